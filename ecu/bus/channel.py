@@ -1,0 +1,205 @@
+"""A bus as the cycle sees it: drain what waits, send without blocking, say how the line is.
+
+python-can opens every interface. On SocketCAN the bus's own socket is then drained directly
+(`ecu/bus/socketcan.py`); every other interface goes through python-can's messages.
+"""
+
+import logging
+import os
+import socket
+import sys
+import time
+from collections import deque
+from collections.abc import Iterable
+from typing import Any, Final, NamedTuple, Protocol
+
+import can
+
+from ecu.bus.database import closest
+from ecu.errors import UserError
+from ecu.records import EXTENDED_ID, FRAME_EXTENDED, FRAME_FD, RecordArray
+
+# Frames of one identifier that may be on their way back to us: 0.3 s of a 10 ms frame.
+_ECHOES: Final = 32
+# A driver's stamp that far from the real-time clock counts from another origin (e.g. the adapter's start).
+_FOREIGN_ORIGIN_NS: Final = 5_000_000_000
+_IP_MULTICAST_ALL: Final = 49  # linux/in.h
+_KNOWN: Final = sorted(can.VALID_INTERFACES)
+
+logging.getLogger("can").addHandler(logging.NullHandler())  # its exceptions say it again, in one line
+
+
+class BusStatus(NamedTuple):
+    """How the line is."""
+
+    bus_off: bool
+    error_passive: bool
+    send_failures: int
+    """Frames that were not taken, or not acknowledged, so far."""
+    dropped: int
+    """Received frames that the kernel dropped so far."""
+
+
+class Channel(Protocol):
+    """One open bus."""
+
+    name: str
+
+    def drain(self, frames: RecordArray, start: int) -> int:
+        """Write every frame that waits, from `frames[start]` on; return how many, at most what fits."""
+
+    def send(self, frames: RecordArray, count: int) -> int:
+        """Hand over the first `count` frames without blocking; return how many were taken."""
+
+    def status(self) -> BusStatus:
+        """Return how the line is now."""
+
+    def close(self) -> None:
+        """Leave the bus."""
+
+
+def open_channel(interface: str, channel: str, *, receive_ids: Iterable[int], fd: bool = False) -> Channel:
+    """Open `channel` of python-can's `interface` for the identifiers `receive_ids`.
+
+    A 29-bit identifier carries `EXTENDED_ID`. Include one's own output identifiers, so that a foreign sender
+    of them is seen: one's own frames do not come back. With `fd`, CAN FD frames are received too.
+
+    Raises:
+        UserError: the bus cannot be opened.
+    """
+    wanted = frozenset(receive_ids)
+    special: dict[str, Any] = {}
+    if interface == "udp_multicast":
+        special["hop_limit"] = 0  # stay on this machine
+    # python-can's udp_multicast, told not to take FD frames, ends a burst at the first one.
+    if fd or interface == "udp_multicast":
+        special["fd"] = True
+    if interface not in can.VALID_INTERFACES:
+        raise UserError(
+            f"{interface} {channel}",
+            "",
+            f"cannot be opened: no such interface{closest(interface, _KNOWN)}; take "
+            f"one of python-can's: {', '.join(_KNOWN)}",
+        )
+    bus = _open(interface, channel, special)
+    if isinstance(bus, str):
+        raise UserError(
+            f"{interface} {channel}",
+            "",
+            f"cannot be opened: {bus}; is the interface there and up (ip link), and its driver installed?",
+        )
+    if interface == "udp_multicast":
+        _hear_own_group_only(bus)
+    if interface == "socketcan" and sys.platform == "linux":
+        from ecu.bus.socketcan import SocketcanChannel
+
+        return SocketcanChannel(bus, channel, wanted)
+    return GenericChannel(bus, channel, wanted, fd=fd, hears_itself=interface == "udp_multicast")
+
+
+def _open(interface: str, channel: str, special: dict[str, Any]) -> can.BusABC | str:
+    """Return the bus, or why it cannot be opened."""
+    log = logging.getLogger("can.bus")
+    log.disabled = True
+    try:
+        return can.Bus(interface=interface, channel=channel, **special)
+    except Exception as error:  # python-can's drivers let errors of many kinds through
+        # The bus that was begun ends here, with those who hold it; it would complain of no shutdown.
+        error.__traceback__ = error.__context__ = None
+        return str(error)
+    finally:
+        log.disabled = False
+
+
+def _hear_own_group_only(bus: can.BusABC) -> None:
+    """Leave the groups alone that other processes joined: Linux hands them to every socket of the port."""
+    if sys.platform == "linux":
+        with socket.socket(fileno=os.dup(bus.fileno())) as own:
+            own.setsockopt(socket.IPPROTO_IP, _IP_MULTICAST_ALL, 0)
+
+
+class GenericChannel:
+    """Any interface of python-can, message by message."""
+
+    def __init__(
+        self, bus: can.BusABC, name: str, receive_ids: frozenset[int], *, fd: bool, hears_itself: bool
+    ) -> None:
+        self.name = name
+        self._bus, self._wanted, self._fd = bus, receive_ids, fd
+        self._echoes: dict[int, deque[bytes]] | None = {} if hears_itself else None
+        self._failures, self._off = 0, False
+
+    def drain(self, frames: RecordArray, start: int) -> int:
+        """See `Channel`."""
+        count = 0
+        while start + count < len(frames):
+            try:
+                message = self._bus.recv(timeout=0)
+            except (can.CanError, OSError):
+                self._off = True
+                break
+            if message is None:
+                break
+            if message.is_error_frame or message.is_remote_frame or (message.is_fd and not self._fd):
+                continue
+            identifier = message.arbitration_id | (EXTENDED_ID if message.is_extended_id else 0)
+            if identifier not in self._wanted or self._is_echo(identifier, bytes(message.data)):
+                continue
+            self._off = False
+            _store(message, frames[start + count])
+            count += 1
+        return count
+
+    def _is_echo(self, identifier: int, data: bytes) -> bool:
+        """Whether this is a frame of ours that comes back: each sent frame explains one."""
+        sent = self._echoes.get(identifier) if self._echoes is not None else None
+        if sent is None or data not in sent:
+            return False
+        sent.remove(data)
+        return True
+
+    def send(self, frames: RecordArray, count: int) -> int:
+        """See `Channel`."""
+        taken = 0
+        for frame in frames[:count]:
+            flags, length = int(frame["flags"]), int(frame["length"])
+            data = frame["data"][:length].tobytes()
+            extended = bool(flags & FRAME_EXTENDED)
+            message = can.Message(
+                arbitration_id=int(frame["can_id"]),
+                is_extended_id=extended,
+                is_fd=bool(flags & FRAME_FD),
+                data=data,
+            )
+            try:
+                self._bus.send(message, timeout=0)
+            except (can.CanError, OSError):
+                self._failures += 1
+                continue
+            taken += 1
+            if self._echoes is not None:
+                identifier = message.arbitration_id | (EXTENDED_ID if extended else 0)
+                self._echoes.setdefault(identifier, deque(maxlen=_ECHOES)).append(data)
+        return taken
+
+    def status(self) -> BusStatus:
+        """See `Channel`."""
+        state = self._bus.state
+        off = self._off or state is can.BusState.ERROR
+        return BusStatus(off, state is can.BusState.PASSIVE, self._failures, 0)
+
+    def close(self) -> None:
+        """See `Channel`."""
+        self._bus.shutdown()
+
+
+def _store(message: can.Message, frame: Any) -> None:
+    now = time.time_ns()
+    stamp = round(message.timestamp * 1e6) * 1000
+    frame["stamp_ns"] = stamp if abs(now - stamp) < _FOREIGN_ORIGIN_NS else now // 1000 * 1000
+    frame["can_id"] = message.arbitration_id
+    frame["flags"] = FRAME_EXTENDED * message.is_extended_id | FRAME_FD * message.is_fd
+    length = len(message.data)
+    frame["length"] = length
+    frame["data"][:length] = message.data
+    frame["data"][length:] = 0

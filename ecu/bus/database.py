@@ -1,0 +1,109 @@
+"""Databases: loaded and checked by cantools, refused in one line that names the place and the remedy."""
+
+import re
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, Final
+
+import cantools
+from cantools.database import Database, Message
+
+from ecu.bus.bits import first_bit
+from ecu.errors import UserError
+
+LONGEST_PAYLOAD: Final = 64  # bytes, CAN FD
+SHOWN: Final = 6  # names, of those that could be meant
+
+_SYNTAX = re.compile(r'Invalid syntax at line (\d+), column (\d+): "(.*?)"{1,2}$', re.DOTALL)
+_OVERLAP = re.compile(r"The signals (\S+) and (\S+) are overlapping in message (\S+?)\.?\"?$")
+_OUTSIDE = re.compile(r"The signal (\S+) does not fit in message (\S+?)\.?\"?$")
+
+
+def _refusal(path: Path, error: Exception) -> UserError:
+    text = str(error)
+    if found := _SYNTAX.search(text):
+        line, column, source = found.groups()
+        around = source.partition(">>!<<")
+        near = f"{around[0][-20:]}»{around[2][:30]}".strip()
+        remedy = f"syntax not understood at » in: {near}; mend that line"
+        return UserError(str(path), f"line {line}, column {column}", remedy)
+    if found := _OVERLAP.search(text):
+        first, second, message = found.groups()
+        remedy = f"overlaps {second}; if that is meant, set strict = false in the map"
+        return UserError(str(path), f"{message}.{first}", remedy)
+    if found := _OUTSIDE.search(text):
+        signal, message = found.groups()
+        remedy = "does not fit its message; if it is not used, set strict = false in the map"
+        return UserError(str(path), f"{message}.{signal}", remedy)
+    reason = " ".join(text.split()) or type(error).__name__
+    return UserError(str(path), "", f"not a database that can be read ({reason})")
+
+
+def load_database(path: Path, strict: bool = True) -> Database:
+    """Return the database at `path`; `strict` refuses overlapping and misplaced signals.
+
+    Raises UserError naming line and column, or message and signal.
+    """
+    if not path.is_file():
+        raise UserError(str(path), "", "no such file; give the path of a database (.dbc, .arxml, .kcd, .sym)")
+    try:
+        database = cantools.database.load_file(path, strict=strict)
+    except Exception as error:  # cantools' parsers let errors of many kinds through
+        raise _refusal(path, error) from None
+    if not isinstance(database, Database):
+        raise UserError(str(path), "", "a diagnostics database; give one that describes CAN messages")
+    return database
+
+
+def attribute(message: Message, name: str, default: int = 0) -> int:
+    """Return an integer message attribute of a DBC, or what it says for all, or `default`."""
+    specifics = message.dbc
+    if specifics is not None and name in specifics.attributes:
+        return int(specifics.attributes[name].value)
+    return default
+
+
+def find_message(database: Database, name: str, where: Path, key: str) -> Message:
+    """Return the message `name`, which `key` of the file `where` asks for; raises UserError if it is none."""
+    try:
+        return database.get_message_by_name(name)
+    except KeyError:
+        names = [message.name for message in database.messages]
+        remedy = f"the database has no message {name}{_choice(name, names)}"
+        raise UserError(str(where), key, remedy) from None
+
+
+def find_signal(message: Message, name: str, path: Path, where: Path, key: str) -> Any:
+    """Return the signal `name` of the message, which `key` of the file `where` asks for.
+
+    Raises UserError when there is none, or none that can be read (`path` is the database's).
+    """
+    for signal in message.signals:
+        if signal.name == name:
+            if not fits(signal, message.length) or not signal.scale:
+                remedy = f"start bit, length or scale is wrong for {message.length} bytes; mend it"
+                raise UserError(str(path), f"{message.name}.{name}", remedy)
+            if signal.multiplexer_signal is not None:
+                find_signal(message, signal.multiplexer_signal, path, where, key)
+            return signal
+    names = [signal.name for signal in message.signals]
+    remedy = f"message {message.name} has no signal {name}{_choice(name, names)}"
+    raise UserError(str(where), key, remedy)
+
+
+def fits(signal: Any, length: int) -> bool:
+    """Return whether the signal lies within a payload of `length` bytes that a frame can have."""
+    start = first_bit(signal.start, signal.byte_order == "big_endian")
+    return length <= LONGEST_PAYLOAD and bool(start + signal.length <= 8 * length)
+
+
+def _choice(name: str, names: list[str]) -> str:
+    """Return the name that was probably meant, or what there is."""
+    more = f", … ({len(names)} in all)" if len(names) > SHOWN else ""
+    return closest(name, names) or f"; it has {', '.join(sorted(names)[:SHOWN])}{more}"
+
+
+def closest(name: str, names: list[str]) -> str:
+    """Return a hint at the name that was probably meant, or nothing."""
+    near = get_close_matches(name, names, 1, 0.5)
+    return f"; did you mean {near[0]}?" if near else ""

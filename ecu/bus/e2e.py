@@ -1,0 +1,159 @@
+"""End-to-end protection: is a frame intact, and is it the next one of its sender?
+
+Checksum rules, by the names that signal maps use:
+
+autosar_p01      AUTOSAR E2E Profile 1 (PRS E2E Protocol, R4.x), Data ID mode BOTH: CRC-8 SAE J1850 in
+                 byte 0 over the Data ID's low byte, its high byte and every byte behind the CRC;
+                 counter 0–14 in the low nibble of byte 1. Start and XOR value are 0: the profile's 0xFF
+                 cancel those of the CRC routine.
+ford_brake_sn_4  0x07D: byte 2 = 0xFF − (b0 + b1 + counter), counter in the high nibble of byte 3
+ford_accel_data  0x092: byte 6 = 0x16 − (b0 + … + b5 + b7)
+toyota           last byte = identifier's bytes + length + all other bytes
+hyundai_sum      last byte = sum of all other bytes (0x153)
+hyundai_xor      high nibble of the last byte = XOR of all other nibbles (0x2B0)
+
+Each maker's rule holds for every frame of the recorded drives that the tests read.
+
+Counter, as AUTOSAR's P01 check: the largest step allowed is 1 and grows by one with every message cycle
+without an accepted frame. A frame out of sequence is a candidate: if two more follow it consistently, each a
+cycle later, and none in between fits the sequence known, its sender was restarted and is accepted again.
+Frames that fit win over the candidate, and no third frame is accepted within half a cycle: so a block that
+is replayed beside its living sender, or in a burst, is not taken (but for two frames that fit by chance).
+"""
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ecu.jit import Record, kernel
+
+NO_CHECKSUM, AUTOSAR_P01, FORD_BRAKE_SN_4, FORD_ACCEL_DATA, TOYOTA, HYUNDAI_SUM, HYUNDAI_XOR = range(7)
+RULES: Final = {
+    "autosar_p01": AUTOSAR_P01,
+    "ford_brake_sn_4": FORD_BRAKE_SN_4,
+    "ford_accel_data": FORD_ACCEL_DATA,
+    "toyota": TOYOTA,
+    "hyundai_sum": HYUNDAI_SUM,
+    "hyundai_xor": HYUNDAI_XOR,
+}
+SHORTEST: Final = {"autosar_p01": 2, "ford_brake_sn_4": 4, "ford_accel_data": 8}
+"""The payload that a rule needs at least [bytes], 2 where not listed."""
+
+P01_MODULO: Final = 15  # counter 0–14
+P01_COUNTER_START, P01_COUNTER_LENGTH = 8, 4
+
+# What the counter says of a frame
+IN_SEQUENCE, SOME_LOST, RESYNCHRONISED, REPEATED, WRONG_SEQUENCE = range(5)
+_FRAMES_TO_RESYNCHRONISE: Final = 3  # the first out of sequence and two consistent with it
+
+
+def _crc8_table() -> NDArray[np.uint8]:
+    polynomial = 0x1D  # SAE J1850
+    table = np.arange(256)
+    for _ in range(8):
+        table = np.where(table & 0x80, (table << 1) ^ polynomial, table << 1) & 0xFF
+    return table.astype(np.uint8)
+
+
+_CRC8: Final = _crc8_table()
+
+
+@kernel
+def p01_crc(data: NDArray[np.uint8], length: int, data_id: int) -> int:
+    """Return the Profile 1 CRC of bytes 1 to `length` − 1 of `data`."""
+    crc = _CRC8[data_id & 0xFF]
+    crc = _CRC8[crc ^ np.uint8((data_id >> 8) & 0xFF)]
+    for i in range(1, length):
+        crc = _CRC8[crc ^ data[i]]
+    return int(crc)
+
+
+@kernel
+def p01_protect(data: NDArray[np.uint8], length: int, data_id: int, counter: int) -> None:
+    """Write counter and CRC into the payload."""
+    data[1] = np.uint8((data[1] & 0xF0) | counter)
+    data[0] = np.uint8(p01_crc(data, length, data_id))
+
+
+@kernel
+def checksum_holds(rule: int, data: NDArray[np.uint8], length: int, can_id: int, data_id: int) -> bool:
+    """Return whether the payload of `length` bytes obeys the rule."""
+    last = length - 1
+    total = 0
+    if rule == AUTOSAR_P01:
+        return int(data[0]) == p01_crc(data, length, data_id)
+    if rule == FORD_BRAKE_SN_4:
+        total = 0xFF - (int(data[0]) + int(data[1]) + (int(data[3]) >> 4))
+        return int(data[2]) == total & 0xFF
+    if rule == FORD_ACCEL_DATA:
+        total = 0x16 - int(data[7])
+        for i in range(6):
+            total -= int(data[i])
+        return int(data[6]) == total & 0xFF
+    if rule == TOYOTA:
+        total = (can_id >> 8) + (can_id & 0xFF) + length
+    if rule in (TOYOTA, HYUNDAI_SUM):
+        for i in range(last):
+            total += int(data[i])
+        return int(data[last]) == total & 0xFF
+    if rule == HYUNDAI_XOR:
+        for i in range(last):
+            total ^= int(data[i]) ^ (int(data[i]) >> 4)
+        return int(data[last]) >> 4 == (total ^ int(data[last])) & 0xF
+    return True
+
+
+# What is remembered of a sender's counter between frames
+SEQUENCE: Final = [
+    ("accepted_ns", "i8"),  # stamp of the last frame accepted
+    ("previous_ns", "i8"),  # and of the one before
+    ("candidate_ns", "i8"),
+    ("counter", "i2"),
+    ("candidate", "i2"),
+    ("consistent", "u1"),
+    ("started", "u1"),
+]
+
+
+@kernel
+def _accept(state: Record, counter: int, stamp_ns: int) -> None:
+    state.counter = counter
+    state.previous_ns = state.accepted_ns
+    state.accepted_ns = stamp_ns
+    state.consistent = 0
+    state.started = 1
+
+
+@kernel
+def check_counter(state: Record, counter: int, modulo: int, stamp_ns: int, period_ns: int) -> Any:
+    """Judge a frame's counter and remember it in `state` (fields of `SEQUENCE`); the first frame is accepted.
+
+    Returns IN_SEQUENCE, SOME_LOST or RESYNCHRONISED (accepted), REPEATED or WRONG_SEQUENCE (rejected).
+    """
+    if counter >= modulo:
+        return WRONG_SEQUENCE
+    if not state.started:
+        _accept(state, counter, stamp_ns)
+        return IN_SEQUENCE
+    if 0 <= stamp_ns - state.previous_ns < period_ns // 2:
+        return WRONG_SEQUENCE
+    cycles = max(0, (stamp_ns - state.accepted_ns + period_ns // 2) // period_ns)
+    step = (counter - state.counter) % modulo
+    if step == 0:
+        return REPEATED
+    if step <= 1 + cycles:
+        _accept(state, counter, stamp_ns)
+        return IN_SEQUENCE if step == 1 else SOME_LOST
+    cycles = (stamp_ns - state.candidate_ns + period_ns // 2) // period_ns
+    step = (counter - state.candidate) % modulo
+    if state.consistent > 0 and 1 <= step <= cycles:
+        state.consistent += 1
+    else:
+        state.consistent = 1
+    state.candidate = counter
+    state.candidate_ns = stamp_ns
+    if state.consistent < _FRAMES_TO_RESYNCHRONISE:
+        return WRONG_SEQUENCE
+    _accept(state, counter, stamp_ns)
+    return RESYNCHRONISED

@@ -1,0 +1,31 @@
+"""Before the first frame is sent: is somebody else already sending as we would?"""
+
+import time
+
+from ecu.bus.channel import Channel
+from ecu.bus.transmit import TransmitPlan
+from ecu.errors import UserError
+from ecu.records import EXTENDED_ID, FRAME, FRAME_EXTENDED, new_record
+
+
+def listen_before_send(channel: Channel, where: str, plan: TransmitPlan, seconds: float) -> None:
+    """Listen for a while and refuse if someone else already sends one of our frames.
+
+    Raises:
+        UserError: someone does.
+    """
+    names = dict(zip(plan.ids.tolist(), plan.messages["name"].tolist(), strict=True))
+    frames = new_record(FRAME, 1024)
+    end = time.monotonic() + seconds
+    while True:
+        for frame in frames[: channel.drain(frames, 0)]:
+            number = int(frame["can_id"]) | (EXTENDED_ID if frame["flags"] & FRAME_EXTENDED else 0)
+            if number in names:
+                raise UserError(
+                    where,
+                    f"frame {int(frame['can_id']):03X} ({names[number]})",
+                    "someone else already sends it; stop the other sender first",
+                )
+        if time.monotonic() >= end:
+            return
+        time.sleep(0.01)

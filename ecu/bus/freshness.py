@@ -1,0 +1,142 @@
+"""From samples to inputs: value, `new`, age and three verdicts.
+
+Every target place has a time-out, a range of intervals that passes for its rate, and a physical range.
+ALIVE: the last sample, valid or not, is younger than the time-out. RATE_OK: alive, and the mean interval of
+its samples lies within the range. VALID: the last sample was available, within the physical range and
+declared valid.
+"""
+
+import math
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ecu.jit import Record, kernel
+from ecu.records import RecordArray
+from ecu.signals import ALIVE, INPUT_SIGNALS, RATE_OK, VALID
+
+FRESHNESS: Final = np.dtype(
+    [
+        ("stamp_ns", "i8"),  # of the last sample
+        ("timeout_ns", "i8"),
+        ("shortest_ns", "f8"),  # mean intervals from here …
+        ("longest_ns", "f8"),  # … to here are about the rate expected
+        ("interval_ns", "f8"),  # mean interval measured
+        ("low", "f8"),
+        ("high", "f8"),
+        ("samples", "u4"),  # counted since the signal was last lost, at most `_AVERAGED`
+        ("valid", "u1"),
+        ("taken", "u4"),  # valid samples so far
+        ("outside", "u4"),  # … refused for the physical range
+        ("invalid", "u4"),  # … not available, or declared invalid
+    ],
+    align=True,
+)
+
+NEVER: Final = -(2**62)
+"""Stamp of a signal that has not come yet: its age is beyond any time-out."""
+RATE_TOLERANCE: Final = 2.0
+"""The mean interval may be off by this factor: a lost frame now and then is not a wrong rate."""
+_AVERAGED: Final = 16  # intervals
+
+
+def new_freshness(
+    timeout_s: ArrayLike, period_s: ArrayLike, slowest_s: ArrayLike, low: ArrayLike, high: ArrayLike
+) -> RecordArray:
+    """Return what to expect of each target place, nothing received yet, shape (places,).
+
+    `period_s` to `slowest_s` is the range of intervals that the sender may choose from.
+    """
+    freshness = np.zeros(len(np.atleast_1d(timeout_s)), FRESHNESS)
+    freshness["stamp_ns"] = NEVER
+    freshness["timeout_ns"] = np.rint(np.asarray(timeout_s) * 1e9)
+    freshness["shortest_ns"] = np.asarray(period_s) * 1e9 / RATE_TOLERANCE
+    freshness["longest_ns"] = np.asarray(slowest_s) * 1e9 * RATE_TOLERANCE
+    freshness["low"] = low
+    freshness["high"] = high
+    return freshness
+
+
+def input_freshness(periods_s: dict[int, tuple[float, float]], timeouts_s: dict[int, float]) -> RecordArray:
+    """Return what to expect of the contract's inputs: period ranges and special time-outs [s]."""
+    places = range(len(INPUT_SIGNALS))
+    return new_freshness(
+        [timeouts_s.get(place, INPUT_SIGNALS[place].timeout_s) for place in places],
+        [periods_s.get(place, (0.0, 0.0))[0] for place in places],
+        [periods_s.get(place, (0.0, 0.0))[1] for place in places],
+        [signal.low for signal in INPUT_SIGNALS],
+        [signal.high for signal in INPUT_SIGNALS],
+    )
+
+
+def target_dtype(places: int) -> np.dtype[Any]:
+    """Return a record that kernels fill as they fill `ecu.records.INPUTS`, with another number of places."""
+    return np.dtype(
+        [
+            ("t_ns", "i8"),
+            ("dt_ns", "i8"),
+            ("value", "f8", (places,)),
+            ("age_ns", "i8", (places,)),
+            ("new", "u1", (places,)),
+            ("verdict", "u1", (places,)),
+        ],
+        align=True,
+    )
+
+
+@kernel
+def begin_cycle(inputs: Record, t_ns: int, dt_ns: int) -> None:
+    """Open the cycle that ends at `t_ns`: no sample is new yet."""
+    inputs.t_ns = t_ns
+    inputs.dt_ns = dt_ns
+    for place in range(len(inputs.new)):
+        inputs.new[place] = 0
+
+
+@kernel
+def accept(inputs: Record, freshness: Any, place: int, value: float, stamp_ns: int, valid: bool) -> None:
+    """Take one sample.
+
+    An invalid one (not `valid`, not finite or out of range) proves that its sender lives, but leaves the
+    value and `new` alone. One older than the last is ignored, unless the clock was set back meanwhile.
+    """
+    known = freshness[place]
+    last = known.stamp_ns
+    if stamp_ns < last <= inputs.t_ns:
+        return
+    interval = stamp_ns - last
+    if known.samples == 0 or interval < 0 or interval > known.timeout_ns:
+        known.samples = 1
+    else:
+        known.interval_ns += (interval - known.interval_ns) / known.samples
+        known.samples = min(known.samples + 1, _AVERAGED)
+    known.stamp_ns = stamp_ns
+    if valid and known.low <= value <= known.high:
+        known.valid = 1
+        inputs.value[place] = value
+        inputs.new[place] = 1
+        known.taken += 1
+        return
+    known.valid = 0
+    if valid and not math.isnan(value):
+        known.outside += 1
+    else:
+        known.invalid += 1
+
+
+@kernel
+def end_cycle(inputs: Record, freshness: Any) -> None:
+    """Write the ages and the three verdicts."""
+    for place in range(len(inputs.new)):
+        known = freshness[place]
+        age = max(0, inputs.t_ns - known.stamp_ns)
+        verdict = 0
+        if age <= known.timeout_ns:
+            verdict |= ALIVE
+            if known.samples > 1 and known.shortest_ns <= known.interval_ns <= known.longest_ns:
+                verdict |= RATE_OK
+        if known.valid:
+            verdict |= VALID
+        inputs.age_ns[place] = age
+        inputs.verdict[place] = verdict

@@ -1,0 +1,277 @@
+"""From frames to inputs: identifier, length, checksum, counter, multiplexer, bits, validity, freshness.
+
+A `ReceivePlan` is what a database (and a signal map) says, a `Reception` what has come so far. A frame
+that is rejected changes nothing that it carries, only the counters.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from cantools.database import Message
+from numpy.typing import NDArray
+
+from ecu.bus import bits, e2e
+from ecu.bus.database import attribute, load_database
+from ecu.bus.freshness import NEVER, accept, input_freshness, new_freshness
+from ecu.bus.plan import SIGNAL, SignalUse, compile_signals, is_present, is_valid, physical
+from ecu.jit import Record, kernel
+from ecu.records import EXTENDED_ID, FRAME_ERROR, FRAME_EXTENDED, FRAME_REMOTE, RecordArray
+from ecu.signals import INPUT, INPUT_SIGNALS, N_OUTPUTS, OUTPUT
+
+MESSAGE: Final = np.dtype(
+    [
+        ("name", "U48"),
+        ("id", "u4"),  # with EXTENDED_ID
+        ("data_id", "u4"),
+        ("period_ns", "i8"),
+        ("first", "i4"),  # rows of `signals`
+        ("count", "i4"),
+        ("rule", "u1"),
+        ("length", "u1"),
+        ("foreign", "u1"),  # nobody else may send it
+        ("modulo", "i2"),  # of the counter, 0: none
+        ("counter_start", "i2"),
+        ("counter_length", "u1"),
+        ("counter_big_endian", "u1"),
+    ],
+    align=True,
+)
+
+# Per message of the plan
+MESSAGE_COUNTERS: Final = np.dtype(
+    [
+        ("received", "u4"),
+        ("accepted", "u4"),
+        ("checksum_errors", "u4"),
+        ("sequence_errors", "u4"),
+        ("repeated", "u4"),
+        ("length_errors", "u4"),
+        ("lost", "u4"),  # accepted frames that a counter step above one preceded
+        ("resynchronised", "u4"),
+        ("stamp_ns", "i8"),  # of the last frame received
+        *e2e.SEQUENCE,
+    ],
+    align=True,
+)
+TOTALS: Final = np.dtype(
+    [("frames", "u8"), ("unknown", "u8"), ("foreign", "u8"), ("bus_errors", "u8"), ("rejected", "u8")]
+)
+
+
+class ReceivePlan(NamedTuple):
+    """What is taken from which frames; `messages` in ascending order of identifiers. Never written to."""
+
+    ids: NDArray[np.uint32]
+    """Identifiers, those of 29 bits with EXTENDED_ID: what kernel filters must let through."""
+    messages: RecordArray
+    signals: RecordArray
+    codes: NDArray[np.int64]
+    expected: RecordArray
+    """`FRESHNESS` before the first sample, one per target place."""
+    mapped: NDArray[np.bool_]
+    """Per target place: whether any message feeds it."""
+
+
+class Reception(NamedTuple):
+    """What has been received. Kernels write to it."""
+
+    messages: RecordArray
+    """`MESSAGE_COUNTERS` in the order of the plan's messages."""
+    totals: RecordArray
+    """`TOTALS`, length 1."""
+    freshness: RecordArray
+    """`FRESHNESS` per target place."""
+
+
+class MessageUse(NamedTuple):
+    """What is wanted of one message; `period_s` to `slowest_s` is the range of intervals it may come at."""
+
+    message: Message
+    signals: Sequence[SignalUse]
+    period_s: float
+    slowest_s: float
+    rule: int = e2e.NO_CHECKSUM
+    data_id: int = 0
+    counter: Any = None
+    """The cantools signal that counts frames, None: there is none."""
+    modulo: int = 0
+    foreign: bool = False
+
+
+def compile_receive(uses: Sequence[MessageUse], expected: RecordArray) -> ReceivePlan:
+    """Return the plan that takes `uses` into as many target places as `expected` has."""
+    uses = sorted(uses, key=_identifier)
+    messages = np.zeros(len(uses), MESSAGE)
+    rows: list[RecordArray] = [np.zeros(0, SIGNAL)]
+    codes: list[int] = []
+    mapped = np.zeros(len(expected), np.bool_)
+    for message, use in zip(messages, uses, strict=True):
+        first = sum(map(len, rows))
+        compiled = compile_signals(use.message, use.signals, first, len(codes))
+        rows.append(compiled.rows)
+        codes += compiled.codes
+        mapped[[signal.place for signal in use.signals]] = True
+        message["name"], message["id"] = use.message.name, _identifier(use)
+        message["length"] = use.message.length
+        message["period_ns"] = round(use.period_s * 1e9)
+        message["first"], message["count"] = first, compiled.wanted
+        message["rule"], message["data_id"], message["foreign"] = use.rule, use.data_id, use.foreign
+        if use.counter is not None:
+            big_endian = use.counter.byte_order == "big_endian"
+            message["modulo"] = use.modulo
+            message["counter_start"] = bits.first_bit(use.counter.start, big_endian)
+            message["counter_length"], message["counter_big_endian"] = use.counter.length, big_endian
+    return ReceivePlan(
+        np.ascontiguousarray(messages["id"]),
+        messages,
+        np.concatenate(rows),
+        np.array([*codes, 0], np.int64),
+        expected,
+        mapped,
+    )
+
+
+def _identifier(use: MessageUse) -> int:
+    return int(use.message.frame_id) | (EXTENDED_ID if use.message.is_extended_frame else 0)
+
+
+def new_reception(plan: ReceivePlan) -> Reception:
+    """Return the state before the first frame."""
+    messages = np.zeros(len(plan.messages), MESSAGE_COUNTERS)
+    messages["stamp_ns"] = NEVER
+    return Reception(messages, np.zeros(1, TOTALS), plan.expected.copy())
+
+
+@kernel
+def _find(ids: NDArray[np.uint32], identifier: int) -> int:
+    low, high = 0, len(ids)
+    while low < high:
+        middle = (low + high) // 2
+        if ids[middle] < identifier:
+            low = middle + 1
+        else:
+            high = middle
+    return low if low < len(ids) and ids[low] == identifier else -1
+
+
+@kernel
+def check_frame(message: Record, counters: Record, frame: Record) -> bool:
+    """Return whether the frame is complete, intact and the next of its sender; counts what it is not."""
+    if frame.length < message.length or (message.rule != e2e.NO_CHECKSUM and frame.length != message.length):
+        counters.length_errors += 1
+        return False
+    can_id: Any = np.int64(frame.can_id)
+    if not e2e.checksum_holds(message.rule, frame.data, message.length, can_id, message.data_id):
+        counters.checksum_errors += 1
+        return False
+    if message.modulo > 0:
+        start, length, big_endian = message.counter_start, message.counter_length, message.counter_big_endian
+        counter: Any = np.int64(bits.extract(frame.data, start, length, big_endian))
+        found = e2e.check_counter(counters, counter, message.modulo, frame.stamp_ns, message.period_ns)
+        if found == e2e.REPEATED:
+            counters.repeated += 1
+            return False
+        if found == e2e.WRONG_SEQUENCE:
+            counters.sequence_errors += 1
+            return False
+        if found == e2e.SOME_LOST:
+            counters.lost += 1
+        elif found == e2e.RESYNCHRONISED:
+            counters.resynchronised += 1
+    counters.accepted += 1
+    return True
+
+
+@kernel
+def receive(
+    plan: ReceivePlan, reception: Reception, frames: Any, first: int, count: int, inputs: Record
+) -> int:
+    """Consume `frames[first:count]` in order up to the first that is stamped after `inputs.t_ns`.
+
+    Returns the index of the first frame left. `inputs` is `ecu.records.INPUTS` or a `target_dtype` record.
+    """
+    totals = reception.totals[0]
+    for index in range(first, count):
+        frame = frames[index]
+        if frame.stamp_ns > inputs.t_ns:
+            return index
+        totals.frames += 1
+        if frame.flags & (FRAME_ERROR | FRAME_REMOTE):
+            totals.bus_errors += 1
+            continue
+        identifier: Any = np.int64(frame.can_id)
+        if frame.flags & FRAME_EXTENDED:
+            identifier |= EXTENDED_ID
+        place = _find(plan.ids, identifier)
+        if place < 0:
+            totals.unknown += 1
+            continue
+        message = plan.messages[place]
+        counters = reception.messages[place]
+        counters.received += 1
+        counters.stamp_ns = frame.stamp_ns
+        if message.foreign:
+            totals.foreign += 1
+            continue
+        if not check_frame(message, counters, frame):
+            totals.rejected += 1
+            continue
+        for row in range(message.first, message.first + message.count):
+            if is_present(plan.signals, plan.codes, row, frame.data):
+                signal = plan.signals[row]
+                valid = is_valid(plan.signals, plan.codes, row, frame.data)
+                value = physical(signal, frame.data)
+                accept(inputs, reception.freshness, signal.place, value, frame.stamp_ns, valid)
+    return count
+
+
+def _protected(message: Message, places: dict[str, int]) -> MessageUse:
+    """Return what is wanted of a contract message: every signal that has a place."""
+    names = [signal.name for signal in message.signals]
+    period_s = attribute(message, "GenMsgCycleTime") * 1e-3
+    slowest_s = attribute(message, "CycleTimeSlowest") * 1e-3 or period_s
+    protected = attribute(message, "E2EDataId") != 0
+    return MessageUse(
+        message,
+        [SignalUse(name, places[name]) for name in names if name in places],
+        period_s,
+        slowest_s,
+        e2e.AUTOSAR_P01 if protected else e2e.NO_CHECKSUM,
+        attribute(message, "E2EDataId"),
+        message.get_signal_by_name("alive_counter") if protected else None,
+        e2e.P01_MODULO,
+    )
+
+
+def contract_receive_plan(dbc_path: Path) -> ReceivePlan:
+    """Return the ECU's own plan: input frames into `INPUTS`; a frame like the ECU's own counts as foreign."""
+    messages = load_database(dbc_path).messages
+    uses = [_protected(message, INPUT) for message in messages if "BrakeEcu" not in message.senders]
+    watched = [MessageUse(m, [], 0.0, 0.0, foreign=True) for m in messages if "BrakeEcu" in m.senders]
+    periods = {signal.place: (use.period_s, use.slowest_s) for use in uses for signal in use.signals}
+    return compile_receive(uses + watched, input_freshness(periods, {}))
+
+
+def contract_listen_plan(dbc_path: Path) -> ReceivePlan:
+    """Return the plan of who listens to the ECU: its output frames into a vector of `OUTPUT_COLUMNS`.
+
+    The target is a `target_dtype(N_OUTPUTS)` record. A value sent in two messages (`pressure_demand_valid`)
+    comes at twice the rate.
+    """
+    messages = load_database(dbc_path).messages
+    uses = [_protected(message, OUTPUT) for message in messages if "BrakeEcu" in message.senders]
+    rate = np.zeros(N_OUTPUTS)
+    for use in uses:
+        for signal in use.signals:
+            rate[signal.place] += 1.0 / use.period_s
+    period_s = np.divide(1.0, rate, out=np.zeros(N_OUTPUTS), where=rate > 0.0)
+    everything = np.full(N_OUTPUTS, np.inf)
+    timeout_s = np.maximum(0.1, 3.0 * period_s)
+    return compile_receive(uses, new_freshness(timeout_s, period_s, period_s, -everything, everything))
+
+
+def input_names(plan: ReceivePlan) -> tuple[str, ...]:
+    """Return the names of the inputs that the plan feeds."""
+    return tuple(signal.name for signal, mapped in zip(INPUT_SIGNALS, plan.mapped, strict=True) if mapped)

@@ -1,0 +1,220 @@
+"""Signal maps: which message and signal of another maker's database is which input of ours.
+
+A map is a TOML file; `docs/signal-maps.md` explains it with an example. A value becomes
+((raw as the database scales it) · factor + offset) in `unit`, and that is converted to the contract's unit.
+"""
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from cantools.database import Database, Message
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from ecu.bus import e2e
+from ecu.bus.database import attribute, closest, find_message, find_signal, load_database
+from ecu.bus.freshness import input_freshness
+from ecu.bus.plan import SignalUse
+from ecu.bus.receive import MessageUse, ReceivePlan, compile_receive, contract_receive_plan
+from ecu.bus.units import conversion
+from ecu.config import describe, read_toml
+from ecu.errors import UserError
+from ecu.resources import resource
+from ecu.signals import INPUT, INPUT_SIGNALS
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Validity(_Table):
+    """A signal of the same message that must have one of `values` (raw codes)."""
+
+    signal: str
+    values: tuple[int, ...] = Field(min_length=1)
+
+
+class MappedInput(_Table):
+    """Where one input comes from."""
+
+    message: str
+    signal: str
+    unit: str | None = None
+    """Of the value after factor and offset; the database's own if it is not given."""
+    factor: float = 1.0
+    offset: float = 0.0
+    sentinels: tuple[float, ...] = ()
+    """Values as the database scales them that are no measurement."""
+    validity: Validity | None = None
+    timeout: float | None = Field(default=None, gt=0.0)
+    """Seconds, if not the contract's."""
+
+
+class Counter(_Table):
+    """The signal that counts a message's frames: 0 … `modulo` − 1."""
+
+    signal: str
+    modulo: int | None = Field(default=None, ge=2)
+    """All values of its bits if it is not given."""
+
+
+class MappedMessage(_Table):
+    """How a message comes and how it is protected."""
+
+    period: float | None = Field(default=None, gt=0.0)
+    """Seconds; the database's GenMsgCycleTime if it is not given."""
+    slowest_period: float | None = Field(default=None, gt=0.0)
+    checksum: str | None = None
+    data_id: int = Field(default=0, ge=0, le=0xFFFF)
+    counter: Counter | None = None
+
+
+class SignalMap(_Table):
+    """A whole map file."""
+
+    database: str
+    """Path, relative to the map file."""
+    strict: bool = True
+    """Refuse a database whose signals overlap."""
+    bus: str | None = None
+    """Interface name in logs that hold several buses; None: every bus."""
+    rolling_radius: float | None = Field(default=None, gt=0.1, lt=2.0)
+    ignore_checksum: tuple[str, ...] = ()
+    """Messages that are taken although checksum or counter are wrong."""
+    messages: dict[str, MappedMessage] = {}
+    inputs: dict[str, MappedInput] = Field(min_length=1)
+
+
+class MappedBus(NamedTuple):
+    """A map, ready for `receive`."""
+
+    plan: ReceivePlan
+    bus: str | None
+    """Interface that the frames are taken from; None: every one."""
+
+
+def read_signal_map(path: Path) -> SignalMap:
+    """Return the checked content of a map file; raises UserError that names the key."""
+    content = read_toml(path)
+    try:
+        return SignalMap.model_validate(content)
+    except ValidationError as error:
+        raise describe(error, str(path)) from None
+
+
+def load_signal_map(path: Path) -> MappedBus:
+    """Return the plan that a map file describes; raises UserError that names file, key and remedy."""
+    signal_map = read_signal_map(path)
+    database_path = path.parent / signal_map.database
+    database = load_database(database_path, signal_map.strict)
+    _check_names(path, signal_map)
+    names = list(dict.fromkeys(mapped.message for mapped in signal_map.inputs.values()))
+    uses = [_message_use(path, database_path, signal_map, database, name) for name in names]
+    periods = {signal.place: (use.period_s, use.slowest_s) for use in uses for signal in use.signals}
+    timeouts = {
+        INPUT[name]: mapped.timeout
+        for name, mapped in signal_map.inputs.items()
+        if mapped.timeout is not None
+    }
+    return MappedBus(compile_receive(uses, input_freshness(periods, timeouts)), signal_map.bus)
+
+
+def receive_plan(map_file: Path | None) -> ReceivePlan:
+    """Return what is taken from the bus: the contract's frames, or what a signal map names.
+
+    Raises UserError for a map or a database that is not usable.
+    """
+    if map_file is None:
+        return contract_receive_plan(resource("dbc/brake_ecu.dbc"))
+    return load_signal_map(map_file).plan
+
+
+def _check_names(path: Path, signal_map: SignalMap) -> None:
+    for name in signal_map.inputs:
+        if name not in INPUT:
+            hint = (
+                closest(name, [*INPUT]) or f"; there are {', '.join([*INPUT][:5])}, … (docs/signal-maps.md)"
+            )
+            raise UserError(str(path), f"inputs.{name}", f"no such input{hint}")
+    used = {mapped.message for mapped in signal_map.inputs.values()}
+    for name in signal_map.messages:
+        if name not in used:
+            raise UserError(str(path), f"messages.{name}", "no input uses it; remove it or mend its name")
+    for name in signal_map.ignore_checksum:
+        message = signal_map.messages.get(name)
+        if message is None or (message.checksum is None and message.counter is None):
+            raise UserError(
+                str(path), "ignore_checksum", f"{name} has neither checksum nor counter in [messages.{name}]"
+            )
+
+
+def _message_use(
+    path: Path, database_path: Path, signal_map: SignalMap, database: Database, name: str
+) -> MessageUse:
+    first = next(target for target, mapped in signal_map.inputs.items() if mapped.message == name)
+    message = find_message(database, name, path, f"inputs.{first}.message")
+    settings = signal_map.messages.get(name, MappedMessage())
+    key = f"messages.{name}"
+    period_s = settings.period or attribute(message, "GenMsgCycleTime") * 1e-3
+    if not period_s:
+        raise UserError(str(path), f"{key}.period", "missing, and the database has none; give it in seconds")
+    signals = [
+        _signal_use(path, database_path, signal_map, message, f"inputs.{target}", target, mapped)
+        for target, mapped in signal_map.inputs.items()
+        if mapped.message == name
+    ]
+    use = MessageUse(message, signals, period_s, settings.slowest_period or period_s)
+    if name in signal_map.ignore_checksum:
+        return use
+    return use._replace(**_protection(path, database_path, message, settings, key))
+
+
+def _protection(
+    path: Path, database_path: Path, message: Message, settings: MappedMessage, key: str
+) -> dict[str, Any]:
+    protection: dict[str, Any] = {"data_id": settings.data_id}
+    if settings.checksum is not None:
+        if settings.checksum not in e2e.RULES:
+            known = ", ".join(e2e.RULES)
+            raise UserError(
+                str(path), f"{key}.checksum", f'unknown rule "{settings.checksum}"; known: {known}'
+            )
+        if message.length < e2e.SHORTEST.get(settings.checksum, 2):
+            raise UserError(str(path), f"{key}.checksum", f"{message.name} is too short for this rule")
+        protection["rule"] = e2e.RULES[settings.checksum]
+    if settings.counter is not None:
+        counter = find_signal(message, settings.counter.signal, database_path, path, f"{key}.counter.signal")
+        modulo = settings.counter.modulo or 1 << min(counter.length, 15)
+        if counter.length > 15 or modulo > 1 << counter.length:
+            raise UserError(
+                str(path), f"{key}.counter", f"{counter.name} has {counter.length} bits; at most 15 count"
+            )
+        protection["counter"], protection["modulo"] = counter, modulo
+    return protection
+
+
+def _signal_use(
+    path: Path,
+    database_path: Path,
+    signal_map: SignalMap,
+    message: Message,
+    key: str,
+    target: str,
+    mapped: MappedInput,
+) -> SignalUse:
+    signal = find_signal(message, mapped.signal, database_path, path, f"{key}.signal")
+    unit = mapped.unit if mapped.unit is not None else signal.unit or ""
+    place = INPUT[target]
+    factor, offset = conversion(
+        unit, INPUT_SIGNALS[place].unit, signal_map.rolling_radius, str(path), f"{key}.unit"
+    )
+    if mapped.validity is not None:
+        find_signal(message, mapped.validity.signal, database_path, path, f"{key}.validity.signal")
+    return SignalUse(
+        mapped.signal,
+        place,
+        mapped.factor * factor,
+        mapped.offset * factor + offset,
+        mapped.sentinels,
+        mapped.validity.signal if mapped.validity else "",
+        mapped.validity.values if mapped.validity else (),
+    )

@@ -1,0 +1,266 @@
+"""CONFIG files: one vehicle, its brakes, sensors and tuning, in TOML; checked here, turned into `PARAMS`.
+
+Pressures stand in bar, everything else in SI units. A key that is missing, unknown or out of range is one
+line: the file, the key and what would be right.
+"""
+
+import hashlib
+import json
+import math
+import tomllib
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from ecu.errors import UserError
+from ecu.estimation.tyre import rolling_radius
+from ecu.params import GRAVITY, PARAMS, PEDAL_POINTS
+from ecu.records import RecordArray
+
+AIR_DENSITY = 1.2  # kg/m^3, 20 degC at sea level
+BAR = 1e5
+
+Positive = Annotated[float, Field(gt=0)]
+Share = Annotated[float, Field(gt=0, lt=1)]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Vehicle(_Section):
+    """Masses and lengths of the car as driven."""
+
+    mass: Annotated[float, Field(gt=200, lt=10000)]
+    wheelbase: Annotated[float, Field(gt=1, lt=8)]
+    front_axle: Positive
+    """Centre of gravity to front axle, m."""
+    cog_height: Annotated[float, Field(gt=0.1, lt=3)]
+    track: Annotated[float, Field(gt=0.8, lt=3)]
+    drag_coefficient: Positive
+    frontal_area: Positive
+    rolling_resistance: Annotated[float, Field(ge=0, lt=0.1)]
+    pitch_gradient: Annotated[float, Field(ge=0, lt=0.02)]
+    """Nose-down pitch per deceleration, rad per m/s^2."""
+    imu_x: float
+    """Acceleration sensor ahead of the centre of gravity, m."""
+    load_transfer_lag: Annotated[float, Field(ge=0, lt=1)]
+
+
+class Axle(_Section):
+    """One axle: tyre and brake of each of its two corners."""
+
+    unloaded_radius: Annotated[float, Field(gt=0.15, lt=0.8)]
+    vertical_stiffness: Annotated[float, Field(gt=5e4, lt=2e6)]
+    wheel_inertia: Positive
+    slip_stiffness: Annotated[float, Field(gt=3, lt=100)]
+    """Longitudinal slip stiffness per wheel load at static load, -."""
+    stiffness_degression: Annotated[float, Field(ge=0, lt=0.5)]
+    """e in C_L ~ F_Z^(1-e); 0: stiffness proportional to load."""
+    pistons: Annotated[int, Field(ge=1, le=12)]
+    """Pistons on one side of the disc."""
+    piston_diameter: Annotated[float, Field(gt=0.01, lt=0.15)]
+    effective_radius: Annotated[float, Field(gt=0.03, lt=0.4)]
+    mu_nominal: Annotated[float, Field(gt=0.1, lt=1)]
+    push_out_pressure: Annotated[float, Field(ge=0, lt=10)]
+    activation_decel: Annotated[float, Field(ge=0)]
+    """The observer of this axle works above this deceleration, m/s^2."""
+
+
+class Sensors(_Section):
+    """Standard deviations of the sensors (Table 4.1) and the delay of the speed reference."""
+
+    wheel_speed: Positive = 0.1
+    accel: Positive = 0.01
+    pressure: Positive = 1.8
+    vehicle_speed: Positive = 0.027
+    vehicle_speed_delay: Annotated[float, Field(ge=0, lt=1)] = 0.0
+
+
+class Observer(_Section):
+    """Tuning of the friction observer."""
+
+    relaxation_length: Positive = 0.25
+    cornering_stiffness: Positive = 15.0
+    min_speed: Positive = 15 / 3.6
+    rls_forgetting: Share = 0.93
+    mu_drift: Positive = 0.02
+    sigma_mu_initial: Share = 0.15
+    sigma_mass: Share = 0.02
+    sigma_slip_stiffness_ratio: Share = 0.04
+
+
+class Control(_Section):
+    """Pedal map and limits of the pressure demand."""
+
+    pedal_position: list[float] = Field(min_length=2, max_length=PEDAL_POINTS)
+    pedal_decel: list[float] = Field(min_length=2, max_length=PEDAL_POINTS)
+    max_pressure: Annotated[float, Field(gt=20, le=180)] = 180.0
+    max_pressure_rate: Annotated[float, Field(ge=1500)] = 3000.0
+    compensate: bool = True
+
+    @field_validator("pedal_position", "pedal_decel")
+    @classmethod
+    def _rising(cls, points: list[float]) -> list[float]:
+        if any(b < a for a, b in pairwise(points)) or points[0] < 0:
+            raise ValueError("must rise from zero or more")
+        return points
+
+    @field_validator("pedal_position")
+    @classmethod
+    def _distinct(cls, points: list[float]) -> list[float]:
+        if len(set(points)) < len(points):
+            raise ValueError("names the same position twice")
+        return points
+
+    @model_validator(mode="after")
+    def _paired(self) -> "Control":
+        if len(self.pedal_position) != len(self.pedal_decel):
+            raise ValueError("pedal_position and pedal_decel need the same number of points")
+        return self
+
+
+class Config(_Section):
+    """One vehicle's configuration."""
+
+    name: Annotated[str, Field(min_length=1)]
+    transmit: bool = False
+    """Armed: pressure demands are flagged valid. Otherwise a shadow that only listens and publishes."""
+    can_fd: bool = False
+    vehicle: Vehicle
+    front: Axle
+    rear: Axle
+    sensors: Sensors = Sensors()
+    observer: Observer = Observer()
+    control: Control
+
+    @model_validator(mode="after")
+    def _axles(self) -> "Config":
+        if self.vehicle.front_axle >= self.vehicle.wheelbase:
+            raise ValueError("vehicle.front_axle must be smaller than vehicle.wheelbase")
+        return self
+
+
+_NUMBER, _WHOLE = "give a number", "give a whole number"
+_WANTED = {
+    "float_type": _NUMBER,
+    "float_parsing": _NUMBER,
+    "finite_number": "give a finite number",
+    "int_type": _WHOLE,
+    "int_parsing": _WHOLE,
+    "int_from_float": _WHOLE,
+    "bool_type": "give true or false",
+    "bool_parsing": "give true or false",
+    "string_type": 'give a text in "quotes"',
+    "list_type": "give a list in [brackets]",
+    "tuple_type": "give a list in [brackets]",
+    "dict_type": "give a table with keys of its own",
+    "model_type": "give a table with keys of its own",
+    "greater_than": "give a value above {gt:g}",
+    "greater_than_equal": "give a value of at least {ge:g}",
+    "less_than": "give a value below {lt:g}",
+    "less_than_equal": "give a value of at most {le:g}",
+    "string_too_short": "give a text, not an empty one",
+    "too_short": "give at least {min_length} values",
+    "too_long": "give at most {max_length} values",
+    "value_error": "{error}",
+}
+"""What is right, by pydantic's kind of finding."""
+
+
+def describe(error: ValidationError, where: str) -> UserError:
+    """Turn the first finding of pydantic into one line with the key's path."""
+    finding = error.errors(include_url=False)[0]
+    place = ".".join(str(part) for part in finding["loc"])
+    more = error.error_count() - 1
+    if finding["type"] == "missing":
+        remedy = "missing; add this key"
+    elif finding["type"] == "extra_forbidden":
+        remedy = "unknown key; remove it or correct its spelling"
+    else:
+        wanted = _WANTED.get(finding["type"], finding["msg"]).format(**finding.get("ctx", {}))
+        remedy = f"{wanted} (found {finding['input']!r})" if place else wanted
+    return UserError(where, place, remedy + (f" ({more} more findings)" if more else ""))
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Read a TOML file; what cannot be read is one line."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise UserError(str(path), "", "no such file") from None
+    except IsADirectoryError:
+        raise UserError(str(path), "", "is a folder; give a TOML file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise UserError(str(path), "", f"cannot be read as text: {error}") from None
+    except tomllib.TOMLDecodeError as error:
+        raise UserError(str(path), "", f"not valid TOML: {error}") from None
+
+
+def load_config(path: Path) -> Config:
+    """Read and check a CONFIG file.
+
+    Raises:
+        UserError: the file cannot be read, or a key is missing, unknown or out of range.
+    """
+    content = read_toml(path)
+    try:
+        return Config.model_validate(content)
+    except ValidationError as error:
+        raise describe(error, str(path)) from None
+
+
+def config_hash(config: Config) -> str:
+    """Return a hash of everything that changes results, so two runs can be told apart."""
+    text = json.dumps(config.model_dump(exclude={"transmit"}), sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def store_key(config: Config) -> str:
+    """Return what learned values belong to: vehicle, brakes and the version of the algorithm."""
+    brakes = json.dumps([config.front.model_dump(), config.rear.model_dump()], sort_keys=True)
+    return f"{config.name}/{hashlib.sha256(brakes.encode()).hexdigest()[:8]}/1"
+
+
+def new_params(config: Config) -> RecordArray:
+    """Return `PARAMS` of length 1 in SI units; every input counts as mapped until told otherwise."""
+    params = np.zeros(1, PARAMS)
+    row = params[0]
+    vehicle, sensors, observer, control = config.vehicle, config.sensors, config.observer, config.control
+    row["transmit"], row["compensate"] = config.transmit, control.compensate
+    row["mapped"] = 1
+    rear_axle = vehicle.wheelbase - vehicle.front_axle
+    for name in ("mass", "wheelbase", "front_axle", "cog_height", "track", "rolling_resistance"):
+        row[name] = getattr(vehicle, name)
+    for name in ("pitch_gradient", "imu_x", "load_transfer_lag"):
+        row[name] = getattr(vehicle, name)
+    row["rear_axle"] = rear_axle
+    row["drag_area"] = 0.5 * AIR_DENSITY * vehicle.drag_coefficient * vehicle.frontal_area
+    axle_load = vehicle.mass * GRAVITY / vehicle.wheelbase
+    for corner, axle in enumerate((config.front, config.front, config.rear, config.rear)):
+        static_load = axle_load * (rear_axle if corner < 2 else vehicle.front_axle) / 2
+        row["wheel_radius"][corner] = rolling_radius(
+            static_load, axle.unloaded_radius, axle.vertical_stiffness
+        )
+        row["piston_area"][corner] = axle.pistons * math.pi / 4 * axle.piston_diameter**2
+        row["push_out_pressure"][corner] = axle.push_out_pressure * BAR
+        row["static_load"][corner] = static_load
+        for name in ("unloaded_radius", "vertical_stiffness", "wheel_inertia", "slip_stiffness"):
+            row[name][corner] = getattr(axle, name)
+        for name in ("stiffness_degression", "effective_radius", "mu_nominal", "activation_decel"):
+            row[name][corner] = getattr(axle, name)
+    row["sigma_wheel_speed"], row["sigma_accel"] = sensors.wheel_speed, sensors.accel
+    row["sigma_pressure"] = sensors.pressure * BAR
+    row["sigma_vehicle_speed"] = sensors.vehicle_speed
+    row["vehicle_speed_delay"] = sensors.vehicle_speed_delay
+    for name in Observer.model_fields:
+        row[name] = getattr(observer, name)
+    for name in ("pedal_position", "pedal_decel"):
+        points = getattr(control, name)
+        row[name] = points + points[-1:] * (PEDAL_POINTS - len(points))
+    row["max_pressure"] = control.max_pressure * BAR
+    row["max_pressure_rate"] = control.max_pressure_rate * BAR
+    return params

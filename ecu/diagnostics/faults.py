@@ -1,0 +1,63 @@
+"""`active_faults`: one bit for each thing that is wrong, with what it means and what to do.
+
+The table is the single list: events, reports and docs/faults.md repeat it.
+"""
+
+from typing import Final, NamedTuple
+
+
+class Fault(NamedTuple):
+    """One bit of the mask."""
+
+    bit: int
+    name: str
+    meaning: str
+    remedy: str
+
+
+WHEEL_SPEED_LOST: Final = 1 << 0
+IMU_LOST: Final = 1 << 1
+PRESSURE_LOST: Final = 1 << 2
+REQUEST_LOST: Final = 1 << 3
+STEERING_LOST: Final = 1 << 4
+PEDAL_IMPLAUSIBLE: Final = 1 << 5
+HYDRAULICS_NOT_READY: Final = 1 << 6
+DEMAND_LIMITED: Final = 1 << 7
+FILTER_RESET: Final = 1 << 8
+PEDAL_LOST: Final = 1 << 9
+MOTOR_TORQUE_LOST: Final = 1 << 10
+BUS_OFF: Final = 1 << 16
+ERROR_PASSIVE: Final = 1 << 17
+FOREIGN_SENDER: Final = 1 << 18
+SEND_FAILED: Final = 1 << 19
+FRAMES_DROPPED: Final = 1 << 20
+LATE: Final = 1 << 21
+COMPILED: Final = 1 << 22
+
+FAULTS: Final = (
+    Fault(WHEEL_SPEED_LOST, "wheel speed lost", "a wheel speed is stale or invalid", "check the sender of WheelSpeed*"),
+    Fault(IMU_LOST, "IMU lost", "longitudinal acceleration is stale or invalid", "check the sender of Imu"),
+    Fault(PRESSURE_LOST, "pressure lost", "a calliper pressure is stale or invalid", "check CalliperPressure*"),
+    Fault(REQUEST_LOST, "request lost", "neither the pedal nor a valid deceleration demand arrives", "check BrakeRequest"),
+    Fault(STEERING_LOST, "steering lost", "steering angle, yaw rate or lateral acceleration is stale: straight driving is assumed", "check Steering, Imu"),
+    Fault(PEDAL_IMPLAUSIBLE, "pedal implausible", "position above 5 % while the pedal is reported free", "check the pedal sensor"),
+    Fault(HYDRAULICS_NOT_READY, "hydraulics not ready", "HydraulicStatus reports not ready", "check the hydraulic unit"),
+    Fault(DEMAND_LIMITED, "demand limited", "the output limiter replaced or cut a demand", "compare friction and demand in the report"),
+    Fault(FILTER_RESET, "filter reset", "an estimator met a value that is not finite and began anew", "look at the inputs at that time"),
+    Fault(PEDAL_LOST, "pedal lost", "the pedal position is stale or invalid", "check the sender of BrakeRequest"),
+    Fault(MOTOR_TORQUE_LOST, "motor torque lost", "a motor torque came before and is stale: its wheel learns nothing", "check the sender of Motor*"),
+    Fault(BUS_OFF, "bus off", "the CAN controller went off the bus", "check wiring; ip link set DEV type can restart-ms 100"),
+    Fault(ERROR_PASSIVE, "error passive", "the CAN controller counts many errors", "check termination and bit rate"),
+    Fault(FOREIGN_SENDER, "foreign sender", "someone else sends one of our identifiers", "stop the other sender"),
+    Fault(SEND_FAILED, "send failed", "the kernel refused a frame", "raise txqueuelen; check the bus load"),
+    Fault(FRAMES_DROPPED, "frames dropped", "the kernel dropped received frames", "check the load of the machine"),
+    Fault(LATE, "late", "a cycle missed its deadline", "see `brake-ecu doctor` for real-time rights"),
+    Fault(COMPILED, "compiled in operation", "a kernel was compiled after the start", "warm the cache: python -m ecu.warm"),
+)  # fmt: skip
+
+DEGRADING: Final = WHEEL_SPEED_LOST | IMU_LOST | PRESSURE_LOST | PEDAL_LOST | BUS_OFF | FOREIGN_SENDER
+
+
+def fault_names(mask: int) -> list[str]:
+    """Return the names of the faults in a mask."""
+    return [fault.name for fault in FAULTS if mask & fault.bit]

@@ -1,0 +1,44 @@
+"""Structured logging to stderr: readable on a terminal, JSON elsewhere; one line a second per cause."""
+
+import logging
+import sys
+import time
+from collections.abc import Callable
+from typing import Any, Final
+
+import structlog
+
+QUIET_S: Final = 1.0
+
+
+def configure_logging() -> None:
+    """Send every event of this process to stderr."""
+    terminal = sys.stderr.isatty()
+    renderer: Any = structlog.dev.ConsoleRenderer() if terminal else structlog.processors.JSONRenderer()
+    structlog.configure(
+        processors=[
+            structlog.processors.add_log_level,
+            structlog.processors.TimeStamper(fmt="iso", utc=True),
+            renderer,
+        ],
+        wrapper_class=structlog.make_filtering_bound_logger(logging.INFO),
+        logger_factory=structlog.WriteLoggerFactory(file=sys.stderr),
+    )
+
+
+class Throttle:
+    """Lets one event a second pass per cause; the next that passes says how many did not."""
+
+    def __init__(self, now_s: Callable[[], float] = time.monotonic) -> None:
+        self._now_s = now_s
+        self._last: dict[str, float] = {}
+        self._held: dict[str, int] = {}
+
+    def passes(self, cause: str) -> int | None:
+        """Return how many events of this cause were held back since the last that passed; None: hold it."""
+        now = self._now_s()
+        if now - self._last.get(cause, -QUIET_S) < QUIET_S:
+            self._held[cause] = self._held.get(cause, 0) + 1
+            return None
+        self._last[cause] = now
+        return self._held.pop(cause, 0)

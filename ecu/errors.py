@@ -1,0 +1,16 @@
+"""Errors that a user can mend: one line that names the file, the place in it and what would be right."""
+
+
+class UserError(Exception):
+    """Bad arguments, configuration or input. The command prints its one line and exits with 2.
+
+    Example: `config/suv.toml: vehicle.mass: missing; give the mass in kg`.
+    """
+
+    def __init__(self, where: str, place: str, remedy: str) -> None:
+        self.where, self.place, self.remedy = where, place, remedy
+        super().__init__(": ".join(part for part in (where, place, remedy) if part))
+
+
+class RunFault(Exception):
+    """The run itself found a fault (a bus that went off, no input). The command exits with 1."""

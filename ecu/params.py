@@ -1,0 +1,67 @@
+"""The parameters of one vehicle as kernels read them: SI units, one value per corner where corners differ."""
+
+from typing import Final
+
+import numpy as np
+
+from ecu.signals import N_INPUTS
+
+# Points of the pedal map; a shorter map is padded with its last point.
+PEDAL_POINTS: Final = 8
+
+GRAVITY: Final = 9.81  # m/s^2
+
+PARAMS: Final = np.dtype(
+    [
+        ("transmit", "u1"),  # armed: demands are flagged valid
+        ("mapped", "u1", (N_INPUTS,)),  # inputs that some frame or column feeds
+        # vehicle
+        ("mass", "f8"),  # kg
+        ("wheelbase", "f8"),  # m
+        ("front_axle", "f8"),  # l_f, centre of gravity to front axle, m
+        ("rear_axle", "f8"),  # l_r, m
+        ("cog_height", "f8"),  # m
+        ("track", "f8"),  # m
+        ("drag_area", "f8"),  # 0.5 rho c_d A, N/(m/s)^2
+        ("rolling_resistance", "f8"),  # -
+        ("pitch_gradient", "f8"),  # nose-down pitch per braking deceleration, rad/(m/s^2)
+        ("imu_x", "f8"),  # sensor ahead of the centre of gravity, m
+        ("load_transfer_lag", "f8"),  # s
+        ("cornering_stiffness", "f8"),  # per load, 1/rad
+        # wheels and tyres
+        ("unloaded_radius", "f8", (4,)),  # r_0, m
+        ("wheel_radius", "f8", (4,)),  # rolling radius at static load, m
+        ("vertical_stiffness", "f8", (4,)),  # K_Z, N/m
+        ("wheel_inertia", "f8", (4,)),  # kg m^2
+        ("static_load", "f8", (4,)),  # N
+        ("slip_stiffness", "f8", (4,)),  # C_L / F_Z at static load, -
+        ("stiffness_degression", "f8", (4,)),  # e of C_L ~ F_Z^(1-e)
+        ("relaxation_length", "f8"),  # C_L / K_L, m
+        # brakes
+        ("piston_area", "f8", (4,)),  # A_k, all pistons of one side, m^2
+        ("effective_radius", "f8", (4,)),  # m
+        ("push_out_pressure", "f8", (4,)),  # Pa
+        ("mu_nominal", "f8", (4,)),  # mean friction by SAE J2522
+        # sensors
+        ("sigma_wheel_speed", "f8"),  # rad/s
+        ("sigma_accel", "f8"),  # m/s^2
+        ("sigma_pressure", "f8"),  # Pa
+        ("sigma_vehicle_speed", "f8"),  # m/s
+        ("vehicle_speed_delay", "f8"),  # s
+        # observer
+        ("activation_decel", "f8", (4,)),  # m/s^2
+        ("min_speed", "f8"),  # m/s
+        ("rls_forgetting", "f8"),  # per 10 ms
+        ("mu_drift", "f8"),  # random walk of friction, 1/sqrt(s)
+        ("sigma_mu_initial", "f8"),  # relative to nominal
+        ("sigma_mass", "f8"),  # relative
+        ("sigma_slip_stiffness_ratio", "f8"),  # front to rear, relative
+        # control
+        ("pedal_position", "f8", (PEDAL_POINTS,)),  # %
+        ("pedal_decel", "f8", (PEDAL_POINTS,)),  # m/s^2
+        ("max_pressure", "f8"),  # Pa
+        ("max_pressure_rate", "f8"),  # Pa/s
+        ("compensate", "u1"),
+    ],
+    align=True,
+)

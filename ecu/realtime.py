@@ -1,0 +1,80 @@
+"""What a process asks of the kernel to be woken in time; each refusal is one warning with its remedy."""
+
+import ctypes
+import gc
+import os
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+import structlog
+
+PRIORITY: Final = 50  # of SCHED_FIFO: the priority that Linux gives its interrupt threads
+_MCL_CURRENT_FUTURE: Final = 1 | 2
+
+
+class Verdict(NamedTuple):
+    """What became of one request."""
+
+    name: str
+    granted: bool
+    reason: str
+    remedy: str
+
+
+def _fifo() -> None:
+    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+
+
+def _lock_memory() -> None:
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.mlockall(_MCL_CURRENT_FUTURE) != 0:
+        number = ctypes.get_errno()
+        raise OSError(number, os.strerror(number))
+
+
+def _last_cpu() -> None:
+    """Stay on the last CPU allowed: interrupts are served by the first ones."""
+    os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+
+
+REQUESTS: Final[tuple[tuple[str, Callable[[], None], str], ...]] = (
+    (
+        "SCHED_FIFO",
+        _fifo,
+        f"grant CAP_SYS_NICE, or `rtprio {PRIORITY}` in /etc/security/limits.conf (ulimit -r), "
+        "or LimitRTPRIO in the unit",
+    ),
+    (
+        "mlockall",
+        _lock_memory,
+        "grant CAP_IPC_LOCK, or `memlock unlimited` in /etc/security/limits.conf (ulimit -l), "
+        "or LimitMEMLOCK=infinity in the unit",
+    ),
+)
+AFFINITY: Final = ("affinity", _last_cpu, "let the cpuset of this process hold a CPU of its own")
+
+
+def make_realtime() -> list[Verdict]:
+    """Ask for SCHED_FIFO, locked memory and one CPU, switch the garbage collector off; return the verdicts.
+
+    What is alive now is frozen: call it after the warm-up. A refusal is logged and the service goes on.
+    """
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    verdicts = [_attempt(*request) for request in REQUESTS]
+    if verdicts[0].granted:  # tied to one CPU without priority it could not dodge a busy neighbour
+        verdicts.append(_attempt(*AFFINITY))
+    log = structlog.get_logger("realtime")
+    for verdict in verdicts:
+        if not verdict.granted:
+            log.warning("refused", what=verdict.name, reason=verdict.reason, remedy=verdict.remedy)
+    return verdicts
+
+
+def _attempt(name: str, request: Callable[[], None], remedy: str) -> Verdict:
+    try:
+        request()
+    except (OSError, AttributeError) as error:
+        return Verdict(name, False, str(error), remedy)
+    return Verdict(name, True, "", remedy)

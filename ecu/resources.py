@@ -1,0 +1,30 @@
+"""The files that are shipped with the program: databases, vehicles, signal maps, scenarios."""
+
+from pathlib import Path
+
+from ecu.errors import UserError
+
+_PACKAGE = Path(__file__).parent
+
+
+def resource(name: str) -> Path:
+    """Path of a shipped file or folder, e.g. `dbc/brake_ecu.dbc`, `config/suv.toml`: of the checkout, or of
+    the installed package."""
+    installed = _PACKAGE / "data"
+    return (installed if installed.is_dir() else _PACKAGE.parent) / name
+
+
+def named(name: str, folder: str) -> Path:
+    """Path of the file `name`; where no such file exists a bare name means the shipped one in `folder`.
+
+    `named("suv", "config")` is the shipped `config/suv.toml`. Raises UserError for a bare name that is
+    neither; any other path is returned as it is.
+    """
+    path = Path(name)
+    if path.is_file() or path.suffix or len(path.parts) != 1:
+        return path
+    shipped = resource(folder) / f"{name}.toml"
+    if shipped.is_file():
+        return shipped
+    names = ", ".join(sorted(file.stem for file in resource(folder).glob("*.toml")))
+    raise UserError(name, "", f"no such file, and none that is shipped ({names})")

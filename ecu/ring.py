@@ -1,0 +1,235 @@
+"""A ring in shared memory: the cycle writes it and waits for nobody, any process may read along.
+
+The file holds a header, a description (JSON), the state before the first cycle, a slot per cycle and a ring
+of frames. A slot carries its number before and after its content is written (-1 between), so a reader that
+was overtaken notices and counts what it lost. Frames are claimed before they are overwritten.
+"""
+
+import json
+import mmap
+import os
+import tempfile
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ecu.errors import UserError
+from ecu.jit import kernel
+from ecu.records import CYCLE, FRAME, LEARNED, OUTPUTS, RecordArray
+
+SLOTS: Final = 2400  # 24 s of cycles
+FRAMES: Final = 131072  # 29 s of a classical bus at 45 frames per cycle
+
+# One cycle as it stands in the ring's slots and in a recording's cycles.bin.
+RECORDED: Final = np.dtype([("cycle", CYCLE), ("outputs", OUTPUTS), ("learned", LEARNED)], align=True)
+_SLOT: Final = np.dtype([("number", "i8"), ("first_frame", "i8"), ("recorded", RECORDED)], align=True)
+_HEADER: Final = np.dtype(
+    [
+        ("magic", "u8"),
+        ("slots", "i8"),
+        ("frames", "i8"),
+        ("description_bytes", "i8"),
+        ("initial_bytes", "i8"),
+        ("written", "i8"),  # cycles so far
+        ("frames_claimed", "i8"),
+        ("frames_written", "i8"),
+        ("closed", "i8"),
+    ]
+)
+_MAGIC: Final = int.from_bytes(b"ecuring1", "little")
+_PAGE: Final = 4096
+
+
+class Ring(NamedTuple):
+    """The mapped parts of a ring."""
+
+    path: Path
+    memory: mmap.mmap
+    header: RecordArray
+    slots: RecordArray
+    frames: RecordArray
+
+
+def ring_path(pid: int) -> Path:
+    """Return where the ring of process `pid` is: memory, not a disk, where the machine has such a folder.
+
+    Rings that dead processes left behind are removed.
+    """
+    shared = Path("/dev/shm")
+    folder = shared if os.access(shared, os.W_OK) else Path(tempfile.gettempdir())
+    for left in folder.glob("brake-ecu.*.ring"):
+        owner = left.name.split(".")[1]
+        if owner.isdecimal() and not Path("/proc", owner).exists():
+            remove_ring(left)
+    return folder / f"brake-ecu.{pid}.ring"
+
+
+def _round_up(size: int) -> int:
+    return -(-size // _PAGE) * _PAGE
+
+
+def _map(path: Path, memory: mmap.mmap) -> Ring:
+    header = np.frombuffer(memory, _HEADER, 1)
+    row = header[0]
+    at = _round_up(_HEADER.itemsize) + _round_up(int(row["description_bytes"]) + int(row["initial_bytes"]))
+    slots = np.frombuffer(memory, _SLOT, int(row["slots"]), at)
+    frames = np.frombuffer(memory, FRAME, int(row["frames"]), at + _round_up(slots.nbytes))
+    return Ring(path, memory, header, slots, frames)
+
+
+def create_ring(
+    path: Path, description: dict[str, Any], initial: bytes, *, slots: int = SLOTS, frames: int = FRAMES
+) -> Ring:
+    """Make the ring with all its pages in memory; it appears at `path` when it is complete.
+
+    `description` tells readers what the records mean; `initial` is the state before the first cycle.
+
+    Raises:
+        UserError: no room for it.
+    """
+    text = json.dumps(description).encode()
+    head = _round_up(_HEADER.itemsize) + _round_up(len(text) + len(initial))
+    size = head + _round_up(slots * _SLOT.itemsize) + _round_up(frames * FRAME.itemsize)
+    unfinished = path.with_name(path.name + ".new")
+    try:
+        handle = os.open(unfinished, os.O_RDWR | os.O_CREAT | os.O_TRUNC, 0o600)
+        try:
+            os.posix_fallocate(handle, 0, size)
+            memory = mmap.mmap(handle, size, mmap.MAP_SHARED | mmap.MAP_POPULATE)
+        finally:
+            os.close(handle)
+    except OSError as error:
+        raise UserError(str(path), "", f"no room for a ring of {size >> 20} MB: {error.strerror}") from None
+    header = np.frombuffer(memory, _HEADER, 1)
+    row = header[0]
+    row["slots"], row["frames"] = slots, frames
+    row["description_bytes"], row["initial_bytes"] = len(text), len(initial)
+    at = _round_up(_HEADER.itemsize)
+    memory[at : at + len(text) + len(initial)] = text + initial
+    ring = _map(path, memory)
+    ring.slots["number"] = -1
+    row["magic"] = _MAGIC
+    unfinished.rename(path)
+    return ring
+
+
+def publish(
+    ring: Ring,
+    cycle: RecordArray,
+    outputs: RecordArray,
+    learned: RecordArray,
+    frames: RecordArray,
+) -> None:
+    """Write one cycle with its `cycle["frames"]` frames, the first of `frames`; never waits.
+
+    The claims stand outside the kernel that fills: a compiler may not move or drop them there.
+    """
+    header = ring.header[0]
+    number, begin = int(header["written"]), int(header["frames_written"])
+    end = begin + int(cycle["frames"][0])
+    place = number % len(ring.slots)
+    numbers = ring.slots["number"]
+    numbers[place] = -1
+    header["frames_claimed"] = end
+    _fill(ring.slots, place, ring.frames, begin, end, cycle, outputs, learned, frames)
+    header["frames_written"] = end
+    numbers[place] = number
+    header["written"] = number + 1
+
+
+# Arrays, not records: handing a numpy record to a kernel costs 10 us, an array 0.6 us.
+@kernel
+def _fill(
+    slots: RecordArray,
+    place: int,
+    ring_frames: RecordArray,
+    begin: int,
+    end: int,
+    cycle: RecordArray,
+    outputs: RecordArray,
+    learned: RecordArray,
+    frames: RecordArray,
+) -> None:
+    for i in range(begin, end):
+        ring_frames[i % len(ring_frames)] = frames[i - begin]
+    slot = slots[place]
+    slot.first_frame = begin
+    slot.recorded.cycle = cycle[0]
+    slot.recorded.outputs = outputs[0]
+    slot.recorded.learned = learned[0]
+
+
+def close_ring(ring: Ring) -> None:
+    """Tell readers that no more cycles come; the file goes when the last of them lets go of it."""
+    ring.header[0]["closed"] = 1
+
+
+class Batch(NamedTuple):
+    """Cycles read from a ring, in order."""
+
+    records: RecordArray
+    """RECORDED, shape (n,)."""
+    frames: RecordArray
+    """FRAME, the frames of these cycles in the order they were consumed."""
+
+
+class RingReader:
+    """Reads a ring behind its writer, from the oldest cycle that is still there."""
+
+    def __init__(self, path: Path) -> None:
+        try:
+            with path.open("rb") as file:
+                memory = mmap.mmap(file.fileno(), 0, prot=mmap.PROT_READ)
+        except (OSError, ValueError) as error:
+            raise UserError(str(path), "", f"no ring to read here: {error}") from None
+        if len(memory) < _PAGE or int(np.frombuffer(memory, _HEADER, 1)[0]["magic"]) != _MAGIC:
+            raise UserError(str(path), "", "not a ring of this version; start the service anew")
+        self.ring = _map(path, memory)
+        row = self.ring.header[0]
+        at = _round_up(_HEADER.itemsize)
+        end = at + int(row["description_bytes"])
+        self.description: dict[str, Any] = json.loads(memory[at:end])
+        self.initial: bytes = memory[end : end + int(row["initial_bytes"])]
+        self.lost_cycles = self.lost_frames = 0
+        self._next = max(0, int(row["written"]) - len(self.ring.slots))
+
+    @property
+    def closed(self) -> bool:
+        """Whether the writer said that no more cycles come."""
+        return bool(self.ring.header[0]["closed"])
+
+    def read(self, limit: int = 256) -> Batch:
+        """Return up to `limit` cycles that were not read yet; what was overwritten is counted as lost."""
+        header, slots = self.ring.header[0], self.ring.slots
+        written = int(header["written"])
+        oldest = written - len(slots)
+        if self._next < oldest:
+            self.lost_cycles += oldest - self._next
+            self._next = oldest
+        wanted = np.arange(self._next, min(written, self._next + limit))
+        copied = slots[wanted % len(slots)]
+        intact = (copied["number"] == wanted) & (slots["number"][wanted % len(slots)] == wanted)
+        self.lost_cycles += int(len(wanted) - intact.sum())
+        self._next += len(wanted)
+        copied = copied[intact]
+        return Batch(copied["recorded"], self._frames(copied))
+
+    def _frames(self, slots: RecordArray) -> RecordArray:
+        ring = self.ring.frames
+        counts = slots["recorded"]["cycle"]["frames"].astype(np.int64)
+        total = int(counts.sum())
+        starts = np.repeat(slots["first_frame"] - (np.cumsum(counts) - counts), counts)
+        places: NDArray[np.int64] = starts + np.arange(total)
+        copied = ring[places % len(ring)]
+        intact = places >= int(self.ring.header[0]["frames_claimed"]) - len(ring)
+        self.lost_frames += int(total - intact.sum())
+        return copied[intact]
+
+
+def remove_ring(path: Path) -> None:
+    """Take the ring's name away; whoever has it mapped keeps it."""
+    with suppress(OSError):
+        path.unlink()

@@ -1,0 +1,156 @@
+"""The table of every signal: its name, unit, message and time-out. Everything else is derived from it.
+
+Names and units are the project's public contract: add, but never rename, remove or change a unit.
+A four-wheel quantity stands as four signals in the order `CORNERS`; `INPUT[name]` is a signal's place in
+`inputs.value`, and a constant such as `WHEEL_SPEED` is the place of its front-left one.
+"""
+
+from typing import Final, NamedTuple
+
+CORNERS: Final = ("fl", "fr", "rl", "rr")
+
+
+class InputSignal(NamedTuple):
+    """A quantity that the ECU reads."""
+
+    name: str
+    unit: str
+    message: str
+    timeout_s: float
+    """After this long without a new sample the signal is not alive any more."""
+    low: float
+    """Physical range: a sample outside is invalid."""
+    high: float
+
+
+def _corners(name: str, *rest: object) -> list[InputSignal]:
+    message = str(rest[1])
+    axle = ("Front", "Front", "Rear", "Rear")
+    return [
+        InputSignal(f"{name}_{c}", str(rest[0]), message + a if message else "", *map(float, rest[2:]))  # type: ignore[arg-type]
+        for c, a in zip(CORNERS, axle, strict=True)
+    ]
+
+
+INPUT_SIGNALS: Final[tuple[InputSignal, ...]] = (
+    *_corners("wheel_speed", "rad/s", "WheelSpeed", 0.1, -20.0, 400.0),
+    InputSignal("accel_x", "m/s^2", "Imu", 0.1, -40.0, 40.0),
+    InputSignal("accel_y", "m/s^2", "Imu", 0.1, -40.0, 40.0),
+    InputSignal("yaw_rate", "rad/s", "Imu", 0.1, -6.0, 6.0),
+    *_corners("calliper_pressure", "bar", "CalliperPressure", 0.1, -10.0, 250.0),
+    InputSignal("pedal_position", "%", "BrakeRequest", 0.1, 0.0, 100.0),
+    InputSignal("pedal_pressed", "-", "BrakeRequest", 0.1, 0.0, 1.0),
+    InputSignal("decel_demand", "m/s^2", "BrakeRequest", 0.1, 0.0, 15.0),
+    InputSignal("decel_demand_valid", "-", "BrakeRequest", 0.1, 0.0, 1.0),
+    InputSignal("accelerator_position", "%", "BrakeRequest", 0.1, 0.0, 100.0),
+    InputSignal("reverse", "-", "BrakeRequest", 0.1, 0.0, 1.0),
+    InputSignal("abs_active", "-", "BrakeRequest", 0.1, 0.0, 1.0),
+    InputSignal("esp_active", "-", "BrakeRequest", 0.1, 0.0, 1.0),
+    InputSignal("steering_angle", "rad", "Steering", 0.1, -1.5, 1.5),
+    *_corners("motor_torque", "N m", "Motor", 0.1, -8000.0, 8000.0),
+    *_corners("motor_limit", "N m", "Motor", 0.1, 0.0, 8000.0),
+    InputSignal("vehicle_speed", "m/s", "VehicleSpeed", 0.5, -30.0, 150.0),
+    InputSignal("vehicle_speed_valid", "-", "VehicleSpeed", 0.5, 0.0, 1.0),
+    InputSignal("accumulator_pressure", "bar", "HydraulicStatus", 0.2, 0.0, 300.0),
+    InputSignal("hydraulic_ready", "-", "HydraulicStatus", 0.2, 0.0, 1.0),
+    InputSignal("ambient_temperature", "degC", "Ambient", 3.0, -60.0, 80.0),
+    InputSignal("rain", "-", "Ambient", 3.0, 0.0, 1.0),
+    *_corners("wheel_force_x", "N", "WheelForce", 0.1, -40000.0, 40000.0),
+    *_corners("wheel_torque_y", "N m", "WheelForce", 0.1, -10000.0, 10000.0),
+    # A reference in recordings only: no message of ours carries it.
+    *_corners("disc_temperature_measured", "degC", "", 3.0, -60.0, 1200.0),
+)
+INPUT: Final = {signal.name: place for place, signal in enumerate(INPUT_SIGNALS)}
+N_INPUTS: Final = len(INPUT_SIGNALS)
+
+# Places for kernels (numba takes module constants at compile time).
+WHEEL_SPEED: Final = INPUT["wheel_speed_fl"]
+ACCEL_X: Final = INPUT["accel_x"]
+ACCEL_Y: Final = INPUT["accel_y"]
+YAW_RATE: Final = INPUT["yaw_rate"]
+CALLIPER_PRESSURE: Final = INPUT["calliper_pressure_fl"]
+PEDAL_POSITION: Final = INPUT["pedal_position"]
+PEDAL_PRESSED: Final = INPUT["pedal_pressed"]
+DECEL_DEMAND: Final = INPUT["decel_demand"]
+DECEL_DEMAND_VALID: Final = INPUT["decel_demand_valid"]
+ACCELERATOR_POSITION: Final = INPUT["accelerator_position"]
+REVERSE: Final = INPUT["reverse"]
+ABS_ACTIVE: Final = INPUT["abs_active"]
+ESP_ACTIVE: Final = INPUT["esp_active"]
+STEERING_ANGLE: Final = INPUT["steering_angle"]
+MOTOR_TORQUE: Final = INPUT["motor_torque_fl"]
+MOTOR_LIMIT: Final = INPUT["motor_limit_fl"]
+VEHICLE_SPEED: Final = INPUT["vehicle_speed"]
+VEHICLE_SPEED_VALID: Final = INPUT["vehicle_speed_valid"]
+ACCUMULATOR_PRESSURE: Final = INPUT["accumulator_pressure"]
+HYDRAULIC_READY: Final = INPUT["hydraulic_ready"]
+AMBIENT_TEMPERATURE: Final = INPUT["ambient_temperature"]
+
+# The three verdicts on an input, as bits of `inputs.verdict`.
+ALIVE: Final = 1  # a sample arrived within its time-out
+RATE_OK: Final = 2  # samples arrive at about the rate that is expected
+VALID: Final = 4  # the last sample was available, in range and declared valid by its sender
+USABLE: Final = ALIVE | VALID
+
+# EcuStatus `mode`
+STARTING, READY, ACTIVE, DEGRADED, FAILED = range(5)
+# `mode_*` of a corner's friction estimate
+NOMINAL, OBSERVING, HOLDING, FAULT = range(4)
+
+
+class OutputSignal(NamedTuple):
+    """A quantity that the ECU sends or writes into results. NaN means "not available"."""
+
+    name: str
+    unit: str
+    corners: bool
+    message: str
+    """DBC message (for a corner quantity split over the axles: its stem), empty: results only."""
+
+
+OUTPUT_SIGNALS: Final[tuple[OutputSignal, ...]] = (
+    OutputSignal("vehicle_speed", "m/s", False, ""),
+    OutputSignal("k_f", "-", False, ""),
+    OutputSignal("mode", "-", False, "EcuStatus"),
+    OutputSignal("slip", "-", True, ""),
+    OutputSignal("wheel_force_x", "N", True, ""),
+    OutputSignal("wheel_force_z", "N", True, ""),
+    OutputSignal("mu_b", "-", True, "Blcf"),
+    OutputSignal("sigma_mu_b", "-", True, "Blcf"),
+    OutputSignal("mode_mu_b", "-", True, "Blcf"),  # sent and written as mode_fl, mode_fr, …
+    OutputSignal("brake_torque", "N m", True, ""),
+    OutputSignal("pressure_demand", "bar", True, "PressureDemand"),
+    OutputSignal("pressure_demand_valid", "-", False, "PressureDemandFront PressureDemandRear"),
+    OutputSignal("motor_demand", "N m", True, "MotorDemand"),
+    OutputSignal("motor_demand_valid", "-", False, "MotorDemandFront MotorDemandRear"),
+    OutputSignal("disc_temperature", "degC", True, "DiscTemperature"),
+    OutputSignal("pad_wear", "mm", True, "PadWear"),
+    OutputSignal("pad_remaining", "%", True, "PadWear"),
+    OutputSignal("pad_wear_mass", "g", True, ""),
+    OutputSignal("particles_last_brake", "-", False, "ParticleEmissions"),
+    OutputSignal("particles_per_km", "1/km", False, "ParticleEmissions"),
+    OutputSignal("active_faults", "-", False, "EcuStatus"),
+    OutputSignal("overruns", "-", False, "EcuStatus"),
+    OutputSignal("worst_lateness_us", "us", False, "EcuStatus"),
+    # Beyond the contract: what a reader of results needs to judge the rest.
+    OutputSignal("decel_demand_total", "m/s^2", False, ""),  # the larger of pedal map and decel_demand
+    OutputSignal("accel_x_road", "m/s^2", False, ""),  # specific force in road axes, pitch removed
+    OutputSignal("braking", "-", False, ""),  # 1 while a brake application lasts
+    OutputSignal("calliper_pressure", "bar", True, ""),  # as measured, last sample
+    OutputSignal("pressure_uncompensated", "bar", True, ""),  # the demand with the base friction
+)
+
+
+def column_names(signal: OutputSignal) -> tuple[str, ...]:
+    """Names of an output in results and on the bus, one per corner for a four-wheel quantity."""
+    if not signal.corners:
+        return (signal.name,)
+    stem = "mode" if signal.name == "mode_mu_b" else signal.name
+    return tuple(f"{stem}_{corner}" for corner in CORNERS)
+
+
+OUTPUT_COLUMNS: Final = tuple(name for signal in OUTPUT_SIGNALS for name in column_names(signal))
+OUTPUT: Final = {name: place for place, name in enumerate(OUTPUT_COLUMNS)}
+N_OUTPUTS: Final = len(OUTPUT_COLUMNS)
+
+CYCLE_NS: Final = 10_000_000

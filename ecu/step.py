@@ -1,0 +1,199 @@
+"""The whole algorithm as one function of its arguments alone.
+
+`step(params, state, inputs, outputs)` overwrites preallocated records and depends on nothing else, so the
+daemon, replay and closed-loop simulation get the same bits from the same inputs. Order of one cycle:
+
+    brake application -> accelerations -> wheel loads, radii -> brake torques, expected slip -> speed -> slip
+    -> tyre forces -> friction -> demand -> pressure law -> limiter -> mode
+"""
+
+import math
+
+import numpy as np
+
+from ecu.control.demand import requested_decel, wheel_torque_demand
+from ecu.control.limiter import LIMITER_STATE, limit_pressure
+from ecu.control.mode import MODE_STATE, decide_mode, input_faults
+from ecu.control.pressure_law import (
+    PRESSURE_LAW_STATE,
+    compensated_pressure,
+    follow_friction,
+    level_left_right,
+    pressure_for_torque,
+    set_base,
+)
+from ecu.diagnostics.faults import DEMAND_LIMITED, FILTER_RESET
+from ecu.estimation.force import FORCE_STATE, reset_force, total_tyre_force, update_force
+from ecu.estimation.friction import (
+    FRICTION_STATE,
+    hand_over,
+    restore_friction,
+    update_friction,
+    update_pressure,
+)
+from ecu.estimation.motion import MOTION_STATE, update_motion, usable
+from ecu.estimation.observer2 import OBSERVER_STATE
+from ecu.estimation.slip import (
+    RADIUS_START,
+    WHEELS_STATE,
+    expect_slip,
+    learn_radius,
+    update_radius,
+    update_slip,
+)
+from ecu.estimation.speed import SPEED_STATE, update_speed
+from ecu.estimation.wheel_load import WHEEL_LOAD_STATE, update_wheel_load
+from ecu.jit import Record, kernel
+from ecu.monitoring.application import APPLICATION_STATE, update_application
+from ecu.records import LEARNED, RecordArray
+from ecu.signals import ACCEL_X, CALLIPER_PRESSURE, FAILED, STARTING
+
+BAR = 1e5
+
+STATE = np.dtype(
+    [
+        ("motion", MOTION_STATE),
+        ("wheel_load", WHEEL_LOAD_STATE),
+        ("speed", SPEED_STATE),
+        ("wheels", WHEELS_STATE),
+        ("force", FORCE_STATE),
+        ("observer", OBSERVER_STATE),
+        ("friction", FRICTION_STATE),
+        ("application", APPLICATION_STATE),
+        ("control", PRESSURE_LAW_STATE),
+        ("limiter", LIMITER_STATE),
+        ("mode", MODE_STATE),
+        ("learned", LEARNED),
+    ],
+    align=True,
+)
+
+
+def new_state(params: RecordArray, learned: RecordArray | None = None) -> RecordArray:
+    """Return the state before the first cycle, shape (1,).
+
+    Args:
+        params: `PARAMS`, shape (1,).
+        learned: `LEARNED`, shape (1,), as the state store keeps it; None: nothing is known.
+    """
+    state = np.zeros(1, STATE)
+    row = state[0]
+    if learned is None:
+        row["learned"]["radius_sigma"] = RADIUS_START
+    else:
+        row["learned"] = learned[0]
+    row["control"]["mu_override"] = math.nan
+    row["force"]["k_f"] = 1.0
+    _begin(params, state)
+    return state
+
+
+@kernel
+def _begin(params: Record, state: Record) -> None:
+    p, s = params[0], state[0]
+    restore_friction(p, s.friction, s.learned)
+    set_base(s.control, s.learned)
+    update_wheel_load(p, s.wheel_load, 0.0, 0.0, 1.0)
+    update_radius(p, s.wheels, s.learned, s.wheel_load.load)
+
+
+@kernel
+def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None:
+    """Run one cycle.
+
+    Args:
+        params: `PARAMS`, shape (1,), read only.
+        state: `STATE`, shape (1,), overwritten.
+        inputs: `INPUTS`, shape (1,), read only.
+        outputs: `OUTPUTS`, shape (1,), overwritten; NaN where nothing is known.
+    """
+    p, s, u, y = params[0], state[0], inputs[0], outputs[0]
+    dt = 1e-9 * u.dt_ns
+    _estimate(p, s, u, dt)
+    decel = _control(p, s, u, y, dt)
+    faults = u.bus_faults | input_faults(p, u)
+    if s.friction.reset:
+        faults |= FILTER_RESET
+    if s.limiter.limited:
+        faults |= DEMAND_LIMITED
+    asked = math.isfinite(decel) and decel > 0.05
+    mode = decide_mode(s.mode, faults, asked or s.application.braking != 0, dt)
+    _publish(p, s, u, y, decel, faults, mode)
+
+
+@kernel
+def _estimate(p: Record, s: Record, u: Record, dt: float) -> None:
+    update_application(p, s.application, u, dt)
+    if s.application.ended:
+        hand_over(s.friction, s.learned)
+    if s.application.started:
+        reset_force(s.force)
+    braking = s.application.braking != 0
+    if not braking:
+        set_base(s.control, s.learned)
+    update_motion(p, s.motion, u, s.speed.speed, s.friction.torque)
+    update_wheel_load(p, s.wheel_load, s.motion.accel_x, s.motion.accel_y, dt)
+    update_radius(p, s.wheels, s.learned, s.wheel_load.load)
+    update_pressure(p, s.friction, u, dt)
+    s.force.total = total_tyre_force(p, s.motion, s.speed.speed)
+    expect_slip(p, s.wheels, u, s.wheel_load.load, s.force.total, s.friction.torque)
+    update_speed(p, s.speed, s.motion, s.wheels, s.learned, u, braking, dt)
+    accel = s.motion.accel_x - s.speed.bias
+    update_slip(p, s.wheels, s.motion, u, s.speed.speed, accel, dt)
+    if s.speed.started:
+        learn_radius(p, s.wheels, s.learned, s.motion, u, s.speed, braking, dt)
+    regress = braking and s.speed.speed > p.min_speed and usable(u, ACCEL_X)
+    update_force(p, s.force, s.wheels, s.wheel_load.load, regress)
+    update_friction(
+        p, s.friction, s.observer, s.learned, u, s.motion, s.wheels, s.wheel_load.load, s.force, s.speed,
+        s.application, dt,
+    )  # fmt: skip
+
+
+@kernel
+def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
+    decel = requested_decel(p, u)
+    if p.compensate:
+        follow_friction(s.control, s.friction.mu, dt)
+    s.limiter.limited = 0
+    for i in range(4):
+        torque = wheel_torque_demand(p, decel, i)
+        y.pressure_uncompensated[i] = pressure_for_torque(p, torque, s.control.base[i], i)
+        y.pressure_demand[i] = compensated_pressure(p, s.control, y.pressure_uncompensated[i], i)
+    level_left_right(y.pressure_demand, y.pressure_uncompensated)
+    for i in range(4):
+        torque = wheel_torque_demand(p, decel, i)
+        wanted, uncompensated = y.pressure_demand[i], y.pressure_uncompensated[i]
+        y.pressure_demand[i] = limit_pressure(p, s.limiter, i, wanted, uncompensated, torque, dt) / BAR
+        y.pressure_uncompensated[i] = uncompensated / BAR
+    return decel
+
+
+@kernel
+def _publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: int, mode: int) -> None:
+    started = s.speed.started != 0
+    y.vehicle_speed = s.speed.speed if started else math.nan
+    y.k_f = s.force.k_f
+    y.mode = mode
+    y.active_faults = faults
+    y.overruns = u.overruns
+    y.worst_lateness_us = u.worst_lateness_us
+    y.pressure_demand_valid = 1.0 if p.transmit and mode != STARTING and mode != FAILED else 0.0
+    y.motor_demand_valid = 0.0
+    y.decel_demand_total = decel
+    y.accel_x_road = s.motion.accel_x
+    y.braking = s.application.braking
+    y.particles_last_brake = y.particles_per_km = math.nan
+    for i in range(4):
+        y.slip[i] = s.wheels.slip[i] if started else math.nan
+        y.wheel_force_x[i] = s.force.virtual[i] if started else math.nan
+        y.wheel_force_z[i] = s.wheel_load.load[i]
+        y.mu_b[i] = s.friction.mu[i]
+        y.sigma_mu_b[i] = s.friction.sigma[i]
+        y.mode_mu_b[i] = s.friction.mode[i]
+        y.brake_torque[i] = s.friction.torque[i]
+        y.calliper_pressure[i] = u.value[CALLIPER_PRESSURE + i]
+        y.motor_demand[i] = y.disc_temperature[i] = math.nan
+        y.pad_wear[i] = y.pad_remaining[i] = y.pad_wear_mass[i] = math.nan
+        if mode == FAILED:
+            y.pressure_demand[i] = 0.0

@@ -1,0 +1,146 @@
+"""Plant files: the shipped cars, drawn cars, one line for every mistake."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from brakelab.plant.description import Plant, PlantFileError, draw, load_plant, nominal
+
+CONFIG = Path(__file__).parents[3] / "config" / "plant"
+SEEDS = range(60)
+
+
+@pytest.mark.parametrize(
+    ("name", "mass", "base", "friction"),
+    [
+        ("suv", 2105, 2.665, (0.3825, 0.495)),
+        ("suv14", 2105, 2.665, (0.3825, 0.495)),
+        ("sedan", 2100, 3.07, (0.43, 0.39)),
+        ("lcv", 1900, 3.0, (0.42, 0.41)),
+    ],
+)
+def test_shipped_cars_are_those_of_appendix_d(
+    name: str, mass: float, base: float, friction: tuple[float, float]
+) -> None:
+    plant = load_plant(CONFIG / f"{name}.toml")
+    body = plant.vehicle.body
+    assert body.mass == mass
+    assert body.front_length + body.rear_length == pytest.approx(base)
+    assert (plant.brake(0).friction_nominal, plant.brake(3).friction_nominal) == friction
+    assert nominal(plant)["mass"] == mass
+
+
+@pytest.mark.parametrize(
+    ("field", "spread"),
+    [
+        ("mass", 0.03),
+        ("cog_height", 0.05),
+        ("free_radius", 0.003),
+        ("slip_stiffness", 0.16),
+        ("wheel_inertia", 0.1),
+        ("push_out_pressure", 0.3 / 0.5),
+    ],
+)
+def test_drawn_cars_spread_as_far_as_they_should(suv: Plant, field: str, spread: float) -> None:
+    base = nominal(suv)[0][field]
+    ratio = np.array([draw(suv, seed)[0][field] / base - 1.0 for seed in SEEDS])
+    assert np.all(np.abs(ratio) <= spread * 1.02)
+    assert np.ptp(ratio) > 1.6 * spread
+
+
+def test_slip_stiffness_varies_with_the_car_and_little_between_axles(suv: Plant) -> None:
+    stiffness = np.array([draw(suv, seed)[0]["slip_stiffness"] for seed in SEEDS])
+    between = stiffness[:, 2] / stiffness[:, 0] - 1.0
+    assert 0.01 < np.abs(between).max() <= 0.0203
+    assert np.all(stiffness[:, ::2] == stiffness[:, 1::2])
+
+
+def test_wheel_radii_differ_from_each_other(suv: Plant) -> None:
+    assert len(set(draw(suv, 1)[0]["free_radius"])) == 4
+
+
+def test_what_is_not_drawn_stays(suv: Plant) -> None:
+    drawn, base = draw(suv, 5)[0], nominal(suv)[0]
+    for name in ("friction_scale", "track", "vertical_stiffness", "nominal_load", "friction_row"):
+        assert np.array_equal(drawn[name], base[name])
+
+
+def test_same_seed_same_car(suv: Plant) -> None:
+    assert draw(suv, 11).tobytes() == draw(suv, 11).tobytes() != draw(suv, 12).tobytes()
+
+
+@pytest.mark.parametrize(
+    ("edit", "place"),
+    [
+        (lambda text: text.replace("mass = 2105.0", "mass = -1.0"), "body.mass"),
+        (lambda text: text.replace("track = 1.625", ""), "body.track"),
+        (lambda text: text.replace("[motor]", "[motor]\ncolour = 3"), "motor.colour"),
+        (lambda text: text.replace('lining = "A"', 'lining = "Z"'), "brake_front.lining"),
+        (lambda text: text.replace('lining = "A"', 'lining = "A"\nfriction = "Z"'), "brake_front.friction"),
+        (lambda text: text.replace("[body]", "[body"), "not valid TOML"),
+    ],
+)
+def test_a_mistake_in_a_plant_file_is_one_line(
+    tmp_path: Path, edit: Callable[[str], str], place: str
+) -> None:
+    path = tmp_path / "car.toml"
+    path.write_text(edit((CONFIG / "suv.toml").read_text()))
+    (tmp_path / "linings.toml").write_text((CONFIG / "linings.toml").read_text())
+    with pytest.raises(PlantFileError) as caught:
+        load_plant(path)
+    assert caught.value.place == place
+    assert "\n" not in caught.value.remedy
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(PlantFileError, match=r"nowhere\.toml"):
+        load_plant(tmp_path / "nowhere.toml")
+
+
+def test_a_suspension_makes_the_difference_between_the_two_sport_utility_vehicles(suv: Plant) -> None:
+    full = load_plant(CONFIG / "suv14.toml")
+    assert nominal(full)["suspended"] == 1
+    assert nominal(suv)["suspended"] == 0
+    for section in ("body", "tyre", "brake_front", "brake_rear", "hydraulics", "sensor"):
+        assert getattr(full.vehicle, section) == getattr(suv.vehicle, section)
+
+
+@pytest.mark.parametrize(
+    ("edit", "place", "remedy"),
+    [
+        (
+            lambda text: text.replace("[tyre]", "[attitude]\nfrequency = 1\n[tyre]"),
+            "attitude.damping",
+            "required",
+        ),
+        (lambda text: text.replace("[suspension]", "[spring]"), "spring", "not permitted"),
+        (lambda text: text.replace("-0.3, -0.1, 0.0", "-0.3, -0.4, 0.0"), "suspension", "rising speeds"),
+        (lambda text: text.replace("0.0, 300.0", "0.0, -300.0"), "suspension", "sign"),
+        (lambda text: text.replace("magic_c", "burckhardt_fall = 0.4\nmagic_c"), "tyre", "either"),
+        (lambda text: text.replace("magic_e = 0.2", ""), "tyre", "either"),
+        (lambda text: text.replace("peak_power", "# "), "motor", "or neither"),
+        (lambda text: text.replace("peak_torque = 2", "peak_torque = 1"), "motor", "not below"),
+        (lambda text: text[: text.index("[suspension]")] + text[text.index("[tyre]") :], "", "either"),
+    ],
+)
+def test_a_mistake_in_a_chassis_is_one_line(
+    tmp_path: Path, edit: Callable[[str], str], place: str, remedy: str
+) -> None:
+    path = tmp_path / "car.toml"
+    path.write_text(edit((CONFIG / "suv14.toml").read_text()))
+    (tmp_path / "linings.toml").write_text((CONFIG / "linings.toml").read_text())
+    with pytest.raises(PlantFileError) as caught:
+        load_plant(path)
+    assert caught.value.place == place
+    assert remedy in caught.value.remedy
+    assert "\n" not in caught.value.remedy
+
+
+def test_a_file_may_choose_burckhardts_tyre(tmp_path: Path) -> None:
+    path = tmp_path / "car.toml"
+    text = (CONFIG / "suv14.toml").read_text()
+    path.write_text(text.replace("magic_c = 1.6", "burckhardt_fall = 0.406").replace("magic_e = 0.2", ""))
+    (tmp_path / "linings.toml").write_text((CONFIG / "linings.toml").read_text())
+    assert nominal(load_plant(path))["burckhardt_fall"] == 0.406

@@ -1,0 +1,155 @@
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from brakelab.report.command import report
+from brakelab.report.look import DARK
+from ecu.errors import UserError
+
+Files = dict[str, Path]
+
+
+def change(path: Path, edit: Callable[[pa.Table], pa.Table]) -> None:
+    pq.write_table(edit(pq.read_table(path)), path)
+
+
+def column(name: str, values: object) -> Callable[[pa.Table], pa.Table]:
+    def edit(table: pa.Table) -> pa.Table:
+        return table.set_column(table.column_names.index(name), name, pa.array(values))
+
+    return edit
+
+
+def cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-100])
+
+
+def written(files: Files, truth: bool = True, timing: bool = True) -> str:
+    out = files["result"].with_name("new") / "report.html"
+    report(files["result"], files["truth"] if truth else None, out, files["timing"] if timing else None)
+    return out.read_text("utf-8")
+
+
+def visible(page: str) -> str:
+    body = re.sub(r"<(script|style).*?</\1>", "", page, flags=re.DOTALL)
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", body))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Vehicle SUV",
+        "Configuration 0123456789ab",
+        "1 June 2024, 11:06:40 UTC",
+        "4.00 4.16 0.380 0.380 0.490 0.500 80 80 600",
+        "Missed periods 2 of 6000",
+        "Achieved over demanded \N{MINUS SIGN}3.0 %",
+        "request lost 50.01",
+        "lateness",
+    ],
+)
+def test_page_says(drive_files: Files, text: str) -> None:
+    assert text in visible(written(drive_files))
+
+
+def test_page_is_small_and_names_no_address(drive_files: Files) -> None:
+    page = written(drive_files)
+    assert len(page.encode()) < 3_000_000
+    assert not re.search(r"<(script|link|img|iframe)[^>]+(src|href)=", page)
+    assert "default-src 'none'" in page
+
+
+def test_long_drive_stays_small(drive_files: Files) -> None:
+    def longer(table: pa.Table) -> pa.Table:
+        many = pa.concat_tables([table] * 20)
+        return many.set_column(0, "t", pa.array(np.arange(many.num_rows) * 0.01))
+
+    change(drive_files["result"], lambda table: longer(table.select(["t", *set(table.column_names) - {"t"}])))
+    page = written(drive_files)
+    assert len(page.encode()) < 3_000_000
+    assert "the smallest and the largest value" in page
+
+
+def test_without_truth_and_timing_their_tables_are_absent(drive_files: Files) -> None:
+    text = visible(written(drive_files, truth=False, timing=False))
+    assert "nRMSE" not in text
+    assert "Loop timing" not in text
+
+
+def test_columns_of_the_contract_alone_are_enough(drive_files: Files) -> None:
+    names = ["t", "vehicle_speed", *(f"mu_b_{corner}" for corner in ("fl", "fr", "rl", "rr"))]
+    change(drive_files["result"], lambda table: table.select(names))
+    drive_files["brakes"].unlink()
+    assert "No braking was found" in visible(written(drive_files))
+
+
+def test_names_from_outside_are_text(drive_files: Files) -> None:
+    change(
+        drive_files["result"], lambda table: table.replace_schema_metadata({"vehicle": "<script>alert(1)"})
+    )
+    assert "&lt;script&gt;alert(1)" in written(drive_files)
+
+
+def test_truth_is_shifted_by_the_absolute_starts(drive_files: Files) -> None:
+    early = {"start_time_ns": str(1717240000000000000 - 1_000_000_000)}
+
+    def start_earlier(table: pa.Table) -> pa.Table:
+        moved = pa.array(table.column("t").to_numpy() + 1.0)
+        return table.set_column(0, "t", moved).replace_schema_metadata(early)
+
+    plain = visible(written(drive_files))
+    change(drive_files["truth"], start_earlier)
+    row = re.compile(r"front (\S+) (\S+) \d+ \S+ rear")
+    assert row.search(visible(written(drive_files))).groups() == row.search(plain).groups()  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(
+    ("file", "damage", "line"),
+    [
+        ("result", lambda path: path.unlink(), r"stops\.parquet: no such file: give a RESULT"),
+        ("result", cut, r"stops\.parquet: not a readable Parquet file"),
+        ("result", lambda path: path.write_bytes(b""), r"stops\.parquet: not a readable Parquet file"),
+        ("result", lambda path: change(path, lambda t: t.drop_columns("mu_b_rl")), r"mu_b_rl: missing"),
+        ("result", lambda path: change(path, lambda t: t.slice(0, 0)), r"0 rows"),
+        ("result", lambda path: change(path, column("t", np.zeros(6000))), r"column t, row 1: time must"),
+        ("result", lambda path: change(path, column("mu_b_fl", ["x"] * 6000)), r"mu_b_fl: holds string"),
+        ("truth", lambda path: path.unlink(), r"stops\.truth\.parquet: no such file: give the NAME"),
+        ("truth", lambda path: change(path, lambda t: t.drop_columns("mu_b_fr")), r"column mu_b_fr: missing"),
+        ("truth", lambda path: change(path, column("t", 1e4 + np.arange(6000.0))), r"the truth of the same"),
+        ("brakes", cut, r"stops\.brakes\.parquet: not a readable Parquet file"),
+        ("brakes", lambda path: change(path, lambda t: t.drop_columns("v_in")), r"column v_in: missing"),
+        ("brakes", lambda path: change(path, lambda t: t.slice(0, 3)), r"brake 0: needs one row each for fl"),
+        ("timing", lambda path: (path / "recording.json").unlink(), r"no recording here"),
+        ("timing", lambda path: (path / "cycles.bin").write_bytes(b"torn"), r"no cycle in it"),
+    ],
+)  # fmt: skip
+def test_damage_gives_one_line(
+    drive_files: Files, file: str, damage: Callable[[Path], None], line: str
+) -> None:
+    damage(drive_files[file])
+    with pytest.raises(UserError, match=line) as caught:
+        written(drive_files)
+    assert "\n" not in str(caught.value)
+
+
+def test_place_that_cannot_be_written(drive_files: Files) -> None:
+    with pytest.raises(UserError, match="choose another --out"):
+        report(drive_files["result"], None, drive_files["result"] / "report.html")
+
+
+def test_dark_colours_can_be_taken_back() -> None:
+    assert len(set(DARK.values())) == len(DARK)
+    assert not set(DARK) & set(DARK.values())
+
+
+@pytest.mark.parametrize("name", ["result", "truth"])
+def test_an_input_is_never_overwritten(drive_files: Files, name: str) -> None:
+    before = drive_files[name].read_bytes()
+    with pytest.raises(UserError, match=f"^--out: .*would overwrite {drive_files[name]}"):
+        report(drive_files["result"], drive_files["truth"], drive_files[name])
+    assert drive_files[name].read_bytes() == before

@@ -1,0 +1,68 @@
+"""The page in a real browser: every plot drawn, nothing on the console, nothing asked of the network."""
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from brakelab.report.command import report
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium here (apt-get install chromium)")
+
+OPTIONS = (
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync",
+    "--disable-background-networking", "--disable-component-update", "--enable-logging=stderr",
+    "--virtual-time-budget=10000", "--window-size=1400,3600",
+)  # fmt: skip
+
+# Leaves what it saw in the title, which --dump-dom shows.
+PROBE = """<script>
+setTimeout(() => {
+  const canvases = [], look = (node) => {
+    if (node.tagName === "CANVAS") canvases.push(node);
+    for (const child of [...node.children, ...(node.shadowRoot ? node.shadowRoot.children : [])]) look(child);
+  };
+  const inked = (canvas) => canvas.width > 0 &&
+    canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data.some((byte) => byte > 0);
+  const drawn = [...document.querySelectorAll(".plots figure")].filter((figure) => {
+    canvases.length = 0;
+    look(figure);
+    return canvases.some(inked);
+  });
+  document.querySelectorAll("button[data-from]")[1].click();
+  const range = [...Bokeh.documents[0].all_models].find((model) => model.name === "drive-time");
+  const colours = [...Bokeh.documents[0].all_models].flatMap((model) => model.axis_label_text_color ?? []);
+  document.title = JSON.stringify({
+    figures: document.querySelectorAll(".plots figure").length, drawn: drawn.length,
+    loaded: performance.getEntriesByType("resource").map((entry) => entry.name),
+    window: [range.start, range.end], ink: [...new Set(colours)].map((colour) => colour.value ?? colour),
+    overflow: document.documentElement.scrollWidth - innerWidth,
+  });
+}, 6000);
+</script></body>"""
+
+
+@pytest.mark.parametrize(("scheme", "ink"), [(1, "#1b1f24"), (0, "#e8ebef")], ids=["light", "dark"])
+def test_every_plot_is_drawn(drive_files: dict[str, Path], tmp_path: Path, scheme: int, ink: str) -> None:
+    page = tmp_path / "report.html"
+    report(drive_files["result"], drive_files["truth"], page, drive_files["timing"])
+    probed = tmp_path / "probed.html"
+    probed.write_text(page.read_text("utf-8").replace("</body>", PROBE), "utf-8")
+    profile = f"--user-data-dir={tmp_path / 'profile'}"
+    shade = f"--blink-settings=preferredColorScheme={scheme}"
+    command = [str(CHROMIUM), *OPTIONS, profile, shade, "--dump-dom", probed.as_uri()]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+    title = re.search(r"<title>(.*?)</title>", done.stdout)
+    assert title, done.stderr[-2000:]
+    seen = json.loads(title[1])
+    assert seen["figures"] == seen["drawn"] == 12
+    assert seen["loaded"] == []
+    assert seen["window"] == pytest.approx([21.5, 27.13], abs=0.05)
+    assert seen["ink"] == [ink]
+    assert seen["overflow"] <= 0
+    console = [line for line in done.stderr.splitlines() if "CONSOLE" in line]
+    assert [line for line in console if "document idle" not in line and "log level" not in line] == []

@@ -1,0 +1,165 @@
+"""The vehicle in real time, on a clock and a bus of the test."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from brakelab.closed_loop import plans
+from brakelab.scenario import Scenario, load_scenario
+from brakelab.vehicle_bus import TRUTH_COLUMNS
+from brakelab.vehicle_node import drive_in_real_time, main, new_node, write_truth_file
+from ecu.bus.channel import BusStatus
+from ecu.bus.transmit import frame_buffer, new_transmission, transmit
+from ecu.clock import TimeSource
+from ecu.records import RecordArray
+from ecu.signals import N_OUTPUTS, OUTPUT
+
+CONFIG = Path(__file__).parents[2] / "config"
+EPOCH_NS = 1_700_000_000_000_000_000
+
+
+class FakeClock:
+    """Time passes only in sleep, which oversleeps where the test says so."""
+
+    def __init__(self, late: dict[int, int] | None = None) -> None:
+        self.now_ns, self.naps, self.late = 5_000_000_000, 0, late or {}
+
+    def source(self) -> TimeSource:
+        return TimeSource(lambda: self.now_ns, lambda: self.now_ns + EPOCH_NS, self.sleep)
+
+    def sleep(self, deadline_ns: int) -> None:
+        self.naps += 1
+        self.now_ns = deadline_ns + self.late.get(self.naps, 0)
+
+
+class FakeBus:
+    """Keeps what is sent; `ecu` answers every cycle with these pressure demands [bar], or nobody does."""
+
+    name = "fake"
+
+    def __init__(self, clock: FakeClock, ecu: float | None = None) -> None:
+        self.sent: list[RecordArray] = []
+        self.clock, self.ecu = clock, ecu
+        self.plan = plans().ecu_sends
+        self.transmission, self.frames = new_transmission(self.plan), frame_buffer(self.plan)
+        self.cycle = 0
+
+    def drain(self, frames: RecordArray, start: int) -> int:
+        self.cycle += 1
+        if self.ecu is None:
+            return 0
+        values = np.full(N_OUTPUTS, np.nan)
+        first = OUTPUT["pressure_demand_fl"]
+        values[first : first + 4] = self.ecu
+        values[OUTPUT["pressure_demand_valid"]] = 1.0
+        count: int = transmit(self.plan, self.transmission, values, self.cycle, self.frames)
+        self.frames["stamp_ns"] = self.clock.now_ns + EPOCH_NS - 1_000_000
+        frames[start : start + count] = self.frames[:count]
+        return count
+
+    def send(self, frames: RecordArray, count: int) -> int:
+        self.sent.append(frames[:count].copy())
+        return count
+
+    def status(self) -> BusStatus:
+        return BusStatus(False, False, 0, 0)
+
+    def close(self) -> None:
+        pass
+
+
+def scenario(seconds: float) -> Scenario:
+    """Return a braking of this length from 120 km/h."""
+    whole = load_scenario(CONFIG / "scenarios" / "stop-1.toml")
+    brake = whole.phase[1].model_copy(update={"until_speed": None, "seconds": seconds})
+    return whole.model_copy(update={"phase": [brake]})
+
+
+def column(values: Any, name: str) -> Any:
+    return values[:, TRUTH_COLUMNS.index(name)]
+
+
+def test_frames_leave_every_10_ms_with_running_counters() -> None:
+    clock = FakeClock()
+    bus = FakeBus(clock)
+    truth = drive_in_real_time(new_node(scenario(0.5), 1), bus, clock.source())
+    assert len(bus.sent) == len(truth.t) == 50
+    speed = [frames[frames["can_id"] == 0x70] for frames in bus.sent]
+    assert [len(found) for found in speed] == [1] * 50
+    assert [int(found[0]["data"][1] & 0xF) for found in speed] == [k % 15 for k in range(50)]
+    assert truth.start_ns == EPOCH_NS + 5_010_000_000
+    assert np.allclose(np.diff(truth.t), 0.01)
+
+
+def test_without_an_ecu_the_hydraulics_brake() -> None:
+    clock = FakeClock()
+    truth = drive_in_real_time(new_node(scenario(2.0), 1), FakeBus(clock), clock.source())
+    assert column(truth.values, "accel_x_road")[-1] == pytest.approx(-4.0, rel=0.25)
+
+
+def test_demands_of_the_ecu_are_obeyed() -> None:
+    clock = FakeClock()
+    truth = drive_in_real_time(new_node(scenario(1.0), 1), FakeBus(clock, ecu=22.0), clock.source())
+    assert column(truth.values, "calliper_pressure_rr")[-1] == pytest.approx(22.0, abs=0.2)
+
+
+def test_missed_periods_are_lived_through() -> None:
+    lost = 5
+    on_time, late = FakeClock(), FakeClock({20: lost * 10_000_000 + 1_000_000})
+    punctual = drive_in_real_time(new_node(scenario(1.0), 1), FakeBus(on_time), on_time.source())
+    delayed = drive_in_real_time(new_node(scenario(1.0), 1), FakeBus(late), late.source())
+    assert len(punctual.t) - len(delayed.t) == lost
+    assert delayed.t[-1] == pytest.approx(punctual.t[-1])
+    assert np.allclose(
+        column(delayed.values, "vehicle_speed")[-1], column(punctual.values, "vehicle_speed")[-1]
+    )
+
+
+def test_frames_are_lost_as_often_as_asked_and_always_the_same() -> None:
+    def sent(share: float, seed: int) -> list[int]:
+        clock = FakeClock()
+        bus = FakeBus(clock)
+        drive_in_real_time(new_node(scenario(5.0), 1), bus, clock.source(), share, seed)
+        return [len(frames) for frames in bus.sent]
+
+    all_of_them, some = sum(sent(0.0, 1)), sent(0.05, 1)
+    assert sum(some) / all_of_them == pytest.approx(0.95, abs=0.01)
+    assert sent(0.05, 1) == some != sent(0.05, 2)
+
+
+def test_it_leaves_when_it_is_told_to() -> None:
+    clock = FakeClock()
+    bus = FakeBus(clock)
+    truth = drive_in_real_time(
+        new_node(scenario(60.0), 1), bus, clock.source(), stopped=lambda: len(bus.sent) >= 7
+    )
+    assert len(truth.t) == 7
+
+
+def test_truth_file_knows_when_it_started(tmp_path: Path) -> None:
+    clock = FakeClock()
+    truth = drive_in_real_time(new_node(scenario(0.2), 1), FakeBus(clock), clock.source())
+    path = tmp_path / "new" / "truth.parquet"
+    write_truth_file(path, truth, "short", 1)
+    table = pq.read_table(path)
+    assert table.num_rows == 20
+    assert int(table.schema.metadata[b"start_time_ns"]) == truth.start_ns
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["nowhere", "-i", "virtual", "-c", "x"], "nowhere"),
+        (["stop-1", "-i", "no-such-interface", "-c", "x"], "no-such-interface"),
+    ],
+)
+def test_a_mistake_is_one_line_and_exit_code_2(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 2
+    line = capsys.readouterr().err.strip().splitlines()
+    assert len(line) == 1
+    assert said in line[0]

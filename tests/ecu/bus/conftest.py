@@ -1,0 +1,68 @@
+"""Where the repository's databases and the recorded drives are, and frames for kernels."""
+
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import settings
+
+from ecu.records import FRAME, RecordArray
+
+# The first call of a kernel compiles it.
+settings.register_profile("kernels", deadline=None)
+settings.load_profile("kernels")
+
+ROOT = Path(__file__).parents[3]
+LINE = re.compile(r"\((\d+)\.(\d{6})\) (\S+) ([0-9A-F]+)#([0-9A-F]*)")
+
+
+@pytest.fixture(scope="session")
+def root() -> Path:
+    return ROOT
+
+
+@pytest.fixture(scope="session")
+def contract() -> Path:
+    return ROOT / "dbc" / "brake_ecu.dbc"
+
+
+@pytest.fixture(scope="session")
+def drives() -> Path:
+    folder = Path(os.environ.get("BRAKE_ECU_SHARED") or ROOT.parent / "shared") / "drives"
+    if not folder.is_dir():
+        pytest.skip("the recorded drives are not beside the checkout (set BRAKE_ECU_SHARED)")
+    return folder
+
+
+def _frame(stamp_ns: int, can_id: int, data: bytes, flags: int = 0) -> RecordArray:
+    frames = np.zeros(1, FRAME)
+    frames["stamp_ns"], frames["can_id"], frames["flags"] = stamp_ns, can_id, flags
+    frames["length"] = len(data)
+    frames["data"][0, : len(data)] = np.frombuffer(data, np.uint8)
+    return frames
+
+
+@pytest.fixture(scope="session")
+def frame() -> Callable[..., RecordArray]:
+    """frame(stamp_ns, can_id, data, flags=0) -> one FRAME, shape (1,)."""
+    return _frame
+
+
+@pytest.fixture(scope="session")
+def read_log() -> Callable[[Path, str], RecordArray]:
+    """read_log(path, bus) -> the frames of one interface of a candump log."""
+
+    def read(path: Path, bus: str) -> RecordArray:
+        lines = (LINE.match(line) for line in path.read_text().splitlines())
+        return np.concatenate(
+            [
+                _frame((int(m[1]) * 1_000_000 + int(m[2])) * 1000, int(m[4], 16), bytes.fromhex(m[5]))
+                for m in lines
+                if m is not None and m[3] == bus
+            ]
+        )
+
+    return read

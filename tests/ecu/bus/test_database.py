@@ -1,0 +1,94 @@
+"""A database that cannot be used gives one line: where, what, and what would mend it."""
+
+from pathlib import Path
+
+import pytest
+
+from ecu.bus.database import attribute, find_message, find_signal, load_database
+from ecu.errors import UserError
+
+HEAD = 'VERSION ""\nNS_ :\nBS_:\nBU_: A\n'
+OVERLAP = HEAD + 'BO_ 1 M: 8 A\n SG_ one : 0|8@1+ (1,0) [0|0] "" A\n SG_ two : 4|8@1+ (1,0) [0|0] "" A\n'
+OUTSIDE = HEAD + 'BO_ 1 M: 1 A\n SG_ one : 4|8@1+ (1,0) [0|0] "" A\n'
+SYNTAX = HEAD + 'BO_ 1 M: 8 A\n SG_ one : 0|8@1+ (.5,0) [0|0] "" A\n'
+
+
+SYNTAX_NEAR = 'SG_ one : 0|8@1+ (».5,0) [0|0] "" A'
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        (OVERLAP, "M.two: overlaps one; if that is meant, set strict = false in the map"),
+        (OUTSIDE, "M.one: does not fit its message; if it is not used, set strict = false in the map"),
+        (SYNTAX, "line 6, column 20: syntax not understood at » in: " + SYNTAX_NEAR + "; mend that line"),
+        ("", "line 1, column 1: syntax not understood at » in: »; mend that line"),
+        ("hello", "line 1, column 1: syntax not understood at » in: »hello; mend that line"),
+    ],
+)
+def test_refusal_is_one_line(tmp_path: Path, text: str, line: str) -> None:
+    path = tmp_path / "car.dbc"
+    path.write_text(text)
+    with pytest.raises(UserError) as refusal:
+        load_database(path)
+    assert str(refusal.value) == f"{path}: {line}"
+
+
+def test_what_is_only_strictly_refused_loads_when_asked(tmp_path: Path) -> None:
+    path = tmp_path / "car.dbc"
+    path.write_text(OVERLAP)
+    assert [signal.name for signal in load_database(path, strict=False).messages[0].signals] == ["one", "two"]
+
+
+def test_missing_file() -> None:
+    with pytest.raises(UserError, match="no such file"):
+        load_database(Path("nowhere.dbc"))
+
+
+def test_names_that_are_missing_get_a_hint(contract: Path) -> None:
+    database = load_database(contract)
+    with pytest.raises(UserError, match=r"^map.toml: inputs.x.message: .*did you mean WheelSpeedFront"):
+        find_message(database, "WheelSpedFront", Path("map.toml"), "inputs.x.message")
+    with pytest.raises(
+        UserError, match=r"^map.toml: x.signal: message Imu has no signal accel_z; did you mean accel_"
+    ):
+        find_signal(database.get_message_by_name("Imu"), "accel_z", contract, Path("map.toml"), "x.signal")
+
+
+def test_attributes(contract: Path) -> None:
+    database = load_database(contract)
+    assert attribute(database.get_message_by_name("VehicleSpeed"), "CycleTimeSlowest") == 100
+    assert attribute(database.get_message_by_name("EcuStatus"), "E2EDataId") == 0
+
+
+@pytest.mark.drives
+@pytest.mark.parametrize(
+    ("name", "strict", "lenient"),
+    [
+        ("toyota_new_mc_pt_generated", "PCS_HUD.PCS_TEMP: overlaps SET_ME_X10", ""),
+        ("toyota_nodsu_pt_generated", "PCS_HUD.PCS_TEMP: overlaps SET_ME_X10", ""),
+        ("hyundai_canfd_generated", "SCC_CONTROL.SCC_ObjSta: overlaps ZEROS_10", ""),
+        ("vw_mqb", "PLA_01.PLA_Bremsverzoegerung: overlaps PLA_Bremsmoment", ""),
+        ("hyundai_can_generated", "line 1659, column 5: syntax", "line 1659, column 5: syntax"),
+        (
+            "honda_civic_touring_2016_can_generated",
+            "line 211, column 13: syntax",
+            "line 211, column 13: syntax",
+        ),
+        (
+            "chrysler_pacifica_2017_hybrid_generated",
+            "line 20, column 33: syntax",
+            "line 20, column 33: syntax",
+        ),
+    ],
+)
+def test_databases_of_real_cars_that_are_refused(drives: Path, name: str, strict: str, lenient: str) -> None:
+    path = drives / "dbc" / f"{name}.dbc"
+    with pytest.raises(UserError) as refusal:
+        load_database(path)
+    assert strict in str(refusal.value)
+    if lenient:
+        with pytest.raises(UserError, match=lenient):
+            load_database(path, strict=False)
+    else:
+        assert load_database(path, strict=False).messages

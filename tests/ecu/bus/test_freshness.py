@@ -1,0 +1,134 @@
+"""Samples to verdicts: time-outs, rates, ranges, old and invalid samples."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ecu.bus.freshness import accept, begin_cycle, end_cycle, new_freshness, target_dtype
+from ecu.records import RecordArray
+from ecu.signals import ALIVE, RATE_OK, VALID
+
+MS = 1_000_000
+T0 = 1_700_000_000_000_000_000
+
+
+class Signal:
+    """One target place, with a time-out of 0.1 s, a period of 10 ms and a range of 0 to 100."""
+
+    def __init__(self, period_s: float = 0.01, slowest_s: float | None = None) -> None:
+        self.inputs: RecordArray = np.zeros(1, target_dtype(1))
+        self.freshness = new_freshness([0.1], [period_s], [slowest_s or period_s], [0.0], [100.0])
+
+    def cycle(self, ms: float, *samples: tuple[float, float, bool]) -> tuple[float, int, int]:
+        """Take samples (stamp in ms, value, valid) in the cycle that ends at `ms`; value, new, verdict."""
+        inputs: Any = self.inputs[0]
+        begin_cycle(inputs, T0 + round(ms * MS), 10 * MS)
+        for stamp, value, valid in samples:
+            accept(inputs, self.freshness, 0, value, T0 + round(stamp * MS), valid)
+        end_cycle(inputs, self.freshness)
+        return float(inputs["value"][0]), int(inputs["new"][0]), int(inputs["verdict"][0])
+
+    @property
+    def age_ms(self) -> float:
+        return float(self.inputs["age_ns"][0, 0]) / MS
+
+
+def test_a_signal_that_never_came() -> None:
+    signal = Signal()
+    assert signal.cycle(10) == (0.0, 0, 0)
+    assert signal.age_ms > 1e9
+
+
+def test_one_sample_is_new_once_and_ages() -> None:
+    signal = Signal()
+    assert signal.cycle(10, (7, 5.0, True)) == (5.0, 1, ALIVE | VALID)
+    assert signal.age_ms == 3
+    assert signal.cycle(20) == (5.0, 0, ALIVE | VALID)
+    assert signal.age_ms == 13
+
+
+@pytest.mark.parametrize(("age_ms", "alive"), [(99, True), (100, True), (101, False)])
+def test_time_out(age_ms: int, alive: bool) -> None:
+    signal = Signal()
+    signal.cycle(10, (10, 5.0, True))
+    assert (signal.cycle(10 + age_ms)[2] & ALIVE != 0) is alive
+
+
+@pytest.mark.parametrize("value", [-0.1, 100.1, math.nan, math.inf, -math.inf])
+def test_a_value_out_of_range_is_not_taken_but_proves_life(value: float) -> None:
+    signal = Signal()
+    signal.cycle(10, (10, 5.0, True))
+    assert signal.cycle(20, (20, value, True)) == (5.0, 0, ALIVE | RATE_OK)
+    assert signal.age_ms == 0
+    assert signal.cycle(30, (30, 6.0, True)) == (6.0, 1, ALIVE | RATE_OK | VALID)
+
+
+def test_a_sample_declared_invalid() -> None:
+    signal = Signal()
+    signal.cycle(10, (10, 5.0, True))
+    assert signal.cycle(20, (20, 6.0, False))[:2] == (5.0, 0)
+    assert signal.cycle(30)[2] & VALID == 0
+
+
+def test_an_older_sample_is_ignored() -> None:
+    signal = Signal()
+    assert signal.cycle(20, (18, 5.0, True), (12, 9.0, True))[:2] == (5.0, 1)
+    assert signal.cycle(30, (17, 9.0, True))[:2] == (5.0, 0)
+
+
+def test_samples_of_the_same_stamp_are_all_taken() -> None:
+    signal = Signal()
+    assert signal.cycle(20, (18, 5.0, True), (18, 9.0, True))[:2] == (9.0, 1)
+
+
+def test_a_clock_that_is_set_back_does_not_freeze_the_signal() -> None:
+    signal = Signal()
+    signal.cycle(5000, (5000, 5.0, True))
+    assert signal.cycle(10, (9, 6.0, True)) == (6.0, 1, ALIVE | VALID)
+
+
+@pytest.mark.parametrize(
+    ("interval_ms", "period_s", "slowest_s", "right"),
+    [
+        (10, 0.01, 0.01, True),
+        (6, 0.01, 0.01, True),
+        (19, 0.01, 0.01, True),
+        (4, 0.01, 0.01, False),
+        (25, 0.01, 0.01, False),
+        (10, 0.01, 0.1, True),  # VehicleSpeed: every 10 to 100 ms
+        (40, 0.01, 0.1, True),
+        (100, 0.01, 0.1, True),
+        (4, 0.01, 0.1, False),
+    ],
+)
+def test_rate(interval_ms: int, period_s: float, slowest_s: float, right: bool) -> None:
+    signal = Signal(period_s, slowest_s)
+    for k in range(40):
+        verdict = signal.cycle(interval_ms * k, (interval_ms * k, 5.0, True))[2]
+    assert (verdict & RATE_OK != 0) is right
+
+
+def test_a_lost_frame_now_and_then_is_no_wrong_rate() -> None:
+    signal = Signal()
+    for k in range(100):
+        samples = [] if k % 5 == 4 else [(10.0 * k, 5.0, True)]
+        verdict = signal.cycle(10 * k, *samples)[2]
+        assert k < 1 or verdict & RATE_OK
+
+
+def test_after_a_gap_the_rate_is_measured_anew() -> None:
+    signal = Signal()
+    for k in range(20):
+        signal.cycle(10 * k, (10 * k, 5.0, True))
+    assert signal.cycle(1000)[2] == VALID
+    assert signal.cycle(1010, (1010, 5.0, True))[2] == ALIVE | VALID
+    assert signal.cycle(1020, (1020, 5.0, True))[2] == ALIVE | RATE_OK | VALID
+
+
+def test_every_sample_is_counted_by_what_became_of_it() -> None:
+    signal = Signal()
+    signal.cycle(10, (2, 5.0, True), (4, 6.0, True), (6, 200.0, True), (8, math.nan, True), (10, 5.0, False))
+    counted = signal.freshness[0]
+    assert (counted["taken"], counted["outside"], counted["invalid"]) == (2, 1, 2)

@@ -1,0 +1,40 @@
+"""A healthy car for the tests of the algorithm: the shipped SUV and inputs that all arrived in this cycle."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ecu.config import load_config, new_params
+from ecu.records import INPUTS, RecordArray
+from ecu.signals import CORNERS, INPUT, RATE_OK, USABLE
+
+CONFIGS = Path(__file__).parents[2] / "config"
+
+
+@pytest.fixture
+def params() -> RecordArray:
+    """`PARAMS` of the shipped SUV, shape (1,), fresh for each test."""
+    return new_params(load_config(CONFIGS / "suv.toml"))
+
+
+@pytest.fixture
+def feed() -> Callable[..., RecordArray]:
+    """Write named inputs as samples of this cycle; a four-wheel name takes a number or four."""
+
+    def write(inputs: RecordArray | None = None, **values: Any) -> RecordArray:
+        if inputs is None:
+            inputs = np.zeros(1, INPUTS)
+            inputs["dt_ns"] = 10_000_000
+            inputs["new"], inputs["verdict"] = 1, USABLE | RATE_OK
+        for name, value in values.items():
+            if name in INPUT:
+                inputs[0]["value"][INPUT[name]] = value
+            else:
+                first = INPUT[f"{name}_{CORNERS[0]}"]
+                inputs[0]["value"][first : first + 4] = value
+        return inputs
+
+    return write

@@ -1,0 +1,127 @@
+"""Torque to pressure (5.4) and its compensation (corrected 5.8) against the brake's own law (A.19)."""
+
+import math
+
+import numpy as np
+import pytest
+
+from ecu.control.pressure_law import (
+    PRESSURE_LAW_STATE,
+    compensated_pressure,
+    follow_friction,
+    level_left_right,
+    pressure_for_torque,
+    set_base,
+)
+from ecu.records import LEARNED
+
+BAR = 1e5
+BRAKES = [(0.060, 0.1205), (0.060, 0.1205), (0.034, 0.1288), (0.034, 0.1288)]  # Table D.1: d_p, r_eff [m]
+PUSH_OUT = 0.5 * BAR
+
+
+def torque_of(pressure: float, mu: float, corner: int) -> float:
+    """(A.19), one piston a side: T = 2 mu A (p - p_0) r_eff."""
+    diameter, radius = BRAKES[corner]
+    return 2 * mu * math.pi * diameter**2 / 4 * (pressure - PUSH_OUT) * radius
+
+
+def law(base: float = 0.45, used: float = 0.45):
+    state = np.zeros(1, PRESSURE_LAW_STATE)
+    state["base"], state["used"], state["mu_override"] = base, used, math.nan
+    return state[0]
+
+
+@pytest.mark.parametrize("corner", range(4))
+@pytest.mark.parametrize("mu", [0.225, 0.45, 0.675])
+@pytest.mark.parametrize("torque", [1.0, 100.0, 1500.0])
+def test_the_law_inverts_the_brake(params, corner: int, mu: float, torque: float) -> None:
+    pressure = pressure_for_torque(params[0], torque, mu, corner)
+    assert torque_of(pressure, mu, corner) == pytest.approx(torque, rel=1e-9)
+
+
+@pytest.mark.parametrize("torque", [0.0, -1.0])
+def test_no_torque_is_no_pressure(params, torque: float) -> None:
+    assert pressure_for_torque(params[0], torque, 0.45, 0) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("e", "torque_error"),
+    # Friction is (1+e) of the base; 1 - e + e^2 against the exact 1 / (1+e) leaves e^3.
+    [(-0.3, -0.027), (-0.2, -0.008), (-0.1, -0.001), (0.0, 0.0), (0.1, 0.001), (0.2, 0.008), (0.3, 0.027)],
+)
+@pytest.mark.parametrize("corner", range(4))
+def test_truncation_costs_the_cube_of_the_change(params, corner: int, e: float, torque_error: float) -> None:
+    mu = 0.45 * (1 + e)
+    uncompensated = pressure_for_torque(params[0], 500.0, 0.45, corner)
+    pressure = compensated_pressure(params[0], law(used=mu), uncompensated, corner)
+    assert torque_of(pressure, mu, corner) / 500.0 - 1 == pytest.approx(torque_error, abs=1e-9)
+
+
+@pytest.mark.parametrize("pressure", [PUSH_OUT, 0.2 * BAR, 0.0])
+@pytest.mark.parametrize("used", [0.32, 0.58])
+def test_the_push_out_pressure_is_not_scaled(params, pressure: float, used: float) -> None:
+    assert compensated_pressure(params[0], law(used=used), pressure, 0) == pytest.approx(pressure)
+
+
+@pytest.mark.parametrize(
+    ("estimate", "used"),
+    [(0.05, 0.315), (0.31, 0.315), (0.32, 0.32), (0.58, 0.58), (0.59, 0.585), (2.0, 0.585)],
+)
+def test_compensation_saturates_at_30_percent_of_the_base(estimate: float, used: float) -> None:
+    state = law()
+    for _ in range(500):
+        follow_friction(state, np.full(4, estimate), 0.01)
+    assert state["used"] == pytest.approx(np.full(4, used))
+
+
+@pytest.mark.parametrize("dt", [0.01, 0.03])
+def test_the_friction_in_use_moves_no_faster_than_half_a_unit_a_second(dt: float) -> None:
+    state = law()
+    for k in range(1, 4):
+        follow_friction(state, np.array([0.6, 0.3, 0.45, 0.4501]), dt)
+        assert state["used"] == pytest.approx([0.45 + 0.5 * k * dt, 0.45 - 0.5 * k * dt, 0.45, 0.4501])
+
+
+def test_a_friction_that_is_not_a_number_does_not_stick(params) -> None:
+    state = law()
+    follow_friction(state, np.full(4, math.nan), 0.01)
+    follow_friction(state, np.full(4, 0.45), 0.01)
+    assert np.isfinite(state["used"]).all()
+    assert np.isfinite(compensated_pressure(params[0], state, 30 * BAR, 0))
+
+
+def test_the_base_is_what_was_learned() -> None:
+    learned = np.zeros(1, LEARNED)
+    learned["mu_b"] = [0.4, 0.41, 0.5, 0.51]
+    state = law()
+    set_base(state, learned[0])
+    assert list(state["base"]) == list(state["used"]) == [0.4, 0.41, 0.5, 0.51]
+
+
+def test_the_ideal_controller_of_the_laboratory_is_exact(params) -> None:
+    state = law()
+    state["mu_override"] = 0.2
+    pressure = compensated_pressure(params[0], state, pressure_for_torque(params[0], 500.0, 0.45, 0), 0)
+    assert torque_of(pressure, 0.2, 0) == pytest.approx(500.0)
+
+
+@pytest.mark.parametrize(
+    ("case", "base", "compensated", "levelled"),
+    [
+        ("nothing added", [60, 60, 40, 40], [60, 60, 40, 40], [60, 60, 40, 40]),
+        ("both sides alike", [60, 60, 40, 40], [75, 75, 50, 50], [75, 75, 50, 50]),
+        ("within 10 % of the axle's demand", [60, 60, 40, 40], [63, 58, 42, 39], [63, 58, 42, 39]),
+        ("left gets too much", [60, 60, 40, 40], [72, 60, 40, 40], [69, 63, 40, 40]),
+        ("right gets too much", [60, 60, 40, 40], [60, 72, 40, 40], [63, 69, 40, 40]),
+        ("rear alone", [60, 60, 40, 40], [60, 60, 36, 48], [60, 60, 40, 44]),
+        ("a difference of the demand itself stays", [70, 50, 40, 40], [70, 50, 40, 40], [70, 50, 40, 40]),
+    ],
+)
+def test_left_and_right_differ_by_a_tenth_of_the_axle_s_demand(case, base, compensated, levelled) -> None:
+    pressures = np.array(compensated, float)
+    level_left_right(pressures, np.array(base, float))
+    assert pressures == pytest.approx(np.array(levelled, float)), case
+    # What the axle brakes with stays the same.
+    assert pressures[:2].sum() == pytest.approx(sum(compensated[:2]))
+    assert pressures[2:].sum() == pytest.approx(sum(compensated[2:]))

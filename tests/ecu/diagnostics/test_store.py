@@ -1,0 +1,175 @@
+import os
+import random
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from structlog.testing import capture_logs
+
+from ecu.diagnostics.store import FILE, REVISIONS_KEPT, first_keeper, is_due, open_store, restore, save
+from ecu.errors import UserError
+from ecu.records import LEARNED, new_record
+
+NOMINAL = np.full(4, 0.45)
+KEY = "suv/1234/1"
+
+
+def learned(brakings: int = 1, **values: object):
+    record = new_record(LEARNED)
+    record["mu_b"], record["sigma_mu_b"], record["observed_s"] = 0.40, 0.03, 5.0
+    record["radius_sigma"], record["brakings"] = 0.002, brakings
+    for name, value in values.items():
+        record[name] = value
+    return record
+
+
+def test_what_was_saved_comes_back_bit_by_bit(tmp_path):
+    store = open_store(tmp_path)
+    record = learned(mu_b=[[0.38, 0.41, 0.5, 0.3]])
+    save(store, KEY, record)
+    store.close()
+    revision, found = restore(open_store(tmp_path), KEY, NOMINAL)
+    assert (revision, found.tobytes()) == (1, record.tobytes())
+
+
+def test_another_vehicle_or_version_knows_nothing_of_it(tmp_path):
+    store = open_store(tmp_path)
+    save(store, KEY, learned())
+    assert restore(store, "suv/1234/2", NOMINAL) is None
+
+
+def test_the_last_revisions_are_kept(tmp_path):
+    store = open_store(tmp_path)
+    for brakings in range(REVISIONS_KEPT + 5):
+        save(store, KEY, learned(brakings))
+    kept = [row[0] for row in store.execute("SELECT revision FROM learned ORDER BY revision")]
+    assert kept == list(range(6, REVISIONS_KEPT + 6))
+
+
+OUT_OF_RANGE = {
+    "friction below half of nominal": {"mu_b": 0.22},
+    "friction above one and a half": {"mu_b": 0.68},
+    "friction is no number": {"mu_b": np.nan},
+    "deviation of zero": {"sigma_mu_b": 0.0},
+    "infinite deviation": {"sigma_mu_b": np.inf},
+    "radius off by 4 %": {"radius_error": [[0, 0, 0, -0.04]]},
+    "radius is no number": {"radius_error": np.nan},
+    "negative time": {"observed_s": -1.0},
+    "negative count": {"brakings": -1},
+}
+
+
+@pytest.mark.parametrize("wrong", OUT_OF_RANGE.values(), ids=OUT_OF_RANGE)
+def test_a_value_that_cannot_be_falls_back_to_the_revision_before(tmp_path, wrong):
+    store = open_store(tmp_path)
+    save(store, KEY, learned(7))
+    save(store, KEY, learned(**{"brakings": 8, **wrong}))
+    revision, found = restore(store, KEY, NOMINAL)
+    assert (revision, found["brakings"][0]) == (1, 7)
+
+
+def test_a_corner_that_was_never_observed_needs_no_friction(tmp_path):
+    store = open_store(tmp_path)
+    save(store, KEY, learned(mu_b=[[0.4, 0.4, 0, 0]], sigma_mu_b=[[1, 1, 0, 0]], observed_s=[[1, 1, 0, 0]]))
+    assert restore(store, KEY, NOMINAL) is not None
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        "UPDATE learned SET crc = crc + 1 WHERE revision = 2",
+        "UPDATE learned SET record = zeroblob(length(record)) WHERE revision = 2",
+        "UPDATE learned SET record = x'00' WHERE revision = 2",
+        "UPDATE learned SET revision = 3 WHERE revision = 2",
+    ],
+    ids=["CRC", "content", "length", "number"],
+)
+def test_a_damaged_row_falls_back_to_the_revision_before(tmp_path, damage):
+    store = open_store(tmp_path)
+    save(store, KEY, learned(7))
+    save(store, KEY, learned(8))
+    store.execute(damage)
+    with capture_logs() as lines:
+        revision, found = restore(store, KEY, NOMINAL)
+    assert (revision, found["brakings"][0]) == (1, 7)
+    assert [line["event"] for line in lines] == ["revision_refused"]
+
+
+@pytest.mark.parametrize("content", [b"", b"no database at all" * 100, None], ids=["empty", "text", "torn"])
+def test_a_damaged_file_is_set_aside_and_a_new_one_made(tmp_path, content):
+    path = tmp_path / FILE
+    store = open_store(tmp_path)
+    for brakings in range(100):
+        save(store, f"{KEY}{brakings}", learned())
+    store.close()
+    torn = path.read_bytes()
+    path.write_bytes(torn[: len(torn) // 2] if content is None else content)
+    with capture_logs() as lines:
+        store = open_store(tmp_path)
+    save(store, KEY, learned(9))
+    assert restore(store, KEY, NOMINAL)[1]["brakings"][0] == 9
+    if content != b"":  # an empty file is a new database
+        assert [line["event"] for line in lines] == ["store_damaged"]
+        assert len(list(tmp_path.glob("*.damaged-*"))) == 1
+
+
+def test_a_folder_that_cannot_be_made_is_one_line(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UserError, match="cannot be opened"):
+        open_store(tmp_path / "file")
+
+
+# changes of the record [s later] -> whether it is due
+DUE = {
+    "nothing changed": ({}, 3600, False),
+    "a braking ended": ({"brakings": 2}, 0, True),
+    "a radius was learned, at once": ({"radius_error": 0.001}, 59, False),
+    "a radius was learned, a minute ago": ({"radius_error": 0.001}, 60, True),
+}
+
+
+@pytest.mark.parametrize(("change", "later_s", "due"), DUE.values(), ids=DUE)
+def test_it_is_saved_after_each_braking_and_at_most_every_minute(change, later_s, due):
+    keeper = first_keeper(learned(1), 100.0)
+    assert is_due(keeper, learned(**{"brakings": 1, **change}), 100.0 + later_s) is due
+
+
+WRITER = """
+import sys
+import numpy as np
+from pathlib import Path
+from ecu.diagnostics.store import open_store, save
+from ecu.records import LEARNED, new_record
+store, record = open_store(Path(sys.argv[1])), new_record(LEARNED)
+record["mu_b"], record["sigma_mu_b"], record["observed_s"], record["radius_sigma"] = 0.4, 0.03, 5.0, 0.002
+for brakings in range(int(sys.argv[2]), 10**9):
+    record["brakings"] = brakings
+    save(store, sys.argv[3], record)
+    print(brakings, flush=True)
+"""
+
+
+def test_killed_at_fifty_instants_it_opens_and_has_lost_nothing_that_was_saved(tmp_path):
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
+    draw = random.Random(20)
+    kept = 0
+    for _ in range(50):
+        command = [sys.executable, "-c", WRITER, str(tmp_path), str(kept + 1), KEY]
+        writer = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
+        for _ in range(draw.randint(1, 20)):  # killed in the middle of whatever follows this line
+            reported = int(writer.stdout.readline())
+        for _ in range(draw.randint(0, 20_000)):
+            pass
+        writer.send_signal(signal.SIGKILL)
+        rest = writer.stdout.read().split("\n")[:-1]
+        writer.wait()
+        reported = int(rest[-1]) if rest else reported
+        with capture_logs() as lines:
+            store = open_store(tmp_path)
+        kept = int(restore(store, KEY, NOMINAL)[1]["brakings"][0])
+        store.close()
+        assert lines == []
+        assert kept in (reported, reported + 1)

@@ -1,0 +1,141 @@
+"""What a user reads who typed something wrong: one line, and the exit code."""
+
+import pytest
+
+from ecu import __version__, cli, resources
+from ecu.errors import RunFault, UserError
+
+COMMANDS = ("run", "demo", "simulate", "replay", "play", "report", "bench", "doctor")
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("stop", "No such command 'stop'; see brake-ecu --help"),
+        ("replya", "Did you mean 'replay'"),
+        ("--loud", "No such option: --loud"),
+        ("run", "Missing option '--config'; see brake-ecu run --help"),
+        ("run --config suv -i socketcan", "Missing option '-c'"),
+        ("run --config suv -i socketcan -c can0 --recrod out", "No such option: --recrod"),
+        (
+            "run --config nosuch -i socketcan -c can0",
+            "nosuch: no such file, and none that is shipped (lcv, mustang,",
+        ),
+        ("play drive.log -i socketcan -c can0 --speed fast", "Invalid value for '--speed'"),
+        ("replay drive.log --config suv --out r.parquet --observer best", "take observer2"),
+        ("replay --config suv --out r.parquet", "Missing argument 'LOG…'"),
+        ("simulate nosuch --config suv --out x", "nosuch: no such file, and none that is shipped ("),
+        ("bench step codec", "unexpected extra argument"),
+        ("simulate stop-1 --config suv --out x --seed -1", "Invalid value for '--seed'"),
+    ],
+)
+def test_a_mistake_is_one_line_and_exit_code_2(
+    line: str, says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(line.split()) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.startswith("brake-ecu: ")
+    assert says in printed.err
+    assert printed.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "says"),
+    [
+        (
+            UserError("suv.toml", "vehicle.mass", "missing; give kg"),
+            2,
+            "suv.toml: vehicle.mass: missing; give kg",
+        ),
+        (RunFault("can0: bus off"), 1, "can0: bus off"),
+        (OSError(28, "No space left on device"), 2, "no space left on the disk"),
+        (
+            FileNotFoundError(2, "No such file or directory", "drive.log"),
+            2,
+            "drive.log: no such file or directory",
+        ),
+        (
+            ModuleNotFoundError("No module named 'bokeh'", name="bokeh.plotting"),
+            2,
+            "pip install 'brake-ecu[lab]'",
+        ),
+        (ModuleNotFoundError("No module named 'ecu.x'", name="ecu.x"), 1, "unexpected ModuleNotFoundError"),
+        (
+            ZeroDivisionError("two\nlines"),
+            1,
+            "unexpected ZeroDivisionError: two lines (a fault of the program",
+        ),
+        (KeyboardInterrupt(), 130, ""),
+    ],
+)
+def test_what_a_command_raises_becomes_one_line(
+    error: BaseException,
+    code: int,
+    says: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def fail(*_: object, **__: object) -> int:
+        raise error
+
+    monkeypatch.delenv("BRAKE_ECU_DEBUG", raising=False)
+    monkeypatch.setattr(cli, "app", fail)
+    assert cli.main(["demo"]) == code
+    printed = capsys.readouterr().err
+    assert says in printed
+    assert "Traceback" not in printed
+    assert printed.count("\n") == (1 if says else 0)
+
+
+def test_debugging_shows_where(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setenv("BRAKE_ECU_DEBUG", "1")
+    cli.main(["stop"])
+    assert "Traceback" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_explains_itself(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main([command, "--help"]) == 0
+    assert f"Usage: brake-ecu {command}" in capsys.readouterr().out
+
+
+def test_without_arguments_the_commands_are_listed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.argv", ["brake-ecu"])
+    assert cli.main() == 0
+    listed = capsys.readouterr().out
+    assert all(f"\n  {command} " in listed for command in COMMANDS)
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["--version"]) == 0
+    assert capsys.readouterr().out == f"brake-ecu {__version__}\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "folder", "expected"),
+    [
+        ("suv", "config", "suv.toml"),
+        ("mustang", "config/maps", "mustang.toml"),
+        ("own.toml", "config", None),
+        ("cars/suv", "config", None),
+    ],
+)
+def test_only_a_bare_name_means_a_shipped_file(name: str, folder: str, expected: str | None) -> None:
+    path = resources.named(name, folder)
+    if expected is None:
+        assert str(path) == name
+    else:
+        assert path == resources.resource(folder) / expected
+        assert path.is_file()
+
+
+def test_a_file_of_that_name_comes_first(
+    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = tmp_path_factory.mktemp("here")
+    (here / "suv").write_text("")
+    monkeypatch.chdir(here)
+    assert str(resources.named("suv", "config")) == "suv"

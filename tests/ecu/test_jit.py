@@ -1,0 +1,47 @@
+"""The cache of compiled kernels is named after everything that a kernel is made of."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from ecu import jit
+
+ROOT = Path(__file__).parents[2]
+FOLDERS = {"ecu": ROOT / "ecu", "brakelab": ROOT / "tools" / "brakelab"}
+
+
+def names_in_kernels(module: ast.Module) -> set[str]:
+    functions = (node for node in module.body if isinstance(node, ast.FunctionDef))
+    kernels = (function for function in functions if "kernel" in map(ast.unparse, function.decorator_list))
+    bodies = (ast.Module(kernel.body, []) for kernel in kernels)
+    return {node.id for body in bodies for node in ast.walk(body) if isinstance(node, ast.Name)}
+
+
+def constants_of_kernels(package: str) -> set[Path]:
+    """Modules of which a kernel takes a constant: numba compiles its value in."""
+    found = set()
+    for path in FOLDERS[package].rglob("*.py"):
+        module = ast.parse(path.read_text("utf-8"))
+        used = names_in_kernels(module)
+        for node in ast.walk(module):
+            if not isinstance(node, ast.ImportFrom):
+                continue
+            root, _, rest = (node.module or "").partition(".")
+            taken = {name.name for name in node.names} & used
+            if root in FOLDERS and taken:
+                place = FOLDERS[root].joinpath(*filter(None, rest.split(".")))
+                modules = {place / name for name in taken} if place.is_dir() else {place}
+                found |= {source.with_suffix(".py") for source in modules}
+    return found
+
+
+@pytest.mark.parametrize("package", FOLDERS)
+def test_whatever_a_kernel_takes_a_constant_from_counts(package: str) -> None:
+    modules = constants_of_kernels(package)
+    assert len(modules) > 5
+    assert [path.name for path in sorted(modules) if not jit.is_source_of_kernels(path)] == []
+
+
+def test_a_module_of_neither_kind_does_not_count() -> None:
+    assert not jit.is_source_of_kernels(FOLDERS["ecu"] / "cli.py")

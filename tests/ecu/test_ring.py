@@ -1,0 +1,144 @@
+import multiprocessing
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ecu.errors import UserError
+from ecu.records import CYCLE, FRAME, LEARNED, OUTPUTS, new_record
+from ecu.ring import FRAMES, SLOTS, RingReader, close_ring, create_ring, publish
+from ecu.signals import CYCLE_NS
+
+
+class Writer:
+    """Publishes numbered cycles; frame n of the run has the identifier n % 2048."""
+
+    def __init__(self, path: Path, slots: int, frames: int) -> None:
+        self.ring = create_ring(path, {"channel": "can0"}, b"initial", slots=slots, frames=frames)
+        self.cycle, self.outputs, self.learned = new_record(CYCLE), new_record(OUTPUTS), new_record(LEARNED)
+        self.frames = new_record(FRAME, 100)
+        self.sent = 0
+
+    def publish(self, *frames_per_cycle: int) -> None:
+        for count in frames_per_cycle:
+            number = int(self.ring.header["written"][0])
+            self.cycle["number"], self.cycle["frames"] = number, count
+            self.outputs["k_f"], self.learned["mu_b"] = number + 0.5, number
+            self.frames["can_id"] = (self.sent + np.arange(100)) % 2048
+            publish(self.ring, self.cycle, self.outputs, self.learned, self.frames)
+            self.sent += count
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "test.ring"
+
+
+def test_a_reader_gets_what_was_written_in_order(path):
+    writer = Writer(path, slots=16, frames=64)
+    reader = RingReader(path)
+    writer.publish(3, 0, 7)
+    batch = reader.read()
+    assert batch.records["cycle"]["number"].tolist() == [0, 1, 2]
+    assert batch.records["outputs"]["k_f"].tolist() == [0.5, 1.5, 2.5]
+    assert batch.records["learned"]["mu_b"][:, 3].tolist() == [0, 1, 2]
+    assert batch.frames["can_id"].tolist() == list(range(10))
+    assert len(reader.read().records) == 0
+    assert (reader.description, reader.initial) == ({"channel": "can0"}, b"initial")
+
+
+def test_it_goes_on_over_the_end_of_the_memory(path):
+    writer = Writer(path, slots=8, frames=16)
+    reader = RingReader(path)
+    for _ in range(20):
+        writer.publish(2, 0, 5)
+        batch = reader.read()
+        assert len(batch.records) == 3
+        assert np.diff(batch.frames["can_id"].astype(int)).tolist() == [1] * 6
+    assert (reader.lost_cycles, reader.lost_frames) == (0, 0)
+
+
+def test_an_overtaken_reader_counts_what_it_lost(path):
+    writer = Writer(path, slots=8, frames=1000)
+    reader = RingReader(path)
+    writer.publish(*[1] * 30)
+    batch = reader.read()
+    assert batch.records["cycle"]["number"].tolist() == list(range(22, 30))
+    assert batch.frames["can_id"].tolist() == list(range(22, 30))
+    assert reader.lost_cycles == 22
+
+
+def test_frames_that_were_overwritten_are_counted_and_left_out(path):
+    writer = Writer(path, slots=8, frames=16)
+    reader = RingReader(path)
+    writer.publish(10, 10, 4)
+    batch = reader.read()
+    assert len(batch.records) == 3
+    assert batch.frames["can_id"].tolist() == list(range(8, 24))
+    assert reader.lost_frames == 8
+
+
+def test_a_slot_that_is_being_written_is_not_read(path):
+    writer = Writer(path, slots=8, frames=16)
+    reader = RingReader(path)
+    writer.publish(0, 0, 0)
+    writer.ring.slots["number"][1] = -1
+    assert reader.read().records["cycle"]["number"].tolist() == [0, 2]
+    assert reader.lost_cycles == 1
+
+
+def test_a_late_reader_starts_with_the_oldest_cycle_still_there(path):
+    writer = Writer(path, slots=8, frames=16)
+    writer.publish(*[0] * 11)
+    reader = RingReader(path)
+    assert reader.read(limit=2).records["cycle"]["number"].tolist() == [3, 4]
+    assert reader.lost_cycles == 0
+
+
+def test_the_reader_learns_that_the_writer_is_done(path):
+    writer = Writer(path, slots=8, frames=16)
+    reader = RingReader(path)
+    assert not reader.closed
+    close_ring(writer.ring)
+    assert reader.closed
+
+
+def test_it_holds_twenty_seconds_of_a_full_bus():
+    assert SLOTS * CYCLE_NS >= 20e9
+    assert FRAMES >= 20 * 100 * 45
+
+
+def _flood(path: Path, cycles: int) -> None:
+    writer = Writer(path, slots=32, frames=256)
+    writer.publish(*[7] * cycles)
+    close_ring(writer.ring)
+
+
+def test_a_reader_beside_a_racing_writer_sees_whole_cycles_only(path):
+    process = multiprocessing.get_context("spawn").Process(target=_flood, args=(path, 20_000))
+    process.start()
+    while not path.exists() and process.is_alive():
+        pass
+    reader, read, done = None, 0, False
+    while not done:
+        try:
+            reader = reader or RingReader(path)
+        except UserError:  # not laid out yet
+            continue
+        done = reader.closed
+        batch = reader.read()
+        numbers = batch.records["cycle"]["number"]
+        assert (batch.records["outputs"]["k_f"] == numbers + 0.5).all()
+        assert (batch.records["learned"]["mu_b"] == numbers[:, None]).all()
+        assert np.isin(batch.frames["can_id"], np.arange(2048)).all()
+        read += len(numbers)
+    process.join()
+    assert reader is not None
+    assert read + reader.lost_cycles == 20_000
+
+
+@pytest.mark.parametrize("content", [b"", b"x" * 10_000], ids=["empty", "something else"])
+def test_another_file_is_one_line(path, content):
+    path.write_bytes(content)
+    with pytest.raises(UserError, match="ring"):
+        RingReader(path)

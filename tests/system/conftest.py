@@ -1,0 +1,140 @@
+"""Whole processes on real buses: the daemon as a child, a vehicle that sends its frames."""
+
+import json
+import os
+import queue
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ecu.bus.channel import Channel, open_channel
+from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
+from ecu.clock import Grid, system_time
+from ecu.records import FRAME, new_record
+from ecu.signals import INPUT, N_INPUTS
+
+ROOT = Path(__file__).parents[2]
+DBC = ROOT / "dbc" / "brake_ecu.dbc"
+PATIENCE_S = 300  # a cold cache compiles every kernel
+
+
+class Daemon:
+    """`brake-ecu run` as a child process; its log is read line by line."""
+
+    def __init__(self, *arguments: object) -> None:
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tools")])}
+        command = [sys.executable, "-m", "ecu.cli", "run", *map(str, arguments)]
+        self.process = subprocess.Popen(
+            command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=environment
+        )
+        self._lines: queue.Queue[str | None] = queue.Queue()
+        self.seen: list[dict[str, Any]] = []
+        self.other: list[str] = []
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self) -> None:
+        assert self.process.stderr is not None
+        for line in self.process.stderr:
+            self._lines.put(line)
+        self._lines.put(None)
+
+    def wait_for(self, event: str, **content: Any) -> dict[str, Any]:
+        """Return the first line of `event` with `content`, read already or to come."""
+        wanted = {"event": event, **content}
+        for line in self.seen:
+            if wanted.items() <= line.items():
+                return line
+        while self._next():
+            if self.seen and wanted.items() <= self.seen[-1].items():
+                return self.seen[-1]
+        raise AssertionError(f"ended without {wanted}: {self.seen} {self.other}")
+
+    def _next(self) -> bool:
+        line = self._lines.get(timeout=PATIENCE_S)
+        if line is None:
+            return False
+        try:
+            self.seen.append(json.loads(line))
+        except json.JSONDecodeError:
+            self.other.append(line.strip())
+        return True
+
+    def end(self, number: int | None = signal.SIGTERM) -> int:
+        """Send a signal, wait for the end and return the exit code."""
+        if number is not None and self.process.poll() is None:
+            self.process.send_signal(number)
+        while self._next():
+            pass
+        return self.process.wait(PATIENCE_S)
+
+
+@pytest.fixture
+def daemon() -> Iterator[Callable[..., Daemon]]:
+    """Start daemons that do not outlive the test."""
+    started: list[Daemon] = []
+
+    def start(*arguments: object) -> Daemon:
+        started.append(Daemon(*arguments))
+        return started[-1]
+
+    yield start
+    for one in started:
+        if one.process.poll() is None:
+            one.process.kill()
+        one.process.wait()
+
+
+class Vehicle:
+    """Sends every frame of the vehicle at its rate for as long as it is told to, and hears what it must."""
+
+    def __init__(self, channel: Channel) -> None:
+        self.channel = channel
+        self._plan = contract_transmit_plan(DBC, "Vehicle")
+        self._counters, self._buffer = new_transmission(self._plan), frame_buffer(self._plan)
+        self._periods = 0
+        self.values = np.zeros(N_INPUTS)
+        self.set(hydraulic_ready=1, decel_demand_valid=1, accumulator_pressure=160, vehicle_speed=0)
+
+    def set(self, **values: float) -> None:
+        """Set inputs by name."""
+        for name, value in values.items():
+            self.values[INPUT[name]] = value
+
+    def drive(self, seconds: float) -> np.ndarray[Any, Any]:
+        """Send for a while; return the frames that came in meanwhile."""
+        grid, heard, frames = Grid(system_time()), [], new_record(FRAME, 4096)
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            grid.wait()
+            count = transmit(self._plan, self._counters, self.values, self._periods, self._buffer)
+            self.channel.send(self._buffer, count)
+            self._periods += 1
+            heard.append(frames[: self.channel.drain(frames, 0)].copy())
+        return np.concatenate(heard)
+
+
+def demand_ids() -> list[int]:
+    """Identifiers of all frames of the ECU, demands first."""
+    return [int(number) for number in contract_transmit_plan(DBC, "BrakeEcu").ids]
+
+
+@pytest.fixture
+def vehicle() -> Iterator[Callable[..., Vehicle]]:
+    """Open a vehicle on a bus."""
+    opened: list[Vehicle] = []
+
+    def start(interface: str, channel: str) -> Vehicle:
+        opened.append(Vehicle(open_channel(interface, channel, receive_ids=demand_ids())))
+        return opened[-1]
+
+    yield start
+    for one in opened:
+        one.channel.close()

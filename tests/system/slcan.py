@@ -1,0 +1,95 @@
+"""Two CAN controllers on one wire: the kernel's slcan driver, with this program as the adapters.
+
+Each adapter is a pseudo-terminal whose kernel side has the slcan line discipline, so the network device has a
+bit rate and a controller state. What one sends is given to the other; a controller's state and missing
+acknowledgements can be reported to it as an adapter would.
+"""
+
+import contextlib
+import fcntl
+import os
+import selectors
+import struct
+import subprocess
+import threading
+import tty
+
+N_SLCAN = 17
+TIOCSETD, SIOCGIFNAME = 0x5423, 0x8910
+
+# Adapter to driver: "s", a letter for the state, transmit and receive error counters in three digits each.
+ACTIVE, WARNING, PASSIVE, BUS_OFF = "sa000000", "sw097000", "sp130000", "sb256000"
+NOT_ACKNOWLEDGED = "e1a"
+FRAME_LETTERS = b"tTrR"
+
+
+class Controller:
+    """One slcan network device and the adapter's end of its line."""
+
+    def __init__(self) -> None:
+        self.adapter, self._kernel = os.openpty()
+        for end in (self.adapter, self._kernel):
+            tty.setraw(end)
+        fcntl.ioctl(self._kernel, TIOCSETD, struct.pack("i", N_SLCAN))
+        name = fcntl.ioctl(self._kernel, SIOCGIFNAME, bytes(64))
+        self.name = name.split(b"\0", 1)[0].decode()
+        self.rest = b""
+
+    def up(self) -> None:
+        """Bring the device up at 500 kbit/s."""
+        for arguments in (f"{self.name} type can bitrate 500000", f"{self.name} up"):
+            subprocess.run(["ip", "link", "set", *arguments.split()], check=True)
+
+    def report(self, line: str) -> None:
+        """Tell the driver something, as the adapter's firmware would."""
+        os.write(self.adapter, line.encode() + b"\r")
+
+    def close(self) -> None:
+        """Take the device away."""
+        subprocess.run(["ip", "link", "set", self.name, "down"], check=False)
+        for end in (self._kernel, self.adapter):
+            with contextlib.suppress(OSError):
+                os.close(end)
+
+
+class Wire:
+    """Carries frames between two controllers until it is closed; `cut`: nobody is there to acknowledge."""
+
+    def __init__(self) -> None:
+        self.ends = (Controller(), Controller())
+        self.cut = False
+        self._stop_reader, self._stop = os.pipe()
+        self._thread = threading.Thread(target=self._carry, daemon=True)
+        self._thread.start()
+        for end in self.ends:
+            end.up()
+
+    def _carry(self) -> None:
+        with selectors.DefaultSelector() as ready:
+            ready.register(self._stop_reader, selectors.EVENT_READ)
+            for here, there in (self.ends, self.ends[::-1]):
+                ready.register(here.adapter, selectors.EVENT_READ, (here, there))
+            while True:
+                for key, _ in ready.select():
+                    if key.data is None:
+                        return
+                    self._pass_on(*key.data)
+
+    def _pass_on(self, here: Controller, there: Controller) -> None:
+        *lines, here.rest = (here.rest + os.read(here.adapter, 4096)).split(b"\r")
+        for line in lines:
+            if line[:1] not in FRAME_LETTERS or not line:
+                continue
+            if self.cut:
+                here.report(NOT_ACKNOWLEDGED)
+            else:
+                os.write(there.adapter, line + b"\r")
+
+    def close(self) -> None:
+        """Stop carrying and take both devices away."""
+        os.write(self._stop, b"x")
+        self._thread.join()
+        for end in self.ends:
+            end.close()
+        os.close(self._stop)
+        os.close(self._stop_reader)

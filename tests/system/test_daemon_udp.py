@@ -1,0 +1,104 @@
+"""The daemon as a process, over an interface that every machine has."""
+
+import signal
+import time
+
+import numpy as np
+import pytest
+
+from ecu.config import load_config, store_key
+from ecu.diagnostics.store import open_store, restore, save
+from ecu.recorder import read_recording
+from ecu.records import LEARNED
+
+from .conftest import ROOT, demand_ids
+
+CONFIG = ROOT / "config" / "suv.toml"
+GROUP = "239.74.163.77"
+BUS = ("--config", CONFIG, "-i", "udp_multicast", "-c", GROUP)
+
+
+def test_it_starts_cycles_records_and_leaves_in_order(daemon, vehicle, tmp_path):
+    car = vehicle("udp_multicast", GROUP)
+    unit = daemon(*BUS, "--record", tmp_path / "record", "--state", tmp_path / "state")
+    assert unit.wait_for("ready")["armed"] is False
+    heard = car.drive(2.0)
+    assert unit.end(signal.SIGTERM) == 0
+    assert set(demand_ids()[:4]) <= set(heard["can_id"].tolist())
+    last = car.drive(0.05)
+    assert last["can_id"].tolist().count(demand_ids()[0]) >= 1  # the farewell
+    stopped = unit.wait_for("stopped")
+    recording = read_recording(tmp_path / "record")
+    assert len(recording.cycles) == stopped["cycles"] > 100
+    assert (np.diff(recording.cycles["number"]) == 1).all()
+    assert len(recording.frames.read_text().splitlines()) == recording.cycles["frames"].sum() > 1000
+    assert not any(
+        line["event"] == "fault" and line["fault"] == "compiled in operation" for line in unit.seen
+    )
+
+
+def test_a_second_daemon_on_the_same_bus_refuses(daemon, vehicle):
+    car = vehicle("udp_multicast", GROUP)
+    first = daemon(*BUS)
+    first.wait_for("ready")
+    second = daemon(*BUS)
+    assert second.end(None) == 2
+    assert any("someone else already sends it" in line for line in second.other)
+    car.drive(0.5)
+    assert first.end() == 0
+
+
+def test_a_run_without_any_frame_found_a_fault(daemon):
+    unit = daemon(*BUS)
+    unit.wait_for("ready")
+    assert unit.end(signal.SIGINT) == 1
+    assert any("no frame of the database came in" in line for line in unit.other)
+
+
+def test_a_restart_after_kill_has_what_was_learned(daemon, vehicle, tmp_path):
+    config = load_config(CONFIG)
+    learned = np.zeros(1, LEARNED)
+    learned["mu_b"], learned["sigma_mu_b"], learned["observed_s"] = config.front.mu_nominal * 0.9, 0.02, 9.0
+    learned["radius_sigma"], learned["brakings"] = 0.002, 3
+    state = tmp_path / "state"
+    store = open_store(state)
+    save(store, store_key(config), learned)
+    store.close()
+    car = vehicle("udp_multicast", GROUP)
+    for _ in range(2):
+        unit = daemon(*BUS, "--state", state, "--record", tmp_path / "record")
+        assert unit.wait_for("restored")["brakings"] == 3
+        unit.wait_for("ready")
+        car.drive(0.5)
+        assert unit.end(signal.SIGKILL) == -signal.SIGKILL
+        assert read_recording(tmp_path / "record").learned["brakings"][-1] == 3
+    nominal = np.full(4, config.front.mu_nominal)
+    assert restore(open_store(state), store_key(config), nominal)[1].tobytes() == learned.tobytes()
+
+
+def test_the_side_process_writes_out_the_ring_when_the_daemon_is_killed(daemon, vehicle, tmp_path):
+    car = vehicle("udp_multicast", GROUP)
+    unit = daemon(*BUS, "--record", tmp_path)
+    unit.wait_for("ready")
+    car.drive(1.0)
+    unit.end(signal.SIGKILL)  # returns when the side process has closed the log, too
+    recording = read_recording(tmp_path)
+    assert len(recording.cycles) > 50
+    assert len(recording.frames.read_text().splitlines()) == recording.cycles["frames"].sum()
+    assert (time.time_ns() - recording.cycles["t_ns"][-1]) < 60e9
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (("--config", "nosuch.toml", "-i", "virtual", "-c", "x"), "nosuch.toml"),
+        (("--config", CONFIG, "-i", "nonsense", "-c", "x"), "nonsense x: cannot be opened"),
+        ((*BUS, "--state", CONFIG), "cannot be opened"),
+        ((*BUS, "--record", CONFIG), "cannot record here"),
+    ],
+    ids=["config", "interface", "state", "record"],
+)
+def test_what_the_user_can_mend_is_one_line_and_exit_code_2(daemon, arguments, line):
+    unit = daemon(*arguments)
+    assert unit.end(None) == 2
+    assert [line in text for text in unit.other] == [True]

@@ -1,0 +1,280 @@
+"""A real SocketCAN bus: the drain and the daemon on vcan0, controller states on a wire of two controllers."""
+
+import os
+import re
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import can
+import numpy as np
+import pytest
+
+from ecu.bus.channel import open_channel
+from ecu.recorder import read_recording
+from ecu.records import EXTENDED_ID, FRAME, FRAME_EXTENDED, FRAME_FD, new_record
+
+from .conftest import ROOT, demand_ids
+from .slcan import ACTIVE, BUS_OFF, PASSIVE, WARNING, Wire
+
+pytestmark = pytest.mark.socketcan
+
+BUS = ("--config", ROOT / "config" / "suv.toml", "-i", "socketcan", "-c", "vcan0")
+
+
+@pytest.fixture
+def pair():
+    """Sender and receiver of 0x10 and 29-bit 0x20 on vcan0."""
+    sender = open_channel("socketcan", "vcan0", receive_ids=[0x30])
+    receiver = open_channel("socketcan", "vcan0", receive_ids=[0x10, 0x20 | EXTENDED_ID])
+    yield sender, receiver
+    sender.close()
+    receiver.close()
+
+
+def frames_of(*ids, flags=0, length=8):
+    frames = new_record(FRAME, len(ids))
+    frames["can_id"], frames["flags"], frames["length"] = ids, flags, length
+    frames["data"][:, :length] = np.arange(length)
+    return frames
+
+
+def drained(channel, frames, start, wanted):
+    """Drain until `wanted` frames are there: on a loaded machine the kernel delivers a little later."""
+    count, end = 0, time.monotonic() + 1.0
+    while count < wanted and time.monotonic() < end:
+        count += channel.drain(frames, start + count)
+    return count
+
+
+def test_the_kernel_lets_only_wanted_identifiers_through(pair):
+    sender, receiver = pair
+    frames = new_record(FRAME, 16)
+    sender.send(frames_of(0x10, 0x11, 0x20, 0x710), 4)
+    sender.send(frames_of(0x10, 0x20, flags=FRAME_EXTENDED), 2)
+    count = drained(receiver, frames, 0, 2)
+    found = list(zip(frames["can_id"][:count].tolist(), frames["flags"][:count].tolist(), strict=True))
+    assert found == [(0x10, 0), (0x20, FRAME_EXTENDED)]
+    assert frames["data"][0, :9].tolist() == [0, 1, 2, 3, 4, 5, 6, 7, 0]
+
+
+def test_one_does_not_hear_oneself_but_another_sender_of_ones_frames(pair):
+    sender, receiver = pair
+    frames = new_record(FRAME, 16)
+    receiver.send(frames_of(0x10), 1)
+    assert receiver.drain(frames, 0) == 0
+    sender.send(frames_of(0x10), 1)
+    assert drained(receiver, frames, 0, 1) == 1
+
+
+def test_a_burst_longer_than_one_system_call_comes_in_order(pair):
+    sender, receiver = pair
+    sent = frames_of(*[0x10] * 300)
+    sent["data"][:, 0], sent["data"][:, 1] = np.arange(300) % 256, np.arange(300) // 256
+    frames = new_record(FRAME, 512)
+    assert sender.send(sent, 300) == 300
+    assert drained(receiver, frames, 7, 300) == 300
+    assert (frames["data"][7:307] == sent["data"]).all()
+
+
+def test_what_does_not_fit_waits_in_the_kernel(pair):
+    sender, receiver = pair
+    sender.send(frames_of(*[0x10] * 10), 10)
+    frames = new_record(FRAME, 8)
+    assert drained(receiver, frames, 4, 4) == 4
+    assert drained(receiver, frames, 0, 6) == 6
+
+
+def test_stamps_are_the_kernels_real_time_in_whole_microseconds(pair):
+    sender, receiver = pair
+    before = time.time_ns()
+    for _ in range(20):
+        sender.send(frames_of(0x10), 1)
+    after = time.time_ns()
+    frames = new_record(FRAME, 32)
+    stamps = frames["stamp_ns"][: receiver.drain(frames, 0)]
+    assert (stamps % 1000 == 0).all()
+    assert before - 1000 <= stamps[0] <= stamps[-1] <= after
+    assert (np.diff(stamps) >= 0).all()
+
+
+def test_frames_that_the_kernel_drops_are_counted(pair):
+    sender, receiver = pair
+    receiver._socket.setsockopt(1, 8, 2048)  # SOL_SOCKET, SO_RCVBUF
+    sender.send(frames_of(*[0x10] * 100), 100)
+    frames = new_record(FRAME, 128)
+    received = receiver.drain(frames, 0)
+    sender.send(frames_of(0x10), 1)
+    received += receiver.drain(frames, 0)
+    assert receiver.status().dropped == 101 - received > 0
+
+
+def test_fd_frames_come_where_configured():
+    subprocess.run(["ip", "link", "set", "vcan1", "down"], check=True)
+    subprocess.run(["ip", "link", "set", "vcan1", "mtu", "72", "up"], check=True)
+    sender = open_channel("socketcan", "vcan1", receive_ids=[], fd=True)
+    receivers = [open_channel("socketcan", "vcan1", receive_ids=[0x10], fd=fd) for fd in (True, False)]
+    sender.send(frames_of(0x10, flags=FRAME_FD, length=64), 1)
+    frames = new_record(FRAME, 8)
+    assert [receiver.drain(frames, 0) for receiver in receivers] == [1, 0]
+    assert (frames["flags"][0], frames["length"][0], frames["data"][0, 63]) == (FRAME_FD, 64, 63)
+    for channel in (sender, *receivers):
+        channel.close()
+
+
+def test_an_interface_that_goes_down_counts_as_bus_off_until_it_is_back(pair):
+    sender, receiver = pair
+    frames = new_record(FRAME, 8)
+    subprocess.run(["ip", "link", "set", "vcan0", "down"], check=True)
+    try:
+        assert sender.send(frames_of(0x10, 0x10), 2) == 0
+        receiver.drain(frames, 0)
+        assert receiver.status().bus_off
+        assert sender.status().bus_off
+        assert sender.status().send_failures == 2
+    finally:
+        subprocess.run(["ip", "link", "set", "vcan0", "up"], check=True)
+    assert sender.send(frames_of(0x10), 1) == 1
+    assert drained(receiver, frames, 0, 1) == 1
+    assert not receiver.status().bus_off
+
+
+@pytest.fixture
+def wire():
+    made = Wire()
+    yield made
+    made.close()
+
+
+def settled(channel, wanted):
+    """Drain until the status is what is wanted; error frames pass through a terminal line."""
+    frames, end = new_record(FRAME, 64), time.monotonic() + 5
+    while not wanted(channel.status()) and time.monotonic() < end:
+        channel.drain(frames, 0)
+        time.sleep(0.005)
+    return wanted(channel.status())
+
+
+# what the controller reports, in order -> (bus off, error passive)
+STATES = {
+    "warning": ([WARNING], (False, False)),
+    "passive": ([WARNING, PASSIVE], (False, True)),
+    "recovered": ([WARNING, PASSIVE, ACTIVE], (False, False)),
+    "bus off": ([WARNING, PASSIVE, BUS_OFF], (True, True)),
+}
+
+
+@pytest.mark.parametrize(("reports", "expected"), STATES.values(), ids=STATES)
+def test_the_controllers_state_is_followed(wire, reports, expected):
+    unit = open_channel("socketcan", wire.ends[0].name, receive_ids=[0x10])
+    for line in reports:
+        wire.ends[0].report(line)
+        time.sleep(0.05)
+    assert settled(unit, lambda status: (status.bus_off, status.error_passive) == expected)
+    unit.close()
+
+
+def test_frames_go_through_the_wire_and_a_missing_acknowledgement_is_counted(wire):
+    unit = open_channel("socketcan", wire.ends[0].name, receive_ids=[0x10])
+    other = can.Bus(interface="socketcan", channel=wire.ends[1].name)
+    unit.send(frames_of(0x123), 1)
+    heard = other.recv(5)
+    assert (heard.arbitration_id, bytes(heard.data)) == (0x123, bytes(range(8)))
+    assert unit.status().send_failures == 0
+    wire.cut = True
+    unit.send(frames_of(0x124), 1)
+    assert settled(unit, lambda status: status.send_failures == 1)
+    unit.close()
+    other.shutdown()
+
+
+def test_the_daemon_cycles_records_what_candump_sees_and_leaves_in_order(daemon, vehicle, tmp_path):
+    car = vehicle("socketcan", "vcan0")
+    unit = daemon(*BUS, "--record", tmp_path / "record")
+    unit.wait_for("ready")
+    log = tmp_path / "candump.log"
+    with log.open("wb") as file:
+        candump = subprocess.Popen(["candump", "-L", "-r", "4000000", "vcan0"], stdout=file)
+        time.sleep(0.3)
+        car.drive(3.0)
+        assert unit.end(signal.SIGTERM) == 0
+        time.sleep(0.2)
+        candump.terminate()
+        candump.wait()
+    recording = read_recording(tmp_path / "record")
+    assert recording.cycles["dropped"][-1] == 0
+    assert len(recording.cycles) == unit.wait_for("stopped")["cycles"] > 250
+    own = {f"{number:03X}" for number in demand_ids()}
+    independent = [line for line in log.read_text().splitlines() if _identifier(line) not in own]
+    recorded = recording.frames.read_text().splitlines()
+    first = independent.index(recorded[0])
+    assert recorded == independent[first : first + len(recorded)]
+    demands = [line for line in log.read_text().splitlines() if _identifier(line) == f"{demand_ids()[0]:03X}"]
+    assert len(demands) > 250
+
+
+def _identifier(line: str) -> str:
+    found = re.match(r"\(\d+\.\d{6}\) \S+ ([0-9A-F]+)#", line)
+    assert found
+    return found[1]
+
+
+def test_the_daemon_refuses_where_someone_sends_its_frames(daemon):
+    other = can.Bus(interface="socketcan", channel="vcan0")
+    task = other.send_periodic(can.Message(arbitration_id=demand_ids()[0], is_extended_id=False), 0.05)
+    unit = daemon(*BUS)
+    assert unit.end(None) == 2
+    assert any("someone else already sends it" in line for line in unit.other)
+    task.stop()
+    other.shutdown()
+
+
+def test_a_second_sender_in_operation_is_a_fault_that_goes_again(daemon, vehicle):
+    car = vehicle("socketcan", "vcan0")
+    unit = daemon(*BUS)
+    unit.wait_for("ready")
+    car.drive(0.5)
+    intruder = open_channel("socketcan", "vcan0", receive_ids=[])
+    intruder.send(frames_of(demand_ids()[0]), 1)
+    car.drive(2.0)
+    unit.wait_for("fault", fault="foreign sender")
+    unit.wait_for("fault_gone", fault="foreign sender")
+    intruder.close()
+    assert unit.end() == 0
+
+
+def test_a_bus_that_goes_off_is_a_fault_and_the_exit_code_1(daemon, wire):
+    unit = daemon(*BUS[:-1], wire.ends[0].name)
+    unit.wait_for("ready")
+    for line in (WARNING, PASSIVE, BUS_OFF):
+        wire.ends[0].report(line)
+        time.sleep(0.05)
+    unit.wait_for("fault", fault="bus off")
+    assert unit.end() == 1
+    assert any("bus was off" in line for line in unit.other)
+
+
+def test_the_daemon_comes_back_when_the_interface_does(daemon, vehicle):
+    car = vehicle("socketcan", "vcan0")
+    unit = daemon(*BUS)
+    unit.wait_for("ready")
+    car.drive(0.5)
+    subprocess.run(["ip", "link", "set", "vcan0", "down"], check=True)
+    unit.wait_for("fault", fault="bus off")
+    subprocess.run(["ip", "link", "set", "vcan0", "up"], check=True)
+    heard = car.drive(2.0)
+    assert demand_ids()[0] in heard["can_id"].tolist()
+    unit.wait_for("fault_gone", fault="bus off")
+    assert unit.end() == 0
+
+
+def test_no_ring_is_left_behind(daemon, vehicle):
+    car = vehicle("socketcan", "vcan0")
+    unit = daemon(*BUS)
+    ring = Path(unit.wait_for("ready")["ring"])
+    assert ring.exists()
+    car.drive(0.3)
+    os.kill(unit.process.pid, signal.SIGTERM)
+    assert unit.end(None) == 0
+    assert not ring.exists()

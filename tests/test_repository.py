@@ -1,0 +1,152 @@
+"""What holds for the repository as a whole."""
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from ecu import __version__
+from ecu.cli import LABORATORY
+
+ROOT = Path(__file__).parent.parent
+LOCKS = sorted((ROOT / "requirements").glob("*.txt"))
+SOURCES = sorted([*(ROOT / "ecu").rglob("*.py"), *(ROOT / "tools").rglob("*.py")])
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+IGNORED = {
+    ".git",
+    ".venv",
+    "out",
+    "build",
+    "dist",
+    "__pycache__",
+    ".mypy_cache",
+    ".ruff_cache",
+    ".pytest_cache",
+    ".hypothesis",
+}
+TEXTS = {".cfg", ".json", ".lock", ".md", ".sh", ".toml", ".txt", ""}
+INDEX_ADDRESS = re.compile(
+    r"https?://\S*/(simple|packages|-)/|--(extra-)?index-url|--find-links|files\.pythonhosted"
+)
+
+
+def _texts() -> Iterator[Path]:
+    for path in ROOT.rglob("*"):
+        if not IGNORED.intersection(path.relative_to(ROOT).parts) and path.suffix in TEXTS and path.is_file():
+            yield path
+
+
+def _imports(path: Path) -> Iterator[tuple[str, bool]]:
+    """Names that a module imports, and whether only inside a function."""
+    tree = ast.parse(path.read_text())
+    inside = {
+        id(node)
+        for function in ast.walk(tree)
+        if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef)
+        for node in ast.walk(function)
+    }
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield alias.name, id(node) in inside
+        elif isinstance(node, ast.ImportFrom):
+            yield node.module or "", id(node) in inside
+
+
+def _requirements(lock: Path) -> dict[str, set[str]]:
+    """Pinned versions by name; a version may hold for some Pythons only."""
+    versions: dict[str, set[str]] = {}
+    for name, version in re.findall(r"^([\w.\-]+)==([^\\\n]+)", lock.read_text(), re.MULTILINE):
+        versions.setdefault(name, set()).add(version.strip())
+    return versions
+
+
+def test_no_file_names_a_package_index() -> None:
+    found = [str(path) for path in _texts() if INDEX_ADDRESS.search(path.read_text(errors="ignore"))]
+    assert found == []
+
+
+@pytest.mark.parametrize("lock", LOCKS, ids=lambda path: path.name)
+def test_every_requirement_is_pinned_with_a_hash(lock: Path) -> None:
+    entries = re.sub(r"\\\n", " ", lock.read_text()).splitlines()
+    assert entries
+    for entry in entries:
+        assert re.match(r"[\w.\-]+==\S+ .*--hash=sha256:[0-9a-f]{64}", entry), entry[:80]
+
+
+def test_the_locks_agree() -> None:
+    """The development set holds the others at the same versions: `make test` after `make demo` only adds."""
+    everything = _requirements(ROOT / "requirements/dev.txt")
+    for lock in ("onboard", "lab"):
+        for name, versions in _requirements(ROOT / f"requirements/{lock}.txt").items():
+            assert versions <= everything.get(name, set()), f"{lock}.txt: {name}"
+
+
+def test_the_locks_hold_what_the_project_asks_for() -> None:
+    def names(requirements: list[str]) -> set[str]:
+        return {re.split(r"[\[>=<]", requirement)[0] for requirement in requirements}
+
+    project, extras = PROJECT["project"], PROJECT["project"]["optional-dependencies"]
+    onboard = names(project["dependencies"])
+    laboratory = names(extras["lab"])
+    assert laboratory == set(LABORATORY)
+    assert onboard <= _requirements(ROOT / "requirements/onboard.txt").keys()
+    assert onboard | laboratory <= _requirements(ROOT / "requirements/lab.txt").keys()
+    assert names(extras["dev"]) - {"brake-ecu"} <= _requirements(ROOT / "requirements/dev.txt").keys()
+    assert not laboratory & _requirements(ROOT / "requirements/onboard.txt").keys()
+
+
+def test_the_version_is_stated_once_for_package_and_program() -> None:
+    assert PROJECT["project"]["version"] == __version__
+    assert f"## {__version__}" in (ROOT / "CHANGELOG.md").read_text()
+
+
+def test_onboard_code_loads_no_laboratory() -> None:
+    """Every module of `ecu` is imported in a process of its own; then none of these may be loaded."""
+    script = (
+        "import importlib, pkgutil, sys, ecu\n"
+        "for module in pkgutil.walk_packages(ecu.__path__, 'ecu.'):\n"
+        "    importlib.import_module(module.name)\n"
+        "print(*{name.partition('.')[0] for name in sys.modules})\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert not {"brakelab", "matplotlib", "asammdf", *LABORATORY} & set(done.stdout.split())
+
+
+def test_ecu_never_imports_the_laboratory() -> None:
+    """But for the command line, inside the functions of its commands."""
+    for path in (ROOT / "ecu").rglob("*.py"):
+        for name, lazily in _imports(path):
+            if name.partition(".")[0] in {"brakelab", *LABORATORY}:
+                assert path.name == "cli.py", f"{path}: {name}"
+                assert lazily, f"{path}: {name}"
+
+
+def test_the_simulated_vehicle_knows_nothing_of_the_ecu() -> None:
+    for path in (ROOT / "tools/brakelab/plant").rglob("*.py"):
+        for name, _ in _imports(path):
+            assert name.partition(".")[0] != "ecu", f"{path}: {name}"
+            assert not name.startswith("brakelab.") or name.startswith("brakelab.plant"), f"{path}: {name}"
+
+
+def test_the_ecu_knows_nothing_of_the_simulated_vehicle() -> None:
+    for path in (ROOT / "ecu").rglob("*.py"):
+        assert "config/plant" not in path.read_text(), path
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_a_module_is_one_idea(path: Path) -> None:
+    assert len(path.read_text().splitlines()) <= 350, "split it: 300 lines are the aim, 350 the limit"
+
+
+def test_every_path_that_the_documents_name_exists() -> None:
+    for document in [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]:
+        for target in re.findall(r"\]\((?!https?:|#)([^)#]+)", document.read_text()):
+            assert (document.parent / target).exists(), f"{document.name}: {target}"

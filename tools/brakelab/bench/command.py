@@ -1,0 +1,160 @@
+"""`brake-ecu bench`: measures on this machine, beside what else could do the job."""
+
+import json as json_format
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from rich.console import Console
+from rich.progress import track
+
+from brakelab.bench import codec, cycle, plant, step
+from brakelab.bench import stops as stops_bench
+from brakelab.bench.friction import friction_tables
+from brakelab.bench.measure import Figure, Row, machine
+from brakelab.bench.table import Table, markdown, show, stop_tables, time_table
+from ecu import __version__
+from ecu.config import config_hash, load_config
+from ecu.errors import UserError
+from ecu.resources import resource
+
+STOPS: Final = "stops"
+STOPS_TEXT: Final = (
+    "Stops from 120 km/h to standstill, Table 4.2 of the thesis: #1 4, #2 7 m/s² on a dry road (1.2), #3 4, "
+    "#4 6 m/s² on a wet one (0.7). The car is that of config/plant/suv.toml, drawn per seed; its linings "
+    "have 0.85 (front) and 1.10 (rear) of the 0.45 that the ECU is configured with. Nothing was learned "
+    "before. Counted from 0.5 s after the demand has its full value, down to 15 km/h."
+)
+
+FRICTION: Final = "friction"
+FRICTION_TEXT: Final = (
+    "What the friction laws of tools/brakelab/plant/friction, the disc and the brake unit of the simulated "
+    "vehicle reproduce of the thesis, on the simulated dynamometer. Numbers: config/plant/linings.toml."
+)
+
+
+class Bench(NamedTuple):
+    """One bench of times."""
+
+    rows: Callable[[], list[Row]]
+    title: str
+    below: str
+
+
+BENCHES: Final = {
+    "step": Bench(
+        step.step_rows,
+        "step",
+        f"Processor time of a cycle with four wheels, {step.CYCLES} cycles of braking in each of "
+        f"{step.ROUNDS} rounds. All filters get the same inputs and give the same friction.",
+    ),
+    "codec": Bench(
+        codec.codec_rows,
+        "codec",
+        f"Processor time of a message: the 13 protected inputs of the contract, {codec.CYCLES} cycles in "
+        f"each of {codec.ROUNDS} rounds. Ours with CRC, counter and (decoding) freshness, the peer without.",
+    ),
+    "plant": Bench(
+        plant.plant_rows,
+        "plant",
+        f"Time of the simulated vehicle per millisecond of its drive: {plant.STEPS} steps of 1 ms in each of "
+        f"{plant.ROUNDS} rounds, braking in a curve on a rough road from 50 m/s. Processor time "
+        "unless by the clock.",
+    ),
+    "cycle": Bench(
+        cycle.cycle_rows,
+        "cycle",
+        f"Time by the clock, {cycle.CYCLES} cycles of 10 ms in each of {cycle.ROUNDS} rounds, in real time "
+        "but without real-time rights: 39 frames in, 6 out, over a socket pair that carries can_frames. Ours "
+        "is the daemon's cycle; the peer checks nothing and runs the four filters alone.",
+    ),
+}
+
+
+def bench(name: str | None, json: bool) -> int:
+    """Run one bench, or without a name all that measure time; print tables, or JSON. Returns 0.
+
+    In a checkout, a run of all times renews docs/benchmarks.md, `stops` docs/observer-accuracy.md and
+    `friction` docs/friction.md.
+
+    Raises:
+        UserError: there is no such bench.
+    """
+    if name is not None and name not in (*BENCHES, STOPS, FRICTION):
+        raise UserError(
+            "bench", name, f"no such bench; choose one of {', '.join((*BENCHES, STOPS, FRICTION))}"
+        )
+    if name == STOPS:
+        return _stops(json)
+    return _friction(json) if name == FRICTION else _times(name, json)
+
+
+def _times(name: str | None, json: bool) -> int:
+    line = machine()
+    chosen = {key: value for key, value in BENCHES.items() if name in (None, key)}
+    rows = {key: value.rows() for key, value in chosen.items()}
+    if json:
+        _print_json({"machine": line, **{key: [_plain(row) for row in value] for key, value in rows.items()}})
+        return 0
+    tables = [time_table(chosen[key].title, rows[key], chosen[key].below) for key in rows]
+    _print_tables(line, tables)
+    if name is None:
+        _write("benchmarks.md", "Times", f"`brake-ecu bench`, version {__version__}. {line}.", tables)
+    return 0
+
+
+def _stops(json: bool) -> int:
+    path = resource("config/suv.toml")
+    config = load_config(path)
+    console = Console(stderr=True)
+    result = stops_bench.stops(
+        config, progress=lambda items: track(items, description="stops", console=console, transient=True)
+    )
+    seeds = stops_bench.SEEDS
+    of = f"version {__version__}, config/{path.name} ({config_hash(config)[:12]}), seeds 0–{seeds - 1}"
+    if json:
+        plain = {key: [_plain(row) for row in rows] for key, rows in result._asdict().items()}
+        _print_json({"of": of, **plain})
+        return 0
+    tables = stop_tables(result, seeds)
+    _print_tables(of, tables)
+    text = f"`brake-ecu bench stops`, {of}. {STOPS_TEXT}"
+    _write("observer-accuracy.md", "Accuracy of Observer 2 and of the compensation", text, tables)
+    return 0
+
+
+def _friction(json: bool) -> int:
+    tables = friction_tables()
+    of = f"`brake-ecu bench friction`, version {__version__}"
+    if json:
+        _print_json({"of": of, "tables": [table._asdict() for table in tables]})
+        return 0
+    _print_tables(of, tables)
+    _write("friction.md", "Friction laws, disc and brake unit", f"{of}. {FRICTION_TEXT}", tables)
+    return 0
+
+
+def _plain(row: Any) -> dict[str, Any]:
+    """Return a row as JSON has it: figures become objects, times get their ratio."""
+    values = row._asdict().items()
+    plain = {key: value._asdict() if isinstance(value, Figure) else value for key, value in values}
+    return plain | {"ratio": row.ratio} if isinstance(row, Row) else plain
+
+
+def _print_json(content: dict[str, Any]) -> None:
+    print(json_format.dumps(content, indent=1, ensure_ascii=False))
+
+
+def _print_tables(line: str, tables: list[Table]) -> None:
+    console = Console()
+    console.print(line, highlight=False)
+    for table in tables:
+        show(console, table)
+
+
+def _write(name: str, title: str, text: str, tables: list[Table]) -> None:
+    folder: Path = resource("docs")
+    if folder.is_dir():
+        content = "\n".join([f"# {title}", "", text, "", *map(markdown, tables)])
+        (folder / name).write_text(content.rstrip() + "\n", encoding="utf-8")
+        Console(stderr=True).print(f"written: docs/{name}", highlight=False)

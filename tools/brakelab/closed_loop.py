@@ -1,0 +1,277 @@
+"""The simulated vehicle and the ECU closed in memory over real frames, and `brake-ecu simulate`.
+
+One cycle k: the driver acts, the vehicle measures and sends; its frames arrive shortly before T_k; the ECU
+receives, steps and sends; the vehicle understands the demands and moves on by 10 ms. All of it runs in one
+kernel with the ECU's own kernels, so that what is simulated is what is driven.
+"""
+
+from functools import cache
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from brakelab.outputs import check_outputs
+from brakelab.plant.driver import drive
+from brakelab.scenario import LONGEST, Scenario, load_scenario
+from brakelab.vehicle_bus import (
+    N_TRUTH,
+    TRUTH_COLUMNS,
+    Vehicle,
+    carry_on,
+    new_noise,
+    new_values,
+    new_vehicle,
+    sense,
+    understand,
+    write_truth,
+)
+from ecu.bus.freshness import begin_cycle, end_cycle, target_dtype
+from ecu.bus.receive import (
+    ReceivePlan,
+    Reception,
+    contract_listen_plan,
+    contract_receive_plan,
+    new_reception,
+    receive,
+)
+from ecu.bus.transmit import (
+    Transmission,
+    TransmitPlan,
+    contract_transmit_plan,
+    frame_buffer,
+    new_transmission,
+    transmit,
+)
+from ecu.config import Config, load_config, new_params
+from ecu.errors import UserError
+from ecu.jit import kernel
+from ecu.recorder import candump_lines
+from ecu.records import FRAME, INPUTS, OUTPUTS, RecordArray, new_record, output_vector
+from ecu.resources import resource
+from ecu.signals import CYCLE_NS, INPUT_SIGNALS, N_INPUTS, N_OUTPUTS, OUTPUT_COLUMNS
+from ecu.step import new_state, step
+
+START_NS: Final = 1_700_000_000_000_000_000
+"""T_0 of every simulation on the real-time clock."""
+SPACING_NS: Final = 10_000
+"""Between frames of one burst."""
+CHUNK: Final = 1000
+"""Cycles that one call of the kernel runs at most."""
+VEHICLE_BUS: Final = "can0"
+
+
+class Plans(NamedTuple):
+    """Who sends and understands what."""
+
+    vehicle_sends: TransmitPlan
+    vehicle_hears: ReceivePlan
+    ecu_sends: TransmitPlan
+    ecu_hears: ReceivePlan
+
+
+class Sides(NamedTuple):
+    """Vehicle and ECU, each with its ends of the bus."""
+
+    vehicle: Vehicle
+    values: NDArray[np.float64]
+    vehicle_sent: Transmission
+    heard: RecordArray
+    vehicle_reception: Reception
+    params: RecordArray
+    state: RecordArray
+    inputs: RecordArray
+    outputs: RecordArray
+    output_vector: NDArray[np.float64]
+    ecu_sent: Transmission
+    ecu_reception: Reception
+    vehicle_frames: RecordArray
+    ecu_frames: RecordArray
+
+
+class Loop(NamedTuple):
+    """One closed loop."""
+
+    sides: Sides
+    noise: Generator
+
+
+class Drive(NamedTuple):
+    """A simulated drive, one row per cycle; names and units of the contract."""
+
+    t: NDArray[np.float64]
+    """T_k since the start [s], shape (n,)."""
+    inputs: dict[str, NDArray[np.float64]]
+    """As the ECU decoded them; NaN where no new sample arrived."""
+    outputs: dict[str, NDArray[np.float64]]
+    truth: dict[str, NDArray[np.float64]]
+    """At T_k, by `TRUTH_COLUMNS`."""
+    frames: RecordArray
+    """`FRAME` of both directions in the order of their stamps."""
+
+
+@cache
+def plans() -> Plans:
+    """Return the plans of the contract's database."""
+    dbc = resource("dbc/brake_ecu.dbc")
+    return Plans(
+        contract_transmit_plan(dbc, "Vehicle"),
+        contract_listen_plan(dbc),
+        contract_transmit_plan(dbc, "BrakeEcu"),
+        contract_receive_plan(dbc),
+    )
+
+
+def new_loop(scenario: Scenario, config: Config, seed: int, armed: bool = True) -> Loop:
+    """Return a closed loop before its first cycle; car and noise are drawn from `seed`.
+
+    `armed`: the ECU's demands count, whatever `config.transmit` says; else the vehicle's fallback brakes.
+
+    Raises:
+        UserError: the plant's file cannot be read or is wrong.
+    """
+    params = new_params(config)
+    params["transmit"] = armed
+    outputs = new_record(OUTPUTS)
+    plan = plans()
+    sides = Sides(
+        new_vehicle(scenario, seed),
+        new_values(),
+        new_transmission(plan.vehicle_sends),
+        np.zeros(1, target_dtype(N_OUTPUTS)),
+        new_reception(plan.vehicle_hears),
+        params,
+        new_state(params),
+        new_record(INPUTS),
+        outputs,
+        output_vector(outputs),
+        new_transmission(plan.ecu_sends),
+        new_reception(plan.ecu_hears),
+        frame_buffer(plan.vehicle_sends),
+        frame_buffer(plan.ecu_sends),
+    )
+    return Loop(sides, new_noise(seed))
+
+
+@kernel
+def _hand_over(frames: Any, count: int, first_ns: int, spacing_ns: int, kept: Any, place: int) -> int:
+    """Stamp `count` frames and keep copies from `place` on; returns the place behind them."""
+    for i in range(count):
+        frames[i].stamp_ns = first_ns + i * spacing_ns
+        kept[place + i] = frames[i]
+    return place + count
+
+
+@kernel
+def _run(
+    plan: Plans,
+    loop: Sides,
+    noise: Generator,
+    ideal: bool,
+    first_cycle: int,
+    decoded: NDArray[np.float64],
+    outputs: NDArray[np.float64],
+    truth: NDArray[np.float64],
+    kept: Any,
+) -> tuple[int, int, bool]:
+    """Run cycles until the rows are full or the script has ended.
+
+    Returns rows and frames written, and whether the script goes on.
+    """
+    vehicle, inputs, heard = loop.vehicle, loop.inputs[0], loop.heard[0]
+    place = 0
+    for row in range(len(truth)):
+        if not drive(vehicle.script, vehicle.params[0], vehicle.state[0], vehicle.driver[0], 1e-9 * CYCLE_NS):
+            return row, place, False
+        cycle = first_cycle + row
+        t_ns = START_NS + cycle * CYCLE_NS
+        sense(vehicle, noise, loop.values)
+        write_truth(vehicle, truth[row])
+        sent = transmit(plan.vehicle_sends, loop.vehicle_sent, loop.values, cycle, loop.vehicle_frames)
+        # A log's time grid starts at its first frame: the first burst bears T_0 itself.
+        spacing = SPACING_NS if cycle > 0 else 0
+        place = _hand_over(loop.vehicle_frames, sent, t_ns - sent * spacing, spacing, kept, place)
+
+        begin_cycle(inputs, t_ns, CYCLE_NS)
+        receive(plan.ecu_hears, loop.ecu_reception, loop.vehicle_frames, 0, sent, inputs)
+        end_cycle(inputs, loop.ecu_reception.freshness)
+        for i in range(N_INPUTS):
+            decoded[row, i] = inputs.value[i] if inputs.new[i] else np.nan
+        if ideal:
+            for i in range(4):
+                loop.state[0].control.mu_override[i] = vehicle.state[0].mu_b[i]
+        step(loop.params, loop.state, loop.inputs, loop.outputs)
+        outputs[row] = loop.output_vector
+
+        sent = transmit(plan.ecu_sends, loop.ecu_sent, loop.output_vector, cycle, loop.ecu_frames)
+        place = _hand_over(loop.ecu_frames, sent, t_ns + 10 * SPACING_NS, SPACING_NS, kept, place)
+        begin_cycle(heard, t_ns + CYCLE_NS // 2, CYCLE_NS)
+        receive(plan.vehicle_hears, loop.vehicle_reception, loop.ecu_frames, 0, sent, heard)
+        understand(heard, vehicle.demand[0])
+        carry_on(vehicle)
+    return len(truth), place, True
+
+
+def run(loop: Loop, ideal: bool = False) -> Drive:
+    """Run a new loop to the end of its script and return what happened.
+
+    `ideal`: the ECU's pressure law is given the true friction, to compare a compensated controller with.
+    """
+    sides = loop.sides
+    per_cycle = len(sides.vehicle_frames) + len(sides.ecu_frames)
+    blocks: list[tuple[NDArray[np.float64], ...]] = []
+    frames: list[RecordArray] = []
+    first, running = 0, True
+    while running and first * CYCLE_NS < LONGEST * 1e9:
+        block = (np.empty((CHUNK, N_INPUTS)), np.empty((CHUNK, N_OUTPUTS)), np.empty((CHUNK, N_TRUTH)))
+        kept = np.zeros(CHUNK * per_cycle, FRAME)
+        rows, count, running = _run(plans(), sides, loop.noise, ideal, first, *block, kept)
+        blocks.append(tuple(values[:rows] for values in block))
+        frames.append(kept[:count])
+        first += rows
+    decoded, outputs, truth = (np.concatenate(values) for values in zip(*blocks, strict=True))
+    return Drive(
+        np.arange(first, dtype=np.float64) * (1e-9 * CYCLE_NS),
+        dict(zip((signal.name for signal in INPUT_SIGNALS), decoded.T, strict=True)),
+        dict(zip(OUTPUT_COLUMNS, outputs.T, strict=True)),
+        dict(zip(TRUTH_COLUMNS, truth.T, strict=True)),
+        np.concatenate(frames),
+    )
+
+
+def write_columns(
+    path: Path, t: NDArray[np.float64], columns: dict[str, NDArray[np.float64]], metadata: dict[str, str]
+) -> None:
+    """Write columns as Parquet (zstd) with `t` [s]; NaN becomes null, an empty column is left out."""
+    arrays = {"t": pa.array(t)}
+    for name, column in columns.items():
+        if not np.all(np.isnan(column)):
+            arrays[name] = pa.array(column, from_pandas=True)
+    table = pa.table(arrays).replace_schema_metadata(metadata)
+    pq.write_table(table, path, compression="zstd")
+
+
+def simulate(scenario: Path, config: Path, out: Path, seed: int = 0) -> int:
+    """Run a scenario with the ECU of `config` and write OUT.log, OUT.parquet and OUT.truth.parquet.
+
+    The simulated ECU is armed. Returns the exit code.
+
+    Raises:
+        UserError: a file cannot be read, is wrong, or cannot be written.
+    """
+    log, inputs, truth = (out.with_name(out.name + end) for end in (".log", ".parquet", ".truth.parquet"))
+    check_outputs(out, (log, inputs, truth), (scenario, config))
+    result = run(new_loop(load_scenario(scenario), load_config(config), seed))
+    metadata = {"start_time_ns": str(START_NS), "scenario": scenario.stem, "seed": str(seed)}
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        log.write_bytes(candump_lines(result.frames, VEHICLE_BUS))
+        write_columns(inputs, result.t, result.inputs, metadata)
+        write_columns(truth, result.t, result.truth, metadata)
+    except OSError as error:
+        raise UserError(str(out), "", f"cannot be written ({error.strerror}); choose another --out") from None
+    return 0

@@ -1,0 +1,56 @@
+"""One 10 ms cycle of the simulated vehicle: what the actuators are told, ten steps of the car.
+
+Fallback: when the pressure demand is flagged invalid, or none was accepted for 30 ms, the hydraulics brake on
+their own: equal pressure on all wheels in proportion to the driver's demand, with nominal friction.
+"""
+
+from typing import Final
+
+from brakelab.plant.driver import Script, at_time
+from brakelab.plant.jit import Record, kernel
+from brakelab.plant.records import BRAKE
+from brakelab.plant.road import set_road
+from brakelab.plant.vehicle import STEP, advance
+
+CYCLE: Final = 0.010  # s
+STEPS: Final = 10
+DEMAND_TIMEOUT: Final = 0.030  # s
+FULL_PEDAL_DECEL: Final = 10.0  # m/s^2 at 100 % in fallback. Assumption
+BAR: Final = 1e5  # Pa
+
+
+@kernel
+def set_commands(
+    script: Script, params: Record, state: Record, driver: Record, demand: Record, commands: Record
+) -> None:
+    """Set what the actuators do in the coming cycle, and the road as far as it is described by time."""
+    heard = demand.pressure_valid == 1 and demand.pressure_age < DEMAND_TIMEOUT
+    decel = max(driver.decel_demand, 0.01 * driver.pedal_position * FULL_PEDAL_DECEL)
+    braking = script.phases[driver.phase].kind == BRAKE
+    blended = script.blending and braking and demand.motor_valid == 1
+    blended = blended and demand.motor_age < DEMAND_TIMEOUT
+    for wheel in range(4):
+        fallback = params.fallback_gain * decel
+        if fallback > 0.0:
+            fallback += params.push_out_pressure[wheel]
+        commands.pressure_demand[wheel] = BAR * demand.pressure[wheel] if heard else fallback
+        commands.motor_demand[wheel] = demand.motor[wheel] if blended else driver.motor_demand[wheel]
+    commands.road_friction[:] = at_time(script.road_friction, state.t)
+    commands.grade = at_time(script.grade, state.t)
+    commands.ambient_temperature = script.ambient_temperature
+
+
+@kernel
+def move(
+    script: Script, params: Record, state: Record, driver: Record, demand: Record, commands: Record
+) -> None:
+    """Move the car on by one cycle, after `drive` has let the driver act.
+
+    `demand` is what was understood of the ECU up to now; its ages grow by a cycle.
+    """
+    set_commands(script, params, state, driver, demand, commands)
+    for _ in range(STEPS):
+        set_road(script.road, params, state, commands)
+        advance(params, state, commands, STEP)
+    demand.pressure_age += CYCLE
+    demand.motor_age += CYCLE

@@ -1,0 +1,54 @@
+"""What a friction law is to the files that describe it."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Annotated, Final
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from brakelab.plant.jit import kernel
+
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+
+ROW: Final = 32  # numbers that a law may have
+START: Final = 0  # place in every row: the memory at the start of an application
+KELVIN: Final = 273.15  # K at 0 degC
+
+
+class Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class RigBrake(Section):
+    """The brake with which a lining was measured (Table 3.1)."""
+
+    piston_area: Positive  # m^2, all pistons of one side
+    pad_area: Positive  # m^2
+    effective_radius: Positive  # m
+    tyre_radius: Positive  # m, relates disc and road
+
+    def inertia(self, mass: float) -> float:
+        """Return the rig's inertia [kg m^2] for a quarter car of `mass` [kg]."""
+        return mass * self.tyre_radius**2
+
+    def gain(self, mass: float) -> float:
+        """Return 2 A_k r_eff / I [rad/s^2 per Pa]: slowing of the rig's disc over mu_b p."""
+        return 2.0 * self.piston_area * self.effective_radius / self.inertia(mass)
+
+
+class Law(Section, ABC):
+    """Entry of a friction law in a lining file."""
+
+    rig_mass: Positive  # kg, of the quarter car with which the law was identified
+
+    @abstractmethod
+    def row(self, brake: RigBrake) -> Sequence[float]:
+        """Return the law's numbers for its kernel, at most `ROW`, the first being the starting memory."""
+
+
+@kernel
+def linear_step(value: float, rate: float, drive: float, dt: float) -> float:
+    """Return x a step `dt` later of x' = rate x + drive: trapezoidal, stable for every rate < 0."""
+    half = 0.5 * dt * rate
+    return (value * (1.0 + half) + dt * drive) / (1.0 - half)

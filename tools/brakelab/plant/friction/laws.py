@@ -1,0 +1,51 @@
+"""All friction laws: their numbers, and the one kernel that calls the right one."""
+
+from typing import Annotated, Final
+
+from pydantic import Field
+
+from brakelab.plant.friction import constant, ilvo, ilvo_bounded, ostermeyer, ostermeyer_revised, table
+from brakelab.plant.friction.constant import Constant
+from brakelab.plant.friction.ilvo import Ilvo
+from brakelab.plant.friction.ilvo_bounded import IlvoBounded
+from brakelab.plant.friction.law import ROW, Law, RigBrake
+from brakelab.plant.friction.ostermeyer import Ostermeyer
+from brakelab.plant.friction.ostermeyer_revised import OstermeyerRevised
+from brakelab.plant.friction.table import Table
+from brakelab.plant.jit import Record, kernel
+
+LAWS: Final[tuple[type[Law], ...]] = (IlvoBounded, Ilvo, Ostermeyer, OstermeyerRevised, Constant, Table)
+AnyLaw = Annotated[
+    IlvoBounded | Ilvo | Ostermeyer | OstermeyerRevised | Constant | Table, Field(discriminator="law")
+]
+
+
+def law_row(law: Law, brake: RigBrake) -> tuple[int, list[float]]:
+    """Return the law's number, which `friction` wants, and its row of `ROW` numbers."""
+    row = list(law.row(brake))
+    return LAWS.index(type(law)), row + [0.0] * (ROW - len(row))
+
+
+@kernel
+def friction(
+    law: int,
+    row: Record,
+    memory: float,
+    pressure: float,
+    speed: float,
+    slowing: float,
+    temperature: float,
+    dt: float,
+) -> tuple[float, float]:
+    """Return memory and mu_b of the law numbered `law`, `dt` [s] later; see the package for the inputs."""
+    if law == 0:
+        return ilvo_bounded.step(row, memory, pressure, speed, slowing, temperature, dt)
+    if law == 1:
+        return ilvo.step(row, memory, pressure, speed, slowing, temperature, dt)
+    if law == 2:
+        return ostermeyer.step(row, memory, pressure, speed, slowing, temperature, dt)
+    if law == 3:
+        return ostermeyer_revised.step(row, memory, pressure, speed, slowing, temperature, dt)
+    if law == 4:
+        return constant.step(row, memory, pressure, speed, slowing, temperature, dt)
+    return table.step(row, memory, pressure, speed, slowing, temperature, dt)

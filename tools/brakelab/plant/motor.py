@@ -1,0 +1,55 @@
+"""Four motors, each with its half shaft: first order with dead time (A.16), limited by map and battery.
+
+Torque is that at the wheel, positive when it brakes (regenerates). The map has Figure A.7's shape: constant
+torque, then constant power; below a wheel speed regeneration fades out. Beyond the nominal limits lies a peak
+that the motor bears for a time (30 s, Table A.1): what it takes of the peak empties a reserve, rest fills it
+again, and the last second of the reserve fades the peak out. The battery's limits are shared equally by the
+motors.
+"""
+
+import math
+from typing import Final
+
+from brakelab.plant.hydraulics import look_back
+from brakelab.plant.jit import Record, kernel
+
+TIME_CONSTANT: Final = 0.0022  # s (A.16)
+DEAD_TIME: Final = 0.0022  # s (A.16)
+RECOVERY: Final = 1.0 / 3.0  # s of peak regained per second at or below the nominal torque. Assumption
+PEAK_FADE: Final = 1.0  # s of reserve. Assumption
+
+
+@kernel
+def map_torque(torque_limit: float, power_limit: float, speed: float) -> float:
+    """Return the torque [N m] of a map with these limits [N m, W] at a wheel speed >= 0 [rad/s]."""
+    return min(torque_limit, power_limit / max(speed, 1.0))
+
+
+@kernel
+def advance_motors(params: Record, state: Record, dt: float) -> None:
+    """Move the four motor torques on by `dt` [s]; the newest demand is in the history already."""
+    asked = look_back(DEAD_TIME, dt, state.place)
+    motors = 0
+    for wheel in range(4):
+        motors += params.motor_share[wheel] > 0.0
+    for wheel in range(4):
+        speed = abs(state.wheel_speed[wheel])
+        if params.motor_share[wheel] > 0.0:
+            nominal = map_torque(params.motor_torque_limit, params.motor_power_limit, speed)
+            peak = map_torque(params.motor_peak_torque, params.motor_peak_power, speed)
+        else:
+            nominal = peak = 0.0
+        drawn = abs(state.motor_torque[wheel]) - nominal
+        if drawn > 0.0 and peak > nominal:
+            state.peak_reserve[wheel] -= dt * min(drawn / (peak - nominal), 1.0)
+        else:
+            state.peak_reserve[wheel] += dt * RECOVERY
+        state.peak_reserve[wheel] = min(max(state.peak_reserve[wheel], 0.0), params.motor_peak_time)
+        limit = nominal + (peak - nominal) * min(state.peak_reserve[wheel] / PEAK_FADE, 1.0)
+        drive_limit = min(limit, params.discharge_limit / (max(speed, 1.0) * max(motors, 1)))
+        charge_limit = min(limit, params.charge_limit / (max(speed, 1.0) * max(motors, 1)))
+        state.motor_limit[wheel] = charge_limit * min(speed / params.motor_fade_speed, 1.0)
+        target = min(max(state.motor_history[asked, wheel], -drive_limit), state.motor_limit[wheel])
+        state.motor_torque[wheel] += (1.0 - math.exp(-dt / TIME_CONSTANT)) * (
+            target - state.motor_torque[wheel]
+        )

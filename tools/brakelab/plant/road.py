@@ -1,0 +1,69 @@
+"""The road by place: friction and height under each side, grade and bank, over the distance driven.
+
+Friction tells left from right, so that a table describes a patch, a change of surface or a split road (dry
+about 1.2, wet 0.7, ice 0.2). An axle meets a place when it gets there: the front axle `front_length` before
+the centre of gravity.
+"""
+
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakelab.plant.jit import Record, kernel
+
+
+class Road(NamedTuple):
+    """Tables over distance [m], rising; a table without rows: not described by place."""
+
+    friction: NDArray[np.float64]
+    """Rows of distance, friction left, friction right, shape (n, 3)."""
+    height: NDArray[np.float64]
+    """Rows of distance, height left, height right [m], shape (n, 3)."""
+    grade: NDArray[np.float64]
+    """Rows of distance and grade [rad], uphill positive, shape (n, 2)."""
+    bank: NDArray[np.float64]
+    """Rows of distance and bank [rad], left side high positive, shape (n, 2)."""
+
+
+LEVEL: Final = Road(np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 2)), np.empty((0, 2)))
+"""A road of which nothing is described by place."""
+
+
+@kernel
+def at_place(table: NDArray[np.float64], distance: float, column: int) -> float:
+    """Return a column's value at `distance` [m]: linear between rows, constant outside; needs a row."""
+    low, high = 0, len(table) - 1
+    first: float = table[low, column]
+    last: float = table[high, column]
+    if distance <= table[low, 0]:
+        return first
+    if distance >= table[high, 0]:
+        return last
+    while high - low > 1:
+        middle = (low + high) // 2
+        if table[middle, 0] <= distance:
+            low = middle
+        else:
+            high = middle
+    part = (distance - table[low, 0]) / (table[high, 0] - table[low, 0])
+    value: float = table[low, column] + part * (table[high, column] - table[low, column])
+    return value
+
+
+@kernel
+def set_road(road: Road, params: Record, state: Record, commands: Record) -> None:
+    """Set what the car stands on now, as far as the road is described by place."""
+    if len(road.friction) > 0 or len(road.height) > 0:
+        for wheel in range(4):
+            along = params.front_length if wheel < 2 else -params.rear_length
+            place = state.distance + along
+            column = 1 + wheel % 2
+            if len(road.friction) > 0:
+                commands.road_friction[wheel] = at_place(road.friction, place, column)
+            if len(road.height) > 0:
+                commands.road_height[wheel] = at_place(road.height, place, column)
+    if len(road.grade) > 0:
+        commands.grade = at_place(road.grade, state.distance, 1)
+    if len(road.bank) > 0:
+        commands.bank = at_place(road.bank, state.distance, 1)

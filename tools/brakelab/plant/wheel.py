@@ -1,0 +1,62 @@
+"""One wheel between brake, motor and road: spin, slip and the force that the tyre has built up.
+
+Model. I omega' = -T_motor - r F_L - (T_b + f_r r F_z) sign(omega) (A.3; slip and F_L negative in braking),
+tau F_L' + F_L = F_L(slip) (A.13), slip = (r omega - v_L) / max(r omega, v_L) (A.6).
+
+Discretisation. Both equations are stiff (r^2 C / (I v) is some 300 1/s at 30 m/s, and at standstill the
+carcass is a spring against the wheel), so they are solved together by the trapezoidal rule, linearised in
+omega. Brake and rolling resistance are Coulomb friction: they can stop the wheel within a step but never
+turn it back.
+"""
+
+import math
+
+from brakelab.plant.jit import Record, kernel
+from brakelab.plant.tyre import (
+    TRANSITION_SPEED,
+    degressive,
+    relaxation_rate,
+    rolling_radius,
+    steady_forces,
+)
+
+
+@kernel
+def advance_wheel(
+    params: Record, state: Record, wheel: int, speed_long: float, speed_lat: float, friction: float, dt: float
+) -> None:
+    """Move spin [rad/s] and tyre forces [N] of `wheel` on by `dt` [s].
+
+    `speed_long`, `speed_lat` [m/s]: of the hub in the wheel's axes; `friction`: of the road.
+    """
+    load = state.wheel_load[wheel]
+    radius = rolling_radius(params.free_radius[wheel], params.vertical_stiffness[wheel], load)
+    omega = state.wheel_speed[wheel]
+    reference = max(abs(radius * omega), abs(speed_long), TRANSITION_SPEED)
+    slip = (radius * omega - speed_long) / reference
+    slip_angle = -speed_lat / max(abs(speed_long), TRANSITION_SPEED)
+    steady_x, steady_y, stiffness = steady_forces(params, wheel, load, friction, slip, slip_angle)
+
+    nominal = params.nominal_load[wheel]
+    c_x = degressive(params.slip_stiffness[wheel], params.stiffness_degression, load, nominal)
+    c_y = degressive(params.cornering_stiffness[wheel], params.stiffness_degression, load, nominal)
+    gain_x = 1.0 - math.exp(-dt * relaxation_rate(c_x, params.longitudinal_stiffness, speed_long))
+    gain_y = 1.0 - math.exp(-dt * relaxation_rate(c_y, params.lateral_stiffness, speed_long))
+
+    grown = gain_x * (steady_x - state.force_x[wheel])
+    grown_per_spin = 0.5 * gain_x * stiffness * radius / reference
+    mean_force = state.force_x[wheel] + 0.5 * grown
+    inertia = params.wheel_inertia[wheel] + 0.5 * dt * radius * grown_per_spin
+    free = omega - dt * (state.motor_torque[wheel] + radius * mean_force) / inertia
+    stopping = dt * (state.brake_torque[wheel] + params.rolling_resistance * load * radius) / inertia
+    turning = max(abs(free) - stopping, 0.0)
+    new_omega = math.copysign(turning, free)
+
+    state.rolling_radius[wheel] = radius
+    state.wheel_speed[wheel] = new_omega
+    state.force_x[wheel] += grown + grown_per_spin * (new_omega - omega)
+    state.force_y[wheel] += gain_y * (steady_y - state.force_y[wheel])
+    state.slip[wheel] = (radius * new_omega - speed_long) / max(
+        abs(radius * new_omega), abs(speed_long), TRANSITION_SPEED
+    )
+    state.slip_angle[wheel] = slip_angle

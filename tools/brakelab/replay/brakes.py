@@ -1,0 +1,238 @@
+"""Book of the brake applications: one row per application and corner, from the rows of results.
+
+An application is a run of rows with `braking` = 1. For corner i with piston area A_i of one side, effective
+radius r_eff, push-out pressure p_0 and tyre radius r:
+
+    mu_b_mean       = ∫ T_b / (2 A_i r_eff (p − p_0)) ds / ∫ ds
+    decel_predicted = mean of [Σ_i (2 A_i r_eff mu_i (p_i − p_0)⁺ + M_i) / r_i + drag v² + rolling m g] / m
+
+The first from 90 % of the steady pressure (the median of what lies above half of the highest) until release
+or 5 km/h; in the second mu_i was learned before the application, M_i is the motor torque (positive brakes).
+A vehicle that stands decelerates no further: such rows count with 0 in the prediction, as in `decel_mean`.
+"""
+
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ecu.estimation.friction import SECONDS_FOR_LEARNING, SIGMA_FOR_LEARNING
+from ecu.params import GRAVITY
+from ecu.records import RecordArray
+from ecu.signals import CORNERS, FAULT, N_OUTPUTS, OBSERVING, OUTPUT
+
+Vector = NDArray[np.float64]
+
+BAR: Final = 1e5  # Pa
+RELEASE_BAR: Final = 1.0  # an application lasts while a pressure is this much above p_0 (contract)
+SLOWEST: Final = 5.0 / 3.6  # m/s, end of the friction mean (contract)
+STANDING: Final = 0.3  # m/s, below: the vehicle stands
+PERIOD: Final = 0.01  # s, one row
+LEARNED: Final = "learned"
+
+BRAKE_UNITS: Final = {
+    "brake": "-",
+    "corner": "-",
+    "t_start": "s",
+    "duration": "s",
+    "v_in": "m/s",
+    "v_end": "m/s",
+    "decel_mean": "m/s^2",
+    "decel_predicted": "m/s^2",
+    "mu_b_mean": "-",
+    "mu_b_mean_time": "-",
+    "brake_torque_mean": "N m",
+    "brake_energy": "J",
+    "disc_temperature_in": "degC",
+    "disc_temperature_mean": "degC",
+    "pad_wear_mass": "g",
+    "emission_factor": "log10(particles)",
+    # Beyond the contract: what became of the estimate.
+    "mu_b_end": "-",
+    "sigma_mu_b_end": "-",
+    "observed": "s",
+    "learning": "-",
+}
+
+
+class BrakeRow(NamedTuple):
+    """One application at one corner; NaN: not available. Units: `BRAKE_UNITS`."""
+
+    brake: int
+    corner: str
+    t_start: float
+    duration: float
+    v_in: float
+    v_end: float
+    decel_mean: float
+    decel_predicted: float
+    mu_b_mean: float
+    mu_b_mean_time: float
+    brake_torque_mean: float
+    brake_energy: float
+    disc_temperature_in: float
+    disc_temperature_mean: float
+    pad_wear_mass: float
+    emission_factor: float
+    mu_b_end: float
+    sigma_mu_b_end: float
+    observed: float
+    learning: str
+    """`LEARNED`, or why this application taught nothing."""
+
+
+def _corners(rows: Vector, name: str) -> Vector:
+    first = OUTPUT[f"{name}_fl"]
+    return rows[..., first : first + 4]
+
+
+def _mean(values: Vector, weights: Vector | None = None) -> float:
+    known = np.isfinite(values)
+    weights = np.ones_like(values) if weights is None else weights
+    total = float(weights[known].sum())
+    return float(values[known] @ weights[known]) / total if total > 0.0 else float("nan")
+
+
+def friction_means(
+    torque: Vector, pressure: Vector, speed: Vector, lever: float, p_0: float
+) -> tuple[float, float]:
+    """Return the mean friction by distance and by time; NaN if the pressure never acted.
+
+    `torque` [N m], `pressure` [bar] and `speed` [m/s] over one application, shape (n,);
+    `lever` 2 A r_eff [m^3], `p_0` push-out pressure [Pa].
+    """
+    none = (float("nan"), float("nan"))
+    highest = np.nanmax(pressure, initial=0.0)
+    if not highest * BAR > p_0 + RELEASE_BAR * BAR:
+        return none
+    steady = np.median(pressure[pressure > 0.5 * highest])
+    reached = np.flatnonzero(pressure >= 0.9 * steady)
+    first = int(reached[0])
+    over = (pressure * BAR < p_0 + RELEASE_BAR * BAR) | (speed < SLOWEST)
+    ends = np.flatnonzero(over[first:])
+    last = first + int(ends[0]) if len(ends) else len(pressure)
+    if last == first:
+        return none
+    part = slice(first, last)
+    friction = torque[part] / (lever * (pressure[part] * BAR - p_0))
+    return _mean(friction, np.nan_to_num(speed[part])), _mean(friction)
+
+
+def predicted_deceleration(rows: Vector, friction: Vector, params: RecordArray) -> float:
+    """Return the mean deceleration [m/s^2] over `rows`, shape (n, N_ROW), with `friction`, shape (4,)."""
+    p = params[0]
+    speed = rows[:, OUTPUT["vehicle_speed"]]
+    pressure = np.maximum(_corners(rows, "calliper_pressure") * BAR - p["push_out_pressure"], 0.0)
+    motor = np.nan_to_num(rows[:, N_OUTPUTS : N_OUTPUTS + 4])
+    brake = 2.0 * p["piston_area"] * p["effective_radius"] * friction * pressure
+    force = ((brake + motor) / p["wheel_radius"]).sum(axis=1)
+    force = force + p["drag_area"] * speed**2 + p["rolling_resistance"] * p["mass"] * GRAVITY
+    return _mean(np.where(speed > STANDING, force / p["mass"], 0.0))
+
+
+def _modes(rows: Vector, i: int) -> Vector:
+    return rows[:, OUTPUT["mode_fl"] + i]
+
+
+def learning(rows: Vector, i: int, params: RecordArray) -> str:
+    """Return `LEARNED` if corner i's estimate over `rows`, shape (n, N_ROW), was kept, else why not."""
+    p = params[0]
+    observed = PERIOD * np.count_nonzero(_modes(rows, i) == OBSERVING)
+    sigma = _corners(rows[-1], "sigma_mu_b")[i] / _corners(rows[-1], "mu_b")[i]
+    if observed >= SECONDS_FOR_LEARNING and sigma < SIGMA_FOR_LEARNING:
+        return LEARNED
+    if observed >= SECONDS_FOR_LEARNING:
+        return f"σ {100 * sigma:.0f} %"
+    if observed > 0.0:
+        return f"observed {observed:.1f} s only"
+    if np.mean(_modes(rows, i) == FAULT) > 0.5:
+        return "inputs lost"
+    fastest = np.nanmax(rows[:, OUTPUT["vehicle_speed"]], initial=0.0)
+    strongest = np.nanmax(-rows[:, OUTPUT["accel_x_road"]], initial=0.0)
+    if fastest <= p["min_speed"]:
+        return "stands" if fastest < STANDING else f"slower than {3.6 * p['min_speed']:.0f} km/h"
+    if strongest <= p["activation_decel"][i]:
+        return f"below {p['activation_decel'][i]:.1f} m/s²"
+    return "held: ABS, ESP, accelerator or reverse, or slip too small or too large"
+
+
+def application(number: int, t: Vector, rows: Vector, before: Vector, params: RecordArray) -> list[BrakeRow]:
+    """Return the four rows of one application.
+
+    `t` [s] and `rows`, shapes (n,) and (n, N_ROW), are its own; `before`, shape (N_ROW,), precedes it.
+    """
+    p = params[0]
+    speed = rows[:, OUTPUT["vehicle_speed"]]
+    duration = float(t[-1] - t[0]) + PERIOD
+    known = speed[np.isfinite(speed)]
+    v_in, v_end = (float(known[0]), float(known[-1])) if len(known) else (float("nan"), float("nan"))
+    predicted = predicted_deceleration(rows, _corners(before, "mu_b"), params)
+    torque, pressure = _corners(rows, "brake_torque"), _corners(rows, "calliper_pressure")
+    slip, heat = np.nan_to_num(_corners(rows, "slip")), _corners(rows, "disc_temperature")
+    worn = _corners(rows[-1], "pad_wear_mass") - _corners(before, "pad_wear_mass")
+    lines = []
+    for i, corner in enumerate(CORNERS):
+        lever = float(2.0 * p["piston_area"][i] * p["effective_radius"][i])
+        mu_distance, mu_time = friction_means(
+            torque[:, i], pressure[:, i], speed, lever, float(p["push_out_pressure"][i])
+        )
+        power = torque[:, i] * speed * (1.0 + slip[:, i]) / p["wheel_radius"][i]
+        lines.append(
+            BrakeRow(
+                number,
+                corner,
+                float(t[0]),
+                duration,
+                v_in,
+                v_end,
+                max((v_in - v_end) / duration, 0.0),
+                predicted,
+                mu_distance,
+                mu_time,
+                _mean(torque[:, i]),
+                _mean(power) * duration,
+                float(heat[0, i]),
+                _mean(heat[:, i]),
+                float(worn[i]),
+                float("nan"),
+                float(_corners(rows[-1], "mu_b")[i]),
+                float(_corners(rows[-1], "sigma_mu_b")[i]),
+                PERIOD * float(np.count_nonzero(_modes(rows, i) == OBSERVING)),
+                learning(rows, i, params),
+            )
+        )
+    return lines
+
+
+class BrakeBook:
+    """Collects applications from rows that come in blocks; it keeps only the rows of the one that lasts."""
+
+    def __init__(self, params: RecordArray) -> None:
+        self.rows: list[BrakeRow] = []
+        self._params = params
+        self._t: Vector = np.empty(0)
+        self._rows: Vector = np.empty((0, 0))
+
+    def add(self, t: Vector, rows: Vector) -> None:
+        """Add rows that follow the last: `t` [s], shape (n,), and `rows`, shape (n, N_ROW)."""
+        if len(self._t):
+            t, rows = np.concatenate((self._t, t)), np.concatenate((self._rows, rows))
+        braking = rows[:, OUTPUT["braking"]] == 1.0
+        edges = np.flatnonzero(np.diff(braking, prepend=False))
+        for start, end in zip(edges[0::2], edges[1::2], strict=False):
+            self._close(t, rows, int(start), int(end))
+        kept = max(int(edges[-1]) - 1, 0) if len(edges) % 2 else max(len(t) - 1, 0)
+        self._t, self._rows = t[kept:].copy(), rows[kept:].copy()
+
+    def end_log(self) -> None:
+        """End a log: an application that still lasts ends with it, and the next row follows nothing."""
+        if len(self._t) and self._rows[-1, OUTPUT["braking"]] == 1.0:
+            start = int(self._rows[0, OUTPUT["braking"]] != 1.0)
+            self._close(self._t, self._rows, start, len(self._t))
+            self.rows[-4:] = [row._replace(learning="the log ends first") for row in self.rows[-4:]]
+        self._t, self._rows = np.empty(0), np.empty((0, 0))
+
+    def _close(self, t: Vector, rows: Vector, start: int, end: int) -> None:
+        number = len(self.rows) // len(CORNERS)
+        before = rows[max(start - 1, 0)]
+        self.rows += application(number, t[start:end], rows[start:end], before, self._params)

@@ -1,0 +1,157 @@
+"""`brake-ecu replay`: recorded logs, one drive in the order given, through the code of the ECU."""
+
+import sys
+from collections.abc import Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+
+from brakelab.outputs import check_outputs
+from brakelab.replay.engine import Rows, new_ecu
+from brakelab.replay.log import kind_of, log_hash, log_size, replay_log
+from brakelab.replay.needed import NEEDED, fault_lines, needed_lines, nothing_usable
+from brakelab.replay.progress import progress_bar
+from brakelab.replay.quality import Findings, quality_counts, quality_lines
+from brakelab.replay.source import load_source, map_unused
+from brakelab.replay.summary import SHORT, brakings_table, taps
+from brakelab.results import ResultWriter, brakes_path
+from ecu import __version__
+from ecu.bus.receive import ReceivePlan
+from ecu.config import Config, config_hash, load_config, new_params, store_key
+from ecu.diagnostics.store import open_store, restore, save
+from ecu.errors import RunFault, UserError
+from ecu.recorder import read_recording
+from ecu.records import RecordArray
+from ecu.signals import CORNERS, CYCLE_NS
+from ecu.step import new_state
+
+OBSERVERS: Final = ("observer2",)
+WIDTH: Final = 110  # columns of the table where no terminal says how wide it is
+_PERIOD: Final = 1e-9 * CYCLE_NS  # s
+
+
+def replay(
+    logs: Sequence[Path],
+    config: Path,
+    map: Path | None,
+    observer: str,
+    state: Path | None,
+    out: Path,
+    cycles: Path | None = None,
+) -> int:
+    """Replay `logs` as one drive into `out` (its folder is made) and `<name>.brakes.parquet`; return 0.
+
+    `map` is a signal map (None: the ECU's own database), `state` the folder of the state store, `cycles` a
+    recording that gives initial state, T_k and missed periods to an independent log of the same drive.
+
+    Raises:
+        UserError: an argument, the configuration, the map or a log is not right.
+        RunFault: the results are written, but no needed input was ever usable.
+    """
+    _check(logs, observer, out, cycles)
+    check_outputs(out, (out, brakes_path(out)), [*logs, config, *([map] if map else [])])
+    vehicle = load_config(config)
+    source = load_source(map)
+    if map:
+        for log in logs:
+            if kind_of(log) == "signals":
+                print(map_unused(map, log), file=sys.stderr)
+    recording = read_recording(cycles) if cycles else None
+    params = new_params(vehicle)
+    learned = _restore(state, vehicle, params)
+    before = new_state(params, learned)["learned"].tobytes()
+    findings = [Findings(path) for path in logs]
+    with (
+        ResultWriter(out, params) as writer,
+        progress_bar("replay", sum(log_size(path) for path in logs)) as advance,
+    ):
+        writer.provenance = {
+            "version": __version__,
+            "vehicle": vehicle.name,
+            "observer": observer,
+            "config_hash": config_hash(vehicle),
+            "database_hash": source.database_hash,
+            "inputs": [{"name": path.name, "sha256": log_hash(path)} for path in logs],
+        }
+        shift = 0.0
+        for place, found in enumerate(findings):
+            ecu = new_ecu(params, learned)
+            end = shift
+            for rows in replay_log(found.path, ecu, source, recording, found, advance):
+                t = _seconds(rows, found, kind_of(found.path))
+                if place and found.rows == len(t):  # the first block of a log that goes on
+                    shift = round(shift - t[0], 9)
+                t = np.round(t + shift, 9) if place else t
+                writer.provenance.setdefault("start_time_ns", str(found.start_ns))
+                writer.write(t, rows.values)
+                end = float(t[-1]) + _PERIOD
+            writer.brakes.end_log()
+            shift = end
+            learned = ecu.state["learned"].copy()
+        writer.quality = [quality_counts(found) for found in findings]
+    if state and learned is not None and learned.tobytes() != before:
+        with closing(open_store(state)) as store:
+            save(store, store_key(vehicle), learned)
+    _tell(writer, findings, source.plan, params[0]["mu_nominal"])
+    if nothing_usable(findings):
+        names = ", ".join(group.name for group in NEEDED)
+        raise RunFault(f"{out}: not one sample of the needed inputs was usable ({names})")
+    return 0
+
+
+def _check(logs: Sequence[Path], observer: str, out: Path, cycles: Path | None) -> None:
+    if observer not in OBSERVERS:
+        raise UserError("--observer", observer, f"comes later; take {', '.join(OBSERVERS)}")
+    if out.suffix != ".parquet":
+        raise UserError("--out", str(out), "results are written as Parquet; let the name end in .parquet")
+    for log in logs:
+        if not log.exists():
+            raise UserError(str(log), "", "no such file; give an existing log")
+        kind = kind_of(log)
+        if cycles and kind != "frames":
+            raise UserError(
+                str(log), "", "only a log of frames can take its cycles from a recording; leave --cycles out"
+            )
+    if cycles and len(logs) > 1:
+        raise UserError("--cycles", str(cycles), "belongs to one log; replay the logs one by one")
+
+
+def _restore(state: Path | None, vehicle: Config, params: RecordArray) -> RecordArray | None:
+    if state is None:
+        return None
+    with closing(open_store(state)) as store:
+        found = restore(store, store_key(vehicle), params[0]["mu_nominal"])
+    return found[1] if found else None
+
+
+def _seconds(rows: Rows, found: Findings, kind: str) -> NDArray[np.float64]:
+    """Return `t` on the log's own axis: a signal file's own, seconds since the first frame otherwise."""
+    if kind == "signals":
+        return np.where(np.isnan(rows.t), np.round(rows.t_ns * 1e-9, 9), rows.t)
+    return np.round((rows.t_ns - found.start_ns) * 1e-9, 9)
+
+
+def _tell(
+    writer: ResultWriter, findings: Sequence[Findings], plan: ReceivePlan, nominal: Sequence[float]
+) -> None:
+    for found in findings:
+        for line in (*quality_lines(found, plan), *needed_lines(found), *fault_lines(found)):
+            print(line, file=sys.stderr)
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=WIDTH)
+    brakings = writer.brakes.rows
+    short = taps(brakings)
+    if len(brakings) > short * len(CORNERS):
+        console.print(brakings_table(brakings, nominal))
+    else:
+        print("no braking in this drive")
+    if short:
+        print(f"{short} applications shorter than {SHORT} s are in {brakes_path(writer.path).name} only")
+    frames = sum(found.log.frames for found in findings)
+    samples = sum(found.signals.samples for found in findings)
+    print(f"{writer.path}: {writer.rows} rows from {frames} frames and {samples} samples")

@@ -1,0 +1,187 @@
+"""One log of a drive, whatever its form, through one ECU: rows of results come out."""
+
+import hashlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from brakelab.replay.candump import LogQuality, read_candump
+from brakelab.replay.engine import Ecu, Rows, run_frames, run_samples
+from brakelab.replay.quality import Findings, identifier, note_faults
+from brakelab.replay.signal_file import SampleBlock, freshness_at_any_rate, read_signals
+from brakelab.replay.source import Source, only_interface
+from ecu.bus.receive import ReceivePlan, new_reception
+from ecu.diagnostics.faults import FOREIGN_SENDER
+from ecu.errors import UserError
+from ecu.recorder import Recording, read_recording
+from ecu.records import CYCLE, EXTENDED_ID, FRAME_ERROR, FRAME_EXTENDED, RecordArray
+
+FORMATS: Final = "candump .log (also .log.gz), .parquet, .csv, or the folder of a recording"
+
+Advance = Callable[[int], None]
+
+
+def kind_of(path: Path) -> str:
+    """Return "recording", "signals" or "frames". Raises UserError for what is not read."""
+    if path.is_dir():
+        return "recording"
+    suffixes = [suffix.lower() for suffix in path.suffixes]
+    if suffixes[-1:] in ([".parquet"], [".csv"]):
+        return "signals"
+    if suffixes[-1:] == [".log"] or suffixes[-2:] == [".log", ".gz"]:
+        return "frames"
+    raise UserError(
+        str(path), "", f"unknown kind of log {path.suffix or '(no suffix)'}; replay reads {FORMATS}"
+    )
+
+
+def log_size(path: Path) -> int:
+    """Return the length in bytes by which progress is shown."""
+    if path.is_dir():
+        path = read_recording(path).frames
+    return path.stat().st_size if path.is_file() else 0
+
+
+def log_hash(path: Path) -> str:
+    """Return the SHA-256 of the log's content."""
+    if path.is_dir():
+        path = read_recording(path).frames
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def read_cycles(recording: Recording) -> RecordArray:
+    """Return the cycles of a recording as CYCLE, shape (n,). Raises UserError if its layout is another's."""
+    cycles = np.zeros(len(recording.cycles), CYCLE)
+    try:
+        for name in CYCLE.names or ():
+            cycles[name] = recording.cycles[name]
+    except ValueError:
+        raise _other_version(recording) from None
+    if not len(cycles):
+        raise UserError(str(recording.folder), "cycles.bin", "no cycle was recorded; record for longer")
+    return cycles
+
+
+def start_as_recorded(ecu: Ecu, recording: Recording) -> None:
+    """Overwrite the ECU's state with the one before the first recorded cycle."""
+    if recording.initial.dtype != ecu.state.dtype:
+        raise _other_version(recording)
+    ecu.state[:] = recording.initial
+
+
+def _other_version(recording: Recording) -> UserError:
+    return UserError(
+        str(recording.folder), "recording.json", "recorded by another version; replay its frames.log instead"
+    )
+
+
+def replay_log(
+    path: Path,
+    ecu: Ecu,
+    source: Source,
+    recording: Recording | None,
+    findings: Findings,
+    advance: Advance,
+) -> Iterator[Rows]:
+    """Yield the rows of one log.
+
+    `recording` gives initial state, T_k and missed periods to a log of frames. `advance(bytes)` hears of
+    progress.
+    """
+    kind = kind_of(path)
+    if kind == "signals":
+        yield from _noted(_replay_signals(path, ecu, findings, advance), findings)
+        return
+    counted = kind == "recording"
+    if counted:
+        recording = read_recording(path)
+    text = recording.frames if recording and counted else path
+    plan = source.plan
+    ecu.params[0]["mapped"] = plan.mapped
+    reception = findings.reception = new_reception(plan)
+    findings.freshness, findings.mapped = reception.freshness, plan.mapped
+    blocks = read_candump(text, findings.interfaces, findings.log, advance)
+    if source.bus and not counted:
+        blocks = only_interface(blocks, source.bus, findings)
+    if recording is None:
+        rows = run_frames(ecu, plan, reception, blocks)
+    else:
+        start_as_recorded(ecu, recording)
+        cycles = read_cycles(recording)
+        if not counted:
+            blocks = _from_first_recorded(blocks, recording)
+            counted = _heard_everything(cycles)
+            if counted:
+                blocks = _expected_only(blocks, plan)
+        rows = run_frames(ecu, plan, reception, blocks, cycles, counted)
+    yield from _noted(rows, findings)
+    if not reception.messages["accepted"].any():
+        raise _foreign(path, source, findings)
+
+
+def _from_first_recorded(blocks: Iterator[RecordArray], recording: Recording) -> Iterator[RecordArray]:
+    """Leave out what was on the bus before the recorded run heard its first frame."""
+    own = next(read_candump(recording.frames, [], LogQuality()))
+    for block in blocks:
+        later = block[np.maximum.accumulate(block["stamp_ns"]) >= own["stamp_ns"][0]]
+        if len(later):
+            yield later
+
+
+def _heard_everything(cycles: RecordArray) -> bool:
+    """Return whether the recorded run consumed all expected frames of its bus, and nobody sent its own.
+
+    Then each cycle took as many of an independent log's frames as it noted, also such as the kernel
+    delivered after the cycle whose deadline they were stamped before.
+    """
+    return not (cycles["dropped"].any() or (cycles["bus_faults"] & FOREIGN_SENDER).any())
+
+
+def _expected_only(blocks: Iterator[RecordArray], plan: ReceivePlan) -> Iterator[RecordArray]:
+    """Leave out what the kernel's filter kept from the recorded run, and what it sent itself."""
+    wanted = plan.ids[plan.messages["foreign"] == 0]
+    for block in blocks:
+        extended = np.where(block["flags"] & FRAME_EXTENDED, EXTENDED_ID, 0).astype(np.uint32)
+        expected = block[np.isin(block["can_id"] | extended, wanted) & (block["flags"] & FRAME_ERROR == 0)]
+        if len(expected):
+            yield expected
+
+
+def _noted(rows: Iterator[Rows], findings: Findings) -> Iterator[Rows]:
+    for block in rows:
+        if not findings.rows:
+            findings.start_ns = int(block.t_ns[0])
+        findings.rows += len(block.t_ns)
+        note_faults(findings, block.values)
+        yield block
+
+
+def _replay_signals(path: Path, ecu: Ecu, findings: Findings, advance: Advance) -> Iterator[Rows]:
+    blocks = read_signals(path, findings.signals)
+    first = next(blocks)
+    findings.mapped[first.places] = True
+    ecu.params[0]["mapped"] = findings.mapped
+    freshness = findings.freshness = freshness_at_any_rate()
+
+    def every() -> Iterator[SampleBlock]:
+        yield first
+        yield from blocks
+
+    yield from run_samples(ecu, freshness, every())
+    advance(log_size(path))
+
+
+def _foreign(path: Path, source: Source, findings: Findings) -> UserError:
+    plan = source.plan
+    ours = plan.messages["foreign"] == 0
+    wanted = [identifier(message) for message in plan.messages[ours]]
+    shown = ", ".join(wanted[:4]) + (f", … ({len(wanted)} in all)" if len(wanted) > 4 else "")
+    rejected = int(findings.reception.messages["received"][ours].sum()) if findings.reception else 0
+    heard = f"{findings.log.frames} frames on {', '.join(findings.interfaces)}"
+    found = "no identifier" if not rejected else f"no intact frame ({rejected} rejected)"
+    where = f" on {source.bus}" if source.bus else ""
+    remedy = f"{found} that is expected{where} ({shown}); give the signal map of this car: --map MAP"
+    return UserError(str(path), heard, remedy)

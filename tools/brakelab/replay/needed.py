@@ -1,0 +1,115 @@
+"""What became of the inputs that the ECU needs: one line for each group that was of no use, and for the
+faults that lasted most of a drive.
+"""
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from brakelab.replay.quality import Findings
+from ecu.diagnostics.faults import DEGRADING, FAULTS, REQUEST_LOST
+from ecu.records import RecordArray
+from ecu.signals import (
+    ACCEL_X,
+    CALLIPER_PRESSURE,
+    CYCLE_NS,
+    DECEL_DEMAND,
+    INPUT_SIGNALS,
+    PEDAL_POSITION,
+    WHEEL_SPEED,
+)
+
+
+class Group(NamedTuple):
+    """Inputs that are told in one line."""
+
+    name: str
+    places: tuple[int, ...]
+    alternatives: bool = False
+    """One of them is enough, and only what is mapped is missed."""
+
+
+NEEDED: Final = (
+    Group("wheel_speed_*", tuple(range(WHEEL_SPEED, WHEEL_SPEED + 4))),
+    Group("accel_x", (ACCEL_X,)),
+    Group("calliper_pressure_*", tuple(range(CALLIPER_PRESSURE, CALLIPER_PRESSURE + 4))),
+    Group("pedal_position, decel_demand", (PEDAL_POSITION, DECEL_DEMAND), alternatives=True),
+)
+MOST: Final = 0.5
+"""Share of the samples, or of the drive, from which on it is told."""
+
+
+def needed_lines(found: Findings) -> list[str]:
+    """Return a line for each group of needed inputs that this log gave mostly refused, or not at all."""
+    if found.freshness is None:
+        return []
+    lines = []
+    for group in NEEDED:
+        places = [place for place in group.places if found.mapped[place] or not group.alternatives]
+        causes = {place: _cause(found, place) for place in places}
+        bad = [place for place in places if causes[place]]
+        if group.alternatives and any(found.freshness["taken"][list(group.places)]):
+            bad = [place for place in bad if found.freshness["outside"][place]]
+        for cause in dict.fromkeys(causes[place] for place in bad):
+            shown = [place for place in bad if causes[place] == cause]
+            names = group.name if len(shown) == len(group.places) else _names(shown)
+            lines.append(f"{found.path}: {names}: {_share(found.freshness, shown)}{cause}")
+    return lines
+
+
+def nothing_usable(logs: Sequence[Findings]) -> bool:
+    """Return whether no needed input had a single valid sample in the whole drive."""
+    places = [place for group in NEEDED for place in group.places]
+    return not any(found.freshness["taken"][places].any() for found in logs if found.freshness is not None)
+
+
+def fault_lines(found: Findings) -> list[str]:
+    """Return a line that names the faults that degraded or failed the ECU in this log, and how long."""
+    if not found.faulty_rows:
+        return []
+
+    def extent(rows: int) -> str:
+        return _percent(rows / found.rows) if rows > MOST * found.rows else f"{1e-9 * CYCLE_NS * rows:.2f} s"
+
+    causes = [fault for fault in FAULTS if fault.bit & (DEGRADING | REQUEST_LOST)]
+    lasting = sorted(causes, key=lambda fault: -found.fault_rows[fault.bit])
+    names = [
+        f"{fault.name} ({extent(found.fault_rows[fault.bit])})"
+        for fault in lasting
+        if found.fault_rows[fault.bit]
+    ]
+    return [
+        f"{found.path}: degraded or failed for {extent(found.faulty_rows)} of the drive: {', '.join(names)}"
+    ]
+
+
+def _cause(found: Findings, place: int) -> str:
+    """Return what is wrong with an input and what would be right, empty: nothing."""
+    assert found.freshness is not None
+    known, signal = found.freshness[place], INPUT_SIGNALS[place]
+    taken, outside, invalid = int(known["taken"]), int(known["outside"]), int(known["invalid"])
+    if not taken + outside + invalid:
+        if found.reception is None:
+            return "no sample in the whole log; fill this column"
+        return "no sample in the whole log; check its sender, or map it"
+    if outside + invalid <= MOST * (taken + outside + invalid):
+        return ""
+    if outside > invalid:
+        return f"of samples outside {signal.low:g}…{signal.high:g} {signal.unit}; is the unit {signal.unit}?"
+    return "of samples declared invalid or not available; check its sender, or the map's validity"
+
+
+def _share(freshness: RecordArray, places: Sequence[int]) -> str:
+    rows = freshness[list(places)]
+    refused = int(rows["outside"].sum() + rows["invalid"].sum())
+    total = refused + int(rows["taken"].sum())
+    return f"{_percent(refused / total)} " if total else ""
+
+
+def _names(places: Sequence[int]) -> str:
+    return ", ".join(INPUT_SIGNALS[place].name for place in places)
+
+
+def _percent(share: float) -> str:
+    return f"{np.floor(100 * share):.0f} %"

@@ -1,0 +1,119 @@
+"""What a log held and what was wrong in it: counters for the metadata, one line for each kind of damage."""
+
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakelab.replay.candump import LogQuality
+from brakelab.replay.signal_file import SignalQuality
+from ecu.bus.receive import ReceivePlan, Reception
+from ecu.diagnostics.faults import FAULTS
+from ecu.records import EXTENDED_ID, RecordArray
+from ecu.signals import DEGRADED, N_INPUTS, OUTPUT
+
+
+@dataclass
+class Findings:
+    """What one log held; filled while it is read."""
+
+    path: Path
+    start_ns: int = 0
+    """Of its first row, on the log's own clock."""
+    rows: int = 0
+    interfaces: list[str] = field(default_factory=list)
+    log: LogQuality = field(default_factory=LogQuality)
+    signals: SignalQuality = field(default_factory=SignalQuality)
+    reception: Reception | None = None
+    other_interfaces: int = 0
+    """Frames of interfaces that the map does not name."""
+    freshness: RecordArray | None = None
+    """What became of the samples of each input, shape (N_INPUTS,)."""
+    mapped: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(N_INPUTS, np.bool_))
+    """Where the log can hold an input, shape (N_INPUTS,)."""
+    faulty_rows: int = 0
+    """In which the mode was degraded or failed."""
+    fault_rows: Counter[int] = field(default_factory=Counter)
+    """Of these, by the fault's bit."""
+
+
+def note_faults(findings: Findings, values: NDArray[np.float64]) -> None:
+    """Count what was wrong in rows of results, shape (n, N_ROW)."""
+    faulty = values[:, OUTPUT["mode"]] >= DEGRADED
+    masks = values[faulty, OUTPUT["active_faults"]].astype(np.int64)
+    findings.faulty_rows += len(masks)
+    for fault in FAULTS:
+        findings.fault_rows[fault.bit] += int(np.count_nonzero(masks & fault.bit))
+
+
+def identifier(message: Any) -> str:
+    """Return a message's identifier as candump writes it."""
+    number = int(message["id"])
+    return f"{number - EXTENDED_ID:08X}" if number & EXTENDED_ID else f"{number:03X}"
+
+
+def quality_lines(findings: Findings, plan: ReceivePlan) -> list[str]:
+    """Return one line for each kind of damage in the log, nothing for a clean one."""
+    name, log = str(findings.path), findings.log
+    lines = []
+    if log.damaged_lines:
+        first = log.first_damaged_line
+        lines.append(f"{name}: line {first}: {log.damaged_lines} damaged lines skipped, this is the first")
+    if log.cut_line:
+        lines.append(f"{name}: line {log.cut_line}: the last line is cut off and was not used")
+    if log.stamps_backwards:
+        lines.append(
+            f"{name}: time steps back at {log.stamps_backwards} frames; they count in the order of the log"
+        )
+    if findings.signals.unknown_columns:
+        lines.append(f"{name}: columns not used: {', '.join(findings.signals.unknown_columns)}")
+    if findings.reception is None:
+        return lines
+    counters = findings.reception.messages
+    kinds = {
+        "checksum_errors": "CRC errors",
+        "sequence_errors": "counter errors",
+        "repeated": "repeated counters",
+        "length_errors": "wrong lengths",
+        "lost": "gaps in counters",
+    }
+    for kind, text in kinds.items():
+        total = int(counters[kind].sum())
+        if total:
+            worst = plan.messages[int(counters[kind].argmax())]
+            received = int(counters["received"].sum())
+            share = f"{100 * total / received:.1f} % of {received} frames"
+            lines.append(f"{name}: {total} {text} ({share}), most in {worst['name']} ({identifier(worst)})")
+    silent = [
+        f"{message['name']} ({identifier(message)})"
+        for message, counter in zip(plan.messages, counters, strict=True)
+        if not counter["received"] and not message["foreign"]
+    ]
+    if silent:
+        lines.append(f"{name}: never received: {', '.join(silent)}")
+    return lines
+
+
+def quality_counts(findings: Findings) -> dict[str, Any]:
+    """Return the counters of quality for the metadata of results."""
+    counts: dict[str, Any] = {
+        "rows": findings.rows,
+        **vars(findings.log),
+        "samples": findings.signals.samples,
+    }
+    if findings.reception is not None:
+        messages = findings.reception.messages
+        kinds = (
+            "received",
+            "accepted",
+            "checksum_errors",
+            "sequence_errors",
+            "repeated",
+            "length_errors",
+            "lost",
+        )
+        counts |= {kind: int(messages[kind].sum()) for kind in kinds}
+    return counts

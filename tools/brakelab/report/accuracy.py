@@ -1,0 +1,90 @@
+"""How far the estimated friction is from the true one, counted as in the thesis's Table 4.3.
+
+nRMSE = sqrt(mean((estimate - truth)^2)) / mean(truth), over both wheels of an axle, in every braking from
+0.5 s after the demand is reached down to 15 km/h.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakelab.report.brakings import Braking, inside
+from brakelab.report.drive import Drive, Vector
+
+AXLES = {"front": slice(0, 2), "rear": slice(2, 4)}
+
+SETTLING_S = 0.5  # after the demand is reached: pressure and slip have settled
+LOWEST_SPEED = 15.0 / 3.6  # m/s, the observers switch off below (thesis, 4.4)
+# The demand counts as reached at this share: before compensation the friction may be 20 % low.
+REACHED = 0.8
+
+
+class Accuracy(NamedTuple):
+    """Errors of one axle's friction, as shares of the mean true friction; NaN without any sample."""
+
+    nrmse: float
+    bias: float
+    """Mean of estimate minus truth."""
+    inside: float
+    """Share of the samples whose truth lies within ±2σ: 0.95 if σ is honest."""
+    seconds: float
+    """Driving time that was evaluated."""
+
+
+def achieved_deceleration(drive: Drive, truth: Drive | None) -> Vector:
+    """Return the true deceleration where it is known, else the measured one [m/s^2], shape (n,)."""
+    return -(truth if truth and truth.has("accel_x_road") else drive).column("accel_x_road")
+
+
+def evaluated(drive: Drive, truth: Drive | None, found: list[Braking]) -> NDArray[np.bool_]:
+    """Return the rows that count, shape (n,); `truth` lies on the time axis of `drive`."""
+    demand = drive.column("decel_demand_total")
+    achieved = achieved_deceleration(drive, truth)
+    speed = (truth if truth and truth.has("vehicle_speed") else drive).column("vehicle_speed")
+    rows = np.zeros(len(drive.t), bool)
+    for braking in found:
+        within = inside(drive, braking)
+        reached = np.flatnonzero(within & (demand > 0.0) & (achieved >= REACHED * demand))
+        if reached.size:
+            settled = drive.t >= drive.t[reached[0]] + SETTLING_S
+            rows |= within & settled & (demand > 0.0) & (speed >= LOWEST_SPEED)
+    return rows
+
+
+def tracking(drive: Drive, truth: Drive | None, found: list[Braking]) -> list[float]:
+    """Return per braking how much more was achieved than demanded, as a share; NaN: nothing to evaluate."""
+    rows = evaluated(drive, truth, found)
+    demand, achieved = drive.column("decel_demand_total"), achieved_deceleration(drive, truth)
+    shares = []
+    for braking in found:
+        mine = rows & inside(drive, braking)
+        shares.append(float(achieved[mine].sum() / demand[mine].sum()) - 1.0 if mine.any() else float("nan"))
+    return shares
+
+
+def accuracy(estimate: Vector, sigma: Vector, true: Vector, dt: float) -> Accuracy:
+    """Return the errors of an axle; all arrays of shape (rows, wheels), dt the time between rows [s]."""
+    error = estimate - true
+    known = np.isfinite(error)
+    if not known.any():
+        return Accuracy(np.nan, np.nan, np.nan, 0.0)
+    mean = float(true[known].mean())
+    within = np.abs(error[known]) <= 2.0 * sigma[known]
+    return Accuracy(
+        nrmse=float(np.sqrt(np.mean(error[known] ** 2))) / mean,
+        bias=float(error[known].mean()) / mean,
+        inside=float(within.mean()),
+        seconds=float(known.any(axis=1).sum()) * dt,
+    )
+
+
+def accuracy_per_axle(drive: Drive, truth: Drive, found: list[Braking]) -> dict[str, Accuracy]:
+    """Return the accuracy of the front and the rear axle over all brakings."""
+    rows = evaluated(drive, truth, found)
+    dt = float(np.median(np.diff(drive.t)))
+    estimate, sigma, true = drive.corners("mu_b"), drive.corners("sigma_mu_b"), truth.corners("mu_b")
+    return {
+        axle: accuracy(estimate[rows, wheels], sigma[rows, wheels], true[rows, wheels], dt)
+        for axle, wheels in AXLES.items()
+    }

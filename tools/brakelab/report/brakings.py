@@ -1,0 +1,133 @@
+"""The brakings of a drive: from `<name>.brakes.parquet` where replay left one, else from the result."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakelab.replay.summary import SHORT
+from brakelab.report.drive import Drive, Vector, numbers, read_parquet
+from ecu.errors import UserError
+from ecu.signals import CORNERS
+
+PERIOD = 0.01  # s, one row
+STANDING = 0.3  # m/s, below: the vehicle stands and decelerates no further
+
+_PER_BRAKE = ("t_start", "duration", "v_in", "v_end", "decel_mean", "decel_predicted")
+_REMEDY = "write it again with `brake-ecu replay`, or remove it: the report then uses the result alone"
+
+
+class Braking(NamedTuple):
+    """One brake application. Speeds in m/s, decelerations in m/s^2, magnitudes; NaN: not known."""
+
+    number: int
+    t_start: float
+    t_end: float
+    v_in: float
+    v_end: float
+    demanded: float
+    """Mean of the demand over the application; it counts as 0 while the vehicle stands, as in `achieved`."""
+    achieved: float
+    """(v_in - v_end) / duration."""
+    predicted: float
+    """From pressures and the friction that was learned before this application."""
+    friction: Vector
+    """Mean estimate per corner, shape (4,)."""
+    temperature_in: Vector
+    """Of the discs at the start [degC], shape (4,)."""
+    energy: float
+    """Into the four brakes [J]."""
+
+
+def brakes_path(result: Path) -> Path:
+    """Return where replay writes the table of brakings that belongs to `result`."""
+    return result.with_suffix(".brakes.parquet")
+
+
+def brakings(drive: Drive, result: Path) -> list[Braking]:
+    """Return the brakings of a drive in order, without taps shorter than `SHORT`.
+
+    Raises UserError when their file is damaged.
+    """
+    path = brakes_path(result)
+    found = _from_file(drive, path) if path.exists() else _from_result(drive)
+    lasting = [braking for braking in found if braking.t_end - braking.t_start >= SHORT]
+    return [braking._replace(number=number) for number, braking in enumerate(lasting, 1)]
+
+
+def inside(drive: Drive, braking: Braking) -> NDArray[np.bool_]:
+    """Return which rows belong to the braking, shape (n,)."""
+    return np.asarray((drive.t >= braking.t_start) & (drive.t <= braking.t_end))
+
+
+def _mean(values: Vector) -> float:
+    finite = values[np.isfinite(values)]
+    return float(finite.mean()) if finite.size else float("nan")
+
+
+def _demand(drive: Drive) -> Vector:
+    stands = np.abs(drive.column("vehicle_speed")) < STANDING
+    return drive.column("decel_demand_total") * ~stands
+
+
+def _from_file(drive: Drive, path: Path) -> list[Braking]:
+    table = read_parquet(path, _REMEDY)
+    for name in ("brake", "corner", *_PER_BRAKE, "mu_b_mean"):
+        if name not in table.column_names:
+            raise UserError(str(path), f"column {name}: missing", _REMEDY)
+    corner = np.asarray(table.column("corner").to_pylist())
+    brake = numbers(table, "brake", path)
+    per_brake = {name: numbers(table, name, path) for name in _PER_BRAKE}
+
+    def optional(name: str) -> Vector:
+        if name in table.column_names:
+            return numbers(table, name, path)
+        return np.full(len(brake), np.nan)
+
+    friction, temperature, energy = map(optional, ("mu_b_mean", "disc_temperature_in", "brake_energy"))
+    found = []
+    for number in np.unique(brake):
+        rows = np.flatnonzero(brake == number)
+        place = {str(corner[row]): row for row in rows}
+        if set(place) != set(CORNERS):
+            raise UserError(str(path), f"brake {number:.0f}", "needs one row each for " + ", ".join(CORNERS))
+        order = [place[name] for name in CORNERS]
+        t_start, duration, v_in, v_end, achieved, predicted = (
+            float(per_brake[name][order[0]]) for name in _PER_BRAKE
+        )
+        braking = Braking(
+            0, t_start, t_start + duration, v_in, v_end, float("nan"), achieved, predicted,
+            friction[order], temperature[order], float(energy[order].sum()),
+        )  # fmt: skip
+        found.append(braking._replace(demanded=_mean(_demand(drive)[inside(drive, braking)])))
+    return found
+
+
+def _from_result(drive: Drive) -> list[Braking]:
+    name = "braking" if drive.has("braking") else "decel_demand_total"
+    busy = np.nan_to_num(drive.column(name)) > 0.5
+    edges = np.flatnonzero(np.diff(busy.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
+    friction = drive.corners("mu_b")
+    temperature = drive.corners("disc_temperature")
+    speed = drive.column("vehicle_speed")
+    found = []
+    for first, end in edges:
+        last = end - 1
+        duration = max(float(drive.t[last] - drive.t[first]), PERIOD)
+        found.append(
+            Braking(
+                number=0,
+                t_start=float(drive.t[first]),
+                t_end=float(drive.t[last]),
+                v_in=float(speed[first]),
+                v_end=float(speed[last]),
+                demanded=_mean(_demand(drive)[first:end]),
+                achieved=float(speed[first] - speed[last]) / duration,
+                predicted=float("nan"),
+                friction=np.array([_mean(friction[first:end, corner]) for corner in range(4)]),
+                temperature_in=temperature[first],
+                energy=float("nan"),
+            )
+        )
+    return found

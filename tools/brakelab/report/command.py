@@ -1,0 +1,103 @@
+"""`brake-ecu report RESULT.parquet [--truth TRUTH.parquet] --out REPORT.html`"""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from brakelab.outputs import check_outputs
+from brakelab.report.accuracy import accuracy_per_axle, tracking
+from brakelab.report.brakings import Braking, brakings
+from brakelab.report.drive import Vector, onto, read_drive
+from brakelab.report.loop import plots_of_loop
+from brakelab.report.over_time import POINTS, plots_over_time
+from brakelab.report.page import fill
+from brakelab.report.per_braking import plots_per_braking
+from brakelab.report.summary import facts, faults, tiles
+from brakelab.report.timing import read_timing, spreads
+from ecu.errors import UserError
+from ecu.signals import CORNERS
+
+_FRICTION = tuple(f"mu_b_{corner}" for corner in CORNERS)
+
+
+class Row(NamedTuple):
+    """A line of the table of brakings, in the page's units."""
+
+    number: int
+    t_start: float
+    t_end: float
+    duration: float
+    v_in: float
+    v_end: float
+    demanded: float
+    achieved: float
+    predicted: float
+    friction: Vector
+    temperature_front: float
+    temperature_rear: float
+    kilojoules: float
+
+
+def report(result: Path, truth: Path | None, out: Path, timing: Path | None = None) -> None:
+    """Write the page on `result` to `out`; it needs no other file and asks the network for nothing.
+
+    `result` is what replay or the closed loop wrote, `truth` the plant's true values (`simulate` writes
+    them), `timing` a recording's folder or its `cycles.bin`. Raises UserError with one line for any of
+    them that is missing or damaged, and when `out` cannot be written.
+    """
+    recorded = [] if timing is None else [timing, timing / "cycles.bin"]
+    check_outputs(out, [out], [result, *([truth] if truth else []), *recorded])
+    drive = read_drive(
+        result, ("vehicle_speed", *_FRICTION), "give a RESULT.parquet that `brake-ecu replay` or `demo` wrote"
+    )
+    true = None
+    if truth is not None:
+        remedy = "give the NAME.truth.parquet that `brake-ecu simulate` wrote"
+        true = onto(drive, read_drive(truth, _FRICTION, remedy), truth)
+    found = brakings(drive, result)
+    accuracy = None if true is None else accuracy_per_axle(drive, true, found)
+    loop = None if timing is None else read_timing(timing)
+    rows = [_row(braking) for braking in found]
+    page = fill(
+        {
+            "over_time": plots_over_time(drive, true, found),
+            "per_braking": plots_per_braking(found),
+            "loop_plots": {} if loop is None else plots_of_loop(loop),
+        },
+        {
+            "name": result.stem,
+            "facts": facts(drive),
+            "tiles": tiles(drive, found, tracking(drive, true, found), accuracy, loop),
+            "brakings": rows,
+            "with_temperature": any(np.isfinite(row.temperature_front) for row in rows),
+            "with_energy": any(np.isfinite(row.kilojoules) for row in rows),
+            "accuracy": accuracy,
+            "reduced": len(drive.t) > POINTS,
+            "faults": faults(drive),
+            "spreads": {} if loop is None else spreads(loop),
+        },
+    )
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        out.write_text(page, "utf-8")
+    except OSError as error:
+        raise UserError(str(out), error.strerror or "not writable", "choose another --out") from error
+
+
+def _row(braking: Braking) -> Row:
+    return Row(
+        number=braking.number,
+        t_start=braking.t_start,
+        t_end=braking.t_end,
+        duration=braking.t_end - braking.t_start,
+        v_in=braking.v_in,
+        v_end=braking.v_end,
+        demanded=braking.demanded,
+        achieved=braking.achieved,
+        predicted=braking.predicted,
+        friction=braking.friction,
+        temperature_front=float(braking.temperature_in[:2].mean()),
+        temperature_rear=float(braking.temperature_in[2:].mean()),
+        kilojoules=braking.energy * 1e-3,
+    )

@@ -1,0 +1,163 @@
+"""The linked plots over the drive: speed, deceleration, friction, pressures, K_f and modes, one time axis."""
+
+from typing import Any
+
+import numpy as np
+from bokeh.models import ColumnDataSource, HoverTool, Range1d
+from bokeh.models.annotations import BoxAnnotation
+
+from brakelab.report.brakings import Braking, inside
+from brakelab.report.downsample import Buckets, buckets, extremes, times
+from brakelab.report.drive import Drive, Vector
+from brakelab.report.look import DEMAND, ESTIMATE, INK, LEFT, RIGHT, SHADE, link_crosshair, new_figure
+from brakelab.report.modes import modes_plot
+
+# Points per line: 60 s of drive at full resolution, and 30 lines of them stay below 1 MB.
+POINTS = 6000
+
+KMH = 3.6
+TIME = "Time [s]"
+
+
+def plots_over_time(drive: Drive, truth: Drive | None, found: list[Braking]) -> dict[str, Any]:
+    """Return the figures by name in reading order; all share the x range `drive-time` and one source."""
+    busy = np.zeros(len(drive.t), bool)
+    for braking in found:
+        busy |= inside(drive, braking)
+    grid = buckets(busy, POINTS)
+    lines = _lines(drive, truth)
+    source = ColumnDataSource(
+        {"t": times(grid, drive.t), **{name: extremes(grid, v).astype("f4") for name, v in lines.items()}}
+    )
+    span = Range1d(start=float(drive.t[0]), end=float(drive.t[-1]), name="drive-time", bounds="auto")
+    plots = {
+        "speed": _speed(source, span),
+        "deceleration": _deceleration(source, span),
+        "friction-front": _friction(source, span, "front", ("fl", "fr")),
+        "friction-rear": _friction(source, span, "rear", ("rl", "rr")),
+        "pressure-front": _pressure(source, span, "front", ("fl", "fr")),
+        "pressure-rear": _pressure(source, span, "rear", ("rl", "rr")),
+        "k-f": _tyre_factor(source, span),
+        "modes": modes_plot(drive, _coarse(grid), span),
+    }
+    for plot in plots.values():
+        for braking in found:
+            plot.add_layout(
+                BoxAnnotation(
+                    left=braking.t_start, right=braking.t_end, fill_color=SHADE, fill_alpha=1.0,
+                    line_color=None, level="image",
+                )
+            )  # fmt: skip
+    link_crosshair(list(plots.values()))
+    return plots
+
+
+def _coarse(grid: Buckets) -> Buckets:
+    """Half the buckets: neighbours joined, because a bar of a mode needs no two points per pixel."""
+    last = grid.last[1::2]
+    if len(grid.first) % 2:
+        last = np.append(last, grid.last[-1])
+    return Buckets(grid.first[::2], last)
+
+
+def _lines(drive: Drive, truth: Drive | None) -> dict[str, Vector]:
+    """Return every quantity that has a number somewhere, in the units of the plots."""
+    lines = {
+        "speed": drive.column("vehicle_speed") * KMH,
+        "demanded": drive.column("decel_demand_total"),
+        "achieved": -drive.column("accel_x_road"),
+        "k_f": drive.column("k_f"),
+    }
+    for corner in ("fl", "fr", "rl", "rr"):
+        mu, sigma = drive.column(f"mu_b_{corner}"), drive.column(f"sigma_mu_b_{corner}")
+        lines[f"mu_{corner}"] = mu
+        lines[f"low_{corner}"], lines[f"high_{corner}"] = mu - 2.0 * sigma, mu + 2.0 * sigma
+        lines[f"pressure_{corner}"] = drive.column(f"calliper_pressure_{corner}")
+        lines[f"demand_{corner}"] = drive.column(f"pressure_demand_{corner}")
+    if truth is not None:
+        lines["speed_true"] = truth.column("vehicle_speed") * KMH
+        lines["achieved_true"] = -truth.column("accel_x_road")
+        lines["k_f_true"] = truth.column("k_f")
+        for corner in ("fl", "fr", "rl", "rr"):
+            lines[f"mu_true_{corner}"] = truth.column(f"mu_b_{corner}")
+    return {name: values for name, values in lines.items() if np.isfinite(values).any()}
+
+
+def _line(plot: Any, source: ColumnDataSource, name: str, label: str, colour: str, **style: Any) -> None:
+    """Draw a line and enter it in the legend, unless the drive does not have it."""
+    if name in source.column_names:
+        style = {"line_width": 1.6, **style}
+        plot.line("t", name, source=source, line_color=colour, legend_label=label, **style)
+
+
+def _hover(plot: Any, source: ColumnDataSource, rows: list[tuple[str, str, str]]) -> None:
+    """Show the values of (label, column, format) at the time under the mouse."""
+    tips = [(label, f"@{name}{{{form}}}") for label, name, form in rows if name in source.column_names]
+    if plot.renderers:
+        plot.add_tools(
+            HoverTool(renderers=plot.renderers[-1:], mode="vline", tooltips=[("time", "@t{0.00} s"), *tips])
+        )
+
+
+def _speed(source: ColumnDataSource, span: Range1d) -> Any:
+    plot = new_figure(TIME, "Speed [km/h]", x_range=span, window_axis="x")
+    _line(plot, source, "speed", "estimated", ESTIMATE)
+    _line(plot, source, "speed_true", "true", INK, line_dash="dashed", line_width=1.2)
+    _hover(plot, source, [("estimated", "speed", "0.0"), ("true", "speed_true", "0.0")])
+    return plot
+
+
+def _deceleration(source: ColumnDataSource, span: Range1d) -> Any:
+    plot = new_figure(TIME, "Deceleration [m/s²]", x_range=span, window_axis="x")
+    _line(plot, source, "achieved", "achieved (measured)", ESTIMATE, line_width=1.0)
+    _line(plot, source, "achieved_true", "achieved (true)", INK, line_dash="dashed", line_width=1.2)
+    _line(plot, source, "demanded", "demanded", DEMAND, line_width=2.0)
+    rows = [("demanded", "demanded"), ("achieved", "achieved"), ("true", "achieved_true")]
+    _hover(plot, source, [(label, name, "0.00") for label, name in rows])
+    return plot
+
+
+def _friction(source: ColumnDataSource, span: Range1d, axle: str, corners: tuple[str, str]) -> Any:
+    plot = new_figure(TIME, f"Friction {axle} [-]", x_range=span, window_axis="x")
+    sides = list(zip(corners, ("left", "right"), (LEFT, RIGHT), strict=True))
+    for corner, _, colour in sides:
+        if f"low_{corner}" in source.column_names:
+            plot.varea(
+                "t", f"low_{corner}", f"high_{corner}", source=source, fill_color=colour, fill_alpha=0.16
+            )  # fmt: skip
+    bands = len(plot.renderers)
+    for corner, side, colour in sides:
+        _line(plot, source, f"mu_{corner}", f"{side}, band ±2σ", colour)
+    for corner, side, _ in sides:
+        dash = "dashed" if side == "left" else "dotted"
+        _line(plot, source, f"mu_true_{corner}", f"{side}, true", INK, line_dash=dash, line_width=1.3)
+    # The lines set the range: a band that is wide for an instant would flatten everything.
+    plot.y_range.update(renderers=plot.renderers[bands:], range_padding=0.5, min_interval=0.2)
+    rows = [(f"{side}{kind}", f"{name}_{corner}", "0.000")
+            for corner, side, _ in sides for kind, name in (("", "mu"), (" true", "mu_true"))]  # fmt: skip
+    _hover(plot, source, rows)
+    return plot
+
+
+def _pressure(source: ColumnDataSource, span: Range1d, axle: str, corners: tuple[str, str]) -> Any:
+    plot = new_figure(TIME, f"Pressure {axle} [bar]", x_range=span, window_axis="x")
+    sides = list(zip(corners, ("left", "right"), (LEFT, RIGHT), strict=True))
+    for corner, side, colour in sides:
+        _line(
+            plot, source, f"pressure_{corner}", f"{side}, measured", colour, line_width=0.8, line_alpha=0.55
+        )
+    for corner, side, _ in sides:
+        dash = "solid" if side == "left" else "dashed"
+        _line(plot, source, f"demand_{corner}", f"{side}, demanded", DEMAND, line_width=1.8, line_dash=dash)
+    rows = [(f"{side} {kind}", f"{name}_{corner}", "0.0") for corner, side, _ in sides
+            for kind, name in (("demanded", "demand"), ("measured", "pressure"))]  # fmt: skip
+    _hover(plot, source, rows)
+    return plot
+
+
+def _tyre_factor(source: ColumnDataSource, span: Range1d) -> Any:
+    plot = new_figure(TIME, "Tyre factor K_f [-]", x_range=span, window_axis="x")
+    _line(plot, source, "k_f", "estimated", ESTIMATE)
+    _line(plot, source, "k_f_true", "true", INK, line_dash="dashed", line_width=1.2)
+    _hover(plot, source, [("estimated", "k_f", "0.000"), ("true", "k_f_true", "0.000")])
+    return plot

@@ -1,0 +1,67 @@
+"""Fills the page's template: facts, tiles, tables and the plots with the browser code they need."""
+
+import json
+import math
+from collections.abc import Mapping
+from importlib.resources import files
+from typing import Any, NamedTuple
+
+from bokeh.embed import components
+from bokeh.resources import Resources
+from jinja2 import Environment, StrictUndefined
+
+from brakelab.report.look import DARK
+
+_NONE = "–"
+
+
+class Tile(NamedTuple):
+    """One figure of the summary; `warns` marks what needs attention."""
+
+    title: str
+    value: str
+    unit: str
+    note: str
+    warns: bool = False
+
+
+def fixed(value: float, digits: int) -> str:
+    """Return the number with `digits` decimals and a true minus sign, a dash when it is not known."""
+    return f"{value:.{digits}f}".replace("-", "\N{MINUS SIGN}") if math.isfinite(value) else _NONE
+
+
+def percent(share: float, digits: int) -> str:
+    """Return a share as a percentage without the sign for per cent."""
+    return fixed(100.0 * share, digits)
+
+
+def signed_percent(share: float, digits: int) -> str:
+    """Return a share as a percentage with its sign."""
+    return f"{100.0 * share:+.{digits}f}".replace("-", "\N{MINUS SIGN}") if math.isfinite(share) else _NONE
+
+
+def kmh(speed: float) -> str:
+    """Return a speed in m/s as whole km/h."""
+    return fixed(abs(speed) * 3.6, 0)
+
+
+def fill(plots: Mapping[str, Mapping[str, Any]], content: Mapping[str, Any]) -> str:
+    """Return the page; `plots` maps the template's places to figures by name, `content` is the rest."""
+    figures = {name: plot for group in plots.values() for name, plot in group.items()}
+    script, divs = components(figures)
+    here = files("brakelab.report")
+    # Autoescape: names of files and metadata come from outside.
+    page = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    page.filters.update(fixed=fixed, percent=percent, signed_percent=signed_percent, kmh=kmh)
+    return page.from_string((here / "page.html.j2").read_text("utf-8")).render(
+        css=(here / "page.css").read_text("utf-8"),
+        js=(here / "page.js").read_text("utf-8"),
+        dark=json.dumps(DARK),
+        bokeh=Resources(mode="inline", components=["bokeh"]).render(),
+        script=script,
+        **{
+            place: [{"div": divs[name], "height": plot.height} for name, plot in group.items()]
+            for place, group in plots.items()
+        },
+        **content,
+    )

@@ -1,0 +1,127 @@
+"""What the head of the page says: where the result comes from, and the drive in a few numbers."""
+
+from datetime import UTC, datetime
+from typing import NamedTuple
+
+import numpy as np
+
+from brakelab.report.accuracy import AXLES, Accuracy
+from brakelab.report.brakings import Braking
+from brakelab.report.drive import Drive, Vector, start_ns
+from brakelab.report.modes import fault_masks, faults_seen
+from brakelab.report.page import Tile, fixed, percent, signed_percent
+from brakelab.report.timing import Timing, spread
+from ecu.diagnostics.faults import FAULTS
+
+# Beyond these a tile is marked: what an engineer would look into first.
+_HONEST_SHARE = 0.8
+_DEMAND_ERROR = 0.1
+
+
+class FaultSeen(NamedTuple):
+    """A row of the table of faults; times in s."""
+
+    name: str
+    first: float
+    seconds: float
+    remedy: str
+
+
+def facts(drive: Drive) -> list[tuple[str, str]]:
+    """Return label and value of what the result says about its origin."""
+    start = start_ns(drive)
+    when = ""
+    if start is not None:
+        when = datetime.fromtimestamp(start // 10**9, UTC).strftime("%d %B %Y, %H:%M:%S UTC")
+    rows = [
+        ("Vehicle", drive.metadata.get("vehicle", "")),
+        ("Start", when.lstrip("0")),
+        ("Configuration", drive.metadata.get("config_hash", "")[:12]),
+        ("brake-ecu", drive.metadata.get("version", "")),
+        ("Observer", drive.metadata.get("observer", "")),
+    ]
+    return [(label, value) for label, value in rows if value]
+
+
+def tiles(
+    drive: Drive,
+    found: list[Braking],
+    shares: list[float],
+    accuracy: dict[str, Accuracy] | None,
+    timing: Timing | None,
+) -> list[Tile]:
+    """Return the summary in reading order; `shares`: what `tracking` returned."""
+    shown = [_drive(drive), _brakings(found), *_friction(drive, accuracy)]
+    if found:
+        shown.append(_deceleration(shares))
+    shown.append(_faults(drive))
+    if timing is not None:
+        late = spread(timing.lateness)
+        note = f"lateness 99 % {late.p99:.0f} µs, worst {late.worst:.0f} µs"
+        count = len(timing.lateness)
+        shown.append(Tile("Missed periods", f"{timing.missed}", f"of {count}", note, timing.missed > 0))
+    return shown
+
+
+def faults(drive: Drive) -> list[FaultSeen]:
+    """Return every fault that was active, with when and how long."""
+    masks = fault_masks(drive)
+    dt = np.append(np.diff(drive.t), 0.0)
+    remedies = {fault.bit: fault.remedy for fault in FAULTS}
+    rows = []
+    for bit, name in faults_seen(drive).items():
+        active = (masks & bit) != 0
+        first = float(drive.t[int(np.argmax(active))])
+        rows.append(FaultSeen(name, first, float(dt[active].sum()), remedies.get(bit, "")))
+    return rows
+
+
+def _drive(drive: Drive) -> Tile:
+    speed = np.nan_to_num(drive.column("vehicle_speed"))
+    kilometres = float((speed[1:] * np.diff(drive.t)).sum()) * 1e-3
+    seconds = drive.t[-1] - drive.t[0]
+    return Tile("Drive", f"{kilometres:.2f}", "km", f"{seconds:.0f} s, up to {speed.max() * 3.6:.0f} km/h")
+
+
+def _brakings(found: list[Braking]) -> Tile:
+    if not found:
+        return Tile("Brakings", "0", "", "none in this drive")
+    hardest = max(found, key=lambda braking: braking.achieved)
+    note = f"hardest: no. {hardest.number}, {fixed(hardest.achieved, 1)} m/s²"
+    return Tile("Brakings", f"{len(found)}", "", note)
+
+
+def _friction(drive: Drive, accuracy: dict[str, Accuracy] | None) -> list[Tile]:
+    mu, sigma = drive.corners("mu_b"), drive.corners("sigma_mu_b")
+    shown = []
+    for axle, wheels in AXLES.items():
+        last, band = _last(mu[:, wheels]), 2.0 * _last(sigma[:, wheels])
+        note, warns = "at the end of the drive", False
+        if accuracy is not None:
+            row = accuracy[axle]
+            note = f"nRMSE {percent(row.nrmse, 1)} %, truth inside ±2σ {percent(row.inside, 0)} %"
+            warns = row.inside < _HONEST_SHARE
+        shown.append(Tile(f"Friction {axle}, ±2σ", fixed(last, 3), f"± {fixed(band, 3)}", note, warns))
+    return shown
+
+
+def _last(values: Vector) -> float:
+    rows = values[np.isfinite(values).all(axis=1)]
+    return float(rows[-1].mean()) if len(rows) else float("nan")
+
+
+def _deceleration(shares: list[float]) -> Tile:
+    known = np.array([share for share in shares if np.isfinite(share)])
+    title = "Achieved over demanded"
+    if not known.size:
+        return Tile(title, fixed(float("nan"), 0), "", "no steady braking in the result")
+    mean, worst = float(known.mean()), float(known[np.argmax(np.abs(known))])
+    note = f"steady deceleration; worst braking {signed_percent(worst, 1)} %"
+    return Tile(title, signed_percent(mean, 1), "%", note, abs(worst) > _DEMAND_ERROR)
+
+
+def _faults(drive: Drive) -> Tile:
+    seen = list(faults_seen(drive).values())
+    if not drive.has("active_faults"):
+        return Tile("Faults", fixed(float("nan"), 0), "", "not in the result")
+    return Tile("Faults", f"{len(seen)}", "", ", ".join(seen) or "none seen", bool(seen))

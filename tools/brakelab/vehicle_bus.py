@@ -1,0 +1,202 @@
+"""The simulated vehicle at the bus: its sensors and driver as signals out, the ECU's demands in.
+
+Shared by the closed loop in memory and by the vehicle in real time.
+"""
+
+import math
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from brakelab.plant.cycle import move
+from brakelab.plant.description import draw
+from brakelab.plant.driver import Script, friction_now, grade_now
+from brakelab.plant.records import COMMANDS, DEMAND, DRIVER, MEASURED, RecordArray, new_record
+from brakelab.plant.sensors import body_accelerations, measure
+from brakelab.plant.vehicle import new_state
+from brakelab.scenario import Scenario, scenario_plant
+from ecu import signals
+from ecu.jit import Record, kernel
+from ecu.signals import CORNERS, INPUT, N_INPUTS, OUTPUT
+
+PRESSED_FROM: Final = 1.0  # % of pedal travel
+WHEEL_FORCE_X: Final = INPUT["wheel_force_x_fl"]
+WHEEL_TORQUE_Y: Final = INPUT["wheel_torque_y_fl"]
+RAIN: Final = INPUT["rain"]
+PRESSURE_DEMAND: Final = OUTPUT["pressure_demand_fl"]
+PRESSURE_DEMAND_VALID: Final = OUTPUT["pressure_demand_valid"]
+MOTOR_DEMAND: Final = OUTPUT["motor_demand_fl"]
+MOTOR_DEMAND_VALID: Final = OUTPUT["motor_demand_valid"]
+
+_SCALAR_TRUTH: Final = (
+    "vehicle_speed",
+    "distance",
+    "accel_x",  # as a perfect accelerometer reads it
+    "accel_x_road",  # specific force in road axes
+    "accel_y",
+    "yaw_rate",
+    "pitch",
+    "decel_demand",
+    "pedal_position",
+    "road_friction",
+    "grade",
+)
+_CORNER_TRUTH: Final = (
+    "mu_b",
+    "wheel_force_x",
+    "wheel_force_z",
+    "slip",
+    "brake_torque",
+    "disc_temperature",
+    "motor_torque",
+    "calliper_pressure",
+    "wheel_speed",
+    "rolling_radius",
+)
+TRUTH_COLUMNS: Final = _SCALAR_TRUTH + tuple(f"{name}_{c}" for name in _CORNER_TRUTH for c in CORNERS)
+"""True values by the contract's names; beyond it: distance [m], pitch and grade [rad], rolling radius [m]."""
+N_TRUTH: Final = len(TRUTH_COLUMNS)
+_FIRST_CORNER: Final = len(_SCALAR_TRUTH)
+
+
+class Vehicle(NamedTuple):
+    """The simulated vehicle's records, each of shape (1,), and its script."""
+
+    script: Script
+    params: RecordArray
+    state: RecordArray
+    driver: RecordArray
+    demand: RecordArray
+    commands: RecordArray
+    measured: RecordArray
+    speed_sent: bool
+    transducers_sent: bool
+
+
+def new_vehicle(scenario: Scenario, seed: int) -> Vehicle:
+    """Return the vehicle of a scenario before its first cycle, its car drawn from `seed`.
+
+    Raises:
+        UserError: the plant's file cannot be read or is wrong.
+    """
+    params = draw(scenario_plant(scenario), seed)
+    commands = new_record(COMMANDS)
+    commands["road_friction"] = scenario.script().road_friction[0, 1]
+    demand = new_record(DEMAND)
+    demand["pressure_age"] = demand["motor_age"] = math.inf
+    return Vehicle(
+        scenario.script(),
+        params,
+        new_state(params, scenario.initial_speed, scenario.initial_disc_temperature),
+        new_record(DRIVER),
+        demand,
+        commands,
+        new_record(MEASURED),
+        scenario.vehicle_speed,
+        scenario.wheel_transducers,
+    )
+
+
+def new_noise(seed: int) -> Generator:
+    """Return the source of the sensors' noise. It goes to kernels beside the records: within a tuple numba
+    would need milliseconds in each call to see what it is."""
+    return np.random.default_rng([seed, 1])
+
+
+@kernel
+def sense(vehicle: Vehicle, noise: Generator, values: NDArray[np.float64]) -> None:
+    """Write what the vehicle sends now into `values`, shape (N_INPUTS,); NaN: not available."""
+    state, driver, measured = vehicle.state[0], vehicle.driver[0], vehicle.measured[0]
+    grade = grade_now(vehicle.script, state)
+    measure(vehicle.params[0], state, grade, noise, measured)
+    values[:] = np.nan
+    values[signals.ACCEL_X] = measured.accel_x
+    values[signals.ACCEL_Y] = measured.accel_y
+    values[signals.YAW_RATE] = measured.yaw_rate
+    values[signals.PEDAL_POSITION] = driver.pedal_position
+    values[signals.PEDAL_PRESSED] = 1.0 if driver.pedal_position > PRESSED_FROM else 0.0
+    values[signals.DECEL_DEMAND] = driver.decel_demand
+    values[signals.DECEL_DEMAND_VALID] = driver.decel_demand_valid
+    values[signals.ACCELERATOR_POSITION] = driver.accelerator_position
+    values[signals.REVERSE] = values[signals.ABS_ACTIVE] = values[signals.ESP_ACTIVE] = 0.0
+    values[signals.STEERING_ANGLE] = vehicle.commands[0].steering_angle
+    values[signals.ACCUMULATOR_PRESSURE] = 1e-5 * vehicle.params[0].pressure_limit
+    values[signals.HYDRAULIC_READY] = 1.0
+    values[signals.AMBIENT_TEMPERATURE] = vehicle.script.ambient_temperature
+    values[RAIN] = 0.0
+    if vehicle.speed_sent:
+        values[signals.VEHICLE_SPEED] = measured.vehicle_speed
+        values[signals.VEHICLE_SPEED_VALID] = 1.0
+    for i in range(4):
+        values[signals.WHEEL_SPEED + i] = measured.wheel_speed[i]
+        values[signals.CALLIPER_PRESSURE + i] = measured.calliper_pressure[i]
+        values[signals.MOTOR_TORQUE + i] = state.motor_torque[i]
+        values[signals.MOTOR_LIMIT + i] = state.motor_limit[i]
+        if vehicle.transducers_sent:
+            values[WHEEL_FORCE_X + i] = measured.wheel_force_x[i]
+            values[WHEEL_TORQUE_Y + i] = measured.wheel_torque_y[i]
+
+
+@kernel
+def understand(heard: Record, demand: Record) -> None:
+    """Take over the ECU's demands that arrived in this cycle; `heard` is a record of `OUTPUT_COLUMNS`."""
+    if heard.new[PRESSURE_DEMAND] and heard.new[PRESSURE_DEMAND + 2]:
+        demand.pressure_age = 0.0
+        demand.pressure_valid = heard.value[PRESSURE_DEMAND_VALID] == 1.0
+        for i in range(4):
+            demand.pressure[i] = heard.value[PRESSURE_DEMAND + i]
+    if heard.new[MOTOR_DEMAND] and heard.new[MOTOR_DEMAND + 2]:
+        demand.motor_age = 0.0
+        demand.motor_valid = heard.value[MOTOR_DEMAND_VALID] == 1.0
+        for i in range(4):
+            demand.motor[i] = heard.value[MOTOR_DEMAND + i]
+
+
+@kernel
+def carry_on(vehicle: Vehicle) -> None:
+    """Move the car on by one cycle with the demands that were understood."""
+    move(
+        vehicle.script,
+        vehicle.params[0],
+        vehicle.state[0],
+        vehicle.driver[0],
+        vehicle.demand[0],
+        vehicle.commands[0],
+    )
+
+
+@kernel
+def write_truth(vehicle: Vehicle, row: NDArray[np.float64]) -> None:
+    """Write the true values of now into `row`, shape (N_TRUTH,), in the order of `TRUTH_COLUMNS`."""
+    state, driver = vehicle.state[0], vehicle.driver[0]
+    grade = grade_now(vehicle.script, state)
+    row[0] = state.speed_x
+    row[1] = state.distance
+    row[2] = body_accelerations(vehicle.params[0], state, grade)[0]
+    row[3] = state.accel_x
+    row[4] = body_accelerations(vehicle.params[0], state, grade)[1]
+    row[5] = state.yaw_rate
+    row[6] = state.pitch
+    row[7] = driver.decel_demand
+    row[8] = driver.pedal_position
+    row[9] = friction_now(vehicle.script, state)
+    row[10] = grade
+    for i in range(4):
+        corner = _FIRST_CORNER + i
+        row[corner] = state.mu_b[i]
+        row[corner + 4] = state.force_x[i]
+        row[corner + 8] = state.wheel_load[i]
+        row[corner + 12] = state.slip[i]
+        row[corner + 16] = state.brake_torque[i]
+        row[corner + 20] = state.disc_temperature[i]
+        row[corner + 24] = state.motor_torque[i]
+        row[corner + 28] = 1e-5 * state.pressure[i]
+        row[corner + 32] = state.wheel_speed[i]
+        row[corner + 36] = state.rolling_radius[i]
+
+
+def new_values() -> NDArray[Any]:
+    """Return room for what the vehicle sends, shape (N_INPUTS,)."""
+    return np.full(N_INPUTS, np.nan)

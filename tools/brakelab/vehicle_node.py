@@ -1,0 +1,280 @@
+"""The simulated vehicle as a process of its own on a real bus, in real time.
+
+`python -m brakelab.vehicle_node SCENARIO -i INTERFACE -c CHANNEL` sends the vehicle's frames every 10 ms on
+absolute deadlines, takes the ECU's demands, and leaves when the scenario has ended or on SIGTERM. It prints
+`ready` when it is compiled and on the bus. Without valid demands for 30 ms its own hydraulics brake.
+"""
+
+import argparse
+import gc
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from brakelab.closed_loop import Plans, plans, write_columns
+from brakelab.plant.driver import drive
+from brakelab.scenario import Scenario, load_scenario
+from brakelab.vehicle_bus import (
+    N_TRUTH,
+    TRUTH_COLUMNS,
+    Vehicle,
+    carry_on,
+    new_noise,
+    new_values,
+    new_vehicle,
+    sense,
+    understand,
+    write_truth,
+)
+from ecu.bus.channel import Channel, open_channel
+from ecu.bus.freshness import begin_cycle, target_dtype
+from ecu.bus.receive import Reception, new_reception, receive
+from ecu.bus.transmit import Transmission, frame_buffer, new_transmission, transmit
+from ecu.clock import Grid, TimeSource, system_time
+from ecu.errors import UserError
+from ecu.jit import kernel
+from ecu.records import FRAME, RecordArray
+from ecu.resources import named
+from ecu.signals import CYCLE_NS, N_OUTPUTS
+
+RECEIVED_AT_ONCE: Final = 256
+PRIORITY: Final = 10
+"""SCHED_FIFO, below the daemon's."""
+SILENCE_CYCLES: Final = 50
+"""Without a frame of the ECU: it has left."""
+
+
+class Side(NamedTuple):
+    """The vehicle and its ends of the bus."""
+
+    vehicle: Vehicle
+    values: NDArray[np.float64]
+    sent: Transmission
+    heard: RecordArray
+    reception: Reception
+    frames_out: RecordArray
+    frames_in: RecordArray
+
+
+class Node(NamedTuple):
+    """One vehicle in real time."""
+
+    side: Side
+    noise: Generator
+
+
+class Truth(NamedTuple):
+    """What really happened, one row per cycle."""
+
+    start_ns: int
+    """First T_k on the real-time clock."""
+    t: NDArray[np.float64]
+    """Seconds since `start_ns`, shape (n,)."""
+    values: NDArray[np.float64]
+    """In the order of `TRUTH_COLUMNS`, shape (n, N_TRUTH)."""
+
+
+def new_node(scenario: Scenario, seed: int) -> Node:
+    """Return a vehicle before its first cycle; car and noise are drawn from `seed`.
+
+    Raises:
+        UserError: the plant's file cannot be read or is wrong.
+    """
+    plan = plans()
+    side = Side(
+        new_vehicle(scenario, seed),
+        new_values(),
+        new_transmission(plan.vehicle_sends),
+        np.zeros(1, target_dtype(N_OUTPUTS)),
+        new_reception(plan.vehicle_hears),
+        frame_buffer(plan.vehicle_sends),
+        np.zeros(RECEIVED_AT_ONCE, FRAME),
+    )
+    return Node(side, new_noise(seed))
+
+
+@kernel
+def _turn(
+    plan: Plans,
+    side: Side,
+    noise: Generator,
+    now_ns: int,
+    received: int,
+    periods: int,
+    cycle: int,
+    row: NDArray[np.float64],
+) -> int:
+    """Take demands, live through `periods` cycles, measure; returns frames to send, -1 at the end."""
+    vehicle = side.vehicle
+    begin_cycle(side.heard[0], now_ns, CYCLE_NS)
+    receive(plan.vehicle_hears, side.reception, side.frames_in, 0, received, side.heard[0])
+    understand(side.heard[0], vehicle.demand[0])
+    for _ in range(periods):
+        if vehicle.driver[0].started:
+            carry_on(vehicle)
+        if not drive(vehicle.script, vehicle.params[0], vehicle.state[0], vehicle.driver[0], 1e-9 * CYCLE_NS):
+            return -1
+    sense(vehicle, noise, side.values)
+    write_truth(vehicle, row)
+    return int(transmit(plan.vehicle_sends, side.sent, side.values, cycle, side.frames_out))
+
+
+def _lose(frames: RecordArray, count: int, share: float, random: np.random.Generator) -> int:
+    """Remove each of the first `count` frames with probability `share`; returns how many are left."""
+    kept = np.flatnonzero(random.random(count) >= share)
+    frames[: len(kept)] = frames[kept]
+    return len(kept)
+
+
+def drive_in_real_time(
+    node: Node,
+    channel: Channel,
+    source: TimeSource,
+    lost_share: float = 0.0,
+    seed: int = 0,
+    stopped: Callable[[], bool] = lambda: False,
+) -> Truth:
+    """Drive the node's scenario on `channel` to its end, or until `stopped`.
+
+    `lost_share` of the vehicle's frames is not sent (seeded by `seed`). Periods that were missed are lived
+    through by the car, but not sent.
+    """
+    side = node.side
+    grid = Grid(source)
+    random = np.random.default_rng([seed, 2])
+    rows: list[NDArray[np.float64]] = []
+    cycles: list[int] = []
+    start_ns = cycle = 0
+    while not stopped():
+        tick = grid.wait()
+        periods = tick.missed + 1 if rows else 1
+        cycle += periods if rows else 0
+        start_ns = start_ns or tick.t_ns
+        received = channel.drain(side.frames_in, 0)
+        row = np.empty(N_TRUTH)
+        count = _turn(plans(), side, node.noise, source.realtime_ns(), received, periods, cycle, row)
+        if count < 0:
+            break
+        if lost_share > 0.0:
+            count = _lose(side.frames_out, count, lost_share, random)
+        channel.send(side.frames_out, count)
+        rows.append(row)
+        cycles.append(cycle)
+    t = np.array(cycles, np.float64) * (1e-9 * CYCLE_NS)
+    return Truth(start_ns, t, np.array(rows).reshape(-1, N_TRUTH))
+
+
+def wait_for_ecu(node: Node, channel: Channel, stopped: Callable[[], bool]) -> None:
+    """Return when the first frame of the ECU is heard, or when `stopped`."""
+    while not stopped() and not channel.drain(node.side.frames_in, 0):
+        time.sleep(0.001)
+
+
+def stay_with_ecu(node: Node, channel: Channel, source: TimeSource, stopped: Callable[[], bool]) -> None:
+    """Keep sending what the car's sensors said last until the ECU falls silent, or until `stopped`."""
+    side, grid = node.side, Grid(source)
+    cycle = silent = 0
+    while silent < SILENCE_CYCLES and not stopped():
+        grid.wait()
+        cycle += 1
+        silent = 0 if channel.drain(side.frames_in, 0) else silent + 1
+        count = transmit(plans().vehicle_sends, side.sent, side.values, cycle, side.frames_out)
+        channel.send(side.frames_out, count)
+
+
+def write_truth_file(path: Path, truth: Truth, scenario: str, seed: int) -> None:
+    """Write the truth as Parquet with the absolute start in its metadata.
+
+    Raises:
+        UserError: the file cannot be written.
+    """
+    metadata = {"start_time_ns": str(truth.start_ns), "scenario": scenario, "seed": str(seed)}
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_columns(path, truth.t, dict(zip(TRUTH_COLUMNS, truth.values.T, strict=True)), metadata)
+    except OSError as error:
+        raise UserError(str(path), "", f"cannot be written ({error.strerror}); choose another file") from None
+
+
+def warm_up(scenario: Scenario) -> None:
+    """Compile, or load from the cache, what a cycle needs."""
+    node = new_node(scenario, 0)
+    _turn(plans(), node.side, node.noise, CYCLE_NS, 0, 1, 0, np.empty(N_TRUTH))
+
+
+def _ask_for_priority() -> None:
+    """Be woken in time where the machine grants it, but after the ECU: a vehicle does not wait for others."""
+    gc.collect()
+    gc.freeze()
+    with suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+
+
+def _share(text: str) -> float:
+    share = float(text)
+    if not 0.0 <= share < 1.0:
+        raise argparse.ArgumentTypeError("give a share from 0 to below 1")
+    return share
+
+
+def _arguments(argv: list[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="python -m brakelab.vehicle_node", description="The simulated vehicle on a bus, in real time."
+    )
+    parser.add_argument("scenario", help="a scenario file, or a shipped one by name")
+    parser.add_argument("-i", "--interface", required=True, help="as python-can calls it")
+    parser.add_argument("-c", "--channel", required=True, help="as python-can calls it")
+    parser.add_argument("--seed", type=int, default=0, help="of the drawn car, its noise and lost frames")
+    parser.add_argument("--lose", type=_share, default=0.0, metavar="SHARE", help="of the frames, 0 to 1")
+    parser.add_argument(
+        "--with-ecu", action="store_true", help="drive off when the ECU is heard, stay until it is silent"
+    )
+    parser.add_argument("--truth", type=Path, metavar="FILE", help="where to write what really happened")
+    return parser.parse_args(argv)
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the process; returns its exit code."""
+    arguments = _arguments(argv)
+    stop: list[int] = []
+
+    def ask_to_stop(number: int, frame: Any) -> None:
+        stop.append(number)
+
+    signal.signal(signal.SIGTERM, ask_to_stop)
+    signal.signal(signal.SIGINT, ask_to_stop)
+    try:
+        path = named(arguments.scenario, "config/scenarios")
+        scenario = load_scenario(path)
+        warm_up(scenario)
+        node = new_node(scenario, arguments.seed)
+        listened = [int(identifier) for identifier in plans().vehicle_hears.ids]
+        channel = open_channel(arguments.interface, arguments.channel, receive_ids=listened)
+        _ask_for_priority()
+        print("ready", flush=True)
+        source, stopped = system_time(), lambda: bool(stop)
+        if arguments.with_ecu:
+            wait_for_ecu(node, channel, stopped)
+        truth = drive_in_real_time(node, channel, source, arguments.lose, arguments.seed, stopped)
+        if arguments.truth is not None:
+            write_truth_file(arguments.truth, truth, path.stem, arguments.seed)
+        if arguments.with_ecu:
+            stay_with_ecu(node, channel, source, stopped)
+        channel.close()
+    except UserError as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
