@@ -50,7 +50,7 @@ def test_a_second_daemon_on_the_same_bus_refuses(daemon, vehicle):
 
 def test_a_run_without_any_frame_found_a_fault(daemon):
     unit = daemon(*BUS)
-    unit.wait_for("ready")
+    unit.wait_for("fault")  # a run stopped before its first cycle has found none
     assert unit.end(signal.SIGINT) == 1
     assert any("no frame of the database came in" in line for line in unit.other)
 
