@@ -1,0 +1,73 @@
+"""Prediction and correction of the joint observer's state; one scalar measurement at a time.
+
+Correction after Schmidt: a state that is not free keeps its value and variance, but its covariances act, so
+that what it leaves uncertain is not counted as known. Innovations beyond `GATE` standard deviations count with
+a variance that puts them on the gate; beyond four gates they are rejected.
+"""
+
+import math
+
+from ecu.estimation.joint.layout import BIAS, MU, SLOPE, V, N
+from ecu.jit import Record, kernel
+
+GATE = 3.0
+REJECT = 4.0 * GATE
+
+
+@kernel
+def drift_speed(state: Record, time: float) -> None:
+    """Let bias and slope act on the covariance of speed over `time` [s]: v' = a - b - g sin(slope)."""
+    p = state.p
+    for j in range(N):
+        if j != V:
+            p[V, j] -= time * (p[BIAS, j] + p[SLOPE, j])
+            p[j, V] = p[V, j]
+    p[V, V] -= time * (2.0 * (p[V, BIAS] + p[V, SLOPE]) + time * (p[BIAS, BIAS] + p[SLOPE, SLOPE]))
+
+
+@kernel
+def walk_friction(state: Record, common: float, front: float, rear: float, wheel: float) -> None:
+    """Add to the variance of the four frictions: of all together, of each axle, of each wheel."""
+    p = state.p
+    for i in range(4):
+        for j in range(4):
+            add = common
+            if i // 2 == j // 2:
+                add += front if i < 2 else rear
+            if i == j:
+                add += wheel
+            p[MU + i, MU + j] += add
+
+
+@kernel
+def correct(state: Record, innovation: float, variance: float) -> float:
+    """Fuse a measurement with derivatives `state.h` and noise `variance`; returns its test ratio."""
+    p, h, ph, x, free = state.p, state.h, state.ph, state.x, state.free
+    total = variance
+    for i in range(N):
+        s = 0.0
+        for j in range(N):
+            s += p[i, j] * h[j]
+        ph[i] = s
+    for i in range(N):
+        total += ph[i] * h[i]
+    ratio = innovation * innovation / total
+    if not math.isfinite(ratio) or ratio > REJECT * REJECT:
+        return ratio
+    if ratio > GATE * GATE:
+        total = innovation * innovation / (GATE * GATE)
+    scale = innovation / total
+    for i in range(N):
+        if free[i]:
+            x[i] += scale * ph[i]
+    inverse = 1.0 / total
+    for i in range(N):
+        gain = ph[i] * inverse
+        if free[i]:
+            for j in range(N):
+                p[i, j] -= gain * ph[j]
+        else:
+            for j in range(N):
+                if free[j]:
+                    p[i, j] -= gain * ph[j]
+    return ratio

@@ -1,0 +1,87 @@
+"""The states of the joint observer: what one filter for the whole vehicle knows and how well.
+
+Friction, stiffness, mass, peak, motor scale and drag are logarithms of the ratio to the configuration: scaling
+mass and all frictions together is invisible to friction braking, and in logarithms that direction is constant,
+so relinearising cannot invent knowledge of it.
+"""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+V: Final = 0  # vehicle speed [m/s]
+MU: Final = 1  # four: ln of lining friction over nominal
+STIFFNESS: Final = 5  # ln of the tyres' slip stiffness over configured
+RATIO: Final = 6  # ln of rear over front stiffness, beyond configured
+RADIUS: Final = 7  # four: ln of rolling radius over (A.4)
+BIAS: Final = 11  # accelerometer bias [m/s^2]
+SLOPE: Final = 12  # gravity along the road [m/s^2], uphill positive
+MASS: Final = 13  # ln of mass over configured
+PEAK: Final = 14  # ln of the tyres' peak adhesion over nominal
+LOAD: Final = 15  # exponent of stiffness over load, beyond configured
+SINKING: Final = 16  # ln of the radius's change per load over (A.4)
+MOTOR: Final = 17  # ln of motor torque over reported
+DRAG: Final = 18  # ln of air drag over configured
+OFFSET: Final = 19  # two: pressure [bar] lost beyond push-out and sensor, per axle
+DELAY: Final = 21  # of the speed reference beyond configured [s]
+N: Final = 22
+
+WINDOW_STATE: Final = np.dtype(
+    [
+        ("time", "f8"),  # s
+        ("cycles", "i8"),
+        ("accel", "f8"),  # sums over the cycles: specific force in road axes [m/s^2]
+        ("lateral", "f8"),  # part of front lateral force along the car [N]
+        ("speed", "f8"),
+        ("change", "f8"),  # dv/dt [m/s^2]
+        ("load", "f8", (4,)),  # N
+        ("motor", "f8", (4,)),  # N m
+        ("omega", "f8", (4,)),  # sums over samples [rad/s]
+        ("ground", "f8", (4,)),  # m/s, at the samples' own time
+        ("omega_samples", "i8", (4,)),
+        ("pressure", "f8", (4,)),  # above push-out [bar]
+        ("pressure_samples", "i8", (4,)),
+        ("reference", "f8"),  # speed reference less prediction [m/s]
+        ("reference_change", "f8"),  # dv/dt at its samples [m/s^2]
+        ("reference_samples", "i8"),
+        ("accel_cycles", "i8"),
+        ("motor_known", "u1"),
+    ],
+    align=True,
+)
+
+JOINT_STATE: Final = np.dtype(
+    [
+        ("x", "f8", (N,)),
+        ("p", "f8", (N, N)),
+        ("free", "u1", (N,)),  # states that this window may correct; the others are considered only
+        ("h", "f8", (N,)),  # derivatives of one measurement
+        ("ph", "f8", (N,)),
+        ("kept_x", "f8", (2, N)),  # snapshots: the newer in row 0
+        ("kept_p", "f8", (2, N, N)),
+        ("kept_s", "f8"),  # age of the newer one [s]
+        ("window", WINDOW_STATE),
+        ("started", "u1"),
+        ("hold_s", "f8"),  # no learning for this long, a wheel had left the tyre's range
+        ("smooth_pressure", "f8", (4,)),  # bar above push-out
+        ("last_pressure", "f8", (4,)),  # of the last window [bar]
+        ("last_slip", "f8", (4,)),
+        ("slip", "f8", (4,)),
+        ("force", "f8", (4,)),  # N
+        ("observed", "u1", (4,)),  # friction was corrected in the last window
+        ("observed_s", "f8", (4,)),  # in this braking
+        ("ratio", "f8", (6,)),  # squared innovation over its variance: wheels, total force, speed reference
+        ("reset", "u1"),
+    ],
+    align=True,
+)
+
+PRIOR: Final[NDArray[np.float64]] = np.zeros(N)
+"""Standard deviations before anything is learned; friction, radii and speed are set apart."""
+PRIOR[STIFFNESS], PRIOR[RATIO] = 0.25, 0.04
+PRIOR[BIAS], PRIOR[SLOPE] = 0.05, 0.3
+PRIOR[MASS], PRIOR[PEAK], PRIOR[LOAD], PRIOR[SINKING] = 0.02, 0.25, 0.05, 0.10
+PRIOR[MOTOR], PRIOR[DRAG] = 0.01, 0.10
+PRIOR[OFFSET : OFFSET + 2] = 0.3
+PRIOR[DELAY] = 0.01

@@ -1,0 +1,329 @@
+"""The joint observer: one filter for speed, tyres, mass, sensors and the friction of all four linings.
+
+A window of a few cycles is one step: the state walks, then the speed reference, each wheel's speed and the car's
+longitudinal balance correct it. Which states they may correct depends on what the car does:
+
+friction braking   speed, frictions, tyre stiffness and peak, radii, slope; the rest is considered only
+motors alone       everything but friction and pressure offsets: known torque shows mass, drag, stiffness
+rolling            speed, radii and their sinking, bias, slope, drag
+below 3.4 m/s, sliding, ABS, ESP, the driver accelerating against the brakes: speed and slope only
+
+When a wheel runs past the tyre's range all but the speed goes back to what was known 0.2 to 0.4 s before.
+"""
+
+import math
+
+import numpy as np
+
+from ecu.estimation.joint.kalman import correct, drift_speed, walk_friction
+from ecu.estimation.joint.layout import (
+    BIAS,
+    DELAY,
+    DRAG,
+    LOAD,
+    MASS,
+    MOTOR,
+    MU,
+    OFFSET,
+    PEAK,
+    PRIOR,
+    RADIUS,
+    RATIO,
+    SINKING,
+    SLOPE,
+    STIFFNESS,
+    N,
+    V,
+)
+from ecu.estimation.joint.wheel import brake_lever, predict_balance, predict_wheel
+from ecu.estimation.joint.window import close_window, gather, open_window
+from ecu.estimation.motion import usable
+from ecu.jit import Record, kernel
+from ecu.signals import (
+    ABS_ACTIVE,
+    ACCELERATOR_POSITION,
+    ESP_ACTIVE,
+    REVERSE,
+    WHEEL_SPEED,
+)
+
+WINDOW_S = 0.05
+LEAST_SPEED = 3.4  # m/s
+APPLIED = 1.0  # bar above push-out: the brakes act
+MOTORS = 100.0  # N m of all motors: their torque is worth looking at
+LARGE_SLIP = 0.12
+HOLD_S = 0.4
+SNAPSHOT_S = 0.2
+
+# Standard deviations of friction's prior, of its logarithm: all four together, per axle, per wheel.
+MU_COMMON, MU_AXLE, MU_WHEEL = 0.13, 0.17, 0.06
+RADIUS_COMMON, RADIUS_WHEEL = 0.004, 0.0015
+
+# Random walks per square root of a second.
+WALK = np.zeros(N)
+WALK[V] = 0.02
+WALK[STIFFNESS], WALK[RATIO] = 0.01, 0.0005
+WALK[RADIUS : RADIUS + 4] = 1e-5
+WALK[BIAS], WALK[SLOPE] = 0.0005, 0.05
+WALK[PEAK], WALK[LOAD], WALK[SINKING] = 0.01, 0.0005, 0.0005
+WALK[MASS], WALK[MOTOR], WALK[DRAG] = 1e-5, 1e-5, 0.0005
+WALK[DELAY] = 1e-4
+MU_WALK_COMMON, MU_WALK_AXLE, MU_WALK_WHEEL = 0.02, 0.03, 0.01
+MU_WALK_PRESSURE = 0.05  # of an axle's friction, per relative change of its pressure
+MU_WALK_HELD = 0.003
+CUT_OFF = 1.0
+
+BALANCE_FLOOR = 0.01  # m/s^2 that the balance leaves out
+BALANCE_SHARE = 0.004  # of the deceleration
+TRANSIENT = 0.5  # of a slip's change since the last window
+TWIN = 3.0  # bar, of a pressure taken from the other side
+LOW_SPEED_NOISE = 0.15  # m/s
+
+
+@kernel
+def start_joint(params: Record, state: Record) -> None:
+    """Set the state before anything is learned."""
+    x, p = state.x, state.p
+    for i in range(N):
+        x[i] = 0.0
+        for j in range(N):
+            p[i, j] = 0.0
+        p[i, i] = PRIOR[i] ** 2
+    p[V, V] = 0.25
+    for i in range(4):
+        for j in range(4):
+            p[RADIUS + i, RADIUS + j] = RADIUS_COMMON**2 + (RADIUS_WHEEL**2 if i == j else 0.0)
+            axle = MU_AXLE**2 if i // 2 == j // 2 else 0.0
+            p[MU + i, MU + j] = MU_COMMON**2 + axle + (MU_WHEEL**2 if i == j else 0.0)
+    open_window(state)
+    _keep(state, 0)
+    _keep(state, 1)
+
+
+@kernel
+def _keep(state: Record, row: int) -> None:
+    for i in range(N):
+        state.kept_x[row, i] = state.x[i]
+        for j in range(N):
+            state.kept_p[row, i, j] = state.p[i, j]
+
+
+@kernel
+def _go_back(state: Record) -> None:
+    """Return to the older snapshot in all but the speed, of which little is sure now."""
+    for i in range(N):
+        if i != V:
+            state.x[i] = state.kept_x[1, i]
+        for j in range(N):
+            state.p[i, j] = state.kept_p[1, i, j] if i != V and j != V else 0.0
+    state.p[V, V] = 0.25
+
+
+@kernel
+def _start_speed(params: Record, state: Record, inputs: Record) -> None:
+    for i in range(4):
+        if not usable(inputs, WHEEL_SPEED + i):
+            return
+    total = 0.0
+    for i in range(4):
+        total += inputs.value[WHEEL_SPEED + i] * params.wheel_radius[i]
+    state.x[V] = max(0.25 * total, 0.0)
+    state.started = 1
+
+
+@kernel
+def _learning_forbidden(inputs: Record, braking: bool) -> bool:
+    value = inputs.value
+    against = (
+        braking and usable(inputs, ACCELERATOR_POSITION) and value[ACCELERATOR_POSITION] > 2.0
+    )
+    return (
+        against or value[ABS_ACTIVE] > 0.5 or value[ESP_ACTIVE] > 0.5 or value[REVERSE] > 0.5
+    )
+
+
+@kernel
+def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> None:
+    free = state.free
+    for i in range(N):
+        free[i] = 0
+    free[V] = free[SLOPE] = 1
+    if not learning:
+        return
+    for i in range(4):
+        free[RADIUS + i] = 1
+        free[MU + i] = 1 if braking else 0
+    free[DELAY] = 1
+    if braking:
+        free[STIFFNESS] = free[PEAK] = 1
+    else:
+        free[BIAS] = free[SINKING] = free[DRAG] = 1
+        if motors:
+            free[STIFFNESS] = free[RATIO] = free[MASS] = free[LOAD] = free[MOTOR] = free[PEAK] = 1
+
+
+@kernel
+def _pressure_change(state: Record, left: int) -> float:
+    """Return the relative change of an axle's pressure since the last window."""
+    before = state.last_pressure[left] + state.last_pressure[left + 1]
+    now = state.window.pressure[left] + state.window.pressure[left + 1]
+    change: float = (now - before) / (0.5 * abs(now + before) + 20.0)
+    return change
+
+
+@kernel
+def _walk(state: Record, braking: bool, time: float) -> None:
+    p, w = state.p, state.window
+    drift_speed(state, time)
+    for i in range(N):
+        p[i, i] += WALK[i] ** 2 * time
+    if braking:
+        front = MU_WALK_AXLE**2 * time + (MU_WALK_PRESSURE * _pressure_change(state, 0)) ** 2
+        rear = MU_WALK_AXLE**2 * time + (MU_WALK_PRESSURE * _pressure_change(state, 2)) ** 2
+        walk_friction(state, MU_WALK_COMMON**2 * time, front, rear, MU_WALK_WHEEL**2 * time)
+    elif p[MU, MU] < MU_COMMON**2 + MU_AXLE**2:
+        held = MU_WALK_HELD**2 * time
+        walk_friction(state, held, held, held, 0.2 * held)
+
+
+@kernel
+def update_joint(
+    params: Record,
+    state: Record,
+    inputs: Record,
+    motion: Record,
+    load: Record,
+    braking: bool,
+    dt: float,
+) -> None:
+    """Take this cycle's samples in and, at the end of a window, correct the state by them."""
+    state.reset = 0
+    if not state.started:
+        _start_speed(params, state, inputs)
+        if not state.started:
+            return
+    gather(params, state, inputs, motion, load, dt)
+    state.hold_s = max(state.hold_s - dt, 0.0)
+    if state.window.time < WINDOW_S - 0.001:
+        return
+    close_window(state)
+    _fuse(params, state, inputs, braking)
+    _look_after(params, state)
+    open_window(state)
+
+
+@kernel
+def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
+    w, x = state.window, state.x
+    time = w.time
+    applied = braking
+    motors = 0.0
+    for i in range(4):
+        if w.pressure_samples[i] == 0:
+            twin = i + 1 - 2 * (i % 2)
+            w.pressure[i] = w.pressure[twin] if w.pressure_samples[twin] > 0 else state.last_pressure[i]
+        motors += abs(w.motor[i])
+    moving = x[V] > LEAST_SPEED
+    _walk(state, applied, time)
+    learning = (
+        moving and state.hold_s <= 0.0 and w.motor_known != 0 and not _learning_forbidden(inputs, applied)
+    )
+    _choose_free(state, applied, motors > MOTORS, learning)
+    before = x[V]
+    if w.reference_samples > 0:
+        h = state.h
+        for j in range(N):
+            h[j] = 0.0
+        h[V] = 1.0
+        h[DELAY] = -w.reference_change
+        state.ratio[5] = correct(state, w.reference, params.sigma_vehicle_speed**2 / w.reference_samples)
+        if state.ratio[5] > 100.0:
+            x[V] += w.reference
+            state.p[V, V] += 0.25
+    for i in range(4):
+        state.observed[i] = 0
+        if w.omega_samples[i] > 0:
+            _fuse_wheel(params, state, i, before, moving, learning and applied)
+    if w.accel_cycles == w.cycles and learning:
+        _fuse_balance(params, state)
+    for i in range(4):
+        state.last_pressure[i] = w.pressure[i]
+
+
+@kernel
+def _fuse_wheel(params: Record, state: Record, i: int, before: float, moving: bool, observing: bool) -> None:
+    w, x = state.window, state.x
+    n = w.omega_samples[i]
+    ground = max(w.ground[i] + x[V] - before, 0.0)
+    omega = predict_wheel(
+        params, state, i, ground, w.pressure[i], state.smooth_pressure[i], w.motor[i], w.load[i], w.change
+    )  # fmt: skip
+    if not moving:
+        for j in range(N):
+            state.h[j] = 0.0
+        r = params.wheel_radius[i]
+        state.h[V] = 1.0 / r
+        correct(state, w.omega[i] - ground / r, (params.sigma_wheel_speed**2 + (LOW_SPEED_NOISE / r) ** 2) / n)
+        return
+    per_bar = state.h[OFFSET + i // 2]
+    sigma_pressure = params.sigma_pressure * 1e-5
+    samples = max(w.pressure_samples[i], 1)
+    variance = params.sigma_wheel_speed**2 / n + per_bar**2 * sigma_pressure**2 / samples
+    if w.pressure_samples[i] == 0:
+        variance += (per_bar * TWIN) ** 2
+    transient = TRANSIENT * (state.slip[i] - state.last_slip[i]) * ground / params.wheel_radius[i]
+    variance += transient * transient
+    state.last_slip[i] = state.slip[i]
+    state.ratio[i] = correct(state, w.omega[i] - omega, variance)
+    state.observed[i] = 1 if observing and state.smooth_pressure[i] > 2.0 * APPLIED else 0
+
+
+@kernel
+def _fuse_balance(params: Record, state: Record) -> None:
+    w = state.window
+    left = predict_balance(
+        params, state, w.pressure, state.smooth_pressure, w.motor, w.load, w.accel, w.change, state.x[V], w.lateral
+    )  # fmt: skip
+    variance = params.sigma_accel**2 / w.cycles + BALANCE_FLOOR**2 + (BALANCE_SHARE * w.accel) ** 2
+    sigma_pressure = params.sigma_pressure * 1e-5
+    for i in range(4):
+        per_bar = brake_lever(params, i) * params.mu_nominal[i] * math.exp(state.x[MU + i])
+        per_bar /= params.wheel_radius[i] * params.mass
+        if state.smooth_pressure[i] > 0.5:
+            variance += (per_bar * sigma_pressure) ** 2 / max(w.pressure_samples[i], 1)
+            change = w.pressure[i] - state.last_pressure[i]
+            variance += (TRANSIENT * per_bar * change) ** 2
+    state.ratio[4] = correct(state, -left, variance)
+
+
+@kernel
+def _look_after(params: Record, state: Record) -> None:
+    """Keep snapshots, go back when a wheel slides, begin anew when a value is not finite."""
+    w, x = state.window, state.x
+    total = 0.0
+    for i in range(N):
+        total += x[i] + state.p[i, i]
+    if not math.isfinite(total):
+        start_joint(params, state)
+        state.started, state.reset = 0, 1
+        return
+    sliding = False
+    for i in range(4):
+        if w.omega_samples[i] > 0 and w.ground[i] > LEAST_SPEED:
+            slip = w.omega[i] * params.wheel_radius[i] / w.ground[i] - 1.0
+            sliding = sliding or abs(slip) > LARGE_SLIP
+    state.kept_s += w.time
+    if sliding and state.hold_s <= 0.0:
+        _go_back(state)
+    if sliding:
+        state.hold_s = HOLD_S
+    elif state.hold_s <= 0.0 and state.kept_s >= SNAPSHOT_S:
+        for i in range(N):
+            state.kept_x[1, i] = state.kept_x[0, i]
+            for j in range(N):
+                state.kept_p[1, i, j] = state.kept_p[0, i, j]
+        _keep(state, 0)
+        state.kept_s = 0.0
+    for i in range(4):
+        limit = math.log(1.5)
+        x[MU + i] = min(max(x[MU + i], -math.log(2.0)), limit)

@@ -1,0 +1,177 @@
+"""What one wheel and the whole car should show, given the states, with analytic derivatives.
+
+Wheel: torque T = s_m T_m + T_b + M_R and the wheel's inertia stand against the tyre force, the force over load
+gives slip by the inverse of the tyre's curve, slip and radius give wheel speed.
+
+    F = -(T + I dv/dt / r) / r        n = F / F_Z     u = n / D
+    slip = (c D / C) tan(asin(u) / c)                 inverse Magic Formula with E = 0
+    omega = v_i (1 + slip) / r        braking; v_i / ((1 - slip) r) driving (A.6)
+
+Car: m (a_x - b) + drag + sum (T_i + I_i domega_i/dt) / r_i = 0.
+"""
+
+import math
+
+from ecu.estimation.joint.layout import (
+    BIAS,
+    DRAG,
+    LOAD,
+    MASS,
+    MOTOR,
+    MU,
+    OFFSET,
+    PEAK,
+    RADIUS,
+    RATIO,
+    SINKING,
+    STIFFNESS,
+    N,
+    V,
+)
+from ecu.estimation.tyre import rolling_radius
+from ecu.jit import Record, kernel
+
+BAR = 1e5
+SHAPE = 1.6  # c of the Magic Formula
+NOMINAL_PEAK = 0.9  # adhesion
+STEEPEST = 0.93  # of the peak; the curve goes on straight from there
+
+
+@kernel
+def slip_of_force(used: float, stiffness: float, peak: float) -> tuple[float, float]:
+    """Return slip and its derivative by the adhesion used (force over load); `stiffness` over load."""
+    u = used / peak
+    inside = min(max(u, -STEEPEST), STEEPEST)
+    tangent = math.tan(math.asin(inside) / SHAPE)
+    slope = (1.0 + tangent * tangent) / (math.sqrt(1.0 - inside * inside) * stiffness)
+    return peak * SHAPE * tangent / stiffness + slope * peak * (u - inside), slope
+
+
+@kernel
+def brake_lever(params: Record, i: int) -> float:
+    """Return brake torque per friction and pressure [N m/bar] of a wheel."""
+    lever: float = 2.0 * BAR * params.piston_area[i] * params.effective_radius[i]
+    return lever
+
+
+@kernel
+def radius(params: Record, state: Record, i: int, load: float) -> tuple[float, float]:
+    """Return the rolling radius [m] of a wheel and its derivative by the logarithm of its sinking."""
+    at_rest = params.wheel_radius[i]
+    nominal = rolling_radius(load, params.unloaded_radius[i], params.vertical_stiffness[i])
+    change = (nominal - at_rest) * math.exp(state.x[SINKING])
+    scale = math.exp(state.x[RADIUS + i])
+    return (at_rest + change) * scale, change * scale
+
+
+@kernel
+def brake_torque(params: Record, state: Record, i: int, pressure: float) -> float:
+    """Return the brake torque [N m] at a pressure above push-out [bar]."""
+    mu = params.mu_nominal[i] * math.exp(state.x[MU + i])
+    torque: float = brake_lever(params, i) * mu * max(pressure - state.x[OFFSET + i // 2], 0.0)
+    return torque
+
+
+@kernel
+def predict_wheel(
+    params: Record,
+    state: Record,
+    i: int,
+    ground: float,
+    pressure: float,
+    smooth: float,
+    motor: float,
+    load: float,
+    change: float,
+) -> float:
+    """Return the wheel speed [rad/s] to expect and set `state.h`, `state.slip`, `state.force` of the wheel.
+
+    Args:
+        params: `PARAMS`.
+        state: `JOINT_STATE`.
+        i: wheel.
+        ground: speed of the wheel over ground in its direction [m/s].
+        pressure: above push-out [bar].
+        smooth: the same with less noise; derivatives use it, or its noise would weaken what is learned.
+        motor: reported motor torque [N m].
+        load: by the configured mass [N].
+        change: dv/dt [m/s^2].
+    """
+    x, h = state.x, state.h
+    r, sinking = radius(params, state, i, load)
+    motor *= math.exp(x[MOTOR])
+    rolling = params.rolling_resistance * load * r
+    force = -(brake_torque(params, state, i, pressure) + motor + rolling + params.wheel_inertia[i] * change / r) / r
+    scale = math.exp(-x[MASS]) / load
+    relative = load / params.static_load[i]
+    exponent = params.stiffness_degression[i] + x[LOAD]
+    rear = x[RATIO] if i >= 2 else 0.0
+    stiffness = params.slip_stiffness[i] * math.exp(x[STIFFNESS] + rear) * relative**-exponent
+    peak = NOMINAL_PEAK * math.exp(x[PEAK])
+    used = force * scale
+    slip, slope = slip_of_force(used, stiffness, peak)
+    state.slip[i], state.force[i] = slip, force
+    if slip < 0.0:
+        omega, by_slip = ground * (1.0 + slip) / r, ground / r
+    else:
+        keep = max(1.0 - slip, 0.1)
+        omega, by_slip = ground / (keep * r), ground / (keep * keep * r)
+    for j in range(N):
+        h[j] = 0.0
+    h[V] = omega / max(ground, 0.1)
+    mu = params.mu_nominal[i] * math.exp(x[MU + i])
+    lever = brake_lever(params, i)
+    by_force = by_slip * slope * scale
+    h[MU + i] = -by_force * lever * mu * max(smooth - x[OFFSET + i // 2], 0.0) / r
+    h[OFFSET + i // 2] = by_force * lever * mu / r if smooth > 0.5 else 0.0
+    h[MOTOR] = -by_force * motor / r
+    h[MASS] = -by_slip * slope * used
+    h[STIFFNESS] = -by_slip * slip
+    if i >= 2:
+        h[RATIO] = -by_slip * slip
+    h[LOAD] = by_slip * slip * math.log(relative)
+    h[PEAK] = by_slip * (slip - slope * used)
+    h[RADIUS + i] = -omega
+    h[SINKING] = -omega * sinking / r
+    return omega
+
+
+@kernel
+def predict_balance(
+    params: Record,
+    state: Record,
+    pressure: Record,
+    smooth: Record,
+    motor: Record,
+    load: Record,
+    accel: float,
+    change: float,
+    speed: float,
+    lateral: float,
+) -> float:
+    """Return what is left of the car's longitudinal balance over the configured mass [m/s^2]; sets `state.h`.
+
+    Arguments as in `predict_wheel`, of shape (4,); `accel`: specific force in road axes [m/s^2]; `lateral`: the
+    lateral forces' part along the car [N].
+    """
+    x, h, mass = state.x, state.h, params.mass
+    for j in range(N):
+        h[j] = 0.0
+    drag = params.drag_area * speed * abs(speed) * math.exp(x[DRAG])
+    inertial = math.exp(x[MASS]) * (accel - x[BIAS])
+    left = inertial + (drag + lateral) / mass
+    for i in range(4):
+        r, _ = radius(params, state, i, load[i])
+        driven = motor[i] * math.exp(x[MOTOR])
+        rolling = params.rolling_resistance * load[i] * r
+        torque = brake_torque(params, state, i, pressure[i]) + driven + rolling
+        left += (torque + params.wheel_inertia[i] * change / r) / (r * mass)
+        per_bar = brake_lever(params, i) * params.mu_nominal[i] * math.exp(x[MU + i]) / (r * mass)
+        h[MU + i] = per_bar * max(smooth[i] - x[OFFSET + i // 2], 0.0)
+        if smooth[i] > 0.5:
+            h[OFFSET + i // 2] -= per_bar
+        h[MOTOR] += driven / (r * mass)
+    h[MASS] = inertial
+    h[BIAS] = -math.exp(x[MASS])
+    h[DRAG] = drag / mass
+    return left

@@ -1,0 +1,100 @@
+"""Samples of a few cycles gathered to means, each sample against the prediction at its own time.
+
+Pressure noise as a factor of the unknown friction would ruin the filter, and filtering the pressure alone would
+set it against faster signals. Means of all signals over the same cycles keep them in step, their noise is white
+from window to window, and what did not arrive is simply not in the mean.
+"""
+
+import math
+
+from ecu.estimation.joint.layout import BIAS, DELAY, SLOPE, V
+from ecu.estimation.motion import corner_speed, fresh, motor_torque, motor_torque_known, usable
+from ecu.jit import Record, kernel
+from ecu.signals import ACCEL_X, CALLIPER_PRESSURE, VEHICLE_SPEED, VEHICLE_SPEED_VALID, WHEEL_SPEED
+
+BAR = 1e5
+SMOOTHING = 0.2  # s, of the pressure that derivatives use
+
+
+@kernel
+def open_window(state: Record) -> None:
+    """Begin a window."""
+    w = state.window
+    w.time, w.cycles, w.accel, w.lateral, w.speed, w.change = 0.0, 0, 0.0, 0.0, 0.0, 0.0
+    w.reference, w.reference_change, w.reference_samples, w.accel_cycles = 0.0, 0.0, 0, 0
+    w.motor_known = 1
+    for i in range(4):
+        w.load[i] = w.motor[i] = w.omega[i] = w.ground[i] = w.pressure[i] = 0.0
+        w.omega_samples[i] = w.pressure_samples[i] = 0
+
+
+@kernel
+def speed_change(state: Record, motion: Record) -> float:
+    """Return dv/dt [m/s^2] by the accelerometer and what is known of its bias and the slope."""
+    change: float = (
+        motion.accel_x - state.x[BIAS] - state.x[SLOPE] + motion.yaw_rate * motion.lateral_speed
+    )
+    return change
+
+
+@kernel
+def gather(params: Record, state: Record, inputs: Record, motion: Record, load: Record, dt: float) -> None:
+    """Move the speed on by `dt` [s] and add this cycle's samples to the window."""
+    w, x, value = state.window, state.x, inputs.value
+    change = speed_change(state, motion)
+    x[V] = max(x[V] + dt * change, 0.0)
+    w.time += dt
+    w.cycles += 1
+    w.accel += motion.accel_x
+    w.accel_cycles += 1 if usable(inputs, ACCEL_X) else 0
+    w.change += change
+    w.speed += x[V]
+    front_lateral = params.mass * motion.accel_y * params.rear_axle / params.wheelbase
+    w.lateral += front_lateral * math.sin(motion.steering)
+    for i in range(4):
+        w.load[i] += load[i]
+        w.motor[i] += motor_torque(inputs, i)
+        if not motor_torque_known(inputs, i):
+            w.motor_known = 0
+        place = WHEEL_SPEED + i
+        if fresh(inputs, place):
+            w.omega[i] += value[place]
+            w.ground[i] += corner_speed(params, motion, x[V] - 1e-9 * inputs.age_ns[place] * change, i)
+            w.omega_samples[i] += 1
+        place = CALLIPER_PRESSURE + i
+        if fresh(inputs, place):
+            above = value[place] - params.push_out_pressure[i] / BAR
+            w.pressure[i] += above
+            w.pressure_samples[i] += 1
+            gain = 1.0 - math.exp(-dt / SMOOTHING)
+            state.smooth_pressure[i] += gain * (above - state.smooth_pressure[i])
+    place = VEHICLE_SPEED
+    if fresh(inputs, place) and (
+        value[VEHICLE_SPEED_VALID] > 0.5 or not params.mapped[VEHICLE_SPEED_VALID]
+    ):
+        delay = params.vehicle_speed_delay + x[DELAY] + 1e-9 * inputs.age_ns[place]
+        w.reference += value[place] - (x[V] - delay * change)
+        w.reference_change += change
+        w.reference_samples += 1
+
+
+@kernel
+def close_window(state: Record) -> None:
+    """Turn the sums into means."""
+    w = state.window
+    n = w.cycles
+    w.accel /= n
+    w.change /= n
+    w.speed /= n
+    w.lateral /= n
+    for i in range(4):
+        w.load[i] /= n
+        w.motor[i] /= n
+        if w.omega_samples[i] > 0:
+            w.omega[i] /= w.omega_samples[i]
+            w.ground[i] /= w.omega_samples[i]
+        if w.pressure_samples[i] > 0:
+            w.pressure[i] /= w.pressure_samples[i]
+    if w.reference_samples > 0:
+        w.reference /= w.reference_samples
+        w.reference_change /= w.reference_samples
