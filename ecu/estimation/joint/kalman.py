@@ -22,7 +22,8 @@ def drift_speed(state: Record, time: float) -> None:
         if j != V:
             p[V, j] -= time * (p[BIAS, j] + p[SLOPE, j])
             p[j, V] = p[V, j]
-    p[V, V] -= time * (2.0 * (p[V, BIAS] + p[V, SLOPE]) + time * (p[BIAS, BIAS] + p[SLOPE, SLOPE]))
+    both = p[BIAS, BIAS] + 2.0 * p[BIAS, SLOPE] + p[SLOPE, SLOPE]
+    p[V, V] -= time * (2.0 * (p[V, BIAS] + p[V, SLOPE]) + time * both)
 
 
 @kernel

@@ -10,6 +10,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ecu.estimation.joint.pressure import PRESSURE_STATE
+
 V: Final = 0  # vehicle speed [m/s]
 MU: Final = 1  # four: ln of lining friction over nominal
 STIFFNESS: Final = 5  # ln of the tyres' slip stiffness over configured
@@ -22,7 +24,7 @@ PEAK: Final = 14  # ln of the tyres' peak adhesion over nominal
 LOAD: Final = 15  # exponent of stiffness over load, beyond configured
 SINKING: Final = 16  # ln of the radius's change per load over (A.4)
 MOTOR: Final = 17  # ln of motor torque over reported
-DRAG: Final = 18  # ln of air drag over configured
+DRAG: Final = 18  # ln of air drag per mass over configured
 OFFSET: Final = 19  # two: pressure [bar] lost beyond push-out and sensor, per axle
 DELAY: Final = 21  # of the speed reference beyond configured [s]
 N: Final = 22
@@ -42,6 +44,9 @@ WINDOW_STATE: Final = np.dtype(
         ("omega_samples", "i8", (4,)),
         ("pressure", "f8", (4,)),  # above push-out [bar]
         ("pressure_samples", "i8", (4,)),
+        ("tracked", "f8", (4,)),  # by the model, sum then mean [bar]
+        ("tracked_cycles", "i8", (4,)),
+        ("pressure_variance", "f8", (4,)),  # bar^2, of this window alone
         ("reference", "f8"),  # speed reference less prediction [m/s]
         ("reference_change", "f8"),  # dv/dt at its samples [m/s^2]
         ("reference_samples", "i8"),
@@ -62,6 +67,7 @@ JOINT_STATE: Final = np.dtype(
         ("kept_p", "f8", (2, N, N)),
         ("kept_s", "f8"),  # age of the newer one [s]
         ("window", WINDOW_STATE),
+        ("pressures", PRESSURE_STATE),
         ("started", "u1"),
         ("hold_s", "f8"),  # no learning for this long, a wheel had left the tyre's range
         ("smooth_pressure", "f8", (4,)),  # bar above push-out
@@ -82,6 +88,6 @@ PRIOR: Final[NDArray[np.float64]] = np.zeros(N)
 PRIOR[STIFFNESS], PRIOR[RATIO] = 0.25, 0.04
 PRIOR[BIAS], PRIOR[SLOPE] = 0.05, 0.3
 PRIOR[MASS], PRIOR[PEAK], PRIOR[LOAD], PRIOR[SINKING] = 0.02, 0.25, 0.05, 0.10
-PRIOR[MOTOR], PRIOR[DRAG] = 0.01, 0.10
+PRIOR[MOTOR], PRIOR[DRAG] = 0.02, 0.10
 PRIOR[OFFSET : OFFSET + 2] = 0.3
 PRIOR[DELAY] = 0.01

@@ -68,7 +68,7 @@ WALK[BIAS], WALK[SLOPE] = 0.0005, 0.05
 WALK[PEAK], WALK[LOAD], WALK[SINKING] = 0.01, 0.0005, 0.0005
 WALK[MASS], WALK[MOTOR], WALK[DRAG] = 1e-5, 1e-5, 0.0005
 WALK[DELAY] = 1e-4
-MU_WALK_COMMON, MU_WALK_AXLE, MU_WALK_WHEEL = 0.02, 0.03, 0.01
+MU_WALK_COMMON, MU_WALK_AXLE, MU_WALK_WHEEL = 0.15, 0.03, 0.005
 MU_WALK_PRESSURE = 0.05  # of an axle's friction, per relative change of its pressure
 MU_WALK_HELD = 0.003
 CUT_OFF = 1.0
@@ -78,6 +78,7 @@ BALANCE_SHARE = 0.004  # of the deceleration
 TRANSIENT = 0.5  # of a slip's change since the last window
 TWIN = 3.0  # bar, of a pressure taken from the other side
 LOW_SPEED_NOISE = 0.15  # m/s
+JUMP = 100.0  # squared test ratio: while wheels slide such a reference is believed at once
 
 
 @kernel
@@ -159,7 +160,7 @@ def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> 
     else:
         free[BIAS] = free[SINKING] = free[DRAG] = 1
         if motors:
-            free[STIFFNESS] = free[RATIO] = free[MASS] = free[LOAD] = free[MOTOR] = free[PEAK] = 1
+            free[STIFFNESS] = free[RATIO] = free[MASS] = free[LOAD] = free[PEAK] = 1
 
 
 @kernel
@@ -193,6 +194,7 @@ def update_joint(
     inputs: Record,
     motion: Record,
     load: Record,
+    demand: Record,
     braking: bool,
     dt: float,
 ) -> None:
@@ -202,11 +204,11 @@ def update_joint(
         _start_speed(params, state, inputs)
         if not state.started:
             return
-    gather(params, state, inputs, motion, load, dt)
+    gather(params, state, inputs, motion, load, demand, dt)
     state.hold_s = max(state.hold_s - dt, 0.0)
     if state.window.time < WINDOW_S - 0.001:
         return
-    close_window(state)
+    close_window(params, state)
     _fuse(params, state, inputs, braking)
     _look_after(params, state)
     open_window(state)
@@ -222,6 +224,9 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
         if w.pressure_samples[i] == 0:
             twin = i + 1 - 2 * (i % 2)
             w.pressure[i] = w.pressure[twin] if w.pressure_samples[twin] > 0 else state.last_pressure[i]
+            w.pressure_variance[i] = TWIN**2
+        if not braking and state.smooth_pressure[i] < APPLIED:
+            w.pressure[i] = state.smooth_pressure[i] = 0.0  # noise about zero is no torque
         motors += abs(w.motor[i])
     moving = x[V] > LEAST_SPEED
     _walk(state, applied, time)
@@ -237,7 +242,7 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
         h[V] = 1.0
         h[DELAY] = -w.reference_change
         state.ratio[5] = correct(state, w.reference, params.sigma_vehicle_speed**2 / w.reference_samples)
-        if state.ratio[5] > 100.0:
+        if state.ratio[5] > JUMP and state.hold_s > 0.0:
             x[V] += w.reference
             state.p[V, V] += 0.25
     for i in range(4):
@@ -266,11 +271,7 @@ def _fuse_wheel(params: Record, state: Record, i: int, before: float, moving: bo
         correct(state, w.omega[i] - ground / r, (params.sigma_wheel_speed**2 + (LOW_SPEED_NOISE / r) ** 2) / n)
         return
     per_bar = state.h[OFFSET + i // 2]
-    sigma_pressure = params.sigma_pressure * 1e-5
-    samples = max(w.pressure_samples[i], 1)
-    variance = params.sigma_wheel_speed**2 / n + per_bar**2 * sigma_pressure**2 / samples
-    if w.pressure_samples[i] == 0:
-        variance += (per_bar * TWIN) ** 2
+    variance = params.sigma_wheel_speed**2 / n + per_bar**2 * w.pressure_variance[i]
     transient = TRANSIENT * (state.slip[i] - state.last_slip[i]) * ground / params.wheel_radius[i]
     variance += transient * transient
     state.last_slip[i] = state.slip[i]
@@ -285,12 +286,11 @@ def _fuse_balance(params: Record, state: Record) -> None:
         params, state, w.pressure, state.smooth_pressure, w.motor, w.load, w.accel, w.change, state.x[V], w.lateral
     )  # fmt: skip
     variance = params.sigma_accel**2 / w.cycles + BALANCE_FLOOR**2 + (BALANCE_SHARE * w.accel) ** 2
-    sigma_pressure = params.sigma_pressure * 1e-5
     for i in range(4):
         per_bar = brake_lever(params, i) * params.mu_nominal[i] * math.exp(state.x[MU + i])
         per_bar /= params.wheel_radius[i] * params.mass
         if state.smooth_pressure[i] > 0.5:
-            variance += (per_bar * sigma_pressure) ** 2 / max(w.pressure_samples[i], 1)
+            variance += per_bar**2 * w.pressure_variance[i]
             change = w.pressure[i] - state.last_pressure[i]
             variance += (TRANSIENT * per_bar * change) ** 2
     state.ratio[4] = correct(state, -left, variance)

@@ -34,6 +34,7 @@ from ecu.jit import Record, kernel
 BAR = 1e5
 SHAPE = 1.6  # c of the Magic Formula
 NOMINAL_PEAK = 0.9  # adhesion
+PEAK_DEGRESSION = 0.05  # adhesion falls a little with load (Figure A.6)
 STEEPEST = 0.93  # of the peak; the curve goes on straight from there
 
 
@@ -100,14 +101,16 @@ def predict_wheel(
     x, h = state.x, state.h
     r, sinking = radius(params, state, i, load)
     motor *= math.exp(x[MOTOR])
-    rolling = params.rolling_resistance * load * r
-    force = -(brake_torque(params, state, i, pressure) + motor + rolling + params.wheel_inertia[i] * change / r) / r
-    scale = math.exp(-x[MASS]) / load
+    # With the mass, so that nothing but air drag tells a scale common to mass and all torques.
+    heavier = math.exp(x[MASS])
+    own = heavier * (params.rolling_resistance * load * r + params.wheel_inertia[i] * change / r)
+    force = -(brake_torque(params, state, i, pressure) + motor + own) / r
+    scale = 1.0 / (heavier * load)
     relative = load / params.static_load[i]
     exponent = params.stiffness_degression[i] + x[LOAD]
     rear = x[RATIO] if i >= 2 else 0.0
     stiffness = params.slip_stiffness[i] * math.exp(x[STIFFNESS] + rear) * relative**-exponent
-    peak = NOMINAL_PEAK * math.exp(x[PEAK])
+    peak = NOMINAL_PEAK * math.exp(x[PEAK]) * relative**-PEAK_DEGRESSION
     used = force * scale
     slip, slope = slip_of_force(used, stiffness, peak)
     state.slip[i], state.force[i] = slip, force
@@ -116,6 +119,9 @@ def predict_wheel(
     else:
         keep = max(1.0 - slip, 0.1)
         omega, by_slip = ground / (keep * r), ground / (keep * keep * r)
+    # Derivatives at the smooth pressure: were its noise in both, it would weaken what is learned.
+    used += (brake_torque(params, state, i, pressure) - brake_torque(params, state, i, smooth)) * scale / r
+    slip, slope = slip_of_force(used, stiffness, peak)
     for j in range(N):
         h[j] = 0.0
     h[V] = omega / max(ground, 0.1)
@@ -125,7 +131,7 @@ def predict_wheel(
     h[MU + i] = -by_force * lever * mu * max(smooth - x[OFFSET + i // 2], 0.0) / r
     h[OFFSET + i // 2] = by_force * lever * mu / r if smooth > 0.5 else 0.0
     h[MOTOR] = -by_force * motor / r
-    h[MASS] = -by_slip * slope * used
+    h[MASS] = -by_slip * slope * (used + own * scale / r)
     h[STIFFNESS] = -by_slip * slip
     if i >= 2:
         h[RATIO] = -by_slip * slip
@@ -157,21 +163,21 @@ def predict_balance(
     x, h, mass = state.x, state.h, params.mass
     for j in range(N):
         h[j] = 0.0
-    drag = params.drag_area * speed * abs(speed) * math.exp(x[DRAG])
-    inertial = math.exp(x[MASS]) * (accel - x[BIAS])
-    left = inertial + (drag + lateral) / mass
+    heavier = math.exp(x[MASS])
+    drag = heavier * math.exp(x[DRAG]) * params.drag_area * speed * abs(speed) / mass
+    left = heavier * (accel - x[BIAS] + lateral / mass) + drag
     for i in range(4):
         r, _ = radius(params, state, i, load[i])
         driven = motor[i] * math.exp(x[MOTOR])
-        rolling = params.rolling_resistance * load[i] * r
-        torque = brake_torque(params, state, i, pressure[i]) + driven + rolling
-        left += (torque + params.wheel_inertia[i] * change / r) / (r * mass)
+        own = heavier * (params.rolling_resistance * load[i] * r + params.wheel_inertia[i] * change / r)
+        left += (brake_torque(params, state, i, pressure[i]) + driven + own) / (r * mass)
+        # Derivative by the mass: by the torques, not by the noisy acceleration that they equal.
+        h[MASS] -= (brake_torque(params, state, i, smooth[i]) + driven) / (r * mass)
         per_bar = brake_lever(params, i) * params.mu_nominal[i] * math.exp(x[MU + i]) / (r * mass)
         h[MU + i] = per_bar * max(smooth[i] - x[OFFSET + i // 2], 0.0)
         if smooth[i] > 0.5:
             h[OFFSET + i // 2] -= per_bar
         h[MOTOR] += driven / (r * mass)
-    h[MASS] = inertial
-    h[BIAS] = -math.exp(x[MASS])
-    h[DRAG] = drag / mass
+    h[BIAS] = -heavier
+    h[DRAG] = drag
     return left

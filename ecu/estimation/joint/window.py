@@ -8,11 +8,13 @@ from window to window, and what did not arrive is simply not in the mean.
 import math
 
 from ecu.estimation.joint.layout import BIAS, DELAY, SLOPE, V
+from ecu.estimation.joint.pressure import correct_pressure, follow_demand, follows
 from ecu.estimation.motion import corner_speed, fresh, motor_torque, motor_torque_known, usable
 from ecu.jit import Record, kernel
 from ecu.signals import ACCEL_X, CALLIPER_PRESSURE, VEHICLE_SPEED, VEHICLE_SPEED_VALID, WHEEL_SPEED
 
 BAR = 1e5
+NEW_SHARE = 0.2  # of the model's variance that is another one in the next window
 SMOOTHING = 0.2  # s, of the pressure that derivatives use
 
 
@@ -25,7 +27,8 @@ def open_window(state: Record) -> None:
     w.motor_known = 1
     for i in range(4):
         w.load[i] = w.motor[i] = w.omega[i] = w.ground[i] = w.pressure[i] = 0.0
-        w.omega_samples[i] = w.pressure_samples[i] = 0
+        w.tracked[i] = 0.0
+        w.omega_samples[i] = w.pressure_samples[i] = w.tracked_cycles[i] = 0
 
 
 @kernel
@@ -38,7 +41,9 @@ def speed_change(state: Record, motion: Record) -> float:
 
 
 @kernel
-def gather(params: Record, state: Record, inputs: Record, motion: Record, load: Record, dt: float) -> None:
+def gather(
+    params: Record, state: Record, inputs: Record, motion: Record, load: Record, demand: Record, dt: float
+) -> None:
     """Move the speed on by `dt` [s] and add this cycle's samples to the window."""
     w, x, value = state.window, state.x, inputs.value
     change = speed_change(state, motion)
@@ -62,12 +67,18 @@ def gather(params: Record, state: Record, inputs: Record, motion: Record, load: 
             w.ground[i] += corner_speed(params, motion, x[V] - 1e-9 * inputs.age_ns[place] * change, i)
             w.omega_samples[i] += 1
         place = CALLIPER_PRESSURE + i
+        push_out = params.push_out_pressure[i] / BAR
+        follow_demand(state.pressures, i, demand[i] / BAR, dt)
         if fresh(inputs, place):
-            above = value[place] - params.push_out_pressure[i] / BAR
+            above = value[place] - push_out
             w.pressure[i] += above
             w.pressure_samples[i] += 1
+            correct_pressure(state.pressures, i, value[place], params.sigma_pressure / BAR, dt)
             gain = 1.0 - math.exp(-dt / SMOOTHING)
             state.smooth_pressure[i] += gain * (above - state.smooth_pressure[i])
+        if follows(state.pressures, i):
+            w.tracked[i] += state.pressures.value[i] - push_out
+            w.tracked_cycles[i] += 1
     place = VEHICLE_SPEED
     if fresh(inputs, place) and (
         value[VEHICLE_SPEED_VALID] > 0.5 or not params.mapped[VEHICLE_SPEED_VALID]
@@ -79,7 +90,7 @@ def gather(params: Record, state: Record, inputs: Record, motion: Record, load: 
 
 
 @kernel
-def close_window(state: Record) -> None:
+def close_window(params: Record, state: Record) -> None:
     """Turn the sums into means."""
     w = state.window
     n = w.cycles
@@ -95,6 +106,11 @@ def close_window(state: Record) -> None:
             w.ground[i] /= w.omega_samples[i]
         if w.pressure_samples[i] > 0:
             w.pressure[i] /= w.pressure_samples[i]
+            w.pressure_variance[i] = (params.sigma_pressure / BAR) ** 2 / w.pressure_samples[i]
+        if w.tracked_cycles[i] == n and w.pressure_samples[i] > 0:
+            w.pressure[i] = w.tracked[i] / n
+            w.pressure_variance[i] = NEW_SHARE * state.pressures.variance[i]
+            state.smooth_pressure[i] = w.pressure[i]
     if w.reference_samples > 0:
         w.reference /= w.reference_samples
         w.reference_change /= w.reference_samples

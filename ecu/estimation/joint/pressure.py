@@ -1,0 +1,73 @@
+"""Calliper pressure as a state that the ECU's own demand drives, wherever the car follows it.
+
+The sensor's noise (Table 4.1: 1.8 bar) multiplies the unknown friction, and only time takes it away. Where the
+hydraulics follow the demand, its course is known (A.17, A.18 to first order: a dead time and a lag) and time is
+there; the variance grows with the change, so that another lag or gain does no harm. Where the sensor disagrees
+for longer (a shadow, a fallback, a recording of another controller) the raw samples count until both agree again.
+"""
+
+import math
+
+import numpy as np
+
+from ecu.jit import Record, kernel
+
+PRESSURE_STATE = np.dtype(
+    [
+        ("demand", "f8", (4, 4)),  # of the last cycles [bar], the newest in row 0
+        ("model", "f8", (4,)),  # demand after dead time and lag [bar]
+        ("value", "f8", (4,)),  # bar
+        ("variance", "f8", (4,)),  # bar^2
+        ("disagreement", "f8", (4,)),  # low-passed innovation [bar]
+        ("agreed_s", "f8", (4,)),  # for this long model and sensor have agreed
+    ],
+    align=True,
+)
+
+DEAD_CYCLES = 3  # 26 ms (A.17)
+LAG = 0.040  # s, between build-up (A.17) and release (A.18)
+WALK = 0.1  # bar/sqrt(s)
+SHARE = 0.15  # of a change, one standard deviation
+DISAGREEMENT_LAG = 0.15  # s
+TOLERANCE = 3.0  # standard deviations
+TOLERANCE_SHARE = 0.05  # of the pressure
+AGREED_S = 0.3
+
+
+@kernel
+def follow_demand(state: Record, i: int, demand: float, dt: float) -> None:
+    """Move a wheel's pressure on by `dt` [s] as the hydraulics follow the last `demand` [bar] sent."""
+    row = state.demand
+    for k in range(DEAD_CYCLES, 0, -1):
+        row[k, i] = row[k - 1, i]
+    row[0, i] = demand
+    change = (1.0 - math.exp(-dt / LAG)) * (row[DEAD_CYCLES - 1, i] - state.model[i])
+    state.model[i] += change
+    state.value[i] += change
+    state.variance[i] += WALK**2 * dt + (SHARE * change) ** 2
+
+
+@kernel
+def correct_pressure(state: Record, i: int, measured: float, sigma: float, dt: float) -> None:
+    """Fuse a sample [bar] of standard deviation `sigma`; judge whether the pressure follows the demand."""
+    innovation = measured - state.value[i]
+    gain = 1.0 - math.exp(-dt / DISAGREEMENT_LAG)
+    state.disagreement[i] += gain * (innovation - state.disagreement[i])
+    averaged = sigma * math.sqrt(0.5 * gain) + math.sqrt(state.variance[i])
+    limit = TOLERANCE * averaged + TOLERANCE_SHARE * abs(measured)
+    if abs(state.disagreement[i]) > limit:
+        state.value[i], state.variance[i] = measured, sigma * sigma
+        state.disagreement[i] = state.agreed_s[i] = 0.0
+        return
+    state.agreed_s[i] += dt
+    total = state.variance[i] + sigma * sigma
+    weight = state.variance[i] / total
+    state.value[i] += weight * innovation
+    state.variance[i] *= 1.0 - weight
+
+
+@kernel
+def follows(state: Record, i: int) -> bool:
+    """Return whether a wheel's pressure has followed the demand for a while."""
+    agreed: bool = state.agreed_s[i] > AGREED_S
+    return agreed
