@@ -231,7 +231,7 @@ def run(loop: Loop, ideal: bool = False) -> Drive:
         kept = np.zeros(CHUNK * per_cycle, FRAME)
         rows, count, running = _run(plans(), sides, loop.noise, ideal, first, *block, kept)
         blocks.append(tuple(values[:rows] for values in block))
-        frames.append(kept[:count])
+        frames.append(kept[:count].copy())
         first += rows
     decoded, outputs, truth = (np.concatenate(values) for values in zip(*blocks, strict=True))
     return Drive(

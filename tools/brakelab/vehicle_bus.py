@@ -42,6 +42,10 @@ _SCALAR_TRUTH: Final = (
     "pedal_position",
     "road_friction",
     "grade",
+    "position_x",
+    "position_y",
+    "heading",
+    "steering_angle",
 )
 _CORNER_TRUTH: Final = (
     "mu_b",
@@ -56,7 +60,8 @@ _CORNER_TRUTH: Final = (
     "rolling_radius",
 )
 TRUTH_COLUMNS: Final = _SCALAR_TRUTH + tuple(f"{name}_{c}" for name in _CORNER_TRUTH for c in CORNERS)
-"""True values by the contract's names; beyond it: distance [m], pitch and grade [rad], rolling radius [m]."""
+"""True values by the contract's names; beyond it: distance and position [m], pitch, heading and grade [rad],
+rolling radius [m]."""
 N_TRUTH: Final = len(TRUTH_COLUMNS)
 _FIRST_CORNER: Final = len(_SCALAR_TRUTH)
 
@@ -79,15 +84,16 @@ def new_vehicle(scenario: Scenario, seed: int) -> Vehicle:
     """Return the vehicle of a scenario before its first cycle, its car drawn from `seed`.
 
     Raises:
-        UserError: the plant's file cannot be read or is wrong.
+        UserError: the plant's or the trace's file cannot be read or is wrong.
     """
+    script = scenario.script()
     params = draw(scenario_plant(scenario), seed)
     commands = new_record(COMMANDS)
-    commands["road_friction"] = scenario.script().road_friction[0, 1]
+    commands["road_friction"] = script.road_friction[0, 1]
     demand = new_record(DEMAND)
     demand["pressure_age"] = demand["motor_age"] = math.inf
     return Vehicle(
-        scenario.script(),
+        script,
         params,
         new_state(params, scenario.initial_speed, scenario.initial_disc_temperature),
         new_record(DRIVER),
@@ -125,7 +131,7 @@ def sense(vehicle: Vehicle, noise: Generator, values: NDArray[np.float64]) -> No
     values[signals.ACCUMULATOR_PRESSURE] = 1e-5 * vehicle.params[0].pressure_limit
     values[signals.HYDRAULIC_READY] = 1.0
     values[signals.AMBIENT_TEMPERATURE] = vehicle.script.ambient_temperature
-    values[RAIN] = 0.0
+    values[RAIN] = 1.0 if vehicle.script.wetness > 0.0 else 0.0
     if vehicle.speed_sent:
         values[signals.VEHICLE_SPEED] = measured.vehicle_speed
         values[signals.VEHICLE_SPEED_VALID] = 1.0
@@ -183,6 +189,10 @@ def write_truth(vehicle: Vehicle, row: NDArray[np.float64]) -> None:
     row[8] = driver.pedal_position
     row[9] = friction_now(vehicle.script, state)
     row[10] = grade
+    row[11] = state.position_x
+    row[12] = state.position_y
+    row[13] = state.heading
+    row[14] = driver.steering_angle
     for i in range(4):
         corner = _FIRST_CORNER + i
         row[corner] = state.mu_b[i]

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from brakelab.plant.cycle import CYCLE, move
-from brakelab.plant.driver import Script, at_time, drive
+from brakelab.plant.driver import Script, drive
 from brakelab.plant.records import BRAKE, COAST, CRUISE, DEMAND, DRIVER, PHASE, new_record
+from brakelab.plant.road import value_at
 
-DEFAULTS = {"accel": 2.0, "ramp": 13.3, "seconds": math.inf}
-PLACES = ("speed", "decel", "pedal", "until_speed")
+DEFAULTS = {"accel": 2.0, "ramp": 13.3, "pedal_rate": 150 / 90 * 100, "seconds": math.inf}
+PLACES = ("speed", "decel", "pedal", "kept_decel", "until_speed")
 
 
 def script(*phases: dict[str, Any], blending: bool = False, friction: float = 1.2) -> Script:
@@ -47,7 +48,7 @@ class Trip:
     ("t", "value"), [(-1.0, 1.2), (2.0, 1.2), (2.5, 0.95), (3.0, 0.7), (9.0, 0.7), (5.0, 0.7)]
 )
 def test_road_is_linear_between_rows_and_constant_outside(t: float, value: float) -> None:
-    assert at_time(np.array([[0.0, 1.2], [2.0, 1.2], [3.0, 0.7]]), t) == pytest.approx(value)
+    assert value_at(np.array([[0.0, 1.2], [2.0, 1.2], [3.0, 0.7]]), t, 1) == pytest.approx(value)
 
 
 def test_demand_reaches_4_within_the_time_a_pedal_takes(car_at: Callable[[float], Any]) -> None:
@@ -121,7 +122,7 @@ def test_the_hydraulics_fall_back_when_the_demand_is_invalid_or_30_ms_old(
     car_at: Callable[[float], Any], valid: int, age: float, expected_bar: float | None
 ) -> None:
     trip = Trip(car_at(30.0), script({"kind": BRAKE, "decel": 4.0}))
-    trip.driver["decel_demand"] = 4.0
+    trip.driver["asked_decel"] = 4.0
     trip.demand["pressure"], trip.demand["pressure_valid"], trip.demand["pressure_age"] = 30.0, valid, age
     trip.cycle()
     asked = 1e-5 * trip.car.commands["pressure_demand"][0]

@@ -88,6 +88,10 @@ def advance_planar(
     state.speed_y += dt * (state.accel_y - state.yaw_rate * old_speed - sideways)
     state.yaw_rate += dt * state.yaw_accel
     state.distance += 0.5 * dt * (old_speed + state.speed_x)
+    state.heading += dt * state.yaw_rate
+    sine, cosine = math.sin(state.heading), math.cos(state.heading)
+    state.position_x += dt * (state.speed_x * cosine - state.speed_y * sine)
+    state.position_y += dt * (state.speed_x * sine + state.speed_y * cosine)
 
 
 @kernel

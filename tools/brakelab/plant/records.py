@@ -111,6 +111,9 @@ STATE: Final = np.dtype(
         # integrated
         ("t", "f8"),
         ("distance", "f8"),  # m, along the car's axis
+        ("position_x", "f8"),  # m, of the centre of gravity over the ground; at the start 0
+        ("position_y", "f8"),
+        ("heading", "f8"),  # rad, of the car's axis over the ground, to the left
         ("speed_x", "f8"),  # m/s, of the centre of gravity
         ("speed_y", "f8"),
         ("yaw_rate", "f8"),  # rad/s
@@ -179,18 +182,20 @@ MEASURED: Final = np.dtype(
 # What the driver does in one phase of a script.
 PHASE: Final = np.dtype(
     [
-        ("kind", "i8"),  # CRUISE, COAST or BRAKE
+        ("kind", "i8"),  # CRUISE, COAST, BRAKE or FOLLOW
         ("speed", "f8"),  # m/s, to be held on the motors
         ("accel", "f8"),  # m/s^2, largest acceleration on the way to that speed
-        ("decel", "f8"),  # m/s^2, asked for as a deceleration demand; NaN: by the pedal
-        ("pedal", "f8"),  # %
+        ("decel", "f8"),  # m/s^2, asked for as a deceleration demand, or NaN
+        ("pedal", "f8"),  # %, or NaN
+        ("kept_decel", "f8"),  # m/s^2, to be reached and kept by the pedal, or NaN
         ("ramp", "f8"),  # m/s^3, of the deceleration demand
+        ("pedal_rate", "f8"),  # %/s
         ("until_speed", "f8"),  # m/s; the phase ends when the speed passes it; NaN: never
         ("seconds", "f8"),  # s; the phase ends after this time; inf: never
     ],
     align=True,
 )
-CRUISE, COAST, BRAKE = range(3)
+CRUISE, COAST, BRAKE, FOLLOW = range(4)
 
 # What the driver does now.
 DRIVER: Final = np.dtype(
@@ -198,11 +203,15 @@ DRIVER: Final = np.dtype(
         ("phase", "i8"),  # place in the script; beyond its end: finished
         ("started", "u1"),
         ("above", "u1"),  # the phase began above its `until_speed`
+        ("braking", "u1"),
         ("elapsed", "f8"),  # s, in this phase
-        ("decel_demand", "f8"),  # m/s^2
+        ("correction", "f8"),  # m/s^2, what the driver has found to be missing
+        ("asked_decel", "f8"),  # m/s^2, of brakes and motors together
+        ("decel_demand", "f8"),  # m/s^2, of the brakes
         ("decel_demand_valid", "f8"),
         ("pedal_position", "f8"),  # %
         ("accelerator_position", "f8"),  # %
+        ("steering_angle", "f8"),  # rad at the road wheel, left positive
         ("motor_demand", "f8", (4,)),  # N m at the wheel, positive brakes
     ],
     align=True,
