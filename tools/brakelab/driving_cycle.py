@@ -1,25 +1,33 @@
 """A trip of some 100 minutes as real driving has it: speed and grade, drawn from a seed.
 
 The trip goes through a town, over country roads and along a motorway. Each road is a chain of legs: the
-driver accelerates to what the road allows, holds it as well as traffic lets him, lifts the foot and brakes for
-what ends the leg (a light, a junction, a bend, a queue). Accelerations are trapezia with limited jerk. Every
-trip meets Table 1.1: as on the road, one that misses a row is discarded and driven anew.
+driver accelerates to what the road allows, holds it as well as traffic lets him, lifts the foot and brakes
+for what ends the leg (a light, a junction, a bend, a queue). Accelerations are trapezia with limited jerk.
+Every trip meets Table 1.1: as on the road, one that misses a row is discarded and driven anew.
 
 ```
 python -m brakelab.driving_cycle [--seed N] [--svg PICTURE.svg] [DRIVE.truth.parquet]
 ```
-prints the trip of a seed, or what a simulated car has driven, beside Tables 1.1 and 1.2.
+prints the trip of a seed, or a drive of the simulated car that followed it, beside Tables 1.1 and 1.2.
 """
 
+import argparse
 import math
+import signal
+import sys
 from dataclasses import dataclass, field
 from itertools import count
+from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.random import Generator
 
-from brakelab.trip_table import KMH, Array, distance_driven, trip_rows
+from brakelab.report.drive import read_drive
+from brakelab.trip_picture import write_picture
+from brakelab.trip_report import DRIVE_COLUMNS, brake_lines, braking_lines, follow_line, trip_lines
+from brakelab.trip_table import KMH, Array, brakings, distance_driven, trip_rows
+from ecu.errors import UserError
 
 DT: Final = 0.1  # s, of the samples
 # Assumptions, all of them: an everyday driver.
@@ -46,7 +54,8 @@ class Cycle(NamedTuple):
 
     def grade_by_time(self) -> Array:
         """Return the grade [rad] at each `t` for a car that follows the speed; shape (n,)."""
-        return np.interp(distance_driven(self.t, self.speed), self.grade[:, 0], self.grade[:, 1])
+        place = distance_driven(self.t, self.speed)
+        return np.asarray(np.interp(place, self.grade[:, 0], self.grade[:, 1]))
 
 
 class _End(NamedTuple):
@@ -73,22 +82,22 @@ class _Road(NamedTuple):
     """rad, standard deviation of the grade"""
 
 
-LIGHT: Final = _End(0.28, (0.0, 0.0), (8.0, 48.0))
-QUEUE: Final = _End(0.14, (0.0, 0.0), (2.0, 12.0))
-TURN: Final = _End(0.28, (12.0, 22.0))
-ROUNDABOUT: Final = _End(0.30, (20.0, 35.0))
+LIGHT: Final = _End(0.30, (0.0, 0.0), (8.0, 48.0))
+QUEUE: Final = _End(0.10, (0.0, 0.0), (2.0, 12.0))
+TURN: Final = _End(0.29, (12.0, 22.0))
+ROUNDABOUT: Final = _End(0.31, (20.0, 35.0))
 TOWN: Final = _Road(
-    29_200.0, 420.0, (30.0, 40.0, 50.0, 50.0, 50.0, 50.0), (LIGHT, QUEUE, TURN, ROUNDABOUT), 0.024
+    29_200.0, 420.0, (30.0, 40.0, 50.0, 50.0, 50.0, 50.0), (LIGHT, QUEUE, TURN, ROUNDABOUT), 0.026
 )
 COUNTRY: Final = _Road(
     32_600.0,
     1600.0,
     (70.0, 80.0, 80.0, 85.0),
     (_End(0.55, (50.0, 65.0)), _End(0.35, (20.0, 32.0)), _End(0.10, (0.0, 0.0), (3.0, 20.0))),
-    0.040,
+    0.042,
 )
 FREEWAY: Final = _Road(
-    23_800.0, 3600.0, (107.0, 112.0, 116.0), (_End(0.5, (80.0, 92.0)), _End(0.5, (95.0, 105.0))), 0.026
+    23_800.0, 3600.0, (107.0, 112.0, 116.0), (_End(0.5, (80.0, 92.0)), _End(0.5, (95.0, 105.0))), 0.022
 )
 SLIP_ROAD: Final = 50.0  # km/h, at both ends of the motorway
 
@@ -129,14 +138,14 @@ def _length(start: float, piece: Array) -> float:
 def _along(start: float, end: float, seconds: list[float], accel: list[float]) -> Array:
     """Return speeds every DT after `start` up to `end`.
 
-    The acceleration runs linearly through `accel`, `seconds` apart, up to a factor near 1; time is stretched to
-    a whole number of samples.
+    The acceleration runs linearly through `accel`, `seconds` apart, up to a factor near 1; time is stretched
+    to a whole number of samples.
     """
     knots = np.concatenate([[0.0], np.cumsum(seconds)])
     grid = np.linspace(0.0, knots[-1], math.ceil(knots[-1] / DT) + 1)
     a = np.interp(grid, knots, accel)
     gained = np.cumsum(a[1:] + a[:-1])
-    piece = start + (end - start) * gained / gained[-1]
+    piece: Array = start + (end - start) * gained / gained[-1]
     piece[-1] = end
     return piece
 
@@ -167,10 +176,10 @@ def _cruise(rng: Generator, speed: float, metres: float) -> Array:
     seconds = metres / speed
     swells = max(round(seconds / 25.0), 1)
     samples = round(seconds / swells / DT)
-    shape = np.sin(np.pi * np.arange(1, samples + 1) / max(samples, 1)) ** 2
+    shape = np.sin(np.pi * np.arange(1, samples + 1) / samples) ** 2
     most = 0.01 * (samples * DT) ** 2  # m/s: keeps a short swell flat, 0.2 m/s^3
     heights = np.clip(UNEVEN * speed * rng.standard_normal(swells), -most, most)
-    return speed + np.outer(heights, shape).ravel()
+    return np.asarray(speed + np.outer(heights, shape).ravel())
 
 
 def _leg(trace: _Trace, rng: Generator, driver: _Driver, metres: float, allowed: float, end: float) -> None:
@@ -214,7 +223,7 @@ def _hills(rng: Generator, parts: list[tuple[float, float]]) -> Array:
     trip ends as high as it began."""
     rows = [(0.0, 0.0)]
     while rows[-1][0] < parts[-1][0]:
-        place = rows[-1][0] + rng.uniform(200.0, 800.0)
+        place = rows[-1][0] + rng.uniform(300.0, 1000.0)
         hilly = next((hilly for end, hilly in parts if place <= end), parts[-1][1])
         rows.append((place, hilly * rng.standard_normal()))
     table = np.array(rows)
@@ -236,9 +245,8 @@ def _trip(rng: Generator) -> Cycle:
     _leg(trace, rng, driver, 400.0, KMH * 50.0, 0.0)
     trace.add(np.zeros(round(rng.uniform(5.0, 20.0) / DT)))
     speed = np.concatenate(trace.pieces)
-    return Cycle(
-        DT * np.arange(len(speed)), speed, _hills(rng, [*parts, (trace.distance + 1000.0, TOWN.hilly)])
-    )
+    hills = _hills(rng, [*parts, (trace.distance + 1000.0, TOWN.hilly)])
+    return Cycle(np.linspace(0.0, DT * (len(speed) - 1), len(speed)), speed, hills)
 
 
 def real_driving(seed: int) -> Cycle:
@@ -247,3 +255,44 @@ def real_driving(seed: int) -> Cycle:
     return next(
         trip for trip in trips if all(row.met for row in trip_rows(trip.t, trip.speed, trip.grade_by_time()))
     )
+
+
+def _arguments(argv: list[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="python -m brakelab.driving_cycle", description="A trip beside the thesis' Tables 1.1 and 1.2."
+    )
+    parser.add_argument(
+        "drive", nargs="?", type=Path, help="NAME.truth.parquet of a car that followed the trip"
+    )
+    parser.add_argument("--seed", type=int, default=1, help="of the trip")
+    parser.add_argument("--svg", type=Path, metavar="FILE", help="where to draw it")
+    return parser.parse_args(argv)
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Print, and draw, a trip or a drive; returns the exit code."""
+    arguments = _arguments(argv)
+    try:
+        trip = real_driving(arguments.seed)
+        t, speed, grade = trip.t, trip.speed, trip.grade_by_time()
+        lines = [f"Trip of seed {arguments.seed}", ""]
+        discs = np.empty((len(t), 0))
+        if arguments.drive is not None:
+            drive = read_drive(arguments.drive, DRIVE_COLUMNS, "give the truth of a simulated drive")
+            t, speed, grade = drive.t, drive.columns["vehicle_speed"], drive.columns["grade"]
+            discs = drive.corners("disc_temperature")
+            lines = [f"{arguments.drive.name} beside the trip of seed {arguments.seed}"]
+            lines += [follow_line(t, speed, trip.t, trip.speed), "", *brake_lines(drive), ""]
+        found = brakings(t, speed, -np.gradient(speed, t))
+        print("\n".join([*lines, *trip_lines(t, speed, grade, found), "", *braking_lines(found)]))
+        if arguments.svg is not None:
+            write_picture(arguments.svg, t, speed, grade, discs)
+    except UserError as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # as `| head` needs it
+    raise SystemExit(main())

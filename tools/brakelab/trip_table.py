@@ -61,6 +61,12 @@ def distance_driven(t: Array, speed: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum(0.5 * np.diff(t) * (speed[1:] + speed[:-1]))])
 
 
+def height_gained(t: Array, speed: Array, grade: Array) -> Array:
+    """Return the height [m] over the start at each `t` [s], on a road of `grade` [rad]."""
+    climb = speed * np.sin(grade)
+    return np.concatenate([[0.0], np.cumsum(0.5 * np.diff(t) * (climb[1:] + climb[:-1]))])
+
+
 def trip_rows(t: Array, speed: Array, grade: Array) -> list[Row]:
     """Return the rows of Table 1.1 for a trip: `t` [s], `speed` [m/s] and `grade` [rad], all of shape (n,).
 
@@ -78,8 +84,7 @@ def trip_rows(t: Array, speed: Array, grade: Array) -> list[Row]:
         name: float(metres[where].sum())
         for name, where in (("Urban", urban), ("Rural", rural), ("Motorway", motorway))
     }
-    climbs = 0.5 * (np.sin(grade[1:]) + np.sin(grade[:-1])) * metres
-    gain = float(np.maximum(climbs, 0.0).sum())
+    gain = float(np.maximum(np.diff(height_gained(t, speed, grade)), 0.0).sum())
     stopped = float(dt[mean < STOPPED].sum())
     fast = float(dt[mean > MOTORWAY].sum())
 
