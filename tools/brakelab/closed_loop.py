@@ -116,10 +116,15 @@ class Drive(NamedTuple):
 
 @cache
 def plans() -> Plans:
-    """Return the plans of the contract's database."""
+    """Return the plans of the contract's database.
+
+    A frame without any new sample is not sent: that is how a sensor is slow or dead.
+    """
     dbc = resource("dbc/brake_ecu.dbc")
+    vehicle_sends = contract_transmit_plan(dbc, "Vehicle")
+    vehicle_sends.messages["optional"] = 1
     return Plans(
-        contract_transmit_plan(dbc, "Vehicle"),
+        vehicle_sends,
         contract_listen_plan(dbc),
         contract_transmit_plan(dbc, "BrakeEcu"),
         contract_receive_plan(dbc),

@@ -29,6 +29,12 @@ The road can be described by place instead of time, with friction and height of 
 friction = [[0.0, 1.2, 1.2], [150.0, 1.2, 1.2], [150.1, 0.2, 1.2]]    # m, left, right
 grade = [[0.0, 0.0], [300.0, -0.06]]                                    # m, rad
 
+[sensor.accel_x]                 # errors of a sensor, see `brakelab.plant.sensor_errors`
+bias = [-0.1, 0.1]               # drawn per car; or one number
+
+[sensor.wheel_speed_fl]          # `wheel_speed` would be all four
+lost_from = 3.0                  # s
+
 [steering]
 angle = [[0.0, 0.0], [2.0, 0.03]]          # s, rad at the road wheel, left positive
 path = [[0.0, 0.0], [30.0, 3.5]]           # or m, m: what the driver steers after
@@ -48,6 +54,7 @@ from brakelab.plant.description import Plant, PlantFileError, load_plant
 from brakelab.plant.driver import PEDAL_TRAVEL, Script
 from brakelab.plant.records import BRAKE, COAST, CRUISE, FOLLOW, PHASE
 from brakelab.plant.road import Road
+from brakelab.plant.sensor_errors import Sensors
 from brakelab.plant.steering import Steering
 from brakelab.speed_trace import SpeedTrace, generated_trace, read_trace, trace_of
 from ecu.config import describe, read_toml
@@ -188,10 +195,12 @@ class Scenario(_Section):
     wetness: Share = 0.0
     """Of the discs, 0 dry to 1 rain; above 0 the bus says that it rains."""
     tyre_fault: TyreFault | None = None
-    vehicle_speed: bool = True
-    """The bus carries a vehicle speed."""
+    vehicle_speed: Literal["ideal", "optical", "gnss", "none"] = "ideal"
+    """What the speed on the bus comes from; see `brakelab.plant.sensor_errors.SPEED_SOURCES`."""
     wheel_transducers: bool = False
     """The bus carries wheel forces and torques."""
+    sensor: Sensors = {}
+    """Errors of its sensors beside those that the car's file gives."""
     blending: bool = False
     """While braking the motors do what the ECU asks; otherwise they rest."""
     motor_share: Share = 0.0

@@ -79,7 +79,9 @@ class _Stop(NamedTuple):
 
 def _brake(test: int, speed_known: bool, config: Config, seed: int, ideal: bool = False) -> _Stop:
     scenario = load_scenario(resource(f"config/scenarios/stop-{test}.toml"))
-    loop = new_loop(scenario.model_copy(update={"vehicle_speed": speed_known}), config, seed)
+    loop = new_loop(
+        scenario.model_copy(update={"vehicle_speed": "ideal" if speed_known else "none"}), config, seed
+    )
     mass = float(loop.sides.vehicle.params["mass"][0])
     drive = run(loop, ideal)
     truth = drive.truth

@@ -14,6 +14,7 @@ RecordArray = NDArray[np.void]
 
 GRAVITY: Final = 9.81  # m/s^2
 HISTORY: Final = 64  # samples of demand that a dead time can look back: 32 ms at steps of 0.5 ms
+LOOK_BACK: Final = 64  # cycles that a delayed sensor can look back: 0.64 s
 DAMPER_KNOTS: Final = 7  # of a damper's force over speed
 
 # What one car is: nominal or drawn.
@@ -164,17 +165,33 @@ STATE: Final = np.dtype(
     align=True,
 )
 
-# What the sensors say; pressure in bar as the signal has it.
-MEASURED: Final = np.dtype(
+# One sensor of one car, in the unit of its signal; see sensor_errors.py.
+SENSOR: Final = np.dtype(
     [
-        ("wheel_speed", "f8", (4,)),
-        ("accel_x", "f8"),
-        ("accel_y", "f8"),
-        ("yaw_rate", "f8"),
-        ("calliper_pressure", "f8", (4,)),  # bar
-        ("vehicle_speed", "f8"),
-        ("wheel_force_x", "f8", (4,)),
-        ("wheel_torque_y", "f8", (4,)),
+        ("noise", "f8"),  # standard deviation
+        ("resolution", "f8"),
+        ("delay", "f8"),  # cycles
+        ("bias", "f8"),
+        ("drift_step", "f8"),  # standard deviation of what a cycle adds
+        ("drift_decay", "f8"),  # of what was there, in a cycle
+        ("dropout_begin", "f8"),  # probability per sample
+        ("dropout_end", "f8"),
+        ("period", "f8"),  # s
+        ("stuck_from", "f8"),  # s
+        ("lost_from", "f8"),  # s
+    ],
+    align=True,
+)
+
+# What that sensor remembers.
+SENSING: Final = np.dtype(
+    [
+        ("history", "f8", (LOOK_BACK,)),  # true values by cycle
+        ("cycle", "i8"),  # of the newest
+        ("drift", "f8"),
+        ("sample", "i8"),  # number of the last one, where there is a period
+        ("dropped", "u1"),
+        ("held", "f8"),  # value of the last sample
     ],
     align=True,
 )
