@@ -4,19 +4,18 @@
 """
 
 import tomllib
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from brakelab.plant.friction.law import NotNegative, Positive, Section
 from brakelab.plant.friction.laws import law_row
 from brakelab.plant.linings import VEHICLE_LAW, Lining, Linings, rig_with
 from brakelab.plant.records import DAMPER_KNOTS, GRAVITY, PARAMS, RecordArray, new_record
 from brakelab.plant.rig import nominal_friction
-from brakelab.plant.sensor_errors import SensorErrors, check_names
+from brakelab.plant.sensor_errors import SensorFile
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 AIR_DENSITY: Final = 1.2  # kg/m^3
@@ -143,24 +142,6 @@ class Motor(Section):
         return self
 
 
-class Sensor(Section):
-    """Beside `position` a table for each sensor that is not the standard one, by the name of its signal."""
-
-    model_config = ConfigDict(extra="allow")
-    __pydantic_extra__: dict[str, SensorErrors] = Field(init=False)
-
-    position: tuple[float, float, float]
-
-    @property
-    def errors(self) -> Mapping[str, SensorErrors]:
-        return self.__pydantic_extra__
-
-    @model_validator(mode="after")
-    def _known(self) -> "Sensor":
-        check_names(self.__pydantic_extra__)
-        return self
-
-
 class VehicleFile(Section):
     body: Body
     attitude: Attitude | None = None
@@ -170,7 +151,7 @@ class VehicleFile(Section):
     brake_rear: Brake
     hydraulics: Hydraulics
     motor: Motor
-    sensor: Sensor
+    sensor: SensorFile
 
     @model_validator(mode="after")
     def _one_chassis(self) -> "VehicleFile":

@@ -20,7 +20,7 @@ from typing import Annotated, Any, Final
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
-from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, model_validator
 
 from brakelab.plant.friction.law import NotNegative, Positive, Section
 from brakelab.plant.jit import Record, kernel
@@ -82,8 +82,7 @@ class SensorErrors(Section):
     """s"""
 
 
-def check_names(given: dict[str, SensorErrors]) -> dict[str, SensorErrors]:
-    """Return `given`. Raises ValueError: a name is no sensor's."""
+def _known(given: dict[str, SensorErrors]) -> dict[str, SensorErrors]:
     stems = [name for name in SIGNALS if name[-3:] not in {f"_{corner}" for corner in CORNERS}]
     stems += [*WHEEL_STEMS, "motor_torque"]
     for name in given:
@@ -92,8 +91,27 @@ def check_names(given: dict[str, SensorErrors]) -> dict[str, SensorErrors]:
     return given
 
 
-Sensors = Annotated[dict[str, SensorErrors], AfterValidator(check_names)]
+Sensors = Annotated[dict[str, SensorErrors], AfterValidator(_known)]
 """By name of the signal; a name without a corner means all four."""
+
+
+class SensorFile(Section):
+    """`[sensor]` of a car: the accelerometer's place [m], and tables of `Sensors`."""
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, SensorErrors] = Field(init=False)
+
+    position: tuple[float, float, float]
+
+    @property
+    def errors(self) -> Mapping[str, SensorErrors]:
+        return self.__pydantic_extra__
+
+    @model_validator(mode="after")
+    def _names_known(self) -> "SensorFile":
+        _known(self.__pydantic_extra__)
+        return self
+
 
 STANDARD: Final[Mapping[str, SensorErrors]] = {
     "accel_x": SensorErrors(noise=0.01),  # m/s^2 (Table 4.1)
