@@ -142,6 +142,17 @@ STATE: Final = np.dtype(
         ("roll_rate", "f8"),
         ("unsprung_height", "f8", (4,)),  # m
         ("unsprung_rate", "f8", (4,)),
+        ("road_height", "f8", (4,)),  # m under each wheel
+        # J since the start, see energy.py
+        ("brake_heat", "f8", (4,)),
+        ("tyre_work", "f8"),  # into the tyres: slip and what their carcasses store
+        ("drag_loss", "f8"),
+        ("rolling_loss", "f8"),
+        ("damper_heat", "f8"),
+        ("regenerated", "f8"),  # into the motors
+        ("driven", "f8"),  # out of the motors
+        ("lifted", "f8"),  # against gravity
+        ("road_work", "f8"),  # of the road's heights on the tyres
         # follows from these
         ("accel_x", "f8"),  # m/s^2, specific force at the centre of gravity, road axes
         ("accel_y", "f8"),
@@ -160,6 +171,7 @@ STATE: Final = np.dtype(
         ("slip_angle", "f8", (4,)),  # -, tangent
         ("mu_b", "f8", (4,)),  # -
         ("brake_torque", "f8", (4,)),  # N m, magnitude
+        ("brake_work", "f8", (4,)),  # J, of friction in the last step
         ("motor_limit", "f8", (4,)),  # N m that can be regenerated now
     ],
     align=True,
