@@ -221,8 +221,8 @@ def _run(
     return len(truth), place, True
 
 
-def run(loop: Loop, ideal: bool = False) -> Drive:
-    """Run a new loop to the end of its script and return what happened.
+def run(loop: Loop, ideal: bool = False, seconds: float = LONGEST) -> Drive:
+    """Run a new loop to the end of its script, or for `seconds`, and return what happened.
 
     `ideal`: the ECU's pressure law is given the true friction, to compare a compensated controller with.
     """
@@ -230,10 +230,11 @@ def run(loop: Loop, ideal: bool = False) -> Drive:
     per_cycle = len(sides.vehicle_frames) + len(sides.ecu_frames)
     blocks: list[tuple[NDArray[np.float64], ...]] = []
     frames: list[RecordArray] = []
-    first, running = 0, True
-    while running and first * CYCLE_NS < LONGEST * 1e9:
-        block = (np.empty((CHUNK, N_INPUTS)), np.empty((CHUNK, N_OUTPUTS)), np.empty((CHUNK, N_TRUTH)))
-        kept = np.zeros(CHUNK * per_cycle, FRAME)
+    first, last, running = 0, round(seconds * 1e9 / CYCLE_NS), True
+    while running and first < last:
+        size = min(CHUNK, last - first)
+        block = (np.empty((size, N_INPUTS)), np.empty((size, N_OUTPUTS)), np.empty((size, N_TRUTH)))
+        kept = np.zeros(size * per_cycle, FRAME)
         rows, count, running = _run(plans(), sides, loop.noise, ideal, first, *block, kept)
         blocks.append(tuple(values[:rows] for values in block))
         frames.append(kept[:count].copy())

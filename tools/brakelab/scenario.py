@@ -102,6 +102,8 @@ class Phase(_Section):
             raise ValueError("never ends; give until_speed or seconds")
         if (self.speed is None) == (self.kind == "cruise"):
             raise ValueError("speed belongs to a cruise phase, and only there")
+        if self.kind == "cruise" and self.speed == self.until_speed:
+            raise ValueError("until_speed is never passed; give a speed beyond it")
         given = sum(getattr(self, name) is not None for name in BRAKE_BY)
         if given != (self.kind == "brake"):
             raise ValueError("a brake phase needs one of decel, pedal and kept_decel, no other phase has any")

@@ -190,7 +190,10 @@ def _next_phase(script: Script, state: Record, driver: Record, dt: float) -> boo
         driver.elapsed = 0.0
         driver.correction = 0.0
         driver.braking = phase.kind == BRAKE
-        driver.above = state.speed_x > phase.until_speed - STANDSTILL
+        if phase.kind == CRUISE:
+            driver.above = phase.speed < phase.until_speed
+        else:
+            driver.above = state.speed_x > phase.until_speed - STANDSTILL
     driver.elapsed += dt
     return True
 
