@@ -6,7 +6,8 @@ tyres store are functions of the state. What leaves or enters is summed by the p
 the spins this is exact to rounding; what does not close is the error of the suspension's integration.
 
 A tyre whose force lags (A.13, A.14) is a spring K in series with its slip: it stores F^2 / (2 K). `tyres` is
-what remains of the work that went into them, the loss by slip.
+what remains of the work that went into them, the loss by slip. A force acts on the car with the end of a
+step and on the wheel with its middle, so `tyres` also holds half a step of it while it builds up.
 
 A height of the road lifts a wheel without holding the car back, as a shaker would (assumption: slopes of a
 profile are small); this work enters as `road`. The reduced car's body leans without energy.
