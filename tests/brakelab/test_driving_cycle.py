@@ -9,8 +9,8 @@ import pytest
 
 from brakelab.driving_cycle import BRAKE_JERK, DRIVE_JERK, DT, STRONGEST_BRAKING, main, real_driving
 from brakelab.report.drive import read_drive
-from brakelab.trip_report import DRIVE_COLUMNS, brake_lines
-from brakelab.trip_table import KMH, Row, brakings, distance_driven, trip_rows
+from brakelab.trip_report import DRIVE_COLUMNS, brake_lines, part_lines
+from brakelab.trip_table import KMH, Brakings, Row, brakings, distance_driven, trip_rows
 
 SEEDS = (1, 2, 3, 4, 5)
 TABLE_1_1 = [  # name, low, high
@@ -92,6 +92,11 @@ def test_a_car_and_its_driver_can_follow(seed: int) -> None:
     assert accel.min() > -STRONGEST_BRAKING
     assert np.abs(jerk).max() < 1.05 * BRAKE_JERK
     assert np.abs(jerk[accel[1:] > 0.1]).max() < 1.05 * DRIVE_JERK
+
+
+def test_a_change_of_speed_within_one_sample_divides_by_nothing() -> None:
+    with np.errstate(all="raise"):  # seed 102 has one of 1 mm/s
+        assert np.isfinite(real_driving(102).speed).all()
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -208,6 +213,41 @@ def test_a_drive_is_reported_beside_its_trip(tmp_path: Path, capsys: pytest.Capt
     assert "1.00 m/s at most" in said
     assert said.count("  yes\n") == len(TABLE_1_1)
     assert "disc temperature" in (tmp_path / "d.svg").read_text()
+
+
+def test_brakings_are_counted_where_they_begin() -> None:
+    """200 s at 15 m/s, 100 s at 20 m/s and 100 s at 30 m/s, and no way that takes time in between."""
+    t = np.arange(0.0, 400.5, 1.0)
+    speed = np.where(t <= 200.0, 15.0, np.where(t <= 300.0, 20.0, 30.0))
+    rows = np.array([(10.0, 5.0, 15.0, 0.0, 1.0), (20.0, 5.0, 16.0, 8.0, 2.0), (390.0, 5.0, 30.0, 25.0, 1.5)])
+    discs = np.column_stack([t, t, 2.0 * t, 2.0 * t])
+    urban, rural, motorway = (line.split() for line in part_lines(t, speed, discs, Brakings(*rows.T))[1:])
+    assert urban == ["Urban", "2", "67", "55.8", "1.50", "15", "30"]  # 2 in 3 km
+    assert rural == ["Rural", "0", "0"]
+    assert motorway == ["Motorway", "1", "33", "108.0", "1.50", "390", "780"]
+
+
+def drive_at(path: Path, speed: float) -> Path:
+    """Write a drive of 100 s at a constant speed [m/s]."""
+    columns = {name: np.full(100, speed if name == "vehicle_speed" else 0.0) for name in DRIVE_COLUMNS}
+    pq.write_table(pa.table({"t": np.arange(100.0), **columns}), path)
+    return path
+
+
+def test_a_drive_without_brakings_is_reported_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    drive = drive_at(tmp_path / "d.parquet", 20.0)
+    assert main([str(drive), "--svg", str(tmp_path / "d.svg")]) == 0
+    assert "No braking" in capsys.readouterr().out
+
+
+def test_a_car_that_never_moves_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([str(drive_at(tmp_path / "d.parquet", 0.0))]) == 2
+    assert "vehicle_speed: never above 0" in capsys.readouterr().err
+
+
+def test_a_seed_below_0_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--seed", "-1"]) == 2
+    assert capsys.readouterr().err == "--seed: -1: give a whole number from 0 on\n"
 
 
 def test_a_file_that_is_no_drive_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

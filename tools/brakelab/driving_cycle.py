@@ -23,14 +23,14 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.random import Generator
 
+from brakelab import trip_report
 from brakelab.report.drive import read_drive
 from brakelab.trip_picture import write_picture
-from brakelab.trip_report import DRIVE_COLUMNS, brake_lines, braking_lines, follow_line, trip_lines
 from brakelab.trip_table import KMH, Array, brakings, distance_driven, trip_rows
 from ecu.errors import UserError
 
 DT: Final = 0.1  # s, of the samples
-# Assumptions, all of them: an everyday driver.
+# Assumptions, as all figures of roads and driver below.
 COAST: Final = 0.35  # m/s^2, foot off
 COAST_SECONDS: Final = (1.0, 5.0)  # before the brake is touched
 BRAKE_JERK: Final = 2.0  # m/s^3
@@ -99,7 +99,6 @@ COUNTRY: Final = _Road(
 FREEWAY: Final = _Road(
     23_800.0, 3600.0, (107.0, 112.0, 116.0), (_End(0.5, (80.0, 92.0)), _End(0.5, (95.0, 105.0))), 0.022
 )
-SLIP_ROAD: Final = 50.0  # km/h, at both ends of the motorway
 
 
 class _Driver(NamedTuple):
@@ -142,7 +141,7 @@ def _along(start: float, end: float, seconds: list[float], accel: list[float]) -
     to a whole number of samples.
     """
     knots = np.concatenate([[0.0], np.cumsum(seconds)])
-    grid = np.linspace(0.0, knots[-1], math.ceil(knots[-1] / DT) + 1)
+    grid = np.linspace(0.0, knots[-1], max(math.ceil(knots[-1] / DT), 2) + 1)
     a = np.interp(grid, knots, accel)
     gained = np.cumsum(a[1:] + a[:-1])
     piece: Array = start + (end - start) * gained / gained[-1]
@@ -233,7 +232,7 @@ def _hills(rng: Generator, parts: list[tuple[float, float]]) -> Array:
 
 
 def _trip(rng: Generator) -> Cycle:
-    driver = _Driver(rng.uniform(1.60, 1.85), rng.uniform(0.22, 0.32), rng.uniform(0.85, 1.05))
+    driver = _Driver(rng.uniform(1.67, 1.90), rng.uniform(0.26, 0.36), rng.uniform(0.85, 1.05))
     trace = _Trace()
     trace.add(np.zeros(round(rng.uniform(5.0, 20.0) / DT)))
     parts = []
@@ -241,11 +240,11 @@ def _trip(rng: Generator) -> Cycle:
         _drive_road(trace, rng, driver, road)
         parts.append((trace.distance, road.hilly))
         if road is not TOWN:  # a slip road, up to the motorway or down from it
-            _leg(trace, rng, driver, 500.0, KMH * 70.0, KMH * SLIP_ROAD)
+            _leg(trace, rng, driver, 500.0, KMH * 70.0, KMH * 50.0)
     _leg(trace, rng, driver, 400.0, KMH * 50.0, 0.0)
     trace.add(np.zeros(round(rng.uniform(5.0, 20.0) / DT)))
     speed = np.concatenate(trace.pieces)
-    hills = _hills(rng, [*parts, (trace.distance + 1000.0, TOWN.hilly)])
+    hills = _hills(rng, [*parts, (trace.distance + 1000.0, 0.0)])
     return Cycle(np.linspace(0.0, DT * (len(speed) - 1), len(speed)), speed, hills)
 
 
@@ -257,34 +256,37 @@ def real_driving(seed: int) -> Cycle:
     )
 
 
-def _arguments(argv: list[str] | None) -> argparse.Namespace:
+def main(argv: list[str] | None = None) -> int:
+    """Print, and draw, a trip or a drive; returns the exit code."""
     parser = argparse.ArgumentParser(
         prog="python -m brakelab.driving_cycle", description="A trip beside the thesis' Tables 1.1 and 1.2."
     )
-    parser.add_argument(
-        "drive", nargs="?", type=Path, help="NAME.truth.parquet of a car that followed the trip"
-    )
-    parser.add_argument("--seed", type=int, default=1, help="of the trip")
+    parser.add_argument("drive", nargs="?", type=Path, help="NAME.truth.parquet of a car that followed it")
+    parser.add_argument("--seed", type=int, default=1, help="of the trip, from 0 on")
     parser.add_argument("--svg", type=Path, metavar="FILE", help="where to draw it")
-    return parser.parse_args(argv)
-
-
-def main(argv: list[str] | None = None) -> int:
-    """Print, and draw, a trip or a drive; returns the exit code."""
-    arguments = _arguments(argv)
+    arguments = parser.parse_args(argv)
     try:
+        if arguments.seed < 0:
+            raise UserError("--seed", str(arguments.seed), "give a whole number from 0 on")
         trip = real_driving(arguments.seed)
         t, speed, grade = trip.t, trip.speed, trip.grade_by_time()
         lines = [f"Trip of seed {arguments.seed}", ""]
-        discs = np.empty((len(t), 0))
+        discs = np.empty((len(t), 0))  # none are known
         if arguments.drive is not None:
-            drive = read_drive(arguments.drive, DRIVE_COLUMNS, "give the truth of a simulated drive")
+            drive = read_drive(
+                arguments.drive, trip_report.DRIVE_COLUMNS, "give the truth of a simulated drive"
+            )
             t, speed, grade = drive.t, drive.columns["vehicle_speed"], drive.columns["grade"]
+            if not speed.max() > 0.0:
+                raise UserError(str(arguments.drive), "vehicle_speed", "never above 0; give a car that moves")
             discs = drive.corners("disc_temperature")
             lines = [f"{arguments.drive.name} beside the trip of seed {arguments.seed}"]
-            lines += [follow_line(t, speed, trip.t, trip.speed), "", *brake_lines(drive), ""]
+            lines += [trip_report.follow_line(t, speed, trip.t, trip.speed), ""]
+            lines += [*trip_report.brake_lines(drive), ""]
         found = brakings(t, speed, -np.gradient(speed, t))
-        print("\n".join([*lines, *trip_lines(t, speed, grade, found), "", *braking_lines(found)]))
+        lines += [*trip_report.trip_lines(t, speed, grade, found), ""]
+        lines += [*trip_report.part_lines(t, speed, discs, found), ""]
+        print("\n".join([*lines, *trip_report.braking_lines(found)]))
         if arguments.svg is not None:
             write_picture(arguments.svg, t, speed, grade, discs)
     except UserError as error:

@@ -12,13 +12,13 @@ from ecu.errors import UserError
 from ecu.signals import CORNERS
 
 LEFT, WIDTH, TOP, HEIGHT, GAP = 60.0, 920.0, 24.0, 130.0, 34.0
-POINTS: Final = 2400
+POINTS: Final = 1400
 COLOURS: Final = ("#0072b2", "#56b4e9", "#d55e00", "#e69f00")
 
 
 def _ticks(low: float, high: float) -> Array:
     step = next(s for s in (1, 2, 5, 10, 20, 50, 100, 200, 500) if (high - low) / s <= 6)
-    return np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step
+    return np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step + 0.0
 
 
 def _panel(
@@ -59,7 +59,8 @@ def write_picture(path: Path, t: Array, speed: Array, grade: Array, discs: Array
         ("height over the start [m]", [height_gained(t, speed, grade)], ()),
     ]
     if discs.size:
-        title = "disc temperature [degC]: " + ", ".join(CORNERS)
+        names = (f'<tspan style="fill:{c}">{name}</tspan>' for name, c in zip(CORNERS, COLOURS, strict=True))
+        title = f"disc temperature [degC]: {', '.join(names)}"
         panels.append((title, list(discs.T), ()))
     body: list[str] = []
     for place, (title, lines, marks) in enumerate(panels):

@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from brakelab.report.drive import Drive
-from brakelab.trip_table import KMH, Array, Brakings, Row, distance_driven, trip_rows
+from brakelab.trip_table import KMH, RURAL, URBAN, Array, Brakings, Row, distance_driven, trip_rows
 from ecu.signals import CORNERS
 
 DRIVE_COLUMNS: Final = (
@@ -34,6 +34,8 @@ def trip_lines(t: Array, speed: Array, grade: Array, found: Brakings) -> list[st
             f"{row.name:26}{row.unit:>10}{_limits(row):>12}{row.ilmenau:10.0f}{row.value:10.1f}  {verdict}"
         )
     decel = found.mean_decel
+    if len(decel) == 0:
+        return [*lines, "", "No braking"]
     kilometres = distance_driven(t, speed)[-1] / 1e3
 
     def share(low: float, high: float) -> float:
@@ -54,7 +56,33 @@ def trip_lines(t: Array, speed: Array, grade: Array, found: Brakings) -> list[st
     lines += ["", "Mean deceleration [m/s^2], a # for each braking"]
     edges = np.arange(0.0, max(float(decel.max()), 3.0) + BIN, BIN)
     for low, number in zip(edges, np.histogram(decel, edges)[0], strict=False):
-        lines.append(f"{low:4.1f} to {low + BIN:3.1f}{number:5d}  {'#' * number}")
+        lines.append(f"{low:4.1f} to {low + BIN:3.1f}{number:5d}  {'#' * number}".rstrip())
+    return lines
+
+
+def part_lines(t: Array, speed: Array, discs: Array, found: Brakings) -> list[str]:
+    """Return number and means of the brakings of each part of a trip, told apart by the speed before them.
+
+    `discs` are temperatures [degC] of shape (n, 4), or (n, 0) where they are not known. After Figures 7.3
+    and 7.4.
+    """
+    lines = [f"{'Brakings, means':16}{'number':>8}{'per 100 km':>12}{'from [km/h]':>13}{'by [m/s^2]':>12}"]
+    if discs.size:
+        lines[0] += "  discs before, front and rear [degC]"
+    metres = np.diff(distance_driven(t, speed))
+    for name, low, high in (("Urban", -np.inf, URBAN), ("Rural", URBAN, RURAL), ("Motorway", RURAL, np.inf)):
+        here = (found.speed_in > low) & (found.speed_in <= high)
+        kilometres = metres[(speed[1:] > low) & (speed[1:] <= high)].sum() / 1e3
+        if kilometres == 0.0:
+            continue
+        number = int(here.sum())
+        line = f"{name:16}{number:8d}{100.0 * number / kilometres:12.0f}"
+        if number:
+            line += f"{found.speed_in[here].mean() / KMH:13.1f}{found.mean_decel[here].mean():12.2f}"
+            if discs.size:
+                before = discs[np.searchsorted(t, found.start[here])].mean(axis=0)
+                line += f"{before[:2].mean():10.0f}{before[2:].mean():8.0f}"
+        lines.append(line)
     return lines
 
 
@@ -62,7 +90,7 @@ def braking_lines(found: Brakings) -> list[str]:
     """Return one line for each braking, speeds in km/h."""
     lines = ["start [s]  lasts [s]  from [km/h]  to [km/h]  mean deceleration [m/s^2]"]
     for start, lasts, v_in, v_out, decel in zip(*found, strict=True):
-        lines.append(f"{start:9.1f}{lasts:11.1f}{v_in / KMH:13.1f}{v_out / KMH:11.1f}{decel:27.2f}")
+        lines.append(f"{start:9.1f}{lasts:11.1f}{v_in / KMH:13.1f}{max(v_out, 0.0) / KMH:11.1f}{decel:27.2f}")
     return lines
 
 

@@ -91,7 +91,7 @@ def trip_rows(t: Array, speed: Array, grade: Array) -> list[Row]:
     some, free = np.inf, -np.inf
     distances = zip(parts.items(), (32.0, 31.0, 24.0), strict=True)
     shares = zip(parts.items(), ((29.0, 44.0, 37.0), (23.0, 43.0, 35.0), (23.0, 43.0, 27.0)), strict=True)
-    urban_speed = parts["Urban"] / float(dt[urban].sum()) / KMH
+    urban_speed = parts["Urban"] / float(dt[urban].sum()) / KMH if urban.any() else np.nan
     return [
         Row("Duration", "min", 90.0, 120.0, 100.0, lasted / 60.0),
         *(
