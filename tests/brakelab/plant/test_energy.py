@@ -135,7 +135,7 @@ def test_energy_of_every_scenario_is_accounted_for(name: str, car: str | None) -
     run(loop, seconds=LONGEST)
     found = energy(vehicle.params, start, vehicle.state)
     assert found.turned_over > 1e5
-    assert abs(found.missing) < 1e-3, found
+    assert abs(found.missing) < 1e-5, found
     assert min(found.brakes, found.tyres, found.drag, found.rolling, found.regenerated) >= 0.0
 
 
