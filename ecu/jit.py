@@ -18,6 +18,8 @@ from typing import Any, TypeVar, cast
 import numba
 import numba.core.event as numba_event
 
+from ecu.errors import UserError
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 # A numba record or a row of a structured array: attributes by field name, typed by its dtype only.
@@ -53,10 +55,28 @@ def _digest(package: str) -> str:
     return text.hexdigest()[:16]
 
 
+@cache
+def _folder(package: str) -> str:
+    """Return where the kernels of a package are kept. numba would turn to a place that can go stale."""
+    folder = _CACHE_ROOT / f"{package}-{_digest(package)}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        writable = False
+    else:
+        writable = os.access(folder, os.W_OK)
+    if not writable:
+        raise UserError(str(folder), "", "cannot be written; set NUMBA_CACHE_DIR to a folder of yours")
+    return str(folder)
+
+
 def kernel(function: Function) -> Function:
-    """Compile `function` with numba (no Python objects, no fastmath) and cache it on disk."""
-    package = function.__module__.partition(".")[0]
-    numba.config.CACHE_DIR = str(_CACHE_ROOT / f"{package}-{_digest(package)}")
+    """Compile `function` with numba (no Python objects, no fastmath) and cache it on disk.
+
+    Raises:
+        UserError: there is no place for the cache.
+    """
+    numba.config.CACHE_DIR = _folder(function.__module__.partition(".")[0])
     return cast(Function, numba.njit(**OPTIONS)(function))
 
 

@@ -16,7 +16,7 @@ from ecu.cli import LABORATORY
 ROOT = Path(__file__).parent.parent
 LOCKS = sorted((ROOT / "requirements").glob("*.txt"))
 SOURCES = sorted([*(ROOT / "ecu").rglob("*.py"), *(ROOT / "tools").rglob("*.py")])
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
 IGNORED = {
     ".git",
     ".venv",
@@ -43,7 +43,7 @@ def _texts() -> Iterator[Path]:
 
 def _imports(path: Path) -> Iterator[tuple[str, bool]]:
     """Names that a module imports, and whether only inside a function."""
-    tree = ast.parse(path.read_text())
+    tree = ast.parse(path.read_text("utf-8"))
     inside = {
         id(node)
         for function in ast.walk(tree)
@@ -61,19 +61,19 @@ def _imports(path: Path) -> Iterator[tuple[str, bool]]:
 def _requirements(lock: Path) -> dict[str, set[str]]:
     """Pinned versions by name; a version may hold for some Pythons only."""
     versions: dict[str, set[str]] = {}
-    for name, version in re.findall(r"^([\w.\-]+)==([^\\\n]+)", lock.read_text(), re.MULTILINE):
+    for name, version in re.findall(r"^([\w.\-]+)==([^\\\n]+)", lock.read_text("utf-8"), re.MULTILINE):
         versions.setdefault(name, set()).add(version.strip())
     return versions
 
 
 def test_no_file_names_a_package_index() -> None:
-    found = [str(path) for path in _texts() if INDEX_ADDRESS.search(path.read_text(errors="ignore"))]
+    found = [str(path) for path in _texts() if INDEX_ADDRESS.search(path.read_text("utf-8", errors="ignore"))]
     assert found == []
 
 
 @pytest.mark.parametrize("lock", LOCKS, ids=lambda path: path.name)
 def test_every_requirement_is_pinned_with_a_hash(lock: Path) -> None:
-    entries = re.sub(r"\\\n", " ", lock.read_text()).splitlines()
+    entries = re.sub(r"\\\n", " ", lock.read_text("utf-8")).splitlines()
     assert entries
     for entry in entries:
         assert re.match(r"[\w.\-]+==\S+ .*--hash=sha256:[0-9a-f]{64}", entry), entry[:80]
@@ -103,7 +103,7 @@ def test_the_locks_hold_what_the_project_asks_for() -> None:
 
 def test_the_version_is_stated_once_for_package_and_program() -> None:
     assert PROJECT["project"]["version"] == __version__
-    assert f"## {__version__}" in (ROOT / "CHANGELOG.md").read_text()
+    assert f"## {__version__}" in (ROOT / "CHANGELOG.md").read_text("utf-8")
 
 
 def test_onboard_code_loads_no_laboratory() -> None:
@@ -138,15 +138,15 @@ def test_the_simulated_vehicle_knows_nothing_of_the_ecu() -> None:
 
 def test_the_ecu_knows_nothing_of_the_simulated_vehicle() -> None:
     for path in (ROOT / "ecu").rglob("*.py"):
-        assert "config/plant" not in path.read_text(), path
+        assert "config/plant" not in path.read_text("utf-8"), path
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_a_module_is_one_idea(path: Path) -> None:
-    assert len(path.read_text().splitlines()) <= 350, "split it: 300 lines are the aim, 350 the limit"
+    assert len(path.read_text("utf-8").splitlines()) <= 350, "split it: 300 lines are the aim, 350 the limit"
 
 
 def test_every_path_that_the_documents_name_exists() -> None:
     for document in [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]:
-        for target in re.findall(r"\]\((?!https?:|#)([^)#]+)", document.read_text()):
+        for target in re.findall(r"\]\((?!https?:|#)([^)#]+)", document.read_text("utf-8")):
             assert (document.parent / target).exists(), f"{document.name}: {target}"

@@ -101,7 +101,7 @@ def test_inputs_are_the_truth_with_noise_quantised(stop: Drive) -> None:
 
 
 def test_options_decide_what_is_on_the_bus(config: Config) -> None:
-    bare = scenario("stop-2").model_copy(update={"vehicle_speed": False, "wheel_transducers": True})
+    bare = scenario("stop-2").model_copy(update={"vehicle_speed": "none", "wheel_transducers": True})
     drive = run(new_loop(bare, config, 0))
     assert np.isnan(drive.inputs["vehicle_speed"]).all()
     force = drive.inputs["wheel_force_x_rl"] - drive.truth["wheel_force_x_rl"]

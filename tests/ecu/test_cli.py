@@ -1,5 +1,7 @@
 """What a user reads who typed something wrong: one line, and the exit code."""
 
+from pathlib import Path
+
 import pytest
 
 from ecu import __version__, cli, resources
@@ -30,8 +32,13 @@ COMMANDS = ("run", "demo", "simulate", "replay", "play", "report", "bench", "doc
     ],
 )
 def test_a_mistake_is_one_line_and_exit_code_2(
-    line: str, says: str, capsys: pytest.CaptureFixture[str]
+    line: str,
+    says: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
+    monkeypatch.chdir(tmp_path)
     assert cli.main(line.split()) == 2
     printed = capsys.readouterr()
     assert printed.out == ""
@@ -79,7 +86,6 @@ def test_what_a_command_raises_becomes_one_line(
     def fail(*_: object, **__: object) -> int:
         raise error
 
-    monkeypatch.delenv("BRAKE_ECU_DEBUG", raising=False)
     monkeypatch.setattr(cli, "app", fail)
     assert cli.main(["demo"]) == code
     printed = capsys.readouterr().err
@@ -123,7 +129,10 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
         ("cars/suv", "config", None),
     ],
 )
-def test_only_a_bare_name_means_a_shipped_file(name: str, folder: str, expected: str | None) -> None:
+def test_only_a_bare_name_means_a_shipped_file(
+    name: str, folder: str, expected: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
     path = resources.named(name, folder)
     if expected is None:
         assert str(path) == name

@@ -220,21 +220,22 @@ def test_learned_values_are_taken_over(tmp_path):
     assert ecu.learned.tobytes() == learned.tobytes()
 
 
-def test_ten_thousand_cycles_leave_no_memory_behind(bench):
+def test_thousands_of_cycles_leave_no_memory_behind(bench):
     enabled = _nrt_python.memsys_stats_enabled()
     _nrt_python.memsys_enable_stats()
     gc.disable()
     try:
         bench.run(2000)
-        blocks, numba_before = sys.getallocatedblocks(), rtsys.get_allocation_stats()
-        bench.run(10_000)
-        grown, numba_after = sys.getallocatedblocks() - blocks, rtsys.get_allocation_stats()
+        numba_before, blocks = rtsys.get_allocation_stats(), [sys.getallocatedblocks()]
+        for _ in range(3):
+            bench.run(5000)
+            blocks.append(sys.getallocatedblocks())
+        numba_after = rtsys.get_allocation_stats()
     finally:
         gc.enable()
         if not enabled:
             _nrt_python.memsys_disable_stats()
     assert numba_after.alloc - numba_after.free == numba_before.alloc - numba_before.free
     assert numba_after.mi_alloc - numba_after.mi_free == numba_before.mi_alloc - numba_before.mi_free
-    assert (
-        abs(grown) <= 16
-    )  # a counter that leaves Python's small numbers holds a block; cycles would hold 10,000
+    # The interpreter takes some blocks once in a while; what cycles kept would show in each stretch.
+    assert np.diff(blocks).min() <= 4

@@ -1,6 +1,9 @@
 """The cache of compiled kernels is named after everything that a kernel is made of."""
 
 import ast
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -45,3 +48,15 @@ def test_whatever_a_kernel_takes_a_constant_from_counts(package: str) -> None:
 
 def test_a_module_of_neither_kind_does_not_count() -> None:
     assert not jit.is_source_of_kernels(FOLDERS["ecu"] / "cli.py")
+
+
+def test_without_a_place_for_the_cache_nothing_is_compiled_and_one_line_says_so(tmp_path: Path) -> None:
+    place = tmp_path / "file"
+    place.write_text("")
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(place)}
+    command = [sys.executable, "-m", "ecu.cli", "doctor"]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith(f"brake-ecu: {place}")
+    assert done.stderr.count("\n") == 1
+    assert "set NUMBA_CACHE_DIR" in done.stderr

@@ -1,4 +1,5 @@
 import multiprocessing
+from multiprocessing.synchronize import Event
 from pathlib import Path
 
 import numpy as np
@@ -108,24 +109,24 @@ def test_it_holds_twenty_seconds_of_a_full_bus():
     assert FRAMES >= 20 * 100 * 45
 
 
-def _flood(path: Path, cycles: int) -> None:
+def _flood(path: Path, cycles: int, reading: Event) -> None:
     writer = Writer(path, slots=32, frames=256)
+    reading.wait()
     writer.publish(*[7] * cycles)
     close_ring(writer.ring)
 
 
 def test_a_reader_beside_a_racing_writer_sees_whole_cycles_only(path):
-    process = multiprocessing.get_context("spawn").Process(target=_flood, args=(path, 20_000))
+    spawn = multiprocessing.get_context("spawn")
+    reading = spawn.Event()
+    process = spawn.Process(target=_flood, args=(path, 20_000, reading))
     process.start()
     while not path.exists() and process.is_alive():
         pass
-    reader, read, done = None, 0, False
+    reader, read, done = RingReader(path), 0, False
+    reading.set()
     while not done:
-        try:
-            reader = reader or RingReader(path)
-        except UserError:  # not laid out yet
-            continue
-        done = reader.closed
+        done = reader.closed or not process.is_alive()
         batch = reader.read()
         numbers = batch.records["cycle"]["number"]
         assert (batch.records["outputs"]["k_f"] == numbers + 0.5).all()
@@ -133,7 +134,6 @@ def test_a_reader_beside_a_racing_writer_sees_whole_cycles_only(path):
         assert np.isin(batch.frames["can_id"], np.arange(2048)).all()
         read += len(numbers)
     process.join()
-    assert reader is not None
     assert read + reader.lost_cycles == 20_000
 
 

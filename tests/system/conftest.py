@@ -3,12 +3,14 @@
 import json
 import os
 import queue
+import shutil
 import signal
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -57,9 +59,16 @@ class Daemon:
                 return self.seen[-1]
         raise AssertionError(f"ended without {wanted}: {self.seen} {self.other}")
 
+    def said(self, event: str, **content: Any) -> bool:
+        """Whether a line of `event` with `content` was written by now."""
+        while not self._lines.empty() and self._next():
+            pass
+        return any({"event": event, **content}.items() <= line.items() for line in self.seen)
+
     def _next(self) -> bool:
         line = self._lines.get(timeout=PATIENCE_S)
         if line is None:
+            self._lines.put(None)
             return False
         try:
             self.seen.append(json.loads(line))
@@ -92,6 +101,22 @@ def daemon() -> Iterator[Callable[..., Daemon]]:
         one.process.wait()
 
 
+def patience() -> Iterator[None]:
+    """Turns of a loop that waits for a fact: how long that takes is the machine's affair."""
+    end = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end:
+        yield
+    raise AssertionError(f"not in {PATIENCE_S} s")
+
+
+def wait_for(fact: Callable[[], bool]) -> None:
+    """Look again and again until `fact` holds."""
+    for _ in patience():
+        if fact():
+            return
+        time.sleep(0.01)
+
+
 class Vehicle:
     """Sends every frame of the vehicle at its rate for as long as it is told to, and hears what it must."""
 
@@ -100,6 +125,7 @@ class Vehicle:
         self._plan = contract_transmit_plan(DBC, "Vehicle")
         self._counters, self._buffer = new_transmission(self._plan), frame_buffer(self._plan)
         self._periods = 0
+        self._frames = new_record(FRAME, 4096)
         self.values = np.zeros(N_INPUTS)
         self.set(hydraulic_ready=1, decel_demand_valid=1, accumulator_pressure=160, vehicle_speed=0)
 
@@ -108,22 +134,29 @@ class Vehicle:
         for name, value in values.items():
             self.values[INPUT[name]] = value
 
-    def drive(self, seconds: float) -> np.ndarray[Any, Any]:
-        """Send for a while; return the frames that came in meanwhile."""
-        grid, heard, frames = Grid(system_time()), [], new_record(FRAME, 4096)
-        end = time.monotonic() + seconds
-        while time.monotonic() < end:
+    def drive(self, cycles: int, until: Callable[[], bool] = lambda: True) -> np.ndarray[Any, Any]:
+        """Send until `cycles` of the daemon were heard and `until` holds; return the frames that came in."""
+        grid, heard, demands = Grid(system_time()), [self.hear()], 0
+        for _ in patience():
             grid.wait()
             count = transmit(self._plan, self._counters, self.values, self._periods, self._buffer)
             self.channel.send(self._buffer, count)
             self._periods += 1
-            heard.append(frames[: self.channel.drain(frames, 0)].copy())
+            heard.append(self.hear())
+            demands += int((heard[-1]["can_id"] == demand_ids()[0]).sum())
+            if demands >= cycles and until():
+                break
         return np.concatenate(heard)
 
+    def hear(self) -> np.ndarray[Any, Any]:
+        """Return the frames that wait."""
+        return self._frames[: self.channel.drain(self._frames, 0)].copy()
 
-def demand_ids() -> list[int]:
+
+@cache
+def demand_ids() -> tuple[int, ...]:
     """Identifiers of all frames of the ECU, demands first."""
-    return [int(number) for number in contract_transmit_plan(DBC, "BrakeEcu").ids]
+    return tuple(int(number) for number in contract_transmit_plan(DBC, "BrakeEcu").ids)
 
 
 @pytest.fixture
@@ -138,3 +171,40 @@ def vehicle() -> Iterator[Callable[..., Vehicle]]:
     yield start
     for one in opened:
         one.channel.close()
+
+
+class Witness:
+    """candump on vcan0, the log that knows nothing of the daemon."""
+
+    def __init__(self, log: Path) -> None:
+        self.log = log
+        program = shutil.which("candump")
+        assert program, "candump is missing: apt-get install can-utils"
+        with log.open("wb") as file:
+            self._process = subprocess.Popen([program, "-L", "-r", "4000000", "vcan0"], stdout=file)
+        wait_for(lambda: log.stat().st_size > 0)
+
+    def lines_until(self, last: str) -> list[str]:
+        """Wait for the line `last`, end the log and return its lines."""
+        wait_for(lambda: f"{last}\n" in self.log.read_text())
+        self.end()
+        return self.log.read_text().splitlines()
+
+    def end(self) -> None:
+        """Stop listening."""
+        self._process.terminate()
+        self._process.wait()
+
+
+@pytest.fixture
+def witness(tmp_path: Path) -> Iterator[Callable[[], Witness]]:
+    """Start a witness on a bus where someone sends; return when it hears."""
+    started: list[Witness] = []
+
+    def start() -> Witness:
+        started.append(Witness(tmp_path / "candump.log"))
+        return started[-1]
+
+    yield start
+    for one in started:
+        one.end()

@@ -7,6 +7,7 @@ acknowledgements can be reported to it as an adapter would.
 
 import contextlib
 import fcntl
+import json
 import os
 import selectors
 import struct
@@ -19,6 +20,12 @@ TIOCSETD, SIOCGIFNAME = 0x5423, 0x8910
 
 # Adapter to driver: "s", a letter for the state, transmit and receive error counters in three digits each.
 ACTIVE, WARNING, PASSIVE, BUS_OFF = "sa000000", "sw097000", "sp130000", "sb256000"
+STATE_NAMES = {
+    ACTIVE: "ERROR-ACTIVE",
+    WARNING: "ERROR-WARNING",
+    PASSIVE: "ERROR-PASSIVE",
+    BUS_OFF: "BUS-OFF",
+}
 NOT_ACKNOWLEDGED = "e1a"
 FRAME_LETTERS = b"tTrR"
 
@@ -43,6 +50,12 @@ class Controller:
     def report(self, line: str) -> None:
         """Tell the driver something, as the adapter's firmware would."""
         os.write(self.adapter, line.encode() + b"\r")
+
+    def state(self) -> str:
+        """Return the controller's state as the kernel has it."""
+        command = ["ip", "-json", "-details", "link", "show", self.name]
+        (device,) = json.loads(subprocess.run(command, check=True, capture_output=True).stdout)
+        return str(device["linkinfo"]["info_data"]["state"])
 
     def close(self) -> None:
         """Take the device away."""

@@ -1,11 +1,13 @@
 """The daemon as a process, over an interface that every machine has."""
 
+import os
 import signal
 import time
 
 import numpy as np
 import pytest
 
+from ecu.bus.e2e import P01_MODULO
 from ecu.config import load_config, store_key
 from ecu.diagnostics.store import open_store, restore, save
 from ecu.recorder import read_recording
@@ -14,7 +16,7 @@ from ecu.records import LEARNED
 from .conftest import ROOT, demand_ids
 
 CONFIG = ROOT / "config" / "suv.toml"
-GROUP = "239.74.163.77"
+GROUP = f"239.74.{os.getpid() >> 8 & 0xFF}.{os.getpid() & 0xFF}"  # a bus of this run's own
 BUS = ("--config", CONFIG, "-i", "udp_multicast", "-c", GROUP)
 
 
@@ -22,16 +24,17 @@ def test_it_starts_cycles_records_and_leaves_in_order(daemon, vehicle, tmp_path)
     car = vehicle("udp_multicast", GROUP)
     unit = daemon(*BUS, "--record", tmp_path / "record", "--state", tmp_path / "state")
     assert unit.wait_for("ready")["armed"] is False
-    heard = car.drive(2.0)
+    heard = car.drive(100, until=lambda: unit.said("mode", now="ready"))
     assert unit.end(signal.SIGTERM) == 0
     assert set(demand_ids()[:4]) <= set(heard["can_id"].tolist())
-    last = car.drive(0.05)
-    assert last["can_id"].tolist().count(demand_ids()[0]) >= 1  # the farewell
     stopped = unit.wait_for("stopped")
+    last = car.hear()
+    farewell = last["data"][last["can_id"] == demand_ids()[0]][-1]
+    assert farewell[1] & 0xF == stopped["cycles"] % P01_MODULO  # one more than there were cycles
     recording = read_recording(tmp_path / "record")
-    assert len(recording.cycles) == stopped["cycles"] > 100
+    assert len(recording.cycles) == stopped["cycles"] >= 100
     assert (np.diff(recording.cycles["number"]) == 1).all()
-    assert len(recording.frames.read_text().splitlines()) == recording.cycles["frames"].sum() > 1000
+    assert len(recording.frames.read_text().splitlines()) == recording.cycles["frames"].sum() > 100
     assert not any(
         line["event"] == "fault" and line["fault"] == "compiled in operation" for line in unit.seen
     )
@@ -44,7 +47,7 @@ def test_a_second_daemon_on_the_same_bus_refuses(daemon, vehicle):
     second = daemon(*BUS)
     assert second.end(None) == 2
     assert any("someone else already sends it" in line for line in second.other)
-    car.drive(0.5)
+    car.drive(1, until=lambda: first.said("mode", now="ready"))
     assert first.end() == 0
 
 
@@ -69,7 +72,7 @@ def test_a_restart_after_kill_has_what_was_learned(daemon, vehicle, tmp_path):
         unit = daemon(*BUS, "--state", state, "--record", tmp_path / "record")
         assert unit.wait_for("restored")["brakings"] == 3
         unit.wait_for("ready")
-        car.drive(0.5)
+        car.drive(2)
         assert unit.end(signal.SIGKILL) == -signal.SIGKILL
         assert read_recording(tmp_path / "record").learned["brakings"][-1] == 3
     nominal = np.full(4, config.front.mu_nominal)
@@ -77,15 +80,16 @@ def test_a_restart_after_kill_has_what_was_learned(daemon, vehicle, tmp_path):
 
 
 def test_the_side_process_writes_out_the_ring_when_the_daemon_is_killed(daemon, vehicle, tmp_path):
+    begin_ns = time.time_ns()
     car = vehicle("udp_multicast", GROUP)
     unit = daemon(*BUS, "--record", tmp_path)
     unit.wait_for("ready")
-    car.drive(1.0)
+    car.drive(50)
     unit.end(signal.SIGKILL)  # returns when the side process has closed the log, too
     recording = read_recording(tmp_path)
-    assert len(recording.cycles) > 50
+    assert len(recording.cycles) >= 49  # the last one heard may not have been published
     assert len(recording.frames.read_text().splitlines()) == recording.cycles["frames"].sum()
-    assert (time.time_ns() - recording.cycles["t_ns"][-1]) < 60e9
+    assert begin_ns < recording.cycles["t_ns"][0] < recording.cycles["t_ns"][-1] < time.time_ns()
 
 
 @pytest.mark.parametrize(

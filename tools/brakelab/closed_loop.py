@@ -116,10 +116,15 @@ class Drive(NamedTuple):
 
 @cache
 def plans() -> Plans:
-    """Return the plans of the contract's database."""
+    """Return the plans of the contract's database.
+
+    A frame without any new sample is not sent: that is how a sensor is slow or dead.
+    """
     dbc = resource("dbc/brake_ecu.dbc")
+    vehicle_sends = contract_transmit_plan(dbc, "Vehicle")
+    vehicle_sends.messages["optional"] = 1
     return Plans(
-        contract_transmit_plan(dbc, "Vehicle"),
+        vehicle_sends,
         contract_listen_plan(dbc),
         contract_transmit_plan(dbc, "BrakeEcu"),
         contract_receive_plan(dbc),
@@ -216,8 +221,8 @@ def _run(
     return len(truth), place, True
 
 
-def run(loop: Loop, ideal: bool = False) -> Drive:
-    """Run a new loop to the end of its script and return what happened.
+def run(loop: Loop, ideal: bool = False, seconds: float = LONGEST) -> Drive:
+    """Run a new loop to the end of its script, or for `seconds`, and return what happened.
 
     `ideal`: the ECU's pressure law is given the true friction, to compare a compensated controller with.
     """
@@ -225,13 +230,14 @@ def run(loop: Loop, ideal: bool = False) -> Drive:
     per_cycle = len(sides.vehicle_frames) + len(sides.ecu_frames)
     blocks: list[tuple[NDArray[np.float64], ...]] = []
     frames: list[RecordArray] = []
-    first, running = 0, True
-    while running and first * CYCLE_NS < LONGEST * 1e9:
-        block = (np.empty((CHUNK, N_INPUTS)), np.empty((CHUNK, N_OUTPUTS)), np.empty((CHUNK, N_TRUTH)))
-        kept = np.zeros(CHUNK * per_cycle, FRAME)
+    first, last, running = 0, round(seconds * 1e9 / CYCLE_NS), True
+    while running and first < last:
+        size = min(CHUNK, last - first)
+        block = (np.empty((size, N_INPUTS)), np.empty((size, N_OUTPUTS)), np.empty((size, N_TRUTH)))
+        kept = np.zeros(size * per_cycle, FRAME)
         rows, count, running = _run(plans(), sides, loop.noise, ideal, first, *block, kept)
         blocks.append(tuple(values[:rows] for values in block))
-        frames.append(kept[:count])
+        frames.append(kept[:count].copy())
         first += rows
     decoded, outputs, truth = (np.concatenate(values) for values in zip(*blocks, strict=True))
     return Drive(

@@ -11,10 +11,19 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from brakelab.plant.cycle import move
-from brakelab.plant.description import draw
+from brakelab.plant.description import Plant, draw
 from brakelab.plant.driver import Script, friction_now, grade_now
-from brakelab.plant.records import COMMANDS, DEMAND, DRIVER, MEASURED, RecordArray, new_record
-from brakelab.plant.sensors import body_accelerations, measure
+from brakelab.plant.records import COMMANDS, DEMAND, DRIVER, RecordArray, new_record
+from brakelab.plant.sensor_errors import (
+    ABSENT,
+    SIGNALS,
+    SPEED_SOURCES,
+    STANDARD,
+    disturb,
+    new_sensing,
+    new_sensors,
+)
+from brakelab.plant.sensors import body_accelerations, true_readings
 from brakelab.plant.vehicle import new_state
 from brakelab.scenario import Scenario, scenario_plant
 from ecu import signals
@@ -22,8 +31,7 @@ from ecu.jit import Record, kernel
 from ecu.signals import CORNERS, INPUT, N_INPUTS, OUTPUT
 
 PRESSED_FROM: Final = 1.0  # % of pedal travel
-WHEEL_FORCE_X: Final = INPUT["wheel_force_x_fl"]
-WHEEL_TORQUE_Y: Final = INPUT["wheel_torque_y_fl"]
+SENSED: Final = np.array([INPUT[name] for name in SIGNALS])
 RAIN: Final = INPUT["rain"]
 PRESSURE_DEMAND: Final = OUTPUT["pressure_demand_fl"]
 PRESSURE_DEMAND_VALID: Final = OUTPUT["pressure_demand_valid"]
@@ -42,6 +50,10 @@ _SCALAR_TRUTH: Final = (
     "pedal_position",
     "road_friction",
     "grade",
+    "position_x",
+    "position_y",
+    "heading",
+    "steering_angle",
 )
 _CORNER_TRUTH: Final = (
     "mu_b",
@@ -56,7 +68,8 @@ _CORNER_TRUTH: Final = (
     "rolling_radius",
 )
 TRUTH_COLUMNS: Final = _SCALAR_TRUTH + tuple(f"{name}_{c}" for name in _CORNER_TRUTH for c in CORNERS)
-"""True values by the contract's names; beyond it: distance [m], pitch and grade [rad], rolling radius [m]."""
+"""True values by the contract's names; beyond it: distance and position [m], pitch, heading and grade [rad],
+rolling radius [m]."""
 N_TRUTH: Final = len(TRUTH_COLUMNS)
 _FIRST_CORNER: Final = len(_SCALAR_TRUTH)
 
@@ -70,32 +83,42 @@ class Vehicle(NamedTuple):
     driver: RecordArray
     demand: RecordArray
     commands: RecordArray
-    measured: RecordArray
-    speed_sent: bool
-    transducers_sent: bool
+    sensors: RecordArray
+    sensing: RecordArray
+    measured: NDArray[np.float64]
+    speed_over_ground: bool
+
+
+def _sensors(scenario: Scenario, plant: Plant, seed: int) -> RecordArray:
+    transducers = {} if scenario.wheel_transducers else {"wheel_force_x": ABSENT, "wheel_torque_y": ABSENT}
+    speed = {"vehicle_speed": SPEED_SOURCES[scenario.vehicle_speed]}
+    return new_sensors((STANDARD, speed, plant.vehicle.sensor.errors, scenario.sensor, transducers), seed)
 
 
 def new_vehicle(scenario: Scenario, seed: int) -> Vehicle:
     """Return the vehicle of a scenario before its first cycle, its car drawn from `seed`.
 
     Raises:
-        UserError: the plant's file cannot be read or is wrong.
+        UserError: the plant's or the trace's file cannot be read or is wrong.
     """
-    params = draw(scenario_plant(scenario), seed)
+    script = scenario.script()
+    plant = scenario_plant(scenario)
+    params = draw(plant, seed)
     commands = new_record(COMMANDS)
-    commands["road_friction"] = scenario.script().road_friction[0, 1]
+    commands["road_friction"] = script.road_friction[0, 1]
     demand = new_record(DEMAND)
     demand["pressure_age"] = demand["motor_age"] = math.inf
     return Vehicle(
-        scenario.script(),
+        script,
         params,
         new_state(params, scenario.initial_speed, scenario.initial_disc_temperature),
         new_record(DRIVER),
         demand,
         commands,
-        new_record(MEASURED),
-        scenario.vehicle_speed,
-        scenario.wheel_transducers,
+        _sensors(scenario, plant, seed),
+        new_sensing(),
+        np.empty(len(SIGNALS)),
+        scenario.vehicle_speed == "gnss",
     )
 
 
@@ -108,35 +131,28 @@ def new_noise(seed: int) -> Generator:
 @kernel
 def sense(vehicle: Vehicle, noise: Generator, values: NDArray[np.float64]) -> None:
     """Write what the vehicle sends now into `values`, shape (N_INPUTS,); NaN: not available."""
-    state, driver, measured = vehicle.state[0], vehicle.driver[0], vehicle.measured[0]
+    state, driver, measured = vehicle.state[0], vehicle.driver[0], vehicle.measured
     grade = grade_now(vehicle.script, state)
-    measure(vehicle.params[0], state, grade, noise, measured)
+    steering = vehicle.commands[0].steering_angle
+    true_readings(vehicle.params[0], state, grade, steering, vehicle.speed_over_ground, measured)
+    disturb(vehicle.sensors, vehicle.sensing, state.t, noise, measured)
     values[:] = np.nan
-    values[signals.ACCEL_X] = measured.accel_x
-    values[signals.ACCEL_Y] = measured.accel_y
-    values[signals.YAW_RATE] = measured.yaw_rate
+    for i in range(len(measured)):
+        values[SENSED[i]] = measured[i]
     values[signals.PEDAL_POSITION] = driver.pedal_position
     values[signals.PEDAL_PRESSED] = 1.0 if driver.pedal_position > PRESSED_FROM else 0.0
     values[signals.DECEL_DEMAND] = driver.decel_demand
     values[signals.DECEL_DEMAND_VALID] = driver.decel_demand_valid
     values[signals.ACCELERATOR_POSITION] = driver.accelerator_position
     values[signals.REVERSE] = values[signals.ABS_ACTIVE] = values[signals.ESP_ACTIVE] = 0.0
-    values[signals.STEERING_ANGLE] = vehicle.commands[0].steering_angle
     values[signals.ACCUMULATOR_PRESSURE] = 1e-5 * vehicle.params[0].pressure_limit
     values[signals.HYDRAULIC_READY] = 1.0
     values[signals.AMBIENT_TEMPERATURE] = vehicle.script.ambient_temperature
-    values[RAIN] = 0.0
-    if vehicle.speed_sent:
-        values[signals.VEHICLE_SPEED] = measured.vehicle_speed
+    values[RAIN] = 1.0 if vehicle.script.wetness > 0.0 else 0.0
+    if not np.isnan(values[signals.VEHICLE_SPEED]):
         values[signals.VEHICLE_SPEED_VALID] = 1.0
     for i in range(4):
-        values[signals.WHEEL_SPEED + i] = measured.wheel_speed[i]
-        values[signals.CALLIPER_PRESSURE + i] = measured.calliper_pressure[i]
-        values[signals.MOTOR_TORQUE + i] = state.motor_torque[i]
         values[signals.MOTOR_LIMIT + i] = state.motor_limit[i]
-        if vehicle.transducers_sent:
-            values[WHEEL_FORCE_X + i] = measured.wheel_force_x[i]
-            values[WHEEL_TORQUE_Y + i] = measured.wheel_torque_y[i]
 
 
 @kernel
@@ -183,6 +199,10 @@ def write_truth(vehicle: Vehicle, row: NDArray[np.float64]) -> None:
     row[8] = driver.pedal_position
     row[9] = friction_now(vehicle.script, state)
     row[10] = grade
+    row[11] = state.position_x
+    row[12] = state.position_y
+    row[13] = state.heading
+    row[14] = driver.steering_angle
     for i in range(4):
         corner = _FIRST_CORNER + i
         row[corner] = state.mu_b[i]

@@ -76,7 +76,7 @@ def test_page_names_config_seeds_and_every_figure(
     (tmp_path / "config").mkdir()
     (tmp_path / "config" / "suv.toml").write_bytes(resource("config/suv.toml").read_bytes())
     monkeypatch.setattr(command, "resource", lambda name: tmp_path / name)
-    monkeypatch.setattr(command.stops_bench, "stops", lambda config, progress: result)
+    monkeypatch.setattr(command.stops_bench, "stops", lambda config, spread: result)
     assert command.bench("stops", json=False) == 0
     page = (tmp_path / "docs" / "observer-accuracy.md").read_text(encoding="utf-8")
     assert "config/suv.toml" in page

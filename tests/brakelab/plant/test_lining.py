@@ -94,7 +94,7 @@ def test_torque_counts_both_faces_above_the_push_out_pressure(suv: Plant) -> Non
 def test_a_disc_that_brakes_steadily_reaches_the_closed_form(suv: Plant, wetness: float) -> None:
     params, state = nominal(suv)[0], new_record(STATE)[0]
     torque, spin, speed, seconds = 800.0, 60.0, 22.0, 20.0
-    state["brake_torque"], state["wheel_speed"], state["speed_x"] = torque, spin, speed
+    state["brake_work"], state["speed_x"] = torque * spin * DT, speed
     state["disc_temperature"] = 100.0
     for _ in range(round(seconds / DT)):
         advance_disc_temperature(params, state, 20.0, wetness, DT)

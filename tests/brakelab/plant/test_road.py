@@ -8,7 +8,7 @@ import pytest
 
 from brakelab.plant.driver import Script, friction_now, grade_now
 from brakelab.plant.records import PHASE
-from brakelab.plant.road import LEVEL, Road, at_place, set_road
+from brakelab.plant.road import LEVEL, Road, set_road, value_at
 from brakelab.plant.vehicle import STEP, advance
 
 FRONT, REAR = 1.29, 1.375
@@ -36,7 +36,7 @@ def test_tables_are_linear_between_rows_and_constant_outside(rows: int) -> None:
     for place in (*np.linspace(-5.0, table[-1, 0] + 5.0, 200), *table[:, 0]):
         for column in (1, 2):
             expected = np.interp(place, table[:, 0], table[:, column])
-            assert at_place(table, place, column) == pytest.approx(expected)
+            assert value_at(table, place, column) == pytest.approx(expected)
 
 
 def test_each_wheel_meets_a_patch_when_it_gets_there(car_at: Callable[[float], Any]) -> None:

@@ -16,10 +16,17 @@ from brakelab.plant.tyre import (
     relaxation_rate,
     rolling_radius,
     steady_forces,
+    stiffnesses,
 )
 from brakelab.plant.wheel import advance_wheel
 
 RADIUS, STIFFNESS = 0.3706, 2.6e5
+
+
+def forces_of(tyre: Any, load: float, road: float, slip: float, angle: float) -> tuple[float, float, float]:
+    """Steady forces of the front left tyre under `load` on a road's friction."""
+    peak = degressive(road, tyre["friction_degression"], load, tyre["nominal_load"][0])
+    return steady_forces(tyre, *stiffnesses(tyre, 0, load), peak, slip, angle)
 
 
 def test_an_unloaded_tyre_rolls_on_its_free_radius() -> None:
@@ -51,7 +58,7 @@ def tyre(suv: Plant) -> Any:
 def test_slip_stiffness_is_the_slope_at_the_origin_on_every_road(tyre: Any) -> None:
     load = float(tyre["nominal_load"][0])
     for road in (1.2, 0.7, 0.2):
-        force, _, _ = steady_forces(tyre, 0, load, road, -1e-5, 0.0)
+        force, _, _ = forces_of(tyre, load, road, -1e-5, 0.0)
         assert force / -1e-5 == pytest.approx(22.0 * load, rel=1e-3)
 
 
@@ -69,7 +76,7 @@ def test_friction_and_stiffness_grow_less_than_load() -> None:
 def test_force_stays_within_kamms_circle_and_has_the_sign_of_its_slip(
     tyre: Any, slip: float, angle: float, load: float, road: float
 ) -> None:
-    along, across, _ = steady_forces(tyre, 0, load, road, slip, angle)
+    along, across, _ = forces_of(tyre, load, road, slip, angle)
     peak = degressive(road, tyre["friction_degression"], load, tyre["nominal_load"][0])
     assert math.hypot(along, across) <= peak * (1 + 1e-9)
     assert along * slip >= 0.0
@@ -77,8 +84,8 @@ def test_force_stays_within_kamms_circle_and_has_the_sign_of_its_slip(
 
 
 def test_side_slip_costs_braking_force(tyre: Any) -> None:
-    straight, _, _ = steady_forces(tyre, 0, 5000.0, 1.2, -0.05, 0.0)
-    turning, _, _ = steady_forces(tyre, 0, 5000.0, 1.2, -0.05, 0.10)
+    straight, _, _ = forces_of(tyre, 5000.0, 1.2, -0.05, 0.0)
+    turning, _, _ = forces_of(tyre, 5000.0, 1.2, -0.05, 0.10)
     assert straight < turning < 0.0
 
 
@@ -97,7 +104,7 @@ def test_side_force_builds_up_over_the_relaxation_length(
     dt = 1e-3
     for _ in range(round(length / speed / dt)):
         advance_wheel(car.params[0], car.now, 0, speed, -0.002 * speed, 1.2, dt)
-    steady = steady_forces(car.params[0], 0, car.now["wheel_load"][0], 1.2, 0.0, 0.002)[1]
+    steady = forces_of(car.params[0], car.now["wheel_load"][0], 1.2, 0.0, 0.002)[1]
     assert car.now["force_y"][0] == pytest.approx((1 - math.exp(-1)) * steady, rel=0.04)
 
 
@@ -132,13 +139,11 @@ def test_a_car_may_have_burckhardts_tyres(car_at: Callable[[float], Any]) -> Non
     params["burckhardt_fall"] = 0.406
     tyre, load = params[0], float(params["nominal_load"][0, 0])
     for road in (1.2, 0.7, 0.2):
-        assert steady_forces(tyre, 0, load, road, -1e-6, 0.0)[0] / -1e-6 == pytest.approx(
-            22.0 * load, rel=1e-3
-        )
-        forces = [-steady_forces(tyre, 0, load, road, -0.001 * k, 0.0)[0] for k in range(1, 1001)]
+        assert forces_of(tyre, load, road, -1e-6, 0.0)[0] / -1e-6 == pytest.approx(22.0 * load, rel=1e-3)
+        forces = [-forces_of(tyre, load, road, -0.001 * k, 0.0)[0] for k in range(1, 1001)]
         assert max(forces) == pytest.approx(road * load, rel=1e-3)
         assert 0.55 < forces[-1] / max(forces) < 0.75
-        both = steady_forces(tyre, 0, load, road, -0.1, 0.2)
+        both = forces_of(tyre, load, road, -0.1, 0.2)
         assert math.hypot(both[0], both[1]) <= road * load * (1 + 1e-5)
 
 

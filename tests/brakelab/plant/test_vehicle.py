@@ -1,4 +1,4 @@
-"""The whole car braking: energy, closed forms, an independent integration, step size, standstill."""
+"""The whole car braking: closed forms, an independent integration, standstill, locked wheels, motors."""
 
 import importlib
 import math
@@ -14,31 +14,6 @@ from brakelab.plant.jit import kernel
 
 MASS, G, BASE, FRONT, REAR, HEIGHT = 2105.0, 9.81, 2.665, 1.29, 1.375, 0.66
 DRAG = 0.5 * 1.2 * 0.35 * 2.32
-
-
-def test_energy_of_a_stop_is_accounted_for(car_at: Callable[[float], Any]) -> None:
-    car = car_at(30.0)
-    car.press(35.0, 35.0)
-    spent = dict.fromkeys(("brakes", "tyres", "drag", "rolling"), 0.0)
-    before = {"speed": 30.0, "spin": car.now["wheel_speed"].copy()}
-    start = 0.5 * MASS * 30.0**2 + 0.5 * 1.6 * float(np.sum(before["spin"] ** 2))
-
-    def account(state: Any) -> None:
-        speed = 0.5 * (before["speed"] + float(state["speed_x"]))
-        spin = 0.5 * (before["spin"] + state["wheel_speed"])
-        radius, load = state["rolling_radius"], state["wheel_load"]
-        spent["brakes"] += 1e-3 * float(np.sum(state["brake_torque"] * spin))
-        spent["tyres"] += 1e-3 * float(np.sum(state["force_x"] * (radius * spin - speed)))
-        spent["drag"] += 1e-3 * DRAG * speed**3
-        spent["rolling"] += 1e-3 * float(np.sum(0.010 * load * radius * spin))
-        before["speed"], before["spin"] = float(state["speed_x"]), state["wheel_speed"].copy()
-
-    while car.now["speed_x"] > 1.0:
-        car.run(0.01, watch=account)
-    left = 0.5 * MASS * before["speed"] ** 2 + 0.5 * 1.6 * float(np.sum(before["spin"] ** 2))
-    assert sum(spent.values()) == pytest.approx(start - left, rel=0.005)
-    assert all(energy > 0.0 for energy in spent.values())
-    assert spent["brakes"] > 0.9 * start
 
 
 @pytest.mark.parametrize(("front_bar", "rear_bar"), [(15.0, 15.0), (35.0, 50.0), (60.0, 60.0)])
@@ -118,19 +93,6 @@ def test_a_stop_agrees_with_an_independent_integration(
     assert np.max(np.abs(found[:, 1:3] - expected[:, 1:3])) < 0.2  # rad/s
     settled = t > 0.5
     assert np.max(np.abs(found[settled, 3:] / expected[settled, 3:] - 1.0)) < 1e-3
-
-
-def test_halving_the_step_changes_the_stopping_distance_by_less_than_a_thousandth(
-    car_at: Callable[[float], Any],
-) -> None:
-    distance = []
-    for dt in (1e-3, 0.5e-3):
-        car = car_at(30.0)
-        car.press(40.0, 40.0)
-        while car.now["speed_x"] > 0.0:
-            car.run(0.01, dt)
-        distance.append(float(car.now["distance"]))
-    assert distance[0] == pytest.approx(distance[1], rel=1e-3)
 
 
 @pytest.mark.parametrize("grade", [-0.1, 0.0, 0.1])

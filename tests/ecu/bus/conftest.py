@@ -7,13 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import settings
 
 from ecu.records import FRAME, RecordArray
-
-# The first call of a kernel compiles it.
-settings.register_profile("kernels", deadline=None)
-settings.load_profile("kernels")
 
 ROOT = Path(__file__).parents[3]
 LINE = re.compile(r"\((\d+)\.(\d{6})\) (\S+) ([0-9A-F]+)#([0-9A-F]*)")

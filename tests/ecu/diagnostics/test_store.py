@@ -1,8 +1,8 @@
-import os
+import itertools
+import multiprocessing
 import random
-import signal
-import subprocess
-import sys
+from contextlib import suppress
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
@@ -137,36 +137,33 @@ def test_it_is_saved_after_each_braking_and_at_most_every_minute(change, later_s
     assert is_due(keeper, learned(**{"brakings": 1, **change}), 100.0 + later_s) is due
 
 
-WRITER = """
-import sys
-import numpy as np
-from pathlib import Path
-from ecu.diagnostics.store import open_store, save
-from ecu.records import LEARNED, new_record
-store, record = open_store(Path(sys.argv[1])), new_record(LEARNED)
-record["mu_b"], record["sigma_mu_b"], record["observed_s"], record["radius_sigma"] = 0.4, 0.03, 5.0, 0.002
-for brakings in range(int(sys.argv[2]), 10**9):
-    record["brakings"] = brakings
-    save(store, sys.argv[3], record)
-    print(brakings, flush=True)
-"""
+def write_until_killed(folder: Path, first: int, saved: Connection) -> None:
+    """Save one revision after the other and say which are saved."""
+    store = open_store(folder)
+    for brakings in itertools.count(first):
+        save(store, KEY, learned(brakings))
+        saved.send(brakings)
 
 
 def test_killed_at_fifty_instants_it_opens_and_has_lost_nothing_that_was_saved(tmp_path):
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
+    processes = multiprocessing.get_context("forkserver")
+    processes.set_forkserver_preload([__name__])
     draw = random.Random(20)
     kept = 0
     for _ in range(50):
-        command = [sys.executable, "-c", WRITER, str(tmp_path), str(kept + 1), KEY]
-        writer = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
+        saved, said = processes.Pipe(duplex=False)
+        writer = processes.Process(target=write_until_killed, args=(tmp_path, kept + 1, said))
+        writer.start()
+        said.close()
         for _ in range(draw.randint(1, 20)):  # killed in the middle of whatever follows this line
-            reported = int(writer.stdout.readline())
+            reported = saved.recv()
         for _ in range(draw.randint(0, 20_000)):
             pass
-        writer.send_signal(signal.SIGKILL)
-        rest = writer.stdout.read().split("\n")[:-1]
-        writer.wait()
-        reported = int(rest[-1]) if rest else reported
+        writer.kill()
+        with suppress(EOFError):
+            while True:
+                reported = saved.recv()
+        writer.join()
         with capture_logs() as lines:
             store = open_store(tmp_path)
         kept = int(restore(store, KEY, NOMINAL)[1]["brakings"][0])

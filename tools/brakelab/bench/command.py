@@ -1,7 +1,9 @@
 """`brake-ecu bench`: measures on this machine, beside what else could do the job."""
 
 import json as json_format
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -10,6 +12,7 @@ from rich.progress import track
 
 from brakelab.bench import codec, cycle, plant, step
 from brakelab.bench import stops as stops_bench
+from brakelab.bench.energy import energy_tables
 from brakelab.bench.friction import friction_tables
 from brakelab.bench.measure import Figure, Row, machine
 from brakelab.bench.table import Table, markdown, show, stop_tables, time_table
@@ -30,6 +33,12 @@ FRICTION: Final = "friction"
 FRICTION_TEXT: Final = (
     "What the friction laws of tools/brakelab/plant/friction, the disc and the brake unit of the simulated "
     "vehicle reproduce of the thesis, on the simulated dynamometer. Numbers: config/plant/linings.toml."
+)
+
+ENERGY: Final = "energy"
+ENERGY_TEXT: Final = (
+    "Every scenario of config/scenarios in closed loop with the ECU of config/suv.toml. The simulated "
+    "vehicle sums what leaves and enters in its own steps (tools/brakelab/plant/energy.py)."
 )
 
 
@@ -74,19 +83,16 @@ BENCHES: Final = {
 def bench(name: str | None, json: bool) -> int:
     """Run one bench, or without a name all that measure time; print tables, or JSON. Returns 0.
 
-    In a checkout, a run of all times renews docs/benchmarks.md, `stops` docs/observer-accuracy.md and
-    `friction` docs/friction.md.
+    In a checkout, a run of all times renews docs/benchmarks.md, `stops` docs/observer-accuracy.md,
+    `friction` docs/friction.md and `energy` docs/energy.md.
 
     Raises:
         UserError: there is no such bench.
     """
-    if name is not None and name not in (*BENCHES, STOPS, FRICTION):
-        raise UserError(
-            "bench", name, f"no such bench; choose one of {', '.join((*BENCHES, STOPS, FRICTION))}"
-        )
-    if name == STOPS:
-        return _stops(json)
-    return _friction(json) if name == FRICTION else _times(name, json)
+    others = {STOPS: _stops, FRICTION: _friction, ENERGY: _energy}
+    if name is not None and name not in (*BENCHES, *others):
+        raise UserError("bench", name, f"no such bench; choose one of {', '.join((*BENCHES, *others))}")
+    return others[name](json) if name in others else _times(name, json)
 
 
 def _times(name: str | None, json: bool) -> int:
@@ -107,9 +113,15 @@ def _stops(json: bool) -> int:
     path = resource("config/suv.toml")
     config = load_config(path)
     console = Console(stderr=True)
-    result = stops_bench.stops(
-        config, progress=lambda items: track(items, description="stops", console=console, transient=True)
-    )
+    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+
+        def all_cores(
+            drive: stops_bench.Case, cases: list[stops_bench.Named]
+        ) -> Iterable[stops_bench.Result]:
+            results = pool.map(drive, cases)
+            return track(results, "stops", len(cases), console=console, transient=True)
+
+        result = stops_bench.stops(config, spread=all_cores)
     seeds = stops_bench.SEEDS
     of = f"version {__version__}, config/{path.name} ({config_hash(config)[:12]}), seeds 0–{seeds - 1}"
     if json:
@@ -124,13 +136,21 @@ def _stops(json: bool) -> int:
 
 
 def _friction(json: bool) -> int:
-    tables = friction_tables()
-    of = f"`brake-ecu bench friction`, version {__version__}"
+    return _page(FRICTION, "Friction laws, disc and brake unit", FRICTION_TEXT, friction_tables(), json)
+
+
+def _energy(json: bool) -> int:
+    tables = energy_tables(resource("config/scenarios"), load_config(resource("config/suv.toml")))
+    return _page(ENERGY, "Where the energy goes", ENERGY_TEXT, tables, json)
+
+
+def _page(name: str, title: str, text: str, tables: list[Table], json: bool) -> int:
+    of = f"`brake-ecu bench {name}`, version {__version__}"
     if json:
         _print_json({"of": of, "tables": [table._asdict() for table in tables]})
         return 0
     _print_tables(of, tables)
-    _write("friction.md", "Friction laws, disc and brake unit", f"{of}. {FRICTION_TEXT}", tables)
+    _write(f"{name}.md", title, f"{of}. {text}", tables)
     return 0
 
 

@@ -10,6 +10,7 @@ compensation  mean of |achieved - wanted| / wanted; wanted is the demand, or wha
 """
 
 from collections.abc import Callable, Iterable
+from functools import partial
 from itertools import product
 from typing import Final, NamedTuple
 
@@ -79,7 +80,9 @@ class _Stop(NamedTuple):
 
 def _brake(test: int, speed_known: bool, config: Config, seed: int, ideal: bool = False) -> _Stop:
     scenario = load_scenario(resource(f"config/scenarios/stop-{test}.toml"))
-    loop = new_loop(scenario.model_copy(update={"vehicle_speed": speed_known}), config, seed)
+    loop = new_loop(
+        scenario.model_copy(update={"vehicle_speed": "ideal" if speed_known else "none"}), config, seed
+    )
     mass = float(loop.sides.vehicle.params["mass"][0])
     drive = run(loop, ideal)
     truth = drive.truth
@@ -149,10 +152,14 @@ def _one_car(test: int, speed_known: bool, config: Config, seed: int) -> _Seed:
     )
 
 
-def case_result(
-    test: int, speed_known: bool, config: Config, seeds: int
-) -> tuple[list[Friction], Compensation]:
+Named = tuple[bool, int]
+"""With or without `vehicle_speed`, and the number of a test."""
+Result = tuple[list[Friction], Compensation]
+
+
+def case_result(config: Config, seeds: int, case: Named) -> Result:
     """Drive one test with cars 0 to `seeds` - 1; figures are median, least and greatest over them."""
+    speed_known, test = case
     cars = [_one_car(test, speed_known, config, seed) for seed in range(seeds)]
     friction = []
     for axle in AXLES:
@@ -164,17 +171,17 @@ def case_result(
     return friction, Compensation(test, speed_known, *map(figure, errors_of))
 
 
-Progress = Callable[[list[tuple[bool, int]]], Iterable[tuple[bool, int]]]
-"""Hands on what it is given and may show how far it is."""
+Case = Callable[[Named], Result]
+Spread = Callable[[Case, list[Named]], Iterable[Result]]
+"""As `map` does it: results in the order of the cases, which may be driven side by side."""
 
 
-def stops(
-    config: Config, seeds: int = SEEDS, tests: tuple[int, ...] = TESTS, progress: Progress = list
-) -> Stops:
+def stops(config: Config, seeds: int = SEEDS, tests: tuple[int, ...] = TESTS, spread: Spread = map) -> Stops:
     """Drive all tests with and without `vehicle_speed` and return their results."""
     result = Stops([], [])
-    for speed_known, test in progress(list(product((True, False), tests))):
-        friction, compensation = case_result(test, speed_known, config, seeds)
+    for friction, compensation in spread(
+        partial(case_result, config, seeds), list(product((True, False), tests))
+    ):
         result.friction.extend(friction)
         result.compensation.append(compensation)
     return result

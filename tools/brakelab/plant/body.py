@@ -74,7 +74,10 @@ def tyre_forces(params: Record, state: Record, steering_angle: float) -> tuple[f
 def advance_planar(
     params: Record, state: Record, steering_angle: float, grade: float, bank: float, dt: float
 ) -> None:
-    """Move speed, yaw rate and distance on by `dt` [s] under the tyre forces (A.1, corrected)."""
+    """Move speed, yaw rate and place on by `dt` [s] under the tyre forces (A.1, corrected).
+
+    The axes turn with the car at its mean yaw rate, trapezoidal: turning alone changes no energy.
+    """
     force_x, force_y, moment = tyre_forces(params, state, steering_angle)
     drag = params.drag_factor * state.speed_x * abs(state.speed_x)
     state.accel_x = (force_x - drag) / params.mass
@@ -82,12 +85,26 @@ def advance_planar(
     state.yaw_accel = moment / params.yaw_inertia
     state.bank = bank
 
-    old_speed = state.speed_x
+    uphill = GRAVITY * math.sin(grade)
     sideways = GRAVITY * math.cos(grade) * math.sin(bank)
-    state.speed_x += dt * (state.accel_x + state.yaw_rate * state.speed_y - GRAVITY * math.sin(grade))
-    state.speed_y += dt * (state.accel_y - state.yaw_rate * old_speed - sideways)
+    old_x, old_y, old_rate = state.speed_x, state.speed_y, state.yaw_rate
     state.yaw_rate += dt * state.yaw_accel
-    state.distance += 0.5 * dt * (old_speed + state.speed_x)
+    half_turn = 0.25 * dt * (old_rate + state.yaw_rate)
+    x = old_x + half_turn * old_y + dt * (state.accel_x - uphill)
+    y = old_y - half_turn * old_x + dt * (state.accel_y - sideways)
+    state.speed_x = (x + half_turn * y) / (1.0 + half_turn * half_turn)
+    state.speed_y = (y - half_turn * x) / (1.0 + half_turn * half_turn)
+
+    forward, left = 0.5 * dt * (old_x + state.speed_x), 0.5 * dt * (old_y + state.speed_y)
+    turned = 0.5 * dt * (old_rate + state.yaw_rate)
+    state.distance += forward
+    state.heading += turned
+    sine, cosine = math.sin(state.heading), math.cos(state.heading)
+    state.position_x += forward * cosine - left * sine
+    state.position_y += forward * sine + left * cosine
+    state.drag_loss += drag * forward
+    state.lifted += params.mass * (uphill * forward + sideways * left)
+    state.tyre_work -= force_x * forward + force_y * left + moment * turned
 
 
 @kernel

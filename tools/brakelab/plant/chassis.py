@@ -81,6 +81,18 @@ def tyre_load(params: Record, wheel: int, height: float) -> float:
 
 
 @kernel
+def raise_road(params: Record, state: Record, commands: Record) -> None:
+    """Take over the heights under the wheels, and the work [J] that they do on the tyres at once."""
+    for wheel in range(4):
+        height = commands.road_height[wheel]
+        if height != state.road_height[wheel]:
+            before = tyre_load(params, wheel, state.unsprung_height[wheel] - state.road_height[wheel])
+            after = tyre_load(params, wheel, state.unsprung_height[wheel] - height)
+            state.road_work += 0.5 * (after**2 - before**2) / params.vertical_stiffness[wheel]
+            state.road_height[wheel] = height
+
+
+@kernel
 def advance_chassis(params: Record, state: Record, commands: Record, dt: float) -> None:
     """Move body and unsprung masses on by `dt` [s] and set the wheel loads at half the step [N]."""
     half = 0.5 * dt
@@ -90,6 +102,7 @@ def advance_chassis(params: Record, state: Record, commands: Record, dt: float) 
     side = 0.5 * params.track
     gravity = GRAVITY * math.cos(commands.grade) * math.cos(commands.bank)
     force_x, force_y, _ = tyre_forces(params, state, commands.steering_angle)
+    raise_road(params, state, commands)
 
     state.heave += half * state.heave_rate
     state.pitch += half * state.pitch_rate
@@ -104,6 +117,8 @@ def advance_chassis(params: Record, state: Record, commands: Record, dt: float) 
     raised = state.heave + params.cog_height * (2.0 - pitch_cosine - roll_cosine)
 
     lift = 0.0
+    damped = 0.0
+    rising = 0.0
     pitch_moment = 0.0
     roll_moment = 0.0
     for axle in range(2):
@@ -121,21 +136,30 @@ def advance_chassis(params: Record, state: Record, commands: Record, dt: float) 
             travel = travel_left if wheel == left else travel_right
             rate = state.unsprung_rate[wheel] + half * state.unsprung_accel[wheel]
             rate -= mount_rate + (sign * side * roll_cosine + roll_lean) * roll_speed
-            strut = spring_force(params, wheel, travel) + damper_force(params, wheel, rate) + sign * bar
-            load = tyre_load(params, wheel, state.unsprung_height[wheel] - commands.road_height[wheel])
+            damping = damper_force(params, wheel, rate)
+            strut = spring_force(params, wheel, travel) + damping + sign * bar
+            load = tyre_load(params, wheel, state.unsprung_height[wheel] - state.road_height[wheel])
+            old_rate = state.unsprung_rate[wheel]
             state.wheel_load[wheel] = load
             state.unsprung_accel[wheel] = (load - strut) / params.unsprung_mass[wheel] - gravity
             state.unsprung_rate[wheel] += dt * state.unsprung_accel[wheel]
             state.unsprung_height[wheel] += half * state.unsprung_rate[wheel]
+            damped += damping * rate
+            rising += params.unsprung_mass[wheel] * (old_rate + state.unsprung_rate[wheel])
             lift += strut
             pitch_moment -= (along * pitch_cosine - pitch_lean) * strut
             roll_moment += (sign * side * roll_cosine + roll_lean) * strut
     state.heave_accel = lift / body_mass - gravity
     state.pitch_accel = (pitch_moment - params.cog_height * force_x) / params.pitch_inertia
     state.roll_accel = (roll_moment + params.cog_height * force_y) / params.roll_inertia
+    old_heave, old_pitch, old_roll = state.heave_rate, state.pitch_rate, state.roll_rate
     state.heave_rate += dt * state.heave_accel
     state.pitch_rate += dt * state.pitch_accel
     state.roll_rate += dt * state.roll_accel
+    state.damper_heat += dt * damped
+    state.lifted += gravity * half * (rising + body_mass * (old_heave + state.heave_rate))
+    swung_back, swung_left = half * (old_pitch + state.pitch_rate), half * (old_roll + state.roll_rate)
+    state.tyre_work += params.cog_height * (force_x * swung_back - force_y * swung_left)
     state.heave += half * state.heave_rate
     state.pitch += half * state.pitch_rate
     state.roll += half * state.roll_rate

@@ -6,10 +6,9 @@ their own: equal pressure on all wheels in proportion to the driver's demand, wi
 
 from typing import Final
 
-from brakelab.plant.driver import Script, at_time
+from brakelab.plant.driver import Script
 from brakelab.plant.jit import Record, kernel
-from brakelab.plant.records import BRAKE
-from brakelab.plant.road import set_road
+from brakelab.plant.road import set_road, value_at
 from brakelab.plant.vehicle import STEP, advance
 
 CYCLE: Final = 0.010  # s
@@ -26,8 +25,7 @@ def set_commands(
     """Set what the actuators do in the coming cycle, and the road as far as it is described by time."""
     heard = demand.pressure_valid == 1 and demand.pressure_age < DEMAND_TIMEOUT
     decel = max(driver.decel_demand, 0.01 * driver.pedal_position * FULL_PEDAL_DECEL)
-    braking = script.phases[driver.phase].kind == BRAKE
-    blended = script.blending and braking and demand.motor_valid == 1
+    blended = script.blending and driver.braking == 1 and demand.motor_valid == 1
     blended = blended and demand.motor_age < DEMAND_TIMEOUT
     for wheel in range(4):
         fallback = params.fallback_gain * decel
@@ -35,9 +33,11 @@ def set_commands(
             fallback += params.push_out_pressure[wheel]
         commands.pressure_demand[wheel] = BAR * demand.pressure[wheel] if heard else fallback
         commands.motor_demand[wheel] = demand.motor[wheel] if blended else driver.motor_demand[wheel]
-    commands.road_friction[:] = at_time(script.road_friction, state.t)
-    commands.grade = at_time(script.grade, state.t)
+    commands.steering_angle = driver.steering_angle
+    commands.road_friction[:] = value_at(script.road_friction, state.t, 1)
+    commands.grade = value_at(script.grade, state.t, 1)
     commands.ambient_temperature = script.ambient_temperature
+    commands.wetness = script.wetness
 
 
 @kernel
@@ -49,6 +49,9 @@ def move(
     `demand` is what was understood of the ECU up to now; its ages grow by a cycle.
     """
     set_commands(script, params, state, driver, demand, commands)
+    if round(state.t / CYCLE) == script.fault_cycle:
+        for wheel in range(4):
+            params.slip_stiffness[wheel] *= script.fault_stiffness
     for _ in range(STEPS):
         set_road(script.road, params, state, commands)
         advance(params, state, commands, STEP)

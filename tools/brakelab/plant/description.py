@@ -15,6 +15,7 @@ from brakelab.plant.friction.laws import law_row
 from brakelab.plant.linings import VEHICLE_LAW, Lining, Linings, rig_with
 from brakelab.plant.records import DAMPER_KNOTS, GRAVITY, PARAMS, RecordArray, new_record
 from brakelab.plant.rig import nominal_friction
+from brakelab.plant.sensor_errors import SensorFile
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 AIR_DENSITY: Final = 1.2  # kg/m^3
@@ -141,10 +142,6 @@ class Motor(Section):
         return self
 
 
-class Sensor(Section):
-    position: tuple[float, float, float]
-
-
 class VehicleFile(Section):
     body: Body
     attitude: Attitude | None = None
@@ -154,7 +151,7 @@ class VehicleFile(Section):
     brake_rear: Brake
     hydraulics: Hydraulics
     motor: Motor
-    sensor: Sensor
+    sensor: SensorFile
 
     @model_validator(mode="after")
     def _one_chassis(self) -> "VehicleFile":

@@ -47,12 +47,13 @@ def advance_disc_temperature(
 ) -> None:
     """Heat the discs by the friction power of this step and cool them by the air [degC] (3.7)."""
     for wheel in range(4):
+        state.brake_heat[wheel] += state.brake_work[wheel]
         cooling = cooling_rate(params.cooling[wheel], params.cooling_by_speed[wheel], state.speed_x, wetness)
         state.disc_temperature[wheel] = disc_step(
             state.disc_temperature[wheel],
             params.heating[wheel],
             cooling,
-            state.brake_torque[wheel] * abs(state.wheel_speed[wheel]),
+            state.brake_work[wheel] / dt,
             ambient,
             dt,
         )

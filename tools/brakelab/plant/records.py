@@ -14,6 +14,7 @@ RecordArray = NDArray[np.void]
 
 GRAVITY: Final = 9.81  # m/s^2
 HISTORY: Final = 64  # samples of demand that a dead time can look back: 32 ms at steps of 0.5 ms
+LOOK_BACK: Final = 64  # cycles that a delayed sensor can look back: 0.64 s
 DAMPER_KNOTS: Final = 7  # of a damper's force over speed
 
 # What one car is: nominal or drawn.
@@ -111,6 +112,9 @@ STATE: Final = np.dtype(
         # integrated
         ("t", "f8"),
         ("distance", "f8"),  # m, along the car's axis
+        ("position_x", "f8"),  # m, of the centre of gravity over the ground; at the start 0
+        ("position_y", "f8"),
+        ("heading", "f8"),  # rad, of the car's axis over the ground, to the left
         ("speed_x", "f8"),  # m/s, of the centre of gravity
         ("speed_y", "f8"),
         ("yaw_rate", "f8"),  # rad/s
@@ -138,6 +142,17 @@ STATE: Final = np.dtype(
         ("roll_rate", "f8"),
         ("unsprung_height", "f8", (4,)),  # m
         ("unsprung_rate", "f8", (4,)),
+        ("road_height", "f8", (4,)),  # m under each wheel
+        # J since the start, see energy.py
+        ("brake_heat", "f8", (4,)),
+        ("tyre_work", "f8"),  # into the tyres: slip and what their carcasses store
+        ("drag_loss", "f8"),
+        ("rolling_loss", "f8"),
+        ("damper_heat", "f8"),
+        ("regenerated", "f8"),  # into the motors
+        ("driven", "f8"),  # out of the motors
+        ("lifted", "f8"),  # against gravity
+        ("road_work", "f8"),  # of the road's heights on the tyres
         # follows from these
         ("accel_x", "f8"),  # m/s^2, specific force at the centre of gravity, road axes
         ("accel_y", "f8"),
@@ -156,22 +171,39 @@ STATE: Final = np.dtype(
         ("slip_angle", "f8", (4,)),  # -, tangent
         ("mu_b", "f8", (4,)),  # -
         ("brake_torque", "f8", (4,)),  # N m, magnitude
+        ("brake_work", "f8", (4,)),  # J, of friction in the last step
         ("motor_limit", "f8", (4,)),  # N m that can be regenerated now
     ],
     align=True,
 )
 
-# What the sensors say; pressure in bar as the signal has it.
-MEASURED: Final = np.dtype(
+# One sensor of one car, in the unit of its signal; see sensor_errors.py.
+SENSOR: Final = np.dtype(
     [
-        ("wheel_speed", "f8", (4,)),
-        ("accel_x", "f8"),
-        ("accel_y", "f8"),
-        ("yaw_rate", "f8"),
-        ("calliper_pressure", "f8", (4,)),  # bar
-        ("vehicle_speed", "f8"),
-        ("wheel_force_x", "f8", (4,)),
-        ("wheel_torque_y", "f8", (4,)),
+        ("noise", "f8"),  # standard deviation
+        ("resolution", "f8"),
+        ("delay", "f8"),  # cycles
+        ("bias", "f8"),
+        ("drift_step", "f8"),  # standard deviation of what a cycle adds
+        ("drift_decay", "f8"),  # of what was there, in a cycle
+        ("dropout_begin", "f8"),  # probability per sample
+        ("dropout_end", "f8"),
+        ("period", "f8"),  # s
+        ("stuck_from", "f8"),  # s
+        ("lost_from", "f8"),  # s
+    ],
+    align=True,
+)
+
+# What that sensor remembers.
+SENSING: Final = np.dtype(
+    [
+        ("history", "f8", (LOOK_BACK,)),  # true values by cycle
+        ("cycle", "i8"),  # of the newest
+        ("drift", "f8"),
+        ("sample", "i8"),  # number of the last one, where there is a period
+        ("dropped", "u1"),
+        ("held", "f8"),  # value of the last sample
     ],
     align=True,
 )
@@ -179,18 +211,20 @@ MEASURED: Final = np.dtype(
 # What the driver does in one phase of a script.
 PHASE: Final = np.dtype(
     [
-        ("kind", "i8"),  # CRUISE, COAST or BRAKE
+        ("kind", "i8"),  # CRUISE, COAST, BRAKE or FOLLOW
         ("speed", "f8"),  # m/s, to be held on the motors
         ("accel", "f8"),  # m/s^2, largest acceleration on the way to that speed
-        ("decel", "f8"),  # m/s^2, asked for as a deceleration demand; NaN: by the pedal
-        ("pedal", "f8"),  # %
+        ("decel", "f8"),  # m/s^2, asked for as a deceleration demand, or NaN
+        ("pedal", "f8"),  # %, or NaN
+        ("kept_decel", "f8"),  # m/s^2, to be reached and kept by the pedal, or NaN
         ("ramp", "f8"),  # m/s^3, of the deceleration demand
+        ("pedal_rate", "f8"),  # %/s
         ("until_speed", "f8"),  # m/s; the phase ends when the speed passes it; NaN: never
         ("seconds", "f8"),  # s; the phase ends after this time; inf: never
     ],
     align=True,
 )
-CRUISE, COAST, BRAKE = range(3)
+CRUISE, COAST, BRAKE, FOLLOW = range(4)
 
 # What the driver does now.
 DRIVER: Final = np.dtype(
@@ -198,11 +232,15 @@ DRIVER: Final = np.dtype(
         ("phase", "i8"),  # place in the script; beyond its end: finished
         ("started", "u1"),
         ("above", "u1"),  # the phase began above its `until_speed`
+        ("braking", "u1"),
         ("elapsed", "f8"),  # s, in this phase
-        ("decel_demand", "f8"),  # m/s^2
+        ("correction", "f8"),  # m/s^2, what the driver has found to be missing
+        ("asked_decel", "f8"),  # m/s^2, of brakes and motors together
+        ("decel_demand", "f8"),  # m/s^2, of the brakes
         ("decel_demand_valid", "f8"),
         ("pedal_position", "f8"),  # %
         ("accelerator_position", "f8"),  # %
+        ("steering_angle", "f8"),  # rad at the road wheel, left positive
         ("motor_demand", "f8", (4,)),  # N m at the wheel, positive brakes
     ],
     align=True,

@@ -31,22 +31,25 @@ LEVEL: Final = Road(np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 2)), np.emp
 
 
 @kernel
-def at_place(table: NDArray[np.float64], distance: float, column: int) -> float:
-    """Return a column's value at `distance` [m]: linear between rows, constant outside; needs a row."""
+def value_at(table: NDArray[np.float64], place: float, column: int) -> float:
+    """Return a column's value at `place` of the rising first one: linear between rows, constant outside.
+
+    The table, shape (n, columns), needs a row; the first column is a distance [m] or a time [s].
+    """
     low, high = 0, len(table) - 1
     first: float = table[low, column]
     last: float = table[high, column]
-    if distance <= table[low, 0]:
+    if place <= table[low, 0]:
         return first
-    if distance >= table[high, 0]:
+    if place >= table[high, 0]:
         return last
     while high - low > 1:
         middle = (low + high) // 2
-        if table[middle, 0] <= distance:
+        if table[middle, 0] <= place:
             low = middle
         else:
             high = middle
-    part = (distance - table[low, 0]) / (table[high, 0] - table[low, 0])
+    part = (place - table[low, 0]) / (table[high, 0] - table[low, 0])
     value: float = table[low, column] + part * (table[high, column] - table[low, column])
     return value
 
@@ -60,10 +63,10 @@ def set_road(road: Road, params: Record, state: Record, commands: Record) -> Non
             place = state.distance + along
             column = 1 + wheel % 2
             if len(road.friction) > 0:
-                commands.road_friction[wheel] = at_place(road.friction, place, column)
+                commands.road_friction[wheel] = value_at(road.friction, place, column)
             if len(road.height) > 0:
-                commands.road_height[wheel] = at_place(road.height, place, column)
+                commands.road_height[wheel] = value_at(road.height, place, column)
     if len(road.grade) > 0:
-        commands.grade = at_place(road.grade, state.distance, 1)
+        commands.grade = value_at(road.grade, state.distance, 1)
     if len(road.bank) > 0:
-        commands.bank = at_place(road.bank, state.distance, 1)
+        commands.bank = value_at(road.bank, state.distance, 1)

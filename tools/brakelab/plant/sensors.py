@@ -1,29 +1,26 @@
-"""What the car's sensors make of the truth: positions, the body's attitude and white noise.
+"""What the car's sensors make of the truth: positions, the body's attitude and their errors.
 
-Noise: Table 4.1; yaw rate and wheel torque are not in it and are assumptions. The accelerometer is fixed to
-the body: pitched nose down by theta it reads f_x cos(theta) - f_z sin(theta), f being specific force in road
-axes at the sensor's place, so gravity's part on a slope is in the reading. f_z is gravity across the road
-and, with a suspension, the body's heave. Attitude is the model's: lagged gradients or, with a suspension, the
-integrated pitch and roll.
+The accelerometer is fixed to the body: pitched nose down by theta it reads f_x cos(theta) - f_z sin(theta),
+f being specific force in road axes at the sensor's place, so gravity's part on a slope is in the reading. f_z
+is gravity across the road and, with a suspension, the body's heave. Attitude is the model's: lagged gradients
+or, with a suspension, the integrated pitch and roll. Errors: `sensor_errors.py`.
 """
 
 import math
 from typing import Final
 
-from numpy.random import Generator
+import numpy as np
+from numpy.typing import NDArray
 
 from brakelab.plant.jit import Record, kernel
 from brakelab.plant.records import GRAVITY
-
-SPEED_NOISE: Final = 0.027  # m/s (Table 4.1)
-WHEEL_SPEED_NOISE: Final = 0.1  # rad/s (Table 4.1)
-ACCEL_NOISE: Final = 0.01  # m/s^2 (Table 4.1)
-PRESSURE_NOISE: Final = 1.8  # bar (Table 4.1)
-FORCE_NOISE: Final = 10.0  # N (Table 4.1)
-YAW_RATE_NOISE: Final = 0.002  # rad/s. Assumption
-TORQUE_NOISE: Final = 3.5  # N m. Assumption: the force's noise at the lever of the wheel radius
+from brakelab.plant.sensor_errors import SIGNALS, WHEEL_STEMS
 
 PASCAL_TO_BAR: Final = 1e-5
+FIRST_WHEEL: Final = SIGNALS.index("wheel_speed_fl")
+PER_WHEEL: Final = len(WHEEL_STEMS)
+MOTOR_TORQUE: Final = SIGNALS.index("motor_torque_fl")
+STEERING_ANGLE: Final = SIGNALS.index("steering_angle")
 
 
 @kernel
@@ -43,19 +40,27 @@ def body_accelerations(params: Record, state: Record, grade: float) -> tuple[flo
 
 
 @kernel
-def measure(params: Record, state: Record, grade: float, noise: Generator, measured: Record) -> None:
-    """Overwrite `measured` with noisy readings of `state`. The order of the draws is fixed."""
-    accel_x, accel_y = body_accelerations(params, state, grade)
-    measured.accel_x = accel_x + ACCEL_NOISE * noise.standard_normal()
-    measured.accel_y = accel_y + ACCEL_NOISE * noise.standard_normal()
-    measured.yaw_rate = state.yaw_rate + YAW_RATE_NOISE * noise.standard_normal()
-    measured.vehicle_speed = state.speed_x + SPEED_NOISE * noise.standard_normal()
+def true_readings(
+    params: Record,
+    state: Record,
+    grade: float,
+    steering_angle: float,
+    over_ground: bool,
+    readings: NDArray[np.float64],
+) -> None:
+    """Write what faultless sensors read into `readings`, shape (len(SIGNALS),), units of the signals.
+
+    `over_ground`: the speed's magnitude, as a satellite receiver knows it, instead of its part along the car.
+    """
+    readings[0], readings[1] = body_accelerations(params, state, grade)
+    readings[2] = state.yaw_rate
+    readings[3] = math.hypot(state.speed_x, state.speed_y) if over_ground else state.speed_x
     for wheel in range(4):
-        measured.wheel_speed[wheel] = state.wheel_speed[wheel] + WHEEL_SPEED_NOISE * noise.standard_normal()
-        measured.calliper_pressure[wheel] = (
-            PASCAL_TO_BAR * state.pressure[wheel] + PRESSURE_NOISE * noise.standard_normal()
-        )
-        measured.wheel_force_x[wheel] = state.force_x[wheel] + FORCE_NOISE * noise.standard_normal()
+        first = FIRST_WHEEL + PER_WHEEL * wheel
         braking = math.copysign(state.brake_torque[wheel], state.wheel_speed[wheel])
-        torque = -braking - state.motor_torque[wheel]
-        measured.wheel_torque_y[wheel] = torque + TORQUE_NOISE * noise.standard_normal()
+        readings[first] = state.wheel_speed[wheel]
+        readings[first + 1] = PASCAL_TO_BAR * state.pressure[wheel]
+        readings[first + 2] = state.force_x[wheel]
+        readings[first + 3] = -braking - state.motor_torque[wheel]
+        readings[MOTOR_TORQUE + wheel] = state.motor_torque[wheel]
+    readings[STEERING_ANGLE] = steering_angle

@@ -63,26 +63,29 @@ def burckhardt(linear_force: float, stiffness: float, peak: float, fall: float) 
 
 
 @kernel
+def stiffnesses(params: Record, wheel: int, load: float) -> tuple[float, float]:
+    """Return C_L [N] per slip and C_S [N] per tan(alpha) of a wheel under `load` [N]."""
+    nominal = params.nominal_load[wheel]
+    return (
+        degressive(params.slip_stiffness[wheel], params.stiffness_degression, load, nominal),
+        degressive(params.cornering_stiffness[wheel], params.stiffness_degression, load, nominal),
+    )
+
+
+@kernel
 def steady_forces(
-    params: Record, wheel: int, load: float, road_friction: float, slip: float, slip_angle: float
+    params: Record, c_x: float, c_y: float, peak: float, slip: float, slip_angle: float
 ) -> tuple[float, float, float]:
     """Return F_L, F_S [N] in steady state and dF_L/dslip [N] >= 0 as a secant, for slip and tan(alpha)."""
-    nominal = params.nominal_load[wheel]
-    k_x = slip * degressive(params.slip_stiffness[wheel], params.stiffness_degression, load, nominal)
-    k_y = slip_angle * degressive(
-        params.cornering_stiffness[wheel], params.stiffness_degression, load, nominal
-    )
+    k_x, k_y = slip * c_x, slip_angle * c_y
     k = math.hypot(k_x, k_y)
     if k < 1e-9:
-        return k_x, k_y, degressive(params.slip_stiffness[wheel], params.stiffness_degression, load, nominal)
-    peak = degressive(road_friction, params.friction_degression, load, nominal)
-    stiffness = degressive(params.slip_stiffness[wheel], params.stiffness_degression, load, nominal)
+        return k_x, k_y, c_x
     if params.burckhardt_fall > 0.0:
-        share = burckhardt(k, stiffness, peak, params.burckhardt_fall) / k
+        share = burckhardt(k, c_x, peak, params.burckhardt_fall) / k
     else:
         share = magic_formula(k, peak, params.magic_c, params.magic_e) / k
-    secant = share * stiffness
-    return share * k_x, share * k_y, max(secant, 0.0)
+    return share * k_x, share * k_y, max(share * c_x, 0.0)
 
 
 @kernel

@@ -6,7 +6,7 @@ tau F_L' + F_L = F_L(slip) (A.13), slip = (r omega - v_L) / max(r omega, v_L) (A
 Discretisation. Both equations are stiff (r^2 C / (I v) is some 300 1/s at 30 m/s, and at standstill the
 carcass is a spring against the wheel), so they are solved together by the trapezoidal rule, linearised in
 omega. Brake and rolling resistance are Coulomb friction: they can stop the wheel within a step but never
-turn it back.
+turn it back. Work of a step is torque times mean spin, which is just what the spin's energy changes by.
 """
 
 import math
@@ -18,6 +18,7 @@ from brakelab.plant.tyre import (
     relaxation_rate,
     rolling_radius,
     steady_forces,
+    stiffnesses,
 )
 
 
@@ -35,11 +36,9 @@ def advance_wheel(
     reference = max(abs(radius * omega), abs(speed_long), TRANSITION_SPEED)
     slip = (radius * omega - speed_long) / reference
     slip_angle = -speed_lat / max(abs(speed_long), TRANSITION_SPEED)
-    steady_x, steady_y, stiffness = steady_forces(params, wheel, load, friction, slip, slip_angle)
-
-    nominal = params.nominal_load[wheel]
-    c_x = degressive(params.slip_stiffness[wheel], params.stiffness_degression, load, nominal)
-    c_y = degressive(params.cornering_stiffness[wheel], params.stiffness_degression, load, nominal)
+    c_x, c_y = stiffnesses(params, wheel, load)
+    peak = degressive(friction, params.friction_degression, load, params.nominal_load[wheel])
+    steady_x, steady_y, stiffness = steady_forces(params, c_x, c_y, peak, slip, slip_angle)
     gain_x = 1.0 - math.exp(-dt * relaxation_rate(c_x, params.longitudinal_stiffness, speed_long))
     gain_y = 1.0 - math.exp(-dt * relaxation_rate(c_y, params.lateral_stiffness, speed_long))
 
@@ -48,13 +47,27 @@ def advance_wheel(
     mean_force = state.force_x[wheel] + 0.5 * grown
     inertia = params.wheel_inertia[wheel] + 0.5 * dt * radius * grown_per_spin
     free = omega - dt * (state.motor_torque[wheel] + radius * mean_force) / inertia
-    stopping = dt * (state.brake_torque[wheel] + params.rolling_resistance * load * radius) / inertia
+    braking, rolling = state.brake_torque[wheel], params.rolling_resistance * load * radius
+    stopping = dt * (braking + rolling) / inertia
     turning = max(abs(free) - stopping, 0.0)
     new_omega = math.copysign(turning, free)
+    new_force = state.force_x[wheel] + grown + grown_per_spin * (new_omega - omega)
+
+    turned = 0.5 * dt * (omega + new_omega)
+    held_back = 1.0 if abs(free) >= stopping else abs(free) / stopping
+    rubbed = math.copysign(held_back, free) * turned
+    state.brake_work[wheel] = braking * rubbed
+    state.rolling_loss += rolling * rubbed
+    regenerated = state.motor_torque[wheel] * turned
+    if regenerated > 0.0:
+        state.regenerated += regenerated
+    else:
+        state.driven -= regenerated
+    state.tyre_work += 0.5 * radius * (state.force_x[wheel] + new_force) * turned
 
     state.rolling_radius[wheel] = radius
     state.wheel_speed[wheel] = new_omega
-    state.force_x[wheel] += grown + grown_per_spin * (new_omega - omega)
+    state.force_x[wheel] = new_force
     state.force_y[wheel] += gain_y * (steady_y - state.force_y[wheel])
     state.slip[wheel] = (radius * new_omega - speed_long) / max(
         abs(radius * new_omega), abs(speed_long), TRANSITION_SPEED
