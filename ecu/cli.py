@@ -135,8 +135,9 @@ def replay(
     out: Annotated[Path, typer.Option("--out", metavar="RESULT.parquet", help="Results, one row per 10 ms")],
     map: Map = None,
     observer: Annotated[
-        str, typer.Option("--observer", metavar="OBSERVER", help="Friction observer: observer2")
-    ] = "observer2",
+        str | None,
+        typer.Option("--observer", metavar="OBSERVER", help="joint, observer1, observer2; default: CONFIG's"),
+    ] = None,
     state: State = None,
     cycles: Annotated[
         Path | None,

@@ -10,14 +10,14 @@ import math
 import tomllib
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from ecu.errors import UserError
 from ecu.estimation.tyre import rolling_radius
-from ecu.params import GRAVITY, PARAMS, PEDAL_POINTS
+from ecu.params import GRAVITY, OBSERVERS, PARAMS, PEDAL_POINTS
 from ecu.records import RecordArray
 
 AIR_DENSITY = 1.2  # kg/m^3, 20 degC at sea level
@@ -81,7 +81,10 @@ class Sensors(_Section):
 
 
 class Observer(_Section):
-    """Tuning of the friction observer."""
+    """The friction observer and its tuning."""
+
+    kind: Literal["joint", "observer1", "observer2"] = "joint"
+    """One filter for the whole car, or the thesis's observers with measured or with virtual wheel forces."""
 
     relaxation_length: Positive = 0.25
     cornering_stiffness: Positive = 15.0
@@ -222,7 +225,7 @@ def config_hash(config: Config) -> str:
 def store_key(config: Config) -> str:
     """Return what learned values belong to: vehicle, brakes and the version of the algorithm."""
     brakes = json.dumps([config.front.model_dump(), config.rear.model_dump()], sort_keys=True)
-    return f"{config.name}/{hashlib.sha256(brakes.encode()).hexdigest()[:8]}/1"
+    return f"{config.name}/{hashlib.sha256(brakes.encode()).hexdigest()[:8]}/2"
 
 
 def new_params(config: Config) -> RecordArray:
@@ -256,7 +259,8 @@ def new_params(config: Config) -> RecordArray:
     row["sigma_pressure"] = sensors.pressure * BAR
     row["sigma_vehicle_speed"] = sensors.vehicle_speed
     row["vehicle_speed_delay"] = sensors.vehicle_speed_delay
-    for name in Observer.model_fields:
+    row["observer"] = OBSERVERS.index(observer.kind)
+    for name in set(Observer.model_fields) - {"kind"}:
         row[name] = getattr(observer, name)
     for name in ("pedal_position", "pedal_decel"):
         points = getattr(control, name)

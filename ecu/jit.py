@@ -34,7 +34,9 @@ _CACHE_ROOT = Path(
 )
 
 
-_CONSTANTS = frozenset({"clock.py", "faults.py", "jit.py", "layout.py", "params.py", "records.py", "signals.py"})
+_CONSTANTS = frozenset(
+    {"clock.py", "faults.py", "jit.py", "layout.py", "params.py", "records.py", "signals.py"}
+)
 
 
 def is_source_of_kernels(path: Path) -> bool:

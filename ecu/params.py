@@ -11,6 +11,9 @@ PEDAL_POINTS: Final = 8
 
 GRAVITY: Final = 9.81  # m/s^2
 
+OBSERVERS: Final = ("joint", "observer1", "observer2")
+JOINT, OBSERVER1, OBSERVER2 = range(3)
+
 PARAMS: Final = np.dtype(
     [
         ("transmit", "u1"),  # armed: demands are flagged valid
@@ -49,6 +52,7 @@ PARAMS: Final = np.dtype(
         ("sigma_vehicle_speed", "f8"),  # m/s
         ("vehicle_speed_delay", "f8"),  # s
         # observer
+        ("observer", "i8"),  # OBSERVERS
         ("activation_decel", "f8", (4,)),  # m/s^2
         ("min_speed", "f8"),  # m/s
         ("rls_forgetting", "f8"),  # per 10 ms

@@ -72,6 +72,7 @@ CYCLE: Final = np.dtype(
     ],
     align=True,
 )
+N_JOINT: Final = 22
 # What the ECU has learned and must not lose: carried between brakings, drives and restarts.
 LEARNED: Final = np.dtype(
     [
@@ -80,6 +81,8 @@ LEARNED: Final = np.dtype(
         ("observed_s", "f8", (4,)),  # time that this friction was observed, 0: nominal
         ("radius_error", "f8", (4,)),  # relative error of the free rolling radius
         ("radius_sigma", "f8", (4,)),
+        ("joint", "f8", (N_JOINT,)),  # the joint observer's states, see its layout
+        ("joint_sigma", "f8", (N_JOINT,)),  # 0: nothing learned yet
         ("brakings", "i8"),  # brake applications since the record was first made
     ],
     align=True,

@@ -84,6 +84,7 @@ VEHICLE_SPEED: Final = INPUT["vehicle_speed"]
 VEHICLE_SPEED_VALID: Final = INPUT["vehicle_speed_valid"]
 ACCUMULATOR_PRESSURE: Final = INPUT["accumulator_pressure"]
 HYDRAULIC_READY: Final = INPUT["hydraulic_ready"]
+WHEEL_FORCE_X: Final = INPUT["wheel_force_x_fl"]
 AMBIENT_TEMPERATURE: Final = INPUT["ambient_temperature"]
 
 # The three verdicts on an input, as bits of `inputs.verdict`.

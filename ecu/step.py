@@ -23,7 +23,13 @@ from ecu.control.pressure_law import (
     set_base,
 )
 from ecu.diagnostics.faults import DEMAND_LIMITED, FILTER_RESET
-from ecu.estimation.force import FORCE_STATE, reset_force, total_tyre_force, update_force
+from ecu.estimation.force import (
+    FORCE_STATE,
+    reset_force,
+    take_measured_force,
+    total_tyre_force,
+    update_force,
+)
 from ecu.estimation.friction import (
     FRICTION_STATE,
     hand_over,
@@ -31,6 +37,9 @@ from ecu.estimation.friction import (
     update_friction,
     update_pressure,
 )
+from ecu.estimation.joint.layout import JOINT_STATE, STIFFNESS, V
+from ecu.estimation.joint.learned import keep_joint, publish_friction, restore_joint
+from ecu.estimation.joint.observer import update_joint
 from ecu.estimation.motion import MOTION_STATE, update_motion, usable
 from ecu.estimation.observer2 import OBSERVER_STATE
 from ecu.estimation.slip import (
@@ -45,6 +54,7 @@ from ecu.estimation.speed import SPEED_STATE, update_speed
 from ecu.estimation.wheel_load import WHEEL_LOAD_STATE, update_wheel_load
 from ecu.jit import Record, kernel
 from ecu.monitoring.application import APPLICATION_STATE, update_application
+from ecu.params import JOINT, OBSERVER1
 from ecu.records import LEARNED, RecordArray
 from ecu.signals import ACCEL_X, CALLIPER_PRESSURE, FAILED, STARTING
 
@@ -55,6 +65,7 @@ STATE = np.dtype(
         ("motion", MOTION_STATE),
         ("wheel_load", WHEEL_LOAD_STATE),
         ("speed", SPEED_STATE),
+        ("joint", JOINT_STATE),
         ("wheels", WHEELS_STATE),
         ("force", FORCE_STATE),
         ("observer", OBSERVER_STATE),
@@ -92,6 +103,7 @@ def new_state(params: RecordArray, learned: RecordArray | None = None) -> Record
 def _begin(params: Record, state: Record) -> None:
     p, s = params[0], state[0]
     restore_friction(p, s.friction, s.learned)
+    restore_joint(p, s.joint, s.learned)
     set_base(s.control, s.learned)
     update_wheel_load(p, s.wheel_load, 0.0, 0.0, 1.0)
     update_radius(p, s.wheels, s.learned, s.wheel_load.load)
@@ -133,8 +145,28 @@ def _estimate(p: Record, s: Record, u: Record, dt: float) -> None:
         set_base(s.control, s.learned)
     update_motion(p, s.motion, u, s.speed.speed, s.friction.torque)
     update_wheel_load(p, s.wheel_load, s.motion.accel_x, s.motion.accel_y, dt)
-    update_radius(p, s.wheels, s.learned, s.wheel_load.load)
     update_pressure(p, s.friction, u, dt)
+    if p.observer == JOINT:
+        _observe_jointly(p, s, u, braking, dt)
+    else:
+        _observe_by_wheel(p, s, u, braking, dt)
+
+
+@kernel
+def _observe_jointly(p: Record, s: Record, u: Record, braking: bool, dt: float) -> None:
+    joint = s.joint
+    update_joint(p, joint, u, s.motion, s.wheel_load.load, s.limiter.pressure, braking, dt)
+    publish_friction(p, joint, s.friction, s.learned, u, braking, dt)
+    keep_joint(joint, s.learned)
+    s.speed.started, s.speed.speed = joint.started, joint.x[V]
+    s.force.k_f = math.exp(joint.x[STIFFNESS])
+    for i in range(4):
+        s.wheels.slip[i], s.force.virtual[i] = joint.slip[i], joint.force[i]
+
+
+@kernel
+def _observe_by_wheel(p: Record, s: Record, u: Record, braking: bool, dt: float) -> None:
+    update_radius(p, s.wheels, s.learned, s.wheel_load.load)
     s.force.total = total_tyre_force(p, s.motion, s.speed.speed)
     expect_slip(p, s.wheels, u, s.wheel_load.load, s.force.total, s.friction.torque)
     update_speed(p, s.speed, s.motion, s.wheels, s.learned, u, braking, dt)
@@ -144,6 +176,8 @@ def _estimate(p: Record, s: Record, u: Record, dt: float) -> None:
         learn_radius(p, s.wheels, s.learned, s.motion, u, s.speed, braking, dt)
     regress = braking and s.speed.speed > p.min_speed and usable(u, ACCEL_X)
     update_force(p, s.force, s.wheels, s.wheel_load.load, regress)
+    if p.observer == OBSERVER1:
+        take_measured_force(s.force, u)
     update_friction(
         p, s.friction, s.observer, s.learned, u, s.motion, s.wheels, s.wheel_load.load, s.force, s.speed,
         s.application, dt,

@@ -24,6 +24,8 @@ REVISIONS_KEPT: Final = 20
 SAVE_INTERVAL_S: Final = 60.0
 MU_RANGE: Final = (0.5, 1.5)  # of nominal
 RADIUS_ERROR_LIMIT: Final = 0.03
+JOINT_LIMIT: Final = 1.5
+"""Of any state of the joint observer: logarithms, and the rest is smaller still."""
 
 _TABLE: Final = """
 CREATE TABLE IF NOT EXISTS learned (
@@ -158,6 +160,8 @@ def out_of_range(learned: RecordArray, mu_nominal: NDArray[np.float64]) -> str:
         "sigma_mu_b": ~known | (np.isfinite(sigma) & (sigma > 0)),
         "radius_error": np.abs(row["radius_error"]) <= RADIUS_ERROR_LIMIT,
         "radius_sigma": np.isfinite(row["radius_sigma"]) & (row["radius_sigma"] > 0),
+        "joint": np.abs(row["joint"]) <= JOINT_LIMIT,
+        "joint_sigma": np.isfinite(row["joint_sigma"]) & (row["joint_sigma"] >= 0),
         "brakings": np.asarray(row["brakings"] >= 0),
     }
     return next((name for name, good in checks.items() if not good.all()), "")

@@ -15,8 +15,10 @@ import math
 
 import numpy as np
 
+from ecu.estimation.motion import usable
 from ecu.estimation.tyre import slip_stiffness
 from ecu.jit import Record, kernel
+from ecu.signals import WHEEL_FORCE_X
 
 FORCE_STATE = np.dtype(
     [
@@ -26,6 +28,7 @@ FORCE_STATE = np.dtype(
         ("residual", "f8"),  # mean square of the relative residual
         ("model", "f8", (4,)),  # F_L^(TM) [N]
         ("virtual", "f8", (4,)),  # F_L^(VS) [N]
+        ("measured", "u1", (4,)),  # Observer 1: a transducer stands in for it
     ],
     align=True,
 )
@@ -74,3 +77,12 @@ def update_force(params: Record, state: Record, wheels: Record, load: Record, re
     state.k_f = min(max(state.k_f, K_F_LOW), K_F_HIGH)
     for i in range(4):
         state.virtual[i] = state.k_f * state.model[i]
+
+
+@kernel
+def take_measured_force(state: Record, inputs: Record) -> None:
+    """Let measured wheel forces stand in for the virtual sensor where they are there (Observer 1, 4.3)."""
+    for i in range(4):
+        state.measured[i] = 1 if usable(inputs, WHEEL_FORCE_X + i) else 0
+        if state.measured[i]:
+            state.virtual[i] = inputs.value[WHEEL_FORCE_X + i]

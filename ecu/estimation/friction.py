@@ -74,6 +74,7 @@ SECONDS_FOR_LEARNING = 1.0
 TYRE_CURVE = 1.0  # relative error of the linear tyre per slip: 5 % at 5 % of slip
 SLIP_FLOOR = 0.0004  # error of slip that does not average out: radius, speed
 TIME_CORRELATION = 3.0  # low-passed slip samples are correlated: their variance counts this often
+TRANSDUCER_NOISE = 10.0  # N, of a wheel force transducer (Table 4.1)
 HELD_GROWTH = 0.002  # growth of sigma while holding, 1/sqrt(s)
 
 
@@ -248,7 +249,7 @@ def _observe(
     outer = motor_torque(inputs, i) + rolling
     stiffness = force.k_f * slip_stiffness(params, i, load[i], wheels.expected_force[i])
     slip_noise = params.sigma_wheel_speed * radius / max(speed.speed, 1.0)
-    variance = (stiffness * slip_noise) ** 2
+    variance = TRANSDUCER_NOISE**2 if force.measured[i] else (stiffness * slip_noise) ** 2
     predict_observer(
         params, observer, i, max(state.pressure[i], 0.0), outer, force.virtual[i], variance, radius,
         load[i], speed.speed, params.mu_drift, dt,

@@ -1,13 +1,12 @@
 """Prediction and correction of the joint observer's state; one scalar measurement at a time.
 
 Correction after Schmidt: a state that is not free keeps its value and variance, but its covariances act, so
-that what it leaves uncertain is not counted as known. Innovations beyond `GATE` standard deviations count with
-a variance that puts them on the gate; beyond four gates they are rejected.
-"""
+that what it leaves uncertain is not counted as known. Innovations beyond `GATE` standard deviations count
+with a variance that puts them on the gate; beyond four gates they are rejected."""
 
 import math
 
-from ecu.estimation.joint.layout import BIAS, MU, SLOPE, V, N
+from ecu.estimation.joint.layout import BIAS, MU, SLOPE, N, V
 from ecu.jit import Record, kernel
 
 GATE = 3.0

@@ -1,9 +1,8 @@
 """The states of the joint observer: what one filter for the whole vehicle knows and how well.
 
-Friction, stiffness, mass, peak, motor scale and drag are logarithms of the ratio to the configuration: scaling
-mass and all frictions together is invisible to friction braking, and in logarithms that direction is constant,
-so relinearising cannot invent knowledge of it.
-"""
+Friction, stiffness, mass, peak, motor scale and drag are logarithms of the ratio to the configuration:
+scaling mass and all frictions together is invisible to friction braking, and in logarithms that direction is
+constant, so relinearising cannot invent knowledge of it."""
 
 from typing import Final
 
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ecu.estimation.joint.pressure import PRESSURE_STATE
+from ecu.records import N_JOINT
 
 V: Final = 0  # vehicle speed [m/s]
 MU: Final = 1  # four: ln of lining friction over nominal
@@ -27,7 +27,7 @@ MOTOR: Final = 17  # ln of motor torque over reported
 DRAG: Final = 18  # ln of air drag per mass over configured
 OFFSET: Final = 19  # two: pressure [bar] lost beyond push-out and sensor, per axle
 DELAY: Final = 21  # of the speed reference beyond configured [s]
-N: Final = 22
+N: Final = N_JOINT
 
 WINDOW_STATE: Final = np.dtype(
     [
@@ -78,6 +78,7 @@ JOINT_STATE: Final = np.dtype(
         ("observed", "u1", (4,)),  # friction was corrected in the last window
         ("observed_s", "f8", (4,)),  # in this braking
         ("ratio", "f8", (6,)),  # squared innovation over its variance: wheels, total force, speed reference
+        ("reversing", "u1"),
         ("reset", "u1"),
     ],
     align=True,

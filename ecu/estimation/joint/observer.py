@@ -1,7 +1,7 @@
 """The joint observer: one filter for speed, tyres, mass, sensors and the friction of all four linings.
 
-A window of a few cycles is one step: the state walks, then the speed reference, each wheel's speed and the car's
-longitudinal balance correct it. Which states they may correct depends on what the car does:
+A window of a few cycles is one step: the state walks, then the speed reference, each wheel's speed and the
+car's longitudinal balance correct it. Which states they may correct depends on what the car does:
 
 friction braking   speed, frictions, tyre stiffness and peak, radii, slope; the rest is considered only
 motors alone       everything but friction and pressure offsets: known torque shows mass, drag, stiffness
@@ -121,26 +121,29 @@ def _go_back(state: Record) -> None:
 
 
 @kernel
+def _mean_wheel(params: Record, inputs: Record) -> float:
+    """Return the mean speed of the wheels [m/s] by their last samples, without a sign."""
+    total = 0.0
+    for i in range(4):
+        total += abs(inputs.value[WHEEL_SPEED + i]) * params.wheel_radius[i]
+    return 0.25 * total
+
+
+@kernel
 def _start_speed(params: Record, state: Record, inputs: Record) -> None:
     for i in range(4):
         if not usable(inputs, WHEEL_SPEED + i):
             return
-    total = 0.0
-    for i in range(4):
-        total += inputs.value[WHEEL_SPEED + i] * params.wheel_radius[i]
-    state.x[V] = max(0.25 * total, 0.0)
+    state.x[V] = _mean_wheel(params, inputs)
     state.started = 1
 
 
 @kernel
 def _learning_forbidden(inputs: Record, braking: bool) -> bool:
     value = inputs.value
-    against = (
-        braking and usable(inputs, ACCELERATOR_POSITION) and value[ACCELERATOR_POSITION] > 2.0
-    )
-    return (
-        against or value[ABS_ACTIVE] > 0.5 or value[ESP_ACTIVE] > 0.5 or value[REVERSE] > 0.5
-    )
+    against = braking and usable(inputs, ACCELERATOR_POSITION) and value[ACCELERATOR_POSITION] > 2.0
+    forbidden: bool = against or value[ABS_ACTIVE] > 0.5 or value[ESP_ACTIVE] > 0.5
+    return forbidden
 
 
 @kernel
@@ -174,7 +177,7 @@ def _pressure_change(state: Record, left: int) -> float:
 
 @kernel
 def _walk(state: Record, braking: bool, time: float) -> None:
-    p, w = state.p, state.window
+    p = state.p
     drift_speed(state, time)
     for i in range(N):
         p[i, i] += WALK[i] ** 2 * time
@@ -204,6 +207,13 @@ def update_joint(
         _start_speed(params, state, inputs)
         if not state.started:
             return
+    if usable(inputs, REVERSE) and inputs.value[REVERSE] > 0.5:
+        state.x[V] = -_mean_wheel(params, inputs)
+        state.reversing = 1
+        return
+    if state.reversing:
+        state.x[V], state.p[V, V], state.reversing = _mean_wheel(params, inputs), 0.25, 0
+        open_window(state)
     gather(params, state, inputs, motion, load, demand, dt)
     state.hold_s = max(state.hold_s - dt, 0.0)
     if state.window.time < WINDOW_S - 0.001:
@@ -268,7 +278,9 @@ def _fuse_wheel(params: Record, state: Record, i: int, before: float, moving: bo
             state.h[j] = 0.0
         r = params.wheel_radius[i]
         state.h[V] = 1.0 / r
-        correct(state, w.omega[i] - ground / r, (params.sigma_wheel_speed**2 + (LOW_SPEED_NOISE / r) ** 2) / n)
+        correct(
+            state, w.omega[i] - ground / r, (params.sigma_wheel_speed**2 + (LOW_SPEED_NOISE / r) ** 2) / n
+        )
         return
     per_bar = state.h[OFFSET + i // 2]
     variance = params.sigma_wheel_speed**2 / n + per_bar**2 * w.pressure_variance[i]
@@ -283,7 +295,8 @@ def _fuse_wheel(params: Record, state: Record, i: int, before: float, moving: bo
 def _fuse_balance(params: Record, state: Record) -> None:
     w = state.window
     left = predict_balance(
-        params, state, w.pressure, state.smooth_pressure, w.motor, w.load, w.accel, w.change, state.x[V], w.lateral
+        params, state, w.pressure, state.smooth_pressure, w.motor, w.load, w.accel, w.change, state.x[V],
+        w.lateral,
     )  # fmt: skip
     variance = params.sigma_accel**2 / w.cycles + BALANCE_FLOOR**2 + (BALANCE_SHARE * w.accel) ** 2
     for i in range(4):

@@ -1,10 +1,10 @@
 """Calliper pressure as a state that the ECU's own demand drives, wherever the car follows it.
 
-The sensor's noise (Table 4.1: 1.8 bar) multiplies the unknown friction, and only time takes it away. Where the
-hydraulics follow the demand, its course is known (A.17, A.18 to first order: a dead time and a lag) and time is
-there; the variance grows with the change, so that another lag or gain does no harm. Where the sensor disagrees
-for longer (a shadow, a fallback, a recording of another controller) the raw samples count until both agree again.
-"""
+The sensor's noise (Table 4.1: 1.8 bar) multiplies the unknown friction, and only time takes it away. Where
+the hydraulics follow the demand, its course is known (A.17, A.18 to first order: a dead time and a lag) and
+time is there; the variance grows with the change, so that another lag or gain does no harm. Where the sensor
+disagrees for longer (a shadow, a fallback, a recording of another controller) the raw samples count until
+both agree again."""
 
 import math
 

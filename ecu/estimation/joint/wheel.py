@@ -1,7 +1,7 @@
 """What one wheel and the whole car should show, given the states, with analytic derivatives.
 
-Wheel: torque T = s_m T_m + T_b + M_R and the wheel's inertia stand against the tyre force, the force over load
-gives slip by the inverse of the tyre's curve, slip and radius give wheel speed.
+Wheel: torque T = s_m T_m + T_b + M_R and the wheel's inertia stand against the tyre force, the force over
+load gives slip by the inverse of the tyre's curve, slip and radius give wheel speed.
 
     F = -(T + I dv/dt / r) / r        n = F / F_Z     u = n / D
     slip = (c D / C) tan(asin(u) / c)                 inverse Magic Formula with E = 0
@@ -157,8 +157,8 @@ def predict_balance(
 ) -> float:
     """Return what is left of the car's longitudinal balance over the configured mass [m/s^2]; sets `state.h`.
 
-    Arguments as in `predict_wheel`, of shape (4,); `accel`: specific force in road axes [m/s^2]; `lateral`: the
-    lateral forces' part along the car [N].
+    Arguments as in `predict_wheel`, of shape (4,); `accel`: specific force in road axes [m/s^2]; `lateral`:
+    the lateral forces' part along the car [N].
     """
     x, h, mass = state.x, state.h, params.mass
     for j in range(N):
@@ -180,4 +180,5 @@ def predict_balance(
         h[MOTOR] += driven / (r * mass)
     h[BIAS] = -heavier
     h[DRAG] = drag
-    return left
+    result: float = left
+    return result

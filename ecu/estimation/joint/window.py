@@ -1,9 +1,8 @@
 """Samples of a few cycles gathered to means, each sample against the prediction at its own time.
 
-Pressure noise as a factor of the unknown friction would ruin the filter, and filtering the pressure alone would
-set it against faster signals. Means of all signals over the same cycles keep them in step, their noise is white
-from window to window, and what did not arrive is simply not in the mean.
-"""
+Pressure noise as a factor of the unknown friction would ruin the filter, and filtering the pressure alone
+would set it against faster signals. Means of all signals over the same cycles keep them in step, their noise
+is white from window to window, and what did not arrive is simply not in the mean."""
 
 import math
 
@@ -34,9 +33,7 @@ def open_window(state: Record) -> None:
 @kernel
 def speed_change(state: Record, motion: Record) -> float:
     """Return dv/dt [m/s^2] by the accelerometer and what is known of its bias and the slope."""
-    change: float = (
-        motion.accel_x - state.x[BIAS] - state.x[SLOPE] + motion.yaw_rate * motion.lateral_speed
-    )
+    change: float = motion.accel_x - state.x[BIAS] - state.x[SLOPE] + motion.yaw_rate * motion.lateral_speed
     return change
 
 
@@ -80,9 +77,7 @@ def gather(
             w.tracked[i] += state.pressures.value[i] - push_out
             w.tracked_cycles[i] += 1
     place = VEHICLE_SPEED
-    if fresh(inputs, place) and (
-        value[VEHICLE_SPEED_VALID] > 0.5 or not params.mapped[VEHICLE_SPEED_VALID]
-    ):
+    if fresh(inputs, place) and (value[VEHICLE_SPEED_VALID] > 0.5 or not params.mapped[VEHICLE_SPEED_VALID]):
         delay = params.vehicle_speed_delay + x[DELAY] + 1e-9 * inputs.age_ns[place]
         w.reference += value[place] - (x[V] - delay * change)
         w.reference_change += change

@@ -24,12 +24,12 @@ from ecu.bus.receive import ReceivePlan
 from ecu.config import Config, config_hash, load_config, new_params, store_key
 from ecu.diagnostics.store import open_store, restore, save
 from ecu.errors import RunFault, UserError
+from ecu.params import OBSERVERS
 from ecu.recorder import read_recording
 from ecu.records import RecordArray
 from ecu.signals import CORNERS, CYCLE_NS
 from ecu.step import new_state
 
-OBSERVERS: Final = ("observer2",)
 WIDTH: Final = 110  # columns of the table where no terminal says how wide it is
 _PERIOD: Final = 1e-9 * CYCLE_NS  # s
 
@@ -38,7 +38,7 @@ def replay(
     logs: Sequence[Path],
     config: Path,
     map: Path | None,
-    observer: str,
+    observer: str | None,
     state: Path | None,
     out: Path,
     cycles: Path | None = None,
@@ -54,7 +54,7 @@ def replay(
     """
     _check(logs, observer, out, cycles)
     check_outputs(out, (out, brakes_path(out)), [*logs, config, *([map] if map else [])])
-    vehicle = load_config(config)
+    vehicle = _with_observer(load_config(config), observer)
     source = load_source(map)
     if map:
         for log in logs:
@@ -72,7 +72,7 @@ def replay(
         writer.provenance = {
             "version": __version__,
             "vehicle": vehicle.name,
-            "observer": observer,
+            "observer": vehicle.observer.kind,
             "config_hash": config_hash(vehicle),
             "database_hash": source.database_hash,
             "inputs": [{"name": path.name, "sha256": log_hash(path)} for path in logs],
@@ -103,9 +103,15 @@ def replay(
     return 0
 
 
-def _check(logs: Sequence[Path], observer: str, out: Path, cycles: Path | None) -> None:
-    if observer not in OBSERVERS:
-        raise UserError("--observer", observer, f"comes later; take {', '.join(OBSERVERS)}")
+def _with_observer(vehicle: Config, observer: str | None) -> Config:
+    if observer is None:
+        return vehicle
+    return vehicle.model_copy(update={"observer": vehicle.observer.model_copy(update={"kind": observer})})
+
+
+def _check(logs: Sequence[Path], observer: str | None, out: Path, cycles: Path | None) -> None:
+    if observer is not None and observer not in OBSERVERS:
+        raise UserError("--observer", observer, f"not known; take {', '.join(OBSERVERS)}")
     if out.suffix != ".parquet":
         raise UserError("--out", str(out), "results are written as Parquet; let the name end in .parquet")
     for log in logs:

@@ -1,0 +1,118 @@
+"""What the joint observer gives to the rest of the ECU, and what it keeps between drives.
+
+Kept are the states but speed and slope, with their standard deviations; of the correlations only the one that
+physics gives back: an error of mass is in every friction alike. What may have changed in between (load,
+tyres, weather) is less sure after a restart."""
+
+import math
+
+import numpy as np
+
+from ecu.estimation.joint.layout import (
+    BIAS,
+    DELAY,
+    DRAG,
+    MASS,
+    MU,
+    OFFSET,
+    PEAK,
+    PRIOR,
+    RADIUS,
+    SLOPE,
+    STIFFNESS,
+    N,
+    V,
+)
+from ecu.estimation.joint.observer import RADIUS_COMMON, RADIUS_WHEEL, start_joint
+from ecu.estimation.joint.pressure import follows
+from ecu.estimation.motion import usable
+from ecu.jit import Record, kernel
+from ecu.signals import CALLIPER_PRESSURE, FAULT, HOLDING, NOMINAL, OBSERVING, WHEEL_SPEED
+
+BAR = 1e5
+LEAST_RATIO, GREATEST_RATIO = 0.5, 1.5  # of nominal friction
+
+# Standard deviations that a pause of unknown length adds.
+PAUSE = np.zeros(N)
+PAUSE[STIFFNESS], PAUSE[PEAK] = 0.05, 0.10
+PAUSE[RADIUS : RADIUS + 4] = 0.0003
+PAUSE[BIAS], PAUSE[MASS], PAUSE[DRAG] = 0.005, 0.005, 0.02
+PAUSE[DELAY] = 0.001
+MU_PAUSE = 0.03
+
+
+@kernel
+def restore_joint(params: Record, state: Record, learned: Record) -> None:
+    """Begin with what was learned; with the prior where nothing was."""
+    start_joint(params, state)
+    x, p = state.x, state.p
+    if learned.joint_sigma[MASS] > 0.0:
+        for i in range(N):
+            if i in (V, SLOPE) or MU <= i < MU + 4 or OFFSET <= i < OFFSET + 2:
+                continue
+            x[i] = learned.joint[i]
+            for j in range(N):
+                p[i, j] = p[j, i] = 0.0
+            limit = RADIUS_COMMON if RADIUS <= i < RADIUS + 4 else PRIOR[i]
+            p[i, i] = min(learned.joint_sigma[i] ** 2 + PAUSE[i] ** 2, limit * limit)
+        least = min(
+            p[RADIUS, RADIUS], p[RADIUS + 1, RADIUS + 1], p[RADIUS + 2, RADIUS + 2], p[RADIUS + 3, RADIUS + 3]
+        )
+        for i in range(RADIUS, RADIUS + 4):
+            for j in range(RADIUS, RADIUS + 4):
+                if i != j:
+                    p[i, j] = max(least - RADIUS_WHEEL**2, 0.0)
+    for i in range(4):
+        if learned.observed_s[i] <= 0.0:
+            continue
+        x[MU + i] = math.log(learned.mu_b[i] / params.mu_nominal[i])
+        relative = learned.sigma_mu_b[i] / learned.mu_b[i]
+        shared = min(p[MASS, MASS], 0.8 * relative * relative)
+        for j in range(4):
+            if j != i and learned.observed_s[j] > 0.0:
+                p[MU + i, MU + j] = p[MU + j, MU + i] = shared
+        p[MU + i, MU + i] = relative * relative + MU_PAUSE**2
+        p[MU + i, MASS] = p[MASS, MU + i] = shared
+    for i in range(4):
+        for j in range(4):
+            if (learned.observed_s[i] > 0.0) != (learned.observed_s[j] > 0.0):
+                p[MU + i, MU + j] = 0.0
+
+
+@kernel
+def keep_joint(state: Record, learned: Record) -> None:
+    """Write what is known now into `learned`."""
+    for i in range(N):
+        if i in (V, SLOPE):
+            continue
+        learned.joint[i] = state.x[i]
+        learned.joint_sigma[i] = math.sqrt(max(state.p[i, i], 0.0))
+
+
+@kernel
+def publish_friction(
+    params: Record, state: Record, friction: Record, learned: Record, inputs: Record, braking: bool, dt: float
+) -> None:
+    """Overwrite friction, its standard deviation and mode of every corner from the joint observer."""
+    friction.reset = state.reset
+    for i in range(4):
+        nominal = params.mu_nominal[i]
+        mu = min(max(nominal * math.exp(state.x[MU + i]), LEAST_RATIO * nominal), GREATEST_RATIO * nominal)
+        variance = state.p[MU + i, MU + i]
+        if braking and follows(state.pressures, i):
+            above = max(state.pressures.value[i] - params.push_out_pressure[i] / BAR, 1.0)
+            variance += state.pressures.variance[i] / (above * above)
+        friction.mu[i], friction.sigma[i] = mu, mu * math.sqrt(variance)
+        if braking and state.observed[i]:
+            friction.observed_s[i] += dt
+            friction.mode[i] = OBSERVING
+        elif (
+            params.mapped[WHEEL_SPEED + i]
+            and params.mapped[CALLIPER_PRESSURE + i]
+            and not (usable(inputs, WHEEL_SPEED + i) and usable(inputs, CALLIPER_PRESSURE + i))
+        ):
+            friction.mode[i] = FAULT
+        elif friction.observed_s[i] > 0.0 or learned.observed_s[i] > 0.0:
+            friction.mode[i] = HOLDING
+        else:
+            friction.mode[i] = NOMINAL
