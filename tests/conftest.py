@@ -1,6 +1,7 @@
-"""What tests need around them: a real SocketCAN bus, the recorded drives; else they skip with a reason."""
+"""What tests need around them: a SocketCAN bus, UDP multicast, the recorded drives; else they are skipped."""
 
 import os
+import socket
 from pathlib import Path
 
 import pytest
@@ -30,12 +31,24 @@ def drives() -> Path:
     return shared_folder() / "drives"
 
 
+def _has_multicast() -> bool:
+    group = socket.inet_aton("239.74.163.1")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, group + socket.inet_aton("0.0.0.0"))
+        except OSError:
+            return False
+    return True
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     absent = {}
     if not Path("/sys/class/net/vcan0").exists():
         absent["socketcan"] = "no interface vcan0"
     if not (shared_folder() / "drives").is_dir():
         absent["drives"] = "no recorded drives beside the checkout (BRAKE_ECU_SHARED)"
+    if not _has_multicast():
+        absent["multicast"] = "no UDP multicast (ip route add 239.0.0.0/8 dev lo)"
     for item in items:
         for marker, reason in absent.items():
             if item.get_closest_marker(marker):

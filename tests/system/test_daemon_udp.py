@@ -15,6 +15,8 @@ from ecu.records import LEARNED
 
 from .conftest import ROOT, demand_ids
 
+pytestmark = pytest.mark.multicast
+
 CONFIG = ROOT / "config" / "suv.toml"
 GROUP = f"239.74.{os.getpid() >> 8 & 0xFF}.{os.getpid() & 0xFF}"  # a bus of this run's own
 BUS = ("--config", CONFIG, "-i", "udp_multicast", "-c", GROUP)

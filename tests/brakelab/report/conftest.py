@@ -94,18 +94,23 @@ def write_recording(folder: Path) -> Path:
     return folder
 
 
-@pytest.fixture
-def drive_files(tmp_path: Path) -> dict[str, Path]:
-    """The made-up drive on disk: result, truth, brakes, timing."""
+def write_drive(folder: Path) -> dict[str, Path]:
+    """Write the made-up drive: result, truth, brakes, timing."""
     result, truth, brakes = made_up_drive()
     metadata = {
         "start_time_ns": "1717240000000000000", "vehicle": "SUV", "config_hash": "0123456789abcdef",
         "version": "0.1.0",
     }  # fmt: skip
-    path = write(tmp_path / "stops.parquet", result, metadata)
+    path = write(folder / "stops.parquet", result, metadata)
     return {
         "result": path,
-        "truth": write(tmp_path / "stops.truth.parquet", truth),
+        "truth": write(folder / "stops.truth.parquet", truth),
         "brakes": write(brakes_path(path), brakes),
-        "timing": write_recording(tmp_path / "recording"),
+        "timing": write_recording(folder / "recording"),
     }
+
+
+@pytest.fixture
+def drive_files(tmp_path: Path) -> dict[str, Path]:
+    """The made-up drive on disk."""
+    return write_drive(tmp_path)

@@ -219,6 +219,7 @@ def test_virtual_channels_do_not_need_a_thread():
     unit.close()
 
 
+@pytest.mark.multicast
 def test_another_group_of_the_same_machine_is_another_bus():
     groups = ("239.74.163.5", "239.74.163.6", "239.74.163.6")
     other, sender, hearer = (open_channel("udp_multicast", group, receive_ids=[0x10]) for group in groups)
