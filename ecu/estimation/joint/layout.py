@@ -71,6 +71,7 @@ JOINT_STATE: Final = np.dtype(
         ("pressures", PRESSURE_STATE),
         ("started", "u1"),
         ("sliding", "u1"),
+        ("releasing", "u1"),
         ("untrusted_s", "f8"),  # time since a wheel was last believed [s]
         ("hold_s", "f8"),  # no learning for this long, a wheel had left the tyre's range
         ("smooth_pressure", "f8", (4,)),  # bar above push-out

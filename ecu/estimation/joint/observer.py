@@ -160,6 +160,16 @@ def _pressure_change(state: Record, left: int) -> float:
 
 
 @kernel
+def _watch_release(state: Record, braking: bool) -> None:
+    """When the brakes are released, friction goes back to what it was before that could disturb it."""
+    falling = braking and min(_pressure_change(state, 0), _pressure_change(state, 2)) < -RELEASE
+    if falling and not state.releasing:
+        for i in range(MU, MU + 4):
+            state.x[i] = state.kept_x[1, i]
+    state.releasing = 1 if falling else 0
+
+
+@kernel
 def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> None:
     free = state.free
     for i in range(N):
@@ -167,12 +177,11 @@ def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> 
     free[V] = free[SLOPE] = 1
     if not learning:
         return
-    releasing = braking and min(_pressure_change(state, 0), _pressure_change(state, 2)) < -RELEASE
     for i in range(4):
         free[RADIUS + i] = 1
-        free[MU + i] = 1 if braking and not releasing else 0
+        free[MU + i] = 1 if braking and not state.releasing else 0
     free[DELAY] = 1
-    if releasing:
+    if state.releasing:
         return
     if braking:
         free[STIFFNESS] = free[PEAK] = 1
@@ -249,6 +258,7 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
         motors += abs(w.motor[i])
     moving = x[V] > LEAST_SPEED
     _walk(state, braking, time)
+    _watch_release(state, braking)
     learning = (
         moving and state.hold_s <= 0.0 and w.motor_known != 0 and not _learning_forbidden(inputs, braking)
     )
@@ -365,7 +375,7 @@ def _look_after(params: Record, state: Record, braking: bool) -> None:
         _go_back(state)
     if state.sliding:
         state.hold_s = HOLD_S
-    elif state.hold_s <= 0.0 and state.kept_s >= SNAPSHOT_S:
+    elif state.hold_s <= 0.0 and not state.releasing and state.kept_s >= SNAPSHOT_S:
         for i in range(N):
             state.kept_x[1, i] = state.kept_x[0, i]
             for j in range(N):
