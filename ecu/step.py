@@ -105,7 +105,7 @@ def _begin(params: Record, state: Record) -> None:
     restore_friction(p, s.friction, s.learned)
     restore_joint(p, s.joint, s.learned)
     set_base(s.control, s.learned)
-    update_wheel_load(p, s.wheel_load, 0.0, 0.0, 1.0)
+    update_wheel_load(p, s.wheel_load, 0.0, 0.0, 0.0, 1.0)
     update_radius(p, s.wheels, s.learned, s.wheel_load.load)
 
 
@@ -144,7 +144,7 @@ def _estimate(p: Record, s: Record, u: Record, dt: float) -> None:
     if not braking:
         set_base(s.control, s.learned)
     update_motion(p, s.motion, u, s.speed.speed, s.friction.torque)
-    update_wheel_load(p, s.wheel_load, s.motion.accel_x, s.motion.accel_y, dt)
+    update_wheel_load(p, s.wheel_load, s.motion.accel_x, s.motion.accel_y, s.speed.speed, dt)
     update_pressure(p, s.friction, u, dt)
     if p.observer == JOINT:
         _observe_jointly(p, s, u, braking, dt)

@@ -22,13 +22,19 @@ MIN_LOAD_SHARE = 0.1
 
 
 @kernel
-def update_wheel_load(params: Record, state: Record, accel_x: float, accel_y: float, dt: float) -> None:
-    """Overwrite `state.load` [N] from specific forces in road axes [m/s^2]."""
+def update_wheel_load(
+    params: Record, state: Record, accel_x: float, accel_y: float, speed: float, dt: float
+) -> None:
+    """Overwrite `state.load` [N] from specific forces in road axes [m/s^2] and speed [m/s].
+
+    Air drag acts at the centre of gravity (assumption); the tyres that hold against it pitch the car too.
+    """
     gain = 1.0 - math.exp(-dt / max(params.load_transfer_lag, 1e-6))
     state.accel_x += gain * (accel_x - state.accel_x)
     state.accel_y += gain * (accel_y - state.accel_y)
     mass, length = params.mass, params.wheelbase
-    pitch_transfer = mass * state.accel_x * params.cog_height / (2.0 * length)
+    tyres = mass * state.accel_x + params.drag_area * speed * abs(speed)
+    pitch_transfer = tyres * params.cog_height / (2.0 * length)
     for i in range(4):
         opposite = params.rear_axle if i < 2 else params.front_axle
         static = mass * GRAVITY * opposite / (2.0 * length)

@@ -15,7 +15,7 @@ V: Final = 0  # vehicle speed [m/s]
 MU: Final = 1  # four: ln of lining friction over nominal
 STIFFNESS: Final = 5  # ln of the tyres' slip stiffness over configured
 RATIO: Final = 6  # ln of rear over front stiffness, beyond configured
-RADIUS: Final = 7  # four: ln of rolling radius over (A.4)
+RADIUS: Final = 7  # four: ln of a rolling radius over (A.4), beyond the common one
 BIAS: Final = 11  # accelerometer bias [m/s^2]
 SLOPE: Final = 12  # gravity along the road [m/s^2], uphill positive
 MASS: Final = 13  # ln of mass over configured
@@ -27,6 +27,7 @@ DRAG: Final = 18  # ln of air drag per mass over configured
 OFFSET: Final = 19  # two: pressure [bar] lost beyond push-out and sensor, per axle
 DELAY: Final = 21  # of the speed reference beyond configured [s]
 DRIVE: Final = 22  # two: unreported drive of an axle over mass [m/s^2]; only considered
+ROLLING: Final = 24  # ln of all rolling radii: nothing but a speed reference tells it
 N: Final = N_JOINT
 
 WINDOW_STATE: Final = np.dtype(

@@ -19,6 +19,7 @@ from ecu.estimation.joint.layout import (
     OFFSET,
     PEAK,
     RADIUS,
+    ROLLING,
     SLOPE,
     STIFFNESS,
     N,
@@ -26,7 +27,7 @@ from ecu.estimation.joint.layout import (
 )
 from ecu.estimation.joint.observer import start_joint
 from ecu.estimation.joint.pressure import follows
-from ecu.estimation.joint.prior import PRIOR, RADIUS_COMMON, RADIUS_WHEEL, set_prior
+from ecu.estimation.joint.prior import PRIOR, set_prior
 from ecu.estimation.motion import usable
 from ecu.jit import Record, kernel
 from ecu.signals import CALLIPER_PRESSURE, FAULT, HOLDING, NOMINAL, OBSERVING, WHEEL_SPEED
@@ -36,7 +37,7 @@ BAR = 1e5
 # Standard deviations that a pause of unknown length adds.
 PAUSE = np.zeros(N)
 PAUSE[STIFFNESS], PAUSE[PEAK] = 0.05, 0.10
-PAUSE[RADIUS : RADIUS + 4] = 0.0003
+PAUSE[RADIUS : RADIUS + 4] = PAUSE[ROLLING] = 0.0003
 PAUSE[BIAS], PAUSE[MASS], PAUSE[DRAG] = 0.005, 0.005, 0.02
 PAUSE[DELAY] = 0.001
 MU_PAUSE = 0.03
@@ -54,15 +55,7 @@ def restore_joint(params: Record, state: Record, learned: Record) -> None:
             x[i] = learned.joint[i]
             for j in range(N):
                 p[i, j] = p[j, i] = 0.0
-            limit = RADIUS_COMMON if RADIUS <= i < RADIUS + 4 else PRIOR[i]
-            p[i, i] = min(learned.joint_sigma[i] ** 2 + PAUSE[i] ** 2, limit * limit)
-        least = min(
-            p[RADIUS, RADIUS], p[RADIUS + 1, RADIUS + 1], p[RADIUS + 2, RADIUS + 2], p[RADIUS + 3, RADIUS + 3]
-        )
-        for i in range(RADIUS, RADIUS + 4):
-            for j in range(RADIUS, RADIUS + 4):
-                if i != j:
-                    p[i, j] = max(least - RADIUS_WHEEL**2, 0.0)
+            p[i, i] = min(learned.joint_sigma[i] ** 2 + PAUSE[i] ** 2, PRIOR[i] ** 2)
     for i in range(4):
         if learned.observed_s[i] <= 0.0:
             continue

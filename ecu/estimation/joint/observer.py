@@ -26,6 +26,7 @@ from ecu.estimation.joint.layout import (
     PEAK,
     RADIUS,
     RATIO,
+    ROLLING,
     SINKING,
     SLOPE,
     STIFFNESS,
@@ -127,6 +128,7 @@ def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> 
         free[RADIUS + i] = 1
         free[MU + i] = 1 if braking and not state.releasing else 0
     free[DELAY] = 1
+    free[ROLLING] = 1 if state.window.reference_samples > 0 else 0
     if state.releasing:
         return
     if braking:

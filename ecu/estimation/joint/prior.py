@@ -16,6 +16,7 @@ from ecu.estimation.joint.layout import (
     PEAK,
     RADIUS,
     RATIO,
+    ROLLING,
     SINKING,
     SLOPE,
     STIFFNESS,
@@ -26,23 +27,23 @@ from ecu.jit import Record, kernel
 
 PRIOR = np.zeros(N)
 """Standard deviations before anything is learned; friction, radii and speed are set apart."""
-PRIOR[STIFFNESS], PRIOR[RATIO] = 0.25, 0.04
+PRIOR[STIFFNESS], PRIOR[RATIO] = 0.25, 0.12
 PRIOR[BIAS], PRIOR[SLOPE] = 0.1, 0.3
 PRIOR[MASS], PRIOR[PEAK], PRIOR[LOAD], PRIOR[SINKING] = 0.02, 0.25, 0.05, 0.10
 PRIOR[DRAG] = 0.10
+PRIOR[RADIUS : RADIUS + 4], PRIOR[ROLLING] = 0.0015, 0.004
 PRIOR[OFFSET : OFFSET + 2] = 0.3
-PRIOR[DELAY] = 0.01
-PRIOR[DRIVE : DRIVE + 2] = 0.15  # drag and creep of an engine in gear
+PRIOR[DELAY] = 0.005
+PRIOR[DRIVE : DRIVE + 2] = 0.25  # drag and creep of an engine in gear
 
 # Standard deviations of friction's prior, of its logarithm: all four together, per axle, per wheel.
 MU_COMMON, MU_AXLE, MU_WHEEL = 0.13, 0.17, 0.06
-RADIUS_COMMON, RADIUS_WHEEL = 0.004, 0.0015
 
 # Random walks per square root of a second.
 WALK = np.zeros(N)
 WALK[V] = 0.02
 WALK[STIFFNESS], WALK[RATIO] = 0.01, 0.0005
-WALK[RADIUS : RADIUS + 4] = 1e-5
+WALK[RADIUS : RADIUS + 4] = WALK[ROLLING] = 1e-5
 WALK[BIAS], WALK[SLOPE] = 0.0005, 0.05
 WALK[PEAK], WALK[LOAD], WALK[SINKING] = 0.01, 0.0005, 0.0005
 WALK[MASS], WALK[MOTOR], WALK[DRAG] = 1e-5, 1e-5, 0.0005
@@ -65,7 +66,6 @@ def set_prior(params: Record, state: Record) -> None:
     p[MOTOR, MOTOR] = params.sigma_motor_torque**2
     for i in range(4):
         for j in range(4):
-            p[RADIUS + i, RADIUS + j] = RADIUS_COMMON**2 + (RADIUS_WHEEL**2 if i == j else 0.0)
             axle = MU_AXLE**2 if i // 2 == j // 2 else 0.0
             p[MU + i, MU + j] = MU_COMMON**2 + axle + (MU_WHEEL**2 if i == j else 0.0)
 

@@ -25,6 +25,7 @@ from ecu.estimation.joint.layout import (
     PEAK,
     RADIUS,
     RATIO,
+    ROLLING,
     SINKING,
     STIFFNESS,
     N,
@@ -74,7 +75,7 @@ def radius(params: Record, state: Record, i: int, load: float) -> tuple[float, f
     at_rest = params.wheel_radius[i]
     nominal = rolling_radius(load, params.unloaded_radius[i], params.vertical_stiffness[i])
     change = (nominal - at_rest) * math.exp(state.x[SINKING])
-    scale = math.exp(state.x[RADIUS + i])
+    scale = math.exp(state.x[ROLLING] + state.x[RADIUS + i])
     return (at_rest + change) * scale, change * scale
 
 
@@ -138,7 +139,7 @@ def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float
         h[RATIO] = -by_slip * slip
     h[LOAD] = by_slip * slip * math.log(relative)
     h[PEAK] = by_slip * (slip - slope * used)
-    h[RADIUS + i] = -omega
+    h[RADIUS + i] = h[ROLLING] = -omega
     h[SINKING] = -omega * sinking / r
     if not w.motor_reported:
         h[DRIVE + i // 2] = 0.5 * by_force * params.mass

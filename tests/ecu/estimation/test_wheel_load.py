@@ -10,23 +10,25 @@ FL, FR, RL, RR = range(4)
 NO_LAG = 100.0  # s: long enough to settle
 
 
-def loads(params, accel_x: float, accel_y: float) -> np.ndarray:
+def loads(params, accel_x: float, accel_y: float, speed: float = 0.0) -> np.ndarray:
     state = np.zeros(1, WHEEL_LOAD_STATE)
-    update_wheel_load(params[0], state[0], accel_x, accel_y, NO_LAG)
+    update_wheel_load(params[0], state[0], accel_x, accel_y, speed, NO_LAG)
     return state[0]["load"].copy()
 
 
 STATES = [(0, 0), (-4, 0), (-8, 0), (3, 0), (0, 4), (0, -4), (-4, 3), (-6, -2), (2, 5)]
 
 
+@pytest.mark.parametrize("speed", [0.0, 30.0])
 @pytest.mark.parametrize(("accel_x", "accel_y"), STATES)
-def test_loads_carry_the_car_and_balance_its_moments(params, accel_x: float, accel_y: float) -> None:
+def test_loads_carry_the_car_and_balance_its_moments(params, accel_x, accel_y, speed: float) -> None:
     p = params[0]
+    drag = float(p["drag_area"]) * speed**2
     m, h, b, l_f, l_r = (float(p[k]) for k in ("mass", "cog_height", "track", "front_axle", "rear_axle"))
-    z = loads(params, accel_x, accel_y)
+    z = loads(params, accel_x, accel_y, speed)
     assert z.sum() == pytest.approx(m * G, rel=1e-12)
-    # About the lateral axis through the centre of gravity: tyre forces m a_x act h below it.
-    assert l_f * (z[FL] + z[FR]) - l_r * (z[RL] + z[RR]) == pytest.approx(-m * accel_x * h, abs=1e-6)
+    # About the lateral axis through the centre of gravity: tyre forces m a_x + drag act h below it.
+    assert l_f * (z[FL] + z[FR]) - l_r * (z[RL] + z[RR]) == pytest.approx(-(m * accel_x + drag) * h, abs=1e-6)
     # About the longitudinal axis; ISO 8855, a left turn has a_y > 0 and loads the right wheels.
     assert 0.5 * b * (z[FR] + z[RR] - z[FL] - z[RL]) == pytest.approx(m * accel_y * h, abs=1e-6)
 
@@ -70,11 +72,11 @@ def test_a_wheel_is_never_taken_as_lifted(params) -> None:
 def test_transfer_lags_by_its_time_constant_whatever_the_step(params, dt: float) -> None:
     lag = float(params[0]["load_transfer_lag"])
     state = np.zeros(1, WHEEL_LOAD_STATE)
-    update_wheel_load(params[0], state[0], 0.0, 0.0, NO_LAG)
+    update_wheel_load(params[0], state[0], 0.0, 0.0, 0.0, NO_LAG)
     settled = loads(params, -5, 0)[FL]
     static = state[0]["load"][FL]
     cycles = round(lag * 5 / dt)
     for _ in range(cycles):
-        update_wheel_load(params[0], state[0], -5.0, 0.0, dt)
+        update_wheel_load(params[0], state[0], -5.0, 0.0, 0.0, dt)
     reached = (state[0]["load"][FL] - static) / (settled - static)
     assert reached == pytest.approx(1 - np.exp(-cycles * dt / lag), rel=1e-6)
