@@ -17,7 +17,7 @@ from ecu import __version__
 from ecu.errors import RunFault, UserError
 from ecu.resources import named
 
-LABORATORY = ("bokeh", "jinja2", "pyarrow")
+LABORATORY = ("bokeh", "jinja2", "pyarrow", "pymoo")
 """What the extra `lab` installs, by the names that are imported."""
 
 app = typer.Typer(

@@ -91,6 +91,13 @@ class Observer(_Section):
     min_speed: Positive = 15 / 3.6
     rls_forgetting: Share = 0.93
     mu_drift: Positive = 0.02
+    """Random walk of friction, 1/sqrt(s)."""
+    omega_walk: Positive = 2.0
+    """Random walk of wheel speed by torques that are not modelled (road), rad/s/sqrt(s)."""
+    force_walk: Positive = 0.10
+    """Model error of the tyre force relative to the wheel load, 1/sqrt(s)."""
+    time_correlation: Positive = 3.0
+    """Low-passed slip samples are correlated: the virtual force's variance counts this often."""
     sigma_mu_initial: Share = 0.15
     sigma_mass: Share = 0.02
     sigma_slip_stiffness_ratio: Share = 0.04

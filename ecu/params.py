@@ -57,6 +57,9 @@ PARAMS: Final = np.dtype(
         ("min_speed", "f8"),  # m/s
         ("rls_forgetting", "f8"),  # per 10 ms
         ("mu_drift", "f8"),  # random walk of friction, 1/sqrt(s)
+        ("omega_walk", "f8"),  # random walk of wheel speed, rad/s/sqrt(s)
+        ("force_walk", "f8"),  # random walk of tyre force relative to the wheel load, 1/sqrt(s)
+        ("time_correlation", "f8"),  # of the virtual force: its variance counts this often
         ("sigma_mu_initial", "f8"),  # relative to nominal
         ("sigma_mass", "f8"),  # relative
         ("sigma_slip_stiffness_ratio", "f8"),  # front to rear, relative
