@@ -48,6 +48,8 @@ class Vehicle(_Section):
     imu_x: float
     """Acceleration sensor ahead of the centre of gravity, m."""
     load_transfer_lag: Annotated[float, Field(ge=0, lt=1)]
+    ambient_temperature: Annotated[float, Field(gt=-50, lt=60)] = 15.0
+    """Where no sensor reports it, degC."""
 
 
 class Axle(_Section):
@@ -68,6 +70,12 @@ class Axle(_Section):
     push_out_pressure: Annotated[float, Field(ge=0, lt=10)]
     activation_decel: Annotated[float, Field(ge=0)]
     """The observer of this axle works above this deceleration, m/s^2."""
+    disc_heating: Annotated[float, Field(gt=2e-5, lt=2e-3)] = 2.111e-4
+    """Rise of the disc's temperature per brake work, xi of (3.7), K/J: share of the heat / (mass c_p)."""
+    disc_cooling: Annotated[float, Field(gt=0, lt=0.1)] = 1.792e-3
+    """At standstill, delta_0 of (3.7), 1/s."""
+    disc_cooling_by_speed: Annotated[float, Field(ge=0, lt=0.01)] = 9.108e-5
+    """delta_1 of (3.7), 1/m. Table C.1 prints ten times as much: 400 to 100 degC in a minute at 100 km/h."""
 
 
 class Sensors(_Section):
@@ -245,7 +253,7 @@ def new_params(config: Config) -> RecordArray:
     rear_axle = vehicle.wheelbase - vehicle.front_axle
     for name in ("mass", "wheelbase", "front_axle", "cog_height", "track", "rolling_resistance"):
         row[name] = getattr(vehicle, name)
-    for name in ("pitch_gradient", "imu_x", "load_transfer_lag"):
+    for name in ("pitch_gradient", "imu_x", "load_transfer_lag", "ambient_temperature"):
         row[name] = getattr(vehicle, name)
     row["rear_axle"] = rear_axle
     row["drag_area"] = 0.5 * AIR_DENSITY * vehicle.drag_coefficient * vehicle.frontal_area
@@ -261,6 +269,8 @@ def new_params(config: Config) -> RecordArray:
         for name in ("unloaded_radius", "vertical_stiffness", "wheel_inertia", "slip_stiffness"):
             row[name][corner] = getattr(axle, name)
         for name in ("stiffness_degression", "effective_radius", "mu_nominal", "activation_decel"):
+            row[name][corner] = getattr(axle, name)
+        for name in ("disc_heating", "disc_cooling", "disc_cooling_by_speed"):
             row[name][corner] = getattr(axle, name)
     row["sigma_wheel_speed"], row["sigma_accel"] = sensors.wheel_speed, sensors.accel
     row["sigma_pressure"] = sensors.pressure * BAR

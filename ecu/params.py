@@ -45,6 +45,10 @@ PARAMS: Final = np.dtype(
         ("effective_radius", "f8", (4,)),  # m
         ("push_out_pressure", "f8", (4,)),  # Pa
         ("mu_nominal", "f8", (4,)),  # mean friction by SAE J2522
+        ("disc_heating", "f8", (4,)),  # xi (3.7), K/J
+        ("disc_cooling", "f8", (4,)),  # delta_0 (3.7), 1/s
+        ("disc_cooling_by_speed", "f8", (4,)),  # delta_1 (3.7), 1/m
+        ("ambient_temperature", "f8"),  # where no sensor reports it, degC
         # sensors
         ("sigma_wheel_speed", "f8"),  # rad/s
         ("sigma_accel", "f8"),  # m/s^2
