@@ -1,7 +1,8 @@
 """CONFIG files: one vehicle, its brakes, sensors and tuning, in TOML; checked here, turned into `PARAMS`.
 
-Pressures stand in bar, everything else in SI units. A key that is missing, unknown or out of range is one
-line: the file, the key and what would be right.
+Pressures stand in bar, everything else in SI units. `include = "tuned.toml"` takes from
+another file, named relative to this one, the keys that this one does not give itself. A key that is missing,
+unknown or out of range is one line: the file, the key and what would be right.
 """
 
 import hashlib
@@ -222,13 +223,41 @@ def load_config(path: Path) -> Config:
     """Read and check a CONFIG file.
 
     Raises:
-        UserError: the file cannot be read, or a key is missing, unknown or out of range.
+        UserError: a file cannot be read, or a key is missing, unknown or out of range.
     """
-    content = read_toml(path)
+    own = read_toml(path)
+    source, included = _included(path, own.pop("include")) if "include" in own else (path, {})
     try:
-        return Config.model_validate(content)
+        return Config.model_validate(_merged(own, included))
     except ValidationError as error:
-        raise describe(error, str(path)) from None
+        keys = error.errors()[0]["loc"]
+        elsewhere = _holds(included, keys) and not _holds(own, keys)
+        raise describe(error, str(source if elsewhere else path)) from None
+
+
+def _included(path: Path, name: object) -> tuple[Path, dict[str, Any]]:
+    if not isinstance(name, str) or not name:
+        raise UserError(str(path), "include", 'give the name of a TOML file in "quotes"')
+    source = path.parent / name
+    included = read_toml(source)
+    if "include" in included:
+        raise UserError(str(source), "include", f"an included file includes no other; name it in {path}")
+    return source, included
+
+
+def _merged(own: dict[str, Any], included: dict[str, Any]) -> dict[str, Any]:
+    both = {
+        key: _merged(own[key], value)
+        for key, value in included.items()
+        if isinstance(value, dict) and isinstance(own.get(key), dict)
+    }
+    return included | own | both
+
+
+def _holds(content: Any, keys: tuple[int | str, ...]) -> bool:
+    if not keys:
+        return True
+    return isinstance(content, dict) and keys[0] in content and _holds(content[keys[0]], keys[1:])
 
 
 def config_hash(config: Config) -> str:

@@ -67,7 +67,10 @@ def constants(params: RecordArray) -> Constants:
         float(row["relaxation_length"]),
         float(row["sigma_wheel_speed"]) ** 2,
         float(row["sigma_pressure"]),
-        *(float(row[name]) for name in ("mu_drift", "omega_walk", "force_walk", "time_correlation")),
+        float(row["mu_drift"]),
+        float(row["omega_walk"]),
+        float(row["force_walk"]),
+        float(row["time_correlation"]),
         row["mu_nominal"].copy(),
         row["sigma_mu_initial"] * row["mu_nominal"],
     )
