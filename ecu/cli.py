@@ -209,7 +209,7 @@ def tune(
     seeds: Annotated[
         int, typer.Option("--seeds", min=1, help="Drawn cars to tune on, and as many others to validate")
     ] = 4,
-    generations: Annotated[int, typer.Option("--generations", min=1, help="Of the genetic algorithm")] = 30,
+    generations: Annotated[int, typer.Option("--generations", min=1, help="Of the genetic algorithm")] = 20,
     population: Annotated[int, typer.Option("--population", min=4, help="Tunings in a generation")] = 30,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the genetic algorithm")] = 0,
     out: Annotated[

@@ -1,8 +1,8 @@
 """CONFIG files: one vehicle, its brakes, sensors and tuning, in TOML; checked here, turned into `PARAMS`.
 
-Pressures stand in bar, everything else in SI units. `include = "tuned.toml"` takes from
-another file, named relative to this one, the keys that this one does not give itself. A key that is missing,
-unknown or out of range is one line: the file, the key and what would be right.
+Pressures stand in bar, everything else in SI units. `include = "tuned.toml"` takes from another file, named
+relative to this one, the keys that this one does not give itself. A key that is missing, unknown or out of
+range is one line: the file, the key and what would be right.
 """
 
 import hashlib
@@ -255,9 +255,10 @@ def _merged(own: dict[str, Any], included: dict[str, Any]) -> dict[str, Any]:
 
 
 def _holds(content: Any, keys: tuple[int | str, ...]) -> bool:
-    if not keys:
+    """Return whether the key is there; places within a list count as its key."""
+    if not keys or not isinstance(content, dict):
         return True
-    return isinstance(content, dict) and keys[0] in content and _holds(content[keys[0]], keys[1:])
+    return keys[0] in content and _holds(content[keys[0]], keys[1:])
 
 
 def config_hash(config: Config) -> str:

@@ -41,7 +41,7 @@ _CONSTANTS = frozenset(
 
 def is_source_of_kernels(path: Path) -> bool:
     """Return whether a module holds kernels, or constants that are compiled into them."""
-    return path.name in _CONSTANTS or b"kernel\ndef " in path.read_bytes()
+    return path.name in _CONSTANTS or b"@kernel" in path.read_bytes()
 
 
 @cache
@@ -80,12 +80,6 @@ def kernel(function: Function) -> Function:
     """
     numba.config.CACHE_DIR = _folder(function.__module__.partition(".")[0])
     return cast(Function, numba.njit(**OPTIONS)(function))
-
-
-def parallel_kernel(function: Function) -> Function:
-    """Compile `function` as `kernel` does; its `numba.prange` loops share the processor's cores."""
-    numba.config.CACHE_DIR = _folder(function.__module__.partition(".")[0])
-    return cast(Function, numba.njit(**OPTIONS, parallel=True)(function))
 
 
 class CompileCounter(numba_event.Listener):  # type: ignore[misc]

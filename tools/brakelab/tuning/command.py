@@ -86,7 +86,7 @@ def _record(config: Config, scenarios: Mapping[Path, Scenario], cars: range) -> 
         for path, scenario in scenarios.items():
             for car in cars:
                 recordings.append(recording(drive_once(scenario, config, car)))
-                if recordings[-1].braking.max() < 0:
+                if not (recordings[-1].braking >= 0).any():
                     raise UserError(
                         str(path), "", "has no braking above 15 km/h of a second or more; add one"
                     )
@@ -155,19 +155,13 @@ def _write(out: Path, of: str, rows: Sequence[Row], config: Config) -> None:
 def _tell(out: Path, of: str, rows: Sequence[Row], seeds: int) -> None:
     lines = []
     for row in rows:
-        cells = [row.session]
-        for axle in range(2):
-            before, after = row.before.nrmse[axle], row.after.nrmse[axle]
-            cells += [f"{before:.2f}", f"{after:.2f}", f"{100.0 * (1.0 - after / before):.0f}"]
-        inside = (row.before.inside_2_sigma, row.after.inside_2_sigma)
-        lines.append((*cells, *("{:.0f}, {:.0f}".format(*both) for both in inside)))
-    axles = ("manual", "tuned", "less [%]")
-    columns = (
-        "session",
-        *(f"{axle} {what}" for axle in ("front", "rear") for what in axles),
-        "truth inside 2σ [%], manual",
-        "tuned",
-    )
+        gains = [
+            f"{before:.2f} → {after:.2f} ({100.0 * (after / before - 1.0):+.0f} %)"
+            for before, after in zip(row.before.nrmse, row.after.nrmse, strict=True)
+        ]
+        inside = (*row.before.inside_2_sigma, *row.after.inside_2_sigma)
+        lines.append((row.session, *gains, "{:.0f}, {:.0f} → {:.0f}, {:.0f}".format(*inside)))
+    columns = ("session", "front, manual → tuned", "rear, manual → tuned", "truth inside 2σ [%]")
     below = (
         f"Means over brake applications and {seeds} cars; other cars: none of those that were tuned on, in "
         f"closed loop. The thesis on a car of its own, Table 6.1: {TABLE_6_1}."

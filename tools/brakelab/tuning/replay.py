@@ -7,25 +7,24 @@ is judged on inputs that another one drove.
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.tuning.recording import Errors, Recording, mean_errors
 from ecu.config import Config, new_params
-from ecu.jit import parallel_kernel
+from ecu.jit import kernel
 from ecu.records import OUTPUTS, RecordArray, new_record
 from ecu.step import new_state, step
 
 Array = NDArray[np.float64]
 
 
-@parallel_kernel
+@kernel
 def _replay(
     params: Any, states: Any, outputs: Any, inputs: Any, mu_b: Array, braking: NDArray[np.int64], sums: Array
 ) -> None:
     """Add up squares, truth, samples, samples inside 2 sigma in `sums`, shape (tunings, brakings, 2, 4)."""
-    for one in numba.prange(len(params)):
+    for one in range(len(params)):
         for k in range(len(inputs)):
             step(params[one : one + 1], states[one : one + 1], inputs[k : k + 1], outputs[one : one + 1])
             if braking[k] < 0:

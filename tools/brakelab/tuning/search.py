@@ -24,10 +24,10 @@ from ecu.config import Config
 
 RANGES: Final = {
     "omega_walk": (0.2, 20.0),
-    "force_walk": (0.01, 1.0),
+    "force_walk": (0.01, 10.0),
     "mu_drift": (0.002, 0.2),
     "time_correlation": (0.1, 100.0),
-    "rls_forgetting": (0.5, 0.995),
+    "rls_forgetting": (0.1, 0.995),
 }
 """Where each key of [observer] is searched."""
 DIGITS: Final = 4
