@@ -87,6 +87,7 @@ class Sensors(_Section):
     pressure: Positive = 1.8
     vehicle_speed: Positive = 0.027
     vehicle_speed_delay: Annotated[float, Field(ge=0, lt=1)] = 0.0
+    motor_torque: Annotated[float, Field(ge=0, le=1)] = 0.015
 
 
 class Observer(_Section):
@@ -305,6 +306,7 @@ def new_params(config: Config) -> RecordArray:
     row["sigma_wheel_speed"], row["sigma_accel"] = sensors.wheel_speed, sensors.accel
     row["sigma_pressure"] = sensors.pressure * BAR
     row["sigma_vehicle_speed"] = sensors.vehicle_speed
+    row["sigma_motor_torque"] = sensors.motor_torque
     row["vehicle_speed_delay"] = sensors.vehicle_speed_delay
     row["observer"] = OBSERVERS.index(observer.kind)
     for name in set(Observer.model_fields) - {"kind"}:

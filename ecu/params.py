@@ -55,6 +55,7 @@ PARAMS: Final = np.dtype(
         ("sigma_pressure", "f8"),  # Pa
         ("sigma_vehicle_speed", "f8"),  # m/s
         ("vehicle_speed_delay", "f8"),  # s
+        ("sigma_motor_torque", "f8"),  # of the torque reported, relative
         # observer
         ("observer", "i8"),  # OBSERVERS
         ("activation_decel", "f8", (4,)),  # m/s^2

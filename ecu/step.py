@@ -38,7 +38,7 @@ from ecu.estimation.friction import (
     update_pressure,
 )
 from ecu.estimation.joint.layout import JOINT_STATE, STIFFNESS, V
-from ecu.estimation.joint.learned import keep_joint, publish_friction, restore_joint
+from ecu.estimation.joint.learned import keep_joint, publish_friction, restore_joint, settle_friction
 from ecu.estimation.joint.observer import update_joint
 from ecu.estimation.motion import MOTION_STATE, update_motion, usable
 from ecu.estimation.observer2 import OBSERVER_STATE
@@ -164,6 +164,8 @@ def _estimate(p: Record, s: Record, u: Record, dt: float) -> None:
 def _observe_jointly(p: Record, s: Record, u: Record, braking: bool, dt: float) -> None:
     joint = s.joint
     update_joint(p, joint, u, s.motion, s.wheel_load.load, s.limiter.pressure, braking, dt)
+    if s.application.ended:
+        settle_friction(p, joint, s.learned)
     publish_friction(p, joint, s.friction, s.learned, u, braking, dt)
     keep_joint(joint, s.learned)
     s.speed.started, s.speed.speed = joint.started, joint.x[V]

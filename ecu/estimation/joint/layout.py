@@ -7,7 +7,6 @@ constant, so relinearising cannot invent knowledge of it."""
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ecu.estimation.joint.pressure import PRESSURE_STATE
 from ecu.records import N_JOINT
@@ -27,6 +26,7 @@ MOTOR: Final = 17  # ln of motor torque over reported
 DRAG: Final = 18  # ln of air drag per mass over configured
 OFFSET: Final = 19  # two: pressure [bar] lost beyond push-out and sensor, per axle
 DELAY: Final = 21  # of the speed reference beyond configured [s]
+DRIVE: Final = 22  # two: unreported drive of an axle over mass [m/s^2]; only considered
 N: Final = N_JOINT
 
 WINDOW_STATE: Final = np.dtype(
@@ -35,6 +35,7 @@ WINDOW_STATE: Final = np.dtype(
         ("cycles", "i8"),
         ("accel", "f8"),  # sums over the cycles: specific force in road axes [m/s^2]
         ("lateral", "f8"),  # part of front lateral force along the car [N]
+        ("across", "f8"),  # lateral force over load
         ("speed", "f8"),
         ("change", "f8"),  # dv/dt [m/s^2]
         ("load", "f8", (4,)),  # N
@@ -70,11 +71,13 @@ JOINT_STATE: Final = np.dtype(
         ("window", WINDOW_STATE),
         ("pressures", PRESSURE_STATE),
         ("started", "u1"),
-        ("sliding", "u1"),
+        ("slides", "u1", (4,)),  # 1: the wheel is too far from the car's speed to tell it
+        ("sliding", "i8"),  # number of such wheels
         ("releasing", "u1"),
         ("untrusted_s", "f8"),  # time since a wheel was last believed [s]
         ("hold_s", "f8"),  # no learning for this long, a wheel had left the tyre's range
         ("smooth_pressure", "f8", (4,)),  # bar above push-out
+        ("last_smooth", "f8", (4,)),  # of the last window [bar]
         ("last_pressure", "f8", (4,)),  # of the last window [bar]
         ("last_slip", "f8", (4,)),
         ("slip", "f8", (4,)),
@@ -87,12 +90,3 @@ JOINT_STATE: Final = np.dtype(
     ],
     align=True,
 )
-
-PRIOR: Final[NDArray[np.float64]] = np.zeros(N)
-"""Standard deviations before anything is learned; friction, radii and speed are set apart."""
-PRIOR[STIFFNESS], PRIOR[RATIO] = 0.25, 0.04
-PRIOR[BIAS], PRIOR[SLOPE] = 0.05, 0.3
-PRIOR[MASS], PRIOR[PEAK], PRIOR[LOAD], PRIOR[SINKING] = 0.02, 0.25, 0.05, 0.10
-PRIOR[MOTOR], PRIOR[DRAG] = 0.015, 0.10
-PRIOR[OFFSET : OFFSET + 2] = 0.3
-PRIOR[DELAY] = 0.01

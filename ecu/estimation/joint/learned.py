@@ -8,29 +8,30 @@ import math
 
 import numpy as np
 
+from ecu.estimation.friction import GREATEST_RATIO, LEAST_RATIO, SIGMA_FOR_LEARNING
 from ecu.estimation.joint.layout import (
     BIAS,
     DELAY,
     DRAG,
     MASS,
+    MOTOR,
     MU,
     OFFSET,
     PEAK,
-    PRIOR,
     RADIUS,
     SLOPE,
     STIFFNESS,
     N,
     V,
 )
-from ecu.estimation.joint.observer import RADIUS_COMMON, RADIUS_WHEEL, start_joint
+from ecu.estimation.joint.observer import start_joint
 from ecu.estimation.joint.pressure import follows
+from ecu.estimation.joint.prior import PRIOR, RADIUS_COMMON, RADIUS_WHEEL, set_prior
 from ecu.estimation.motion import usable
 from ecu.jit import Record, kernel
 from ecu.signals import CALLIPER_PRESSURE, FAULT, HOLDING, NOMINAL, OBSERVING, WHEEL_SPEED
 
 BAR = 1e5
-LEAST_RATIO, GREATEST_RATIO = 0.5, 1.5  # of nominal friction
 
 # Standard deviations that a pause of unknown length adds.
 PAUSE = np.zeros(N)
@@ -44,11 +45,11 @@ MU_PAUSE = 0.03
 @kernel
 def restore_joint(params: Record, state: Record, learned: Record) -> None:
     """Begin with what was learned; with the prior where nothing was."""
-    start_joint(params, state)
+    set_prior(params, state)
     x, p = state.x, state.p
     if learned.joint_sigma[MASS] > 0.0:
         for i in range(N):
-            if i in (V, SLOPE) or MU <= i < MU + 4 or OFFSET <= i < OFFSET + 2:
+            if i in (V, SLOPE, MOTOR) or MU <= i < MU + 4 or OFFSET <= i < OFFSET + 2:
                 continue
             x[i] = learned.joint[i]
             for j in range(N):
@@ -77,6 +78,7 @@ def restore_joint(params: Record, state: Record, learned: Record) -> None:
         for j in range(4):
             if (learned.observed_s[i] > 0.0) != (learned.observed_s[j] > 0.0):
                 p[MU + i, MU + j] = 0.0
+    start_joint(state)
 
 
 @kernel
@@ -90,6 +92,24 @@ def keep_joint(state: Record, learned: Record) -> None:
 
 
 @kernel
+def _at_bound(ratio: float) -> bool:
+    return ratio < 1.001 * LEAST_RATIO or ratio > 0.999 * GREATEST_RATIO
+
+
+@kernel
+def settle_friction(params: Record, state: Record, learned: Record) -> None:
+    """Let friction that a braking left unsure or at its bound go back to what is the base of the next."""
+    for i in range(4):
+        unsure = state.p[MU + i, MU + i] > SIGMA_FOR_LEARNING**2
+        if not unsure and not _at_bound(math.exp(state.x[MU + i])):
+            continue
+        state.x[MU + i] = math.log(learned.mu_b[i] / params.mu_nominal[i])
+        for j in range(N):
+            state.p[MU + i, j] = state.p[j, MU + i] = 0.0
+        state.p[MU + i, MU + i] = (learned.sigma_mu_b[i] / learned.mu_b[i]) ** 2 + MU_PAUSE**2
+
+
+@kernel
 def publish_friction(
     params: Record, state: Record, friction: Record, learned: Record, inputs: Record, braking: bool, dt: float
 ) -> None:
@@ -97,11 +117,14 @@ def publish_friction(
     friction.reset = state.reset
     for i in range(4):
         nominal = params.mu_nominal[i]
-        mu = min(max(nominal * math.exp(state.x[MU + i]), LEAST_RATIO * nominal), GREATEST_RATIO * nominal)
+        ratio = math.exp(state.x[MU + i])
+        mu = nominal * ratio
         variance = state.p[MU + i, MU + i]
         if state.observed[i] and follows(state.pressures, i):
             above = max(state.smooth_pressure[i], 1.0)
             variance += state.pressures.variance[i] / (above * above)
+        if _at_bound(ratio):
+            variance = max(variance, params.sigma_mu_initial**2)
         friction.mu[i], friction.sigma[i] = mu, mu * math.sqrt(variance)
         if braking and state.observed[i]:
             friction.observed_s[i] += dt

@@ -13,20 +13,17 @@ When a wheel runs past the tyre's range all but the speed goes back to what was 
 
 import math
 
-import numpy as np
-
-from ecu.estimation.joint.kalman import correct, drift_speed, walk_friction
+from ecu.estimation.friction import GREATEST_RATIO, LEAST_RATIO
+from ecu.estimation.joint.kalman import correct
 from ecu.estimation.joint.layout import (
     BIAS,
     DELAY,
     DRAG,
     LOAD,
     MASS,
-    MOTOR,
     MU,
     OFFSET,
     PEAK,
-    PRIOR,
     RADIUS,
     RATIO,
     SINKING,
@@ -35,6 +32,9 @@ from ecu.estimation.joint.layout import (
     N,
     V,
 )
+from ecu.estimation.joint.pressure import follows
+from ecu.estimation.joint.prior import pressure_change, set_prior, walk
+from ecu.estimation.joint.snapshot import go_back, keep, keep_newer
 from ecu.estimation.joint.wheel import brake_lever, predict_balance, predict_wheel
 from ecu.estimation.joint.window import close_window, gather, open_window
 from ecu.estimation.motion import usable
@@ -52,33 +52,18 @@ LEAST_SPEED = 3.4  # m/s
 APPLIED = 1.0  # bar above push-out: the brakes act
 MOTORS = 100.0  # N m of all motors: their torque is worth looking at
 LARGE_SLIP = 0.12
+SLIDING_FORCE = 0.3  # relative error of a sliding wheel's force if it is taken for its brake force
 SLIDING_FLOOR = 5.0  # m/s, that it is relative to at least
 BELIEVED_AFTER = 3.0  # s without a wheel that rolls, brakes released
+RELEASE = 0.15  # relative fall in a window: pressure, slip and force lag differently and teach nothing
 HOLD_S = 0.4
 SNAPSHOT_S = 0.2
 
-# Standard deviations of friction's prior, of its logarithm: all four together, per axle, per wheel.
-MU_COMMON, MU_AXLE, MU_WHEEL = 0.13, 0.17, 0.06
-RADIUS_COMMON, RADIUS_WHEEL = 0.004, 0.0015
-
-# Random walks per square root of a second.
-WALK = np.zeros(N)
-WALK[V] = 0.02
-WALK[STIFFNESS], WALK[RATIO] = 0.01, 0.0005
-WALK[RADIUS : RADIUS + 4] = 1e-5
-WALK[BIAS], WALK[SLOPE] = 0.0005, 0.05
-WALK[PEAK], WALK[LOAD], WALK[SINKING] = 0.01, 0.0005, 0.0005
-WALK[MASS], WALK[MOTOR], WALK[DRAG] = 1e-5, 1e-5, 0.0005
-WALK[DELAY] = 1e-4
-MU_WALK_COMMON, MU_WALK_AXLE, MU_WALK_WHEEL = 0.15, 0.03, 0.005
-MU_WALK_PRESSURE = 0.05  # of an axle's friction, per relative change of its pressure
-RELEASE = 0.15  # relative fall in a window: pressure, slip and force lag differently and teach nothing
-MU_WALK_HELD = 0.003
-CUT_OFF = 1.0
-
 BALANCE_FLOOR = 0.01  # m/s^2 that the balance leaves out
 BALANCE_SHARE = 0.004  # of the deceleration
+SKEW_FOLLOWED, SKEW_REPORTED = 0.5, 3.0  # windows between pressure and force; a foreign log is worse
 TRANSIENT = 0.5  # of a slip's change since the last window
+CORNERING = 1.0  # of slip, per squared adhesion used sideways: then load and slip angle are not well known
 UNEXPLAINED = 0.15  # m/s^2 while rolling: someone drives or brakes the car without saying so
 TWIN = 3.0  # bar, of a pressure taken from the other side
 LOW_SPEED_NOISE = 0.15  # m/s
@@ -86,42 +71,12 @@ JUMP = 100.0  # squared test ratio: while wheels slide such a reference is belie
 
 
 @kernel
-def start_joint(params: Record, state: Record) -> None:
-    """Set the state before anything is learned."""
-    x, p = state.x, state.p
-    for i in range(N):
-        x[i] = 0.0
-        for j in range(N):
-            p[i, j] = 0.0
-        p[i, i] = PRIOR[i] ** 2
-    p[V, V] = 0.25
-    for i in range(4):
-        for j in range(4):
-            p[RADIUS + i, RADIUS + j] = RADIUS_COMMON**2 + (RADIUS_WHEEL**2 if i == j else 0.0)
-            axle = MU_AXLE**2 if i // 2 == j // 2 else 0.0
-            p[MU + i, MU + j] = MU_COMMON**2 + axle + (MU_WHEEL**2 if i == j else 0.0)
+def start_joint(state: Record) -> None:
+    """Begin with what the state knows, the speed apart."""
+    state.started = 0
     open_window(state)
-    _keep(state, 0)
-    _keep(state, 1)
-
-
-@kernel
-def _keep(state: Record, row: int) -> None:
-    for i in range(N):
-        state.kept_x[row, i] = state.x[i]
-        for j in range(N):
-            state.kept_p[row, i, j] = state.p[i, j]
-
-
-@kernel
-def _go_back(state: Record) -> None:
-    """Return to the older snapshot in all but the speed, of which little is sure now."""
-    for i in range(N):
-        if i != V:
-            state.x[i] = state.kept_x[1, i]
-        for j in range(N):
-            state.p[i, j] = state.kept_p[1, i, j] if i != V and j != V else 0.0
-    state.p[V, V] = 0.25
+    keep(state, 0)
+    keep(state, 1)
 
 
 @kernel
@@ -151,18 +106,9 @@ def _learning_forbidden(inputs: Record, braking: bool) -> bool:
 
 
 @kernel
-def _pressure_change(state: Record, left: int) -> float:
-    """Return the relative change of an axle's pressure since the last window."""
-    before = state.last_pressure[left] + state.last_pressure[left + 1]
-    now = state.window.pressure[left] + state.window.pressure[left + 1]
-    change: float = (now - before) / (0.5 * abs(now + before) + 20.0)
-    return change
-
-
-@kernel
 def _watch_release(state: Record, braking: bool) -> None:
     """When the brakes are released, friction goes back to what it was before that could disturb it."""
-    falling = braking and min(_pressure_change(state, 0), _pressure_change(state, 2)) < -RELEASE
+    falling = braking and min(pressure_change(state, 0), pressure_change(state, 2)) < -RELEASE
     if falling and not state.releasing:
         for i in range(MU, MU + 4):
             state.x[i] = state.kept_x[1, i]
@@ -190,23 +136,6 @@ def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> 
         free[BIAS] = free[DRAG] = state.window.motor_reported
         if motors:
             free[STIFFNESS] = free[RATIO] = free[MASS] = free[LOAD] = free[PEAK] = 1
-
-
-@kernel
-def _walk(state: Record, braking: bool, time: float) -> None:
-    p = state.p
-    drift_speed(state, time)
-    for i in range(N):
-        p[i, i] += WALK[i] ** 2 * time
-    if braking:
-        rise_front = max(_pressure_change(state, 0), 0.0)
-        rise_rear = max(_pressure_change(state, 2), 0.0)
-        front = MU_WALK_AXLE**2 * time + (MU_WALK_PRESSURE * rise_front) ** 2
-        rear = MU_WALK_AXLE**2 * time + (MU_WALK_PRESSURE * rise_rear) ** 2
-        walk_friction(state, MU_WALK_COMMON**2 * time, front, rear, MU_WALK_WHEEL**2 * time)
-    elif p[MU, MU] < MU_COMMON**2 + MU_AXLE**2:
-        held = MU_WALK_HELD**2 * time
-        walk_friction(state, held, held, held, 0.2 * held)
 
 
 @kernel
@@ -257,13 +186,13 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
             w.pressure[i] = state.smooth_pressure[i] = 0.0  # noise about zero is no torque
         motors += abs(w.motor[i])
     moving = x[V] > LEAST_SPEED
-    _walk(state, braking, time)
+    walk(state, braking and moving, time)
     _watch_release(state, braking)
     learning = (
         moving and state.hold_s <= 0.0 and w.motor_known != 0 and not _learning_forbidden(inputs, braking)
     )
     if learning and not braking and motors <= MOTORS:
-        learning = w.accel_cycles == w.cycles and abs(_balance(params, state)) < UNEXPLAINED
+        learning = w.accel_cycles == w.cycles and abs(predict_balance(params, state)) < UNEXPLAINED
     _choose_free(state, braking, motors > MOTORS, learning)
     before = x[V]
     if w.reference_samples > 0:
@@ -276,21 +205,19 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
         if state.ratio[5] > JUMP and state.hold_s > 0.0:
             x[V] += w.reference
             state.p[V, V] += 0.25
-    state.sliding = 0
     state.untrusted_s += time
     for i in range(4):
         state.observed[i] = 0
         if w.omega_samples[i] == 0:
             continue
-        if _slides(params, state, i):
-            state.sliding = 1
-        else:
+        state.slides[i] = 1 if _slides(params, state, i) else 0
+        if not state.slides[i]:
             state.untrusted_s = 0.0
             _fuse_wheel(params, state, i, before, moving, learning and braking)
     if learning and w.accel_cycles == w.cycles and (braking or w.motor_reported):
         _fuse_balance(params, state)
     for i in range(4):
-        state.last_pressure[i] = w.pressure[i]
+        state.last_pressure[i], state.last_smooth[i] = w.pressure[i], state.smooth_pressure[i]
 
 
 @kernel
@@ -307,9 +234,7 @@ def _fuse_wheel(params: Record, state: Record, i: int, before: float, moving: bo
     w, x = state.window, state.x
     n = w.omega_samples[i]
     ground = max(w.ground[i] + x[V] - before, 0.0)
-    omega = predict_wheel(
-        params, state, i, ground, w.pressure[i], state.smooth_pressure[i], w.motor[i], w.load[i], w.change
-    )  # fmt: skip
+    omega = predict_wheel(params, state, i, ground)
     if not moving:
         for j in range(N):
             state.h[j] = 0.0
@@ -320,36 +245,36 @@ def _fuse_wheel(params: Record, state: Record, i: int, before: float, moving: bo
         )
         return
     per_bar = state.h[OFFSET + i // 2]
-    variance = params.sigma_wheel_speed**2 / n + per_bar**2 * w.pressure_variance[i]
+    variance = params.sigma_wheel_speed**2 / n
+    variance += per_bar**2 * (w.pressure_variance[i] + _skew(state, i) ** 2)
     transient = TRANSIENT * (state.slip[i] - state.last_slip[i]) * ground / params.wheel_radius[i]
-    variance += transient * transient
+    corner = CORNERING * w.across * w.across * state.slip[i] * ground / params.wheel_radius[i]
+    variance += transient * transient + corner * corner
     state.last_slip[i] = state.slip[i]
     state.ratio[i] = correct(state, w.omega[i] - omega, variance)
     state.observed[i] = 1 if observing and state.smooth_pressure[i] > 2.0 * APPLIED else 0
 
 
 @kernel
-def _balance(params: Record, state: Record) -> float:
-    w = state.window
-    left: float = predict_balance(
-        params, state, w.pressure, state.smooth_pressure, w.motor, w.load, w.accel, w.change, state.x[V],
-        w.lateral,
-    )  # fmt: skip
-    return left
+def _skew(state: Record, i: int) -> float:
+    """Return what a pressure [bar] may be off because it acts earlier or later than it is told."""
+    windows = SKEW_FOLLOWED if follows(state.pressures, i) else SKEW_REPORTED
+    skew: float = windows * (state.smooth_pressure[i] - state.last_smooth[i])
+    return skew
 
 
 @kernel
 def _fuse_balance(params: Record, state: Record) -> None:
     w = state.window
-    left = _balance(params, state)
+    left = predict_balance(params, state)
     variance = params.sigma_accel**2 / w.cycles + BALANCE_FLOOR**2 + (BALANCE_SHARE * w.accel) ** 2
     for i in range(4):
         per_bar = brake_lever(params, i) * params.mu_nominal[i] * math.exp(state.x[MU + i])
         per_bar /= params.wheel_radius[i] * params.mass
         if state.smooth_pressure[i] > 0.5:
-            variance += per_bar**2 * w.pressure_variance[i]
-            change = w.pressure[i] - state.last_pressure[i]
-            variance += (TRANSIENT * per_bar * change) ** 2
+            variance += per_bar**2 * (w.pressure_variance[i] + _skew(state, i) ** 2)
+        if state.slides[i]:
+            variance += (SLIDING_FORCE * per_bar * w.pressure[i]) ** 2
     state.ratio[4] = correct(state, -left, variance)
 
 
@@ -361,8 +286,9 @@ def _look_after(params: Record, state: Record, braking: bool) -> None:
     for i in range(N):
         total += x[i] + state.p[i, i]
     if not math.isfinite(total):
-        start_joint(params, state)
-        state.started, state.reset = 0, 1
+        set_prior(params, state)
+        start_joint(state)
+        state.reset = 1
         return
     if state.untrusted_s > BELIEVED_AFTER and not braking:
         state.started = 0  # then it is the speed that is wrong
@@ -371,17 +297,13 @@ def _look_after(params: Record, state: Record, braking: bool) -> None:
             p_v[V, j] = p_v[j, V] = 0.0
         p_v[V, V] = 0.25
     state.kept_s += w.time
-    if state.sliding and braking and state.hold_s <= 0.0:
-        _go_back(state)
-    if state.sliding:
+    sliding = state.slides[0] + state.slides[1] + state.slides[2] + state.slides[3]
+    if sliding > state.sliding and braking and state.hold_s <= 0.0:
+        go_back(state)
+    if sliding > 1 or sliding != state.sliding:
         state.hold_s = HOLD_S
-    elif state.hold_s <= 0.0 and not state.releasing and state.kept_s >= SNAPSHOT_S:
-        for i in range(N):
-            state.kept_x[1, i] = state.kept_x[0, i]
-            for j in range(N):
-                state.kept_p[1, i, j] = state.kept_p[0, i, j]
-        _keep(state, 0)
-        state.kept_s = 0.0
+    state.sliding = sliding
+    if state.hold_s <= 0.0 and not state.releasing and state.kept_s >= SNAPSHOT_S:
+        keep_newer(state)
     for i in range(4):
-        limit = math.log(1.5)
-        x[MU + i] = min(max(x[MU + i], -math.log(2.0)), limit)
+        x[MU + i] = min(max(x[MU + i], math.log(LEAST_RATIO)), math.log(GREATEST_RATIO))

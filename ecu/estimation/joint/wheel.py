@@ -5,6 +5,7 @@ load gives slip by the inverse of the tyre's curve, slip and radius give wheel s
 
     F = -(T + I dv/dt / r) / r        n = F / F_Z     u = n / D
     slip = (c D / C) tan(asin(u) / c)                 inverse Magic Formula with E = 0
+    slip_x = slip(n_xy) n_x / n_xy                    n_xy^2 = n_x^2 + n_y^2, as a tyre that corners
     omega = v_i (1 + slip) / r        braking; v_i / ((1 - slip) r) driving (A.6)
 
 Car: m (a_x - b) + drag + sum (T_i + I_i domega_i/dt) / r_i = 0.
@@ -15,6 +16,7 @@ import math
 from ecu.estimation.joint.layout import (
     BIAS,
     DRAG,
+    DRIVE,
     LOAD,
     MASS,
     MOTOR,
@@ -49,6 +51,17 @@ def slip_of_force(used: float, stiffness: float, peak: float) -> tuple[float, fl
 
 
 @kernel
+def combined_slip(used: float, across: float, stiffness: float, peak: float) -> tuple[float, float]:
+    """Return longitudinal slip and its derivative by `used`, of a tyre that carries `across` too."""
+    if across == 0.0:
+        return slip_of_force(used, stiffness, peak)
+    both = math.sqrt(used * used + across * across)
+    slip, slope = slip_of_force(both, stiffness, peak)
+    along = used / both
+    return slip * along, slope * along * along + slip / both * (1.0 - along * along)
+
+
+@kernel
 def brake_lever(params: Record, i: int) -> float:
     """Return brake torque per friction and pressure [N m/bar] of a wheel."""
     lever: float = 2.0 * BAR * params.piston_area[i] * params.effective_radius[i]
@@ -74,36 +87,25 @@ def brake_torque(params: Record, state: Record, i: int, pressure: float) -> floa
 
 
 @kernel
-def predict_wheel(
-    params: Record,
-    state: Record,
-    i: int,
-    ground: float,
-    pressure: float,
-    smooth: float,
-    motor: float,
-    load: float,
-    change: float,
-) -> float:
-    """Return the wheel speed [rad/s] to expect and set `state.h`, `state.slip`, `state.force` of the wheel.
+def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float:
+    """Return the mean speed of a wheel [rad/s] to expect of this window.
+
+    Sets `state.h`, and slip and force of the wheel. Derivatives are taken at the smooth pressure: were the
+    noise of the window's own in both, it would weaken what is learned.
 
     Args:
         params: `PARAMS`.
         state: `JOINT_STATE`.
         i: wheel.
         ground: speed of the wheel over ground in its direction [m/s].
-        pressure: above push-out [bar].
-        smooth: the same with less noise; derivatives use it, or its noise would weaken what is learned.
-        motor: reported motor torque [N m].
-        load: by the configured mass [N].
-        change: dv/dt [m/s^2].
     """
-    x, h = state.x, state.h
+    x, h, w = state.x, state.h, state.window
+    load, pressure, smooth = w.load[i], w.pressure[i], state.smooth_pressure[i]
     r, sinking = radius(params, state, i, load)
-    motor *= math.exp(x[MOTOR])
+    motor = w.motor[i] * math.exp(x[MOTOR])
     # With the mass, so that nothing but air drag tells a scale common to mass and all torques.
     heavier = math.exp(x[MASS])
-    own = heavier * (params.rolling_resistance * load * r + params.wheel_inertia[i] * change / r)
+    own = heavier * (params.rolling_resistance * load * r + params.wheel_inertia[i] * w.change / r)
     force = -(brake_torque(params, state, i, pressure) + motor + own) / r
     scale = 1.0 / (heavier * load)
     relative = load / params.static_load[i]
@@ -112,16 +114,15 @@ def predict_wheel(
     stiffness = params.slip_stiffness[i] * math.exp(x[STIFFNESS] + rear) * relative**-exponent
     peak = NOMINAL_PEAK * math.exp(x[PEAK]) * relative**-PEAK_DEGRESSION
     used = force * scale
-    slip, slope = slip_of_force(used, stiffness, peak)
+    slip, slope = combined_slip(used, w.across, stiffness, peak)
     state.slip[i], state.force[i] = slip, force
     if slip < 0.0:
         omega, by_slip = ground * (1.0 + slip) / r, ground / r
     else:
         keep = max(1.0 - slip, 0.1)
         omega, by_slip = ground / (keep * r), ground / (keep * keep * r)
-    # Derivatives at the smooth pressure: were its noise in both, it would weaken what is learned.
     used += (brake_torque(params, state, i, pressure) - brake_torque(params, state, i, smooth)) * scale / r
-    slip, slope = slip_of_force(used, stiffness, peak)
+    slip, slope = combined_slip(used, w.across, stiffness, peak)
     for j in range(N):
         h[j] = 0.0
     h[V] = omega / max(ground, 0.1)
@@ -139,46 +140,36 @@ def predict_wheel(
     h[PEAK] = by_slip * (slip - slope * used)
     h[RADIUS + i] = -omega
     h[SINKING] = -omega * sinking / r
+    if not w.motor_reported:
+        h[DRIVE + i // 2] = 0.5 * by_force * params.mass
     return omega
 
 
 @kernel
-def predict_balance(
-    params: Record,
-    state: Record,
-    pressure: Record,
-    smooth: Record,
-    motor: Record,
-    load: Record,
-    accel: float,
-    change: float,
-    speed: float,
-    lateral: float,
-) -> float:
-    """Return what is left of the car's longitudinal balance over the configured mass [m/s^2]; sets `state.h`.
-
-    Arguments as in `predict_wheel`, of shape (4,); `accel`: specific force in road axes [m/s^2]; `lateral`:
-    the lateral forces' part along the car [N].
-    """
-    x, h, mass = state.x, state.h, params.mass
+def predict_balance(params: Record, state: Record) -> float:
+    """Return what is left of the car's balance over the configured mass [m/s^2]; sets `state.h`."""
+    x, h, w, mass = state.x, state.h, state.window, params.mass
     for j in range(N):
         h[j] = 0.0
-    heavier = math.exp(x[MASS])
+    speed, heavier = x[V], math.exp(x[MASS])
     drag = heavier * math.exp(x[DRAG]) * params.drag_area * speed * abs(speed) / mass
-    left = heavier * (accel - x[BIAS] + lateral / mass) + drag
+    left = heavier * (w.accel - x[BIAS] + w.lateral / mass) + drag
     for i in range(4):
-        r, _ = radius(params, state, i, load[i])
-        driven = motor[i] * math.exp(x[MOTOR])
-        own = heavier * (params.rolling_resistance * load[i] * r + params.wheel_inertia[i] * change / r)
-        left += (brake_torque(params, state, i, pressure[i]) + driven + own) / (r * mass)
+        r, _ = radius(params, state, i, w.load[i])
+        driven = w.motor[i] * math.exp(x[MOTOR])
+        own = heavier * (params.rolling_resistance * w.load[i] * r + params.wheel_inertia[i] * w.change / r)
+        left += (brake_torque(params, state, i, w.pressure[i]) + driven + own) / (r * mass)
+        smooth = state.smooth_pressure[i]
         # Derivative by the mass: by the torques, not by the noisy acceleration that they equal.
-        h[MASS] -= (brake_torque(params, state, i, smooth[i]) + driven) / (r * mass)
+        h[MASS] -= (brake_torque(params, state, i, smooth) + driven) / (r * mass)
         per_bar = brake_lever(params, i) * params.mu_nominal[i] * math.exp(x[MU + i]) / (r * mass)
-        h[MU + i] = per_bar * max(smooth[i] - x[OFFSET + i // 2], 0.0)
-        if smooth[i] > 0.5:
+        h[MU + i] = per_bar * max(smooth - x[OFFSET + i // 2], 0.0)
+        if smooth > 0.5:
             h[OFFSET + i // 2] -= per_bar
         h[MOTOR] += driven / (r * mass)
     h[BIAS] = -heavier
     h[DRAG] = drag
+    if not w.motor_reported:
+        h[DRIVE] = h[DRIVE + 1] = -1.0
     result: float = left
     return result

@@ -10,6 +10,7 @@ from ecu.estimation.joint.layout import BIAS, DELAY, SLOPE, V
 from ecu.estimation.joint.pressure import correct_pressure, follow_demand, follows
 from ecu.estimation.motion import corner_speed, fresh, motor_torque, motor_torque_known, usable
 from ecu.jit import Record, kernel
+from ecu.params import GRAVITY
 from ecu.signals import (
     ACCEL_X,
     CALLIPER_PRESSURE,
@@ -28,7 +29,7 @@ SMOOTHING = 0.2  # s, of the pressure that derivatives use
 def open_window(state: Record) -> None:
     """Begin a window."""
     w = state.window
-    w.time, w.cycles, w.accel, w.lateral, w.speed, w.change = 0.0, 0, 0.0, 0.0, 0.0, 0.0
+    w.time, w.cycles, w.accel, w.lateral, w.across, w.speed, w.change = 0.0, 0, 0.0, 0.0, 0.0, 0.0, 0.0
     w.reference, w.reference_change, w.reference_samples, w.accel_cycles = 0.0, 0.0, 0, 0
     w.motor_known, w.motor_reported = 1, 0
     for i in range(4):
@@ -59,6 +60,7 @@ def gather(
     w.change += change
     w.speed += x[V]
     front_lateral = params.mass * motion.accel_y * params.rear_axle / params.wheelbase
+    w.across += motion.accel_y / GRAVITY
     w.lateral += front_lateral * math.sin(motion.steering)
     for i in range(4):
         w.load[i] += load[i]
@@ -102,6 +104,7 @@ def close_window(params: Record, state: Record) -> None:
     w.change /= n
     w.speed /= n
     w.lateral /= n
+    w.across /= n
     for i in range(4):
         w.load[i] /= n
         w.motor[i] /= n

@@ -1,0 +1,35 @@
+"""Snapshots of what was known a moment ago, to go back to when it was learned from a wheel about to slide."""
+
+from ecu.estimation.joint.layout import N, V
+from ecu.jit import Record, kernel
+
+
+@kernel
+def keep(state: Record, row: int) -> None:
+    """Write what is known now over snapshot `row`."""
+    for i in range(N):
+        state.kept_x[row, i] = state.x[i]
+        for j in range(N):
+            state.kept_p[row, i, j] = state.p[i, j]
+
+
+@kernel
+def go_back(state: Record) -> None:
+    """Return to the older snapshot in all but the speed, of which little is sure now."""
+    for i in range(N):
+        if i != V:
+            state.x[i] = state.kept_x[1, i]
+        for j in range(N):
+            state.p[i, j] = state.kept_p[1, i, j] if i != V and j != V else 0.0
+    state.p[V, V] = 0.25
+
+
+@kernel
+def keep_newer(state: Record) -> None:
+    """Make the newer snapshot the older one and take a new one."""
+    for i in range(N):
+        state.kept_x[1, i] = state.kept_x[0, i]
+        for j in range(N):
+            state.kept_p[1, i, j] = state.kept_p[0, i, j]
+    keep(state, 0)
+    state.kept_s = 0.0
