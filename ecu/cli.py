@@ -17,7 +17,7 @@ from ecu import __version__
 from ecu.errors import RunFault, UserError
 from ecu.resources import named
 
-LABORATORY = ("bokeh", "jinja2", "pyarrow")
+LABORATORY = ("bokeh", "jinja2", "pyarrow", "pymoo")
 """What the extra `lab` installs, by the names that are imported."""
 
 app = typer.Typer(
@@ -183,6 +183,45 @@ def report(
 
     command.report(result, truth, out, timing)
     return 0
+
+
+@app.command()
+def tune(
+    config: Config,
+    scenario: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--scenario",
+            parser=_scenario,
+            metavar="SCENARIO",
+            help="Drives to tune on, repeatable; default: fixed-pedal, bursts",
+        ),
+    ] = None,
+    validate: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--validate",
+            parser=_scenario,
+            metavar="SCENARIO",
+            help="Drives to validate on, repeatable; default: fixed-decel, fade",
+        ),
+    ] = None,
+    seeds: Annotated[
+        int, typer.Option("--seeds", min=1, help="Drawn cars to tune on, and as many others to validate")
+    ] = 4,
+    generations: Annotated[int, typer.Option("--generations", min=1, help="Of the genetic algorithm")] = 20,
+    population: Annotated[int, typer.Option("--population", min=4, help="Tunings in a generation")] = 30,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the genetic algorithm")] = 0,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="TUNED.toml", help="What a CONFIG can `include`")
+    ] = Path("tuned.toml"),
+) -> int:
+    """Noise of Observer 2 by a genetic algorithm on simulated drives. Ctrl-C: the best so far."""
+    from brakelab.tuning import command
+
+    trained = scenario or [_scenario(name) for name in command.FIRST_SESSION]
+    validated = validate or [_scenario(name) for name in command.LATER_SESSIONS]
+    return command.tune(config, trained, validated, seeds, command.Budget(generations, population, seed), out)
 
 
 @app.command()

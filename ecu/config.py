@@ -1,7 +1,8 @@
 """CONFIG files: one vehicle, its brakes, sensors and tuning, in TOML; checked here, turned into `PARAMS`.
 
-Pressures stand in bar, everything else in SI units. A key that is missing, unknown or out of range is one
-line: the file, the key and what would be right.
+Pressures stand in bar, everything else in SI units. `include = "tuned.toml"` takes from another file, named
+relative to this one, the keys that this one does not give itself. A key that is missing, unknown or out of
+range is one line: the file, the key and what would be right.
 """
 
 import hashlib
@@ -48,6 +49,8 @@ class Vehicle(_Section):
     imu_x: float
     """Acceleration sensor ahead of the centre of gravity, m."""
     load_transfer_lag: Annotated[float, Field(ge=0, lt=1)]
+    ambient_temperature: Annotated[float, Field(gt=-50, lt=60)] = 15.0
+    """Where no sensor reports it, degC."""
 
 
 class Axle(_Section):
@@ -68,6 +71,12 @@ class Axle(_Section):
     push_out_pressure: Annotated[float, Field(ge=0, lt=10)]
     activation_decel: Annotated[float, Field(ge=0)]
     """The observer of this axle works above this deceleration, m/s^2."""
+    disc_heating: Annotated[float, Field(gt=2e-5, lt=2e-3)] = 2.111e-4
+    """Rise of the disc's temperature per brake work, xi of (3.7), K/J: share of the heat / (mass c_p)."""
+    disc_cooling: Annotated[float, Field(gt=0, lt=0.1)] = 1.792e-3
+    """At standstill, delta_0 of (3.7), 1/s."""
+    disc_cooling_by_speed: Annotated[float, Field(ge=0, lt=0.01)] = 9.108e-5
+    """delta_1 of (3.7), 1/m. Table C.1 prints ten times as much: 400 to 100 degC in a minute at 100 km/h."""
 
 
 class Sensors(_Section):
@@ -92,6 +101,13 @@ class Observer(_Section):
     min_speed: Positive = 15 / 3.6
     rls_forgetting: Share = 0.93
     mu_drift: Positive = 0.02
+    """Random walk of friction, 1/sqrt(s)."""
+    omega_walk: Positive = 2.0
+    """Random walk of wheel speed by torques that are not modelled (road), rad/s/sqrt(s)."""
+    force_walk: Positive = 0.10
+    """Model error of the tyre force relative to the wheel load, 1/sqrt(s)."""
+    time_correlation: Positive = 3.0
+    """Low-passed slip samples are correlated: the virtual force's variance counts this often."""
     sigma_mu_initial: Share = 0.15
     sigma_mass: Share = 0.02
     sigma_slip_stiffness_ratio: Share = 0.04
@@ -208,13 +224,42 @@ def load_config(path: Path) -> Config:
     """Read and check a CONFIG file.
 
     Raises:
-        UserError: the file cannot be read, or a key is missing, unknown or out of range.
+        UserError: a file cannot be read, or a key is missing, unknown or out of range.
     """
-    content = read_toml(path)
+    own = read_toml(path)
+    source, included = _included(path, own.pop("include")) if "include" in own else (path, {})
     try:
-        return Config.model_validate(content)
+        return Config.model_validate(_merged(own, included))
     except ValidationError as error:
-        raise describe(error, str(path)) from None
+        keys = error.errors()[0]["loc"]
+        elsewhere = _holds(included, keys) and not _holds(own, keys)
+        raise describe(error, str(source if elsewhere else path)) from None
+
+
+def _included(path: Path, name: object) -> tuple[Path, dict[str, Any]]:
+    if not isinstance(name, str) or not name:
+        raise UserError(str(path), "include", 'give the name of a TOML file in "quotes"')
+    source = path.parent / name
+    included = read_toml(source)
+    if "include" in included:
+        raise UserError(str(source), "include", f"an included file includes no other; name it in {path}")
+    return source, included
+
+
+def _merged(own: dict[str, Any], included: dict[str, Any]) -> dict[str, Any]:
+    both = {
+        key: _merged(own[key], value)
+        for key, value in included.items()
+        if isinstance(value, dict) and isinstance(own.get(key), dict)
+    }
+    return included | own | both
+
+
+def _holds(content: Any, keys: tuple[int | str, ...]) -> bool:
+    """Return whether the key is there; places within a list count as its key."""
+    if not keys or not isinstance(content, dict):
+        return True
+    return keys[0] in content and _holds(content[keys[0]], keys[1:])
 
 
 def config_hash(config: Config) -> str:
@@ -239,7 +284,7 @@ def new_params(config: Config) -> RecordArray:
     rear_axle = vehicle.wheelbase - vehicle.front_axle
     for name in ("mass", "wheelbase", "front_axle", "cog_height", "track", "rolling_resistance"):
         row[name] = getattr(vehicle, name)
-    for name in ("pitch_gradient", "imu_x", "load_transfer_lag"):
+    for name in ("pitch_gradient", "imu_x", "load_transfer_lag", "ambient_temperature"):
         row[name] = getattr(vehicle, name)
     row["rear_axle"] = rear_axle
     row["drag_area"] = 0.5 * AIR_DENSITY * vehicle.drag_coefficient * vehicle.frontal_area
@@ -255,6 +300,8 @@ def new_params(config: Config) -> RecordArray:
         for name in ("unloaded_radius", "vertical_stiffness", "wheel_inertia", "slip_stiffness"):
             row[name][corner] = getattr(axle, name)
         for name in ("stiffness_degression", "effective_radius", "mu_nominal", "activation_decel"):
+            row[name][corner] = getattr(axle, name)
+        for name in ("disc_heating", "disc_cooling", "disc_cooling_by_speed"):
             row[name][corner] = getattr(axle, name)
     row["sigma_wheel_speed"], row["sigma_accel"] = sensors.wheel_speed, sensors.accel
     row["sigma_pressure"] = sensors.pressure * BAR

@@ -45,6 +45,10 @@ PARAMS: Final = np.dtype(
         ("effective_radius", "f8", (4,)),  # m
         ("push_out_pressure", "f8", (4,)),  # Pa
         ("mu_nominal", "f8", (4,)),  # mean friction by SAE J2522
+        ("disc_heating", "f8", (4,)),  # xi (3.7), K/J
+        ("disc_cooling", "f8", (4,)),  # delta_0 (3.7), 1/s
+        ("disc_cooling_by_speed", "f8", (4,)),  # delta_1 (3.7), 1/m
+        ("ambient_temperature", "f8"),  # where no sensor reports it, degC
         # sensors
         ("sigma_wheel_speed", "f8"),  # rad/s
         ("sigma_accel", "f8"),  # m/s^2
@@ -58,6 +62,9 @@ PARAMS: Final = np.dtype(
         ("min_speed", "f8"),  # m/s
         ("rls_forgetting", "f8"),  # per 10 ms
         ("mu_drift", "f8"),  # random walk of friction, 1/sqrt(s)
+        ("omega_walk", "f8"),  # random walk of wheel speed, rad/s/sqrt(s)
+        ("force_walk", "f8"),  # random walk of tyre force relative to the wheel load, 1/sqrt(s)
+        ("time_correlation", "f8"),  # of the virtual force: its variance counts this often
         ("sigma_mu_initial", "f8"),  # relative to nominal
         ("sigma_mass", "f8"),  # relative
         ("sigma_slip_stiffness_ratio", "f8"),  # front to rear, relative

@@ -83,6 +83,7 @@ LEARNED: Final = np.dtype(
         ("radius_sigma", "f8", (4,)),
         ("joint", "f8", (N_JOINT,)),  # the joint observer's states, see its layout
         ("joint_sigma", "f8", (N_JOINT,)),  # 0: nothing learned yet
+        ("disc_excess", "f8", (4,)),  # most that the last braking left the disc above the air [K]
         ("brakings", "i8"),  # brake applications since the record was first made
     ],
     align=True,

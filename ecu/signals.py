@@ -86,6 +86,7 @@ ACCUMULATOR_PRESSURE: Final = INPUT["accumulator_pressure"]
 HYDRAULIC_READY: Final = INPUT["hydraulic_ready"]
 WHEEL_FORCE_X: Final = INPUT["wheel_force_x_fl"]
 AMBIENT_TEMPERATURE: Final = INPUT["ambient_temperature"]
+RAIN: Final = INPUT["rain"]
 
 # The three verdicts on an input, as bits of `inputs.verdict`.
 ALIVE: Final = 1  # a sample arrived within its time-out
@@ -139,6 +140,7 @@ OUTPUT_SIGNALS: Final[tuple[OutputSignal, ...]] = (
     OutputSignal("braking", "-", False, ""),  # 1 while a brake application lasts
     OutputSignal("calliper_pressure", "bar", True, ""),  # as measured, last sample
     OutputSignal("pressure_uncompensated", "bar", True, ""),  # the demand with the base friction
+    OutputSignal("sigma_disc_temperature", "K", True, ""),
 )
 
 

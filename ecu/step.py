@@ -4,7 +4,7 @@
 daemon, replay and closed-loop simulation get the same bits from the same inputs. Order of one cycle:
 
     brake application -> accelerations -> wheel loads, radii -> brake torques, expected slip -> speed -> slip
-    -> tyre forces -> friction -> demand -> pressure law -> limiter -> mode
+    -> tyre forces -> friction -> disc temperature -> demand -> pressure law -> limiter -> mode
 """
 
 import math
@@ -54,6 +54,7 @@ from ecu.estimation.speed import SPEED_STATE, update_speed
 from ecu.estimation.wheel_load import WHEEL_LOAD_STATE, update_wheel_load
 from ecu.jit import Record, kernel
 from ecu.monitoring.application import APPLICATION_STATE, update_application
+from ecu.monitoring.disc_temperature import DISC_STATE, UNKNOWN_EXCESS, start_discs, update_discs
 from ecu.params import JOINT, OBSERVER1
 from ecu.records import LEARNED, RecordArray
 from ecu.signals import ACCEL_X, CALLIPER_PRESSURE, FAILED, STARTING
@@ -71,6 +72,7 @@ STATE = np.dtype(
         ("observer", OBSERVER_STATE),
         ("friction", FRICTION_STATE),
         ("application", APPLICATION_STATE),
+        ("discs", DISC_STATE),
         ("control", PRESSURE_LAW_STATE),
         ("limiter", LIMITER_STATE),
         ("mode", MODE_STATE),
@@ -91,6 +93,7 @@ def new_state(params: RecordArray, learned: RecordArray | None = None) -> Record
     row = state[0]
     if learned is None:
         row["learned"]["radius_sigma"] = RADIUS_START
+        row["learned"]["disc_excess"] = UNKNOWN_EXCESS
     else:
         row["learned"] = learned[0]
     row["control"]["mu_override"] = math.nan
@@ -105,6 +108,7 @@ def _begin(params: Record, state: Record) -> None:
     restore_friction(p, s.friction, s.learned)
     restore_joint(p, s.joint, s.learned)
     set_base(s.control, s.learned)
+    start_discs(p, s.discs, s.learned)
     update_wheel_load(p, s.wheel_load, 0.0, 0.0, 0.0, 1.0)
     update_radius(p, s.wheels, s.learned, s.wheel_load.load)
 
@@ -122,6 +126,10 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
     p, s, u, y = params[0], state[0], inputs[0], outputs[0]
     dt = 1e-9 * u.dt_ns
     _estimate(p, s, u, dt)
+    update_discs(
+        p, s.discs, s.learned, u, s.friction, s.application, s.wheel_load.load,
+        total_tyre_force(p, s.motion, s.speed.speed), s.speed.speed, dt,
+    )  # fmt: skip
     decel = _control(p, s, u, y, dt)
     faults = u.bus_faults | input_faults(p, u)
     if s.friction.reset:
@@ -229,7 +237,10 @@ def _publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: i
         y.mode_mu_b[i] = s.friction.mode[i]
         y.brake_torque[i] = s.friction.torque[i]
         y.calliper_pressure[i] = u.value[CALLIPER_PRESSURE + i]
-        y.motor_demand[i] = y.disc_temperature[i] = math.nan
+        mapped = p.mapped[CALLIPER_PRESSURE + i] != 0
+        y.disc_temperature[i] = s.discs.temperature[i] if mapped else math.nan
+        y.sigma_disc_temperature[i] = s.discs.sigma[i] if mapped else math.nan
+        y.motor_demand[i] = math.nan
         y.pad_wear[i] = y.pad_remaining[i] = y.pad_wear_mass[i] = math.nan
         if mode == FAILED:
             y.pressure_demand[i] = 0.0

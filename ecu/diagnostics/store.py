@@ -24,6 +24,7 @@ REVISIONS_KEPT: Final = 20
 SAVE_INTERVAL_S: Final = 60.0
 MU_RANGE: Final = (0.5, 1.5)  # of nominal
 RADIUS_ERROR_LIMIT: Final = 0.03
+DISC_EXCESS_LIMIT: Final = 2000.0  # K above the air, with its error
 JOINT_LIMIT: Final = 1.5
 """Of any state of the joint observer: logarithms, and the rest is smaller still."""
 
@@ -162,6 +163,7 @@ def out_of_range(learned: RecordArray, mu_nominal: NDArray[np.float64]) -> str:
         "radius_sigma": np.isfinite(row["radius_sigma"]) & (row["radius_sigma"] > 0),
         "joint": np.abs(row["joint"]) <= JOINT_LIMIT,
         "joint_sigma": np.isfinite(row["joint_sigma"]) & (row["joint_sigma"] >= 0),
+        "disc_excess": (row["disc_excess"] >= 0) & (row["disc_excess"] <= DISC_EXCESS_LIMIT),
         "brakings": np.asarray(row["brakings"] >= 0),
     }
     return next((name for name, good in checks.items() if not good.all()), "")

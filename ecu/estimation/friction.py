@@ -73,7 +73,6 @@ SIGMA_FOR_LEARNING = 0.10
 SECONDS_FOR_LEARNING = 1.0
 TYRE_CURVE = 1.0  # relative error of the linear tyre per slip: 5 % at 5 % of slip
 SLIP_FLOOR = 0.0004  # error of slip that does not average out: radius, speed
-TIME_CORRELATION = 3.0  # low-passed slip samples are correlated: their variance counts this often
 TRANSDUCER_NOISE = 10.0  # N, of a wheel force transducer (Table 4.1)
 HELD_GROWTH = 0.002  # growth of sigma while holding, 1/sqrt(s)
 
@@ -256,7 +255,7 @@ def _observe(
     )  # fmt: skip
     if wheels.fresh[i]:
         correct_omega(observer, i, inputs.value[WHEEL_SPEED + i], params.sigma_wheel_speed**2)
-        correct_force(observer, i, force.virtual[i], TIME_CORRELATION * variance)
+        correct_force(observer, i, force.virtual[i], params.time_correlation * variance)
     if not observer_sound(observer, i):
         start_observer(
             observer, i, inputs.value[WHEEL_SPEED + i], force.virtual[i], params.mu_nominal[i], 0.07

@@ -31,8 +31,6 @@ OBSERVER_STATE = np.dtype(
 )
 
 GATE = 4.0
-FORCE_WALK = 0.10  # model error of the tyre force per second^0.5, relative to the wheel load
-OMEGA_WALK = 2.0  # unmodelled wheel torque (rolling, road), rad/s^2 * s^0.5
 
 
 @kernel
@@ -78,11 +76,11 @@ def predict_observer(
     p = state.p[i]
     ww, wf, wm, ff, fm, mm = p[0], p[1], p[2], p[3], p[4], p[5]
     pressure_noise = dt / inertia * lever * state.mu[i] * params.sigma_pressure
-    walk = OMEGA_WALK**2 * dt + pressure_noise**2
+    walk = params.omega_walk**2 * dt + pressure_noise**2
     p[0] = ww + a * a * ff + b * b * mm + 2.0 * (a * wf + b * wm + a * b * fm) + walk
     p[1] = keep * (wf + a * ff + b * fm)
     p[2] = wm + a * fm + b * mm
-    p[3] = keep * keep * ff + (1.0 - keep) ** 2 * force_variance + (FORCE_WALK * load) ** 2 * dt
+    p[3] = keep * keep * ff + (1.0 - keep) ** 2 * force_variance + (params.force_walk * load) ** 2 * dt
     p[4] = keep * fm
     p[5] = mm + drift * drift * dt
 

@@ -7,7 +7,7 @@ import pytest
 from ecu import __version__, cli, resources
 from ecu.errors import RunFault, UserError
 
-COMMANDS = ("run", "demo", "simulate", "replay", "play", "report", "bench", "doctor")
+COMMANDS = ("run", "demo", "simulate", "replay", "play", "report", "tune", "bench", "doctor")
 
 
 @pytest.mark.parametrize(
@@ -29,6 +29,8 @@ COMMANDS = ("run", "demo", "simulate", "replay", "play", "report", "bench", "doc
         ("simulate nosuch --config suv --out x", "nosuch: no such file, and none that is shipped ("),
         ("bench step codec", "unexpected extra argument"),
         ("simulate stop-1 --config suv --out x --seed -1", "Invalid value for '--seed'"),
+        ("tune --config suv --out tuned.txt", "--out: tuned.txt: a tuning is written as TOML"),
+        ("tune --config suv --population 3", "Invalid value for '--population'"),
     ],
 )
 def test_a_mistake_is_one_line_and_exit_code_2(

@@ -242,3 +242,67 @@ def test_a_folder_is_answered_with_what_is_wanted(tmp_path: Path) -> None:
     with pytest.raises(UserError) as caught:
         load_config(tmp_path)
     assert str(caught.value) == f"{tmp_path}: is a folder; give a TOML file"
+
+
+MERGED = [
+    # the car's own [observer], the included file, mu_drift and omega_walk of both (shipped: 0.02 and 2.0)
+    ("", "[observer]\nmu_drift = 0.05", (0.05, 2.0)),
+    ("[observer]\nomega_walk = 4.0\n", "[observer]\nmu_drift = 0.05", (0.05, 4.0)),
+    ("[observer]\nmu_drift = 0.01\n", "[observer]\nmu_drift = 0.05\nomega_walk = 4.0", (0.01, 4.0)),
+    ("", "", (0.02, 2.0)),
+]
+
+
+@pytest.mark.parametrize(("own", "included", "expected"), MERGED)
+def test_an_included_file_gives_what_the_car_does_not_give_itself(
+    tmp_path: Path, own: str, included: str, expected: tuple[float, float]
+) -> None:
+    (tmp_path / "tuned.toml").write_text(included, encoding="utf-8")
+    path = tmp_path / "car.toml"
+    path.write_text(f'include = "tuned.toml"\n{SUV}\n{own}', encoding="utf-8")
+    config = load_config(path)
+    assert (config.observer.mu_drift, config.observer.omega_walk) == expected
+    assert config.vehicle == load_config(CONFIGS / "suv.toml").vehicle
+
+
+def test_the_hash_is_that_of_the_merged_content(tmp_path: Path) -> None:
+    drift = "[observer]\nmu_drift = 0.05\n"
+    (tmp_path / "tuned.toml").write_text(drift, encoding="utf-8")
+    for name, text in (("with", f'include = "tuned.toml"\n{SUV}'), ("whole", f"{SUV}\n{drift}")):
+        (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")
+    merged, whole = (load_config(tmp_path / f"{name}.toml") for name in ("with", "whole"))
+    assert config_hash(merged) == config_hash(whole) != config_hash(load_config(CONFIGS / "suv.toml"))
+
+
+WRONG_INCLUDES = [
+    # include, content of the included file, the line
+    ('"nosuch.toml"', "", "nosuch.toml: no such file"),
+    ('"."', "", "is a folder"),
+    ('""', "", 'car.toml: include: give the name of a TOML file in "quotes"'),
+    ("3", "", 'car.toml: include: give the name of a TOML file in "quotes"'),
+    ('"tuned.toml"', "[[[", "tuned.toml: not valid TOML"),
+    ('"tuned.toml"', 'include = "car.toml"', "tuned.toml: include: an included file includes no other"),
+    ('"tuned.toml"', "[observer]\nmu_drift = -1", "tuned.toml: observer.mu_drift: give a value above 0"),
+    ('"tuned.toml"', "[observer]\nmu_drfit = 1", "tuned.toml: observer.mu_drfit: unknown key"),
+    ('"tuned.toml"', "observer = 3", "tuned.toml: observer: give a table"),
+]
+
+
+@pytest.mark.parametrize(("include", "content", "line"), WRONG_INCLUDES)
+def test_a_wrong_include_is_one_line_that_names_the_file_at_fault(
+    tmp_path: Path, include: str, content: str, line: str
+) -> None:
+    (tmp_path / "tuned.toml").write_text(content, encoding="utf-8")
+    (tmp_path / "car.toml").write_text(f"include = {include}\n{SUV}", encoding="utf-8")
+    with pytest.raises(UserError) as caught:
+        load_config(tmp_path / "car.toml")
+    assert line in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_what_the_car_itself_has_wrong_is_not_blamed_on_the_included_file(tmp_path: Path) -> None:
+    (tmp_path / "tuned.toml").write_text("[vehicle]\nmass = 2000.0\n", encoding="utf-8")
+    path = tmp_path / "car.toml"
+    path.write_text(f'include = "tuned.toml"\n{change("vehicle.mass", "1.0")()}', encoding="utf-8")
+    with pytest.raises(UserError, match=r"car\.toml: vehicle\.mass: give a value above 200"):
+        load_config(path)

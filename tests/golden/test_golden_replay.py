@@ -17,7 +17,10 @@ from ecu.resources import resource
 
 HERE = Path(__file__).parent
 REFERENCE = HERE / "mustang_braking.csv"
-FOUR = ("slip", "wheel_force_x", "wheel_force_z", "mu_b", "sigma_mu_b", "mode", "brake_torque")
+FOUR = (
+    *("slip", "wheel_force_x", "wheel_force_z", "mu_b", "sigma_mu_b", "mode", "brake_torque"),
+    *("disc_temperature", "sigma_disc_temperature"),
+)
 NAMES = [
     *("t", "vehicle_speed", "k_f", "mode", "active_faults", "braking"),
     *(f"{name}_{corner}" for name in FOUR for corner in ("fl", "fr", "rl", "rr")),

@@ -27,7 +27,7 @@ from ecu.jit import Record, kernel
 
 PRIOR = np.zeros(N)
 """Standard deviations before anything is learned; friction, radii and speed are set apart."""
-PRIOR[STIFFNESS], PRIOR[RATIO] = 0.25, 0.12
+PRIOR[STIFFNESS], PRIOR[RATIO] = 0.25, 0.08
 PRIOR[BIAS], PRIOR[SLOPE] = 0.1, 0.3
 PRIOR[MASS], PRIOR[PEAK], PRIOR[LOAD], PRIOR[SINKING] = 0.02, 0.25, 0.05, 0.10
 PRIOR[DRAG] = 0.10

@@ -10,11 +10,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ecu.estimation.friction import TIME_CORRELATION
 from ecu.estimation.observer2 import (
-    FORCE_WALK,
     OBSERVER_STATE,
-    OMEGA_WALK,
     correct_force,
     correct_omega,
     observer_sound,
@@ -118,8 +115,8 @@ def test_prediction_follows_the_differential_equation(params, row) -> None:
     # Covariance: A P A' + Q with the function's own Jacobian
     car = params[0]
     noise_torque = 2 * car["piston_area"][i] * car["effective_radius"][i] * 0.42 * car["sigma_pressure"]
-    walk = OMEGA_WALK**2 * DT + (DT / INERTIA * noise_torque) ** 2
-    Q = np.diag([walk, (FORCE_WALK * LOAD) ** 2 * DT, 0.02**2 * DT])
+    walk = 2.0**2 * DT + (DT / INERTIA * noise_torque) ** 2
+    Q = np.diag([walk, (0.10 * LOAD) ** 2 * DT, 0.02**2 * DT])
     expected = A_own @ P @ A_own.T + Q
     np.testing.assert_allclose(covariance(state, i), expected, rtol=1e-6, atol=1e-9 * np.abs(expected).max())
 
@@ -206,7 +203,7 @@ class Wheel:
                 self.params, self.state, self.i, self.pressure, 0.0, virtual, self.speed, variance=variance
             )
             correct_omega(self.state, self.i, omega + 0.1 * self.random.standard_normal(), 0.1**2)
-            correct_force(self.state, self.i, virtual, TIME_CORRELATION * variance)
+            correct_force(self.state, self.i, virtual, self.params["time_correlation"] * variance)
             assert observer_sound(self.state, self.i)
             rows.append((estimate(self.state, self.i), covariance(self.state, self.i)))
         return rows
@@ -225,7 +222,7 @@ def test_it_is_stable_at_every_speed(params, corner: int, speed: float) -> None:
     assert rows[-1][0][2] == pytest.approx(0.4, rel=0.06)
     # The steady filter's error matrix (I - K C) A contracts.
     P, A = rows[-1][1], system_matrix(params[0], corner, 40 * BAR, speed)
-    C, R = np.array([[1.0, 0, 0], [0, 1.0, 0]]), np.diag([0.01, TIME_CORRELATION * 250.0**2])
+    C, R = np.array([[1.0, 0, 0], [0, 1.0, 0]]), np.diag([0.01, params[0]["time_correlation"] * 250.0**2])
     K = P @ C.T @ np.linalg.inv(R)
     assert np.abs(np.linalg.eigvals((np.eye(3) - K @ C) @ A)).max() < 1.0
 

@@ -4,21 +4,17 @@ The wheel transducers are on, so that every 10 and 20 ms message of the contract
 """
 
 from functools import cache
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.closed_loop import START_NS, Drive, new_loop, run
+from brakelab.closed_loop import Drive, new_loop, plans, run
+from brakelab.ecu_inputs import ecu_inputs, vehicle_frames
 from brakelab.scenario import load_scenario
-from ecu.bus.freshness import begin_cycle, end_cycle
-from ecu.bus.receive import ReceivePlan, Reception, contract_receive_plan, new_reception, receive
-from ecu.bus.transmit import contract_transmit_plan
 from ecu.config import load_config, new_params
-from ecu.jit import kernel
-from ecu.records import INPUTS, RecordArray, new_record
+from ecu.records import RecordArray
 from ecu.resources import resource
-from ecu.signals import CYCLE_NS
 
 MESSAGES_IN: Final = 13
 """Input messages of the contract at 10 and 20 ms."""
@@ -48,26 +44,13 @@ def simulated_stop() -> Stop:
     scenario = scenario.model_copy(update={"wheel_transducers": True})
     config = load_config(resource("config/suv.toml"))
     drive = run(new_loop(scenario, config, seed=0))
-    plan = contract_receive_plan(resource("dbc/brake_ecu.dbc"))
-    own = contract_transmit_plan(resource("dbc/brake_ecu.dbc"), "BrakeEcu").ids
-    frames = drive.frames[~np.isin(drive.frames["can_id"], own)]
-    inputs = new_record(INPUTS, len(drive.t))
-    _decode(plan, new_reception(plan), frames, new_record(INPUTS), inputs)
+    frames = vehicle_frames(drive.frames)
+    inputs = ecu_inputs(frames, len(drive.t))
     params = new_params(config)
-    params["mapped"] = plan.mapped
+    params["mapped"] = plans().ecu_hears.mapped
     return Stop(params, frames, inputs, inputs["value"].copy(), _all_observing(drive))
 
 
 def _all_observing(drive: Drive) -> int:
     modes = np.stack([drive.outputs[f"mode_{corner}"] for corner in ("fl", "fr", "rl", "rr")])
     return int(np.flatnonzero((modes == 1).all(axis=0))[0])
-
-
-@kernel
-def _decode(plan: ReceivePlan, reception: Reception, frames: Any, now: Any, inputs: Any) -> None:
-    first = 0
-    for k in range(len(inputs)):
-        begin_cycle(now[0], START_NS + k * CYCLE_NS, CYCLE_NS)
-        first = receive(plan, reception, frames, first, len(frames), now[0])
-        end_cycle(now[0], reception.freshness)
-        inputs[k] = now[0]

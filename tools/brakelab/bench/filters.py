@@ -10,11 +10,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ecu.estimation.friction import TIME_CORRELATION
 from ecu.estimation.observer2 import (
-    FORCE_WALK,
     OBSERVER_STATE,
-    OMEGA_WALK,
     correct_force,
     correct_omega,
     predict_observer,
@@ -54,6 +51,9 @@ class Constants(NamedTuple):
     sigma_pressure: float
     """Pa."""
     drift: float
+    omega_walk: float
+    force_walk: float
+    time_correlation: float
     mu: NDArray[np.float64]
     sigma_mu: NDArray[np.float64]
 
@@ -68,6 +68,9 @@ def constants(params: RecordArray) -> Constants:
         float(row["sigma_wheel_speed"]) ** 2,
         float(row["sigma_pressure"]),
         float(row["mu_drift"]),
+        float(row["omega_walk"]),
+        float(row["force_walk"]),
+        float(row["time_correlation"]),
         row["mu_nominal"].copy(),
         row["sigma_mu_initial"] * row["mu_nominal"],
     )
@@ -110,7 +113,7 @@ def filter_cycle(params: RecordArray, observer: RecordArray, table: RecordArray,
             given.radius, given.load, given.speed, car.mu_drift, DT,
         )  # fmt: skip
         correct_omega(state, i, given.omega, car.sigma_wheel_speed**2)
-        correct_force(state, i, given.force, TIME_CORRELATION * given.force_variance)
+        correct_force(state, i, given.force, car.time_correlation * given.force_variance)
 
 
 @kernel
@@ -151,14 +154,15 @@ class NumpyFilters:
         a[:, 0, 2] = -DT * const.torque_per_mu * row["pressure"] / const.inertia
         a[:, 1, 1] = keep
         torque_noise = const.torque_per_mu * self.x[:, 2] * const.sigma_pressure
-        self._q[:, 0, 0] = OMEGA_WALK**2 * DT + (DT / const.inertia * torque_noise) ** 2
+        self._q[:, 0, 0] = const.omega_walk**2 * DT + (DT / const.inertia * torque_noise) ** 2
         gained = (1.0 - keep) * row["force"]
         self.x = (a @ self.x[:, :, None])[:, :, 0]
         self.x[:, 0] += lever * gained - DT * row["outer_torque"] / const.inertia
         self.x[:, 1] += gained
-        self._q[:, 1, 1] = (FORCE_WALK * row["load"]) ** 2 * DT + (1.0 - keep) ** 2 * row["force_variance"]
+        force_walk = (const.force_walk * row["load"]) ** 2 * DT
+        self._q[:, 1, 1] = force_walk + (1.0 - keep) ** 2 * row["force_variance"]
         p = a @ self.p @ a.transpose(0, 2, 1) + self._q
-        self._r[:, 1, 1] = TIME_CORRELATION * row["force_variance"]
+        self._r[:, 1, 1] = const.time_correlation * row["force_variance"]
         gain = p[:, :, :2] @ np.linalg.inv(p[:, :2, :2] + self._r)
         innovation = np.stack([row["omega"], row["force"]], axis=1) - self.x[:, :2]
         self.x += (gain @ innovation[:, :, None])[:, :, 0]
@@ -202,8 +206,8 @@ class FilterpyFilters:
             ekf.B[0, 1] = lever * (1.0 - keep)
             ekf.B[1, 1] = 1.0 - keep
             torque_noise = torque_per_mu * float(ekf.x[2, 0]) * self.const.sigma_pressure
-            ekf.Q[0, 0] = OMEGA_WALK**2 * DT + (per_inertia * torque_noise) ** 2
-            ekf.Q[1, 1] = (FORCE_WALK * load) ** 2 * DT + (1.0 - keep) ** 2 * variance
-            ekf.R[1, 1] = TIME_CORRELATION * variance
+            ekf.Q[0, 0] = self.const.omega_walk**2 * DT + (per_inertia * torque_noise) ** 2
+            ekf.Q[1, 1] = (self.const.force_walk * load) ** 2 * DT + (1.0 - keep) ** 2 * variance
+            ekf.R[1, 1] = self.const.time_correlation * variance
             ekf.predict(np.array([[outer], [force]]))
             ekf.update(np.array([[omega], [force]]), self._jacobian, self._measured)

@@ -1,6 +1,6 @@
-"""The linked plots over the drive: speed, deceleration, friction, pressures, K_f and modes, one time axis."""
+"""The linked plots over a drive: speed, deceleration, friction, pressures, discs, K_f and modes."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from bokeh.models import ColumnDataSource, HoverTool, Range1d
@@ -12,11 +12,25 @@ from brakelab.report.drive import Drive, Vector
 from brakelab.report.look import DEMAND, ESTIMATE, INK, LEFT, RIGHT, SHADE, link_crosshair, new_figure
 from brakelab.report.modes import modes_plot
 
-# Points per line: 60 s of drive at full resolution, and 30 lines of them stay below 1 MB.
+# Points per line: 60 s of drive at full resolution, and 40 lines of them stay near 1 MB.
 POINTS = 6000
 
 KMH = 3.6
 TIME = "Time [s]"
+_FRONT, _REAR = ("fl", "fr"), ("rl", "rr")
+
+
+class _Estimated(NamedTuple):
+    """A corner quantity with its standard deviation, and how it is drawn."""
+
+    column: str
+    digits: str
+    least_span: float
+    """Of the axis, in the quantity's unit."""
+
+
+_FRICTION = _Estimated("mu_b", "0.000", 0.2)
+_DISC = _Estimated("disc_temperature", "0", 40.0)
 
 
 def plots_over_time(drive: Drive, truth: Drive | None, found: list[Braking]) -> dict[str, Any]:
@@ -33,10 +47,12 @@ def plots_over_time(drive: Drive, truth: Drive | None, found: list[Braking]) -> 
     plots = {
         "speed": _speed(source, span),
         "deceleration": _deceleration(source, span),
-        "friction-front": _friction(source, span, "front", ("fl", "fr")),
-        "friction-rear": _friction(source, span, "rear", ("rl", "rr")),
-        "pressure-front": _pressure(source, span, "front", ("fl", "fr")),
-        "pressure-rear": _pressure(source, span, "rear", ("rl", "rr")),
+        "friction-front": _estimate(source, span, "Friction front [-]", _FRONT, _FRICTION),
+        "friction-rear": _estimate(source, span, "Friction rear [-]", _REAR, _FRICTION),
+        "pressure-front": _pressure(source, span, "front", _FRONT),
+        "pressure-rear": _pressure(source, span, "rear", _REAR),
+        "disc-front": _estimate(source, span, "Disc front [°C]", _FRONT, _DISC),
+        "disc-rear": _estimate(source, span, "Disc rear [°C]", _REAR, _DISC),
         "k-f": _tyre_factor(source, span),
         "modes": modes_plot(drive, _coarse(grid), span),
     }
@@ -69,9 +85,11 @@ def _lines(drive: Drive, truth: Drive | None) -> dict[str, Vector]:
         "k_f": drive.column("k_f"),
     }
     for corner in ("fl", "fr", "rl", "rr"):
-        mu, sigma = drive.column(f"mu_b_{corner}"), drive.column(f"sigma_mu_b_{corner}")
-        lines[f"mu_{corner}"] = mu
-        lines[f"low_{corner}"], lines[f"high_{corner}"] = mu - 2.0 * sigma, mu + 2.0 * sigma
+        for name in (_FRICTION.column, _DISC.column):
+            value, sigma = drive.column(f"{name}_{corner}"), drive.column(f"sigma_{name}_{corner}")
+            lines[f"{name}_{corner}"] = value
+            lines[f"{name}_low_{corner}"] = value - 2.0 * sigma
+            lines[f"{name}_high_{corner}"] = value + 2.0 * sigma
         lines[f"pressure_{corner}"] = drive.column(f"calliper_pressure_{corner}")
         lines[f"demand_{corner}"] = drive.column(f"pressure_demand_{corner}")
     if truth is not None:
@@ -79,7 +97,8 @@ def _lines(drive: Drive, truth: Drive | None) -> dict[str, Vector]:
         lines["achieved_true"] = -truth.column("accel_x_road")
         lines["k_f_true"] = truth.column("k_f")
         for corner in ("fl", "fr", "rl", "rr"):
-            lines[f"mu_true_{corner}"] = truth.column(f"mu_b_{corner}")
+            for name in (_FRICTION.column, _DISC.column):
+                lines[f"{name}_true_{corner}"] = truth.column(f"{name}_{corner}")
     return {name: values for name, values in lines.items() if np.isfinite(values).any()}
 
 
@@ -117,24 +136,26 @@ def _deceleration(source: ColumnDataSource, span: Range1d) -> Any:
     return plot
 
 
-def _friction(source: ColumnDataSource, span: Range1d, axle: str, corners: tuple[str, str]) -> Any:
-    plot = new_figure(TIME, f"Friction {axle} [-]", x_range=span, window_axis="x")
+def _estimate(
+    source: ColumnDataSource, span: Range1d, label: str, corners: tuple[str, str], what: _Estimated
+) -> Any:
+    plot = new_figure(TIME, label, x_range=span, window_axis="x")
     sides = list(zip(corners, ("left", "right"), (LEFT, RIGHT), strict=True))
+    name = what.column
     for corner, _, colour in sides:
-        if f"low_{corner}" in source.column_names:
-            plot.varea(
-                "t", f"low_{corner}", f"high_{corner}", source=source, fill_color=colour, fill_alpha=0.16
-            )  # fmt: skip
+        low, high = f"{name}_low_{corner}", f"{name}_high_{corner}"
+        if low in source.column_names:
+            plot.varea("t", low, high, source=source, fill_color=colour, fill_alpha=0.16)
     bands = len(plot.renderers)
     for corner, side, colour in sides:
-        _line(plot, source, f"mu_{corner}", f"{side}, band ±2σ", colour)
+        _line(plot, source, f"{name}_{corner}", f"{side}, band ±2σ", colour)
     for corner, side, _ in sides:
         dash = "dashed" if side == "left" else "dotted"
-        _line(plot, source, f"mu_true_{corner}", f"{side}, true", INK, line_dash=dash, line_width=1.3)
+        _line(plot, source, f"{name}_true_{corner}", f"{side}, true", INK, line_dash=dash, line_width=1.3)
     # The lines set the range: a band that is wide for an instant would flatten everything.
-    plot.y_range.update(renderers=plot.renderers[bands:], range_padding=0.5, min_interval=0.2)
-    rows = [(f"{side}{kind}", f"{name}_{corner}", "0.000")
-            for corner, side, _ in sides for kind, name in (("", "mu"), (" true", "mu_true"))]  # fmt: skip
+    plot.y_range.update(renderers=plot.renderers[bands:], range_padding=0.5, min_interval=what.least_span)
+    rows = [(f"{side}{kind}", f"{name}{true}_{corner}", what.digits)
+            for corner, side, _ in sides for kind, true in (("", ""), (" true", "_true"))]  # fmt: skip
     _hover(plot, source, rows)
     return plot
 

@@ -1,0 +1,108 @@
+"""Drives recorded once, so that many tunings can be stepped through them: inputs, truth, and what counts.
+
+A brake application counts from 0.5 s after its start down to 15 km/h. Its error is
+
+    nRMSE = sqrt(mean((estimate - truth)^2)) / mean(truth)     over both wheels of an axle
+
+and a session's is the mean over the applications of each drive, then over the drives: three long stops weigh
+as much as twelve short ones, as in Table 6.1.
+"""
+
+from collections.abc import Iterable
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakelab.bench.stops import AXLES, LOWEST_SPEED, SETTLING_S, nrmse
+from brakelab.closed_loop import Drive, new_loop, run
+from brakelab.ecu_inputs import ecu_inputs, vehicle_frames
+from brakelab.scenario import Scenario
+from ecu.config import Config
+from ecu.records import RecordArray
+from ecu.signals import CORNERS, CYCLE_NS
+
+Array = NDArray[np.float64]
+
+PER_SECOND: Final = 1_000_000_000 // CYCLE_NS
+AROUND_S: Final = 20.0
+"""Of driving that is kept before and after the brake is used; what lies between teaches nothing new. The
+speed needs some of it to settle after a cut: errors change by less than 0.1 of a per cent, with 5 s by 15.
+"""
+SHORTEST_S: Final = 0.5
+"""An application of which less counts is none."""
+
+
+class Recording(NamedTuple):
+    """One drive of one car."""
+
+    inputs: RecordArray
+    """`INPUTS`, shape (n,)."""
+    mu_b: Array
+    """True friction, shape (n, 4)."""
+    braking: NDArray[np.int64]
+    """Number of the brake application that counts in a cycle, from 0; -1: none. Shape (n,)."""
+
+
+class Errors(NamedTuple):
+    """Errors over a session, in %: shape (front and rear,)."""
+
+    nrmse: Array
+    inside_2_sigma: Array
+    """Share of the samples whose truth lies within ±2σ."""
+
+
+def applications(drive: Drive) -> NDArray[np.int64]:
+    """Return the number of the brake application that counts in each row, -1: none; shape (n,)."""
+    on = drive.outputs["braking"] > 0.5
+    starts = np.flatnonzero(np.diff(on, prepend=False) & on)
+    numbers = np.full(len(on), -1)
+    for start in starts:
+        length = np.argmin(np.append(on[start:], False))
+        rows = np.arange(start + round(SETTLING_S * PER_SECOND), start + length)
+        rows = rows[drive.truth["vehicle_speed"][rows] > LOWEST_SPEED]
+        if len(rows) >= SHORTEST_S * PER_SECOND:
+            numbers[rows] = numbers.max() + 1
+    return numbers
+
+
+def drive_errors(drive: Drive) -> Errors:
+    """Return the errors of what the ECU estimated while it drove; NaN without an application."""
+    braking = applications(drive)
+    if braking.max() < 0:
+        return Errors(np.full(len(AXLES), np.nan), np.full(len(AXLES), np.nan))
+    table = [
+        [_axle_errors(drive, braking == number, axle) for axle in AXLES.values()]
+        for number in range(braking.max() + 1)
+    ]
+    return Errors(*np.mean(table, axis=0).T)
+
+
+def _axle_errors(drive: Drive, rows: NDArray[np.bool_], corners: Iterable[str]) -> tuple[float, float]:
+    estimate, sigma, true = (
+        np.stack([table[f"{stem}_{corner}"][rows] for corner in corners])
+        for table, stem in ((drive.outputs, "mu_b"), (drive.outputs, "sigma_mu_b"), (drive.truth, "mu_b"))
+    )
+    return nrmse(estimate, true), 100.0 * float(np.mean(np.abs(estimate - true) <= 2.0 * sigma))
+
+
+def mean_errors(errors: Iterable[Errors]) -> Errors:
+    """Return the mean over drives."""
+    nrmses, inside = zip(*errors, strict=True)
+    return Errors(np.mean(nrmses, axis=0), np.mean(inside, axis=0))
+
+
+def drive_once(scenario: Scenario, config: Config, seed: int) -> Drive:
+    """Return a drive in closed loop, car and noise drawn from `seed`."""
+    return run(new_loop(scenario, config, seed))
+
+
+def recording(drive: Drive) -> Recording:
+    """Return what of a drive is stepped through again."""
+    braking = applications(drive)
+    inputs = ecu_inputs(vehicle_frames(drive.frames), len(drive.t))
+    mu_b = np.stack([drive.truth[f"mu_b_{corner}"] for corner in CORNERS], axis=1)
+    rows, around = np.arange(len(drive.t)), round(AROUND_S * PER_SECOND)
+    before = np.concatenate([[0.0], np.cumsum(drive.outputs["braking"])])
+    kept = before[np.minimum(rows + around, len(rows))] > before[np.maximum(rows - around, 0)]
+    return Recording(inputs[kept].copy(), mu_b[kept].copy(), braking[kept].copy())
