@@ -48,14 +48,20 @@ def simulated_stop() -> Stop:
     scenario = scenario.model_copy(update={"wheel_transducers": True})
     config = load_config(resource("config/suv.toml"))
     drive = run(new_loop(scenario, config, seed=0))
+    frames, inputs = decoded(drive)
+    params = new_params(config)
+    params["mapped"] = contract_receive_plan(resource("dbc/brake_ecu.dbc")).mapped
+    return Stop(params, frames, inputs, inputs["value"].copy(), _all_observing(drive))
+
+
+def decoded(drive: Drive) -> tuple[RecordArray, RecordArray]:
+    """Return the vehicle's frames of a drive (`FRAME`) and the `INPUTS` of every cycle, shape (n,)."""
     plan = contract_receive_plan(resource("dbc/brake_ecu.dbc"))
     own = contract_transmit_plan(resource("dbc/brake_ecu.dbc"), "BrakeEcu").ids
     frames = drive.frames[~np.isin(drive.frames["can_id"], own)]
     inputs = new_record(INPUTS, len(drive.t))
     _decode(plan, new_reception(plan), frames, new_record(INPUTS), inputs)
-    params = new_params(config)
-    params["mapped"] = plan.mapped
-    return Stop(params, frames, inputs, inputs["value"].copy(), _all_observing(drive))
+    return frames, inputs
 
 
 def _all_observing(drive: Drive) -> int:
