@@ -24,7 +24,7 @@ COMMANDS = ("run", "demo", "simulate", "replay", "play", "report", "bench", "doc
             "nosuch: no such file, and none that is shipped (lcv, mustang,",
         ),
         ("play drive.log -i socketcan -c can0 --speed fast", "Invalid value for '--speed'"),
-        ("replay drive.log --config suv --out r.parquet --observer best", "take observer2"),
+        ("replay drive.log --config suv --out r.parquet --observer best", "take joint, observer1, observer2"),
         ("replay --config suv --out r.parquet", "Missing argument 'LOG…'"),
         ("simulate nosuch --config suv --out x", "nosuch: no such file, and none that is shipped ("),
         ("bench step codec", "unexpected extra argument"),

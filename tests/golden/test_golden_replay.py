@@ -29,9 +29,7 @@ RELATIVE, ABSOLUTE = 1e-6, 1e-9
 def test_a_recorded_braking_gives_the_committed_numbers(tmp_path: Path) -> None:
     out = tmp_path / "out.parquet"
     logs = [HERE / "mustang_braking.log.gz"]
-    replay(
-        logs, resource("config/mustang.toml"), resource("config/maps/mustang.toml"), "observer2", None, out
-    )
+    replay(logs, resource("config/mustang.toml"), resource("config/maps/mustang.toml"), None, None, out)
     columns = read_result(out).columns
     found = np.transpose([columns[name][::EVERY] for name in NAMES])
     if os.environ.get("BRAKE_ECU_UPDATE_GOLDEN") == "1":
@@ -55,9 +53,7 @@ def test_a_recorded_braking_gives_the_committed_numbers(tmp_path: Path) -> None:
 def test_the_drive_is_what_its_description_says(tmp_path: Path) -> None:
     out = tmp_path / "out.parquet"
     logs = [HERE / "mustang_braking.log.gz"]
-    replay(
-        logs, resource("config/mustang.toml"), resource("config/maps/mustang.toml"), "observer2", None, out
-    )
+    replay(logs, resource("config/mustang.toml"), resource("config/maps/mustang.toml"), None, None, out)
     brakes = read_result(tmp_path / "out.brakes.parquet").columns
     assert list(brakes["brake"]) == [0, 0, 0, 0]
     assert 3.6 * brakes["v_in"][0] == pytest.approx(54, abs=3)

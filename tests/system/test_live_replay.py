@@ -66,7 +66,7 @@ def test_an_independent_log_gives_the_same_bits(daemon, witness, tmp_path, lost_
     recording = read_recording(tmp_path / "record")
     independent.lines_until(recording.frames.read_text().splitlines()[-1])
     result = tmp_path / "result.parquet"
-    replay([independent.log], CONFIG, None, "observer2", None, result, recording.folder)
+    replay([independent.log], CONFIG, None, None, None, result, recording.folder)
     live = np.array([output_vector(row.reshape(1)) for row in recording.outputs])
     table = pq.read_table(result)
     assert table.num_rows == len(live)

@@ -131,7 +131,7 @@ def demo(out: Path) -> int:
     (_in_one_process if bus.interface == "virtual" else _in_two_processes)(bus, config, out)
     recording = read_recording(out / "drive").folder
     result, page = out / "result.parquet", out / "report.html"
-    replay([recording], config, None, "observer2", None, result)
+    replay([recording], config, None, None, None, result)
     report(result, out / "truth.parquet", page, recording)
     say(f"report: {page.resolve()}")
     return 0

@@ -52,6 +52,7 @@ WINDOW_STATE: Final = np.dtype(
         ("reference_samples", "i8"),
         ("accel_cycles", "i8"),
         ("motor_known", "u1"),
+        ("motor_reported", "u1"),
     ],
     align=True,
 )
@@ -69,6 +70,9 @@ JOINT_STATE: Final = np.dtype(
         ("window", WINDOW_STATE),
         ("pressures", PRESSURE_STATE),
         ("started", "u1"),
+        ("sliding", "u1"),
+        ("releasing", "u1"),
+        ("untrusted_s", "f8"),  # time since a wheel was last believed [s]
         ("hold_s", "f8"),  # no learning for this long, a wheel had left the tyre's range
         ("smooth_pressure", "f8", (4,)),  # bar above push-out
         ("last_pressure", "f8", (4,)),  # of the last window [bar]
@@ -89,6 +93,6 @@ PRIOR: Final[NDArray[np.float64]] = np.zeros(N)
 PRIOR[STIFFNESS], PRIOR[RATIO] = 0.25, 0.04
 PRIOR[BIAS], PRIOR[SLOPE] = 0.05, 0.3
 PRIOR[MASS], PRIOR[PEAK], PRIOR[LOAD], PRIOR[SINKING] = 0.02, 0.25, 0.05, 0.10
-PRIOR[MOTOR], PRIOR[DRAG] = 0.02, 0.10
+PRIOR[MOTOR], PRIOR[DRAG] = 0.015, 0.10
 PRIOR[OFFSET : OFFSET + 2] = 0.3
 PRIOR[DELAY] = 0.01

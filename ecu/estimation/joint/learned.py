@@ -99,8 +99,8 @@ def publish_friction(
         nominal = params.mu_nominal[i]
         mu = min(max(nominal * math.exp(state.x[MU + i]), LEAST_RATIO * nominal), GREATEST_RATIO * nominal)
         variance = state.p[MU + i, MU + i]
-        if braking and follows(state.pressures, i):
-            above = max(state.pressures.value[i] - params.push_out_pressure[i] / BAR, 1.0)
+        if state.observed[i] and follows(state.pressures, i):
+            above = max(state.smooth_pressure[i], 1.0)
             variance += state.pressures.variance[i] / (above * above)
         friction.mu[i], friction.sigma[i] = mu, mu * math.sqrt(variance)
         if braking and state.observed[i]:

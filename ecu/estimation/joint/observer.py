@@ -5,7 +5,7 @@ car's longitudinal balance correct it. Which states they may correct depends on 
 
 friction braking   speed, frictions, tyre stiffness and peak, radii, slope; the rest is considered only
 motors alone       everything but friction and pressure offsets: known torque shows mass, drag, stiffness
-rolling            speed, radii and their sinking, bias, slope, drag
+rolling            speed, radii and their sinking, slope; bias and drag where motor torque is reported
 below 3.4 m/s, sliding, ABS, ESP, the driver accelerating against the brakes: speed and slope only
 
 When a wheel runs past the tyre's range all but the speed goes back to what was known 0.2 to 0.4 s before.
@@ -52,6 +52,8 @@ LEAST_SPEED = 3.4  # m/s
 APPLIED = 1.0  # bar above push-out: the brakes act
 MOTORS = 100.0  # N m of all motors: their torque is worth looking at
 LARGE_SLIP = 0.12
+SLIDING_FLOOR = 5.0  # m/s, that it is relative to at least
+BELIEVED_AFTER = 3.0  # s without a wheel that rolls, brakes released
 HOLD_S = 0.4
 SNAPSHOT_S = 0.2
 
@@ -70,12 +72,14 @@ WALK[MASS], WALK[MOTOR], WALK[DRAG] = 1e-5, 1e-5, 0.0005
 WALK[DELAY] = 1e-4
 MU_WALK_COMMON, MU_WALK_AXLE, MU_WALK_WHEEL = 0.15, 0.03, 0.005
 MU_WALK_PRESSURE = 0.05  # of an axle's friction, per relative change of its pressure
+RELEASE = 0.15  # relative fall in a window: pressure, slip and force lag differently and teach nothing
 MU_WALK_HELD = 0.003
 CUT_OFF = 1.0
 
 BALANCE_FLOOR = 0.01  # m/s^2 that the balance leaves out
 BALANCE_SHARE = 0.004  # of the deceleration
 TRANSIENT = 0.5  # of a slip's change since the last window
+UNEXPLAINED = 0.15  # m/s^2 while rolling: someone drives or brakes the car without saying so
 TWIN = 3.0  # bar, of a pressure taken from the other side
 LOW_SPEED_NOISE = 0.15  # m/s
 JUMP = 100.0  # squared test ratio: while wheels slide such a reference is believed at once
@@ -147,26 +151,6 @@ def _learning_forbidden(inputs: Record, braking: bool) -> bool:
 
 
 @kernel
-def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> None:
-    free = state.free
-    for i in range(N):
-        free[i] = 0
-    free[V] = free[SLOPE] = 1
-    if not learning:
-        return
-    for i in range(4):
-        free[RADIUS + i] = 1
-        free[MU + i] = 1 if braking else 0
-    free[DELAY] = 1
-    if braking:
-        free[STIFFNESS] = free[PEAK] = 1
-    else:
-        free[BIAS] = free[SINKING] = free[DRAG] = 1
-        if motors:
-            free[STIFFNESS] = free[RATIO] = free[MASS] = free[LOAD] = free[PEAK] = 1
-
-
-@kernel
 def _pressure_change(state: Record, left: int) -> float:
     """Return the relative change of an axle's pressure since the last window."""
     before = state.last_pressure[left] + state.last_pressure[left + 1]
@@ -176,14 +160,49 @@ def _pressure_change(state: Record, left: int) -> float:
 
 
 @kernel
+def _watch_release(state: Record, braking: bool) -> None:
+    """When the brakes are released, friction goes back to what it was before that could disturb it."""
+    falling = braking and min(_pressure_change(state, 0), _pressure_change(state, 2)) < -RELEASE
+    if falling and not state.releasing:
+        for i in range(MU, MU + 4):
+            state.x[i] = state.kept_x[1, i]
+    state.releasing = 1 if falling else 0
+
+
+@kernel
+def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> None:
+    free = state.free
+    for i in range(N):
+        free[i] = 0
+    free[V] = free[SLOPE] = 1
+    if not learning:
+        return
+    for i in range(4):
+        free[RADIUS + i] = 1
+        free[MU + i] = 1 if braking and not state.releasing else 0
+    free[DELAY] = 1
+    if state.releasing:
+        return
+    if braking:
+        free[STIFFNESS] = free[PEAK] = 1
+    else:
+        free[SINKING] = 1
+        free[BIAS] = free[DRAG] = state.window.motor_reported
+        if motors:
+            free[STIFFNESS] = free[RATIO] = free[MASS] = free[LOAD] = free[PEAK] = 1
+
+
+@kernel
 def _walk(state: Record, braking: bool, time: float) -> None:
     p = state.p
     drift_speed(state, time)
     for i in range(N):
         p[i, i] += WALK[i] ** 2 * time
     if braking:
-        front = MU_WALK_AXLE**2 * time + (MU_WALK_PRESSURE * _pressure_change(state, 0)) ** 2
-        rear = MU_WALK_AXLE**2 * time + (MU_WALK_PRESSURE * _pressure_change(state, 2)) ** 2
+        rise_front = max(_pressure_change(state, 0), 0.0)
+        rise_rear = max(_pressure_change(state, 2), 0.0)
+        front = MU_WALK_AXLE**2 * time + (MU_WALK_PRESSURE * rise_front) ** 2
+        rear = MU_WALK_AXLE**2 * time + (MU_WALK_PRESSURE * rise_rear) ** 2
         walk_friction(state, MU_WALK_COMMON**2 * time, front, rear, MU_WALK_WHEEL**2 * time)
     elif p[MU, MU] < MU_COMMON**2 + MU_AXLE**2:
         held = MU_WALK_HELD**2 * time
@@ -220,7 +239,7 @@ def update_joint(
         return
     close_window(params, state)
     _fuse(params, state, inputs, braking)
-    _look_after(params, state)
+    _look_after(params, state, braking)
     open_window(state)
 
 
@@ -228,7 +247,6 @@ def update_joint(
 def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     w, x = state.window, state.x
     time = w.time
-    applied = braking
     motors = 0.0
     for i in range(4):
         if w.pressure_samples[i] == 0:
@@ -239,11 +257,14 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
             w.pressure[i] = state.smooth_pressure[i] = 0.0  # noise about zero is no torque
         motors += abs(w.motor[i])
     moving = x[V] > LEAST_SPEED
-    _walk(state, applied, time)
+    _walk(state, braking, time)
+    _watch_release(state, braking)
     learning = (
-        moving and state.hold_s <= 0.0 and w.motor_known != 0 and not _learning_forbidden(inputs, applied)
+        moving and state.hold_s <= 0.0 and w.motor_known != 0 and not _learning_forbidden(inputs, braking)
     )
-    _choose_free(state, applied, motors > MOTORS, learning)
+    if learning and not braking and motors <= MOTORS:
+        learning = w.accel_cycles == w.cycles and abs(_balance(params, state)) < UNEXPLAINED
+    _choose_free(state, braking, motors > MOTORS, learning)
     before = x[V]
     if w.reference_samples > 0:
         h = state.h
@@ -255,14 +276,30 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
         if state.ratio[5] > JUMP and state.hold_s > 0.0:
             x[V] += w.reference
             state.p[V, V] += 0.25
+    state.sliding = 0
+    state.untrusted_s += time
     for i in range(4):
         state.observed[i] = 0
-        if w.omega_samples[i] > 0:
-            _fuse_wheel(params, state, i, before, moving, learning and applied)
-    if w.accel_cycles == w.cycles and learning:
+        if w.omega_samples[i] == 0:
+            continue
+        if _slides(params, state, i):
+            state.sliding = 1
+        else:
+            state.untrusted_s = 0.0
+            _fuse_wheel(params, state, i, before, moving, learning and braking)
+    if learning and w.accel_cycles == w.cycles and (braking or w.motor_reported):
         _fuse_balance(params, state)
     for i in range(4):
         state.last_pressure[i] = w.pressure[i]
+
+
+@kernel
+def _slides(params: Record, state: Record, i: int) -> bool:
+    """Return whether a wheel is so far from the car's speed that it does not tell it."""
+    w = state.window
+    rolled = w.omega[i] * params.wheel_radius[i]
+    slides: bool = abs(rolled - w.ground[i]) > LARGE_SLIP * max(w.ground[i], rolled, SLIDING_FLOOR)
+    return slides
 
 
 @kernel
@@ -292,12 +329,19 @@ def _fuse_wheel(params: Record, state: Record, i: int, before: float, moving: bo
 
 
 @kernel
-def _fuse_balance(params: Record, state: Record) -> None:
+def _balance(params: Record, state: Record) -> float:
     w = state.window
-    left = predict_balance(
+    left: float = predict_balance(
         params, state, w.pressure, state.smooth_pressure, w.motor, w.load, w.accel, w.change, state.x[V],
         w.lateral,
     )  # fmt: skip
+    return left
+
+
+@kernel
+def _fuse_balance(params: Record, state: Record) -> None:
+    w = state.window
+    left = _balance(params, state)
     variance = params.sigma_accel**2 / w.cycles + BALANCE_FLOOR**2 + (BALANCE_SHARE * w.accel) ** 2
     for i in range(4):
         per_bar = brake_lever(params, i) * params.mu_nominal[i] * math.exp(state.x[MU + i])
@@ -310,7 +354,7 @@ def _fuse_balance(params: Record, state: Record) -> None:
 
 
 @kernel
-def _look_after(params: Record, state: Record) -> None:
+def _look_after(params: Record, state: Record, braking: bool) -> None:
     """Keep snapshots, go back when a wheel slides, begin anew when a value is not finite."""
     w, x = state.window, state.x
     total = 0.0
@@ -320,17 +364,18 @@ def _look_after(params: Record, state: Record) -> None:
         start_joint(params, state)
         state.started, state.reset = 0, 1
         return
-    sliding = False
-    for i in range(4):
-        if w.omega_samples[i] > 0 and w.ground[i] > LEAST_SPEED:
-            slip = w.omega[i] * params.wheel_radius[i] / w.ground[i] - 1.0
-            sliding = sliding or abs(slip) > LARGE_SLIP
+    if state.untrusted_s > BELIEVED_AFTER and not braking:
+        state.started = 0  # then it is the speed that is wrong
+        state.untrusted_s, p_v = 0.0, state.p
+        for j in range(N):
+            p_v[V, j] = p_v[j, V] = 0.0
+        p_v[V, V] = 0.25
     state.kept_s += w.time
-    if sliding and state.hold_s <= 0.0:
+    if state.sliding and braking and state.hold_s <= 0.0:
         _go_back(state)
-    if sliding:
+    if state.sliding:
         state.hold_s = HOLD_S
-    elif state.hold_s <= 0.0 and state.kept_s >= SNAPSHOT_S:
+    elif state.hold_s <= 0.0 and not state.releasing and state.kept_s >= SNAPSHOT_S:
         for i in range(N):
             state.kept_x[1, i] = state.kept_x[0, i]
             for j in range(N):

@@ -28,9 +28,8 @@ DEAD_CYCLES = 3  # 26 ms (A.17)
 LAG = 0.040  # s, between build-up (A.17) and release (A.18)
 WALK = 0.1  # bar/sqrt(s)
 SHARE = 0.15  # of a change, one standard deviation
-DISAGREEMENT_LAG = 0.15  # s
+DISAGREEMENT_LAG = 0.4  # s
 TOLERANCE = 3.0  # standard deviations
-TOLERANCE_SHARE = 0.05  # of the pressure
 AGREED_S = 0.3
 
 
@@ -54,7 +53,7 @@ def correct_pressure(state: Record, i: int, measured: float, sigma: float, dt: f
     gain = 1.0 - math.exp(-dt / DISAGREEMENT_LAG)
     state.disagreement[i] += gain * (innovation - state.disagreement[i])
     averaged = sigma * math.sqrt(0.5 * gain) + math.sqrt(state.variance[i])
-    limit = TOLERANCE * averaged + TOLERANCE_SHARE * abs(measured)
+    limit = TOLERANCE * averaged
     if abs(state.disagreement[i]) > limit:
         state.value[i], state.variance[i] = measured, sigma * sigma
         state.disagreement[i] = state.agreed_s[i] = 0.0

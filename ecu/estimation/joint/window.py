@@ -10,7 +10,14 @@ from ecu.estimation.joint.layout import BIAS, DELAY, SLOPE, V
 from ecu.estimation.joint.pressure import correct_pressure, follow_demand, follows
 from ecu.estimation.motion import corner_speed, fresh, motor_torque, motor_torque_known, usable
 from ecu.jit import Record, kernel
-from ecu.signals import ACCEL_X, CALLIPER_PRESSURE, VEHICLE_SPEED, VEHICLE_SPEED_VALID, WHEEL_SPEED
+from ecu.signals import (
+    ACCEL_X,
+    CALLIPER_PRESSURE,
+    MOTOR_TORQUE,
+    VEHICLE_SPEED,
+    VEHICLE_SPEED_VALID,
+    WHEEL_SPEED,
+)
 
 BAR = 1e5
 NEW_SHARE = 0.2  # of the model's variance that is another one in the next window
@@ -23,7 +30,7 @@ def open_window(state: Record) -> None:
     w = state.window
     w.time, w.cycles, w.accel, w.lateral, w.speed, w.change = 0.0, 0, 0.0, 0.0, 0.0, 0.0
     w.reference, w.reference_change, w.reference_samples, w.accel_cycles = 0.0, 0.0, 0, 0
-    w.motor_known = 1
+    w.motor_known, w.motor_reported = 1, 0
     for i in range(4):
         w.load[i] = w.motor[i] = w.omega[i] = w.ground[i] = w.pressure[i] = 0.0
         w.tracked[i] = 0.0
@@ -58,6 +65,8 @@ def gather(
         w.motor[i] += motor_torque(inputs, i)
         if not motor_torque_known(inputs, i):
             w.motor_known = 0
+        if usable(inputs, MOTOR_TORQUE + i):
+            w.motor_reported = 1
         place = WHEEL_SPEED + i
         if fresh(inputs, place):
             w.omega[i] += value[place]

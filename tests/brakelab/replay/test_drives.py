@@ -19,7 +19,7 @@ def run(log: Path, car: str, config: str, out: Path) -> tuple[dict[str, np.ndarr
             [log],
             resource(f"config/{config}.toml"),
             resource(f"config/maps/{car}.toml"),
-            "observer2",
+            None,
             None,
             out,
         )

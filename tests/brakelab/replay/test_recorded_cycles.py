@@ -87,7 +87,7 @@ def compare(out: Path, records: RecordArray) -> None:
 def test_a_recording_replays_to_its_own_bits(tmp_path: Path) -> None:
     folder, records = record(tmp_path, drive(tmp_path))
     config = resource("config/suv.toml")
-    assert replay([folder], config, None, "observer2", None, tmp_path / "out.parquet") == 0
+    assert replay([folder], config, None, None, None, tmp_path / "out.parquet") == 0
     compare(tmp_path / "out.parquet", records)
 
 
@@ -97,7 +97,7 @@ def test_an_independent_log_replays_with_the_cycles_of_a_recording(tmp_path: Pat
     log = tmp_path / "witness.log"
     log.write_bytes(candump_lines(frames, "can0"))
     config = resource("config/suv.toml")
-    assert replay([log], config, None, "observer2", None, tmp_path / "out.parquet", folder) == 0
+    assert replay([log], config, None, None, None, tmp_path / "out.parquet", folder) == 0
     compare(tmp_path / "out.parquet", records)
 
 
@@ -106,11 +106,11 @@ def test_a_recording_of_another_layout_gives_one_line(tmp_path: Path) -> None:
     about = folder / ABOUT_FILE
     about.write_text(about.read_text().replace('"brakings"', '"brakes"'))
     with pytest.raises(UserError, match="recorded by another version"):
-        replay([folder], resource("config/suv.toml"), None, "observer2", None, tmp_path / "out.parquet")
+        replay([folder], resource("config/suv.toml"), None, None, None, tmp_path / "out.parquet")
 
 
 def test_a_recording_without_cycles_gives_one_line(tmp_path: Path) -> None:
     folder, _ = record(tmp_path, drive(tmp_path))
     (folder / CYCLES_FILE).write_bytes(b"")
     with pytest.raises(UserError, match="no cycle was recorded"):
-        replay([folder], resource("config/suv.toml"), None, "observer2", None, tmp_path / "out.parquet")
+        replay([folder], resource("config/suv.toml"), None, None, None, tmp_path / "out.parquet")

@@ -59,7 +59,7 @@ def frames_of(path: Path, log: Path) -> Path:
 def run(
     logs: list[Path], out: Path, state: Path | None = None, map: Path | None = None
 ) -> dict[str, np.ndarray]:
-    assert replay(logs, SUV, map, "observer2", state, out) == 0
+    assert replay(logs, SUV, map, None, state, out) == 0
     return read_result(out).columns
 
 
@@ -179,7 +179,7 @@ def test_a_log_that_cannot_be_replayed_gives_one_line_and_no_result(tmp_path: Pa
 @pytest.mark.parametrize(
     ("change", "line"),
     [
-        ({"observer": "joint"}, "--observer: joint: comes later"),
+        ({"observer": "best"}, "--observer: best: not known; take joint"),
         ({"out": Path("result.mf4")}, "--out: result.mf4: results are written as Parquet"),
         ({"logs": [Path("no.log")]}, "no.log: no such file"),
     ],

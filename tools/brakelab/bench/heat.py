@@ -55,10 +55,11 @@ def heat_tables(linings: Linings) -> list[Table]:
             "Disc: seconds from 400 to 100 °C at constant speed",
             ("brake", "delta_1", *(f"{speed:.0f} km/h" for speed in speeds)),
             cooling,
-            "Figure 3.7 has no table. It shows cooling from 400 °C at a low and a high cruising speed, and that "
-            "the corrected model ends nearer to the measurement than the conventional one (delta_1 = 0: the time "
-            "at 0 km/h, whatever the speed), mostly at high speed; both sets say so. As printed, delta_1 cools a disc within a minute at 100 km/h, which no car's disc does. With a "
-            "tenth it takes five to seven minutes. The plant uses the tenth. Wet: rain multiplies delta_1 by "
+            "Figure 3.7 has no table. It shows cooling from 400 °C at a low and a high cruising speed, "
+            "beside the conventional model (delta_1 = 0: the time at 0 km/h, whatever the speed); with both "
+            "sets the models part the more the faster the car. As printed, delta_1 cools a disc within a "
+            "minute at 100 km/h, which no car's disc does. With a tenth it takes five to seven minutes. "
+            "The plant uses the tenth. Wet: rain multiplies delta_1 by "
             f"{WET:.0f}, an assumption; Figure 7.15 shows only that rain adds cooling at high speed.",
         ),
         Table(
