@@ -37,9 +37,10 @@ STOPS_TEXT: Final = (
 OBSERVERS: Final = "observers"
 OBSERVERS_TEXT: Final = (
     "Cars are drawn per seed from config/plant/suv.toml, sensors have the noise of Table 4.1. Cold: the "
-    "configuration as it is, nothing learned. Driven in: after ten minutes of config/scenarios/ordinary.toml in "
-    "the same car, with what the state store keeps of them. Every observer closes the loop itself; figures "
-    "stand for front/rear. Counted while the brakes of both axles have been on for 0.8 s, above 15 km/h.\n\n"
+    "configuration as it is, nothing learned. Driven in: after ten minutes of "
+    "config/scenarios/ordinary.toml in the same car, with what the state store keeps of them. Every "
+    "observer closes the loop itself; figures stand for front/rear. Counted while the brakes of both axles "
+    "have been on for 0.8 s, above 15 km/h.\n\n"
     "![Error of the friction over 2σ, and the squared innovations](images/observers.svg)"
 )
 
@@ -104,7 +105,7 @@ def bench(name: str | None, json: bool, seeds: int) -> int:
     Raises:
         UserError: there is no such bench.
     """
-    others = {
+    others: dict[str, Callable[[bool], int]] = {
         STOPS: partial(_stops, seeds=seeds),
         OBSERVERS: partial(_observers, seeds=seeds),
         FRICTION: _friction,

@@ -1,9 +1,9 @@
 """The friction observers over `observers_cases`: the thesis's two, the joint one and a constant.
 
-Every observer drives its own closed loop with the same cars and the same noise. Counted are the rows in which
-the brakes of both axles have been on for 0.8 s (the demand's ramp of 0.3 s and the half second of
-`stops.window`), above 15 km/h; nRMSE as there. *Driven in*: what the state store would have kept of ten minutes
-of `config/scenarios/ordinary.toml` in the same car is given to a new state.
+Every observer drives its own closed loop with the same cars and the same noise. Counted are the rows in
+which the brakes of both axles have been on for 0.8 s (the demand's ramp of 0.3 s and the half second of
+`stops.window`), above 15 km/h; nRMSE as there. *Driven in*: what the state store would have kept of ten
+minutes of `config/scenarios/ordinary.toml` in the same car is given to a new state.
 """
 
 from collections.abc import Callable, Iterable
@@ -30,6 +30,7 @@ from brakelab.bench.stops import AXLES, LOWEST_SPEED, Vector, columns, friction_
 from brakelab.closed_loop import Drive, new_loop, run
 from brakelab.replay.signal_file import freshness_at_any_rate
 from ecu.config import new_params
+from ecu.diagnostics.store import out_of_range
 from ecu.params import OBSERVERS
 from ecu.records import OUTPUTS, RecordArray, new_record
 from ecu.signals import CORNERS
@@ -97,7 +98,7 @@ def drive_car(
     transducers = {"wheel_transducers": observer == "observer1"}
     loop = new_loop(setup.scenario.model_copy(update=transducers), config, seed)
     sides = loop.sides
-    for name, factors in setup.car.items():
+    for name, factors in setup.car:
         sides.vehicle.params[name][0] *= factors
     if setup.any_rate:
         sides.ecu_reception.freshness[:] = freshness_at_any_rate()
@@ -110,12 +111,17 @@ def _setup(case: Case, seed: int) -> Setup:
     return case.change(Setup(case.scenario, configured()), 1.0 if seed % 2 == 0 else -1.0)
 
 
-def _ordinary(case: Case, task: Task) -> RecordArray:
-    """Return what ten minutes of ordinary driving teach; of `case` only what lasts is there."""
-    ordinary = Case(shipped(ORDINARY))
+def _ordinary(case: Case, task: Task) -> RecordArray | None:
+    """Return what ten minutes of ordinary driving teach; of `case` only the car and what lasts is there.
+
+    None: the store would not give it back.
+    """
+    ordinary = Case(shipped(ORDINARY).model_copy(update={"plant": case.scenario.plant}))
     if case.lasting:
         ordinary = ordinary._replace(change=case.change)
-    return drive_car(_setup(ordinary, task.seed), task.observer, task.seed)[1]
+    setup = _setup(ordinary, task.seed)
+    _, learned = drive_car(setup, task.observer, task.seed)
+    return None if out_of_range(learned, new_params(setup.config)["mu_nominal"][0]) else learned
 
 
 def _axle_error(drive: Drive, axle: str) -> Vector:
@@ -163,29 +169,31 @@ def _event(name: str, drive: Drive) -> tuple[float, float]:
     return settling(drive, last, first), abs(force)
 
 
-def _sample(name: str, task: Task, learned: RecordArray | None) -> Sample:
+def _sample(name: str, task: Task, driven_in: bool, learned: RecordArray | None) -> Sample:
     setup = _setup(CASES[name], task.seed)
     drive, _ = drive_car(setup, task.observer, task.seed, learned)
     rows, config = counted(drive), setup.config
     front = friction_errors(drive, rows, "front", config.front.mu_nominal)
     rear = friction_errors(drive, rows, "rear", config.rear.mu_nominal)
     event = _event(name, drive) if name in EVENTS else (float("nan"), float("nan"))
-    return Sample(name, task.observer, learned is not None, *zip(front, rear, strict=True), *event)
+    error, inside, nominal = ((front[k], rear[k]) for k in range(3))
+    return Sample(name, task.observer, driven_in, error, inside, nominal, *event)
 
 
 def drive_task(task: Task) -> list[Sample]:
     """Drive the cases of a task, cold and driven in."""
     samples = []
-    ordinary: dict[str, RecordArray] = {}
+    ordinary: dict[tuple[str, str], RecordArray | None] = {}
     for name in task.cases:
         case = CASES[name]
-        before = name if case.lasting else ORDINARY
+        before = case.scenario.plant, name if case.lasting else ORDINARY
         if before not in ordinary:
             ordinary[before] = _ordinary(case, task)
-        learned = ordinary[before].copy()
-        if name == WRONG_START:
+        learned = ordinary[before]
+        if name == WRONG_START and learned is not None:
+            learned = learned.copy()
             learned["observed_s"] = 0.0  # the linings are new, the car is not
-        samples += [_sample(name, task, None), _sample(name, task, learned)]
+        samples += [_sample(name, task, False, None), _sample(name, task, True, learned)]
     return samples
 
 

@@ -19,8 +19,9 @@ EVERY_SENSOR: Final = (
     *("accel_x", "accel_y", "yaw_rate", "vehicle_speed"),
     *("wheel_speed", "calliper_pressure", "motor_torque", "steering_angle"),
 )
-BURST: Final = 0.180  # s, mean length of a gap
-SLOW_PERIODS: Final = {name: 1.0 / 66.0 for name in ("accel_x", "accel_y", "yaw_rate", "wheel_speed")}
+GAP, BETWEEN_GAPS = 0.180, 2.0  # s, means
+LOST_IN_GAPS: Final = GAP / (GAP + BETWEEN_GAPS)
+SLOW_PERIODS: Final = dict.fromkeys(("accel_x", "accel_y", "yaw_rate", "wheel_speed"), 1.0 / 66.0)
 """s; the other sensors have 33 Hz."""
 
 
@@ -29,8 +30,8 @@ class Setup(NamedTuple):
 
     scenario: Scenario
     config: Config
-    car: dict[str, tuple[float, ...]] = {}
-    """Factors per wheel upon parameters of the drawn car."""
+    car: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    """Parameters of the drawn car and factors upon them per wheel."""
     any_rate: bool = False
     """The ECU expects inputs at whatever rate they come."""
 
@@ -138,25 +139,25 @@ def _slow_inputs(setup: Setup, sign: float) -> Setup:
     sensor = {}
     for name in EVERY_SENSOR:
         period = SLOW_PERIODS.get(name, 1.0 / 33.0)
-        sensor[name] = SensorErrors(period=period, dropout=0.01, dropout_length=BURST / period)
+        sensor[name] = SensorErrors(period=period, dropout=period / BETWEEN_GAPS, dropout_length=GAP / period)
     return _scenario(setup, sensor=sensor)._replace(any_rate=True)
 
 
 def _radii(setup: Setup, sign: float) -> Setup:
-    share = 0.005 * sign
-    return setup._replace(car={"free_radius": (1.0 + share, 1.0 - share, 1.0 - share, 1.0 + share)})
+    share = 0.005 * sign  # front against rear looks like slip
+    return setup._replace(car=(("free_radius", (1.0 + share, 1.0 + share, 1.0 - share, 1.0 - share)),))
 
 
 def _unequal(setup: Setup, sign: float) -> Setup:
     left, right = 1.0 + 0.1 * sign, 1.0 - 0.1 * sign
-    return setup._replace(car={"friction_scale": (left, right, left, right)})
+    return setup._replace(car=(("friction_scale", (left, right, left, right)),))
 
 
 def _robustness() -> dict[str, Case]:
     stop = shipped("stop-1")
     lasting: dict[str, Change] = {
         "mass ±10 %": _changed(vehicle__mass=0.1),
-        "rolling radius ±0.5 % per wheel": _radii,
+        "rolling radius ±0.5 %, rear ∓": _radii,
         "tyre stiffness ±30 %": _changed(front__slip_stiffness=0.3, rear__slip_stiffness=0.3),
         "pressure offset ±1 bar": _sensing(
             lambda sign: {"calliper_pressure": SensorErrors(bias=(sign, sign))}
@@ -217,4 +218,6 @@ EVENTS: Final = {
     "low-grip patch": Case(shipped("low-grip")),
 }
 """Drives of which times are told."""
+LONGEST: Final = {"tyre stiffness × 0.67": 0.10, "low-grip patch": 0.30}
+"""How long their events may be felt [s]: as in the thesis, read off Figures 4.11 and 5.5."""
 CASES: Final = ACCURACY | ROBUSTNESS | EVENTS

@@ -64,7 +64,7 @@ def _errors(drive: Drive, rows: NDArray[np.bool_]) -> Vector:
 
 
 def innovations(drive: Drive, learned: RecordArray | None) -> Vector:
-    """Return the squared innovations of a drive with `configured`, NaN between windows, shape (CHANNELS, n)."""
+    """Return the squared innovations of a drive, NaN between windows, shape (CHANNELS, n)."""
     params = new_params(configured())
     params["transmit"] = True
     _, inputs = decoded(drive)
