@@ -80,7 +80,7 @@ def _drive(pressure: NDArray[np.float64], speed: NDArray[np.float64], error: NDA
     truth = {f"calliper_pressure_{corner}": pressure.copy() for corner in CORNERS} | {"vehicle_speed": speed}
     truth |= {f"mu_b_{corner}": np.full(len(speed), 0.4) for corner in CORNERS}
     outputs = {f"mu_b_{corner}": 0.4 * (1.0 + error) for corner in CORNERS}
-    return Drive(0.01 * np.arange(len(speed)), {}, outputs, truth, new_record(FRAME, 0))
+    return Drive(0.01 * np.arange(len(speed), dtype=np.float64), {}, outputs, truth, new_record(FRAME, 0))
 
 
 def test_rows_count_after_0_8_s_of_pressure_on_every_wheel_above_15_kmh() -> None:
