@@ -177,6 +177,7 @@ def _robustness() -> dict[str, Case]:
         "inputs at 33–66 Hz, gaps of 180 ms": _slow_inputs,
     }
     passing: dict[str, Change] = {
+        "nothing": _as_is,
         "wheel sensor lost while braking": _sensing(
             lambda sign: {"wheel_speed_fl": SensorErrors(lost_from=8.0)}
         ),
@@ -186,8 +187,8 @@ def _robustness() -> dict[str, Case]:
         ),
     }
     twice = (1.6, 1.8)
-    cases = {name: Case(stop, None, twice, change=change, lasting=True) for name, change in lasting.items()}
-    cases |= {name: Case(stop, None, twice, change=change) for name, change in passing.items()}
+    cases = {name: Case(stop, None, twice, change=change) for name, change in passing.items()}
+    cases |= {name: Case(stop, None, twice, change=change, lasting=True) for name, change in lasting.items()}
     curve = shipped("curve")
     assert curve.steering is not None
     gentler = SteeringFile(angle=[(t, 0.8 * angle) for t, angle in curve.steering.angle])
