@@ -26,7 +26,7 @@ PICTURED: Final = 5
 CHANNELS: Final = 5  # four wheel speeds, total force
 EVERY: Final = 10  # cycles
 LEFT, WIDTH, TOP, HEIGHT, GAP = 44.0, 520.0, 24.0, 96.0, 40.0
-SECONDS, LARGEST = 9.0, 2.0  # of the panels' axes
+SECONDS, LARGEST = 7.0, 2.0  # of the panels' axes
 BIN, BINS = 0.25, 16
 COLOURS: Final = ("#9aa5b1", "#d55e00")  # cold, driven in
 
