@@ -228,11 +228,12 @@ def tune(
 def bench(
     name: Annotated[str | None, typer.Argument(metavar="NAME", help="One benchmark; without: all")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table")] = False,
+    seeds: Annotated[int, typer.Option(min=1, help="Cars that stops and observers draw")] = 20,
 ) -> int:
-    """Times of step, codec and cycle on this machine."""
+    """Times of step, codec and cycle on this machine; accuracy over drawn cars."""
     from brakelab.bench import command
 
-    return command.bench(name, json)
+    return command.bench(name, json, seeds)
 
 
 @app.command()

@@ -57,6 +57,7 @@ FACTS = {
     "fixed-pedal": Fact(LONG, CUT_OFF, 27.8, (0.9, 1.1)),  # Table 6.1: about 1
     "lane-change": Fact((8.9, 9.1), 22.2, 22.3, (-0.2, 0.2), (4.0, 7.0)),
     "low-grip": Fact((5, 8), 0.0, 20.8, (4.0, 5.0)),
+    "ordinary": Fact(LONG, CUT_OFF, 25.0, (0.0, 0.0), (1.5, 2.6)),  # on the motors for the first minute
     "rain": Fact(LONG, CUT_OFF, 33.4, (2.9, 3.4)),
     "real-driving": Fact(LONG, CUT_OFF, math.nan, (0.0, 2.5), disc=(20, 60)),
     "repeated": Fact((14, 17), 0.0, 36.2, (4.0, 4.5)),

@@ -76,13 +76,13 @@ def test_page_names_config_seeds_and_every_figure(
     (tmp_path / "config").mkdir()
     (tmp_path / "config" / "suv.toml").write_bytes(resource("config/suv.toml").read_bytes())
     monkeypatch.setattr(command, "resource", lambda name: tmp_path / name)
-    monkeypatch.setattr(command.stops_bench, "stops", lambda config, spread: result)
-    assert command.bench("stops", json=False) == 0
+    monkeypatch.setattr(command.stops_bench, "stops", lambda config, seeds, spread: result)
+    assert command.bench("stops", json=False, seeds=20) == 0
     page = (tmp_path / "docs" / "observer-accuracy.md").read_text(encoding="utf-8")
     assert "config/suv.toml" in page
     assert "seeds 0–19" in page
     for table in stop_tables(result, 20):
         assert markdown(table).rstrip() in page
     assert f"| #1 rear | yes | {result.friction[1].nrmse.median:.2f} |" in page
-    assert command.bench("stops", json=True) == 0
+    assert command.bench("stops", json=True, seeds=20) == 0
     assert '"to_ideal_uncompensated"' in capsys.readouterr().out

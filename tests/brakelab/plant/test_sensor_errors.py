@@ -76,6 +76,12 @@ def test_a_bias_stays(bias: float) -> None:
     assert signals(true, bias=bias)[:, 0] == pytest.approx(true + bias, abs=1e-15)
 
 
+@pytest.mark.parametrize("scale", [1.03, 0.5])
+def test_a_scale_multiplies_the_truth_not_the_bias(scale: float) -> None:
+    true = np.linspace(-3.0, 30.0, 200)
+    assert signals(true, scale=scale, bias=0.1)[:, 0] == pytest.approx(scale * true + 0.1, abs=1e-12)
+
+
 def test_a_bias_with_two_bounds_is_drawn_evenly_per_car_and_corner() -> None:
     wheels = [SIGNALS.index(f"wheel_speed_{c}") for c in ("fl", "fr", "rl", "rr")]
     given = ({"wheel_speed": SensorErrors(bias=(-0.2, 0.4))},)

@@ -3,6 +3,7 @@
 import json as json_format
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -15,6 +16,10 @@ from brakelab.bench import stops as stops_bench
 from brakelab.bench.energy import energy_tables
 from brakelab.bench.friction import friction_tables
 from brakelab.bench.measure import Figure, Row, machine
+from brakelab.bench.observers import Sample, Task, observer_rows, step_times, tasks
+from brakelab.bench.observers_cases import configured
+from brakelab.bench.observers_picture import PICTURED, consistency_of, write_picture
+from brakelab.bench.observers_table import finite, observer_tables
 from brakelab.bench.table import Table, markdown, show, stop_tables, time_table
 from ecu import __version__
 from ecu.config import config_hash, load_config
@@ -27,6 +32,16 @@ STOPS_TEXT: Final = (
     "#4 6 m/s² on a wet one (0.7). The car is that of config/plant/suv.toml, drawn per seed; its linings "
     "have 0.85 (front) and 1.10 (rear) of the 0.45 that the ECU is configured with. Nothing was learned "
     "before. Counted from 0.5 s after the demand has its full value, down to 15 km/h."
+)
+
+OBSERVERS: Final = "observers"
+OBSERVERS_TEXT: Final = (
+    "Cars are drawn per seed from config/plant/suv.toml, sensors have the noise of Table 4.1. Cold: the "
+    "configuration as it is, nothing learned. Driven in: after ten minutes of "
+    "config/scenarios/ordinary.toml in the same car, with what the state store keeps of them. Every "
+    "observer closes the loop itself; figures stand for front/rear. Counted while the brakes of both axles "
+    "have been on for 0.8 s, above 15 km/h.\n\n"
+    "![Error of the friction over 2σ, and the squared innovations](images/observers.svg)"
 )
 
 FRICTION: Final = "friction"
@@ -80,16 +95,22 @@ BENCHES: Final = {
 }
 
 
-def bench(name: str | None, json: bool) -> int:
+def bench(name: str | None, json: bool, seeds: int = 20) -> int:
     """Run one bench, or without a name all that measure time; print tables, or JSON. Returns 0.
 
     In a checkout, a run of all times renews docs/benchmarks.md, `stops` docs/observer-accuracy.md,
-    `friction` docs/friction.md and `energy` docs/energy.md.
+    `observers` docs/observers.md, `friction` docs/friction.md and `energy` docs/energy.md. `seeds`: how many
+    cars `stops` and `observers` draw.
 
     Raises:
         UserError: there is no such bench.
     """
-    others = {STOPS: _stops, FRICTION: _friction, ENERGY: _energy}
+    others: dict[str, Callable[[bool], int]] = {
+        STOPS: partial(_stops, seeds=seeds),
+        OBSERVERS: partial(_observers, seeds=seeds),
+        FRICTION: _friction,
+        ENERGY: _energy,
+    }
     if name is not None and name not in (*BENCHES, *others):
         raise UserError("bench", name, f"no such bench; choose one of {', '.join((*BENCHES, *others))}")
     return others[name](json) if name in others else _times(name, json)
@@ -109,7 +130,7 @@ def _times(name: str | None, json: bool) -> int:
     return 0
 
 
-def _stops(json: bool) -> int:
+def _stops(json: bool, seeds: int) -> int:
     path = resource("config/suv.toml")
     config = load_config(path)
     console = Console(stderr=True)
@@ -121,8 +142,7 @@ def _stops(json: bool) -> int:
             results = pool.map(drive, cases)
             return track(results, "stops", len(cases), console=console, transient=True)
 
-        result = stops_bench.stops(config, spread=all_cores)
-    seeds = stops_bench.SEEDS
+        result = stops_bench.stops(config, seeds, spread=all_cores)
     of = f"version {__version__}, config/{path.name} ({config_hash(config)[:12]}), seeds 0–{seeds - 1}"
     if json:
         plain = {key: [_plain(row) for row in rows] for key, rows in result._asdict().items()}
@@ -132,6 +152,30 @@ def _stops(json: bool) -> int:
     _print_tables(of, tables)
     text = f"`brake-ecu bench stops`, {of}. {STOPS_TEXT}"
     _write("observer-accuracy.md", "Accuracy of Observer 2 and of the compensation", text, tables)
+    return 0
+
+
+def _observers(json: bool, seeds: int) -> int:
+    console = Console(stderr=True)
+    todo = tasks(seeds)
+    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+
+        def all_cores(drive: Callable[[Task], list[Sample]], cars: list[Task]) -> Iterable[list[Sample]]:
+            return track(pool.map(drive, cars), OBSERVERS, len(cars), console=console, transient=True)
+
+        rows = observer_rows(todo, all_cores)
+        consistency = list(pool.map(consistency_of, range(min(seeds, PICTURED))))
+    times = step_times()
+    of = f"version {__version__}, config/suv.toml ({config_hash(configured())[:12]}), seeds 0–{seeds - 1}"
+    if json:
+        plain = {name: value._asdict() for name, value in times.items()}
+        _print_json(finite({"of": of, "rows": [_plain(row) for row in rows], "step_us": plain}))
+        return 0
+    tables = observer_tables(rows, times, consistency)
+    _print_tables(of, tables)
+    text = f"`brake-ecu bench observers`, {of}. {machine()}. {OBSERVERS_TEXT}"
+    _write("observers.md", "The observers beside their goals", text, tables)
+    write_picture(resource("docs") / "images" / "observers.svg", consistency)
     return 0
 
 

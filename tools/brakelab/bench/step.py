@@ -25,7 +25,8 @@ CYCLES: Final = 500  # of braking, all four corners observing: from 31 to 12 m/s
 
 
 @kernel
-def _steps(params: Any, state: Any, inputs: Any, outputs: Any) -> None:
+def run_steps(params: Any, state: Any, inputs: Any, outputs: Any) -> None:
+    """Step through `inputs`, shape (cycles,)."""
     for k in range(len(inputs)):
         step(params, state, inputs[k : k + 1], outputs)
 
@@ -43,7 +44,7 @@ def filter_table(cycles: int) -> tuple[RecordArray, RecordArray, RecordArray, Re
     stop = simulated_stop()
     outputs = new_record(OUTPUTS)
     state = new_state(stop.params)
-    _steps(stop.params, state, stop.inputs[: stop.braking], outputs)
+    run_steps(stop.params, state, stop.inputs[: stop.braking], outputs)
     inputs = stop.inputs[stop.braking : stop.braking + cycles]
     table = np.zeros((len(inputs), 4), FILTER_INPUT)
     _noted_steps(stop.params, state.copy(), inputs, outputs, table)
@@ -87,7 +88,7 @@ def step_rows(rounds: int = ROUNDS, cycles: int = CYCLES) -> list[Row]:
             filterpy_filters[0].cycle(row)
 
     tasks = [
-        timed(lambda: _steps(params, state, inputs, outputs), count, reset),
+        timed(lambda: run_steps(params, state, inputs, outputs), count, reset),
         timed(steps_from_python, count, reset),
         timed(lambda: filter_cycles(params, observer, table), count, reset),
         timed(filters_from_python, count, reset),

@@ -106,16 +106,18 @@ def nrmse(estimate: Vector, true: Vector) -> float:
     return float(100.0 * np.sqrt(np.mean((estimate - true) ** 2)) / np.mean(true))
 
 
-def _columns(table: dict[str, Vector], stem: str, axle: str, rows: NDArray[np.bool_]) -> Vector:
+def columns(table: dict[str, Vector], stem: str, axle: str, rows: NDArray[np.bool_]) -> Vector:
+    """Return both wheels of an axle, shape (2, rows)."""
     return np.stack([table[f"{stem}_{corner}"][rows] for corner in AXLES[axle]])
 
 
-def _friction_errors(drive: Drive, axle: str, nominal: float) -> tuple[float, float, float]:
-    """Return nRMSE [%], share inside 2σ and nRMSE of the nominal friction [%]."""
-    rows = window(drive)
-    true = _columns(drive.truth, "mu_b", axle, rows)
-    estimate = _columns(drive.outputs, "mu_b", axle, rows)
-    sigma = _columns(drive.outputs, "sigma_mu_b", axle, rows)
+def friction_errors(
+    drive: Drive, rows: NDArray[np.bool_], axle: str, nominal: float
+) -> tuple[float, float, float]:
+    """Return nRMSE [%], share inside 2σ and nRMSE of the nominal friction [%] over `rows`."""
+    true = columns(drive.truth, "mu_b", axle, rows)
+    estimate = columns(drive.outputs, "mu_b", axle, rows)
+    sigma = columns(drive.outputs, "sigma_mu_b", axle, rows)
     inside = float(np.mean(np.abs(estimate - true) <= 2.0 * sigma))
     return nrmse(estimate, true), inside, nrmse(np.full_like(true, nominal), true)
 
@@ -141,8 +143,9 @@ def _one_car(test: int, speed_known: bool, config: Config, seed: int) -> _Seed:
     uncompensated = _brake(test, speed_known, plain, seed)
     ideal = _brake(test, speed_known, config, seed, ideal=True)
     nominal = {"front": config.front.mu_nominal, "rear": config.rear.mu_nominal}
+    rows = window(ours.drive)
     return _Seed(
-        {axle: _friction_errors(ours.drive, axle, nominal[axle]) for axle in AXLES},
+        {axle: friction_errors(ours.drive, rows, axle, nominal[axle]) for axle in AXLES},
         (
             _relative_error(ours, ours.drive.truth["decel_demand"]),
             _relative_error(uncompensated, uncompensated.drive.truth["decel_demand"]),

@@ -183,6 +183,7 @@ SENSOR: Final = np.dtype(
         ("noise", "f8"),  # standard deviation
         ("resolution", "f8"),
         ("delay", "f8"),  # cycles
+        ("scale", "f8"),
         ("bias", "f8"),
         ("drift_step", "f8"),  # standard deviation of what a cycle adds
         ("drift_decay", "f8"),  # of what was there, in a cycle

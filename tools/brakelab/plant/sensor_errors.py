@@ -2,7 +2,7 @@
 
 x(t) true   x_d = x(t - delay)                          linear between the cycles before and after
             b' = -b / tau + q w                         Gauss-Markov drift, tau = inf: random walk, var q^2 t
-            y = x_d + bias + b + noise N(0, 1)          held from `stuck_from` on
+            y = s x_d + bias + b + noise N(0, 1)        held from `stuck_from` on
             y = resolution * round(y / resolution)
 
 A sample has no value (NaN) before its `period` is over, in a burst of dropout, and from `lost_from` on.
@@ -66,6 +66,7 @@ class SensorErrors(Section):
     resolution: NotNegative = 0.0
     delay: Annotated[tuple[Delay, Delay], BeforeValidator(_bounds), AfterValidator(_rises)] = (0.0, 0.0)
     """s"""
+    scale: Positive = 1.0
     bias: Annotated[tuple[float, float], BeforeValidator(_bounds), AfterValidator(_rises)] = (0.0, 0.0)
     drift: NotNegative = 0.0
     """q, unit per root second."""
@@ -153,7 +154,7 @@ def new_sensors(layers: Iterable[Mapping[str, SensorErrors]], seed: int) -> Reco
                 said = layer.get(key)
                 if said is not None:
                     errors = errors.model_copy(update=said.model_dump(exclude_unset=True))
-        for field in ("noise", "resolution", "period", "stuck_from", "lost_from"):
+        for field in ("noise", "resolution", "scale", "period", "stuck_from", "lost_from"):
             row[field] = getattr(errors, field)
         row["delay"] = random.uniform(*errors.delay) / CYCLE
         row["bias"] = random.uniform(*errors.bias)
@@ -220,7 +221,7 @@ def disturb(
     for i in range(len(sensors)):
         sensor, memory = sensors[i], sensing[i]
         _pass_time(sensor, memory, values[i], cycle, noise)
-        value = _delayed(sensor, memory) + (sensor.bias + memory.drift)
+        value = sensor.scale * _delayed(sensor, memory) + (sensor.bias + memory.drift)
         if sensor.noise > 0.0:
             value += sensor.noise * noise.standard_normal()
         if sensor.resolution > 0.0:
