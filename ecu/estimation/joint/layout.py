@@ -28,6 +28,7 @@ OFFSET: Final = 19  # two: pressure [bar] lost beyond push-out and sensor, per a
 DELAY: Final = 21  # of the speed reference beyond configured [s]
 DRIVE: Final = 22  # two: unreported drive of an axle over mass [m/s^2]; only considered
 ROLLING: Final = 24  # ln of all rolling radii: nothing but a speed reference tells it
+RATE: Final = 25  # change of all four MU while the pads rub [1/s]
 N: Final = N_JOINT
 
 WINDOW_STATE: Final = np.dtype(

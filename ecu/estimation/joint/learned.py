@@ -8,26 +8,26 @@ import math
 
 import numpy as np
 
-from ecu.estimation.friction import GREATEST_RATIO, LEAST_RATIO, SIGMA_FOR_LEARNING
+from ecu.estimation.friction import GREATEST_RATIO, LEAST_RATIO
 from ecu.estimation.joint.layout import (
     BIAS,
     DELAY,
     DRAG,
     MASS,
-    MOTOR,
     MU,
     OFFSET,
     PEAK,
     RADIUS,
+    RATE,
     ROLLING,
     SLOPE,
     STIFFNESS,
     N,
     V,
 )
-from ecu.estimation.joint.observer import start_joint
+from ecu.estimation.joint.observer import WINDOW_S, start_joint
 from ecu.estimation.joint.pressure import follows
-from ecu.estimation.joint.prior import PRIOR, set_prior
+from ecu.estimation.joint.prior import set_prior
 from ecu.estimation.motion import usable
 from ecu.jit import Record, kernel
 from ecu.signals import CALLIPER_PRESSURE, FAULT, HOLDING, NOMINAL, OBSERVING, WHEEL_SPEED
@@ -50,12 +50,10 @@ def restore_joint(params: Record, state: Record, learned: Record) -> None:
     x, p = state.x, state.p
     if learned.joint_sigma[MASS] > 0.0:
         for i in range(N):
-            if i in (V, SLOPE, MOTOR) or MU <= i < MU + 4 or OFFSET <= i < OFFSET + 2:
+            if i in (V, SLOPE, RATE) or MU <= i < MU + 4 or OFFSET <= i < OFFSET + 2:
                 continue
             x[i] = learned.joint[i]
-            for j in range(N):
-                p[i, j] = p[j, i] = 0.0
-            p[i, i] = min(learned.joint_sigma[i] ** 2 + PAUSE[i] ** 2, PRIOR[i] ** 2)
+            p[i, i] = min(learned.joint_sigma[i] ** 2 + PAUSE[i] ** 2, p[i, i])
     for i in range(4):
         if learned.observed_s[i] <= 0.0:
             continue
@@ -91,15 +89,27 @@ def _at_bound(ratio: float) -> bool:
 
 @kernel
 def settle_friction(params: Record, state: Record, learned: Record) -> None:
-    """Let friction that a braking left unsure or at its bound go back to what is the base of the next."""
+    """Let friction that a braking left at its bound go back, of all wheels, to what is the base of the next.
+
+    An estimate that is only unsure stays: its errors balance those of the other axle.
+    """
+    credible = True
+    for i in range(MU, MU + 4):
+        credible = credible and not _at_bound(math.exp(state.x[i]))
+    if credible:
+        return
     for i in range(4):
-        unsure = state.p[MU + i, MU + i] > SIGMA_FOR_LEARNING**2
-        if not unsure and not _at_bound(math.exp(state.x[MU + i])):
-            continue
         state.x[MU + i] = math.log(learned.mu_b[i] / params.mu_nominal[i])
         for j in range(N):
             state.p[MU + i, j] = state.p[j, MU + i] = 0.0
         state.p[MU + i, MU + i] = (learned.sigma_mu_b[i] / learned.mu_b[i]) ** 2 + MU_PAUSE**2
+
+
+@kernel
+def friction_now(state: Record, i: int) -> float:
+    """Return ln of friction over nominal: what the middle of the last window had, moved on by its rate."""
+    moved: float = state.x[MU + i] + state.x[RATE] * (0.5 * WINDOW_S + state.window.time)
+    return moved
 
 
 @kernel
@@ -110,7 +120,7 @@ def publish_friction(
     friction.reset = state.reset
     for i in range(4):
         nominal = params.mu_nominal[i]
-        ratio = math.exp(state.x[MU + i])
+        ratio = math.exp(friction_now(state, i))
         mu = nominal * ratio
         variance = state.p[MU + i, MU + i]
         if state.observed[i] and follows(state.pressures, i):

@@ -21,10 +21,12 @@ from ecu.estimation.joint.layout import (
     DRAG,
     LOAD,
     MASS,
+    MOTOR,
     MU,
     OFFSET,
     PEAK,
     RADIUS,
+    RATE,
     RATIO,
     ROLLING,
     SINKING,
@@ -34,7 +36,7 @@ from ecu.estimation.joint.layout import (
     V,
 )
 from ecu.estimation.joint.pressure import follows
-from ecu.estimation.joint.prior import pressure_change, set_prior, walk
+from ecu.estimation.joint.prior import forget_rate, pressure_change, set_prior, walk
 from ecu.estimation.joint.snapshot import go_back, keep, keep_newer
 from ecu.estimation.joint.wheel import brake_lever, predict_balance, predict_wheel
 from ecu.estimation.joint.window import close_window, gather, open_window
@@ -119,6 +121,8 @@ def _watch_release(state: Record, braking: bool) -> None:
 @kernel
 def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> None:
     free = state.free
+    if not (braking and learning) or state.releasing:
+        forget_rate(state)
     for i in range(N):
         free[i] = 0
     free[V] = free[SLOPE] = 1
@@ -127,6 +131,7 @@ def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> 
     for i in range(4):
         free[RADIUS + i] = 1
         free[MU + i] = 1 if braking and not state.releasing else 0
+    free[RATE] = free[MU]
     free[DELAY] = 1
     free[ROLLING] = 1 if state.window.reference_samples > 0 else 0
     if state.releasing:
@@ -137,7 +142,7 @@ def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> 
         free[SINKING] = 1
         free[BIAS] = free[DRAG] = state.window.motor_reported
         if motors:
-            free[STIFFNESS] = free[RATIO] = free[MASS] = free[LOAD] = free[PEAK] = 1
+            free[STIFFNESS] = free[RATIO] = free[MASS] = free[LOAD] = free[PEAK] = free[MOTOR] = 1
 
 
 @kernel

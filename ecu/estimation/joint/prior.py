@@ -15,6 +15,7 @@ from ecu.estimation.joint.layout import (
     OFFSET,
     PEAK,
     RADIUS,
+    RATE,
     RATIO,
     ROLLING,
     SINKING,
@@ -27,13 +28,14 @@ from ecu.jit import Record, kernel
 
 PRIOR = np.zeros(N)
 """Standard deviations before anything is learned; friction, radii and speed are set apart."""
-PRIOR[STIFFNESS], PRIOR[RATIO] = 0.25, 0.08
+PRIOR[STIFFNESS], PRIOR[RATIO] = 0.25, 0.06
 PRIOR[BIAS], PRIOR[SLOPE] = 0.1, 0.3
 PRIOR[MASS], PRIOR[PEAK], PRIOR[LOAD], PRIOR[SINKING] = 0.02, 0.25, 0.05, 0.10
 PRIOR[DRAG] = 0.10
 PRIOR[RADIUS : RADIUS + 4], PRIOR[ROLLING] = 0.0015, 0.004
 PRIOR[OFFSET : OFFSET + 2] = 0.3
 PRIOR[DELAY] = 0.005
+PRIOR[RATE] = 0.1
 PRIOR[DRIVE : DRIVE + 2] = 0.25  # drag and creep of an engine in gear
 
 # Standard deviations of friction's prior, of its logarithm: all four together, per axle, per wheel.
@@ -48,7 +50,8 @@ WALK[BIAS], WALK[SLOPE] = 0.0005, 0.05
 WALK[PEAK], WALK[LOAD], WALK[SINKING] = 0.01, 0.0005, 0.0005
 WALK[MASS], WALK[MOTOR], WALK[DRAG] = 1e-5, 1e-5, 0.0005
 WALK[DELAY] = 1e-4
-MU_WALK_COMMON, MU_WALK_AXLE, MU_WALK_WHEEL = 0.15, 0.03, 0.005
+WALK[RATE] = 0.1
+MU_WALK_COMMON, MU_WALK_AXLE, MU_WALK_WHEEL = 0.08, 0.02, 0.005
 MU_WALK_PRESSURE = 0.05  # of an axle's friction, per relative change of its pressure
 MU_WALK_HELD = 0.003
 
@@ -80,6 +83,27 @@ def pressure_change(state: Record, left: int) -> float:
 
 
 @kernel
+def _change_friction(state: Record, time: float) -> None:
+    """Move friction on by its rate."""
+    x, p = state.x, state.p
+    for i in range(MU, MU + 4):
+        x[i] += time * x[RATE]
+        for j in range(N):
+            p[i, j] += time * p[RATE, j]
+    for i in range(MU, MU + 4):
+        for j in range(N):
+            p[j, i] += time * p[j, RATE]
+
+
+@kernel
+def forget_rate(state: Record) -> None:
+    """Let friction's rate be unknown."""
+    for j in range(N):
+        state.p[RATE, j] = state.p[j, RATE] = 0.0
+    state.x[RATE], state.p[RATE, RATE] = 0.0, PRIOR[RATE] ** 2
+
+
+@kernel
 def walk(state: Record, rubbing: bool, time: float) -> None:
     """Add to the covariance what may have changed over `time` [s]; friction changes while the pads rub."""
     p = state.p
@@ -87,6 +111,7 @@ def walk(state: Record, rubbing: bool, time: float) -> None:
     for i in range(N):
         p[i, i] += WALK[i] ** 2 * time
     if rubbing:
+        _change_friction(state, time)
         rise_front = max(pressure_change(state, 0), 0.0)
         rise_rear = max(pressure_change(state, 2), 0.0)
         front = MU_WALK_AXLE**2 * time + (MU_WALK_PRESSURE * rise_front) ** 2

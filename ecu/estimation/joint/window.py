@@ -76,12 +76,14 @@ def gather(
             w.omega_samples[i] += 1
         place = CALLIPER_PRESSURE + i
         push_out = params.push_out_pressure[i] / BAR
-        follow_demand(state.pressures, i, demand[i] / BAR, dt)
+        if params.transmit:
+            follow_demand(state.pressures, i, demand[i] / BAR, dt)
         if fresh(inputs, place):
             above = value[place] - push_out
             w.pressure[i] += above
             w.pressure_samples[i] += 1
-            correct_pressure(state.pressures, i, value[place], params.sigma_pressure / BAR, dt)
+            if params.transmit:
+                correct_pressure(state.pressures, i, value[place], params.sigma_pressure / BAR, dt)
             gain = 1.0 - math.exp(-dt / SMOOTHING)
             state.smooth_pressure[i] += gain * (above - state.smooth_pressure[i])
         if follows(state.pressures, i):
