@@ -2,7 +2,8 @@
 
 Correction after Schmidt: a state that is not free keeps its value and variance, but its covariances act, so
 that what it leaves uncertain is not counted as known. Innovations beyond `GATE` standard deviations count
-with a variance that puts them on the gate; beyond four gates they are rejected."""
+with a variance that puts them on the gate, and while friction is not observed correct speed and slope alone:
+what a car is learns from what fits. Beyond four gates they are rejected."""
 
 import math
 
@@ -40,6 +41,12 @@ def walk_friction(state: Record, common: float, front: float, rear: float, wheel
 
 
 @kernel
+def _corrects(free: Record, i: int, only_speed: bool) -> bool:
+    allowed: bool = free[i] != 0 and (not only_speed or i in (V, SLOPE))
+    return allowed
+
+
+@kernel
 def correct(state: Record, innovation: float, variance: float) -> float:
     """Fuse a measurement with derivatives `state.h` and noise `variance`; returns its test ratio."""
     p, h, ph, x, free = state.p, state.h, state.ph, state.x, state.free
@@ -54,20 +61,22 @@ def correct(state: Record, innovation: float, variance: float) -> float:
     ratio = innovation * innovation / total
     if not math.isfinite(ratio) or ratio > REJECT * REJECT:
         return ratio
-    if ratio > GATE * GATE:
+    outlier = ratio > GATE * GATE
+    if outlier:
         total = innovation * innovation / (GATE * GATE)
+    only_speed = outlier and not free[MU]
     scale = innovation / total
     for i in range(N):
-        if free[i]:
+        if _corrects(free, i, only_speed):
             x[i] += scale * ph[i]
     inverse = 1.0 / total
     for i in range(N):
         gain = ph[i] * inverse
-        if free[i]:
+        if _corrects(free, i, only_speed):
             for j in range(N):
                 p[i, j] -= gain * ph[j]
         else:
             for j in range(N):
-                if free[j]:
+                if _corrects(free, j, only_speed):
                     p[i, j] -= gain * ph[j]
     return ratio

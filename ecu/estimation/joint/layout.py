@@ -26,7 +26,7 @@ MOTOR: Final = 17  # ln of motor torque over reported
 DRAG: Final = 18  # ln of air drag per mass over configured
 OFFSET: Final = 19  # two: pressure [bar] lost beyond push-out and sensor, per axle
 DELAY: Final = 21  # of the speed reference beyond configured [s]
-DRIVE: Final = 22  # two: unreported drive of an axle over mass [m/s^2]; only considered
+DRIVE: Final = 22  # two: unknown drive of an axle over mass [m/s^2]; only considered
 ROLLING: Final = 24  # ln of all rolling radii: nothing but a speed reference tells it
 RATE: Final = 25  # change of all four MU while the pads rub [1/s]
 N: Final = N_JOINT
@@ -69,7 +69,6 @@ JOINT_STATE: Final = np.dtype(
         ("ph", "f8", (N,)),
         ("kept_x", "f8", (2, N)),  # snapshots: the newer in row 0
         ("kept_p", "f8", (2, N, N)),
-        ("window_s", "f8"),  # length of the last window
         ("kept_s", "f8"),  # age of the newer one [s]
         ("window", WINDOW_STATE),
         ("pressures", PRESSURE_STATE),
@@ -81,6 +80,7 @@ JOINT_STATE: Final = np.dtype(
         ("hold_s", "f8"),  # no learning for this long, a wheel had left the tyre's range
         ("smooth_pressure", "f8", (4,)),  # bar above push-out
         ("readings", "f8", (4,)),  # mean pressure readings of released brakes [bar]
+        ("last_accel", "f8"),  # of the last window [m/s^2]
         ("last_smooth", "f8", (4,)),  # of the last window [bar]
         ("last_pressure", "f8", (4,)),  # of the last window [bar]
         ("last_slip", "f8", (4,)),

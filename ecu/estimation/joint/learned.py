@@ -25,7 +25,7 @@ from ecu.estimation.joint.layout import (
     N,
     V,
 )
-from ecu.estimation.joint.observer import start_joint
+from ecu.estimation.joint.observer import WINDOW_S, start_joint
 from ecu.estimation.joint.pressure import follows
 from ecu.estimation.joint.prior import set_prior
 from ecu.estimation.motion import usable
@@ -109,7 +109,7 @@ def settle_friction(params: Record, state: Record, learned: Record) -> None:
 @kernel
 def friction_now(state: Record, i: int) -> float:
     """Return ln of friction over nominal: what the middle of the last window had, moved on by its rate."""
-    moved: float = state.x[MU + i] + state.x[RATE] * (0.5 * state.window_s + state.window.time)
+    moved: float = state.x[MU + i] + state.x[RATE] * (0.5 * WINDOW_S + state.window.time)
     return moved
 
 

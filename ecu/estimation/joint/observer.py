@@ -50,7 +50,7 @@ from ecu.signals import (
     WHEEL_SPEED,
 )
 
-WINDOW_S, LONGEST_WINDOW_S = 0.05, 0.12
+WINDOW_S = 0.05
 LEAST_SPEED = 3.4  # m/s
 APPLIED = 1.0  # bar above push-out: the brakes act
 STRAIGHT = 0.05  # lateral acceleration over gravity: more, and wheels roll by their own loads and angles
@@ -66,6 +66,7 @@ SNAPSHOT_S = 0.2
 BALANCE_FLOOR = 0.01  # m/s^2 that the balance leaves out
 BALANCE_SHARE = 0.004  # of the deceleration
 SKEW_FOLLOWED, SKEW_REPORTED = 0.5, 3.0  # windows between pressure and force; a foreign log is worse
+SKEW_ACCEL = 0.5  # windows between acceleration and torques
 TRANSIENT = 0.5  # of a slip's change since the last window
 CORNERING = 1.0  # of slip, per squared adhesion used sideways: then load and slip angle are not well known
 UNEXPLAINED = 0.15  # m/s^2 while rolling: someone drives or brakes the car without saying so
@@ -140,23 +141,11 @@ def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> 
     if braking:
         free[STIFFNESS] = free[PEAK] = 1
     else:
-        free[SINKING] = 1
         free[BIAS] = free[DRAG] = state.window.motor_reported
         if motors:
-            free[STIFFNESS] = free[RATIO] = free[MASS] = free[LOAD] = free[PEAK] = free[MOTOR] = 1
-
-
-@kernel
-def _window_full(state: Record, inputs: Record) -> bool:
-    """Return whether the window has its length, and of slower wheel speeds two samples."""
-    w = state.window
-    if w.time < WINDOW_S - 0.001:
-        return False
-    few = False
-    for i in range(4):
-        few = few or (w.omega_samples[i] < 2 and usable(inputs, WHEEL_SPEED + i))
-    full: bool = not few or w.time > LONGEST_WINDOW_S
-    return full
+            free[STIFFNESS] = free[RATIO] = free[MASS] = free[LOAD] = free[PEAK] = free[MOTOR] = free[
+                SINKING
+            ] = 1
 
 
 @kernel
@@ -185,9 +174,8 @@ def update_joint(
         open_window(state)
     gather(params, state, inputs, motion, load, demand, dt)
     state.hold_s = max(state.hold_s - dt, 0.0)
-    if not _window_full(state, inputs):
+    if state.window.time < WINDOW_S - 0.001:
         return
-    state.window_s = state.window.time
     close_window(params, state)
     _fuse(params, state, inputs, braking)
     _look_after(params, state, braking)
@@ -224,8 +212,8 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     learning = (
         moving and state.hold_s <= 0.0 and w.motor_known != 0 and not _learning_forbidden(inputs, braking)
     )
-    if learning and not braking and abs(w.across) > STRAIGHT:
-        learning = False
+    if learning and not braking:
+        learning = abs(w.across) < STRAIGHT
     if learning and not braking and motors <= MOTORS:
         learning = w.accel_cycles == w.cycles and abs(predict_balance(params, state)) < UNEXPLAINED
     _choose_free(state, braking, motors > MOTORS, learning)
@@ -251,6 +239,7 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
             _fuse_wheel(params, state, i, before, moving, learning and braking)
     if learning and w.accel_cycles == w.cycles and (braking or w.motor_reported):
         _fuse_balance(params, state)
+    state.last_accel = w.accel
     for i in range(4):
         state.last_pressure[i], state.last_smooth[i] = w.pressure[i], state.smooth_pressure[i]
 
@@ -303,6 +292,7 @@ def _fuse_balance(params: Record, state: Record) -> None:
     w = state.window
     left = predict_balance(params, state)
     variance = params.sigma_accel**2 / w.cycles + BALANCE_FLOOR**2 + (BALANCE_SHARE * w.accel) ** 2
+    variance += (SKEW_ACCEL * (w.accel - state.last_accel)) ** 2
     for i in range(4):
         per_bar = brake_lever(params, i) * params.mu_nominal[i] * math.exp(state.x[MU + i])
         per_bar /= params.wheel_radius[i] * params.mass

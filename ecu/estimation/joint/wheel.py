@@ -38,6 +38,7 @@ BAR = 1e5
 SHAPE = 1.6  # c of the Magic Formula
 NOMINAL_PEAK = 0.9  # adhesion
 PEAK_DEGRESSION = 0.05  # adhesion falls a little with load (Figure A.6)
+UNKNOWN_PER_ERROR = 2.0  # an engine's torque that is known to half only may as well not be known
 STEEPEST = 0.93  # of the peak; the curve goes on straight from there
 
 
@@ -85,6 +86,13 @@ def brake_torque(params: Record, state: Record, i: int, pressure: float) -> floa
     mu = params.mu_nominal[i] * math.exp(state.x[MU + i])
     torque: float = brake_lever(params, i) * mu * max(pressure - state.x[OFFSET + i // 2], 0.0)
     return torque
+
+
+@kernel
+def _unknown_share(params: Record, state: Record) -> float:
+    """Return what is unknown of the drive, over that of a car that reports no motor torque."""
+    share: float = min(UNKNOWN_PER_ERROR * params.sigma_motor_torque, 1.0)
+    return share if state.window.motor_reported else 1.0
 
 
 @kernel
@@ -141,8 +149,7 @@ def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float
     h[PEAK] = by_slip * (slip - slope * used)
     h[RADIUS + i] = h[ROLLING] = -omega
     h[SINKING] = -omega * sinking / r
-    if not w.motor_reported:
-        h[DRIVE + i // 2] = 0.5 * by_force * params.mass
+    h[DRIVE + i // 2] = 0.5 * by_force * params.mass * _unknown_share(params, state)
     return omega
 
 
@@ -170,7 +177,6 @@ def predict_balance(params: Record, state: Record) -> float:
         h[MOTOR] += driven / (r * mass)
     h[BIAS] = -heavier
     h[DRAG] = drag
-    if not w.motor_reported:
-        h[DRIVE] = h[DRIVE + 1] = -1.0
+    h[DRIVE] = h[DRIVE + 1] = -_unknown_share(params, state)
     result: float = left
     return result

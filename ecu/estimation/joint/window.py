@@ -21,6 +21,7 @@ from ecu.signals import (
 )
 
 BAR = 1e5
+OLDEST_S = 0.06  # of an acceleration or torque that is set against others
 NEW_SHARE = 0.2  # of the model's variance that is another one in the next window
 SMOOTHING = 0.2  # s, of the pressure that derivatives use
 
@@ -46,6 +47,13 @@ def speed_change(state: Record, motion: Record) -> float:
 
 
 @kernel
+def _current(inputs: Record, place: int) -> bool:
+    """Return whether a value is of now: alive, but not kept over a gap."""
+    current: bool = usable(inputs, place) and inputs.age_ns[place] < 1e9 * OLDEST_S
+    return current
+
+
+@kernel
 def gather(
     params: Record, state: Record, inputs: Record, motion: Record, load: Record, demand: Record, dt: float
 ) -> None:
@@ -56,7 +64,7 @@ def gather(
     w.time += dt
     w.cycles += 1
     w.accel += motion.accel_x
-    w.accel_cycles += 1 if usable(inputs, ACCEL_X) else 0
+    w.accel_cycles += 1 if _current(inputs, ACCEL_X) else 0
     w.change += change
     w.speed += x[V]
     front_lateral = params.mass * motion.accel_y * params.rear_axle / params.wheelbase
@@ -65,7 +73,8 @@ def gather(
     for i in range(4):
         w.load[i] += load[i]
         w.motor[i] += motor_torque(inputs, i)
-        if not motor_torque_known(inputs, i):
+        stale = usable(inputs, MOTOR_TORQUE + i) and not _current(inputs, MOTOR_TORQUE + i)
+        if stale or not motor_torque_known(inputs, i):
             w.motor_known = 0
         if usable(inputs, MOTOR_TORQUE + i):
             w.motor_reported = 1
