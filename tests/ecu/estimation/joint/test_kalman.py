@@ -1,4 +1,4 @@
-"""Prediction and correction against the textbook's matrices: F P F' + Q, and Kalman's and Schmidt's update."""
+"""Prediction and correction against matrices: F P F' + Q, and the update of Kalman and of Schmidt."""
 
 import math
 
@@ -185,7 +185,7 @@ def test_while_the_pads_rub_friction_moves_with_its_rate(name: str, last, now, t
 
 
 @pytest.mark.parametrize(("sigma_mu", "grows"), [(0.02, True), (2 * MU_COMMON, False)])
-def test_while_nothing_rubs_friction_is_slowly_forgotten_up_to_its_prior(
+def test_while_nothing_rubs_friction_is_slowly_forgotten(
     sigma_mu: float, grows: bool
 ) -> None:
     state, time = some_state(10), 0.05

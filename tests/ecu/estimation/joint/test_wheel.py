@@ -1,4 +1,4 @@
-"""The wheel's and the car's prediction: its tyre against the Magic Formula, its derivatives against differences."""
+"""Prediction of wheels and car: the tyre against the Magic Formula, derivatives against differences."""
 
 import math
 
@@ -143,7 +143,7 @@ POINTS = {
 
 
 def set_point(params, state, point: str, balanced: bool = False) -> None:
-    """Write an operating point into the window; the pressure's derivatives are taken at the pressure itself."""
+    """Write an operating point into the window, the smooth pressure being the pressure itself."""
     speed, decel, front, rear, motor_front, motor_rear, across, reported = POINTS[point]
     w, car = state["window"], params
     random = np.random.default_rng(5)
