@@ -43,7 +43,9 @@ class Car:
         self.mu = np.broadcast_to(true.pop("mu", 0.45), 4).copy()
         self.mass = self.params["mass"] * true.pop("mass", 1.0)
         self.stiffness: float = true.pop("stiffness", 1.0)
-        self.quiet: bool = true.pop("quiet", False)
+        names = ("wheel_speed", "pressure", "accel", "vehicle_speed")
+        quiet = true.pop("quiet", False)
+        self.sigma = {name: 0.0 if quiet else float(self.params[f"sigma_{name}"]) for name in names}
         assert not true
         self.state = np.zeros(1, JOINT_STATE)[0]
         set_prior(self.params, self.state)
@@ -84,7 +86,7 @@ class Car:
         p, value, new = self.params, self.inputs[0]["value"], self.inputs[0]["new"]
         bar = np.concatenate([np.broadcast_to(front, 2), np.broadcast_to(rear, 2)]).astype(float)
         motor = np.broadcast_to(motor, 4).astype(float)
-        noise = 0.0 if self.quiet else 1.0
+        sigma, normal = self.sigma, self.random.standard_normal
         for k in range(round(seconds / DT)):
             force, change = self.forces(bar, motor, slope)
             self.speed = max(self.speed + change * DT, 0.0)
@@ -94,18 +96,14 @@ class Car:
             for i, own in (slide or {}).items():
                 slip[i] = own
             rolled = np.where(slip < 0, 1 + slip, 1 / (1 - slip)) * self.speed
-            omega = rolled / p["wheel_radius"] + noise * p["sigma_wheel_speed"] * self.random.standard_normal(
-                4
-            )
+            omega = rolled / p["wheel_radius"] + sigma["wheel_speed"] * normal(4)
             value[WHEEL_SPEED : WHEEL_SPEED + 4] = omega
-            pressure = bar + noise * p["sigma_pressure"] / BAR * self.random.standard_normal(4)
+            pressure = bar + sigma["pressure"] / BAR * normal(4)
             value[CALLIPER_PRESSURE : CALLIPER_PRESSURE + 4] = pressure + p["push_out_pressure"] / BAR
             value[MOTOR_TORQUE : MOTOR_TORQUE + 4] = motor
-            self.motion["accel_x"] = change + slope + noise * p["sigma_accel"] * self.random.standard_normal()
+            self.motion["accel_x"] = change + slope + sigma["accel"] * normal()
             new[VEHICLE_SPEED] = reference and k % 2 == 0
-            value[VEHICLE_SPEED] = (
-                self.speed + noise * p["sigma_vehicle_speed"] * self.random.standard_normal()
-            )
+            value[VEHICLE_SPEED] = self.speed + sigma["vehicle_speed"] * normal()
             self.observe(bool(bar.any()) if braking is None else braking)
             yield self.state
 

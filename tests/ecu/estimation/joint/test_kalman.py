@@ -185,9 +185,7 @@ def test_while_the_pads_rub_friction_moves_with_its_rate(name: str, last, now, t
 
 
 @pytest.mark.parametrize(("sigma_mu", "grows"), [(0.02, True), (2 * MU_COMMON, False)])
-def test_while_nothing_rubs_friction_is_slowly_forgotten(
-    sigma_mu: float, grows: bool
-) -> None:
+def test_while_nothing_rubs_friction_is_slowly_forgotten(sigma_mu: float, grows: bool) -> None:
     state, time = some_state(10), 0.05
     state["p"][FRICTION, :] = state["p"][:, FRICTION] = 0.0
     state["p"][FRICTION, FRICTION] = sigma_mu**2 * np.eye(4)

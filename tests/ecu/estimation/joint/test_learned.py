@@ -98,7 +98,9 @@ def test_friction_that_was_never_observed_is_the_priors() -> None:
     learned, prior = keep(driven(1)), new_state()
     learned["observed_s"] = [10.0, 0.0, 0.0, 0.0]
     P = restored(learned)["p"]
-    np.testing.assert_array_equal(P[MU + 1 : MU + 4, MU + 1 : MU + 4], prior["p"][MU + 1 : MU + 4, MU + 1 : MU + 4])
+    np.testing.assert_array_equal(
+        P[MU + 1 : MU + 4, MU + 1 : MU + 4], prior["p"][MU + 1 : MU + 4, MU + 1 : MU + 4]
+    )
     np.testing.assert_array_equal(P[MU, MU + 1 : MU + 4], 0.0)
     np.testing.assert_array_equal(P[:, MU], P[MU])
     assert P[MU, MASS] > 0 == P[MU + 1, MASS]
@@ -140,7 +142,9 @@ LEARNED_VALUES = {
 
 @settings(max_examples=300)
 @given(**LEARNED_VALUES)
-def test_whatever_the_store_accepts_gives_a_covariance(share, relative, observed, joint, joint_sigma, mass) -> None:
+def test_whatever_the_store_accepts_gives_a_covariance(
+    share, relative, observed, joint, joint_sigma, mass
+) -> None:
     learned = np.zeros(1, LEARNED)
     row = learned[0]
     row["mu_b"] = SUV["mu_nominal"] * share

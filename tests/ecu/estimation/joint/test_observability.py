@@ -21,7 +21,11 @@ SCALE[MU_ALL], SCALE[V], SCALE[MOTOR] = MU_COMMON, 0.5, 0.015
 BRAKING = {
     # speed [m/s], front and rear [bar], front and rear motor torque [N m]
     "one level": [(30.0, 38.0, 30.0, 0.0, 0.0)],
-    "three levels": [(30.0, 19.0, 15.0, 0.0, 0.0), (25.0, 38.0, 30.0, 0.0, 0.0), (10.0, 60.0, 50.0, 0.0, 0.0)],
+    "three levels": [
+        (30.0, 19.0, 15.0, 0.0, 0.0),
+        (25.0, 38.0, 30.0, 0.0, 0.0),
+        (10.0, 60.0, 50.0, 0.0, 0.0),
+    ],
     "motors first": [(35.0, 0.0, 0.0, 300.0, 300.0), (30.0, 38.0, 30.0, 0.0, 0.0)],
     "motors and coasting first": [
         (35.0, 0.0, 0.0, 0.0, 0.0),
@@ -100,11 +104,10 @@ def test_without_a_speed_reference_the_common_radius_shows_nothing(params, state
     """Within a window a larger radius is a faster car: omega = v (1 + slip) / r."""
     for point in BRAKING[drive]:
         H, states = rows(params[0], state, [point]), [V, ROLLING]
-        H = H[:4]  # wheels; the balance has speed in its drag alone
-        assert deficiency(H, states) == 1
+        assert singular(H, states)[-1] < 0.3  # sigma of noise by a sigma of the prior: nothing in a window
         direction = weakest(H, states)
-        assert direction[0] / direction[1] == pytest.approx(point[0], rel=1e-9)
-        assert deficiency(rows(params[0], state, [point], reference=True), states) == 0
+        assert direction[0] / direction[1] == pytest.approx(point[0], rel=0.02)
+        assert singular(rows(params[0], state, [point], reference=True), states)[-1] > 3.0
 
 
 def test_with_a_speed_reference_five_radii_have_one_too_many(params, state) -> None:
@@ -116,7 +119,9 @@ def test_with_a_speed_reference_five_radii_have_one_too_many(params, state) -> N
 
 
 @pytest.mark.parametrize(("drive", "missing"), [("one level", 1), ("three levels", 0)])
-def test_one_level_of_braking_does_not_tell_stiffness_from_peak(params, state, drive: str, missing: int) -> None:
+def test_one_level_of_braking_does_not_tell_stiffness_from_peak(
+    params, state, drive: str, missing: int
+) -> None:
     """A front axle at one level shows one slip for both."""
     points = [(v, front, 0.0, 0.0, 0.0) for v, front, *_ in BRAKING[drive]]
     front = [k for k in range(5 * len(points)) if k % 5 < 2]
