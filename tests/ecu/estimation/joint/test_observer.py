@@ -99,7 +99,7 @@ def test_it_finds_friction_as_well_as_it_says(new_car, front, rear, mass, stiffn
 BIASED = pytest.mark.xfail(
     strict=True,
     reason="noise of the pressure sensor biases what is hard to tell apart: front +1.2 %, rear -4.5 %, "
-    "stiffness -4 %, peak +18 %; half of it goes with the fifth of a window's own noise that is in the smooth "
+    "stiffness -4 %, peak +18 %; half of it goes with the fifth of a window's noise that is in the smooth "
     "pressure, at which its derivatives are taken",
 )
 
