@@ -89,4 +89,5 @@ def test_truth_is_inside_two_sigma(params, name: str, free) -> None:
     assert 0.90 < share[free].mean() < 0.995
     assert 0.90 < share[FRICTION].mean() < 0.995
     assert share.min() > 0.80  # each of 26 alone, over 60 runs
-    assert np.mean(distance) == pytest.approx(1.0, abs=0.15)  # normalised estimation error squared
+    # The mean of normalised squares of so many errors scatters by this much.
+    assert np.mean(distance) == pytest.approx(1.0, abs=3 * np.sqrt(2 / (len(distance) * len(free))))
