@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ecu.estimation.joint.layout import MASS, MU, SLOPE, STIFFNESS, N, V
-from ecu.estimation.joint.observer import HOLD_S, SNAPSHOT_S, WINDOW_S
+from ecu.estimation.joint.observer import HOLD_S, WINDOW_S
 from ecu.estimation.joint.prior import set_prior
 from ecu.signals import (
     ABS_ACTIVE,
@@ -126,8 +126,8 @@ def history(car, seconds: float, **how):
 
 
 def known_before(rows, time: float) -> list[np.ndarray]:
-    """Return the frictions known `SNAPSHOT_S` to twice that before `time`, a window more or less."""
-    early, late = time - 2 * SNAPSHOT_S - WINDOW_S - 0.001, time - SNAPSHOT_S + WINDOW_S + 0.001
+    """Return the frictions known 0.2 to 0.4 s before `time`, a window more or less."""
+    early, late = time - 0.4 - WINDOW_S - 0.001, time - 0.2 + WINDOW_S + 0.001
     return [mu for at, mu in rows if early <= at <= late]
 
 
