@@ -166,7 +166,7 @@ def _observe_jointly(p: Record, s: Record, u: Record, braking: bool, dt: float) 
     update_joint(p, joint, u, s.motion, s.wheel_load.load, s.limiter.pressure, braking, dt)
     if s.application.ended:
         settle_friction(p, joint, s.learned)
-    publish_friction(p, joint, s.friction, s.learned, u, braking, dt)
+    publish_friction(p, joint, s.friction, s.learned, u, s.wheel_load.load, braking, dt)
     keep_joint(joint, s.learned)
     s.speed.started, s.speed.speed = joint.started, joint.x[V]
     s.force.k_f = math.exp(joint.x[STIFFNESS])

@@ -69,6 +69,7 @@ JOINT_STATE: Final = np.dtype(
         ("ph", "f8", (N,)),
         ("kept_x", "f8", (2, N)),  # snapshots: the newer in row 0
         ("kept_p", "f8", (2, N, N)),
+        ("window_s", "f8"),  # length of the last window
         ("kept_s", "f8"),  # age of the newer one [s]
         ("window", WINDOW_STATE),
         ("pressures", PRESSURE_STATE),
@@ -79,6 +80,7 @@ JOINT_STATE: Final = np.dtype(
         ("untrusted_s", "f8"),  # time since a wheel was last believed [s]
         ("hold_s", "f8"),  # no learning for this long, a wheel had left the tyre's range
         ("smooth_pressure", "f8", (4,)),  # bar above push-out
+        ("readings", "f8", (4,)),  # mean pressure readings of released brakes [bar]
         ("last_smooth", "f8", (4,)),  # of the last window [bar]
         ("last_pressure", "f8", (4,)),  # of the last window [bar]
         ("last_slip", "f8", (4,)),

@@ -25,7 +25,7 @@ from ecu.estimation.joint.layout import (
     N,
     V,
 )
-from ecu.estimation.joint.observer import WINDOW_S, start_joint
+from ecu.estimation.joint.observer import start_joint
 from ecu.estimation.joint.pressure import follows
 from ecu.estimation.joint.prior import set_prior
 from ecu.estimation.motion import usable
@@ -41,6 +41,7 @@ PAUSE[RADIUS : RADIUS + 4] = PAUSE[ROLLING] = 0.0003
 PAUSE[BIAS], PAUSE[MASS], PAUSE[DRAG] = 0.005, 0.005, 0.02
 PAUSE[DELAY] = 0.001
 MU_PAUSE = 0.03
+TRANSFER_ERROR = 0.06  # of a load's change over the load at rest, as error of friction
 
 
 @kernel
@@ -108,13 +109,33 @@ def settle_friction(params: Record, state: Record, learned: Record) -> None:
 @kernel
 def friction_now(state: Record, i: int) -> float:
     """Return ln of friction over nominal: what the middle of the last window had, moved on by its rate."""
-    moved: float = state.x[MU + i] + state.x[RATE] * (0.5 * WINDOW_S + state.window.time)
+    moved: float = state.x[MU + i] + state.x[RATE] * (0.5 * state.window_s + state.window.time)
     return moved
 
 
 @kernel
+def _systematic(params: Record, state: Record, load: Record, i: int) -> float:
+    """Return the variance of ln friction that does not average out.
+
+    Load transfer is known to a few per cent; what sets left against right may be the road's as well.
+    """
+    transfer = TRANSFER_ERROR * (load[i] / params.static_load[i] - 1.0)
+    twin = i + 1 - 2 * (i % 2)
+    side = 0.5 * (state.x[MU + i] - state.x[MU + twin])
+    total: float = transfer * transfer + side * side
+    return total
+
+
+@kernel
 def publish_friction(
-    params: Record, state: Record, friction: Record, learned: Record, inputs: Record, braking: bool, dt: float
+    params: Record,
+    state: Record,
+    friction: Record,
+    learned: Record,
+    inputs: Record,
+    load: Record,
+    braking: bool,
+    dt: float,
 ) -> None:
     """Overwrite friction, its standard deviation and mode of every corner from the joint observer."""
     friction.reset = state.reset
@@ -122,7 +143,7 @@ def publish_friction(
         nominal = params.mu_nominal[i]
         ratio = math.exp(friction_now(state, i))
         mu = nominal * ratio
-        variance = state.p[MU + i, MU + i]
+        variance = state.p[MU + i, MU + i] + _systematic(params, state, load, i)
         if state.observed[i] and follows(state.pressures, i):
             above = max(state.smooth_pressure[i], 1.0)
             variance += state.pressures.variance[i] / (above * above)

@@ -35,10 +35,10 @@ from ecu.estimation.joint.layout import (
     N,
     V,
 )
-from ecu.estimation.joint.pressure import follows
+from ecu.estimation.joint.pressure import follows, learn_zero
 from ecu.estimation.joint.prior import forget_rate, pressure_change, set_prior, walk
 from ecu.estimation.joint.snapshot import go_back, keep, keep_newer
-from ecu.estimation.joint.wheel import brake_lever, predict_balance, predict_wheel
+from ecu.estimation.joint.wheel import BAR, brake_lever, predict_balance, predict_wheel
 from ecu.estimation.joint.window import close_window, gather, open_window
 from ecu.estimation.motion import usable
 from ecu.jit import Record, kernel
@@ -50,9 +50,10 @@ from ecu.signals import (
     WHEEL_SPEED,
 )
 
-WINDOW_S = 0.05
+WINDOW_S, LONGEST_WINDOW_S = 0.05, 0.12
 LEAST_SPEED = 3.4  # m/s
 APPLIED = 1.0  # bar above push-out: the brakes act
+STRAIGHT = 0.05  # lateral acceleration over gravity: more, and wheels roll by their own loads and angles
 MOTORS = 100.0  # N m of all motors: their torque is worth looking at
 LARGE_SLIP = 0.12
 SLIDING_FORCE = 0.3  # relative error of a sliding wheel's force if it is taken for its brake force
@@ -97,7 +98,7 @@ def _start_speed(params: Record, state: Record, inputs: Record) -> None:
         if not usable(inputs, WHEEL_SPEED + i):
             return
     state.x[V] = _mean_wheel(params, inputs)
-    state.started = 1
+    state.started, state.hold_s = 1, HOLD_S
 
 
 @kernel
@@ -146,6 +147,19 @@ def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> 
 
 
 @kernel
+def _window_full(state: Record, inputs: Record) -> bool:
+    """Return whether the window has its length, and of slower wheel speeds two samples."""
+    w = state.window
+    if w.time < WINDOW_S - 0.001:
+        return False
+    few = False
+    for i in range(4):
+        few = few or (w.omega_samples[i] < 2 and usable(inputs, WHEEL_SPEED + i))
+    full: bool = not few or w.time > LONGEST_WINDOW_S
+    return full
+
+
+@kernel
 def update_joint(
     params: Record,
     state: Record,
@@ -171,8 +185,9 @@ def update_joint(
         open_window(state)
     gather(params, state, inputs, motion, load, demand, dt)
     state.hold_s = max(state.hold_s - dt, 0.0)
-    if state.window.time < WINDOW_S - 0.001:
+    if not _window_full(state, inputs):
         return
+    state.window_s = state.window.time
     close_window(params, state)
     _fuse(params, state, inputs, braking)
     _look_after(params, state, braking)
@@ -180,10 +195,21 @@ def update_joint(
 
 
 @kernel
+def _learn_zeros(params: Record, state: Record, braking: bool) -> None:
+    w, zero, readings = state.window, state.pressures.zero, state.readings
+    for i in range(4):
+        if braking or w.pressure_samples[i] == 0 or state.smooth_pressure[i] > APPLIED:
+            return
+        readings[i] = w.pressure[i] + params.push_out_pressure[i] / BAR + zero[i]
+    learn_zero(state.pressures, readings)
+
+
+@kernel
 def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     w, x = state.window, state.x
     time = w.time
     motors = 0.0
+    _learn_zeros(params, state, braking)
     for i in range(4):
         if w.pressure_samples[i] == 0:
             twin = i + 1 - 2 * (i % 2)
@@ -198,6 +224,8 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     learning = (
         moving and state.hold_s <= 0.0 and w.motor_known != 0 and not _learning_forbidden(inputs, braking)
     )
+    if learning and not braking and abs(w.across) > STRAIGHT:
+        learning = False
     if learning and not braking and motors <= MOTORS:
         learning = w.accel_cycles == w.cycles and abs(predict_balance(params, state)) < UNEXPLAINED
     _choose_free(state, braking, motors > MOTORS, learning)

@@ -30,7 +30,7 @@ PRIOR = np.zeros(N)
 """Standard deviations before anything is learned; friction, radii and speed are set apart."""
 PRIOR[STIFFNESS], PRIOR[RATIO] = 0.25, 0.06
 PRIOR[BIAS], PRIOR[SLOPE] = 0.1, 0.3
-PRIOR[MASS], PRIOR[PEAK], PRIOR[LOAD], PRIOR[SINKING] = 0.02, 0.25, 0.05, 0.10
+PRIOR[MASS], PRIOR[PEAK], PRIOR[LOAD], PRIOR[SINKING] = 0.04, 0.25, 0.05, 0.06
 PRIOR[DRAG] = 0.10
 PRIOR[RADIUS : RADIUS + 4], PRIOR[ROLLING] = 0.0015, 0.004
 PRIOR[OFFSET : OFFSET + 2] = 0.3

@@ -79,11 +79,12 @@ def gather(
         if params.transmit:
             follow_demand(state.pressures, i, demand[i] / BAR, dt)
         if fresh(inputs, place):
-            above = value[place] - push_out
+            reading = value[place] - state.pressures.zero[i]
+            above = reading - push_out
             w.pressure[i] += above
             w.pressure_samples[i] += 1
             if params.transmit:
-                correct_pressure(state.pressures, i, value[place], params.sigma_pressure / BAR, dt)
+                correct_pressure(state.pressures, i, reading, params.sigma_pressure / BAR, dt)
             gain = 1.0 - math.exp(-dt / SMOOTHING)
             state.smooth_pressure[i] += gain * (above - state.smooth_pressure[i])
         if follows(state.pressures, i):
