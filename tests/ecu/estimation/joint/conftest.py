@@ -98,8 +98,9 @@ class Car:
             rolled = np.where(slip < 0, 1 + slip, 1 / (1 - slip)) * self.speed
             omega = rolled / p["wheel_radius"] + sigma["wheel_speed"] * normal(4)
             value[WHEEL_SPEED : WHEEL_SPEED + 4] = omega
-            pressure = bar + sigma["pressure"] / BAR * normal(4)
-            value[CALLIPER_PRESSURE : CALLIPER_PRESSURE + 4] = pressure + p["push_out_pressure"] / BAR
+            reading = np.where(bar > 0, bar + p["push_out_pressure"] / BAR, 0.0)
+            reading = reading + sigma["pressure"] / BAR * normal(4)
+            value[CALLIPER_PRESSURE : CALLIPER_PRESSURE + 4] = reading
             value[MOTOR_TORQUE : MOTOR_TORQUE + 4] = motor
             self.motion["accel_x"] = change + slope + sigma["accel"] * normal()
             new[VEHICLE_SPEED] = reference and k % 2 == 0

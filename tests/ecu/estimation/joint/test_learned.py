@@ -20,7 +20,6 @@ from ecu.estimation.joint.learned import (
     restore_joint,
     settle_friction,
 )
-from ecu.estimation.joint.observer import WINDOW_S
 from ecu.estimation.joint.prior import set_prior
 from ecu.records import LEARNED
 
@@ -162,13 +161,15 @@ def test_whatever_the_store_accepts_gives_a_covariance(
 
 
 def test_mass_is_in_every_friction_alike() -> None:
-    """0.02 of mass is 0.02 of each friction: what is left of each is its own."""
-    learned = keep(new_state(), 0.04)
+    """A per cent of mass is a per cent of each friction: what is left of each is its own."""
+    before = new_state()
+    before["p"][MASS, MASS] = 0.01**2
+    learned = keep(before, 0.04)
     P = restored(learned)["p"]
     shared = P[np.ix_(FRICTION, [MASS])].ravel()
-    np.testing.assert_allclose(shared, 0.02**2)
+    np.testing.assert_allclose(shared, 0.01**2 + PAUSE[MASS] ** 2)
     off = P[np.ix_(FRICTION, FRICTION)][~np.eye(4, dtype=bool)]
-    np.testing.assert_allclose(off, 0.02**2)
+    np.testing.assert_allclose(off, 0.01**2 + PAUSE[MASS] ** 2)
 
 
 AT_BOUND = [
@@ -214,16 +215,17 @@ def test_settled_friction_is_base_of_the_next_braking_where_nothing_was_learned(
 def test_published_friction_is_the_states_moved_on_by_its_rate(params, feed, ratio: float) -> None:
     state, friction = driven(7), np.zeros(1, FRICTION_STATE)[0]
     state["x"][FRICTION], state["x"][RATE] = math.log(ratio), 0.0
-    publish_friction(SUV, state, friction, np.zeros(1, LEARNED)[0], feed()[0], False, 0.01)
+    at_rest, learned, inputs = SUV["static_load"].copy(), np.zeros(1, LEARNED)[0], feed()[0]
+    publish_friction(SUV, state, friction, learned, inputs, at_rest, False, 0.01)
     np.testing.assert_allclose(friction["mu"], ratio * SUV["mu_nominal"])
     own = sigma(state)[FRICTION]
     if ratio in (LEAST_RATIO, GREATEST_RATIO):
         own = np.maximum(own, SUV["sigma_mu_initial"])
     np.testing.assert_allclose(friction["sigma"], friction["mu"] * own)
-    state["x"][RATE], state["window"]["time"] = 0.05, 0.02
+    state["x"][RATE], state["window"]["time"], state["window_s"] = 0.05, 0.02, 0.06
     state["x"][FRICTION] = 0.0
-    publish_friction(SUV, state, friction, np.zeros(1, LEARNED)[0], feed()[0], False, 0.01)
-    np.testing.assert_allclose(friction["mu"], SUV["mu_nominal"] * math.exp(0.05 * (WINDOW_S / 2 + 0.02)))
+    publish_friction(SUV, state, friction, learned, inputs, at_rest, False, 0.01)
+    np.testing.assert_allclose(friction["mu"], SUV["mu_nominal"] * math.exp(0.05 * (0.03 + 0.02)))
 
 
 def test_what_is_kept_is_neither_speed_nor_slope() -> None:
