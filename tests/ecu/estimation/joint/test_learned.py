@@ -235,3 +235,15 @@ def test_what_is_kept_is_neither_speed_nor_slope() -> None:
     assert learned["joint"][[V, SLOPE]] == pytest.approx([0.0, 0.0])
     assert learned["joint"][[STIFFNESS, BIAS]] == pytest.approx(state["x"][[STIFFNESS, BIAS]])
     assert learned["joint_sigma"][MASS] == pytest.approx(sigma(state)[MASS])
+
+
+@pytest.mark.parametrize("transfer", [-0.4, 0.0, 0.3])  # of the load at rest
+@pytest.mark.parametrize("side", [0.0, 0.1])  # left over right
+def test_what_does_not_average_out_is_in_the_published_sigma(feed, transfer: float, side: float) -> None:
+    """Load transfer known to 6 %, and half of what sets left against right."""
+    state, friction = driven(9), np.zeros(1, FRICTION_STATE)[0]
+    state["x"][FRICTION], state["x"][RATE] = np.array([0.5, -0.5, 0.5, -0.5]) * side, 0.0
+    load = SUV["static_load"] * (1 + transfer)
+    publish_friction(SUV, state, friction, np.zeros(1, LEARNED)[0], feed()[0], load, False, 0.01)
+    expected = np.sqrt(sigma(state)[FRICTION] ** 2 + (0.06 * transfer) ** 2 + (0.5 * side) ** 2)
+    np.testing.assert_allclose(friction["sigma"] / friction["mu"], expected, rtol=1e-12)
