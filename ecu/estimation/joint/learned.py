@@ -64,7 +64,7 @@ def restore_joint(params: Record, state: Record, learned: Record) -> None:
         for j in range(4):
             if j != i and learned.observed_s[j] > 0.0:
                 p[MU + i, MU + j] = p[MU + j, MU + i] = shared
-        p[MU + i, MU + i] = relative * relative + MU_PAUSE**2
+        p[MU + i, MU + i] = min(relative * relative + MU_PAUSE**2, p[MU + i, MU + i])
         p[MU + i, MASS] = p[MASS, MU + i] = shared
     for i in range(4):
         for j in range(4):

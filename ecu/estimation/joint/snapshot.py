@@ -21,7 +21,10 @@ def go_back(state: Record) -> None:
             state.x[i] = state.kept_x[1, i]
         for j in range(N):
             state.p[i, j] = state.kept_p[1, i, j] if i != V and j != V else 0.0
-    state.p[V, V] = 0.25
+        state.kept_x[0, i] = state.kept_x[1, i]
+        for j in range(N):
+            state.kept_p[0, i, j] = state.kept_p[1, i, j]
+    state.p[V, V], state.kept_s = 0.25, 0.0
 
 
 @kernel

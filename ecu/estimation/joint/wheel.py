@@ -53,14 +53,16 @@ def slip_of_force(used: float, stiffness: float, peak: float) -> tuple[float, fl
 
 
 @kernel
-def combined_slip(used: float, across: float, stiffness: float, peak: float) -> tuple[float, float]:
-    """Return longitudinal slip and its derivative by `used`, of a tyre that carries `across` too."""
+def combined_slip(used: float, across: float, stiffness: float, peak: float) -> tuple[float, float, float]:
+    """Return slip along and its derivatives by `used` and ln `peak`, of a tyre that carries `across`."""
     if across == 0.0:
-        return slip_of_force(used, stiffness, peak)
+        slip, slope = slip_of_force(used, stiffness, peak)
+        return slip, slope, slip - slope * used
     both = math.sqrt(used * used + across * across)
     slip, slope = slip_of_force(both, stiffness, peak)
     along = used / both
-    return slip * along, slope * along * along + slip / both * (1.0 - along * along)
+    by_used = slope * along * along + slip / both * (1.0 - along * along)
+    return slip * along, by_used, along * (slip - slope * both)
 
 
 @kernel
@@ -99,8 +101,8 @@ def _unknown_share(params: Record, state: Record) -> float:
 def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float:
     """Return the mean speed of a wheel [rad/s] to expect of this window.
 
-    Sets `state.h`, and slip and force of the wheel. Derivatives are taken at the smooth pressure: were the
-    noise of the window's own in both, it would weaken what is learned.
+    Sets `state.h`, and slip and force of the wheel. Derivatives are taken at the last window's smooth
+    pressure: were the noise of this window's own in both, it would bias what is learned.
 
     Args:
         params: `PARAMS`.
@@ -109,7 +111,7 @@ def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float
         ground: speed of the wheel over ground in its direction [m/s].
     """
     x, h, w = state.x, state.h, state.window
-    load, pressure, smooth = w.load[i], w.pressure[i], state.smooth_pressure[i]
+    load, pressure, smooth = w.load[i], w.pressure[i], state.last_smooth[i]
     r, sinking = radius(params, state, i, load)
     motor = w.motor[i] * math.exp(x[MOTOR])
     # With the mass, so that nothing but air drag tells a scale common to mass and all torques.
@@ -123,7 +125,7 @@ def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float
     stiffness = params.slip_stiffness[i] * math.exp(x[STIFFNESS] + rear) * relative**-exponent
     peak = NOMINAL_PEAK * math.exp(x[PEAK]) * relative**-PEAK_DEGRESSION
     used = force * scale
-    slip, slope = combined_slip(used, w.across, stiffness, peak)
+    slip, _, _ = combined_slip(used, w.across, stiffness, peak)
     state.slip[i], state.force[i] = slip, force
     if slip < 0.0:
         omega, by_slip = ground * (1.0 + slip) / r, ground / r
@@ -131,7 +133,7 @@ def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float
         keep = max(1.0 - slip, 0.1)
         omega, by_slip = ground / (keep * r), ground / (keep * keep * r)
     used += (brake_torque(params, state, i, pressure) - brake_torque(params, state, i, smooth)) * scale / r
-    slip, slope = combined_slip(used, w.across, stiffness, peak)
+    slip, slope, by_peak = combined_slip(used, w.across, stiffness, peak)
     for j in range(N):
         h[j] = 0.0
     h[V] = omega / max(ground, 0.1)
@@ -146,9 +148,9 @@ def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float
     if i >= 2:
         h[RATIO] = -by_slip * slip
     h[LOAD] = by_slip * slip * math.log(relative)
-    h[PEAK] = by_slip * (slip - slope * used)
-    h[RADIUS + i] = h[ROLLING] = -omega
-    h[SINKING] = -omega * sinking / r
+    h[PEAK] = by_slip * by_peak
+    h[RADIUS + i] = h[ROLLING] = -omega - by_slip * slope * used  # a larger wheel needs less force
+    h[SINKING] = h[RADIUS + i] * sinking / r
     h[DRIVE + i // 2] = 0.5 * by_force * params.mass * _unknown_share(params, state)
     return omega
 
@@ -167,7 +169,7 @@ def predict_balance(params: Record, state: Record) -> float:
         driven = w.motor[i] * math.exp(x[MOTOR])
         own = heavier * (params.rolling_resistance * w.load[i] * r + params.wheel_inertia[i] * w.change / r)
         left += (brake_torque(params, state, i, w.pressure[i]) + driven + own) / (r * mass)
-        smooth = state.smooth_pressure[i]
+        smooth = state.last_smooth[i]
         # Derivative by the mass: by the torques, not by the noisy acceleration that they equal.
         h[MASS] -= (brake_torque(params, state, i, smooth) + driven) / (r * mass)
         per_bar = brake_lever(params, i) * params.mu_nominal[i] * math.exp(x[MU + i]) / (r * mass)

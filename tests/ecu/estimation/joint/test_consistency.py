@@ -31,7 +31,7 @@ def derivatives(car, state, point) -> np.ndarray:
     w = state["window"]
     state["x"][:] = 0.0
     state["x"][V], w["load"], w["motor_reported"] = speed, car["static_load"], 1
-    w["pressure"] = state["smooth_pressure"] = np.repeat([front, rear], 2)
+    w["pressure"] = state["smooth_pressure"] = state["last_smooth"] = np.repeat([front, rear], 2)
     out = []
     for i in range(4):
         predict_wheel(car, state, i, speed)

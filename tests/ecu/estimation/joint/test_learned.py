@@ -20,6 +20,7 @@ from ecu.estimation.joint.learned import (
     restore_joint,
     settle_friction,
 )
+from ecu.estimation.joint.observer import WINDOW_S
 from ecu.estimation.joint.prior import set_prior
 from ecu.records import LEARNED
 
@@ -118,12 +119,7 @@ def test_restarts_alone_make_nothing_surer() -> None:
     assert (before <= sigma(new_state()) * (1 + 1e-12)).all()
 
 
-WIDE = pytest.mark.xfail(
-    strict=True, reason="friction's restored variance is not held to the prior's, as all others are"
-)
-
-
-@pytest.mark.parametrize("relative", [0.01, 0.1, 0.2, pytest.param(0.3, marks=WIDE)])
+@pytest.mark.parametrize("relative", [0.01, 0.1, 0.2, 0.3])
 def test_friction_comes_back_no_less_sure_than_new(relative: float) -> None:
     after = restored(keep(driven(3), relative))
     assert (sigma(after)[FRICTION] <= sigma(new_state())[FRICTION] * (1 + 1e-12)).all()
@@ -222,10 +218,10 @@ def test_published_friction_is_the_states_moved_on_by_its_rate(params, feed, rat
     if ratio in (LEAST_RATIO, GREATEST_RATIO):
         own = np.maximum(own, SUV["sigma_mu_initial"])
     np.testing.assert_allclose(friction["sigma"], friction["mu"] * own)
-    state["x"][RATE], state["window"]["time"], state["window_s"] = 0.05, 0.02, 0.06
+    state["x"][RATE], state["window"]["time"] = 0.05, 0.02
     state["x"][FRICTION] = 0.0
     publish_friction(SUV, state, friction, learned, inputs, at_rest, False, 0.01)
-    np.testing.assert_allclose(friction["mu"], SUV["mu_nominal"] * math.exp(0.05 * (0.03 + 0.02)))
+    np.testing.assert_allclose(friction["mu"], SUV["mu_nominal"] * math.exp(0.05 * (0.5 * WINDOW_S + 0.02)))
 
 
 def test_what_is_kept_is_neither_speed_nor_slope() -> None:

@@ -155,11 +155,6 @@ def test_a_wheel_that_begins_to_slide_takes_friction_back(new_car, after: float,
     assert state["x"][V] == pytest.approx(car.speed, abs=0.3)
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="going back leaves the newer snapshot, which may have been taken while the wheel ran away; after "
-    "the hold it becomes the older one, and a slide in the next 0.2 s goes back to it",
-)
 def test_a_second_slide_goes_back_to_what_was_known_before_it(new_car) -> None:
     """As a wheel under an ABS that does not tell: it slides, is caught, and slides again."""
     car = new_car(seed=2, mu=[0.40, 0.40, 0.48, 0.48], speed=38.0)
