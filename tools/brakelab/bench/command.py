@@ -151,7 +151,7 @@ def _stops(json: bool, seeds: int) -> int:
     tables = stop_tables(result, seeds)
     _print_tables(of, tables)
     text = f"`brake-ecu bench stops`, {of}. {STOPS_TEXT}"
-    _write("observer-accuracy.md", "Accuracy of Observer 2 and of the compensation", text, tables)
+    _write("observer-accuracy.md", "Accuracy of the friction and of the compensation", text, tables)
     return 0
 
 
