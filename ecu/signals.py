@@ -141,6 +141,10 @@ OUTPUT_SIGNALS: Final[tuple[OutputSignal, ...]] = (
     OutputSignal("calliper_pressure", "bar", True, ""),  # as measured, last sample
     OutputSignal("pressure_uncompensated", "bar", True, ""),  # the demand with the base friction
     OutputSignal("sigma_disc_temperature", "K", True, ""),
+    # Squared innovation over its variance and squared gate, last window: beyond 1 it counts less. Joint only.
+    OutputSignal("test_ratio", "-", True, ""),  # of wheel speed
+    OutputSignal("test_ratio_balance", "-", False, ""),  # of the forces along the car
+    OutputSignal("test_ratio_speed", "-", False, ""),  # of the speed reference
 )
 
 

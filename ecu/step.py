@@ -37,6 +37,7 @@ from ecu.estimation.friction import (
     update_friction,
     update_pressure,
 )
+from ecu.estimation.joint.kalman import GATE
 from ecu.estimation.joint.layout import JOINT_STATE, STIFFNESS, V
 from ecu.estimation.joint.learned import keep_joint, publish_friction, restore_joint, settle_friction
 from ecu.estimation.joint.observer import update_joint
@@ -214,6 +215,12 @@ def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
 
 
 @kernel
+def _test_ratio(p: Record, s: Record, channel: int) -> float:
+    ratio: float = s.joint.ratio[channel] / (GATE * GATE)
+    return ratio if p.observer == JOINT and s.joint.started else math.nan
+
+
+@kernel
 def _publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: int, mode: int) -> None:
     started = s.speed.started != 0
     y.vehicle_speed = s.speed.speed if started else math.nan
@@ -227,6 +234,7 @@ def _publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: i
     y.decel_demand_total = decel
     y.accel_x_road = s.motion.accel_x
     y.braking = s.application.braking
+    y.test_ratio_balance, y.test_ratio_speed = _test_ratio(p, s, 4), _test_ratio(p, s, 5)
     y.particles_last_brake = y.particles_per_km = math.nan
     for i in range(4):
         y.slip[i] = s.wheels.slip[i] if started else math.nan
@@ -240,6 +248,7 @@ def _publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: i
         mapped = p.mapped[CALLIPER_PRESSURE + i] != 0
         y.disc_temperature[i] = s.discs.temperature[i] if mapped else math.nan
         y.sigma_disc_temperature[i] = s.discs.sigma[i] if mapped else math.nan
+        y.test_ratio[i] = _test_ratio(p, s, i)
         y.motor_demand[i] = math.nan
         y.pad_wear[i] = y.pad_remaining[i] = y.pad_wear_mass[i] = math.nan
         if mode == FAILED:

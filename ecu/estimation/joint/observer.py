@@ -218,6 +218,8 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
         learning = w.accel_cycles == w.cycles and abs(predict_balance(params, state)) < UNEXPLAINED
     _choose_free(state, braking, motors > MOTORS, learning)
     before = x[V]
+    for channel in range(6):
+        state.ratio[channel] = math.nan
     if w.reference_samples > 0:
         h = state.h
         for j in range(N):
