@@ -81,7 +81,7 @@ def braking_line(number: int, duration: float, rows: RecordArray) -> str:
     rolling = rows["vehicle_speed"] > MEASURED_ABOVE
     held = rows[rolling & (demand >= 0.9 * demand[rolling].max(initial=0.0))]
     friction = ", ".join(
-        f"{axle} friction {last['mu_b'][i]:.3f} ± {2 * last['sigma_mu_b'][i]:.3f}"
+        f"{axle} friction {last['mu_b'][i]:.3f} ± {2 * last['sigma_mu_b'][i]:.3f} (2σ)"
         for axle, i in (("front", 0), ("rear", 2))
     )
     return (
