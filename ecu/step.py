@@ -38,7 +38,7 @@ from ecu.estimation.friction import (
     update_pressure,
 )
 from ecu.estimation.joint.kalman import GATE
-from ecu.estimation.joint.layout import JOINT_STATE, STIFFNESS, V
+from ecu.estimation.joint.layout import JOINT_STATE, MU, STIFFNESS, V
 from ecu.estimation.joint.learned import keep_joint, publish_friction, restore_joint, settle_friction
 from ecu.estimation.joint.observer import update_joint
 from ecu.estimation.motion import MOTION_STATE, update_motion, usable
@@ -55,7 +55,13 @@ from ecu.estimation.speed import SPEED_STATE, update_speed
 from ecu.estimation.wheel_load import WHEEL_LOAD_STATE, update_wheel_load
 from ecu.jit import Record, kernel
 from ecu.monitoring.application import APPLICATION_STATE, update_application
-from ecu.monitoring.disc_temperature import DISC_STATE, UNKNOWN_EXCESS, start_discs, update_discs
+from ecu.monitoring.disc_temperature import (
+    DISC_STATE,
+    UNKNOWN_EXCESS,
+    heat_widening,
+    start_discs,
+    update_discs,
+)
 from ecu.params import JOINT, OBSERVER1
 from ecu.records import LEARNED, RecordArray
 from ecu.signals import ACCEL_X, CALLIPER_PRESSURE, FAILED, STARTING
@@ -164,6 +170,9 @@ def _estimate(p: Record, s: Record, u: Record, dt: float) -> None:
 @kernel
 def _observe_jointly(p: Record, s: Record, u: Record, braking: bool, dt: float) -> None:
     joint = s.joint
+    if s.application.started:
+        for i in range(4):
+            joint.p[MU + i, MU + i] += heat_widening(s.discs, i) ** 2
     update_joint(p, joint, u, s.motion, s.wheel_load.load, s.limiter.pressure, braking, dt)
     if s.application.ended:
         settle_friction(p, joint, s.learned)

@@ -331,3 +331,18 @@ def test_ten_thousand_cycles_allocate_nothing(car: Car) -> None:
         before.alloc - before.free,
         before.mi_alloc - before.mi_free,
     )
+
+
+def test_heat_put_in_since_friction_was_observed_widens_it(params, feed) -> None:
+    """200 K are 8 % (assumption of `disc_temperature`); never a change of friction itself."""
+    greatest = []
+    for change in (0.0, 200.0):
+        car = Car(params, feed)
+        car.drive((0.0, 1.0), (60.0, 2.0), (0.0, 1.0))
+        car.state["discs"][0]["observed_at"] -= change
+        before = car.state["friction"][0]["mu"].copy()
+        rows = car.drive((60.0, 0.25))
+        widest = int(column(rows, "sigma_mu_b_fl").argmax())
+        greatest.append(column(rows, "sigma_mu_b_fl")[widest] / column(rows, "mu_b_fl")[widest])
+        assert column(rows, "mu_b_fl")[widest] == pytest.approx(before[0], rel=0.02)
+    assert greatest[1] ** 2 - greatest[0] ** 2 == pytest.approx(0.08**2, rel=0.2)
