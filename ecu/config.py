@@ -18,11 +18,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from ecu.errors import UserError
 from ecu.estimation.tyre import rolling_radius
-from ecu.params import GRAVITY, OBSERVERS, PARAMS, PEDAL_POINTS
+from ecu.params import BAR, GRAVITY, OBSERVERS, PARAMS, PEDAL_POINTS
 from ecu.records import RecordArray
 
 AIR_DENSITY = 1.2  # kg/m^3, 20 degC at sea level
-BAR = 1e5
 
 Positive = Annotated[float, Field(gt=0)]
 Share = Annotated[float, Field(gt=0, lt=1)]

@@ -10,6 +10,7 @@ from ecu.signals import N_INPUTS
 PEDAL_POINTS: Final = 8
 
 GRAVITY: Final = 9.81  # m/s^2
+BAR: Final = 1e5  # Pa
 
 OBSERVERS: Final = ("joint", "observer1", "observer2")
 JOINT, OBSERVER1, OBSERVER2 = range(3)

@@ -62,11 +62,9 @@ from ecu.monitoring.disc_temperature import (
     start_discs,
     update_discs,
 )
-from ecu.params import JOINT, OBSERVER1
+from ecu.params import BAR, JOINT, OBSERVER1
 from ecu.records import LEARNED, RecordArray
 from ecu.signals import ACCEL_X, CALLIPER_PRESSURE, FAILED, STARTING
-
-BAR = 1e5
 
 STATE = np.dtype(
     [
@@ -177,7 +175,8 @@ def _observe_jointly(p: Record, s: Record, u: Record, braking: bool, dt: float) 
     if s.application.ended:
         settle_friction(p, joint, s.learned)
     publish_friction(p, joint, s.friction, s.learned, u, s.wheel_load.load, braking, dt)
-    keep_joint(joint, s.learned)
+    if joint.window.cycles == 0:  # what is known changes at the end of a window alone
+        keep_joint(joint, s.learned)
     s.speed.started, s.speed.speed = joint.started, joint.x[V]
     s.force.k_f = math.exp(joint.x[STIFFNESS])
     for i in range(4):

@@ -125,13 +125,28 @@ def _inputs_usable(inputs: Record, i: int) -> bool:
 
 
 @kernel
+def resting_mode(params: Record, state: Record, learned: Record, good: bool, i: int) -> int:
+    """Return the mode of a corner that does not observe; `good`: its inputs are usable."""
+    if not good and params.mapped[WHEEL_SPEED + i] and params.mapped[CALLIPER_PRESSURE + i]:
+        return FAULT
+    return HOLDING if state.observed_s[i] > 0.0 or learned.observed_s[i] > 0.0 else NOMINAL
+
+
+@kernel
+def driver_accelerates(inputs: Record) -> bool:
+    """Return whether the accelerator is known to be pressed."""
+    pressed: bool = usable(inputs, ACCELERATOR_POSITION) and inputs.value[ACCELERATOR_POSITION] > 2.0
+    return pressed
+
+
+@kernel
 def _hold_all(inputs: Record) -> bool:
     value = inputs.value
     return (
         value[ABS_ACTIVE] > 0.5
         or value[ESP_ACTIVE] > 0.5
         or value[REVERSE] > 0.5
-        or (usable(inputs, ACCELERATOR_POSITION) and value[ACCELERATOR_POSITION] > 2.0)
+        or driver_accelerates(inputs)
     )
 
 
@@ -198,12 +213,8 @@ def update_friction(
             _observe(params, state, observer, inputs, wheels, load, force, speed, i, dt)
             state.mode[i] = OBSERVING
             state.observed_s[i] += dt
-        elif not good and params.mapped[WHEEL_SPEED + i] and params.mapped[CALLIPER_PRESSURE + i]:
-            state.mode[i] = FAULT
-        elif state.observed_s[i] > 0.0 or learned.observed_s[i] > 0.0:
-            state.mode[i] = HOLDING
         else:
-            state.mode[i] = NOMINAL
+            state.mode[i] = resting_mode(params, state, learned, good, i)
         if not state.active[i]:
             ceiling = params.sigma_mu_initial * params.mu_nominal[i]
             grown = math.sqrt(state.sigma[i] ** 2 + (HELD_GROWTH * params.mu_nominal[i]) ** 2 * dt)

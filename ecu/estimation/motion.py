@@ -19,7 +19,7 @@ import numpy as np
 
 from ecu.jit import Record, kernel
 from ecu.params import GRAVITY
-from ecu.signals import ACCEL_X, ACCEL_Y, MOTOR_TORQUE, STEERING_ANGLE, USABLE, YAW_RATE
+from ecu.signals import ACCEL_X, ACCEL_Y, MOTOR_TORQUE, STEERING_ANGLE, USABLE, WHEEL_SPEED, YAW_RATE
 
 MOTION_STATE = np.dtype(
     [
@@ -58,6 +58,15 @@ def motor_torque_known(inputs: Record, corner: int) -> bool:
     """Return whether the motor torque is reported, or was never more than zero: a car without such motors."""
     place = MOTOR_TORQUE + corner
     return usable(inputs, place) or inputs.value[place] == 0.0
+
+
+@kernel
+def mean_wheel_speed(params: Record, inputs: Record) -> float:
+    """Return the mean speed of the wheels [m/s] by their last samples, without a sign."""
+    total = 0.0
+    for i in range(4):
+        total += abs(inputs.value[WHEEL_SPEED + i]) * params.wheel_radius[i]
+    return 0.25 * total
 
 
 @kernel

@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from ecu.estimation.motion import corner_speed, fresh, usable
+from ecu.estimation.motion import corner_speed, fresh, mean_wheel_speed, usable
 from ecu.jit import Record, kernel
 from ecu.signals import ACCEL_X, REVERSE, VEHICLE_SPEED, VEHICLE_SPEED_VALID, WHEEL_SPEED
 
@@ -68,10 +68,7 @@ def _follow_backwards(params: Record, state: Record, inputs: Record) -> None:
     for i in range(4):
         if not fresh(inputs, WHEEL_SPEED + i):
             return
-    total = 0.0
-    for i in range(4):
-        total += abs(inputs.value[WHEEL_SPEED + i]) * params.wheel_radius[i]
-    state.speed, state.p_vv, state.p_vb = -0.25 * total, 0.25, 0.0
+    state.speed, state.p_vv, state.p_vb = -mean_wheel_speed(params, inputs), 0.25, 0.0
 
 
 @kernel

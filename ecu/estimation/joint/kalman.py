@@ -15,6 +15,21 @@ REJECT = 4.0 * GATE
 
 
 @kernel
+def forget(state: Record, i: int, variance: float) -> None:
+    """Let a state have `variance` and no covariance."""
+    for j in range(N):
+        state.p[i, j] = state.p[j, i] = 0.0
+    state.p[i, i] = variance
+
+
+@kernel
+def clear_derivatives(state: Record) -> None:
+    """Begin a measurement that depends on nothing."""
+    for j in range(N):
+        state.h[j] = 0.0
+
+
+@kernel
 def drift_speed(state: Record, time: float) -> None:
     """Let bias and slope act on the covariance of speed over `time` [s]: v' = a - b - g sin(slope)."""
     p = state.p

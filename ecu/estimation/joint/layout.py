@@ -38,7 +38,6 @@ WINDOW_STATE: Final = np.dtype(
         ("accel", "f8"),  # sums over the cycles: specific force in road axes [m/s^2]
         ("lateral", "f8"),  # part of front lateral force along the car [N]
         ("across", "f8"),  # lateral force over load
-        ("speed", "f8"),
         ("change", "f8"),  # dv/dt [m/s^2]
         ("load", "f8", (4,)),  # N
         ("motor", "f8", (4,)),  # N m
@@ -87,7 +86,6 @@ JOINT_STATE: Final = np.dtype(
         ("slip", "f8", (4,)),
         ("force", "f8", (4,)),  # N
         ("observed", "u1", (4,)),  # friction was corrected in the last window
-        ("observed_s", "f8", (4,)),  # in this braking
         ("ratio", "f8", (6,)),  # squared innovation over its variance: wheels, total force, speed reference
         ("reversing", "u1"),
         ("reset", "u1"),

@@ -1,14 +1,15 @@
 """What the joint observer gives to the rest of the ECU, and what it keeps between drives.
 
-Kept are the states but speed and slope, with their standard deviations; of the correlations only the one that
-physics gives back: an error of mass is in every friction alike. What may have changed in between (load,
-tyres, weather) is less sure after a restart."""
+Kept are the states but speed, slope and rate, with their standard deviations; of the correlations only the
+one that physics gives back: an error of mass is in every friction alike. What may have changed in between
+(load, tyres, weather) is less sure after a restart."""
 
 import math
 
 import numpy as np
 
-from ecu.estimation.friction import GREATEST_RATIO, LEAST_RATIO
+from ecu.estimation.friction import GREATEST_RATIO, LEAST_RATIO, resting_mode
+from ecu.estimation.joint.kalman import forget
 from ecu.estimation.joint.layout import (
     BIAS,
     DELAY,
@@ -30,9 +31,7 @@ from ecu.estimation.joint.pressure import follows
 from ecu.estimation.joint.prior import set_prior
 from ecu.estimation.motion import usable
 from ecu.jit import Record, kernel
-from ecu.signals import CALLIPER_PRESSURE, FAULT, HOLDING, NOMINAL, OBSERVING, WHEEL_SPEED
-
-BAR = 1e5
+from ecu.signals import CALLIPER_PRESSURE, OBSERVING, WHEEL_SPEED
 
 # Standard deviations that a pause of unknown length adds.
 PAUSE = np.zeros(N)
@@ -77,7 +76,7 @@ def restore_joint(params: Record, state: Record, learned: Record) -> None:
 def keep_joint(state: Record, learned: Record) -> None:
     """Write what is known now into `learned`."""
     for i in range(N):
-        if i in (V, SLOPE):
+        if i in (V, SLOPE, RATE):
             continue
         learned.joint[i] = state.x[i]
         learned.joint_sigma[i] = math.sqrt(max(state.p[i, i], 0.0))
@@ -101,9 +100,7 @@ def settle_friction(params: Record, state: Record, learned: Record) -> None:
         return
     for i in range(4):
         state.x[MU + i] = math.log(learned.mu_b[i] / params.mu_nominal[i])
-        for j in range(N):
-            state.p[MU + i, j] = state.p[j, MU + i] = 0.0
-        state.p[MU + i, MU + i] = (learned.sigma_mu_b[i] / learned.mu_b[i]) ** 2 + MU_PAUSE**2
+        forget(state, MU + i, (learned.sigma_mu_b[i] / learned.mu_b[i]) ** 2 + MU_PAUSE**2)
 
 
 @kernel
@@ -120,8 +117,7 @@ def _systematic(params: Record, state: Record, load: Record, i: int) -> float:
     Load transfer is known to a few per cent; what sets left against right may be the road's as well.
     """
     transfer = TRANSFER_ERROR * (load[i] / params.static_load[i] - 1.0)
-    twin = i + 1 - 2 * (i % 2)
-    side = 0.5 * (state.x[MU + i] - state.x[MU + twin])
+    side = 0.5 * (state.x[MU + i] - state.x[MU + (i ^ 1)])
     total: float = transfer * transfer + side * side
     return total
 
@@ -153,13 +149,6 @@ def publish_friction(
         if braking and state.observed[i]:
             friction.observed_s[i] += dt
             friction.mode[i] = OBSERVING
-        elif (
-            params.mapped[WHEEL_SPEED + i]
-            and params.mapped[CALLIPER_PRESSURE + i]
-            and not (usable(inputs, WHEEL_SPEED + i) and usable(inputs, CALLIPER_PRESSURE + i))
-        ):
-            friction.mode[i] = FAULT
-        elif friction.observed_s[i] > 0.0 or learned.observed_s[i] > 0.0:
-            friction.mode[i] = HOLDING
         else:
-            friction.mode[i] = NOMINAL
+            good = usable(inputs, WHEEL_SPEED + i) and usable(inputs, CALLIPER_PRESSURE + i)
+            friction.mode[i] = resting_mode(params, friction, learned, good, i)

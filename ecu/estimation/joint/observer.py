@@ -5,7 +5,7 @@ car's longitudinal balance correct it. Which states they may correct depends on 
 
 friction braking   speed, frictions, tyre stiffness and peak, radii, slope; the rest is considered only
 motors alone       everything but friction and pressure offsets: known torque shows mass, drag, stiffness
-rolling            speed, radii and their sinking, slope; bias and drag where motor torque is reported
+rolling            speed, radii, slope; bias and drag where motor torque is reported
 below 3.4 m/s, sliding, ABS, ESP, the driver accelerating against the brakes: speed and slope only
 
 When a wheel runs past the tyre's range all but the speed goes back to what was known 0.2 to 0.4 s before.
@@ -13,8 +13,8 @@ When a wheel runs past the tyre's range all but the speed goes back to what was 
 
 import math
 
-from ecu.estimation.friction import GREATEST_RATIO, LEAST_RATIO
-from ecu.estimation.joint.kalman import correct
+from ecu.estimation.friction import GREATEST_RATIO, LEAST_RATIO, driver_accelerates
+from ecu.estimation.joint.kalman import clear_derivatives, correct, forget
 from ecu.estimation.joint.layout import (
     BIAS,
     DELAY,
@@ -38,13 +38,13 @@ from ecu.estimation.joint.layout import (
 from ecu.estimation.joint.pressure import follows, learn_zero
 from ecu.estimation.joint.prior import forget_rate, pressure_change, set_prior, walk
 from ecu.estimation.joint.snapshot import go_back, keep, keep_newer
-from ecu.estimation.joint.wheel import BAR, brake_lever, predict_balance, predict_wheel
+from ecu.estimation.joint.wheel import brake_lever, predict_balance, predict_wheel
 from ecu.estimation.joint.window import close_window, gather, open_window
-from ecu.estimation.motion import usable
+from ecu.estimation.motion import mean_wheel_speed, usable
 from ecu.jit import Record, kernel
+from ecu.params import BAR
 from ecu.signals import (
     ABS_ACTIVE,
-    ACCELERATOR_POSITION,
     ESP_ACTIVE,
     REVERSE,
     WHEEL_SPEED,
@@ -85,27 +85,18 @@ def start_joint(state: Record) -> None:
 
 
 @kernel
-def _mean_wheel(params: Record, inputs: Record) -> float:
-    """Return the mean speed of the wheels [m/s] by their last samples, without a sign."""
-    total = 0.0
-    for i in range(4):
-        total += abs(inputs.value[WHEEL_SPEED + i]) * params.wheel_radius[i]
-    return 0.25 * total
-
-
-@kernel
 def _start_speed(params: Record, state: Record, inputs: Record) -> None:
     for i in range(4):
         if not usable(inputs, WHEEL_SPEED + i):
             return
-    state.x[V] = _mean_wheel(params, inputs)
+    state.x[V] = mean_wheel_speed(params, inputs)
     state.started, state.hold_s = 1, HOLD_S
 
 
 @kernel
 def _learning_forbidden(inputs: Record, braking: bool) -> bool:
     value = inputs.value
-    against = braking and usable(inputs, ACCELERATOR_POSITION) and value[ACCELERATOR_POSITION] > 2.0
+    against = braking and driver_accelerates(inputs)
     forbidden: bool = against or value[ABS_ACTIVE] > 0.5 or value[ESP_ACTIVE] > 0.5
     return forbidden
 
@@ -143,9 +134,8 @@ def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> 
     else:
         free[BIAS] = free[DRAG] = state.window.motor_reported
         if motors:
-            free[STIFFNESS] = free[RATIO] = free[MASS] = free[LOAD] = free[PEAK] = free[MOTOR] = free[
-                SINKING
-            ] = 1
+            for i in (STIFFNESS, RATIO, MASS, LOAD, PEAK, MOTOR, SINKING):
+                free[i] = 1
 
 
 @kernel
@@ -166,11 +156,11 @@ def update_joint(
         if not state.started:
             return
     if usable(inputs, REVERSE) and inputs.value[REVERSE] > 0.5:
-        state.x[V] = -_mean_wheel(params, inputs)
+        state.x[V] = -mean_wheel_speed(params, inputs)
         state.reversing = 1
         return
     if state.reversing:
-        state.x[V], state.p[V, V], state.reversing = _mean_wheel(params, inputs), 0.25, 0
+        state.x[V], state.p[V, V], state.reversing = mean_wheel_speed(params, inputs), 0.25, 0
         open_window(state)
     gather(params, state, inputs, motion, load, demand, dt)
     state.hold_s = max(state.hold_s - dt, 0.0)
@@ -200,7 +190,7 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     _learn_zeros(params, state, braking)
     for i in range(4):
         if w.pressure_samples[i] == 0:
-            twin = i + 1 - 2 * (i % 2)
+            twin = i ^ 1
             w.pressure[i] = w.pressure[twin] if w.pressure_samples[twin] > 0 else state.last_pressure[i]
             w.pressure_variance[i] = TWIN**2
         if not braking and state.smooth_pressure[i] < APPLIED:
@@ -212,8 +202,8 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     learning = (
         moving and state.hold_s <= 0.0 and w.motor_known != 0 and not _learning_forbidden(inputs, braking)
     )
-    if learning and not braking:
-        learning = abs(w.across) < STRAIGHT
+    if not braking:
+        learning = learning and abs(w.across) < STRAIGHT
     if learning and not braking and motors <= MOTORS:
         learning = w.accel_cycles == w.cycles and abs(predict_balance(params, state)) < UNEXPLAINED
     _choose_free(state, braking, motors > MOTORS, learning)
@@ -221,11 +211,8 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     for channel in range(6):
         state.ratio[channel] = math.nan
     if w.reference_samples > 0:
-        h = state.h
-        for j in range(N):
-            h[j] = 0.0
-        h[V] = 1.0
-        h[DELAY] = -w.reference_change
+        clear_derivatives(state)
+        state.h[V], state.h[DELAY] = 1.0, -w.reference_change
         state.ratio[5] = correct(state, w.reference, params.sigma_vehicle_speed**2 / w.reference_samples)
         if state.ratio[5] > JUMP and state.hold_s > 0.0:
             x[V] += w.reference
@@ -262,8 +249,7 @@ def _fuse_wheel(params: Record, state: Record, i: int, before: float, moving: bo
     ground = max(w.ground[i] + x[V] - before, 0.0)
     omega = predict_wheel(params, state, i, ground)
     if not moving:
-        for j in range(N):
-            state.h[j] = 0.0
+        clear_derivatives(state)
         r = params.wheel_radius[i]
         state.h[V] = 1.0 / r
         correct(
@@ -319,10 +305,8 @@ def _look_after(params: Record, state: Record, braking: bool) -> None:
         return
     if state.untrusted_s > BELIEVED_AFTER and not braking:
         state.started = 0  # then it is the speed that is wrong
-        state.untrusted_s, p_v = 0.0, state.p
-        for j in range(N):
-            p_v[V, j] = p_v[j, V] = 0.0
-        p_v[V, V] = 0.25
+        state.untrusted_s = 0.0
+        forget(state, V, 0.25)
     state.kept_s += w.time
     sliding = state.slides[0] + state.slides[1] + state.slides[2] + state.slides[3]
     if sliding > state.sliding and braking and state.hold_s <= 0.0:

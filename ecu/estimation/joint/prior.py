@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ecu.estimation.joint.kalman import drift_speed, walk_friction
+from ecu.estimation.joint.kalman import drift_speed, forget, walk_friction
 from ecu.estimation.joint.layout import (
     BIAS,
     DELAY,
@@ -27,7 +27,7 @@ from ecu.estimation.joint.layout import (
 from ecu.jit import Record, kernel
 
 PRIOR = np.zeros(N)
-"""Standard deviations before anything is learned; friction, radii and speed are set apart."""
+"""Standard deviations before anything is learned; friction, motor scale and speed are set apart."""
 PRIOR[STIFFNESS], PRIOR[RATIO] = 0.25, 0.06
 PRIOR[BIAS], PRIOR[SLOPE] = 0.1, 0.3
 PRIOR[MASS], PRIOR[PEAK], PRIOR[LOAD], PRIOR[SINKING] = 0.04, 0.25, 0.05, 0.06
@@ -98,9 +98,8 @@ def _change_friction(state: Record, time: float) -> None:
 @kernel
 def forget_rate(state: Record) -> None:
     """Let friction's rate be unknown."""
-    for j in range(N):
-        state.p[RATE, j] = state.p[j, RATE] = 0.0
-    state.x[RATE], state.p[RATE, RATE] = 0.0, PRIOR[RATE] ** 2
+    state.x[RATE] = 0.0
+    forget(state, RATE, PRIOR[RATE] ** 2)
 
 
 @kernel

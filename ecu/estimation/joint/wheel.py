@@ -13,6 +13,7 @@ Car: m (a_x - b) + drag + sum (T_i + I_i domega_i/dt) / r_i = 0.
 
 import math
 
+from ecu.estimation.joint.kalman import clear_derivatives
 from ecu.estimation.joint.layout import (
     BIAS,
     DRAG,
@@ -28,13 +29,12 @@ from ecu.estimation.joint.layout import (
     ROLLING,
     SINKING,
     STIFFNESS,
-    N,
     V,
 )
 from ecu.estimation.tyre import rolling_radius
 from ecu.jit import Record, kernel
+from ecu.params import BAR
 
-BAR = 1e5
 SHAPE = 1.6  # c of the Magic Formula
 NOMINAL_PEAK = 0.9  # adhesion
 PEAK_DEGRESSION = 0.05  # adhesion falls a little with load (Figure A.6)
@@ -134,8 +134,7 @@ def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float
         omega, by_slip = ground / (keep * r), ground / (keep * keep * r)
     used += (brake_torque(params, state, i, pressure) - brake_torque(params, state, i, smooth)) * scale / r
     slip, slope, by_peak = combined_slip(used, w.across, stiffness, peak)
-    for j in range(N):
-        h[j] = 0.0
+    clear_derivatives(state)
     h[V] = omega / max(ground, 0.1)
     mu = params.mu_nominal[i] * math.exp(x[MU + i])
     lever = brake_lever(params, i)
@@ -159,8 +158,7 @@ def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float
 def predict_balance(params: Record, state: Record) -> float:
     """Return what is left of the car's balance over the configured mass [m/s^2]; sets `state.h`."""
     x, h, w, mass = state.x, state.h, state.window, params.mass
-    for j in range(N):
-        h[j] = 0.0
+    clear_derivatives(state)
     speed, heavier = x[V], math.exp(x[MASS])
     drag = heavier * math.exp(x[DRAG]) * params.drag_area * speed * abs(speed) / mass
     left = heavier * (w.accel - x[BIAS] + w.lateral / mass) + drag

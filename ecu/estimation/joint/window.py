@@ -10,7 +10,7 @@ from ecu.estimation.joint.layout import BIAS, DELAY, SLOPE, V
 from ecu.estimation.joint.pressure import correct_pressure, follow_demand, follows
 from ecu.estimation.motion import corner_speed, fresh, motor_torque, motor_torque_known, usable
 from ecu.jit import Record, kernel
-from ecu.params import GRAVITY
+from ecu.params import BAR, GRAVITY
 from ecu.signals import (
     ACCEL_X,
     CALLIPER_PRESSURE,
@@ -20,7 +20,6 @@ from ecu.signals import (
     WHEEL_SPEED,
 )
 
-BAR = 1e5
 OLDEST_S = 0.06  # of an acceleration or torque that is set against others
 NEW_SHARE = 0.2  # of the model's variance that is another one in the next window
 SMOOTHING = 0.2  # s, of the pressure that derivatives use
@@ -30,7 +29,7 @@ SMOOTHING = 0.2  # s, of the pressure that derivatives use
 def open_window(state: Record) -> None:
     """Begin a window."""
     w = state.window
-    w.time, w.cycles, w.accel, w.lateral, w.across, w.speed, w.change = 0.0, 0, 0.0, 0.0, 0.0, 0.0, 0.0
+    w.time, w.cycles, w.accel, w.lateral, w.across, w.change = 0.0, 0, 0.0, 0.0, 0.0, 0.0
     w.reference, w.reference_change, w.reference_samples, w.accel_cycles = 0.0, 0.0, 0, 0
     w.motor_known, w.motor_reported = 1, 0
     for i in range(4):
@@ -66,7 +65,6 @@ def gather(
     w.accel += motion.accel_x
     w.accel_cycles += 1 if _current(inputs, ACCEL_X) else 0
     w.change += change
-    w.speed += x[V]
     front_lateral = params.mass * motion.accel_y * params.rear_axle / params.wheelbase
     w.across += motion.accel_y / GRAVITY
     w.lateral += front_lateral * math.sin(motion.steering)
@@ -114,7 +112,6 @@ def close_window(params: Record, state: Record) -> None:
     n = w.cycles
     w.accel /= n
     w.change /= n
-    w.speed /= n
     w.lateral /= n
     w.across /= n
     for i in range(4):

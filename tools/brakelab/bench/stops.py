@@ -111,15 +111,20 @@ def columns(table: dict[str, Vector], stem: str, axle: str, rows: NDArray[np.boo
     return np.stack([table[f"{stem}_{corner}"][rows] for corner in AXLES[axle]])
 
 
+def estimate_errors(drive: Drive, rows: NDArray[np.bool_], axle: str) -> tuple[float, float]:
+    """Return nRMSE [%] and share inside 2σ of an axle's friction over `rows`."""
+    true = columns(drive.truth, "mu_b", axle, rows)
+    estimate = columns(drive.outputs, "mu_b", axle, rows)
+    sigma = columns(drive.outputs, "sigma_mu_b", axle, rows)
+    return nrmse(estimate, true), float(np.mean(np.abs(estimate - true) <= 2.0 * sigma))
+
+
 def friction_errors(
     drive: Drive, rows: NDArray[np.bool_], axle: str, nominal: float
 ) -> tuple[float, float, float]:
     """Return nRMSE [%], share inside 2σ and nRMSE of the nominal friction [%] over `rows`."""
     true = columns(drive.truth, "mu_b", axle, rows)
-    estimate = columns(drive.outputs, "mu_b", axle, rows)
-    sigma = columns(drive.outputs, "sigma_mu_b", axle, rows)
-    inside = float(np.mean(np.abs(estimate - true) <= 2.0 * sigma))
-    return nrmse(estimate, true), inside, nrmse(np.full_like(true, nominal), true)
+    return *estimate_errors(drive, rows, axle), nrmse(np.full_like(true, nominal), true)
 
 
 def _relative_error(stop: _Stop, wanted: Vector) -> float:

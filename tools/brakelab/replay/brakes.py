@@ -17,13 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ecu.estimation.friction import SECONDS_FOR_LEARNING, SIGMA_FOR_LEARNING
-from ecu.params import GRAVITY
+from ecu.params import BAR, GRAVITY
 from ecu.records import RecordArray
 from ecu.signals import CORNERS, FAULT, N_OUTPUTS, OBSERVING, OUTPUT
 
 Vector = NDArray[np.float64]
 
-BAR: Final = 1e5  # Pa
 RELEASE_BAR: Final = 1.0  # an application lasts while a pressure is this much above p_0 (contract)
 SLOWEST: Final = 5.0 / 3.6  # m/s, end of the friction mean (contract)
 STANDING: Final = 0.3  # m/s, below: the vehicle stands

@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.bench.stops import AXLES, LOWEST_SPEED, SETTLING_S, nrmse
+from brakelab.bench.stops import AXLES, LOWEST_SPEED, SETTLING_S, estimate_errors
 from brakelab.closed_loop import Drive, new_loop, run
 from brakelab.ecu_inputs import ecu_inputs, vehicle_frames
 from brakelab.scenario import Scenario
@@ -72,18 +72,11 @@ def drive_errors(drive: Drive) -> Errors:
     if braking.max() < 0:
         return Errors(np.full(len(AXLES), np.nan), np.full(len(AXLES), np.nan))
     table = [
-        [_axle_errors(drive, braking == number, axle) for axle in AXLES.values()]
+        [estimate_errors(drive, braking == number, axle) for axle in AXLES]
         for number in range(braking.max() + 1)
     ]
-    return Errors(*np.mean(table, axis=0).T)
-
-
-def _axle_errors(drive: Drive, rows: NDArray[np.bool_], corners: Iterable[str]) -> tuple[float, float]:
-    estimate, sigma, true = (
-        np.stack([table[f"{stem}_{corner}"][rows] for corner in corners])
-        for table, stem in ((drive.outputs, "mu_b"), (drive.outputs, "sigma_mu_b"), (drive.truth, "mu_b"))
-    )
-    return nrmse(estimate, true), 100.0 * float(np.mean(np.abs(estimate - true) <= 2.0 * sigma))
+    error, inside = np.mean(table, axis=0).T
+    return Errors(error, 100.0 * inside)
 
 
 def mean_errors(errors: Iterable[Errors]) -> Errors:
