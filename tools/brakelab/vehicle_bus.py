@@ -152,7 +152,8 @@ def sense(vehicle: Vehicle, noise: Generator, values: NDArray[np.float64]) -> No
     if not np.isnan(values[signals.VEHICLE_SPEED]):
         values[signals.VEHICLE_SPEED_VALID] = 1.0
     for i in range(4):
-        values[signals.MOTOR_LIMIT + i] = state.motor_limit[i]
+        if not np.isnan(values[signals.MOTOR_TORQUE + i]):  # both are one frame's
+            values[signals.MOTOR_LIMIT + i] = state.motor_limit[i]
 
 
 @kernel

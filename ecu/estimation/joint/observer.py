@@ -8,13 +8,14 @@ motors alone       everything but friction and pressure offsets: known torque sh
 rolling            speed, radii, slope; bias and drag where motor torque is reported
 below 3.4 m/s, sliding, ABS, ESP, the driver accelerating against the brakes: speed and slope only
 
-When a wheel runs past the tyre's range all but the speed goes back to what was known 0.2 to 0.4 s before.
+When a wheel runs past the tyre's range, or most wheels contradict the tyres that are known, all but the speed
+goes back to what was known 0.2 to 0.4 s before.
 """
 
 import math
 
 from ecu.estimation.friction import GREATEST_RATIO, LEAST_RATIO, driver_accelerates
-from ecu.estimation.joint.kalman import clear_derivatives, correct, forget
+from ecu.estimation.joint.kalman import GATE, clear_derivatives, correct, forget
 from ecu.estimation.joint.layout import (
     BIAS,
     DELAY,
@@ -36,7 +37,7 @@ from ecu.estimation.joint.layout import (
     V,
 )
 from ecu.estimation.joint.pressure import follows, learn_zero
-from ecu.estimation.joint.prior import forget_rate, pressure_change, set_prior, walk
+from ecu.estimation.joint.prior import PRIOR, forget_rate, pressure_change, set_prior, walk
 from ecu.estimation.joint.snapshot import go_back, keep, keep_newer
 from ecu.estimation.joint.wheel import brake_lever, predict_balance, predict_wheel
 from ecu.estimation.joint.window import close_window, gather, open_window
@@ -60,7 +61,7 @@ SLIDING_FORCE = 0.3  # relative error of a sliding wheel's force if it is taken 
 SLIDING_FLOOR = 5.0  # m/s, that it is relative to at least
 BELIEVED_AFTER = 3.0  # s without a wheel that rolls, brakes released
 RELEASE = 0.15  # relative fall in a window: pressure, slip and force lag differently and teach nothing
-HOLD_S = 0.4
+HOLD_S = 0.2
 SNAPSHOT_S = 0.2
 
 BALANCE_FLOOR = 0.01  # m/s^2 that the balance leaves out
@@ -69,6 +70,7 @@ SKEW_FOLLOWED, SKEW_REPORTED = 0.5, 3.0  # windows between pressure and force; a
 SKEW_ACCEL = 0.5  # windows between acceleration and torques
 TRANSIENT = 0.5  # of a slip's change since the last window
 CORNERING = 1.0  # of slip, per squared adhesion used sideways: then load and slip angle are not well known
+OTHER_TYRES = 2.5  # wheels on the gate at once
 UNEXPLAINED = 0.15  # m/s^2 while rolling: someone drives or brakes the car without saying so
 TWIN = 3.0  # bar, of a pressure taken from the other side
 LOW_SPEED_NOISE = 0.15  # m/s
@@ -226,11 +228,25 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
         if not state.slides[i]:
             state.untrusted_s = 0.0
             _fuse_wheel(params, state, i, before, moving, learning and braking)
+    _watch_tyres(state, learning and braking)
     if learning and w.accel_cycles == w.cycles and (braking or w.motor_reported):
         _fuse_balance(params, state)
     state.last_accel = w.accel
     for i in range(4):
         state.last_pressure[i], state.last_smooth[i] = w.pressure[i], state.smooth_pressure[i]
+
+
+@kernel
+def _watch_tyres(state: Record, observing: bool) -> None:
+    """Let friction go back and stiffness be unknown where most wheels contradict the tyres that are known."""
+    against = 0.0
+    for i in range(4):
+        if math.isfinite(state.ratio[i]):
+            against += min(state.ratio[i], GATE * GATE)
+    known = state.p[STIFFNESS, STIFFNESS] < (0.5 * PRIOR[STIFFNESS]) ** 2
+    if observing and known and against > OTHER_TYRES * GATE * GATE:
+        go_back(state)
+        forget(state, STIFFNESS, PRIOR[STIFFNESS] ** 2)
 
 
 @kernel

@@ -135,6 +135,28 @@ def is_one_of(mu: np.ndarray, rows, rtol: float = 1e-9) -> bool:
     return any(np.allclose(mu, row, rtol=rtol) for row in rows)
 
 
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("factor", [0.67, 0.75, 1.4])
+def test_another_tyre_is_not_taken_for_another_friction(new_car, factor: float, seed: int) -> None:
+    """The stiffness of all tyres, known to 4 %, changes at once while braking (thesis, section 4.6)."""
+    rows = []
+    for stiffness in (1.0, factor):
+        car = new_car(seed=seed, speed=38.0)
+        car.state["p"][STIFFNESS, STIFFNESS] = 0.04**2
+        car.drive(1.0)
+        car.drive(2.0, **BRAKING)
+        car.stiffness = stiffness
+        rows.append([mu for _, mu in history(car, 1.5, **BRAKING)])
+    learned = float(np.exp(car.state["x"][STIFFNESS]))
+    off = np.abs(np.divide(rows[1], rows[0]) - 1).max(axis=1)
+    print(
+        f"stiffness {learned:.3f}, friction at most {100 * off.max():.1f}, at last {100 * off[-1]:.1f} % off"
+    )
+    assert learned == pytest.approx(factor, rel=0.06)
+    assert off.max() < 0.06
+    assert off[-1] < 0.02
+
+
 @pytest.mark.parametrize("wheel", [0, 3])
 @pytest.mark.parametrize("after", [2.0, 2.05, 2.1, 2.15])
 def test_a_wheel_that_begins_to_slide_takes_friction_back(new_car, after: float, wheel: int) -> None:
