@@ -186,6 +186,17 @@ def report(
 
 
 @app.command()
+def compare(
+    a: Annotated[Path, typer.Argument(metavar="A.parquet", help="What `replay` wrote")],
+    b: Annotated[Path, typer.Argument(metavar="B.parquet", help="Of another version or tuning")],
+) -> int:
+    """Two results side by side, what differs most first. Exit code 1: something differs that matters."""
+    from brakelab import compare
+
+    return compare.compare(a, b)
+
+
+@app.command()
 def tune(
     config: Config,
     scenario: Annotated[
