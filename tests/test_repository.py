@@ -59,9 +59,9 @@ def _imports(path: Path) -> Iterator[tuple[str, bool]]:
 
 
 def _requirements(lock: Path) -> dict[str, set[str]]:
-    """Pinned versions by name; a version may hold for some Pythons only."""
+    """Pinned versions by name; a version may hold for some Pythons or systems only."""
     versions: dict[str, set[str]] = {}
-    for name, version in re.findall(r"^([\w.\-]+)==([^\\\n]+)", lock.read_text("utf-8"), re.MULTILINE):
+    for name, version in re.findall(r"^([\w.\-]+)==([^\\\n;]+)", lock.read_text("utf-8"), re.MULTILINE):
         versions.setdefault(name, set()).add(version.strip())
     return versions
 
