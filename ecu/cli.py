@@ -185,6 +185,22 @@ def report(
     return 0
 
 
+map_app = typer.Typer(help="Signal maps: what the frames of a car mean.", no_args_is_help=True)
+app.add_typer(map_app, name="map")
+
+
+@map_app.command()
+def suggest(
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="A recorded drive")],
+    dbc: Annotated[Path, typer.Option("--dbc", metavar="DB", help="The car's database")],
+    out: Annotated[Path | None, typer.Option("--out", metavar="MAP.toml", help="Default: printed")] = None,
+) -> int:
+    """A map proposed by names, units and physics, for you to edit."""
+    from brakelab.mapping import command
+
+    return command.suggest(log, dbc, out)
+
+
 @app.command()
 def compare(
     a: Annotated[Path, typer.Argument(metavar="A.parquet", help="What `replay` wrote")],

@@ -32,6 +32,11 @@ _SPELLINGS: Final = {
 }  # fmt: skip
 
 
+def spelled(unit: str) -> str:
+    """Return a unit as this module spells it."""
+    return _SPELLINGS.get(unit.strip(), unit.strip())
+
+
 def conversion(
     unit: str, target: str, rolling_radius: float | None, where: str, key: str
 ) -> tuple[float, float]:
@@ -39,7 +44,7 @@ def conversion(
 
     A speed turns into a wheel speed by the rolling radius [m]. Raises UserError for a unit that does not.
     """
-    name = _SPELLINGS.get(unit.strip(), unit.strip())
+    name = spelled(unit)
     known = CONVERSIONS[target]
     if name in known:
         return known[name]

@@ -1,0 +1,157 @@
+"""`brake-ecu map suggest`: proposes a signal map that the user then edits."""
+
+import os
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from cantools.database import Database
+from rich.console import Console
+from rich.table import Table
+
+from brakelab.mapping.names import converts, words
+from brakelab.mapping.physics import RADIUS, Found, propose
+from brakelab.mapping.series import Series, read_series
+from brakelab.replay.candump import LogQuality, read_candump
+from brakelab.replay.command import WIDTH
+from ecu.bus.database import load_database
+from ecu.bus.signal_map import load_signal_map
+from ecu.bus.units import spelled
+from ecu.errors import RunFault, UserError
+
+COUNTING: Final = {"counter", "count", "cnt", "cntr", "alive", "ctr", "no"}
+WANTED: Final = (
+    *("wheel_speed_fl", "accel_x", "accel_y", "yaw_rate", "steering_angle", "calliper_pressure_fl"),
+    *("pedal_position", "accelerator_position", "motor_torque_fl", "abs_active"),
+)
+
+
+def suggest(log: Path, dbc: Path, out: Path | None) -> int:
+    """Print a proposal with its evidence; write it to `out`, or print it where there is none. Returns 0.
+
+    Raises:
+        UserError: the log, the database or `out` is not right.
+        RunFault: no wheel speeds were found, against which everything else is judged.
+    """
+    database, strict = _load(dbc)
+    interfaces: list[str] = []
+    series = read_series(read_candump(log, interfaces, LogQuality()), database)
+    found, drives = propose(series)
+    if not found:
+        raise RunFault(f"{log}: no four wheel speeds that {dbc} names; is it the database of this car?")
+    bus = found[0].series.bus
+    here = [one for one in series if one.bus == bus]
+    text = map_text(found, here, (out or Path("map.toml")), dbc, strict, interfaces, bus)
+    _show(found, drives)
+    if out is None:
+        print(text)
+        return 0
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        out.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise UserError(str(out), "", f"cannot be written ({error.strerror}); choose another --out") from None
+    load_signal_map(out)
+    Console(stderr=True).print(f"written: {out}; check and edit it", highlight=False)
+    return 0
+
+
+def _load(dbc: Path) -> tuple[Database, bool]:
+    try:
+        return load_database(dbc), True
+    except UserError as error:
+        if "strict = false" not in str(error):
+            raise
+        return load_database(dbc, strict=False), False
+
+
+def _stem(target: str) -> str:
+    return target.removesuffix("_fl").removesuffix("_fr").removesuffix("_rl").removesuffix("_rr")
+
+
+def _show(found: list[Found], drives: bool) -> None:
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        console = Console(stderr=True, width=WIDTH)
+    table = Table(title="proposed", title_justify="left")
+    for column in ("input", "message", "signal", "unit", "factor", "why"):
+        table.add_column(column)
+    rows: dict[tuple[str, str], list[Found]] = {}
+    for one in found:
+        rows.setdefault((_stem(one.target), one.evidence), []).append(one)
+    for (stem, evidence), ones in rows.items():
+        signals = " ".join(dict.fromkeys(one.series.signal for one in ones))
+        first = ones[0]
+        table.add_row(stem, first.series.message, signals, first.unit, f"{first.factor:.4g}", evidence)
+    console.print(table)
+    targets = {one.target for one in found}
+    missing = [_stem(name) for name in WANTED if name not in targets]
+    if missing:
+        console.print(f"nothing found for {', '.join(missing)}", highlight=False)
+    if not drives:
+        console.print("the car stands in this log: signs and scales could not be checked", highlight=False)
+
+
+def _number(value: float) -> str:
+    return f"{value:.6g}"
+
+
+def _counter(series: list[Series], message: str) -> str | None:
+    """Return the signal that counts a message's frames."""
+    for one in series:
+        if one.message != message or not COUNTING & set(words(one.signal)):
+            continue
+        steps = np.diff(one.value)
+        if len(steps) and np.mean(np.isin(steps, (1.0, -one.value.max()))) > 0.7 and one.value.max() > 1:
+            return one.signal
+    return None
+
+
+def map_text(
+    found: list[Found],
+    series: list[Series],
+    out: Path,
+    dbc: Path,
+    strict: bool,
+    interfaces: list[str],
+    bus: int,
+) -> str:
+    """Return the proposal as the text of a signal map whose place will be `out`."""
+    database = os.path.relpath(dbc.resolve(), out.resolve().parent)
+    lines = [
+        "# Proposed from a recorded drive: check every line, above all the signs (ISO 8855).",
+        "# docs/signal-maps.md explains the keys.",
+        "",
+        f'database = "{database}"',
+    ]
+    if not strict:
+        lines.append("strict = false              # signals of this database overlap")
+    if len(interfaces) > 1:
+        lines.append(f'bus = "{interfaces[bus]}"')
+    wheel = next(one.series for one in found if one.target == "wheel_speed_fl")
+    if not converts(wheel.unit, "rad/s"):
+        lines.append(f"rolling_radius = {RADIUS}       # m, assumed: give that of your tyres")
+    for message in dict.fromkeys(one.series.message for one in found):
+        first = next(one.series for one in found if one.series.message == message)
+        lines += ["", f"[messages.{message}]", f"period = {first.period:.3g}"]
+        mean = (first.t[-1] - first.t[0]) / max(len(first.t) - 1, 1)
+        if mean > 1.5 * first.period:
+            lines.append(f"slowest_period = {mean:.2g}      # frames are lost or irregular")
+        counter = _counter(series, message)
+        if counter:
+            lines.append(f'counter = {{ signal = "{counter}" }}')
+    lines += ["", "[inputs]"]
+    told = ""
+    for one in found:
+        if one.evidence != told:
+            lines.append(f"# {one.evidence}")
+            told = one.evidence
+        entry = f'message = "{one.series.message}", signal = "{one.series.signal}"'
+        if one.factor != 1.0:
+            entry += f", factor = {_number(one.factor)}"
+        if one.offset:
+            entry += f", offset = {_number(one.offset)}"
+        if one.unit != spelled(one.series.unit):
+            entry += f', unit = "{one.unit}"'
+        lines.append(f"{one.target} = {{ {entry} }}")
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,97 @@
+"""Every signal of a log that its database knows, as a series over time."""
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+from cantools.database import Database, Message
+from numpy.typing import NDArray
+
+from ecu.bus.database import fits
+from ecu.bus.plan import compile_message, decode
+from ecu.jit import kernel
+from ecu.records import EXTENDED_ID, FRAME_ERROR, FRAME_EXTENDED, FRAME_REMOTE, RecordArray
+
+Vector = NDArray[np.float64]
+FEWEST = 20  # frames of a message
+
+
+class Series(NamedTuple):
+    """One signal of the log."""
+
+    message: str
+    signal: str
+    unit: str
+    bus: int
+    """Place of the interface in the log's list."""
+    period: float
+    """Median between frames [s]."""
+    flag: bool
+    """One or two bits: it says yes or no."""
+    t: Vector
+    """s since the first frame of the log, rising."""
+    value: Vector
+    """As the database scales it, NaN where the multiplexer selects others."""
+
+    @property
+    def name(self) -> str:
+        """Message and signal."""
+        return f"{self.message}.{self.signal}"
+
+
+@kernel
+def _decode_all(
+    signals: Any, codes: NDArray[np.int64], data: NDArray[np.uint8], values: NDArray[np.float64]
+) -> None:
+    for k in range(len(data)):
+        decode(signals, codes, data[k], values[k])
+
+
+def _readable(message: Message) -> bool:
+    return message.length > 0 and any(fits(signal, message.length) for signal in message.signals)
+
+
+def read_series(blocks: Iterable[RecordArray], database: Database) -> list[Series]:
+    """Return the series of all messages that came at least `FEWEST` times, on each bus for itself.
+
+    `blocks`: FRAME in the order of the log. Frames of a wrong length are left out.
+    """
+    frames = np.concatenate([np.asarray(block).copy() for block in blocks])
+    frames = frames[frames["flags"] & (FRAME_ERROR | FRAME_REMOTE) == 0]
+    extended = np.where(frames["flags"] & FRAME_EXTENDED, EXTENDED_ID, 0).astype(np.uint32)
+    ids = frames["can_id"] | extended
+    start = frames["stamp_ns"].min() if len(frames) else 0
+    found = []
+    for message in database.messages:
+        identifier = message.frame_id | (EXTENDED_ID if message.is_extended_frame else 0)
+        mine = frames[ids == identifier]
+        mine = mine[mine["length"] >= message.length]
+        if not _readable(message):
+            continue
+        for bus in np.unique(mine["bus"]):
+            here = mine[mine["bus"] == bus]
+            if len(here) >= FEWEST:
+                found += _series(message, here, int(bus), int(start))
+    return found
+
+
+def _series(message: Message, frames: RecordArray, bus: int, start: int) -> list[Series]:
+    plan = compile_message(message)
+    values = np.empty((len(frames), len(plan.names)))
+    _decode_all(plan.signals, plan.codes, np.ascontiguousarray(frames["data"]), values)
+    t, first = np.unique((frames["stamp_ns"] - start) * 1e-9, return_index=True)
+    period = float(np.median(np.diff(t))) if len(t) > 1 else np.nan
+    signals = {signal.name: signal for signal in message.signals}
+    return [
+        Series(
+            message.name,
+            name,
+            signals[name].unit or "",
+            bus,
+            period,
+            signals[name].length <= 2,
+            t,
+            values[first, place],
+        )
+        for place, name in enumerate(plan.names)
+    ]
