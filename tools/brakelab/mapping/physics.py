@@ -229,10 +229,10 @@ def inertial(series: list[Series], motion: Motion) -> list[Found]:
     take("accel_x", motion.change, "dv/dt")
     yaw_rate = max(motion.yaw_rates, key=lambda wheels: _strength(series, motion, wheels, fast))
     take("yaw_rate", yaw_rate, "right less left wheels")
-    for one in found:
-        if one.target == "yaw_rate":
-            scale = one.factor * CONVERSIONS["rad/s"][one.unit][0]
-            yaw_rate = _smooth(on_grid(one.series, motion.t)) * scale
+    for known in found:
+        if known.target == "yaw_rate":
+            scale = known.factor * CONVERSIONS["rad/s"][known.unit][0]
+            yaw_rate = _smooth(on_grid(known.series, motion.t)) * scale
     take("accel_y", motion.speed * yaw_rate, "speed times yaw rate")
     wanted = np.arctan(WHEELBASE * yaw_rate / np.maximum(motion.speed, MOVING))
     best = _best(series, "steering_angle", motion, wanted, fast)
