@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.replay.summary import SHORT
+from brakelab.replay.prediction import SHORT
 from brakelab.report.drive import Drive, Vector, numbers, read_parquet
 from ecu.errors import UserError
 from ecu.signals import CORNERS
