@@ -12,7 +12,7 @@ from brakelab.replay.prediction import errors
 from ecu.config import load_config, new_params
 from ecu.params import BAR
 from ecu.records import RecordArray
-from ecu.signals import HOLDING, N_OUTPUTS, OUTPUT
+from ecu.signals import FAULT, HOLDING, N_OUTPUTS, NOMINAL, OUTPUT
 
 MU, SIGMA, PRESSURE, DECEL = 0.42, 0.021, 40.0, 3.5
 BEGINS, ENDS = 250, 550
@@ -91,8 +91,19 @@ def test_sigma_is_that_of_friction_and_of_motors(params: RecordArray) -> None:
     assert line.sigma_decel_predicted == pytest.approx(np.hypot(of_friction, of_motors), rel=1e-9)
 
 
+@pytest.mark.parametrize(("mode", "learned"), [(NOMINAL, 0), (HOLDING, 1), (FAULT, 0)])
+def test_whether_friction_was_learned_before(params: RecordArray, mode: int, learned: int) -> None:
+    rows = braking()
+    rows[:BEGINS, OUTPUT["mode_fl"]] = mode
+    assert judged(params, rows).learned_before == learned
+
+
 def accelerator(rows: np.ndarray) -> None:
     rows[BEGINS:ENDS, ACCELERATOR] = 30.0
+
+
+def late_change_of_pedals(rows: np.ndarray) -> None:
+    rows[BEGINS : BEGINS + 40, ACCELERATOR] = 30.0
 
 
 def change_of_pedals(rows: np.ndarray) -> None:
@@ -138,6 +149,7 @@ def speed_lost(rows: np.ndarray) -> None:
     [
         (lambda rows: None, ""),
         (accelerator, "accelerator pressed"),
+        (late_change_of_pedals, "accelerator pressed"),
         (change_of_pedals, ""),
         (launch, "below 0.5 m/s²"),
         (driven(0.25), "driving torque"),

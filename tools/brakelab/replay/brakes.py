@@ -197,7 +197,7 @@ def application(number: int, t: Vector, rows: Vector, start: int, params: Record
                 PERIOD * float(np.count_nonzero(_modes(rows, i) == OBSERVING)),
                 learning(rows, i, params, against),
                 prediction.sigma,
-                int(_modes(before, i) in (OBSERVING, HOLDING)),
+                int(_modes(before, i) == HOLDING),
                 left_out(duration, decel, against, prediction.decel),
             )
         )
