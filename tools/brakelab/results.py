@@ -16,14 +16,15 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from brakelab.replay.brakes import BRAKE_UNITS, BrakeBook
+from brakelab.replay.engine import MEASURED_INPUTS
 from ecu.errors import UserError
 from ecu.records import RecordArray
-from ecu.signals import INPUT_SIGNALS, MOTOR_TORQUE, OUTPUT_COLUMNS, OUTPUT_SIGNALS, column_names
+from ecu.signals import INPUT_SIGNALS, OUTPUT_COLUMNS, OUTPUT_SIGNALS, column_names
 
-MEASURED_COLUMNS: Final = tuple(signal.name for signal in INPUT_SIGNALS[MOTOR_TORQUE : MOTOR_TORQUE + 4])
-"""Inputs that a reader needs beside the outputs: the motor torques as last received."""
-ROW_COLUMNS: Final = OUTPUT_COLUMNS + MEASURED_COLUMNS
-"""A row of results without `t`: the outputs as a vector, then `MEASURED_COLUMNS`."""
+MEASURED: Final = tuple(INPUT_SIGNALS[place] for place in MEASURED_INPUTS)
+"""Inputs that a reader needs beside the outputs, as last received."""
+ROW_COLUMNS: Final = OUTPUT_COLUMNS + tuple(signal.name for signal in MEASURED)
+"""A row of results without `t`: the outputs as a vector, then `MEASURED`."""
 N_ROW: Final = len(ROW_COLUMNS)
 
 _SMALL: Final = {"mode", "mode_mu_b", "pressure_demand_valid", "motor_demand_valid", "braking"}
@@ -37,12 +38,12 @@ def _row_schema() -> pa.Schema:
             pa.int8() if signal.name in _SMALL else pa.uint32() if signal.name in _COUNTS else pa.float64()
         )
         fields += [pa.field(name, kind, metadata={"unit": signal.unit}) for name in column_names(signal)]
-    fields += [pa.field(name, pa.float64(), metadata={"unit": "N m"}) for name in MEASURED_COLUMNS]
+    fields += [pa.field(signal.name, pa.float64(), metadata={"unit": signal.unit}) for signal in MEASURED]
     return pa.schema(fields)
 
 
 def _brake_schema() -> pa.Schema:
-    kinds = {"brake": pa.int32(), "corner": pa.string(), "learning": pa.string()}
+    kinds = {"brake": pa.int32(), **dict.fromkeys(("corner", "learning", "left_out"), pa.string())}
     return pa.schema(
         [
             pa.field(name, kinds.get(name, pa.float64()), metadata={"unit": u})

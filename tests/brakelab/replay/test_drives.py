@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from brakelab.replay.command import replay
-from brakelab.replay.summary import SHORT
+from brakelab.replay.prediction import SHORT
 from brakelab.results import read_result
 from ecu.resources import resource
 

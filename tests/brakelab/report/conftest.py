@@ -62,7 +62,8 @@ def made_up_drive(seconds: float = 60.0) -> tuple[dict[str, Any], dict[str, Any]
                 "v_in": V_IN, "v_end": 0.0, "decel_mean": deceleration,
                 "decel_predicted": 1.04 * deceleration,
                 "mu_b_mean": TRUE_FRICTION[corner], "disc_temperature_in": 80.0 + 20 * number,
-                "brake_energy": 1.5e5,
+                "brake_energy": 1.5e5, "sigma_decel_predicted": 0.02 * deceleration,
+                "learned_before": int(number > 0), "left_out": "accelerator pressed" if number == 2 else "",
             }  # fmt: skip
             for name, value in row.items():
                 brakes.setdefault(name, []).append(value)

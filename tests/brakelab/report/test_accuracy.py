@@ -17,7 +17,9 @@ def stop(achieved: float) -> tuple[Drive, list[Braking]]:
     demand = np.where((T >= 2.0) & (T < 9.0), DEMANDED, 0.0)
     columns = {"vehicle_speed": speed, "decel_demand_total": demand, "accel_x_road": -decel}
     nan = float("nan")
-    return Drive(T, columns, {}), [Braking(1, 2.0, 9.0, 30.0, 0.0, nan, nan, nan, NONE, NONE, nan)]
+    return Drive(T, columns, {}), [
+        Braking(1, 2.0, 9.0, 30.0, 0.0, nan, nan, nan, NONE, NONE, nan, nan, nan, "")
+    ]
 
 
 def test_window_begins_half_a_second_after_the_demand_and_ends_at_15_kmh() -> None:

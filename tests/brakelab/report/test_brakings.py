@@ -52,3 +52,5 @@ def test_only_the_file_knows_prediction_and_energy(drive_files: dict[str, Path])
     assert first.predicted == pytest.approx(4.16)
     assert first.energy == pytest.approx(6e5)
     assert first.friction.tolist() == [0.38, 0.38, 0.49, 0.50]
+    assert first.sigma == pytest.approx(0.08)
+    assert (first.learned, first.left_out) == (0.0, "")

@@ -62,7 +62,7 @@ def test_every_plot_is_drawn(drive_files: dict[str, Path], tmp_path: Path, schem
     title = re.search(r"<title>(.*?)</title>", done.stdout)
     assert title, done.stderr[-2000:]
     seen = json.loads(title[1])
-    assert seen["figures"] == seen["drawn"] == 14
+    assert seen["figures"] == seen["drawn"] == 16
     assert seen["loaded"] == []
     assert seen["window"] == pytest.approx([21.5, 27.13], abs=0.05)
     assert seen["ink"] == [ink]

@@ -4,28 +4,33 @@ An application is a run of rows with `braking` = 1. For corner i with piston are
 radius r_eff, push-out pressure p_0 and tyre radius r:
 
     mu_b_mean       = ∫ T_b / (2 A_i r_eff (p − p_0)) ds / ∫ ds
-    decel_predicted = mean of [Σ_i (2 A_i r_eff mu_i (p_i − p_0)⁺ + M_i) / r_i + drag v² + rolling m g] / m
 
-The first from 90 % of the steady pressure (the median of what lies above half of the highest) until release
-or 5 km/h; in the second mu_i was learned before the application, M_i is the motor torque (positive brakes).
-A vehicle that stands decelerates no further: such rows count with 0 in the prediction, as in `decel_mean`.
+from 90 % of the steady pressure (the median of what lies above half of the highest) until release or 5 km/h.
+What it was expected to do: `brakelab.replay.prediction`.
 """
 
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from brakelab.replay.prediction import (
+    SLOPE_ROWS,
+    STANDING,
+    Vector,
+    corners,
+    driven_against,
+    left_out,
+    mean,
+    predict,
+    slope_felt,
+)
 from ecu.estimation.friction import SECONDS_FOR_LEARNING, SIGMA_FOR_LEARNING
-from ecu.params import BAR, GRAVITY
+from ecu.params import BAR
 from ecu.records import RecordArray
-from ecu.signals import CORNERS, FAULT, N_OUTPUTS, OBSERVING, OUTPUT
-
-Vector = NDArray[np.float64]
+from ecu.signals import CORNERS, FAULT, HOLDING, OBSERVING, OUTPUT
 
 RELEASE_BAR: Final = 1.0  # an application lasts while a pressure is this much above p_0 (contract)
 SLOWEST: Final = 5.0 / 3.6  # m/s, end of the friction mean (contract)
-STANDING: Final = 0.3  # m/s, below: the vehicle stands
 PERIOD: Final = 0.01  # s, one row
 LEARNED: Final = "learned"
 
@@ -51,6 +56,10 @@ BRAKE_UNITS: Final = {
     "sigma_mu_b_end": "-",
     "observed": "s",
     "learning": "-",
+    # Beyond the contract: what the prediction is worth.
+    "sigma_decel_predicted": "m/s^2",
+    "learned_before": "-",
+    "left_out": "-",
 }
 
 
@@ -78,18 +87,11 @@ class BrakeRow(NamedTuple):
     observed: float
     learning: str
     """`LEARNED`, or why this application taught nothing."""
-
-
-def _corners(rows: Vector, name: str) -> Vector:
-    first = OUTPUT[f"{name}_fl"]
-    return rows[..., first : first + 4]
-
-
-def _mean(values: Vector, weights: Vector | None = None) -> float:
-    known = np.isfinite(values)
-    weights = np.ones_like(values) if weights is None else weights
-    total = float(weights[known].sum())
-    return float(values[known] @ weights[known]) / total if total > 0.0 else float("nan")
+    sigma_decel_predicted: float
+    learned_before: int
+    """1: the friction in the prediction was learned, 0: it is nominal."""
+    left_out: str
+    """Why the prediction does not count, empty where it does."""
 
 
 def friction_means(
@@ -114,30 +116,21 @@ def friction_means(
         return none
     part = slice(first, last)
     friction = torque[part] / (lever * (pressure[part] * BAR - p_0))
-    return _mean(friction, np.nan_to_num(speed[part])), _mean(friction)
-
-
-def predicted_deceleration(rows: Vector, friction: Vector, params: RecordArray) -> float:
-    """Return the mean deceleration [m/s^2] over `rows`, shape (n, N_ROW), with `friction`, shape (4,)."""
-    p = params[0]
-    speed = rows[:, OUTPUT["vehicle_speed"]]
-    pressure = np.maximum(_corners(rows, "calliper_pressure") * BAR - p["push_out_pressure"], 0.0)
-    motor = np.nan_to_num(rows[:, N_OUTPUTS : N_OUTPUTS + 4])
-    brake = 2.0 * p["piston_area"] * p["effective_radius"] * friction * pressure
-    force = ((brake + motor) / p["wheel_radius"]).sum(axis=1)
-    force = force + p["drag_area"] * speed**2 + p["rolling_resistance"] * p["mass"] * GRAVITY
-    return _mean(np.where(speed > STANDING, force / p["mass"], 0.0))
+    return mean(friction, np.nan_to_num(speed[part])), mean(friction)
 
 
 def _modes(rows: Vector, i: int) -> Vector:
-    return rows[:, OUTPUT["mode_fl"] + i]
+    return rows[..., OUTPUT["mode_fl"] + i]
 
 
-def learning(rows: Vector, i: int, params: RecordArray) -> str:
-    """Return `LEARNED` if corner i's estimate over `rows`, shape (n, N_ROW), was kept, else why not."""
+def learning(rows: Vector, i: int, params: RecordArray, against: str = "") -> str:
+    """Return `LEARNED` if corner i's estimate over `rows`, shape (n, N_ROW), was kept, else why not.
+
+    `against`: what `driven_against` says.
+    """
     p = params[0]
     observed = PERIOD * np.count_nonzero(_modes(rows, i) == OBSERVING)
-    sigma = _corners(rows[-1], "sigma_mu_b")[i] / _corners(rows[-1], "mu_b")[i]
+    sigma = corners(rows[-1], "sigma_mu_b")[i] / corners(rows[-1], "mu_b")[i]
     if observed >= SECONDS_FOR_LEARNING and sigma < SIGMA_FOR_LEARNING:
         return LEARNED
     if observed >= SECONDS_FOR_LEARNING:
@@ -152,23 +145,28 @@ def learning(rows: Vector, i: int, params: RecordArray) -> str:
         return "stands" if fastest < STANDING else f"slower than {3.6 * p['min_speed']:.0f} km/h"
     if strongest <= p["activation_decel"][i]:
         return f"below {p['activation_decel'][i]:.1f} m/s²"
-    return "held: ABS, ESP, accelerator or reverse, or slip too small or too large"
+    return against or "held: ABS, ESP, accelerator or reverse, or slip too small or too large"
 
 
-def application(number: int, t: Vector, rows: Vector, before: Vector, params: RecordArray) -> list[BrakeRow]:
+def application(number: int, t: Vector, rows: Vector, start: int, params: RecordArray) -> list[BrakeRow]:
     """Return the four rows of one application.
 
-    `t` [s] and `rows`, shapes (n,) and (n, N_ROW), are its own; `before`, shape (N_ROW,), precedes it.
+    `t` [s] and `rows`, shapes (n,) and (n, N_ROW), are its own from place `start` on and what precedes it.
     """
     p = params[0]
+    slope = slope_felt(t[:start], rows[:start])
+    before = rows[max(start - 1, 0)]
+    t, rows = t[start:], rows[start:]
     speed = rows[:, OUTPUT["vehicle_speed"]]
     duration = float(t[-1] - t[0]) + PERIOD
     known = speed[np.isfinite(speed)]
     v_in, v_end = (float(known[0]), float(known[-1])) if len(known) else (float("nan"), float("nan"))
-    predicted = predicted_deceleration(rows, _corners(before, "mu_b"), params)
-    torque, pressure = _corners(rows, "brake_torque"), _corners(rows, "calliper_pressure")
-    slip, heat = np.nan_to_num(_corners(rows, "slip")), _corners(rows, "disc_temperature")
-    worn = _corners(rows[-1], "pad_wear_mass") - _corners(before, "pad_wear_mass")
+    decel = max((v_in - v_end) / duration, 0.0)
+    prediction = predict(rows, before, slope, params)
+    against = driven_against(rows, prediction)
+    torque, pressure = corners(rows, "brake_torque"), corners(rows, "calliper_pressure")
+    slip, heat = np.nan_to_num(corners(rows, "slip")), corners(rows, "disc_temperature")
+    worn = corners(rows[-1], "pad_wear_mass") - corners(before, "pad_wear_mass")
     lines = []
     for i, corner in enumerate(CORNERS):
         lever = float(2.0 * p["piston_area"][i] * p["effective_radius"][i])
@@ -184,54 +182,60 @@ def application(number: int, t: Vector, rows: Vector, before: Vector, params: Re
                 duration,
                 v_in,
                 v_end,
-                max((v_in - v_end) / duration, 0.0),
-                predicted,
+                decel,
+                prediction.decel,
                 mu_distance,
                 mu_time,
-                _mean(torque[:, i]),
-                _mean(power) * duration,
+                mean(torque[:, i]),
+                mean(power) * duration,
                 float(heat[0, i]),
-                _mean(heat[:, i]),
+                mean(heat[:, i]),
                 float(worn[i]),
                 float("nan"),
-                float(_corners(rows[-1], "mu_b")[i]),
-                float(_corners(rows[-1], "sigma_mu_b")[i]),
+                float(corners(rows[-1], "mu_b")[i]),
+                float(corners(rows[-1], "sigma_mu_b")[i]),
                 PERIOD * float(np.count_nonzero(_modes(rows, i) == OBSERVING)),
-                learning(rows, i, params),
+                learning(rows, i, params, against),
+                prediction.sigma,
+                int(_modes(before, i) == HOLDING),
+                left_out(duration, decel, against, prediction.decel),
             )
         )
     return lines
 
 
 class BrakeBook:
-    """Collects applications from rows that come in blocks; it keeps only the rows of the one that lasts."""
+    """Collects applications from rows that come in blocks; it keeps only the rows of the one that lasts and
+    those just before."""
 
     def __init__(self, params: RecordArray) -> None:
         self.rows: list[BrakeRow] = []
         self._params = params
         self._t: Vector = np.empty(0)
         self._rows: Vector = np.empty((0, 0))
+        self._done = 0
+        """So many of the rows kept are no part of an application to come."""
 
     def add(self, t: Vector, rows: Vector) -> None:
         """Add rows that follow the last: `t` [s], shape (n,), and `rows`, shape (n, N_ROW)."""
         if len(self._t):
             t, rows = np.concatenate((self._t, t)), np.concatenate((self._rows, rows))
-        braking = rows[:, OUTPUT["braking"]] == 1.0
-        edges = np.flatnonzero(np.diff(braking, prepend=False))
+        braking = rows[self._done :, OUTPUT["braking"]] == 1.0
+        edges = self._done + np.flatnonzero(np.diff(braking, prepend=False))
         for start, end in zip(edges[0::2], edges[1::2], strict=False):
-            self._close(t, rows, int(start), int(end))
-        kept = max(int(edges[-1]) - 1, 0) if len(edges) % 2 else max(len(t) - 1, 0)
-        self._t, self._rows = t[kept:].copy(), rows[kept:].copy()
+            self._close(t[:end], rows[:end], int(start))
+        done = int(edges[-1]) if len(edges) % 2 else len(t)
+        kept = max(done - SLOPE_ROWS, 0)
+        self._t, self._rows, self._done = t[kept:].copy(), rows[kept:].copy(), done - kept
 
     def end_log(self) -> None:
         """End a log: an application that still lasts ends with it, and the next row follows nothing."""
-        if len(self._t) and self._rows[-1, OUTPUT["braking"]] == 1.0:
-            start = int(self._rows[0, OUTPUT["braking"]] != 1.0)
-            self._close(self._t, self._rows, start, len(self._t))
+        if self._done < len(self._t):
+            self._close(self._t, self._rows, self._done)
             self.rows[-4:] = [row._replace(learning="the log ends first") for row in self.rows[-4:]]
-        self._t, self._rows = np.empty(0), np.empty((0, 0))
+        self._t, self._rows, self._done = np.empty(0), np.empty((0, 0)), 0
 
-    def _close(self, t: Vector, rows: Vector, start: int, end: int) -> None:
+    def _close(self, t: Vector, rows: Vector, start: int) -> None:
         number = len(self.rows) // len(CORNERS)
-        before = rows[max(start - 1, 0)]
-        self.rows += application(number, t[start:end], rows[start:end], before, self._params)
+        known = max(start - SLOPE_ROWS, 0)
+        self.rows += application(number, t[known:], rows[known:], start - known, self._params)

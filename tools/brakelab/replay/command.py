@@ -14,10 +14,11 @@ from brakelab.outputs import check_outputs
 from brakelab.replay.engine import Rows, new_ecu
 from brakelab.replay.log import kind_of, log_hash, log_size, replay_log
 from brakelab.replay.needed import NEEDED, fault_lines, needed_lines, nothing_usable
+from brakelab.replay.prediction import SHORT
 from brakelab.replay.progress import progress_bar
 from brakelab.replay.quality import Findings, quality_counts, quality_lines
 from brakelab.replay.source import load_source, map_unused
-from brakelab.replay.summary import SHORT, brakings_table, taps
+from brakelab.replay.summary import brakings_table, prediction_lines, taps
 from brakelab.results import ResultWriter, brakes_path
 from ecu import __version__
 from ecu.bus.receive import ReceivePlan
@@ -158,6 +159,8 @@ def _tell(
         print("no braking in this drive")
     if short:
         print(f"{short} applications shorter than {SHORT} s are in {brakes_path(writer.path).name} only")
+    for line in prediction_lines(brakings):
+        print(line)
     frames = sum(found.log.frames for found in findings)
     samples = sum(found.signals.samples for found in findings)
     print(f"{writer.path}: {writer.rows} rows from {frames} frames and {samples} samples")

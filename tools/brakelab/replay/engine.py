@@ -17,14 +17,15 @@ from ecu.bus.freshness import accept, begin_cycle, end_cycle
 from ecu.bus.receive import ReceivePlan, Reception, receive
 from ecu.jit import Record, kernel
 from ecu.records import CYCLE, FRAME, INPUTS, OUTPUTS, RecordArray, new_record, output_vector
-from ecu.signals import CYCLE_NS, MOTOR_TORQUE, N_OUTPUTS, USABLE
+from ecu.signals import ACCELERATOR_POSITION, CYCLE_NS, MOTOR_TORQUE, N_OUTPUTS, USABLE
 from ecu.step import new_state, step
 
 Vector = NDArray[np.float64]
 Block = TypeVar("Block")
 
-N_ROW: Final = N_OUTPUTS + 4
-"""A row: the outputs as a vector, then the four motor torques as received [N m], NaN where not usable."""
+MEASURED_INPUTS: Final = (*range(MOTOR_TORQUE, MOTOR_TORQUE + 4), ACCELERATOR_POSITION)
+N_ROW: Final = N_OUTPUTS + len(MEASURED_INPUTS)
+"""A row: the outputs as a vector, then `MEASURED_INPUTS` as received, NaN where not usable."""
 BLOCK_CYCLES: Final = 4096
 
 _EVERYTHING: Final = 1 << 62
@@ -73,9 +74,10 @@ def _close_cycle(
     end_cycle(inputs[0], freshness)
     step(params, state, inputs, outputs)
     row[:N_OUTPUTS] = vector
-    for i in range(4):
-        usable = inputs[0].verdict[MOTOR_TORQUE + i] & USABLE == USABLE
-        row[N_OUTPUTS + i] = inputs[0].value[MOTOR_TORQUE + i] if usable else np.nan
+    for i in range(len(MEASURED_INPUTS)):
+        place = MEASURED_INPUTS[i]
+        usable = inputs[0].verdict[place] & USABLE == USABLE
+        row[N_OUTPUTS + i] = inputs[0].value[place] if usable else np.nan
 
 
 @kernel

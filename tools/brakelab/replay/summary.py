@@ -1,17 +1,16 @@
-"""The table of brakings that `replay` prints: one line per application, one column of friction per axle."""
+"""What `replay` prints of the brakings: a line for each, and how well they were predicted."""
 
 import math
+from collections import Counter
 from collections.abc import Sequence
-from typing import Final
 
 from rich.box import SIMPLE
 from rich.table import Table
 
 from brakelab.replay.brakes import LEARNED, BrakeRow
+from brakelab.replay.prediction import SHORT, errors
 from ecu.estimation.friction import GREATEST_RATIO, LEAST_RATIO
 from ecu.signals import CORNERS
-
-SHORT: Final = 0.5  # s
 
 
 def brakings_table(rows: Sequence[BrakeRow], nominal: Sequence[float]) -> Table:
@@ -45,6 +44,32 @@ def brakings_table(rows: Sequence[BrakeRow], nominal: Sequence[float]) -> Table:
 def taps(rows: Sequence[BrakeRow]) -> int:
     """Return how many applications in `rows` are too short for the table."""
     return sum(row.duration < SHORT for row in rows[:: len(CORNERS)])
+
+
+def prediction_lines(rows: Sequence[BrakeRow]) -> list[str]:
+    """Return how far the predictions of the applications in `rows` were off, and which do not count."""
+    ones = rows[:: len(CORNERS)]
+    learned = [any(row.learned_before for row in rows[k : k + 4]) for k in range(0, len(rows), len(CORNERS))]
+    counted = [k for k, row in enumerate(ones) if not row.left_out]
+    found = errors(
+        [ones[k].decel_mean for k in counted],
+        [ones[k].decel_predicted for k in counted],
+        [learned[k] for k in counted],
+    )
+    told = "prediction: no braking to judge it by"
+    if found.counted:
+        shares = f"{100 * found.median:.1f} % in the median, {100 * found.worst:.1f} % at worst"
+        told = f"prediction of {found.counted} brakings: off by {shares}, bias {100 * found.bias:+.1f} %"
+    if found.nominal:
+        told += f"; {found.nominal} with nominal friction, as nothing was learned before"
+    why = Counter(row.left_out for row in ones if row.left_out)
+    if not why:
+        return [told]
+    return [
+        told,
+        "left out of the prediction: "
+        + ", ".join(f"{count} {reason}" for reason, count in why.most_common()),
+    ]
 
 
 def _number(value: float, digits: int) -> str:

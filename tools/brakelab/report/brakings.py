@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.replay.summary import SHORT
+from brakelab.replay.prediction import SHORT, left_out
 from brakelab.report.drive import Drive, Vector, numbers, read_parquet
 from ecu.errors import UserError
 from ecu.signals import CORNERS
@@ -38,6 +38,12 @@ class Braking(NamedTuple):
     """Of the discs at the start [degC], shape (4,)."""
     energy: float
     """Into the four brakes [J]."""
+    sigma: float
+    """Standard deviation of `predicted`; NaN: not known."""
+    learned: float
+    """Share of the corners whose friction had been learned before; NaN: not known."""
+    left_out: str
+    """Why the prediction does not count, empty where it does."""
 
 
 def brakes_path(result: Path) -> Path:
@@ -86,6 +92,8 @@ def _from_file(drive: Drive, path: Path) -> list[Braking]:
         return np.full(len(brake), np.nan)
 
     friction, temperature, energy = map(optional, ("mu_b_mean", "disc_temperature_in", "brake_energy"))
+    sigma, learned = map(optional, ("sigma_decel_predicted", "learned_before"))
+    told = table.column("left_out").to_pylist() if "left_out" in table.column_names else None
     found = []
     for number in np.unique(brake):
         rows = np.flatnonzero(brake == number)
@@ -98,7 +106,9 @@ def _from_file(drive: Drive, path: Path) -> list[Braking]:
         )
         braking = Braking(
             0, t_start, t_start + duration, v_in, v_end, float("nan"), achieved, predicted,
-            friction[order], temperature[order], float(energy[order].sum()),
+            friction[order], temperature[order], float(energy[order].sum()), float(sigma[order[0]]),
+            float(learned[order].mean()),
+            str(told[order[0]] or "") if told else left_out(duration, achieved, "", predicted),
         )  # fmt: skip
         found.append(braking._replace(demanded=_mean(_demand(drive)[inside(drive, braking)])))
     return found
@@ -128,6 +138,9 @@ def _from_result(drive: Drive) -> list[Braking]:
                 friction=np.array([_mean(friction[first:end, corner]) for corner in range(4)]),
                 temperature_in=temperature[first],
                 energy=float("nan"),
+                sigma=float("nan"),
+                learned=float("nan"),
+                left_out="no prediction",
             )
         )
     return found

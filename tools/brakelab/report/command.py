@@ -13,6 +13,7 @@ from brakelab.report.loop import plots_of_loop
 from brakelab.report.over_time import POINTS, plots_over_time
 from brakelab.report.page import fill
 from brakelab.report.per_braking import plots_per_braking
+from brakelab.report.prediction import plots_of_prediction, prediction_errors, prediction_rows
 from brakelab.report.summary import facts, faults, tiles
 from brakelab.report.timing import read_timing, spreads
 from ecu.errors import UserError
@@ -59,19 +60,23 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
     accuracy = None if true is None else accuracy_per_axle(drive, true, found)
     loop = None if timing is None else read_timing(timing)
     rows = [_row(braking) for braking in found]
+    predicted = prediction_errors(found)
     page = fill(
         {
             "over_time": plots_over_time(drive, true, found),
+            "prediction_plots": plots_of_prediction(found),
             "per_braking": plots_per_braking(found),
             "loop_plots": {} if loop is None else plots_of_loop(loop),
         },
         {
             "name": result.stem,
             "facts": facts(drive),
-            "tiles": tiles(drive, found, tracking(drive, true, found), accuracy, loop),
+            "tiles": tiles(drive, found, tracking(drive, true, found), predicted, accuracy, loop),
             "brakings": rows,
             "with_temperature": any(np.isfinite(row.temperature_front) for row in rows),
             "with_energy": any(np.isfinite(row.kilojoules) for row in rows),
+            "predictions": prediction_rows(found),
+            "prediction_errors": predicted,
             "accuracy": accuracy,
             "reduced": len(drive.t) > POINTS,
             "faults": faults(drive),

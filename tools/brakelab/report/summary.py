@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from brakelab.replay.prediction import Errors
 from brakelab.report.accuracy import AXLES, Accuracy
 from brakelab.report.brakings import Braking
 from brakelab.report.drive import Drive, Vector, start_ns
@@ -16,6 +17,7 @@ from ecu.diagnostics.faults import FAULTS
 # Beyond these a tile is marked: what an engineer would look into first.
 _HONEST_SHARE = 0.8
 _DEMAND_ERROR = 0.1
+_PREDICTION_ERROR = 0.1
 
 
 class FaultSeen(NamedTuple):
@@ -47,6 +49,7 @@ def tiles(
     drive: Drive,
     found: list[Braking],
     shares: list[float],
+    predicted: Errors,
     accuracy: dict[str, Accuracy] | None,
     timing: Timing | None,
 ) -> list[Tile]:
@@ -54,6 +57,8 @@ def tiles(
     shown = [_drive(drive), _brakings(found), *_friction(drive, accuracy)]
     if found:
         shown.append(_deceleration(shares))
+    if predicted.counted:
+        shown.append(_prediction(predicted))
     shown.append(_faults(drive))
     if timing is not None:
         late = spread(timing.lateness)
@@ -118,6 +123,12 @@ def _deceleration(shares: list[float]) -> Tile:
     mean, worst = float(known.mean()), float(known[np.argmax(np.abs(known))])
     note = f"steady deceleration; worst braking {signed_percent(worst, 1)} %"
     return Tile(title, signed_percent(mean, 1), "%", note, abs(worst) > _DEMAND_ERROR)
+
+
+def _prediction(found: Errors) -> Tile:
+    worst, bias = percent(found.worst, 1), signed_percent(found.bias, 1)
+    note = f"median of {found.counted}; worst {worst} %, bias {bias} %"
+    return Tile("Prediction error", percent(found.median, 1), "%", note, found.median > _PREDICTION_ERROR)
 
 
 def _faults(drive: Drive) -> Tile:

@@ -1,0 +1,161 @@
+"""How well the deceleration of each braking was predicted: rows of the table, errors and two plots.
+
+Where no sensor tells the friction, this is how an estimate is judged.
+"""
+
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from bokeh.models import ColumnDataSource, HoverTool, Range1d, SingleIntervalTicker
+from bokeh.models.annotations import BoxAnnotation, Span
+
+from brakelab.replay.prediction import Errors, errors
+from brakelab.report.brakings import Braking
+from brakelab.report.look import DEMAND, ESTIMATE, INK, QUIET, new_figure
+
+BAND: Final = 0.05
+HEIGHT: Final = 300
+_BAND_ALPHA: Final = 0.14
+
+
+class Row(NamedTuple):
+    """A line of the table; decelerations in m/s^2."""
+
+    number: int
+    measured: float
+    predicted: float
+    sigma: float
+    error: float
+    """Predicted over measured, less 1."""
+    sigma_error: float
+    friction: str
+    """Where the friction in the prediction came from."""
+    left_out: str
+
+
+def prediction_rows(found: list[Braking]) -> list[Row]:
+    """Return a row for each braking, none where nothing was predicted."""
+    if not any(np.isfinite(braking.predicted) for braking in found):
+        return []
+    return [
+        Row(
+            braking.number,
+            braking.achieved,
+            braking.predicted,
+            braking.sigma,
+            *_share(braking),
+            _origin(braking.learned),
+            braking.left_out,
+        )
+        for braking in found
+    ]
+
+
+def _share(braking: Braking) -> tuple[float, float]:
+    if braking.left_out:
+        return float("nan"), float("nan")
+    return braking.predicted / braking.achieved - 1.0, braking.sigma / braking.achieved
+
+
+def _origin(learned: float) -> str:
+    if np.isnan(learned):
+        return "–"
+    return "learned" if learned == 1.0 else "nominal" if learned == 0.0 else "learned in part"
+
+
+def prediction_errors(found: list[Braking]) -> Errors:
+    """Return the errors of the predictions that count."""
+    counted = [braking for braking in found if not braking.left_out]
+    return errors(
+        [braking.achieved for braking in counted],
+        [braking.predicted for braking in counted],
+        [braking.learned != 0.0 for braking in counted],
+    )
+
+
+def plots_of_prediction(found: list[Braking]) -> dict[str, Any]:
+    """Return predicted over measured and error over number by name; empty where no prediction counts."""
+    counted = [row for row in prediction_rows(found) if not row.left_out]
+    if not counted:
+        return {}
+    rest = [row for row in prediction_rows(found) if row.left_out]
+    source, others = _source(counted), _source(rest)
+    return {
+        "prediction": _over_measured(source, others),
+        "prediction-error": _over_number(source, len(found)),
+    }
+
+
+def _source(rows: list[Row]) -> ColumnDataSource:
+    numbers = np.array([row[:6] for row in rows], float).reshape(-1, 6)
+    number, measured, predicted, sigma, error, sigma_error = numbers.T
+    return ColumnDataSource(
+        {
+            "number": number, "measured": measured, "predicted": predicted, "error": 100.0 * error,
+            "low": predicted - 2.0 * sigma, "high": predicted + 2.0 * sigma,
+            "error_low": 100.0 * (error - 2.0 * sigma_error),
+            "error_high": 100.0 * (error + 2.0 * sigma_error),
+            "friction": [row.friction for row in rows], "left_out": [row.left_out for row in rows],
+        }
+    )  # fmt: skip
+
+
+def _over_measured(source: ColumnDataSource, others: ColumnDataSource) -> Any:
+    end = _reach(source, ("measured", "predicted"), "high")
+    spans = [Range1d(start=0.0, end=end) for _ in range(2)]
+    plot = _figure("Measured [m/s²]", "Predicted [m/s²]", x_range=spans[0], y_range=spans[1])
+    plot.varea(
+        [0.0, end], [0.0, (1.0 - BAND) * end], [0.0, (1.0 + BAND) * end], fill_color=DEMAND,
+        fill_alpha=_BAND_ALPHA, legend_label=f"±{100 * BAND:.0f} %",
+    )  # fmt: skip
+    plot.line([0.0, end], [0.0, end], line_color=INK, line_dash="dashed", legend_label="1:1")
+    _points(plot, source, "measured", "predicted", "low", "high")
+    if len(others.data["number"]):
+        shown = plot.scatter(
+            "measured", "predicted", source=others, marker="x", size=8, line_color=QUIET, line_width=1.6,
+            legend_label="left out",
+        )  # fmt: skip
+        _hover(plot, shown, [("left out", "@left_out")])
+    return plot
+
+
+def _over_number(source: ColumnDataSource, count: int) -> Any:
+    largest = max(_reach(source, ("error",), "error_low", "error_high"), 200.0 * BAND)
+    along, across = Range1d(start=0.5, end=count + 0.5, bounds="auto"), Range1d(start=-largest, end=largest)
+    plot = _figure("Braking", "Predicted over measured − 1 [%]", x_range=along, y_range=across)
+    plot.xaxis.ticker = SingleIntervalTicker(interval=max(1, -(-count // 15)))
+    plot.xgrid.grid_line_color = None
+    plot.add_layout(
+        BoxAnnotation(bottom=-100.0 * BAND, top=100.0 * BAND, fill_color=DEMAND, fill_alpha=_BAND_ALPHA,
+                      line_color=None)
+    )  # fmt: skip
+    plot.add_layout(Span(location=0.0, dimension="width", line_color=INK, line_dash="dashed"))
+    _points(plot, source, "number", "error", "error_low", "error_high")
+    return plot
+
+
+def _reach(source: ColumnDataSource, points: tuple[str, ...], *bars: str) -> float:
+    """Return how far an axis goes to show all points and nine in ten of the bars."""
+    farthest = max(float(np.abs(np.asarray(source.data[name])).max()) for name in points)
+    ends = np.abs(np.concatenate([np.asarray(source.data[name]) for name in bars]))
+    return 1.08 * max(farthest, float(np.quantile(ends, 0.9)) if np.isfinite(ends).all() else 0.0)
+
+
+def _figure(x_label: str, y_label: str, **ranges: Range1d) -> Any:
+    tools = "pan,box_zoom,reset,save"
+    return new_figure(x_label, y_label, height=HEIGHT, tools=tools, active_drag="box_zoom", **ranges)
+
+
+def _points(plot: Any, source: ColumnDataSource, x: str, y: str, low: str, high: str) -> None:
+    if np.isfinite(source.data[low]).any():
+        plot.segment(x, low, x, high, source=source, line_color=ESTIMATE, line_alpha=0.45, legend_label="±2σ")
+    shown = plot.scatter(
+        x, y, source=source, size=8, line_color=ESTIMATE, fill_color=ESTIMATE, fill_alpha=0.85,
+        legend_label="brakings",
+    )  # fmt: skip
+    _hover(plot, shown, [("error", "@error{+0.0} %"), ("friction", "@friction")])
+
+
+def _hover(plot: Any, shown: Any, more: list[tuple[str, str]]) -> None:
+    values = [(name, f"@{name}{{0.00}} m/s²") for name in ("measured", "predicted")]
+    plot.add_tools(HoverTool(renderers=[shown], tooltips=[("braking", "@number"), *values, *more]))
