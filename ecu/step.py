@@ -39,7 +39,14 @@ from ecu.estimation.friction import (
 )
 from ecu.estimation.joint.kalman import GATE
 from ecu.estimation.joint.layout import JOINT_STATE, MU, STIFFNESS, V
-from ecu.estimation.joint.learned import keep_joint, publish_friction, restore_joint, settle_friction
+from ecu.estimation.joint.learned import (
+    begin_course,
+    keep_joint,
+    publish_friction,
+    restore_joint,
+    settle_friction,
+    take_mean,
+)
 from ecu.estimation.joint.observer import update_joint
 from ecu.estimation.motion import MOTION_STATE, update_motion, usable
 from ecu.estimation.observer2 import OBSERVER_STATE
@@ -150,6 +157,8 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
 def _estimate(p: Record, s: Record, u: Record, dt: float) -> None:
     update_application(p, s.application, u, dt)
     if s.application.ended:
+        if p.observer == JOINT:
+            take_mean(p, s.joint, s.friction)
         hand_over(s.friction, s.learned)
     if s.application.started:
         reset_force(s.force)
@@ -171,6 +180,7 @@ def _observe_jointly(p: Record, s: Record, u: Record, braking: bool, dt: float) 
     if s.application.started:
         for i in range(4):
             joint.p[MU + i, MU + i] += heat_widening(s.discs, i) ** 2
+        begin_course(joint)
     update_joint(p, joint, u, s.motion, s.wheel_load.load, s.limiter.pressure, braking, dt)
     if s.application.ended:
         settle_friction(p, joint, s.learned)

@@ -7,7 +7,19 @@ import pytest
 from ecu import __version__, cli, resources
 from ecu.errors import RunFault, UserError
 
-COMMANDS = ("run", "demo", "simulate", "replay", "play", "report", "compare", "map", "tune", "bench", "doctor")
+COMMANDS = (
+    "run",
+    "demo",
+    "simulate",
+    "replay",
+    "play",
+    "report",
+    "compare",
+    "map",
+    "tune",
+    "bench",
+    "doctor",
+)
 
 
 @pytest.mark.parametrize(

@@ -86,6 +86,8 @@ JOINT_STATE: Final = np.dtype(
         ("slip", "f8", (4,)),
         ("force", "f8", (4,)),  # N
         ("observed", "u1", (4,)),  # friction was corrected in the last window
+        ("way", "f8", (4,)),  # over which friction was observed in this braking [m]
+        ("course", "f8", (4,)),  # its integral over this way [m]
         ("ratio", "f8", (6,)),  # squared innovation over its variance: wheels, total force, speed reference
         ("reversing", "u1"),
         ("reset", "u1"),

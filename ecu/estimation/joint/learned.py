@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from ecu.estimation.friction import GREATEST_RATIO, LEAST_RATIO, resting_mode
+from ecu.estimation.friction import GREATEST_RATIO, LEAST_RATIO, resting_mode, worth_learning
 from ecu.estimation.joint.kalman import forget
 from ecu.estimation.joint.layout import (
     BIAS,
@@ -40,6 +40,7 @@ PAUSE[RADIUS : RADIUS + 4] = PAUSE[ROLLING] = 0.0003
 PAUSE[BIAS], PAUSE[MASS], PAUSE[DRAG] = 0.005, 0.005, 0.02
 PAUSE[DELAY] = 0.001
 MU_PAUSE = 0.03
+SPREAD = 1.0 / 3.0  # variance of an even change over the square of its end
 TRANSFER_ERROR = 0.06  # of a load's change over the load at rest, as error of friction
 
 
@@ -85,6 +86,33 @@ def keep_joint(state: Record, learned: Record) -> None:
 @kernel
 def _at_bound(ratio: float) -> bool:
     return ratio < 1.001 * LEAST_RATIO or ratio > 0.999 * GREATEST_RATIO
+
+
+@kernel
+def begin_course(state: Record) -> None:
+    """Begin to note the friction of a braking."""
+    for i in range(4):
+        state.way[i] = state.course[i] = 0.0
+
+
+@kernel
+def take_mean(params: Record, state: Record, friction: Record) -> None:
+    """At the end of a braking let friction be its mean over the distance.
+
+    Friction changes within a braking as the pads heat and comes back until the next: its mean says more of
+    that one than its last value. How far it went stays in its variance. An estimate that is not sure stays:
+    its errors balance those of the other wheels.
+    """
+    for i in range(4):
+        if not worth_learning(friction, i):
+            return
+    for i in range(4):
+        mean = state.course[i] / state.way[i]
+        change = math.log(friction.mu[i] / mean)
+        state.x[MU + i] = math.log(mean / params.mu_nominal[i])
+        state.p[MU + i, MU + i] += SPREAD * change * change
+        friction.sigma[i] *= mean / friction.mu[i]
+        friction.mu[i] = mean
 
 
 @kernel
@@ -148,6 +176,8 @@ def publish_friction(
         friction.mu[i], friction.sigma[i] = mu, mu * math.sqrt(variance)
         if braking and state.observed[i]:
             friction.observed_s[i] += dt
+            state.way[i] += state.x[V] * dt
+            state.course[i] += mu * state.x[V] * dt
             friction.mode[i] = OBSERVING
         else:
             good = usable(inputs, WHEEL_SPEED + i) and usable(inputs, CALLIPER_PRESSURE + i)

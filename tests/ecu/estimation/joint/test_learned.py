@@ -15,10 +15,12 @@ from ecu.estimation.joint.layout import BIAS, JOINT_STATE, MASS, MU, OFFSET, RAT
 from ecu.estimation.joint.learned import (
     MU_PAUSE,
     PAUSE,
+    begin_course,
     keep_joint,
     publish_friction,
     restore_joint,
     settle_friction,
+    take_mean,
 )
 from ecu.estimation.joint.observer import WINDOW_S
 from ecu.estimation.joint.prior import set_prior
@@ -205,6 +207,40 @@ def test_settled_friction_is_base_of_the_next_braking_where_nothing_was_learned(
     settle_friction(SUV, state, learned)
     np.testing.assert_array_equal(state["x"][FRICTION], 0.0)
     assert (sigma(state)[FRICTION] > 0.1).all()
+
+
+@pytest.mark.parametrize(("first", "last"), [(0.33, 0.41), (0.45, 0.45), (0.50, 0.42)])
+def test_a_braking_leaves_the_mean_of_its_friction_over_the_distance(params, feed, first, last) -> None:
+    """Friction changes evenly over the distance of a stop; half way it has its mean."""
+    state, friction = driven(8), np.zeros(1, FRICTION_STATE)[0]
+    at_rest, learned, inputs = SUV["static_load"].copy(), np.zeros(1, LEARNED)[0], feed()[0]
+    state["x"][RATE], state["window"]["time"] = 0.0, -0.5 * WINDOW_S
+    state["observed"] = 1
+    state["p"][FRICTION, FRICTION] = 0.05**2
+    variance = np.diag(state["p"]).copy()
+    begin_course(state)
+    decel, speed, distance = 4.0, 25.0, 0.0
+    whole = speed**2 / (2 * decel)
+    while speed > 0.0:
+        mu = first + (last - first) * distance / whole
+        state["x"][FRICTION] = np.log(mu / SUV["mu_nominal"])
+        state["x"][V] = speed
+        publish_friction(SUV, state, friction, learned, inputs, at_rest, True, 0.01)
+        distance += speed * 0.01
+        speed -= decel * 0.01
+    unsure = state.copy()
+    take_mean(SUV, state, friction)
+    mean = 0.5 * (first + last)
+    assert SUV["mu_nominal"] * np.exp(state["x"][FRICTION]) == pytest.approx([mean] * 4, rel=2e-3)
+    assert friction["mu"] == pytest.approx([mean] * 4, rel=2e-3)
+    spread = np.log(last / mean) ** 2 / 3
+    added = (np.diag(state["p"]) - variance)[FRICTION]
+    assert added == pytest.approx([spread] * 4, rel=0.05, abs=1e-7)
+
+    friction["sigma"][2] = 0.2 * friction["mu"][2]
+    last_value = unsure["x"].copy()
+    take_mean(SUV, unsure, friction)
+    np.testing.assert_array_equal(unsure["x"], last_value)
 
 
 @pytest.mark.parametrize("ratio", [0.7, 1.0, 1.2, LEAST_RATIO, GREATEST_RATIO])
