@@ -98,7 +98,8 @@ class Observer(_Section):
     relaxation_length: Positive = 0.25
     cornering_stiffness: Positive = 15.0
     min_speed: Positive = 15 / 3.6
-    rls_forgetting: Share = 0.93
+    rls_forgetting: Share = 0.7
+    """Of K_f, per 10 ms: tyre and road may change within 100 ms (section 4.6)."""
     mu_drift: Positive = 0.02
     """Random walk of friction, 1/sqrt(s)."""
     omega_walk: Positive = 2.0

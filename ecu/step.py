@@ -109,7 +109,7 @@ def new_state(params: RecordArray, learned: RecordArray | None = None) -> Record
     else:
         row["learned"] = learned[0]
     row["control"]["mu_override"] = math.nan
-    row["force"]["k_f"] = 1.0
+    row["force"]["k_f"] = row["force"]["stiffness"] = 1.0
     _begin(params, state)
     return state
 
@@ -204,7 +204,7 @@ def _observe_by_wheel(p: Record, s: Record, u: Record, braking: bool, dt: float)
     if s.speed.started:
         learn_radius(p, s.wheels, s.learned, s.motion, u, s.speed, braking, dt)
     regress = braking and s.speed.speed > p.min_speed and usable(u, ACCEL_X)
-    update_force(p, s.force, s.wheels, s.wheel_load.load, regress)
+    update_force(p, s.force, s.motion, s.wheels, s.wheel_load.load, regress, dt)
     if p.observer == OBSERVER1:
         take_measured_force(s.force, u)
     update_friction(

@@ -17,12 +17,14 @@ import math
 
 import numpy as np
 
+from ecu.control.demand import requested_decel
 from ecu.estimation.motion import motor_torque, motor_torque_known, usable
 from ecu.estimation.observer2 import (
     correct_force,
     correct_omega,
     observer_sound,
     predict_observer,
+    process_noise,
     start_observer,
 )
 from ecu.estimation.slip import CUT_OFF
@@ -181,6 +183,8 @@ def update_friction(
     _guard_slip(state, wheels, application, dt)
     hold_all = _hold_all(inputs) or state.slipping != 0
     state.reset = 0
+    asked = requested_decel(params, inputs)
+    noise = process_noise(asked if math.isfinite(asked) else -motion.accel_x, speed.speed)
     for i in range(4):
         above = state.pressure[i]
         scale = FORGET_WITHIN if state.active[i] else 1.0
@@ -190,7 +194,7 @@ def update_friction(
             and not hold_all
             and above > scale * MIN_PRESSURE
             and speed.speed > params.min_speed
-            and force.residual < RESIDUAL_LIMIT**2
+            and (force.measured[i] != 0 or force.residual < RESIDUAL_LIMIT**2)
             and -motion.accel_x > scale * params.activation_decel[i]
             and wheels.slip[i] < POSITIVE_SLIP
         )
@@ -210,7 +214,7 @@ def update_friction(
             sigma = max(state.sigma[i], 0.5 * params.sigma_mu_initial * params.mu_nominal[i])
             start_observer(observer, i, inputs.value[WHEEL_SPEED + i], force.virtual[i], start, sigma)
         if state.active[i]:
-            _observe(params, state, observer, inputs, wheels, load, force, speed, i, dt)
+            _observe(params, state, observer, inputs, wheels, load, force, speed, noise, i, dt)
             state.mode[i] = OBSERVING
             state.observed_s[i] += dt
         else:
@@ -251,18 +255,19 @@ def _observe(
     load: Record,
     force: Record,
     speed: Record,
+    noise: float,
     i: int,
     dt: float,
 ) -> None:
     radius = wheels.radius[i]
     rolling = params.rolling_resistance * load[i] * radius
     outer = motor_torque(inputs, i) + rolling
-    stiffness = force.k_f * slip_stiffness(params, i, load[i], wheels.expected_force[i])
+    stiffness = force.k_f * force.stiffness * slip_stiffness(params, i, load[i], wheels.expected_force[i])
     slip_noise = params.sigma_wheel_speed * radius / max(speed.speed, 1.0)
     variance = TRANSDUCER_NOISE**2 if force.measured[i] else (stiffness * slip_noise) ** 2
     predict_observer(
         params, observer, i, max(state.pressure[i], 0.0), outer, force.virtual[i], variance, radius,
-        load[i], speed.speed, params.mu_drift, dt,
+        load[i], speed.speed, params.mu_drift, noise, dt,
     )  # fmt: skip
     if wheels.fresh[i]:
         correct_omega(observer, i, inputs.value[WHEEL_SPEED + i], params.sigma_wheel_speed**2)

@@ -12,6 +12,10 @@ Inputs        calliper pressure p, motor torque T_m (positive regenerates), roll
 Discretised exactly for F_L (10 ms is twice the relaxation time at 30 m/s: explicit Euler would diverge) and
 with the mean of F_L over the step for omega. The tyre model enters already scaled by K_f, so model and
 measurement agree. The pressure is low-passed at the slip's 16 Hz: all signals lag alike.
+
+The process noise of omega and F_L is scheduled (section 4.4): its standard deviation grows linearly below
+2 m/s^2 of demanded deceleration, to three times at none, and likewise below 30 km/h, where the model fails at
+predicting the states. The breakpoint of speed and the growth are assumptions.
 """
 
 import math
@@ -31,6 +35,16 @@ OBSERVER_STATE = np.dtype(
 )
 
 GATE = 4.0
+LOW_DECEL, LOW_SPEED = 2.0, 30.0 / 3.6  # m/s^2, m/s
+GROWTH = 2.0
+
+
+@kernel
+def process_noise(decel: float, speed: float) -> float:
+    """Return the factor on process noise (standard deviation) at a deceleration [m/s^2] and speed [m/s]."""
+    gentle = 1.0 - min(max(decel / LOW_DECEL, 0.0), 1.0)
+    slow = 1.0 - min(max(speed / LOW_SPEED, 0.0), 1.0)
+    return 1.0 + GROWTH * max(gentle, slow)
 
 
 @kernel
@@ -54,11 +68,12 @@ def predict_observer(
     load: float,
     speed: float,
     drift: float,
+    noise: float,
     dt: float,
 ) -> None:
     """Advance wheel `i` by dt [s]; `pressure` above push-out [Pa], `outer_torque` T_m + M_R [N m].
 
-    `force_input` is F_L^(VS) [N] with the variance of its noise [N^2].
+    `force_input` is F_L^(VS) [N] with the variance of its noise [N^2]; `noise` from `process_noise`.
     """
     inertia = params.wheel_inertia[i]
     lever = 2.0 * params.piston_area[i] * params.effective_radius[i]
@@ -76,11 +91,13 @@ def predict_observer(
     p = state.p[i]
     ww, wf, wm, ff, fm, mm = p[0], p[1], p[2], p[3], p[4], p[5]
     pressure_noise = dt / inertia * lever * state.mu[i] * params.sigma_pressure
-    walk = params.omega_walk**2 * dt + pressure_noise**2
+    walk = (noise * params.omega_walk) ** 2 * dt + pressure_noise**2
     p[0] = ww + a * a * ff + b * b * mm + 2.0 * (a * wf + b * wm + a * b * fm) + walk
     p[1] = keep * (wf + a * ff + b * fm)
     p[2] = wm + a * fm + b * mm
-    p[3] = keep * keep * ff + (1.0 - keep) ** 2 * force_variance + (params.force_walk * load) ** 2 * dt
+    p[3] = (
+        keep * keep * ff + (1.0 - keep) ** 2 * force_variance + (noise * params.force_walk * load) ** 2 * dt
+    )
     p[4] = keep * fm
     p[5] = mm + drift * drift * dt
 

@@ -13,6 +13,7 @@ from ecu.signals import (
     CALLIPER_PRESSURE,
     FAULT,
     HOLDING,
+    INPUT,
     NOMINAL,
     OBSERVING,
     VALID,
@@ -34,7 +35,7 @@ class Stop:
     def __init__(self, params, feed, mu: float = 0.40) -> None:
         self.params, self.feed, self.inputs, self.mu = params[0], feed, feed(), mu
         self.s = np.zeros(1, STATE)[0]
-        self.s["force"]["k_f"] = 1.0
+        self.s["force"]["k_f"] = self.s["force"]["stiffness"] = 1.0
         self.s["wheels"]["radius"], self.s["wheels"]["fresh"] = RADIUS, 1
         self.s["speed"]["started"], self.s["wheel_load"]["load"] = 1, LOADS
         self.speed, self.decel = 25.0, 4.0
@@ -277,3 +278,25 @@ def test_motor_torque_is_not_taken_for_friction(params, feed, motor: float) -> N
     stop.motor = motor
     assert list(stop.run(3.0)) == [OBSERVING] * 4
     assert stop.s["friction"]["mu"] == pytest.approx(np.full(4, 0.40), rel=0.02)
+
+
+def test_process_noise_follows_the_deceleration_asked_for_or_the_measured_one(params, feed) -> None:
+    """Section 4.4. A gentle demand widens the filter; without a demand the car's 4 m/s^2 count."""
+    variances = []
+    for asked, usable in ((4.0, True), (0.5, True), (0.5, False)):
+        stop = Stop(params, feed)
+        stop.feed(stop.inputs, decel_demand=asked, decel_demand_valid=1.0)
+        if not usable:
+            stop.inputs[0]["verdict"][[INPUT["pedal_position"], INPUT["decel_demand"]]] = 0
+        stop.run(1.0)
+        variances.append(stop.s["observer"]["p"][0, 3])
+    hard, gentle, measured = variances
+    assert gentle > 1.5 * hard
+    assert measured == hard
+
+
+@pytest.mark.parametrize(("transducers", "mode"), [(0, HOLDING), (1, OBSERVING)])
+def test_strong_variations_of_k_f_stop_it_where_forces_are_not_measured(stop, transducers, mode) -> None:
+    stop.run(1.0)
+    stop.s["force"]["residual"], stop.s["force"]["measured"] = 0.4**2, transducers
+    assert list(stop.run(0.05)) == [mode] * 4

@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from ecu.estimation.friction import FRICTION_STATE, update_pressure
 from ecu.estimation.observer2 import (
     OBSERVER_STATE,
     correct_force,
     correct_omega,
     observer_sound,
     predict_observer,
+    process_noise,
     start_observer,
 )
 from ecu.estimation.slip import CUT_OFF
@@ -59,7 +61,9 @@ def estimate(state, i: int) -> np.ndarray:
 
 
 def predict(params, state, i, pressure, outer, force_in, speed, drift=0.02, variance=0.0) -> None:
-    predict_observer(params, state, i, pressure, outer, force_in, variance, RADIUS, LOAD, speed, drift, DT)
+    predict_observer(
+        params, state, i, pressure, outer, force_in, variance, RADIUS, LOAD, speed, drift, 1.0, DT
+    )
 
 
 def new(i: int, x, P=None):
@@ -150,27 +154,73 @@ def test_an_outlier_moves_the_state_by_at_most_four_standard_deviations(correct,
     np.testing.assert_allclose(moved[1], -limit, rtol=1e-6, atol=1e-8)
 
 
-def system_matrix(params, corner: int, pressure: float, speed: float) -> np.ndarray:
-    x = np.array([speed / RADIUS, -2000.0, 0.45])
+def system_matrices(params, corner: int, above: float, speed: float, mu: float):
+    """Return (A, C) of the code by differences; of a correction with P = I and no noise, 1 - K C is seen."""
+    x = np.array([speed / RADIUS, -2000.0, mu])
 
-    def own(y: np.ndarray) -> np.ndarray:
+    def predicted(y: np.ndarray) -> np.ndarray:
         trial = new(corner, y)
-        predict(params, trial, corner, pressure, 0.0, -2000.0, speed)
+        predict(params, trial, corner, above, 0.0, -2000.0, speed)
         return estimate(trial, corner)
 
-    return jacobian(own, x)
+    def measured(correct, z: float):
+        def corrected(y: np.ndarray) -> np.ndarray:
+            trial = new(corner, y, np.eye(3))
+            correct(trial, corner, z, 0.0)
+            return estimate(trial, corner)
+
+        return (np.eye(3) - jacobian(corrected, x)).sum(axis=0)
+
+    C = np.array([measured(correct_omega, x[0]), measured(correct_force, x[1])])
+    return jacobian(predicted, x), C
 
 
 @pytest.mark.parametrize("corner", [0, 2])
-@pytest.mark.parametrize("speed", [4.2, 10.0, 33.0, 70.0])
-@pytest.mark.parametrize(("bar", "rank"), [(0.0, 2), (1e-9, 2), (0.5, 3), (3.0, 3), (30.0, 3), (150.0, 3)])
-def test_friction_is_observable_if_and_only_if_pressure_acts(params, corner, speed, bar, rank) -> None:
-    """(4.37, corrected): rank of [C; CA; CA^2], states in units of their usual uncertainty."""
+@pytest.mark.parametrize(("speed", "mu"), [(4.2, 0.45), (33.0, 0.45), (33.0, 0.1), (33.0, 0.0), (70.0, 0.9)])
+@pytest.mark.parametrize(
+    ("bar", "rank"), [(0.0, 2), (0.4, 2), (0.5, 2), (0.6, 3), (3.0, 3), (30.0, 3), (150.0, 3)]
+)
+def test_friction_is_observable_if_and_only_if_pressure_exceeds_push_out(
+    params, feed, corner, speed, mu, bar, rank
+) -> None:
+    """(4.37, corrected): rank of [C; CA; CA^2], states in units of their usual uncertainty; any mu."""
+    friction = np.zeros(1, FRICTION_STATE)[0]
+    assert params[0]["push_out_pressure"][corner] == 0.5 * BAR
+    update_pressure(params[0], friction, feed(calliper_pressure=bar)[0], 1e3)  # long enough to settle
+    A, C = system_matrices(params[0], corner, max(float(friction["pressure"][corner]), 0.0), speed, mu)
     scale = np.diag([1.0, 1000.0, 0.1])
-    A = np.linalg.inv(scale) @ system_matrix(params[0], corner, bar * BAR, speed) @ scale
-    C = np.array([[1.0, 0, 0], [0, 1.0, 0]])
-    gramian = sum((M := C @ np.linalg.matrix_power(A, n)).T @ M for n in range(3))
-    assert np.linalg.matrix_rank(gramian, tol=1e-9) == rank
+    A, C = np.linalg.inv(scale) @ A @ scale, np.diag([1.0, 1e-3]) @ C @ scale
+    np.testing.assert_allclose(C, [[1, 0, 0], [0, 1, 0]], atol=1e-6)
+    matrix = np.vstack([C, C @ A, C @ A @ A])
+    assert np.linalg.matrix_rank(matrix, tol=1e-6) == rank
+
+
+@pytest.mark.parametrize(
+    ("decel", "speed", "factor"),
+    [
+        (4.0, 25.0, 1.0),
+        (2.0, 25.0, 1.0),
+        (1.0, 25.0, 2.0),
+        (0.0, 25.0, 3.0),
+        (-3.0, 25.0, 3.0),
+        (4.0, 30 / 3.6, 1.0),
+        (4.0, 15 / 3.6, 2.0),
+        (1.5, 15 / 3.6, 2.0),
+    ],
+)
+def test_process_noise_grows_for_gentle_and_for_slow_braking(params, decel, speed, factor) -> None:
+    """Section 4.4: more uncertainty below 2 m/s^2 and at low speed; friction's own walk stays."""
+    noise = process_noise(decel, speed)
+    assert noise == pytest.approx(factor)
+    variances = []
+    for each in (0.0, 1.0, noise):
+        state = new(0, np.array([90.0, -2000.0, 0.42]))
+        predict_observer(params[0], state, 0, 0.0, 0.0, -2000.0, 0.0, RADIUS, LOAD, 20.0, 0.02, each, DT)
+        variances.append(covariance(state, 0))
+    none, usual, scheduled = variances
+    for k, share in ((0, factor**2), (1, factor**2)):
+        assert scheduled[k, k] - none[k, k] == pytest.approx(share * (usual[k, k] - none[k, k]))
+    assert scheduled[2, 2] == none[2, 2] == pytest.approx(0.02**2 * DT)
 
 
 class Wheel:
@@ -212,7 +262,8 @@ class Wheel:
 @pytest.mark.parametrize("corner", [0, 2])
 @pytest.mark.parametrize("speed", [4.0, 8.0, 15.0, 25.0, 33.0, 50.0, 70.0])
 def test_it_is_stable_at_every_speed(params, corner: int, speed: float) -> None:
-    assert np.abs(np.linalg.eigvals(system_matrix(params[0], corner, 50 * BAR, speed))).max() <= 1.0 + 1e-9
+    A, _ = system_matrices(params[0], corner, 50 * BAR, speed, 0.45)
+    assert np.abs(np.linalg.eigvals(A)).max() <= 1.0 + 1e-9
     wheel = Wheel(params, 7, corner, speed, 0.0, 0.4, 40.0)
     rows = wheel.run(5.0, 0.5, 0.07)
     for x, P in rows:
@@ -221,8 +272,8 @@ def test_it_is_stable_at_every_speed(params, corner: int, speed: float) -> None:
     # Errors die away: a disturbed state comes back.
     assert rows[-1][0][2] == pytest.approx(0.4, rel=0.06)
     # The steady filter's error matrix (I - K C) A contracts.
-    P, A = rows[-1][1], system_matrix(params[0], corner, 40 * BAR, speed)
-    C, R = np.array([[1.0, 0, 0], [0, 1.0, 0]]), np.diag([0.01, params[0]["time_correlation"] * 250.0**2])
+    P, (A, C) = rows[-1][1], system_matrices(params[0], corner, 40 * BAR, speed, 0.45)
+    R = np.diag([0.01, params[0]["time_correlation"] * 250.0**2])
     K = P @ C.T @ np.linalg.inv(R)
     assert np.abs(np.linalg.eigvals((np.eye(3) - K @ C) @ A)).max() < 1.0
 

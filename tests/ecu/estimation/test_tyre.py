@@ -5,7 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from ecu.estimation.tyre import longitudinal_slip, rolling_radius, slip_stiffness
+from ecu.estimation.tyre import (
+    initial_stiffness,
+    longitudinal_slip,
+    rolling_radius,
+    slip_stiffness,
+    tyre_force,
+)
 
 RADIUS, STIFFNESS = 0.3705, 250e3
 
@@ -95,3 +101,53 @@ def test_the_secant_lies_between_a_brush_tyre_and_a_magic_formula(params, slip: 
     (brush_secant, in_brush), (magic_secant, in_magic) = secants
     assert brush_secant < in_brush
     assert in_magic < magic_secant
+
+
+@pytest.mark.parametrize("corner", [0, 2])
+@pytest.mark.parametrize("load", [2000.0, 5000.0, 8000.0])
+def test_small_slip_has_the_stiffness_and_the_secant_of_the_linear_tyre(params, corner, load) -> None:
+    start = initial_stiffness(params[0], corner, load)
+    step = 1e-7
+    slope = (tyre_force(start, load, step, 0.0) - tyre_force(start, load, -step, 0.0)) / (2 * step)
+    assert slope == pytest.approx(start, rel=1e-5)
+    for slip in (-0.03, -0.01, 0.02):
+        force = tyre_force(start, load, slip, 0.0)
+        assert force / slip == pytest.approx(slip_stiffness(params[0], corner, load, force), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("slip", "adhesion"),
+    [(-0.10, -1.112), (-0.17, -1.170), (-0.30, -1.123), (-0.50, -1.020), (-1.0, -0.760), (1.0, 0.760)],
+)
+def test_large_slip_is_that_of_dry_asphalt(params, slip: float, adhesion: float) -> None:
+    """Burckhardt's curve for dry asphalt, read off its table: peak 1.17 at 17 % of slip, locked 0.76."""
+    start = initial_stiffness(params[0], 0, 5000.0)
+    assert tyre_force(start, 5000.0, slip, 0.0) == pytest.approx(5000.0 * adhesion, rel=2e-3)
+
+
+def test_force_is_continuous_where_the_curves_meet(params) -> None:
+    start = initial_stiffness(params[0], 0, 5000.0)
+    force = np.array([tyre_force(start, 5000.0, -s, 0.0) for s in np.arange(0.0, 1.0, 1e-4)])
+    assert np.abs(np.diff(force)).max() <= start * 1e-4
+
+
+@pytest.mark.parametrize("accel_y", [-4.0, 2.0, 4.0])
+@pytest.mark.parametrize("slip", [-0.01, -0.02, -0.1, -1.0])
+def test_a_tyre_that_corners_holds_less_along(params, slip: float, accel_y: float) -> None:
+    """The force of the total slip, in its direction: along and across are the legs of a triangle."""
+    load = 5000.0
+    start = initial_stiffness(params[0], 0, load)
+    across = accel_y / 9.81 * load / start
+    both = tyre_force(start, load, math.sqrt(slip**2 + across**2), 0.0)
+    along = tyre_force(start, load, slip, accel_y)
+    assert along == pytest.approx(both * math.cos(math.atan2(abs(across), abs(slip))) * np.sign(slip))
+    assert 0 < along / tyre_force(start, load, slip, 0.0) < 1 or slip < -0.05
+
+
+def test_it_holds_the_side_force_that_the_slip_across_stands_for(params) -> None:
+    """Little braking in a curve of 1 m/s^2: the force across is m a_y but for the curve of the tyre."""
+    load = 5000.0
+    start = initial_stiffness(params[0], 0, load)
+    along = tyre_force(start, load, -1e-4, 1.0)
+    across = along / -1e-4 * (load / start / 9.81)
+    assert across == pytest.approx(load / 9.81, rel=0.03)

@@ -110,7 +110,7 @@ def filter_cycle(params: RecordArray, observer: RecordArray, table: RecordArray,
         given = table[k, i]
         predict_observer(
             car, state, i, given.pressure, given.outer_torque, given.force, given.force_variance,
-            given.radius, given.load, given.speed, car.mu_drift, DT,
+            given.radius, given.load, given.speed, car.mu_drift, 1.0, DT,
         )  # fmt: skip
         correct_omega(state, i, given.omega, car.sigma_wheel_speed**2)
         correct_force(state, i, given.force, car.time_correlation * given.force_variance)
