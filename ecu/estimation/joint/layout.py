@@ -74,6 +74,7 @@ JOINT_STATE: Final = np.dtype(
         ("started", "u1"),
         ("slides", "u1", (4,)),  # 1: the wheel is too far from the car's speed to tell it
         ("sliding", "i8"),  # number of such wheels
+        ("yields", "u1", (4,)),  # 1: so far from the car's speed that its torque does not tell its force
         ("releasing", "u1"),
         ("untrusted_s", "f8"),  # time since a wheel was last believed [s]
         ("hold_s", "f8"),  # no learning for this long, a wheel had left the tyre's range

@@ -41,11 +41,12 @@ from ecu.estimation.joint.prior import PRIOR, forget_rate, pressure_change, set_
 from ecu.estimation.joint.snapshot import go_back, keep, keep_newer
 from ecu.estimation.joint.wheel import brake_lever, predict_balance, predict_wheel
 from ecu.estimation.joint.window import close_window, gather, open_window
-from ecu.estimation.motion import mean_wheel_speed, usable
+from ecu.estimation.motion import fresh, mean_wheel_speed, usable
 from ecu.jit import Record, kernel
 from ecu.params import BAR
 from ecu.signals import (
     ABS_ACTIVE,
+    ACCEL_X,
     ESP_ACTIVE,
     REVERSE,
     WHEEL_SPEED,
@@ -57,6 +58,7 @@ APPLIED = 1.0  # bar above push-out: the brakes act
 STRAIGHT = 0.05  # lateral acceleration over gravity: more, and wheels roll by their own loads and angles
 MOTORS = 100.0  # N m of all motors: their torque is worth looking at
 LARGE_SLIP = 0.12
+YIELDING = 0.06  # slip from which the force along the car says more of a wheel's force than its torque
 SLIDING_FORCE = 0.3  # relative error of a sliding wheel's force if it is taken for its brake force
 SLIDING_FLOOR = 5.0  # m/s, that it is relative to at least
 BELIEVED_AFTER = 3.0  # s without a wheel that rolls, brakes released
@@ -165,6 +167,8 @@ def update_joint(
         state.x[V], state.p[V, V], state.reversing = mean_wheel_speed(params, inputs), 0.25, 0
         open_window(state)
     gather(params, state, inputs, motion, load, demand, dt)
+    if braking and usable(inputs, ACCEL_X):
+        _share_force(params, state, inputs, motion.accel_x, load)
     state.hold_s = max(state.hold_s - dt, 0.0)
     if state.window.time < WINDOW_S - 0.001:
         return
@@ -247,6 +251,25 @@ def _watch_tyres(state: Record, observing: bool) -> None:
     if observing and known and against > OTHER_TYRES * GATE * GATE:
         go_back(state)
         forget(state, STIFFNESS, PRIOR[STIFFNESS] ** 2)
+
+
+@kernel
+def _share_force(params: Record, state: Record, inputs: Record, accel: float, load: Record) -> None:
+    """Give the wheels that begin to slide, by their loads, the force along the car that the others leave."""
+    x = state.x
+    drag = math.exp(x[DRAG]) * params.drag_area * x[V] * abs(x[V])
+    left, loaded = math.exp(x[MASS]) * (params.mass * (accel - x[BIAS]) + drag), 0.0
+    for i in range(4):
+        rolled = inputs.value[WHEEL_SPEED + i] * params.wheel_radius[i]
+        if fresh(inputs, WHEEL_SPEED + i):
+            state.yields[i] = 1 if abs(rolled - x[V]) > YIELDING * max(x[V], rolled, SLIDING_FLOOR) else 0
+        if state.yields[i]:
+            loaded += load[i]
+        else:
+            left -= state.force[i]
+    for i in range(4):
+        if state.yields[i]:
+            state.force[i] = left * load[i] / loaded
 
 
 @kernel

@@ -157,6 +157,23 @@ def test_another_tyre_is_not_taken_for_another_friction(new_car, factor: float, 
     assert off[-1] < 0.02
 
 
+@pytest.mark.parametrize("wheels", [(0, 1), (2, 3), (0, 1, 2, 3)])
+def test_sliding_wheels_have_the_force_that_the_others_leave(new_car, wheels: tuple[int, ...]) -> None:
+    """What decelerates the car and is not the others' is theirs, shared by load, whatever their torque."""
+    car = new_car(quiet=True, speed=30.0)
+    car.drive(1.0)
+    car.drive(1.0, **BRAKING)
+    locked = dict.fromkeys(wheels, -0.8)
+    for state in car.cycles(0.5, **BRAKING, slide=locked):
+        pass
+    force, _ = car.forces(np.array([38.0, 38.0, 30.0, 30.0]), np.zeros(4), 0.0)
+    assert state["force"][list(wheels)].sum() == pytest.approx(force[list(wheels)].sum(), rel=0.03)
+    others = [i for i in range(4) if i not in wheels]
+    assert state["force"][others] == pytest.approx(force[others], rel=0.05)
+    share = car.load[list(wheels)] / car.load[list(wheels)].sum()
+    assert state["force"][list(wheels)] == pytest.approx(force[list(wheels)].sum() * share, rel=0.03)
+
+
 @pytest.mark.parametrize("wheel", [0, 3])
 @pytest.mark.parametrize("after", [2.0, 2.05, 2.1, 2.15])
 def test_a_wheel_that_begins_to_slide_takes_friction_back(new_car, after: float, wheel: int) -> None:
