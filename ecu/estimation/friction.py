@@ -2,8 +2,8 @@
 
 A corner observes while its pressure acts, the car is fast enough (15 km/h) and decelerates enough for its
 axle, the wheel stays in the tyre's linear range and every signal it needs is usable. It holds the last
-estimate otherwise, always while `abs_active` or `esp_active` is set, while the driver accelerates against
-the brakes and in reverse.
+estimate otherwise, always while `abs_active` or `esp_active` is set, while the driver accelerates or motors
+drive against the brakes, and in reverse.
 
 What one braking learned becomes the base of the next compensation only if it was observed for a second or
 more with a standard deviation below 10 % (`learned`). Friction stays within 0.5–1.5 of nominal.
@@ -76,6 +76,7 @@ SECONDS_FOR_LEARNING = 1.0
 TYRE_CURVE = 1.0  # relative error of the linear tyre per slip: 5 % at 5 % of slip
 SLIP_FLOOR = 0.0004  # error of slip that does not average out: radius, speed
 TRANSDUCER_NOISE = 10.0  # N, of a wheel force transducer (Table 4.1)
+DRIVEN = 0.2  # of the brakes' torque: motors that drive with more drive against the brakes
 HELD_GROWTH = 0.002  # growth of sigma while holding, 1/sqrt(s)
 
 
@@ -142,13 +143,24 @@ def driver_accelerates(inputs: Record) -> bool:
 
 
 @kernel
-def _hold_all(inputs: Record) -> bool:
+def drives_against(motors: float, brakes: float) -> bool:
+    """Return whether motors drive with more than a share of the brakes' torque; sums of the wheels [N m]."""
+    return motors < -DRIVEN * brakes
+
+
+@kernel
+def _hold_all(inputs: Record, torque: Record) -> bool:
     value = inputs.value
+    motors, brakes = 0.0, 0.0
+    for i in range(4):
+        motors += motor_torque(inputs, i)
+        brakes += torque[i]
     return (
         value[ABS_ACTIVE] > 0.5
         or value[ESP_ACTIVE] > 0.5
         or value[REVERSE] > 0.5
         or driver_accelerates(inputs)
+        or drives_against(motors, brakes)
     )
 
 
@@ -181,7 +193,7 @@ def update_friction(
 ) -> None:
     """Overwrite friction, its standard deviation and mode of every corner."""
     _guard_slip(state, wheels, application, dt)
-    hold_all = _hold_all(inputs) or state.slipping != 0
+    hold_all = _hold_all(inputs, state.torque) or state.slipping != 0
     state.reset = 0
     asked = requested_decel(params, inputs)
     noise = process_noise(asked if math.isfinite(asked) else -motion.accel_x, speed.speed)

@@ -6,7 +6,7 @@ car's longitudinal balance correct it. Which states they may correct depends on 
 friction braking   speed, frictions, tyre stiffness and peak, radii, slope; the rest is considered only
 motors alone       everything but friction and pressure offsets: known torque shows mass, drag, stiffness
 rolling            speed, radii, slope; bias and drag where motor torque is reported
-below 3.4 m/s, sliding, ABS, ESP, the driver accelerating against the brakes: speed and slope only
+below 3.4 m/s, sliding, ABS, ESP, driver or motors driving against the brakes: speed and slope only
 
 When a wheel runs past the tyre's range, or most wheels contradict the tyres that are known, all but the speed
 goes back to what was known 0.2 to 0.4 s before.
@@ -14,7 +14,12 @@ goes back to what was known 0.2 to 0.4 s before.
 
 import math
 
-from ecu.estimation.friction import GREATEST_RATIO, LEAST_RATIO, driver_accelerates
+from ecu.estimation.friction import (
+    GREATEST_RATIO,
+    LEAST_RATIO,
+    driver_accelerates,
+    drives_against,
+)
 from ecu.estimation.joint.kalman import GATE, clear_derivatives, correct, forget
 from ecu.estimation.joint.layout import (
     BIAS,
@@ -39,7 +44,7 @@ from ecu.estimation.joint.layout import (
 from ecu.estimation.joint.pressure import follows, learn_zero
 from ecu.estimation.joint.prior import PRIOR, forget_rate, pressure_change, set_prior, walk
 from ecu.estimation.joint.snapshot import go_back, keep, keep_newer
-from ecu.estimation.joint.wheel import brake_lever, predict_balance, predict_wheel
+from ecu.estimation.joint.wheel import brake_lever, brake_torque, predict_balance, predict_wheel
 from ecu.estimation.joint.window import close_window, gather, open_window
 from ecu.estimation.motion import fresh, mean_wheel_speed, usable
 from ecu.jit import Record, kernel
@@ -98,9 +103,13 @@ def _start_speed(params: Record, state: Record, inputs: Record) -> None:
 
 
 @kernel
-def _learning_forbidden(inputs: Record, braking: bool) -> bool:
-    value = inputs.value
-    against = braking and driver_accelerates(inputs)
+def _learning_forbidden(params: Record, state: Record, inputs: Record, braking: bool) -> bool:
+    value, w = inputs.value, state.window
+    motors, brakes = 0.0, 0.0
+    for i in range(4):
+        motors += w.motor[i]
+        brakes += brake_torque(params, state, i, w.pressure[i])
+    against = braking and (driver_accelerates(inputs) or drives_against(motors, brakes))
     forbidden: bool = against or value[ABS_ACTIVE] > 0.5 or value[ESP_ACTIVE] > 0.5
     return forbidden
 
@@ -205,9 +214,8 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     moving = x[V] > LEAST_SPEED
     walk(state, braking and moving, time)
     _watch_release(state, braking)
-    learning = (
-        moving and state.hold_s <= 0.0 and w.motor_known != 0 and not _learning_forbidden(inputs, braking)
-    )
+    learning = moving and state.hold_s <= 0.0 and w.motor_known != 0
+    learning = learning and not _learning_forbidden(params, state, inputs, braking)
     if not braking:
         learning = learning and abs(w.across) < STRAIGHT
     if learning and not braking and motors <= MOTORS:

@@ -100,9 +100,6 @@ def test_where_no_accelerator_is_known_driving_torque_marks_it(
     assert list(brakes["left_out"][::4]) == ["", "driving torque", ""]
 
 
-@pytest.mark.xfail(
-    strict=True, reason="the ECU holds friction by the accelerator alone, not by driving torque"
-)
 @pytest.mark.parametrize("observer", ["joint", "observer2"])
 def test_driving_torque_alone_teaches_nothing(drive_log: Path, tmp_path: Path, observer: str) -> None:
     log = without(drive_log, "accelerator_position", tmp_path / "one-foot.parquet")

@@ -271,13 +271,19 @@ def test_an_input_that_is_not_finite_leaves_no_trace(stop: Stop, signal: str, va
     assert np.isfinite(stop.s["friction"]["torque"]).all()
 
 
-@pytest.mark.parametrize("motor", [-300.0, 0.0, 300.0])
+@pytest.mark.parametrize("motor", [-60.0, 0.0, 300.0])
 def test_motor_torque_is_not_taken_for_friction(params, feed, motor: float) -> None:
     """Positive regenerates: the tyre then holds more than the friction brake gives."""
     stop = Stop(params, feed)
     stop.motor = motor
     assert list(stop.run(3.0)) == [OBSERVING] * 4
     assert stop.s["friction"]["mu"] == pytest.approx(np.full(4, 0.40), rel=0.02)
+
+
+def test_motors_that_drive_against_the_brakes_teach_nothing(params, feed) -> None:
+    stop = Stop(params, feed)
+    stop.motor = -300.0
+    assert OBSERVING not in list(stop.run(3.0))
 
 
 def test_process_noise_follows_the_deceleration_asked_for_or_the_measured_one(params, feed) -> None:

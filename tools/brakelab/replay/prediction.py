@@ -20,6 +20,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ecu.estimation.friction import DRIVEN
 from ecu.params import BAR, GRAVITY
 from ecu.records import RecordArray
 from ecu.signals import N_OUTPUTS, OUTPUT
@@ -31,7 +32,6 @@ SHORT: Final = 0.5  # s, shorter: a tap on the pedal
 WEAK: Final = 0.5  # m/s^2, below: an error of it in per cent says nothing
 PRESSED: Final = 2.0  # %, of the accelerator; the ECU learns nothing above it either
 OVERLAP: Final = 0.1  # of the pressure over time: so much may overlap while the foot changes pedals
-DRIVEN: Final = 0.2  # of the brakes' force: motors that drive with more drive against the brakes
 SLOPE_ROWS: Final = 200  # before an application, from which the slope is known
 LEAST_SLOPE_ROWS: Final = 50
 
