@@ -59,6 +59,14 @@ def set_base(state: Record, learned: Record) -> None:
 
 
 @kernel
+def friction_in_use(state: Record, corner: int) -> float:
+    """Return the friction that the law counts on now."""
+    override: float = state.mu_override[corner]
+    used: float = state.used[corner]
+    return override if math.isfinite(override) else used
+
+
+@kernel
 def compensated_pressure(params: Record, state: Record, pressure: float, corner: int) -> float:
     """Return the pressure [Pa] corrected for the friction in use (corrected 5.8)."""
     base: float = state.base[corner]
