@@ -142,6 +142,13 @@ class Control(_Section):
         return self
 
 
+class Blending(_Section):
+    """What the motors take of the brake torque, f of (5.2): 0 off, 1 series phasing, parallel in between."""
+
+    front: Annotated[float, Field(ge=0, le=1)] = 0.0
+    rear: Annotated[float, Field(ge=0, le=1)] = 0.0
+
+
 class Config(_Section):
     """One vehicle's configuration."""
 
@@ -155,6 +162,7 @@ class Config(_Section):
     sensors: Sensors = Sensors()
     observer: Observer = Observer()
     control: Control
+    blending: Blending = Blending()
 
     @model_validator(mode="after")
     def _axles(self) -> "Config":
@@ -313,6 +321,7 @@ def new_params(config: Config) -> RecordArray:
     for name in ("pedal_position", "pedal_decel"):
         points = getattr(control, name)
         row[name] = points + points[-1:] * (PEDAL_POINTS - len(points))
+    row["blending"] = np.repeat((config.blending.front, config.blending.rear), 2)
     row["max_pressure"] = control.max_pressure * BAR
     row["max_pressure_rate"] = control.max_pressure_rate * BAR
     return params

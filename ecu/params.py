@@ -75,6 +75,7 @@ PARAMS: Final = np.dtype(
         ("max_pressure", "f8"),  # Pa
         ("max_pressure_rate", "f8"),  # Pa/s
         ("compensate", "u1"),
+        ("blending", "f8", (4,)),  # f of (5.2): 0 off, 1 series phasing
     ],
     align=True,
 )

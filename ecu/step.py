@@ -4,14 +4,16 @@
 daemon, replay and closed-loop simulation get the same bits from the same inputs. Order of one cycle:
 
     brake application -> accelerations -> wheel loads, radii -> brake torques, expected slip -> speed -> slip
-    -> tyre forces -> friction -> disc temperature -> demand -> pressure law -> limiter -> mode
+    -> tyre forces -> friction -> disc temperature -> demand -> blending -> pressure law -> limiter -> mode
 """
 
 import math
 
 import numpy as np
 
+from ecu.control.blending import BLENDING_STATE, blend, blends, update_motors
 from ecu.control.demand import requested_decel, wheel_torque_demand
+from ecu.control.friction_torque import FRICTION_TORQUE_STATE, friction_torque, update_friction_torque
 from ecu.control.limiter import LIMITER_STATE, limit_pressure
 from ecu.control.mode import MODE_STATE, decide_mode, input_faults
 from ecu.control.pressure_law import (
@@ -78,6 +80,8 @@ STATE = np.dtype(
         ("friction", FRICTION_STATE),
         ("application", APPLICATION_STATE),
         ("discs", DISC_STATE),
+        ("friction_torque", FRICTION_TORQUE_STATE),
+        ("blending", BLENDING_STATE),
         ("control", PRESSURE_LAW_STATE),
         ("limiter", LIMITER_STATE),
         ("mode", MODE_STATE),
@@ -209,13 +213,18 @@ def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
     if p.compensate:
         follow_friction(s.control, s.friction.mu, dt)
     s.limiter.limited = 0
+    update_friction_torque(p, s.friction_torque, u, s.limiter.pressure, s.joint.pressures.zero, dt)
+    update_motors(s.blending, u, dt)
     for i in range(4):
         torque = wheel_torque_demand(p, decel, i)
+        motor = blend(p, s.blending, torque, friction_torque(p, s.friction_torque, s.control, i), i)
+        y.motor_demand[i] = motor if blends(p) else math.nan
+        torque = s.blending.lining[i]
         y.pressure_uncompensated[i] = pressure_for_torque(p, torque, s.control.base[i], i)
         y.pressure_demand[i] = compensated_pressure(p, s.control, y.pressure_uncompensated[i], i)
     level_left_right(y.pressure_demand, y.pressure_uncompensated)
     for i in range(4):
-        torque = wheel_torque_demand(p, decel, i)
+        torque = s.blending.lining[i]
         wanted, uncompensated = y.pressure_demand[i], y.pressure_uncompensated[i]
         y.pressure_demand[i] = limit_pressure(p, s.limiter, i, wanted, uncompensated, torque, dt) / BAR
         y.pressure_uncompensated[i] = uncompensated / BAR
@@ -238,7 +247,7 @@ def _publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: i
     y.overruns = u.overruns
     y.worst_lateness_us = u.worst_lateness_us
     y.pressure_demand_valid = 1.0 if p.transmit and mode != STARTING and mode != FAILED else 0.0
-    y.motor_demand_valid = 0.0
+    y.motor_demand_valid = y.pressure_demand_valid if blends(p) else 0.0
     y.decel_demand_total = decel
     y.accel_x_road = s.motion.accel_x
     y.braking = s.application.braking
@@ -257,7 +266,6 @@ def _publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: i
         y.disc_temperature[i] = s.discs.temperature[i] if mapped else math.nan
         y.sigma_disc_temperature[i] = s.discs.sigma[i] if mapped else math.nan
         y.test_ratio[i] = _test_ratio(p, s, i)
-        y.motor_demand[i] = math.nan
         y.pad_wear[i] = y.pad_remaining[i] = y.pad_wear_mass[i] = math.nan
         if mode == FAILED:
             y.pressure_demand[i] = 0.0

@@ -25,7 +25,8 @@ def set_commands(
     """Set what the actuators do in the coming cycle, and the road as far as it is described by time."""
     heard = demand.pressure_valid == 1 and demand.pressure_age < DEMAND_TIMEOUT
     decel = max(driver.decel_demand, 0.01 * driver.pedal_position * FULL_PEDAL_DECEL)
-    blended = script.blending and driver.braking == 1 and demand.motor_valid == 1
+    asks = driver.braking == 1 or decel > 0.0
+    blended = script.blending and asks and demand.motor_valid == 1
     blended = blended and demand.motor_age < DEMAND_TIMEOUT
     for wheel in range(4):
         fallback = params.fallback_gain * decel
