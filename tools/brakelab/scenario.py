@@ -204,7 +204,7 @@ class Scenario(_Section):
     sensor: Sensors = {}
     """Errors of its sensors beside those that the car's file gives."""
     blending: bool = False
-    """While braking the motors do what the ECU asks; otherwise they rest."""
+    """While brakes are asked for the motors do what the ECU asks; otherwise they rest."""
     motor_share: Share = 0.0
     """Of each deceleration asked for, what the motors take; the brakes are asked for the rest (5.2)."""
     trace: Trace | None = None
