@@ -18,8 +18,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from ecu.errors import UserError
 from ecu.estimation.tyre import rolling_radius
-from ecu.params import BAR, GRAVITY, OBSERVERS, PARAMS, PEDAL_POINTS
+from ecu.params import BAR, DISTRIBUTIONS, GRAVITY, OBSERVERS, PARAMS, PEDAL_POINTS
 from ecu.records import RecordArray
+from ecu.regulation import Load, annex_5_violation
 
 AIR_DENSITY = 1.2  # kg/m^3, 20 degC at sea level
 
@@ -50,6 +51,27 @@ class Vehicle(_Section):
     load_transfer_lag: Annotated[float, Field(ge=0, lt=1)]
     ambient_temperature: Annotated[float, Field(gt=-50, lt=60)] = 15.0
     """Where no sensor reports it, degC."""
+    laden_mass: Annotated[float, Field(gt=200, lt=10000)] | None = None
+    """Greatest mass allowed, kg. Without the three of `laden_` the car counts as driven at `mass` alone."""
+    laden_front_axle: Positive | None = None
+    """Centre of gravity to front axle when laden, m."""
+    laden_cog_height: Annotated[float, Field(gt=0.1, lt=3)] | None = None
+
+    def loads(self) -> tuple[Load, ...]:
+        """Return the states of load that the car is driven in: as configured, and laden if that is given."""
+        unladen = Load("unladen", self.mass, self.front_axle, self.cog_height)
+        if self.laden_mass is None or self.laden_front_axle is None or self.laden_cog_height is None:
+            return (unladen,)
+        return unladen, Load("laden", self.laden_mass, self.laden_front_axle, self.laden_cog_height)
+
+    @model_validator(mode="after")
+    def _laden(self) -> "Vehicle":
+        given = [self.laden_mass, self.laden_front_axle, self.laden_cog_height]
+        if given != [None] * 3 and None in given:
+            raise ValueError("give all of laden_mass, laden_front_axle and laden_cog_height, or none")
+        if self.laden_mass is not None and self.laden_mass < self.mass:
+            raise ValueError("laden_mass must not be smaller than mass")
+        return self
 
 
 class Axle(_Section):
@@ -107,16 +129,24 @@ class Observer(_Section):
     """Model error of the tyre force relative to the wheel load, 1/sqrt(s)."""
     time_correlation: Positive = 3.0
     """Low-passed slip samples are correlated: the virtual force's variance counts this often."""
-    sigma_mu_initial: Share = 0.15
+    sigma_mu_initial: Annotated[float, Field(gt=0, lt=0.4)] = 0.15
     sigma_mass: Share = 0.02
     sigma_slip_stiffness_ratio: Share = 0.04
 
 
 class Control(_Section):
-    """Pedal map and limits of the pressure demand."""
+    """Pedal map, holding at rest, distribution, limits of the pressure demand."""
 
     pedal_position: list[float] = Field(min_length=2, max_length=PEDAL_POINTS)
     pedal_decel: list[float] = Field(min_length=2, max_length=PEDAL_POINTS)
+    hold_grade: Annotated[float, Field(ge=0, le=0.5)] = 0.2
+    """Steepest grade (tangent) on which the standing car is held, laden and with the linings at - 2 sigma."""
+    distribution: Literal["ideal", "fixed", "electronic"] = "ideal"
+    """Equal adhesion at both axles, a constant share, or a constant share until the ideal one passes it."""
+    front_share: Share | None = None
+    """Of the brake force, for the distributions "fixed" and "electronic"."""
+    rear_slip_margin: Annotated[float, Field(ge=0.002, le=0.05)] = 0.005
+    """Slip of a rear wheel beyond the front one of its side that takes back the torque of the rear."""
     max_pressure: Annotated[float, Field(gt=20, le=180)] = 180.0
     max_pressure_rate: Annotated[float, Field(ge=1500)] = 3000.0
     compensate: bool = True
@@ -126,6 +156,13 @@ class Control(_Section):
     def _rising(cls, points: list[float]) -> list[float]:
         if any(b < a for a, b in pairwise(points)) or points[0] < 0:
             raise ValueError("must rise from zero or more")
+        return points
+
+    @field_validator("pedal_decel")
+    @classmethod
+    def _free_at_rest(cls, points: list[float]) -> list[float]:
+        if points[0] != 0.0:
+            raise ValueError("must start at 0: a pedal at rest brakes nothing")
         return points
 
     @field_validator("pedal_position")
@@ -139,6 +176,8 @@ class Control(_Section):
     def _paired(self) -> "Control":
         if len(self.pedal_position) != len(self.pedal_decel):
             raise ValueError("pedal_position and pedal_decel need the same number of points")
+        if (self.front_share is None) != (self.distribution == "ideal"):
+            raise ValueError('distributions "fixed" and "electronic" need a front_share, "ideal" has its own')
         return self
 
 
@@ -209,7 +248,8 @@ def describe(error: ValidationError, where: str) -> UserError:
         remedy = "unknown key; remove it or correct its spelling"
     else:
         wanted = _WANTED.get(finding["type"], finding["msg"]).format(**finding.get("ctx", {}))
-        remedy = f"{wanted} (found {finding['input']!r})" if place else wanted
+        one_value = place and not isinstance(finding["input"], dict)
+        remedy = f"{wanted} (found {finding['input']!r})" if one_value else wanted
     return UserError(where, place, remedy + (f" ({more} more findings)" if more else ""))
 
 
@@ -231,16 +271,21 @@ def load_config(path: Path) -> Config:
     """Read and check a CONFIG file.
 
     Raises:
-        UserError: a file cannot be read, or a key is missing, unknown or out of range.
+        UserError: a file cannot be read, a key is missing, unknown or out of range, or the distribution of
+            the brake force violates Annex 5 of ECE R13-H.
     """
     own = read_toml(path)
     source, included = _included(path, own.pop("include")) if "include" in own else (path, {})
     try:
-        return Config.model_validate(_merged(own, included))
+        config = Config.model_validate(_merged(own, included))
     except ValidationError as error:
         keys = error.errors()[0]["loc"]
         elsewhere = _holds(included, keys) and not _holds(own, keys)
         raise describe(error, str(source if elsewhere else path)) from None
+    finding = annex_5_violation(new_params(config)[0], config.vehicle.loads())
+    if finding:
+        raise UserError(str(path), "control.distribution", finding)
+    return config
 
 
 def _included(path: Path, name: object) -> tuple[Path, dict[str, Any]]:
@@ -322,6 +367,11 @@ def new_params(config: Config) -> RecordArray:
         points = getattr(control, name)
         row[name] = points + points[-1:] * (PEDAL_POINTS - len(points))
     row["blending"] = np.repeat((config.blending.front, config.blending.rear), 2)
+    heaviest = max(load.mass for load in vehicle.loads())
+    down_grade = GRAVITY * math.sin(math.atan(control.hold_grade)) * heaviest / vehicle.mass
+    row["hold_decel"] = down_grade / (1.0 - 2.0 * observer.sigma_mu_initial)
+    row["distribution"] = DISTRIBUTIONS.index(control.distribution)
+    row["front_share"], row["rear_slip_margin"] = control.front_share or 0.0, control.rear_slip_margin
     row["max_pressure"] = control.max_pressure * BAR
     row["max_pressure_rate"] = control.max_pressure_rate * BAR
     return params

@@ -15,6 +15,8 @@ BAR: Final = 1e5  # Pa
 OBSERVERS: Final = ("joint", "observer1", "observer2")
 JOINT, OBSERVER1, OBSERVER2 = range(3)
 
+DISTRIBUTIONS: Final = ("ideal", "fixed", "electronic")
+
 PARAMS: Final = np.dtype(
     [
         ("transmit", "u1"),  # armed: demands are flagged valid
@@ -72,6 +74,10 @@ PARAMS: Final = np.dtype(
         # control
         ("pedal_position", "f8", (PEDAL_POINTS,)),  # %
         ("pedal_decel", "f8", (PEDAL_POINTS,)),  # m/s^2
+        ("hold_decel", "f8"),  # that the standing car is held with at least, m/s^2
+        ("distribution", "i8"),  # DISTRIBUTIONS
+        ("front_share", "f8"),  # of the brake force, where the distribution has one
+        ("rear_slip_margin", "f8"),  # a rear wheel may slip this much more than the front one
         ("max_pressure", "f8"),  # Pa
         ("max_pressure_rate", "f8"),  # Pa/s
         ("compensate", "u1"),

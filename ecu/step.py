@@ -4,7 +4,8 @@
 daemon, replay and closed-loop simulation get the same bits from the same inputs. Order of one cycle:
 
     brake application -> accelerations -> wheel loads, radii -> brake torques, expected slip -> speed -> slip
-    -> tyre forces -> friction -> disc temperature -> demand -> blending -> pressure law -> limiter -> mode
+    -> tyre forces -> friction -> disc temperature -> demand -> distribution -> blending -> pressure law
+    -> limiter -> mode
 """
 
 import math
@@ -12,7 +13,8 @@ import math
 import numpy as np
 
 from ecu.control.blending import BLENDING_STATE, blend, blends, update_motors
-from ecu.control.demand import requested_decel, wheel_torque_demand
+from ecu.control.demand import DEMAND_STATE, update_demand
+from ecu.control.distribution import DISTRIBUTION_STATE, cap_rear, distribute, watch_rear
 from ecu.control.friction_torque import FRICTION_TORQUE_STATE, friction_torque, update_friction_torque
 from ecu.control.limiter import LIMITER_STATE, limit_pressure
 from ecu.control.mode import MODE_STATE, decide_mode, input_faults
@@ -80,6 +82,8 @@ STATE = np.dtype(
         ("friction", FRICTION_STATE),
         ("application", APPLICATION_STATE),
         ("discs", DISC_STATE),
+        ("demand", DEMAND_STATE),
+        ("distribution", DISTRIBUTION_STATE),
         ("friction_torque", FRICTION_TORQUE_STATE),
         ("blending", BLENDING_STATE),
         ("control", PRESSURE_LAW_STATE),
@@ -107,6 +111,7 @@ def new_state(params: RecordArray, learned: RecordArray | None = None) -> Record
         row["learned"] = learned[0]
     row["control"]["mu_override"] = math.nan
     row["force"]["k_f"] = 1.0
+    row["distribution"]["rear"] = 1.0
     _begin(params, state)
     return state
 
@@ -209,20 +214,24 @@ def _observe_by_wheel(p: Record, s: Record, u: Record, braking: bool, dt: float)
 
 @kernel
 def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
-    decel = requested_decel(p, u)
+    speed = s.speed.speed if s.speed.started else math.nan
+    decel = update_demand(p, s.demand, u, speed, dt)
+    watch_rear(p, s.distribution, s.wheels, s.learned, decel, speed, dt)
+    distribute(p, s.distribution, decel)
     if p.compensate:
         follow_friction(s.control, s.friction.mu, dt)
     s.limiter.limited = 0
     update_friction_torque(p, s.friction_torque, u, s.limiter.pressure, s.joint.pressures.zero, dt)
     update_motors(s.blending, u, dt)
     for i in range(4):
-        torque = wheel_torque_demand(p, decel, i)
+        torque = s.distribution.torque[i]
         motor = blend(p, s.blending, torque, friction_torque(p, s.friction_torque, s.control, i), i)
         y.motor_demand[i] = motor if blends(p) else math.nan
         torque = s.blending.lining[i]
         y.pressure_uncompensated[i] = pressure_for_torque(p, torque, s.control.base[i], i)
         y.pressure_demand[i] = compensated_pressure(p, s.control, y.pressure_uncompensated[i], i)
     level_left_right(y.pressure_demand, y.pressure_uncompensated)
+    cap_rear(p, s.distribution, decel, s.blending.lining, s.friction, y.pressure_demand)
     for i in range(4):
         torque = s.blending.lining[i]
         wanted, uncompensated = y.pressure_demand[i], y.pressure_uncompensated[i]
