@@ -145,7 +145,7 @@ class Control(_Section):
     """Equal adhesion at both axles, a constant share, or a constant share until the ideal one passes it."""
     front_share: Share | None = None
     """Of the brake force, for the distributions "fixed" and "electronic"."""
-    rear_slip_margin: Annotated[float, Field(ge=0.002, le=0.05)] = 0.005
+    rear_slip_margin: Annotated[float, Field(ge=0.002, le=0.05)] = 0.01
     """Slip of a rear wheel beyond the front one of its side that takes back the torque of the rear."""
     max_pressure: Annotated[float, Field(gt=20, le=180)] = 180.0
     max_pressure_rate: Annotated[float, Field(ge=1500)] = 3000.0

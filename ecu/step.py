@@ -216,7 +216,7 @@ def _observe_by_wheel(p: Record, s: Record, u: Record, braking: bool, dt: float)
 def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
     speed = s.speed.speed if s.speed.started else math.nan
     decel = update_demand(p, s.demand, u, speed, dt)
-    watch_rear(p, s.distribution, s.wheels, s.learned, decel, speed, dt)
+    watch_rear(p, s.distribution, u, s.motion, s.wheel_load.load, decel, speed, dt)
     distribute(p, s.distribution, decel)
     if p.compensate:
         follow_friction(s.control, s.friction.mu, dt)

@@ -18,22 +18,31 @@ import math
 
 import numpy as np
 
+from ecu.estimation.motion import corner_speed, fresh
+from ecu.estimation.tyre import rolling_radius
 from ecu.jit import Record, kernel
 from ecu.params import DISTRIBUTIONS, GRAVITY
+from ecu.signals import WHEEL_SPEED
 
 DISTRIBUTION_STATE = np.dtype(
     [
         ("torque", "f8", (4,)),  # demanded of each wheel [N m], >= 0; NaN without a request
         ("rear", "f8"),  # what of its torque the rear axle is left, LEAST_REAR to 1
+        ("beyond", "f8", (2,)),  # slip of a rear wheel beyond the front one of its side, low-passed
+        ("offset", "f8", (2,)),  # the same while rolling freely: the radii
+        ("free_s", "f8", (2,)),  # how long that was learned, at most LEARNING_TIME
     ],
     align=True,
 )
 
 IDEAL, FIXED, ELECTRONIC = range(len(DISTRIBUTIONS))
 LEAST_REAR = 0.3  # what the rear keeps whatever its wheels seem to do
-TAKE_BACK = 400.0  # 1/s per slip: 1 % too much takes back the rear's torque at 4 1/s
+TAKE_BACK = 600.0  # 1/s per slip: 1 % too much takes back the rear's torque at 6 1/s
 GIVE_BACK = 0.3  # 1/s
-OLDEST_SLIP = 0.1  # s
+SMOOTHING = 0.2  # per sample: 50 ms; leaves a fifth of the wheel speeds' noise
+LEARNING_TIME = 2.0  # s
+RADIUS_DOUBT = 0.008  # until then: radii within 0.3 % and what else differs, two standard deviations
+FREE_ACCEL, FREE_YAW_RATE = 0.5, 0.03  # m/s^2, rad/s
 RULED_FROM = 0.15  # z from which on Annex 5 orders the axles
 ROUNDING = 1e-9
 
@@ -56,32 +65,68 @@ def front_share(params: Record, decel: float) -> float:
 
 
 @kernel
+def _rear_beyond_front(
+    params: Record, inputs: Record, motion: Record, load: Record, speed: float, side: int
+) -> float:
+    """Return how much more than the front wheel of its side a rear wheel slips, NaN without new samples."""
+    slips = 0.0
+    for i in (side, side + 2):
+        ground = corner_speed(params, motion, speed, i)
+        if not (fresh(inputs, WHEEL_SPEED + i) and ground > 0.0):
+            return math.nan
+        radius = rolling_radius(load[i], params.unloaded_radius[i], params.vertical_stiffness[i])
+        rolled = inputs.value[WHEEL_SPEED + i] * radius / ground
+        slips += rolled if i == side else -rolled
+    return slips
+
+
+@kernel
 def watch_rear(
-    params: Record, state: Record, wheels: Record, learned: Record, decel: float, speed: float, dt: float
+    params: Record,
+    state: Record,
+    inputs: Record,
+    motion: Record,
+    load: Record,
+    decel: float,
+    speed: float,
+    dt: float,
 ) -> None:
     """Move what the rear axle is left, by the slip of its wheels beyond that of the front ones.
 
+    Wheel speeds are compared with each other, at the radii of their loads (A.4): a rear wheel on its way to
+    lock is what observers reject as an outlier. What the radii differ beside that is learned while the car
+    rolls freely.
+
     Args:
         params: `PARAMS`.
-        state: `DISTRIBUTION_STATE`; `rear` is overwritten.
-        wheels: `WHEELS_STATE`, for the slip.
-        learned: `LEARNED`, for the uncertainty of the radii: twice that much slip is not believed.
+        state: `DISTRIBUTION_STATE`; all but `torque` is overwritten.
+        inputs: `INPUTS`.
+        motion: `MOTION_STATE`.
+        load: of the wheels [N].
         decel: demanded [m/s^2]; the rear has all of its torque again once nobody brakes.
         speed: of the vehicle [m/s], NaN: unknown. Below `min_speed` slip says nothing.
         dt: time since the last cycle [s].
     """
-    if not decel > 0.0:
-        state.rear = 1.0
-        return
-    change = GIVE_BACK
-    for i in range(2):
-        known = wheels.since_s[i] < OLDEST_SLIP and wheels.since_s[i + 2] < OLDEST_SLIP
-        if known and speed > params.min_speed and wheels.slip[i + 2] < 0.0:
-            doubt = 2.0 * math.hypot(learned.radius_sigma[i], learned.radius_sigma[i + 2])
-            beyond = wheels.slip[i] - wheels.slip[i + 2] - params.rear_slip_margin - doubt
-            if beyond > 0.0:
-                change = min(change, -TAKE_BACK * beyond)
-    state.rear = min(max(state.rear + change * dt, LEAST_REAR), 1.0)
+    brakes = decel > 0.0
+    free = not brakes and abs(motion.accel_x) < FREE_ACCEL and abs(motion.yaw_rate) < FREE_YAW_RATE
+    worst = 0.0
+    for side in range(2):
+        beyond = math.nan
+        if speed > params.min_speed:
+            beyond = _rear_beyond_front(params, inputs, motion, load, speed, side)
+        if math.isnan(beyond):
+            state.beyond[side] = 0.0
+            continue
+        if free:
+            state.free_s[side] = min(state.free_s[side] + dt, LEARNING_TIME)
+            state.offset[side] += dt / state.free_s[side] * (beyond - state.offset[side])
+        state.beyond[side] += SMOOTHING * (beyond - state.offset[side] - state.beyond[side])
+        doubt = params.sigma_wheel_speed * params.wheel_radius[side] / speed
+        if state.free_s[side] < LEARNING_TIME:
+            doubt += RADIUS_DOUBT
+        worst = max(worst, state.beyond[side] - params.rear_slip_margin - doubt)
+    change = -TAKE_BACK * worst if worst > 0.0 else GIVE_BACK
+    state.rear = min(max(state.rear + change * dt, LEAST_REAR), 1.0) if brakes else 1.0
 
 
 @kernel
