@@ -7,7 +7,7 @@ import pytest
 from ecu import __version__, cli, resources
 from ecu.errors import RunFault, UserError
 
-COMMANDS = ("run", "demo", "simulate", "replay", "play", "report", "tune", "bench", "doctor")
+COMMANDS = ("run", "demo", "simulate", "replay", "play", "report", "rig", "tune", "bench", "doctor")
 
 
 @pytest.mark.parametrize(
@@ -28,6 +28,9 @@ COMMANDS = ("run", "demo", "simulate", "replay", "play", "report", "tune", "benc
         ("replay --config suv --out r.parquet", "Missing argument 'LOG…'"),
         ("simulate nosuch --config suv --out x", "nosuch: no such file, and none that is shipped ("),
         ("bench step codec", "unexpected extra argument"),
+        ("rig stop-7 --config suv", "stop-7: no such file, and none that is shipped (blending-0,"),
+        ("rig stop-1 stop-1 --config suv", "stop-1: named twice"),
+        ("rig stop-1 --config suv -i socketcan", "-i, -c: give both or none"),
         ("simulate stop-1 --config suv --out x --seed -1", "Invalid value for '--seed'"),
         ("tune --config suv --out tuned.txt", "--out: tuned.txt: a tuning is written as TOML"),
         ("tune --config suv --population 3", "Invalid value for '--population'"),

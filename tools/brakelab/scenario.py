@@ -39,6 +39,7 @@ lost_from = 3.0                  # s
 angle = [[0.0, 0.0], [2.0, 0.03]]          # s, rad at the road wheel, left positive
 path = [[0.0, 0.0], [30.0, 3.5]]           # or m, m: what the driver steers after
 ```
+What goes wrong on the bus, at a sensor or an actuator is told by `[[fault]]` tables: `brakelab.rig.faults`.
 """
 
 import math
@@ -56,6 +57,7 @@ from brakelab.plant.records import BRAKE, COAST, CRUISE, FOLLOW, PHASE
 from brakelab.plant.road import Road
 from brakelab.plant.sensor_errors import Sensors
 from brakelab.plant.steering import Steering
+from brakelab.rig.faults import Fault
 from brakelab.speed_trace import SpeedTrace, generated_trace, read_trace, trace_of
 from ecu.config import describe, read_toml
 from ecu.errors import UserError
@@ -210,6 +212,8 @@ class Scenario(_Section):
     trace: Trace | None = None
     repeat: Annotated[int, Field(ge=1)] = 1
     """How often the phases are driven."""
+    fault: list[Fault] = []
+    """What goes wrong on the way; see `brakelab.rig.faults`."""
     phase: Annotated[list[Phase], Field(min_length=1)]
 
     @model_validator(mode="after")
