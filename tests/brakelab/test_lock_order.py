@@ -1,7 +1,7 @@
 """Wheel-lock sequence of ECE R13-H, Annex 5: the front locks before the rear, or within 0.1 s of it.
 
-The linings are at the wrong ends of their 2 sigma, 30 % off, and compensation is switched off: nothing but the
-watch over the rear's slip keeps the order.
+The linings are at the wrong ends of their 2 sigma, 30 % off, and compensation is switched off: nothing but
+the watch over the rear's slip keeps the order.
 """
 
 from pathlib import Path

@@ -51,7 +51,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from brakelab.plant.cycle import CYCLE
-from brakelab.plant.description import Plant, PlantFileError, load_plant
+from brakelab.plant.description import Body, Plant, PlantFileError, load_plant
 from brakelab.plant.driver import PEDAL_TRAVEL, Script
 from brakelab.plant.records import BRAKE, COAST, CRUISE, FOLLOW, PHASE
 from brakelab.plant.road import Road
@@ -160,6 +160,29 @@ class TyreFault(_Section):
     stiffness: Positive
 
 
+class Payload(_Section):
+    """What the car carries beside its driver, a point of mass `mass` [kg]."""
+
+    mass: Positive
+    behind: float
+    """Behind the empty car's centre of gravity, m."""
+    height: Positive
+    """Over the road, m."""
+
+    def body(self, empty: Body) -> Body:
+        """Return the laden car's body: its mass, centre of gravity and yaw inertia."""
+        mass = empty.mass + self.mass
+        back = self.mass * self.behind / mass
+        update = {
+            "mass": mass,
+            "front_length": empty.front_length + back,
+            "rear_length": empty.rear_length - back,
+            "cog_height": (empty.mass * empty.cog_height + self.mass * self.height) / mass,
+            "yaw_inertia": empty.yaw_inertia + empty.mass * back * self.behind,
+        }
+        return empty.model_copy(update=update)
+
+
 class RoadByPlace(_Section):
     """The road over the distance driven; see `brakelab.plant.road`."""
 
@@ -186,6 +209,7 @@ class Scenario(_Section):
     """A scenario file."""
 
     plant: str
+    payload: Payload | None = None
     initial_speed: NotNegative
     initial_disc_temperature: tuple[float, float] = (100.0, 100.0)
     """Front and rear, degC; 100 as where the friction's nominal value is defined."""
@@ -306,6 +330,10 @@ def scenario_plant(scenario: Scenario) -> Plant:
         UserError: the plant's file cannot be read or is wrong.
     """
     try:
-        return load_plant(named(scenario.plant, "config/plant"))
+        plant = load_plant(named(scenario.plant, "config/plant"))
     except PlantFileError as error:
         raise UserError(error.where, error.place, error.remedy) from None
+    if scenario.payload is None:
+        return plant
+    laden = plant.vehicle.model_copy(update={"body": scenario.payload.body(plant.vehicle.body)})
+    return plant.model_copy(update={"vehicle": laden})
