@@ -64,9 +64,9 @@ from brakelab.plant.sensor_errors import Sensors
 from brakelab.plant.steering import Steering
 from brakelab.rig.faults import Fault
 from brakelab.speed_trace import SpeedTrace, generated_trace, read_trace, trace_of
-from ecu.config import describe, read_toml
 from ecu.errors import UserError
 from ecu.resources import named
+from ecu.toml_file import describe, read_toml
 
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
