@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from ecu.errors import UserError
 from ecu.estimation.tyre import rolling_radius
-from ecu.params import BAR, DISTRIBUTIONS, GRAVITY, OBSERVERS, PARAMS, PEDAL_POINTS
+from ecu.params import BAR, COMPENSATIONS, DISTRIBUTIONS, GRAVITY, OBSERVERS, PARAMS, PEDAL_POINTS
 from ecu.records import RecordArray
 from ecu.regulation import Load, annex_5_violation
 from ecu.toml_file import describe, read_toml
@@ -149,7 +149,10 @@ class Control(_Section):
     """Slip of a rear wheel beyond the front one of its side that takes back the torque of the rear."""
     max_pressure: Annotated[float, Field(gt=20, le=180)] = 180.0
     max_pressure_rate: Annotated[float, Field(ge=1500)] = 3000.0
-    compensate: bool = True
+    compensation: Literal["second-order", "inverse", "off"] = "second-order"
+    """How pressure follows friction in a braking: corrected (5.8), what it approximates, or nominal friction."""
+    slip_guard: bool = True
+    """Hold the pressure back at a wheel that slips beyond its tyre's range."""
 
     @field_validator("pedal_position", "pedal_decel")
     @classmethod
@@ -274,7 +277,8 @@ def new_params(config: Config) -> RecordArray:
     params = np.zeros(1, PARAMS)
     row = params[0]
     vehicle, sensors, observer, control = config.vehicle, config.sensors, config.observer, config.control
-    row["transmit"], row["compensate"] = config.transmit, control.compensate
+    row["transmit"], row["slip_guard"] = config.transmit, control.slip_guard
+    row["compensation"] = COMPENSATIONS.index(control.compensation)
     row["mapped"] = 1
     rear_axle = vehicle.wheelbase - vehicle.front_axle
     for name in ("mass", "wheelbase", "front_axle", "cog_height", "track", "rolling_resistance"):

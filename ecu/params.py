@@ -16,6 +16,8 @@ OBSERVERS: Final = ("joint", "observer1", "observer2")
 JOINT, OBSERVER1, OBSERVER2 = range(3)
 
 DISTRIBUTIONS: Final = ("ideal", "fixed", "electronic")
+COMPENSATIONS: Final = ("second-order", "inverse", "off")
+SECOND_ORDER, INVERSE, OFF = range(3)
 
 PARAMS: Final = np.dtype(
     [
@@ -80,7 +82,8 @@ PARAMS: Final = np.dtype(
         ("rear_slip_margin", "f8"),  # a rear wheel may slip this much more than the front one
         ("max_pressure", "f8"),  # Pa
         ("max_pressure_rate", "f8"),  # Pa/s
-        ("compensate", "u1"),
+        ("compensation", "i8"),  # COMPENSATIONS
+        ("slip_guard", "u1"),
         ("blending", "f8", (4,)),  # f of (5.2): 0 off, 1 series phasing
     ],
     align=True,

@@ -5,6 +5,7 @@ daemon, replay and closed-loop simulation get the same bits from the same inputs
 
     brake application -> accelerations -> wheel loads, radii -> brake torques, expected slip -> speed -> slip
     -> tyre forces -> friction -> disc temperature -> demand -> distribution -> blending -> pressure law
+    -> slip guard -> limiter -> mode
     -> limiter -> mode
 """
 
@@ -16,7 +17,7 @@ from ecu.control.blending import BLENDING_STATE, blend, blends, update_motors
 from ecu.control.demand import DEMAND_STATE, update_demand
 from ecu.control.distribution import DISTRIBUTION_STATE, cap_rear, distribute, watch_rear
 from ecu.control.friction_torque import FRICTION_TORQUE_STATE, friction_torque, update_friction_torque
-from ecu.control.limiter import LIMITER_STATE, limit_pressure
+from ecu.control.limiter import LIMITER_STATE, available_pressure, limit_pressure
 from ecu.control.mode import MODE_STATE, decide_mode, input_faults
 from ecu.control.pressure_law import (
     PRESSURE_LAW_STATE,
@@ -25,8 +26,16 @@ from ecu.control.pressure_law import (
     level_left_right,
     pressure_for_torque,
     set_base,
+    watch_limit,
 )
-from ecu.diagnostics.faults import DEMAND_LIMITED, FILTER_RESET
+from ecu.control.slip_guard import SLIP_GUARD_STATE, guard_slip
+from ecu.diagnostics.faults import (
+    ACCUMULATOR_LOW,
+    BRAKE_FADE,
+    DEMAND_LIMITED,
+    FILTER_RESET,
+    WHEEL_SLIPS,
+)
 from ecu.estimation.force import (
     FORCE_STATE,
     reset_force,
@@ -44,7 +53,7 @@ from ecu.estimation.friction import (
 from ecu.estimation.joint.kalman import GATE
 from ecu.estimation.joint.layout import JOINT_STATE, MU, STIFFNESS, V
 from ecu.estimation.joint.learned import keep_joint, publish_friction, restore_joint, settle_friction
-from ecu.estimation.joint.observer import update_joint
+from ecu.estimation.joint.observer import mistrust_wheels, update_joint
 from ecu.estimation.motion import MOTION_STATE, update_motion, usable
 from ecu.estimation.observer2 import OBSERVER_STATE
 from ecu.estimation.slip import (
@@ -87,6 +96,7 @@ STATE = np.dtype(
         ("friction_torque", FRICTION_TORQUE_STATE),
         ("blending", BLENDING_STATE),
         ("control", PRESSURE_LAW_STATE),
+        ("guard", SLIP_GUARD_STATE),
         ("limiter", LIMITER_STATE),
         ("mode", MODE_STATE),
         ("learned", LEARNED),
@@ -121,7 +131,7 @@ def _begin(params: Record, state: Record) -> None:
     p, s = params[0], state[0]
     restore_friction(p, s.friction, s.learned)
     restore_joint(p, s.joint, s.learned)
-    set_base(s.control, s.learned)
+    set_base(p, s.control, s.learned)
     start_discs(p, s.discs, s.learned)
     update_wheel_load(p, s.wheel_load, 0.0, 0.0, 0.0, 1.0)
     update_radius(p, s.wheels, s.learned, s.wheel_load.load)
@@ -150,6 +160,12 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
         faults |= FILTER_RESET
     if s.limiter.limited:
         faults |= DEMAND_LIMITED
+    if s.limiter.starved:
+        faults |= ACCUMULATOR_LOW
+    if s.guard.acting:
+        faults |= WHEEL_SLIPS
+    if s.control.at_limit:
+        faults |= BRAKE_FADE
     asked = math.isfinite(decel) and decel > 0.05
     mode = decide_mode(s.mode, faults, asked or s.application.braking != 0, dt)
     _publish(p, s, u, y, decel, faults, mode)
@@ -164,7 +180,7 @@ def _estimate(p: Record, s: Record, u: Record, dt: float) -> None:
         reset_force(s.force)
     braking = s.application.braking != 0
     if not braking:
-        set_base(s.control, s.learned)
+        set_base(p, s.control, s.learned)
     update_motion(p, s.motion, u, s.speed.speed, s.friction.torque)
     update_wheel_load(p, s.wheel_load, s.motion.accel_x, s.motion.accel_y, s.speed.speed, dt)
     update_pressure(p, s.friction, u, dt)
@@ -180,6 +196,8 @@ def _observe_jointly(p: Record, s: Record, u: Record, braking: bool, dt: float) 
     if s.application.started:
         for i in range(4):
             joint.p[MU + i, MU + i] += heat_widening(s.discs, i) ** 2
+    if s.guard.acting:
+        mistrust_wheels(joint)
     update_joint(p, joint, u, s.motion, s.wheel_load.load, s.limiter.pressure, braking, dt)
     if s.application.ended:
         settle_friction(p, joint, s.learned)
@@ -218,9 +236,7 @@ def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
     decel = update_demand(p, s.demand, u, speed, dt)
     watch_rear(p, s.distribution, u, s.motion, s.wheel_load.load, decel, speed, dt)
     distribute(p, s.distribution, decel)
-    if p.compensate:
-        follow_friction(s.control, s.friction.mu, dt)
-    s.limiter.limited = 0
+    follow_friction(p, s.control, s.friction.mu, dt)
     update_friction_torque(p, s.friction_torque, u, s.limiter.pressure, s.joint.pressures.zero, dt)
     update_motors(s.blending, u, dt)
     for i in range(4):
@@ -232,12 +248,25 @@ def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
         y.pressure_demand[i] = compensated_pressure(p, s.control, y.pressure_uncompensated[i], i)
     level_left_right(y.pressure_demand, y.pressure_uncompensated)
     cap_rear(p, s.distribution, decel, s.blending.lining, s.friction, y.pressure_demand)
-    for i in range(4):
-        torque = s.blending.lining[i]
-        wanted, uncompensated = y.pressure_demand[i], y.pressure_uncompensated[i]
-        y.pressure_demand[i] = limit_pressure(p, s.limiter, i, wanted, uncompensated, torque, dt) / BAR
-        y.pressure_uncompensated[i] = uncompensated / BAR
+    if p.slip_guard:
+        guard_slip(p, s.guard, u, s.motion, speed, s.limiter.pressure, y.pressure_demand, dt)
+    _limit(p, s, y, available_pressure(p, u), decel, dt)
     return decel
+
+
+@kernel
+def _limit(p: Record, s: Record, y: Record, available: float, decel: float, dt: float) -> None:
+    s.limiter.limited = s.limiter.starved = 0
+    for i in range(4):
+        wanted, uncompensated = y.pressure_demand[i], y.pressure_uncompensated[i]
+        ceiling = min(available, s.guard.cap[i]) if s.guard.capped[i] else available
+        torque = s.blending.lining[i]
+        pressure = limit_pressure(p, s.limiter, i, wanted, uncompensated, torque, ceiling, dt)
+        s.control.cut[i] = 1 if pressure < wanted - 1.0 else 0
+        if available < min(wanted, p.max_pressure):
+            s.limiter.starved = 1
+        y.pressure_demand[i], y.pressure_uncompensated[i] = pressure / BAR, uncompensated / BAR
+    watch_limit(p, s.control, s.friction.mu, s.guard.capped, decel > 0.0, dt)
 
 
 @kernel

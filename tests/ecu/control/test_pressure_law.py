@@ -1,10 +1,12 @@
 """Torque to pressure (5.4) and its compensation (corrected 5.8) against the brake's own law (A.19)."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from ecu.config import load_config, new_params
 from ecu.control.pressure_law import (
     PRESSURE_LAW_STATE,
     compensated_pressure,
@@ -12,10 +14,13 @@ from ecu.control.pressure_law import (
     level_left_right,
     pressure_for_torque,
     set_base,
+    watch_limit,
 )
+from ecu.params import INVERSE, OFF, SECOND_ORDER
 from ecu.records import LEARNED
 
 BAR = 1e5
+PARAMS = new_params(load_config(Path(__file__).parents[3] / "config" / "suv.toml"))[0]
 BRAKES = [(0.060, 0.1205), (0.060, 0.1205), (0.034, 0.1288), (0.034, 0.1288)]  # Table D.1: d_p, r_eff [m]
 PUSH_OUT = 0.5 * BAR
 
@@ -58,6 +63,17 @@ def test_truncation_costs_the_cube_of_the_change(params, corner: int, e: float, 
     assert torque_of(pressure, mu, corner) / 500.0 - 1 == pytest.approx(torque_error, abs=1e-9)
 
 
+@pytest.mark.parametrize("e", [-0.3, -0.15, 0.0, 0.15, 0.3])
+@pytest.mark.parametrize("corner", range(4))
+def test_the_inverse_is_exact(params, corner: int, e: float) -> None:
+    params["compensation"] = INVERSE
+    mu = 0.45 * (1 + e)
+    pressure = compensated_pressure(
+        params[0], law(used=mu), pressure_for_torque(params[0], 500.0, 0.45, corner), corner
+    )
+    assert torque_of(pressure, mu, corner) == pytest.approx(500.0, rel=1e-12)
+
+
 @pytest.mark.parametrize("pressure", [PUSH_OUT, 0.2 * BAR, 0.0])
 @pytest.mark.parametrize("used", [0.32, 0.58])
 def test_the_push_out_pressure_is_not_scaled(params, pressure: float, used: float) -> None:
@@ -71,7 +87,7 @@ def test_the_push_out_pressure_is_not_scaled(params, pressure: float, used: floa
 def test_compensation_saturates_at_30_percent_of_the_base(estimate: float, used: float) -> None:
     state = law()
     for _ in range(500):
-        follow_friction(state, np.full(4, estimate), 0.01)
+        follow_friction(PARAMS, state, np.full(4, estimate), 0.01)
     assert state["used"] == pytest.approx(np.full(4, used))
 
 
@@ -79,14 +95,14 @@ def test_compensation_saturates_at_30_percent_of_the_base(estimate: float, used:
 def test_the_friction_in_use_moves_no_faster_than_half_a_unit_a_second(dt: float) -> None:
     state = law()
     for k in range(1, 4):
-        follow_friction(state, np.array([0.6, 0.3, 0.45, 0.4501]), dt)
+        follow_friction(PARAMS, state, np.array([0.6, 0.3, 0.45, 0.4501]), dt)
         assert state["used"] == pytest.approx([0.45 + 0.5 * k * dt, 0.45 - 0.5 * k * dt, 0.45, 0.4501])
 
 
 def test_a_friction_that_is_not_a_number_does_not_stick(params) -> None:
     state = law()
-    follow_friction(state, np.full(4, math.nan), 0.01)
-    follow_friction(state, np.full(4, 0.45), 0.01)
+    follow_friction(PARAMS, state, np.full(4, math.nan), 0.01)
+    follow_friction(PARAMS, state, np.full(4, 0.45), 0.01)
     assert np.isfinite(state["used"]).all()
     assert np.isfinite(compensated_pressure(params[0], state, 30 * BAR, 0))
 
@@ -95,8 +111,73 @@ def test_the_base_is_what_was_learned() -> None:
     learned = np.zeros(1, LEARNED)
     learned["mu_b"] = [0.4, 0.41, 0.5, 0.51]
     state = law()
-    set_base(state, learned[0])
+    set_base(PARAMS, state, learned[0])
     assert list(state["base"]) == list(state["used"]) == [0.4, 0.41, 0.5, 0.51]
+
+
+def test_without_compensation_nominal_friction_counts_whatever_was_learned(params) -> None:
+    params["compensation"] = OFF
+    learned = np.zeros(1, LEARNED)
+    learned["mu_b"] = 0.3
+    state = law()
+    set_base(params[0], state, learned[0])
+    follow_friction(params[0], state, np.full(4, 0.36), 0.01)
+    assert list(state["base"]) == list(state["used"]) == [0.45] * 4
+
+
+@pytest.mark.parametrize(
+    ("case", "cut", "estimate", "after"),
+    [
+        ("friction falls, pressure is to be had", 0, 0.38, 0.445),
+        ("friction falls, pressure is cut: no more is asked for", 1, 0.38, 0.45),
+        ("friction rises, pressure is cut: less is asked for", 1, 0.52, 0.455),
+    ],
+)
+def test_friction_in_use_does_not_run_on_while_the_pressure_is_cut(case, cut, estimate, after) -> None:
+    state = law()
+    state["cut"] = cut
+    follow_friction(PARAMS, state, np.full(4, estimate), 0.01)
+    assert state["used"] == pytest.approx(np.full(4, after)), case
+
+
+@pytest.mark.parametrize(
+    ("case", "compensation", "estimate", "cut", "guarded", "asked", "told"),
+    [
+        ("friction as known", SECOND_ORDER, 0.45, 0, 0, True, False),
+        ("29 % below its base", SECOND_ORDER, 0.45 * 0.71, 0, 0, True, False),
+        ("31 % below its base", SECOND_ORDER, 0.45 * 0.69, 0, 0, True, True),
+        ("31 % below, nothing asked for", SECOND_ORDER, 0.45 * 0.69, 0, 0, False, False),
+        ("31 % below, inverse", INVERSE, 0.45 * 0.69, 0, 0, True, True),
+        ("31 % below, nobody compensates", OFF, 0.45 * 0.69, 0, 0, True, False),
+        ("31 % above: brakes more than asked, no fade", SECOND_ORDER, 0.45 * 1.31, 0, 0, True, False),
+        ("a pressure that cannot be had", SECOND_ORDER, 0.45, 1, 0, True, True),
+        ("a pressure cut because the wheel slips", SECOND_ORDER, 0.45, 1, 1, True, False),
+        ("not a number", SECOND_ORDER, math.nan, 0, 0, True, False),
+    ],
+)
+def test_when_the_driver_is_told_that_the_brakes_fade(
+    params, case, compensation, estimate, cut, guarded, asked, told
+) -> None:
+    params["compensation"] = compensation
+    state = law()
+    state["cut"][2] = cut
+    mu, guard = np.array([0.45, estimate, 0.45, 0.45]), np.array([0, 0, guarded, 0])
+    after = []
+    for _ in range(40):
+        watch_limit(params[0], state, mu, guard, asked, 0.01)
+        after.append(int(state["at_limit"]))
+    assert after[28] == 0, case  # 0.29 s
+    assert after[-1] == told, case
+
+
+def test_what_the_driver_is_told_lasts_until_the_brakes_are_released() -> None:
+    state, faded, well = law(), np.full(4, 0.3), np.full(4, 0.45)
+    seen = []
+    for mu, asked, cycles in ((faded, True, 40), (well, True, 100), (well, False, 1), (well, True, 40)):
+        for _ in range(cycles):
+            watch_limit(PARAMS, state, mu, np.zeros(4), asked, 0.01)
+        seen.append(int(state["at_limit"]))
+    assert seen == [1, 1, 0, 0]
 
 
 def test_the_ideal_controller_of_the_laboratory_is_exact(params) -> None:

@@ -143,7 +143,7 @@ class _Seed(NamedTuple):
 
 
 def _one_car(test: int, speed_known: bool, config: Config, seed: int) -> _Seed:
-    plain = config.model_copy(update={"control": config.control.model_copy(update={"compensate": False})})
+    plain = config.model_copy(update={"control": config.control.model_copy(update={"compensation": "off"})})
     ours = _brake(test, speed_known, config, seed)
     uncompensated = _brake(test, speed_known, plain, seed)
     ideal = _brake(test, speed_known, config, seed, ideal=True)
