@@ -41,7 +41,7 @@ GROWING = 10.0  # m/s^2; noise of the wheel speeds and braking as in RANGE stay 
 RETURNING = -5.0  # m/s^2
 GROWTH_LAG = 0.02  # s
 LEAST_SPEED = 3.0  # m/s
-CUT = 500.0 * BAR  # Pa/s
+CUT = 400.0 * BAR  # Pa/s
 RETURN = 200.0 * BAR  # Pa/s
 
 

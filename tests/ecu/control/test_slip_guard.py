@@ -50,8 +50,8 @@ def wheels(params, feed) -> Wheels:
 def test_a_wheel_that_falls_behind_is_capped_from_a_tenth_of_slip_on(wheels: Wheels) -> None:
     caps = wheels.run_into(-0.5)
     assert all(math.isinf(cap) for cap in caps[: 5 + 2])  # 5 and 10 % of slip
-    assert caps[5 + 2] == pytest.approx(55.0)  # 15 %: the last demand, less a cycle of 500 bar/s
-    assert np.diff(caps[5 + 2 :]) == pytest.approx(np.full(7, -5.0))
+    assert caps[5 + 2] == pytest.approx(56.0)  # 15 %: the last demand, less a cycle of 400 bar/s
+    assert np.diff(caps[5 + 2 :]) == pytest.approx(np.full(7, -4.0))
 
 
 def test_cut_down_to_the_push_out_pressure_and_no_further(wheels: Wheels) -> None:
