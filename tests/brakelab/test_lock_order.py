@@ -1,7 +1,7 @@
 """Wheel-lock sequence of ECE R13-H, Annex 5: the front locks before the rear, or within 0.1 s of it.
 
-The linings are at the wrong ends of their 2 sigma, 30 % off, and compensation is switched off: nothing but
-the watch over the rear's slip keeps the order.
+The linings are at the wrong ends of their 2 sigma, 30 % off; compensation and slip guard are switched off:
+nothing but the watch over the rear's slip keeps the order.
 """
 
 from pathlib import Path
@@ -29,11 +29,8 @@ def lock_times(road: float, speed: float, ramp: float, seed: int, watched: bool)
         {"plant": "suv", "initial_speed": speed, "road_friction": road, "phase": phases}
     )
     config = load_config(CONFIG / "suv.toml")
-    loop = new_loop(
-        scenario,
-        config.model_copy(update={"control": config.control.model_copy(update={"compensate": False})}),
-        seed,
-    )
+    control = config.control.model_copy(update={"compensation": "off", "slip_guard": False})
+    loop = new_loop(scenario, config.model_copy(update={"control": control}), seed)
     if not watched:
         loop.sides.params["rear_slip_margin"] = np.inf
     # The plant's linings are 0.85 and 1.10 of what the ECU counts on.

@@ -35,6 +35,11 @@ bias = [-0.1, 0.1]               # drawn per car; or one number
 [sensor.wheel_speed_fl]          # `wheel_speed` would be all four
 lost_from = 3.0                  # s
 
+[payload]                        # what the car carries
+mass = 495.0                     # kg
+behind = 0.65                    # m, of the empty car's centre of gravity
+height = 0.80                    # m
+
 [steering]
 angle = [[0.0, 0.0], [2.0, 0.03]]          # s, rad at the road wheel, left positive
 path = [[0.0, 0.0], [30.0, 3.5]]           # or m, m: what the driver steers after
