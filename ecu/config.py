@@ -189,6 +189,8 @@ class Blending(_Section):
 
     front: Annotated[float, Field(ge=0, le=1)] = 0.0
     rear: Annotated[float, Field(ge=0, le=1)] = 0.0
+    fade_speed: Annotated[float, Field(ge=0, lt=20)] = 3.0
+    """Below it the motors' limit falls with the speed, m/s (Figure A.7); a motor's own map knows better."""
 
 
 class Config(_Section):
@@ -313,6 +315,7 @@ def new_params(config: Config) -> RecordArray:
     for name in ("pedal_position", "pedal_decel"):
         points = getattr(control, name)
         row[name] = points + points[-1:] * (PEDAL_POINTS - len(points))
+    row["fade_speed"] = config.blending.fade_speed
     row["blending"] = np.repeat((config.blending.front, config.blending.rear), 2)
     heaviest = max(load.mass for load in vehicle.loads())
     down_grade = GRAVITY * math.sin(math.atan(control.hold_grade)) * heaviest / vehicle.mass

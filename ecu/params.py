@@ -85,6 +85,7 @@ PARAMS: Final = np.dtype(
         ("compensation", "i8"),  # COMPENSATIONS
         ("slip_guard", "u1"),
         ("blending", "f8", (4,)),  # f of (5.2): 0 off, 1 series phasing
+        ("fade_speed", "f8"),  # below it the motors' limit fades, m/s
     ],
     align=True,
 )

@@ -238,10 +238,10 @@ def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
     distribute(p, s.distribution, decel)
     follow_friction(p, s.control, s.friction.mu, dt)
     update_friction_torque(p, s.friction_torque, u, s.limiter.pressure, s.joint.pressures.zero, dt)
-    update_motors(s.blending, u, dt)
+    update_motors(p, s.blending, u, s.speed.speed, decel, dt)
     for i in range(4):
         torque = s.distribution.torque[i]
-        motor = blend(p, s.blending, torque, friction_torque(p, s.friction_torque, s.control, i), i)
+        motor = blend(p, s.blending, torque, friction_torque(p, s.friction_torque, s.control, i), i, dt)
         y.motor_demand[i] = motor if blends(p) else math.nan
         torque = s.blending.lining[i]
         y.pressure_uncompensated[i] = pressure_for_torque(p, torque, s.control.base[i], i)

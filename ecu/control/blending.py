@@ -7,9 +7,10 @@ Corrected: in print max(0, T_EM - T_max) is zero always, T_EM having been cut al
 
 The linings are asked for what the motor is planned to leave, and the motor gives what they do not give yet
 (`friction_torque.py`): it is ten times as fast as the hydraulics (26 ms dead time, 90 % after 0.1 s), so their
-sum follows the demand while torque changes hands. For that the plan has to be early: it goes by what the limit
-will be `AHEAD` from now where it falls, as it does towards standstill, and lets the motor take more again at a
-rate that the hydraulics follow. A motor whose limit or torque is unknown, or which does not give what it is
+sum follows the demand while torque changes hands. For that the plan has to be early: it goes by what limit and
+demand will be `AHEAD` from now where one falls or the other rises. Towards standstill the limit fades with the
+speed below `fade_speed`, which is known before it begins. The motor takes more again at a rate that the
+hydraulics follow. A motor whose limit or torque is unknown, or which does not give what it is
 asked for, is planned for no longer; its demand fades while the linings take over. Under ABS or ESP, and in
 reverse, it is zero at once. A motor that failed a braking is tried again in the next one.
 """
@@ -25,7 +26,9 @@ from ecu.signals import ABS_ACTIVE, ESP_ACTIVE, MOTOR_LIMIT, MOTOR_TORQUE, REVER
 BLENDING_STATE = np.dtype(
     [
         ("limit", "f8", (4,)),  # last one known [N m]
-        ("rate", "f8", (4,)),  # of the limit where it falls, low-passed, <= 0 [N m/s]
+        ("fall", "f8", (4,)),  # of the limit, low-passed [N m/s]
+        ("torque", "f8", (4,)),  # last demand [N m]
+        ("rise", "f8", (4,)),  # of the demand, low-passed [N m/s]
         ("ceiling", "f8", (4,)),  # the motor may be asked for this much [N m]
         ("allowed", "f8", (4,)),  # the plan may count on this much [N m]
         ("asked", "f8", (3, 4)),  # motor demands of the last cycles [N m], the newest in row 0
@@ -37,7 +40,7 @@ BLENDING_STATE = np.dtype(
 )
 
 AHEAD = 0.12  # s: dead time and lag of the hydraulics, and something for the motor to fill
-RATE_LAG = 0.5  # share of the old rate that a new sample leaves
+RATE_GAIN = 0.5  # of a new sample in a rate
 RISE = 2000.0  # N m/s, of what the plan counts on
 FADE = 6000.0  # N m/s, of the demand to a motor that is planned for no longer
 OLDEST_S = 0.05  # of a limit or torque
@@ -68,21 +71,42 @@ def _watch_motor(state: Record, inputs: Record, i: int, dt: float) -> None:
 
 
 @kernel
-def _follow_limit(state: Record, inputs: Record, i: int, dt: float) -> None:
+def _follow_limit(state: Record, inputs: Record, fading: float, i: int, dt: float) -> None:
+    """Take a limit in; `fading`: what the fade at low speed will leave of it."""
     limit: float = inputs.value[MOTOR_LIMIT + i]
     if fresh(inputs, MOTOR_LIMIT + i):
-        falling = min((limit - state.limit[i]) / dt, 0.0)
-        state.rate[i] = RATE_LAG * state.rate[i] + (1.0 - RATE_LAG) * falling
+        fall = max((state.limit[i] - limit) / dt, 0.0)
+        state.fall[i] += RATE_GAIN * (fall - state.fall[i])
         state.limit[i] = limit
-    state.ceiling[i] = max(limit + dt * state.rate[i], 0.0)
-    ahead = max(limit + AHEAD * state.rate[i], 0.0)
+    state.ceiling[i] = max(limit - dt * state.fall[i], 0.0)
+    ahead = max(min(limit - AHEAD * state.fall[i], fading * limit), 0.0)
     state.allowed[i] = min(ahead, state.allowed[i] + RISE * dt)
 
 
 @kernel
-def update_motors(state: Record, inputs: Record, dt: float) -> None:
-    """Overwrite what each motor may be asked for and planned with; `state` is `BLENDING_STATE`."""
+def _fading(params: Record, speed: float, decel: float) -> float:
+    """Return what will be left of a motor's limit of now when it fades below `fade_speed`."""
+    if not (params.fade_speed > 0.0 and speed > params.fade_speed):
+        return 1.0
+    return min(max(speed - AHEAD * decel, 0.0) / params.fade_speed, 1.0)
+
+
+@kernel
+def update_motors(
+    params: Record, state: Record, inputs: Record, speed: float, decel: float, dt: float
+) -> None:
+    """Overwrite what each motor may be asked for and planned with.
+
+    Args:
+        params: `PARAMS`.
+        state: `BLENDING_STATE`, overwritten.
+        inputs: `INPUTS`.
+        speed: of the vehicle [m/s].
+        decel: demanded [m/s^2], may be NaN.
+        dt: time since the last cycle [s].
+    """
     value = inputs.value
+    fading = _fading(params, speed, decel)
     forbidden = value[ABS_ACTIVE] > 0.5 or value[ESP_ACTIVE] > 0.5 or value[REVERSE] > 0.5
     for i in range(4):
         known = _current(inputs, MOTOR_LIMIT + i) and _current(inputs, MOTOR_TORQUE + i) and dt > 0.0
@@ -91,14 +115,14 @@ def update_motors(state: Record, inputs: Record, dt: float) -> None:
         if forbidden:
             state.ceiling[i] = state.allowed[i] = 0.0
         elif known and not state.lost[i]:
-            _follow_limit(state, inputs, i, dt)
+            _follow_limit(state, inputs, fading, i, dt)
         else:
             state.ceiling[i] = max(state.ceiling[i] - FADE * dt, 0.0)
             state.allowed[i] = 0.0
 
 
 @kernel
-def blend(params: Record, state: Record, torque: float, lining: float, i: int) -> float:
+def blend(params: Record, state: Record, torque: float, lining: float, i: int, dt: float) -> float:
     """Return the torque to ask of a wheel's motor [N m] and set that of its lining, `state.lining`.
 
     Args:
@@ -107,13 +131,18 @@ def blend(params: Record, state: Record, torque: float, lining: float, i: int) -
         torque: demanded of the wheel [N m], may be NaN.
         lining: what the lining will give at the end of the coming cycle [N m].
         i: wheel.
+        dt: time since the last cycle [s].
     """
     state.lining[i] = torque
     motor = 0.0
+    rise = max((torque - state.torque[i]) / dt, 0.0) if dt > 0.0 and torque > 0.0 else 0.0
+    state.rise[i] += RATE_GAIN * (rise - state.rise[i])
+    state.torque[i] = torque if torque > 0.0 else 0.0
     if not torque > 0.0:
         state.lost[i] = 0
     elif params.blending[i] > 0.0:
-        state.lining[i] = torque - min(params.blending[i] * torque, state.allowed[i])
+        allowed = max(state.allowed[i] - AHEAD * state.rise[i], 0.0)
+        state.lining[i] = torque - min(params.blending[i] * torque, allowed)
         motor = min(max(torque - lining, 0.0), state.ceiling[i])
     if not math.isfinite(motor):
         motor = 0.0
