@@ -236,6 +236,8 @@ class Scenario(_Section):
     """Errors of its sensors beside those that the car's file gives."""
     blending: bool = False
     """While brakes are asked for the motors do what the ECU asks; otherwise they rest."""
+    charge_limit: ByTime = []
+    """What the battery takes, W, instead of what the car's file says; at 0 its motors cannot brake."""
     motor_share: Share = 0.0
     """Of each deceleration asked for, what the motors take; the brakes are asked for the rest (5.2)."""
     trace: Trace | None = None
@@ -247,12 +249,14 @@ class Scenario(_Section):
 
     @model_validator(mode="after")
     def _consistent(self) -> "Scenario":
-        for name in ("road_friction", "grade"):
+        for name in ("road_friction", "grade", "charge_limit"):
             table = _rows(getattr(self, name))
-            if len(table) == 0 or np.any(np.diff(table[:, 0]) <= 0.0):
+            if (len(table) == 0 and name != "charge_limit") or np.any(np.diff(table[:, 0]) <= 0.0):
                 raise ValueError(f"{name}: give rows of rising time [[t, value], ...]")
         if any(value <= 0.0 for _, value in self.road_friction):
             raise ValueError("road_friction: give values above 0")
+        if any(value < 0.0 for _, value in self.charge_limit):
+            raise ValueError("charge_limit: give values of at least 0")
         for name, by_time in (("friction", "road_friction"), ("grade", "grade")):
             if getattr(self.road, name) and by_time in self.model_fields_set:
                 raise ValueError(f"give either {by_time} (by time) or road.{name} (by place)")
@@ -292,6 +296,7 @@ class Scenario(_Section):
             self.motor_share,
             -1 if fault is None else round(fault.time / CYCLE),
             1.0 if fault is None else fault.stiffness,
+            _rows(self.charge_limit),
         )
 
     def _phases(self, trace_end: float) -> NDArray[np.void]:

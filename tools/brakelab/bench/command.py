@@ -13,6 +13,7 @@ from rich.progress import track
 
 from brakelab.bench import codec, cycle, plant, step
 from brakelab.bench import stops as stops_bench
+from brakelab.bench.blending import CARS, blending_tables
 from brakelab.bench.energy import energy_tables
 from brakelab.bench.friction import friction_tables
 from brakelab.bench.measure import Figure, Row, machine
@@ -54,6 +55,14 @@ ENERGY: Final = "energy"
 ENERGY_TEXT: Final = (
     "Every scenario of config/scenarios in closed loop with the ECU of config/suv.toml. The simulated "
     "vehicle sums what leaves and enters in its own steps (tools/brakelab/plant/energy.py)."
+)
+
+BLENDING: Final = "blending"
+BLENDING_TEXT: Final = (
+    "Brakings from 75 km/h in closed loop with the ECU of config/suv.toml, whose motors take the share f on both "
+    f"axles. {CARS} cars, drawn from config/plant/suv.toml; figures are median (least–greatest) over them. Torque "
+    "is that of linings and motors, true; the demand is m a r with mass and radius of the configuration (5.1). "
+    "In the first two tables the ECU is told the true friction: what is left is the error of blending."
 )
 
 
@@ -99,8 +108,8 @@ def bench(name: str | None, json: bool, seeds: int = 20) -> int:
     """Run one bench, or without a name all that measure time; print tables, or JSON. Returns 0.
 
     In a checkout, a run of all times renews docs/benchmarks.md, `stops` docs/observer-accuracy.md,
-    `observers` docs/observers.md, `friction` docs/friction.md and `energy` docs/energy.md. `seeds`: how many
-    cars `stops` and `observers` draw.
+    `observers` docs/observers.md, `friction` docs/friction.md, `energy` docs/energy.md and `blending`
+    docs/blending.md. `seeds`: how many cars `stops` and `observers` draw.
 
     Raises:
         UserError: there is no such bench.
@@ -110,6 +119,7 @@ def bench(name: str | None, json: bool, seeds: int = 20) -> int:
         OBSERVERS: partial(_observers, seeds=seeds),
         FRICTION: _friction,
         ENERGY: _energy,
+        BLENDING: _blending,
     }
     if name is not None and name not in (*BENCHES, *others):
         raise UserError("bench", name, f"no such bench; choose one of {', '.join((*BENCHES, *others))}")
@@ -186,6 +196,10 @@ def _friction(json: bool) -> int:
 def _energy(json: bool) -> int:
     tables = energy_tables(resource("config/scenarios"), load_config(resource("config/suv.toml")))
     return _page(ENERGY, "Where the energy goes", ENERGY_TEXT, tables, json)
+
+
+def _blending(json: bool) -> int:
+    return _page(BLENDING, "Motors and linings brake together", BLENDING_TEXT, blending_tables(), json)
 
 
 def _page(name: str, title: str, text: str, tables: list[Table], json: bool) -> int:

@@ -53,6 +53,8 @@ def move(
     if round(state.t / CYCLE) == script.fault_cycle:
         for wheel in range(4):
             params.slip_stiffness[wheel] *= script.fault_stiffness
+    if len(script.charge_limit) > 0:
+        params.charge_limit = value_at(script.charge_limit, state.t, 1)
     for _ in range(STEPS):
         set_road(script.road, params, state, commands)
         advance(params, state, commands, STEP)

@@ -57,6 +57,8 @@ class Script(NamedTuple):
     fault_cycle: int = -1
     """From this cycle on the tyres' slip stiffness is `fault_stiffness` of what it was."""
     fault_stiffness: float = 1.0
+    charge_limit: NDArray[np.float64] = np.empty((0, 2))
+    """Rows of time [s] and what the battery takes [W], shape (n, 2); empty: what the car's file says."""
 
 
 @kernel
