@@ -13,10 +13,16 @@ import math
 
 import numpy as np
 
-from ecu.control.blending import BLENDING_STATE, blend, blends, update_motors
+from ecu.control.blending import (
+    BLENDING_STATE,
+    blends,
+    motor_torque_demand,
+    share_torque,
+    update_motors,
+)
 from ecu.control.demand import DEMAND_STATE, update_demand
 from ecu.control.distribution import DISTRIBUTION_STATE, cap_rear, distribute, watch_rear
-from ecu.control.friction_torque import FRICTION_TORQUE_STATE, friction_torque, update_friction_torque
+from ecu.control.friction_torque import FRICTION_TORQUE_STATE, follow_pressure, lagging_torque
 from ecu.control.limiter import LIMITER_STATE, available_pressure, limit_pressure
 from ecu.control.mode import MODE_STATE, decide_mode, input_faults
 from ecu.control.pressure_law import (
@@ -237,19 +243,19 @@ def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
     watch_rear(p, s.distribution, u, s.motion, s.wheel_load.load, decel, speed, dt)
     distribute(p, s.distribution, decel)
     follow_friction(p, s.control, s.friction.mu, dt)
-    update_friction_torque(p, s.friction_torque, u, s.limiter.pressure, s.joint.pressures.zero, dt)
-    update_motors(p, s.blending, u, s.speed.speed, decel, dt)
+    follow_pressure(p, s.friction_torque, u, s.limiter.pressure, s.joint.pressures.zero, dt)
+    update_motors(p, s.blending, u, s.guard.capped, s.speed.speed, decel, dt)
+    share_torque(p, s.blending, s.distribution.torque, dt)
     for i in range(4):
-        torque = s.distribution.torque[i]
-        motor = blend(p, s.blending, torque, friction_torque(p, s.friction_torque, s.control, i), i, dt)
-        y.motor_demand[i] = motor if blends(p) else math.nan
         torque = s.blending.lining[i]
         y.pressure_uncompensated[i] = pressure_for_torque(p, torque, s.control.base[i], i)
         y.pressure_demand[i] = compensated_pressure(p, s.control, y.pressure_uncompensated[i], i)
     level_left_right(y.pressure_demand, y.pressure_uncompensated)
     cap_rear(p, s.distribution, decel, s.blending.lining, s.friction, y.pressure_demand)
     if p.slip_guard:
-        guard_slip(p, s.guard, u, s.motion, speed, s.limiter.pressure, y.pressure_demand, dt)
+        guard_slip(
+            p, s.guard, u, s.motion, speed, s.limiter.pressure, y.pressure_demand, s.distribution.torque, dt
+        )
     _limit(p, s, y, available_pressure(p, u), decel, dt)
     return decel
 
@@ -266,6 +272,8 @@ def _limit(p: Record, s: Record, y: Record, available: float, decel: float, dt: 
         if available < min(wanted, p.max_pressure):
             s.limiter.starved = 1
         y.pressure_demand[i], y.pressure_uncompensated[i] = pressure / BAR, uncompensated / BAR
+        motor = motor_torque_demand(p, s.blending, lagging_torque(p, s.friction_torque, s.control, wanted, i), i)
+        y.motor_demand[i] = motor if blends(p) else math.nan
     watch_limit(p, s.control, s.friction.mu, s.guard.capped, decel > 0.0, dt)
 
 

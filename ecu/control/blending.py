@@ -1,21 +1,21 @@
 """Who brakes a wheel: motor or lining (corrected 5.2, 5.3).
 
     T_EM,plan = sat_0^T_max(f T_b)        T_EHB = T_b - T_EM,plan          f: 0 off, 1 series, else parallel
-    T_EM      = sat_0^T_max(T_b - T_lining)
+    T_EM      = sat_0^T_max(T_EM,plan + what the lining still lacks of T_EHB)
 
 Corrected: in print max(0, T_EM - T_max) is zero always, T_EM having been cut already.
 
-The linings are asked for what the motor is planned to leave, and the motor gives what they do not give yet
-(`friction_torque.py`): it is ten times as fast as the hydraulics (26 ms dead time, 90 % after 0.1 s), so their
-sum follows the demand while torque changes hands. For that the plan has to be early: it goes by what limit and
-demand will be `AHEAD` from now where one falls or the other rises. Towards standstill the limit fades with the
-speed below `fade_speed`, which is known before it begins. The motor takes more again at a rate that the
-hydraulics follow. Where the plan drops, the last part of the linings' share comes later: the pressure overshoots
-a step by 6 %, and a motor that is gone makes up for nothing.
+The linings are asked for what the motor is planned to leave, and the motor gives beside its plan what they do
+not give yet (`friction_torque.py`): it is ten times as fast as the hydraulics (26 ms dead time, 90 % after
+0.1 s), so their sum follows the demand while torque changes hands. For that the plan has to be early: it goes
+by what limit and demand will be `AHEAD` from now where one falls or the other rises. Towards standstill the
+limit fades with the speed below `fade_speed`, which is known before it begins. The motor takes more again at
+a rate that the hydraulics follow. Where the plan drops, the last part of the linings' share comes later: the
+pressure overshoots a step by 6 %, and a motor that is gone makes up for nothing.
 
-A motor whose limit or torque is unknown, or which does not give what it is asked for, is planned for no longer;
-its demand fades while the linings take over. It is tried again in the next braking. Under ABS or ESP, and in
-reverse, motors are asked for nothing at once.
+A motor whose limit or torque is unknown, or which does not give what it is asked for, is planned for no
+longer; its demand fades while the linings take over. It is tried again in the next braking. Under ABS or ESP,
+in reverse and at a wheel that the slip guard holds, the motor is asked for nothing at once.
 """
 
 import math
@@ -39,6 +39,7 @@ BLENDING_STATE = np.dtype(
         ("lost", "u1", (4,)),  # it gave too little in this braking
         ("slow", "f8", (4,)),  # plan, low-passed [N m]
         ("lining", "f8", (4,)),  # torque that the lining is asked for [N m]
+        ("plan", "f8", (4,)),  # the rest of the demand [N m]
     ],
     align=True,
 )
@@ -81,7 +82,7 @@ def _follow_limit(state: Record, inputs: Record, fading: float, i: int, dt: floa
     limit: float = inputs.value[MOTOR_LIMIT + i]
     if fresh(inputs, MOTOR_LIMIT + i):
         fall = max((state.limit[i] - limit) / dt, 0.0)
-        state.fall[i] += RATE_GAIN * (fall - state.fall[i])
+        state.fall[i] = max(fall, state.fall[i] + RATE_GAIN * (fall - state.fall[i]))
         state.limit[i] = limit
     state.ceiling[i] = max(limit - dt * state.fall[i], 0.0)
     ahead = max(min(limit - AHEAD * state.fall[i], fading * limit), 0.0)
@@ -98,7 +99,7 @@ def _fading(params: Record, speed: float, decel: float) -> float:
 
 @kernel
 def update_motors(
-    params: Record, state: Record, inputs: Record, speed: float, decel: float, dt: float
+    params: Record, state: Record, inputs: Record, guarded: Record, speed: float, decel: float, dt: float
 ) -> None:
     """Overwrite what each motor may be asked for and planned with.
 
@@ -106,6 +107,7 @@ def update_motors(
         params: `PARAMS`.
         state: `BLENDING_STATE`, overwritten.
         inputs: `INPUTS`.
+        guarded: wheels whose lining is held back because they slip, shape (4,).
         speed: of the vehicle [m/s].
         decel: demanded [m/s^2], may be NaN.
         dt: time since the last cycle [s].
@@ -117,7 +119,7 @@ def update_motors(
         known = _current(inputs, MOTOR_LIMIT + i) and _current(inputs, MOTOR_TORQUE + i) and dt > 0.0
         if known:
             _watch_motor(state, inputs, i, dt)
-        if forbidden:
+        if forbidden or guarded[i]:
             state.ceiling[i] = state.allowed[i] = 0.0
         elif known and not state.lost[i]:
             _follow_limit(state, inputs, fading, i, dt)
@@ -127,33 +129,35 @@ def update_motors(
 
 
 @kernel
-def blend(params: Record, state: Record, torque: float, lining: float, i: int, dt: float) -> float:
-    """Return the torque to ask of a wheel's motor [N m] and set that of its lining, `state.lining`.
+def share_torque(params: Record, state: Record, torque: Record, dt: float) -> None:
+    """Overwrite what the linings are asked for and what is planned for the motors.
 
     Args:
         params: `PARAMS`.
         state: `BLENDING_STATE`, after `update_motors`.
-        torque: demanded of the wheel [N m], may be NaN.
-        lining: what the lining will give at the end of the coming cycle [N m].
-        i: wheel.
+        torque: demanded of the wheels [N m], shape (4,); may be NaN.
         dt: time since the last cycle [s].
     """
-    state.lining[i] = torque
-    motor = 0.0
-    rise = max((torque - state.torque[i]) / dt, 0.0) if dt > 0.0 and torque > 0.0 else 0.0
-    state.rise[i] += RATE_GAIN * (rise - state.rise[i])
-    state.torque[i] = torque if torque > 0.0 else 0.0
-    if not torque > 0.0:
-        state.lost[i] = 0
-        state.slow[i] = 0.0
-    elif params.blending[i] > 0.0:
+    for i in range(4):
+        demand = max(torque[i], 0.0) if math.isfinite(torque[i]) else 0.0
+        rise = max((demand - state.torque[i]) / dt, 0.0) if dt > 0.0 else 0.0
+        state.rise[i] += RATE_GAIN * (rise - state.rise[i])
+        state.torque[i] = demand
         allowed = max(state.allowed[i] - AHEAD * state.rise[i], 0.0)
-        plan = min(params.blending[i] * torque, allowed)
+        plan = min(params.blending[i] * demand, allowed)
         later = LATER * max(state.slow[i] - plan, 0.0)
         state.slow[i] += (1.0 - math.exp(-dt / LATER_S)) * (plan - state.slow[i])
-        state.lining[i] = max(torque - plan - later, 0.0)
-        motor = min(max(torque - lining, 0.0), state.ceiling[i])
-    if not math.isfinite(motor):
+        state.plan[i] = min(plan + later, demand)
+        state.lining[i] = torque[i] - state.plan[i]
+        if demand == 0.0:
+            state.lost[i] = 0
+
+
+@kernel
+def motor_torque_demand(params: Record, state: Record, lag: float, i: int) -> float:
+    """Return the torque to ask of a wheel's motor [N m]; `lag` [N m] is what its lining still lacks."""
+    motor = min(max(state.plan[i] + lag, 0.0), state.torque[i], state.ceiling[i])
+    if not (params.blending[i] > 0.0 and math.isfinite(motor)):
         motor = 0.0
     state.asked[2, i], state.asked[1, i], state.asked[0, i] = state.asked[1, i], state.asked[0, i], motor
     return motor

@@ -1,14 +1,14 @@
-"""Brake torque of the linings at the end of the coming cycle: what motors have to leave to them.
+"""How far the linings' torque lags behind what they are to have: what motors can make up for.
 
-Model. Of the demands sent, what the hydraulics let through after their dead time (A.17, A.18: a rise after 26,
-a fall after 15 ms; here 25 and 15, half cycles) drives a pressure of second order,
+Model. Of the demands sent, what the hydraulics let through after their dead time (A.17, A.18: a rise after
+26, a fall after 15 ms; here 25 and 15, half cycles) drives a pressure of second order,
 
     inertia p'' + damping p' + p = min(rise, fall)
 
-by the trapezoidal rule. The dead time is longer than a cycle, so the coming one is known already. The sensor's
-1.8 bar of noise is some 50 N m at a front wheel: its samples correct the course of the model, the more the more
-that has moved. Torque is 2 A_k r_eff mu (p - p_0) (A.19) with the friction that the pressure law uses: motors
-make up for the hydraulics' lag, not for what the law does not know.
+by the trapezoidal rule. The dead time is longer than a cycle, so the coming one is known already. The
+sensor's 1.8 bar of noise is some 50 N m at a front wheel: its samples correct the course of the model, the
+more the more that has moved. Torque is 2 A_k r_eff mu (p - p_0) (A.19) with the friction that the pressure
+law uses: this is about lags, not about what the law does not know, or holds back.
 """
 
 import numpy as np
@@ -66,7 +66,7 @@ def _advance_cycle(state: Record, i: int, sent: float) -> None:
 
 
 @kernel
-def update_friction_torque(
+def follow_pressure(
     params: Record, state: Record, inputs: Record, sent: Record, zero: Record, dt: float
 ) -> None:
     """Take in the demands of the last cycle and the pressures measured now.
@@ -91,8 +91,17 @@ def update_friction_torque(
 
 
 @kernel
-def friction_torque(params: Record, state: Record, law: Record, i: int) -> float:
-    """Return a wheel's brake torque [N m] at the end of the coming cycle, `law` being `PRESSURE_LAW_STATE`."""
+def lagging_torque(params: Record, state: Record, law: Record, wanted: float, i: int) -> float:
+    """Return what a wheel's lining lacks of the torque it is to have, at the end of the coming cycle [N m].
+
+    Args:
+        params: `PARAMS`.
+        state: `FRICTION_TORQUE_STATE`.
+        law: `PRESSURE_LAW_STATE`, for the friction.
+        wanted: the pressure that it is to have now [Pa].
+        i: wheel.
+    """
     lever: float = 2.0 * params.piston_area[i] * params.effective_radius[i]
-    above = BAR * state.value[i] - params.push_out_pressure[i]
-    return lever * friction_in_use(law, i) * max(above, 0.0)
+    push_out = params.push_out_pressure[i]
+    missing = max(wanted - push_out, 0.0) - max(BAR * state.value[i] - push_out, 0.0)
+    return lever * friction_in_use(law, i) * missing

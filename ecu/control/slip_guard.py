@@ -73,6 +73,7 @@ def guard_slip(
     speed: float,
     sent: Record,
     wanted: Record,
+    torque: Record,
     dt: float,
 ) -> None:
     """Overwrite which wheels are capped, and at which pressure.
@@ -85,6 +86,7 @@ def guard_slip(
         speed: of the car [m/s], NaN where it is not known.
         sent: pressures demanded in the last cycle [Pa], shape (4,).
         wanted: pressures that the pressure law asks for now [Pa], shape (4,).
+        torque: demanded of the wheels, of motors and linings [N m], shape (4,).
         dt: time since the last cycle [s].
     """
     watching = speed > LEAST_SPEED and not _flag(inputs, REVERSE)
@@ -102,6 +104,6 @@ def guard_slip(
             state.cap[i] += RETURN * dt
             if not state.cap[i] < wanted[i]:
                 state.capped[i] = 0
-        if not wanted[i] > 0.0:
+        if not torque[i] > 0.0:
             state.capped[i] = 0
         state.acting = max(state.acting, state.capped[i])

@@ -27,7 +27,7 @@ class Wheels:
         omega = self.speed / self.params["wheel_radius"]
         omega[0] *= 1.0 + slip
         self.feed(self.inputs, wheel_speed=omega, **self.flags)
-        pressures = self.sent, self.wanted
+        pressures = self.sent, self.wanted, self.wanted
         guard_slip(self.params, self.state, self.inputs[0], self.motion, self.speed, *pressures, DT)
         assert not self.state["capped"][1:].any()
         assert self.state["acting"] == self.state["capped"][0]

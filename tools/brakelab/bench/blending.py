@@ -1,9 +1,9 @@
-"""Brake blending in closed loop: torque while it changes hands, a motor that is lost, and what friction that is
+"""Brake blending in closed loop: torque that changes hands, motors that are lost, and what friction that is
 wrong does to the sum (sections 5.3, 5.7; Figure 5.8).
 
 Torque is that of linings and motors of all wheels, true; the demand is m a r with mass and radius of the
-configuration (5.1). Counted from when the demand has its full value down to 1 km/h. While torque changes hands
-the ECU is told the true friction: what is left is the error of blending.
+configuration (5.1). Counted from the full demand down to 1 km/h. For the first two the ECU is told the true
+friction: what is left is the error of blending.
 """
 
 from collections.abc import Callable
@@ -12,10 +12,10 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.bench.measure import Figure, figure
+from brakelab.bench.measure import figure
 from brakelab.bench.observers_cases import shipped
 from brakelab.bench.stops import FULL, window
-from brakelab.bench.table import Table
+from brakelab.bench.table import Table, spread
 from brakelab.closed_loop import Drive, Loop, new_loop, run
 from brakelab.plant.friction.ilvo_bounded import DEBRIS, HEAT, SPEED
 from brakelab.plant.sensor_errors import SensorErrors
@@ -38,9 +38,9 @@ SHARES: Final = (0.0, 0.2, 0.4, 0.6, 0.8)
 class Changing(NamedTuple):
     """Torque of one braking while it changes hands."""
 
-    least: float
-    """Error to the demand [%]."""
-    greatest: float
+    below: float
+    """The demand by at most [%]."""
+    above: float
     outside_ms: float
     """The longest time outside `TOLERANCE`."""
     motors: float
@@ -52,10 +52,10 @@ class Loss(NamedTuple):
 
     within_ms: float
     """After the loss; from then on the sum is within `TOLERANCE` of the demand."""
-    least: float
-    """The least sum less what the linings gave before, of the demand [%]; not below 0 but for rounding."""
-    greatest: float
-    """Error to the demand after the loss [%]."""
+    missing: float
+    """Of what the linings gave before, at most [% of the demand]."""
+    above: float
+    """The demand after the loss by at most [%]."""
 
 
 def blended(share: float, compensate: bool = True) -> Config:
@@ -114,7 +114,7 @@ def changing(drive: Drive, config: Config) -> Changing:
     speed = drive.truth["vehicle_speed"][rows]
     taken = float(motors @ speed) / float((linings + motors) @ speed)
     outside = _longest(np.abs(error) > TOLERANCE)
-    return Changing(float(error.min()), float(error.max()), 10.0 * outside, 100.0 * taken)
+    return Changing(-float(error.min()), float(error.max()), 10.0 * outside, 100.0 * taken)
 
 
 def loss(drive: Drive, config: Config) -> Loss:
@@ -127,8 +127,8 @@ def loss(drive: Drive, config: Config) -> Loss:
     outside = np.flatnonzero(np.abs(error) > TOLERANCE)
     first = rows[: np.argmax(rows)].size + (int(outside[-1]) + 1 if len(outside) else 0)
     before = linings[np.argmax(rows) - 3]
-    least = float(np.min((total - before) / wanted))
-    return Loss(1e3 * float(drive.t[first] - LOSS), 100.0 * least, float(error.max()))
+    missing = 100.0 * float(np.max((before - total) / wanted))
+    return Loss(round(1e3 * float(drive.t[first] - LOSS)), max(missing, 0.0), float(error.max()))
 
 
 def freeze_friction(loop: Loop) -> None:
@@ -169,13 +169,9 @@ def wrong_friction(share: float, ratio: float, compensate: bool, seed: int) -> f
     return float(100.0 * np.sqrt(np.mean((decel - wanted) ** 2)) / np.mean(wanted))
 
 
-def _spread(value: Figure) -> str:
-    return f"{value.median:.2f} ({value.low:.2f}–{value.high:.2f})"
-
-
 def _over_cars(of: Callable[[int], NamedTuple], cars: int) -> list[str]:
     """Return each field of what `of` gives for a seed as median (least–greatest) over the cars."""
-    return [_spread(figure(values)) for values in zip(*map(of, range(cars)), strict=True)]
+    return [spread(figure(values)) for values in zip(*map(of, range(cars)), strict=True)]
 
 
 def _drive(scenario: Scenario, config: Config, seed: int) -> Drive:
@@ -201,16 +197,10 @@ def _changing_table(cars: int) -> Table:
             return changing(_drive(scenario, config, seed), config)
 
         rows.append((name, *_over_cars(one, cars)))
-    columns = (
-        "case",
-        "least error [%]",
-        "greatest error [%]",
-        "longest outside 2 % [ms]",
-        "motors' share [%]",
-    )
+    columns = ("case", "below [%]", "above [%]", "longest outside 2 % [ms]", "motors' share [%]")
     below = (
-        f"Sum of the torques over the demand, from the full demand to {3.6 * LOWEST_SPEED:g} km/h; "
-        "motors' share: of the braking energy."
+        "How far the sum of the torques is below and above the demand at most, from the full demand to "
+        f"{3.6 * LOWEST_SPEED:g} km/h; motors' share: of the braking energy."
     )
     return Table("Torque that changes hands", columns, rows, below)
 
@@ -224,12 +214,7 @@ def _loss_table(cars: int) -> Table:
             return loss(_drive(shipped("motor-loss"), config, seed), config)
 
         rows.append((f"{share:g}", *_over_cars(one, cars)))
-    columns = (
-        "f",
-        "within 2 % after [ms]",
-        "least sum over linings before [% of the demand]",
-        "greatest error [%]",
-    )
+    columns = ("f", "within 2 % after [ms]", "below the linings before [% of the demand]", "above [%]")
     below = (
         f"At t = {LOSS:g} s of config/scenarios/motor-loss.toml limit and torque of all motors become zero."
     )
@@ -243,14 +228,15 @@ def _wrong_friction_table(cars: int) -> Table:
         for ratio in (1.0 + WRONG, 1.0 - WRONG):
             for compensate in (False, True):
                 errors = [wrong_friction(share, ratio, compensate, seed) for seed in range(cars)]
-                cells.append(_spread(figure(errors)))
+                cells.append(spread(figure(errors)))
         rows.append((f"{share:g}", *cells))
     columns = ("f", "under-braking", "compensated", "over-braking", "compensated ")
     below = (
-        "Figure 5.8: root mean square of the sum's error over the demand, as deceleration: the sum over mass and "
-        f"radius of the car, the friction a constant, the configured one {100.0 * WRONG:.0f} % too high "
-        "(under-braking) or too low. Nothing was learned before. Counted from 0.5 s after the full demand to "
-        "15 km/h. Without compensation the error holds that of the configured mass too (up to 3 %)."
+        "Figure 5.8: root mean square of the error over the demand, as deceleration: the sum of the torques "
+        "over mass and radius of the car. Friction is a constant, the configured one "
+        f"{100.0 * WRONG:.0f} % too high (under-braking) or too low. Nothing was learned before. Counted from "
+        "0.5 s after the full demand to 15 km/h. Without compensation the error holds that of the configured "
+        "mass too (up to 3 %)."
     )
     return Table("Friction wrong by 15 %: error of the deceleration [%]", columns, rows, below)
 

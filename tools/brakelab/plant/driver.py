@@ -43,8 +43,8 @@ class Script(NamedTuple):
     """Rows of time [s] and grade [rad], shape (n, 2)."""
     ambient_temperature: float
     blending: bool
-    """While the driver asks for brakes the motors do what the ECU asks; otherwise they rest in braking phases,
-    but for `motor_share`."""
+    """While brakes are asked for the motors do what the ECU asks; otherwise they rest in braking phases, but
+    for `motor_share`."""
     road: Road = LEVEL
     """What is described by place goes before what is described by time."""
     steering: Steering = HANDS_OFF
