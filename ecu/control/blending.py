@@ -57,7 +57,8 @@ SHORT_S = 0.03
 @kernel
 def blends(params: Record) -> bool:
     """Return whether any wheel's motor is to brake."""
-    return params.blending[0] + params.blending[2] > 0.0
+    blending: bool = params.blending[0] + params.blending[2] > 0.0
+    return blending
 
 
 @kernel
@@ -92,9 +93,10 @@ def _follow_limit(state: Record, inputs: Record, fading: float, i: int, dt: floa
 @kernel
 def _fading(params: Record, speed: float, decel: float) -> float:
     """Return what will be left of a motor's limit of now when it fades below `fade_speed`."""
-    if not (params.fade_speed > 0.0 and speed > params.fade_speed):
+    if not (params.fade_speed > 0.0 and speed > params.fade_speed and decel > 0.0):
         return 1.0
-    return min(max(speed - AHEAD * decel, 0.0) / params.fade_speed, 1.0)
+    left: float = min(max(speed - AHEAD * decel, 0.0) / params.fade_speed, 1.0)
+    return left
 
 
 @kernel
@@ -156,7 +158,7 @@ def share_torque(params: Record, state: Record, torque: Record, dt: float) -> No
 @kernel
 def motor_torque_demand(params: Record, state: Record, lag: float, i: int) -> float:
     """Return the torque to ask of a wheel's motor [N m]; `lag` [N m] is what its lining still lacks."""
-    motor = min(max(state.plan[i] + lag, 0.0), state.torque[i], state.ceiling[i])
+    motor: float = min(max(state.plan[i] + lag, 0.0), state.torque[i], state.ceiling[i])
     if not (params.blending[i] > 0.0 and math.isfinite(motor)):
         motor = 0.0
     state.asked[2, i], state.asked[1, i], state.asked[0, i] = state.asked[1, i], state.asked[0, i], motor

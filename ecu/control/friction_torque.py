@@ -104,4 +104,5 @@ def lagging_torque(params: Record, state: Record, law: Record, wanted: float, i:
     lever: float = 2.0 * params.piston_area[i] * params.effective_radius[i]
     push_out = params.push_out_pressure[i]
     missing = max(wanted - push_out, 0.0) - max(BAR * state.value[i] - push_out, 0.0)
-    return lever * friction_in_use(law, i) * missing
+    torque: float = lever * friction_in_use(law, i) * missing
+    return torque

@@ -48,6 +48,7 @@ FACTS = {
     "blending-40": Fact((7, 8), 0.0, 20.8, (3.9, 4.4)),
     "blending-60": Fact((7, 8), 0.0, 20.8, (3.9, 4.4)),
     "blending-80": Fact((7, 8), 0.0, 20.8, (3.9, 4.4)),
+    "charge-limit": Fact((7, 8), 0.0, 20.8, (3.9, 4.4)),  # this ECU's motors rest
     "bursts": Fact((40, 55), 0.0, 27.8, (2.0, 2.5)),  # Table 6.1: 1.5 to 1.6 with another pedal
     "curve": Fact((12, 16), 0.0, 22.4, (2.9, 3.5), (5.0, 9.0)),
     "demo": Fact((50, 58), 0.0, 27.8, (5.0, 6.5)),
@@ -55,6 +56,8 @@ FACTS = {
     "fade": Fact((140, 170), 5.6, 27.8, (3.3, 3.6), disc=(350, 500)),
     "fixed-decel": Fact(LONG, CUT_OFF, 13.9, (1.2, 1.4)),
     "fixed-pedal": Fact(LONG, CUT_OFF, 27.8, (0.9, 1.1)),  # Table 6.1: about 1
+    "hand-over": Fact((7, 8), 0.0, 20.8, (3.9, 4.4)),
+    "motor-loss": Fact((7, 8), 0.0, 20.8, (3.9, 4.4)),
     "lane-change": Fact((8.9, 9.1), 22.2, 22.3, (-0.2, 0.2), (4.0, 7.0)),
     "low-grip": Fact((5, 8), 0.0, 20.8, (4.0, 5.0)),
     "ordinary": Fact(LONG, CUT_OFF, 25.0, (0.0, 0.0), (1.5, 2.6)),  # on the motors for the first minute

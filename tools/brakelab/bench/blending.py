@@ -19,6 +19,7 @@ from brakelab.bench.table import Table, spread
 from brakelab.closed_loop import Drive, Loop, new_loop, run
 from brakelab.plant.friction.ilvo_bounded import DEBRIS, HEAT, SPEED
 from brakelab.plant.sensor_errors import SensorErrors
+from brakelab.rig.faults import Fault
 from brakelab.scenario import Phase, Scenario
 from ecu.config import Config, load_config, new_params
 from ecu.resources import resource
@@ -205,19 +206,32 @@ def _changing_table(cars: int) -> Table:
     return Table("Torque that changes hands", columns, rows, below)
 
 
+def _faulty(*faults: Fault) -> Scenario:
+    """Return the scenario hand-over with faults."""
+    return shipped("hand-over").model_copy(update={"fault": list(faults)})
+
+
 def _loss_table(cars: int) -> Table:
+    gone = Fault(kind="motor_lost", t=LOSS)
+    hidden = Fault(kind="stuck", t=LOSS, signal=["motor_limit"])
+    mute = Fault(kind="lost", t=LOSS, message=["MotorFront", "MotorRear"])
+    cases: dict[str, tuple[Scenario, float]] = {
+        **{f"limit 0 is told, f = {f:g}": (shipped("motor-loss"), f) for f in (*SHARES[1:], 1.0)},
+        "limit told as before, f = 0.8": (_faulty(gone, hidden), 0.8),
+        "limit told as before, f = 1": (_faulty(gone, hidden), 1.0),
+        "frames of the motors stop, f = 0.8": (_faulty(gone, mute), 0.8),
+        "frames of the motors stop, f = 1": (_faulty(gone, mute), 1.0),
+    }
     rows = []
-    for share in (*SHARES[1:], 1.0):
+    for name, (scenario, share) in cases.items():
         config = blended(share)
 
-        def one(seed: int, config: Config = config) -> Loss:
-            return loss(_drive(shipped("motor-loss"), config, seed), config)
+        def one(seed: int, scenario: Scenario = scenario, config: Config = config) -> Loss:
+            return loss(_drive(scenario, config, seed), config)
 
-        rows.append((f"{share:g}", *_over_cars(one, cars)))
-    columns = ("f", "within 2 % after [ms]", "below the linings before [% of the demand]", "above [%]")
-    below = (
-        f"At t = {LOSS:g} s of config/scenarios/motor-loss.toml limit and torque of all motors become zero."
-    )
+        rows.append((name, *_over_cars(one, cars)))
+    columns = ("case", "within 2 % after [ms]", "below the linings before [% of the demand]", "above [%]")
+    below = f"All motors are lost at t = {LOSS:g} s; the sum is counted from then on."
     return Table("Motors lost", columns, rows, below)
 
 
@@ -234,9 +248,9 @@ def _wrong_friction_table(cars: int) -> Table:
     below = (
         "Figure 5.8: root mean square of the error over the demand, as deceleration: the sum of the torques "
         "over mass and radius of the car. Friction is a constant, the configured one "
-        f"{100.0 * WRONG:.0f} % too high (under-braking) or too low. Nothing was learned before. Counted from "
-        "0.5 s after the full demand to 15 km/h. Without compensation the error holds that of the configured "
-        "mass too (up to 3 %)."
+        f"{100.0 * WRONG:.0f} % too high (under-braking) or too low. Nothing was learned before. Counted "
+        "from 0.5 s after the full demand to 15 km/h. Without compensation the error holds that of the "
+        "configured mass too (up to 3 %)."
     )
     return Table("Friction wrong by 15 %: error of the deceleration [%]", columns, rows, below)
 
