@@ -272,7 +272,9 @@ def _limit(p: Record, s: Record, y: Record, available: float, decel: float, dt: 
         if available < min(wanted, p.max_pressure):
             s.limiter.starved = 1
         y.pressure_demand[i], y.pressure_uncompensated[i] = pressure / BAR, uncompensated / BAR
-        motor = motor_torque_demand(p, s.blending, lagging_torque(p, s.friction_torque, s.control, wanted, i), i)
+        motor = motor_torque_demand(
+            p, s.blending, lagging_torque(p, s.friction_torque, s.control, wanted, i), i
+        )
         y.motor_demand[i] = motor if blends(p) else math.nan
     watch_limit(p, s.control, s.friction.mu, s.guard.capped, decel > 0.0, dt)
 

@@ -25,14 +25,14 @@ class Motors:
         params["blending"] = share
         self.p, self.feed, self.inputs = params[0], feed, feed(motor_limit=limit)
         self.state = np.zeros(1, BLENDING_STATE)[0]
-        self.gives, self.asked = gives, np.zeros(4)
+        self.gives, self.asked, self.guarded = gives, np.zeros(4), np.zeros(4, np.uint8)
         for _ in range(300):  # s until the plan counts on all of the limit
             self.cycle(0.0)
 
     def cycle(self, torque: float, lag: float = 0.0, speed: float = SPEED, **inputs: float) -> float:
         """Run a cycle with this torque demanded of each wheel; return what the first motor is asked for."""
         self.feed(self.inputs, **{"motor_torque": self.gives * self.asked, **inputs})
-        update_motors(self.p, self.state, self.inputs[0], speed, DECEL, DT)
+        update_motors(self.p, self.state, self.inputs[0], self.guarded, speed, DECEL, DT)
         share_torque(self.p, self.state, np.full(4, torque), DT)
         self.asked = np.array([motor_torque_demand(self.p, self.state, lag, i) for i in range(4)])
         return float(self.asked[0])
@@ -123,6 +123,14 @@ def test_no_motor_brakes_where_another_controls_the_wheels_or_in_reverse(params,
     for _ in range(60):
         motors.cycle(900.0, **{name: 1.0})
     assert motors.state["lining"][0] == pytest.approx(900.0, rel=1e-3)
+
+
+def test_a_wheel_that_the_slip_guard_holds_has_no_motor(params, feed) -> None:
+    motors = Motors(params, feed, 0.7, 1350.0)
+    motors.settle(900.0)
+    motors.guarded[0] = 1
+    assert motors.cycle(900.0, 50.0) == 0.0
+    assert motors.asked[1] == pytest.approx(680.0)
 
 
 @pytest.mark.parametrize("name", ["motor_limit", "motor_torque"])

@@ -60,11 +60,13 @@ class Loss(NamedTuple):
 
 
 def blended(share: float, compensate: bool = True) -> Config:
-    """Return config/suv.toml with this share of the motors on both axles."""
+    """Return config/suv.toml with this share of the motors on both axles, its friction compensated or not."""
     config = load_config(resource("config/suv.toml"))
     blending = config.blending.model_copy(update={"front": share, "rear": share})
-    control = config.control.model_copy(update={"compensate": compensate})
-    return config.model_copy(update={"blending": blending, "control": control})
+    config = config.model_copy(update={"blending": blending})
+    if compensate:
+        return config
+    return config.model_copy(update={"control": config.control.model_copy(update={"compensation": "off"})})
 
 
 def stop(decel: float) -> Scenario:
