@@ -44,11 +44,22 @@ class Reaction(NamedTuple):
 
 
 def reactions(drive: Drive, truth: Drive, faults: list[Fault]) -> list[Reaction]:
-    """Return the reaction to every fault.
+    """Return the reaction to every fault, up to the beginning of the next.
 
     `drive` are the ECU's results, `truth` the vehicle's on its own axis; both count from T_0.
     """
-    return [_reaction(drive, truth, fault) for fault in faults]
+    found = []
+    for fault in faults:
+        limit = min((other.t for other in faults if other.t > fault.t), default=math.inf)
+        found.append(_reaction(_until(drive, limit), _until(truth, limit), fault))
+    return found
+
+
+def _until(drive: Drive, limit: float) -> Drive:
+    rows = drive.t < limit
+    return Drive(
+        drive.t[rows], {name: values[rows] for name, values in drive.columns.items()}, drive.metadata
+    )
 
 
 def unexplained(drive: Drive, faults: list[Fault]) -> list[str]:
