@@ -8,7 +8,8 @@ import errno
 import os
 import sys
 import traceback
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -66,6 +67,16 @@ Channel = Annotated[str, _CHANNEL]
 State = Annotated[Path | None, _STATE]
 
 
+@contextmanager
+def _ahead_of_others() -> Iterator[None]:
+    """Load before ordinary processes do, where that is granted: a daemon that starts again is wanted soon."""
+    with suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
+    yield
+    with suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+
+
 @app.callback()
 def _options(
     version: Annotated[
@@ -93,9 +104,8 @@ def run(
     ] = False,
 ) -> int:
     """The daemon on a bus. A shadow unless `transmit = true` in CONFIG arms it."""
-    with suppress(OSError):  # only root may; a daemon that is started again is wanted at once
-        os.nice(-10)
-    from ecu import service
+    with _ahead_of_others():
+        from ecu import service
 
     return service.run(service.RunOptions(config, interface, channel, map, record, state, standby))
 

@@ -245,7 +245,6 @@ def main() -> int:
     options = parser.parse_args()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
-    os.nice(10)  # nobody waits for it
     configure_logging()
     if not sys.stdin.readline():  # the parent makes the ring, then says so; it went instead
         return 1
