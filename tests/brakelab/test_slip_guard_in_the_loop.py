@@ -42,7 +42,7 @@ def locked_s(result: Drive) -> list[float]:
     [  # which wheels lock without the guard, for at least, and with it at most [s]
         ("patch of ice", shipped("low-grip"), "fl fr rl rr", 0.5, 0.25),
         ("ice on the left", shipped("split"), "fl rl", 1.2, 0.05),
-        ("too much for a dry road", stop(11.0, 1.0), "fl fr rl rr", 2.0, 0.3),
+        ("too much for a dry road", stop(11.0, 1.0), "fl fr rl rr", 2.0, 0.5),
     ],
 )
 def test_locked_wheels_roll_again(case, scenario, locked, before, after) -> None:

@@ -6,6 +6,7 @@ kernel with the ECU's own kernels, so that what is simulated is what is driven. 
 the scenario's faults (`brakelab.rig.faults`) on their way.
 """
 
+import math
 from functools import cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -105,6 +106,18 @@ class Loop(NamedTuple):
     noise: Generator
 
 
+class Told(NamedTuple):
+    """The friction that the ECU's pressure law is told to use in place of its own."""
+
+    true_share: float = 0.0
+    """Of the true friction: 1 makes the ideal controller; 0: not told."""
+    front: float = 0.0
+    """Amplitude of a sine about the base friction, relative to it, of the front axle."""
+    rear: float = 0.0
+    frequency: float = 0.0
+    """Of the sine [Hz]; 0: not told."""
+
+
 class Drive(NamedTuple):
     """A simulated drive, one row per cycle; names and units of the contract."""
 
@@ -179,11 +192,23 @@ def _hand_over(frames: Any, count: int, first_ns: int, spacing_ns: int, kept: An
 
 
 @kernel
+def _tell(told: Told, control: Any, true: Any, t: float) -> None:
+    """Tell the pressure law a friction: `control` is its state, `true` the car's friction, `t` the time [s]."""
+    for i in range(4):
+        if told.true_share > 0.0:
+            control.mu_override[i] = told.true_share * true[i]
+        elif told.frequency > 0.0:
+            amplitude = told.front if i < 2 else told.rear
+            wave = 1.0 + amplitude * math.sin(2.0 * math.pi * told.frequency * t)
+            control.mu_override[i] = control.base[i] * wave
+
+
+@kernel
 def _run(
     plan: Plans,
     loop: Sides,
     noise: Generator,
-    ideal: bool,
+    told: Told,
     alive: bool,
     first_cycle: int,
     decoded: NDArray[np.float64],
@@ -221,9 +246,7 @@ def _run(
         end_cycle(inputs, loop.ecu_reception.freshness)
         for i in range(N_INPUTS):
             decoded[row, i] = inputs.value[i] if inputs.new[i] else np.nan
-        if ideal:
-            for i in range(4):
-                loop.state[0].control.mu_override[i] = vehicle.state[0].mu_b[i]
+        _tell(told, loop.state[0].control, vehicle.state[0].mu_b, t)
         step(loop.params, loop.state, loop.inputs, loop.outputs)
         outputs[row] = loop.output_vector
 
@@ -248,12 +271,14 @@ def _start_anew(sides: Sides) -> None:
         old[:] = new
 
 
-def run(loop: Loop, ideal: bool = False, seconds: float = LONGEST) -> Drive:
+def run(loop: Loop, ideal: bool = False, seconds: float = LONGEST, told: Told | None = None) -> Drive:
     """Run a new loop to the end of its script, or for `seconds`, and return what happened.
 
-    `ideal`: the ECU's pressure law is given the true friction, to compare a compensated controller with.
+    `ideal`: the ECU's pressure law is given the true friction, to compare a compensated controller with; `told`:
+    another one.
     Where the scenario kills the daemon, its outputs are NaN until it, or its standby, sends again.
     """
+    told = told or Told(1.0 if ideal else 0.0)
     sides = loop.sides
     per_cycle = 2 * (len(sides.vehicle_frames) + len(sides.ecu_frames))
     blocks: list[tuple[NDArray[np.float64], ...]] = []
@@ -270,7 +295,7 @@ def run(loop: Loop, ideal: bool = False, seconds: float = LONGEST) -> Drive:
         size = min(CHUNK, last - first, until - first)
         block = (np.empty((size, N_INPUTS)), np.empty((size, N_OUTPUTS)), np.empty((size, N_TRUTH)))
         kept = np.zeros(size * per_cycle, FRAME)
-        rows, count, running = _run(plans(), sides, loop.noise, ideal, alive, first, *block, kept)
+        rows, count, running = _run(plans(), sides, loop.noise, told, alive, first, *block, kept)
         blocks.append(tuple(values[:rows] for values in block))
         frames.append(kept[:count].copy())
         first += rows
