@@ -150,7 +150,7 @@ class Control(_Section):
     max_pressure: Annotated[float, Field(gt=20, le=180)] = 180.0
     max_pressure_rate: Annotated[float, Field(ge=1500)] = 3000.0
     compensation: Literal["second-order", "inverse", "off"] = "second-order"
-    """How pressure follows friction in a braking: corrected (5.8), what it approximates, or nominal friction."""
+    """How pressure follows friction in a braking: by (5.8) corrected, by its exact form, or not at all."""
     slip_guard: bool = True
     """Hold the pressure back at a wheel that slips beyond its tyre's range."""
 

@@ -29,6 +29,7 @@ from ecu.control.pressure_law import (
     PRESSURE_LAW_STATE,
     compensated_pressure,
     follow_friction,
+    learn_start,
     level_left_right,
     pressure_for_torque,
     set_base,
@@ -125,7 +126,7 @@ def new_state(params: RecordArray, learned: RecordArray | None = None) -> Record
         row["learned"]["disc_excess"] = UNKNOWN_EXCESS
     else:
         row["learned"] = learned[0]
-    row["control"]["mu_override"] = math.nan
+    row["control"]["mu_override"], row["control"]["start"] = math.nan, 1.0
     row["force"]["k_f"] = 1.0
     row["distribution"]["rear"] = 1.0
     _begin(params, state)
@@ -181,6 +182,7 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
 def _estimate(p: Record, s: Record, u: Record, dt: float) -> None:
     update_application(p, s.application, u, dt)
     if s.application.ended:
+        learn_start(s.control, s.friction)
         hand_over(s.friction, s.learned)
     if s.application.started:
         reset_force(s.force)
@@ -242,7 +244,7 @@ def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
     decel = update_demand(p, s.demand, u, speed, dt)
     watch_rear(p, s.distribution, u, s.motion, s.wheel_load.load, decel, speed, dt)
     distribute(p, s.distribution, decel)
-    follow_friction(p, s.control, s.friction.mu, dt)
+    follow_friction(p, s.control, s.friction, dt)
     follow_pressure(p, s.friction_torque, u, s.limiter.pressure, s.joint.pressures.zero, dt)
     update_motors(p, s.blending, u, s.guard.capped, s.speed.speed, decel, dt)
     share_torque(p, s.blending, s.distribution.torque, dt)

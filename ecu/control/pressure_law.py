@@ -10,12 +10,17 @@ T is what the lining shall give (5.4). The second order leaves e^3 of torque, 2.
 nominal friction always. The base changes between applications only, so a noisy estimate divides nothing. The
 friction used moves at most `FRICTION_RATE` a second: the loop through estimator and hydraulics (26 ms dead
 time) stays slow against both. Where a pressure cannot be had it does not fall on: no more would come of it.
+
+Many linings rub harder as speed falls and begin the next braking lower again (assumption; those of the simulated
+rear axle by a sixth). So the base is the learned friction times what the last braking began with over what it ended with, and the
+estimate, which at first still is that of the end, is followed once it has been observed anew for `EARLY_S`.
 """
 
 import math
 
 import numpy as np
 
+from ecu.estimation.friction import well_observed
 from ecu.jit import Record, kernel
 from ecu.params import INVERSE, OFF
 
@@ -24,6 +29,8 @@ PRESSURE_LAW_STATE = np.dtype(
         ("base", "f8", (4,)),  # mu_0
         ("used", "f8", (4,)),  # friction in use
         ("mu_override", "f8", (4,)),  # the laboratory's ideal controller is given the true friction; NaN: off
+        ("early", "f8", (4,)),  # friction soon after this braking began, 0: not observed yet
+        ("start", "f8", (4,)),  # friction at the begin of a braking over that at the end of the one before
         ("cut", "u1", (4,)),  # the last pressure was cut on its way out
         ("limit_s", "f8"),  # for this long the deceleration has not been kept
         ("at_limit", "u1"),  # it was too long in this braking
@@ -35,6 +42,8 @@ GREATEST_CHANGE = 0.3  # relative to the base (5.6)
 FRICTION_RATE = 0.5  # 1/s
 LEFT_RIGHT_SHARE = 0.10  # of the axle's demand
 LIMIT_S = 0.3
+EARLY_S = 0.6  # of observing
+LARGEST_START = 0.25  # relative
 
 
 @kernel
@@ -48,12 +57,19 @@ def pressure_for_torque(params: Record, torque: float, mu: float, corner: int) -
 
 
 @kernel
-def follow_friction(params: Record, state: Record, mu: Record, dt: float) -> None:
-    """Move the friction in use towards the estimate, within +-30 % of the base."""
+def follow_friction(params: Record, state: Record, friction: Record, dt: float) -> None:
+    """Move the friction in use towards the estimate, within +-30 % of the base.
+
+    While it still is what the last braking ended with, and that braking began with another, it waits.
+    """
     if params.compensation == OFF:
         return
-    step = FRICTION_RATE * dt
+    step, mu = FRICTION_RATE * dt, friction.mu
     for i in range(4):
+        if friction.observed_s[i] < EARLY_S and state.start[i] != 1.0:
+            continue
+        if state.early[i] == 0.0 and friction.observed_s[i] >= EARLY_S:
+            state.early[i] = mu[i]
         base: float = state.base[i]
         target = mu[i] if math.isfinite(mu[i]) else base
         target = min(max(target, (1.0 - GREATEST_CHANGE) * base), (1.0 + GREATEST_CHANGE) * base)
@@ -65,8 +81,20 @@ def follow_friction(params: Record, state: Record, mu: Record, dt: float) -> Non
 def set_base(params: Record, state: Record, learned: Record) -> None:
     """Take the learned friction as the base; only between applications."""
     for i in range(4):
-        state.base[i] = params.mu_nominal[i] if params.compensation == OFF else learned.mu_b[i]
+        base = learned.mu_b[i] * state.start[i]
+        state.base[i] = params.mu_nominal[i] if params.compensation == OFF else base
         state.used[i] = state.base[i]
+
+
+@kernel
+def learn_start(state: Record, friction: Record) -> None:
+    """At the end of a braking: keep what it began with over what it ended with, where both are known."""
+    for i in range(4):
+        known = state.early[i] > 0.0 and well_observed(friction, i)
+        if known:
+            change = state.early[i] / friction.mu[i]
+            state.start[i] = min(max(change, 1.0 - LARGEST_START), 1.0 + LARGEST_START)
+        state.early[i] = 0.0
 
 
 @kernel

@@ -282,11 +282,18 @@ def _observe(
 
 
 @kernel
+def well_observed(state: Record, i: int) -> bool:
+    """Return whether this braking's friction of a corner may be learned."""
+    sure: bool = state.sigma[i] < SIGMA_FOR_LEARNING * state.mu[i]
+    return sure and state.observed_s[i] >= SECONDS_FOR_LEARNING
+
+
+@kernel
 def hand_over(state: Record, learned: Record) -> None:
     """At the end of a braking: keep what was observed well enough as the base of the next."""
     learned.brakings += 1
     for i in range(4):
-        if state.observed_s[i] >= SECONDS_FOR_LEARNING and state.sigma[i] < SIGMA_FOR_LEARNING * state.mu[i]:
+        if well_observed(state, i):
             learned.mu_b[i] = state.mu[i]
             learned.sigma_mu_b[i] = state.sigma[i]
             learned.observed_s[i] += state.observed_s[i]

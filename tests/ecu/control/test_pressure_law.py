@@ -11,11 +11,13 @@ from ecu.control.pressure_law import (
     PRESSURE_LAW_STATE,
     compensated_pressure,
     follow_friction,
+    learn_start,
     level_left_right,
     pressure_for_torque,
     set_base,
     watch_limit,
 )
+from ecu.estimation.friction import FRICTION_STATE
 from ecu.params import INVERSE, OFF, SECOND_ORDER
 from ecu.records import LEARNED
 
@@ -33,8 +35,15 @@ def torque_of(pressure: float, mu: float, corner: int) -> float:
 
 def law(base: float = 0.45, used: float = 0.45):
     state = np.zeros(1, PRESSURE_LAW_STATE)
-    state["base"], state["used"], state["mu_override"] = base, used, math.nan
+    state["base"], state["used"], state["mu_override"], state["start"] = base, used, math.nan, 1.0
     return state[0]
+
+
+def estimated(mu: object, sigma: float = 0.02, observed_s: float = 2.0):
+    """Return what the observer says."""
+    friction = np.zeros(1, FRICTION_STATE)
+    friction["mu"], friction["sigma"], friction["observed_s"] = mu, sigma, observed_s
+    return friction[0]
 
 
 @pytest.mark.parametrize("corner", range(4))
@@ -87,7 +96,7 @@ def test_the_push_out_pressure_is_not_scaled(params, pressure: float, used: floa
 def test_compensation_saturates_at_30_percent_of_the_base(estimate: float, used: float) -> None:
     state = law()
     for _ in range(500):
-        follow_friction(PARAMS, state, np.full(4, estimate), 0.01)
+        follow_friction(PARAMS, state, estimated(np.full(4, estimate)), 0.01)
     assert state["used"] == pytest.approx(np.full(4, used))
 
 
@@ -95,14 +104,14 @@ def test_compensation_saturates_at_30_percent_of_the_base(estimate: float, used:
 def test_the_friction_in_use_moves_no_faster_than_half_a_unit_a_second(dt: float) -> None:
     state = law()
     for k in range(1, 4):
-        follow_friction(PARAMS, state, np.array([0.6, 0.3, 0.45, 0.4501]), dt)
+        follow_friction(PARAMS, state, estimated(np.array([0.6, 0.3, 0.45, 0.4501])), dt)
         assert state["used"] == pytest.approx([0.45 + 0.5 * k * dt, 0.45 - 0.5 * k * dt, 0.45, 0.4501])
 
 
 def test_a_friction_that_is_not_a_number_does_not_stick(params) -> None:
     state = law()
-    follow_friction(PARAMS, state, np.full(4, math.nan), 0.01)
-    follow_friction(PARAMS, state, np.full(4, 0.45), 0.01)
+    follow_friction(PARAMS, state, estimated(np.full(4, math.nan)), 0.01)
+    follow_friction(PARAMS, state, estimated(np.full(4, 0.45)), 0.01)
     assert np.isfinite(state["used"]).all()
     assert np.isfinite(compensated_pressure(params[0], state, 30 * BAR, 0))
 
@@ -121,8 +130,43 @@ def test_without_compensation_nominal_friction_counts_whatever_was_learned(param
     learned["mu_b"] = 0.3
     state = law()
     set_base(params[0], state, learned[0])
-    follow_friction(params[0], state, np.full(4, 0.36), 0.01)
+    follow_friction(params[0], state, estimated(np.full(4, 0.36)), 0.01)
     assert list(state["base"]) == list(state["used"]) == [0.45] * 4
+
+
+@pytest.mark.parametrize(
+    ("case", "began", "ended", "sigma", "observed_s", "start"),
+    [
+        ("rises by a fifth within the braking", 0.40, 0.48, 0.02, 2.0, 0.40 / 0.48),
+        ("falls", 0.45, 0.40, 0.02, 2.0, 0.45 / 0.40),
+        ("doubles: cannot be all true", 0.30, 0.60, 0.02, 2.0, 0.75),
+        ("too unsure", 0.40, 0.48, 0.05, 2.0, 1.0),
+        ("too short", 0.40, 0.48, 0.02, 0.9, 1.0),
+    ],
+)
+def test_a_braking_begins_with_another_friction_than_it_ends_with(
+    case, began, ended, sigma, observed_s, start
+) -> None:
+    state, learned = law(), np.zeros(1, LEARNED)
+    follow_friction(PARAMS, state, estimated(0.45, observed_s=0.5), 0.01)
+    assert not state["early"].any()  # not yet
+    follow_friction(PARAMS, state, estimated(began, observed_s=0.61), 0.01)
+    follow_friction(PARAMS, state, estimated(ended, observed_s=1.5), 0.01)
+    learn_start(state, estimated(ended, sigma, observed_s))
+    assert state["start"] == pytest.approx(np.full(4, start)), case
+    learned["mu_b"] = ended
+    set_base(PARAMS, state, learned[0])
+    assert state["base"] == pytest.approx(np.full(4, ended * start))
+    assert not state["early"].any()
+
+
+def test_where_brakings_begin_with_another_friction_the_last_one_s_end_is_not_followed() -> None:
+    state = law()
+    state["start"][:2] = 0.9
+    follow_friction(PARAMS, state, estimated(0.5, observed_s=0.59), 0.01)
+    assert list(state["used"]) == pytest.approx([0.45, 0.45, 0.455, 0.455])
+    follow_friction(PARAMS, state, estimated(0.5, observed_s=0.61), 0.01)
+    assert list(state["used"]) == pytest.approx([0.455, 0.455, 0.46, 0.46])
 
 
 @pytest.mark.parametrize(
@@ -136,7 +180,7 @@ def test_without_compensation_nominal_friction_counts_whatever_was_learned(param
 def test_friction_in_use_does_not_run_on_while_the_pressure_is_cut(case, cut, estimate, after) -> None:
     state = law()
     state["cut"] = cut
-    follow_friction(PARAMS, state, np.full(4, estimate), 0.01)
+    follow_friction(PARAMS, state, estimated(np.full(4, estimate)), 0.01)
     assert state["used"] == pytest.approx(np.full(4, after)), case
 
 

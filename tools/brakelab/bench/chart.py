@@ -77,7 +77,9 @@ def _draw(panel: Panel, left: float, top: float) -> list[str]:
     return parts
 
 
-def write_chart(path: Path, panels: Sequence[Panel], legend: Sequence[tuple[str, str]], columns: int = 2) -> None:
+def write_chart(
+    path: Path, panels: Sequence[Panel], legend: Sequence[tuple[str, str]], columns: int = 2
+) -> None:
     """Write panels row by row, above them the legend's names in their colours; nothing without the folder.
 
     Raises:

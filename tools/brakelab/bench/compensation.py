@@ -77,13 +77,17 @@ def drive_as(kind: str, scenario: Scenario, config: Config, seed: int) -> Run:
     return Run(drive, achieved_decel(loop, drive))
 
 
-def applications(drive: Drive) -> list[NDArray[np.int_]]:
-    """Return the rows of each brake application, from the first demand until it falls again."""
+def asked_rows(drive: Drive) -> list[NDArray[np.int_]]:
+    """Return the rows of each brake application, from the first demand to the last."""
     asked = drive.outputs["decel_demand_total"]
     ends = np.flatnonzero(np.diff(np.r_[0, (asked > ASKED).astype(int), 0]))
-    found = []
-    for start, end in zip(ends[::2], ends[1::2], strict=True):
-        rows = np.arange(start, end)
+    return [np.arange(start, end) for start, end in zip(ends[::2], ends[1::2], strict=True)]
+
+
+def applications(drive: Drive) -> list[NDArray[np.int_]]:
+    """Return the rows of each brake application until its demand falls again."""
+    asked, found = drive.outputs["decel_demand_total"], []
+    for rows in asked_rows(drive):
         last = np.flatnonzero(asked[rows] >= FULL * asked[rows].max())[-1]
         found.append(rows[: last + 1])
     return found
@@ -95,7 +99,9 @@ def application_errors(run: Run, ideal: Run) -> list[float]:
     errors = []
     for rows in applications(ideal.drive):
         rows = rows[rows < n]
-        rows = rows[(ideal.decel[rows] >= LEVELS[0]) & (ideal.drive.truth["vehicle_speed"][rows] > LOWEST_SPEED)]
+        rows = rows[
+            (ideal.decel[rows] >= LEVELS[0]) & (ideal.drive.truth["vehicle_speed"][rows] > LOWEST_SPEED)
+        ]
         if len(rows) > 0:
             errors.append(float(100.0 * np.mean(np.abs(run.decel[rows] / ideal.decel[rows] - 1.0))))
     return errors
@@ -104,14 +110,13 @@ def application_errors(run: Run, ideal: Run) -> list[float]:
 def pedal_curve(run: Run, rows: NDArray[np.int_]) -> Vector:
     """Return the pedal [%] at which the deceleration of an application first passes each of `LEVELS`.
 
-    The pedal is taken where it was a build-up (`LAG` cycles) before, so that a fast one is not read late; NaN
-    where a level is not reached while the pedal moves.
+    NaN where a level is not reached while the pedal moves: there the pedal says nothing.
     """
     pedal, decel = run.drive.truth["pedal_position"][rows], np.maximum.accumulate(run.decel[rows])
     crossed = np.searchsorted(decel, LEVELS)
     found = np.full(len(LEVELS), np.nan)
     for place, row in enumerate(crossed):
-        if 0 < row < len(rows):
+        if 0 < row < len(rows) and pedal[row] < pedal.max():
             share = (LEVELS[place] - decel[row - 1]) / (decel[row] - decel[row - 1])
             found[place] = pedal[row - 1] + share * (pedal[row] - pedal[row - 1])
     return found
@@ -141,7 +146,7 @@ def level_errors(run: Run, ideal: Run) -> tuple[Vector, Vector]:
 def fade_pedal(run: Run) -> tuple[Vector, Vector]:
     """Return pedal [%] and true front friction of each stop, means once the driver has settled."""
     pedals, frictions = [], []
-    for rows in applications(run.drive):
+    for rows in asked_rows(run.drive):
         rows = rows[round(SETTLED_S / 0.01) :]
         rows = rows[run.drive.truth["vehicle_speed"][rows] > 6.0]
         if len(rows) > 0:
@@ -190,12 +195,19 @@ def _cell(value: Figure) -> str:
     return f"{value.median:.1f} ({value.high:.1f})"
 
 
+def _mean_and_worst(errors: Vector) -> str:
+    known = errors[np.isfinite(errors)]
+    return f"{known.mean():.1f} ({known.max():.1f})" if len(known) > 0 else "–"
+
+
 def _application_table(cars: list[Car]) -> Table:
     rows = []
     for name in MANOEUVRES:
         count = min(len(car.errors[name, kind]) for car in cars for kind in list(RUNS)[1:])
         for place in range(count):
-            cells = (_cell(figure([car.errors[name, kind][place] for car in cars])) for kind in list(RUNS)[1:])
+            cells = (
+                _cell(figure([car.errors[name, kind][place] for car in cars])) for kind in list(RUNS)[1:]
+            )
             rows.append((f"{name}, {place + 1}", *cells))
     return Table(
         "Deceleration of each application: mean relative error to the ideal [%]",
@@ -212,14 +224,13 @@ def _level_table(cars: list[Car]) -> Table:
         for kind in ("compensated", "uncompensated"):
             for place, what in enumerate(("deceleration at equal pedal", "pedal at equal deceleration")):
                 errors = np.abs(np.concatenate([car.levels[name, kind][place] for car in cars]))
-                cells = (f"{np.nanmean(errors[:, k]):.1f} ({np.nanmax(errors[:, k]):.1f})" for k in range(0, 11, 2))
-                rows.append((f"{name}: {kind}, {what}", *cells))
+                rows.append((f"{name}: {kind}, {what}", *map(_mean_and_worst, errors.T[::2])))
     return Table(
         "Curve of deceleration over pedal (Figures 5.11a, 5.12a): relative error to the ideal [%]",
         ("pedal, run", *(f"{level:.0f} m/s²" for level in LEVELS[::2])),
         rows,
         "Mean over cars and applications from the second on (worst). The pedal goes to 78 % instead of 60, so that "
-        "the curve reaches 6 m/s². Goal: within 3.",
+        "the curve reaches 6 m/s²; – where it had arrived before the car did. Goal: within 3.",
     )
 
 
@@ -229,7 +240,9 @@ def _fade_table(cars: list[Car]) -> Table:
     for stop in range(count):
         friction = np.mean([car.fade["compensated"][1][stop] for car in cars])
         pedals = [figure([car.fade[kind][0][stop] for car in cars]) for kind in FADE_RUNS]
-        change = [100.0 * (car.fade["compensated"][0][stop] / car.fade["compensated"][0][0] - 1.0) for car in cars]
+        change = [
+            100.0 * (car.fade["compensated"][0][stop] / car.fade["compensated"][0][0] - 1.0) for car in cars
+        ]
         rows.append(
             (
                 str(stop + 1),
@@ -272,7 +285,9 @@ def _over_time(title: str, runs: dict[str, Run]) -> list[Panel]:
     end = float(max(r.drive.t[-1] for r in runs.values()))
     return [
         Panel(f"{title}: deceleration [m/s²]", "t [s]", (0.0, end), (0.0, 6.0), lines),
-        Panel(f"{title}: friction, true and estimated; rear above", "t [s]", (0.0, end), (0.3, 0.7), friction),
+        Panel(
+            f"{title}: friction, true and estimated; rear above", "t [s]", (0.0, end), (0.3, 0.7), friction
+        ),
     ]
 
 
