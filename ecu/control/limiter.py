@@ -42,7 +42,7 @@ EMPTY = 10.0 * BAR  # far below the gas pressure of any accumulator
 def available_pressure(params: Record, inputs: Record) -> float:
     """Return the highest pressure [Pa] that the hydraulics can give: the accumulator's, where it is known.
 
-    One that reads empty limits nothing: if it is, there is nothing to hold back; if the sensor lies, all there is.
+    One that reads empty limits nothing: if it is, there is nothing to hold back; if the sensor lies, all is.
     """
     available: float = params.max_pressure
     if usable(inputs, ACCUMULATOR_PRESSURE):

@@ -11,9 +11,10 @@ nominal friction always. The base changes between applications only, so a noisy 
 friction used moves at most `FRICTION_RATE` a second: the loop through estimator and hydraulics (26 ms dead
 time) stays slow against both. Where a pressure cannot be had it does not fall on: no more would come of it.
 
-Many linings rub harder as speed falls and begin the next braking lower again (assumption; those of the simulated
-rear axle by a sixth). So the base is the learned friction times what the last braking began with over what it ended with, and the
-estimate, which at first still is that of the end, is followed once it has been observed anew for `EARLY_S`.
+Many linings rub harder as speed falls and begin the next braking lower again (assumption; those of the
+simulated car's rear by a sixth). So the base is the learned friction times what the last braking began with
+over what it ended with, and the estimate, at first still that of the end, is followed once it was observed
+for `EARLY_S`.
 """
 
 import math

@@ -9,8 +9,8 @@ hold     slip beyond `RANGE`, the wheel comes back: the cap stays
 return   slip within `RANGE`, or the car slower than `LEAST_SPEED`: the cap rises until it caps nothing
 
 A wheel must be seen to fall behind, so a car's speed that is wrong by a tenth caps nothing. Where an ABS or
-ESP says that it works, the cap never falls: two controllers would cut the same wheel. This is no ABS: it looks
-for no best slip, knows no yaw and leaves each wheel to itself.
+ESP says that it works, the cap never falls: two controllers would cut the same wheel. This is no ABS: it
+looks for no best slip, knows no yaw and leaves each wheel to itself.
 
 Assumption: all constants; found with the simulated vehicle on friction of 0.2 to 1.2.
 """

@@ -1,4 +1,5 @@
-"""The slip guard in the simulated car: wheels that lock without it roll, and where none would lock it rests."""
+"""The slip guard in the simulated car: wheels that lock without it roll, and where none would lock it
+rests."""
 
 import numpy as np
 import pytest

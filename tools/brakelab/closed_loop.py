@@ -193,7 +193,7 @@ def _hand_over(frames: Any, count: int, first_ns: int, spacing_ns: int, kept: An
 
 @kernel
 def _tell(told: Told, control: Any, true: Any, t: float) -> None:
-    """Tell the pressure law a friction: `control` is its state, `true` the car's friction, `t` the time [s]."""
+    """Tell the pressure law a friction: `control` is its state, `true` the car's friction, `t` time [s]."""
     for i in range(4):
         if told.true_share > 0.0:
             control.mu_override[i] = told.true_share * true[i]
@@ -274,9 +274,9 @@ def _start_anew(sides: Sides) -> None:
 def run(loop: Loop, ideal: bool = False, seconds: float = LONGEST, told: Told | None = None) -> Drive:
     """Run a new loop to the end of its script, or for `seconds`, and return what happened.
 
-    `ideal`: the ECU's pressure law is given the true friction, to compare a compensated controller with; `told`:
-    another one.
-    Where the scenario kills the daemon, its outputs are NaN until it, or its standby, sends again.
+    `ideal`: the ECU's pressure law is given the true friction, to compare a compensated controller with;
+    `told`: another one. Where the scenario kills the daemon, its outputs are NaN until it, or its standby,
+    sends again.
     """
     told = told or Told(1.0 if ideal else 0.0)
     sides = loop.sides

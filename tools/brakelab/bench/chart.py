@@ -69,8 +69,8 @@ def _draw(panel: Panel, left: float, top: float) -> list[str]:
         parts.append(f'<text x="{x:.1f}" y="{top + HEIGHT + 16}" text-anchor="middle">{tick:.3g}</text>')
     for line in panel.lines:
         every = max(len(line.x) // LARGEST, 1)
-        x, y = line.x[::every], np.clip(line.y[::every], *panel.y)
-        pairs = zip(place_x(x), place_y(y), strict=True)
+        heights = np.clip(line.y[::every], *panel.y)
+        pairs = zip(place_x(line.x[::every]), place_y(heights), strict=True)
         points = " ".join(f"{a:.1f},{b:.1f}" for a, b in pairs if np.isfinite(a + b))
         dashes = ' stroke-dasharray="5 4"' if line.dashed else ""
         parts.append(f'<polyline points="{points}" stroke="{line.colour}" stroke-width="1.4"{dashes}/>')

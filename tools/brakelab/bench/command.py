@@ -69,20 +69,22 @@ BLENDING_TEXT: Final = (
 
 COMPENSATION: Final = "compensation"
 COMPENSATION_TEXT: Final = (
-    "Manoeuvres of section 5.7 and fade (6.2.3) in closed loop with the ECU of config/suv.toml, motors at rest "
-    "but where it says so; cars are drawn per seed from config/plant/suv.toml, nothing was learned before. Ideal: "
-    "the same controller in the same car, told the true friction. Achieved: brake and motor torque over radius and "
-    "mass, all true. Uncompensated: nominal friction always. Under, over: told 1.15 and 0.85 of the true friction "
-    "(section 5.6).\n\n![Deceleration, friction and pedal curves of car 0](images/compensation.svg)"
+    "Manoeuvres of section 5.7 and fade (6.2.3) in closed loop with the ECU of config/suv.toml, motors at "
+    "rest but where it says so; cars are drawn per seed from config/plant/suv.toml, nothing was learned "
+    "before. Ideal: the same controller in the same car, told the true friction. Achieved: brake and "
+    "motor torque over radius and mass, all true. Uncompensated: nominal friction always. Under, over: "
+    "told 1.15 and 0.85 of the true friction (section 5.6).\n\n![Deceleration, friction and pedal curves "
+    "of car 0](images/compensation.svg)"
 )
 
 MARGINS: Final = "margins"
 MARGINS_TEXT: Final = (
-    "How far the loop through pressure law, hydraulics, car and observer is from instability, measured with the "
-    "loop cut at the friction in use (tools/brakelab/bench/margins.py). The loop gain is far below 1 at every "
-    "frequency: an estimate of friction is torque over pressure, and more pressure gives more torque, so to first "
-    "order the estimate does not see what the law does. What comes back is lag between the signals and what "
-    "friction really owes to pressure.\n\n![Loop gain and distance from +1](images/control-margins.svg)"
+    "How far the loop through pressure law, hydraulics, car and observer is from instability, measured "
+    "with the loop cut at the friction in use (tools/brakelab/bench/margins.py). The loop gain is far "
+    "below 1 at every frequency: an estimate of friction is torque over pressure, and more pressure gives "
+    "more torque, so to first order the estimate does not see what the law does. What comes back is lag "
+    "between the signals and what friction really owes to pressure.\n\n![Loop gain and distance from "
+    "+1](images/control-margins.svg)"
 )
 
 
@@ -245,9 +247,7 @@ def _blending(json: bool) -> int:
     return _page(BLENDING, "Motors and linings brake together", BLENDING_TEXT, blending_tables(), json)
 
 
-def _page(
-    name: str, title: str, text: str, tables: list[Table], json: bool, file: str | None = None
-) -> int:
+def _page(name: str, title: str, text: str, tables: list[Table], json: bool, file: str | None = None) -> int:
     of = f"`brake-ecu bench {name}`, version {__version__}"
     if json:
         _print_json({"of": of, "tables": [table._asdict() for table in tables]})

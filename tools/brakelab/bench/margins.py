@@ -1,16 +1,16 @@
 """Gain and phase margin of the loop through pressure law, hydraulics, car and friction observer.
 
-The loop: friction in use -> pressure demand (5.8) -> hydraulics -> brake torque, wheel speed, deceleration ->
-observer -> friction estimate -> friction in use. It is cut at the friction in use, where the simulated driver's
-braking is disturbed by a sine of `AMPLITUDE`, at one axle after the other; what comes back is the estimate. Each
-drive is run with the sine and with its negative, so that noise, drift and temperature cancel:
+The loop: friction in use -> pressure demand (5.8) -> hydraulics -> brake torque, wheel speed, deceleration
+-> observer -> friction estimate -> friction in use. It is cut at the friction in use, where the simulated
+driver's braking is disturbed by a sine of `AMPLITUDE`, at one axle after the other; what comes back is the
+estimate. Each drive is run with the sine and with its negative, so that noise, drift and temperature cancel:
 
     L_ij = ln mu_i(+) - ln mu_i(-), in phase with the sine, over 2 amplitude_j        i, j: front, rear
 
-Closed, the loop feeds L back with a positive sign; it is stable where no eigenvalue of L encircles +1. Gain margin
-is 1 / the largest modulus of an eigenvalue (by how much the loop may be more lively, whatever its phase), phase
-margin the least phase where a modulus is 1, distance the least |1 - eigenvalue|. The limit of `FRICTION_RATE` on
-the friction in use is left out: it makes the loop slower still.
+Closed, the loop feeds L back with a positive sign; it is stable where no eigenvalue of L encircles +1. Gain
+margin is 1 / the largest modulus of an eigenvalue (by how much the loop may be more lively, whatever its
+phase), phase margin the least phase where a modulus is 1, distance the least |1 - eigenvalue|. The limit of
+`FRICTION_RATE` on the friction in use is left out: it makes the loop slower still.
 """
 
 from collections.abc import Callable, Iterable
@@ -80,7 +80,10 @@ def braking() -> Scenario:
 
 
 def in_phase(t: NDArray[np.float64], y: NDArray[np.float64], frequency: float) -> complex:
-    """Return amplitude and phase of `y` relative to sin(2 pi frequency t), over whole periods up to the end."""
+    """Return amplitude and phase of `y` relative to sin(2 pi frequency t), over whole periods.
+
+    They are counted back from the last row.
+    """
     period = 1.0 / frequency
     rows = t > t[-1] - np.floor((t[-1] - t[0]) / period + 1e-9) * period + 1e-9
     t, y = t[rows], y[rows]
@@ -92,7 +95,7 @@ def in_phase(t: NDArray[np.float64], y: NDArray[np.float64], frequency: float) -
 
 
 def _estimates(config: Config, seed: int, told: Told) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return time [s] and ln of the friction estimated at both axles, shape (2, n), of the rows that count."""
+    """Return time [s] and ln of the friction estimated at both axles, shape (2, n), of a braking."""
     drive = run(new_loop(braking(), config, seed), told=told)
     rows = (drive.t > 1.0 + SETTLED_S) & (drive.truth["vehicle_speed"] > LEAST_SPEED)
     return drive.t[rows], np.stack(
@@ -113,7 +116,7 @@ def margins_of(config: Config, seed: int) -> Margins:
             change = 0.5 * (both[0][1][:, :n] - both[1][1][:, :n]) / AMPLITUDE
             for back in range(2):
                 loop[place, back, axle] = in_phase(both[0][0][:n], change[back], frequency)
-    return Margins(loop, np.linalg.eigvals(loop))
+    return Margins(loop, np.linalg.eigvals(loop).astype(np.complex128))
 
 
 Spread = Callable[[Callable[[int], Margins], Iterable[int]], Iterable[Margins]]
