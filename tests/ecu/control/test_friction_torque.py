@@ -73,6 +73,14 @@ def test_noise_of_the_sensor_is_not_felt(params, feed) -> None:
     assert np.std(np.diff(values)) < 0.03
 
 
+def test_what_the_sensors_read_without_pressure_is_taken_off(params, feed) -> None:
+    car = Follower(params, feed)
+    car.zero[:] = 1.5
+    for _ in range(300):
+        found = car.cycle(20.0, 21.5)
+    assert found == pytest.approx(20.0, abs=0.2)
+
+
 def test_hydraulics_that_do_not_follow_are_believed(params, feed) -> None:
     car = Follower(params, feed)
     for _ in range(100):
