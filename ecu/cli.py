@@ -8,6 +8,8 @@ import errno
 import os
 import sys
 import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -15,7 +17,7 @@ import typer
 
 from ecu import __version__
 from ecu.errors import RunFault, UserError
-from ecu.resources import named
+from ecu.resources import SCENARIOS, named
 
 LABORATORY = ("bokeh", "jinja2", "pyarrow", "pymoo")
 """What the extra `lab` installs, by the names that are imported."""
@@ -37,7 +39,7 @@ def _map(name: str) -> Path:
 
 
 def _scenario(name: str) -> Path:
-    return named(name, "config/scenarios")
+    return named(name, *SCENARIOS)
 
 
 def _show_version(wanted: bool) -> None:
@@ -65,6 +67,16 @@ Channel = Annotated[str, _CHANNEL]
 State = Annotated[Path | None, _STATE]
 
 
+@contextmanager
+def _ahead_of_others() -> Iterator[None]:
+    """Load before ordinary processes do, where that is granted: a daemon that starts again is wanted soon."""
+    with suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
+    yield
+    with suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+
+
 @app.callback()
 def _options(
     version: Annotated[
@@ -86,11 +98,16 @@ def run(
         typer.Option("--record", metavar="DIR", help="Record frames, cycles and outputs into this folder"),
     ] = None,
     state: State = None,
+    standby: Annotated[
+        bool,
+        typer.Option("--standby", help="Silent beside a daemon that runs; takes over when it is silent"),
+    ] = False,
 ) -> int:
     """The daemon on a bus. A shadow unless `transmit = true` in CONFIG arms it."""
-    from ecu import service
+    with _ahead_of_others():
+        from ecu import service
 
-    return service.run(service.RunOptions(config, interface, channel, map, record, state))
+    return service.run(service.RunOptions(config, interface, channel, map, record, state, standby))
 
 
 @app.command()
@@ -123,6 +140,34 @@ def simulate(
     from brakelab import closed_loop
 
     return closed_loop.simulate(scenario, config, out, seed)
+
+
+@app.command()
+def rig(
+    scenario: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="SCENARIO…", help="Scenario files or folders of them, or shipped ones by name: faults, …"
+        ),
+    ],
+    config: Config,
+    interface: Annotated[str | None, _INTERFACE] = None,
+    channel: Annotated[str | None, _CHANNEL] = None,
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of results and reports")] = Path(
+        "out/rig"
+    ),
+    lock_step: Annotated[
+        bool, typer.Option("--lock-step", help="In memory, as fast as it goes, instead of on a bus")
+    ] = False,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the drawn vehicle and its noise")] = 0,
+) -> int:
+    """Tables of scenarios with their faults: daemon and vehicle on a bus. One report."""
+    from brakelab.rig import command
+
+    if (interface is None) != (channel is None):
+        raise UserError("-i, -c", "", "give both or none; none: a bus of its own on this machine")
+    bus = None if interface is None or channel is None else (interface, channel)
+    return command.rig(scenario, config, bus, out, lock_step, seed)
 
 
 @app.command()

@@ -8,7 +8,6 @@ range is one line: the file, the key and what would be right.
 import hashlib
 import json
 import math
-import tomllib
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -18,8 +17,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from ecu.errors import UserError
 from ecu.estimation.tyre import rolling_radius
-from ecu.params import BAR, GRAVITY, OBSERVERS, PARAMS, PEDAL_POINTS
+from ecu.params import BAR, COMPENSATIONS, DISTRIBUTIONS, GRAVITY, OBSERVERS, PARAMS, PEDAL_POINTS
 from ecu.records import RecordArray
+from ecu.regulation import Load, annex_5_violation
+from ecu.toml_file import describe, read_toml
 
 AIR_DENSITY = 1.2  # kg/m^3, 20 degC at sea level
 
@@ -50,6 +51,27 @@ class Vehicle(_Section):
     load_transfer_lag: Annotated[float, Field(ge=0, lt=1)]
     ambient_temperature: Annotated[float, Field(gt=-50, lt=60)] = 15.0
     """Where no sensor reports it, degC."""
+    laden_mass: Annotated[float, Field(gt=200, lt=10000)] | None = None
+    """Greatest mass allowed, kg. Without the three of `laden_` the car counts as driven at `mass` alone."""
+    laden_front_axle: Positive | None = None
+    """Centre of gravity to front axle when laden, m."""
+    laden_cog_height: Annotated[float, Field(gt=0.1, lt=3)] | None = None
+
+    def loads(self) -> tuple[Load, ...]:
+        """Return the states of load that the car is driven in: as configured, and laden if that is given."""
+        unladen = Load("unladen", self.mass, self.front_axle, self.cog_height)
+        if self.laden_mass is None or self.laden_front_axle is None or self.laden_cog_height is None:
+            return (unladen,)
+        return unladen, Load("laden", self.laden_mass, self.laden_front_axle, self.laden_cog_height)
+
+    @model_validator(mode="after")
+    def _laden(self) -> "Vehicle":
+        given = [self.laden_mass, self.laden_front_axle, self.laden_cog_height]
+        if given != [None] * 3 and None in given:
+            raise ValueError("give all of laden_mass, laden_front_axle and laden_cog_height, or none")
+        if self.laden_mass is not None and self.laden_mass < self.mass:
+            raise ValueError("laden_mass must not be smaller than mass")
+        return self
 
 
 class Axle(_Section):
@@ -108,25 +130,43 @@ class Observer(_Section):
     """Model error of the tyre force relative to the wheel load, 1/sqrt(s)."""
     time_correlation: Positive = 3.0
     """Low-passed slip samples are correlated: the virtual force's variance counts this often."""
-    sigma_mu_initial: Share = 0.15
+    sigma_mu_initial: Annotated[float, Field(gt=0, lt=0.4)] = 0.15
     sigma_mass: Share = 0.02
     sigma_slip_stiffness_ratio: Share = 0.04
 
 
 class Control(_Section):
-    """Pedal map and limits of the pressure demand."""
+    """Pedal map, holding at rest, distribution, limits of the pressure demand."""
 
     pedal_position: list[float] = Field(min_length=2, max_length=PEDAL_POINTS)
     pedal_decel: list[float] = Field(min_length=2, max_length=PEDAL_POINTS)
+    hold_grade: Annotated[float, Field(ge=0, le=0.5)] = 0.2
+    """Steepest grade (tangent) on which the standing car is held, laden and with the linings at - 2 sigma."""
+    distribution: Literal["ideal", "fixed", "electronic"] = "ideal"
+    """Equal adhesion at both axles, a constant share, or a constant share until the ideal one passes it."""
+    front_share: Share | None = None
+    """Of the brake force, for the distributions "fixed" and "electronic"."""
+    rear_slip_margin: Annotated[float, Field(ge=0.002, le=0.05)] = 0.01
+    """Slip of a rear wheel beyond the front one of its side that takes back the torque of the rear."""
     max_pressure: Annotated[float, Field(gt=20, le=180)] = 180.0
     max_pressure_rate: Annotated[float, Field(ge=1500)] = 3000.0
-    compensate: bool = True
+    compensation: Literal["second-order", "inverse", "off"] = "second-order"
+    """How pressure follows friction in a braking: by (5.8) corrected, by its exact form, or not at all."""
+    slip_guard: bool = True
+    """Hold the pressure back at a wheel that slips beyond its tyre's range."""
 
     @field_validator("pedal_position", "pedal_decel")
     @classmethod
     def _rising(cls, points: list[float]) -> list[float]:
         if any(b < a for a, b in pairwise(points)) or points[0] < 0:
             raise ValueError("must rise from zero or more")
+        return points
+
+    @field_validator("pedal_decel")
+    @classmethod
+    def _free_at_rest(cls, points: list[float]) -> list[float]:
+        if points[0] != 0.0:
+            raise ValueError("must start at 0: a pedal at rest brakes nothing")
         return points
 
     @field_validator("pedal_position")
@@ -140,7 +180,18 @@ class Control(_Section):
     def _paired(self) -> "Control":
         if len(self.pedal_position) != len(self.pedal_decel):
             raise ValueError("pedal_position and pedal_decel need the same number of points")
+        if (self.front_share is None) != (self.distribution == "ideal"):
+            raise ValueError('distributions "fixed" and "electronic" need a front_share, "ideal" has its own')
         return self
+
+
+class Blending(_Section):
+    """What the motors take of the brake torque, f of (5.2): 0 off, 1 series phasing, parallel in between."""
+
+    front: Annotated[float, Field(ge=0, le=1)] = 0.0
+    rear: Annotated[float, Field(ge=0, le=1)] = 0.0
+    fade_speed: Annotated[float, Field(ge=0, lt=20)] = 3.0
+    """Below it the motors' limit falls with the speed, m/s (Figure A.7); a motor's own map knows better."""
 
 
 class Config(_Section):
@@ -156,6 +207,7 @@ class Config(_Section):
     sensors: Sensors = Sensors()
     observer: Observer = Observer()
     control: Control
+    blending: Blending = Blending()
 
     @model_validator(mode="after")
     def _axles(self) -> "Config":
@@ -164,76 +216,25 @@ class Config(_Section):
         return self
 
 
-_NUMBER, _WHOLE = "give a number", "give a whole number"
-_WANTED = {
-    "float_type": _NUMBER,
-    "float_parsing": _NUMBER,
-    "finite_number": "give a finite number",
-    "int_type": _WHOLE,
-    "int_parsing": _WHOLE,
-    "int_from_float": _WHOLE,
-    "bool_type": "give true or false",
-    "bool_parsing": "give true or false",
-    "string_type": 'give a text in "quotes"',
-    "list_type": "give a list in [brackets]",
-    "tuple_type": "give a list in [brackets]",
-    "dict_type": "give a table with keys of its own",
-    "model_type": "give a table with keys of its own",
-    "greater_than": "give a value above {gt:g}",
-    "greater_than_equal": "give a value of at least {ge:g}",
-    "less_than": "give a value below {lt:g}",
-    "less_than_equal": "give a value of at most {le:g}",
-    "string_too_short": "give a text, not an empty one",
-    "too_short": "give at least {min_length} values",
-    "too_long": "give at most {max_length} values",
-    "value_error": "{error}",
-}
-"""What is right, by pydantic's kind of finding."""
-
-
-def describe(error: ValidationError, where: str) -> UserError:
-    """Turn the first finding of pydantic into one line with the key's path."""
-    finding = error.errors(include_url=False)[0]
-    place = ".".join(str(part) for part in finding["loc"])
-    more = error.error_count() - 1
-    if finding["type"] == "missing":
-        remedy = "missing; add this key"
-    elif finding["type"] == "extra_forbidden":
-        remedy = "unknown key; remove it or correct its spelling"
-    else:
-        wanted = _WANTED.get(finding["type"], finding["msg"]).format(**finding.get("ctx", {}))
-        remedy = f"{wanted} (found {finding['input']!r})" if place else wanted
-    return UserError(where, place, remedy + (f" ({more} more findings)" if more else ""))
-
-
-def read_toml(path: Path) -> dict[str, Any]:
-    """Read a TOML file; what cannot be read is one line."""
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise UserError(str(path), "", "no such file") from None
-    except IsADirectoryError:
-        raise UserError(str(path), "", "is a folder; give a TOML file") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise UserError(str(path), "", f"cannot be read as text: {error}") from None
-    except tomllib.TOMLDecodeError as error:
-        raise UserError(str(path), "", f"not valid TOML: {error}") from None
-
-
 def load_config(path: Path) -> Config:
     """Read and check a CONFIG file.
 
     Raises:
-        UserError: a file cannot be read, or a key is missing, unknown or out of range.
+        UserError: a file cannot be read, a key is missing, unknown or out of range, or the distribution of
+            the brake force violates Annex 5 of ECE R13-H.
     """
     own = read_toml(path)
     source, included = _included(path, own.pop("include")) if "include" in own else (path, {})
     try:
-        return Config.model_validate(_merged(own, included))
+        config = Config.model_validate(_merged(own, included))
     except ValidationError as error:
         keys = error.errors()[0]["loc"]
         elsewhere = _holds(included, keys) and not _holds(own, keys)
         raise describe(error, str(source if elsewhere else path)) from None
+    finding = annex_5_violation(new_params(config)[0], config.vehicle.loads())
+    if finding:
+        raise UserError(str(path), "control.distribution", finding)
+    return config
 
 
 def _included(path: Path, name: object) -> tuple[Path, dict[str, Any]]:
@@ -279,7 +280,8 @@ def new_params(config: Config) -> RecordArray:
     params = np.zeros(1, PARAMS)
     row = params[0]
     vehicle, sensors, observer, control = config.vehicle, config.sensors, config.observer, config.control
-    row["transmit"], row["compensate"] = config.transmit, control.compensate
+    row["transmit"], row["slip_guard"] = config.transmit, control.slip_guard
+    row["compensation"] = COMPENSATIONS.index(control.compensation)
     row["mapped"] = 1
     rear_axle = vehicle.wheelbase - vehicle.front_axle
     for name in ("mass", "wheelbase", "front_axle", "cog_height", "track", "rolling_resistance"):
@@ -314,6 +316,13 @@ def new_params(config: Config) -> RecordArray:
     for name in ("pedal_position", "pedal_decel"):
         points = getattr(control, name)
         row[name] = points + points[-1:] * (PEDAL_POINTS - len(points))
+    row["fade_speed"] = config.blending.fade_speed
+    row["blending"] = np.repeat((config.blending.front, config.blending.rear), 2)
+    heaviest = max(load.mass for load in vehicle.loads())
+    down_grade = GRAVITY * math.sin(math.atan(control.hold_grade)) * heaviest / vehicle.mass
+    row["hold_decel"] = down_grade / (1.0 - 2.0 * observer.sigma_mu_initial)
+    row["distribution"] = DISTRIBUTIONS.index(control.distribution)
+    row["front_share"], row["rear_slip_margin"] = control.front_share or 0.0, control.rear_slip_margin
     row["max_pressure"] = control.max_pressure * BAR
     row["max_pressure_rate"] = control.max_pressure_rate * BAR
     return params

@@ -30,6 +30,7 @@ from ecu.records import (
 )
 from ecu.ring import Ring, publish
 from ecu.signals import CYCLE_NS
+from ecu.standby import Standby
 from ecu.step import new_state, step
 
 WAITING_FRAMES: Final = 4096  # room for what waits: a second of a saturated bus
@@ -125,10 +126,15 @@ class Watch:
 class Progress:
     """What is carried from cycle to cycle beside the ECU's own records."""
 
-    def __init__(self, watch: Watch) -> None:
-        self.watch, self.timing = watch, Timing()
+    def __init__(self, watch: Watch, standby: Standby | None = None) -> None:
+        self.watch, self.standby, self.timing = watch, standby, Timing()
         self.number = self.overruns = self.waiting = self.foreign = 0
         self.worst_lateness_ns = self.previous_t_ns = 0
+
+    @property
+    def speaks(self) -> bool:
+        """Whether this daemon sends."""
+        return self.standby is None or self.standby.speaks
 
 
 def cycle_once(ecu: Ecu, channel: Channel, ring: Ring, grid: Grid, run: Progress) -> None:
@@ -150,13 +156,18 @@ def cycle_once(ecu: Ecu, channel: Channel, ring: Ring, grid: Grid, run: Progress
         run.previous_t_ns,
         grid.source.realtime_ns(),
     )
-    run.foreign += foreign
+    if run.standby is None:
+        run.foreign += foreign
+    else:
+        run.standby.listen(ecu.transmit_plan, ecu.transmission, ecu.waiting, run.waiting, tick.t_mono_ns)
     status = channel.status()
     _note_service(ecu, run, tick, status)
     received = clock()
     step(ecu.params, ecu.state, ecu.inputs, ecu.outputs)
     stepped = clock()
-    due = transmit(ecu.transmit_plan, ecu.transmission, ecu.vector, run.number, ecu.sending)
+    due = 0
+    if run.speaks:
+        due = transmit(ecu.transmit_plan, ecu.transmission, ecu.vector, run.number, ecu.sending)
     encoded = clock()
     channel.send(ecu.sending, due)
     sent = clock()

@@ -15,6 +15,10 @@ BAR: Final = 1e5  # Pa
 OBSERVERS: Final = ("joint", "observer1", "observer2")
 JOINT, OBSERVER1, OBSERVER2 = range(3)
 
+DISTRIBUTIONS: Final = ("ideal", "fixed", "electronic")
+COMPENSATIONS: Final = ("second-order", "inverse", "off")
+SECOND_ORDER, INVERSE, OFF = range(3)
+
 PARAMS: Final = np.dtype(
     [
         ("transmit", "u1"),  # armed: demands are flagged valid
@@ -72,9 +76,16 @@ PARAMS: Final = np.dtype(
         # control
         ("pedal_position", "f8", (PEDAL_POINTS,)),  # %
         ("pedal_decel", "f8", (PEDAL_POINTS,)),  # m/s^2
+        ("hold_decel", "f8"),  # that the standing car is held with at least, m/s^2
+        ("distribution", "i8"),  # DISTRIBUTIONS
+        ("front_share", "f8"),  # of the brake force, where the distribution has one
+        ("rear_slip_margin", "f8"),  # a rear wheel may slip this much more than the front one
         ("max_pressure", "f8"),  # Pa
         ("max_pressure_rate", "f8"),  # Pa/s
-        ("compensate", "u1"),
+        ("compensation", "i8"),  # COMPENSATIONS
+        ("slip_guard", "u1"),
+        ("blending", "f8", (4,)),  # f of (5.2): 0 off, 1 series phasing
+        ("fade_speed", "f8"),  # below it the motors' limit fades, m/s
     ],
     align=True,
 )

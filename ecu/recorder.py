@@ -2,7 +2,8 @@
 
 `python -m ecu.recorder --ring RING --parent PID [--record DIR] [--state DIR]`. It ends when the ring is
 closed or its parent is gone, after everything in the ring is written; signals to the group are left to
-the parent. A disk that is full ends the recording, nothing else.
+the parent. It begins when a line comes on its standard input: the ring is there. A disk that is full ends
+the recording, nothing else.
 """
 
 import argparse
@@ -10,6 +11,7 @@ import json
 import os
 import signal
 import sqlite3
+import sys
 import time
 from pathlib import Path
 from typing import Any, BinaryIO, Final, NamedTuple
@@ -244,6 +246,8 @@ def main() -> int:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     configure_logging()
+    if not sys.stdin.readline():  # the parent makes the ring, then says so; it went instead
+        return 1
     try:
         recorder = Recorder(RingReader(options.ring), options.record, options.state)
     except UserError as error:

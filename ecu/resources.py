@@ -1,6 +1,7 @@
 """The files that are shipped with the program: databases, vehicles, signal maps, scenarios."""
 
 from pathlib import Path
+from typing import Final
 
 from ecu.errors import UserError
 
@@ -14,8 +15,11 @@ def resource(name: str) -> Path:
     return (installed if installed.is_dir() else _PACKAGE.parent) / name
 
 
-def named(name: str, folder: str) -> Path:
-    """Path of the file `name`; where no such file exists a bare name means the shipped one in `folder`.
+SCENARIOS: Final = ("config/scenarios", "config/scenarios/faults")
+
+
+def named(name: str, *folders: str) -> Path:
+    """Path of the file `name`; where no such file exists a bare name means a shipped one in `folders`.
 
     `named("suv", "config")` is the shipped `config/suv.toml`. Raises UserError for a bare name that is
     neither; any other path is returned as it is.
@@ -23,8 +27,8 @@ def named(name: str, folder: str) -> Path:
     path = Path(name)
     if path.is_file() or path.suffix or len(path.parts) != 1:
         return path
-    shipped = resource(folder) / f"{name}.toml"
-    if shipped.is_file():
-        return shipped
-    names = ", ".join(sorted(file.stem for file in resource(folder).glob("*.toml")))
+    shipped = {file.stem: file for folder in folders for file in sorted(resource(folder).glob("*.toml"))}
+    if name in shipped:
+        return shipped[name]
+    names = ", ".join(shipped)
     raise UserError(name, "", f"no such file, and none that is shipped ({names})")

@@ -53,18 +53,28 @@ class Ring(NamedTuple):
     frames: RecordArray
 
 
-def ring_path(pid: int) -> Path:
-    """Return where the ring of process `pid` is: memory, not a disk, where the machine has such a folder.
-
-    Rings that dead processes left behind are removed.
-    """
+def _folder() -> Path:
+    """Memory, not a disk, where the machine has such a folder."""
     shared = Path("/dev/shm")
-    folder = shared if os.access(shared, os.W_OK) else Path(tempfile.gettempdir())
-    for left in folder.glob("brake-ecu.*.ring"):
-        owner = left.name.split(".")[1]
+    return shared if os.access(shared, os.W_OK) else Path(tempfile.gettempdir())
+
+
+def living_rings() -> list[Path]:
+    """Return the rings of processes that live; those that dead processes left behind are removed."""
+    rings = []
+    for path in sorted(_folder().glob("brake-ecu.*.ring")):
+        owner = path.name.split(".")[1]
         if owner.isdecimal() and not Path("/proc", owner).exists():
-            remove_ring(left)
-    return folder / f"brake-ecu.{pid}.ring"
+            remove_ring(path)
+        else:
+            rings.append(path)
+    return rings
+
+
+def ring_path(pid: int) -> Path:
+    """Return where the ring of process `pid` is."""
+    living_rings()
+    return _folder() / f"brake-ecu.{pid}.ring"
 
 
 def _round_up(size: int) -> int:
@@ -200,6 +210,17 @@ class RingReader:
     def closed(self) -> bool:
         """Whether the writer said that no more cycles come."""
         return bool(self.ring.header[0]["closed"])
+
+    def latest(self) -> RecordArray | None:
+        """Return the last cycle (`RECORDED`, shape (1,)), None while there is none. `read` is not touched."""
+        slots = self.ring.slots
+        for _ in range(10):  # the writer may overtake us
+            number = int(self.ring.header[0]["written"]) - 1
+            place = number % len(slots)
+            copied = slots[place : place + 1].copy()
+            if number >= 0 and copied["number"][0] == number == slots["number"][place]:
+                return copied["recorded"]
+        return None
 
     def read(self, limit: int = 256) -> Batch:
         """Return up to `limit` cycles that were not read yet; what was overwritten is counted as lost."""

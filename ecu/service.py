@@ -11,6 +11,7 @@ import socket
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from types import FrameType
 from typing import Any, Final, NamedTuple
@@ -37,6 +38,8 @@ from ecu.records import STAGES, RecordArray
 from ecu.resources import resource
 from ecu.ring import Ring, close_ring, create_ring, remove_ring, ring_path
 from ecu.signals import CYCLE_NS, INPUT_SIGNALS, OUTPUT_SIGNALS
+from ecu.standby import Standby, learned_by_first
+from ecu.step import STATE
 from ecu.warm import warm_up
 
 LISTEN_S: Final = 1.0
@@ -53,6 +56,7 @@ class RunOptions(NamedTuple):
     map: Path | None = None
     record: Path | None = None
     state: Path | None = None
+    standby: bool = False
 
 
 class Session(NamedTuple):
@@ -64,34 +68,41 @@ class Session(NamedTuple):
     recorder: "subprocess.Popen[str]"
     verdicts: list[Verdict]
     compiled: CompileCounter
+    standby: Standby | None
 
 
 def _prepare(options: RunOptions) -> Session:
-    began = time.monotonic()
     compiled = CompileCounter()
     config = load_config(options.config)
     receiving = receive_plan(options.map)
     sending = contract_transmit_plan(resource("dbc/brake_ecu.dbc"), "BrakeEcu")
     params = new_params(config)
-    ecu = new_ecu(params, _restored(options.state, config, params), receiving, sending)
-    warm_up(ecu, compiled)
-    warm_s = time.monotonic() - began
+    description = _describe(options, config)
+    path = ring_path(os.getpid())
     channel = open_channel(
         options.interface,
         options.channel,
         receive_ids=[*receiving.ids.tolist(), *sending.ids.tolist()],
         fd=config.can_fd,
     )
+    began = time.monotonic()  # what comes from here on waits in the channel and is listened to below
+    recorder = _start_recorder(path, options)
     try:
-        listen_before_send(channel, f"{options.interface} {options.channel}", sending, LISTEN_S)
-        path = ring_path(os.getpid())
-        ring = create_ring(path, _describe(options, config, ecu), ecu.state.tobytes())
-        try:
-            recorder = _start_recorder(ring, options)
-        except BaseException:
-            remove_ring(path)
-            raise
+        learned = _restored(options.state, config, params)
+        if options.standby:
+            from_first = learned_by_first(description, params["mu_nominal"][0])
+            learned = learned if from_first is None else from_first
+        ecu = new_ecu(params, learned, receiving, sending)
+        warm_up(ecu, compiled)
+        warm_s = time.monotonic() - began
+        if not options.standby:
+            where = f"{options.interface} {options.channel}"
+            listen_before_send(channel, where, sending, LISTEN_S - warm_s)
+        ring = create_ring(path, description, ecu.state.tobytes())
+        _await_recorder(recorder)
     except BaseException:
+        remove_ring(path)
+        recorder.kill()
         channel.close()
         raise
     verdicts = make_realtime()
@@ -99,13 +110,14 @@ def _prepare(options: RunOptions) -> Session:
         "ready",
         channel=options.channel,
         armed=config.transmit,
+        standby=options.standby,
         warm_up_s=round(warm_s, 2),
         compiled=compiled.count,
         realtime={verdict.name: verdict.granted for verdict in verdicts},
         ring=str(path),
     )
     _notify("READY=1")
-    return Session(ecu, channel, ring, recorder, verdicts, compiled)
+    return Session(ecu, channel, ring, recorder, verdicts, compiled, Standby() if options.standby else None)
 
 
 def _restored(folder: Path | None, config: Config, params: RecordArray) -> RecordArray | None:
@@ -126,7 +138,7 @@ def _restored(folder: Path | None, config: Config, params: RecordArray) -> Recor
     return learned
 
 
-def _describe(options: RunOptions, config: Config, ecu: Ecu) -> dict[str, Any]:
+def _describe(options: RunOptions, config: Config) -> dict[str, Any]:
     """Return what a recording says of itself."""
     return {
         "name": config.name,
@@ -146,17 +158,13 @@ def _describe(options: RunOptions, config: Config, ecu: Ecu) -> dict[str, Any]:
         },
         "units": {signal.name: signal.unit for signal in OUTPUT_SIGNALS},
         "input_units": {signal.name: signal.unit for signal in INPUT_SIGNALS},
-        "state": layout(ecu.state.dtype),
+        "state": layout(STATE),
     }
 
 
-def _start_recorder(ring: Ring, options: RunOptions) -> "subprocess.Popen[str]":
-    """Start the side process and wait until it has opened what it writes.
-
-    Raises:
-        UserError: it could not.
-    """
-    command = [sys.executable, "-m", "ecu.recorder", "--ring", str(ring.path), "--parent", str(os.getpid())]
+def _start_recorder(ring: Path, options: RunOptions) -> "subprocess.Popen[str]":
+    """Start the side process, which loads while we do."""
+    command = [sys.executable, "-m", "ecu.recorder", "--ring", str(ring), "--parent", str(os.getpid())]
     for name in ("record", "state"):
         folder = getattr(options, name)
         if folder is not None:
@@ -164,14 +172,27 @@ def _start_recorder(ring: Ring, options: RunOptions) -> "subprocess.Popen[str]":
     package = str(Path(__file__).parent.parent)
     paths = [package, *filter(None, [os.environ.get("PYTHONPATH")])]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
-    recorder = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
+    return subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment
+    )
+
+
+def _await_recorder(recorder: "subprocess.Popen[str]") -> None:
+    """Let the side process open the ring and what it writes.
+
+    Raises:
+        UserError: it could not.
+    """
+    assert recorder.stdin is not None
     assert recorder.stdout is not None
+    with suppress(BrokenPipeError):  # it ended: no answer comes either
+        recorder.stdin.write("go\n")
+        recorder.stdin.close()
     answer = recorder.stdout.readline().strip()
     recorder.stdout.close()
     if answer != "ready":
         recorder.wait()
         raise UserError("", "", answer or "the side process did not start; see the line before")
-    return recorder
 
 
 def _notify(state: str) -> None:
@@ -207,7 +228,8 @@ def run(options: RunOptions) -> int:
     session = _prepare(options)
     try:
         progress = _cycle_until(session, stopping)
-        send_farewell(session.ecu, session.channel, progress.number)
+        if progress.speaks:
+            send_farewell(session.ecu, session.channel, progress.number)
         off = session.channel.status().bus_off
     finally:
         _leave(session)
@@ -223,12 +245,17 @@ def run(options: RunOptions) -> int:
 
 
 def _cycle_until(session: Session, stopping: list[int]) -> Progress:
-    ecu, channel, ring, recorder, _, compiled = session
-    progress = Progress(Watch(channel.status(), compiled))
+    ecu, channel, ring, recorder, _, compiled, standby = session
+    progress = Progress(Watch(channel.status(), compiled), standby)
     grid = Grid(system_time())
-    recorder_lives = True
+    recorder_lives, spoke = True, progress.speaks
     while not stopping:
         cycle_once(ecu, channel, ring, grid, progress)
+        if progress.speaks != spoke:
+            spoke = progress.speaks
+            structlog.get_logger("ecu").warning(
+                "takes_over" if spoke else "falls_silent", cycle=progress.number
+            )
         if recorder_lives and progress.number % LOOK_AT_RECORDER_CYCLES == 0 and recorder.poll() is not None:
             recorder_lives = False
             structlog.get_logger("ecu").error(

@@ -4,25 +4,45 @@
 daemon, replay and closed-loop simulation get the same bits from the same inputs. Order of one cycle:
 
     brake application -> accelerations -> wheel loads, radii -> brake torques, expected slip -> speed -> slip
-    -> tyre forces -> friction -> disc temperature -> demand -> pressure law -> limiter -> mode
+    -> tyre forces -> friction -> disc temperature -> demand -> distribution -> blending -> pressure law
+    -> slip guard -> limiter -> mode
+    -> limiter -> mode
 """
 
 import math
 
 import numpy as np
 
-from ecu.control.demand import requested_decel, wheel_torque_demand
-from ecu.control.limiter import LIMITER_STATE, limit_pressure
+from ecu.control.blending import (
+    BLENDING_STATE,
+    blends,
+    motor_torque_demand,
+    share_torque,
+    update_motors,
+)
+from ecu.control.demand import DEMAND_STATE, update_demand
+from ecu.control.distribution import DISTRIBUTION_STATE, cap_rear, distribute, watch_rear
+from ecu.control.friction_torque import FRICTION_TORQUE_STATE, follow_pressure, lagging_torque
+from ecu.control.limiter import LIMITER_STATE, available_pressure, limit_pressure
 from ecu.control.mode import MODE_STATE, decide_mode, input_faults
 from ecu.control.pressure_law import (
     PRESSURE_LAW_STATE,
     compensated_pressure,
     follow_friction,
+    learn_start,
     level_left_right,
     pressure_for_torque,
     set_base,
+    watch_limit,
 )
-from ecu.diagnostics.faults import DEMAND_LIMITED, FILTER_RESET
+from ecu.control.slip_guard import SLIP_GUARD_STATE, guard_slip
+from ecu.diagnostics.faults import (
+    ACCUMULATOR_LOW,
+    BRAKE_FADE,
+    DEMAND_LIMITED,
+    FILTER_RESET,
+    WHEEL_SLIPS,
+)
 from ecu.estimation.force import (
     FORCE_STATE,
     reset_force,
@@ -47,7 +67,7 @@ from ecu.estimation.joint.learned import (
     settle_friction,
     take_mean,
 )
-from ecu.estimation.joint.observer import update_joint
+from ecu.estimation.joint.observer import mistrust_wheels, update_joint
 from ecu.estimation.motion import MOTION_STATE, update_motion, usable
 from ecu.estimation.observer2 import OBSERVER_STATE
 from ecu.estimation.slip import (
@@ -85,7 +105,12 @@ STATE = np.dtype(
         ("friction", FRICTION_STATE),
         ("application", APPLICATION_STATE),
         ("discs", DISC_STATE),
+        ("demand", DEMAND_STATE),
+        ("distribution", DISTRIBUTION_STATE),
+        ("friction_torque", FRICTION_TORQUE_STATE),
+        ("blending", BLENDING_STATE),
         ("control", PRESSURE_LAW_STATE),
+        ("guard", SLIP_GUARD_STATE),
         ("limiter", LIMITER_STATE),
         ("mode", MODE_STATE),
         ("learned", LEARNED),
@@ -108,8 +133,9 @@ def new_state(params: RecordArray, learned: RecordArray | None = None) -> Record
         row["learned"]["disc_excess"] = UNKNOWN_EXCESS
     else:
         row["learned"] = learned[0]
-    row["control"]["mu_override"] = math.nan
+    row["control"]["mu_override"], row["control"]["start"] = math.nan, 1.0
     row["force"]["k_f"] = row["force"]["stiffness"] = 1.0
+    row["distribution"]["rear"] = 1.0
     _begin(params, state)
     return state
 
@@ -119,7 +145,7 @@ def _begin(params: Record, state: Record) -> None:
     p, s = params[0], state[0]
     restore_friction(p, s.friction, s.learned)
     restore_joint(p, s.joint, s.learned)
-    set_base(s.control, s.learned)
+    set_base(p, s.control, s.learned)
     start_discs(p, s.discs, s.learned)
     update_wheel_load(p, s.wheel_load, 0.0, 0.0, 0.0, 1.0)
     update_radius(p, s.wheels, s.learned, s.wheel_load.load)
@@ -148,6 +174,12 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
         faults |= FILTER_RESET
     if s.limiter.limited:
         faults |= DEMAND_LIMITED
+    if s.limiter.starved:
+        faults |= ACCUMULATOR_LOW
+    if s.guard.acting:
+        faults |= WHEEL_SLIPS
+    if s.control.at_limit:
+        faults |= BRAKE_FADE
     asked = math.isfinite(decel) and decel > 0.05
     mode = decide_mode(s.mode, faults, asked or s.application.braking != 0, dt)
     _publish(p, s, u, y, decel, faults, mode)
@@ -159,12 +191,13 @@ def _estimate(p: Record, s: Record, u: Record, dt: float) -> None:
     if s.application.ended:
         if p.observer == JOINT:
             take_mean(p, s.joint, s.friction)
+        learn_start(s.control, s.friction)
         hand_over(s.friction, s.learned)
     if s.application.started:
         reset_force(s.force)
     braking = s.application.braking != 0
     if not braking:
-        set_base(s.control, s.learned)
+        set_base(p, s.control, s.learned)
     update_motion(p, s.motion, u, s.speed.speed, s.friction.torque)
     update_wheel_load(p, s.wheel_load, s.motion.accel_x, s.motion.accel_y, s.speed.speed, dt)
     update_pressure(p, s.friction, u, dt)
@@ -181,6 +214,8 @@ def _observe_jointly(p: Record, s: Record, u: Record, braking: bool, dt: float) 
         for i in range(4):
             joint.p[MU + i, MU + i] += heat_widening(s.discs, i) ** 2
         begin_course(joint)
+    if s.guard.acting:
+        mistrust_wheels(joint)
     update_joint(p, joint, u, s.motion, s.wheel_load.load, s.limiter.pressure, braking, dt)
     if s.application.ended:
         settle_friction(p, joint, s.learned)
@@ -215,21 +250,45 @@ def _observe_by_wheel(p: Record, s: Record, u: Record, braking: bool, dt: float)
 
 @kernel
 def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
-    decel = requested_decel(p, u)
-    if p.compensate:
-        follow_friction(s.control, s.friction.mu, dt)
-    s.limiter.limited = 0
+    speed = s.speed.speed if s.speed.started else math.nan
+    decel = update_demand(p, s.demand, u, speed, dt)
+    watch_rear(p, s.distribution, u, s.motion, s.wheel_load.load, decel, speed, dt)
+    distribute(p, s.distribution, decel)
+    follow_friction(p, s.control, s.friction, dt)
+    follow_pressure(p, s.friction_torque, u, s.limiter.pressure, s.joint.pressures.zero, dt)
+    update_motors(p, s.blending, u, s.guard.capped, s.speed.speed, decel, dt)
+    share_torque(p, s.blending, s.distribution.torque, dt)
     for i in range(4):
-        torque = wheel_torque_demand(p, decel, i)
+        torque = s.blending.lining[i]
         y.pressure_uncompensated[i] = pressure_for_torque(p, torque, s.control.base[i], i)
         y.pressure_demand[i] = compensated_pressure(p, s.control, y.pressure_uncompensated[i], i)
     level_left_right(y.pressure_demand, y.pressure_uncompensated)
-    for i in range(4):
-        torque = wheel_torque_demand(p, decel, i)
-        wanted, uncompensated = y.pressure_demand[i], y.pressure_uncompensated[i]
-        y.pressure_demand[i] = limit_pressure(p, s.limiter, i, wanted, uncompensated, torque, dt) / BAR
-        y.pressure_uncompensated[i] = uncompensated / BAR
+    cap_rear(p, s.distribution, decel, s.blending.lining, s.friction, y.pressure_demand)
+    if p.slip_guard:
+        guard_slip(
+            p, s.guard, u, s.motion, speed, s.limiter.pressure, y.pressure_demand, s.distribution.torque, dt
+        )
+    _limit(p, s, y, available_pressure(p, u), decel, dt)
     return decel
+
+
+@kernel
+def _limit(p: Record, s: Record, y: Record, available: float, decel: float, dt: float) -> None:
+    s.limiter.limited = s.limiter.starved = 0
+    for i in range(4):
+        wanted, uncompensated = y.pressure_demand[i], y.pressure_uncompensated[i]
+        ceiling = min(available, s.guard.cap[i]) if s.guard.capped[i] else available
+        torque = s.blending.lining[i]
+        pressure = limit_pressure(p, s.limiter, i, wanted, uncompensated, torque, ceiling, dt)
+        s.control.cut[i] = 1 if pressure < wanted - 1.0 else 0
+        if available < min(wanted, p.max_pressure):
+            s.limiter.starved = 1
+        y.pressure_demand[i], y.pressure_uncompensated[i] = pressure / BAR, uncompensated / BAR
+        motor = motor_torque_demand(
+            p, s.blending, lagging_torque(p, s.friction_torque, s.control, wanted, i), i
+        )
+        y.motor_demand[i] = motor if blends(p) else math.nan
+    watch_limit(p, s.control, s.friction.mu, s.guard.capped, decel > 0.0, dt)
 
 
 @kernel
@@ -248,7 +307,7 @@ def _publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: i
     y.overruns = u.overruns
     y.worst_lateness_us = u.worst_lateness_us
     y.pressure_demand_valid = 1.0 if p.transmit and mode != STARTING and mode != FAILED else 0.0
-    y.motor_demand_valid = 0.0
+    y.motor_demand_valid = y.pressure_demand_valid if blends(p) else 0.0
     y.decel_demand_total = decel
     y.accel_x_road = s.motion.accel_x
     y.braking = s.application.braking
@@ -267,7 +326,6 @@ def _publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: i
         y.disc_temperature[i] = s.discs.temperature[i] if mapped else math.nan
         y.sigma_disc_temperature[i] = s.discs.sigma[i] if mapped else math.nan
         y.test_ratio[i] = _test_ratio(p, s, i)
-        y.motor_demand[i] = math.nan
         y.pad_wear[i] = y.pad_remaining[i] = y.pad_wear_mass[i] = math.nan
         if mode == FAILED:
             y.pressure_demand[i] = 0.0

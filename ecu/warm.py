@@ -20,6 +20,7 @@ from ecu.records import RecordArray
 from ecu.resources import resource
 from ecu.ring import create_ring
 from ecu.signals import CYCLE_NS
+from ecu.standby import Standby
 
 
 class _Silence:
@@ -45,11 +46,12 @@ def warm_up(ecu: Ecu, compiled: CompileCounter) -> None:
     twin = new_ecu(ecu.params, None, ecu.receive_plan, ecu.transmit_plan)
     with tempfile.TemporaryDirectory(prefix="brake-ecu-") as folder:
         ring = create_ring(Path(folder) / "ring", {}, b"", slots=2, frames=1)
-        progress = Progress(Watch(_Silence().status(), compiled))
         instants = itertools.count(0, CYCLE_NS // 100)
         grid = Grid(TimeSource(instants.__next__, instants.__next__, lambda _: None))
-        for _ in range(3):
-            cycle_once(twin, _Silence(), ring, grid, progress)
+        for standby in (None, Standby()):
+            progress = Progress(Watch(_Silence().status(), compiled), standby)
+            for _ in range(3):
+                cycle_once(twin, _Silence(), ring, grid, progress)
 
 
 def warm() -> int:

@@ -18,7 +18,8 @@ def listen_before_send(channel: Channel, where: str, plan: TransmitPlan, seconds
     frames = new_record(FRAME, 1024)
     end = time.monotonic() + seconds
     while True:
-        for frame in frames[: channel.drain(frames, 0)]:
+        count = channel.drain(frames, 0)
+        for frame in frames[:count]:
             number = int(frame["can_id"]) | (EXTENDED_ID if frame["flags"] & FRAME_EXTENDED else 0)
             if number in names:
                 raise UserError(
@@ -26,6 +27,6 @@ def listen_before_send(channel: Channel, where: str, plan: TransmitPlan, seconds
                     f"frame {int(frame['can_id']):03X} ({names[number]})",
                     "someone else already sends it; stop the other sender first",
                 )
-        if time.monotonic() >= end:
+        if time.monotonic() >= end and count < len(frames):
             return
         time.sleep(0.01)

@@ -1,18 +1,37 @@
-"""What is asked for: pedal to deceleration, the automated demand, torque per wheel (5.1, Figure 4.2).
+"""What is asked for: pedal to deceleration, the automated demand, holding the car that stands.
 
-a_dem = max(pedal map, valid decel_demand)
-T_b,dem = m a_dem r                                     (5.1)
-front share = (l_r + z h) / L,  z = a_dem / g           ideal distribution: equal adhesion of the axles
+a_dem = max(pedal map, valid decel_demand), while the car is held: at least `hold_decel`
+
+A car that has stood for 0.5 s with its brakes asked for is held until the pedal is back at rest and no
+automated demand is left, or until the accelerator is pressed; then the holding demand fades out. It is
+enough for the steepest grade of the configuration, see `new_params`. There is no creep function: without a
+request nothing is braked.
 """
 
 import math
 
-from ecu.estimation.motion import usable
+import numpy as np
+
+from ecu.estimation.motion import mean_wheel_speed, usable
 from ecu.jit import Record, kernel
-from ecu.params import GRAVITY, PEDAL_POINTS
-from ecu.signals import DECEL_DEMAND, DECEL_DEMAND_VALID, PEDAL_POSITION
+from ecu.params import PEDAL_POINTS
+from ecu.signals import ACCELERATOR_POSITION, DECEL_DEMAND, DECEL_DEMAND_VALID, PEDAL_POSITION, WHEEL_SPEED
+
+DEMAND_STATE = np.dtype(
+    [
+        ("standing_s", "f8"),  # how long the car has stood [s]
+        ("held", "u1"),
+        ("hold", "f8"),  # holding demand [m/s^2], fades in and out
+    ],
+    align=True,
+)
 
 MAX_DECEL = 12.0  # m/s^2: no tyre on a road car holds more
+STANDSTILL = 0.3  # m/s
+STANDING_TIME = 0.5  # s
+LEAST_REQUEST = 0.05  # m/s^2, below it nobody brakes
+ACCELERATOR_PRESSED = 3.0  # %
+HOLD_RATE = 5.0  # m/s^3: let go within 0.7 s, as fast as a foot changes the pedal
 
 
 @kernel
@@ -49,16 +68,37 @@ def requested_decel(params: Record, inputs: Record) -> float:
 
 
 @kernel
-def front_share(params: Record, decel: float) -> float:
-    """Return the front axle's share of the brake force in the ideal distribution (Figure 4.2), at most 1."""
-    share: float = (params.rear_axle + decel / GRAVITY * params.cog_height) / params.wheelbase
-    return min(share, 1.0)
+def _stands(params: Record, inputs: Record, speed: float) -> bool:
+    """Return whether wheels and vehicle speed [m/s, NaN: unknown] say that the car stands."""
+    for i in range(4):
+        if not usable(inputs, WHEEL_SPEED + i):
+            return False
+    return mean_wheel_speed(params, inputs) < STANDSTILL and not abs(speed) >= STANDSTILL
 
 
 @kernel
-def wheel_torque_demand(params: Record, decel: float, corner: int) -> float:
-    """Return the brake torque demanded of one wheel [N m], >= 0."""
-    share = front_share(params, decel)
-    axle = share if corner < 2 else 1.0 - share
-    torque: float = 0.5 * axle * params.mass * decel * params.wheel_radius[corner]
-    return torque
+def update_demand(params: Record, state: Record, inputs: Record, speed: float, dt: float) -> float:
+    """Return the deceleration demanded [m/s^2], NaN where neither pedal nor demand is usable.
+
+    Args:
+        params: `PARAMS`.
+        state: `DEMAND_STATE`, overwritten.
+        inputs: `INPUTS`.
+        speed: of the vehicle [m/s], NaN: unknown.
+        dt: time since the last cycle [s].
+    """
+    asked = requested_decel(params, inputs)
+    if math.isnan(asked):
+        return asked
+    state.standing_s = state.standing_s + dt if _stands(params, inputs, speed) else 0.0
+    driving_off = (
+        usable(inputs, ACCELERATOR_POSITION) and inputs.value[ACCELERATOR_POSITION] > ACCELERATOR_PRESSED
+    )
+    if driving_off or asked < LEAST_REQUEST:
+        state.held = 0
+    elif state.standing_s >= STANDING_TIME:
+        state.held = 1
+    target = params.hold_decel if state.held else 0.0
+    state.hold += min(max(target - state.hold, -HOLD_RATE * dt), HOLD_RATE * dt)
+    held: float = state.hold
+    return min(max(asked, held), MAX_DECEL)

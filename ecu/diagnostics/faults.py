@@ -26,6 +26,9 @@ DEMAND_LIMITED: Final = 1 << 7
 FILTER_RESET: Final = 1 << 8
 PEDAL_LOST: Final = 1 << 9
 MOTOR_TORQUE_LOST: Final = 1 << 10
+BRAKE_FADE: Final = 1 << 11
+WHEEL_SLIPS: Final = 1 << 12
+ACCUMULATOR_LOW: Final = 1 << 13
 BUS_OFF: Final = 1 << 16
 ERROR_PASSIVE: Final = 1 << 17
 FOREIGN_SENDER: Final = 1 << 18
@@ -46,6 +49,9 @@ FAULTS: Final = (
     Fault(FILTER_RESET, "filter reset", "an estimator met a value that is not finite and began anew", "look at the inputs at that time"),
     Fault(PEDAL_LOST, "pedal lost", "the pedal position is stale or invalid", "check the sender of BrakeRequest"),
     Fault(MOTOR_TORQUE_LOST, "motor torque lost", "a motor torque came before and is stale: its wheel learns nothing", "check the sender of Motor*"),
+    Fault(BRAKE_FADE, "compensation at its limit", "friction more than 30 % below its base, or a pressure that cannot be had: the car brakes less than the pedal asks for", "brake earlier and let the brakes cool; look at the linings and at friction in the report"),
+    Fault(WHEEL_SLIPS, "wheel slips", "a wheel ran past its tyre's range: its pressure demand is held back", "look at slip in the report; an ABS is not part of this ECU"),
+    Fault(ACCUMULATOR_LOW, "accumulator low", "the accumulator holds less than is demanded: the demand is cut to it", "check the hydraulic unit and the sender of HydraulicStatus"),
     Fault(BUS_OFF, "bus off", "the CAN controller went off the bus", "check wiring; ip link set DEV type can restart-ms 100"),
     Fault(ERROR_PASSIVE, "error passive", "the CAN controller counts many errors", "check termination and bit rate"),
     Fault(FOREIGN_SENDER, "foreign sender", "someone else sends one of our identifiers", "stop the other sender"),

@@ -299,10 +299,10 @@ def _observe(
 
 
 @kernel
-def worth_learning(state: Record, i: int) -> bool:
-    """Return whether friction was observed for long and well enough to be a base."""
-    long: bool = state.observed_s[i] >= SECONDS_FOR_LEARNING
-    return long and state.sigma[i] < SIGMA_FOR_LEARNING * state.mu[i]
+def well_observed(state: Record, i: int) -> bool:
+    """Return whether this braking's friction of a corner may be learned."""
+    sure: bool = state.sigma[i] < SIGMA_FOR_LEARNING * state.mu[i]
+    return sure and state.observed_s[i] >= SECONDS_FOR_LEARNING
 
 
 @kernel
@@ -310,7 +310,7 @@ def hand_over(state: Record, learned: Record) -> None:
     """At the end of a braking: keep what was observed well enough as the base of the next."""
     learned.brakings += 1
     for i in range(4):
-        if worth_learning(state, i):
+        if well_observed(state, i):
             learned.mu_b[i] = state.mu[i]
             learned.sigma_mu_b[i] = state.sigma[i]
             learned.observed_s[i] += state.observed_s[i]

@@ -119,9 +119,9 @@ def test_a_shadow_leaves_braking_to_the_hydraulics(config: Config) -> None:
 def test_the_ideal_controller_brakes_with_the_true_friction(config: Config) -> None:
     """Brake torque over m r against the demand, steady part, mean error: the law alone is left."""
 
-    def error(ideal: bool, compensate: bool) -> float:
+    def error(ideal: bool, compensation: str) -> float:
         chosen = config.model_copy(
-            update={"control": config.control.model_copy(update={"compensate": compensate})}
+            update={"control": config.control.model_copy(update={"compensation": compensation})}
         )
         drive = run(new_loop(scenario("stop-1"), chosen, 3), ideal)
         speed = drive.truth["vehicle_speed"]
@@ -130,7 +130,7 @@ def test_the_ideal_controller_brakes_with_the_true_friction(config: Config) -> N
         decel, asked = torque[steady] / (2105.0 * 0.365), drive.truth["decel_demand"][steady]
         return float(np.abs(decel / asked - 1.0).mean())
 
-    ideal, uncompensated = error(True, True), error(False, False)
+    ideal, uncompensated = error(True, "second-order"), error(False, "off")
     print(f"mean error: ideal {ideal:.3f}, uncompensated {uncompensated:.3f}")
     assert ideal < 0.04
     assert ideal < 0.5 * uncompensated

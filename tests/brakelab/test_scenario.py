@@ -90,6 +90,8 @@ def test_a_road_may_be_described_by_place(tmp_path: Path) -> None:
         ('road_friction = "wet"' + GOOD, "road_friction.0.1: give a number (found 'wet')"),
         ("wetness = 1.5" + GOOD, "wetness: give a value of at most 1"),
         ("repeat = 0" + GOOD, "repeat: give a value of at least 1"),
+        ("charge_limit = [[1.0, 1e5], [0.5, 0.0]]" + GOOD, "charge_limit: give rows of rising time"),
+        ("charge_limit = -1.0" + GOOD, "charge_limit: give values of at least 0"),
         ("motor_share = 0.5\nblending = true" + GOOD, "either blending (by the ECU) or motor_share"),
         (GOOD + "pedal_speed = 0.0", "phase.0.pedal_speed: give a value above 0"),
         (GOOD + "kept_decel = 3.0", "one of decel, pedal and kept_decel"),

@@ -48,6 +48,7 @@ FACTS = {
     "blending-40": Fact((7, 8), 0.0, 20.8, (3.9, 4.4)),
     "blending-60": Fact((7, 8), 0.0, 20.8, (3.9, 4.4)),
     "blending-80": Fact((7, 8), 0.0, 20.8, (3.9, 4.4)),
+    "charge-limit": Fact((7, 8), 0.0, 20.8, (3.9, 4.4)),  # this ECU's motors rest
     "bursts": Fact((40, 55), 0.0, 27.8, (2.0, 2.5)),  # Table 6.1: 1.5 to 1.6 with another pedal
     "curve": Fact((12, 16), 0.0, 22.4, (2.9, 3.5), (5.0, 9.0)),
     "demo": Fact((50, 58), 0.0, 27.8, (5.0, 6.5)),
@@ -55,6 +56,8 @@ FACTS = {
     "fade": Fact((140, 170), 5.6, 27.8, (3.3, 3.6), disc=(350, 500)),
     "fixed-decel": Fact(LONG, CUT_OFF, 13.9, (1.2, 1.4)),
     "fixed-pedal": Fact(LONG, CUT_OFF, 27.8, (0.9, 1.1)),  # Table 6.1: about 1
+    "hand-over": Fact((7, 8), 0.0, 20.8, (3.9, 4.4)),
+    "motor-loss": Fact((7, 8), 0.0, 20.8, (3.9, 4.4)),
     "lane-change": Fact((8.9, 9.1), 22.2, 22.3, (-0.2, 0.2), (4.0, 7.0)),
     "low-grip": Fact((5, 8), 0.0, 20.8, (4.0, 5.0)),
     "ordinary": Fact(LONG, CUT_OFF, 25.0, (0.0, 0.0), (1.5, 2.6)),  # on the motors for the first minute
@@ -65,12 +68,14 @@ FACTS = {
     "repeated-slow": Fact((15, 18), 0.0, 36.1, (4.0, 4.5)),
     "sensitivity": Fact(LONG, CUT_OFF, 27.8, (0.7, 1.0)),
     "single": Fact((6, 8), 0.0, 20.8, (3.9, 4.5)),
-    "split": Fact((6.4, 6.6), 18.3, 22.3, (1.8, 2.3), (1.0, 4.0)),
+    "split": Fact((6.4, 6.6), 19.1, 22.3, (1.5, 2.3), (0.5, 4.0)),
     "staircase": Fact((30, 60), 27.0, 27.8, (4.0, 5.3)),
     "stop-1": Fact((13, 16), 0.0, 33.4, (3.8, 4.4)),
     "stop-2": Fact((10, 12), 0.0, 33.4, (6.7, 7.5)),
     "stop-3": Fact((13, 16), 0.0, 33.4, (3.8, 4.4)),
     "stop-4": Fact((10, 14), 0.0, 33.4, (5.7, 6.5)),
+    "type-0": Fact((5, 6), 0.0, 27.8, (8.0, 8.7)),
+    "type-0-laden": Fact((5, 6), 0.0, 27.8, (8.0, 8.7)),
     "tyre-stiffness": Fact((8, 10), 0.0, 27.8, (3.9, 4.4)),
 }
 
@@ -143,11 +148,11 @@ def test_braking_in_the_curve_turns_the_car_in_but_it_stays_on_its_wheels() -> N
     assert min(truth[f"wheel_force_z_{c}"].min() for c in CORNERS) > 300.0
 
 
-def test_split_friction_locks_the_left_wheels_and_turns_to_the_right() -> None:
+def test_on_split_friction_the_left_wheels_slip_but_roll_and_the_car_drifts_to_the_right() -> None:
     truth = driven("split").truth
-    assert truth["slip_fl"].min() < -0.9
+    assert -0.5 < truth["slip_fl"].min() < -0.1
     assert truth["slip_fr"].min() > -0.1
-    assert truth["heading"][-1] < -0.1
+    assert -0.1 < truth["heading"][-1] < -0.02
     assert truth["position_y"][-1] < -1.0
 
 
@@ -156,8 +161,8 @@ def test_the_patch_is_met_at_2_s_and_locks_the_wheels() -> None:
     locked = drive.t[drive.truth["slip_fl"] < -0.5]
     assert locked[0] == pytest.approx(2.1, abs=0.1)
     on_patch = (drive.t > 2.35) & (drive.t < 2.5)
-    # All four slide at 1.26 m/s^2: the tyre's curve is down from 0.2 to two thirds of it at full slip.
-    assert -drive.truth["accel_x_road"][on_patch].mean() == pytest.approx(0.2 * 9.81 * 0.62, rel=0.1)
+    # Sliding, all four would give 0.62 of the road's 0.2; some slide, some are released.
+    assert -drive.truth["accel_x_road"][on_patch].mean() == pytest.approx(0.2 * 9.81 * 0.62, rel=0.2)
     assert drive.truth["slip_fl"][drive.t > 3.2].min() > -0.1
 
 

@@ -8,6 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from brakelab.closed_loop import plans
+from brakelab.rig.faults import Fault
 from brakelab.scenario import Scenario, load_scenario
 from brakelab.vehicle_bus import TRUTH_COLUMNS
 from brakelab.vehicle_node import drive_in_real_time, main, new_node, write_truth_file
@@ -122,7 +123,9 @@ def test_frames_are_lost_as_often_as_asked_and_always_the_same() -> None:
     def sent(share: float, seed: int) -> list[int]:
         clock = FakeClock()
         bus = FakeBus(clock)
-        drive_in_real_time(new_node(scenario(5.0), 1), bus, clock.source(), share, seed)
+        lossy = [Fault(kind="lost", t=0.0, share=share)] if share else []
+        node = new_node(scenario(5.0).model_copy(update={"fault": lossy}), seed)
+        drive_in_real_time(node, bus, clock.source())
         return [len(frames) for frames in bus.sent]
 
     all_of_them, some = sum(sent(0.0, 1)), sent(0.05, 1)

@@ -8,7 +8,8 @@ import pytest
 from numba.core.runtime import rtsys
 from numba.core.runtime._nrt_python import memsys_enable_stats
 
-from ecu.diagnostics.faults import REQUEST_LOST
+from ecu.diagnostics.faults import ACCUMULATOR_LOW, BRAKE_FADE, DEMAND_LIMITED, REQUEST_LOST, WHEEL_SLIPS
+from ecu.params import OFF
 from ecu.records import OUTPUTS, output_vector
 from ecu.signals import (
     ACTIVE,
@@ -299,10 +300,67 @@ def test_compensation_asks_for_the_pressure_that_the_linings_need(params, feed, 
 
 
 def test_switched_off_compensation_leaves_the_base(params, feed) -> None:
-    params[0]["compensate"] = 0
+    params[0]["compensation"] = OFF
     rows = Car(params, feed, mu=0.36).drive((0.0, 2.0), (60.0, 3.0))
     demand, uncompensated = (column(rows, f"pressure_{k}_fl")[-200:] for k in ("demand", "uncompensated"))
     assert demand == pytest.approx(uncompensated, abs=1e-6)
+
+
+def test_the_base_changes_between_brakings_alone(params, feed) -> None:
+    """And only for what was observed for a second or more with sigma below 10 % (design principle 5)."""
+    car = Car(params, feed, mu=0.38)
+    seen, learned = [], []
+    for pedal, seconds in ((0.0, 3.0), (60.0, 3.5), (0.0, 1.0), (60.0, 0.6), (0.0, 1.0)):
+        leg = []
+        for _ in range(round(seconds / DT)):
+            car.cycle(pedal)
+            leg.append(car.state["control"][0]["base"].copy())
+        seen.append(np.array(leg))
+        learned.append(car.state["learned"][0]["mu_b"].copy())
+    nominal, first = params[0]["mu_nominal"], learned[2]
+    assert np.all(seen[1] == nominal)  # the whole first braking
+    assert first == pytest.approx(np.full(4, 0.38), rel=0.06)
+    base = first * car.state["control"][0]["start"]
+    assert base == pytest.approx(first, rel=0.05)  # this car's friction is the same all along
+    assert np.all(seen[2][-1] == base)
+    assert np.all(seen[3] == base)
+    assert np.all(seen[4][-1] == base)  # 0.6 s teach the base nothing
+
+
+def test_no_demand_beyond_what_the_accumulator_holds_and_the_driver_is_told(car: Car) -> None:
+    fine = car.drive((0.0, 1.0), (60.0, 2.0))
+    car.overwrite = {"accumulator_pressure": 20.0}
+    low = car.drive((60.0, 1.0))
+    assert column(fine, "pressure_demand_fl").max() > 25.0
+    faults = column(low, "active_faults").astype(int)
+    for corner in CORNERS:
+        assert column(low, f"pressure_demand_{corner}").max() <= 20.0
+    assert (faults & ACCUMULATOR_LOW).all()
+    assert not (faults[:25] & BRAKE_FADE).any()
+    assert (faults[35:] & BRAKE_FADE).all()
+    assert not (column(fine, "active_faults").astype(int) & (ACCUMULATOR_LOW | BRAKE_FADE)).any()
+    car.overwrite = {"accumulator_pressure": 180.0}
+    again = car.drive((60.0, 0.5))
+    # Friction in use waited at what it was: the pressure is there again at once.
+    assert column(again, "pressure_demand_fl")[-1] == pytest.approx(
+        column(fine, "pressure_demand_fl")[-1], rel=0.05
+    )
+
+
+def test_a_wheel_that_locks_is_let_go_and_nothing_is_learned_from_it(car: Car) -> None:
+    car.drive((0.0, 2.0), (60.0, 3.0))
+    known = car.state["friction"][0]["mu"].copy()
+    car.overwrite = {"wheel_speed_fl": 0.6 * car.speed / 0.36}
+    car.drive((60.0, 0.02))
+    car.overwrite = {"wheel_speed_fl": 0.3 * car.speed / 0.36}
+    locked = car.drive((60.0, 0.3))
+    faults = column(locked, "active_faults").astype(int)
+    assert (faults[2:] & WHEEL_SLIPS).all()
+    assert column(locked, "pressure_demand_fl")[-1] < 1.0
+    assert column(locked, "pressure_demand_fr")[-1] > 25.0
+    assert not (faults & (DEMAND_LIMITED | BRAKE_FADE)).any()
+    assert [column(locked, f"mode_{c}")[-1] for c in CORNERS] == [HOLDING] * 4
+    assert car.state["friction"][0]["mu"] == pytest.approx(known, rel=0.02)
 
 
 @pytest.mark.parametrize("missed", [1, 5])

@@ -45,13 +45,14 @@ until_speed = 0.5
 )
 def test_an_independent_log_gives_the_same_bits(daemon, witness, tmp_path, lost_share, held_up_s):
     scenario = tmp_path / "scenario.toml"
-    scenario.write_text(SCENARIO, encoding="utf-8")
+    lossy = f'[[fault]]\nkind = "lost"\nt = 0.0\nshare = {lost_share}\n' if lost_share else ""
+    scenario.write_text(SCENARIO + lossy, encoding="utf-8")
     unit = daemon("--config", CONFIG, "-i", "socketcan", "-c", "vcan0", "--record", tmp_path / "record")
     unit.wait_for("ready")
     independent = witness()
     command = [sys.executable, "-m", "brakelab.vehicle_node", scenario, "-i", "socketcan", "-c", "vcan0"]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tools")])}
-    with subprocess.Popen([*command, "--lose", str(lost_share)], env=environment, stdout=-1) as vehicle:
+    with subprocess.Popen(command, env=environment, stdout=-1) as vehicle:
         assert vehicle.stdout is not None
         vehicle.stdout.readline()
         for seconds in held_up_s:

@@ -2,9 +2,11 @@
 
 One cycle k: the driver acts, the vehicle measures and sends; its frames arrive shortly before T_k; the ECU
 receives, steps and sends; the vehicle understands the demands and moves on by 10 ms. All of it runs in one
-kernel with the ECU's own kernels, so that what is simulated is what is driven.
+kernel with the ECU's own kernels, so that what is simulated is what is driven. Frames of both directions pass
+the scenario's faults (`brakelab.rig.faults`) on their way.
 """
 
+import math
 from functools import cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -17,6 +19,8 @@ from numpy.typing import NDArray
 
 from brakelab.outputs import check_outputs
 from brakelab.plant.driver import drive
+from brakelab.rig.deaths import killed
+from brakelab.rig.faults import Way, convey, new_way
 from brakelab.scenario import LONGEST, Scenario, load_scenario
 from brakelab.vehicle_bus import (
     N_TRUTH,
@@ -91,6 +95,8 @@ class Sides(NamedTuple):
     ecu_reception: Reception
     vehicle_frames: RecordArray
     ecu_frames: RecordArray
+    to_ecu: Way
+    to_vehicle: Way
 
 
 class Loop(NamedTuple):
@@ -98,6 +104,18 @@ class Loop(NamedTuple):
 
     sides: Sides
     noise: Generator
+
+
+class Told(NamedTuple):
+    """The friction that the ECU's pressure law is told to use in place of its own."""
+
+    true_share: float = 0.0
+    """Of the true friction: 1 makes the ideal controller; 0: not told."""
+    front: float = 0.0
+    """Amplitude of a sine about the base friction, relative to it, of the front axle."""
+    rear: float = 0.0
+    frequency: float = 0.0
+    """Of the sine [Hz]; 0: not told."""
 
 
 class Drive(NamedTuple):
@@ -158,6 +176,8 @@ def new_loop(scenario: Scenario, config: Config, seed: int, armed: bool = True) 
         new_reception(plan.ecu_hears),
         frame_buffer(plan.vehicle_sends),
         frame_buffer(plan.ecu_sends),
+        new_way(),
+        new_way(),
     )
     return Loop(sides, new_noise(seed))
 
@@ -172,11 +192,24 @@ def _hand_over(frames: Any, count: int, first_ns: int, spacing_ns: int, kept: An
 
 
 @kernel
+def _tell(told: Told, control: Any, true: Any, t: float) -> None:
+    """Tell the pressure law a friction: `control` is its state, `true` the car's friction, `t` time [s]."""
+    for i in range(4):
+        if told.true_share > 0.0:
+            control.mu_override[i] = told.true_share * true[i]
+        elif told.frequency > 0.0:
+            amplitude = told.front if i < 2 else told.rear
+            wave = 1.0 + amplitude * math.sin(2.0 * math.pi * told.frequency * t)
+            control.mu_override[i] = control.base[i] * wave
+
+
+@kernel
 def _run(
     plan: Plans,
     loop: Sides,
     noise: Generator,
-    ideal: bool,
+    told: Told,
+    alive: bool,
     first_cycle: int,
     decoded: NDArray[np.float64],
     outputs: NDArray[np.float64],
@@ -197,45 +230,72 @@ def _run(
         sense(vehicle, noise, loop.values)
         write_truth(vehicle, truth[row])
         sent = transmit(plan.vehicle_sends, loop.vehicle_sent, loop.values, cycle, loop.vehicle_frames)
+        t = 1e-9 * (cycle * CYCLE_NS)
+        sent = convey(vehicle.faults, loop.to_ecu, t, noise, loop.vehicle_frames, sent)
+        arrived = loop.to_ecu.arrived
         # A log's time grid starts at its first frame: the first burst bears T_0 itself.
         spacing = SPACING_NS if cycle > 0 else 0
-        place = _hand_over(loop.vehicle_frames, sent, t_ns - sent * spacing, spacing, kept, place)
+        place = _hand_over(arrived, sent, t_ns - sent * spacing, spacing, kept, place)
 
+        if not alive:
+            decoded[row] = outputs[row] = np.nan
+            carry_on(vehicle)
+            continue
         begin_cycle(inputs, t_ns, CYCLE_NS)
-        receive(plan.ecu_hears, loop.ecu_reception, loop.vehicle_frames, 0, sent, inputs)
+        receive(plan.ecu_hears, loop.ecu_reception, arrived, 0, sent, inputs)
         end_cycle(inputs, loop.ecu_reception.freshness)
         for i in range(N_INPUTS):
             decoded[row, i] = inputs.value[i] if inputs.new[i] else np.nan
-        if ideal:
-            for i in range(4):
-                loop.state[0].control.mu_override[i] = vehicle.state[0].mu_b[i]
+        _tell(told, loop.state[0].control, vehicle.state[0].mu_b, t)
         step(loop.params, loop.state, loop.inputs, loop.outputs)
         outputs[row] = loop.output_vector
 
         sent = transmit(plan.ecu_sends, loop.ecu_sent, loop.output_vector, cycle, loop.ecu_frames)
-        place = _hand_over(loop.ecu_frames, sent, t_ns + 10 * SPACING_NS, SPACING_NS, kept, place)
+        sent = convey(vehicle.faults, loop.to_vehicle, t, noise, loop.ecu_frames, sent)
+        arrived = loop.to_vehicle.arrived
+        place = _hand_over(arrived, sent, t_ns + 10 * SPACING_NS, SPACING_NS, kept, place)
         begin_cycle(heard, t_ns + CYCLE_NS // 2, CYCLE_NS)
-        receive(plan.vehicle_hears, loop.vehicle_reception, loop.ecu_frames, 0, sent, heard)
+        receive(plan.vehicle_hears, loop.vehicle_reception, arrived, 0, sent, heard)
         understand(heard, vehicle.demand[0])
         carry_on(vehicle)
     return len(truth), place, True
 
 
-def run(loop: Loop, ideal: bool = False, seconds: float = LONGEST) -> Drive:
+def _start_anew(sides: Sides) -> None:
+    """Let the ECU begin with what its side process kept of the one before."""
+    learned = sides.state["learned"].copy()
+    sides.state[:] = new_state(sides.params, learned)
+    memory: tuple[NDArray[Any], ...] = (*sides.ecu_reception, *sides.ecu_sent)
+    fresh = (*new_reception(plans().ecu_hears), *new_transmission(plans().ecu_sends))
+    for old, new in zip(memory, fresh, strict=True):
+        old[:] = new
+
+
+def run(loop: Loop, ideal: bool = False, seconds: float = LONGEST, told: Told | None = None) -> Drive:
     """Run a new loop to the end of its script, or for `seconds`, and return what happened.
 
-    `ideal`: the ECU's pressure law is given the true friction, to compare a compensated controller with.
+    `ideal`: the ECU's pressure law is given the true friction, to compare a compensated controller with;
+    `told`: another one. Where the scenario kills the daemon, its outputs are NaN until it, or its standby,
+    sends again.
     """
+    told = told or Told(1.0 if ideal else 0.0)
     sides = loop.sides
-    per_cycle = len(sides.vehicle_frames) + len(sides.ecu_frames)
+    per_cycle = 2 * (len(sides.vehicle_frames) + len(sides.ecu_frames))
     blocks: list[tuple[NDArray[np.float64], ...]] = []
     frames: list[RecordArray] = []
     first, last, running = 0, round(seconds * 1e9 / CYCLE_NS), True
+    deaths = killed(sides.vehicle.faults)
     while running and first < last:
-        size = min(CHUNK, last - first)
+        if deaths and first >= deaths[0].end:
+            if not deaths.pop(0).standby:
+                _start_anew(sides)
+            continue
+        alive = not deaths or first < deaths[0].begin
+        until = (deaths[0].begin if alive else deaths[0].end) if deaths else last
+        size = min(CHUNK, last - first, until - first)
         block = (np.empty((size, N_INPUTS)), np.empty((size, N_OUTPUTS)), np.empty((size, N_TRUTH)))
         kept = np.zeros(size * per_cycle, FRAME)
-        rows, count, running = _run(plans(), sides, loop.noise, ideal, first, *block, kept)
+        rows, count, running = _run(plans(), sides, loop.noise, told, alive, first, *block, kept)
         blocks.append(tuple(values[:rows] for values in block))
         frames.append(kept[:count].copy())
         first += rows

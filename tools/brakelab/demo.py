@@ -1,32 +1,29 @@
-"""`brake-ecu demo`: daemon and simulated vehicle on a bus of their own, in real time; a report at the end.
+"""`brake-ecu demo`: one scenario on the rig (`brakelab.rig`), in real time; a report at the end.
 
 On vcan0 where it exists, else over UDP multicast that stays on the machine, as two processes. Where neither
 is to be had, both sides run as threads of one process on python-can's `virtual` bus.
 """
 
 import os
-import re
 import signal
-import subprocess
-import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
-import can
 import numpy as np
 from rich.console import Console
 
 from brakelab.closed_loop import plans
-from brakelab.replay.command import replay
 from brakelab.report.command import report
+from brakelab.rig.live import Bus, armed_config, choose_bus, drive
+from brakelab.rig.results import write_recorded
 from brakelab.scenario import load_scenario
 from brakelab.vehicle_node import drive_in_real_time, new_node, wait_for_ecu, warm_up, write_truth_file
 from ecu.bus.channel import open_channel
 from ecu.clock import system_time
-from ecu.errors import RunFault, UserError
+from ecu.config import load_config
+from ecu.errors import UserError
 from ecu.recorder import read_recording
 from ecu.records import RecordArray
 from ecu.resources import resource
@@ -36,42 +33,9 @@ from ecu.warm import warm
 
 SCENARIO: Final = "config/scenarios/demo.toml"
 SEED: Final = 1
-MULTICAST: Final = f"239.74.163.{os.getpid() % 250 + 2}"  # a group of its own: two demos do not meet
 MEASURED_ABOVE: Final = 15 / 3.6  # m/s
-PATIENCE_S: Final = 180.0  # for a slow machine to get ready
 
 say = Console(highlight=False, soft_wrap=True).print
-
-
-class Bus(NamedTuple):
-    """Where daemon and vehicle meet."""
-
-    interface: str
-    channel: str
-    why: str
-
-
-def choose_bus() -> Bus:
-    """Return the best bus this machine has."""
-    if Path("/sys/class/net/vcan0").exists():
-        return Bus("socketcan", "vcan0", "vcan0")
-    try:
-        open_channel("udp_multicast", MULTICAST, receive_ids=[]).close()
-    except (OSError, can.CanError, UserError) as error:
-        return Bus(
-            "virtual", "demo", f"python-can's virtual bus in one process (no vcan0, no multicast: {error})"
-        )
-    return Bus("udp_multicast", MULTICAST, "UDP multicast that stays on this machine (there is no vcan0)")
-
-
-def armed_config(out: Path) -> Path:
-    """Write the SUV's configuration with the demands armed into `out` and return its path."""
-    text = resource("config/suv.toml").read_text(encoding="utf-8")
-    path = out / "suv.toml"
-    path.write_text(
-        re.sub(r"^transmit = false.*$", "transmit = true", text, flags=re.MULTILINE), encoding="utf-8"
-    )
-    return path
 
 
 def braking_line(number: int, duration: float, rows: RecordArray) -> str:
@@ -91,21 +55,24 @@ def braking_line(number: int, duration: float, rows: RecordArray) -> str:
     )
 
 
-def brakings(reader: RingReader, going_on: Callable[[], bool]) -> Iterator[str]:
-    """Yield a line per braking as it ends, while `going_on`."""
-    number = 0
-    t: list[float] = []
-    rows: list[np.void] = []
-    while going_on():
+class Brakings:
+    """Says a line per braking as it ends."""
+
+    def __init__(self) -> None:
+        self._number = 0
+        self._t: list[float] = []
+        self._rows: list[np.void] = []
+
+    def look(self, reader: RingReader) -> None:
+        """Take the cycles into account that came since the last look."""
         for record in reader.read().records:
             if record["outputs"]["braking"]:
-                t.append(1e-9 * record["cycle"]["t_mono_ns"])
-                rows.append(record["outputs"])
-            elif rows:
-                number += 1
-                yield braking_line(number, t[-1] - t[0], np.array(rows))
-                t, rows = [], []
-        time.sleep(0.1)
+                self._t.append(1e-9 * record["cycle"]["t_mono_ns"])
+                self._rows.append(record["outputs"])
+            elif self._rows:
+                self._number += 1
+                say(braking_line(self._number, self._t[-1] - self._t[0], np.array(self._rows)))
+                self._t, self._rows = [], []
 
 
 def demo(out: Path) -> int:
@@ -117,7 +84,7 @@ def demo(out: Path) -> int:
     """
     try:
         out.mkdir(parents=True, exist_ok=True)
-        config = armed_config(out)
+        config = armed_config(resource("config/suv.toml"), out)
     except OSError as error:
         raise UserError(
             "--out", str(out), f"cannot be written ({error.strerror}); choose another folder"
@@ -128,56 +95,28 @@ def demo(out: Path) -> int:
     warm_up(load_scenario(resource(SCENARIO)))
     warm()
     say("driving: a staircase of 1 to 5 m/s² and three stops, about 70 s")
-    (_in_one_process if bus.interface == "virtual" else _in_two_processes)(bus, config, out)
-    recording = read_recording(out / "drive").folder
-    result, page = out / "result.parquet", out / "report.html"
-    replay([recording], config, None, None, None, result)
-    report(result, out / "truth.parquet", page, recording)
+    if bus.interface == "virtual":
+        recordings = _in_one_process(bus, config, out)
+    else:
+        recordings = drive(bus, resource(SCENARIO), config, [], out, SEED, Brakings().look).recordings
+    written = write_recorded(recordings, load_config(config), out)
+    page = out / "report.html"
+    report(written.result, out / "truth.parquet", page, recordings[0])
     say(f"report: {page.resolve()}")
     return 0
 
 
-def _await_ring(pid: int, ended: Callable[[], bool]) -> RingReader:
-    deadline = time.monotonic() + PATIENCE_S
-    while time.monotonic() < deadline and not ended():
-        if ring_path(pid).exists():
-            return RingReader(ring_path(pid))
-        time.sleep(0.05)
-    raise RunFault("the daemon did not become ready; its log says why")
-
-
-def _in_two_processes(bus: Bus, config: Path, out: Path) -> None:
-    python, meeting = sys.executable, ["-i", bus.interface, "-c", bus.channel]
-    truth, log = out / "truth.parquet", out / "daemon.log"
-    truth.unlink(missing_ok=True)
-    command = [python, "-m", "brakelab.vehicle_node", str(resource(SCENARIO)), *meeting, "--with-ecu"]
-    with log.open("wb") as file:
-        vehicle = subprocess.Popen(
-            [*command, "--seed", str(SEED), "--truth", str(truth)], stdout=subprocess.PIPE, stderr=file
-        )
-        assert vehicle.stdout is not None
-        vehicle.stdout.readline()
-        command = [python, "-m", "ecu.cli", "run", "--config", str(config), *meeting]
-        daemon = subprocess.Popen([*command, "--record", str(out / "drive")], stderr=file)
-        try:
-            reader = _await_ring(daemon.pid, lambda: daemon.poll() is not None)
-            for line in brakings(reader, lambda: vehicle.poll() is None and not truth.exists()):
-                say(line)
-        finally:
-            daemon.send_signal(signal.SIGTERM)
-            code = daemon.wait()
-            vehicle.terminate()
-            vehicle.wait()
-    if code or not truth.exists():
-        raise RunFault(f"daemon or vehicle ended early; {log} says why")
-
-
-def _in_one_process(bus: Bus, config: Path, out: Path) -> None:
+def _in_one_process(bus: Bus, config: Path, out: Path) -> list[Path]:
     def drive_then_stop() -> None:
-        reader = _await_ring(os.getpid(), lambda: False)
-        threading.Thread(
-            target=lambda: [say(line) for line in brakings(reader, lambda: not over.is_set())]
-        ).start()
+        while not ring_path(os.getpid()).exists():
+            time.sleep(0.05)
+        reader, said = RingReader(ring_path(os.getpid())), Brakings()
+
+        def follow() -> None:
+            while not over.wait(0.1):
+                said.look(reader)
+
+        threading.Thread(target=follow).start()
         node = new_node(load_scenario(resource(SCENARIO)), SEED)
         channel = open_channel(bus.interface, bus.channel, receive_ids=plans().vehicle_hears.ids.tolist())
         wait_for_ecu(node, channel, over.is_set)
@@ -189,3 +128,4 @@ def _in_one_process(bus: Bus, config: Path, out: Path) -> None:
     over = threading.Event()
     threading.Thread(target=drive_then_stop).start()
     run(RunOptions(config, bus.interface, bus.channel, record=out / "drive"))
+    return [read_recording(out / "drive").folder]

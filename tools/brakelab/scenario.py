@@ -35,10 +35,16 @@ bias = [-0.1, 0.1]               # drawn per car; or one number
 [sensor.wheel_speed_fl]          # `wheel_speed` would be all four
 lost_from = 3.0                  # s
 
+[payload]                        # what the car carries
+mass = 495.0                     # kg
+behind = 0.65                    # m, of the empty car's centre of gravity
+height = 0.80                    # m
+
 [steering]
 angle = [[0.0, 0.0], [2.0, 0.03]]          # s, rad at the road wheel, left positive
 path = [[0.0, 0.0], [30.0, 3.5]]           # or m, m: what the driver steers after
 ```
+What goes wrong on the bus, at a sensor or an actuator is told by `[[fault]]` tables: `brakelab.rig.faults`.
 """
 
 import math
@@ -50,16 +56,17 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from brakelab.plant.cycle import CYCLE
-from brakelab.plant.description import Plant, PlantFileError, load_plant
+from brakelab.plant.description import Body, Plant, PlantFileError, load_plant
 from brakelab.plant.driver import PEDAL_TRAVEL, Script
 from brakelab.plant.records import BRAKE, COAST, CRUISE, FOLLOW, PHASE
 from brakelab.plant.road import Road
 from brakelab.plant.sensor_errors import Sensors
 from brakelab.plant.steering import Steering
+from brakelab.rig.faults import Fault
 from brakelab.speed_trace import SpeedTrace, generated_trace, read_trace, trace_of
-from ecu.config import describe, read_toml
 from ecu.errors import UserError
 from ecu.resources import named
+from ecu.toml_file import describe, read_toml
 
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
@@ -158,6 +165,29 @@ class TyreFault(_Section):
     stiffness: Positive
 
 
+class Payload(_Section):
+    """What the car carries beside its driver, a point of mass `mass` [kg]."""
+
+    mass: Positive
+    behind: float
+    """Behind the empty car's centre of gravity, m."""
+    height: Positive
+    """Over the road, m."""
+
+    def body(self, empty: Body) -> Body:
+        """Return the laden car's body: its mass, centre of gravity and yaw inertia."""
+        mass = empty.mass + self.mass
+        back = self.mass * self.behind / mass
+        update = {
+            "mass": mass,
+            "front_length": empty.front_length + back,
+            "rear_length": empty.rear_length - back,
+            "cog_height": (empty.mass * empty.cog_height + self.mass * self.height) / mass,
+            "yaw_inertia": empty.yaw_inertia + empty.mass * back * self.behind,
+        }
+        return empty.model_copy(update=update)
+
+
 class RoadByPlace(_Section):
     """The road over the distance driven; see `brakelab.plant.road`."""
 
@@ -184,6 +214,7 @@ class Scenario(_Section):
     """A scenario file."""
 
     plant: str
+    payload: Payload | None = None
     initial_speed: NotNegative
     initial_disc_temperature: tuple[float, float] = (100.0, 100.0)
     """Front and rear, degC; 100 as where the friction's nominal value is defined."""
@@ -204,22 +235,28 @@ class Scenario(_Section):
     sensor: Sensors = {}
     """Errors of its sensors beside those that the car's file gives."""
     blending: bool = False
-    """While braking the motors do what the ECU asks; otherwise they rest."""
+    """While brakes are asked for the motors do what the ECU asks; otherwise they rest."""
+    charge_limit: ByTime = []
+    """What the battery takes, W, instead of what the car's file says; at 0 its motors cannot brake."""
     motor_share: Share = 0.0
     """Of each deceleration asked for, what the motors take; the brakes are asked for the rest (5.2)."""
     trace: Trace | None = None
     repeat: Annotated[int, Field(ge=1)] = 1
     """How often the phases are driven."""
+    fault: list[Fault] = []
+    """What goes wrong on the way; see `brakelab.rig.faults`."""
     phase: Annotated[list[Phase], Field(min_length=1)]
 
     @model_validator(mode="after")
     def _consistent(self) -> "Scenario":
-        for name in ("road_friction", "grade"):
+        for name in ("road_friction", "grade", "charge_limit"):
             table = _rows(getattr(self, name))
-            if len(table) == 0 or np.any(np.diff(table[:, 0]) <= 0.0):
+            if (len(table) == 0 and name != "charge_limit") or np.any(np.diff(table[:, 0]) <= 0.0):
                 raise ValueError(f"{name}: give rows of rising time [[t, value], ...]")
         if any(value <= 0.0 for _, value in self.road_friction):
             raise ValueError("road_friction: give values above 0")
+        if any(value < 0.0 for _, value in self.charge_limit):
+            raise ValueError("charge_limit: give values of at least 0")
         for name, by_time in (("friction", "road_friction"), ("grade", "grade")):
             if getattr(self.road, name) and by_time in self.model_fields_set:
                 raise ValueError(f"give either {by_time} (by time) or road.{name} (by place)")
@@ -259,6 +296,7 @@ class Scenario(_Section):
             self.motor_share,
             -1 if fault is None else round(fault.time / CYCLE),
             1.0 if fault is None else fault.stiffness,
+            _rows(self.charge_limit),
         )
 
     def _phases(self, trace_end: float) -> NDArray[np.void]:
@@ -302,6 +340,10 @@ def scenario_plant(scenario: Scenario) -> Plant:
         UserError: the plant's file cannot be read or is wrong.
     """
     try:
-        return load_plant(named(scenario.plant, "config/plant"))
+        plant = load_plant(named(scenario.plant, "config/plant"))
     except PlantFileError as error:
         raise UserError(error.where, error.place, error.remedy) from None
+    if scenario.payload is None:
+        return plant
+    laden = plant.vehicle.model_copy(update={"body": scenario.payload.body(plant.vehicle.body)})
+    return plant.model_copy(update={"vehicle": laden})

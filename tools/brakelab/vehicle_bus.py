@@ -10,7 +10,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from brakelab.plant.cycle import move
+from brakelab.plant.cycle import DEMAND_TIMEOUT, move
 from brakelab.plant.description import Plant, draw
 from brakelab.plant.driver import Script, friction_now, grade_now
 from brakelab.plant.records import COMMANDS, DEMAND, DRIVER, RecordArray, new_record
@@ -25,6 +25,7 @@ from brakelab.plant.sensor_errors import (
 )
 from brakelab.plant.sensors import body_accelerations, true_readings
 from brakelab.plant.vehicle import new_state
+from brakelab.rig.faults import fault_records, spoil_car
 from brakelab.scenario import Scenario, scenario_plant
 from ecu import signals
 from ecu.jit import Record, kernel
@@ -54,6 +55,7 @@ _SCALAR_TRUTH: Final = (
     "position_y",
     "heading",
     "steering_angle",
+    "demand_heard",  # 1: the ECU's pressure demands are obeyed, 0: the hydraulics brake on their own
 )
 _CORNER_TRUTH: Final = (
     "mu_b",
@@ -87,6 +89,10 @@ class Vehicle(NamedTuple):
     sensing: RecordArray
     measured: NDArray[np.float64]
     speed_over_ground: bool
+    faults: RecordArray
+    """`brakelab.rig.faults.FAULT`, shape (n,)."""
+    sound: RecordArray
+    """`params` without faults."""
 
 
 def _sensors(scenario: Scenario, plant: Plant, seed: int) -> RecordArray:
@@ -119,6 +125,8 @@ def new_vehicle(scenario: Scenario, seed: int) -> Vehicle:
         new_sensing(),
         np.empty(len(SIGNALS)),
         scenario.vehicle_speed == "gnss",
+        fault_records(scenario.fault),
+        params.copy(),
     )
 
 
@@ -154,6 +162,7 @@ def sense(vehicle: Vehicle, noise: Generator, values: NDArray[np.float64]) -> No
     for i in range(4):
         if not np.isnan(values[signals.MOTOR_TORQUE + i]):  # both are one frame's
             values[signals.MOTOR_LIMIT + i] = state.motor_limit[i]
+    spoil_car(vehicle.faults, state.t, noise, vehicle.sound[0], vehicle.params[0], values)
 
 
 @kernel
@@ -204,6 +213,8 @@ def write_truth(vehicle: Vehicle, row: NDArray[np.float64]) -> None:
     row[12] = state.position_y
     row[13] = state.heading
     row[14] = driver.steering_angle
+    demand = vehicle.demand[0]
+    row[15] = 1.0 if demand.pressure_valid == 1 and demand.pressure_age < DEMAND_TIMEOUT else 0.0
     for i in range(4):
         corner = _FIRST_CORNER + i
         row[corner] = state.mu_b[i]

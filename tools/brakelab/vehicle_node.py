@@ -2,7 +2,9 @@
 
 `python -m brakelab.vehicle_node SCENARIO -i INTERFACE -c CHANNEL` sends the vehicle's frames every 10 ms on
 absolute deadlines, takes the ECU's demands, and leaves when the scenario has ended or on SIGTERM. It prints
-`ready` when it is compiled and on the bus. Without valid demands for 30 ms its own hydraulics brake.
+`ready` when it is compiled and on the bus, and `driving NS` when it sets off: T_0 on the monotonic clock.
+Without valid demands for 30 ms its own hydraulics brake. The scenario's faults act on its sensors, on its
+actuators and on the frames of both directions.
 """
 
 import argparse
@@ -22,6 +24,7 @@ from numpy.typing import NDArray
 
 from brakelab.closed_loop import Plans, plans, write_columns
 from brakelab.plant.driver import drive
+from brakelab.rig.faults import Way, convey, new_way
 from brakelab.scenario import Scenario, load_scenario
 from brakelab.vehicle_bus import (
     N_TRUTH,
@@ -43,7 +46,7 @@ from ecu.clock import Grid, TimeSource, system_time
 from ecu.errors import UserError
 from ecu.jit import kernel
 from ecu.records import FRAME, RecordArray
-from ecu.resources import named
+from ecu.resources import SCENARIOS, named
 from ecu.signals import CYCLE_NS, N_OUTPUTS
 
 RECEIVED_AT_ONCE: Final = 256
@@ -63,6 +66,8 @@ class Side(NamedTuple):
     reception: Reception
     frames_out: RecordArray
     frames_in: RecordArray
+    to_ecu: Way
+    to_vehicle: Way
 
 
 class Node(NamedTuple):
@@ -98,6 +103,8 @@ def new_node(scenario: Scenario, seed: int) -> Node:
         new_reception(plan.vehicle_hears),
         frame_buffer(plan.vehicle_sends),
         np.zeros(RECEIVED_AT_ONCE, FRAME),
+        new_way(),
+        new_way(),
     )
     return Node(side, new_noise(seed))
 
@@ -113,10 +120,15 @@ def _turn(
     cycle: int,
     row: NDArray[np.float64],
 ) -> int:
-    """Take demands, live through `periods` cycles, measure; returns frames to send, -1 at the end."""
+    """Take demands, live through `periods` cycles, measure.
+
+    Returns how many frames of `side.to_ecu.arrived` to send, -1 at the end.
+    """
     vehicle = side.vehicle
+    t = 1e-9 * (cycle * CYCLE_NS)
     begin_cycle(side.heard[0], now_ns, CYCLE_NS)
-    receive(plan.vehicle_hears, side.reception, side.frames_in, 0, received, side.heard[0])
+    received = convey(vehicle.faults, side.to_vehicle, t, noise, side.frames_in, received)
+    receive(plan.vehicle_hears, side.reception, side.to_vehicle.arrived, 0, received, side.heard[0])
     understand(side.heard[0], vehicle.demand[0])
     for _ in range(periods):
         if vehicle.driver[0].started:
@@ -125,32 +137,25 @@ def _turn(
             return -1
     sense(vehicle, noise, side.values)
     write_truth(vehicle, row)
-    return int(transmit(plan.vehicle_sends, side.sent, side.values, cycle, side.frames_out))
-
-
-def _lose(frames: RecordArray, count: int, share: float, random: np.random.Generator) -> int:
-    """Remove each of the first `count` frames with probability `share`; returns how many are left."""
-    kept = np.flatnonzero(random.random(count) >= share)
-    frames[: len(kept)] = frames[kept]
-    return len(kept)
+    count = transmit(plan.vehicle_sends, side.sent, side.values, cycle, side.frames_out)
+    return int(convey(vehicle.faults, side.to_ecu, t, noise, side.frames_out, count))
 
 
 def drive_in_real_time(
     node: Node,
     channel: Channel,
     source: TimeSource,
-    lost_share: float = 0.0,
-    seed: int = 0,
     stopped: Callable[[], bool] = lambda: False,
+    set_off: Callable[[int], None] = lambda t_mono_ns: None,
 ) -> Truth:
     """Drive the node's scenario on `channel` to its end, or until `stopped`.
 
-    `lost_share` of the vehicle's frames is not sent (seeded by `seed`). Periods that were missed are lived
-    through by the car, but not sent.
+    `set_off` is told T_0 on the monotonic clock.
+    Periods that were missed are lived through by the car, but not sent.
     """
     side = node.side
     grid = Grid(source)
-    random = np.random.default_rng([seed, 2])
+    set_off(grid.deadline_ns + CYCLE_NS)
     rows: list[NDArray[np.float64]] = []
     cycles: list[int] = []
     start_ns = cycle = 0
@@ -164,9 +169,7 @@ def drive_in_real_time(
         count = _turn(plans(), side, node.noise, source.realtime_ns(), received, periods, cycle, row)
         if count < 0:
             break
-        if lost_share > 0.0:
-            count = _lose(side.frames_out, count, lost_share, random)
-        channel.send(side.frames_out, count)
+        channel.send(side.to_ecu.arrived, count)
         rows.append(row)
         cycles.append(cycle)
     t = np.array(cycles, np.float64) * (1e-9 * CYCLE_NS)
@@ -219,11 +222,8 @@ def _ask_for_priority() -> None:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
 
 
-def _share(text: str) -> float:
-    share = float(text)
-    if not 0.0 <= share < 1.0:
-        raise argparse.ArgumentTypeError("give a share from 0 to below 1")
-    return share
+def _tell_set_off(t_mono_ns: int) -> None:
+    print(f"driving {t_mono_ns}", flush=True)
 
 
 def _arguments(argv: list[str] | None) -> argparse.Namespace:
@@ -233,8 +233,7 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument("scenario", help="a scenario file, or a shipped one by name")
     parser.add_argument("-i", "--interface", required=True, help="as python-can calls it")
     parser.add_argument("-c", "--channel", required=True, help="as python-can calls it")
-    parser.add_argument("--seed", type=int, default=0, help="of the drawn car, its noise and lost frames")
-    parser.add_argument("--lose", type=_share, default=0.0, metavar="SHARE", help="of the frames, 0 to 1")
+    parser.add_argument("--seed", type=int, default=0, help="of the drawn car and its noise")
     parser.add_argument(
         "--with-ecu", action="store_true", help="drive off when the ECU is heard, stay until it is silent"
     )
@@ -253,7 +252,7 @@ def main(argv: list[str] | None = None) -> int:
     signal.signal(signal.SIGTERM, ask_to_stop)
     signal.signal(signal.SIGINT, ask_to_stop)
     try:
-        path = named(arguments.scenario, "config/scenarios")
+        path = named(arguments.scenario, *SCENARIOS)
         scenario = load_scenario(path)
         warm_up(scenario)
         node = new_node(scenario, arguments.seed)
@@ -264,7 +263,7 @@ def main(argv: list[str] | None = None) -> int:
         source, stopped = system_time(), lambda: bool(stop)
         if arguments.with_ecu:
             wait_for_ecu(node, channel, stopped)
-        truth = drive_in_real_time(node, channel, source, arguments.lose, arguments.seed, stopped)
+        truth = drive_in_real_time(node, channel, source, stopped, _tell_set_off)
         if arguments.truth is not None:
             write_truth_file(arguments.truth, truth, path.stem, arguments.seed)
         if arguments.with_ecu:

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from ecu.estimation.friction import GREATEST_RATIO, LEAST_RATIO, resting_mode, worth_learning
+from ecu.estimation.friction import GREATEST_RATIO, LEAST_RATIO, resting_mode, well_observed
 from ecu.estimation.joint.kalman import forget
 from ecu.estimation.joint.layout import (
     BIAS,
@@ -104,7 +104,7 @@ def take_mean(params: Record, state: Record, friction: Record) -> None:
     its errors balance those of the other wheels.
     """
     for i in range(4):
-        if not worth_learning(friction, i):
+        if not well_observed(friction, i):
             return
     for i in range(4):
         mean = state.course[i] / state.way[i]

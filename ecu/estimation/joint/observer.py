@@ -188,6 +188,14 @@ def update_joint(
 
 
 @kernel
+def mistrust_wheels(state: Record) -> None:
+    """Learn nothing for a while: a wheel slips beyond its tyre's range, whatever this filter sees of it."""
+    if state.hold_s <= 0.0:
+        go_back(state)
+    state.hold_s = HOLD_S
+
+
+@kernel
 def _learn_zeros(params: Record, state: Record, braking: bool) -> None:
     w, zero, readings = state.window, state.pressures.zero, state.readings
     for i in range(4):

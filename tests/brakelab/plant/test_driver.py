@@ -170,6 +170,15 @@ def test_tyres_soften_once_in_the_cycle_of_their_fault(
     assert trip.car.params["slip_stiffness"][0] == pytest.approx(np.full(4, stiffness))
 
 
+def test_the_battery_takes_what_the_script_says(car_at: Callable[[float], Any]) -> None:
+    table = np.array([[0.0, 80e3], [0.5, 80e3], [1.0, 0.0]])
+    trip = Trip(car_at(20.0), script({"kind": COAST})._replace(charge_limit=table))
+    for seconds, power in ((0.4, 80e3), (0.35, 40e3), (0.5, 0.0)):
+        trip.run(seconds)
+        now = trip.car.now
+        assert float(now["motor_limit"] @ now["wheel_speed"]) == pytest.approx(power, rel=0.05, abs=1.0)
+
+
 def test_rain_cools_the_discs_of_a_moving_car(car_at: Callable[[float], Any]) -> None:
     left = []
     for wetness in (0.0, 1.0):

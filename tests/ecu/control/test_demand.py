@@ -1,4 +1,4 @@
-"""Pedal to deceleration and the ideal distribution, against the equal use of grip at both axles."""
+"""What is asked for: the pedal map, the larger of pedal and automated demand, holding the standing car."""
 
 import math
 from pathlib import Path
@@ -9,16 +9,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ecu.config import load_config, new_params
-from ecu.control.demand import front_share, pedal_to_decel, requested_decel, wheel_torque_demand
+from ecu.control.demand import DEMAND_STATE, pedal_to_decel, requested_decel, update_demand
 from ecu.signals import (
+    ACCELERATOR_POSITION,
     ALIVE,
     DECEL_DEMAND,
     DECEL_DEMAND_VALID,
     PEDAL_POSITION,
     VALID,
+    WHEEL_SPEED,
 )
 
-G = 9.81
+G, DT = 9.81, 0.01
 CONFIGS = Path(__file__).parents[3] / "config"
 MAP = [(0, 0), (5, 0), (20, 0.8), (40, 2.1), (60, 4.0), (80, 6.6), (100, 10.0)]  # config/suv.toml
 
@@ -99,43 +101,100 @@ def test_an_absurd_demand_is_cut_to_what_a_road_holds(params, feed, asked: float
     assert 0.0 <= requested_decel(params[0], inputs[0]) <= 12.0
 
 
-@pytest.mark.parametrize("z", [0.0, 0.1, 0.15, 0.3, 0.5, 0.8, 1.0])
-def test_both_axles_use_the_same_share_of_their_grip(params, z: float) -> None:
+class Holding:
+    """A car whose wheels turn as told; `run` returns the demand of every cycle."""
+
+    def __init__(self, params, feed) -> None:
+        self.params, self.feed, self.state = params[0], feed, np.zeros(1, DEMAND_STATE)
+        self.hold = float(params[0]["hold_decel"])
+
+    def run(self, seconds: float, pedal=0.0, speed=0.0, accelerator=0.0, demand=0.0, lost=()) -> np.ndarray:
+        inputs = self.feed(
+            wheel_speed=speed / self.params["wheel_radius"],
+            pedal_position=pedal,
+            decel_demand=demand,
+            decel_demand_valid=float(demand > 0.0),
+            accelerator_position=accelerator,
+        )
+        for place in lost:
+            inputs[0]["verdict"][place] = 0
+        cycle = (self.params, self.state[0], inputs[0], math.nan, DT)
+        return np.array([update_demand(*cycle) for _ in range(round(seconds / DT))])
+
+
+@pytest.fixture
+def holding(params, feed) -> Holding:
+    return Holding(params, feed)
+
+
+def test_the_holding_demand_is_enough_for_the_grade(params) -> None:
+    """20 %, 2600 kg laden, linings at 0.45 - 2 * 15 %: what they give balances m g sin."""
     p = params[0]
-    share = front_share(p, z * G)
-    weight, length, h = p["mass"] * G, p["wheelbase"], p["cog_height"]
-    front_load = weight * (p["rear_axle"] + z * h) / length
-    rear_load = weight * (p["front_axle"] - z * h) / length
-    front, rear = share * z * weight / front_load, (1 - share) * z * weight / rear_load
-    assert front == pytest.approx(z)
-    assert rear == pytest.approx(z)
+    brakes = p["mass"] * p["hold_decel"] * 0.7
+    assert brakes == pytest.approx(2600.0 * G * 0.2 / math.hypot(1.0, 0.2))
 
 
-@pytest.mark.parametrize("name", ["suv", "sedan", "lcv", "mustang"])
-def test_ece_r13h_the_rear_axle_never_locks_first(name: str) -> None:
-    """Annex 5: between z 0.15 and 0.8 the front axle uses at least as much grip as the rear one, at nominal
-    friction (equal, for the ideal distribution), and both need no more than (z + 0.04) / 0.7."""
-    p = new_params(load_config(CONFIGS / f"{name}.toml"))[0]
-    for z in np.linspace(0.15, 0.8, 66):
-        share = front_share(p, z * G)
-        front = share * z / ((p["rear_axle"] + z * p["cog_height"]) / p["wheelbase"])
-        rear = (1 - share) * z / ((p["front_axle"] - z * p["cog_height"]) / p["wheelbase"])
-        assert front >= rear - 1e-12
-        assert front <= (z + 0.04) / 0.7
+RELEASES = [
+    # what lets the car go
+    ("pedal at rest", {"pedal": 0.0}, True),
+    ("pedal in its free travel", {"pedal": 4.9}, True),
+    ("accelerator with the brake still touched", {"pedal": 8.0, "accelerator": 4.0}, True),
+    ("pedal eased", {"pedal": 8.0}, False),
+    ("accelerator at rest", {"pedal": 8.0, "accelerator": 2.0}, False),
+    (
+        "accelerator without a valid signal",
+        {"pedal": 8.0, "accelerator": 50.0, "lost": (ACCELERATOR_POSITION,)},
+        False,
+    ),
+    ("rolling while the pedal is touched", {"pedal": 8.0, "speed": 2.0}, False),
+]
 
 
-@pytest.mark.parametrize("decel", [0.5, 2.0, 4.0, 8.0, 12.0])
-def test_torques_add_up_to_the_force_that_is_asked_for(params, decel: float) -> None:
-    """(5.1): sum T_b / r = m a; nothing on either side of the car is larger than the other."""
-    p = params[0]
-    torques = [wheel_torque_demand(p, decel, i) for i in range(4)]
-    assert sum(t / r for t, r in zip(torques, p["wheel_radius"], strict=True)) == pytest.approx(
-        p["mass"] * decel
-    )
-    assert torques[0] == torques[1] > torques[2] == torques[3] >= 0
+@pytest.mark.parametrize(("case", "then", "released"), RELEASES, ids=[row[0] for row in RELEASES])
+def test_the_standing_car_is_held_until_the_driver_lets_it_go(holding, case, then, released) -> None:
+    asked = 0.16 if then["pedal"] == 8.0 else 0.0
+    assert holding.run(0.4, pedal=20.0) == pytest.approx(0.8), "has not stood long enough"
+    assert holding.run(1.0, pedal=20.0)[-1] == pytest.approx(holding.hold)
+    after = holding.run(1.0, **then)
+    assert after[-1] == pytest.approx(asked if released else holding.hold), case
+    if released:
+        assert np.all(np.diff(after) <= 0.0)
+        assert np.abs(np.diff(after)).max() <= 5.0 * DT + 1e-9
+        assert after[-1] == asked or asked > 0.0, "exactly zero, not nearly"
 
 
-def test_no_request_is_no_torque_and_an_unknown_one_is_unknown(params) -> None:
-    for corner in range(4):
-        assert wheel_torque_demand(params[0], 0.0, corner) == 0.0
-        assert not wheel_torque_demand(params[0], math.nan, corner) > 0.0
+def test_an_automated_demand_holds_and_lets_go_as_the_pedal_does(holding) -> None:
+    assert holding.run(1.5, demand=0.5)[-1] == pytest.approx(holding.hold)
+    assert holding.run(1.0)[-1] == 0.0
+
+
+def test_who_asks_for_more_than_holding_gets_it(holding) -> None:
+    assert holding.run(2.0, pedal=80.0) == pytest.approx(6.6)
+
+
+NOT_HELD = [
+    ("nobody brakes: the car may creep", {}),
+    ("it moves at walking pace", {"pedal": 20.0, "speed": 0.5}),
+    ("accelerator and brake", {"pedal": 20.0, "accelerator": 30.0}),
+    ("a wheel speed is lost", {"pedal": 20.0, "lost": (WHEEL_SPEED + 2,)}),
+]
+
+
+@pytest.mark.parametrize(("case", "given"), NOT_HELD, ids=[row[0] for row in NOT_HELD])
+def test_who_is_not_held(holding, case, given) -> None:
+    expected = 0.8 if given.get("pedal") else 0.0
+    assert holding.run(2.0, **given) == pytest.approx(expected), case
+
+
+def test_standing_wheels_of_a_moving_car_are_no_standstill(params, feed) -> None:
+    """All wheels locked on ice: the vehicle's speed says otherwise."""
+    inputs, state = feed(pedal_position=20.0, wheel_speed=0.0), np.zeros(1, DEMAND_STATE)
+    for _ in range(200):
+        assert update_demand(params[0], state[0], inputs[0], 8.0, DT) == pytest.approx(0.8)
+
+
+def test_a_lost_request_is_no_release(holding) -> None:
+    holding.run(2.0, pedal=20.0)
+    lost = (PEDAL_POSITION, DECEL_DEMAND)
+    assert np.isnan(holding.run(0.5, pedal=20.0, lost=lost)).all()
+    assert holding.run(0.01, pedal=20.0)[0] == pytest.approx(holding.hold)

@@ -16,7 +16,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ecu.config import load_config, new_params
-from ecu.control.limiter import LIMITER_STATE, limit_pressure
+from ecu.control.limiter import LIMITER_STATE, available_pressure, limit_pressure
+from ecu.signals import ALIVE, INPUT, USABLE, VALID
 
 BAR = 1e5
 DT = 0.01
@@ -43,9 +44,9 @@ def fresh(corner: int = 0, pressure: float = 0.0, uncompensated: float = 0.0, wa
 
 
 @numba.njit
-def limit(params, state, corner, wanted, uncompensated, torque, dt):
+def limit(params, state, corner, wanted, uncompensated, torque, dt, ceiling=180e5):
     """The limiter on arrays of one record: five times as fast to call from Python as with records."""
-    return limit_pressure(params[0], state[0], corner, wanted, uncompensated, torque, dt)
+    return limit_pressure(params[0], state[0], corner, wanted, uncompensated, torque, ceiling, dt)
 
 
 def nominal(torque: float, corner: int = 0) -> float:
@@ -113,6 +114,52 @@ def test_the_window_holds_for_the_uncompensated_demand_too() -> None:
     torque = 400.0
     doubled = PUSH_OUT + 2 * torque / PER_PASCAL[0]
     assert settle(fresh(), 0, NAN, doubled, torque) == pytest.approx(PUSH_OUT + 1.6 * torque / PER_PASCAL[0])
+
+
+# ---------------------------------------------------------------- what the hydraulics can give, and slip
+
+
+@pytest.mark.parametrize("corner", range(4))
+def test_no_pressure_above_the_ceiling_in_a_dense_sweep(corner: int) -> None:
+    torque = (80 * BAR - PUSH_OUT) * PER_PASCAL[corner]
+    for ceiling in np.concatenate([np.linspace(78, 82, 81), [0, 1, 40, 179, 180]]) * BAR:
+        state = fresh(corner, 80 * BAR, 80 * BAR, 80 * BAR)
+        pressure = limit(PARAMS, state, corner, 80 * BAR, 80 * BAR, torque, DT, ceiling)
+        assert pressure == pytest.approx(min(80 * BAR, ceiling))
+        assert state["limited"] == 0  # what the hydraulics lack is no fault of the demand
+
+
+@pytest.mark.parametrize("ceiling", [NAN, INF, -INF, -1.0, 181 * BAR])
+def test_a_ceiling_that_cannot_be_is_none(ceiling: float) -> None:
+    torque = (60 * BAR - PUSH_OUT) * PER_PASCAL[0]
+    assert limit(PARAMS, fresh(0, 60 * BAR), 0, 60 * BAR, 60 * BAR, torque, DT, ceiling) == 60 * BAR
+
+
+def test_from_below_a_ceiling_that_is_lifted_pressure_rises_from_where_it_was() -> None:
+    torque = (90 * BAR - PUSH_OUT) * PER_PASCAL[0]
+    state = fresh(0, 90 * BAR, 90 * BAR, 90 * BAR)
+    ceilings = [30 * BAR, 30 * BAR, 180 * BAR, 180 * BAR]
+    got = [limit(PARAMS, state, 0, 90 * BAR, 90 * BAR, torque, DT, ceiling) for ceiling in ceilings]
+    assert got == pytest.approx([30 * BAR, 30 * BAR, 60 * BAR, 90 * BAR])
+
+
+@pytest.mark.parametrize(
+    ("case", "verdict", "accumulator", "available"),
+    [
+        ("full", USABLE, 180.0, 180.0),
+        ("fuller than the demand may be", USABLE, 210.0, 180.0),
+        ("low", USABLE, 95.5, 95.5),
+        ("a little", USABLE, 10.5, 10.5),
+        ("empty, or a sensor that lies", USABLE, 0.0, 180.0),
+        ("stale", VALID, 20.0, 180.0),
+        ("invalid", ALIVE, 20.0, 180.0),
+        ("never came", 0, 0.0, 180.0),
+    ],
+)
+def test_what_the_accumulator_can_give(feed, case, verdict, accumulator, available) -> None:
+    inputs = feed(accumulator_pressure=accumulator)
+    inputs[0]["verdict"][INPUT["accumulator_pressure"]] = verdict
+    assert available_pressure(PARAMS[0], inputs[0]) == pytest.approx(available * BAR), case
 
 
 # ---------------------------------------------------------------- 0–180 bar
@@ -289,17 +336,21 @@ SPECIAL = [
 ]
 anything = st.sampled_from(SPECIAL) | st.floats() | st.floats(-1e7, 3e7)
 any_torque = st.sampled_from(SPECIAL) | st.floats() | st.floats(0, 6000)
-cycles = st.lists(st.tuples(anything, anything, any_torque), min_size=1, max_size=12)
+cycles = st.lists(st.tuples(anything, anything, any_torque, anything), min_size=1, max_size=12)
 
 
-def check(last: float, pressure: float, torque: float, corner: int, dt: float = DT) -> None:
+def check(
+    last: float, pressure: float, torque: float, corner: int, dt: float = DT, ceiling: float = 180 * BAR
+) -> None:
     """The limits that hold whatever the arguments were."""
+    ceiling = ceiling if 0 <= ceiling <= 180 * BAR else 180 * BAR
     assert math.isfinite(pressure)
     assert 0.0 <= pressure <= 180 * BAR
     assert pressure <= last + RATE * dt + 1e-6
     if math.isfinite(torque) and torque > 0:
         least = PUSH_OUT + 0.6 * torque / PER_PASCAL[corner]
-        assert pressure >= min(least, last + RATE * dt, 180 * BAR) * (1 - 1e-12) - 1e-6
+        assert pressure >= min(least, last + RATE * dt, ceiling) * (1 - 1e-12) - 1e-6
+        assert pressure <= ceiling
         assert torque_at_nominal(pressure, corner) <= 1.6 * torque * (1 + 1e-9) + 1e-6
     else:
         assert pressure == 0.0
@@ -307,12 +358,14 @@ def check(last: float, pressure: float, torque: float, corner: int, dt: float = 
 
 @settings(max_examples=500, deadline=None)
 @given(cycles, st.integers(0, 3))
-def test_every_limit_holds_whatever_comes(sequence: list[tuple[float, float, float]], corner: int) -> None:
+def test_every_limit_holds_whatever_comes(
+    sequence: list[tuple[float, float, float, float]], corner: int
+) -> None:
     state = fresh()
     last = 0.0
-    for wanted, uncompensated, torque in sequence:
-        pressure = limit(PARAMS, state, corner, wanted, uncompensated, torque, DT)
-        check(last, pressure, torque, corner)
+    for wanted, uncompensated, torque, ceiling in sequence:
+        pressure = limit(PARAMS, state, corner, wanted, uncompensated, torque, DT, ceiling)
+        check(last, pressure, torque, corner, DT, ceiling)
         last = pressure
 
 

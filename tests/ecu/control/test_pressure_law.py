@@ -1,21 +1,28 @@
 """Torque to pressure (5.4) and its compensation (corrected 5.8) against the brake's own law (A.19)."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from ecu.config import load_config, new_params
 from ecu.control.pressure_law import (
     PRESSURE_LAW_STATE,
     compensated_pressure,
     follow_friction,
+    learn_start,
     level_left_right,
     pressure_for_torque,
     set_base,
+    watch_limit,
 )
+from ecu.estimation.friction import FRICTION_STATE
+from ecu.params import INVERSE, OFF, SECOND_ORDER
 from ecu.records import LEARNED
 
 BAR = 1e5
+PARAMS = new_params(load_config(Path(__file__).parents[3] / "config" / "suv.toml"))[0]
 BRAKES = [(0.060, 0.1205), (0.060, 0.1205), (0.034, 0.1288), (0.034, 0.1288)]  # Table D.1: d_p, r_eff [m]
 PUSH_OUT = 0.5 * BAR
 
@@ -28,8 +35,15 @@ def torque_of(pressure: float, mu: float, corner: int) -> float:
 
 def law(base: float = 0.45, used: float = 0.45):
     state = np.zeros(1, PRESSURE_LAW_STATE)
-    state["base"], state["used"], state["mu_override"] = base, used, math.nan
+    state["base"], state["used"], state["mu_override"], state["start"] = base, used, math.nan, 1.0
     return state[0]
+
+
+def estimated(mu: object, sigma: float = 0.02, observed_s: float = 2.0):
+    """Return what the observer says."""
+    friction = np.zeros(1, FRICTION_STATE)
+    friction["mu"], friction["sigma"], friction["observed_s"] = mu, sigma, observed_s
+    return friction[0]
 
 
 @pytest.mark.parametrize("corner", range(4))
@@ -58,6 +72,17 @@ def test_truncation_costs_the_cube_of_the_change(params, corner: int, e: float, 
     assert torque_of(pressure, mu, corner) / 500.0 - 1 == pytest.approx(torque_error, abs=1e-9)
 
 
+@pytest.mark.parametrize("e", [-0.3, -0.15, 0.0, 0.15, 0.3])
+@pytest.mark.parametrize("corner", range(4))
+def test_the_inverse_is_exact(params, corner: int, e: float) -> None:
+    params["compensation"] = INVERSE
+    mu = 0.45 * (1 + e)
+    pressure = compensated_pressure(
+        params[0], law(used=mu), pressure_for_torque(params[0], 500.0, 0.45, corner), corner
+    )
+    assert torque_of(pressure, mu, corner) == pytest.approx(500.0, rel=1e-12)
+
+
 @pytest.mark.parametrize("pressure", [PUSH_OUT, 0.2 * BAR, 0.0])
 @pytest.mark.parametrize("used", [0.32, 0.58])
 def test_the_push_out_pressure_is_not_scaled(params, pressure: float, used: float) -> None:
@@ -71,7 +96,7 @@ def test_the_push_out_pressure_is_not_scaled(params, pressure: float, used: floa
 def test_compensation_saturates_at_30_percent_of_the_base(estimate: float, used: float) -> None:
     state = law()
     for _ in range(500):
-        follow_friction(state, np.full(4, estimate), 0.01)
+        follow_friction(PARAMS, state, estimated(np.full(4, estimate)), 0.01)
     assert state["used"] == pytest.approx(np.full(4, used))
 
 
@@ -79,14 +104,14 @@ def test_compensation_saturates_at_30_percent_of_the_base(estimate: float, used:
 def test_the_friction_in_use_moves_no_faster_than_half_a_unit_a_second(dt: float) -> None:
     state = law()
     for k in range(1, 4):
-        follow_friction(state, np.array([0.6, 0.3, 0.45, 0.4501]), dt)
+        follow_friction(PARAMS, state, estimated(np.array([0.6, 0.3, 0.45, 0.4501])), dt)
         assert state["used"] == pytest.approx([0.45 + 0.5 * k * dt, 0.45 - 0.5 * k * dt, 0.45, 0.4501])
 
 
 def test_a_friction_that_is_not_a_number_does_not_stick(params) -> None:
     state = law()
-    follow_friction(state, np.full(4, math.nan), 0.01)
-    follow_friction(state, np.full(4, 0.45), 0.01)
+    follow_friction(PARAMS, state, estimated(np.full(4, math.nan)), 0.01)
+    follow_friction(PARAMS, state, estimated(np.full(4, 0.45)), 0.01)
     assert np.isfinite(state["used"]).all()
     assert np.isfinite(compensated_pressure(params[0], state, 30 * BAR, 0))
 
@@ -95,8 +120,108 @@ def test_the_base_is_what_was_learned() -> None:
     learned = np.zeros(1, LEARNED)
     learned["mu_b"] = [0.4, 0.41, 0.5, 0.51]
     state = law()
-    set_base(state, learned[0])
+    set_base(PARAMS, state, learned[0])
     assert list(state["base"]) == list(state["used"]) == [0.4, 0.41, 0.5, 0.51]
+
+
+def test_without_compensation_nominal_friction_counts_whatever_was_learned(params) -> None:
+    params["compensation"] = OFF
+    learned = np.zeros(1, LEARNED)
+    learned["mu_b"] = 0.3
+    state = law()
+    set_base(params[0], state, learned[0])
+    follow_friction(params[0], state, estimated(np.full(4, 0.36)), 0.01)
+    assert list(state["base"]) == list(state["used"]) == [0.45] * 4
+
+
+@pytest.mark.parametrize(
+    ("case", "began", "ended", "sigma", "observed_s", "start"),
+    [
+        ("rises by a fifth within the braking", 0.40, 0.48, 0.02, 2.0, 0.40 / 0.48),
+        ("falls", 0.45, 0.40, 0.02, 2.0, 0.45 / 0.40),
+        ("doubles: cannot be all true", 0.30, 0.60, 0.02, 2.0, 0.75),
+        ("too unsure", 0.40, 0.48, 0.05, 2.0, 1.0),
+        ("too short", 0.40, 0.48, 0.02, 0.9, 1.0),
+    ],
+)
+def test_a_braking_begins_with_another_friction_than_it_ends_with(
+    case, began, ended, sigma, observed_s, start
+) -> None:
+    state, learned = law(), np.zeros(1, LEARNED)
+    follow_friction(PARAMS, state, estimated(0.45, observed_s=0.5), 0.01)
+    assert not state["early"].any()  # not yet
+    follow_friction(PARAMS, state, estimated(began, observed_s=0.61), 0.01)
+    follow_friction(PARAMS, state, estimated(ended, observed_s=1.5), 0.01)
+    learn_start(state, estimated(ended, sigma, observed_s))
+    assert state["start"] == pytest.approx(np.full(4, start)), case
+    learned["mu_b"] = ended
+    set_base(PARAMS, state, learned[0])
+    assert state["base"] == pytest.approx(np.full(4, ended * start))
+    assert not state["early"].any()
+
+
+def test_where_brakings_begin_with_another_friction_the_last_one_s_end_is_not_followed() -> None:
+    state = law()
+    state["start"][:2] = 0.9
+    follow_friction(PARAMS, state, estimated(0.5, observed_s=0.59), 0.01)
+    assert list(state["used"]) == pytest.approx([0.45, 0.45, 0.455, 0.455])
+    follow_friction(PARAMS, state, estimated(0.5, observed_s=0.61), 0.01)
+    assert list(state["used"]) == pytest.approx([0.455, 0.455, 0.46, 0.46])
+
+
+@pytest.mark.parametrize(
+    ("case", "cut", "estimate", "after"),
+    [
+        ("friction falls, pressure is to be had", 0, 0.38, 0.445),
+        ("friction falls, pressure is cut: no more is asked for", 1, 0.38, 0.45),
+        ("friction rises, pressure is cut: less is asked for", 1, 0.52, 0.455),
+    ],
+)
+def test_friction_in_use_does_not_run_on_while_the_pressure_is_cut(case, cut, estimate, after) -> None:
+    state = law()
+    state["cut"] = cut
+    follow_friction(PARAMS, state, estimated(np.full(4, estimate)), 0.01)
+    assert state["used"] == pytest.approx(np.full(4, after)), case
+
+
+@pytest.mark.parametrize(
+    ("case", "compensation", "estimate", "cut", "guarded", "asked", "told"),
+    [
+        ("friction as known", SECOND_ORDER, 0.45, 0, 0, True, False),
+        ("29 % below its base", SECOND_ORDER, 0.45 * 0.71, 0, 0, True, False),
+        ("31 % below its base", SECOND_ORDER, 0.45 * 0.69, 0, 0, True, True),
+        ("31 % below, nothing asked for", SECOND_ORDER, 0.45 * 0.69, 0, 0, False, False),
+        ("31 % below, inverse", INVERSE, 0.45 * 0.69, 0, 0, True, True),
+        ("31 % below, nobody compensates", OFF, 0.45 * 0.69, 0, 0, True, False),
+        ("31 % above: brakes more than asked, no fade", SECOND_ORDER, 0.45 * 1.31, 0, 0, True, False),
+        ("a pressure that cannot be had", SECOND_ORDER, 0.45, 1, 0, True, True),
+        ("a pressure cut because the wheel slips", SECOND_ORDER, 0.45, 1, 1, True, False),
+        ("not a number", SECOND_ORDER, math.nan, 0, 0, True, False),
+    ],
+)
+def test_when_the_driver_is_told_that_the_brakes_fade(
+    params, case, compensation, estimate, cut, guarded, asked, told
+) -> None:
+    params["compensation"] = compensation
+    state = law()
+    state["cut"][2] = cut
+    mu, guard = np.array([0.45, estimate, 0.45, 0.45]), np.array([0, 0, guarded, 0])
+    after = []
+    for _ in range(40):
+        watch_limit(params[0], state, mu, guard, asked, 0.01)
+        after.append(int(state["at_limit"]))
+    assert after[28] == 0, case  # 0.29 s
+    assert after[-1] == told, case
+
+
+def test_what_the_driver_is_told_lasts_until_the_brakes_are_released() -> None:
+    state, faded, well = law(), np.full(4, 0.3), np.full(4, 0.45)
+    seen = []
+    for mu, asked, cycles in ((faded, True, 40), (well, True, 100), (well, False, 1), (well, True, 40)):
+        for _ in range(cycles):
+            watch_limit(PARAMS, state, mu, np.zeros(4), asked, 0.01)
+        seen.append(int(state["at_limit"]))
+    assert seen == [1, 1, 0, 0]
 
 
 def test_the_ideal_controller_of_the_laboratory_is_exact(params) -> None:

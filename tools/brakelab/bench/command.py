@@ -11,8 +11,10 @@ from typing import Any, Final, NamedTuple, TypeVar
 from rich.console import Console
 from rich.progress import track
 
-from brakelab.bench import ablation, bound, codec, cycle, plant, step
+from brakelab.bench import ablation, bound, codec, compensation, cycle, margins, plant, step
 from brakelab.bench import stops as stops_bench
+from brakelab.bench.blending import CARS, blending_tables
+from brakelab.bench.chart import write_chart
 from brakelab.bench.energy import energy_tables
 from brakelab.bench.friction import friction_tables
 from brakelab.bench.measure import Figure, Row, machine
@@ -81,6 +83,35 @@ ENERGY_TEXT: Final = (
     "vehicle sums what leaves and enters in its own steps (tools/brakelab/plant/energy.py)."
 )
 
+BLENDING: Final = "blending"
+BLENDING_TEXT: Final = (
+    "Brakings from 75 km/h in closed loop with the ECU of config/suv.toml, whose motors take the share f on "
+    f"both axles. {CARS} cars, drawn from config/plant/suv.toml; figures are median (least–greatest) over "
+    "them. Torque is that of linings and motors, true; the demand is m a r with mass and radius of the "
+    "configuration (5.1). In the first two tables the ECU is told the true friction: what is left is the "
+    "error of blending."
+)
+
+COMPENSATION: Final = "compensation"
+COMPENSATION_TEXT: Final = (
+    "Manoeuvres of section 5.7 and fade (6.2.3) in closed loop with the ECU of config/suv.toml, motors at "
+    "rest but where it says so; cars are drawn per seed from config/plant/suv.toml, nothing was learned "
+    "before. Ideal: the same controller in the same car, told the true friction. Achieved: brake and "
+    "motor torque over radius and mass, all true. Uncompensated: nominal friction always. Under, over: "
+    "told 1.15 and 0.85 of the true friction (section 5.6).\n\n![Deceleration, friction and pedal curves "
+    "of car 0](images/compensation.svg)"
+)
+
+MARGINS: Final = "margins"
+MARGINS_TEXT: Final = (
+    "How far the loop through pressure law, hydraulics, car and observer is from instability, measured "
+    "with the loop cut at the friction in use (tools/brakelab/bench/margins.py). The loop gain is far "
+    "below 1 at every frequency: an estimate of friction is torque over pressure, and more pressure gives "
+    "more torque, so to first order the estimate does not see what the law does. What comes back is lag "
+    "between the signals and what friction really owes to pressure.\n\n![Loop gain and distance from "
+    "+1](images/control-margins.svg)"
+)
+
 
 Car = TypeVar("Car")
 
@@ -127,8 +158,8 @@ def bench(name: str | None, json: bool, seeds: int = 20) -> int:
     """Run one bench, or without a name all that measure time; print tables, or JSON. Returns 0.
 
     In a checkout, a run of all times renews docs/benchmarks.md, `stops` docs/observer-accuracy.md,
-    `observers` docs/observers.md, each of `ablation`, `bound`, `friction` and `energy` the page of its name.
-    `seeds`: how many cars `stops` and `observers` draw, `ablation` and `bound` at most.
+    `observers` docs/observers.md, each other one the page of its name. `seeds`: how many cars `stops` and
+    `observers` draw, `ablation` and `bound` at most.
 
     Raises:
         UserError: there is no such bench.
@@ -140,6 +171,9 @@ def bench(name: str | None, json: bool, seeds: int = 20) -> int:
         BOUND: partial(_bound, seeds=seeds),
         FRICTION: _friction,
         ENERGY: _energy,
+        COMPENSATION: _compensation,
+        MARGINS: _margins,
+        BLENDING: _blending,
     }
     if name is not None and name not in (*BENCHES, *others):
         raise UserError("bench", name, f"no such bench; choose one of {', '.join((*BENCHES, *others))}")
@@ -236,13 +270,38 @@ def _energy(json: bool) -> int:
     return _page(ENERGY, "Where the energy goes", ENERGY_TEXT, tables, json)
 
 
-def _page(name: str, title: str, text: str, tables: list[Table], json: bool) -> int:
+def _compensation(json: bool) -> int:
+    config = load_config(resource("config/suv.toml"))
+    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+        tables = compensation.compensation_tables(compensation.drive_cars(config, spread=pool.map))
+    if not json:
+        panels, picture = compensation.pictured(config), resource("docs") / "images" / "compensation.svg"
+        write_chart(picture, panels, compensation.LEGEND)
+    return _page(COMPENSATION, "What compensation is worth", COMPENSATION_TEXT, tables, json)
+
+
+def _margins(json: bool) -> int:
+    config = load_config(resource("config/suv.toml"))
+    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+        cars = margins.measure_cars(config, spread=pool.map)
+    if not json:
+        picture = resource("docs") / "images" / "control-margins.svg"
+        write_chart(picture, margins.margin_panels(cars), margins.LEGEND)
+    tables = margins.margin_tables(cars)
+    return _page(MARGINS, "Margins of the control loop", MARGINS_TEXT, tables, json, "control-margins")
+
+
+def _blending(json: bool) -> int:
+    return _page(BLENDING, "Motors and linings brake together", BLENDING_TEXT, blending_tables(), json)
+
+
+def _page(name: str, title: str, text: str, tables: list[Table], json: bool, file: str | None = None) -> int:
     of = f"`brake-ecu bench {name}`, version {__version__}"
     if json:
         _print_json({"of": of, "tables": [table._asdict() for table in tables]})
         return 0
     _print_tables(of, tables)
-    _write(f"{name}.md", title, f"{of}. {text}", tables)
+    _write(f"{file or name}.md", title, f"{of}. {text}", tables)
     return 0
 
 

@@ -46,6 +46,12 @@ def _as_is(setup: Setup, sign: float) -> Setup:
     return setup
 
 
+def _unguarded(setup: Setup, sign: float) -> Setup:
+    """Let wheels lock: what is measured is what the observers make of it (Figure 5.5)."""
+    control = setup.config.control.model_copy(update={"slip_guard": False})
+    return setup._replace(config=setup.config.model_copy(update={"control": control}))
+
+
 class Case(NamedTuple):
     """One line of a table."""
 
@@ -195,7 +201,7 @@ def _robustness() -> dict[str, Case]:
     cases["braking in a curve, 4 m/s² across"] = Case(
         curve.model_copy(update={"steering": gentler}), None, twice
     )
-    cases["split friction, left wheels lock"] = Case(shipped("split"), None, twice)
+    cases["split friction, left wheels lock"] = Case(shipped("split"), None, twice, change=_unguarded)
     return cases
 
 
@@ -216,7 +222,7 @@ def _wrong_start(setup: Setup, sign: float) -> Setup:
 EVENTS: Final = {
     WRONG_START: Case(shipped("stop-1"), change=_wrong_start),
     "tyre stiffness × 0.67": Case(shipped("tyre-stiffness")),
-    "low-grip patch": Case(shipped("low-grip")),
+    "low-grip patch": Case(shipped("low-grip"), change=_unguarded),
 }
 """Drives of which times are told."""
 LONGEST: Final = {"tyre stiffness × 0.67": 0.10, "low-grip patch": 0.30}

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.bench.measure import Figure, figure
-from brakelab.closed_loop import Drive, new_loop, run
+from brakelab.closed_loop import Drive, Loop, new_loop, run
 from brakelab.scenario import load_scenario
 from ecu.config import Config
 from ecu.resources import resource
@@ -83,14 +83,18 @@ def _brake(test: int, speed_known: bool, config: Config, seed: int, ideal: bool 
     loop = new_loop(
         scenario.model_copy(update={"vehicle_speed": "ideal" if speed_known else "none"}), config, seed
     )
-    mass = float(loop.sides.vehicle.params["mass"][0])
     drive = run(loop, ideal)
+    return _Stop(drive, achieved_decel(loop, drive))
+
+
+def achieved_decel(loop: Loop, drive: Drive) -> Vector:
+    """Return the deceleration [m/s^2] by the torques of a drive and the mass of its car, shape (n,)."""
     truth = drive.truth
     force = sum(
         (truth[f"brake_torque_{c}"] + truth[f"motor_torque_{c}"]) / truth[f"rolling_radius_{c}"]
         for c in CORNERS
     )
-    return _Stop(drive, np.asarray(force) / mass)
+    return np.asarray(force) / float(loop.sides.vehicle.params["mass"][0])
 
 
 def window(drive: Drive) -> NDArray[np.bool_]:
@@ -143,7 +147,7 @@ class _Seed(NamedTuple):
 
 
 def _one_car(test: int, speed_known: bool, config: Config, seed: int) -> _Seed:
-    plain = config.model_copy(update={"control": config.control.model_copy(update={"compensate": False})})
+    plain = config.model_copy(update={"control": config.control.model_copy(update={"compensation": "off"})})
     ours = _brake(test, speed_known, config, seed)
     uncompensated = _brake(test, speed_known, plain, seed)
     ideal = _brake(test, speed_known, config, seed, ideal=True)

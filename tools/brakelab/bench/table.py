@@ -23,7 +23,8 @@ def _number(value: float) -> str:
     return f"{value:.3g}" if value < 1000.0 else f"{value:.0f}"
 
 
-def _spread(value: Figure) -> str:
+def spread(value: Figure) -> str:
+    """Return "median (least–greatest)"."""
     return f"{_number(value.median)} ({_number(value.low)}–{_number(value.high)})"
 
 
@@ -32,8 +33,8 @@ def time_table(title: str, rows: Sequence[Row], below: str) -> Table:
     lines = [
         (
             row.what,
-            _spread(row.ours),
-            "–" if row.peer is None else _spread(row.peer),
+            spread(row.ours),
+            "–" if row.peer is None else spread(row.peer),
             "–" if row.ratio is None else _number(row.ratio),
             row.unit,
             row.note,

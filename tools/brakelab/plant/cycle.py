@@ -25,7 +25,8 @@ def set_commands(
     """Set what the actuators do in the coming cycle, and the road as far as it is described by time."""
     heard = demand.pressure_valid == 1 and demand.pressure_age < DEMAND_TIMEOUT
     decel = max(driver.decel_demand, 0.01 * driver.pedal_position * FULL_PEDAL_DECEL)
-    blended = script.blending and driver.braking == 1 and demand.motor_valid == 1
+    asks = driver.braking == 1 or decel > 0.0
+    blended = script.blending and asks and demand.motor_valid == 1
     blended = blended and demand.motor_age < DEMAND_TIMEOUT
     for wheel in range(4):
         fallback = params.fallback_gain * decel
@@ -52,6 +53,8 @@ def move(
     if round(state.t / CYCLE) == script.fault_cycle:
         for wheel in range(4):
             params.slip_stiffness[wheel] *= script.fault_stiffness
+    if len(script.charge_limit) > 0:
+        params.charge_limit = value_at(script.charge_limit, state.t, 1)
     for _ in range(STEPS):
         set_road(script.road, params, state, commands)
         advance(params, state, commands, STEP)

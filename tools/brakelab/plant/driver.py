@@ -43,7 +43,8 @@ class Script(NamedTuple):
     """Rows of time [s] and grade [rad], shape (n, 2)."""
     ambient_temperature: float
     blending: bool
-    """In braking the motors do what the ECU asks; otherwise they rest, but for `motor_share`."""
+    """While brakes are asked for the motors do what the ECU asks; otherwise they rest in braking phases, but
+    for `motor_share`."""
     road: Road = LEVEL
     """What is described by place goes before what is described by time."""
     steering: Steering = HANDS_OFF
@@ -56,6 +57,8 @@ class Script(NamedTuple):
     fault_cycle: int = -1
     """From this cycle on the tyres' slip stiffness is `fault_stiffness` of what it was."""
     fault_stiffness: float = 1.0
+    charge_limit: NDArray[np.float64] = np.empty((0, 2))
+    """Rows of time [s] and what the battery takes [W], shape (n, 2); empty: what the car's file says."""
 
 
 @kernel

@@ -1,0 +1,71 @@
+"""The rig with whole processes: a braking with a killed daemon beside its standby, on a real bus."""
+
+import os
+import subprocess
+import sys
+
+import pyarrow.parquet as pq
+import pytest
+
+from .conftest import PATIENCE_S, ROOT
+
+GROUP = f"239.76.{os.getpid() >> 8 & 0xFF}.{os.getpid() & 0xFF}"
+# Imu frames are lost after the kill, which the standby has to notice.
+SCENARIO = """
+plant = "suv"
+initial_speed = 15.0
+phase = [
+    { kind = "coast", seconds = 0.5 },
+    { kind = "brake", decel = 4.0, until_speed = 0.0 },
+]
+[[fault]]
+kind = "daemon_killed"
+t = 2.0
+standby = true
+[[fault]]
+kind = "lost"
+message = ["Imu"]
+t = 3.0
+duration = 0.3
+"""
+
+
+def rig(tmp_path, *arguments):
+    """Run the rig on the scenario; return its rows by kind of fault, and the row of the scenario."""
+    scenario = tmp_path / "killed.toml"
+    scenario.write_text(SCENARIO, "utf-8")
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tools")])}
+    command = [sys.executable, "-m", "ecu.cli", "rig", scenario, "--config", "suv", "--seed", "1"]
+    done = subprocess.run(
+        [*command, "--out", tmp_path / "out", *arguments],
+        env=environment, capture_output=True, text=True, timeout=PATIENCE_S, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    print(done.stdout)
+    assert (tmp_path / "out" / "rig.html").exists()
+    faults = pq.read_table(tmp_path / "out" / "faults.parquet").to_pylist()
+    return {row["kind"]: row for row in faults}, pq.read_table(
+        tmp_path / "out" / "scenarios.parquet"
+    ).to_pylist()[0]
+
+
+@pytest.mark.parametrize(
+    "bus",
+    [
+        pytest.param(("-i", "udp_multicast", "-c", GROUP), marks=pytest.mark.multicast, id="multicast"),
+        pytest.param(("-i", "socketcan", "-c", "vcan0"), marks=pytest.mark.socketcan, id="vcan"),
+        pytest.param(("--lock-step",), id="lock-step"),
+    ],
+)
+def test_the_standby_brakes_on_where_the_killed_one_stopped(tmp_path, bus):
+    faults, drive = rig(tmp_path, *bus)
+    killed, lost = faults["daemon_killed"], faults["lost"]
+    print(f"fallback {killed['fallback']:.0f} ms, recovered after {killed['recovered']:.0f} ms")
+    assert 20.0 <= killed["fallback"] < 500.0  # 50 ms of silence, of which 30 ms count as heard, and a cycle
+    assert killed["recovered"] < 500.0
+    assert "IMU lost" in lost["bits"]
+    assert lost["mode"] == "degraded"
+    assert lost["recovered"] < 500.0
+    assert drive["unexplained"] == ""
+    assert drive["differing"] == 0  # replay gives every bit again
+    assert drive["stopping_distance"] == pytest.approx(drive["undisturbed"], rel=0.05)

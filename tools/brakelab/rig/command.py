@@ -1,0 +1,126 @@
+"""`brake-ecu rig SCENARIO… --config CONFIG`: tables of scenarios against the ECU, in real time or in memory.
+
+In real time the daemon and the vehicle are processes on a bus; with `--lock-step` both run in one loop in
+memory as fast as it goes. Per scenario a folder with results, truth, frames and report; over all of them
+`rig.html`, `scenarios.parquet` and `faults.parquet`.
+"""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from rich.console import Console
+
+from brakelab.closed_loop import new_loop, run
+from brakelab.report.command import report
+from brakelab.report.drive import Drive
+from brakelab.rig.live import Bus, armed_config, choose_bus, drive
+from brakelab.rig.outcome import Outcome, outcome, stopping_distance
+from brakelab.rig.page import summary, write_page, write_tables
+from brakelab.rig.results import write_recorded, write_simulated
+from brakelab.scenario import Scenario, load_scenario
+from brakelab.vehicle_node import warm_up
+from ecu.config import Config, load_config
+from ecu.errors import RunFault, UserError
+from ecu.resources import SCENARIOS, named, resource
+from ecu.warm import warm
+
+WIDTH: Final = 150  # columns of the table where no terminal says how wide it is
+
+say = Console(highlight=False, soft_wrap=True, stderr=True).print
+
+
+def found(names: Sequence[str]) -> list[Path]:
+    """Return the scenarios of `names`: files, shipped ones by name, and all of a folder (shipped: faults).
+
+    Raises:
+        UserError: there is none of that name.
+    """
+    paths: list[Path] = []
+    for name in names:
+        folder = next((f for f in (Path(name), resource(SCENARIOS[0]) / name) if f.is_dir()), None)
+        paths += [named(name, *SCENARIOS)] if folder is None else sorted(folder.glob("*.toml"))
+    twice = {path.stem for path in paths if sum(other.stem == path.stem for other in paths) > 1}
+    if twice:
+        raise UserError(sorted(twice)[0], "", "named twice; results are kept by name, so name it once")
+    if not paths:
+        raise UserError(" ".join(names), "", "no scenario in this folder; name one with *.toml files")
+    return paths
+
+
+def rig(
+    names: Sequence[str],
+    config: Path,
+    bus: tuple[str, str] | None,
+    out: Path,
+    lock_step: bool,
+    seed: int,
+) -> int:
+    """Run every scenario; return 0, or 1 if one of them showed what no fault of it explains.
+
+    `bus`: interface and channel, None: the best that this machine has.
+
+    Raises:
+        UserError: a scenario, the configuration or the bus is not right, or `out` cannot be written.
+        RunFault: a daemon or the vehicle ended early.
+    """
+    scenarios = [(path, load_scenario(path)) for path in found(names)]
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        armed = armed_config(config, out)
+    except OSError as error:
+        raise UserError("--out", str(out), f"cannot be written ({error.strerror}); choose another") from None
+    vehicle = load_config(armed)
+    meeting = None
+    if not lock_step:
+        meeting = choose_bus() if bus is None else Bus(*bus, " ".join(bus))
+        if meeting.interface == "virtual":
+            raise RunFault(f"two processes cannot meet: {meeting.why}; take --lock-step, or -i and -c")
+        say(f"bus: {meeting.why}; compiling what is not in the cache yet")
+        warm_up(scenarios[0][1])
+        warm()
+    outcomes = []
+    for path, scenario in scenarios:
+        folder = out / path.stem
+        folder.mkdir(exist_ok=True)
+        say(f"driving {path.stem}")
+        if meeting is None:
+            outcomes.append(_in_memory(path.stem, scenario, vehicle, folder, seed))
+        else:
+            outcomes.append(_in_real_time(path, scenario, meeting, armed, vehicle, folder, seed))
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=WIDTH)
+    console.print(summary(outcomes))
+    write_tables(outcomes, out)
+    page = out / "rig.html"
+    page.write_text(write_page(outcomes, meeting, vehicle, seed), "utf-8")
+    say(f"report: {page.resolve()}")
+    return int(any(result.unexplained or result.differing for result in outcomes))
+
+
+def _undisturbed(scenario: Scenario, vehicle: Config, seed: int) -> float:
+    """Return the stopping distance [m] without the scenario's faults."""
+    if not scenario.fault:
+        return math.nan
+    sound = run(new_loop(scenario.model_copy(update={"fault": []}), vehicle, seed))
+    return stopping_distance(Drive(sound.t, sound.truth, {}))
+
+
+def _in_memory(name: str, scenario: Scenario, vehicle: Config, folder: Path, seed: int) -> Outcome:
+    loop = new_loop(scenario, vehicle, seed)
+    written = write_simulated(loop, run(loop), vehicle, folder)
+    truth = folder / "truth.parquet"
+    report(written.result, truth, folder / "report.html")
+    return outcome(name, written, truth, scenario.fault, _undisturbed(scenario, vehicle, seed), [])
+
+
+def _in_real_time(
+    path: Path, scenario: Scenario, bus: Bus, armed: Path, vehicle: Config, folder: Path, seed: int
+) -> Outcome:
+    recorded = drive(bus, path, armed, scenario.fault, folder, seed)
+    written = write_recorded(recorded.recordings, vehicle, folder)
+    report(written.result, recorded.truth, folder / "report.html", recorded.recordings[0])
+    undisturbed = _undisturbed(scenario, vehicle, seed)
+    return outcome(path.stem, written, recorded.truth, scenario.fault, undisturbed, recorded.recordings)

@@ -1,0 +1,216 @@
+"""One scenario in real time: daemon and vehicle as processes of their own that meet on a bus.
+
+The vehicle (`brakelab.vehicle_node`) sets off when it hears the ECU. What a scenario's faults do to frames,
+sensors and actuators happens in it; what they do to the daemon happens here, at the same T_0.
+"""
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import IO, Any, Final, NamedTuple
+
+import can
+
+from brakelab.rig.faults import Fault
+from ecu.bus.channel import open_channel
+from ecu.errors import RunFault, UserError
+from ecu.ring import RingReader, ring_path
+
+MULTICAST: Final = f"239.74.163.{os.getpid() % 250 + 2}"  # a group of its own: two rigs do not meet
+PATIENCE_S: Final = 180.0  # for a slow machine to get ready
+TURN_S: Final = 0.05
+
+
+class Bus(NamedTuple):
+    """Where daemon and vehicle meet."""
+
+    interface: str
+    channel: str
+    why: str
+
+
+def choose_bus() -> Bus:
+    """Return the best bus this machine has."""
+    if Path("/sys/class/net/vcan0").exists():
+        return Bus("socketcan", "vcan0", "vcan0")
+    try:
+        open_channel("udp_multicast", MULTICAST, receive_ids=[]).close()
+    except (OSError, can.CanError, UserError) as error:
+        return Bus(
+            "virtual", "demo", f"python-can's virtual bus in one process (no vcan0, no multicast: {error})"
+        )
+    return Bus("udp_multicast", MULTICAST, "UDP multicast that stays on this machine (there is no vcan0)")
+
+
+def armed_config(config: Path, out: Path) -> Path:
+    """Write the configuration with the demands armed into `out` and return its path."""
+    text, found = re.subn(
+        r"^transmit *=.*$", "transmit = true", config.read_text(encoding="utf-8"), flags=re.MULTILINE
+    )
+    text = re.sub(
+        r'^include *= *"(.*)"',
+        lambda match: f'include = "{(config.parent / match[1]).resolve()}"',
+        text,
+        flags=re.MULTILINE,
+    )
+    path = out / f"{config.stem}.toml"
+    path.write_text(text if found else f"transmit = true\n{text}", encoding="utf-8")
+    return path
+
+
+class Recorded(NamedTuple):
+    """What a drive in real time left behind."""
+
+    truth: Path
+    recordings: list[Path]
+    """Of the daemons that drove, in the order of their starts; a standby's last."""
+    exits: list[int]
+    """How each daemon ended, in the order of their starts: an exit code, or minus the signal."""
+
+
+class Processes:
+    """Vehicle and daemons of one drive."""
+
+    def __init__(self, bus: Bus, config: Path, out: Path, log: IO[bytes]) -> None:
+        self.out, self.truth = out, out / "truth.parquet"
+        self.daemons: list[subprocess.Popen[bytes]] = []
+        self._meeting = ["-i", bus.interface, "-c", bus.channel]
+        self._config, self._log = config, log
+        self.vehicle: subprocess.Popen[str] | None = None
+
+    def start_vehicle(self, scenario: Path, seed: int) -> None:
+        """Start the vehicle and wait until it is on the bus.
+
+        Raises:
+            RunFault: it did not get there.
+        """
+        command = [sys.executable, "-m", "brakelab.vehicle_node", str(scenario), *self._meeting, "--with-ecu"]
+        command += ["--seed", str(seed), "--truth", str(self.truth)]
+        self.vehicle = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=self._log, text=True)
+        self._line("ready")
+
+    def start_daemon(self, folder: str, *options: str) -> RingReader | None:
+        """Start a daemon that records into `folder` and wait for its ring; None: it ended at once."""
+        command = [sys.executable, "-m", "ecu.cli", "run", "--config", str(self._config), *self._meeting]
+        command += ["--record", str(self.out / folder), "--state", str(self.out / folder / "state")]
+        daemon = subprocess.Popen([*command, *options], stderr=self._log)
+        self.daemons.append(daemon)
+        deadline = time.monotonic() + PATIENCE_S
+        while time.monotonic() < deadline and daemon.poll() is None:
+            if ring_path(daemon.pid).exists():
+                return RingReader(ring_path(daemon.pid))
+            time.sleep(0.01)
+        return None
+
+    def departure(self) -> float:
+        """Wait until the vehicle sets off; return T_0 on the monotonic clock [s]."""
+        return 1e-9 * int(self._line("driving").split()[1])
+
+    def _line(self, begin: str) -> str:
+        assert self.vehicle is not None
+        assert self.vehicle.stdout is not None
+        line = self.vehicle.stdout.readline()
+        if not line.startswith(begin):
+            raise RunFault("the vehicle did not set off; its log says why")
+        return line
+
+    def driving(self) -> bool:
+        """Whether the drive goes on."""
+        assert self.vehicle is not None
+        return self.vehicle.poll() is None and not self.truth.exists()
+
+    def end(self) -> list[int]:
+        """End whoever still runs; return the daemons' exits."""
+        for daemon in self.daemons:
+            if daemon.poll() is None:
+                daemon.send_signal(signal.SIGTERM)
+        exits = [daemon.wait() for daemon in self.daemons]
+        if self.vehicle is not None:
+            self.vehicle.terminate()
+            self.vehicle.wait()
+        return exits
+
+
+def drive(
+    bus: Bus,
+    scenario: Path,
+    config: Path,
+    faults: list[Fault],
+    out: Path,
+    seed: int,
+    look: Callable[[RingReader], Any] = lambda ring: None,
+) -> Recorded:
+    """Drive a scenario with the armed `config`; `look` sees the daemon's ring every 50 ms.
+
+    Raises:
+        RunFault: a daemon or the vehicle ended early.
+    """
+    kills = [fault for fault in faults if fault.kind == "daemon_killed"]
+    for left in ("drive", "standby"):
+        shutil.rmtree(out / left, ignore_errors=True)
+    log = out / "daemon.log"
+    with log.open("wb") as file:
+        processes = Processes(bus, config, out, file)
+        processes.truth.unlink(missing_ok=True)
+        try:
+            processes.start_vehicle(scenario, seed)
+            if any(fault.standby for fault in kills):
+                processes.start_daemon("standby", "--standby")
+            ring = processes.start_daemon("drive")
+            if ring is None:
+                raise RunFault(f"the daemon did not become ready; {log} says why")
+            _act(processes, kills, ring, look)
+        finally:
+            exits = processes.end()
+    if not processes.truth.exists():
+        raise RunFault(f"the vehicle ended early; {log} says why")
+    _check(exits, kills, log)
+    recordings = [path.parent for name in ("drive", "standby") for path in _recordings(out / name)]
+    return Recorded(processes.truth, recordings, exits)
+
+
+def _recordings(folder: Path) -> list[Path]:
+    """Return the recordings in a folder that hold a cycle, in the order of their starts."""
+    filled = [path for path in folder.glob("*/cycles.bin") if path.stat().st_size]
+    return sorted(filled, key=lambda path: (path.parent / "recording.json").stat().st_mtime_ns)
+
+
+def _act(
+    processes: Processes, kills: list[Fault], ring: RingReader, look: Callable[[RingReader], Any]
+) -> None:
+    """Kill and restart daemons in time until the drive is over."""
+    t_0 = processes.departure()
+    victim = processes.daemons[-1]
+    actions = [(t_0 + fault.t, "kill") for fault in kills]
+    actions += [(t_0 + fault.end, "start") for fault in kills if fault.duration is not None]
+    actions.sort()
+    while processes.driving():
+        if actions and time.monotonic() >= actions[0][0]:
+            if actions.pop(0)[1] == "kill":
+                victim.kill()
+            else:
+                victim.wait()
+                ring = processes.start_daemon("drive") or ring
+                victim = processes.daemons[-1]
+            continue
+        look(ring)
+        due = actions[0][0] - time.monotonic() if actions else TURN_S
+        time.sleep(min(max(due, 0.0), TURN_S))
+
+
+def _check(exits: list[int], kills: list[Fault], log: Path) -> None:
+    """Raise `RunFault` if a daemon ended that was not meant to."""
+    allowed = {0}
+    if kills:
+        allowed.add(-signal.SIGKILL)
+    if any(fault.standby and fault.duration is not None for fault in kills):
+        allowed.add(2)  # it hears the standby and refuses
+    for code in exits:
+        if code not in allowed:
+            raise RunFault(f"a daemon ended with {code}; {log} says why")

@@ -1,0 +1,96 @@
+"""The rig's outcomes as a page, as tables on disk and as one on the terminal."""
+
+import math
+from importlib.resources import files
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+from jinja2 import Environment, StrictUndefined
+from rich.table import Table
+
+from brakelab.report.page import fixed, percent, signed_percent
+from brakelab.rig.live import Bus
+from brakelab.rig.outcome import Outcome
+from brakelab.rig.reaction import Reaction
+from ecu import __version__
+from ecu.config import Config, config_hash
+
+
+def more_distance(outcome: Outcome) -> float:
+    """Return how much longer the stopping distance was than without the faults, as a share."""
+    return outcome.stopping_distance / outcome.undisturbed - 1.0
+
+
+def bits_text(reaction: Reaction) -> str:
+    """Return the fault bits that were raised, with the ms after which."""
+    return ", ".join(f"{name} {after:.0f}" for name, after in reaction.bits) or "none"
+
+
+def summary(outcomes: list[Outcome]) -> Table:
+    """Return the outcomes as a table for the terminal."""
+    table = Table(box=None, pad_edge=False)
+    table.add_column("scenario", no_wrap=True)
+    for name in ("s", "decel error", "friction nRMSE", "stop m", "vs sound", "missed", "frames lost"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("faults")
+    for one in outcomes:
+        seen = [f"{reaction.kind}: {bits_text(reaction)}" for reaction in one.reactions]
+        table.add_row(
+            one.scenario,
+            fixed(one.seconds, 1),
+            fixed(one.decel_error, 2),
+            f"{percent(one.nrmse_front, 1)} / {percent(one.nrmse_rear, 1)} %",
+            fixed(one.stopping_distance, 1),
+            signed_percent(more_distance(one), 1),
+            str(one.missed),
+            str(one.frames.lost),
+            "; ".join([*seen, *(f"unexplained: {name}" for name in one.unexplained)]),
+        )
+    return table
+
+
+def write_tables(outcomes: list[Outcome], out: Path) -> None:
+    """Write `scenarios.parquet` and `faults.parquet`: one row per scenario, one per injected fault."""
+    flat = (
+        "scenario", "seconds", "brakings", "decel_error", "nrmse_front", "nrmse_rear", "stopping_distance",
+        "undisturbed", "differing", "cycles", "missed",
+    )  # fmt: skip
+    rows = [
+        {name: getattr(one, name) for name in flat}
+        | {f"frames_{name}": value for name, value in one.frames._asdict().items()}
+        | {f"lateness_{name}_us": value for name, value in one.lateness._asdict().items()}
+        | {"unexplained": ", ".join(one.unexplained)}
+        for one in outcomes
+    ]
+    pq.write_table(pa.Table.from_pylist(rows), out / "scenarios.parquet")
+    injected = [
+        {"scenario": one.scenario} | reaction._asdict() | {"bits": bits_text(reaction)}
+        for one in outcomes
+        for reaction in one.reactions
+    ]
+    if injected:
+        pq.write_table(pa.Table.from_pylist(injected), out / "faults.parquet")
+
+
+def write_page(outcomes: list[Outcome], bus: Bus | None, config: Config, seed: int) -> str:
+    """Return the page; it needs no other file but links to the reports beside it."""
+    page = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    page.filters.update(fixed=fixed, percent=percent, signed_percent=signed_percent)
+    source = (files("brakelab.rig") / "page.html.j2").read_text("utf-8")
+    return page.from_string(source).render(
+        css=(files("brakelab.report") / "page.css").read_text("utf-8"),
+        outcomes=outcomes,
+        more_distance=more_distance,
+        bits_text=bits_text,
+        live=bus is not None,
+        facts=[
+            ("Vehicle", config.name),
+            ("Configuration", config_hash(config)[:12]),
+            ("Observer", config.observer.kind),
+            ("Seed", str(seed)),
+            ("Bus", bus.why if bus else "in memory, lock-step"),
+            ("brake-ecu", __version__),
+        ],
+        isinf=math.isinf,
+    )

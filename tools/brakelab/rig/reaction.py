@@ -1,0 +1,129 @@
+"""What the ECU did about a fault, and how long that took, from results and truth on one time axis."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakelab.report.drive import Drive
+from brakelab.report.modes import fault_masks
+from brakelab.rig.faults import Fault
+from ecu.diagnostics.events import MODES
+from ecu.diagnostics.faults import FAULTS, LATE
+from ecu.signals import DEGRADED
+
+AFTER_S = 3.0
+"""What shows up this long after the end of a fault still counts as its consequence."""
+FIRST_HEARD_S = 0.05
+"""The vehicle sets off at the ECU's first frame: from then on it has heard demands."""
+SHOWN_S = 1.0
+"""A passing fault of the service shows its bit for so long."""
+
+
+class Reaction(NamedTuple):
+    """The ECU's answer to one fault. Times in ms after the fault began, NaN: never."""
+
+    kind: str
+    what: str
+    """Frames, signals or corners that it hits."""
+    t: float
+    """s"""
+    duration: float
+    """s, inf: to the end."""
+    bits: list[tuple[str, float]]
+    """Fault bits that were raised, with when."""
+    mode: str
+    """Worst mode."""
+    mode_after: float
+    fallback: float
+    """ms in all in which the vehicle did not obey the ECU but braked on its own."""
+    fallback_after: float
+    recovered: float
+    """ms after the fault's end (of a killed daemon: after the kill) until everything is as before."""
+
+
+def reactions(drive: Drive, truth: Drive, faults: list[Fault]) -> list[Reaction]:
+    """Return the reaction to every fault, up to the beginning of the next.
+
+    `drive` are the ECU's results, `truth` the vehicle's on its own axis; both count from T_0.
+    """
+    found = []
+    for fault in faults:
+        limit = min((other.t for other in faults if other.t > fault.t), default=math.inf)
+        found.append(_reaction(_until(drive, limit), _until(truth, limit), fault))
+    return found
+
+
+def _until(drive: Drive, limit: float) -> Drive:
+    rows = drive.t < limit
+    return Drive(
+        drive.t[rows], {name: values[rows] for name, values in drive.columns.items()}, drive.metadata
+    )
+
+
+def unexplained(drive: Drive, faults: list[Fault]) -> list[str]:
+    """Return the names of fault bits that were raised outside of any fault's time and `AFTER_S` behind.
+
+    "late" is none of them: it tells of the machine's load, and the missed periods are counted.
+    """
+    masks = fault_masks(drive) & ~LATE
+    for fault in faults:
+        masks = np.where((drive.t >= fault.t) & (drive.t < _end(fault) + AFTER_S), 0, masks)
+    return [fault.name for fault in FAULTS if (masks & fault.bit).any()]
+
+
+def _end(fault: Fault) -> float:
+    """Return when the fault is over; a killed daemon stays dead, but its absence is what is looked at."""
+    return fault.t if fault.kind == "daemon_killed" and fault.standby else fault.end
+
+
+def _first(t: NDArray[np.float64], rows: NDArray[np.bool_], since: float) -> float:
+    """Return when the first of `rows` is, in ms after `since`; NaN: none."""
+    places = np.flatnonzero(rows)
+    return 1e3 * (float(t[places[0]]) - since) if len(places) else math.nan
+
+
+def _reaction(drive: Drive, truth: Drive, fault: Fault) -> Reaction:
+    masks, mode = fault_masks(drive), drive.column("mode")
+    end = _end(fault)
+    within = (drive.t >= fault.t) & (drive.t < end + AFTER_S)
+    before = np.flatnonzero(drive.t < fault.t)
+    usual = int(masks[before[-1]]) if len(before) else 0
+    raised = within & ((masks & ~usual) != 0)
+    bits = []
+    for one in FAULTS:
+        after = _first(drive.t, raised & ((masks & ~usual & one.bit) != 0), fault.t)
+        if math.isfinite(after):
+            bits.append((one.name, after))
+    worst = int(np.nanmax(mode[within])) if within.any() else 0
+    deaf = truth.column("demand_heard") == 0.0
+    concerned = deaf & (truth.t >= max(fault.t, FIRST_HEARD_S)) & (truth.t < end + AFTER_S)
+    period = float(np.median(np.diff(truth.t)))
+    return Reaction(
+        kind=fault.kind,
+        what=", ".join([*fault.message, *fault.signal]),
+        t=fault.t,
+        duration=end - fault.t,
+        bits=sorted(bits, key=lambda bit: bit[1]),
+        mode=MODES[worst],
+        mode_after=_first(drive.t, within & (mode == worst) & (mode >= DEGRADED), fault.t),
+        fallback=1e3 * period * float(np.count_nonzero(concerned)),
+        fallback_after=_first(truth.t, concerned, fault.t),
+        recovered=_recovered(drive, truth, fault, usual),
+    )
+
+
+def _recovered(drive: Drive, truth: Drive, fault: Fault, usual: int) -> float:
+    """Return when the last trace of the fault was gone, in ms after its end."""
+    since = fault.t if fault.kind == "daemon_killed" else _end(fault)
+    if math.isinf(since):
+        return math.nan
+    wrong = ((fault_masks(drive) & ~usual) != 0) | (drive.column("mode") >= DEGRADED)
+    wrong &= (drive.t >= since) & (drive.t < since + AFTER_S + SHOWN_S)
+    deaf = (truth.column("demand_heard") == 0.0) & (truth.t >= since) & (truth.t < since + AFTER_S + SHOWN_S)
+    lasts = [float(t[rows][-1]) for t, rows in ((drive.t, wrong), (truth.t, deaf)) if rows.any()]
+    if not lasts:
+        return 0.0
+    last = max(lasts)
+    return math.nan if last >= min(drive.t[-1], truth.t[-1]) - 0.02 else 1e3 * (last - since) + 10.0

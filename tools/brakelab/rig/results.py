@@ -1,0 +1,111 @@
+"""Results of a rig's drive as files, whether it was driven in real time or in memory."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakelab.closed_loop import START_NS, Loop, write_columns
+from brakelab.closed_loop import Drive as Simulated
+from brakelab.replay.engine import Rows, new_ecu
+from brakelab.replay.log import replay_log
+from brakelab.replay.quality import Findings
+from brakelab.replay.source import load_source
+from brakelab.results import ResultWriter
+from ecu import __version__
+from ecu.bus.receive import Reception
+from ecu.config import Config, config_hash, new_params
+from ecu.recorder import Recording, candump_lines, read_recording
+from ecu.signals import CYCLE_NS, INPUT_SIGNALS, MOTOR_TORQUE, N_OUTPUTS, OUTPUT_COLUMNS
+
+
+class Frames(NamedTuple):
+    """What became of the vehicle's frames."""
+
+    received: int = 0
+    rejected: int = 0
+    """By E2E: checksum, sequence, repeated, length."""
+    lost: int = 0
+    """As the counters tell, or dropped by the kernel."""
+
+    def plus(self, reception: Reception, dropped: int) -> "Frames":
+        """Return the sum with another run's."""
+        ours = reception.messages[reception.messages["accepted"] > 0]
+        rejected = int(reception.totals[0]["rejected"])
+        lost = int(ours["lost"].sum()) + dropped
+        return Frames(self.received + int(ours["received"].sum()), self.rejected + rejected, self.lost + lost)
+
+
+class Written(NamedTuple):
+    """One drive's results."""
+
+    result: Path
+    frames: Frames
+    differing: int
+    """Values that a replay of the recorded frames did not give again; in memory nothing is replayed."""
+
+
+def _provenance(writer: ResultWriter, config: Config, start_ns: int) -> None:
+    writer.provenance = {
+        "version": __version__,
+        "vehicle": config.name,
+        "observer": config.observer.kind,
+        "config_hash": config_hash(config),
+        "start_time_ns": str(start_ns),
+    }
+
+
+def write_simulated(loop: Loop, drive: Simulated, config: Config, out: Path) -> Written:
+    """Write frames.log, truth.parquet and result.parquet of a drive in memory."""
+    result = out / "result.parquet"
+    (out / "frames.log").write_bytes(candump_lines(drive.frames, "can0"))
+    write_columns(out / "truth.parquet", drive.t, drive.truth, {"start_time_ns": str(START_NS)})
+    motors = [_held(drive.inputs[signal.name]) for signal in INPUT_SIGNALS[MOTOR_TORQUE : MOTOR_TORQUE + 4]]
+    rows = np.column_stack([*(drive.outputs[name] for name in OUTPUT_COLUMNS), *motors])
+    lives = np.isfinite(drive.outputs["mode"])
+    with ResultWriter(result, new_params(config)) as writer:
+        _provenance(writer, config, START_NS)
+        writer.write(drive.t[lives], rows[lives])
+    return Written(result, Frames().plus(loop.sides.ecu_reception, 0), 0)
+
+
+def _held(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a column whose gaps keep the last value."""
+    places = np.maximum.accumulate(np.where(np.isfinite(values), np.arange(len(values)), 0))
+    return values[places]
+
+
+def write_recorded(recordings: Iterable[Path], config: Config, out: Path) -> Written:
+    """Replay what the daemons recorded, one after the other, into result.parquet; compare every value."""
+    result, source = out / "result.parquet", load_source(None)
+    frames, differing, start_ns, last_ns = Frames(), 0, 0, 0
+    params = new_params(config)
+    with ResultWriter(result, params) as writer:
+        for folder in recordings:
+            recording, findings = read_recording(folder), Findings(folder)
+            ecu = new_ecu(params, None)
+            blocks = list(replay_log(folder, ecu, source, None, findings, lambda size: None))
+            differing += _differing(recording, blocks)
+            assert findings.reception is not None
+            frames = frames.plus(findings.reception, int(recording.cycles["dropped"][-1]))
+            for rows in blocks:
+                start_ns = start_ns or int(rows.t_ns[0])
+                if not writer.provenance:
+                    _provenance(writer, config, start_ns)
+                later = rows.t_ns >= last_ns + CYCLE_NS // 2  # a standby goes on where the first one ended
+                if later.any():
+                    t = np.array(1e-9 * (rows.t_ns[later] - start_ns), np.float64)
+                    writer.write(np.round(t, 9), rows.values[later])
+                    last_ns = int(rows.t_ns[-1])
+    return Written(result, frames, differing)
+
+
+def _differing(recording: Recording, blocks: list[Rows]) -> int:
+    """Return how many of the values that the daemon computed replay did not give again, bit by bit."""
+    live = np.ascontiguousarray(recording.outputs).view(np.float64).reshape(len(recording.outputs), -1)
+    again = np.concatenate([rows.values[:, :N_OUTPUTS] for rows in blocks])
+    if live.shape != again.shape:
+        return max(live.size, again.size)
+    return int(np.count_nonzero((live != again) & ~(np.isnan(live) & np.isnan(again))))
