@@ -68,9 +68,10 @@ def unexplained(drive: Drive, faults: list[Fault]) -> list[str]:
     "late" is none of them: it tells of the machine's load, and the missed periods are counted.
     """
     masks = fault_masks(drive) & ~LATE
+    rises = masks & ~np.concatenate([[0], masks[:-1]])
     for fault in faults:
-        masks = np.where((drive.t >= fault.t) & (drive.t < _end(fault) + AFTER_S), 0, masks)
-    return [fault.name for fault in FAULTS if (masks & fault.bit).any()]
+        rises[(drive.t >= fault.t) & (drive.t < _end(fault) + AFTER_S)] = 0
+    return [fault.name for fault in FAULTS if (rises & fault.bit).any()]
 
 
 def _end(fault: Fault) -> float:
