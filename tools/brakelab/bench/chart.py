@@ -41,7 +41,7 @@ def _ticks(low: float, high: float) -> NDArray[np.float64]:
     power = 10.0 ** np.floor(np.log10(raw))
     step = power * min((1.0, 2.0, 2.5, 5.0, 10.0), key=lambda nice: abs(nice - raw / power))
     ticks: NDArray[np.float64] = np.arange(np.ceil(low / step - 1e-9), high / step + 1e-9) * step
-    return ticks
+    return ticks + 0.0  # no -0
 
 
 def _draw(panel: Panel, left: float, top: float) -> list[str]:

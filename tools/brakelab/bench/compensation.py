@@ -287,7 +287,7 @@ def _over_time(title: str, runs: dict[str, Run]) -> list[Panel]:
     return [
         Panel(f"{title}: deceleration [m/s²]", "t [s]", (0.0, end), (0.0, 6.0), lines),
         Panel(
-            f"{title}: friction, true and estimated; rear above", "t [s]", (0.0, end), (0.3, 0.7), friction
+            f"{title}: friction, rear above", "t [s]", (0.0, end), (0.3, 0.7), friction
         ),
     ]
 

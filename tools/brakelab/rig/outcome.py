@@ -100,7 +100,7 @@ def outcome(
         nrmse_rear=accuracy["rear"].nrmse,
         stopping_distance=stopping_distance(own),
         undisturbed=undisturbed,
-        unexplained=unexplained(from_start, faults),
+        unexplained=unexplained(from_start, own, faults),
         reactions=reactions(from_start, own, faults),
         frames=written.frames,
         differing=written.differing,

@@ -17,6 +17,7 @@ AFTER_S = 3.0
 """What shows up this long after the end of a fault still counts as its consequence."""
 FIRST_HEARD_S = 0.05
 """The vehicle sets off at the ECU's first frame: from then on it has heard demands."""
+HELD_UP_S = 0.05
 SHOWN_S = 1.0
 """A passing fault of the service shows its bit for so long."""
 
@@ -62,15 +63,20 @@ def _until(drive: Drive, limit: float) -> Drive:
     )
 
 
-def unexplained(drive: Drive, faults: list[Fault]) -> list[str]:
+def unexplained(drive: Drive, truth: Drive, faults: list[Fault]) -> list[str]:
     """Return the names of fault bits that were raised outside of any fault's time and `AFTER_S` behind.
 
-    "late" is none of them: it tells of the machine's load, and the missed periods are counted.
+    What the machine's load does is none of them: "late", and what is missed where the vehicle was held up
+    for more than `HELD_UP_S`.
     """
     masks = fault_masks(drive) & ~LATE
+    rises = masks & ~np.concatenate([[0], masks[:-1]])
     for fault in faults:
-        masks = np.where((drive.t >= fault.t) & (drive.t < _end(fault) + AFTER_S), 0, masks)
-    return [fault.name for fault in FAULTS if (masks & fault.bit).any()]
+        rises[(drive.t >= fault.t) & (drive.t < _end(fault) + AFTER_S)] = 0
+    rises[drive.t > truth.t[-1]] = 0  # the vehicle writes its files
+    for place in np.flatnonzero(np.diff(truth.t) > HELD_UP_S):
+        rises[(drive.t >= truth.t[place]) & (drive.t < truth.t[place + 1] + SHOWN_S)] = 0
+    return [fault.name for fault in FAULTS if (rises & fault.bit).any()]
 
 
 def _end(fault: Fault) -> float:
