@@ -152,7 +152,7 @@ REFUSED: dict[str, tuple[str, str | None, str]] = {
         "1 frames on can0: no intact frame (1 rejected) that is expected (",
     ),
     "empty log": ("drive.log", "", "line 1: the file is empty"),
-    "another format by content": ("drive.log", "date Mon\nbase hex\n", "line 1: no candump log"),
+    "another format by content": ("drive.log", "date Mon\nbase hex\n", "line 1: this is a Vector ASC log"),
     "another format by name": ("drive.blf", "LOGG", "unknown kind of log .blf; replay reads candump .log"),
     "no suffix": ("drive", "LOGG", "unknown kind of log (no suffix)"),
     "NaN as time": ("drive.csv", "t,accel_x\nnan,1\n", "line 2, t: time is missing"),
