@@ -25,7 +25,7 @@ Block = TypeVar("Block")
 
 N_ROW: Final = N_OUTPUTS + 4
 """A row: the outputs as a vector, then the four motor torques as received [N m], NaN where not usable."""
-BLOCK_CYCLES: Final = 4096
+BLOCK_CYCLES: Final = 16384
 
 _EVERYTHING: Final = 1 << 62
 # Where a run stands between two calls of its kernel: place in the block, cycles done of the chunk, whether

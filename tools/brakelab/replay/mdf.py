@@ -8,7 +8,9 @@ microseconds, as the ECU has them. `BusChannel` n becomes interface number n.
 asammdf is in an extra: where it is installed, `import can` takes longer (see `ecu/bus/__init__.py`).
 """
 
+import gc
 import logging
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
@@ -45,14 +47,21 @@ class Measurement:
         except ImportError:
             raise UserError(str(path), "", "MDF4 needs asammdf: pip install 'brake-ecu[mdf]'") from None
         logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # the same, in one line, comes from here
+        # Where its constructor fails its destructor does so too, and Python would print that.
+        hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
         try:
-            measurement: Any = MDF
-            self._mdf: Any = measurement(path, process_bus_logging=False)
-        except Exception as error:  # a damaged file makes it raise anything
-            reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-            raise UserError(
-                str(path), "", f"no readable MDF4 file ({reason}); save it again where it was recorded"
-            ) from None
+            try:
+                measurement: Any = MDF
+                self._mdf: Any = measurement(path, process_bus_logging=False)
+                return
+            except Exception as error:  # a damaged file makes it raise anything
+                reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+            gc.collect()
+        finally:
+            sys.unraisablehook = hook
+        raise UserError(
+            str(path), "", f"no readable MDF4 file ({reason}); save it again where it was recorded"
+        )
 
     def channels(self) -> Iterator[tuple[str, int, int]]:
         """Yield name, group and place in it of every channel."""

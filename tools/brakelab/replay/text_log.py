@@ -180,15 +180,9 @@ def read_text(
                 read += count
                 if at_header:
                     end = int(np.argmax(text == 0x0A))
-                    note_line(
-                        SKIPPED
-                        if header(text[:end].tobytes().decode("utf-8", "replace").strip())
-                        else DAMAGED,
-                        counts[0],
-                        lines,
-                        frames["data"],
-                        0,
-                    )
+                    counts["line"] += 1
+                    if not header(text[:end].tobytes().decode("utf-8", "replace").strip()):
+                        quality.note_damage(1, f"line {counts[0]['line']}")
                     text = text[end + 1 :]
                 if counts[0]["damaged"]:
                     quality.note_damage(int(counts[0]["damaged"]), f"line {counts[0]['first']}")
