@@ -14,6 +14,8 @@ from brakelab.bench.log_formats import FORMATS, convert, messages, write, write_
 from brakelab.replay.command import replay
 from brakelab.replay.formats import format_of, kind_of, read_frames
 from brakelab.replay.log_quality import LogQuality
+from brakelab.replay.quality import Findings
+from brakelab.replay.source import only_interface
 from brakelab.results import read_result
 from ecu.errors import UserError
 from ecu.records import RecordArray
@@ -83,6 +85,18 @@ def test_logs_of_can_logconvert(tmp_path: Path, end: str) -> None:
     expected, frames = read(head)[0], read(out)[0]
     np.testing.assert_array_equal(frames["data"], expected["data"])
     np.testing.assert_array_equal(np.diff(frames["stamp_ns"]), np.diff(expected["stamp_ns"]))
+
+
+@pytest.mark.parametrize("end", FORMATS)
+@pytest.mark.parametrize("name", ["can1", "2"])
+def test_a_bus_is_chosen_by_its_interface_or_channel(kona: dict[str, Path], end: str, name: str) -> None:
+    findings = Findings(kona[end])
+    blocks = read_frames(kona[end], findings.interfaces, findings.log)
+    chosen = np.concatenate(list(only_interface(blocks, name, findings)))
+    expected = [line for line in kona["sorted"].read_text().splitlines() if " can1 " in line]
+    assert len(chosen) == len(expected) < findings.log.frames
+    assert [f"{can_id:03X}" for can_id in chosen["can_id"]] == [line.split()[2][:3] for line in expected]
+    assert findings.other_interfaces == findings.log.frames - len(expected)
 
 
 @pytest.mark.parametrize("end", TEXT)

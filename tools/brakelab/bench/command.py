@@ -15,7 +15,7 @@ from brakelab.bench import codec, cycle, plant, step
 from brakelab.bench import stops as stops_bench
 from brakelab.bench.energy import energy_tables
 from brakelab.bench.friction import friction_tables
-from brakelab.bench.measure import Figure, Row, machine
+from brakelab.bench.measure import NOT_INSTALLED, Figure, Row, machine
 from brakelab.bench.observers import Sample, Task, observer_rows, step_times, tasks
 from brakelab.bench.observers_cases import configured
 from brakelab.bench.observers_picture import PICTURED, consistency_of, write_picture
@@ -54,6 +54,13 @@ ENERGY: Final = "energy"
 ENERGY_TEXT: Final = (
     "Every scenario of config/scenarios in closed loop with the ECU of config/suv.toml. The simulated "
     "vehicle sums what leaves and enters in its own steps (tools/brakelab/plant/energy.py)."
+)
+
+
+REPLAY: Final = "replay"
+REPLAY_TEXT: Final = (
+    "One drive of ten minutes in closed loop (config/scenarios/ordinary.toml) as a log of every format, "
+    "written by python-can and asammdf."
 )
 
 
@@ -99,7 +106,8 @@ def bench(name: str | None, json: bool, seeds: int = 20) -> int:
     """Run one bench, or without a name all that measure time; print tables, or JSON. Returns 0.
 
     In a checkout, a run of all times renews docs/benchmarks.md, `stops` docs/observer-accuracy.md,
-    `observers` docs/observers.md, `friction` docs/friction.md and `energy` docs/energy.md. `seeds`: how many
+    `observers` docs/observers.md, `friction` docs/friction.md, `energy` docs/energy.md and `replay`
+    docs/replay-speed.md. `seeds`: how many
     cars `stops` and `observers` draw.
 
     Raises:
@@ -110,6 +118,7 @@ def bench(name: str | None, json: bool, seeds: int = 20) -> int:
         OBSERVERS: partial(_observers, seeds=seeds),
         FRICTION: _friction,
         ENERGY: _energy,
+        REPLAY: _replay,
     }
     if name is not None and name not in (*BENCHES, *others):
         raise UserError("bench", name, f"no such bench; choose one of {', '.join((*BENCHES, *others))}")
@@ -188,13 +197,23 @@ def _energy(json: bool) -> int:
     return _page(ENERGY, "Where the energy goes", ENERGY_TEXT, tables, json)
 
 
-def _page(name: str, title: str, text: str, tables: list[Table], json: bool) -> int:
+def _replay(json: bool) -> int:
+    try:
+        from brakelab.bench.replay import replay_tables
+    except ImportError:
+        raise UserError("bench", REPLAY, NOT_INSTALLED.format("asammdf")) from None
+    return _page(
+        REPLAY, "Speed of replay", f"{machine()}. {REPLAY_TEXT}", replay_tables(), json, "replay-speed"
+    )
+
+
+def _page(name: str, title: str, text: str, tables: list[Table], json: bool, file: str = "") -> int:
     of = f"`brake-ecu bench {name}`, version {__version__}"
     if json:
         _print_json({"of": of, "tables": [table._asdict() for table in tables]})
         return 0
     _print_tables(of, tables)
-    _write(f"{name}.md", title, f"{of}. {text}", tables)
+    _write(f"{file or name}.md", title, f"{of}. {text}", tables)
     return 0
 
 

@@ -76,7 +76,7 @@ def bus_logging(kind: str, frames: RecordArray, interfaces: list[str]) -> NDArra
     return samples
 
 
-def write_mdf(out: Path, frames: RecordArray, interfaces: list[str], compression: int = 2) -> Path:
+def write_mdf(out: Path, frames: RecordArray, interfaces: list[str], compression: Any = 2) -> Path:
     """Write MDF4 bus logging: a group of data frames for each interface, and one of error frames."""
     start_ns = int(frames["stamp_ns"].min()) // 1000 * 1000
     source = Source("CAN", "CAN", "", mdf_constants.SOURCE_BUS, mdf_constants.BUS_TYPE_CAN)
@@ -91,5 +91,6 @@ def write_mdf(out: Path, frames: RecordArray, interfaces: list[str], compression
                 samples = bus_logging(kind, frames[chosen], interfaces)
                 t = (frames["stamp_ns"][chosen] - start_ns) * 1e-9
                 mdf.append(Signal(samples, t, name=kind, source=source))
-        mdf.save(out, overwrite=True, compression=compression)
+        level: Any = compression
+        mdf.save(out, overwrite=True, compression=level)
     return out
