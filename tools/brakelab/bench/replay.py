@@ -28,7 +28,7 @@ from brakelab.replay.formats import read_frames
 from brakelab.replay.log_quality import LogQuality
 from brakelab.scenario import load_scenario
 from ecu.bus.freshness import begin_cycle, end_cycle
-from ecu.bus.receive import contract_receive_plan, new_reception, receive
+from ecu.bus.receive import ReceivePlan, contract_receive_plan, new_reception, receive
 from ecu.config import load_config, new_params
 from ecu.recorder import candump_lines
 from ecu.records import INPUTS, OUTPUTS, RecordArray, new_record
@@ -59,8 +59,7 @@ def _blocks(log: Path) -> Iterator[RecordArray]:
     return read_frames(log, [], LogQuality())
 
 
-def _decode(log: Path) -> None:
-    plan = contract_receive_plan(resource(_DBC))
+def _decode(log: Path, plan: ReceivePlan) -> None:
     reception, inputs = new_reception(plan), new_record(INPUTS)
     inputs["t_ns"] = np.iinfo(np.int64).max
     for block in _blocks(log):
@@ -159,8 +158,8 @@ def _tables(folder: Path, rounds: int, scenario: str, part_s: float) -> list[Tab
     whole, few, out = len(frames), len(part), folder / "out.parquet"
     bus, codec, mdf = installed("python-can"), installed("cantools"), installed("asammdf")
 
-    def python() -> PythonEcu:
-        return PythonEcu(None, params, (0,))  # type: ignore[arg-type]
+    plan = contract_receive_plan(resource(_DBC))
+    ecu = PythonEcu(None, params, (0,))  # type: ignore[arg-type]
 
     reading: dict[str, tuple[Task, Task | None, str, str]] = {}
     for end, log in logs.items():
@@ -171,15 +170,14 @@ def _tables(folder: Path, rounds: int, scenario: str, part_s: float) -> list[Tab
             peer = _task(lambda log=parts[end]: sum(1 for _ in _messages(log)), few)  # type: ignore[misc]
             note = bus
         reading[f"{_NAMES[end]}: frames"] = (ours, peer, "µs", note)
-    ecu = python()
     reading["candump: signals"] = (
-        _task(lambda: _decode(logs[".log"]), whole),
+        _task(lambda: _decode(logs[".log"], plan), whole),
         _task(lambda: _python_decode(parts[".log"], ecu), few),
         "µs",
         f"{bus}, {codec}",
     )
     reading["MDF4: signals"] = (
-        _task(lambda: _decode(logs[".mf4"]), whole),
+        _task(lambda: _decode(logs[".mf4"], plan), whole),
         _task(lambda: _asammdf_decode(parts[".mf4"]), few),
         "µs",
         f"{mdf}, extract_bus_logging",
@@ -187,10 +185,11 @@ def _tables(folder: Path, rounds: int, scenario: str, part_s: float) -> list[Tab
     replays: dict[str, tuple[Task, Task | None, str, str]] = {}
     for end, log in logs.items():
         ours = _task(lambda log=log: _replay(log, out), cycles)  # type: ignore[misc]
-        other = None
+        other, note = None, mdf
         if end != ".mf4":
-            other = _task(lambda log=parts[end]: _python_replay(log, python()), part_cycles)  # type: ignore[misc]
-        replays[_NAMES[end]] = (ours, other, "µs", f"{bus}, {codec}, numpy: four filters only")
+            note = f"{bus}, {codec}, numpy: four filters only"
+            other = _task(lambda log=parts[end]: _python_replay(log, ecu), part_cycles)  # type: ignore[misc]
+        replays[_NAMES[end]] = (ours, other, "µs", note)
     steps = _inputs_of_cycles(logs[".log"])
     replays["step alone"] = (_task(lambda: _step(steps, params), len(steps)), None, "µs", "the bound")
     read_rows, replay_rows = _rows(reading, rounds), _rows(replays, rounds)

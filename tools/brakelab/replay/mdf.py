@@ -19,7 +19,7 @@ from typing import Any, Final, Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.replay.log_quality import FrameBlock, LogQuality
+from brakelab.replay.log_quality import BLOCK_FRAMES, FrameBlock, LogQuality
 from brakelab.replay.text_log import FD_LENGTHS
 from ecu.errors import UserError
 from ecu.records import FRAME, FRAME_ERROR, FRAME_EXTENDED, FRAME_FD, FRAME_REMOTE, RecordArray
@@ -165,8 +165,9 @@ def read_mdf(
     read = 0
     try:
         for ready in in_step(sources, lambda block: block["frame"]["stamp_ns"]):
-            merged = np.concatenate([block for _, block in ready])
+            merged = ready[0][1]
             if len(ready) > 1:
+                merged = np.concatenate([block for _, block in ready])
                 rising = [np.maximum.accumulate(block["frame"]["stamp_ns"]) for _, block in ready]
                 merged = merged[np.argsort(np.concatenate(rising), kind="stable")]
             read += len(merged)
@@ -210,17 +211,19 @@ def _frames(
                 }
                 stamps = parts["ID"].timestamps
                 columns = {name: part.samples for name, part in parts.items()}
-            block = np.zeros(len(stamps), _PLACED)
-            block["place"] = np.arange(first, first + len(stamps))
-            block["frame"]["stamp_ns"] = start_ns + np.rint(stamps * 1e6).astype(np.int64) * 1000
-            _fill(block["frame"], columns, _KINDS[kind])
         except Exception as error:  # a damaged file makes asammdf raise anything
             quality.cut = f"record {first} of group {group}: cannot be read ({error}), the rest is missing"
             return
-        if not len(block):
+        if not len(stamps):
             quality.cut = f"record {first} of group {group}: {rows - first} records are missing"
             return
-        yield block
+        for begin in range(0, len(stamps), BLOCK_FRAMES):
+            part = slice(begin, begin + BLOCK_FRAMES)
+            block = np.zeros(len(stamps[part]), _PLACED)
+            block["place"] = np.arange(first + begin, first + begin + len(block))
+            block["frame"]["stamp_ns"] = start_ns + np.rint(stamps[part] * 1e6).astype(np.int64) * 1000
+            _fill(block["frame"], {name: column[part] for name, column in columns.items()}, _KINDS[kind])
+            yield block
 
 
 def _fill(frames: RecordArray, columns: dict[str, NDArray[Any]], kind: int) -> None:
@@ -235,7 +238,9 @@ def _fill(frames: RecordArray, columns: dict[str, NDArray[Any]], kind: int) -> N
     frames["flags"] = kind | FRAME_EXTENDED * extended | FRAME_FD * flag("EDL")
     frames["bus"] = columns["BusChannel"].astype(np.int64) & 0xFF if "BusChannel" in columns else 1
     data = columns.get("DataBytes", np.zeros((len(frames), 0), np.uint8))
-    width = data.shape[1] if data.ndim == 2 else 0
+    if data.ndim == 1:  # bytes of one length as a word each
+        data = np.ascontiguousarray(data).view(np.uint8).reshape(len(frames), -1)
+    width = data.shape[1]
     if "DataLength" in columns:
         length = columns["DataLength"].astype(np.int64)
     elif "DLC" in columns:
