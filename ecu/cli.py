@@ -174,7 +174,11 @@ def rig(
 def replay(
     logs: Annotated[
         list[Path],
-        typer.Argument(metavar="LOG…", help="One drive: CAN logs, or Parquet or CSV of signals, in order"),
+        typer.Argument(
+            metavar="LOG…",
+            help="One drive, in order: logs of CAN frames (.log .asc .blf .trc .mf4) or "
+            "of signals (.mf4 .parquet .csv)",
+        ),
     ],
     config: Config,
     out: Annotated[Path, typer.Option("--out", metavar="RESULT.parquet", help="Results, one row per 10 ms")],
@@ -199,7 +203,12 @@ def replay(
 
 @app.command()
 def play(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="A CAN log, or Parquet or CSV of signals")],
+    log: Annotated[
+        Path,
+        typer.Argument(
+            metavar="LOG", help="Frames (.log .asc .blf .trc .mf4) or signals (.mf4 .parquet .csv)"
+        ),
+    ],
     interface: Interface,
     channel: Channel,
     map: Map = None,

@@ -208,10 +208,10 @@ def is_present(signals: Any, codes: NDArray[np.int64], row: int, data: NDArray[n
 
 
 @kernel
-def is_valid(signals: Any, codes: NDArray[np.int64], row: int, data: NDArray[np.uint8]) -> bool:
-    """Return whether the signal is available and its validity signal agrees."""
+def is_valid(signals: Any, codes: NDArray[np.int64], row: int, code: int, data: NDArray[np.uint8]) -> bool:
+    """Return whether the signal, whose `raw_code` is `code`, is available and its validity signal agrees."""
     signal = signals[row]
-    if signal.refused[1] > 0 and _listed(codes, signal.refused, raw_code(signal, data)):
+    if signal.refused[1] > 0 and _listed(codes, signal.refused, code):
         return False
     if signal.validity < 0:
         return True
@@ -219,10 +219,9 @@ def is_valid(signals: Any, codes: NDArray[np.int64], row: int, data: NDArray[np.
 
 
 @kernel
-def physical(row: Record, data: NDArray[np.uint8]) -> float:
-    """Return the signal's value in the unit of its target; a float signal may give NaN or ±inf."""
-    raw = bits.extract(data, row.start, row.length, row.big_endian)
-    return float(bits.number(raw, row.length, row.kind) * row.scale + row.offset)
+def physical(row: Record, code: int) -> float:
+    """Return what a `raw_code` is in the unit of the target; a float signal may give NaN or ±inf."""
+    return float(bits.number(np.uint64(code), row.length, row.kind) * row.scale + row.offset)
 
 
 @kernel
@@ -232,7 +231,9 @@ def decode(
     """Write every signal's value to its place; NaN where the multiplexers select others."""
     for row in range(len(signals)):
         present = is_present(signals, codes, row, data)
-        values[signals[row].place] = physical(signals[row], data) if present else np.nan
+        values[signals[row].place] = (
+            physical(signals[row], raw_code(signals[row], data)) if present else np.nan
+        )
 
 
 @kernel

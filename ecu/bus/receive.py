@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ecu.bus import bits, e2e
 from ecu.bus.database import attribute, load_database
 from ecu.bus.freshness import NEVER, accept, input_freshness, new_freshness
-from ecu.bus.plan import SIGNAL, SignalUse, compile_signals, is_present, is_valid, physical
+from ecu.bus.plan import SIGNAL, SignalUse, compile_signals, is_present, is_valid, physical, raw_code
 from ecu.jit import Record, kernel
 from ecu.records import EXTENDED_ID, FRAME_ERROR, FRAME_EXTENDED, FRAME_REMOTE, RecordArray
 from ecu.signals import INPUT, INPUT_SIGNALS, N_OUTPUTS, OUTPUT
@@ -221,8 +221,9 @@ def receive(
         for row in range(message.first, message.first + message.count):
             if is_present(plan.signals, plan.codes, row, frame.data):
                 signal = plan.signals[row]
-                valid = is_valid(plan.signals, plan.codes, row, frame.data)
-                value = physical(signal, frame.data)
+                code = raw_code(signal, frame.data)
+                valid = is_valid(plan.signals, plan.codes, row, code, frame.data)
+                value = physical(signal, code)
                 accept(inputs, reception.freshness, signal.place, value, frame.stamp_ns, valid)
     return count
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from structlog.testing import capture_logs
 
-from brakelab.replay.candump import LogQuality, read_candump
+from brakelab.replay.formats import read_frames
+from brakelab.replay.log_quality import LogQuality
 from ecu import recorder as recorder_module
 from ecu.diagnostics.store import open_store, restore
 from ecu.errors import UserError
@@ -149,7 +150,7 @@ def test_a_recording_bears_a_name_that_a_candump_log_can_bear(channel, name, tmp
     assert interface_name(channel) == name
     frames, interfaces = new_record(FRAME), []
     (tmp_path / "drive.log").write_bytes(candump_lines(frames, name))
-    assert len(next(read_candump(tmp_path / "drive.log", interfaces, LogQuality()))) == 1
+    assert len(next(read_frames(tmp_path / "drive.log", interfaces, LogQuality()))) == 1
     assert interfaces == [name]
 
 

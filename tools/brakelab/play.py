@@ -14,8 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.replay.candump import read_candump
-from brakelab.replay.log import kind_of
+from brakelab.replay.formats import kind_of, read_frames
 from brakelab.replay.progress import progress_bar
 from brakelab.replay.quality import Findings
 from brakelab.replay.signal_file import SampleBlock, freshness_at_any_rate, read_signals
@@ -100,8 +99,8 @@ def send_on_schedule(
 
 def raw_bursts(log: Path, channel: str, findings: Findings) -> Iterator[Burst]:
     """Yield the data frames of a log as they are; of several interfaces `channel`, else the first."""
-    text = read_recording(log).frames if log.is_dir() else log
-    for block in read_candump(text, findings.interfaces, findings.log):
+    path = read_recording(log).frames if log.is_dir() else log
+    for block in read_frames(path, findings.interfaces, findings.log):
         name = channel if channel in findings.interfaces else findings.interfaces[0]
         for chosen in only_interface([block], name, findings):
             frames = chosen[chosen["flags"] & (FRAME_ERROR | FRAME_REMOTE) == 0]
@@ -129,8 +128,8 @@ def contract_bursts(log: Path, source: Source, findings: Findings) -> Iterator[B
 
 
 def _decoded_frames(log: Path, source: Source, findings: Findings) -> Iterator[tuple[int, Vector]]:
-    text = read_recording(log).frames if log.is_dir() else log
-    blocks: Iterator[RecordArray] = read_candump(text, findings.interfaces, findings.log)
+    path = read_recording(log).frames if log.is_dir() else log
+    blocks: Iterator[RecordArray] = read_frames(path, findings.interfaces, findings.log)
     if source.bus:
         blocks = only_interface(blocks, source.bus, findings)
     inputs, reception = new_record(INPUTS), new_reception(source.plan)

@@ -95,7 +95,7 @@ class ResultWriter:
 
     def write(self, t: NDArray[np.float64], rows: NDArray[np.float64]) -> None:
         """Append rows: `t` [s], shape (n,), `rows` in the order of `ROW_COLUMNS`, shape (n, N_ROW)."""
-        self._open().write_table(_table(ROW_SCHEMA, [t, *rows.T]))
+        self._open().write_table(_table(ROW_SCHEMA, [t, *np.ascontiguousarray(rows.T)]))
         self.brakes.add(t, rows)
         self.rows += len(t)
 
@@ -104,7 +104,10 @@ class ResultWriter:
             schema = ROW_SCHEMA.with_metadata(_encoded(self.provenance))
             try:
                 self.path.parent.mkdir(parents=True, exist_ok=True)
-                self._file = pq.ParquetWriter(self._unfinished, schema, compression="zstd")
+                # Dictionaries of numbers that hardly ever repeat take as long as all else, and more room.
+                self._file = pq.ParquetWriter(
+                    self._unfinished, schema, compression="zstd", use_dictionary=False
+                )
             except OSError as error:
                 raise _not_written(self.path, error) from None
         return self._file

@@ -169,3 +169,16 @@ def test_unknown_bench_names_those_there_are() -> None:
         UserError, match="steps: no such bench; choose one of step, codec, plant, cycle, stops"
     ):
         command.bench("steps", json=False)
+
+
+def test_replay_tables() -> None:
+    replay = pytest.importorskip("brakelab.bench.replay")
+    reading, whole = replay.replay_tables(rounds=1, scenario="stop-2", part_s=1.0)
+    formats = ("candump", "ASC", "BLF", "TRC", "MDF4")
+    assert [row[0] for row in reading.rows] == [
+        *(f"{name}: frames" for name in formats),
+        "candump: signals",
+        "MDF4: signals",
+    ]
+    assert [row[0] for row in whole.rows] == [*formats, "step alone"]
+    assert all(name in whole.below for name in formats)

@@ -12,7 +12,8 @@ from brakelab.ecu_inputs import vehicle_frames
 from brakelab.mapping.names import corner_of, words
 from brakelab.mapping.physics import Found, fit, propose
 from brakelab.mapping.series import read_series
-from brakelab.replay.candump import LogQuality, read_candump
+from brakelab.replay.formats import read_frames
+from brakelab.replay.log_quality import LogQuality
 from ecu import cli
 from ecu.bus.database import load_database
 from ecu.bus.signal_map import load_signal_map, read_signal_map
@@ -142,7 +143,7 @@ def test_real_cars_get_what_their_maps_say(car: str) -> None:
     if log is None:
         pytest.skip(f"no log of the {car} here")
     database = load_database(resource(f"dbc/cars/{car}.dbc"), strict=False)
-    found, drives = propose(read_series(read_candump(log, [], LogQuality()), database))
+    found, drives = propose(read_series(read_frames(log, [], LogQuality()), database))
     shipped_map = read_signal_map(resource(f"config/maps/{car}.toml")).inputs
     for one in found:
         print(car, drives, one.target, one.series.name, one.factor, one.evidence)

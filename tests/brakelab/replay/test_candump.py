@@ -10,8 +10,9 @@ from can.io import CanutilsLogReader, CanutilsLogWriter
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from brakelab.replay import candump
-from brakelab.replay.candump import LogQuality, read_candump
+from brakelab.replay import text_log
+from brakelab.replay.formats import read_frames
+from brakelab.replay.log_quality import LogQuality
 from ecu.errors import UserError
 from ecu.records import FRAME_ERROR, FRAME_EXTENDED, FRAME_FD, FRAME_REMOTE, RecordArray
 
@@ -20,7 +21,7 @@ GOOD = "(1600000000.000100) can0 123#0102\n"
 
 def read(path: Path, interfaces: list[str] | None = None) -> tuple[RecordArray, LogQuality]:
     quality = LogQuality()
-    blocks = list(read_candump(path, interfaces if interfaces is not None else [], quality))
+    blocks = list(read_frames(path, interfaces if interfaces is not None else [], quality))
     return np.concatenate(blocks), quality
 
 
@@ -56,7 +57,7 @@ def test_reads_what_python_can_reads(tmp_path: Path, sent: list[can.Message]) ->
     interfaces: list[str] = []
     frames, quality = read(path, interfaces)
     expected = list(CanutilsLogReader(path))
-    assert quality.damaged_lines == 0
+    assert quality.damaged == 0
     assert len(frames) == len(expected) == quality.frames
     for frame, message in zip(frames, expected, strict=True):
         assert frame["stamp_ns"] == round(message.timestamp * 1e6) * 1000
@@ -97,7 +98,7 @@ def test_a_damaged_line_is_skipped_counted_and_named(tmp_path: Path, line: str, 
     path.write_text(GOOD + line + "\n" + GOOD.replace("123", "124") + line + "\n")
     frames, quality = read(path)
     assert [hex(i) for i in frames["can_id"]] == ["0x123", "0x124"], damage
-    assert (quality.damaged_lines, quality.first_damaged_line) == (2, 2)
+    assert (quality.damaged, quality.first_damaged) == (2, "line 2")
     assert not frames["data"][:, 2:].any()
 
 
@@ -118,7 +119,7 @@ def test_forms_of_a_line(tmp_path: Path, line: str, can_id: int, flags: int, dat
     path = tmp_path / "drive.log"
     path.write_text(line + "\n")
     (frame,), quality = read(path)
-    assert quality.damaged_lines == 0
+    assert quality.damaged == 0
     assert frame["stamp_ns"] == 1_000_000_000
     assert (frame["can_id"], frame["flags"]) == (can_id, flags)
     assert bytes(frame["data"][: frame["length"]]).hex() == data
@@ -145,7 +146,7 @@ def test_a_last_line_without_its_end_is_not_used(tmp_path: Path) -> None:
     path.write_text(GOOD * 3 + GOOD.rstrip())
     frames, quality = read(path)
     assert len(frames) == 3
-    assert quality.cut_line == 4
+    assert quality.cut.startswith("line 4: the last line is cut off")
 
 
 def test_blocks_join_without_a_seam(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -153,8 +154,8 @@ def test_blocks_join_without_a_seam(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     lines = [f"(1600000000.{k:06d}) can{k % 2} {k:03X}#{'5A' * (k % 9)}\n" for k in range(1000)]
     path.write_text("".join(lines))
     whole, _ = read(path)
-    monkeypatch.setattr(candump, "BLOCK_BYTES", 97)
-    monkeypatch.setattr(candump, "BLOCK_FRAMES", 2)
+    monkeypatch.setattr(text_log, "BLOCK_BYTES", 97)
+    monkeypatch.setattr(text_log, "BLOCK_FRAMES", 2)
     pieces, quality = read(path)
     assert pieces.tobytes() == whole.tobytes()
     assert quality.frames == 1000
@@ -181,10 +182,13 @@ def test_a_packed_log_reads_like_a_plain_one(tmp_path: Path) -> None:
     [
         (b"", "line 1: the file is empty"),
         (b"PAR1" + bytes(200), "line 1: this is a Parquet file; let its name end in .parquet"),
-        (b"date Mon Jan 1\nbase hex timestamps absolute\n", "line 1: no candump log"),
+        (b"date Mon Jan 1\nbase hex timestamps absolute\n", "line 1: this is a Vector ASC log"),
         (bytes(range(256)) * 9, "line 1: no candump log"),
         (b"(1600000000.000100) can0 123#0102", "line 1: no candump log"),
-        (GOOD.encode() + b"(1700000000.000100) can0 123#0102\n", "line 2: time jumps by more than an hour"),
+        (
+            GOOD.encode() + b"(1700000000.000100) can0 123#0102\n" * 2,
+            "line 3: time jumps by more than an hour",
+        ),
     ],
 )
 def test_what_is_no_candump_log_gives_one_line(tmp_path: Path, content: bytes, line: str) -> None:

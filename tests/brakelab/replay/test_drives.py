@@ -5,7 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from brakelab.bench.log_formats import FORMATS, convert
 from brakelab.replay.command import replay
+from brakelab.replay.formats import read_frames
+from brakelab.replay.log_quality import LogQuality
 from brakelab.replay.prediction import SHORT
 from brakelab.results import read_result
 from ecu.resources import resource
@@ -46,3 +49,30 @@ def test_nothing_is_learned_where_nothing_can_be(drives: Path, tmp_path: Path, c
         assert set(columns[f"mu_b_{corner}"]) == {0.45}
         assert not (columns[f"mode_{corner}"] == 1).any()
     assert "learned" not in brakes["learning"]
+
+
+@pytest.mark.parametrize("end", FORMATS)
+@pytest.mark.parametrize(
+    ("car", "log"), [("mustang", "mustang_s550"), ("rav4", "rav4_bus0_bus1"), ("kona", "kona")]
+)
+def test_every_format_gives_the_results_of_candump(
+    drives: Path, tmp_path: Path, car: str, log: str, end: str
+) -> None:
+    """The first 20,000 frames, in the order of their stamps: python-can's writers let no time fall."""
+    lines = (drives / car / f"{log}.candump.log").read_text().splitlines(keepends=True)[:20_000]
+    source = tmp_path / "drive.log"
+    source.write_text("".join(sorted(lines, key=lambda line: line.split()[0])))
+    other = convert(source, tmp_path / f"other{end}")
+    frames = [
+        np.concatenate(list(read_frames(path, ["can0", "can1"], LogQuality()))) for path in (source, other)
+    ]
+    if end == ".mf4":  # frames of one stamp come bus by bus
+        frames[0] = frames[0][np.lexsort((frames[0]["bus"], frames[0]["stamp_ns"]))]
+    for name in ("can_id", "flags", "bus", "length", "data"):
+        np.testing.assert_array_equal(frames[1][name], frames[0][name])
+    np.testing.assert_array_equal(np.diff(frames[1]["stamp_ns"]), np.diff(frames[0]["stamp_ns"]))
+    config = "mustang" if car == "mustang" else "suv"
+    expected, _ = run(source, car, config, tmp_path / "a.parquet")
+    found, _ = run(other, car, config, tmp_path / "b.parquet")
+    for name, column in expected.items():
+        np.testing.assert_array_equal(found[name], column, err_msg=name)

@@ -8,8 +8,9 @@ import pytest
 
 from brakelab.play import contract_bursts
 from brakelab.replay import engine
-from brakelab.replay.candump import LogQuality, read_candump
 from brakelab.replay.engine import Rows, new_ecu, run_frames, run_samples
+from brakelab.replay.formats import read_frames
+from brakelab.replay.log_quality import LogQuality
 from brakelab.replay.quality import Findings
 from brakelab.replay.signal_file import SampleBlock, freshness_at_any_rate
 from brakelab.replay.source import load_source
@@ -194,7 +195,7 @@ def test_candump_text_keeps_every_bit_of_a_frame(tmp_path: Path) -> None:
     frames = drive_frames(tmp_path, 0.5)
     path = tmp_path / "drive.log"
     path.write_bytes(candump_lines(frames, "can0"))
-    read = np.concatenate(list(read_candump(path, [], LogQuality())))
+    read = np.concatenate(list(read_frames(path, [], LogQuality())))
     assert read.tobytes() == frames.tobytes()
 
 

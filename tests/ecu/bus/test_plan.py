@@ -199,7 +199,7 @@ def test_sentinels_and_validity() -> None:
     codes = np.array(rows.codes, np.int64)
     for which, raw, valid in [(1, 4, True), (2, 4, True), (3, 4, False), (1, 0x80, False)]:
         data = np.array([which, raw, 0, 0, 0, 0, 0, 0], np.uint8)
-        assert is_valid(rows.rows, codes, 0, data) == valid, (which, raw)
+        assert is_valid(rows.rows, codes, 0, raw_code(rows.rows[0], data), data) == valid, (which, raw)
     assert raw_code(rows.rows[0], np.array([1, 0x80, 0, 0, 0, 0, 0, 0], np.uint8)) == -128
 
 

@@ -17,7 +17,7 @@ from brakelab.bench.blending import CARS, blending_tables
 from brakelab.bench.chart import write_chart
 from brakelab.bench.energy import energy_tables
 from brakelab.bench.friction import friction_tables
-from brakelab.bench.measure import Figure, Row, machine
+from brakelab.bench.measure import NOT_INSTALLED, Figure, Row, machine
 from brakelab.bench.observers import Sample, Task, observer_rows, step_times, tasks
 from brakelab.bench.observers_cases import configured
 from brakelab.bench.observers_picture import PICTURED, consistency_of, write_picture
@@ -116,6 +116,13 @@ MARGINS_TEXT: Final = (
 Car = TypeVar("Car")
 
 
+REPLAY: Final = "replay"
+REPLAY_TEXT: Final = (
+    "One drive of ten minutes in closed loop (config/scenarios/ordinary.toml) as a log of every format, "
+    "written by python-can and asammdf."
+)
+
+
 class Bench(NamedTuple):
     """One bench of times."""
 
@@ -174,6 +181,7 @@ def bench(name: str | None, json: bool, seeds: int = 20) -> int:
         COMPENSATION: _compensation,
         MARGINS: _margins,
         BLENDING: _blending,
+        REPLAY: _replay,
     }
     if name is not None and name not in (*BENCHES, *others):
         raise UserError("bench", name, f"no such bench; choose one of {', '.join((*BENCHES, *others))}")
@@ -293,6 +301,16 @@ def _margins(json: bool) -> int:
 
 def _blending(json: bool) -> int:
     return _page(BLENDING, "Motors and linings brake together", BLENDING_TEXT, blending_tables(), json)
+
+
+def _replay(json: bool) -> int:
+    try:
+        from brakelab.bench.replay import replay_tables
+    except ImportError:
+        raise UserError("bench", REPLAY, NOT_INSTALLED.format("asammdf")) from None
+    return _page(
+        REPLAY, "Speed of replay", f"{machine()}. {REPLAY_TEXT}", replay_tables(), json, "replay-speed"
+    )
 
 
 def _page(name: str, title: str, text: str, tables: list[Table], json: bool, file: str | None = None) -> int:

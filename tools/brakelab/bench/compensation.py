@@ -286,9 +286,7 @@ def _over_time(title: str, runs: dict[str, Run]) -> list[Panel]:
     end = float(max(r.drive.t[-1] for r in runs.values()))
     return [
         Panel(f"{title}: deceleration [m/s²]", "t [s]", (0.0, end), (0.0, 6.0), lines),
-        Panel(
-            f"{title}: friction, rear above", "t [s]", (0.0, end), (0.3, 0.7), friction
-        ),
+        Panel(f"{title}: friction, rear above", "t [s]", (0.0, end), (0.3, 0.7), friction),
     ]
 
 

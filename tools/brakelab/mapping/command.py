@@ -12,8 +12,9 @@ from rich.table import Table
 from brakelab.mapping.names import converts, words
 from brakelab.mapping.physics import RADIUS, Found, propose
 from brakelab.mapping.series import Series, read_series
-from brakelab.replay.candump import LogQuality, read_candump
 from brakelab.replay.command import WIDTH
+from brakelab.replay.formats import read_frames
+from brakelab.replay.log_quality import LogQuality
 from ecu.bus.database import load_database
 from ecu.bus.signal_map import load_signal_map
 from ecu.bus.units import spelled
@@ -35,7 +36,7 @@ def suggest(log: Path, dbc: Path, out: Path | None) -> int:
     """
     database, strict = _load(dbc)
     interfaces: list[str] = []
-    series = read_series(read_candump(log, interfaces, LogQuality()), database)
+    series = read_series(read_frames(log, interfaces, LogQuality()), database)
     found, drives = propose(series)
     if not found:
         raise RunFault(f"{log}: no four wheel speeds that {dbc} names; is it the database of this car?")

@@ -3,58 +3,24 @@
 A line is `(seconds.fraction) interface ID#BYTES`: three hexadecimal digits for an 11-bit identifier, eight
 for a 29-bit one (or, with 0x20000000 set, an error frame), `##F` and up to 64 bytes for a CAN FD frame with
 flags F, `#R` for a remote frame, optionally followed by ` R` or ` T` for its direction.
-A damaged line is skipped and counted; a last line without its end is never used: its bytes may be missing.
 """
 
-import gzip
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Final, cast
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ecu.errors import UserError
+from brakelab.replay.log_quality import FrameBlock, LogQuality
+from brakelab.replay.text_log import DAMAGED, DATA, HEX, IS_FD_LENGTH, SKIPPED, note_line, read_text
 from ecu.jit import Record, kernel
-from ecu.records import FRAME, FRAME_ERROR, FRAME_EXTENDED, FRAME_FD, FRAME_REMOTE, RecordArray
+from ecu.records import FRAME_ERROR, FRAME_EXTENDED, FRAME_FD, FRAME_REMOTE, RecordArray
 
 EXAMPLE: Final = "(1600000820.298000) can0 085#7C33800047E07C7F"
-BLOCK_BYTES: Final = 1 << 22
-BLOCK_FRAMES: Final = 1 << 16
 MAX_INTERFACES: Final = 16
 MAX_NAME: Final = 16  # IFNAMSIZ
-# A step of the clock beyond this is no gap in the drive but a wrong stamp or two logs in one file.
-MAX_JUMP_NS: Final = 3_600_000_000_000
-
-_HEX = np.full(256, 255, np.uint8)
-for _place, _digit in enumerate(b"0123456789ABCDEF"):
-    _HEX[_digit] = _HEX[ord(chr(_digit).lower())] = _place
-# Payload lengths that CAN FD knows.
-_FD_LENGTH = np.zeros(65, np.bool_)
-_FD_LENGTH[[0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64]] = True
-
-_COUNTS: Final = np.dtype(
-    [
-        (name, "i8")
-        for name in ("line", "frames", "damaged", "first", "backwards", "repeated", "jump", "last_ns")
-    ]
-    + [("last_on_ns", "i8", (MAX_INTERFACES,))]
-)
-
-
-@dataclass
-class LogQuality:
-    """What was found wrong in a CAN log; line numbers count from 1, 0: none."""
-
-    frames: int = 0
-    damaged_lines: int = 0
-    first_damaged_line: int = 0
-    cut_line: int = 0
-    """The last line, if its end is missing."""
-    stamps_backwards: int = 0
-    """Against the frame before on the same interface, as `stamps_repeated`."""
-    stamps_repeated: int = 0
+_USUAL: Final = 20 + MAX_NAME + 1 + 9 + 16 + 2  # bytes of a line as a logger writes it, at most
 
 
 @kernel
@@ -74,6 +40,17 @@ def _interface(text: NDArray[np.uint8], start: int, end: int, names: NDArray[np.
         if same:
             return place
     return -1
+
+
+@kernel
+def _name_of(text: NDArray[np.uint8], at: int) -> int:
+    """Return where the interface of a line that is good begins."""
+    while text[at] != 0x29:
+        at += 1
+    at += 1
+    while text[at] == 0x20:
+        at += 1
+    return at
 
 
 @kernel
@@ -118,8 +95,8 @@ def _parse_line(
         at += 1
     first = at
     can_id = np.int64(0)
-    while at < end and _HEX[text[at]] < 16 and at - first < 9:
-        can_id = 16 * can_id + np.int64(_HEX[text[at]])
+    while at < end and HEX[text[at]] < 16 and at - first < 9:
+        can_id = 16 * can_id + np.int64(HEX[text[at]])
         at += 1
     digits = at - first
     if at >= end or text[at] != 0x23 or (digits != 3 and digits != 8):
@@ -145,17 +122,17 @@ def _parse_line(
         if at < end and text[at] == 0x23:
             flags |= FRAME_FD
             limit = 64
-            if at + 1 >= end or _HEX[text[at + 1]] > 15:
+            if at + 1 >= end or HEX[text[at + 1]] > 15:
                 return False
             at += 2
         while at + 1 < end and length < limit:
-            high, low = _HEX[text[at]], _HEX[text[at + 1]]
+            high, low = HEX[text[at]], HEX[text[at + 1]]
             if high > 15 or low > 15:
                 break
             data[length] = 16 * high + low
             length += 1
             at += 2
-        if limit == 64 and not _FD_LENGTH[length]:
+        if limit == 64 and not IS_FD_LENGTH[length]:
             return False
     while at < end and (text[at] == 0x20 or text[at] == 0x0D):
         at += 1
@@ -177,128 +154,129 @@ def _parse_line(
 
 
 @kernel
-def parse_candump(
-    text: NDArray[np.uint8],
-    frames: RecordArray,
-    data: NDArray[np.uint8],
-    names: NDArray[np.uint8],
-    counts: Record,
+def _parse_usual(
+    text: NDArray[np.uint8], at: int, name: int, frame: Record, data: NDArray[np.uint8]
 ) -> tuple[int, int]:
-    """Parse whole lines until the text or the room in `frames` (zeroed; `data` its payloads) ends.
+    """Parse a line as a logger writes it: ten digits, six digits, the interface of the line before (which
+    begins at `name`), a data frame of at most eight bytes.
 
-    Returns how many bytes were used and how many frames written.
+    `text` has `_USUAL` bytes from `at` on. Returns where the line ends (-1: it has another form) and where
+    its interface begins.
     """
+    if text[at] != 0x28 or text[at + 11] != 0x2E or text[at + 18] != 0x29 or text[at + 19] != 0x20:
+        return -1, 0
+    seconds, fraction, wrong = np.int64(0), np.int64(0), np.int64(0)
+    for i in range(at + 1, at + 11):
+        digit = np.int64(text[i]) - 48
+        wrong |= digit | digit + 6
+        seconds = 10 * seconds + digit
+    for i in range(at + 12, at + 18):
+        digit = np.int64(text[i]) - 48
+        wrong |= digit | digit + 6
+        fraction = 10 * fraction + digit
+    if wrong & ~15:
+        return -1, 0
+    at += 20
+    own = at
+    while text[at] == text[name] and text[at] != 0x20 and at - own < MAX_NAME:
+        at += 1
+        name += 1
+    if text[at] != 0x20 or text[name] != 0x20:
+        return -1, 0
+    at += 1
+    can_id, wrong = np.int64(0), np.int64(0)
+    first = at
+    while text[at] != 0x23 and at - first < 8:
+        digit = np.int64(HEX[text[at]])
+        wrong |= digit
+        can_id = 16 * can_id + digit
+        at += 1
+    standard = at - first == 3
+    if text[at] != 0x23 or wrong & ~15 or not (standard or at - first == 8):
+        return -1, 0
+    if can_id > (0x7FF if standard else 0x1FFFFFFF):
+        return -1, 0
+    at += 1
+    length = 0
+    while text[at] != 0x0A and length < 8:
+        high, low = np.int64(HEX[text[at]]), np.int64(HEX[text[at + 1]])
+        if (high | low) & ~15:
+            return -1, 0
+        data[length] = 16 * high + low
+        length += 1
+        at += 2
+    if text[at] != 0x0A:
+        return -1, 0
+    frame.stamp_ns = seconds * 1_000_000_000 + fraction * 1000
+    frame.can_id = can_id
+    frame.flags = 0 if standard else FRAME_EXTENDED
+    frame.length = length
+    return at, own
+
+
+@kernel
+def _parse_candump(
+    text: NDArray[np.uint8],
+    names: NDArray[np.uint8],
+    frames: RecordArray,
+    payloads: NDArray[np.uint8],
+    lines: NDArray[np.int64],
+    counts: Record,
+) -> tuple[int, int, bool]:
     size, room = len(text), len(frames)
-    used = count = 0
-    while count < room and counts.jump == 0:
+    used = count = bus = 0
+    name = -1
+    while count < room:
+        if name >= 0 and used + _USUAL <= size:
+            end, own = _parse_usual(text, used, name, frames[count], payloads[count])
+            if end >= 0:
+                frames[count].bus = bus
+                counts.line += 1
+                lines[count] = counts.line
+                name = own
+                count += 1
+                used = end + 1
+                continue
+            payloads[count] = 0
         end = used
         while end < size and text[end] != 0x0A:
             end += 1
         if end == size:
             break
         counts.line += 1
-        blank = end == used or (end == used + 1 and text[used] == 0x0D)
-        if _parse_line(text, used, end, frames[count], data[count], names):
-            stamp = frames[count].stamp_ns
-            if counts.frames and abs(stamp - counts.last_ns) > MAX_JUMP_NS:
-                counts.jump = counts.line
-            counts.last_ns = stamp
-            bus = frames[count].bus
-            counts.backwards += stamp < counts.last_on_ns[bus]
-            counts.repeated += stamp == counts.last_on_ns[bus]
-            counts.last_on_ns[bus] = stamp
-            counts.frames += 1
-            count += 1
-        elif not blank:
-            data[count] = 0
-            counts.damaged += 1
-            if counts.first == 0:
-                counts.first = counts.line
+        if end == used or (end == used + 1 and text[used] == 0x0D):
+            found = SKIPPED
+        elif _parse_line(text, used, end, frames[count], payloads[count], names):
+            found = DATA
+            name, bus = _name_of(text, used), frames[count].bus
+        else:
+            found = DAMAGED
+        count = note_line(found, counts, lines, payloads, count)
         used = end + 1
-    return used, count
-
-
-def _open(path: Path) -> IO[bytes]:
-    try:
-        return cast(IO[bytes], gzip.open(path, "rb")) if path.suffix == ".gz" else path.open("rb")
-    except OSError as error:
-        raise UserError(
-            str(path), "", f"cannot be read ({error.strerror}); give an existing candump log"
-        ) from None
+    return used, count, False
 
 
 def read_candump(
     path: Path, interfaces: list[str], quality: LogQuality, advance: Callable[[int], None] | None = None
-) -> Iterator[RecordArray]:
-    """Yield the frames of a candump log (`.log`, also with `.gz`) in blocks of at most `BLOCK_FRAMES`.
+) -> Iterator[FrameBlock]:
+    """Yield the frames of a candump log in blocks; `bus` is the place of the interface in `interfaces`.
 
-    A frame's `bus` is the place of its interface in `interfaces`, to which new names are added. `quality` is
-    kept up to date; `advance(bytes)` hears of progress in bytes of text. Raises UserError for what is no
-    candump log and for a clock that jumps.
+    New names are added to `interfaces`. `quality` and `advance`: see `read_text`. Raises UserError for what
+    is no candump log.
     """
     names = np.zeros((MAX_INTERFACES, MAX_NAME), np.uint8)
     for place, name in enumerate(interfaces):
         names[place, : len(name)] = np.frombuffer(name.encode(), np.uint8)
-    counts = np.zeros(1, _COUNTS)
-    rest = b""
-    with _open(path) as stream:
-        while True:
-            try:
-                chunk = stream.read(BLOCK_BYTES)
-            except (OSError, EOFError) as error:
-                if not counts[0]["frames"]:
-                    raise UserError(
-                        str(path), "line 1", f"cannot be unpacked ({error}); give a candump log"
-                    ) from None
-                chunk = b""  # a gzip file cut off: its text ends here
-                rest = rest or b"?"
-            if not chunk:
-                break
-            text = np.frombuffer(rest + chunk, np.uint8)
-            while True:
-                frames = np.zeros(min(BLOCK_FRAMES, len(text) // 12 + 1), FRAME)
-                used, count = parse_candump(text, frames, frames["data"], names, counts[0])
-                text = text[used:]
-                _note(path, counts[0], names, interfaces, quality)
-                if count:
-                    yield frames[:count]
-                if count < len(frames):
-                    break
-            rest = text.tobytes()
-            if not quality.frames and (quality.damaged_lines or len(rest) >= BLOCK_BYTES):
-                raise _wrong_format(path)
-            if advance:
-                advance(len(chunk))
-    if not quality.frames:
-        raise _wrong_format(path)
-    if rest.strip():
-        quality.cut_line = int(counts[0]["line"]) + 1
 
+    def parse(text: NDArray[np.uint8], *into: Any) -> tuple[int, int, bool]:
+        return _parse_candump(text, names, *into)
 
-def _note(
-    path: Path, counts: Record, names: NDArray[np.uint8], interfaces: list[str], quality: LogQuality
-) -> None:
-    if counts["jump"]:
-        raise UserError(
-            str(path),
-            f"line {counts['jump']}",
-            "time jumps by more than an hour; mend the line or split the log here",
-        )
-    quality.frames = int(counts["frames"])
-    quality.damaged_lines = int(counts["damaged"])
-    quality.first_damaged_line = int(counts["first"])
-    quality.stamps_backwards = int(counts["backwards"])
-    quality.stamps_repeated = int(counts["repeated"])
-    for name in names[len(interfaces) :]:
-        if name[0]:
-            interfaces.append(name.tobytes().rstrip(b"\0").decode("latin-1"))
+    def no_header(line: str) -> bool:
+        return False
 
-
-def _wrong_format(path: Path) -> UserError:
-    if path.stat().st_size == 0:
-        return UserError(str(path), "line 1", f"the file is empty; a candump log has lines like {EXAMPLE}")
-    with path.open("rb") as stream:
-        start = stream.read(4)
-    if start == b"PAR1":
-        return UserError(str(path), "line 1", "this is a Parquet file; let its name end in .parquet")
-    return UserError(str(path), "line 1", f"no candump log; its lines look like {EXAMPLE}")
+    remedy = f"no candump log; its lines look like {EXAMPLE}"
+    for block in read_text(path, parse, no_header, remedy, quality, advance):
+        for name in names[len(interfaces) :]:
+            if name[0]:
+                interfaces.append(name.tobytes().rstrip(b"\0").decode("latin-1"))
+        yield block

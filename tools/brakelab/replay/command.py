@@ -12,7 +12,8 @@ from rich.console import Console
 
 from brakelab.outputs import check_outputs
 from brakelab.replay.engine import Rows, new_ecu
-from brakelab.replay.log import kind_of, log_hash, log_size, replay_log
+from brakelab.replay.formats import kind_of
+from brakelab.replay.log import log_hash, log_size, replay_log
 from brakelab.replay.needed import NEEDED, fault_lines, needed_lines, nothing_usable
 from brakelab.replay.prediction import SHORT
 from brakelab.replay.progress import progress_bar
@@ -81,13 +82,13 @@ def replay(
         shift = 0.0
         for place, found in enumerate(findings):
             ecu = new_ecu(params, learned)
-            end = shift
+            end, kind = shift, kind_of(found.path)
             for rows in replay_log(found.path, ecu, source, recording, found, advance):
-                t = _seconds(rows, found, kind_of(found.path))
+                t = _seconds(rows, found, kind)
                 if place and found.rows == len(t):  # the first block of a log that goes on
                     shift = round(shift - t[0], 9)
                 t = np.round(t + shift, 9) if place else t
-                writer.provenance.setdefault("start_time_ns", str(found.start_ns))
+                writer.provenance.setdefault("start_time_ns", str(found.start_ns + found.signals.zero_ns))
                 writer.write(t, rows.values)
                 end = float(t[-1]) + _PERIOD
             writer.brakes.end_log()

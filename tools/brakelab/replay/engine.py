@@ -26,7 +26,7 @@ Block = TypeVar("Block")
 MEASURED_INPUTS: Final = (*range(MOTOR_TORQUE, MOTOR_TORQUE + 4), ACCELERATOR_POSITION)
 N_ROW: Final = N_OUTPUTS + len(MEASURED_INPUTS)
 """A row: the outputs as a vector, then `MEASURED_INPUTS` as received, NaN where not usable."""
-BLOCK_CYCLES: Final = 4096
+BLOCK_CYCLES: Final = 16384
 
 _EVERYTHING: Final = 1 << 62
 # Where a run stands between two calls of its kernel: place in the block, cycles done of the chunk, whether

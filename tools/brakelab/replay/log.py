@@ -1,14 +1,14 @@
 """One log of a drive, whatever its form, through one ECU: rows of results come out."""
 
 import hashlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
-from brakelab.replay.candump import LogQuality, read_candump
 from brakelab.replay.engine import Ecu, Rows, run_frames, run_samples
+from brakelab.replay.formats import Advance, kind_of, read_frames
+from brakelab.replay.log_quality import LogQuality
 from brakelab.replay.quality import Findings, identifier, note_faults
 from brakelab.replay.signal_file import SampleBlock, freshness_at_any_rate, read_signals
 from brakelab.replay.source import Source, only_interface
@@ -17,24 +17,6 @@ from ecu.diagnostics.faults import FOREIGN_SENDER
 from ecu.errors import UserError
 from ecu.recorder import Recording, read_recording
 from ecu.records import CYCLE, EXTENDED_ID, FRAME_ERROR, FRAME_EXTENDED, RecordArray
-
-FORMATS: Final = "candump .log (also .log.gz), .parquet, .csv, or the folder of a recording"
-
-Advance = Callable[[int], None]
-
-
-def kind_of(path: Path) -> str:
-    """Return "recording", "signals" or "frames". Raises UserError for what is not read."""
-    if path.is_dir():
-        return "recording"
-    suffixes = [suffix.lower() for suffix in path.suffixes]
-    if suffixes[-1:] in ([".parquet"], [".csv"]):
-        return "signals"
-    if suffixes[-1:] == [".log"] or suffixes[-2:] == [".log", ".gz"]:
-        return "frames"
-    raise UserError(
-        str(path), "", f"unknown kind of log {path.suffix or '(no suffix)'}; replay reads {FORMATS}"
-    )
 
 
 def log_size(path: Path) -> int:
@@ -98,12 +80,12 @@ def replay_log(
     counted = kind == "recording"
     if counted:
         recording = read_recording(path)
-    text = recording.frames if recording and counted else path
+    log = recording.frames if recording and counted else path
     plan = source.plan
     ecu.params[0]["mapped"] = plan.mapped
     reception = findings.reception = new_reception(plan)
     findings.freshness, findings.mapped = reception.freshness, plan.mapped
-    blocks = read_candump(text, findings.interfaces, findings.log, advance)
+    blocks = read_frames(log, findings.interfaces, findings.log, advance)
     if source.bus and not counted:
         blocks = only_interface(blocks, source.bus, findings)
     if recording is None:
@@ -124,7 +106,7 @@ def replay_log(
 
 def _from_first_recorded(blocks: Iterator[RecordArray], recording: Recording) -> Iterator[RecordArray]:
     """Leave out what was on the bus before the recorded run heard its first frame."""
-    own = next(read_candump(recording.frames, [], LogQuality()))
+    own = next(read_frames(recording.frames, [], LogQuality()))
     for block in blocks:
         later = block[np.maximum.accumulate(block["stamp_ns"]) >= own["stamp_ns"][0]]
         if len(later):

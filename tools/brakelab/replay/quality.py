@@ -3,17 +3,19 @@
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.replay.candump import LogQuality
+from brakelab.replay.log_quality import LogQuality
 from brakelab.replay.signal_file import SignalQuality
 from ecu.bus.receive import ReceivePlan, Reception
 from ecu.diagnostics.faults import FAULTS
 from ecu.records import EXTENDED_ID, RecordArray
 from ecu.signals import DEGRADED, N_INPUTS, OUTPUT
+
+SHOWN: Final = 20  # names in a line
 
 
 @dataclass
@@ -59,17 +61,20 @@ def quality_lines(findings: Findings, plan: ReceivePlan) -> list[str]:
     """Return one line for each kind of damage in the log, nothing for a clean one."""
     name, log = str(findings.path), findings.log
     lines = []
-    if log.damaged_lines:
-        first = log.first_damaged_line
-        lines.append(f"{name}: line {first}: {log.damaged_lines} damaged lines skipped, this is the first")
-    if log.cut_line:
-        lines.append(f"{name}: line {log.cut_line}: the last line is cut off and was not used")
+    if log.damaged:
+        first = log.first_damaged
+        what = "lines" if first.startswith("line") else "pieces"
+        lines.append(f"{name}: {first}: {log.damaged} damaged {what} skipped, this is the first")
+    if log.cut:
+        lines.append(f"{name}: {log.cut}")
     if log.stamps_backwards:
         lines.append(
             f"{name}: time steps back at {log.stamps_backwards} frames; they count in the order of the log"
         )
     if findings.signals.unknown_columns:
-        lines.append(f"{name}: columns not used: {', '.join(findings.signals.unknown_columns)}")
+        unknown = findings.signals.unknown_columns
+        more = f", … ({len(unknown)} in all)" if len(unknown) > SHOWN else ""
+        lines.append(f"{name}: columns not used: {', '.join(unknown[:SHOWN])}{more}")
     if findings.reception is None:
         return lines
     counters = findings.reception.messages

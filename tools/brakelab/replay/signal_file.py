@@ -1,4 +1,4 @@
-"""Reads decoded signals: a Parquet or CSV file with `t` [s] and columns with the contract's input names.
+"""Reads decoded signals: Parquet or CSV with `t` [s] and columns with the contract's input names, or MDF4.
 
 Rates may be mixed: null or NaN in a cell means that there is no new sample. Times are cut to whole
 microseconds relative to the first row, so that 0.1 + 0.2 and 0.3 are one instant.
@@ -15,7 +15,8 @@ import pyarrow.csv as pa_csv
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from brakelab.replay.candump import MAX_JUMP_NS
+from brakelab.replay.log_quality import MAX_JUMP_NS
+from brakelab.replay.mdf_channels import open_channels, read_channels
 from ecu.bus.freshness import input_freshness
 from ecu.errors import UserError
 from ecu.records import RecordArray
@@ -47,6 +48,8 @@ class SignalQuality:
     rows: int = 0
     samples: int = 0
     unknown_columns: list[str] = field(default_factory=list)
+    zero_ns: int = 0
+    """Date of t = 0 as Unix time, if the file says so."""
 
 
 def freshness_at_any_rate() -> RecordArray:
@@ -66,7 +69,10 @@ def read_signals(path: Path, quality: SignalQuality) -> Iterator[SampleBlock]:
     Raises UserError with file, row and column for a `t` that is missing, falls, jumps or is not in seconds,
     an infinite value, a cell that is no number, and a file without any known column.
     """
-    batches = _csv_batches(path) if path.suffix == ".csv" else _parquet_batches(path)
+    if path.suffix.lower() == ".mf4":
+        batches = _mdf_batches(path, quality)
+    else:
+        batches = _csv_batches(path) if path.suffix == ".csv" else _parquet_batches(path)
     origin: float | None = None
     last_ns = 0
     columns: list[str] = []
@@ -203,6 +209,18 @@ def _parquet_batches(path: Path) -> Iterator[pa.RecordBatch]:
         raise UserError(
             str(path), "", f"no readable Parquet file ({reason}); write it again or name it .csv"
         ) from None
+
+
+def _mdf_batches(path: Path, quality: SignalQuality) -> Iterator[pa.RecordBatch]:
+    channels = open_channels(path)
+    try:
+        quality.zero_ns = channels.measurement.start_ns()
+        names = ["t", *(name for places in channels.groups.values() for name in places), *channels.unknown]
+        nothing = pa.array([], pa.null())
+        yield pa.RecordBatch.from_arrays([nothing] * len(names), names=names)
+        yield from read_channels(path, channels)
+    finally:
+        channels.measurement.close()
 
 
 def _csv_batches(path: Path) -> Iterator[pa.RecordBatch]:

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from brakelab.replay.formats import interface_name
 from brakelab.replay.quality import Findings
 from ecu.bus.receive import ReceivePlan, contract_receive_plan
 from ecu.bus.signal_map import load_signal_map, read_signal_map
@@ -42,7 +43,11 @@ def _hash(*paths: Path) -> str:
 
 
 def only_interface(blocks: Iterable[RecordArray], name: str, findings: Findings) -> Iterator[RecordArray]:
-    """Keep the frames of one interface; a log of a single one is that bus, whatever its name."""
+    """Keep the frames of one interface; a log of a single one is that bus, whatever its name.
+
+    `name` may be the number of a channel: channel 1 is can0.
+    """
+    name = interface_name(int(name)) if name.isdecimal() else name
     for block in blocks:
         names = findings.interfaces
         if name in names:
