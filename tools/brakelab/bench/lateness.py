@@ -1,0 +1,129 @@
+"""How late the daemon's cycles begin while other processes keep every core busy, and when they end.
+
+Daemon and simulated vehicle are processes on a bus of their own. Beside them, on the daemon's own core and
+above its priority, a bare loop wakes every 10 ms and does nothing: the floor that this machine sets.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakelab.bench.table import Table
+from brakelab.rig.live import Processes, armed_config, choose_bus
+from ecu.clock import Grid, system_time
+from ecu.realtime import PRIORITY, make_realtime
+from ecu.recorder import read_recording
+from ecu.resources import resource
+from ecu.signals import CYCLE_NS
+
+SCENARIO: Final = "config/scenarios/ordinary.toml"  # ten minutes
+SEED: Final = 1
+SETTLING_S: Final = 2.0
+LEAST_CYCLES: Final = 100
+BUSY: Final = "while True: pass"
+SHARES: Final = (0.5, 0.99, 0.999, 1.0)
+
+
+class Lateness(NamedTuple):
+    """What was measured; times in us, shape (cycles,)."""
+
+    bare: NDArray[np.float64]
+    woken: NDArray[np.float64]
+    """Start of the daemon's cycle after its deadline."""
+    ended: NDArray[np.float64]
+    """End of its last stage after its deadline."""
+    missed: int
+    """Periods without a cycle of their own."""
+    bus: str
+    busy: int
+    """Processes that kept the cores busy."""
+
+
+def bare_loop() -> None:
+    """Wake every 10 ms until standard input closes, then print how late each time was [ns], as JSON."""
+    make_realtime()
+    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY + 1))
+    late: list[int] = []
+    grid = Grid(system_time())
+    parent = os.getppid()
+    while os.getppid() == parent and not os.path.exists(sys.argv[1]):
+        late.append(grid.wait().lateness_ns)
+    print(json.dumps(late))
+
+
+def measure(seconds: float) -> Lateness:
+    """Drive `SCENARIO` for `seconds` with every core busy.
+
+    Raises:
+        RunFault: daemon or vehicle did not get ready.
+        UserError: there is no bus on which two processes can meet.
+    """
+    bus = choose_bus()
+    busy: list[subprocess.Popen[bytes]] = []
+    with tempfile.TemporaryDirectory() as folder:
+        out, stop = Path(folder), Path(folder) / "stop"
+        config = armed_config(resource("config/suv.toml"), out)
+        with (out / "daemon.log").open("wb") as log:
+            processes = Processes(bus, config, out, log)
+            bare = None
+            try:
+                processes.start_vehicle(resource(SCENARIO), SEED)
+                processes.start_daemon("drive")
+                processes.departure()
+                busy = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in os.sched_getaffinity(0)]
+                bare = subprocess.Popen(
+                    [sys.executable, "-c", f"from {__name__} import bare_loop; bare_loop()", str(stop)],
+                    stdout=subprocess.PIPE,
+                    text=True,
+                )
+                deadline = time.monotonic() + seconds + SETTLING_S
+                while time.monotonic() < deadline and processes.driving():
+                    time.sleep(0.5)
+                stop.touch()
+                floor = np.array(json.loads(bare.communicate()[0]), np.float64)
+            finally:
+                for process in (*busy, *([bare] if bare else [])):
+                    process.kill()
+                    process.wait()
+                processes.end()
+        cycles = read_recording(out / "drive").cycles
+    skipped = round(SETTLING_S * 1e9 / CYCLE_NS)
+    cycles = cycles[skipped : skipped + round(seconds * 1e9 / CYCLE_NS)]
+    woken = cycles["lateness_ns"] * 1e-3
+    return Lateness(
+        floor[LEAST_CYCLES:] * 1e-3,
+        woken,
+        woken + cycles["stage_ns"].sum(axis=1) * 1e-3,
+        int(cycles["missed"].sum()),
+        bus.why,
+        len(busy),
+    )
+
+
+def lateness_tables(seconds: float) -> list[Table]:
+    """Return the table of a run of `seconds`."""
+    found = measure(seconds)
+    late_ends = int(np.sum(found.ended > 1e-3 * CYCLE_NS))
+
+    def row(what: str, values: NDArray[np.float64], goal: str) -> tuple[str, ...]:
+        return (what, *(f"{np.quantile(values, share):.0f}" for share in SHARES), goal)
+
+    rows = [
+        row("bare loop wakes", found.bare, "–"),
+        row("daemon's cycle begins", found.woken, "p99.9 ≤ 500"),
+        row("daemon's cycle ends", found.ended, "≤ 10000"),
+    ]
+    below = (
+        f"µs after the deadline, {len(found.woken)} cycles of 10 ms on {found.bus}, {found.busy} other processes "
+        f"busy on as many cores. {found.missed} periods missed, {late_ends} cycles ended after the next deadline "
+        "(goal: none)."
+    )
+    return [Table("lateness", ("what", "p50", "p99", "p99.9", "worst", "goal"), rows, below)]
