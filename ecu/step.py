@@ -42,6 +42,7 @@ from ecu.diagnostics.faults import (
     DEMAND_LIMITED,
     FILTER_RESET,
     WHEEL_SLIPS,
+    WHEEL_SPEED_IMPLAUSIBLE,
 )
 from ecu.estimation.force import (
     FORCE_STATE,
@@ -89,6 +90,7 @@ from ecu.monitoring.disc_temperature import (
     start_discs,
     update_discs,
 )
+from ecu.monitoring.plausibility import PLAUSIBILITY_STATE, wheel_speed_implausible
 from ecu.params import BAR, JOINT, OBSERVER1
 from ecu.records import LEARNED, RecordArray
 from ecu.signals import ACCEL_X, CALLIPER_PRESSURE, FAILED, STARTING
@@ -112,6 +114,7 @@ STATE = np.dtype(
         ("control", PRESSURE_LAW_STATE),
         ("guard", SLIP_GUARD_STATE),
         ("limiter", LIMITER_STATE),
+        ("plausibility", PLAUSIBILITY_STATE),
         ("mode", MODE_STATE),
         ("learned", LEARNED),
     ],
@@ -170,6 +173,10 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
     )  # fmt: skip
     decel = _control(p, s, u, y, dt)
     faults = u.bus_faults | input_faults(p, u)
+    if s.speed.started and wheel_speed_implausible(
+        p, s.plausibility, u, s.motion, s.speed.speed, s.friction.torque, dt
+    ):
+        faults |= WHEEL_SPEED_IMPLAUSIBLE
     if s.friction.reset:
         faults |= FILTER_RESET
     if s.limiter.limited:

@@ -44,6 +44,7 @@ LEARNING_TIME = 2.0  # s
 RADIUS_DOUBT = 0.008  # until then: radii within 0.3 % and what else differs, two standard deviations
 FREE_ACCEL, FREE_YAW_RATE = 0.5, 0.03  # m/s^2, rad/s
 RULED_FROM = 0.15  # z from which on Annex 5 orders the axles
+FASTEST = 1.02  # of the ground below it
 ROUNDING = 1e-9
 
 
@@ -68,7 +69,10 @@ def front_share(params: Record, decel: float) -> float:
 def _rear_beyond_front(
     params: Record, inputs: Record, motion: Record, load: Record, speed: float, side: int
 ) -> float:
-    """Return how much more than the front wheel of its side a rear wheel slips, NaN without new samples."""
+    """Return how much more than the front wheel of its side a rear wheel slips.
+
+    NaN without new samples, or where a wheel turns faster than a braked one can: its sensor keeps a value.
+    """
     slips = 0.0
     for i in (side, side + 2):
         ground = corner_speed(params, motion, speed, i)
@@ -76,6 +80,8 @@ def _rear_beyond_front(
             return math.nan
         radius = rolling_radius(load[i], params.unloaded_radius[i], params.vertical_stiffness[i])
         rolled = inputs.value[WHEEL_SPEED + i] * radius / ground
+        if rolled > FASTEST:
+            return math.nan
         slips += rolled if i == side else -rolled
     return slips
 

@@ -29,6 +29,7 @@ MOTOR_TORQUE_LOST: Final = 1 << 10
 BRAKE_FADE: Final = 1 << 11
 WHEEL_SLIPS: Final = 1 << 12
 ACCUMULATOR_LOW: Final = 1 << 13
+WHEEL_SPEED_IMPLAUSIBLE: Final = 1 << 14
 BUS_OFF: Final = 1 << 16
 ERROR_PASSIVE: Final = 1 << 17
 FOREIGN_SENDER: Final = 1 << 18
@@ -52,6 +53,7 @@ FAULTS: Final = (
     Fault(BRAKE_FADE, "compensation at its limit", "friction more than 30 % below its base, or a pressure that cannot be had: the car brakes less than the pedal asks for", "brake earlier and let the brakes cool; look at the linings and at friction in the report"),
     Fault(WHEEL_SLIPS, "wheel slips", "a wheel ran past its tyre's range: its pressure demand is held back", "look at slip in the report; an ABS is not part of this ECU"),
     Fault(ACCUMULATOR_LOW, "accumulator low", "the accumulator holds less than is demanded: the demand is cut to it", "check the hydraulic unit and the sender of HydraulicStatus"),
+    Fault(WHEEL_SPEED_IMPLAUSIBLE, "wheel speed implausible", "a wheel that brakes turns faster than the car", "check that wheel's sensor: it may keep an old value"),
     Fault(BUS_OFF, "bus off", "the CAN controller went off the bus", "check wiring; ip link set DEV type can restart-ms 100"),
     Fault(ERROR_PASSIVE, "error passive", "the CAN controller counts many errors", "check termination and bit rate"),
     Fault(FOREIGN_SENDER, "foreign sender", "someone else sends one of our identifiers", "stop the other sender"),

@@ -24,7 +24,6 @@ SHORTEST: Final = 12  # bytes of a line that holds a frame
 DATA, SKIPPED, DAMAGED, HEADER = 0, 1, 2, 3
 COUNTS: Final = np.dtype([("line", "i8"), ("damaged", "i8"), ("first", "i8")])
 
-MOST: Final = 10**18
 HEX: Final = np.full(256, 255, np.uint8)
 for _place, _digit in enumerate(b"0123456789ABCDEF"):
     HEX[_digit] = HEX[ord(chr(_digit).lower())] = _place
@@ -89,14 +88,14 @@ def number(text: NDArray[np.uint8], at: int, end: int, base: int) -> int:
 def decimal(text: NDArray[np.uint8], at: int, end: int, places: int) -> int:
     """Return the decimal number that `text[at:end]` is, times 10^`places` (digits beyond are cut); -1: none.
 
-    A number without a fraction is one; neither side has more than 12 digits.
+    A number without a fraction is one too; nine digits stand before it at most.
     """
     value: Any = np.int64(0)
     first = at
     while at < end and text[at] >= 48 and text[at] <= 57:
         value = 10 * value + np.int64(text[at] - 48)
         at += 1
-    if not 0 < at - first <= 12:
+    if not 0 < at - first <= 9:
         return -1
     digits = 0
     if at < end and text[at] == 0x2E:
@@ -109,7 +108,7 @@ def decimal(text: NDArray[np.uint8], at: int, end: int, places: int) -> int:
             at += 1
         if at == first:
             return -1
-    if at != end or value > MOST:
+    if at != end:
         return -1
     for _ in range(places - digits):
         value *= 10

@@ -13,12 +13,12 @@ from brakelab.replay.engine import Rows, new_ecu
 from brakelab.replay.log import replay_log
 from brakelab.replay.quality import Findings
 from brakelab.replay.source import load_source
-from brakelab.results import ResultWriter
+from brakelab.results import MEASURED, ResultWriter
 from ecu import __version__
 from ecu.bus.receive import Reception
 from ecu.config import Config, config_hash, new_params
 from ecu.recorder import Recording, candump_lines, read_recording
-from ecu.signals import CYCLE_NS, INPUT_SIGNALS, MOTOR_TORQUE, N_OUTPUTS, OUTPUT_COLUMNS
+from ecu.signals import CYCLE_NS, N_OUTPUTS, OUTPUT_COLUMNS
 
 
 class Frames(NamedTuple):
@@ -62,8 +62,8 @@ def write_simulated(loop: Loop, drive: Simulated, config: Config, out: Path) -> 
     result = out / "result.parquet"
     (out / "frames.log").write_bytes(candump_lines(drive.frames, "can0"))
     write_columns(out / "truth.parquet", drive.t, drive.truth, {"start_time_ns": str(START_NS)})
-    motors = [_held(drive.inputs[signal.name]) for signal in INPUT_SIGNALS[MOTOR_TORQUE : MOTOR_TORQUE + 4]]
-    rows = np.column_stack([*(drive.outputs[name] for name in OUTPUT_COLUMNS), *motors])
+    measured = [_held(drive.inputs[signal.name]) for signal in MEASURED]
+    rows = np.column_stack([*(drive.outputs[name] for name in OUTPUT_COLUMNS), *measured])
     lives = np.isfinite(drive.outputs["mode"])
     with ResultWriter(result, new_params(config)) as writer:
         _provenance(writer, config, START_NS)
