@@ -68,7 +68,8 @@ from ecu.estimation.joint.learned import (
     settle_friction,
     take_mean,
 )
-from ecu.estimation.joint.observer import mistrust_wheels, update_joint
+from ecu.estimation.joint.observer import update_joint
+from ecu.estimation.joint.sliding import mistrust_wheels
 from ecu.estimation.motion import MOTION_STATE, update_motion, usable
 from ecu.estimation.observer2 import OBSERVER_STATE
 from ecu.estimation.slip import (

@@ -20,7 +20,7 @@ from ecu.estimation.friction import (
     driver_accelerates,
     drives_against,
 )
-from ecu.estimation.joint.kalman import GATE, clear_derivatives, correct, forget
+from ecu.estimation.joint.kalman import clear_derivatives, correct, forget
 from ecu.estimation.joint.layout import (
     BIAS,
     DELAY,
@@ -42,11 +42,12 @@ from ecu.estimation.joint.layout import (
     V,
 )
 from ecu.estimation.joint.pressure import follows, learn_zero
-from ecu.estimation.joint.prior import PRIOR, forget_rate, pressure_change, set_prior, walk
+from ecu.estimation.joint.prior import forget_rate, pressure_change, set_prior, walk
+from ecu.estimation.joint.sliding import HOLD_S, share_force, watch_tyres, wheel_slides
 from ecu.estimation.joint.snapshot import go_back, keep, keep_newer
 from ecu.estimation.joint.wheel import brake_lever, brake_torque, predict_balance, predict_wheel
 from ecu.estimation.joint.window import close_window, gather, open_window
-from ecu.estimation.motion import fresh, mean_wheel_speed, usable
+from ecu.estimation.motion import mean_wheel_speed, usable
 from ecu.jit import Record, kernel
 from ecu.params import BAR
 from ecu.signals import (
@@ -62,13 +63,9 @@ LEAST_SPEED = 3.4  # m/s
 APPLIED = 1.0  # bar above push-out: the brakes act
 STRAIGHT = 0.05  # lateral acceleration over gravity: more, and wheels roll by their own loads and angles
 MOTORS = 100.0  # N m of all motors: their torque is worth looking at
-LARGE_SLIP = 0.12
-YIELDING = 0.06  # slip from which the force along the car says more of a wheel's force than its torque
 SLIDING_FORCE = 0.3  # relative error of a sliding wheel's force if it is taken for its brake force
-SLIDING_FLOOR = 5.0  # m/s, that it is relative to at least
 BELIEVED_AFTER = 3.0  # s without a wheel that rolls, brakes released
 RELEASE = 0.15  # relative fall in a window: pressure, slip and force lag differently and teach nothing
-HOLD_S = 0.2
 SNAPSHOT_S = 0.2
 
 BALANCE_FLOOR = 0.01  # m/s^2 that the balance leaves out
@@ -77,7 +74,6 @@ SKEW_FOLLOWED, SKEW_REPORTED = 0.5, 3.0  # windows between pressure and force; a
 SKEW_ACCEL = 0.5  # windows between acceleration and torques
 TRANSIENT = 0.5  # of a slip's change since the last window
 CORNERING = 1.0  # of slip, per squared adhesion used sideways: then load and slip angle are not well known
-OTHER_TYRES = 2.5  # wheels on the gate at once
 UNEXPLAINED = 0.15  # m/s^2 while rolling: someone drives or brakes the car without saying so
 TWIN = 3.0  # bar, of a pressure taken from the other side
 LOW_SPEED_NOISE = 0.15  # m/s
@@ -177,7 +173,7 @@ def update_joint(
         open_window(state)
     gather(params, state, inputs, motion, load, demand, dt)
     if braking and usable(inputs, ACCEL_X):
-        _share_force(params, state, inputs, motion.accel_x, load)
+        share_force(params, state, inputs, motion.accel_x, load)
     state.hold_s = max(state.hold_s - dt, 0.0)
     if state.window.time < WINDOW_S - 0.001:
         return
@@ -185,14 +181,6 @@ def update_joint(
     _fuse(params, state, inputs, braking)
     _look_after(params, state, braking)
     open_window(state)
-
-
-@kernel
-def mistrust_wheels(state: Record) -> None:
-    """Learn nothing for a while: a wheel slips beyond its tyre's range, whatever this filter sees of it."""
-    if state.hold_s <= 0.0:
-        go_back(state)
-    state.hold_s = HOLD_S
 
 
 @kernel
@@ -244,57 +232,16 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
         state.observed[i] = 0
         if w.omega_samples[i] == 0:
             continue
-        state.slides[i] = 1 if _slides(params, state, i) else 0
+        state.slides[i] = 1 if wheel_slides(params, state, i) else 0
         if not state.slides[i]:
             state.untrusted_s = 0.0
             _fuse_wheel(params, state, i, before, moving, learning and braking)
-    _watch_tyres(state, learning and braking)
+    watch_tyres(state, learning and braking)
     if learning and w.accel_cycles == w.cycles and (braking or w.motor_reported):
         _fuse_balance(params, state)
     state.last_accel = w.accel
     for i in range(4):
         state.last_pressure[i], state.last_smooth[i] = w.pressure[i], state.smooth_pressure[i]
-
-
-@kernel
-def _watch_tyres(state: Record, observing: bool) -> None:
-    """Let friction go back and stiffness be unknown where most wheels contradict the tyres that are known."""
-    against = 0.0
-    for i in range(4):
-        if math.isfinite(state.ratio[i]):
-            against += min(state.ratio[i], GATE * GATE)
-    known = state.p[STIFFNESS, STIFFNESS] < (0.5 * PRIOR[STIFFNESS]) ** 2
-    if observing and known and against > OTHER_TYRES * GATE * GATE:
-        go_back(state)
-        forget(state, STIFFNESS, PRIOR[STIFFNESS] ** 2)
-
-
-@kernel
-def _share_force(params: Record, state: Record, inputs: Record, accel: float, load: Record) -> None:
-    """Give the wheels that begin to slide, by their loads, the force along the car that the others leave."""
-    x = state.x
-    drag = math.exp(x[DRAG]) * params.drag_area * x[V] * abs(x[V])
-    left, loaded = math.exp(x[MASS]) * (params.mass * (accel - x[BIAS]) + drag), 0.0
-    for i in range(4):
-        rolled = inputs.value[WHEEL_SPEED + i] * params.wheel_radius[i]
-        if fresh(inputs, WHEEL_SPEED + i):
-            state.yields[i] = 1 if abs(rolled - x[V]) > YIELDING * max(x[V], rolled, SLIDING_FLOOR) else 0
-        if state.yields[i]:
-            loaded += load[i]
-        else:
-            left -= state.force[i]
-    for i in range(4):
-        if state.yields[i]:
-            state.force[i] = left * load[i] / loaded
-
-
-@kernel
-def _slides(params: Record, state: Record, i: int) -> bool:
-    """Return whether a wheel is so far from the car's speed that it does not tell it."""
-    w = state.window
-    rolled = w.omega[i] * params.wheel_radius[i]
-    slides: bool = abs(rolled - w.ground[i]) > LARGE_SLIP * max(w.ground[i], rolled, SLIDING_FLOOR)
-    return slides
 
 
 @kernel

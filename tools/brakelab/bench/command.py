@@ -116,6 +116,13 @@ MARGINS_TEXT: Final = (
 Car = TypeVar("Car")
 
 
+LATENESS: Final = "lateness"
+LATENESS_TEXT: Final = (
+    "Daemon and simulated vehicle as processes in real time, with a busy process on every core. The bare "
+    "loop wakes every 10 ms on the daemon's core, above its priority, and does nothing: what the machine "
+    "allows."
+)
+
 REPLAY: Final = "replay"
 REPLAY_TEXT: Final = (
     "One drive of ten minutes in closed loop (config/scenarios/ordinary.toml) as a log of every format, "
@@ -161,12 +168,12 @@ BENCHES: Final = {
 }
 
 
-def bench(name: str | None, json: bool, seeds: int = 20) -> int:
+def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0) -> int:
     """Run one bench, or without a name all that measure time; print tables, or JSON. Returns 0.
 
     In a checkout, a run of all times renews docs/benchmarks.md, `stops` docs/observer-accuracy.md,
     `observers` docs/observers.md, each other one the page of its name. `seeds`: how many cars `stops` and
-    `observers` draw, `ablation` and `bound` at most.
+    `observers` draw, `ablation` and `bound` at most; `seconds`: how long `lateness` drives.
 
     Raises:
         UserError: there is no such bench.
@@ -181,6 +188,7 @@ def bench(name: str | None, json: bool, seeds: int = 20) -> int:
         COMPENSATION: _compensation,
         MARGINS: _margins,
         BLENDING: _blending,
+        LATENESS: partial(_lateness, seconds=seconds),
         REPLAY: _replay,
     }
     if name is not None and name not in (*BENCHES, *others):
@@ -301,6 +309,13 @@ def _margins(json: bool) -> int:
 
 def _blending(json: bool) -> int:
     return _page(BLENDING, "Motors and linings brake together", BLENDING_TEXT, blending_tables(), json)
+
+
+def _lateness(json: bool, seconds: float) -> int:
+    from brakelab.bench.lateness import lateness_tables
+
+    text = f"{machine()}. {LATENESS_TEXT}"
+    return _page(LATENESS, "Lateness under load", text, lateness_tables(seconds), json)
 
 
 def _replay(json: bool) -> int:

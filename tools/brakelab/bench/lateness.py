@@ -11,7 +11,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,7 +90,8 @@ def measure(seconds: float) -> Lateness:
                 stop.touch()
                 floor = np.array(json.loads(bare.communicate()[0]), np.float64)
             finally:
-                for process in (*busy, *([bare] if bare else [])):
+                others: list[subprocess.Popen[Any]] = [*busy, *([bare] if bare else [])]
+                for process in others:
                     process.kill()
                     process.wait()
                 processes.end()
@@ -122,8 +123,8 @@ def lateness_tables(seconds: float) -> list[Table]:
         row("daemon's cycle ends", found.ended, "≤ 10000"),
     ]
     below = (
-        f"µs after the deadline, {len(found.woken)} cycles of 10 ms on {found.bus}, {found.busy} other processes "
-        f"busy on as many cores. {found.missed} periods missed, {late_ends} cycles ended after the next deadline "
-        "(goal: none)."
+        f"µs after the deadline, {len(found.woken)} cycles of 10 ms on {found.bus}, {found.busy} other "
+        f"processes busy on as many cores. {found.missed} periods missed, {late_ends} cycles ended after the "
+        "next deadline (goal: none)."
     )
     return [Table("lateness", ("what", "p50", "p99", "p99.9", "worst", "goal"), rows, below)]

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from ecu.estimation.joint.layout import MASS, MU, SLOPE, STIFFNESS, N, V
-from ecu.estimation.joint.observer import HOLD_S, WINDOW_S
+from ecu.estimation.joint.observer import WINDOW_S
 from ecu.estimation.joint.prior import set_prior
+from ecu.estimation.joint.sliding import HOLD_S
 from ecu.signals import (
     ABS_ACTIVE,
     ACCELERATOR_POSITION,

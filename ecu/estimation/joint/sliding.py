@@ -1,0 +1,66 @@
+"""Wheels that leave what is known of their tyres: what is believed of them, and what goes back."""
+
+import math
+
+from ecu.estimation.joint.kalman import GATE, forget
+from ecu.estimation.joint.layout import BIAS, DRAG, MASS, STIFFNESS, V
+from ecu.estimation.joint.prior import PRIOR
+from ecu.estimation.joint.snapshot import go_back
+from ecu.estimation.motion import fresh
+from ecu.jit import Record, kernel
+from ecu.signals import WHEEL_SPEED
+
+LARGE_SLIP = 0.12
+YIELDING = 0.06  # slip from which the force along the car says more of a wheel's force than its torque
+SLIDING_FLOOR = 5.0  # m/s, that slip is relative to at least
+HOLD_S = 0.2
+OTHER_TYRES = 2.5  # wheels on the gate at once
+
+
+@kernel
+def share_force(params: Record, state: Record, inputs: Record, accel: float, load: Record) -> None:
+    """Give the wheels that begin to slide, by their loads, the force along the car that the others leave."""
+    x = state.x
+    drag = math.exp(x[DRAG]) * params.drag_area * x[V] * abs(x[V])
+    left, loaded = math.exp(x[MASS]) * (params.mass * (accel - x[BIAS]) + drag), 0.0
+    for i in range(4):
+        rolled = inputs.value[WHEEL_SPEED + i] * params.wheel_radius[i]
+        if fresh(inputs, WHEEL_SPEED + i):
+            state.yields[i] = 1 if abs(rolled - x[V]) > YIELDING * max(x[V], rolled, SLIDING_FLOOR) else 0
+        if state.yields[i]:
+            loaded += load[i]
+        else:
+            left -= state.force[i]
+    for i in range(4):
+        if state.yields[i]:
+            state.force[i] = left * load[i] / loaded
+
+
+@kernel
+def wheel_slides(params: Record, state: Record, i: int) -> bool:
+    """Return whether a wheel is so far from the car's speed that it does not tell it."""
+    w = state.window
+    rolled = w.omega[i] * params.wheel_radius[i]
+    slides: bool = abs(rolled - w.ground[i]) > LARGE_SLIP * max(w.ground[i], rolled, SLIDING_FLOOR)
+    return slides
+
+
+@kernel
+def watch_tyres(state: Record, observing: bool) -> None:
+    """Let friction go back and stiffness be unknown where most wheels contradict the tyres that are known."""
+    against = 0.0
+    for i in range(4):
+        if math.isfinite(state.ratio[i]):
+            against += min(state.ratio[i], GATE * GATE)
+    known = state.p[STIFFNESS, STIFFNESS] < (0.5 * PRIOR[STIFFNESS]) ** 2
+    if observing and known and against > OTHER_TYRES * GATE * GATE:
+        go_back(state)
+        forget(state, STIFFNESS, PRIOR[STIFFNESS] ** 2)
+
+
+@kernel
+def mistrust_wheels(state: Record) -> None:
+    """Learn nothing for a while: a wheel slips beyond its tyre's range, whatever this filter sees of it."""
+    if state.hold_s <= 0.0:
+        go_back(state)
+    state.hold_s = HOLD_S
