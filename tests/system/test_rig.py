@@ -64,7 +64,8 @@ def test_the_standby_brakes_on_where_the_killed_one_stopped(tmp_path, bus):
     assert 20.0 <= killed["fallback"] < 500.0  # 50 ms of silence, of which 30 ms count as heard, and a cycle
     assert killed["recovered"] < 500.0
     assert "IMU lost" in lost["bits"]
-    assert lost["mode"] == "degraded"
+    # A machine that holds the vehicle up for 0.1 s takes the request away as well.
+    assert lost["mode"] in (("degraded",) if "--lock-step" in bus else ("degraded", "failed"))
     assert lost["recovered"] < 500.0
     assert drive["unexplained"] == ""
     assert drive["differing"] == 0  # replay gives every bit again

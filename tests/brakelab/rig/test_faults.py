@@ -159,7 +159,7 @@ def test_without_demands_the_hydraulics_brake_on_their_own(tmp_path: Path) -> No
     ("fault", "name", "shift", "spread"),
     [
         ('kind = "stuck"\nsignal = ["calliper_pressure_fl"]', "calliper_pressure_fl", None, 0.0),
-        ('kind = "biased"\nsignal = ["accel_x"]\namount = 0.5', "accel_x", 0.5, 0.015),
+        ('kind = "biased"\nsignal = ["accel_x"]\namount = 0.5', "accel_x", 0.5, 0.012),
         ('kind = "noisy"\nsignal = ["calliper_pressure"]\namount = 6.0', "calliper_pressure_rr", 0.0, 6.3),
     ],
 )
@@ -209,7 +209,8 @@ def test_a_killed_daemon_is_silent_and_knows_its_friction_afterwards(
     assert drive.t[dead][0] == pytest.approx(9.0)
     before, after = (drive.outputs["mu_b_fl"][place] for place in np.flatnonzero(dead)[[0, -1]] + [-1, 1])
     print(f"friction {before:.3f} before, {after:.3f} after")
-    assert after == pytest.approx(before, rel=0.06 if not standby else 0.01)
+    # The store has the mean of the braking before, a standby what it estimated itself.
+    assert after == pytest.approx(before, rel=0.01 if standby else 0.15)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from rich.progress import track
 
 from brakelab.bench import ablation, bound, codec, compensation, cycle, margins, plant, step
 from brakelab.bench import stops as stops_bench
-from brakelab.bench.blending import CARS, blending_tables
+from brakelab.bench.blending import blending_tables
 from brakelab.bench.chart import write_chart
 from brakelab.bench.energy import energy_tables
 from brakelab.bench.friction import friction_tables
@@ -23,111 +23,49 @@ from brakelab.bench.observers_cases import configured
 from brakelab.bench.observers_picture import PICTURED, consistency_of, write_picture
 from brakelab.bench.observers_table import finite, observer_tables
 from brakelab.bench.table import Table, markdown, show, stop_tables, time_table
+from brakelab.bench.texts import (
+    ABLATION_TEXT,
+    BLENDING_TEXT,
+    BOUND_TEXT,
+    COMPENSATION_TEXT,
+    ENERGY_TEXT,
+    FRICTION_TEXT,
+    LATENESS_TEXT,
+    MARGINS_TEXT,
+    OBSERVERS_TEXT,
+    REPLAY_TEXT,
+    STOPS_TEXT,
+)
 from ecu import __version__
 from ecu.config import config_hash, load_config
 from ecu.errors import UserError
 from ecu.resources import resource
 
 STOPS: Final = "stops"
-STOPS_TEXT: Final = (
-    "Stops from 120 km/h to standstill, Table 4.2 of the thesis: #1 4, #2 7 m/s² on a dry road (1.2), #3 4, "
-    "#4 6 m/s² on a wet one (0.7). The car is that of config/plant/suv.toml, drawn per seed; its linings "
-    "have 0.85 (front) and 1.10 (rear) of the 0.45 that the ECU is configured with. Nothing was learned "
-    "before. Counted from 0.5 s after the demand has its full value, down to 15 km/h."
-)
 
 OBSERVERS: Final = "observers"
-OBSERVERS_TEXT: Final = (
-    "Cars are drawn per seed from config/plant/suv.toml, sensors have the noise of Table 4.1. Cold: the "
-    "configuration as it is, nothing learned. Driven in: after ten minutes of "
-    "config/scenarios/ordinary.toml in the same car, with what the state store keeps of them. Every "
-    "observer closes the loop itself; figures stand for front/rear. Counted while the brakes of both axles "
-    "have been on for 0.8 s, above 15 km/h.\n\n"
-    "![Error of the friction over 2σ, and the squared innovations](images/observers.svg)"
-)
 
 ABLATION: Final = "ablation"
-ABLATION_TEXT: Final = (
-    "Each line takes one thing away from the joint observer; the rest is as in "
-    "[observers.md](observers.md). What is withheld or worthless is so in the ten minutes before too, "
-    "what was learned is forgotten after them. Balance of forces: the accelerometer still drives the "
-    "speed. Pressure by the demand: the same drives seen by a shadow, which has the samples alone. Motor "
-    "torque: it is there in the case itself. Friction's rate, the zeros of the pressure sensors and the "
-    "changing share of front and rear cannot be taken away from outside."
-)
 
 BOUND: Final = "bound"
-BOUND_TEXT: Final = (
-    "How well friction could be known at all with the noise of Table 4.1: a posterior Cramér-Rao bound. "
-    "The drives of [observers.md](observers.md), driven in, become a linear system about what really "
-    "happened, 27 states in the simulated car's own structure, apart from the code of the ECU. Kalman's "
-    "filter of it is the best there is. *Learned*: it starts with the standard deviations that the joint "
-    "observer kept of the ten minutes. *Ten minutes*: with what they show at best, to one who knew the "
-    "spread of the drawn cars. *Car known*: friction alone is unknown. In these three friction changes by "
-    "a rate of each axle, random, but as fast and for as long as in that very stop. *Course known*: as "
-    "ten minutes, but how friction changes is known, as if a law of friction told it. Assumed: friction "
-    "at the beginning of an application is known from the one before to 5 % in common and 3 % an axle; "
-    "pressure follows the demand to 5 % of its change; motor torque is exact, as it is in these cars. "
-    "With 20 % or 15 % instead, stop #1 of the first car changes by 0.04 (ten minutes)."
-)
 
 FRICTION: Final = "friction"
-FRICTION_TEXT: Final = (
-    "What the friction laws of tools/brakelab/plant/friction, the disc and the brake unit of the simulated "
-    "vehicle reproduce of the thesis, on the simulated dynamometer. Numbers: config/plant/linings.toml."
-)
 
 ENERGY: Final = "energy"
-ENERGY_TEXT: Final = (
-    "Every scenario of config/scenarios in closed loop with the ECU of config/suv.toml. The simulated "
-    "vehicle sums what leaves and enters in its own steps (tools/brakelab/plant/energy.py)."
-)
 
 BLENDING: Final = "blending"
-BLENDING_TEXT: Final = (
-    "Brakings from 75 km/h in closed loop with the ECU of config/suv.toml, whose motors take the share f on "
-    f"both axles. {CARS} cars, drawn from config/plant/suv.toml; figures are median (least–greatest) over "
-    "them. Torque is that of linings and motors, true; the demand is m a r with mass and radius of the "
-    "configuration (5.1). In the first two tables the ECU is told the true friction: what is left is the "
-    "error of blending."
-)
 
 COMPENSATION: Final = "compensation"
-COMPENSATION_TEXT: Final = (
-    "Manoeuvres of section 5.7 and fade (6.2.3) in closed loop with the ECU of config/suv.toml, motors at "
-    "rest but where it says so; cars are drawn per seed from config/plant/suv.toml, nothing was learned "
-    "before. Ideal: the same controller in the same car, told the true friction. Achieved: brake and "
-    "motor torque over radius and mass, all true. Uncompensated: nominal friction always. Under, over: "
-    "told 1.15 and 0.85 of the true friction (section 5.6).\n\n![Deceleration, friction and pedal curves "
-    "of car 0](images/compensation.svg)"
-)
 
 MARGINS: Final = "margins"
-MARGINS_TEXT: Final = (
-    "How far the loop through pressure law, hydraulics, car and observer is from instability, measured "
-    "with the loop cut at the friction in use (tools/brakelab/bench/margins.py). The loop gain is far "
-    "below 1 at every frequency: an estimate of friction is torque over pressure, and more pressure gives "
-    "more torque, so to first order the estimate does not see what the law does. What comes back is lag "
-    "between the signals and what friction really owes to pressure.\n\n![Loop gain and distance from "
-    "+1](images/control-margins.svg)"
-)
 
 
 Car = TypeVar("Car")
 
 
 LATENESS: Final = "lateness"
-LATENESS_TEXT: Final = (
-    "Daemon and simulated vehicle as processes in real time, with a busy process on every core. The bare "
-    "loop wakes every 10 ms on the daemon's core, above its priority, and does nothing: what the machine "
-    "allows."
-)
 
 REPLAY: Final = "replay"
-REPLAY_TEXT: Final = (
-    "One drive of ten minutes in closed loop (config/scenarios/ordinary.toml) as a log of every format, "
-    "written by python-can and asammdf."
-)
 
 
 class Bench(NamedTuple):
