@@ -42,30 +42,18 @@ from ecu.errors import UserError
 from ecu.resources import resource
 
 STOPS: Final = "stops"
-
 OBSERVERS: Final = "observers"
-
 ABLATION: Final = "ablation"
-
 BOUND: Final = "bound"
-
 FRICTION: Final = "friction"
-
 ENERGY: Final = "energy"
-
 BLENDING: Final = "blending"
-
 COMPENSATION: Final = "compensation"
-
 MARGINS: Final = "margins"
-
+LATENESS: Final = "lateness"
+REPLAY: Final = "replay"
 
 Car = TypeVar("Car")
-
-
-LATENESS: Final = "lateness"
-
-REPLAY: Final = "replay"
 
 
 class Bench(NamedTuple):
