@@ -132,7 +132,9 @@ def replay(
         typer.Argument(metavar="LOG…", help="One drive: CAN logs, or Parquet or CSV of signals, in order"),
     ],
     config: Config,
-    out: Annotated[Path, typer.Option("--out", metavar="RESULT.parquet", help="Results, one row per 10 ms")],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="RESULT.parquet", help="Results, a row per 10 ms; or .mf4")
+    ],
     map: Map = None,
     observer: Annotated[
         str | None,
