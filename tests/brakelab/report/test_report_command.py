@@ -60,6 +60,12 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> str:
         "1 with nominal friction, as nothing was learned before",
         "1 4.00 4.16 0.08 +4.0 nominal 2 6.00 6.24 0.12 +4.0 learned 3 8.00 8.32 0.16 – learned accelerator",
         "request lost 50.01",
+        "Data marked 1 3 frames dropped by the kernel; Imu",
+        "Replayed 300 × real time 6000 rows in 0.2 s: 30000 rows/s",
+        "stops.log 6000 90000 0.20 30000 300 3 frames dropped by the kernel",
+        "accel_x 100.0 100 0.02 0 0 0 0 \N{MINUS SIGN}4 1 m/s²",
+        "Imu 072 6000 100.0 100 0 0 0 0 7",
+        "Never received: yaw_rate.",
         "lateness",
     ],
 )
@@ -89,6 +95,11 @@ def test_without_truth_and_timing_their_tables_are_absent(drive_files: Files) ->
     text = visible(written(drive_files, truth=False, timing=False))
     assert "nRMSE" not in text
     assert "Loop timing" not in text
+
+
+def test_a_result_without_metadata_has_no_data_quality(drive_files: Files) -> None:
+    change(drive_files["result"], lambda table: table.replace_schema_metadata({}))
+    assert "Data quality" not in visible(written(drive_files))
 
 
 def test_columns_of_the_contract_alone_are_enough(drive_files: Files) -> None:

@@ -34,6 +34,7 @@ SEEN: Final = np.dtype(
 
 # Most that is plausible from one sample to the next: a step (noise, a kerb) and a rate [1/s].
 # Assumption: brakes of 3 kN m at 1 kg m^2, valves of 2000 bar/s, a foot in 0.1 s, a disc of some kg.
+# Requests may step: demands, limits, and an accelerator that cruise control moves.
 PLAUSIBLE: Final = {
     "wheel_speed": (3.0, 3000.0),
     "accel_x": (15.0, 500.0),
@@ -41,7 +42,6 @@ PLAUSIBLE: Final = {
     "yaw_rate": (0.3, 20.0),
     "calliper_pressure": (12.0, 2000.0),
     "pedal_position": (5.0, 1500.0),
-    "accelerator_position": (5.0, 1500.0),
     "steering_angle": (0.1, 4.0),
     "motor_torque": (500.0, 100_000.0),
     "vehicle_speed": (1.0, 30.0),

@@ -86,7 +86,7 @@ def read_drive(path: Path, required: tuple[str, ...], remedy: str) -> Drive:
     ]
     metadata = {
         key.decode(errors="replace"): value.decode(errors="replace")
-        for key, value in (table.schema.metadata or {}).items()
+        for key, value in (pq.read_metadata(path).metadata or {}).items()
     }
     return Drive(t, {name: numbers(table, name, path) for name in numeric if name != "t"}, metadata)
 

@@ -141,9 +141,13 @@ def _input(row: dict[str, Any], seconds: float) -> list[Cell]:
         Cell(fixed(row["greatest_gap_s"], 2), row["greatest_gap_s"] > row["timeout_s"]),
         *(Cell(fixed(share, 2) if share else "0", share > 0.0) for share in shares),
         *(Cell(f"{row[kind]}", row[kind] > 0) for kind in ("clipped", "jumps")),
-        *(Cell("–" if row[end] is None else f"{row[end]:.4g}") for end in ("least", "greatest")),
-        Cell(row["unit"]),
+        *(Cell(_digits(row[end])) for end in ("least", "greatest")),
+        Cell(row["unit"].replace("^2", "²").replace("degC", "°C")),
     ]
+
+
+def _digits(value: float | None) -> str:
+    return "–" if value is None else f"{value:.4g}".replace("-", "\N{MINUS SIGN}")
 
 
 def _message(row: dict[str, Any], seconds: float) -> list[Cell]:
