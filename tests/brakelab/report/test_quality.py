@@ -91,11 +91,12 @@ def test_logs_are_put_together() -> None:
 
 
 def test_tiles() -> None:
-    clean = read_quality(drive(log(), log()), Path("r.parquet"))
+    long = {"rows": 30_000, "seconds": 1.5} | {"inputs": [INPUT_COUNTS | {"samples": 30_000}]}
+    clean = read_quality(drive(log(**long), log(**long)), Path("r.parquet"))
     assert clean is not None
     marked, speed = quality_tiles(clean)
     assert (marked.value, marked.warns) == ("0", False)
-    assert (speed.value, speed.note) == ("200", "2000 rows in 0.1 s: 20000 rows/s")
+    assert (speed.value, speed.note) == ("200", "60000 rows in 3.0 s: 20000 rows/s")
     damaged = read_quality(drive(log({"jumps": 1}, damaged_lines=7, dropped=2)), Path("r.parquet"))
     assert damaged is not None
     tile = quality_tiles(damaged)[0]

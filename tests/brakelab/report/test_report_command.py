@@ -61,7 +61,6 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> str:
         "1 4.00 4.16 0.08 +4.0 nominal 2 6.00 6.24 0.12 +4.0 learned 3 8.00 8.32 0.16 – learned accelerator",
         "request lost 50.01",
         "Data marked 1 3 frames dropped by the kernel; Imu",
-        "Replayed 300 × real time 6000 rows in 0.2 s: 30000 rows/s",
         "stops.log 6000 90000 0.20 30000 300 3 frames dropped by the kernel",
         "accel_x 100.0 100 0.02 0 0 0 0 \N{MINUS SIGN}4 1 m/s²",
         "Imu 072 6000 100.0 100 0 0 0 0 7",

@@ -62,6 +62,8 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
         true = onto(drive, read_drive(truth, _FRICTION, remedy), truth)
     found = brakings(drive, result)
     accuracy = None if true is None else accuracy_per_axle(drive, true, found)
+    if accuracy is not None and not any(row.seconds for row in accuracy.values()):
+        accuracy = None
     loop = None if timing is None else read_timing(timing)
     quality = read_quality(drive, result)
     rows = [_row(*pair) for pair in zip(found, sparklines(drive, found), strict=True)]

@@ -15,6 +15,7 @@ POINTS: Final = 600
 """Of each wheel in a plot."""
 BINS: Final = 12
 _FEWEST: Final = 20  # rows of a bin
+_LEAST_ROWS: Final = 100  # of a plot: 1 s of observation
 _LEAST_SPAN: Final = 0.1
 
 # Column of a corner (or of the car), label, factor to the label's unit
@@ -34,7 +35,7 @@ def plots_of_friction(drive: Drive, truth: Drive | None, found: list[Braking]) -
     for stem, label, factor in _AGAINST:
         for axle, wheels in AXLES.items():
             observed = [_observed(drive, corner, stem, factor, rows) for corner in CORNERS[wheels]]
-            if any(len(at) for at, _ in observed):
+            if sum(len(at) for at, _ in observed) >= _LEAST_ROWS:
                 true = None if truth is None else truth.corners("mu_b")[:, wheels]
                 plots[f"{stem}-{axle}"] = _plot(drive, observed, label, axle, true)
     return plots

@@ -12,6 +12,8 @@ from ecu.errors import UserError
 PERIOD: Final = 0.01  # s, one row
 RATE_OFF: Final = 0.1
 """Share by which a rate may miss what is expected before it is marked."""
+LONG: Final = 60_000
+"""Rows from which on a replay's speed is not that of its start."""
 _DAMAGE: Final = {
     "damaged": "pieces damaged",
     "damaged_lines": "lines damaged",
@@ -95,7 +97,7 @@ def quality_tiles(quality: Quality) -> list[Tile]:
         tiles.append(Tile("Data marked", f"{len(marked)}", "", note or f"none {count}", warns))
     took = sum(log.seconds for log in quality.logs)
     rows = sum(log.rows for log in quality.logs)
-    if took > 0.0:
+    if rows >= LONG and took > 0.0:
         note = f"{rows} rows in {fixed(took, 1)} s: {rows / took:.0f} rows/s"
         tiles.append(Tile("Replayed", f"{PERIOD * rows / took:.0f}", "× real time", note))
     return tiles
