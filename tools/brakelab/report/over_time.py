@@ -59,14 +59,15 @@ def plots_over_time(drive: Drive, truth: Drive | None, found: list[Braking]) -> 
         "k-f": _tyre_factor(source, span),
         "modes": modes_plot(drive, _coarse(grid), span),
     }
+    shades = [
+        BoxAnnotation(
+            left=braking.t_start, right=braking.t_end, fill_color=SHADE, fill_alpha=1.0, line_color=None,
+            level="image",
+        )
+        for braking in found
+    ]  # fmt: skip
     for plot in plots.values():
-        for braking in found:
-            plot.add_layout(
-                BoxAnnotation(
-                    left=braking.t_start, right=braking.t_end, fill_color=SHADE, fill_alpha=1.0,
-                    line_color=None, level="image",
-                )
-            )  # fmt: skip
+        plot.center.extend(shades)  # the same in all plots: a long drive has hundreds
     link_crosshair(list(plots.values()))
     return plots
 
