@@ -92,7 +92,9 @@ def replay(
         ),
     ],
     config: Config,
-    out: Annotated[Path, typer.Option("--out", metavar="RESULT.parquet", help="Results, one row per 10 ms")],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="RESULT.parquet", help="Results, a row per 10 ms; or .mf4")
+    ],
     map: Map = None,
     observer: Annotated[
         str | None,

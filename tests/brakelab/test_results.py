@@ -1,5 +1,8 @@
-"""Result files: columns, units, nulls, provenance; complete or not there at all."""
+"""Result files: columns, units, nulls, provenance; complete or not there at all; Parquet and MDF4 alike."""
 
+import json
+import sys
+from datetime import timedelta
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from brakelab.replay.engine import N_ROW
+from brakelab.report.drive import read_drive
 from brakelab.results import ROW_COLUMNS, ResultWriter, brakes_path, read_result
 from ecu.config import load_config, new_params
 from ecu.errors import UserError
@@ -113,3 +117,54 @@ def test_a_result_that_cannot_be_read_gives_one_line(tmp_path: Path, content: st
     with pytest.raises(UserError) as error:
         read_result(path)
     assert str(error.value).startswith(str(path))
+
+
+def test_mdf4_holds_the_same_numbers_units_and_provenance(tmp_path: Path, params: RecordArray) -> None:
+    asammdf = pytest.importorskip("asammdf")
+    values = rows(100)
+    values[20:70, OUTPUT["braking"]] = 1.0
+    values[5, OUTPUT["mode"]] = np.nan
+    provenance = {"version": "0.1.0", "start_time_ns": "1600000000123456789", "inputs": [{"name": "<&.log"}]}
+    for name in ("drive.parquet", "drive.mf4"):
+        with ResultWriter(tmp_path / name, params) as writer:
+            writer.provenance = dict(provenance)
+            writer.write(2.0 + np.arange(60) * 0.01, values[:60])
+            writer.write(2.6 + np.arange(40) * 0.01, values[60:])
+            writer.quality = [{"frames": 3}]
+    names = {"drive.brakes.parquet", "drive.mf4", "drive.parquet"}
+    assert {file.name for file in tmp_path.iterdir()} == names
+    with asammdf.MDF(tmp_path / "drive.mf4") as mdf:
+        for group, name in enumerate(("drive.parquet", "drive.brakes.parquet")):
+            result = read_result(tmp_path / name)
+            channels = mdf.groups[group].channels
+            assert {channel.name for channel in channels} == set(result.columns)
+            for index, channel in enumerate(channels):
+                signal = mdf.get(group=group, index=index, ignore_invalidation_bits=True)
+                assert channel.unit == result.units[channel.name]
+                if signal.samples.dtype.kind == "S":
+                    found = [text.decode() for text in signal.samples]
+                    assert found == list(result.columns[channel.name])
+                    continue
+                found = signal.samples.astype(float)
+                if signal.invalidation_bits is not None:
+                    found[np.asarray(signal.invalidation_bits)] = np.nan
+                np.testing.assert_array_equal(found, result.columns[channel.name], channel.name)
+        stated = mdf.header._common_properties
+        assert json.loads(stated["inputs"]) == provenance["inputs"]
+        assert stated["quality"] == '[{"frames": 3}]'
+        assert mdf.header.abs_time == 1600000000123456789 - 2 * 10**9  # where t = 0
+        assert mdf.start_time.utcoffset() == timedelta(0)
+
+
+def test_mdf4_without_asammdf_names_the_remedy_before_the_run(
+    tmp_path: Path, params: RecordArray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "asammdf", None)
+    with pytest.raises(UserError, match=r"drive\.mf4: MDF4 needs asammdf: pip install 'brake-ecu\[mdf\]'"):
+        ResultWriter(tmp_path / "drive.mf4", params)
+
+
+def test_our_own_commands_read_parquet(tmp_path: Path) -> None:
+    for read in (read_result, lambda path: read_drive(path, (), "")):
+        with pytest.raises(UserError, match="`replay` with --out RESULT"):
+            read(tmp_path / "drive.mf4")

@@ -1,4 +1,5 @@
-"""Results as files: `RESULT.parquet` with one row every 10 ms and `RESULT.brakes.parquet` beside it.
+"""Results as files: `RESULT.parquet` with one row every 10 ms and `RESULT.brakes.parquet` beside it, or both
+as the channel groups of one `RESULT.mf4`.
 
 Names and units are the contract's. A quantity that is not available is null. The unit of a column stands in
 its field's metadata, the provenance (version, hashes, start, quality of the input) in the schema's.
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from brakelab.replay.brakes import BRAKE_UNITS, BrakeBook
 from brakelab.replay.engine import MEASURED_INPUTS
+from brakelab.results_mdf import SUFFIX, load_asammdf, refuse_mdf, write_mdf
 from ecu.errors import UserError
 from ecu.records import RecordArray
 from ecu.signals import INPUT_SIGNALS, OUTPUT_COLUMNS, OUTPUT_SIGNALS, column_names
@@ -57,8 +59,8 @@ BRAKE_SCHEMA: Final = _brake_schema()
 
 
 def brakes_path(result: Path) -> Path:
-    """Return where the brake applications of `result` are: `<name>.brakes.parquet`."""
-    return result.with_name(result.stem + ".brakes.parquet")
+    """Return where the brake applications of `result` are: `<name>.brakes.parquet`, or in an MDF4 file."""
+    return result if result.suffix == SUFFIX else result.with_name(result.stem + ".brakes.parquet")
 
 
 def _table(schema: pa.Schema, columns: Sequence[NDArray[Any] | list[Any]]) -> pa.Table:
@@ -79,10 +81,15 @@ def _encoded(metadata: dict[str, Any]) -> dict[str, str]:
 
 
 class ResultWriter:
-    """Writes a result row group by row group; both files appear when the run is complete, or not at all."""
+    """Writes a result row group by row group; its files appear when the run is complete, or not at all."""
 
     def __init__(self, path: Path, params: RecordArray) -> None:
-        """`params`: the parameters of `step`, shape (1,): geometry of the brakes, mass, resistances."""
+        """`params`: the parameters of `step`, shape (1,): geometry of the brakes, mass, resistances.
+
+        Raises UserError for a `path` that ends in .mf4 where asammdf is not installed.
+        """
+        if path.suffix == SUFFIX:
+            load_asammdf(path)
         self.path = path
         self.brakes = BrakeBook(params)
         self.provenance: dict[str, Any] = {}
@@ -127,6 +134,12 @@ class ResultWriter:
         self.brakes.end_log()
         columns = [[getattr(row, name) for row in self.brakes.rows] for name in BRAKE_UNITS]
         table = _table(BRAKE_SCHEMA, columns).replace_schema_metadata(_encoded(self.provenance))
+        if self.path.suffix == SUFFIX:
+            try:
+                write_mdf(self._unfinished, table, self.path)
+            finally:
+                self._unfinished.unlink()
+            return
         pq.write_table(table, brakes_path(self.path), compression="zstd")
         self._unfinished.replace(self.path)
 
@@ -149,6 +162,7 @@ def read_result(path: Path) -> Result:
 
     Raises UserError if it cannot be read.
     """
+    refuse_mdf(path)
     try:
         table = pq.read_table(path)
         stored = pq.read_metadata(path).metadata or {}

@@ -89,7 +89,7 @@ def live_samples(params: RecordArray, block: SampleBlock, cycles: int) -> np.nda
                     )
             row += 1
         end_cycle(ecu.inputs[0], freshness)
-        step(*ecu)
+        step(*ecu[:4])
         lines.append(ecu.outputs.view(np.float64).copy())
     return np.array(lines)
 
@@ -153,7 +153,7 @@ def live_frames(params: RecordArray, frames: RecordArray, cycles: RecordArray, c
         until = first + int(cycle["frames"]) if counted else len(frames)
         first = receive(plan, reception, frames, first, until, ecu.inputs[0])
         end_cycle(ecu.inputs[0], reception.freshness)
-        step(*ecu)
+        step(*ecu[:4])
         lines.append(ecu.outputs.view(np.float64).copy())
     return np.array(lines)
 

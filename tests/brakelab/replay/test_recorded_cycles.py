@@ -66,7 +66,7 @@ def record(tmp_path: Path, frames: RecordArray) -> tuple[Path, RecordArray]:
         following = receive(plan, reception, frames, first, len(frames), ecu.inputs[0])
         cycle["frames"], first = following - first, following
         end_cycle(ecu.inputs[0], reception.freshness)
-        step(*ecu)
+        step(*ecu[:4])
         records["outputs"][k] = ecu.outputs[0]
         records["learned"][k] = ecu.state["learned"][0]
     about = {"start_ns": START_NS, "state": layout(ecu.state.dtype)}

@@ -180,7 +180,7 @@ def test_a_log_that_cannot_be_replayed_gives_one_line_and_no_result(tmp_path: Pa
     ("change", "line"),
     [
         ({"observer": "best"}, "--observer: best: not known; take joint"),
-        ({"out": Path("result.mf4")}, "--out: result.mf4: results are written as Parquet"),
+        ({"out": Path("result.csv")}, "--out: result.csv: results are written as Parquet or MDF4"),
         ({"logs": [Path("no.log")]}, "no.log: no such file"),
     ],
 )

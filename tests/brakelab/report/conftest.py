@@ -18,6 +18,15 @@ STOPS = ((5.0, 4.0), (22.0, 6.0), (40.0, 8.0))  # start [s], deceleration [m/s^2
 V_IN = 100.0 / 3.6
 DT = 0.01
 TRUE_FRICTION = {"fl": 0.38, "fr": 0.38, "rl": 0.49, "rr": 0.50}
+INPUT_COUNTS: dict[str, Any] = {
+    "name": "accel_x", "unit": "m/s^2", "samples": 1000, "expected_hz": [100.0, 100.0], "timeout_s": 0.1,
+    "greatest_gap_s": 0.02, "invalid": 0, "outside": 0, "clipped": 0, "jumps": 0, "least": -4.0,
+    "greatest": 1.0,
+}  # fmt: skip
+MESSAGE_COUNTS: dict[str, Any] = {
+    "name": "Imu", "id": "072", "expected_hz": 100.0, "received": 1000, "accepted": 1000,
+    "checksum_errors": 0, "sequence_errors": 0, "repeated": 0, "length_errors": 0, "lost": 0,
+}  # fmt: skip
 
 
 def made_up_drive(seconds: float = 60.0) -> tuple[dict[str, Any], dict[str, Any], dict[str, list[Any]]]:
@@ -105,6 +114,12 @@ def write_drive(folder: Path) -> dict[str, Path]:
     metadata = {
         "start_time_ns": "1717240000000000000", "vehicle": "SUV", "config_hash": "0123456789abcdef",
         "version": "0.1.0",
+        "inputs": json.dumps([{"name": "stops.log", "sha256": ""}]),
+        "quality": json.dumps([{
+            "rows": 6000, "frames": 90000, "samples": 0, "seconds": 0.2, "dropped": 3,
+            "inputs": [INPUT_COUNTS | {"samples": 6000}, INPUT_COUNTS | {"name": "yaw_rate", "samples": 0}],
+            "messages": [MESSAGE_COUNTS | {"received": 6000, "lost": 7}],
+        }]),
     }  # fmt: skip
     path = write(folder / "stops.parquet", result, metadata)
     return {

@@ -4,6 +4,7 @@ import pytest
 from brakelab.report.accuracy import accuracy, achieved_deceleration, evaluated, tracking
 from brakelab.report.brakings import Braking
 from brakelab.report.drive import Drive
+from ecu.signals import CORNERS
 
 NONE = np.full(4, np.nan)
 T = np.arange(0.0, 12.0, 0.01)
@@ -39,6 +40,22 @@ def test_demand_must_be_reached(achieved: float, counts: bool) -> None:
 def test_tracking_is_achieved_over_demanded() -> None:
     drive, found = stop(achieved=4.5)
     assert tracking(drive, None, found) == pytest.approx([-0.1])
+
+
+@pytest.mark.parametrize(
+    ("motor", "asked", "counts"),
+    [(0.0, 0.0, True), (80.0, 0.0, True), (150.0, 0.0, False), (150.0, 150.0, True)],
+)
+def test_motors_that_brake_on_another_demand_hide_the_brakes(
+    motor: float, asked: float, counts: bool
+) -> None:
+    drive, found = stop(achieved=5.0)
+    torques = {"brake_torque": 1000.0, "motor_torque": motor, "motor_demand": asked}
+    more = {
+        f"{name}_{corner}": np.full_like(T, value) for name, value in torques.items() for corner in CORNERS
+    }
+    (share,) = tracking(drive._replace(columns={**drive.columns, **more}), None, found)
+    assert np.isfinite(share) == counts
 
 
 def test_true_deceleration_goes_before_the_measured_one() -> None:

@@ -60,6 +60,11 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> str:
         "1 with nominal friction, as nothing was learned before",
         "1 4.00 4.16 0.08 +4.0 nominal 2 6.00 6.24 0.12 +4.0 learned 3 8.00 8.32 0.16 – learned accelerator",
         "request lost 50.01",
+        "Data marked 1 3 frames dropped by the kernel; Imu",
+        "stops.log 6000 90000 0.20 30000 300 3 frames dropped by the kernel",
+        "accel_x 100.0 100 0.02 0 0 0 0 \N{MINUS SIGN}4 1 m/s²",
+        "Imu 072 6000 100.0 100 0 0 0 0 7",
+        "Never received: yaw_rate.",
         "lateness",
     ],
 )
@@ -74,13 +79,16 @@ def test_page_is_small_and_names_no_address(drive_files: Files) -> None:
     assert "default-src 'none'" in page
 
 
-def test_long_drive_stays_small(drive_files: Files) -> None:
+def test_an_hour_with_180_brakings_stays_small(drive_files: Files) -> None:
     def longer(table: pa.Table) -> pa.Table:
-        many = pa.concat_tables([table] * 20)
-        return many.set_column(0, "t", pa.array(np.arange(many.num_rows) * 0.01))
+        many = pa.concat_tables([table] * 60)
+        return column("t", np.arange(many.num_rows) * 0.01)(many)
 
-    change(drive_files["result"], lambda table: longer(table.select(["t", *set(table.column_names) - {"t"}])))
+    change(drive_files["result"], longer)
+    change(drive_files["truth"], longer)
+    drive_files["brakes"].unlink()
     page = written(drive_files)
+    assert page.count('class="spark"') == 180
     assert len(page.encode()) < 3_000_000
     assert "the smallest and the largest value" in page
 
@@ -89,6 +97,11 @@ def test_without_truth_and_timing_their_tables_are_absent(drive_files: Files) ->
     text = visible(written(drive_files, truth=False, timing=False))
     assert "nRMSE" not in text
     assert "Loop timing" not in text
+
+
+def test_a_result_without_metadata_has_no_data_quality(drive_files: Files) -> None:
+    change(drive_files["result"], lambda table: table.replace_schema_metadata({}))
+    assert "Data quality" not in visible(written(drive_files))
 
 
 def test_columns_of_the_contract_alone_are_enough(drive_files: Files) -> None:

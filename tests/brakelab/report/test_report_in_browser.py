@@ -18,7 +18,7 @@ OPTIONS = (
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync",
     "--disable-dev-shm-usage",
     "--disable-background-networking", "--disable-component-update", "--enable-logging=stderr",
-    "--virtual-time-budget=10000", "--window-size=1400,3600",
+    "--virtual-time-budget=10000", "--window-size=1400,6000",
 )  # fmt: skip
 
 # Leaves what it saw in the title, which --dump-dom shows.
@@ -62,7 +62,7 @@ def test_every_plot_is_drawn(drive_files: dict[str, Path], tmp_path: Path, schem
     title = re.search(r"<title>(.*?)</title>", done.stdout)
     assert title, done.stderr[-2000:]
     seen = json.loads(title[1])
-    assert seen["figures"] == seen["drawn"] == 16
+    assert seen["figures"] == seen["drawn"] == 22
     assert seen["loaded"] == []
     assert seen["window"] == pytest.approx([21.5, 27.13], abs=0.05)
     assert seen["ink"] == [ink]

@@ -4,6 +4,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
+from time import perf_counter
 from typing import Final
 
 import numpy as np
@@ -21,6 +22,7 @@ from brakelab.replay.quality import Findings, quality_counts, quality_lines
 from brakelab.replay.source import load_source, map_unused
 from brakelab.replay.summary import brakings_table, prediction_lines, taps
 from brakelab.results import ResultWriter, brakes_path
+from brakelab.results_mdf import SUFFIX
 from ecu import __version__
 from ecu.bus.receive import ReceivePlan
 from ecu.config import Config, config_hash, load_config, new_params, store_key
@@ -46,6 +48,8 @@ def replay(
     cycles: Path | None = None,
 ) -> int:
     """Replay `logs` as one drive into `out` (its folder is made) and `<name>.brakes.parquet`; return 0.
+
+    An `out` that ends in .mf4 holds both.
 
     `map` is a signal map (None: the ECU's own database), `state` the folder of the state store, `cycles` a
     recording that gives initial state, T_k and missed periods to an independent log of the same drive.
@@ -82,7 +86,7 @@ def replay(
         shift = 0.0
         for place, found in enumerate(findings):
             ecu = new_ecu(params, learned)
-            end, kind = shift, kind_of(found.path)
+            end, kind, began = shift, kind_of(found.path), perf_counter()
             for rows in replay_log(found.path, ecu, source, recording, found, advance):
                 t = _seconds(rows, found, kind)
                 if place and found.rows == len(t):  # the first block of a log that goes on
@@ -92,9 +96,10 @@ def replay(
                 writer.write(t, rows.values)
                 end = float(t[-1]) + _PERIOD
             writer.brakes.end_log()
+            found.seconds = perf_counter() - began
             shift = end
             learned = ecu.state["learned"].copy()
-        writer.quality = [quality_counts(found) for found in findings]
+        writer.quality = [quality_counts(found, source.plan) for found in findings]
     if state and learned is not None and learned.tobytes() != before:
         with closing(open_store(state)) as store:
             save(store, store_key(vehicle), learned)
@@ -114,8 +119,9 @@ def _with_observer(vehicle: Config, observer: str | None) -> Config:
 def _check(logs: Sequence[Path], observer: str | None, out: Path, cycles: Path | None) -> None:
     if observer is not None and observer not in OBSERVERS:
         raise UserError("--observer", observer, f"not known; take {', '.join(OBSERVERS)}")
-    if out.suffix != ".parquet":
-        raise UserError("--out", str(out), "results are written as Parquet; let the name end in .parquet")
+    if out.suffix not in (".parquet", SUFFIX):
+        remedy = f"results are written as Parquet or MDF4; let the name end in .parquet or {SUFFIX}"
+        raise UserError("--out", str(out), remedy)
     for log in logs:
         if not log.exists():
             raise UserError(str(log), "", "no such file; give an existing log")

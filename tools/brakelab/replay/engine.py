@@ -12,6 +12,7 @@ from typing import Any, Final, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.replay.seen import look_at, new_seen
 from brakelab.replay.signal_file import SampleBlock
 from ecu.bus.freshness import accept, begin_cycle, end_cycle
 from ecu.bus.receive import ReceivePlan, Reception, receive
@@ -35,12 +36,14 @@ _AT: Final = np.dtype([("cursor", "i8"), ("done", "i8"), ("open", "i8"), ("left"
 
 
 class Ecu(NamedTuple):
-    """The records of one ECU, each of shape (1,)."""
+    """The records of one ECU, each of shape (1,), and what its inputs were like."""
 
     params: RecordArray
     state: RecordArray
     inputs: RecordArray
     outputs: RecordArray
+    seen: RecordArray
+    """SEEN, shape (N_INPUTS,)."""
 
 
 class Rows(NamedTuple):
@@ -56,7 +59,7 @@ class Rows(NamedTuple):
 
 def new_ecu(params: RecordArray, learned: RecordArray | None) -> Ecu:
     """Return an ECU before its first cycle that has `learned`, shape (1,), from before; None: nothing."""
-    return Ecu(params, new_state(params, learned), new_record(INPUTS), new_record(OUTPUTS))
+    return Ecu(params, new_state(params, learned), new_record(INPUTS), new_record(OUTPUTS), new_seen())
 
 
 @kernel
@@ -69,9 +72,10 @@ def _open_cycle(inputs: Record, cycle: Record) -> None:
 
 @kernel
 def _close_cycle(
-    params: Any, state: Any, inputs: Any, outputs: Any, vector: Vector, freshness: Any, row: Vector
+    params: Any, state: Any, inputs: Any, outputs: Any, seen: Any, vector: Vector, freshness: Any, row: Vector
 ) -> None:
     end_cycle(inputs[0], freshness)
+    look_at(inputs[0], seen)
     step(params, state, inputs, outputs)
     row[:N_OUTPUTS] = vector
     for i in range(len(MEASURED_INPUTS)):
@@ -86,6 +90,7 @@ def _run_frames(
     state: Any,
     inputs: Any,
     outputs: Any,
+    seen: Any,
     vector: Vector,
     plan: ReceivePlan,
     reception: Reception,
@@ -113,7 +118,7 @@ def _run_frames(
         run.cursor = cursor
         if cursor == len(frames) and run.left > 0 and not last:
             return
-        _close_cycle(params, state, inputs, outputs, vector, reception.freshness, values[run.done])
+        _close_cycle(params, state, inputs, outputs, seen, vector, reception.freshness, values[run.done])
         run.done += 1
         run.open = 0
 
@@ -124,6 +129,7 @@ def _run_samples(
     state: Any,
     inputs: Any,
     outputs: Any,
+    seen: Any,
     vector: Vector,
     freshness: Any,
     block: SampleBlock,
@@ -151,7 +157,7 @@ def _run_samples(
             run.cursor += 1
         if run.cursor == len(block.t_ns) and not last:
             return
-        _close_cycle(params, state, inputs, outputs, vector, freshness, values[run.done])
+        _close_cycle(params, state, inputs, outputs, seen, vector, freshness, values[run.done])
         run.done += 1
         run.open = 0
 

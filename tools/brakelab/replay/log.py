@@ -10,6 +10,7 @@ from brakelab.replay.engine import Ecu, Rows, run_frames, run_samples
 from brakelab.replay.formats import Advance, kind_of, read_frames
 from brakelab.replay.log_quality import LogQuality
 from brakelab.replay.quality import Findings, identifier, note_faults
+from brakelab.replay.seen import set_raw_ends
 from brakelab.replay.signal_file import SampleBlock, freshness_at_any_rate, read_signals
 from brakelab.replay.source import Source, only_interface
 from ecu.bus.receive import ReceivePlan, new_reception
@@ -73,6 +74,7 @@ def replay_log(
     `recording` gives initial state, T_k and missed periods to a log of frames. `advance(bytes)` hears of
     progress.
     """
+    findings.seen = ecu.seen
     kind = kind_of(path)
     if kind == "signals":
         yield from _noted(_replay_signals(path, ecu, findings, advance), findings)
@@ -85,6 +87,7 @@ def replay_log(
     ecu.params[0]["mapped"] = plan.mapped
     reception = findings.reception = new_reception(plan)
     findings.freshness, findings.mapped = reception.freshness, plan.mapped
+    set_raw_ends(ecu.seen, plan.signals)
     blocks = read_frames(log, findings.interfaces, findings.log, advance)
     if source.bus and not counted:
         blocks = only_interface(blocks, source.bus, findings)
@@ -93,6 +96,7 @@ def replay_log(
     else:
         start_as_recorded(ecu, recording)
         cycles = read_cycles(recording)
+        findings.dropped = int(cycles["dropped"].max())
         if not counted:
             blocks = _from_first_recorded(blocks, recording)
             counted = _heard_everything(cycles)

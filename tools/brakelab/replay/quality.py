@@ -10,10 +10,22 @@ from numpy.typing import NDArray
 
 from brakelab.replay.log_quality import LogQuality
 from brakelab.replay.signal_file import SignalQuality
+from ecu.bus.freshness import RATE_TOLERANCE
 from ecu.bus.receive import ReceivePlan, Reception
 from ecu.diagnostics.faults import FAULTS
 from ecu.records import EXTENDED_ID, RecordArray
-from ecu.signals import DEGRADED, N_INPUTS, OUTPUT
+from ecu.signals import DEGRADED, INPUT_SIGNALS, N_INPUTS, OUTPUT
+
+MESSAGE_KINDS: Final = (
+    "received",
+    "accepted",
+    "checksum_errors",
+    "sequence_errors",
+    "repeated",
+    "length_errors",
+    "lost",
+)
+"""Counters of a message that results keep, as in `ecu.bus.receive.MESSAGE_COUNTERS`."""
 
 SHOWN: Final = 20  # names in a line
 
@@ -34,8 +46,14 @@ class Findings:
     """Frames of interfaces that the map does not name."""
     freshness: RecordArray | None = None
     """What became of the samples of each input, shape (N_INPUTS,)."""
+    seen: RecordArray | None = None
+    """What its samples were like, shape (N_INPUTS,)."""
     mapped: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(N_INPUTS, np.bool_))
     """Where the log can hold an input, shape (N_INPUTS,)."""
+    dropped: int = 0
+    """Frames that the kernel dropped in a recorded run."""
+    seconds: float = 0.0
+    """That the replay took."""
     faulty_rows: int = 0
     """In which the mode was degraded or failed."""
     fault_rows: Counter[int] = field(default_factory=Counter)
@@ -102,23 +120,55 @@ def quality_lines(findings: Findings, plan: ReceivePlan) -> list[str]:
     return lines
 
 
-def quality_counts(findings: Findings) -> dict[str, Any]:
+def quality_counts(findings: Findings, plan: ReceivePlan) -> dict[str, Any]:
     """Return the counters of quality for the metadata of results."""
     counts: dict[str, Any] = {
         "rows": findings.rows,
         **vars(findings.log),
         "samples": findings.signals.samples,
+        "dropped": findings.dropped,
+        "seconds": round(findings.seconds, 3),
+        "inputs": _input_counts(findings),
     }
     if findings.reception is not None:
         messages = findings.reception.messages
-        kinds = (
-            "received",
-            "accepted",
-            "checksum_errors",
-            "sequence_errors",
-            "repeated",
-            "length_errors",
-            "lost",
-        )
-        counts |= {kind: int(messages[kind].sum()) for kind in kinds}
+        counts |= {kind: int(messages[kind].sum()) for kind in MESSAGE_KINDS}
+        counts["messages"] = [
+            {
+                "name": str(message["name"]),
+                "id": identifier(message),
+                "expected_hz": 1e9 / float(message["period_ns"]) if message["period_ns"] else None,
+                **{kind: int(counter[kind]) for kind in MESSAGE_KINDS},
+            }
+            for message, counter in zip(plan.messages, messages, strict=True)
+            if not message["foreign"]
+        ]
     return counts
+
+
+def _input_counts(findings: Findings) -> list[dict[str, Any]]:
+    """Return what became of each input that the log can hold."""
+    if findings.freshness is None or findings.seen is None:
+        return []
+    inputs = []
+    for place in np.flatnonzero(findings.mapped):
+        signal, known, seen = INPUT_SIGNALS[place], findings.freshness[place], findings.seen[place]
+        intervals = (known["longest_ns"] / RATE_TOLERANCE, known["shortest_ns"] * RATE_TOLERANCE)
+        promised = known["shortest_ns"] > 0.0
+        inputs.append(
+            {
+                "name": signal.name,
+                "unit": signal.unit,
+                "samples": int(known["taken"]) + int(known["outside"]) + int(known["invalid"]),
+                "expected_hz": [float(1e9 / interval) for interval in intervals] if promised else [],
+                "timeout_s": round(1e-9 * int(known["timeout_ns"]), 6),
+                "greatest_gap_s": round(1e-9 * int(seen["gap_ns"]), 6),
+                "invalid": int(known["invalid"]),
+                "outside": int(known["outside"]),
+                "clipped": int(seen["clipped"]),
+                "jumps": int(seen["jumps"]),
+                "least": float(seen["least"]) if seen["values"] else None,
+                "greatest": float(seen["greatest"]) if seen["values"] else None,
+            }
+        )
+    return inputs

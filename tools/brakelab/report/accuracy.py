@@ -18,6 +18,8 @@ SETTLING_S = 0.5  # after the demand is reached: pressure and slip have settled
 LOWEST_SPEED = 15.0 / 3.6  # m/s, the observers switch off below (thesis, 4.4)
 # The demand counts as reached at this share: before compensation the friction may be 20 % low.
 REACHED = 0.8
+# Motors that brake with more than this share of the brakes' torque, and not on the ECU's demand, hide it.
+MOTORS = 0.1
 
 
 class Accuracy(NamedTuple):
@@ -53,14 +55,26 @@ def evaluated(drive: Drive, truth: Drive | None, found: list[Braking]) -> NDArra
 
 
 def tracking(drive: Drive, truth: Drive | None, found: list[Braking]) -> list[float]:
-    """Return per braking how much more was achieved than demanded, as a share; NaN: nothing to evaluate."""
+    """Return per braking how much more was achieved than demanded, as a share.
+
+    NaN: nothing to evaluate, or motors braked on somebody else's demand.
+    """
     rows = evaluated(drive, truth, found)
     demand, achieved = drive.column("decel_demand_total"), achieved_deceleration(drive, truth)
     shares = []
     for braking in found:
         mine = rows & inside(drive, braking)
-        shares.append(float(achieved[mine].sum() / demand[mine].sum()) - 1.0 if mine.any() else float("nan"))
+        known = mine.any() and not _others_brake(drive, mine)
+        shares.append(float(achieved[mine].sum() / demand[mine].sum()) - 1.0 if known else float("nan"))
     return shares
+
+
+def _others_brake(drive: Drive, rows: NDArray[np.bool_]) -> bool:
+    motors, brakes, asked = (
+        np.nan_to_num(drive.corners(name)[rows]).sum()
+        for name in ("motor_torque", "brake_torque", "motor_demand")
+    )
+    return bool(motors - asked > MOTORS * brakes > 0.0)
 
 
 def accuracy(estimate: Vector, sigma: Vector, true: Vector, dt: float) -> Accuracy:

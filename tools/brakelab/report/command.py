@@ -9,11 +9,14 @@ from brakelab.outputs import check_outputs
 from brakelab.report.accuracy import accuracy_per_axle, tracking
 from brakelab.report.brakings import Braking, brakings
 from brakelab.report.drive import Vector, onto, read_drive
+from brakelab.report.friction import plots_of_friction
 from brakelab.report.loop import plots_of_loop
 from brakelab.report.over_time import POINTS, plots_over_time
 from brakelab.report.page import fill
 from brakelab.report.per_braking import plots_per_braking
 from brakelab.report.prediction import plots_of_prediction, prediction_errors, prediction_rows
+from brakelab.report.quality import quality_tiles, read_quality
+from brakelab.report.sparkline import sparklines
 from brakelab.report.summary import facts, faults, tiles
 from brakelab.report.timing import read_timing, spreads
 from ecu.errors import UserError
@@ -38,6 +41,7 @@ class Row(NamedTuple):
     temperature_front: float
     temperature_rear: float
     kilojoules: float
+    sparkline: str
 
 
 def report(result: Path, truth: Path | None, out: Path, timing: Path | None = None) -> None:
@@ -58,12 +62,16 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
         true = onto(drive, read_drive(truth, _FRICTION, remedy), truth)
     found = brakings(drive, result)
     accuracy = None if true is None else accuracy_per_axle(drive, true, found)
+    if accuracy is not None and not any(row.seconds for row in accuracy.values()):
+        accuracy = None
     loop = None if timing is None else read_timing(timing)
-    rows = [_row(braking) for braking in found]
+    quality = read_quality(drive, result)
+    rows = [_row(*pair) for pair in zip(found, sparklines(drive, found), strict=True)]
     predicted = prediction_errors(found)
     page = fill(
         {
             "over_time": plots_over_time(drive, true, found),
+            "friction_plots": plots_of_friction(drive, true, found),
             "prediction_plots": plots_of_prediction(found),
             "per_braking": plots_per_braking(found),
             "loop_plots": {} if loop is None else plots_of_loop(loop),
@@ -71,15 +79,20 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
         {
             "name": result.stem,
             "facts": facts(drive),
-            "tiles": tiles(drive, found, tracking(drive, true, found), predicted, accuracy, loop),
+            "tiles": [
+                *tiles(drive, found, tracking(drive, true, found), predicted, accuracy, loop),
+                *(quality_tiles(quality) if quality else []),
+            ],
             "brakings": rows,
             "with_temperature": any(np.isfinite(row.temperature_front) for row in rows),
+            "with_sparklines": any(row.sparkline for row in rows),
             "with_energy": any(np.isfinite(row.kilojoules) for row in rows),
             "predictions": prediction_rows(found),
             "prediction_errors": predicted,
             "accuracy": accuracy,
             "reduced": len(drive.t) > POINTS,
             "faults": faults(drive),
+            "quality": quality,
             "spreads": {} if loop is None else spreads(loop),
         },
     )
@@ -90,7 +103,7 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
         raise UserError(str(out), error.strerror or "not writable", "choose another --out") from error
 
 
-def _row(braking: Braking) -> Row:
+def _row(braking: Braking, sparkline: str) -> Row:
     return Row(
         number=braking.number,
         t_start=braking.t_start,
@@ -105,4 +118,5 @@ def _row(braking: Braking) -> Row:
         temperature_front=float(braking.temperature_in[:2].mean()),
         temperature_rear=float(braking.temperature_in[2:].mean()),
         kilojoules=braking.energy * 1e-3,
+        sparkline=sparkline,
     )

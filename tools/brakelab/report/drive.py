@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from brakelab.results_mdf import refuse_mdf
 from ecu.errors import UserError
 from ecu.signals import CORNERS
 
@@ -39,6 +40,7 @@ class Drive(NamedTuple):
 
 def read_parquet(path: Path, remedy: str) -> pa.Table:
     """Return the table; UserError with `remedy` when there is none or it cannot be read."""
+    refuse_mdf(path)
     if not path.is_file():
         raise UserError(str(path), "no such file", remedy)
     try:
@@ -84,7 +86,7 @@ def read_drive(path: Path, required: tuple[str, ...], remedy: str) -> Drive:
     ]
     metadata = {
         key.decode(errors="replace"): value.decode(errors="replace")
-        for key, value in (table.schema.metadata or {}).items()
+        for key, value in (pq.read_metadata(path).metadata or {}).items()
     }
     return Drive(t, {name: numbers(table, name, path) for name in numeric if name != "t"}, metadata)
 

@@ -29,6 +29,9 @@ class _Estimated(NamedTuple):
     """Of the axis, in the quantity's unit."""
 
 
+# Least span of the other axes: a drive in which nothing happens is drawn flat.
+_LEAST_KMH, _LEAST_DECELERATION, _LEAST_BAR, _LEAST_FACTOR = 10.0, 1.0, 20.0, 0.2
+
 _FRICTION = _Estimated("mu_b", "0.000", 0.2)
 _DISC = _Estimated("disc_temperature", "0", 40.0)
 
@@ -56,14 +59,15 @@ def plots_over_time(drive: Drive, truth: Drive | None, found: list[Braking]) -> 
         "k-f": _tyre_factor(source, span),
         "modes": modes_plot(drive, _coarse(grid), span),
     }
+    shades = [
+        BoxAnnotation(
+            left=braking.t_start, right=braking.t_end, fill_color=SHADE, fill_alpha=1.0, line_color=None,
+            level="image",
+        )
+        for braking in found
+    ]  # fmt: skip
     for plot in plots.values():
-        for braking in found:
-            plot.add_layout(
-                BoxAnnotation(
-                    left=braking.t_start, right=braking.t_end, fill_color=SHADE, fill_alpha=1.0,
-                    line_color=None, level="image",
-                )
-            )  # fmt: skip
+        plot.center.extend(shades)  # the same in all plots: a long drive has hundreds
     link_crosshair(list(plots.values()))
     return plots
 
@@ -120,6 +124,7 @@ def _hover(plot: Any, source: ColumnDataSource, rows: list[tuple[str, str, str]]
 
 def _speed(source: ColumnDataSource, span: Range1d) -> Any:
     plot = new_figure(TIME, "Speed [km/h]", x_range=span, window_axis="x")
+    plot.y_range.min_interval = _LEAST_KMH
     _line(plot, source, "speed", "estimated", ESTIMATE)
     _line(plot, source, "speed_true", "true", INK, line_dash="dashed", line_width=1.2)
     _hover(plot, source, [("estimated", "speed", "0.0"), ("true", "speed_true", "0.0")])
@@ -128,6 +133,7 @@ def _speed(source: ColumnDataSource, span: Range1d) -> Any:
 
 def _deceleration(source: ColumnDataSource, span: Range1d) -> Any:
     plot = new_figure(TIME, "Deceleration [m/s²]", x_range=span, window_axis="x")
+    plot.y_range.min_interval = _LEAST_DECELERATION
     _line(plot, source, "achieved", "achieved (measured)", ESTIMATE, line_width=1.0)
     _line(plot, source, "achieved_true", "achieved (true)", INK, line_dash="dashed", line_width=1.2)
     _line(plot, source, "demanded", "demanded", DEMAND, line_width=2.0)
@@ -162,11 +168,10 @@ def _estimate(
 
 def _pressure(source: ColumnDataSource, span: Range1d, axle: str, corners: tuple[str, str]) -> Any:
     plot = new_figure(TIME, f"Pressure {axle} [bar]", x_range=span, window_axis="x")
+    plot.y_range.min_interval = _LEAST_BAR
     sides = list(zip(corners, ("left", "right"), (LEFT, RIGHT), strict=True))
     for corner, side, colour in sides:
-        _line(
-            plot, source, f"pressure_{corner}", f"{side}, measured", colour, line_width=0.8, line_alpha=0.55
-        )
+        _line(plot, source, f"pressure_{corner}", side, colour, line_width=0.8, line_alpha=0.55)
     for corner, side, _ in sides:
         dash = "solid" if side == "left" else "dashed"
         _line(plot, source, f"demand_{corner}", f"{side}, demanded", DEMAND, line_width=1.8, line_dash=dash)
@@ -178,6 +183,7 @@ def _pressure(source: ColumnDataSource, span: Range1d, axle: str, corners: tuple
 
 def _tyre_factor(source: ColumnDataSource, span: Range1d) -> Any:
     plot = new_figure(TIME, "Tyre factor K_f [-]", x_range=span, window_axis="x")
+    plot.y_range.min_interval = _LEAST_FACTOR
     _line(plot, source, "k_f", "estimated", ESTIMATE)
     _line(plot, source, "k_f_true", "true", INK, line_dash="dashed", line_width=1.2)
     _hover(plot, source, [("estimated", "k_f", "0.000"), ("true", "k_f_true", "0.000")])

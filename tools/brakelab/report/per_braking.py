@@ -35,7 +35,7 @@ def plots_per_braking(found: list[Braking]) -> dict[str, Any]:
     }
     source = ColumnDataSource(columns)
     span = Range1d(start=0.5, end=len(found) + 0.5, bounds="auto")
-    friction = _figure(span, "Mean friction [-]", len(found))
+    friction = _figure(span, "Mean friction [-]", len(found), 0.1)
     for place, (corner, (label, colour, marker)) in enumerate(zip(CORNERS, _MARKERS, strict=True)):
         if np.isfinite(mean[:, place]).any():
             friction.line(f"at_{corner}", corner, source=source, line_color=colour, line_alpha=0.35)
@@ -43,7 +43,7 @@ def plots_per_braking(found: list[Braking]) -> dict[str, Any]:
                 f"at_{corner}", corner, source=source, marker=marker, size=8, line_color=colour,
                 fill_color=colour, fill_alpha=0.35 if place > 1 else 0.9, legend_label=label,
             )  # fmt: skip
-    deceleration = _figure(span, "Mean deceleration [m/s²]", len(found))
+    deceleration = _figure(span, "Mean deceleration [m/s²]", len(found), 1.0)
     for name, colour, marker, size in _DECELERATIONS:
         if np.isfinite(columns[name]).any():
             deceleration.scatter(
@@ -59,8 +59,9 @@ def _hover(plot: Any, tips: list[tuple[str, str]]) -> None:
     plot.add_tools(HoverTool(tooltips=[("braking", "@number"), *tips]))
 
 
-def _figure(span: Range1d, label: str, count: int) -> Any:
+def _figure(span: Range1d, label: str, count: int, least_span: float) -> Any:
     plot = new_figure("Braking", label, x_range=span)
+    plot.y_range.min_interval = least_span
     plot.xaxis.ticker = SingleIntervalTicker(interval=max(1, -(-count // 15)))
     plot.xgrid.grid_line_color = None
     return plot

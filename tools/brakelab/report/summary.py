@@ -119,7 +119,7 @@ def _deceleration(shares: list[float]) -> Tile:
     known = np.array([share for share in shares if np.isfinite(share)])
     title = "Achieved over demanded"
     if not known.size:
-        return Tile(title, fixed(float("nan"), 0), "", "no steady braking in the result")
+        return Tile(title, fixed(float("nan"), 0), "", "no steady braking by the brakes alone")
     mean, worst = float(known.mean()), float(known[np.argmax(np.abs(known))])
     note = f"steady deceleration; worst braking {signed_percent(worst, 1)} %"
     return Tile(title, signed_percent(mean, 1), "%", note, abs(worst) > _DEMAND_ERROR)

@@ -1,0 +1,50 @@
+"""The small curves: one scale for the drive, means of stretches, nothing where nothing is known."""
+
+import re
+
+import numpy as np
+import pytest
+
+from brakelab.report.brakings import Braking
+from brakelab.report.drive import Drive
+from brakelab.report.sparkline import HEIGHT, POINTS, sparklines
+
+NONE = np.full(4, np.nan)
+T = np.arange(0.0, 30.0, 0.01)
+
+
+def braking(start: float, end: float) -> Braking:
+    nan = float("nan")
+    return Braking(1, start, end, 30.0, 0.0, nan, nan, nan, NONE, NONE, nan, nan, nan, "")
+
+
+def heights(svg: str, name: str) -> np.ndarray:
+    points = re.search(rf'class="{name}" points="([^"]+)"', svg)
+    assert points
+    return np.array([float(point.split(",")[1]) for point in points[1].split()])
+
+
+@pytest.fixture
+def two_brakings() -> tuple[Drive, list[Braking]]:
+    """From 2 s 4 m/s² demanded and achieved, from 12 s 8 demanded and 4 achieved."""
+    demand = 4.0 * ((T >= 2) & (T < 8)) + 8.0 * ((T >= 12) & (T < 18))
+    achieved = np.minimum(demand, 4.0) + 0.1 * (-1.0) ** np.arange(len(T))
+    columns = {"decel_demand_total": demand, "accel_x_road": -achieved}
+    return Drive(T, columns, {}), [braking(2.0, 7.99), braking(12.0, 17.99)]
+
+
+def test_equal_decelerations_have_equal_heights(two_brakings: tuple[Drive, list[Braking]]) -> None:
+    first, second = sparklines(*two_brakings)
+    top, base = 2.0, HEIGHT - 2.0
+    np.testing.assert_allclose(heights(second, "demanded"), top, atol=0.1)
+    for svg, name in ((first, "demanded"), (first, "achieved"), (second, "achieved")):
+        np.testing.assert_allclose(heights(svg, name), 0.5 * (top + base), atol=0.4)
+    assert len(heights(first, "achieved")) == POINTS
+    assert len(first) < 1500
+
+
+def test_what_is_not_known_is_not_drawn(two_brakings: tuple[Drive, list[Braking]]) -> None:
+    drive, found = two_brakings
+    drive.columns["decel_demand_total"][:] = np.nan  # type: ignore[index]
+    assert ["demanded" in svg for svg in sparklines(drive, found)] == [False, False]
+    assert sparklines(Drive(T, {}, {}), found) == ["", ""]

@@ -1,0 +1,101 @@
+"""Friction against disc temperature, speed and pressure, as it was observed in the brakings of a drive."""
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakelab.report.accuracy import AXLES
+from brakelab.report.brakings import Braking, inside
+from brakelab.report.drive import Drive, Vector
+from brakelab.report.look import INK, LEFT, RIGHT, new_figure
+from ecu.signals import CORNERS, OBSERVING
+
+POINTS: Final = 600
+"""Of each wheel in a plot."""
+BINS: Final = 12
+_FEWEST: Final = 20  # rows of a bin
+_LEAST_ROWS: Final = 100  # of a plot: 1 s of observation
+_LEAST_SPAN: Final = 0.1
+
+# Column of a corner (or of the car), label, factor to the label's unit
+_AGAINST: Final = (
+    ("disc_temperature", "Disc temperature [°C]", 1.0),
+    ("vehicle_speed", "Speed [km/h]", 3.6),
+    ("calliper_pressure", "Pressure [bar]", 1.0),
+)
+
+
+def plots_of_friction(drive: Drive, truth: Drive | None, found: list[Braking]) -> dict[str, Any]:
+    """Return the figures by name, front and rear for each quantity; empty where nothing was observed."""
+    rows = np.zeros(len(drive.t), bool)
+    for braking in found:
+        rows |= inside(drive, braking)
+    plots = {}
+    for stem, label, factor in _AGAINST:
+        for axle, wheels in AXLES.items():
+            observed = [_observed(drive, corner, stem, factor, rows) for corner in CORNERS[wheels]]
+            if sum(len(at) for at, _ in observed) >= _LEAST_ROWS:
+                true = None if truth is None else truth.corners("mu_b")[:, wheels]
+                plots[f"{stem}-{axle}"] = _plot(drive, observed, label, axle, true)
+    return plots
+
+
+def _observed(
+    drive: Drive, corner: str, stem: str, factor: float, rows: NDArray[np.bool_]
+) -> tuple[Vector, NDArray[np.int64]]:
+    """Return a quantity where the corner's friction was observed, and in which rows."""
+    at = drive.column(stem if drive.has(stem) else f"{stem}_{corner}") * factor
+    known = np.isfinite(at) & np.isfinite(drive.column(f"mu_b_{corner}"))
+    if drive.has(f"mode_{corner}"):
+        known = known & (drive.column(f"mode_{corner}") == OBSERVING)
+    places = np.flatnonzero(rows & known)
+    return at[places], places
+
+
+def _plot(
+    drive: Drive,
+    observed: list[tuple[Vector, NDArray[np.int64]]],
+    label: str,
+    axle: str,
+    true: Vector | None,
+) -> Any:
+    wheels = AXLES[axle]
+    plot = new_figure(label, f"Friction {axle} [-]", tools="pan,box_zoom,reset,save", active_drag="box_zoom")
+    mu, sigma = drive.corners("mu_b")[:, wheels], drive.corners("sigma_mu_b")[:, wheels]
+    for wheel, (values, places) in enumerate(observed):
+        some = slice(None, None, max(1, -(-len(values) // POINTS)))
+        plot.scatter(
+            values[some].astype("f4"), mu[places[some], wheel].astype("f4"), size=3, line_color=None,
+            fill_color=(LEFT, RIGHT)[wheel], fill_alpha=0.35, legend_label=("left", "right")[wheel],
+        )  # fmt: skip
+    at = np.concatenate([at for at, _ in observed])
+    place = np.concatenate([places for _, places in observed])
+    side = np.repeat([0, 1], [len(places) for _, places in observed])
+    centre, mean = _binned(at, mu[place, side])
+    spread = 2.0 * _binned(at, sigma[place, side])[1]
+    # Points and means set the range: a wide band would flatten them.
+    shown = list(plot.renderers)
+    if len(centre) > 1:
+        plot.varea(
+            centre, mean - spread, mean + spread, fill_color=INK, fill_alpha=0.1, legend_label="mean, ±2σ"
+        )
+        shown.append(plot.line(centre, mean, line_color=INK, line_width=1.6, legend_label="mean, ±2σ"))
+        if true is not None:
+            centre, mean = _binned(at, true[place, side])
+            dashed = {"line_color": INK, "line_dash": "dashed", "line_width": 1.3}
+            shown.append(plot.line(centre, mean, legend_label="mean, true", **dashed))
+    plot.y_range.update(renderers=shown, range_padding=0.2, min_interval=_LEAST_SPAN)
+    return plot
+
+
+def _binned(at: Vector, values: Vector) -> tuple[Vector, Vector]:
+    """Return the mean of `values` in stretches of `at`, and the stretches' own; few rows make no mean."""
+    known = np.isfinite(values)
+    at, values = at[known], values[known]
+    if not len(at) or np.ptp(at) == 0.0:
+        return np.empty(0), np.empty(0)
+    number = np.minimum(((at - at.min()) / np.ptp(at) * BINS).astype(int), BINS - 1)
+    count = np.bincount(number, minlength=BINS)
+    kept = count >= _FEWEST
+    return tuple(np.bincount(number, of, BINS)[kept] / count[kept] for of in (at, values))  # type: ignore[return-value]
