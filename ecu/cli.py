@@ -19,6 +19,8 @@ from ecu.resources import named
 
 LABORATORY = ("bokeh", "jinja2", "pyarrow", "pymoo")
 """What the extra `lab` installs, by the names that are imported."""
+FLEET = ("distributed", "fsspec")
+"""What the extra `fleet` installs."""
 
 app = typer.Typer(
     help="A real-time brake ECU: estimates brake lining friction, corrects pressure demands by it.",
@@ -202,6 +204,40 @@ def suggest(
 
 
 @app.command()
+def fleet(
+    logs: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="GLOB|MANIFEST", help='"data/*/*.log": a folder a vehicle; or a manifest, CSV or TOML'
+        ),
+    ],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Tables and report; goes on where it stopped")
+    ],
+    config: Annotated[Path | None, _CONFIG] = None,
+    map: Map = None,
+    observer: Annotated[
+        str | None,
+        typer.Option("--observer", metavar="OBSERVER", help="joint, observer1, observer2; default: CONFIG's"),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster; default: processes here"),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option("--workers", min=1, metavar="N", help="Processes here; default: one a core")
+    ] = None,
+    rows: Annotated[
+        bool, typer.Option("--rows", help="Keep the rows of every drive too: 1 GB for 15 h and more")
+    ] = False,
+) -> int:
+    """Thousands of recorded drives, vehicles side by side. Exit code 1: drives failed."""
+    from brakelab.fleet import command
+
+    return command.fleet(logs, config, map, observer, scheduler, workers, out, rows)
+
+
+@app.command()
 def compare(
     a: Annotated[Path, typer.Argument(metavar="A.parquet", help="What `replay` wrote")],
     b: Annotated[Path, typer.Argument(metavar="B.parquet", help="Of another version or tuning")],
@@ -289,6 +325,8 @@ def _describe(error: Exception) -> tuple[str, int]:
             return f"{error.format_message().rstrip('.')}; see {command} --help", error.exit_code
         case ModuleNotFoundError(name=str(name)) if name.partition(".")[0] in LABORATORY:
             return f"{name} is missing: this command needs the laboratory, pip install 'brake-ecu[lab]'", 2
+        case ModuleNotFoundError(name=str(name)) if name.partition(".")[0] in (*FLEET, "dask"):
+            return f"{name} is missing: fleets need Dask, pip install 'brake-ecu[lab,fleet]'", 2
         case OSError(filename=str(filename), strerror=str(reason)):
             return f"{filename}: {reason.lower()}", 2
         case OSError(errno=errno.ENOSPC):
