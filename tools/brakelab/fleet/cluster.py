@@ -5,6 +5,7 @@ import os
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any, Final
 
 import dask
 from distributed import Client, LocalCluster
@@ -12,7 +13,7 @@ from distributed import Client, LocalCluster
 from ecu import __version__
 from ecu.errors import UserError
 
-TIMEOUT_S = 10.0
+TIMEOUT_S: Final = 10.0
 
 
 @contextmanager
@@ -41,17 +42,24 @@ def _cores() -> int:
 
 def _local(workers: int) -> Iterator[Client]:
     # A drive whose worker died comes back to the client, which counts and tells it.
-    # Interrupts are for the client alone: workers are born with them blocked, as are those that replace them.
-    with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
-        blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
-            cluster = LocalCluster(
-                n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL
-            )
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
-        with cluster, Client(cluster) as client:
-            yield client
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 0}),
+        LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            dashboard_address="127.0.0.1:0",
+            scheduler_kwargs={"dashboard": False},
+            silence_logs=logging.CRITICAL,
+            preload=[__name__],
+        ) as cluster,
+        Client(cluster) as client,
+    ):
+        yield client
+
+
+def dask_setup(worker: Any) -> None:
+    """Make ready a worker of this machine, which Dask calls it for: Ctrl-C is for the client alone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _version() -> str:

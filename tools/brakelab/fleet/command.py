@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import pyarrow.parquet as pq
 
@@ -15,6 +15,7 @@ from brakelab.fleet.manifest import Drive, find_drives
 from brakelab.fleet.output import brakes_file, others
 from brakelab.fleet.page import write_page
 from brakelab.fleet.run import Chain, Planned, run_fleet
+from brakelab.fleet.statistics import notes
 from brakelab.fleet.summary import summary_table, when
 from brakelab.replay.command import with_observer
 from brakelab.replay.progress import progress_bar
@@ -22,7 +23,7 @@ from brakelab.replay.source import load_source
 from ecu.config import load_config
 from ecu.errors import UserError
 
-SHOWN = 20
+SHOWN: Final = 20
 """Failures that are printed; all of them are in the report."""
 
 
@@ -111,7 +112,7 @@ def _tell(done: Sequence[dict[str, Any]], replayed: int, total: int, out: Path) 
             " name another --out",
             file=sys.stderr,
         )
-    noted = sum(bool(summary["notes"]) for summary in done)
+    noted = len(notes([summary for summary in done if not summary["fault"]]))
     hours = sum(summary.get("duration") or 0.0 for summary in done) / 3600.0
     kilometres = sum(summary.get("distance") or 0.0 for summary in done) / 1000.0
     vehicles = len({summary["vehicle"] for summary in done})

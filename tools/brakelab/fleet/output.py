@@ -74,8 +74,11 @@ def keep(out: Path, outcome: Outcome, key: str) -> None:
     }
     path.parent.mkdir(parents=True, exist_ok=True)
     unfinished = path.with_name(f".{path.name}.unfinished")
-    pq.write_table(table.replace_schema_metadata(metadata), unfinished, compression="zstd")
-    unfinished.replace(path)
+    try:
+        pq.write_table(table.replace_schema_metadata(metadata), unfinished, compression="zstd")
+        unfinished.replace(path)
+    finally:
+        unfinished.unlink(missing_ok=True)
 
 
 def others(out: Path, wanted: set[Path]) -> Iterator[Path]:

@@ -10,13 +10,16 @@ from bokeh.models import ColumnDataSource, HoverTool
 
 from brakelab.fleet.statistics import (
     QUANTITIES,
+    Note,
     Quantity,
     Summary,
     Vehicles,
     Weeks,
     by_week,
+    notes,
     outliers,
     per_vehicle,
+    told,
     values_of,
 )
 from brakelab.report.look import ESTIMATE, SHADE, new_figure
@@ -48,8 +51,10 @@ def write_page(done: Sequence[Summary], out: Path) -> None:
             "facts": [("Drives", f"{len(done)}"), ("brake-ecu", __version__)],
             "tiles": _tiles(done, good, vehicles),
             "outliers": outliers(vehicles)[:ROWS],
-            "failed": [row for row in done if row["fault"]],
-            "noted": [row for row in good if row["notes"]],
+            "failed": [
+                Note(row["vehicle"], row["drive"], told(row, "fault")) for row in done if row["fault"]
+            ],
+            "noted": notes(good),
             "undated": sum(row["start_time"] is None for row in good),
             "rows": ROWS,
         },
@@ -77,21 +82,20 @@ def _tiles(done: Sequence[Summary], good: Sequence[Summary], vehicles: Vehicles)
         Tile("Brakings", f"{brakings}", "", f"{taught} of them taught friction"),
     ]
     errors = values_of(good, "prediction_error")
-    tiles.append(Tile("Prediction error", *_median(errors, 100.0, 1), "% (median), 5 to 95 % of drives"))
+    tiles.append(_spread_tile("Prediction error [%]", errors, 100.0, 1, "drives"))
     for quantity in (QUANTITIES[0], QUANTITIES[1], QUANTITIES[3]):
-        title = quantity.title.partition(" [")[0]
         values = vehicles.values[quantity.name]
-        tiles.append(Tile(title, *_median(values, quantity.scale, quantity.digits), "5 to 95 % of vehicles"))
+        tiles.append(_spread_tile(quantity.title, values, quantity.scale, quantity.digits, "vehicles"))
     return tiles
 
 
-def _median(values: Any, scale: float, digits: int) -> tuple[str, str]:
+def _spread_tile(title: str, values: Any, scale: float, digits: int, among: str) -> Tile:
     """Return the median, and the range in which nine of ten lie."""
+    name, _, unit = title.rstrip("]").partition(" [")
     known = values[np.isfinite(values)] * scale
-    if not len(known):
-        return fixed(float("nan"), 0), ""
-    low, middle, high = np.percentile(known, (5, 50, 95))
-    return fixed(middle, digits), f"{fixed(low, digits)} … {fixed(high, digits)}"
+    low, middle, high = np.percentile(known, (5, 50, 95)) if len(known) else [float("nan")] * 3
+    note = f"median; {fixed(low, digits)} … {fixed(high, digits)} are 90 % of the {among}"
+    return Tile(name, fixed(middle, digits), unit.replace("-", ""), note)
 
 
 def _weeks(quantity: Quantity, weeks: Weeks) -> Any:

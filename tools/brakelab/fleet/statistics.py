@@ -5,6 +5,7 @@ their spread, (x − median) / (1.4826 · median |x − median|); 3.5 is the usu
 1993).
 """
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
@@ -65,6 +66,14 @@ class Outlier(NamedTuple):
     score: float
 
 
+class Note(NamedTuple):
+    """What is told of one drive."""
+
+    vehicle: str
+    drive: str
+    lines: list[str]
+
+
 class Weeks(NamedTuple):
     """A quantity over weeks."""
 
@@ -121,6 +130,27 @@ def outliers(vehicles: Vehicles) -> list[Outlier]:
                     drives = int(vehicles.drives[k])
                     found.append(Outlier(vehicles.names[k], drives, quantity, float(column[k]), usual, score))
     return sorted(found, key=lambda outlier: -abs(outlier.score))
+
+
+def told(row: Summary, column: str) -> list[str]:
+    """Return the lines of `fault` or `notes` without the names of the logs, which the drive's stands for."""
+    text = row[column]
+    for log in row["logs"].splitlines():
+        text = text.replace(f"{log}: ", "")
+    return list(text.splitlines())
+
+
+def notes(done: Sequence[Summary]) -> list[Note]:
+    """Return what is peculiar to a drive's logs: not what more than half of the vehicle's drives have."""
+    drives = Counter(row["vehicle"] for row in done)
+    times = Counter((row["vehicle"], line) for row in done for line in set(told(row, "notes")))
+    found = []
+    for row in done:
+        name = row["vehicle"]
+        lines = [line for line in told(row, "notes") if 2 * times[name, line] <= drives[name]]
+        if lines:
+            found.append(Note(name, row["drive"], lines))
+    return found
 
 
 def by_week(done: Sequence[Summary], name: str) -> Weeks:
