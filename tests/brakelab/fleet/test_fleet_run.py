@@ -1,5 +1,6 @@
 """The order of drives, what is carried from one to the next, and what a lost worker costs."""
 
+import io
 import os
 import signal
 import time
@@ -7,13 +8,14 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import pyarrow.parquet as pq
 import pytest
 from distributed import Client
 
 from brakelab.fleet.cluster import connect
+from brakelab.fleet.job import Job, Outcome, metadata_of
 from brakelab.fleet.manifest import Drive
 from brakelab.fleet.run import TRIES, Chain, Planned, run_fleet
-from brakelab.fleet.task import Job, Outcome
 from brakelab.replay.source import load_source
 from brakelab.results import brakes_table
 from ecu.config import load_config
@@ -32,26 +34,19 @@ def client() -> Iterator[Client]:
         yield here
 
 
-def empty_file() -> bytes:
-    import io
-
-    import pyarrow.parquet as pq
-
-    file = io.BytesIO()
-    pq.write_table(brakes_table([]), file)
-    return file.getvalue()
-
-
 def noting(harm: Callable[[Job], None] = lambda job: None) -> Task:
     """A task that appends the drive's name to what was learned; `bad` drives fail."""
-    brakes = empty_file()
+    brakes = brakes_table([])
 
     def task(job: Job) -> Outcome:
         harm(job)
         summary = {"vehicle": job.vehicle, "drive": job.drive, "fault": "", "notes": "", "logs": ""}
         if job.drive.startswith("bad"):
             return Outcome(summary | {"fault": "damaged"}, b"", job.learned)
-        return Outcome(summary, brakes, job.learned + job.drive.encode() + b" ")
+        outcome = Outcome(summary, b"", job.learned + job.drive.encode() + b" ")
+        file = io.BytesIO()
+        pq.write_table(brakes.replace_schema_metadata(metadata_of(job, outcome)), file)
+        return outcome._replace(file=file.getvalue())
 
     return task
 

@@ -9,14 +9,19 @@ A car is drawn once, its drives have a course, a weather and a noise of their ow
 
 import argparse
 import json
+import time
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 import numpy as np
 
 from brakelab.closed_loop import START_NS, VEHICLE_BUS, new_loop, run, write_columns
+from brakelab.fleet.job import Job, Outcome
+from brakelab.fleet.task import replay_job
 from brakelab.replay.progress import progress_bar
 from brakelab.scenario import Scenario
 from ecu.config import load_config
@@ -76,6 +81,22 @@ def write_drive(vehicle: int, drive: int, seconds: float, path: Path) -> None:
         frames = result.frames.copy()
         frames["stamp_ns"] += FIRST_NS + drive * BETWEEN_NS - START_NS
         path.write_bytes(candump_lines(frames, VEHICLE_BUS))
+
+
+def simulate_and_replay(job: Job) -> Outcome:
+    """Simulate the drive `<vehicle>/<drive>/<seconds>` that the job names, replay it and forget it.
+
+    The summary has `simulate_seconds` too.
+    """
+    vehicle, drive, seconds = (int(part) for part in job.logs[0].split("/"))
+    with TemporaryDirectory(prefix="brake-ecu-fleet-") as folder:
+        log = Path(folder, f"{drive}.log")
+        began = time.perf_counter()
+        write_drive(vehicle, drive, seconds, log)
+        simulated = time.perf_counter() - began
+        outcome = replay_job(replace(job, logs=(str(log),)))
+    outcome.summary["simulate_seconds"] = simulated
+    return outcome
 
 
 def damage(logs: list[Path]) -> None:

@@ -5,6 +5,8 @@ teaches nothing, and the next starts with what was known before it. So the sched
 few drives for each worker, however many there are; vehicles with the longest way to go come first.
 """
 
+import math
+import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from heapq import heapify, heappop, heappush
@@ -13,15 +15,18 @@ from typing import Any, Final, NamedTuple
 
 from distributed import Client, Future, KilledWorker, as_completed
 
+from brakelab.fleet.job import Job, Outcome, failed
 from brakelab.fleet.manifest import Drive
-from brakelab.fleet.output import keep, key_of, rows_file, standing
-from brakelab.fleet.task import Job, Outcome, failed, replay_job
+from brakelab.fleet.output import keep, rows_file, standing
+from brakelab.fleet.task import replay_job
 from brakelab.replay.source import Source
 from ecu.config import Config, store_key
 from ecu.errors import RunFault
 
 TRIES: Final = 3
 """After so many lost workers the drive is held to be what killed them."""
+COUNT_S: Final = 2.0
+"""Between looks at how many workers there are."""
 QUEUED: Final = 2
 """Drives on the cluster for each of its threads: one runs, one waits for it to end."""
 
@@ -59,10 +64,10 @@ class Chain:
 
     def job(self, out: Path, rows: bool) -> Job:
         """Return the job of the next drive."""
-        drive, config, source, *_ = self.drives[self.place]
+        drive, config, source, _, mark, _ = self.drives[self.place]
         file = str(rows_file(out, drive.vehicle, drive.name)) if rows else ""
         learned = self.learned.get(store_key(config), b"")
-        return Job(drive.vehicle, drive.name, drive.logs, config, source, learned, file)
+        return Job(drive.vehicle, drive.name, drive.logs, config, source, learned, mark, file)
 
     def finish(self, outcome: Outcome) -> dict[str, Any]:
         """Go on to the drive after this one; return its summary."""
@@ -89,9 +94,11 @@ def run_fleet(
     heapify(ready)
     running: dict[Future, tuple[int, Chain, Job]] = {}
     finished = as_completed()
+    room, counted = 1, -math.inf
     while ready or running:
-        room = QUEUED * max(sum(client.nthreads().values()), 1) - len(running)
-        while ready and room > 0:
+        if time.monotonic() > counted + COUNT_S:
+            room, counted = QUEUED * max(sum(client.nthreads().values()), 1), time.monotonic()
+        while ready and len(running) < room:
             _, number, chain = heappop(ready)
             for planned, summary in _skip(chain, out, rows):
                 yield planned, summary, False
@@ -101,7 +108,6 @@ def run_fleet(
             future = client.submit(task, job, pure=False, priority=chain.left)
             running[future] = number, chain, job
             finished.add(future)
-            room -= 1
         if not running:
             continue
         future = next(finished)
@@ -113,7 +119,7 @@ def run_fleet(
             planned = chain.drives[chain.place]
             outcome = outcome or failed(job, f"{job.logs[0]}: killed {TRIES} workers; is it too large?")
             outcome.summary["tries"] = chain.tries
-            keep(out, outcome, key_of(job, planned.mark))
+            keep(out, outcome)
             yield planned, chain.finish(outcome), True
         heappush(ready, (-chain.left, number, chain))
 
@@ -124,10 +130,11 @@ def _skip(chain: Chain, out: Path, rows: bool) -> Iterator[tuple[Planned, dict[s
         planned = chain.drives[chain.place]
         job = chain.job(out, rows)
         if planned.fault:
-            outcome: Outcome | None = failed(job, planned.fault)
-            keep(out, failed(job, planned.fault), "")
+            outcome: Outcome | None
+            outcome = failed(job, planned.fault)
+            keep(out, outcome)
         else:
-            outcome = standing(out, job, key_of(job, planned.mark))
+            outcome = standing(out, job)
         if outcome is None:
             return
         yield planned, chain.finish(outcome)
