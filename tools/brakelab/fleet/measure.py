@@ -97,8 +97,8 @@ def scaling(manifest: Path, rounds: int, count: int) -> None:
         )
         for workers, took in ((1, one), (2, two)):
             print(
-                f"  {workers} workers {took['wall']:.1f} s, {100 * took['busy']:.1f} % of it in replays; CPU each "
-                f"{took['work']:.0f} ms workers, {took['parent']:.0f} ms client and scheduler; "
+                f"  {workers} workers {took['wall']:.1f} s, {100 * took['busy']:.1f} % of it in replays; "
+                f"CPU each {took['work']:.0f} ms workers, {took['parent']:.0f} ms client and scheduler; "
                 f"peak {took['peak']:.0f} MB a worker",
                 flush=True,
             )
