@@ -31,6 +31,8 @@ from ecu.errors import RunFault, UserError
 
 LABORATORY = ("bokeh", "jinja2", "pyarrow", "pymoo")
 """What the extra `lab` installs, by the names that are imported."""
+FLEET = ("distributed", "fsspec")
+"""What the extra `fleet` installs."""
 
 app = typer.Typer(
     help="A real-time brake ECU: estimates brake lining friction, corrects pressure demands by it.",
@@ -118,6 +120,8 @@ def _describe(error: Exception) -> tuple[str, int]:
             return f"{error.format_message().rstrip('.')}; see {command} --help", error.exit_code
         case ModuleNotFoundError(name=str(name)) if name.partition(".")[0] in LABORATORY:
             return f"{name} is missing: this command needs the laboratory, pip install 'brake-ecu[lab]'", 2
+        case ModuleNotFoundError(name=str(name)) if name.partition(".")[0] in (*FLEET, "dask"):
+            return f"{name} is missing: fleets need Dask, pip install 'brake-ecu[lab,fleet]'", 2
         case OSError(filename=str(filename), strerror=str(reason)):
             return f"{filename}: {reason.lower()}", 2
         case OSError(errno=errno.ENOSPC):

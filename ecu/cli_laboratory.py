@@ -8,6 +8,7 @@ import typer
 
 from ecu.arguments import (
     CHANNEL_OPTION,
+    CONFIG_OPTION,
     INTERFACE_OPTION,
     Channel,
     Config,
@@ -166,6 +167,40 @@ def suggest(
     from brakelab.mapping import command
 
     return command.suggest(log, dbc, out)
+
+
+@app.command()
+def fleet(
+    logs: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="GLOB|MANIFEST", help='"data/*/*.log": a folder a vehicle; or a manifest, CSV or TOML'
+        ),
+    ],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Tables and report; goes on where it stopped")
+    ],
+    config: Annotated[Path | None, CONFIG_OPTION] = None,
+    map: Map = None,
+    observer: Annotated[
+        str | None,
+        typer.Option("--observer", metavar="OBSERVER", help="joint, observer1, observer2; default: CONFIG's"),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster; default: processes here"),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option("--workers", min=1, metavar="N", help="Processes here; default: one a core")
+    ] = None,
+    rows: Annotated[
+        bool, typer.Option("--rows", help="Keep the rows of every drive too: 1 GB for 15 h and more")
+    ] = False,
+) -> int:
+    """Thousands of recorded drives, vehicles side by side. Exit code 1: drives failed."""
+    from brakelab.fleet import command
+
+    return command.fleet(logs, config, map, observer, scheduler, workers, out, rows)
 
 
 @app.command()

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from ecu import __version__
-from ecu.cli import LABORATORY
+from ecu.cli import FLEET, LABORATORY
 
 ROOT = Path(__file__).parent.parent
 LOCKS = sorted((ROOT / "requirements").glob("*.txt"))
@@ -95,6 +95,7 @@ def test_the_locks_hold_what_the_project_asks_for() -> None:
     onboard = names(project["dependencies"])
     laboratory = names(extras["lab"])
     assert laboratory == set(LABORATORY)
+    assert names(extras["fleet"]) == set(FLEET)
     assert onboard <= _requirements(ROOT / "requirements/onboard.txt").keys()
     assert onboard | laboratory <= _requirements(ROOT / "requirements/lab.txt").keys()
     assert names(extras["dev"]) - {"brake-ecu"} <= _requirements(ROOT / "requirements/dev.txt").keys()
@@ -117,14 +118,14 @@ def test_onboard_code_loads_no_laboratory() -> None:
     done = subprocess.run(
         [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True
     )
-    assert not {"brakelab", "matplotlib", "asammdf", *LABORATORY} & set(done.stdout.split())
+    assert not {"brakelab", "matplotlib", "asammdf", *LABORATORY, *FLEET} & set(done.stdout.split())
 
 
 def test_ecu_never_imports_the_laboratory() -> None:
     """But for the laboratory's commands, inside their functions."""
     for path in (ROOT / "ecu").rglob("*.py"):
         for name, lazily in _imports(path):
-            if name.partition(".")[0] in {"brakelab", *LABORATORY}:
+            if name.partition(".")[0] in {"brakelab", *LABORATORY, *FLEET}:
                 assert path.name == "cli_laboratory.py", f"{path}: {name}"
                 assert lazily, f"{path}: {name}"
 

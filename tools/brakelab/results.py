@@ -16,7 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from brakelab.replay.brakes import BRAKE_UNITS, BrakeBook
+from brakelab.replay.brakes import BRAKE_UNITS, BrakeBook, BrakeRow
 from brakelab.replay.engine import MEASURED_INPUTS
 from brakelab.results_mdf import SUFFIX, load_asammdf, refuse_mdf, write_mdf
 from ecu.errors import UserError
@@ -76,6 +76,12 @@ def _table(schema: pa.Schema, columns: Sequence[NDArray[Any] | list[Any]]) -> pa
     return pa.Table.from_arrays(arrays, schema=schema)
 
 
+def brakes_table(rows: Sequence[BrakeRow]) -> pa.Table:
+    """Return the table of brake applications, without metadata."""
+    columns = [[getattr(row, name) for row in rows] for name in BRAKE_UNITS]
+    return _table(BRAKE_SCHEMA, columns)
+
+
 def _encoded(metadata: dict[str, Any]) -> dict[str, str]:
     return {name: value if isinstance(value, str) else json.dumps(value) for name, value in metadata.items()}
 
@@ -132,8 +138,7 @@ class ResultWriter:
         file.add_key_value_metadata({"quality": json.dumps(self.quality)})
         file.close()
         self.brakes.end_log()
-        columns = [[getattr(row, name) for row in self.brakes.rows] for name in BRAKE_UNITS]
-        table = _table(BRAKE_SCHEMA, columns).replace_schema_metadata(_encoded(self.provenance))
+        table = brakes_table(self.brakes.rows).replace_schema_metadata(_encoded(self.provenance))
         if self.path.suffix == SUFFIX:
             try:
                 write_mdf(self._unfinished, table, self.path)

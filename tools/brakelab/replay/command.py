@@ -4,7 +4,6 @@ import sys
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
-from time import perf_counter
 from typing import Final
 
 import numpy as np
@@ -12,9 +11,9 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from brakelab.outputs import check_outputs
-from brakelab.replay.engine import Rows, new_ecu
+from brakelab.replay.drive import replay_drive
 from brakelab.replay.formats import kind_of
-from brakelab.replay.log import log_hash, log_size, replay_log
+from brakelab.replay.log import log_hash, log_size
 from brakelab.replay.needed import NEEDED, fault_lines, needed_lines, nothing_usable
 from brakelab.replay.prediction import SHORT
 from brakelab.replay.progress import progress_bar
@@ -31,11 +30,10 @@ from ecu.errors import RunFault, UserError
 from ecu.params import OBSERVERS
 from ecu.recorder import read_recording
 from ecu.records import RecordArray
-from ecu.signals import CORNERS, CYCLE_NS
+from ecu.signals import CORNERS
 from ecu.step import new_state
 
 WIDTH: Final = 110  # columns of the table where no terminal says how wide it is
-_PERIOD: Final = 1e-9 * CYCLE_NS  # s
 
 
 def replay(
@@ -58,9 +56,9 @@ def replay(
         UserError: an argument, the configuration, the map or a log is not right.
         RunFault: the results are written, but no needed input was ever usable.
     """
-    _check(logs, observer, out, cycles)
+    _check(logs, out, cycles)
     check_outputs(out, (out, brakes_path(out)), [*logs, config, *([map] if map else [])])
-    vehicle = _with_observer(load_config(config), observer)
+    vehicle = with_observer(load_config(config), observer)
     source = load_source(map)
     if map:
         for log in logs:
@@ -83,22 +81,15 @@ def replay(
             "database_hash": source.database_hash,
             "inputs": [{"name": path.name, "sha256": log_hash(path)} for path in logs],
         }
-        shift = 0.0
-        for place, found in enumerate(findings):
-            ecu = new_ecu(params, learned)
-            end, kind, began = shift, kind_of(found.path), perf_counter()
-            for rows in replay_log(found.path, ecu, source, recording, found, advance):
-                t = _seconds(rows, found, kind)
-                if place and found.rows == len(t):  # the first block of a log that goes on
-                    shift = round(shift - t[0], 9)
-                t = np.round(t + shift, 9) if place else t
-                writer.provenance.setdefault("start_time_ns", str(found.start_ns + found.signals.zero_ns))
-                writer.write(t, rows.values)
-                end = float(t[-1]) + _PERIOD
-            writer.brakes.end_log()
-            found.seconds = perf_counter() - began
-            shift = end
-            learned = ecu.state["learned"].copy()
+
+        def write(t: NDArray[np.float64], rows: NDArray[np.float64]) -> None:
+            began_ns = findings[0].start_ns + findings[0].signals.zero_ns
+            writer.provenance.setdefault("start_time_ns", str(began_ns))
+            writer.write(t, rows)
+
+        learned = replay_drive(
+            findings, params, learned, source, write, writer.brakes.end_log, advance, recording
+        )
         writer.quality = [quality_counts(found, source.plan) for found in findings]
     if state and learned is not None and learned.tobytes() != before:
         with closing(open_store(state)) as store:
@@ -110,15 +101,16 @@ def replay(
     return 0
 
 
-def _with_observer(vehicle: Config, observer: str | None) -> Config:
+def with_observer(vehicle: Config, observer: str | None) -> Config:
+    """Return the configuration with another observer, None: its own. Raises UserError for an unknown one."""
     if observer is None:
         return vehicle
+    if observer not in OBSERVERS:
+        raise UserError("--observer", observer, f"not known; take {', '.join(OBSERVERS)}")
     return vehicle.model_copy(update={"observer": vehicle.observer.model_copy(update={"kind": observer})})
 
 
-def _check(logs: Sequence[Path], observer: str | None, out: Path, cycles: Path | None) -> None:
-    if observer is not None and observer not in OBSERVERS:
-        raise UserError("--observer", observer, f"not known; take {', '.join(OBSERVERS)}")
+def _check(logs: Sequence[Path], out: Path, cycles: Path | None) -> None:
     if out.suffix not in (".parquet", SUFFIX):
         remedy = f"results are written as Parquet or MDF4; let the name end in .parquet or {SUFFIX}"
         raise UserError("--out", str(out), remedy)
@@ -140,13 +132,6 @@ def _restore(state: Path | None, vehicle: Config, params: RecordArray) -> Record
     with closing(open_store(state)) as store:
         found = restore(store, store_key(vehicle), params[0]["mu_nominal"])
     return found[1] if found else None
-
-
-def _seconds(rows: Rows, found: Findings, kind: str) -> NDArray[np.float64]:
-    """Return `t` on the log's own axis: a signal file's own, seconds since the first frame otherwise."""
-    if kind == "signals":
-        return np.where(np.isnan(rows.t), np.round(rows.t_ns * 1e-9, 9), rows.t)
-    return np.round((rows.t_ns - found.start_ns) * 1e-9, 9)
 
 
 def _tell(

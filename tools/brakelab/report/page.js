@@ -38,9 +38,9 @@
     show(at);
     document.querySelector(".drive").scrollIntoView({ behavior: "smooth" });
   }));
-  document.getElementById("whole").addEventListener("click", () => show(-1));
-  document.getElementById("previous").addEventListener("click", () => step(-1));
-  document.getElementById("next").addEventListener("click", () => step(1));
+  document.getElementById("whole")?.addEventListener("click", () => show(-1));
+  document.getElementById("previous")?.addEventListener("click", () => step(-1));
+  document.getElementById("next")?.addEventListener("click", () => step(1));
   screenIsDark.addEventListener("change", recolour);
 
   const started = setInterval(() => {

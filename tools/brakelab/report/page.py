@@ -4,7 +4,8 @@ import json
 import math
 from collections.abc import Mapping
 from importlib.resources import files
-from typing import Any, NamedTuple
+from importlib.resources.abc import Traversable
+from typing import Any, Final, NamedTuple
 
 from bokeh.embed import components
 from bokeh.resources import Resources
@@ -12,6 +13,7 @@ from jinja2 import Environment, StrictUndefined
 
 from brakelab.report.look import DARK
 
+PAGE: Final[Traversable] = files("brakelab.report") / "page.html.j2"
 _NONE = "–"
 
 
@@ -45,7 +47,11 @@ def kmh(speed: float) -> str:
     return fixed(abs(speed) * 3.6, 0)
 
 
-def fill(plots: Mapping[str, Mapping[str, Any]], content: Mapping[str, Any]) -> str:
+def fill(
+    plots: Mapping[str, Mapping[str, Any]],
+    content: Mapping[str, Any],
+    template: Traversable = PAGE,
+) -> str:
     """Return the page; `plots` maps the template's places to figures by name, `content` is the rest."""
     figures = {name: plot for group in plots.values() for name, plot in group.items()}
     script, divs = components(figures)
@@ -53,7 +59,7 @@ def fill(plots: Mapping[str, Mapping[str, Any]], content: Mapping[str, Any]) -> 
     # Autoescape: names of files and metadata come from outside.
     page = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     page.filters.update(fixed=fixed, percent=percent, signed_percent=signed_percent, kmh=kmh)
-    return page.from_string((here / "page.html.j2").read_text("utf-8")).render(
+    return page.from_string(template.read_text("utf-8")).render(
         css=(here / "page.css").read_text("utf-8"),
         js=(here / "page.js").read_text("utf-8"),
         dark=json.dumps(DARK),

@@ -1,0 +1,140 @@
+"""The order of drives, what is carried from one to the next, and what a lost worker costs."""
+
+import io
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+from distributed import Client
+
+from brakelab.fleet.cluster import connect
+from brakelab.fleet.job import Job, Outcome, metadata_of
+from brakelab.fleet.manifest import Drive
+from brakelab.fleet.run import TRIES, Chain, Planned, run_fleet
+from brakelab.replay.source import load_source
+from brakelab.results import brakes_table
+from ecu.config import load_config
+from ecu.errors import UserError
+from ecu.resources import resource
+
+SUV, SEDAN = (load_config(resource(f"config/{name}.toml")) for name in ("suv", "sedan"))
+SOURCE = load_source(None)
+Task = Callable[[Job], Outcome]
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[Client]:
+    """Two processes: a worker can be killed."""
+    with connect(None, 2) as here:
+        yield here
+
+
+def noting(harm: Callable[[Job], None] = lambda job: None) -> Task:
+    """A task that appends the drive's name to what was learned; `bad` drives fail."""
+    brakes = brakes_table([])
+
+    def task(job: Job) -> Outcome:
+        harm(job)
+        summary = {"vehicle": job.vehicle, "drive": job.drive, "fault": "", "notes": "", "logs": ""}
+        if job.drive.startswith("bad"):
+            return Outcome(summary | {"fault": "damaged"}, b"", job.learned)
+        outcome = Outcome(summary, b"", job.learned + job.drive.encode() + b" ")
+        file = io.BytesIO()
+        pq.write_table(brakes.replace_schema_metadata(metadata_of(job, outcome)), file)
+        return outcome._replace(file=file.getvalue())
+
+    return task
+
+
+def fleet(**vehicles: str) -> list[Chain]:
+    """Chains by vehicle, of drives named in a text; `!` marks another car's brakes."""
+    chains = []
+    for vehicle, names in vehicles.items():
+        chain = Chain()
+        for name in names.split():
+            config = SEDAN if name.endswith("!") else SUV
+            drive = Drive(vehicle, name, (f"/d/{name}",), Path("suv.toml"), None)
+            chain.add(Planned(drive, config, SOURCE, 100, name, ""))
+        chains.append(chain)
+    return chains
+
+
+def run(client: Client, chains: list[Chain], out: Path, task: Task) -> dict[str, dict[str, Any]]:
+    """Summaries by drive, with `new`."""
+    done = {}
+    for planned, summary, new in run_fleet(client, chains, out, task=task):
+        done[f"{planned.drive.vehicle}/{planned.drive.name}"] = summary | {"new": new}
+    return done
+
+
+def learned(chain: Chain) -> list[str]:
+    return [text.decode() for text in chain.learned.values()]
+
+
+def test_what_was_learned_goes_along_in_order(client: Client, tmp_path: Path) -> None:
+    chains = fleet(a="1 2 3 4 5 6", b="1", c="1 bad2 3", d="1 x! 2 y!")
+    done = run(client, chains, tmp_path, noting())
+    assert len(done) == 14
+    assert learned(chains[0]) == ["1 2 3 4 5 6 "]
+    assert learned(chains[1]) == ["1 "]
+    assert learned(chains[2]) == ["1 3 "]
+    assert learned(chains[3]) == ["1 2 ", "x! y! "]
+    assert [name for name, summary in done.items() if summary["fault"]] == ["c/bad2"]
+
+
+def test_a_second_run_does_what_is_missing(client: Client, tmp_path: Path) -> None:
+    run(client, fleet(a="1 2 3", b="1 bad2 3"), tmp_path, noting())
+    (tmp_path / "brakes/vehicle=a/2.parquet").unlink()
+    chains = fleet(a="1 2 3", b="1 bad2 3 4")
+    done = run(client, chains, tmp_path, noting())
+    assert {name for name, summary in done.items() if summary["new"]} == {"a/2", "b/bad2", "b/4"}
+    assert learned(chains[0]) == ["1 2 3 "]
+    assert learned(chains[1]) == ["1 3 4 "]
+
+
+def test_what_follows_from_another_input_is_done_again(client: Client, tmp_path: Path) -> None:
+    run(client, fleet(a="1 2 3 4", b="1 2"), tmp_path, noting())
+    chains = fleet(a="1 bad2 3 4", b="1 2")
+    done = run(client, chains, tmp_path, noting())
+    assert {name for name, summary in done.items() if summary["new"]} == {"a/bad2", "a/3", "a/4"}
+    assert learned(chains[0]) == ["1 3 4 "]
+
+
+def test_a_killed_worker_costs_its_drive_a_second_try(client: Client, tmp_path: Path) -> None:
+    def die_once(job: Job) -> None:
+        here = tmp_path / "died"
+        if job.drive == "2" and not here.exists():
+            here.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        time.sleep(0.01)
+
+    chains = fleet(a="1 2 3", b="1 3 4 5")
+    done = run(client, chains, tmp_path / "out", noting(die_once))
+    assert learned(chains[0]) == ["1 2 3 "]
+    assert learned(chains[1]) == ["1 3 4 5 "]
+    assert done["a/2"]["tries"] == 2
+    assert not any(summary["fault"] for summary in done.values())
+
+
+def test_a_drive_that_kills_its_workers_fails_alone(client: Client, tmp_path: Path) -> None:
+    def die(job: Job) -> None:
+        if job.drive == "2":
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    chains = fleet(a="1 2 3")
+    done = run(client, chains, tmp_path, noting(die))
+    assert done["a/2"]["fault"] == f"/d/2: killed {TRIES} workers; is it too large?"
+    assert learned(chains[0]) == ["1 3 "]
+
+
+def test_a_scheduler_that_is_not_there_is_one_line() -> None:
+    with (
+        pytest.raises(UserError, match=r"--scheduler: .*no Dask scheduler answers"),
+        connect("tcp://127.0.0.1:9", 1),
+    ):
+        pass

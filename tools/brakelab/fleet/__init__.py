@@ -1,0 +1,1 @@
+"""Thousands of recorded drives through the code of the ECU, on this machine or a Dask cluster."""

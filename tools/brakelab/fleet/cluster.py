@@ -1,0 +1,74 @@
+"""Where the drives are replayed: processes of this machine, or the workers of a Dask scheduler."""
+
+import logging
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, Final
+
+import dask
+from distributed import Client, LocalCluster
+
+from ecu import __version__
+from ecu.errors import UserError
+
+TIMEOUT_S: Final = 10.0
+
+
+@contextmanager
+def connect(scheduler: str | None, workers: int | None) -> Iterator[Client]:
+    """Give a client of the scheduler at an address; None: of `workers` processes here (None: one a core).
+
+    Raises:
+        UserError: nobody answers at the address, or its workers have another version of this program.
+    """
+    if scheduler is None:
+        yield from _local(workers or _cores())
+        return
+    try:
+        client = Client(scheduler, timeout=TIMEOUT_S)
+    except (OSError, ValueError) as error:
+        remedy = f"no Dask scheduler answers ({error}); start one with `dask scheduler`, or leave this out"
+        raise UserError("--scheduler", scheduler, remedy) from None
+    with client:
+        _check_versions(client, scheduler)
+        yield client
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _local(workers: int) -> Iterator[Client]:
+    # A drive whose worker died comes back to the client, which counts and tells it.
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 0}),
+        LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            dashboard_address="127.0.0.1:0",
+            scheduler_kwargs={"dashboard": False},
+            silence_logs=logging.CRITICAL,
+            preload=[__name__],
+        ) as cluster,
+        Client(cluster) as client,
+    ):
+        yield client
+
+
+def dask_setup(worker: Any) -> None:
+    """Make ready a worker of this machine, which Dask calls it for: Ctrl-C is for the client alone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _version() -> str:
+    return __version__
+
+
+def _check_versions(client: Client, scheduler: str) -> None:
+    for worker, found in client.run(_version, on_error="return").items():
+        if found != __version__:
+            says = f"version {found}" if isinstance(found, str) else f"{found}"
+            remedy = f"worker {worker} cannot run brake-ecu {__version__} ({says}); install it there"
+            raise UserError("--scheduler", scheduler, remedy)

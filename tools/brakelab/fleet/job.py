@@ -1,0 +1,84 @@
+"""A drive as it goes to a worker, what comes back, and how an earlier run's outcome is known again."""
+
+import base64
+import hashlib
+import json
+from dataclasses import dataclass
+from typing import Any, Final, NamedTuple
+
+from brakelab.replay.source import Source
+from ecu import __version__
+from ecu.config import Config, config_hash
+from ecu.records import LEARNED
+
+KEY: Final = b"fleet_key"
+
+
+@dataclass(frozen=True)
+class Job:
+    """One drive for a worker; it needs no file of the client but the logs."""
+
+    vehicle: str
+    drive: str
+    logs: tuple[str, ...]
+    config: Config
+    source: Source
+    learned: bytes
+    """LEARNED from before the drive, empty: nothing was."""
+    mark: str
+    """Changes with the content of the logs."""
+    rows: str
+    """File of the rows, on a disk that client and workers share; empty: none."""
+
+
+class Outcome(NamedTuple):
+    """What comes back."""
+
+    summary: dict[str, Any]
+    """By `SUMMARY_SCHEMA`; with a `fault` there are no brakings, and what was learned is as before."""
+    file: bytes
+    """Parquet: the brakings, and in the metadata what the next run needs; empty with a `fault`."""
+    learned: bytes
+
+
+def failed(job: Job, fault: str) -> Outcome:
+    """Return the outcome of a drive that could not be replayed."""
+    return Outcome(provenance(job) | {"fault": " ".join(fault.split()), "notes": ""}, b"", job.learned)
+
+
+def provenance(job: Job) -> dict[str, Any]:
+    """Return the part of the summary that is known before the drive."""
+    return {
+        "vehicle": job.vehicle,
+        "drive": job.drive,
+        "logs": "\n".join(job.logs),
+        "config_hash": config_hash(job.config),
+        "database_hash": job.source.database_hash,
+        "observer": job.config.observer.kind,
+        "version": __version__,
+    }
+
+
+def key_of(job: Job) -> str:
+    """Return a hash of all that the outcome follows from."""
+    parts = (
+        *(__version__, str(LEARNED.descr), job.mark, config_hash(job.config), job.source.database_hash),
+        *(job.source.bus, hashlib.sha256(job.learned).hexdigest()),
+    )
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
+
+
+def metadata_of(job: Job, outcome: Outcome) -> dict[bytes, bytes]:
+    """Return the metadata of a drive's file."""
+    return {
+        KEY: key_of(job).encode(),
+        b"summary": json.dumps(outcome.summary).encode(),
+        b"learned": base64.b64encode(outcome.learned),
+    }
+
+
+def outcome_of(job: Job, metadata: dict[bytes, bytes]) -> Outcome | None:
+    """Return the outcome that a file's metadata holds; None if it is not that of this very job."""
+    if metadata.get(KEY) != key_of(job).encode():
+        return None
+    return Outcome(json.loads(metadata[b"summary"]), b"", base64.b64decode(metadata[b"learned"]))

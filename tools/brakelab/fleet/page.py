@@ -1,0 +1,131 @@
+"""The page on a fleet: what stands out, how friction, prediction and energy spread, what failed."""
+
+from collections.abc import Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from bokeh.models import ColumnDataSource, HoverTool
+
+from brakelab.fleet.statistics import (
+    QUANTITIES,
+    Note,
+    Quantity,
+    Summary,
+    Vehicles,
+    Weeks,
+    by_week,
+    notes,
+    outliers,
+    per_vehicle,
+    told,
+    values_of,
+)
+from brakelab.report.look import ESTIMATE, SHADE, new_figure
+from brakelab.report.page import Tile, fill, fixed
+from ecu import __version__
+from ecu.errors import UserError
+
+ROWS: Final = 200
+"""Of each table; `drives.parquet` has them all."""
+BINS: Final = 30
+
+
+def write_page(done: Sequence[Summary], out: Path) -> None:
+    """Write the page on `done`, summaries of drives; it needs no other file. Raises UserError."""
+    good = [row for row in done if not row["fault"]]
+    vehicles = per_vehicle(good)
+    weeks = {quantity.name: by_week(good, quantity.name) for quantity in QUANTITIES}
+    page = fill(
+        {
+            "by_week": {
+                f"week-{q.name}": _weeks(q, weeks[q.name])
+                for q in QUANTITIES
+                if len(weeks[q.name].drives) > 1
+            },
+            "by_vehicle": {f"vehicle-{q.name}": _spread(q, vehicles.values[q.name]) for q in QUANTITIES},
+        },
+        {
+            "name": out.parent.name,
+            "facts": [("Drives", f"{len(done)}"), ("brake-ecu", __version__)],
+            "tiles": _tiles(done, good, vehicles),
+            "outliers": outliers(vehicles)[:ROWS],
+            "failed": [
+                Note(row["vehicle"], row["drive"], told(row, "fault")) for row in done if row["fault"]
+            ],
+            "noted": notes(good),
+            "undated": sum(row["start_time"] is None for row in good),
+            "rows": ROWS,
+        },
+        files("brakelab.fleet") / "fleet.html.j2",
+    )
+    try:
+        out.write_text(page, "utf-8")
+    except OSError as error:
+        raise UserError(str(out), "", f"cannot be written ({error.strerror}); choose another --out") from None
+
+
+def _tiles(done: Sequence[Summary], good: Sequence[Summary], vehicles: Vehicles) -> list[Tile]:
+    hours, metres = (sum(row[name] for row in good) for name in ("duration", "distance"))
+    brakings = sum(row["brakings"] for row in good)
+    taught = sum(row["learned"] for row in good)
+    faults = len(done) - len(good)
+    tiles = [
+        Tile("Drives done", f"{len(good)}", f"of {len(done)}", f"{faults} failed", faults > 0),
+        Tile(
+            "Driven",
+            f"{metres / 1000.0:.0f}",
+            "km",
+            f"{hours / 3600.0:.1f} h, {len(vehicles.names)} vehicles",
+        ),
+        Tile("Brakings", f"{brakings}", "", f"{taught} of them taught friction"),
+    ]
+    errors = values_of(good, "prediction_error")
+    tiles.append(_spread_tile("Prediction error [%]", errors, 100.0, 1, "drives"))
+    for quantity in (QUANTITIES[0], QUANTITIES[1], QUANTITIES[3]):
+        values = vehicles.values[quantity.name]
+        tiles.append(_spread_tile(quantity.title, values, quantity.scale, quantity.digits, "vehicles"))
+    return tiles
+
+
+def _spread_tile(title: str, values: Any, scale: float, digits: int, among: str) -> Tile:
+    """Return the median, and the range in which nine of ten lie."""
+    name, _, unit = title.rstrip("]").partition(" [")
+    known = values[np.isfinite(values)] * scale
+    low, middle, high = np.percentile(known, (5, 50, 95)) if len(known) else [float("nan")] * 3
+    note = f"median; {fixed(low, digits)} … {fixed(high, digits)} are 90 % of the {among}"
+    return Tile(name, fixed(middle, digits), unit.replace("-", ""), note)
+
+
+def _weeks(quantity: Quantity, weeks: Weeks) -> Any:
+    plot = new_figure("Week from", quantity.title, x_axis_type="datetime")
+    columns = dict(zip(("p5", "p25", "p50", "p75", "p95"), weeks.quantiles.T * quantity.scale, strict=True))
+    source = ColumnDataSource({"week": weeks.start_ms, "drives": weeks.drives, **columns})
+    for low, high, alpha in (("p5", "p95", 0.14), ("p25", "p75", 0.26)):
+        label = f"{low[1:]} to {high[1:]} % of drives"
+        plot.varea(
+            "week", low, high, source=source, fill_color=ESTIMATE, fill_alpha=alpha, legend_label=label
+        )
+    line = plot.line("week", "p50", source=source, line_color=ESTIMATE, line_width=1.8, legend_label="median")
+    digits = "0." + "0" * quantity.digits if quantity.digits else "0"
+    tips = [("week from", "@week{%d %b %Y}"), ("median", f"@p50{{{digits}}}")]
+    tips += [("5 to 95 %", f"@p5{{{digits}}} to @p95{{{digits}}}"), ("drives", "@drives")]
+    plot.add_tools(HoverTool(renderers=[line], mode="vline", tooltips=tips, formatters={"@week": "datetime"}))
+    return plot
+
+
+def _spread(quantity: Quantity, values: Any) -> Any:
+    plot = new_figure(quantity.title, "Vehicles")
+    known = values[np.isfinite(values)] * quantity.scale
+    if len(known):
+        counts, edges = np.histogram(known, min(BINS, max(5, len(known) // 3)))
+        source = ColumnDataSource({"left": edges[:-1], "right": edges[1:], "count": counts})
+        bars = plot.quad("left", "right", "count", 0, source=source, fill_color=ESTIMATE, line_color=SHADE)
+        plot.y_range.start = 0
+        plot.add_tools(
+            HoverTool(
+                renderers=[bars], tooltips=[("vehicles", "@count"), ("from", "@left"), ("to", "@right")]
+            )
+        )
+    return plot

@@ -1,0 +1,155 @@
+"""The drives of every vehicle in order, different vehicles side by side.
+
+A vehicle has one drive on the cluster at a time: what that one taught goes into the next. A drive that fails
+teaches nothing, and the next starts with what was known before it. So the scheduler never knows more than a
+few drives for each worker, however many there are; vehicles with the longest way to go come first.
+"""
+
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from heapq import heapify, heappop, heappush
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from distributed import Client, Future, KilledWorker, as_completed
+
+from brakelab.fleet.job import Job, Outcome, failed
+from brakelab.fleet.manifest import Drive
+from brakelab.fleet.output import keep, rows_file, standing
+from brakelab.fleet.task import replay_job
+from brakelab.replay.source import Source
+from ecu.config import Config, store_key
+from ecu.errors import RunFault
+
+TRIES: Final = 3
+"""After so many lost workers the drive is held to be what killed them."""
+COUNT_S: Final = 2.0
+"""Between looks at how many workers there are."""
+QUEUED: Final = 2
+"""Drives on the cluster for each of its threads: one runs, one waits for it to end."""
+
+
+class Planned(NamedTuple):
+    """A drive with all that is known before it is replayed."""
+
+    drive: Drive
+    config: Config
+    source: Source
+    size: int
+    """Of its logs, bytes."""
+    mark: str
+    """Changes with the content of its logs."""
+    fault: str
+    """Why it cannot be replayed, empty if nothing is known against it."""
+
+
+@dataclass
+class Chain:
+    """The drives of one vehicle, in order, and how far it has come."""
+
+    drives: list[Planned] = field(default_factory=list)
+    left: int = 0
+    """Bytes to go."""
+    place: int = 0
+    learned: dict[str, bytes] = field(default_factory=dict)
+    """What was learned, by what it belongs to: other brakes start anew, as in the state store."""
+    tries: int = 1
+
+    def add(self, planned: Planned) -> None:
+        """Add the drive after the last."""
+        self.drives.append(planned)
+        self.left += planned.size
+
+    def job(self, out: Path, rows: bool) -> Job:
+        """Return the job of the next drive."""
+        drive, config, source, _, mark, _ = self.drives[self.place]
+        file = str(rows_file(out, drive.vehicle, drive.name)) if rows else ""
+        learned = self.learned.get(store_key(config), b"")
+        return Job(drive.vehicle, drive.name, drive.logs, config, source, learned, mark, file)
+
+    def finish(self, outcome: Outcome) -> dict[str, Any]:
+        """Go on to the drive after this one; return its summary."""
+        planned = self.drives[self.place]
+        self.learned[store_key(planned.config)] = outcome.learned
+        summary = outcome.summary | {"tries": outcome.summary.get("tries", self.tries)}
+        self.place, self.tries, self.left = self.place + 1, 1, self.left - planned.size
+        return summary
+
+
+def run_fleet(
+    client: Client,
+    chains: Sequence[Chain],
+    out: Path,
+    rows: bool = False,
+    task: Callable[[Job], Outcome] = replay_job,
+) -> Iterator[tuple[Planned, dict[str, Any], bool]]:
+    """Yield each drive, its summary and whether it was replayed just now, as they get done.
+
+    Raises:
+        RunFault: the scheduler was lost.
+    """
+    ready = [(-chain.left, number, chain) for number, chain in enumerate(chains)]
+    heapify(ready)
+    running: dict[Future, tuple[int, Chain, Job]] = {}
+    finished = as_completed()
+    room, counted = 1, -math.inf
+    while ready or running:
+        if time.monotonic() > counted + COUNT_S:
+            room, counted = QUEUED * max(sum(client.nthreads().values()), 1), time.monotonic()
+        while ready and len(running) < room:
+            _, number, chain = heappop(ready)
+            for planned, summary in _skip(chain, out, rows):
+                yield planned, summary, False
+            if chain.place == len(chain.drives):
+                continue
+            job = chain.job(out, rows)
+            future = client.submit(task, job, pure=False, priority=chain.left)
+            running[future] = number, chain, job
+            finished.add(future)
+        if not running:
+            continue
+        future = next(finished)
+        number, chain, job = running.pop(future)
+        outcome = _outcome(future, job)
+        if outcome is None and chain.tries < TRIES:
+            chain.tries += 1
+        else:
+            planned = chain.drives[chain.place]
+            outcome = outcome or failed(job, f"{job.logs[0]}: killed {TRIES} workers; is it too large?")
+            outcome.summary["tries"] = chain.tries
+            keep(out, outcome)
+            yield planned, chain.finish(outcome), True
+        heappush(ready, (-chain.left, number, chain))
+
+
+def _skip(chain: Chain, out: Path, rows: bool) -> Iterator[tuple[Planned, dict[str, Any]]]:
+    """Pass the drives that stand already, and those that cannot be replayed."""
+    while chain.place < len(chain.drives):
+        planned = chain.drives[chain.place]
+        job = chain.job(out, rows)
+        if planned.fault:
+            outcome: Outcome | None
+            outcome = failed(job, planned.fault)
+            keep(out, outcome)
+        else:
+            outcome = standing(out, job)
+        if outcome is None:
+            return
+        yield planned, chain.finish(outcome)
+
+
+def _outcome(future: Future, job: Job) -> Outcome | None:
+    """Return what became of a job, None: its worker died."""
+    if future.status in ("cancelled", "lost"):
+        raise RunFault(
+            "the Dask scheduler was lost; what is done stays, the same command goes on with the rest"
+        )
+    error = future.exception()
+    if isinstance(error, KilledWorker):
+        return None
+    if error is not None:
+        return failed(job, f"{job.logs[0]}: {type(error).__name__}: {error}")
+    outcome: Outcome = future.result()
+    return outcome

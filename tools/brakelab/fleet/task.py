@@ -1,0 +1,108 @@
+"""What a worker does: one drive, from its logs to its brakings, its summary and what was learned."""
+
+import io
+import shutil
+import time
+from collections.abc import Sequence
+from contextlib import nullcontext
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from brakelab.fleet.files import local_copies
+from brakelab.fleet.job import Job, Outcome, failed, metadata_of, provenance
+from brakelab.fleet.summary import DriveBook
+from brakelab.replay.drive import replay_drive
+from brakelab.replay.log import log_hash
+from brakelab.replay.needed import NEEDED, fault_lines, needed_lines, nothing_usable
+from brakelab.replay.quality import Findings, quality_lines
+from brakelab.results import ResultWriter, brakes_table
+from ecu.config import new_params
+from ecu.diagnostics.store import out_of_range
+from ecu.errors import RunFault, UserError
+from ecu.records import LEARNED
+
+
+def replay_job(job: Job) -> Outcome:
+    """Replay one drive. Whatever goes wrong with it is in the outcome: nothing is raised."""
+    began = time.perf_counter()
+    paths: list[Path] = []
+    brakes = None
+    try:
+        with local_copies(job.logs) as paths:
+            outcome, brakes = _replay(job, paths)
+    except (UserError, RunFault) as error:
+        outcome = failed(job, str(error))
+    except Exception as error:
+        outcome = failed(job, f"{job.logs[0]}: unexpected {type(error).__name__}: {error} (please report it)")
+    for name in ("fault", "notes"):
+        outcome.summary[name] = _by_address(outcome.summary[name], paths, job.logs)
+    outcome.summary["replay_seconds"] = time.perf_counter() - began
+    return outcome if brakes is None else outcome._replace(file=_file(job, outcome, brakes))
+
+
+def _file(job: Job, outcome: Outcome, brakes: pa.Table) -> bytes:
+    """Return the Parquet file of a drive's brakings, with all that an earlier run is known by."""
+    file = io.BytesIO()
+    pq.write_table(brakes.replace_schema_metadata(metadata_of(job, outcome)), file, compression="zstd")
+    return file.getvalue()
+
+
+def _replay(job: Job, paths: Sequence[Path]) -> tuple[Outcome, pa.Table]:
+    params = new_params(job.config)
+    learned = np.frombuffer(job.learned, LEARNED).copy() if job.learned else None
+    findings = [Findings(path) for path in paths]
+    for path in paths:
+        if not path.exists():
+            raise UserError(str(path), "", "no such file; give an existing log")
+    book = DriveBook(params)
+    with TemporaryDirectory(prefix="brake-ecu-fleet-") as folder:
+        file = Path(folder, "rows.parquet")
+        with ResultWriter(file, params) if job.rows else nullcontext() as writer:
+
+            def write(t: NDArray[np.float64], rows: NDArray[np.float64]) -> None:
+                book.add(t, rows)
+                if writer is not None:
+                    start = {"start_time_ns": str(findings[0].start_ns)}
+                    writer.provenance = writer.provenance or provenance(job) | start
+                    writer.write(t, rows)
+
+            after = replay_drive(
+                findings, params, learned, job.source, write, book.brakes.end_log, lambda _: None
+            )
+        if nothing_usable(findings):
+            names = ", ".join(group.name for group in NEEDED)
+            raise RunFault(f"{paths[0]}: not one sample of the needed inputs was usable ({names})")
+        if job.rows:
+            _put(file, Path(job.rows))
+    assert after is not None
+    kept = job.learned if out_of_range(after, params[0]["mu_nominal"]) else after.tobytes()
+    notes = [
+        line
+        for found in findings
+        for line in (*quality_lines(found, job.source.plan), *needed_lines(found), *fault_lines(found))
+    ]
+    summary = provenance(job) | book.summary(findings)
+    summary |= {"fault": "", "notes": "\n".join(notes), "sha256": "\n".join(log_hash(path) for path in paths)}
+    table = brakes_table(book.brakes.rows)
+    drives = pa.array([job.drive] * len(table), pa.string())
+    return Outcome(summary, b"", kept), table.add_column(0, "drive", drives)
+
+
+def _put(file: Path, target: Path) -> None:
+    """Let `file` appear as `target` complete or not at all."""
+    unfinished = target.with_name(f".{target.name}.unfinished")
+    target.parent.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(file, unfinished)
+    unfinished.replace(target)
+
+
+def _by_address(text: str, paths: Sequence[Path], urls: Sequence[str]) -> str:
+    """Return a message with the logs' own names instead of those of their copies."""
+    for path, url in zip(paths, urls, strict=False):
+        text = text.replace(str(path), url)
+    return text

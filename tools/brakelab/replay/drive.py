@@ -1,0 +1,65 @@
+"""A drive of one log or several through one ECU: what was learned is carried over, time goes on."""
+
+from collections.abc import Callable, Sequence
+from time import perf_counter
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakelab.replay.engine import Rows, new_ecu
+from brakelab.replay.formats import Advance, kind_of
+from brakelab.replay.log import replay_log
+from brakelab.replay.quality import Findings
+from brakelab.replay.source import Source
+from ecu.recorder import Recording
+from ecu.records import RecordArray
+from ecu.signals import CYCLE_NS
+
+_PERIOD: Final = 1e-9 * CYCLE_NS  # s
+
+Write = Callable[[NDArray[np.float64], NDArray[np.float64]], None]
+
+
+def replay_drive(
+    findings: Sequence[Findings],
+    params: RecordArray,
+    learned: RecordArray | None,
+    source: Source,
+    write: Write,
+    end_log: Callable[[], None],
+    advance: Advance,
+    recording: Recording | None = None,
+) -> RecordArray | None:
+    """Replay the logs that `findings` name, in order, and return what was learned, LEARNED of shape (1,).
+
+    `learned` is from before the drive. `write(t, rows)` takes the rows as they come: t [s], shape (n,), and
+    shape (n, N_ROW); `end_log()` is told where a log ends, `advance(bytes)` of progress. `recording` gives
+    initial state, T_k and missed periods to an independent log of the same drive.
+
+    Raises:
+        UserError: a log is not right.
+    """
+    shift = 0.0
+    for place, found in enumerate(findings):
+        ecu = new_ecu(params, learned)
+        end, kind, began = shift, kind_of(found.path), perf_counter()
+        for rows in replay_log(found.path, ecu, source, recording, found, advance):
+            t = _seconds(rows, found, kind)
+            if place and found.rows == len(t):  # the first block of a log that goes on
+                shift = round(shift - t[0], 9)
+            t = np.round(t + shift, 9) if place else t
+            write(t, rows.values)
+            end = float(t[-1]) + _PERIOD
+        end_log()
+        found.seconds = perf_counter() - began
+        shift = end
+        learned = ecu.state["learned"].copy()
+    return learned
+
+
+def _seconds(rows: Rows, found: Findings, kind: str) -> NDArray[np.float64]:
+    """Return `t` on the log's own axis: a signal file's own, seconds since the first frame otherwise."""
+    if kind == "signals":
+        return np.where(np.isnan(rows.t), np.round(rows.t_ns * 1e-9, 9), rows.t)
+    return np.round((rows.t_ns - found.start_ns) * 1e-9, 9)
