@@ -84,8 +84,9 @@ def replay(
         }
         shift = 0.0
         for place, found in enumerate(findings):
+            began = perf_counter()
             ecu = new_ecu(params, learned)
-            end, began = shift, perf_counter()
+            end = shift
             for rows in replay_log(found.path, ecu, source, recording, found, advance):
                 t = _seconds(rows, found, kind_of(found.path))
                 if place and found.rows == len(t):  # the first block of a log that goes on
