@@ -85,9 +85,9 @@ def replay_log(
     log = recording.frames if recording and counted else path
     plan = source.plan
     ecu.params[0]["mapped"] = plan.mapped
+    set_raw_ends(ecu.seen, plan.signals)
     reception = findings.reception = new_reception(plan)
     findings.freshness, findings.mapped = reception.freshness, plan.mapped
-    set_raw_ends(ecu.seen, plan.signals)
     blocks = read_frames(log, findings.interfaces, findings.log, advance)
     if source.bus and not counted:
         blocks = only_interface(blocks, source.bus, findings)

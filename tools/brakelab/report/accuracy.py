@@ -61,20 +61,16 @@ def tracking(drive: Drive, truth: Drive | None, found: list[Braking]) -> list[fl
     """
     rows = evaluated(drive, truth, found)
     demand, achieved = drive.column("decel_demand_total"), achieved_deceleration(drive, truth)
+    motors, brakes, asked = (
+        np.nan_to_num(drive.corners(name)).sum(axis=1)
+        for name in ("motor_torque", "brake_torque", "motor_demand")
+    )
     shares = []
     for braking in found:
         mine = rows & inside(drive, braking)
-        known = mine.any() and not _others_brake(drive, mine)
+        known = mine.any() and not (motors - asked)[mine].sum() > MOTORS * brakes[mine].sum() > 0.0
         shares.append(float(achieved[mine].sum() / demand[mine].sum()) - 1.0 if known else float("nan"))
     return shares
-
-
-def _others_brake(drive: Drive, rows: NDArray[np.bool_]) -> bool:
-    motors, brakes, asked = (
-        np.nan_to_num(drive.corners(name)[rows]).sum()
-        for name in ("motor_torque", "brake_torque", "motor_demand")
-    )
-    return bool(motors - asked > MOTORS * brakes > 0.0)
 
 
 def accuracy(estimate: Vector, sigma: Vector, true: Vector, dt: float) -> Accuracy:

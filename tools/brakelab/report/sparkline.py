@@ -12,17 +12,14 @@ _LEAST_SCALE = 2.0  # m/s^2
 
 def sparklines(drive: Drive, found: list[Braking]) -> list[str]:
     """Return an SVG for each braking, empty where nothing is known; stretches are drawn by their means."""
+    decelerations = drive.column("decel_demand_total"), -drive.column("accel_x_road")
     lines = []
     for braking in found:
         rows = inside(drive, braking)
-        lines.append([_means(drive.t[rows], values[rows]) for values in _decelerations(drive)])
+        lines.append([_means(drive.t[rows], values[rows]) for values in decelerations])
     tops = [float(mean.max()) for pair in lines for _, mean in pair if len(mean)]
     scale = max([_LEAST_SCALE, *tops])
     return [_svg(pair, scale) if any(len(mean) for _, mean in pair) else "" for pair in lines]
-
-
-def _decelerations(drive: Drive) -> tuple[Vector, Vector]:
-    return drive.column("decel_demand_total"), -drive.column("accel_x_road")
 
 
 def _means(t: Vector, values: Vector) -> tuple[Vector, Vector]:
