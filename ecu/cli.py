@@ -228,7 +228,7 @@ def fleet(
         int | None, typer.Option("--workers", min=1, metavar="N", help="Processes here; default: one a core")
     ] = None,
     rows: Annotated[
-        bool, typer.Option("--rows", help="Keep the rows of every drive too: 1 GB for 15 h and more")
+        bool, typer.Option("--rows", help="Keep the rows of every drive too, 0.1 GB for each hour")
     ] = False,
 ) -> int:
     """Thousands of recorded drives, vehicles side by side. Exit code 1: drives failed."""
