@@ -58,12 +58,16 @@ _INTERFACE = typer.Option(
     "-i", "--interface", metavar="INTERFACE", help="As python-can calls it: socketcan, …"
 )
 _CHANNEL = typer.Option("-c", "--channel", metavar="CHANNEL", help="As python-can calls it: can0, …")
+_OBSERVER = typer.Option(
+    "--observer", metavar="OBSERVER", help="joint, observer1, observer2; default: CONFIG's"
+)
 _STATE = typer.Option("--state", metavar="DIR", help="Where learned friction is kept between runs")
 
 Config = Annotated[Path, _CONFIG]
 Map = Annotated[Path | None, _MAP]
 Interface = Annotated[str, _INTERFACE]
 Channel = Annotated[str, _CHANNEL]
+Observer = Annotated[str | None, _OBSERVER]
 State = Annotated[Path | None, _STATE]
 
 
@@ -136,10 +140,7 @@ def replay(
     config: Config,
     out: Annotated[Path, typer.Option("--out", metavar="RESULT.parquet", help="Results, one row per 10 ms")],
     map: Map = None,
-    observer: Annotated[
-        str | None,
-        typer.Option("--observer", metavar="OBSERVER", help="joint, observer1, observer2; default: CONFIG's"),
-    ] = None,
+    observer: Observer = None,
     state: State = None,
     cycles: Annotated[
         Path | None,
@@ -206,32 +207,19 @@ def suggest(
 @app.command()
 def fleet(
     logs: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="GLOB|MANIFEST", help='"data/*/*.log": a folder a vehicle; or a manifest, CSV or TOML'
-        ),
+        list[str], typer.Argument(metavar="GLOB|MANIFEST", help='"data/*/*.log", a folder a car')
     ],
-    out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Tables and report; goes on where it stopped")
-    ],
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Tables and report")],
     config: Annotated[Path | None, _CONFIG] = None,
     map: Map = None,
-    observer: Annotated[
-        str | None,
-        typer.Option("--observer", metavar="OBSERVER", help="joint, observer1, observer2; default: CONFIG's"),
-    ] = None,
+    observer: Observer = None,
     scheduler: Annotated[
-        str | None,
-        typer.Option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster; default: processes here"),
+        str | None, typer.Option("--scheduler", metavar="ADDRESS", help="Of Dask; default: processes here")
     ] = None,
-    workers: Annotated[
-        int | None, typer.Option("--workers", min=1, metavar="N", help="Processes here; default: one a core")
-    ] = None,
-    rows: Annotated[
-        bool, typer.Option("--rows", help="Keep the rows of every drive too, 0.1 GB for each hour")
-    ] = False,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes here; default: one a core")] = None,
+    rows: Annotated[bool, typer.Option("--rows", help="Keep rows too, 0.1 GB for each hour")] = False,
 ) -> int:
-    """Thousands of recorded drives, vehicles side by side. Exit code 1: drives failed."""
+    """Thousands of recorded drives, vehicles side by side. Goes on where it stopped."""
     from brakelab.fleet import command
 
     return command.fleet(logs, config, map, observer, scheduler, workers, out, rows)
