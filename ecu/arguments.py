@@ -33,6 +33,9 @@ INTERFACE_OPTION = typer.Option(
     "-i", "--interface", metavar="INTERFACE", help="As python-can calls it: socketcan, …"
 )
 CHANNEL_OPTION = typer.Option("-c", "--channel", metavar="CHANNEL", help="As python-can calls it: can0, …")
+OBSERVER_OPTION = typer.Option(
+    "--observer", metavar="OBSERVER", help="joint, observer1, observer2; default: CONFIG's"
+)
 STATE_OPTION = typer.Option("--state", metavar="DIR", help="Where learned friction is kept between runs")
 
 Config = Annotated[Path, CONFIG_OPTION]
@@ -40,3 +43,4 @@ Map = Annotated[Path | None, MAP_OPTION]
 Interface = Annotated[str, INTERFACE_OPTION]
 Channel = Annotated[str, CHANNEL_OPTION]
 State = Annotated[Path | None, STATE_OPTION]
+Observer = Annotated[str | None, OBSERVER_OPTION]

@@ -14,6 +14,7 @@ from ecu.arguments import (
     Config,
     Interface,
     Map,
+    Observer,
     State,
     scenario_file,
 )
@@ -97,10 +98,7 @@ def replay(
         Path, typer.Option("--out", metavar="RESULT.parquet", help="Results, a row per 10 ms; or .mf4")
     ],
     map: Map = None,
-    observer: Annotated[
-        str | None,
-        typer.Option("--observer", metavar="OBSERVER", help="joint, observer1, observer2; default: CONFIG's"),
-    ] = None,
+    observer: Observer = None,
     state: State = None,
     cycles: Annotated[
         Path | None,
@@ -182,10 +180,7 @@ def fleet(
     ],
     config: Annotated[Path | None, CONFIG_OPTION] = None,
     map: Map = None,
-    observer: Annotated[
-        str | None,
-        typer.Option("--observer", metavar="OBSERVER", help="joint, observer1, observer2; default: CONFIG's"),
-    ] = None,
+    observer: Observer = None,
     scheduler: Annotated[
         str | None,
         typer.Option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster; default: processes here"),

@@ -97,6 +97,15 @@ def test_a_second_run_does_what_is_missing(client: Client, tmp_path: Path) -> No
     assert learned(chains[1]) == ["1 3 4 "]
 
 
+def test_a_log_that_changed_is_done_again(client: Client, tmp_path: Path) -> None:
+    run(client, fleet(a="1 2 3"), tmp_path, noting())
+    chains = fleet(a="1 2 3")
+    chains[0].drives[1] = chains[0].drives[1]._replace(mark="another")
+    done = run(client, chains, tmp_path, noting())
+    # It taught what it taught before, so the drive after it stands.
+    assert {name for name, summary in done.items() if summary["new"]} == {"a/2"}
+
+
 def test_what_follows_from_another_input_is_done_again(client: Client, tmp_path: Path) -> None:
     run(client, fleet(a="1 2 3 4", b="1 2"), tmp_path, noting())
     chains = fleet(a="1 bad2 3 4", b="1 2")

@@ -56,9 +56,9 @@ def replay(
         UserError: an argument, the configuration, the map or a log is not right.
         RunFault: the results are written, but no needed input was ever usable.
     """
+    vehicle = with_observer(load_config(config), observer)
     _check(logs, out, cycles)
     check_outputs(out, (out, brakes_path(out)), [*logs, config, *([map] if map else [])])
-    vehicle = with_observer(load_config(config), observer)
     source = load_source(map)
     if map:
         for log in logs:
