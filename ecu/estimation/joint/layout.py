@@ -90,6 +90,7 @@ JOINT_STATE: Final = np.dtype(
         ("way", "f8", (4,)),  # over which friction was observed in this braking [m]
         ("course", "f8", (4,)),  # its integral over this way [m]
         ("ratio", "f8", (6,)),  # squared innovation over its variance: wheels, total force, speed reference
+        ("pull", "f8", (4,)),  # the wheels' test ratios up to the gate, with the sign of the innovation
         ("reversing", "u1"),
         ("reset", "u1"),
     ],

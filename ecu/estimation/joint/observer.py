@@ -20,7 +20,7 @@ from ecu.estimation.friction import (
     driver_accelerates,
     drives_against,
 )
-from ecu.estimation.joint.kalman import clear_derivatives, correct, forget
+from ecu.estimation.joint.kalman import GATE, clear_derivatives, correct, forget
 from ecu.estimation.joint.layout import (
     BIAS,
     DELAY,
@@ -63,7 +63,7 @@ LEAST_SPEED = 3.4  # m/s
 APPLIED = 1.0  # bar above push-out: the brakes act
 STRAIGHT = 0.05  # lateral acceleration over gravity: more, and wheels roll by their own loads and angles
 MOTORS = 100.0  # N m of all motors: their torque is worth looking at
-SLIDING_FORCE = 0.3  # relative error of a sliding wheel's force if it is taken for its brake force
+SLIDING_FORCE = 0.3  # relative error of the force of a wheel that seems too fast, taken for its brake force
 BELIEVED_AFTER = 3.0  # s without a wheel that rolls, brakes released
 RELEASE = 0.15  # relative fall in a window: pressure, slip and force lag differently and teach nothing
 SNAPSHOT_S = 0.2
@@ -229,7 +229,7 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
             state.p[V, V] += 0.25
     state.untrusted_s += time
     for i in range(4):
-        state.observed[i] = 0
+        state.observed[i], state.pull[i] = 0, 0.0
         if w.omega_samples[i] == 0:
             continue
         state.slides[i] = 1 if wheel_slides(params, state, i) else 0
@@ -265,7 +265,9 @@ def _fuse_wheel(params: Record, state: Record, i: int, before: float, moving: bo
     corner = CORNERING * w.across * w.across * state.slip[i] * ground / params.wheel_radius[i]
     variance += transient * transient + corner * corner
     state.last_slip[i] = state.slip[i]
-    state.ratio[i] = correct(state, w.omega[i] - omega, variance)
+    innovation = w.omega[i] - omega
+    state.ratio[i] = correct(state, innovation, variance)
+    state.pull[i] = math.copysign(min(state.ratio[i], GATE * GATE), innovation)
     state.observed[i] = 1 if observing and state.smooth_pressure[i] > 2.0 * APPLIED else 0
 
 
@@ -288,6 +290,8 @@ def _fuse_balance(params: Record, state: Record) -> None:
         per_bar /= params.wheel_radius[i] * params.mass
         if state.smooth_pressure[i] > 0.5:
             variance += per_bar**2 * (w.pressure_variance[i] + _skew(state, i) ** 2)
+        if state.slides[i] and w.omega[i] * params.wheel_radius[i] < w.ground[i]:
+            return  # what it holds is the road's to say
         if state.slides[i]:
             variance += (SLIDING_FORCE * per_bar * w.pressure[i]) ** 2
     state.ratio[4] = correct(state, -left, variance)

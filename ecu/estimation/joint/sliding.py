@@ -47,13 +47,12 @@ def wheel_slides(params: Record, state: Record, i: int) -> bool:
 
 @kernel
 def watch_tyres(state: Record, observing: bool) -> None:
-    """Let friction go back and stiffness be unknown where most wheels contradict the tyres that are known."""
+    """Let friction go back and stiffness be unknown where most wheels contradict the known tyres alike."""
     against = 0.0
     for i in range(4):
-        if math.isfinite(state.ratio[i]):
-            against += min(state.ratio[i], GATE * GATE)
+        against += state.pull[i]
     known = state.p[STIFFNESS, STIFFNESS] < (0.5 * PRIOR[STIFFNESS]) ** 2
-    if observing and known and against > OTHER_TYRES * GATE * GATE:
+    if observing and known and abs(against) > OTHER_TYRES * GATE * GATE:
         go_back(state)
         forget(state, STIFFNESS, PRIOR[STIFFNESS] ** 2)
 
