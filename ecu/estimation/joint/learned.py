@@ -60,15 +60,14 @@ def restore_joint(params: Record, state: Record, learned: Record) -> None:
             continue
         x[MU + i] = math.log(learned.mu_b[i] / params.mu_nominal[i])
         relative = learned.sigma_mu_b[i] / learned.mu_b[i]
-        shared = min(p[MASS, MASS], 0.8 * relative * relative)
-        for j in range(4):
-            if j != i and learned.observed_s[j] > 0.0:
-                p[MU + i, MU + j] = p[MU + j, MU + i] = shared
         p[MU + i, MU + i] = min(relative * relative + MU_PAUSE**2, p[MU + i, MU + i])
-        p[MU + i, MASS] = p[MASS, MU + i] = shared
+        p[MU + i, MASS] = p[MASS, MU + i] = min(p[MASS, MASS], 0.8 * relative * relative)
     for i in range(4):
         for j in range(4):
-            if (learned.observed_s[i] > 0.0) != (learned.observed_s[j] > 0.0):
+            both = learned.observed_s[i] > 0.0 and learned.observed_s[j] > 0.0
+            if both and i != j:  # what both owe to the mass
+                p[MU + i, MU + j] = p[MU + i, MASS] * p[MU + j, MASS] / p[MASS, MASS]
+            elif (learned.observed_s[i] > 0.0) != (learned.observed_s[j] > 0.0):
                 p[MU + i, MU + j] = 0.0
     start_joint(state)
 

@@ -104,7 +104,7 @@ def test_a_log_far_away_is_the_log_here(data: Path) -> None:
 DAMAGES = {
     "empty.log": (b"", "line 1: the file is empty"),
     "garbage.log": (b"\xff\x00" * 5000, "garbage.log"),
-    "frames.dat": (b"(1.0) can0 123#00\n", "unknown kind of log .dat"),
+    "frames.dat": (b"(1.0) can0 123#00\n", "let its name end in .log"),
     "cut.parquet": (b"PAR1\x15\x04\x15", "no readable Parquet file"),
     "gone.log": (None, "no such file"),
 }

@@ -45,11 +45,12 @@ class Reaction(NamedTuple):
 
 
 def reactions(drive: Drive, truth: Drive, faults: list[Fault]) -> list[Reaction]:
-    """Return the reaction to every fault, up to the beginning of the next.
+    """Return the reaction to every fault, up to the beginning of the next or the vehicle's departure.
 
     `drive` are the ECU's results, `truth` the vehicle's on its own axis; both count from T_0.
     """
     found = []
+    drive = _until(drive, truth.t[-1])
     for fault in faults:
         limit = min((other.t for other in faults if other.t > fault.t), default=math.inf)
         found.append(_reaction(_until(drive, limit), _until(truth, limit), fault))
