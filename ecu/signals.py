@@ -10,6 +10,11 @@ from typing import Final, NamedTuple
 CORNERS: Final = ("fl", "fr", "rl", "rr")
 
 
+def without_corner(name: str) -> str:
+    """Return a name without the corner that it ends with."""
+    return name[:-3] if name[-3:] in {f"_{corner}" for corner in CORNERS} else name
+
+
 class InputSignal(NamedTuple):
     """A quantity that the ECU reads."""
 

@@ -6,7 +6,6 @@ daemon, replay and closed-loop simulation get the same bits from the same inputs
     brake application -> accelerations -> wheel loads, radii -> brake torques, expected slip -> speed -> slip
     -> tyre forces -> friction -> disc temperature -> demand -> distribution -> blending -> pressure law
     -> slip guard -> limiter -> mode
-    -> limiter -> mode
 """
 
 import math

@@ -18,7 +18,7 @@ from rich.table import Table
 from brakelab.replay.command import WIDTH
 from brakelab.results import Result, brakes_path, read_result
 from ecu.errors import UserError
-from ecu.signals import CORNERS
+from ecu.signals import CORNERS, without_corner
 
 MATTERS: Final = {
     "m/s": 0.05,
@@ -58,12 +58,8 @@ class Difference(NamedTuple):
     """Greatest difference over what matters; above 1 it does."""
 
 
-def _stem(name: str) -> str:
-    return name[:-3] if name[-3:] in {f"_{corner}" for corner in CORNERS} else name
-
-
 def _threshold(name: str, unit: str, values: NDArray[np.float64]) -> float:
-    if _stem(name) in EXACT:
+    if without_corner(name) in EXACT:
         return 0.5
     rms = float(np.sqrt(np.mean(np.square(values)))) if len(values) else 0.0
     return max(MATTERS.get(unit, 0.0), OF_RMS * rms, 1e-12)
@@ -117,7 +113,7 @@ def _show(
         )
     for row, place in zip(of, at, strict=True):
         table.add_row(
-            _stem(row.name),
+            without_corner(row.name),
             units.get(row.name, ""),
             "" if np.isnan(row.rms) else f"{row.rms:.3g}",
             "" if np.isnan(row.greatest) else f"{row.greatest:+.3g}",
@@ -179,7 +175,7 @@ def compare(a: Path, b: Path) -> int:
         equal = len(set(before) & set(after)) - len(found)
         by_quantity: dict[str, Difference] = {}
         for row in heavy:
-            by_quantity.setdefault(_stem(row.name), row)
+            by_quantity.setdefault(without_corner(row.name), row)
         worst = list(by_quantity.values())
         if worst:
             places = [_place(title, before, row) for row in worst]
@@ -195,5 +191,5 @@ def _place(title: str, columns: Columns, difference: Difference) -> str:
     row = difference.place
     if title == BRAKES:
         return f"braking {columns['brake'][row] + 1:.0f} {columns['corner'][row]}"
-    corner = difference.name[len(_stem(difference.name)) + 1 :]
+    corner = difference.name[len(without_corner(difference.name)) + 1 :]
     return f"{columns['t'][row]:.2f} s {corner}".rstrip()

@@ -18,6 +18,12 @@ OTHER_TYRES = 2.5  # wheels on the gate at once
 
 
 @kernel
+def _beyond(rolled: float, ground: float, slip: float) -> bool:
+    """Return whether a wheel's speed differs from that of the ground [m/s] by more than a slip."""
+    return abs(rolled - ground) > slip * max(ground, rolled, SLIDING_FLOOR)
+
+
+@kernel
 def share_force(params: Record, state: Record, inputs: Record, accel: float, load: Record) -> None:
     """Give the wheels that begin to slide, by their loads, the force along the car that the others leave."""
     x = state.x
@@ -26,7 +32,7 @@ def share_force(params: Record, state: Record, inputs: Record, accel: float, loa
     for i in range(4):
         rolled = inputs.value[WHEEL_SPEED + i] * params.wheel_radius[i]
         if fresh(inputs, WHEEL_SPEED + i):
-            state.yields[i] = 1 if abs(rolled - x[V]) > YIELDING * max(x[V], rolled, SLIDING_FLOOR) else 0
+            state.yields[i] = 1 if _beyond(rolled, x[V], YIELDING) else 0
         if state.yields[i]:
             loaded += load[i]
         else:
@@ -40,9 +46,7 @@ def share_force(params: Record, state: Record, inputs: Record, accel: float, loa
 def wheel_slides(params: Record, state: Record, i: int) -> bool:
     """Return whether a wheel is so far from the car's speed that it does not tell it."""
     w = state.window
-    rolled = w.omega[i] * params.wheel_radius[i]
-    slides: bool = abs(rolled - w.ground[i]) > LARGE_SLIP * max(w.ground[i], rolled, SLIDING_FLOOR)
-    return slides
+    return _beyond(w.omega[i] * params.wheel_radius[i], w.ground[i], LARGE_SLIP)
 
 
 @kernel

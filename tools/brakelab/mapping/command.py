@@ -19,6 +19,7 @@ from ecu.bus.database import load_database
 from ecu.bus.signal_map import load_signal_map
 from ecu.bus.units import spelled
 from ecu.errors import RunFault, UserError
+from ecu.signals import without_corner
 
 COUNTING: Final = {"counter", "count", "cnt", "cntr", "alive", "ctr", "no"}
 WANTED: Final = (
@@ -66,10 +67,6 @@ def _load(dbc: Path) -> tuple[Database, bool]:
         return load_database(dbc, strict=False), False
 
 
-def _stem(target: str) -> str:
-    return target.removesuffix("_fl").removesuffix("_fr").removesuffix("_rl").removesuffix("_rr")
-
-
 def _show(found: list[Found], drives: bool) -> None:
     console = Console(stderr=True)
     if not console.is_terminal:
@@ -79,14 +76,14 @@ def _show(found: list[Found], drives: bool) -> None:
         table.add_column(column)
     rows: dict[tuple[str, str], list[Found]] = {}
     for one in found:
-        rows.setdefault((_stem(one.target), one.evidence), []).append(one)
+        rows.setdefault((without_corner(one.target), one.evidence), []).append(one)
     for (stem, evidence), ones in rows.items():
         signals = " ".join(dict.fromkeys(one.series.signal for one in ones))
         first = ones[0]
         table.add_row(stem, first.series.message, signals, first.unit, f"{first.factor:.4g}", evidence)
     console.print(table)
     targets = {one.target for one in found}
-    missing = [_stem(name) for name in WANTED if name not in targets]
+    missing = [without_corner(name) for name in WANTED if name not in targets]
     if missing:
         console.print(f"nothing found for {', '.join(missing)}", highlight=False)
     if not drives:

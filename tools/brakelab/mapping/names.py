@@ -4,6 +4,7 @@ import re
 from typing import Final
 
 from ecu.bus.units import CONVERSIONS, spelled
+from ecu.signals import without_corner
 
 _CORNERS: Final = (
     ("fl", ("fl", "lf", "frontleft", "leftfront", "frtlft", "lftfrt", "vl", "lhf", "flh")),
@@ -62,7 +63,7 @@ def corner_of(name: str) -> tuple[str, str]:
 def score(name: str, target: str) -> float:
     """Return how much a name speaks for an input: words found less words against it."""
     parts = words(name)
-    stem = target[:-3] if target[-3:] in ("_fl", "_fr", "_rl", "_rr") else target
+    stem = without_corner(target)
 
     def speaks(word: str) -> bool:
         return any(part == word or (len(word) > 3 and part.startswith(word)) for part in parts)
