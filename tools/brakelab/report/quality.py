@@ -139,7 +139,7 @@ def _input(row: dict[str, Any], seconds: float) -> list[Cell]:
     shares = [100.0 * row[kind] / row["samples"] for kind in ("invalid", "outside")]
     return [
         Cell(fixed(rate, 1), off),
-        Cell("–".join(dict.fromkeys(f"{hertz:g}" for hertz in expected)) or "any"),
+        Cell("–".join(dict.fromkeys(f"{hertz:.3g}" for hertz in expected)) or "any"),
         Cell(fixed(row["greatest_gap_s"], 2), row["greatest_gap_s"] > row["timeout_s"]),
         *(Cell(fixed(share, 2) if share else "0", share > 0.0) for share in shares),
         *(Cell(f"{row[kind]}", row[kind] > 0) for kind in ("clipped", "jumps")),
@@ -158,6 +158,6 @@ def _message(row: dict[str, Any], seconds: float) -> list[Cell]:
         Cell(row["id"]),
         Cell(f"{row['received']}"),
         Cell(fixed(rate, 1)),
-        Cell(f"{expected:g}" if expected else "any"),
+        Cell(f"{expected:.3g}" if expected else "any"),
         *(Cell(f"{row[kind]}", row[kind] > 0) for kind in _MESSAGE),
     ]
