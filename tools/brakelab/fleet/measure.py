@@ -1,21 +1,25 @@
-"""What a fleet costs beyond its replays, and how long 30,000 km take.
+"""What a fleet costs beyond its replays, how long 30,000 km take, what memory a long log takes.
 
 ```
 python -m brakelab.fleet.measure scaling MANIFEST [--rounds 3] [--drives 100]
 python -m brakelab.fleet.measure distance [--kilometres 30000] [--minutes 5] [--workers 2]
+python -m brakelab.fleet.measure length [--gigabytes 10]
 ```
 `scaling` replays the same drives without Dask, by one worker and by two, in turn. `distance` simulates drives
 of ten minutes, replays and forgets them one by one, and keeps their brakings until its end; what it does not
-reach in its time, or before Ctrl-C, it extrapolates.
+reach in its time, or before Ctrl-C, it extrapolates. `length` replays one log that long: a drive of ten
+minutes again and again, with a jump of speed and counters at each seam.
 """
 
 import argparse
 import os
-import resource
+import re
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager, redirect_stdout, suppress
+from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
@@ -23,15 +27,21 @@ from typing import Any, Final
 import numpy as np
 from distributed import Client
 
+from brakelab.candump_text import candump_text
+from brakelab.closed_loop import VEHICLE_BUS
 from brakelab.fleet.cluster import connect
 from brakelab.fleet.command import plan
-from brakelab.fleet.generate import plant_of, simulate_and_replay
+from brakelab.fleet.generate import plant_of, simulate_and_replay, write_drive
 from brakelab.fleet.manifest import Drive, find_drives
 from brakelab.fleet.run import Chain, Planned, Task, run_fleet
 from brakelab.fleet.task import replay_job
+from brakelab.replay.command import replay
+from brakelab.replay.formats import read_frames
+from brakelab.replay.log_quality import LogQuality
 from brakelab.replay.source import load_source
 from ecu.config import load_config
 from ecu.resources import named
+from ecu.signals import CYCLE_NS
 
 SECONDS: Final = 600
 """Of a simulated drive."""
@@ -51,7 +61,9 @@ def _warm(workers: int, chains: Sequence[Chain], task: Task = replay_job) -> Ite
 
 
 def _peak_megabytes() -> float:
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    """Return the most memory that this process has held, without that of the one that started it."""
+    held = re.search(r"VmHWM:\s*(\d+) kB", Path("/proc/self/status").read_text("ascii"))
+    return int(held[1]) / 1024.0 if held else float("nan")
 
 
 def _by_workers(workers: int, drives: Sequence[Drive]) -> dict[str, float]:
@@ -174,6 +186,45 @@ def distance(kilometres: float, minutes: float, workers: int) -> None:
     )
 
 
+def _write_long(log: Path, size: float) -> float:
+    """Write a log of `size` bytes; return the hours in it."""
+    write_drive(0, 0, SECONDS, log)
+    frames = np.concatenate(list(read_frames(log, [], LogQuality())))
+    length_ns = int(frames["stamp_ns"].max() - frames["stamp_ns"].min()) + CYCLE_NS
+    drives = 1
+    with log.open("ab") as file:
+        while file.tell() < size:
+            frames["stamp_ns"] += length_ns
+            file.write(candump_text(frames, VEHICLE_BUS))
+            drives += 1
+    return 1e-9 * drives * length_ns / 3600.0
+
+
+def _replay_long(log: Path) -> tuple[float, float]:
+    """Replay as the command does; return processor time [s] and peak of memory [MB]."""
+    work = time.process_time()
+    with open(os.devnull, "w") as nowhere, redirect_stdout(nowhere):
+        replay([log], named(plant_of(0), "config"), None, None, None, log.with_suffix(".parquet"))
+    return time.process_time() - work, _peak_megabytes()
+
+
+def length(gigabytes: float) -> None:
+    """Print what the replay of a log of `gigabytes` takes, in a process of its own."""
+    spawn = get_context("spawn")
+    with TemporaryDirectory() as folder:
+        log = Path(folder, "long.log")
+        with ProcessPoolExecutor(1, spawn) as pool:
+            hours = pool.submit(_write_long, log, 1e9 * gigabytes).result()
+        began = time.perf_counter()
+        with ProcessPoolExecutor(1, spawn) as pool:
+            work, peak = pool.submit(_replay_long, log).result()
+        wall = time.perf_counter() - began
+        print(
+            f"{1e-9 * log.stat().st_size:.2f} GB, {hours:.1f} h: {work:.0f} s CPU, {wall:.0f} s, "
+            f"peak {peak:.0f} MB; {1e-6 * log.with_suffix('.parquet').stat().st_size:.0f} MB of rows"
+        )
+
+
 def main() -> None:
     """Measure what the command line asks for."""
     parser = argparse.ArgumentParser(prog="python -m brakelab.fleet.measure")
@@ -186,8 +237,12 @@ def main() -> None:
     two.add_argument("--kilometres", type=float, default=30_000.0)
     two.add_argument("--minutes", type=float, default=5.0)
     two.add_argument("--workers", type=int, default=2)
+    three = what.add_parser("length")
+    three.add_argument("--gigabytes", type=float, default=10.0)
     given = parser.parse_args()
-    if given.what == "scaling":
+    if given.what == "length":
+        length(given.gigabytes)
+    elif given.what == "scaling":
         scaling(given.manifest, given.rounds, given.drives)
     else:
         distance(given.kilometres, given.minutes, given.workers)
