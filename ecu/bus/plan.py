@@ -199,6 +199,11 @@ def _listed(codes: NDArray[np.int64], which: NDArray[np.int32], code: int) -> bo
 @kernel
 def is_present(signals: Any, codes: NDArray[np.int64], row: int, data: NDArray[np.uint8]) -> bool:
     """Return whether the multiplexers of this payload select the signal."""
+    return signals[row].selector < 0 or _is_selected(signals, codes, row, data)
+
+
+@kernel
+def _is_selected(signals: Any, codes: NDArray[np.int64], row: int, data: NDArray[np.uint8]) -> bool:
     while signals[row].selector >= 0:
         selector = signals[row].selector
         if not _listed(codes, signals[row].selected, raw_code(signals[selector], data)):

@@ -7,6 +7,7 @@ the scenario's faults (`brakelab.rig.faults`) on their way.
 """
 
 import math
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -17,6 +18,7 @@ import pyarrow.parquet as pq
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from brakelab.candump_text import candump_text
 from brakelab.outputs import check_outputs
 from brakelab.plant.driver import drive
 from brakelab.rig.deaths import killed
@@ -54,7 +56,6 @@ from ecu.bus.transmit import (
 from ecu.config import Config, load_config, new_params
 from ecu.errors import UserError
 from ecu.jit import kernel
-from ecu.recorder import candump_lines
 from ecu.records import FRAME, INPUTS, OUTPUTS, RecordArray, new_record, output_vector
 from ecu.resources import resource
 from ecu.signals import CYCLE_NS, INPUT_SIGNALS, N_INPUTS, N_OUTPUTS, OUTPUT_COLUMNS
@@ -130,6 +131,19 @@ class Drive(NamedTuple):
     """At T_k, by `TRUTH_COLUMNS`."""
     frames: RecordArray
     """`FRAME` of both directions in the order of their stamps."""
+
+
+class Block(NamedTuple):
+    """Some cycles of a drive, a row for each."""
+
+    decoded: NDArray[np.float64]
+    """`INPUT_SIGNALS` as the ECU decoded them, NaN where no new sample arrived; shape (n, N_INPUTS)."""
+    outputs: NDArray[np.float64]
+    """Shape (n, N_OUTPUTS)."""
+    truth: NDArray[np.float64]
+    """Shape (n, N_TRUTH)."""
+    frames: RecordArray
+    """As in `Drive`."""
 
 
 @cache
@@ -271,18 +285,11 @@ def _start_anew(sides: Sides) -> None:
         old[:] = new
 
 
-def run(loop: Loop, ideal: bool = False, seconds: float = LONGEST, told: Told | None = None) -> Drive:
-    """Run a new loop to the end of its script, or for `seconds`, and return what happened.
-
-    `ideal`: the ECU's pressure law is given the true friction, to compare a compensated controller with;
-    `told`: another one. Where the scenario kills the daemon, its outputs are NaN until it, or its standby,
-    sends again.
-    """
-    told = told or Told(1.0 if ideal else 0.0)
-    sides = loop.sides
-    per_cycle = 2 * (len(sides.vehicle_frames) + len(sides.ecu_frames))
-    blocks: list[tuple[NDArray[np.float64], ...]] = []
-    frames: list[RecordArray] = []
+def run_blocks(loop: Loop, seconds: float = LONGEST, told: Told | None = None) -> Iterator[Block]:
+    """Run a new loop as `run` does, yielding blocks of its cycles: the next one overwrites the arrays."""
+    told, sides = told or Told(), loop.sides
+    rows_of = tuple(np.empty((CHUNK, width)) for width in (N_INPUTS, N_OUTPUTS, N_TRUTH))
+    kept = new_record(FRAME, CHUNK * 2 * (len(sides.vehicle_frames) + len(sides.ecu_frames)))
     first, last, running = 0, round(seconds * 1e9 / CYCLE_NS), True
     deaths = killed(sides.vehicle.faults)
     while running and first < last:
@@ -292,20 +299,30 @@ def run(loop: Loop, ideal: bool = False, seconds: float = LONGEST, told: Told | 
             continue
         alive = not deaths or first < deaths[0].begin
         until = (deaths[0].begin if alive else deaths[0].end) if deaths else last
-        size = min(CHUNK, last - first, until - first)
-        block = (np.empty((size, N_INPUTS)), np.empty((size, N_OUTPUTS)), np.empty((size, N_TRUTH)))
-        kept = np.zeros(size * per_cycle, FRAME)
-        rows, count, running = _run(plans(), sides, loop.noise, told, alive, first, *block, kept)
-        blocks.append(tuple(values[:rows] for values in block))
-        frames.append(kept[:count].copy())
-        first += rows
-    decoded, outputs, truth = (np.concatenate(values) for values in zip(*blocks, strict=True))
+        decoded, outputs, truth = (rows[: min(CHUNK, last - first, until - first)] for rows in rows_of)
+        done, count, running = _run(
+            plans(), sides, loop.noise, told, alive, first, decoded, outputs, truth, kept
+        )
+        yield Block(decoded[:done], outputs[:done], truth[:done], kept[:count])
+        first += done
+
+
+def run(loop: Loop, ideal: bool = False, seconds: float = LONGEST, told: Told | None = None) -> Drive:
+    """Run a new loop to the end of its script, or for `seconds`, and return what happened.
+
+    `ideal`: the ECU's pressure law is given the true friction, to compare a compensated controller with;
+    `told`: another one. Where the scenario kills the daemon, its outputs are NaN until it, or its standby,
+    sends again.
+    """
+    told = told or Told(1.0 if ideal else 0.0)
+    blocks = [tuple(values.copy() for values in block) for block in run_blocks(loop, seconds, told)]
+    decoded, outputs, truth, frames = (np.concatenate(values) for values in zip(*blocks, strict=True))
     return Drive(
-        np.arange(first, dtype=np.float64) * (1e-9 * CYCLE_NS),
+        np.arange(len(truth), dtype=np.float64) * (1e-9 * CYCLE_NS),
         dict(zip((signal.name for signal in INPUT_SIGNALS), decoded.T, strict=True)),
         dict(zip(OUTPUT_COLUMNS, outputs.T, strict=True)),
         dict(zip(TRUTH_COLUMNS, truth.T, strict=True)),
-        np.concatenate(frames),
+        frames,
     )
 
 
@@ -335,7 +352,7 @@ def simulate(scenario: Path, config: Path, out: Path, seed: int = 0) -> int:
     metadata = {"start_time_ns": str(START_NS), "scenario": scenario.stem, "seed": str(seed)}
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        log.write_bytes(candump_lines(result.frames, VEHICLE_BUS))
+        log.write_bytes(candump_text(result.frames, VEHICLE_BUS))
         write_columns(inputs, result.t, result.inputs, metadata)
         write_columns(truth, result.t, result.truth, metadata)
     except OSError as error:

@@ -22,6 +22,7 @@ from brakelab.bench.measure import Figure, Row, Task, alternate, installed
 from brakelab.bench.python_ecu import PythonEcu
 from brakelab.bench.step import run_steps
 from brakelab.bench.table import Table, time_table
+from brakelab.candump_text import candump_text
 from brakelab.closed_loop import VEHICLE_BUS, new_loop, run
 from brakelab.replay.command import replay
 from brakelab.replay.formats import read_frames
@@ -30,7 +31,6 @@ from brakelab.scenario import load_scenario
 from ecu.bus.freshness import begin_cycle, end_cycle
 from ecu.bus.receive import ReceivePlan, contract_receive_plan, new_reception, receive
 from ecu.config import load_config, new_params
-from ecu.recorder import candump_lines
 from ecu.records import INPUTS, OUTPUTS, RecordArray, new_record
 from ecu.resources import resource
 from ecu.signals import CYCLE_NS
@@ -143,7 +143,7 @@ def replay_tables(rounds: int = ROUNDS, scenario: str = SCENARIO, part_s: float 
 
 def _write(log: Path, frames: RecordArray) -> dict[str, Path]:
     """Write a log in every format; return each by the end of its name."""
-    log.write_bytes(candump_lines(frames, VEHICLE_BUS))
+    log.write_bytes(candump_text(frames, VEHICLE_BUS))
     return {end: log if end == ".log" else convert(log, log.with_suffix(end)) for end in FORMATS}
 
 

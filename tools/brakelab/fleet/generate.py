@@ -19,13 +19,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from brakelab.closed_loop import START_NS, VEHICLE_BUS, new_loop, run, write_columns
+from brakelab.candump_text import candump_text
+from brakelab.closed_loop import START_NS, VEHICLE_BUS, new_loop, run, run_blocks, write_columns
 from brakelab.fleet.job import Job, Outcome
 from brakelab.fleet.task import replay_job
 from brakelab.replay.progress import progress_bar
 from brakelab.scenario import Scenario
 from ecu.config import load_config
-from ecu.recorder import candump_lines
 from ecu.resources import named
 
 PLANTS: Final = ("suv", "sedan", "lcv")
@@ -73,14 +73,16 @@ def write_drive(vehicle: int, drive: int, seconds: float, path: Path) -> None:
     loop = new_loop(
         scenario_of(vehicle, drive, seconds), load_config(named(plant_of(vehicle), "config")), vehicle
     )
-    result = run(loop._replace(noise=np.random.default_rng([vehicle, drive, 1])))
+    loop = loop._replace(noise=np.random.default_rng([vehicle, drive, 1]))
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.suffix == ".parquet":
+        result = run(loop)
         write_columns(path, result.t, result.inputs, {})
-    else:
-        frames = result.frames.copy()
-        frames["stamp_ns"] += FIRST_NS + drive * BETWEEN_NS - START_NS
-        path.write_bytes(candump_lines(frames, VEHICLE_BUS))
+        return
+    with path.open("wb") as log:
+        for block in run_blocks(loop):
+            block.frames["stamp_ns"] += FIRST_NS + drive * BETWEEN_NS - START_NS
+            log.write(candump_text(block.frames, VEHICLE_BUS))
 
 
 def simulate_and_replay(job: Job) -> Outcome:

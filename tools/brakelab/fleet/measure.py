@@ -1,19 +1,25 @@
-"""What a fleet costs beyond its replays, and how long 30,000 km take.
+"""What a fleet costs beyond its replays, how long 30,000 km take, what memory a long log takes.
 
 ```
 python -m brakelab.fleet.measure scaling MANIFEST [--rounds 3] [--drives 100]
 python -m brakelab.fleet.measure distance [--kilometres 30000] [--minutes 5] [--workers 2]
+python -m brakelab.fleet.measure length [--gigabytes 10]
 ```
 `scaling` replays the same drives without Dask, by one worker and by two, in turn. `distance` simulates drives
-of ten minutes, replays and forgets them one by one; what it does not reach in its time it extrapolates.
+of ten minutes, replays and forgets them one by one, and keeps their brakings until its end; what it does not
+reach in its time, or before Ctrl-C, it extrapolates. `length` replays one log that long: a drive of ten
+minutes again and again, with a jump of speed and counters at each seam.
 """
 
 import argparse
 import os
-import resource
+import re
+import sys
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager, redirect_stdout, suppress
+from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
@@ -21,33 +27,43 @@ from typing import Any, Final
 import numpy as np
 from distributed import Client
 
+from brakelab.candump_text import candump_text
+from brakelab.closed_loop import VEHICLE_BUS
 from brakelab.fleet.cluster import connect
 from brakelab.fleet.command import plan
-from brakelab.fleet.generate import plant_of, simulate_and_replay
+from brakelab.fleet.generate import plant_of, simulate_and_replay, write_drive
 from brakelab.fleet.manifest import Drive, find_drives
-from brakelab.fleet.run import Chain, Planned, run_fleet
+from brakelab.fleet.run import Chain, Planned, Task, run_fleet
 from brakelab.fleet.task import replay_job
+from brakelab.replay.command import replay
+from brakelab.replay.formats import read_frames
+from brakelab.replay.log_quality import LogQuality
 from brakelab.replay.source import load_source
 from ecu.config import load_config
 from ecu.resources import named
+from ecu.signals import CYCLE_NS
 
 SECONDS: Final = 600
 """Of a simulated drive."""
 VEHICLES: Final = 30
+TELL_S: Final = 30.0
+"""Between lines of progress."""
 
 
 @contextmanager
-def _warm(workers: int, chains: Sequence[Chain]) -> Iterator[Client]:
+def _warm(workers: int, chains: Sequence[Chain], task: Task = replay_job) -> Iterator[Client]:
     """Give a client whose workers have all the code loaded."""
     with connect(None, workers) as client:
         job = chains[0].job(Path(), rows=False)
         for worker in client.nthreads():
-            client.submit(replay_job, job, workers=[worker], pure=False).result()
+            client.submit(task, job, workers=[worker], pure=False).result()
         yield client
 
 
 def _peak_megabytes() -> float:
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    """Return the most memory that this process has held, without that of the one that started it."""
+    held = re.search(r"VmHWM:\s*(\d+) kB", Path("/proc/self/status").read_text("ascii"))
+    return int(held[1]) / 1024.0 if held else float("nan")
 
 
 def _by_workers(workers: int, drives: Sequence[Drive]) -> dict[str, float]:
@@ -121,34 +137,92 @@ def _simulated(kilometres: float) -> list[Chain]:
     return chains
 
 
+def _work(client: Client) -> float:
+    """Return the processor time [s] that client, scheduler and workers have used up to now."""
+    return time.process_time() + float(sum(client.run(time.process_time).values()))
+
+
 def distance(kilometres: float, minutes: float, workers: int) -> None:
-    """Print how far simulated drives came in `minutes`, and what `kilometres` would take."""
+    """Print how far simulated drives came in `minutes` or until Ctrl-C, and what `kilometres` would take."""
     done: list[dict[str, Any]] = []
-    with TemporaryDirectory() as folder, connect(None, workers) as client:
-        chains = _simulated(kilometres)
+    driven = wall = told = 0.0
+    chains = _simulated(kilometres)
+    with TemporaryDirectory() as folder, _warm(workers, chains, simulate_and_replay) as client:
+        work = _work(client)
         began = time.perf_counter()
-        for _, summary, _ in run_fleet(client, chains, Path(folder), task=simulate_and_replay):
-            done.append(summary)
-            wall = time.perf_counter() - began
-            if wall > 60.0 * minutes or sum(row["distance"] for row in done) > 1e3 * kilometres:
-                break
+        with suppress(KeyboardInterrupt):
+            for _, summary, _ in run_fleet(client, chains, Path(folder), task=simulate_and_replay):
+                done.append(summary)
+                driven += 1e-3 * summary.get("distance", 0.0)
+                wall = time.perf_counter() - began
+                if wall > told:
+                    told = wall + TELL_S
+                    print(f"{wall:.0f} s: {len(done)} drives, {driven:.0f} km", file=sys.stderr, flush=True)
+                if wall > 60.0 * minutes or driven >= kilometres:
+                    break
+        work = _work(client) - work
         peaks = client.run(_peak_megabytes).values()
         kept = sum(file.stat().st_size for file in Path(folder).rglob("*.parquet"))
-    driven, hours = (sum(row[name] for row in done) for name in ("distance", "duration"))
-    replayed, simulated = (sum(row[f"{name}_seconds"] for row in done) for name in ("replay", "simulate"))
-    share = 1e3 * kilometres / driven
-    errors = [row["prediction_error"] for row in done if row.get("prediction_error") is not None]
+    good = [row for row in done if not row["fault"]]
+    if not good:
+        print(f"{len(done)} drives, none replayed")
+        return
+    hours = sum(row["duration"] for row in good) / 3600.0
+    replayed, simulated = (sum(row[f"{name}_seconds"] for row in good) for name in ("replay", "simulate"))
+    errors = [row["prediction_error"] for row in good if row["prediction_error"] is not None]
+    share = kilometres / driven
     print(
-        f"{len(done)} drives, {1e-3 * driven:.0f} km, {hours / 3600:.1f} h in {wall:.0f} s, "
-        f"{workers} workers, load {os.getloadavg()[0]:.1f}\n"
-        f"simulated {hours / simulated:.0f} times, replayed {hours / replayed:.0f} times as fast as driven; "
-        f"in tasks {100 * (replayed + simulated) / (workers * wall):.1f} % of the time\n"
-        f"prediction off by {100 * float(np.median(errors)):.1f} % (median), "
-        f"failed {sum(bool(row['fault']) for row in done)}; peak {max(peaks):.0f} MB a worker, "
-        f"{1e-3 * kept / len(done):.0f} kB kept a drive\n"
-        f"{kilometres:.0f} km: {share * wall / 3600:.1f} h at this rate, replay alone "
-        f"{share * replayed / workers / 3600:.1f} h"
+        f"{len(done)} drives, {len(done) - len(good)} failed; {driven:.0f} km in {hours:.1f} h of driving, "
+        f"{driven / hours:.0f} km/h on the mean\n"
+        f"{wall:.0f} s with {workers} workers, load {os.getloadavg()[0]:.1f}: {3600.0 * hours / wall:.0f} "
+        f"times as fast as driven; {100.0 * (replayed + simulated) / (workers * wall):.1f} % of it in tasks, "
+        f"of which {100.0 * replayed / (replayed + simulated):.0f} % in replays\n"
+        f"CPU {work / len(done):.2f} s a drive, {work / 3600.0:.2f} h in all, for simulation, replay, client "
+        f"and scheduler\n"
+        f"prediction off by {100.0 * float(np.median(errors)):.1f} % (median); peak {max(peaks):.0f} MB a "
+        f"worker, {1e-3 * kept / len(done):.0f} kB kept a drive\n"
+        f"{kilometres:.0f} km: {share * wall / 3600.0:.2f} h at this rate, {share * work / 3600.0:.2f} h of "
+        f"processor time"
     )
+
+
+def _write_long(log: Path, size: float) -> float:
+    """Write a log of `size` bytes; return the hours in it."""
+    write_drive(0, 0, SECONDS, log)
+    frames = np.concatenate(list(read_frames(log, [], LogQuality())))
+    length_ns = int(frames["stamp_ns"].max() - frames["stamp_ns"].min()) + CYCLE_NS
+    drives = 1
+    with log.open("ab") as file:
+        while file.tell() < size:
+            frames["stamp_ns"] += length_ns
+            file.write(candump_text(frames, VEHICLE_BUS))
+            drives += 1
+    return 1e-9 * drives * length_ns / 3600.0
+
+
+def _replay_long(log: Path) -> tuple[float, float]:
+    """Replay as the command does; return processor time [s] and peak of memory [MB]."""
+    work = time.process_time()
+    with open(os.devnull, "w") as nowhere, redirect_stdout(nowhere):
+        replay([log], named(plant_of(0), "config"), None, None, None, log.with_suffix(".parquet"))
+    return time.process_time() - work, _peak_megabytes()
+
+
+def length(gigabytes: float) -> None:
+    """Print what the replay of a log of `gigabytes` takes, in a process of its own."""
+    spawn = get_context("spawn")
+    with TemporaryDirectory() as folder:
+        log = Path(folder, "long.log")
+        with ProcessPoolExecutor(1, spawn) as pool:
+            hours = pool.submit(_write_long, log, 1e9 * gigabytes).result()
+        began = time.perf_counter()
+        with ProcessPoolExecutor(1, spawn) as pool:
+            work, peak = pool.submit(_replay_long, log).result()
+        wall = time.perf_counter() - began
+        print(
+            f"{1e-9 * log.stat().st_size:.2f} GB, {hours:.1f} h: {work:.0f} s CPU, {wall:.0f} s, "
+            f"peak {peak:.0f} MB; {1e-6 * log.with_suffix('.parquet').stat().st_size:.0f} MB of rows"
+        )
 
 
 def main() -> None:
@@ -163,8 +237,12 @@ def main() -> None:
     two.add_argument("--kilometres", type=float, default=30_000.0)
     two.add_argument("--minutes", type=float, default=5.0)
     two.add_argument("--workers", type=int, default=2)
+    three = what.add_parser("length")
+    three.add_argument("--gigabytes", type=float, default=10.0)
     given = parser.parse_args()
-    if given.what == "scaling":
+    if given.what == "length":
+        length(given.gigabytes)
+    elif given.what == "scaling":
         scaling(given.manifest, given.rounds, given.drives)
     else:
         distance(given.kilometres, given.minutes, given.workers)

@@ -31,6 +31,9 @@ QUEUED: Final = 2
 """Drives on the cluster for each of its threads: one runs, one waits for it to end."""
 
 
+Task = Callable[[Job], Outcome]
+
+
 class Planned(NamedTuple):
     """A drive with all that is known before it is replayed."""
 
@@ -83,7 +86,7 @@ def run_fleet(
     chains: Sequence[Chain],
     out: Path,
     rows: bool = False,
-    task: Callable[[Job], Outcome] = replay_job,
+    task: Task = replay_job,
 ) -> Iterator[tuple[Planned, dict[str, Any], bool]]:
     """Yield each drive, its summary and whether it was replayed just now, as they get done.
 

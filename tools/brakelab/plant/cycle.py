@@ -8,7 +8,7 @@ from typing import Final
 
 from brakelab.plant.driver import Script
 from brakelab.plant.jit import Record, kernel
-from brakelab.plant.road import set_road, value_at
+from brakelab.plant.road import is_described, set_road, value_at
 from brakelab.plant.vehicle import STEP, advance
 
 CYCLE: Final = 0.010  # s
@@ -55,8 +55,10 @@ def move(
             params.slip_stiffness[wheel] *= script.fault_stiffness
     if len(script.charge_limit) > 0:
         params.charge_limit = value_at(script.charge_limit, state.t, 1)
+    road, by_place = script.road, is_described(script.road)
     for _ in range(STEPS):
-        set_road(script.road, params, state, commands)
+        if by_place:
+            set_road(road, params, state, commands)
         advance(params, state, commands, STEP)
     demand.pressure_age += CYCLE
     demand.motor_age += CYCLE

@@ -55,6 +55,12 @@ def value_at(table: NDArray[np.float64], place: float, column: int) -> float:
 
 
 @kernel
+def is_described(road: Road) -> bool:
+    """Return whether anything is described by place."""
+    return len(road.friction) > 0 or len(road.height) > 0 or len(road.grade) > 0 or len(road.bank) > 0
+
+
+@kernel
 def set_road(road: Road, params: Record, state: Record, commands: Record) -> None:
     """Set what the car stands on now, as far as the road is described by place."""
     if len(road.friction) > 0 or len(road.height) > 0:

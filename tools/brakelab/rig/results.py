@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.candump_text import candump_text
 from brakelab.closed_loop import START_NS, Loop, write_columns
 from brakelab.closed_loop import Drive as Simulated
 from brakelab.replay.engine import Rows, new_ecu
@@ -17,7 +18,7 @@ from brakelab.results import MEASURED, ResultWriter
 from ecu import __version__
 from ecu.bus.receive import Reception
 from ecu.config import Config, config_hash, new_params
-from ecu.recorder import Recording, candump_lines, read_recording
+from ecu.recorder import Recording, read_recording
 from ecu.signals import CYCLE_NS, N_OUTPUTS, OUTPUT_COLUMNS
 
 
@@ -60,7 +61,7 @@ def _provenance(writer: ResultWriter, config: Config, start_ns: int) -> None:
 def write_simulated(loop: Loop, drive: Simulated, config: Config, out: Path) -> Written:
     """Write frames.log, truth.parquet and result.parquet of a drive in memory."""
     result = out / "result.parquet"
-    (out / "frames.log").write_bytes(candump_lines(drive.frames, "can0"))
+    (out / "frames.log").write_bytes(candump_text(drive.frames, "can0"))
     write_columns(out / "truth.parquet", drive.t, drive.truth, {"start_time_ns": str(START_NS)})
     measured = [_held(drive.inputs[signal.name]) for signal in MEASURED]
     rows = np.column_stack([*(drive.outputs[name] for name in OUTPUT_COLUMNS), *measured])
