@@ -97,6 +97,6 @@ def test_a_controller_that_goes_off_is_told_and_obeyed_again_after_its_restart(t
     print({name: off[name] for name in ("bits", "fallback", "recovered")})
     assert "bus off" in off["bits"]
     assert off["fallback"] >= 400.0  # 500 ms off, of which 30 ms count as heard
-    assert off["recovered"] < 2000.0
+    assert off["recovered"] < 3000.0  # "send failed" is shown for a second; the rest is the machine's affair
     assert drive["differing"] == 0
     assert "state of the ECU's CAN controller" in (tmp_path / "out" / "rig.html").read_text("utf-8")

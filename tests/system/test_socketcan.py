@@ -183,6 +183,18 @@ def test_the_controllers_state_is_followed(wire, reports):
     unit.close()
 
 
+def test_a_controller_that_takes_part_again_is_neither_off_nor_passive(wire):
+    unit = open_channel("socketcan", wire.ends[0].name, receive_ids=[0x10])
+    other = open_channel("socketcan", wire.ends[1].name, receive_ids=[])
+    wire.ends[0].go_off()
+    settle(unit, lambda status: (status.bus_off, status.error_passive) == (True, True))
+    wire.ends[0].restart()
+    other.send(frames_of(0x10), 1)
+    settle(unit, lambda status: (status.bus_off, status.error_passive) == (False, False))
+    unit.close()
+    other.close()
+
+
 def test_frames_go_through_the_wire_and_a_missing_acknowledgement_is_counted(wire):
     unit = open_channel("socketcan", wire.ends[0].name, receive_ids=[0x10])
     other = can.Bus(interface="socketcan", channel=wire.ends[1].name)
