@@ -4,12 +4,16 @@ Every command imports what it needs when it is called, so that the daemon starts
 Exit code 0 on success, 1 when the run found a fault, 2 for bad arguments, configuration or input.
 """
 
+import sys
+
+from ecu.start import ahead_of_others, kept_out
+
+if sys.argv[1:2] == ["run"]:  # under load, loading the command line alone would take a second
+    ahead_of_others()
+
 import errno
 import os
-import sys
 import traceback
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -48,16 +52,6 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@contextmanager
-def _ahead_of_others() -> Iterator[None]:
-    """Load before ordinary processes do, where that is granted: a daemon that starts again is wanted soon."""
-    with suppress(OSError, AttributeError):
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
-    yield
-    with suppress(OSError, AttributeError):
-        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
-
-
 @app.callback()
 def _options(
     version: Annotated[
@@ -85,9 +79,10 @@ def run(
     ] = False,
 ) -> int:
     """The daemon on a bus. A shadow unless `transmit = true` in CONFIG arms it."""
-    with _ahead_of_others():
-        from ecu import service
+    with kept_out("rich", "scipy"):  # structlog's tracebacks, and BLAS that no kernel of the cycle calls
+        import numba.np.arraymath  # noqa: F401
 
+        from ecu import service
     return service.run(service.RunOptions(config, interface, channel, map, record, state, standby))
 
 

@@ -83,13 +83,16 @@ def kernel(function: Function) -> Function:
 
 
 class CompileCounter(numba_event.Listener):  # type: ignore[misc]
-    """Counts compilations from now on: after the warm-up there must be none."""
+    """Counts compilations from now on: after the warm-up there must be none. The first calls `at_first`."""
 
-    def __init__(self) -> None:
+    def __init__(self, at_first: Callable[[], None] = lambda: None) -> None:
         self.count = 0
+        self._at_first = at_first
         numba_event.register("numba:compile", self)
 
     def on_start(self, event: numba_event.Event) -> None:
+        if not self.count:
+            self._at_first()
         self.count += 1
 
     def on_end(self, event: numba_event.Event) -> None:

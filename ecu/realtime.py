@@ -4,12 +4,13 @@ import ctypes
 import gc
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Final, NamedTuple
 
 import structlog
 
 PRIORITY: Final = 50  # of SCHED_FIFO: the priority that Linux gives its interrupt threads
-_MCL_CURRENT_FUTURE: Final = 1 | 2
+_MCL_CURRENT, _MCL_FUTURE = 1, 2
 
 
 class Verdict(NamedTuple):
@@ -25,9 +26,9 @@ def _fifo() -> None:
     os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
 
 
-def _lock_memory() -> None:
+def _lock_memory(which: int = _MCL_CURRENT | _MCL_FUTURE) -> None:
     libc = ctypes.CDLL(None, use_errno=True)
-    if libc.mlockall(_MCL_CURRENT_FUTURE) != 0:
+    if libc.mlockall(which) != 0:
         number = ctypes.get_errno()
         raise OSError(number, os.strerror(number))
 
@@ -54,14 +55,24 @@ REQUESTS: Final[tuple[tuple[str, Callable[[], None], str], ...]] = (
 AFFINITY: Final = ("affinity", _last_cpu, "let the cpuset of this process hold a CPU of its own")
 
 
-def make_realtime() -> list[Verdict]:
-    """Ask for SCHED_FIFO, locked memory and one CPU, switch the garbage collector off; return the verdicts.
+def settle() -> None:
+    """Freeze what is alive, collect no garbage any more, have all of it in memory: after the warm-up.
 
-    What is alive now is frozen: call it after the warm-up. A refusal is logged and the service goes on.
+    What the kernel took out of its page cache comes from the disk, which can take a second.
     """
     gc.collect()
     gc.freeze()
     gc.disable()
+    with suppress(OSError, AttributeError):  # `make_realtime` asks again and judges
+        _lock_memory(_MCL_CURRENT)
+
+
+def make_realtime() -> list[Verdict]:
+    """Settle what has not settled, ask for SCHED_FIFO, locked memory and one CPU; return the verdicts.
+
+    A refusal is logged and the service goes on.
+    """
+    settle()
     verdicts = [_attempt(*request) for request in REQUESTS]
     if verdicts[0].granted:  # tied to one CPU without priority it could not dodge a busy neighbour
         verdicts.append(_attempt(*AFFINITY))

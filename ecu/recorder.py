@@ -25,6 +25,7 @@ from ecu.diagnostics.log import configure_logging
 from ecu.errors import UserError
 from ecu.records import FRAME_EXTENDED, FRAME_FD, RecordArray
 from ecu.ring import RECORDED, Batch, RingReader, remove_ring
+from ecu.start import like_others
 
 PERIOD_S: Final = 0.1
 FRAMES_FILE, CYCLES_FILE, ABOUT_FILE, INITIAL_FILE = (
@@ -254,6 +255,7 @@ def main() -> int:
         print(error, flush=True)
         return 2
     print("ready", flush=True)
+    like_others()
     while os.getppid() == options.parent and not recorder.reader.closed:
         recorder.turn()
         time.sleep(PERIOD_S)

@@ -32,13 +32,14 @@ from ecu.diagnostics import store as state_store
 from ecu.diagnostics.log import configure_logging
 from ecu.errors import RunFault, UserError
 from ecu.jit import CompileCounter
-from ecu.realtime import Verdict, make_realtime
+from ecu.realtime import Verdict, make_realtime, settle
 from ecu.recorder import interface_name, layout
 from ecu.records import STAGES, RecordArray
 from ecu.resources import resource
 from ecu.ring import Ring, close_ring, create_ring, remove_ring, ring_path
 from ecu.signals import CYCLE_NS, INPUT_SIGNALS, OUTPUT_SIGNALS
 from ecu.standby import Standby, learned_by_first
+from ecu.start import like_others
 from ecu.step import STATE
 from ecu.warm import warm_up
 
@@ -72,7 +73,7 @@ class Session(NamedTuple):
 
 
 def _prepare(options: RunOptions) -> Session:
-    compiled = CompileCounter()
+    compiled = CompileCounter(like_others)  # minutes of compiling are not worth anyone's standing still
     config = load_config(options.config)
     receiving = receive_plan(options.map)
     sending = contract_transmit_plan(resource("dbc/brake_ecu.dbc"), "BrakeEcu")
@@ -94,6 +95,7 @@ def _prepare(options: RunOptions) -> Session:
             learned = learned if from_first is None else from_first
         ecu = new_ecu(params, learned, receiving, sending)
         warm_up(ecu, compiled)
+        settle()  # here it costs nothing: whoever does not stand by listens for a second all the same
         warm_s = time.monotonic() - began
         if not options.standby:
             where = f"{options.interface} {options.channel}"

@@ -4,12 +4,7 @@ Where asammdf is installed, python-can loads it for log files that the bus never
 0.9 s of processor time instead of 0.17 s. It is kept out of python-can alone; the laboratory may import it.
 """
 
-import sys
+from ecu.start import kept_out
 
-_kept_out = "asammdf" not in sys.modules
-if _kept_out:
-    sys.modules["asammdf"] = None  # type: ignore[assignment]
-import can  # noqa: E402, F401
-
-if _kept_out:
-    del sys.modules["asammdf"]
+with kept_out("asammdf"):
+    import can  # noqa: F401

@@ -209,7 +209,8 @@ def _parse(
         if raw.can_id & _ERR:
             _note_line(raw.can_id, raw.data[1], line)
             continue
-        line[_BUS_OFF] = 0
+        if line[_BUS_OFF]:  # a controller that takes part again starts error active
+            line[_BUS_OFF] = line[_PASSIVE] = 0
         frame = frames[start + written]
         fd = messages[i].length == _CANFD_MTU
         extended = raw.can_id & EXTENDED_ID != 0

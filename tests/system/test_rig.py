@@ -7,6 +7,9 @@ import sys
 import pyarrow.parquet as pq
 import pytest
 
+from brakelab.rig.wire import lay_wire
+from ecu.errors import UserError
+
 from .conftest import PATIENCE_S, ROOT
 
 GROUP = f"239.76.{os.getpid() >> 8 & 0xFF}.{os.getpid() & 0xFF}"
@@ -29,11 +32,19 @@ t = 3.0
 duration = 0.3
 """
 
+WITHOUT_FAULTS = SCENARIO[: SCENARIO.index("[[fault]]")].replace("15.0", "30.0")
+GOES_OFF = f"""{WITHOUT_FAULTS}
+[[fault]]
+kind = "bus_off"
+t = 2.0
+duration = 0.5
+"""
 
-def rig(tmp_path, *arguments):
+
+def rig(tmp_path, *arguments, text=SCENARIO):
     """Run the rig on the scenario; return its rows by kind of fault, and the row of the scenario."""
-    scenario = tmp_path / "killed.toml"
-    scenario.write_text(SCENARIO, "utf-8")
+    scenario = tmp_path / "drive.toml"
+    scenario.write_text(text, "utf-8")
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tools")])}
     command = [sys.executable, "-m", "ecu.cli", "rig", scenario, "--config", "suv", "--seed", "1"]
     done = subprocess.run(
@@ -73,3 +84,19 @@ def test_the_standby_brakes_on_where_the_killed_one_stopped(tmp_path, bus):
     assert set(drive["unexplained"].split(", ")) <= ({""} if exact else {"", "late"})
     assert drive["differing"] == 0  # replay gives every bit again
     assert drive["stopping_distance"] == pytest.approx(drive["undisturbed"], rel=0.05)
+
+
+@pytest.mark.socketcan
+def test_a_controller_that_goes_off_is_told_and_obeyed_again_after_its_restart(tmp_path):
+    try:
+        lay_wire().close()
+    except UserError as error:
+        pytest.skip(str(error))
+    faults, drive = rig(tmp_path, "-i", "socketcan", "-c", "slcan", text=GOES_OFF)
+    off = faults["bus_off"]
+    print({name: off[name] for name in ("bits", "fallback", "recovered")})
+    assert "bus off" in off["bits"]
+    assert off["fallback"] >= 400.0  # 500 ms off, of which 30 ms count as heard
+    assert off["recovered"] < 3000.0  # "send failed" is shown for a second; the rest is the machine's affair
+    assert drive["differing"] == 0
+    assert "state of the ECU's CAN controller" in (tmp_path / "out" / "rig.html").read_text("utf-8")

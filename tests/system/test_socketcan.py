@@ -11,12 +11,12 @@ import can
 import numpy as np
 import pytest
 
+from brakelab.rig.wire import ACTIVE, BUS_OFF, PASSIVE, STATE_NAMES, WARNING, Wire
 from ecu.bus.channel import open_channel
 from ecu.recorder import read_recording
 from ecu.records import EXTENDED_ID, FRAME, FRAME_EXTENDED, FRAME_FD, new_record
 
 from .conftest import ROOT, demand_ids, patience, wait_for
-from .slcan import ACTIVE, BUS_OFF, PASSIVE, STATE_NAMES, WARNING, Wire
 
 pytestmark = pytest.mark.socketcan
 
@@ -181,6 +181,18 @@ def test_the_controllers_state_is_followed(wire, reports):
         wait_for(lambda name=STATE_NAMES[line]: wire.ends[0].state() == name)
         settle(unit, lambda status, now=expected: (status.bus_off, status.error_passive) == now)
     unit.close()
+
+
+def test_a_controller_that_takes_part_again_is_neither_off_nor_passive(wire):
+    unit = open_channel("socketcan", wire.ends[0].name, receive_ids=[0x10])
+    other = open_channel("socketcan", wire.ends[1].name, receive_ids=[])
+    wire.ends[0].go_off()
+    settle(unit, lambda status: (status.bus_off, status.error_passive) == (True, True))
+    wire.ends[0].restart()
+    other.send(frames_of(0x10), 1)
+    settle(unit, lambda status: (status.bus_off, status.error_passive) == (False, False))
+    unit.close()
+    other.close()
 
 
 def test_frames_go_through_the_wire_and_a_missing_acknowledgement_is_counted(wire):

@@ -237,6 +237,9 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--with-ecu", action="store_true", help="drive off when the ECU is heard, stay until it is silent"
     )
+    parser.add_argument(
+        "--bus-goes-off", action="store_true", help="faults of the kind bus_off are the bus's affair"
+    )
     parser.add_argument("--truth", type=Path, metavar="FILE", help="where to write what really happened")
     return parser.parse_args(argv)
 
@@ -254,6 +257,9 @@ def main(argv: list[str] | None = None) -> int:
     try:
         path = named(arguments.scenario, *SCENARIOS)
         scenario = load_scenario(path)
+        if arguments.bus_goes_off:
+            rest = [fault for fault in scenario.fault if fault.kind != "bus_off"]
+            scenario = scenario.model_copy(update={"fault": rest})
         warm_up(scenario)
         node = new_node(scenario, arguments.seed)
         listened = [int(identifier) for identifier in plans().vehicle_hears.ids]

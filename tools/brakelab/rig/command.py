@@ -15,7 +15,7 @@ from rich.console import Console
 from brakelab.closed_loop import new_loop, run
 from brakelab.report.command import report
 from brakelab.report.drive import Drive
-from brakelab.rig.live import Bus, armed_config, choose_bus, drive
+from brakelab.rig.live import Bus, armed_config, choose_bus, drive, named_bus
 from brakelab.rig.outcome import Outcome, outcome, stopping_distance
 from brakelab.rig.page import summary, write_page, write_tables
 from brakelab.rig.results import write_recorded, write_simulated
@@ -74,21 +74,25 @@ def rig(
     vehicle = load_config(armed)
     meeting = None
     if not lock_step:
-        meeting = choose_bus() if bus is None else Bus(*bus, " ".join(bus))
+        meeting = choose_bus() if bus is None else named_bus(*bus)
         if meeting.interface == "virtual":
             raise RunFault(f"two processes cannot meet: {meeting.why}; take --lock-step, or -i and -c")
         say(f"bus: {meeting.why}; compiling what is not in the cache yet")
         warm_up(scenarios[0][1])
         warm()
     outcomes = []
-    for path, scenario in scenarios:
-        folder = out / path.stem
-        folder.mkdir(exist_ok=True)
-        say(f"driving {path.stem}")
-        if meeting is None:
-            outcomes.append(_in_memory(path.stem, scenario, vehicle, folder, seed))
-        else:
-            outcomes.append(_in_real_time(path, scenario, meeting, armed, vehicle, folder, seed))
+    try:
+        for path, scenario in scenarios:
+            folder = out / path.stem
+            folder.mkdir(exist_ok=True)
+            say(f"driving {path.stem}")
+            if meeting is None:
+                outcomes.append(_in_memory(path.stem, scenario, vehicle, folder, seed))
+            else:
+                outcomes.append(_in_real_time(path, scenario, meeting, armed, vehicle, folder, seed))
+    finally:
+        if meeting is not None:
+            meeting.close()
     console = Console()
     if not console.is_terminal:
         console = Console(width=WIDTH)

@@ -4,6 +4,7 @@ The vehicle (`brakelab.vehicle_node`) sets off when it hears the ECU. What a sce
 sensors and actuators happens in it; what they do to the daemon happens here, at the same T_0.
 """
 
+import math
 import os
 import re
 import shutil
@@ -18,9 +19,11 @@ from typing import IO, Any, Final, NamedTuple
 import can
 
 from brakelab.rig.faults import Fault
+from brakelab.rig.wire import CHANNEL, Wire, lay_wire
 from ecu.bus.channel import open_channel
 from ecu.errors import RunFault, UserError
 from ecu.ring import RingReader, ring_path
+from ecu.start import ahead_of_others
 
 MULTICAST: Final = f"239.74.163.{os.getpid() % 250 + 2}"  # a group of its own: two rigs do not meet
 PATIENCE_S: Final = 180.0  # for a slow machine to get ready
@@ -33,6 +36,25 @@ class Bus(NamedTuple):
     interface: str
     channel: str
     why: str
+    wire: Wire | None = None
+    """Its first end is the daemon's `channel`, the vehicle is at the second."""
+
+    def close(self) -> None:
+        """Leave nothing behind."""
+        if self.wire is not None:
+            self.wire.close()
+
+
+def named_bus(interface: str, channel: str) -> Bus:
+    """Return the bus of python-can's names, or a wire of two controllers for `socketcan slcan`.
+
+    Raises:
+        UserError: there can be no such wire here.
+    """
+    if (interface, channel) != ("socketcan", CHANNEL):
+        return Bus(interface, channel, f"{interface} {channel}")
+    wire = lay_wire()
+    return Bus(interface, wire.ends[0].name, "a wire of two slcan controllers", wire)
 
 
 def choose_bus() -> Bus:
@@ -80,8 +102,7 @@ class Processes:
     def __init__(self, bus: Bus, config: Path, out: Path, log: IO[bytes]) -> None:
         self.out, self.truth = out, out / "truth.parquet"
         self.daemons: list[subprocess.Popen[bytes]] = []
-        self._meeting = ["-i", bus.interface, "-c", bus.channel]
-        self._config, self._log = config, log
+        self._bus, self._config, self._log = bus, config, log
         self.vehicle: subprocess.Popen[str] | None = None
 
     def start_vehicle(self, scenario: Path, seed: int) -> None:
@@ -90,16 +111,20 @@ class Processes:
         Raises:
             RunFault: it did not get there.
         """
-        command = [sys.executable, "-m", "brakelab.vehicle_node", str(scenario), *self._meeting, "--with-ecu"]
-        command += ["--seed", str(seed), "--truth", str(self.truth)]
+        wire = self._bus.wire
+        command = [sys.executable, "-m", "brakelab.vehicle_node", str(scenario), "-i", self._bus.interface]
+        command += ["-c", self._bus.channel] if wire is None else ["-c", wire.ends[1].name, "--bus-goes-off"]
+        command += ["--with-ecu", "--seed", str(seed), "--truth", str(self.truth)]
         self.vehicle = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=self._log, text=True)
         self._line("ready")
 
     def start_daemon(self, folder: str, *options: str) -> RingReader | None:
         """Start a daemon that records into `folder` and wait for its ring; None: it ended at once."""
-        command = [sys.executable, "-m", "ecu.cli", "run", "--config", str(self._config), *self._meeting]
+        command = [sys.executable, "-m", "ecu.cli", "run", "--config", str(self._config)]
+        command += ["-i", self._bus.interface, "-c", self._bus.channel]
         command += ["--record", str(self.out / folder), "--state", str(self.out / folder / "state")]
-        daemon = subprocess.Popen([*command, *options], stderr=self._log)
+        # As a service manager would start it.
+        daemon = subprocess.Popen([*command, *options], stderr=self._log, preexec_fn=ahead_of_others)
         self.daemons.append(daemon)
         deadline = time.monotonic() + PATIENCE_S
         while time.monotonic() < deadline and daemon.poll() is None:
@@ -165,12 +190,14 @@ def drive(
             ring = processes.start_daemon("drive")
             if ring is None:
                 raise RunFault(f"the daemon did not become ready; {log} says why")
-            _act(processes, kills, ring, look)
+            _act(processes, _actions(faults, bus.wire), bus.wire, ring, look)
         finally:
             exits = processes.end()
+            if bus.wire is not None:
+                bus.wire.ends[0].restart()
     if not processes.truth.exists():
         raise RunFault(f"the vehicle ended early; {log} says why")
-    _check(exits, kills, log)
+    _check(exits, faults, log)
     recordings = [path.parent for name in ("drive", "standby") for path in _recordings(out / name)]
     return Recorded(processes.truth, recordings, exits)
 
@@ -181,36 +208,56 @@ def _recordings(folder: Path) -> list[Path]:
     return sorted(filled, key=lambda path: (path.parent / "recording.json").stat().st_mtime_ns)
 
 
+def _actions(faults: list[Fault], wire: Wire | None) -> list[tuple[float, str]]:
+    """Return what has to be done when [s after T_0], in order."""
+    actions = []
+    for fault in faults:
+        if fault.kind == "daemon_killed":
+            actions += [(fault.t, "kill"), (fault.end, "start")]
+        elif fault.kind == "bus_off" and wire is not None:
+            actions += [(fault.t, "off"), (fault.end, "on")]
+    return sorted(action for action in actions if math.isfinite(action[0]))
+
+
 def _act(
-    processes: Processes, kills: list[Fault], ring: RingReader, look: Callable[[RingReader], Any]
+    processes: Processes,
+    actions: list[tuple[float, str]],
+    wire: Wire | None,
+    ring: RingReader,
+    look: Callable[[RingReader], Any],
 ) -> None:
-    """Kill and restart daemons in time until the drive is over."""
+    """Kill and restart daemons, and their controller, in time until the drive is over."""
     t_0 = processes.departure()
     victim = processes.daemons[-1]
-    actions = [(t_0 + fault.t, "kill") for fault in kills]
-    actions += [(t_0 + fault.end, "start") for fault in kills if fault.duration is not None]
-    actions.sort()
     while processes.driving():
-        if actions and time.monotonic() >= actions[0][0]:
-            if actions.pop(0)[1] == "kill":
-                victim.kill()
-            else:
-                victim.wait()
-                ring = processes.start_daemon("drive") or ring
-                victim = processes.daemons[-1]
+        if actions and time.monotonic() >= t_0 + actions[0][0]:
+            match actions.pop(0)[1]:
+                case "kill":
+                    victim.kill()
+                case "start":
+                    victim.wait()
+                    ring = processes.start_daemon("drive") or ring
+                    victim = processes.daemons[-1]
+                case "off" if wire is not None:
+                    wire.ends[0].go_off()
+                case "on" if wire is not None:
+                    wire.ends[0].restart()
             continue
         look(ring)
-        due = actions[0][0] - time.monotonic() if actions else TURN_S
+        due = t_0 + actions[0][0] - time.monotonic() if actions else TURN_S
         time.sleep(min(max(due, 0.0), TURN_S))
 
 
-def _check(exits: list[int], kills: list[Fault], log: Path) -> None:
+def _check(exits: list[int], faults: list[Fault], log: Path) -> None:
     """Raise `RunFault` if a daemon ended that was not meant to."""
     allowed = {0}
-    if kills:
-        allowed.add(-signal.SIGKILL)
-    if any(fault.standby and fault.duration is not None for fault in kills):
-        allowed.add(2)  # it hears the standby and refuses
+    for fault in faults:
+        if fault.kind == "bus_off" and fault.duration is None:
+            allowed.add(1)
+        if fault.kind == "daemon_killed":
+            allowed.add(-signal.SIGKILL)
+            if fault.standby and fault.duration is not None:
+                allowed.add(2)  # it hears the standby and refuses
     for code in exits:
         if code not in allowed:
             raise RunFault(f"a daemon ended with {code}; {log} says why")

@@ -84,6 +84,7 @@ def write_page(outcomes: list[Outcome], bus: Bus | None, config: Config, seed: i
         more_distance=more_distance,
         bits_text=bits_text,
         live=bus is not None,
+        controller=bus is not None and bus.wire is not None,
         facts=[
             ("Vehicle", config.name),
             ("Configuration", config_hash(config)[:12]),

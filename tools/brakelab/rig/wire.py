@@ -2,7 +2,9 @@
 
 Each adapter is a pseudo-terminal whose kernel side has the slcan line discipline, so the network device has a
 bit rate and a controller state. What one sends is given to the other; a controller's state and missing
-acknowledgements can be reported to it as an adapter would.
+acknowledgements can be reported to it as an adapter would. Needs root, `ip`, and the kernel's slcan driver.
+
+The driver has no restart after bus-off of its own (it refuses `restart-ms`): the device is taken down and up.
 """
 
 import contextlib
@@ -14,20 +16,29 @@ import struct
 import subprocess
 import threading
 import tty
+from typing import Final
 
-N_SLCAN = 17
-TIOCSETD, SIOCGIFNAME = 0x5423, 0x8910
+from ecu.errors import UserError
+
+CHANNEL: Final = "slcan"
+"""What the rig's `-c` says for a wire of its own."""
+PRIORITY: Final = 10  # of SCHED_FIFO: the vehicle's
+QUEUE: Final = 256  # frames that a device keeps; the default of 10 is less than a car sends at once
+
+N_SLCAN: Final = 17
+TIOCSETD: Final = 0x5423
+SIOCGIFNAME: Final = 0x8910
 
 # Adapter to driver: "s", a letter for the state, transmit and receive error counters in three digits each.
 ACTIVE, WARNING, PASSIVE, BUS_OFF = "sa000000", "sw097000", "sp130000", "sb256000"
-STATE_NAMES = {
+STATE_NAMES: Final = {
     ACTIVE: "ERROR-ACTIVE",
     WARNING: "ERROR-WARNING",
     PASSIVE: "ERROR-PASSIVE",
     BUS_OFF: "BUS-OFF",
 }
-NOT_ACKNOWLEDGED = "e1a"
-FRAME_LETTERS = b"tTrR"
+NOT_ACKNOWLEDGED: Final = "e1a"
+FRAME_LETTERS: Final = b"tTrR"
 
 
 class Controller:
@@ -41,11 +52,28 @@ class Controller:
         name = fcntl.ioctl(self._kernel, SIOCGIFNAME, bytes(64))
         self.name = name.split(b"\0", 1)[0].decode()
         self.rest = b""
+        self.off = False
 
     def up(self) -> None:
         """Bring the device up at 500 kbit/s."""
-        for arguments in (f"{self.name} type can bitrate 500000", f"{self.name} up"):
-            subprocess.run(["ip", "link", "set", *arguments.split()], check=True)
+        self._set("type", "can", "bitrate", "500000")
+        self._set("txqueuelen", str(QUEUE), "up")
+
+    def _set(self, *arguments: str) -> None:
+        subprocess.run(["ip", "link", "set", self.name, *arguments], check=True)
+
+    def go_off(self) -> None:
+        """Go bus-off by way of the states before it; the line neither hears nor reaches it any more."""
+        self.off = True
+        for state in (WARNING, PASSIVE, BUS_OFF):
+            self.report(state)
+
+    def restart(self) -> None:
+        """Take part again, if it was off."""
+        if self.off:
+            self._set("down")
+            self._set("up")
+            self.off = False
 
     def report(self, line: str) -> None:
         """Tell the driver something, as the adapter's firmware would."""
@@ -59,7 +87,8 @@ class Controller:
 
     def close(self) -> None:
         """Take the device away."""
-        subprocess.run(["ip", "link", "set", self.name, "down"], check=False)
+        with contextlib.suppress(subprocess.CalledProcessError):
+            self._set("down")
         for end in (self._kernel, self.adapter):
             with contextlib.suppress(OSError):
                 os.close(end)
@@ -78,6 +107,8 @@ class Wire:
             end.up()
 
     def _carry(self) -> None:
+        with contextlib.suppress(OSError):
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))  # of this thread
         with selectors.DefaultSelector() as ready:
             ready.register(self._stop_reader, selectors.EVENT_READ)
             for here, there in (self.ends, self.ends[::-1]):
@@ -95,7 +126,7 @@ class Wire:
                 continue
             if self.cut:
                 here.report(NOT_ACKNOWLEDGED)
-            else:
+            elif not (here.off or there.off):
                 os.write(there.adapter, line + b"\r")
 
     def close(self) -> None:
@@ -106,3 +137,19 @@ class Wire:
             end.close()
         os.close(self._stop)
         os.close(self._stop_reader)
+
+
+def lay_wire() -> Wire:
+    """Return a wire between two controllers that are up.
+
+    Raises:
+        UserError: this machine, or this user, cannot make one.
+    """
+    try:
+        return Wire()
+    except (OSError, subprocess.CalledProcessError) as error:
+        raise UserError(
+            f"-c {CHANNEL}",
+            "",
+            f"cannot make two controllers ({error}); needs root, ip and modprobe can-dev slcan",
+        ) from None
