@@ -42,9 +42,7 @@ ARRIVALS = {
 
 
 @pytest.mark.parametrize(("numbers", "came", "late"), ARRIVALS.values(), ids=ARRIVALS)
-def test_lateness_counts_from_the_earliest_frame(
-    numbers: list[int], came: list[int], late: list[int]
-) -> None:
+def test_late_is_against_the_earliest_frame(numbers: list[int], came: list[int], late: list[int]) -> None:
     stamps = 1_700_000_000_000_000_000 + 1000 * np.array(came)
     found = bench.errors_us(np.array([0, 1000, 2000]), 2.0, np.array(numbers), stamps)
     np.testing.assert_allclose(found, late, atol=1e-6)
