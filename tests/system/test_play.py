@@ -60,12 +60,13 @@ def test_all_frames_arrive_in_order(bus, listener, tmp_path, speed):
     assert out.startswith(f"{log}: {FRAMES} frames sent, late by ")
 
 
-def test_ctrl_c_ends_it_and_says_how_far_it_came(bus, listener, tmp_path):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_and_it_says_how_far_it_came(bus, listener, tmp_path, number):
     log = tmp_path / "drive.log"
     write_log(log, 10_000 * np.arange(100_000), "can0")
     player = play(bus, log, 1.0)
     listener.wait()
-    player.send_signal(signal.SIGINT)
+    player.send_signal(number)
     numbers, _ = listener.hear(player)
     out, err = player.communicate()
     assert player.returncode == 130

@@ -4,6 +4,7 @@ A second process reads the log ahead (`brakelab/read_ahead.py`), this one only w
 until shortly before a frame is due and watches the clock for the rest.
 """
 
+import signal
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -80,7 +81,7 @@ class Sent:
 
 
 def play(log: Path, interface: str, channel: str, map: Path | None, speed: float) -> int:
-    """Put `log` onto a bus, `speed` times as fast as it was; return 0, or 130 after Ctrl-C.
+    """Put `log` onto a bus, `speed` times as fast as it was; return 0, or 130 after SIGINT or SIGTERM.
 
     Raises:
         UserError: an argument, the map or the log is not right, or the bus cannot be opened.
@@ -92,6 +93,8 @@ def play(log: Path, interface: str, channel: str, map: Path | None, speed: float
         raise UserError(str(log), "", "no such file; give an existing log")
     if map and kind_of(log) == "signals":
         print(map_unused(map, log), file=sys.stderr)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)  # a shell's background jobs ignore SIGINT
     sent, code = Sent(), 0
     with ReadAhead(partial(timed_frames, log, map, channel, speed), Findings(log)) as ahead:
         blocks = iter(ahead)
