@@ -124,7 +124,7 @@ def play(
     interface: Interface,
     channel: Channel,
     map: Map = None,
-    speed: Annotated[float, typer.Option("--speed", metavar="X", help="Times real time")] = 1.0,
+    speed: Annotated[float, typer.Option("--speed", metavar="X", help="Times real time, 0.1–20")] = 1.0,
 ) -> int:
     """A recorded drive onto a bus. With MAP as frames of the ECU with fresh E2E."""
     from brakelab import play
@@ -253,7 +253,7 @@ def bench(
     name: Annotated[str | None, typer.Argument(metavar="NAME", help="One benchmark; without: all")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table")] = False,
     seeds: Annotated[int, typer.Option(min=1, help="Cars that stops and observers draw")] = 20,
-    seconds: Annotated[float, typer.Option(min=5.0, max=580.0, help="How long lateness drives")] = 60.0,
+    seconds: Annotated[float, typer.Option(min=5.0, max=580.0, help="Of lateness and play")] = 60.0,
 ) -> int:
     """Times of step, codec and cycle on this machine; accuracy over drawn cars."""
     from brakelab.bench import command

@@ -11,6 +11,10 @@ class UserError(Exception):
         self.where, self.place, self.remedy = where, place, remedy
         super().__init__(": ".join(part for part in (where, place, remedy) if part))
 
+    def __reduce__(self) -> tuple[type["UserError"], tuple[str, str, str]]:
+        """Cross to another process as what it was made of."""
+        return type(self), (self.where, self.place, self.remedy)
+
 
 class RunFault(Exception):
     """The run itself found a fault (a bus that went off, no input). The command exits with 1."""

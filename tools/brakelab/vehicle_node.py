@@ -8,13 +8,10 @@ actuators and on the frames of both directions.
 """
 
 import argparse
-import gc
-import os
 import signal
 import sys
 import time
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -24,6 +21,7 @@ from numpy.typing import NDArray
 
 from brakelab.closed_loop import Plans, plans, write_columns
 from brakelab.plant.driver import drive
+from brakelab.priority import ask_for_priority
 from brakelab.rig.faults import Way, convey, new_way
 from brakelab.scenario import Scenario, load_scenario
 from brakelab.vehicle_bus import (
@@ -50,8 +48,6 @@ from ecu.resources import SCENARIOS, named
 from ecu.signals import CYCLE_NS, N_OUTPUTS
 
 RECEIVED_AT_ONCE: Final = 256
-PRIORITY: Final = 10
-"""SCHED_FIFO, below the daemon's."""
 SILENCE_CYCLES: Final = 50
 """Without a frame of the ECU: it has left."""
 
@@ -214,14 +210,6 @@ def warm_up(scenario: Scenario) -> None:
     _turn(plans(), node.side, node.noise, CYCLE_NS, 0, 1, 0, np.empty(N_TRUTH))
 
 
-def _ask_for_priority() -> None:
-    """Be woken in time where the machine grants it, but after the ECU: a vehicle does not wait for others."""
-    gc.collect()
-    gc.freeze()
-    with suppress(OSError, AttributeError):
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
-
-
 def _tell_set_off(t_mono_ns: int) -> None:
     print(f"driving {t_mono_ns}", flush=True)
 
@@ -264,7 +252,7 @@ def main(argv: list[str] | None = None) -> int:
         node = new_node(scenario, arguments.seed)
         listened = [int(identifier) for identifier in plans().vehicle_hears.ids]
         channel = open_channel(arguments.interface, arguments.channel, receive_ids=listened)
-        _ask_for_priority()
+        ask_for_priority()
         print("ready", flush=True)
         source, stopped = system_time(), lambda: bool(stop)
         if arguments.with_ecu:

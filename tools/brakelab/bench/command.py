@@ -33,6 +33,7 @@ from brakelab.bench.texts import (
     LATENESS_TEXT,
     MARGINS_TEXT,
     OBSERVERS_TEXT,
+    PLAY_TEXT,
     REPLAY_TEXT,
     STOPS_TEXT,
 )
@@ -52,6 +53,7 @@ COMPENSATION: Final = "compensation"
 MARGINS: Final = "margins"
 LATENESS: Final = "lateness"
 REPLAY: Final = "replay"
+PLAY: Final = "play"
 
 Car = TypeVar("Car")
 
@@ -98,8 +100,9 @@ def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0) 
     """Run one bench, or without a name all that measure time; print tables, or JSON. Returns 0.
 
     In a checkout, a run of all times renews docs/benchmarks.md, `stops` docs/observer-accuracy.md,
-    `observers` docs/observers.md, each other one the page of its name. `seeds`: how many cars `stops` and
-    `observers` draw, `ablation` and `bound` at most; `seconds`: how long `lateness` drives.
+    `observers` docs/observers.md, each other one the page of its name; that of `play` keeps the tables of
+    other buses. `seeds`: how many cars `stops` and `observers` draw, `ablation` and `bound` at most;
+    `seconds`: how long `lateness` drives and all players of `play` send.
 
     Raises:
         UserError: there is no such bench.
@@ -116,6 +119,7 @@ def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0) 
         BLENDING: _blending,
         LATENESS: partial(_lateness, seconds=seconds),
         REPLAY: _replay,
+        PLAY: partial(_play, seconds=seconds),
     }
     if name is not None and name not in (*BENCHES, *others):
         raise UserError("bench", name, f"no such bench; choose one of {', '.join((*BENCHES, *others))}")
@@ -254,13 +258,27 @@ def _replay(json: bool) -> int:
     )
 
 
-def _page(name: str, title: str, text: str, tables: list[Table], json: bool, file: str | None = None) -> int:
+def _play(json: bool, seconds: float) -> int:
+    from brakelab.bench.play import play_tables
+
+    return _page(PLAY, "How late frames are played", PLAY_TEXT, play_tables(seconds), json, keep=True)
+
+
+def _page(
+    name: str,
+    title: str,
+    text: str,
+    tables: list[Table],
+    json: bool,
+    file: str | None = None,
+    keep: bool = False,
+) -> int:
     of = f"`brake-ecu bench {name}`, version {__version__}"
     if json:
         _print_json({"of": of, "tables": [table._asdict() for table in tables]})
         return 0
     _print_tables(of, tables)
-    _write(f"{file or name}.md", title, f"{of}. {text}", tables)
+    _write(f"{file or name}.md", title, f"{of}. {text}", tables, keep)
     return 0
 
 
@@ -282,9 +300,15 @@ def _print_tables(line: str, tables: list[Table]) -> None:
         show(console, table)
 
 
-def _write(name: str, title: str, text: str, tables: list[Table]) -> None:
+def _write(name: str, title: str, text: str, tables: list[Table], keep: bool = False) -> None:
+    """Renew a page; with `keep` the sections of other titles stay: of other buses, measured elsewhere."""
     folder: Path = resource("docs")
     if folder.is_dir():
-        content = "\n".join([f"# {title}", "", text, "", *map(markdown, tables)])
+        sections = {table.title: markdown(table) for table in tables}
+        if keep and (folder / name).exists():
+            _, *before = (folder / name).read_text(encoding="utf-8").split("\n## ")
+            kept = {section.partition("\n")[0]: f"## {section.rstrip()}\n" for section in before}
+            sections = kept | sections
+        content = "\n".join([f"# {title}", "", text, "", *sections.values()])
         (folder / name).write_text(content.rstrip() + "\n", encoding="utf-8")
         Console(stderr=True).print(f"written: docs/{name}", highlight=False)

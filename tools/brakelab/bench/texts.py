@@ -89,3 +89,12 @@ REPLAY_TEXT: Final = (
     "One drive of ten minutes in closed loop (config/scenarios/ordinary.toml) as a log of every format, "
     "written by python-can and asammdf."
 )
+
+PLAY_TEXT: Final = (
+    "Traffic of a bus of 500 kbit/s with 40 % load: 40 identifiers every 10 to 100 ms with jitter, one frame "
+    "after another, 1620 a second. Only ours has an option for the speed; the others get the log with its "
+    "stamps divided by it. How late a frame was is the kernel's stamp of its arrival at a socket of the "
+    "bench's own against its stamp in the log over the speed; 0 is the frame of the run that came earliest "
+    "against the log, for every player alike. Nothing sent: ours on a bus that takes every frame and does "
+    "nothing, against the schedule itself."
+)

@@ -75,8 +75,8 @@ def identifier(message: Any) -> str:
     return f"{number - EXTENDED_ID:08X}" if number & EXTENDED_ID else f"{number:03X}"
 
 
-def quality_lines(findings: Findings, plan: ReceivePlan) -> list[str]:
-    """Return one line for each kind of damage in the log, nothing for a clean one."""
+def log_lines(findings: Findings) -> list[str]:
+    """Return one line for each kind of damage in the file itself, nothing for a sound one."""
     name, log = str(findings.path), findings.log
     lines = []
     if log.damaged:
@@ -93,6 +93,12 @@ def quality_lines(findings: Findings, plan: ReceivePlan) -> list[str]:
         unknown = findings.signals.unknown_columns
         more = f", … ({len(unknown)} in all)" if len(unknown) > SHOWN else ""
         lines.append(f"{name}: columns not used: {', '.join(unknown[:SHOWN])}{more}")
+    return lines
+
+
+def quality_lines(findings: Findings, plan: ReceivePlan) -> list[str]:
+    """Return one line for each kind of damage in the log, nothing for a clean one."""
+    name, lines = str(findings.path), log_lines(findings)
     if findings.reception is None:
         return lines
     counters = findings.reception.messages
