@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from brakelab.replay.formats import kind_of, read_frames
 from brakelab.replay.progress import progress_bar
-from brakelab.replay.quality import Findings
+from brakelab.replay.quality import Findings, damage_lines
 from brakelab.replay.signal_file import SampleBlock, freshness_at_any_rate, read_signals
 from brakelab.replay.source import Source, load_source, map_unused, only_interface
 from ecu.bus.channel import Channel, open_channel
@@ -70,6 +70,8 @@ def play(log: Path, interface: str, channel: str, map: Path | None, speed: float
         offered, taken = send_on_schedule(chain([first], bursts), bus, speed, system_time())
     finally:
         bus.close()
+    for line in damage_lines(findings):
+        print(line, file=sys.stderr)
     refused = f", {offered - taken} refused by the bus" if taken < offered else ""
     others = (
         f", {findings.other_interfaces} of other interfaces left out" if findings.other_interfaces else ""
