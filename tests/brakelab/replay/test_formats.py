@@ -165,6 +165,13 @@ def test_what_cannot_be_read_gives_one_line(tmp_path: Path, name: str, content: 
     assert "\n" not in str(error.value)
 
 
+def test_decoded_signals_hold_no_frames(tmp_path: Path) -> None:
+    path = tmp_path / "drive.csv"
+    path.write_text("t,accel_x\n0,1\n")
+    with pytest.raises(UserError, match="holds signals that are decoded already; give a log of frames"):
+        read(path)
+
+
 @pytest.mark.parametrize("end", FORMATS)
 def test_of_a_file_cut_in_the_middle_the_first_half_is_read(
     kona: dict[str, Path], tmp_path: Path, end: str

@@ -120,6 +120,8 @@ def read_frames(
     end = format_of(path)
     if end == ".log":
         return checked(path, read_candump(path, interfaces, quality, advance), quality, mended)
+    if end in (".parquet", ".csv"):
+        raise UserError(str(path), "", "holds signals that are decoded already; give a log of frames")
     read = {".asc": read_asc, ".trc": read_trc, ".blf": read_blf, ".mf4": read_mdf}[end]
     return checked(path, _named(read(path, quality, advance), interfaces), quality, mended)
 
