@@ -151,7 +151,7 @@ def read_recording(folder: Path) -> Recording:
     if not (folder / ABOUT_FILE).exists():
         inside = sorted(about.parent for about in folder.glob(f"*/{ABOUT_FILE}"))
         if not inside:
-            raise UserError(str(folder), "", f"no recording here ({ABOUT_FILE} is missing)")
+            raise UserError(str(folder), "", f"no recording here ({ABOUT_FILE} is missing); give a log")
         folder = inside[-1]
     try:
         about = json.loads((folder / ABOUT_FILE).read_text(encoding="utf-8"))

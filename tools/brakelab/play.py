@@ -17,7 +17,7 @@ from brakelab.play_log import timed_frames
 from brakelab.priority import PRIORITY, ask_for_priority
 from brakelab.read_ahead import ReadAhead
 from brakelab.replay.formats import kind_of
-from brakelab.replay.quality import Findings, log_lines
+from brakelab.replay.quality import Findings, damage_lines
 from brakelab.replay.source import map_unused
 from ecu.bus.channel import Channel, open_channel
 from ecu.clock import Histogram, TimeSource, system_time
@@ -109,7 +109,7 @@ def play(log: Path, interface: str, channel: str, map: Path | None, speed: float
         finally:
             bus.close()
     print(_summary(ahead.findings, sent, code))
-    for line in log_lines(ahead.findings):
+    for line in damage_lines(ahead.findings):
         print(line, file=sys.stderr)
     return code
 

@@ -52,7 +52,8 @@ def write_mdf(rows: Path, brakes: pa.Table, out: Path) -> None:
         first = _append(asammdf, mdf, groups, "t", "rows")
         _append(asammdf, mdf, iter([brakes]), "t_start", "brake applications")
         mdf.header.comment = _comment(metadata)
-        mdf.header.abs_time = int(metadata.get("start_time_ns", 0)) - round(first * 1e9)
+        start = metadata.get("start_time_ns")
+        mdf.header.abs_time = int(start) - round(first * 1e9) if start else 0
         mdf.header.time_flags = mdf.header.tz_offset = mdf.header.daylight_save_time = 0  # UTC
         mdf.save(unfinished, overwrite=True, compression=_TRANSPOSED_DEFLATE)
     unfinished.replace(out)

@@ -55,7 +55,8 @@ def test_reads_what_python_can_reads(tmp_path: Path, sent: list[can.Message]) ->
         for message in sent:
             writer.on_message_received(message)
     interfaces: list[str] = []
-    frames, quality = read(path, interfaces)
+    quality = LogQuality()  # stamps in any order are not mended here
+    frames = np.concatenate(list(read_frames(path, interfaces, quality, mended=False)))
     expected = list(CanutilsLogReader(path))
     assert quality.damaged == 0
     assert len(frames) == len(expected) == quality.frames
@@ -187,7 +188,7 @@ def test_a_packed_log_reads_like_a_plain_one(tmp_path: Path) -> None:
         (b"(1600000000.000100) can0 123#0102", "line 1: no candump log"),
         (
             GOOD.encode() + b"(1700000000.000100) can0 123#0102\n" * 2,
-            "line 3: time jumps by more than an hour",
+            "line 2: time jumps by more than an hour",
         ),
     ],
 )

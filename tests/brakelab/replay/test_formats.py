@@ -2,15 +2,20 @@
 
 import gzip
 import shutil
+import struct
 import subprocess
 import sys
+import zlib
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from asammdf import MDF
 
 from brakelab.bench.log_formats import FORMATS, convert, messages, write, write_mdf
+from brakelab.replay import text_log
 from brakelab.replay.command import replay
 from brakelab.replay.formats import format_of, kind_of, read_frames
 from brakelab.replay.log_quality import LogQuality
@@ -140,6 +145,15 @@ def test_a_wrong_name_says_what_it_really_is(
         ("drive.blf.gz", gzip.compress(b"LOGG" + bytes(200)), "this is a Vector BLF file in gzip; unpack it"),
         ("drive.asc.gz", gzip.compress(b"date Mon\n")[:-9], "line 1: cannot be unpacked ("),
         ("drive.asc", b"\xff" * 3_000_000, "line 1: no frame in this ASC log"),
+        ("drive.blf", b"\x85" * 9000, "damaged from byte 144 (no object begins here) on: no frame"),
+        ("drive.log.gz", b"\x85" * 9000, "byte 0: its name says gzip, its content does not"),
+        ("drive.blf", b"t,accel_x\n0,1\n", "line 1: this is a CSV file; let its name end in .csv"),
+        (
+            "drive.parquet",
+            b'"accel_x";"t"\r\n0;1\r\n',
+            "line 1: this is a CSV file; let its name end in .csv",
+        ),
+        ("drive.csv.gz", gzip.compress(b"t,accel_x\n0,1\n"), "this is a CSV file in gzip; unpack it"),
     ],
 )
 def test_what_cannot_be_read_gives_one_line(tmp_path: Path, name: str, content: bytes, line: str) -> None:
@@ -149,6 +163,13 @@ def test_what_cannot_be_read_gives_one_line(tmp_path: Path, name: str, content: 
         read(path) if kind_of(path) == "frames" else None
     assert str(error.value).startswith(f"{path}: {line}")
     assert "\n" not in str(error.value)
+
+
+def test_decoded_signals_hold_no_frames(tmp_path: Path) -> None:
+    path = tmp_path / "drive.csv"
+    path.write_text("t,accel_x\n0,1\n")
+    with pytest.raises(UserError, match="holds signals that are decoded already; give a log of frames"):
+        read(path)
 
 
 @pytest.mark.parametrize("end", FORMATS)
@@ -210,6 +231,50 @@ def test_a_lost_blf_container_costs_its_own_frames_only(tmp_path: Path) -> None:
     np.testing.assert_array_equal(frames["data"], kept)
 
 
+def mustang_in_containers(path: Path) -> tuple[RecordArray, bytearray, list[int]]:
+    """The Mustang's frames, their BLF file in containers of 4 kB, and where these begin and the last ends."""
+    expected, _ = read(DATA / "mustang.log")
+    content = bytearray(write(path, messages(expected, ["can0"]), max_container_size=4096).read_bytes())
+    begins = [144]
+    while begins[-1] < len(content):
+        size = int.from_bytes(content[begins[-1] + 8 : begins[-1] + 12], "little")
+        begins.append(begins[-1] + size + size % 4)
+    return expected, content, begins
+
+
+@pytest.mark.parametrize("damage", ["zeros over two containers", "a bomb", "an absurd header"])
+def test_what_follows_a_damaged_place_of_a_blf_file_is_read(tmp_path: Path, damage: str) -> None:
+    path = tmp_path / "drive.blf"
+    expected, content, begins = mustang_in_containers(path)
+    if damage == "an absurd header":
+        content[4:8] = b"\xff" * 4
+        lost, place = 0, ""
+    elif damage == "a bomb":  # 100 MB of zeros in 100 kB
+        packed = zlib.compress(bytes(100_000_000), 9)
+        head = struct.pack("<4sHHLLH6xL4x", b"LOBJ", 16, 1, 32 + len(packed), 10, 2, 100_000_000)
+        content[begins[3] : begins[3]] = head + packed + bytes(len(packed) % 4)
+        lost, place = 0, f"byte {begins[3]} (more than 64 MB in one container)"
+    else:
+        content[begins[3] : begins[5]] = bytes(begins[5] - begins[3])
+        lost, place = 2 * 4096 // 48 + 1, f"byte {begins[3]} (zeros where an object should begin)"
+    path.write_bytes(content)
+    frames, quality = read(path)
+    assert quality.first_damaged == place
+    assert len(expected) - lost - 1 <= len(frames) <= len(expected) - lost + 1
+    assert frames["data"][-1].tobytes() == expected["data"][-1].tobytes()
+
+
+@pytest.mark.parametrize("tail", [b"", b"garbage behind the stream"])
+def test_of_a_packed_text_all_is_read_up_to_the_damage(tmp_path: Path, tail: bytes) -> None:
+    text = (DATA / "mustang.log").read_bytes()
+    packed = gzip.compress(text)
+    path = tmp_path / "drive.log.gz"
+    path.write_bytes(packed + tail if tail else packed[:-9])
+    frames, quality = read(path)
+    assert len(frames) >= text.count(b"\n") - 20
+    assert quality.cut.endswith("the packed data is cut off or damaged here, the rest was not read")
+
+
 def test_a_line_of_many_megabytes_is_one_damaged_line(tmp_path: Path) -> None:
     path = tmp_path / "drive.log"
     good = b"(1600000000.000100) can0 123#0102\n"
@@ -226,6 +291,59 @@ def test_a_stamp_far_from_its_neighbours_is_left_out(tmp_path: Path) -> None:
     frames, quality = read(path)
     assert list(frames["data"][:, 0]) == [1, 3]
     assert (quality.damaged, quality.first_damaged, quality.stamps_backwards) == (1, "line 2", 0)
+
+
+SECOND = 1_000_000_000
+# Of 200 frames on two interfaces, 10 ms apart: stamps of some are off; frames left out, what is told.
+CLOCKS: dict[str, tuple[Callable[[int], int], dict[str, Any]]] = {
+    "as it was": (lambda k: 0, {}),
+    "set back by 10 s": (
+        lambda k: -10 * SECOND * (k >= 100),
+        {"clock_set_back": 2, "first_set_back": "line 101, by 10.0 s"},
+    ),
+    "set back twice": (
+        lambda k: -5 * SECOND * ((k >= 50) + (k >= 150)),
+        {"clock_set_back": 4, "first_set_back": "line 51, by 5.0 s"},
+    ),
+    "one stamp 80 s ahead": (lambda k: 80 * SECOND * (k == 99), {"damaged": 1, "first_damaged": "line 100"}),
+    "one stamp 2 s behind": (lambda k: -2 * SECOND * (k == 99), {"damaged": 1, "first_damaged": "line 100"}),
+    "one stamp beyond all numbers": (
+        lambda k: 8 * 10**9 * SECOND * (k == 99),
+        {"damaged": 1, "first_damaged": "line 100"},
+    ),
+    "the last stamp 2 h ahead": (
+        lambda k: 7200 * SECOND * (k == 199),
+        {"damaged": 1, "first_damaged": "line 200"},
+    ),
+    "a gap of 50 min": (
+        lambda k: 3000 * SECOND * (k >= 100),
+        {"gaps": 1, "longest_gap": "line 101", "longest_gap_s": 3000.01},
+    ),
+    "half a second late": (lambda k: -SECOND // 2 * (k == 99), {"stamps_backwards": 1}),
+    "a second clock 40 s behind": (lambda k: -40 * SECOND * (k % 2), {}),
+}
+
+
+@pytest.mark.parametrize("clock", CLOCKS)
+@pytest.mark.parametrize("block_frames", [1 << 14, 7])
+def test_clocks_that_jump_are_mended_and_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, clock: str, block_frames: int
+) -> None:
+    monkeypatch.setattr(text_log, "BLOCK_FRAMES", block_frames)
+    off, told = CLOCKS[clock]
+    true = [1_600_000_000 * SECOND + k * SECOND // 100 for k in range(200)]
+    stamps = [stamp + off(k) for k, stamp in enumerate(true)]
+    path = tmp_path / "drive.log"
+    path.write_text(
+        "".join(f"({s // SECOND}.{s % SECOND:09d}) can{k % 2} 123#{k:02X}\n" for k, s in enumerate(stamps))
+    )
+    frames, quality = read(path)
+    unlike = {name: value for name, value in vars(quality).items() if value != vars(LogQuality())[name]}
+    assert unlike == told | {"frames": 200 - told.get("damaged", 0)}
+    kept = [k for k in range(200) if k in frames["data"][:, 0]]
+    expected = np.array(true if "clock_set_back" in told else stamps, object)[kept]
+    # A clock that was set back goes on from the last frame of the same interface, 20 ms before.
+    assert np.abs(frames["stamp_ns"] - expected).max() <= 40_000_000 * ("clock_set_back" in told)
 
 
 @pytest.mark.parametrize("compression", [0, 2])

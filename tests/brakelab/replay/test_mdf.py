@@ -12,7 +12,7 @@ from asammdf import MDF, Signal
 from brakelab.bench.log_formats import write_mdf
 from brakelab.replay import mdf as mdf_reader
 from brakelab.replay.formats import kind_of, read_frames
-from brakelab.replay.log_quality import LogQuality
+from brakelab.replay.log_quality import Damage, LogQuality
 from brakelab.replay.mdf_channels import open_channels, read_channels
 from brakelab.replay.signal_file import SignalQuality, read_signals
 from ecu.errors import UserError
@@ -95,15 +95,15 @@ def test_channels_of_several_rates_are_one_table(tmp_path: Path) -> None:
 @pytest.mark.parametrize("window", [1, 13, 100_000])
 def test_windows_join_without_a_seam(tmp_path: Path, window: int) -> None:
     path = drive(tmp_path / "drive.mf4")
-    whole = pa.Table.from_batches(read_channels(path, open_channels(path)))
-    pieces = pa.Table.from_batches(read_channels(path, open_channels(path), window))
+    whole = pa.Table.from_batches(read_channels(path, open_channels(path), Damage()))
+    pieces = pa.Table.from_batches(read_channels(path, open_channels(path), Damage(), window))
     for name in whole.column_names:
         np.testing.assert_array_equal(pieces[name].to_numpy(), whole[name].to_numpy())
 
 
 def test_channels_replay_like_parquet(tmp_path: Path) -> None:
     path = drive(tmp_path / "drive.mf4")
-    table = pa.Table.from_batches(read_channels(path, open_channels(path)))
+    table = pa.Table.from_batches(read_channels(path, open_channels(path), Damage()))
     pq.write_table(table, tmp_path / "drive.parquet")
     ours, theirs = (
         list(read_signals(tmp_path / f"drive.{end}", SignalQuality())) for end in ("mf4", "parquet")

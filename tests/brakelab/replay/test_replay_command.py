@@ -80,6 +80,25 @@ def test_frames_and_signals_of_one_drive_tell_the_same(tmp_path: Path) -> None:
     assert '"checksum_errors": 0' in result.metadata["quality"]
 
 
+@pytest.mark.parametrize(
+    ("first", "stated"), [(0.0, "1700000000000000000"), (7.0, "1700000000000000000"), (0.0, "")]
+)
+def test_the_date_of_a_signal_file_is_kept(tmp_path: Path, first: float, stated: str) -> None:
+    """`start_time_ns` is the date of the first row, as our own files state it; without a date there is none."""
+    path = stop(tmp_path / "stop.parquet", first)
+    if stated:
+        table = pq.read_table(path).replace_schema_metadata({"start_time_ns": stated})
+        pq.write_table(table, path)
+    run([path], tmp_path / "out.parquet")
+    metadata = read_result(tmp_path / "out.parquet").metadata
+    assert metadata.get("start_time_ns", "") == stated
+
+
+def test_unix_time_in_t_is_a_date(tmp_path: Path) -> None:
+    run([stop(tmp_path / "stop.parquet", 1.7e9)], tmp_path / "out.parquet")
+    assert read_result(tmp_path / "out.parquet").metadata["start_time_ns"] == "1700000000000000000"
+
+
 def test_several_logs_are_one_drive(tmp_path: Path) -> None:
     first, second = stop(tmp_path / "1.parquet", 3.0), stop(tmp_path / "2.parquet", 50.0)
     log = frames_of(second, tmp_path / "3.log")

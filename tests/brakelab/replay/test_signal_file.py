@@ -15,9 +15,11 @@ from ecu.errors import UserError
 from ecu.signals import ACCEL_X, INPUT
 
 
-def write(path: Path, content: str | dict[str, list[Any]]) -> Path:
-    if isinstance(content, str):
-        path.write_text(content)
+def write(path: Path, content: str | bytes | dict[str, list[Any]]) -> Path:
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+    elif isinstance(content, str):
+        path.write_text(content, newline="")
     else:
         pq.write_table(pa.table(content), path)
     return path
@@ -74,12 +76,24 @@ DAMAGED = {
         "row 1, accel_x: infinite value",
     ),
     "infinite value, CSV": ("t,accel_x\n0,1\n0.01,-inf\n", "line 3, accel_x: infinite value"),
-    "cell that is no number": ("t,accel_x\n0,1\n0.01,1.2.3\n", "line 3, accel_x: '1.2.3' is no number"),
-    "row with a cell missing": ("t,accel_x,yaw_rate\n0,1,2\n0.01,1\n", "line 3: a row needs 3 cells"),
-    "time missing in a row": ({"t": [0.0, None], "accel_x": [1.0, 2.0]}, "row 1, t: time is missing"),
-    "time not finite": ("t,accel_x\n0,1\ninf,1\n", "line 3, t: time is missing or not finite"),
-    "time repeated": ("t,accel_x\n0,1\n0.01,1\n0.01,2\n", "line 4, t: time does not rise"),
-    "time falling": ({"t": [0.1, 0.0], "accel_x": [1.0, 2.0]}, "row 1, t: time does not rise"),
+    "no number at all": ("t,accel_x\n0,fast\n\n0.01,1.2.3\n", "line 2, accel_x: 'fast' is no number"),
+    "decimal commas between commas": (
+        "t,accel_x\n0,0,1,5\n0,1,1,6\n",
+        "line 2 (4 cells instead of 2): no row",
+    ),
+    "no time in any row": ({"t": [None, math.nan], "accel_x": [1.0, 2.0]}, "row 0, t: time is missing"),
+    "time falling": (
+        {"t": [0.1, 0.0], "accel_x": [1.0, 2.0]},
+        "row 1, t: time falls by 0.1 s to 0 s; sort the rows, or split the file",
+    ),
+    "a clock set back": ("t,accel_x\n11,1\n\n1,2\n", "line 4, t: time falls by 10 s to 1 s"),
+    "UTF-16": (
+        "\ufefft,accel_x\n0,1\n".encode("utf-16-le"),
+        "line 1: this is UTF-16; save it as CSV in UTF-8",
+    ),
+    "lines that end in CR": ("t,accel_x\r0,1\r", "line 1: does not end; every line has to end in LF"),
+    "a first line of 3 MB": ("t" * 3_000_000, "line 1: does not end"),
+    "garbage": (bytes(range(128, 256)) + b"\n\xff,\xfe,\n" * 3, "line 1: column t is missing"),
     "a jump": ({"t": [0.0, 0.01, 3600.1], "accel_x": [1.0] * 3}, "row 2, t: time jumps by more than an hour"),
     "a jump far away": ("t,accel_x\n0,1\n1e9,1\n", "line 3, t: time jumps by more than an hour"),
     "gaps alone": (
@@ -98,18 +112,93 @@ DAMAGED = {
     "no known column": ({"t": [0.0], "speed": [1.0]}, "columns: no known input among t, speed"),
     "column twice": ("t,accel_x,accel_x\n0,1,1\n", "line 1: column accel_x stands twice"),
     "text in a Parquet column": ({"t": [0.0], "accel_x": ["fast"]}, "row 0, accel_x: 'fast' is no number"),
-    "no rows": ("t,accel_x\n", "line 2: no rows"),
-    "empty file": ("", "line 1: the file is empty"),
+    "no rows": ("t,accel_x\n", "line 2: no row that can be read"),
 }
 
 
 @pytest.mark.parametrize("damage", DAMAGED)
 def test_a_damaged_input_gives_one_line(tmp_path: Path, damage: str) -> None:
     content, line = DAMAGED[damage]
-    path = write(tmp_path / ("drive.csv" if isinstance(content, str) else "drive.parquet"), content)
+    path = write(tmp_path / ("drive.parquet" if isinstance(content, dict) else "drive.csv"), content)
     with pytest.raises(UserError) as error:
         list(read_signals(path, SignalQuality()))
     assert str(error.value).startswith(f"{path}: {line}")
+
+
+# What is damaged: the file, the values of accel_x that are read, how many pieces are not and where.
+MENDED: dict[str, tuple[Any, list[float], int, str]] = {
+    "a cell that is no number": (
+        "t,accel_x\n0,1\n\n1,x\n2,3\n",
+        [1, math.nan, 3],
+        1,
+        "line 4, accel_x ('x' is no number)",
+    ),
+    "cells missing": ("t,accel_x\n0,1\n1\n2,3\n", [1, 3], 1, "line 3 (1 cell instead of 2)"),
+    "time missing": ("t,accel_x\n0,1\n,2\ninf,3\n3,4\n", [1, 4], 2, "line 3, t (missing)"),
+    "time missing, Parquet": (
+        {"t": [0.0, None, 2.0], "accel_x": [1.0, 2.0, 3.0]},
+        [1, 3],
+        1,
+        "row 1, t (missing)",
+    ),
+    "bytes that are no text": (
+        b"t,accel_x\n0,1\n\xff\xfe,\x8c,\n2,3\n",
+        [1, 3],
+        1,
+        "line 3 (3 cells instead of 2)",
+    ),
+    "a quote that is never closed": (
+        't,accel_x\n0,1\n1,"2\n2,3\n',
+        [1, 3],
+        1,
+        "line 3 (1 cell instead of 2)",
+    ),
+    "a line of 3 MB": ("t,accel_x\n0,1\n" + "7" * 3_000_000 + "\n2,3\n", [1, 3], 1, "line 3"),
+    "a line of 3 MB at the end": ("t,accel_x\n0,1\n2,3\n" + "7" * 3_000_000, [1, 3], 1, "line 4"),
+    "a last line that is cut off": ("t,accel_x\n0,1\n2,3\n3", [1, 3], 0, "line 4: the last line is cut off"),
+    "a last line without its end": ("t,accel_x\n0,1\n2,3", [1, 3], 0, ""),
+    "a line of units": ("t,accel_x\ns,m/s^2\n0,1\n2,3\n", [1, 3], 2, "line 2, t ('s' is no number)"),
+    "semicolons and decimal commas": ("t;accel_x\n0,5;1,25\n1,5;-3,5\n", [1.25, -3.5], 0, ""),
+    "tabs": ('"t"\t"accel_x"\r\n0.5\t"1.25"\r\n', [1.25], 0, ""),
+    "two samples at one instant": ("t,accel_x\n0,1\n0,2\n1,3\n", [1, 2, 3], 0, ""),
+}
+
+
+@pytest.mark.parametrize("damage", MENDED)
+def test_what_can_be_read_is_read_and_the_rest_has_its_place(tmp_path: Path, damage: str) -> None:
+    content, values, damaged, place = MENDED[damage]
+    path = write(tmp_path / ("drive.parquet" if isinstance(content, dict) else "drive.CSV"), content)
+    quality = SignalQuality()
+    blocks = list(read_signals(path, quality))
+    np.testing.assert_array_equal(np.concatenate([block.values[:, 0] for block in blocks]), values)
+    assert quality.damaged == damaged
+    assert (quality.first_damaged or quality.cut)[: len(place) or None] == place
+    assert quality.stamps_repeated == (1 if damage == "two samples at one instant" else 0)
+
+
+def test_of_a_parquet_file_the_row_groups_before_the_damage_are_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(signal_file, "BLOCK_ROWS", 1000)
+    path, t = tmp_path / "drive.parquet", np.arange(3000) * 0.01
+    pq.write_table(pa.table({"t": t, "accel_x": t}), path, row_group_size=1000)
+    content = bytearray(path.read_bytes())
+    content[2 * len(content) // 3 : 2 * len(content) // 3 + 2000] = bytes(2000)
+    path.write_bytes(content)
+    quality = SignalQuality()
+    rows = sum(len(block.t) for block in read_signals(path, quality))
+    assert rows == quality.rows == 2000 or rows == 1000
+    assert quality.cut.startswith(f"row {rows}: cannot be read (")
+
+
+@pytest.mark.parametrize("first", [0.0, 5.0])
+def test_the_date_of_a_parquet_file_is_that_of_its_first_row(tmp_path: Path, first: float) -> None:
+    table = pa.table({"t": [first, first + 1.0], "accel_x": [0.0, 0.0]})
+    path, quality = tmp_path / "drive.parquet", SignalQuality()
+    pq.write_table(table.replace_schema_metadata({"start_time_ns": "1700000000000000000"}), path)
+    (block,) = read_signals(path, quality)
+    assert quality.zero_ns is not None
+    assert quality.zero_ns + block.t_ns[0] == 1_700_000_000_000_000_000
 
 
 def test_a_parquet_file_in_name_only_gives_one_line(tmp_path: Path) -> None:

@@ -318,5 +318,5 @@ def test_an_asc_clock_that_is_set_is_refused_with_its_line(tmp_path: Path) -> No
     path = tmp_path / "drive.asc"
     lines = "1.0 1  123 Rx d 1 07\n9000.0 1  123 Rx d 1 07\n9000.1 1  123 Rx d 1 07\n"
     path.write_text(ASC.format(base="hex", stamps="absolute") + lines)
-    with pytest.raises(UserError, match="line 9: time jumps by more than an hour"):
+    with pytest.raises(UserError, match="line 8: time jumps by more than an hour"):
         read(path)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from brakelab.tuning.search import with_observer
+from brakelab.observer import with_observer
 from ecu.config import Config, load_config
 from ecu.resources import resource
 

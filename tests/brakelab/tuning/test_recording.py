@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from brakelab.closed_loop import Drive, new_loop, run
+from brakelab.observer import with_observer
 from brakelab.scenario import load_scenario
 from brakelab.tuning.recording import (
     SHORTEST_S,
@@ -16,7 +17,6 @@ from brakelab.tuning.recording import (
     recording,
 )
 from brakelab.tuning.replay import replay_errors
-from brakelab.tuning.search import with_observer
 from ecu.config import Config
 from ecu.records import new_record
 

@@ -28,6 +28,7 @@ from brakelab.bench.observers_cases import (
 from brakelab.bench.step import CYCLES, ROUNDS, run_steps
 from brakelab.bench.stops import AXLES, LOWEST_SPEED, Vector, columns, friction_errors, nrmse
 from brakelab.closed_loop import Drive, new_loop, run
+from brakelab.observer import with_observer
 from brakelab.replay.signal_file import freshness_at_any_rate
 from ecu.config import new_params
 from ecu.diagnostics.store import out_of_range
@@ -93,8 +94,7 @@ def drive_car(
 
     `learned`: what was known before; None: nothing. Only `observer1` has wheel transducers.
     """
-    chosen = setup.config.observer.model_copy(update={"kind": observer})
-    config = setup.config.model_copy(update={"observer": chosen})
+    config = with_observer(setup.config, observer)
     transducers = {"wheel_transducers": observer == "observer1"}
     loop = new_loop(setup.scenario.model_copy(update=transducers), config, seed)
     sides = loop.sides
@@ -263,8 +263,7 @@ def step_times() -> dict[str, Figure]:
     inputs = stop.inputs[: stop.braking + CYCLES]
     measured = []
     for observer in OBSERVERS:
-        chosen = configured().observer.model_copy(update={"kind": observer})
-        params = new_params(configured().model_copy(update={"observer": chosen}))
+        params = new_params(with_observer(configured(), observer))
         params["mapped"] = stop.params["mapped"]
         state, outputs = new_state(params), new_record(OUTPUTS)
         run_steps(params, state, inputs[: stop.braking], outputs)

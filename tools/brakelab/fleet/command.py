@@ -17,7 +17,7 @@ from brakelab.fleet.page import write_page
 from brakelab.fleet.run import Chain, Planned, run_fleet
 from brakelab.fleet.statistics import notes
 from brakelab.fleet.summary import summary_table, when
-from brakelab.replay.command import with_observer
+from brakelab.observer import with_observer
 from brakelab.replay.progress import progress_bar
 from brakelab.replay.source import load_source
 from ecu.config import load_config

@@ -15,8 +15,6 @@ from brakelab.replay.quality import Findings
 from ecu.records import RecordArray
 from ecu.signals import CORNERS, CYCLE_NS, HOLDING, OBSERVING, OUTPUT
 
-ABSOLUTE: Final = 10**18
-"""ns; a log that starts earlier than 2001 has no clock of its own, its `t` starts anywhere."""
 _PERIOD: Final = 1e-9 * CYCLE_NS  # s
 
 _TEXT: Final = pa.string()
@@ -81,9 +79,8 @@ class DriveBook:
             [four[0].decel_predicted for four in counted],
             [any(row.learned_before for row in four) for four in counted],
         )
-        start = findings[0].start_ns
         return {
-            "start_time": start if start >= ABSOLUTE else None,
+            "start_time": findings[0].began_ns,
             "duration": self._rows * _PERIOD,
             "distance": self._metres,
             "brakings": len(applications),

@@ -67,7 +67,8 @@ def _replay(job: Job, paths: Sequence[Path]) -> tuple[Outcome, pa.Table]:
             def write(t: NDArray[np.float64], rows: NDArray[np.float64]) -> None:
                 book.add(t, rows)
                 if writer is not None:
-                    start = {"start_time_ns": str(findings[0].start_ns)}
+                    began_ns = findings[0].began_ns
+                    start = {} if began_ns is None else {"start_time_ns": str(began_ns)}
                     writer.provenance = writer.provenance or provenance(job) | start
                     writer.write(t, rows)
 

@@ -1,6 +1,7 @@
 """`brake-ecu map suggest`: proposes a signal map that the user then edits."""
 
 import os
+import sys
 from pathlib import Path
 from typing import Final
 
@@ -14,7 +15,7 @@ from brakelab.mapping.physics import RADIUS, Found, propose
 from brakelab.mapping.series import Series, read_series
 from brakelab.replay.command import WIDTH
 from brakelab.replay.formats import read_frames
-from brakelab.replay.log_quality import LogQuality
+from brakelab.replay.quality import Findings, damage_lines
 from ecu.bus.database import load_database
 from ecu.bus.signal_map import load_signal_map
 from ecu.bus.units import spelled
@@ -36,8 +37,11 @@ def suggest(log: Path, dbc: Path, out: Path | None) -> int:
         RunFault: no wheel speeds were found, against which everything else is judged.
     """
     database, strict = _load(dbc)
-    interfaces: list[str] = []
-    series = read_series(read_frames(log, interfaces, LogQuality()), database)
+    findings = Findings(log)
+    interfaces = findings.interfaces
+    series = read_series(read_frames(log, interfaces, findings.log), database)
+    for line in damage_lines(findings):
+        print(line, file=sys.stderr)
     found, drives = propose(series)
     if not found:
         raise RunFault(f"{log}: no four wheel speeds that {dbc} names; is it the database of this car?")

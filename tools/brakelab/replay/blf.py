@@ -203,9 +203,11 @@ def _unpack(packed: bytes, method: int) -> tuple[bytes, str]:
         return b"", f"packed by an unknown method ({method})"
     unpacker = zlib.decompressobj()
     try:
-        content = unpacker.decompress(packed)
+        content = unpacker.decompress(packed, LARGEST)
     except zlib.error as error:
         return b"", str(error)  # what came before may be wrong already
+    if unpacker.unconsumed_tail:
+        return b"", f"more than {LARGEST >> 20} MB in one container"
     return content, "" if unpacker.eof else "its end is missing"
 
 
@@ -214,8 +216,13 @@ def _pieces(stream: IO[bytes], advance: Callable[[int], None] | None) -> Iterato
     while True:
         offset = stream.tell()
         header = stream.read(_HEADER)
-        if not header.strip(b"\0"):
+        if not header:
             return
+        if not header.strip(b"\0"):  # room that a recorder had reserved, or lost
+            if not _seek_object(stream, offset):
+                return
+            yield _Piece(b"", offset, "zeros where an object should begin")
+            continue
         if len(header) < _HEADER:
             yield _Piece(b"", offset, "the file is cut off here")
             return
@@ -234,7 +241,8 @@ def _pieces(stream: IO[bytes], advance: Callable[[int], None] | None) -> Iterato
             yield _Piece(header + body, offset, damage)
         elif len(body) >= 16:
             content, reason = _unpack(body[16:], struct.unpack_from("<H", body)[0])
-            yield _Piece(content, offset, damage or reason)
+            # A container that is whole and still does not end was overwritten: what it gives may be wrong.
+            yield _Piece(b"" if reason and not damage else content, offset, damage or reason)
         else:
             yield _Piece(b"", offset, damage or "an empty container")
 
@@ -266,7 +274,8 @@ def read_blf(
     with path.open("rb") as stream:
         header = stream.read(144)
         start_ns = start_time_ns(header) if len(header) >= 56 else 0
-        stream.seek(struct.unpack_from("<L", header, 4)[0] if len(header) >= 8 else 0)
+        stated = struct.unpack_from("<L", header, 4)[0] if len(header) >= 8 else 0
+        stream.seek(min(stated, len(header)))
         rest, rest_offset = b"", 0
         for batch in _batches(_pieces(stream, advance)):
             for piece in batch:

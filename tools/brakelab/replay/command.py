@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
+from brakelab.observer import with_observer
 from brakelab.outputs import check_outputs
 from brakelab.replay.drive import replay_drive
 from brakelab.replay.formats import kind_of
@@ -27,7 +28,6 @@ from ecu.bus.receive import ReceivePlan
 from ecu.config import Config, config_hash, load_config, new_params, store_key
 from ecu.diagnostics.store import open_store, restore, save
 from ecu.errors import RunFault, UserError
-from ecu.params import OBSERVERS
 from ecu.recorder import read_recording
 from ecu.records import RecordArray
 from ecu.signals import CORNERS
@@ -83,8 +83,8 @@ def replay(
         }
 
         def write(t: NDArray[np.float64], rows: NDArray[np.float64]) -> None:
-            began_ns = findings[0].start_ns + findings[0].signals.zero_ns
-            writer.provenance.setdefault("start_time_ns", str(began_ns))
+            if (began_ns := findings[0].began_ns) is not None:
+                writer.provenance.setdefault("start_time_ns", str(began_ns))
             writer.write(t, rows)
 
         learned = replay_drive(
@@ -99,15 +99,6 @@ def replay(
         names = ", ".join(group.name for group in NEEDED)
         raise RunFault(f"{out}: not one sample of the needed inputs was usable ({names})")
     return 0
-
-
-def with_observer(vehicle: Config, observer: str | None) -> Config:
-    """Return the configuration with another observer, None: its own. Raises UserError for an unknown one."""
-    if observer is None:
-        return vehicle
-    if observer not in OBSERVERS:
-        raise UserError("--observer", observer, f"not known; take {', '.join(OBSERVERS)}")
-    return vehicle.model_copy(update={"observer": vehicle.observer.model_copy(update={"kind": observer})})
 
 
 def _check(logs: Sequence[Path], out: Path, cycles: Path | None) -> None:

@@ -41,6 +41,7 @@ _BEGINS: Final = (
     (re.compile(rb"\s*\(\d+\.\d+\) +\S+ +[0-9A-Fa-f]+#"), ".log"),
     (re.compile(rb"\s*(date |base +(hex|dec)|\d+\.\d+ +(\d+|CANFD) +\S+ )", re.IGNORECASE), ".asc"),
     (re.compile(rb"\s*(;|\d+\) +\d)"), ".trc"),
+    (re.compile(rb"(\xef\xbb\xbf)?([\w\". -]+[,;\t])*\"?t\"?([,;\t]|\r?\n)"), ".csv"),
 )
 
 Advance = Callable[[int], None]
@@ -60,7 +61,7 @@ def format_of(path: Path) -> str:
         with path.open("rb") as plain:
             head = _head_of_packed(path) if packed else plain.read(_HEAD)
     except OSError as error:
-        raise UserError(str(path), "", f"cannot be read ({error.strerror}); give an existing log") from None
+        raise UserError(str(path), "", f"cannot be read ({error.strerror}); give a log that can") from None
     found = next((end for begin, end in _BEGINS if begin.match(head)), None)
     if not head and not packed and named in _NAMES:
         raise UserError(str(path), "line 1", f"the file is empty; it should be {_NAMES[named]}")
@@ -70,6 +71,9 @@ def format_of(path: Path) -> str:
         ends = f"{found}.gz" if packed else found
         what = f"{_NAMES[found]} in gzip" if packed else _NAMES[found]
         raise UserError(str(path), "line 1", f"this is {what}; let its name end in {ends}")
+    if packed_name and not packed and not found and named in _TEXT:
+        remedy = "its name says gzip, its content does not; give the log as it was recorded"
+        raise UserError(str(path), "byte 0", remedy)
     if named not in _NAMES or (packed_name and named not in _TEXT):
         raise UserError(
             str(path), "", f"unknown kind of log {path.suffix or '(no suffix)'}; replay reads {FORMATS}"
@@ -101,19 +105,25 @@ def interface_name(channel: int) -> str:
 
 
 def read_frames(
-    path: Path, interfaces: list[str], quality: LogQuality, advance: Advance | None = None
+    path: Path,
+    interfaces: list[str],
+    quality: LogQuality,
+    advance: Advance | None = None,
+    mended: bool = True,
 ) -> Iterator[RecordArray]:
     """Yield the frames of a log of any format in blocks of FRAME.
 
     A frame's `bus` is the place of its interface in `interfaces`, to which new names are added. `quality` is
-    kept up to date; `advance(bytes)` hears of progress. Raises UserError for a log that has no frame, and
-    for a clock that jumps.
+    kept up to date; `advance(bytes)` hears of progress; `mended`: see `checked`. Raises UserError for a log
+    that has no frame, and for a clock that jumps.
     """
     end = format_of(path)
     if end == ".log":
-        return checked(path, read_candump(path, interfaces, quality, advance), quality)
+        return checked(path, read_candump(path, interfaces, quality, advance), quality, mended)
+    if end in (".parquet", ".csv"):
+        raise UserError(str(path), "", "holds signals that are decoded already; give a log of frames")
     read = {".asc": read_asc, ".trc": read_trc, ".blf": read_blf, ".mf4": read_mdf}[end]
-    return checked(path, _named(read(path, quality, advance), interfaces), quality)
+    return checked(path, _named(read(path, quality, advance), interfaces), quality, mended)
 
 
 def _named(blocks: Iterator[FrameBlock], interfaces: list[str]) -> Iterator[FrameBlock]:

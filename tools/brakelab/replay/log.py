@@ -88,7 +88,7 @@ def replay_log(
     set_raw_ends(ecu.seen, plan.signals)
     reception = findings.reception = new_reception(plan)
     findings.freshness, findings.mapped = reception.freshness, plan.mapped
-    blocks = read_frames(log, findings.interfaces, findings.log, advance)
+    blocks = read_frames(log, findings.interfaces, findings.log, advance, mended=not counted)
     if source.bus and not counted:
         blocks = only_interface(blocks, source.bus, findings)
     if recording is None:
@@ -110,7 +110,7 @@ def replay_log(
 
 def _from_first_recorded(blocks: Iterator[RecordArray], recording: Recording) -> Iterator[RecordArray]:
     """Leave out what was on the bus before the recorded run heard its first frame."""
-    own = next(read_frames(recording.frames, [], LogQuality()))
+    own = next(read_frames(recording.frames, [], LogQuality(), mended=False))
     for block in blocks:
         later = block[np.maximum.accumulate(block["stamp_ns"]) >= own["stamp_ns"][0]]
         if len(later):

@@ -214,9 +214,9 @@ def _frames(
         except Exception as error:  # a damaged file makes asammdf raise anything
             quality.cut = f"record {first} of group {group}: cannot be read ({error}), the rest is missing"
             return
-        if not len(stamps):
-            quality.cut = f"record {first} of group {group}: {rows - first} records are missing"
-            return
+        if len(stamps) < min(WINDOW, rows - first):
+            end = first + len(stamps)
+            quality.cut = f"record {end} of group {group}: {rows - end} records are missing"
         for begin in range(0, len(stamps), BLOCK_FRAMES):
             part = slice(begin, begin + BLOCK_FRAMES)
             block = np.zeros(len(stamps[part]), _PLACED)
@@ -224,6 +224,8 @@ def _frames(
             block["frame"]["stamp_ns"] = start_ns + np.rint(stamps[part] * 1e6).astype(np.int64) * 1000
             _fill(block["frame"], {name: column[part] for name, column in columns.items()}, _KINDS[kind])
             yield block
+        if quality.cut:
+            return
 
 
 def _fill(frames: RecordArray, columns: dict[str, NDArray[Any]], kind: int) -> None:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import pyarrow as pa
 
+from brakelab.replay.log_quality import Damage
 from brakelab.replay.mdf import Column, Measurement, in_step
 from ecu.errors import UserError
 from ecu.records import RecordArray
@@ -46,15 +47,19 @@ def open_channels(path: Path) -> Channels:
     return Channels(measurement, groups, unknown)
 
 
-def read_channels(path: Path, channels: Channels, window: int = 1 << 16) -> Iterator[pa.RecordBatch]:
+def read_channels(
+    path: Path, channels: Channels, damage: Damage, window: int = 1 << 16
+) -> Iterator[pa.RecordBatch]:
     """Yield rows with `t` [s] and every input, NaN: no sample; at most `window` records of a group at once.
 
+    Of records of one group at one instant the last counts. What cannot be read goes into `damage`.
+
     Raises:
-        UserError: time falls within a group, or records cannot be read.
+        UserError: time falls within a group, or its first record cannot be read.
     """
     measurement, groups, _ = channels
     names = [name for places in groups.values() for name in places]
-    sources = [_samples(path, measurement, group, places, window) for group, places in groups.items()]
+    sources = [_samples(path, measurement, group, places, damage, window) for group, places in groups.items()]
     firsts = np.cumsum([0, *(len(places) for places in groups.values())])
     last = -np.inf
     for ready in in_step(sources, lambda block: block["t"]):
@@ -74,7 +79,12 @@ def read_channels(path: Path, channels: Channels, window: int = 1 << 16) -> Iter
 
 
 def _samples(
-    path: Path, measurement: Measurement, group: int, places: dict[str, int], window: int
+    path: Path,
+    measurement: Measurement,
+    group: int,
+    places: dict[str, int],
+    damage: Damage,
+    window: int,
 ) -> Iterator[RecordArray]:
     rows, last = measurement.rows(group), -np.inf
     dtype = np.dtype([("t", "f8"), ("values", "f8", (len(places),))])
@@ -86,22 +96,34 @@ def _samples(
             for place, column in enumerate(columns):
                 block["values"][:, place] = _valid(column)
         except Exception as error:  # a damaged file makes asammdf raise anything
-            raise UserError(
-                str(path),
-                f"group {group}, record {first}",
-                f"cannot be read ({error}); save the file again where it was recorded",
-            ) from None
-        falling = np.flatnonzero(np.diff(block["t"], prepend=last) < 0)
+            where = f"group {group}, record {first}"
+            if first:
+                damage.cut = f"{where}: cannot be read ({error}), the rest of this group is missing"
+                return
+            remedy = f"cannot be read ({error}); save the file again where it was recorded"
+            raise UserError(str(path), where, remedy) from None
+        here = min(window, rows - first)
+        if len(block) < here:
+            missing = rows - first - len(block)
+            damage.cut = f"group {group}, record {first + len(block)}: {missing} records are missing"
+        lost = np.flatnonzero(~np.isfinite(block["t"]))
+        if len(lost):
+            damage.note_damage(len(lost), f"group {group}, record {first + int(lost[0])} (no time)")
+            block = block[np.isfinite(block["t"])]
+        steps = np.diff(block["t"], prepend=last)
+        damage.stamps_repeated += int(np.count_nonzero(steps == 0))
+        falling = np.flatnonzero(steps < 0)
         if len(falling):
             raise UserError(
                 str(path),
                 f"group {group}, record {first + int(falling[0])}",
                 f"time falls to {block['t'][falling[0]]:g} s; sort the records",
             )
-        if not len(block):
+        if len(block):
+            last = float(block["t"][-1])
+            yield block
+        if damage.cut:
             return
-        last = float(block["t"][-1])
-        yield block
 
 
 def _numeric(measurement: Measurement, group: int, index: int, first: int, window: int) -> Column:

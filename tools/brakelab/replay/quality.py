@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.replay.log_quality import LogQuality
+from brakelab.replay.log_quality import Damage, LogQuality
 from brakelab.replay.signal_file import SignalQuality
 from ecu.bus.freshness import RATE_TOLERANCE
 from ecu.bus.receive import ReceivePlan, Reception
@@ -28,6 +28,8 @@ MESSAGE_KINDS: Final = (
 """Counters of a message that results keep, as in `ecu.bus.receive.MESSAGE_COUNTERS`."""
 
 SHOWN: Final = 20  # names in a line
+ABSOLUTE_NS: Final = 10**18
+"""Unix time (September 2001) before which a log has no date of its own."""
 
 
 @dataclass
@@ -59,6 +61,12 @@ class Findings:
     fault_rows: Counter[int] = field(default_factory=Counter)
     """Of these, by the fault's bit."""
 
+    @property
+    def began_ns(self) -> int | None:
+        """Unix time of the first row, None: the log has no date."""
+        began = self.start_ns + (self.signals.zero_ns or 0)
+        return began if began >= ABSOLUTE_NS else None
+
 
 def note_faults(findings: Findings, values: NDArray[np.float64]) -> None:
     """Count what was wrong in rows of results, shape (n, N_ROW)."""
@@ -75,22 +83,31 @@ def identifier(message: Any) -> str:
     return f"{number - EXTENDED_ID:08X}" if number & EXTENDED_ID else f"{number:03X}"
 
 
-def log_lines(findings: Findings) -> list[str]:
-    """Return one line for each kind of damage in the file itself, nothing for a sound one."""
-    name, log = str(findings.path), findings.log
+def damage_lines(findings: Findings) -> list[str]:
+    """Return one line for each kind of damage in the file itself: what is missing, stamps that do not fit."""
+    name, log, signals = str(findings.path), findings.log, findings.signals
     lines = []
-    if log.damaged:
-        first = log.first_damaged
-        what = "lines" if first.startswith("line") else "pieces"
-        lines.append(f"{name}: {first}: {log.damaged} damaged {what} skipped, this is the first")
-    if log.cut:
-        lines.append(f"{name}: {log.cut}")
+    for found in (log, signals):
+        if found.damaged:
+            first = found.first_damaged
+            what = "lines" if first.removeprefix("line ").isdecimal() else "pieces"
+            lines.append(f"{name}: {first}: {found.damaged} damaged {what} skipped, this is the first")
+        if found.cut:
+            lines.append(f"{name}: {found.cut}")
+    if log.clock_set_back:
+        first = f"{log.clock_set_back} times, this is the first" if log.clock_set_back > 1 else "once"
+        lines.append(
+            f"{name}: {log.first_set_back}: the clock was set back {first}; time goes on as before it"
+        )
     if log.stamps_backwards:
         lines.append(
             f"{name}: time steps back at {log.stamps_backwards} frames; they count in the order of the log"
         )
-    if findings.signals.unknown_columns:
-        unknown = findings.signals.unknown_columns
+    if log.gaps:
+        first = f"the longest of {log.gaps} gaps" if log.gaps > 1 else "the only gap"
+        lines.append(f"{name}: {log.longest_gap}: no frame for {log.longest_gap_s:.1f} s before, {first}")
+    if signals.unknown_columns:
+        unknown = signals.unknown_columns
         more = f", … ({len(unknown)} in all)" if len(unknown) > SHOWN else ""
         lines.append(f"{name}: columns not used: {', '.join(unknown[:SHOWN])}{more}")
     return lines
@@ -98,7 +115,7 @@ def log_lines(findings: Findings) -> list[str]:
 
 def quality_lines(findings: Findings, plan: ReceivePlan) -> list[str]:
     """Return one line for each kind of damage in the log, nothing for a clean one."""
-    name, lines = str(findings.path), log_lines(findings)
+    name, lines = str(findings.path), damage_lines(findings)
     if findings.reception is None:
         return lines
     counters = findings.reception.messages
@@ -131,6 +148,7 @@ def quality_counts(findings: Findings, plan: ReceivePlan) -> dict[str, Any]:
     counts: dict[str, Any] = {
         "rows": findings.rows,
         **vars(findings.log),
+        **({} if findings.reception else {key: getattr(findings.signals, key) for key in vars(Damage())}),
         "samples": findings.signals.samples,
         "dropped": findings.dropped,
         "seconds": round(findings.seconds, 3),

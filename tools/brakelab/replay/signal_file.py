@@ -1,21 +1,22 @@
 """Reads decoded signals: Parquet or CSV with `t` [s] and columns with the contract's input names, or MDF4.
 
 Rates may be mixed: null or NaN in a cell means that there is no new sample. Times are cut to whole
-microseconds relative to the first row, so that 0.1 + 0.2 and 0.3 are one instant.
+microseconds relative to the first row, so that 0.1 + 0.2 and 0.3 are one instant; of several samples of one
+input at one instant the last counts.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, Literal, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.csv as pa_csv
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from brakelab.replay.log_quality import MAX_JUMP_NS
+from brakelab.replay.csv_rows import csv_columns, csv_rows
+from brakelab.replay.log_quality import MAX_JUMP_NS, Damage
 from brakelab.replay.mdf_channels import open_channels, read_channels
 from ecu.bus.freshness import input_freshness
 from ecu.errors import UserError
@@ -26,6 +27,7 @@ BLOCK_ROWS: Final = 1 << 16
 FEW_ROWS: Final = 10  # too few to judge their distance
 SLOWEST_STEP: Final = 0.9  # s, above: no input would stay alive, so t is probably not in seconds
 LATEST: Final = 9e9  # s, the year 2255 as Unix time
+_SHOWN: Final = 20  # names in a line
 _REMEDY: Final = f"give t [s] and columns such as {', '.join(list(INPUT)[:3])} (contract input names)"
 
 
@@ -42,13 +44,13 @@ class SampleBlock(NamedTuple):
 
 
 @dataclass
-class SignalQuality:
+class SignalQuality(Damage):
     """What was found in a signal file."""
 
     rows: int = 0
     samples: int = 0
     unknown_columns: list[str] = field(default_factory=list)
-    zero_ns: int = 0
+    zero_ns: int | None = None
     """Date of t = 0 as Unix time, if the file says so."""
 
 
@@ -58,66 +60,85 @@ def freshness_at_any_rate() -> RecordArray:
     return input_freshness(any_rate, {})
 
 
-def row_place(path: Path, row: int) -> str:
-    """Return how a user finds data row `row` (from 0): a line of a CSV file, a row of a Parquet file."""
-    return f"line {row + 2}" if path.suffix == ".csv" else f"row {row}"
+class _Batch(NamedTuple):
+    """Some rows of a file."""
+
+    rows: pa.RecordBatch
+    places: NDArray[np.int64]
+    """Of each row: its line in a CSV file, else its number from 0, shape (rows,)."""
+
+
+def _is_csv(path: Path) -> bool:
+    return path.suffix.lower() == ".csv"
+
+
+def _place(path: Path, number: int) -> str:
+    """Return how a user finds what `_Batch.places` names."""
+    return f"line {number}" if _is_csv(path) else f"row {number}"
 
 
 def read_signals(path: Path, quality: SignalQuality) -> Iterator[SampleBlock]:
     """Yield a signal file in blocks of rows; `quality` is kept up to date.
 
-    Raises UserError with file, row and column for a `t` that is missing, falls, jumps or is not in seconds,
-    an infinite value, a cell that is no number, and a file without any known column.
+    Cells that are no number and rows without `t` are left out and counted. Raises UserError with file, row
+    and column for a `t` that falls, jumps or is not in seconds, an infinite value, a column without any
+    number, and a file without any known column or row.
     """
     if path.suffix.lower() == ".mf4":
         batches = _mdf_batches(path, quality)
     else:
-        batches = _csv_batches(path) if path.suffix == ".csv" else _parquet_batches(path)
-    origin: float | None = None
+        batches = _csv_batches(path, quality) if _is_csv(path) else _parquet_batches(path, quality)
+    origin_ns: int | None = None
     last_ns = 0
     columns: list[str] = []
-    for batch in batches:
+    for batch, places in batches:
         if not columns:
             columns = _known_columns(path, batch.schema.names, quality)
-        if batch.num_rows == 0:
+        t = _column(path, batch, "t", places, quality)
+        known = np.isfinite(t)
+        if not known.all():
+            if not known.any():
+                remedy = "time is missing or not finite; give t in seconds in every row"
+                raise UserError(str(path), f"{_place(path, places[0])}, t", remedy)
+            missing = np.flatnonzero(~known)
+            quality.note_damage(len(missing), f"{_place(path, places[missing[0]])}, t (missing)")
+            batch, places, t = batch.filter(pa.array(known)), places[known], t[known]
+        if not len(t):
             continue
-        t = _column(path, batch, "t", quality.rows)
-        missing = np.flatnonzero(~np.isfinite(t))
-        if len(missing):
-            place = row_place(path, quality.rows + int(missing[0]))
-            raise UserError(
-                str(path), f"{place}, t", "time is missing or not finite; give t in seconds in every row"
-            )
         _check_unit(path, t)
-        if origin is None:
+        if origin_ns is None:
             origin = float(t[0])
-            last_ns = round(origin * 1e6) * 1000 - 1
-        t_ns = round(origin * 1e6) * 1000 + np.rint((t - origin) * 1e6).astype(np.int64) * 1000
-        falling = np.flatnonzero(np.diff(t_ns, prepend=last_ns) <= 0)
+            origin_ns = last_ns = round(origin * 1e6) * 1000
+        t_ns = origin_ns + np.rint((t - origin) * 1e6).astype(np.int64) * 1000
+        steps = np.diff(t_ns, prepend=last_ns)
+        falling = np.flatnonzero(steps < 0)
         if len(falling):
             row = int(falling[0])
             raise UserError(
                 str(path),
-                f"{row_place(path, quality.rows + row)}, t",
-                f"time does not rise ({t[row]:g} s); sort the rows and keep one row for each instant",
+                f"{_place(path, places[row])}, t",
+                f"time falls by {-1e-9 * steps[row]:g} s to {t[row]:g} s; sort the rows, or split the file"
+                " here if its clock was set back",
             )
-        _check_span(path, t_ns, last_ns, round(origin * 1e6) * 1000, quality.rows)
+        quality.stamps_repeated += int(np.count_nonzero(steps[quality.rows == 0 :] == 0))
+        _check_span(path, t_ns, last_ns, origin_ns, places, quality.rows)
         last_ns = int(t_ns[-1])
         values = np.empty((len(t), len(columns)))
         for column, name in enumerate(columns):
-            values[:, column] = _column(path, batch, name, quality.rows)
+            values[:, column] = _column(path, batch, name, places, quality)
             infinite = np.flatnonzero(np.isinf(values[:, column]))
             if len(infinite):
                 raise UserError(
                     str(path),
-                    f"{row_place(path, quality.rows + int(infinite[0]))}, {name}",
+                    f"{_place(path, places[infinite[0]])}, {name}",
                     "infinite value; write null or NaN where there is no sample",
                 )
         quality.rows += len(t)
         quality.samples += int(np.count_nonzero(~np.isnan(values)))
         yield SampleBlock(np.array(t), t_ns, np.array([INPUT[name] for name in columns], np.int64), values)
     if quality.rows == 0:
-        raise UserError(str(path), row_place(path, 0), f"no rows; {_REMEDY}")
+        remedy = quality.cut or f"no row that can be read; {_REMEDY}"
+        raise UserError(str(path), quality.first_damaged or _place(path, 2 * _is_csv(path)), remedy)
 
 
 def _check_unit(path: Path, t: NDArray[np.float64]) -> None:
@@ -130,13 +151,20 @@ def _check_unit(path: Path, t: NDArray[np.float64]) -> None:
         raise UserError(str(path), "t", remedy)
 
 
-def _check_span(path: Path, t_ns: NDArray[np.int64], last_ns: int, origin_ns: int, rows: int) -> None:
+def _check_span(
+    path: Path,
+    t_ns: NDArray[np.int64],
+    last_ns: int,
+    origin_ns: int,
+    places: NDArray[np.int64],
+    rows: int,
+) -> None:
     """Refuse a jump, and gaps that add up to a result of far more rows than the file has."""
     jumps = np.flatnonzero(np.diff(t_ns, prepend=last_ns) > MAX_JUMP_NS)
     if len(jumps):
         raise UserError(
             str(path),
-            f"{row_place(path, rows + int(jumps[0]))}, t",
+            f"{_place(path, places[jumps[0]])}, t",
             "time jumps by more than an hour; mend the row or split the file here",
         )
     seconds = np.arange(rows, rows + len(t_ns)) * 1_000_000_000
@@ -144,13 +172,13 @@ def _check_span(path: Path, t_ns: NDArray[np.int64], last_ns: int, origin_ns: in
     if len(empty):
         raise UserError(
             str(path),
-            f"{row_place(path, rows + int(empty[0]))}, t",
+            f"{_place(path, places[empty[0]])}, t",
             "so far less than a row a second and more than an hour without any; split the file at its gaps",
         )
 
 
 def _known_columns(path: Path, names: list[str], quality: SignalQuality) -> list[str]:
-    where = row_place(path, -1) if path.suffix == ".csv" else "columns"
+    where = _place(path, 1) if _is_csv(path) else "columns"
     if "t" not in names:
         raise UserError(str(path), where, f"column t is missing; {_REMEDY}")
     twice = sorted({name for name in names if names.count(name) > 1})
@@ -159,102 +187,91 @@ def _known_columns(path: Path, names: list[str], quality: SignalQuality) -> list
     known = [name for name in names if name in INPUT]
     quality.unknown_columns = [name for name in names if name not in INPUT and name != "t"]
     if not known:
-        raise UserError(str(path), where, f"no known input among {', '.join(names)}; {_REMEDY}")
+        shown = f"{', '.join(names[:_SHOWN])}{', …' if len(names) > _SHOWN else ''}"
+        raise UserError(str(path), where, f"no known input among {shown}; {_REMEDY}")
     return known
 
 
-def _column(path: Path, batch: pa.RecordBatch, name: str, row: int) -> NDArray[np.float64]:
+def _column(
+    path: Path, batch: pa.RecordBatch, name: str, places: NDArray[np.int64], quality: SignalQuality
+) -> NDArray[np.float64]:
     column = batch.column(name)
     if pa.types.is_null(column.type):
         return np.full(batch.num_rows, np.nan)
-    if pa.types.is_string(column.type):  # CSV: the type was not guessed, so that a bad cell has its line
-        return _numbers(path, column, name, row)
     try:
         return np.asarray(column.cast(pa.float64()).to_numpy(zero_copy_only=False), np.float64)
     except (pa.ArrowInvalid, pa.ArrowNotImplementedError):
-        raise UserError(str(path), name, f"type {column.type} is no number; write float64") from None
-
-
-def _numbers(path: Path, column: "pa.Array[Any]", name: str, row: int) -> NDArray[np.float64]:
-    try:
-        return np.asarray(column.cast(pa.float64()).to_numpy(zero_copy_only=False), np.float64)
-    except pa.ArrowInvalid:
-        pass
+        if not pa.types.is_string(column.type):
+            remedy = f"type {column.type} is no number; write float64"
+            raise UserError(str(path), name, remedy) from None
     values = np.full(len(column), np.nan)
-    for i, cell in enumerate(column.to_pylist()):
-        if cell is not None:
-            try:
-                values[i] = float(cell)
-            except ValueError:
-                place = f"{row_place(path, row + i)}, {name}"
-                raise UserError(
-                    str(path), place, f"{cell!r} is no number; leave the cell empty if unknown"
-                ) from None
+    wrong: list[int] = []
+    for row, cell in enumerate(column.to_pylist()):
+        try:
+            values[row] = float(cell) if cell is not None else np.nan
+        except ValueError:
+            wrong.append(row)
+    if wrong:
+        place = f"{_place(path, places[wrong[0]])}, {name}"
+        reason = f"{str(column[wrong[0]])[:_SHOWN]!r} is no number"
+        if len(wrong) == len(column) - column.null_count:
+            raise UserError(str(path), place, f"{reason}; leave the cell empty if unknown")
+        quality.note_damage(len(wrong), f"{place} ({reason})")
     return values
 
 
-def _parquet_batches(path: Path) -> Iterator[pa.RecordBatch]:
+def _numbered(batches: Iterator[pa.RecordBatch]) -> Iterator[_Batch]:
+    done = 0
+    for batch in batches:
+        yield _Batch(batch, np.arange(done, done + batch.num_rows))
+        done += batch.num_rows
+
+
+def _names_only(names: list[str]) -> _Batch:
+    """Return no row of these columns: what is not known is listed, not read."""
+    rows = pa.RecordBatch.from_arrays([pa.array([], pa.null())] * len(names), names=names)
+    return _Batch(rows, np.empty(0, np.int64))
+
+
+def _parquet_batches(path: Path, quality: SignalQuality) -> Iterator[_Batch]:
     try:
         with pq.ParquetFile(path) as source:
-            wanted = [name for name in source.schema_arrow.names if name == "t" or name in INPUT]
-            unread = [name for name in source.schema_arrow.names if name not in wanted]
-            nothing = pa.array([], pa.null())
-            # An empty batch with every name first: unknown columns are listed, not read.
-            yield pa.RecordBatch.from_arrays([nothing] * (len(wanted) + len(unread)), names=wanted + unread)
-            yield from source.iter_batches(BLOCK_ROWS, columns=wanted)
-    except FileNotFoundError:
-        raise UserError(str(path), "", "no such file; give an existing Parquet or CSV file") from None
+            names = source.schema_arrow.names
+            yield _names_only(names)
+            _note_start(source, quality)
+            wanted = [name for name in names if name == "t" or name in INPUT]
+            yield from _numbered(source.iter_batches(BLOCK_ROWS, columns=wanted))
     except (pa.ArrowInvalid, OSError) as error:
-        reason = str(error).splitlines()[0]
-        raise UserError(
-            str(path), "", f"no readable Parquet file ({reason}); write it again or name it .csv"
-        ) from None
+        reason = str(error).splitlines()[0].rstrip(".")
+        if not quality.rows:
+            remedy = f"no readable Parquet file ({reason}); write it again"
+            raise UserError(str(path), "", remedy) from None
+        quality.cut = f"row {quality.rows}: cannot be read ({reason}), the rest is missing"
 
 
-def _mdf_batches(path: Path, quality: SignalQuality) -> Iterator[pa.RecordBatch]:
+def _note_start(source: pq.ParquetFile, quality: SignalQuality) -> None:
+    """Note the date of t = 0 where the metadata has that of the first row, as our own files do."""
+    start = (source.metadata.metadata or {}).get(b"start_time_ns", b"").decode("ascii", "replace")
+    if start.isdecimal() and source.metadata.num_rows:
+        first = next(source.iter_batches(1, columns=["t"])).column(0)[0].as_py()
+        if isinstance(first, float):
+            quality.zero_ns = int(start) - round(first * 1e6) * 1000
+
+
+def _mdf_batches(path: Path, quality: SignalQuality) -> Iterator[_Batch]:
     channels = open_channels(path)
     try:
         quality.zero_ns = channels.measurement.start_ns()
-        names = ["t", *(name for places in channels.groups.values() for name in places), *channels.unknown]
-        nothing = pa.array([], pa.null())
-        yield pa.RecordBatch.from_arrays([nothing] * len(names), names=names)
-        yield from read_channels(path, channels)
+        inputs = [name for places in channels.groups.values() for name in places]
+        yield _names_only(["t", *inputs, *channels.unknown])
+        yield from _numbered(read_channels(path, channels, quality))
     finally:
         channels.measurement.close()
 
 
-def _csv_batches(path: Path) -> Iterator[pa.RecordBatch]:
-    try:
-        with path.open("rb") as stream:
-            header = stream.readline().decode("utf-8", "replace").strip().lstrip("\ufeff")
-    except OSError as error:
-        raise UserError(
-            str(path), "", f"cannot be read ({error.strerror}); give an existing CSV file"
-        ) from None
-    if not header:
-        raise UserError(str(path), "line 1", f"the file is empty; {_REMEDY}")
-    names = [name.strip().strip('"') for name in header.split(",")]
-    damaged: list[int] = []
-
-    def note(row: pa_csv.InvalidRow) -> Literal["skip", "error"]:
-        damaged.append(row.number if row.number is not None else 0)
-        return "error"
-
-    types = dict.fromkeys(names, pa.string())
-    try:
-        with pa_csv.open_csv(
-            path,
-            read_options=pa_csv.ReadOptions(column_names=names, skip_rows=1, use_threads=False),
-            parse_options=pa_csv.ParseOptions(invalid_row_handler=note),
-            convert_options=pa_csv.ConvertOptions(
-                column_types=types, null_values=["", "null", "NULL", "NA"], strings_can_be_null=True
-            ),
-        ) as source:
-            yield pa.RecordBatch.from_arrays([pa.array([], pa.null())] * len(names), names=names)
-            yield from source
-    except pa.ArrowInvalid as error:
-        place = f"line {damaged[0]}" if damaged else "line 2"
-        remedy = (
-            f"a row needs {len(names)} cells like the first line" if damaged else str(error).splitlines()[0]
-        )
-        raise UserError(str(path), place, remedy) from None
+def _csv_batches(path: Path, quality: SignalQuality) -> Iterator[_Batch]:
+    names, delimiter = csv_columns(path)
+    yield _names_only(names)
+    wanted = [name for name in names if name == "t" or name in INPUT]
+    for lines, rows in csv_rows(path, names, delimiter, wanted, quality):
+        yield _Batch(rows, lines)

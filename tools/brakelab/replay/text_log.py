@@ -140,6 +140,19 @@ def open_log(path: Path) -> IO[bytes]:
         raise UserError(str(path), "", f"cannot be read ({error.strerror}); give an existing log") from None
 
 
+def _read(stream: IO[bytes]) -> tuple[bytes, Exception | None]:
+    """Return the next bytes of a log, and why a packed one cannot be unpacked beyond them."""
+    parts: list[bytes] = []
+    missing = BLOCK_BYTES
+    try:
+        while missing > 0 and (part := stream.read1(missing)):  # type: ignore[attr-defined]
+            parts.append(part)
+            missing -= len(part)
+    except (OSError, EOFError, zlib.error) as error:
+        return b"".join(parts), error
+    return b"".join(parts), None
+
+
 def read_text(
     path: Path,
     parse: Parse,
@@ -156,15 +169,9 @@ def read_text(
     counts = np.zeros(1, COUNTS)
     rest, read, too_long = b"", 0, False
     with open_log(path) as stream:
-        while True:
-            try:
-                chunk = stream.read(BLOCK_BYTES)
-            except (OSError, EOFError, zlib.error) as error:
-                place = f"line {counts[0]['line'] + 1}"
-                if not read:
-                    raise UserError(str(path), place, f"cannot be unpacked ({error}); {no_log}") from None
-                quality.cut = f"{place}: the packed data is cut off or damaged here, the rest was not read"
-                return
+        torn: Exception | None = None
+        while torn is None:
+            chunk, torn = _read(stream)
             if not chunk:
                 break
             if too_long:  # its beginning was counted already
@@ -200,6 +207,9 @@ def read_text(
             if advance:
                 advance(len(chunk))
     if not read:
-        raise UserError(str(path), "line 1", no_log)
-    if rest.strip():
+        raise UserError(str(path), "line 1", f"cannot be unpacked ({torn}); {no_log}" if torn else no_log)
+    if torn:
+        place = f"line {counts[0]['line'] + 1}"
+        quality.cut = f"{place}: the packed data is cut off or damaged here, the rest was not read"
+    elif rest.strip():
         quality.cut = f"line {counts[0]['line'] + 1}: the last line is cut off and was not used"

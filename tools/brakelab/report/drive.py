@@ -100,11 +100,13 @@ def start_ns(drive: Drive) -> int | None:
 def onto(drive: Drive, truth: Drive, truth_path: Path) -> Drive:
     """Return the truth on the time axis of `drive`, NaN outside its span.
 
-    The two axes are brought together by the absolute starts when both files state theirs, else both
-    are taken to have the same zero. Raises UserError when the spans do not overlap.
+    The two axes are brought together by the dates of their first rows when both files state theirs, else
+    both are taken to have the same zero. Raises UserError when the spans do not overlap.
     """
     starts = start_ns(drive), start_ns(truth)
-    shift = (starts[1] - starts[0]) * 1e-9 if starts[0] is not None and starts[1] is not None else 0.0
+    shift = 0.0
+    if starts[0] is not None and starts[1] is not None:
+        shift = (starts[1] - starts[0]) * 1e-9 - (truth.t[0] - drive.t[0])
     t = truth.t + shift
     if t[0] > drive.t[-1] or t[-1] < drive.t[0]:
         span = f"{drive.t[0]:.1f} to {drive.t[-1]:.1f} s"

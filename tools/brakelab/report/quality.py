@@ -18,6 +18,8 @@ _DAMAGE: Final = {
     "damaged": "pieces damaged",
     "damaged_lines": "lines damaged",
     "stamps_backwards": "steps back in time",
+    "clock_set_back": "times the clock was set back",
+    "gaps": "gaps of more than a second",
     "dropped": "frames dropped by the kernel",
 }
 _MESSAGE: Final = ("checksum_errors", "sequence_errors", "repeated", "length_errors", "lost")

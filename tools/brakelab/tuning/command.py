@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 from rich.console import Console
 
 from brakelab.bench.table import Table, show
+from brakelab.observer import with_observer
 from brakelab.outputs import check_outputs
 from brakelab.replay.progress import progress_bar
 from brakelab.scenario import Scenario, load_scenario
@@ -19,7 +20,7 @@ from brakelab.tuning.recording import (
     recording,
 )
 from brakelab.tuning.replay import replay_errors
-from brakelab.tuning.search import RANGES, Best, search, with_observer
+from brakelab.tuning.search import RANGES, Best, search
 from ecu import __version__
 from ecu.config import Config, config_hash, load_config
 from ecu.errors import UserError

@@ -19,6 +19,7 @@ from pymoo.core.evaluator import Evaluator
 from pymoo.core.problem import Problem
 from pymoo.problems.static import StaticProblem
 
+from brakelab.observer import with_observer
 from brakelab.tuning.recording import Errors
 from ecu.config import Config
 
@@ -61,12 +62,7 @@ def tuned(config: Config, place: NDArray[np.float64]) -> Config:
     values = dict(zip(RANGES, 10.0**place, strict=True))
     values["rls_forgetting"] = 1.0 - values["rls_forgetting"]
     rounded = {key: float(f"{value:.{DIGITS}g}") for key, value in values.items()}
-    return with_observer(config, **rounded)
-
-
-def with_observer(config: Config, **keys: float | str) -> Config:
-    """Return `config` with these keys of [observer]."""
-    return config.model_copy(update={"observer": config.observer.model_copy(update=keys)})
+    return with_observer(config, None, **rounded)
 
 
 def search(best: Best, judge: Judge, generations: int, population: int, seed: int) -> Iterator[Best]:
