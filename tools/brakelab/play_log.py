@@ -5,10 +5,9 @@ decoded every 10 ms and encoded as the contract's input frames with fresh counte
 stale or invalid in the log is sent as "not available".
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import chain
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,34 +27,6 @@ from ecu.signals import CYCLE_NS, USABLE
 
 Vector = NDArray[np.float64]
 
-# Stamps that step back by more are those of a clock that was set back; by less, of a log out of order.
-SET_BACK_NS: Final = 100_000_000
-
-
-class Timetable:
-    """When the frames of a log are due, from its stamps.
-
-    Frames leave in the order of the log: one whose stamp is a little before the one of the frame before it
-    is due with that frame. Where the clock was set back, the log goes on from there without a pause.
-    """
-
-    def __init__(self, speed: float) -> None:
-        self._speed = speed
-        self._first_ns: int | None = None
-        self._latest_ns = self._set_back_ns = 0
-
-    def due(self, stamps: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return when frames with these `stamps` are due, ns after the first frame of the log, shape (n,)."""
-        due = np.empty(len(stamps))
-        for place, stamp in enumerate(stamps.tolist()):
-            if self._first_ns is None:
-                self._first_ns = self._latest_ns = stamp
-            if stamp + self._set_back_ns < self._latest_ns - SET_BACK_NS:
-                self._set_back_ns = self._latest_ns - stamp
-            self._latest_ns = max(self._latest_ns, stamp + self._set_back_ns)
-            due[place] = self._latest_ns - self._first_ns
-        return np.rint(due / self._speed).astype(np.int64)
-
 
 def timed_frames(
     log: Path, map: Path | None, channel: str, speed: float, findings: Findings
@@ -69,13 +40,29 @@ def timed_frames(
         blocks = raw_frames(log, channel, findings)
     else:
         blocks = contract_frames(log, load_source(map), findings)
-    timetable, empty = Timetable(speed), True
-    for frames in blocks:
-        frames["stamp_ns"] = timetable.due(frames["stamp_ns"])
+    empty = True
+    for frames in timed(blocks, speed):
         empty = False
         yield frames
     if empty:
         raise UserError(str(log), "", "holds no frame that can be sent; give a log of data frames")
+
+
+def timed(blocks: Iterable[RecordArray], speed: float) -> Iterator[RecordArray]:
+    """Yield `blocks`, none of them empty, with `stamp_ns` as the time since the first frame over `speed`.
+
+    Frames leave in the order of the log: one whose stamp is before that of the frame before it is due with
+    that frame.
+    """
+    first_ns = latest_ns = None
+    for frames in blocks:
+        stamps = np.maximum.accumulate(frames["stamp_ns"])
+        if first_ns is None or latest_ns is None:
+            first_ns = latest_ns = stamps[0]
+        stamps = np.maximum(stamps, latest_ns)
+        latest_ns = stamps[-1]
+        frames["stamp_ns"] = np.rint((stamps - first_ns) / speed)
+        yield frames
 
 
 def raw_frames(log: Path, channel: str, findings: Findings) -> Iterator[RecordArray]:
