@@ -56,7 +56,8 @@ def _figure_table(cars: list[Car]) -> Table:
         f"Mean over {len(cars)} cars and the applications from the second on: of the deceleration over "
         "time (5.9, 5.10), at equal pedal over 1 to 6 m/s² (5.11, 5.12). Of 5.8 (compensation abates the "
         "error at every f, and motors the disturbance) the five cars stand in "
-        "[blending.md](blending.md). The thesis's figures have no numbers to compare with.",
+        "[blending.md](blending.md). The thesis's figures have no numbers to compare with. In 5.10 nominal "
+        "friction, too high in front and too low at the rear, is as good by chance: see control.md.",
     )
 
 
