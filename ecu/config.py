@@ -150,8 +150,8 @@ class Control(_Section):
     """Slip of a rear wheel beyond the front one of its side that takes back the torque of the rear."""
     max_pressure: Annotated[float, Field(gt=20, le=180)] = 180.0
     max_pressure_rate: Annotated[float, Field(ge=1500)] = 3000.0
-    compensation: Literal["second-order", "inverse", "off"] = "second-order"
-    """How pressure follows friction in a braking: by (5.8) corrected, by its exact form, or not at all."""
+    compensation: Literal["second-order", "inverse", "off"] = "inverse"
+    """How pressure follows friction in a braking: by (5.8) corrected, by what it approximates, or not."""
     slip_guard: bool = True
     """Hold the pressure back at a wheel that slips beyond its tyre's range."""
 

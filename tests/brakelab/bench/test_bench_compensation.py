@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from brakelab.bench.compensation import (
+    CURVES,
     LEVELS,
+    Car,
     Run,
     application_errors,
     applications,
@@ -12,6 +14,7 @@ from brakelab.bench.compensation import (
     level_errors,
     manoeuvre,
 )
+from brakelab.bench.compensation_table import mass_table
 from brakelab.closed_loop import Drive
 from ecu.config import load_config
 from ecu.records import FRAME, new_record
@@ -47,6 +50,17 @@ def test_errors_of_a_share(share: float) -> None:
     decel, travel = level_errors(run, ideal)
     assert decel == pytest.approx(np.full((1, len(LEVELS)), 100 * (share - 1)))
     assert travel == pytest.approx(np.full((1, len(LEVELS)), 100 * (1 / share - 1)), abs=0.02)
+
+
+def test_what_the_mass_leaves_is_the_same_in_cars_that_differ_by_mass_alone() -> None:
+    cars = []
+    for excess in (-2.5, 0.0, 1.5):
+        decel = np.full((2, len(LEVELS)), excess - 3.6)
+        levels = {(name, "compensated"): (decel, decel) for name in CURVES}
+        cars.append(Car({}, levels, {}, excess))
+    rows = mass_table(cars).rows
+    assert rows[0][:3] == ("car 0", "-2.5", "-6.1")
+    assert rows[-1][2:] == ("-3.6 (0.0)",) * 6
 
 
 def test_told_too_much_friction_the_car_brakes_too_little() -> None:

@@ -66,6 +66,7 @@ def test_no_torque_is_no_pressure(params, torque: float) -> None:
 )
 @pytest.mark.parametrize("corner", range(4))
 def test_truncation_costs_the_cube_of_the_change(params, corner: int, e: float, torque_error: float) -> None:
+    params["compensation"] = SECOND_ORDER
     mu = 0.45 * (1 + e)
     uncompensated = pressure_for_torque(params[0], 500.0, 0.45, corner)
     pressure = compensated_pressure(params[0], law(used=mu), uncompensated, corner)

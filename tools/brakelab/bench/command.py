@@ -11,7 +11,18 @@ from typing import Any, Final, NamedTuple, TypeVar
 from rich.console import Console
 from rich.progress import track
 
-from brakelab.bench import ablation, bound, codec, compensation, cycle, margins, plant, step
+from brakelab.bench import (
+    ablation,
+    bound,
+    codec,
+    compensation,
+    compensation_picture,
+    compensation_table,
+    cycle,
+    margins,
+    plant,
+    step,
+)
 from brakelab.bench import stops as stops_bench
 from brakelab.bench.blending import blending_tables
 from brakelab.bench.chart import write_chart
@@ -219,10 +230,11 @@ def _energy(json: bool) -> int:
 def _compensation(json: bool) -> int:
     config = load_config(resource("config/suv.toml"))
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
-        tables = compensation.compensation_tables(compensation.drive_cars(config, spread=pool.map))
+        cars = compensation.drive_cars(config, spread=pool.map)
+    tables = compensation_table.compensation_tables(cars)
     if not json:
-        panels, picture = compensation.pictured(config), resource("docs") / "images" / "compensation.svg"
-        write_chart(picture, panels, compensation.LEGEND)
+        picture = resource("docs") / "images" / "compensation.svg"
+        write_chart(picture, compensation_picture.pictured(config), compensation_picture.LEGEND)
     return _page(COMPENSATION, "What compensation is worth", COMPENSATION_TEXT, tables, json)
 
 

@@ -16,10 +16,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.bench.chart import BLUE, GREEN, GREY, ORANGE, PINK, Line, Panel
-from brakelab.bench.measure import Figure, figure
-from brakelab.bench.stops import AXLES, LOWEST_SPEED, Vector, achieved_decel, columns
-from brakelab.bench.table import Table
+from brakelab.bench.chart import BLUE, GREEN, GREY, ORANGE, PINK
+from brakelab.bench.stops import LOWEST_SPEED, Vector, achieved_decel, columns
 from brakelab.closed_loop import Drive, Told, new_loop, run
 from brakelab.scenario import Scenario, load_scenario
 from ecu.config import Config
@@ -36,15 +34,30 @@ RUNS: Final = {
 TOLD: Final = {"ideal": 1.0, "under": 1.15, "over": 0.85}
 SWEEP: Final = 78.0  # % of the pedal, for 6.3 m/s^2: the curve up to 6
 LEVELS: Final = np.arange(1.0, 6.01, 0.5)  # m/s^2
+MOTORS: Final = 0.7  # f of section 5.7.2
+
+
+class Manoeuvre(NamedTuple):
+    """A scenario and what is changed in it."""
+
+    scenario: str
+    pedal: float | None = None
+    """Greatest [%], in place of the scenario's."""
+    motors: float = 0.0
+    """Share f (5.2, 5.3) that the ECU asks of the motors of both axles."""
+
+
 MANOEUVRES: Final = {
-    "single application": ("single", None),
-    "repeated": ("repeated", None),
-    "repeated, pedal at 50 mm/s": ("repeated-slow", None),
-    "repeated, motors take 70 %": ("repeated-blended", None),
-    "repeated up to 6 m/s²": ("repeated", SWEEP),
-    "repeated up to 6 m/s², pedal at 50 mm/s": ("repeated-slow", SWEEP),
+    "single application": Manoeuvre("single"),
+    "repeated": Manoeuvre("repeated"),
+    "repeated, pedal at 50 mm/s": Manoeuvre("repeated-slow"),
+    "repeated, motors take 70 %": Manoeuvre("repeated", motors=MOTORS),
+    "repeated up to 6 m/s²": Manoeuvre("repeated", SWEEP),
+    "repeated up to 6 m/s², pedal at 50 mm/s": Manoeuvre("repeated-slow", SWEEP),
+    "repeated up to 6 m/s², motors take 70 %": Manoeuvre("repeated", SWEEP, MOTORS),
+    "repeated up to 6 m/s², pedal at 50 mm/s, motors take 70 %": Manoeuvre("repeated-slow", SWEEP, MOTORS),
 }
-CURVES: Final = tuple(name for name, (_, pedal) in MANOEUVRES.items() if pedal)
+CURVES: Final = tuple(name for name, how in MANOEUVRES.items() if how.pedal)
 ASKED: Final = 0.2  # m/s^2
 FULL: Final = 0.98  # of the demand
 SETTLED_S: Final = 2.5  # of a braking with a kept deceleration
@@ -59,12 +72,20 @@ class Run(NamedTuple):
 
 def manoeuvre(name: str) -> Scenario:
     """Return a manoeuvre of `MANOEUVRES`."""
-    file, pedal = MANOEUVRES[name]
-    scenario = load_scenario(resource(f"config/scenarios/{file}.toml"))
-    if pedal is None:
+    how = MANOEUVRES[name]
+    scenario = load_scenario(resource(f"config/scenarios/{how.scenario}.toml"))
+    scenario = scenario.model_copy(update={"blending": how.motors > 0.0})
+    if how.pedal is None:
         return scenario
-    phases = [p if p.pedal is None else p.model_copy(update={"pedal": pedal}) for p in scenario.phase]
+    phases = [p if p.pedal is None else p.model_copy(update={"pedal": how.pedal}) for p in scenario.phase]
     return scenario.model_copy(update={"phase": phases})
+
+
+def configured(name: str, config: Config) -> Config:
+    """Return the configuration of a manoeuvre of `MANOEUVRES`."""
+    share = MANOEUVRES[name].motors
+    blending = config.blending.model_copy(update={"front": share, "rear": share})
+    return config.model_copy(update={"blending": blending})
 
 
 def drive_as(kind: str, scenario: Scenario, config: Config, seed: int) -> Run:
@@ -156,6 +177,12 @@ def fade_pedal(run: Run) -> tuple[Vector, Vector]:
     return np.array(pedals), np.array(frictions)
 
 
+def drive_all(name: str, config: Config, seed: int) -> dict[str, Run]:
+    """Drive a manoeuvre of `MANOEUVRES` as each of `RUNS`."""
+    scenario, config = manoeuvre(name), configured(name, config)
+    return {kind: drive_as(kind, scenario, config, seed) for kind in RUNS}
+
+
 class Car(NamedTuple):
     """What one car did."""
 
@@ -163,6 +190,8 @@ class Car(NamedTuple):
     """By manoeuvre and run, one per application."""
     levels: dict[tuple[str, str], tuple[Vector, Vector]]
     fade: dict[str, tuple[Vector, Vector]]
+    excess: float
+    """Mass beyond the configured one [%]."""
 
 
 FADE_RUNS: Final = ("ideal", "compensated", "uncompensated")
@@ -170,10 +199,11 @@ FADE_RUNS: Final = ("ideal", "compensated", "uncompensated")
 
 def one_car(config: Config, seed: int) -> Car:
     """Drive every manoeuvre in every way."""
-    car = Car({}, {}, {})
+    vehicle = new_loop(manoeuvre("single application"), config, seed).sides.vehicle
+    mass = float(vehicle.params["mass"][0])
+    car = Car({}, {}, {}, 100.0 * (mass / config.vehicle.mass - 1.0))
     for name in MANOEUVRES:
-        scenario = manoeuvre(name)
-        runs = {kind: drive_as(kind, scenario, config, seed) for kind in RUNS}
+        runs = drive_all(name, config, seed)
         for kind in list(RUNS)[1:]:
             car.errors[name, kind] = application_errors(runs[kind], runs["ideal"])
             if name in CURVES:
@@ -190,124 +220,3 @@ Spread = Callable[[Callable[[int], Car], Iterable[int]], Iterable[Car]]
 def drive_cars(config: Config, cars: int = CARS, spread: Spread = map) -> list[Car]:
     """Drive cars 0 to `cars` - 1."""
     return list(spread(partial(one_car, config), range(cars)))
-
-
-def _cell(value: Figure) -> str:
-    return f"{value.median:.1f} ({value.high:.1f})"
-
-
-def _mean_and_worst(errors: Vector) -> str:
-    known = errors[np.isfinite(errors)]
-    return f"{known.mean():.1f} ({known.max():.1f})" if len(known) > 0 else "–"
-
-
-def _application_table(cars: list[Car]) -> Table:
-    rows = []
-    for name in MANOEUVRES:
-        count = min(len(car.errors[name, kind]) for car in cars for kind in list(RUNS)[1:])
-        for place in range(count):
-            cells = (
-                _cell(figure([car.errors[name, kind][place] for car in cars])) for kind in list(RUNS)[1:]
-            )
-            rows.append((f"{name}, {place + 1}", *cells))
-    return Table(
-        "Deceleration of each application: mean relative error to the ideal [%]",
-        ("manoeuvre, application", *list(RUNS)[1:]),
-        rows,
-        f"Median over {len(cars)} cars (worst). Counted from 1 m/s² until the pedal is released. Goals: "
-        f"from the second application on within 3, the first within 5.",
-    )
-
-
-def _level_table(cars: list[Car]) -> Table:
-    rows = []
-    for name in CURVES:
-        for kind in ("compensated", "uncompensated"):
-            for place, what in enumerate(("deceleration at equal pedal", "pedal at equal deceleration")):
-                errors = np.abs(np.concatenate([car.levels[name, kind][place] for car in cars]))
-                rows.append((f"{name}: {kind}, {what}", *map(_mean_and_worst, errors.T[::2])))
-    return Table(
-        "Curve of deceleration over pedal (Figures 5.11a, 5.12a): relative error to the ideal [%]",
-        ("pedal, run", *(f"{level:.0f} m/s²" for level in LEVELS[::2])),
-        rows,
-        "Mean over cars and applications from the second on (worst). The pedal goes to 78 % instead of "
-        "60, so that the curve reaches 6 m/s²; – where it had arrived before the car did. Goal: within 3.",
-    )
-
-
-def _fade_table(cars: list[Car]) -> Table:
-    rows = []
-    count = min(len(car.fade[kind][0]) for car in cars for kind in FADE_RUNS)
-    for stop in range(count):
-        friction = np.mean([car.fade["compensated"][1][stop] for car in cars])
-        pedals = [figure([car.fade[kind][0][stop] for car in cars]) for kind in FADE_RUNS]
-        change = [
-            100.0 * (car.fade["compensated"][0][stop] / car.fade["compensated"][0][0] - 1.0) for car in cars
-        ]
-        rows.append(
-            (
-                str(stop + 1),
-                f"{friction:.3f}",
-                *(f"{p.median:.1f} ({p.low:.1f}–{p.high:.1f})" for p in pedals),
-                f"{min(change):+.1f} to {max(change):+.1f}",
-            )
-        )
-    return Table(
-        "Fade (section 6.2.3): pedal [%] that keeps 3.4 m/s²",
-        ("stop", "front friction", *FADE_RUNS, "compensated, change since stop 1 [%]"),
-        rows,
-        f"Median over {len(cars)} cars (least–greatest); the pedal from {SETTLED_S} s after the first "
-        f"touch on. Goal: within 4 % of the first stop.",
-    )
-
-
-def compensation_tables(cars: list[Car]) -> list[Table]:
-    """Return the tables of the page."""
-    return [_application_table(cars), _level_table(cars), _fade_table(cars)]
-
-
-LEGEND: Final = [
-    ("ideal (dashed)", GREY),
-    ("compensated", ORANGE),
-    ("uncompensated", BLUE),
-    ("under-braking", GREEN),
-    ("over-braking", PINK),
-]
-
-
-def _over_time(title: str, runs: dict[str, Run]) -> list[Panel]:
-    lines = [Line(r.drive.t, r.decel, RUNS[kind], kind == "ideal") for kind, r in runs.items()]
-    friction = []
-    for axle in AXLES:
-        drive = runs["compensated"].drive
-        rows = np.ones(len(drive.t), np.bool_)
-        friction.append(Line(drive.t, columns(drive.truth, "mu_b", axle, rows).mean(axis=0), GREY, True))
-        friction.append(Line(drive.t, columns(drive.outputs, "mu_b", axle, rows).mean(axis=0), ORANGE))
-    end = float(max(r.drive.t[-1] for r in runs.values()))
-    return [
-        Panel(f"{title}: deceleration [m/s²]", "t [s]", (0.0, end), (0.0, 6.0), lines),
-        Panel(f"{title}: friction, rear above", "t [s]", (0.0, end), (0.3, 0.7), friction),
-    ]
-
-
-def _curve(title: str, runs: dict[str, Run]) -> Panel:
-    lines = []
-    for kind, r in runs.items():
-        rows = applications(r.drive)[1]
-        lines.append(Line(r.drive.truth["pedal_position"][rows], r.decel[rows], RUNS[kind], kind == "ideal"))
-    return Panel(title, "pedal [%]", (0.0, 80.0), (0.0, 8.0), lines)
-
-
-def pictured(config: Config) -> list[Panel]:
-    """Drive car 0 and return the panels of Figures 5.9 to 5.12."""
-    found: dict[str, dict[str, Run]] = {}
-    for name in list(MANOEUVRES)[1:]:
-        scenario = manoeuvre(name)
-        found[name] = {kind: drive_as(kind, scenario, config, 0) for kind in RUNS}
-    fast, slow = CURVES
-    return [
-        *_over_time("Figure 5.9", found["repeated"]),
-        *_over_time("Figure 5.10, 70 % motors", found["repeated, motors take 70 %"]),
-        _curve("Figure 5.11a: deceleration [m/s²], 150 mm/s, application 2", found[fast]),
-        _curve("Figure 5.12a: deceleration [m/s²], 50 mm/s, application 2", found[slow]),
-    ]
