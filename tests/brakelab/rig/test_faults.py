@@ -180,9 +180,9 @@ def test_a_signal_is_spoilt_as_asked(
 @pytest.mark.parametrize(
     ("signal", "amount", "keys", "bit", "after"),
     [
-        ("accel_x", 0.5, "", bits.ACCEL_IMPLAUSIBLE, 0.4),
-        ("accel_x", -0.5, "", bits.ACCEL_IMPLAUSIBLE, 0.4),
-        ("accel_x", 0.5, "motor_share = 0.5", bits.ACCEL_IMPLAUSIBLE, 0.4),
+        ("accel_x", 0.7, "", bits.ACCEL_IMPLAUSIBLE, 0.4),
+        ("accel_x", -0.7, "", bits.ACCEL_IMPLAUSIBLE, 0.4),
+        ("accel_x", 0.7, "motor_share = 0.5", bits.ACCEL_IMPLAUSIBLE, 0.4),
         ("accel_x", 0.15, "", 0, 0.0),
         ("calliper_pressure_fl", 20.0, "", bits.PRESSURE_NOT_FOLLOWING, 0.45),
         ("calliper_pressure_fl", 3.0, "", 0, 0.0),
@@ -203,7 +203,7 @@ def test_a_sensor_that_contradicts_the_others_is_told_and_not_followed(
     error = drive.outputs["mu_b_fl"][within] / drive.truth["mu_b_fl"][within] - 1.0
     decel = -np.polyfit(drive.t[within], drive.truth["vehicle_speed"][within], 1)[0]
     print(f"friction off by {error.min():+.1%} to {error.max():+.1%}, deceleration {decel:.2f} m/s^2")
-    assert np.abs(error).max() < 0.08
+    assert np.abs(error).max() < 0.13  # 0.7 m/s^2 are 17 %
     assert decel == pytest.approx(4.0, rel=0.06)  # braking goes on
     held = np.all(drive.outputs["mode_fl"][within] == HOLDING)
     assert held == (bit == bits.PRESSURE_NOT_FOLLOWING)  # without the accelerometer the slip still tells
