@@ -36,10 +36,13 @@ from ecu.control.pressure_law import (
 )
 from ecu.control.slip_guard import SLIP_GUARD_STATE, guard_slip
 from ecu.diagnostics.faults import (
+    ACCEL_IMPLAUSIBLE,
     ACCUMULATOR_LOW,
     BRAKE_FADE,
     DEMAND_LIMITED,
     FILTER_RESET,
+    MOTOR_SHORT,
+    PRESSURE_NOT_FOLLOWING,
     WHEEL_SLIPS,
     WHEEL_SPEED_IMPLAUSIBLE,
 )
@@ -82,6 +85,7 @@ from ecu.estimation.slip import (
 from ecu.estimation.speed import SPEED_STATE, update_speed
 from ecu.estimation.wheel_load import WHEEL_LOAD_STATE, update_wheel_load
 from ecu.jit import Record, kernel
+from ecu.monitoring.acceleration import ACCELERATION_STATE, watch_acceleration
 from ecu.monitoring.application import APPLICATION_STATE, update_application
 from ecu.monitoring.disc_temperature import (
     DISC_STATE,
@@ -90,9 +94,9 @@ from ecu.monitoring.disc_temperature import (
     start_discs,
     update_discs,
 )
-from ecu.monitoring.plausibility import PLAUSIBILITY_STATE, wheel_speed_implausible
+from ecu.monitoring.plausibility import PLAUSIBILITY_STATE, watch_pressures, wheel_speed_implausible
 from ecu.params import BAR, JOINT, OBSERVER1
-from ecu.records import LEARNED, RecordArray
+from ecu.records import INPUTS, LEARNED, RecordArray
 from ecu.signals import ACCEL_X, CALLIPER_PRESSURE, FAILED, STARTING
 
 STATE = np.dtype(
@@ -115,6 +119,8 @@ STATE = np.dtype(
         ("guard", SLIP_GUARD_STATE),
         ("limiter", LIMITER_STATE),
         ("plausibility", PLAUSIBILITY_STATE),
+        ("acceleration", ACCELERATION_STATE),
+        ("trusted", INPUTS),  # the inputs without what is implausible
         ("mode", MODE_STATE),
         ("learned", LEARNED),
     ],
@@ -166,13 +172,17 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
     """
     p, s, u, y = params[0], state[0], inputs[0], outputs[0]
     dt = 1e-9 * u.dt_ns
+    faults = u.bus_faults | input_faults(p, u) | _watch_sensors(p, s, u, dt)
+    if s.acceleration.implausible:
+        s.trusted = u
+        s.trusted.verdict[ACCEL_X] = s.trusted.new[ACCEL_X] = 0
+        u = s.trusted
     _estimate(p, s, u, dt)
     update_discs(
         p, s.discs, s.learned, u, s.friction, s.application, s.wheel_load.load,
         total_tyre_force(p, s.motion, s.speed.speed), s.speed.speed, dt,
     )  # fmt: skip
     decel = _control(p, s, u, y, dt)
-    faults = u.bus_faults | input_faults(p, u)
     if s.speed.started and wheel_speed_implausible(
         p, s.plausibility, u, s.motion, s.speed.speed, s.friction.torque, dt
     ):
@@ -187,9 +197,32 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
         faults |= WHEEL_SLIPS
     if s.control.at_limit:
         faults |= BRAKE_FADE
+    for i in range(4):
+        if s.blending.lost[i] and s.plausibility.sent:
+            faults |= MOTOR_SHORT
     asked = math.isfinite(decel) and decel > 0.05
     mode = decide_mode(s.mode, faults, asked or s.application.braking != 0, dt)
     _publish(p, s, u, y, decel, faults, mode)
+
+
+@kernel
+def _watch_sensors(p: Record, s: Record, u: Record, dt: float) -> int:
+    """Return the fault bits of sensors whose readings contradict the others."""
+    faults = 0
+    doubted = s.acceleration.implausible != 0
+    if s.speed.started:
+        watch_acceleration(
+            p, s.acceleration, u, s.motion, s.friction, s.control.base, s.speed.speed,
+            s.application.braking != 0, dt,
+        )  # fmt: skip
+    if s.acceleration.implausible:
+        faults |= ACCEL_IMPLAUSIBLE
+    begins = s.acceleration.implausible != 0 and not doubted
+    watch_pressures(s.plausibility, u, s.friction_torque.model, s.joint.pressures.zero, dt)
+    if s.plausibility.pressure:
+        faults |= PRESSURE_NOT_FOLLOWING
+    s.friction.held = 1 if s.plausibility.pressure or begins else 0
+    return faults
 
 
 @kernel
@@ -221,7 +254,7 @@ def _observe_jointly(p: Record, s: Record, u: Record, braking: bool, dt: float) 
         for i in range(4):
             joint.p[MU + i, MU + i] += heat_widening(s.discs, i) ** 2
         begin_course(joint)
-    if s.guard.acting:
+    if s.guard.acting or s.friction.held:
         mistrust_wheels(joint)
     update_joint(p, joint, u, s.motion, s.wheel_load.load, s.limiter.pressure, braking, dt)
     if s.application.ended:
@@ -314,6 +347,7 @@ def _publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: i
     y.overruns = u.overruns
     y.worst_lateness_us = u.worst_lateness_us
     y.pressure_demand_valid = 1.0 if p.transmit and mode != STARTING and mode != FAILED else 0.0
+    s.plausibility.sent = 1 if y.pressure_demand_valid > 0.5 else 0
     y.motor_demand_valid = y.pressure_demand_valid if blends(p) else 0.0
     y.decel_demand_total = decel
     y.accel_x_road = s.motion.accel_x

@@ -72,7 +72,8 @@ def _watch_motor(state: Record, inputs: Record, i: int, dt: float) -> None:
     """Find a motor that gives less than its limit and all the last demands promised."""
     asked = min(state.asked[0, i], state.asked[1, i], state.asked[2, i], state.limit[i])
     missing = asked - inputs.value[MOTOR_TORQUE + i]
-    state.short_s[i] = state.short_s[i] + dt if missing > SHORT_SHARE * asked + SHORT_TORQUE else 0.0
+    short = asked > 0.0 and missing > SHORT_SHARE * asked + SHORT_TORQUE
+    state.short_s[i] = state.short_s[i] + dt if short else 0.0
     if state.short_s[i] >= SHORT_S:
         state.lost[i] = 1
 

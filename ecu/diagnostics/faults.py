@@ -30,6 +30,7 @@ BRAKE_FADE: Final = 1 << 11
 WHEEL_SLIPS: Final = 1 << 12
 ACCUMULATOR_LOW: Final = 1 << 13
 WHEEL_SPEED_IMPLAUSIBLE: Final = 1 << 14
+ACCEL_IMPLAUSIBLE: Final = 1 << 15
 BUS_OFF: Final = 1 << 16
 ERROR_PASSIVE: Final = 1 << 17
 FOREIGN_SENDER: Final = 1 << 18
@@ -37,6 +38,8 @@ SEND_FAILED: Final = 1 << 19
 FRAMES_DROPPED: Final = 1 << 20
 LATE: Final = 1 << 21
 COMPILED: Final = 1 << 22
+MOTOR_SHORT: Final = 1 << 23
+PRESSURE_NOT_FOLLOWING: Final = 1 << 24
 
 FAULTS: Final = (
     Fault(WHEEL_SPEED_LOST, "wheel speed lost", "a wheel speed is stale or invalid", "check the sender of WheelSpeed*"),
@@ -54,6 +57,7 @@ FAULTS: Final = (
     Fault(WHEEL_SLIPS, "wheel slips", "a wheel ran past its tyre's range: its pressure demand is held back", "look at slip in the report; an ABS is not part of this ECU"),
     Fault(ACCUMULATOR_LOW, "accumulator low", "the accumulator holds less than is demanded: the demand is cut to it", "check the hydraulic unit and the sender of HydraulicStatus"),
     Fault(WHEEL_SPEED_IMPLAUSIBLE, "wheel speed implausible", "a wheel that brakes turns faster than the car", "check that wheel's sensor: it may keep an old value"),
+    Fault(ACCEL_IMPLAUSIBLE, "acceleration implausible", "the accelerometer moved against the wheels and the torques of the brakes: its reading is not used", "check the mounting and the supply of the IMU"),
     Fault(BUS_OFF, "bus off", "the CAN controller went off the bus", "check wiring; ip link set DEV type can restart-ms 100"),
     Fault(ERROR_PASSIVE, "error passive", "the CAN controller counts many errors", "check termination and bit rate"),
     Fault(FOREIGN_SENDER, "foreign sender", "someone else sends one of our identifiers", "stop the other sender"),
@@ -61,9 +65,20 @@ FAULTS: Final = (
     Fault(FRAMES_DROPPED, "frames dropped", "the kernel dropped received frames", "check the load of the machine"),
     Fault(LATE, "late", "a cycle missed its deadline", "see `brake-ecu doctor` for real-time rights"),
     Fault(COMPILED, "compiled in operation", "a kernel was compiled after the start", "warm the cache: python -m ecu.warm"),
+    Fault(MOTOR_SHORT, "motor gives less than demanded", "a motor gave less than demanded within the limit that it reports: the linings brake in its place until the brakes are released", "compare motor_demand, motor_torque and motor_limit of that wheel; check the inverter"),
+    Fault(PRESSURE_NOT_FOLLOWING, "pressure does not follow demand", "a calliper pressure is not what was demanded while others are: nothing is learned", "check that wheel's pressure sensor and valve, and the receiver of PressureDemand*"),
 )  # fmt: skip
 
-DEGRADING: Final = WHEEL_SPEED_LOST | IMU_LOST | PRESSURE_LOST | PEDAL_LOST | BUS_OFF | FOREIGN_SENDER
+DEGRADING: Final = (
+    WHEEL_SPEED_LOST
+    | IMU_LOST
+    | PRESSURE_LOST
+    | PEDAL_LOST
+    | ACCEL_IMPLAUSIBLE
+    | BUS_OFF
+    | FOREIGN_SENDER
+    | PRESSURE_NOT_FOLLOWING
+)
 
 
 def fault_names(mask: int) -> list[str]:

@@ -57,6 +57,7 @@ FRICTION_STATE = np.dtype(
         ("kept_mu", "f8", (2, 4)),  # snapshots: the newer in row 0
         ("kept_sigma", "f8", (2, 4)),
         ("kept_s", "f8"),  # age of the newer one [s]
+        ("held", "u1"),  # a signal became implausible, or a pressure is: what was learned last goes back
         ("slipping", "u1"),  # a wheel has left the linear range
         ("reset", "u1"),  # a filter met a value that is not finite
     ],
@@ -193,7 +194,7 @@ def update_friction(
 ) -> None:
     """Overwrite friction, its standard deviation and mode of every corner."""
     _guard_slip(state, wheels, application, dt)
-    hold_all = _hold_all(inputs, state.torque) or state.slipping != 0
+    hold_all = _hold_all(inputs, state.torque) or state.slipping != 0 or state.held != 0
     state.reset = 0
     asked = requested_decel(params, inputs)
     noise = process_noise(asked if math.isfinite(asked) else -motion.accel_x, speed.speed)

@@ -20,6 +20,7 @@ from brakelab.closed_loop import Drive, new_loop, run
 from brakelab.rig.faults import Fault
 from brakelab.scenario import Phase, Scenario
 from ecu.config import load_config
+from ecu.diagnostics.faults import MOTOR_SHORT
 from ecu.resources import resource
 from ecu.signals import CORNERS
 
@@ -78,6 +79,29 @@ def test_linings_make_up_for_lost_motors_within_250_ms(scenario: Scenario, share
         assert found.within_ms <= 250.0
         assert found.missing < 0.1  # never less than what the linings gave before
         assert found.above < 2.5
+
+
+@pytest.mark.parametrize(
+    ("scenario", "armed", "after"),
+    [
+        (faulty(GONE, HIDDEN), True, 0.06),
+        (faulty(GONE, HIDDEN), False, None),  # a shadow asks nobody
+        (faulty(GONE), True, None),  # a motor that says so is not short
+        (faulty(MUTE), True, None),
+        (shipped("hand-over"), True, None),
+        (shipped("charge-limit"), True, None),
+    ],
+    ids=["limit told as before", "shadow", "limit 0 is told", "frames stop", "sound", "battery takes less"],
+)
+def test_a_motor_that_gives_less_than_its_limit_promises_is_told(scenario, armed, after) -> None:
+    for share in (0.2, 0.8, 1.0):
+        result = drive(scenario, share, armed=armed)
+        told = result.t[(result.outputs["active_faults"].astype(int) & MOTOR_SHORT) != 0]
+        assert bool(len(told)) == (after is not None), share
+        if after is not None:
+            print(f"f = {share}: after {1e3 * (told[0] - LOSS):.0f} ms")
+            assert LOSS < told[0] < LOSS + after
+            assert told[-1] > result.t[-1] - 0.2  # until the brakes are released
 
 
 def test_motors_that_only_fall_silent_hand_over_smoothly() -> None:

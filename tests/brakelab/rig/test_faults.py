@@ -15,7 +15,7 @@ from ecu.diagnostics import faults as bits
 from ecu.errors import UserError
 from ecu.records import FRAME, new_record
 from ecu.resources import resource
-from ecu.signals import CORNERS
+from ecu.signals import CORNERS, DEGRADED, HOLDING
 
 ROOT = Path(__file__).parents[3]
 CONFIG = load_config(ROOT / "config" / "suv.toml")
@@ -175,6 +175,38 @@ def test_a_signal_is_spoilt_as_asked(
     print(f"{name}: {error.mean():.3f} ± {error.std():.3f}")
     assert error.mean() == pytest.approx(shift, abs=4 * spread / 10 + 0.01)
     assert error.std() == pytest.approx(spread, rel=0.25)
+
+
+@pytest.mark.parametrize(
+    ("signal", "amount", "keys", "bit", "after"),
+    [
+        ("accel_x", 0.7, "", bits.ACCEL_IMPLAUSIBLE, 0.4),
+        ("accel_x", -0.7, "", bits.ACCEL_IMPLAUSIBLE, 0.4),
+        ("accel_x", 0.7, "motor_share = 0.5", bits.ACCEL_IMPLAUSIBLE, 0.4),
+        ("accel_x", 0.15, "", 0, 0.0),
+        ("calliper_pressure_fl", 20.0, "", bits.PRESSURE_NOT_FOLLOWING, 0.45),
+        ("calliper_pressure_fl", 3.0, "", 0, 0.0),
+    ],
+)
+def test_a_sensor_that_contradicts_the_others_is_told_and_not_followed(
+    tmp_path: Path, signal: str, amount: float, keys: str, bit: int, after: float
+) -> None:
+    fault = f'kind = "biased"\nsignal = ["{signal}"]\namount = {amount}'
+    _, drive = driven(tmp_path, fault, keys)
+    assert raised(drive, 0.0, 2.0) == 0
+    assert raised(drive, 2.0 + after, 3.0) == bit
+    assert raised(drive, 3.6, 3.9) == 0
+    if not bit:
+        return
+    within = rows(drive, 2.0 + after, 3.0)
+    assert np.all(drive.outputs["mode"][within] == DEGRADED)
+    error = drive.outputs["mu_b_fl"][within] / drive.truth["mu_b_fl"][within] - 1.0
+    decel = -np.polyfit(drive.t[within], drive.truth["vehicle_speed"][within], 1)[0]
+    print(f"friction off by {error.min():+.1%} to {error.max():+.1%}, deceleration {decel:.2f} m/s^2")
+    assert np.abs(error).max() < 0.13  # 0.7 m/s^2 are 17 %
+    assert decel == pytest.approx(4.0, rel=0.06)  # braking goes on
+    held = np.all(drive.outputs["mode_fl"][within] == HOLDING)
+    assert held == (bit == bits.PRESSURE_NOT_FOLLOWING)  # without the accelerometer the slip still tells
 
 
 def test_motors_fail_and_come_back(tmp_path: Path) -> None:

@@ -171,6 +171,15 @@ def test_a_motor_that_gives_too_little_is_planned_for_no_longer(params, feed, gi
     assert motors.settle(900.0)[0] == pytest.approx(630.0)  # tried again
 
 
+def test_a_motor_that_drove_until_the_brakes_are_asked_for_is_not_short(params, feed) -> None:
+    motors = Motors(params, feed, 0.7, 1350.0)
+    for _ in range(100):
+        motors.cycle(0.0, motor_torque=-900.0)
+    motors.cycle(900.0, motor_torque=-900.0)
+    assert motors.settle(900.0)[0] == pytest.approx(630.0)
+    assert not motors.state["lost"].any()
+
+
 def test_the_hydraulics_do_not_overshoot_when_a_motor_is_lost(params, feed) -> None:
     """(A.17) solved by scipy: a plain step of 630 N m would overshoot by 5.6 % and settle after 0.18 s."""
     motors = Motors(params, feed, 0.7, 1350.0)

@@ -1,11 +1,13 @@
-"""A wheel that brakes and turns faster than the car: said after 0.3 s, of nothing else."""
+"""A wheel that brakes and turns faster than the car, a pressure apart from its demand: said after 0.3 s."""
+
+from typing import Any
 
 import numpy as np
 import pytest
 
 from ecu.estimation.motion import MOTION_STATE
-from ecu.monitoring.plausibility import PLAUSIBILITY_STATE, wheel_speed_implausible
-from ecu.signals import MOTOR_TORQUE, WHEEL_SPEED
+from ecu.monitoring.plausibility import PLAUSIBILITY_STATE, watch_pressures, wheel_speed_implausible
+from ecu.signals import CALLIPER_PRESSURE, MOTOR_TORQUE, WHEEL_SPEED
 
 CASES = [
     # what, turns over ground, brake torque [N m], motor torque [N m], car's speed [m/s], implausible
@@ -47,3 +49,61 @@ def test_a_wheel_that_brakes_is_not_faster_than_the_car(
     assert any(said) == implausible
     if implausible:
         assert said.index(True) == pytest.approx(30, abs=1)
+
+
+PRESSURES: list[tuple[str, list[float], list[float], dict[str, Any], bool]] = [
+    # what, demanded [bar], measured [bar], beside it, does not follow
+    ("all follow", [30, 30, 12, 12], [30, 30, 12, 12], {}, False),
+    ("as far as the model goes", [60, 60, 20, 20], [48, 72, 24, 16], {}, False),
+    ("one keeps its value", [0, 0, 0, 0], [30, 0, 0, 0], {}, True),
+    ("one does not rise", [30, 30, 12, 12], [30, 0, 12, 12], {}, True),
+    ("an axle does not rise", [30, 30, 12, 12], [0, 0, 12, 12], {}, True),
+    ("the car's own hydraulics brake", [30, 30, 30, 30], [0, 0, 0, 0], {}, False),
+    ("a shadow", [30, 30, 12, 12], [30, 0, 12, 12], {"sent": 0}, False),
+    ("an ABS works", [30, 30, 12, 12], [30, 0, 12, 12], {"abs_active": 1.0}, False),
+    ("ESP works", [0, 0, 0, 0], [30, 0, 0, 0], {"esp_active": 1.0}, False),
+    ("the sensor is lost", [30, 30, 12, 12], [30, 0, 12, 12], {"lost": 1}, False),
+]
+
+
+@pytest.mark.parametrize(
+    ("what", "demanded", "measured", "beside", "apart"), PRESSURES, ids=lambda value: str(value)[:24]
+)
+def test_a_pressure_follows_its_demand_if_any_does(
+    feed, what: str, demanded: list[float], measured: list[float], beside: dict[str, Any], apart: bool
+) -> None:
+    rng, zero = np.random.default_rng(3), np.full(4, 0.7)
+    state = np.zeros(1, PLAUSIBILITY_STATE)[0]
+    state["sent"] = beside.get("sent", 1)
+    inputs = feed(**{name: value for name, value in beside.items() if name.endswith("active")})
+    if "lost" in beside:
+        inputs[0]["verdict"][CALLIPER_PRESSURE + 1] = 0
+    said = []
+    for _ in range(60):
+        feed(inputs, calliper_pressure=measured + zero + rng.normal(0.0, 1.8, 4))
+        watch_pressures(state, inputs[0], np.array(demanded, float), zero, 0.01)
+        said.append(bool(state["pressure"]))
+    assert any(said) == apart
+    if apart:
+        assert said.index(True) == pytest.approx(30, abs=1)
+
+
+def test_noise_of_6_bar_is_no_pressure_that_does_not_follow(feed) -> None:
+    rng, state = np.random.default_rng(3), np.zeros(1, PLAUSIBILITY_STATE)[0]
+    state["sent"], inputs = 1, feed()
+    for _ in range(20_000):
+        feed(inputs, calliper_pressure=30.0 + rng.normal(0.0, 6.0, 4))
+        watch_pressures(state, inputs[0], np.full(4, 30.0), np.zeros(4), 0.01)
+        assert not state["pressure"]
+
+
+def test_a_pressure_that_follows_again_is_believed_again(feed) -> None:
+    state, inputs = np.zeros(1, PLAUSIBILITY_STATE)[0], feed()
+    state["sent"] = 1
+    said = []
+    for k in range(1000):
+        feed(inputs, calliper_pressure=[0.0 if k < 600 else 30.0, 30.0, 12.0, 12.0])
+        watch_pressures(state, inputs[0], np.array([30.0, 30.0, 12.0, 12.0]), np.zeros(4), 0.01)
+        said.append(bool(state["pressure"]))
+    assert said[599]
+    assert not any(said[632:])
