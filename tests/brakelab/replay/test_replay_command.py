@@ -84,7 +84,7 @@ def test_frames_and_signals_of_one_drive_tell_the_same(tmp_path: Path) -> None:
     ("first", "stated"), [(0.0, "1700000000000000000"), (7.0, "1700000000000000000"), (0.0, "")]
 )
 def test_the_date_of_a_signal_file_is_kept(tmp_path: Path, first: float, stated: str) -> None:
-    """`start_time_ns` is the date of the first row, as our own files state it; else there is none."""
+    """`start_time_ns` is the date of the first row; a file without a date gives none."""
     path = stop(tmp_path / "stop.parquet", first)
     if stated:
         table = pq.read_table(path).replace_schema_metadata({"start_time_ns": stated})
