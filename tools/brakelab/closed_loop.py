@@ -63,10 +63,8 @@ from ecu.step import new_state, step
 
 START_NS: Final = 1_700_000_000_000_000_000
 """T_0 of every simulation on the real-time clock."""
-SPACING_NS: Final = 10_000
-"""Between frames of one burst."""
-CHUNK: Final = 1000
-"""Cycles that one call of the kernel runs at most."""
+SPACING_NS: Final = 10_000  # between frames of one burst
+CHUNK: Final = 1000  # cycles that one call of the kernel runs at most
 VEHICLE_BUS: Final = "can0"
 
 
@@ -134,16 +132,12 @@ class Drive(NamedTuple):
 
 
 class Block(NamedTuple):
-    """Some cycles of a drive, a row for each."""
+    """Some cycles of a `Drive`, a row each, of shape (n, N_INPUTS), (n, N_OUTPUTS), (n, N_TRUTH); frames."""
 
     decoded: NDArray[np.float64]
-    """`INPUT_SIGNALS` as the ECU decoded them, NaN where no new sample arrived; shape (n, N_INPUTS)."""
     outputs: NDArray[np.float64]
-    """Shape (n, N_OUTPUTS)."""
     truth: NDArray[np.float64]
-    """Shape (n, N_TRUTH)."""
     frames: RecordArray
-    """As in `Drive`."""
 
 
 @cache
@@ -288,7 +282,7 @@ def _start_anew(sides: Sides) -> None:
 def run_blocks(loop: Loop, seconds: float = LONGEST, told: Told | None = None) -> Iterator[Block]:
     """Run a new loop as `run` does, yielding blocks of its cycles: the next one overwrites the arrays."""
     told, sides = told or Told(), loop.sides
-    rows_of = tuple(np.empty((CHUNK, width)) for width in (N_INPUTS, N_OUTPUTS, N_TRUTH))
+    decoded, outputs, truth = (np.empty((CHUNK, width)) for width in (N_INPUTS, N_OUTPUTS, N_TRUTH))
     kept = new_record(FRAME, CHUNK * 2 * (len(sides.vehicle_frames) + len(sides.ecu_frames)))
     first, last, running = 0, round(seconds * 1e9 / CYCLE_NS), True
     deaths = killed(sides.vehicle.faults)
@@ -299,10 +293,9 @@ def run_blocks(loop: Loop, seconds: float = LONGEST, told: Told | None = None) -
             continue
         alive = not deaths or first < deaths[0].begin
         until = (deaths[0].begin if alive else deaths[0].end) if deaths else last
-        decoded, outputs, truth = (rows[: min(CHUNK, last - first, until - first)] for rows in rows_of)
-        done, count, running = _run(
-            plans(), sides, loop.noise, told, alive, first, decoded, outputs, truth, kept
-        )
+        size = min(CHUNK, last - first, until - first)
+        rows = decoded[:size], outputs[:size], truth[:size]
+        done, count, running = _run(plans(), sides, loop.noise, told, alive, first, *rows, kept)
         yield Block(decoded[:done], outputs[:done], truth[:done], kept[:count])
         first += done
 
@@ -314,8 +307,8 @@ def run(loop: Loop, ideal: bool = False, seconds: float = LONGEST, told: Told | 
     `told`: another one. Where the scenario kills the daemon, its outputs are NaN until it, or its standby,
     sends again.
     """
-    told = told or Told(1.0 if ideal else 0.0)
-    blocks = [tuple(values.copy() for values in block) for block in run_blocks(loop, seconds, told)]
+    running = run_blocks(loop, seconds, told or Told(1.0 if ideal else 0.0))
+    blocks = [tuple(map(np.copy, block)) for block in running]
     decoded, outputs, truth, frames = (np.concatenate(values) for values in zip(*blocks, strict=True))
     return Drive(
         np.arange(len(truth), dtype=np.float64) * (1e-9 * CYCLE_NS),
@@ -334,14 +327,11 @@ def write_columns(
     for name, column in columns.items():
         if not np.all(np.isnan(column)):
             arrays[name] = pa.array(column, from_pandas=True)
-    table = pa.table(arrays).replace_schema_metadata(metadata)
-    pq.write_table(table, path, compression="zstd")
+    pq.write_table(pa.table(arrays).replace_schema_metadata(metadata), path, compression="zstd")
 
 
 def simulate(scenario: Path, config: Path, out: Path, seed: int = 0) -> int:
-    """Run a scenario with the ECU of `config` and write OUT.log, OUT.parquet and OUT.truth.parquet.
-
-    The simulated ECU is armed. Returns the exit code.
+    """Run a scenario with the ECU of `config`, armed; write OUT.log, OUT.parquet, OUT.truth.parquet.
 
     Raises:
         UserError: a file cannot be read, is wrong, or cannot be written.
