@@ -8,7 +8,6 @@ actuators and on the frames of both directions.
 """
 
 import argparse
-import gc
 import os
 import signal
 import sys
@@ -45,6 +44,7 @@ from ecu.bus.transmit import Transmission, frame_buffer, new_transmission, trans
 from ecu.clock import Grid, TimeSource, system_time
 from ecu.errors import UserError
 from ecu.jit import kernel
+from ecu.realtime import settle
 from ecu.records import FRAME, RecordArray
 from ecu.resources import SCENARIOS, named
 from ecu.signals import CYCLE_NS, N_OUTPUTS
@@ -216,8 +216,7 @@ def warm_up(scenario: Scenario) -> None:
 
 def _ask_for_priority() -> None:
     """Be woken in time where the machine grants it, but after the ECU: a vehicle does not wait for others."""
-    gc.collect()
-    gc.freeze()
+    settle()
     with suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
 
