@@ -1,8 +1,9 @@
 """Real-time rights for what stands in for a vehicle on a bus."""
 
-import gc
 import os
 from typing import Final
+
+from ecu.realtime import settle
 
 PRIORITY: Final = 10
 """SCHED_FIFO, below the daemon's: a vehicle does not wait for others, and the ECU does not wait for it."""
@@ -11,10 +12,9 @@ PRIORITY: Final = 10
 def ask_for_priority() -> str:
     """Be woken in time where the machine grants it; return why it does not, "" if it does.
 
-    What is alive now is frozen, which keeps the garbage collector short: call it after the preparations.
+    What is alive now settles (`ecu.realtime`): call it after the preparations.
     """
-    gc.collect()
-    gc.freeze()
+    settle()
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
     except (OSError, AttributeError) as error:
