@@ -22,7 +22,7 @@ from ecu.control.blending import (
 from ecu.control.demand import DEMAND_STATE, update_demand
 from ecu.control.distribution import DISTRIBUTION_STATE, cap_rear, distribute, watch_rear
 from ecu.control.friction_torque import FRICTION_TORQUE_STATE, follow_pressure, lagging_torque
-from ecu.control.limiter import LIMITER_STATE, available_pressure, limit_pressure
+from ecu.control.limiter import LIMITER_STATE, available_pressure, limit_pressure, reads_empty
 from ecu.control.mode import MODE_STATE, decide_mode, input_faults
 from ecu.control.pressure_law import (
     PRESSURE_LAW_STATE,
@@ -85,7 +85,7 @@ from ecu.estimation.slip import (
 from ecu.estimation.speed import SPEED_STATE, update_speed
 from ecu.estimation.wheel_load import WHEEL_LOAD_STATE, update_wheel_load
 from ecu.jit import Record, kernel
-from ecu.monitoring.acceleration import ACCELERATION_STATE, watch_acceleration
+from ecu.monitoring.acceleration import ACCELERATION_STATE, GREATEST_ACCEL, watch_acceleration
 from ecu.monitoring.application import APPLICATION_STATE, update_application
 from ecu.monitoring.disc_temperature import (
     DISC_STATE,
@@ -94,10 +94,15 @@ from ecu.monitoring.disc_temperature import (
     start_discs,
     update_discs,
 )
-from ecu.monitoring.plausibility import PLAUSIBILITY_STATE, watch_pressures, wheel_speed_implausible
+from ecu.monitoring.plausibility import (
+    PLAUSIBILITY_STATE,
+    watch_pressures,
+    watch_wheels,
+    wheel_speed_implausible,
+)
 from ecu.params import BAR, JOINT, OBSERVER1
 from ecu.records import INPUTS, LEARNED, RecordArray
-from ecu.signals import ACCEL_X, CALLIPER_PRESSURE, FAILED, STARTING
+from ecu.signals import ACCEL_X, CALLIPER_PRESSURE, FAILED, STARTING, WHEEL_SPEED
 
 STATE = np.dtype(
     [
@@ -173,25 +178,19 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
     p, s, u, y = params[0], state[0], inputs[0], outputs[0]
     dt = 1e-9 * u.dt_ns
     faults = u.bus_faults | input_faults(p, u) | _watch_sensors(p, s, u, dt)
-    if s.acceleration.implausible:
-        s.trusted = u
-        s.trusted.verdict[ACCEL_X] = s.trusted.new[ACCEL_X] = 0
-        u = s.trusted
+    _leave_out(s, u)
+    u = s.trusted
     _estimate(p, s, u, dt)
     update_discs(
         p, s.discs, s.learned, u, s.friction, s.application, s.wheel_load.load,
         total_tyre_force(p, s.motion, s.speed.speed), s.speed.speed, dt,
     )  # fmt: skip
     decel = _control(p, s, u, y, dt)
-    if s.speed.started and wheel_speed_implausible(
-        p, s.plausibility, u, s.motion, s.speed.speed, s.friction.torque, dt
-    ):
-        faults |= WHEEL_SPEED_IMPLAUSIBLE
     if s.friction.reset:
         faults |= FILTER_RESET
     if s.limiter.limited:
         faults |= DEMAND_LIMITED
-    if s.limiter.starved:
+    if s.limiter.starved or reads_empty(u):
         faults |= ACCUMULATOR_LOW
     if s.guard.acting:
         faults |= WHEEL_SLIPS
@@ -215,6 +214,9 @@ def _watch_sensors(p: Record, s: Record, u: Record, dt: float) -> int:
             p, s.acceleration, u, s.motion, s.friction, s.control.base, s.speed.speed,
             s.application.braking != 0, dt,
         )  # fmt: skip
+        watch_wheels(p, s.plausibility, u, s.motion, s.speed.speed, s.friction.torque, dt)
+        if wheel_speed_implausible(p, s.plausibility, u, s.motion, s.speed.speed, s.friction.torque, dt):
+            faults |= WHEEL_SPEED_IMPLAUSIBLE
     if s.acceleration.implausible:
         faults |= ACCEL_IMPLAUSIBLE
     begins = s.acceleration.implausible != 0 and not doubted
@@ -223,6 +225,22 @@ def _watch_sensors(p: Record, s: Record, u: Record, dt: float) -> int:
         faults |= PRESSURE_NOT_FOLLOWING
     s.friction.held = 1 if s.plausibility.pressure or begins else 0
     return faults
+
+
+@kernel
+def _leave_out(s: Record, u: Record) -> None:
+    """Overwrite the trusted inputs: `u` without what is implausible."""
+    s.trusted = u
+    if s.acceleration.implausible or abs(u.value[ACCEL_X]) > GREATEST_ACCEL:
+        _distrust(s.trusted, ACCEL_X)
+    for i in range(4):
+        if s.plausibility.fell[i]:
+            _distrust(s.trusted, WHEEL_SPEED + i)
+
+
+@kernel
+def _distrust(inputs: Record, place: int) -> None:
+    inputs.verdict[place] = inputs.new[place] = 0
 
 
 @kernel

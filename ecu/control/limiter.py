@@ -39,16 +39,21 @@ EMPTY = 10.0 * BAR  # far below the gas pressure of any accumulator
 
 
 @kernel
+def reads_empty(inputs: Record) -> bool:
+    """Return whether an accumulator tells a pressure at which nothing would brake."""
+    told: bool = usable(inputs, ACCUMULATOR_PRESSURE)
+    return told and BAR * inputs.value[ACCUMULATOR_PRESSURE] <= EMPTY
+
+
+@kernel
 def available_pressure(params: Record, inputs: Record) -> float:
     """Return the highest pressure [Pa] that the hydraulics can give: the accumulator's, where it is known.
 
     One that reads empty limits nothing: if it is, there is nothing to hold back; if the sensor lies, all is.
     """
     available: float = params.max_pressure
-    if usable(inputs, ACCUMULATOR_PRESSURE):
-        accumulator = BAR * inputs.value[ACCUMULATOR_PRESSURE]
-        if EMPTY < accumulator < available:
-            available = accumulator
+    if usable(inputs, ACCUMULATOR_PRESSURE) and not reads_empty(inputs):
+        available = min(BAR * inputs.value[ACCUMULATOR_PRESSURE], available)
     return available
 
 

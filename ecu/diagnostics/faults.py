@@ -55,8 +55,8 @@ FAULTS: Final = (
     Fault(MOTOR_TORQUE_LOST, "motor torque lost", "a motor torque came before and is stale: its wheel learns nothing", "check the sender of Motor*"),
     Fault(BRAKE_FADE, "compensation at its limit", "friction more than 30 % below its base, or a pressure that cannot be had: the car brakes less than the pedal asks for", "brake earlier and let the brakes cool; look at the linings and at friction in the report"),
     Fault(WHEEL_SLIPS, "wheel slips", "a wheel ran past its tyre's range: its pressure demand is held back", "look at slip in the report; an ABS is not part of this ECU"),
-    Fault(ACCUMULATOR_LOW, "accumulator low", "the accumulator holds less than is demanded: the demand is cut to it", "check the hydraulic unit and the sender of HydraulicStatus"),
-    Fault(WHEEL_SPEED_IMPLAUSIBLE, "wheel speed implausible", "a wheel that brakes turns faster than the car", "check that wheel's sensor: it may keep an old value"),
+    Fault(ACCUMULATOR_LOW, "accumulator low", "the accumulator holds less than is demanded: the demand is cut to it; one that reads below 10 bar cuts nothing", "check the hydraulic unit and the sender of HydraulicStatus"),
+    Fault(WHEEL_SPEED_IMPLAUSIBLE, "wheel speed implausible", "a wheel that brakes turns faster than the car, or its speed fell faster than a wheel's can: then it is left out", "check that wheel's sensor and its wires"),
     Fault(ACCEL_IMPLAUSIBLE, "acceleration implausible", "the accelerometer moved against the wheels and the torques of the brakes: its reading is not used", "check the mounting and the supply of the IMU"),
     Fault(BUS_OFF, "bus off", "the CAN controller went off the bus", "check wiring; ip link set DEV type can restart-ms 100"),
     Fault(ERROR_PASSIVE, "error passive", "the CAN controller counts many errors", "check termination and bit rate"),
@@ -66,7 +66,7 @@ FAULTS: Final = (
     Fault(LATE, "late", "a cycle missed its deadline", "see `brake-ecu doctor` for real-time rights"),
     Fault(COMPILED, "compiled in operation", "a kernel was compiled after the start", "warm the cache: python -m ecu.warm"),
     Fault(MOTOR_SHORT, "motor gives less than demanded", "a motor gave less than demanded within the limit that it reports: the linings brake in its place until the brakes are released", "compare motor_demand, motor_torque and motor_limit of that wheel; check the inverter"),
-    Fault(PRESSURE_NOT_FOLLOWING, "pressure does not follow demand", "a calliper pressure is not what was demanded while others are: nothing is learned", "check that wheel's pressure sensor and valve, and the receiver of PressureDemand*"),
+    Fault(PRESSURE_NOT_FOLLOWING, "pressure does not follow demand", "a calliper pressure is not what was demanded while the three others are: nothing is learned", "check that wheel's pressure sensor and valve, and the receiver of PressureDemand*"),
 )  # fmt: skip
 
 DEGRADING: Final = (

@@ -67,6 +67,7 @@ ROLLING = 0.06  # of the speed, that a rolling wheel differs by at most
 LEAST = 0.25  # m/s^2
 SLIP, SLIP_BY_SPEED = 0.1, 0.01  # -, s/m
 FORCE = 0.3  # friction may be wrong by so much
+GREATEST_ACCEL = 15.0  # m/s^2: no tyre on a road holds more
 SLOPE = 2.0  # m/s^2, of a slope of 20 %
 DENIED = 1.0  # m/s^2
 SECOND = 10  # blocks

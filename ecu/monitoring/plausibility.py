@@ -4,19 +4,28 @@ A wheel that brakes does not turn faster than the car. A sensor that keeps its l
 soon as the car slows down; its frames are new, intact and on time. A wheel that is slower than the car may
 slide, so nothing is said of it.
 
-A pressure follows the demands that were sent (`control/friction_torque.py` models how) if any does. Where all
-four do not, somebody else brakes, or nobody listens: nothing is said of a sensor or a valve then.
+A wheel whose speed falls by more than its brake could make it has no wheel behind that reading: wires break
+to 0. It is left out until it agrees with the car again, or the car stands.
+
+A pressure follows the demands that were sent (`control/friction_torque.py` models how) if the three others
+do. Where more than one does not, somebody else brakes, or nobody listens: nothing is said of a sensor or a
+valve then.
 """
+
+import math
 
 import numpy as np
 
-from ecu.estimation.motion import corner_speed, motor_torque, usable
+from ecu.estimation.motion import corner_speed, fresh, motor_torque, usable
 from ecu.jit import Record, kernel
 from ecu.signals import ABS_ACTIVE, CALLIPER_PRESSURE, ESP_ACTIVE, WHEEL_SPEED
 
 PLAUSIBILITY_STATE = np.dtype(
     [
         ("for_s", "f8", (4,)),  # a wheel has been too fast for this long
+        ("omega", "f8", (4,)),  # last sample of a wheel [rad/s]
+        ("age_s", "f8", (4,)),  # of it
+        ("fell", "u1", (4,)),  # faster than a wheel can
         ("apart_s", "f8", (4,)),  # a pressure has not been what was demanded, longer than it was
         ("pressure", "u1"),  # one has been for too long
         ("sent", "u1"),  # the last demands were valid
@@ -28,20 +37,24 @@ FASTER = 1.05  # than the ground below it: radii, curves and the car's speed are
 BRAKED = 100.0  # N m
 LEAST_SPEED = 5.0  # m/s
 DOUBT_S = 0.3
-ALL = 0b1111
+FALL, FALL_SHARE = 8.0, 3.0  # rad/s, of what the brake's torque does to the free wheel
+OLDEST_S = 0.1  # of a sample that the next is compared with
+ROLLING = 0.06  # of the speed, that a rolling wheel differs by at most
+STANDSTILL = 0.1  # m/s
 APART, APART_SHARE = 8.0, 0.2  # bar, of the pressure: noise, and what the model of the hydraulics leaves
+FOLLOWS = 0.75  # of that
 
 
 @kernel
 def wheel_speed_implausible(
     params: Record, state: Record, inputs: Record, motion: Record, speed: float, torque: Record, dt: float
 ) -> bool:
-    """Return whether a wheel has been too fast for `DOUBT_S`.
+    """Return whether a wheel has been too fast for `DOUBT_S`, or has fallen too fast.
 
     Args:
         params: `PARAMS`.
         state: `PLAUSIBILITY_STATE`, overwritten.
-        inputs: `INPUTS`.
+        inputs: `INPUTS`, as they came.
         motion: `MOTION_STATE`.
         speed: of the car [m/s].
         torque: of the linings, shape (4,) [N m], >= 0.
@@ -49,6 +62,7 @@ def wheel_speed_implausible(
     """
     found = False
     for i in range(4):
+        found = found or state.fell[i] != 0
         ground = corner_speed(params, motion, speed, i)
         turns = inputs.value[WHEEL_SPEED + i] * params.wheel_radius[i]
         braked = torque[i] > BRAKED and motor_torque(inputs, i) >= 0.0
@@ -59,10 +73,36 @@ def wheel_speed_implausible(
 
 
 @kernel
-def _apart(inputs: Record, i: int, expected: float, zero: float) -> bool:
+def watch_wheels(
+    params: Record, state: Record, inputs: Record, motion: Record, speed: float, torque: Record, dt: float
+) -> None:
+    """Overwrite `state.fell`: whose speed has fallen faster than a wheel's can.
+
+    Arguments as for `wheel_speed_implausible`.
+    """
+    for i in range(4):
+        state.age_s[i] += dt
+        if fresh(inputs, WHEEL_SPEED + i):
+            omega = inputs.value[WHEEL_SPEED + i]
+            braked = torque[i] + abs(motor_torque(inputs, i))
+            possible = FALL + FALL_SHARE * braked / params.wheel_inertia[i] * state.age_s[i]
+            ground = corner_speed(params, motion, speed, i)
+            known = state.age_s[i] < OLDEST_S and usable(inputs, CALLIPER_PRESSURE + i)
+            if known and state.omega[i] - omega > possible:
+                state.fell[i] = 1
+            elif abs(omega * params.wheel_radius[i] - ground) < ROLLING * ground:
+                state.fell[i] = 0
+            state.omega[i], state.age_s[i] = omega, 0.0
+        if speed < STANDSTILL:
+            state.fell[i] = 0
+
+
+@kernel
+def _gap(inputs: Record, i: int, expected: float, zero: float) -> float:
+    """Return how far a pressure is from what is expected of it, over what is too far; NaN: not known."""
     place = CALLIPER_PRESSURE + i
-    gap = abs(inputs.value[place] - zero - expected)
-    return usable(inputs, place) and gap > APART + APART_SHARE * expected
+    gap = abs(inputs.value[place] - zero - expected) / (APART + APART_SHARE * expected)
+    return gap if usable(inputs, place) else math.nan
 
 
 @kernel
@@ -77,15 +117,14 @@ def watch_pressures(state: Record, inputs: Record, expected: Record, zero: Recor
         dt: time since the last cycle [s].
     """
     others = inputs.value[ABS_ACTIVE] > 0.5 or inputs.value[ESP_ACTIVE] > 0.5
-    apart = 0
+    following = 0
     for i in range(4):
-        if _apart(inputs, i, expected[i], zero[i]):
-            apart |= 1 << i
+        following += 1 if _gap(inputs, i, expected[i], zero[i]) < FOLLOWS else 0
     state.pressure = 0
     for i in range(4):
-        if state.sent == 0 or others or apart == ALL:
+        if state.sent == 0 or others:
             state.apart_s[i] = 0.0
-        elif apart >> i & 1:
+        elif following == 3 and _gap(inputs, i, expected[i], zero[i]) > 1.0:
             state.apart_s[i] = min(state.apart_s[i] + dt, 2.0 * DOUBT_S)
         else:
             state.apart_s[i] = max(state.apart_s[i] - dt, 0.0)

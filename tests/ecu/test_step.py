@@ -89,6 +89,7 @@ class Car:
             pedal_position=pedal,
             pedal_pressed=float(pedal > 1),
             hydraulic_ready=1.0,
+            accumulator_pressure=180.0,
             motor_torque=0.0,
             accel_y=0.0,
             yaw_rate=0.0,

@@ -173,11 +173,11 @@ def publish_friction(
         if _at_bound(ratio):
             variance = max(variance, params.sigma_mu_initial**2)
         friction.mu[i], friction.sigma[i] = mu, mu * math.sqrt(variance)
-        if braking and state.observed[i]:
+        good = usable(inputs, WHEEL_SPEED + i) and usable(inputs, CALLIPER_PRESSURE + i)
+        if braking and state.observed[i] and good:
             friction.observed_s[i] += dt
             state.way[i] += state.x[V] * dt
             state.course[i] += mu * state.x[V] * dt
             friction.mode[i] = OBSERVING
         else:
-            good = usable(inputs, WHEEL_SPEED + i) and usable(inputs, CALLIPER_PRESSURE + i)
             friction.mode[i] = resting_mode(params, friction, learned, good, i)

@@ -53,6 +53,7 @@ from ecu.params import BAR
 from ecu.signals import (
     ABS_ACTIVE,
     ACCEL_X,
+    CALLIPER_PRESSURE,
     ESP_ACTIVE,
     REVERSE,
     WHEEL_SPEED,
@@ -99,6 +100,13 @@ def _start_speed(params: Record, state: Record, inputs: Record) -> None:
 
 
 @kernel
+def _axle_unknown(inputs: Record, left: int) -> bool:
+    """Return whether neither pressure of an axle is usable: one alone stands for both."""
+    pressure = CALLIPER_PRESSURE + left
+    return not (usable(inputs, pressure) or usable(inputs, pressure + 1))
+
+
+@kernel
 def _learning_forbidden(params: Record, state: Record, inputs: Record, braking: bool) -> bool:
     value, w = inputs.value, state.window
     motors, brakes = 0.0, 0.0
@@ -106,7 +114,8 @@ def _learning_forbidden(params: Record, state: Record, inputs: Record, braking: 
         motors += w.motor[i]
         brakes += brake_torque(params, state, i, w.pressure[i])
     against = braking and (driver_accelerates(inputs) or drives_against(motors, brakes))
-    forbidden: bool = against or value[ABS_ACTIVE] > 0.5 or value[ESP_ACTIVE] > 0.5
+    unknown = braking and (_axle_unknown(inputs, 0) or _axle_unknown(inputs, 2))
+    forbidden: bool = against or unknown or value[ABS_ACTIVE] > 0.5 or value[ESP_ACTIVE] > 0.5
     return forbidden
 
 

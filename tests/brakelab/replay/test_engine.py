@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brakelab.play import contract_bursts
+from brakelab.play_log import contract_frames
 from brakelab.replay import engine
 from brakelab.replay.engine import Rows, new_ecu, run_frames, run_samples
 from brakelab.replay.formats import read_frames
@@ -135,9 +135,9 @@ def drive_frames(tmp_path: Path, seconds: float = 3.0) -> RecordArray:
     )
     random = np.random.default_rng(3)
     frames = []
-    for burst in contract_bursts(path, load_source(None), Findings(path)):
-        block = burst.frames[random.random(len(burst.frames)) > 0.05].copy()
-        block["stamp_ns"] = START_NS + burst.t_ns + np.sort(random.integers(-9_000, 0, len(block))) * 1000
+    for burst in contract_frames(path, load_source(None), Findings(path)):
+        block = burst[random.random(len(burst)) > 0.05].copy()
+        block["stamp_ns"] += START_NS + np.sort(random.integers(-9_000, 0, len(block))) * 1000
         frames.append(block)
     return np.concatenate(frames)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brakelab.play import contract_bursts
+from brakelab.play_log import contract_frames
 from brakelab.replay.command import replay
 from brakelab.replay.engine import new_ecu
 from brakelab.replay.quality import Findings
@@ -37,9 +37,9 @@ def drive(tmp_path: Path) -> RecordArray:
     table = np.transpose([t, *[speed] * 4, *[45.0 * on] * 4, -5.0 * on])
     np.savetxt(path, table, delimiter=",", header=header, comments="")
     frames = []
-    for burst in contract_bursts(path, load_source(None), Findings(path)):
-        block = burst.frames.copy()
-        block["stamp_ns"] = START_NS + burst.t_ns + np.arange(len(block)) * 200_000
+    for burst in contract_frames(path, load_source(None), Findings(path)):
+        block = burst.copy()
+        block["stamp_ns"] += START_NS + np.arange(len(block)) * 200_000
         frames.append(block)
     return np.concatenate(frames)
 

@@ -10,7 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from brakelab.play import contract_bursts
+from brakelab.play_log import contract_frames
 from brakelab.replay.command import replay
 from brakelab.replay.quality import Findings
 from brakelab.replay.source import load_source
@@ -48,9 +48,8 @@ def stop(path: Path, t0: float = 0.0, brakes: float = 4.0) -> Path:
 def frames_of(path: Path, log: Path) -> Path:
     """The signal file as candump text of contract frames."""
     text = b""
-    for burst in contract_bursts(path, load_source(None), Findings(path)):
-        frames = burst.frames.copy()
-        frames["stamp_ns"] = START_NS + burst.t_ns
+    for frames in contract_frames(path, load_source(None), Findings(path)):
+        frames["stamp_ns"] += START_NS
         text += candump_lines(frames, "can0")
     log.write_bytes(text)
     return log

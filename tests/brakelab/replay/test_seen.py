@@ -8,7 +8,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from brakelab.play import contract_bursts
+from brakelab.play_log import contract_frames
 from brakelab.replay.command import replay
 from brakelab.replay.quality import Findings
 from brakelab.replay.seen import new_seen, set_raw_ends
@@ -79,9 +79,8 @@ def test_a_longer_gap_allows_a_larger_step(tmp_path: Path) -> None:
 def test_frames_have_a_rate_and_counters_of_their_own(tmp_path: Path) -> None:
     path, log = signals(tmp_path / "drive.parquet", {}), tmp_path / "drive.log"
     text = b""
-    for burst in contract_bursts(path, load_source(None), Findings(path)):
-        frames = burst.frames.copy()
-        frames["stamp_ns"] = 1_600_000_000_000_000_000 + burst.t_ns
+    for frames in contract_frames(path, load_source(None), Findings(path)):
+        frames["stamp_ns"] += 1_600_000_000_000_000_000
         text += candump_lines(frames, "can0")
     lines = text.splitlines(keepends=True)
     wheel = [place for place, line in enumerate(lines) if b" 070#" in line]
