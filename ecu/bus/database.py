@@ -46,6 +46,8 @@ def load_database(path: Path, strict: bool = True) -> Database:
     """
     if not path.is_file():
         raise UserError(str(path), "", "no such file; give the path of a database (.dbc, .arxml, .kcd, .sym)")
+    if path.stat().st_size == 0:
+        raise UserError(str(path), "", "the file is empty; give a database (.dbc, .arxml, .kcd, .sym)")
     try:
         database = cantools.database.load_file(path, strict=strict)
     except Exception as error:  # cantools' parsers let errors of many kinds through

@@ -171,7 +171,7 @@ def test_the_written_map_is_one(drive, tmp_path: Path, capsys: pytest.CaptureFix
 
 def test_another_cars_database_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     log = next(LOGS.glob("rav4*.log"))
-    assert cli.main(["map", "suggest", str(log), "--dbc", str(resource("dbc/cars/kona.dbc"))]) == 1
+    assert cli.main(["map", "suggest", str(log), "--dbc", str(resource("dbc/cars/kona.dbc"))]) == 2
     said = capsys.readouterr().err
     assert "no four wheel speeds" in said
     assert said.count("\n") == 1

@@ -19,7 +19,7 @@ from brakelab.replay.quality import Findings, damage_lines
 from ecu.bus.database import load_database
 from ecu.bus.signal_map import load_signal_map
 from ecu.bus.units import spelled
-from ecu.errors import RunFault, UserError
+from ecu.errors import UserError
 from ecu.signals import without_corner
 
 COUNTING: Final = {"counter", "count", "cnt", "cntr", "alive", "ctr", "no"}
@@ -33,8 +33,8 @@ def suggest(log: Path, dbc: Path, out: Path | None) -> int:
     """Print a proposal with its evidence; write it to `out`, or print it where there is none. Returns 0.
 
     Raises:
-        UserError: the log, the database or `out` is not right.
-        RunFault: no wheel speeds were found, against which everything else is judged.
+        UserError: the log, the database or `out` is not right, or no wheel speeds were found, against which
+            everything else is judged.
     """
     database, strict = _load(dbc)
     findings = Findings(log)
@@ -44,7 +44,7 @@ def suggest(log: Path, dbc: Path, out: Path | None) -> int:
         print(line, file=sys.stderr)
     found, drives = propose(series)
     if not found:
-        raise RunFault(f"{log}: no four wheel speeds that {dbc} names; is it the database of this car?")
+        raise UserError(str(dbc), "", f"names no four wheel speeds in {log}; give the database of this car")
     bus = found[0].series.bus
     here = [one for one in series if one.bus == bus]
     text = map_text(found, here, (out or Path("map.toml")), dbc, strict, interfaces, bus)

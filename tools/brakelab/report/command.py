@@ -57,6 +57,8 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
         result, ("vehicle_speed", *_FRICTION), "give a RESULT.parquet that `brake-ecu replay` or `demo` wrote"
     )
     true = None
+    if truth is not None and truth.resolve() == result.resolve():
+        raise UserError(str(truth), "", "this is the result; give true values as --truth, or none")
     if truth is not None:
         remedy = "give the NAME.truth.parquet that `brake-ecu simulate` wrote"
         true = onto(drive, read_drive(truth, _FRICTION, remedy), truth)
