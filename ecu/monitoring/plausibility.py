@@ -1,8 +1,8 @@
 """What a wheel speed and a calliper pressure cannot be.
 
-A wheel that brakes does not turn faster than the car. A sensor that keeps its last value looks like that as
-soon as the car slows down; its frames are new, intact and on time. A wheel that is slower than the car may
-slide, so nothing is said of it.
+A wheel that brakes does not turn faster than the car, nor than the other wheels: if all do, the car's speed
+is wrong. A sensor that keeps its last value looks like that as soon as the car slows down; its frames are
+new, intact and on time. A wheel that is slower than the car may slide, so nothing is said of it.
 
 A wheel whose speed falls by more than its brake could make it has no wheel behind that reading: wires break
 to 0. It is left out until it agrees with the car again, or the car stands.
@@ -46,6 +46,14 @@ FOLLOWS = 0.75  # of that
 
 
 @kernel
+def _over_ground(params: Record, inputs: Record, motion: Record, speed: float, i: int) -> float:
+    """Return how fast a wheel turns over what the ground below it does."""
+    turns = inputs.value[WHEEL_SPEED + i] * params.wheel_radius[i]
+    over: float = turns / corner_speed(params, motion, speed, i)
+    return over
+
+
+@kernel
 def wheel_speed_implausible(
     params: Record, state: Record, inputs: Record, motion: Record, speed: float, torque: Record, dt: float
 ) -> bool:
@@ -61,13 +69,18 @@ def wheel_speed_implausible(
         dt: time since the last cycle [s].
     """
     found = False
+    total, wheels = 0.0, 0
+    for i in range(4):
+        if usable(inputs, WHEEL_SPEED + i):
+            total += _over_ground(params, inputs, motion, speed, i)
+            wheels += 1
     for i in range(4):
         found = found or state.fell[i] != 0
-        ground = corner_speed(params, motion, speed, i)
-        turns = inputs.value[WHEEL_SPEED + i] * params.wheel_radius[i]
+        over = _over_ground(params, inputs, motion, speed, i)
         braked = torque[i] > BRAKED and motor_torque(inputs, i) >= 0.0
-        fast = usable(inputs, WHEEL_SPEED + i) and speed > LEAST_SPEED and turns > FASTER * ground
-        state.for_s[i] = state.for_s[i] + dt if fast and braked else 0.0
+        fast = usable(inputs, WHEEL_SPEED + i) and speed > LEAST_SPEED and over > FASTER
+        alone = wheels > 1 and over > FASTER * (total - over) / (wheels - 1)
+        state.for_s[i] = state.for_s[i] + dt if fast and alone and braked else 0.0
         found = found or state.for_s[i] > DOUBT_S
     return found
 

@@ -22,7 +22,7 @@ SYNTAX_NEAR = 'SG_ one : 0|8@1+ (».5,0) [0|0] "" A'
         (OVERLAP, "M.two: overlaps one; if that is meant, set strict = false in the map"),
         (OUTSIDE, "M.one: does not fit its message; if it is not used, set strict = false in the map"),
         (SYNTAX, "line 6, column 20: syntax not understood at » in: " + SYNTAX_NEAR + "; mend that line"),
-        ("", "line 1, column 1: syntax not understood at » in: »; mend that line"),
+        ("", "the file is empty; give a database (.dbc, .arxml, .kcd, .sym)"),
         ("hello", "line 1, column 1: syntax not understood at » in: »hello; mend that line"),
     ],
 )

@@ -87,6 +87,22 @@ def test_a_wheel_whose_wire_breaks_is_left_out_until_it_agrees_again(params, fee
     assert fallen([60.0, 0.0, 60.0, 60.0], 0.0, params, feed) == [False, True, False, False]
 
 
+@pytest.mark.parametrize("stuck", [1, 2])
+@pytest.mark.parametrize("car", [0.93, 1.0], ids=["speed 7 % low", "speed right"])
+def test_wheels_are_held_against_each_other_too(params, feed, stuck: int, car: float) -> None:
+    state, motion = np.zeros(1, PLAUSIBILITY_STATE)[0], np.zeros(1, MOTION_STATE)[0]
+    turns = np.array([1.2] * stuck + [0.99] * (4 - stuck)) * 20.0 / params[0]["wheel_radius"]
+    sound = np.full(4, 0.99) * 20.0 / params[0]["wheel_radius"]
+    for speeds, expected in ((sound, False), (turns, True)):
+        said = [
+            wheel_speed_implausible(
+                params[0], state, feed(wheel_speed=speeds)[0], motion, car * 20.0, np.full(4, 800.0), 0.01
+            )
+            for _ in range(50)
+        ]
+        assert any(said) == expected
+
+
 PRESSURES: list[tuple[str, list[float], list[float], dict[str, Any], bool]] = [
     # what, demanded [bar], measured [bar], beside it, does not follow
     ("all follow", [30, 30, 12, 12], [30, 30, 12, 12], {}, False),
