@@ -36,15 +36,12 @@ from ecu.control.pressure_law import (
 )
 from ecu.control.slip_guard import SLIP_GUARD_STATE, guard_slip
 from ecu.diagnostics.faults import (
-    ACCEL_IMPLAUSIBLE,
     ACCUMULATOR_LOW,
     BRAKE_FADE,
     DEMAND_LIMITED,
     FILTER_RESET,
     MOTOR_SHORT,
-    PRESSURE_NOT_FOLLOWING,
     WHEEL_SLIPS,
-    WHEEL_SPEED_IMPLAUSIBLE,
 )
 from ecu.estimation.force import (
     FORCE_STATE,
@@ -85,7 +82,7 @@ from ecu.estimation.slip import (
 from ecu.estimation.speed import SPEED_STATE, update_speed
 from ecu.estimation.wheel_load import WHEEL_LOAD_STATE, update_wheel_load
 from ecu.jit import Record, kernel
-from ecu.monitoring.acceleration import ACCELERATION_STATE, GREATEST_ACCEL, watch_acceleration
+from ecu.monitoring.acceleration import ACCELERATION_STATE
 from ecu.monitoring.application import APPLICATION_STATE, update_application
 from ecu.monitoring.disc_temperature import (
     DISC_STATE,
@@ -94,15 +91,11 @@ from ecu.monitoring.disc_temperature import (
     start_discs,
     update_discs,
 )
-from ecu.monitoring.plausibility import (
-    PLAUSIBILITY_STATE,
-    watch_pressures,
-    watch_wheels,
-    wheel_speed_implausible,
-)
+from ecu.monitoring.plausibility import PLAUSIBILITY_STATE
+from ecu.monitoring.sensors import leave_out, watch_sensors
 from ecu.params import BAR, JOINT, OBSERVER1
 from ecu.records import INPUTS, LEARNED, RecordArray
-from ecu.signals import ACCEL_X, CALLIPER_PRESSURE, FAILED, STARTING, WHEEL_SPEED
+from ecu.signals import ACCEL_X, CALLIPER_PRESSURE, FAILED, STARTING
 
 STATE = np.dtype(
     [
@@ -177,8 +170,8 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
     """
     p, s, u, y = params[0], state[0], inputs[0], outputs[0]
     dt = 1e-9 * u.dt_ns
-    faults = u.bus_faults | input_faults(p, u) | _watch_sensors(p, s, u, dt)
-    _leave_out(s, u)
+    faults = u.bus_faults | input_faults(p, u) | watch_sensors(p, s, u, dt)
+    leave_out(s, u)
     u = s.trusted
     _estimate(p, s, u, dt)
     update_discs(
@@ -202,45 +195,6 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
     asked = math.isfinite(decel) and decel > 0.05
     mode = decide_mode(s.mode, faults, asked or s.application.braking != 0, dt)
     _publish(p, s, u, y, decel, faults, mode)
-
-
-@kernel
-def _watch_sensors(p: Record, s: Record, u: Record, dt: float) -> int:
-    """Return the fault bits of sensors whose readings contradict the others."""
-    faults = 0
-    doubted = s.acceleration.implausible != 0
-    if s.speed.started:
-        watch_acceleration(
-            p, s.acceleration, u, s.motion, s.friction, s.control.base, s.speed.speed,
-            s.application.braking != 0, dt,
-        )  # fmt: skip
-        watch_wheels(p, s.plausibility, u, s.motion, s.speed.speed, s.friction.torque, dt)
-        if wheel_speed_implausible(p, s.plausibility, u, s.motion, s.speed.speed, s.friction.torque, dt):
-            faults |= WHEEL_SPEED_IMPLAUSIBLE
-    if s.acceleration.implausible:
-        faults |= ACCEL_IMPLAUSIBLE
-    begins = s.acceleration.implausible != 0 and not doubted
-    watch_pressures(s.plausibility, u, s.friction_torque.model, s.joint.pressures.zero, dt)
-    if s.plausibility.pressure:
-        faults |= PRESSURE_NOT_FOLLOWING
-    s.friction.held = 1 if s.plausibility.pressure or begins else 0
-    return faults
-
-
-@kernel
-def _leave_out(s: Record, u: Record) -> None:
-    """Overwrite the trusted inputs: `u` without what is implausible."""
-    s.trusted = u
-    if s.acceleration.implausible or abs(u.value[ACCEL_X]) > GREATEST_ACCEL:
-        _distrust(s.trusted, ACCEL_X)
-    for i in range(4):
-        if s.plausibility.fell[i]:
-            _distrust(s.trusted, WHEEL_SPEED + i)
-
-
-@kernel
-def _distrust(inputs: Record, place: int) -> None:
-    inputs.verdict[place] = inputs.new[place] = 0
 
 
 @kernel

@@ -3,7 +3,8 @@
 Three say how hard the car brakes, each as a mean over a block of 0.1 s:
 
     a   the accelerometer, in road axes, cornering removed
-    w   the wheels: dv/dt of v = mean(omega r) (1 - a / (g C)), the slip that the force needs taken off
+    w   the wheels: dv/dt of v = mean(omega r) (1 - a / (g C)), the slip that the force needs taken off, and
+        of mean(omega r) itself: tyres may be stiffer than C; what is less counts
     f   the torques: -(sum of linings and motors) / (r m), with the friction that the braking began with
 
 A slope is in w and not in a or f; a lining that changes is in a and w alike, and not in f. So where a has
@@ -37,19 +38,17 @@ from ecu.signals import (
     WHEEL_SPEED,
 )
 
-A, W, F = range(3)
+A, W, F, ROLLED = range(4)
+KINDS = 4
 BLOCKS = 12
 ACCELERATION_STATE = np.dtype(
     [
         ("time", "f8"),  # of the block that is gathered [s]
         ("cycles", "i8"),
         ("good", "u1"),  # every cycle of it tells something
-        ("sum", "f8", (3,)),
-        (
-            "mean",
-            "f8",
-            (BLOCKS, 3),
-        ),  # a [m/s^2], v [m/s] and f [m/s^2] of the last blocks, the newest in row 0
+        ("sum", "f8", (KINDS,)),
+        # Of the last blocks, the newest in row 0: a [m/s^2], v [m/s], f [m/s^2], mean of omega r [m/s].
+        ("mean", "f8", (BLOCKS, KINDS)),
         ("good_blocks", "i8"),  # in a row
         ("beyond", "i8"),  # blocks in a row that are beyond any road
         ("agreed", "i8"),  # blocks in a row that agree again
@@ -113,15 +112,16 @@ def _gather(
     state.sum[A] += reading + motion.yaw_rate * motion.lateral_speed
     state.sum[W] += wheels * (1.0 - reading / (GRAVITY * params.slip_stiffness[0]))
     state.sum[F] += force
+    state.sum[ROLLED] += wheels
     state.cycles += 1
 
 
 @kernel
 def _close_block(state: Record) -> None:
     for k in range(BLOCKS - 1, 0, -1):
-        for j in range(3):
+        for j in range(KINDS):
             state.mean[k, j] = state.mean[k - 1, j]
-    for j in range(3):
+    for j in range(KINDS):
         state.mean[0, j] = state.sum[j] / state.cycles
         state.sum[j] = 0.0
     sound = state.good != 0 and state.time < LONGEST_BLOCK_S
@@ -142,10 +142,35 @@ def _before(mean: Record, j: int) -> float:
 
 
 @kernel
+def _beside_wheels(mean: Record, j: int) -> float:
+    """Return a - dv/dt now, v in column `j` [m/s^2]."""
+    beside: float = _now(mean, A) - (mean[0, j] - mean[2, j]) / (2.0 * BLOCK_S)
+    return beside
+
+
+@kernel
+def _usually_beside_wheels(mean: Record, j: int) -> float:
+    """Return a - dv/dt before, of a straight line through four blocks [m/s^2]."""
+    change = (3.0 * (mean[4, j] - mean[7, j]) + mean[5, j] - mean[6, j]) / (10.0 * BLOCK_S)
+    beside: float = _before(mean, A) - change
+    return beside
+
+
+@kernel
+def _moved_against_wheels(mean: Record) -> float:
+    """Return by how much a has moved against the wheels, of whatever stiffness [m/s^2]."""
+    slipping = _beside_wheels(mean, W) - _usually_beside_wheels(mean, W)
+    rolling = _beside_wheels(mean, ROLLED) - _usually_beside_wheels(mean, ROLLED)
+    if slipping * rolling <= 0.0:
+        return 0.0
+    return slipping if abs(slipping) < abs(rolling) else rolling
+
+
+@kernel
 def _judge(state: Record) -> None:
     """Compare the last blocks with those before, or with what was usual before the sensor jumped."""
     mean = state.mean
-    against_wheels = _now(mean, A) - (mean[0, W] - mean[2, W]) / (2.0 * BLOCK_S)
+    against_wheels = _beside_wheels(mean, W)
     against_force = _now(mean, A) - _now(mean, F)
     if state.implausible:
         agrees = state.good_blocks >= 3 and abs(against_wheels - state.usual) < AGAIN * LEAST
@@ -166,17 +191,14 @@ def _judge(state: Record) -> None:
     for k in range(1, BLOCKS):
         least, greatest = min(least, mean[k, F]), max(greatest, mean[k, F])
     moved = greatest - least
-    # The slope of a straight line through four blocks.
-    change = (3.0 * (mean[4, W] - mean[7, W]) + mean[5, W] - mean[6, W]) / (10.0 * BLOCK_S)
-    usual = _before(mean, A) - change
-    wheels = against_wheels - usual
+    wheels = _moved_against_wheels(mean)
     force = against_force - (_before(mean, A) - _before(mean, F))
     wheels_err = LEAST + (SLIP + SLIP_BY_SPEED * _now(mean, W)) * moved
     force_err = LEAST + FORCE * moved
     jumped = (wheels > wheels_err and force > force_err) or (wheels < -wheels_err and force < -force_err)
     if jumped or state.beyond >= SECOND:
         state.implausible, state.agreed = 1, 0
-        state.usual = usual if jumped else 0.0
+        state.usual = _usually_beside_wheels(mean, W) if jumped else 0.0
 
 
 @kernel

@@ -237,16 +237,18 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
             x[V] += w.reference
             state.p[V, V] += 0.25
     state.untrusted_s += time
+    seen = 0
     for i in range(4):
         state.observed[i], state.pull[i] = 0, 0.0
         if w.omega_samples[i] == 0:
             continue
+        seen += 1
         state.slides[i] = 1 if wheel_slides(params, state, i) else 0
         if not state.slides[i]:
             state.untrusted_s = 0.0
             _fuse_wheel(params, state, i, before, moving, learning and braking)
     watch_tyres(state, learning and braking)
-    if learning and w.accel_cycles == w.cycles and (braking or w.motor_reported):
+    if seen and learning and w.accel_cycles == w.cycles and (braking or w.motor_reported):
         _fuse_balance(params, state)
     state.last_accel = w.accel
     for i in range(4):

@@ -1,0 +1,57 @@
+"""Which readings the others deny, what is said of it, and what is left out of the inputs.
+
+Accelerometer, wheel speeds and calliper pressures are held against each other before anything is estimated
+from them in this cycle, by what the last one estimated.
+"""
+
+from ecu.diagnostics.faults import ACCEL_IMPLAUSIBLE, PRESSURE_NOT_FOLLOWING, WHEEL_SPEED_IMPLAUSIBLE
+from ecu.jit import Record, kernel
+from ecu.monitoring.acceleration import GREATEST_ACCEL, watch_acceleration
+from ecu.monitoring.plausibility import watch_pressures, watch_wheels, wheel_speed_implausible
+from ecu.signals import ACCEL_X, WHEEL_SPEED
+
+
+@kernel
+def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> int:
+    """Return the fault bits of sensors whose readings contradict the others.
+
+    Args:
+        p: `PARAMS`.
+        s: `STATE` of `ecu.step`; the parts of `monitoring` are overwritten.
+        u: `INPUTS`.
+        dt: time since the last cycle [s].
+    """
+    faults = 0
+    doubted = s.acceleration.implausible != 0
+    if s.speed.started:
+        watch_acceleration(
+            p, s.acceleration, u, s.motion, s.friction, s.control.base, s.speed.speed,
+            s.application.braking != 0, dt,
+        )  # fmt: skip
+        watch_wheels(p, s.plausibility, u, s.motion, s.speed.speed, s.friction.torque, dt)
+        if wheel_speed_implausible(p, s.plausibility, u, s.motion, s.speed.speed, s.friction.torque, dt):
+            faults |= WHEEL_SPEED_IMPLAUSIBLE
+    if s.acceleration.implausible:
+        faults |= ACCEL_IMPLAUSIBLE
+    begins = s.acceleration.implausible != 0 and not doubted
+    watch_pressures(s.plausibility, u, s.friction_torque.model, s.joint.pressures.zero, dt)
+    if s.plausibility.pressure:
+        faults |= PRESSURE_NOT_FOLLOWING
+    s.friction.held = 1 if s.plausibility.pressure or begins else 0
+    return faults
+
+
+@kernel
+def leave_out(s: Record, u: Record) -> None:
+    """Overwrite the trusted inputs: `u` without what is implausible."""
+    s.trusted = u
+    if s.acceleration.implausible or abs(u.value[ACCEL_X]) > GREATEST_ACCEL:
+        _distrust(s.trusted, ACCEL_X)
+    for i in range(4):
+        if s.plausibility.fell[i]:
+            _distrust(s.trusted, WHEEL_SPEED + i)
+
+
+@kernel
+def _distrust(inputs: Record, place: int) -> None:
+    inputs.verdict[place] = inputs.new[place] = 0
