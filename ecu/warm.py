@@ -23,22 +23,25 @@ from ecu.signals import CYCLE_NS
 from ecu.standby import Standby
 
 
-class _Silence:
-    """A bus on which nothing happens."""
+class Silence:
+    """A bus on which nothing happens, see `ecu.bus.channel.Channel`."""
 
     name = ""
 
     def drain(self, frames: RecordArray, start: int) -> int:
+        """Hear nothing."""
         return 0
 
     def send(self, frames: RecordArray, count: int) -> int:
+        """Take `count` frames."""
         return count
 
     def status(self) -> BusStatus:
+        """Return that all is well."""
         return BusStatus(False, False, 0, 0)
 
     def close(self) -> None:
-        pass
+        """Nothing is open."""
 
 
 def warm_up(ecu: Ecu, compiled: CompileCounter) -> None:
@@ -49,9 +52,9 @@ def warm_up(ecu: Ecu, compiled: CompileCounter) -> None:
         instants = itertools.count(0, CYCLE_NS // 100)
         grid = Grid(TimeSource(instants.__next__, instants.__next__, lambda _: None))
         for standby in (None, Standby()):
-            progress = Progress(Watch(_Silence().status(), compiled), standby)
+            progress = Progress(Watch(Silence().status(), compiled), standby)
             for _ in range(3):
-                cycle_once(twin, _Silence(), ring, grid, progress)
+                cycle_once(twin, Silence(), ring, grid, progress)
 
 
 def warm() -> int:

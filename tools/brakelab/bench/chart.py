@@ -95,6 +95,15 @@ def write_chart(
     for number, panel in enumerate(panels):
         row, column = divmod(number, columns)
         body += _draw(panel, LEFT + column * (WIDTH + GAP_X), TOP + row * (HEIGHT + GAP_Y))
+    write_svg(path, width, height, body)
+
+
+def write_svg(path: Path, width: float, height: float, body: Sequence[str]) -> None:
+    """Write SVG elements as a picture on white.
+
+    Raises:
+        UserError: the file cannot be written.
+    """
     text = (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" '
         'font-family="sans-serif" font-size="12" fill="none">\n'

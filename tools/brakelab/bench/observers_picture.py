@@ -6,11 +6,11 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.bench.chart import write_svg
 from brakelab.bench.observers import JOINT, ORDINARY, counted, drive_car
 from brakelab.bench.observers_cases import Setup, configured, shipped
 from brakelab.bench.stops import AXLES, Vector, columns
 from brakelab.closed_loop import Drive
-from ecu.errors import UserError
 from ecu.estimation.joint.kalman import GATE
 from ecu.signals import CORNERS
 
@@ -136,14 +136,4 @@ def write_picture(path: Path, cars: list[Consistency]) -> None:
         body += _error_panel(title, axle, TOP + axle * (HEIGHT + GAP), cars)
     title = "innovations over their σ, all wheels and total force; dashed: Gaussian"
     body += _histogram(title, TOP + 2 * (HEIGHT + GAP), cars)
-    text = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {LEFT + WIDTH + 16:.0f} '
-        f'{TOP + 3 * (HEIGHT + GAP):.0f}" font-family="sans-serif" font-size="12" fill="none">\n'
-        '<style>text{fill:#333}</style><rect width="100%" height="100%" fill="#fff"/>\n'
-        + "\n".join(body)
-        + "\n</svg>\n"
-    )
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise UserError(str(path), "", f"cannot be written ({error.strerror}); make it writable") from None
+    write_svg(path, LEFT + WIDTH + 16.0, TOP + 3 * (HEIGHT + GAP), body)

@@ -30,9 +30,8 @@ from brakelab.play_log import timed_frames
 from brakelab.priority import PRIORITY, ask_for_priority
 from brakelab.replay.quality import Findings
 from brakelab.rig.live import Bus, choose_bus
-from ecu.bus.channel import BusStatus
 from ecu.clock import system_time
-from ecu.records import RecordArray
+from ecu.warm import Silence
 
 SPEEDS: Final = (0.1, 1.0, 5.0, 20.0)
 GOAL_US: Final = 100
@@ -141,33 +140,12 @@ def play_in_memory(log: str, interface: str, channel: str, options: str) -> None
             bus.send(message)
 
 
-class Nowhere:
-    """A bus that takes every frame and does nothing, see `ecu.bus.channel.Channel`."""
-
-    name = "nowhere"
-
-    def drain(self, frames: RecordArray, start: int) -> int:
-        """Hear nothing."""
-        return 0
-
-    def send(self, frames: RecordArray, count: int) -> int:
-        """Take `count` frames."""
-        return count
-
-    def status(self) -> BusStatus:
-        """Return that all is well."""
-        return BusStatus(False, False, 0, 0)
-
-    def close(self) -> None:
-        """Nothing is open."""
-
-
 def play_nowhere(log: str, speed: float) -> None:
     """Keep the times of a log and send nothing; print quantiles of the lateness [us], as JSON."""
     blocks = list(timed_frames(Path(log), None, "", speed, Findings(Path(log))))
     ask_for_priority()
     sent = Sent()
-    send_on_schedule(blocks, Nowhere(), system_time(), sent)
+    send_on_schedule(blocks, Silence(), system_time(), sent)
     print(json.dumps([1e-3 * sent.late.quantile(share) for share in SHARES]))
 
 
