@@ -2,6 +2,7 @@
 
 ```
 plant = "suv"                    # of config/plant
+draw = "wide"                    # or "nominal": cars of the series that differ little
 initial_speed = 33.33            # m/s
 road_friction = [[0.0, 1.2], [9.0, 1.2], [9.01, 0.7]]      # or one number
 
@@ -57,6 +58,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 
 from brakelab.plant.cycle import CYCLE
 from brakelab.plant.description import Body, Plant, PlantFileError, load_plant
+from brakelab.plant.draw import Widths, load_widths
 from brakelab.plant.driver import PEDAL_TRAVEL, Script
 from brakelab.plant.records import BRAKE, COAST, CRUISE, FOLLOW, PHASE
 from brakelab.plant.road import Road
@@ -65,7 +67,7 @@ from brakelab.plant.steering import Steering
 from brakelab.rig.faults import Fault
 from brakelab.speed_trace import SpeedTrace, generated_trace, read_trace, trace_of
 from ecu.errors import UserError
-from ecu.resources import named
+from ecu.resources import named, resource
 from ecu.toml_file import describe, read_toml
 
 Positive = Annotated[float, Field(gt=0.0)]
@@ -214,6 +216,8 @@ class Scenario(_Section):
     """A scenario file."""
 
     plant: str
+    draw: Literal["wide", "nominal"] = "nominal"
+    """How far the car of a seed is from its file; see `brakelab.plant.draw`."""
     payload: Payload | None = None
     initial_speed: NotNegative
     initial_disc_temperature: tuple[float, float] = (100.0, 100.0)
@@ -347,3 +351,16 @@ def scenario_plant(scenario: Scenario) -> Plant:
         return plant
     laden = plant.vehicle.model_copy(update={"body": scenario.payload.body(plant.vehicle.body)})
     return plant.model_copy(update={"vehicle": laden})
+
+
+def scenario_widths(scenario: Scenario) -> Widths:
+    """Return how far the cars of a scenario are drawn: by the file beside the car's, or the shipped one.
+
+    Raises:
+        UserError: the file is wrong.
+    """
+    own = named(scenario.plant, "config/plant").with_name("draw.toml")
+    try:
+        return load_widths(own if own.is_file() else resource("config/plant/draw.toml"), scenario.draw)
+    except PlantFileError as error:
+        raise UserError(error.where, error.place, error.remedy) from None

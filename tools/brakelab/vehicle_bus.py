@@ -11,7 +11,8 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from brakelab.plant.cycle import DEMAND_TIMEOUT, move
-from brakelab.plant.description import Plant, draw
+from brakelab.plant.description import Plant, PlantFileError
+from brakelab.plant.draw import Widths, draw, draw_sensors
 from brakelab.plant.driver import Script, friction_now, grade_now
 from brakelab.plant.records import COMMANDS, DEMAND, DRIVER, RecordArray, new_record
 from brakelab.plant.sensor_errors import (
@@ -26,8 +27,9 @@ from brakelab.plant.sensor_errors import (
 from brakelab.plant.sensors import body_accelerations, true_readings
 from brakelab.plant.vehicle import new_state
 from brakelab.rig.faults import fault_records, spoil_car
-from brakelab.scenario import Scenario, scenario_plant
+from brakelab.scenario import Scenario, scenario_plant, scenario_widths
 from ecu import signals
+from ecu.errors import UserError
 from ecu.jit import Record, kernel
 from ecu.signals import CORNERS, INPUT, N_INPUTS, OUTPUT
 
@@ -95,10 +97,11 @@ class Vehicle(NamedTuple):
     """`params` without faults."""
 
 
-def _sensors(scenario: Scenario, plant: Plant, seed: int) -> RecordArray:
+def _sensors(scenario: Scenario, plant: Plant, width: Widths, seed: int) -> RecordArray:
     transducers = {} if scenario.wheel_transducers else {"wheel_force_x": ABSENT, "wheel_torque_y": ABSENT}
-    speed = {"vehicle_speed": SPEED_SOURCES[scenario.vehicle_speed]}
-    return new_sensors((STANDARD, speed, plant.vehicle.sensor.errors, scenario.sensor, transducers), seed)
+    known = {**STANDARD, "vehicle_speed": SPEED_SOURCES[scenario.vehicle_speed]}
+    drawn = draw_sensors(known, seed, width)
+    return new_sensors((known, drawn, plant.vehicle.sensor.errors, scenario.sensor, transducers), seed)
 
 
 def new_vehicle(scenario: Scenario, seed: int) -> Vehicle:
@@ -108,8 +111,11 @@ def new_vehicle(scenario: Scenario, seed: int) -> Vehicle:
         UserError: the plant's or the trace's file cannot be read or is wrong.
     """
     script = scenario.script()
-    plant = scenario_plant(scenario)
-    params = draw(plant, seed)
+    plant, width = scenario_plant(scenario), scenario_widths(scenario)
+    try:
+        params = draw(plant, seed, width)
+    except PlantFileError as error:
+        raise UserError(error.where, error.place, error.remedy) from None
     commands = new_record(COMMANDS)
     commands["road_friction"] = script.road_friction[0, 1]
     demand = new_record(DEMAND)
@@ -121,7 +127,7 @@ def new_vehicle(scenario: Scenario, seed: int) -> Vehicle:
         new_record(DRIVER),
         demand,
         commands,
-        _sensors(scenario, plant, seed),
+        _sensors(scenario, plant, width, seed),
         new_sensing(),
         np.empty(len(SIGNALS)),
         scenario.vehicle_speed == "gnss",

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakelab.plant.description import draw, load_plant
+from brakelab.plant.description import load_plant
+from brakelab.plant.draw import draw, load_widths
 from brakelab.plant.sensors import body_accelerations
 from brakelab.plant.vehicle import new_state
 
@@ -20,7 +21,7 @@ Maker = Callable[[str, float], Any]
 
 def test_a_drawn_car_rolls_without_a_jolt(shipped: Maker) -> None:
     car = shipped("suv14", 20.0)
-    car.params[:] = draw(load_plant(CONFIG / "suv14.toml"), 4)
+    car.params[:] = draw(load_plant(CONFIG / "suv14.toml"), 4, load_widths(CONFIG / "draw.toml", "wide"))
     car.state[:] = new_state(car.params, 20.0, (100.0, 100.0))
     before = float(car.now["heave"])
     accelerations: list[float] = []

@@ -3,13 +3,11 @@
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from brakelab.plant.description import Plant, PlantFileError, draw, load_plant, nominal
+from brakelab.plant.description import Plant, PlantFileError, load_plant, nominal
 
 CONFIG = Path(__file__).parents[3] / "config" / "plant"
-SEEDS = range(60)
 
 
 @pytest.mark.parametrize(
@@ -28,47 +26,9 @@ def test_shipped_cars_are_those_of_appendix_d(
     body = plant.vehicle.body
     assert body.mass == mass
     assert body.front_length + body.rear_length == pytest.approx(base)
-    assert (plant.brake(0).friction_nominal, plant.brake(3).friction_nominal) == friction
+    levels = [plant.brake(i).friction_level * plant.brake(i).friction_nominal for i in (0, 3)]
+    assert levels == pytest.approx(friction)
     assert nominal(plant)["mass"] == mass
-
-
-@pytest.mark.parametrize(
-    ("field", "spread"),
-    [
-        ("mass", 0.03),
-        ("cog_height", 0.05),
-        ("free_radius", 0.003),
-        ("slip_stiffness", 0.16),
-        ("wheel_inertia", 0.1),
-        ("push_out_pressure", 0.3 / 0.5),
-    ],
-)
-def test_drawn_cars_spread_as_far_as_they_should(suv: Plant, field: str, spread: float) -> None:
-    base = nominal(suv)[0][field]
-    ratio = np.array([draw(suv, seed)[0][field] / base - 1.0 for seed in SEEDS])
-    assert np.all(np.abs(ratio) <= spread * 1.02)
-    assert np.ptp(ratio) > 1.6 * spread
-
-
-def test_slip_stiffness_varies_with_the_car_and_little_between_axles(suv: Plant) -> None:
-    stiffness = np.array([draw(suv, seed)[0]["slip_stiffness"] for seed in SEEDS])
-    between = stiffness[:, 2] / stiffness[:, 0] - 1.0
-    assert 0.01 < np.abs(between).max() <= 0.0203
-    assert np.all(stiffness[:, ::2] == stiffness[:, 1::2])
-
-
-def test_wheel_radii_differ_from_each_other(suv: Plant) -> None:
-    assert len(set(draw(suv, 1)[0]["free_radius"])) == 4
-
-
-def test_what_is_not_drawn_stays(suv: Plant) -> None:
-    drawn, base = draw(suv, 5)[0], nominal(suv)[0]
-    for name in ("friction_scale", "track", "vertical_stiffness", "nominal_load", "friction_row"):
-        assert np.array_equal(drawn[name], base[name])
-
-
-def test_same_seed_same_car(suv: Plant) -> None:
-    assert draw(suv, 11).tobytes() == draw(suv, 11).tobytes() != draw(suv, 12).tobytes()
 
 
 @pytest.mark.parametrize(

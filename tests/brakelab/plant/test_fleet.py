@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brakelab.plant.description import draw, load_plant
+from brakelab.plant.description import load_plant
+from brakelab.plant.draw import draw, load_widths
 from brakelab.plant.fleet import advance_fleet
 from brakelab.plant.records import COMMANDS, STATE, RecordArray
 from brakelab.plant.vehicle import STEP, advance, new_state
@@ -17,7 +18,8 @@ CARS = 5
 @pytest.mark.parametrize("name", ["suv", "suv14"])
 def test_a_fleet_is_the_cars_one_by_one(name: str) -> None:
     plant = load_plant(CONFIG / f"{name}.toml")
-    params: RecordArray = np.concatenate([draw(plant, seed) for seed in range(CARS)])
+    width = load_widths(CONFIG / "draw.toml", "wide")
+    params: RecordArray = np.concatenate([draw(plant, seed, width) for seed in range(CARS)])
     states: RecordArray = np.concatenate(
         [new_state(params[i : i + 1], 25.0, (80.0, 80.0)) for i in range(CARS)]
     )

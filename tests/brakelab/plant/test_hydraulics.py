@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from brakelab.bench.staircase import STEPS, measure_step
-from brakelab.plant.hydraulics import advance_pressure, command_for, settled_pressure
-from brakelab.plant.records import PARAMS, STATE, new_record
+from brakelab.plant.hydraulics import BUILD_UP, RELEASE, advance_pressure, command_for, settled_pressure
+from brakelab.plant.records import HISTORY, PARAMS, STATE, new_record
 
 DT = 1e-3
 BAR = 1e5
@@ -25,11 +25,12 @@ def respond(
     params["pressure_limit"] = 180 * BAR
     params["offset_start"] = 60 * BAR
     params["offset_slope"], params["offset_known"] = slope, known
+    params["build_up"], params["release"] = BUILD_UP, RELEASE
     state["pressure"] = state["turning_point"] = start_bar * BAR
     state["demand_history"] = start_bar * BAR
     pressure = []
     for demand in demand_bar:
-        state["place"] = (state["place"] + 1) % 64
+        state["place"] = (state["place"] + 1) % HISTORY
         state["demand_history"][0, state["place"][0]] = demand * BAR
         advance_pressure(params[0], state[0], DT)
         pressure.append(state["pressure"][0, 0] / BAR)

@@ -14,7 +14,8 @@ import numba
 import numpy as np
 
 from brakelab.bench.measure import Figure, Row, Task, alternate, installed, timed
-from brakelab.plant.description import draw, load_plant
+from brakelab.plant.description import load_plant
+from brakelab.plant.draw import draw, load_widths
 from brakelab.plant.fleet import advance_fleet
 from brakelab.plant.jit import kernel
 from brakelab.plant.records import COMMANDS, RecordArray
@@ -43,7 +44,8 @@ def _drive(params: Any, state: Any, commands: Any, steps: int) -> None:
 def cars(name: str, count: int) -> tuple[RecordArray, RecordArray, RecordArray]:
     """Return parameters, states at 50 m/s and commands of `count` drawn cars, shape (count,) each."""
     plant = load_plant(resource(f"config/plant/{name}.toml"))
-    params = np.concatenate([draw(plant, seed) for seed in range(count)])
+    width = load_widths(resource("config/plant/draw.toml"), "wide")
+    params = np.concatenate([draw(plant, seed, width) for seed in range(count)])
     states = np.concatenate([new_state(params[i : i + 1], 50.0, (100.0, 100.0)) for i in range(count)])
     commands = np.zeros(count, COMMANDS)
     commands["road_friction"], commands["ambient_temperature"] = 1.2, 20.0

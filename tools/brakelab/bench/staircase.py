@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.bench.table import Table
-from brakelab.plant.hydraulics import advance_pressure
+from brakelab.plant.hydraulics import BUILD_UP, RELEASE, advance_pressure
 from brakelab.plant.records import HISTORY, PARAMS, STATE, new_record
 
 BAR: Final = 1e5  # Pa
@@ -35,6 +35,7 @@ def respond(start: float, end: float) -> NDArray[np.float64]:
     """Return the pressure [bar] of a calliper after every step of 1 ms, from rest at `start` [bar]."""
     params, state = new_record(PARAMS), new_record(STATE)
     params["pressure_limit"] = 180.0 * BAR
+    params["build_up"], params["release"] = BUILD_UP, RELEASE
     state["pressure"] = state["turning_point"] = state["demand_history"] = start * BAR
     pressure = np.empty(round(HOLD / DT))
     for place in range(len(pressure)):

@@ -1,4 +1,4 @@
-"""What a car is: `config/plant/*.toml`, checked, turned into the plant's parameters, nominal or drawn.
+"""What a car is: `config/plant/*.toml`, checked, turned into the parameters of the car as described.
 
 `config/plant/linings.toml`, beside every vehicle file, holds the linings that vehicles name.
 """
@@ -12,6 +12,7 @@ from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from brakelab.plant.friction.law import NotNegative, Positive, Section
 from brakelab.plant.friction.laws import law_row
+from brakelab.plant.hydraulics import BUILD_UP, RELEASE
 from brakelab.plant.linings import VEHICLE_LAW, Lining, Linings, rig_with
 from brakelab.plant.records import DAMPER_KNOTS, GRAVITY, PARAMS, RecordArray, new_record
 from brakelab.plant.rig import nominal_friction
@@ -108,6 +109,9 @@ class Brake(Section):
     lining: str
     friction: str = VEHICLE_LAW  # name of the lining's friction law
     friction_nominal: Positive
+    """As the data sheet has it."""
+    friction_level: Positive = 1.0
+    """Of this car's linings, over the nominal friction."""
     piston_diameter: Positive
     effective_radius: Positive
     push_out_pressure: NotNegative  # bar
@@ -209,10 +213,11 @@ def load_plant(path: Path) -> Plant:
     return Plant(name=path.stem, vehicle=vehicle, linings=linings)
 
 
-def _set_lining(car: Any, wheel: int, lining: Lining, law: str, friction_nominal: float) -> None:
+def set_lining(car: Any, wheel: int, lining: Lining, law: str, mu_nominal: float) -> None:
+    """Let a wheel of `car`, one `PARAMS`, have a lining under one of its laws, of that nominal friction."""
     entry = lining.friction[law]
     car["friction_law"][wheel], car["friction_row"][wheel] = law_row(entry, lining.brake)
-    car["friction_scale"][wheel] = friction_nominal / nominal_friction(rig_with(lining, law))
+    car["friction_scale"][wheel] = mu_nominal / nominal_friction(rig_with(lining, law))
     car["rig_gain"][wheel] = lining.brake.gain(entry.rig_mass)
     for name in ("heating", "cooling", "cooling_by_speed"):
         car[name][wheel] = getattr(lining.disc, name)
@@ -249,6 +254,7 @@ def nominal(plant: Plant) -> RecordArray:
     if suspension is not None:
         _set_suspension(car, suspension)
     hydraulics = plant.vehicle.hydraulics
+    car["build_up"], car["release"] = BUILD_UP, RELEASE
     car["pressure_limit"] = 1e5 * hydraulics.pressure_limit
     car["offset_start"] = 1e5 * hydraulics.offset_start
     car["offset_slope"], car["offset_known"] = hydraulics.offset_slope, hydraulics.offset_known
@@ -257,7 +263,9 @@ def nominal(plant: Plant) -> RecordArray:
         car["piston_area"][wheel] = 0.25 * np.pi * brake.piston_diameter**2
         car["effective_radius"][wheel] = brake.effective_radius
         car["push_out_pressure"][wheel] = 1e5 * brake.push_out_pressure
-        _set_lining(car, wheel, plant.lining(wheel), brake.friction, brake.friction_nominal)
+        lining = plant.lining(wheel)
+        level = brake.friction_level * brake.friction_nominal
+        set_lining(car, wheel, lining, brake.friction, level)
     leverage = 4.0 * hydraulics.fallback_friction
     leverage *= sum(car["piston_area"][wheel] * car["effective_radius"][wheel] for wheel in (0, 2))
     car["fallback_gain"] = body.mass * tyre.free_radius / leverage
@@ -270,23 +278,4 @@ def nominal(plant: Plant) -> RecordArray:
     car["charge_limit"], car["discharge_limit"] = motor.charge_limit, motor.discharge_limit
     car["motor_fade_speed"] = motor.fade_speed
     car["sensor_position"] = plant.vehicle.sensor.position
-    return params
-
-
-def draw(plant: Plant, seed: int) -> RecordArray:
-    """Return the parameters of one car of the series, shape (1,); the same for the same `seed`.
-
-    Uniform: mass 3 %, centre of gravity height 5 %, wheel radii 0.3 % each, slip stiffness 15 % common and
-    1 % per axle, wheel inertia 10 %, push-out pressure 0.3 bar (per axle). Friction is equal left and right.
-    """
-    params = nominal(plant)
-    car = params[0]
-    random = np.random.default_rng(seed)
-    car["mass"] *= 1.0 + random.uniform(-0.03, 0.03)
-    car["cog_height"] *= 1.0 + random.uniform(-0.05, 0.05)
-    car["free_radius"] *= 1.0 + random.uniform(-0.003, 0.003, 4)
-    stiffness = 1.0 + random.uniform(-0.15, 0.15)
-    car["slip_stiffness"] *= stiffness * np.repeat(1.0 + random.uniform(-0.01, 0.01, 2), 2)
-    car["wheel_inertia"] *= 1.0 + random.uniform(-0.1, 0.1)
-    car["push_out_pressure"] += np.repeat(random.uniform(-0.3e5, 0.3e5, 2), 2)
     return params

@@ -1,6 +1,7 @@
 """The electro-hydraulic brake: from a pressure demand to the pressure in the calliper.
 
-Model. Second order with dead time, one set for build-up (A.17) and one for release (A.18).
+Model. Second order with dead time, one set for build-up (A.17) and one for release (A.18), which `BUILD_UP`
+and `RELEASE` hold; a drawn unit has its own.
 States: pressure and its rate, which both models share, so that a change of model makes no jump.
 Input: the smaller of the demands 15 ms and 26 ms ago: a rise is seen after the longer, a fall after the
 shorter dead time. The direction of that input chooses the model; it has turned when it is HYSTERESIS away
@@ -15,10 +16,9 @@ from typing import Final
 from brakelab.plant.jit import Record, kernel
 from brakelab.plant.records import HISTORY
 
-BUILD_UP: Final = (0.00075, 0.037)  # s^2, s (A.17)
-RELEASE: Final = (0.00021, 0.045)  # s^2, s (A.18)
-BUILD_UP_DEAD_TIME: Final = 0.026  # s (A.17)
-RELEASE_DEAD_TIME: Final = 0.015  # s (A.18)
+BUILD_UP: Final = (0.00075, 0.037, 0.026)  # s^2, s, dead time s (A.17)
+RELEASE: Final = (0.00021, 0.045, 0.015)  # s^2, s, dead time s (A.18)
+INERTIA, DAMPING, DEAD_TIME = range(3)
 HYSTERESIS: Final = 0.5e5  # Pa. Assumption: below this the demand has not turned
 
 
@@ -54,8 +54,8 @@ def command_for(start: float, slope: float, wanted: float) -> float:
 @kernel
 def advance_pressure(params: Record, state: Record, dt: float) -> None:
     """Move the four calliper pressures on by `dt` [s]; the newest demand is in the history already."""
-    rising = look_back(BUILD_UP_DEAD_TIME, dt, state.place)
-    falling = look_back(RELEASE_DEAD_TIME, dt, state.place)
+    rising = look_back(params.build_up[DEAD_TIME], dt, state.place)
+    falling = look_back(params.release[DEAD_TIME], dt, state.place)
     for wheel in range(4):
         demand = min(state.demand_history[rising, wheel], state.demand_history[falling, wheel])
         command = command_for(params.offset_start, params.offset_known, demand)
@@ -73,9 +73,9 @@ def advance_pressure(params: Record, state: Record, dt: float) -> None:
                 state.releasing[wheel] = 1
                 extreme = demand
         state.turning_point[wheel] = extreme
-        inertia, damping = RELEASE if state.releasing[wheel] else BUILD_UP
+        model = params.release if state.releasing[wheel] else params.build_up
         pressure, rate = second_order(
-            state.pressure[wheel], state.pressure_rate[wheel], demand, inertia, damping, dt
+            state.pressure[wheel], state.pressure_rate[wheel], demand, model[INERTIA], model[DAMPING], dt
         )
         if pressure < 0.0 or pressure > params.pressure_limit:
             pressure = min(max(pressure, 0.0), params.pressure_limit)

@@ -13,7 +13,7 @@ from brakelab.plant.friction.law import ROW
 RecordArray = NDArray[np.void]
 
 GRAVITY: Final = 9.81  # m/s^2
-HISTORY: Final = 64  # samples of demand that a dead time can look back: 32 ms at steps of 0.5 ms
+HISTORY: Final = 80  # samples of demand that a dead time can look back: 40 ms at steps of 0.5 ms
 LOOK_BACK: Final = 64  # cycles that a delayed sensor can look back: 0.64 s
 DAMPER_KNOTS: Final = 7  # of a damper's force over speed
 
@@ -53,6 +53,8 @@ PARAMS: Final = np.dtype(
         ("offset_start", "f8"),  # Pa, from which the brake unit settles below its command
         ("offset_slope", "f8"),  # -, lost of what exceeds it
         ("offset_known", "f8"),  # -, slope that the unit's inverse map corrects
+        ("build_up", "f8", (3,)),  # s^2, s, dead time s (A.17)
+        ("release", "f8", (3,)),  # likewise (A.18)
         ("fallback_gain", "f8"),  # Pa per m/s^2, of the hydraulics without the ECU
         ("friction_law", "i8", (4,)),  # number in friction/laws.py
         ("friction_row", "f8", (4, ROW)),  # the law's numbers

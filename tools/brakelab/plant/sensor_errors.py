@@ -15,14 +15,14 @@ errors depends on the seed alone.
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, model_validator
 
-from brakelab.plant.friction.law import NotNegative, Positive, Section
+from brakelab.plant.friction.law import Bounds, NotNegative, Positive, Section, as_bounds, in_order
 from brakelab.plant.jit import Record, kernel
 from brakelab.plant.records import LOOK_BACK, SENSING, SENSOR, RecordArray
 
@@ -40,16 +40,6 @@ SLACK: Final = 1e-4  # s by which the sum of all steps may fall short of a cycle
 LONGEST_DELAY: Final = 0.6  # s, less than LOOK_BACK cycles
 
 
-def _bounds(given: Any) -> Any:
-    return given if isinstance(given, list | tuple) else (given, given)
-
-
-def _rises(bounds: tuple[float, float]) -> tuple[float, float]:
-    if bounds[0] > bounds[1]:
-        raise ValueError("give the lower bound first")
-    return bounds
-
-
 Delay = Annotated[float, Field(ge=0.0, le=LONGEST_DELAY)]
 
 
@@ -64,10 +54,10 @@ class SensorErrors(Section):
     noise: NotNegative = 0.0
     """Standard deviation, white."""
     resolution: NotNegative = 0.0
-    delay: Annotated[tuple[Delay, Delay], BeforeValidator(_bounds), AfterValidator(_rises)] = (0.0, 0.0)
+    delay: Annotated[tuple[Delay, Delay], BeforeValidator(as_bounds), AfterValidator(in_order)] = (0.0, 0.0)
     """s"""
     scale: Positive = 1.0
-    bias: Annotated[tuple[float, float], BeforeValidator(_bounds), AfterValidator(_rises)] = (0.0, 0.0)
+    bias: Annotated[Bounds, BeforeValidator(as_bounds), AfterValidator(in_order)] = (0.0, 0.0)
     drift: NotNegative = 0.0
     """q, unit per root second."""
     drift_time: Positive = math.inf

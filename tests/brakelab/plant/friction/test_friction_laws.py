@@ -63,11 +63,18 @@ def equations(name: str, lining: Lining) -> Rate:
         )
         return -first * ((p * area * v + second) * x - third * (tau + 273.15)), x
 
-    return {"ilvo_bounded": bounded, "ilvo": ilvo}.get(law["law"], ostermeyer)
+    def surface(x: float, p: float, v: float, slowing: float, tau: float) -> tuple[float, float]:
+        exponents = np.mean(law["pressure"]), np.mean(law["speed"])
+        curves = (max(p, 5e5) / 30e5) ** exponents[0] * (v / 5.0) ** exponents[1]
+        heat = 1.0 - np.mean(law["fall"]) * ((tau - np.mean(law["best"])) / 100.0) ** 2
+        mu = law["mu"] * curves * heat * (1.0 + np.mean(law["bite"]) * x)
+        return (1.0 - x) * v / np.mean(law["way"]), mu
+
+    return {"ilvo_bounded": bounded, "ilvo": ilvo, "surface": surface}.get(law["law"], ostermeyer)
 
 
 @pytest.mark.parametrize("brake", ["A", "B", "C"])
-@pytest.mark.parametrize("name", ["SIM", "R1", "R2", "printed", "Ost", "Ost_revised"])
+@pytest.mark.parametrize("name", ["SIM", "R1", "R2", "printed", "Ost", "Ost_revised", "surface"])
 def test_a_stop_is_the_solution_of_the_laws_equations(suv: Plant, brake: str, name: str) -> None:
     lining = suv.linings.lining[brake]
     rate, rig = equations(name, lining), rig_with(lining, name)
@@ -107,7 +114,7 @@ def test_a_stop_is_the_solution_of_the_laws_equations(suv: Plant, brake: str, na
 @settings(max_examples=200, deadline=None)
 @given(
     brake=st.sampled_from("ABC"),
-    name=st.sampled_from(["SIM", "R1", "R2", "printed", "Ost", "Ost_revised"]),
+    name=st.sampled_from(["SIM", "R1", "R2", "printed", "Ost", "Ost_revised", "surface"]),
     pressure=st.floats(0.0, 180e5),
     speed=st.floats(0.0, 40.0),
     slowing=st.floats(0.0, 80.0),

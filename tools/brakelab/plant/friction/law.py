@@ -2,18 +2,33 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Annotated, Final
+from typing import Annotated, Any, Final, Self
 
+from numpy.random import Generator
 from pydantic import BaseModel, ConfigDict, Field
 
 from brakelab.plant.jit import kernel
 
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
+Bounds = tuple[float, float]
+"""What is drawn between, evenly."""
 
 ROW: Final = 32  # numbers that a law may have
 START: Final = 0  # place in every row: the memory at the start of an application
 KELVIN: Final = 273.15  # K at 0 degC
+
+
+def as_bounds(given: Any) -> Any:
+    """Return a number as the two bounds that it is."""
+    return given if isinstance(given, list | tuple) else (given, given)
+
+
+def in_order(bounds: Bounds) -> Bounds:
+    """Return `bounds` if the lower comes first. Raises `ValueError`."""
+    if bounds[0] > bounds[1]:
+        raise ValueError("give the lower bound first")
+    return bounds
 
 
 class Section(BaseModel):
@@ -45,6 +60,10 @@ class Law(Section, ABC):
     @abstractmethod
     def row(self, brake: RigBrake) -> Sequence[float]:
         """Return the law's numbers for its kernel, at most `ROW`, the first being the starting memory."""
+
+    def drawn(self, random: Generator) -> Self:
+        """Return the law of one lining of the series."""
+        return self
 
 
 @kernel

@@ -4,19 +4,37 @@ from typing import Annotated, Final
 
 from pydantic import Field
 
-from brakelab.plant.friction import constant, ilvo, ilvo_bounded, ostermeyer, ostermeyer_revised, table
+from brakelab.plant.friction import (
+    constant,
+    ilvo,
+    ilvo_bounded,
+    ostermeyer,
+    ostermeyer_revised,
+    surface,
+    table,
+)
 from brakelab.plant.friction.constant import Constant
 from brakelab.plant.friction.ilvo import Ilvo
 from brakelab.plant.friction.ilvo_bounded import IlvoBounded
 from brakelab.plant.friction.law import ROW, Law, RigBrake
 from brakelab.plant.friction.ostermeyer import Ostermeyer
 from brakelab.plant.friction.ostermeyer_revised import OstermeyerRevised
+from brakelab.plant.friction.surface import Surface
 from brakelab.plant.friction.table import Table
 from brakelab.plant.jit import Record, kernel
 
-LAWS: Final[tuple[type[Law], ...]] = (IlvoBounded, Ilvo, Ostermeyer, OstermeyerRevised, Constant, Table)
+LAWS: Final[tuple[type[Law], ...]] = (
+    IlvoBounded,
+    Ilvo,
+    Ostermeyer,
+    OstermeyerRevised,
+    Constant,
+    Table,
+    Surface,
+)
 AnyLaw = Annotated[
-    IlvoBounded | Ilvo | Ostermeyer | OstermeyerRevised | Constant | Table, Field(discriminator="law")
+    IlvoBounded | Ilvo | Ostermeyer | OstermeyerRevised | Constant | Table | Surface,
+    Field(discriminator="law"),
 ]
 
 
@@ -48,4 +66,6 @@ def friction(
         return ostermeyer_revised.step(row, memory, pressure, speed, slowing, temperature, dt)
     if law == 4:
         return constant.step(row, memory, pressure, speed, slowing, temperature, dt)
-    return table.step(row, memory, pressure, speed, slowing, temperature, dt)
+    if law == 5:
+        return table.step(row, memory, pressure, speed, slowing, temperature, dt)
+    return surface.step(row, memory, pressure, speed, slowing, temperature, dt)
