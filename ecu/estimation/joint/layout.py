@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from ecu.estimation.joint.motors import MOTORS_STATE
 from ecu.estimation.joint.pressure import PRESSURE_STATE
 from ecu.records import N_JOINT
 
@@ -66,11 +67,13 @@ JOINT_STATE: Final = np.dtype(
         ("free", "u1", (N,)),  # states that this window may correct; the others are considered only
         ("h", "f8", (N,)),  # derivatives of one measurement
         ("ph", "f8", (N,)),
+        ("per_torque", "f8"),  # derivative of that measurement by a torque on the wheel
         ("kept_x", "f8", (2, N)),  # snapshots: the newer in row 0
         ("kept_p", "f8", (2, N, N)),
         ("kept_s", "f8"),  # age of the newer one [s]
         ("window", WINDOW_STATE),
         ("pressures", PRESSURE_STATE),
+        ("motors", MOTORS_STATE),
         ("started", "u1"),
         ("slides", "u1", (4,)),  # 1: the wheel is too far from the car's speed to tell it
         ("sliding", "i8"),  # number of such wheels
@@ -81,6 +84,9 @@ JOINT_STATE: Final = np.dtype(
         ("smooth_pressure", "f8", (4,)),  # bar above push-out
         ("readings", "f8", (4,)),  # mean pressure readings of released brakes [bar]
         ("last_accel", "f8"),  # of the last window [m/s^2]
+        ("smooth_accel", "f8"),  # low-passed [m/s^2]
+        ("mean_accel", "f8"),  # of the last seconds [m/s^2]
+        ("last_smooth_accel", "f8"),  # of the last window [m/s^2]
         ("last_smooth", "f8", (4,)),  # of the last window [bar]
         ("last_pressure", "f8", (4,)),  # of the last window [bar]
         ("last_slip", "f8", (4,)),

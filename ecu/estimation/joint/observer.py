@@ -63,6 +63,8 @@ WINDOW_S = 0.05
 LEAST_SPEED = 3.4  # m/s
 APPLIED = 1.0  # bar above push-out: the brakes act
 STRAIGHT = 0.05  # lateral acceleration over gravity: more, and wheels roll by their own loads and angles
+VARIES_FROM, VARIES = 0.3, 0.2  # m/s^2: acceleration that tells a mass, and its change within seconds
+COLOURED = 20.0  # times the variance of white noise: what an inverter's torque errs by is not white
 MOTORS = 100.0  # N m of all motors: their torque is worth looking at
 SLIDING_FORCE = 0.3  # relative error of the force of a wheel that seems too fast, taken for its brake force
 BELIEVED_AFTER = 3.0  # s without a wheel that rolls, brakes released
@@ -130,6 +132,13 @@ def _watch_release(state: Record, braking: bool) -> None:
 
 
 @kernel
+def _accelerates(state: Record) -> bool:
+    """Return whether acceleration varies: what does not cannot tell mass from bias, drag and slope."""
+    accel = state.window.accel
+    return abs(accel) > VARIES_FROM and abs(accel - state.mean_accel) > VARIES
+
+
+@kernel
 def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> None:
     free = state.free
     if not (braking and learning) or state.releasing:
@@ -152,8 +161,9 @@ def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> 
     else:
         free[BIAS] = free[DRAG] = state.window.motor_reported
         if motors:
-            for i in (STIFFNESS, RATIO, MASS, LOAD, PEAK, MOTOR, SINKING):
+            for i in (STIFFNESS, RATIO, LOAD, PEAK, SINKING):
                 free[i] = 1
+            free[MASS] = free[MOTOR] = 1 if _accelerates(state) else 0
 
 
 @kernel
@@ -249,9 +259,10 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
             _fuse_wheel(params, state, i, before, moving, learning and braking)
     watch_tyres(state, learning and braking)
     if seen and learning and w.accel_cycles == w.cycles and (braking or w.motor_reported):
-        _fuse_balance(params, state)
-    state.last_accel = w.accel
+        _fuse_balance(params, state, braking)
+    state.last_accel, state.last_smooth_accel = w.accel, state.smooth_accel
     for i in range(4):
+        state.motors.last_smooth[i] = state.motors.smooth[i]
         state.last_pressure[i], state.last_smooth[i] = w.pressure[i], state.smooth_pressure[i]
 
 
@@ -276,8 +287,12 @@ def _fuse_wheel(params: Record, state: Record, i: int, before: float, moving: bo
     corner = CORNERING * w.across * w.across * state.slip[i] * ground / params.wheel_radius[i]
     variance += transient * transient + corner * corner
     state.last_slip[i] = state.slip[i]
+    variance += state.per_torque**2 * _motor_variance(state, i, observing)
     innovation = w.omega[i] - omega
+    mass, motor = state.free[MASS], state.free[MOTOR]
+    state.free[MASS] = state.free[MOTOR] = 0
     state.ratio[i] = correct(state, innovation, variance)
+    state.free[MASS], state.free[MOTOR] = mass, motor
     state.pull[i] = math.copysign(min(state.ratio[i], GATE * GATE), innovation)
     state.observed[i] = 1 if observing and state.smooth_pressure[i] > 2.0 * APPLIED else 0
 
@@ -291,14 +306,23 @@ def _skew(state: Record, i: int) -> float:
 
 
 @kernel
-def _fuse_balance(params: Record, state: Record) -> None:
+def _motor_variance(state: Record, i: int, braking: bool) -> float:
+    """Return the variance of a wheel's mean motor torque in this window [(N m)^2]."""
+    variance: float = state.motors.variance[i] / state.window.cycles
+    return variance if braking else COLOURED * variance
+
+
+@kernel
+def _fuse_balance(params: Record, state: Record, braking: bool) -> None:
     w = state.window
     left = predict_balance(params, state)
     variance = params.sigma_accel**2 / w.cycles + BALANCE_FLOOR**2 + (BALANCE_SHARE * w.accel) ** 2
     variance += (SKEW_ACCEL * (w.accel - state.last_accel)) ** 2
     for i in range(4):
         per_bar = brake_lever(params, i) * params.mu_nominal[i] * math.exp(state.x[MU + i])
-        per_bar /= params.wheel_radius[i] * params.mass
+        per_torque = 1.0 / (params.wheel_radius[i] * params.mass)
+        per_bar *= per_torque
+        variance += per_torque**2 * _motor_variance(state, i, braking)
         if state.smooth_pressure[i] > 0.5:
             variance += per_bar**2 * (w.pressure_variance[i] + _skew(state, i) ** 2)
         if state.slides[i] and w.omega[i] * params.wheel_radius[i] < w.ground[i]:

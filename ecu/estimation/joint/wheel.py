@@ -132,16 +132,19 @@ def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float
     else:
         keep = max(1.0 - slip, 0.1)
         omega, by_slip = ground / (keep * r), ground / (keep * keep * r)
-    used += (brake_torque(params, state, i, pressure) - brake_torque(params, state, i, smooth)) * scale / r
+    driven = state.motors.last_smooth[i] * math.exp(x[MOTOR])
+    later = brake_torque(params, state, i, pressure) - brake_torque(params, state, i, smooth)
+    used += (later + motor - driven) * scale / r
     slip, slope, by_peak = combined_slip(used, w.across, stiffness, peak)
     clear_derivatives(state)
     h[V] = omega / max(ground, 0.1)
     mu = params.mu_nominal[i] * math.exp(x[MU + i])
     lever = brake_lever(params, i)
     by_force = by_slip * slope * scale
+    state.per_torque = -by_force / r
     h[MU + i] = -by_force * lever * mu * max(smooth - x[OFFSET + i // 2], 0.0) / r
     h[OFFSET + i // 2] = by_force * lever * mu / r if smooth > 0.5 else 0.0
-    h[MOTOR] = -by_force * motor / r
+    h[MOTOR] = -by_force * driven / r
     h[MASS] = -by_slip * slope * (used + own * scale / r)
     h[STIFFNESS] = -by_slip * slip
     if i >= 2:
@@ -162,19 +165,22 @@ def predict_balance(params: Record, state: Record) -> float:
     speed, heavier = x[V], math.exp(x[MASS])
     drag = heavier * math.exp(x[DRAG]) * params.drag_area * speed * abs(speed) / mass
     left = heavier * (w.accel - x[BIAS] + w.lateral / mass) + drag
+    # What grows with the mass, by the accelerometer of before: free of the noise of this window's torques.
+    inert = heavier * (state.last_smooth_accel - x[BIAS] + w.lateral / mass) + drag
+    linings = 0.0
     for i in range(4):
         r, _ = radius(params, state, i, w.load[i])
         driven = w.motor[i] * math.exp(x[MOTOR])
         own = heavier * (params.rolling_resistance * w.load[i] * r + params.wheel_inertia[i] * w.change / r)
+        inert += own / (r * mass)
         left += (brake_torque(params, state, i, w.pressure[i]) + driven + own) / (r * mass)
         smooth = state.last_smooth[i]
-        # Derivative by the mass: by the torques, not by the noisy acceleration that they equal.
-        h[MASS] -= (brake_torque(params, state, i, smooth) + driven) / (r * mass)
+        linings += brake_torque(params, state, i, smooth) / (r * mass)
         per_bar = brake_lever(params, i) * params.mu_nominal[i] * math.exp(x[MU + i]) / (r * mass)
         h[MU + i] = per_bar * max(smooth - x[OFFSET + i // 2], 0.0)
         if smooth > 0.5:
             h[OFFSET + i // 2] -= per_bar
-        h[MOTOR] += driven / (r * mass)
+    h[MASS], h[MOTOR] = inert, -inert - linings
     h[BIAS] = -heavier
     h[DRAG] = drag
     h[DRIVE] = h[DRIVE + 1] = -_unknown_share(params, state)

@@ -7,6 +7,7 @@ is white from window to window, and what did not arrive is simply not in the mea
 import math
 
 from ecu.estimation.joint.layout import BIAS, DELAY, SLOPE, V
+from ecu.estimation.joint.motors import follow_motors
 from ecu.estimation.joint.pressure import correct_pressure, follow_demand, follows
 from ecu.estimation.motion import corner_speed, fresh, motor_torque, motor_torque_known, usable
 from ecu.jit import Record, kernel
@@ -22,7 +23,8 @@ from ecu.signals import (
 
 OLDEST_S = 0.06  # of an acceleration or torque that is set against others
 NEW_SHARE = 0.2  # of the model's variance that is another one in the next window
-SMOOTHING = 0.2  # s, of the pressure that derivatives use
+SMOOTHING = 0.2  # s, of pressure and acceleration that derivatives use
+STEADY = 5.0  # s, over which an acceleration that varies is told from one that lasts
 
 
 @kernel
@@ -65,6 +67,10 @@ def gather(
     w.accel += motion.accel_x
     w.accel_cycles += 1 if _current(inputs, ACCEL_X) else 0
     w.change += change
+    gain = 1.0 - math.exp(-dt / SMOOTHING)
+    state.smooth_accel += gain * (motion.accel_x - state.smooth_accel)
+    state.mean_accel += (1.0 - math.exp(-dt / STEADY)) * (motion.accel_x - state.mean_accel)
+    follow_motors(state.motors, inputs, dt)
     front_lateral = params.mass * motion.accel_y * params.rear_axle / params.wheelbase
     w.across += motion.accel_y / GRAVITY
     w.lateral += front_lateral * math.sin(motion.steering)
@@ -92,7 +98,6 @@ def gather(
             w.pressure_samples[i] += 1
             if params.transmit:
                 correct_pressure(state.pressures, i, reading, params.sigma_pressure / BAR, dt)
-            gain = 1.0 - math.exp(-dt / SMOOTHING)
             state.smooth_pressure[i] += gain * (above - state.smooth_pressure[i])
         if follows(state.pressures, i):
             w.tracked[i] += state.pressures.value[i] - push_out
