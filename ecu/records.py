@@ -72,7 +72,8 @@ CYCLE: Final = np.dtype(
     ],
     align=True,
 )
-N_JOINT: Final = 26
+N_JOINT: Final = 32
+N_KEPT: Final = 23
 # What the ECU has learned and must not lose: carried between brakings, drives and restarts.
 LEARNED: Final = np.dtype(
     [
@@ -82,7 +83,8 @@ LEARNED: Final = np.dtype(
         ("radius_error", "f8", (4,)),  # relative error of the free rolling radius
         ("radius_sigma", "f8", (4,)),
         ("joint", "f8", (N_JOINT,)),  # the joint observer's states, see its layout
-        ("joint_sigma", "f8", (N_JOINT,)),  # 0: nothing learned yet
+        ("joint_covariance", "f8", (N_KEPT * (N_KEPT + 1) // 2,)),  # of those kept: lower triangle by rows
+        ("joint_known", "u1"),  # 0: nothing learned yet
         ("disc_excess", "f8", (4,)),  # most that the last braking left the disc above the air [K]
         ("brakings", "i8"),  # brake applications since the record was first made
     ],

@@ -58,17 +58,17 @@ from ecu.estimation.friction import (
     update_pressure,
 )
 from ecu.estimation.joint.kalman import GATE
-from ecu.estimation.joint.layout import JOINT_STATE, MU, STIFFNESS, V
+from ecu.estimation.joint.layout import JOINT_STATE, MASS, STIFFNESS, V
 from ecu.estimation.joint.learned import (
-    begin_course,
+    hand_over_level,
     keep_joint,
     publish_friction,
     restore_joint,
-    settle_friction,
-    take_mean,
 )
 from ecu.estimation.joint.observer import update_joint
+from ecu.estimation.joint.prior import begin_application, end_application
 from ecu.estimation.joint.sliding import mistrust_wheels
+from ecu.estimation.joint.wheel import unknown_share
 from ecu.estimation.motion import MOTION_STATE, update_motion, usable
 from ecu.estimation.observer2 import OBSERVER_STATE
 from ecu.estimation.slip import (
@@ -202,9 +202,13 @@ def _estimate(p: Record, s: Record, u: Record, dt: float) -> None:
     update_application(p, s.application, u, dt)
     if s.application.ended:
         if p.observer == JOINT:
-            take_mean(p, s.joint, s.friction)
-        learn_start(s.control, s.friction)
-        hand_over(s.friction, s.learned)
+            end_application(s.joint)
+            keep_joint(p, s.joint, s.friction, s.learned)
+            learn_start(s.control, s.friction, s.learned)
+            hand_over_level(p, s.joint, s.friction, s.learned)
+        else:
+            learn_start(s.control, s.friction, s.learned)
+            hand_over(s.friction, s.learned)
     if s.application.started:
         reset_force(s.force)
     braking = s.application.braking != 0
@@ -224,16 +228,14 @@ def _observe_jointly(p: Record, s: Record, u: Record, braking: bool, dt: float) 
     joint = s.joint
     if s.application.started:
         for i in range(4):
-            joint.p[MU + i, MU + i] += heat_widening(s.discs, i) ** 2
-        begin_course(joint)
+            joint.heat[i] = heat_widening(s.discs, i)
+        begin_application(joint, unknown_share(p, joint), joint.heat)
     if s.guard.acting or s.friction.held:
         mistrust_wheels(joint)
     update_joint(p, joint, u, s.motion, s.wheel_load.load, s.limiter.pressure, braking, dt)
-    if s.application.ended:
-        settle_friction(p, joint, s.learned)
-    publish_friction(p, joint, s.friction, s.learned, u, s.wheel_load.load, braking, dt)
+    publish_friction(p, joint, s.friction, s.learned, u, braking, dt)
     if joint.window.cycles == 0:  # what is known changes at the end of a window alone
-        keep_joint(joint, s.learned)
+        keep_joint(p, joint, s.friction, s.learned)
     s.speed.started, s.speed.speed = joint.started, joint.x[V]
     s.force.k_f = math.exp(joint.x[STIFFNESS])
     for i in range(4):
@@ -265,8 +267,9 @@ def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
     speed = s.speed.speed if s.speed.started else math.nan
     decel = update_demand(p, s.demand, u, speed, dt)
     watch_rear(p, s.distribution, u, s.motion, s.wheel_load.load, decel, speed, dt)
-    distribute(p, s.distribution, decel)
-    follow_friction(p, s.control, s.friction, dt)
+    mass = p.mass * math.exp(s.joint.x[MASS]) if p.observer == JOINT else p.mass
+    distribute(p, s.distribution, mass, decel)
+    follow_friction(p, s.control, s.friction, s.learned, dt)
     follow_pressure(p, s.friction_torque, u, s.limiter.pressure, s.joint.pressures.zero, dt)
     update_motors(p, s.blending, u, s.guard.capped, s.speed.speed, decel, dt)
     share_torque(p, s.blending, s.distribution.torque, dt)

@@ -136,12 +136,15 @@ def watch_rear(
 
 
 @kernel
-def distribute(params: Record, state: Record, decel: float) -> None:
-    """Overwrite the torque demanded of each wheel [N m]; NaN for an unknown deceleration [m/s^2]."""
+def distribute(params: Record, state: Record, mass: float, decel: float) -> None:
+    """Overwrite the torque demanded of each wheel [N m]; NaN for an unknown deceleration [m/s^2].
+
+    `mass` [kg] is that of the car as it is known now.
+    """
     front = front_share(params, decel)
     for i in range(4):
         axle = front if i < 2 else (1.0 - front) * state.rear
-        state.torque[i] = 0.5 * axle * params.mass * decel * params.wheel_radius[i]
+        state.torque[i] = 0.5 * axle * mass * decel * params.wheel_radius[i]
 
 
 @kernel

@@ -21,7 +21,7 @@ import math
 
 import numpy as np
 
-from ecu.estimation.friction import well_observed
+from ecu.estimation.friction import GREATEST_RATIO, LEAST_RATIO, well_observed
 from ecu.jit import Record, kernel
 from ecu.params import INVERSE, OFF
 
@@ -39,6 +39,7 @@ PRESSURE_LAW_STATE = np.dtype(
     align=True,
 )
 
+SURE = 0.05
 GREATEST_CHANGE = 0.3  # relative to the base (5.6)
 FRICTION_RATE = 0.5  # 1/s
 LEFT_RIGHT_SHARE = 0.10  # of the axle's demand
@@ -58,8 +59,8 @@ def pressure_for_torque(params: Record, torque: float, mu: float, corner: int) -
 
 
 @kernel
-def follow_friction(params: Record, state: Record, friction: Record, dt: float) -> None:
-    """Move the friction in use towards the estimate, within +-30 % of the base.
+def follow_friction(params: Record, state: Record, friction: Record, learned: Record, dt: float) -> None:
+    """Move the friction in use towards the estimate, within +-30 % of what is learned now.
 
     While it still is what the last braking ended with, and that braking began with another, it waits.
     """
@@ -73,7 +74,10 @@ def follow_friction(params: Record, state: Record, friction: Record, dt: float) 
             state.early[i] = mu[i]
         base: float = state.base[i]
         target = mu[i] if math.isfinite(mu[i]) else base
-        target = min(max(target, (1.0 - GREATEST_CHANGE) * base), (1.0 + GREATEST_CHANGE) * base)
+        doubt = max(friction.sigma[i] / max(mu[i], 0.1) - SURE, 0.0)
+        if target > base:
+            target = max(target * math.exp(-2.0 * doubt), base)
+        target = min(max(target, LEAST_RATIO * params.mu_nominal[i]), GREATEST_RATIO * params.mu_nominal[i])
         least = 0.0 if state.cut[i] else -step
         state.used[i] += min(max(target - state.used[i], least), step)
 
@@ -88,12 +92,12 @@ def set_base(params: Record, state: Record, learned: Record) -> None:
 
 
 @kernel
-def learn_start(state: Record, friction: Record) -> None:
+def learn_start(state: Record, friction: Record, learned: Record) -> None:
     """At the end of a braking: keep what it began with over what it ended with, where both are known."""
     for i in range(4):
         known = state.early[i] > 0.0 and well_observed(friction, i)
         if known:
-            change = state.early[i] / friction.mu[i]
+            change = state.early[i] / learned.mu_b[i]
             state.start[i] = min(max(change, 1.0 - LARGEST_START), 1.0 + LARGEST_START)
         state.early[i] = 0.0
 

@@ -162,7 +162,7 @@ def out_of_range(learned: RecordArray, mu_nominal: NDArray[np.float64]) -> str:
         "radius_error": np.abs(row["radius_error"]) <= RADIUS_ERROR_LIMIT,
         "radius_sigma": np.isfinite(row["radius_sigma"]) & (row["radius_sigma"] > 0),
         "joint": np.abs(row["joint"]) <= JOINT_LIMIT,
-        "joint_sigma": np.isfinite(row["joint_sigma"]) & (row["joint_sigma"] >= 0),
+        "joint_covariance": np.isfinite(row["joint_covariance"]),
         "disc_excess": (row["disc_excess"] >= 0) & (row["disc_excess"] <= DISC_EXCESS_LIMIT),
         "brakings": np.asarray(row["brakings"] >= 0),
     }

@@ -7,7 +7,7 @@ what a car is learns from what fits. Beyond four gates they are rejected."""
 
 import math
 
-from ecu.estimation.joint.layout import BIAS, MU, SLOPE, N, V
+from ecu.estimation.joint.layout import BIAS, LEVEL, SLOPE, N, V
 from ecu.jit import Record, kernel
 
 GATE = 3.0
@@ -20,6 +20,13 @@ def forget(state: Record, i: int, variance: float) -> None:
     for j in range(N):
         state.p[i, j] = state.p[j, i] = 0.0
     state.p[i, i] = variance
+
+
+@kernel
+def clear_state(state: Record, i: int, variance: float) -> None:
+    """Let a state be zero with `variance` and no covariance."""
+    state.x[i] = 0.0
+    forget(state, i, variance)
 
 
 @kernel
@@ -39,20 +46,6 @@ def drift_speed(state: Record, time: float) -> None:
             p[j, V] = p[V, j]
     both = p[BIAS, BIAS] + 2.0 * p[BIAS, SLOPE] + p[SLOPE, SLOPE]
     p[V, V] -= time * (2.0 * (p[V, BIAS] + p[V, SLOPE]) + time * both)
-
-
-@kernel
-def walk_friction(state: Record, common: float, front: float, rear: float, wheel: float) -> None:
-    """Add to the variance of the four frictions: of all together, of each axle, of each wheel."""
-    p = state.p
-    for i in range(4):
-        for j in range(4):
-            add = common
-            if i // 2 == j // 2:
-                add += front if i < 2 else rear
-            if i == j:
-                add += wheel
-            p[MU + i, MU + j] += add
 
 
 @kernel
@@ -79,7 +72,7 @@ def correct(state: Record, innovation: float, variance: float) -> float:
     outlier = ratio > GATE * GATE
     if outlier:
         total = innovation * innovation / (GATE * GATE)
-    only_speed = outlier and not free[MU]
+    only_speed = outlier and not free[LEVEL]
     scale = innovation / total
     for i in range(N):
         if _corrects(free, i, only_speed):

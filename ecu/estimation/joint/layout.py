@@ -1,6 +1,7 @@
 """The states of the joint observer: what one filter for the whole vehicle knows and how well.
 
-Friction, stiffness, mass, peak, motor scale and drag are logarithms of the ratio to the configuration:
+Friction of a lining is its level, which outlives the brake application, times its axle's change within the
+application. Friction, stiffness, mass, motor scale and drag are logarithms of the ratio to the configuration:
 scaling mass and all frictions together is invisible to friction braking, and in logarithms that direction is
 constant, so relinearising cannot invent knowledge of it."""
 
@@ -13,14 +14,14 @@ from ecu.estimation.joint.pressure import PRESSURE_STATE
 from ecu.records import N_JOINT
 
 V: Final = 0  # vehicle speed [m/s]
-MU: Final = 1  # four: ln of lining friction over nominal
+LEVEL: Final = 1  # four: ln of lining friction over nominal, as it outlives a brake application
 STIFFNESS: Final = 5  # ln of the tyres' slip stiffness over configured
 RATIO: Final = 6  # ln of rear over front stiffness, beyond configured
 RADIUS: Final = 7  # four: ln of a rolling radius over (A.4), beyond the common one
 BIAS: Final = 11  # accelerometer bias [m/s^2]
 SLOPE: Final = 12  # gravity along the road [m/s^2], uphill positive
 MASS: Final = 13  # ln of mass over configured
-PEAK: Final = 14  # ln of the tyres' peak adhesion over nominal
+PEAK: Final = 14  # of the tyres' peak adhesion, see `peak_adhesion`
 LOAD: Final = 15  # exponent of stiffness over load, beyond configured
 SINKING: Final = 16  # ln of the radius's change per load over (A.4)
 MOTOR: Final = 17  # ln of motor torque over reported
@@ -29,8 +30,15 @@ OFFSET: Final = 19  # two: pressure [bar] lost beyond push-out and sensor, per a
 DELAY: Final = 21  # of the speed reference beyond configured [s]
 DRIVE: Final = 22  # two: unknown drive of an axle over mass [m/s^2]; only considered
 ROLLING: Final = 24  # ln of all rolling radii: nothing but a speed reference tells it
-RATE: Final = 25  # change of all four MU while the pads rub [1/s]
+RATE: Final = 25  # change of CHANGE, of both axles [1/s]
+CHANGE: Final = 26  # two: ln of an axle's friction over its level, within an application
+SLIP_ERROR: Final = 28  # two: of an axle's slip, by drive that nobody reports; only considered
+SIDE: Final = 30  # ln of the stiffness of the left tyres over the right ones; only considered
+PEAK_LOAD: Final = 31  # exponent of peak adhesion over load, beyond the usual; only considered
 N: Final = N_JOINT
+
+PASSING: Final = (V, SLOPE, RATE, CHANGE, CHANGE + 1, DRIVE, DRIVE + 1, SLIP_ERROR, SLIP_ERROR + 1)
+"""What a brake application, or a drive, leaves behind: kept nowhere."""
 
 WINDOW_STATE: Final = np.dtype(
     [
@@ -81,6 +89,7 @@ JOINT_STATE: Final = np.dtype(
         ("releasing", "u1"),
         ("untrusted_s", "f8"),  # time since a wheel was last believed [s]
         ("hold_s", "f8"),  # no learning for this long, a wheel had left the tyre's range
+        ("reference_s", "f8"),  # time since a speed reference came [s]
         ("smooth_pressure", "f8", (4,)),  # bar above push-out
         ("readings", "f8", (4,)),  # mean pressure readings of released brakes [bar]
         ("last_accel", "f8"),  # of the last window [m/s^2]
@@ -91,12 +100,13 @@ JOINT_STATE: Final = np.dtype(
         ("last_pressure", "f8", (4,)),  # of the last window [bar]
         ("last_slip", "f8", (4,)),
         ("slip", "f8", (4,)),
+        ("curved", "f8"),  # part of the last wheel's slip beyond that of a linear tyre
         ("force", "f8", (4,)),  # N
         ("observed", "u1", (4,)),  # friction was corrected in the last window
-        ("way", "f8", (4,)),  # over which friction was observed in this braking [m]
-        ("course", "f8", (4,)),  # its integral over this way [m]
+        ("heat", "f8", (4,)),  # relative standard deviation of friction by its disc's temperature
         ("ratio", "f8", (6,)),  # squared innovation over its variance: wheels, total force, speed reference
         ("pull", "f8", (4,)),  # the wheels' test ratios up to the gate, with the sign of the innovation
+        ("at_bound", "u1"),  # a learned state is at its bound
         ("reversing", "u1"),
         ("reset", "u1"),
     ],

@@ -1,47 +1,46 @@
 """What the joint observer gives to the rest of the ECU, and what it keeps between drives.
 
-Kept are the states but speed, slope and rate, with their standard deviations; of the correlations only the
-one that physics gives back: an error of mass is in every friction alike. What may have changed in between
-(load, tyres, weather) is less sure after a restart."""
+Kept are the states that outlive a drive, with their whole covariance: what a car's pressures cannot tell
+apart stays together after a restart as well. What may have changed in between (load, tyres, weather) is less
+sure then; the peak belongs to the road and is forgotten."""
 
 import math
 
 import numpy as np
 
-from ecu.estimation.friction import GREATEST_RATIO, LEAST_RATIO, resting_mode, well_observed
-from ecu.estimation.joint.kalman import forget
+from ecu.estimation.friction import GREATEST_RATIO, LEAST_RATIO, resting_mode
 from ecu.estimation.joint.layout import (
     BIAS,
+    CHANGE,
     DELAY,
     DRAG,
+    LEVEL,
     MASS,
-    MU,
-    OFFSET,
+    PASSING,
     PEAK,
     RADIUS,
     RATE,
     ROLLING,
-    SLOPE,
     STIFFNESS,
     N,
-    V,
 )
 from ecu.estimation.joint.observer import WINDOW_S, start_joint
 from ecu.estimation.joint.pressure import follows
-from ecu.estimation.joint.prior import set_prior
+from ecu.estimation.joint.kalman import clear_state
+from ecu.estimation.joint.prior import set_prior, widen_levels
 from ecu.estimation.motion import usable
 from ecu.jit import Record, kernel
 from ecu.signals import CALLIPER_PRESSURE, OBSERVING, WHEEL_SPEED
 
+KEPT = np.array([i for i in range(N) if i not in PASSING])
+
 # Standard deviations that a pause of unknown length adds.
 PAUSE = np.zeros(N)
-PAUSE[STIFFNESS], PAUSE[PEAK] = 0.05, 0.10
+PAUSE[STIFFNESS] = 0.05
 PAUSE[RADIUS : RADIUS + 4] = PAUSE[ROLLING] = 0.0003
 PAUSE[BIAS], PAUSE[MASS], PAUSE[DRAG] = 0.005, 0.005, 0.02
 PAUSE[DELAY] = 0.001
-MU_PAUSE = 0.03
-SPREAD = 1.0 / 3.0  # variance of an even change over the square of its end
-TRANSFER_ERROR = 0.06  # of a load's change over the load at rest, as error of friction
+LEVEL_PAUSE = 0.03  # of all levels alike
 
 
 @kernel
@@ -49,37 +48,44 @@ def restore_joint(params: Record, state: Record, learned: Record) -> None:
     """Begin with what was learned; with the prior where nothing was."""
     set_prior(params, state)
     x, p = state.x, state.p
-    if learned.joint_sigma[MASS] > 0.0:
-        for i in range(N):
-            if i in (V, SLOPE, RATE) or MU <= i < MU + 4 or OFFSET <= i < OFFSET + 2:
-                continue
+    if learned.joint_known:
+        peak = p[PEAK, PEAK]
+        place = 0
+        for k in range(len(KEPT)):
+            i = KEPT[k]
             x[i] = learned.joint[i]
-            p[i, i] = min(learned.joint_sigma[i] ** 2 + PAUSE[i] ** 2, p[i, i])
-    for i in range(4):
-        if learned.observed_s[i] <= 0.0:
-            continue
-        x[MU + i] = math.log(learned.mu_b[i] / params.mu_nominal[i])
-        relative = learned.sigma_mu_b[i] / learned.mu_b[i]
-        p[MU + i, MU + i] = min(relative * relative + MU_PAUSE**2, p[MU + i, MU + i])
-        p[MU + i, MASS] = p[MASS, MU + i] = min(p[MASS, MASS], 0.8 * relative * relative)
-    for i in range(4):
-        for j in range(4):
-            both = learned.observed_s[i] > 0.0 and learned.observed_s[j] > 0.0
-            if both and i != j:  # what both owe to the mass
-                p[MU + i, MU + j] = p[MU + i, MASS] * p[MU + j, MASS] / p[MASS, MASS]
-            elif (learned.observed_s[i] > 0.0) != (learned.observed_s[j] > 0.0):
-                p[MU + i, MU + j] = 0.0
+            for m in range(k + 1):
+                p[i, KEPT[m]] = p[KEPT[m], i] = learned.joint_covariance[place]
+                place += 1
+            p[i, i] += PAUSE[i] ** 2
+        widen_levels(state, LEVEL_PAUSE**2, 0.0, 0.0)
+        clear_state(state, PEAK, peak)
     start_joint(state)
 
 
 @kernel
-def keep_joint(state: Record, learned: Record) -> None:
+def keep_joint(params: Record, state: Record, friction: Record, learned: Record) -> None:
     """Write what is known now into `learned`."""
-    for i in range(N):
-        if i in (V, SLOPE, RATE):
-            continue
+    learned.joint_known = 1
+    place = 0
+    for k in range(len(KEPT)):
+        i = KEPT[k]
         learned.joint[i] = state.x[i]
-        learned.joint_sigma[i] = math.sqrt(max(state.p[i, i], 0.0))
+        for m in range(k + 1):
+            learned.joint_covariance[place] = state.p[i, KEPT[m]]
+            place += 1
+    for i in range(4):
+        mu = params.mu_nominal[i] * math.exp(state.x[LEVEL + i])
+        learned.mu_b[i], learned.sigma_mu_b[i] = mu, mu * _sigma(params, state, i, False)
+
+
+@kernel
+def hand_over_level(params: Record, state: Record, friction: Record, learned: Record) -> None:
+    """At the end of a braking: count what it observed."""
+    learned.brakings += 1
+    for i in range(4):
+        learned.observed_s[i] += friction.observed_s[i]
+        friction.observed_s[i] = 0.0
 
 
 @kernel
@@ -88,65 +94,23 @@ def _at_bound(ratio: float) -> bool:
 
 
 @kernel
-def begin_course(state: Record) -> None:
-    """Begin to note the friction of a braking."""
-    for i in range(4):
-        state.way[i] = state.course[i] = 0.0
-
-
-@kernel
-def take_mean(params: Record, state: Record, friction: Record) -> None:
-    """At the end of a braking let friction be its mean over the distance.
-
-    Friction changes within a braking as the pads heat and comes back until the next: its mean says more of
-    that one than its last value. How far it went stays in its variance. An estimate that is not sure stays:
-    its errors balance those of the other wheels.
-    """
-    for i in range(4):
-        if not well_observed(friction, i):
-            return
-    for i in range(4):
-        mean = state.course[i] / state.way[i]
-        change = math.log(friction.mu[i] / mean)
-        state.x[MU + i] = math.log(mean / params.mu_nominal[i])
-        state.p[MU + i, MU + i] += SPREAD * change * change
-        friction.sigma[i] *= mean / friction.mu[i]
-        friction.mu[i] = mean
-
-
-@kernel
-def settle_friction(params: Record, state: Record, learned: Record) -> None:
-    """Let friction that a braking left at its bound go back, of all wheels, to what is the base of the next.
-
-    An estimate that is only unsure stays: its errors balance those of the other axle.
-    """
-    credible = True
-    for i in range(MU, MU + 4):
-        credible = credible and not _at_bound(math.exp(state.x[i]))
-    if credible:
-        return
-    for i in range(4):
-        state.x[MU + i] = math.log(learned.mu_b[i] / params.mu_nominal[i])
-        forget(state, MU + i, (learned.sigma_mu_b[i] / learned.mu_b[i]) ** 2 + MU_PAUSE**2)
-
-
-@kernel
 def friction_now(state: Record, i: int) -> float:
     """Return ln of friction over nominal: what the middle of the last window had, moved on by its rate."""
-    moved: float = state.x[MU + i] + state.x[RATE] * (0.5 * WINDOW_S + state.window.time)
+    ahead = 0.5 * WINDOW_S + state.window.time
+    moved: float = state.x[LEVEL + i] + state.x[CHANGE + i // 2] + state.x[RATE] * ahead
     return moved
 
 
 @kernel
-def _systematic(params: Record, state: Record, load: Record, i: int) -> float:
-    """Return the variance of ln friction that does not average out.
-
-    Load transfer is known to a few per cent; what sets left against right may be the road's as well.
-    """
-    transfer = TRANSFER_ERROR * (load[i] / params.static_load[i] - 1.0)
-    side = 0.5 * (state.x[MU + i] - state.x[MU + (i ^ 1)])
-    total: float = transfer * transfer + side * side
-    return total
+def _sigma(params: Record, state: Record, i: int, now: bool) -> float:
+    """Return the standard deviation of ln friction: of the level, or of what it is `now`."""
+    p, level, change = state.p, LEVEL + i, CHANGE + i // 2
+    variance = p[level, level]
+    if now:
+        variance += 2.0 * p[level, change] + p[change, change]
+    if _at_bound(math.exp(state.x[level])):
+        variance = max(variance, params.sigma_mu_initial**2)
+    return math.sqrt(max(variance, 0.0))
 
 
 @kernel
@@ -156,28 +120,21 @@ def publish_friction(
     friction: Record,
     learned: Record,
     inputs: Record,
-    load: Record,
     braking: bool,
     dt: float,
 ) -> None:
     """Overwrite friction, its standard deviation and mode of every corner from the joint observer."""
     friction.reset = state.reset
     for i in range(4):
-        nominal = params.mu_nominal[i]
-        ratio = math.exp(friction_now(state, i))
-        mu = nominal * ratio
-        variance = state.p[MU + i, MU + i] + _systematic(params, state, load, i)
+        mu = params.mu_nominal[i] * math.exp(friction_now(state, i))
+        sigma = _sigma(params, state, i, True)
         if state.observed[i] and follows(state.pressures, i):
             above = max(state.smooth_pressure[i], 1.0)
-            variance += state.pressures.variance[i] / (above * above)
-        if _at_bound(ratio):
-            variance = max(variance, params.sigma_mu_initial**2)
-        friction.mu[i], friction.sigma[i] = mu, mu * math.sqrt(variance)
+            sigma = math.sqrt(sigma * sigma + state.pressures.variance[i] / (above * above))
+        friction.mu[i], friction.sigma[i] = mu, mu * sigma
         good = usable(inputs, WHEEL_SPEED + i) and usable(inputs, CALLIPER_PRESSURE + i)
         if braking and state.observed[i] and good:
             friction.observed_s[i] += dt
-            state.way[i] += state.x[V] * dt
-            state.course[i] += mu * state.x[V] * dt
             friction.mode[i] = OBSERVING
         else:
             friction.mode[i] = resting_mode(params, friction, learned, good, i)

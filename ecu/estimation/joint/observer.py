@@ -23,12 +23,13 @@ from ecu.estimation.friction import (
 from ecu.estimation.joint.kalman import GATE, clear_derivatives, correct, forget
 from ecu.estimation.joint.layout import (
     BIAS,
+    CHANGE,
     DELAY,
     DRAG,
     LOAD,
     MASS,
     MOTOR,
-    MU,
+    LEVEL,
     OFFSET,
     PEAK,
     RADIUS,
@@ -42,14 +43,14 @@ from ecu.estimation.joint.layout import (
     V,
 )
 from ecu.estimation.joint.pressure import follows, learn_zero
-from ecu.estimation.joint.prior import forget_rate, pressure_change, set_prior, walk
+from ecu.estimation.joint.prior import UNKNOWN_DRIVE, forget_rate, pressure_change, set_prior, walk
 from ecu.estimation.joint.sliding import HOLD_S, share_force, watch_tyres, wheel_slides
 from ecu.estimation.joint.snapshot import go_back, keep, keep_newer
-from ecu.estimation.joint.wheel import brake_lever, brake_torque, predict_balance, predict_wheel
+from ecu.estimation.joint.wheel import brake_lever, brake_torque, friction, predict_balance, predict_wheel, unknown_share
 from ecu.estimation.joint.window import close_window, gather, open_window
 from ecu.estimation.motion import mean_wheel_speed, usable
 from ecu.jit import Record, kernel
-from ecu.params import BAR
+from ecu.params import BAR, GRAVITY
 from ecu.signals import (
     ABS_ACTIVE,
     ACCEL_X,
@@ -74,8 +75,10 @@ SNAPSHOT_S = 0.2
 BALANCE_FLOOR = 0.01  # m/s^2 that the balance leaves out
 BALANCE_SHARE = 0.004  # of the deceleration
 SKEW_FOLLOWED, SKEW_REPORTED = 0.5, 3.0  # windows between pressure and force; a foreign log is worse
+ACROSS = 0.4  # of the lateral acceleration: stands for less that lasts a second
 SKEW_ACCEL = 0.5  # windows between acceleration and torques
 TRANSIENT = 0.5  # of a slip's change since the last window
+CURVED = 1.0  # of a slip's part beyond that of a linear tyre: what the peak is not known for
 CORNERING = 1.0  # of slip, per squared adhesion used sideways: then load and slip angle are not well known
 UNEXPLAINED = 0.15  # m/s^2 while rolling: someone drives or brakes the car without saying so
 TWIN = 3.0  # bar, of a pressure taken from the other side
@@ -126,7 +129,9 @@ def _watch_release(state: Record, braking: bool) -> None:
     """When the brakes are released, friction goes back to what it was before that could disturb it."""
     falling = braking and min(pressure_change(state, 0), pressure_change(state, 2)) < -RELEASE
     if falling and not state.releasing:
-        for i in range(MU, MU + 4):
+        for i in range(LEVEL, LEVEL + 4):
+            state.x[i] = state.kept_x[1, i]
+        for i in range(CHANGE, CHANGE + 2):
             state.x[i] = state.kept_x[1, i]
     state.releasing = 1 if falling else 0
 
@@ -150,8 +155,8 @@ def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> 
         return
     for i in range(4):
         free[RADIUS + i] = 1
-        free[MU + i] = 1 if braking and not state.releasing else 0
-    free[RATE] = free[MU]
+        free[LEVEL + i] = 1 if braking and not state.releasing else 0
+    free[RATE] = free[CHANGE] = free[CHANGE + 1] = free[LEVEL]
     free[DELAY] = 1
     free[ROLLING] = 1 if state.window.reference_samples > 0 else 0
     if state.releasing:
@@ -239,7 +244,9 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     before = x[V]
     for channel in range(6):
         state.ratio[channel] = math.nan
+    state.reference_s += time
     if w.reference_samples > 0:
+        state.reference_s = 0.0
         clear_derivatives(state)
         state.h[V], state.h[DELAY] = 1.0, -w.reference_change
         state.ratio[5] = correct(state, w.reference, params.sigma_vehicle_speed**2 / w.reference_samples)
@@ -285,7 +292,8 @@ def _fuse_wheel(params: Record, state: Record, i: int, before: float, moving: bo
     variance += per_bar**2 * (w.pressure_variance[i] + _skew(state, i) ** 2)
     transient = TRANSIENT * (state.slip[i] - state.last_slip[i]) * ground / params.wheel_radius[i]
     corner = CORNERING * w.across * w.across * state.slip[i] * ground / params.wheel_radius[i]
-    variance += transient * transient + corner * corner
+    curved = CURVED * state.curved * ground / params.wheel_radius[i]
+    variance += transient * transient + corner * corner + curved * curved
     state.last_slip[i] = state.slip[i]
     variance += state.per_torque**2 * _motor_variance(state, i, observing)
     innovation = w.omega[i] - omega
@@ -318,8 +326,9 @@ def _fuse_balance(params: Record, state: Record, braking: bool) -> None:
     left = predict_balance(params, state)
     variance = params.sigma_accel**2 / w.cycles + BALANCE_FLOOR**2 + (BALANCE_SHARE * w.accel) ** 2
     variance += (SKEW_ACCEL * (w.accel - state.last_accel)) ** 2
+    variance += (ACROSS * w.across * GRAVITY) ** 2 + (UNKNOWN_DRIVE * unknown_share(params, state)) ** 2
     for i in range(4):
-        per_bar = brake_lever(params, i) * params.mu_nominal[i] * math.exp(state.x[MU + i])
+        per_bar = brake_lever(params, i) * friction(params, state, i)
         per_torque = 1.0 / (params.wheel_radius[i] * params.mass)
         per_bar *= per_torque
         variance += per_torque**2 * _motor_variance(state, i, braking)
@@ -357,5 +366,5 @@ def _look_after(params: Record, state: Record, braking: bool) -> None:
     state.sliding = sliding
     if state.hold_s <= 0.0 and not state.releasing and state.kept_s >= SNAPSHOT_S:
         keep_newer(state)
-    for i in range(4):
-        x[MU + i] = min(max(x[MU + i], math.log(LEAST_RATIO)), math.log(GREATEST_RATIO))
+    for i in range(LEVEL, LEVEL + 4):
+        x[i] = min(max(x[i], math.log(LEAST_RATIO)), math.log(GREATEST_RATIO))

@@ -1,24 +1,31 @@
-"""What is known before anything is learned, and how fast each state may wander from it."""
+"""What is known before anything is learned, what a brake application begins with, and how fast each state
+may wander from it."""
+
+import math
 
 import numpy as np
 
-from ecu.estimation.joint.kalman import drift_speed, forget, walk_friction
+from ecu.estimation.joint.kalman import clear_state, drift_speed, forget
 from ecu.estimation.joint.layout import (
     BIAS,
+    CHANGE,
     DELAY,
     DRAG,
     DRIVE,
+    LEVEL,
     LOAD,
     MASS,
     MOTOR,
-    MU,
     OFFSET,
     PEAK,
+    PEAK_LOAD,
     RADIUS,
     RATE,
     RATIO,
     ROLLING,
+    SIDE,
     SINKING,
+    SLIP_ERROR,
     SLOPE,
     STIFFNESS,
     N,
@@ -30,16 +37,23 @@ PRIOR = np.zeros(N)
 """Standard deviations before anything is learned; friction, motor scale and speed are set apart."""
 PRIOR[STIFFNESS], PRIOR[RATIO] = 0.25, 0.06
 PRIOR[BIAS], PRIOR[SLOPE] = 0.1, 0.3
-PRIOR[MASS], PRIOR[PEAK], PRIOR[LOAD], PRIOR[SINKING] = 0.04, 0.25, 0.05, 0.06
+PRIOR[MASS], PRIOR[PEAK], PRIOR[LOAD], PRIOR[SINKING] = 0.03, 0.25, 0.05, 0.10
 PRIOR[DRAG] = 0.10
 PRIOR[RADIUS : RADIUS + 4], PRIOR[ROLLING] = 0.0015, 0.004
 PRIOR[OFFSET : OFFSET + 2] = 0.3
 PRIOR[DELAY] = 0.005
-PRIOR[RATE] = 0.1
-PRIOR[DRIVE : DRIVE + 2] = 0.25  # drag and creep of an engine in gear
+PRIOR[SIDE], PRIOR[PEAK_LOAD] = 0.02, 0.08
 
 # Standard deviations of friction's prior, of its logarithm: all four together, per axle, per wheel.
-MU_COMMON, MU_AXLE, MU_WHEEL = 0.13, 0.17, 0.06
+LEVEL_COMMON, LEVEL_AXLE, LEVEL_WHEEL = 0.13, 0.17, 0.06
+# By how much the level of an application differs from that of the one before.
+STEP_COMMON, STEP_AXLE, STEP_WHEEL = 0.03, 0.02, 0.005
+# How far friction goes from its level within an application, and how long it takes to forget that.
+CHANGE_COMMON, CHANGE_AXLE, CHANGE_S = 0.06, 0.03, 2.0
+CHANGE_BY_PRESSURE = 0.05  # of an axle's friction, per relative change of its pressure
+RATE_SIGMA = 0.1  # 1/s
+UNKNOWN_DRIVE = 0.3  # m/s^2 per axle: drag of an engine, down-shifts
+UNKNOWN_SLIP, UNKNOWN_SLIP_BY_AGE = 0.003, 0.01  # of an axle's slip by it: with a speed reference, without
 
 # Random walks per square root of a second.
 WALK = np.zeros(N)
@@ -51,9 +65,21 @@ WALK[PEAK], WALK[LOAD], WALK[SINKING] = 0.01, 0.0005, 0.0005
 WALK[MASS], WALK[MOTOR], WALK[DRAG] = 1e-5, 1e-5, 0.0005
 WALK[DELAY] = 1e-4
 WALK[RATE] = 0.1
-MU_WALK_COMMON, MU_WALK_AXLE, MU_WALK_WHEEL = 0.08, 0.02, 0.005
-MU_WALK_PRESSURE = 0.05  # of an axle's friction, per relative change of its pressure
-MU_WALK_HELD = 0.003
+LEVEL_WALK = 0.01  # of all levels alike while the pads rub
+
+
+@kernel
+def widen_levels(state: Record, common: float, axle: float, wheel: float) -> None:
+    """Add to the variance of the four levels: of all together, of each axle, of each wheel."""
+    p = state.p
+    for i in range(4):
+        for j in range(4):
+            add = common
+            if i // 2 == j // 2:
+                add += axle
+            if i == j:
+                add += wheel
+            p[LEVEL + i, LEVEL + j] += add
 
 
 @kernel
@@ -67,10 +93,46 @@ def set_prior(params: Record, state: Record) -> None:
         p[i, i] = PRIOR[i] ** 2
     p[V, V] = 0.25
     p[MOTOR, MOTOR] = params.sigma_motor_torque**2
+    widen_levels(state, LEVEL_COMMON**2, LEVEL_AXLE**2, LEVEL_WHEEL**2)
+
+
+@kernel
+def begin_application(state: Record, unknown: float, heat: Record) -> None:
+    """Let the level have changed since the last application, and begin with friction at its level.
+
+    Args:
+        state: `JOINT_STATE`, overwritten.
+        unknown: share of the drive that nobody reports, 0 to 1.
+        heat: relative standard deviation that each friction has gained by its disc's temperature, shape (4,).
+    """
+    p = state.p
+    widen_levels(state, STEP_COMMON**2, STEP_AXLE**2, STEP_WHEEL**2)
     for i in range(4):
         for j in range(4):
-            axle = MU_AXLE**2 if i // 2 == j // 2 else 0.0
-            p[MU + i, MU + j] = MU_COMMON**2 + axle + (MU_WHEEL**2 if i == j else 0.0)
+            p[LEVEL + i, LEVEL + j] += heat[i] * heat[j]
+    for axle in range(2):
+        clear_state(state, CHANGE + axle, CHANGE_COMMON**2 + CHANGE_AXLE**2)
+    p[CHANGE, CHANGE + 1] = p[CHANGE + 1, CHANGE] = CHANGE_COMMON**2
+    forget_rate(state)
+    slip = UNKNOWN_SLIP + UNKNOWN_SLIP_BY_AGE * min(state.reference_s, 1.0)
+    for axle in range(2):
+        clear_state(state, DRIVE + axle, (UNKNOWN_DRIVE * unknown) ** 2)
+        clear_state(state, SLIP_ERROR + axle, (slip * unknown) ** 2)
+
+
+@kernel
+def end_application(state: Record) -> None:
+    """Let the level stand for friction again: what an application did to it passes."""
+    for axle in range(2):
+        clear_state(state, CHANGE + axle, 0.0)
+    clear_state(state, RATE, 0.0)
+
+
+@kernel
+def forget_rate(state: Record) -> None:
+    """Let friction's rate be unknown."""
+    state.x[RATE] = 0.0
+    forget(state, RATE, RATE_SIGMA**2)
 
 
 @kernel
@@ -84,22 +146,24 @@ def pressure_change(state: Record, left: int) -> float:
 
 @kernel
 def _change_friction(state: Record, time: float) -> None:
-    """Move friction on by its rate."""
+    """Move friction on: it returns to its level, driven by its rate and by what is new."""
     x, p = state.x, state.p
-    for i in range(MU, MU + 4):
-        x[i] += time * x[RATE]
+    stays = math.exp(-time / CHANGE_S)
+    for axle in range(2):
+        i = CHANGE + axle
+        x[i] = stays * x[i] + time * x[RATE]
         for j in range(N):
-            p[i, j] += time * p[RATE, j]
-    for i in range(MU, MU + 4):
+            p[i, j] = stays * p[i, j] + time * p[RATE, j]
+    for axle in range(2):
+        i = CHANGE + axle
         for j in range(N):
-            p[j, i] += time * p[j, RATE]
-
-
-@kernel
-def forget_rate(state: Record) -> None:
-    """Let friction's rate be unknown."""
-    state.x[RATE] = 0.0
-    forget(state, RATE, PRIOR[RATE] ** 2)
+            p[j, i] = stays * p[j, i] + time * p[j, RATE]
+    new = 1.0 - stays * stays
+    for i in range(2):
+        rise = CHANGE_BY_PRESSURE * max(pressure_change(state, 2 * i), 0.0)
+        p[CHANGE + i, CHANGE + i] += new * (CHANGE_COMMON**2 + CHANGE_AXLE**2) + rise * rise
+    p[CHANGE, CHANGE + 1] += new * CHANGE_COMMON**2
+    p[CHANGE + 1, CHANGE] += new * CHANGE_COMMON**2
 
 
 @kernel
@@ -108,14 +172,8 @@ def walk(state: Record, rubbing: bool, time: float) -> None:
     p = state.p
     drift_speed(state, time)
     for i in range(N):
-        p[i, i] += WALK[i] ** 2 * time
+        if i != RATE or rubbing:
+            p[i, i] += WALK[i] ** 2 * time
     if rubbing:
         _change_friction(state, time)
-        rise_front = max(pressure_change(state, 0), 0.0)
-        rise_rear = max(pressure_change(state, 2), 0.0)
-        front = MU_WALK_AXLE**2 * time + (MU_WALK_PRESSURE * rise_front) ** 2
-        rear = MU_WALK_AXLE**2 * time + (MU_WALK_PRESSURE * rise_rear) ** 2
-        walk_friction(state, MU_WALK_COMMON**2 * time, front, rear, MU_WALK_WHEEL**2 * time)
-    elif p[MU, MU] < MU_COMMON**2 + MU_AXLE**2:
-        held = MU_WALK_HELD**2 * time
-        walk_friction(state, held, held, held, 0.2 * held)
+        widen_levels(state, LEVEL_WALK**2 * time, 0.0, 0.0)

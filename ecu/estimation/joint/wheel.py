@@ -17,17 +17,21 @@ from ecu.estimation.joint.kalman import clear_derivatives
 from ecu.estimation.joint.layout import (
     BIAS,
     DRAG,
+    CHANGE,
     DRIVE,
+    LEVEL,
     LOAD,
     MASS,
     MOTOR,
-    MU,
     OFFSET,
     PEAK,
+    PEAK_LOAD,
     RADIUS,
     RATIO,
     ROLLING,
+    SIDE,
     SINKING,
+    SLIP_ERROR,
     STIFFNESS,
     V,
 )
@@ -39,6 +43,7 @@ SHAPE = 1.6  # c of the Magic Formula
 NOMINAL_PEAK = 0.9  # adhesion
 PEAK_DEGRESSION = 0.05  # adhesion falls a little with load (Figure A.6)
 UNKNOWN_PER_ERROR = 2.0  # an engine's torque that is known to half only may as well not be known
+LEAST_OF_PEAK = 0.2  # of 1 - 4 y: a peak half as high again as usual
 STEEPEST = 0.93  # of the peak; the curve goes on straight from there
 
 
@@ -83,18 +88,37 @@ def radius(params: Record, state: Record, i: int, load: float) -> tuple[float, f
 
 
 @kernel
+def friction(params: Record, state: Record, i: int) -> float:
+    """Return the lining friction of a wheel."""
+    mu: float = params.mu_nominal[i] * math.exp(state.x[LEVEL + i] + state.x[CHANGE + i // 2])
+    return mu
+
+
+@kernel
+def peak_adhesion(state: Record, relative: float) -> float:
+    """Return the tyres' peak adhesion at a load over that at rest.
+
+    D = D_0 (1 - 4 y)^(-1/4): slip near the peak is about linear in y, so a y that noise has pushed up can
+    come back; in ln D its derivative would be gone by then.
+    """
+    y = state.x[PEAK]
+    nominal: float = NOMINAL_PEAK * max(1.0 - 4.0 * y, LEAST_OF_PEAK) ** -0.25
+    return nominal * relative ** (state.x[PEAK_LOAD] - PEAK_DEGRESSION)
+
+
+@kernel
 def brake_torque(params: Record, state: Record, i: int, pressure: float) -> float:
     """Return the brake torque [N m] at a pressure above push-out [bar]."""
-    mu = params.mu_nominal[i] * math.exp(state.x[MU + i])
+    mu = friction(params, state, i)
     torque: float = brake_lever(params, i) * mu * max(pressure - state.x[OFFSET + i // 2], 0.0)
     return torque
 
 
 @kernel
-def _unknown_share(params: Record, state: Record) -> float:
+def unknown_share(params: Record, state: Record) -> float:
     """Return what is unknown of the drive, over that of a car that reports no motor torque."""
     share: float = min(UNKNOWN_PER_ERROR * params.sigma_motor_torque, 1.0)
-    return share if state.window.motor_reported else 1.0
+    return share if state.motors.samples[0] + state.motors.samples[2] > 0 else 1.0
 
 
 @kernel
@@ -122,11 +146,13 @@ def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float
     relative = load / params.static_load[i]
     exponent = params.stiffness_degression[i] + x[LOAD]
     rear = x[RATIO] if i >= 2 else 0.0
-    stiffness = params.slip_stiffness[i] * math.exp(x[STIFFNESS] + rear) * relative**-exponent
-    peak = NOMINAL_PEAK * math.exp(x[PEAK]) * relative**-PEAK_DEGRESSION
+    side = 0.5 * x[SIDE] if i % 2 == 0 else -0.5 * x[SIDE]
+    stiffness = params.slip_stiffness[i] * math.exp(x[STIFFNESS] + rear + side) * relative**-exponent
+    peak = peak_adhesion(state, relative)
     used = force * scale
     slip, _, _ = combined_slip(used, w.across, stiffness, peak)
     state.slip[i], state.force[i] = slip, force
+    state.curved = slip - used / stiffness
     if slip < 0.0:
         omega, by_slip = ground * (1.0 + slip) / r, ground / r
     else:
@@ -138,11 +164,12 @@ def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float
     slip, slope, by_peak = combined_slip(used, w.across, stiffness, peak)
     clear_derivatives(state)
     h[V] = omega / max(ground, 0.1)
-    mu = params.mu_nominal[i] * math.exp(x[MU + i])
+    mu = friction(params, state, i)
     lever = brake_lever(params, i)
     by_force = by_slip * slope * scale
     state.per_torque = -by_force / r
-    h[MU + i] = -by_force * lever * mu * max(smooth - x[OFFSET + i // 2], 0.0) / r
+    h[LEVEL + i] = -by_force * lever * mu * max(smooth - x[OFFSET + i // 2], 0.0) / r
+    h[CHANGE + i // 2] = h[LEVEL + i]
     h[OFFSET + i // 2] = by_force * lever * mu / r if smooth > 0.5 else 0.0
     h[MOTOR] = -by_force * driven / r
     h[MASS] = -by_slip * slope * (used + own * scale / r)
@@ -150,10 +177,13 @@ def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float
     if i >= 2:
         h[RATIO] = -by_slip * slip
     h[LOAD] = by_slip * slip * math.log(relative)
-    h[PEAK] = by_slip * by_peak
+    h[PEAK] = by_slip * by_peak / max(1.0 - 4.0 * x[PEAK], LEAST_OF_PEAK)
+    h[PEAK_LOAD] = by_slip * by_peak * math.log(relative)
+    h[SIDE] = -by_slip * slip * (0.5 if i % 2 == 0 else -0.5)
+    h[SLIP_ERROR + i // 2] = by_slip
     h[RADIUS + i] = h[ROLLING] = -omega - by_slip * slope * used  # a larger wheel needs less force
     h[SINKING] = h[RADIUS + i] * sinking / r
-    h[DRIVE + i // 2] = 0.5 * by_force * params.mass * _unknown_share(params, state)
+    h[DRIVE + i // 2] = 0.5 * by_force * params.mass
     return omega
 
 
@@ -176,13 +206,14 @@ def predict_balance(params: Record, state: Record) -> float:
         left += (brake_torque(params, state, i, w.pressure[i]) + driven + own) / (r * mass)
         smooth = state.last_smooth[i]
         linings += brake_torque(params, state, i, smooth) / (r * mass)
-        per_bar = brake_lever(params, i) * params.mu_nominal[i] * math.exp(x[MU + i]) / (r * mass)
-        h[MU + i] = per_bar * max(smooth - x[OFFSET + i // 2], 0.0)
+        per_bar = brake_lever(params, i) * friction(params, state, i) / (r * mass)
+        h[LEVEL + i] = per_bar * max(smooth - x[OFFSET + i // 2], 0.0)
+        h[CHANGE + i // 2] += h[LEVEL + i]
         if smooth > 0.5:
             h[OFFSET + i // 2] -= per_bar
     h[MASS], h[MOTOR] = inert, -inert - linings
     h[BIAS] = -heavier
     h[DRAG] = drag
-    h[DRIVE] = h[DRIVE + 1] = -_unknown_share(params, state)
+    h[DRIVE] = h[DRIVE + 1] = -1.0
     result: float = left
     return result
