@@ -72,7 +72,7 @@ CYCLE: Final = np.dtype(
     ],
     align=True,
 )
-N_JOINT: Final = 32
+N_JOINT: Final = 34
 N_KEPT: Final = 23
 # What the ECU has learned and must not lose: carried between brakings, drives and restarts.
 LEARNED: Final = np.dtype(

@@ -35,9 +35,13 @@ CHANGE: Final = 26  # two: ln of an axle's friction over its level, within an ap
 SLIP_ERROR: Final = 28  # two: of an axle's slip, by drive that nobody reports; only considered
 SIDE: Final = 30  # ln of the stiffness of the left tyres over the right ones; only considered
 PEAK_LOAD: Final = 31  # exponent of peak adhesion over load, beyond the usual; only considered
+MEAN: Final = 32  # two: mean of CHANGE over this application, weighted by pressure
 N: Final = N_JOINT
 
-PASSING: Final = (V, SLOPE, RATE, CHANGE, CHANGE + 1, DRIVE, DRIVE + 1, SLIP_ERROR, SLIP_ERROR + 1)
+PASSING: Final = (
+    *(V, SLOPE, RATE, CHANGE, CHANGE + 1, MEAN, MEAN + 1),
+    *(DRIVE, DRIVE + 1, SLIP_ERROR, SLIP_ERROR + 1),
+)
 """What a brake application, or a drive, leaves behind: kept nowhere."""
 
 WINDOW_STATE: Final = np.dtype(
@@ -75,6 +79,7 @@ JOINT_STATE: Final = np.dtype(
         ("free", "u1", (N,)),  # states that this window may correct; the others are considered only
         ("h", "f8", (N,)),  # derivatives of one measurement
         ("ph", "f8", (N,)),
+        ("weight", "f8"),  # of MEAN so far [bar]
         ("per_torque", "f8"),  # derivative of that measurement by a torque on the wheel
         ("kept_x", "f8", (2, N)),  # snapshots: the newer in row 0
         ("kept_p", "f8", (2, N, N)),

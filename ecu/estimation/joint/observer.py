@@ -43,7 +43,7 @@ from ecu.estimation.joint.layout import (
     V,
 )
 from ecu.estimation.joint.pressure import follows, learn_zero
-from ecu.estimation.joint.prior import UNKNOWN_DRIVE, forget_rate, pressure_change, set_prior, walk
+from ecu.estimation.joint.prior import UNKNOWN_DRIVE, forget_rate, note_change, pressure_change, set_prior, walk
 from ecu.estimation.joint.sliding import HOLD_S, share_force, watch_tyres, wheel_slides
 from ecu.estimation.joint.snapshot import go_back, keep, keep_newer
 from ecu.estimation.joint.wheel import brake_lever, brake_torque, friction, predict_balance, predict_wheel, unknown_share
@@ -264,6 +264,12 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
         if not state.slides[i]:
             state.untrusted_s = 0.0
             _fuse_wheel(params, state, i, before, moving, learning and braking)
+    if state.free[LEVEL]:
+        weight = 0.0
+        for i in range(4):
+            weight += max(state.smooth_pressure[i], 0.0)
+        if weight > 4.0 * APPLIED:
+            note_change(state, weight)
     watch_tyres(state, learning and braking)
     if seen and learning and w.accel_cycles == w.cycles and (braking or w.motor_reported):
         _fuse_balance(params, state, braking)

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 
-from ecu.estimation.joint.kalman import clear_state, drift_speed, forget
+from ecu.estimation.joint.kalman import clear_derivatives, clear_state, correct, drift_speed, forget
 from ecu.estimation.joint.layout import (
     BIAS,
     CHANGE,
@@ -15,6 +15,7 @@ from ecu.estimation.joint.layout import (
     LEVEL,
     LOAD,
     MASS,
+    MEAN,
     MOTOR,
     OFFSET,
     PEAK,
@@ -51,6 +52,7 @@ STEP_COMMON, STEP_AXLE, STEP_WHEEL = 0.03, 0.02, 0.005
 # How far friction goes from its level within an application, and how long it takes to forget that.
 CHANGE_COMMON, CHANGE_AXLE, CHANGE_S = 0.06, 0.03, 2.0
 CHANGE_BY_PRESSURE = 0.05  # of an axle's friction, per relative change of its pressure
+MEAN_ZERO = 0.003  # the mean of changes within an application
 RATE_SIGMA = 0.1  # 1/s
 UNKNOWN_DRIVE = 0.3  # m/s^2 per axle: drag of an engine, down-shifts
 UNKNOWN_SLIP, UNKNOWN_SLIP_BY_AGE = 0.003, 0.01  # of an axle's slip by it: with a speed reference, without
@@ -112,7 +114,9 @@ def begin_application(state: Record, unknown: float, heat: Record) -> None:
             p[LEVEL + i, LEVEL + j] += heat[i] * heat[j]
     for axle in range(2):
         clear_state(state, CHANGE + axle, CHANGE_COMMON**2 + CHANGE_AXLE**2)
+        clear_state(state, MEAN + axle, 0.0)
     p[CHANGE, CHANGE + 1] = p[CHANGE + 1, CHANGE] = CHANGE_COMMON**2
+    state.weight = 0.0
     forget_rate(state)
     slip = UNKNOWN_SLIP + UNKNOWN_SLIP_BY_AGE * min(state.reference_s, 1.0)
     for axle in range(2):
@@ -122,10 +126,42 @@ def begin_application(state: Record, unknown: float, heat: Record) -> None:
 
 @kernel
 def end_application(state: Record) -> None:
-    """Let the level stand for friction again: what an application did to it passes."""
+    """Let the level be the mean of the friction in this application, and stand for it again.
+
+    Changes are from the mean: that theirs is zero, where they were observed, is known now.
+    """
+    free = state.free
+    for i in range(N):
+        free[i] = 0
+    for i in range(LEVEL, LEVEL + 4):
+        free[i] = 1
+    free[RATE] = free[CHANGE] = free[CHANGE + 1] = free[MEAN] = free[MEAN + 1] = 1
+    for axle in range(2):
+        if state.weight > 0.0:
+            clear_derivatives(state)
+            state.h[MEAN + axle] = 1.0
+            correct(state, -state.x[MEAN + axle], MEAN_ZERO**2)
     for axle in range(2):
         clear_state(state, CHANGE + axle, 0.0)
+        clear_state(state, MEAN + axle, 0.0)
     clear_state(state, RATE, 0.0)
+
+
+@kernel
+def note_change(state: Record, weight: float) -> None:
+    """Take friction's change of now into its mean, by `weight` [bar]."""
+    x, p = state.x, state.p
+    state.weight += weight
+    share = weight / state.weight
+    for axle in range(2):
+        m, c = MEAN + axle, CHANGE + axle
+        x[m] += share * (x[c] - x[m])
+        for j in range(N):
+            p[m, j] += share * (p[c, j] - p[m, j])
+    for axle in range(2):
+        m, c = MEAN + axle, CHANGE + axle
+        for j in range(N):
+            p[j, m] += share * (p[j, c] - p[j, m])
 
 
 @kernel
