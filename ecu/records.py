@@ -72,8 +72,8 @@ CYCLE: Final = np.dtype(
     ],
     align=True,
 )
-N_JOINT: Final = 34
-N_KEPT: Final = 23
+N_JOINT: Final = 36
+N_KEPT: Final = 25
 # What the ECU has learned and must not lose: carried between brakings, drives and restarts.
 LEARNED: Final = np.dtype(
     [

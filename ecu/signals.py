@@ -142,6 +142,7 @@ OUTPUT_SIGNALS: Final[tuple[OutputSignal, ...]] = (
     # Beyond the contract: what a reader of results needs to judge the rest.
     OutputSignal("decel_demand_total", "m/s^2", False, ""),  # the larger of pedal map and decel_demand
     OutputSignal("accel_x_road", "m/s^2", False, ""),  # specific force in road axes, pitch removed
+    OutputSignal("overrun", "m/s^2", False, ""),  # deceleration by a drive that nobody reports, while braking
     OutputSignal("braking", "-", False, ""),  # 1 while a brake application lasts
     OutputSignal("calliper_pressure", "bar", True, ""),  # as measured, last sample
     OutputSignal("pressure_uncompensated", "bar", True, ""),  # the demand with the base friction

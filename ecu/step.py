@@ -58,7 +58,7 @@ from ecu.estimation.friction import (
     update_pressure,
 )
 from ecu.estimation.joint.kalman import GATE
-from ecu.estimation.joint.layout import JOINT_STATE, MASS, STIFFNESS, V
+from ecu.estimation.joint.layout import JOINT_STATE, MASS, OVERRUN, STIFFNESS, V
 from ecu.estimation.joint.learned import (
     hand_over_level,
     keep_joint,
@@ -326,6 +326,7 @@ def _publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: i
     y.motor_demand_valid = y.pressure_demand_valid if blends(p) else 0.0
     y.decel_demand_total = decel
     y.accel_x_road = s.motion.accel_x
+    y.overrun = s.joint.x[OVERRUN] if p.observer == JOINT else 0.0
     y.braking = s.application.braking
     y.test_ratio_balance, y.test_ratio_speed = _test_ratio(p, s, 4), _test_ratio(p, s, 5)
     y.particles_last_brake = y.particles_per_km = math.nan

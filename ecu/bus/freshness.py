@@ -20,6 +20,8 @@ FRESHNESS: Final = np.dtype(
     [
         ("stamp_ns", "i8"),  # of the last sample
         ("timeout_ns", "i8"),
+        ("least_timeout_ns", "i8"),
+        ("patience_ns", "i8"),  # between samples of a signal whose time-out follows its rate
         ("shortest_ns", "f8"),  # mean intervals from here …
         ("longest_ns", "f8"),  # … to here are about the rate expected
         ("interval_ns", "f8"),  # mean interval measured
@@ -39,6 +41,8 @@ NEVER: Final = -(2**62)
 RATE_TOLERANCE: Final = 2.0
 """The mean interval may be off by this factor: a lost frame now and then is not a wrong rate."""
 _AVERAGED: Final = 16  # intervals
+PERIODS_UNTIL_LOST: Final = 3.0
+"""Of a signal whose sender promises no rate."""
 
 
 def new_freshness(
@@ -51,6 +55,7 @@ def new_freshness(
     freshness = np.zeros(len(np.atleast_1d(timeout_s)), FRESHNESS)
     freshness["stamp_ns"] = NEVER
     freshness["timeout_ns"] = np.rint(np.asarray(timeout_s) * 1e9)
+    freshness["least_timeout_ns"] = freshness["patience_ns"] = freshness["timeout_ns"]
     freshness["shortest_ns"] = np.asarray(period_s) * 1e9 / RATE_TOLERANCE
     freshness["longest_ns"] = np.asarray(slowest_s) * 1e9 * RATE_TOLERANCE
     freshness["low"] = low
@@ -106,11 +111,13 @@ def accept(inputs: Record, freshness: Any, place: int, value: float, stamp_ns: i
     if stamp_ns < last <= inputs.t_ns:
         return
     interval = stamp_ns - last
-    if known.samples == 0 or interval < 0 or interval > known.timeout_ns:
+    if known.samples == 0 or interval < 0 or interval > known.patience_ns:
         known.samples = 1
     else:
         known.interval_ns += (interval - known.interval_ns) / known.samples
         known.samples = min(known.samples + 1, _AVERAGED)
+        if known.patience_ns > known.least_timeout_ns:
+            known.timeout_ns = max(known.least_timeout_ns, int(PERIODS_UNTIL_LOST * known.interval_ns))
     known.stamp_ns = stamp_ns
     if valid and known.low <= value <= known.high:
         known.valid = 1

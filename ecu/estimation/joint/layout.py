@@ -11,6 +11,7 @@ import numpy as np
 
 from ecu.estimation.joint.motors import MOTORS_STATE
 from ecu.estimation.joint.pressure import PRESSURE_STATE
+from ecu.estimation.joint.sampling import SAMPLING_STATE
 from ecu.records import N_JOINT
 
 V: Final = 0  # vehicle speed [m/s]
@@ -35,6 +36,8 @@ CHANGE: Final = 26  # two: ln of an axle's friction over its level, within an ap
 SLIP_ERROR: Final = 28  # two: of an axle's slip, by drive that nobody reports; only considered
 SIDE: Final = 30  # ln of the stiffness of the left tyres over the right ones; only considered
 PEAK_LOAD: Final = 31  # exponent of peak adhesion over load, beyond the usual; only considered
+SKEW: Final = 34  # by which force follows the pressure reported, beyond the sampling [s]
+OVERRUN: Final = 35  # drag of a drive that nobody reports, while braking, over mass [m/s^2]
 MEAN: Final = 32  # two: mean of CHANGE over this application, weighted by pressure
 N: Final = N_JOINT
 
@@ -57,7 +60,10 @@ WINDOW_STATE: Final = np.dtype(
         ("omega", "f8", (4,)),  # sums over samples [rad/s]
         ("ground", "f8", (4,)),  # m/s, at the samples' own time
         ("omega_samples", "i8", (4,)),
-        ("pressure", "f8", (4,)),  # above push-out [bar]
+        ("pressure", "f8", (4,)),  # above push-out, in the window [bar]
+        ("common_pressure", "f8", (4,)),  # likewise, at the common time of all signals
+        ("common_accel", "f8"),  # at that time [m/s^2]
+        ("balanced", "u1"),  # that time is another one than that of the last balance
         ("pressure_samples", "i8", (4,)),
         ("tracked", "f8", (4,)),  # by the model, sum then mean [bar]
         ("tracked_cycles", "i8", (4,)),
@@ -65,7 +71,6 @@ WINDOW_STATE: Final = np.dtype(
         ("reference", "f8"),  # speed reference less prediction [m/s]
         ("reference_change", "f8"),  # dv/dt at its samples [m/s^2]
         ("reference_samples", "i8"),
-        ("accel_cycles", "i8"),
         ("motor_known", "u1"),
         ("motor_reported", "u1"),
     ],
@@ -87,6 +92,7 @@ JOINT_STATE: Final = np.dtype(
         ("window", WINDOW_STATE),
         ("pressures", PRESSURE_STATE),
         ("motors", MOTORS_STATE),
+        ("sampling", SAMPLING_STATE),
         ("started", "u1"),
         ("slides", "u1", (4,)),  # 1: the wheel is too far from the car's speed to tell it
         ("sliding", "i8"),  # number of such wheels
@@ -102,6 +108,7 @@ JOINT_STATE: Final = np.dtype(
         ("mean_accel", "f8"),  # of the last seconds [m/s^2]
         ("last_smooth_accel", "f8"),  # of the last window [m/s^2]
         ("last_smooth", "f8", (4,)),  # of the last window [bar]
+        ("last_slope", "f8", (4,)),  # of the smooth pressure, in the last window [bar/s]
         ("last_pressure", "f8", (4,)),  # of the last window [bar]
         ("last_slip", "f8", (4,)),
         ("slip", "f8", (4,)),

@@ -31,12 +31,14 @@ from ecu.estimation.joint.layout import (
     MOTOR,
     LEVEL,
     OFFSET,
+    OVERRUN,
     PEAK,
     RADIUS,
     RATE,
     RATIO,
     ROLLING,
     SINKING,
+    SKEW,
     SLOPE,
     STIFFNESS,
     N,
@@ -44,6 +46,7 @@ from ecu.estimation.joint.layout import (
 )
 from ecu.estimation.joint.pressure import follows, learn_zero
 from ecu.estimation.joint.prior import UNKNOWN_DRIVE, forget_rate, note_change, pressure_change, set_prior, walk
+from ecu.estimation.joint.sampling import ACCEL
 from ecu.estimation.joint.sliding import HOLD_S, share_force, watch_tyres, wheel_slides
 from ecu.estimation.joint.snapshot import go_back, keep, keep_newer
 from ecu.estimation.joint.wheel import brake_lever, brake_torque, friction, predict_balance, predict_wheel, unknown_share
@@ -162,7 +165,7 @@ def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> 
     if state.releasing:
         return
     if braking:
-        free[STIFFNESS] = free[PEAK] = 1
+        free[STIFFNESS] = free[PEAK] = free[SKEW] = free[OVERRUN] = 1
     else:
         free[BIAS] = free[DRAG] = state.window.motor_reported
         if motors:
@@ -224,12 +227,12 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     motors = 0.0
     _learn_zeros(params, state, braking)
     for i in range(4):
-        if w.pressure_samples[i] == 0:
+        if not usable(inputs, CALLIPER_PRESSURE + i):
             twin = i ^ 1
-            w.pressure[i] = w.pressure[twin] if w.pressure_samples[twin] > 0 else state.last_pressure[i]
+            w.pressure[i], w.common_pressure[i] = w.pressure[twin], w.common_pressure[twin]
             w.pressure_variance[i] = TWIN**2
         if not braking and state.smooth_pressure[i] < APPLIED:
-            w.pressure[i] = state.smooth_pressure[i] = 0.0  # noise about zero is no torque
+            w.pressure[i] = w.common_pressure[i] = state.smooth_pressure[i] = 0.0  # noise is no torque
         motors += abs(w.motor[i])
     moving = x[V] > LEAST_SPEED
     walk(state, braking and moving, time)
@@ -239,7 +242,7 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     if not braking:
         learning = learning and abs(w.across) < STRAIGHT
     if learning and not braking and motors <= MOTORS:
-        learning = w.accel_cycles == w.cycles and abs(predict_balance(params, state)) < UNEXPLAINED
+        learning = w.balanced and abs(predict_balance(params, state, False)) < UNEXPLAINED
     _choose_free(state, braking, motors > MOTORS, learning)
     before = x[V]
     for channel in range(6):
@@ -271,11 +274,12 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
         if weight > 4.0 * APPLIED:
             note_change(state, weight)
     watch_tyres(state, learning and braking)
-    if seen and learning and w.accel_cycles == w.cycles and (braking or w.motor_reported):
+    if seen and learning and w.balanced and (braking or w.motor_reported):
         _fuse_balance(params, state, braking)
     state.last_accel, state.last_smooth_accel = w.accel, state.smooth_accel
     for i in range(4):
         state.motors.last_smooth[i] = state.motors.smooth[i]
+        state.last_slope[i] = (state.smooth_pressure[i] - state.last_smooth[i]) / time
         state.last_pressure[i], state.last_smooth[i] = w.pressure[i], state.smooth_pressure[i]
 
 
@@ -329,8 +333,8 @@ def _motor_variance(state: Record, i: int, braking: bool) -> float:
 @kernel
 def _fuse_balance(params: Record, state: Record, braking: bool) -> None:
     w = state.window
-    left = predict_balance(params, state)
-    variance = params.sigma_accel**2 / w.cycles + BALANCE_FLOOR**2 + (BALANCE_SHARE * w.accel) ** 2
+    left = predict_balance(params, state, braking)
+    variance = params.sigma_accel**2 / max(state.sampling.samples[ACCEL], 1) + BALANCE_FLOOR**2 + (BALANCE_SHARE * w.accel) ** 2
     variance += (SKEW_ACCEL * (w.accel - state.last_accel)) ** 2
     variance += (ACROSS * w.across * GRAVITY) ** 2 + (UNKNOWN_DRIVE * unknown_share(params, state)) ** 2
     for i in range(4):

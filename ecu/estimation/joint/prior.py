@@ -18,6 +18,7 @@ from ecu.estimation.joint.layout import (
     MEAN,
     MOTOR,
     OFFSET,
+    OVERRUN,
     PEAK,
     PEAK_LOAD,
     RADIUS,
@@ -26,6 +27,7 @@ from ecu.estimation.joint.layout import (
     ROLLING,
     SIDE,
     SINKING,
+    SKEW,
     SLIP_ERROR,
     SLOPE,
     STIFFNESS,
@@ -44,6 +46,7 @@ PRIOR[RADIUS : RADIUS + 4], PRIOR[ROLLING] = 0.0015, 0.004
 PRIOR[OFFSET : OFFSET + 2] = 0.3
 PRIOR[DELAY] = 0.005
 PRIOR[SIDE], PRIOR[PEAK_LOAD] = 0.02, 0.08
+PRIOR[SKEW] = 0.03  # where pressures are as reported
 
 # Standard deviations of friction's prior, of its logarithm: all four together, per axle, per wheel.
 LEVEL_COMMON, LEVEL_AXLE, LEVEL_WHEEL = 0.13, 0.17, 0.06
@@ -54,6 +57,8 @@ CHANGE_COMMON, CHANGE_AXLE, CHANGE_S = 0.06, 0.03, 2.0
 CHANGE_BY_PRESSURE = 0.05  # of an axle's friction, per relative change of its pressure
 MEAN_ZERO = 0.003  # the mean of changes within an application
 RATE_SIGMA = 0.1  # 1/s
+UNKNOWN_PER_ERROR = 2.0  # an engine's torque that is known to half only may as well not be known
+OVERRUN_MEAN, OVERRUN_SIGMA = 0.2, 0.3  # m/s^2, drag of an engine in gear
 UNKNOWN_DRIVE = 0.3  # m/s^2 per axle: drag of an engine, down-shifts
 UNKNOWN_SLIP, UNKNOWN_SLIP_BY_AGE = 0.003, 0.01  # of an axle's slip by it: with a speed reference, without
 
@@ -67,6 +72,7 @@ WALK[PEAK], WALK[LOAD], WALK[SINKING] = 0.01, 0.0005, 0.0005
 WALK[MASS], WALK[MOTOR], WALK[DRAG] = 1e-5, 1e-5, 0.0005
 WALK[DELAY] = 1e-4
 WALK[RATE] = 0.1
+WALK[SKEW] = 0.001
 LEVEL_WALK = 0.01  # of all levels alike while the pads rub
 
 
@@ -95,6 +101,8 @@ def set_prior(params: Record, state: Record) -> None:
         p[i, i] = PRIOR[i] ** 2
     p[V, V] = 0.25
     p[MOTOR, MOTOR] = params.sigma_motor_torque**2
+    unknown = min(UNKNOWN_PER_ERROR * params.sigma_motor_torque, 1.0)
+    x[OVERRUN], p[OVERRUN, OVERRUN] = OVERRUN_MEAN * unknown, (OVERRUN_SIGMA * unknown) ** 2
     widen_levels(state, LEVEL_COMMON**2, LEVEL_AXLE**2, LEVEL_WHEEL**2)
 
 

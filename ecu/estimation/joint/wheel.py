@@ -24,6 +24,7 @@ from ecu.estimation.joint.layout import (
     MASS,
     MOTOR,
     OFFSET,
+    OVERRUN,
     PEAK,
     PEAK_LOAD,
     RADIUS,
@@ -31,10 +32,13 @@ from ecu.estimation.joint.layout import (
     ROLLING,
     SIDE,
     SINKING,
+    SKEW,
     SLIP_ERROR,
     STIFFNESS,
     V,
 )
+from ecu.estimation.joint.prior import UNKNOWN_PER_ERROR
+from ecu.estimation.joint.sampling import slope
 from ecu.estimation.tyre import rolling_radius
 from ecu.jit import Record, kernel
 from ecu.params import BAR
@@ -42,7 +46,6 @@ from ecu.params import BAR
 SHAPE = 1.6  # c of the Magic Formula
 NOMINAL_PEAK = 0.9  # adhesion
 PEAK_DEGRESSION = 0.05  # adhesion falls a little with load (Figure A.6)
-UNKNOWN_PER_ERROR = 2.0  # an engine's torque that is known to half only may as well not be known
 LEAST_OF_PEAK = 0.2  # of 1 - 4 y: a peak half as high again as usual
 STEEPEST = 0.93  # of the peak; the curve goes on straight from there
 
@@ -188,13 +191,13 @@ def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float
 
 
 @kernel
-def predict_balance(params: Record, state: Record) -> float:
+def predict_balance(params: Record, state: Record, braking: bool) -> float:
     """Return what is left of the car's balance over the configured mass [m/s^2]; sets `state.h`."""
     x, h, w, mass = state.x, state.h, state.window, params.mass
     clear_derivatives(state)
     speed, heavier = x[V], math.exp(x[MASS])
     drag = heavier * math.exp(x[DRAG]) * params.drag_area * speed * abs(speed) / mass
-    left = heavier * (w.accel - x[BIAS] + w.lateral / mass) + drag
+    left = heavier * (w.common_accel - x[BIAS] + w.lateral / mass) + drag
     # What grows with the mass, by the accelerometer of before: free of the noise of this window's torques.
     inert = heavier * (state.last_smooth_accel - x[BIAS] + w.lateral / mass) + drag
     linings = 0.0
@@ -203,7 +206,8 @@ def predict_balance(params: Record, state: Record) -> float:
         driven = w.motor[i] * math.exp(x[MOTOR])
         own = heavier * (params.rolling_resistance * w.load[i] * r + params.wheel_inertia[i] * w.change / r)
         inert += own / (r * mass)
-        left += (brake_torque(params, state, i, w.pressure[i]) + driven + own) / (r * mass)
+        late = w.common_pressure[i] - x[SKEW] * slope(state.sampling, i)
+        left += (brake_torque(params, state, i, late) + driven + own) / (r * mass)
         smooth = state.last_smooth[i]
         linings += brake_torque(params, state, i, smooth) / (r * mass)
         per_bar = brake_lever(params, i) * friction(params, state, i) / (r * mass)
@@ -211,9 +215,13 @@ def predict_balance(params: Record, state: Record) -> float:
         h[CHANGE + i // 2] += h[LEVEL + i]
         if smooth > 0.5:
             h[OFFSET + i // 2] -= per_bar
+            h[SKEW] -= per_bar * state.last_slope[i]
     h[MASS], h[MOTOR] = inert, -inert - linings
     h[BIAS] = -heavier
     h[DRAG] = drag
     h[DRIVE] = h[DRIVE + 1] = -1.0
+    if braking:
+        left += x[OVERRUN]
+        h[OVERRUN] = 1.0
     result: float = left
     return result

@@ -9,6 +9,14 @@ import math
 from ecu.estimation.joint.layout import BIAS, DELAY, SLOPE, V
 from ecu.estimation.joint.motors import follow_motors
 from ecu.estimation.joint.pressure import correct_pressure, follow_demand, follows
+from ecu.estimation.joint.sampling import (
+    ACCEL,
+    add_sample,
+    advance_common_time,
+    at_common_time,
+    close_sampling,
+    open_sampling,
+)
 from ecu.estimation.motion import corner_speed, fresh, motor_torque, motor_torque_known, usable
 from ecu.jit import Record, kernel
 from ecu.params import BAR, GRAVITY
@@ -32,7 +40,8 @@ def open_window(state: Record) -> None:
     """Begin a window."""
     w = state.window
     w.time, w.cycles, w.accel, w.lateral, w.across, w.change = 0.0, 0, 0.0, 0.0, 0.0, 0.0
-    w.reference, w.reference_change, w.reference_samples, w.accel_cycles = 0.0, 0.0, 0, 0
+    w.reference, w.reference_change, w.reference_samples, w.balanced = 0.0, 0.0, 0, 0
+    open_sampling(state.sampling)
     w.motor_known, w.motor_reported = 1, 0
     for i in range(4):
         w.load[i] = w.motor[i] = w.omega[i] = w.ground[i] = w.pressure[i] = 0.0
@@ -65,7 +74,9 @@ def gather(
     w.time += dt
     w.cycles += 1
     w.accel += motion.accel_x
-    w.accel_cycles += 1 if _current(inputs, ACCEL_X) else 0
+    state.sampling.now += dt
+    if fresh(inputs, ACCEL_X):
+        add_sample(state.sampling, ACCEL, motion.accel_x, 1e-9 * inputs.age_ns[ACCEL_X])
     w.change += change
     gain = 1.0 - math.exp(-dt / SMOOTHING)
     state.smooth_accel += gain * (motion.accel_x - state.smooth_accel)
@@ -94,11 +105,10 @@ def gather(
         if fresh(inputs, place):
             reading = value[place] - state.pressures.zero[i]
             above = reading - push_out
-            w.pressure[i] += above
+            add_sample(state.sampling, i, above, 1e-9 * inputs.age_ns[place])
             w.pressure_samples[i] += 1
             if params.transmit:
                 correct_pressure(state.pressures, i, reading, params.sigma_pressure / BAR, dt)
-            state.smooth_pressure[i] += gain * (above - state.smooth_pressure[i])
         if follows(state.pressures, i):
             w.tracked[i] += state.pressures.value[i] - push_out
             w.tracked_cycles[i] += 1
@@ -115,6 +125,10 @@ def close_window(params: Record, state: Record) -> None:
     """Turn the sums into means."""
     w = state.window
     n = w.cycles
+    close_sampling(state.sampling)
+    w.balanced = 1 if advance_common_time(state.sampling) else 0
+    w.common_accel = at_common_time(state.sampling, ACCEL)
+    gain = 1.0 - math.exp(-w.time / SMOOTHING)
     w.accel /= n
     w.change /= n
     w.lateral /= n
@@ -125,13 +139,16 @@ def close_window(params: Record, state: Record) -> None:
         if w.omega_samples[i] > 0:
             w.omega[i] /= w.omega_samples[i]
             w.ground[i] /= w.omega_samples[i]
-        if w.pressure_samples[i] > 0:
-            w.pressure[i] /= w.pressure_samples[i]
-            w.pressure_variance[i] = (params.sigma_pressure / BAR) ** 2 / w.pressure_samples[i]
+        sampled = state.sampling.samples[i]
+        w.pressure[i] = state.sampling.value[i]
+        w.common_pressure[i] = at_common_time(state.sampling, i)
+        w.pressure_variance[i] = (params.sigma_pressure / BAR) ** 2 / max(sampled, 1)
         if w.tracked_cycles[i] == n and w.pressure_samples[i] > 0:
-            w.pressure[i] = w.tracked[i] / n
+            w.pressure[i] = w.common_pressure[i] = w.tracked[i] / n
             w.pressure_variance[i] = NEW_SHARE * state.pressures.variance[i]
             state.smooth_pressure[i] = w.pressure[i]
+        else:
+            state.smooth_pressure[i] += gain * (w.pressure[i] - state.smooth_pressure[i])
     if w.reference_samples > 0:
         w.reference /= w.reference_samples
         w.reference_change /= w.reference_samples

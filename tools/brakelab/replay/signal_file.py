@@ -26,6 +26,8 @@ from ecu.signals import INPUT, INPUT_SIGNALS
 BLOCK_ROWS: Final = 1 << 16
 FEW_ROWS: Final = 10  # too few to judge their distance
 SLOWEST_STEP: Final = 0.9  # s, above: no input would stay alive, so t is probably not in seconds
+SLOWEST_S: Final = 0.3
+"""Between samples of a signal that still counts as one."""
 LATEST: Final = 9e9  # s, the year 2255 as Unix time
 _SHOWN: Final = 20  # names in a line
 _REMEDY: Final = f"give t [s] and columns such as {', '.join(list(INPUT)[:3])} (contract input names)"
@@ -55,9 +57,14 @@ class SignalQuality(Damage):
 
 
 def freshness_at_any_rate() -> RecordArray:
-    """Return FRESHNESS per input, nothing received yet: a signal file promises no rate."""
+    """Return FRESHNESS per input, nothing received yet: a signal file promises no rate.
+
+    Time-outs follow the rate of the samples, down to `SLOWEST_S` between them.
+    """
     any_rate = {place: (0.0, signal.timeout_s) for place, signal in enumerate(INPUT_SIGNALS)}
-    return input_freshness(any_rate, {})
+    freshness = input_freshness(any_rate, {})
+    freshness["patience_ns"] = np.maximum(freshness["patience_ns"], round(1e9 * SLOWEST_S))
+    return freshness
 
 
 class _Batch(NamedTuple):
