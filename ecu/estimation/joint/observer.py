@@ -309,8 +309,16 @@ def _fuse_wheel(params: Record, state: Record, i: int, before: float, moving: bo
     innovation = w.omega[i] - omega
     mass, motor = state.free[MASS], state.free[MOTOR]
     state.free[MASS] = state.free[MOTOR] = 0
+    level = state.free[LEVEL]
+    if unknown_share(params, state) > 0.3 and state.reference_s > 1.0:
+        for k in range(4):
+            state.free[LEVEL + k] = 0
+        state.free[CHANGE] = state.free[CHANGE + 1] = state.free[RATE] = 0
     state.ratio[i] = correct(state, innovation, variance)
     state.free[MASS], state.free[MOTOR] = mass, motor
+    for k in range(4):
+        state.free[LEVEL + k] = level
+    state.free[CHANGE] = state.free[CHANGE + 1] = state.free[RATE] = level
     state.pull[i] = math.copysign(min(state.ratio[i], GATE * GATE), innovation)
     state.observed[i] = 1 if observing and state.smooth_pressure[i] > 2.0 * APPLIED else 0
 
