@@ -14,6 +14,7 @@ goes back to what was known 0.2 to 0.4 s before.
 
 import math
 
+from ecu.control.demand import LEAST_REQUEST, requested_decel
 from ecu.estimation.friction import (
     GREATEST_RATIO,
     LEAST_RATIO,
@@ -65,6 +66,7 @@ from ecu.signals import (
 
 WINDOW_S = 0.05
 LEAST_SPEED = 3.4  # m/s
+FREE = 0.4  # bar above push-out, mean of the wheels: the brakes are released
 APPLIED = 1.0  # bar above push-out: the brakes act
 STRAIGHT = 0.05  # lateral acceleration over gravity: more, and wheels roll by their own loads and angles
 VARIES_FROM, VARIES = 0.3, 0.2  # m/s^2: acceleration that tells a mass, and its change within seconds
@@ -211,10 +213,24 @@ def update_joint(
 
 
 @kernel
-def _learn_zeros(params: Record, state: Record, braking: bool) -> None:
-    w, zero, readings = state.window, state.pressures.zero, state.readings
+def _released(params: Record, state: Record, inputs: Record) -> bool:
+    """Return whether nobody brakes by the linings, not even a little."""
+    asked = requested_decel(params, inputs)
+    if not params.transmit and asked > LEAST_REQUEST:
+        return False
+    total = 0.0
     for i in range(4):
-        if braking or w.pressure_samples[i] == 0 or state.smooth_pressure[i] > APPLIED:
+        total += state.smooth_pressure[i]
+    return total < 4.0 * FREE
+
+
+@kernel
+def _learn_zeros(params: Record, state: Record, inputs: Record, braking: bool) -> None:
+    w, zero, readings = state.window, state.pressures.zero, state.readings
+    if braking or not _released(params, state, inputs):
+        return
+    for i in range(4):
+        if w.pressure_samples[i] == 0:
             return
         readings[i] = w.pressure[i] + params.push_out_pressure[i] / BAR + zero[i]
     learn_zero(state.pressures, readings)
@@ -225,7 +241,8 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     w, x = state.window, state.x
     time = w.time
     motors = 0.0
-    _learn_zeros(params, state, braking)
+    _learn_zeros(params, state, inputs, braking)
+    released = _released(params, state, inputs)
     for i in range(4):
         if not usable(inputs, CALLIPER_PRESSURE + i):
             twin = i ^ 1
@@ -240,7 +257,7 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     learning = moving and state.hold_s <= 0.0 and w.motor_known != 0
     learning = learning and not _learning_forbidden(params, state, inputs, braking)
     if not braking:
-        learning = learning and abs(w.across) < STRAIGHT
+        learning = learning and abs(w.across) < STRAIGHT and released
     if learning and not braking and motors <= MOTORS:
         learning = w.balanced and abs(predict_balance(params, state, False)) < UNEXPLAINED
     _choose_free(state, braking, motors > MOTORS, learning)

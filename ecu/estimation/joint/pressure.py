@@ -33,7 +33,7 @@ SHARE = 0.15  # of a change, one standard deviation
 DISAGREEMENT_LAG = 0.4  # s
 TOLERANCE = 3.0  # standard deviations
 AGREED_S = 0.3
-ZERO_START, ZERO_WINDOWS = 20, 200  # windows of prior and of memory
+ZERO_START, ZERO_WINDOWS = 20, 2400  # windows of prior and of memory
 ZERO_LIMIT = 3.0  # bar
 
 

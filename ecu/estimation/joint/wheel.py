@@ -113,7 +113,7 @@ def peak_adhesion(state: Record, relative: float) -> float:
 def brake_torque(params: Record, state: Record, i: int, pressure: float) -> float:
     """Return the brake torque [N m] at a pressure above push-out [bar]."""
     mu = friction(params, state, i)
-    torque: float = brake_lever(params, i) * mu * max(pressure - state.x[OFFSET + i // 2], 0.0)
+    torque: float = brake_lever(params, i) * mu * (pressure - state.x[OFFSET + i // 2] if pressure != 0.0 else 0.0)
     return torque
 
 
