@@ -167,7 +167,7 @@ def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> 
     if state.releasing:
         return
     if braking:
-        free[STIFFNESS] = free[PEAK] = free[SKEW] = free[OVERRUN] = 1
+        free[STIFFNESS] = free[PEAK] = free[SKEW] = 1
     else:
         free[BIAS] = free[DRAG] = state.window.motor_reported
         if motors:

@@ -46,7 +46,7 @@ PRIOR[RADIUS : RADIUS + 4], PRIOR[ROLLING] = 0.0015, 0.004
 PRIOR[OFFSET : OFFSET + 2] = 0.3
 PRIOR[DELAY] = 0.005
 PRIOR[SIDE], PRIOR[PEAK_LOAD] = 0.02, 0.08
-PRIOR[SKEW] = 0.03  # where pressures are as reported
+PRIOR[SKEW] = 0.0  # where pressures are as reported
 
 # Standard deviations of friction's prior, of its logarithm: all four together, per axle, per wheel.
 LEVEL_COMMON, LEVEL_AXLE, LEVEL_WHEEL = 0.13, 0.17, 0.06
