@@ -15,12 +15,7 @@ goes back to what was known 0.2 to 0.4 s before.
 import math
 
 from ecu.control.demand import LEAST_REQUEST, requested_decel
-from ecu.estimation.friction import (
-    GREATEST_RATIO,
-    LEAST_RATIO,
-    driver_accelerates,
-    drives_against,
-)
+from ecu.estimation.friction import driver_accelerates, drives_against
 from ecu.estimation.joint.kalman import GATE, clear_derivatives, correct, forget
 from ecu.estimation.joint.layout import (
     BIAS,
@@ -46,7 +41,7 @@ from ecu.estimation.joint.layout import (
     V,
 )
 from ecu.estimation.joint.pressure import follows, learn_zero
-from ecu.estimation.joint.prior import UNKNOWN_DRIVE, forget_rate, note_change, pressure_change, set_prior, walk
+from ecu.estimation.joint.prior import UNKNOWN_DRIVE, forget_rate, keep_within_bounds, note_change, pressure_change, set_prior, walk
 from ecu.estimation.joint.sampling import ACCEL
 from ecu.estimation.joint.sliding import HOLD_S, share_force, watch_tyres, wheel_slides
 from ecu.estimation.joint.snapshot import go_back, keep, keep_newer
@@ -70,6 +65,7 @@ FREE = 0.4  # bar above push-out, mean of the wheels: the brakes are released
 APPLIED = 1.0  # bar above push-out: the brakes act
 STRAIGHT = 0.05  # lateral acceleration over gravity: more, and wheels roll by their own loads and angles
 VARIES_FROM, VARIES = 0.3, 0.2  # m/s^2: acceleration that tells a mass, and its change within seconds
+SCALE_ONLY = 0.03  # relative error of a motor's torque that is its scale; what is beyond changes
 COLOURED = 20.0  # times the variance of white noise: what an inverter's torque errs by is not white
 MOTORS = 100.0  # N m of all motors: their torque is worth looking at
 SLIDING_FORCE = 0.3  # relative error of the force of a wheel that seems too fast, taken for its brake force
@@ -357,7 +353,7 @@ def _motor_variance(state: Record, i: int, braking: bool) -> float:
 
 @kernel
 def _fuse_balance(params: Record, state: Record, braking: bool) -> None:
-    w = state.window
+    w, wild = state.window, 0.0
     left = predict_balance(params, state, braking)
     variance = params.sigma_accel**2 / max(state.sampling.samples[ACCEL], 1) + BALANCE_FLOOR**2 + (BALANCE_SHARE * w.accel) ** 2
     variance += (SKEW_ACCEL * (w.accel - state.last_accel)) ** 2
@@ -367,12 +363,15 @@ def _fuse_balance(params: Record, state: Record, braking: bool) -> None:
         per_torque = 1.0 / (params.wheel_radius[i] * params.mass)
         per_bar *= per_torque
         variance += per_torque**2 * _motor_variance(state, i, braking)
+        wild += per_torque * abs(w.motor[i])
         if state.smooth_pressure[i] > 0.5:
             variance += per_bar**2 * (w.pressure_variance[i] + _skew(state, i) ** 2)
         if state.slides[i] and w.omega[i] * params.wheel_radius[i] < w.ground[i]:
             return  # what it holds is the road's to say
         if state.slides[i]:
             variance += (SLIDING_FORCE * per_bar * w.pressure[i]) ** 2
+    wild *= max(params.sigma_motor_torque - SCALE_ONLY, 0.0)
+    variance += wild * wild * (1.0 if braking else COLOURED)
     state.ratio[4] = correct(state, -left, variance)
 
 
@@ -401,5 +400,4 @@ def _look_after(params: Record, state: Record, braking: bool) -> None:
     state.sliding = sliding
     if state.hold_s <= 0.0 and not state.releasing and state.kept_s >= SNAPSHOT_S:
         keep_newer(state)
-    for i in range(LEVEL, LEVEL + 4):
-        x[i] = min(max(x[i], math.log(LEAST_RATIO)), math.log(GREATEST_RATIO))
+    state.at_bound = 1 if keep_within_bounds(state) else 0

@@ -34,6 +34,7 @@ from ecu.estimation.joint.layout import (
     N,
     V,
 )
+from ecu.estimation.friction import GREATEST_RATIO, LEAST_RATIO
 from ecu.jit import Record, kernel
 
 PRIOR = np.zeros(N)
@@ -68,12 +69,41 @@ WALK[V] = 0.02
 WALK[STIFFNESS], WALK[RATIO] = 0.01, 0.0005
 WALK[RADIUS : RADIUS + 4] = WALK[ROLLING] = 1e-5
 WALK[BIAS], WALK[SLOPE] = 0.001, 0.05
+SLOPE_S = 100.0  # after which a slope is forgotten: no road climbs for ever
 WALK[PEAK], WALK[LOAD], WALK[SINKING] = 0.01, 0.0005, 0.0005
 WALK[MASS], WALK[MOTOR], WALK[DRAG] = 1e-5, 1e-5, 0.005
 WALK[DELAY] = 1e-4
 WALK[RATE] = 0.1
 WALK[SKEW] = 0.0
 LEVEL_WALK = 0.01  # of all levels alike while the pads rub
+
+
+# Bounds of what is learned: beyond them it is a fault that is learned, not a car. Of friction: `friction.py`.
+LOWEST, HIGHEST = np.full(N, -np.inf), np.full(N, np.inf)
+LOWEST[LEVEL : LEVEL + 4], HIGHEST[LEVEL : LEVEL + 4] = math.log(LEAST_RATIO), math.log(GREATEST_RATIO)
+LOWEST[STIFFNESS], HIGHEST[STIFFNESS] = math.log(0.4), math.log(2.5)
+LOWEST[RADIUS : RADIUS + 4], HIGHEST[RADIUS : RADIUS + 4] = -0.02, 0.02
+LOWEST[BIAS], HIGHEST[BIAS] = -0.6, 0.6
+LOWEST[MASS], HIGHEST[MASS] = math.log(0.85), math.log(1.30)
+LOWEST[PEAK], HIGHEST[PEAK] = -1.0, 0.2
+LOWEST[RATIO], HIGHEST[RATIO] = -0.4, 0.4
+LOWEST[LOAD], HIGHEST[LOAD] = -0.3, 0.3
+LOWEST[SINKING], HIGHEST[SINKING] = -1.2, 1.2
+LOWEST[MOTOR], HIGHEST[MOTOR] = math.log(0.6), math.log(1.6)
+LOWEST[DRAG], HIGHEST[DRAG] = math.log(0.5), math.log(2.0)
+LOWEST[ROLLING], HIGHEST[ROLLING] = -0.03, 0.03
+LOWEST[DELAY], HIGHEST[DELAY] = -0.1, 0.1
+
+
+@kernel
+def keep_within_bounds(state: Record) -> bool:
+    """Put learned states that have left their bounds back on them; return whether there was one."""
+    x, found = state.x, False
+    for i in range(N):
+        if x[i] < LOWEST[i] or x[i] > HIGHEST[i]:
+            x[i] = min(max(x[i], LOWEST[i]), HIGHEST[i])
+            found = True
+    return found
 
 
 @kernel
@@ -211,10 +241,21 @@ def _change_friction(state: Record, time: float) -> None:
 
 
 @kernel
+def _forget_slope(state: Record, stays: float) -> None:
+    state.x[SLOPE] *= stays
+    for j in range(N):
+        state.p[SLOPE, j] *= stays
+    for j in range(N):
+        state.p[j, SLOPE] *= stays
+
+
+@kernel
 def walk(state: Record, rubbing: bool, time: float) -> None:
     """Add to the covariance what may have changed over `time` [s]; friction changes while the pads rub."""
     p = state.p
     drift_speed(state, time)
+    if state.x[V] > 1.0:
+        _forget_slope(state, math.exp(-time / SLOPE_S))
     for i in range(N):
         if i != RATE or rubbing:
             p[i, i] += WALK[i] ** 2 * time
