@@ -132,7 +132,7 @@ def set_prior(params: Record, state: Record) -> None:
     p[V, V] = 0.25
     p[MOTOR, MOTOR] = params.sigma_motor_torque**2
     unknown = min(UNKNOWN_PER_ERROR * params.sigma_motor_torque, 1.0)
-    x[OVERRUN], p[OVERRUN, OVERRUN] = OVERRUN_MEAN * unknown, (OVERRUN_SIGMA * unknown) ** 2
+    p[OVERRUN, OVERRUN] = (OVERRUN_SIGMA * unknown) ** 2
     widen_levels(state, LEVEL_COMMON**2, LEVEL_AXLE**2, LEVEL_WHEEL**2)
 
 
@@ -156,6 +156,7 @@ def begin_application(state: Record, unknown: float, heat: Record) -> None:
     p[CHANGE, CHANGE + 1] = p[CHANGE + 1, CHANGE] = CHANGE_COMMON**2
     state.weight = 0.0
     forget_rate(state)
+    state.x[OVERRUN] = OVERRUN_MEAN if unknown >= 1.0 else 0.0
     slip = UNKNOWN_SLIP + UNKNOWN_SLIP_BY_AGE * min(state.reference_s, 1.0)
     for axle in range(2):
         clear_state(state, DRIVE + axle, (UNKNOWN_DRIVE * unknown) ** 2)
