@@ -54,7 +54,7 @@ LEVEL_COMMON, LEVEL_AXLE, LEVEL_WHEEL = 0.13, 0.17, 0.06
 # By how much the level of an application differs from that of the one before.
 STEP_COMMON, STEP_AXLE, STEP_WHEEL = 0.03, 0.02, 0.005
 # How far friction goes from its level within an application, and how long it takes to forget that.
-CHANGE_COMMON, CHANGE_AXLE, CHANGE_S = 0.06, 0.03, 2.0
+CHANGE_COMMON, CHANGE_AXLE, CHANGE_S = 0.08, 0.03, 4.0
 CHANGE_BY_PRESSURE = 0.05  # of an axle's friction, per relative change of its pressure
 MEAN_ZERO = 0.003  # the mean of changes within an application
 RATE_SIGMA = 0.1  # 1/s
