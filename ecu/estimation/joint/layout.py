@@ -112,6 +112,7 @@ JOINT_STATE: Final = np.dtype(
         ("last_pressure", "f8", (4,)),  # of the last window [bar]
         ("last_slip", "f8", (4,)),
         ("slip", "f8", (4,)),
+        ("unsettled", "f8"),  # its slip less that at the torque of a moment ago
         ("curved", "f8"),  # part of the last wheel's slip beyond that of a linear tyre
         ("force", "f8", (4,)),  # N
         ("observed", "u1", (4,)),  # friction was corrected in the last window

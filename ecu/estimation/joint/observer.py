@@ -313,7 +313,7 @@ def _fuse_wheel(params: Record, state: Record, i: int, before: float, moving: bo
     per_bar = state.h[OFFSET + i // 2]
     variance = params.sigma_wheel_speed**2 / n
     variance += per_bar**2 * (w.pressure_variance[i] + _skew(state, i) ** 2)
-    transient = TRANSIENT * (state.slip[i] - state.last_slip[i]) * ground / params.wheel_radius[i]
+    transient = TRANSIENT * state.unsettled * ground / params.wheel_radius[i]
     corner = CORNERING * w.across * w.across * state.slip[i] * ground / params.wheel_radius[i]
     curved = CURVED * state.curved * ground / params.wheel_radius[i]
     variance += transient * transient + corner * corner + curved * curved

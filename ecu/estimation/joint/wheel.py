@@ -165,6 +165,7 @@ def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float
     later = brake_torque(params, state, i, pressure) - brake_torque(params, state, i, smooth)
     used += (later + motor - driven) * scale / r
     slip, slope, by_peak = combined_slip(used, w.across, stiffness, peak)
+    state.unsettled = state.slip[i] - slip
     clear_derivatives(state)
     h[V] = omega / max(ground, 0.1)
     mu = friction(params, state, i)
