@@ -72,8 +72,8 @@ CYCLE: Final = np.dtype(
     ],
     align=True,
 )
-N_JOINT: Final = 36
-N_KEPT: Final = 25
+N_JOINT: Final = 35
+N_KEPT: Final = 24
 # What the ECU has learned and must not lose: carried between brakings, drives and restarts.
 LEARNED: Final = np.dtype(
     [

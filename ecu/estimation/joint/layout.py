@@ -36,8 +36,7 @@ CHANGE: Final = 26  # two: ln of an axle's friction over its level, within an ap
 SLIP_ERROR: Final = 28  # two: of an axle's slip, by drive that nobody reports; only considered
 SIDE: Final = 30  # ln of the stiffness of the left tyres over the right ones; only considered
 PEAK_LOAD: Final = 31  # exponent of peak adhesion over load, beyond the usual; only considered
-SKEW: Final = 34  # by which force follows the pressure reported, beyond the sampling [s]
-OVERRUN: Final = 35  # drag of a drive that nobody reports, while braking, over mass [m/s^2]
+OVERRUN: Final = 34  # drag of a drive that nobody reports, while braking, over mass [m/s^2]
 MEAN: Final = 32  # two: mean of CHANGE over this application, weighted by pressure
 N: Final = N_JOINT
 
@@ -108,7 +107,6 @@ JOINT_STATE: Final = np.dtype(
         ("mean_accel", "f8"),  # of the last seconds [m/s^2]
         ("last_smooth_accel", "f8"),  # of the last window [m/s^2]
         ("last_smooth", "f8", (4,)),  # of the last window [bar]
-        ("last_slope", "f8", (4,)),  # of the smooth pressure, in the last window [bar/s]
         ("last_pressure", "f8", (4,)),  # of the last window [bar]
         ("last_slip", "f8", (4,)),
         ("slip", "f8", (4,)),

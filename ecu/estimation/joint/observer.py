@@ -34,7 +34,6 @@ from ecu.estimation.joint.layout import (
     RATIO,
     ROLLING,
     SINKING,
-    SKEW,
     SLOPE,
     STIFFNESS,
     N,
@@ -163,7 +162,7 @@ def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> 
     if state.releasing:
         return
     if braking:
-        free[STIFFNESS] = free[PEAK] = free[SKEW] = 1
+        free[STIFFNESS] = free[PEAK] = 1
     else:
         free[BIAS] = free[DRAG] = state.window.motor_reported
         if motors:
@@ -292,7 +291,6 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     state.last_accel, state.last_smooth_accel = w.accel, state.smooth_accel
     for i in range(4):
         state.motors.last_smooth[i] = state.motors.smooth[i]
-        state.last_slope[i] = (state.smooth_pressure[i] - state.last_smooth[i]) / time
         state.last_pressure[i], state.last_smooth[i] = w.pressure[i], state.smooth_pressure[i]
 
 
@@ -322,16 +320,8 @@ def _fuse_wheel(params: Record, state: Record, i: int, before: float, moving: bo
     innovation = w.omega[i] - omega
     mass, motor = state.free[MASS], state.free[MOTOR]
     state.free[MASS] = state.free[MOTOR] = 0
-    level = state.free[LEVEL]
-    if unknown_share(params, state) > 0.3 and state.reference_s > 1.0:
-        for k in range(4):
-            state.free[LEVEL + k] = 0
-        state.free[CHANGE] = state.free[CHANGE + 1] = state.free[RATE] = 0
     state.ratio[i] = correct(state, innovation, variance)
     state.free[MASS], state.free[MOTOR] = mass, motor
-    for k in range(4):
-        state.free[LEVEL + k] = level
-    state.free[CHANGE] = state.free[CHANGE + 1] = state.free[RATE] = level
     state.pull[i] = math.copysign(min(state.ratio[i], GATE * GATE), innovation)
     state.observed[i] = 1 if observing and state.smooth_pressure[i] > 2.0 * APPLIED else 0
 

@@ -27,7 +27,6 @@ from ecu.estimation.joint.layout import (
     ROLLING,
     SIDE,
     SINKING,
-    SKEW,
     SLIP_ERROR,
     SLOPE,
     STIFFNESS,
@@ -47,7 +46,6 @@ PRIOR[RADIUS : RADIUS + 4], PRIOR[ROLLING] = 0.0015, 0.004
 PRIOR[OFFSET : OFFSET + 2] = 0.3
 PRIOR[DELAY] = 0.005
 PRIOR[SIDE], PRIOR[PEAK_LOAD] = 0.02, 0.08
-PRIOR[SKEW] = 0.0  # where pressures are as reported
 
 # Standard deviations of friction's prior, of its logarithm: all four together, per axle, per wheel.
 LEVEL_COMMON, LEVEL_AXLE, LEVEL_WHEEL = 0.13, 0.17, 0.06
@@ -61,7 +59,7 @@ RATE_SIGMA = 0.1  # 1/s
 UNKNOWN_PER_ERROR = 2.0  # an engine's torque that is known to half only may as well not be known
 OVERRUN_MEAN, OVERRUN_SIGMA = 0.2, 0.3  # m/s^2, drag of an engine in gear
 UNKNOWN_DRIVE = 0.3  # m/s^2 per axle: drag of an engine, down-shifts
-UNKNOWN_SLIP, UNKNOWN_SLIP_BY_AGE = 0.003, 0.01  # of an axle's slip by it: with a speed reference, without
+UNKNOWN_SLIP, UNKNOWN_SLIP_BY_AGE = 0.003, 0.1  # of an axle's slip by it: with a speed reference, without
 
 # Random walks per square root of a second.
 WALK = np.zeros(N)
@@ -74,7 +72,6 @@ WALK[PEAK], WALK[LOAD], WALK[SINKING] = 0.01, 0.0005, 0.0005
 WALK[MASS], WALK[MOTOR], WALK[DRAG] = 1e-5, 1e-5, 0.005
 WALK[DELAY] = 1e-4
 WALK[RATE] = 0.1
-WALK[SKEW] = 0.0
 LEVEL_WALK = 0.01  # of all levels alike while the pads rub
 
 
@@ -157,10 +154,10 @@ def begin_application(state: Record, unknown: float, heat: Record) -> None:
     state.weight = 0.0
     forget_rate(state)
     state.x[OVERRUN] = OVERRUN_MEAN if unknown >= 1.0 else 0.0
-    slip = UNKNOWN_SLIP + UNKNOWN_SLIP_BY_AGE * min(state.reference_s, 1.0)
+    slip = (UNKNOWN_SLIP + UNKNOWN_SLIP_BY_AGE * unknown * min(state.reference_s, 1.0)) * unknown
     for axle in range(2):
         clear_state(state, DRIVE + axle, (UNKNOWN_DRIVE * unknown) ** 2)
-        clear_state(state, SLIP_ERROR + axle, (slip * unknown) ** 2)
+        clear_state(state, SLIP_ERROR + axle, slip * slip)
 
 
 @kernel

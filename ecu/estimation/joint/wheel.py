@@ -32,13 +32,11 @@ from ecu.estimation.joint.layout import (
     ROLLING,
     SIDE,
     SINKING,
-    SKEW,
     SLIP_ERROR,
     STIFFNESS,
     V,
 )
 from ecu.estimation.joint.prior import UNKNOWN_PER_ERROR
-from ecu.estimation.joint.sampling import slope
 from ecu.estimation.tyre import rolling_radius
 from ecu.jit import Record, kernel
 from ecu.params import BAR
@@ -207,8 +205,7 @@ def predict_balance(params: Record, state: Record, braking: bool) -> float:
         driven = w.motor[i] * math.exp(x[MOTOR])
         own = heavier * (params.rolling_resistance * w.load[i] * r + params.wheel_inertia[i] * w.change / r)
         inert += own / (r * mass)
-        late = w.common_pressure[i] - x[SKEW] * slope(state.sampling, i)
-        left += (brake_torque(params, state, i, late) + driven + own) / (r * mass)
+        left += (brake_torque(params, state, i, w.common_pressure[i]) + driven + own) / (r * mass)
         smooth = state.last_smooth[i]
         linings += brake_torque(params, state, i, smooth) / (r * mass)
         per_bar = brake_lever(params, i) * friction(params, state, i) / (r * mass)
@@ -216,7 +213,6 @@ def predict_balance(params: Record, state: Record, braking: bool) -> float:
         h[CHANGE + i // 2] += h[LEVEL + i]
         if smooth > 0.5:
             h[OFFSET + i // 2] -= per_bar
-            h[SKEW] -= per_bar * state.last_slope[i]
     h[MASS], h[MOTOR] = inert, -inert - linings
     h[BIAS] = -heavier
     h[DRAG] = drag
