@@ -60,10 +60,11 @@ def correct(state: Record, innovation: float, variance: float) -> float:
     p, h, ph, x, free = state.p, state.h, state.ph, state.x, state.free
     total = variance
     for i in range(N):
-        s = 0.0
-        for j in range(N):
-            s += p[i, j] * h[j]
-        ph[i] = s
+        ph[i] = 0.0
+    for j in range(N):  # most derivatives are zero
+        if h[j] != 0.0:
+            for i in range(N):
+                ph[i] += p[j, i] * h[j]
     for i in range(N):
         total += ph[i] * h[i]
     ratio = innovation * innovation / total
@@ -79,12 +80,13 @@ def correct(state: Record, innovation: float, variance: float) -> float:
             x[i] += scale * ph[i]
     inverse = 1.0 / total
     for i in range(N):
-        gain = ph[i] * inverse
         if _corrects(free, i, only_speed):
+            gain = ph[i] * inverse
             for j in range(N):
                 p[i, j] -= gain * ph[j]
-        else:
+    for i in range(N):
+        if not _corrects(free, i, only_speed):
             for j in range(N):
                 if _corrects(free, j, only_speed):
-                    p[i, j] -= gain * ph[j]
+                    p[i, j] = p[j, i]
     return ratio
