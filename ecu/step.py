@@ -270,7 +270,7 @@ def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
     mass = p.mass * math.exp(s.joint.x[MASS]) if p.observer == JOINT else p.mass
     distribute(p, s.distribution, mass, decel)
     follow_friction(p, s.control, s.friction, s.learned, dt)
-    follow_pressure(p, s.friction_torque, u, s.limiter.pressure, s.joint.pressures.zero, dt)
+    follow_pressure(p, s.friction_torque, u, s.limiter.pressure, s.joint.zero.value, dt)
     update_motors(p, s.blending, u, s.guard.capped, s.speed.speed, decel, dt)
     share_torque(p, s.blending, s.distribution.torque, dt)
     for i in range(4):

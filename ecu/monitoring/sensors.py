@@ -34,7 +34,7 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> int:
     if s.acceleration.implausible:
         faults |= ACCEL_IMPLAUSIBLE
     begins = s.acceleration.implausible != 0 and not doubted
-    watch_pressures(s.plausibility, u, s.friction_torque.model, s.joint.pressures.zero, dt)
+    watch_pressures(s.plausibility, u, s.friction_torque.model, s.joint.zero.value, dt)
     if s.plausibility.pressure:
         faults |= PRESSURE_NOT_FOLLOWING
     s.friction.held = 1 if s.plausibility.pressure or begins else 0

@@ -12,6 +12,7 @@ import numpy as np
 from ecu.estimation.joint.motors import MOTORS_STATE
 from ecu.estimation.joint.pressure import PRESSURE_STATE
 from ecu.estimation.joint.sampling import SAMPLING_STATE
+from ecu.estimation.joint.zero import ZERO_STATE
 from ecu.records import N_JOINT
 
 V: Final = 0  # vehicle speed [m/s]
@@ -92,16 +93,17 @@ JOINT_STATE: Final = np.dtype(
         ("pressures", PRESSURE_STATE),
         ("motors", MOTORS_STATE),
         ("sampling", SAMPLING_STATE),
+        ("zero", ZERO_STATE),
         ("started", "u1"),
         ("slides", "u1", (4,)),  # 1: the wheel is too far from the car's speed to tell it
         ("sliding", "i8"),  # number of such wheels
         ("yields", "u1", (4,)),  # 1: so far from the car's speed that its torque does not tell its force
         ("releasing", "u1"),
+        ("released", "u1"),  # nobody brakes by the linings
         ("untrusted_s", "f8"),  # time since a wheel was last believed [s]
         ("hold_s", "f8"),  # no learning for this long, a wheel had left the tyre's range
         ("reference_s", "f8"),  # time since a speed reference came [s]
         ("smooth_pressure", "f8", (4,)),  # bar above push-out
-        ("readings", "f8", (4,)),  # mean pressure readings of released brakes [bar]
         ("last_accel", "f8"),  # of the last window [m/s^2]
         ("smooth_accel", "f8"),  # low-passed [m/s^2]
         ("mean_accel", "f8"),  # of the last seconds [m/s^2]

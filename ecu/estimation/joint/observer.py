@@ -39,13 +39,14 @@ from ecu.estimation.joint.layout import (
     N,
     V,
 )
-from ecu.estimation.joint.pressure import follows, learn_zero
+from ecu.estimation.joint.pressure import follows
 from ecu.estimation.joint.prior import UNKNOWN_DRIVE, forget_rate, keep_within_bounds, note_change, pressure_change, set_prior, walk
 from ecu.estimation.joint.sampling import ACCEL
 from ecu.estimation.joint.sliding import HOLD_S, share_force, watch_tyres, wheel_slides
 from ecu.estimation.joint.snapshot import go_back, keep, keep_newer
 from ecu.estimation.joint.wheel import brake_lever, brake_torque, friction, predict_balance, predict_wheel, unknown_share
 from ecu.estimation.joint.window import close_window, gather, open_window
+from ecu.estimation.joint.zero import settle_zero
 from ecu.estimation.motion import mean_wheel_speed, usable
 from ecu.jit import Record, kernel
 from ecu.params import BAR, GRAVITY
@@ -195,7 +196,8 @@ def update_joint(
     if state.reversing:
         state.x[V], state.p[V, V], state.reversing = mean_wheel_speed(params, inputs), 0.25, 0
         open_window(state)
-    gather(params, state, inputs, motion, load, demand, dt)
+    state.released = 1 if not braking and _released(params, state, inputs) else 0
+    gather(params, state, inputs, motion, load, demand, state.released != 0, dt)
     if braking and usable(inputs, ACCEL_X):
         share_force(params, state, inputs, motion.accel_x, load)
     state.hold_s = max(state.hold_s - dt, 0.0)
@@ -220,25 +222,13 @@ def _released(params: Record, state: Record, inputs: Record) -> bool:
 
 
 @kernel
-def _learn_zeros(params: Record, state: Record, inputs: Record, braking: bool) -> None:
-    w, zero, readings = state.window, state.pressures.zero, state.readings
-    if braking or not _released(params, state, inputs):
-        return
-    for i in range(4):
-        if w.pressure_samples[i] == 0:
-            return
-        readings[i] = w.pressure[i] + params.push_out_pressure[i] / BAR + zero[i]
-    learn_zero(state.pressures, readings)
-
-
-@kernel
 def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     w, x = state.window, state.x
     time = w.time
     motors = 0.0
-    _learn_zeros(params, state, inputs, braking)
-    released = _released(params, state, inputs)
     for i in range(4):
+        if state.released:
+            settle_zero(state.zero, i)
         if not usable(inputs, CALLIPER_PRESSURE + i):
             twin = i ^ 1
             w.pressure[i], w.common_pressure[i] = w.pressure[twin], w.common_pressure[twin]
@@ -252,7 +242,7 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     learning = moving and state.hold_s <= 0.0 and w.motor_known != 0
     learning = learning and not _learning_forbidden(params, state, inputs, braking)
     if not braking:
-        learning = learning and abs(w.across) < STRAIGHT and released
+        learning = learning and abs(w.across) < STRAIGHT and state.released != 0
     if learning and not braking and motors <= MOTORS:
         learning = w.balanced and abs(predict_balance(params, state, False)) < UNEXPLAINED
     _choose_free(state, braking, motors > MOTORS, learning)

@@ -19,8 +19,6 @@ PRESSURE_STATE = np.dtype(
         ("value", "f8", (4,)),  # bar
         ("variance", "f8", (4,)),  # bar^2
         ("disagreement", "f8", (4,)),  # low-passed innovation [bar]
-        ("zero", "f8", (4,)),  # what the sensor reads without pressure [bar]
-        ("zero_windows", "i8"),  # that the zero was learned from
         ("agreed_s", "f8", (4,)),  # for this long model and sensor have agreed
     ],
     align=True,
@@ -33,8 +31,6 @@ SHARE = 0.15  # of a change, one standard deviation
 DISAGREEMENT_LAG = 0.4  # s
 TOLERANCE = 3.0  # standard deviations
 AGREED_S = 0.3
-ZERO_START, ZERO_WINDOWS = 20, 2400  # windows of prior and of memory
-ZERO_LIMIT = 3.0  # bar
 
 
 @kernel
@@ -67,15 +63,6 @@ def correct_pressure(state: Record, i: int, measured: float, sigma: float, dt: f
     weight = state.variance[i] / total
     state.value[i] += weight * innovation
     state.variance[i] *= 1.0 - weight
-
-
-@kernel
-def learn_zero(state: Record, readings: Record) -> None:
-    """Take the mean reading of released brakes over a window [bar], shape (4,), into the zero."""
-    state.zero_windows = min(state.zero_windows + 1, ZERO_WINDOWS)
-    for i in range(4):
-        if abs(readings[i]) < ZERO_LIMIT:
-            state.zero[i] += (readings[i] - state.zero[i]) / (ZERO_START + state.zero_windows)
 
 
 @kernel

@@ -143,6 +143,10 @@ def begin_application(state: Record, unknown: float, heat: Record) -> None:
         heat: relative standard deviation that each friction has gained by its disc's temperature, shape (4,).
     """
     p = state.p
+    for axle in range(2):
+        zeros = 0.25 * (state.zero.variance[2 * axle] + state.zero.variance[2 * axle + 1])
+        i = OFFSET + axle
+        p[i, i] = max(p[i, i], PRIOR[i] ** 2 + zeros)
     widen_levels(state, STEP_COMMON**2, STEP_AXLE**2, STEP_WHEEL**2)
     for i in range(4):
         for j in range(4):

@@ -17,6 +17,7 @@ from ecu.estimation.joint.sampling import (
     close_sampling,
     open_sampling,
 )
+from ecu.estimation.joint.zero import note_rest
 from ecu.estimation.motion import corner_speed, fresh, motor_torque, motor_torque_known, usable
 from ecu.jit import Record, kernel
 from ecu.params import BAR, GRAVITY
@@ -65,7 +66,14 @@ def _current(inputs: Record, place: int) -> bool:
 
 @kernel
 def gather(
-    params: Record, state: Record, inputs: Record, motion: Record, load: Record, demand: Record, dt: float
+    params: Record,
+    state: Record,
+    inputs: Record,
+    motion: Record,
+    load: Record,
+    demand: Record,
+    released: bool,
+    dt: float,
 ) -> None:
     """Move the speed on by `dt` [s] and add this cycle's samples to the window."""
     w, x, value = state.window, state.x, inputs.value
@@ -103,7 +111,9 @@ def gather(
         if params.transmit:
             follow_demand(state.pressures, i, demand[i] / BAR, dt)
         if fresh(inputs, place):
-            reading = value[place] - state.pressures.zero[i]
+            if released:
+                note_rest(state.zero, i, value[place])
+            reading = value[place] - state.zero.value[i]
             above = reading - push_out
             add_sample(state.sampling, i, above, 1e-9 * inputs.age_ns[place])
             w.pressure_samples[i] += 1

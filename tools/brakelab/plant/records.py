@@ -186,6 +186,7 @@ SENSOR: Final = np.dtype(
         ("resolution", "f8"),
         ("delay", "f8"),  # cycles
         ("scale", "f8"),
+        ("floor", "f8"),
         ("bias", "f8"),
         ("drift_step", "f8"),  # standard deviation of what a cycle adds
         ("drift_decay", "f8"),  # of what was there, in a cycle

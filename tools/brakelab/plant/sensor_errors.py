@@ -3,7 +3,7 @@
 x(t) true   x_d = x(t - delay)                          linear between the cycles before and after
             b' = -b / tau + q w                         Gauss-Markov drift, tau = inf: random walk, var q^2 t
             y = s x_d + bias + b + noise N(0, 1)        held from `stuck_from` on
-            y = resolution * round(y / resolution)
+            y = max(resolution * round(y / resolution), floor)
 
 A sample has no value (NaN) before its `period` is over, in a burst of dropout, and from `lost_from` on.
 Bursts begin with probability `dropout` after a sample that was there and last `dropout_length` on the mean
@@ -65,6 +65,8 @@ class SensorErrors(Section):
     dropout: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
     dropout_length: Annotated[float, Field(ge=1.0)] = 1.0
     """Samples."""
+    floor: float = -math.inf
+    """No reading is less: many cars cannot report a pressure below zero."""
     period: NotNegative = 0.0
     """s between samples; 0: a sample in every cycle."""
     stuck_from: NotNegative = math.inf
@@ -144,7 +146,7 @@ def new_sensors(layers: Iterable[Mapping[str, SensorErrors]], seed: int) -> Reco
                 said = layer.get(key)
                 if said is not None:
                     errors = errors.model_copy(update=said.model_dump(exclude_unset=True))
-        for field in ("noise", "resolution", "scale", "period", "stuck_from", "lost_from"):
+        for field in ("noise", "resolution", "scale", "floor", "period", "stuck_from", "lost_from"):
             row[field] = getattr(errors, field)
         row["delay"] = random.uniform(*errors.delay) / CYCLE
         row["bias"] = random.uniform(*errors.bias)
@@ -216,6 +218,7 @@ def disturb(
             value += sensor.noise * noise.standard_normal()
         if sensor.resolution > 0.0:
             value = sensor.resolution * math.floor(value / sensor.resolution + 0.5)
+        value = max(value, sensor.floor)
         if t >= sensor.stuck_from and not math.isnan(memory.held):
             value = memory.held
         there = _is_there(sensor, memory, t, noise)
