@@ -145,6 +145,7 @@ OUTPUT_SIGNALS: Final[tuple[OutputSignal, ...]] = (
     OutputSignal("overrun", "m/s^2", False, ""),  # deceleration by a drive that nobody reports, while braking
     OutputSignal("braking", "-", False, ""),  # 1 while a brake application lasts
     OutputSignal("calliper_pressure", "bar", True, ""),  # as measured, last sample
+    OutputSignal("pressure_zero", "bar", True, ""),  # what its sensor reads without pressure
     OutputSignal("pressure_uncompensated", "bar", True, ""),  # the demand with the base friction
     OutputSignal("sigma_disc_temperature", "K", True, ""),
     # Squared innovation over its variance and squared gate, last window: beyond 1 it counts less. Joint only.

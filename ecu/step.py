@@ -339,6 +339,7 @@ def _publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: i
         y.mode_mu_b[i] = s.friction.mode[i]
         y.brake_torque[i] = s.friction.torque[i]
         y.calliper_pressure[i] = u.value[CALLIPER_PRESSURE + i]
+        y.pressure_zero[i] = s.joint.zero.value[i]
         mapped = p.mapped[CALLIPER_PRESSURE + i] != 0
         y.disc_temperature[i] = s.discs.temperature[i] if mapped else math.nan
         y.sigma_disc_temperature[i] = s.discs.sigma[i] if mapped else math.nan
