@@ -84,6 +84,7 @@ JOINT_STATE: Final = np.dtype(
         ("free", "u1", (N,)),  # states that this window may correct; the others are considered only
         ("h", "f8", (N,)),  # derivatives of one measurement
         ("ph", "f8", (N,)),
+        ("drive_known", "f8"),  # share of the drive torque that is reported
         ("weight", "f8"),  # of MEAN so far [bar]
         ("per_torque", "f8"),  # derivative of that measurement by a torque on the wheel
         ("kept_x", "f8", (2, N)),  # snapshots: the newer in row 0

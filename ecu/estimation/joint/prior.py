@@ -55,7 +55,7 @@ STEP_COMMON, STEP_AXLE, STEP_WHEEL = 0.03, 0.02, 0.005
 CHANGE_COMMON, CHANGE_AXLE, CHANGE_S = 0.08, 0.03, 4.0
 CHANGE_BY_PRESSURE = 0.05  # of an axle's friction, per relative change of its pressure
 MEAN_ZERO = 0.003  # the mean of changes within an application
-RATE_SIGMA = 0.1  # 1/s
+RATE_SIGMA = 0.1  # 1/s, where the drive is known; an engine's kicks look like a rate
 UNKNOWN_PER_ERROR = 2.0  # an engine's torque that is known to half only may as well not be known
 OVERRUN_MEAN, OVERRUN_SIGMA = 0.2, 0.3  # m/s^2, drag of an engine in gear
 UNKNOWN_DRIVE = 0.3  # m/s^2 per axle: drag of an engine, down-shifts
@@ -71,7 +71,7 @@ SLOPE_S = 100.0  # after which a slope is forgotten: no road climbs for ever
 WALK[PEAK], WALK[LOAD], WALK[SINKING] = 0.01, 0.0005, 0.0005
 WALK[MASS], WALK[MOTOR], WALK[DRAG] = 1e-5, 1e-5, 0.005
 WALK[DELAY] = 1e-4
-WALK[RATE] = 0.1
+RATE_WALK = 0.05
 LEVEL_WALK = 0.01  # of all levels alike while the pads rub
 
 
@@ -143,6 +143,7 @@ def begin_application(state: Record, unknown: float, heat: Record) -> None:
         heat: relative standard deviation that each friction has gained by its disc's temperature, shape (4,).
     """
     p = state.p
+    state.drive_known = 1.0 - unknown
     for axle in range(2):
         zeros = 0.25 * (state.zero.variance[2 * axle] + state.zero.variance[2 * axle + 1])
         i = OFFSET + axle
@@ -208,7 +209,7 @@ def note_change(state: Record, weight: float) -> None:
 def forget_rate(state: Record) -> None:
     """Let friction's rate be unknown."""
     state.x[RATE] = 0.0
-    forget(state, RATE, RATE_SIGMA**2)
+    forget(state, RATE, (RATE_SIGMA * state.drive_known) ** 2)
 
 
 @kernel
@@ -259,8 +260,9 @@ def walk(state: Record, rubbing: bool, time: float) -> None:
     if state.x[V] > 1.0:
         _forget_slope(state, math.exp(-time / SLOPE_S))
     for i in range(N):
-        if i != RATE or rubbing:
+        if i != RATE:
             p[i, i] += WALK[i] ** 2 * time
     if rubbing:
+        p[RATE, RATE] += (RATE_WALK * state.drive_known) ** 2 * time
         _change_friction(state, time)
         widen_levels(state, LEVEL_WALK**2 * time, 0.0, 0.0)
