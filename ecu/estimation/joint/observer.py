@@ -40,7 +40,7 @@ from ecu.estimation.joint.layout import (
     V,
 )
 from ecu.estimation.joint.pressure import follows
-from ecu.estimation.joint.prior import UNKNOWN_DRIVE, forget_rate, keep_within_bounds, note_change, pressure_change, set_prior, walk
+from ecu.estimation.joint.prior import UNKNOWN_KICKS, forget_rate, keep_within_bounds, note_change, pressure_change, set_prior, walk
 from ecu.estimation.joint.sampling import ACCEL
 from ecu.estimation.joint.sliding import HOLD_S, share_force, watch_tyres, wheel_slides
 from ecu.estimation.joint.snapshot import go_back, keep, keep_newer
@@ -163,7 +163,7 @@ def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> 
     if state.releasing:
         return
     if braking:
-        free[STIFFNESS] = free[PEAK] = 1
+        free[STIFFNESS] = free[PEAK] = free[OVERRUN] = 1
     else:
         free[BIAS] = free[DRAG] = state.window.motor_reported
         if motors:
@@ -337,7 +337,7 @@ def _fuse_balance(params: Record, state: Record, braking: bool) -> None:
     left = predict_balance(params, state, braking)
     variance = params.sigma_accel**2 / max(state.sampling.samples[ACCEL], 1) + BALANCE_FLOOR**2 + (BALANCE_SHARE * w.accel) ** 2
     variance += (SKEW_ACCEL * (w.accel - state.last_accel)) ** 2
-    variance += (ACROSS * w.across * GRAVITY) ** 2 + (UNKNOWN_DRIVE * unknown_share(params, state)) ** 2
+    variance += (ACROSS * w.across * GRAVITY) ** 2 + (UNKNOWN_KICKS * unknown_share(params, state)) ** 2
     for i in range(4):
         per_bar = brake_lever(params, i) * friction(params, state, i)
         per_torque = 1.0 / (params.wheel_radius[i] * params.mass)

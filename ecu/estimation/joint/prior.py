@@ -58,7 +58,8 @@ MEAN_ZERO = 0.003  # the mean of changes within an application
 RATE_SIGMA = 0.1  # 1/s, where the drive is known; an engine's kicks look like a rate
 UNKNOWN_PER_ERROR = 2.0  # an engine's torque that is known to half only may as well not be known
 OVERRUN_MEAN, OVERRUN_SIGMA = 0.2, 0.3  # m/s^2, drag of an engine in gear
-UNKNOWN_DRIVE = 0.3  # m/s^2 per axle: drag of an engine, down-shifts
+UNKNOWN_DRIVE = 0.1  # m/s^2 per axle, drag of an engine in this application
+UNKNOWN_KICKS = 3.0  # m/s^2, white from window to window: stands for 0.3 that last seconds (down-shifts)
 UNKNOWN_SLIP, UNKNOWN_SLIP_BY_AGE = 0.003, 0.1  # of an axle's slip by it: with a speed reference, without
 
 # Random walks per square root of a second.
