@@ -40,7 +40,7 @@ from ecu.estimation.joint.layout import (
     V,
 )
 from ecu.estimation.joint.pressure import follows
-from ecu.estimation.joint.prior import UNKNOWN_KICKS, forget_rate, keep_within_bounds, note_change, pressure_change, set_prior, walk
+from ecu.estimation.joint.prior import SCALE_ONLY, UNKNOWN_KICKS, forget_rate, keep_within_bounds, note_change, pressure_change, set_prior, walk
 from ecu.estimation.joint.sampling import ACCEL
 from ecu.estimation.joint.sliding import HOLD_S, share_force, watch_tyres, wheel_slides
 from ecu.estimation.joint.snapshot import go_back, keep, keep_newer
@@ -65,7 +65,6 @@ FREE = 0.4  # bar above push-out, mean of the wheels: the brakes are released
 APPLIED = 1.0  # bar above push-out: the brakes act
 STRAIGHT = 0.05  # lateral acceleration over gravity: more, and wheels roll by their own loads and angles
 VARIES_FROM, VARIES = 0.3, 0.2  # m/s^2: acceleration that tells a mass, and its change within seconds
-SCALE_ONLY = 0.03  # relative error of a motor's torque that is its scale; what is beyond changes
 COLOURED = 20.0  # times the variance of white noise: what an inverter's torque errs by is not white
 MOTORS = 100.0  # N m of all motors: their torque is worth looking at
 SLIDING_FORCE = 0.3  # relative error of the force of a wheel that seems too fast, taken for its brake force

@@ -56,6 +56,7 @@ CHANGE_COMMON, CHANGE_AXLE, CHANGE_S = 0.08, 0.03, 4.0
 CHANGE_BY_PRESSURE = 0.05  # of an axle's friction, per relative change of its pressure
 MEAN_ZERO = 0.003  # the mean of changes within an application
 RATE_SIGMA = 0.1  # 1/s, where the drive is known; an engine's kicks look like a rate
+SCALE_ONLY = 0.03  # relative error of a motor's torque that is its scale; what is beyond changes
 UNKNOWN_PER_ERROR = 2.0  # an engine's torque that is known to half only may as well not be known
 OVERRUN_MEAN, OVERRUN_SIGMA = 0.2, 0.3  # m/s^2, drag of an engine in gear
 UNKNOWN_DRIVE = 0.1  # m/s^2 per axle, drag of an engine in this application
@@ -129,7 +130,7 @@ def set_prior(params: Record, state: Record) -> None:
         p[i, i] = PRIOR[i] ** 2
     p[V, V] = 0.25
     p[MOTOR, MOTOR] = params.sigma_motor_torque**2
-    unknown = min(UNKNOWN_PER_ERROR * params.sigma_motor_torque, 1.0)
+    unknown = min(UNKNOWN_PER_ERROR * max(params.sigma_motor_torque - SCALE_ONLY, 0.0), 1.0)
     p[OVERRUN, OVERRUN] = (OVERRUN_SIGMA * unknown) ** 2
     widen_levels(state, LEVEL_COMMON**2, LEVEL_AXLE**2, LEVEL_WHEEL**2)
 

@@ -36,7 +36,7 @@ from ecu.estimation.joint.layout import (
     STIFFNESS,
     V,
 )
-from ecu.estimation.joint.prior import UNKNOWN_PER_ERROR
+from ecu.estimation.joint.prior import SCALE_ONLY, UNKNOWN_PER_ERROR
 from ecu.estimation.tyre import rolling_radius
 from ecu.jit import Record, kernel
 from ecu.params import BAR
@@ -118,7 +118,7 @@ def brake_torque(params: Record, state: Record, i: int, pressure: float) -> floa
 @kernel
 def unknown_share(params: Record, state: Record) -> float:
     """Return what is unknown of the drive, over that of a car that reports no motor torque."""
-    share: float = min(UNKNOWN_PER_ERROR * params.sigma_motor_torque, 1.0)
+    share: float = min(UNKNOWN_PER_ERROR * max(params.sigma_motor_torque - SCALE_ONLY, 0.0), 1.0)
     return share if state.motors.samples[0] + state.motors.samples[2] > 0 else 1.0
 
 
