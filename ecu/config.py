@@ -108,7 +108,7 @@ class Sensors(_Section):
     pressure: Positive = 1.8
     vehicle_speed: Positive = 0.027
     vehicle_speed_delay: Annotated[float, Field(ge=0, lt=1)] = 0.0
-    motor_torque: Annotated[float, Field(ge=0, le=1)] = 0.015
+    motor_torque: Annotated[float, Field(ge=0, le=1)] = 0.03
 
 
 class Observer(_Section):
