@@ -40,6 +40,8 @@ from ecu.diagnostics.faults import (
     BRAKE_FADE,
     DEMAND_LIMITED,
     FILTER_RESET,
+    LEARNED_AT_BOUND,
+    LEARNING_GIVEN_UP,
     MOTOR_SHORT,
     WHEEL_SLIPS,
 )
@@ -66,7 +68,7 @@ from ecu.estimation.joint.learned import (
     restore_joint,
 )
 from ecu.estimation.joint.observer import update_joint
-from ecu.estimation.joint.prior import begin_application, end_application
+from ecu.estimation.joint.prior import begin_application, end_application, forget_levels
 from ecu.estimation.joint.sliding import mistrust_wheels
 from ecu.estimation.joint.wheel import unknown_share
 from ecu.estimation.motion import MOTION_STATE, update_motion, usable
@@ -92,6 +94,13 @@ from ecu.monitoring.disc_temperature import (
     update_discs,
 )
 from ecu.monitoring.plausibility import PLAUSIBILITY_STATE
+from ecu.monitoring.prediction import (
+    PREDICTION_STATE,
+    add_sample,
+    begin_prediction,
+    close_book,
+    end_prediction,
+)
 from ecu.monitoring.sensors import leave_out, watch_sensors
 from ecu.params import BAR, JOINT, OBSERVER1
 from ecu.records import INPUTS, LEARNED, RecordArray
@@ -118,6 +127,7 @@ STATE = np.dtype(
         ("limiter", LIMITER_STATE),
         ("plausibility", PLAUSIBILITY_STATE),
         ("acceleration", ACCELERATION_STATE),
+        ("prediction", PREDICTION_STATE),
         ("trusted", INPUTS),  # the inputs without what is implausible
         ("mode", MODE_STATE),
         ("learned", LEARNED),
@@ -189,6 +199,10 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
         faults |= WHEEL_SLIPS
     if s.control.at_limit:
         faults |= BRAKE_FADE
+    if s.joint.at_bound:
+        faults |= LEARNED_AT_BOUND
+    if s.prediction.told_s > 0.0:
+        faults |= LEARNING_GIVEN_UP
     for i in range(4):
         if s.blending.lost[i] and s.plausibility.sent:
             faults |= MOTOR_SHORT
@@ -203,6 +217,9 @@ def _estimate(p: Record, s: Record, u: Record, dt: float) -> None:
     if s.application.ended:
         if p.observer == JOINT:
             end_application(s.joint)
+            if end_prediction(s.prediction):
+                forget_levels(s.joint)
+                close_book(s.prediction)
             keep_joint(p, s.joint, s.friction, s.learned)
             learn_start(s.control, s.friction, s.learned)
             hand_over_level(p, s.joint, s.friction, s.learned)
@@ -229,10 +246,14 @@ def _observe_jointly(p: Record, s: Record, u: Record, braking: bool, dt: float) 
     if s.application.started:
         for i in range(4):
             joint.heat[i] = heat_widening(s.discs, i)
+        begin_prediction(p, s.prediction, joint)
         begin_application(joint, unknown_share(p, joint), joint.heat)
     if s.guard.acting or s.friction.held:
         mistrust_wheels(joint)
     update_joint(p, joint, u, s.motion, s.wheel_load.load, s.limiter.pressure, braking, dt)
+    if braking:
+        add_sample(p, s.prediction, joint, u, s.motion.accel_x)
+    s.prediction.told_s = max(s.prediction.told_s - dt, 0.0)
     publish_friction(p, joint, s.friction, s.learned, u, braking, dt)
     if joint.window.cycles == 0:  # what is known changes at the end of a window alone
         keep_joint(p, joint, s.friction, s.learned)

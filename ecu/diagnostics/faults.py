@@ -40,6 +40,8 @@ LATE: Final = 1 << 21
 COMPILED: Final = 1 << 22
 MOTOR_SHORT: Final = 1 << 23
 PRESSURE_NOT_FOLLOWING: Final = 1 << 24
+LEARNED_AT_BOUND: Final = 1 << 25
+LEARNING_GIVEN_UP: Final = 1 << 26
 
 FAULTS: Final = (
     Fault(WHEEL_SPEED_LOST, "wheel speed lost", "a wheel speed is stale or invalid", "check the sender of WheelSpeed*"),
@@ -67,6 +69,8 @@ FAULTS: Final = (
     Fault(COMPILED, "compiled in operation", "a kernel was compiled after the start", "warm the cache: python -m ecu.warm"),
     Fault(MOTOR_SHORT, "motor gives less than demanded", "a motor gave less than demanded within the limit that it reports: the linings brake in its place until the brakes are released", "compare motor_demand, motor_torque and motor_limit of that wheel; check the inverter"),
     Fault(PRESSURE_NOT_FOLLOWING, "pressure does not follow demand", "a calliper pressure is not what was demanded while the three others are: nothing is learned", "check that wheel's pressure sensor and valve, and the receiver of PressureDemand*"),
+    Fault(LEARNED_AT_BOUND, "learned value at its bound", "a friction, mass, stiffness, motor scale, radius or zero would be learned beyond what a car can be: it stays at its bound", "compare the configuration with the car: mass, tyres, brakes; check the sensors"),
+    Fault(LEARNING_GIVEN_UP, "learning given up", "what was learned predicted the last brakings worse than the configured friction: it was forgotten and is learned anew", "look at the prediction in the report; check pressures, accelerometer and motor torques against each other"),
 )  # fmt: skip
 
 DEGRADING: Final = (

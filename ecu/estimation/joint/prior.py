@@ -96,12 +96,15 @@ LOWEST[DELAY], HIGHEST[DELAY] = -0.1, 0.1
 
 @kernel
 def keep_within_bounds(state: Record) -> bool:
-    """Put learned states that have left their bounds back on them; return whether there was one."""
+    """Put learned states that have left their bounds back on them; return whether there was one.
+
+    The peak is the road's: to be far off is no fault.
+    """
     x, found = state.x, False
     for i in range(N):
         if x[i] < LOWEST[i] or x[i] > HIGHEST[i]:
             x[i] = min(max(x[i], LOWEST[i]), HIGHEST[i])
-            found = True
+            found = found or i != PEAK
     return found
 
 
@@ -132,6 +135,14 @@ def set_prior(params: Record, state: Record) -> None:
     p[MOTOR, MOTOR] = params.sigma_motor_torque**2
     unknown = min(UNKNOWN_PER_ERROR * max(params.sigma_motor_torque - SCALE_ONLY, 0.0), 1.0)
     p[OVERRUN, OVERRUN] = (OVERRUN_SIGMA * unknown) ** 2
+    widen_levels(state, LEVEL_COMMON**2, LEVEL_AXLE**2, LEVEL_WHEEL**2)
+
+
+@kernel
+def forget_levels(state: Record) -> None:
+    """Let friction be the configured one again, as little known as before anything was learned."""
+    for i in range(LEVEL, LEVEL + 4):
+        clear_state(state, i, 0.0)
     widen_levels(state, LEVEL_COMMON**2, LEVEL_AXLE**2, LEVEL_WHEEL**2)
 
 
