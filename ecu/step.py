@@ -96,7 +96,7 @@ from ecu.monitoring.disc_temperature import (
 from ecu.monitoring.plausibility import PLAUSIBILITY_STATE
 from ecu.monitoring.prediction import (
     PREDICTION_STATE,
-    add_sample,
+    add_window,
     begin_prediction,
     close_book,
     end_prediction,
@@ -251,11 +251,11 @@ def _observe_jointly(p: Record, s: Record, u: Record, braking: bool, dt: float) 
     if s.guard.acting or s.friction.held:
         mistrust_wheels(joint)
     update_joint(p, joint, u, s.motion, s.wheel_load.load, s.limiter.pressure, braking, dt)
-    if braking:
-        add_sample(p, s.prediction, joint, u, s.motion.accel_x)
+    if braking and joint.closed:
+        add_window(p, s.prediction, joint, u)
     s.prediction.told_s = max(s.prediction.told_s - dt, 0.0)
     publish_friction(p, joint, s.friction, s.learned, u, braking, dt)
-    if joint.window.cycles == 0:  # what is known changes at the end of a window alone
+    if joint.closed:  # what is known changes at the end of a window alone
         keep_joint(p, joint, s.friction, s.learned)
     s.speed.started, s.speed.speed = joint.started, joint.x[V]
     s.force.k_f = math.exp(joint.x[STIFFNESS])

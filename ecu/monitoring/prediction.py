@@ -1,8 +1,8 @@
 """Is braking predicted better with what was learned than with what is configured? A book of it.
 
-Each application is judged by specific force, which no slope is in. Over its samples
+Each application is judged by specific force, which no slope is in. Over its windows
 
-    measured     -(a - b) - overrun - (drag + rolling + sum M_i / r_i) / m
+    measured     -(1 + sum I_i / (r_i^2 m)) (a - b) - overrun - (drag + rolling + sum M_i / r_i) / m
     predicted    sum 2 A_i r_eff mu_i (p_i - p_0) / r_i / m        mu_i as it was before the application
 
 twice: with the learned friction, mass, bias and overrun, and with the configured ones. The relative errors
@@ -15,12 +15,11 @@ import math
 import numpy as np
 
 from ecu.estimation.joint.layout import BIAS, DRAG, LEVEL, MASS, MOTOR, OVERRUN, V
-from ecu.estimation.joint.wheel import brake_lever
 from ecu.estimation.friction import driver_accelerates
-from ecu.estimation.motion import motor_torque, usable
+from ecu.estimation.joint.wheel import brake_lever
 from ecu.jit import Record, kernel
-from ecu.params import BAR, GRAVITY
-from ecu.signals import ABS_ACTIVE, ACCEL_X, CALLIPER_PRESSURE, ESP_ACTIVE
+from ecu.params import GRAVITY
+from ecu.signals import ABS_ACTIVE, ESP_ACTIVE
 
 LEARNED_WAY, CONFIGURED_WAY = range(2)
 
@@ -28,7 +27,7 @@ PREDICTION_STATE = np.dtype(
     [
         ("mu", "f8", (2, 4)),  # before this application: learned, configured
         ("mass", "f8", (2,)),  # kg, likewise
-        ("measured", "f8", (2,)),  # sums over the samples that count [m/s^2]
+        ("measured", "f8", (2,)),  # sums over the windows that count [m/s^2]
         ("predicted", "f8", (2,)),
         ("samples", "i8"),
         ("error", "f8", (2,)),  # relative, of the last application
@@ -41,7 +40,8 @@ PREDICTION_STATE = np.dtype(
 )
 
 LEAST_SPEED = 3.4  # m/s
-LEAST_SAMPLES = 50
+LEAST_SAMPLES = 8  # windows
+STEADY = 0.10  # relative change of a pressure in a window; force follows a change later
 LEAST_DECEL = 0.8  # m/s^2, of the linings
 MEMORY = 10.0  # applications
 LEAST_APPLICATIONS = 4.0
@@ -65,36 +65,36 @@ def begin_prediction(params: Record, state: Record, joint: Record) -> None:
 
 @kernel
 def _counts(inputs: Record, joint: Record) -> bool:
+    """Return whether the last window tells how well the car is predicted."""
     works = inputs.value[ABS_ACTIVE] > 0.5 or inputs.value[ESP_ACTIVE] > 0.5
-    counts = joint.x[V] > LEAST_SPEED and joint.sliding == 0 and not works
-    for i in range(4):
-        counts = counts and usable(inputs, CALLIPER_PRESSURE + i)
-    return counts and usable(inputs, ACCEL_X) and not driver_accelerates(inputs)
+    rolls = joint.x[V] > LEAST_SPEED and joint.sliding == 0
+    counts: bool = joint.pressed < STEADY and rolls and joint.window.balanced != 0 and not works
+    return counts and not driver_accelerates(inputs)
 
 
 @kernel
-def add_sample(params: Record, state: Record, joint: Record, inputs: Record, accel: float) -> None:
-    """Take this cycle of an application in; `accel`: specific force in road axes [m/s^2]."""
+def add_window(params: Record, state: Record, joint: Record, inputs: Record) -> None:
+    """Take the last window of an application in: what it measured, all at one time."""
     if not _counts(inputs, joint):
         return
     state.samples += 1
-    x = joint.x
+    x, w = joint.x, joint.window
     speed = x[V]
-    motors, learned, configured = 0.0, 0.0, 0.0
+    motors, learned, configured, wheels = 0.0, 0.0, 0.0, 0.0
     for i in range(4):
         r = params.wheel_radius[i]
-        motors += motor_torque(inputs, i) / r
-        above = inputs.value[CALLIPER_PRESSURE + i] - joint.zero.value[i] - params.push_out_pressure[i] / BAR
-        force = brake_lever(params, i) * above / r
+        motors += w.motor[i] / r
+        wheels += params.wheel_inertia[i] / (r * r * params.mass)
+        force = brake_lever(params, i) * w.common_pressure[i] / r
         learned += force * state.mu[LEARNED_WAY, i]
         configured += force * state.mu[CONFIGURED_WAY, i]
     rolling, drag = params.rolling_resistance * GRAVITY, params.drag_area * speed * speed
     mass = state.mass[LEARNED_WAY]
     rest = rolling + (drag * math.exp(x[DRAG] + x[MASS]) + motors * math.exp(x[MOTOR])) / mass
-    state.measured[LEARNED_WAY] += -(accel - x[BIAS]) - x[OVERRUN] - rest
+    state.measured[LEARNED_WAY] += -(1.0 + wheels) * (w.common_accel - x[BIAS]) - x[OVERRUN] - rest
     state.predicted[LEARNED_WAY] += learned / mass
     mass = state.mass[CONFIGURED_WAY]
-    state.measured[CONFIGURED_WAY] += -accel - rolling - (drag + motors) / mass
+    state.measured[CONFIGURED_WAY] += -(1.0 + wheels) * w.common_accel - rolling - (drag + motors) / mass
     state.predicted[CONFIGURED_WAY] += configured / mass
 
 

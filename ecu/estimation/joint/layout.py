@@ -95,6 +95,8 @@ JOINT_STATE: Final = np.dtype(
         ("motors", MOTORS_STATE),
         ("sampling", SAMPLING_STATE),
         ("zero", ZERO_STATE),
+        ("pressed", "f8"),  # relative change of a pressure in the last window, of either axle the greater
+        ("closed", "u1"),  # a window ended in this cycle
         ("started", "u1"),
         ("slides", "u1", (4,)),  # 1: the wheel is too far from the car's speed to tell it
         ("sliding", "i8"),  # number of such wheels

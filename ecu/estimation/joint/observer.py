@@ -183,7 +183,9 @@ def update_joint(
     dt: float,
 ) -> None:
     """Take this cycle's samples in and, at the end of a window, correct the state by them."""
-    state.reset = 0
+    if state.closed:
+        open_window(state)
+    state.reset = state.closed = 0
     if not state.started:
         _start_speed(params, state, inputs)
         if not state.started:
@@ -205,7 +207,7 @@ def update_joint(
     close_window(params, state)
     _fuse(params, state, inputs, braking)
     _look_after(params, state, braking)
-    open_window(state)
+    state.closed = 1
 
 
 @kernel
@@ -277,6 +279,7 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     watch_tyres(state, learning and braking)
     if seen and learning and w.balanced and (braking or w.motor_reported):
         _fuse_balance(params, state, braking)
+    state.pressed = max(abs(pressure_change(state, 0)), abs(pressure_change(state, 2)))
     state.last_accel, state.last_smooth_accel = w.accel, state.smooth_accel
     for i in range(4):
         state.motors.last_smooth[i] = state.motors.smooth[i]
