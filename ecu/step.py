@@ -60,7 +60,7 @@ from ecu.estimation.friction import (
     update_pressure,
 )
 from ecu.estimation.joint.kalman import GATE
-from ecu.estimation.joint.layout import JOINT_STATE, MASS, OVERRUN, STIFFNESS, V
+from ecu.estimation.joint.layout import BIAS, JOINT_STATE, MASS, OVERRUN, STIFFNESS, V
 from ecu.estimation.joint.learned import (
     hand_over_level,
     keep_joint,
@@ -220,9 +220,9 @@ def _estimate(p: Record, s: Record, u: Record, dt: float) -> None:
             if end_prediction(s.prediction):
                 forget_levels(s.joint)
                 close_book(s.prediction)
-            keep_joint(p, s.joint, s.friction, s.learned)
+            keep_joint(p, s.joint, s.learned)
             learn_start(s.control, s.friction, s.learned)
-            hand_over_level(p, s.joint, s.friction, s.learned)
+            hand_over_level(s.friction, s.learned)
         else:
             learn_start(s.control, s.friction, s.learned)
             hand_over(s.friction, s.learned)
@@ -256,7 +256,7 @@ def _observe_jointly(p: Record, s: Record, u: Record, braking: bool, dt: float) 
     s.prediction.told_s = max(s.prediction.told_s - dt, 0.0)
     publish_friction(p, joint, s.friction, s.learned, u, braking, dt)
     if joint.closed:  # what is known changes at the end of a window alone
-        keep_joint(p, joint, s.friction, s.learned)
+        keep_joint(p, joint, s.learned)
     s.speed.started, s.speed.speed = joint.started, joint.x[V]
     s.force.k_f = math.exp(joint.x[STIFFNESS])
     for i in range(4):
@@ -334,6 +334,17 @@ def _test_ratio(p: Record, s: Record, channel: int) -> float:
 
 
 @kernel
+def _publish_car(p: Record, s: Record, y: Record) -> None:
+    """Write what the joint observer knows of the car; of the others, what is configured."""
+    y.overrun = y.accel_x_zero = 0.0
+    y.vehicle_mass, y.sigma_brake_force = p.mass, math.nan
+    if p.observer == JOINT:
+        x = s.joint.x
+        y.overrun, y.accel_x_zero, y.vehicle_mass = x[OVERRUN], x[BIAS], p.mass * math.exp(x[MASS])
+        y.sigma_brake_force = s.joint.sigma_force
+
+
+@kernel
 def _publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: int, mode: int) -> None:
     started = s.speed.started != 0
     y.vehicle_speed = s.speed.speed if started else math.nan
@@ -347,7 +358,7 @@ def _publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: i
     y.motor_demand_valid = y.pressure_demand_valid if blends(p) else 0.0
     y.decel_demand_total = decel
     y.accel_x_road = s.motion.accel_x
-    y.overrun = s.joint.x[OVERRUN] if p.observer == JOINT else 0.0
+    _publish_car(p, s, y)
     y.braking = s.application.braking
     y.test_ratio_balance, y.test_ratio_speed = _test_ratio(p, s, 4), _test_ratio(p, s, 5)
     y.particles_last_brake = y.particles_per_km = math.nan

@@ -14,8 +14,8 @@ import math
 
 import numpy as np
 
-from ecu.estimation.joint.layout import BIAS, DRAG, LEVEL, MASS, MOTOR, OVERRUN, V
 from ecu.estimation.friction import driver_accelerates
+from ecu.estimation.joint.layout import BIAS, DRAG, LEVEL, MASS, MOTOR, OVERRUN, V
 from ecu.estimation.joint.wheel import brake_lever
 from ecu.jit import Record, kernel
 from ecu.params import GRAVITY
@@ -115,8 +115,8 @@ def end_prediction(state: Record) -> bool:
     state.worse += gain * (difference - before)
     state.spread += gain * ((difference - before) * (difference - state.worse) - state.spread)
     doubt = BEYOND_DOUBT * math.sqrt(state.spread / state.applications)
-    known = state.applications >= LEAST_APPLICATIONS
-    return known and state.worse > LEAST_WORSE and state.worse > doubt
+    worse: bool = state.worse > max(LEAST_WORSE, doubt)
+    return worse and state.applications >= LEAST_APPLICATIONS
 
 
 @kernel

@@ -119,6 +119,7 @@ JOINT_STATE: Final = np.dtype(
         ("curved", "f8"),  # part of the last wheel's slip beyond that of a linear tyre
         ("force", "f8", (4,)),  # N
         ("observed", "u1", (4,)),  # friction was corrected in the last window
+        ("sigma_force", "f8"),  # of the force of all linings at equal pressures, relative
         ("heat", "f8", (4,)),  # relative standard deviation of friction by its disc's temperature
         ("ratio", "f8", (6,)),  # squared innovation over its variance: wheels, total force, speed reference
         ("pull", "f8", (4,)),  # the wheels' test ratios up to the gate, with the sign of the innovation

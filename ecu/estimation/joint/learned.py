@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 from ecu.estimation.friction import GREATEST_RATIO, LEAST_RATIO, resting_mode
+from ecu.estimation.joint.kalman import clear_state
 from ecu.estimation.joint.layout import (
     BIAS,
     CHANGE,
@@ -26,8 +27,8 @@ from ecu.estimation.joint.layout import (
 )
 from ecu.estimation.joint.observer import WINDOW_S, start_joint
 from ecu.estimation.joint.pressure import follows
-from ecu.estimation.joint.kalman import clear_state
 from ecu.estimation.joint.prior import set_prior, widen_levels
+from ecu.estimation.joint.wheel import brake_lever, friction
 from ecu.estimation.motion import usable
 from ecu.jit import Record, kernel
 from ecu.signals import CALLIPER_PRESSURE, OBSERVING, WHEEL_SPEED
@@ -64,7 +65,7 @@ def restore_joint(params: Record, state: Record, learned: Record) -> None:
 
 
 @kernel
-def keep_joint(params: Record, state: Record, friction: Record, learned: Record) -> None:
+def keep_joint(params: Record, state: Record, learned: Record) -> None:
     """Write what is known now into `learned`."""
     learned.joint_known = 1
     place = 0
@@ -80,12 +81,12 @@ def keep_joint(params: Record, state: Record, friction: Record, learned: Record)
 
 
 @kernel
-def hand_over_level(params: Record, state: Record, friction: Record, learned: Record) -> None:
+def hand_over_level(observed: Record, learned: Record) -> None:
     """At the end of a braking: count what it observed."""
     learned.brakings += 1
     for i in range(4):
-        learned.observed_s[i] += friction.observed_s[i]
-        friction.observed_s[i] = 0.0
+        learned.observed_s[i] += observed.observed_s[i]
+        observed.observed_s[i] = 0.0
 
 
 @kernel
@@ -114,27 +115,43 @@ def _sigma(params: Record, state: Record, i: int, now: bool) -> float:
 
 
 @kernel
+def _sigma_force(params: Record, state: Record) -> float:
+    """Return the relative standard deviation of the force of all linings together, at equal pressures."""
+    total, variance = 0.0, 0.0
+    for i in range(4):
+        total += brake_lever(params, i) * friction(params, state, i) / params.wheel_radius[i]
+    for i in range(4):
+        for j in range(4):
+            both = brake_lever(params, i) * friction(params, state, i) / params.wheel_radius[i]
+            both *= brake_lever(params, j) * friction(params, state, j) / params.wheel_radius[j]
+            variance += both / (total * total) * state.p[LEVEL + i, LEVEL + j]
+    return math.sqrt(max(variance, 0.0))
+
+
+@kernel
 def publish_friction(
     params: Record,
     state: Record,
-    friction: Record,
+    published: Record,
     learned: Record,
     inputs: Record,
     braking: bool,
     dt: float,
 ) -> None:
     """Overwrite friction, its standard deviation and mode of every corner from the joint observer."""
-    friction.reset = state.reset
+    published.reset = state.reset
+    if state.closed:
+        state.sigma_force = _sigma_force(params, state)
     for i in range(4):
         mu = params.mu_nominal[i] * math.exp(friction_now(state, i))
         sigma = _sigma(params, state, i, True)
         if state.observed[i] and follows(state.pressures, i):
             above = max(state.smooth_pressure[i], 1.0)
             sigma = math.sqrt(sigma * sigma + state.pressures.variance[i] / (above * above))
-        friction.mu[i], friction.sigma[i] = mu, mu * sigma
+        published.mu[i], published.sigma[i] = mu, mu * sigma
         good = usable(inputs, WHEEL_SPEED + i) and usable(inputs, CALLIPER_PRESSURE + i)
         if braking and state.observed[i] and good:
-            friction.observed_s[i] += dt
-            friction.mode[i] = OBSERVING
+            published.observed_s[i] += dt
+            published.mode[i] = OBSERVING
         else:
-            friction.mode[i] = resting_mode(params, friction, learned, good, i)
+            published.mode[i] = resting_mode(params, published, learned, good, i)

@@ -22,10 +22,10 @@ from ecu.estimation.joint.layout import (
     CHANGE,
     DELAY,
     DRAG,
+    LEVEL,
     LOAD,
     MASS,
     MOTOR,
-    LEVEL,
     OFFSET,
     OVERRUN,
     PEAK,
@@ -40,16 +40,32 @@ from ecu.estimation.joint.layout import (
     V,
 )
 from ecu.estimation.joint.pressure import follows
-from ecu.estimation.joint.prior import SCALE_ONLY, UNKNOWN_KICKS, forget_rate, keep_within_bounds, note_change, pressure_change, set_prior, walk
+from ecu.estimation.joint.prior import (
+    SCALE_ONLY,
+    UNKNOWN_KICKS,
+    forget_rate,
+    keep_within_bounds,
+    note_change,
+    pressure_change,
+    set_prior,
+    walk,
+)
 from ecu.estimation.joint.sampling import ACCEL
 from ecu.estimation.joint.sliding import HOLD_S, share_force, watch_tyres, wheel_slides
 from ecu.estimation.joint.snapshot import go_back, keep, keep_newer
-from ecu.estimation.joint.wheel import brake_lever, brake_torque, friction, predict_balance, predict_wheel, unknown_share
+from ecu.estimation.joint.wheel import (
+    brake_lever,
+    brake_torque,
+    friction,
+    predict_balance,
+    predict_wheel,
+    unknown_share,
+)
 from ecu.estimation.joint.window import close_window, gather, open_window
 from ecu.estimation.joint.zero import settle_zero
 from ecu.estimation.motion import mean_wheel_speed, usable
 from ecu.jit import Record, kernel
-from ecu.params import BAR, GRAVITY
+from ecu.params import GRAVITY
 from ecu.signals import (
     ABS_ACTIVE,
     ACCEL_X,
@@ -140,7 +156,8 @@ def _watch_release(state: Record, braking: bool) -> None:
 def _accelerates(state: Record) -> bool:
     """Return whether acceleration varies: what does not cannot tell mass from bias, drag and slope."""
     accel = state.window.accel
-    return abs(accel) > VARIES_FROM and abs(accel - state.mean_accel) > VARIES
+    varies: bool = abs(accel) > VARIES_FROM and abs(accel - state.mean_accel) > VARIES
+    return varies
 
 
 @kernel
@@ -337,7 +354,11 @@ def _motor_variance(state: Record, i: int, braking: bool) -> float:
 def _fuse_balance(params: Record, state: Record, braking: bool) -> None:
     w, wild = state.window, 0.0
     left = predict_balance(params, state, braking)
-    variance = params.sigma_accel**2 / max(state.sampling.samples[ACCEL], 1) + BALANCE_FLOOR**2 + (BALANCE_SHARE * w.accel) ** 2
+    variance = (
+        params.sigma_accel**2 / max(state.sampling.samples[ACCEL], 1)
+        + BALANCE_FLOOR**2
+        + (BALANCE_SHARE * w.accel) ** 2
+    )
     variance += (SKEW_ACCEL * (w.accel - state.last_accel)) ** 2
     variance += (ACROSS * w.across * GRAVITY) ** 2 + (UNKNOWN_KICKS * unknown_share(params, state)) ** 2
     for i in range(4):

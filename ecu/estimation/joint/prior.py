@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 
+from ecu.estimation.friction import GREATEST_RATIO, LEAST_RATIO
 from ecu.estimation.joint.kalman import clear_derivatives, clear_state, correct, drift_speed, forget
 from ecu.estimation.joint.layout import (
     BIAS,
@@ -33,7 +34,6 @@ from ecu.estimation.joint.layout import (
     N,
     V,
 )
-from ecu.estimation.friction import GREATEST_RATIO, LEAST_RATIO
 from ecu.jit import Record, kernel
 
 PRIOR = np.zeros(N)

@@ -16,8 +16,8 @@ import math
 from ecu.estimation.joint.kalman import clear_derivatives
 from ecu.estimation.joint.layout import (
     BIAS,
-    DRAG,
     CHANGE,
+    DRAG,
     DRIVE,
     LEVEL,
     LOAD,
@@ -103,15 +103,18 @@ def peak_adhesion(state: Record, relative: float) -> float:
     come back; in ln D its derivative would be gone by then.
     """
     y = state.x[PEAK]
-    nominal: float = NOMINAL_PEAK * max(1.0 - 4.0 * y, LEAST_OF_PEAK) ** -0.25
-    return nominal * relative ** (state.x[PEAK_LOAD] - PEAK_DEGRESSION)
+    at_rest: float = NOMINAL_PEAK * max(1.0 - 4.0 * y, LEAST_OF_PEAK) ** -0.25
+    peak: float = at_rest * relative ** (state.x[PEAK_LOAD] - PEAK_DEGRESSION)
+    return peak
 
 
 @kernel
 def brake_torque(params: Record, state: Record, i: int, pressure: float) -> float:
     """Return the brake torque [N m] at a pressure above push-out [bar]."""
-    mu = friction(params, state, i)
-    torque: float = brake_lever(params, i) * mu * (pressure - state.x[OFFSET + i // 2] if pressure != 0.0 else 0.0)
+    if pressure == 0.0:
+        return 0.0
+    acts = pressure - state.x[OFFSET + i // 2]
+    torque: float = brake_lever(params, i) * friction(params, state, i) * acts
     return torque
 
 

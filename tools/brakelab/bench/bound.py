@@ -104,7 +104,7 @@ def as_learned(params: RecordArray, learned: RecordArray, wander: Wander) -> Vec
         (SINKING, layout.SINKING),
         *((RADIUS + i, layout.RADIUS + i) for i in range(4)),
         *((PUSH_OUT + i, layout.OFFSET + i) for i in range(2)),
-        *((MU + i, layout.MU + i) for i in range(4)),
+        *((MU + i, layout.LEVEL + i) for i in range(4)),
     ):
         turn[mine, its] = 1.0
     turn[RADIUS : RADIUS + 4, layout.ROLLING] = 1.0

@@ -75,9 +75,8 @@ class DriveBook:
         applications = [brakings[k : k + 4] for k in range(0, len(brakings), len(CORNERS))]
         counted = [four for four in applications if not four[0].left_out]
         found = errors(
-            [four[0].decel_mean for four in counted],
-            [four[0].decel_predicted for four in counted],
-            [any(row.learned_before for row in four) for four in counted],
+            [four[0].specific_force_mean for four in counted],
+            [four[0].specific_force_predicted for four in counted],
         )
         return {
             "start_time": findings[0].began_ns,

@@ -13,18 +13,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from brakelab.replay.prediction import (
-    SLOPE_ROWS,
-    STANDING,
-    Vector,
-    corners,
-    driven_against,
-    left_out,
-    mean,
-    predict,
-    slope_felt,
-)
-from ecu.estimation.friction import SECONDS_FOR_LEARNING, SIGMA_FOR_LEARNING
+from brakelab.replay.prediction import STANDING, Vector, corners, left_out, mean, predict
 from ecu.params import BAR
 from ecu.records import RecordArray
 from ecu.signals import CORNERS, FAULT, HOLDING, OBSERVING, OUTPUT
@@ -51,13 +40,20 @@ BRAKE_UNITS: Final = {
     "disc_temperature_mean": "degC",
     "pad_wear_mass": "g",
     "emission_factor": "log10(particles)",
-    # Beyond the contract: what became of the estimate.
+    # Beyond the contract: what was known after the application, for the next one.
     "mu_b_end": "-",
     "sigma_mu_b_end": "-",
     "observed": "s",
     "learning": "-",
-    # Beyond the contract: what the prediction is worth.
-    "sigma_decel_predicted": "m/s^2",
+    # Beyond the contract: what the prediction is worth, see `brakelab.replay.prediction`.
+    "mu_b_before": "-",
+    "sigma_mu_b_before": "-",
+    "specific_force_mean": "m/s^2",
+    "specific_force_predicted": "m/s^2",
+    "sigma_specific_force": "m/s^2",
+    "specific_force_configured": "m/s^2",
+    "specific_force_rest": "m/s^2",
+    "specific_force_configured_rest": "m/s^2",
     "learned_before": "-",
     "left_out": "-",
 }
@@ -87,7 +83,17 @@ class BrakeRow(NamedTuple):
     observed: float
     learning: str
     """`LEARNED`, or why this application taught nothing."""
-    sigma_decel_predicted: float
+    mu_b_before: float
+    sigma_mu_b_before: float
+    specific_force_mean: float
+    """Measured; positive braking."""
+    specific_force_predicted: float
+    sigma_specific_force: float
+    specific_force_configured: float
+    """Predicted with the configured friction."""
+    specific_force_rest: float
+    """Part of the predicted one that is not the linings'."""
+    specific_force_configured_rest: float
     learned_before: int
     """1: the friction in the prediction was learned, 0: it is nominal."""
     left_out: str
@@ -123,47 +129,33 @@ def _modes(rows: Vector, i: int) -> Vector:
     return rows[..., OUTPUT["mode_fl"] + i]
 
 
-def learning(rows: Vector, i: int, params: RecordArray, against: str = "") -> str:
-    """Return `LEARNED` if corner i's estimate over `rows`, shape (n, N_ROW), was kept, else why not.
-
-    `against`: what `driven_against` says.
-    """
+def learning(rows: Vector, i: int, params: RecordArray) -> str:
+    """Return `LEARNED` if corner i was observed in `rows`, shape (n, N_ROW), else why it was not."""
     p = params[0]
-    observed = PERIOD * np.count_nonzero(_modes(rows, i) == OBSERVING)
-    sigma = corners(rows[-1], "sigma_mu_b")[i] / corners(rows[-1], "mu_b")[i]
-    if observed >= SECONDS_FOR_LEARNING and sigma < SIGMA_FOR_LEARNING:
+    if np.any(_modes(rows, i) == OBSERVING):
         return LEARNED
-    if observed >= SECONDS_FOR_LEARNING:
-        return f"σ {100 * sigma:.0f} %"
-    if observed > 0.0:
-        return f"observed {observed:.1f} s only"
     if np.mean(_modes(rows, i) == FAULT) > 0.5:
         return "inputs lost"
     fastest = np.nanmax(rows[:, OUTPUT["vehicle_speed"]], initial=0.0)
-    strongest = np.nanmax(-rows[:, OUTPUT["accel_x_road"]], initial=0.0)
     if fastest <= p["min_speed"]:
         return "stands" if fastest < STANDING else f"slower than {3.6 * p['min_speed']:.0f} km/h"
-    if strongest <= p["activation_decel"][i]:
-        return f"below {p['activation_decel'][i]:.1f} m/s²"
-    return against or "held: ABS, ESP, accelerator or reverse, or slip too small or too large"
+    return "held: ABS, ESP, accelerator or reverse, or a wheel that slides"
 
 
-def application(number: int, t: Vector, rows: Vector, start: int, params: RecordArray) -> list[BrakeRow]:
+def application(
+    number: int, t: Vector, rows: Vector, before: Vector, after: Vector, params: RecordArray
+) -> list[BrakeRow]:
     """Return the four rows of one application.
 
-    `t` [s] and `rows`, shapes (n,) and (n, N_ROW), are its own from place `start` on and what precedes it.
+    `t` [s] and `rows`, shapes (n,) and (n, N_ROW), are its own, `before` and `after` the rows around it.
     """
     p = params[0]
-    slope = slope_felt(t[:start], rows[:start])
-    before = rows[max(start - 1, 0)]
-    t, rows = t[start:], rows[start:]
     speed = rows[:, OUTPUT["vehicle_speed"]]
     duration = float(t[-1] - t[0]) + PERIOD
     known = speed[np.isfinite(speed)]
     v_in, v_end = (float(known[0]), float(known[-1])) if len(known) else (float("nan"), float("nan"))
     decel = max((v_in - v_end) / duration, 0.0)
-    prediction = predict(rows, before, slope, params)
-    against = driven_against(rows, prediction)
+    prediction = predict(rows, before, params)
     torque, pressure = corners(rows, "brake_torque"), corners(rows, "calliper_pressure")
     slip, heat = np.nan_to_num(corners(rows, "slip")), corners(rows, "disc_temperature")
     worn = corners(rows[-1], "pad_wear_mass") - corners(before, "pad_wear_mass")
@@ -192,50 +184,55 @@ def application(number: int, t: Vector, rows: Vector, start: int, params: Record
                 mean(heat[:, i]),
                 float(worn[i]),
                 float("nan"),
-                float(corners(rows[-1], "mu_b")[i]),
-                float(corners(rows[-1], "sigma_mu_b")[i]),
+                float(corners(after, "mu_b")[i]),
+                float(corners(after, "sigma_mu_b")[i]),
                 PERIOD * float(np.count_nonzero(_modes(rows, i) == OBSERVING)),
-                learning(rows, i, params, against),
+                learning(rows, i, params),
+                float(corners(before, "mu_b")[i]),
+                float(corners(before, "sigma_mu_b")[i]),
+                prediction.measured,
+                prediction.force,
                 prediction.sigma,
+                prediction.configured,
+                prediction.rest,
+                prediction.configured_rest,
                 int(_modes(before, i) == HOLDING),
-                left_out(duration, decel, against, prediction.decel),
+                left_out(duration, prediction.measured, prediction.force, prediction.rows),
             )
         )
     return lines
 
 
 class BrakeBook:
-    """Collects applications from rows that come in blocks; it keeps only the rows of the one that lasts and
-    those just before."""
+    """Collects applications from rows that come in blocks; it keeps only the rows of the one that lasts, and
+    the one before it."""
 
     def __init__(self, params: RecordArray) -> None:
         self.rows: list[BrakeRow] = []
         self._params = params
         self._t: Vector = np.empty(0)
         self._rows: Vector = np.empty((0, 0))
-        self._done = 0
-        """So many of the rows kept are no part of an application to come."""
 
     def add(self, t: Vector, rows: Vector) -> None:
         """Add rows that follow the last: `t` [s], shape (n,), and `rows`, shape (n, N_ROW)."""
         if len(self._t):
             t, rows = np.concatenate((self._t, t)), np.concatenate((self._rows, rows))
-        braking = rows[self._done :, OUTPUT["braking"]] == 1.0
-        edges = self._done + np.flatnonzero(np.diff(braking, prepend=False))
+        braking = rows[:, OUTPUT["braking"]] == 1.0
+        edges = np.flatnonzero(np.diff(braking, prepend=False))
         for start, end in zip(edges[0::2], edges[1::2], strict=False):
-            self._close(t[:end], rows[:end], int(start))
-        done = int(edges[-1]) if len(edges) % 2 else len(t)
-        kept = max(done - SLOPE_ROWS, 0)
-        self._t, self._rows, self._done = t[kept:].copy(), rows[kept:].copy(), done - kept
+            self._close(t, rows, int(start), int(end))
+        kept = max(int(edges[-1]) - 1, 0) if len(edges) % 2 else max(len(t) - 1, 0)
+        self._t, self._rows = t[kept:].copy(), rows[kept:].copy()
 
     def end_log(self) -> None:
         """End a log: an application that still lasts ends with it, and the next row follows nothing."""
-        if self._done < len(self._t):
-            self._close(self._t, self._rows, self._done)
+        if len(self._t) and self._rows[-1, OUTPUT["braking"]] == 1.0:
+            first = int(np.argmax(self._rows[:, OUTPUT["braking"]] == 1.0))
+            self._close(self._t, self._rows, first, len(self._t))
             self.rows[-4:] = [row._replace(learning="the log ends first") for row in self.rows[-4:]]
-        self._t, self._rows, self._done = np.empty(0), np.empty((0, 0)), 0
+        self._t, self._rows = np.empty(0), np.empty((0, 0))
 
-    def _close(self, t: Vector, rows: Vector, start: int) -> None:
+    def _close(self, t: Vector, rows: Vector, start: int, end: int) -> None:
         number = len(self.rows) // len(CORNERS)
-        known = max(start - SLOPE_ROWS, 0)
-        self.rows += application(number, t[known:], rows[known:], start - known, self._params)
+        before, after = rows[max(start - 1, 0)], rows[min(end, len(rows) - 1)]
+        self.rows += application(number, t[start:end], rows[start:end], before, after, self._params)

@@ -2,16 +2,21 @@
 
 Where no sensor tells the friction, an estimate can only be judged by what it predicts:
 
-    decel_predicted = mean of [Σ (2 A_i r_eff mu_i (p_i − p_0)⁺ + M_i) / r_i + drag v² + (rolling g + s) m]
-                      / (m + Σ I_i / r_i²)
+    f = [sum (2 A_i r_eff mu_i (p_i - z_i - p_0)+ + M_i) / r_i + drag v^2 + rolling g m]
+        / (m + sum I_i / r_i^2) + overrun
 
-mu_i is the friction known before the application and s gravity along the road as the accelerometer felt it
-in the 2 s before; the pressures p_i, the motor torques M_i (positive brakes) and the speed v are its own, I_i
-is a wheel's inertia. A vehicle that stands decelerates no further: such rows count with 0, as they do in the
-measured (v_in − v_end) / duration.
+mu_i, mass m, overrun (drag of a drive that nobody reports) and the pressure sensors' zeros z_i are those
+known before the application; pressures p_i, motor torques M_i (positive brakes) and the speed v are its own, I_i is
+a wheel's inertia. f is a specific force, what an accelerometer reads, so no slope is in it.
 
-The standard deviation is that of the friction, taken as one error common to all four linings (the most that
-it can be), and that of the motor torque.
+    specific_force_predicted   mean of f            over the rows in which the vehicle moves and the driver
+    specific_force_mean        mean of b - a_x      does not drive against the brakes
+    decel_predicted            mean of f over all rows; of a vehicle that stands it is 0
+
+b is the accelerometer's zero as known before. `specific_force_configured` is the first with the configured
+friction and mass and without overrun: what an ECU that never learns would predict.
+
+The standard deviation is that of the force of all linings at equal pressures, and of the motor torque.
 """
 
 from collections.abc import Sequence
@@ -31,21 +36,27 @@ STANDING: Final = 0.3  # m/s, below: the vehicle stands
 SHORT: Final = 0.5  # s, shorter: a tap on the pedal
 WEAK: Final = 0.5  # m/s^2, below: an error of it in per cent says nothing
 PRESSED: Final = 2.0  # %, of the accelerator; the ECU learns nothing above it either
-OVERLAP: Final = 0.1  # of the pressure over time: so much may overlap while the foot changes pedals
-SLOPE_ROWS: Final = 200  # before an application, from which the slope is known
-LEAST_SLOPE_ROWS: Final = 50
+LEAST_ROWS: Final = 40
+"""That count, of an application that is judged."""
 
 
 class Prediction(NamedTuple):
-    """What an application is expected to do, all [m/s^2]."""
+    """What an application is expected to do, and what it did, all [m/s^2]."""
 
     decel: float
-    """Mean deceleration."""
+    """Mean over all of it."""
+    force: float
+    """Mean over the rows that count, as everything below."""
     sigma: float
-    brakes: float
-    """Part of the brakes, while the vehicle moves."""
-    motors: float
-    """Part of the motors, while the vehicle moves; negative: they drive."""
+    configured: float
+    """With the configured friction."""
+    rest: float
+    """Part of `force` that is not the linings'."""
+    configured_rest: float
+    measured: float
+    """Mean specific force, positive braking; NaN: the accelerometer was not usable."""
+    rows: int
+    """That count."""
 
 
 def corners(rows: Vector, name: str) -> Vector:
@@ -62,75 +73,112 @@ def mean(values: Vector, weights: Vector | None = None) -> float:
     return float(values[known] @ weights[known]) / total if total > 0.0 else float("nan")
 
 
-def slope_felt(t: Vector, rows: Vector) -> float:
-    """Return gravity along the road [m/s^2], uphill positive: specific force less dv/dt over `rows`.
-
-    `t` [s], shape (n,), `rows`, shape (n, N_ROW); 0 where too little is known.
-    """
-    speed, accel = rows[:, OUTPUT["vehicle_speed"]], rows[:, OUTPUT["accel_x_road"]]
-    known = np.flatnonzero(np.isfinite(speed) & np.isfinite(accel))
-    if len(known) < LEAST_SLOPE_ROWS:
-        return 0.0
-    first, last = known[0], known[-1]
-    return mean(accel[known]) - float((speed[last] - speed[first]) / (t[last] - t[first]))
-
-
-def predict(rows: Vector, before: Vector, slope: float, params: RecordArray) -> Prediction:
-    """Return what to expect of an application.
-
-    Args:
-        rows: of the application, shape (n, N_ROW).
-        before: the row that precedes it, shape (N_ROW,), whose friction is used.
-        slope: gravity along the road [m/s^2], uphill positive.
-        params: `PARAMS`, shape (1,).
-    """
-    p = params[0]
-    speed = rows[:, OUTPUT["vehicle_speed"]]
-    pressure = np.maximum(corners(rows, "calliper_pressure") * BAR - p["push_out_pressure"], 0.0)
-    lever = 2.0 * p["piston_area"] * p["effective_radius"] / p["wheel_radius"] * pressure
-    brakes, unsure = lever @ corners(before, "mu_b"), lever @ corners(before, "sigma_mu_b")
-    motors = (_motor_torques(rows) / p["wheel_radius"]).sum(axis=1)
-    resistance = p["drag_area"] * speed**2 + (p["rolling_resistance"] * GRAVITY + slope) * p["mass"]
-    moves = speed > STANDING
-    inert = p["mass"] + (p["wheel_inertia"] / p["wheel_radius"] ** 2).sum()
-    mean_motors = mean(np.where(moves, motors, 0.0))
-    return Prediction(
-        mean(np.where(moves, brakes + motors + resistance, 0.0)) / inert,
-        float(np.hypot(mean(np.where(moves, unsure, 0.0)), p["sigma_motor_torque"] * mean_motors)) / inert,
-        mean(brakes[moves]) / inert,
-        mean(motors[moves]) / inert,
-    )
-
-
 def _motor_torques(rows: Vector) -> Vector:
     return np.nan_to_num(rows[:, N_OUTPUTS : N_OUTPUTS + 4])
 
 
-def driven_against(rows: Vector, prediction: Prediction) -> str:
-    """Return how the vehicle was driven against its brakes, empty if it was not."""
-    moving = rows[rows[:, OUTPUT["vehicle_speed"]] > STANDING]
-    pressure = np.maximum(np.nan_to_num(corners(moving, "calliper_pressure")), 0.0).sum(axis=1)
-    if pressure @ (moving[:, N_OUTPUTS + 4] > PRESSED) > OVERLAP * pressure.sum():
-        return "accelerator pressed"
-    return "driving torque" if -prediction.motors > DRIVEN * prediction.brakes else ""
+def _linings(rows: Vector, before: Vector, params: RecordArray) -> Vector:
+    """Return the force of each lining over its friction [N], shape (n, 4)."""
+    p = params[0]
+    zero = np.nan_to_num(corners(before, "pressure_zero")) * BAR
+    acts = np.maximum(corners(rows, "calliper_pressure") * BAR - zero - p["push_out_pressure"], 0.0)
+    return np.asarray(2.0 * p["piston_area"] * p["effective_radius"] / p["wheel_radius"] * acts)
 
 
-def left_out(duration: float, decel: float, against: str, predicted: float) -> str:
+def that_count(rows: Vector, before: Vector, params: RecordArray) -> NDArray[np.bool_]:
+    """Return which rows of an application count: moving, nobody drives against the brakes, shape (n,)."""
+    brakes = _linings(rows, before, params) @ corners(before, "mu_b")
+    motors = (_motor_torques(rows) / params[0]["wheel_radius"]).sum(axis=1)
+    moves = rows[:, OUTPUT["vehicle_speed"]] > STANDING
+    accelerates = rows[:, N_OUTPUTS + 4] > PRESSED
+    felt = np.isfinite(rows[:, OUTPUT["accel_x_road"]])
+    return np.asarray(moves & ~accelerates & ~(-motors > DRIVEN * brakes) & (felt | ~felt.any()))
+
+
+class _Car(NamedTuple):
+    """What a prediction takes the car for."""
+
+    mu_b: Vector
+    mass: float
+    overrun: float
+
+
+def _forces(rows: Vector, before: Vector, car: _Car, params: RecordArray) -> tuple[Vector, Vector]:
+    """Return the specific force of the linings and the rest of it [m/s^2], shape (n,)."""
+    p = params[0]
+    inert = car.mass + (p["wheel_inertia"] / p["wheel_radius"] ** 2).sum()
+    motors = (_motor_torques(rows) / p["wheel_radius"]).sum(axis=1)
+    resistance = p["drag_area"] * rows[:, OUTPUT["vehicle_speed"]] ** 2
+    resistance += p["rolling_resistance"] * GRAVITY * car.mass
+    return _linings(rows, before, params) @ car.mu_b / inert, (motors + resistance) / inert + car.overrun
+
+
+def predict(rows: Vector, before: Vector, params: RecordArray) -> Prediction:
+    """Return what to expect of an application.
+
+    Args:
+        rows: of the application, shape (n, N_ROW).
+        before: the row that precedes it, shape (N_ROW,), whose knowledge is used.
+        params: `PARAMS`, shape (1,).
+    """
+    p = params[0]
+    mass, overrun = (float(np.nan_to_num(before[OUTPUT[name]])) for name in ("vehicle_mass", "overrun"))
+    learned = _Car(corners(before, "mu_b"), mass, overrun)
+    configured = _Car(p["mu_nominal"], float(p["mass"]), 0.0)
+    moves = rows[:, OUTPUT["vehicle_speed"]] > STANDING
+    decel = mean(np.where(moves, sum(_forces(rows, before, learned, params)), 0.0))
+    rows = rows[that_count(rows, before, params)]
+    brakes, rest = map(mean, _forces(rows, before, learned, params))
+    configured_brakes, configured_rest = map(mean, _forces(rows, before, configured, params))
+    motors = mean((_motor_torques(rows) / p["wheel_radius"]).sum(axis=1)) / mass
+    relative = before[OUTPUT["sigma_brake_force"]]
+    if np.isnan(relative):  # of one wheel's observers: taken as one error common to all
+        relative = float(np.mean(corners(before, "sigma_mu_b") / corners(before, "mu_b")))
+    sigma = float(np.hypot(relative * brakes, p["sigma_motor_torque"] * motors))
+    felt = rows[:, OUTPUT["accel_x_road"]] - np.nan_to_num(before[OUTPUT["accel_x_zero"]])
+    return Prediction(
+        decel, brakes + rest, sigma, configured_brakes + configured_rest, rest, configured_rest,
+        -mean(felt), len(rows),
+    )  # fmt: skip
+
+
+def left_out(duration: float, measured: float, predicted: float, rows: int) -> str:
+    """Return why the prediction of an application does not count, empty where it does."""
     if duration < SHORT:
         return f"shorter than {SHORT} s"
-    if against:
-        return against
-    if not np.isfinite([decel, predicted]).all():
+    if rows < LEAST_ROWS:
+        return "driven against the brakes"
+    if not np.isfinite([measured, predicted]).all():
         return "inputs lost"
-    return f"below {WEAK} m/s²" if decel < WEAK else ""
+    return f"below {WEAK} m/s²" if measured < WEAK else ""
+
+
+def running_average(measured: Sequence[float], configured: Sequence[float], rest: Sequence[float]) -> Vector:
+    """Return what a running average of the friction's scale would have predicted, shape (n,).
+
+    Each application is predicted with the mean of 1 and the scales of those before it: what the linings did
+    over what configured friction expects. All three [m/s^2]; `rest` is not the linings'.
+    """
+    linings = np.asarray(configured) - np.asarray(rest)
+    scales = (np.asarray(measured) - np.asarray(rest)) / linings
+    known = np.concatenate(([1.0], scales[:-1])) if len(scales) else np.empty(0)
+    return np.asarray(np.cumsum(known) / np.arange(1, len(known) + 1) * linings + np.asarray(rest))
+
+
+def one_scale(measured: Sequence[float], configured: Sequence[float], rest: Sequence[float]) -> Vector:
+    """Return what one scale of the friction, chosen in hindsight, would have predicted, shape (n,)."""
+    linings = np.asarray(configured) - np.asarray(rest)
+    scales = (np.asarray(measured) - np.asarray(rest)) / linings
+    off = [np.abs((scale * linings + rest) / measured - 1.0).mean() for scale in scales]
+    return np.asarray(scales[int(np.argmin(off))] * linings + rest) if len(scales) else np.empty(0)
 
 
 class Errors(NamedTuple):
     """How far predictions are from what was measured, as shares of the measured; NaN where none counts."""
 
     counted: int
-    nominal: int
-    """Of these, made with friction of which no corner had learned anything."""
+    mean: float
+    """Of the magnitude."""
     median: float
     """Of the magnitude."""
     worst: float
@@ -139,16 +187,12 @@ class Errors(NamedTuple):
     """Mean; positive: more was predicted than came."""
 
 
-def errors(measured: Sequence[float], predicted: Sequence[float], learned: Sequence[bool]) -> Errors:
+def errors(measured: Sequence[float], predicted: Sequence[float] | Vector) -> Errors:
     """Return the errors of predictions that count, one place each; decelerations in m/s^2."""
-    if not measured:
-        return Errors(0, 0, *[float("nan")] * 3)
+    if not len(measured):
+        return Errors(0, *[float("nan")] * 4)
     shares = np.asarray(predicted) / np.asarray(measured) - 1.0
     off = np.abs(shares)
     return Errors(
-        len(shares),
-        len(learned) - sum(learned),
-        float(np.median(off)),
-        float(off.max()),
-        float(shares.mean()),
+        len(shares), float(off.mean()), float(np.median(off)), float(off.max()), float(shares.mean())
     )

@@ -4,11 +4,12 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 
+import numpy as np
 from rich.box import SIMPLE
 from rich.table import Table
 
 from brakelab.replay.brakes import LEARNED, BrakeRow
-from brakelab.replay.prediction import SHORT, errors
+from brakelab.replay.prediction import SHORT, Vector, errors, one_scale, running_average
 from ecu.estimation.friction import GREATEST_RATIO, LEAST_RATIO
 from ecu.signals import CORNERS
 
@@ -19,9 +20,9 @@ def brakings_table(rows: Sequence[BrakeRow], nominal: Sequence[float]) -> Table:
     `nominal`: nominal friction of each corner, to tell an estimate that stands at its bound.
     """
     table = Table(box=SIMPLE)
-    for name in ("start s", "lasts s", "km/h", "decel m/s²", "predicted"):
+    for name in ("start s", "lasts s", "km/h", "m/s²", "predicted", "configured"):
         table.add_column(name, justify="right")
-    for name in ("mu_b front", "mu_b rear", "learned"):
+    for name in ("mu_b front, then", "mu_b rear, then", "not learned"):
         table.add_column(name)
     for first in range(0, len(rows), len(CORNERS)):
         corners = rows[first : first + len(CORNERS)]
@@ -32,8 +33,9 @@ def brakings_table(rows: Sequence[BrakeRow], nominal: Sequence[float]) -> Table:
             f"{one.t_start:.2f}",
             f"{one.duration:.2f}",
             f"{_number(3.6 * one.v_in, 0)} → {_number(3.6 * one.v_end, 0)}",
-            _number(one.decel_mean, 2),
-            _number(one.decel_predicted, 2),
+            _number(one.specific_force_mean, 2),
+            f"{_number(one.specific_force_predicted, 2)} ± {_number(one.sigma_specific_force, 2)}",
+            _number(one.specific_force_configured, 2),
             _friction(corners[:2], nominal[:2]),
             _friction(corners[2:], nominal[2:]),
             _verdict(corners),
@@ -49,27 +51,39 @@ def taps(rows: Sequence[BrakeRow]) -> int:
 def prediction_lines(rows: Sequence[BrakeRow]) -> list[str]:
     """Return how far the predictions of the applications in `rows` were off, and which do not count."""
     ones = rows[:: len(CORNERS)]
-    learned = [any(row.learned_before for row in rows[k : k + 4]) for k in range(0, len(rows), len(CORNERS))]
-    counted = [k for k, row in enumerate(ones) if not row.left_out]
-    found = errors(
-        [ones[k].decel_mean for k in counted],
-        [ones[k].decel_predicted for k in counted],
-        [learned[k] for k in counted],
-    )
-    told = "prediction: no braking to judge it by"
-    if found.counted:
-        shares = f"{100 * found.median:.1f} % in the median, {100 * found.worst:.1f} % at worst"
-        told = f"prediction of {found.counted} brakings: off by {shares}, bias {100 * found.bias:+.1f} %"
-    if found.nominal:
-        told += f"; {found.nominal} with nominal friction, as nothing was learned before"
+    counted = [row for row in ones if not row.left_out]
+    measured = [row.specific_force_mean for row in counted]
+    told = ["prediction: no braking to judge it by"]
+    if counted:
+        found = errors(measured, [row.specific_force_predicted for row in counted])
+        told = [
+            f"prediction of {found.counted} brakings: off by {100 * found.mean:.1f} % on the mean, "
+            f"{100 * found.median:.1f} % in the median, {100 * found.worst:.1f} % at worst, "
+            f"bias {100 * found.bias:+.1f} %",
+            "beside it, on the mean: " + ", ".join(
+                f"{name} {100 * errors(measured, other).mean:.1f} %" for name, other in peers(counted).items()
+            ),
+        ]  # fmt: skip
     why = Counter(row.left_out for row in ones if row.left_out)
     if not why:
-        return [told]
+        return told
     return [
-        told,
+        *told,
         "left out of the prediction: "
         + ", ".join(f"{count} {reason}" for reason, count in why.most_common()),
     ]
+
+
+def peers(rows: Sequence[BrakeRow]) -> dict[str, Vector]:
+    """Return what else could have predicted the applications of `rows`, one row each, by name [m/s^2]."""
+    measured = [row.specific_force_mean for row in rows]
+    configured = [row.specific_force_configured for row in rows]
+    rest = [row.specific_force_configured_rest for row in rows]
+    return {
+        "configured friction": np.asarray(configured),
+        "running average": running_average(measured, configured, rest),
+        "one scale in hindsight": one_scale(measured, configured, rest),
+    }
 
 
 def _number(value: float, digits: int) -> str:
@@ -91,10 +105,12 @@ def _verdict(corners: Sequence[BrakeRow]) -> str:
     reasons = [_reason(corners[:2], "front"), _reason(corners[2:], "rear")]
     same = {row.learning for row in corners}
     if len(same) == 1:
-        return "yes" if same == {LEARNED} else f"no: {same.pop()}"
-    return "; ".join(reasons)
+        return "" if same == {LEARNED} else same.pop()
+    return "; ".join(reason for reason in reasons if reason)
 
 
 def _reason(corners: Sequence[BrakeRow], axle: str) -> str:
-    left, right = ("yes" if row.learning == LEARNED else row.learning for row in corners)
-    return f"{axle} {left}" if left == right else f"{axle} {left} / {right}"
+    left, right = ("" if row.learning == LEARNED else row.learning for row in corners)
+    if not (left or right):
+        return ""
+    return f"{axle} {left}" if left == right else f"{axle} {left or 'learned'} / {right or 'learned'}"

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.replay.prediction import SHORT, left_out
+from brakelab.replay.prediction import LEAST_ROWS, SHORT, left_out
 from brakelab.report.drive import Drive, Vector, numbers, read_parquet
 from ecu.errors import UserError
 from ecu.signals import CORNERS
@@ -16,6 +16,29 @@ STANDING = 0.3  # m/s, below: the vehicle stands and decelerates no further
 
 _PER_BRAKE = ("t_start", "duration", "v_in", "v_end", "decel_mean", "decel_predicted")
 _REMEDY = "write it again with `brake-ecu replay`, or remove it: the report then uses the result alone"
+
+
+class Force(NamedTuple):
+    """Mean specific force of an application [m/s^2], positive braking; NaN: not known."""
+
+    measured: float
+    predicted: float
+    sigma: float
+    """Standard deviation of `predicted`."""
+    configured: float
+    """Predicted with the configured friction."""
+    configured_rest: float
+    """Part of it that is not the linings'."""
+
+
+_OF_FORCE = (
+    "specific_force_mean",
+    "specific_force_predicted",
+    "sigma_specific_force",
+    "specific_force_configured",
+    "specific_force_configured_rest",
+)
+_UNKNOWN = Force(*[float("nan")] * 5)
 
 
 class Braking(NamedTuple):
@@ -31,17 +54,18 @@ class Braking(NamedTuple):
     achieved: float
     """(v_in - v_end) / duration."""
     predicted: float
-    """From pressures and the friction that was learned before this application."""
+    """Of `achieved`, from pressures and what was known before this application."""
     friction: Vector
-    """Mean estimate per corner, shape (4,)."""
+    """What is known after the braking, per corner, shape (4,): what the next one is predicted with."""
+    friction_sigma: Vector
     temperature_in: Vector
     """Of the discs at the start [degC], shape (4,)."""
     energy: float
     """Into the four brakes [J]."""
-    sigma: float
-    """Standard deviation of `predicted`; NaN: not known."""
-    learned: float
-    """Share of the corners whose friction had been learned before; NaN: not known."""
+    force: Force
+    before: Vector
+    """What was known before the braking, per corner, shape (4,)."""
+    before_sigma: Vector
     left_out: str
     """Why the prediction does not count, empty where it does."""
 
@@ -91,8 +115,10 @@ def _from_file(drive: Drive, path: Path) -> list[Braking]:
             return numbers(table, name, path)
         return np.full(len(brake), np.nan)
 
-    friction, temperature, energy = map(optional, ("mu_b_mean", "disc_temperature_in", "brake_energy"))
-    sigma, learned = map(optional, ("sigma_decel_predicted", "learned_before"))
+    temperature, energy = map(optional, ("disc_temperature_in", "brake_energy"))
+    friction = optional("mu_b_end" if "mu_b_end" in table.column_names else "mu_b_mean")
+    per_corner = [optional(name) for name in ("sigma_mu_b_end", "mu_b_before", "sigma_mu_b_before")]
+    forces = [optional(name) for name in _OF_FORCE]
     told = table.column("left_out").to_pylist() if "left_out" in table.column_names else None
     found = []
     for number in np.unique(brake):
@@ -106,9 +132,10 @@ def _from_file(drive: Drive, path: Path) -> list[Braking]:
         )
         braking = Braking(
             0, t_start, t_start + duration, v_in, v_end, float("nan"), achieved, predicted,
-            friction[order], temperature[order], float(energy[order].sum()), float(sigma[order[0]]),
-            float(learned[order].mean()),
-            str(told[order[0]] or "") if told else left_out(duration, achieved, "", predicted),
+            friction[order], per_corner[0][order], temperature[order], float(energy[order].sum()),
+            Force(*(float(column[order[0]]) for column in forces)),
+            *(column[order] for column in per_corner[1:]),
+            str(told[order[0]] or "") if told else left_out(duration, achieved, predicted, LEAST_ROWS),
         )  # fmt: skip
         found.append(braking._replace(demanded=_mean(_demand(drive)[inside(drive, braking)])))
     return found
@@ -118,7 +145,7 @@ def _from_result(drive: Drive) -> list[Braking]:
     name = "braking" if drive.has("braking") else "decel_demand_total"
     busy = np.nan_to_num(drive.column(name)) > 0.5
     edges = np.flatnonzero(np.diff(busy.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
-    friction = drive.corners("mu_b")
+    friction, sigma = drive.corners("mu_b"), drive.corners("sigma_mu_b")
     temperature = drive.corners("disc_temperature")
     speed = drive.column("vehicle_speed")
     found = []
@@ -135,11 +162,13 @@ def _from_result(drive: Drive) -> list[Braking]:
                 demanded=_mean(_demand(drive)[first:end]),
                 achieved=float(speed[first] - speed[last]) / duration,
                 predicted=float("nan"),
-                friction=np.array([_mean(friction[first:end, corner]) for corner in range(4)]),
+                friction=friction[min(end, len(friction) - 1)],
+                friction_sigma=sigma[min(end, len(friction) - 1)],
                 temperature_in=temperature[first],
                 energy=float("nan"),
-                sigma=float("nan"),
-                learned=float("nan"),
+                force=_UNKNOWN,
+                before=friction[max(first - 1, 0)],
+                before_sigma=sigma[max(first - 1, 0)],
                 left_out="no prediction",
             )
         )

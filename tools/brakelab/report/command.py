@@ -8,13 +8,19 @@ import numpy as np
 from brakelab.outputs import check_outputs
 from brakelab.report.accuracy import accuracy_per_axle, tracking
 from brakelab.report.brakings import Braking, brakings
-from brakelab.report.drive import Vector, onto, read_drive
+from brakelab.report.drive import onto, read_drive
 from brakelab.report.friction import plots_of_friction
 from brakelab.report.loop import plots_of_loop
 from brakelab.report.over_time import POINTS, plots_over_time
 from brakelab.report.page import fill
 from brakelab.report.per_braking import plots_per_braking
-from brakelab.report.prediction import plots_of_prediction, prediction_errors, prediction_rows
+from brakelab.report.prediction import (
+    friction_text,
+    peer_errors,
+    plots_of_prediction,
+    prediction_errors,
+    prediction_rows,
+)
 from brakelab.report.quality import quality_tiles, read_quality
 from brakelab.report.sparkline import sparklines
 from brakelab.report.summary import facts, faults, tiles
@@ -37,7 +43,8 @@ class Row(NamedTuple):
     demanded: float
     achieved: float
     predicted: float
-    friction: Vector
+    friction_front: str
+    friction_rear: str
     temperature_front: float
     temperature_rear: float
     kilojoules: float
@@ -91,6 +98,7 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
             "with_energy": any(np.isfinite(row.kilojoules) for row in rows),
             "predictions": prediction_rows(found),
             "prediction_errors": predicted,
+            "prediction_peers": peer_errors(found),
             "accuracy": accuracy,
             "reduced": len(drive.t) > POINTS,
             "faults": faults(drive),
@@ -116,7 +124,8 @@ def _row(braking: Braking, sparkline: str) -> Row:
         demanded=braking.demanded,
         achieved=braking.achieved,
         predicted=braking.predicted,
-        friction=braking.friction,
+        friction_front=friction_text(braking.friction[:2], braking.friction_sigma[:2]),
+        friction_rear=friction_text(braking.friction[2:], braking.friction_sigma[2:]),
         temperature_front=float(braking.temperature_in[:2].mean()),
         temperature_rear=float(braking.temperature_in[2:].mean()),
         kilojoules=braking.energy * 1e-3,

@@ -35,7 +35,7 @@ def plots_per_braking(found: list[Braking]) -> dict[str, Any]:
     }
     source = ColumnDataSource(columns)
     span = Range1d(start=0.5, end=len(found) + 0.5, bounds="auto")
-    friction = _figure(span, "Mean friction [-]", len(found), 0.1)
+    friction = _figure(span, "Friction after it [-]", len(found), 0.1)
     for place, (corner, (label, colour, marker)) in enumerate(zip(CORNERS, _MARKERS, strict=True)):
         if np.isfinite(mean[:, place]).any():
             friction.line(f"at_{corner}", corner, source=source, line_color=colour, line_alpha=0.35)

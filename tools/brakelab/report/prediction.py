@@ -9,8 +9,9 @@ import numpy as np
 from bokeh.models import ColumnDataSource, HoverTool, Range1d, SingleIntervalTicker
 from bokeh.models.annotations import BoxAnnotation, Span
 
-from brakelab.replay.prediction import Errors, errors
-from brakelab.report.brakings import Braking
+from brakelab.replay.prediction import Errors, errors, one_scale, running_average
+from brakelab.report.brakings import Braking, Force
+from brakelab.report.drive import Vector
 from brakelab.report.look import DEMAND, ESTIMATE, INK, QUIET, new_figure
 
 BAND: Final = 0.05
@@ -28,49 +29,72 @@ class Row(NamedTuple):
     error: float
     """Predicted over measured, less 1."""
     sigma_error: float
-    friction: str
-    """Where the friction in the prediction came from."""
+    configured: float
+    """Predicted with the configured friction."""
+    front: str
+    """Friction before the braking, with its standard deviation."""
+    rear: str
     left_out: str
 
 
 def prediction_rows(found: list[Braking]) -> list[Row]:
     """Return a row for each braking, none where nothing was predicted."""
-    if not any(np.isfinite(braking.predicted) for braking in found):
+    if not any(np.isfinite(braking.force.predicted) for braking in found):
         return []
     return [
         Row(
             braking.number,
-            braking.achieved,
-            braking.predicted,
-            braking.sigma,
-            *_share(braking),
-            _origin(braking.learned),
+            *braking.force[:3],
+            *_shares(braking),
+            braking.force.configured,
+            friction_text(braking.before[:2], braking.before_sigma[:2]),
+            friction_text(braking.before[2:], braking.before_sigma[2:]),
             braking.left_out,
         )
         for braking in found
     ]
 
 
-def _share(braking: Braking) -> tuple[float, float]:
+def _shares(braking: Braking) -> tuple[float, float]:
     if braking.left_out:
         return float("nan"), float("nan")
-    return braking.predicted / braking.achieved - 1.0, braking.sigma / braking.achieved
+    force = braking.force
+    return force.predicted / force.measured - 1.0, force.sigma / force.measured
 
 
-def _origin(learned: float) -> str:
-    if np.isnan(learned):
+def friction_text(friction: Vector, sigma: Vector) -> str:
+    """Return an axle's friction with its standard deviation, shapes (2,), as text."""
+    mean, spread = float(np.mean(friction)), float(np.mean(sigma))
+    if not np.isfinite(mean):
         return "–"
-    return "learned" if learned == 1.0 else "nominal" if learned == 0.0 else "learned in part"
+    return f"{mean:.3f} ± {spread:.3f}" if np.isfinite(spread) else f"{mean:.3f}"
 
 
 def prediction_errors(found: list[Braking]) -> Errors:
     """Return the errors of the predictions that count."""
-    counted = [braking for braking in found if not braking.left_out]
-    return errors(
-        [braking.achieved for braking in counted],
-        [braking.predicted for braking in counted],
-        [braking.learned != 0.0 for braking in counted],
-    )
+    counted = _counted(found)
+    return errors([force.measured for force in counted], [force.predicted for force in counted])
+
+
+def _counted(found: list[Braking]) -> list[Force]:
+    return [braking.force for braking in found if not braking.left_out]
+
+
+def peer_errors(found: list[Braking]) -> dict[str, Errors]:
+    """Return the errors of what else could have predicted these brakings, by name; empty: not known."""
+    counted = _counted(found)
+    measured = [force.measured for force in counted]
+    configured = [force.configured for force in counted]
+    rest = [force.configured_rest for force in counted]
+    if not counted or not np.isfinite(configured).all():
+        return {}
+    return {
+        "the configured friction, never learning": errors(measured, configured),
+        "a running average of the friction's scale": errors(
+            measured, running_average(measured, configured, rest)
+        ),
+        "one scale chosen in hindsight": errors(measured, one_scale(measured, configured, rest)),
+    }
 
 
 def plots_of_prediction(found: list[Braking]) -> dict[str, Any]:
@@ -95,7 +119,7 @@ def _source(rows: list[Row]) -> ColumnDataSource:
             "low": predicted - 2.0 * sigma, "high": predicted + 2.0 * sigma,
             "error_low": 100.0 * (error - 2.0 * sigma_error),
             "error_high": 100.0 * (error + 2.0 * sigma_error),
-            "friction": [row.friction for row in rows], "left_out": [row.left_out for row in rows],
+            **{name: [getattr(row, name) for row in rows] for name in ("front", "rear", "left_out")},
         }
     )  # fmt: skip
 
@@ -153,7 +177,7 @@ def _points(plot: Any, source: ColumnDataSource, x: str, y: str, low: str, high:
         x, y, source=source, size=8, line_color=ESTIMATE, fill_color=ESTIMATE, fill_alpha=0.85,
         legend_label="brakings",
     )  # fmt: skip
-    _hover(plot, shown, [("error", "@error{+0.0} %"), ("friction", "@friction")])
+    _hover(plot, shown, [("error", "@error{+0.0} %"), ("friction front", "@front"), ("rear", "@rear")])
 
 
 def _hover(plot: Any, shown: Any, more: list[tuple[str, str]]) -> None:

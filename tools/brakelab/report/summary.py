@@ -127,8 +127,8 @@ def _deceleration(shares: list[float]) -> Tile:
 
 def _prediction(found: Errors) -> Tile:
     worst, bias = percent(found.worst, 1), signed_percent(found.bias, 1)
-    note = f"median of {found.counted}; worst {worst} %, bias {bias} %"
-    return Tile("Prediction error", percent(found.median, 1), "%", note, found.median > _PREDICTION_ERROR)
+    note = f"mean of {found.counted}; worst {worst} %, bias {bias} %"
+    return Tile("Prediction error", percent(found.mean, 1), "%", note, found.mean > _PREDICTION_ERROR)
 
 
 def _faults(drive: Drive) -> Tile:
