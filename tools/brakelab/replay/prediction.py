@@ -6,8 +6,8 @@ Where no sensor tells the friction, an estimate can only be judged by what it pr
         / (m + sum I_i / r_i^2) + overrun
 
 mu_i, mass m, overrun (drag of a drive that nobody reports) and the pressure sensors' zeros z_i are those
-known before the application; pressures p_i, motor torques M_i (positive brakes) and the speed v are its own, I_i is
-a wheel's inertia. f is a specific force, what an accelerometer reads, so no slope is in it.
+known before the application; pressures p_i, motor torques M_i (positive brakes) and the speed v are its own,
+I_i is a wheel's inertia. f is a specific force, what an accelerometer reads, so no slope is in it.
 
     specific_force_predicted   mean of f            over the rows in which the vehicle moves and the driver
     specific_force_mean        mean of b - a_x      does not drive against the brakes

@@ -134,7 +134,7 @@ def _from_file(drive: Drive, path: Path) -> list[Braking]:
             0, t_start, t_start + duration, v_in, v_end, float("nan"), achieved, predicted,
             friction[order], per_corner[0][order], temperature[order], float(energy[order].sum()),
             Force(*(float(column[order[0]]) for column in forces)),
-            *(column[order] for column in per_corner[1:]),
+            per_corner[1][order], per_corner[2][order],
             str(told[order[0]] or "") if told else left_out(duration, achieved, predicted, LEAST_ROWS),
         )  # fmt: skip
         found.append(braking._replace(demanded=_mean(_demand(drive)[inside(drive, braking)])))
