@@ -101,10 +101,12 @@ class Axle(_Section):
 
 
 class Sensors(_Section):
-    """Standard deviations of the sensors (Table 4.1) and the delay of the speed reference."""
+    """Standard deviations of the sensors (Table 4.1), the accelerometer's range, the reference's delay."""
 
     wheel_speed: Positive = 0.1
     accel: Positive = 0.01
+    accel_range: Annotated[float, Field(ge=5.0, le=40.0)] = 20.0
+    """A reading beyond it is none, m/s^2: more than car and tyres can do."""
     pressure: Positive = 1.8
     vehicle_speed: Positive = 0.027
     vehicle_speed_delay: Annotated[float, Field(ge=0, lt=1)] = 0.0
@@ -306,6 +308,7 @@ def new_params(config: Config) -> RecordArray:
         for name in ("disc_heating", "disc_cooling", "disc_cooling_by_speed"):
             row[name][corner] = getattr(axle, name)
     row["sigma_wheel_speed"], row["sigma_accel"] = sensors.wheel_speed, sensors.accel
+    row["accel_range"] = sensors.accel_range
     row["sigma_pressure"] = sensors.pressure * BAR
     row["sigma_vehicle_speed"] = sensors.vehicle_speed
     row["sigma_motor_torque"] = sensors.motor_torque

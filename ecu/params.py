@@ -57,6 +57,7 @@ PARAMS: Final = np.dtype(
         # sensors
         ("sigma_wheel_speed", "f8"),  # rad/s
         ("sigma_accel", "f8"),  # m/s^2
+        ("accel_range", "f8"),  # m/s^2: what is read beyond is no reading
         ("sigma_pressure", "f8"),  # Pa
         ("sigma_vehicle_speed", "f8"),  # m/s
         ("vehicle_speed_delay", "f8"),  # s

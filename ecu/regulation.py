@@ -8,7 +8,8 @@ with the braking rate z = (T_1 + T_2) / P, P the weight, unladen and laden. The 
 distributes by the mass and centre of gravity of the configuration.
 
 - 3.1 (A): f_rear <= f_front for z from 0.15 to 0.8. Asked with the friction that the ECU counts on, and with
-  any friction within 2 sigma after `watch_rear` has taken back what it may: then the rear must not be ahead.
+  any friction within 2 sigma after `watch_trailing` has taken back what it may: then the rear must not be
+  ahead.
 - 3.1 (B): z >= 0.1 + 0.7 (k - 0.2) for k from 0.2 to 0.8, k being the greater of f_front and f_rear. Asked
   with any friction within 2 sigma.
 
@@ -20,7 +21,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ecu.control.distribution import LEAST_REAR, front_share
+from ecu.control.distribution import LEAST_TRAILING, front_share
 from ecu.params import GRAVITY
 
 Row = NDArray[np.float64]
@@ -84,7 +85,7 @@ def annex_5_violation(params: Any, loads: tuple[Load, ...]) -> str | None:
         found = _rear_ahead(utilisation(params, share, load))
         if found:
             return f"{load.name}, {found}; shift brake force to the front"
-        found = _rear_ahead(utilisation(params, share, load, low, LEAST_REAR * high))
+        found = _rear_ahead(utilisation(params, share, load, low, LEAST_TRAILING * high))
         if found:
             return f"{load.name}, friction 2 sigma off, rear taken back, {found}; lower sigma_mu_initial"
         for front in (low, high):

@@ -142,6 +142,7 @@ OUTPUT_SIGNALS: Final[tuple[OutputSignal, ...]] = (
     # Beyond the contract: what a reader of results needs to judge the rest.
     OutputSignal("decel_demand_total", "m/s^2", False, ""),  # the larger of pedal map and decel_demand
     OutputSignal("accel_x_road", "m/s^2", False, ""),  # specific force in road axes, pitch removed
+    OutputSignal("accel_x_model", "m/s^2", False, ""),  # the same by torques and drag
     OutputSignal("accel_x_zero", "m/s^2", False, ""),  # zero error of the accelerometer, as learned
     OutputSignal("vehicle_mass", "kg", False, ""),  # as learned
     OutputSignal("sigma_brake_force", "-", False, ""),  # of all linings together at equal pressures, relative

@@ -20,7 +20,7 @@ from ecu.control.blending import (
     update_motors,
 )
 from ecu.control.demand import DEMAND_STATE, update_demand
-from ecu.control.distribution import DISTRIBUTION_STATE, cap_rear, distribute, watch_rear
+from ecu.control.distribution import DISTRIBUTION_STATE, cap_trailing, distribute, watch_trailing
 from ecu.control.friction_torque import FRICTION_TORQUE_STATE, follow_pressure, lagging_torque
 from ecu.control.limiter import LIMITER_STATE, available_pressure, limit_pressure, reads_empty
 from ecu.control.mode import MODE_STATE, decide_mode, input_faults
@@ -70,8 +70,7 @@ from ecu.estimation.joint.learned import (
 from ecu.estimation.joint.observer import update_joint
 from ecu.estimation.joint.prior import begin_application, end_application, forget_levels
 from ecu.estimation.joint.sliding import mistrust_wheels
-from ecu.estimation.joint.wheel import unknown_share
-from ecu.estimation.motion import MOTION_STATE, update_motion, usable
+from ecu.estimation.motion import MOTION_STATE, STANDING, update_motion, usable
 from ecu.estimation.observer2 import OBSERVER_STATE
 from ecu.estimation.slip import (
     RADIUS_START,
@@ -152,7 +151,7 @@ def new_state(params: RecordArray, learned: RecordArray | None = None) -> Record
         row["learned"] = learned[0]
     row["control"]["mu_override"], row["control"]["start"] = math.nan, 1.0
     row["force"]["k_f"] = row["force"]["stiffness"] = 1.0
-    row["distribution"]["rear"] = 1.0
+    row["distribution"]["trailing"] = 1.0
     _begin(params, state)
     return state
 
@@ -181,7 +180,7 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
     p, s, u, y = params[0], state[0], inputs[0], outputs[0]
     dt = 1e-9 * u.dt_ns
     faults = u.bus_faults | input_faults(p, u) | watch_sensors(p, s, u, dt)
-    leave_out(s, u)
+    leave_out(p, s, u)
     u = s.trusted
     _estimate(p, s, u, dt)
     update_discs(
@@ -247,7 +246,7 @@ def _observe_jointly(p: Record, s: Record, u: Record, braking: bool, dt: float) 
         for i in range(4):
             joint.heat[i] = heat_widening(s.discs, i)
         begin_prediction(p, s.prediction, joint)
-        begin_application(joint, unknown_share(p, joint), joint.heat)
+        begin_application(joint, joint.heat)
     if s.guard.acting or s.friction.held:
         mistrust_wheels(joint)
     update_joint(p, joint, u, s.motion, s.wheel_load.load, s.limiter.pressure, braking, dt)
@@ -287,9 +286,10 @@ def _observe_by_wheel(p: Record, s: Record, u: Record, braking: bool, dt: float)
 def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
     speed = s.speed.speed if s.speed.started else math.nan
     decel = update_demand(p, s.demand, u, speed, dt)
-    watch_rear(p, s.distribution, u, s.motion, s.wheel_load.load, decel, speed, dt)
+    backwards = s.motion.backwards != 0
+    watch_trailing(p, s.distribution, u, s.motion, s.wheel_load.load, decel, speed, dt)
     mass = p.mass * math.exp(s.joint.x[MASS]) if p.observer == JOINT else p.mass
-    distribute(p, s.distribution, mass, decel)
+    distribute(p, s.distribution, mass, decel, backwards)
     follow_friction(p, s.control, s.friction, s.learned, dt)
     follow_pressure(p, s.friction_torque, u, s.limiter.pressure, s.joint.zero.value, dt)
     update_motors(p, s.blending, u, s.guard.capped, s.speed.speed, decel, dt)
@@ -299,7 +299,9 @@ def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
         y.pressure_uncompensated[i] = pressure_for_torque(p, torque, s.control.base[i], i)
         y.pressure_demand[i] = compensated_pressure(p, s.control, y.pressure_uncompensated[i], i)
     level_left_right(y.pressure_demand, y.pressure_uncompensated)
-    cap_rear(p, s.distribution, decel, s.blending.lining, s.friction, y.pressure_demand)
+    cap_trailing(
+        p, s.distribution, decel, s.blending.lining, s.friction, y.pressure_demand, backwards
+    )  # fmt: skip
     if p.slip_guard:
         guard_slip(
             p, s.guard, u, s.motion, speed, s.limiter.pressure, y.pressure_demand, s.distribution.torque, dt
@@ -347,6 +349,7 @@ def _publish_car(p: Record, s: Record, y: Record) -> None:
 @kernel
 def _publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: int, mode: int) -> None:
     started = s.speed.started != 0
+    rolls = started and s.speed.speed > STANDING
     y.vehicle_speed = s.speed.speed if started else math.nan
     y.k_f = s.force.k_f
     y.mode = mode
@@ -357,14 +360,15 @@ def _publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: i
     s.plausibility.sent = 1 if y.pressure_demand_valid > 0.5 else 0
     y.motor_demand_valid = y.pressure_demand_valid if blends(p) else 0.0
     y.decel_demand_total = decel
-    y.accel_x_road = s.motion.accel_x
+    y.accel_x_road = s.motion.accel_x if s.motion.measured else math.nan
+    y.accel_x_model = s.motion.accel_x_model
     _publish_car(p, s, y)
     y.braking = s.application.braking
     y.test_ratio_balance, y.test_ratio_speed = _test_ratio(p, s, 4), _test_ratio(p, s, 5)
     y.particles_last_brake = y.particles_per_km = math.nan
     for i in range(4):
-        y.slip[i] = s.wheels.slip[i] if started else math.nan
-        y.wheel_force_x[i] = s.force.virtual[i] if started else math.nan
+        y.slip[i] = s.wheels.slip[i] if rolls else math.nan
+        y.wheel_force_x[i] = s.force.virtual[i] if rolls else math.nan
         y.wheel_force_z[i] = s.wheel_load.load[i]
         y.mu_b[i] = s.friction.mu[i]
         y.sigma_mu_b[i] = s.friction.sigma[i]

@@ -1,4 +1,4 @@
-"""Torque per wheel: the demand shared between the axles (5.1, Figure 4.2), the rear kept behind the front.
+"""Torque per wheel: the demand shared between the axles (5.1, Figure 4.2), the trailing axle kept behind.
 
     T_b,dem = m a_dem r                                     (5.1)
     ideal       front share (l_r + z h) / L, z = a_dem / g: both axles use the same share of their grip
@@ -8,10 +8,13 @@
 Friction of the linings is known to its sigma only, so none of the three keeps the order of the axles by
 itself. Two things do (ECE R13-H, Annex 5: the rear uses no more grip than the front):
 
-- `watch_rear`: where a rear wheel slips more than the front one of its side by more than
+- `watch_trailing`: where a rear wheel slips more than the front one of its side by more than
   `rear_slip_margin`, the torque of the rear axle is taken back until it does not. That needs no friction.
-- `cap_rear`: compensation raises the rear's pressure relative to the front's only as far as the observer
+- `cap_trailing`: compensation raises the rear's pressure relative to the front's only as far as the observer
   is sure of it, with the rear at mu + 2 sigma and the front at mu - 2 sigma.
+
+Of a car that drives backwards the front axle trails and is relieved: there z is negative in the ideal share,
+and both look at the front.
 """
 
 import math
@@ -27,17 +30,17 @@ from ecu.signals import WHEEL_SPEED
 DISTRIBUTION_STATE = np.dtype(
     [
         ("torque", "f8", (4,)),  # demanded of each wheel [N m], >= 0; NaN without a request
-        ("rear", "f8"),  # what of its torque the rear axle is left, LEAST_REAR to 1
-        ("beyond", "f8", (2,)),  # slip of a rear wheel beyond the front one of its side, low-passed
-        ("offset", "f8", (2,)),  # the same while rolling freely: the radii
+        ("trailing", "f8"),  # what of its torque the trailing axle is left, LEAST_TRAILING to 1
+        ("beyond", "f8", (2,)),  # slip of a trailing wheel beyond the leading one of its side, low-passed
+        ("offset", "f8", (2,)),  # of a rear wheel beyond the front one while rolling freely: the radii
         ("free_s", "f8", (2,)),  # how long that was learned, at most LEARNING_TIME
     ],
     align=True,
 )
 
 IDEAL, FIXED, ELECTRONIC = range(len(DISTRIBUTIONS))
-LEAST_REAR = 0.3  # what the rear keeps whatever its wheels seem to do
-TAKE_BACK = 600.0  # 1/s per slip: 1 % too much takes back the rear's torque at 6 1/s
+LEAST_TRAILING = 0.3  # what the trailing axle keeps whatever its wheels seem to do
+TAKE_BACK = 600.0  # 1/s per slip: 1 % too much takes back the torque at 6 1/s
 GIVE_BACK = 0.3  # 1/s
 SMOOTHING = 0.2  # per sample: 50 ms; leaves a fifth of the wheel speeds' noise
 LEARNING_TIME = 2.0  # s
@@ -50,19 +53,24 @@ ROUNDING = 1e-9
 
 @kernel
 def ideal_front_share(params: Record, decel: float) -> float:
-    """Return the front axle's share of the brake force with equal adhesion of the axles, at most 1."""
+    """Return the front axle's share of the brake force with equal adhesion of the axles, 0 to 1.
+
+    `decel` [m/s^2] is positive driving forwards, negative driving backwards.
+    """
     share: float = (params.rear_axle + decel / GRAVITY * params.cog_height) / params.wheelbase
-    return min(share, 1.0)
+    return min(max(share, 0.0), 1.0)
 
 
 @kernel
 def front_share(params: Record, decel: float) -> float:
-    """Return the front axle's share of the brake force at a demanded deceleration [m/s^2]."""
+    """Return the front axle's share of the brake force; `decel` as for `ideal_front_share`."""
     ideal = ideal_front_share(params, decel)
     if params.distribution == IDEAL:
         return ideal
     share: float = params.front_share
-    return max(share, ideal) if params.distribution == ELECTRONIC else share
+    if params.distribution == ELECTRONIC:
+        share = min(share, ideal) if decel < 0.0 else max(share, ideal)
+    return share
 
 
 @kernel
@@ -73,13 +81,13 @@ def _rear_beyond_front(
 
     NaN without new samples, or where a wheel turns faster than a braked one can: its sensor keeps a value.
     """
-    slips = 0.0
+    slips, forwards = 0.0, 1.0 if speed > 0.0 else -1.0
     for i in (side, side + 2):
-        ground = corner_speed(params, motion, speed, i)
+        ground = forwards * corner_speed(params, motion, speed, i)
         if not (fresh(inputs, WHEEL_SPEED + i) and ground > 0.0):
             return math.nan
         radius = rolling_radius(load[i], params.unloaded_radius[i], params.vertical_stiffness[i])
-        rolled = inputs.value[WHEEL_SPEED + i] * radius / ground
+        rolled = abs(inputs.value[WHEEL_SPEED + i]) * radius / ground
         if rolled > FASTEST:
             return math.nan
         slips += rolled if i == side else -rolled
@@ -87,7 +95,7 @@ def _rear_beyond_front(
 
 
 @kernel
-def watch_rear(
+def watch_trailing(
     params: Record,
     state: Record,
     inputs: Record,
@@ -97,10 +105,10 @@ def watch_rear(
     speed: float,
     dt: float,
 ) -> None:
-    """Move what the rear axle is left, by the slip of its wheels beyond that of the front ones.
+    """Move what the trailing axle is left, by the slip of its wheels beyond that of the leading ones.
 
-    Wheel speeds are compared with each other, at the radii of their loads (A.4): a rear wheel on its way to
-    lock is what observers reject as an outlier. What the radii differ beside that is learned while the car
+    Wheel speeds are compared with each other, at the radii of their loads (A.4): a trailing wheel on its way
+    to lock is what observers reject as an outlier. What the radii differ beside that is learned while the car
     rolls freely.
 
     Args:
@@ -109,16 +117,16 @@ def watch_rear(
         inputs: `INPUTS`.
         motion: `MOTION_STATE`.
         load: of the wheels [N].
-        decel: demanded [m/s^2]; the rear has all of its torque again once nobody brakes.
-        speed: of the vehicle [m/s], NaN: unknown. Below `min_speed` slip says nothing.
+        decel: demanded [m/s^2]; the axle has all of its torque again once nobody brakes.
+        speed: of the vehicle [m/s], NaN: unknown. Slower than `min_speed` slip says nothing.
         dt: time since the last cycle [s].
     """
     brakes = decel > 0.0
     free = not brakes and abs(motion.accel_x) < FREE_ACCEL and abs(motion.yaw_rate) < FREE_YAW_RATE
-    worst = 0.0
+    worst, trailing = 0.0, 1.0 if speed > 0.0 else -1.0
     for side in range(2):
         beyond = math.nan
-        if speed > params.min_speed:
+        if abs(speed) > params.min_speed:
             beyond = _rear_beyond_front(params, inputs, motion, load, speed, side)
         if math.isnan(beyond):
             state.beyond[side] = 0.0
@@ -126,35 +134,43 @@ def watch_rear(
         if free:
             state.free_s[side] = min(state.free_s[side] + dt, LEARNING_TIME)
             state.offset[side] += dt / state.free_s[side] * (beyond - state.offset[side])
-        state.beyond[side] += SMOOTHING * (beyond - state.offset[side] - state.beyond[side])
-        doubt = params.sigma_wheel_speed * params.wheel_radius[side] / speed
+        state.beyond[side] += SMOOTHING * (trailing * (beyond - state.offset[side]) - state.beyond[side])
+        doubt = params.sigma_wheel_speed * params.wheel_radius[side] / abs(speed)
         if state.free_s[side] < LEARNING_TIME:
             doubt += RADIUS_DOUBT
         worst = max(worst, state.beyond[side] - params.rear_slip_margin - doubt)
     change = -TAKE_BACK * worst if worst > 0.0 else GIVE_BACK
-    state.rear = min(max(state.rear + change * dt, LEAST_REAR), 1.0) if brakes else 1.0
+    state.trailing = min(max(state.trailing + change * dt, LEAST_TRAILING), 1.0) if brakes else 1.0
 
 
 @kernel
-def distribute(params: Record, state: Record, mass: float, decel: float) -> None:
+def distribute(params: Record, state: Record, mass: float, decel: float, backwards: bool) -> None:
     """Overwrite the torque demanded of each wheel [N m]; NaN for an unknown deceleration [m/s^2].
 
-    `mass` [kg] is that of the car as it is known now.
+    `mass` [kg] is that of the car as it is known now; `backwards`: it drives so.
     """
-    front = front_share(params, decel)
+    front = front_share(params, -decel if backwards else decel)
     for i in range(4):
-        axle = front if i < 2 else (1.0 - front) * state.rear
+        axle = front if i < 2 else 1.0 - front
+        if (i < 2) == backwards:
+            axle *= state.trailing
         state.torque[i] = 0.5 * axle * mass * decel * params.wheel_radius[i]
 
 
 @kernel
-def cap_rear(
-    params: Record, state: Record, decel: float, lining: Record, friction: Record, pressure: Record
+def cap_trailing(
+    params: Record,
+    state: Record,
+    decel: float,
+    lining: Record,
+    friction: Record,
+    pressure: Record,
+    backwards: bool,
 ) -> None:
-    """Keep compensation from raising the rear's share beyond the line of Annex 5.
+    """Keep compensation from raising the trailing axle's share beyond the line of Annex 5.
 
-    The ratio of the rear's to the front's pressure may exceed that of nominal friction only up to where the
-    rear axle with mu + 2 sigma still uses no more grip than the front axle with mu - 2 sigma.
+    The ratio of the trailing to the leading axle's pressure may exceed that of nominal friction only up to
+    where the trailing axle with mu + 2 sigma still uses no more grip than the leading one with mu - 2 sigma.
 
     Args:
         params: `PARAMS`.
@@ -162,38 +178,41 @@ def cap_rear(
         decel: demanded [m/s^2].
         lining: torque [N m] that the lining of each wheel is asked for; the motors have the rest.
         friction: `FRICTION_STATE`, what the observer claims.
-        pressure: compensated demands [Pa], shape (4,); the rear ones are overwritten.
+        pressure: compensated demands [Pa], shape (4,); those of the trailing axle are overwritten.
+        backwards: the car drives so.
     """
     if not decel >= RULED_FROM * GRAVITY:
         return
     # Sums over an axle: pressure that acts, the same at nominal friction, force of the linings at the end of
     # their interval, force of the motors.
-    front, front_nominal, front_force, front_motors = 0.0, 0.0, 0.0, 0.0
-    rear, rear_nominal, rear_force, rear_motors = 0.0, 0.0, 0.0, 0.0
+    lead, lead_nominal, lead_force, lead_motors = 0.0, 0.0, 0.0, 0.0
+    trail, trail_nominal, trail_force, trail_motors = 0.0, 0.0, 0.0, 0.0
     for i in range(4):
         lever = 2.0 * params.piston_area[i] * params.effective_radius[i]
         acts = max(pressure[i] - params.push_out_pressure[i], 0.0)
         nominal = max(lining[i], 0.0) / (lever * params.mu_nominal[i])
         mu, sigma = friction.mu[i], friction.sigma[i]
         motor = (state.torque[i] - lining[i]) / params.wheel_radius[i]
-        if i < 2:
-            front += acts
-            front_nominal += nominal
-            front_force += acts * lever * max(mu - 2.0 * sigma, 0.0) / params.wheel_radius[i]
-            front_motors += motor
+        if (i < 2) != backwards:
+            lead += acts
+            lead_nominal += nominal
+            lead_force += acts * lever * max(mu - 2.0 * sigma, 0.0) / params.wheel_radius[i]
+            lead_motors += motor
         else:
-            rear += acts
-            rear_nominal += nominal
-            rear_force += acts * lever * (mu + 2.0 * sigma) / params.wheel_radius[i]
-            rear_motors += motor
-    if not (rear > 0.0 and rear_force > 0.0):
+            trail += acts
+            trail_nominal += nominal
+            trail_force += acts * lever * (mu + 2.0 * sigma) / params.wheel_radius[i]
+            trail_motors += motor
+    if not (trail > 0.0 and trail_force > 0.0):
         return
-    share = ideal_front_share(params, decel)
-    line = (front_force + front_motors) * (1.0 - share) / share
-    allowed = (line - rear_motors) / rear_force
-    as_nominal = rear_nominal / rear * (front / front_nominal if front_nominal > 0.0 else 1.0)
+    share = ideal_front_share(params, -decel if backwards else decel)
+    share = 1.0 - share if backwards else share
+    line = (lead_force + lead_motors) * (1.0 - share) / share
+    allowed = (line - trail_motors) / trail_force
+    as_nominal = trail_nominal / trail * (lead / lead_nominal if lead_nominal > 0.0 else 1.0)
     factor = max(allowed, as_nominal)
     if factor < 1.0 - ROUNDING:
-        for i in (2, 3):
+        first = 0 if backwards else 2
+        for i in range(first, first + 2):
             push_out = min(params.push_out_pressure[i], pressure[i])
             pressure[i] = push_out + (pressure[i] - push_out) * factor

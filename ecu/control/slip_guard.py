@@ -1,6 +1,6 @@
 """Holds the pressure back at a wheel that runs past its tyre's range, and gives it back when it rolls again.
 
-    lag    = v_i - omega r                           what a wheel is behind the car [m/s]; slip = -lag / v_i
+    lag    = |v_i| - |omega| r                       what a wheel is behind the car [m/s]; slip = -lag / |v_i|
     growth = d lag / dt, low-passed                  how fast it falls behind [m/s^2]
 
 begins   slip beyond `RANGE` while the lag grows: the cap is the pressure demanded last
@@ -22,7 +22,7 @@ import numpy as np
 from ecu.estimation.motion import corner_speed, fresh, usable
 from ecu.jit import Record, kernel
 from ecu.params import BAR
-from ecu.signals import ABS_ACTIVE, ESP_ACTIVE, REVERSE, WHEEL_SPEED
+from ecu.signals import ABS_ACTIVE, ESP_ACTIVE, WHEEL_SPEED
 
 SLIP_GUARD_STATE = np.dtype(
     [
@@ -56,7 +56,7 @@ def _follow_lag(params: Record, state: Record, inputs: Record, ground: float, i:
     """Take in a new wheel speed; a wheel whose speed is lost lags by nothing."""
     state.age[i] += dt
     if fresh(inputs, WHEEL_SPEED + i) and state.age[i] > 0.0:
-        lag = ground - inputs.value[WHEEL_SPEED + i] * params.wheel_radius[i]
+        lag = ground - abs(inputs.value[WHEEL_SPEED + i]) * params.wheel_radius[i]
         gain = 1.0 - math.exp(-state.age[i] / GROWTH_LAG)
         state.growth[i] += gain * ((lag - state.lag[i]) / state.age[i] - state.growth[i])
         state.lag[i], state.age[i] = lag, 0.0
@@ -83,17 +83,17 @@ def guard_slip(
         state: `SLIP_GUARD_STATE`, overwritten.
         inputs: `INPUTS`.
         motion: `MOTION_STATE`.
-        speed: of the car [m/s], NaN where it is not known.
+        speed: of the car [m/s], negative backwards, NaN where it is not known.
         sent: pressures demanded in the last cycle [Pa], shape (4,).
         wanted: pressures that the pressure law asks for now [Pa], shape (4,).
         torque: demanded of the wheels, of motors and linings [N m], shape (4,).
         dt: time since the last cycle [s].
     """
-    watching = speed > LEAST_SPEED and not _flag(inputs, REVERSE)
+    watching = abs(speed) > LEAST_SPEED
     other = _flag(inputs, ABS_ACTIVE) or _flag(inputs, ESP_ACTIVE)
     state.acting = 0
     for i in range(4):
-        ground = corner_speed(params, motion, speed, i) if watching else 0.0
+        ground = abs(corner_speed(params, motion, speed, i)) if watching else 0.0
         _follow_lag(params, state, inputs, ground, i, dt)
         slipping = watching and state.lag[i] > RANGE * max(ground, LEAST_SPEED)
         if slipping and not state.capped[i] and state.growth[i] > GROWING:

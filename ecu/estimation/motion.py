@@ -19,11 +19,26 @@ import numpy as np
 
 from ecu.jit import Record, kernel
 from ecu.params import GRAVITY
-from ecu.signals import ACCEL_X, ACCEL_Y, MOTOR_TORQUE, STEERING_ANGLE, USABLE, WHEEL_SPEED, YAW_RATE
+from ecu.signals import (
+    ACCEL_X,
+    ACCEL_Y,
+    MOTOR_TORQUE,
+    REVERSE,
+    STEERING_ANGLE,
+    USABLE,
+    WHEEL_SPEED,
+    YAW_RATE,
+)
+
+STANDING = 0.3  # m/s, below: the brakes hold rather than brake
+SLOPE = 2.0  # m/s^2, of a slope of 20 %
 
 MOTION_STATE = np.dtype(
     [
         ("accel_x", "f8"),  # specific force in road axes at the centre of gravity [m/s^2]
+        ("accel_x_model", "f8"),  # the same by the torques of brakes and motors and by drag
+        ("measured", "u1"),  # `accel_x` is, else it is the model's
+        ("backwards", "u1"),  # the car drives so
         ("accel_y", "f8"),
         ("yaw_rate", "f8"),  # rad/s
         ("steering", "f8"),  # rad at the road wheel
@@ -70,23 +85,51 @@ def mean_wheel_speed(params: Record, inputs: Record) -> float:
 
 
 @kernel
+def _drives_backwards(params: Record, inputs: Record) -> bool:
+    """Return whether the car is in reverse, or rolls back by wheel speed sensors that know a sign."""
+    back = 0
+    for i in range(4):
+        place = WHEEL_SPEED + i
+        if usable(inputs, place) and inputs.value[place] * params.wheel_radius[i] < -STANDING:
+            back += 1
+    told: bool = usable(inputs, REVERSE) and inputs.value[REVERSE] > 0.5
+    return told or back > 2
+
+
+@kernel
+def speed_backwards(params: Record, inputs: Record, motion: Record, speed: float, dt: float) -> float:
+    """Return the speed [m/s], negative, of a car that drives backwards, from the last one.
+
+    It is that of the fastest wheel, of sensors that know a sign or do not. Wheels that fall faster than the
+    accelerometer allows on a slope have begun to lock.
+    """
+    slower: float = abs(speed) - (abs(motion.accel_x) + SLOPE) * dt
+    for i in range(4):
+        if usable(inputs, WHEEL_SPEED + i):
+            slower = max(slower, abs(inputs.value[WHEEL_SPEED + i]) * params.wheel_radius[i])
+    return -slower
+
+
+@kernel
 def update_motion(params: Record, state: Record, inputs: Record, speed: float, brake_torque: Record) -> None:
     """Overwrite accelerations, yaw rate, steering and lateral speed; an unusable signal counts as zero.
 
-    Longitudinal acceleration is taken from the torques [N m] and drag while its sensor is lost.
+    Longitudinal acceleration is the model's while its sensor is lost; brake torques [N m] act against travel.
     """
     value = inputs.value
     state.yaw_rate = value[YAW_RATE] if usable(inputs, YAW_RATE) else 0.0
     state.steering = value[STEERING_ANGLE] if usable(inputs, STEERING_ANGLE) else 0.0
     state.accel_y = value[ACCEL_Y] if usable(inputs, ACCEL_Y) else 0.0
+    state.backwards = 1 if _drives_backwards(params, inputs) else 0
+    against = -1.0 if state.backwards else 1.0 if speed > STANDING else 0.0
+    force = -params.drag_area * speed * abs(speed)
+    for i in range(4):
+        force -= (against * brake_torque[i] + motor_torque(inputs, i)) / params.wheel_radius[i]
+    state.accel_x_model = force / params.mass
+    state.accel_x, state.measured = state.accel_x_model, 0
     if usable(inputs, ACCEL_X):
         reading = value[ACCEL_X] + state.yaw_rate**2 * params.imu_x
-        state.accel_x = reading / (1.0 + GRAVITY * params.pitch_gradient)
-    else:
-        force = -params.drag_area * speed * abs(speed)
-        for i in range(4):
-            force -= (brake_torque[i] + motor_torque(inputs, i)) / params.wheel_radius[i]
-        state.accel_x = force / params.mass
+        state.accel_x, state.measured = reading / (1.0 + GRAVITY * params.pitch_gradient), 1
     slip_angle = state.accel_y / (params.cornering_stiffness * GRAVITY)
     state.lateral_speed = params.rear_axle * state.yaw_rate - speed * slip_angle
 

@@ -16,9 +16,9 @@ import math
 
 import numpy as np
 
-from ecu.estimation.motion import corner_speed, fresh, mean_wheel_speed, usable
+from ecu.estimation.motion import corner_speed, fresh, speed_backwards, usable
 from ecu.jit import Record, kernel
-from ecu.signals import ACCEL_X, REVERSE, VEHICLE_SPEED, VEHICLE_SPEED_VALID, WHEEL_SPEED
+from ecu.signals import ACCEL_X, VEHICLE_SPEED, VEHICLE_SPEED_VALID, WHEEL_SPEED
 
 SPEED_STATE = np.dtype(
     [
@@ -63,15 +63,6 @@ def _correct(state: Record, innovation: float, variance: float) -> None:
 
 
 @kernel
-def _follow_backwards(params: Record, state: Record, inputs: Record) -> None:
-    """Take the wheels as the speed, negative, with sensors that know a sign and such that do not."""
-    for i in range(4):
-        if not fresh(inputs, WHEEL_SPEED + i):
-            return
-    state.speed, state.p_vv, state.p_vb = -mean_wheel_speed(params, inputs), 0.25, 0.0
-
-
-@kernel
 def update_speed(
     params: Record,
     state: Record,
@@ -96,8 +87,9 @@ def update_speed(
         state.started = 1
         state.reference_s = 1e3
 
-    if usable(inputs, REVERSE) and value[REVERSE] > 0.5:
-        _follow_backwards(params, state, inputs)
+    if motion.backwards:
+        state.speed = speed_backwards(params, inputs, motion, state.speed, dt)
+        state.p_vv, state.p_vb = 0.25, 0.0
         return
     accel = motion.accel_x + motion.yaw_rate * motion.lateral_speed
     noise = params.sigma_accel**2

@@ -9,23 +9,29 @@ Three say how hard the car brakes, each as a mean over a block of 0.1 s:
 
 A slope is in w and not in a or f; a lining that changes is in a and w alike, and not in f. So where a has
 moved against both, to the same side, the sensor is wrong. The last three blocks are set against four that end
-0.1 s before them; what w and f may err by grows with the range that f ran through in 1.2 s:
+0.1 s before them; what w and f may err by grows with the noise of the sensors and with the range that f ran
+through in 1.2 s:
 
-    |a - w| > LEAST + (SLIP + SLIP_BY_SPEED v) range(f)        |a - f| > LEAST + FORCE range(f)
+    |a - w| > least + (SLIP + SLIP_BY_SPEED v) range(f)        |a - f| > least + FORCE range(f)
+
+with least = max(LEAST, NOISE sigma), sigma of a - w by the noise that the sensors are configured with.
 
 A reading beyond any road (`SLOPE`) that the torques deny for a second is wrong as well, whatever it was
-before. From then on it is not used until it agrees with the wheels as it did before, or the car stands: on
-what slope, nobody knows. Nothing is said of wheels that slide, under ABS or ESP, or of a car whose forces are
-not known (no motor torque is reported, brakes released). A bias that was always there, or comes slowly, is
-not seen.
+before. From then on it is not used until it agrees with the wheels or with the torques as it did before, or
+the car stands: on what slope, nobody knows. Where the drive's torque is not reported, or known badly, the
+torques neither accuse nor confirm: what is beyond any road by the wheels alone is doubted, and believed again
+when it no longer is. Nothing is said of wheels that slide, under ABS or ESP. A bias that was always there, or
+comes slowly, is not seen.
 
 Assumption: all constants; found with the simulated vehicle, whose sound sensor stays below a third of `LEAST`
 in all shipped scenarios.
 """
 
+import math
+
 import numpy as np
 
-from ecu.estimation.motion import motor_torque, usable
+from ecu.estimation.motion import fresh, motor_torque, usable
 from ecu.jit import Record, kernel
 from ecu.params import GRAVITY
 from ecu.signals import (
@@ -46,13 +52,18 @@ ACCELERATION_STATE = np.dtype(
         ("time", "f8"),  # of the block that is gathered [s]
         ("cycles", "i8"),
         ("good", "u1"),  # every cycle of it tells something
+        ("known", "u1"),  # the drive's torque is reported, and well known, in every cycle of it
+        ("readings", "i8"),  # new ones in it
         ("sum", "f8", (KINDS,)),
         # Of the last blocks, the newest in row 0: a [m/s^2], v [m/s], f [m/s^2], mean of omega r [m/s].
         ("mean", "f8", (BLOCKS, KINDS)),
         ("good_blocks", "i8"),  # in a row
+        ("known_blocks", "i8"),  # in a row
+        ("sigma", "f8"),  # of a - w by the sensors' noise [m/s^2]
         ("beyond", "i8"),  # blocks in a row that are beyond any road
         ("agreed", "i8"),  # blocks in a row that agree again
         ("usual", "f8"),  # a - w before the jump [m/s^2]
+        ("usual_force", "f8"),  # a - f before the jump [m/s^2]
         ("implausible", "u1"),
     ],
     align=True,
@@ -63,10 +74,10 @@ LONGEST_BLOCK_S = 0.125  # cycles were missed
 OLDEST_S = 0.06  # of a reading
 LEAST_SPEED = 3.0  # m/s
 ROLLING = 0.06  # of the speed, that a rolling wheel differs by at most
-LEAST = 0.25  # m/s^2
+LEAST, NOISE = 0.25, 6.0  # m/s^2, times sigma
 SLIP, SLIP_BY_SPEED = 0.1, 0.01  # -, s/m
 FORCE = 0.3  # friction may be wrong by so much
-GREATEST_ACCEL = 15.0  # m/s^2: no tyre on a road holds more
+KNOWN_MOTORS = 0.1  # relative error of a motor torque that still tells a force
 SLOPE = 2.0  # m/s^2, of a slope of 20 %
 DENIED = 1.0  # m/s^2
 SECOND = 10  # blocks
@@ -75,20 +86,26 @@ STANDSTILL = 0.1  # m/s
 
 
 @kernel
-def _tells(params: Record, inputs: Record, speed: float, braking: bool) -> bool:
-    """Return whether this cycle's readings are of now and the forces known."""
+def _tells(params: Record, inputs: Record, speed: float) -> bool:
+    """Return whether this cycle's readings are of now and the linings' pressures known."""
     value = inputs.value
     oldest = 1e9 * OLDEST_S
     told = speed > LEAST_SPEED and usable(inputs, ACCEL_X) and inputs.age_ns[ACCEL_X] < oldest
-    reported = False
     for i in range(4):
         wheel = WHEEL_SPEED + i
         rolls = abs(value[wheel] * params.wheel_radius[i] - speed) < ROLLING * speed
         told = told and rolls and usable(inputs, wheel) and inputs.age_ns[wheel] < oldest
         told = told and usable(inputs, CALLIPER_PRESSURE + i)
-        reported = reported or usable(inputs, MOTOR_TORQUE + i)
     works = value[ABS_ACTIVE] > 0.5 or value[ESP_ACTIVE] > 0.5 or value[REVERSE] > 0.5
-    return told and (braking or reported) and not works
+    return told and not works
+
+
+@kernel
+def _drive_known(params: Record, inputs: Record) -> bool:
+    reported = False
+    for i in range(4):
+        reported = reported or usable(inputs, MOTOR_TORQUE + i)
+    return reported and params.sigma_motor_torque <= KNOWN_MOTORS
 
 
 @kernel
@@ -113,11 +130,15 @@ def _gather(
     state.sum[W] += wheels * (1.0 - reading / (GRAVITY * params.slip_stiffness[0]))
     state.sum[F] += force
     state.sum[ROLLED] += wheels
+    state.readings += 1 if fresh(inputs, ACCEL_X) else 0
     state.cycles += 1
 
 
 @kernel
-def _close_block(state: Record) -> None:
+def _close_block(params: Record, state: Record) -> None:
+    turns = 0.5 * params.wheel_radius[0] * params.sigma_wheel_speed
+    variance = 0.6 * params.sigma_accel**2 + 2.0 * (turns / (2.0 * BLOCK_S)) ** 2
+    state.sigma = math.sqrt(variance / max(state.readings, 1))
     for k in range(BLOCKS - 1, 0, -1):
         for j in range(KINDS):
             state.mean[k, j] = state.mean[k - 1, j]
@@ -126,7 +147,8 @@ def _close_block(state: Record) -> None:
         state.sum[j] = 0.0
     sound = state.good != 0 and state.time < LONGEST_BLOCK_S
     state.good_blocks = state.good_blocks + 1 if sound else 0
-    state.time, state.cycles, state.good = 0.0, 0, 1
+    state.known_blocks = state.known_blocks + 1 if sound and state.known else 0
+    state.time, state.cycles, state.readings, state.good, state.known = 0.0, 0, 0, 1, 1
 
 
 @kernel
@@ -167,38 +189,69 @@ def _moved_against_wheels(mean: Record) -> float:
 
 
 @kernel
-def _judge(state: Record) -> None:
-    """Compare the last blocks with those before, or with what was usual before the sensor jumped."""
+def _agrees(state: Record) -> bool:
+    """Return whether a doubted reading is again what it was before."""
     mean = state.mean
+    least = AGAIN * max(LEAST, NOISE * state.sigma)
     against_wheels = _beside_wheels(mean, W)
+    if state.known_blocks < 3:
+        on_a_road: bool = abs(against_wheels) < SLOPE
+        return on_a_road and state.good_blocks >= SECOND
     against_force = _now(mean, A) - _now(mean, F)
-    if state.implausible:
-        agrees = state.good_blocks >= 3 and abs(against_wheels - state.usual) < AGAIN * LEAST
-        state.agreed = state.agreed + 1 if agrees else 0
-        if state.agreed >= AGREED:
-            state.implausible, state.good_blocks = 0, 0
-        return
-    if state.good_blocks < 8:
-        state.beyond = 0
-        return
-    denied = DENIED + FORCE * abs(_now(mean, F))
-    up, down = (
-        min(against_wheels - SLOPE, against_force - denied),
-        max(against_wheels + SLOPE, against_force + denied),
-    )
-    state.beyond = state.beyond + 1 if up > 0.0 or down < 0.0 else 0
+    by_force = state.known_blocks >= SECOND and abs(against_force - state.usual_force) < least
+    by_wheels: bool = abs(against_wheels - state.usual) < least
+    return by_force or by_wheels
+
+
+@kernel
+def _jumped(state: Record) -> bool:
+    """Return whether the reading has moved against wheels and torques."""
+    mean = state.mean
     least, greatest = mean[0, F], mean[0, F]
     for k in range(1, BLOCKS):
         least, greatest = min(least, mean[k, F]), max(greatest, mean[k, F])
     moved = greatest - least
     wheels = _moved_against_wheels(mean)
-    force = against_force - (_before(mean, A) - _before(mean, F))
-    wheels_err = LEAST + (SLIP + SLIP_BY_SPEED * _now(mean, W)) * moved
-    force_err = LEAST + FORCE * moved
-    jumped = (wheels > wheels_err and force > force_err) or (wheels < -wheels_err and force < -force_err)
+    force = _now(mean, A) - _now(mean, F) - (_before(mean, A) - _before(mean, F))
+    noise = max(LEAST, NOISE * state.sigma)
+    wheels_err = noise + (SLIP + SLIP_BY_SPEED * _now(mean, W)) * moved
+    force_err = noise + FORCE * moved
+    up: bool = wheels > wheels_err and force > force_err
+    return up or (wheels < -wheels_err and force < -force_err)
+
+
+@kernel
+def _beyond_any_road(state: Record) -> bool:
+    mean = state.mean
+    against_wheels = _beside_wheels(mean, W)
+    if state.known_blocks < 8:
+        far: bool = abs(against_wheels) > SLOPE + NOISE * state.sigma
+        return far
+    against_force = _now(mean, A) - _now(mean, F)
+    denied = DENIED + FORCE * abs(_now(mean, F))
+    up: bool = against_wheels > SLOPE and against_force > denied
+    return up or (against_wheels < -SLOPE and against_force < -denied)
+
+
+@kernel
+def _judge(state: Record) -> None:
+    """Compare the last blocks with those before, or with what was usual before the sensor jumped."""
+    mean = state.mean
+    if state.implausible:
+        agrees = state.good_blocks >= 3 and _agrees(state)
+        state.agreed = state.agreed + 1 if agrees else 0
+        if state.agreed >= AGREED:
+            state.implausible, state.good_blocks, state.known_blocks = 0, 0, 0
+        return
+    if state.good_blocks < 8:
+        state.beyond = 0
+        return
+    state.beyond = state.beyond + 1 if _beyond_any_road(state) else 0
+    jumped = state.known_blocks >= 8 and _jumped(state)
     if jumped or state.beyond >= SECOND:
         state.implausible, state.agreed = 1, 0
         state.usual = _usually_beside_wheels(mean, W) if jumped else 0.0
+        state.usual_force = _before(mean, A) - _before(mean, F) if jumped else 0.0
 
 
 @kernel
@@ -228,10 +281,12 @@ def watch_acceleration(
     """
     if speed < STANDSTILL:
         state.implausible = 0
-    if not _tells(params, inputs, speed, braking):
+    if not _tells(params, inputs, speed):
         state.good = 0
+    if not _drive_known(params, inputs):
+        state.known = 0
     _gather(params, state, inputs, motion, friction, base, braking)
     state.time += dt
     if state.time > BLOCK_S - 0.001:
-        _close_block(state)
+        _close_block(params, state)
         _judge(state)

@@ -6,7 +6,7 @@ from them in this cycle, by what the last one estimated.
 
 from ecu.diagnostics.faults import ACCEL_IMPLAUSIBLE, PRESSURE_NOT_FOLLOWING, WHEEL_SPEED_IMPLAUSIBLE
 from ecu.jit import Record, kernel
-from ecu.monitoring.acceleration import GREATEST_ACCEL, watch_acceleration
+from ecu.monitoring.acceleration import watch_acceleration
 from ecu.monitoring.plausibility import watch_pressures, watch_wheels, wheel_speed_implausible
 from ecu.signals import ACCEL_X, WHEEL_SPEED
 
@@ -42,10 +42,10 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> int:
 
 
 @kernel
-def leave_out(s: Record, u: Record) -> None:
+def leave_out(p: Record, s: Record, u: Record) -> None:
     """Overwrite the trusted inputs: `u` without what is implausible."""
     s.trusted = u
-    if s.acceleration.implausible or abs(u.value[ACCEL_X]) > GREATEST_ACCEL:
+    if s.acceleration.implausible or abs(u.value[ACCEL_X]) > p.accel_range:
         _distrust(s.trusted, ACCEL_X)
     for i in range(4):
         if s.plausibility.fell[i]:

@@ -63,7 +63,7 @@ from ecu.estimation.joint.wheel import (
 )
 from ecu.estimation.joint.window import close_window, gather, open_window
 from ecu.estimation.joint.zero import settle_zero
-from ecu.estimation.motion import mean_wheel_speed, usable
+from ecu.estimation.motion import mean_wheel_speed, speed_backwards, usable
 from ecu.jit import Record, kernel
 from ecu.params import GRAVITY
 from ecu.signals import (
@@ -71,7 +71,6 @@ from ecu.signals import (
     ACCEL_X,
     CALLIPER_PRESSURE,
     ESP_ACTIVE,
-    REVERSE,
     WHEEL_SPEED,
 )
 
@@ -207,8 +206,8 @@ def update_joint(
         _start_speed(params, state, inputs)
         if not state.started:
             return
-    if usable(inputs, REVERSE) and inputs.value[REVERSE] > 0.5:
-        state.x[V] = -mean_wheel_speed(params, inputs)
+    if motion.backwards:
+        state.x[V] = speed_backwards(params, inputs, motion, state.x[V], dt)
         state.reversing = 1
         return
     if state.reversing:
@@ -255,6 +254,7 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
             w.pressure[i] = w.common_pressure[i] = state.smooth_pressure[i] = 0.0  # noise is no torque
         motors += abs(w.motor[i])
     moving = x[V] > LEAST_SPEED
+    state.drive_known = 1.0 - unknown_share(params, state)
     walk(state, braking and moving, time)
     _watch_release(state, braking)
     learning = moving and state.hold_s <= 0.0 and w.motor_known != 0
@@ -360,7 +360,7 @@ def _fuse_balance(params: Record, state: Record, braking: bool) -> None:
         + (BALANCE_SHARE * w.accel) ** 2
     )
     variance += (SKEW_ACCEL * (w.accel - state.last_accel)) ** 2
-    variance += (ACROSS * w.across * GRAVITY) ** 2 + (UNKNOWN_KICKS * unknown_share(params, state)) ** 2
+    variance += (ACROSS * w.across * GRAVITY) ** 2 + (UNKNOWN_KICKS * (1.0 - state.drive_known)) ** 2
     for i in range(4):
         per_bar = brake_lever(params, i) * friction(params, state, i)
         per_torque = 1.0 / (params.wheel_radius[i] * params.mass)

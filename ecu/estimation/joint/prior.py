@@ -35,6 +35,7 @@ from ecu.estimation.joint.layout import (
     V,
 )
 from ecu.jit import Record, kernel
+from ecu.params import GRAVITY
 
 PRIOR = np.zeros(N)
 """Standard deviations before anything is learned; friction, motor scale and speed are set apart."""
@@ -61,7 +62,9 @@ UNKNOWN_PER_ERROR = 2.0  # an engine's torque that is known to half only may as 
 OVERRUN_MEAN, OVERRUN_SIGMA = 0.2, 0.3  # m/s^2, drag of an engine in gear
 UNKNOWN_DRIVE = 0.1  # m/s^2 per axle, drag of an engine in this application
 UNKNOWN_KICKS = 3.0  # m/s^2, white from window to window: stands for 0.3 that last seconds (down-shifts)
-UNKNOWN_SLIP, UNKNOWN_SLIP_BY_AGE = 0.003, 0.1  # of an axle's slip by it: with a speed reference, without
+# Of an axle's slip by it: with a speed reference, and what comes without one, per acceleration over gravity.
+UNKNOWN_SLIP, UNKNOWN_SLIP_REST, UNKNOWN_SLIP_BY_ACCEL = 0.003, 0.005, 0.1
+UNKNOWN_SLIP_S = 2.0  # after which that is another one
 
 # Random walks per square root of a second.
 WALK = np.zeros(N)
@@ -147,16 +150,14 @@ def forget_levels(state: Record) -> None:
 
 
 @kernel
-def begin_application(state: Record, unknown: float, heat: Record) -> None:
+def begin_application(state: Record, heat: Record) -> None:
     """Let the level have changed since the last application, and begin with friction at its level.
 
     Args:
         state: `JOINT_STATE`, overwritten.
-        unknown: share of the drive that nobody reports, 0 to 1.
         heat: relative standard deviation that each friction has gained by its disc's temperature, shape (4,).
     """
-    p = state.p
-    state.drive_known = 1.0 - unknown
+    p, unknown = state.p, 1.0 - state.drive_known
     for axle in range(2):
         zeros = 0.25 * (state.zero.variance[2 * axle] + state.zero.variance[2 * axle + 1])
         i = OFFSET + axle
@@ -172,10 +173,8 @@ def begin_application(state: Record, unknown: float, heat: Record) -> None:
     state.weight = 0.0
     forget_rate(state)
     state.x[OVERRUN] = OVERRUN_MEAN if unknown >= 1.0 else 0.0
-    slip = (UNKNOWN_SLIP + UNKNOWN_SLIP_BY_AGE * unknown * min(state.reference_s, 1.0)) * unknown
     for axle in range(2):
         clear_state(state, DRIVE + axle, (UNKNOWN_DRIVE * unknown) ** 2)
-        clear_state(state, SLIP_ERROR + axle, slip * slip)
 
 
 @kernel
@@ -257,6 +256,21 @@ def _change_friction(state: Record, time: float) -> None:
 
 
 @kernel
+def _change_slip(state: Record, time: float) -> None:
+    """Move on what an axle's slip is off by drive that nobody reports: the more the tyres have to hold."""
+    p, w, unknown = state.p, state.window, 1.0 - state.drive_known
+    held = math.hypot(w.accel / GRAVITY, w.across)
+    without = (UNKNOWN_SLIP_REST + UNKNOWN_SLIP_BY_ACCEL * held) * unknown * min(state.reference_s, 1.0)
+    sigma = (UNKNOWN_SLIP + without) * unknown
+    stays = math.exp(-time / UNKNOWN_SLIP_S)
+    for i in range(SLIP_ERROR, SLIP_ERROR + 2):
+        for j in range(N):
+            p[i, j] *= stays
+            p[j, i] = p[i, j] if j != i else stays * p[i, j]
+        p[i, i] += (1.0 - stays * stays) * sigma * sigma
+
+
+@kernel
 def _forget_slope(state: Record, stays: float) -> None:
     state.x[SLOPE] *= stays
     for j in range(N):
@@ -272,6 +286,7 @@ def walk(state: Record, rubbing: bool, time: float) -> None:
     drift_speed(state, time)
     if state.x[V] > 1.0:
         _forget_slope(state, math.exp(-time / SLOPE_S))
+    _change_slip(state, time)
     for i in range(N):
         if i != RATE:
             p[i, i] += WALK[i] ** 2 * time
