@@ -199,7 +199,7 @@ def _observers(json: bool, seeds: int, draw: str) -> int:
         plain = {name: value._asdict() for name, value in times.items()}
         _print_json(finite({"of": of, "rows": [_plain(row) for row in rows], "step_us": plain}))
         return 0
-    tables = observer_tables(rows, times, consistency)
+    tables = observer_tables(rows, times, consistency, draw)
     _print_tables(of, tables)
     if draw != WIDE:
         return 0

@@ -19,6 +19,7 @@ from brakelab.bench.observers_cases import (
     CASES,
     EVENTS,
     ROBUSTNESS,
+    SENSORS,
     WRONG_START,
     Case,
     Setup,
@@ -204,8 +205,9 @@ def drive_task(task: Task) -> list[Sample]:
 
 def tasks(seeds: int, draw: str = WIDE) -> list[Task]:
     """Return all there is to do with cars 0 to `seeds` - 1, the longest first."""
-    passing = tuple(name for name, case in ROBUSTNESS.items() if not case.lasting)
-    lasting = tuple(name for name, case in ROBUSTNESS.items() if case.lasting)
+    few = ROBUSTNESS | SENSORS
+    passing = tuple(name for name, case in few.items() if not case.lasting)
+    lasting = tuple(name for name, case in few.items() if case.lasting)
     robust = range(max(seeds // ROBUST_SHARE, 1))
     alone = [Task(JOINT, seed, lasting, draw) for seed in robust]
     common = (*ACCURACY, *EVENTS)
