@@ -241,8 +241,9 @@ def _sensors() -> dict[str, Case]:
     )
     floored = _sensing(lambda sign: {"calliper_pressure": SensorErrors(floor=0.0)})
     for decel in (1.0, 4.0):
-        base = f"{decel:g} m/s²"
-        name = f"{base}, no pressure below zero"
+        base = f"{decel:g} m/s², every signal"
+        cases[base] = Case(_stop(decel=decel))
+        name = f"{decel:g} m/s², no pressure below zero"
         cases[name] = Case(_stop(decel=decel), change=floored, lasting=True, beside=base)
     lacking: dict[str, Change] = {
         "no yaw rate, no steering angle": _sensing(
@@ -254,7 +255,7 @@ def _sensors() -> dict[str, Case]:
     }
     for name, change in lacking.items():
         at_any_rate = _at_any_rate(change)
-        cases[name] = Case(_stop(decel=4.0), change=at_any_rate, lasting=True, beside="4 m/s²")
+        cases[name] = Case(_stop(decel=4.0), change=at_any_rate, lasting=True, beside=base)
     return cases
 
 

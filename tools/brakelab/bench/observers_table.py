@@ -210,9 +210,9 @@ def _sensors(rows: Rows) -> Table:
         "Joint observer with sensors as cars have them: nRMSE [%] and truth inside 2σ [%]",
         ("case", "beside", "cold", "inside 2σ", "driven in", "inside 2σ ", ""),
         lines,
-        "One car of four. Goal: within a quarter of the case beside it. After a cruise at 100 km/h with that "
-        "noise of each wheel's motor torque: a stop of 4 m/s². A case with less of a signal has it in the ten "
-        "minutes before too.",
+        "One car of four, stops of 4 m/s² unless said otherwise. Goal: within a quarter of the case beside "
+        "it. Cruises are at 100 km/h, with that noise of each wheel's motor torque. A case with less of a "
+        "signal has it in the ten minutes before too.",
     )
 
 
