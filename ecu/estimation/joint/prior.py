@@ -43,13 +43,13 @@ PRIOR[STIFFNESS], PRIOR[RATIO] = 0.25, 0.06
 PRIOR[BIAS], PRIOR[SLOPE] = 0.1, 0.3
 PRIOR[MASS], PRIOR[PEAK], PRIOR[LOAD], PRIOR[SINKING] = 0.03, 0.25, 0.05, 0.10
 PRIOR[DRAG] = 0.10
-PRIOR[RADIUS : RADIUS + 4], PRIOR[ROLLING] = 0.0015, 0.004
+PRIOR[RADIUS : RADIUS + 4], PRIOR[ROLLING] = 0.0025, 0.004
 PRIOR[OFFSET : OFFSET + 2] = 0.3
 PRIOR[DELAY] = 0.005
 PRIOR[SIDE], PRIOR[PEAK_LOAD] = 0.02, 0.08
 
 # Standard deviations of friction's prior, of its logarithm: all four together, per axle, per wheel.
-LEVEL_COMMON, LEVEL_AXLE, LEVEL_WHEEL = 0.13, 0.17, 0.06
+LEVEL_COMMON, LEVEL_AXLE, LEVEL_WHEEL = 0.13, 0.17, 0.04
 # By how much the level of an application differs from that of the one before.
 STEP_COMMON, STEP_AXLE, STEP_WHEEL = 0.03, 0.02, 0.005
 # How far friction goes from its level within an application, and how long it takes to forget that.
