@@ -49,12 +49,12 @@ def sigma(state) -> np.ndarray:
     return np.sqrt(np.diag(state["p"]))
 
 
-def driven(seed: int, share: float = 0.5):
+def driven(seed: int):
     """Return a state as a drive may leave it: surer than the prior, everything tied to everything."""
     state, random = new_state(), np.random.default_rng(seed)
-    prior = sigma(state)
+    prior = np.maximum(sigma(state), 0.03)  # a change that the prior has not yet begun
     root = random.standard_normal((N, 2 * N))
-    root *= (share * prior * random.uniform(0.1, 1.0, N) / np.sqrt((root**2).sum(axis=1)))[:, None]
+    root *= (0.5 * prior * random.uniform(0.1, 1.0, N) / np.sqrt((root**2).sum(axis=1)))[:, None]
     state["x"], state["p"] = 0.5 * prior * random.standard_normal(N), root @ root.T
     state["x"][LEVELS] = 0.1 * random.standard_normal(4)
     return state
