@@ -26,10 +26,10 @@ from ecu.estimation.joint.layout import (
     N,
     V,
 )
-from ecu.estimation.joint.observer import BALANCE_FLOOR
+from ecu.estimation.joint.observer import BALANCE_FLOOR, WINDOW_S
 from ecu.estimation.joint.prior import CHANGE_COMMON, LEVEL_AXLE, LEVEL_COMMON, LEVEL_WHEEL, PRIOR
 from ecu.estimation.joint.wheel import predict_balance, predict_wheel
-from ecu.signals import MOTOR_TORQUE
+from ecu.signals import ACCEL_X, MOTOR_TORQUE
 
 LEVELS = list(range(LEVEL, LEVEL + 4))
 SCALE = PRIOR.copy()
@@ -204,3 +204,18 @@ def test_without_a_motor_torque_rolling_shows_neither_bias_nor_drag(new_car, how
     assert state["drive_known"] == 0.0
     held = [BIAS, DRAG, MASS, MOTOR]
     np.testing.assert_array_equal(state["x"][held], before[held])
+
+
+def test_wheels_alone_show_neither_mass_nor_motor_scale(new_car) -> None:
+    """Slip is for stiffness to explain; a mass is for the balance, which has nothing new here."""
+    car = new_car(seed=1, speed=45.0)
+    car.drive(2.0)
+    car.inputs[0]["new"][ACCEL_X] = 0
+    car.drive(1.0)
+    before, freed = car.state["x"].copy(), 0
+    for _ in range(20):
+        state = car.drive(WINDOW_S, motor=300.0)
+        freed += int(state["free"][MASS])
+    assert freed > 10
+    np.testing.assert_array_equal(state["x"][[MASS, MOTOR]], before[[MASS, MOTOR]])
+    assert state["x"][STIFFNESS] != before[STIFFNESS]
