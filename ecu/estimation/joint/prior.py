@@ -101,12 +101,17 @@ LOWEST[DELAY], HIGHEST[DELAY] = -0.1, 0.1
 def keep_within_bounds(state: Record) -> bool:
     """Put learned states that have left their bounds back on them; return whether there was one.
 
-    The peak is the road's: to be far off is no fault.
+    The others follow as their covariances say: what the one may not explain is theirs to explain. Left where
+    they are they would drift for as long as it is pushed. The peak is the road's: to be far off is no fault.
     """
-    x, found = state.x, False
+    x, p, free, found = state.x, state.p, state.free, False
     for i in range(N):
         if x[i] < LOWEST[i] or x[i] > HIGHEST[i]:
-            x[i] = min(max(x[i], LOWEST[i]), HIGHEST[i])
+            back = min(max(x[i], LOWEST[i]), HIGHEST[i]) - x[i]
+            for j in range(N):
+                if j != i and free[i] and free[j] and p[i, i] > 0.0:
+                    x[j] += p[j, i] / p[i, i] * back
+            x[i] += back
             found = found or i != PEAK
     return found
 

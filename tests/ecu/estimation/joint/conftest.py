@@ -13,14 +13,15 @@ from scipy.optimize import brentq
 
 from ecu.estimation.joint.layout import JOINT_STATE
 from ecu.estimation.joint.observer import start_joint, update_joint
-from ecu.estimation.joint.prior import set_prior
+from ecu.estimation.joint.prior import begin_application, end_application, set_prior
 from ecu.estimation.motion import MOTION_STATE
 from ecu.signals import CALLIPER_PRESSURE, MOTOR_TORQUE, VEHICLE_SPEED, WHEEL_SPEED
 
 DT = 0.01
 BAR = 1e5
 GRAVITY = 9.81
-SHAPE, PEAK, DEGRESSION = 1.6, 0.9, 0.05  # Magic Formula: c, D at static load, its fall with load
+SHAPE, PEAK = 1.6, 0.9  # Magic Formula: c, D at static load
+NEARLY_QUIET = 1e-4  # bar; a sensor that read exactly zero at rest would pass for one that is cut off there
 
 
 def magic_formula_slip(used: float, stiffness: float, peak: float) -> float:
@@ -46,6 +47,7 @@ class Car:
         names = ("wheel_speed", "pressure", "accel", "vehicle_speed")
         quiet = true.pop("quiet", False)
         self.sigma = {name: 0.0 if quiet else float(self.params[f"sigma_{name}"]) for name in names}
+        self.sigma["motor"] = true.pop("motor_noise", 0.0)  # N m
         assert not true
         self.state = np.zeros(1, JOINT_STATE)[0]
         set_prior(self.params, self.state)
@@ -54,6 +56,7 @@ class Car:
         self.load = self.params["static_load"].copy()
         self.demand = np.zeros(4)
         self.time = 0.0
+        self.braked = False
 
     def forces(self, bar: np.ndarray, motor: np.ndarray, slope: float) -> tuple[np.ndarray, float]:
         """Return the four tyre forces [N] and dv/dt [m/s^2] while no wheel slides."""
@@ -99,9 +102,9 @@ class Car:
             omega = rolled / p["wheel_radius"] + sigma["wheel_speed"] * normal(4)
             value[WHEEL_SPEED : WHEEL_SPEED + 4] = omega
             reading = np.where(bar > 0, bar + p["push_out_pressure"] / BAR, 0.0)
-            reading = reading + sigma["pressure"] / BAR * normal(4)
+            reading = reading + max(sigma["pressure"] / BAR, NEARLY_QUIET) * normal(4)
             value[CALLIPER_PRESSURE : CALLIPER_PRESSURE + 4] = reading
-            value[MOTOR_TORQUE : MOTOR_TORQUE + 4] = motor
+            value[MOTOR_TORQUE : MOTOR_TORQUE + 4] = motor + sigma["motor"] * normal(4)
             self.motion["accel_x"] = change + slope + sigma["accel"] * normal()
             new[VEHICLE_SPEED] = reference and k % 2 == 0
             value[VEHICLE_SPEED] = self.speed + sigma["vehicle_speed"] * normal()
@@ -109,10 +112,14 @@ class Car:
             yield self.state
 
     def observe(self, braking: bool) -> None:
-        """Run one cycle of the observer on the inputs as they are."""
-        update_joint(
-            self.params, self.state, self.inputs[0], self.motion, self.load, self.demand, braking, DT
-        )
+        """Run one cycle of the observer on the inputs as they are; brake applications begin and end."""
+        if self.braked and not braking:
+            end_application(self.state)
+        if braking and not self.braked:
+            begin_application(self.state, np.zeros(4))
+        self.braked = braking
+        at_rest = self.params["static_load"]  # by the configured mass, as the ECU has it
+        update_joint(self.params, self.state, self.inputs[0], self.motion, at_rest, self.demand, braking, DT)
         self.time += DT
 
     def drive(self, seconds: float, **how: Any) -> Any:

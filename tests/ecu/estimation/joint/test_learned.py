@@ -1,4 +1,4 @@
-"""What is kept between drives: values as they were, never surer than they were, never less sure than new."""
+"""What is kept between drives: values with their covariance, a pause less sure; and what is published."""
 
 import math
 from pathlib import Path
@@ -11,25 +11,26 @@ from hypothesis import strategies as st
 from ecu.config import load_config, new_params
 from ecu.diagnostics.store import JOINT_LIMIT, out_of_range
 from ecu.estimation.friction import FRICTION_STATE, GREATEST_RATIO, LEAST_RATIO
-from ecu.estimation.joint.layout import BIAS, JOINT_STATE, MASS, MU, OFFSET, RATE, SLOPE, STIFFNESS, N, V
+from ecu.estimation.joint.layout import CHANGE, JOINT_STATE, LEVEL, MASS, PASSING, PEAK, RATE, N, V
 from ecu.estimation.joint.learned import (
-    MU_PAUSE,
+    KEPT,
+    LEVEL_PAUSE,
     PAUSE,
-    begin_course,
+    hand_over_level,
     keep_joint,
     publish_friction,
     restore_joint,
-    settle_friction,
-    take_mean,
 )
 from ecu.estimation.joint.observer import WINDOW_S
+from ecu.estimation.joint.pressure import AGREED_S
 from ecu.estimation.joint.prior import set_prior
-from ecu.records import LEARNED
+from ecu.records import LEARNED, N_KEPT
+from ecu.signals import CALLIPER_PRESSURE, OBSERVING
 
 SUV = new_params(load_config(Path(__file__).parents[4] / "config" / "suv.toml"))[0]
-FRICTION = list(range(MU, MU + 4))
+LEVELS = list(range(LEVEL, LEVEL + 4))
+AXLE = [CHANGE, CHANGE, CHANGE + 1, CHANGE + 1]
 BOUND = [math.log(LEAST_RATIO), math.log(GREATEST_RATIO)]
-KEPT = [i for i in range(N) if i not in (V, SLOPE, RATE, OFFSET, OFFSET + 1, *FRICTION)]
 
 
 def new_state():
@@ -49,21 +50,19 @@ def sigma(state) -> np.ndarray:
 
 
 def driven(seed: int):
-    """Return a state as a drive may leave it: somewhere inside the prior, surer than it."""
+    """Return a state as a drive may leave it: surer than the prior, everything tied to everything."""
     state, random = new_state(), np.random.default_rng(seed)
-    prior = sigma(state)
-    state["x"] = 0.5 * prior * random.standard_normal(N)
-    state["p"] = np.diag((prior * random.uniform(0.05, 0.9, N)) ** 2)
+    prior = np.maximum(sigma(state), 0.03)  # a change that the prior has not yet begun
+    root = random.standard_normal((N, 2 * N))
+    root *= (0.5 * prior * random.uniform(0.1, 1.0, N) / np.sqrt((root**2).sum(axis=1)))[:, None]
+    state["x"], state["p"] = 0.5 * prior * random.standard_normal(N), root @ root.T
+    state["x"][LEVELS] = 0.1 * random.standard_normal(4)
     return state
 
 
-def keep(state, relative: float = 0.03):
-    """Return the record after a drive: states by the joint observer, friction as handed over."""
+def keep(state):
     learned = np.zeros(1, LEARNED)[0]
-    keep_joint(state, learned)
-    learned["mu_b"] = SUV["mu_nominal"] * np.exp(state["x"][FRICTION])
-    learned["sigma_mu_b"] = relative * learned["mu_b"]
-    learned["observed_s"] = 12.0
+    keep_joint(SUV, state, learned)
     return learned
 
 
@@ -76,206 +75,209 @@ def test_with_nothing_learned_it_is_the_prior() -> None:
     assert not state["started"]
 
 
+def test_everything_but_what_passes_is_kept() -> None:
+    assert len(KEPT) == N_KEPT
+    assert sorted([*KEPT, *PASSING]) == list(range(N))
+
+
 @pytest.mark.parametrize("seed", range(5))
-def test_what_was_kept_comes_back_less_sure_and_surer_than_new(seed: int) -> None:
-    before, prior = driven(seed), sigma(new_state())
+def test_what_was_kept_comes_back_with_its_covariance_a_pause_less_sure(seed: int) -> None:
+    before, prior = driven(seed), new_state()
     after = restored(keep(before))
-    np.testing.assert_allclose(after["x"][KEPT + FRICTION], before["x"][KEPT + FRICTION], rtol=1e-12)
-    expected = np.minimum(np.hypot(sigma(before), PAUSE), prior)
-    np.testing.assert_allclose(sigma(after)[KEPT], expected[KEPT], rtol=1e-12)
-    assert (sigma(after)[KEPT] >= np.minimum(sigma(before), prior)[KEPT] * (1 - 1e-12)).all()
-    np.testing.assert_allclose(sigma(after)[FRICTION], math.hypot(0.03, MU_PAUSE))
-    assert (sigma(after) <= prior * (1 + 1e-12)).all()
+    expected = before["p"] + np.diag(PAUSE**2)
+    expected[np.ix_(LEVELS, LEVELS)] += LEVEL_PAUSE**2
+    x = before["x"].copy()
+    for i in [*PASSING, PEAK]:  # and the peak is the road's
+        x[i] = 0.0
+        expected[i] = expected[:, i] = 0.0
+        expected[i, i] = prior["p"][i, i]
+    np.testing.assert_allclose(after["x"], x, rtol=1e-12)
+    np.testing.assert_allclose(after["p"], expected, rtol=1e-12, atol=1e-18)
+    assert (sigma(after)[KEPT] >= sigma(before)[KEPT]).all()
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_speed_slope_rate_and_pressure_offsets_begin_anew(seed: int) -> None:
-    after, prior = restored(keep(driven(seed))), new_state()
-    anew = [SLOPE, RATE, OFFSET, OFFSET + 1, V]
-    np.testing.assert_array_equal(after["x"][anew], 0.0)
-    np.testing.assert_array_equal(sigma(after)[anew], sigma(prior)[anew])
+def ignitions(count: int):
+    """Return the state after so many ignitions without a drive, from one as it was made."""
+    learned = keep(new_state())
+    for _ in range(count):
+        state = restored(learned)
+        keep_joint(SUV, state, learned)
+    return state
 
 
-def test_friction_that_was_never_observed_is_the_priors() -> None:
-    learned, prior = keep(driven(1)), new_state()
-    learned["observed_s"] = [10.0, 0.0, 0.0, 0.0]
-    P = restored(learned)["p"]
-    np.testing.assert_array_equal(
-        P[MU + 1 : MU + 4, MU + 1 : MU + 4], prior["p"][MU + 1 : MU + 4, MU + 1 : MU + 4]
-    )
-    np.testing.assert_array_equal(P[MU, MU + 1 : MU + 4], 0.0)
-    np.testing.assert_array_equal(P[:, MU], P[MU])
-    assert P[MU, MASS] > 0 == P[MU + 1, MASS]
-
-
-def test_restarts_alone_make_nothing_surer() -> None:
-    """Twenty ignitions without a drive."""
+def test_ignitions_alone_make_nothing_surer() -> None:
     learned = keep(driven(2))
     before = sigma(restored(learned))
     for _ in range(20):
-        state = restored(learned)
-        keep_joint(state, learned)
+        keep_joint(SUV, restored(learned), learned)
         now = sigma(restored(learned))
         assert (now >= before * (1 - 1e-12)).all()
         before = now
-    assert (before <= sigma(new_state()) * (1 + 1e-12)).all()
 
 
-@pytest.mark.parametrize("relative", [0.01, 0.1, 0.2, 0.3])
-def test_friction_comes_back_no_less_sure_than_new(relative: float) -> None:
-    after = restored(keep(driven(3), relative))
-    assert (sigma(after)[FRICTION] <= sigma(new_state())[FRICTION] * (1 + 1e-12)).all()
+@pytest.mark.xfail(
+    strict=True,
+    reason="pauses add up without a limit: what a car never shows (the mass of one that reports no motor "
+    "torque: 3 % when new) is known to 5.8 % after 100 ignitions and to 16 % after 1000",
+)
+def test_ignitions_alone_make_nothing_less_sure_than_new() -> None:
+    assert (sigma(ignitions(100)) <= sigma(new_state()) * 1.1).all()
 
 
-LEARNED_VALUES = {
-    "share": st.tuples(*[st.floats(0.5, 1.5)] * 4),
-    "relative": st.tuples(*[st.floats(1e-4, 1.0)] * 4),
-    "observed": st.tuples(*[st.sampled_from([0.0, 5.0])] * 4),
+STORED = {
+    "seed": st.integers(0, 10_000),
+    "share": st.floats(1e-3, 10.0),
     "joint": st.lists(st.floats(-JOINT_LIMIT, JOINT_LIMIT), min_size=N, max_size=N),
-    "joint_sigma": st.lists(st.floats(0.0, 2.0), min_size=N, max_size=N),
-    "mass": st.sampled_from([0.0, 1e-4, 0.005, 0.02, 1.0]),
+    "rank": st.integers(1, 2 * N),
 }
 
 
-@settings(max_examples=300)
-@given(**LEARNED_VALUES)
-def test_whatever_the_store_accepts_gives_a_covariance(
-    share, relative, observed, joint, joint_sigma, mass
-) -> None:
+@settings(max_examples=200)
+@given(**STORED)
+def test_whatever_a_drive_may_leave_gives_a_covariance(seed: int, share: float, joint, rank: int) -> None:
+    state, random = new_state(), np.random.default_rng(seed)
+    root = share * np.sqrt(np.diag(state["p"]))[:, None] * random.standard_normal((N, rank)) / math.sqrt(rank)
+    state["x"], state["p"] = joint, root @ root.T
     learned = np.zeros(1, LEARNED)
-    row = learned[0]
-    row["mu_b"] = SUV["mu_nominal"] * share
-    row["sigma_mu_b"] = row["mu_b"] * relative
-    row["observed_s"], row["joint"], row["joint_sigma"] = observed, joint, joint_sigma
-    row["joint_sigma"][MASS] = mass
-    row["radius_sigma"] = 0.001
+    keep_joint(SUV, state, learned[0])
+    learned["radius_sigma"] = 0.001
     assert out_of_range(learned, SUV["mu_nominal"]) == ""
-    P = restored(row)["p"]
+    P = restored(learned[0])["p"]
     np.testing.assert_array_equal(P, P.T)
     some = np.diag(P) > 0
     scale = np.sqrt(np.diag(P)[some])
     assert (P[~some] == 0).all()
-    assert np.linalg.eigvalsh(P[np.ix_(some, some)] / np.outer(scale, scale)).min() > -1e-12
+    assert np.linalg.eigvalsh(P[np.ix_(some, some)] / np.outer(scale, scale)).min() > -1e-10
 
 
-def test_mass_is_in_every_friction_alike() -> None:
-    """A per cent of mass is a per cent of each friction: what is left of each is its own."""
-    before = new_state()
-    before["p"][MASS, MASS] = 0.01**2
-    learned = keep(before, 0.04)
-    P = restored(learned)["p"]
-    shared = P[np.ix_(FRICTION, [MASS])].ravel()
-    np.testing.assert_allclose(shared, 0.01**2 + PAUSE[MASS] ** 2)
-    off = P[np.ix_(FRICTION, FRICTION)][~np.eye(4, dtype=bool)]
-    np.testing.assert_allclose(off, 0.01**2 + PAUSE[MASS] ** 2)
-
-
-AT_BOUND = [
-    # ln of friction over nominal: of one wheel; goes back
-    ("at the least", BOUND[0], True),
-    ("at the greatest", BOUND[1], True),
-    ("a fifth low", math.log(0.8), False),
-    ("just inside", 0.99 * BOUND[1], False),
+KEPT_FRICTION = [
+    # ln of friction over nominal of a wheel; its relative sigma by the covariance, and the least kept
+    ("a fifth low", math.log(0.8), 0.04, 0.0),
+    ("just inside", 0.98 * BOUND[1], 0.04, 0.0),
+    ("at the least", BOUND[0], 0.04, 0.15),
+    ("at the greatest", BOUND[1], 0.04, 0.15),
+    ("at the greatest, unsure", BOUND[1], 0.30, 0.15),
 ]
 
 
 @pytest.mark.parametrize("wheel", range(4))
-@pytest.mark.parametrize(("name", "left", "goes_back"), AT_BOUND, ids=[row[0] for row in AT_BOUND])
-def test_friction_at_its_bound_is_not_carried_on(name: str, left: float, goes_back: bool, wheel: int) -> None:
-    state, learned = driven(4), keep(driven(5), 0.05)
-    state["x"][FRICTION] = 0.1
-    state["x"][MU + wheel] = left
-    state["p"][MU, MASS] = state["p"][MASS, MU] = 1e-5
-    before = state.copy()
-    settle_friction(SUV, state, learned)
-    if not goes_back:
-        assert state.tobytes() == before.tobytes()
-        return
-    np.testing.assert_allclose(SUV["mu_nominal"] * np.exp(state["x"][FRICTION]), learned["mu_b"])
-    np.testing.assert_allclose(sigma(state)[FRICTION], math.hypot(0.05, MU_PAUSE))
-    others = [i for i in range(N) if i not in FRICTION]
-    np.testing.assert_array_equal(state["x"][others], before["x"][others])
-    np.testing.assert_array_equal(state["p"][np.ix_(others, others)], before["p"][np.ix_(others, others)])
-    np.testing.assert_array_equal(state["p"][np.ix_(FRICTION, others)], 0.0)
+@pytest.mark.parametrize(
+    ("name", "level", "own", "least"), KEPT_FRICTION, ids=[row[0] for row in KEPT_FRICTION]
+)
+def test_the_base_of_the_next_braking_is_the_level(name: str, level, own, least, wheel: int) -> None:
+    """Whatever an application has added to it; at a bound it is not believed."""
+    state = driven(3)
+    state["x"][LEVEL + wheel], state["x"][CHANGE : CHANGE + 2] = level, 0.1
+    state["p"][LEVEL + wheel, LEVEL + wheel] = own**2
+    learned = keep(state)
+    mu = SUV["mu_nominal"][wheel] * math.exp(level)
+    assert learned["mu_b"][wheel] == pytest.approx(mu)
+    assert learned["sigma_mu_b"][wheel] == pytest.approx(mu * max(own, least))
 
 
-def test_settled_friction_is_base_of_the_next_braking_where_nothing_was_learned() -> None:
-    """A first braking that ends at a bound: the base is nominal, and no sigma was ever written."""
-    state, learned = driven(6), np.zeros(1, LEARNED)[0]
-    learned["mu_b"], learned["sigma_mu_b"] = SUV["mu_nominal"], 0.15 * SUV["mu_nominal"]
-    state["x"][MU] = BOUND[1]
-    settle_friction(SUV, state, learned)
-    np.testing.assert_array_equal(state["x"][FRICTION], 0.0)
-    assert (sigma(state)[FRICTION] > 0.1).all()
+def published(state, feed, braking: bool, friction=None):
+    friction = np.zeros(1, FRICTION_STATE)[0] if friction is None else friction
+    learned = np.zeros(1, LEARNED)[0]
+    publish_friction(SUV, state, friction, learned, feed()[0], braking, 0.01)
+    return friction
 
 
-@pytest.mark.parametrize(("first", "last"), [(0.33, 0.41), (0.45, 0.45), (0.50, 0.42)])
-def test_a_braking_leaves_the_mean_of_its_friction_over_the_distance(params, feed, first, last) -> None:
-    """Friction changes evenly over the distance of a stop; half way it has its mean."""
-    state, friction = driven(8), np.zeros(1, FRICTION_STATE)[0]
-    at_rest, learned, inputs = SUV["static_load"].copy(), np.zeros(1, LEARNED)[0], feed()[0]
-    state["x"][RATE], state["window"]["time"] = 0.0, -0.5 * WINDOW_S
-    state["observed"] = 1
-    state["p"][FRICTION, FRICTION] = 0.05**2
-    variance = np.diag(state["p"]).copy()
-    begin_course(state)
-    decel, speed, distance = 4.0, 25.0, 0.0
-    whole = speed**2 / (2 * decel)
-    while speed > 0.0:
-        mu = first + (last - first) * distance / whole
-        state["x"][FRICTION] = np.log(mu / SUV["mu_nominal"])
-        state["x"][V] = speed
-        publish_friction(SUV, state, friction, learned, inputs, at_rest, True, 0.01)
-        distance += speed * 0.01
-        speed -= decel * 0.01
-    unsure = state.copy()
-    take_mean(SUV, state, friction)
-    mean = 0.5 * (first + last)
-    assert SUV["mu_nominal"] * np.exp(state["x"][FRICTION]) == pytest.approx([mean] * 4, rel=2e-3)
-    assert friction["mu"] == pytest.approx([mean] * 4, rel=2e-3)
-    spread = np.log(last / mean) ** 2 / 3
-    added = (np.diag(state["p"]) - variance)[FRICTION]
-    assert added == pytest.approx([spread] * 4, rel=0.05, abs=1e-7)
-
-    friction["sigma"][2] = 0.2 * friction["mu"][2]
-    last_value = unsure["x"].copy()
-    take_mean(SUV, unsure, friction)
-    np.testing.assert_array_equal(unsure["x"], last_value)
+AHEAD = [
+    # a window has just ended; time [s] since, by which friction has moved on from that window's middle
+    (True, 0.0, 0.5 * WINDOW_S),
+    (False, 0.01, 0.5 * WINDOW_S + 0.01),
+    (False, 0.04, 0.5 * WINDOW_S + 0.04),
+]
 
 
-@pytest.mark.parametrize("ratio", [0.7, 1.0, 1.2, LEAST_RATIO, GREATEST_RATIO])
-def test_published_friction_is_the_states_moved_on_by_its_rate(params, feed, ratio: float) -> None:
-    state, friction = driven(7), np.zeros(1, FRICTION_STATE)[0]
-    state["x"][FRICTION], state["x"][RATE] = math.log(ratio), 0.0
-    at_rest, learned, inputs = SUV["static_load"].copy(), np.zeros(1, LEARNED)[0], feed()[0]
-    publish_friction(SUV, state, friction, learned, inputs, at_rest, False, 0.01)
-    np.testing.assert_allclose(friction["mu"], ratio * SUV["mu_nominal"])
-    own = sigma(state)[FRICTION]
-    if ratio in (LEAST_RATIO, GREATEST_RATIO):
-        own = np.maximum(own, SUV["sigma_mu_initial"])
-    np.testing.assert_allclose(friction["sigma"], friction["mu"] * own)
-    state["x"][RATE], state["window"]["time"] = 0.05, 0.02
-    state["x"][FRICTION] = 0.0
-    publish_friction(SUV, state, friction, learned, inputs, at_rest, False, 0.01)
-    np.testing.assert_allclose(friction["mu"], SUV["mu_nominal"] * math.exp(0.05 * (0.5 * WINDOW_S + 0.02)))
+@pytest.mark.parametrize(("closed", "since", "ahead"), AHEAD)
+def test_published_friction_is_level_and_change_moved_on_by_its_rate(feed, closed, since, ahead) -> None:
+    state = driven(4)
+    state["closed"], state["window"]["time"] = closed, WINDOW_S if closed else since
+    state["x"][RATE] = 0.3
+    mu = SUV["mu_nominal"] * np.exp(state["x"][LEVELS] + state["x"][AXLE] + 0.3 * ahead)
+    np.testing.assert_allclose(published(state, feed, True)["mu"], mu, rtol=1e-12)
 
 
-def test_what_is_kept_is_neither_speed_nor_slope() -> None:
-    state, learned = driven(8), np.zeros(1, LEARNED)[0]
-    state["x"][V], state["x"][SLOPE] = 30.0, 0.5
-    keep_joint(state, learned)
-    assert learned["joint"][[V, SLOPE]] == pytest.approx([0.0, 0.0])
-    assert learned["joint"][[STIFFNESS, BIAS]] == pytest.approx(state["x"][[STIFFNESS, BIAS]])
-    assert learned["joint_sigma"][MASS] == pytest.approx(sigma(state)[MASS])
+def test_published_sigma_is_that_of_level_and_change_together(feed) -> None:
+    state = driven(5)
+    A = np.zeros((4, N))
+    A[range(4), LEVELS] = A[range(4), AXLE] = 1.0
+    got = published(state, feed, False)
+    relative = np.sqrt(np.diag(A @ state["p"] @ A.T))
+    np.testing.assert_allclose(got["sigma"] / got["mu"], relative, rtol=1e-12)
 
 
-@pytest.mark.parametrize("transfer", [-0.4, 0.0, 0.3])  # of the load at rest
-@pytest.mark.parametrize("side", [0.0, 0.1])  # left over right
-def test_what_does_not_average_out_is_in_the_published_sigma(feed, transfer: float, side: float) -> None:
-    """Load transfer known to 6 %, and half of what sets left against right."""
-    state, friction = driven(9), np.zeros(1, FRICTION_STATE)[0]
-    state["x"][FRICTION], state["x"][RATE] = np.array([0.5, -0.5, 0.5, -0.5]) * side, 0.0
-    load = SUV["static_load"] * (1 + transfer)
-    publish_friction(SUV, state, friction, np.zeros(1, LEARNED)[0], feed()[0], load, False, 0.01)
-    expected = np.sqrt(sigma(state)[FRICTION] ** 2 + (0.06 * transfer) ** 2 + (0.5 * side) ** 2)
-    np.testing.assert_allclose(friction["sigma"] / friction["mu"], expected, rtol=1e-12)
+@pytest.mark.parametrize("follows", [True, False])
+@pytest.mark.parametrize("observed", [True, False])
+def test_an_observed_friction_is_as_unsure_as_the_pressure_it_is_set_against(feed, follows, observed) -> None:
+    """Where the pressure is a model's, it may be off for a while: its error is friction's then."""
+    state = driven(5)
+    plain = published(state, feed, True)
+    state["observed"], state["smooth_pressure"] = observed, [20.0, 20.0, 10.0, 0.5]
+    state["pressures"]["agreed_s"] = 2 * AGREED_S * follows
+    state["pressures"]["variance"] = 0.5**2
+    more = published(state, feed, True)
+    added = (more["sigma"] / more["mu"]) ** 2 - (plain["sigma"] / plain["mu"]) ** 2
+    expected = np.array([0.5 / 20, 0.5 / 20, 0.5 / 10, 0.5]) ** 2 * (follows and observed)
+    np.testing.assert_allclose(added, expected, atol=1e-15)
+
+
+MODES = [
+    # braking, observed, pressure usable; friction is being observed
+    (True, True, True, True),
+    (True, False, True, False),
+    (True, True, False, False),
+    (False, True, True, False),
+]
+
+
+@pytest.mark.parametrize(("braking", "observed", "usable", "observing"), MODES)
+def test_a_corner_is_observed_while_its_signals_show_friction(
+    feed, braking: bool, observed: bool, usable: bool, observing: bool
+) -> None:
+    state, friction = driven(6), np.zeros(1, FRICTION_STATE)[0]
+    inputs, learned = feed()[0], np.zeros(1, LEARNED)[0]
+    state["observed"] = observed
+    inputs["verdict"][CALLIPER_PRESSURE + 1] *= usable
+    for _ in range(5):
+        publish_friction(SUV, state, friction, learned, inputs, braking, 0.01)
+    assert (friction["mode"][1] == OBSERVING) == observing
+    assert friction["observed_s"][1] == pytest.approx(0.05 * observing)
+    assert (friction["mode"][0] == OBSERVING) == (braking and observed)
+
+
+def test_the_sigma_of_all_linings_force_is_that_of_its_logarithms_gradient(feed) -> None:
+    """At equal pressures: force of each is 2 A r_m mu / r; by differences."""
+    state = driven(7)
+    lever = SUV["piston_area"] * SUV["effective_radius"] / SUV["wheel_radius"]
+
+    def force(levels: np.ndarray) -> float:
+        return math.log((lever * SUV["mu_nominal"] * np.exp(levels + state["x"][AXLE])).sum())
+
+    at, step = state["x"][LEVELS], 1e-6
+    by = [(force(at + step * e) - force(at - step * e)) / (2 * step) for e in np.eye(4)]
+    expected = math.sqrt(by @ state["p"][np.ix_(LEVELS, LEVELS)] @ by)
+    state["closed"] = 1
+    published(state, feed, True)
+    assert state["sigma_force"] == pytest.approx(expected, rel=1e-7)
+
+
+def test_the_end_of_a_braking_counts_what_it_observed() -> None:
+    friction, learned = np.zeros(1, FRICTION_STATE)[0], np.zeros(1, LEARNED)[0]
+    learned["observed_s"], learned["brakings"] = 10.0, 3
+    friction["observed_s"] = [1.0, 2.0, 0.0, 0.5]
+    hand_over_level(friction, learned)
+    np.testing.assert_allclose(learned["observed_s"], [11.0, 12.0, 10.0, 10.5])
+    assert learned["brakings"] == 4
+    np.testing.assert_array_equal(friction["observed_s"], 0.0)
+
+
+def test_what_pressures_cannot_tell_apart_stays_together() -> None:
+    """A per cent of mass is a per cent of each friction, after a restart as well."""
+    before = new_state()
+    before["p"][np.ix_([MASS, *LEVELS], [MASS, *LEVELS])] = 0.01**2
+    before["x"][V] = 30.0
+    P = restored(keep(before))["p"]
+    np.testing.assert_allclose(P[LEVELS, MASS], 0.01**2)
+    np.testing.assert_allclose(P[MASS, MASS], 0.01**2 + PAUSE[MASS] ** 2)

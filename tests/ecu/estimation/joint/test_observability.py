@@ -9,14 +9,32 @@ import math
 import numpy as np
 import pytest
 
-from ecu.estimation.joint.layout import DRAG, MASS, MOTOR, MU, PEAK, RADIUS, ROLLING, STIFFNESS, N, V
-from ecu.estimation.joint.observer import BALANCE_FLOOR
-from ecu.estimation.joint.prior import MU_COMMON, PRIOR
+from ecu.estimation.joint.layout import (
+    BIAS,
+    CHANGE,
+    DRAG,
+    LEVEL,
+    MASS,
+    MOTOR,
+    OVERRUN,
+    PEAK,
+    RADIUS,
+    RATE,
+    RATIO,
+    ROLLING,
+    STIFFNESS,
+    N,
+    V,
+)
+from ecu.estimation.joint.observer import BALANCE_FLOOR, WINDOW_S
+from ecu.estimation.joint.prior import CHANGE_COMMON, LEVEL_AXLE, LEVEL_COMMON, LEVEL_WHEEL, PRIOR
 from ecu.estimation.joint.wheel import predict_balance, predict_wheel
+from ecu.signals import ACCEL_X, MOTOR_TORQUE
 
-MU_ALL = list(range(MU, MU + 4))
+LEVELS = list(range(LEVEL, LEVEL + 4))
 SCALE = PRIOR.copy()
-SCALE[MU_ALL], SCALE[V], SCALE[MOTOR] = MU_COMMON, 0.5, 0.015
+SCALE[LEVELS] = math.hypot(LEVEL_COMMON, LEVEL_AXLE, LEVEL_WHEEL)
+SCALE[V], SCALE[MOTOR], SCALE[CHANGE : CHANGE + 2] = 0.5, 0.03, CHANGE_COMMON
 
 BRAKING = {
     # speed [m/s], front and rear [bar], front and rear motor torque [N m]
@@ -39,21 +57,21 @@ BRAKING = {
 def rows(car, state, points, reference: bool = False) -> np.ndarray:
     """Return the derivatives of four wheels, balance and speed reference at each point, in units of noise."""
     out, w = [], state["window"]
-    w["motor_reported"] = 1
     for speed, front, rear, motor_front, motor_rear in points:
         state["x"][:] = 0.0
         state["x"][V] = speed
         w["load"] = car["static_load"]
-        w["pressure"] = state["smooth_pressure"] = state["last_smooth"] = np.repeat([front, rear], 2)
-        w["motor"] = np.repeat([motor_front, motor_rear], 2)
-        w["accel"] = w["change"] = 0.0
-        for _ in range(3):  # the wheels' inertia is part of the balance
-            w["accel"] -= predict_balance(car, state)
-            w["change"] = w["accel"]
+        w["pressure"] = w["common_pressure"] = state["last_smooth"] = np.repeat([front, rear], 2)
+        w["motor"] = state["motors"]["last_smooth"] = np.repeat([motor_front, motor_rear], 2)
+        w["common_accel"] = w["change"] = 0.0
+        for _ in range(5):  # the wheels' inertia is part of the balance
+            w["common_accel"] -= predict_balance(car, state, front > 0)
+            w["change"] = w["common_accel"]
+        state["last_smooth_accel"] = w["common_accel"]
         for i in range(4):
             predict_wheel(car, state, i, speed)
             out.append(state["h"] / car["sigma_wheel_speed"])
-        predict_balance(car, state)
+        predict_balance(car, state, front > 0)
         out.append(state["h"] / BALANCE_FLOOR)
         if reference:
             out.append(np.eye(N)[V] / car["sigma_vehicle_speed"])
@@ -78,24 +96,24 @@ def deficiency(H: np.ndarray, states) -> int:
 @pytest.mark.parametrize("drive", ["one level", "three levels"])
 def test_friction_braking_alone_does_not_tell_mass_from_friction(params, state, drive: str) -> None:
     """At no level, and not at several: all torques and the mass may be larger by the same factor."""
-    H, states = rows(params[0], state, BRAKING[drive]), [*MU_ALL, MASS]
-    assert deficiency(H, MU_ALL) == 0
+    H, states = rows(params[0], state, BRAKING[drive]), [*LEVELS, MASS]
+    assert deficiency(H, LEVELS) == 0
     assert deficiency(H, states) == 1
     np.testing.assert_allclose(weakest(H, states), 1.0, atol=1e-6)
 
 
 def test_a_motor_torque_that_is_known_does(params, state) -> None:
-    H, states = rows(params[0], state, BRAKING["motors first"]), [*MU_ALL, MASS]
+    H, states = rows(params[0], state, BRAKING["motors first"]), [*LEVELS, MASS]
     assert deficiency(H, states) == 0
     sigma = 1 / singular(H, states)[-1]
     print(f"one window of each leaves {sigma:.2f} of the prior's standard deviation")
 
 
 def test_a_motor_torque_of_unknown_scale_does_not(params, state) -> None:
-    H, states = rows(params[0], state, BRAKING["motors and coasting first"]), [*MU_ALL, MASS, MOTOR, DRAG]
+    H, states = rows(params[0], state, BRAKING["motors and coasting first"]), [*LEVELS, MASS, MOTOR, DRAG]
     assert deficiency(H, states) == 1
     same = dict(zip(states, weakest(H, states), strict=True))
-    assert [same[j] for j in [*MU_ALL, MASS, MOTOR]] == pytest.approx([1.0] * 6, abs=1e-6)
+    assert [same[j] for j in [*LEVELS, MASS, MOTOR]] == pytest.approx([1.0] * 6, abs=1e-6)
     assert same[DRAG] == pytest.approx(0.0, abs=1e-6)  # drag is per mass
 
 
@@ -130,25 +148,74 @@ def test_one_level_of_braking_does_not_tell_stiffness_from_peak(
     assert deficiency(H, [STIFFNESS, PEAK]) == missing
 
 
+def test_level_and_change_show_alike(params, state) -> None:
+    """Within an application nothing tells an axle's change from the levels of both its wheels."""
+    H = rows(params[0], state, BRAKING["three levels"])
+    assert deficiency(H, [*LEVELS, CHANGE, CHANGE + 1]) == 2
+
+
+BY_LININGS = [LEVEL, CHANGE, RATE, PEAK, STIFFNESS, OVERRUN]
+BY_MOTORS = [STIFFNESS, RATIO, PEAK, DRAG, BIAS]
 FREED = [
-    # name, how it is driven after 2 s of rolling, with a reference; freed and held
-    ("rolling", {}, True, [V, RADIUS, ROLLING, DRAG], [MU, MASS, STIFFNESS]),
-    ("rolling, no reference", {}, False, [V, RADIUS, DRAG], [ROLLING, MU, MASS]),
-    ("braking", {"front": 38.0, "rear": 30.0}, True, [V, MU, STIFFNESS, ROLLING], [MASS, DRAG, MOTOR]),
-    ("braking, no reference", {"front": 38.0, "rear": 30.0}, False, [V, MU, STIFFNESS], [ROLLING, MASS]),
-    ("motors", {"motor": 300.0}, True, [V, MASS, STIFFNESS, DRAG, ROLLING], [MU]),
-    ("motors, no reference", {"motor": 300.0}, False, [V, MASS, STIFFNESS, DRAG], [MU, ROLLING]),
+    # name, how it is driven after 2 s of rolling, for how long [s], with a reference; freed and held
+    ("rolling", {}, 2.0, True, [V, RADIUS, ROLLING, DRAG, BIAS], [LEVEL, CHANGE, MASS, STIFFNESS]),
+    ("rolling, no reference", {}, 2.0, False, [V, RADIUS, DRAG, BIAS], [ROLLING, LEVEL, MASS]),
+    (
+        "braking",
+        {"front": 38.0, "rear": 30.0},
+        2.0,
+        True,
+        [V, ROLLING, *BY_LININGS],
+        [MASS, DRAG, MOTOR, BIAS],
+    ),
+    ("braking, no reference", {"front": 38.0, "rear": 30.0}, 2.0, False, [V, *BY_LININGS], [ROLLING, MASS]),
+    ("motors", {"motor": 300.0}, 2.0, True, [V, MASS, MOTOR, ROLLING, *BY_MOTORS], [LEVEL, CHANGE, OVERRUN]),
+    ("motors, no reference", {"motor": 300.0}, 2.0, False, [V, MASS, MOTOR, *BY_MOTORS], [LEVEL, ROLLING]),
+    # What does not vary cannot tell mass from bias, drag and slope.
+    ("motors for long", {"motor": 200.0}, 14.0, True, [V, ROLLING, *BY_MOTORS], [MASS, MOTOR, LEVEL]),
 ]
 
 
-@pytest.mark.parametrize(("name", "how", "reference", "freed", "held"), FREED, ids=[row[0] for row in FREED])
-def test_only_what_shows_is_freed(new_car, name: str, how, reference: bool, freed, held) -> None:
-    car = new_car(seed=1)
+@pytest.mark.parametrize(
+    ("name", "how", "seconds", "reference", "freed", "held"), FREED, ids=[row[0] for row in FREED]
+)
+def test_only_what_shows_is_freed(new_car, name: str, how, seconds, reference: bool, freed, held) -> None:
+    car = new_car(seed=1, speed=45.0)
     car.drive(2.0, reference=reference)
     before = car.state["x"].copy()
-    state = car.drive(2.0, reference=reference, **how)
+    state = car.drive(seconds, reference=reference, **how)
     assert state["free"][freed].all()
     assert not state["free"][held].any()
-    np.testing.assert_array_equal(state["x"][held], before[held])
-    assert (state["x"][freed] != before[freed]).all()
+    if name != "motors for long":  # its first seconds varied
+        np.testing.assert_array_equal(state["x"][held], before[held])
+    moves = [i for i in freed if i != OVERRUN]  # where the drive is known there is none
+    assert (state["x"][moves] != before[moves]).all()
     assert math.isfinite(state["p"].sum())
+
+
+@pytest.mark.parametrize("how", [{}, {"front": 38.0, "rear": 30.0}], ids=["rolling", "braking"])
+def test_without_a_motor_torque_rolling_shows_neither_bias_nor_drag(new_car, how) -> None:
+    car = new_car(seed=1, speed=40.0)
+    car.inputs[0]["verdict"][MOTOR_TORQUE : MOTOR_TORQUE + 4] = 0
+    car.inputs[0]["new"][MOTOR_TORQUE : MOTOR_TORQUE + 4] = 0
+    car.drive(2.0)
+    before = car.state["x"].copy()
+    state = car.drive(2.0, **how)
+    assert state["drive_known"] == 0.0
+    held = [BIAS, DRAG, MASS, MOTOR]
+    np.testing.assert_array_equal(state["x"][held], before[held])
+
+
+def test_wheels_alone_show_neither_mass_nor_motor_scale(new_car) -> None:
+    """Slip is for stiffness to explain; a mass is for the balance, which has nothing new here."""
+    car = new_car(seed=1, speed=45.0)
+    car.drive(2.0)
+    car.inputs[0]["new"][ACCEL_X] = 0
+    car.drive(1.0)
+    before, freed = car.state["x"].copy(), 0
+    for _ in range(20):
+        state = car.drive(WINDOW_S, motor=300.0, reference=False)  # which tells speed, and so mass
+        freed += int(state["free"][MASS])
+    assert freed > 10
+    np.testing.assert_array_equal(state["x"][[MASS, MOTOR]], before[[MASS, MOTOR]])
+    assert state["x"][STIFFNESS] != before[STIFFNESS]

@@ -11,12 +11,9 @@ from ecu.estimation.joint.pressure import (
     DEAD_CYCLES,
     LAG,
     PRESSURE_STATE,
-    ZERO_LIMIT,
-    ZERO_START,
     correct_pressure,
     follow_demand,
     follows,
-    learn_zero,
 )
 
 DT = 0.01
@@ -166,20 +163,3 @@ def test_it_takes_up_again() -> None:
 def test_it_does_not_follow_before_it_has_agreed() -> None:
     following = follow(np.full(100, 20.0), np.full(100, 20.0), 1)[2]
     assert int(np.argmax(following)) == pytest.approx(AGREED_S / DT, abs=1)
-
-
-@pytest.mark.parametrize("zero", [-0.8, 0.0, 0.6])
-@pytest.mark.parametrize("windows", [1, 20, 60])
-def test_a_sensors_zero_is_the_mean_of_released_brakes_drawn_to_zero(zero: float, windows: int) -> None:
-    """As though `ZERO_START` readings of zero had come first."""
-    state, random = np.zeros(1, PRESSURE_STATE)[0], np.random.default_rng(3)
-    readings = zero + 0.1 * random.standard_normal((windows, 4))
-    for row in readings:
-        learn_zero(state, row)
-    np.testing.assert_allclose(state["zero"], readings.sum(axis=0) / (ZERO_START + windows))
-
-
-def test_a_reading_too_far_from_zero_is_not_a_zero() -> None:
-    state = np.zeros(1, PRESSURE_STATE)[0]
-    learn_zero(state, np.array([1.01, -1.01, 0.5, math.nan]) * np.array([ZERO_LIMIT, ZERO_LIMIT, 1, 1]))
-    np.testing.assert_allclose(state["zero"], [0.0, 0.0, 0.5 / (ZERO_START + 1), 0.0])

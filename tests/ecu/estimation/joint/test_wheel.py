@@ -6,22 +6,22 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from ecu.estimation.joint import layout
 from ecu.estimation.joint.layout import (
-    BIAS,
-    DRAG,
+    CHANGE,
     DRIVE,
+    LEVEL,
     LOAD,
     MASS,
     MOTOR,
-    MU,
     OFFSET,
     PEAK,
+    PEAK_LOAD,
     RADIUS,
-    RATE,
-    RATIO,
     ROLLING,
+    SIDE,
     SINKING,
-    SLOPE,
+    SLIP_ERROR,
     STIFFNESS,
     N,
     V,
@@ -33,26 +33,21 @@ from ecu.estimation.joint.wheel import (
     SHAPE,
     STEEPEST,
     combined_slip,
+    peak_adhesion,
     predict_balance,
     predict_wheel,
     slip_of_force,
+    unknown_share,
 )
 
-NAMES = {
-    "V": V, "STIFFNESS": STIFFNESS, "RATIO": RATIO, "BIAS": BIAS, "SLOPE": SLOPE, "MASS": MASS,
-    "PEAK": PEAK, "LOAD": LOAD, "SINKING": SINKING, "MOTOR": MOTOR, "DRAG": DRAG, "ROLLING": ROLLING,
-    "RATE": RATE,
-}  # fmt: skip
-NAME = {place: name for name, place in NAMES.items()} | {
-    first + i: f"{name} {i}"
-    for name, first, count in (
-        ("MU", MU, 4),
-        ("RADIUS", RADIUS, 4),
-        ("OFFSET", OFFSET, 2),
-        ("DRIVE", DRIVE, 2),
-    )
-    for i in range(count)
-}
+
+def name_of(place: int) -> str:
+    """Return a state's name, with its number where there are several."""
+    starts = {
+        name: at for name, at in vars(layout).items() if name.isupper() and type(at) is int and name != "N"
+    }
+    name = max((name for name in starts if starts[name] <= place), key=lambda name: starts[name])
+    return f"{name} {place - starts[name]}"
 
 
 def magic_formula(slip: float, stiffness: float, peak: float) -> float:
@@ -129,40 +124,40 @@ def test_combined_slip_is_the_longitudinal_one_where_nothing_is_carried_across(u
 
 
 POINTS = {
-    # speed [m/s], decel [m/s^2], front and rear bar, front and rear motor [N m], across, motor reported
-    "coasting": (30.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0, True),
-    "coasting, no motor reported": (30.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0, False),
-    "driving": (20.0, -1.5, 0.0, 0.0, -250.0, -400.0, 0.0, True),
-    "motor braking": (25.0, 2.0, 0.0, 0.0, 250.0, 500.0, 0.0, True),
-    "braking, 2 m/s^2": (25.0, 2.0, 19.0, 18.0, 0.0, 0.0, 0.0, True),
-    "braking, 4 m/s^2": (33.0, 4.0, 39.0, 36.0, 0.0, 0.0, 0.0, True),
-    "braking, 8 m/s^2": (20.0, 8.0, 66.0, 75.0, 0.0, 0.0, 0.0, True),
-    "braking, engine in gear": (25.0, 4.0, 39.0, 36.0, 0.0, 0.0, 0.0, False),
-    "braking and regenerating": (15.0, 4.0, 20.0, 15.0, 250.0, 200.0, 0.0, True),
-    "braking in a curve": (20.0, 3.0, 29.0, 26.0, 0.0, 0.0, 0.3, True),
-    "front beyond the tyre's range": (20.0, 8.0, 110.0, 30.0, 0.0, 0.0, 0.0, True),
+    # speed [m/s], decel [m/s^2], front and rear bar, front and rear motor [N m], across
+    "coasting": (30.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0),
+    "driving": (20.0, -1.5, 0.0, 0.0, -250.0, -400.0, 0.0),
+    "motor braking": (25.0, 2.0, 0.0, 0.0, 250.0, 500.0, 0.0),
+    "braking, 2 m/s^2": (25.0, 2.0, 19.0, 18.0, 0.0, 0.0, 0.0),
+    "braking, 4 m/s^2": (33.0, 4.0, 39.0, 36.0, 0.0, 0.0, 0.0),
+    "braking, 8 m/s^2": (20.0, 8.0, 66.0, 75.0, 0.0, 0.0, 0.0),
+    "braking and regenerating": (15.0, 4.0, 20.0, 15.0, 250.0, 200.0, 0.0),
+    "braking in a curve": (20.0, 3.0, 29.0, 26.0, 0.0, 0.0, 0.3),
+    "front beyond the tyre's range": (20.0, 8.0, 110.0, 30.0, 0.0, 0.0, 0.0),
 }
 
 
 def set_point(params, state, point: str, balanced: bool = False) -> None:
     """Write an operating point into the window, the smooth pressure being the pressure itself."""
-    speed, decel, front, rear, motor_front, motor_rear, across, reported = POINTS[point]
+    speed, decel, front, rear, motor_front, motor_rear, across = POINTS[point]
     w, car = state["window"], params
     random = np.random.default_rng(5)
     state["x"][:] = 0.3 * PRIOR * random.standard_normal(N)  # nowhere special
-    state["x"][MU : MU + 4] = 0.1 * random.standard_normal(4)
+    state["x"][LEVEL : LEVEL + 4] = 0.1 * random.standard_normal(4)
+    state["x"][CHANGE : CHANGE + 2] = 0.05 * random.standard_normal(2)
     state["x"][OFFSET : OFFSET + 2] = 0.2, 0.3  # nothing frees them; below zero released brakes would brake
     state["x"][MOTOR] = 0.01
     state["x"][V] = speed
     transfer = car["mass"] * decel * car["cog_height"] / car["wheelbase"] / 2
     w["load"] = car["static_load"] + transfer * np.array([1, 1, -1, -1])
-    w["motor"] = np.repeat([motor_front, motor_rear], 2)
-    w["pressure"] = state["smooth_pressure"] = state["last_smooth"] = np.repeat([front, rear], 2)
-    w["change"] = w["accel"] = -decel
-    w["across"], w["lateral"], w["motor_reported"] = across, 150.0 * (across > 0), reported
+    w["motor"] = state["motors"]["last_smooth"] = np.repeat([motor_front, motor_rear], 2)
+    w["pressure"] = w["common_pressure"] = state["last_smooth"] = np.repeat([front, rear], 2)
+    w["change"] = w["accel"] = w["common_accel"] = -decel
+    w["across"], w["lateral"] = across, 150.0 * (across > 0)
     if balanced:
-        w["accel"] -= predict_balance(car, state) / math.exp(state["x"][MASS])
-        assert predict_balance(car, state) == pytest.approx(0.0, abs=1e-12)
+        w["common_accel"] -= predict_balance(car, state, front > 0) / math.exp(state["x"][MASS])
+        assert predict_balance(car, state, front > 0) == pytest.approx(0.0, abs=1e-12)
+    state["last_smooth_accel"] = w["common_accel"]
 
 
 def differences(state, predict, steps: np.ndarray) -> np.ndarray:
@@ -183,11 +178,6 @@ STEPS[V] = STEPS[OFFSET : OFFSET + 2] = 1e-3
 LATER = [SINKING, ROLLING, *range(RADIUS, RADIUS + 4)]  # their share in rolling resistance is left out
 
 
-def unknown(car, state) -> float:
-    """Share of an unreported engine's drive that a reported torque leaves unknown."""
-    return 2.0 * car["sigma_motor_torque"] if state["window"]["motor_reported"] else 1.0
-
-
 def both_derivatives(car, state, point: str, i: int) -> tuple[np.ndarray, np.ndarray, float]:
     """Return derivatives of a wheel's speed as the observer has them and by differences, and the speed."""
     x, w = state["x"], state["window"]
@@ -205,8 +195,11 @@ def both_derivatives(car, state, point: str, i: int) -> tuple[np.ndarray, np.nda
         w["motor"][i] = motor - sign * push * 0.5 * car["mass"] * car["wheel_radius"][i] / math.exp(x[MOTOR])
         shifted.append(predict())
     w["motor"][i] = motor
-    expected[DRIVE + i // 2] = unknown(car, state) * (shifted[0] - shifted[1]) / (2 * push)
+    expected[DRIVE + i // 2] = (shifted[0] - shifted[1]) / (2 * push)
     omega = predict()
+    # Nor is what its slip is off by: v (1 + s) / r while braking, v / ((1 - s) r) driving.
+    slip = state["slip"][i]
+    expected[SLIP_ERROR + i // 2] = omega / (1 + slip) if slip < 0 else omega / (1 - slip)
     return state["h"].copy(), expected, omega
 
 
@@ -218,7 +211,7 @@ def test_derivatives_of_a_wheels_speed(params, state, point: str, i: int) -> Non
         if j in LATER:
             continue  # the tests below
         rel = 0.01 if j in (DRIVE, DRIVE + 1) else 1e-5  # a drive's lever is the static rolling radius
-        assert got[j] == pytest.approx(expected[j], rel=rel, abs=1e-7 * omega), NAME[j]
+        assert got[j] == pytest.approx(expected[j], rel=rel, abs=1e-7 * omega), name_of(j)
 
 
 @pytest.mark.parametrize("point", POINTS)
@@ -226,7 +219,7 @@ def test_derivatives_by_the_radius(params, state, point: str) -> None:
     for i in range(4):
         got, expected, omega = both_derivatives(params[0], state, point, i)
         for j in LATER:
-            assert got[j] == pytest.approx(expected[j], rel=0.01, abs=1e-7 * omega), NAME[j]
+            assert got[j] == pytest.approx(expected[j], rel=0.01, abs=1e-7 * omega), name_of(j)
 
 
 @pytest.mark.parametrize("point", POINTS)
@@ -235,7 +228,7 @@ def test_derivatives_of_the_cars_balance(params, state, point: str) -> None:
     set_point(car, state, point, balanced=True)
 
     def predict() -> float:
-        return predict_balance(car, state)
+        return predict_balance(car, state, POINTS[point][2] > 0)
 
     expected = differences(state, predict, STEPS)
     motor, push = w["motor"].copy(), 1e-4
@@ -247,19 +240,19 @@ def test_derivatives_of_the_cars_balance(params, state, point: str) -> None:
             w["motor"][own] -= sign * push * 0.5 * car["mass"] * car["wheel_radius"][own] / math.exp(x[MOTOR])
             shifted.append(predict())
         w["motor"] = motor
-        expected[DRIVE + axle] = unknown(car, state) * (shifted[0] - shifted[1]) / (2 * push)
+        expected[DRIVE + axle] = (shifted[0] - shifted[1]) / (2 * push)
     predict()
     got = state["h"].copy()
     noise = math.hypot(BALANCE_FLOOR, BALANCE_SHARE * w["accel"])
     for j in range(N):
         if j in LATER:
             assert got[j] == 0.0
-            assert abs(expected[j]) * PRIOR[j] < 1.2 * noise, NAME[j]
+            assert abs(expected[j]) * PRIOR[j] < 1.2 * noise, name_of(j)
         elif j == V:  # drag by an error of speed of 0.1 m/s
             assert abs(got[j] - expected[j]) * 0.1 < 0.3 * noise
         else:
             rel = 0.01 if j in (DRIVE, DRIVE + 1) else 1e-6
-            assert got[j] == pytest.approx(expected[j], rel=rel, abs=1e-8), NAME[j]
+            assert got[j] == pytest.approx(expected[j], rel=rel, abs=1e-8), name_of(j)
 
 
 @pytest.mark.parametrize("point", POINTS)
@@ -291,3 +284,53 @@ def test_wheel_speed_is_the_one_at_which_the_tyre_carries_the_torque(params, sta
         assert magic_formula(slip / along, stiffness, peak) == pytest.approx(both, rel=1e-9)
         assert state["slip"][i] == pytest.approx(slip, rel=1e-9)
         assert state["force"][i] == pytest.approx(-torque / r, rel=1e-9)
+
+
+KNOWN_BEFORE = [LEVEL, LEVEL + 2, CHANGE, OFFSET, STIFFNESS, PEAK, MASS, MOTOR, LOAD, SIDE, PEAK_LOAD, DRIVE]
+
+
+@pytest.mark.parametrize("point", [name for name, row in POINTS.items() if row[2] > 0])
+def test_derivatives_hold_nothing_of_this_windows_pressure(params, state, point: str) -> None:
+    """Its noise is in the prediction: were it in both, it would bias what is learned."""
+    car, w = params[0], state["window"]
+    set_point(car, state, point)
+    for predict in (
+        lambda: predict_wheel(car, state, 0, 20.0),
+        lambda: predict_wheel(car, state, 3, 20.0),
+        lambda: predict_balance(car, state, True),
+    ):
+        before, h = predict(), state["h"].copy()
+        w["pressure"] += 3.0
+        w["common_pressure"] += 3.0
+        assert predict() != before
+        np.testing.assert_allclose(state["h"][KNOWN_BEFORE], h[KNOWN_BEFORE], rtol=1e-12)
+        w["pressure"] -= 3.0
+        w["common_pressure"] -= 3.0
+
+
+UNKNOWN_SHARES = [
+    # relative error of the motors' torque, reported; share of the drive that is unknown
+    (0.00, True, 0.0),
+    (0.03, True, 0.0),
+    (0.13, True, 0.2),
+    (0.50, True, 0.94),
+    (0.60, True, 1.0),
+    (0.03, False, 1.0),
+]
+
+
+@pytest.mark.parametrize(("error", "reported", "share"), UNKNOWN_SHARES)
+def test_a_drive_is_known_as_well_as_its_torque_is_told(params, state, error, reported, share) -> None:
+    """An error of scale is `MOTOR`'s; what is beyond counts twice."""
+    params[0]["sigma_motor_torque"] = error
+    state["motors"]["samples"] = 5 * reported
+    assert unknown_share(params[0], state) == pytest.approx(share)
+
+
+@pytest.mark.parametrize("y", [-1.0, -0.3, 0.0, 0.1, 0.19, 0.25, 0.5])
+@pytest.mark.parametrize("relative", [0.6, 1.0, 1.5])
+def test_peak_adhesion_is_monotonic_in_its_state_and_has_a_greatest_value(state, y, relative) -> None:
+    state["x"][PEAK], state["x"][PEAK_LOAD] = y, 0.02
+    by_load = relative**-0.03
+    expected = NOMINAL_PEAK * by_load * min((1 - 4 * y) ** -0.25 if y < 0.25 else math.inf, 0.2**-0.25)
+    assert peak_adhesion(state, relative) == pytest.approx(expected)
