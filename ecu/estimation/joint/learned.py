@@ -27,7 +27,7 @@ from ecu.estimation.joint.layout import (
 )
 from ecu.estimation.joint.observer import WINDOW_S, start_joint
 from ecu.estimation.joint.pressure import follows
-from ecu.estimation.joint.prior import set_prior, widen_levels
+from ecu.estimation.joint.prior import limit_variance, set_prior, widen_levels
 from ecu.estimation.joint.wheel import brake_lever, friction
 from ecu.estimation.motion import usable
 from ecu.jit import Record, kernel
@@ -50,7 +50,8 @@ def restore_joint(params: Record, state: Record, learned: Record) -> None:
     set_prior(params, state)
     x, p = state.x, state.p
     if learned.joint_known:
-        peak = p[PEAK, PEAK]
+        prior = np.diag(p).copy()
+        peak = prior[PEAK]
         place = 0
         for k in range(len(KEPT)):
             i = KEPT[k]
@@ -60,6 +61,8 @@ def restore_joint(params: Record, state: Record, learned: Record) -> None:
                 place += 1
             p[i, i] += PAUSE[i] ** 2
         widen_levels(state, LEVEL_PAUSE**2, 0.0, 0.0)
+        for i in KEPT:
+            limit_variance(state, i, prior[i])
         clear_state(state, PEAK, peak)
     start_joint(state)
 

@@ -63,7 +63,7 @@ from ecu.estimation.joint.wheel import (
 )
 from ecu.estimation.joint.window import close_window, gather, open_window
 from ecu.estimation.joint.zero import settle_zero
-from ecu.estimation.motion import mean_wheel_speed, speed_backwards, usable
+from ecu.estimation.motion import STANDING, mean_wheel_speed, speed_backwards, usable
 from ecu.jit import Record, kernel
 from ecu.params import GRAVITY
 from ecu.signals import (
@@ -166,7 +166,7 @@ def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> 
         forget_rate(state)
     for i in range(N):
         free[i] = 0
-    free[V] = free[SLOPE] = 1
+    free[V], free[SLOPE] = 1, 1 if state.x[V] > STANDING else 0
     if not learning:
         return
     for i in range(4):

@@ -66,6 +66,9 @@ UNKNOWN_KICKS = 3.0  # m/s^2, white from window to window: stands for 0.3 that l
 UNKNOWN_SLIP, UNKNOWN_SLIP_REST, UNKNOWN_SLIP_BY_ACCEL = 0.003, 0.005, 0.1
 UNKNOWN_SLIP_S = 2.0  # after which that is another one
 
+LASTING = np.array([STIFFNESS, RATIO, BIAS, MASS, PEAK, LOAD, SINKING, DRAG, ROLLING, DELAY, SIDE, PEAK_LOAD])
+"""States of which time alone makes nothing less sure than before anything was learned."""
+
 # Random walks per square root of a second.
 WALK = np.zeros(N)
 WALK[V] = 0.02
@@ -86,6 +89,7 @@ LOWEST[LEVEL : LEVEL + 4], HIGHEST[LEVEL : LEVEL + 4] = math.log(LEAST_RATIO), m
 LOWEST[STIFFNESS], HIGHEST[STIFFNESS] = math.log(0.4), math.log(2.5)
 LOWEST[RADIUS : RADIUS + 4], HIGHEST[RADIUS : RADIUS + 4] = -0.02, 0.02
 LOWEST[BIAS], HIGHEST[BIAS] = -0.6, 0.6
+LOWEST[SLOPE], HIGHEST[SLOPE] = -4.0, 4.0
 LOWEST[MASS], HIGHEST[MASS] = math.log(0.85), math.log(1.30)
 LOWEST[PEAK], HIGHEST[PEAK] = -1.0, 0.2
 LOWEST[RATIO], HIGHEST[RATIO] = -0.4, 0.4
@@ -98,11 +102,23 @@ LOWEST[DELAY], HIGHEST[DELAY] = -0.1, 0.1
 
 
 @kernel
+def limit_variance(state: Record, i: int, most: float) -> None:
+    """Let a state be no less sure than `most`, a variance: its covariances shrink with it."""
+    p = state.p
+    if p[i, i] > most:
+        scale = math.sqrt(most / p[i, i])
+        for j in range(N):
+            p[i, j] *= scale
+            p[j, i] = p[i, j] if j != i else scale * p[i, i]
+
+
+@kernel
 def keep_within_bounds(state: Record) -> bool:
     """Put learned states that have left their bounds back on them; return whether there was one.
 
     The others follow as their covariances say: what the one may not explain is theirs to explain. Left where
-    they are they would drift for as long as it is pushed. The peak is the road's: to be far off is no fault.
+    they are they would drift for as long as it is pushed. Peak and slope are the road's: to be far off is no
+    fault.
     """
     x, p, free, found = state.x, state.p, state.free, False
     for i in range(N):
@@ -112,7 +128,7 @@ def keep_within_bounds(state: Record) -> bool:
                 if j != i and free[i] and free[j] and p[i, i] > 0.0:
                     x[j] += p[j, i] / p[i, i] * back
             x[i] += back
-            found = found or i != PEAK
+            found = found or (i != PEAK and i != SLOPE)
     return found
 
 
@@ -295,6 +311,8 @@ def walk(state: Record, rubbing: bool, time: float) -> None:
     for i in range(N):
         if i != RATE:
             p[i, i] += WALK[i] ** 2 * time
+    for i in LASTING:
+        limit_variance(state, i, PRIOR[i] ** 2)
     if rubbing:
         p[RATE, RATE] += (RATE_WALK * state.drive_known) ** 2 * time
         _change_friction(state, time)

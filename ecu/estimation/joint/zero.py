@@ -29,7 +29,7 @@ ZERO_STATE = np.dtype(
 )
 
 START, MEMORY = 100, 12_000  # samples: of the prior, and until older ones are forgotten
-LIMIT = 3.0  # bar, more is no zero
+LIMIT = 8.0  # bar, more is neither zero nor noise
 LEAST_SHARE = 0.05  # at the floor, of a floored sensor
 NEARLY_ALL = 0.97
 UNKNOWN = 0.7  # bar, standard deviation of a zero that nothing tells

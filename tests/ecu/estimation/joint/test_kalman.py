@@ -24,6 +24,7 @@ from ecu.estimation.joint.prior import (
     CHANGE_BY_PRESSURE,
     CHANGE_COMMON,
     CHANGE_S,
+    LASTING,
     LEVEL_WALK,
     PRIOR,
     RATE_SIGMA,
@@ -251,6 +252,9 @@ def test_a_walk_is_f_p_f_and_q(name: str, last, now, time: float, drive, rubbing
         P = P + together([SLIP_ERROR + axle], slip * (1 - math.exp(-2 * time / UNKNOWN_SLIP_S)))
     other = np.arange(N) != RATE
     P = P + np.diag(WALK**2 * time * other)
+    scale = np.ones(N)
+    scale[LASTING] = np.minimum(1.0, PRIOR[LASTING] / np.sqrt(np.diag(P)[LASTING]))
+    P = P * np.outer(scale, scale)  # no less sure than before anything was learned
     x = F @ state["x"]
     if rubbing:
         P = P + together([RATE], (RATE_WALK * known) ** 2 * time)

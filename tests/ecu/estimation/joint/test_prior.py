@@ -16,6 +16,7 @@ from ecu.estimation.joint.layout import (
     OVERRUN,
     PEAK,
     RATE,
+    SLOPE,
     STIFFNESS,
     N,
 )
@@ -243,7 +244,7 @@ def test_a_state_beyond_its_bound_is_put_on_it_and_what_it_is_tied_to_follows(i:
     state["x"][i] = bound + math.copysign(0.001, bound)
     state["free"] = 1
     x, P = state["x"].copy(), state["p"].copy()
-    assert keep_within_bounds(state) == (i != PEAK)  # the peak is the road's
+    assert keep_within_bounds(state) == (i not in (PEAK, SLOPE))  # they are the road's
     np.testing.assert_allclose(state["x"], x + P[:, i] / P[i, i] * (bound - x[i]), rtol=1e-9, atol=1e-15)
     assert state["x"][i] == pytest.approx(bound)
     np.testing.assert_array_equal(state["p"], P)
