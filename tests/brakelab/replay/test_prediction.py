@@ -1,4 +1,4 @@
-"""What a braking is expected to do, against closed forms, which predictions count and what else predicts it."""
+"""What a braking is expected to do, against closed forms; which predictions count; what others would say."""
 
 from collections.abc import Callable
 from pathlib import Path
