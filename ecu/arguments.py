@@ -38,9 +38,14 @@ OBSERVER_OPTION = typer.Option(
 )
 STATE_OPTION = typer.Option("--state", metavar="DIR", help="Where learned friction is kept between runs")
 
+DRAW_OPTION = typer.Option(
+    "--draw", metavar="WIDTH", help="How far cars differ from their file: wide, nominal; default: SCENARIO's"
+)
+
 Config = Annotated[Path, CONFIG_OPTION]
 Map = Annotated[Path | None, MAP_OPTION]
 Interface = Annotated[str, INTERFACE_OPTION]
 Channel = Annotated[str, CHANNEL_OPTION]
 State = Annotated[Path | None, STATE_OPTION]
+Draw = Annotated[str | None, DRAW_OPTION]
 Observer = Annotated[str | None, OBSERVER_OPTION]

@@ -12,6 +12,7 @@ from ecu.arguments import (
     INTERFACE_OPTION,
     Channel,
     Config,
+    Draw,
     Interface,
     Map,
     Observer,
@@ -48,11 +49,12 @@ def simulate(
         Path, typer.Option("--out", metavar="NAME", help="Writes NAME.log, NAME.parquet, NAME.truth.parquet")
     ],
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the drawn vehicle and its noise")] = 0,
+    draw: Draw = None,
 ) -> int:
     """A scenario in closed loop. Writes frames, decoded inputs and true values."""
     from brakelab import closed_loop
 
-    return closed_loop.simulate(scenario, config, out, seed)
+    return closed_loop.simulate(scenario, config, out, seed, draw)
 
 
 @app.command()
@@ -254,8 +256,11 @@ def bench(
     json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table")] = False,
     seeds: Annotated[int, typer.Option(min=1, help="Cars that stops and observers draw")] = 20,
     seconds: Annotated[float, typer.Option(min=5.0, max=580.0, help="Of lateness and play")] = 60.0,
+    draw: Annotated[
+        str, typer.Option(metavar="WIDTH", help="Cars of stops and observers: wide, nominal")
+    ] = "wide",
 ) -> int:
     """Times of step, codec and cycle on this machine; accuracy over drawn cars."""
     from brakelab.bench import command
 
-    return command.bench(name, json, seeds, seconds)
+    return command.bench(name, json, seeds, seconds, draw)

@@ -274,7 +274,7 @@ def config_hash(config: Config) -> str:
 def store_key(config: Config) -> str:
     """Return what learned values belong to: vehicle, brakes and the version of the algorithm."""
     brakes = json.dumps([config.front.model_dump(), config.rear.model_dump()], sort_keys=True)
-    return f"{config.name}/{hashlib.sha256(brakes.encode()).hexdigest()[:8]}/2"
+    return f"{config.name}/{hashlib.sha256(brakes.encode()).hexdigest()[:8]}/3"
 
 
 def new_params(config: Config) -> RecordArray:

@@ -129,13 +129,12 @@ def _write_all(file: BinaryIO, data: bytes) -> None:
 
 
 class Recording(NamedTuple):
-    """A recording, read back. Cycle k stands in row k of the three arrays."""
+    """A recording, read back. Cycle k stands in row k of both arrays."""
 
     folder: Path
     about: dict[str, Any]
     cycles: RecordArray
     outputs: RecordArray
-    learned: RecordArray
     initial: RecordArray
     """The state before the first cycle, shape (1,)."""
     frames: Path
@@ -161,8 +160,7 @@ def read_recording(folder: Path) -> Recording:
         initial = np.frombuffer((folder / INITIAL_FILE).read_bytes(), dtype_of(about["state"]))
     except (OSError, ValueError, KeyError) as error:
         raise UserError(str(folder), "", f"not a complete recording: {error}") from None
-    cycles, outputs, learned = (records[name] for name in ("cycle", "outputs", "learned"))
-    return Recording(folder, about, cycles, outputs, learned, initial, folder / FRAMES_FILE)
+    return Recording(folder, about, records["cycle"], records["outputs"], initial, folder / FRAMES_FILE)
 
 
 class Recorder:
@@ -175,8 +173,8 @@ class Recorder:
         self.channel, self.key = str(about["channel"]), str(about["store_key"])
         self.files = start_recording(record, about, reader.initial) if record else None
         self.store = state_store.open_store(state) if state else None
-        self.keeper: state_store.Keeper | None = None
-        self.latest: RecordArray | None = None
+        initial = np.frombuffer(reader.initial, dtype_of(about["state"]))
+        self.keeper = state_store.first_keeper(initial["learned"], time.monotonic())
         self._store_refused = False
 
     def turn(self) -> int:
@@ -186,7 +184,7 @@ class Recorder:
             if self.files:
                 self._record(self.files, batch)
             self.events.look(batch.records, self.reader.lost_cycles, self.reader.lost_frames)
-            self._keep(batch.records["learned"])
+            self._keep()
         return len(batch.records)
 
     def _record(self, files: RecordingFiles, batch: Batch) -> None:
@@ -201,14 +199,11 @@ class Recorder:
             )
             self.files = None
 
-    def _keep(self, learned: RecordArray) -> None:
+    def _keep(self) -> None:
         """Save after a braking, or a minute after another change."""
-        now_s = time.monotonic()
-        if self.keeper is None:
-            self.keeper = state_store.first_keeper(learned[:1], now_s)
-        self.latest = learned[-1:].copy()
-        if state_store.is_due(self.keeper, self.latest, now_s):
-            self._save(self.latest, now_s)
+        now_s, learned = time.monotonic(), self.reader.learned()
+        if learned is not None and state_store.is_due(self.keeper, learned, now_s):
+            self._save(learned, now_s)
 
     def _save(self, learned: RecordArray, now_s: float) -> None:
         if self.store is None:
@@ -226,8 +221,9 @@ class Recorder:
         """Write out the rest: the ring, then what was learned since the last save."""
         while self.turn():
             pass
-        if self.keeper and self.latest is not None and self.latest.tobytes() != self.keeper.saved:
-            self._save(self.latest, time.monotonic())
+        learned = self.reader.learned()
+        if learned is not None and learned.tobytes() != self.keeper.saved:
+            self._save(learned, time.monotonic())
         if self.files:
             for file in (self.files.frames, self.files.cycles):
                 os.fsync(file.fileno())

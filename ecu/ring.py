@@ -1,8 +1,9 @@
 """A ring in shared memory: the cycle writes it and waits for nobody, any process may read along.
 
-The file holds a header, a description (JSON), the state before the first cycle, a slot per cycle and a ring
-of frames. A slot carries its number before and after its content is written (-1 between), so a reader that
-was overtaken notices and counts what it lost. Frames are claimed before they are overwritten.
+The file holds a header, a description (JSON), the state before the first cycle, a slot per cycle, what is
+learned (of the last two cycles, in turn) and a ring of frames. A slot carries its number before and after its
+content is written (-1 between), so a reader that was overtaken notices and counts what it lost. Frames are
+claimed before they are overwritten.
 """
 
 import json
@@ -24,7 +25,7 @@ SLOTS: Final = 2400  # 24 s of cycles
 FRAMES: Final = 131072  # 29 s of a classical bus at 45 frames per cycle
 
 # One cycle as it stands in the ring's slots and in a recording's cycles.bin.
-RECORDED: Final = np.dtype([("cycle", CYCLE), ("outputs", OUTPUTS), ("learned", LEARNED)], align=True)
+RECORDED: Final = np.dtype([("cycle", CYCLE), ("outputs", OUTPUTS)], align=True)
 _SLOT: Final = np.dtype([("number", "i8"), ("first_frame", "i8"), ("recorded", RECORDED)], align=True)
 _HEADER: Final = np.dtype(
     [
@@ -39,7 +40,7 @@ _HEADER: Final = np.dtype(
         ("closed", "i8"),
     ]
 )
-_MAGIC: Final = int.from_bytes(b"ecuring1", "little")
+_MAGIC: Final = int.from_bytes(b"ecuring2", "little")
 _PAGE: Final = 4096
 
 
@@ -50,6 +51,8 @@ class Ring(NamedTuple):
     memory: mmap.mmap
     header: RecordArray
     slots: RecordArray
+    learned: RecordArray
+    """LEARNED, shape (2,): after cycle k in row k % 2."""
     frames: RecordArray
 
 
@@ -86,8 +89,10 @@ def _map(path: Path, memory: mmap.mmap) -> Ring:
     row = header[0]
     at = _round_up(_HEADER.itemsize) + _round_up(int(row["description_bytes"]) + int(row["initial_bytes"]))
     slots = np.frombuffer(memory, _SLOT, int(row["slots"]), at)
-    frames = np.frombuffer(memory, FRAME, int(row["frames"]), at + _round_up(slots.nbytes))
-    return Ring(path, memory, header, slots, frames)
+    at += _round_up(slots.nbytes)
+    learned = np.frombuffer(memory, LEARNED, 2, at)
+    frames = np.frombuffer(memory, FRAME, int(row["frames"]), at + _round_up(learned.nbytes))
+    return Ring(path, memory, header, slots, learned, frames)
 
 
 def create_ring(
@@ -102,7 +107,8 @@ def create_ring(
     """
     text = json.dumps(description).encode()
     head = _round_up(_HEADER.itemsize) + _round_up(len(text) + len(initial))
-    size = head + _round_up(slots * _SLOT.itemsize) + _round_up(frames * FRAME.itemsize)
+    parts = (slots * _SLOT.itemsize, 2 * LEARNED.itemsize, frames * FRAME.itemsize)
+    size = head + sum(map(_round_up, parts))
     unfinished = path.with_name(path.name + ".new")
     try:
         handle = os.open(unfinished, os.O_RDWR | os.O_CREAT | os.O_TRUNC, 0o600)
@@ -144,7 +150,8 @@ def publish(
     numbers = ring.slots["number"]
     numbers[place] = -1
     header["frames_claimed"] = end
-    _fill(ring.slots, place, ring.frames, begin, end, cycle, outputs, learned, frames)
+    _fill(ring.slots, place, ring.frames, begin, end, cycle, outputs, frames)
+    ring.learned[number % 2] = learned[0]
     header["frames_written"] = end
     numbers[place] = number
     header["written"] = number + 1
@@ -160,7 +167,6 @@ def _fill(
     end: int,
     cycle: RecordArray,
     outputs: RecordArray,
-    learned: RecordArray,
     frames: RecordArray,
 ) -> None:
     for i in range(begin, end):
@@ -169,7 +175,6 @@ def _fill(
     slot.first_frame = begin
     slot.recorded.cycle = cycle[0]
     slot.recorded.outputs = outputs[0]
-    slot.recorded.learned = learned[0]
 
 
 def close_ring(ring: Ring) -> None:
@@ -211,15 +216,14 @@ class RingReader:
         """Whether the writer said that no more cycles come."""
         return bool(self.ring.header[0]["closed"])
 
-    def latest(self) -> RecordArray | None:
-        """Return the last cycle (`RECORDED`, shape (1,)), None while there is none. `read` is not touched."""
-        slots = self.ring.slots
+    def learned(self) -> RecordArray | None:
+        """Return what is learned as of the last cycle (`LEARNED`, shape (1,)), None while there is none."""
         for _ in range(10):  # the writer may overtake us
-            number = int(self.ring.header[0]["written"]) - 1
-            place = number % len(slots)
-            copied = slots[place : place + 1].copy()
-            if number >= 0 and copied["number"][0] == number == slots["number"][place]:
-                return copied["recorded"]
+            written = int(self.ring.header[0]["written"])
+            row = (written - 1) % 2
+            copied = self.ring.learned[row : row + 1].copy()
+            if written and written == int(self.ring.header[0]["written"]):
+                return copied
         return None
 
     def read(self, limit: int = 256) -> Batch:

@@ -75,10 +75,9 @@ def learned_by_first(description: dict[str, Any], mu_nominal: NDArray[np.float64
             continue
         if any(reader.description.get(name) != description[name] for name in same):
             continue
-        latest = reader.latest()
-        if latest is None:
+        learned = reader.learned()
+        if learned is None:
             continue
-        learned = latest["learned"].copy()
         wrong = out_of_range(learned, mu_nominal)
         if not wrong:
             structlog.get_logger("ecu").info("learned_from_ring", ring=str(path))

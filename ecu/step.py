@@ -105,6 +105,8 @@ from ecu.params import BAR, JOINT, OBSERVER1
 from ecu.records import INPUTS, LEARNED, RecordArray
 from ecu.signals import ACCEL_X, CALLIPER_PRESSURE, FAILED, STARTING
 
+KEEP_S = 1.0  # between two copies of what the joint observer knows, while no application ends
+
 STATE = np.dtype(
     [
         ("motion", MOTION_STATE),
@@ -254,7 +256,8 @@ def _observe_jointly(p: Record, s: Record, u: Record, braking: bool, dt: float) 
         add_window(p, s.prediction, joint, u)
     s.prediction.told_s = max(s.prediction.told_s - dt, 0.0)
     publish_friction(p, joint, s.friction, s.learned, u, braking, dt)
-    if joint.closed:  # what is known changes at the end of a window alone
+    joint.unkept_s += dt
+    if joint.unkept_s > KEEP_S:
         keep_joint(p, joint, s.learned)
     s.speed.started, s.speed.speed = joint.started, joint.x[V]
     s.force.k_f = math.exp(joint.x[STIFFNESS])

@@ -1,9 +1,11 @@
 """What was learned, kept like money: sqlite, WAL, synchronous FULL, a CRC and a revision per row.
 
 Only the side process writes. A row that fails its CRC or its ranges is passed over for the revision before
-it; a file that sqlite cannot read is set aside and a new one made.
+it; a file that sqlite cannot read, or that holds another table, is set aside and a new one made. What another
+version of the algorithm has learned stays in the file and is not used.
 """
 
+import math
 import sqlite3
 import time
 import zlib
@@ -27,6 +29,7 @@ RADIUS_ERROR_LIMIT: Final = 0.03
 DISC_EXCESS_LIMIT: Final = 2000.0  # K above the air, with its error
 JOINT_LIMIT: Final = 1.5
 """Of any state of the joint observer: logarithms, and the rest is smaller still."""
+LEAST_EIGENVALUE: Final = 1e-6  # of a correlation matrix, below zero: rounding
 
 _TABLE: Final = """
 CREATE TABLE IF NOT EXISTS learned (
@@ -60,7 +63,7 @@ def open_store(folder: Path) -> sqlite3.Connection:
 
 def _is_damaged(error: sqlite3.OperationalError) -> bool:
     """Whether the file is at fault and not its surroundings (rights, a full disk, a lock)."""
-    return "disk I/O error" in str(error)
+    return error.sqlite_errorcode & 0xFF in (sqlite3.SQLITE_IOERR, sqlite3.SQLITE_ERROR)
 
 
 def _connect(path: Path) -> sqlite3.Connection:
@@ -69,6 +72,7 @@ def _connect(path: Path) -> sqlite3.Connection:
         store.execute("PRAGMA journal_mode=WAL")
         store.execute("PRAGMA synchronous=FULL")
         store.execute(_TABLE)
+        store.execute("SELECT key, revision, saved_at, record, crc FROM learned LIMIT 1")
         verdict = store.execute("PRAGMA quick_check(1)").fetchone()[0]
         if verdict != "ok":
             raise sqlite3.DatabaseError(verdict)
@@ -138,7 +142,18 @@ def restore(
         structlog.get_logger("store").warning(
             "revision_refused", revision=revision, reason=reason, remedy="the one before it is tried"
         )
+    _tell_of_other_versions(store, key)
     return None
+
+
+def _tell_of_other_versions(store: sqlite3.Connection, key: str) -> None:
+    vehicle = key.rpartition("/")[0]
+    keys = {row[0] for row in store.execute("SELECT DISTINCT key FROM learned")} - {key}
+    others = sorted(other for other in keys if other.rpartition("/")[0] == vehicle)
+    if others:
+        structlog.get_logger("store").warning(
+            "learned_by_another_version", key=others[-1], remedy="it stays in the store; learning begins anew"
+        )
 
 
 def _why_not(key: str, revision: int, record: object, crc: int, mu_nominal: NDArray[np.float64]) -> str:
@@ -155,6 +170,7 @@ def out_of_range(learned: RecordArray, mu_nominal: NDArray[np.float64]) -> str:
     known = row["observed_s"] > 0  # of a corner that was never observed the friction says nothing
     share = row["mu_b"] / mu_nominal
     sigma = row["sigma_mu_b"]
+    p = covariance_of(row["joint_covariance"])
     checks = {
         "observed_s": np.isfinite(row["observed_s"]) & (row["observed_s"] >= 0),
         "mu_b": ~known | ((share >= MU_RANGE[0]) & (share <= MU_RANGE[1])),
@@ -162,11 +178,27 @@ def out_of_range(learned: RecordArray, mu_nominal: NDArray[np.float64]) -> str:
         "radius_error": np.abs(row["radius_error"]) <= RADIUS_ERROR_LIMIT,
         "radius_sigma": np.isfinite(row["radius_sigma"]) & (row["radius_sigma"] > 0),
         "joint": np.abs(row["joint"]) <= JOINT_LIMIT,
-        "joint_covariance": np.isfinite(row["joint_covariance"]),
+        "joint_covariance": np.asarray(not row["joint_known"] or is_covariance(p)),
         "disc_excess": (row["disc_excess"] >= 0) & (row["disc_excess"] <= DISC_EXCESS_LIMIT),
         "brakings": np.asarray(row["brakings"] >= 0),
     }
     return next((name for name, good in checks.items() if not good.all()), "")
+
+
+def covariance_of(triangle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the symmetric matrix whose lower triangle, by rows, is `triangle`."""
+    n = int(math.sqrt(2 * len(triangle)))
+    matrix = np.zeros((n, n))
+    matrix[np.tril_indices(n)] = triangle
+    return matrix + np.tril(matrix, -1).T
+
+
+def is_covariance(matrix: NDArray[np.float64]) -> bool:
+    """Whether a symmetric matrix, shape (n, n), can be one: finite, no variance or eigenvalue below 0."""
+    if not np.isfinite(matrix).all() or (np.diag(matrix) < 0).any():
+        return False
+    sigma = np.sqrt(np.maximum(np.diag(matrix), 1e-30))
+    return bool(np.linalg.eigvalsh(matrix / np.outer(sigma, sigma)).min() > -LEAST_EIGENVALUE)
 
 
 class Keeper(NamedTuple):

@@ -10,7 +10,8 @@ At 8 m/s^2 and 2 deg/g that is 0.28 m/s^2. On a slope the reading contains gravi
 the sum of tyre forces and drag on any slope (corrected 4.16); speed needs the slope removed (`speed.py`).
 
 The lateral speed at the centre of gravity is that of a rear axle with a small slip angle:
-v_y = l_r psi_dot - v_x a_y / (c_alpha g).
+v_y = l_r psi_dot - v_x a_y / (c_alpha g). Of yaw rate and lateral acceleration one tells the other in steady
+cornering, a_y = v_x psi_dot.
 """
 
 import math
@@ -32,6 +33,7 @@ from ecu.signals import (
 
 STANDING = 0.3  # m/s, below: the brakes hold rather than brake
 SLOPE = 2.0  # m/s^2, of a slope of 20 %
+LEAST_CORNERING_SPEED = 5.0  # m/s, from which lateral acceleration tells the yaw rate
 
 MOTION_STATE = np.dtype(
     [
@@ -112,14 +114,17 @@ def speed_backwards(params: Record, inputs: Record, motion: Record, speed: float
 
 @kernel
 def update_motion(params: Record, state: Record, inputs: Record, speed: float, brake_torque: Record) -> None:
-    """Overwrite accelerations, yaw rate, steering and lateral speed; an unusable signal counts as zero.
+    """Overwrite accelerations, yaw rate, steering and lateral speed; what nothing tells counts as zero.
 
     Longitudinal acceleration is the model's while its sensor is lost; brake torques [N m] act against travel.
     """
     value = inputs.value
-    state.yaw_rate = value[YAW_RATE] if usable(inputs, YAW_RATE) else 0.0
     state.steering = value[STEERING_ANGLE] if usable(inputs, STEERING_ANGLE) else 0.0
-    state.accel_y = value[ACCEL_Y] if usable(inputs, ACCEL_Y) else 0.0
+    yaw, across = usable(inputs, YAW_RATE), usable(inputs, ACCEL_Y)
+    state.yaw_rate = value[YAW_RATE] if yaw else 0.0
+    state.accel_y = value[ACCEL_Y] if across else state.yaw_rate * speed
+    if across and not yaw and speed > LEAST_CORNERING_SPEED:
+        state.yaw_rate = state.accel_y / speed
     state.backwards = 1 if _drives_backwards(params, inputs) else 0
     against = -1.0 if state.backwards else 1.0 if speed > STANDING else 0.0
     force = -params.drag_area * speed * abs(speed)

@@ -42,7 +42,7 @@ def test_a_reader_gets_what_was_written_in_order(path):
     batch = reader.read()
     assert batch.records["cycle"]["number"].tolist() == [0, 1, 2]
     assert batch.records["outputs"]["k_f"].tolist() == [0.5, 1.5, 2.5]
-    assert batch.records["learned"]["mu_b"][:, 3].tolist() == [0, 1, 2]
+    assert reader.learned()["mu_b"].tolist() == [[2.0] * 4]
     assert batch.frames["can_id"].tolist() == list(range(10))
     assert len(reader.read().records) == 0
     assert (reader.description, reader.initial) == ({"channel": "can0"}, b"initial")
@@ -130,7 +130,8 @@ def test_a_reader_beside_a_racing_writer_sees_whole_cycles_only(path):
         batch = reader.read()
         numbers = batch.records["cycle"]["number"]
         assert (batch.records["outputs"]["k_f"] == numbers + 0.5).all()
-        assert (batch.records["learned"]["mu_b"] == numbers[:, None]).all()
+        learned = reader.learned()
+        assert learned is None or len(set(learned["mu_b"][0])) == 1
         assert np.isin(batch.frames["can_id"], np.arange(2048)).all()
         read += len(numbers)
     process.join()

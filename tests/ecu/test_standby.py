@@ -166,5 +166,5 @@ def test_what_the_first_one_learned_comes_out_of_its_ring(first_ring, mu_b, desc
 
 def test_before_its_first_cycle_a_ring_tells_nothing(first_ring):
     ring = first_ring(0.4, cycles=0)
-    assert RingReader(ring.path).latest() is None
+    assert RingReader(ring.path).learned() is None
     assert learned_by_first(DESCRIPTION, NOMINAL) is None

@@ -76,7 +76,7 @@ def test_a_restart_after_kill_has_what_was_learned(daemon, vehicle, tmp_path):
         unit.wait_for("ready")
         car.drive(2)
         assert unit.end(signal.SIGKILL) == -signal.SIGKILL
-        assert read_recording(tmp_path / "record").learned["brakings"][-1] == 3
+        assert read_recording(tmp_path / "record").initial["learned"]["brakings"][-1] == 3
     nominal = np.full(4, config.front.mu_nominal)
     assert restore(open_store(state), store_key(config), nominal)[1].tobytes() == learned.tobytes()
 

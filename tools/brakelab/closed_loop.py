@@ -23,7 +23,7 @@ from brakelab.outputs import check_outputs
 from brakelab.plant.driver import drive
 from brakelab.rig.deaths import killed
 from brakelab.rig.faults import Way, convey, new_way
-from brakelab.scenario import LONGEST, Scenario, load_scenario
+from brakelab.scenario import LONGEST, Scenario, load_scenario, with_draw
 from brakelab.vehicle_bus import (
     N_TRUTH,
     TRUTH_COLUMNS,
@@ -330,16 +330,26 @@ def write_columns(
     pq.write_table(pa.table(arrays).replace_schema_metadata(metadata), path, compression="zstd")
 
 
-def simulate(scenario: Path, config: Path, out: Path, seed: int = 0) -> int:
+def simulate(scenario: Path, config: Path, out: Path, seed: int = 0, draw: str | None = None) -> int:
     """Run a scenario with the ECU of `config`, armed; write OUT.log, OUT.parquet, OUT.truth.parquet.
+
+    `draw`: how far the car differs from its file, see `Scenario.draw`; None: as the scenario says.
 
     Raises:
         UserError: a file cannot be read, is wrong, or cannot be written.
     """
     log, inputs, truth = (out.with_name(out.name + end) for end in (".log", ".parquet", ".truth.parquet"))
     check_outputs(out, (log, inputs, truth), (scenario, config))
-    result = run(new_loop(load_scenario(scenario), load_config(config), seed))
-    metadata = {"start_time_ns": str(START_NS), "scenario": scenario.stem, "seed": str(seed)}
+    driven = load_scenario(scenario)
+    if draw is not None:
+        driven = with_draw(driven, draw)
+    result = run(new_loop(driven, load_config(config), seed))
+    metadata = {
+        "start_time_ns": str(START_NS),
+        "scenario": scenario.stem,
+        "seed": str(seed),
+        "draw": driven.draw,
+    }
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         log.write_bytes(candump_text(result.frames, VEHICLE_BUS))

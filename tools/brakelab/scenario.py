@@ -50,7 +50,7 @@ What goes wrong on the bus, at a sensor or an actuator is told by `[[fault]]` ta
 
 import math
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -216,7 +216,7 @@ class Scenario(_Section):
     """A scenario file."""
 
     plant: str
-    draw: Literal["wide", "nominal"] = "nominal"
+    draw: Literal["wide", "nominal"] = "wide"
     """How far the car of a seed is from its file; see `brakelab.plant.draw`."""
     payload: Payload | None = None
     initial_speed: NotNegative
@@ -351,6 +351,18 @@ def scenario_plant(scenario: Scenario) -> Plant:
         return plant
     laden = plant.vehicle.model_copy(update={"body": scenario.payload.body(plant.vehicle.body)})
     return plant.model_copy(update={"vehicle": laden})
+
+
+def with_draw(scenario: Scenario, draw: str) -> Scenario:
+    """Return a scenario whose cars are drawn from that width, "wide" or "nominal".
+
+    Raises:
+        UserError: there is no such width.
+    """
+    known = get_args(Scenario.model_fields["draw"].annotation)
+    if draw not in known:
+        raise UserError("--draw", draw, f"no such draw of cars; choose {' or '.join(known)}")
+    return scenario.model_copy(update={"draw": draw})
 
 
 def scenario_widths(scenario: Scenario) -> Widths:

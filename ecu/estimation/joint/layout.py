@@ -90,10 +90,12 @@ JOINT_STATE: Final = np.dtype(
         ("kept_x", "f8", (2, N)),  # snapshots: the newer in row 0
         ("kept_p", "f8", (2, N, N)),
         ("kept_s", "f8"),  # age of the newer one [s]
+        ("unkept_s", "f8"),  # since it was last written into what is learned [s]
         ("window", WINDOW_STATE),
         ("pressures", PRESSURE_STATE),
         ("motors", MOTORS_STATE),
         ("sampling", SAMPLING_STATE),
+        ("copies", "i8", (2,)),  # samples in which both pressures of an axle were equal
         ("zero", ZERO_STATE),
         ("pressed", "f8"),  # relative change of a pressure in the last window, of either axle the greater
         ("closed", "u1"),  # a window ended in this cycle

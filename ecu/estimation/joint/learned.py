@@ -67,7 +67,7 @@ def restore_joint(params: Record, state: Record, learned: Record) -> None:
 @kernel
 def keep_joint(params: Record, state: Record, learned: Record) -> None:
     """Write what is known now into `learned`."""
-    learned.joint_known = 1
+    learned.joint_known, state.unkept_s = 1, 0.0
     place = 0
     for k in range(len(KEPT)):
         i = KEPT[k]

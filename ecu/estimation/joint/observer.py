@@ -51,7 +51,7 @@ from ecu.estimation.joint.prior import (
     walk,
 )
 from ecu.estimation.joint.sampling import ACCEL
-from ecu.estimation.joint.sliding import HOLD_S, share_force, watch_tyres, wheel_slides
+from ecu.estimation.joint.sliding import HOLD_S, share_force, watch_tyres, wheel_slides, wheels_agree
 from ecu.estimation.joint.snapshot import go_back, keep, keep_newer
 from ecu.estimation.joint.wheel import (
     brake_lever,
@@ -98,7 +98,7 @@ CORNERING = 1.0  # of slip, per squared adhesion used sideways: then load and sl
 UNEXPLAINED = 0.15  # m/s^2 while rolling: someone drives or brakes the car without saying so
 TWIN = 3.0  # bar, of a pressure taken from the other side
 LOW_SPEED_NOISE = 0.15  # m/s
-JUMP = 100.0  # squared test ratio: while wheels slide such a reference is believed at once
+JUMP = 100.0  # squared test ratio: from here a reference is believed at once that wheels cannot deny
 
 
 @kernel
@@ -273,7 +273,8 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
         clear_derivatives(state)
         state.h[V], state.h[DELAY] = 1.0, -w.reference_change
         state.ratio[5] = correct(state, w.reference, params.sigma_vehicle_speed**2 / w.reference_samples)
-        if state.ratio[5] > JUMP and state.hold_s > 0.0:
+        wheels_slide = state.hold_s > 0.0
+        if state.ratio[5] > JUMP and (wheels_slide or wheels_agree(params, state, x[V] + w.reference)):
             x[V] += w.reference
             state.p[V, V] += 0.25
     state.untrusted_s += time

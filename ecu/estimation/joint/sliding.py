@@ -12,6 +12,7 @@ from ecu.signals import WHEEL_SPEED
 
 LARGE_SLIP = 0.12
 YIELDING = 0.06  # slip from which the force along the car says more of a wheel's force than its torque
+AGREEING = 0.05  # slip within which a wheel confirms a speed
 SLIDING_FLOOR = 5.0  # m/s, that slip is relative to at least
 HOLD_S = 0.2
 OTHER_TYRES = 2.5  # wheels on the gate at once
@@ -47,6 +48,17 @@ def wheel_slides(params: Record, state: Record, i: int) -> bool:
     """Return whether a wheel is so far from the car's speed that it does not tell it."""
     w = state.window
     return _beyond(w.omega[i] * params.wheel_radius[i], w.ground[i], LARGE_SLIP)
+
+
+@kernel
+def wheels_agree(params: Record, state: Record, speed: float) -> bool:
+    """Return whether three wheels at least roll at a speed [m/s]."""
+    count = 0
+    for i in range(4):
+        rolled = state.window.omega[i] * params.wheel_radius[i]
+        if state.window.omega_samples[i] > 0 and not _beyond(rolled, speed, AGREEING):
+            count += 1
+    return count > 2
 
 
 @kernel

@@ -31,6 +31,7 @@ from ecu.signals import (
 )
 
 OLDEST_S = 0.06  # of an acceleration or torque that is set against others
+COPIES, LEAST_COMPARED = 20, 2.0  # samples in a row, bar: that a reading is a copy
 NEW_SHARE = 0.2  # of the model's variance that is another one in the next window
 SMOOTHING = 0.2  # s, of pressure and acceleration that derivatives use
 STEADY = 5.0  # s, over which an acceleration that varies is told from one that lasts
@@ -65,6 +66,16 @@ def _current(inputs: Record, place: int) -> bool:
 
 
 @kernel
+def _compare_pressures(state: Record, inputs: Record) -> None:
+    """Count the samples in which an axle's pressures are one reading, copied: no noise makes them equal."""
+    for axle in range(2):
+        left = CALLIPER_PRESSURE + 2 * axle
+        pressure = inputs.value[left]
+        if fresh(inputs, left) and fresh(inputs, left + 1) and pressure > LEAST_COMPARED:
+            state.copies[axle] = state.copies[axle] + 1 if pressure == inputs.value[left + 1] else 0
+
+
+@kernel
 def gather(
     params: Record,
     state: Record,
@@ -77,6 +88,7 @@ def gather(
 ) -> None:
     """Move the speed on by `dt` [s] and add this cycle's samples to the window."""
     w, x, value = state.window, state.x, inputs.value
+    _compare_pressures(state, inputs)
     change = speed_change(state, motion)
     x[V] = max(x[V] + dt * change, 0.0)
     w.time += dt
@@ -153,6 +165,8 @@ def close_window(params: Record, state: Record) -> None:
         w.pressure[i] = state.sampling.value[i]
         w.common_pressure[i] = at_common_time(state.sampling, i)
         w.pressure_variance[i] = (params.sigma_pressure / BAR) ** 2 / max(sampled, 1)
+        if state.copies[i // 2] > COPIES:
+            w.pressure_variance[i] *= 2.0  # one noise in both wheels of an axle
         if w.tracked_cycles[i] == n and w.pressure_samples[i] > 0:
             w.pressure[i] = w.common_pressure[i] = w.tracked[i] / n
             w.pressure_variance[i] = NEW_SHARE * state.pressures.variance[i]

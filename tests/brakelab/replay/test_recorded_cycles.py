@@ -68,7 +68,6 @@ def record(tmp_path: Path, frames: RecordArray) -> tuple[Path, RecordArray]:
         end_cycle(ecu.inputs[0], reception.freshness)
         step(*ecu[:4])
         records["outputs"][k] = ecu.outputs[0]
-        records["learned"][k] = ecu.state["learned"][0]
     about = {"start_ns": START_NS, "state": layout(ecu.state.dtype)}
     files = start_recording(tmp_path / "record", about, initial)
     write_batch(files, Batch(records, frames[begin:first]), "can0")

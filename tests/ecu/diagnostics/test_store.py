@@ -1,7 +1,8 @@
 import itertools
 import multiprocessing
 import random
-from contextlib import suppress
+import sqlite3
+from contextlib import closing, suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -11,16 +12,27 @@ from structlog.testing import capture_logs
 
 from ecu.diagnostics.store import FILE, REVISIONS_KEPT, first_keeper, is_due, open_store, restore, save
 from ecu.errors import UserError
-from ecu.records import LEARNED, new_record
+from ecu.records import LEARNED, N_KEPT, new_record
 
 NOMINAL = np.full(4, 0.45)
 KEY = "suv/1234/1"
+
+
+def triangle(matrix) -> np.ndarray:
+    return matrix[np.tril_indices(N_KEPT)]
+
+
+NEGATIVE, TIED_TOO_MUCH, NOT_FINITE = (0.01 * np.eye(N_KEPT) for _ in range(3))
+NEGATIVE[3, 3] = -1e-4
+TIED_TOO_MUCH[5, 4] = 0.011
+NOT_FINITE[7, 2] = np.nan
 
 
 def learned(brakings: int = 1, **values: object):
     record = new_record(LEARNED)
     record["mu_b"], record["sigma_mu_b"], record["observed_s"] = 0.40, 0.03, 5.0
     record["radius_sigma"], record["brakings"] = 0.002, brakings
+    record["joint_known"], record["joint_covariance"] = 1, triangle(0.01 * np.eye(N_KEPT))
     for name, value in values.items():
         record[name] = value
     return record
@@ -35,10 +47,29 @@ def test_what_was_saved_comes_back_bit_by_bit(tmp_path):
     assert (revision, found.tobytes()) == (1, record.tobytes())
 
 
-def test_another_vehicle_or_version_knows_nothing_of_it(tmp_path):
+@pytest.mark.parametrize(
+    ("key", "told"),
+    [("suv/1234/2", ["learned_by_another_version"]), ("suv/5678/1", []), ("van/1234/1", [])],
+    ids=["version", "brakes", "vehicle"],
+)
+def test_another_vehicle_or_version_knows_nothing_of_it(tmp_path, key, told):
     store = open_store(tmp_path)
     save(store, KEY, learned())
-    assert restore(store, "suv/1234/2", NOMINAL) is None
+    with capture_logs() as lines:
+        assert restore(store, key, NOMINAL) is None
+    assert [line["event"] for line in lines] == told
+    assert restore(store, KEY, NOMINAL) is not None
+
+
+@pytest.mark.parametrize("columns", ["key TEXT, value BLOB", "revision INTEGER"])
+def test_a_file_with_another_table_is_set_aside(tmp_path, columns):
+    with closing(sqlite3.connect(tmp_path / FILE)) as other:
+        other.execute(f"CREATE TABLE learned ({columns})")
+    with capture_logs() as lines:
+        store = open_store(tmp_path)
+    assert [line["event"] for line in lines] == ["store_damaged"]
+    save(store, KEY, learned(9))
+    assert restore(store, KEY, NOMINAL)[1]["brakings"][0] == 9
 
 
 def test_the_last_revisions_are_kept(tmp_path):
@@ -59,6 +90,9 @@ OUT_OF_RANGE = {
     "radius is no number": {"radius_error": np.nan},
     "negative time": {"observed_s": -1.0},
     "negative count": {"brakings": -1},
+    "negative variance": {"joint_covariance": triangle(NEGATIVE)},
+    "correlation above one": {"joint_covariance": triangle(TIED_TOO_MUCH)},
+    "covariance is no number": {"joint_covariance": triangle(NOT_FINITE)},
 }
 
 

@@ -29,7 +29,7 @@ from brakelab.bench.chart import write_chart
 from brakelab.bench.energy import energy_tables
 from brakelab.bench.friction import friction_tables
 from brakelab.bench.measure import NOT_INSTALLED, Figure, Row, machine
-from brakelab.bench.observers import Sample, Task, observer_rows, step_times, tasks
+from brakelab.bench.observers import WIDE, Sample, Task, observer_rows, step_times, tasks
 from brakelab.bench.observers_cases import configured
 from brakelab.bench.observers_picture import PICTURED, consistency_of, write_picture
 from brakelab.bench.observers_table import finite, observer_tables
@@ -49,7 +49,7 @@ from brakelab.bench.texts import (
     STOPS_TEXT,
 )
 from ecu import __version__
-from ecu.config import config_hash, load_config
+from ecu.config import Config, config_hash, load_config
 from ecu.errors import UserError
 from ecu.resources import resource
 
@@ -107,20 +107,21 @@ BENCHES: Final = {
 }
 
 
-def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0) -> int:
+def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0, draw: str = WIDE) -> int:
     """Run one bench, or without a name all that measure time; print tables, or JSON. Returns 0.
 
     In a checkout, a run of all times renews docs/benchmarks.md, `stops` docs/observer-accuracy.md,
     `observers` docs/observers.md, each other one the page of its name; that of `play` keeps the tables of
     other buses. `seeds`: how many cars `stops` and `observers` draw, `ablation` and `bound` at most;
+    `draw`: how far those of `stops` and `observers` differ from their file, pages are of the wide one;
     `seconds`: how long `lateness` drives and all players of `play` send.
 
     Raises:
         UserError: there is no such bench.
     """
     others: dict[str, Callable[[bool], int]] = {
-        STOPS: partial(_stops, seeds=seeds),
-        OBSERVERS: partial(_observers, seeds=seeds),
+        STOPS: partial(_stops, seeds=seeds, draw=draw),
+        OBSERVERS: partial(_observers, seeds=seeds, draw=draw),
         ABLATION: partial(_ablation, seeds=seeds),
         BOUND: partial(_bound, seeds=seeds),
         FRICTION: _friction,
@@ -151,7 +152,7 @@ def _times(name: str | None, json: bool) -> int:
     return 0
 
 
-def _stops(json: bool, seeds: int) -> int:
+def _stops(json: bool, seeds: int, draw: str) -> int:
     path = resource("config/suv.toml")
     config = load_config(path)
     console = Console(stderr=True)
@@ -163,8 +164,8 @@ def _stops(json: bool, seeds: int) -> int:
             results = pool.map(drive, cases)
             return track(results, "stops", len(cases), console=console, transient=True)
 
-        result = stops_bench.stops(config, seeds, spread=all_cores)
-    of = f"version {__version__}, config/{path.name} ({config_hash(config)[:12]}), seeds 0–{seeds - 1}"
+        result = stops_bench.stops(config, seeds, spread=all_cores, draw=draw)
+    of = _of(path.name, config, draw, seeds)
     if json:
         plain = {key: [_plain(row) for row in rows] for key, rows in result._asdict().items()}
         _print_json({"of": of, **plain})
@@ -172,13 +173,19 @@ def _stops(json: bool, seeds: int) -> int:
     tables = stop_tables(result, seeds)
     _print_tables(of, tables)
     text = f"`brake-ecu bench stops`, {of}. {STOPS_TEXT}"
-    _write("observer-accuracy.md", "Accuracy of the friction and of the compensation", text, tables)
+    if draw == WIDE:
+        _write("observer-accuracy.md", "Accuracy of the friction and of the compensation", text, tables)
     return 0
 
 
-def _observers(json: bool, seeds: int) -> int:
+def _of(name: str, config: Config, draw: str, seeds: int) -> str:
+    measured = f"version {__version__}, config/{name} ({config_hash(config)[:12]})"
+    return f"{measured}, {draw} draw, seeds 0–{seeds - 1}"
+
+
+def _observers(json: bool, seeds: int, draw: str) -> int:
     console = Console(stderr=True)
-    todo = tasks(seeds)
+    todo = tasks(seeds, draw)
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
 
         def all_cores(drive: Callable[[Task], list[Sample]], cars: list[Task]) -> Iterable[list[Sample]]:
@@ -187,13 +194,15 @@ def _observers(json: bool, seeds: int) -> int:
         rows = observer_rows(todo, all_cores)
         consistency = list(pool.map(consistency_of, range(min(seeds, PICTURED))))
     times = step_times()
-    of = f"version {__version__}, config/suv.toml ({config_hash(configured())[:12]}), seeds 0–{seeds - 1}"
+    of = _of("suv.toml", configured(), draw, seeds)
     if json:
         plain = {name: value._asdict() for name, value in times.items()}
         _print_json(finite({"of": of, "rows": [_plain(row) for row in rows], "step_us": plain}))
         return 0
-    tables = observer_tables(rows, times, consistency)
+    tables = observer_tables(rows, times, consistency, draw)
     _print_tables(of, tables)
+    if draw != WIDE:
+        return 0
     text = f"`brake-ecu bench observers`, {of}. {machine()}. {OBSERVERS_TEXT}"
     _write("observers.md", "The observers beside their goals", text, tables)
     write_picture(resource("docs") / "images" / "observers.svg", consistency)

@@ -19,6 +19,7 @@ from brakelab.bench.observers_cases import (
     CASES,
     EVENTS,
     ROBUSTNESS,
+    SENSORS,
     WRONG_START,
     Case,
     Setup,
@@ -30,6 +31,7 @@ from brakelab.bench.stops import AXLES, LOWEST_SPEED, Vector, columns, friction_
 from brakelab.closed_loop import Drive, new_loop, run
 from brakelab.observer import with_observer
 from brakelab.replay.signal_file import freshness_at_any_rate
+from brakelab.scenario import with_draw
 from ecu.config import new_params
 from ecu.diagnostics.store import out_of_range
 from ecu.params import OBSERVERS
@@ -41,6 +43,7 @@ SEEDS: Final = 20
 ROBUST_SHARE: Final = 4
 """Robustness is judged with one car out of so many: each disturbance has ten minutes of its own."""
 JOINT: Final = OBSERVERS[0]
+WIDE: Final = "wide"
 ORDINARY: Final = "ordinary"
 FILLED: Final = 2.0  # bar: the brakes are on
 ON_FOR: Final = 80  # cycles
@@ -56,6 +59,8 @@ class Task(NamedTuple):
     observer: str
     seed: int
     cases: tuple[str, ...]
+    draw: str = WIDE
+    """How far the cars differ from their file."""
 
 
 class Sample(NamedTuple):
@@ -107,8 +112,9 @@ def drive_car(
     return run(loop), sides.state["learned"].copy()
 
 
-def _setup(case: Case, seed: int) -> Setup:
-    return case.change(Setup(case.scenario, configured()), 1.0 if seed % 2 == 0 else -1.0)
+def _setup(case: Case, task: Task) -> Setup:
+    sign = 1.0 if task.seed % 2 == 0 else -1.0
+    return case.change(Setup(with_draw(case.scenario, task.draw), configured()), sign)
 
 
 def _ordinary(case: Case, task: Task) -> RecordArray | None:
@@ -119,7 +125,7 @@ def _ordinary(case: Case, task: Task) -> RecordArray | None:
     ordinary = Case(shipped(ORDINARY).model_copy(update={"plant": case.scenario.plant}))
     if case.lasting:
         ordinary = ordinary._replace(change=case.change)
-    setup = _setup(ordinary, task.seed)
+    setup = _setup(ordinary, task)
     _, learned = drive_car(setup, task.observer, task.seed)
     return None if out_of_range(learned, new_params(setup.config)["mu_nominal"][0]) else learned
 
@@ -170,7 +176,7 @@ def _event(name: str, drive: Drive) -> tuple[float, float]:
 
 
 def _sample(name: str, task: Task, driven_in: bool, learned: RecordArray | None) -> Sample:
-    setup = _setup(CASES[name], task.seed)
+    setup = _setup(CASES[name], task)
     drive, _ = drive_car(setup, task.observer, task.seed, learned)
     rows, config = counted(drive), setup.config
     front = friction_errors(drive, rows, "front", config.front.mu_nominal)
@@ -197,14 +203,16 @@ def drive_task(task: Task) -> list[Sample]:
     return samples
 
 
-def tasks(seeds: int) -> list[Task]:
+def tasks(seeds: int, draw: str = WIDE) -> list[Task]:
     """Return all there is to do with cars 0 to `seeds` - 1, the longest first."""
-    passing = tuple(name for name, case in ROBUSTNESS.items() if not case.lasting)
-    lasting = tuple(name for name, case in ROBUSTNESS.items() if case.lasting)
+    few = ROBUSTNESS | SENSORS
+    passing = tuple(name for name, case in few.items() if not case.lasting)
+    lasting = tuple(name for name, case in few.items() if case.lasting)
     robust = range(max(seeds // ROBUST_SHARE, 1))
-    alone = [Task(JOINT, seed, lasting) for seed in robust]
+    alone = [Task(JOINT, seed, lasting, draw) for seed in robust]
+    common = (*ACCURACY, *EVENTS)
     return alone + [
-        Task(observer, seed, (*ACCURACY, *EVENTS, *(passing if observer == JOINT and seed in robust else ())))
+        Task(observer, seed, (*common, *(passing if observer == JOINT and seed in robust else ())), draw)
         for observer in OBSERVERS
         for seed in range(seeds)
     ]

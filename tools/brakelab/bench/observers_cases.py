@@ -1,15 +1,16 @@
 """What the observers are judged by: drives with goals, and what may be wrong about car, sensors or road.
 
 A goal is the nRMSE [%] of front and rear friction that the joint observer should not exceed: `cold` with
-nominal configuration and nothing learned, `driven_in` after `config/scenarios/ordinary.toml`. A disturbance
-whose sign can be either has that of its car: odd seeds are below, even ones above.
+nominal configuration and nothing learned, `driven_in` after `config/scenarios/ordinary.toml`. Those of
+`NOMINAL` are for cars of the nominal draw. A disturbance whose sign can be either has that of its car: odd
+seeds are below, even ones above.
 """
 
 from collections.abc import Callable
 from functools import cache
 from typing import Any, Final, NamedTuple
 
-from brakelab.plant.sensor_errors import SensorErrors
+from brakelab.plant.sensor_errors import ABSENT, SensorErrors
 from brakelab.scenario import Phase, RoadByPlace, Scenario, SteeringFile, load_scenario
 from ecu.config import Config, load_config
 from ecu.resources import resource
@@ -20,6 +21,7 @@ EVERY_SENSOR: Final = (
     *("wheel_speed", "calliper_pressure", "motor_torque", "steering_angle"),
 )
 GAP, BETWEEN_GAPS = 0.180, 2.0  # s, means
+LASTING: Final = 0.5  # s, of a motor torque's error that is not white
 LOST_IN_GAPS: Final = GAP / (GAP + BETWEEN_GAPS)
 SLOW_PERIODS: Final = dict.fromkeys(("accel_x", "accel_y", "yaw_rate", "wheel_speed"), 1.0 / 66.0)
 """s; the other sensors have 33 Hz."""
@@ -64,6 +66,8 @@ class Case(NamedTuple):
     change: Change = _as_is
     lasting: bool = False
     """The change is there in ordinary driving too."""
+    beside: str = ""
+    """The case whose errors it may exceed by a quarter."""
 
 
 @cache
@@ -88,15 +92,18 @@ def _accuracy() -> dict[str, Case]:
     cases = {
         f"stop #{test}": Case(shipped(f"stop-{test}"), cold, driven_in, thesis)
         for test, cold, driven_in, thesis in (
-            (1, (2.4, 3.6), (0.8, 0.9), "4.74/7.23"),
-            (2, (1.7, 3.5), (1.2, 1.2), "3.34/6.96"),
-            (3, (2.3, 4.3), (0.9, 1.0), "4.55/8.51"),
-            (4, (1.6, 3.9), (1.5, 1.5), "3.13/7.87"),
+            (1, (2.5, 4.0), (1.3, 1.8), "4.74/7.23"),
+            (2, (2.5, 4.0), (1.3, 1.8), "3.34/6.96"),
+            (3, (2.5, 4.0), (1.3, 1.8), "4.55/8.51"),
+            (4, (2.5, 4.0), (1.3, 1.8), "3.13/7.87"),
         )
     }
     for decel in (0.7, 1.0, 1.3, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0):
         cold = (4.0, 4.0) if decel >= 1.0 else None
-        cases[f"{decel:g} m/s²"] = Case(_stop(decel=decel), cold, (2.0, 2.0))
+        reached = 3.0 if decel <= 2.0 else 2.0
+        cases[f"{decel:g} m/s²"] = Case(_stop(decel=decel), cold, (reached, reached))
+    slippery = _stop(decel=5.6).model_copy(update={"road_friction": [(0.0, 0.7)]})
+    cases["5.6 m/s² where 0.7 holds"] = Case(slippery, (2.5, 3.3), (2.0, 2.5))
     for percent, cold, reached, thesis in (
         (20, (5.4, 8.2), 1.2, "5.42/8.16"),
         (40, (8.3, 11.3), 1.2, "8.27/11.33"),
@@ -106,7 +113,8 @@ def _accuracy() -> dict[str, Case]:
         name = f"blending {percent / 100:g}"
         cases[name] = Case(shipped(f"blending-{percent}"), cold, (reached, reached), thesis)
     for pedal, thesis in ((20.0, "8.84/22.44"), (28.0, "7.35/15.88"), (48.0, "3.75/10.11")):
-        cases[f"pedal {pedal:g} %"] = Case(_stop(pedal=pedal), (4.0, 7.0), (2.0, 2.0), thesis)
+        reached = 3.0 if pedal < 40.0 else 2.0
+        cases[f"pedal {pedal:g} %"] = Case(_stop(pedal=pedal), (4.0, 7.0), (reached, reached), thesis)
     cases["fade"] = Case(shipped("fade"), (3.0, 5.0), (1.5, 1.5), "3.8–9.6/4.7–22")
     return cases
 
@@ -192,7 +200,7 @@ def _robustness() -> dict[str, Case]:
             setup, road=RoadByPlace(friction=[(0.0, 1.0, 1.0), (230.0, 1.0, 1.0), (230.1, 0.5, 1.0)])
         ),
     }
-    twice = (1.6, 1.8)
+    twice = (2.6, 3.6)
     cases = {name: Case(stop, None, twice, change=change) for name, change in passing.items()}
     cases |= {name: Case(stop, None, twice, change=change, lasting=True) for name, change in lasting.items()}
     curve = shipped("curve")
@@ -205,8 +213,78 @@ def _robustness() -> dict[str, Case]:
     return cases
 
 
+def _after_cruise(seconds: float, grade: float, motor_torque: SensorErrors) -> Scenario:
+    """Return a stop of 4 m/s² after a cruise at 100 km/h."""
+    stop = _stop(decel=4.0)
+    cruise = stop.phase[0].model_copy(update={"seconds": seconds})
+    sensor = stop.sensor | {"motor_torque": motor_torque}
+    changed = {"phase": [cruise, stop.phase[1]], "grade": [(0.0, grade)], "sensor": sensor}
+    return stop.model_copy(update=changed)
+
+
+def _sensors() -> dict[str, Case]:
+    """Return cases with sensors as cars have them, each after the case that it is compared with."""
+    quiet = SensorErrors(noise=0.0)
+    lasting = SensorErrors(noise=0.0, drift=10.0 * (2.0 / LASTING) ** 0.5, drift_time=LASTING)
+    cases = {}
+    for road, grade in (("level road", 0.0), ("5 % climb", 0.05)):
+        base = f"a minute on a {road}, no noise"
+        cases[base] = Case(_after_cruise(60.0, grade, quiet))
+        for noise in (3.0, 20.0):
+            name = f"a minute on a {road}, {noise:g} N m"
+            cases[name] = Case(_after_cruise(60.0, grade, SensorErrors(noise=noise)), beside=base)
+        cases[f"a minute on a {road}, 10 N m that last {LASTING:g} s"] = Case(
+            _after_cruise(60.0, grade, lasting), beside=base
+        )
+    cases["an hour, 10 N m"] = Case(
+        _after_cruise(3600.0, 0.0, SensorErrors(noise=10.0)), beside="a minute on a level road, no noise"
+    )
+    floored = _sensing(lambda sign: {"calliper_pressure": SensorErrors(floor=0.0)})
+    for decel in (1.0, 4.0):
+        base = f"{decel:g} m/s², every signal"
+        cases[base] = Case(_stop(decel=decel))
+        name = f"{decel:g} m/s², no pressure below zero"
+        cases[name] = Case(_stop(decel=decel), change=floored, lasting=True, beside=base)
+    lacking: dict[str, Change] = {
+        "no yaw rate, no steering angle": _sensing(
+            lambda sign: dict.fromkeys(("yaw_rate", "steering_angle"), ABSENT)
+        ),
+        "accelerometer at 10 Hz": _sensing(lambda sign: {"accel_x": SensorErrors(period=0.1)}),
+        "pressures at 20 Hz": _sensing(lambda sign: {"calliper_pressure": SensorErrors(period=0.05)}),
+        "motor torque not told": _sensing(lambda sign: {"motor_torque": ABSENT}),
+    }
+    for name, change in lacking.items():
+        at_any_rate = _at_any_rate(change)
+        cases[name] = Case(_stop(decel=4.0), change=at_any_rate, lasting=True, beside=base)
+    return cases
+
+
+def _at_any_rate(change: Change) -> Change:
+    return lambda setup, sign: change(setup, sign)._replace(any_rate=True)
+
+
 ACCURACY: Final = _accuracy()
 ROBUSTNESS: Final = _robustness()
+SENSORS: Final = _sensors()
+NOMINAL: Final[dict[str, tuple[Goal, Goal]]] = {
+    "stop #1": ((2.4, 3.6), (0.8, 0.9)),
+    "stop #2": ((1.7, 3.5), (1.2, 1.2)),
+    "stop #3": ((2.3, 4.3), (0.9, 1.0)),
+    "stop #4": ((1.6, 3.9), (1.5, 1.5)),
+}
+"""Goals, cold and driven in, of cases that cars of the nominal draw should do better."""
+
+
+def goals(name: str, draw: str) -> tuple[Goal | None, Goal | None]:
+    """Return the goals of a case, cold and driven in, for cars drawn so."""
+    case = CASES[name]
+    if draw != "nominal":
+        return case.cold, case.driven_in
+    if name in ROBUSTNESS:
+        return case.cold, (1.6, 1.8)
+    return NOMINAL.get(name, (case.cold, case.driven_in))
+
+
 WRONG_START: Final = "linings 25 % off"
 
 
@@ -227,4 +305,4 @@ EVENTS: Final = {
 """Drives of which times are told."""
 LONGEST: Final = {"tyre stiffness × 0.67": 0.10, "low-grip patch": 0.30}
 """How long their events may be felt [s]: as in the thesis, read off Figures 4.11 and 5.5."""
-CASES: Final = ACCURACY | ROBUSTNESS | EVENTS
+CASES: Final = ACCURACY | ROBUSTNESS | SENSORS | EVENTS

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from brakelab.bench.measure import Figure, figure
 from brakelab.closed_loop import Drive, Loop, new_loop, run
-from brakelab.scenario import load_scenario
+from brakelab.scenario import Scenario, load_scenario, with_draw
 from ecu.config import Config
 from ecu.resources import resource
 from ecu.signals import CORNERS
@@ -78,11 +78,8 @@ class _Stop(NamedTuple):
     decel: Vector
 
 
-def _brake(test: int, speed_known: bool, config: Config, seed: int, ideal: bool = False) -> _Stop:
-    scenario = load_scenario(resource(f"config/scenarios/stop-{test}.toml"))
-    loop = new_loop(
-        scenario.model_copy(update={"vehicle_speed": "ideal" if speed_known else "none"}), config, seed
-    )
+def _brake(scenario: Scenario, config: Config, seed: int, ideal: bool = False) -> _Stop:
+    loop = new_loop(scenario, config, seed)
     drive = run(loop, ideal)
     return _Stop(drive, achieved_decel(loop, drive))
 
@@ -146,11 +143,11 @@ class _Seed(NamedTuple):
     compensation: tuple[float, float, float, float]
 
 
-def _one_car(test: int, speed_known: bool, config: Config, seed: int) -> _Seed:
+def _one_car(scenario: Scenario, config: Config, seed: int) -> _Seed:
     plain = config.model_copy(update={"control": config.control.model_copy(update={"compensation": "off"})})
-    ours = _brake(test, speed_known, config, seed)
-    uncompensated = _brake(test, speed_known, plain, seed)
-    ideal = _brake(test, speed_known, config, seed, ideal=True)
+    ours = _brake(scenario, config, seed)
+    uncompensated = _brake(scenario, plain, seed)
+    ideal = _brake(scenario, config, seed, ideal=True)
     nominal = {"front": config.front.mu_nominal, "rear": config.rear.mu_nominal}
     rows = window(ours.drive)
     return _Seed(
@@ -169,10 +166,12 @@ Named = tuple[bool, int]
 Result = tuple[list[Friction], Compensation]
 
 
-def case_result(config: Config, seeds: int, case: Named) -> Result:
+def case_result(config: Config, seeds: int, draw: str, case: Named) -> Result:
     """Drive one test with cars 0 to `seeds` - 1; figures are median, least and greatest over them."""
     speed_known, test = case
-    cars = [_one_car(test, speed_known, config, seed) for seed in range(seeds)]
+    stop = with_draw(load_scenario(resource(f"config/scenarios/stop-{test}.toml")), draw)
+    scenario = stop.model_copy(update={"vehicle_speed": "ideal" if speed_known else "none"})
+    cars = [_one_car(scenario, config, seed) for seed in range(seeds)]
     friction = []
     for axle in AXLES:
         errors, inside, nominal = zip(*(car.friction[axle] for car in cars), strict=True)
@@ -188,11 +187,17 @@ Spread = Callable[[Case, list[Named]], Iterable[Result]]
 """As `map` does it: results in the order of the cases, which may be driven side by side."""
 
 
-def stops(config: Config, seeds: int = SEEDS, tests: tuple[int, ...] = TESTS, spread: Spread = map) -> Stops:
+def stops(
+    config: Config,
+    seeds: int = SEEDS,
+    tests: tuple[int, ...] = TESTS,
+    spread: Spread = map,
+    draw: str = "wide",
+) -> Stops:
     """Drive all tests with and without `vehicle_speed` and return their results."""
     result = Stops([], [])
     for friction, compensation in spread(
-        partial(case_result, config, seeds), list(product((True, False), tests))
+        partial(case_result, config, seeds, draw), list(product((True, False), tests))
     ):
         result.friction.extend(friction)
         result.compensation.append(compensation)

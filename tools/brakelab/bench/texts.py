@@ -12,7 +12,7 @@ STOPS_TEXT: Final = (
 )
 
 OBSERVERS_TEXT: Final = (
-    "Cars are drawn per seed from config/plant/suv.toml, sensors have the noise of Table 4.1. Cold: the "
+    "Cars and their sensors are drawn per seed about config/plant/suv.toml and Table 4.1. Cold: the "
     "configuration as it is, nothing learned. Driven in: after ten minutes of "
     "config/scenarios/ordinary.toml in the same car, with what the state store keeps of them. Every "
     "observer closes the loop itself; figures stand for front/rear. Counted while the brakes of both axles "

@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Sequence
 from contextlib import closing
+from itertools import chain
 from pathlib import Path
 from typing import Final
 
@@ -15,7 +16,7 @@ from brakelab.outputs import check_outputs
 from brakelab.replay.drive import replay_drive
 from brakelab.replay.formats import kind_of
 from brakelab.replay.log import log_hash, log_size
-from brakelab.replay.needed import NEEDED, fault_lines, needed_lines, nothing_usable
+from brakelab.replay.needed import NEEDED, fault_lines, lacking_line, needed_lines, nothing_usable
 from brakelab.replay.prediction import SHORT
 from brakelab.replay.progress import progress_bar
 from brakelab.replay.quality import Findings, quality_counts, quality_lines
@@ -129,7 +130,8 @@ def _tell(
     writer: ResultWriter, findings: Sequence[Findings], plan: ReceivePlan, nominal: Sequence[float]
 ) -> None:
     for found in findings:
-        for line in (*quality_lines(found, plan), *needed_lines(found), *fault_lines(found)):
+        about = (quality_lines(found, plan), needed_lines(found), lacking_line(found), fault_lines(found))
+        for line in chain.from_iterable(about):
             print(line, file=sys.stderr)
     console = Console()
     if not console.is_terminal:

@@ -1,5 +1,5 @@
-"""What became of the inputs that the ECU needs: one line for each group that was of no use, and for the
-faults that lasted most of a drive.
+"""What became of the inputs that the ECU needs: one line for each group that was of no use, one that says
+what those cost that a log does not have, and one for the faults that lasted most of a drive.
 """
 
 from collections.abc import Sequence
@@ -12,12 +12,17 @@ from ecu.diagnostics.faults import DEGRADING, FAULTS, REQUEST_LOST
 from ecu.records import RecordArray
 from ecu.signals import (
     ACCEL_X,
+    ACCEL_Y,
     CALLIPER_PRESSURE,
     CYCLE_NS,
     DECEL_DEMAND,
     INPUT_SIGNALS,
+    MOTOR_TORQUE,
     PEDAL_POSITION,
+    STEERING_ANGLE,
+    VEHICLE_SPEED,
     WHEEL_SPEED,
+    YAW_RATE,
 )
 
 
@@ -36,6 +41,20 @@ NEEDED: Final = (
     Group("calliper_pressure_*", tuple(range(CALLIPER_PRESSURE, CALLIPER_PRESSURE + 4))),
     Group("pedal_position, decel_demand", (PEDAL_POSITION, DECEL_DEMAND), alternatives=True),
 )
+HELPFUL: Final = (
+    (
+        Group("vehicle_speed", (VEHICLE_SPEED,)),
+        "the wheels alone tell the speed: wider sigma where all slip",
+    ),
+    (
+        Group("motor_torque_*", tuple(range(MOTOR_TORQUE, MOTOR_TORQUE + 4))),
+        "mass stays as configured, an engine's drag widens sigma",
+    ),
+    (Group("accel_y", (ACCEL_Y,)), "lateral load transfer by yaw rate and speed"),
+    (Group("yaw_rate", (YAW_RATE,)), "yaw rate by lateral acceleration and speed"),
+    (Group("steering_angle", (STEERING_ANGLE,)), "cornering forces of the front axle are not told apart"),
+)
+"""Inputs that a car may lack, and what is known less well without them."""
 MOST: Final = 0.5
 """Share of the samples, or of the drive, from which on it is told."""
 
@@ -56,6 +75,18 @@ def needed_lines(found: Findings) -> list[str]:
             names = group.name if len(shown) == len(group.places) else _names(shown)
             lines.append(f"{found.path}: {names}: {_share(found.freshness, shown)}{cause}")
     return lines
+
+
+def lacking_line(found: Findings) -> list[str]:
+    """Return one line that names the helpful inputs that this log does not have, and what each costs."""
+    if found.freshness is None:
+        return []
+    lacking = [
+        f"{group.name} ({cost})"
+        for group, cost in HELPFUL
+        if not found.freshness["taken"][list(group.places)].any()
+    ]
+    return [f"{found.path}: without {'; '.join(lacking)}"] if lacking else []
 
 
 def nothing_usable(logs: Sequence[Findings]) -> bool:
