@@ -18,7 +18,7 @@ from brakelab.bench.blending import (
 )
 from brakelab.closed_loop import Drive, new_loop, run
 from brakelab.rig.faults import Fault
-from brakelab.scenario import Phase, Scenario
+from brakelab.scenario import Phase, Scenario, with_draw
 from ecu.config import load_config
 from ecu.diagnostics.faults import MOTOR_SHORT
 from ecu.resources import resource
@@ -31,7 +31,8 @@ MUTE = Fault(kind="lost", t=LOSS, message=["MotorFront", "MotorRear"])
 
 
 def drive(scenario: Scenario, share: float, seed: int = 0, armed: bool = True) -> Drive:
-    return run(new_loop(scenario, blended(share), seed, armed), ideal=True)
+    """Brakes are as described: what is left of the error is that of blending."""
+    return run(new_loop(with_draw(scenario, "nominal"), blended(share), seed, armed), ideal=True)
 
 
 def faulty(*faults: Fault) -> Scenario:

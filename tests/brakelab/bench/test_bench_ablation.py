@@ -16,6 +16,7 @@ from brakelab.bench.ablation import (
 from brakelab.bench.observers import counted
 from brakelab.bench.observers_cases import configured, shipped
 from brakelab.bench.stops import AXLES, estimate_errors
+from brakelab.scenario import with_draw
 from ecu.config import new_params
 from ecu.estimation.joint.layout import LEVEL, MASS, RATIO
 from ecu.estimation.joint.learned import KEPT
@@ -23,7 +24,7 @@ from ecu.estimation.joint.prior import LEVEL_AXLE, LEVEL_COMMON, LEVEL_WHEEL, PR
 from ecu.records import LEARNED, RecordArray, new_record
 from ecu.step import new_state
 
-STOP = shipped("stop-1")
+STOP = with_draw(shipped("stop-1"), "nominal")
 
 
 def _learned() -> RecordArray:

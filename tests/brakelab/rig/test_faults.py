@@ -84,6 +84,7 @@ def test_frames_beyond_what_can_be_held_up_are_lost_not_written_elsewhere() -> N
 # A braking from 20 m/s; faults act from 2.0 s on.
 STOP = """
 plant = "suv"
+draw = "nominal"
 initial_speed = 20.0
 {keys}
 [[phase]]
