@@ -85,6 +85,7 @@ LEARNED: Final = np.dtype(
         ("joint", "f8", (N_JOINT,)),  # the joint observer's states, see its layout
         ("joint_covariance", "f8", (N_KEPT * (N_KEPT + 1) // 2,)),  # of those kept: lower triangle by rows
         ("joint_known", "u1"),  # 0: nothing learned yet
+        ("spare", "u1", (7,)),  # a gap would be left undefined by copies, and the bytes are compared
         ("disc_excess", "f8", (4,)),  # most that the last braking left the disc above the air [K]
         ("brakings", "i8"),  # brake applications since the record was first made
     ],

@@ -6,10 +6,11 @@
     p* = p_push + (p_0,dem - p_push) / (1 + e)                         what they approximate: "inverse"
 
 Corrected: the printed form scales the push-out pressure too, and takes T_b where the motors brake as well;
-T is what the lining shall give (5.4). The second order leaves e^3 of torque, 2.7 % at the limit; "off" takes
-nominal friction always. The base changes between applications only, so a noisy estimate divides nothing. The
-friction used moves at most `FRICTION_RATE` a second: the loop through estimator and hydraulics (26 ms dead
-time) stays slow against both. Where a pressure cannot be had it does not fall on: no more would come of it.
+T is what the lining shall give (5.4). The second order leaves e^3 of torque, 2.7 % at the limit, and beyond
+it would turn back; the inverse has no such limit. "off" takes nominal friction always. The base changes
+between applications only, so a noisy estimate divides nothing. The friction used moves at most
+`FRICTION_RATE` a second: the loop through estimator and hydraulics (26 ms dead time) stays slow against both.
+Where a pressure cannot be had it does not fall on: no more would come of it.
 
 Many linings rub harder as speed falls and begin the next braking lower again (assumption; those of the
 simulated car's rear by a sixth). So the base is the learned friction times what the last braking began with
@@ -60,9 +61,10 @@ def pressure_for_torque(params: Record, torque: float, mu: float, corner: int) -
 
 @kernel
 def follow_friction(params: Record, state: Record, friction: Record, learned: Record, dt: float) -> None:
-    """Move the friction in use towards the estimate, within +-30 % of what is learned now.
+    """Move the friction in use towards the estimate, within what friction can be.
 
-    While it still is what the last braking ended with, and that braking began with another, it waits.
+    An estimate above the base counts only as far as it is sure: rather too hard a braking than too weak a
+    one. While it still is what the last braking ended with, and that braking began with another, it waits.
     """
     if params.compensation == OFF:
         return
@@ -118,7 +120,7 @@ def compensated_pressure(params: Record, state: Record, pressure: float, corner:
     if params.compensation == INVERSE or math.isfinite(state.mu_override[corner]):
         factor = base / used
     else:
-        e = (used - base) / base
+        e = min(max((used - base) / base, -GREATEST_CHANGE), GREATEST_CHANGE)
         factor = 1.0 - e + e * e
     push_out: float = min(params.push_out_pressure[corner], pressure)
     compensated: float = push_out + (pressure - push_out) * factor

@@ -16,7 +16,7 @@ from brakelab.closed_loop import (
     simulate,
 )
 from brakelab.replay.engine import new_ecu, run_frames
-from brakelab.scenario import Scenario, load_scenario
+from brakelab.scenario import Scenario, load_scenario, with_draw
 from ecu.bus.receive import new_reception
 from ecu.config import Config, load_config, new_params
 from ecu.errors import UserError
@@ -91,7 +91,8 @@ def test_frames_arrive_in_order_and_before_their_cycle(stop: Drive) -> None:
     assert stamps[0] == START_NS  # the time grid of a replay starts with the first frame
 
 
-def test_inputs_are_the_truth_with_noise_quantised(stop: Drive) -> None:
+def test_inputs_are_the_truth_with_noise_quantised(config: Config) -> None:
+    stop = run(new_loop(with_draw(scenario("stop-1"), "nominal"), config, 3))
     moving = stop.truth["vehicle_speed"] > 5.0
     error = (stop.inputs["wheel_speed_fl"] - stop.truth["wheel_speed_fl"])[moving]
     assert np.nanstd(error) == pytest.approx(0.1, rel=0.1)

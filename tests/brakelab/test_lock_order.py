@@ -26,7 +26,7 @@ def lock_times(road: float, speed: float, ramp: float, seed: int, watched: bool)
         {"kind": "brake", "decel": 10.0, "ramp": ramp, "seconds": 2.5},
     ]
     scenario = Scenario.model_validate(
-        {"plant": "suv", "initial_speed": speed, "road_friction": road, "phase": phases}
+        {"plant": "suv", "draw": "nominal", "initial_speed": speed, "road_friction": road, "phase": phases}
     )
     config = load_config(CONFIG / "suv.toml")
     control = config.control.model_copy(update={"compensation": "off", "slip_guard": False})

@@ -37,7 +37,9 @@ def drive(config: Config) -> Callable[..., Drive]:
     def driven(seed: int = 1, vehicle_speed: str = "ideal", **sensor: dict[str, Any]) -> Drive:
         errors = {name: SensorErrors(**given) for name, given in sensor.items()}
         scenario = load_scenario(CONFIG / "scenarios" / "stop-2.toml")
-        scenario = scenario.model_copy(update={"vehicle_speed": vehicle_speed, "sensor": errors})
+        scenario = scenario.model_copy(
+            update={"vehicle_speed": vehicle_speed, "sensor": errors, "draw": "nominal"}
+        )
         loop = new_loop(scenario, config, seed)
         found = run(loop)
         totals = loop.sides.ecu_reception.totals[0]

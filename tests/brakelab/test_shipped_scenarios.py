@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from brakelab.closed_loop import Drive, new_loop, run
-from brakelab.scenario import LONGEST, load_scenario
+from brakelab.scenario import LONGEST, load_scenario, with_draw
 from ecu.config import load_config
 from ecu.signals import CORNERS
 
@@ -84,7 +84,9 @@ FACTS = {
 def driven(name: str, armed: bool = True) -> Drive:
     """Return the drive of one car, cut after CUT where it is long; unarmed the hydraulics brake alone."""
     scenario, config = load_scenario(CONFIG / "scenarios" / f"{name}.toml"), load_config(CONFIG / "suv.toml")
-    return run(new_loop(scenario, config, 1, armed), seconds=LONGEST if name in WHOLE else CUT)
+    return run(
+        new_loop(with_draw(scenario, "nominal"), config, 1, armed), seconds=LONGEST if name in WHOLE else CUT
+    )
 
 
 def braking(drive: Drive) -> ROWS:

@@ -40,7 +40,7 @@ def test_the_prescribed_performance_is_reached(name: str) -> None:
         assert way <= prescribed
         assert mean >= DECEL
         assert slip > -0.9, "above 15 km/h no wheel may lock"
-        assert np.abs(drive.inputs["motor_torque_fl"][drive.t > 2.2]).max() < 1.0, "disconnected"
+        assert np.abs(drive.truth["motor_torque_fl"][drive.t > 2.2]).max() < 1.0, "disconnected"
 
 
 def test_the_measure_is_that_of_a_constant_deceleration() -> None:

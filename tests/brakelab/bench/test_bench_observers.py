@@ -162,7 +162,7 @@ def _pages(samples: list[Sample]) -> dict[str, dict[str, tuple[str, ...]]]:
     found = observer_rows([Task(JOINT, 0, ())], lambda drive, todo: [samples])
     half = np.array([0.0, 1.0])
     car = Consistency((half, half), (np.zeros((2, 2)),) * 2, (np.ones((5, 2)),) * 2)
-    tables = observer_tables(found, {JOINT: Figure(2.0, 1.0, 3.0)}, [car])
+    tables = observer_tables(found, {JOINT: Figure(2.0, 1.0, 3.0)}, [car], "nominal")
     return {table.title.split(":")[0]: {line[0]: line for line in table.rows} for table in tables}
 
 
@@ -200,7 +200,7 @@ def test_page_and_picture(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> No
     t = np.linspace(0.0, 6.0, 100)
     car = Consistency((t, t), (np.full((2, 100), 0.5),) * 2, (np.ones((5, 20)),) * 2)
     monkeypatch.setattr(command, "resource", lambda name: tmp_path / name)
-    monkeypatch.setattr(command, "tasks", lambda seeds: [])
+    monkeypatch.setattr(command, "tasks", lambda seeds, draw: [])
     found = observer_rows([Task(JOINT, 0, ())], lambda drive, todo: [_samples(1.0)])
     monkeypatch.setattr(command, "observer_rows", lambda todo, spread: found)
     monkeypatch.setattr(command, "ProcessPoolExecutor", lambda mp_context: ThreadPoolExecutor())
@@ -209,7 +209,7 @@ def test_page_and_picture(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> No
     assert command.bench("observers", json=False, seeds=1) == 0
     page = (tmp_path / "docs" / "observers.md").read_text(encoding="utf-8")
     assert "seeds 0–0" in page
-    for table in observer_tables(found, {JOINT: Figure(2.0, 1.0, 3.0)}, [car]):
+    for table in observer_tables(found, {JOINT: Figure(2.0, 1.0, 3.0)}, [car], "wide"):
         assert markdown(table).rstrip() in page
     picture = (tmp_path / "docs" / "images" / "observers.svg").read_text(encoding="utf-8")
     middle = TOP + 0.5 * HEIGHT

@@ -16,7 +16,7 @@ from ecu.resources import resource
 
 @pytest.fixture(scope="module")
 def result() -> Stops:
-    return stops(load_config(resource("config/suv.toml")), seeds=2, tests=(1,))
+    return stops(load_config(resource("config/suv.toml")), seeds=2, tests=(1,), draw="nominal")
 
 
 def test_every_axle_with_and_without_vehicle_speed(result: Stops) -> None:
@@ -77,7 +77,7 @@ def test_page_names_config_seeds_and_every_figure(
     (tmp_path / "config").mkdir()
     (tmp_path / "config" / "suv.toml").write_bytes(resource("config/suv.toml").read_bytes())
     monkeypatch.setattr(command, "resource", lambda name: tmp_path / name)
-    monkeypatch.setattr(command.stops_bench, "stops", lambda config, seeds, spread: result)
+    monkeypatch.setattr(command.stops_bench, "stops", lambda config, seeds, spread, draw: result)
     assert command.bench("stops", json=False, seeds=20) == 0
     page = (tmp_path / "docs" / "observer-accuracy.md").read_text(encoding="utf-8")
     assert "config/suv.toml" in page

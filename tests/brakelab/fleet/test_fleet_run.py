@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 from distributed import Client
 
+from brakelab.fleet import cluster
 from brakelab.fleet.cluster import connect
 from brakelab.fleet.job import Job, Outcome, metadata_of
 from brakelab.fleet.manifest import Drive
@@ -141,7 +142,8 @@ def test_a_drive_that_kills_its_workers_fails_alone(client: Client, tmp_path: Pa
     assert learned(chains[0]) == ["1 3 "]
 
 
-def test_a_scheduler_that_is_not_there_is_one_line() -> None:
+def test_a_scheduler_that_is_not_there_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster, "TIMEOUT_S", 0.5)
     with (
         pytest.raises(UserError, match=r"--scheduler: .*no Dask scheduler answers"),
         connect("tcp://127.0.0.1:9", 1),

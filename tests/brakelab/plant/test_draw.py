@@ -1,7 +1,8 @@
-"""Drawn cars: how far they spread, what stays, and that a seed is a car."""
+"""Drawn cars: each width of the file is its quantity's spread, what stays, and that a seed is a car."""
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,66 +13,171 @@ from brakelab.plant.draw import Widths, draw, draw_sensors, load_widths
 from brakelab.plant.sensor_errors import STANDARD
 
 DRAW = Path(__file__).parents[3] / "config" / "plant" / "draw.toml"
-SEEDS = range(80)
+SEEDS, MANY = range(80), range(300)
 WIDE, NOMINAL = load_widths(DRAW, "wide"), load_widths(DRAW, "nominal")
 
-Column = Callable[[NDArray[np.void]], NDArray[np.float64]]
+Quantity = Callable[[NDArray[np.void], Any], NDArray[np.float64]]
 
 
-def field(name: str, *place: int) -> Column:
-    return lambda cars: np.asarray(cars[name][(slice(None), *place)])
+def relative(name: str, *place: int | list[int]) -> Quantity:
+    """Return what makes of cars and the car as described how far they are off, a column for each draw."""
+
+    def off(cars: NDArray[np.void], base: Any) -> NDArray[np.float64]:
+        away = cars[name] / base[name] - 1.0
+        return np.asarray(away[(slice(None), *place)]).reshape(len(cars), -1)
+
+    return off
 
 
-def rear_over_front(cars: NDArray[np.void]) -> NDArray[np.float64]:
-    return np.asarray(cars["slip_stiffness"][:, 2] / cars["slip_stiffness"][:, 0])
+def moved(cars: NDArray[np.void], base: Any) -> NDArray[np.float64]:
+    """The wheelbase stays."""
+    front = cars["front_length"] - base["front_length"]
+    np.testing.assert_allclose(front, base["rear_length"] - cars["rear_length"], atol=1e-12)
+    return np.asarray(front).reshape(-1, 1)
 
 
-def drawn(plant: Plant, width: Widths, column: Column) -> NDArray[np.float64]:
-    """Return a quantity of every drawn car over that of the car as described."""
-    cars = np.concatenate([draw(plant, seed, width) for seed in SEEDS])
-    return column(cars) / column(nominal(plant))
+def pushed(cars: NDArray[np.void], base: Any) -> NDArray[np.float64]:
+    return np.asarray((cars["push_out_pressure"] - base["push_out_pressure"])[:, AXLES] / 1e5)
 
 
-BOTH = [
-    ("mass", field("mass"), 0.03),
-    ("height of the centre of gravity", field("cog_height"), 0.05),
-    ("free radius", field("free_radius", 2), 0.003),
-    ("wheel inertia", field("wheel_inertia", 0), 0.1),
-    ("push-out pressure", field("push_out_pressure", 0), 0.3 / 0.5),
+def factor(name: str) -> Quantity:
+    return lambda cars, base: (cars[name] / base[name]).reshape(len(cars), -1)[:, :1]
+
+
+def of_data_sheet(cars: NDArray[np.void], base: Any) -> NDArray[np.float64]:
+    """The car's file gives 0.85 of it in front and 1.10 at the rear."""
+    return np.asarray(cars["friction_scale"] / base["friction_scale"] * [0.85, 0.85, 1.10, 1.10])[:, AXLES]
+
+
+AXLES = [0, 2]
+EVERY = [0, 1, 2, 3]
+# Key of draw.toml, what it changes of a car's parameters, the quantity it is the width of, a column for each
+# draw of its own: per car, per axle or per wheel.
+WIDTHS: list[tuple[str, set[str], Quantity]] = [
+    ("mass", {"mass"}, relative("mass")),
+    ("cog_height", {"cog_height"}, relative("cog_height")),
+    ("cog_place", {"front_length", "rear_length"}, moved),
+    ("drag", {"drag_factor"}, relative("drag_factor")),
+    ("rolling_resistance", {"rolling_resistance"}, relative("rolling_resistance")),
+    ("pitch_gradient", {"pitch_gradient"}, relative("pitch_gradient")),
+    ("free_radius", {"free_radius"}, relative("free_radius", EVERY)),
+    ("vertical_stiffness", {"vertical_stiffness"}, relative("vertical_stiffness", 0)),
+    ("wheel_inertia", {"wheel_inertia"}, relative("wheel_inertia", 0)),
+    ("slip_stiffness", {"slip_stiffness"}, relative("slip_stiffness", 0)),
+    ("slip_stiffness_axle", {"slip_stiffness"}, relative("slip_stiffness", AXLES)),
+    ("stiffness_degression", {"stiffness_degression"}, factor("stiffness_degression")),
+    ("friction_axle", {"friction_scale"}, of_data_sheet),
+    ("friction_wheel", {"friction_scale"}, relative("friction_scale", EVERY)),
+    ("effective_radius", {"effective_radius"}, relative("effective_radius", AXLES)),
+    ("piston_area", {"piston_area"}, relative("piston_area", EVERY)),
+    ("push_out_pressure", {"push_out_pressure"}, pushed),
+    ("disc_heating", {"heating"}, relative("heating", AXLES)),
+    ("disc_cooling", {"cooling", "cooling_by_speed"}, relative("cooling_by_speed", AXLES)),
+    ("hydraulic_inertia", {"build_up", "release"}, relative("build_up", 0)),
+    ("hydraulic_damping", {"build_up", "release"}, relative("release", 1)),
+    ("hydraulic_dead_time", {"build_up", "release"}, relative("release", 2)),
 ]
-WIDER = [
-    ("place of the centre of gravity", field("front_length"), 0.04 / 1.29),
-    ("drag", field("drag_factor"), 0.15),
-    ("rolling resistance", field("rolling_resistance"), 0.15),
-    ("pitch", field("pitch_gradient"), 0.2),
-    ("vertical stiffness", field("vertical_stiffness", 0), 0.15),
-    ("stiffness rear over front", rear_over_front, 0.0726),
-    ("effective radius", field("effective_radius", 0), 0.02),
-    ("piston area", field("piston_area", 1), 0.01),
-    ("disc's heating", field("heating", 0), 0.15),
-    ("disc's cooling", field("cooling_by_speed", 2), 0.3),
-    ("inertia of the hydraulics", field("build_up", 0), 0.5),
-    ("damping of the hydraulics", field("release", 1), 0.5),
-    ("dead time of the hydraulics", field("release", 2), 0.3),
-]  # fmt: skip
+SENSORS = {
+    "motor_torque_scale",
+    "motor_torque_noise",
+    "sensor_noise",
+    "accel_zero",
+    "yaw_rate_zero",
+    "steering_zero",
+    "pressure_zero",
+}
 
 
-@pytest.mark.parametrize(
-    ("width", "column", "spread"),
-    [pytest.param(width, row[1], row[2], id=f"{name}: {row[0]}")
-     for name, width, rows in (("wide", WIDE, BOTH + WIDER), ("nominal", NOMINAL, BOTH)) for row in rows],
-)  # fmt: skip
-def test_drawn_cars_spread_as_far_as_they_should(
-    suv: Plant, width: Widths, column: Column, spread: float
+def cars_of(plant: Plant, width: Widths, seeds: range = MANY) -> NDArray[np.void]:
+    return np.concatenate([draw(plant, seed, width) for seed in seeds])
+
+
+def changed(cars: NDArray[np.void], base: Any) -> set[str]:
+    """Return the parameters in which any car differs from the one described."""
+    names = cars.dtype.names or ()
+    return {
+        name
+        for name in names
+        if not np.array_equal(cars[name], np.broadcast_to(base[name], cars[name].shape))
+    }
+
+
+def check_even(drawn: NDArray[np.float64], width: float | tuple[float, float]) -> None:
+    """Check an even distribution over the width, each column drawn for itself."""
+    low, high = width if isinstance(width, tuple) else (-width, width)
+    even = (drawn - 0.5 * (low + high)) / (0.5 * (high - low))
+    print(np.abs(even).max(axis=0), even.mean(axis=0), even.std(axis=0))
+    assert np.all(np.abs(even) <= 1.0 + 1e-9)
+    # Four standard errors of mean and standard deviation of so many.
+    assert np.all(np.abs(even.mean(axis=0)) < 4.0 / np.sqrt(3.0 * len(even)))
+    assert even.std(axis=0) * np.sqrt(3.0) == pytest.approx(
+        np.ones(even.shape[1]), abs=4.0 * np.sqrt(0.2 / len(even))
+    )
+    together = np.corrcoef(even.T).reshape(even.shape[1], -1) - np.eye(even.shape[1])
+    assert np.all(np.abs(together) < 4.0 / np.sqrt(len(even)))
+
+
+def test_every_width_of_the_file_is_looked_at() -> None:
+    assert {row[0] for row in WIDTHS} | SENSORS | {"friction_laws"} == set(Widths.model_fields)
+
+
+@pytest.fixture(scope="module")
+def wide_cars(suv: Plant) -> NDArray[np.void]:
+    return cars_of(suv, WIDE)
+
+
+# Two keys are widths of one parameter: each is looked at alone.
+SHARED = {"slip_stiffness", "slip_stiffness_axle", "friction_axle", "friction_wheel"}
+
+
+def alone(key: str) -> Widths:
+    return Widths(**{key: getattr(WIDE, key)})
+
+
+@pytest.mark.parametrize(("key", "fields"), [row[:2] for row in WIDTHS], ids=[row[0] for row in WIDTHS])
+def test_a_width_changes_its_own_quantity_alone(suv: Plant, key: str, fields: set[str]) -> None:
+    assert changed(cars_of(suv, alone(key), range(5)), nominal(suv)[0]) == fields
+
+
+@pytest.mark.parametrize(("key", "quantity"), [row[::2] for row in WIDTHS], ids=[row[0] for row in WIDTHS])
+def test_a_quantity_spreads_as_far_as_the_file_says(
+    suv: Plant, wide_cars: NDArray[np.void], key: str, quantity: Quantity
 ) -> None:
-    away = drawn(suv, width, column) - 1.0
-    assert np.all(np.abs(away) <= 1.02 * spread)
-    assert np.ptp(away) > 1.6 * spread
+    cars = cars_of(suv, alone(key)) if key in SHARED else wide_cars
+    check_even(quantity(cars, nominal(suv)[0]), getattr(WIDE, key))
+
+
+def test_what_one_key_draws_goes_with_no_other(suv: Plant, wide_cars: NDArray[np.void]) -> None:
+    base = nominal(suv)[0]
+    columns = [quantity(wide_cars, base)[:, 0] for key, _, quantity in WIDTHS if key not in SHARED]
+    together = np.corrcoef(columns) - np.eye(len(columns))
+    print(np.abs(together).max())
+    assert np.abs(together).max() < 4.0 / np.sqrt(len(wide_cars))
+
+
+def test_laws_are_drawn_evenly(wide_cars: NDArray[np.void]) -> None:
+    cars = wide_cars
+    counts = np.unique(cars["friction_law"][:, 0], return_counts=True)[1]
+    expected = len(cars) / len(WIDE.friction_laws)
+    assert len(counts) == len(WIDE.friction_laws) == 3
+    assert counts == pytest.approx(expected, abs=4.0 * np.sqrt(expected * 2.0 / 3.0))
+
+
+def test_the_nominal_draw_differs_only_where_the_file_says(suv: Plant) -> None:
+    base, cars = nominal(suv)[0], cars_of(suv, NOMINAL)
+    given = {key for key in Widths.model_fields if getattr(NOMINAL, key) != getattr(Widths(), key)}
+    named = [row for row in WIDTHS if row[0] in given]
+    assert changed(cars, base) == set().union(*(fields for _, fields, _ in named))
+    for key, _, quantity in named:
+        if not key.startswith("slip_stiffness"):
+            check_even(quantity(cars, base), getattr(NOMINAL, key))
+    for seed in SEEDS:
+        for name, errors in draw_sensors(STANDARD, seed, NOMINAL).items():
+            assert errors == STANDARD.get(name, type(errors)()), name
 
 
 def test_friction_is_any_the_data_sheet_cannot_rule_out(suv: Plant) -> None:
     """Level 0.7 to 1.3 of the data sheet per axle, and 4 % per wheel, whatever the law."""
-    reference = 0.45
     levels, sides, laws = [], [], set()
     for seed in SEEDS:
         car = draw(suv, seed, WIDE)[0]
@@ -80,7 +186,6 @@ def test_friction_is_any_the_data_sheet_cannot_rule_out(suv: Plant) -> None:
         levels += [share[:2].mean(), share[2:].mean()]
         sides.append(share[0] / share[1])
         laws.add(tuple(car["friction_law"]))
-    print(min(levels), max(levels), np.std(sides), laws, reference)
     assert 0.67 < min(levels) < 0.75
     assert 1.25 < max(levels) < 1.34
     assert 0.02 < np.std(sides) < 0.05
@@ -94,30 +199,35 @@ def test_linings_of_one_law_still_differ(suv: Plant) -> None:
     assert len({row.tobytes() for row in rows}) == 10
 
 
-def test_what_the_kind_draw_leaves_alone(suv: Plant) -> None:
-    car, base = draw(suv, 5, NOMINAL)[0], nominal(suv)[0]
-    for name in ("friction_scale", "track", "vertical_stiffness", "nominal_load", "friction_row", "build_up"):
-        assert np.array_equal(car[name], base[name])
-    assert draw_sensors(STANDARD, 5, NOMINAL)["accel_x"].noise == STANDARD["accel_x"].noise
-
-
 @pytest.mark.parametrize("width", [WIDE, NOMINAL], ids=["wide", "nominal"])
 def test_same_seed_same_car(suv: Plant, width: Widths) -> None:
     assert draw(suv, 11, width).tobytes() == draw(suv, 11, width).tobytes() != draw(suv, 12, width).tobytes()
     assert draw_sensors(STANDARD, 3, width) == draw_sensors(STANDARD, 3, width)
 
 
-def test_sensors_spread() -> None:
-    cars = [draw_sensors(STANDARD, seed, WIDE) for seed in SEEDS]
-    noise = np.array([car["calliper_pressure"].noise / 1.8 for car in cars])
-    motors = np.array([(car["motor_torque"].noise, car["motor_torque"].scale) for car in cars])
-    assert 0.5 <= noise.min() < 0.6
-    assert 1.7 < noise.max() <= 2.0
-    assert 3.0 <= motors[:, 0].min() < 4.0
-    assert 9.0 < motors[:, 0].max() <= 10.0
-    assert np.ptp(motors[:, 1]) > 0.05
-    assert cars[0]["accel_x"].bias == (-0.1, 0.1)
-    assert cars[0]["calliper_pressure"].bias == (-0.7, 0.7)
+def test_sensors_spread_as_the_file_says() -> None:
+    cars = [draw_sensors(STANDARD, seed, WIDE) for seed in MANY]
+    noise = np.array([[car[name].noise / errors.noise for name, errors in STANDARD.items()] for car in cars])
+    low, high = WIDE.sensor_noise
+    check_even(np.log(noise), (float(np.log(low)), float(np.log(high))))
+    motors = np.array([(car["motor_torque"].noise, car["motor_torque"].scale - 1.0) for car in cars])
+    check_even(motors[:, :1], WIDE.motor_torque_noise)
+    check_even(motors[:, 1:], WIDE.motor_torque_scale)
+
+
+@pytest.mark.parametrize(
+    ("name", "zero"),
+    [
+        ("accel_x", WIDE.accel_zero),
+        ("accel_y", WIDE.accel_zero),
+        ("yaw_rate", WIDE.yaw_rate_zero),
+        ("steering_angle", WIDE.steering_zero),
+        ("calliper_pressure", WIDE.pressure_zero),
+    ],
+)
+def test_a_sensor_s_zero_is_drawn_within_the_file_s_bounds(name: str, zero: float) -> None:
+    assert zero > 0.0
+    assert draw_sensors(STANDARD, 0, WIDE)[name].bias == (-zero, zero)
 
 
 @pytest.mark.parametrize(

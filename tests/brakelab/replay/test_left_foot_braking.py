@@ -84,11 +84,12 @@ def test_braking_against_the_accelerator_teaches_nothing_and_is_marked(
     drive_log: Path, tmp_path: Path, observer: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     columns, brakes = run(drive_log, observer, tmp_path / "out.parquet")
-    assert list(brakes["left_out"][::4]) == ["", "accelerator pressed", ""]
-    assert set(brakes["learning"][4:8]) == {"accelerator pressed"}
+    assert list(brakes["left_out"][::4]) == ["", "driven against the brakes", ""]
+    (why,) = set(brakes["learning"][4:8])
+    assert why.startswith("held: ABS, ESP, accelerator")
     assert set(brakes["learning"][8:]) == {"learned"}
     assert not changes_in_the_second(columns, brakes)
-    assert "left out of the prediction: 1 accelerator pressed" in capsys.readouterr().out
+    assert "left out of the prediction: 1 driven against the brakes" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("observer", ["joint", "observer2"])
@@ -97,7 +98,7 @@ def test_where_no_accelerator_is_known_driving_torque_marks_it(
 ) -> None:
     log = without(drive_log, "accelerator_position", tmp_path / "one-foot.parquet")
     _, brakes = run(log, observer, tmp_path / "out.parquet")
-    assert list(brakes["left_out"][::4]) == ["", "driving torque", ""]
+    assert list(brakes["left_out"][::4]) == ["", "driven against the brakes", ""]
 
 
 @pytest.mark.parametrize("observer", ["joint", "observer2"])

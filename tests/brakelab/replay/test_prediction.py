@@ -1,4 +1,4 @@
-"""What a braking is expected to do, against closed forms, and which predictions count."""
+"""What a braking is expected to do, against closed forms; which predictions count; what others would say."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -8,124 +8,210 @@ import pytest
 
 from brakelab.replay.brakes import BrakeBook, BrakeRow
 from brakelab.replay.engine import N_ROW
-from brakelab.replay.prediction import errors
+from brakelab.replay.prediction import errors, one_scale, running_average
 from ecu.config import load_config, new_params
 from ecu.params import BAR
-from ecu.records import RecordArray
 from ecu.signals import FAULT, HOLDING, N_OUTPUTS, NOMINAL, OUTPUT
 
 MU, SIGMA, PRESSURE, DECEL = 0.42, 0.021, 40.0, 3.5
 BEGINS, ENDS = 250, 550
 ACCELERATOR = N_OUTPUTS + 4
+Change = Callable[[np.ndarray], None]
+PARAMS = new_params(load_config(Path(__file__).parents[3] / "config" / "suv.toml"))
+P = PARAMS[0]
+INERT = float(P["mass"] + (P["wheel_inertia"] / P["wheel_radius"] ** 2).sum())
+LEVER = 2.0 * P["piston_area"] * P["effective_radius"] / P["wheel_radius"]  # N of force per Pa and friction
+SPEEDS = 30.0 - 0.01 * 0.3 * BEGINS - 0.01 * DECEL * np.arange(ENDS - BEGINS)
 
 
-@pytest.fixture(scope="module")
-def params() -> RecordArray:
-    return new_params(load_config(Path(__file__).parents[3] / "config" / "suv.toml"))
+def four(rows: np.ndarray, name: str) -> np.ndarray:
+    return rows[..., OUTPUT[f"{name}_fl"] : OUTPUT[f"{name}_fl"] + 4]
 
 
-def braking(slope: float = 0.0) -> np.ndarray:
-    """2.5 s of coasting at 0.3 m/s^2, 3 s of braking, 1 s of rolling; gravity along the road in m/s^2."""
+def column(rows: np.ndarray, name: str) -> np.ndarray:
+    return rows[:, OUTPUT[name]]
+
+
+def braking() -> np.ndarray:
+    """2.5 s of coasting at 0.3 m/s^2, 3 s of braking at 40 bar, 1 s of rolling; the car is as configured."""
     rows = np.full((650, N_ROW), np.nan)
     decel = np.repeat([0.3, DECEL, 0.0], [BEGINS, ENDS - BEGINS, 100])
-    rows[:, OUTPUT["vehicle_speed"]] = 30.0 - np.concatenate(([0.0], np.cumsum(decel[:-1]) * 0.01))
-    rows[:, OUTPUT["accel_x_road"]] = slope - decel
-    rows[:, OUTPUT["braking"]] = 0.0
-    rows[BEGINS:ENDS, OUTPUT["braking"]] = 1.0
+    column(rows, "vehicle_speed")[:] = 30.0 - np.concatenate(([0.0], np.cumsum(decel[:-1]) * 0.01))
+    column(rows, "accel_x_road")[:] = -decel
+    column(rows, "braking")[:] = 0.0
+    column(rows, "braking")[BEGINS:ENDS] = 1.0
+    column(rows, "vehicle_mass")[:] = P["mass"]
+    column(rows, "overrun")[:] = column(rows, "accel_x_zero")[:] = 0.0
     for name, value in (("mu_b", MU), ("sigma_mu_b", SIGMA), ("mode", HOLDING), ("calliper_pressure", 0.0)):
-        rows[:, OUTPUT[f"{name}_fl"] : OUTPUT[f"{name}_fl"] + 4] = value
-    rows[BEGINS:ENDS, OUTPUT["calliper_pressure_fl"] : OUTPUT["calliper_pressure_fl"] + 4] = PRESSURE
+        four(rows, name)[:] = value
+    four(rows, "pressure_zero")[:] = 0.0
+    four(rows, "calliper_pressure")[BEGINS:ENDS] = PRESSURE
     rows[:, N_OUTPUTS : N_OUTPUTS + 4] = 0.0
     rows[:, ACCELERATOR] = 0.0
     return rows
 
 
-def judged(params: RecordArray, rows: np.ndarray) -> BrakeRow:
-    book = BrakeBook(params)
+def judged(rows: np.ndarray) -> BrakeRow:
+    book = BrakeBook(PARAMS)
     book.add(np.arange(len(rows)) * 0.01, rows)
     return book.rows[0]
 
 
-def brake_decel(params: RecordArray) -> float:
+def linings(mu: float = MU, pressure: float = PRESSURE, inert: float = INERT) -> float:
     """Deceleration by the four brakes alone, wheels turning with the car."""
-    p = params[0]
-    torque = 2.0 * p["piston_area"] * p["effective_radius"] * MU * (PRESSURE * BAR - p["push_out_pressure"])
-    inert = p["mass"] + (p["wheel_inertia"] / p["wheel_radius"] ** 2).sum()
-    return float((torque / p["wheel_radius"]).sum() / inert)
+    return float((LEVER * mu * (pressure * BAR - P["push_out_pressure"])).sum() / inert)
 
 
-@pytest.mark.parametrize("slope", [-0.6, -0.1, 0.3])
-def test_gravity_felt_before_the_braking_counts(params: RecordArray, slope: float) -> None:
-    """A braking measured by its speed feels the hill, its brakes do not; wheels share in the inertia."""
-    p = params[0]
-    level, hill = judged(params, braking()), judged(params, braking(slope))
-    inert = p["mass"] + (p["wheel_inertia"] / p["wheel_radius"] ** 2).sum()
-    assert hill.decel_predicted - level.decel_predicted == pytest.approx(slope * p["mass"] / inert, rel=1e-6)
+RESISTANCE = float(P["drag_area"] * np.mean(SPEEDS**2) / INERT)
+ROLLING = float(P["rolling_resistance"] * 9.81 * P["mass"] / INERT)
+HEAVIER = INERT + 0.1 * float(P["mass"])
 
 
-def test_gravity_of_the_braking_itself_is_hindsight(params: RecordArray) -> None:
+def motors(rows: np.ndarray) -> None:
+    rows[BEGINS:ENDS, N_OUTPUTS : N_OUTPUTS + 4] = 150.0
+
+
+def heavier(rows: np.ndarray) -> None:
+    column(rows, "vehicle_mass")[:] = 1.1 * P["mass"]
+
+
+def mass_unknown(rows: np.ndarray) -> None:
+    column(rows, "vehicle_mass")[:] = np.nan
+
+
+def rough(rows: np.ndarray) -> None:
+    four(rows, "mu_b")[:] = 1.2 * MU
+
+
+def pressure_zero(rows: np.ndarray) -> None:
+    four(rows, "pressure_zero")[:] = 0.6
+
+
+def overrun(rows: np.ndarray) -> None:
+    column(rows, "overrun")[:] = 0.25
+
+
+MOTORS = float((150.0 / P["wheel_radius"]).sum() / INERT)
+REST = RESISTANCE + ROLLING
+
+
+@pytest.mark.parametrize(
+    ("change", "force", "rest"),
+    [
+        pytest.param(lambda rows: None, linings() + REST, REST, id="as configured but for the friction"),
+        pytest.param(rough, linings(1.2 * MU) + REST, REST, id="friction a fifth higher"),
+        pytest.param(motors, linings() + REST + MOTORS, REST + MOTORS, id="motors brake"),
+        pytest.param(
+            heavier,
+            linings(inert=HEAVIER) + RESISTANCE * INERT / HEAVIER + 1.1 * ROLLING * INERT / HEAVIER,
+            RESISTANCE * INERT / HEAVIER + 1.1 * ROLLING * INERT / HEAVIER,
+            id="a tenth heavier",
+        ),
+        pytest.param(mass_unknown, linings() + REST, REST, id="mass not known: the configured one"),
+        pytest.param(pressure_zero, linings(pressure=39.4) + REST, REST, id="pressure sensors 0.6 bar off"),
+        pytest.param(overrun, linings() + REST + 0.25, REST + 0.25, id="overrun of a drive"),
+    ],
+)
+def test_what_is_expected_of_a_braking(change: Change, force: float, rest: float) -> None:
     rows = braking()
-    known = judged(params, rows).decel_predicted
-    rows[BEGINS:, OUTPUT["accel_x_road"]] += 0.5
-    rows[BEGINS:, OUTPUT["mu_b_fl"] : OUTPUT["mu_b_fl"] + 4] *= 1.3
-    assert judged(params, rows).decel_predicted == known
+    change(rows)
+    line = judged(rows)
+    assert line.specific_force_predicted == pytest.approx(force, rel=1e-9)
+    assert line.specific_force_rest == pytest.approx(rest, rel=1e-9)
+    assert line.decel_predicted == pytest.approx(force, rel=1e-9)
 
 
-@pytest.mark.parametrize("known", [0, 49])
-def test_without_half_a_second_before_it_the_road_is_level(params: RecordArray, known: int) -> None:
-    """As where a log begins so, or the speed was not known yet."""
-    hill, level = braking(0.4), braking()
-    for rows in (hill, level):
-        rows[: BEGINS - known, OUTPUT["vehicle_speed"]] = np.nan
-    assert judged(params, hill).decel_predicted == judged(params, level).decel_predicted
-
-
-def test_sigma_is_that_of_friction_and_of_motors(params: RecordArray) -> None:
+@pytest.mark.parametrize("change", [rough, heavier, overrun], ids=["friction", "mass", "overrun"])
+def test_without_learning_it_is_the_configured_car(change: Change) -> None:
     rows = braking()
-    of_friction = brake_decel(params) * SIGMA / MU
-    assert judged(params, rows).sigma_decel_predicted == pytest.approx(of_friction, rel=1e-9)
-    without = judged(params, rows).decel_predicted
-    rows[BEGINS:ENDS, N_OUTPUTS : N_OUTPUTS + 4] = 300.0
-    line = judged(params, rows)
-    of_motors = params[0]["sigma_motor_torque"] * (line.decel_predicted - without)
-    assert line.sigma_decel_predicted == pytest.approx(np.hypot(of_friction, of_motors), rel=1e-9)
+    change(rows)
+    line = judged(rows)
+    assert line.specific_force_configured == pytest.approx(linings(0.45) + REST, rel=1e-9)
+    assert line.specific_force_configured_rest == pytest.approx(REST, rel=1e-9)
+
+
+def test_what_the_braking_itself_taught_is_hindsight() -> None:
+    rows = braking()
+    known = judged(rows)
+    four(rows, "mu_b")[BEGINS:] *= 1.3
+    column(rows, "vehicle_mass")[BEGINS:] *= 1.1
+    column(rows, "accel_x_zero")[BEGINS:] = 0.3
+    line = judged(rows)
+    assert line.specific_force_predicted == known.specific_force_predicted
+    assert line.specific_force_mean == known.specific_force_mean
+
+
+@pytest.mark.parametrize("zero", [-0.1, 0.0, 0.2])
+def test_measured_is_what_the_accelerometer_reads_but_its_zero(zero: float) -> None:
+    """On any slope: speed falls as it likes."""
+    rows = braking()
+    column(rows, "accel_x_zero")[:] = zero
+    column(rows, "accel_x_road")[:] += zero
+    column(rows, "vehicle_speed")[BEGINS:] += 0.5 * 0.01 * np.arange(400)  # downhill
+    assert judged(rows).specific_force_mean == pytest.approx(DECEL)
+
+
+def test_rows_in_which_the_driver_accelerates_are_no_part_of_it() -> None:
+    """The foot is on the accelerator for the first second, and the car does what it likes."""
+    rows = braking()
+    rows[BEGINS : BEGINS + 100, ACCELERATOR] = 30.0
+    column(rows, "accel_x_road")[BEGINS : BEGINS + 100] = 1.0
+    four(rows, "calliper_pressure")[BEGINS : BEGINS + 100] = 15.0
+    line = judged(rows)
+    assert line.specific_force_mean == pytest.approx(DECEL)
+    drag = float(P["drag_area"] * np.mean(SPEEDS[100:] ** 2) / INERT)
+    assert line.specific_force_predicted == pytest.approx(linings() + drag + ROLLING, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("share", "relative"),
+    [pytest.param(np.nan, SIGMA / MU, id="wheel by wheel"), pytest.param(0.03, 0.03, id="of all linings")],
+)
+def test_sigma_is_that_of_friction_and_of_motors(share: float, relative: float) -> None:
+    rows = braking()
+    column(rows, "sigma_brake_force")[:] = share
+    assert judged(rows).sigma_specific_force == pytest.approx(relative * linings(), rel=1e-9)
+    motors(rows)
+    of_motors = P["sigma_motor_torque"] * (150.0 / P["wheel_radius"]).sum() / P["mass"]
+    both = np.hypot(relative * linings(), of_motors)
+    assert judged(rows).sigma_specific_force == pytest.approx(both, rel=1e-9)
 
 
 @pytest.mark.parametrize(("mode", "learned"), [(NOMINAL, 0), (HOLDING, 1), (FAULT, 0)])
-def test_whether_friction_was_learned_before(params: RecordArray, mode: int, learned: int) -> None:
+def test_whether_friction_was_learned_before(mode: int, learned: int) -> None:
     rows = braking()
     rows[:BEGINS, OUTPUT["mode_fl"]] = mode
-    assert judged(params, rows).learned_before == learned
+    assert judged(rows).learned_before == learned
 
 
 def accelerator(rows: np.ndarray) -> None:
     rows[BEGINS:ENDS, ACCELERATOR] = 30.0
 
 
-def late_change_of_pedals(rows: np.ndarray) -> None:
-    rows[BEGINS : BEGINS + 40, ACCELERATOR] = 30.0
-
-
 def change_of_pedals(rows: np.ndarray) -> None:
     """The foot is on the accelerator until the pressure is up and when it is down again."""
     rows[: BEGINS + 20, ACCELERATOR] = rows[ENDS - 60 :, ACCELERATOR] = 30.0
-    rows[ENDS - 60 : ENDS, OUTPUT["calliper_pressure_fl"] : OUTPUT["calliper_pressure_fl"] + 4] = 2.0
+
+
+def all_but_a_moment(rows: np.ndarray) -> None:
+    rows[BEGINS + 39 : ENDS, ACCELERATOR] = 30.0
+
+
+def held_at_standstill(rows: np.ndarray) -> None:
+    column(rows, "vehicle_speed")[BEGINS:ENDS] = 0.0
 
 
 def launch(rows: np.ndarray) -> None:
     """Held by the brakes, then the accelerator."""
-    rows[BEGINS:ENDS, OUTPUT["vehicle_speed"]] = 0.0
+    held_at_standstill(rows)
     rows[BEGINS:ENDS, ACCELERATOR] = 80.0
 
 
-def driven(share: float) -> Callable[[np.ndarray], None]:
+def driven(share: float) -> Change:
     """Motors at the rear drive with `share` of the force of 40 bar; no accelerator is known."""
 
     def change(rows: np.ndarray) -> None:
-        params = new_params(load_config(Path(__file__).parents[3] / "config" / "suv.toml"))
-        p = params[0]
-        inert = p["mass"] + (p["wheel_inertia"] / p["wheel_radius"] ** 2).sum()
-        torque = share * brake_decel(params) * inert * p["wheel_radius"][2]
+        torque = share * linings() * INERT * P["wheel_radius"][2]
         rows[BEGINS:ENDS, N_OUTPUTS + 2 : N_OUTPUTS + 4] = -0.5 * torque
         rows[:, ACCELERATOR] = np.nan
 
@@ -133,44 +219,76 @@ def driven(share: float) -> Callable[[np.ndarray], None]:
 
 
 def tap(rows: np.ndarray) -> None:
-    rows[BEGINS + 45 : ENDS, OUTPUT["braking"]] = 0.0
+    column(rows, "braking")[BEGINS + 45 : ENDS] = 0.0
 
 
-def hold_downhill(rows: np.ndarray) -> None:
-    rows[BEGINS:ENDS, OUTPUT["vehicle_speed"]] = 20.0
+def not_felt(rows: np.ndarray) -> None:
+    column(rows, "accel_x_road")[BEGINS:ENDS] = -0.4
 
 
 def speed_lost(rows: np.ndarray) -> None:
-    rows[BEGINS:ENDS, OUTPUT["vehicle_speed"]] = np.nan
+    column(rows, "vehicle_speed")[BEGINS:ENDS] = np.nan
+
+
+def accelerometer_lost(rows: np.ndarray) -> None:
+    column(rows, "accel_x_road")[BEGINS:ENDS] = np.nan
+
+
+def accelerometer_lost_for_a_second(rows: np.ndarray) -> None:
+    column(rows, "accel_x_road")[BEGINS : BEGINS + 100] = np.nan
 
 
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
         (lambda rows: None, ""),
-        (accelerator, "accelerator pressed"),
-        (late_change_of_pedals, "accelerator pressed"),
+        (accelerator, "driven against the brakes"),
+        (all_but_a_moment, "driven against the brakes"),
         (change_of_pedals, ""),
-        (launch, "below 0.5 m/s²"),
-        (driven(0.25), "driving torque"),
+        (held_at_standstill, "stands"),
+        (launch, "stands"),
+        (driven(0.25), "driven against the brakes"),
         (driven(0.15), ""),
         (tap, "shorter than 0.5 s"),
-        (hold_downhill, "below 0.5 m/s²"),
+        (not_felt, "below 0.5 m/s²"),
         (speed_lost, "inputs lost"),
+        (accelerometer_lost, "inputs lost"),
+        (accelerometer_lost_for_a_second, ""),
     ],
 )
-def test_which_predictions_count(
-    params: RecordArray, change: Callable[[np.ndarray], None], reason: str
-) -> None:
+def test_which_predictions_count(change: Change, reason: str) -> None:
     rows = braking()
     change(rows)
-    assert judged(params, rows).left_out == reason
+    assert judged(rows).left_out == reason
 
 
 def test_errors_are_shares_of_what_was_measured() -> None:
-    found = errors([2.0, 4.0, 1.0, 5.0], [2.2, 3.8, 1.4, 5.0], [False, True, True, True])
-    assert (found.counted, found.nominal) == (4, 1)
-    assert found[2:] == pytest.approx((0.075, 0.4, 0.1125))
-    nothing = errors([], [], [])
-    assert (nothing.counted, nothing.nominal) == (0, 0)
-    assert np.isnan(nothing[2:]).all()
+    found = errors([2.0, 4.0, 1.0, 5.0], [2.2, 3.8, 1.4, 5.0])
+    assert found.counted == 4
+    assert found[1:] == pytest.approx((0.1375, 0.075, 0.4, 0.1125))
+    nothing = errors([], [])
+    assert nothing.counted == 0
+    assert np.isnan(nothing[1:]).all()
+
+
+# Linings that give 0.8 of what configured friction expects, then 0.9, then 1.2; 0.5 m/s^2 are not theirs.
+CONFIGURED, REST_OF_IT = np.array([3.5, 2.5, 4.5]), np.array([0.5, 0.5, 0.5])
+SCALES = np.array([0.8, 0.9, 1.2])
+MEASURED = SCALES * (CONFIGURED - REST_OF_IT) + REST_OF_IT
+
+
+def test_a_running_average_knows_what_came_before_and_begins_with_the_configured_friction() -> None:
+    known = np.array([1.0, (1.0 + 0.8) / 2.0, (1.0 + 0.8 + 0.9) / 3.0])
+    found = running_average(MEASURED, CONFIGURED, REST_OF_IT)
+    assert found == pytest.approx(known * (CONFIGURED - REST_OF_IT) + REST_OF_IT)
+    assert len(running_average([], [], [])) == 0
+
+
+def test_one_scale_in_hindsight_is_the_best_of_a_fine_search() -> None:
+    def off(scale: float) -> float:
+        return float(np.abs((scale * (CONFIGURED - REST_OF_IT) + REST_OF_IT) / MEASURED - 1.0).mean())
+
+    best = min(off(scale) for scale in np.arange(0.5, 1.5, 1e-4))
+    found = one_scale(MEASURED, CONFIGURED, REST_OF_IT)
+    assert errors(MEASURED, found).mean == pytest.approx(best, abs=1e-4)
+    assert len(one_scale([], [], [])) == 0

@@ -287,12 +287,14 @@ def corners(name: str, value: float | None) -> dict[str, float | None]:
     return {f"{name}_{corner}": value for corner in CORNERS}
 
 
+NO_SPEED = "without vehicle_speed (the wheels alone tell the speed: wider sigma where all slip)"
 WORTHLESS: dict[str, tuple[dict[str, float | None], list[str]]] = {
-    "a good drive": ({}, []),
+    "a good drive": ({}, [NO_SPEED]),
     "pressures in Pa": (
         corners("calliper_pressure", 3e6),
         [
             "calliper_pressure_*: 100 % of samples outside -10…250 bar; is the unit bar?",
+            NO_SPEED,
             "degraded or failed for 87 % of the drive: pressure lost (87 %)",
         ],
     ),
@@ -300,6 +302,7 @@ WORTHLESS: dict[str, tuple[dict[str, float | None], list[str]]] = {
         {"calliper_pressure_rl": math.nan},
         [
             "calliper_pressure_rl: no sample in the whole log; fill this column",
+            NO_SPEED,
             "degraded or failed for 87 % of the drive: pressure lost (87 %)",
         ],
     ),
@@ -307,6 +310,7 @@ WORTHLESS: dict[str, tuple[dict[str, float | None], list[str]]] = {
         {"accel_x": None},
         [
             "accel_x: no sample in the whole log; fill this column",
+            NO_SPEED,
             "degraded or failed for 87 % of the drive: IMU lost (87 %)",
         ],
     ),
@@ -314,12 +318,13 @@ WORTHLESS: dict[str, tuple[dict[str, float | None], list[str]]] = {
         {"pedal_position": 900.0, "decel_demand_valid": 1.0},
         [
             "pedal_position: 100 % of samples outside 0…100 %; is the unit %?",
+            NO_SPEED,
             "degraded or failed for 87 % of the drive: pedal lost (87 %)",
         ],
     ),
     "pedal without a sample, demand right": (
         {"pedal_position": None, "decel_demand_valid": 1.0},
-        [],
+        [NO_SPEED],
     ),
 }
 

@@ -10,10 +10,23 @@ from ecu.signals import CORNERS
 NOMINAL = (0.4, 0.4, 0.36, 0.36)
 
 
+def row(number: int, corner: str, **known: object) -> BrakeRow:
+    """A braking from 30 to 10 m/s in 4 s that taught; everything else is 0 but `known`."""
+    about = {
+        "t_start": 1.0,
+        "duration": 4.0,
+        "v_in": 30.0,
+        "v_end": 10.0,
+        "learning": LEARNED,
+        "left_out": "",
+    }
+    numbers = dict.fromkeys(BrakeRow._fields, 0.0)
+    return BrakeRow(**numbers | {"brake": number, "corner": corner} | about | known)
+
+
 def printed(friction: tuple[float, float, float, float]) -> str:
     rows = [
-        BrakeRow(*(0, corner, 1.0, 4.0, 30.0, 10.0), *[0.0] * 10, mu, 0.02, 3.0, LEARNED, 0.1, 1, "")
-        for corner, mu in zip(CORNERS, friction, strict=True)
+        row(0, corner, mu_b_end=mu, sigma_mu_b_end=0.02) for corner, mu in zip(CORNERS, friction, strict=True)
     ]
     console = Console(width=150)
     with console.capture() as capture:
@@ -36,29 +49,71 @@ def test_friction_at_its_bound_is_marked(friction, front: str, rear: str) -> Non
     assert text.count("at its bound") == (front + rear).count("at its bound")
 
 
-def told(*brakings: tuple[float, float, int, str]) -> list[str]:
-    """Lines for brakings of measured and predicted deceleration, learned before, left out."""
-    rows = []
-    for number, (measured, predicted, learned, left_out) in enumerate(brakings):
-        for corner in CORNERS:
-            numbers = (number, corner, 1.0, 4.0, 30.0, 10.0, measured, predicted, *[0.0] * 8, 0.4, 0.02, 3.0)
-            rows.append(BrakeRow(*numbers, LEARNED, 0.1, learned if corner == "rl" else 0, left_out))
+def test_a_line_has_what_was_measured_predicted_and_configured() -> None:
+    force = {
+        "specific_force_mean": 4.0,
+        "specific_force_predicted": 4.2,
+        "sigma_specific_force": 0.1,
+        "specific_force_configured": 4.6,
+    }
+    console = Console(width=150)
+    with console.capture() as capture:
+        console.print(brakings_table([row(0, corner, **force) for corner in CORNERS], NOMINAL))
+    assert "108 → 36 4.00 4.20 ± 0.10 4.60" in " ".join(capture.get().split())
+
+
+def told(*brakings: tuple[float, float, float, str]) -> list[str]:
+    """Lines for brakings of measured, predicted and configured specific force, and why they are left out."""
+    rows = [
+        row(
+            number,
+            corner,
+            specific_force_mean=measured,
+            specific_force_predicted=predicted,
+            specific_force_configured=configured,
+            left_out=why,
+        )
+        for number, (measured, predicted, configured, why) in enumerate(brakings)
+        for corner in CORNERS
+    ]
     return prediction_lines(rows)
 
 
-def test_prediction_is_told_in_two_lines() -> None:
-    assert told() == ["prediction: no braking to judge it by"]
-    assert told((4.0, 4.2, 1, "")) == [
-        "prediction of 1 brakings: off by 5.0 % in the median, 5.0 % at worst, bias +5.0 %"
-    ]
-    assert told(
-        (2.0, 2.2, 0, ""), (4.0, 3.8, 1, ""), (0.1, 9.0, 1, "below 0.5 m/s²"), (2.0, 9.0, 1, "x")
-    ) == [
-        "prediction of 2 brakings: off by 7.5 % in the median, 10.0 % at worst, bias +2.5 %; "
-        "1 with nominal friction, as nothing was learned before",
-        "left out of the prediction: 1 below 0.5 m/s², 1 x",
-    ]
-    assert told((0.1, 9.0, 1, "below 0.5 m/s²")) == [
-        "prediction: no braking to judge it by",
-        "left out of the prediction: 1 below 0.5 m/s²",
-    ]
+NONE = "prediction: no braking to judge it by"
+
+
+@pytest.mark.parametrize(
+    ("brakings", "lines"),
+    [
+        pytest.param([], [NONE], id="none"),
+        pytest.param(
+            [(4.0, 4.2, 4.4, "")],
+            [
+                "prediction of 1 brakings: off by 5.0 % on the mean, 5.0 % in the median, 5.0 % at worst, "
+                "bias +5.0 %",
+                "beside it, on the mean: configured friction 10.0 %, running average 10.0 %, "
+                "one scale in hindsight 0.0 %",
+            ],
+            id="one",
+        ),
+        # Linings give 1 / 1.1 and 1 / 1.25 of what is configured: the running average takes 1, then 0.95455.
+        pytest.param(
+            [(2.0, 2.2, 2.2, ""), (4.0, 3.8, 5.0, ""), (0.1, 9.0, 9.0, "below 0.5 m/s²"), (2, 9, 9, "x")],
+            [
+                "prediction of 2 brakings: off by 7.5 % on the mean, 7.5 % in the median, 10.0 % at worst, "
+                "bias +2.5 %",
+                "beside it, on the mean: configured friction 17.5 %, running average 14.7 %, "
+                "one scale in hindsight 6.0 %",
+                "left out of the prediction: 1 below 0.5 m/s², 1 x",
+            ],
+            id="two that count, two that do not",
+        ),
+        pytest.param(
+            [(0.1, 9.0, 9.0, "below 0.5 m/s²")],
+            [NONE, "left out of the prediction: 1 below 0.5 m/s²"],
+            id="one that does not count",
+        ),
+    ],
+)
+def test_what_is_told_of_the_prediction(brakings, lines: list[str]) -> None:
+    assert told(*brakings) == lines

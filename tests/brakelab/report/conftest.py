@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from brakelab.report.brakings import brakes_path
+from brakelab.report.brakings import Braking, Force, brakes_path
 from ecu.recorder import ABOUT_FILE, CYCLES_FILE, INITIAL_FILE, layout
 from ecu.ring import RECORDED
 from ecu.signals import CORNERS, OUTPUT_COLUMNS
@@ -27,6 +27,16 @@ MESSAGE_COUNTS: dict[str, Any] = {
     "name": "Imu", "id": "072", "expected_hz": 100.0, "received": 1000, "accepted": 1000,
     "checksum_errors": 0, "sequence_errors": 0, "repeated": 0, "length_errors": 0, "lost": 0,
 }  # fmt: skip
+
+
+def braking_between(start: float, end: float, number: int = 1, **known: Any) -> Braking:
+    """Return a stop from 30 m/s, times in s, of which nothing else is known but `known`."""
+    nan, corners = float("nan"), np.full(4, np.nan)
+    unknown = Braking(
+        number, start, end, 30.0, 0.0, nan, nan, nan, corners, corners, corners, nan, Force(*[nan] * 5),
+        corners, corners, "",
+    )  # fmt: skip
+    return unknown._replace(**known)
 
 
 def made_up_drive(seconds: float = 60.0) -> tuple[dict[str, Any], dict[str, Any], dict[str, list[Any]]]:
@@ -65,14 +75,21 @@ def made_up_drive(seconds: float = 60.0) -> tuple[dict[str, Any], dict[str, Any]
         truth[f"mu_b_{corner}"] = true
     brakes: dict[str, list[Any]] = {}
     for number, (start, deceleration) in enumerate(STOPS):
+        learned = number > 0
         for corner in CORNERS:
             row = {
                 "brake": number, "corner": corner, "t_start": start, "duration": V_IN / deceleration,
                 "v_in": V_IN, "v_end": 0.0, "decel_mean": deceleration,
                 "decel_predicted": 1.04 * deceleration,
                 "mu_b_mean": TRUE_FRICTION[corner], "disc_temperature_in": 80.0 + 20 * number,
-                "brake_energy": 1.5e5, "sigma_decel_predicted": 0.02 * deceleration,
-                "learned_before": int(number > 0), "left_out": "accelerator pressed" if number == 2 else "",
+                "brake_energy": 1.5e5, "mu_b_end": TRUE_FRICTION[corner], "sigma_mu_b_end": 0.005,
+                "mu_b_before": TRUE_FRICTION[corner] if learned else 0.45,
+                "sigma_mu_b_before": 0.01 if learned else 0.055,
+                "specific_force_mean": deceleration, "specific_force_predicted": 1.04 * deceleration,
+                "sigma_specific_force": 0.02 * deceleration,
+                "specific_force_configured": 1.1 * deceleration, "specific_force_configured_rest": 0.1,
+                "learned_before": int(learned),
+                "left_out": "driven against the brakes" if number == 2 else "",
             }  # fmt: skip
             for name, value in row.items():
                 brakes.setdefault(name, []).append(value)

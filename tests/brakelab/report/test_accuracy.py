@@ -6,7 +6,8 @@ from brakelab.report.brakings import Braking
 from brakelab.report.drive import Drive
 from ecu.signals import CORNERS
 
-NONE = np.full(4, np.nan)
+from .conftest import braking_between
+
 T = np.arange(0.0, 12.0, 0.01)
 DEMANDED = 5.0
 
@@ -17,10 +18,7 @@ def stop(achieved: float) -> tuple[Drive, list[Braking]]:
     speed = np.maximum(30.0 - np.cumsum(decel) * 0.01, 0.0)
     demand = np.where((T >= 2.0) & (T < 9.0), DEMANDED, 0.0)
     columns = {"vehicle_speed": speed, "decel_demand_total": demand, "accel_x_road": -decel}
-    nan = float("nan")
-    return Drive(T, columns, {}), [
-        Braking(1, 2.0, 9.0, 30.0, 0.0, nan, nan, nan, NONE, NONE, nan, nan, nan, "")
-    ]
+    return Drive(T, columns, {}), [braking_between(2.0, 9.0)]
 
 
 def test_window_begins_half_a_second_after_the_demand_and_ends_at_15_kmh() -> None:

@@ -52,5 +52,24 @@ def test_only_the_file_knows_prediction_and_energy(drive_files: dict[str, Path])
     assert first.predicted == pytest.approx(4.16)
     assert first.energy == pytest.approx(6e5)
     assert first.friction.tolist() == [0.38, 0.38, 0.49, 0.50]
-    assert first.sigma == pytest.approx(0.08)
-    assert (first.learned, first.left_out) == (0.0, "")
+    assert first.friction_sigma.tolist() == [0.005] * 4
+    assert first.force == pytest.approx((4.0, 4.16, 0.08, 4.4, 0.1))
+    assert (first.before.tolist(), first.before_sigma.tolist()) == ([0.45] * 4, [0.055] * 4)
+    assert first.left_out == ""
+
+
+def test_without_the_file_friction_is_that_of_the_rows_around_the_braking(
+    drive_files: dict[str, Path],
+) -> None:
+    drive_files["brakes"].unlink()
+    drive = read_drive(drive_files["result"], (), "")
+    for braking in brakings(drive, drive_files["result"]):
+        first, last = (round(100.0 * t) for t in (braking.t_start, braking.t_end))
+        for friction, sigma, row in (
+            (braking.before, braking.before_sigma, first - 1),
+            (braking.friction, braking.friction_sigma, last + 1),
+        ):
+            np.testing.assert_array_equal(friction, drive.corners("mu_b")[row])
+            np.testing.assert_array_equal(sigma, drive.corners("sigma_mu_b")[row])
+        assert np.isnan(braking.force).all()
+        assert braking.left_out == "no prediction"

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from brakelab.report.brakings import Braking
 from brakelab.report.drive import Drive
 from brakelab.report.friction import plots_of_friction
 from ecu.signals import CORNERS, HOLDING, OBSERVING
 
-NONE = np.full(4, np.nan)
+from .conftest import braking_between
+
 T = np.arange(0.0, 20.0, 0.01)
-STOP = Braking(1, 5.0, 15.0, 30.0, 0.0, *[float("nan")] * 3, NONE, NONE, *[float("nan")] * 3, "")
+STOP = braking_between(5.0, 15.0)
 
 
 def drive(observed: tuple[float, float]) -> Drive:

@@ -1,4 +1,4 @@
-"""The page's part on predictions: which brakings it counts and what it shows of them."""
+"""The page's part on predictions: which brakings it counts, what it shows of them and what beside them."""
 
 from pathlib import Path
 
@@ -6,45 +6,83 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from brakelab.report.brakings import Braking, brakings
+from brakelab.report.brakings import Braking, Force, brakings
 from brakelab.report.drive import read_drive
-from brakelab.report.prediction import plots_of_prediction, prediction_errors, prediction_rows
+from brakelab.report.prediction import (
+    friction_text,
+    peer_errors,
+    plots_of_prediction,
+    prediction_errors,
+    prediction_rows,
+)
 
-NONE = np.full(4, np.nan)
+from .conftest import braking_between
+
+NAN = float("nan")
+BEFORE, BEFORE_SIGMA = np.array([0.38, 0.40, 0.45, 0.45]), np.array([0.01, 0.02, 0.05, 0.05])
 
 
 def braking(
-    number: int, measured: float, predicted: float, learned: float = 1.0, left_out: str = ""
+    number: int, measured: float, predicted: float, configured: float = NAN, why: str = ""
 ) -> Braking:
-    nan = float("nan")
-    return Braking(
-        number, 0.0, 4.0, 30.0, 10.0, nan, measured, predicted, NONE, NONE, nan, 0.1, learned, left_out
-    )
+    """A braking whose prediction has a sigma of 0.1 m/s^2; 0.2 m/s^2 are not the linings'."""
+    force = Force(measured, predicted, 0.1, configured, 0.2)
+    known = {"force": force, "before": BEFORE, "before_sigma": BEFORE_SIGMA, "left_out": why}
+    return braking_between(0.0, 4.0, number, **known)
 
 
 DRIVE = [
-    braking(1, 2.0, 2.5, learned=0.0),
-    braking(2, 4.0, 3.8, learned=0.5),
-    braking(3, 3.0, 0.5, left_out="driving torque"),
-    braking(4, 0.0, 0.7, left_out="below 0.5 m/s²"),
+    braking(1, 2.0, 2.5, 2.2),
+    braking(2, 4.0, 3.8, 4.2),
+    braking(3, 3.0, 0.5, 3.2, "driven against the brakes"),
+    braking(4, 0.3, 0.7, 0.3, "below 0.5 m/s²"),
 ]
 
 
 def test_rows_tell_error_origin_and_reason() -> None:
     rows = prediction_rows(DRIVE)
-    assert [row.error for row in rows] == pytest.approx([0.25, -0.05, np.nan, np.nan], nan_ok=True)
-    assert [row.sigma_error for row in rows] == pytest.approx([0.05, 0.025, np.nan, np.nan], nan_ok=True)
-    assert [row.friction for row in rows] == ["nominal", "learned in part", "learned", "learned"]
-    assert [row.left_out for row in rows] == ["", "", "driving torque", "below 0.5 m/s²"]
+    assert [row.error for row in rows] == pytest.approx([0.25, -0.05, NAN, NAN], nan_ok=True)
+    assert [row.sigma_error for row in rows] == pytest.approx([0.05, 0.025, NAN, NAN], nan_ok=True)
+    assert [row.configured for row in rows] == [2.2, 4.2, 3.2, 0.3]
+    assert {(row.front, row.rear) for row in rows} == {("0.390 ± 0.015", "0.450 ± 0.050")}
+    assert [row.left_out for row in rows] == ["", "", "driven against the brakes", "below 0.5 m/s²"]
+
+
+@pytest.mark.parametrize(
+    ("friction", "sigma", "text"),
+    [(0.4, 0.02, "0.400 ± 0.020"), (0.4, NAN, "0.400"), (NAN, 0.02, "–")],
+    ids=["known", "sigma unknown", "unknown"],
+)
+def test_friction_as_text(friction: float, sigma: float, text: str) -> None:
+    assert friction_text(np.full(2, friction), np.full(2, sigma)) == text
 
 
 def test_what_is_left_out_does_not_count() -> None:
     found = prediction_errors(DRIVE)
-    assert (found.counted, found.nominal) == (2, 1)
-    assert found[2:] == pytest.approx((0.15, 0.25, 0.1))
+    assert found.counted == 2
+    assert (found.mean, found.median, found.worst, found.bias) == pytest.approx((0.15, 0.15, 0.25, 0.1))
 
 
-@pytest.mark.parametrize("found", [[], DRIVE[2:], [braking(1, 2.0, np.nan, left_out="no prediction")]])
+def test_what_else_could_have_predicted_them() -> None:
+    """Of the two that count linings are expected to give 2.0 and 4.0 m/s^2, and give 1.8 and 3.8.
+
+    Scales 0.9 and 0.95: the running average takes 1, then 0.95; one in hindsight is 0.9 or 0.95 throughout.
+    """
+    never, running, hindsight = peer_errors(DRIVE).values()
+    assert never.mean == pytest.approx(np.mean([0.2 / 2.0, 0.2 / 4.0]))
+    assert running.mean == pytest.approx(np.mean([0.2 / 2.0, 0.0]))
+    assert hindsight.mean == pytest.approx(min(np.mean([0.0, 0.2 / 4.0]), np.mean([0.1 / 2.0, 0.0])))
+    assert {peer.counted for peer in (never, running, hindsight)} == {2}
+
+
+@pytest.mark.parametrize(
+    "found", [[], DRIVE[2:], [braking(1, 2.0, 2.1)]], ids=["none", "none counts", "not predicted so"]
+)
+def test_nothing_is_compared_where_the_configured_prediction_is_not_known(found: list[Braking]) -> None:
+    assert peer_errors(found) == {}
+
+
+@pytest.mark.parametrize("found", [[], DRIVE[2:], [braking(1, 2.0, NAN, why="no prediction")]])
 def test_where_none_counts_there_is_no_plot(found: list[Braking]) -> None:
     assert plots_of_prediction(found) == {}
     assert prediction_errors(found).counted == 0
@@ -56,16 +94,19 @@ def test_axes_show_all_points_and_are_the_same() -> None:
     assert over_number.y_range.end == -over_number.y_range.start > 25.0
 
 
-def test_a_table_of_brakings_without_the_marks_is_judged_by_its_numbers(drive_files: dict[str, Path]) -> None:
-    """As another program may write it, with the columns of the contract alone."""
+def test_a_table_of_brakings_of_the_contract_alone_tells_of_no_prediction(
+    drive_files: dict[str, Path],
+) -> None:
+    """As another program may write it: deceleration measured and predicted, no specific force, no marks."""
     table = pq.read_table(drive_files["brakes"])
-    old = table.drop_columns(["sigma_decel_predicted", "learned_before", "left_out"])
+    kept = [name for name in table.column_names if "specific_force" not in name and "before" not in name]
     slow = [0.0 if number == 0 else 6.0 for number in table.column("brake").to_pylist()]
+    old = table.select([name for name in kept if name not in ("left_out", "mu_b_end", "sigma_mu_b_end")])
     pq.write_table(
         old.set_column(old.column_names.index("decel_mean"), "decel_mean", [slow]), drive_files["brakes"]
     )
     found = brakings(read_drive(drive_files["result"], (), ""), drive_files["result"])
     assert [row.left_out for row in found] == ["below 0.5 m/s²", "", ""]
-    assert [row.friction for row in prediction_rows(found)] == ["–"] * 3
-    assert prediction_errors(found).nominal == 0
-    assert plots_of_prediction(found)
+    assert [row.friction.tolist() for row in found] == [[0.38, 0.38, 0.49, 0.5]] * 3
+    assert prediction_rows(found) == []
+    assert plots_of_prediction(found) == {}

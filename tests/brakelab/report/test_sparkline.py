@@ -9,13 +9,9 @@ from brakelab.report.brakings import Braking
 from brakelab.report.drive import Drive
 from brakelab.report.sparkline import HEIGHT, POINTS, sparklines
 
-NONE = np.full(4, np.nan)
+from .conftest import braking_between
+
 T = np.arange(0.0, 30.0, 0.01)
-
-
-def braking(start: float, end: float) -> Braking:
-    nan = float("nan")
-    return Braking(1, start, end, 30.0, 0.0, nan, nan, nan, NONE, NONE, nan, nan, nan, "")
 
 
 def heights(svg: str, name: str) -> np.ndarray:
@@ -30,7 +26,7 @@ def two_brakings() -> tuple[Drive, list[Braking]]:
     demand = 4.0 * ((T >= 2) & (T < 8)) + 8.0 * ((T >= 12) & (T < 18))
     achieved = np.minimum(demand, 4.0) + 0.1 * (-1.0) ** np.arange(len(T))
     columns = {"decel_demand_total": demand, "accel_x_road": -achieved}
-    return Drive(T, columns, {}), [braking(2.0, 7.99), braking(12.0, 17.99)]
+    return Drive(T, columns, {}), [braking_between(2.0, 7.99), braking_between(12.0, 17.99)]
 
 
 def test_equal_decelerations_have_equal_heights(two_brakings: tuple[Drive, list[Braking]]) -> None:

@@ -10,6 +10,7 @@ from ecu.resources import resource
 
 STOP = """
 plant = "suv"
+draw = "nominal"
 initial_speed = 15.0
 phase = [
     { kind = "cruise", speed = 15.0, seconds = 1.0 },

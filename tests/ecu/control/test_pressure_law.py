@@ -25,6 +25,8 @@ BAR = 1e5
 PARAMS = new_params(load_config(Path(__file__).parents[3] / "config" / "suv.toml"))[0]
 BRAKES = [(0.060, 0.1205), (0.060, 0.1205), (0.034, 0.1288), (0.034, 0.1288)]  # Table D.1: d_p, r_eff [m]
 PUSH_OUT = 0.5 * BAR
+LEARNED_045 = np.zeros(1, LEARNED)[0]
+LEARNED_045["mu_b"] = 0.45
 
 
 def torque_of(pressure: float, mu: float, corner: int) -> float:
@@ -92,27 +94,61 @@ def test_the_push_out_pressure_is_not_scaled(params, pressure: float, used: floa
 
 @pytest.mark.parametrize(
     ("estimate", "used"),
-    [(0.05, 0.315), (0.31, 0.315), (0.32, 0.32), (0.58, 0.58), (0.59, 0.585), (2.0, 0.585)],
+    [(0.05, 0.225), (0.22, 0.225), (0.23, 0.23), (0.66, 0.66), (0.68, 0.675), (2.0, 0.675)],
 )
-def test_compensation_saturates_at_30_percent_of_the_base(estimate: float, used: float) -> None:
+def test_the_friction_in_use_stays_within_half_of_nominal(estimate: float, used: float) -> None:
     state = law()
     for _ in range(500):
-        follow_friction(PARAMS, state, estimated(np.full(4, estimate)), 0.01)
+        follow_friction(PARAMS, state, estimated(np.full(4, estimate)), LEARNED_045, 0.01)
     assert state["used"] == pytest.approx(np.full(4, used))
+
+
+@pytest.mark.parametrize(
+    ("case", "compensation", "mu", "factor"),
+    [
+        ("second order, at its limit", SECOND_ORDER, 0.45 * 0.7, 1.39),
+        ("second order, friction halved", SECOND_ORDER, 0.45 * 0.5, 1.39),
+        ("second order, half as much again: less pressure, not more", SECOND_ORDER, 0.45 * 1.5, 0.79),
+        ("second order, more than twice", SECOND_ORDER, 0.45 * 2.2, 0.79),
+        ("inverse, friction halved", INVERSE, 0.45 * 0.5, 2.0),
+        ("inverse, half as much again", INVERSE, 0.45 * 1.5, 1.0 / 1.5),
+    ],
+)
+def test_the_second_order_saturates_at_30_percent_of_the_base(params, case, compensation, mu, factor) -> None:
+    params["compensation"] = compensation
+    pressure = compensated_pressure(params[0], law(used=mu), PUSH_OUT + 40 * BAR, 0)
+    assert (pressure - PUSH_OUT) / (40 * BAR) == pytest.approx(factor), case
+
+
+@pytest.mark.parametrize(
+    ("case", "mu", "sigma", "used"),
+    [
+        ("rough and sure to 5 %", 0.54, 0.027, 0.54),
+        ("rough, sure to 10 %: twice the other 5 % less", 0.54, 0.054, 0.54 * math.exp(-0.10)),
+        ("rough, sure to 20 %: not sure that it is rough at all", 0.54, 0.108, 0.45),
+        ("smooth, sure to 5 %", 0.36, 0.018, 0.36),
+        ("smooth, sure to 20 %: more pressure is given all the same", 0.36, 0.072, 0.36),
+    ],
+)
+def test_less_pressure_is_given_only_as_far_as_the_estimate_is_sure(case, mu, sigma, used) -> None:
+    state = law()
+    for _ in range(100):
+        follow_friction(PARAMS, state, estimated(mu, sigma), LEARNED_045, 0.01)
+    assert state["used"] == pytest.approx(np.full(4, used)), case
 
 
 @pytest.mark.parametrize("dt", [0.01, 0.03])
 def test_the_friction_in_use_moves_no_faster_than_half_a_unit_a_second(dt: float) -> None:
     state = law()
     for k in range(1, 4):
-        follow_friction(PARAMS, state, estimated(np.array([0.6, 0.3, 0.45, 0.4501])), dt)
+        follow_friction(PARAMS, state, estimated(np.array([0.6, 0.3, 0.45, 0.4501])), LEARNED_045, dt)
         assert state["used"] == pytest.approx([0.45 + 0.5 * k * dt, 0.45 - 0.5 * k * dt, 0.45, 0.4501])
 
 
 def test_a_friction_that_is_not_a_number_does_not_stick(params) -> None:
     state = law()
-    follow_friction(PARAMS, state, estimated(np.full(4, math.nan)), 0.01)
-    follow_friction(PARAMS, state, estimated(np.full(4, 0.45)), 0.01)
+    follow_friction(PARAMS, state, estimated(np.full(4, math.nan)), LEARNED_045, 0.01)
+    follow_friction(PARAMS, state, estimated(np.full(4, 0.45)), LEARNED_045, 0.01)
     assert np.isfinite(state["used"]).all()
     assert np.isfinite(compensated_pressure(params[0], state, 30 * BAR, 0))
 
@@ -131,42 +167,43 @@ def test_without_compensation_nominal_friction_counts_whatever_was_learned(param
     learned["mu_b"] = 0.3
     state = law()
     set_base(params[0], state, learned[0])
-    follow_friction(params[0], state, estimated(np.full(4, 0.36)), 0.01)
+    follow_friction(params[0], state, estimated(np.full(4, 0.36)), LEARNED_045, 0.01)
     assert list(state["base"]) == list(state["used"]) == [0.45] * 4
 
 
 @pytest.mark.parametrize(
-    ("case", "began", "ended", "sigma", "observed_s", "start"),
+    ("case", "began", "level", "sigma", "observed_s", "start"),
     [
-        ("rises by a fifth within the braking", 0.40, 0.48, 0.02, 2.0, 0.40 / 0.48),
-        ("falls", 0.45, 0.40, 0.02, 2.0, 0.45 / 0.40),
-        ("doubles: cannot be all true", 0.30, 0.60, 0.02, 2.0, 0.75),
-        ("too unsure", 0.40, 0.48, 0.05, 2.0, 1.0),
-        ("too short", 0.40, 0.48, 0.02, 0.9, 1.0),
+        ("rises by a fifth within the braking", 0.40, 0.44, 0.02, 2.0, 0.40 / 0.44),
+        ("falls", 0.45, 0.42, 0.02, 2.0, 0.45 / 0.42),
+        ("doubles: cannot be all true", 0.30, 0.45, 0.02, 2.0, 0.75),
+        ("too unsure", 0.40, 0.44, 0.05, 2.0, 1.0),
+        ("too short", 0.40, 0.44, 0.02, 0.9, 1.0),
     ],
 )
-def test_a_braking_begins_with_another_friction_than_it_ends_with(
-    case, began, ended, sigma, observed_s, start
+def test_a_braking_begins_with_another_friction_than_is_learned_of_it(
+    case, began, level, sigma, observed_s, start
 ) -> None:
+    """What is learned is the mean over a braking; the next one begins as this one did."""
     state, learned = law(), np.zeros(1, LEARNED)
-    follow_friction(PARAMS, state, estimated(0.45, observed_s=0.5), 0.01)
+    learned["mu_b"], ended = level, 0.48
+    follow_friction(PARAMS, state, estimated(0.45, observed_s=0.5), learned[0], 0.01)
     assert not state["early"].any()  # not yet
-    follow_friction(PARAMS, state, estimated(began, observed_s=0.61), 0.01)
-    follow_friction(PARAMS, state, estimated(ended, observed_s=1.5), 0.01)
-    learn_start(state, estimated(ended, sigma, observed_s))
+    follow_friction(PARAMS, state, estimated(began, observed_s=0.61), learned[0], 0.01)
+    follow_friction(PARAMS, state, estimated(ended, observed_s=1.5), learned[0], 0.01)
+    learn_start(state, estimated(ended, sigma, observed_s), learned[0])
     assert state["start"] == pytest.approx(np.full(4, start)), case
-    learned["mu_b"] = ended
     set_base(PARAMS, state, learned[0])
-    assert state["base"] == pytest.approx(np.full(4, ended * start))
+    assert state["base"] == pytest.approx(np.full(4, level * start))
     assert not state["early"].any()
 
 
 def test_where_brakings_begin_with_another_friction_the_last_one_s_end_is_not_followed() -> None:
     state = law()
     state["start"][:2] = 0.9
-    follow_friction(PARAMS, state, estimated(0.5, observed_s=0.59), 0.01)
+    follow_friction(PARAMS, state, estimated(0.5, observed_s=0.59), LEARNED_045, 0.01)
     assert list(state["used"]) == pytest.approx([0.45, 0.45, 0.455, 0.455])
-    follow_friction(PARAMS, state, estimated(0.5, observed_s=0.61), 0.01)
+    follow_friction(PARAMS, state, estimated(0.5, observed_s=0.61), LEARNED_045, 0.01)
     assert list(state["used"]) == pytest.approx([0.455, 0.455, 0.46, 0.46])
 
 
@@ -181,7 +218,7 @@ def test_where_brakings_begin_with_another_friction_the_last_one_s_end_is_not_fo
 def test_friction_in_use_does_not_run_on_while_the_pressure_is_cut(case, cut, estimate, after) -> None:
     state = law()
     state["cut"] = cut
-    follow_friction(PARAMS, state, estimated(np.full(4, estimate)), 0.01)
+    follow_friction(PARAMS, state, estimated(np.full(4, estimate)), LEARNED_045, 0.01)
     assert state["used"] == pytest.approx(np.full(4, after)), case
 
 

@@ -14,17 +14,19 @@ SENT = np.array([60.0, 60.0, 40.0, 40.0]) * BAR
 
 
 class Wheels:
-    """A car that keeps its speed while the front-left wheel does what it is told."""
+    """A car that keeps its speed while the front-left wheel does what it is told.
 
-    def __init__(self, params, feed, speed: float = 20.0, **flags: float) -> None:
-        self.params, self.feed, self.flags = params[0], feed, flags
+    `turns`: the sign that its sensors give a wheel speed."""
+
+    def __init__(self, params, feed, speed: float = 20.0, turns: float = 1.0, **flags: float) -> None:
+        self.params, self.feed, self.flags, self.turns = params[0], feed, flags, turns
         self.state, self.motion = np.zeros(1, SLIP_GUARD_STATE)[0], np.zeros(1, MOTION_STATE)[0]
         self.inputs, self.speed = feed(), speed
         self.sent, self.wanted = SENT.copy(), SENT.copy()
 
     def cycle(self, slip: float) -> float:
         """Run a cycle; return the front-left wheel's cap [bar], infinite if it has none."""
-        omega = self.speed / self.params["wheel_radius"]
+        omega = self.turns * abs(self.speed) / self.params["wheel_radius"]
         omega[0] *= 1.0 + slip
         self.feed(self.inputs, wheel_speed=omega, **self.flags)
         pressures = self.sent, self.wanted, self.wanted
@@ -86,15 +88,19 @@ def test_what_caps_nothing(wheels: Wheels, case: str, slip: float, seconds: floa
 
 
 @pytest.mark.parametrize(
-    ("case", "speed", "flags"),
-    [
-        ("walking pace", 2.5, {}),
-        ("speed unknown", math.nan, {}),
-        ("reverse", 20.0, {"reverse": 1.0}),
-    ],
+    ("case", "speed"),
+    [("walking pace", 2.5), ("walking pace backwards", -2.5), ("speed unknown", math.nan)],
 )
-def test_where_nothing_is_capped(params, feed, case, speed, flags) -> None:
-    assert all(math.isinf(cap) for cap in Wheels(params, feed, speed, **flags).run_into(-0.9)), case
+def test_where_nothing_is_capped(params, feed, case, speed) -> None:
+    assert all(math.isinf(cap) for cap in Wheels(params, feed, speed).run_into(-0.9)), case
+
+
+@pytest.mark.parametrize("turns", [1.0, -1.0], ids=["wheel speeds without a sign", "with their sign"])
+def test_backwards_a_wheel_is_capped_as_forwards(params, feed, turns: float) -> None:
+    forwards = Wheels(params, feed, 8.0).run_into(-0.9)
+    backwards = Wheels(params, feed, -8.0, turns, reverse=1.0).run_into(-0.9)
+    assert any(math.isfinite(cap) for cap in forwards)
+    assert backwards == pytest.approx(forwards)
 
 
 @pytest.mark.parametrize("flag", ["abs_active", "esp_active"])

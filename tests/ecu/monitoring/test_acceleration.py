@@ -15,7 +15,7 @@ from ecu.estimation.motion import MOTION_STATE
 from ecu.monitoring.acceleration import ACCELERATION_STATE, watch_acceleration
 from ecu.params import GRAVITY
 from ecu.records import RecordArray
-from ecu.signals import MOTOR_TORQUE, USABLE
+from ecu.signals import MOTOR_TORQUE
 
 JUMP = 3.0  # s
 Course = Callable[[float], float]
@@ -76,9 +76,13 @@ def drive(
     wheels: Course,
     reading: Course,
     seconds: float = 6.0,
+    motors: bool = True,
     **disturbed: Any,
 ) -> list[bool]:
-    """Return in which cycles the reading was implausible; `disturbed`: inputs from `JUMP` on."""
+    """Return in which cycles the reading was implausible.
+
+    `motors`: their torque is reported; `disturbed`: inputs from `JUMP` on.
+    """
     rng = np.random.default_rng(7)
     p = params[0]
     state, motion = np.zeros(1, ACCELERATION_STATE)[0], np.zeros(1, MOTION_STATE)[0]
@@ -96,6 +100,8 @@ def drive(
         torque = -force(t) * p["mass"] * p["wheel_radius"] / 4.0 + rng.normal(0.0, 10.0, 4)
         values = {"wheel_speed": omega, "accel_x": seen, "motor_torque": torque, "calliper_pressure": 0.0}
         feed(inputs, **(values | disturbed if t >= JUMP else values))
+        if not motors:
+            inputs[0]["verdict"][MOTOR_TORQUE : MOTOR_TORQUE + 4] = 0
         watch_acceleration(p, state, inputs[0], motion, friction, base, speed, False, 0.01)
         said.append(bool(state["implausible"]))
     return said
@@ -141,16 +147,45 @@ def test_nothing_is_said_while_a_wheel_slides_or_another_brakes(
     assert not any(drive(params, feed, braked, none, none, steps(1.0), **disturbed))
 
 
-def test_without_the_torque_of_the_motors_only_a_braking_tells(params, feed) -> None:
-    inputs = feed()
-    state, motion = np.zeros(1, ACCELERATION_STATE)[0], np.zeros(1, MOTION_STATE)[0]
-    friction = np.zeros(1, FRICTION_STATE)[0]
-    friction["mu"] = base = params[0]["mu_nominal"].copy()
-    for reported, braking, good in ((True, False, 1), (False, True, 1), (False, False, 0)):
-        inputs["verdict"] = USABLE
-        feed(inputs, wheel_speed=20.0 / params[0]["wheel_radius"])
-        if not reported:
-            inputs[0]["verdict"][MOTOR_TORQUE : MOTOR_TORQUE + 4] = 0
-        state["good"] = 1
-        watch_acceleration(params[0], state, inputs[0], motion, friction, base, 20.0, braking, 0.001)
-        assert state["good"] == good, (reported, braking)
+def unreported(params: RecordArray) -> dict[str, Any]:
+    return {"motors": False}
+
+
+def badly_known(params: RecordArray) -> dict[str, Any]:
+    params["sigma_motor_torque"] = 0.15
+    return {}
+
+
+# what the reading does [m/s^2], said after [s], and no longer so long after the reading is right again [s]
+BY_WHEELS_ALONE = [
+    pytest.param(steps(1.0), None, id="a jump by 1: a slope may do that"),
+    pytest.param(steps(-1.8), None, id="by -1.8"),
+    pytest.param(steps(3.5), 1.2, id="by 3.5: no road does"),
+    pytest.param(steps(-3.5), 1.2, id="by -3.5"),
+    pytest.param(steps(3.5, JUMP, JUMP + 0.6), None, id="by 3.5 for a moment"),
+    pytest.param(steps(3.5, 0.0), -1.2, id="3.5 beside from the first"),
+]
+
+
+@pytest.mark.parametrize("drive_torque", [unreported, badly_known])
+@pytest.mark.parametrize(("reading", "after"), BY_WHEELS_ALONE)
+def test_where_the_drive_s_torque_is_not_known_only_what_no_road_does_is_doubted(
+    params, feed, drive_torque, reading: Course, after: float | None
+) -> None:
+    said = drive(params, feed, braked, none, none, reading, **drive_torque(params))
+    found = 0.01 * said.index(True) - JUMP if any(said) else None
+    print(found)
+    assert found == (None if after is None else pytest.approx(after, abs=0.25))
+
+
+def test_and_is_believed_again_once_a_road_could_do_it(params, feed) -> None:
+    said = drive(params, feed, braked, none, none, steps(3.5, 0.5, JUMP), 8.0, motors=False)
+    assert said[round(100 * JUMP) - 1]
+    gone = 0.01 * (len(said) - said[::-1].index(True)) - JUMP
+    print(gone)
+    assert 0.0 < gone < 0.6
+
+
+def test_forces_that_are_reported_tell_what_wheels_alone_do_not(params, feed) -> None:
+    assert any(drive(params, feed, braked, none, none, steps(1.0)))
+    assert not any(drive(params, feed, braked, none, none, steps(1.0), motors=False))

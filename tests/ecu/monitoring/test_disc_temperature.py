@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from brakelab.closed_loop import Drive, new_loop, run
-from brakelab.scenario import load_scenario
+from brakelab.scenario import load_scenario, with_draw
 from ecu.config import Config, load_config
 from ecu.estimation.friction import update_pressure
 from ecu.monitoring.application import update_application
@@ -331,7 +331,7 @@ def changed(config: Config, heating: float, cooling: float) -> Config:
 
 def driven(name: str, config: Config, known: bool) -> Drive:
     """Return a whole drive; `known`: the ECU is told how hot the discs are at the start."""
-    scenario = load_scenario(CONFIG / "scenarios" / f"{name}.toml")
+    scenario = with_draw(load_scenario(CONFIG / "scenarios" / f"{name}.toml"), "nominal")
     loop = new_loop(scenario, config, 1)
     if known:
         disc = loop.sides.state["discs"][0]

@@ -24,6 +24,7 @@ from ecu.config import new_params
 from ecu.estimation.joint.layout import (
     BIAS,
     DRAG,
+    LEVEL,
     LOAD,
     MASS,
     PEAK,
@@ -33,6 +34,7 @@ from ecu.estimation.joint.layout import (
     SINKING,
     STIFFNESS,
 )
+from ecu.estimation.joint.learned import KEPT
 from ecu.jit import kernel
 from ecu.records import OUTPUTS, RecordArray, new_record, output_vector
 from ecu.signals import N_OUTPUTS, OUTPUT_COLUMNS
@@ -102,12 +104,20 @@ def without(ablation: Ablation, scenario: Scenario, before: bool) -> Scenario:
 
 
 def forget(ablation: Ablation, learned: RecordArray) -> RecordArray:
-    """Return `LEARNED`, shape (1,), without what is forgotten: the prior is less than `UNKNOWN`."""
+    """Return `LEARNED`, shape (1,), with the prior of what is forgotten; it tells nothing of the rest."""
     learned = learned.copy()
-    for state in ablation.forgotten:
-        learned["joint"][0, state], learned["joint_sigma"][0, state] = 0.0, UNKNOWN
+    states = list(ablation.forgotten)
     if ablation.linings:
+        states += range(LEVEL, LEVEL + 4)
         learned["observed_s"] = 0.0
+    prior = new_state(new_params(configured()))["joint"]["p"][0][np.ix_(KEPT, KEPT)]
+    triangle, gone = np.tril_indices(len(KEPT)), np.isin(KEPT, states)
+    covariance = np.zeros_like(prior)
+    covariance[triangle] = learned["joint_covariance"][0]
+    covariance[gone], covariance[:, gone] = 0.0, 0.0
+    covariance[np.ix_(gone, gone)] = prior[np.ix_(gone, gone)]
+    learned["joint_covariance"][0] = covariance[triangle]
+    learned["joint"][0, states] = 0.0
     return learned
 
 

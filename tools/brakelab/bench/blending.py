@@ -1,9 +1,9 @@
 """Brake blending in closed loop: torque that changes hands, motors that are lost, and what friction that is
 wrong does to the sum (sections 5.3, 5.7; Figure 5.8).
 
-Torque is that of linings and motors of all wheels, true; the demand is m a r with mass and radius of the
-configuration (5.1). Counted from the full demand down to 1 km/h. For the first two the ECU is told the true
-friction: what is left is the error of blending.
+Torque is that of linings and motors of all wheels, true; the demand is m a r (5.1) with the radius of the
+configuration and the mass that the ECU knows. Counted from the full demand down to 1 km/h. For the first two
+the ECU is told the true friction: what is left is the error of blending.
 """
 
 from collections.abc import Callable
@@ -87,9 +87,12 @@ def torques(drive: Drive) -> tuple[Vector, Vector]:
 
 
 def demanded(drive: Drive, config: Config) -> Vector:
-    """Return the torque demanded (5.1) that the sum of the same row should be [N m], shape (n,)."""
+    """Return the torque demanded (5.1) that the sum of the same row should be [N m], shape (n,).
+
+    Of the mass that the ECU knows by then: it is learned.
+    """
     radius = float(new_params(config)["wheel_radius"].mean())
-    torque = config.vehicle.mass * drive.outputs["decel_demand_total"] * radius
+    torque = drive.outputs["vehicle_mass"] * drive.outputs["decel_demand_total"] * radius
     return np.concatenate([torque[:1], torque[:-1]])  # a demand acts in the cycle after it
 
 

@@ -197,7 +197,7 @@ def application(
                 prediction.rest,
                 prediction.configured_rest,
                 int(_modes(before, i) == HOLDING),
-                left_out(duration, prediction.measured, prediction.force, prediction.rows),
+                left_out(duration, prediction.measured, prediction.force, prediction.too_few),
             )
         )
     return lines

@@ -55,8 +55,8 @@ class Prediction(NamedTuple):
     configured_rest: float
     measured: float
     """Mean specific force, positive braking; NaN: the accelerometer was not usable."""
-    rows: int
-    """That count."""
+    too_few: str
+    """Why too few rows count, empty where enough do."""
 
 
 def corners(rows: Vector, name: str) -> Vector:
@@ -95,6 +95,15 @@ def that_count(rows: Vector, before: Vector, params: RecordArray) -> NDArray[np.
     return np.asarray(moves & ~accelerates & ~(-motors > DRIVEN * brakes) & (felt | ~felt.any()))
 
 
+def _too_few(speed: Vector, count: int) -> str:
+    """Return why too few rows count; `speed` [m/s] of all rows, shape (n,), `count` of those that do."""
+    if count >= LEAST_ROWS:
+        return ""
+    if np.isnan(speed).sum() > len(speed) - LEAST_ROWS:
+        return "inputs lost"
+    return "stands" if (speed > STANDING).sum() < LEAST_ROWS else "driven against the brakes"
+
+
 class _Car(NamedTuple):
     """What a prediction takes the car for."""
 
@@ -122,11 +131,12 @@ def predict(rows: Vector, before: Vector, params: RecordArray) -> Prediction:
         params: `PARAMS`, shape (1,).
     """
     p = params[0]
-    mass, overrun = (float(np.nan_to_num(before[OUTPUT[name]])) for name in ("vehicle_mass", "overrun"))
+    mass, overrun = float(before[OUTPUT["vehicle_mass"]]), float(np.nan_to_num(before[OUTPUT["overrun"]]))
+    mass = mass if np.isfinite(mass) else float(p["mass"])
     learned = _Car(corners(before, "mu_b"), mass, overrun)
     configured = _Car(p["mu_nominal"], float(p["mass"]), 0.0)
-    moves = rows[:, OUTPUT["vehicle_speed"]] > STANDING
-    decel = mean(np.where(moves, sum(_forces(rows, before, learned, params)), 0.0))
+    speed = rows[:, OUTPUT["vehicle_speed"]]
+    decel = mean(np.where(speed > STANDING, sum(_forces(rows, before, learned, params)), 0.0))
     rows = rows[that_count(rows, before, params)]
     brakes, rest = map(mean, _forces(rows, before, learned, params))
     configured_brakes, configured_rest = map(mean, _forces(rows, before, configured, params))
@@ -138,16 +148,16 @@ def predict(rows: Vector, before: Vector, params: RecordArray) -> Prediction:
     felt = rows[:, OUTPUT["accel_x_road"]] - np.nan_to_num(before[OUTPUT["accel_x_zero"]])
     return Prediction(
         decel, brakes + rest, sigma, configured_brakes + configured_rest, rest, configured_rest,
-        -mean(felt), len(rows),
+        -mean(felt), _too_few(speed, len(rows)),
     )  # fmt: skip
 
 
-def left_out(duration: float, measured: float, predicted: float, rows: int) -> str:
+def left_out(duration: float, measured: float, predicted: float, too_few: str = "") -> str:
     """Return why the prediction of an application does not count, empty where it does."""
     if duration < SHORT:
         return f"shorter than {SHORT} s"
-    if rows < LEAST_ROWS:
-        return "driven against the brakes"
+    if too_few:
+        return too_few
     if not np.isfinite([measured, predicted]).all():
         return "inputs lost"
     return f"below {WEAK} m/s²" if measured < WEAK else ""

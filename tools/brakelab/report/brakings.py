@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.replay.prediction import LEAST_ROWS, SHORT, left_out
+from brakelab.replay.prediction import SHORT, left_out
 from brakelab.report.drive import Drive, Vector, numbers, read_parquet
 from ecu.errors import UserError
 from ecu.signals import CORNERS
@@ -135,7 +135,7 @@ def _from_file(drive: Drive, path: Path) -> list[Braking]:
             friction[order], per_corner[0][order], temperature[order], float(energy[order].sum()),
             Force(*(float(column[order[0]]) for column in forces)),
             per_corner[1][order], per_corner[2][order],
-            str(told[order[0]] or "") if told else left_out(duration, achieved, predicted, LEAST_ROWS),
+            str(told[order[0]] or "") if told else left_out(duration, achieved, predicted),
         )  # fmt: skip
         found.append(braking._replace(demanded=_mean(_demand(drive)[inside(drive, braking)])))
     return found
