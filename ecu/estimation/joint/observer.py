@@ -16,7 +16,8 @@ import math
 
 from ecu.control.demand import LEAST_REQUEST, requested_decel
 from ecu.estimation.friction import driver_accelerates, drives_against
-from ecu.estimation.joint.kalman import GATE, clear_derivatives, correct, forget
+from ecu.estimation.joint.correction import APPLIED, correct_by_balance, correct_by_wheel
+from ecu.estimation.joint.kalman import clear_derivatives, correct, forget
 from ecu.estimation.joint.layout import (
     BIAS,
     CHANGE,
@@ -26,7 +27,6 @@ from ecu.estimation.joint.layout import (
     LOAD,
     MASS,
     MOTOR,
-    OFFSET,
     OVERRUN,
     PEAK,
     RADIUS,
@@ -39,10 +39,7 @@ from ecu.estimation.joint.layout import (
     N,
     V,
 )
-from ecu.estimation.joint.pressure import follows
 from ecu.estimation.joint.prior import (
-    SCALE_ONLY,
-    UNKNOWN_KICKS,
     forget_rate,
     keep_within_bounds,
     note_change,
@@ -50,22 +47,17 @@ from ecu.estimation.joint.prior import (
     set_prior,
     walk,
 )
-from ecu.estimation.joint.sampling import ACCEL
 from ecu.estimation.joint.sliding import HOLD_S, share_force, watch_tyres, wheel_slides, wheels_agree
 from ecu.estimation.joint.snapshot import go_back, keep, keep_newer
 from ecu.estimation.joint.wheel import (
-    brake_lever,
     brake_torque,
-    friction,
     predict_balance,
-    predict_wheel,
     unknown_share,
 )
 from ecu.estimation.joint.window import close_window, gather, open_window
 from ecu.estimation.joint.zero import settle_zero
 from ecu.estimation.motion import STANDING, mean_wheel_speed, speed_backwards, usable
 from ecu.jit import Record, kernel
-from ecu.params import GRAVITY
 from ecu.signals import (
     ABS_ACTIVE,
     ACCEL_X,
@@ -77,27 +69,15 @@ from ecu.signals import (
 WINDOW_S = 0.05
 LEAST_SPEED = 3.4  # m/s
 FREE = 0.4  # bar above push-out, mean of the wheels: the brakes are released
-APPLIED = 1.0  # bar above push-out: the brakes act
 STRAIGHT = 0.05  # lateral acceleration over gravity: more, and wheels roll by their own loads and angles
 VARIES_FROM, VARIES = 0.3, 0.2  # m/s^2: acceleration that tells a mass, and its change within seconds
-COLOURED = 20.0  # times the variance of white noise: what an inverter's torque errs by is not white
 MOTORS = 100.0  # N m of all motors: their torque is worth looking at
-SLIDING_FORCE = 0.3  # relative error of the force of a wheel that seems too fast, taken for its brake force
 BELIEVED_AFTER = 3.0  # s without a wheel that rolls, brakes released
 RELEASE = 0.15  # relative fall in a window: pressure, slip and force lag differently and teach nothing
 SNAPSHOT_S = 0.2
 
-BALANCE_FLOOR = 0.01  # m/s^2 that the balance leaves out
-BALANCE_SHARE = 0.004  # of the deceleration
-SKEW_FOLLOWED, SKEW_REPORTED = 0.5, 3.0  # windows between pressure and force; a foreign log is worse
-ACROSS = 0.4  # of the lateral acceleration: stands for less that lasts a second
-SKEW_ACCEL = 0.5  # windows between acceleration and torques
-TRANSIENT = 1.0  # of a slip's change since the last window
-CURVED = 1.0  # of a slip's part beyond that of a linear tyre: what the peak is not known for
-CORNERING = 1.0  # of slip, per squared adhesion used sideways: then load and slip angle are not well known
 UNEXPLAINED = 0.15  # m/s^2 while rolling: someone drives or brakes the car without saying so
 TWIN = 3.0  # bar, of a pressure taken from the other side
-LOW_SPEED_NOISE = 0.15  # m/s
 JUMP = 100.0  # squared test ratio: from here a reference is believed at once that wheels cannot deny
 
 
@@ -287,7 +267,7 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
         state.slides[i] = 1 if wheel_slides(params, state, i) else 0
         if not state.slides[i]:
             state.untrusted_s = 0.0
-            _fuse_wheel(params, state, i, before, moving, learning and braking)
+            correct_by_wheel(params, state, i, before, moving, learning and braking)
     if state.free[LEVEL]:
         weight = 0.0
         for i in range(4):
@@ -296,87 +276,12 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
             note_change(state, weight)
     watch_tyres(state, learning and braking)
     if seen and learning and w.balanced and (braking or w.motor_reported):
-        _fuse_balance(params, state, braking)
+        correct_by_balance(params, state, braking)
     state.pressed = max(abs(pressure_change(state, 0)), abs(pressure_change(state, 2)))
     state.last_accel, state.last_smooth_accel = w.accel, state.smooth_accel
     for i in range(4):
         state.motors.last_smooth[i] = state.motors.smooth[i]
         state.last_pressure[i], state.last_smooth[i] = w.pressure[i], state.smooth_pressure[i]
-
-
-@kernel
-def _fuse_wheel(params: Record, state: Record, i: int, before: float, moving: bool, observing: bool) -> None:
-    w, x = state.window, state.x
-    n = w.omega_samples[i]
-    ground = max(w.ground[i] + x[V] - before, 0.0)
-    omega = predict_wheel(params, state, i, ground)
-    if not moving:
-        clear_derivatives(state)
-        r = params.wheel_radius[i]
-        state.h[V] = 1.0 / r
-        correct(
-            state, w.omega[i] - ground / r, (params.sigma_wheel_speed**2 + (LOW_SPEED_NOISE / r) ** 2) / n
-        )
-        return
-    per_bar = state.h[OFFSET + i // 2]
-    variance = params.sigma_wheel_speed**2 / n
-    variance += per_bar**2 * (w.pressure_variance[i] + _skew(state, i) ** 2)
-    transient = TRANSIENT * state.unsettled * ground / params.wheel_radius[i]
-    corner = CORNERING * w.across * w.across * state.slip[i] * ground / params.wheel_radius[i]
-    curved = CURVED * state.curved * ground / params.wheel_radius[i]
-    variance += transient * transient + corner * corner + curved * curved
-    state.last_slip[i] = state.slip[i]
-    variance += state.per_torque**2 * _motor_variance(state, i, observing)
-    innovation = w.omega[i] - omega
-    mass, motor = state.free[MASS], state.free[MOTOR]
-    state.free[MASS] = state.free[MOTOR] = 0
-    state.ratio[i] = correct(state, innovation, variance)
-    state.free[MASS], state.free[MOTOR] = mass, motor
-    state.pull[i] = math.copysign(min(state.ratio[i], GATE * GATE), innovation)
-    state.observed[i] = 1 if observing and state.smooth_pressure[i] > 2.0 * APPLIED else 0
-
-
-@kernel
-def _skew(state: Record, i: int) -> float:
-    """Return what a pressure [bar] may be off because it acts earlier or later than it is told."""
-    windows = SKEW_FOLLOWED if follows(state.pressures, i) else SKEW_REPORTED
-    skew: float = windows * (state.smooth_pressure[i] - state.last_smooth[i])
-    return skew
-
-
-@kernel
-def _motor_variance(state: Record, i: int, braking: bool) -> float:
-    """Return the variance of a wheel's mean motor torque in this window [(N m)^2]."""
-    variance: float = state.motors.variance[i] / state.window.cycles
-    return variance if braking else COLOURED * variance
-
-
-@kernel
-def _fuse_balance(params: Record, state: Record, braking: bool) -> None:
-    w, wild = state.window, 0.0
-    left = predict_balance(params, state, braking)
-    variance = (
-        params.sigma_accel**2 / max(state.sampling.samples[ACCEL], 1)
-        + BALANCE_FLOOR**2
-        + (BALANCE_SHARE * w.accel) ** 2
-    )
-    variance += (SKEW_ACCEL * (w.accel - state.last_accel)) ** 2
-    variance += (ACROSS * w.across * GRAVITY) ** 2 + (UNKNOWN_KICKS * (1.0 - state.drive_known)) ** 2
-    for i in range(4):
-        per_bar = brake_lever(params, i) * friction(params, state, i)
-        per_torque = 1.0 / (params.wheel_radius[i] * params.mass)
-        per_bar *= per_torque
-        variance += per_torque**2 * _motor_variance(state, i, braking)
-        wild += per_torque * abs(w.motor[i])
-        if state.smooth_pressure[i] > 0.5:
-            variance += per_bar**2 * (w.pressure_variance[i] + _skew(state, i) ** 2)
-        if state.slides[i] and w.omega[i] * params.wheel_radius[i] < w.ground[i]:
-            return  # what it holds is the road's to say
-        if state.slides[i]:
-            variance += (SLIDING_FORCE * per_bar * w.pressure[i]) ** 2
-    wild *= max(params.sigma_motor_torque - SCALE_ONLY, 0.0)
-    variance += wild * wild * (1.0 if braking else COLOURED)
-    state.ratio[4] = correct(state, -left, variance)
 
 
 @kernel

@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 from ecu.estimation.joint import layout
+from ecu.estimation.joint.correction import BALANCE_FLOOR, BALANCE_SHARE
 from ecu.estimation.joint.layout import (
     CHANGE,
     DRIVE,
@@ -26,7 +27,6 @@ from ecu.estimation.joint.layout import (
     N,
     V,
 )
-from ecu.estimation.joint.observer import BALANCE_FLOOR, BALANCE_SHARE
 from ecu.estimation.joint.prior import PRIOR
 from ecu.estimation.joint.wheel import (
     NOMINAL_PEAK,
