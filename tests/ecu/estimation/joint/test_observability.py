@@ -9,7 +9,8 @@ import math
 import numpy as np
 import pytest
 
-from ecu.estimation.joint.correction import BALANCE_FLOOR, WINDOW_S
+from ecu.estimation.joint.correction import BALANCE_FLOOR
+from ecu.estimation.joint.observer import WINDOW_S
 from ecu.estimation.joint.layout import (
     BIAS,
     CHANGE,
