@@ -52,9 +52,9 @@ def simulate(
     draw: Draw = None,
 ) -> int:
     """A scenario in closed loop. Writes frames, decoded inputs and true values."""
-    from brakelab import closed_loop
+    from brakelab import simulate
 
-    return closed_loop.simulate(scenario, config, out, seed, draw)
+    return simulate.simulate(scenario, config, out, seed, draw)
 
 
 @app.command()

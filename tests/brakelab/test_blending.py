@@ -19,7 +19,8 @@ from brakelab.bench.blending import (
 )
 from brakelab.closed_loop import Drive, new_loop, run
 from brakelab.rig.faults import Fault
-from brakelab.scenario import Phase, Scenario, with_draw
+from brakelab.scenario import Phase, Scenario
+from brakelab.scenario_car import with_draw
 from ecu.config import load_config
 from ecu.diagnostics.faults import MOTOR_SHORT
 from ecu.resources import resource

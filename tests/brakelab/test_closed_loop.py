@@ -6,17 +6,11 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from brakelab.closed_loop import (
-    START_NS,
-    VEHICLE_BUS,
-    Drive,
-    new_loop,
-    plans,
-    run,
-    simulate,
-)
+from brakelab.closed_loop import START_NS, VEHICLE_BUS, Drive, new_loop, plans, run
 from brakelab.replay.engine import new_ecu, run_frames
-from brakelab.scenario import Scenario, load_scenario, with_draw
+from brakelab.scenario import Scenario, load_scenario
+from brakelab.scenario_car import with_draw
+from brakelab.simulate import simulate
 from ecu.bus.receive import new_reception
 from ecu.config import Config, load_config, new_params
 from ecu.errors import UserError

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from brakelab.plant.records import BRAKE, CRUISE
-from brakelab.scenario import load_scenario, scenario_plant
+from brakelab.scenario import load_scenario
+from brakelab.scenario_car import scenario_plant
 from ecu.errors import UserError
 
 CONFIG = Path(__file__).parents[2] / "config" / "scenarios"

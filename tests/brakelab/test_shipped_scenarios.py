@@ -10,7 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from brakelab.closed_loop import Drive, new_loop, run
-from brakelab.scenario import LONGEST, load_scenario, with_draw
+from brakelab.scenario import LONGEST, load_scenario
+from brakelab.scenario_car import with_draw
 from ecu.config import load_config
 from ecu.signals import CORNERS
 

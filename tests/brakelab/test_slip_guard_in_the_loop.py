@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from brakelab.closed_loop import Drive, new_loop, run
-from brakelab.scenario import Phase, Scenario, load_scenario, with_draw
+from brakelab.scenario import Phase, Scenario, load_scenario
+from brakelab.scenario_car import with_draw
 from ecu.config import Config, load_config
 from ecu.diagnostics.faults import WHEEL_SLIPS
 from ecu.resources import resource

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from brakelab.closed_loop import Drive, new_loop, run
-from brakelab.scenario import Payload, load_scenario, scenario_plant
+from brakelab.scenario import Payload, load_scenario
+from brakelab.scenario_car import scenario_plant
 from ecu.config import load_config
 from ecu.signals import CORNERS
 

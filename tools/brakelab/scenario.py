@@ -50,15 +50,14 @@ What goes wrong on the bus, at a sensor or an actuator is told by `[[fault]]` ta
 
 import math
 from pathlib import Path
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from brakelab.plant.cycle import CYCLE
-from brakelab.plant.description import Body, Plant, PlantFileError, load_plant
-from brakelab.plant.draw import Widths, load_widths
+from brakelab.plant.description import Body
 from brakelab.plant.driver import PEDAL_TRAVEL, Script
 from brakelab.plant.records import BRAKE, COAST, CRUISE, FOLLOW, PHASE
 from brakelab.plant.road import Road
@@ -66,8 +65,6 @@ from brakelab.plant.sensor_errors import Sensors
 from brakelab.plant.steering import Steering
 from brakelab.rig.faults import Fault
 from brakelab.speed_trace import SpeedTrace, generated_trace, read_trace, trace_of
-from ecu.errors import UserError
-from ecu.resources import named, resource
 from ecu.toml_file import describe, read_toml
 
 Positive = Annotated[float, Field(gt=0.0)]
@@ -335,44 +332,3 @@ def load_scenario(path: Path) -> Scenario:
         return Scenario.model_validate(content)
     except ValidationError as error:
         raise describe(error, str(path)) from None
-
-
-def scenario_plant(scenario: Scenario) -> Plant:
-    """Return the car of a scenario.
-
-    Raises:
-        UserError: the plant's file cannot be read or is wrong.
-    """
-    try:
-        plant = load_plant(named(scenario.plant, "config/plant"))
-    except PlantFileError as error:
-        raise UserError(error.where, error.place, error.remedy) from None
-    if scenario.payload is None:
-        return plant
-    laden = plant.vehicle.model_copy(update={"body": scenario.payload.body(plant.vehicle.body)})
-    return plant.model_copy(update={"vehicle": laden})
-
-
-def with_draw(scenario: Scenario, draw: str) -> Scenario:
-    """Return a scenario whose cars are drawn from that width, "wide" or "nominal".
-
-    Raises:
-        UserError: there is no such width.
-    """
-    known = get_args(Scenario.model_fields["draw"].annotation)
-    if draw not in known:
-        raise UserError("--draw", draw, f"no such draw of cars; choose {' or '.join(known)}")
-    return scenario.model_copy(update={"draw": draw})
-
-
-def scenario_widths(scenario: Scenario) -> Widths:
-    """Return how far the cars of a scenario are drawn: by the file beside the car's, or the shipped one.
-
-    Raises:
-        UserError: the file is wrong.
-    """
-    own = named(scenario.plant, "config/plant").with_name("draw.toml")
-    try:
-        return load_widths(own if own.is_file() else resource("config/plant/draw.toml"), scenario.draw)
-    except PlantFileError as error:
-        raise UserError(error.where, error.place, error.remedy) from None

@@ -27,7 +27,8 @@ from brakelab.plant.sensor_errors import (
 from brakelab.plant.sensors import body_accelerations, true_readings
 from brakelab.plant.vehicle import new_state
 from brakelab.rig.faults import fault_records, spoil_car
-from brakelab.scenario import Scenario, scenario_plant, scenario_widths
+from brakelab.scenario import Scenario
+from brakelab.scenario_car import scenario_plant, scenario_widths
 from ecu import signals
 from ecu.errors import UserError
 from ecu.jit import Record, kernel

@@ -19,11 +19,12 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from brakelab.closed_loop import Plans, plans, write_columns
+from brakelab.closed_loop import Plans, plans
 from brakelab.plant.driver import drive
 from brakelab.priority import ask_for_priority
 from brakelab.rig.faults import Way, convey, new_way
 from brakelab.scenario import Scenario, load_scenario
+from brakelab.simulate import write_columns
 from brakelab.vehicle_bus import (
     N_TRUTH,
     TRUTH_COLUMNS,

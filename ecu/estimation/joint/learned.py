@@ -17,6 +17,7 @@ from ecu.estimation.joint.layout import (
     DRAG,
     LEVEL,
     MASS,
+    MEAN,
     PASSING,
     PEAK,
     RADIUS,
@@ -75,11 +76,14 @@ def keep_joint(params: Record, state: Record, learned: Record) -> None:
     for k in range(len(KEPT)):
         i = KEPT[k]
         learned.joint[i] = state.x[i]
+        if LEVEL <= i < LEVEL + 4:
+            level = state.x[i] + state.x[MEAN + (i - LEVEL) // 2]  # what an application has shown so far
+            learned.joint[i] = min(max(level, math.log(LEAST_RATIO)), math.log(GREATEST_RATIO))
         for m in range(k + 1):
             learned.joint_covariance[place] = state.p[i, KEPT[m]]
             place += 1
     for i in range(4):
-        mu = params.mu_nominal[i] * math.exp(state.x[LEVEL + i])
+        mu = params.mu_nominal[i] * math.exp(learned.joint[LEVEL + i])
         learned.mu_b[i], learned.sigma_mu_b[i] = mu, mu * _sigma(params, state, i, False)
 
 

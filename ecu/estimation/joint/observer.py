@@ -17,6 +17,7 @@ import math
 from ecu.control.demand import LEAST_REQUEST, requested_decel
 from ecu.estimation.friction import driver_accelerates, drives_against
 from ecu.estimation.joint.correction import APPLIED, correct_by_balance, correct_by_wheel
+from ecu.estimation.joint.drive import measure_drive
 from ecu.estimation.joint.kalman import clear_derivatives, correct, forget
 from ecu.estimation.joint.layout import (
     BIAS,
@@ -202,6 +203,8 @@ def update_joint(
         return
     close_window(params, state)
     _fuse(params, state, inputs, braking)
+    if not braking and usable(inputs, ACCEL_X):
+        measure_drive(params, state)
     _look_after(params, state, braking)
     state.closed = 1
 

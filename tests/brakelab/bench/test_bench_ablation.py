@@ -16,7 +16,7 @@ from brakelab.bench.ablation import (
 from brakelab.bench.observers import counted
 from brakelab.bench.observers_cases import configured, shipped
 from brakelab.bench.stops import AXLES, estimate_errors
-from brakelab.scenario import with_draw
+from brakelab.scenario_car import with_draw
 from ecu.config import new_params
 from ecu.estimation.joint.layout import LEVEL, MASS, RATIO
 from ecu.estimation.joint.learned import KEPT

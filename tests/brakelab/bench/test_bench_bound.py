@@ -26,7 +26,7 @@ from brakelab.bench.observers_cases import ACCURACY, configured, shipped
 from brakelab.closed_loop import Drive, new_loop, run
 from brakelab.plant.records import GRAVITY, RecordArray
 from brakelab.plant.tyre import magic_formula
-from brakelab.scenario import with_draw
+from brakelab.scenario_car import with_draw
 from ecu.signals import CORNERS
 
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from brakelab.closed_loop import Drive, new_loop, run
-from brakelab.scenario import load_scenario, with_draw
+from brakelab.scenario import load_scenario
+from brakelab.scenario_car import with_draw
 from ecu.config import Config, load_config
 from ecu.estimation.friction import update_pressure
 from ecu.monitoring.application import update_application

@@ -31,7 +31,7 @@ from brakelab.bench.stops import AXLES, LOWEST_SPEED, Vector, columns, friction_
 from brakelab.closed_loop import Drive, new_loop, run
 from brakelab.observer import with_observer
 from brakelab.replay.signal_file import freshness_at_any_rate
-from brakelab.scenario import with_draw
+from brakelab.scenario_car import with_draw
 from ecu.config import new_params
 from ecu.diagnostics.store import out_of_range
 from ecu.params import OBSERVERS

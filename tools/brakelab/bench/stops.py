@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from brakelab.bench.measure import Figure, figure
 from brakelab.closed_loop import Drive, Loop, new_loop, run
-from brakelab.scenario import Scenario, load_scenario, with_draw
+from brakelab.scenario import Scenario, load_scenario
+from brakelab.scenario_car import with_draw
 from ecu.config import Config
 from ecu.resources import resource
 from ecu.signals import CORNERS

@@ -20,11 +20,12 @@ from typing import Any, Final
 import numpy as np
 
 from brakelab.candump_text import candump_text
-from brakelab.closed_loop import START_NS, VEHICLE_BUS, new_loop, run, run_blocks, write_columns
+from brakelab.closed_loop import START_NS, VEHICLE_BUS, new_loop, run, run_blocks
 from brakelab.fleet.job import Job, Outcome
 from brakelab.fleet.task import replay_job
 from brakelab.replay.progress import progress_bar
 from brakelab.scenario import Scenario
+from brakelab.simulate import write_columns
 from ecu.config import load_config
 from ecu.resources import named
 

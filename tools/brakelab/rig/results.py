@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.candump_text import candump_text
-from brakelab.closed_loop import START_NS, Loop, write_columns
+from brakelab.closed_loop import START_NS, Loop
 from brakelab.closed_loop import Drive as Simulated
 from brakelab.replay.engine import Rows, new_ecu
 from brakelab.replay.log import replay_log
 from brakelab.replay.quality import Findings
 from brakelab.replay.source import load_source
 from brakelab.results import MEASURED, ResultWriter
+from brakelab.simulate import write_columns
 from ecu import __version__
 from ecu.bus.receive import Reception
 from ecu.config import Config, config_hash, new_params

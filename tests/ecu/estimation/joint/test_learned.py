@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from ecu.config import load_config, new_params
 from ecu.diagnostics.store import JOINT_LIMIT, out_of_range
 from ecu.estimation.friction import FRICTION_STATE, GREATEST_RATIO, LEAST_RATIO
-from ecu.estimation.joint.layout import CHANGE, JOINT_STATE, LEVEL, MASS, PASSING, PEAK, RATE, N, V
+from ecu.estimation.joint.layout import CHANGE, JOINT_STATE, LEVEL, MASS, MEAN, PASSING, PEAK, RATE, N, V
 from ecu.estimation.joint.learned import (
     KEPT,
     LEVEL_PAUSE,
@@ -57,6 +57,7 @@ def driven(seed: int):
     root *= (0.5 * prior * random.uniform(0.1, 1.0, N) / np.sqrt((root**2).sum(axis=1)))[:, None]
     state["x"], state["p"] = 0.5 * prior * random.standard_normal(N), root @ root.T
     state["x"][LEVELS] = 0.1 * random.standard_normal(4)
+    state["x"][MEAN : MEAN + 2] = 0.0  # no application goes on
     return state
 
 
@@ -177,6 +178,16 @@ def test_the_base_of_the_next_braking_is_the_level(name: str, level, own, least,
     mu = SUV["mu_nominal"][wheel] * math.exp(level)
     assert learned["mu_b"][wheel] == pytest.approx(mu)
     assert learned["sigma_mu_b"][wheel] == pytest.approx(mu * max(own, least))
+
+
+def test_amid_an_application_what_it_has_shown_so_far_is_kept() -> None:
+    """The ECU may lose its power at any time."""
+    state = driven(3)
+    state["x"][LEVEL : LEVEL + 4], state["x"][MEAN : MEAN + 2] = 0.05, (-0.10, 0.02)
+    learned = keep(state)
+    expected = SUV["mu_nominal"] * np.exp([-0.05, -0.05, 0.07, 0.07])
+    assert learned["mu_b"] == pytest.approx(expected)
+    assert restored(learned)["x"][LEVEL : LEVEL + 4] == pytest.approx([-0.05, -0.05, 0.07, 0.07])
 
 
 def published(state, feed, braking: bool, friction=None):

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from ecu.estimation.joint.correction import BALANCE_FLOOR
-from ecu.estimation.joint.observer import WINDOW_S
 from ecu.estimation.joint.layout import (
     BIAS,
     CHANGE,
@@ -28,6 +27,7 @@ from ecu.estimation.joint.layout import (
     N,
     V,
 )
+from ecu.estimation.joint.observer import WINDOW_S
 from ecu.estimation.joint.prior import CHANGE_COMMON, LEVEL_AXLE, LEVEL_COMMON, LEVEL_WHEEL, PRIOR
 from ecu.estimation.joint.wheel import predict_balance, predict_wheel
 from ecu.signals import ACCEL_X, MOTOR_TORQUE
