@@ -19,7 +19,7 @@ from brakelab.bench.stops import AXLES, estimate_errors
 from brakelab.scenario_car import with_draw
 from ecu.config import new_params
 from ecu.estimation.joint.layout import LEVEL, MASS, RATIO
-from ecu.estimation.joint.learned import KEPT
+from ecu.estimation.joint.learned import KEPT, LEVEL_PAUSE
 from ecu.estimation.joint.prior import LEVEL_AXLE, LEVEL_COMMON, LEVEL_WHEEL, PRIOR
 from ecu.records import LEARNED, RecordArray, new_record
 from ecu.step import new_state
@@ -61,9 +61,10 @@ def test_forgotten_linings_are_nominal() -> None:
     np.testing.assert_allclose(state["friction"]["mu"], 0.45)
     np.testing.assert_allclose(joint["x"][LEVEL : LEVEL + 4], 0.0)
     level = joint["p"][LEVEL : LEVEL + 4, LEVEL : LEVEL + 4]
-    pause = 0.03**2
-    assert level[0, 0] == pytest.approx(LEVEL_COMMON**2 + LEVEL_AXLE**2 + LEVEL_WHEEL**2 + pause)
-    assert level[0, 2] == pytest.approx(LEVEL_COMMON**2 + pause)
+    prior = LEVEL_COMMON**2 + LEVEL_AXLE**2 + LEVEL_WHEEL**2
+    assert level[0, 0] == pytest.approx(prior)  # no pause makes it less sure than new
+    shared = (LEVEL_COMMON**2 + LEVEL_PAUSE**2) / (prior + LEVEL_PAUSE**2)
+    assert level[0, 2] == pytest.approx(shared * prior)
     assert joint["x"][RATIO] == pytest.approx(0.02)
     assert joint["p"][MASS, MASS] < PRIOR[MASS] ** 2
 
