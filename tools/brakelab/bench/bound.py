@@ -43,10 +43,11 @@ from brakelab.bench.bound_car import (
 from brakelab.bench.bound_system import PRIOR, Wander, before_stop, prior, system_of, wander_of
 from brakelab.bench.linear_bound import filtered, sampled
 from brakelab.bench.observers import JOINT, ORDINARY, counted, drive_car
-from brakelab.bench.observers_cases import ACCURACY, Setup, configured, shipped
+from brakelab.bench.observers_cases import ACCURACY, Setup, configured, goals, shipped
 from brakelab.bench.observers_table import ROUNDING
 from brakelab.bench.stops import AXLES, Vector, estimate_errors
 from brakelab.bench.table import Table
+from brakelab.scenario_car import with_draw
 from brakelab.vehicle_bus import new_vehicle
 from ecu.config import new_params
 from ecu.estimation.joint import layout
@@ -62,12 +63,13 @@ REMEDY: Final = {
     "course known": "with the course known",
 }
 BELOW: Final = (
-    f"Front/rear, medians over {{}} cars; of the bounds over {DRAWS} draws each of noise and of what is not "
+    "Front/rear, medians over {} cars of the nominal draw, whose spread the bounds know; of the bounds over "
+    f"{DRAWS} draws each of noise and of what is not "
     "known. A smoother knows the rest of the stop as well, which no ECU does. Front, rear: can a filter meet "
     "the goal that the joint observer misses? Yes: with what ten minutes show; with the car known: only with "
     "car and sensors known exactly; with the course known: only if it is known beforehand how friction is "
     "going to change; no: not even then. The joint observer can be better than *learned*, which allows for "
-    "1.5 % of motor torque; these cars report it exactly."
+    "wrong motor torque; these cars report it exactly."
 )
 
 
@@ -129,9 +131,9 @@ def axle_errors(course: Course, errors: Vector) -> Vector:
 
 def bounds_of(seed: int, names: Sequence[str] = tuple(ACCURACY)) -> list[Bound]:
     """Return the bounds of one car."""
-    config = configured()
-    ordinary, learned = drive_car(Setup(shipped(ORDINARY), config), JOINT, seed)
-    car = new_vehicle(shipped(ORDINARY), seed).params[0]
+    config, before = configured(), with_draw(shipped(ORDINARY), "nominal")
+    ordinary, learned = drive_car(Setup(before, config), JOINT, seed)
+    car = new_vehicle(before, seed).params[0]
     taught = course_of(ordinary, car, counted(ordinary))
     shown, usual = derivatives(car, taught), wander_of(taught)
     known_after = {
@@ -140,7 +142,8 @@ def bounds_of(seed: int, names: Sequence[str] = tuple(ACCURACY)) -> list[Bound]:
     }
     bounds = []
     for name in names:
-        drive, _ = drive_car(Setup(ACCURACY[name].scenario, config), JOINT, seed, learned)
+        scenario = with_draw(ACCURACY[name].scenario, "nominal")
+        drive, _ = drive_car(Setup(scenario, config), JOINT, seed, learned)
         rows = counted(drive)
         course = course_of(drive, car, rows)
         shown, wander = derivatives(car, course), wander_of(course)
@@ -183,7 +186,7 @@ def bound_table(bounds: Iterable[list[Bound]]) -> Table:
             }
             for kind in range(2)
         )
-        goal = ACCURACY[case].driven_in
+        _, goal = goals(case, "nominal")
         assert goal is not None
         cells = [f"{_pair(filters[level])} ({_pair(smoothers[level])})" for level in LEVELS]
         verdicts = [
