@@ -114,7 +114,7 @@ def end_prediction(state: Record) -> bool:
     before = state.worse
     state.worse += gain * (difference - before)
     state.spread += gain * ((difference - before) * (difference - state.worse) - state.spread)
-    doubt = BEYOND_DOUBT * math.sqrt(state.spread / state.applications)
+    doubt = BEYOND_DOUBT * math.sqrt(state.spread / max(state.applications - 1.0, 1.0))
     worse: bool = state.worse > max(LEAST_WORSE, doubt)
     return worse and state.applications >= LEAST_APPLICATIONS
 
