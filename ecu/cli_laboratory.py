@@ -19,9 +19,13 @@ from ecu.arguments import (
     State,
     scenario_file,
 )
+from ecu.cli_identify import app as identify_app
+from ecu.cli_lab import app as lab_app
 from ecu.errors import UserError
 
 app = typer.Typer()
+app.add_typer(lab_app, name="lab")
+app.add_typer(identify_app, name="identify")
 
 
 @app.command()

@@ -1,0 +1,39 @@
+"""`brake-ecu identify …`: models from measurements. Each command imports what it needs when it is called."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(help="Models from measurements of your own.", no_args_is_help=True)
+
+
+@app.callback()
+def _identify() -> None:
+    pass
+
+
+@app.command()
+def friction(
+    data: Annotated[
+        list[Path],
+        typer.Argument(metavar="DATA…", help="Recordings of one brake on a dynamometer: .csv .parquet .mf4"),
+    ],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="BRAKE.toml", help="Lining file of the simulated vehicle")
+    ],
+    columns: Annotated[
+        Path | None,
+        typer.Option("--columns", metavar="MAP.toml", help="Columns, units, brake; default: DATA with .toml"),
+    ] = None,
+    held_out: Annotated[
+        Path | None,
+        typer.Option(
+            "--held-out", metavar="DATA", help="The choice is made on this; default: the hottest stops"
+        ),
+    ] = None,
+) -> int:
+    """A friction law from a dynamometer's recording: all laws fitted, one chosen, its numbers and limits."""
+    from brakelab.friction_lab import command
+
+    return command.friction(data, columns, held_out, out)

@@ -1,0 +1,77 @@
+"""A short programme on brake A, with a drawn pad and with ILVO of the set R1."""
+
+from collections.abc import Callable
+from functools import partial
+from itertools import product
+
+import numpy as np
+import pytest
+
+from brakelab.friction_lab.columns import Columns
+from brakelab.friction_lab.dynamometer import new_bench
+from brakelab.friction_lab.recording import THRESHOLD, Recording, joined
+from brakelab.friction_lab.stops import Stops, find_stops
+from brakelab.plant.description import read_file
+from brakelab.plant.linings import Lining, Linings, rig_with
+from brakelab.plant.rig import PRESSURE, new_stop, run_stop
+from ecu.resources import resource
+
+KMH = 1.0 / 3.6
+
+
+@pytest.fixture(scope="session")
+def lining() -> Lining:
+    return read_file(resource("config/plant/linings.toml"), Linings).lining["A"]
+
+
+@pytest.fixture(scope="session")
+def columns(lining: Lining) -> Columns:
+    rig = rig_with(lining, "SIM")[0]
+    return Columns.own(lining, float(rig["mass"] * rig["tyre_radius"] ** 2))
+
+
+@pytest.fixture(scope="session")
+def recording(lining: Lining) -> Recording:
+    """Return 24 stops of a drawn pad."""
+    bench = new_bench(lining, "A", 1)
+    parts = []
+    for temperature, speed, bar in product((80.0, 140.0, 200.0), (80.0, 120.0), (15.0, 30.0, 50.0, 70.0)):
+        bench.temperature = temperature
+        bench.wait(60.0, 0.0)
+        bench.temperature = temperature
+        parts.append(
+            bench.measure(new_stop(PRESSURE, speed * KMH, 30.0 * KMH, temperature, pressure=bar * 1e5))
+        )
+    return joined(parts)
+
+
+def r1_recording(lining: Lining, noise: float, seed: int) -> Recording:
+    """Return 36 stops of R1 with `noise` relative to the torque, sampled from steps of 0.25 ms."""
+    random = np.random.default_rng(seed)
+    rig = rig_with(lining, "R1")
+    parts = []
+    grid = product((50.0, 80.0, 110.0, 140.0, 170.0, 200.0), (80.0, 120.0), (15.0, 40.0, 70.0))
+    for place, (temperature, speed, bar) in enumerate(grid):
+        stop = new_stop(PRESSURE, speed * KMH, 30.0 * KMH, temperature, pressure=bar * 1e5)
+        seen = run_stop(rig, stop, dt=2.5e-4)[::20]
+        parts.append(
+            Recording(
+                100.0 * place + seen["t"],
+                seen["pressure"] + THRESHOLD,
+                seen["torque"] * (1.0 + noise * random.standard_normal(len(seen))),
+                seen["speed"] / lining.brake.tyre_radius,
+                seen["temperature"],
+            )
+        )
+    return joined(parts)
+
+
+@pytest.fixture(scope="session")
+def ilvo_recording(lining: Lining) -> Callable[[float, int], Recording]:
+    """Return the function of noise and seed that runs R1."""
+    return partial(r1_recording, lining)
+
+
+@pytest.fixture(scope="session")
+def stops(recording: Recording, columns: Columns) -> Stops:
+    return find_stops(recording, columns, "recording")

@@ -1,0 +1,116 @@
+"""`brake-ecu lab` and `brake-ecu identify friction` from a recording to a law that the rig runs."""
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from brakelab.friction_lab import command, identification
+from brakelab.friction_lab.columns import Columns, load_columns
+from brakelab.friction_lab.identification import Judged, choose, hottest
+from brakelab.friction_lab.reader import read_recording
+from brakelab.friction_lab.recording import Recording, write_recording
+from brakelab.friction_lab.stops import Stops, find_stops
+from brakelab.plant.description import read_file
+from brakelab.plant.friction.constant import Constant
+from brakelab.plant.linings import Lining, Linings, rig_with
+from brakelab.plant.rig import nominal_friction
+from ecu.cli import app
+from ecu.errors import UserError
+
+
+class InThisProcess(ThreadPoolExecutor):
+    """A pool that sees what a test has replaced."""
+
+    def __init__(self, workers: int, mp_context: object) -> None:
+        super().__init__(1)
+
+
+def test_ams_of_brake_b_is_written_and_read(tmp_path: Path) -> None:
+    out = tmp_path / "ams.csv"
+    done = CliRunner().invoke(app, ["lab", "run", "ams", "--brake", "B", "--seed", "3", "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    read = read_recording(out)
+    stops = find_stops(read.recording, read.columns, "ams.csv")
+    assert len(stops) == 6
+    assert stops.start_temperature == pytest.approx([50, 100, 150, 200, 250, 300], abs=3.0)
+    assert load_columns(out.with_suffix(".toml")).rig.inertia == pytest.approx(stops.inertia)
+
+
+def test_a_law_is_identified_and_runs_on_the_rig(
+    tmp_path: Path,
+    recording: Recording,
+    lining: Lining,
+    columns: Columns,
+    stops: Stops,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The lining file has the chosen law as SIM; its nominal friction is what the recording shows."""
+    few = identification.candidates(stops, lining.brake)[:2]
+    monkeypatch.setattr(identification, "candidates", lambda stops, brake: few)
+    monkeypatch.setattr(identification, "ProcessPoolExecutor", InThisProcess)
+    monkeypatch.setattr(identification, "as_completed", list)
+    data, out = tmp_path / "own.parquet", tmp_path / "brake.toml"
+    assert columns.rig.inertia is not None
+    write_recording(data, recording, lining, columns.rig.inertia)
+    assert command.friction([data], None, None, out) == 0
+    found = read_file(out, Linings).lining["mine"]
+    assert found.brake == lining.brake
+    assert set(found.friction) == {"SIM", "constant", "table"}
+    assert found.friction["SIM"] == found.friction["table"]
+    nominal = nominal_friction(rig_with(found, "SIM"))
+    near = np.abs(stops.held_pressure - 30e5) < 5e5
+    seen = np.interp(100.0, stops.start_temperature[near], stops.mean[near])
+    assert nominal == pytest.approx(seen, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("call", "line"),
+    [
+        (lambda f: command.run("cpc", "D", 0, f), "--brake: D: no such brake; choose one of A, B, C"),
+        (lambda f: command.run("cpd", "A", 0, f), "cpd: no such file, and none that is shipped (ams, cpc)"),
+        (lambda f: command.run("ams", "A", 0, f, "R9"), "--law: R9: no such law; choose one of SIM, R1"),
+        (lambda f: command.run("ams", "A", 0, f.with_suffix(".xls")), "ends in .csv or .parquet"),
+        (lambda f: command.friction([f], None, None, f), "6 stops; needs 10"),
+    ],
+)
+def test_one_line_says_what_to_do(tmp_path: Path, call, line: str) -> None:
+    out = tmp_path / "data.csv"
+    command.run("ams", "A", 0, out)
+    with pytest.raises(UserError) as error:
+        call(out)
+    assert line in str(error.value)
+
+
+def test_recordings_of_two_brakes_are_not_one(tmp_path: Path) -> None:
+    for brake in "AB":
+        command.run("ams", brake, 0, tmp_path / f"{brake}.csv")
+    with pytest.raises(UserError, match="identify one brake at a time"):
+        command.look([tmp_path / "A.csv", tmp_path / "B.csv"], None)
+
+
+def judged(name: str, held_out: float, criterion: float) -> Judged:
+    law = Constant(law="constant", rig_mass=1.0, mu=0.4)
+    return Judged(name, law, False, 1, 1.0, held_out, criterion, (), (), "4 of 4", "")
+
+
+@pytest.mark.parametrize(
+    ("laws", "expected"),
+    [
+        ([("a", 4.0, -10.0), ("b", 6.0, -90.0)], "a"),
+        ([("a", 4.00, -10.0), ("b", 4.15, -90.0)], "b"),
+        ([("a", 4.00, -10.0), ("b", 4.25, -90.0)], "a"),
+    ],
+    ids=["least error unseen", "a tie goes to the criterion", "more than 5 % is no tie"],
+)
+def test_the_choice(laws: list[tuple[str, float, float]], expected: str) -> None:
+    assert choose(tuple(judged(*law) for law in laws)).name == expected
+
+
+def test_held_out_are_the_hottest(stops: Stops) -> None:
+    seen, unseen = hottest(stops)
+    assert len(seen) == 19
+    assert len(unseen) == 5
+    assert seen.start_temperature.max() <= unseen.start_temperature.min()

@@ -1,0 +1,114 @@
+"""A stranger's recording: other columns, units and separators, damaged rows; and each line that he gets."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from brakelab.friction_lab.columns import Columns, columns_text
+from brakelab.friction_lab.reader import read_recording
+from brakelab.friction_lab.recording import Recording, write_recording
+from brakelab.plant.linings import Lining
+from ecu.errors import UserError
+
+STRANGE = {
+    "time": ("Zeit", "ms", 1e3, 0.0),
+    "pressure": ("P_Line", "psi", 1.0 / 6894.757, 0.0),
+    "torque": ("M_B", "kN m", -1e-3, 0.0),
+    "speed": ("n", "rpm", 60.0 / (2.0 * np.pi), 0.0),
+    "temperature": ("T_Scheibe", "°F", 1.8, 32.0),
+}
+
+
+def strange(folder: Path, recording: Recording, columns: Columns, damaged: bool = False) -> Path:
+    """Write `recording` with semicolons, decimal commas and STRANGE units, and its file of columns."""
+    values = [getattr(recording, name) * factor + zero for name, (_, _, factor, zero) in STRANGE.items()]
+    rows = [";".join(f"{v:.6f}".replace(".", ",") for v in row) for row in zip(*values, strict=True)]
+    if damaged:
+        rows[50], rows[60], rows[70] = "12;13", rows[60].replace(";", ";x", 1), rows[10]
+    path = folder / "strange.csv"
+    path.write_text("\n".join([";".join(name for name, *_ in STRANGE.values()), *rows, ""]), "utf-8")
+    text = columns_text(columns)
+    for name, (label, unit, _, _) in STRANGE.items():
+        before = next(line for line in text.splitlines() if line.startswith(f"{name} = ["))
+        text = text.replace(before, f'{name} = ["{label}", "{unit}"]')
+    path.with_suffix(".toml").write_text(text, "utf-8")
+    return path
+
+
+@pytest.mark.parametrize("ending", [".csv", ".parquet"])
+def test_what_we_write_is_what_we_read(
+    tmp_path: Path, recording: Recording, lining: Lining, ending: str
+) -> None:
+    path = tmp_path / f"own{ending}"
+    write_recording(path, recording, lining, 129.0)
+    read = read_recording(path)
+    assert read.damaged == ""
+    assert read.columns.brake == lining.brake
+    assert read.columns.rig.inertia == 129.0
+    for found, written, digits in zip(read.recording, recording, (1e-3, 100.0, 0.1, 1e-3, 0.01), strict=True):
+        np.testing.assert_allclose(found, written, atol=digits)
+
+
+def test_a_stranger_s_units_become_si(tmp_path: Path, recording: Recording, columns: Columns) -> None:
+    read = read_recording(strange(tmp_path, recording, columns))
+    for found, written in zip(read.recording, recording, strict=True):
+        np.testing.assert_allclose(found, written, rtol=1e-4, atol=2e-3)
+
+
+def test_damaged_rows_are_left_out_and_counted(
+    tmp_path: Path, recording: Recording, columns: Columns
+) -> None:
+    read = read_recording(strange(tmp_path, recording, columns, damaged=True))
+    assert "3 rows left out" in read.damaged
+    assert len(read.recording.time) == len(recording.time) - 3
+
+
+def test_channels_of_mdf4(tmp_path: Path, recording: Recording, columns: Columns) -> None:
+    asammdf = pytest.importorskip("asammdf")
+    file = asammdf.MDF(version="4.10")
+    units = {
+        "pressure": ("pressure_bar", 1e-5),
+        "torque": ("torque_Nm", 1.0),
+        "temperature": ("disc_temperature_C", 1.0),
+    }
+    units["speed"] = ("speed_km_h", 3.6 * columns.brake.tyre_radius)
+    file.append(
+        [
+            asammdf.Signal(getattr(recording, q) * factor, recording.time, name=name)
+            for q, (name, factor) in units.items()
+        ]
+    )
+    path = tmp_path / "own.mf4"
+    file.save(path)
+    path.with_suffix(".toml").write_text(columns_text(columns), "utf-8")
+    for found, written in zip(read_recording(path).recording, recording, strict=True):
+        np.testing.assert_allclose(found, written, rtol=1e-9, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "line"),
+    [
+        (lambda f: f.unlink(), "no such file"),
+        (lambda f: f.with_suffix(".toml").unlink(), "no file of columns; give --columns"),
+        (lambda f: f.write_text(f.read_text().replace("P_Line", "P")), "P_Line: no such column; the file"),
+        (lambda f: _in_columns(f, '"psi"', '"pound"'), "unit 'pound' of pressure unknown; one of bar, kPa"),
+        (lambda f: _in_columns(f, "piston_area", "piston"), "brake.piston_area: missing; add this key"),
+        (lambda f: f.write_text("\n".join(f.read_text().splitlines()[:40]) + "\n"), "only 39 whole rows"),
+    ],
+    ids=["no file", "no columns", "column", "unit", "brake", "short"],
+)  # fmt: skip
+def test_one_line_says_what_to_do(
+    tmp_path: Path, recording: Recording, columns: Columns, spoil, line: str
+) -> None:
+    path = strange(tmp_path, recording, columns)
+    spoil(path)
+    with pytest.raises(UserError) as error:
+        read_recording(path)
+    assert line in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def _in_columns(path: Path, old: str, new: str) -> None:
+    beside = path.with_suffix(".toml")
+    beside.write_text(beside.read_text("utf-8").replace(old, new), "utf-8")

@@ -1,0 +1,107 @@
+"""The file that says what the columns of a dynamometer's recording mean, and what stood on it.
+
+name = "front axle"                # of the lining that is written
+[columns]                          # name in the file, and its unit
+time = ["Time", "s"]
+pressure = ["P_Line", "psi"]
+torque = ["Torque", "N m"]
+speed = ["Speed", "rpm"]           # rpm, rad/s of the disc; km/h, m/s, mph of the car
+temperature = ["T_disc", "°F"]
+[brake]                            # as in config/plant/linings.toml
+[rig]                              # inertia, pads, push_out_pressure
+[disc]                             # optional; without, heating is found from the stops
+"""
+
+from pathlib import Path
+from typing import Annotated, Final, Literal, Self
+
+from pydantic import Field, ValidationError, model_validator
+
+from brakelab.plant.friction.law import NotNegative, Positive, RigBrake, Section
+from brakelab.plant.linings import Lining
+from ecu.toml_file import describe, read_toml
+
+UNITS: Final[dict[str, dict[str, float]]] = {
+    "time": {"s": 1.0, "ms": 1e-3, "min": 60.0},
+    "pressure": {"bar": 1e5, "kPa": 1e3, "MPa": 1e6, "Pa": 1.0, "psi": 6894.757},
+    "torque": {"N m": 1.0, "Nm": 1.0, "kN m": 1e3, "lbf ft": 1.355818},
+    "speed": {"rad/s": 1.0, "rpm": 0.10471976, "m/s": -1.0, "km/h": -1.0 / 3.6, "mph": -0.44704},
+    "temperature": {"°C": 1.0, "C": 1.0, "K": 1.0, "°F": 1.0 / 1.8, "F": 1.0 / 1.8},
+}
+"""To s, Pa, N m, rad/s and K of difference; below zero: of the car's speed, to m/s."""
+ZEROS: Final = {"K": 273.15, "°F": 32.0, "F": 32.0}
+"""Reading at 0 degC."""
+
+Column = tuple[str, str]
+
+
+class Names(Section):
+    time: Column
+    pressure: Column
+    torque: Column
+    speed: Column
+    temperature: Column
+
+    @model_validator(mode="after")
+    def _units(self) -> Self:
+        for quantity, units in UNITS.items():
+            unit = getattr(self, quantity)[1]
+            if unit not in units:
+                raise ValueError(f"unit {unit!r} of {quantity} unknown; one of {', '.join(units)}")
+        return self
+
+
+class Rig(Section):
+    inertia: Positive | None = None  # kg m^2, of the flywheel; without, found from torque and slowing
+    pads: Literal[1, 2] = 2  # whose torque the sensor shows
+    push_out_pressure: NotNegative = 0.5  # bar, that does not press the pads
+
+
+class DiscGiven(Section):
+    diameter: Positive = 0.33  # m
+    heating: Positive | None = None  # K/J
+    cooling: NotNegative = 1.8e-3  # 1/s, Table C.1 at large
+    cooling_by_speed: NotNegative = 9e-5  # 1/m, likewise
+
+
+class Columns(Section):
+    """A file of columns."""
+
+    name: Annotated[str, Field(min_length=1)] = "mine"
+    columns: Names
+    brake: RigBrake
+    rig: Rig = Rig()
+    disc: DiscGiven = DiscGiven()
+
+    @classmethod
+    def own(cls, lining: Lining, inertia: float) -> Self:
+        """Return what describes our own recordings of `lining` on a flywheel of `inertia` [kg m^2]."""
+        names = Names(
+            time=("time_s", "s"),
+            pressure=("pressure_bar", "bar"),
+            torque=("torque_Nm", "N m"),
+            speed=("speed_km_h", "km/h"),
+            temperature=("disc_temperature_C", "°C"),
+        )
+        disc = DiscGiven(**lining.disc.model_dump())
+        return cls(columns=names, brake=lining.brake, rig=Rig(inertia=inertia), disc=disc)
+
+
+def load_columns(path: Path) -> Columns:
+    """Return the file of columns `path`. Raises `UserError`, one line."""
+    try:
+        return Columns.model_validate(read_toml(path))
+    except ValidationError as error:
+        raise describe(error, str(path)) from None
+
+
+def columns_text(columns: Columns) -> str:
+    """Return it as TOML."""
+    lines = [f'name = "{columns.name}"', "", "[columns]"]
+    for quantity, (name, unit) in columns.columns.model_dump().items():
+        lines.append(f'{quantity} = ["{name}", "{unit}"]')
+    for section in ("brake", "rig", "disc"):
+        lines += ["", f"[{section}]"]
+        values = getattr(columns, section).model_dump(exclude_none=True)
+        lines += [f"{name} = {value!r}" for name, value in values.items()]
+    return "\n".join([*lines, ""])

@@ -1,0 +1,142 @@
+"""`brake-ecu lab` and `brake-ecu identify friction`."""
+
+import time
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+from rich.console import Console
+
+from brakelab.bench.table import show
+from brakelab.friction_lab.analysis import history_effect, principal_components
+from brakelab.friction_lab.columns import Columns
+from brakelab.friction_lab.dynamometer import new_bench, run_programme
+from brakelab.friction_lab.identification import identify
+from brakelab.friction_lab.lining_file import write_lining
+from brakelab.friction_lab.plausibility import refuse_nonsense
+from brakelab.friction_lab.reader import read_recording
+from brakelab.friction_lab.recording import Recording, joined, write_recording
+from brakelab.friction_lab.stops import Stops, find_stops
+from brakelab.friction_lab.tables import (
+    component_table,
+    history_line,
+    law_tables,
+    number_table,
+    residual_table,
+)
+from brakelab.plant.description import read_file
+from brakelab.plant.linings import Linings
+from brakelab.plant.rig_programme import load_programme
+from ecu.errors import UserError
+from ecu.resources import named, resource
+
+BRAKES: Final = ("A", "B", "C")
+FEWEST: Final = 10
+"""Stops that identification needs."""
+BETWEEN: Final = 600.0
+"""s between recordings."""
+
+
+def run(programme: str, brake: str, seed: int, out: Path, law: str | None = None) -> int:
+    """Run a programme on the simulated dynamometer and write its recording. Returns 0.
+
+    `programme`: a file, or cpc, ams; `brake`: A, B or C, of which `seed` draws a pad and the sensors;
+    `law`: of config/plant/linings.toml instead of the pad.
+
+    Raises:
+        UserError: a programme, brake or law of that name does not exist, or `out` ends in something else.
+    """
+    if brake not in BRAKES:
+        raise UserError("--brake", brake, f"no such brake; choose one of {', '.join(BRAKES)}")
+    lining = read_file(resource("config/plant/linings.toml"), Linings).lining[brake]
+    if law is not None and law not in lining.friction:
+        raise UserError("--law", law, f"no such law; choose one of {', '.join(lining.friction)}")
+    bench = new_bench(lining, brake, seed, law=law or "")
+    last = time.monotonic()
+
+    def progress(done: int, of: int) -> None:
+        nonlocal last
+        if time.monotonic() - last > 1.0 or done == of:
+            last = time.monotonic()
+            _tell(f"{done} of {of} stops")
+
+    recording = run_programme(bench, load_programme(named(programme, "config/rig")), progress)
+    rig = bench.rig[0]
+    beside = write_recording(out, recording, lining, float(rig["mass"] * rig["tyre_radius"] ** 2))
+    hours, minutes = bench.time / 3600.0, recording.time.size / 200.0 / 60.0
+    _tell(f"{hours:.1f} h on the rig, {minutes:.0f} min recorded: {out}, {beside}")
+    return 0
+
+
+def look(data: list[Path], columns: Path | None) -> int:
+    """Print the principal components of a programme's stops and the effect of the stop before. Returns 0."""
+    stops = _read(data, columns).stops
+    _need(stops, data[0])
+    console = Console()
+    show(console, component_table(principal_components(stops)))
+    console.print(history_line(history_effect(stops)), highlight=False)
+    return 0
+
+
+def friction(data: list[Path], columns: Path | None, held_out: Path | None, out: Path) -> int:
+    """Identify all laws, print them, and write them with the chosen one as a lining file. Returns 0.
+
+    `data` are recordings of one brake; `columns` describes them all, default: the file beside each;
+    `held_out` is a recording that the choice is made by.
+
+    Raises:
+        UserError: a file cannot be read or makes no physical sense, or holds too few stops; one line.
+    """
+    measured = _read(data, columns)
+    _need(measured.stops, data[0])
+    unseen = None if held_out is None else _read([held_out], columns).stops
+    described = "the fifth of the stops that begins hottest" if held_out is None else str(held_out)
+    identified = identify(measured.columns, measured.stops, unseen, _tell)
+    tables = [
+        *law_tables(identified, described),
+        number_table(identified.chosen),
+        residual_table(identified.chosen, measured.columns, measured.stops),
+    ]
+    for table in tables:
+        show(Console(), table)
+    write_lining(out, measured.columns, measured.heating, identified)
+    _tell(f"written: {out}, the law chosen under the name SIM")
+    return 0
+
+
+class _Measured(NamedTuple):
+    columns: Columns
+    stops: Stops
+    heating: float  # K/J
+
+
+def _read(data: list[Path], columns: Path | None) -> _Measured:
+    """Return the stops of recordings of one brake, one after the other."""
+    parts: list[Recording] = []
+    first: Columns | None = None
+    heating = []
+    for path in data:
+        read = read_recording(path, columns)
+        if read.damaged:
+            _tell(read.damaged)
+        if first is None:
+            first = read.columns
+        elif (read.columns.brake, read.columns.rig) != (first.brake, first.rig):
+            raise UserError(
+                str(path), "brake, rig", f"differ from those of {data[0]}; identify one brake at a time"
+            )
+        heating.append(refuse_nonsense(read.recording, read.columns, str(path)).heating)
+        begin = parts[-1].time[-1] + BETWEEN if parts else 0.0
+        parts.append(read.recording._replace(time=read.recording.time - read.recording.time[0] + begin))
+    assert first is not None
+    stops = find_stops(joined(parts), first, str(data[0]))
+    return _Measured(first, stops, float(np.median(heating)))
+
+
+def _need(stops: Stops, path: Path) -> None:
+    if len(stops) < FEWEST:
+        raise UserError(str(path), "", f"{len(stops)} stops; needs {FEWEST}")
+
+
+def _tell(line: str) -> None:
+    Console(stderr=True).print(line, highlight=False, markup=False, soft_wrap=True)

@@ -1,0 +1,146 @@
+"""`brake-ecu identify friction`: all laws on one recording, and the choice among them.
+
+Choice. Every law is identified twice: on all stops, and without those held out. Held out is the programme
+that was given for it, else the fifth of the stops that begin hottest: a law that only copies what it saw
+shows itself there. Least error on what is held out wins; of laws within 5 % of it, the least information
+criterion (Schwarz's, with stops as observations, since the residuals of one stop hang together).
+"""
+
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from brakelab.friction_lab.candidates import Candidate, candidates
+from brakelab.friction_lab.columns import Columns
+from brakelab.friction_lab.fitting import Fitted, error_of, fit
+from brakelab.friction_lab.stops import Stops, some
+from brakelab.plant.friction.law import Law, RigBrake
+
+HELD_OUT: Final = 0.2
+TIE: Final = 1.05
+PROCESSES: Final = 2
+
+
+class Judged(NamedTuple):
+    """A law that was identified."""
+
+    name: str
+    law: Law
+    starts_at_measured: bool
+    free: int
+    error: float  # nRMSE [%] on what it was identified with
+    held_out: float  # nRMSE [%] on what it had not seen
+    criterion: float  # less is better
+    numbers: tuple[tuple[str, str, float, float], ...]  # name, unit, value, half of the interval of 95 %
+    unidentified: tuple[str, ...]
+    starts: str  # that agreed, of those tried
+    extrapolates: str
+
+
+class Identified(NamedTuple):
+    """All laws, in the order of `candidates`, and which was chosen."""
+
+    laws: tuple[Judged, ...]
+    chosen: Judged
+    stops: int
+    speed: tuple[float, float]  # m/s, sliding, least and greatest seen
+    pressure: tuple[float, float]  # Pa
+    temperature: tuple[float, float]  # degC
+
+
+class _Job(NamedTuple):
+    name: str
+    brake: RigBrake
+    stops: Stops
+    unseen: Stops | None
+
+
+def hottest(stops: Stops) -> tuple[Stops, Stops]:
+    """Return the stops without the fifth that begins hottest, and that fifth."""
+    order = np.argsort(stops.start_temperature, kind="stable")
+    cut = round((1.0 - HELD_OUT) * len(stops))
+    return some(stops, np.sort(order[:cut])), some(stops, np.sort(order[cut:]))
+
+
+def identify(
+    columns: Columns, stops: Stops, unseen: Stops | None, progress: Callable[[str], None]
+) -> Identified:
+    """Return all laws identified on `stops` and judged on `unseen`, by default the hottest of `stops`.
+
+    `progress` is told a line for each law. Two processes.
+    """
+    names = [candidate.name for candidate in candidates(stops, columns.brake)]
+    jobs = [_Job(name, columns.brake, stops, unseen) for name in names]
+    done: dict[str, Judged] = {}
+    with ProcessPoolExecutor(PROCESSES, mp_context=get_context("spawn")) as pool:
+        running = [pool.submit(judge, job) for job in reversed(jobs)]  # the slowest first
+        for future in as_completed(running):
+            judged = future.result()
+            done[judged.name] = judged
+            progress(
+                f"{len(done)} of {len(jobs)}: {judged.name}, nRMSE {judged.error:.2f} %, "
+                f"unseen {judged.held_out:.2f} %, {judged.starts} starts agree"
+            )
+    laws = tuple(done[name] for name in names)
+    return Identified(
+        laws,
+        choose(laws),
+        len(stops),
+        _span(stops.speed),
+        _span(stops.held_pressure),
+        _span(stops.temperature),
+    )
+
+
+def judge(job: _Job) -> Judged:
+    """Return one law identified and judged."""
+    candidate = _named(job.name, job.stops, job.brake)
+    fitted = fit(candidate, job.brake, job.stops)
+    if job.unseen is None:
+        seen, unseen = hottest(job.stops)
+        law = fit(candidate, job.brake, seen).law
+    else:
+        law, unseen = fitted.law, job.unseen
+    held_out = error_of(law, job.brake, unseen, candidate.starts_at_measured)
+    return Judged(
+        candidate.name,
+        fitted.law,
+        candidate.starts_at_measured,
+        len(candidate.free),
+        100.0 * float(np.sqrt(np.mean(fitted.residuals**2)) / np.mean(job.stops.mu)),
+        held_out,
+        criterion(fitted, job.stops),
+        tuple(
+            (free.name, free.unit, value, float(half))
+            for free, value, half in zip(candidate.free, fitted.values, fitted.half, strict=True)
+        ),
+        tuple(fitted.unidentified()),
+        f"{fitted.agreed} of {fitted.tried}",
+        candidate.extrapolates,
+    )
+
+
+def criterion(fitted: Fitted, stops: Stops) -> float:
+    """Return n ln(mean square) + k ln n, n the number of stops."""
+    count = len(stops)
+    mean_square = max(float(np.mean(fitted.residuals**2)), 1e-300)
+    return count * float(np.log(mean_square)) + len(fitted.candidate.free) * float(np.log(count))
+
+
+def choose(laws: tuple[Judged, ...]) -> Judged:
+    """Return the law of least error on what it had not seen; of those that tie, of the least criterion."""
+    least = min(judged.held_out for judged in laws)
+    tied = [judged for judged in laws if judged.held_out <= TIE * least]
+    return min(tied, key=lambda judged: judged.criterion)
+
+
+def _named(name: str, stops: Stops, brake: RigBrake) -> Candidate:
+    return next(candidate for candidate in candidates(stops, brake) if candidate.name == name)
+
+
+def _span(values: np.ndarray) -> tuple[float, float]:
+    low, high = np.percentile(values, [0.5, 99.5])
+    return float(low), float(high)

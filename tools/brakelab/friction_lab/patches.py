@@ -1,0 +1,127 @@
+"""A pad as no law under test has it: plateaus that heat builds, a film that running-in leaves, and chance.
+
+Model. Contact temperature T_c of the plateaus, share n of secondary plateaus, film f, chance x, with p
+pressure, v sliding speed and T disc temperature; w the way that the pad has rubbed:
+
+    T_c' = (T + flash p v - T_c) / 0.3 s
+    dn/dw = (B (1 - n) - D n) / way,   B = birth exp(-E (1/T_c - 1/373 K)) (p / 30 bar)^press
+                                       D = 1 + wear p v / 30 MPa m/s + 3 S((T_c - fade_at) / 40 K)
+    df/dw = (1 - f) / 600 m - S((T_c - fade_at) / 40 K) f / 80 m,   S the logistic function
+    mu_b = (mu_0 + mu_n n (0.8 + 0.2 f)) (1 - fade S((T_c - fade_at) / 60 K)) exp(x + x_stop)
+
+x is a first-order Markov process over the way (5 m, `ripple`), x_stop a draw per application (`scatter`).
+At the release half of what n differs from its value at rest is lost. T_c is not measured, n and f outlive
+the stop: so the same stop depends on what was before it.
+
+Source. The ingredients are those of sections 2.3 and 3.3 (plateaus that temperature, pressure and shear build
+and wear destroys; decay above a critical temperature); the form and the numbers are an assumption, chosen so
+that a constant pressure cycle correlates roughly as Table 3.2 has it and AMS fades as Table 3.4 measured.
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.random import Generator
+
+from brakelab.plant.friction.law import KELVIN
+from brakelab.plant.jit import Record, kernel
+from brakelab.plant.records import RecordArray, new_record
+
+PAD: Final = np.dtype(
+    [
+        ("mu_0", "f8"),
+        ("mu_n", "f8"),
+        ("birth", "f8"),
+        ("activation", "f8"),  # K
+        ("press", "f8"),
+        ("wear", "f8"),
+        ("flash", "f8"),  # K per Pa m/s
+        ("way", "f8"),  # m
+        ("fade", "f8"),
+        ("fade_at", "f8"),  # degC
+        ("scatter", "f8"),
+        ("ripple", "f8"),
+    ],
+    align=True,
+)
+STATE: Final = np.dtype(
+    [
+        ("plateaus", "f8"),
+        ("film", "f8"),
+        ("contact_temperature", "f8"),  # degC
+        ("ripple", "f8"),
+        ("scatter", "f8"),
+    ],
+    align=True,
+)
+
+MEDIANS: Final[dict[str, tuple[float, ...]]] = {
+    "A": (0.250, 0.420, 1.1, 1500.0, 0.45, 0.70, 0.9e-6, 7.0, 0.55, 390.0, 0.020, 0.012),
+    "B": (0.200, 0.520, 0.9, 1600.0, 0.45, 0.70, 0.7e-6, 8.0, 0.30, 460.0, 0.030, 0.015),
+    "C": (0.230, 0.370, 1.2, 1500.0, 0.35, 0.70, 0.8e-6, 7.0, 0.65, 365.0, 0.025, 0.012),
+}
+SPREAD: Final = 0.06
+"""Standard deviation of the logarithm of each number between pads of one make."""
+REST: Final = 0.30  # share of plateaus that a pad at rest tends to
+KEPT: Final = 0.5
+FLASH_TIME: Final = 0.3  # s
+RIPPLE_WAY: Final = 5.0  # m
+PRESSURE: Final = 30e5  # Pa
+POWER: Final = 30e6  # Pa m/s
+
+
+def draw_pad(brake: str, random: Generator) -> RecordArray:
+    """Return one pad of the make of brake A, B or C, shape (1,), dtype PAD."""
+    pad = new_record(PAD)
+    pad[0] = tuple(value * math.exp(SPREAD * random.standard_normal()) for value in MEDIANS[brake])
+    return pad
+
+
+def bedded(ambient: float) -> RecordArray:
+    """Return the state of a pad that was bedded in, at `ambient` [degC], shape (1,), dtype STATE."""
+    state = new_record(STATE)
+    state[0] = (REST, 0.8, ambient, 0.0, 0.0)
+    return state
+
+
+@kernel
+def apply(pad: Record, state: Record, temperature: float, random: Generator) -> None:
+    """Start an application on a disc of `temperature` [degC]."""
+    state.plateaus = REST + KEPT * (state.plateaus - REST)
+    state.contact_temperature = temperature
+    state.scatter = pad.scatter * random.standard_normal()
+
+
+@kernel
+def logistic(x: float) -> float:
+    return 1.0 / (1.0 + math.exp(-min(max(x, -40.0), 40.0)))
+
+
+@kernel
+def rub(
+    pad: Record,
+    state: Record,
+    pressure: float,
+    speed: float,
+    temperature: float,
+    dt: float,
+    random: Generator,
+) -> float:
+    """Return mu_b `dt` [s] later, at `pressure` [Pa], sliding `speed` [m/s], disc `temperature` [degC]."""
+    power = pressure * speed
+    goal = temperature + pad.flash * power
+    state.contact_temperature += (goal - state.contact_temperature) * dt / FLASH_TIME
+    way = speed * dt
+    kelvin = state.contact_temperature + KELVIN
+    burnt = logistic((state.contact_temperature - pad.fade_at) / 40.0)
+    births = pad.birth * math.exp(-pad.activation * (1.0 / kelvin - 1.0 / 373.15))
+    births *= (max(pressure, 1e3) / PRESSURE) ** pad.press
+    deaths = 1.0 + pad.wear * power / POWER + 3.0 * burnt
+    state.plateaus += (births * (1.0 - state.plateaus) - deaths * state.plateaus) * way / pad.way
+    state.film += way * ((1.0 - state.film) / 600.0 - burnt * state.film / 80.0)
+    kept = math.exp(-way / RIPPLE_WAY)
+    state.ripple = kept * state.ripple + pad.ripple * math.sqrt(1.0 - kept * kept) * random.standard_normal()
+    mu = pad.mu_0 + pad.mu_n * state.plateaus * (0.8 + 0.2 * state.film)
+    mu *= 1.0 - pad.fade * logistic((state.contact_temperature - pad.fade_at) / 60.0)
+    return float(mu * math.exp(state.ripple + state.scatter))
