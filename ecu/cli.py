@@ -33,7 +33,7 @@ from ecu.arguments import (
 from ecu.cli_laboratory import app as laboratory
 from ecu.errors import RunFault, UserError
 
-LABORATORY = ("bokeh", "jinja2", "pyarrow", "pymoo")
+LABORATORY = ("bokeh", "jinja2", "pyarrow", "pymoo", "scipy")
 """What the extra `lab` installs, by the names that are imported."""
 FLEET = ("distributed", "fsspec")
 """What the extra `fleet` installs."""

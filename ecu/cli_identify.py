@@ -32,8 +32,12 @@ def friction(
             "--held-out", metavar="DATA", help="The choice is made on this; default: the hottest stops"
         ),
     ] = None,
+    profile: Annotated[
+        str | None,
+        typer.Option("--profile", metavar="LAW", help="Profile likelihood of this law's numbers too"),
+    ] = None,
 ) -> int:
     """A friction law from a dynamometer's recording: all laws fitted, one chosen, its numbers and limits."""
     from brakelab.friction_lab import command
 
-    return command.friction(data, columns, held_out, out)
+    return command.friction(data, columns, held_out, out, profile)

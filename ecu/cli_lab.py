@@ -16,19 +16,25 @@ def run(
     out: Annotated[
         Path, typer.Option("--out", metavar="DATA", help=".csv or .parquet; columns and brake go beside it")
     ],
-    brake: Annotated[str, typer.Option("--brake", metavar="BRAKE", help="A, B or C")] = "A",
+    brake: Annotated[
+        str, typer.Option("--brake", metavar="BRAKE", help="A, B or C; or a lining of LININGS")
+    ] = "A",
     seed: Annotated[
         int, typer.Option("--seed", min=0, help="Seed of the pad, its chance and the sensors")
     ] = 0,
     law: Annotated[
         str | None,
-        typer.Option("--law", metavar="LAW", help="Of the shipped linings, instead of a pad"),
+        typer.Option("--law", metavar="LAW", help="A friction law of the lining, instead of a pad"),
+    ] = None,
+    linings: Annotated[
+        Path | None,
+        typer.Option("--linings", metavar="LININGS", help="What `identify friction` wrote; needs --law"),
     ] = None,
 ) -> int:
     """A programme on the simulated dynamometer, 200 Hz, with a pad that follows none of the laws."""
     from brakelab.friction_lab import command
 
-    return command.run(programme, brake, seed, out, law)
+    return command.run(programme, brake, seed, out, law, linings)
 
 
 @app.command()

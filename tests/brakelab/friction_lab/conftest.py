@@ -1,13 +1,14 @@
-"""A short programme on brake A, with a drawn pad and with ILVO of the set R1."""
+"""A short programme on brake A, with a drawn pad and with ILVO of the set R1; and as a stranger's CSV."""
 
 from collections.abc import Callable
 from functools import partial
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from brakelab.friction_lab.columns import Columns
+from brakelab.friction_lab.columns import Columns, columns_text
 from brakelab.friction_lab.dynamometer import new_bench
 from brakelab.friction_lab.recording import THRESHOLD, Recording, joined
 from brakelab.friction_lab.stops import Stops, find_stops
@@ -75,3 +76,34 @@ def ilvo_recording(lining: Lining) -> Callable[[float, int], Recording]:
 @pytest.fixture(scope="session")
 def stops(recording: Recording, columns: Columns) -> Stops:
     return find_stops(recording, columns, "recording")
+
+
+STRANGE = {
+    "time": ("Zeit", "ms", 1e3, 0.0),
+    "pressure": ("P_Line", "psi", 1.0 / 6894.757, 0.0),
+    "torque": ("M_B", "kN m", -1e-3, 0.0),
+    "speed": ("n", "rpm", 60.0 / (2.0 * np.pi), 0.0),
+    "temperature": ("T_Scheibe", "°F", 1.8, 32.0),
+}
+
+
+def write_strange(columns: Columns, folder: Path, recording: Recording, damaged: bool = False) -> Path:
+    """Write `recording` with semicolons, decimal commas and STRANGE units, and its file of columns."""
+    values = [getattr(recording, name) * factor + zero for name, (_, _, factor, zero) in STRANGE.items()]
+    rows = [";".join(f"{v:.6f}".replace(".", ",") for v in row) for row in zip(*values, strict=True)]
+    if damaged:
+        rows[50], rows[60], rows[70] = "12;13", rows[60].replace(";", ";x", 1), rows[10]
+    path = folder / "strange.csv"
+    path.write_text("\n".join([";".join(name for name, *_ in STRANGE.values()), *rows, ""]), "utf-8")
+    text = columns_text(columns)
+    for name, (label, unit, _, _) in STRANGE.items():
+        before = next(line for line in text.splitlines() if line.startswith(f"{name} = ["))
+        text = text.replace(before, f'{name} = ["{label}", "{unit}"]')
+    path.with_suffix(".toml").write_text(text, "utf-8")
+    return path
+
+
+@pytest.fixture
+def strange(columns: Columns) -> Callable[..., Path]:
+    """Return the function of folder and recording that writes a stranger's CSV."""
+    return partial(write_strange, columns)

@@ -1,5 +1,6 @@
 """A stranger's recording: other columns, units and separators, damaged rows; and each line that he gets."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,29 +12,7 @@ from brakelab.friction_lab.recording import Recording, write_recording
 from brakelab.plant.linings import Lining
 from ecu.errors import UserError
 
-STRANGE = {
-    "time": ("Zeit", "ms", 1e3, 0.0),
-    "pressure": ("P_Line", "psi", 1.0 / 6894.757, 0.0),
-    "torque": ("M_B", "kN m", -1e-3, 0.0),
-    "speed": ("n", "rpm", 60.0 / (2.0 * np.pi), 0.0),
-    "temperature": ("T_Scheibe", "°F", 1.8, 32.0),
-}
-
-
-def strange(folder: Path, recording: Recording, columns: Columns, damaged: bool = False) -> Path:
-    """Write `recording` with semicolons, decimal commas and STRANGE units, and its file of columns."""
-    values = [getattr(recording, name) * factor + zero for name, (_, _, factor, zero) in STRANGE.items()]
-    rows = [";".join(f"{v:.6f}".replace(".", ",") for v in row) for row in zip(*values, strict=True)]
-    if damaged:
-        rows[50], rows[60], rows[70] = "12;13", rows[60].replace(";", ";x", 1), rows[10]
-    path = folder / "strange.csv"
-    path.write_text("\n".join([";".join(name for name, *_ in STRANGE.values()), *rows, ""]), "utf-8")
-    text = columns_text(columns)
-    for name, (label, unit, _, _) in STRANGE.items():
-        before = next(line for line in text.splitlines() if line.startswith(f"{name} = ["))
-        text = text.replace(before, f'{name} = ["{label}", "{unit}"]')
-    path.with_suffix(".toml").write_text(text, "utf-8")
-    return path
+Write = Callable[..., Path]
 
 
 @pytest.mark.parametrize("ending", [".csv", ".parquet"])
@@ -50,16 +29,14 @@ def test_what_we_write_is_what_we_read(
         np.testing.assert_allclose(found, written, atol=digits)
 
 
-def test_a_stranger_s_units_become_si(tmp_path: Path, recording: Recording, columns: Columns) -> None:
-    read = read_recording(strange(tmp_path, recording, columns))
+def test_a_stranger_s_units_become_si(tmp_path: Path, recording: Recording, strange: Write) -> None:
+    read = read_recording(strange(tmp_path, recording))
     for found, written in zip(read.recording, recording, strict=True):
         np.testing.assert_allclose(found, written, rtol=1e-4, atol=2e-3)
 
 
-def test_damaged_rows_are_left_out_and_counted(
-    tmp_path: Path, recording: Recording, columns: Columns
-) -> None:
-    read = read_recording(strange(tmp_path, recording, columns, damaged=True))
+def test_damaged_rows_are_left_out_and_counted(tmp_path: Path, recording: Recording, strange: Write) -> None:
+    read = read_recording(strange(tmp_path, recording, damaged=True))
     assert "3 rows left out" in read.damaged
     assert len(read.recording.time) == len(recording.time) - 3
 
@@ -99,9 +76,9 @@ def test_channels_of_mdf4(tmp_path: Path, recording: Recording, columns: Columns
     ids=["no file", "no columns", "column", "unit", "brake", "short"],
 )  # fmt: skip
 def test_one_line_says_what_to_do(
-    tmp_path: Path, recording: Recording, columns: Columns, spoil, line: str
+    tmp_path: Path, recording: Recording, strange: Write, spoil, line: str
 ) -> None:
-    path = strange(tmp_path, recording, columns)
+    path = strange(tmp_path, recording)
     spoil(path)
     with pytest.raises(UserError) as error:
         read_recording(path)

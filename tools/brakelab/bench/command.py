@@ -41,6 +41,7 @@ from brakelab.bench.texts import (
     COMPENSATION_TEXT,
     ENERGY_TEXT,
     FRICTION_TEXT,
+    LAB_TEXT,
     LATENESS_TEXT,
     MARGINS_TEXT,
     OBSERVERS_TEXT,
@@ -58,6 +59,7 @@ OBSERVERS: Final = "observers"
 ABLATION: Final = "ablation"
 BOUND: Final = "bound"
 FRICTION: Final = "friction"
+LAB: Final = "lab"
 ENERGY: Final = "energy"
 BLENDING: Final = "blending"
 COMPENSATION: Final = "compensation"
@@ -125,6 +127,7 @@ def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0, 
         ABLATION: partial(_ablation, seeds=seeds),
         BOUND: partial(_bound, seeds=seeds),
         FRICTION: _friction,
+        LAB: _lab,
         ENERGY: _energy,
         COMPENSATION: _compensation,
         MARGINS: _margins,
@@ -229,6 +232,15 @@ def _bound(json: bool, seeds: int) -> int:
 
 def _friction(json: bool) -> int:
     return _page(FRICTION, "Friction laws, disc and brake unit", FRICTION_TEXT, friction_tables(), json)
+
+
+def _lab(json: bool) -> int:
+    from brakelab.bench.lab import run_lab
+    from brakelab.bench.lab_table import lab_tables
+
+    console = Console(stderr=True)
+    tables = lab_tables(run_lab(lambda line: console.print(line, highlight=False, markup=False)))
+    return _page(LAB, "The friction laboratory", LAB_TEXT, tables, json, "friction-lab")
 
 
 def _energy(json: bool) -> int:

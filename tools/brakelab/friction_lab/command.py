@@ -9,8 +9,10 @@ from rich.console import Console
 
 from brakelab.bench.table import show
 from brakelab.friction_lab.analysis import history_effect, principal_components
+from brakelab.friction_lab.candidates import candidates
 from brakelab.friction_lab.columns import Columns
 from brakelab.friction_lab.dynamometer import new_bench, run_programme
+from brakelab.friction_lab.fitting import fit
 from brakelab.friction_lab.identification import identify
 from brakelab.friction_lab.lining_file import write_lining
 from brakelab.friction_lab.plausibility import refuse_nonsense
@@ -22,33 +24,38 @@ from brakelab.friction_lab.tables import (
     history_line,
     law_tables,
     number_table,
+    profile_table,
     residual_table,
 )
-from brakelab.plant.description import read_file
-from brakelab.plant.linings import Linings
+from brakelab.plant.description import PlantFileError, read_file
+from brakelab.plant.linings import Lining, Linings
 from brakelab.plant.rig_programme import load_programme
 from ecu.errors import UserError
 from ecu.resources import named, resource
 
-BRAKES: Final = ("A", "B", "C")
 FEWEST: Final = 10
 """Stops that identification needs."""
 BETWEEN: Final = 600.0
 """s between recordings."""
 
 
-def run(programme: str, brake: str, seed: int, out: Path, law: str | None = None) -> int:
+def run(
+    programme: str, brake: str, seed: int, out: Path, law: str | None = None, linings: Path | None = None
+) -> int:
     """Run a programme on the simulated dynamometer and write its recording. Returns 0.
 
-    `programme`: a file, or cpc, ams; `brake`: A, B or C, of which `seed` draws a pad and the sensors;
-    `law`: of config/plant/linings.toml instead of the pad.
+    `programme`: a file, or cpc, ams; `brake`: A, B or C, of which `seed` draws a pad and the sensors, or a
+    lining of the file `linings`; `law`: of the lining, instead of a pad.
 
     Raises:
         UserError: a programme, brake or law of that name does not exist, or `out` ends in something else.
     """
-    if brake not in BRAKES:
-        raise UserError("--brake", brake, f"no such brake; choose one of {', '.join(BRAKES)}")
-    lining = read_file(resource("config/plant/linings.toml"), Linings).lining[brake]
+    known = _linings(linings)
+    if brake not in known:
+        raise UserError("--brake", brake, f"no such brake; choose one of {', '.join(known)}")
+    lining = known[brake]
+    if linings is not None and law is None:
+        raise UserError("--law", "", f"missing; --linings has laws, no pads: {', '.join(lining.friction)}")
     if law is not None and law not in lining.friction:
         raise UserError("--law", law, f"no such law; choose one of {', '.join(lining.friction)}")
     bench = new_bench(lining, brake, seed, law=law or "")
@@ -78,7 +85,9 @@ def look(data: list[Path], columns: Path | None) -> int:
     return 0
 
 
-def friction(data: list[Path], columns: Path | None, held_out: Path | None, out: Path) -> int:
+def friction(
+    data: list[Path], columns: Path | None, held_out: Path | None, out: Path, profile: str | None = None
+) -> int:
     """Identify all laws, print them, and write them with the chosen one as a lining file. Returns 0.
 
     `data` are recordings of one brake; `columns` describes them all, default: the file beside each;
@@ -89,6 +98,9 @@ def friction(data: list[Path], columns: Path | None, held_out: Path | None, out:
     """
     measured = _read(data, columns)
     _need(measured.stops, data[0])
+    laws = {candidate.name: candidate for candidate in candidates(measured.stops, measured.columns.brake)}
+    if profile is not None and profile not in laws:
+        raise UserError("--profile", profile, f"no such law; choose one of {', '.join(laws)}")
     unseen = None if held_out is None else _read([held_out], columns).stops
     described = "the fifth of the stops that begins hottest" if held_out is None else str(held_out)
     identified = identify(measured.columns, measured.stops, unseen, _tell)
@@ -97,11 +109,24 @@ def friction(data: list[Path], columns: Path | None, held_out: Path | None, out:
         number_table(identified.chosen),
         residual_table(identified.chosen, measured.columns, measured.stops),
     ]
+    if profile is not None:
+        fitted = fit(laws[profile], measured.columns.brake, measured.stops)
+        tables.append(profile_table(fitted, measured.columns.brake, measured.stops, _tell))
     for table in tables:
         show(Console(), table)
     write_lining(out, measured.columns, measured.heating, identified)
     _tell(f"written: {out}, the law chosen under the name SIM")
     return 0
+
+
+def _linings(path: Path | None) -> dict[str, Lining]:
+    """Return the linings of a file, or those that are shipped."""
+    if path is None:
+        return read_file(resource("config/plant/linings.toml"), Linings).lining
+    try:
+        return read_file(path, Linings).lining
+    except PlantFileError as error:
+        raise UserError(str(path), error.place, error.remedy) from None
 
 
 class _Measured(NamedTuple):

@@ -164,9 +164,16 @@ def fit(candidate: Candidate, brake: RigBrake, stops: Stops, seed: int = 0) -> F
     ended.sort(key=lambda pair: pair[0])
     polished = [_least_squares(walk, shares) for _, shares in ended[:POLISHED]]
     polished.sort(key=lambda result: result.cost)
-    agreed = sum(result.cost <= 1.01 * polished[0].cost for result in polished)
+    agreed = sum(bool(result.cost <= 1.01 * polished[0].cost) for result in polished)
     best = min((_least_squares(finish, r.x) for r in polished[:FINISHED]), key=lambda r: r.cost)
     return _judged(candidate, brake, stops, best.x, agreed, len(polished))
+
+
+def refit(fitted: Fitted, brake: RigBrake, stops: Stops) -> Law:
+    """Return the law fitted to other `stops`, by least squares from where `fitted` ended."""
+    candidate = fitted.candidate
+    found = _least_squares(residual_function(candidate, brake, stops), fitted.shares)
+    return candidate.law(candidate.values(found.x))
 
 
 def _starts(candidate: Candidate, mean: float, seed: int) -> Matrix:

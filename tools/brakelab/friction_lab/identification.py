@@ -15,7 +15,7 @@ import numpy as np
 
 from brakelab.friction_lab.candidates import Candidate, candidates
 from brakelab.friction_lab.columns import Columns
-from brakelab.friction_lab.fitting import Fitted, error_of, fit
+from brakelab.friction_lab.fitting import Fitted, error_of, fit, refit
 from brakelab.friction_lab.stops import Stops, some
 from brakelab.plant.friction.law import Law, RigBrake
 
@@ -101,7 +101,7 @@ def judge(job: _Job) -> Judged:
     fitted = fit(candidate, job.brake, job.stops)
     if job.unseen is None:
         seen, unseen = hottest(job.stops)
-        law = fit(candidate, job.brake, seen).law
+        law = refit(fitted, job.brake, seen)
     else:
         law, unseen = fitted.law, job.unseen
     held_out = error_of(law, job.brake, unseen, candidate.starts_at_measured)

@@ -49,11 +49,10 @@ class Stops:
     block_first: Places  # (blocks,)
     block_stop: Places  # (blocks,), the stop of each
     mu: Vector  # (blocks,), measured
-    mean: Vector  # (stops,), measured, over distance
+    mean: Vector  # (stops,), over distance, of the recursive curve (SAE J2522)
     start_speed: Vector  # (stops,), m/s, sliding
     start_temperature: Vector  # (stops,), degC
     held_pressure: Vector  # (stops,), Pa, mean where friction counts
-    begin: Vector  # (stops,), s
     inertia: float  # kg m^2
 
     def __len__(self) -> int:
@@ -105,7 +104,8 @@ def find_stops(recording: Recording, columns: Columns, where: str) -> Stops:
         starts.append(blocks)
         owners.append(np.full(count, stop))
         mu.append(found)
-        mean.append(np.average(found, weights=speed[use].mean(axis=1)))
+        curve = friction_over_time(torque[begin:end], on, lever, dt)
+        mean.append(np.average(curve[risen - begin :], weights=speed[risen:end]))
         held.append(pressure[risen:end].mean())
     return Stops(
         first.astype(np.int64),
@@ -123,7 +123,6 @@ def find_stops(recording: Recording, columns: Columns, where: str) -> Stops:
         np.array([speed[begin : begin + per_block].mean() for begin in first[:-1]]),
         np.array([recording.temperature[run[0] : run[0] + per_block].mean() for run in runs]),
         np.array(held),
-        np.array([time[run[0]] for run in runs]),
         inertia,
     )
 
@@ -140,7 +139,7 @@ def some(stops: Stops, wanted: Places) -> Stops:
     ]
     owners = [np.full(len(block), place) for place, block in enumerate(blocks)]
     sampled = ("pressure", "speed", "temperature", "slowing", "torque")
-    each = ("mean", "start_speed", "start_temperature", "held_pressure", "begin")
+    each = ("mean", "start_speed", "start_temperature", "held_pressure")
     return replace(
         stops,
         first=first.astype(np.int64),

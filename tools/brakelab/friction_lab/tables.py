@@ -1,13 +1,17 @@
 """What was identified, as tables."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from brakelab.bench.table import Table
 from brakelab.friction_lab.analysis import Components, History
 from brakelab.friction_lab.columns import Columns
-from brakelab.friction_lab.fitting import replayed
+from brakelab.friction_lab.fitting import Fitted, replayed
 from brakelab.friction_lab.identification import Identified, Judged
+from brakelab.friction_lab.profile import profile_interval
 from brakelab.friction_lab.stops import Stops
+from brakelab.plant.friction.law import RigBrake
 
 PARTS = 5
 
@@ -54,6 +58,23 @@ def number_table(judged: Judged) -> Table:
     ]
     below = "Intervals of 95 %, residuals of one stop taken together. Told: by these stops."
     return Table(f"Numbers of {judged.name}", ("number", "value", "±", "unit", "told"), rows, below)
+
+
+def profile_table(fitted: Fitted, brake: RigBrake, stops: Stops, progress: Callable[[str], None]) -> Table:
+    """Return the profile likelihood's intervals beside those of slopes; `progress` is told each number."""
+    rows = []
+    for place, (free, value, half) in enumerate(
+        zip(fitted.candidate.free, fitted.values, fitted.half, strict=True)
+    ):
+        interval = profile_interval(fitted, brake, stops, place)
+        progress(f"profile: {free.name}")
+        slopes = f"{value - half:.4g} to {value + half:.4g}"
+        rows.append(
+            (free.name, f"{value:.4g}", slopes, f"{interval.low:.4g} to {interval.high:.4g}", free.unit)
+        )
+    columns = ("number", "value", "by slopes", "by profile", "unit")
+    below = "Intervals of 95 %. An infinite end: the stops do not bound the number on that side."
+    return Table(f"Profile of {fitted.candidate.name}", columns, rows, below)
 
 
 def residual_table(judged: Judged, columns: Columns, stops: Stops) -> Table:

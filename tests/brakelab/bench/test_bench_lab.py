@@ -1,0 +1,67 @@
+"""The bench of the friction laboratory: the printed tables it stands beside, and its own arithmetic."""
+
+import numpy as np
+import pytest
+
+from brakelab.bench.friction import LOADINGS, TABLE_3_4, TEMPERATURES
+from brakelab.bench.lab import linings, on_ams, r1_recording, recovery
+from brakelab.bench.lab_table import PRINTED, TABLE_3_4_NRMSE
+from brakelab.friction_lab.columns import Columns
+from brakelab.friction_lab.dynamometer import new_bench, run_programme
+from brakelab.friction_lab.identification import Judged
+from brakelab.friction_lab.stops import Stops, find_stops
+from brakelab.plant.friction.constant import Constant
+from brakelab.plant.rig_programme import load_programme
+from ecu.resources import resource
+
+
+@pytest.fixture(scope="module")
+def ams() -> Stops:
+    lining = linings().lining["A"]
+    bench = new_bench(lining, "A", 1)
+    programme = load_programme(resource("config/rig/ams.toml"))
+    recording = run_programme(bench, programme, lambda done, of: None)
+    rig = bench.rig[0]
+    return find_stops(recording, Columns.own(lining, float(rig["mass"] * rig["tyre_radius"] ** 2)), "ams")
+
+
+@pytest.mark.parametrize("law", ["ostermeyer", "ostermeyer_revised", "ilvo"])
+@pytest.mark.parametrize("brake", ["A", "B", "C"])
+def test_printed_errors_are_at_least_those_of_the_means(law: str, brake: str) -> None:
+    """A stop's nRMSE holds the error of its mean, so no printed nRMSE may be far below (weights differ)."""
+    measured = np.array(TABLE_3_4["measured"][brake])
+    means = 100.0 * np.abs(np.array(TABLE_3_4[PRINTED[law]][brake]) / measured - 1.0)
+    assert np.all(np.array(TABLE_3_4_NRMSE[law][brake]) > means - 2.0)
+
+
+@pytest.mark.parametrize(("brake", "share"), [("A", 0.362), ("B", 0.253), ("C", 0.250)])
+def test_the_thesis_s_loadings_give_these_shares_of_variance(brake: str, share: float) -> None:
+    """Temperature's r^2 from the loading l and the three components' variance V: 2 l^2 (4 V - 3)^2."""
+    *_, loading, variance = LOADINGS[brake]
+    assert 2.0 * (loading * (4.0 * variance - 3.0)) ** 2 == pytest.approx(share, abs=0.01)
+
+
+def test_a_constant_on_ams_errs_by_its_distance(ams: Stops) -> None:
+    law = Constant(law="constant", rig_mass=996.0, mu=0.40)
+    judged = Judged("constant", law, False, 1, 0.0, 0.0, 0.0, (), (), "", "")
+    found = on_ams(judged, linings().lining["A"], ams)
+    assert len(ams) == len(TEMPERATURES)
+    expected = 100.0 * (0.40 / ams.mean - 1.0)
+    assert found.replayed == pytest.approx(expected, abs=1e-9)
+    assert found.closed == pytest.approx(expected, abs=1e-6)
+    assert np.all(found.nrmse >= np.abs(found.replayed) - 0.5)
+
+
+def test_coverage_counts_draws_inside() -> None:
+    truth = np.array([1.0, 2.0])
+    draws = [("A", np.array([1.0 + off, 2.0]), np.array([0.1, 0.2]), truth) for off in (0.05, 0.2, -0.09)]
+    found = recovery("A", [*draws, ("B", truth, truth, truth)])
+    assert found.inside == pytest.approx([2.0 / 3.0, 1.0])
+    assert found.width == pytest.approx([10.0, 10.0])
+
+
+def test_the_noise_of_a_recovery_is_one_percent() -> None:
+    lining = linings().lining["A"]
+    one, two = (r1_recording(lining, seed).torque for seed in (0, 1))
+    on = one > 100.0
+    assert np.std(one[on] / two[on] - 1.0) == pytest.approx(0.01 * np.sqrt(2.0), rel=0.03)

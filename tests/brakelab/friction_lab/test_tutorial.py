@@ -1,0 +1,59 @@
+"""The tutorial of docs/friction-lab.md, run as it stands on a stranger's CSV with damaged rows."""
+
+import re
+import shutil
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from brakelab.friction_lab import identification
+from brakelab.friction_lab.recording import Recording
+from brakelab.plant.description import read_file
+from brakelab.plant.linings import Linings
+from ecu.cli import app
+from ecu.resources import resource
+
+PAGE = resource("docs") / "friction-lab.md"
+
+
+class InThisProcess(ThreadPoolExecutor):
+    """A pool that sees what a test has replaced."""
+
+    def __init__(self, workers: int, mp_context: object) -> None:
+        super().__init__(1)
+
+
+def test_five_commands(
+    tmp_path: Path,
+    recording: Recording,
+    strange: Callable[..., Path],
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    """With the two simplest laws only, for time; all seven: `brake-ecu bench lab`."""
+    few = identification.candidates
+    monkeypatch.setattr(identification, "candidates", lambda stops, brake: few(stops, brake)[:2])
+    monkeypatch.setattr(identification, "ProcessPoolExecutor", InThisProcess)
+    monkeypatch.setattr(identification, "as_completed", list)
+    monkeypatch.chdir(tmp_path)
+    text = PAGE.read_text("utf-8")
+    columns = re.search(r"```toml\n(.*?)```", text, re.DOTALL)
+    commands = re.search(r"```sh\n(.*?)```", text, re.DOTALL)
+    assert columns is not None
+    assert commands is not None
+    strange(tmp_path, recording, damaged=True)
+    Path("mine.toml").write_text(columns[1], "utf-8")
+    lines = commands[1].strip().splitlines()
+    assert len(lines) == 5
+    for line in lines:
+        program, *words = line.split()
+        if program == "cp":
+            shutil.copy(*words)
+            continue
+        done = CliRunner().invoke(app, words)
+        assert done.exit_code == 0, f"{line}: {done.output} {done.exception}"
+    assert "3 rows left out" in capfd.readouterr().err
+    assert set(read_file(Path("linings.toml"), Linings).lining) == {"mine"}
