@@ -210,6 +210,6 @@ def run_programme(bench: Bench, programme: Programme, progress: Callable[[int, i
 
 def new_bench(lining: Lining, brake: str, seed: int, noise: Noise | None = None, law: str = "") -> Bench:
     """Return the rig for brake A, B or C with a pad drawn by `seed`, or with `law` of `lining`."""
-    random = np.random.default_rng([seed, ord(brake)])
+    random = np.random.default_rng([seed, *brake.encode()])
     rig = rig_with(lining, law or CYCLE_LAW)
     return Bench(rig, random, Noise() if noise is None else noise, "" if law else brake)
