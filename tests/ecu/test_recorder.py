@@ -8,13 +8,12 @@ from structlog.testing import capture_logs
 
 from brakelab.replay.formats import read_frames
 from brakelab.replay.log_quality import LogQuality
-from ecu import recorder as recorder_module
+from ecu import side_process
 from ecu.diagnostics.store import open_store, restore
 from ecu.errors import UserError
 from ecu.recorder import (
     CYCLES_FILE,
     FRAMES_FILE,
-    Recorder,
     candump_lines,
     dtype_of,
     interface_name,
@@ -23,6 +22,7 @@ from ecu.recorder import (
 )
 from ecu.records import CYCLE, FRAME, FRAME_EXTENDED, FRAME_FD, LEARNED, OUTPUTS, new_record
 from ecu.ring import RECORDED, RingReader, create_ring, publish
+from ecu.side_process import Recorder
 
 STATE = np.dtype([("speed", "f8"), ("learned", LEARNED), ("flag", "u1")], align=True)
 ABOUT = {
@@ -180,7 +180,7 @@ def saved_brakings(folder):
 
 def test_learned_values_are_saved_after_a_braking_and_at_the_end(tmp_path, monkeypatch):
     clock = [0.0]
-    monkeypatch.setattr(recorder_module.time, "monotonic", lambda: clock[0])
+    monkeypatch.setattr(side_process.time, "monotonic", lambda: clock[0])
     run = Run(tmp_path, state=tmp_path / "state")
     run.cycles(5)
     assert saved_brakings(tmp_path / "state") is None
