@@ -74,6 +74,15 @@ def run(
         Path | None,
         typer.Option("--record", metavar="DIR", help="Record frames, cycles and outputs into this folder"),
     ] = None,
+    record_limit: Annotated[
+        float | None,
+        typer.Option(
+            "--record-limit",
+            metavar="GB",
+            min=0.01,
+            help="Remove the oldest recordings in DIR beyond this size",
+        ),
+    ] = None,
     state: State = None,
     standby: Annotated[
         bool,
@@ -85,7 +94,9 @@ def run(
         import numba.np.arraymath  # noqa: F401
 
         from ecu import prepare, service
-    return service.run(prepare.RunOptions(config, interface, channel, map, record, state, standby))
+    return service.run(
+        prepare.RunOptions(config, interface, channel, map, record, record_limit, state, standby)
+    )
 
 
 app.add_typer(laboratory)

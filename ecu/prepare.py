@@ -50,6 +50,8 @@ class RunOptions(NamedTuple):
     channel: str
     map: Path | None = None
     record: Path | None = None
+    record_limit: float | None = None
+    """GB of all recordings in `record`."""
     state: Path | None = None
     standby: bool = False
 
@@ -200,5 +202,5 @@ def _describe(options: RunOptions, config: Config) -> dict[str, Any]:
 
 
 def _side_arguments(options: RunOptions) -> list[str]:
-    folders = {"--record": options.record, "--state": options.state}
-    return [word for name, folder in folders.items() if folder is not None for word in (name, str(folder))]
+    given = {"--record": options.record, "--record-limit": options.record_limit, "--state": options.state}
+    return [word for name, value in given.items() if value is not None for word in (name, str(value))]

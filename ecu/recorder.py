@@ -8,8 +8,9 @@ import json
 import os
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO, Final, NamedTuple
 
 import numpy as np
 
@@ -23,6 +24,7 @@ FRAMES_FILE, CYCLES_FILE, ABOUT_FILE, INITIAL_FILE = (
     "recording.json",
     "initial.bin",
 )
+FILES: Final = (FRAMES_FILE, CYCLES_FILE, INITIAL_FILE, ABOUT_FILE)
 
 
 def layout(dtype: np.dtype[Any]) -> dict[str, Any]:
@@ -142,6 +144,27 @@ def _end_of_lines(file: BinaryIO, count: int | None) -> int:
             end = at + int(ends[-1])
         seen, at = seen + len(ends), at + len(block)
     return end
+
+
+def make_room(folder: Path, limit_bytes: float) -> bool:
+    """Remove the oldest other recordings beside `folder` until all are within the limit.
+
+    Returns False when this one alone is larger. Raises OSError.
+    """
+    recordings = sorted(about.parent for about in folder.parent.glob(f"*/{ABOUT_FILE}"))
+    files = {one: [one / name for name in FILES if (one / name).exists()] for one in recordings}
+    sizes = {one: sum(file.stat().st_size for file in files[one]) for one in recordings}
+    total: int = sum(sizes.values())
+    for one in recordings:
+        if total <= limit_bytes:
+            break
+        if one != folder:
+            for file in files[one]:
+                file.unlink()
+            with suppress(OSError):  # somebody put something else there
+                one.rmdir()
+            total -= sizes[one]
+    return total <= limit_bytes
 
 
 def write_batch(files: RecordingFiles, batch: Batch, channel: str) -> None:

@@ -1,13 +1,14 @@
 """The side process of `run`: it reads the ring, writes the recording, keeps the state store and logs events.
 
-`python -m ecu.side_process --ring RING --leash SOCKET --parent PID [--record DIR] [--state DIR] [--again]`,
-started by `ecu/supervisor.py`. It ends when the ring is closed or the loop is gone, after everything in the
-ring is written; signals to the group are left to the loop. A disk that is full ends the recording, nothing
-else; a store that cannot be written is tried again at the next change. `--again`: another one died, this one
-goes on where it was.
+`python -m ecu.side_process --ring RING --leash SOCKET --parent PID [--record DIR [--record-limit GB]]
+[--state DIR] [--again]`, started by `ecu/supervisor.py`. It ends when the ring is closed or the loop is gone,
+after everything in the ring is written; signals to the group are left to the loop. A disk that is full ends
+the recording, nothing else; a store that cannot be written is tried again at the next change. `--again`: another
+one died, this one goes on where it was.
 """
 
 import argparse
+import math
 import os
 import select
 import signal
@@ -26,7 +27,7 @@ from ecu.diagnostics import store as state_store
 from ecu.diagnostics.events import EventLog
 from ecu.diagnostics.log import configure_logging
 from ecu.errors import UserError
-from ecu.recorder import RecordingFiles, dtype_of, resume_recording, start_recording, write_batch
+from ecu.recorder import RecordingFiles, dtype_of, make_room, resume_recording, start_recording, write_batch
 from ecu.records import RecordArray
 from ecu.ring import Batch, RingReader, remove_ring
 from ecu.side import KEPT, NOT_KEPT, READY, REFUSED, word
@@ -36,19 +37,27 @@ from ecu.supervisor import become
 
 PERIOD_S: Final = 0.1
 LOOK_FOR_RING_S: Final = 0.005
+LOOK_AT_SIZE_S: Final = 10.0  # a megabyte
 
 
 class Recorder:
     """Everything the side process does with one ring."""
 
     def __init__(
-        self, reader: RingReader, record: Path | None, state: Path | None, *, again: bool = False
+        self,
+        reader: RingReader,
+        record: Path | None,
+        state: Path | None,
+        *,
+        limit_bytes: float = math.inf,
+        again: bool = False,
     ) -> None:
         about = reader.description
         self.reader, self.log = reader, structlog.get_logger("recorder")
         self.events = EventLog()
         self.channel, self.key = str(about["channel"]), str(about["store_key"])
         self.files: RecordingFiles | None = None
+        self._limit_bytes, self._looked_s = limit_bytes, -math.inf
         if again:
             self._go_on(record)
         elif record:
@@ -109,6 +118,10 @@ class Recorder:
     def _record(self, files: RecordingFiles, batch: Batch) -> None:
         try:
             write_batch(files, batch, self.channel)
+            if time.monotonic() - self._looked_s >= LOOK_AT_SIZE_S and self._limit_bytes < math.inf:
+                self._looked_s = time.monotonic()
+                if not make_room(files.folder, self._limit_bytes):
+                    self._stop_recording(str(files.folder), "this recording alone is at --record-limit")
         except OSError as error:
             self._stop_recording(str(files.folder), str(error.strerror))
 
@@ -192,6 +205,7 @@ def main() -> int:
     parser.add_argument("--leash", type=int, required=True)
     parser.add_argument("--parent", type=int, required=True)
     parser.add_argument("--record", type=Path)
+    parser.add_argument("--record-limit", type=float, default=math.inf)
     parser.add_argument("--state", type=Path)
     parser.add_argument("--again", action="store_true")
     options = parser.parse_args()
@@ -204,7 +218,13 @@ def main() -> int:
         if _loop_is_gone(leash, LOOK_FOR_RING_S):
             return 0
     try:
-        recorder = Recorder(RingReader(options.ring), options.record, options.state, again=options.again)
+        recorder = Recorder(
+            RingReader(options.ring),
+            options.record,
+            options.state,
+            limit_bytes=1e9 * options.record_limit,
+            again=options.again,
+        )
     except UserError as error:
         _say(leash, REFUSED + str(error).encode())
         return 2
