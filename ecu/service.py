@@ -17,19 +17,10 @@ from ecu.errors import RunFault
 from ecu.prepare import RunOptions, Session, prepare
 from ecu.records import STAGES
 from ecu.ring import close_ring, remove_ring
-from ecu.start import left_at_once
+from ecu.start import ENDING, left_at_once
 
 LOOK_AT_SIDE_CYCLES: Final = 10
 SIDE_PATIENCE_S: Final = 30.0  # to write out the ring
-ENDING: Final = (
-    signal.SIGTERM,
-    signal.SIGINT,
-    signal.SIGHUP,
-    signal.SIGQUIT,
-    signal.SIGABRT,
-    signal.SIGUSR1,
-    signal.SIGUSR2,
-)
 
 
 def run(options: RunOptions) -> int:
@@ -60,6 +51,8 @@ def run(options: RunOptions) -> int:
         words["by"] = signal.Signals(stopping[0]).name
     except BaseException as error:
         words["by"] = f"{type(error).__name__}: {error}"
+        if isinstance(error, OSError):  # of the machine, not of an argument: starting again may help
+            raise RunFault(f"the loop ended: {error}") from error
         raise
     finally:
         if progress.speaks:

@@ -3,8 +3,8 @@
 `python -m ecu.side_process --ring RING --leash SOCKET --parent PID [--record DIR [--record-limit GB]]
 [--state DIR] [--again]`, started by `ecu/supervisor.py`. It ends when the ring is closed or the loop is gone,
 after everything in the ring is written; signals to the group are left to the loop. A disk that is full ends
-the recording, nothing else; a store that cannot be written is tried again at the next change. `--again`: another
-one died, this one goes on where it was.
+the recording, nothing else; a store that cannot be written is tried again at the next change. `--again`:
+another one died, this one goes on where it was.
 """
 
 import argparse
@@ -32,7 +32,7 @@ from ecu.records import RecordArray
 from ecu.ring import Batch, RingReader, remove_ring
 from ecu.side import KEPT, NOT_KEPT, READY, REFUSED, word
 from ecu.sink import free_output
-from ecu.start import like_others
+from ecu.start import ENDING, like_others
 from ecu.supervisor import become
 
 PERIOD_S: Final = 0.1
@@ -210,7 +210,7 @@ def main() -> int:
     parser.add_argument("--again", action="store_true")
     options = parser.parse_args()
     free_output()
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    for number in ENDING:
         signal.signal(number, signal.SIG_IGN)
     configure_logging()
     leash = socket.socket(fileno=options.leash)

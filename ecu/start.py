@@ -12,6 +12,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Final
 
+ENDING: Final = (
+    signal.SIGTERM,
+    signal.SIGINT,
+    signal.SIGHUP,
+    signal.SIGQUIT,
+    signal.SIGABRT,
+    signal.SIGUSR1,
+    signal.SIGUSR2,
+)
+"""End a run in order; a group's are left to the loop by its side processes."""
 PRIORITY: Final = 1  # of SCHED_FIFO: before every ordinary process, after whatever runs in real time
 
 

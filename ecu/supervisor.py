@@ -19,7 +19,7 @@ from typing import Final, NoReturn
 
 from ecu.side import AWAY
 from ecu.sink import free_output
-from ecu.start import like_others
+from ecu.start import ENDING, like_others
 
 PAUSE_S: Final = 0.1
 LONGEST_PAUSE_S: Final = 10.0  # less than the ring holds
@@ -30,7 +30,7 @@ FINAL_EXITS: Final = (0, 2)
 def main(arguments: Sequence[str]) -> int:
     """Keep a recorder alive as long as the loop lives; returns its last exit code."""
     free_output()
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    for number in ENDING:
         signal.signal(number, signal.SIG_IGN)
     leash = socket.socket(fileno=int(arguments[0]))
     leash.setblocking(False)
