@@ -28,8 +28,8 @@ class Sink(io.TextIOBase):
                 self._socket = socket.socket(fileno=os.dup(handle))
             else:
                 self._free = _set_free(handle)
-        except OSError:  # closed: every line is dropped
-            pass
+        except OSError:  # closed, and soon perhaps another file's: every line is dropped
+            self._handle = -1
 
     def write(self, text: str) -> int:
         """Write what can be written now; returns the length of `text` in any case."""
@@ -54,7 +54,7 @@ class Sink(io.TextIOBase):
             return self._socket.send(data, socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL)
         if self._free:
             return os.write(self._handle, data)
-        if not select.select([], [self._handle], [], 0)[1]:
+        if self._handle < 0 or not select.select([], [self._handle], [], 0)[1]:
             return 0
         return os.write(self._handle, data[:_ATOMIC])
 
@@ -64,7 +64,7 @@ class Sink(io.TextIOBase):
 
     def isatty(self) -> bool:
         """Whether it is a terminal."""
-        return os.isatty(self._handle)
+        return self._handle >= 0 and os.isatty(self._handle)
 
     def fileno(self) -> int:
         """The file descriptor."""
@@ -86,5 +86,13 @@ def _set_free(handle: int) -> bool:
 
 
 def free_output() -> None:
-    """Replace standard output and error of this process, and of those it starts, by sinks."""
+    """Replace standard output and error of this process, and of those it starts, by sinks.
+
+    Where one is closed, /dev/null takes its number, so that no socket or file gets it.
+    """
+    for handle in range(3):
+        try:
+            os.fstat(handle)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
     sys.stdout, sys.stderr = Sink(1), Sink(2)

@@ -3,6 +3,8 @@
 import os
 import socket
 import stat
+import subprocess
+import sys
 from contextlib import suppress
 
 import pytest
@@ -37,11 +39,23 @@ def test_a_reader_that_is_gone_is_no_matter(pipe, late):
     assert sink.dropped == 1
 
 
-def test_a_closed_descriptor_is_no_matter(pipe):
+def test_a_closed_descriptor_is_no_matter_nor_is_who_gets_its_number(pipe, tmp_path):
     os.close(pipe[1])
     sink = Sink(pipe[1])
+    other = os.open(tmp_path / "other", os.O_RDWR | os.O_CREAT)
+    os.dup2(other, pipe[1])
     sink.write(LINE)
     assert sink.dropped == 1
+    assert (tmp_path / "other").read_bytes() == b""
+
+
+def test_closed_standard_streams_are_nobody_else_s(tmp_path):
+    script = (
+        "import os, sys; from ecu.sink import free_output; os.closerange(0, 3); free_output()\n"
+        "os.write(os.open(sys.argv[1], os.O_WRONLY | os.O_CREAT), b'%d' % os.dup(0))"
+    )
+    subprocess.run([sys.executable, "-c", script, str(tmp_path / "number")], check=True)
+    assert int((tmp_path / "number").read_bytes()) > 2
 
 
 def test_a_reader_that_does_not_read_costs_lines_that_are_counted(pipe):
