@@ -42,6 +42,7 @@ MOTOR_SHORT: Final = 1 << 23
 PRESSURE_NOT_FOLLOWING: Final = 1 << 24
 LEARNED_AT_BOUND: Final = 1 << 25
 LEARNING_GIVEN_UP: Final = 1 << 26
+NOT_KEPT: Final = 1 << 27
 
 FAULTS: Final = (
     Fault(WHEEL_SPEED_LOST, "wheel speed lost", "a wheel speed is stale or invalid", "check the sender of WheelSpeed*"),
@@ -71,6 +72,7 @@ FAULTS: Final = (
     Fault(PRESSURE_NOT_FOLLOWING, "pressure does not follow demand", "a calliper pressure is not what was demanded while the three others are: nothing is learned", "check that wheel's pressure sensor and valve, and the receiver of PressureDemand*"),
     Fault(LEARNED_AT_BOUND, "learned value at its bound", "a friction, mass, stiffness, motor scale, radius or zero would be learned beyond what a car can be: it stays at its bound", "compare the configuration with the car: mass, tyres, brakes; check the sensors"),
     Fault(LEARNING_GIVEN_UP, "learning given up", "what was learned predicted the last brakings worse than the configured friction: it was forgotten and is learned anew", "look at the prediction in the report; check pressures, accelerometer and motor torques against each other"),
+    Fault(NOT_KEPT, "nothing is kept", "the side process is away or hangs, or the state folder cannot be written: what is learned now ends with this run", "it is started again by itself; look at the disk and at the log lines before"),
 )  # fmt: skip
 
 DEGRADING: Final = (
