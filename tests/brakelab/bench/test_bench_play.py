@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brakelab.bench import command
+from brakelab.bench import command, output
 from brakelab.bench import play as bench
 from brakelab.bench.table import Table
 from brakelab.replay.formats import read_frames
@@ -64,7 +64,7 @@ def test_play_tables(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_page_keeps_the_tables_of_other_buses(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(command, "resource", lambda name: tmp_path / name)
+    monkeypatch.setattr(output, "resource", lambda name: tmp_path / name)
     (tmp_path / "docs").mkdir()
     for title, value in [("one bus", "1"), ("another", "2"), ("one bus", "3")]:
         table = Table(title, ("what", "us"), [("a", value)], "Below.")

@@ -1,12 +1,10 @@
 """`brake-ecu bench`: measures on this machine, beside what else could do the job."""
 
-import json as json_format
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from multiprocessing import get_context
-from pathlib import Path
-from typing import Any, Final, NamedTuple, TypeVar
+from typing import Final, NamedTuple, TypeVar
 
 from rich.console import Console
 from rich.progress import track
@@ -29,12 +27,13 @@ from brakelab.bench.blending import blending_tables
 from brakelab.bench.chart import write_chart
 from brakelab.bench.energy import energy_tables
 from brakelab.bench.friction import friction_tables
-from brakelab.bench.measure import NOT_INSTALLED, Figure, Row, machine
+from brakelab.bench.measure import NOT_INSTALLED, Row, machine
 from brakelab.bench.observers import WIDE, Sample, Task, observer_rows, step_times, tasks
 from brakelab.bench.observers_cases import configured
 from brakelab.bench.observers_picture import PICTURED, consistency_of, write_picture
 from brakelab.bench.observers_table import finite, observer_tables
-from brakelab.bench.table import Table, markdown, show, stop_tables, time_table
+from brakelab.bench.output import plain_row, print_json, print_tables, write_page
+from brakelab.bench.table import Table, stop_tables, time_table
 from brakelab.bench.texts import (
     ABLATION_TEXT,
     BLENDING_TEXT,
@@ -150,12 +149,14 @@ def _times(name: str | None, json: bool) -> int:
     chosen = {key: value for key, value in BENCHES.items() if name in (None, key)}
     rows = {key: value.rows() for key, value in chosen.items()}
     if json:
-        _print_json({"machine": line, **{key: [_plain(row) for row in value] for key, value in rows.items()}})
+        print_json(
+            {"machine": line, **{key: [plain_row(row) for row in value] for key, value in rows.items()}}
+        )
         return 0
     tables = [time_table(chosen[key].title, rows[key], chosen[key].below) for key in rows]
-    _print_tables(line, tables)
+    print_tables(line, tables)
     if name is None:
-        _write("benchmarks.md", "Times", f"`brake-ecu bench`, version {__version__}. {line}.", tables)
+        write_page("benchmarks.md", "Times", f"`brake-ecu bench`, version {__version__}. {line}.", tables)
     return 0
 
 
@@ -174,14 +175,14 @@ def _stops(json: bool, seeds: int, draw: str) -> int:
         result = stops_bench.stops(config, seeds, spread=all_cores, draw=draw)
     of = _of(path.name, config, draw, seeds)
     if json:
-        plain = {key: [_plain(row) for row in rows] for key, rows in result._asdict().items()}
-        _print_json({"of": of, **plain})
+        plain = {key: [plain_row(row) for row in rows] for key, rows in result._asdict().items()}
+        print_json({"of": of, **plain})
         return 0
     tables = stop_tables(result, seeds)
-    _print_tables(of, tables)
+    print_tables(of, tables)
     text = f"`brake-ecu bench stops`, {of}. {STOPS_TEXT}"
     if draw == WIDE:
-        _write("observer-accuracy.md", "Accuracy of the friction and of the compensation", text, tables)
+        write_page("observer-accuracy.md", "Accuracy of the friction and of the compensation", text, tables)
     return 0
 
 
@@ -204,14 +205,14 @@ def _observers(json: bool, seeds: int, draw: str) -> int:
     of = _of("suv.toml", configured(), draw, seeds)
     if json:
         plain = {name: value._asdict() for name, value in times.items()}
-        _print_json(finite({"of": of, "rows": [_plain(row) for row in rows], "step_us": plain}))
+        print_json(finite({"of": of, "rows": [plain_row(row) for row in rows], "step_us": plain}))
         return 0
     tables = observer_tables(rows, times, consistency, draw)
-    _print_tables(of, tables)
+    print_tables(of, tables)
     if draw != WIDE:
         return 0
     text = f"`brake-ecu bench observers`, {of}. {machine()}. {OBSERVERS_TEXT}"
-    _write("observers.md", "The observers beside their goals", text, tables)
+    write_page("observers.md", "The observers beside their goals", text, tables)
     write_picture(resource("docs") / "images" / "observers.svg", consistency)
     return 0
 
@@ -317,40 +318,8 @@ def _page(
 ) -> int:
     of = f"`brake-ecu bench {name}`, version {__version__}"
     if json:
-        _print_json({"of": of, "tables": [table._asdict() for table in tables]})
+        print_json({"of": of, "tables": [table._asdict() for table in tables]})
         return 0
-    _print_tables(of, tables)
-    _write(f"{file or name}.md", title, f"{of}. {text}", tables, keep)
+    print_tables(of, tables)
+    write_page(f"{file or name}.md", title, f"{of}. {text}", tables, keep)
     return 0
-
-
-def _plain(row: Any) -> dict[str, Any]:
-    """Return a row as JSON has it: figures become objects, times get their ratio."""
-    values = row._asdict().items()
-    plain = {key: value._asdict() if isinstance(value, Figure) else value for key, value in values}
-    return plain | {"ratio": row.ratio} if isinstance(row, Row) else plain
-
-
-def _print_json(content: dict[str, Any]) -> None:
-    print(json_format.dumps(content, indent=1, ensure_ascii=False))
-
-
-def _print_tables(line: str, tables: list[Table]) -> None:
-    console = Console()
-    console.print(line, highlight=False)
-    for table in tables:
-        show(console, table)
-
-
-def _write(name: str, title: str, text: str, tables: list[Table], keep: bool = False) -> None:
-    """Renew a page; with `keep` the sections of other titles stay: of other buses, measured elsewhere."""
-    folder: Path = resource("docs")
-    if folder.is_dir():
-        sections = {table.title: markdown(table) for table in tables}
-        if keep and (folder / name).exists():
-            _, *before = (folder / name).read_text(encoding="utf-8").split("\n## ")
-            kept = {section.partition("\n")[0]: f"## {section.rstrip()}\n" for section in before}
-            sections = kept | sections
-        content = "\n".join([f"# {title}", "", text, "", *sections.values()])
-        (folder / name).write_text(content.rstrip() + "\n", encoding="utf-8")
-        Console(stderr=True).print(f"written: docs/{name}", highlight=False)

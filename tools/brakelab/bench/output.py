@@ -1,0 +1,45 @@
+"""What a bench puts out: tables on the terminal, JSON, and pages of the documentation."""
+
+import json as json_format
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from brakelab.bench.measure import Figure, Row
+from brakelab.bench.table import Table, markdown, show
+from ecu.resources import resource
+
+
+def plain_row(row: Any) -> dict[str, Any]:
+    """Return a row as JSON has it: figures become objects, times get their ratio."""
+    values = row._asdict().items()
+    plain = {key: value._asdict() if isinstance(value, Figure) else value for key, value in values}
+    return plain | {"ratio": row.ratio} if isinstance(row, Row) else plain
+
+
+def print_json(content: dict[str, Any]) -> None:
+    """Print it, indented."""
+    print(json_format.dumps(content, indent=1, ensure_ascii=False))
+
+
+def print_tables(line: str, tables: list[Table]) -> None:
+    """Print a line, then tables."""
+    console = Console()
+    console.print(line, highlight=False)
+    for table in tables:
+        show(console, table)
+
+
+def write_page(name: str, title: str, text: str, tables: list[Table], keep: bool = False) -> None:
+    """Renew a page; with `keep` the sections of other titles stay: of other buses, measured elsewhere."""
+    folder: Path = resource("docs")
+    if folder.is_dir():
+        sections = {table.title: markdown(table) for table in tables}
+        if keep and (folder / name).exists():
+            _, *before = (folder / name).read_text(encoding="utf-8").split("\n## ")
+            kept = {section.partition("\n")[0]: f"## {section.rstrip()}\n" for section in before}
+            sections = kept | sections
+        content = "\n".join([f"# {title}", "", text, "", *sections.values()])
+        (folder / name).write_text(content.rstrip() + "\n", encoding="utf-8")
+        Console(stderr=True).print(f"written: docs/{name}", highlight=False)
