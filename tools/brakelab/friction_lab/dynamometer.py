@@ -11,19 +11,17 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.random import Generator
 
-from brakelab.friction_lab.patches import apply, bedded, draw_pad, rub
+from brakelab.friction_lab.patches import bedded, draw_pad, run_pad
 from brakelab.friction_lab.recording import RATE, THRESHOLD, Recording, joined
-from brakelab.plant.disc import cooling_rate, disc_step
+from brakelab.plant.disc import cooling_rate
 from brakelab.plant.jit import Record, kernel
 from brakelab.plant.linings import Lining, rig_with
 from brakelab.plant.records import RecordArray
 from brakelab.plant.rig import (
     DECELERATION,
     DRAG,
-    HIGHEST_PRESSURE,
     LONGEST,
     PRESSURE,
-    SMALLEST_LEVER,
     STEP,
     TRACE,
     new_stop,
@@ -32,7 +30,6 @@ from brakelab.plant.rig import (
 from brakelab.plant.rig_programme import BAR, DRAG_TIME, KMH, MOST_DRAGS, Gate, Programme
 
 PAUSE: Final = 5.0  # s between recorded stops, at least
-LEAST_DEMAND: Final = 0.3  # of a demand that falls
 CYCLE_LAW: Final = "SIM"
 """The law of the lining file whose rig mass the flywheel has."""
 
@@ -50,53 +47,6 @@ class Noise(NamedTuple):
     speed: float = 0.05  # rad/s
     temperature: float = 0.5  # K
     thermocouple: float = 0.4  # s, time constant
-
-
-@kernel
-def run_pad(
-    rig: Record,
-    stop: Record,
-    fall: float,
-    pad: Record,
-    state: Record,
-    random: Generator,
-    trace: Record,
-    dt: float,
-) -> int:
-    """Run a stop as brakelab.plant.rig does, with the pad's friction; return the number of steps.
-
-    `fall` [1/s]: the demand falls by this share of itself per second, down to LEAST_DEMAND.
-    """
-    lever = 2.0 * rig.piston_area * rig.effective_radius
-    inertia = rig.mass * rig.tyre_radius * rig.tyre_radius
-    omega = stop.speed / rig.tyre_radius
-    temperature = stop.temperature
-    apply(pad, state, temperature, random)
-    mu = pad.mu_0 + pad.mu_n * state.plateaus
-    wanted = rig.mass * stop.deceleration * rig.tyre_radius
-    steps = 0
-    while steps < trace.shape[0]:
-        speed = omega * rig.tyre_radius
-        if (speed <= stop.end_speed and stop.control != DRAG) or temperature >= stop.end_temperature:
-            break
-        t = steps * dt
-        share = min(t / stop.ramp, 1.0)
-        asked = share * max(1.0 - fall * t, LEAST_DEMAND)
-        if stop.control == DECELERATION:
-            pressure = min(asked * wanted / max(lever * mu, SMALLEST_LEVER), HIGHEST_PRESSURE)
-        else:
-            pressure = asked * stop.pressure
-        mu = rub(pad, state, pressure, rig.effective_radius * omega, temperature, dt, random)
-        torque = lever * mu * pressure
-        now = trace[steps]
-        now.t, now.share, now.pressure, now.speed = t, share, pressure, speed
-        now.temperature, now.memory, now.mu_b, now.torque = temperature, state.plateaus, mu, torque
-        cooling = cooling_rate(rig.cooling, rig.cooling_by_speed, speed, rig.wetness)
-        temperature = disc_step(temperature, rig.heating, cooling, torque * omega, rig.ambient, dt)
-        if stop.control != DRAG:
-            omega -= dt * torque / inertia
-        steps += 1
-    return steps
 
 
 class Bench:

@@ -24,9 +24,11 @@ from typing import Final
 import numpy as np
 from numpy.random import Generator
 
+from brakelab.plant.disc import cooling_rate, disc_step
 from brakelab.plant.friction.law import KELVIN
 from brakelab.plant.jit import Record, kernel
 from brakelab.plant.records import RecordArray, new_record
+from brakelab.plant.rig import DECELERATION, DRAG, HIGHEST_PRESSURE, SMALLEST_LEVER
 
 PAD: Final = np.dtype(
     [
@@ -69,6 +71,7 @@ FLASH_TIME: Final = 0.3  # s
 RIPPLE_WAY: Final = 5.0  # m
 PRESSURE: Final = 30e5  # Pa
 POWER: Final = 30e6  # Pa m/s
+LEAST_DEMAND: Final = 0.3  # of a demand that falls
 
 
 def draw_pad(brake: str, random: Generator) -> RecordArray:
@@ -125,3 +128,50 @@ def rub(
     mu = pad.mu_0 + pad.mu_n * state.plateaus * (0.8 + 0.2 * state.film)
     mu *= 1.0 - pad.fade * logistic((state.contact_temperature - pad.fade_at) / 60.0)
     return float(mu * math.exp(state.ripple + state.scatter))
+
+
+@kernel
+def run_pad(
+    rig: Record,
+    stop: Record,
+    fall: float,
+    pad: Record,
+    state: Record,
+    random: Generator,
+    trace: Record,
+    dt: float,
+) -> int:
+    """Run a stop as brakelab.plant.rig does, with the pad's friction; return the number of steps.
+
+    `fall` [1/s]: the demand falls by this share of itself per second, down to LEAST_DEMAND.
+    """
+    lever = 2.0 * rig.piston_area * rig.effective_radius
+    inertia = rig.mass * rig.tyre_radius * rig.tyre_radius
+    omega = stop.speed / rig.tyre_radius
+    temperature = stop.temperature
+    apply(pad, state, temperature, random)
+    mu = pad.mu_0 + pad.mu_n * state.plateaus
+    wanted = rig.mass * stop.deceleration * rig.tyre_radius
+    steps = 0
+    while steps < trace.shape[0]:
+        speed = omega * rig.tyre_radius
+        if (speed <= stop.end_speed and stop.control != DRAG) or temperature >= stop.end_temperature:
+            break
+        t = steps * dt
+        share = min(t / stop.ramp, 1.0)
+        asked = share * max(1.0 - fall * t, LEAST_DEMAND)
+        if stop.control == DECELERATION:
+            pressure = min(asked * wanted / max(lever * mu, SMALLEST_LEVER), HIGHEST_PRESSURE)
+        else:
+            pressure = asked * stop.pressure
+        mu = rub(pad, state, pressure, rig.effective_radius * omega, temperature, dt, random)
+        torque = lever * mu * pressure
+        now = trace[steps]
+        now.t, now.share, now.pressure, now.speed = t, share, pressure, speed
+        now.temperature, now.memory, now.mu_b, now.torque = temperature, state.plateaus, mu, torque
+        cooling = cooling_rate(rig.cooling, rig.cooling_by_speed, speed, rig.wetness)
+        temperature = disc_step(temperature, rig.heating, cooling, torque * omega, rig.ambient, dt)
+        if stop.control != DRAG:
+            omega -= dt * torque / inertia
+        steps += 1
+    return steps
