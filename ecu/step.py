@@ -181,7 +181,7 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
     """
     p, s, u, y = params[0], state[0], inputs[0], outputs[0]
     dt = 1e-9 * u.dt_ns
-    faults = u.bus_faults | input_faults(p, u) | watch_sensors(p, s, u, dt)
+    faults = u.bus_faults | u.e2e_faults | input_faults(p, u) | watch_sensors(p, s, u, dt)
     leave_out(p, s, u)
     u = s.trusted
     _estimate(p, s, u, dt)
