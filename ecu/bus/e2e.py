@@ -18,9 +18,11 @@ Counter: a sender keeps a grid, one count a period. While it lives (an accepted 
 `LIVING` periods) a frame fits where its counter says that its place on the grid is: half a period either
 way, a quarter while anything else claims the sequence. So a stream that is replayed beside its sender does
 not fit, whatever was lost meanwhile, unless it runs in the very phase of the sender: then two frames claim
-one place, which is told (CROSSED), and the nearer one keeps the grid. A sender that is gone for longer is
-taken again as AUTOSAR's P01 check does, by any step that the time since then allows, or after three
-consistent frames: so one that restarts is back after `LIVING` periods and two. `link.py` judges the stream.
+one place, which is told (CROSSED), and the nearer one keeps the grid. Frames that come later than the grid
+says, where nobody disputes them, are those of a sender that was held up: it has a new grid, unless a frame
+of the former one comes after all. A sender that is gone is taken again as AUTOSAR's P01 check does, by any
+step that the time since then allows, or after three consistent frames: so one that restarts is back after
+`LIVING` periods and two. `link.py` judges the stream.
 """
 
 from typing import Any, Final
@@ -111,7 +113,7 @@ def checksum_holds(rule: int, data: NDArray[np.uint8], length: int, can_id: int,
     return True
 
 
-# What is remembered of a sender's counter between frames
+# What is remembered of a sender's counter between frames; wide, since kernels compute with it
 SEQUENCE: Final = [
     ("accepted_ns", "i8"),  # stamp of the last frame accepted
     ("expected_ns", "i8"),  # where its place on the grid was
@@ -119,9 +121,12 @@ SEQUENCE: Final = [
     ("disputed_ns", "i8"),  # stamp of the last frame that claimed the sequence and did not fit
     ("doubted_ns", "i8"),  # stamp of the last reason to doubt whose frames are accepted
     ("candidate_ns", "i8"),
-    ("counter", "i2"),
-    ("candidate", "i2"),
-    ("consistent", "u1"),
+    ("former_ns", "i8"),  # grid of a sender that seemed held up, for as long as it may live
+    ("former_until_ns", "i8"),
+    ("former", "i8"),  # its counter
+    ("counter", "i8"),
+    ("candidate", "i8"),
+    ("consistent", "i8"),
     ("started", "u1"),
 ]
 
@@ -147,6 +152,18 @@ def _accept(state: Record, counter: int, stamp_ns: int, expected_ns: int) -> Non
 @kernel
 def _dispute(state: Record, stamp_ns: int) -> None:
     state.disputed_ns = state.doubted_ns = stamp_ns
+
+
+@kernel
+def _takes_back(state: Record, counter: int, modulo: int, stamp_ns: int, period_ns: int) -> bool:
+    """Accept a frame that fits the former grid: its sender was not held up, another one spoke for it."""
+    expected_ns = state.former_ns + (counter - state.former) % modulo * period_ns
+    fits: bool = stamp_ns <= state.former_until_ns and abs(stamp_ns - expected_ns) <= period_ns // 2
+    if fits:
+        _dispute(state, stamp_ns)
+        _accept(state, counter, stamp_ns, expected_ns)
+        state.former_until_ns = 0
+    return fits
 
 
 @kernel
@@ -192,12 +209,12 @@ def check_counter(
     elapsed = stamp_ns - state.grid_ns
     step = (counter - state.counter) % modulo
     if step == 0:
+        _dispute(state, stamp_ns)
         if since_accepted > period_ns // 2:
             return REPEATED
         nearer = abs(stamp_ns - state.expected_ns) < abs(state.accepted_ns - state.expected_ns)
         if nearer:
             _accept(state, counter, stamp_ns, state.expected_ns)
-        _dispute(state, stamp_ns)
         return CROSSED
     found = IN_SEQUENCE if step == 1 else SOME_LOST
     gone = since_accepted > LIVING * slowest_ns
@@ -209,9 +226,17 @@ def check_counter(
     disputed = state.disputed_ns > 0 and stamp_ns - state.disputed_ns < DOUBT_NS
     tolerance = period_ns // 4 if disputed else period_ns // 2
     early = step * period_ns - elapsed
-    if early > tolerance or elapsed - step * slowest_ns > tolerance:
+    if early > tolerance or (disputed and elapsed - step * slowest_ns > tolerance):
+        if _takes_back(state, counter, modulo, stamp_ns, period_ns):
+            return SOME_LOST
         return _resynchronise(state, counter, modulo, stamp_ns, period_ns, gone)
-    if early > period_ns // 4:
+    if elapsed - step * slowest_ns > tolerance:
+        state.former_ns, state.former = state.grid_ns, state.counter
+        state.former_until_ns = state.accepted_ns + int(LIVING * period_ns)
+        state.doubted_ns = stamp_ns
+        _accept(state, counter, stamp_ns, stamp_ns)
+        return found
+    if abs(early) > period_ns // 4 and slowest_ns == period_ns:
         state.doubted_ns = stamp_ns
     if slowest_ns > period_ns:
         _accept(state, counter, stamp_ns, stamp_ns)

@@ -33,13 +33,13 @@ TOLD_NS: Final = 1_000_000_000
 _MASK: Final = (1 << WINDOW) - 1
 
 LINK: Final = [
-    ("ok_window", "u4"),  # the last checks as bits, the newest is bit 0
-    ("error_window", "u4"),
-    ("rejected_window", "u4"),
-    ("ok_count", "u1"),  # how many bits are set
-    ("error_count", "u1"),
-    ("rejected_count", "u1"),
-    ("link", "u1"),  # NODATA, INIT, VALID or INVALID
+    ("ok_window", "i8"),  # the last checks as bits, the newest is bit 0
+    ("error_window", "i8"),
+    ("rejected_window", "i8"),
+    ("ok_count", "i8"),  # how many bits are set
+    ("error_count", "i8"),
+    ("rejected_count", "i8"),
+    ("link", "i8"),  # NODATA, INIT, VALID or INVALID
     ("crowd", "f8"),  # frames beyond what a sender makes
     ("checked_ns", "i8"),  # stamp of the last frame checked
     ("told_ns", "i8"),  # stamp of the last frame that made it loud
