@@ -9,14 +9,14 @@ import itertools
 import math
 from pathlib import Path
 
-import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ecu.config import load_config, new_params
-from ecu.control.limiter import LIMITER_STATE, available_pressure, limit_pressure
+from ecu.control.limiter import LIMITER_STATE, available_pressure, limit_axle
+from ecu.jit import kernel
 from ecu.signals import ALIVE, INPUT, USABLE, VALID
 
 BAR = 1e5
@@ -43,10 +43,20 @@ def fresh(corner: int = 0, pressure: float = 0.0, uncompensated: float = 0.0, wa
     return state
 
 
-@numba.njit
-def limit(params, state, corner, wanted, uncompensated, torque, dt, ceiling=180e5):
+@kernel
+def limit_both(params, state, left, wanted, uncompensated, torque, ceiling, dt):
     """The limiter on arrays of one record: five times as fast to call from Python as with records."""
-    return limit_pressure(params[0], state[0], corner, wanted, uncompensated, torque, ceiling, dt)
+    state[0].ceiling[:] = ceiling
+    limit_axle(params[0], state[0], left, wanted, uncompensated, torque, dt)
+
+
+@kernel
+def limit(params, state, corner, wanted, uncompensated, torque, dt, ceiling=180e5):
+    """One corner; nothing is asked of the other one, so there is nothing to level."""
+    four = np.zeros((3, 4))
+    four[0, corner], four[1, corner], four[2, corner] = wanted, uncompensated, torque
+    limit_both(params, state, corner // 2 * 2, four[0], four[1], four[2], ceiling, dt)
+    return state[0].pressure[corner]
 
 
 def nominal(torque: float, corner: int = 0) -> float:
@@ -301,16 +311,17 @@ def test_the_replacement_lasts_until_the_compensated_demand_comes_back(jump: flo
     assert state["limited"] == 0
 
 
-def test_corners_do_not_know_of_each_other() -> None:
+def test_axles_do_not_know_of_each_other() -> None:
     state = fresh()
-    for corner in range(4):
+    for left in (0, 2):
         before = state.copy()
-        torque = 100.0 + 50 * corner
-        limit(PARAMS, state, corner, nominal(torque, corner), nominal(torque, corner), torque, DT)
-        for other in set(range(4)) - {corner}:
+        four = np.full((3, 4), 300.0)
+        four[:2] = [nominal(300.0, corner) for corner in range(4)]
+        limit_both(PARAMS, state, left, four[0], four[1], four[2], 180 * BAR, DT)
+        for other in (2 - left, 3 - left):
             for field in ("pressure", "uncompensated", "wanted"):
                 assert state[field][0, other] == before[field][0, other]
-        assert state["wanted"][0, corner] == state["uncompensated"][0, corner] == nominal(torque, corner)
+        assert state["wanted"][0, left] == state["uncompensated"][0, left] == nominal(300.0, left)
 
 
 # ---------------------------------------------------------------- anything at all
