@@ -6,10 +6,12 @@ Exit code 0 on success, 1 when the run found a fault, 2 for bad arguments, confi
 
 import sys
 
+from ecu.sink import free_output
 from ecu.start import ahead_of_others, kept_out
 
 if sys.argv[1:2] == ["run"]:  # under load, loading the command line alone would take a second
     ahead_of_others()
+    free_output()
 
 import errno
 import os
@@ -72,6 +74,15 @@ def run(
         Path | None,
         typer.Option("--record", metavar="DIR", help="Record frames, cycles and outputs into this folder"),
     ] = None,
+    record_limit: Annotated[
+        float | None,
+        typer.Option(
+            "--record-limit",
+            metavar="GB",
+            min=0.01,
+            help="Remove the oldest recordings in DIR beyond this size",
+        ),
+    ] = None,
     state: State = None,
     standby: Annotated[
         bool,
@@ -82,8 +93,10 @@ def run(
     with kept_out("rich", "scipy"):  # structlog's tracebacks, and BLAS that no kernel of the cycle calls
         import numba.np.arraymath  # noqa: F401
 
-        from ecu import service
-    return service.run(service.RunOptions(config, interface, channel, map, record, state, standby))
+        from ecu import prepare, service
+    return service.run(
+        prepare.RunOptions(config, interface, channel, map, record, record_limit, state, standby)
+    )
 
 
 app.add_typer(laboratory)

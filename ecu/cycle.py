@@ -4,6 +4,8 @@
 nothing that stays, logs nothing and waits for nothing but its deadline.
 """
 
+import time
+from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -30,11 +32,12 @@ from ecu.records import (
 )
 from ecu.ring import Ring, publish
 from ecu.signals import CYCLE_NS
-from ecu.standby import Standby
+from ecu.standby import Claim, Standby
 from ecu.step import new_state, step
 
 WAITING_FRAMES: Final = 4096  # room for what waits: a second of a saturated bus
 HOLD_CYCLES: Final = 100  # a passing fault of the service shows for a second
+FAREWELLS: Final = 3  # one may be lost
 _COUNTED: Final = (faults.SEND_FAILED, faults.FRAMES_DROPPED, faults.FOREIGN_SENDER, faults.LATE)
 
 
@@ -105,12 +108,16 @@ class Watch:
         self._compiled, self._compiled_at_start = compiled, compiled.count
         self._seen = [start.send_failures, start.dropped, 0, 0]
         self._until = [0, 0, 0, 0]
+        self.kept = True
+        """Whether the side process keeps what it is given."""
 
     def look(self, number: int, status: BusStatus, foreign: int, overruns: int) -> int:
         """Return the bits in cycle `number`."""
         bits = faults.BUS_OFF if status.bus_off else 0
         if status.error_passive:
             bits |= faults.ERROR_PASSIVE
+        if not self.kept:
+            bits |= faults.NOT_KEPT
         if self._compiled.count > self._compiled_at_start:
             bits |= faults.COMPILED
         counters = (status.send_failures, status.dropped, foreign, overruns)
@@ -127,7 +134,7 @@ class Progress:
     """What is carried from cycle to cycle beside the ECU's own records."""
 
     def __init__(self, watch: Watch, standby: Standby | None = None) -> None:
-        self.watch, self.standby, self.timing = watch, standby, Timing()
+        self.watch, self.standby, self.claim, self.timing = watch, standby, Claim(), Timing()
         self.number = self.overruns = self.waiting = self.foreign = 0
         self.worst_lateness_ns = self.previous_t_ns = 0
 
@@ -158,7 +165,9 @@ def cycle_once(ecu: Ecu, channel: Channel, ring: Ring, grid: Grid, run: Progress
     )
     if run.standby is None:
         run.foreign += foreign
-    else:
+        if run.claim.is_lost(foreign, tick.missed):
+            run.standby = Standby(yielded=True)
+    if run.standby is not None:
         run.standby.listen(ecu.transmit_plan, ecu.transmission, ecu.waiting, run.waiting, tick.t_mono_ns)
     status = channel.status()
     _note_service(ecu, run, tick, status)
@@ -200,7 +209,7 @@ def _note_cycle(
     for name in ("bus_faults", "overruns", "worst_lateness_us"):
         cycle[name] = ecu.inputs[name]
     cycle["frames"], cycle["late_frames"], cycle["dropped"] = consumed, late, dropped
-    cycle["stage_ns"] = stages_ns
+    cycle["stage_ns"], cycle["speaks"] = stages_ns, run.speaks
 
 
 @kernel
@@ -247,9 +256,18 @@ def _keep_rest(frames: Any, first: int, count: int) -> int:
     return count - first
 
 
-def send_farewell(ecu: Ecu, channel: Channel, number: int) -> None:
-    """Send what is due once more with demand 0 flagged invalid: the hydraulic fallback takes over at once."""
+def send_farewell(
+    ecu: Ecu, channel: Channel, number: int, sleep: Callable[[float], None] = time.sleep
+) -> None:
+    """Send what is due with demand 0 flagged invalid, in three cycles from `number` on.
+
+    The hydraulic fallback takes over at once. It works whatever the cycle was in the middle of.
+    """
     outputs = ecu.outputs
     outputs["pressure_demand"] = outputs["pressure_demand_valid"] = outputs["motor_demand_valid"] = 0.0
     outputs["motor_demand"] = np.nan
-    channel.send(ecu.sending, transmit(ecu.transmit_plan, ecu.transmission, ecu.vector, number, ecu.sending))
+    for cycle in range(number, number + FAREWELLS):
+        if cycle > number:
+            sleep(CYCLE_NS * 1e-9)
+        due = transmit(ecu.transmit_plan, ecu.transmission, ecu.vector, cycle, ecu.sending)
+        channel.send(ecu.sending, due)

@@ -110,16 +110,15 @@ def kernel(function: Function) -> Function:
 
 
 class CompileCounter(numba_event.Listener):  # type: ignore[misc]
-    """Counts compilations from now on: after the warm-up there must be none. The first calls `at_first`."""
+    """Counts compilations from now on: after the warm-up there must be none. `begins` is called before."""
 
-    def __init__(self, at_first: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, begins: Callable[[int], None] = lambda count: None) -> None:
         self.count = 0
-        self._at_first = at_first
+        self._begins = begins
         numba_event.register("numba:compile", self)
 
     def on_start(self, event: numba_event.Event) -> None:
-        if not self.count:
-            self._at_first()
+        self._begins(self.count)
         self.count += 1
 
     def on_end(self, event: numba_event.Event) -> None:

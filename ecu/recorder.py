@@ -1,39 +1,30 @@
-"""The side process of `run`: it reads the ring, writes the recording, keeps the state store and logs events.
+"""A recording: its files, written while the ECU runs, gone on with by another process, and read.
 
-`python -m ecu.recorder --ring RING --parent PID [--record DIR] [--state DIR]`. It ends when the ring is
-closed or its parent is gone, after everything in the ring is written; signals to the group are left to
-the parent. It begins when a line comes on its standard input: the ring is there. A disk that is full ends
-the recording, nothing else.
+A folder holds the frames (candump text), the cycles (`RECORDED`, raw), what they mean (JSON) and the state
+before the first cycle.
 """
 
-import argparse
 import json
 import os
-import signal
-import sqlite3
-import sys
 import time
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO, Final, NamedTuple
 
 import numpy as np
-import structlog
 
-from ecu.diagnostics import store as state_store
-from ecu.diagnostics.events import EventLog
-from ecu.diagnostics.log import configure_logging
 from ecu.errors import UserError
 from ecu.records import FRAME_EXTENDED, FRAME_FD, RecordArray
-from ecu.ring import RECORDED, Batch, RingReader, remove_ring
-from ecu.start import like_others
+from ecu.ring import RECORDED, Batch
 
-PERIOD_S: Final = 0.1
 FRAMES_FILE, CYCLES_FILE, ABOUT_FILE, INITIAL_FILE = (
     "frames.log",
     "cycles.bin",
     "recording.json",
     "initial.bin",
 )
+FILES: Final = (FRAMES_FILE, CYCLES_FILE, INITIAL_FILE, ABOUT_FILE)
 
 
 def layout(dtype: np.dtype[Any]) -> dict[str, Any]:
@@ -116,6 +107,66 @@ def start_recording(parent: Path, description: dict[str, Any], initial: bytes) -
         ) from None
 
 
+def resume_recording(
+    parent: Path, description: dict[str, Any], frames_before: Callable[[int], int | None]
+) -> tuple[RecordingFiles, int] | None:
+    """Open the recording of the run that `description` is of to go on; None: there is none.
+
+    Returns the files and the number of the last cycle in them, -1 for none. What was written of a cycle that
+    is not there in whole is cut off; `frames_before(n)` says how many frames the cycles before n consumed.
+    Raises OSError.
+    """
+    for about in sorted(parent.glob(f"*/{ABOUT_FILE}"), reverse=True):
+        if json.loads(about.read_text(encoding="utf-8"))["start_ns"] == description["start_ns"]:
+            break
+    else:
+        return None
+    frames = (about.parent / FRAMES_FILE).open("r+b", buffering=0)
+    cycles = (about.parent / CYCLES_FILE).open("r+b", buffering=0)
+    whole = os.fstat(cycles.fileno()).st_size // RECORDED.itemsize
+    cycles.truncate(cycles.seek(whole * RECORDED.itemsize))
+    last = -1
+    if whole:
+        cycles.seek(-RECORDED.itemsize, os.SEEK_END)
+        last = int(np.frombuffer(cycles.read(RECORDED.itemsize), RECORDED)["cycle"]["number"][0])
+    frames.truncate(frames.seek(_end_of_lines(frames, frames_before(last + 1))))
+    return RecordingFiles(about.parent, frames, cycles), last
+
+
+def _end_of_lines(file: BinaryIO, count: int | None) -> int:
+    """Return where the first `count` lines end; of fewer, or if it is None, where the last whole one ends."""
+    seen = end = at = 0
+    while block := file.read(1 << 20):
+        ends = np.flatnonzero(np.frombuffer(block, np.uint8) == ord("\n")) + 1
+        if count is not None and seen + len(ends) >= count:
+            return at + int(ends[count - seen - 1]) if count > seen else end
+        if len(ends):
+            end = at + int(ends[-1])
+        seen, at = seen + len(ends), at + len(block)
+    return end
+
+
+def make_room(folder: Path, limit_bytes: float) -> bool:
+    """Remove the oldest other recordings beside `folder` until all are within the limit.
+
+    Returns False when this one alone is larger. Raises OSError.
+    """
+    recordings = sorted(about.parent for about in folder.parent.glob(f"*/{ABOUT_FILE}"))
+    files = {one: [one / name for name in FILES if (one / name).exists()] for one in recordings}
+    sizes = {one: sum(file.stat().st_size for file in files[one]) for one in recordings}
+    total: int = sum(sizes.values())
+    for one in recordings:
+        if total <= limit_bytes:
+            break
+        if one != folder:
+            for file in files[one]:
+                file.unlink()
+            with suppress(OSError):  # somebody put something else there
+                one.rmdir()
+            total -= sizes[one]
+    return total <= limit_bytes
+
+
 def write_batch(files: RecordingFiles, batch: Batch, channel: str) -> None:
     """Append one batch; frames first, so that a cycle in cycles.bin has its frames. Raises OSError."""
     _write_all(files.frames, candump_lines(batch.frames, channel))
@@ -161,104 +212,3 @@ def read_recording(folder: Path) -> Recording:
     except (OSError, ValueError, KeyError) as error:
         raise UserError(str(folder), "", f"not a complete recording: {error}") from None
     return Recording(folder, about, records["cycle"], records["outputs"], initial, folder / FRAMES_FILE)
-
-
-class Recorder:
-    """Everything the side process does with one ring."""
-
-    def __init__(self, reader: RingReader, record: Path | None, state: Path | None) -> None:
-        about = reader.description
-        self.reader, self.log = reader, structlog.get_logger("recorder")
-        self.events = EventLog()
-        self.channel, self.key = str(about["channel"]), str(about["store_key"])
-        self.files = start_recording(record, about, reader.initial) if record else None
-        self.store = state_store.open_store(state) if state else None
-        initial = np.frombuffer(reader.initial, dtype_of(about["state"]))
-        self.keeper = state_store.first_keeper(initial["learned"], time.monotonic())
-        self._store_refused = False
-
-    def turn(self) -> int:
-        """Handle what came since the last turn; return how many cycles that was."""
-        batch = self.reader.read()
-        if len(batch.records):
-            if self.files:
-                self._record(self.files, batch)
-            self.events.look(batch.records, self.reader.lost_cycles, self.reader.lost_frames)
-            self._keep()
-        return len(batch.records)
-
-    def _record(self, files: RecordingFiles, batch: Batch) -> None:
-        try:
-            write_batch(files, batch, self.channel)
-        except OSError as error:
-            self.log.error(
-                "recording_stopped",
-                folder=str(files.folder),
-                reason=error.strerror,
-                remedy="free the disk and start anew",
-            )
-            self.files = None
-
-    def _keep(self) -> None:
-        """Save after a braking, or a minute after another change."""
-        now_s, learned = time.monotonic(), self.reader.learned()
-        if learned is not None and state_store.is_due(self.keeper, learned, now_s):
-            self._save(learned, now_s)
-
-    def _save(self, learned: RecordArray, now_s: float) -> None:
-        if self.store is None:
-            return
-        try:
-            state_store.save(self.store, self.key, learned)
-            self._store_refused = False
-            self.keeper = state_store.first_keeper(learned, now_s)
-        except sqlite3.Error as error:
-            if not self._store_refused:
-                self.log.error("not_saved", reason=str(error), remedy="free the disk; it is tried again")
-            self._store_refused = True
-
-    def finish(self) -> None:
-        """Write out the rest: the ring, then what was learned since the last save."""
-        while self.turn():
-            pass
-        learned = self.reader.learned()
-        if learned is not None and learned.tobytes() != self.keeper.saved:
-            self._save(learned, time.monotonic())
-        if self.files:
-            for file in (self.files.frames, self.files.cycles):
-                os.fsync(file.fileno())
-                file.close()
-        if self.store:
-            self.store.close()
-
-
-def main() -> int:
-    """Follow the ring until its writer is done or gone."""
-    parser = argparse.ArgumentParser(prog="python -m ecu.recorder", description="The side process of run.")
-    parser.add_argument("--ring", type=Path, required=True)
-    parser.add_argument("--parent", type=int, required=True)
-    parser.add_argument("--record", type=Path)
-    parser.add_argument("--state", type=Path)
-    options = parser.parse_args()
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.SIG_IGN)
-    configure_logging()
-    if not sys.stdin.readline():  # the parent makes the ring, then says so; it went instead
-        return 1
-    try:
-        recorder = Recorder(RingReader(options.ring), options.record, options.state)
-    except UserError as error:
-        print(error, flush=True)
-        return 2
-    print("ready", flush=True)
-    like_others()
-    while os.getppid() == options.parent and not recorder.reader.closed:
-        recorder.turn()
-        time.sleep(PERIOD_S)
-    recorder.finish()
-    remove_ring(options.ring)
-    return 0
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -71,6 +71,7 @@ CYCLE: Final = np.dtype(
         ("worst_lateness_us", "f8"),
         ("lateness_ns", "i8"),
         ("stage_ns", "i8", (5,)),  # drain, receive, step, transmit, send
+        ("speaks", "i8"),  # 0: a standby that is silent, or one that yielded; nothing was sent
     ],
     align=True,
 )

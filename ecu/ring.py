@@ -4,11 +4,17 @@ The file holds a header, a description (JSON), the state before the first cycle,
 learned (of the last two cycles, in turn) and a ring of frames. A slot carries its number before and after its
 content is written (-1 between), so a reader that was overtaken notices and counts what it lost. Frames are
 claimed before they are overwritten.
+
+The file is its owner's alone: made anew (O_EXCL, O_NOFOLLOW), mode 0600, and read only if it belongs to the
+reader's user. Whoever wrote it holds a lock on it for as long as it lives, in whatever namespace.
 """
 
+import fcntl
 import json
 import mmap
 import os
+import secrets
+import stat
 import tempfile
 from contextlib import suppress
 from pathlib import Path
@@ -27,6 +33,7 @@ FRAMES: Final = 131072  # 29 s of a classical bus at 45 frames per cycle
 # One cycle as it stands in the ring's slots and in a recording's cycles.bin.
 RECORDED: Final = np.dtype([("cycle", CYCLE), ("outputs", OUTPUTS)], align=True)
 _SLOT: Final = np.dtype([("number", "i8"), ("first_frame", "i8"), ("recorded", RECORDED)], align=True)
+_LAST_WORDS_BYTES: Final = 3072
 _HEADER: Final = np.dtype(
     [
         ("magic", "u8"),
@@ -38,9 +45,11 @@ _HEADER: Final = np.dtype(
         ("frames_claimed", "i8"),
         ("frames_written", "i8"),
         ("closed", "i8"),
+        ("followed", "i8"),  # the last cycle that the side process is known to have handled, -1: none
+        ("last_words", f"S{_LAST_WORDS_BYTES}"),  # JSON
     ]
 )
-_MAGIC: Final = int.from_bytes(b"ecuring2", "little")
+_MAGIC: Final = int.from_bytes(b"ecuring3", "little")
 _PAGE: Final = 4096
 
 
@@ -63,25 +72,58 @@ def _folder() -> Path:
 
 
 def living_rings() -> list[Path]:
-    """Return the rings of processes that live; those that dead processes left behind are removed."""
-    rings = []
-    for path in sorted(_folder().glob("brake-ecu.*.ring")):
-        owner = path.name.split(".")[1]
-        if owner.isdecimal() and not Path("/proc", owner).exists():
+    """Return our user's rings whose writers live; those that dead ones left behind are removed."""
+    folder, rings = _folder(), []
+    for path in sorted([*folder.glob("brake-ecu.*.ring"), *folder.glob("brake-ecu.*.new")]):
+        try:
+            handle = _open_own(path)
+        except OSError:  # another user's, or gone meanwhile
+            continue
+        try:
+            fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
             remove_ring(path)
-        else:
-            rings.append(path)
+        except BlockingIOError:
+            rings += [path] if path.suffix == ".ring" else []
+        finally:
+            os.close(handle)
     return rings
 
 
+def _open_own(path: Path) -> int:
+    """Open a regular file that is ours and that nobody else may write. Raises OSError for any other."""
+    handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+    found = os.fstat(handle)
+    others = stat.S_IWGRP | stat.S_IWOTH
+    if stat.S_ISREG(found.st_mode) and found.st_uid == os.geteuid() and not found.st_mode & others:
+        return handle
+    os.close(handle)
+    raise PermissionError(1, "not a file of this user alone")
+
+
 def ring_path(pid: int) -> Path:
-    """Return where the ring of process `pid` is."""
+    """Return where the ring of process `pid` is. Containers that share the folder have pids of their own."""
     living_rings()
-    return _folder() / f"brake-ecu.{pid}.ring"
+    try:
+        namespace = os.stat("/proc/self/ns/pid").st_ino
+    except OSError:
+        namespace = 0
+    return _folder() / f"brake-ecu.{namespace}.{pid}.ring"
 
 
 def _round_up(size: int) -> int:
     return -(-size // _PAGE) * _PAGE
+
+
+def _is_ring(memory: mmap.mmap) -> bool:
+    """Whether header and size fit together."""
+    if len(memory) < _PAGE:
+        return False
+    row = np.frombuffer(memory, _HEADER, 1)[0]
+    sizes = [int(row[name]) for name in ("slots", "frames", "description_bytes", "initial_bytes")]
+    if int(row["magic"]) != _MAGIC or min(sizes[:2]) < 1 or min(sizes[2:]) < 0:
+        return False
+    parts = (_HEADER.itemsize, sum(sizes[2:]), sizes[0] * _SLOT.itemsize, 2 * LEARNED.itemsize)
+    return sum(map(_round_up, (*parts, sizes[1] * FRAME.itemsize))) == len(memory)
 
 
 def _map(path: Path, memory: mmap.mmap) -> Ring:
@@ -109,26 +151,34 @@ def create_ring(
     head = _round_up(_HEADER.itemsize) + _round_up(len(text) + len(initial))
     parts = (slots * _SLOT.itemsize, 2 * LEARNED.itemsize, frames * FRAME.itemsize)
     size = head + sum(map(_round_up, parts))
-    unfinished = path.with_name(path.name + ".new")
+    unfinished = path.with_name(f"{path.name}.{secrets.token_hex(4)}.new")
     try:
-        handle = os.open(unfinished, os.O_RDWR | os.O_CREAT | os.O_TRUNC, 0o600)
+        handle = os.open(unfinished, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o600)
         try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)  # the mapping keeps it
             os.posix_fallocate(handle, 0, size)
             memory = mmap.mmap(handle, size, mmap.MAP_SHARED | mmap.MAP_POPULATE)
         finally:
             os.close(handle)
     except OSError as error:
-        raise UserError(str(path), "", f"no room for a ring of {size >> 20} MB: {error.strerror}") from None
+        remove_ring(unfinished)
+        raise UserError(
+            str(path), "", f"cannot make a ring of {size >> 20} MB there: {error.strerror}"
+        ) from None
     header = np.frombuffer(memory, _HEADER, 1)
     row = header[0]
-    row["slots"], row["frames"] = slots, frames
+    row["slots"], row["frames"], row["followed"] = slots, frames, -1
     row["description_bytes"], row["initial_bytes"] = len(text), len(initial)
     at = _round_up(_HEADER.itemsize)
     memory[at : at + len(text) + len(initial)] = text + initial
     ring = _map(path, memory)
     ring.slots["number"] = -1
     row["magic"] = _MAGIC
-    unfinished.rename(path)
+    try:
+        unfinished.rename(path)
+    except OSError as error:
+        remove_ring(unfinished)
+        raise UserError(str(path), "", f"cannot be replaced: {error.strerror}; remove it") from None
     return ring
 
 
@@ -177,8 +227,9 @@ def _fill(
     slot.recorded.outputs = outputs[0]
 
 
-def close_ring(ring: Ring) -> None:
+def close_ring(ring: Ring, last_words: dict[str, Any] | None = None) -> None:
     """Tell readers that no more cycles come; the file goes when the last of them lets go of it."""
+    ring.header[0]["last_words"] = json.dumps(last_words or {}).encode()
     ring.header[0]["closed"] = 1
 
 
@@ -196,17 +247,23 @@ class RingReader:
 
     def __init__(self, path: Path) -> None:
         try:
-            with path.open("rb") as file:
-                memory = mmap.mmap(file.fileno(), 0, prot=mmap.PROT_READ)
+            handle = _open_own(path)
+            try:
+                memory = mmap.mmap(handle, 0, prot=mmap.PROT_READ)
+            finally:
+                os.close(handle)
         except (OSError, ValueError) as error:
             raise UserError(str(path), "", f"no ring to read here: {error}") from None
-        if len(memory) < _PAGE or int(np.frombuffer(memory, _HEADER, 1)[0]["magic"]) != _MAGIC:
+        if not _is_ring(memory):
             raise UserError(str(path), "", "not a ring of this version; start the service anew")
         self.ring = _map(path, memory)
         row = self.ring.header[0]
         at = _round_up(_HEADER.itemsize)
         end = at + int(row["description_bytes"])
-        self.description: dict[str, Any] = json.loads(memory[at:end])
+        try:
+            self.description: dict[str, Any] = dict(json.loads(memory[at:end]))
+        except (ValueError, TypeError):
+            raise UserError(str(path), "", "not a ring: its description cannot be read") from None
         self.initial: bytes = memory[end : end + int(row["initial_bytes"])]
         self.lost_cycles = self.lost_frames = 0
         self._next = max(0, int(row["written"]) - len(self.ring.slots))
@@ -215,6 +272,33 @@ class RingReader:
     def closed(self) -> bool:
         """Whether the writer said that no more cycles come."""
         return bool(self.ring.header[0]["closed"])
+
+    @property
+    def last_read(self) -> int:
+        """The number of the last cycle that was read, -1 before the first."""
+        return self._next - 1
+
+    @property
+    def last_words(self) -> dict[str, Any]:
+        """What the writer said when it closed the ring."""
+        words: dict[str, Any] = json.loads(bytes(self.ring.header[0]["last_words"]) or b"{}")
+        return words
+
+    def go_on_after(self, number: int) -> RecordArray | None:
+        """Read on behind the cycle `number`; return that cycle (`RECORDED`, shape (1,)) if it is there."""
+        place = number % len(self.ring.slots)
+        slot = self.ring.slots[place : place + 1].copy()
+        self._next = number + 1
+        return slot["recorded"] if slot["number"][0] == number >= 0 else None
+
+    def frames_before(self, number: int) -> int | None:
+        """Return how many frames all cycles before `number` consumed; None: not known any more."""
+        header = self.ring.header[0]
+        slot = self.ring.slots[number % len(self.ring.slots)].copy()
+        if slot["number"] == number:
+            return int(slot["first_frame"])
+        total = int(header["frames_written"])
+        return total if header["written"] == number else None
 
     def learned(self) -> RecordArray | None:
         """Return what is learned as of the last cycle (`LEARNED`, shape (1,)), None while there is none."""

@@ -24,6 +24,7 @@ _ECHOES: Final = 32
 # A driver's stamp that far from the real-time clock counts from another origin (e.g. the adapter's start).
 _FOREIGN_ORIGIN_NS: Final = 5_000_000_000
 _IP_MULTICAST_ALL: Final = 49  # linux/in.h
+_MALFORMED_AT_ONCE: Final = 200  # messages that cannot be read, per cycle: the rest waits
 _KNOWN: Final = sorted(can.VALID_INTERFACES)
 
 logging.getLogger("can").addHandler(logging.NullHandler())  # its exceptions say it again, in one line
@@ -118,6 +119,15 @@ def _hear_own_group_only(bus: can.BusABC) -> None:
             own.setsockopt(socket.IPPROTO_IP, _IP_MULTICAST_ALL, 0)
 
 
+def _is_malformed(error: Exception) -> bool:
+    """Whether the driver could not read one message: the line says nothing of itself by that.
+
+    python-can names no kind of its own for it; what fails about the line has a reason from the system.
+    """
+    reason = error.__cause__
+    return isinstance(error, can.CanOperationError) and reason is not None and not isinstance(reason, OSError)
+
+
 class GenericChannel:
     """Any interface of python-can, message by message."""
 
@@ -131,13 +141,18 @@ class GenericChannel:
 
     def drain(self, frames: RecordArray, start: int) -> int:
         """See `Channel`."""
-        count = 0
+        count = malformed = 0
         while start + count < len(frames):
             try:
                 message = self._bus.recv(timeout=0)
-            except (can.CanError, OSError):
-                self._off = True
-                break
+            except (can.CanError, OSError) as error:
+                if not _is_malformed(error):
+                    self._off = True
+                    break
+                malformed += 1
+                if malformed == _MALFORMED_AT_ONCE:
+                    break
+                continue
             if message is None:
                 break
             if message.is_error_frame or message.is_remote_frame or (message.is_fd and not self._fd):

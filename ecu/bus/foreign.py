@@ -1,11 +1,23 @@
 """Before the first frame is sent: is somebody else already sending as we would?"""
 
 import time
+from typing import Final
 
 from ecu.bus.channel import Channel
 from ecu.bus.transmit import TransmitPlan
 from ecu.errors import UserError
 from ecu.records import EXTENDED_ID, FRAME, FRAME_EXTENDED, new_record
+
+_AT_ONCE: Final = 1024
+_DISCARD_S: Final = 0.5  # a bus that brings more than can be thrown away in that time is listened to as it is
+
+
+def discard(channel: Channel) -> None:
+    """Throw away what waits in the channel: it tells of the past."""
+    frames = new_record(FRAME, _AT_ONCE)
+    end = time.monotonic() + _DISCARD_S
+    while channel.drain(frames, 0) and time.monotonic() < end:
+        pass
 
 
 def listen_before_send(channel: Channel, where: str, plan: TransmitPlan, seconds: float) -> None:
@@ -15,7 +27,7 @@ def listen_before_send(channel: Channel, where: str, plan: TransmitPlan, seconds
         UserError: someone does.
     """
     names = dict(zip(plan.ids.tolist(), plan.messages["name"].tolist(), strict=True))
-    frames = new_record(FRAME, 1024)
+    frames = new_record(FRAME, _AT_ONCE)
     end = time.monotonic() + seconds
     while True:
         count = channel.drain(frames, 0)

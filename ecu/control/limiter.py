@@ -44,6 +44,7 @@ LIMITER_STATE = np.dtype(
 
 LEAST_TORQUE, GREATEST_TORQUE = 0.6, 1.6
 LEFT_RIGHT_SHARE = 0.10
+BEYOND_ANY = 1e12  # Pa; of two pressures that are both infinite there is no share
 # A demand that rises while its compensated twin falls by more than this in one cycle is a fault [Pa].
 AGAINST_DEMAND = 5e5
 EMPTY = 10.0 * BAR  # far below the gas pressure of any accumulator
@@ -72,7 +73,7 @@ def available_pressure(params: Record, inputs: Record) -> float:
 def _nominal_pressure(params: Record, torque: float, corner: int) -> float:
     """Return the pressure [Pa] beyond the push-out pressure that makes a torque at nominal friction."""
     lever: float = 2.0 * params.piston_area[corner] * params.effective_radius[corner]
-    nominal: float = torque / (lever * params.mu_nominal[corner])
+    nominal: float = min(torque / (lever * params.mu_nominal[corner]), BEYOND_ANY)
     return nominal
 
 

@@ -38,6 +38,12 @@ OPTIONAL: Final = frozenset(
 )
 
 
+UNIT_FOLDERS: Final = tuple(
+    map(Path, ("/etc/systemd/system", "/run/systemd/system", "/usr/lib/systemd/system"))
+)
+UNIT_NEEDS: Final = ("Type=notify", "WatchdogSec=", "Restart=", "RestartPreventExitStatus=2")
+
+
 class Check(NamedTuple):
     """One line of the table."""
 
@@ -72,6 +78,7 @@ def machine() -> list[Check]:
         _clock_source(),
         _wake_up(),
         _cache(),
+        unit(),
     ]
 
 
@@ -135,6 +142,21 @@ def _cache() -> Check:
             "kernel cache", False, f"{folder}: {error.strerror}", "set NUMBA_CACHE_DIR to a folder of yours"
         )
     return Check("kernel cache", True, f"{folder} can be written")
+
+
+def unit(folders: tuple[Path, ...] = UNIT_FOLDERS) -> Check:
+    """Check that an installed systemd unit has what the daemon relies on; point to ours if there is none."""
+    ours = resource("tools/deploy/brake-ecu.service")
+    installed = [path for folder in folders for path in sorted(folder.glob("brake-ecu*.service"))]
+    if not installed:
+        return Check("systemd unit", True, f"not installed; {ours} is one")
+    for path in installed:
+        lines = {line.partition("#")[0].strip() for line in path.read_text("utf-8").splitlines()}
+        missing = [key for key in UNIT_NEEDS if not any(line.startswith(key) for line in lines)]
+        if missing:
+            found = f"{path} lacks {', '.join(missing)}"
+            return Check("systemd unit", False, found, f"take them from {ours}")
+    return Check("systemd unit", True, ", ".join(map(str, installed)))
 
 
 def kernels(config: Path | None, plan: ReceivePlan) -> Check:

@@ -21,6 +21,14 @@ class EventLog:
         self._log = structlog.get_logger("ecu")
         self._throttle = throttle or Throttle()
         self._mode, self._faults, self._overruns, self._dropped, self._lost = 0, 0, 0, 0, 0
+        self._speaks: bool | None = None
+
+    def begin_after(self, record: RecordArray) -> None:
+        """Take over from another one that had seen `record` (`RECORDED`, shape (1,)) and said so."""
+        cycle, outputs = record["cycle"][0], record["outputs"][0]
+        self._mode, self._faults = (int(np.nan_to_num(outputs[name])) for name in ("mode", "active_faults"))
+        self._overruns, self._dropped = int(cycle["overruns"]), int(cycle["dropped"])
+        self._speaks = bool(cycle["speaks"])
 
     def look(self, records: RecordArray, lost_cycles: int, lost_frames: int) -> None:
         """Log what changed within `records` (`RECORDED`, shape (n,)); `lost_*`: what the reader missed."""
@@ -31,6 +39,12 @@ class EventLog:
         changed = (mode != np.r_[self._mode, mode[:-1]]) | (faults != np.r_[self._faults, faults[:-1]])
         for row in np.flatnonzero(changed):
             self._look_at(int(cycles["number"][row]), int(mode[row]), int(faults[row]))
+        speaks = cycles["speaks"] != 0
+        if self._speaks is None:
+            self._speaks = bool(speaks[0])
+        for row in np.flatnonzero(speaks != np.r_[self._speaks, speaks[:-1]]):
+            self._say("takes_over" if speaks[row] else "falls_silent", cycle=int(cycles["number"][row]))
+        self._speaks = bool(speaks[-1])
         last = cycles[-1]
         overruns, dropped = int(last["overruns"]), int(last["dropped"])
         if overruns > self._overruns:
@@ -59,5 +73,12 @@ class EventLog:
             return
         if held:
             content["held_back"] = held
-        serious = event in ("missed", "frames_dropped", "ring_overtaken", "fault")
+        serious = event in (
+            "missed",
+            "frames_dropped",
+            "ring_overtaken",
+            "fault",
+            "takes_over",
+            "falls_silent",
+        )
         (self._log.warning if serious else self._log.info)(event, **content)

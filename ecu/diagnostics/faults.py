@@ -42,6 +42,7 @@ MOTOR_SHORT: Final = 1 << 23
 PRESSURE_NOT_FOLLOWING: Final = 1 << 24
 LEARNED_AT_BOUND: Final = 1 << 25
 LEARNING_GIVEN_UP: Final = 1 << 26
+NOT_KEPT: Final = 1 << 27
 E2E_REJECTIONS: Final = 1 << 28
 
 FAULTS: Final = (
@@ -72,6 +73,7 @@ FAULTS: Final = (
     Fault(PRESSURE_NOT_FOLLOWING, "pressure does not follow demand", "a calliper pressure is not what was demanded while the three others are: nothing is learned", "check that wheel's pressure sensor and valve, and the receiver of PressureDemand*"),
     Fault(LEARNED_AT_BOUND, "learned value at its bound", "a friction, mass, stiffness, motor scale, radius or zero would be learned beyond what a car can be: it stays at its bound", "compare the configuration with the car: mass, tyres, brakes; check the sensors"),
     Fault(LEARNING_GIVEN_UP, "learning given up", "what was learned predicted the last brakings worse than the configured friction: it was forgotten and is learned anew", "look at the prediction in the report; check pressures, accelerometer and motor torques against each other"),
+    Fault(NOT_KEPT, "nothing is kept", "the side process is away or hangs, or the state folder cannot be written: what is learned now ends with this run", "it is started again by itself; look at the disk and at the log lines before"),
     Fault(E2E_REJECTIONS, "E2E rejections", "of a protected message more frames come than its sender makes, or many are rejected: nothing is learned, and a request in doubt is not lowered", "look for a second sender of that message and for disturbances of the bus: `brake-ecu doctor -i -c` counts them"),
 )  # fmt: skip
 

@@ -13,7 +13,7 @@ QUIET_S: Final = 1.0
 
 def configure_logging() -> None:
     """Send every event of this process to stderr."""
-    terminal = sys.stderr.isatty()
+    terminal = sys.stderr is not None and sys.stderr.isatty()
     renderer: Any = structlog.dev.ConsoleRenderer() if terminal else structlog.processors.JSONRenderer()
     structlog.configure(
         processors=[

@@ -1,8 +1,9 @@
 """What was learned, kept like money: sqlite, WAL, synchronous FULL, a CRC and a revision per row.
 
 Only the side process writes. A row that fails its CRC or its ranges is passed over for the revision before
-it; a file that sqlite cannot read, or that holds another table, is set aside and a new one made. What another
-version of the algorithm has learned stays in the file and is not used.
+it; a file that sqlite cannot read, or that holds another table, another schema or values of another kind, is
+set aside and a new one made. What another version of the algorithm has learned stays in the file and is not
+used. The folder is its owner's alone.
 """
 
 import math
@@ -10,7 +11,7 @@ import sqlite3
 import time
 import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -22,6 +23,8 @@ from ecu.errors import UserError
 from ecu.records import LEARNED, RecordArray
 
 FILE: Final = "learned.sqlite"
+DAMAGED: Final = (sqlite3.Error, ValueError, OverflowError, TypeError)
+"""What sqlite3 raises over a damaged file: text that is no UTF-8, and numbers that cannot be, among them."""
 REVISIONS_KEPT: Final = 20
 SAVE_INTERVAL_S: Final = 60.0
 MU_RANGE: Final = (0.5, 1.5)  # of nominal
@@ -31,12 +34,16 @@ JOINT_LIMIT: Final = 1.5
 """Of any state of the joint observer: logarithms, and the rest is smaller still."""
 LEAST_EIGENVALUE: Final = 1e-6  # of a correlation matrix, below zero: rounding
 
-_TABLE: Final = """
-CREATE TABLE IF NOT EXISTS learned (
+_TABLE: Final = """CREATE TABLE learned (
     key TEXT NOT NULL, revision INTEGER NOT NULL, saved_at TEXT NOT NULL,
     record BLOB NOT NULL, crc INTEGER NOT NULL,
     PRIMARY KEY (key, revision)
 )"""
+_FILE_FORMATS: Final = (b"\x01\x01", b"\x02\x02")  # bytes 18 and 19: rollback journal, WAL
+_LARGEST_REVISION: Final = 1 << 53
+_OF_ANOTHER_KIND: Final = f"""SELECT count(*) FROM learned WHERE typeof(key) != 'text'
+    OR typeof(saved_at) != 'text' OR typeof(record) != 'blob' OR typeof(crc) != 'integer'
+    OR typeof(revision) != 'integer' OR revision NOT BETWEEN 1 AND {_LARGEST_REVISION}"""
 
 
 def open_store(folder: Path) -> sqlite3.Connection:
@@ -47,15 +54,15 @@ def open_store(folder: Path) -> sqlite3.Connection:
     """
     path = folder / FILE
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         try:
             return _connect(path)
-        except sqlite3.DatabaseError as error:
+        except DAMAGED as error:
             if isinstance(error, sqlite3.OperationalError) and not _is_damaged(error):
                 raise
             _set_aside(path, str(error))
             return _connect(path)
-    except (OSError, sqlite3.Error) as error:
+    except (OSError, *DAMAGED) as error:
         raise UserError(
             str(path), "", f"cannot be opened: {error}; give a folder that can be written"
         ) from None
@@ -63,19 +70,32 @@ def open_store(folder: Path) -> sqlite3.Connection:
 
 def _is_damaged(error: sqlite3.OperationalError) -> bool:
     """Whether the file is at fault and not its surroundings (rights, a full disk, a lock)."""
-    return error.sqlite_errorcode & 0xFF in (sqlite3.SQLITE_IOERR, sqlite3.SQLITE_ERROR)
+    code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR)  # Python's own, over text, has none
+    return code & 0xFF in (sqlite3.SQLITE_IOERR, sqlite3.SQLITE_ERROR)
 
 
 def _connect(path: Path) -> sqlite3.Connection:
+    with suppress(FileNotFoundError), path.open("rb") as file:
+        if file.read(20)[18:] not in (b"", *_FILE_FORMATS):  # sqlite would take it as read-only
+            raise sqlite3.DatabaseError("its format is another's")
     store = sqlite3.connect(path, isolation_level=None, timeout=0.5)
     try:
         store.execute("PRAGMA journal_mode=WAL")
         store.execute("PRAGMA synchronous=FULL")
-        store.execute(_TABLE)
-        store.execute("SELECT key, revision, saved_at, record, crc FROM learned LIMIT 1")
-        verdict = store.execute("PRAGMA quick_check(1)").fetchone()[0]
+        with _transaction(store):
+            schema = store.execute(
+                "SELECT type, name, sql FROM sqlite_schema WHERE sql IS NOT NULL"
+            ).fetchall()
+            if not schema:
+                store.execute(_TABLE)
+            store.execute("PRAGMA user_version = 1")  # one that cannot be written shows now
+        if schema and schema != [("table", "learned", _TABLE)]:
+            raise sqlite3.DatabaseError("it holds another schema")
+        verdict = store.execute("PRAGMA integrity_check(1)").fetchone()[0]
         if verdict != "ok":
             raise sqlite3.DatabaseError(verdict)
+        if store.execute(_OF_ANOTHER_KIND).fetchone()[0]:
+            raise sqlite3.DatabaseError("it holds values of another kind")
     except BaseException:
         store.close()
         raise

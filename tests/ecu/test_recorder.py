@@ -1,5 +1,6 @@
 import io
 import json
+import os
 import re
 
 import numpy as np
@@ -8,21 +9,22 @@ from structlog.testing import capture_logs
 
 from brakelab.replay.formats import read_frames
 from brakelab.replay.log_quality import LogQuality
-from ecu import recorder as recorder_module
+from ecu import side_process
 from ecu.diagnostics.store import open_store, restore
 from ecu.errors import UserError
 from ecu.recorder import (
     CYCLES_FILE,
     FRAMES_FILE,
-    Recorder,
     candump_lines,
     dtype_of,
     interface_name,
     layout,
+    make_room,
     read_recording,
 )
 from ecu.records import CYCLE, FRAME, FRAME_EXTENDED, FRAME_FD, LEARNED, OUTPUTS, new_record
 from ecu.ring import RECORDED, RingReader, create_ring, publish
+from ecu.side_process import Recorder
 
 STATE = np.dtype([("speed", "f8"), ("learned", LEARNED), ("flag", "u1")], align=True)
 ABOUT = {
@@ -37,7 +39,7 @@ ABOUT = {
 class Run:
     """A ring with a recorder at its end."""
 
-    def __init__(self, tmp_path, record=None, state=None):
+    def __init__(self, tmp_path, record=None, state=None, **more):
         initial = new_record(STATE)
         initial["speed"] = 12.5
         self.ring = create_ring(tmp_path / "ring", ABOUT, initial.tobytes(), slots=64, frames=1024)
@@ -46,7 +48,7 @@ class Run:
         self.learned["radius_sigma"] = 0.002
         self.frames = new_record(FRAME, 3)
         self.frames["length"], self.frames["can_id"] = 2, [0x10, 0x123, 0x7FF]
-        self.recorder = Recorder(RingReader(self.ring.path), record, state)
+        self.recorder = Recorder(RingReader(self.ring.path), record, state, **more)
 
     def cycles(self, count, frames=0, brakings=0, **outputs):
         for _ in range(count):
@@ -173,6 +175,75 @@ def test_a_full_disk_ends_the_recording_with_one_line_and_nothing_else(tmp_path)
     assert restore(open_store(tmp_path / "state"), "suv/1/1", np.full(4, 0.4)) is not None
 
 
+# what a killed recorder left beside whole cycles: bytes more or less of frames.log, of cycles.bin
+LEFT = {
+    "nothing": (0, 0),
+    "frames of a cycle that is not there": (70, 0),
+    "a torn line": (5, 0),
+    "a torn cycle": (0, 100),
+    "both": (33, RECORDED.itemsize - 1),
+    "cycles only in part": (0, -100),
+}
+
+
+@pytest.mark.parametrize(("frames", "cycles"), LEFT.values(), ids=LEFT)
+def test_one_that_was_killed_is_gone_on_with_in_the_same_recording(tmp_path, frames, cycles):
+    run = Run(tmp_path, record=tmp_path / "record", state=tmp_path / "state")
+    run.cycles(4, frames=2, mode=1)
+    files = run.recorder.files
+    assert os.write(files.frames.fileno(), b"(1700000000.000001) can0 010#0000\n"[:1] * frames) == frames
+    if cycles < 0:
+        os.truncate(files.cycles.fileno(), 4 * RECORDED.itemsize + cycles)
+    else:
+        os.write(files.cycles.fileno(), bytes(cycles))
+    run.recorder = None
+    run.ring.header["followed"] = 2
+    with capture_logs() as lines:
+        run.recorder = Recorder(
+            RingReader(run.ring.path), tmp_path / "record", tmp_path / "state", again=True
+        )
+        run.cycles(3, frames=1, mode=1)
+        run.recorder.finish()
+    recording = read_recording(tmp_path / "record")
+    assert recording.cycles["number"].tolist() == list(range(7))
+    assert len(recording.frames.read_text().splitlines()) == 4 * 2 + 3
+    assert saved_brakings(tmp_path / "state") == 0
+    assert lines == []  # what the first one said is not said again
+
+
+def test_a_store_that_cannot_be_written_is_tried_again(tmp_path):
+    (tmp_path / "state").write_text("a file")
+    with capture_logs() as lines:
+        run = Run(tmp_path, state=tmp_path / "state")
+        run.cycles(2)
+        assert not run.recorder.kept
+        run.cycles(1, brakings=1)
+        run.cycles(1, brakings=2)
+    assert [line["event"] for line in lines] == ["not_kept"]
+    (tmp_path / "state").unlink()
+    run.cycles(1, brakings=3)
+    assert run.recorder.kept
+    assert saved_brakings(tmp_path / "state") == 3
+
+
+def test_a_limit_removes_the_oldest_recordings_and_stops_one_that_is_larger_alone(tmp_path):
+    for _ in range(3):
+        run = Run(tmp_path, record=tmp_path / "record")
+        run.cycles(10)
+        run.recorder.finish()
+    folders = sorted((tmp_path / "record").iterdir())
+    size = sum(file.stat().st_size for file in folders[0].iterdir())
+    assert make_room(folders[2], 3 * size)
+    assert sorted((tmp_path / "record").iterdir()) == folders
+    (folders[0] / "note.txt").write_text("of the user")
+    assert make_room(folders[2], 2.5 * size)
+    assert [len(list(folder.iterdir())) for folder in folders] == [1, 4, 4]
+    with capture_logs() as lines:
+        run = Run(tmp_path, record=tmp_path / "record", limit_bytes=2000)
+        run.cycles(10)
+    assert [line["event"] for line in lines] == ["recording_stopped"]
+
+
 def saved_brakings(folder):
     found = restore(open_store(folder), "suv/1/1", np.full(4, 0.4))
     return None if found is None else int(found[1]["brakings"][0])
@@ -180,7 +251,7 @@ def saved_brakings(folder):
 
 def test_learned_values_are_saved_after_a_braking_and_at_the_end(tmp_path, monkeypatch):
     clock = [0.0]
-    monkeypatch.setattr(recorder_module.time, "monotonic", lambda: clock[0])
+    monkeypatch.setattr(side_process.time, "monotonic", lambda: clock[0])
     run = Run(tmp_path, state=tmp_path / "state")
     run.cycles(5)
     assert saved_brakings(tmp_path / "state") is None

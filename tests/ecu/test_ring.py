@@ -1,13 +1,26 @@
 import multiprocessing
+import os
+import subprocess
+import sys
 from multiprocessing.synchronize import Event
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from ecu import ring as ring_module
 from ecu.errors import UserError
 from ecu.records import CYCLE, FRAME, LEARNED, OUTPUTS, new_record
-from ecu.ring import FRAMES, SLOTS, RingReader, close_ring, create_ring, publish
+from ecu.ring import (
+    FRAMES,
+    SLOTS,
+    RingReader,
+    close_ring,
+    create_ring,
+    living_rings,
+    publish,
+    ring_path,
+)
 from ecu.signals import CYCLE_NS
 
 
@@ -143,3 +156,86 @@ def test_another_file_is_one_line(path, content):
     path.write_bytes(content)
     with pytest.raises(UserError, match="ring"):
         RingReader(path)
+
+
+def test_it_is_its_owner_s_alone_and_follows_no_link(path, tmp_path):
+    victim = tmp_path / "victim"
+    victim.write_text("mine")
+    path.symlink_to(victim)
+    Writer(path, slots=8, frames=16)
+    assert victim.read_text() == "mine"
+    assert path.stat(follow_symlinks=False).st_mode & 0o777 == 0o600
+    assert not path.is_symlink()
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def _link(path):
+    path.rename(path.with_name("elsewhere"))
+    path.symlink_to(path.with_name("elsewhere"))
+
+
+def _header(path, **values):
+    content = bytearray(path.read_bytes())
+    header = np.frombuffer(content, ring_module._HEADER, 1)
+    for name, value in values.items():
+        header[name] = value
+    path.write_bytes(content)
+
+
+# what somebody made of a ring; none of them is read
+FORGED = {
+    "a symbolic link": _link,
+    "anyone may write it": lambda path: path.chmod(0o602),
+    "another user's": lambda path: os.chown(path, 12345, -1),
+    "cut": lambda path: path.write_bytes(path.read_bytes()[:-1]),
+    "no description": lambda path: _header(path, description_bytes=0),
+    "its description is a list": lambda path: path.write_bytes(
+        path.read_bytes().replace(b'{"channel": "can0"}', b'["channel", "can0"]')
+    ),
+    "no slots": lambda path: _header(path, slots=0),
+    "more slots than it has": lambda path: _header(path, slots=10**12),
+    "negative": lambda path: _header(path, frames=-5),
+    "a pipe": lambda path: (path.unlink(), os.mkfifo(path)),
+}
+
+
+@pytest.mark.parametrize("forge", FORGED.values(), ids=FORGED)
+def test_what_is_not_our_own_ring_is_one_line(path, forge):
+    Writer(path, slots=8, frames=16)
+    try:
+        forge(path)
+    except PermissionError:
+        pytest.skip("only root gives files away")
+    with pytest.raises(UserError, match="ring"):
+        RingReader(path)
+
+
+def test_rings_of_the_living_are_known_by_their_lock(tmp_path, monkeypatch):
+    monkeypatch.setattr(ring_module, "_folder", lambda: tmp_path)
+    kept = Writer(
+        ring_path(1), slots=8, frames=16
+    )  # a process id that is not the writer's, as in a container
+    script = (
+        "import sys, time; from pathlib import Path; from ecu.ring import create_ring\n"
+        "ring = create_ring(Path(sys.argv[1]), {}, b'', slots=2, frames=2); print(flush=True); time.sleep(60)"
+    )
+    command = [sys.executable, "-c", script, str(ring_path(2))]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as other:
+        other.stdout.readline()
+        assert living_rings() == sorted([kept.ring.path, ring_path(2)])
+        other.kill()
+    (tmp_path / "brake-ecu.0.3.ring.abcd.new").write_text("left by one that died while it made it")
+    assert living_rings() == [kept.ring.path]
+    assert [file.name for file in tmp_path.iterdir()] == [kept.ring.path.name]
+
+
+def test_last_words_and_where_to_go_on(path):
+    writer = Writer(path, slots=8, frames=64)
+    writer.publish(3, 0, 7, 1)
+    reader = RingReader(path)
+    assert reader.go_on_after(1)["cycle"]["number"].tolist() == [1]
+    assert [reader.frames_before(number) for number in (0, 2, 4, 5)] == [0, 3, 11, None]
+    assert reader.read().records["cycle"]["number"].tolist() == [2, 3]
+    assert reader.last_read == 3
+    close_ring(writer.ring, {"cycles": 4})
+    assert reader.last_words == {"cycles": 4}

@@ -1,6 +1,7 @@
 """The second daemon: silent beside a living one, speaking 50 ms after it fell silent."""
 
 import json
+import random
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ from ecu.jit import CompileCounter
 from ecu.records import CYCLE, FRAME, LEARNED, OUTPUTS, new_record
 from ecu.ring import RingReader, create_ring, publish
 from ecu.signals import CYCLE_NS
-from ecu.standby import SILENCE_NS, Standby, learned_by_first
+from ecu.standby import SILENCE_NS, Claim, Standby, learned_by_first
 
 ROOT = Path(__file__).parents[2]
 DBC = ROOT / "dbc" / "brake_ecu.dbc"
@@ -121,6 +122,59 @@ def test_one_goes_on_counting_where_the_other_stopped(tmp_path):
     for _ in range(10):
         cycle(first, second)  # it was only held up
     assert len(second[1].sent) == before
+
+
+def yields_after(foreign, missed=(), cycles=2000):
+    """Return in which cycle a daemon yields that hears another one in the cycles `foreign`; None: never."""
+    claim = Claim()
+    for cycle in range(cycles):
+        if claim.is_lost(int(cycle in foreign), 30 if cycle in missed else 0):
+            return cycle
+    return None
+
+
+# cycles in which another sender is heard, cycles after a gap of 0.3 s -> the cycle in which it yields
+CLAIMS = {
+    "nobody else": ((), (), None),
+    "another that began with it": (range(2000), (), 9),
+    "another within two seconds": (range(150, 2000), (), 159),
+    "another every second cycle": (range(0, 2000, 2), (), None),  # half a sender is none
+    "one that came later": (range(210, 2000), (), None),
+    "one that came much later": (range(1500, 2000), (), None),
+    "what waited while it was held up": ([1000], [1000], None),
+    "one that came while it was held up": (range(1000, 2000), [1000], 1009),
+    "a standby that falls silent when it hears us": ([1000, 1001], [1000], None),
+}
+
+
+@pytest.mark.parametrize(("foreign", "missed", "cycle"), CLAIMS.values(), ids=CLAIMS)
+def test_who_spoke_first_goes_on_and_a_newcomer_yields(foreign, missed, cycle):
+    assert yields_after(foreign, missed) == cycle
+
+
+@pytest.mark.parametrize("apart", [0, 1, 7, 50])
+def test_of_two_that_began_together_one_speaks_before_long(tmp_path, apart):
+    """Eight seeds of the draw; `apart`: cycles between their starts."""
+    longest = 0
+    for seed in range(8):
+        random.seed(seed)
+        now = [0]
+        clock = TimeSource(
+            lambda now=now: now[0], lambda now=now: now[0], lambda until, now=now: now.__setitem__(0, until)
+        )
+        units = [unit(tmp_path / f"{seed}.{name}", clock) for name in (1, 2)]
+        units[0][1].other, units[1][1].other = units[1][1], units[0][1]
+        silence, spoke = 0, []
+        for cycle in range(apart + 150):
+            before = [len(one[1].sent) for one in units]
+            for ecu, wire, ring, grid, progress in units if cycle >= apart else units[:1]:
+                now[0] = grid.deadline_ns = cycle * CYCLE_NS  # both live through the same period
+                cycle_once(ecu, wire, ring, grid, progress)
+            spoke.append(sum(len(one[1].sent) > count for one, count in zip(units, before, strict=True)))
+            silence = 0 if spoke[-1] else silence + 1
+            longest = max(longest, silence)
+        assert set(spoke[-60:]) == {1}, seed
+    assert longest <= 21  # 50 ms, and at most 150 ms drawn
 
 
 DESCRIPTION = {"interface": "socketcan", "channel": "can0", "store_key": "suv/1", "state": {"itemsize": 8}}

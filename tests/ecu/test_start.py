@@ -2,13 +2,16 @@
 
 import importlib
 import os
+import signal
+import subprocess
 import sys
+import threading
 
 import numba
 import pytest
 
 from ecu.jit import CompileCounter
-from ecu.start import ahead_of_others, kept_out, like_others
+from ecu.start import ahead_of_others, kept_out, left_at_once, like_others
 
 
 def test_what_is_kept_out_is_not_found_and_comes_back_afterwards(monkeypatch, tmp_path):
@@ -22,12 +25,32 @@ def test_what_is_kept_out_is_not_found_and_comes_back_afterwards(monkeypatch, tm
         assert importlib.import_module("library_of_nobody")
 
 
-def test_the_first_compilation_and_only_that_gives_precedence_up():
+def test_each_compilation_is_told_before_it_begins():
     told = []
-    counter = CompileCounter(lambda: told.append(counter.count))
+    counter = CompileCounter(told.append)
     for result in (1, 2):
         numba.njit(lambda result=result: result)()
-    assert (told, counter.count) == ([0], 2)
+    assert (told, counter.count) == ([0, 1], 2)
+
+
+def test_a_signal_ends_what_compiles_at_once_and_nobody_s_business_else():
+    script = (
+        "import ctypes, os, signal\n"
+        "from ecu.start import left_at_once\n"
+        "signal.signal(signal.SIGTERM, lambda *_: None)\n"
+        "with left_at_once():\n"
+        "    print('compiling', flush=True)\n"
+        "    ctypes.CDLL(None).sleep(60)\n"  # as the compiler: no Python, no handler
+        "raise SystemExit(9)\n"
+    )
+    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE)
+    assert process.stdout.readline() == b"compiling\n"
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(10) == 0
+    before = threading.active_count()
+    with left_at_once():
+        assert threading.active_count() == before + 1
+    assert threading.active_count() == before  # the loop has no thread beside it
 
 
 def test_precedence_is_real_time_below_every_cycle_and_goes_back():

@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -31,16 +32,23 @@ PATIENCE_S = 300  # a cold cache compiles every kernel
 class Daemon:
     """`brake-ecu run` as a child process; its log is read line by line."""
 
-    def __init__(self, *arguments: object) -> None:
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tools")])}
-        command = [sys.executable, "-m", "ecu.cli", "run", *map(str, arguments)]
+    def __init__(
+        self, *arguments: object, stderr: int = subprocess.PIPE, program: str = "", **environment: str
+    ) -> None:
+        paths = os.pathsep.join([str(ROOT), str(ROOT / "tools")])
+        command = [sys.executable, *(["-c", program] if program else ["-m", "ecu.cli"]), "run"]
         self.process = subprocess.Popen(
-            command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=environment
+            [*command, *map(str, arguments)],
+            stdout=subprocess.DEVNULL,
+            stderr=stderr,
+            text=True,
+            env={**os.environ, "PYTHONPATH": paths, **environment},
         )
         self._lines: queue.Queue[str | None] = queue.Queue()
         self.seen: list[dict[str, Any]] = []
         self.other: list[str] = []
-        threading.Thread(target=self._read, daemon=True).start()
+        if stderr == subprocess.PIPE:
+            threading.Thread(target=self._read, daemon=True).start()
 
     def _read(self) -> None:
         assert self.process.stderr is not None
@@ -64,6 +72,14 @@ class Daemon:
         while not self._lines.empty() and self._next():
             pass
         return any({"event": event, **content}.items() <= line.items() for line in self.seen)
+
+    def family(self) -> list[int]:
+        """Process ids of the loop, the supervisor and the recorder, as far as they are there."""
+        family = [self.process.pid]
+        for pid in family:
+            with suppress(OSError):
+                family += map(int, Path(f"/proc/{pid}/task/{pid}/children").read_text().split())
+        return family
 
     def _next(self) -> bool:
         line = self._lines.get(timeout=PATIENCE_S)
@@ -90,8 +106,8 @@ def daemon() -> Iterator[Callable[..., Daemon]]:
     """Start daemons that do not outlive the test."""
     started: list[Daemon] = []
 
-    def start(*arguments: object) -> Daemon:
-        started.append(Daemon(*arguments))
+    def start(*arguments: object, **more: Any) -> Daemon:
+        started.append(Daemon(*arguments, **more))
         return started[-1]
 
     yield start

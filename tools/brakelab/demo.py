@@ -24,11 +24,12 @@ from ecu.bus.channel import open_channel
 from ecu.clock import system_time
 from ecu.config import load_config
 from ecu.errors import UserError
+from ecu.prepare import RunOptions
 from ecu.recorder import read_recording
 from ecu.records import RecordArray
 from ecu.resources import resource
 from ecu.ring import RingReader, ring_path
-from ecu.service import RunOptions, run
+from ecu.service import run
 from ecu.warm import warm
 
 SCENARIO: Final = "config/scenarios/demo.toml"

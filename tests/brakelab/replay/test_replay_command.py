@@ -79,6 +79,19 @@ def test_frames_and_signals_of_one_drive_tell_the_same(tmp_path: Path) -> None:
     assert '"checksum_errors": 0' in result.metadata["quality"]
 
 
+@pytest.mark.parametrize("t0", [-5.0, -3.0, -1e6, -1e8], ids=str)
+def test_time_before_zero_is_time_like_any_other(tmp_path: Path, t0: float) -> None:
+    """CANape and others count from the trigger; the last row is the last sample, not t = 0."""
+    path = tmp_path / "stop.csv"
+    table = pq.read_table(stop(tmp_path / "stop.parquet", t0)).slice(0, 200)
+    columns = {name: table.column(name).to_pylist() for name in table.column_names}
+    rows = [",".join(f"{value:.2f}" for value in row) for row in zip(*columns.values(), strict=True)]
+    path.write_text("\n".join([",".join(columns), *rows]) + "\n")
+    t = run([path], tmp_path / "out.parquet")["t"]
+    assert len(t) == 200
+    assert (t[0], t[-1]) == pytest.approx((t0, t0 + 1.99), abs=1e-6)
+
+
 @pytest.mark.parametrize(
     ("first", "stated"), [(0.0, "1700000000000000000"), (7.0, "1700000000000000000"), (0.0, "")]
 )

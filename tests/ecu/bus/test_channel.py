@@ -24,7 +24,10 @@ class ScriptedBus:
     def recv(self, timeout):
         if self.gone:
             raise can.CanOperationError("gone")
-        return self.heard.pop(0) if self.heard else None
+        heard = self.heard.pop(0) if self.heard else None
+        if isinstance(heard, Exception):
+            raise can.CanOperationError("could not unpack received message") from heard
+        return heard
 
     def send(self, message, timeout):
         if self.refuses:
@@ -257,3 +260,22 @@ def test_a_bus_that_was_begun_ends_without_a_word(caplog):
 def test_an_unknown_interface_is_answered_with_those_known():
     with pytest.raises(UserError, match=r"no such interface; did you mean socketcan\?; .*virtual"):
         open_channel("socketcam", "can0", receive_ids=[])
+
+
+@pytest.mark.parametrize(
+    ("reason", "off"), [(ValueError("no msgpack"), False), (OSError(100, "Network is down"), True)]
+)
+def test_a_message_that_cannot_be_read_is_no_bus_off_and_holds_up_nothing(reason, off):
+    bus, frames = ScriptedBus(), new_record(FRAME, 8)
+    bus.heard = [reason, message(0x10), reason, reason, message(0x10)]
+    opened = channel(bus, [0x10])
+    assert opened.drain(frames, 0) == (0 if off else 2)
+    assert opened.status().bus_off is off
+
+
+def test_junk_without_end_does_not_hold_the_cycle_up():
+    bus, frames = ScriptedBus(), new_record(FRAME, 8)
+    bus.heard = [ValueError()] * 1000
+    opened = channel(bus, [0x10])
+    opened.drain(frames, 0)
+    assert len(bus.heard) == 800

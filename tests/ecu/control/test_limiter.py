@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ecu.config import load_config, new_params
-from ecu.control.limiter import LIMITER_STATE, available_pressure, limit_axle
+from ecu.control.limiter import LIMITER_STATE, available_pressure, limit_axle, reads_empty
 from ecu.jit import kernel
 from ecu.signals import ALIVE, INPUT, USABLE, VALID
 
@@ -97,6 +97,22 @@ def test_no_torque_is_no_pressure_at_once(torque: float, wanted: float) -> None:
     assert [state[k][0, 0] for k in ("pressure", "uncompensated", "wanted")] == [0.0, 0.0, 0.0]
 
 
+@pytest.mark.parametrize("torque", [1e12, 5.5e304, 1.7e308])
+@pytest.mark.parametrize("wanted", [0.0, 60 * BAR, 1e300, NAN])
+@pytest.mark.parametrize("uncompensated", [0.0, -1e300, 1e300, NAN])
+def test_a_torque_whose_pressure_is_no_number(torque: float, wanted: float, uncompensated: float) -> None:
+    assert settle(fresh(), 0, wanted, uncompensated, torque) == 180 * BAR
+
+
+def test_half_a_pascal_of_rounding_is_no_limit_and_two_are() -> None:
+    """`limited` is told from 1 Pa on."""
+    for beyond, told in ((0.95, 0), (1.05, 1)):
+        state = fresh()
+        wanted = PUSH_OUT + 1.6 * 400.0 / PER_PASCAL[0] + beyond
+        limit(PARAMS, state, 0, wanted, nominal(400.0), 400.0, DT)
+        assert state["limited"] == told
+
+
 def test_the_smallest_torque_is_a_demand() -> None:
     assert settle(fresh(), 0, nominal(0.01), nominal(0.01), 0.01) == pytest.approx(nominal(0.01))
 
@@ -159,7 +175,8 @@ def test_from_below_a_ceiling_that_is_lifted_pressure_rises_from_where_it_was() 
         ("full", USABLE, 180.0, 180.0),
         ("fuller than the demand may be", USABLE, 210.0, 180.0),
         ("low", USABLE, 95.5, 95.5),
-        ("a little", USABLE, 10.5, 10.5),
+        ("a little", USABLE, 10.01, 10.01),
+        ("no more than the gas", USABLE, 10.0, 180.0),
         ("empty, or a sensor that lies", USABLE, 0.0, 180.0),
         ("stale", VALID, 20.0, 180.0),
         ("invalid", ALIVE, 20.0, 180.0),
@@ -170,6 +187,7 @@ def test_what_the_accumulator_can_give(feed, case, verdict, accumulator, availab
     inputs = feed(accumulator_pressure=accumulator)
     inputs[0]["verdict"][INPUT["accumulator_pressure"]] = verdict
     assert available_pressure(PARAMS[0], inputs[0]) == pytest.approx(available * BAR), case
+    assert bool(reads_empty(inputs[0])) == (verdict == USABLE and accumulator <= 10.0)
 
 
 # ---------------------------------------------------------------- 0–180 bar
@@ -277,6 +295,8 @@ def test_an_uncompensated_demand_that_is_no_pressure_is_computed_anew(uncompensa
         ("falling demand, compensation follows", -8.0, -9.0, False),
         ("falling demand, compensation rises a little", -8.0, 4.9, False),
         ("falling demand, compensation jumps", -8.0, 5.1, True),
+        ("just not against", 8.0, -5.0, False),
+        ("just not against, rising", -8.0, 5.0, False),
     ],
 )
 def test_a_demand_that_moves_against_the_uncompensated_one_is_replaced(

@@ -3,8 +3,9 @@ from pathlib import Path
 import pytest
 
 from ecu.bus.receive import contract_receive_plan, new_reception
-from ecu.diagnostics.doctor import doctor, machine, messages
+from ecu.diagnostics.doctor import doctor, machine, messages, unit
 from ecu.errors import UserError
+from ecu.resources import resource
 
 DBC = Path(__file__).parents[3] / "dbc" / "brake_ecu.dbc"
 
@@ -49,3 +50,25 @@ def test_the_machine_is_looked_at_and_every_refusal_has_a_remedy():
 def test_half_a_bus_is_a_bad_argument(arguments):
     with pytest.raises(UserError, match="give both or none"):
         doctor(None, None, *arguments)
+
+
+# the unit that is installed -> whether it will do, and what is said
+UNITS = {
+    "none": (None, True, "not installed"),
+    "ours": (resource("tools/deploy/brake-ecu.service").read_text(), True, "brake-ecu.service"),
+    "no watchdog": (
+        "[Service]\nType=notify\nRestart=always\nRestartPreventExitStatus=2\n",
+        False,
+        "WatchdogSec=",
+    ),
+    "nothing of it": ("[Service]\n#Type=notify\n", False, "Type=notify, WatchdogSec=, Restart="),
+}
+
+
+@pytest.mark.parametrize(("text", "good", "found"), UNITS.values(), ids=UNITS)
+def test_the_unit_has_what_the_daemon_relies_on(tmp_path, text, good, found):
+    if text is not None:
+        (tmp_path / "brake-ecu.service").write_text(text)
+    check = unit((tmp_path,))
+    assert (check.good, found in check.found) == (good, True)
+    assert good or "tools/deploy" in check.remedy

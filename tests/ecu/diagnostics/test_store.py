@@ -204,3 +204,49 @@ def test_killed_at_fifty_instants_it_opens_and_has_lost_nothing_that_was_saved(t
         store.close()
         assert lines == []
         assert kept in (reported, reported + 1)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory) -> bytes:
+    """A store's file of two revisions, as sqlite leaves it."""
+    folder = tmp_path_factory.mktemp("whole")
+    with closing(open_store(folder)) as store:
+        save(store, KEY, learned(7))
+        save(store, KEY, learned(8))
+    return (folder / FILE).read_bytes()
+
+
+def look_at(folder: Path, content: bytes) -> tuple[int | None, list[str]]:
+    """Open a store of that content as the daemon does; return the brakings restored and the lines said."""
+    for file in folder.glob(f"{FILE}*"):
+        file.unlink()
+    (folder / FILE).write_bytes(content)
+    with capture_logs() as lines, closing(open_store(folder)) as store:
+        found = restore(store, KEY, NOMINAL)
+        save(store, KEY, learned(9) if found is None else found[1])
+    good = {learned(brakings).tobytes() for brakings in (7, 8)}
+    assert found is None or found[1].tobytes() in good
+    return None if found is None else int(found[1]["brakings"][0]), [line["event"] for line in lines]
+
+
+def test_a_single_damaged_byte_costs_one_line_at_most_and_gives_no_wrong_value(whole, tmp_path):
+    """The header, every third byte of the schema, and a sample of all (the whole file was tried once)."""
+    draw = random.Random(12)
+    schema = whole.index(b"CREATE TABLE")
+    page = int.from_bytes(whole[16:18], "big")
+    places = {*range(100), *range(schema - 60, page, 3), *draw.sample(range(len(whole)), 300)}
+    outcomes = []
+    for place in sorted(places):
+        damaged = bytearray(whole)
+        damaged[place] ^= 1 << draw.randrange(8) if place % 2 else 0x8D
+        brakings, lines = look_at(tmp_path, bytes(damaged))
+        assert brakings is not None or lines, place
+        assert len([line for line in lines if line == "store_damaged"]) <= 1
+        assert len(lines) <= 2, (place, lines)
+        outcomes.append((brakings, tuple(lines)))
+    assert len(set(outcomes)) >= 3  # whole, the revision before, set aside
+
+
+def test_the_folder_is_its_owner_s_alone(tmp_path):
+    open_store(tmp_path / "state").close()
+    assert (tmp_path / "state").stat().st_mode & 0o777 == 0o700

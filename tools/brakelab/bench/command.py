@@ -21,6 +21,7 @@ from brakelab.bench import (
     cycle,
     margins,
     plant,
+    recorded,
     step,
 )
 from brakelab.bench import stops as stops_bench
@@ -45,6 +46,7 @@ from brakelab.bench.texts import (
     MARGINS_TEXT,
     OBSERVERS_TEXT,
     PLAY_TEXT,
+    RECORDED_TEXT,
     REPLAY_TEXT,
     STOPS_TEXT,
 )
@@ -63,6 +65,7 @@ BLENDING: Final = "blending"
 COMPENSATION: Final = "compensation"
 MARGINS: Final = "margins"
 LATENESS: Final = "lateness"
+RECORDED: Final = "recorded"
 REPLAY: Final = "replay"
 PLAY: Final = "play"
 
@@ -112,7 +115,7 @@ def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0, 
 
     In a checkout, a run of all times renews docs/benchmarks.md, `stops` docs/observer-accuracy.md,
     `observers` docs/observers.md, each other one the page of its name; that of `play` keeps the tables of
-    other buses. `seeds`: how many cars `stops` and `observers` draw, `ablation` and `bound` at most;
+    other buses. `seeds`: how many cars `stops` and `observers` draw, the others at most;
     `draw`: how far those of `stops` and `observers` differ from their file, pages are of the wide one;
     `seconds`: how long `lateness` drives and all players of `play` send.
 
@@ -129,6 +132,7 @@ def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0, 
         COMPENSATION: _compensation,
         MARGINS: _margins,
         BLENDING: _blending,
+        RECORDED: partial(_recorded, seeds=seeds),
         LATENESS: partial(_lateness, seconds=seconds),
         REPLAY: _replay,
         PLAY: partial(_play, seconds=seconds),
@@ -225,6 +229,11 @@ def _ablation(json: bool, seeds: int) -> int:
 def _bound(json: bool, seeds: int) -> int:
     table = bound.bound_table(_each_car(BOUND, bound.bounds_of, min(seeds, bound.CARS)))
     return _page(BOUND, "What the sensors allow", BOUND_TEXT, [table], json)
+
+
+def _recorded(json: bool, seeds: int) -> int:
+    table = recorded.recorded_table(_each_car(RECORDED, recorded.recorded_of, min(seeds, recorded.CARS)))
+    return _page(RECORDED, "Cars as loggers record them", RECORDED_TEXT, [table], json, "recorded-cars")
 
 
 def _friction(json: bool) -> int:

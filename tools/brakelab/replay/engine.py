@@ -226,7 +226,8 @@ def _run(
                 return
             schedule = _grid(int(stamps(block)[0]))
         if not last:
-            latest = max(int(stamps(block).max()), latest or 0)
+            newest = int(stamps(block).max())
+            latest = newest if latest is None else max(newest, latest)
         at["cursor"] = 0
         while True:
             if at[0]["done"] == len(chunk):
