@@ -41,7 +41,9 @@ INPUTS: Final = np.dtype(
         ("new", "u1", (N_INPUTS,)),  # a valid sample arrived in this cycle
         ("verdict", "u1", (N_INPUTS,)),  # ALIVE | RATE_OK | VALID
         ("bus_faults", "u4"),  # fault bits that only the service can see (bus off, foreign sender, …)
+        ("e2e_faults", "u4"),  # fault bits that only the receiver can see: streams that cannot be trusted
         ("overruns", "u4"),
+        ("spare", "u4"),  # a gap would be left undefined by copies
         ("worst_lateness_us", "f8"),
     ],
     align=True,

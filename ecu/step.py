@@ -22,14 +22,13 @@ from ecu.control.blending import (
 from ecu.control.demand import DEMAND_STATE, update_demand
 from ecu.control.distribution import DISTRIBUTION_STATE, cap_trailing, distribute, watch_trailing
 from ecu.control.friction_torque import FRICTION_TORQUE_STATE, follow_pressure, lagging_torque
-from ecu.control.limiter import LIMITER_STATE, available_pressure, limit_pressure, reads_empty
+from ecu.control.limiter import LIMITER_STATE, available_pressure, limit_axle, reads_empty
 from ecu.control.mode import MODE_STATE, decide_mode, input_faults
 from ecu.control.pressure_law import (
     PRESSURE_LAW_STATE,
     compensated_pressure,
     follow_friction,
     learn_start,
-    level_left_right,
     pressure_for_torque,
     set_base,
     watch_limit,
@@ -181,7 +180,7 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
     """
     p, s, u, y = params[0], state[0], inputs[0], outputs[0]
     dt = 1e-9 * u.dt_ns
-    faults = u.bus_faults | input_faults(p, u) | watch_sensors(p, s, u, dt)
+    faults = u.bus_faults | u.e2e_faults | input_faults(p, u) | watch_sensors(p, s, u, dt)
     leave_out(p, s, u)
     u = s.trusted
     _estimate(p, s, u, dt)
@@ -301,7 +300,6 @@ def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
         torque = s.blending.lining[i]
         y.pressure_uncompensated[i] = pressure_for_torque(p, torque, s.control.base[i], i)
         y.pressure_demand[i] = compensated_pressure(p, s.control, y.pressure_uncompensated[i], i)
-    level_left_right(y.pressure_demand, y.pressure_uncompensated)
     cap_trailing(
         p, s.distribution, decel, s.blending.lining, s.friction, y.pressure_demand, backwards
     )  # fmt: skip
@@ -315,18 +313,20 @@ def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
 
 @kernel
 def _limit(p: Record, s: Record, y: Record, available: float, decel: float, dt: float) -> None:
-    s.limiter.limited = s.limiter.starved = 0
+    limiter = s.limiter
+    limiter.limited = limiter.starved = 0
     for i in range(4):
-        wanted, uncompensated = y.pressure_demand[i], y.pressure_uncompensated[i]
-        ceiling = min(available, s.guard.cap[i]) if s.guard.capped[i] else available
-        torque = s.blending.lining[i]
-        pressure = limit_pressure(p, s.limiter, i, wanted, uncompensated, torque, ceiling, dt)
-        s.control.cut[i] = 1 if pressure < wanted - 1.0 else 0
-        if available < min(wanted, p.max_pressure):
-            s.limiter.starved = 1
-        y.pressure_demand[i], y.pressure_uncompensated[i] = pressure / BAR, uncompensated / BAR
+        limiter.ceiling[i] = min(available, s.guard.cap[i]) if s.guard.capped[i] else available
+        if available < min(y.pressure_demand[i], p.max_pressure):
+            limiter.starved = 1
+    for left in (0, 2):
+        limit_axle(p, limiter, left, y.pressure_demand, y.pressure_uncompensated, s.blending.lining, dt)
+    for i in range(4):
+        asked, pressure = limiter.asked[i], limiter.pressure[i]
+        s.control.cut[i] = 1 if pressure < asked - 1.0 else 0
+        y.pressure_demand[i], y.pressure_uncompensated[i] = pressure / BAR, y.pressure_uncompensated[i] / BAR
         motor = motor_torque_demand(
-            p, s.blending, lagging_torque(p, s.friction_torque, s.control, wanted, i), i
+            p, s.blending, lagging_torque(p, s.friction_torque, s.control, asked, i), i
         )
         y.motor_demand[i] = motor if blends(p) else math.nan
     watch_limit(p, s.control, s.friction.mu, s.guard.capped, decel > 0.0, dt)

@@ -14,11 +14,15 @@ hyundai_xor      high nibble of the last byte = XOR of all other nibbles (0x2B0)
 
 Each maker's rule holds for every frame of the recorded drives that the tests read.
 
-Counter, as AUTOSAR's P01 check: the largest step allowed is 1 and grows by one with every message cycle
-without an accepted frame. A frame out of sequence is a candidate: if two more follow it consistently, each a
-cycle later, and none in between fits the sequence known, its sender was restarted and is accepted again.
-Frames that fit win over the candidate, and no third frame is accepted within half a cycle: so a block that
-is replayed beside its living sender, or in a burst, is not taken (but for two frames that fit by chance).
+Counter: a sender keeps a grid, one count a period. While it lives (an accepted frame not older than
+`LIVING` periods) a frame fits where its counter says that its place on the grid is: half a period either
+way, a quarter while anything else claims the sequence. So a stream that is replayed beside its sender does
+not fit, whatever was lost meanwhile, unless it runs in the very phase of the sender: then two frames claim
+one place, which is told (CROSSED), and the nearer one keeps the grid. Frames that come later than the grid
+says, where nobody disputes them, are those of a sender that was held up: it has a new grid, unless a frame
+of the former one comes after all. A sender that is gone is taken again as AUTOSAR's P01 check does, by any
+step that the time since then allows, or after three consistent frames: so one that restarts is back after
+`LIVING` periods and two. `link.py` judges the stream.
 """
 
 from typing import Any, Final
@@ -44,8 +48,13 @@ P01_MODULO: Final = 15  # counter 0–14
 P01_COUNTER_START, P01_COUNTER_LENGTH = 8, 4
 
 # What the counter says of a frame
-IN_SEQUENCE, SOME_LOST, RESYNCHRONISED, REPEATED, WRONG_SEQUENCE = range(5)
+IN_SEQUENCE, SOME_LOST, RESYNCHRONISED, REPEATED, WRONG_SEQUENCE, CROSSED = range(6)
+LIVING: Final = 6.5
+"""Periods without a frame that a sender may lose, five frames and their jitter, before it is gone."""
 _FRAMES_TO_RESYNCHRONISE: Final = 3  # the first out of sequence and two consistent with it
+_GRID_GAIN: Final = 0.25  # of a frame's lateness in the grid: slower than jitter, faster than drift
+_DOUBTED_GAIN: Final = 0.0625  # five frames of another sender do not draw it away
+DOUBT_NS: Final = 1_000_000_000  # that one frame out of place lasts
 
 
 def _crc8_table() -> NDArray[np.uint8]:
@@ -104,56 +113,133 @@ def checksum_holds(rule: int, data: NDArray[np.uint8], length: int, can_id: int,
     return True
 
 
-# What is remembered of a sender's counter between frames
+# What is remembered of a sender's counter between frames; wide, since kernels compute with it
 SEQUENCE: Final = [
     ("accepted_ns", "i8"),  # stamp of the last frame accepted
-    ("previous_ns", "i8"),  # and of the one before
+    ("expected_ns", "i8"),  # where its place on the grid was
+    ("grid_ns", "i8"),  # the same, with what it says of the grid itself
+    ("disputed_ns", "i8"),  # stamp of the last frame that claimed the sequence and did not fit
+    ("doubted_ns", "i8"),  # stamp of the last reason to doubt whose frames are accepted
     ("candidate_ns", "i8"),
-    ("counter", "i2"),
-    ("candidate", "i2"),
-    ("consistent", "u1"),
+    ("former_ns", "i8"),  # grid of a sender that seemed held up, for as long as it may live
+    ("former_until_ns", "i8"),
+    ("former", "i8"),  # its counter
+    ("counter", "i8"),
+    ("candidate", "i8"),
+    ("consistent", "i8"),
     ("started", "u1"),
 ]
 
 
 @kernel
-def _accept(state: Record, counter: int, stamp_ns: int) -> None:
+def in_doubt(state: Record, stamp_ns: int) -> bool:
+    """Return whether more than one may send what is accepted: told in the last second."""
+    doubt: bool = state.doubted_ns > 0 and stamp_ns - state.doubted_ns < DOUBT_NS
+    return doubt
+
+
+@kernel
+def _accept(state: Record, counter: int, stamp_ns: int, expected_ns: int) -> None:
+    gain = _DOUBTED_GAIN if in_doubt(state, stamp_ns) else _GRID_GAIN
     state.counter = counter
-    state.previous_ns = state.accepted_ns
     state.accepted_ns = stamp_ns
+    state.expected_ns = expected_ns
+    state.grid_ns = expected_ns + int(gain * (stamp_ns - expected_ns))
     state.consistent = 0
     state.started = 1
 
 
 @kernel
-def check_counter(state: Record, counter: int, modulo: int, stamp_ns: int, period_ns: int) -> Any:
+def _dispute(state: Record, stamp_ns: int) -> None:
+    state.disputed_ns = state.doubted_ns = stamp_ns
+
+
+@kernel
+def _takes_back(state: Record, counter: int, modulo: int, stamp_ns: int, period_ns: int) -> bool:
+    """Accept a frame that fits the former grid: its sender was not held up, another one spoke for it."""
+    expected_ns = state.former_ns + (counter - state.former) % modulo * period_ns
+    fits: bool = stamp_ns <= state.former_until_ns and abs(stamp_ns - expected_ns) <= period_ns // 2
+    if fits:
+        _dispute(state, stamp_ns)
+        _accept(state, counter, stamp_ns, expected_ns)
+        state.former_until_ns = 0
+    return fits
+
+
+@kernel
+def _resynchronise(
+    state: Record, counter: int, modulo: int, stamp_ns: int, period_ns: int, gone: bool
+) -> Any:
+    """Take a frame that does not fit as a candidate; of a sender that is gone accept the third one."""
+    cycles = (stamp_ns - state.candidate_ns + period_ns // 2) // period_ns
+    consistent = state.consistent > 0 and 1 <= (counter - state.candidate) % modulo <= cycles
+    state.consistent = min(state.consistent + 1, _FRAMES_TO_RESYNCHRONISE) if consistent else 1
+    state.candidate = counter
+    state.candidate_ns = stamp_ns
+    if gone and state.consistent >= _FRAMES_TO_RESYNCHRONISE:
+        _accept(state, counter, stamp_ns, stamp_ns)
+        return RESYNCHRONISED
+    _dispute(state, stamp_ns)
+    return WRONG_SEQUENCE
+
+
+@kernel
+def check_counter(
+    state: Record, counter: int, modulo: int, stamp_ns: int, period_ns: int, slowest_ns: int
+) -> Any:
     """Judge a frame's counter and remember it in `state` (fields of `SEQUENCE`); the first frame is accepted.
 
-    Returns IN_SEQUENCE, SOME_LOST or RESYNCHRONISED (accepted), REPEATED or WRONG_SEQUENCE (rejected).
+    Args:
+        state: fields of `SEQUENCE`, overwritten.
+        counter: of the frame.
+        modulo: that the counter runs to.
+        stamp_ns: of the frame.
+        period_ns: between two frames.
+        slowest_ns: the same of a sender that may choose; with it there is no grid.
+
+    Returns IN_SEQUENCE, SOME_LOST or RESYNCHRONISED (accepted), REPEATED, WRONG_SEQUENCE or CROSSED: a second
+    frame for the place in the sequence that the last one accepted has (rejected).
     """
     if counter >= modulo:
         return WRONG_SEQUENCE
-    if not state.started:
-        _accept(state, counter, stamp_ns)
+    since_accepted = stamp_ns - state.accepted_ns
+    if not state.started or since_accepted < -period_ns:  # the clock was set back
+        _accept(state, counter, stamp_ns, stamp_ns)
         return IN_SEQUENCE
-    if 0 <= stamp_ns - state.previous_ns < period_ns // 2:
-        return WRONG_SEQUENCE
-    cycles = max(0, (stamp_ns - state.accepted_ns + period_ns // 2) // period_ns)
+    elapsed = stamp_ns - state.grid_ns
     step = (counter - state.counter) % modulo
     if step == 0:
-        return REPEATED
-    if step <= 1 + cycles:
-        _accept(state, counter, stamp_ns)
-        return IN_SEQUENCE if step == 1 else SOME_LOST
-    cycles = (stamp_ns - state.candidate_ns + period_ns // 2) // period_ns
-    step = (counter - state.candidate) % modulo
-    if state.consistent > 0 and 1 <= step <= cycles:
-        state.consistent += 1
+        _dispute(state, stamp_ns)
+        if since_accepted > period_ns // 2:
+            return REPEATED
+        nearer = abs(stamp_ns - state.expected_ns) < abs(state.accepted_ns - state.expected_ns)
+        if nearer:
+            _accept(state, counter, stamp_ns, state.expected_ns)
+        return CROSSED
+    found = IN_SEQUENCE if step == 1 else SOME_LOST
+    gone = since_accepted > LIVING * slowest_ns
+    if gone:
+        if step <= 1 + (elapsed + period_ns // 2) // period_ns:
+            _accept(state, counter, stamp_ns, stamp_ns)
+            return found
+        return _resynchronise(state, counter, modulo, stamp_ns, period_ns, gone)
+    disputed = state.disputed_ns > 0 and stamp_ns - state.disputed_ns < DOUBT_NS
+    tolerance = period_ns // 4 if disputed else period_ns // 2
+    early = step * period_ns - elapsed
+    if early > tolerance or (disputed and elapsed - step * slowest_ns > tolerance):
+        if _takes_back(state, counter, modulo, stamp_ns, period_ns):
+            return SOME_LOST
+        return _resynchronise(state, counter, modulo, stamp_ns, period_ns, gone)
+    if elapsed - step * slowest_ns > tolerance:
+        state.former_ns, state.former = state.grid_ns, state.counter
+        state.former_until_ns = state.accepted_ns + int(LIVING * period_ns)
+        state.doubted_ns = stamp_ns
+        _accept(state, counter, stamp_ns, stamp_ns)
+        return found
+    if abs(early) > period_ns // 4 and slowest_ns == period_ns:
+        state.doubted_ns = stamp_ns
+    if slowest_ns > period_ns:
+        _accept(state, counter, stamp_ns, stamp_ns)
     else:
-        state.consistent = 1
-    state.candidate = counter
-    state.candidate_ns = stamp_ns
-    if state.consistent < _FRAMES_TO_RESYNCHRONISE:
-        return WRONG_SEQUENCE
-    _accept(state, counter, stamp_ns)
-    return RESYNCHRONISED
+        _accept(state, counter, stamp_ns, stamp_ns + early)
+    return found

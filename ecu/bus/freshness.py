@@ -85,6 +85,7 @@ def target_dtype(places: int) -> np.dtype[Any]:
             ("age_ns", "i8", (places,)),
             ("new", "u1", (places,)),
             ("verdict", "u1", (places,)),
+            ("e2e_faults", "u4"),
         ],
         align=True,
     )

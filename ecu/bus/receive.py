@@ -12,13 +12,15 @@ import numpy as np
 from cantools.database import Message
 from numpy.typing import NDArray
 
-from ecu.bus import bits, e2e
+from ecu.bus import bits, e2e, link
 from ecu.bus.database import attribute, load_database
 from ecu.bus.freshness import NEVER, accept, input_freshness, new_freshness
 from ecu.bus.plan import SIGNAL, SignalUse, compile_signals, is_present, is_valid, physical, raw_code
+from ecu.bus.request import FIRST, LAST, REQUEST, begin_request, hold_request, note_request
+from ecu.diagnostics.faults import E2E_REJECTIONS
 from ecu.jit import Record, kernel
 from ecu.records import EXTENDED_ID, FRAME_ERROR, FRAME_EXTENDED, FRAME_REMOTE, RecordArray
-from ecu.signals import INPUT, INPUT_SIGNALS, N_OUTPUTS, OUTPUT
+from ecu.signals import INPUT, INPUT_SIGNALS, N_INPUTS, N_OUTPUTS, OUTPUT
 
 MESSAGE: Final = np.dtype(
     [
@@ -26,11 +28,13 @@ MESSAGE: Final = np.dtype(
         ("id", "u4"),  # with EXTENDED_ID
         ("data_id", "u4"),
         ("period_ns", "i8"),
+        ("slowest_ns", "i8"),
         ("first", "i4"),  # rows of `signals`
         ("count", "i4"),
         ("rule", "u1"),
         ("length", "u1"),
         ("foreign", "u1"),  # nobody else may send it
+        ("request", "u1"),  # it carries what the driver asks for
         ("modulo", "i2"),  # of the counter, 0: none
         ("counter_start", "i2"),
         ("counter_length", "u1"),
@@ -52,11 +56,19 @@ MESSAGE_COUNTERS: Final = np.dtype(
         ("resynchronised", "u4"),
         ("stamp_ns", "i8"),  # of the last frame received
         *e2e.SEQUENCE,
+        *link.LINK,
     ],
     align=True,
 )
 TOTALS: Final = np.dtype(
-    [("frames", "u8"), ("unknown", "u8"), ("foreign", "u8"), ("bus_errors", "u8"), ("rejected", "u8")]
+    [
+        ("frames", "u8"),
+        ("unknown", "u8"),
+        ("foreign", "u8"),
+        ("bus_errors", "u8"),
+        ("rejected", "u8"),
+        ("loud_ns", "i8"),  # stamp of the last frame that made its stream loud
+    ]
 )
 
 
@@ -83,6 +95,8 @@ class Reception(NamedTuple):
     """`TOTALS`, length 1."""
     freshness: RecordArray
     """`FRESHNESS` per target place."""
+    request: RecordArray
+    """`REQUEST`, length 1."""
 
 
 class MessageUse(NamedTuple):
@@ -116,8 +130,11 @@ def compile_receive(uses: Sequence[MessageUse], expected: RecordArray) -> Receiv
         message["name"], message["id"] = use.message.name, _identifier(use)
         message["length"] = use.message.length
         message["period_ns"] = round(use.period_s * 1e9)
+        message["slowest_ns"] = round(use.slowest_s * 1e9)
         message["first"], message["count"] = first, compiled.wanted
         message["rule"], message["data_id"], message["foreign"] = use.rule, use.data_id, use.foreign
+        asks = [FIRST <= signal.place <= LAST for signal in use.signals]
+        message["request"] = len(expected) == N_INPUTS and any(asks)
         if use.counter is not None:
             big_endian = use.counter.byte_order == "big_endian"
             message["modulo"] = use.modulo
@@ -141,7 +158,7 @@ def new_reception(plan: ReceivePlan) -> Reception:
     """Return the state before the first frame."""
     messages = np.zeros(len(plan.messages), MESSAGE_COUNTERS)
     messages["stamp_ns"] = NEVER
-    return Reception(messages, np.zeros(1, TOTALS), plan.expected.copy())
+    return Reception(messages, np.zeros(1, TOTALS), plan.expected.copy(), np.zeros(1, REQUEST))
 
 
 @kernel
@@ -157,31 +174,43 @@ def _find(ids: NDArray[np.uint32], identifier: int) -> int:
 
 
 @kernel
-def check_frame(message: Record, counters: Record, frame: Record) -> bool:
-    """Return whether the frame is complete, intact and the next of its sender; counts what it is not."""
+def check_frame(message: Record, counters: Record, frame: Record) -> Any:
+    """Return what a frame's check says, P_OK where it is complete, intact and the next of its sender.
+
+    Counts what it is not.
+    """
     if frame.length < message.length or (message.rule != e2e.NO_CHECKSUM and frame.length != message.length):
         counters.length_errors += 1
-        return False
+        return link.P_ERROR
     can_id: Any = np.int64(frame.can_id)
     if not e2e.checksum_holds(message.rule, frame.data, message.length, can_id, message.data_id):
         counters.checksum_errors += 1
-        return False
+        return link.P_ERROR
     if message.modulo > 0:
         start, length, big_endian = message.counter_start, message.counter_length, message.counter_big_endian
         counter: Any = np.int64(bits.extract(frame.data, start, length, big_endian))
-        found = e2e.check_counter(counters, counter, message.modulo, frame.stamp_ns, message.period_ns)
-        if found == e2e.REPEATED:
+        found = e2e.check_counter(
+            counters, counter, message.modulo, frame.stamp_ns, message.period_ns, message.slowest_ns
+        )
+        if found == e2e.REPEATED or found == e2e.CROSSED:
             counters.repeated += 1
-            return False
+            return link.P_REPEATED
         if found == e2e.WRONG_SEQUENCE:
             counters.sequence_errors += 1
-            return False
+            return link.P_WRONG_SEQUENCE
         if found == e2e.SOME_LOST:
             counters.lost += 1
         elif found == e2e.RESYNCHRONISED:
             counters.resynchronised += 1
     counters.accepted += 1
-    return True
+    return link.P_OK
+
+
+@kernel
+def _tell_links(totals: Record, inputs: Record) -> None:
+    """Write the fault bit of streams that are loud."""
+    loud = totals.loud_ns > 0 and inputs.t_ns - totals.loud_ns < link.TOLD_NS
+    inputs.e2e_faults = E2E_REJECTIONS if loud else 0
 
 
 @kernel
@@ -195,10 +224,11 @@ def receive(
     # Fields of tuples are taken out once: in the loop each would be counted as a reference, atomically.
     ids, messages, signals, codes = plan.ids, plan.messages, plan.signals, plan.codes
     counted, freshness, totals = reception.messages, reception.freshness, reception.totals[0]
-    for index in range(first, count):
+    request = reception.request[0]
+    index = first
+    while index < count and frames[index].stamp_ns <= inputs.t_ns:
         frame = frames[index]
-        if frame.stamp_ns > inputs.t_ns:
-            return index
+        index += 1
         totals.frames += 1
         if frame.flags & (FRAME_ERROR | FRAME_REMOTE):
             totals.bus_errors += 1
@@ -217,17 +247,37 @@ def receive(
         if message.foreign:
             totals.foreign += 1
             continue
-        if not check_frame(message, counters, frame):
+        status = check_frame(message, counters, frame)
+        if message.modulo > 0 and link.judge_link(
+            counters, status, frame.stamp_ns, message.period_ns, message.slowest_ns
+        ):
+            totals.loud_ns = frame.stamp_ns
+        doubt = message.request != 0 and e2e.in_doubt(counters, frame.stamp_ns)
+        claims = status == link.P_REPEATED and counters.disputed_ns == frame.stamp_ns
+        if status != link.P_OK:
             totals.rejected += 1
-            continue
+            if not (doubt and claims):
+                continue
+        if message.request:
+            begin_request(request)
         for row in range(message.first, message.first + message.count):
             if is_present(signals, codes, row, frame.data):
                 signal = signals[row]
                 code = raw_code(signal, frame.data)
                 valid = is_valid(signals, codes, row, code, frame.data)
                 value = physical(signal, code)
+                asked = message.request != 0 and FIRST <= signal.place <= LAST
+                if (doubt and asked and not valid) or (status != link.P_OK and not asked):
+                    continue
+                if asked and valid:
+                    request.sample[signal.place - FIRST] = value
                 accept(inputs, freshness, signal.place, value, frame.stamp_ns, valid)
-    return count
+        if message.request:
+            note_request(request, frame.stamp_ns)
+            if doubt:
+                hold_request(request, inputs)
+    _tell_links(totals, inputs)
+    return index
 
 
 def _protected(message: Message, places: dict[str, int]) -> MessageUse:

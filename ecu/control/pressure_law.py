@@ -43,7 +43,6 @@ PRESSURE_LAW_STATE = np.dtype(
 SURE = 0.05
 GREATEST_CHANGE = 0.3  # relative to the base (5.6)
 FRICTION_RATE = 0.5  # 1/s
-LEFT_RIGHT_SHARE = 0.10  # of the axle's demand
 LIMIT_S = 0.3
 EARLY_S = 0.6  # of observing
 LARGEST_START = 0.25  # relative
@@ -125,22 +124,6 @@ def compensated_pressure(params: Record, state: Record, pressure: float, corner:
     push_out: float = min(params.push_out_pressure[corner], pressure)
     compensated: float = push_out + (pressure - push_out) * factor
     return compensated
-
-
-@kernel
-def level_left_right(pressures: Record, base: Record) -> None:
-    """Keep what compensation adds to the left/right difference within 10 % of the axle's mean demand."""
-    for left in (0, 2):
-        right = left + 1
-        added = (pressures[left] - base[left]) - (pressures[right] - base[right])
-        limit = LEFT_RIGHT_SHARE * 0.5 * (base[left] + base[right])
-        excess = 0.0
-        if added > limit:
-            excess = added - limit
-        elif added < -limit:
-            excess = added + limit
-        pressures[left] -= 0.5 * excess
-        pressures[right] += 0.5 * excess
 
 
 @kernel

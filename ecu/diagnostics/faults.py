@@ -43,6 +43,7 @@ PRESSURE_NOT_FOLLOWING: Final = 1 << 24
 LEARNED_AT_BOUND: Final = 1 << 25
 LEARNING_GIVEN_UP: Final = 1 << 26
 NOT_KEPT: Final = 1 << 27
+E2E_REJECTIONS: Final = 1 << 28
 
 FAULTS: Final = (
     Fault(WHEEL_SPEED_LOST, "wheel speed lost", "a wheel speed is stale or invalid", "check the sender of WheelSpeed*"),
@@ -73,6 +74,7 @@ FAULTS: Final = (
     Fault(LEARNED_AT_BOUND, "learned value at its bound", "a friction, mass, stiffness, motor scale, radius or zero would be learned beyond what a car can be: it stays at its bound", "compare the configuration with the car: mass, tyres, brakes; check the sensors"),
     Fault(LEARNING_GIVEN_UP, "learning given up", "what was learned predicted the last brakings worse than the configured friction: it was forgotten and is learned anew", "look at the prediction in the report; check pressures, accelerometer and motor torques against each other"),
     Fault(NOT_KEPT, "nothing is kept", "the side process is away or hangs, or the state folder cannot be written: what is learned now ends with this run", "it is started again by itself; look at the disk and at the log lines before"),
+    Fault(E2E_REJECTIONS, "E2E rejections", "of a protected message more frames come than its sender makes, or many are rejected: nothing is learned, and a request in doubt is not lowered", "look for a second sender of that message and for disturbances of the bus: `brake-ecu doctor -i -c` counts them"),
 )  # fmt: skip
 
 DEGRADING: Final = (
@@ -84,6 +86,7 @@ DEGRADING: Final = (
     | BUS_OFF
     | FOREIGN_SENDER
     | PRESSURE_NOT_FOLLOWING
+    | E2E_REJECTIONS
 )
 
 

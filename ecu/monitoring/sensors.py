@@ -37,7 +37,7 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> int:
     watch_pressures(s.plausibility, u, s.friction_torque.model, s.joint.zero.value, dt)
     if s.plausibility.pressure:
         faults |= PRESSURE_NOT_FOLLOWING
-    s.friction.held = 1 if s.plausibility.pressure or begins else 0
+    s.friction.held = 1 if s.plausibility.pressure or begins or u.e2e_faults else 0
     return faults
 
 

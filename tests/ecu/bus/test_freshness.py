@@ -6,7 +6,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ecu.bus.freshness import accept, begin_cycle, end_cycle, new_freshness, target_dtype
+from ecu.bus.freshness import (
+    accept,
+    begin_cycle,
+    end_cycle,
+    input_freshness,
+    new_freshness,
+    target_dtype,
+)
 from ecu.records import RecordArray
 from ecu.signals import ALIVE, RATE_OK, VALID
 
@@ -54,6 +61,12 @@ def test_time_out(age_ms: int, alive: bool) -> None:
     signal = Signal()
     signal.cycle(10, (10, 5.0, True))
     assert (signal.cycle(10 + age_ms)[2] & ALIVE != 0) is alive
+
+
+@pytest.mark.parametrize("value", [0.0, 100.0])
+def test_the_ends_of_the_range_belong_to_it(value: float) -> None:
+    """A pedal at rest says 0 %."""
+    assert Signal().cycle(10, (10, value, True)) == (value, 1, ALIVE | VALID)
 
 
 @pytest.mark.parametrize("value", [-0.1, 100.1, math.nan, math.inf, -math.inf])
@@ -125,6 +138,33 @@ def test_after_a_gap_the_rate_is_measured_anew() -> None:
     assert signal.cycle(1000)[2] == VALID
     assert signal.cycle(1010, (1010, 5.0, True))[2] == ALIVE | VALID
     assert signal.cycle(1020, (1020, 5.0, True))[2] == ALIVE | RATE_OK | VALID
+
+
+def test_what_is_expected_before_the_first_sample() -> None:
+    known = new_freshness([0.1, 0.2], [0.01, 0.02], [0.01, 0.1], [0.0, -1.0], [100.0, 1.0])
+    assert len(known) == 2
+    assert known["timeout_ns"].tolist() == [100 * MS, 200 * MS]
+    assert known["shortest_ns"].tolist() == [5 * MS, 10 * MS]
+    assert known["longest_ns"].tolist() == [20 * MS, 200 * MS]
+    assert (known["samples"] == 0).all()
+    place_without_a_message = input_freshness({}, {})[0]
+    assert (place_without_a_message["shortest_ns"], place_without_a_message["longest_ns"]) == (0.0, 0.0)
+
+
+def test_the_mean_interval_is_that_of_all_samples_at_first() -> None:
+    """10, 20, 30 ms: 10, then 15, then 20 on the average."""
+    signal, means = Signal(), []
+    for stamp in (0, 10, 30, 60):
+        signal.cycle(stamp, (stamp, 5.0, True))
+        means.append(float(signal.freshness[0]["interval_ns"]) / MS)
+    assert means == [0.0, 10.0, 15.0, 20.0]
+
+
+def test_a_new_cycle_has_no_new_sample_and_an_age_that_is_never_negative() -> None:
+    signal = Signal()
+    assert signal.cycle(10, (12, 5.0, True))[1] == 1
+    assert signal.age_ms == 0
+    assert signal.cycle(20)[1] == 0
 
 
 def test_every_sample_is_counted_by_what_became_of_it() -> None:

@@ -11,6 +11,7 @@ from ecu.diagnostics.faults import (
     FOREIGN_SENDER,
     HYDRAULICS_NOT_READY,
     IMU_LOST,
+    MOTOR_TORQUE_LOST,
     PEDAL_IMPLAUSIBLE,
     PEDAL_LOST,
     PRESSURE_LOST,
@@ -93,9 +94,29 @@ def test_a_pedal_that_is_pressed_and_free_at_once(params, feed, position, presse
     assert input_faults(params[0], inputs[0]) == bit
 
 
-@pytest.mark.parametrize(("ready", "bit"), [(1.0, 0), (0.0, HYDRAULICS_NOT_READY)])
+@pytest.mark.parametrize(
+    ("ready", "bit"),
+    [(1.0, 0), (0.5, 0), (0.49, HYDRAULICS_NOT_READY), (0.0, HYDRAULICS_NOT_READY)],
+)
 def test_hydraulics_that_are_not_ready(params, feed, ready, bit) -> None:
     assert input_faults(params[0], feed(**ALL_GOOD | {"hydraulic_ready": ready})[0]) == bit
+
+
+@pytest.mark.parametrize("verdict", [0, ALIVE, VALID], ids=["never", "invalid", "stale"])
+def test_hydraulics_that_say_nothing_are_not_told_as_not_ready(params, feed, verdict) -> None:
+    inputs = feed(**ALL_GOOD | {"hydraulic_ready": 0.0})
+    inputs[0]["verdict"][INPUT["hydraulic_ready"]] = verdict
+    assert input_faults(params[0], inputs[0]) == 0
+
+
+@pytest.mark.parametrize("corner", ["fl", "fr", "rl", "rr"])
+@pytest.mark.parametrize("verdict", [ALIVE, VALID], ids=["invalid", "stale"])
+def test_a_motor_torque_that_came_and_is_lost(params, feed, corner, verdict) -> None:
+    inputs = feed(**ALL_GOOD)
+    place = INPUT[f"motor_torque_{corner}"]
+    inputs[0]["verdict"][place], inputs[0]["value"][place] = verdict, 80.0
+    assert input_faults(params[0], inputs[0]) == MOTOR_TORQUE_LOST
+    assert decide_mode(running(), MOTOR_TORQUE_LOST, False, 0.01) == READY
 
 
 def test_a_steering_angle_that_the_car_does_not_have_is_not_lost(params, feed) -> None:

@@ -12,7 +12,6 @@ from ecu.control.pressure_law import (
     compensated_pressure,
     follow_friction,
     learn_start,
-    level_left_right,
     pressure_for_torque,
     set_base,
     watch_limit,
@@ -267,24 +266,3 @@ def test_the_ideal_controller_of_the_laboratory_is_exact(params) -> None:
     state["mu_override"] = 0.2
     pressure = compensated_pressure(params[0], state, pressure_for_torque(params[0], 500.0, 0.45, 0), 0)
     assert torque_of(pressure, 0.2, 0) == pytest.approx(500.0)
-
-
-@pytest.mark.parametrize(
-    ("case", "base", "compensated", "levelled"),
-    [
-        ("nothing added", [60, 60, 40, 40], [60, 60, 40, 40], [60, 60, 40, 40]),
-        ("both sides alike", [60, 60, 40, 40], [75, 75, 50, 50], [75, 75, 50, 50]),
-        ("within 10 % of the axle's demand", [60, 60, 40, 40], [63, 58, 42, 39], [63, 58, 42, 39]),
-        ("left gets too much", [60, 60, 40, 40], [72, 60, 40, 40], [69, 63, 40, 40]),
-        ("right gets too much", [60, 60, 40, 40], [60, 72, 40, 40], [63, 69, 40, 40]),
-        ("rear alone", [60, 60, 40, 40], [60, 60, 36, 48], [60, 60, 40, 44]),
-        ("a difference of the demand itself stays", [70, 50, 40, 40], [70, 50, 40, 40], [70, 50, 40, 40]),
-    ],
-)
-def test_left_and_right_differ_by_a_tenth_of_the_axle_s_demand(case, base, compensated, levelled) -> None:
-    pressures = np.array(compensated, float)
-    level_left_right(pressures, np.array(base, float))
-    assert pressures == pytest.approx(np.array(levelled, float)), case
-    # What the axle brakes with stays the same.
-    assert pressures[:2].sum() == pytest.approx(sum(compensated[:2]))
-    assert pressures[2:].sum() == pytest.approx(sum(compensated[2:]))

@@ -142,3 +142,47 @@ def test_a_value_that_is_not_finite_leaves_no_trace(wheels: Wheels) -> None:
     assert math.isinf(caps[0])
     assert math.isfinite(caps[-1])
     assert np.isfinite(wheels.state["growth"]).all()
+
+
+@pytest.mark.parametrize(("growth", "capped"), [(9.5, False), (10.5, True)])
+def test_a_wheel_falls_behind_from_ten_metres_per_second_squared_on(wheels, growth, capped) -> None:
+    caps = [wheels.cycle(-growth * k * DT / 20.0) for k in range(60)]
+    assert any(map(math.isfinite, caps)) == capped
+
+
+def test_an_old_sample_is_not_taken_twice(wheels: Wheels) -> None:
+    """A wheel at 30 % of slip whose next frame is late: growth is known by the frames alone."""
+    place = INPUT["wheel_speed_fl"]
+    wheels.run_into(-0.05)
+    before = wheels.state["growth"][0], wheels.state["lag"][0]
+    omega = wheels.inputs[0]["value"].copy()
+    wheels.inputs[0]["new"][place] = 0
+    pressures = wheels.sent, wheels.wanted, wheels.wanted
+    for _ in range(3):
+        guard_slip(wheels.params, wheels.state, wheels.inputs[0], wheels.motion, 30.0, *pressures, DT)
+    assert (wheels.inputs[0]["value"] == omega).all()
+    assert (wheels.state["growth"][0], wheels.state["lag"][0]) == before
+    assert wheels.state["age"][0] == pytest.approx(3 * DT)
+
+
+def test_of_a_lost_wheel_speed_nothing_is_kept(wheels: Wheels) -> None:
+    place = INPUT["wheel_speed_fl"]
+    wheels.run_into(-0.4)
+    wheels.inputs[0]["new"][place] = wheels.inputs[0]["verdict"][place] = 0
+    pressures = wheels.sent, wheels.wanted, wheels.wanted
+    guard_slip(wheels.params, wheels.state, wheels.inputs[0], wheels.motion, 20.0, *pressures, DT)
+    assert wheels.state["lag"][0] == wheels.state["growth"][0] == 0.0
+
+
+def test_growth_that_is_not_finite_is_forgotten_while_the_sensor_lives(wheels: Wheels) -> None:
+    wheels.run_into(-0.05)
+    wheels.state["growth"][0] = math.nan
+    wheels.cycle(-0.05)
+    assert wheels.state["growth"][0] == wheels.state["lag"][0] == 0.0
+
+
+def test_a_cap_is_set_once_and_not_raised_by_the_demand(wheels: Wheels) -> None:
+    """While the wheel locks the demand that was sent is the cap itself, whatever the driver adds."""
+    caps = [cap for cap in wheels.run_into(-0.9) if math.isfinite(cap)]
+    wheels.sent[0] = 150.0 * BAR
+    assert wheels.cycle(-0.95) == pytest.approx(caps[-1] - 4.0)

@@ -26,6 +26,8 @@ CASES = [
     ("a small tyre", 1.04, 800.0, 0.0, 20.0, False),
     ("too slow to tell", 1.30, 800.0, 0.0, 3.0, False),
     ("not braked", 1.30, 20.0, 0.0, 20.0, False),
+    ("hardly braked", 1.30, 99.0, 0.0, 20.0, False),
+    ("braked just enough to tell", 1.30, 101.0, 0.0, 20.0, True),
 ]
 
 
@@ -115,6 +117,8 @@ PRESSURES: list[tuple[str, list[float], list[float], dict[str, Any], bool]] = [
     ("an ABS works", [30, 30, 12, 12], [30, 0, 12, 12], {"abs_active": 1.0}, False),
     ("ESP works", [0, 0, 0, 0], [30, 0, 0, 0], {"esp_active": 1.0}, False),
     ("the sensor is lost", [30, 30, 12, 12], [30, 0, 12, 12], {"lost": 1}, False),
+    ("an ABS that is half said to work", [30, 30, 12, 12], [30, 0, 12, 12], {"abs_active": 0.5}, True),
+    ("an ABS that is rather said to work", [30, 30, 12, 12], [30, 0, 12, 12], {"abs_active": 0.51}, False),
 ]
 
 
@@ -159,3 +163,23 @@ def test_a_pressure_that_follows_again_is_believed_again(feed) -> None:
         said.append(bool(state["pressure"]))
     assert said[599]
     assert not any(said[632:])
+
+
+def test_a_lost_wheel_does_not_count_among_the_others(params, feed) -> None:
+    """Three wheels 8 % fast are the car's speed that is wrong; a lost one that reads 0 does not hide that."""
+    state, motion = np.zeros(1, PLAUSIBILITY_STATE)[0], np.zeros(1, MOTION_STATE)[0]
+    inputs = feed(wheel_speed=np.array([1.08, 1.08, 1.08, 0.0]) * 20.0 / params[0]["wheel_radius"])
+    inputs[0]["verdict"][WHEEL_SPEED + 3] = 0
+    for _ in range(60):
+        assert not wheel_speed_implausible(params[0], state, inputs[0], motion, 20.0, np.full(4, 800.0), 0.01)
+
+
+@pytest.mark.parametrize(
+    ("age", "left_out"),
+    [(0.09, True), (0.0999, True), (0.1, False), (0.105, False), (0.2, False)],
+)
+def test_a_sample_is_compared_with_one_that_is_younger_than_0_1_s(params, feed, age, left_out) -> None:
+    state, motion = np.zeros(1, PLAUSIBILITY_STATE)[0], np.zeros(1, MOTION_STATE)[0]
+    state["omega"], ground = 60.0, 60.0 * float(params[0]["wheel_radius"][0])
+    watch_wheels(params[0], state, feed(wheel_speed=0.0)[0], motion, ground, np.zeros(4), age)
+    assert bool(state["fell"][0]) == left_out

@@ -1,0 +1,60 @@
+"""What the driver asks for while it is in doubt who says so: a request is not lowered by a stream in doubt.
+
+While more than one may send the request (`e2e.in_doubt`) pedal position, pedal switch and the automated
+demand are the largest of the last 60 to 120 ms: longer than five frames that the living sender loses. Every
+frame that claims the sender's place counts; one out of sequence does not. The pedal goes first: an automated
+demand counts only as far as its own frame vouches for it, and can only add to the pedal's.
+"""
+
+from typing import Final
+
+import numpy as np
+
+from ecu.jit import Record, kernel
+from ecu.signals import DECEL_DEMAND, DECEL_DEMAND_VALID, PEDAL_POSITION, PEDAL_PRESSED
+
+FIRST, LAST = PEDAL_POSITION, DECEL_DEMAND_VALID
+"""The places of the request lie side by side."""
+HALF_NS: Final = 60_000_000
+
+REQUEST: Final = np.dtype(
+    [
+        ("since_ns", "i8"),  # when `newer` began
+        ("sample", "f8", (4,)),  # of this frame, from FIRST on; 0: none, or not valid
+        ("newer", "f8", (4,)),  # largest since then
+        ("older", "f8", (4,)),  # largest of the `HALF_NS` before
+    ],
+    align=True,
+)
+
+
+@kernel
+def begin_request(state: Record) -> None:
+    """Forget the samples of the frame before."""
+    for i in range(4):
+        state.sample[i] = 0.0
+
+
+@kernel
+def note_request(state: Record, stamp_ns: int) -> None:
+    """Take a frame's samples into the largest ones."""
+    age = stamp_ns - state.since_ns
+    if not 0 <= age < HALF_NS:
+        kept = 1.0 if 0 <= age < 2 * HALF_NS else 0.0
+        for i in range(4):
+            state.older[i], state.newer[i] = kept * state.newer[i], 0.0
+        state.since_ns = stamp_ns
+    if state.sample[DECEL_DEMAND_VALID - FIRST] < 0.5:
+        state.sample[DECEL_DEMAND - FIRST] = 0.0
+    for i in range(4):
+        state.newer[i] = max(state.newer[i], state.sample[i])
+
+
+@kernel
+def hold_request(state: Record, inputs: Record) -> None:
+    """Overwrite the request in `inputs` by the largest of the last frames."""
+    for place in (PEDAL_POSITION, PEDAL_PRESSED):
+        inputs.value[place] = max(state.newer[place - FIRST], state.older[place - FIRST])
+    decel = max(state.newer[DECEL_DEMAND - FIRST], state.older[DECEL_DEMAND - FIRST])
+    if decel > 0.0:
+        inputs.value[DECEL_DEMAND], inputs.value[DECEL_DEMAND_VALID] = decel, 1.0

@@ -1,0 +1,183 @@
+"""A request in doubt is not lowered: the table of replayed streams, at the inputs that `step` reads."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ecu.bus.e2e import p01_protect
+from ecu.bus.freshness import begin_cycle, end_cycle
+from ecu.bus.receive import contract_receive_plan, new_reception, receive
+from ecu.bus.request import FIRST, HALF_NS, LAST, REQUEST, begin_request, hold_request, note_request
+from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
+from ecu.diagnostics.faults import E2E_REJECTIONS
+from ecu.records import FRAME, INPUTS, RecordArray, new_record
+from ecu.signals import (
+    DECEL_DEMAND,
+    DECEL_DEMAND_VALID,
+    INPUT_SIGNALS,
+    PEDAL_POSITION,
+    PEDAL_PRESSED,
+    USABLE,
+)
+
+CONTRACT = Path(__file__).parents[3] / "dbc" / "brake_ecu.dbc"
+PLAN = contract_receive_plan(CONTRACT)
+VEHICLE = contract_transmit_plan(CONTRACT, "Vehicle")
+MS = 1_000_000
+CYCLE_NS = 10 * MS
+T0 = 1_700_000_000_000_000_000
+BRAKE_REQUEST, DATA_ID = 0x60, 0x6B01
+
+
+def request_frames(decel: float, pedal: float = np.nan) -> RecordArray:
+    """One frame that asks for these; shape (1,)."""
+    values = np.array([signal.low for signal in INPUT_SIGNALS])
+    values[[PEDAL_POSITION, PEDAL_PRESSED]] = pedal, float(pedal > 0.0)
+    values[[DECEL_DEMAND, DECEL_DEMAND_VALID]] = decel, float(np.isfinite(decel))
+    frames = frame_buffer(VEHICLE)
+    count = transmit(VEHICLE, new_transmission(VEHICLE), values, 0, frames)
+    return frames[:count][frames["can_id"][:count] == BRAKE_REQUEST].copy()
+
+
+LIVING, RELEASED = request_frames(3.0), request_frames(0.0)
+PEDAL, PEDAL_FREE = request_frames(np.nan, 40.0), request_frames(np.nan, 0.0)
+
+
+class Wire:
+    """Frames with their instants, handed to the ECU cycle by cycle."""
+
+    def __init__(self) -> None:
+        self.frames: list[tuple[int, RecordArray]] = []
+
+    def send(self, frame: RecordArray, counter: int, ms: float) -> None:
+        sent = frame.copy()
+        p01_protect(sent["data"][0], 8, DATA_ID, counter % 15)
+        sent["stamp_ns"] = T0 + int(ms * MS)
+        self.frames.append((int(sent["stamp_ns"][0]), sent))
+
+    def run(self, cycles: int, deadline_ms: float) -> RecordArray:
+        """Inputs behind each cycle, the first ends at `deadline_ms`."""
+        self.frames.sort(key=lambda frame: frame[0])
+        frames = np.concatenate([frame for _, frame in self.frames])
+        inputs, reception = new_record(INPUTS), new_reception(PLAN)
+        kept = np.zeros(cycles, INPUTS)
+        now: Any = inputs[0]
+        first = 0
+        for k in range(cycles):
+            begin_cycle(now, T0 + int((10 * k + deadline_ms) * MS), CYCLE_NS)
+            first = receive(PLAN, reception, frames, first, len(frames), now)
+            end_cycle(now, reception.freshness)
+            kept[k] = inputs[0]
+        return kept
+
+
+def asked(inputs: RecordArray) -> Any:
+    """Deceleration that the automated driver asks for in each cycle, 0 where it is not usable."""
+    value, verdict = inputs["value"], inputs["verdict"]
+    usable = (verdict[:, DECEL_DEMAND] & USABLE == USABLE) & (value[:, DECEL_DEMAND_VALID] > 0.5)
+    return np.where(usable, value[:, DECEL_DEMAND], 0.0)
+
+
+def duel(phase: int, lost: int, offset: float, deadline: float, seed: int, begin: int) -> RecordArray:
+    """The sender asks for 3 m/s², beside it a stream of `RELEASED`; 1 ms of jitter each. 400 cycles."""
+    random, wire = np.random.default_rng(seed), Wire()
+    for k in range(400):
+        living_ms, replayed_ms = random.uniform(-1.0, 1.0, 2)
+        if k < 60 or k % 30 >= lost:
+            wire.send(LIVING, k, 10 * k + living_ms)
+        if k >= begin:
+            wire.send(RELEASED, k + phase, 10 * k + offset + replayed_ms)
+    return wire.run(400, deadline)
+
+
+@pytest.mark.parametrize("begin", [50, 60])  # before the sender loses frames, and with the first one
+@pytest.mark.parametrize("lost", range(6))
+@pytest.mark.parametrize("phase", range(15))
+def test_a_replayed_release_never_lowers_the_demand(phase: int, lost: int, begin: int) -> None:
+    """From the second frame on: the very first may come within the sender's own jitter, a cycle before it."""
+    for offset in (0.5, 2.0, 3.5, 5.0, 6.5, 8.0, 9.5):
+        if begin == 60 and abs(offset - 10 * (phase == 1)) < 3.6 and phase < 2:
+            continue  # in the place of a sender that is silent: it is the sender
+        for deadline in (1.5, 9.2):
+            inputs = duel(phase, lost, offset, deadline, 100 * phase + lost, begin)
+            demand = np.delete(asked(inputs), (0, 1, begin))
+            assert demand.min() == pytest.approx(3.0), (offset, deadline)
+            told = inputs["e2e_faults"] == E2E_REJECTIONS
+            assert not told[:begin].any()
+            assert told[begin + 25 :].all(), "told after a quarter of a second at most"
+
+
+@pytest.mark.parametrize("phase", range(15))
+def test_a_replayed_braking_is_followed_in_the_senders_own_phase_only(phase: int) -> None:
+    """A stream that asks for more can win in the sender's place alone: the safe side of that doubt."""
+    wire = Wire()
+    for k in range(400):
+        wire.send(RELEASED, k, 10 * k)
+        if k >= 50:
+            wire.send(LIVING, k + phase, 10 * k + 1.0)
+    worst = asked(wire.run(400, 4.0)).max()
+    assert worst == pytest.approx(3.0 if phase == 0 else 0.0)
+
+
+def test_doubt_delays_a_release_by_120_ms_at_most() -> None:
+    wire = Wire()
+    for k in range(200):
+        wire.send(PEDAL if k < 100 else PEDAL_FREE, k, 10 * k)
+        if k >= 50:
+            wire.send(PEDAL_FREE, k, 10 * k + 1.0)
+    inputs = wire.run(200, 4.0)
+    position = inputs["value"][:, PEDAL_POSITION]
+    released = int(np.argmax(position[100:] == 0.0))
+    assert position[:100].tolist() == pytest.approx([40.0] * 100, abs=0.5)
+    assert 5 <= released <= 12
+    assert inputs["value"][99, PEDAL_PRESSED] == 1.0
+    assert inputs["value"][-1, PEDAL_PRESSED] == 0.0
+
+
+def test_without_doubt_a_release_counts_at_once() -> None:
+    wire = Wire()
+    for k in range(100):
+        wire.send(LIVING if k < 50 else RELEASED, k, 10 * k)
+    assert asked(wire.run(100, 1.0)).tolist() == pytest.approx([3.0] * 50 + [0.0] * 50, abs=0.02)
+
+
+def test_a_restarted_sender_is_followed_within_100_ms() -> None:
+    for phase in range(15):
+        wire = Wire()
+        for k in range(100):
+            wire.send(RELEASED if k < 50 else LIVING, k if k < 50 else k + phase, 10 * k)
+        taken = int(np.argmax(asked(wire.run(100, 1.0))[50:] > 2.9))
+        assert taken <= 9, phase
+        assert wire.run(100, 1.0)["verdict"][10:, DECEL_DEMAND].min() & USABLE == USABLE, "never lost"
+
+
+def test_a_request_that_is_not_vouched_for_adds_nothing() -> None:
+    state, inputs = np.zeros(1, REQUEST)[0], new_record(INPUTS)[0]
+    begin_request(state)
+    state["sample"][DECEL_DEMAND - FIRST] = 12.0
+    note_request(state, T0)
+    hold_request(state, inputs)
+    assert inputs["value"][DECEL_DEMAND] == inputs["value"][DECEL_DEMAND_VALID] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("age_ms", "held"),
+    [(0, 40.0), (59.9, 40.0), (60, 40.0), (119, 40.0), (120, 0.0), (1000, 0.0), (-10, 0.0)],
+)
+def test_the_largest_of_the_last_60_to_120_ms(age_ms: float, held: float) -> None:
+    state, inputs = np.zeros(1, REQUEST)[0], new_record(INPUTS)[0]
+    begin_request(state)
+    state["sample"][0] = 40.0
+    note_request(state, T0)
+    begin_request(state)
+    note_request(state, T0 + int(age_ms * MS))
+    hold_request(state, inputs)
+    assert inputs["value"][PEDAL_POSITION] == held
+
+
+def test_places_lie_side_by_side() -> None:
+    assert tuple(range(FIRST, LAST + 1)) == (PEDAL_POSITION, PEDAL_PRESSED, DECEL_DEMAND, DECEL_DEMAND_VALID)
+    assert HALF_NS == 60 * MS
+    assert LIVING.dtype == FRAME
