@@ -13,6 +13,7 @@ import signal
 import sqlite3
 import sys
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, BinaryIO, Final, NamedTuple
 
@@ -173,6 +174,9 @@ class Recorder:
         self.channel, self.key = str(about["channel"]), str(about["store_key"])
         self.files = start_recording(record, about, reader.initial) if record else None
         self.store = state_store.open_store(state) if state else None
+        self.kept_open = ExitStack()
+        if state:
+            self.kept_open.enter_context(state_store.in_use(state))
         initial = np.frombuffer(reader.initial, dtype_of(about["state"]))
         self.keeper = state_store.first_keeper(initial["learned"], time.monotonic())
         self._store_refused = False
@@ -230,6 +234,7 @@ class Recorder:
                 file.close()
         if self.store:
             self.store.close()
+        self.kept_open.close()
 
 
 def main() -> int:

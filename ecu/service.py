@@ -28,8 +28,8 @@ from ecu.bus.transmit import contract_transmit_plan
 from ecu.clock import Grid, system_time
 from ecu.config import Config, config_hash, load_config, new_params, store_key
 from ecu.cycle import Ecu, Progress, Watch, cycle_once, new_ecu, send_farewell
-from ecu.diagnostics import store as state_store
 from ecu.diagnostics.log import configure_logging
+from ecu.diagnostics.restored import restored
 from ecu.errors import RunFault, UserError
 from ecu.jit import CompileCounter
 from ecu.realtime import Verdict, make_realtime, settle
@@ -126,11 +126,7 @@ def _restored(folder: Path | None, config: Config, params: RecordArray) -> Recor
     """Return what was learned before, None if there is nothing to go by."""
     if folder is None:
         return None
-    store = state_store.open_store(folder)
-    try:
-        found = state_store.restore(store, store_key(config), params["mu_nominal"][0])
-    finally:
-        store.close()
+    found = restored(folder, config, params)
     if found is None:
         return None
     revision, learned = found
