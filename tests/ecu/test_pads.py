@@ -21,8 +21,10 @@ PER_MM = float(PARAMS["pad_mass"][0, 0])
 
 
 def driven(km: float, grams: float, legs: np.ndarray | None = None):
-    """Return a record of pads that were fitted new, driven `km`, worn by `grams` each by the law (3 mm in front are 4.75 mm of
-    the smaller pads at the rear)."""
+    """Return a record of pads that were fitted new, driven `km`, worn by `grams` each by the law.
+
+    3 mm in front are 4.75 mm of the smaller pads at the rear.
+    """
     learned = new_state(PARAMS)["learned"].copy()
     wear = learned[0]["wear"]
     wear["odometer"], wear["told"] = 1e3 * km, 1
