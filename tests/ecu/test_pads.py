@@ -23,7 +23,7 @@ PER_MM = float(PARAMS["pad_mass"][0, 0])
 def driven(km: float, grams: float, legs: np.ndarray | None = None):
     """Return a record of pads that were fitted new, driven `km`, worn by `grams` each by the law.
 
-    3 mm in front are 4.75 mm of the smaller pads at the rear.
+    3 mm in front are 7.16 mm of the smaller pads at the rear.
     """
     learned = new_state(PARAMS)["learned"].copy()
     wear = learned[0]["wear"]
@@ -98,7 +98,7 @@ def test_wear_survives_a_configuration_that_changes(tmp_path, capsys):
     other.write_text(text.replace("coefficients = [0.1016", "coefficients = [0.2032", 1))
     wear_command(other, folder, None, None)
     lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[1] for line in lines[1:5]] == ["6.00", "6.00", "7.25", "7.25"]
+    assert [line.split()[1] for line in lines[1:5]] == ["6.00", "6.00", "4.84", "4.84"]
 
 
 REFUSED = {
