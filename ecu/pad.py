@@ -33,8 +33,11 @@ class Pad(Section):
     """Wear on the road over that on the dynamometer (section 7.6)."""
     sigma: Annotated[float, Field(gt=0, lt=1)] = 0.15
     """Of the law, relative, for linings that were never measured."""
-    walk: Annotated[float, Field(ge=0, lt=0.2)] = 0.006
+    walk: Annotated[float, Field(ge=0, lt=0.2)] = 0.01
     """What the scale of the law changes by as the lining wears, per square root of a gram."""
+    scatter: Annotated[float, Field(ge=0, lt=5)] = 0.35
+    """Standard deviation of the mass over the square root of the mass, sqrt(g): weather and roads, some 10 %
+    that stay the same over some 6 g."""
 
     @model_validator(mode="after")
     def _something_to_wear(self) -> "Pad":
@@ -48,6 +51,7 @@ def set_pad(row: Any, corner: int, pad: Pad) -> None:
     used = [1.0] * 7 if pad.law == "extended" else [1.0] * 3 + [0.0] * 4
     row["wear_law"][:, corner] = pad.road_scale * np.multiply(pad.coefficients, used)
     row["wear_sigma"][corner], row["wear_walk"][corner] = pad.sigma, pad.walk
+    row["wear_scatter"][corner] = pad.scatter
     row["pad_mass"][corner] = 2.0 * pad.density * pad.area  # kg/m is g/mm
     row["pad_life"][corner] = pad.thickness_new - pad.thickness_worn
     row["chamfer_depth"][corner], row["chamfer_share"][corner] = pad.chamfer_depth, pad.chamfer_share

@@ -59,6 +59,7 @@ PARAMS: Final = np.dtype(
         ("wear_law", "f8", (7, 4)),  # coefficients of (7.15) on the road, of both pads of a calliper
         ("wear_sigma", "f8", (4,)),  # relative, of the law for linings that were never measured
         ("wear_walk", "f8", (4,)),  # what that changes by per gram worn off, 1/sqrt(g)
+        ("wear_scatter", "f8", (4,)),  # what weather and roads add to a gram, sqrt(g)
         ("pad_mass", "f8", (4,)),  # of a millimetre of both pads, g/mm
         ("pad_life", "f8", (4,)),  # mm from new to worn
         ("chamfer_depth", "f8", (4,)),  # mm

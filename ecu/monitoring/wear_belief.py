@@ -4,7 +4,7 @@ States, of each corner: the mass M worn off at the last measurement and one fact
 the thesis scales its dynamometer law to the road by (7.6, from one measurement; here from all of them):
 
     M(t) = M_k + s g(t)        g: mass by the law since then, coefficients times regressors
-    s' = noise, walk^2 per gram
+    s' = noise, walk^2 per gram; beside it M scatters by weather and roads, scatter^2 per gram
 
 s begins at 1 with the law's spread and, relative to the mass so far, what friction and temperature may be
 off by. A measured thickness is a measured M (`pad_geometry.py`); both states are corrected by Kalman's rule.
@@ -31,7 +31,7 @@ BELIEF = np.dtype(
     align=True,
 )
 
-NEW_SIGMA = 0.05  # mm, of linings that were fitted new
+NEW_SIGMA = 0.15  # mm: how thick new linings are, and what running in takes beyond the law (Figure 7.12)
 UNIFORM = math.sqrt(12.0)  # width of an even distribution over its standard deviation
 LEAST_SCALE = 0.2
 
@@ -64,7 +64,8 @@ def _ahead(params: Record, state: Record, i: int, law: float) -> tuple[float, fl
     mass = state.mass[i] + state.scale[i] * g
     variance = state.mass_variance[i] + g * (2.0 * state.covariance[i] + g * state.scale_variance[i])
     covariance = state.covariance[i] + g * state.scale_variance[i] + 0.5 * walk * g * g
-    return mass, variance + walk * g * g * g / 3.0, covariance, state.scale_variance[i] + walk * g
+    variance += walk * g * g * g / 3.0 + params.wear_scatter[i] * params.wear_scatter[i] * g
+    return mass, variance, covariance, state.scale_variance[i] + walk * g
 
 
 @kernel

@@ -192,7 +192,7 @@ def mass_now(brakes: Brakes) -> tuple[float, float, float]:
 def test_one_measurement_is_bayes_rule(brakes):
     """By hand: mass s g with s = 1 ± 0.15, measured ± R: s = 1 + P g (z - g) / (P g^2 + R + new)."""
     fit_new(brakes.kept, "front")
-    brakes.p["wear_walk"] = 0.0
+    brakes.p["wear_walk"] = brakes.p["wear_scatter"] = 0.0
     drive(brakes, 300)
     g = mass_by_law(brakes.p, brakes.kept["regressors"], 0)
     per_mm = brakes.p["pad_mass"][0]
@@ -221,7 +221,7 @@ def test_measurements_find_the_scale_of_the_road_and_the_band_holds_the_truth(pa
         scale, wear, sigma = mass_now(brakes)
         assert abs(scale - 0.75) < 0.12
         assert abs(wear - true) < 3.0 * sigma
-        assert sigma < 0.25  # 0.15 by the walk of the scale since the last one
+        assert sigma < 0.35  # most of it by the walk of the scale since the last one
 
 
 def test_measurements_are_worth_something_else_by_another_law(brakes):
@@ -230,7 +230,7 @@ def test_measurements_are_worth_something_else_by_another_law(brakes):
     drive(brakes, 400)
     lost = 1.1 * mass_by_law(brakes.p, brakes.kept["regressors"], 0) / brakes.p["pad_mass"][0]
     add_measurement(brakes.kept, 0, lost, 0.01)
-    brakes.p["wear_sigma"] = 5.0  # nothing is known beforehand
+    brakes.p["wear_sigma"], brakes.p["wear_scatter"] = 5.0, 0.0  # nothing is known beforehand
     first = mass_now(brakes)
     brakes.p["wear_law"] *= 0.5
     second = mass_now(brakes)

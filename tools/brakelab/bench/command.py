@@ -47,6 +47,7 @@ from brakelab.bench.texts import (
     PLAY_TEXT,
     REPLAY_TEXT,
     STOPS_TEXT,
+    WEAR_TEXT,
 )
 from ecu import __version__
 from ecu.config import Config, config_hash, load_config
@@ -65,6 +66,7 @@ MARGINS: Final = "margins"
 LATENESS: Final = "lateness"
 REPLAY: Final = "replay"
 PLAY: Final = "play"
+WEAR: Final = "wear"
 
 Car = TypeVar("Car")
 
@@ -112,7 +114,8 @@ def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0, 
 
     In a checkout, a run of all times renews docs/benchmarks.md, `stops` docs/observer-accuracy.md,
     `observers` docs/observers.md, each other one the page of its name; that of `play` keeps the tables of
-    other buses. `seeds`: how many cars `stops` and `observers` draw, `ablation` and `bound` at most;
+    other buses. `seeds`: how many cars `stops` and `observers` draw, `ablation`, `bound` and `wear` at
+    most;
     `draw`: how far those of `stops` and `observers` differ from their file, pages are of the wide one;
     `seconds`: how long `lateness` drives and all players of `play` send.
 
@@ -132,6 +135,7 @@ def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0, 
         LATENESS: partial(_lateness, seconds=seconds),
         REPLAY: _replay,
         PLAY: partial(_play, seconds=seconds),
+        WEAR: partial(_wear, seeds=seeds),
     }
     if name is not None and name not in (*BENCHES, *others):
         raise UserError("bench", name, f"no such bench; choose one of {', '.join((*BENCHES, *others))}")
@@ -283,6 +287,18 @@ def _play(json: bool, seconds: float) -> int:
     from brakelab.bench.play import play_tables
 
     return _page(PLAY, "How late frames are played", PLAY_TEXT, play_tables(seconds), json, keep=True)
+
+
+def _wear(json: bool, seeds: int) -> int:
+    from brakelab.bench import wear, wear_drives, wear_study
+
+    cars = _each_car(WEAR, wear_drives.drive_car, min(seeds, wear.CARS))
+    laws = wear_study.dynamometer_laws()
+    lives = wear.wear_lives(cars, laws)
+    if not json:
+        picture = resource("docs") / "images" / "wear.svg"
+        write_chart(picture, wear.wear_panels(lives, len(cars)), wear.LEGEND)
+    return _page(WEAR, "Wear", WEAR_TEXT, wear.wear_tables(cars, laws, lives), json)
 
 
 def _page(
