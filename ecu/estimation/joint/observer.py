@@ -17,7 +17,7 @@ import math
 from ecu.control.demand import LEAST_REQUEST, requested_decel
 from ecu.estimation.friction import driver_accelerates, drives_against
 from ecu.estimation.joint.correction import APPLIED, correct_by_balance, correct_by_wheel
-from ecu.estimation.joint.drive import measure_drive
+from ecu.estimation.joint.drive import KNOWN, measure_drive
 from ecu.estimation.joint.kalman import clear_derivatives, correct, forget
 from ecu.estimation.joint.layout import (
     BIAS,
@@ -161,7 +161,7 @@ def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> 
     if braking:
         free[STIFFNESS] = free[PEAK] = free[OVERRUN] = 1
     else:
-        free[BIAS] = free[DRAG] = state.window.motor_reported
+        free[BIAS] = free[DRAG] = 1 if state.window.motor_reported and state.drive_known > KNOWN else 0
         if motors:
             for i in (STIFFNESS, RATIO, LOAD, PEAK, SINKING):
                 free[i] = 1

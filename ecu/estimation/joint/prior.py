@@ -157,8 +157,6 @@ def set_prior(params: Record, state: Record) -> None:
         p[i, i] = PRIOR[i] ** 2
     p[V, V] = 0.25
     p[MOTOR, MOTOR] = params.sigma_motor_torque**2
-    unknown = min(UNKNOWN_PER_ERROR * max(params.sigma_motor_torque - SCALE_ONLY, 0.0), 1.0)
-    p[OVERRUN, OVERRUN] = (OVERRUN_SIGMA * unknown) ** 2
     widen_levels(state, LEVEL_COMMON**2, LEVEL_AXLE**2, LEVEL_WHEEL**2)
 
 
@@ -193,7 +191,11 @@ def begin_application(state: Record, heat: Record) -> None:
     p[CHANGE, CHANGE + 1] = p[CHANGE + 1, CHANGE] = CHANGE_COMMON**2
     state.weight = 0.0
     forget_rate(state)
-    state.x[OVERRUN] = OVERRUN_MEAN if unknown >= 1.0 else 0.0
+    if unknown <= 0.0:
+        clear_state(state, OVERRUN, 0.0)
+    elif p[OVERRUN, OVERRUN] == 0.0 or unknown < 1.0:  # the torque of an engine errs by another value
+        clear_state(state, OVERRUN, (OVERRUN_SIGMA * unknown) ** 2)
+        state.x[OVERRUN] = OVERRUN_MEAN if unknown >= 1.0 else 0.0
     for axle in range(2):
         clear_state(state, DRIVE + axle, (UNKNOWN_DRIVE * unknown) ** 2)
 

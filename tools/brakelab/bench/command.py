@@ -1,12 +1,10 @@
 """`brake-ecu bench`: measures on this machine, beside what else could do the job."""
 
-import json as json_format
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from multiprocessing import get_context
-from pathlib import Path
-from typing import Any, Final, NamedTuple, TypeVar
+from typing import Final, NamedTuple, TypeVar
 
 from rich.console import Console
 from rich.progress import track
@@ -21,6 +19,7 @@ from brakelab.bench import (
     cycle,
     margins,
     plant,
+    recorded,
     step,
 )
 from brakelab.bench import stops as stops_bench
@@ -28,12 +27,13 @@ from brakelab.bench.blending import blending_tables
 from brakelab.bench.chart import write_chart
 from brakelab.bench.energy import energy_tables
 from brakelab.bench.friction import friction_tables
-from brakelab.bench.measure import NOT_INSTALLED, Figure, Row, machine
+from brakelab.bench.measure import NOT_INSTALLED, Row, machine
 from brakelab.bench.observers import WIDE, Sample, Task, observer_rows, step_times, tasks
 from brakelab.bench.observers_cases import configured
 from brakelab.bench.observers_picture import PICTURED, consistency_of, write_picture
 from brakelab.bench.observers_table import finite, observer_tables
-from brakelab.bench.table import Table, markdown, show, stop_tables, time_table
+from brakelab.bench.page import as_json, print_json, print_tables, write_page, write_tables
+from brakelab.bench.table import stop_tables, time_table
 from brakelab.bench.texts import (
     ABLATION_TEXT,
     BLENDING_TEXT,
@@ -45,6 +45,7 @@ from brakelab.bench.texts import (
     MARGINS_TEXT,
     OBSERVERS_TEXT,
     PLAY_TEXT,
+    RECORDED_TEXT,
     REPLAY_TEXT,
     STOPS_TEXT,
     WEAR_TEXT,
@@ -64,6 +65,7 @@ BLENDING: Final = "blending"
 COMPENSATION: Final = "compensation"
 MARGINS: Final = "margins"
 LATENESS: Final = "lateness"
+RECORDED: Final = "recorded"
 REPLAY: Final = "replay"
 PLAY: Final = "play"
 WEAR: Final = "wear"
@@ -114,8 +116,7 @@ def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0, 
 
     In a checkout, a run of all times renews docs/benchmarks.md, `stops` docs/observer-accuracy.md,
     `observers` docs/observers.md, each other one the page of its name; that of `play` keeps the tables of
-    other buses. `seeds`: how many cars `stops` and `observers` draw, `ablation`, `bound` and `wear` at
-    most;
+    other buses. `seeds`: how many cars `stops` and `observers` draw, the others at most;
     `draw`: how far those of `stops` and `observers` differ from their file, pages are of the wide one;
     `seconds`: how long `lateness` drives and all players of `play` send.
 
@@ -132,6 +133,7 @@ def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0, 
         COMPENSATION: _compensation,
         MARGINS: _margins,
         BLENDING: _blending,
+        RECORDED: partial(_recorded, seeds=seeds),
         LATENESS: partial(_lateness, seconds=seconds),
         REPLAY: _replay,
         PLAY: partial(_play, seconds=seconds),
@@ -147,12 +149,12 @@ def _times(name: str | None, json: bool) -> int:
     chosen = {key: value for key, value in BENCHES.items() if name in (None, key)}
     rows = {key: value.rows() for key, value in chosen.items()}
     if json:
-        _print_json({"machine": line, **{key: [_plain(row) for row in value] for key, value in rows.items()}})
+        print_json({"machine": line, **{key: [as_json(row) for row in value] for key, value in rows.items()}})
         return 0
     tables = [time_table(chosen[key].title, rows[key], chosen[key].below) for key in rows]
-    _print_tables(line, tables)
+    print_tables(line, tables)
     if name is None:
-        _write("benchmarks.md", "Times", f"`brake-ecu bench`, version {__version__}. {line}.", tables)
+        write_tables("benchmarks.md", "Times", f"`brake-ecu bench`, version {__version__}. {line}.", tables)
     return 0
 
 
@@ -171,14 +173,14 @@ def _stops(json: bool, seeds: int, draw: str) -> int:
         result = stops_bench.stops(config, seeds, spread=all_cores, draw=draw)
     of = _of(path.name, config, draw, seeds)
     if json:
-        plain = {key: [_plain(row) for row in rows] for key, rows in result._asdict().items()}
-        _print_json({"of": of, **plain})
+        plain = {key: [as_json(row) for row in rows] for key, rows in result._asdict().items()}
+        print_json({"of": of, **plain})
         return 0
     tables = stop_tables(result, seeds)
-    _print_tables(of, tables)
+    print_tables(of, tables)
     text = f"`brake-ecu bench stops`, {of}. {STOPS_TEXT}"
     if draw == WIDE:
-        _write("observer-accuracy.md", "Accuracy of the friction and of the compensation", text, tables)
+        write_tables("observer-accuracy.md", "Accuracy of the friction and of the compensation", text, tables)
     return 0
 
 
@@ -201,14 +203,14 @@ def _observers(json: bool, seeds: int, draw: str) -> int:
     of = _of("suv.toml", configured(), draw, seeds)
     if json:
         plain = {name: value._asdict() for name, value in times.items()}
-        _print_json(finite({"of": of, "rows": [_plain(row) for row in rows], "step_us": plain}))
+        print_json(finite({"of": of, "rows": [as_json(row) for row in rows], "step_us": plain}))
         return 0
     tables = observer_tables(rows, times, consistency, draw)
-    _print_tables(of, tables)
+    print_tables(of, tables)
     if draw != WIDE:
         return 0
     text = f"`brake-ecu bench observers`, {of}. {machine()}. {OBSERVERS_TEXT}"
-    _write("observers.md", "The observers beside their goals", text, tables)
+    write_tables("observers.md", "The observers beside their goals", text, tables)
     write_picture(resource("docs") / "images" / "observers.svg", consistency)
     return 0
 
@@ -223,21 +225,26 @@ def _each_car(name: str, drive: Callable[[int], Car], cars: int) -> list[Car]:
 def _ablation(json: bool, seeds: int) -> int:
     cars = _each_car(ABLATION, ablation.samples_of, min(seeds, ablation.CARS))
     table = ablation.ablation_table(cars)
-    return _page(ABLATION, "What carries the joint observer", ABLATION_TEXT, [table], json)
+    return write_page(ABLATION, "What carries the joint observer", ABLATION_TEXT, [table], json)
 
 
 def _bound(json: bool, seeds: int) -> int:
     table = bound.bound_table(_each_car(BOUND, bound.bounds_of, min(seeds, bound.CARS)))
-    return _page(BOUND, "What the sensors allow", BOUND_TEXT, [table], json)
+    return write_page(BOUND, "What the sensors allow", BOUND_TEXT, [table], json)
+
+
+def _recorded(json: bool, seeds: int) -> int:
+    table = recorded.recorded_table(_each_car(RECORDED, recorded.recorded_of, min(seeds, recorded.CARS)))
+    return write_page(RECORDED, "Cars as loggers record them", RECORDED_TEXT, [table], json, "recorded-cars")
 
 
 def _friction(json: bool) -> int:
-    return _page(FRICTION, "Friction laws, disc and brake unit", FRICTION_TEXT, friction_tables(), json)
+    return write_page(FRICTION, "Friction laws, disc and brake unit", FRICTION_TEXT, friction_tables(), json)
 
 
 def _energy(json: bool) -> int:
     tables = energy_tables(resource("config/scenarios"), load_config(resource("config/suv.toml")))
-    return _page(ENERGY, "Where the energy goes", ENERGY_TEXT, tables, json)
+    return write_page(ENERGY, "Where the energy goes", ENERGY_TEXT, tables, json)
 
 
 def _compensation(json: bool) -> int:
@@ -248,7 +255,7 @@ def _compensation(json: bool) -> int:
     if not json:
         picture = resource("docs") / "images" / "compensation.svg"
         write_chart(picture, compensation_picture.pictured(config), compensation_picture.LEGEND)
-    return _page(COMPENSATION, "What compensation is worth", COMPENSATION_TEXT, tables, json)
+    return write_page(COMPENSATION, "What compensation is worth", COMPENSATION_TEXT, tables, json)
 
 
 def _margins(json: bool) -> int:
@@ -259,18 +266,18 @@ def _margins(json: bool) -> int:
         picture = resource("docs") / "images" / "control-margins.svg"
         write_chart(picture, margins.margin_panels(cars), margins.LEGEND)
     tables = margins.margin_tables(cars)
-    return _page(MARGINS, "Margins of the control loop", MARGINS_TEXT, tables, json, "control-margins")
+    return write_page(MARGINS, "Margins of the control loop", MARGINS_TEXT, tables, json, "control-margins")
 
 
 def _blending(json: bool) -> int:
-    return _page(BLENDING, "Motors and linings brake together", BLENDING_TEXT, blending_tables(), json)
+    return write_page(BLENDING, "Motors and linings brake together", BLENDING_TEXT, blending_tables(), json)
 
 
 def _lateness(json: bool, seconds: float) -> int:
     from brakelab.bench.lateness import lateness_tables
 
     text = f"{machine()}. {LATENESS_TEXT}"
-    return _page(LATENESS, "Lateness under load", text, lateness_tables(seconds), json)
+    return write_page(LATENESS, "Lateness under load", text, lateness_tables(seconds), json)
 
 
 def _replay(json: bool) -> int:
@@ -278,7 +285,7 @@ def _replay(json: bool) -> int:
         from brakelab.bench.replay import replay_tables
     except ImportError:
         raise UserError("bench", REPLAY, NOT_INSTALLED.format("asammdf")) from None
-    return _page(
+    return write_page(
         REPLAY, "Speed of replay", f"{machine()}. {REPLAY_TEXT}", replay_tables(), json, "replay-speed"
     )
 
@@ -286,7 +293,7 @@ def _replay(json: bool) -> int:
 def _play(json: bool, seconds: float) -> int:
     from brakelab.bench.play import play_tables
 
-    return _page(PLAY, "How late frames are played", PLAY_TEXT, play_tables(seconds), json, keep=True)
+    return write_page(PLAY, "How late frames are played", PLAY_TEXT, play_tables(seconds), json, keep=True)
 
 
 def _wear(json: bool, seeds: int) -> int:
@@ -298,54 +305,4 @@ def _wear(json: bool, seeds: int) -> int:
     if not json:
         picture = resource("docs") / "images" / "wear.svg"
         write_chart(picture, wear.wear_panels(lives, len(cars)), wear.LEGEND)
-    return _page(WEAR, "Wear", WEAR_TEXT, wear.wear_tables(cars, laws, lives), json)
-
-
-def _page(
-    name: str,
-    title: str,
-    text: str,
-    tables: list[Table],
-    json: bool,
-    file: str | None = None,
-    keep: bool = False,
-) -> int:
-    of = f"`brake-ecu bench {name}`, version {__version__}"
-    if json:
-        _print_json({"of": of, "tables": [table._asdict() for table in tables]})
-        return 0
-    _print_tables(of, tables)
-    _write(f"{file or name}.md", title, f"{of}. {text}", tables, keep)
-    return 0
-
-
-def _plain(row: Any) -> dict[str, Any]:
-    """Return a row as JSON has it: figures become objects, times get their ratio."""
-    values = row._asdict().items()
-    plain = {key: value._asdict() if isinstance(value, Figure) else value for key, value in values}
-    return plain | {"ratio": row.ratio} if isinstance(row, Row) else plain
-
-
-def _print_json(content: dict[str, Any]) -> None:
-    print(json_format.dumps(content, indent=1, ensure_ascii=False))
-
-
-def _print_tables(line: str, tables: list[Table]) -> None:
-    console = Console()
-    console.print(line, highlight=False)
-    for table in tables:
-        show(console, table)
-
-
-def _write(name: str, title: str, text: str, tables: list[Table], keep: bool = False) -> None:
-    """Renew a page; with `keep` the sections of other titles stay: of other buses, measured elsewhere."""
-    folder: Path = resource("docs")
-    if folder.is_dir():
-        sections = {table.title: markdown(table) for table in tables}
-        if keep and (folder / name).exists():
-            _, *before = (folder / name).read_text(encoding="utf-8").split("\n## ")
-            kept = {section.partition("\n")[0]: f"## {section.rstrip()}\n" for section in before}
-            sections = kept | sections
-        content = "\n".join([f"# {title}", "", text, "", *sections.values()])
-        (folder / name).write_text(content.rstrip() + "\n", encoding="utf-8")
-        Console(stderr=True).print(f"written: docs/{name}", highlight=False)
+    return write_page(WEAR, "Wear", WEAR_TEXT, wear.wear_tables(cars, laws, lives), json)

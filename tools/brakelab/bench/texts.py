@@ -61,6 +61,13 @@ BLENDING_TEXT: Final = (
     "the ECU knows. Where it is told the true friction, what is left is the error of blending."
 )
 
+RECORDED_TEXT: Final = (
+    "Ten brakings of 1.5 to 7 m/s² from 30 m/s by cars whose front and rear pressures are proportional, "
+    "braked by an ECU that corrects nothing. Replayed is what a logger has: wheel speeds at 100 Hz, one "
+    "pressure per axle at 20 Hz, the accelerometer at 50 or 10 Hz; no speed reference, no motor torque. The "
+    "cars have no engine that drags, where the observer assumes one of 0.2 ± 0.3 m/s²."
+)
+
 COMPENSATION_TEXT: Final = (
     "Manoeuvres of section 5.7 and fade (6.2.3) in closed loop with the ECU of config/suv.toml, motors at "
     "rest but where it says so (then the ECU blends, f = 0.7 on both axles); cars are drawn per seed from "

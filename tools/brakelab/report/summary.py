@@ -1,5 +1,6 @@
 """What the head of the page says: where the result comes from, and the drive in a few numbers."""
 
+import math
 from datetime import UTC, datetime
 from typing import NamedTuple
 
@@ -91,9 +92,15 @@ def _drive(drive: Drive) -> Tile:
 def _brakings(found: list[Braking]) -> Tile:
     if not found:
         return Tile("Brakings", "0", "", "none in this drive")
-    hardest = max(found, key=lambda braking: braking.achieved)
-    note = f"hardest: no. {hardest.number}, {fixed(hardest.achieved, 1)} m/s²"
+    hardest = max(found, key=_while_moving)
+    note = f"hardest: no. {hardest.number}, {fixed(_while_moving(hardest), 1)} m/s²"
     return Tile("Brakings", f"{len(found)}", "", note)
+
+
+def _while_moving(braking: Braking) -> float:
+    """Return the mean specific force [m/s^2], where it is known: a mean over a standing end says little."""
+    measured = braking.force.measured
+    return measured if math.isfinite(measured) else braking.achieved
 
 
 def _friction(drive: Drive, accuracy: dict[str, Accuracy] | None) -> list[Tile]:
