@@ -2,7 +2,8 @@
 
 import pytest
 
-from brakelab.bench import command, page
+from brakelab.bench import command
+from brakelab.bench import page as bench_page
 from brakelab.bench.friction import BRAKES, RUNS, TABLE_3_4, free_inertia, friction_tables, rms_row, run_means
 from brakelab.plant.description import load_plant
 from brakelab.plant.linings import Linings
@@ -46,7 +47,7 @@ def test_every_column_of_table_3_4_is_complete() -> None:
 
 def test_the_bench_writes_its_page(monkeypatch: pytest.MonkeyPatch) -> None:
     written = []
-    monkeypatch.setattr(page, "write_tables", lambda name, *rest: written.append((name, len(rest[2]))))
+    monkeypatch.setattr(bench_page, "write_tables", lambda name, *rest: written.append((name, len(rest[2]))))
     assert command.bench("friction", json=False) == 0
     assert written == [("friction.md", len(friction_tables()))]
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brakelab.bench import command, page
+from brakelab.bench import command
+from brakelab.bench import page as bench_page
 from brakelab.bench.measure import Figure
 from brakelab.bench.observers import (
     JOINT,
@@ -199,7 +200,7 @@ def test_page_and_picture(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> No
     (tmp_path / "docs" / "images").mkdir(parents=True)
     t = np.linspace(0.0, 6.0, 100)
     car = Consistency((t, t), (np.full((2, 100), 0.5),) * 2, (np.ones((5, 20)),) * 2)
-    for module in (command, page):
+    for module in (command, bench_page):
         monkeypatch.setattr(module, "resource", lambda name: tmp_path / name)
     monkeypatch.setattr(command, "tasks", lambda seeds, draw: [])
     found = observer_rows([Task(JOINT, 0, ())], lambda drive, todo: [_samples(1.0)])

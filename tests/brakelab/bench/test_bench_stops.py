@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brakelab.bench import command, page
+from brakelab.bench import command
+from brakelab.bench import page as bench_page
 from brakelab.bench.stops import TABLE_4_3, Stops, nrmse, stops, window
 from brakelab.bench.table import markdown, stop_tables
 from brakelab.closed_loop import Drive
@@ -76,7 +77,7 @@ def test_page_names_config_seeds_and_every_figure(
     (tmp_path / "docs").mkdir()
     (tmp_path / "config").mkdir()
     (tmp_path / "config" / "suv.toml").write_bytes(resource("config/suv.toml").read_bytes())
-    for module in (command, page):
+    for module in (command, bench_page):
         monkeypatch.setattr(module, "resource", lambda name: tmp_path / name)
     monkeypatch.setattr(command.stops_bench, "stops", lambda config, seeds, spread, draw: result)
     assert command.bench("stops", json=False, seeds=20) == 0

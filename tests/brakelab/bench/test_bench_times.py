@@ -8,7 +8,8 @@ import cantools
 import numpy as np
 import pytest
 
-from brakelab.bench import command, page
+from brakelab.bench import command
+from brakelab.bench import page as bench_page
 from brakelab.bench.braking import MESSAGES_IN, simulated_stop
 from brakelab.bench.codec import codec_rows, protected_frames
 from brakelab.bench.cycle import bursts, cycle_rows, our_side, python_side, run_cycles, thrice
@@ -140,7 +141,7 @@ def one_bench(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     rows = [Row("a", FIGURE, Figure(6.0, 6.0, 6.0), "µs", "peer"), Row("b", FIGURE, None, "µs", "none")]
     monkeypatch.setattr(command, "BENCHES", {"step": command.Bench(lambda: rows, "step", "Below.")})
     (tmp_path / "docs").mkdir()
-    for module in (command, page):
+    for module in (command, bench_page):
         monkeypatch.setattr(module, "resource", lambda name: tmp_path / name)
     return tmp_path / "docs" / "benchmarks.md"
 
