@@ -103,6 +103,26 @@ app.add_typer(laboratory)
 
 
 @app.command()
+def wear(
+    config: Config,
+    state: Annotated[
+        Path, typer.Option("--state", metavar="DIR", help="Where `run` and `replay` keep what is learned")
+    ],
+    new_pads: Annotated[
+        str | None, typer.Option("--new-pads", metavar="AXLE", help="New pads were fitted: front, rear, all")
+    ] = None,
+    measured: Annotated[
+        str | None,
+        typer.Option("--measured", metavar="fl=9.8,…", help="Thickness of linings in mm, without backplate"),
+    ] = None,
+) -> int:
+    """What is left of the brake pads and how far it goes. Takes new pads and measured thicknesses."""
+    from ecu import pads
+
+    return pads.wear_command(config, state, new_pads, measured)
+
+
+@app.command()
 def doctor(
     config: Annotated[Path | None, CONFIG_OPTION] = None,
     map: Map = None,

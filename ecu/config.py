@@ -13,14 +13,15 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
 from ecu.errors import UserError
 from ecu.estimation.tyre import rolling_radius
+from ecu.pad import Pad, set_pad
 from ecu.params import BAR, COMPENSATIONS, DISTRIBUTIONS, GRAVITY, OBSERVERS, PARAMS, PEDAL_POINTS
 from ecu.records import RecordArray
 from ecu.regulation import Load, annex_5_violation
-from ecu.toml_file import describe, read_toml
+from ecu.toml_file import Section, describe, read_toml
 
 AIR_DENSITY = 1.2  # kg/m^3, 20 degC at sea level
 
@@ -28,11 +29,7 @@ Positive = Annotated[float, Field(gt=0)]
 Share = Annotated[float, Field(gt=0, lt=1)]
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
-
-
-class Vehicle(_Section):
+class Vehicle(Section):
     """Masses and lengths of the car as driven."""
 
     mass: Annotated[float, Field(gt=200, lt=10000)]
@@ -74,7 +71,7 @@ class Vehicle(_Section):
         return self
 
 
-class Axle(_Section):
+class Axle(Section):
     """One axle: tyre and brake of each of its two corners."""
 
     unloaded_radius: Annotated[float, Field(gt=0.15, lt=0.8)]
@@ -98,9 +95,10 @@ class Axle(_Section):
     """At standstill, delta_0 of (3.7), 1/s."""
     disc_cooling_by_speed: Annotated[float, Field(ge=0, lt=0.01)] = 9.108e-5
     """delta_1 of (3.7), 1/m. Table C.1 prints ten times as much: 400 to 100 degC in a minute at 100 km/h."""
+    pad: Pad = Pad()
 
 
-class Sensors(_Section):
+class Sensors(Section):
     """Standard deviations of the sensors (Table 4.1), the accelerometer's range, the reference's delay."""
 
     wheel_speed: Positive = 0.1
@@ -113,7 +111,7 @@ class Sensors(_Section):
     motor_torque: Annotated[float, Field(ge=0, le=1)] = 0.03
 
 
-class Observer(_Section):
+class Observer(Section):
     """The friction observer and its tuning."""
 
     kind: Literal["joint", "observer1", "observer2"] = "joint"
@@ -137,7 +135,7 @@ class Observer(_Section):
     sigma_slip_stiffness_ratio: Share = 0.04
 
 
-class Control(_Section):
+class Control(Section):
     """Pedal map, holding at rest, distribution, limits of the pressure demand."""
 
     pedal_position: list[float] = Field(min_length=2, max_length=PEDAL_POINTS)
@@ -187,7 +185,7 @@ class Control(_Section):
         return self
 
 
-class Blending(_Section):
+class Blending(Section):
     """What the motors take of the brake torque, f of (5.2): 0 off, 1 series phasing, parallel in between."""
 
     front: Annotated[float, Field(ge=0, le=1)] = 0.0
@@ -196,7 +194,7 @@ class Blending(_Section):
     """Below it the motors' limit falls with the speed, m/s (Figure A.7); a motor's own map knows better."""
 
 
-class Config(_Section):
+class Config(Section):
     """One vehicle's configuration."""
 
     name: Annotated[str, Field(min_length=1)]
@@ -272,9 +270,13 @@ def config_hash(config: Config) -> str:
 
 
 def store_key(config: Config) -> str:
-    """Return what learned values belong to: vehicle, brakes and the version of the algorithm."""
-    brakes = json.dumps([config.front.model_dump(), config.rear.model_dump()], sort_keys=True)
-    return f"{config.name}/{hashlib.sha256(brakes.encode()).hexdigest()[:8]}/3"
+    """Return what learned values belong to: vehicle, brakes and the version of the algorithm.
+
+    Not the linings' wear law: wear is kept in a form that any law can be applied to later.
+    """
+    axles = [axle.model_dump(exclude={"pad"}) for axle in (config.front, config.rear)]
+    brakes = json.dumps(axles, sort_keys=True)
+    return f"{config.name}/{hashlib.sha256(brakes.encode()).hexdigest()[:8]}/4"
 
 
 def new_params(config: Config) -> RecordArray:
@@ -307,6 +309,7 @@ def new_params(config: Config) -> RecordArray:
             row[name][corner] = getattr(axle, name)
         for name in ("disc_heating", "disc_cooling", "disc_cooling_by_speed"):
             row[name][corner] = getattr(axle, name)
+        set_pad(row, corner, axle.pad)
     row["sigma_wheel_speed"], row["sigma_accel"] = sensors.wheel_speed, sensors.accel
     row["accel_range"] = sensors.accel_range
     row["sigma_pressure"] = sensors.pressure * BAR

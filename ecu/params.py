@@ -11,6 +11,7 @@ PEDAL_POINTS: Final = 8
 
 GRAVITY: Final = 9.81  # m/s^2
 BAR: Final = 1e5  # Pa
+MEGA: Final = 1e-6  # MW of a watt
 
 OBSERVERS: Final = ("joint", "observer1", "observer2")
 JOINT, OBSERVER1, OBSERVER2 = range(3)
@@ -54,6 +55,15 @@ PARAMS: Final = np.dtype(
         ("disc_cooling", "f8", (4,)),  # delta_0 (3.7), 1/s
         ("disc_cooling_by_speed", "f8", (4,)),  # delta_1 (3.7), 1/m
         ("ambient_temperature", "f8"),  # where no sensor reports it, degC
+        # linings, see monitoring/wear.py
+        ("wear_law", "f8", (7, 4)),  # coefficients of (7.15) on the road, of both pads of a calliper
+        ("wear_sigma", "f8", (4,)),  # relative, of the law for linings that were never measured
+        ("wear_walk", "f8", (4,)),  # what that changes by per gram worn off, 1/sqrt(g)
+        ("wear_scatter", "f8", (4,)),  # what weather and roads add to a gram, sqrt(g)
+        ("pad_mass", "f8", (4,)),  # of a millimetre of both pads, g/mm
+        ("pad_life", "f8", (4,)),  # mm from new to worn
+        ("chamfer_depth", "f8", (4,)),  # mm
+        ("chamfer_share", "f8", (4,)),  # of the area that chamfers take off new pads
         # sensors
         ("sigma_wheel_speed", "f8"),  # rad/s
         ("sigma_accel", "f8"),  # m/s^2

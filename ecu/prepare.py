@@ -23,6 +23,7 @@ from ecu.bus.transmit import contract_transmit_plan
 from ecu.config import Config, config_hash, load_config, new_params, store_key
 from ecu.cycle import Ecu, new_ecu
 from ecu.diagnostics import store as state_store
+from ecu.diagnostics.restored import restored
 from ecu.errors import UserError
 from ecu.jit import CompileCounter
 from ecu.notify import Manager
@@ -159,15 +160,9 @@ def _restored(folder: Path | None, config: Config, params: RecordArray) -> Recor
     if folder is None:
         return None
     try:
-        store = state_store.open_store(folder)
-    except UserError:
+        found = restored(folder, config, params)
+    except (UserError, *state_store.DAMAGED):
         return None
-    try:
-        found = state_store.restore(store, store_key(config), params["mu_nominal"][0])
-    except state_store.DAMAGED:
-        return None
-    finally:
-        store.close()
     if found is None:
         return None
     revision, learned = found

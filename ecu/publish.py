@@ -73,6 +73,9 @@ def publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: in
         y.disc_temperature[i] = s.discs.temperature[i] if mapped else math.nan
         y.sigma_disc_temperature[i] = s.discs.sigma[i] if mapped else math.nan
         y.test_ratio[i] = _test_ratio(p, s, i)
-        y.pad_wear[i] = y.pad_remaining[i] = y.pad_wear_mass[i] = math.nan
+        y.pad_wear[i] = s.wear.wear[i] if mapped else math.nan
+        y.sigma_pad_wear[i] = s.wear.sigma[i] if mapped else math.nan
+        y.pad_remaining[i] = 100.0 * max(1.0 - s.wear.wear[i] / p.pad_life[i], 0.0) if mapped else math.nan
+        y.pad_wear_mass[i] = s.wear.mass[i] if mapped else math.nan
         if mode == FAILED:
             y.pressure_demand[i] = 0.0

@@ -77,6 +77,27 @@ CYCLE: Final = np.dtype(
 )
 N_JOINT: Final = 35
 N_KEPT: Final = 24
+N_REGRESSORS: Final = 7
+N_MEASURED: Final = 8
+N_LEGS: Final = 8
+# What the linings have done since they were fitted, in a form that no wear law is in: (7.16) and its errors.
+WEAR: Final = np.dtype(
+    [
+        ("regressors", "f8", (N_REGRESSORS, 4)),  # see `REGRESSORS` of monitoring/wear.py
+        ("friction_error", "f8", (N_REGRESSORS, 4)),  # standard deviation of these by that of friction
+        ("temperature_error", "f8", (N_REGRESSORS, 4)),  # by that of the disc's temperature
+        ("odometer", "f8"),  # m, since the record was first made
+        ("fitted_at", "f8", (4,)),  # m of the odometer
+        ("told", "i8", (4,)),  # 1: somebody said that these linings were new then
+        ("measurements", "i8", (4,)),  # that are kept
+        ("measured_wear", "f8", (N_MEASURED, 4)),  # mm below new
+        ("measured_sigma", "f8", (N_MEASURED, 4)),  # mm
+        ("measured_at", "f8", (N_MEASURED, N_REGRESSORS, 4)),  # regressors then
+        ("legs", "i8"),  # of equal length that were driven
+        ("leg_ends", "f8", (N_LEGS, N_REGRESSORS, 4)),  # regressors at the end of the last ones, in a ring
+    ],
+    align=True,
+)
 # What the ECU has learned and must not lose: carried between brakings, drives and restarts.
 LEARNED: Final = np.dtype(
     [
@@ -91,6 +112,7 @@ LEARNED: Final = np.dtype(
         ("spare", "u1", (7,)),  # a gap would be left undefined by copies, and the bytes are compared
         ("disc_excess", "f8", (4,)),  # most that the last braking left the disc above the air [K]
         ("brakings", "i8"),  # brake applications since the record was first made
+        ("wear", WEAR),
     ],
     align=True,
 )

@@ -16,7 +16,7 @@ import socket
 import sqlite3
 import sys
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Final
 
@@ -65,6 +65,7 @@ class Recorder:
         initial = np.frombuffer(reader.initial, dtype_of(about["state"]))
         self.keeper = state_store.first_keeper(initial["learned"], time.monotonic())
         self.store: sqlite3.Connection | None = None
+        self._kept_open = ExitStack()
         self.state, self._refused = state, ""
         if state:
             self._open_store(state)
@@ -89,8 +90,9 @@ class Recorder:
     def _open_store(self, state: Path) -> None:
         try:
             self.store = state_store.open_store(state)
+            self._kept_open.enter_context(state_store.in_use(state))
             self._refused = ""
-        except UserError as error:
+        except (UserError, OSError) as error:
             self._refuse(str(error))
 
     def _refuse(self, reason: str) -> None:
@@ -164,6 +166,7 @@ class Recorder:
                 file.close()
         if self.store:
             self.store.close()
+        self._kept_open.close()
 
     def say_last_words(self) -> None:
         """Log how the run ended."""

@@ -152,6 +152,7 @@ OUTPUT_SIGNALS: Final[tuple[OutputSignal, ...]] = (
     OutputSignal("pressure_zero", "bar", True, ""),  # what its sensor reads without pressure
     OutputSignal("pressure_uncompensated", "bar", True, ""),  # the demand with the base friction
     OutputSignal("sigma_disc_temperature", "K", True, ""),
+    OutputSignal("sigma_pad_wear", "mm", True, ""),
     # Squared innovation over its variance and squared gate, last window: beyond 1 it counts less. Joint only.
     OutputSignal("test_ratio", "-", True, ""),  # of wheel speed
     OutputSignal("test_ratio_balance", "-", False, ""),  # of the forces along the car

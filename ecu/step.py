@@ -4,8 +4,8 @@
 daemon, replay and closed-loop simulation get the same bits from the same inputs. Order of one cycle:
 
     brake application -> accelerations -> wheel loads, radii -> brake torques, expected slip -> speed -> slip
-    -> tyre forces -> friction -> disc temperature -> demand -> distribution -> blending -> pressure law
-    -> slip guard -> limiter -> mode
+    -> tyre forces -> friction -> disc temperature -> wear -> demand -> distribution -> blending
+    -> pressure law -> slip guard -> limiter -> mode
 """
 
 import math
@@ -99,6 +99,7 @@ from ecu.monitoring.prediction import (
     end_prediction,
 )
 from ecu.monitoring.sensors import leave_out, watch_sensors
+from ecu.monitoring.wear import WEAR_STATE, restore_wear, update_wear
 from ecu.params import BAR, JOINT, OBSERVER1
 from ecu.publish import publish
 from ecu.records import INPUTS, LEARNED, RecordArray
@@ -118,6 +119,7 @@ STATE = np.dtype(
         ("friction", FRICTION_STATE),
         ("application", APPLICATION_STATE),
         ("discs", DISC_STATE),
+        ("wear", WEAR_STATE),
         ("demand", DEMAND_STATE),
         ("distribution", DISTRIBUTION_STATE),
         ("friction_torque", FRICTION_TORQUE_STATE),
@@ -164,6 +166,7 @@ def _begin(params: Record, state: Record) -> None:
     restore_joint(p, s.joint, s.learned)
     set_base(p, s.control, s.learned)
     start_discs(p, s.discs, s.learned)
+    restore_wear(p, s.wear, s.learned)
     update_wheel_load(p, s.wheel_load, 0.0, 0.0, 0.0, 1.0)
     update_radius(p, s.wheels, s.learned, s.wheel_load.load)
 
@@ -188,6 +191,7 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
         p, s.discs, s.learned, u, s.friction, s.application, s.wheel_load.load,
         total_tyre_force(p, s.motion, s.speed.speed), s.speed.speed, dt,
     )  # fmt: skip
+    update_wear(p, s.wear, s.learned, u, s.friction, s.discs, s.application, s.speed.speed, dt)
     decel = _control(p, s, u, y, dt)
     if s.friction.reset:
         faults |= FILTER_RESET

@@ -4,9 +4,16 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from ecu.errors import UserError
+
+
+class Section(BaseModel):
+    """A table of a TOML file: no key but those it knows, no value but of the kind it has."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
+
 
 _NUMBER, _WHOLE = "give a number", "give a whole number"
 _WANTED = {

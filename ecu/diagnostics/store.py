@@ -4,27 +4,33 @@ Only the side process writes. A row that fails its CRC or its ranges is passed o
 it; a file that sqlite cannot read, or that holds another table, another schema or values of another kind, is
 set aside and a new one made. What another version of the algorithm has learned stays in the file and is not
 used. The folder is its owner's alone.
+
+What the linings have done is also kept as rows of its own, in the same transaction, by the vehicle's name
+alone: it outlives a new version and a configuration that changes, and belongs to the pads, not to the brakes'
+parameters.
 """
 
+import fcntl
 import math
 import sqlite3
 import time
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import structlog
 from numpy.typing import NDArray
 
 from ecu.errors import UserError
-from ecu.records import LEARNED, RecordArray
+from ecu.records import LEARNED, N_MEASURED, WEAR, RecordArray
 
 FILE: Final = "learned.sqlite"
 DAMAGED: Final = (sqlite3.Error, ValueError, OverflowError, TypeError)
 """What sqlite3 raises over a damaged file: text that is no UTF-8, and numbers that cannot be, among them."""
+LOCK: Final = "in-use"
 REVISIONS_KEPT: Final = 20
 SAVE_INTERVAL_S: Final = 60.0
 MU_RANGE: Final = (0.5, 1.5)  # of nominal
@@ -32,6 +38,8 @@ RADIUS_ERROR_LIMIT: Final = 0.03
 DISC_EXCESS_LIMIT: Final = 2000.0  # K above the air, with its error
 JOINT_LIMIT: Final = 1.5
 """Of any state of the joint observer: logarithms, and the rest is smaller still."""
+FARTHEST: Final = 1e10  # m, of an odometer
+THICKEST: Final = 50.0  # mm
 LEAST_EIGENVALUE: Final = 1e-6  # of a correlation matrix, below zero: rounding
 
 _TABLE: Final = """CREATE TABLE learned (
@@ -66,6 +74,33 @@ def open_store(folder: Path) -> sqlite3.Connection:
         raise UserError(
             str(path), "", f"cannot be opened: {error}; give a folder that can be written"
         ) from None
+
+
+@contextmanager
+def in_use(folder: Path) -> Iterator[None]:
+    """Let no one change by hand what is kept in `folder` while a daemon keeps it."""
+    with (folder / LOCK).open("a") as file:
+        fcntl.flock(file, fcntl.LOCK_SH)
+        yield
+
+
+@contextmanager
+def alone(folder: Path) -> Iterator[None]:
+    """Change what is kept in `folder` by hand.
+
+    Raises:
+        UserError: a daemon keeps it, or the folder cannot be written.
+    """
+    try:
+        with (folder / LOCK).open("a") as file:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            yield
+    except BlockingIOError:
+        raise UserError(
+            str(folder), "", "a daemon keeps it and would overwrite this; stop it first"
+        ) from None
+    except OSError as error:
+        raise UserError(str(folder), "", f"cannot be written: {error.strerror}") from None
 
 
 def _is_damaged(error: sqlite3.OperationalError) -> bool:
@@ -123,15 +158,24 @@ def _crc(key: str, revision: int, record: bytes) -> int:
 
 def save(store: sqlite3.Connection, key: str, learned: RecordArray) -> int:
     """Add `learned` (`LEARNED`, shape (1,)) as the next revision of `key`, durable on return; returns it."""
-    record = learned.tobytes()
     with _transaction(store):
-        last = store.execute("SELECT max(revision) FROM learned WHERE key = ?", (key,)).fetchone()[0]
-        revision = (last or 0) + 1
-        now = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
-        crc = _crc(key, revision, record)
-        store.execute("INSERT INTO learned VALUES (?, ?, ?, ?, ?)", (key, revision, now, record, crc))
-        store.execute("DELETE FROM learned WHERE key = ? AND revision <= ?", (key, revision - REVISIONS_KEPT))
-    return int(revision)
+        _add(store, wear_key(key), learned["wear"].tobytes())
+        return _add(store, key, learned.tobytes())
+
+
+def _add(store: sqlite3.Connection, key: str, record: bytes) -> int:
+    last = store.execute("SELECT max(revision) FROM learned WHERE key = ?", (key,)).fetchone()[0]
+    revision = int(last or 0) + 1
+    now = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
+    crc = _crc(key, revision, record)
+    store.execute("INSERT INTO learned VALUES (?, ?, ?, ?, ?)", (key, revision, now, record, crc))
+    store.execute("DELETE FROM learned WHERE key = ? AND revision <= ?", (key, revision - REVISIONS_KEPT))
+    return revision
+
+
+def wear_key(key: str) -> str:
+    """Return what the linings' wear is kept under: the vehicle of `key` and the version of its layout."""
+    return f"{key.rsplit('/', 2)[0]}/wear/1"
 
 
 @contextmanager
@@ -150,19 +194,43 @@ def restore(
 ) -> tuple[int, RecordArray] | None:
     """Return the newest good revision of `key` and its record (`LEARNED`, shape (1,)); None without one.
 
-    `mu_nominal` has shape (4,). Good: the CRC holds and every value lies in its range.
+    `mu_nominal` has shape (4,). Good: the CRC holds and every value lies in its range. Its wear is the
+    vehicle's where that went on since.
     """
+    found = _newest_good(store, key, LEARNED, lambda learned: out_of_range(learned, mu_nominal))
+    if not found:
+        _tell_of_other_versions(store, key)
+        return None
+    wear = restore_wear(store, key)
+    if wear is not None and wear["odometer"][0] >= found[1]["wear"]["odometer"][0]:
+        found[1]["wear"] = wear
+    return found
+
+
+def restore_wear(store: sqlite3.Connection, key: str) -> RecordArray | None:
+    """Return the vehicle's wear (`WEAR`, shape (1,)) by its newest good row, None without one."""
+    found = _newest_good(store, wear_key(key), WEAR, wear_out_of_range)
+    return found[1] if found else None
+
+
+def _newest_good(
+    store: sqlite3.Connection, key: str, dtype: np.dtype[Any], wrong: Callable[[RecordArray], str]
+) -> tuple[int, RecordArray] | None:
     rows = store.execute(
         "SELECT revision, record, crc FROM learned WHERE key = ? ORDER BY revision DESC", (key,)
     )
     for revision, record, crc in rows.fetchall():
-        reason = _why_not(key, revision, record, crc, mu_nominal)
+        if not isinstance(record, bytes) or len(record) != dtype.itemsize:
+            reason = "another layout"
+        elif crc != _crc(key, revision, record):
+            reason = "CRC"
+        else:
+            reason = wrong(np.frombuffer(record, dtype))
         if not reason:
-            return revision, np.frombuffer(record, LEARNED).copy()
+            return revision, np.frombuffer(record, dtype).copy()
         structlog.get_logger("store").warning(
             "revision_refused", revision=revision, reason=reason, remedy="the one before it is tried"
         )
-    _tell_of_other_versions(store, key)
     return None
 
 
@@ -174,14 +242,6 @@ def _tell_of_other_versions(store: sqlite3.Connection, key: str) -> None:
         structlog.get_logger("store").warning(
             "learned_by_another_version", key=others[-1], remedy="it stays in the store; learning begins anew"
         )
-
-
-def _why_not(key: str, revision: int, record: object, crc: int, mu_nominal: NDArray[np.float64]) -> str:
-    if not isinstance(record, bytes) or len(record) != LEARNED.itemsize:
-        return "another layout"
-    if crc != _crc(key, revision, record):
-        return "CRC"
-    return out_of_range(np.frombuffer(record, LEARNED), mu_nominal)
 
 
 def out_of_range(learned: RecordArray, mu_nominal: NDArray[np.float64]) -> str:
@@ -202,6 +262,23 @@ def out_of_range(learned: RecordArray, mu_nominal: NDArray[np.float64]) -> str:
         "disc_excess": (row["disc_excess"] >= 0) & (row["disc_excess"] <= DISC_EXCESS_LIMIT),
         "brakings": np.asarray(row["brakings"] >= 0),
     }
+    first = next((name for name, good in checks.items() if not good.all()), "")
+    return first or wear_out_of_range(learned["wear"])
+
+
+def wear_out_of_range(wear: RecordArray) -> str:
+    """Return the name of the first value of `wear` (shape (1,)) that cannot be, empty if there is none."""
+    row = wear[0]
+    sums = ("regressors", "friction_error", "temperature_error", "leg_ends", "measured_at")
+    checks = {name: np.isfinite(row[name]) & (row[name] >= 0) for name in sums}
+    checks["odometer"] = np.asarray(0 <= row["odometer"] <= FARTHEST)
+    checks["fitted_at"] = (row["fitted_at"] >= 0) & (row["fitted_at"] <= row["odometer"])
+    checks["told"] = np.isin(row["told"], (0, 1))
+    checks["measurements"] = (row["measurements"] >= 0) & (row["measurements"] <= N_MEASURED)
+    used = np.arange(N_MEASURED)[:, None] < row["measurements"]
+    checks["measured_wear"] = ~used | (np.abs(row["measured_wear"]) <= THICKEST)
+    checks["measured_sigma"] = ~used | ((row["measured_sigma"] > 0) & (row["measured_sigma"] <= THICKEST))
+    checks["legs"] = np.asarray(0 <= row["legs"] <= FARTHEST)
     return next((name for name, good in checks.items() if not good.all()), "")
 
 

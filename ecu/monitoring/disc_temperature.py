@@ -43,6 +43,8 @@ DISC_STATE = np.dtype(
         ("temperature", "f8", (4,)),  # degC
         ("observed_at", "f8", (4,)),  # temperature when friction was last observed [degC]
         ("ambient", "f8"),  # degC
+        ("power", "f8", (4,)),  # of friction, W
+        ("omega", "f8", (4,)),  # of the wheel, rad/s
     ],
     align=True,
 )
@@ -106,6 +108,7 @@ def update_discs(
         else:
             power = max(-total_force, 0.0) * load[i] / load_sum * abs(speed)
             heating_error = 1.0
+        state.power[i], state.omega[i] = power, omega
         _advance(params, state, i, power, heating_error, by_speed, cooling_error, dt)
         parts = state.sigma_heating[i] ** 2 + state.sigma_cooling[i] ** 2 + state.sigma_start[i] ** 2
         state.sigma[i] = math.sqrt(parts + sigma_ambient**2)

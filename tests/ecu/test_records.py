@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from ecu.records import FRAME, LEARNED
+from ecu.records import FRAME, LEARNED, WEAR
 
 
-@pytest.mark.parametrize("record", [FRAME, LEARNED], ids=["frame", "learned"])
+@pytest.mark.parametrize("record", [FRAME, LEARNED, WEAR], ids=["frame", "learned", "wear"])
 def test_every_byte_of_a_record_belongs_to_a_field(record: np.dtype) -> None:
     assert sum(record[name].itemsize for name in record.names) == record.itemsize
 

@@ -26,6 +26,7 @@ from brakelab.plant.sensor_errors import (
 )
 from brakelab.plant.sensors import body_accelerations, true_readings
 from brakelab.plant.vehicle import new_state
+from brakelab.plant.wear import pad_wear
 from brakelab.rig.faults import fault_records, spoil_car
 from brakelab.scenario import Scenario
 from brakelab.scenario_car import scenario_plant, scenario_widths
@@ -71,6 +72,8 @@ _CORNER_TRUTH: Final = (
     "calliper_pressure",
     "wheel_speed",
     "rolling_radius",
+    "pad_wear",
+    "pad_wear_mass",
 )
 TRUTH_COLUMNS: Final = _SCALAR_TRUTH + tuple(f"{name}_{c}" for name in _CORNER_TRUTH for c in CORNERS)
 """True values by the contract's names; beyond it: distance and position [m], pitch, heading and grade [rad],
@@ -234,6 +237,8 @@ def write_truth(vehicle: Vehicle, row: NDArray[np.float64]) -> None:
         row[corner + 28] = 1e-5 * state.pressure[i]
         row[corner + 32] = state.wheel_speed[i]
         row[corner + 36] = state.rolling_radius[i]
+        row[corner + 40] = pad_wear(vehicle.params[0].wear_row[i], state.pad_wear_mass[i])
+        row[corner + 44] = state.pad_wear_mass[i]
 
 
 def new_values() -> NDArray[Any]:

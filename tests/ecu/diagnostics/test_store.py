@@ -10,9 +10,20 @@ import numpy as np
 import pytest
 from structlog.testing import capture_logs
 
-from ecu.diagnostics.store import FILE, REVISIONS_KEPT, first_keeper, is_due, open_store, restore, save
+from ecu.diagnostics.store import (
+    FILE,
+    REVISIONS_KEPT,
+    alone,
+    first_keeper,
+    in_use,
+    is_due,
+    open_store,
+    restore,
+    restore_wear,
+    save,
+)
 from ecu.errors import UserError
-from ecu.records import LEARNED, N_KEPT, new_record
+from ecu.records import LEARNED, N_KEPT, N_MEASURED, WEAR, new_record
 
 NOMINAL = np.full(4, 0.45)
 KEY = "suv/1234/1"
@@ -76,11 +87,25 @@ def test_the_last_revisions_are_kept(tmp_path):
     store = open_store(tmp_path)
     for brakings in range(REVISIONS_KEPT + 5):
         save(store, KEY, learned(brakings))
-    kept = [row[0] for row in store.execute("SELECT revision FROM learned ORDER BY revision")]
+    kept = [row[0] for row in store.execute("SELECT revision FROM learned WHERE key = ? ORDER BY 1", (KEY,))]
     assert kept == list(range(6, REVISIONS_KEPT + 6))
 
 
+def wear(**values: object):
+    record = new_record(WEAR)
+    record["odometer"] = 5e6
+    for name, value in values.items():
+        record[name] = value
+    return record
+
+
 OUT_OF_RANGE = {
+    "wear that shrank below nothing": {"wear": wear(regressors=-1.0)},
+    "wear is no number": {"wear": wear(temperature_error=np.nan)},
+    "odometer that runs backwards": {"wear": wear(odometer=-1.0)},
+    "pads from the future": {"wear": wear(fitted_at=6e6)},
+    "more measurements than there is room": {"wear": wear(measurements=N_MEASURED + 1)},
+    "a measurement without doubt": {"wear": wear(measurements=1, measured_sigma=0.0)},
     "friction below half of nominal": {"mu_b": 0.22},
     "friction above one and a half": {"mu_b": 0.68},
     "friction is no number": {"mu_b": np.nan},
@@ -125,7 +150,7 @@ def test_a_damaged_row_falls_back_to_the_revision_before(tmp_path, damage):
     store = open_store(tmp_path)
     save(store, KEY, learned(7))
     save(store, KEY, learned(8))
-    store.execute(damage)
+    store.execute(f"{damage} AND key = '{KEY}'")
     with capture_logs() as lines:
         revision, found = restore(store, KEY, NOMINAL)
     assert (revision, found["brakings"][0]) == (1, 7)
@@ -169,6 +194,38 @@ DUE = {
 def test_it_is_saved_after_each_braking_and_at_most_every_minute(change, later_s, due):
     keeper = first_keeper(learned(1), 100.0)
     assert is_due(keeper, learned(**{"brakings": 1, **change}), 100.0 + later_s) is due
+
+
+def test_wear_outlives_a_new_version_and_another_configuration_of_the_brakes(tmp_path):
+    store = open_store(tmp_path)
+    save(store, KEY, learned(wear=wear(regressors=3.0)))
+    assert restore(store, "suv/9999/2", NOMINAL) is None
+    assert restore_wear(store, "suv/9999/2")["regressors"].min() == 3.0
+    assert restore_wear(store, "van/1234/1") is None
+
+
+def test_wear_goes_on_from_where_the_car_is_and_not_from_where_these_brakes_were_last(tmp_path):
+    store = open_store(tmp_path)
+    save(store, KEY, learned(7, wear=wear(odometer=1e6, regressors=1.0)))
+    save(store, "suv/9999/1", learned(8, wear=wear(odometer=2e6, regressors=2.0)))
+    _, found = restore(store, KEY, NOMINAL)
+    assert (found["brakings"][0], found["wear"]["regressors"][0, 0, 0]) == (7, 2.0)
+
+
+def test_a_damaged_row_of_wear_leaves_that_of_the_whole_record(tmp_path):
+    store = open_store(tmp_path)
+    save(store, KEY, learned(7, wear=wear(odometer=1e6, regressors=1.0)))
+    save(store, KEY, learned(8, wear=wear(odometer=2e6, regressors=2.0)))
+    store.execute("UPDATE learned SET crc = crc + 1 WHERE revision = 2 AND key LIKE '%/wear/%'")
+    with capture_logs():
+        assert restore(store, KEY, NOMINAL)[1]["wear"]["regressors"].max() == 2.0
+
+
+def test_nobody_changes_it_by_hand_while_a_daemon_keeps_it(tmp_path):
+    with in_use(tmp_path), in_use(tmp_path), pytest.raises(UserError, match="stop it first"), alone(tmp_path):
+        pass
+    with alone(tmp_path):
+        pass
 
 
 def write_until_killed(folder: Path, first: int, saved: Connection) -> None:

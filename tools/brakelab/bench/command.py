@@ -49,6 +49,7 @@ from brakelab.bench.texts import (
     RECORDED_TEXT,
     REPLAY_TEXT,
     STOPS_TEXT,
+    WEAR_TEXT,
 )
 from ecu import __version__
 from ecu.config import Config, config_hash, load_config
@@ -67,6 +68,7 @@ COMPENSATION: Final = "compensation"
 MARGINS: Final = "margins"
 LATENESS: Final = "lateness"
 RECORDED: Final = "recorded"
+WEAR: Final = "wear"
 REPLAY: Final = "replay"
 PLAY: Final = "play"
 
@@ -135,6 +137,7 @@ def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0, 
         MARGINS: _margins,
         BLENDING: _blending,
         RECORDED: partial(_recorded, seeds=seeds),
+        WEAR: partial(_wear, seeds=seeds),
         LATENESS: partial(_lateness, seconds=seconds),
         REPLAY: _replay,
         PLAY: partial(_play, seconds=seconds),
@@ -238,6 +241,18 @@ def _bound(json: bool, seeds: int) -> int:
 def _recorded(json: bool, seeds: int) -> int:
     table = recorded.recorded_table(_each_car(RECORDED, recorded.recorded_of, min(seeds, recorded.CARS)))
     return _page(RECORDED, "Cars as loggers record them", RECORDED_TEXT, [table], json, "recorded-cars")
+
+
+def _wear(json: bool, seeds: int) -> int:
+    from brakelab.bench import wear, wear_drives, wear_study
+
+    cars = _each_car(WEAR, wear_drives.drive_car, min(seeds, wear.CARS))
+    laws = wear_study.dynamometer_laws()
+    lives = wear.wear_lives(cars, laws)
+    if not json:
+        picture = resource("docs") / "images" / "wear.svg"
+        write_chart(picture, wear.wear_panels(lives, len(cars)), wear.LEGEND)
+    return _page(WEAR, "Wear", WEAR_TEXT, wear.wear_tables(cars, laws, lives), json)
 
 
 def _friction(json: bool) -> int:

@@ -160,3 +160,15 @@ PLAY_TEXT: Final = (
     "against the log, for every player alike. Nothing sent: ours on a bus that takes every frame and does "
     "nothing, against the schedule itself."
 )
+
+WEAR_TEXT: Final = (
+    "How wear is kept, measured and identified: [pad-wear.md](pad-wear.md). Cars are drawn (wide) from "
+    "config/plant/suv.toml; each is driven in closed loop, without a speed reference, through one trip of "
+    "real driving by a calm, a usual and a lively driver in winter, spring and summer, its ECU going on with "
+    "what it has learned. Parts of these trips (town, country, motorway) are drawn into 30,000 km, one mix "
+    "of them between two measurements. True wear follows the plant's own law (tools/brakelab/plant/wear.py: "
+    "Archard with a regime of heat, running in, a lot of each axle, a climate that changes over 1,000 km), "
+    "which nothing on board knows. The ECU's law comes from the dynamometer with linings of another lot on "
+    "another car's brake. A thickness is measured to ± 0.1 mm (standard deviation). `scatter` and `walk` of "
+    "the linings were chosen on cars 0 and 1.\n\n![True and predicted wear](images/wear.svg)"
+)

@@ -55,6 +55,10 @@ class Widths(Section):
     """Of each axle."""
     disc_cooling: NotNegative = 0.0
     """Of each axle; both numbers."""
+    wear_lot: Factors = SAME
+    """Of each axle's linings."""
+    wear_climate: NotNegative = 0.0
+    """Standard deviation of its logarithm, of a day: air and dirt."""
     hydraulic_inertia: NotNegative = 0.0
     hydraulic_damping: NotNegative = 0.0
     hydraulic_dead_time: NotNegative = 0.0
@@ -123,6 +127,9 @@ def draw(plant: Plant, seed: int, width: Widths) -> RecordArray:
     car["stiffness_degression"] *= rest.uniform(*width.stiffness_degression)
     _draw_brakes(plant, car, width, rest)
     _draw_hydraulics(car, width, rest)
+    wear = np.random.default_rng([seed, 7])
+    car["wear_scale"] *= np.repeat(wear.uniform(*width.wear_lot, 2), 2)
+    car["wear_scale"] *= np.exp(width.wear_climate * wear.standard_normal())
     return params
 
 

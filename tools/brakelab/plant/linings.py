@@ -6,6 +6,7 @@ from brakelab.plant.friction.law import NotNegative, Positive, RigBrake, Section
 from brakelab.plant.friction.laws import AnyLaw, law_row
 from brakelab.plant.records import RecordArray, new_record
 from brakelab.plant.rig import AMBIENT, RIG
+from brakelab.plant.wear import WearLaw
 
 VEHICLE_LAW: Final = "SIM"
 
@@ -25,6 +26,7 @@ class Lining(Section):
     brake: RigBrake
     disc: Disc
     friction: dict[str, AnyLaw]
+    wear: WearLaw = WearLaw()
 
 
 class Linings(Section):

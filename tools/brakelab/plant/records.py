@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.plant.friction.law import ROW
+from brakelab.plant.wear import WEAR_ROW
 
 RecordArray = NDArray[np.void]
 
@@ -67,6 +68,8 @@ PARAMS: Final = np.dtype(
         ("heating", "f8", (4,)),  # K/J (xi)
         ("cooling", "f8", (4,)),  # 1/s (delta_0)
         ("cooling_by_speed", "f8", (4,)),  # 1/m (delta_1)
+        ("wear_row", "f8", (4, WEAR_ROW)),  # numbers of wear.py
+        ("wear_scale", "f8", (4,)),  # -, lot of the lining and climate of the day
         ("motor_share", "f8", (4,)),  # -, of a total torque
         ("motor_torque_limit", "f8"),  # N m at the wheel
         ("motor_power_limit", "f8"),  # W
@@ -137,6 +140,7 @@ STATE: Final = np.dtype(
         ("applied", "u1", (4,)),  # pads touch the disc
         ("lining_memory", "f8", (4,)),  # of the friction law, e.g. normalised contact area
         ("disc_temperature", "f8", (4,)),  # degC
+        ("pad_wear_mass", "f8", (4,)),  # g, of both pads
         # integrated with a suspension only; heights from the design position, up
         ("heave", "f8"),  # m, of the body's centre of gravity
         ("heave_rate", "f8"),

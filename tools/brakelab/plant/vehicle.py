@@ -16,6 +16,7 @@ from brakelab.plant.lining import advance_disc_temperature, advance_lining
 from brakelab.plant.motor import advance_motors
 from brakelab.plant.records import HISTORY, STATE, RecordArray, new_record
 from brakelab.plant.tyre import rolling_radius
+from brakelab.plant.wear import advance_wear
 from brakelab.plant.wheel import advance_wheel
 
 STEP = 1e-3  # s
@@ -41,6 +42,7 @@ def advance(params: Record, state: Record, commands: Record, dt: float) -> None:
     advance_planar(params, state, commands.steering_angle, commands.grade, commands.bank, dt)
     if not params.suspended:
         advance_attitude(params, state, dt)
+    advance_wear(params, state, dt)
     advance_disc_temperature(params, state, commands.ambient_temperature, commands.wetness, dt)
     state.t += dt
 

@@ -14,6 +14,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from brakelab.replay.prediction import STANDING, Vector, corners, left_out, mean, predict
+from brakelab.replay.wear import wear_of
+from ecu.monitoring.wear import REGRESSORS
 from ecu.params import BAR
 from ecu.records import RecordArray
 from ecu.signals import CORNERS, FAULT, HOLDING, OBSERVING, OUTPUT
@@ -56,6 +58,8 @@ BRAKE_UNITS: Final = {
     "specific_force_configured_rest": "m/s^2",
     "learned_before": "-",
     "left_out": "-",
+    "sigma_pad_wear_mass": "g",
+    **dict(REGRESSORS),
 }
 
 
@@ -98,6 +102,14 @@ class BrakeRow(NamedTuple):
     """1: the friction in the prediction was learned, 0: it is nominal."""
     left_out: str
     """Why the prediction does not count, empty where it does."""
+    sigma_pad_wear_mass: float
+    wear_energy: float
+    wear_energy_t: float
+    wear_energy_t2: float
+    wear_torque_rate: float
+    wear_torque_rate_t: float
+    wear_power2: float
+    wear_power2_t: float
 
 
 def friction_means(
@@ -158,7 +170,7 @@ def application(
     prediction = predict(rows, before, params)
     torque, pressure = corners(rows, "brake_torque"), corners(rows, "calliper_pressure")
     slip, heat = np.nan_to_num(corners(rows, "slip")), corners(rows, "disc_temperature")
-    worn = corners(rows[-1], "pad_wear_mass") - corners(before, "pad_wear_mass")
+    wear = wear_of(rows, params)
     lines = []
     for i, corner in enumerate(CORNERS):
         lever = float(2.0 * p["piston_area"][i] * p["effective_radius"][i])
@@ -182,7 +194,7 @@ def application(
                 mean(power) * duration,
                 float(heat[0, i]),
                 mean(heat[:, i]),
-                float(worn[i]),
+                float(wear.mass[i]),
                 float("nan"),
                 float(corners(after, "mu_b")[i]),
                 float(corners(after, "sigma_mu_b")[i]),
@@ -198,6 +210,8 @@ def application(
                 prediction.configured_rest,
                 int(_modes(before, i) == HOLDING),
                 left_out(duration, prediction.measured, prediction.force, prediction.too_few),
+                float(wear.sigma[i]),
+                *wear.regressors[:, i].tolist(),
             )
         )
     return lines

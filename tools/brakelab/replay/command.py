@@ -27,7 +27,8 @@ from brakelab.results_mdf import SUFFIX
 from ecu import __version__
 from ecu.bus.receive import ReceivePlan
 from ecu.config import Config, config_hash, load_config, new_params, store_key
-from ecu.diagnostics.store import open_store, restore, save
+from ecu.diagnostics.restored import restored
+from ecu.diagnostics.store import open_store, save
 from ecu.errors import RunFault, UserError
 from ecu.recorder import read_recording
 from ecu.records import RecordArray
@@ -121,8 +122,7 @@ def _check(logs: Sequence[Path], out: Path, cycles: Path | None) -> None:
 def _restore(state: Path | None, vehicle: Config, params: RecordArray) -> RecordArray | None:
     if state is None:
         return None
-    with closing(open_store(state)) as store:
-        found = restore(store, store_key(vehicle), params[0]["mu_nominal"])
+    found = restored(state, vehicle, params)
     return found[1] if found else None
 
 

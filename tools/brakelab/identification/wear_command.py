@@ -1,0 +1,175 @@
+"""`brake-ecu identify wear`: a wear law from dynamometer blocks, as a file that `--config` takes; a page."""
+
+import os
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from brakelab.bench.chart import BLUE, GREEN, ORANGE, PINK, Line, Panel, write_chart
+from brakelab.bench.table import Table, markdown
+from brakelab.identification.wear_blocks import Array, Block, Heat, read_blocks
+from brakelab.identification.wear_fit import QUASI_STATIC, TERMS, UNITS, Fit, fit_law
+from brakelab.identification.wear_fusion import Fused, fuse
+from brakelab.outputs import check_outputs
+from ecu.config import Axle, load_config
+from ecu.errors import UserError
+
+COOLING_SPEED: Final = 15.0  # m/s, at which stops are taken to be cooled
+MOTION: Final = ((5.0, BLUE), (20.0, GREEN), (50.0, ORANGE))  # kW of friction
+ROAD: Final = 0.10  # relative: what the road differs from a laboratory by (section 7.6)
+
+
+def specific_wear(coefficients: Array, temperature: Array, power: float, rate: float) -> Array:
+    """Return k_b [g/MJ] of (7.13), corrected to |omega'|, over `temperature` [degC], shape (n,).
+
+    `power` of friction [MW]; `rate` |omega'|/omega [1/s].
+    """
+    g = coefficients
+    quasi_static = g[0] + g[1] * temperature + g[2] * temperature**2
+    return np.asarray(quasi_static + (g[3] + g[4] * temperature) * rate + (g[5] + g[6] * temperature) * power)
+
+
+def leave_one_out(fit: Fit, mass: Array) -> float:
+    """Return the root mean square of the relative error of blocks by the law of the others."""
+    return float(np.sqrt(np.mean((fit.left_out / mass - 1.0) ** 2)))
+
+
+def tables(blocks: list[Block], fused: Fused, fit: Fit, static: Fit) -> list[Table]:
+    """Return coefficients, blocks and the comparison of the two laws as tables."""
+    coefficients = [
+        (name, unit, f"{value:.4g}", f"{low:.4g}–{high:.4g}" if value else "pruned")
+        for name, unit, value, low, high in zip(
+            TERMS, UNITS, fit.coefficients, fit.low, fit.high, strict=True
+        )
+    ]
+    rows = [
+        (
+            block.name,
+            f"{block.applications}",
+            f"{block.regressors[0]:.1f}",
+            f"{block.temperature:.0f}",
+            f"{mass:.3f}",
+            f"{predicted:.3f}",
+            f"{100 * (predicted / mass - 1):+.1f}",
+            f"{100 * (left_out / mass - 1):+.1f}",
+        )
+        for block, mass, predicted, left_out in zip(
+            blocks, fused.mass, fit.predicted, fit.left_out, strict=True
+        )
+    ]
+    laws = [
+        (
+            name,
+            f"{each.r2:.4f}",
+            f"{100 * leave_one_out(each, fused.mass):.1f}",
+            f"{100 * each.scatter:.1f}",
+            f"{each.criterion:.1f}",
+            f"{each.rank}",
+        )
+        for name, each in (("extended (7.13)", fit), ("quasi-static (7.14)", static))
+    ]
+    slope = f"{fused.slope:.2f} g/mm" if np.isfinite(fused.slope) else "not measured"
+    return [
+        Table(
+            "Law",
+            ("term", "unit", "value", "95 % confidence"),
+            coefficients,
+            "Of both pads of a calliper, disc in degC; terms that do not lower AICc are pruned.",
+        ),
+        Table(
+            "Blocks",
+            ("block", "applications", "energy [MJ]", "disc [degC]", "mass [g]", "law [g]", "error [%]",
+             "left out [%]"),
+            rows,
+            f"Mass: balance and thickness blended (7.11); mass over linear wear K: {slope}. Left out: by the "
+            "law of the other blocks.",
+        ),
+        Table(
+            "The two laws",
+            ("law", "R²", "left out, RMS [%]", "scatter [%]", "AICc", "rank"),
+            laws,
+            "Rank: of the scaled regressors; no law has more terms.",
+        ),
+    ]  # fmt: skip
+
+
+def write_page(page: Path, blocks: list[Block], fused: Fused, fit: Fit, static: Fit) -> None:
+    """Write the tables, Figure 7.9's surface and the residuals beside each other."""
+    heat = np.linspace(20.0, 400.0, 100)
+    rate = 0.15  # 1/s
+    lines = [
+        Line(heat, specific_wear(fit.coefficients, heat, 1e-3 * power, rate), colour)
+        for power, colour in MOTION
+    ]
+    lines.append(Line(heat, specific_wear(static.coefficients, heat, 0.0, 0.0), PINK, True))
+    top = 1.1 * max(float(line.y.max()) for line in lines)
+    most = 1.05 * float(max(fused.mass.max(), fit.predicted.max()))
+    order = np.argsort([block.temperature for block in blocks])
+    degrees = np.array([blocks[k].temperature for k in order])
+    residual = 100.0 * (fit.predicted / fused.mass - 1.0)[order]
+    wide = max(1.2 * float(np.abs(residual).max()), 1.0)
+    by_mass = np.argsort(fused.mass)
+    panels = [
+        Panel("specific wear [g/MJ]", "disc [degC]", (20.0, 400.0), (0.0, top), lines),
+        Panel("by the law over measured [g]", "measured [g]", (0.0, most), (0.0, most), [
+            Line(fused.mass[by_mass], fit.predicted[by_mass], BLUE),
+            Line(np.array([0.0, most]), np.array([0.0, most]), PINK, True),
+        ]),
+        Panel("residual [%]", "mean disc temperature [degC]", (degrees[0] - 1.0, degrees[-1] + 1.0),
+              (-wide, wide), [Line(degrees, residual, ORANGE)]),
+    ]  # fmt: skip
+    picture = page.with_suffix(".svg")
+    legend = [(f"{power:.0f} kW", colour) for power, colour in MOTION] + [("quasi-static", PINK)]
+    write_chart(picture, panels, legend)
+    parts = [markdown(table) for table in tables(blocks, fused, fit, static)]
+    head = f"# Wear law of {len(blocks)} blocks\n\n![Figure 7.9 and residuals]({picture.name})\n\n"
+    page.write_text(head + "\n".join(parts).rstrip() + "\n", encoding="utf-8")
+
+
+def car_toml(config: Path, out: Path, axle: str, fit: Fit, error: float) -> str:
+    """Return a configuration that takes everything but the wear law from `config`."""
+    include = os.path.relpath(config, out.parent).replace("\\", "/")
+    numbers = ", ".join(f"{value:.6g}" for value in fit.coefficients)
+    return (
+        f'include = "{include}"\n\n[{axle}.pad]\n'
+        "# from dynamometer blocks, disc in degC: g/MJ, g/MJ/K, g/MJ/K^2, g/MW, g/MW/K, g s/MJ^2, …/K\n"
+        f'law = "extended"\ncoefficients = [{numbers}]\n'
+        f"sigma = {min(max(error, 0.02), 0.9):.4f} # relative, blocks left out and the way to the road\n"
+    )
+
+
+def identify_wear(manifest: Path, config: Path, axle: str, out: Path) -> int:
+    """Identify the wear law of an axle's linings; write `out` and `out`.md, return 0.
+
+    Raises:
+        UserError: an argument or a file is not right.
+    """
+    if axle not in ("front", "rear"):
+        raise UserError("--axle", axle, "choose front or rear")
+    vehicle = load_config(config)
+    page = out.with_suffix(".md")
+    check_outputs(out, (out, page), [manifest, config])
+    brake: Axle = getattr(vehicle, axle)
+    cooling = brake.disc_cooling + COOLING_SPEED * brake.disc_cooling_by_speed
+    blocks = read_blocks(manifest, brake.pad, Heat(brake.disc_heating, cooling))
+    fused = fuse(np.array([b.wear for b in blocks]), np.array([b.mass for b in blocks]))
+    regressors = np.array([block.regressors for block in blocks])
+    variance = np.diag(fused.covariance)
+    try:
+        fit = fit_law(regressors, fused.mass, variance)
+        static = fit_law(regressors, fused.mass, variance, QUASI_STATIC)
+    except UserError as error:
+        raise UserError(str(manifest), f"{error.where}: {error.place}", error.remedy) from None
+    sigma = float(np.hypot(leave_one_out(fit, fused.mass), ROAD))
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_text(car_toml(config, out, axle, fit, sigma), encoding="utf-8")
+    write_page(page, blocks, fused, fit, static)
+    named = zip(TERMS, fit.coefficients, UNITS, strict=True)
+    kept = ", ".join(f"{name} = {value:.4g} {unit}" for name, value, unit in named if value)
+    print(f"{out}: {kept}")
+    print(
+        f"{page}: {len(blocks)} blocks, R² {fit.r2:.4f} (quasi-static {static.r2:.4f}), blocks left out "
+        f"{100 * leave_one_out(fit, fused.mass):.1f} % RMS, rank {fit.rank} of 7"
+    )
+    return 0

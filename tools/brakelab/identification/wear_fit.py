@@ -1,0 +1,142 @@
+"""Coefficients of a wear law from blocks (7.15–7.19): scaled, weighted, not negative, few.
+
+Every column is scaled to 1, every block weighted by its standard deviation: that of the measurement and a
+share of its mass, the scatter that no law explains, found with it. All sets of terms are tried that the rank
+of the scaled regressors allows; the least information criterion (AICc) wins. Confidence: parametric
+bootstrap.
+"""
+
+from itertools import combinations
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+from ecu.errors import UserError
+
+Array = NDArray[np.float64]
+
+TERMS: Final = ("γ10", "γ11", "γ12", "γ20", "γ21", "γ30", "γ31")
+UNITS: Final = ("g/MJ", "g/MJ/K", "g/MJ/K^2", "g/MW", "g/MW/K", "g s/MJ^2", "g s/(MJ^2 K)")
+QUASI_STATIC: Final = (0, 1, 2)
+LEAST_SINGULAR: Final = 1e-3  # of the greatest, of regressors scaled by row and column
+LEAST_SCATTER: Final = 0.005  # relative
+ROUNDS: Final = 400
+CONFIDENCE: Final = (2.5, 97.5)  # %
+
+
+class Fit(NamedTuple):
+    """A law and what it is worth."""
+
+    coefficients: Array
+    """Shape (7,), terms that were pruned are 0."""
+    low: Array
+    high: Array
+    predicted: Array
+    """g, shape (n,)."""
+    left_out: Array
+    """g, each block by the law of the others; shape (n,)."""
+    scatter: float
+    """Relative standard deviation that is not the measurement's."""
+    r2: float
+    criterion: float
+    rank: int
+    condition: float
+
+
+def _scaled(regressors: Array) -> tuple[Array, Array]:
+    scale = np.max(regressors, axis=0)
+    scale[scale == 0.0] = 1.0
+    return regressors / scale, scale
+
+
+def rank_of(regressors: Array) -> tuple[int, float]:
+    """Return the numerical rank of the regressors, shape (n, 7), and their condition number.
+
+    Rows count by their direction: a block twice as long says nothing else.
+    """
+    rows = regressors / regressors[:, :1]
+    columns, _ = _scaled(rows)
+    singular = np.linalg.svd(columns, compute_uv=False)
+    rank = int(np.count_nonzero(singular > LEAST_SINGULAR * singular[0]))
+    return rank, float(singular[0] / max(singular[-1], 1e-300))
+
+
+def _solve(regressors: Array, mass: Array, sigma: Array, terms: tuple[int, ...]) -> Array:
+    part, scale = _scaled(regressors[:, terms])
+    found, _ = nnls(part / sigma[:, None], mass / sigma)
+    coefficients = np.zeros(regressors.shape[1])
+    coefficients[list(terms)] = found / scale
+    return coefficients
+
+
+def _sigma(mass: Array, variance: Array, scatter: float) -> Array:
+    return np.asarray(np.sqrt(variance + (scatter * mass) ** 2))
+
+
+def _fit_terms(
+    regressors: Array, mass: Array, variance: Array, terms: tuple[int, ...]
+) -> tuple[Array, float, float]:
+    """Return coefficients, scatter and the criterion for a set of terms."""
+    scatter, count = 0.03, len(mass)
+    coefficients = np.zeros(regressors.shape[1])
+    for _ in range(20):
+        coefficients = _solve(regressors, mass, _sigma(mass, variance, scatter), terms)
+        residual = (mass - regressors @ coefficients) / mass
+        free = max(count - int(np.count_nonzero(coefficients)), 1)
+        own = float(residual @ residual) / free - float(np.mean(variance / mass**2))
+        scatter = max(float(np.sqrt(max(own, 0.0))), LEAST_SCATTER)
+    sigma = _sigma(mass, variance, scatter)
+    residual = (mass - regressors @ coefficients) / sigma
+    k = float(np.count_nonzero(coefficients)) + 1.0  # the scatter is one more
+    likelihood = float(residual @ residual + 2.0 * np.sum(np.log(sigma / mass)))
+    punished = 2.0 * k + 2.0 * k * (k + 1) / max(count - k - 1, 0.5)
+    return coefficients, scatter, likelihood + punished
+
+
+def fit_law(
+    regressors: Array, mass: Array, variance: Array, allowed: tuple[int, ...] = tuple(range(7)), seed: int = 0
+) -> Fit:
+    """Return the law of the blocks: `regressors` (n, 7), `mass` [g] and its `variance` [g^2] (n,).
+
+    `allowed`: places of the terms that may be in it.
+
+    Raises:
+        UserError: there are too few blocks, or all are alike.
+    """
+    if len(mass) < 3:
+        raise UserError("blocks", str(len(mass)), "too few to tell one law from another; give 3 or more")
+    rank, condition = rank_of(regressors[:, allowed])
+    if rank < 2:
+        raise UserError(
+            "blocks",
+            f"{len(mass)}",
+            "all alike, their regressors are collinear: add other roads, drivers or temperatures",
+        )
+    most = min(rank, len(mass) - 2, len(allowed))
+    tried = {
+        terms: _fit_terms(regressors, mass, variance, terms)
+        for size in range(1, most + 1)
+        for terms in combinations(allowed, size)
+    }
+    criteria = {terms: found[2] for terms, found in tried.items()}
+    terms = min(criteria, key=criteria.__getitem__)
+    coefficients, scatter, criterion = tried[terms]
+    predicted = regressors @ coefficients
+    sigma = _sigma(mass, variance, scatter)
+    random = np.random.default_rng(seed)
+    drawn = np.array(
+        [
+            _solve(regressors, np.maximum(predicted + sigma * z, 1e-9), sigma, terms)
+            for z in random.standard_normal((ROUNDS, len(mass)))
+        ]
+    )
+    low, high = np.percentile(drawn, CONFIDENCE, axis=0)
+    left_out = np.empty(len(mass))
+    for i in range(len(mass)):
+        others = np.arange(len(mass)) != i
+        left_out[i] = regressors[i] @ _solve(regressors[others], mass[others], sigma[others], terms)
+    spread = float(np.sum((mass - mass.mean()) ** 2))
+    r2 = 1.0 - float(np.sum((mass - predicted) ** 2)) / spread
+    return Fit(coefficients, low, high, predicted, left_out, scatter, r2, criterion, rank, condition)

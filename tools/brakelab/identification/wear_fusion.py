@@ -1,0 +1,48 @@
+"""Linear wear and wear mass blended by what each is worth (7.7–7.11).
+
+Points (x_i, y_i): linear wear [mm] and mass [g] of each block; through the origin runs the line of slope K by
+least squares (7.7). Each point moves onto it in the direction -alpha/K (7.9); the most likely place has
+alpha = (sigma_y / sigma_x)^2: small where the balance is the better one, as on a dynamometer. What comes out
+has the variance 1 / (1/sigma_y^2 + 1/(K sigma_x)^2), K's own beside it, which is the same for all points.
+"""
+
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+BALANCE: Final = 0.03  # g, two weighings of two pads: balance and moisture
+POINT: Final = 0.010  # mm, of one thickness at one point
+POINTS: Final = 6
+
+
+class Fused(NamedTuple):
+    """Wear of the blocks after blending."""
+
+    mass: NDArray[np.float64]
+    """g, shape (n,)."""
+    covariance: NDArray[np.float64]
+    """g^2, shape (n, n)."""
+    slope: float
+    """K, g/mm; NaN: no thickness was measured."""
+    alpha: float
+
+
+def fuse(wear: NDArray[np.float64], mass: NDArray[np.float64]) -> Fused:
+    """Return the blended masses of `wear` [mm], NaN where not measured, and `mass` [g], shape (n,)."""
+    own = np.full(len(mass), 2.0 * BALANCE**2)
+    known = np.isfinite(wear)
+    if np.count_nonzero(known) < 2:
+        return Fused(mass.copy(), np.diag(own), float("nan"), 0.0)
+    x, y = wear[known], mass[known]
+    slope = float(x @ y / (x @ x))
+    sigma_x, sigma_y = POINT * np.sqrt(2.0 / POINTS), np.sqrt(2.0) * BALANCE
+    alpha = (sigma_y / sigma_x) ** 2
+    per_slope = alpha / slope
+    fused, variance = mass.copy(), own.copy()
+    fused[known] = slope * (y + per_slope * x) / (slope + per_slope)  # (7.11) on y = K x
+    variance[known] = 1.0 / (1.0 / sigma_y**2 + 1.0 / (slope * sigma_x) ** 2)
+    share = np.zeros(len(mass))
+    share[known] = x * per_slope / (slope + per_slope)  # d fused / d K, the direction held
+    of_slope = (sigma_y**2 + (slope * sigma_x) ** 2) / float(x @ x)
+    return Fused(fused, np.diag(variance) + of_slope * np.outer(share, share), slope, float(alpha))
