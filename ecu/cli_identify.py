@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from ecu.arguments import Config
+
 app = typer.Typer(help="Models from measurements of your own.", no_args_is_help=True)
 
 
@@ -41,3 +43,19 @@ def friction(
     from brakelab.friction_lab import command
 
     return command.friction(data, columns, held_out, out, profile)
+
+
+@app.command()
+def wear(
+    manifest: Annotated[
+        Path,
+        typer.Argument(metavar="MANIFEST.csv", help="Blocks: file, masses, thicknesses"),
+    ],
+    config: Config,
+    out: Annotated[Path, typer.Option("--out", metavar="CAR.toml", help="A CONFIG; CAR.md beside")],
+    axle: Annotated[str, typer.Option("--axle", metavar="AXLE", help="Whose linings: front, rear")] = "front",
+) -> int:
+    """The wear law of brake linings from dynamometer blocks. Writes a CONFIG."""
+    from brakelab.identification import wear_command
+
+    return wear_command.identify_wear(manifest, config, axle, out)

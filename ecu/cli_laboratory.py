@@ -173,26 +173,6 @@ def suggest(
     return command.suggest(log, dbc, out)
 
 
-identify_app = typer.Typer(help="Parameters of a car from measurements.", no_args_is_help=True)
-app.add_typer(identify_app, name="identify")
-
-
-@identify_app.command("wear")
-def identify_wear(
-    manifest: Annotated[
-        Path,
-        typer.Argument(metavar="MANIFEST.csv", help="Blocks: file, masses, thicknesses"),
-    ],
-    config: Config,
-    out: Annotated[Path, typer.Option("--out", metavar="CAR.toml", help="A CONFIG; CAR.md beside")],
-    axle: Annotated[str, typer.Option("--axle", metavar="AXLE", help="Whose linings: front, rear")] = "front",
-) -> int:
-    """The wear law of brake linings from dynamometer blocks."""
-    from brakelab.identification import wear_command
-
-    return wear_command.identify_wear(manifest, config, axle, out)
-
-
 @app.command()
 def fleet(
     logs: Annotated[

@@ -10,7 +10,7 @@ import pytest
 
 from brakelab.bench import command, output
 from brakelab.bench.braking import MESSAGES_IN, simulated_stop
-from brakelab.bench.codec import codec_rows, protected_frames
+from brakelab.bench.codec import codec_rows, plan_of_the_bench, protected_frames
 from brakelab.bench.cycle import bursts, cycle_rows, our_side, python_side, run_cycles, thrice
 from brakelab.bench.filters import FilterpyFilters, NumpyFilters, constants, filter_cycles, new_observer
 from brakelab.bench.measure import Figure, Row
@@ -79,7 +79,7 @@ def test_step_without_filterpy_says_how_to_get_it(monkeypatch: pytest.MonkeyPatc
 
 def test_all_frames_of_the_codec_bench_are_accepted_and_read_as_cantools_reads_them() -> None:
     frames = protected_frames(simulated_stop(), cycles=4)
-    plan = contract_receive_plan(resource("dbc/brake_ecu.dbc"))
+    plan = plan_of_the_bench()
     reception, inputs = new_reception(plan), new_record(INPUTS)
     inputs["t_ns"] = frames["stamp_ns"][-1]
     receive(plan, reception, frames, 0, len(frames), inputs[0])

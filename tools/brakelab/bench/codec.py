@@ -7,7 +7,7 @@ import numpy as np
 
 from brakelab.bench.braking import ALL_DUE, MESSAGES_IN, Stop, simulated_stop
 from brakelab.bench.measure import Row, alternate, installed, timed
-from ecu.bus.receive import contract_receive_plan, new_reception, receive
+from ecu.bus.receive import ReceivePlan, contract_receive_plan, new_reception, receive
 from ecu.bus.transmit import (
     Transmission,
     TransmitPlan,
@@ -19,6 +19,7 @@ from ecu.bus.transmit import (
 from ecu.jit import kernel
 from ecu.records import FRAME, INPUTS, RecordArray, new_record
 from ecu.resources import resource
+from ecu.signals import CYCLE_NS
 
 ROUNDS: Final = 15
 CYCLES: Final = 300
@@ -35,7 +36,7 @@ def _transmit_all(
         due = transmit(plan, transmission, values[k], cycle, sent)
         for i in range(due):
             frames[count] = sent[i]
-            frames[count].stamp_ns = 10_000_000 * (k + 1)
+            frames[count].stamp_ns = CYCLE_NS * (k + 1)
             count += 1
     return count
 
@@ -49,12 +50,19 @@ def protected_frames(stop: Stop, cycles: int) -> RecordArray:
     return frames
 
 
+def plan_of_the_bench() -> ReceivePlan:
+    """Return what the ECU receives, every message once in 10 ms: as `protected_frames` has them."""
+    plan = contract_receive_plan(resource("dbc/brake_ecu.dbc"))
+    plan.messages["period_ns"] = plan.messages["slowest_ns"] = CYCLE_NS
+    return plan
+
+
 def codec_rows(rounds: int = ROUNDS, cycles: int = CYCLES) -> list[Row]:
     """Return the rows; times per message."""
     stop, dbc = simulated_stop(), resource("dbc/brake_ecu.dbc")
     frames = protected_frames(stop, cycles)
     count = len(frames)
-    plan = contract_receive_plan(dbc)
+    plan = plan_of_the_bench()
     clean, reception = new_reception(plan), new_reception(plan)
     now = new_record(INPUTS)
     now["t_ns"] = frames["stamp_ns"][-1]
