@@ -10,18 +10,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+import numpy as np
 from rich.console import Console
 
 from brakelab.closed_loop import new_loop, run
 from brakelab.report.command import report
 from brakelab.report.drive import Drive
 from brakelab.rig.live import Bus, armed_config, choose_bus, drive, named_bus
-from brakelab.rig.outcome import Outcome, outcome, stopping_distance
+from brakelab.rig.outcome import Outcome, Undisturbed, outcome, stopping_distance
 from brakelab.rig.page import summary, write_page, write_tables
 from brakelab.rig.results import write_recorded, write_simulated
 from brakelab.scenario import Scenario, load_scenario
 from brakelab.vehicle_node import warm_up
 from ecu.config import Config, load_config
+from ecu.diagnostics.faults import fault_names
 from ecu.errors import RunFault, UserError
 from ecu.resources import SCENARIOS, named, resource
 from ecu.warm import warm
@@ -104,12 +106,13 @@ def rig(
     return int(any(result.unexplained or result.differing for result in outcomes))
 
 
-def _undisturbed(scenario: Scenario, vehicle: Config, seed: int) -> float:
-    """Return the stopping distance [m] without the scenario's faults."""
+def _undisturbed(scenario: Scenario, vehicle: Config, seed: int) -> Undisturbed:
+    """Return what the same drive is without the scenario's faults."""
     if not scenario.fault:
-        return math.nan
+        return Undisturbed(math.nan, frozenset())
     sound = run(new_loop(scenario.model_copy(update={"fault": []}), vehicle, seed))
-    return stopping_distance(Drive(sound.t, sound.truth, {}))
+    mask = int(np.bitwise_or.reduce(np.nan_to_num(sound.outputs["active_faults"]).astype(np.int64)))
+    return Undisturbed(stopping_distance(Drive(sound.t, sound.truth, {})), frozenset(fault_names(mask)))
 
 
 def _in_memory(name: str, scenario: Scenario, vehicle: Config, folder: Path, seed: int) -> Outcome:

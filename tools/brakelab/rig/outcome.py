@@ -70,15 +70,24 @@ def stopping_distance(truth: Drive) -> float:
     return float(distance[end] - distance[begin])
 
 
+class Undisturbed(NamedTuple):
+    """The same drive without the faults of its scenario."""
+
+    stopping_distance: float
+    """m; NaN: no such drive."""
+    faults: frozenset[str]
+    """Names of the fault bits that it shows: of a car beyond what compensation may do, for one."""
+
+
 def outcome(
     name: str,
     written: Written,
     truth_path: Path,
     faults: list[Fault],
-    undisturbed: float,
+    undisturbed: Undisturbed,
     recordings: list[Path],
 ) -> Outcome:
-    """Return what the files of one drive say; `undisturbed`: stopping distance without the faults."""
+    """Return what the files of one drive say; a fault bit that the same car shows without them is its own."""
     drive = read_drive(written.result, ("vehicle_speed",), _REMEDY)
     own = read_drive(truth_path, ("vehicle_speed",), _REMEDY)
     truth = onto(drive, own, truth_path)
@@ -99,8 +108,8 @@ def outcome(
         nrmse_front=accuracy["front"].nrmse,
         nrmse_rear=accuracy["rear"].nrmse,
         stopping_distance=stopping_distance(own),
-        undisturbed=undisturbed,
-        unexplained=unexplained(from_start, own, faults),
+        undisturbed=undisturbed.stopping_distance,
+        unexplained=[name for name in unexplained(from_start, own, faults) if name not in undisturbed.faults],
         reactions=reactions(from_start, own, faults),
         frames=written.frames,
         differing=written.differing,
