@@ -43,6 +43,7 @@ class Daemon:
             stderr=stderr,
             text=True,
             env={**os.environ, "PYTHONPATH": paths, **environment},
+            preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),  # the tests may run under nohup
         )
         self._lines: queue.Queue[str | None] = queue.Queue()
         self.seen: list[dict[str, Any]] = []
