@@ -124,15 +124,15 @@ def _sigma(params: Record, state: Record, i: int, now: bool) -> float:
 @kernel
 def _sigma_force(params: Record, state: Record) -> float:
     """Return the relative standard deviation of the force of all linings together, at equal pressures."""
-    total, variance = 0.0, 0.0
-    for i in range(4):
-        total += brake_lever(params, i) * friction(params, state, i) / params.wheel_radius[i]
-    for i in range(4):
-        for j in range(4):
-            both = brake_lever(params, i) * friction(params, state, i) / params.wheel_radius[i]
-            both *= brake_lever(params, j) * friction(params, state, j) / params.wheel_radius[j]
-            variance += both / (total * total) * state.p[LEVEL + i, LEVEL + j]
-    return math.sqrt(max(variance, 0.0))
+    h, total, variance = state.h, 0.0, 0.0
+    for i in range(LEVEL, LEVEL + 4):
+        h[i] = brake_lever(params, i - LEVEL) * friction(params, state, i - LEVEL)
+        h[i] /= params.wheel_radius[i - LEVEL]
+        total += h[i]
+    for i in range(LEVEL, LEVEL + 4):
+        for j in range(LEVEL, LEVEL + 4):
+            variance += h[i] * h[j] * state.p[i, j]
+    return math.sqrt(max(variance, 0.0)) / total
 
 
 @kernel
