@@ -4,9 +4,7 @@ An engine's torque in a log is that before gears and losses, known to half. Whil
 along the car that the other wheels leave is theirs, shared as the reported torques are.
 """
 
-import math
-
-from ecu.estimation.joint.layout import BIAS, DRAG, MASS, V
+from ecu.estimation.joint.wheel import car_force
 from ecu.jit import Record, kernel
 
 KNOWN = 0.5  # share of the drive from which its torque is believed
@@ -21,11 +19,10 @@ def measure_drive(params: Record, state: Record) -> None:
         params: `PARAMS`.
         state: `JOINT_STATE` at the end of a window in which nobody braked.
     """
-    x, w = state.x, state.window
+    w = state.window
     if state.drive_known > KNOWN:
         return
-    drag = math.exp(x[DRAG]) * params.drag_area * x[V] * abs(x[V])
-    left, driving = math.exp(x[MASS]) * (params.mass * (w.accel - x[BIAS]) + drag), 0.0
+    left, driving = car_force(params, state, w.accel), 0.0
     for i in range(4):
         if abs(w.motor[i]) > DRIVES:
             driving += w.motor[i]

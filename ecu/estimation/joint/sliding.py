@@ -1,11 +1,10 @@
 """Wheels that leave what is known of their tyres: what is believed of them, and what goes back."""
 
-import math
-
 from ecu.estimation.joint.kalman import GATE, forget
-from ecu.estimation.joint.layout import BIAS, DRAG, MASS, STIFFNESS, V
+from ecu.estimation.joint.layout import STIFFNESS, V
 from ecu.estimation.joint.prior import PRIOR
 from ecu.estimation.joint.snapshot import go_back
+from ecu.estimation.joint.wheel import car_force
 from ecu.estimation.motion import fresh
 from ecu.jit import Record, kernel
 from ecu.signals import WHEEL_SPEED
@@ -27,13 +26,11 @@ def _beyond(rolled: float, ground: float, slip: float) -> bool:
 @kernel
 def share_force(params: Record, state: Record, inputs: Record, accel: float, load: Record) -> None:
     """Give the wheels that begin to slide, by their loads, the force along the car that the others leave."""
-    x = state.x
-    drag = math.exp(x[DRAG]) * params.drag_area * x[V] * abs(x[V])
-    left, loaded = math.exp(x[MASS]) * (params.mass * (accel - x[BIAS]) + drag), 0.0
+    left, loaded = car_force(params, state, accel), 0.0
     for i in range(4):
         rolled = inputs.value[WHEEL_SPEED + i] * params.wheel_radius[i]
         if fresh(inputs, WHEEL_SPEED + i):
-            state.yields[i] = 1 if _beyond(rolled, x[V], YIELDING) else 0
+            state.yields[i] = 1 if _beyond(rolled, state.x[V], YIELDING) else 0
         if state.yields[i]:
             loaded += load[i]
         else:

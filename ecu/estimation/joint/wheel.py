@@ -193,6 +193,15 @@ def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float
 
 
 @kernel
+def car_force(params: Record, state: Record, accel: float) -> float:
+    """Return the force of all tyres along the car [N] at a specific force [m/s^2], with what is learned."""
+    x = state.x
+    drag = math.exp(x[DRAG]) * params.drag_area * x[V] * abs(x[V])
+    force: float = math.exp(x[MASS]) * (params.mass * (accel - x[BIAS]) + drag)
+    return force
+
+
+@kernel
 def predict_balance(params: Record, state: Record, braking: bool) -> float:
     """Return what is left of the car's balance over the configured mass [m/s^2]; sets `state.h`."""
     x, h, w, mass = state.x, state.h, state.window, params.mass
