@@ -296,7 +296,7 @@ def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
     watch_trailing(p, s.distribution, u, s.motion, s.wheel_load.load, decel, speed, dt)
     mass = p.mass * math.exp(s.joint.x[MASS]) if p.observer == JOINT else p.mass
     distribute(p, s.distribution, mass, decel, backwards)
-    follow_friction(p, s.control, s.friction, s.learned, dt)
+    follow_friction(p, s.control, s.friction, dt)
     follow_pressure(p, s.friction_torque, u, s.limiter.pressure, s.joint.zero.value, dt)
     update_motors(p, s.blending, u, s.guard.capped, s.speed.speed, decel, dt)
     share_torque(p, s.blending, s.distribution.torque, dt)

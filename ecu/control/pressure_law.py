@@ -59,7 +59,7 @@ def pressure_for_torque(params: Record, torque: float, mu: float, corner: int) -
 
 
 @kernel
-def follow_friction(params: Record, state: Record, friction: Record, learned: Record, dt: float) -> None:
+def follow_friction(params: Record, state: Record, friction: Record, dt: float) -> None:
     """Move the friction in use towards the estimate, within what friction can be.
 
     An estimate above the base counts only as far as it is sure: rather too hard a braking than too weak a

@@ -98,7 +98,7 @@ def test_the_push_out_pressure_is_not_scaled(params, pressure: float, used: floa
 def test_the_friction_in_use_stays_within_half_of_nominal(estimate: float, used: float) -> None:
     state = law()
     for _ in range(500):
-        follow_friction(PARAMS, state, estimated(np.full(4, estimate)), LEARNED_045, 0.01)
+        follow_friction(PARAMS, state, estimated(np.full(4, estimate)), 0.01)
     assert state["used"] == pytest.approx(np.full(4, used))
 
 
@@ -132,7 +132,7 @@ def test_the_second_order_saturates_at_30_percent_of_the_base(params, case, comp
 def test_less_pressure_is_given_only_as_far_as_the_estimate_is_sure(case, mu, sigma, used) -> None:
     state = law()
     for _ in range(100):
-        follow_friction(PARAMS, state, estimated(mu, sigma), LEARNED_045, 0.01)
+        follow_friction(PARAMS, state, estimated(mu, sigma), 0.01)
     assert state["used"] == pytest.approx(np.full(4, used)), case
 
 
@@ -140,14 +140,14 @@ def test_less_pressure_is_given_only_as_far_as_the_estimate_is_sure(case, mu, si
 def test_the_friction_in_use_moves_no_faster_than_half_a_unit_a_second(dt: float) -> None:
     state = law()
     for k in range(1, 4):
-        follow_friction(PARAMS, state, estimated(np.array([0.6, 0.3, 0.45, 0.4501])), LEARNED_045, dt)
+        follow_friction(PARAMS, state, estimated(np.array([0.6, 0.3, 0.45, 0.4501])), dt)
         assert state["used"] == pytest.approx([0.45 + 0.5 * k * dt, 0.45 - 0.5 * k * dt, 0.45, 0.4501])
 
 
 def test_a_friction_that_is_not_a_number_does_not_stick(params) -> None:
     state = law()
-    follow_friction(PARAMS, state, estimated(np.full(4, math.nan)), LEARNED_045, 0.01)
-    follow_friction(PARAMS, state, estimated(np.full(4, 0.45)), LEARNED_045, 0.01)
+    follow_friction(PARAMS, state, estimated(np.full(4, math.nan)), 0.01)
+    follow_friction(PARAMS, state, estimated(np.full(4, 0.45)), 0.01)
     assert np.isfinite(state["used"]).all()
     assert np.isfinite(compensated_pressure(params[0], state, 30 * BAR, 0))
 
@@ -166,7 +166,7 @@ def test_without_compensation_nominal_friction_counts_whatever_was_learned(param
     learned["mu_b"] = 0.3
     state = law()
     set_base(params[0], state, learned[0])
-    follow_friction(params[0], state, estimated(np.full(4, 0.36)), LEARNED_045, 0.01)
+    follow_friction(params[0], state, estimated(np.full(4, 0.36)), 0.01)
     assert list(state["base"]) == list(state["used"]) == [0.45] * 4
 
 
@@ -186,10 +186,10 @@ def test_a_braking_begins_with_another_friction_than_is_learned_of_it(
     """What is learned is the mean over a braking; the next one begins as this one did."""
     state, learned = law(), np.zeros(1, LEARNED)
     learned["mu_b"], ended = level, 0.48
-    follow_friction(PARAMS, state, estimated(0.45, observed_s=0.5), learned[0], 0.01)
+    follow_friction(PARAMS, state, estimated(0.45, observed_s=0.5), 0.01)
     assert not state["early"].any()  # not yet
-    follow_friction(PARAMS, state, estimated(began, observed_s=0.61), learned[0], 0.01)
-    follow_friction(PARAMS, state, estimated(ended, observed_s=1.5), learned[0], 0.01)
+    follow_friction(PARAMS, state, estimated(began, observed_s=0.61), 0.01)
+    follow_friction(PARAMS, state, estimated(ended, observed_s=1.5), 0.01)
     learn_start(state, estimated(ended, sigma, observed_s), learned[0])
     assert state["start"] == pytest.approx(np.full(4, start)), case
     set_base(PARAMS, state, learned[0])
@@ -200,9 +200,9 @@ def test_a_braking_begins_with_another_friction_than_is_learned_of_it(
 def test_where_brakings_begin_with_another_friction_the_last_one_s_end_is_not_followed() -> None:
     state = law()
     state["start"][:2] = 0.9
-    follow_friction(PARAMS, state, estimated(0.5, observed_s=0.59), LEARNED_045, 0.01)
+    follow_friction(PARAMS, state, estimated(0.5, observed_s=0.59), 0.01)
     assert list(state["used"]) == pytest.approx([0.45, 0.45, 0.455, 0.455])
-    follow_friction(PARAMS, state, estimated(0.5, observed_s=0.61), LEARNED_045, 0.01)
+    follow_friction(PARAMS, state, estimated(0.5, observed_s=0.61), 0.01)
     assert list(state["used"]) == pytest.approx([0.455, 0.455, 0.46, 0.46])
 
 
@@ -217,7 +217,7 @@ def test_where_brakings_begin_with_another_friction_the_last_one_s_end_is_not_fo
 def test_friction_in_use_does_not_run_on_while_the_pressure_is_cut(case, cut, estimate, after) -> None:
     state = law()
     state["cut"] = cut
-    follow_friction(PARAMS, state, estimated(np.full(4, estimate)), LEARNED_045, 0.01)
+    follow_friction(PARAMS, state, estimated(np.full(4, estimate)), 0.01)
     assert state["used"] == pytest.approx(np.full(4, after)), case
 
 
