@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from brakelab.bench.friction import LOADINGS, TABLE_3_4, TEMPERATURES
-from brakelab.bench.lab import linings, on_ams, r1_recording, recovery
+from brakelab.bench.lab import NOISE, linings, on_ams, r1_recording, recovery
 from brakelab.bench.lab_table import PRINTED, TABLE_3_4_NRMSE
 from brakelab.friction_lab.columns import Columns
 from brakelab.friction_lab.dynamometer import new_bench, run_programme
@@ -62,6 +62,6 @@ def test_coverage_counts_draws_inside() -> None:
 
 def test_the_noise_of_a_recovery_is_one_percent() -> None:
     lining = linings().lining["A"]
-    one, two = (r1_recording(lining, seed).torque for seed in (0, 1))
+    one, two = (r1_recording(lining, NOISE, seed).torque for seed in (0, 1))
     on = one > 100.0
     assert np.std(one[on] / two[on] - 1.0) == pytest.approx(0.01 * np.sqrt(2.0), rel=0.03)

@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from brakelab.bench.lab import r1_recording
 from brakelab.friction_lab.columns import Columns, columns_text
 from brakelab.friction_lab.dynamometer import new_bench
-from brakelab.friction_lab.recording import THRESHOLD, Recording, joined
+from brakelab.friction_lab.recording import Recording, joined
 from brakelab.friction_lab.stops import Stops, find_stops
 from brakelab.plant.description import read_file
 from brakelab.plant.linings import Lining, Linings, rig_with
-from brakelab.plant.rig import PRESSURE, new_stop, run_stop
+from brakelab.plant.rig import PRESSURE, new_stop
 from ecu.resources import resource
 
 KMH = 1.0 / 3.6
@@ -42,27 +43,6 @@ def recording(lining: Lining) -> Recording:
         bench.temperature = temperature
         parts.append(
             bench.measure(new_stop(PRESSURE, speed * KMH, 30.0 * KMH, temperature, pressure=bar * 1e5))
-        )
-    return joined(parts)
-
-
-def r1_recording(lining: Lining, noise: float, seed: int) -> Recording:
-    """Return 36 stops of R1 with `noise` relative to the torque, sampled from steps of 0.25 ms."""
-    random = np.random.default_rng(seed)
-    rig = rig_with(lining, "R1")
-    parts = []
-    grid = product((50.0, 80.0, 110.0, 140.0, 170.0, 200.0), (80.0, 120.0), (15.0, 40.0, 70.0))
-    for place, (temperature, speed, bar) in enumerate(grid):
-        stop = new_stop(PRESSURE, speed * KMH, 30.0 * KMH, temperature, pressure=bar * 1e5)
-        seen = run_stop(rig, stop, dt=2.5e-4)[::20]
-        parts.append(
-            Recording(
-                100.0 * place + seen["t"],
-                seen["pressure"] + THRESHOLD,
-                seen["torque"] * (1.0 + noise * random.standard_normal(len(seen))),
-                seen["speed"] / lining.brake.tyre_radius,
-                seen["temperature"],
-            )
         )
     return joined(parts)
 

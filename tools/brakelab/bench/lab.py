@@ -125,7 +125,7 @@ def recovered(job: tuple[str, int]) -> tuple[str, Vector, Vector, Vector]:
     brake, draw = job
     lining = linings().lining[brake]
     columns = columns_of(lining, "R1")
-    stops = find_stops(r1_recording(lining, draw), columns, "R1")
+    stops = find_stops(r1_recording(lining, NOISE, draw), columns, "R1")
     candidate = next(c for c in candidates(stops, lining.brake) if c.name == "ilvo")
     fitted = fit(candidate, lining.brake, stops, draw)
     law = lining.friction["R1"].model_dump()
@@ -133,8 +133,8 @@ def recovered(job: tuple[str, int]) -> tuple[str, Vector, Vector, Vector]:
     return brake, np.array(fitted.values), fitted.half, np.array(truth)
 
 
-def r1_recording(lining: Lining, seed: int) -> Recording:
-    """Return 36 stops of R1 at constant pressure, integrated in steps of 0.25 ms, the torque with NOISE."""
+def r1_recording(lining: Lining, noise: float, seed: int) -> Recording:
+    """Return 36 stops of R1 at constant pressure in steps of 0.25 ms, with `noise` relative to the torque."""
     random = np.random.default_rng(seed)
     rig = rig_with(lining, "R1")
     parts = []
@@ -142,7 +142,7 @@ def r1_recording(lining: Lining, seed: int) -> Recording:
     for place, (temperature, speed, bar) in enumerate(grid):
         stop = new_stop(PRESSURE, speed * KMH, 30.0 * KMH, temperature, pressure=bar * 1e5)
         seen = run_stop(rig, stop, dt=2.5e-4)[::20]
-        torque = seen["torque"] * (1.0 + NOISE * random.standard_normal(len(seen)))
+        torque = seen["torque"] * (1.0 + noise * random.standard_normal(len(seen)))
         speeds = seen["speed"] / lining.brake.tyre_radius
         parts.append(
             Recording(

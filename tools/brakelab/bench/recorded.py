@@ -19,7 +19,7 @@ from brakelab.bench.table import Table, spread
 from brakelab.closed_loop import Drive, new_loop, run
 from brakelab.replay.brakes import BrakeBook, BrakeRow
 from brakelab.replay.drive import replay_drive
-from brakelab.replay.prediction import errors
+from brakelab.replay.prediction import corners, errors
 from brakelab.replay.quality import Findings
 from brakelab.replay.source import load_source
 from brakelab.replay.summary import peers
@@ -27,7 +27,7 @@ from brakelab.scenario import Phase, Scenario
 from brakelab.simulate import write_columns
 from ecu.config import Config, load_config, new_params
 from ecu.resources import resource
-from ecu.signals import CORNERS, OUTPUT
+from ecu.signals import CORNERS
 
 Vector = NDArray[np.float64]
 
@@ -117,11 +117,6 @@ def _replay(drive: Drive, logger: Logger, config: Config) -> tuple[Vector, list[
     return np.concatenate(rows), book.rows
 
 
-def _corner_columns(rows: Vector, name: str) -> Vector:
-    first = OUTPUT[f"{name}_fl"]
-    return rows[:, first : first + 4]
-
-
 def _judge(drive: Drive, rows: Vector, found: list[BrakeRow], config: Config) -> Recorded:
     applications = found[:: len(CORNERS)]
     true = np.stack([drive.truth[f"mu_b_{corner}"] for corner in CORNERS], axis=1)
@@ -134,7 +129,7 @@ def _judge(drive: Drive, rows: Vector, found: list[BrakeRow], config: Config) ->
         at = int(np.searchsorted(drive.t, application.t_start))
         last = int(np.searchsorted(drive.t, application.t_start + application.duration))
         weight = lever * np.maximum(pressure[at:last], 0.0).mean(axis=0)
-        mu, sigma = (_corner_columns(rows, name)[at - 1] for name in ("mu_b", "sigma_mu_b"))
+        mu, sigma = (corners(rows, name)[at - 1] for name in ("mu_b", "sigma_mu_b"))
         truth = true[at:last].mean(axis=0)
         sums.append(abs(float(weight @ mu) / float(weight @ truth) - 1.0))
         inside += list(np.abs(mu - truth) <= 2.0 * sigma)
