@@ -24,8 +24,6 @@ BAR = 1e5
 PARAMS = new_params(load_config(Path(__file__).parents[3] / "config" / "suv.toml"))[0]
 BRAKES = [(0.060, 0.1205), (0.060, 0.1205), (0.034, 0.1288), (0.034, 0.1288)]  # Table D.1: d_p, r_eff [m]
 PUSH_OUT = 0.5 * BAR
-LEARNED_045 = np.zeros(1, LEARNED)[0]
-LEARNED_045["mu_b"] = 0.45
 
 
 def torque_of(pressure: float, mu: float, corner: int) -> float:
