@@ -19,8 +19,9 @@ from ecu.control.blending import (
     share_torque,
     update_motors,
 )
-from ecu.control.demand import DEMAND_STATE, update_demand
+from ecu.control.demand import DEMAND_STATE, hold_pedal, update_demand
 from ecu.control.distribution import DISTRIBUTION_STATE, cap_trailing, distribute, watch_trailing
+from ecu.control.failed_brakes import FAILED_BRAKES_STATE, replace_failed
 from ecu.control.friction_torque import FRICTION_TORQUE_STATE, follow_pressure, lagging_torque
 from ecu.control.limiter import LIMITER_STATE, available_pressure, limit_axle, reads_empty
 from ecu.control.mode import MODE_STATE, decide_mode, input_faults
@@ -122,6 +123,7 @@ STATE = np.dtype(
         ("wear", WEAR_STATE),
         ("demand", DEMAND_STATE),
         ("distribution", DISTRIBUTION_STATE),
+        ("failed_brakes", FAILED_BRAKES_STATE),
         ("friction_torque", FRICTION_TORQUE_STATE),
         ("blending", BLENDING_STATE),
         ("control", PRESSURE_LAW_STATE),
@@ -153,6 +155,7 @@ def new_state(params: RecordArray, learned: RecordArray | None = None) -> Record
     else:
         row["learned"] = learned[0]
     row["control"]["mu_override"], row["control"]["start"] = math.nan, 1.0
+    row["failed_brakes"]["scale"] = 1.0
     row["force"]["k_f"] = row["force"]["stiffness"] = 1.0
     row["distribution"]["trailing"] = 1.0
     _begin(params, state)
@@ -186,6 +189,7 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
     faults = u.bus_faults | u.e2e_faults | input_faults(p, u) | watch_sensors(p, s, u, dt)
     leave_out(p, s, u)
     u = s.trusted
+    hold_pedal(p, s.demand, u)
     _estimate(p, s, u, dt)
     update_discs(
         p, s.discs, s.learned, u, s.friction, s.application, s.wheel_load.load,
@@ -254,7 +258,9 @@ def _observe_jointly(p: Record, s: Record, u: Record, braking: bool, dt: float) 
         begin_application(joint, joint.heat)
     if s.guard.acting or s.friction.held:
         mistrust_wheels(joint)
-    update_joint(p, joint, u, s.motion, s.wheel_load.load, s.limiter.pressure, braking, dt)
+    for i in range(4):
+        s.failed_brakes.sent[i] = 0.0 if s.failed_brakes.failed[i] else s.limiter.pressure[i]
+    update_joint(p, joint, u, s.motion, s.wheel_load.load, s.failed_brakes.sent, braking, dt)
     if braking and joint.closed:
         add_window(p, s.prediction, joint, u)
     s.prediction.told_s = max(s.prediction.told_s - dt, 0.0)
@@ -293,19 +299,21 @@ def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
     speed = s.speed.speed if s.speed.started else math.nan
     decel = update_demand(p, s.demand, u, speed, dt)
     backwards = s.motion.backwards != 0
-    watch_trailing(p, s.distribution, u, s.motion, s.wheel_load.load, decel, speed, dt)
+    failed = s.failed_brakes.failed
+    watch_trailing(p, s.distribution, u, s.motion, s.wheel_load.load, failed, decel, speed, dt)
     mass = p.mass * math.exp(s.joint.x[MASS]) if p.observer == JOINT else p.mass
     distribute(p, s.distribution, mass, decel, backwards)
     follow_friction(p, s.control, s.friction, dt)
     follow_pressure(p, s.friction_torque, u, s.limiter.pressure, s.joint.zero.value, dt)
     update_motors(p, s.blending, u, s.guard.capped, s.speed.speed, decel, dt)
+    replace_failed(p, s.failed_brakes, s.distribution, s.blending.allowed, decel, backwards, dt)
     share_torque(p, s.blending, s.distribution.torque, dt)
     for i in range(4):
         torque = s.blending.lining[i]
         y.pressure_uncompensated[i] = pressure_for_torque(p, torque, s.control.base[i], i)
         y.pressure_demand[i] = compensated_pressure(p, s.control, y.pressure_uncompensated[i], i)
     cap_trailing(
-        p, s.distribution, decel, s.blending.lining, s.friction, y.pressure_demand, backwards
+        p, s.distribution, decel, s.blending.lining, s.friction, y.pressure_demand, failed, backwards
     )  # fmt: skip
     if p.slip_guard:
         guard_slip(

@@ -6,6 +6,9 @@ A car that has stood for 0.5 s with its brakes asked for is held until the pedal
 automated demand is left, or until the accelerator is pressed; then the holding demand fades out. It is
 enough for the steepest grade of the configuration, see `new_params`. There is no creep function: without a
 request nothing is braked.
+
+A pedal whose position is lost while its switch is not is taken to stay where it was until the switch opens;
+one that is pressed only then asks for `SECONDARY_DECEL`.
 """
 
 import math
@@ -15,13 +18,22 @@ import numpy as np
 from ecu.estimation.motion import mean_wheel_speed, usable
 from ecu.jit import Record, kernel
 from ecu.params import PEDAL_POINTS
-from ecu.signals import ACCELERATOR_POSITION, DECEL_DEMAND, DECEL_DEMAND_VALID, PEDAL_POSITION, WHEEL_SPEED
+from ecu.signals import (
+    ACCELERATOR_POSITION,
+    DECEL_DEMAND,
+    DECEL_DEMAND_VALID,
+    PEDAL_POSITION,
+    PEDAL_PRESSED,
+    USABLE,
+    WHEEL_SPEED,
+)
 
 DEMAND_STATE = np.dtype(
     [
         ("standing_s", "f8"),  # how long the car has stood [s]
         ("held", "u1"),
         ("hold", "f8"),  # holding demand [m/s^2], fades in and out
+        ("pedal", "f8"),  # last position known, or taken for it [%]
     ],
     align=True,
 )
@@ -31,6 +43,7 @@ STANDSTILL = 0.3  # m/s
 STANDING_TIME = 0.5  # s
 LEAST_REQUEST = 0.05  # m/s^2, below it nobody brakes
 ACCELERATOR_PRESSED = 3.0  # %
+SECONDARY_DECEL = 2.44  # m/s^2, of a secondary braking system (ECE R13-H, Annex 3, 2.2)
 HOLD_RATE = 5.0  # m/s^3: let go within 0.7 s, as fast as a foot changes the pedal
 
 
@@ -43,6 +56,46 @@ def pedal_to_decel(params: Record, position: float) -> float:
         if position > x[j - 1] and x[j] > x[j - 1]:
             decel = y[j - 1] + (y[j] - y[j - 1]) * min((position - x[j - 1]) / (x[j] - x[j - 1]), 1.0)
     return decel
+
+
+@kernel
+def _position_for(params: Record, decel: float) -> float:
+    """Return the pedal position [%] that asks for a deceleration [m/s^2]."""
+    x, y = params.pedal_position, params.pedal_decel
+    for j in range(1, PEDAL_POINTS):
+        if y[j] >= decel and y[j] > y[j - 1]:
+            found: float = x[j - 1] + (x[j] - x[j - 1]) * (decel - y[j - 1]) / (y[j] - y[j - 1])
+            return found
+    last: float = x[PEDAL_POINTS - 1]
+    return last
+
+
+@kernel
+def pedal_known(params: Record, inputs: Record) -> bool:
+    """Return whether the pedal's position arrives, or at least its switch does."""
+    switch = params.mapped[PEDAL_POSITION] != 0 and usable(inputs, PEDAL_PRESSED)
+    return usable(inputs, PEDAL_POSITION) or switch
+
+
+@kernel
+def hold_pedal(params: Record, state: Record, inputs: Record) -> None:
+    """Overwrite a lost pedal position by what its switch leaves of the last one.
+
+    Args:
+        params: `PARAMS`.
+        state: `DEMAND_STATE`; `pedal` is overwritten.
+        inputs: the trusted `INPUTS`.
+    """
+    if usable(inputs, PEDAL_POSITION):
+        state.pedal = inputs.value[PEDAL_POSITION]
+        return
+    if not pedal_known(params, inputs):
+        return
+    if inputs.value[PEDAL_PRESSED] < 0.5:
+        state.pedal = 0.0
+    elif pedal_to_decel(params, state.pedal) < LEAST_REQUEST:
+        state.pedal = _position_for(params, SECONDARY_DECEL)
+    inputs.value[PEDAL_POSITION], inputs.verdict[PEDAL_POSITION] = state.pedal, USABLE
 
 
 @kernel

@@ -10,6 +10,7 @@ itself. Two things do (ECE R13-H, Annex 5: the rear uses no more grip than the f
 
 - `watch_trailing`: where a rear wheel slips more than the front one of its side by more than
   `rear_slip_margin`, the torque of the rear axle is taken back until it does not. That needs no friction.
+  Beside a front wheel whose brake has failed it may slip `LONE_SLIP`.
 - `cap_trailing`: compensation raises the rear's pressure relative to the front's only as far as the observer
   is sure of it, with the rear at mu + 2 sigma and the front at mu - 2 sigma.
 
@@ -48,6 +49,7 @@ RADIUS_DOUBT = 0.008  # until then: radii within 0.3 % and what else differs, tw
 FREE_ACCEL, FREE_YAW_RATE = 0.5, 0.03  # m/s^2, rad/s
 RULED_FROM = 0.15  # z from which on Annex 5 orders the axles
 FASTEST = 1.02  # of the ground below it
+LONE_SLIP = 0.04  # of a trailing wheel beside one that rolls: tyres have their peak at 0.1 on a dry road
 ROUNDING = 1e-9
 
 
@@ -101,6 +103,7 @@ def watch_trailing(
     inputs: Record,
     motion: Record,
     load: Record,
+    failed: Record,
     decel: float,
     speed: float,
     dt: float,
@@ -117,6 +120,7 @@ def watch_trailing(
         inputs: `INPUTS`.
         motion: `MOTION_STATE`.
         load: of the wheels [N].
+        failed: wheels whose brake gives nothing, shape (4,).
         decel: demanded [m/s^2]; the axle has all of its torque again once nobody brakes.
         speed: of the vehicle [m/s], NaN: unknown. Slower than `min_speed` slip says nothing.
         dt: time since the last cycle [s].
@@ -138,7 +142,9 @@ def watch_trailing(
         doubt = params.sigma_wheel_speed * params.wheel_radius[side] / abs(speed)
         if state.free_s[side] < LEARNING_TIME:
             doubt += RADIUS_DOUBT
-        worst = max(worst, state.beyond[side] - params.rear_slip_margin - doubt)
+        leading = side if trailing > 0.0 else side + 2
+        margin = LONE_SLIP if failed[leading] else params.rear_slip_margin
+        worst = max(worst, state.beyond[side] - margin - doubt)
     change = -TAKE_BACK * worst if worst > 0.0 else GIVE_BACK
     state.trailing = min(max(state.trailing + change * dt, LEAST_TRAILING), 1.0) if brakes else 1.0
 
@@ -165,6 +171,7 @@ def cap_trailing(
     lining: Record,
     friction: Record,
     pressure: Record,
+    failed: Record,
     backwards: bool,
 ) -> None:
     """Keep compensation from raising the trailing axle's share beyond the line of Annex 5.
@@ -179,6 +186,7 @@ def cap_trailing(
         lining: torque [N m] that the lining of each wheel is asked for; the motors have the rest.
         friction: `FRICTION_STATE`, what the observer claims.
         pressure: compensated demands [Pa], shape (4,); those of the trailing axle are overwritten.
+        failed: wheels whose brake gives nothing, shape (4,); the rule is then one of the wheels that brake.
         backwards: the car drives so.
     """
     if not decel >= RULED_FROM * GRAVITY:
@@ -187,27 +195,32 @@ def cap_trailing(
     # their interval, force of the motors.
     lead, lead_nominal, lead_force, lead_motors = 0.0, 0.0, 0.0, 0.0
     trail, trail_nominal, trail_force, trail_motors = 0.0, 0.0, 0.0, 0.0
+    leading, trailing = 0, 0
     for i in range(4):
+        if failed[i]:
+            continue
         lever = 2.0 * params.piston_area[i] * params.effective_radius[i]
         acts = max(pressure[i] - params.push_out_pressure[i], 0.0)
         nominal = max(lining[i], 0.0) / (lever * params.mu_nominal[i])
         mu, sigma = friction.mu[i], friction.sigma[i]
         motor = (state.torque[i] - lining[i]) / params.wheel_radius[i]
         if (i < 2) != backwards:
+            leading += 1
             lead += acts
             lead_nominal += nominal
             lead_force += acts * lever * max(mu - 2.0 * sigma, 0.0) / params.wheel_radius[i]
             lead_motors += motor
         else:
+            trailing += 1
             trail += acts
             trail_nominal += nominal
             trail_force += acts * lever * (mu + 2.0 * sigma) / params.wheel_radius[i]
             trail_motors += motor
-    if not (trail > 0.0 and trail_force > 0.0):
+    if not (trail > 0.0 and trail_force > 0.0 and leading > 0):
         return
     share = ideal_front_share(params, -decel if backwards else decel)
     share = 1.0 - share if backwards else share
-    line = (lead_force + lead_motors) * (1.0 - share) / share
+    line = (lead_force + lead_motors) * (1.0 - share) / share * trailing / leading
     allowed = (line - trail_motors) / trail_force
     as_nominal = trail_nominal / trail * (lead / lead_nominal if lead_nominal > 0.0 else 1.0)
     factor = max(allowed, as_nominal)

@@ -4,12 +4,13 @@ starting   until every needed input was seen, at most one second
 ready      inputs good, nobody brakes
 active     brakes are asked for or applied
 degraded   a needed input is lost: friction is held or nominal, braking goes on
-failed     neither pedal nor demand arrives: demand 0, flagged invalid, the hydraulic fallback takes over
+failed     neither pedal, nor its switch, nor demand arrives: demand 0, flagged invalid, the hydraulic
+           fallback takes over
 """
 
 import numpy as np
 
-from ecu.control.demand import automated_demand_valid
+from ecu.control.demand import automated_demand_valid, pedal_known
 from ecu.diagnostics.faults import (
     DEGRADING,
     HYDRAULICS_NOT_READY,
@@ -65,7 +66,7 @@ def input_faults(params: Record, inputs: Record) -> int:
             faults |= MOTOR_TORQUE_LOST
     if not usable(inputs, ACCEL_X):
         faults |= IMU_LOST
-    if not usable(inputs, PEDAL_POSITION) and not automated_demand_valid(inputs):
+    if not pedal_known(params, inputs) and not automated_demand_valid(inputs):
         faults |= REQUEST_LOST
     if _lost(params, inputs, PEDAL_POSITION):
         faults |= PEDAL_LOST

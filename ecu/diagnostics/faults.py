@@ -44,18 +44,19 @@ LEARNED_AT_BOUND: Final = 1 << 25
 LEARNING_GIVEN_UP: Final = 1 << 26
 NOT_KEPT: Final = 1 << 27
 E2E_REJECTIONS: Final = 1 << 28
+BRAKE_FAILED: Final = 1 << 29
 
 FAULTS: Final = (
     Fault(WHEEL_SPEED_LOST, "wheel speed lost", "a wheel speed is stale or invalid", "check the sender of WheelSpeed*"),
     Fault(IMU_LOST, "IMU lost", "longitudinal acceleration is stale or invalid", "check the sender of Imu"),
     Fault(PRESSURE_LOST, "pressure lost", "a calliper pressure is stale or invalid", "check CalliperPressure*"),
-    Fault(REQUEST_LOST, "request lost", "neither the pedal nor a valid deceleration demand arrives", "check BrakeRequest"),
+    Fault(REQUEST_LOST, "request lost", "neither the pedal, nor its switch, nor a valid deceleration demand arrives", "check BrakeRequest"),
     Fault(STEERING_LOST, "steering lost", "steering angle, yaw rate or lateral acceleration is stale: straight driving is assumed", "check Steering, Imu"),
     Fault(PEDAL_IMPLAUSIBLE, "pedal implausible", "position above 5 % while the pedal is reported free", "check the pedal sensor"),
     Fault(HYDRAULICS_NOT_READY, "hydraulics not ready", "HydraulicStatus reports not ready", "check the hydraulic unit"),
     Fault(DEMAND_LIMITED, "demand limited", "the output limiter replaced or cut a demand", "compare friction and demand in the report"),
     Fault(FILTER_RESET, "filter reset", "an estimator met a value that is not finite and began anew", "look at the inputs at that time"),
-    Fault(PEDAL_LOST, "pedal lost", "the pedal position is stale or invalid", "check the sender of BrakeRequest"),
+    Fault(PEDAL_LOST, "pedal lost", "the pedal position is stale or invalid: it is taken to stay as it was while the switch of the pedal is closed", "check the sender of BrakeRequest"),
     Fault(MOTOR_TORQUE_LOST, "motor torque lost", "a motor torque came before and is stale: its wheel learns nothing", "check the sender of Motor*"),
     Fault(BRAKE_FADE, "compensation at its limit", "friction more than 30 % below its base, or a pressure that cannot be had: the car brakes less than the pedal asks for", "brake earlier and let the brakes cool; look at the linings and at friction in the report"),
     Fault(WHEEL_SLIPS, "wheel slips", "a wheel ran past its tyre's range: its pressure demand is held back", "look at slip in the report; an ABS is not part of this ECU"),
@@ -70,11 +71,12 @@ FAULTS: Final = (
     Fault(LATE, "late", "a cycle missed its deadline", "see `brake-ecu doctor` for real-time rights"),
     Fault(COMPILED, "compiled in operation", "a kernel was compiled after the start", "warm the cache: python -m ecu.warm"),
     Fault(MOTOR_SHORT, "motor gives less than demanded", "a motor gave less than demanded within the limit that it reports: the linings brake in its place until the brakes are released", "compare motor_demand, motor_torque and motor_limit of that wheel; check the inverter"),
-    Fault(PRESSURE_NOT_FOLLOWING, "pressure does not follow demand", "a calliper pressure is not what was demanded while the three others are: nothing is learned", "check that wheel's pressure sensor and valve, and the receiver of PressureDemand*"),
+    Fault(PRESSURE_NOT_FOLLOWING, "pressure does not follow demand", "a calliper pressure is not what was demanded while the three others are: it is not used, that of the other side stands for it", "check that wheel's pressure sensor and valve, and the receiver of PressureDemand*"),
     Fault(LEARNED_AT_BOUND, "learned value at its bound", "a friction, mass, stiffness, motor scale, radius or zero would be learned beyond what a car can be: it stays at its bound", "compare the configuration with the car: mass, tyres, brakes; check the sensors"),
     Fault(LEARNING_GIVEN_UP, "learning given up", "what was learned predicted the last brakings worse than the configured friction: it was forgotten and is learned anew", "look at the prediction in the report; check pressures, accelerometer and motor torques against each other"),
     Fault(NOT_KEPT, "nothing is kept", "the side process is away or hangs, or the state folder cannot be written: what is learned now ends with this run", "it is started again by itself; look at the disk and at the log lines before"),
     Fault(E2E_REJECTIONS, "E2E rejections", "of a protected message more frames come than its sender makes, or many are rejected: nothing is learned, and a request in doubt is not lowered", "look for a second sender of that message and for disturbances of the bus: `brake-ecu doctor -i -c` counts them"),
+    Fault(BRAKE_FAILED, "brake gives nothing", "a calliper has far less pressure than demanded, and the car brakes less by its share: the other wheels and the motors brake in its place", "stop; look for a leak, a valve that does not open, or a line that is shut"),
 )  # fmt: skip
 
 DEGRADING: Final = (
@@ -87,6 +89,7 @@ DEGRADING: Final = (
     | FOREIGN_SENDER
     | PRESSURE_NOT_FOLLOWING
     | E2E_REJECTIONS
+    | BRAKE_FAILED
 )
 
 

@@ -4,11 +4,19 @@ Accelerometer, wheel speeds and calliper pressures are held against each other b
 from them in this cycle, by what the last one estimated.
 """
 
-from ecu.diagnostics.faults import ACCEL_IMPLAUSIBLE, PRESSURE_NOT_FOLLOWING, WHEEL_SPEED_IMPLAUSIBLE
+from ecu.control.failed_brakes import watch_brakes
+from ecu.diagnostics.faults import (
+    ACCEL_IMPLAUSIBLE,
+    BRAKE_FAILED,
+    PRESSURE_NOT_FOLLOWING,
+    WHEEL_SPEED_IMPLAUSIBLE,
+)
 from ecu.jit import Record, kernel
 from ecu.monitoring.acceleration import watch_acceleration
 from ecu.monitoring.plausibility import watch_pressures, watch_wheels, wheel_speed_implausible
-from ecu.signals import ACCEL_X, WHEEL_SPEED
+from ecu.signals import ACCEL_X, CALLIPER_PRESSURE, WHEEL_SPEED
+
+LEFT_OUT_S = 0.03  # that a pressure is not what was demanded
 
 
 @kernel
@@ -37,7 +45,15 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> int:
     watch_pressures(s.plausibility, u, s.friction_torque.model, s.joint.zero.value, dt)
     if s.plausibility.pressure:
         faults |= PRESSURE_NOT_FOLLOWING
-    s.friction.held = 1 if s.plausibility.pressure or begins or u.e2e_faults else 0
+    failed = s.failed_brakes.any != 0
+    watch_brakes(
+        p, s.failed_brakes, u, s.motion, s.control, s.friction_torque.model, s.joint.zero.value,
+        s.speed.speed, s.plausibility.sent != 0, dt,
+    )  # fmt: skip
+    fails = s.failed_brakes.any != 0 and not failed
+    if s.failed_brakes.any:
+        faults |= BRAKE_FAILED
+    s.friction.held = 1 if begins or fails or u.e2e_faults else 0
     return faults
 
 
@@ -50,6 +66,8 @@ def leave_out(p: Record, s: Record, u: Record) -> None:
     for i in range(4):
         if s.plausibility.fell[i]:
             _distrust(s.trusted, WHEEL_SPEED + i)
+        if s.plausibility.apart_s[i] > LEFT_OUT_S and not s.failed_brakes.failed[i]:
+            _distrust(s.trusted, CALLIPER_PRESSURE + i)
 
 
 @kernel

@@ -194,7 +194,7 @@ def test_no_pedal_and_no_demand_is_failed_and_flagged_invalid(params, feed) -> N
     params[0]["transmit"] = 1
     car = Car(params, feed)
     car.drive((0.0, 1.0), (60.0, 1.0))
-    for name in ("pedal_position", "decel_demand"):
+    for name in ("pedal_position", "pedal_pressed", "decel_demand"):
         car.inputs[0]["verdict"][INPUT[name]] = 0
     row = car.cycle(60.0)[None]
     assert column(row, "mode")[0] == FAILED

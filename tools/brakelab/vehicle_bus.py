@@ -163,7 +163,7 @@ def sense(vehicle: Vehicle, noise: Generator, values: NDArray[np.float64]) -> No
     values[signals.DECEL_DEMAND_VALID] = driver.decel_demand_valid
     values[signals.ACCELERATOR_POSITION] = driver.accelerator_position
     values[signals.REVERSE] = values[signals.ABS_ACTIVE] = values[signals.ESP_ACTIVE] = 0.0
-    values[signals.ACCUMULATOR_PRESSURE] = 1e-5 * vehicle.params[0].pressure_limit
+    values[signals.ACCUMULATOR_PRESSURE] = 1e-5 * vehicle.sound[0].pressure_limit[0]
     values[signals.HYDRAULIC_READY] = 1.0
     values[signals.AMBIENT_TEMPERATURE] = vehicle.script.ambient_temperature
     values[RAIN] = 1.0 if vehicle.script.wetness > 0.0 else 0.0

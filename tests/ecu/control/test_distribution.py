@@ -141,7 +141,7 @@ class Watch:
         self.params, self.state, self.feed = params[0], state[0], feed
         self.motion = np.zeros(1, MOTION_STATE)[0]
         self.load = np.array(self.params["static_load"])
-        self.error = np.zeros(4)
+        self.error, self.failed = np.zeros(4), np.zeros(4, np.uint8)
         params["rear_slip_margin"] = 0.005
         self.state["free_s"] = learned
 
@@ -160,7 +160,7 @@ class Watch:
             inputs = self.feed(wheel_speed=omega + noise * random.standard_normal(4))
             if lost is not None:
                 inputs[0]["new"][WHEEL_SPEED + lost] = 0
-            watch_trailing(p, self.state, inputs[0], self.motion, self.load, decel, speed, DT)
+            watch_trailing(p, self.state, inputs[0], self.motion, self.load, self.failed, decel, speed, DT)
         return float(self.state["trailing"])
 
 
@@ -212,6 +212,22 @@ def test_a_trailing_axle_that_slips_more_than_the_leading_one_is_taken_back(
     assert rear[0] - 1e-9 <= left <= rear[1], case
 
 
+BESIDE_FAILED = [
+    # failed, slip fl fr rl rr [%], what the rear is left after a second
+    ("a rear wheel alone on its side may slip 4 %", (0,), (0, -3, -4, -3), 1.0),
+    ("not 6 %", (0,), (0, -3, -6, -3), LEAST_TRAILING),
+    ("the other side is watched as ever", (0,), (0, -3, -3, -4.5), LEAST_TRAILING),
+    ("both rear wheels alone", (0, 1), (0, 0, -4, -4), 1.0),
+    ("a rear brake failed: nothing changes", (2,), (-3, -3, 0, -4.5), LEAST_TRAILING),
+]
+
+
+@pytest.mark.parametrize(("case", "failed", "slip", "rear"), BESIDE_FAILED, ids=[c[0] for c in BESIDE_FAILED])
+def test_beside_a_failed_front_brake_a_rear_wheel_may_slip_more(watch, case, failed, slip, rear) -> None:
+    watch.failed[list(failed)] = 1
+    assert watch.run(slip, seconds=1.0) == pytest.approx(rear), case
+
+
 def test_the_radii_that_load_transfer_changes_are_no_slip(watch) -> None:
     """At 8 m/s^2 the front's radius is 0.3 % smaller, the rear's larger: 0.6 % of slip that is not there."""
     watch.load += np.array([1, 1, -1, -1]) * 0.5 * 2105 * 8.0 * 0.65 / 2.665
@@ -249,8 +265,11 @@ def torques_of(params, pressure, mu) -> np.ndarray:
     return 2 * p["piston_area"] * p["effective_radius"] * acts * mu
 
 
+NONE = np.zeros(4, np.uint8)
+
+
 def capped(
-    params, state, z, wanted, mu, sigma, motor=(0.0, 0.0), backwards=False
+    params, state, z, wanted, mu, sigma, motor=(0.0, 0.0), backwards=False, failed=NONE
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return pressures before and after the cap; `wanted`: friction that front and rear count on."""
     p, decel = params[0], z * G
@@ -260,7 +279,7 @@ def capped(
     before = lining / (lever * np.repeat(wanted, 2)) + p["push_out_pressure"]
     friction, after = np.zeros(1, FRICTION_STATE), before.copy()
     friction["mu"], friction["sigma"] = np.repeat(mu, 2), np.repeat(sigma, 2)
-    cap_trailing(p, state[0], decel, lining, friction[0], after, backwards)
+    cap_trailing(p, state[0], decel, lining, friction[0], after, failed, backwards)
     return before, after
 
 

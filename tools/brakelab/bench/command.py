@@ -26,6 +26,7 @@ from brakelab.bench import stops as stops_bench
 from brakelab.bench.blending import blending_tables
 from brakelab.bench.chart import write_chart
 from brakelab.bench.energy import energy_tables
+from brakelab.bench.failures import failure_tables
 from brakelab.bench.friction import friction_tables
 from brakelab.bench.measure import NOT_INSTALLED, Row, machine
 from brakelab.bench.observers import WIDE, Sample, Task, observer_rows, step_times, tasks
@@ -40,6 +41,7 @@ from brakelab.bench.texts import (
     BOUND_TEXT,
     COMPENSATION_TEXT,
     ENERGY_TEXT,
+    FAILURES_TEXT,
     FRICTION_TEXT,
     LAB_TEXT,
     LATENESS_TEXT,
@@ -64,6 +66,7 @@ FRICTION: Final = "friction"
 LAB: Final = "lab"
 ENERGY: Final = "energy"
 BLENDING: Final = "blending"
+FAILURES: Final = "failures"
 COMPENSATION: Final = "compensation"
 MARGINS: Final = "margins"
 LATENESS: Final = "lateness"
@@ -136,6 +139,7 @@ def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0, 
         COMPENSATION: _compensation,
         MARGINS: _margins,
         BLENDING: _blending,
+        FAILURES: _failures,
         RECORDED: partial(_recorded, seeds=seeds),
         WEAR: partial(_wear, seeds=seeds),
         LATENESS: partial(_lateness, seconds=seconds),
@@ -297,6 +301,10 @@ def _margins(json: bool) -> int:
 
 def _blending(json: bool) -> int:
     return _page(BLENDING, "Motors and linings brake together", BLENDING_TEXT, blending_tables(), json)
+
+
+def _failures(json: bool) -> int:
+    return _page(FAILURES, "Brakes that fail", FAILURES_TEXT, failure_tables(), json)
 
 
 def _lateness(json: bool, seconds: float) -> int:

@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from brakelab.bench import failures
 from brakelab.bench.blending import CARS
 
 STOPS_TEXT: Final = (
@@ -113,6 +114,16 @@ BLENDING_TEXT: Final = (
     "them. Torque is that of linings and motors, true; the demand is m a r with mass and radius of the "
     "configuration (5.1). Cars of the wide draw: their hydraulics, motors and frictions are not those that "
     "the ECU knows. Where it is told the true friction, what is left is the error of blending."
+)
+
+FAILURES_TEXT: Final = (
+    "In the second of two brakings from 28 m/s, by a driver who keeps the lane, a brake gives nothing "
+    f"any more from t = {failures.FAILS:g} s on. Deceleration is that of the second that begins "
+    f"{1e3 * failures.AFTER:g} ms after it, against the same car without the fault. What the front axle's "
+    "circuit takes at 4 m/s² and more, and the diagonal one at 6 m/s², the grip of the other wheels does not "
+    "give at once; what one front calliper takes at 6 m/s² the limit of the yaw moment does not. "
+    f"{failures.CARS} cars of the wide draw, median (least–greatest). "
+    "[control.md](control.md#brakes-that-fail) says how."
 )
 
 RECORDED_TEXT: Final = (

@@ -13,10 +13,12 @@ share = 0.5                  # of these frames
 | lost, doubled, corrupted | message, share | frames do not come, come twice, come with one bit turned |
 | late | message, share, delay [s] | frames come `delay` later |
 | stuck | signal | a signal on the bus keeps its value, its frames come on |
+| invalid | signal | a signal is sent as not available |
 | biased, noisy | signal, amount | `amount` is added; white noise of that standard deviation is added |
 | bus_off | | the ECU's controller is off the bus: neither side hears the other |
 | daemon_killed | standby | SIGKILL at `t`, a new start after `duration`; `standby`: a second one stands by |
 | motor_lost | corner | motors give no torque and say that they can regenerate none |
+| calliper_dead | corner | callipers get no pressure: one, or those of a circuit |
 | accumulator_low | amount [bar] | the hydraulics reach this pressure at most and say "not ready" |
 
 Frames are spoilt on their way, after the sender protected them; a signal is spoilt before, so that its frame
@@ -46,17 +48,18 @@ Kind = Literal[
     "doubled",
     "corrupted",
     "stuck",
+    "invalid",
     "biased",
     "noisy",
     "bus_off",
     "daemon_killed",
     "motor_lost",
+    "calliper_dead",
     "accumulator_low",
 ]
 KINDS: Final[tuple[str, ...]] = get_args(Kind)
-LATE, LOST, DOUBLED, CORRUPTED, STUCK, BIASED, NOISY, BUS_OFF, DAEMON_KILLED, MOTOR_LOST, ACCUMULATOR_LOW = (
-    range(len(KINDS))
-)
+LATE, LOST, DOUBLED, CORRUPTED, STUCK, INVALID, BIASED, NOISY, BUS_OFF, DAEMON_KILLED = range(10)
+MOTOR_LOST, CALLIPER_DEAD, ACCUMULATOR_LOW = range(10, len(KINDS))
 _FRAMES: Final = {"message", "share"}
 _BELONGS: Final[dict[str, set[str]]] = {
     "late": {*_FRAMES, "delay"},
@@ -64,11 +67,13 @@ _BELONGS: Final[dict[str, set[str]]] = {
     "doubled": _FRAMES,
     "corrupted": _FRAMES,
     "stuck": {"signal"},
+    "invalid": {"signal"},
     "biased": {"signal", "amount"},
     "noisy": {"signal", "amount"},
     "bus_off": set(),
     "daemon_killed": {"standby"},
     "motor_lost": {"corner"},
+    "calliper_dead": {"corner"},
     "accumulator_low": {"amount"},
 }
 _NEEDED: Final = {"delay", "signal", "amount"}
@@ -262,6 +267,8 @@ def _spoil_signals(fault: Record, on: bool, noise: Generator, values: NDArray[np
             continue
         if not on:
             fault.held[place] = np.nan
+        elif fault.kind == INVALID:
+            values[place] = np.nan
         elif fault.kind == BIASED:
             values[place] += fault.amount
         elif fault.kind == NOISY:
@@ -282,17 +289,22 @@ def spoil_car(
     """
     for i in range(4):
         params.motor_share[i] = sound.motor_share[i]
-    params.pressure_limit = sound.pressure_limit
+        params.pressure_limit[i] = sound.pressure_limit[i]
     for j in range(len(faults)):
         fault = faults[j]
         on = is_on(fault, t)
-        if fault.kind == STUCK or fault.kind == BIASED or fault.kind == NOISY:
+        if fault.kind == STUCK or fault.kind == INVALID or fault.kind == BIASED or fault.kind == NOISY:
             _spoil_signals(fault, on, noise, values)
         elif on and fault.kind == MOTOR_LOST:
             for i in range(4):
                 if fault.corner[i]:
                     params.motor_share[i] = 0.0
+        elif on and fault.kind == CALLIPER_DEAD:
+            for i in range(4):
+                if fault.corner[i]:
+                    params.pressure_limit[i] = 0.0
         elif on and fault.kind == ACCUMULATOR_LOW:
-            params.pressure_limit = 1e5 * fault.amount
+            for i in range(4):
+                params.pressure_limit[i] = min(params.pressure_limit[i], 1e5 * fault.amount)
             values[signals.ACCUMULATOR_PRESSURE] = fault.amount
             values[signals.HYDRAULIC_READY] = 0.0
