@@ -16,13 +16,13 @@ import numba
 import numpy as np
 import pytest
 
-from brakelab.closed_loop import new_loop, run
 from brakelab.replay.command import replay
-from brakelab.results import read_result
-from brakelab.scenario import load_scenario
-from ecu.config import load_config
-from ecu.resources import resource
-from ecu.signals import OUTPUT_COLUMNS
+from brakelab.results.files import read_result
+from brakelab.simulation.closed_loop import new_loop, run
+from brakelab.simulation.scenario import load_scenario
+from ecu.contract.signals import OUTPUT_COLUMNS
+from ecu.settings.config import load_config
+from ecu.settings.resources import resource
 
 HERE = Path(__file__).parent
 REFERENCE, MADE_ON = HERE / "outputs.csv", HERE / "made_on.json"

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from brakelab.bench.failures import FAILURES, braking, left_of
-from brakelab.closed_loop import new_loop, run
-from ecu.config import load_config
+from brakelab.simulation.closed_loop import new_loop, run
+from brakelab.studies.failures import FAILURES, braking, left_of
+from ecu.settings.config import load_config
 
 CONFIG = load_config(Path(__file__).parents[3] / "config" / "suv.toml")
 CAR = 11

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from brakelab.bench import command, output
-from brakelab.bench.braking import MESSAGES_IN, simulated_stop
 from brakelab.bench.codec import codec_rows, plan_of_the_bench, protected_frames
 from brakelab.bench.cycle import bursts, cycle_rows, our_side, python_side, run_cycles, thrice
 from brakelab.bench.filters import FilterpyFilters, NumpyFilters, constants, filter_cycles, new_observer
@@ -17,11 +16,12 @@ from brakelab.bench.measure import Figure, Row
 from brakelab.bench.plant import cars, plant_rows
 from brakelab.bench.socket_pair import put
 from brakelab.bench.step import filter_table, step_rows
+from brakelab.studies.braking import MESSAGES_IN, simulated_stop
 from ecu.bus.receive import contract_receive_plan, new_reception, receive
+from ecu.contract.records import FRAME, INPUTS, STAGES, new_record
+from ecu.contract.signals import INPUT
 from ecu.errors import UserError
-from ecu.records import FRAME, INPUTS, STAGES, new_record
-from ecu.resources import resource
-from ecu.signals import INPUT
+from ecu.settings.resources import resource
 
 FIGURE = Figure(2.0, 1.0, 4.0)
 

@@ -9,33 +9,30 @@ from typing import Final, NamedTuple, TypeVar
 from rich.console import Console
 from rich.progress import track
 
-from brakelab.bench import (
+from brakelab.bench import codec, cycle, plant, step
+from brakelab.bench.measure import NOT_INSTALLED, Row, machine
+from brakelab.bench.output import plain_row, print_json, print_tables, write_page
+from brakelab.studies import (
     ablation,
     bound,
-    codec,
     compensation,
     compensation_picture,
     compensation_table,
-    cycle,
     margins,
-    plant,
     recorded,
-    step,
 )
-from brakelab.bench import stops as stops_bench
-from brakelab.bench.blending import blending_tables
-from brakelab.bench.chart import write_chart
-from brakelab.bench.energy import energy_tables
-from brakelab.bench.failures import failure_tables
-from brakelab.bench.friction import friction_tables
-from brakelab.bench.measure import NOT_INSTALLED, Row, machine
-from brakelab.bench.observers import WIDE, Sample, Task, observer_rows, step_times, tasks
-from brakelab.bench.observers_cases import configured
-from brakelab.bench.observers_picture import PICTURED, consistency_of, write_picture
-from brakelab.bench.observers_table import finite, observer_tables
-from brakelab.bench.output import plain_row, print_json, print_tables, write_page
-from brakelab.bench.table import Table, stop_tables, time_table
-from brakelab.bench.texts import (
+from brakelab.studies import stops as stops_bench
+from brakelab.studies.blending import blending_tables
+from brakelab.studies.chart import write_chart
+from brakelab.studies.energy import energy_tables
+from brakelab.studies.failures import failure_tables
+from brakelab.studies.friction import friction_tables
+from brakelab.studies.observers import WIDE, Sample, Task, observer_rows, step_times, tasks
+from brakelab.studies.observers_cases import configured
+from brakelab.studies.observers_picture import PICTURED, consistency_of, write_picture
+from brakelab.studies.observers_table import finite, observer_tables
+from brakelab.studies.table import Table, stop_tables, time_table
+from brakelab.studies.texts import (
     ABLATION_TEXT,
     BLENDING_TEXT,
     BOUND_TEXT,
@@ -54,9 +51,9 @@ from brakelab.bench.texts import (
     WEAR_TEXT,
 )
 from ecu import __version__
-from ecu.config import Config, config_hash, load_config
 from ecu.errors import UserError
-from ecu.resources import resource
+from ecu.settings.config import Config, config_hash, load_config
+from ecu.settings.resources import resource
 
 STOPS: Final = "stops"
 OBSERVERS: Final = "observers"
@@ -248,7 +245,7 @@ def _recorded(json: bool, seeds: int) -> int:
 
 
 def _wear(json: bool, seeds: int) -> int:
-    from brakelab.bench import wear, wear_drives, wear_study
+    from brakelab.studies import wear, wear_drives, wear_study
 
     cars = _each_car(WEAR, wear_drives.drive_car, min(seeds, wear.CARS))
     laws = wear_study.dynamometer_laws()
@@ -264,8 +261,8 @@ def _friction(json: bool) -> int:
 
 
 def _lab(json: bool) -> int:
-    from brakelab.bench.lab import run_lab
-    from brakelab.bench.lab_table import lab_tables
+    from brakelab.studies.lab import run_lab
+    from brakelab.studies.lab_table import lab_tables
 
     console = Console(stderr=True)
     tables = lab_tables(run_lab(lambda line: console.print(line, highlight=False, markup=False)))
