@@ -5,22 +5,22 @@ the old code. Kernels are therefore cached in a folder named after the text of e
 their package (and of `ecu`, whose kernels the laboratory calls).
 
 `NUMBA_CACHE_DIR` chooses the place, default `~/.cache/brake-ecu`. With `NUMBA_DISABLE_JIT=1` kernels run as
-plain Python, hundreds of times as slowly: for coverage, mutation and debuggers.
+plain Python (`ecu/interpreted.py`).
 """
 
 import hashlib
 import os
 from collections.abc import Callable
-from functools import cache, wraps
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
 import numba.core.event as numba_event
-import numpy as np
 
 from ecu.errors import UserError
+from ecu.interpreted import interpreted
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -74,29 +74,6 @@ def _folder(package: str) -> str:
     return str(folder)
 
 
-def _with_attributes(value: Any) -> Any:
-    """Return a view of a record, or of an array of them, that has its fields as attributes."""
-    if isinstance(value, tuple):
-        views = map(_with_attributes, value)
-        return type(value)(*views) if hasattr(value, "_fields") else tuple(views)
-    if isinstance(value, np.ndarray) and value.dtype.names and not isinstance(value, np.recarray):
-        return value.view(np.recarray)
-    if type(value) is np.void and value.dtype.names:
-        return value.view((np.record, value.dtype))
-    return value
-
-
-def _interpreted(function: Function) -> Function:
-    """Return a kernel as plain Python: fields as attributes, no warning where IEEE 754 says what comes."""
-
-    @wraps(function)
-    def run(*arguments: Any) -> Any:
-        with np.errstate(all="ignore"):
-            return function(*map(_with_attributes, arguments))
-
-    return cast(Function, run)
-
-
 def kernel(function: Function) -> Function:
     """Compile `function` with numba (no Python objects, no fastmath) and cache it on disk.
 
@@ -104,7 +81,7 @@ def kernel(function: Function) -> Function:
         UserError: there is no place for the cache.
     """
     if numba.config.DISABLE_JIT:
-        return _interpreted(function)
+        return interpreted(function)
     numba.config.CACHE_DIR = _folder(function.__module__.partition(".")[0])
     return cast(Function, numba.njit(**OPTIONS)(function))
 
