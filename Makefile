@@ -1,13 +1,17 @@
-# make demo | test | check | clean. Sets up .venv itself; PYTHON=... chooses the interpreter.
+# make demo | test | check | coverage | mutants | fuzz | soak | clean. Sets up .venv itself; PYTHON=... chooses the interpreter.
 PIP := .venv/bin/python -m pip --disable-pip-version-check install --quiet
 PINNED := $(PIP) --require-hashes --requirement requirements/build.txt
 
-.PHONY: help demo test check clean
+.PHONY: help demo test check coverage mutants fuzz soak clean
 
 help:
 	@echo "make demo    the ECU brakes a simulated car on a bus, in real time; a report at the end"
 	@echo "make test    every test"
 	@echo "make check   ruff, format and types"
+	@echo "make coverage  lines and branches of ecu/control and ecu/bus, kernels as plain Python: all of them"
+	@echo "make mutants   one change at a time in what brakes: which one do the tests not notice?"
+	@echo "make fuzz      damaged files by the thousand"
+	@echo "make soak      24 h in virtual time; ARGS='live --hours 1': in real time"
 	@echo "make clean   remove .venv, results and caches"
 	@echo "The first call installs what it needs into .venv. PYTHON=/path/to/python3.12 chooses a Python;"
 	@echo "ARGS=... goes to the command: make test ARGS=tests/ecu, make demo ARGS='--out out/first'."
@@ -22,6 +26,19 @@ check: .venv/dev
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 	.venv/bin/mypy
+
+coverage: .venv/dev
+	NUMBA_DISABLE_JIT=1 .venv/bin/python -m pytest -n auto --maxprocesses 4 --cov \
+		tests/ecu/control tests/ecu/bus $(ARGS)
+
+mutants: .venv/dev
+	.venv/bin/python tools/mutate.py $(ARGS)
+
+fuzz: .venv/dev
+	FUZZ_CASES=3000 .venv/bin/python -m pytest -n auto --maxprocesses 4 tests/test_fuzz.py $(ARGS)
+
+soak: .venv/dev
+	.venv/bin/python -m brakelab.soak $(or $(ARGS),virtual --hours 24)
 
 clean:
 	rm -rf .venv out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis

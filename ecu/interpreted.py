@@ -13,7 +13,7 @@ import numpy as np
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-class _Record(np.void):
+class _Record(np.void):  # type: ignore[misc]  # final to the type checker alone
     """One record, a view."""
 
     def __getattribute__(self, name: str) -> Any:
@@ -42,8 +42,8 @@ def _dtype_with_attributes(dtype: np.dtype[Any]) -> np.dtype[Any]:
         return np.dtype((_dtype_with_attributes(base), shape))
     if not dtype.names:
         return dtype
-    fields = dtype.fields or {}
-    layout = {
+    fields: Any = dtype.fields
+    layout: Any = {
         "names": list(dtype.names),
         "formats": [_dtype_with_attributes(fields[name][0]) for name in dtype.names],
         "offsets": [fields[name][1] for name in dtype.names],

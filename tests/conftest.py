@@ -58,6 +58,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         absent["socketcan"] = "no interface vcan0"
     if not (shared_folder() / "drives").is_dir():
         absent["drives"] = "no recorded drives beside the checkout (BRAKE_ECU_SHARED)"
+    if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
+        absent["compiled"] = "kernels run as plain Python"
     if not _has_multicast():
         absent["multicast"] = "no UDP multicast (ip route add 239.0.0.0/8 dev lo)"
     for item in items:

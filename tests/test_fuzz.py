@@ -36,9 +36,10 @@ from ecu.settings.config import load_config, new_params
 ROOT = Path(__file__).parent.parent
 FRAMES = 200
 NUMBERS = [
-    b"-1", b"0", b"-0", b"nan", b"inf", b"1e308", b"4294967296", b"99999999999999999999", b"\xff" * 4, b"\0" * 8,
-    b"\x7f\xff\xff\xff", b"\xff\xff\xff\x7f", b"\x00\x00\x00\x80", b"\xff" * 8, b"'", b'"', b"[", b"\n", b"\r\n\r\n",
-]  # fmt: skip
+    *(b"-1", b"0", b"-0", b"nan", b"inf", b"1e308", b"4294967296", b"99999999999999999999"),
+    *(b"\xff" * 4, b"\0" * 8, b"\xff" * 8, b"\x7f\xff\xff\xff", b"\xff\xff\xff\x7f", b"\x00\x00\x00\x80"),
+    *(b"'", b'"', b"[", b"\n", b"\r\n\r\n"),
+]
 KINDS = ("flip", "byte", "cut out", "put in", "number", "double", "end")
 
 
@@ -224,11 +225,13 @@ def test_a_damaged_file_gives_a_result_or_one_line(
         for left in path.parent.iterdir():
             left.unlink()
         _write(kind, path, damaged(content, changes))
+        told = ""
         try:
             READERS[kind](path)
         except (UserError, RunFault) as error:
-            assert "\n" not in str(error)
-            assert len(str(error)) < 1000
+            told = str(error)
+        assert "\n" not in told
+        assert len(told) < 1000
 
     run()
 

@@ -209,6 +209,7 @@ def read_recording(folder: Path) -> Recording:
         content = (folder / CYCLES_FILE).read_bytes()
         records = np.frombuffer(content, kind, len(content) // kind.itemsize)
         initial = np.frombuffer((folder / INITIAL_FILE).read_bytes(), dtype_of(about["state"]))
-    except (OSError, ValueError, KeyError) as error:
-        raise UserError(str(folder), "", f"not a complete recording: {error}") from None
+    except (OSError, ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        reason = " ".join(str(error).split())[:200]
+        raise UserError(str(folder), "", f"not a complete recording: {reason}") from None
     return Recording(folder, about, records["cycle"], records["outputs"], initial, folder / FRAMES_FILE)

@@ -107,7 +107,7 @@ def new_node(scenario: Scenario, seed: int) -> Node:
 
 
 @kernel
-def _turn(
+def live_through(
     plan: Plans,
     side: Side,
     noise: Generator,
@@ -163,7 +163,7 @@ def drive_in_real_time(
         start_ns = start_ns or tick.t_ns
         received = channel.drain(side.frames_in, 0)
         row = np.empty(N_TRUTH)
-        count = _turn(plans(), side, node.noise, source.realtime_ns(), received, periods, cycle, row)
+        count = live_through(plans(), side, node.noise, source.realtime_ns(), received, periods, cycle, row)
         if count < 0:
             break
         channel.send(side.to_ecu.arrived, count)
@@ -208,7 +208,7 @@ def write_truth_file(path: Path, truth: Truth, scenario: str, seed: int) -> None
 def warm_up(scenario: Scenario) -> None:
     """Compile, or load from the cache, what a cycle needs."""
     node = new_node(scenario, 0)
-    _turn(plans(), node.side, node.noise, CYCLE_NS, 0, 1, 0, np.empty(N_TRUTH))
+    live_through(plans(), node.side, node.noise, CYCLE_NS, 0, 1, 0, np.empty(N_TRUTH))
 
 
 def _tell_set_off(t_mono_ns: int) -> None:

@@ -220,3 +220,13 @@ def test_hours_without_a_row_are_allowed_where_enough_rows_were_written(tmp_path
     t = [*(0.5 * k for k in range(8000)), 7000.0]
     path = write(tmp_path / "drive.parquet", {"t": t, "accel_x": t})
     assert sum(len(block.t) for block in read_signals(path, SignalQuality())) == 8001
+
+
+@pytest.mark.parametrize("row", ["0.01,\r2", "0.0\r1,2", "\r0.01,2", "0.01,2\r"])
+def test_a_cr_alone_costs_its_line_and_no_other(tmp_path: Path, row: str) -> None:
+    """Other readers end a line there, and count more rows than there are lines."""
+    quality = SignalQuality()
+    content = f"t,accel_x\n0.00,1\n{row}\n0.02,3\n".encode()
+    (block,) = read_signals(write(tmp_path / "drive.csv", content), quality)
+    assert block.values[[0, -1], 0].tolist() == [1.0, 3.0]
+    assert (len(block.t_ns), quality.damaged) == ((3, 0) if row.endswith("\r") else (2, 1))

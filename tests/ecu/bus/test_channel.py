@@ -279,3 +279,17 @@ def test_junk_without_end_does_not_hold_the_cycle_up():
     opened = channel(bus, [0x10])
     opened.drain(frames, 0)
     assert len(bus.heard) == 800
+
+
+@pytest.mark.parametrize(
+    ("interface", "platform", "drains_itself"),
+    [("socketcan", "linux", True), ("socketcan", "darwin", False), ("udp_multicast", "darwin", False)],
+)
+def test_only_socketcan_on_linux_is_drained_past_python_can(monkeypatch, interface, platform, drains_itself):
+    opened = []
+    monkeypatch.setattr(can, "Bus", lambda **_: ScriptedBus())
+    monkeypatch.setattr(socketcan, "SocketcanChannel", lambda bus, name, wanted: opened.append(name))
+    monkeypatch.setattr("sys.platform", platform)
+    found = open_channel(interface, "can7", receive_ids=[0x10])
+    assert opened == (["can7"] if drains_itself else [])
+    assert isinstance(found, GenericChannel) is not drains_itself

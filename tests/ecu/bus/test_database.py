@@ -2,7 +2,9 @@
 
 from pathlib import Path
 
+import cantools.database
 import pytest
+from cantools.database import diagnostics
 
 from ecu.bus.database import attribute, find_message, find_signal, load_database
 from ecu.errors import UserError
@@ -92,3 +94,31 @@ def test_databases_of_real_cars_that_are_refused(drives: Path, name: str, strict
             load_database(path, strict=False)
     else:
         assert load_database(path, strict=False).messages
+
+
+def test_a_file_of_another_kind_is_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "car.arxml"
+    path.write_text("<html><body>not found</body></html>")
+    with pytest.raises(UserError, match=r"car.arxml: not a database that can be read \(.+\)$"):
+        load_database(path)
+
+
+def test_a_diagnostics_database_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "car.cdd"
+    path.write_text("<CANDELA/>")
+    monkeypatch.setattr(cantools.database, "load_file", lambda path, strict: diagnostics.Database())
+    with pytest.raises(UserError, match="a diagnostics database; give one that describes CAN messages"):
+        load_database(path)
+
+
+@pytest.mark.parametrize(("start", "told"), [(0, ""), (60, "M.which: start bit, length or scale is wrong")])
+def test_the_multiplexer_of_a_signal_has_to_be_readable_too(tmp_path: Path, start: int, told: str) -> None:
+    path = tmp_path / "car.dbc"
+    which = f' SG_ which M : {start}|8@1+ (1,0) [0|0] "" A\n'
+    path.write_text(HEAD + f'BO_ 1 M: 8 A\n{which} SG_ one m1 : 8|8@1+ (1,0) [0|0] "" A\n')
+    message = load_database(path, strict=False).messages[0]
+    if told:
+        with pytest.raises(UserError, match=told):
+            find_signal(message, "one", path, path, "x")
+    else:
+        assert find_signal(message, "one", path, path, "x").name == "one"

@@ -172,3 +172,14 @@ def test_every_sample_is_counted_by_what_became_of_it() -> None:
     signal.cycle(10, (2, 5.0, True), (4, 6.0, True), (6, 200.0, True), (8, math.nan, True), (10, 5.0, False))
     counted = signal.freshness[0]
     assert (counted["taken"], counted["outside"], counted["invalid"]) == (2, 1, 2)
+
+
+@pytest.mark.parametrize(("interval_ms", "timeout_ms"), [(10, 100), (30, 100), (50, 150), (400, 1200)])
+def test_where_no_rate_is_promised_the_time_out_is_three_intervals(interval_ms: int, timeout_ms: int) -> None:
+    signal = Signal()
+    signal.freshness["patience_ns"] = 1000 * MS
+    for k in range(20):
+        signal.cycle(interval_ms * k, (interval_ms * k, 5.0, True))
+    last = interval_ms * 19
+    assert signal.cycle(last + timeout_ms)[2] & ALIVE
+    assert not signal.cycle(last + timeout_ms + 1)[2] & ALIVE

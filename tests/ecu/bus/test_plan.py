@@ -1,6 +1,7 @@
 """Compiled codecs against cantools: ours, the shipped cars', a multiplexed one and many real cars'."""
 
 import math
+import struct
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -219,3 +220,12 @@ def test_databases_of_real_cars_decode_as_cantools(drives: Path) -> None:
                 check_decode(message, plan, data)
             messages += 1
     assert messages > 900
+
+
+@pytest.mark.parametrize("value", [0.0, -2.5, 1 / 3, 1e300, 5e-324, -math.inf])
+def test_a_double_is_sent_bit_by_bit(value: float) -> None:
+    plan = compile_message(multiplexed()["Numbers"])
+    values, data = np.zeros(len(plan.names)), np.zeros(24, np.uint8)
+    values[plan.names.index("double")] = value
+    encode(plan.signals, plan.codes, values, data)
+    assert data[8:16].tobytes() == struct.pack("<d", value)

@@ -8,17 +8,29 @@ import numpy as np
 import pytest
 from numba.core.runtime import _nrt_python, rtsys
 
+from ecu.bus.database import load_database
 from ecu.bus.e2e import p01_protect
-from ecu.bus.freshness import begin_cycle, end_cycle
+from ecu.bus.freshness import begin_cycle, end_cycle, new_freshness, target_dtype
+from ecu.bus.plan import SignalUse
 from ecu.bus.receive import (
     EXTENDED_ID,
+    MessageUse,
+    compile_receive,
     contract_receive_plan,
     input_names,
     new_reception,
     receive,
 )
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
-from ecu.contract.records import FRAME_ERROR, FRAME_EXTENDED, FRAME_REMOTE, INPUTS, RecordArray, new_record
+from ecu.contract.records import (
+    FRAME,
+    FRAME_ERROR,
+    FRAME_EXTENDED,
+    FRAME_REMOTE,
+    INPUTS,
+    RecordArray,
+    new_record,
+)
 from ecu.contract.signals import ALIVE, INPUT, INPUT_SIGNALS, N_INPUTS, RATE_OK, USABLE, VALID
 
 ROOT = Path(__file__).parents[3]
@@ -153,6 +165,7 @@ def test_a_stuck_counter_is_never_taken_twice() -> None:
     assert bus.verdict(INPUT["wheel_speed_rl"]) & USABLE == USABLE
 
 
+@pytest.mark.compiled
 def test_five_percent_corrupted() -> None:
     bus, random = Bus(), np.random.default_rng(1)
     spoilt = 0
@@ -288,6 +301,7 @@ def test_a_log_may_start_anywhere() -> None:
     assert bus.inputs["new"][0, SPEED] == 1
 
 
+@pytest.mark.compiled
 def test_kernels_allocate_nothing_but_a_handle_per_array_argument() -> None:
     bus = Bus()
     bus.run(3)
@@ -315,3 +329,21 @@ def test_extended_identifiers_are_not_mixed_up_with_standard_ones() -> None:
     assert EXTENDED_ID == 0x8000_0000
     assert not any(PLAN.ids & EXTENDED_ID)
     assert len(PLAN.expected) == N_INPUTS
+
+
+def test_of_a_multiplexed_message_comes_what_its_multiplexer_says(tmp_path: Path) -> None:
+    path = tmp_path / "car.dbc"
+    path.write_text(
+        'VERSION ""\nNS_ :\nBS_:\nBU_: A\nBO_ 1 M: 3 A\n SG_ which M : 0|8@1+ (1,0) [0|0] "" A\n'
+        ' SG_ one m1 : 8|8@1+ (1,0) [0|0] "" A\n SG_ two m2 : 16|8@1+ (1,0) [0|0] "" A\n'
+    )
+    message = load_database(path).messages[0]
+    use = MessageUse(message, [SignalUse("one", 0), SignalUse("two", 1)], 0.01, 0.01)
+    plan = compile_receive([use], new_freshness([0.1] * 2, [0.01] * 2, [0.01] * 2, [0.0] * 2, [255.0] * 2))
+    for which, new in ((1, [1, 0]), (2, [0, 1]), (3, [0, 0])):
+        inputs, frames = np.zeros(1, target_dtype(2)), new_record(FRAME)
+        frames["can_id"], frames["length"], frames["data"][0, :3] = 1, 3, [which, 10, 20]
+        begin_cycle(inputs[0], 0, CYCLE_NS)
+        receive(plan, new_reception(plan), frames, 0, 1, inputs[0])
+        assert inputs["new"][0].tolist() == new
+        assert inputs["value"][0].tolist() == [10.0 * new[0], 20.0 * new[1]]

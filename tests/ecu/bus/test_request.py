@@ -92,6 +92,7 @@ def duel(phase: int, lost: int, offset: float, deadline: float, seed: int, begin
     return wire.run(400, deadline)
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("begin", [50, 60])  # before the sender loses frames, and with the first one
 @pytest.mark.parametrize("lost", range(6))
 @pytest.mark.parametrize("phase", range(15))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ecu.bus.freshness import begin_cycle, end_cycle
 from ecu.bus.receive import Reception, input_names, new_reception, receive
-from ecu.bus.signal_map import MappedBus, load_signal_map
+from ecu.bus.signal_map import MappedBus, load_signal_map, receive_plan
 from ecu.bus.units import CONVERSIONS, conversion
 from ecu.contract.records import INPUTS, RecordArray, new_record
 from ecu.contract.signals import ALIVE, CYCLE_NS, INPUT, INPUT_SIGNALS, VALID
@@ -345,3 +345,15 @@ def test_every_unit_of_the_contract_converts_into_itself() -> None:
     assert CONVERSIONS["degC"]["K"] == (1.0, -273.15)
     factor, offset = conversion("degF", "degC", None, "", "")
     assert (212 * factor + offset, 32 * factor + offset) == pytest.approx((100.0, 0.0))
+
+
+def test_a_rule_that_needs_more_bytes_than_the_message_has(tmp_path: Path) -> None:
+    path = write(tmp_path, "period = 0.01", 'period = 0.01\nchecksum = "ford_accel_data"')
+    (tmp_path / "car.dbc").write_text(DATABASE.replace("Wheels: 8", "Wheels: 7"))
+    with pytest.raises(UserError, match=r"messages.Wheels.checksum: Wheels is too short for this rule"):
+        load_signal_map(path)
+
+
+def test_without_a_map_the_contract_is_received(tmp_path: Path) -> None:
+    assert 0x60 in receive_plan(None).ids
+    assert receive_plan(write(tmp_path)).ids.tolist() == [10]

@@ -73,8 +73,9 @@ def _parsed(
 ) -> tuple[NDArray[np.int64], pa.RecordBatch]:
     """Parse whole lines, of which the first has the number `line`."""
     pieces = text.split(b"\n")[:-1]
-    if b'"' in text:  # one that is never closed would swallow all that follows
-        pieces = [b"?" if piece.count(b'"') % 2 else piece for piece in pieces]
+    # A quote that is never closed would swallow all that follows, a CR alone would end a line.
+    if b'"' in text or text.count(b"\r") != text.count(b"\r\n"):
+        pieces = [b"?" if piece.count(b'"') % 2 or b"\r" in piece[:-1] else piece for piece in pieces]
         text = b"\n".join(pieces) + b"\n"
     lines = line + np.flatnonzero([len(piece) > piece.endswith(b"\r") for piece in pieces])
     wrong: list[tuple[int, int]] = []

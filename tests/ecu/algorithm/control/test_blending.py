@@ -7,6 +7,7 @@ import pytest
 from scipy.signal import TransferFunction, lsim
 
 from ecu.algorithm.control.blending import (
+    AHEAD,
     BLENDING_STATE,
     blends,
     motor_torque_demand,
@@ -230,3 +231,25 @@ def test_without_a_request_there_is_none(params, feed) -> None:
     motors.settle(900.0)
     assert motors.cycle(math.nan) == 0.0
     assert math.isnan(motors.state["lining"][0])
+
+
+@pytest.mark.parametrize(
+    ("of_fade_speed", "decel", "fade_speed", "left"),
+    [
+        (5.0, 4.0, 3.0, 1.0),  # far above it
+        (1.0 + 0.5 * AHEAD, 3.0, 3.0, 1.0 - 0.5 * AHEAD),  # v - 0.1 s * 3 m/s^2, over 3 m/s
+        (0.9, 4.0, 3.0, 1.0),  # below it the limit says so itself
+        (1.01, 0.0, 3.0, 1.0),  # does not brake
+        (1.01, -1.0, 3.0, 1.0),
+        (1.01, 100.0, 3.0, 0.0),  # stands before the plan is due
+        (1.01, 4.0, 0.0, 1.0),  # motors that do not fade
+    ],
+)
+def test_what_will_be_left_of_a_limit_that_fades(
+    params, feed, of_fade_speed, decel, fade_speed, left
+) -> None:
+    params["fade_speed"] = fade_speed
+    state, inputs = np.zeros(1, BLENDING_STATE)[0], feed(motor_limit=1000.0, motor_torque=0.0)
+    for _ in range(300):
+        update_motors(params[0], state, inputs[0], np.zeros(4, np.uint8), of_fade_speed * 3.0, decel, DT)
+    assert state["allowed"] == pytest.approx([1000.0 * left] * 4)

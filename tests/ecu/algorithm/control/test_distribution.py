@@ -194,6 +194,7 @@ WATCHED = [
         {"lost": 2},
         LEAST,
     ),
+    ("a front wheel's sensor keeps its value: no slip of a braked wheel", (30, -3, -3, -3), {}, (1.0, 1.0)),
     ("nobody brakes", WORSE, {"decel": 0.0}, (1.0, 1.0)),
     ("request lost", WORSE, {"decel": math.nan}, (1.0, 1.0)),
     ("backwards, equal slip", EQUAL, {"speed": -8.0}, (1.0, 1.0)),
@@ -361,3 +362,9 @@ def test_within_the_claimed_interval_the_rear_stays_behind_once_it_is_raised(par
 @pytest.mark.parametrize("name", ["suv", "sedan", "lcv", "mustang"])
 def test_shipped_configurations_have_the_ideal_distribution(name: str) -> None:
     assert new_params(load_config(CONFIGS / f"{name}.toml"))[0]["distribution"] == IDEAL
+
+
+def test_where_the_trailing_linings_do_nothing_there_is_nothing_to_cap(params, state) -> None:
+    before, after = capped(params, state, 0.5, (0.45, 0.36), (0.45, 0.36), (0.05, 0.05), motor=(0.0, 1.0))
+    assert before[2:] == pytest.approx([params["push_out_pressure"][0, 2]] * 2)
+    assert after.tolist() == before.tolist()

@@ -117,6 +117,7 @@ def test_levelling_is_told_and_what_is_within_the_rule_is_not() -> None:
         )
 
 
+@pytest.mark.compiled
 def test_every_pair_of_shares() -> None:
     """Both sides from nothing to three times the demand, in steps of 0.05."""
     steps = np.arange(0.0, 3.0, 0.05)
@@ -187,6 +188,7 @@ def _attack(params, state, random, special, per_pascal, found):
                 found[0] += 1
 
 
+@pytest.mark.compiled
 def test_a_million_adversarial_cycles() -> None:
     """Demands, friction, NaN and slip guard at random: 4 % of the cycles jump by up to the whole range."""
     random = np.random.default_rng(12)
