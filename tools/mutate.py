@@ -3,25 +3,30 @@
     python tools/mutate.py [MODULE…] [--every N]       of `TESTS`, or all of them
 
 Changes one comparison, operator, constant or condition at a time and runs the module's tests, with kernels as
-plain Python; each mutant is a fork of one process that has loaded the libraries. Prints what survives. Exit
-code 1 if anything does that `tools/mutants.toml` does not argue, or if that file argues for a mutant that is
-killed or no longer exists.
+plain Python; each mutant is a fork of the process that has collected them. Prints what survives. Exit code 1
+if anything does that `tools/mutants.toml` does not argue, or if that file argues for a mutant that is killed
+or no longer exists.
 """
 
 import argparse
 import ast
-import contextlib
 import copy
-import importlib.abc
-import importlib.util
-import io
+import importlib
+import inspect
+import json
 import os
 import signal
 import sys
 import tomllib
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
+from types import ModuleType
 from typing import Any
+
+os.environ |= {"NUMBA_DISABLE_JIT": "1", "OMP_NUM_THREADS": "1"}
+
+import pytest
 
 CHECKOUT = Path(__file__).parent.parent
 ARGUED = CHECKOUT / "tools" / "mutants.toml"
@@ -38,7 +43,6 @@ TESTS = {
     "ecu/algorithm/estimation/joint/kalman.py": ("estimation/joint/test_kalman.py",),
 }
 """The modules that are held to it, and their tests in tests/ecu."""
-LIBRARIES = ("numba", "pytest", "hypothesis.strategies", "scipy.signal", "cantools", "can", "pydantic", "e2e")
 TIMEOUT_S = 60
 COMPARISONS: dict[type[ast.cmpop], type[ast.cmpop]] = {
     ast.Lt: ast.LtE,
@@ -58,33 +62,31 @@ OPERATORS: dict[type[ast.operator], type[ast.operator]] = {
 }
 
 
-def mutants(source: str) -> Iterator[tuple[str, ast.Module]]:
-    """Yield the name and the tree of every changed copy of a module.
+def mutants(source: str) -> Iterator[tuple[str, ast.stmt]]:
+    """Yield the name of every change of a module, and the changed statement of its top level.
 
     A name is `function: line of the source: before -> after`, with a number where there are several.
     """
-    tree, lines = ast.parse(source), source.splitlines()
+    lines = source.splitlines()
     seen: dict[str, int] = {}
-    for place, (where, node) in enumerate(_nodes(tree)):
-        for change in range(_changes(node)):
-            mutated = copy.deepcopy(tree)
-            other = next(n for k, (_, n) in enumerate(_nodes(mutated)) if k == place)
-            before = ast.unparse(node).splitlines()[0]
-            _change(other, change)
-            line = lines[getattr(node, "lineno", 1) - 1].strip()
-            name = f"{where}: {line}: {before} -> {ast.unparse(other).splitlines()[0]}"
-            seen[name] = seen.get(name, 0) + 1
-            yield (name if seen[name] == 1 else f"{name} ({seen[name]})"), ast.fix_missing_locations(mutated)
+    for statement in ast.parse(source).body:
+        for place, node in enumerate(_nodes(statement)):
+            for change in range(_changes(node)):
+                mutated = copy.deepcopy(statement)
+                other = next(n for k, n in enumerate(_nodes(mutated)) if k == place)
+                before = ast.unparse(node).splitlines()[0]
+                _change(other, change)
+                line = lines[getattr(node, "lineno", 1) - 1].strip()
+                where = f"{statement.name}: " if isinstance(statement, ast.FunctionDef) else ""
+                name = f"{where}{line}: {before} -> {ast.unparse(other).splitlines()[0]}"
+                seen[name] = seen.get(name, 0) + 1
+                yield (name if seen[name] == 1 else f"{name} ({seen[name]})"), mutated
 
 
-def _nodes(tree: ast.Module) -> Iterator[tuple[str, ast.AST]]:
-    """Yield every node that runs, with the function that it is in."""
-    for statement in tree.body:
-        if isinstance(statement, ast.FunctionDef):
-            for part in statement.body:
-                yield from ((statement.name, node) for node in ast.walk(part))
-        else:
-            yield from (("", node) for node in ast.walk(statement))
+def _nodes(statement: ast.stmt) -> Iterator[ast.AST]:
+    """Yield every node that runs."""
+    for part in statement.body if isinstance(statement, ast.FunctionDef) else [statement]:
+        yield from ast.walk(part)
 
 
 def _changes(node: ast.AST) -> int:
@@ -118,105 +120,128 @@ def _change(node: ast.AST, change: int) -> None:
         node.value = value + 1 if isinstance(value, int) else 2.0 * value if value else 1.0
 
 
-class _Mutated(importlib.abc.MetaPathFinder, importlib.abc.Loader):
-    """Loads one module from a changed tree."""
-
-    def __init__(self, module: str, tree: ast.Module) -> None:
-        self._name = module.removesuffix(".py").replace("/", ".")
-        self._path, self._tree = CHECKOUT / module, tree
-
-    def find_spec(self, name: str, path: Any, target: Any = None) -> Any:
-        if name != self._name:
-            return None
-        return importlib.util.spec_from_file_location(name, self._path, loader=self)
-
-    def create_module(self, spec: Any) -> None:
-        return None
-
-    def exec_module(self, module: Any) -> None:
-        exec(compile(self._tree, self._path, "exec"), module.__dict__)
+def _apply(module: ModuleType, statement: ast.stmt) -> None:
+    """Replace a function's code, or set a constant anew, in a module that is in use."""
+    if not isinstance(statement, ast.FunctionDef):
+        _execute(statement, module.__dict__)
+        return
+    statement.decorator_list = []
+    scope = dict(module.__dict__)
+    _execute(statement, scope)
+    inspect.unwrap(module.__dict__[statement.name]).__code__ = scope[statement.name].__code__
 
 
-def _start(module: str, tree: ast.Module) -> int:
-    """Fork a process that runs the tests of `module`; its exit code 0: the mutant survives."""
-    child = os.fork()
-    if child:
-        return child
-    signal.alarm(TIMEOUT_S)
-    quiet = os.open(os.devnull, os.O_RDWR)
-    for stream in (0, 1, 2):
-        os.dup2(quiet, stream)
-    sys.meta_path.insert(0, _Mutated(module, tree))
-    code = 1
-    with contextlib.suppress(BaseException):
-        import pytest
-
-        tests = [str(CHECKOUT / "tests" / "ecu" / name) for name in TESTS[module]]
-        options = ["-x", "-qq", "-p", "no:cacheprovider", "-p", "no:faulthandler", "--capture=no"]
-        with contextlib.redirect_stdout(io.StringIO()):
-            code = int(pytest.main([*options, *tests]))
-    os._exit(code)
+def _execute(statement: ast.stmt, scope: dict[str, Any]) -> None:
+    tree = ast.fix_missing_locations(ast.Module([statement], []))
+    exec(compile(tree, "<mutant>", "exec"), scope)
 
 
-def _survivors(module: str, every: int, workers: int) -> tuple[int, list[str], set[str]]:
-    """Return how many mutants were tried, which survive, and the names of all."""
-    source = (CHECKOUT / module).read_text("utf-8")
-    child = _start(module, ast.parse(source))
-    if os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]):
-        raise SystemExit(f"{module}: its tests fail without any change")
-    running: dict[int, str] = {}
-    survivors: list[str] = []
-    names: set[str] = set()
-    tried = 0
+class Mutation:
+    """Runs the collected tests once for every mutant of `module`, instead of once."""
 
-    def await_one() -> None:
+    def __init__(self, module: str, every: int, workers: int) -> None:
+        self._module, self._every, self._workers = module, every, workers
+        self.tried = 0
+        self.names: set[str] = set()
+        self.survivors: list[str] = []
+        self._running: dict[int, str] = {}
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtestloop(self, session: pytest.Session) -> bool:
+        """Fork a process for each."""
+        module = importlib.import_module(self._module.removesuffix(".py").replace("/", "."))
+        self._start(session, module, "", None)
+        self._await_one()
+        if not self.survivors:
+            raise pytest.UsageError(f"{self._module}: its tests fail without any change")
+        self.survivors.clear()
+        for number, (name, statement) in enumerate(mutants((CHECKOUT / self._module).read_text("utf-8"))):
+            self.names.add(name)
+            if number % self._every:
+                continue
+            self.tried += 1
+            self._start(session, module, name, statement)
+            if len(self._running) >= self._workers:
+                self._await_one()
+        while self._running:
+            self._await_one()
+        return True
+
+    def _start(
+        self, session: pytest.Session, module: ModuleType, name: str, statement: ast.stmt | None
+    ) -> None:
+        child = os.fork()
+        if child:
+            self._running[child] = name
+            return
+        try:
+            signal.alarm(TIMEOUT_S)
+            if statement is not None:
+                _apply(module, statement)
+            for item, following in pairwise([*session.items, None]):
+                session.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
+                if session.testsfailed:
+                    os._exit(1)
+            os._exit(0)
+        finally:
+            os._exit(2)
+
+    def _await_one(self) -> None:
         pid, status = os.wait()
-        name = running.pop(pid)
+        name = self._running.pop(pid)
         if status == 0:
-            survivors.append(name)
+            self.survivors.append(name)
 
-    for number, (name, tree) in enumerate(mutants(source)):
-        names.add(name)
-        if number % every:
-            continue
-        tried += 1
-        running[_start(module, tree)] = name
-        if len(running) >= workers:
-            await_one()
-    while running:
-        await_one()
-    return tried, survivors, names
+
+def _run(module: str, every: int, workers: int) -> dict[str, Any]:
+    """Run the mutants of a module in a process of its own; return what it found."""
+    reading, writing = os.pipe()
+    child = os.fork()
+    if not child:
+        quiet = os.open(os.devnull, os.O_RDWR)
+        for stream in (0, 1):
+            os.dup2(quiet, stream)
+        mutation = Mutation(module, every, workers)
+        tests = [str(CHECKOUT / "tests" / "ecu" / name) for name in TESTS[module]]
+        code = pytest.main(["-x", "-qq", "-p", "no:cacheprovider", "--capture=no", *tests], [mutation])
+        found = {"tried": mutation.tried, "survivors": mutation.survivors, "names": [*mutation.names]}
+        with os.fdopen(writing, "w") as pipe:
+            json.dump(found if code in (0, 5) else {}, pipe)
+        os._exit(0)
+    os.close(writing)
+    with os.fdopen(reading) as pipe:
+        answer: dict[str, Any] = json.loads(pipe.read() or "{}")
+    os.waitpid(child, 0)
+    if not answer:
+        raise SystemExit(f"{module}: its tests fail without any change")
+    return answer
 
 
 def main() -> int:
     """Run the mutants."""
     parser = argparse.ArgumentParser(description="Change a module in one place at a time and run its tests.")
-    parser.add_argument("modules", nargs="*", metavar="MODULE", choices=[*TESTS, []], default=list(TESTS))
+    parser.add_argument("modules", nargs="*", metavar="MODULE", help="of those that are held to it")
     parser.add_argument("--every", type=int, default=1, help="take every N-th mutant only")
     wanted = parser.parse_args()
-    os.environ |= {"NUMBA_DISABLE_JIT": "1", "PYTHONDONTWRITEBYTECODE": "1", "OMP_NUM_THREADS": "1"}
-    sys.path[:0] = [str(CHECKOUT), str(CHECKOUT / "tools")]
-    sys.dont_write_bytecode = True
     os.chdir(CHECKOUT)
-    for name in LIBRARIES:
-        with contextlib.suppress(ImportError):
-            importlib.import_module(name)
+    sys.path[:0] = [str(CHECKOUT), str(CHECKOUT / "tools")]
     argued = tomllib.loads(ARGUED.read_text("utf-8")) if ARGUED.exists() else {}
     workers, wrong = min(4, os.cpu_count() or 1), 0
     total = [0, 0, 0]
-    for module in wanted.modules:
-        tried, survivors, names = _survivors(module, wanted.every, workers)
-        reasons = argued.get(module, {})
-        for name in sorted(set(survivors) - set(reasons)):
+    for module in wanted.modules or TESTS:
+        found = _run(module, wanted.every, workers)
+        survivors, names, reasons = set(found["survivors"]), set(found["names"]), set(argued.get(module, {}))
+        for name in sorted(survivors - reasons):
             print(f"SURVIVED {module} | {name}", flush=True)
-        stale = set(reasons) - names if wanted.every > 1 else set(reasons) - set(survivors)
+        stale = reasons - (names if wanted.every > 1 else survivors)
         for name in sorted(stale):
-            what = "no longer exists" if name not in names else "is killed"
+            what = "is killed" if name in names else "no longer exists"
             print(f"ARGUED FOR BUT {what}: {module} | {name}")
-        known = len(set(survivors) & set(reasons))
+        known = len(survivors & reasons)
         wrong += len(survivors) - known + len(stale)
-        total = [total[0] + tried, total[1] + tried - len(survivors), total[2] + known]
-        print(f"{module}: {tried - len(survivors)} of {tried} killed, {known} argued", flush=True)
+        killed = found["tried"] - len(survivors)
+        total = [total[0] + found["tried"], total[1] + killed, total[2] + known]
+        print(f"{module}: {killed} of {found['tried']} killed, {known} argued", flush=True)
     print(f"all: {total[1]} of {total[0]} killed, {total[2]} argued, {wrong} wrong")
     return 1 if wrong else 0
 

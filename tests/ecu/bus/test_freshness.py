@@ -89,6 +89,9 @@ def test_an_older_sample_is_ignored() -> None:
     signal = Signal()
     assert signal.cycle(20, (18, 5.0, True), (12, 9.0, True))[:2] == (5.0, 1)
     assert signal.cycle(30, (17, 9.0, True))[:2] == (5.0, 0)
+    assert signal.cycle(40, (40, 6.0, True), (39, 9.0, True))[:2] == (6.0, 1), (
+        "nor one older than a deadline's"
+    )
 
 
 def test_samples_of_the_same_stamp_are_all_taken() -> None:
@@ -96,10 +99,18 @@ def test_samples_of_the_same_stamp_are_all_taken() -> None:
     assert signal.cycle(20, (18, 5.0, True), (18, 9.0, True))[:2] == (9.0, 1)
 
 
+def test_two_samples_of_one_stamp_do_not_begin_the_rate_anew() -> None:
+    signal = Signal()
+    for k in range(10):
+        signal.cycle(10 * k, (10 * k, 5.0, True))
+    assert signal.cycle(100, (100, 5.0, True), (100, 5.0, True))[2] & RATE_OK
+
+
 def test_a_clock_that_is_set_back_does_not_freeze_the_signal() -> None:
     signal = Signal()
     signal.cycle(5000, (5000, 5.0, True))
     assert signal.cycle(10, (9, 6.0, True)) == (6.0, 1, ALIVE | VALID)
+    assert signal.cycle(20, (19, 6.0, True)) == (6.0, 1, ALIVE | RATE_OK | VALID)
 
 
 @pytest.mark.parametrize(
@@ -108,6 +119,8 @@ def test_a_clock_that_is_set_back_does_not_freeze_the_signal() -> None:
         (10, 0.01, 0.01, True),
         (6, 0.01, 0.01, True),
         (19, 0.01, 0.01, True),
+        (5, 0.01, 0.01, True),  # half and double belong to it
+        (20, 0.01, 0.01, True),
         (4, 0.01, 0.01, False),
         (25, 0.01, 0.01, False),
         (10, 0.01, 0.1, True),  # VehicleSpeed: every 10 to 100 ms
@@ -183,3 +196,25 @@ def test_where_no_rate_is_promised_the_time_out_is_three_intervals(interval_ms: 
     last = interval_ms * 19
     assert signal.cycle(last + timeout_ms)[2] & ALIVE
     assert not signal.cycle(last + timeout_ms + 1)[2] & ALIVE
+
+
+def test_the_time_out_of_a_sender_that_promised_its_rate_does_not_follow_it() -> None:
+    signal = Signal()
+    for k in range(20):
+        signal.cycle(90 * k, (90 * k, 5.0, True))
+    assert signal.cycle(90 * 19 + 100)[2] & ALIVE
+    assert not signal.cycle(90 * 19 + 101)[2] & ALIVE
+
+
+def test_the_mean_interval_forgets_with_a_sixteenth() -> None:
+    signal = Signal()
+    for k in range(40):
+        signal.cycle(10 * k, (10 * k, 5.0, True))
+    signal.cycle(416, (416, 5.0, True))
+    assert float(signal.freshness[0]["interval_ns"]) / MS == pytest.approx(10.0 + 16.0 / 16)
+
+
+def test_a_place_has_the_period_range_and_the_time_out_it_is_given() -> None:
+    known = input_freshness({3: (0.01, 0.1)}, {3: 0.7})[3]
+    assert (known["shortest_ns"], known["longest_ns"]) == (5 * MS, 200 * MS)
+    assert known["timeout_ns"] == 700 * MS

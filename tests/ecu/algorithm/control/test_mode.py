@@ -95,10 +95,25 @@ def test_a_pedal_that_is_lost_beside_a_valid_demand_is_seen(params, feed) -> Non
 
 @pytest.mark.parametrize(
     ("position", "pressed", "bit"),
-    [(5.0, 0, 0), (5.1, 0, PEDAL_IMPLAUSIBLE), (5.1, 1, 0), (0, 0, 0), (0, 1, 0)],
+    [
+        (5.0, 0, 0),
+        (5.1, 0, PEDAL_IMPLAUSIBLE),
+        (5.1, 0.49, PEDAL_IMPLAUSIBLE),
+        (5.1, 0.5, 0),
+        (5.1, 1, 0),
+        (0, 0, 0),
+        (0, 1, 0),
+    ],
 )
 def test_a_pedal_that_is_pressed_and_free_at_once(params, feed, position, pressed, bit) -> None:
     inputs = feed(**ALL_GOOD | {"pedal_position": position, "pedal_pressed": pressed})
+    assert input_faults(params[0], inputs[0]) == bit
+
+
+@pytest.mark.parametrize(("lost", "bit"), [("pedal_position", PEDAL_LOST), ("pedal_pressed", 0)])
+def test_a_lost_half_of_the_pedal_contradicts_nothing(params, feed, lost, bit) -> None:
+    inputs = feed(**ALL_GOOD | {"pedal_position": 50.0, "pedal_pressed": 0.0})
+    inputs[0]["verdict"][INPUT[lost]] = ALIVE
     assert input_faults(params[0], inputs[0]) == bit
 
 
@@ -158,3 +173,8 @@ def test_the_start_ends_when_everything_is_there_and_does_not_come_back() -> Non
     assert decide_mode(state[0], 0, False, 0.01) == READY
     assert decide_mode(state[0], IMU_LOST, False, 0.01) == DEGRADED
     assert decide_mode(state[0], 0, True, 0.01) == ACTIVE
+
+
+@pytest.mark.parametrize(("age", "mode"), [(0.99, STARTING), (1.0, DEGRADED)])
+def test_the_start_is_over_after_a_second(age: float, mode: int) -> None:
+    assert decide_mode(np.zeros(1, MODE_STATE)[0], IMU_LOST, False, age) == mode
