@@ -45,6 +45,7 @@ from ecu.warm import warm_up
 HOUR: Final = 360_000  # cycles
 RESTART: Final = 6 * HOUR
 TURN: Final = 200  # cycles between two turns of the recorder; it reads 256 at once
+SETTLED: Final = 25  # cycles: frames of 20 ms are accepted again after 0.15 s
 WRAP: Final = 1 << 32
 GROWTH_MB: Final = 4.0  # of a process after its warm-up: an hour of 24, a tenth of a live run
 PAGE: Final = os.sysconf("SC_PAGE_SIZE")
@@ -110,6 +111,10 @@ class Rig:
         self.heard += count
         return count
 
+    def rejected(self) -> int:
+        """Return how many frames of the ECU the car did not accept so far."""
+        return int(self.node.side.reception.totals["rejected"][0])
+
     def status(self) -> BusStatus:
         """Nothing is ever wrong with this bus."""
         return FINE
@@ -127,7 +132,8 @@ class Life(NamedTuple):
     lost: int
     """Cycles and frames that the recorder missed."""
     spoilt: int
-    """Frames of either side that were not accepted."""
+    """Frames of either side that were not accepted, but for the car's in the first `SETTLED` cycles: whoever
+    starts anew has to be accepted again."""
     wrapped: bool
     kept: str
     """What is wrong with what was learned or with what was stored of it."""
@@ -151,9 +157,10 @@ def run_one(rig: Rig, folder: Path, first: int, cycles: int, memory: list[float]
     counters = ecu.reception.messages
     for name in ("received", "accepted"):
         counters[name] = first % WRAP
-    rejected_before = int(rig.node.side.reception.totals["rejected"][0])
-    overslept = 0
+    overslept, resynchronising = 0, 0
     for done in range(cycles):
+        if done == SETTLED:
+            resynchronising = rig.rejected()
         if done % HOUR == HOUR // 2:
             rig.oversleeps, overslept = True, overslept + 1
         cycle_once(ecu, rig, ring, grid, progress)
@@ -172,7 +179,7 @@ def run_one(rig: Rig, folder: Path, first: int, cycles: int, memory: list[float]
     same = again is not None and again[1].tobytes() == learned.tobytes()
     wrong = out_of_range(learned, params["mu_nominal"][0])
     spoilt = (counters["received"] - counters["accepted"]).sum(dtype=np.int64)
-    spoilt += int(rig.node.side.reception.totals["rejected"][0]) - rejected_before
+    spoilt += rig.rejected() - resynchronising
     return Life(
         progress.number - first,
         progress.overruns,
