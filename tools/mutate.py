@@ -86,7 +86,14 @@ def mutants(source: str) -> Iterator[tuple[str, ast.stmt]]:
 def _nodes(statement: ast.stmt) -> Iterator[ast.AST]:
     """Yield every node that runs."""
     for part in statement.body if isinstance(statement, ast.FunctionDef) else [statement]:
-        yield from ast.walk(part)
+        fields = {inner for node in ast.walk(part) if _is_field(node) for inner in ast.walk(node)}
+        yield from (node for node in ast.walk(part) if node not in fields)
+
+
+def _is_field(node: ast.AST) -> bool:
+    """Whether it lays out a field of a record: name and format."""
+    kinds = [getattr(part, "value", None) for part in node.elts[:2]] if isinstance(node, ast.Tuple) else []
+    return len(kinds) == 2 and all(isinstance(kind, str) for kind in kinds)
 
 
 def _changes(node: ast.AST) -> int:

@@ -186,3 +186,61 @@ def test_a_cap_is_set_once_and_not_raised_by_the_demand(wheels: Wheels) -> None:
     caps = [cap for cap in wheels.run_into(-0.9) if math.isfinite(cap)]
     wheels.sent[0] = 150.0 * BAR
     assert wheels.cycle(-0.95) == pytest.approx(caps[-1] - 4.0)
+
+
+@pytest.mark.parametrize(("speed", "capped"), [(2.9, False), (3.2, True), (4.0, True), (-4.0, True)])
+def test_wheels_are_watched_from_three_metres_per_second_on(params, feed, speed, capped) -> None:
+    caps = Wheels(params, feed, speed).run_into(-0.95)
+    assert any(map(math.isfinite, caps)) == capped
+
+
+@pytest.mark.parametrize(("returning", "cut"), [(3.0, True), (4.5, True), (5.5, False), (8.0, False)])
+def test_the_cap_falls_until_a_wheel_comes_back_at_five_metres_per_second_squared(
+    wheels: Wheels, returning: float, cut: bool
+) -> None:
+    wheels.run_into(-0.9)
+    wheels.wanted[:], wheels.state["cap"][0] = 180.0 * BAR, 170.0 * BAR
+    caps = [wheels.cycle(-0.9 + returning * k * DT / 20.0) for k in range(30)]
+    assert (caps[-1] < caps[-10]) == cut
+
+
+def test_growth_is_low_passed_with_20_ms(wheels: Wheels) -> None:
+    for _ in range(20):
+        wheels.cycle(0.0)
+    wheels.cycle(-0.05)  # 1 m/s in 10 ms
+    assert wheels.state["growth"][0] == pytest.approx(100.0 * (1.0 - math.exp(-0.5)))
+
+
+def test_an_abs_that_is_half_said_to_work_does_not(params, feed) -> None:
+    caps = Wheels(params, feed, abs_active=0.5).run_into(-0.95)
+    assert min(caps) < 56.0
+
+
+def test_within_the_range_a_fast_growing_slip_caps_nothing(wheels: Wheels) -> None:
+    """The driver asks for much more than was sent: it would be held where it is."""
+    wheels.wanted[:] = 150.0 * BAR
+    assert all(math.isinf(cap) for cap in wheels.run_into(-0.09, 0.02))
+
+
+@pytest.mark.parametrize("corner", range(4))
+@pytest.mark.parametrize("lost", [False, True])
+def test_each_wheel_is_watched_by_its_own_sensor(params, feed, corner: int, lost: bool) -> None:
+    state, motion = np.zeros(1, SLIP_GUARD_STATE)[0], np.zeros(1, MOTION_STATE)[0]
+    place, inputs = INPUT["wheel_speed_fl"] + corner, feed()
+    for k in range(12):
+        omega = 20.0 / params[0]["wheel_radius"]
+        omega[corner] *= 1.0 - 0.07 * k
+        feed(inputs, wheel_speed=omega)
+        if lost:
+            inputs[0]["new"][place] = inputs[0]["verdict"][place] = 0
+        guard_slip(params[0], state, inputs[0], motion, 20.0, SENT, SENT, SENT, DT)
+    assert state["capped"].tolist() == [int(i == corner and not lost) for i in range(4)]
+
+
+def test_no_time_between_two_cycles_changes_nothing(wheels: Wheels) -> None:
+    wheels.run_into(-0.08)
+    before = wheels.state.copy()
+    pressures = wheels.sent, wheels.wanted, wheels.wanted
+    guard_slip(wheels.params, wheels.state, wheels.inputs[0], wheels.motion, 20.0, *pressures, 0.0)
+    assert wheels.state["growth"].tolist() == before["growth"].tolist()
+    assert wheels.state["lag"].tolist() == before["lag"].tolist()
