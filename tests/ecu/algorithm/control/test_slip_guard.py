@@ -237,6 +237,23 @@ def test_each_wheel_is_watched_by_its_own_sensor(params, feed, corner: int, lost
     assert state["capped"].tolist() == [int(i == corner and not lost) for i in range(4)]
 
 
+@pytest.mark.parametrize("corner", range(4))
+def test_a_late_sample_is_waited_for_and_a_lost_one_forgotten(params, feed, corner: int) -> None:
+    state, motion = np.zeros(1, SLIP_GUARD_STATE)[0], np.zeros(1, MOTION_STATE)[0]
+    place, inputs = INPUT["wheel_speed_fl"] + corner, feed()
+    lags = []
+    for k in range(8):
+        omega = 20.0 / params[0]["wheel_radius"]
+        omega[corner] *= 1.0 - 0.07 * k
+        feed(inputs, wheel_speed=omega)
+        inputs[0]["new"][place] = k < 5
+        inputs[0]["verdict"][place] *= k < 7
+        guard_slip(params[0], state, inputs[0], motion, 20.0, SENT, SENT, SENT, DT)
+        lags.append(float(state["lag"][corner]))
+    assert lags == pytest.approx([20.0 * 0.07 * k for k in (0, 1, 2, 3, 4, 4, 4)] + [0.0])
+    assert state["growth"][corner] == 0.0
+
+
 def test_no_time_between_two_cycles_changes_nothing(wheels: Wheels) -> None:
     wheels.run_into(-0.08)
     before = wheels.state.copy()
