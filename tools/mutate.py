@@ -17,6 +17,7 @@ import json
 import os
 import signal
 import sys
+import time
 import tomllib
 from collections.abc import Iterator
 from itertools import pairwise
@@ -43,7 +44,7 @@ TESTS = {
     "ecu/algorithm/estimation/joint/kalman.py": ("estimation/joint/test_kalman.py",),
 }
 """The modules that are held to it, and their tests in tests/ecu."""
-TIMEOUT_S = 60
+TIMEOUT_S, SLOWER = 5.0, 3.0  # what a mutant may take at least, and over what the tests take without it
 COMPARISONS: dict[type[ast.cmpop], type[ast.cmpop]] = {
     ast.Lt: ast.LtE,
     ast.LtE: ast.Lt,
@@ -148,7 +149,7 @@ class Mutation:
 
     def __init__(self, module: str, every: int, workers: int) -> None:
         self._module, self._every, self._workers = module, every, workers
-        self.tried = 0
+        self.tried, self._patience_s = 0, 600.0
         self.names: set[str] = set()
         self.survivors: list[str] = []
         self._running: dict[int, str] = {}
@@ -157,8 +158,10 @@ class Mutation:
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
         """Fork a process for each."""
         module = importlib.import_module(self._module.removesuffix(".py").replace("/", "."))
+        began_s = time.monotonic()
         self._start(session, module, "", None)
         self._await_one()
+        self._patience_s = TIMEOUT_S + SLOWER * (time.monotonic() - began_s)
         if not self.survivors:
             raise pytest.UsageError(f"{self._module}: its tests fail without any change")
         self.survivors.clear()
@@ -182,7 +185,7 @@ class Mutation:
             self._running[child] = name
             return
         try:
-            signal.alarm(TIMEOUT_S)
+            signal.setitimer(signal.ITIMER_REAL, self._patience_s)
             if statement is not None:
                 _apply(module, statement)
             for item, following in pairwise([*session.items, None]):

@@ -8,13 +8,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ecu.algorithm.control.demand import DEMAND_STATE, pedal_to_decel, requested_decel, update_demand
+from ecu.algorithm.control.demand import (
+    DEMAND_STATE,
+    hold_pedal,
+    pedal_to_decel,
+    requested_decel,
+    update_demand,
+)
 from ecu.contract.signals import (
     ACCELERATOR_POSITION,
     ALIVE,
     DECEL_DEMAND,
     DECEL_DEMAND_VALID,
     PEDAL_POSITION,
+    PEDAL_PRESSED,
+    USABLE,
     VALID,
     WHEEL_SPEED,
 )
@@ -198,3 +206,43 @@ def test_a_lost_request_is_no_release(holding) -> None:
     lost = (PEDAL_POSITION, DECEL_DEMAND)
     assert np.isnan(holding.run(0.5, pedal=20.0, lost=lost)).all()
     assert holding.run(0.01, pedal=20.0)[0] == pytest.approx(holding.hold)
+
+
+# 2.44 m/s^2 lies between 40 % (2.1) and 60 % (4.0) of the map: 40 + 20 * 0.34 / 1.9
+SECONDARY = 43.579
+LOST_POSITIONS = [
+    # case, position before [%], switch, its verdict, mapped, position then [%], usable
+    ("pressed since before it was lost", 60.0, 1.0, USABLE, 1, 60.0, True),
+    ("let go", 60.0, 0.0, USABLE, 1, 0.0, True),
+    ("pressed only since it was lost", 0.0, 1.0, USABLE, 1, SECONDARY, True),
+    ("pressed less than anyone brakes with", 5.5, 1.0, USABLE, 1, SECONDARY, True),
+    ("the switch is lost too", 60.0, 1.0, ALIVE, 1, 60.0, False),
+    ("a car without a pedal position", 60.0, 1.0, USABLE, 0, 60.0, False),
+]
+
+
+@pytest.mark.parametrize(
+    ("case", "before", "switch", "verdict", "mapped", "then", "usable"),
+    LOST_POSITIONS,
+    ids=[row[0] for row in LOST_POSITIONS],
+)
+def test_a_pedal_whose_position_is_lost_is_held_by_its_switch(
+    params, feed, case, before, switch, verdict, mapped, then, usable
+) -> None:
+    state, inputs = np.zeros(1, DEMAND_STATE)[0], feed(pedal_position=before, pedal_pressed=1.0)
+    hold_pedal(params[0], state, inputs[0])
+    assert inputs[0]["value"][PEDAL_POSITION] == before
+    params["mapped"][0, PEDAL_POSITION] = mapped
+    feed(inputs, pedal_pressed=switch)
+    inputs[0]["verdict"][PEDAL_POSITION], inputs[0]["verdict"][PEDAL_PRESSED] = ALIVE, verdict
+    hold_pedal(params[0], state, inputs[0])
+    assert inputs[0]["value"][PEDAL_POSITION] == pytest.approx(then, abs=1e-3)
+    assert bool(inputs[0]["verdict"][PEDAL_POSITION] & USABLE == USABLE) is usable
+
+
+def test_a_map_that_asks_for_less_than_a_secondary_brake_gives_all_it_has(params, feed) -> None:
+    params["pedal_decel"][0] *= 0.2
+    state, inputs = np.zeros(1, DEMAND_STATE)[0], feed(pedal_pressed=1.0)
+    inputs[0]["verdict"][PEDAL_POSITION] = ALIVE
+    hold_pedal(params[0], state, inputs[0])
+    assert inputs[0]["value"][PEDAL_POSITION] == 100.0

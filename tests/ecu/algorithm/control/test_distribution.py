@@ -368,3 +368,15 @@ def test_where_the_trailing_linings_do_nothing_there_is_nothing_to_cap(params, s
     before, after = capped(params, state, 0.5, (0.45, 0.36), (0.45, 0.36), (0.05, 0.05), motor=(0.0, 1.0))
     assert before[2:] == pytest.approx([params["push_out_pressure"][0, 2]] * 2)
     assert after.tolist() == before.tolist()
+
+
+def test_a_brake_that_gives_nothing_is_no_part_of_its_axles_rule(params, state) -> None:
+    """Rear 20 % smooth and not sure of it: each wheel that brakes is held as both would be."""
+    known = (0.5, (0.45, 0.36), (0.45, 0.36), (0.045, 0.045))
+    both = capped(params, state, *known)[1]
+    for dead in (2, 3):
+        failed = np.arange(4) == dead
+        before, after = capped(params, state, *known, failed=failed.astype(np.uint8))
+        alive = 5 - dead
+        assert after[alive] < before[alive]
+        assert after[:2].tolist() == both[:2].tolist()

@@ -231,3 +231,8 @@ def test_the_axle_that_slips_is_relieved_here_too(params) -> None:
     free, held = Replaced(params, (FL,), 3.0), Replaced(params, (FL,), 3.0, trailing=0.5)
     assert held.force[RL] / held.load[RL] == pytest.approx(0.5 * held.force[FR] / held.load[FR])
     assert held.force[FR] > free.force[FR]
+
+
+def test_with_no_brake_left_nothing_is_moved(params) -> None:
+    car = Replaced(params, (FL, FR, RL, RR), 3.0)
+    assert car.force == pytest.approx(car.before)
