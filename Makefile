@@ -28,8 +28,8 @@ check: .venv/dev
 	.venv/bin/mypy
 
 coverage: .venv/dev
-	NUMBA_DISABLE_JIT=1 .venv/bin/python -m pytest -n auto --maxprocesses 4 --cov \
-		tests/ecu/control tests/ecu/bus $(ARGS)
+	NUMBA_DISABLE_JIT=1 .venv/bin/python -m pytest -n auto --maxprocesses 4 \
+		tests/ecu/control tests/ecu/bus $(ARGS) --cov
 
 mutants: .venv/dev
 	.venv/bin/python tools/mutate.py $(ARGS)
