@@ -180,3 +180,22 @@ def test_a_sender_that_may_choose_is_silent_only_behind_its_slowest_rate() -> No
     for k in range(30):
         judge_link(state, P_OK, (1000 + 100 * k) * MS, PERIOD, 10 * PERIOD)
     assert (NAMES[int(state["link"])], state["ok_count"]) == ("VALID", 16)
+
+
+@pytest.mark.parametrize(("periods", "silent"), [(1.4, 0), (1.45, 0), (1.55, 1), (2.4, 1), (2.6, 2)])
+def test_silence_is_counted_in_whole_periods(periods: float, silent: int) -> None:
+    state = new_link()
+    for k in range(30):
+        judge_link(state, P_OK, (1000 + 10 * k) * MS, PERIOD, PERIOD)
+    judge_link(state, P_OK, 1290 * MS + int(periods * PERIOD), PERIOD, PERIOD)
+    assert state["ok_count"] == 16 - silent
+
+
+def test_the_seventeenth_frame_of_a_crowd_is_told_and_four_more_at_its_rate() -> None:
+    """Beyond 16 periods; it empties by 1.25 a period, and each frame adds one."""
+    state = new_link()
+    loud = [bool(judge_link(state, P_OK, 1000 * MS, PERIOD, PERIOD)) for _ in range(100)]
+    assert loud == [False] * 16 + [True] * 84
+    after = [bool(judge_link(state, P_OK, (1010 + 10 * k) * MS, PERIOD, PERIOD)) for k in range(8)]
+    assert after == [True] * 3 + [False] * 5
+    assert state["told_ns"] == 1030 * MS

@@ -5,7 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from ecu.algorithm.estimation.joint.kalman import GATE, REJECT, clear_state, correct, drift_speed, forget
+from ecu.algorithm.estimation.joint.kalman import (
+    GATE,
+    REJECT,
+    clear_derivatives,
+    clear_state,
+    correct,
+    drift_speed,
+    forget,
+)
 from ecu.algorithm.estimation.joint.layout import (
     BIAS,
     CHANGE,
@@ -329,3 +337,9 @@ def test_a_measurement_of_friction_and_mass_together_ties_them() -> None:
     P = state["p"]
     assert P[LEVEL, LEVEL] + P[MASS, MASS] - 2 * P[LEVEL, MASS] == pytest.approx(1e-8, rel=1e-3)
     assert P[LEVEL, LEVEL] + P[MASS, MASS] + 2 * P[LEVEL, MASS] == pytest.approx(2 * 0.1**2)
+
+
+def test_a_measurement_begins_without_derivatives() -> None:
+    state = some_state(1)
+    clear_derivatives(state)
+    assert state["h"].tolist() == [0.0] * N
