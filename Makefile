@@ -8,7 +8,7 @@ help:
 	@echo "make demo    the ECU brakes a simulated car on a bus, in real time; a report at the end"
 	@echo "make test    every test"
 	@echo "make check   ruff, format and types"
-	@echo "make coverage  lines and branches of ecu/control and ecu/bus, kernels as plain Python: all of them"
+	@echo "make coverage  lines and branches of ecu/algorithm/control and ecu/bus, kernels as plain Python: all of them"
 	@echo "make mutants   one change at a time in what brakes: which one do the tests not notice?"
 	@echo "make fuzz      damaged files by the thousand"
 	@echo "make soak      24 h in virtual time; ARGS='live --hours 1': in real time"
@@ -29,7 +29,7 @@ check: .venv/dev
 
 coverage: .venv/dev
 	NUMBA_DISABLE_JIT=1 .venv/bin/python -m pytest -n auto --maxprocesses 4 \
-		tests/ecu/control tests/ecu/bus $(ARGS) --cov
+		tests/ecu/algorithm/control tests/ecu/bus $(ARGS) --cov
 
 mutants: .venv/dev
 	.venv/bin/python tools/mutate.py $(ARGS)

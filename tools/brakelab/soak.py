@@ -3,7 +3,7 @@
     python -m brakelab.soak virtual --hours 24        the loop on a clock of its own, as fast as it goes
     python -m brakelab.soak live --hours 1            `brake-ecu run` with recording and store, in real time
 
-`virtual` runs `ecu.runtime.cycle.cycle_once` with ring, recorder and state store in one process: the loop closed over
+`virtual` runs `cycle_once` with ring, recorder and state store in one process: the loop closed over
 real frames. Cycle numbers and counters of frames begin half a run below 2^32; every hour the clock
 oversleeps a period; every six hours the ECU ends and another one begins with what was stored.
 `live` is daemon and car on a bus. Prints a table of checks; exit code 1 if one fails.
