@@ -149,7 +149,27 @@ def test_a_module_is_one_idea(path: Path) -> None:
     assert len(path.read_text("utf-8").splitlines()) <= 350, "split it: 300 lines are the aim, 350 the limit"
 
 
-def test_every_path_that_the_documents_name_exists() -> None:
-    for document in [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]:
-        for target in re.findall(r"\]\((?!https?:|#)([^)#]+)", document.read_text("utf-8")):
-            assert (document.parent / target).exists(), f"{document.name}: {target}"
+DOCUMENTS = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
+
+
+def _anchors(document: Path) -> set[str]:
+    """Fragments that the headings of a document answer to."""
+    headings = re.findall(r"^#+ +(.*)$", document.read_text("utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_every_relative_link_leads_somewhere(document: Path) -> None:
+    for target in re.findall(r"\]\(\s*(?!https?:)([^)]+)\)", document.read_text("utf-8")):
+        path, _, fragment = target.partition("#")
+        linked = document.parent / path if path else document
+        assert linked.exists(), target
+        assert not fragment or fragment in _anchors(linked), target
+
+
+def test_the_index_of_the_documents_names_every_page() -> None:
+    index = ROOT / "docs/README.md"
+    linked = {
+        (index.parent / path).resolve() for path in re.findall(r"\]\(([^)#]+)", index.read_text("utf-8"))
+    }
+    assert {*(ROOT / "docs").rglob("*.md")} - {index} <= linked

@@ -196,7 +196,7 @@ def test_json_has_null_for_what_is_not_finite() -> None:
 
 
 def test_page_and_picture(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    (tmp_path / "docs" / "images").mkdir(parents=True)
+    (tmp_path / "docs" / "results" / "images").mkdir(parents=True)
     t = np.linspace(0.0, 6.0, 100)
     car = Consistency((t, t), (np.full((2, 100), 0.5),) * 2, (np.ones((5, 20)),) * 2)
     monkeypatch.setattr(command, "resource", lambda name: tmp_path / name)
@@ -208,11 +208,11 @@ def test_page_and_picture(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> No
     monkeypatch.setattr(command, "consistency_of", lambda seed: car)
     monkeypatch.setattr(command, "step_times", lambda: {JOINT: Figure(2.0, 1.0, 3.0)})
     assert command.bench("observers", json=False, seeds=1) == 0
-    page = (tmp_path / "docs" / "observers.md").read_text(encoding="utf-8")
+    page = (tmp_path / "docs" / "results" / "observers.md").read_text(encoding="utf-8")
     assert "seeds 0–0" in page
     for table in observer_tables(found, {JOINT: Figure(2.0, 1.0, 3.0)}, [car], "wide"):
         assert markdown(table).rstrip() in page
-    picture = (tmp_path / "docs" / "images" / "observers.svg").read_text(encoding="utf-8")
+    picture = (tmp_path / "docs" / "results" / "images" / "observers.svg").read_text(encoding="utf-8")
     middle = TOP + 0.5 * HEIGHT
     # 0.5 of 2σ, up, in a panel whose edges are at 2.
     assert f"{LEFT:.0f},{middle - 0.25 * 0.5 * HEIGHT:.1f} " in picture

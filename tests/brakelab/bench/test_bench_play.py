@@ -65,12 +65,12 @@ def test_play_tables(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_page_keeps_the_tables_of_other_buses(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(output, "resource", lambda name: tmp_path / name)
-    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs" / "results").mkdir(parents=True)
     for title, value in [("one bus", "1"), ("another", "2"), ("one bus", "3")]:
         table = Table(title, ("what", "us"), [("a", value)], "Below.")
         monkeypatch.setattr("brakelab.bench.play.play_tables", lambda seconds, table=table: [table])
         assert command.bench("play", json=False) == 0
-    text = (tmp_path / "docs" / "play.md").read_text(encoding="utf-8")
+    text = (tmp_path / "docs" / "results" / "play.md").read_text(encoding="utf-8")
     assert text.count("Below.") == text.count("## ") == 2
     assert (
         text.index("## one bus")

@@ -73,14 +73,14 @@ def test_window_begins_half_a_second_after_the_full_demand_and_ends_at_15_kmh() 
 def test_page_names_config_seeds_and_every_figure(
     result: Stops, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs" / "results").mkdir(parents=True)
     (tmp_path / "config").mkdir()
     (tmp_path / "config" / "suv.toml").write_bytes(resource("config/suv.toml").read_bytes())
     monkeypatch.setattr(command, "resource", lambda name: tmp_path / name)
     monkeypatch.setattr(output, "resource", lambda name: tmp_path / name)
     monkeypatch.setattr(command.stops_bench, "stops", lambda config, seeds, spread, draw: result)
     assert command.bench("stops", json=False, seeds=20) == 0
-    page = (tmp_path / "docs" / "observer-accuracy.md").read_text(encoding="utf-8")
+    page = (tmp_path / "docs" / "results" / "observer-accuracy.md").read_text(encoding="utf-8")
     assert "config/suv.toml" in page
     assert "seeds 0–19" in page
     for table in stop_tables(result, 20):

@@ -139,9 +139,9 @@ def one_bench(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """The command with one instant bench, in a checkout whose documentation is empty."""
     rows = [Row("a", FIGURE, Figure(6.0, 6.0, 6.0), "µs", "peer"), Row("b", FIGURE, None, "µs", "none")]
     monkeypatch.setattr(command, "BENCHES", {"step": command.Bench(lambda: rows, "step", "Below.")})
-    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs" / "results").mkdir(parents=True)
     monkeypatch.setattr(output, "resource", lambda name: tmp_path / name)
-    return tmp_path / "docs" / "benchmarks.md"
+    return tmp_path / "docs" / "results" / "benchmarks.md"
 
 
 def test_json_holds_machine_figures_and_ratio(one_bench: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,4 +1,4 @@
-"""The tutorial of docs/friction-lab.md, run as it stands on a stranger's CSV with damaged rows."""
+"""The tutorial of docs/results/friction-lab.md, run as it stands on a stranger's CSV with damaged rows."""
 
 import re
 import shutil
@@ -19,7 +19,7 @@ from brakelab.plant.friction.law import RigBrake
 from brakelab.plant.linings import Linings
 from ecu.settings.resources import resource
 
-PAGE = resource("docs") / "friction-lab.md"
+PAGE = resource("docs/results/friction-lab.md")
 
 
 class InThisProcess(ThreadPoolExecutor):

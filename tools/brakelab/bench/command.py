@@ -11,7 +11,7 @@ from rich.progress import track
 
 from brakelab.bench import codec, cycle, plant, step
 from brakelab.bench.measure import NOT_INSTALLED, Row, machine
-from brakelab.bench.output import plain_row, print_json, print_tables, write_page
+from brakelab.bench.output import PICTURES, plain_row, print_json, print_tables, write_page
 from brakelab.studies import (
     ablation,
     bound,
@@ -116,9 +116,9 @@ BENCHES: Final = {
 def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0, draw: str = WIDE) -> int:
     """Run one bench, or without a name all that measure time; print tables, or JSON. Returns 0.
 
-    In a checkout, a run of all times renews docs/benchmarks.md, `stops` docs/observer-accuracy.md,
-    `observers` docs/observers.md, each other one the page of its name; that of `play` keeps the tables of
-    other buses. `seeds`: how many cars `stops` and `observers` draw, the others at most;
+    In a checkout, a run of all times renews docs/results/benchmarks.md, `stops` observer-accuracy.md
+    beside it, each other bench the page of its name; `play` keeps the tables of other buses.
+    `seeds`: how many cars `stops` and `observers` draw, the others at most;
     `draw`: how far those of `stops` and `observers` differ from their file, pages are of the wide one;
     `seconds`: how long `lateness` drives and all players of `play` send.
 
@@ -217,7 +217,7 @@ def _observers(json: bool, seeds: int, draw: str) -> int:
         return 0
     text = f"`brake-ecu bench observers`, {of}. {machine()}. {OBSERVERS_TEXT}"
     write_page("observers.md", "The observers beside their goals", text, tables)
-    write_picture(resource("docs") / "images" / "observers.svg", consistency)
+    write_picture(resource(PICTURES) / "observers.svg", consistency)
     return 0
 
 
@@ -251,7 +251,7 @@ def _wear(json: bool, seeds: int) -> int:
     laws = wear_study.dynamometer_laws()
     lives = wear.wear_lives(cars, laws)
     if not json:
-        picture = resource("docs") / "images" / "wear.svg"
+        picture = resource(PICTURES) / "wear.svg"
         write_chart(picture, wear.wear_panels(lives, len(cars)), wear.LEGEND)
     return _page(WEAR, "Wear", WEAR_TEXT, wear.wear_tables(cars, laws, lives), json)
 
@@ -280,7 +280,7 @@ def _compensation(json: bool) -> int:
         cars = compensation.drive_cars(config, spread=pool.map)
     tables = compensation_table.compensation_tables(cars)
     if not json:
-        picture = resource("docs") / "images" / "compensation.svg"
+        picture = resource(PICTURES) / "compensation.svg"
         write_chart(picture, compensation_picture.pictured(config), compensation_picture.LEGEND)
     return _page(COMPENSATION, "What compensation is worth", COMPENSATION_TEXT, tables, json)
 
@@ -290,7 +290,7 @@ def _margins(json: bool) -> int:
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
         cars = margins.measure_cars(config, spread=pool.map)
     if not json:
-        picture = resource("docs") / "images" / "control-margins.svg"
+        picture = resource(PICTURES) / "control-margins.svg"
         write_chart(picture, margins.margin_panels(cars), margins.LEGEND)
     tables = margins.margin_tables(cars)
     return _page(MARGINS, "Margins of the control loop", MARGINS_TEXT, tables, json, "control-margins")

@@ -1,14 +1,17 @@
 """What a bench puts out: tables on the terminal, JSON, and pages of the documentation."""
 
 import json as json_format
-from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from rich.console import Console
 
 from brakelab.bench.measure import Figure, Row
 from brakelab.studies.table import Table, markdown, show
 from ecu.settings.resources import resource
+
+RESULTS: Final = "docs/results"
+"""Folder of the pages that benches write."""
+PICTURES: Final = f"{RESULTS}/images"
 
 
 def plain_row(row: Any) -> dict[str, Any]:
@@ -33,7 +36,7 @@ def print_tables(line: str, tables: list[Table]) -> None:
 
 def write_page(name: str, title: str, text: str, tables: list[Table], keep: bool = False) -> None:
     """Renew a page; with `keep` the sections of other titles stay: of other buses, measured elsewhere."""
-    folder: Path = resource("docs")
+    folder = resource(RESULTS)
     if folder.is_dir():
         sections = {table.title: markdown(table) for table in tables}
         if keep and (folder / name).exists():
@@ -42,4 +45,4 @@ def write_page(name: str, title: str, text: str, tables: list[Table], keep: bool
             sections = kept | sections
         content = "\n".join([f"# {title}", "", text, "", *sections.values()])
         (folder / name).write_text(content.rstrip() + "\n", encoding="utf-8")
-        Console(stderr=True).print(f"written: docs/{name}", highlight=False)
+        Console(stderr=True).print(f"written: {RESULTS}/{name}", highlight=False)

@@ -1,4 +1,4 @@
-"""The tables of docs/compensation.md."""
+"""The tables of docs/results/compensation.md."""
 
 from typing import Final
 
@@ -57,7 +57,8 @@ def _figure_table(cars: list[Car]) -> Table:
         "time (5.9, 5.10), at equal pedal over 1 to 6 m/s² (5.11, 5.12). Of 5.8 (compensation abates the "
         "error at every f, and motors the disturbance) the five cars stand in "
         "[blending.md](blending.md). The thesis's figures have no numbers to compare with. In 5.10 nominal "
-        "friction, too high in front and too low at the rear, is as good by chance: see control.md.",
+        "friction, too high in front and too low at the rear, is as good by chance: see "
+        "[control.md](../control.md).",
     )
 
 
@@ -114,7 +115,8 @@ def mass_table(cars: list[Car]) -> Table:
         "Mean over the applications from the second on; mass beyond the configured one. An estimate "
         "learned from deceleration makes the car keep what the pedal asks for whatever it weighs; the ideal "
         "knows friction and not mass, so beside it such a car is off by its mass. What that leaves is "
-        "nearly the same in all cars: friction at the beginning of a braking, see control.md.",
+        "nearly the same in all cars: friction at the beginning of a braking, see "
+        "[control.md](../control.md).",
     )
 
 

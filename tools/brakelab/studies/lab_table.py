@@ -166,7 +166,7 @@ def _ams(lab: Lab) -> Table:
         "alone; closed loop: RMS error [%] of the six means when the law's own friction sets the pressure. "
         "*: chosen. A and C fade above what CPC shows them, so all laws extrapolate, and those that rise "
         "with temperature miss most, as in the thesis. ILVO is good in replay and not in closed loop, as "
-        "docs/friction.md found of the thesis's own numbers: the measured pressure holds the "
+        "friction.md found of the thesis's own numbers: the measured pressure holds the "
         f"answer.\n\n{_verdict(lab)}"
     )
     return Table("Table 3.4: AMS, which no law has seen", columns, rows, below)
@@ -231,7 +231,7 @@ def _numbers(lab: Lab) -> Table:
         rows.append((name, *cells))
     columns = ("number", *(f"{b}{what}" for b in BRAKES for what in (", thesis", "")))
     below = (
-        "ILVO on CPC of our pads, form R1 of docs/friction.md, units there. The thesis's are of its "
+        "ILVO on CPC of our pads, form R1 of friction.md, units there. The thesis's are of its "
         "brakes: the same signs and orders of size, no more is to be expected. Its a (10⁻⁹, without a "
         "mantissa) has no value to compare."
     )
@@ -249,7 +249,7 @@ def _recovery(lab: Lab) -> Table:
     below = (
         f"R1, 36 stops at constant pressure, torque with 1 % noise, {DRAWS} draws; the goal is 90 to 99 % "
         f"within the intervals, found over all {overall:.0f} %. With R1 and these numbers Table 3.4 is met "
-        "to 1.96 % (docs/friction.md)."
+        "to 1.96 % (friction.md)."
     )
     columns = ("number", "truth", "within the interval of 95 % [%]", "half interval [%]")
     return Table("ILVO found in its own data", columns, rows, below)

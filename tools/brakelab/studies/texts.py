@@ -123,7 +123,7 @@ FAILURES_TEXT: Final = (
     "circuit takes at 4 m/s² and more, and the diagonal one at 6 m/s², the grip of the other wheels does not "
     "give at once; what one front calliper takes at 6 m/s² the limit of the yaw moment does not. "
     f"{failures.CARS} cars of the wide draw, median (least–greatest). "
-    "[control.md](control.md#brakes-that-fail) says how."
+    "[control.md](../control.md#brakes-that-fail) says how."
 )
 
 RECORDED_TEXT: Final = (
@@ -173,7 +173,7 @@ PLAY_TEXT: Final = (
 )
 
 WEAR_TEXT: Final = (
-    "How wear is kept, measured and identified: [pad-wear.md](pad-wear.md). Cars are drawn (wide) from "
+    "How wear is kept, measured and identified: [pad-wear.md](../pad-wear.md). Cars are drawn (wide) from "
     "config/plant/suv.toml; each is driven in closed loop, without a speed reference, through one trip of "
     "real driving by a calm, a usual and a lively driver in winter, spring and summer, its ECU going on with "
     "what it has learned. Parts of these trips (town, country, motorway) are drawn into 30,000 km, one mix "
