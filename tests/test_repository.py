@@ -167,6 +167,16 @@ def test_every_relative_link_leads_somewhere(document: Path) -> None:
         assert not fragment or fragment in _anchors(linked), target
 
 
+@pytest.mark.parametrize("page", sorted((ROOT / "docs/results").glob("*.md")), ids=lambda path: path.name)
+def test_every_page_of_results_says_what_it_was_measured_on(page: Path) -> None:
+    """By what command, on what commit, with what configuration: `tools/stale_pages.py` reads it."""
+    text = page.read_text("utf-8")
+    assert re.search(
+        r"^Measured on commit [0-9a-f]{7}(-dirty)?, config/suv\.toml [0-9a-f]{12}\.$", text, re.M
+    )
+    assert re.search(r"`brake-ecu bench ?\w*`, version \d", text)
+
+
 def test_the_index_of_the_documents_names_every_page() -> None:
     index = ROOT / "docs/README.md"
     linked = {

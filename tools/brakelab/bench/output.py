@@ -6,6 +6,7 @@ from typing import Any, Final
 from rich.console import Console
 
 from brakelab.bench.measure import Figure, Row
+from brakelab.bench.provenance import measured_on
 from brakelab.studies.table import Table, markdown, show
 from ecu.settings.resources import resource
 
@@ -43,6 +44,6 @@ def write_page(name: str, title: str, text: str, tables: list[Table], keep: bool
             _, *before = (folder / name).read_text(encoding="utf-8").split("\n## ")
             kept = {section.partition("\n")[0]: f"## {section.rstrip()}\n" for section in before}
             sections = kept | sections
-        content = "\n".join([f"# {title}", "", text, "", *sections.values()])
+        content = "\n".join([f"# {title}", "", measured_on(), "", text, "", *sections.values()])
         (folder / name).write_text(content.rstrip() + "\n", encoding="utf-8")
         Console(stderr=True).print(f"written: {RESULTS}/{name}", highlight=False)
