@@ -183,3 +183,12 @@ def test_the_index_of_the_documents_names_every_page() -> None:
         (index.parent / path).resolve() for path in re.findall(r"\]\(([^)#]+)", index.read_text("utf-8"))
     }
     assert {*(ROOT / "docs").rglob("*.md")} - {index} <= linked
+
+
+def test_the_glossary_names_what_the_code_has() -> None:
+    glossary = (ROOT / "docs/glossary.md").read_text("utf-8")
+    cells = [row.rsplit("|", 2)[1] for row in re.findall(r"^\|.*\|$", glossary, re.MULTILINE)]
+    names = {name for cell in cells for name in re.findall(r"`(\w+)`", cell)}
+    words = {word for path in SOURCES for word in re.findall(r"\w+", path.read_text("utf-8"))}
+    assert len(names) > 50
+    assert names <= words, f"renamed or gone: {sorted(names - words)}"
