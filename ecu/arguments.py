@@ -1,11 +1,41 @@
-"""What the commands of `brake-ecu` share: files that are shipped by a short name, and a bus."""
+"""Options and arguments that several commands of `brake-ecu` take, and the look of their help."""
 
+import re
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from ecu.settings.resources import SCENARIOS, named
+
+
+class PlainHelp(TyperCommand):
+    """A command whose help names its arguments as the README does: `LOG...`, without Python types."""
+
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        """Return what stands behind the command's name in its usage line."""
+        pieces: list[str] = super().collect_usage_pieces(ctx)
+        return [re.sub(r"^{(.*)}", r"\1", piece) for piece in pieces]
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Write the sections of arguments and options."""
+        for section, kind in (("Arguments", "argument"), ("Options", "option")):
+            parameters = [one for one in self.get_params(ctx) if one.param_type_name == kind]
+            records = [one.get_help_record(ctx) for one in parameters]
+            lines = [(re.sub(r" <.*>$", "", record[0]), record[1]) for record in records if record]
+            if lines:
+                with formatter.section(section):
+                    formatter.write_dl(lines)
+
+
+class Commands(typer.Typer):
+    """A group of commands with plain help."""
+
+    def command(self, name: str | None = None, **options: Any) -> Callable[[Any], Any]:
+        """Decorate a function as a command of this group."""
+        return super().command(name, cls=PlainHelp, **options)
 
 
 def config_file(name: str) -> Path:
@@ -24,22 +54,25 @@ def scenario_file(name: str) -> Path:
 
 
 CONFIG_OPTION = typer.Option(
-    "--config", parser=config_file, metavar="CONFIG", help="Vehicle and tuning: a file, or suv, …"
+    "--config",
+    parser=config_file,
+    metavar="CONFIG",
+    help="Vehicle and tuning: file or name (suv, …)",
 )
 MAP_OPTION = typer.Option(
-    "--map", parser=map_file, metavar="MAP", help="Signal map of a foreign bus: a file, or mustang, …"
+    "--map", parser=map_file, metavar="MAP", help="Signal map: file or name (mustang, …)"
 )
 INTERFACE_OPTION = typer.Option(
-    "-i", "--interface", metavar="INTERFACE", help="As python-can calls it: socketcan, …"
+    "-i", "--interface", metavar="INTERFACE", help="Interface of python-can: socketcan, …"
 )
-CHANNEL_OPTION = typer.Option("-c", "--channel", metavar="CHANNEL", help="As python-can calls it: can0, …")
+CHANNEL_OPTION = typer.Option("-c", "--channel", metavar="CHANNEL", help="Channel of the interface: can0, …")
 OBSERVER_OPTION = typer.Option(
-    "--observer", metavar="OBSERVER", help="joint, observer1, observer2; default: CONFIG's"
+    "--observer", metavar="OBSERVER", help="joint, observer1 or observer2; default: CONFIG's"
 )
-STATE_OPTION = typer.Option("--state", metavar="DIR", help="Where learned friction is kept between runs")
+STATE_OPTION = typer.Option("--state", metavar="DIR", help="Folder that keeps learned values between runs")
 
 DRAW_OPTION = typer.Option(
-    "--draw", metavar="WIDTH", help="How far cars differ from their file: wide, nominal; default: SCENARIO's"
+    "--draw", metavar="WIDTH", help="Spread of the drawn cars: wide or nominal; default: SCENARIO's"
 )
 
 Config = Annotated[Path, CONFIG_OPTION]

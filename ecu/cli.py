@@ -30,6 +30,7 @@ from ecu.arguments import (
     CONFIG_OPTION,
     INTERFACE_OPTION,
     Channel,
+    Commands,
     Config,
     Interface,
     Map,
@@ -42,8 +43,8 @@ LABORATORY = ("bokeh", "jinja2", "pyarrow", "pymoo", "scipy")
 FLEET = ("distributed", "fsspec")
 """What the extra `fleet` installs."""
 
-app = typer.Typer(
-    help="A real-time brake ECU: estimates brake lining friction, corrects pressure demands by it.",
+app = Commands(
+    help="Real-time brake ECU: estimates brake lining friction and corrects pressure demands by it.",
     add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
@@ -60,7 +61,7 @@ def _show_version(wanted: bool) -> None:
 def _options(
     version: Annotated[
         bool,
-        typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and leave"),
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit."),
     ] = False,
 ) -> None:
     pass
@@ -74,7 +75,9 @@ def run(
     map: Map = None,
     record: Annotated[
         Path | None,
-        typer.Option("--record", metavar="DIR", help="Record frames, cycles and outputs into this folder"),
+        typer.Option(
+            "--record", metavar="DIR", help="Record frames, cycles and outputs into a new folder of DIR"
+        ),
     ] = None,
     record_limit: Annotated[
         float | None,
@@ -88,10 +91,10 @@ def run(
     state: State = None,
     standby: Annotated[
         bool,
-        typer.Option("--standby", help="Silent beside a daemon that runs; takes over when it is silent"),
+        typer.Option("--standby", help="Stay silent beside a running daemon; take over when it falls silent"),
     ] = False,
 ) -> int:
-    """The daemon on a bus. A shadow unless `transmit = true` in CONFIG arms it."""
+    """Run the daemon on a CAN bus. Its demands are flagged invalid unless `transmit = true` in CONFIG."""
     with kept_out("rich", "scipy"):  # structlog's tracebacks, and BLAS that no kernel of the cycle calls
         import numba.np.arraymath  # noqa: F401
 
@@ -105,17 +108,20 @@ def run(
 def wear(
     config: Config,
     state: Annotated[
-        Path, typer.Option("--state", metavar="DIR", help="Where `run` and `replay` keep what is learned")
+        Path,
+        typer.Option("--state", metavar="DIR", help="Folder of learned values, as for `run` and `replay`"),
     ],
     new_pads: Annotated[
-        str | None, typer.Option("--new-pads", metavar="AXLE", help="New pads were fitted: front, rear, all")
+        str | None, typer.Option("--new-pads", metavar="AXLE", help="Register new pads: front, rear or all")
     ] = None,
     measured: Annotated[
         str | None,
-        typer.Option("--measured", metavar="fl=9.8,…", help="Thickness of linings in mm, without backplate"),
+        typer.Option(
+            "--measured", metavar="fl=9.8,…", help="Register measured linings in mm, without backplate"
+        ),
     ] = None,
 ) -> int:
-    """What is left of the brake pads and how far it goes. Takes new pads and measured thicknesses."""
+    """Show how thick the brake pads are and how far they last. Register new and measured ones."""
     from ecu import pads
 
     return pads.wear_command(config, state, new_pads, measured)
@@ -128,7 +134,7 @@ def doctor(
     interface: Annotated[str | None, INTERFACE_OPTION] = None,
     channel: Annotated[str | None, CHANNEL_OPTION] = None,
 ) -> int:
-    """What this machine lacks to run it. With a bus: frames, rates, E2E."""
+    """Check that this machine can run the ECU. With a bus, check its frames, rates and E2E too."""
     from ecu import doctor
 
     return doctor.doctor(config, map, interface, channel)

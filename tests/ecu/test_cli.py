@@ -1,5 +1,6 @@
 """What a user reads who typed something wrong: one line, and the exit code."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -39,7 +40,7 @@ COMMANDS = (
         ),
         ("play drive.log -i socketcan -c can0 --speed fast", "Invalid value for '--speed'"),
         ("replay drive.log --config suv --out r.parquet --observer best", "take joint, observer1, observer2"),
-        ("replay --config suv --out r.parquet", "Missing argument 'LOG…'"),
+        ("replay --config suv --out r.parquet", "Missing argument 'LOG'"),
         ("simulate nosuch --config suv --out x", "nosuch: no such file, and none that is shipped ("),
         ("bench step codec", "unexpected extra argument"),
         ("rig stop-7 --config suv", "stop-7: no such file, and none that is shipped (blending-0,"),
@@ -167,3 +168,40 @@ def test_a_file_of_that_name_comes_first(
     (here / "suv").write_text("")
     monkeypatch.chdir(here)
     assert str(resources.named("suv", "config")) == "suv"
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        *("run", "demo", "simulate", "rig", "replay", "play", "report", "fleet", "wear", "compare", "tune"),
+        *("bench", "doctor", "map suggest", "lab run", "lab look", "identify friction", "identify wear"),
+    ],
+)
+def test_help_is_an_imperative_and_shows_no_python_types(
+    command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main([*command.split(), "--help"]) == 0
+    usage, sentence, *rest = capsys.readouterr().out.split("\n\n")
+    assert not re.search(r"[<{\[](str|int|path|Path|list|float)\b", "".join([usage, *rest]))
+    first = sentence.split()[0]
+    assert first in VERBS, f"{command}: begins with {first}"
+
+
+VERBS = {
+    *("Run", "Brake", "Simulate", "Test", "Replay", "Play", "Write", "Show", "Compare", "Tune", "Measure"),
+    *("Check", "Propose", "Analyse", "Identify"),
+}
+
+
+def test_commands_fit_one_line_each(capsys: pytest.CaptureFixture[str]) -> None:
+    for group in ([], ["lab"], ["identify"], ["map"]):
+        assert cli.main([*group, "--help"]) == 0
+        assert "..." not in capsys.readouterr().out.partition("Commands:")[2]
+
+
+def test_help_of_bench_lists_every_bench(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["bench", "nope"]) == 2
+    names = capsys.readouterr().err.rpartition("choose one of ")[2].strip().split(", ")
+    assert len(names) > 15
+    assert cli.main(["bench", "--help"]) == 0
+    assert set(names) <= set(re.findall(r"\w+", capsys.readouterr().out.partition("Options:")[0]))

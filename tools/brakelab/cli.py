@@ -13,6 +13,7 @@ from ecu.arguments import (
     CONFIG_OPTION,
     INTERFACE_OPTION,
     Channel,
+    Commands,
     Config,
     Draw,
     Interface,
@@ -23,7 +24,7 @@ from ecu.arguments import (
 )
 from ecu.errors import UserError
 
-app = typer.Typer()
+app = Commands()
 app.add_typer(lab_app, name="lab")
 app.add_typer(identify_app, name="identify")
 
@@ -31,10 +32,10 @@ app.add_typer(identify_app, name="identify")
 @app.command()
 def demo(
     out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Folder of the recording and the report")
+        Path, typer.Option("--out", metavar="DIR", help="Folder to write recording and report into")
     ] = Path("out/demo"),
 ) -> int:
-    """The daemon brakes a simulated car in real time. A report at the end."""
+    """Brake a simulated car in real time and write a report."""
     from brakelab.rig import demo
 
     return demo.demo(out)
@@ -45,17 +46,19 @@ def simulate(
     scenario: Annotated[
         Path,
         typer.Argument(
-            parser=scenario_file, metavar="SCENARIO", help="A scenario file, or a shipped one by name"
+            parser=scenario_file, metavar="SCENARIO", help="Scenario file, or name of a shipped one"
         ),
     ],
     config: Config,
     out: Annotated[
-        Path, typer.Option("--out", metavar="NAME", help="Writes NAME.log, NAME.parquet, NAME.truth.parquet")
+        Path, typer.Option("--out", metavar="NAME", help="Write NAME.log, NAME.parquet, NAME.truth.parquet")
     ],
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the drawn vehicle and its noise")] = 0,
+    seed: Annotated[
+        int, typer.Option("--seed", metavar="N", min=0, help="Seed of the drawn vehicle and its noise")
+    ] = 0,
     draw: Draw = None,
 ) -> int:
-    """A scenario in closed loop. Writes frames, decoded inputs and true values."""
+    """Simulate a scenario in closed loop. Write frames, decoded inputs and true values."""
     from brakelab.simulation import simulate
 
     return simulate.simulate(scenario, config, out, seed, draw)
@@ -66,21 +69,23 @@ def rig(
     scenario: Annotated[
         list[str],
         typer.Argument(
-            metavar="SCENARIO…", help="Scenario files or folders of them, or shipped ones by name: faults, …"
+            metavar="SCENARIO", help="Scenario files, folders of them, or shipped names: faults, …"
         ),
     ],
     config: Config,
     interface: Annotated[str | None, INTERFACE_OPTION] = None,
     channel: Annotated[str | None, CHANNEL_OPTION] = None,
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of results and reports")] = Path(
-        "out/rig"
-    ),
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Folder to write results and reports into")
+    ] = Path("out/rig"),
     lock_step: Annotated[
-        bool, typer.Option("--lock-step", help="In memory, as fast as it goes, instead of on a bus")
+        bool, typer.Option("--lock-step", help="Run in memory, as fast as possible, instead of on a bus")
     ] = False,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the drawn vehicle and its noise")] = 0,
+    seed: Annotated[
+        int, typer.Option("--seed", metavar="N", min=0, help="Seed of the drawn vehicle and its noise")
+    ] = 0,
 ) -> int:
-    """Tables of scenarios with their faults: daemon and vehicle on a bus. One report."""
+    """Test the ECU in scenarios with faults. Write one report."""
     from brakelab.rig import command
 
     if (interface is None) != (channel is None):
@@ -94,14 +99,17 @@ def replay(
     logs: Annotated[
         list[Path],
         typer.Argument(
-            metavar="LOG…",
-            help="One drive, in order: logs of CAN frames (.log .asc .blf .trc .mf4) or "
-            "of signals (.mf4 .parquet .csv)",
+            metavar="LOG",
+            help="Logs of one drive, in order: frames (.log .asc .blf .trc .mf4) or "
+            "signals (.mf4 .parquet .csv)",
         ),
     ],
     config: Config,
     out: Annotated[
-        Path, typer.Option("--out", metavar="RESULT.parquet", help="Results, a row per 10 ms; or .mf4")
+        Path,
+        typer.Option(
+            "--out", metavar="RESULT.parquet", help="Results to write, a row per 10 ms: .parquet or .mf4"
+        ),
     ],
     map: Map = None,
     observer: Observer = None,
@@ -109,11 +117,13 @@ def replay(
     cycles: Annotated[
         Path | None,
         typer.Option(
-            "--cycles", metavar="RECORDING", help="What `run --record` left: repeat its cycles to the bit"
+            "--cycles",
+            metavar="RECORDING",
+            help="Repeat the cycles of this recording of `run --record` to the bit",
         ),
     ] = None,
 ) -> int:
-    """A recorded drive through the code of the ECU. Writes results."""
+    """Replay a recorded drive through the ECU. Write results."""
     from brakelab.replay import command
 
     return command.replay(logs, config, map, observer, state, out, cycles)
@@ -124,15 +134,17 @@ def play(
     log: Annotated[
         Path,
         typer.Argument(
-            metavar="LOG", help="Frames (.log .asc .blf .trc .mf4) or signals (.mf4 .parquet .csv)"
+            metavar="LOG", help="Log of frames (.log .asc .blf .trc .mf4) or signals (.mf4 .parquet .csv)"
         ),
     ],
     interface: Interface,
     channel: Channel,
     map: Map = None,
-    speed: Annotated[float, typer.Option("--speed", metavar="X", help="Times real time, 0.1–20")] = 1.0,
+    speed: Annotated[
+        float, typer.Option("--speed", metavar="X", help="Speed over real time, 0.1 to 20")
+    ] = 1.0,
 ) -> int:
-    """A recorded drive onto a bus. With MAP as frames of the ECU with fresh E2E."""
+    """Play a recorded drive onto a CAN bus. With MAP, send frames of the ECU with fresh E2E."""
     from brakelab.play import command as play
 
     return play.play(log, interface, channel, map, speed)
@@ -140,34 +152,38 @@ def play(
 
 @app.command()
 def report(
-    result: Annotated[Path, typer.Argument(metavar="RESULT.parquet", help="What `replay` wrote")],
-    out: Annotated[Path, typer.Option("--out", metavar="REPORT.html", help="One self-contained page")],
+    result: Annotated[Path, typer.Argument(metavar="RESULT.parquet", help="Results of `replay`")],
+    out: Annotated[Path, typer.Option("--out", metavar="REPORT.html", help="Page to write, self-contained")],
     truth: Annotated[
         Path | None, typer.Option("--truth", metavar="TRUTH.parquet", help="True values of a simulated drive")
     ] = None,
     timing: Annotated[
         Path | None,
-        typer.Option("--timing", metavar="RECORDING", help="What `run --record` left: times of the loop"),
+        typer.Option(
+            "--timing", metavar="RECORDING", help="Recording of `run --record`, to show times of its loop"
+        ),
     ] = None,
 ) -> int:
-    """Results as a page of linked figures."""
+    """Write results as a page of linked figures."""
     from brakelab.report import command
 
     command.report(result, truth, out, timing)
     return 0
 
 
-map_app = typer.Typer(help="Signal maps: what the frames of a car mean.", no_args_is_help=True)
+map_app = Commands(help="Make signal maps for other CAN databases.", no_args_is_help=True)
 app.add_typer(map_app, name="map")
 
 
 @map_app.command()
 def suggest(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="A recorded drive")],
-    dbc: Annotated[Path, typer.Option("--dbc", metavar="DB", help="The car's database")],
-    out: Annotated[Path | None, typer.Option("--out", metavar="MAP.toml", help="Default: printed")] = None,
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="Recorded drive")],
+    dbc: Annotated[Path, typer.Option("--dbc", metavar="DB", help="CAN database of the car")],
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="MAP.toml", help="Map to write; default: print it")
+    ] = None,
 ) -> int:
-    """A map proposed by names, units and physics, for you to edit."""
+    """Propose a map by names, units and physics, for you to edit."""
     from brakelab.mapping import command
 
     return command.suggest(log, dbc, out)
@@ -178,27 +194,36 @@ def fleet(
     logs: Annotated[
         list[str],
         typer.Argument(
-            metavar="GLOB|MANIFEST", help='"data/*/*.log": a folder a vehicle; or a manifest, CSV or TOML'
+            metavar="GLOB|MANIFEST",
+            help='"data/*/*.log" (a folder per vehicle), or a manifest, .csv or .toml',
         ),
     ],
     out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Tables and report; goes on where it stopped")
+        Path,
+        typer.Option(
+            "--out", metavar="DIR", help="Folder of tables and report; a stopped run continues here"
+        ),
     ],
     config: Annotated[Path | None, CONFIG_OPTION] = None,
     map: Map = None,
     observer: Observer = None,
     scheduler: Annotated[
         str | None,
-        typer.Option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster; default: processes here"),
+        typer.Option(
+            "--scheduler", metavar="ADDRESS", help="Use this Dask cluster; default: local processes"
+        ),
     ] = None,
     workers: Annotated[
-        int | None, typer.Option("--workers", min=1, metavar="N", help="Processes here; default: one a core")
+        int | None,
+        typer.Option(
+            "--workers", min=1, metavar="N", help="Number of local processes; default: one per core"
+        ),
     ] = None,
     rows: Annotated[
-        bool, typer.Option("--rows", help="Keep the rows of every drive too: 1 GB for 15 h and more")
+        bool, typer.Option("--rows", help="Keep the rows of every drive too: up to 1 GB per 15 h")
     ] = False,
 ) -> int:
-    """Thousands of recorded drives, vehicles side by side. Exit code 1: drives failed."""
+    """Replay thousands of recorded drives in parallel. Exit code 1: drives failed."""
     from brakelab.fleet import command
 
     return command.fleet(logs, config, map, observer, scheduler, workers, out, rows)
@@ -206,10 +231,10 @@ def fleet(
 
 @app.command()
 def compare(
-    a: Annotated[Path, typer.Argument(metavar="A.parquet", help="What `replay` wrote")],
-    b: Annotated[Path, typer.Argument(metavar="B.parquet", help="Of another version or tuning")],
+    a: Annotated[Path, typer.Argument(metavar="A.parquet", help="Results of `replay`")],
+    b: Annotated[Path, typer.Argument(metavar="B.parquet", help="Results of another version or tuning")],
 ) -> int:
-    """Two results side by side, what differs most first. Exit code 1: something differs that matters."""
+    """Compare two results, largest difference first. Exit code 1: a difference matters."""
     from brakelab.results import compare
 
     return compare.compare(a, b)
@@ -224,7 +249,7 @@ def tune(
             "--scenario",
             parser=scenario_file,
             metavar="SCENARIO",
-            help="Drives to tune on, repeatable; default: fixed-pedal, bursts",
+            help="Scenario to tune on, repeatable; default: fixed-pedal, bursts",
         ),
     ] = None,
     validate: Annotated[
@@ -233,20 +258,29 @@ def tune(
             "--validate",
             parser=scenario_file,
             metavar="SCENARIO",
-            help="Drives to validate on, repeatable; default: fixed-decel, fade",
+            help="Scenario to validate on, repeatable; default: fixed-decel, fade",
         ),
     ] = None,
     seeds: Annotated[
-        int, typer.Option("--seeds", min=1, help="Drawn cars to tune on, and as many others to validate")
+        int,
+        typer.Option(
+            "--seeds", metavar="N", min=1, help="Number of drawn cars to tune on; as many to validate"
+        ),
     ] = 4,
-    generations: Annotated[int, typer.Option("--generations", min=1, help="Of the genetic algorithm")] = 20,
-    population: Annotated[int, typer.Option("--population", min=4, help="Tunings in a generation")] = 30,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the genetic algorithm")] = 0,
+    generations: Annotated[
+        int, typer.Option("--generations", metavar="G", min=1, help="Number of generations")
+    ] = 20,
+    population: Annotated[
+        int, typer.Option("--population", metavar="P", min=4, help="Tunings per generation")
+    ] = 30,
+    seed: Annotated[
+        int, typer.Option("--seed", metavar="N", min=0, help="Seed of the genetic algorithm")
+    ] = 0,
     out: Annotated[
-        Path, typer.Option("--out", metavar="TUNED.toml", help="What a CONFIG can `include`")
+        Path, typer.Option("--out", metavar="TUNED.toml", help="Tuning to write; a CONFIG can `include` it")
     ] = Path("tuned.toml"),
 ) -> int:
-    """Noise of Observer 2 by a genetic algorithm on simulated drives. Ctrl-C: the best so far."""
+    """Tune Observer 2 on simulated drives by a genetic algorithm. Ctrl-C writes the best so far."""
     from brakelab.tuning import command
 
     trained = scenario or [scenario_file(name) for name in command.FIRST_SESSION]
@@ -256,15 +290,28 @@ def tune(
 
 @app.command()
 def bench(
-    name: Annotated[str | None, typer.Argument(metavar="NAME", help="One benchmark; without: all")] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table")] = False,
-    seeds: Annotated[int, typer.Option(min=1, help="Cars that stops and observers draw")] = 20,
-    seconds: Annotated[float, typer.Option(min=5.0, max=580.0, help="Of lateness and play")] = 60.0,
+    name: Annotated[
+        str | None, typer.Argument(metavar="NAME", help="Bench to run; default: step, codec, plant, cycle")
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables")] = False,
+    seeds: Annotated[
+        int, typer.Option(metavar="N", min=1, help="Number of cars that are drawn, at most")
+    ] = 20,
+    seconds: Annotated[
+        float, typer.Option(metavar="S", min=5.0, max=580.0, help="Duration of lateness and play")
+    ] = 60.0,
     draw: Annotated[
-        str, typer.Option(metavar="WIDTH", help="Cars of stops and observers: wide, nominal")
+        str, typer.Option(metavar="WIDTH", help="Spread of the cars of stops and observers: wide or nominal")
     ] = "wide",
 ) -> int:
-    """Times of step, codec and cycle on this machine; accuracy over drawn cars."""
+    """Measure times, accuracy, control and physics. Print tables.
+
+    \b
+    times     step, codec, plant, cycle, lateness, replay, play
+    accuracy  stops, observers, ablation, bound, recorded
+    control   compensation, margins, blending, failures
+    physics   friction, lab, energy, wear
+    """
     from brakelab.bench import command
 
     return command.bench(name, json, seeds, seconds, draw)

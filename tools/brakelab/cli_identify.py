@@ -5,9 +5,9 @@ from typing import Annotated
 
 import typer
 
-from ecu.arguments import Config
+from ecu.arguments import Commands, Config
 
-app = typer.Typer(help="Models from measurements of your own.", no_args_is_help=True)
+app = Commands(help="Identify models from your own measurements.", no_args_is_help=True)
 
 
 @app.callback()
@@ -19,10 +19,11 @@ def _identify() -> None:
 def friction(
     data: Annotated[
         list[Path],
-        typer.Argument(metavar="DATA…", help="Recordings of one brake on a dynamometer: .csv .parquet .mf4"),
+        typer.Argument(metavar="DATA", help="Recordings of one brake on a dynamometer: .csv .parquet .mf4"),
     ],
     out: Annotated[
-        Path, typer.Option("--out", metavar="BRAKE.toml", help="Lining file of the simulated vehicle")
+        Path,
+        typer.Option("--out", metavar="BRAKE.toml", help="Lining file to write, for the simulated vehicle"),
     ],
     columns: Annotated[
         Path | None,
@@ -31,15 +32,15 @@ def friction(
     held_out: Annotated[
         Path | None,
         typer.Option(
-            "--held-out", metavar="DATA", help="The choice is made on this; default: the hottest stops"
+            "--held-out", metavar="DATA", help="Recording to choose the law by; default: the hottest stops"
         ),
     ] = None,
     profile: Annotated[
         str | None,
-        typer.Option("--profile", metavar="LAW", help="Profile likelihood of this law's numbers too"),
+        typer.Option("--profile", metavar="LAW", help="Compute profile likelihoods of this law's parameters"),
     ] = None,
 ) -> int:
-    """A friction law from a dynamometer's recording: all laws fitted, one chosen, its numbers and limits."""
+    """Identify a friction law from dynamometer recordings. Fit all laws, choose one, state its limits."""
     from brakelab.friction_lab import command
 
     return command.friction(data, columns, held_out, out, profile)
@@ -49,13 +50,17 @@ def friction(
 def wear(
     manifest: Annotated[
         Path,
-        typer.Argument(metavar="MANIFEST.csv", help="Blocks: file, masses, thicknesses"),
+        typer.Argument(metavar="MANIFEST.csv", help="Table of blocks: file, masses, thicknesses"),
     ],
     config: Config,
-    out: Annotated[Path, typer.Option("--out", metavar="CAR.toml", help="A CONFIG; CAR.md beside")],
-    axle: Annotated[str, typer.Option("--axle", metavar="AXLE", help="Whose linings: front, rear")] = "front",
+    out: Annotated[
+        Path, typer.Option("--out", metavar="CAR.toml", help="CONFIG to write, with a page CAR.md beside it")
+    ],
+    axle: Annotated[
+        str, typer.Option("--axle", metavar="AXLE", help="Axle of the linings: front or rear")
+    ] = "front",
 ) -> int:
-    """The wear law of brake linings from dynamometer blocks. Writes a CONFIG."""
+    """Identify the wear law of brake linings from dynamometer blocks. Write a CONFIG."""
     from brakelab.identification import wear_command
 
     return wear_command.identify_wear(manifest, config, axle, out)

@@ -5,33 +5,38 @@ from typing import Annotated
 
 import typer
 
-app = typer.Typer(help="A simulated brake dynamometer, and what a recording shows.", no_args_is_help=True)
+from ecu.arguments import Commands
+
+app = Commands(help="Run a simulated brake dynamometer and analyse recordings.", no_args_is_help=True)
 
 
 @app.command()
 def run(
     programme: Annotated[
-        str, typer.Argument(metavar="PROGRAMME", help="A file as in config/rig, or cpc, ams")
+        str, typer.Argument(metavar="PROGRAMME", help="cpc, ams, or a file as in config/rig")
     ],
     out: Annotated[
-        Path, typer.Option("--out", metavar="DATA", help=".csv or .parquet; columns and brake go beside it")
+        Path,
+        typer.Option(
+            "--out", metavar="DATA", help="Recording to write, .csv or .parquet; columns and brake beside it"
+        ),
     ],
     brake: Annotated[
-        str, typer.Option("--brake", metavar="BRAKE", help="A, B or C; or a lining of LININGS")
+        str, typer.Option("--brake", metavar="BRAKE", help="Brake A, B or C, or a lining of LININGS")
     ] = "A",
     seed: Annotated[
-        int, typer.Option("--seed", min=0, help="Seed of the pad, its chance and the sensors")
+        int, typer.Option("--seed", metavar="N", min=0, help="Seed of the pad, its scatter and the sensors")
     ] = 0,
     law: Annotated[
         str | None,
-        typer.Option("--law", metavar="LAW", help="A friction law of the lining, instead of a pad"),
+        typer.Option("--law", metavar="LAW", help="Use this friction law of the lining instead of a pad"),
     ] = None,
     linings: Annotated[
         Path | None,
-        typer.Option("--linings", metavar="LININGS", help="What `identify friction` wrote; needs --law"),
+        typer.Option("--linings", metavar="LININGS", help="Lining file of `identify friction`; needs --law"),
     ] = None,
 ) -> int:
-    """A programme on the simulated dynamometer, 200 Hz, with a pad that follows none of the laws."""
+    """Run a programme on the dynamometer. Record at 200 Hz; the pad follows none of the friction laws."""
     from brakelab.friction_lab import command
 
     return command.run(programme, brake, seed, out, law, linings)
@@ -40,14 +45,14 @@ def run(
 @app.command()
 def look(
     data: Annotated[
-        list[Path], typer.Argument(metavar="DATA…", help="Recordings of one brake: .csv .parquet .mf4")
+        list[Path], typer.Argument(metavar="DATA", help="Recordings of one brake: .csv .parquet .mf4")
     ],
     columns: Annotated[
         Path | None,
         typer.Option("--columns", metavar="MAP.toml", help="Columns, units, brake; default: DATA with .toml"),
     ] = None,
 ) -> int:
-    """Principal components, shares of variance and the effect of the stop before."""
+    """Analyse a recording. Show principal components, shares of variance, effect of the previous stop."""
     from brakelab.friction_lab import command
 
     return command.look(data, columns)
