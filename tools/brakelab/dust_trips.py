@@ -64,7 +64,7 @@ SPEED_NOISE: Final = 0.03  # m/s
 COUNT_NOISE: Final = 0.04  # share, of a sample
 FLOW: Final = 0.07  # m^3/s
 FLOW_NOISE: Final = 0.01  # share
-DRIVEN: Final = (0.0, 30e6)  # J, of the brake before the first trip
+DRIVEN: Final = (20e6, 60e6)  # J, of the brake before the first trip: bedded, as UN GTR 24 has it done
 
 
 class Trip(NamedTuple):
