@@ -187,7 +187,6 @@ def extract(trip: Recorded, radius: float) -> Applications:
     excess = trip.concentration - background.at(trip.speed)
     way = way_of_air(trip, excess)
     emitted = np.cumsum(1e6 * trip.flow * excess) * PERIOD
-    ends = [end for _, end in places]
     particles, energy = [], []
     for k, (start, end) in enumerate(places):
         first = start + round(max(way - BEFORE_S, 0.0) / PERIOD)
