@@ -132,8 +132,8 @@ def _sensed(out: Array, random: Generator) -> dict[str, Array]:
     return dict(zip(COLUMNS, values, strict=True))
 
 
-def campaign(seed: int, day: float = DAY, trips: int = TRIPS) -> list[Trip]:
-    """Return the trips of one vehicle with one pair of linings, both drawn; `day` as `DAY`."""
+def drawn_brake(seed: int) -> RecordArray:
+    """Return the drawn van of a seed with its crew, shape (1,), its linings' emission drawn too."""
     plant = load_plant(resource("config/plant/lcv.toml"))
     width = load_widths(resource("config/plant/draw.toml"), "wide").model_copy(update={"emission_day": 0.0})
     car = draw(plant, seed, width)
@@ -147,13 +147,20 @@ def campaign(seed: int, day: float = DAY, trips: int = TRIPS) -> list[Trip]:
             "hot": np.exp(random.uniform(*np.log((12.0, 50.0)))),
         }
     )
-    car["emission_row"][0, CORNER] = law.row()
+    car["emission_row"] = law.row()
+    return car
+
+
+def campaign(seed: int, day: float = DAY, application: float = APPLICATION, trips: int = TRIPS) -> list[Trip]:
+    """Return the trips of one vehicle; `day` as `DAY`, `application` as `APPLICATION`."""
+    car = drawn_brake(seed)
+    random = np.random.default_rng([seed, 82])
     work, found = random.uniform(*DRIVEN), []
     for number in range(trips):
         drive, _ = _trace(random, 1000 * seed + number)
         conditions = _conditions(random, day)
         conditions["work"] = work
-        scatter = np.exp(APPLICATION * random.normal(size=600) - 0.5 * APPLICATION**2)
+        scatter = np.exp(application * random.normal(size=600) - 0.5 * application**2)
         wander = _wander(random, len(drive))
         out, mean = (np.zeros((len(drive) // 10 + 1, EMITTED + 1)) for _ in range(2))
         rows, _ = run_trip(car[0], CORNER, conditions[0], drive, wander, scatter, out)

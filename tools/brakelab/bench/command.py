@@ -39,6 +39,7 @@ from brakelab.bench.texts import (
     BLENDING_TEXT,
     BOUND_TEXT,
     COMPENSATION_TEXT,
+    DUST_TEXT,
     ENERGY_TEXT,
     FRICTION_TEXT,
     LAB_TEXT,
@@ -69,6 +70,7 @@ MARGINS: Final = "margins"
 LATENESS: Final = "lateness"
 RECORDED: Final = "recorded"
 WEAR: Final = "wear"
+DUST: Final = "dust"
 REPLAY: Final = "replay"
 PLAY: Final = "play"
 
@@ -138,6 +140,7 @@ def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0, 
         BLENDING: _blending,
         RECORDED: partial(_recorded, seeds=seeds),
         WEAR: partial(_wear, seeds=seeds),
+        DUST: partial(_dust, seeds=seeds),
         LATENESS: partial(_lateness, seconds=seconds),
         REPLAY: _replay,
         PLAY: partial(_play, seconds=seconds),
@@ -253,6 +256,15 @@ def _wear(json: bool, seeds: int) -> int:
         picture = resource("docs") / "images" / "wear.svg"
         write_chart(picture, wear.wear_panels(lives, len(cars)), wear.LEGEND)
     return _page(WEAR, "Wear", WEAR_TEXT, wear.wear_tables(cars, laws, lives), json)
+
+
+def _dust(json: bool, seeds: int) -> int:
+    from brakelab.bench import dust
+
+    tables, panels = dust.dust_page(partial(_each_car, DUST), min(seeds, dust.DRAWS))
+    if not json:
+        write_chart(resource("docs") / "images" / "dust.svg", panels, dust.LEGEND)
+    return _page(DUST, "Dust", DUST_TEXT, tables, json)
 
 
 def _friction(json: bool) -> int:

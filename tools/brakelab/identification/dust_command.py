@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -16,6 +17,8 @@ from brakelab.outputs import check_outputs
 from ecu.config import Axle, load_config, new_params
 from ecu.dust import MODELS
 from ecu.errors import UserError
+
+LEGEND: Final = (("chosen", BLUE), ("others", ORANGE), ("95 %, and the background's line", PINK))
 
 
 def _numbers(values: Array) -> str:
@@ -85,8 +88,7 @@ def dust_panels(trips: list[Applications], judged: list[Judged], chosen: Judged)
 def write_page(page: Path, trips: list[Applications], judged: list[Judged], chosen: Judged) -> None:
     """Write the tables with Figures 8.2 and 8.8 above them."""
     picture = page.with_suffix(".svg")
-    legend = [("chosen", BLUE), ("others", ORANGE), ("95 %, and the background's line", PINK)]
-    write_chart(picture, dust_panels(trips, judged, chosen), legend)
+    write_chart(picture, dust_panels(trips, judged, chosen), LEGEND)
     tables = [model_table(judged, chosen), trip_table(trips), spearman_table(trips)]
     head = f"# Emission of one brake by {len(trips)} trips\n\n![Figures 8.2 and 8.8]({picture.name})\n\n"
     page.write_text(head + "\n".join(map(markdown, tables)).rstrip() + "\n", encoding="utf-8")
