@@ -261,9 +261,7 @@ def _wear(json: bool, seeds: int) -> int:
 def _dust(json: bool, seeds: int) -> int:
     from brakelab.bench import dust
 
-    tables, panels = dust.dust_page(partial(_each_car, DUST), min(seeds, dust.DRAWS))
-    if not json:
-        write_chart(resource("docs") / "images" / "dust.svg", panels, dust.LEGEND)
+    tables = dust.dust_page(partial(_each_car, DUST), min(seeds, dust.DRAWS), not json)
     return _page(DUST, "Dust", DUST_TEXT, tables, json)
 
 

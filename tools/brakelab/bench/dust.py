@@ -6,11 +6,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from brakelab.bench.chart import Panel
+from brakelab.bench.chart import write_chart
 from brakelab.bench.dust_study import Draw, OnBoard, draw_trips, drive_on_board, pictured
 from brakelab.bench.table import Table
 from brakelab.identification.dust_command import LEGEND, dust_panels
 from brakelab.identification.dust_tables import THESIS, spearman_table, trip_table
+from ecu.resources import resource
 
 DRAWS: Final = 20
 CARS: Final = 4
@@ -82,7 +83,7 @@ def dust_tables(draws: list[Draw], quiet: list[Draw], cars: list[OnBoard]) -> li
             f"{100 * car.error:+.1f}",
             f"{100 * car.told_error:+.1f}",
             f"{100 * car.told:.0f}",
-            f"{1e-9 * car.particles_per_km:.2f}",
+            f"{1e-9 * car.particles_per_km:.2f}" if np.isfinite(car.particles_per_km) else "not told",
             f"{car.mass_per_km:.1f}",
             f"{car.true_mass_per_km:.1f}",
         )
@@ -126,14 +127,14 @@ def dust_tables(draws: list[Draw], quiet: list[Draw], cars: list[OnBoard]) -> li
     ]  # fmt: skip
 
 
-def dust_page(each: Callable[..., list[Any]], draws: int) -> tuple[list[Table], list[Panel]]:
-    """Return tables and figures of the page; `each(function, count)` calls a function for 0 to count - 1."""
+def dust_page(each: Callable[..., list[Any]], draws: int, pictured_too: bool) -> list[Table]:
+    """Return the tables of the page and draw its figures; `each(function, count)` calls a function for 0 to
+    count - 1."""
     many = each(draw_trips, draws)
     quiet = each(partial(draw_trips, quiet=True), draws)
     cars = each(drive_on_board, min(draws, CARS))
     trips, judged, chosen = pictured()
-    tables = [*dust_tables(many, quiet, cars), trip_table(trips), spearman_table(trips)]
-    return tables, dust_panels(trips, judged, chosen)
-
-
-__all__ = ["LEGEND", "dust_page"]
+    if pictured_too:
+        picture = resource("docs") / "images" / "dust.svg"
+        write_chart(picture, dust_panels(trips, judged, chosen), LEGEND)
+    return [*dust_tables(many, quiet, cars), trip_table(trips), spearman_table(trips)]

@@ -1,7 +1,7 @@
 """Which emission model is right, and how far: models judged by trips that they have not seen.
 
 Every trip but the tests is left out once; the others fit the model, which then predicts it (the left-out
-predictions). From these follow
+predictions, of what lies within the others: outside nothing is told). From these follow
 
     factor       sum of particles over sum of 10^EF: a model of the logarithm gives the median, not the mean,
                  and sums of medians are too small (Table 8.2 has all of its models low)
@@ -17,6 +17,7 @@ import time
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from brakelab.identification.dust_features import Applications, Array
 from brakelab.identification.dust_models import FITS, LEAST, Model, samples_of
@@ -64,6 +65,11 @@ def ranges(trips: list[Applications]) -> tuple[Array, Array]:
     return np.maximum(low - margin, 1e-3), high + margin
 
 
+def inside_of(features: Array, trained: tuple[Array, Array]) -> NDArray[np.bool_]:
+    """Return whether each of `features`, shape (n, 6), lies within what was trained on, shape (n,)."""
+    return np.asarray(np.all((features >= trained[0]) & (features <= trained[1]), axis=1))
+
+
 def conformal(residuals: Array) -> tuple[float, float]:
     """Return the ends of the interval that holds `COVERAGE` of the next residual, not above and below 0."""
     n, tail = len(residuals), 0.5 * (1.0 - COVERAGE)
@@ -89,7 +95,7 @@ def kpis(
     known = counted > LEAST
     measured = np.log10(counted[known])
     off = measured - factors[known]
-    within = np.all((features >= trained[0]) & (features <= trained[1]), axis=1)
+    within = inside_of(features, trained)
     return Kpis(
         float(said.sum() / counted.sum() - 1.0),
         float(1.0 - np.var(counted - said) / np.var(counted)),
@@ -105,9 +111,10 @@ def judge(name: str, trips: list[Applications], test: list[Applications], seed: 
     fit = FITS[name]
     said, counted = [], []
     for k, trip in enumerate(trips):
-        others = fit(samples_of(trips[:k] + trips[k + 1 :]), seed)
-        said.append(others.predict(trip.features, trip.sequences))
-        counted.append(trip.particles)
+        rest = trips[:k] + trips[k + 1 :]
+        others, within = fit(samples_of(rest), seed), inside_of(trip.features, ranges(rest))
+        said.append(others.predict(trip.features, trip.sequences)[within])
+        counted.append(trip.particles[within])
     factor = float(np.concatenate(counted).sum() / (10.0 ** np.concatenate(said)).sum())
     sums = [factor * (10.0**ef).sum() / n.sum() - 1.0 for ef, n in zip(said, counted, strict=True)]
     known = np.concatenate(counted) > LEAST
