@@ -6,6 +6,7 @@ large part count less. Before a network is trained, applications are resampled s
 is as frequent as the others (Figure 8.4).
 """
 
+import warnings
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
@@ -127,13 +128,16 @@ def resample(factor: Array, seed: int) -> NDArray[np.int64]:
 
 
 def _trained(inputs: Array, output: Array, hidden: int, shrink: float, seed: int) -> Any:
+    from sklearn.exceptions import ConvergenceWarning
     from sklearn.neural_network import MLPRegressor
 
     net = MLPRegressor(
         hidden_layer_sizes=(hidden,), activation="tanh", solver="lbfgs", alpha=shrink * len(output),
         max_iter=500, tol=1e-5, random_state=seed,
     )  # fmt: skip
-    return net.fit(inputs, output)
+    with warnings.catch_warnings():  # it is stopped early as regularisation; left-out trips judge it
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        return net.fit(inputs, output)
 
 
 def _scales(values: Array) -> tuple[Array, Array]:
