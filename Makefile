@@ -16,7 +16,7 @@ demo: .venv/lab
 	.venv/bin/brake-ecu demo $(ARGS)
 
 test: .venv/dev
-	.venv/bin/python -m pytest -n auto --maxprocesses 4 --dist loadfile $(ARGS)
+	.venv/bin/python -m pytest -n $$(($$(nproc) + 1)) --maxprocesses 5 --dist loadgroup $(ARGS)
 
 check: .venv/dev
 	.venv/bin/ruff check .
@@ -31,15 +31,15 @@ clean:
 	@python=$$(sh tools/find-python.sh) && echo "Making .venv with $$python" \
 		&& { "$$python" -m venv .venv || { rm -rf .venv; exit 1; }; }
 
-.venv/lab: requirements/build.txt requirements/lab.txt pyproject.toml | .venv/bin/pip
+.venv/lab: requirements/build.txt requirements/lab.txt pyproject.toml tools/pyproject.toml | .venv/bin/pip
 	@echo "Installing what the laboratory needs into .venv (once)"
 	@$(PINNED) --requirement requirements/lab.txt
-	@$(PIP) --no-deps --no-build-isolation --editable .
+	@$(PIP) --no-deps --no-build-isolation --editable . --editable tools
 	@touch $@
 
 # The development set holds the laboratory's at the same versions.
-.venv/dev: requirements/build.txt requirements/dev.txt pyproject.toml | .venv/bin/pip
+.venv/dev: requirements/build.txt requirements/dev.txt pyproject.toml tools/pyproject.toml | .venv/bin/pip
 	@echo "Installing what the tests need into .venv (once)"
 	@$(PINNED) --requirement requirements/dev.txt
-	@$(PIP) --no-deps --no-build-isolation --editable .
+	@$(PIP) --no-deps --no-build-isolation --editable . --editable tools
 	@touch .venv/lab $@

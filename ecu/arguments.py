@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ecu.resources import SCENARIOS, named
+from ecu.settings.resources import SCENARIOS, named
 
 
 def config_file(name: str) -> Path:

@@ -1,13 +1,14 @@
 """The command line `brake-ecu`: arguments in, one line out for whatever the user can mend.
 
-Every command imports what it needs when it is called, so that the daemon starts without the laboratory.
+Every command imports what it needs when it is called. Other distributions add commands by the entry point
+group `brake_ecu.commands`, as the laboratory does (`tools/pyproject.toml`); the daemon starts without them.
 Exit code 0 on success, 1 when the run found a fault, 2 for bad arguments, configuration or input.
 """
 
 import sys
 
-from ecu.sink import free_output
-from ecu.start import ahead_of_others, kept_out
+from ecu.recording.sink import free_output
+from ecu.runtime.start import ahead_of_others, kept_out
 
 if sys.argv[1:2] == ["run"]:  # under load, loading the command line alone would take a second
     ahead_of_others()
@@ -16,6 +17,8 @@ if sys.argv[1:2] == ["run"]:  # under load, loading the command line alone would
 import errno
 import os
 import traceback
+from functools import cache
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Annotated
 
@@ -32,7 +35,6 @@ from ecu.arguments import (
     Map,
     State,
 )
-from ecu.cli_laboratory import app as laboratory
 from ecu.errors import RunFault, UserError
 
 LABORATORY = ("bokeh", "jinja2", "pyarrow", "pymoo", "scipy")
@@ -95,13 +97,10 @@ def run(
     with kept_out("rich", "scipy"):  # structlog's tracebacks, and BLAS that no kernel of the cycle calls
         import numba.np.arraymath  # noqa: F401
 
-        from ecu import prepare, service
+        from ecu.runtime import prepare, service
     return service.run(
         prepare.RunOptions(config, interface, channel, map, record, record_limit, state, standby)
     )
-
-
-app.add_typer(laboratory)
 
 
 @app.command()
@@ -132,7 +131,7 @@ def doctor(
     channel: Annotated[str | None, CHANNEL_OPTION] = None,
 ) -> int:
     """What this machine lacks to run it. With a bus: frames, rates, E2E."""
-    from ecu.diagnostics import doctor
+    from ecu import doctor
 
     return doctor.doctor(config, map, interface, channel)
 
@@ -147,7 +146,8 @@ def _describe(error: Exception) -> tuple[str, int]:
         case typer.TyperException():
             context = getattr(error, "ctx", None)
             command = context.command_path if context else "brake-ecu"
-            return f"{error.format_message().rstrip('.')}; see {command} --help", error.exit_code
+            hint = "" if _add_commands() else "; the laboratory's commands need pip install brake-ecu-lab"
+            return f"{error.format_message().rstrip('.')}; see {command} --help{hint}", error.exit_code
         case ModuleNotFoundError(name=str(name)) if name.partition(".")[0] in LABORATORY:
             return f"{name} is missing: this command needs the laboratory, pip install 'brake-ecu[lab]'", 2
         case ModuleNotFoundError(name=str(name)) if name.partition(".")[0] in (*FLEET, "dask"):
@@ -169,10 +169,22 @@ def _describe(error: Exception) -> tuple[str, int]:
             )
 
 
+@cache
+def _add_commands(to: typer.Typer = app) -> int:
+    """Add the commands of other distributions, once; return how many distributions these are."""
+    others = entry_points(group="brake_ecu.commands")
+    for point in others:
+        to.add_typer(point.load())
+    return len(others)
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run one command line and return its exit code."""
+    arguments = arguments or sys.argv[1:] or ["--help"]
     try:
-        return app(arguments or sys.argv[1:] or ["--help"], prog_name="brake-ecu", standalone_mode=False) or 0
+        if arguments[0] != "run":
+            _add_commands()
+        return app(arguments, prog_name="brake-ecu", standalone_mode=False) or 0
     except (KeyboardInterrupt, typer.Abort):
         return 130
     except Exception as error:

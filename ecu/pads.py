@@ -7,16 +7,16 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from ecu.config import Config, load_config, new_params, store_key
-from ecu.diagnostics.restored import restored
-from ecu.diagnostics.store import alone, open_store, save
+from ecu.algorithm.monitoring.wear import WEAR_STATE, restore_wear
+from ecu.algorithm.monitoring.wear_belief import mass_by_law
+from ecu.algorithm.step import new_state
+from ecu.contract.records import N_LEGS, N_MEASURED, RecordArray
+from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
-from ecu.monitoring.wear import WEAR_STATE, restore_wear
-from ecu.monitoring.wear_belief import mass_by_law
-from ecu.pad import Pad
-from ecu.records import N_LEGS, N_MEASURED, RecordArray
-from ecu.signals import CORNERS
-from ecu.step import new_state
+from ecu.recording.restored import restored
+from ecu.recording.store import alone, open_store, save
+from ecu.settings.config import Config, load_config, new_params, store_key
+from ecu.settings.pad import Pad
 
 GAUGE: Final = 0.1  # mm, standard deviation of a thickness measured on the car
 TWO_SIDED: Final = 1.96  # standard deviations of a band of 95 %

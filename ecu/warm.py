@@ -12,15 +12,15 @@ from pathlib import Path
 from ecu.bus.channel import BusStatus
 from ecu.bus.signal_map import receive_plan
 from ecu.bus.transmit import contract_transmit_plan
-from ecu.clock import Grid, TimeSource
-from ecu.config import load_config, new_params
-from ecu.cycle import Ecu, Progress, Watch, cycle_once, new_ecu
+from ecu.contract.records import RecordArray
+from ecu.contract.signals import CYCLE_NS
 from ecu.jit import CompileCounter
-from ecu.records import RecordArray
-from ecu.resources import resource
-from ecu.ring import create_ring
-from ecu.signals import CYCLE_NS
-from ecu.standby import Standby
+from ecu.recording.ring import create_ring
+from ecu.runtime.clock import Grid, TimeSource
+from ecu.runtime.cycle import Ecu, Progress, Watch, cycle_once, new_ecu
+from ecu.runtime.standby import Standby
+from ecu.settings.config import load_config, new_params
+from ecu.settings.resources import resource
 
 
 class Silence:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from ecu.notify import Manager
+from ecu.runtime.notify import Manager
 
 DEPLOY = Path(__file__).parent.parent / "tools" / "deploy"
 

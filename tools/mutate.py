@@ -1,6 +1,6 @@
 """Mutation testing: does a module's own test notice when the module is wrong?
 
-    python tools/mutate.py ecu/control/limiter.py tests/ecu/control/test_limiter.py [TEST…] [--every N]
+    python tools/mutate.py MODULE TEST [TEST…] [--every N]
 
 Changes one comparison, operator, constant or condition at a time in a copy of the checkout, runs the tests
 with kernels as plain Python and prints what survives. Exit code 1 if anything does that `EQUIVALENT` does not
@@ -37,7 +37,7 @@ OPERATORS: dict[type[ast.operator], type[ast.operator]] = {
 }
 TIMEOUT_S = 120.0
 EQUIVALENT = {
-    "ecu/control/limiter.py": (
+    "ecu/algorithm/control/limiter.py": (
         "excess == 0.0",  # a shift by nothing
         "bounded > last + step",  # both branches give the same there
         "bounded < last - step",

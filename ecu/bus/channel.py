@@ -16,8 +16,8 @@ from typing import Any, Final, NamedTuple, Protocol
 import can
 
 from ecu.bus.database import closest
+from ecu.contract.records import EXTENDED_ID, FRAME_EXTENDED, FRAME_FD, RecordArray
 from ecu.errors import UserError
-from ecu.records import EXTENDED_ID, FRAME_EXTENDED, FRAME_FD, RecordArray
 
 # Frames of one identifier that may be on their way back to us: 0.3 s of a 10 ms frame.
 _ECHOES: Final = 32

@@ -5,8 +5,8 @@ from typing import Final
 
 from ecu.bus.channel import Channel
 from ecu.bus.transmit import TransmitPlan
+from ecu.contract.records import EXTENDED_ID, FRAME, FRAME_EXTENDED, new_record
 from ecu.errors import UserError
-from ecu.records import EXTENDED_ID, FRAME, FRAME_EXTENDED, new_record
 
 _AT_ONCE: Final = 1024
 _DISCARD_S: Final = 0.5  # a bus that brings more than can be thrown away in that time is listened to as it is

@@ -12,9 +12,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ecu.contract.records import RecordArray
+from ecu.contract.signals import ALIVE, INPUT_SIGNALS, RATE_OK, VALID
 from ecu.jit import Record, kernel
-from ecu.records import RecordArray
-from ecu.signals import ALIVE, INPUT_SIGNALS, RATE_OK, VALID
 
 FRESHNESS: Final = np.dtype(
     [
@@ -76,7 +76,7 @@ def input_freshness(periods_s: dict[int, tuple[float, float]], timeouts_s: dict[
 
 
 def target_dtype(places: int) -> np.dtype[Any]:
-    """Return a record that kernels fill as they fill `ecu.records.INPUTS`, with another number of places."""
+    """Return a record that kernels fill as they fill `INPUTS`, with another number of places."""
     return np.dtype(
         [
             ("t_ns", "i8"),

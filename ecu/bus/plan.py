@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ecu.bus import bits
 from ecu.bus.database import fits
+from ecu.contract.records import RecordArray
 from ecu.jit import Record, kernel
-from ecu.records import RecordArray
 
 # One signal. Lists of raw codes lie in the plan's `codes`, as (first, count).
 SIGNAL: Final = np.dtype(

@@ -17,10 +17,10 @@ from ecu.bus.database import attribute, load_database
 from ecu.bus.freshness import NEVER, accept, input_freshness, new_freshness
 from ecu.bus.plan import SIGNAL, SignalUse, compile_signals, is_present, is_valid, physical, raw_code
 from ecu.bus.request import FIRST, LAST, REQUEST, begin_request, hold_request, note_request
-from ecu.diagnostics.faults import E2E_REJECTIONS
+from ecu.contract.faults import E2E_REJECTIONS
+from ecu.contract.records import EXTENDED_ID, FRAME_ERROR, FRAME_EXTENDED, FRAME_REMOTE, RecordArray
+from ecu.contract.signals import INPUT, INPUT_SIGNALS, N_INPUTS, N_OUTPUTS, OUTPUT
 from ecu.jit import Record, kernel
-from ecu.records import EXTENDED_ID, FRAME_ERROR, FRAME_EXTENDED, FRAME_REMOTE, RecordArray
-from ecu.signals import INPUT, INPUT_SIGNALS, N_INPUTS, N_OUTPUTS, OUTPUT
 
 MESSAGE: Final = np.dtype(
     [
@@ -219,7 +219,7 @@ def receive(
 ) -> int:
     """Consume `frames[first:count]` in order up to the first that is stamped after `inputs.t_ns`.
 
-    Returns the index of the first frame left. `inputs` is `ecu.records.INPUTS` or a `target_dtype` record.
+    Returns the index of the first frame left. `inputs` is `INPUTS` or a `target_dtype` record.
     """
     # Fields of tuples are taken out once: in the loop each would be counted as a reference, atomically.
     ids, messages, signals, codes = plan.ids, plan.messages, plan.signals, plan.codes

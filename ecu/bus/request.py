@@ -10,8 +10,8 @@ from typing import Final
 
 import numpy as np
 
+from ecu.contract.signals import DECEL_DEMAND, DECEL_DEMAND_VALID, PEDAL_POSITION, PEDAL_PRESSED
 from ecu.jit import Record, kernel
-from ecu.signals import DECEL_DEMAND, DECEL_DEMAND_VALID, PEDAL_POSITION, PEDAL_PRESSED
 
 FIRST, LAST = PEDAL_POSITION, DECEL_DEMAND_VALID
 """The places of the request lie side by side."""

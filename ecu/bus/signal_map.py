@@ -16,10 +16,10 @@ from ecu.bus.freshness import input_freshness
 from ecu.bus.plan import SignalUse
 from ecu.bus.receive import MessageUse, ReceivePlan, compile_receive, contract_receive_plan
 from ecu.bus.units import conversion
+from ecu.contract.signals import INPUT, INPUT_SIGNALS
 from ecu.errors import UserError
-from ecu.resources import resource
-from ecu.signals import INPUT, INPUT_SIGNALS
-from ecu.toml_file import describe, read_toml
+from ecu.settings.resources import resource
+from ecu.settings.toml_file import describe, read_toml
 
 
 class _Table(BaseModel):

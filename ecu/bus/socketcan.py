@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ecu.bus.channel import BusStatus
+from ecu.contract.records import EXTENDED_ID, FRAME, FRAME_EXTENDED, FRAME_FD, RecordArray, new_record
 from ecu.errors import UserError
 from ecu.jit import kernel
-from ecu.records import EXTENDED_ID, FRAME, FRAME_EXTENDED, FRAME_FD, RecordArray, new_record
 
 BURST: Final = 128  # frames per system call: a 500 kbit/s bus carries 45 in a cycle
 RECEIVE_BUFFER: Final = 4 << 20  # bytes: about 5000 frames, a second of a saturated bus

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from ecu.bus.database import attribute, load_database
 from ecu.bus.e2e import P01_MODULO, p01_protect
 from ecu.bus.plan import SIGNAL, SignalUse, compile_signals, encode_signal
+from ecu.contract.records import FRAME, RecordArray
+from ecu.contract.signals import CYCLE_NS, INPUT, OUTPUT
 from ecu.jit import Record, kernel
-from ecu.records import FRAME, RecordArray
-from ecu.signals import CYCLE_NS, INPUT, OUTPUT
 
 SENT_MESSAGE: Final = np.dtype(
     [

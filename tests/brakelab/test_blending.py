@@ -4,8 +4,12 @@ motors soon again; cars of three seeds, the ECU told the true friction."""
 import numpy as np
 import pytest
 
-from brakelab.bench import blending
-from brakelab.bench.blending import (
+from brakelab.simulation.closed_loop import Drive, new_loop, run
+from brakelab.simulation.faults import Fault
+from brakelab.simulation.scenario import Phase, Scenario
+from brakelab.simulation.scenario_car import with_draw
+from brakelab.studies import blending
+from brakelab.studies.blending import (
     LOSS,
     blended,
     changing,
@@ -17,14 +21,10 @@ from brakelab.bench.blending import (
     torques,
     wrong_friction,
 )
-from brakelab.closed_loop import Drive, new_loop, run
-from brakelab.rig.faults import Fault
-from brakelab.scenario import Phase, Scenario
-from brakelab.scenario_car import with_draw
-from ecu.config import load_config
-from ecu.diagnostics.faults import MOTOR_SHORT
-from ecu.resources import resource
-from ecu.signals import CORNERS
+from ecu.contract.faults import MOTOR_SHORT
+from ecu.contract.signals import CORNERS
+from ecu.settings.config import load_config
+from ecu.settings.resources import resource
 
 SEEDS = (0, 1, 2)
 GONE = Fault(kind="motor_lost", t=LOSS)

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brakelab.closed_loop import new_loop, run
-from brakelab.scenario import Scenario
-from ecu.config import load_config
+from brakelab.simulation.closed_loop import new_loop, run
+from brakelab.simulation.scenario import Scenario
+from ecu.settings.config import load_config
 
 CONFIG = Path(__file__).parents[2] / "config"
 LOCKED = -0.9

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brakelab.closed_loop import Drive, new_loop, run
 from brakelab.plant.sensor_errors import SensorErrors
-from brakelab.scenario import load_scenario
-from ecu.config import Config, load_config
-from ecu.signals import CORNERS
+from brakelab.simulation.closed_loop import Drive, new_loop, run
+from brakelab.simulation.scenario import load_scenario
+from ecu.contract.signals import CORNERS
+from ecu.settings.config import Config, load_config
 
 CONFIG = Path(__file__).parents[2] / "config"
 IDS = {

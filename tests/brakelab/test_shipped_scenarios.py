@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brakelab.closed_loop import Drive, new_loop, run
-from brakelab.scenario import LONGEST, load_scenario
-from brakelab.scenario_car import with_draw
-from ecu.config import load_config
-from ecu.signals import CORNERS
+from brakelab.simulation.closed_loop import Drive, new_loop, run
+from brakelab.simulation.scenario import LONGEST, load_scenario
+from brakelab.simulation.scenario_car import with_draw
+from ecu.contract.signals import CORNERS
+from ecu.settings.config import load_config
 
 CONFIG = Path(__file__).parents[2] / "config"
 CUT = 60.0

@@ -4,13 +4,13 @@ rests."""
 import numpy as np
 import pytest
 
-from brakelab.closed_loop import Drive, new_loop, run
-from brakelab.scenario import Phase, Scenario, load_scenario
-from brakelab.scenario_car import with_draw
-from ecu.config import Config, load_config
-from ecu.diagnostics.faults import WHEEL_SLIPS
-from ecu.resources import resource
-from ecu.signals import CORNERS
+from brakelab.simulation.closed_loop import Drive, new_loop, run
+from brakelab.simulation.scenario import Phase, Scenario, load_scenario
+from brakelab.simulation.scenario_car import with_draw
+from ecu.contract.faults import WHEEL_SLIPS
+from ecu.contract.signals import CORNERS
+from ecu.settings.config import Config, load_config
+from ecu.settings.resources import resource
 
 LOCKED = -0.5  # of slip
 SEED = 1

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from brakelab.closed_loop import Drive, new_loop, run
-from brakelab.scenario import Scenario, load_scenario
-from ecu.config import load_config
+from brakelab.simulation.closed_loop import Drive, new_loop, run
+from brakelab.simulation.scenario import Scenario, load_scenario
+from ecu.settings.config import load_config
 
 CONFIG = Path(__file__).parents[2] / "config"
 PAYLOAD = load_scenario(CONFIG / "scenarios" / "type-0-laden.toml").payload

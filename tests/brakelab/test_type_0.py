@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brakelab.closed_loop import Drive, new_loop, run
-from brakelab.scenario import Payload, load_scenario
-from brakelab.scenario_car import scenario_plant
-from ecu.config import load_config
-from ecu.signals import CORNERS
+from brakelab.simulation.closed_loop import Drive, new_loop, run
+from brakelab.simulation.scenario import Payload, load_scenario
+from brakelab.simulation.scenario_car import scenario_plant
+from ecu.contract.signals import CORNERS
+from ecu.settings.config import load_config
 
 CONFIG = Path(__file__).parents[2] / "config"
 DECEL = 6.43  # m/s^2

@@ -7,16 +7,16 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from brakelab.closed_loop import plans
-from brakelab.rig.faults import Fault
-from brakelab.scenario import Scenario, load_scenario
-from brakelab.vehicle_bus import TRUTH_COLUMNS
+from brakelab.simulation.closed_loop import plans
+from brakelab.simulation.faults import Fault
+from brakelab.simulation.scenario import Scenario, load_scenario
+from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS
 from brakelab.vehicle_node import drive_in_real_time, main, new_node, write_truth_file
 from ecu.bus.channel import BusStatus
 from ecu.bus.transmit import frame_buffer, new_transmission, transmit
-from ecu.clock import TimeSource
-from ecu.records import RecordArray
-from ecu.signals import N_OUTPUTS, OUTPUT
+from ecu.contract.records import RecordArray
+from ecu.contract.signals import N_OUTPUTS, OUTPUT
+from ecu.runtime.clock import TimeSource
 
 CONFIG = Path(__file__).parents[2] / "config"
 EPOCH_NS = 1_700_000_000_000_000_000

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ecu.config import load_config, new_params
-from ecu.records import INPUTS, RecordArray
-from ecu.signals import CORNERS, INPUT, RATE_OK, USABLE
+from ecu.contract.records import INPUTS, RecordArray
+from ecu.contract.signals import CORNERS, INPUT, RATE_OK, USABLE
+from ecu.settings.config import load_config, new_params
 
 CONFIGS = Path(__file__).parents[2] / "config"
 

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from ecu import __version__, cli, resources
+from ecu import __version__, cli
 from ecu.errors import RunFault, UserError
+from ecu.settings import resources
 
 COMMANDS = (
     "run",

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from ecu.diagnostics.faults import LEARNING_GIVEN_UP
-from ecu.estimation.joint.layout import LEVEL
+from ecu.algorithm.estimation.joint.layout import LEVEL
+from ecu.contract.faults import LEARNING_GIVEN_UP
 
 from .test_step import Car, column
 

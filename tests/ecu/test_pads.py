@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ecu.config import load_config, new_params, store_key
-from ecu.diagnostics.store import in_use, open_store, restore, save
+from ecu.algorithm.monitoring.wear import LEG
+from ecu.algorithm.step import new_state
+from ecu.contract.records import N_LEGS
 from ecu.errors import UserError
-from ecu.monitoring.wear import LEG
 from ecu.pads import appraise, wear_command
-from ecu.records import N_LEGS
-from ecu.step import new_state
+from ecu.recording.store import in_use, open_store, restore, save
+from ecu.settings.config import load_config, new_params, store_key
 
 CONFIG = Path(__file__).parents[2] / "config" / "suv.toml"
 VEHICLE = load_config(CONFIG)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from ecu.params import GRAVITY
-from ecu.records import OUTPUTS, new_record
-from ecu.signals import INPUT
-from ecu.step import new_state, step
+from ecu.algorithm.step import new_state, step
+from ecu.contract.params import GRAVITY
+from ecu.contract.records import OUTPUTS, new_record
+from ecu.contract.signals import INPUT
 
 CYCLE_S = 0.01
 

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brakelab.compare import differences
 from brakelab.replay.command import replay
-from brakelab.results import read_result
-from ecu.resources import resource
+from brakelab.results.compare import differences
+from brakelab.results.files import read_result
+from ecu.settings.resources import resource
 
 HERE = Path(__file__).parent
 REFERENCE = HERE / "mustang_braking.csv"

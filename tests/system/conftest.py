@@ -20,9 +20,9 @@ import pytest
 
 from ecu.bus.channel import Channel, open_channel
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
-from ecu.clock import Grid, system_time
-from ecu.records import FRAME, new_record
-from ecu.signals import INPUT, N_INPUTS
+from ecu.contract.records import FRAME, new_record
+from ecu.contract.signals import INPUT, N_INPUTS
+from ecu.runtime.clock import Grid, system_time
 
 ROOT = Path(__file__).parents[2]
 DBC = ROOT / "dbc" / "brake_ecu.dbc"

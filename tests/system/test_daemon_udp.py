@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from ecu.bus.e2e import P01_MODULO
-from ecu.config import load_config, store_key
-from ecu.diagnostics.store import open_store, restore, save
-from ecu.recorder import read_recording
-from ecu.records import LEARNED
+from ecu.contract.records import LEARNED
+from ecu.recording.recorder import read_recording
+from ecu.recording.store import open_store, restore, save
+from ecu.settings.config import load_config, store_key
 
 from .conftest import ROOT, demand_ids
 

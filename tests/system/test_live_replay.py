@@ -16,9 +16,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from brakelab.replay.command import replay
-from ecu.recorder import read_recording
-from ecu.records import output_vector
-from ecu.signals import OUTPUT_COLUMNS
+from ecu.contract.records import output_vector
+from ecu.contract.signals import OUTPUT_COLUMNS
+from ecu.recording.recorder import read_recording
 
 from .conftest import ROOT
 

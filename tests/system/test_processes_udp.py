@@ -12,10 +12,10 @@ import pytest
 
 from brakelab.plant.cycle import DEMAND_TIMEOUT
 from ecu.bus.e2e import P01_MODULO
-from ecu.diagnostics.faults import FOREIGN_SENDER, NOT_KEPT
-from ecu.diagnostics.store import open_store
-from ecu.recorder import read_recording
-from ecu.signals import CYCLE_NS
+from ecu.contract.faults import FOREIGN_SENDER, NOT_KEPT
+from ecu.contract.signals import CYCLE_NS
+from ecu.recording.recorder import read_recording
+from ecu.recording.store import open_store
 
 from .conftest import ROOT, demand_ids, wait_for
 

@@ -13,8 +13,8 @@ import pytest
 
 from brakelab.rig.wire import ACTIVE, BUS_OFF, PASSIVE, STATE_NAMES, WARNING, Wire
 from ecu.bus.channel import open_channel
-from ecu.recorder import read_recording
-from ecu.records import EXTENDED_ID, FRAME, FRAME_EXTENDED, FRAME_FD, new_record
+from ecu.contract.records import EXTENDED_ID, FRAME, FRAME_EXTENDED, FRAME_FD, new_record
+from ecu.recording.recorder import read_recording
 
 from .conftest import ROOT, demand_ids, patience, wait_for
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ecu.bus.e2e import P01_MODULO
-from ecu.recorder import read_recording
+from ecu.recording.recorder import read_recording
 
 from .conftest import ROOT, demand_ids
 

@@ -19,13 +19,13 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from brakelab.closed_loop import Plans, plans
 from brakelab.plant.driver import drive
-from brakelab.priority import ask_for_priority
-from brakelab.rig.faults import Way, convey, new_way
-from brakelab.scenario import Scenario, load_scenario
-from brakelab.simulate import write_columns
-from brakelab.vehicle_bus import (
+from brakelab.simulation.closed_loop import Plans, plans
+from brakelab.simulation.faults import Way, convey, new_way
+from brakelab.simulation.priority import ask_for_priority
+from brakelab.simulation.scenario import Scenario, load_scenario
+from brakelab.simulation.simulate import write_columns
+from brakelab.simulation.vehicle_bus import (
     N_TRUTH,
     TRUTH_COLUMNS,
     Vehicle,
@@ -41,12 +41,12 @@ from ecu.bus.channel import Channel, open_channel
 from ecu.bus.freshness import begin_cycle, target_dtype
 from ecu.bus.receive import Reception, new_reception, receive
 from ecu.bus.transmit import Transmission, frame_buffer, new_transmission, transmit
-from ecu.clock import Grid, TimeSource, system_time
+from ecu.contract.records import FRAME, RecordArray
+from ecu.contract.signals import CYCLE_NS, N_OUTPUTS
 from ecu.errors import UserError
 from ecu.jit import kernel
-from ecu.records import FRAME, RecordArray
-from ecu.resources import SCENARIOS, named
-from ecu.signals import CYCLE_NS, N_OUTPUTS
+from ecu.runtime.clock import Grid, TimeSource, system_time
+from ecu.settings.resources import SCENARIOS, named
 
 RECEIVED_AT_ONCE: Final = 256
 SILENCE_CYCLES: Final = 50

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from brakelab.bench.ablation import (
+from brakelab.simulation.scenario_car import with_draw
+from brakelab.studies.ablation import (
     ABLATIONS,
     CASES,
     Ablation,
@@ -13,16 +14,15 @@ from brakelab.bench.ablation import (
     forget,
     without,
 )
-from brakelab.bench.observers import counted
-from brakelab.bench.observers_cases import configured, shipped
-from brakelab.bench.stops import AXLES, estimate_errors
-from brakelab.scenario_car import with_draw
-from ecu.config import new_params
-from ecu.estimation.joint.layout import LEVEL, MASS, RATIO
-from ecu.estimation.joint.learned import KEPT, LEVEL_PAUSE
-from ecu.estimation.joint.prior import LEVEL_AXLE, LEVEL_COMMON, LEVEL_WHEEL, PRIOR
-from ecu.records import LEARNED, RecordArray, new_record
-from ecu.step import new_state
+from brakelab.studies.observers import counted
+from brakelab.studies.observers_cases import configured, shipped
+from brakelab.studies.stops import AXLES, estimate_errors
+from ecu.algorithm.estimation.joint.layout import LEVEL, MASS, RATIO
+from ecu.algorithm.estimation.joint.learned import KEPT, LEVEL_PAUSE
+from ecu.algorithm.estimation.joint.prior import LEVEL_AXLE, LEVEL_COMMON, LEVEL_WHEEL, PRIOR
+from ecu.algorithm.step import new_state
+from ecu.contract.records import LEARNED, RecordArray, new_record
+from ecu.settings.config import new_params
 
 STOP = with_draw(shipped("stop-1"), "nominal")
 

@@ -3,9 +3,13 @@
 import numpy as np
 import pytest
 
-from brakelab.bench import bound
-from brakelab.bench.bound import LEVELS, Bound, Limit, axle_errors, bound_table, bounds_of
-from brakelab.bench.bound_car import (
+from brakelab.plant.records import GRAVITY, RecordArray
+from brakelab.plant.tyre import magic_formula
+from brakelab.simulation.closed_loop import Drive, new_loop, run
+from brakelab.simulation.scenario_car import with_draw
+from brakelab.studies import bound
+from brakelab.studies.bound import LEVELS, Bound, Limit, axle_errors, bound_table, bounds_of
+from brakelab.studies.bound_car import (
     MASS,
     MU,
     RADIUS,
@@ -19,15 +23,11 @@ from brakelab.bench.bound_car import (
     shown,
     slip_of,
 )
-from brakelab.bench.bound_system import wander_of
-from brakelab.bench.linear_bound import System, filtered, sampled
-from brakelab.bench.observers import counted
-from brakelab.bench.observers_cases import ACCURACY, configured, shipped
-from brakelab.closed_loop import Drive, new_loop, run
-from brakelab.plant.records import GRAVITY, RecordArray
-from brakelab.plant.tyre import magic_formula
-from brakelab.scenario_car import with_draw
-from ecu.signals import CORNERS
+from brakelab.studies.bound_system import wander_of
+from brakelab.studies.linear_bound import System, filtered, sampled
+from brakelab.studies.observers import counted
+from brakelab.studies.observers_cases import ACCURACY, configured, shipped
+from ecu.contract.signals import CORNERS
 
 
 def _one_wheel(walk: float, noise: float, steps: int) -> System:

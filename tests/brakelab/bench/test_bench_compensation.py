@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from brakelab.bench.compensation import (
+from brakelab.simulation.closed_loop import Drive
+from brakelab.studies.compensation import (
     CURVES,
     LEVELS,
     Car,
@@ -14,11 +15,10 @@ from brakelab.bench.compensation import (
     level_errors,
     manoeuvre,
 )
-from brakelab.bench.compensation_table import mass_table
-from brakelab.closed_loop import Drive
-from ecu.config import load_config
-from ecu.records import FRAME, new_record
-from ecu.resources import resource
+from brakelab.studies.compensation_table import mass_table
+from ecu.contract.records import FRAME, new_record
+from ecu.settings.config import load_config
+from ecu.settings.resources import resource
 
 
 def brakings(share: float) -> Run:

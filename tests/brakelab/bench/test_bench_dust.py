@@ -5,9 +5,9 @@ import pytest
 
 pytest.importorskip("sklearn", reason="needs scikit-learn (extra learn)")
 
-from brakelab.bench.dust import dust_tables, model_rows
-from brakelab.bench.dust_study import Draw, OnBoard, Outcome, _told_error, draw_trips
 from brakelab.identification.dust_models import FITS
+from brakelab.studies.dust import dust_tables, model_rows
+from brakelab.studies.dust_study import Draw, OnBoard, Outcome, _told_error, draw_trips
 
 
 def draw(error: float, floor: float, chosen: str = "monotone law") -> Draw:

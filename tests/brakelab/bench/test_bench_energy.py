@@ -5,9 +5,9 @@ from shutil import copy
 
 import pytest
 
-from brakelab.bench.energy import LOSSES, SOURCES, energy_tables
-from ecu.config import load_config
-from ecu.resources import resource
+from brakelab.studies.energy import LOSSES, SOURCES, energy_tables
+from ecu.settings.config import load_config
+from ecu.settings.resources import resource
 
 NAMES = ("stop-2", "blending-60")
 

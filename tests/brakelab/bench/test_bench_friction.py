@@ -3,10 +3,18 @@
 import pytest
 
 from brakelab.bench import command
-from brakelab.bench.friction import BRAKES, RUNS, TABLE_3_4, free_inertia, friction_tables, rms_row, run_means
 from brakelab.plant.description import load_plant
 from brakelab.plant.linings import Linings
-from ecu.resources import resource
+from brakelab.studies.friction import (
+    BRAKES,
+    RUNS,
+    TABLE_3_4,
+    free_inertia,
+    friction_tables,
+    rms_row,
+    run_means,
+)
+from ecu.settings.resources import resource
 
 
 @pytest.fixture(scope="module")

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from brakelab.bench.friction import LOADINGS, TABLE_3_4, TEMPERATURES
-from brakelab.bench.lab import NOISE, linings, on_ams, r1_recording, recovery
-from brakelab.bench.lab_table import PRINTED, TABLE_3_4_NRMSE
 from brakelab.friction_lab.columns import Columns
 from brakelab.friction_lab.dynamometer import new_bench, run_programme
 from brakelab.friction_lab.identification import Judged
 from brakelab.friction_lab.stops import Stops, find_stops
+from brakelab.plant.dynamometer_programme import load_programme
 from brakelab.plant.friction.constant import Constant
-from brakelab.plant.rig_programme import load_programme
-from ecu.resources import resource
+from brakelab.studies.friction import LOADINGS, TABLE_3_4, TEMPERATURES
+from brakelab.studies.lab import NOISE, linings, on_ams, r1_recording, recovery
+from brakelab.studies.lab_table import PRINTED, TABLE_3_4_NRMSE
+from ecu.settings.resources import resource
 
 
 @pytest.fixture(scope="module")

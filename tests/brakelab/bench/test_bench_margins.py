@@ -4,10 +4,10 @@ one."""
 import numpy as np
 import pytest
 
-from brakelab.bench import margins
-from brakelab.bench.margins import FREQUENCIES, Margins, in_phase, margin_tables
-from ecu.config import load_config
-from ecu.resources import resource
+from brakelab.studies import margins
+from brakelab.studies.margins import FREQUENCIES, Margins, in_phase, margin_tables
+from ecu.settings.config import load_config
+from ecu.settings.resources import resource
 
 
 @pytest.mark.parametrize("gain", [0.02, 0.5])

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from brakelab.bench import command, output
 from brakelab.bench.measure import Figure
-from brakelab.bench.observers import (
+from brakelab.simulation.closed_loop import Drive
+from brakelab.studies.observers import (
     JOINT,
     NEVER,
     Row,
@@ -22,7 +23,7 @@ from brakelab.bench.observers import (
     settling,
     tasks,
 )
-from brakelab.bench.observers_cases import (
+from brakelab.studies.observers_cases import (
     ACCURACY,
     CASES,
     EVENTS,
@@ -33,13 +34,12 @@ from brakelab.bench.observers_cases import (
     configured,
     shipped,
 )
-from brakelab.bench.observers_picture import HEIGHT, LEFT, TOP, Consistency, write_picture
-from brakelab.bench.observers_table import finite, observer_tables
-from brakelab.bench.table import markdown
-from brakelab.closed_loop import Drive
-from ecu.params import OBSERVERS
-from ecu.records import FRAME, new_record
-from ecu.signals import CORNERS
+from brakelab.studies.observers_picture import HEIGHT, LEFT, TOP, Consistency, write_picture
+from brakelab.studies.observers_table import finite, observer_tables
+from brakelab.studies.table import markdown
+from ecu.contract.params import OBSERVERS
+from ecu.contract.records import FRAME, new_record
+from ecu.contract.signals import CORNERS
 
 STOP = "stop #1"
 

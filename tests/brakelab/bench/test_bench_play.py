@@ -7,11 +7,11 @@ import pytest
 
 from brakelab.bench import command, output
 from brakelab.bench import play as bench
-from brakelab.bench.table import Table
-from brakelab.replay.formats import read_frames
-from brakelab.replay.log_quality import LogQuality
+from brakelab.logs.formats import read_frames
+from brakelab.logs.log_quality import LogQuality
 from brakelab.rig.live import Bus
-from ecu.records import RecordArray
+from brakelab.studies.table import Table
+from ecu.contract.records import RecordArray
 
 
 def test_traffic_is_that_of_a_bus_with_40_percent_load() -> None:

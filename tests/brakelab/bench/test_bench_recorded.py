@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from brakelab.bench.recorded import LOGGERS, Logger, _columns, recorded_of, recorded_table
-from brakelab.closed_loop import Drive
-from ecu.records import FRAME, new_record
-from ecu.signals import CORNERS
+from brakelab.simulation.closed_loop import Drive
+from brakelab.studies.recorded import LOGGERS, Logger, _columns, recorded_of, recorded_table
+from ecu.contract.records import FRAME, new_record
+from ecu.contract.signals import CORNERS
 
 
 @pytest.fixture(scope="module")

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from brakelab.bench import command, output
-from brakelab.bench.stops import TABLE_4_3, Stops, nrmse, stops, window
-from brakelab.bench.table import markdown, stop_tables
-from brakelab.closed_loop import Drive
-from ecu.config import load_config
-from ecu.records import FRAME, new_record
-from ecu.resources import resource
+from brakelab.simulation.closed_loop import Drive
+from brakelab.studies.stops import TABLE_4_3, Stops, nrmse, stops, window
+from brakelab.studies.table import markdown, stop_tables
+from ecu.contract.records import FRAME, new_record
+from ecu.settings.config import load_config
+from ecu.settings.resources import resource
 
 
 @pytest.fixture(scope="module")

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from brakelab.bench.wear import determination, inside, wear_tables
-from brakelab.bench.wear_drives import CarDrives, Part, trip_scenario
-from brakelab.bench.wear_study import LAWS, LIFE_KM, MODES, Law, Life, live
 from brakelab.identification.wear_fit import fit_law
+from brakelab.studies.wear import determination, inside, wear_tables
+from brakelab.studies.wear_drives import CarDrives, Part, trip_scenario
+from brakelab.studies.wear_study import LAWS, LIFE_KM, MODES, Law, Life, live
 
 TRUE_LAW = np.array([0.08, 0.0, 0.0, 0.0, 0.0, 3.0, 0.0])
 

@@ -17,9 +17,9 @@ from brakelab.fleet.output import brakes_file
 from brakelab.fleet.task import replay_job
 from brakelab.replay.command import replay
 from brakelab.replay.source import load_source
-from ecu.config import load_config
-from ecu.records import LEARNED
-from ecu.resources import resource
+from ecu.contract.records import LEARNED
+from ecu.settings.config import load_config
+from ecu.settings.resources import resource
 
 SUV = resource("config/suv.toml")
 CARS = {"one": 0, "two": 3}  # both are of the kind of config/suv.toml

@@ -6,7 +6,7 @@ import pytest
 
 from brakelab.fleet.manifest import Drive, find_drives
 from ecu.errors import UserError
-from ecu.resources import resource
+from ecu.settings.resources import resource
 
 SUV, SEDAN = resource("config/suv.toml"), resource("config/sedan.toml")
 KONA = resource("config/maps/kona.toml")

@@ -18,10 +18,10 @@ from brakelab.fleet.job import Job, Outcome, metadata_of
 from brakelab.fleet.manifest import Drive
 from brakelab.fleet.run import TRIES, Chain, Planned, run_fleet
 from brakelab.replay.source import load_source
-from brakelab.results import brakes_table
-from ecu.config import load_config
+from brakelab.results.files import brakes_table
 from ecu.errors import UserError
-from ecu.resources import resource
+from ecu.settings.config import load_config
+from ecu.settings.resources import resource
 
 SUV, SEDAN = (load_config(resource(f"config/{name}.toml")) for name in ("suv", "sedan"))
 SOURCE = load_source(None)

@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brakelab.bench.lab import r1_recording
 from brakelab.friction_lab.columns import Columns, columns_text
 from brakelab.friction_lab.dynamometer import new_bench
 from brakelab.friction_lab.recording import Recording, joined
 from brakelab.friction_lab.stops import Stops, find_stops
 from brakelab.plant.description import read_file
+from brakelab.plant.dynamometer import PRESSURE, new_stop
 from brakelab.plant.linings import Lining, Linings, rig_with
-from brakelab.plant.rig import PRESSURE, new_stop
-from ecu.resources import resource
+from brakelab.studies.lab import r1_recording
+from ecu.settings.resources import resource
 
 KMH = 1.0 / 3.6
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from brakelab.cli import app
 from brakelab.friction_lab import command, identification
 from brakelab.friction_lab.columns import Columns, load_columns
 from brakelab.friction_lab.identification import Judged, choose, hottest
@@ -14,10 +15,9 @@ from brakelab.friction_lab.reader import read_recording
 from brakelab.friction_lab.recording import Recording, write_recording
 from brakelab.friction_lab.stops import Stops, find_stops
 from brakelab.plant.description import read_file
+from brakelab.plant.dynamometer import nominal_friction
 from brakelab.plant.friction.constant import Constant
 from brakelab.plant.linings import Lining, Linings, rig_with
-from brakelab.plant.rig import nominal_friction
-from ecu.cli import app
 from ecu.errors import UserError
 
 FEW = ("constant", "ilvo")

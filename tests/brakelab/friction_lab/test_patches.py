@@ -5,8 +5,8 @@ import pytest
 
 from brakelab.friction_lab.dynamometer import Bench, Noise, new_bench
 from brakelab.friction_lab.patches import MEDIANS, bedded, draw_pad, rub
+from brakelab.plant.dynamometer import DECELERATION, PRESSURE, mean_friction, new_stop
 from brakelab.plant.linings import Lining
-from brakelab.plant.rig import DECELERATION, PRESSURE, mean_friction, new_stop
 
 KMH = 1.0 / 3.6
 

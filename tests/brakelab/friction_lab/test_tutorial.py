@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from brakelab.cli import app
 from brakelab.friction_lab import identification
 from brakelab.friction_lab.candidates import Candidate
 from brakelab.friction_lab.recording import Recording
@@ -16,8 +17,7 @@ from brakelab.friction_lab.stops import Stops
 from brakelab.plant.description import read_file
 from brakelab.plant.friction.law import RigBrake
 from brakelab.plant.linings import Linings
-from ecu.cli import app
-from ecu.resources import resource
+from ecu.settings.resources import resource
 
 PAGE = resource("docs") / "friction-lab.md"
 

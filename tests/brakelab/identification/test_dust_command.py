@@ -8,11 +8,11 @@ import pytest
 
 pytest.importorskip("sklearn", reason="needs scikit-learn (extra learn)")
 
-from brakelab.dust_trips import COLUMNS, campaign, write_campaign
 from brakelab.identification import dust_reader
 from brakelab.identification.dust_command import identify_dust
-from ecu.config import load_config, new_params, store_key
+from brakelab.identification.dust_trips import COLUMNS, campaign, write_campaign
 from ecu.errors import UserError
+from ecu.settings.config import load_config, new_params, store_key
 
 CONFIG = Path(__file__).parents[3] / "config" / "lcv.toml"
 

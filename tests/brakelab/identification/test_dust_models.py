@@ -14,7 +14,7 @@ from brakelab.identification.dust_models import (
     fit_table,
     resample,
 )
-from ecu.dust import NUMBERS
+from ecu.contract.dust import NUMBERS
 
 LAW = np.array([3.5, 0.9, 0.5, 0.2])
 

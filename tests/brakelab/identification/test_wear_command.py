@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from brakelab.identification.wear_command import identify_wear, specific_wear
-from brakelab.wear_programme import COLUMNS, drawn_car, programme, road_stops, write_programme
-from ecu.config import load_config
+from brakelab.identification.wear_programme import COLUMNS, drawn_car, programme, road_stops, write_programme
 from ecu.errors import UserError
+from ecu.settings.config import load_config
 
 CONFIG = Path(__file__).parents[3] / "config" / "suv.toml"
 

@@ -6,19 +6,19 @@ import cantools
 import numpy as np
 import pytest
 
-from brakelab.bench.observers_cases import shipped
-from brakelab.closed_loop import new_loop, run
-from brakelab.ecu_inputs import vehicle_frames
+from brakelab.logs.formats import read_frames
+from brakelab.logs.log_quality import LogQuality
 from brakelab.mapping.names import corner_of, words
 from brakelab.mapping.physics import Found, fit, propose
 from brakelab.mapping.series import read_series
-from brakelab.replay.formats import read_frames
-from brakelab.replay.log_quality import LogQuality
+from brakelab.simulation.closed_loop import new_loop, run
+from brakelab.simulation.ecu_inputs import vehicle_frames
+from brakelab.studies.observers_cases import shipped
 from ecu import cli
 from ecu.bus.database import load_database
 from ecu.bus.signal_map import load_signal_map, read_signal_map
-from ecu.config import load_config
-from ecu.resources import resource
+from ecu.settings.config import load_config
+from ecu.settings.resources import resource
 
 LOGS = Path(__file__).parents[2] / "data"
 

@@ -4,8 +4,8 @@ import pytest
 
 from brakelab.plant.description import Plant
 from brakelab.plant.disc import biot_number, cooling_rate, disc_step
+from brakelab.plant.dynamometer import cool
 from brakelab.plant.linings import rig_with
-from brakelab.plant.rig import cool
 
 KMH = (0, 30, 60, 100, 130)
 

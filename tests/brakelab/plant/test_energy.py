@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brakelab.closed_loop import new_loop, run
 from brakelab.plant.body import advance_planar
 from brakelab.plant.energy import Energy, energy
 from brakelab.plant.records import STATE, new_record
-from brakelab.scenario import load_scenario
-from ecu.config import load_config
+from brakelab.simulation.closed_loop import new_loop, run
+from brakelab.simulation.scenario import load_scenario
+from ecu.settings.config import load_config
 
 CONFIG = Path(__file__).parents[3] / "config"
 SCENARIOS = sorted(path.stem for path in (CONFIG / "scenarios").glob("*.toml"))

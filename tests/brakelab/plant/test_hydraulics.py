@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import signal
 
-from brakelab.bench.staircase import STEPS, measure_step
 from brakelab.plant.hydraulics import BUILD_UP, RELEASE, advance_pressure, command_for, settled_pressure
 from brakelab.plant.records import HISTORY, PARAMS, STATE, new_record
+from brakelab.studies.staircase import STEPS, measure_step
 
 DT = 1e-3
 BAR = 1e5

@@ -9,11 +9,11 @@ import pytest
 
 from brakelab.plant.description import Plant, nominal
 from brakelab.plant.disc import WET
+from brakelab.plant.dynamometer import nominal_friction
 from brakelab.plant.friction.laws import LAWS, law_row
 from brakelab.plant.lining import advance_disc_temperature, advance_lining
 from brakelab.plant.linings import rig_with
 from brakelab.plant.records import STATE, new_record
-from brakelab.plant.rig import nominal_friction
 
 DT = 1e-3
 

@@ -19,7 +19,7 @@ from brakelab.plant.sensor_errors import (
     new_sensing,
     new_sensors,
 )
-from brakelab.scenario import load_scenario
+from brakelab.simulation.scenario import load_scenario
 from ecu.errors import UserError
 
 CONFIG = Path(__file__).parents[3] / "config"

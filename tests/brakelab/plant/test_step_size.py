@@ -12,7 +12,7 @@ from brakelab.plant.cycle import CYCLE, set_commands
 from brakelab.plant.driver import drive
 from brakelab.plant.records import DEMAND, DRIVER, new_record
 from brakelab.plant.vehicle import STEP
-from brakelab.scenario import load_scenario
+from brakelab.simulation.scenario import load_scenario
 
 SCENARIOS = Path(__file__).parents[3] / "config" / "scenarios"
 

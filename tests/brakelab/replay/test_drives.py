@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from brakelab.bench.log_formats import FORMATS, convert
+from brakelab.logs.formats import read_frames
+from brakelab.logs.log_quality import LogQuality
 from brakelab.replay.command import replay
-from brakelab.replay.formats import read_frames
-from brakelab.replay.log_quality import LogQuality
-from brakelab.replay.prediction import SHORT
-from brakelab.results import read_result
-from ecu.resources import resource
+from brakelab.results.files import read_result
+from brakelab.results.prediction import SHORT
+from ecu.settings.resources import resource
 
 pytestmark = pytest.mark.drives
 

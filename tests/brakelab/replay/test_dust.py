@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from brakelab.replay.dust import dust_of
-from ecu.config import load_config, new_params
-from ecu.dust import LAW_TERMS, Dust, set_dust
-from ecu.signals import N_OUTPUTS, OUTPUT
+from ecu.contract.dust import LAW_TERMS
+from ecu.contract.signals import N_OUTPUTS, OUTPUT
+from ecu.settings.config import load_config, new_params
+from ecu.settings.dust import Dust, set_dust
 
 CONFIG = Path(__file__).parents[3] / "config" / "lcv.toml"
 MODEL = Dust(

@@ -6,22 +6,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brakelab.play_log import contract_frames
+from brakelab.logs.formats import read_frames
+from brakelab.logs.log_quality import LogQuality
+from brakelab.logs.signal_file import SampleBlock, freshness_at_any_rate
+from brakelab.play.play_log import contract_frames
 from brakelab.replay import engine
 from brakelab.replay.engine import Rows, new_ecu, run_frames, run_samples
-from brakelab.replay.formats import read_frames
-from brakelab.replay.log_quality import LogQuality
 from brakelab.replay.quality import Findings
-from brakelab.replay.signal_file import SampleBlock, freshness_at_any_rate
 from brakelab.replay.source import load_source
+from ecu.algorithm.step import step
 from ecu.bus.freshness import accept, begin_cycle, end_cycle
 from ecu.bus.receive import contract_receive_plan, new_reception, receive
-from ecu.config import load_config, new_params
-from ecu.recorder import candump_lines
-from ecu.records import CYCLE, FRAME, RecordArray
-from ecu.resources import resource
-from ecu.signals import ACCEL_X, CALLIPER_PRESSURE, CYCLE_NS, MOTOR_TORQUE, N_OUTPUTS, WHEEL_SPEED
-from ecu.step import step
+from ecu.contract.records import CYCLE, FRAME, RecordArray
+from ecu.contract.signals import ACCEL_X, CALLIPER_PRESSURE, CYCLE_NS, MOTOR_TORQUE, N_OUTPUTS, WHEEL_SPEED
+from ecu.recording.recorder import candump_lines
+from ecu.settings.config import load_config, new_params
+from ecu.settings.resources import resource
 
 START_NS = 1_600_000_000_000_000_000
 

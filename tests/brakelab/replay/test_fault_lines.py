@@ -6,7 +6,7 @@ import pytest
 
 from brakelab.replay.needed import fault_lines
 from brakelab.replay.quality import Findings
-from ecu.diagnostics.faults import PEDAL_LOST, WHEEL_SPEED_LOST
+from ecu.contract.faults import PEDAL_LOST, WHEEL_SPEED_LOST
 
 
 @pytest.mark.parametrize(

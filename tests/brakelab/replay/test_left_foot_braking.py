@@ -14,11 +14,11 @@ import pytest
 from brakelab.plant.driver import drive
 from brakelab.plant.records import BRAKE
 from brakelab.replay.command import replay
-from brakelab.results import read_result
-from brakelab.scenario import load_scenario
-from brakelab.vehicle_bus import carry_on, new_noise, new_values, new_vehicle, sense
-from ecu.resources import resource
-from ecu.signals import CORNERS, INPUT_SIGNALS
+from brakelab.results.files import read_result
+from brakelab.simulation.scenario import load_scenario
+from brakelab.simulation.vehicle_bus import carry_on, new_noise, new_values, new_vehicle, sense
+from ecu.contract.signals import CORNERS, INPUT_SIGNALS
+from ecu.settings.resources import resource
 
 SCENARIO = """
 plant = "suv"

@@ -5,22 +5,29 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brakelab.play_log import contract_frames
+from brakelab.play.play_log import contract_frames
 from brakelab.replay.command import replay
 from brakelab.replay.engine import new_ecu
 from brakelab.replay.quality import Findings
 from brakelab.replay.source import load_source
-from brakelab.results import read_result
+from brakelab.results.files import read_result
+from ecu.algorithm.step import step
 from ecu.bus.freshness import begin_cycle, end_cycle
 from ecu.bus.receive import contract_receive_plan, new_reception, receive
-from ecu.config import load_config, new_params
+from ecu.contract.records import RecordArray
+from ecu.contract.signals import CYCLE_NS, OUTPUT_COLUMNS
 from ecu.errors import UserError
-from ecu.recorder import ABOUT_FILE, CYCLES_FILE, candump_lines, layout, start_recording, write_batch
-from ecu.records import RecordArray
-from ecu.resources import resource
-from ecu.ring import RECORDED, Batch
-from ecu.signals import CYCLE_NS, OUTPUT_COLUMNS
-from ecu.step import step
+from ecu.recording.recorder import (
+    ABOUT_FILE,
+    CYCLES_FILE,
+    candump_lines,
+    layout,
+    start_recording,
+    write_batch,
+)
+from ecu.recording.ring import RECORDED, Batch
+from ecu.settings.config import load_config, new_params
+from ecu.settings.resources import resource
 
 START_NS = 1_600_000_000_000_000_000
 CYCLES = 300

@@ -10,17 +10,17 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from brakelab.play_log import contract_frames
+from brakelab.play.play_log import contract_frames
 from brakelab.replay.command import replay
 from brakelab.replay.quality import Findings
 from brakelab.replay.source import load_source
-from brakelab.results import read_result
-from ecu.config import load_config, new_params, store_key
-from ecu.diagnostics.store import open_store, restore
+from brakelab.results.files import read_result
+from ecu.contract.signals import CORNERS
 from ecu.errors import RunFault, UserError
-from ecu.recorder import candump_lines
-from ecu.resources import resource
-from ecu.signals import CORNERS
+from ecu.recording.recorder import candump_lines
+from ecu.recording.store import open_store, restore
+from ecu.settings.config import load_config, new_params, store_key
+from ecu.settings.resources import resource
 
 AT_REST = (
     *("accel_y", "yaw_rate", "steering_angle", "abs_active", "esp_active", "reverse", "accelerator_position"),

@@ -8,16 +8,16 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from brakelab.play_log import contract_frames
+from brakelab.play.play_log import contract_frames
 from brakelab.replay.command import replay
 from brakelab.replay.quality import Findings
 from brakelab.replay.seen import new_seen, set_raw_ends
 from brakelab.replay.source import load_source
-from brakelab.results import read_result
+from brakelab.results.files import read_result
 from ecu.bus.receive import contract_receive_plan
-from ecu.recorder import candump_lines
-from ecu.resources import resource
-from ecu.signals import INPUT
+from ecu.contract.signals import INPUT
+from ecu.recording.recorder import candump_lines
+from ecu.settings.resources import resource
 
 SECONDS = 4.0
 ROWS = 400

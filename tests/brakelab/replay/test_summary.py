@@ -3,9 +3,9 @@
 import pytest
 from rich.console import Console
 
-from brakelab.replay.brakes import LEARNED, BrakeRow
 from brakelab.replay.summary import brakings_table, prediction_lines
-from ecu.signals import CORNERS
+from brakelab.results.brakes import LEARNED, BrakeRow
+from ecu.contract.signals import CORNERS
 
 NOMINAL = (0.4, 0.4, 0.36, 0.36)
 

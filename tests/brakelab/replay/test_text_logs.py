@@ -12,11 +12,11 @@ from can.io.trc import TRCFileVersion
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from brakelab.replay.asc import date_ns
-from brakelab.replay.formats import read_frames
-from brakelab.replay.log_quality import LogQuality
+from brakelab.logs.asc import date_ns
+from brakelab.logs.formats import read_frames
+from brakelab.logs.log_quality import LogQuality
+from ecu.contract.records import FRAME_ERROR, FRAME_EXTENDED, FRAME_FD, FRAME_REMOTE, RecordArray
 from ecu.errors import UserError
-from ecu.records import FRAME_ERROR, FRAME_EXTENDED, FRAME_FD, FRAME_REMOTE, RecordArray
 
 FD_LENGTHS = [*range(9), 12, 16, 20, 24, 32, 48, 64]
 

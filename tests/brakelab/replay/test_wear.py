@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brakelab.closed_loop import new_loop, run_blocks
 from brakelab.replay.wear import regressors_of, wear_of
-from brakelab.scenario import load_scenario
-from ecu.config import load_config, new_params
-from ecu.signals import OUTPUT
+from brakelab.simulation.closed_loop import new_loop, run_blocks
+from brakelab.simulation.scenario import load_scenario
+from ecu.contract.signals import OUTPUT
+from ecu.settings.config import load_config, new_params
 
 CONFIG = Path(__file__).parents[3] / "config"
 

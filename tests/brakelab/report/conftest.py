@@ -10,9 +10,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from brakelab.report.brakings import Braking, Force, brakes_path
-from ecu.recorder import ABOUT_FILE, CYCLES_FILE, INITIAL_FILE, layout
-from ecu.ring import RECORDED
-from ecu.signals import CORNERS, OUTPUT_COLUMNS
+from ecu.contract.signals import CORNERS, OUTPUT_COLUMNS
+from ecu.recording.recorder import ABOUT_FILE, CYCLES_FILE, INITIAL_FILE, layout
+from ecu.recording.ring import RECORDED
 
 STOPS = ((5.0, 4.0), (22.0, 6.0), (40.0, 8.0))  # start [s], deceleration [m/s^2]
 V_IN = 100.0 / 3.6

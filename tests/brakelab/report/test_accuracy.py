@@ -4,7 +4,7 @@ import pytest
 from brakelab.report.accuracy import accuracy, achieved_deceleration, evaluated, tracking
 from brakelab.report.brakings import Braking
 from brakelab.report.drive import Drive
-from ecu.signals import CORNERS
+from ecu.contract.signals import CORNERS
 
 from .conftest import braking_between
 

@@ -5,7 +5,7 @@ import pytest
 
 from brakelab.report.drive import Drive
 from brakelab.report.friction import plots_of_friction
-from ecu.signals import CORNERS, HOLDING, OBSERVING
+from ecu.contract.signals import CORNERS, HOLDING, OBSERVING
 
 from .conftest import braking_between
 

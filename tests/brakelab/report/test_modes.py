@@ -3,8 +3,8 @@ import numpy as np
 from brakelab.report.downsample import buckets
 from brakelab.report.drive import Drive
 from brakelab.report.modes import Bar, faults_seen, mode_bars
-from ecu.diagnostics.faults import IMU_LOST
-from ecu.signals import ACTIVE, HOLDING, OBSERVING, READY, STARTING
+from ecu.contract.faults import IMU_LOST
+from ecu.contract.signals import ACTIVE, HOLDING, OBSERVING, READY, STARTING
 
 
 def drive(**columns: list[float]) -> Drive:

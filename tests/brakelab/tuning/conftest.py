@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from brakelab.observer import with_observer
-from ecu.config import Config, load_config
-from ecu.resources import resource
+from brakelab.simulation.observer import with_observer
+from ecu.settings.config import Config, load_config
+from ecu.settings.resources import resource
 
 STOP = """
 plant = "suv"

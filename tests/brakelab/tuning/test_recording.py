@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brakelab.closed_loop import Drive, new_loop, run
-from brakelab.observer import with_observer
-from brakelab.scenario import load_scenario
+from brakelab.simulation.closed_loop import Drive, new_loop, run
+from brakelab.simulation.observer import with_observer
+from brakelab.simulation.scenario import load_scenario
 from brakelab.tuning.recording import (
     SHORTEST_S,
     applications,
@@ -17,8 +17,8 @@ from brakelab.tuning.recording import (
     recording,
 )
 from brakelab.tuning.replay import replay_errors
-from ecu.config import Config
-from ecu.records import new_record
+from ecu.contract.records import new_record
+from ecu.settings.config import Config
 
 
 def driven(braking: list[tuple[float, float]], until: float, slow_from: float) -> Drive:

@@ -7,7 +7,7 @@ import pytest
 
 from brakelab.tuning.recording import Errors
 from brakelab.tuning.search import RANGES, Best, fitness, genes, search, tuned
-from ecu.config import Config
+from ecu.settings.config import Config
 
 GOAL = {
     "omega_walk": 5.0,

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from brakelab.scenario import load_scenario
+from brakelab.simulation.scenario import load_scenario
 from brakelab.tuning import command
 from brakelab.tuning.recording import drive_errors, drive_once
 from brakelab.tuning.search import RANGES
-from ecu.config import load_config
 from ecu.errors import UserError
-from ecu.resources import resource
+from ecu.settings.config import load_config
+from ecu.settings.resources import resource
 
 SUV = resource("config/suv.toml")
 BUDGET = command.Budget(generations=2, population=6, seed=1)

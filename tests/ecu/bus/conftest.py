@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ecu.records import FRAME, RecordArray
+from ecu.contract.records import FRAME, RecordArray
 
 ROOT = Path(__file__).parents[3]
 LINE = re.compile(r"\((\d+)\.(\d{6})\) (\S+) ([0-9A-F]+)#([0-9A-F]*)")

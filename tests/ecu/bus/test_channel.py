@@ -9,8 +9,8 @@ import pytest
 
 from ecu.bus import socketcan
 from ecu.bus.channel import GenericChannel, open_channel
+from ecu.contract.records import EXTENDED_ID, FRAME, FRAME_EXTENDED, FRAME_FD, new_record
 from ecu.errors import UserError
-from ecu.records import EXTENDED_ID, FRAME, FRAME_EXTENDED, FRAME_FD, new_record
 
 
 class ScriptedBus:

@@ -8,7 +8,7 @@ from cantools.database import Message
 
 from ecu.bus.database import attribute, load_database
 from ecu.bus.plan import not_available_code
-from ecu.signals import INPUT, INPUT_SIGNALS, OUTPUT_SIGNALS, column_names
+from ecu.contract.signals import INPUT, INPUT_SIGNALS, OUTPUT_SIGNALS, column_names
 
 PROTECTION = {"crc", "alive_counter"}
 

@@ -29,7 +29,7 @@ from ecu.bus.e2e import (
     p01_crc,
     p01_protect,
 )
-from ecu.records import RecordArray
+from ecu.contract.records import RecordArray
 
 MS = 1_000_000
 PERIOD = 10 * MS

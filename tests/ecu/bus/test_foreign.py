@@ -7,9 +7,9 @@ import pytest
 from ecu.bus import foreign
 from ecu.bus.foreign import discard, listen_before_send
 from ecu.bus.transmit import contract_transmit_plan
+from ecu.contract.records import FRAME_EXTENDED
 from ecu.errors import UserError
-from ecu.records import FRAME_EXTENDED
-from ecu.resources import resource
+from ecu.settings.resources import resource
 
 PLAN = contract_transmit_plan(resource("dbc/brake_ecu.dbc"), "BrakeEcu")
 DEMAND = int(PLAN.ids[0])

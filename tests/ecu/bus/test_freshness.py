@@ -14,8 +14,8 @@ from ecu.bus.freshness import (
     new_freshness,
     target_dtype,
 )
-from ecu.records import RecordArray
-from ecu.signals import ALIVE, RATE_OK, VALID
+from ecu.contract.records import RecordArray
+from ecu.contract.signals import ALIVE, RATE_OK, VALID
 
 MS = 1_000_000
 T0 = 1_700_000_000_000_000_000

@@ -18,8 +18,8 @@ from ecu.bus.receive import (
     receive,
 )
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
-from ecu.records import FRAME_ERROR, FRAME_EXTENDED, FRAME_REMOTE, INPUTS, RecordArray, new_record
-from ecu.signals import ALIVE, INPUT, INPUT_SIGNALS, N_INPUTS, RATE_OK, USABLE, VALID
+from ecu.contract.records import FRAME_ERROR, FRAME_EXTENDED, FRAME_REMOTE, INPUTS, RecordArray, new_record
+from ecu.contract.signals import ALIVE, INPUT, INPUT_SIGNALS, N_INPUTS, RATE_OK, USABLE, VALID
 
 ROOT = Path(__file__).parents[3]
 CONTRACT = ROOT / "dbc" / "brake_ecu.dbc"

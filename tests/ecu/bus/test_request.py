@@ -11,9 +11,9 @@ from ecu.bus.freshness import begin_cycle, end_cycle
 from ecu.bus.receive import contract_receive_plan, new_reception, receive
 from ecu.bus.request import FIRST, HALF_NS, LAST, REQUEST, begin_request, hold_request, note_request
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
-from ecu.diagnostics.faults import E2E_REJECTIONS
-from ecu.records import FRAME, INPUTS, RecordArray, new_record
-from ecu.signals import (
+from ecu.contract.faults import E2E_REJECTIONS
+from ecu.contract.records import FRAME, INPUTS, RecordArray, new_record
+from ecu.contract.signals import (
     DECEL_DEMAND,
     DECEL_DEMAND_VALID,
     INPUT_SIGNALS,

@@ -15,9 +15,9 @@ from ecu.bus.freshness import begin_cycle, end_cycle
 from ecu.bus.receive import Reception, input_names, new_reception, receive
 from ecu.bus.signal_map import MappedBus, load_signal_map
 from ecu.bus.units import CONVERSIONS, conversion
+from ecu.contract.records import INPUTS, RecordArray, new_record
+from ecu.contract.signals import ALIVE, CYCLE_NS, INPUT, INPUT_SIGNALS, VALID
 from ecu.errors import UserError
-from ecu.records import INPUTS, RecordArray, new_record
-from ecu.signals import ALIVE, CYCLE_NS, INPUT, INPUT_SIGNALS, VALID
 
 ReadLog = Callable[[Path, str], RecordArray]
 CARS = ("mustang", "rav4", "kona")

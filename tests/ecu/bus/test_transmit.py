@@ -13,8 +13,8 @@ from ecu.bus.database import attribute, load_database
 from ecu.bus.freshness import begin_cycle, target_dtype
 from ecu.bus.receive import contract_listen_plan, contract_receive_plan, new_reception, receive
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
-from ecu.records import INPUTS, new_record
-from ecu.signals import INPUT, INPUT_SIGNALS, N_INPUTS, N_OUTPUTS, OUTPUT, OUTPUT_COLUMNS
+from ecu.contract.records import INPUTS, new_record
+from ecu.contract.signals import INPUT, INPUT_SIGNALS, N_INPUTS, N_OUTPUTS, OUTPUT, OUTPUT_COLUMNS
 
 ROOT = Path(__file__).parents[3]
 CONTRACT = ROOT / "dbc" / "brake_ecu.dbc"

@@ -5,8 +5,8 @@ from typing import Any, Final
 import cantools
 import numpy as np
 
-from brakelab.bench.braking import ALL_DUE, MESSAGES_IN, Stop, simulated_stop
 from brakelab.bench.measure import Row, alternate, installed, timed
+from brakelab.studies.braking import ALL_DUE, MESSAGES_IN, Stop, simulated_stop
 from ecu.bus.receive import ReceivePlan, contract_receive_plan, new_reception, receive
 from ecu.bus.transmit import (
     Transmission,
@@ -16,10 +16,10 @@ from ecu.bus.transmit import (
     new_transmission,
     transmit,
 )
+from ecu.contract.records import FRAME, INPUTS, RecordArray, new_record
+from ecu.contract.signals import CYCLE_NS
 from ecu.jit import kernel
-from ecu.records import FRAME, INPUTS, RecordArray, new_record
-from ecu.resources import resource
-from ecu.signals import CYCLE_NS
+from ecu.settings.resources import resource
 
 ROUNDS: Final = 15
 CYCLES: Final = 300

@@ -4,43 +4,42 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from multiprocessing import get_context
-from typing import Final, NamedTuple, TypeVar
+from typing import Final, TypeVar
 
 from rich.console import Console
 from rich.progress import track
 
-from brakelab.bench import (
+from brakelab.bench.measure import NOT_INSTALLED, machine
+from brakelab.bench.output import plain_row, print_json, print_tables, write_page
+from brakelab.bench.times import BENCHES
+from brakelab.studies import (
     ablation,
     bound,
-    codec,
     compensation,
     compensation_picture,
     compensation_table,
-    cycle,
     margins,
-    plant,
     recorded,
-    step,
 )
-from brakelab.bench import stops as stops_bench
-from brakelab.bench.blending import blending_tables
-from brakelab.bench.chart import write_chart
-from brakelab.bench.energy import energy_tables
-from brakelab.bench.friction import friction_tables
-from brakelab.bench.measure import NOT_INSTALLED, Row, machine
-from brakelab.bench.observers import WIDE, Sample, Task, observer_rows, step_times, tasks
-from brakelab.bench.observers_cases import configured
-from brakelab.bench.observers_picture import PICTURED, consistency_of, write_picture
-from brakelab.bench.observers_table import finite, observer_tables
-from brakelab.bench.output import plain_row, print_json, print_tables, write_page
-from brakelab.bench.table import Table, stop_tables, time_table
-from brakelab.bench.texts import (
+from brakelab.studies import stops as stops_bench
+from brakelab.studies.blending import blending_tables
+from brakelab.studies.chart import write_chart
+from brakelab.studies.energy import energy_tables
+from brakelab.studies.failures import failure_tables
+from brakelab.studies.friction import friction_tables
+from brakelab.studies.observers import WIDE, Sample, Task, observer_rows, step_times, tasks
+from brakelab.studies.observers_cases import configured
+from brakelab.studies.observers_picture import PICTURED, consistency_of, write_picture
+from brakelab.studies.observers_table import finite, observer_tables
+from brakelab.studies.table import Table, stop_tables, time_table
+from brakelab.studies.texts import (
     ABLATION_TEXT,
     BLENDING_TEXT,
     BOUND_TEXT,
     COMPENSATION_TEXT,
     DUST_TEXT,
     ENERGY_TEXT,
+    FAILURES_TEXT,
     FRICTION_TEXT,
     LAB_TEXT,
     LATENESS_TEXT,
@@ -53,9 +52,9 @@ from brakelab.bench.texts import (
     WEAR_TEXT,
 )
 from ecu import __version__
-from ecu.config import Config, config_hash, load_config
 from ecu.errors import UserError
-from ecu.resources import resource
+from ecu.settings.config import Config, config_hash, load_config
+from ecu.settings.resources import resource
 
 STOPS: Final = "stops"
 OBSERVERS: Final = "observers"
@@ -65,6 +64,7 @@ FRICTION: Final = "friction"
 LAB: Final = "lab"
 ENERGY: Final = "energy"
 BLENDING: Final = "blending"
+FAILURES: Final = "failures"
 COMPENSATION: Final = "compensation"
 MARGINS: Final = "margins"
 LATENESS: Final = "lateness"
@@ -75,44 +75,6 @@ REPLAY: Final = "replay"
 PLAY: Final = "play"
 
 Car = TypeVar("Car")
-
-
-class Bench(NamedTuple):
-    """One bench of times."""
-
-    rows: Callable[[], list[Row]]
-    title: str
-    below: str
-
-
-BENCHES: Final = {
-    "step": Bench(
-        step.step_rows,
-        "step",
-        f"Processor time of a cycle with four wheels, {step.CYCLES} cycles of braking in each of "
-        f"{step.ROUNDS} rounds. All filters get the same inputs and give the same friction.",
-    ),
-    "codec": Bench(
-        codec.codec_rows,
-        "codec",
-        f"Processor time of a message: the 13 protected inputs of the contract, {codec.CYCLES} cycles in "
-        f"each of {codec.ROUNDS} rounds. Ours with CRC, counter and (decoding) freshness, the peer without.",
-    ),
-    "plant": Bench(
-        plant.plant_rows,
-        "plant",
-        f"Time of the simulated vehicle per millisecond of its drive: {plant.STEPS} steps of 1 ms in each of "
-        f"{plant.ROUNDS} rounds, braking in a curve on a rough road from 50 m/s. Processor time "
-        "unless by the clock.",
-    ),
-    "cycle": Bench(
-        cycle.cycle_rows,
-        "cycle",
-        f"Time by the clock, {cycle.CYCLES} cycles of 10 ms in each of {cycle.ROUNDS} rounds, in real time "
-        "but without real-time rights: 39 frames in, 6 out, over a socket pair that carries can_frames. Ours "
-        "is the daemon's cycle; the peer checks nothing and runs the four filters alone.",
-    ),
-}
 
 
 def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0, draw: str = WIDE) -> int:
@@ -138,6 +100,7 @@ def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0, 
         COMPENSATION: _compensation,
         MARGINS: _margins,
         BLENDING: _blending,
+        FAILURES: _failures,
         RECORDED: partial(_recorded, seeds=seeds),
         WEAR: partial(_wear, seeds=seeds),
         DUST: partial(_dust, seeds=seeds),
@@ -247,7 +210,7 @@ def _recorded(json: bool, seeds: int) -> int:
 
 
 def _wear(json: bool, seeds: int) -> int:
-    from brakelab.bench import wear, wear_drives, wear_study
+    from brakelab.studies import wear, wear_drives, wear_study
 
     cars = _each_car(WEAR, wear_drives.drive_car, min(seeds, wear.CARS))
     laws = wear_study.dynamometer_laws()
@@ -259,7 +222,7 @@ def _wear(json: bool, seeds: int) -> int:
 
 
 def _dust(json: bool, seeds: int) -> int:
-    from brakelab.bench import dust
+    from brakelab.studies import dust
 
     tables = dust.dust_page(partial(_each_car, DUST), min(seeds, dust.DRAWS), not json)
     return _page(DUST, "Dust", DUST_TEXT, tables, json)
@@ -270,8 +233,8 @@ def _friction(json: bool) -> int:
 
 
 def _lab(json: bool) -> int:
-    from brakelab.bench.lab import run_lab
-    from brakelab.bench.lab_table import lab_tables
+    from brakelab.studies.lab import run_lab
+    from brakelab.studies.lab_table import lab_tables
 
     console = Console(stderr=True)
     tables = lab_tables(run_lab(lambda line: console.print(line, highlight=False, markup=False)))
@@ -307,6 +270,10 @@ def _margins(json: bool) -> int:
 
 def _blending(json: bool) -> int:
     return _page(BLENDING, "Motors and linings brake together", BLENDING_TEXT, blending_tables(), json)
+
+
+def _failures(json: bool) -> int:
+    return _page(FAILURES, "Brakes that fail", FAILURES_TEXT, failure_tables(), json)
 
 
 def _lateness(json: bool, seconds: float) -> int:

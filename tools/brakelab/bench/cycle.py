@@ -14,19 +14,19 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.bench.braking import ALL_DUE, MESSAGES_IN, Stop, simulated_stop
 from brakelab.bench.measure import Figure, Row, figure, installed
 from brakelab.bench.python_ecu import PythonEcu
 from brakelab.bench.socket_pair import PythonCanBus, daemon_channel, put, socket_pair, take, wire_format
+from brakelab.studies.braking import ALL_DUE, MESSAGES_IN, Stop, simulated_stop
 from ecu.bus.e2e import P01_MODULO
 from ecu.bus.receive import ReceivePlan, contract_receive_plan
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
-from ecu.clock import Grid, system_time
-from ecu.cycle import Progress, Watch, cycle_once, new_ecu
+from ecu.contract.records import STAGES
 from ecu.jit import CompileCounter
-from ecu.records import STAGES
-from ecu.resources import resource
-from ecu.ring import create_ring, remove_ring
+from ecu.recording.ring import create_ring, remove_ring
+from ecu.runtime.clock import Grid, system_time
+from ecu.runtime.cycle import Progress, Watch, cycle_once, new_ecu
+from ecu.settings.resources import resource
 
 ROUNDS: Final = 10
 CYCLES: Final = 210  # a round

@@ -1,4 +1,4 @@
-"""Four observer filters (`ecu/estimation/observer2.py`) three times: ours, plain numpy, filterpy.
+"""Four observer filters (`ecu/algorithm/estimation/observer2.py`) three times: ours, plain numpy, filterpy.
 
 All get the same inputs (`FILTER_INPUT`, as `update_friction` forms them) and start alike; plain Kalman
 algebra, without our gates, must give the same friction.
@@ -10,17 +10,17 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ecu.estimation.observer2 import (
+from ecu.algorithm.estimation.observer2 import (
     OBSERVER_STATE,
     correct_force,
     correct_omega,
     predict_observer,
     start_observer,
 )
-from ecu.estimation.tyre import slip_stiffness
+from ecu.algorithm.estimation.tyre import slip_stiffness
+from ecu.contract.records import RecordArray
+from ecu.contract.signals import CYCLE_NS, MOTOR_TORQUE, WHEEL_SPEED
 from ecu.jit import Record, kernel
-from ecu.records import RecordArray
-from ecu.signals import CYCLE_NS, MOTOR_TORQUE, WHEEL_SPEED
 
 DT: Final = 1e-9 * CYCLE_NS
 

@@ -16,13 +16,13 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.bench.table import Table
 from brakelab.rig.live import Processes, armed_config, choose_bus
-from ecu.clock import Grid, system_time
-from ecu.realtime import PRIORITY, make_realtime
-from ecu.recorder import read_recording
-from ecu.resources import resource
-from ecu.signals import CYCLE_NS
+from brakelab.studies.table import Table
+from ecu.contract.signals import CYCLE_NS
+from ecu.recording.recorder import read_recording
+from ecu.runtime.clock import Grid, system_time
+from ecu.runtime.realtime import PRIORITY, make_realtime
+from ecu.settings.resources import resource
 
 SCENARIO: Final = "config/scenarios/ordinary.toml"  # ten minutes
 SEED: Final = 1

@@ -12,9 +12,9 @@ from asammdf.blocks import v4_constants as mdf_constants
 from can.io import ASCWriter, BLFWriter, CanutilsLogWriter, TRCWriter
 from numpy.typing import NDArray
 
-from brakelab.replay.formats import read_frames
-from brakelab.replay.log_quality import LogQuality
-from ecu.records import FRAME_ERROR, FRAME_EXTENDED, FRAME_FD, FRAME_REMOTE, RecordArray
+from brakelab.logs.formats import read_frames
+from brakelab.logs.log_quality import LogQuality
+from ecu.contract.records import FRAME_ERROR, FRAME_EXTENDED, FRAME_FD, FRAME_REMOTE, RecordArray
 
 WRITERS: Final[dict[str, Any]] = {
     ".log": CanutilsLogWriter,

@@ -7,8 +7,8 @@ from typing import Any
 from rich.console import Console
 
 from brakelab.bench.measure import Figure, Row
-from brakelab.bench.table import Table, markdown, show
-from ecu.resources import resource
+from brakelab.studies.table import Table, markdown, show
+from ecu.settings.resources import resource
 
 
 def plain_row(row: Any) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from brakelab.plant.fleet import advance_fleet
 from brakelab.plant.jit import kernel
 from brakelab.plant.records import COMMANDS, RecordArray
 from brakelab.plant.vehicle import STEP, advance, new_state
-from ecu.resources import resource
+from ecu.settings.resources import resource
 
 ROUNDS: Final = 11
 STEPS: Final = 10_000

@@ -24,13 +24,13 @@ from can.interfaces.udp_multicast.utils import unpack_message
 from numpy.typing import NDArray
 
 from brakelab.bench.measure import installed, machine
-from brakelab.bench.table import Table
-from brakelab.play import Sent, send_on_schedule
-from brakelab.play_log import timed_frames
-from brakelab.priority import PRIORITY, ask_for_priority
+from brakelab.play.command import Sent, send_on_schedule
+from brakelab.play.play_log import timed_frames
 from brakelab.replay.quality import Findings
 from brakelab.rig.live import Bus, choose_bus
-from ecu.clock import system_time
+from brakelab.simulation.priority import PRIORITY, ask_for_priority
+from brakelab.studies.table import Table
+from ecu.runtime.clock import system_time
 from ecu.warm import Silence
 
 SPEEDS: Final = (0.1, 1.0, 5.0, 20.0)

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from brakelab.bench.filters import FILTER_INPUT, NumpyFilters, constants
 from ecu.bus.database import load_database
-from ecu.records import RecordArray
-from ecu.resources import resource
-from ecu.signals import CORNERS
+from ecu.contract.records import RecordArray
+from ecu.contract.signals import CORNERS
+from ecu.settings.resources import resource
 
 SENT: Final = (
     "PressureDemandFront",

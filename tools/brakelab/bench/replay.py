@@ -21,20 +21,20 @@ from brakelab.bench.log_formats import FORMATS, convert
 from brakelab.bench.measure import Figure, Row, Task, alternate, installed
 from brakelab.bench.python_ecu import PythonEcu
 from brakelab.bench.step import run_steps
-from brakelab.bench.table import Table, time_table
-from brakelab.candump_text import candump_text
-from brakelab.closed_loop import VEHICLE_BUS, new_loop, run
+from brakelab.logs.candump_text import candump_text
+from brakelab.logs.formats import read_frames
+from brakelab.logs.log_quality import LogQuality
 from brakelab.replay.command import replay
-from brakelab.replay.formats import read_frames
-from brakelab.replay.log_quality import LogQuality
-from brakelab.scenario import load_scenario
+from brakelab.simulation.closed_loop import VEHICLE_BUS, new_loop, run
+from brakelab.simulation.scenario import load_scenario
+from brakelab.studies.table import Table, time_table
+from ecu.algorithm.step import new_state
 from ecu.bus.freshness import begin_cycle, end_cycle
 from ecu.bus.receive import ReceivePlan, contract_receive_plan, new_reception, receive
-from ecu.config import load_config, new_params
-from ecu.records import INPUTS, OUTPUTS, RecordArray, new_record
-from ecu.resources import resource
-from ecu.signals import CYCLE_NS
-from ecu.step import new_state
+from ecu.contract.records import INPUTS, OUTPUTS, RecordArray, new_record
+from ecu.contract.signals import CYCLE_NS
+from ecu.settings.config import load_config, new_params
+from ecu.settings.resources import resource
 
 ROUNDS: Final = 3
 SCENARIO: Final = "ordinary"

@@ -11,7 +11,7 @@ from can.interfaces.socketcan.socketcan import SocketcanBus
 from numpy.typing import NDArray
 
 from ecu.bus.socketcan import SocketcanChannel
-from ecu.records import RecordArray
+from ecu.contract.records import RecordArray
 
 _CAN_FRAME: Final = struct.Struct("=IB3x8s")
 _BUFFER: Final = 1 << 20  # bytes

@@ -1,10 +1,9 @@
-"""Time of `ecu.step.step` and of the four friction filters in it, beside filterpy and plain numpy."""
+"""Time of a `step` and of the four friction filters in it, beside filterpy and plain numpy."""
 
 from typing import Any, Final
 
 import numpy as np
 
-from brakelab.bench.braking import simulated_stop
 from brakelab.bench.filters import (
     FILTER_INPUT,
     FilterpyFilters,
@@ -16,9 +15,10 @@ from brakelab.bench.filters import (
     note_inputs,
 )
 from brakelab.bench.measure import NOT_INSTALLED, Figure, Row, alternate, installed, timed
+from brakelab.studies.braking import simulated_stop
+from ecu.algorithm.step import new_state, step
+from ecu.contract.records import OUTPUTS, RecordArray, new_record
 from ecu.jit import kernel
-from ecu.records import OUTPUTS, RecordArray, new_record
-from ecu.step import new_state, step
 
 ROUNDS: Final = 15
 CYCLES: Final = 500  # of braking, all four corners observing: from 31 to 12 m/s

@@ -17,11 +17,11 @@ from brakelab.fleet.page import write_page
 from brakelab.fleet.run import Chain, Planned, run_fleet
 from brakelab.fleet.statistics import notes
 from brakelab.fleet.summary import summary_table, when
-from brakelab.observer import with_observer
 from brakelab.replay.progress import progress_bar
 from brakelab.replay.source import load_source
-from ecu.config import load_config
+from brakelab.simulation.observer import with_observer
 from ecu.errors import UserError
+from ecu.settings.config import load_config
 
 SHOWN: Final = 20
 """Failures that are printed; all of them are in the report."""

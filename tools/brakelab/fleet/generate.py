@@ -19,15 +19,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from brakelab.candump_text import candump_text
-from brakelab.closed_loop import START_NS, VEHICLE_BUS, new_loop, run, run_blocks
 from brakelab.fleet.job import Job, Outcome
 from brakelab.fleet.task import replay_job
+from brakelab.logs.candump_text import candump_text
 from brakelab.replay.progress import progress_bar
-from brakelab.scenario import Scenario
-from brakelab.simulate import write_columns
-from ecu.config import load_config
-from ecu.resources import named
+from brakelab.simulation.closed_loop import START_NS, VEHICLE_BUS, new_loop, run, run_blocks
+from brakelab.simulation.scenario import Scenario
+from brakelab.simulation.simulate import write_columns
+from ecu.settings.config import load_config
+from ecu.settings.resources import named
 
 PLANTS: Final = ("suv", "sedan", "lcv")
 FIRST_NS: Final = 1_767_600_000_000_000_000  # Monday, 5 January 2026, 08:00 UTC

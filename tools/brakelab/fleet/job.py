@@ -8,8 +8,8 @@ from typing import Any, Final, NamedTuple
 
 from brakelab.replay.source import Source
 from ecu import __version__
-from ecu.config import Config, config_hash
-from ecu.records import LEARNED
+from ecu.contract.records import LEARNED
+from ecu.settings.config import Config, config_hash
 
 KEY: Final = b"fleet_key"
 

@@ -27,8 +27,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from brakelab.fleet.files import expand
 from ecu.errors import UserError
-from ecu.resources import named
-from ecu.toml_file import describe, read_toml
+from ecu.settings.resources import named
+from ecu.settings.toml_file import describe, read_toml
 
 COLUMNS: Final = ("vehicle", "log", "time", "config", "map")
 

@@ -27,21 +27,21 @@ from typing import Any, Final
 import numpy as np
 from distributed import Client
 
-from brakelab.candump_text import candump_text
-from brakelab.closed_loop import VEHICLE_BUS
 from brakelab.fleet.cluster import connect
 from brakelab.fleet.command import plan
 from brakelab.fleet.generate import plant_of, simulate_and_replay, write_drive
 from brakelab.fleet.manifest import Drive, find_drives
 from brakelab.fleet.run import Chain, Planned, Task, run_fleet
 from brakelab.fleet.task import replay_job
+from brakelab.logs.candump_text import candump_text
+from brakelab.logs.formats import read_frames
+from brakelab.logs.log_quality import LogQuality
 from brakelab.replay.command import replay
-from brakelab.replay.formats import read_frames
-from brakelab.replay.log_quality import LogQuality
 from brakelab.replay.source import load_source
-from ecu.config import load_config
-from ecu.resources import named
-from ecu.signals import CYCLE_NS
+from brakelab.simulation.closed_loop import VEHICLE_BUS
+from ecu.contract.signals import CYCLE_NS
+from ecu.settings.config import load_config
+from ecu.settings.resources import named
 
 SECONDS: Final = 600
 """Of a simulated drive."""

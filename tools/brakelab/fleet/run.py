@@ -20,8 +20,8 @@ from brakelab.fleet.manifest import Drive
 from brakelab.fleet.output import keep, rows_file, standing
 from brakelab.fleet.task import replay_job
 from brakelab.replay.source import Source
-from ecu.config import Config, store_key
 from ecu.errors import RunFault
+from ecu.settings.config import Config, store_key
 
 TRIES: Final = 3
 """After so many lost workers the drive is held to be what killed them."""

@@ -9,11 +9,11 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from brakelab.replay.brakes import LEARNED, BrakeBook, BrakeRow
-from brakelab.replay.prediction import corners, errors
 from brakelab.replay.quality import Findings
-from ecu.records import RecordArray
-from ecu.signals import CORNERS, CYCLE_NS, HOLDING, OBSERVING, OUTPUT
+from brakelab.results.brakes import LEARNED, BrakeBook, BrakeRow
+from brakelab.results.prediction import corners, errors
+from ecu.contract.records import RecordArray
+from ecu.contract.signals import CORNERS, CYCLE_NS, HOLDING, OBSERVING, OUTPUT
 
 _PERIOD: Final = 1e-9 * CYCLE_NS  # s
 

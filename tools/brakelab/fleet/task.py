@@ -20,11 +20,11 @@ from brakelab.replay.drive import replay_drive
 from brakelab.replay.log import log_hash
 from brakelab.replay.needed import NEEDED, fault_lines, needed_lines, nothing_usable
 from brakelab.replay.quality import Findings, quality_lines
-from brakelab.results import ResultWriter, brakes_table
-from ecu.config import new_params
-from ecu.diagnostics.store import out_of_range
+from brakelab.results.files import ResultWriter, brakes_table
+from ecu.contract.records import LEARNED
 from ecu.errors import RunFault, UserError
-from ecu.records import LEARNED
+from ecu.recording.store import out_of_range
+from ecu.settings.config import new_params
 
 
 def replay_job(job: Job) -> Outcome:

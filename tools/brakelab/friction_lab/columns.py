@@ -19,7 +19,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from brakelab.plant.friction.law import NotNegative, Positive, RigBrake, Section
 from brakelab.plant.linings import Lining
-from ecu.toml_file import describe, read_toml
+from ecu.settings.toml_file import describe, read_toml
 
 UNITS: Final[dict[str, dict[str, float]]] = {
     "time": {"s": 1.0, "ms": 1e-3, "min": 60.0},

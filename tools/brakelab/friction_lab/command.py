@@ -7,7 +7,6 @@ from typing import Final, NamedTuple
 import numpy as np
 from rich.console import Console
 
-from brakelab.bench.table import show
 from brakelab.friction_lab.analysis import history_effect, principal_components
 from brakelab.friction_lab.candidates import candidates
 from brakelab.friction_lab.columns import Columns
@@ -28,10 +27,11 @@ from brakelab.friction_lab.tables import (
     residual_table,
 )
 from brakelab.plant.description import PlantFileError, read_file
+from brakelab.plant.dynamometer_programme import load_programme
 from brakelab.plant.linings import Lining, Linings
-from brakelab.plant.rig_programme import load_programme
+from brakelab.studies.table import show
 from ecu.errors import UserError
-from ecu.resources import named, resource
+from ecu.settings.resources import named, resource
 
 FEWEST: Final = 10
 """Stops that identification needs."""

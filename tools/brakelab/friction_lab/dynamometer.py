@@ -1,6 +1,6 @@
 """The simulated dynamometer with a pad of `patches` or any law of the plant on it, and its sensors.
 
-Rig, stops, disc and gates are those of brakelab.plant.rig; what is recorded is what its sensors show, 200
+Rig, stops, disc and gates are those of `plant/dynamometer.py`; what is recorded is what its sensors show, 200
 times a second, from the beginning of a stop to its end (3.2).
 """
 
@@ -14,10 +14,7 @@ from numpy.random import Generator
 from brakelab.friction_lab.patches import bedded, draw_pad, run_pad
 from brakelab.friction_lab.recording import RATE, THRESHOLD, Recording, joined
 from brakelab.plant.disc import cooling_rate
-from brakelab.plant.jit import Record, kernel
-from brakelab.plant.linings import Lining, rig_with
-from brakelab.plant.records import RecordArray
-from brakelab.plant.rig import (
+from brakelab.plant.dynamometer import (
     DECELERATION,
     DRAG,
     LONGEST,
@@ -27,7 +24,10 @@ from brakelab.plant.rig import (
     new_stop,
     run_stop,
 )
-from brakelab.plant.rig_programme import BAR, DRAG_TIME, KMH, MOST_DRAGS, Gate, Programme
+from brakelab.plant.dynamometer_programme import BAR, DRAG_TIME, KMH, MOST_DRAGS, Gate, Programme
+from brakelab.plant.jit import Record, kernel
+from brakelab.plant.linings import Lining, rig_with
+from brakelab.plant.records import RecordArray
 
 PAUSE: Final = 5.0  # s between recorded stops, at least
 CYCLE_LAW: Final = "SIM"

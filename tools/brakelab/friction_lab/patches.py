@@ -25,10 +25,10 @@ import numpy as np
 from numpy.random import Generator
 
 from brakelab.plant.disc import cooling_rate, disc_step
+from brakelab.plant.dynamometer import DECELERATION, DRAG, HIGHEST_PRESSURE, SMALLEST_LEVER
 from brakelab.plant.friction.law import KELVIN
 from brakelab.plant.jit import Record, kernel
 from brakelab.plant.records import RecordArray, new_record
-from brakelab.plant.rig import DECELERATION, DRAG, HIGHEST_PRESSURE, SMALLEST_LEVER
 
 PAD: Final = np.dtype(
     [
@@ -141,7 +141,7 @@ def run_pad(
     trace: Record,
     dt: float,
 ) -> int:
-    """Run a stop as brakelab.plant.rig does, with the pad's friction; return the number of steps.
+    """Run a stop as brakelab.plant.dynamometer does, with the pad's friction; return the number of steps.
 
     `fall` [1/s]: the demand falls by this share of itself per second, down to LEAST_DEMAND.
     """

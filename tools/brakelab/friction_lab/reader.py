@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from brakelab.friction_lab.columns import UNITS, ZEROS, Columns, load_columns
 from brakelab.friction_lab.recording import NAMES, Recording
-from brakelab.replay.csv_rows import csv_columns, csv_rows
-from brakelab.replay.log_quality import Damage
+from brakelab.logs.csv_rows import csv_columns, csv_rows
+from brakelab.logs.log_quality import Damage
 from ecu.errors import UserError
 
 Vector = NDArray[np.float64]

@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from brakelab.bench.table import Table
 from brakelab.friction_lab.analysis import Components, History
 from brakelab.friction_lab.columns import Columns
 from brakelab.friction_lab.fitting import Fitted, replayed
@@ -12,6 +11,7 @@ from brakelab.friction_lab.identification import Identified, Judged
 from brakelab.friction_lab.profile import profile_interval
 from brakelab.friction_lab.stops import Stops
 from brakelab.plant.friction.law import RigBrake
+from brakelab.studies.table import Table
 
 PARTS = 5
 

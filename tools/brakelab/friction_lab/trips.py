@@ -15,9 +15,9 @@ from brakelab.friction_lab.dynamometer import Bench
 from brakelab.friction_lab.recording import RATE, THRESHOLD, joined
 from brakelab.friction_lab.stops import Stops, find_stops
 from brakelab.plant.disc import cooling_rate, disc_step
+from brakelab.plant.dynamometer import DECELERATION, new_stop
+from brakelab.plant.dynamometer_programme import KMH
 from brakelab.plant.jit import Record, kernel
-from brakelab.plant.rig import DECELERATION, new_stop
-from brakelab.plant.rig_programme import KMH
 
 BRAKINGS: Final = 200
 NOMINAL: Final = 0.45

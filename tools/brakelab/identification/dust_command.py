@@ -6,17 +6,17 @@ from typing import Final
 
 import numpy as np
 
-from brakelab.bench.chart import BLUE, GREY, ORANGE, PINK, Line, Panel, write_chart
-from brakelab.bench.table import markdown
 from brakelab.identification.dust_features import Applications, Array
 from brakelab.identification.dust_fit import Judged, choose, judge_all, ranges
 from brakelab.identification.dust_models import LEAST
 from brakelab.identification.dust_reader import read_trips
 from brakelab.identification.dust_tables import model_table, spearman_table, trip_table
-from brakelab.outputs import check_outputs
-from ecu.config import Axle, load_config, new_params
-from ecu.dust import MODELS
+from brakelab.results.outputs import check_outputs
+from brakelab.studies.chart import BLUE, GREY, ORANGE, PINK, Line, Panel, write_chart
+from brakelab.studies.table import markdown
+from ecu.contract.dust import MODELS
 from ecu.errors import UserError
+from ecu.settings.config import Axle, load_config, new_params
 
 LEGEND: Final = (("chosen", BLUE), ("others", ORANGE), ("95 %, and the background's line", PINK))
 
@@ -30,7 +30,7 @@ def dust_toml(axle: str, chosen: Judged, trained: tuple[Array, Array]) -> str:
     model = chosen.model
     assert model.on_board is not None
     return (
-        f"[{axle}.dust]\n# of one brake; what the numbers are: ecu/monitoring/emission_factor.py\n"
+        f"[{axle}.dust]\n# of one brake; what the numbers are: ecu/algorithm/monitoring/emission_factor.py\n"
         f'model = "{MODELS[model.on_board]}"\nnumbers = {_numbers(model.numbers)}\n'
         "# v_in, v_end [m/s], torque [N m], disc [degC], duration [s], pressure [bar]: trained on this\n"
         f"low = {_numbers(trained[0])}\nhigh = {_numbers(trained[1])}\n"

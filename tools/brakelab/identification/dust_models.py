@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from brakelab.identification.dust_features import Applications
-from ecu.dust import HIDDEN, INPUTS, KNOTS, LAW, LAW_TERMS, NETWORK, NODES, TABLE
-from ecu.monitoring.emission_factor import (
+from ecu.algorithm.monitoring.emission_factor import (
     PRESSURE,
     V_IN,
     emission_factors,
@@ -24,6 +23,7 @@ from ecu.monitoring.emission_factor import (
     network_input,
     node_below,
 )
+from ecu.contract.dust import HIDDEN, INPUTS, KNOTS, LAW, LAW_TERMS, NETWORK, NODES, TABLE
 
 Array = NDArray[np.float64]
 Predictor = Callable[[Array, Array], Array]

@@ -4,9 +4,9 @@ from typing import Final
 
 import numpy as np
 
-from brakelab.bench.table import Table
 from brakelab.identification.dust_features import Applications
 from brakelab.identification.dust_fit import Judged, spearman
+from brakelab.studies.table import Table
 
 THESIS: Final = {"LUT": -32.68, "static ANN": -9.07, "dynamic ANN": -3.95}
 """%, sum of particles of Trip 8, Table 8.2."""

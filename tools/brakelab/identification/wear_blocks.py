@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from brakelab.replay.wear import regressors_of
 from ecu.errors import UserError
-from ecu.pad import Pad
+from ecu.settings.pad import Pad
 
 Array = NDArray[np.float64]
 

@@ -6,14 +6,14 @@ from typing import Final
 
 import numpy as np
 
-from brakelab.bench.chart import BLUE, GREEN, ORANGE, PINK, Line, Panel, write_chart
-from brakelab.bench.table import Table, markdown
 from brakelab.identification.wear_blocks import Array, Block, Heat, read_blocks
 from brakelab.identification.wear_fit import QUASI_STATIC, TERMS, UNITS, Fit, fit_law
 from brakelab.identification.wear_fusion import Fused, fuse
-from brakelab.outputs import check_outputs
-from ecu.config import Axle, load_config
+from brakelab.results.outputs import check_outputs
+from brakelab.studies.chart import BLUE, GREEN, ORANGE, PINK, Line, Panel, write_chart
+from brakelab.studies.table import Table, markdown
 from ecu.errors import UserError
+from ecu.settings.config import Axle, load_config
 
 COOLING_SPEED: Final = 15.0  # m/s, at which stops are taken to be cooled
 MOTION: Final = ((5.0, BLUE), (20.0, GREEN), (50.0, ORANGE))  # kW of friction

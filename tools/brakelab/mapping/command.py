@@ -10,17 +10,17 @@ from cantools.database import Database
 from rich.console import Console
 from rich.table import Table
 
+from brakelab.logs.formats import read_frames
 from brakelab.mapping.names import converts, words
 from brakelab.mapping.physics import RADIUS, Found, propose
 from brakelab.mapping.series import Series, read_series
 from brakelab.replay.command import WIDTH
-from brakelab.replay.formats import read_frames
 from brakelab.replay.quality import Findings, damage_lines
 from ecu.bus.database import load_database
 from ecu.bus.signal_map import load_signal_map
 from ecu.bus.units import spelled
+from ecu.contract.signals import without_corner
 from ecu.errors import UserError
-from ecu.signals import without_corner
 
 COUNTING: Final = {"counter", "count", "cnt", "cntr", "alive", "ctr", "no"}
 WANTED: Final = (

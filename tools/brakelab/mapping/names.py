@@ -4,7 +4,7 @@ import re
 from typing import Final
 
 from ecu.bus.units import CONVERSIONS, spelled
-from ecu.signals import without_corner
+from ecu.contract.signals import without_corner
 
 _CORNERS: Final = (
     ("fl", ("fl", "lf", "frontleft", "leftfront", "frtlft", "lftfrt", "vl", "lhf", "flh")),

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from brakelab.mapping.names import converts, corner_of, names_itself, score
 from brakelab.mapping.series import Series
 from ecu.bus.units import CONVERSIONS, spelled
-from ecu.signals import CORNERS, INPUT, INPUT_SIGNALS
+from ecu.contract.signals import CORNERS, INPUT, INPUT_SIGNALS
 
 Vector = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ecu.bus.database import fits
 from ecu.bus.plan import compile_message, decode
+from ecu.contract.records import EXTENDED_ID, FRAME_ERROR, FRAME_EXTENDED, FRAME_REMOTE, RecordArray
 from ecu.jit import kernel
-from ecu.records import EXTENDED_ID, FRAME_ERROR, FRAME_EXTENDED, FRAME_REMOTE, RecordArray
 
 Vector = NDArray[np.float64]
 FEWEST = 20  # frames of a message

@@ -10,12 +10,12 @@ from typing import Annotated, Any, Final, TypeVar
 import numpy as np
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
+from brakelab.plant.dynamometer import nominal_friction
 from brakelab.plant.friction.law import NotNegative, Positive, Section
 from brakelab.plant.friction.laws import law_row
 from brakelab.plant.hydraulics import BUILD_UP, RELEASE
 from brakelab.plant.linings import VEHICLE_LAW, Lining, Linings, rig_with
 from brakelab.plant.records import DAMPER_KNOTS, GRAVITY, PARAMS, RecordArray, new_record
-from brakelab.plant.rig import nominal_friction
 from brakelab.plant.sensor_errors import SensorFile
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]

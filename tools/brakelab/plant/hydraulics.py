@@ -60,7 +60,7 @@ def advance_pressure(params: Record, state: Record, dt: float) -> None:
         demand = min(state.demand_history[rising, wheel], state.demand_history[falling, wheel])
         command = command_for(params.offset_start, params.offset_known, demand)
         demand = settled_pressure(params.offset_start, params.offset_slope, command)
-        demand = min(max(demand, 0.0), params.pressure_limit)
+        demand = min(max(demand, 0.0), params.pressure_limit[wheel])
         extreme = state.turning_point[wheel]
         if state.releasing[wheel]:
             extreme = min(extreme, demand)
@@ -77,8 +77,8 @@ def advance_pressure(params: Record, state: Record, dt: float) -> None:
         pressure, rate = second_order(
             state.pressure[wheel], state.pressure_rate[wheel], demand, model[INERTIA], model[DAMPING], dt
         )
-        if pressure < 0.0 or pressure > params.pressure_limit:
-            pressure = min(max(pressure, 0.0), params.pressure_limit)
+        if pressure < 0.0 or pressure > params.pressure_limit[wheel]:
+            pressure = min(max(pressure, 0.0), params.pressure_limit[wheel])
             rate = 0.0
         state.pressure[wheel] = pressure
         state.pressure_rate[wheel] = rate

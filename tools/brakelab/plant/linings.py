@@ -2,11 +2,11 @@
 
 from typing import Final
 
+from brakelab.plant.dynamometer import AMBIENT, RIG
 from brakelab.plant.emission import EmissionLaw
 from brakelab.plant.friction.law import NotNegative, Positive, RigBrake, Section
 from brakelab.plant.friction.laws import AnyLaw, law_row
 from brakelab.plant.records import RecordArray, new_record
-from brakelab.plant.rig import AMBIENT, RIG
 from brakelab.plant.wear import WearLaw
 
 VEHICLE_LAW: Final = "SIM"

@@ -51,7 +51,7 @@ PARAMS: Final = np.dtype(
         ("piston_area", "f8", (4,)),  # m^2
         ("effective_radius", "f8", (4,)),  # m
         ("push_out_pressure", "f8", (4,)),  # Pa
-        ("pressure_limit", "f8"),  # Pa
+        ("pressure_limit", "f8", (4,)),  # Pa
         ("offset_start", "f8"),  # Pa, from which the brake unit settles below its command
         ("offset_slope", "f8"),  # -, lost of what exceeds it
         ("offset_known", "f8"),  # -, slope that the unit's inverse map corrects

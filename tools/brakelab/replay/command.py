@@ -11,29 +11,29 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
-from brakelab.observer import with_observer
-from brakelab.outputs import check_outputs
+from brakelab.logs.formats import kind_of
 from brakelab.replay.drive import replay_drive
-from brakelab.replay.formats import kind_of
 from brakelab.replay.log import log_hash, log_size
 from brakelab.replay.needed import NEEDED, fault_lines, lacking_line, needed_lines, nothing_usable
-from brakelab.replay.prediction import SHORT
 from brakelab.replay.progress import progress_bar
 from brakelab.replay.quality import Findings, quality_counts, quality_lines
 from brakelab.replay.source import load_source, map_unused
 from brakelab.replay.summary import brakings_table, prediction_lines, taps
-from brakelab.results import ResultWriter, brakes_path
-from brakelab.results_mdf import SUFFIX
+from brakelab.results.files import ResultWriter, brakes_path
+from brakelab.results.mdf import SUFFIX
+from brakelab.results.outputs import check_outputs
+from brakelab.results.prediction import SHORT
+from brakelab.simulation.observer import with_observer
 from ecu import __version__
+from ecu.algorithm.step import new_state
 from ecu.bus.receive import ReceivePlan
-from ecu.config import Config, config_hash, load_config, new_params, store_key
-from ecu.diagnostics.restored import restored
-from ecu.diagnostics.store import open_store, save
+from ecu.contract.records import RecordArray
+from ecu.contract.signals import CORNERS
 from ecu.errors import RunFault, UserError
-from ecu.recorder import read_recording
-from ecu.records import RecordArray
-from ecu.signals import CORNERS
-from ecu.step import new_state
+from ecu.recording.recorder import read_recording
+from ecu.recording.restored import restored
+from ecu.recording.store import open_store, save
+from ecu.settings.config import Config, config_hash, load_config, new_params, store_key
 
 WIDTH: Final = 110  # columns of the table where no terminal says how wide it is
 

@@ -7,14 +7,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.logs.formats import Advance, kind_of
 from brakelab.replay.engine import Rows, new_ecu
-from brakelab.replay.formats import Advance, kind_of
 from brakelab.replay.log import replay_log
 from brakelab.replay.quality import Findings
 from brakelab.replay.source import Source
-from ecu.recorder import Recording
-from ecu.records import RecordArray
-from ecu.signals import CYCLE_NS
+from ecu.contract.records import RecordArray
+from ecu.contract.signals import CYCLE_NS
+from ecu.recording.recorder import Recording
 
 _PERIOD: Final = 1e-9 * CYCLE_NS  # s
 

@@ -1,7 +1,7 @@
 """What one brake application emitted at each corner, from its rows, by the models that the ECU runs.
 
-The same means as `ecu/monitoring/dust.py` takes, of what results hold. Outside what a model was trained on,
-and where there is none, nothing is told.
+The same means as `ecu/algorithm/monitoring/dust.py` takes, of what results hold. Outside what a model was
+trained on, and where there is none, nothing is told.
 """
 
 from typing import Final, NamedTuple
@@ -9,13 +9,13 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.replay.prediction import Vector, corners
-from ecu.dust import NONE
-from ecu.monitoring.dust import LEAST_WORK, MOVING
-from ecu.monitoring.emission_factor import emission_factor, inside
-from ecu.params import BAR
-from ecu.records import RecordArray
-from ecu.signals import OUTPUT
+from brakelab.results.prediction import Vector, corners
+from ecu.algorithm.monitoring.dust import LEAST_WORK, MOVING
+from ecu.algorithm.monitoring.emission_factor import emission_factor, inside
+from ecu.contract.dust import NONE
+from ecu.contract.params import BAR
+from ecu.contract.records import RecordArray
+from ecu.contract.signals import OUTPUT
 
 PERIOD: Final = 0.01  # s, one row
 

@@ -12,14 +12,14 @@ from typing import Any, Final, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.logs.signal_file import SampleBlock
 from brakelab.replay.seen import look_at, new_seen
-from brakelab.replay.signal_file import SampleBlock
+from ecu.algorithm.step import new_state, step
 from ecu.bus.freshness import accept, begin_cycle, end_cycle
 from ecu.bus.receive import ReceivePlan, Reception, receive
+from ecu.contract.records import CYCLE, FRAME, INPUTS, OUTPUTS, RecordArray, new_record, output_vector
+from ecu.contract.signals import ACCELERATOR_POSITION, CYCLE_NS, MOTOR_TORQUE, N_OUTPUTS, USABLE
 from ecu.jit import Record, kernel
-from ecu.records import CYCLE, FRAME, INPUTS, OUTPUTS, RecordArray, new_record, output_vector
-from ecu.signals import ACCELERATOR_POSITION, CYCLE_NS, MOTOR_TORQUE, N_OUTPUTS, USABLE
-from ecu.step import new_state, step
 
 Vector = NDArray[np.float64]
 Block = TypeVar("Block")

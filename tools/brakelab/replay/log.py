@@ -6,18 +6,18 @@ from pathlib import Path
 
 import numpy as np
 
+from brakelab.logs.formats import Advance, kind_of, read_frames
+from brakelab.logs.log_quality import LogQuality
+from brakelab.logs.signal_file import SampleBlock, freshness_at_any_rate, read_signals
 from brakelab.replay.engine import Ecu, Rows, run_frames, run_samples
-from brakelab.replay.formats import Advance, kind_of, read_frames
-from brakelab.replay.log_quality import LogQuality
 from brakelab.replay.quality import Findings, identifier, note_faults
 from brakelab.replay.seen import set_raw_ends
-from brakelab.replay.signal_file import SampleBlock, freshness_at_any_rate, read_signals
 from brakelab.replay.source import Source, only_interface
 from ecu.bus.receive import ReceivePlan, new_reception
-from ecu.diagnostics.faults import FOREIGN_SENDER
+from ecu.contract.faults import FOREIGN_SENDER
+from ecu.contract.records import CYCLE, EXTENDED_ID, FRAME_ERROR, FRAME_EXTENDED, RecordArray
 from ecu.errors import UserError
-from ecu.recorder import Recording, read_recording
-from ecu.records import CYCLE, EXTENDED_ID, FRAME_ERROR, FRAME_EXTENDED, RecordArray
+from ecu.recording.recorder import Recording, read_recording
 
 
 def log_size(path: Path) -> int:

@@ -8,9 +8,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from brakelab.replay.quality import Findings
-from ecu.diagnostics.faults import DEGRADING, FAULTS, REQUEST_LOST
-from ecu.records import RecordArray
-from ecu.signals import (
+from ecu.contract.faults import DEGRADING, FAULTS, REQUEST_LOST
+from ecu.contract.records import RecordArray
+from ecu.contract.signals import (
     ACCEL_X,
     ACCEL_Y,
     CALLIPER_PRESSURE,

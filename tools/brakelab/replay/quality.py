@@ -8,13 +8,13 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.replay.log_quality import Damage, LogQuality
-from brakelab.replay.signal_file import SignalQuality
+from brakelab.logs.log_quality import Damage, LogQuality
+from brakelab.logs.signal_file import SignalQuality
 from ecu.bus.freshness import RATE_TOLERANCE
 from ecu.bus.receive import ReceivePlan, Reception
-from ecu.diagnostics.faults import FAULTS
-from ecu.records import EXTENDED_ID, RecordArray
-from ecu.signals import DEGRADED, INPUT_SIGNALS, N_INPUTS, OUTPUT
+from ecu.contract.faults import FAULTS
+from ecu.contract.records import EXTENDED_ID, RecordArray
+from ecu.contract.signals import DEGRADED, INPUT_SIGNALS, N_INPUTS, OUTPUT
 
 MESSAGE_KINDS: Final = (
     "received",

@@ -9,9 +9,9 @@ from typing import Final
 import numpy as np
 
 from ecu.bus.freshness import NEVER
+from ecu.contract.records import RecordArray
+from ecu.contract.signals import CORNERS, INPUT_SIGNALS
 from ecu.jit import Record, kernel
-from ecu.records import RecordArray
-from ecu.signals import CORNERS, INPUT_SIGNALS
 
 SEEN: Final = np.dtype(
     [

@@ -5,12 +5,12 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from brakelab.replay.formats import interface_name
+from brakelab.logs.formats import interface_name
 from brakelab.replay.quality import Findings
 from ecu.bus.receive import ReceivePlan, contract_receive_plan
 from ecu.bus.signal_map import load_signal_map, read_signal_map
-from ecu.records import RecordArray
-from ecu.resources import resource
+from ecu.contract.records import RecordArray
+from ecu.settings.resources import resource
 
 
 class Source(NamedTuple):

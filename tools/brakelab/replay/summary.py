@@ -8,10 +8,10 @@ import numpy as np
 from rich.box import SIMPLE
 from rich.table import Table
 
-from brakelab.replay.brakes import LEARNED, BrakeRow
-from brakelab.replay.prediction import SHORT, Vector, errors, one_scale, running_average
-from ecu.estimation.friction import GREATEST_RATIO, LEAST_RATIO
-from ecu.signals import CORNERS
+from brakelab.results.brakes import LEARNED, BrakeRow
+from brakelab.results.prediction import SHORT, Vector, errors, one_scale, running_average
+from ecu.algorithm.estimation.friction import GREATEST_RATIO, LEAST_RATIO
+from ecu.contract.signals import CORNERS
 
 
 def brakings_table(rows: Sequence[BrakeRow], nominal: Sequence[float]) -> Table:

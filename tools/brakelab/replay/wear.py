@@ -1,6 +1,6 @@
 """What one brake application wore off, from its rows: the integrals of (7.16) and their mass.
 
-The same integrals as `ecu/monitoring/wear.py` keeps, by what results hold: the wheel turns at
+The same integrals as `ecu/algorithm/monitoring/wear.py` keeps, by what results hold: the wheel turns at
 v (1 + slip) / r, its slope is taken over 0.2 s to either side, and the temperature is in degC.
 """
 
@@ -9,11 +9,11 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.replay.prediction import Vector, corners
-from ecu.monitoring.wear import ENERGY, ENERGY_T, POWER2, POWER2_T, RATE, RATE_T
-from ecu.params import MEGA
-from ecu.records import RecordArray
-from ecu.signals import OUTPUT
+from brakelab.results.prediction import Vector, corners
+from ecu.algorithm.monitoring.wear import ENERGY, ENERGY_T, POWER2, POWER2_T, RATE, RATE_T
+from ecu.contract.params import MEGA
+from ecu.contract.records import RecordArray
+from ecu.contract.signals import OUTPUT
 
 PERIOD: Final = 0.01  # s, one row
 HALF_WIDTH: Final = 20  # rows

@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.replay.prediction import SHORT, left_out
 from brakelab.report.drive import Drive, Vector, numbers, read_parquet
+from brakelab.results.prediction import SHORT, left_out
+from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
-from ecu.signals import CORNERS
 
 PERIOD = 0.01  # s, one row
 STANDING = 0.3  # m/s, below: the vehicle stands and decelerates no further

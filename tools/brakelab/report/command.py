@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from brakelab.outputs import check_outputs
 from brakelab.report.accuracy import accuracy_per_axle, tracking
 from brakelab.report.brakings import Braking, brakings
 from brakelab.report.drive import onto, read_drive
@@ -25,8 +24,9 @@ from brakelab.report.quality import quality_tiles, read_quality
 from brakelab.report.sparkline import sparklines
 from brakelab.report.summary import facts, faults, tiles
 from brakelab.report.timing import read_timing, spreads
+from brakelab.results.outputs import check_outputs
+from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
-from ecu.signals import CORNERS
 
 _FRICTION = tuple(f"mu_b_{corner}" for corner in CORNERS)
 

@@ -9,9 +9,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from brakelab.results_mdf import refuse_mdf
+from brakelab.results.mdf import refuse_mdf
+from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
-from ecu.signals import CORNERS
 
 Vector = NDArray[np.float64]
 

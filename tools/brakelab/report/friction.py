@@ -9,7 +9,7 @@ from brakelab.report.accuracy import AXLES
 from brakelab.report.brakings import Braking, inside
 from brakelab.report.drive import Drive, Vector
 from brakelab.report.look import INK, LEFT, RIGHT, new_figure
-from ecu.signals import CORNERS, OBSERVING
+from ecu.contract.signals import CORNERS, OBSERVING
 
 POINTS: Final = 600
 """Of each wheel in a plot."""

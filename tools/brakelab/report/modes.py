@@ -9,8 +9,8 @@ from bokeh.models.annotations import Legend
 from brakelab.report.downsample import Buckets, worst
 from brakelab.report.drive import Drive, Vector
 from brakelab.report.look import DEGRADED, ESTIMATE, FAILED, HOLDING, IDLE, new_figure
-from ecu.diagnostics.faults import FAULTS
-from ecu.signals import CORNERS, STARTING
+from ecu.contract.faults import FAULTS
+from ecu.contract.signals import CORNERS, STARTING
 
 # What each state looks like: (label of the legend, colour)
 _KINDS = {

@@ -7,7 +7,7 @@ from bokeh.models import ColumnDataSource, HoverTool, Range1d, SingleIntervalTic
 
 from brakelab.report.brakings import Braking
 from brakelab.report.look import DEMAND, ESTIMATE, LEFT, RIGHT, new_figure
-from ecu.signals import CORNERS
+from ecu.contract.signals import CORNERS
 
 _MARKERS = (("front left", LEFT, "circle"), ("front right", RIGHT, "circle"),
             ("rear left", LEFT, "triangle"), ("rear right", RIGHT, "triangle"))  # fmt: skip

@@ -9,10 +9,10 @@ import numpy as np
 from bokeh.models import ColumnDataSource, HoverTool, Range1d, SingleIntervalTicker
 from bokeh.models.annotations import BoxAnnotation, Span
 
-from brakelab.replay.prediction import Errors, errors, one_scale, running_average
 from brakelab.report.brakings import Braking, Force
 from brakelab.report.drive import Vector
 from brakelab.report.look import DEMAND, ESTIMATE, INK, QUIET, new_figure
+from brakelab.results.prediction import Errors, errors, one_scale, running_average
 
 BAND: Final = 0.05
 HEIGHT: Final = 300

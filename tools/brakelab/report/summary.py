@@ -6,14 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from brakelab.replay.prediction import Errors
 from brakelab.report.accuracy import AXLES, Accuracy
 from brakelab.report.brakings import Braking
 from brakelab.report.drive import Drive, Vector, start_ns
 from brakelab.report.modes import fault_masks, faults_seen
 from brakelab.report.page import Tile, fixed, percent, signed_percent
 from brakelab.report.timing import Timing, spread
-from ecu.diagnostics.faults import FAULTS
+from brakelab.results.prediction import Errors
+from ecu.contract.faults import FAULTS
 
 # Beyond these a tile is marked: what an engineer would look into first.
 _HONEST_SHARE = 0.8

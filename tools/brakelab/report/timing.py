@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from brakelab.report.drive import Vector
+from ecu.contract.records import STAGES
 from ecu.errors import UserError
-from ecu.recorder import read_recording
-from ecu.records import STAGES
+from ecu.recording.recorder import read_recording
 
 
 class Timing(NamedTuple):

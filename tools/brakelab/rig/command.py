@@ -13,19 +13,19 @@ from typing import Final
 import numpy as np
 from rich.console import Console
 
-from brakelab.closed_loop import new_loop, run
 from brakelab.report.command import report
 from brakelab.report.drive import Drive
 from brakelab.rig.live import Bus, armed_config, choose_bus, drive, named_bus
 from brakelab.rig.outcome import Outcome, Undisturbed, outcome, stopping_distance
 from brakelab.rig.page import summary, write_page, write_tables
 from brakelab.rig.results import write_recorded, write_simulated
-from brakelab.scenario import Scenario, load_scenario
+from brakelab.simulation.closed_loop import new_loop, run
+from brakelab.simulation.scenario import Scenario, load_scenario
 from brakelab.vehicle_node import warm_up
-from ecu.config import Config, load_config
-from ecu.diagnostics.faults import fault_names
+from ecu.contract.faults import fault_names
 from ecu.errors import RunFault, UserError
-from ecu.resources import SCENARIOS, named, resource
+from ecu.settings.config import Config, load_config
+from ecu.settings.resources import SCENARIOS, named, resource
 from ecu.warm import warm
 
 WIDTH: Final = 150  # columns of the table where no terminal says how wide it is

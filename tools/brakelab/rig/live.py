@@ -18,12 +18,12 @@ from typing import IO, Any, Final, NamedTuple
 
 import can
 
-from brakelab.rig.faults import Fault
 from brakelab.rig.wire import CHANNEL, Wire, lay_wire
+from brakelab.simulation.faults import Fault
 from ecu.bus.channel import open_channel
 from ecu.errors import RunFault, UserError
-from ecu.ring import RingReader, ring_path
-from ecu.start import ahead_of_others
+from ecu.recording.ring import RingReader, ring_path
+from ecu.runtime.start import ahead_of_others
 
 MULTICAST: Final = f"239.74.163.{os.getpid() % 250 + 2}"  # a group of its own: two rigs do not meet
 PATIENCE_S: Final = 180.0  # for a slow machine to get ready

@@ -11,9 +11,9 @@ from brakelab.report.accuracy import accuracy_per_axle, achieved_deceleration, e
 from brakelab.report.brakings import brakings
 from brakelab.report.drive import Drive, Vector, onto, read_drive, start_ns
 from brakelab.report.timing import Spread, read_timing, spread
-from brakelab.rig.faults import Fault
 from brakelab.rig.reaction import Reaction, reactions, unexplained
 from brakelab.rig.results import Frames, Written
+from brakelab.simulation.faults import Fault
 
 STANDSTILL = 0.2  # m/s
 SETTLED_ROWS = 50  # 0.5 s

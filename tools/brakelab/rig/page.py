@@ -14,7 +14,7 @@ from brakelab.rig.live import Bus
 from brakelab.rig.outcome import Outcome
 from brakelab.rig.reaction import Reaction
 from ecu import __version__
-from ecu.config import Config, config_hash
+from ecu.settings.config import Config, config_hash
 
 
 def more_distance(outcome: Outcome) -> float:

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from brakelab.report.drive import Drive
 from brakelab.report.modes import fault_masks
-from brakelab.rig.faults import Fault
-from ecu.diagnostics.events import MODES
-from ecu.diagnostics.faults import FAULTS, LATE
-from ecu.signals import DEGRADED
+from brakelab.simulation.faults import Fault
+from ecu.contract.faults import FAULTS, LATE
+from ecu.contract.signals import DEGRADED
+from ecu.recording.events import MODES
 
 AFTER_S = 3.0
 """What shows up this long after the end of a fault still counts as its consequence."""

@@ -7,20 +7,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.candump_text import candump_text
-from brakelab.closed_loop import START_NS, Loop
-from brakelab.closed_loop import Drive as Simulated
+from brakelab.logs.candump_text import candump_text
 from brakelab.replay.engine import Rows, new_ecu
 from brakelab.replay.log import replay_log
 from brakelab.replay.quality import Findings
 from brakelab.replay.source import load_source
-from brakelab.results import MEASURED, ResultWriter
-from brakelab.simulate import write_columns
+from brakelab.results.files import MEASURED, ResultWriter
+from brakelab.simulation.closed_loop import START_NS, Loop
+from brakelab.simulation.closed_loop import Drive as Simulated
+from brakelab.simulation.simulate import write_columns
 from ecu import __version__
 from ecu.bus.receive import Reception
-from ecu.config import Config, config_hash, new_params
-from ecu.recorder import Recording, read_recording
-from ecu.signals import CYCLE_NS, N_OUTPUTS, OUTPUT_COLUMNS
+from ecu.contract.signals import CYCLE_NS, N_OUTPUTS, OUTPUT_COLUMNS
+from ecu.recording.recorder import Recording, read_recording
+from ecu.settings.config import Config, config_hash, new_params
 
 
 class Frames(NamedTuple):

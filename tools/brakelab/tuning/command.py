@@ -6,11 +6,11 @@ from typing import Final, NamedTuple
 
 from rich.console import Console
 
-from brakelab.bench.table import Table, show
-from brakelab.observer import with_observer
-from brakelab.outputs import check_outputs
 from brakelab.replay.progress import progress_bar
-from brakelab.scenario import Scenario, load_scenario
+from brakelab.results.outputs import check_outputs
+from brakelab.simulation.observer import with_observer
+from brakelab.simulation.scenario import Scenario, load_scenario
+from brakelab.studies.table import Table, show
 from brakelab.tuning.recording import (
     Errors,
     Recording,
@@ -22,8 +22,8 @@ from brakelab.tuning.recording import (
 from brakelab.tuning.replay import replay_errors
 from brakelab.tuning.search import RANGES, Best, search
 from ecu import __version__
-from ecu.config import Config, config_hash, load_config
 from ecu.errors import UserError
+from ecu.settings.config import Config, config_hash, load_config
 
 FIRST_SESSION: Final = ("fixed-pedal", "bursts")
 """Section 6.2.1, calibration."""

@@ -14,13 +14,13 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.bench.stops import AXLES, LOWEST_SPEED, SETTLING_S, estimate_errors
-from brakelab.closed_loop import Drive, new_loop, run
-from brakelab.ecu_inputs import ecu_inputs, vehicle_frames
-from brakelab.scenario import Scenario
-from ecu.config import Config
-from ecu.records import RecordArray
-from ecu.signals import CORNERS, CYCLE_NS
+from brakelab.simulation.closed_loop import Drive, new_loop, run
+from brakelab.simulation.ecu_inputs import ecu_inputs, vehicle_frames
+from brakelab.simulation.scenario import Scenario
+from brakelab.studies.stops import AXLES, LOWEST_SPEED, SETTLING_S, estimate_errors
+from ecu.contract.records import RecordArray
+from ecu.contract.signals import CORNERS, CYCLE_NS
+from ecu.settings.config import Config
 
 Array = NDArray[np.float64]
 

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.tuning.recording import Errors, Recording, mean_errors
-from ecu.config import Config, new_params
+from ecu.algorithm.step import new_state, step
+from ecu.contract.records import OUTPUTS, RecordArray, new_record
 from ecu.jit import kernel
-from ecu.records import OUTPUTS, RecordArray, new_record
-from ecu.step import new_state, step
+from ecu.settings.config import Config, new_params
 
 Array = NDArray[np.float64]
 

@@ -19,9 +19,9 @@ from pymoo.core.evaluator import Evaluator
 from pymoo.core.problem import Problem
 from pymoo.problems.static import StaticProblem
 
-from brakelab.observer import with_observer
+from brakelab.simulation.observer import with_observer
 from brakelab.tuning.recording import Errors
-from ecu.config import Config
+from ecu.settings.config import Config
 
 RANGES: Final = {
     "omega_walk": (0.2, 20.0),

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from brakelab.plant.description import Plant, PlantFileError, load_plant
+from brakelab.plant.dynamometer import PRESSURE, STEP, new_stop, run_stop
 from brakelab.plant.friction.constant import Constant
 from brakelab.plant.friction.law import ROW, RigBrake, linear_step
 from brakelab.plant.friction.laws import LAWS, friction, law_row
 from brakelab.plant.friction.table import Table
 from brakelab.plant.linings import Lining, rig_with
-from brakelab.plant.rig import PRESSURE, STEP, new_stop, run_stop
 
 CONFIG = Path(__file__).parents[4] / "config" / "plant"
 BRAKE_A = RigBrake(piston_area=2.827e-3, pad_area=7.125e-3, effective_radius=0.1459, tyre_radius=0.36)

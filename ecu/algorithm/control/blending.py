@@ -1,0 +1,166 @@
+"""Who brakes a wheel: motor or lining (corrected 5.2, 5.3).
+
+    T_EM,plan = sat_0^T_max(f T_b)        T_EHB = T_b - T_EM,plan          f: 0 off, 1 series, else parallel
+    T_EM      = sat_0^T_max(T_EM,plan + what the lining still lacks of T_EHB)
+
+Corrected: in print max(0, T_EM - T_max) is zero always, T_EM having been cut already.
+
+The linings are asked for what the motor is planned to leave, and the motor gives beside its plan what they do
+not give yet (`friction_torque.py`): it is ten times as fast as the hydraulics (26 ms dead time, 90 % after
+0.1 s), so their sum follows the demand while torque changes hands. For that the plan has to be early: it goes
+by what limit and demand will be `AHEAD` from now where one falls or the other rises. Towards standstill the
+limit fades with the speed below `fade_speed`, which is known before it begins. The motor takes more again at
+a rate that the hydraulics follow. Where the plan drops, the last part of the linings' share comes later: the
+pressure overshoots a step by 6 %, and a motor that is gone makes up for nothing.
+
+A motor whose limit or torque is unknown, or which does not give what it is asked for, is planned for no
+longer; its demand fades while the linings take over. It is tried again in the next braking. Under ABS or ESP,
+in reverse and at a wheel that the slip guard holds, the motor is asked for nothing at once.
+"""
+
+import math
+
+import numpy as np
+
+from ecu.algorithm.estimation.motion import fresh, usable
+from ecu.contract.signals import ABS_ACTIVE, ESP_ACTIVE, MOTOR_LIMIT, MOTOR_TORQUE, REVERSE
+from ecu.jit import Record, kernel
+
+BLENDING_STATE = np.dtype(
+    [
+        ("limit", "f8", (4,)),  # last one known [N m]
+        ("fall", "f8", (4,)),  # of the limit, low-passed [N m/s]
+        ("torque", "f8", (4,)),  # last demand [N m]
+        ("rise", "f8", (4,)),  # of the demand, low-passed [N m/s]
+        ("ceiling", "f8", (4,)),  # the motor may be asked for this much [N m]
+        ("allowed", "f8", (4,)),  # the plan may count on this much [N m]
+        ("asked", "f8", (3, 4)),  # motor demands of the last cycles [N m], the newest in row 0
+        ("short_s", "f8", (4,)),  # for this long the motor has given too little
+        ("lost", "u1", (4,)),  # it gave too little in this braking
+        ("slow", "f8", (4,)),  # plan, low-passed [N m]
+        ("lining", "f8", (4,)),  # torque that the lining is asked for [N m]
+        ("plan", "f8", (4,)),  # the rest of the demand [N m]
+    ],
+    align=True,
+)
+
+AHEAD = 0.12  # s: dead time and lag of the hydraulics, and something for the motor to fill
+RATE_GAIN = 0.5  # of a new sample in a rate
+RISE = 2000.0  # N m/s, of what the plan counts on
+FADE = 6000.0  # N m/s, of the demand to a motor that is planned for no longer
+LATER, LATER_S = 0.16, 0.06  # -, s: settles a step of (A.17) within 1 % in 0.11 s instead of 0.18 s
+OLDEST_S = 0.05  # of a limit or torque
+SHORT_SHARE, SHORT_TORQUE = 0.15, 50.0  # of the demand, N m: the motor gives too little
+SHORT_S = 0.03
+
+
+@kernel
+def blends(params: Record) -> bool:
+    """Return whether any wheel's motor is to brake."""
+    blending: bool = params.blending[0] + params.blending[2] > 0.0
+    return blending
+
+
+@kernel
+def _current(inputs: Record, place: int) -> bool:
+    current: bool = usable(inputs, place) and inputs.age_ns[place] < 1e9 * OLDEST_S
+    return current
+
+
+@kernel
+def _watch_motor(state: Record, inputs: Record, i: int, dt: float) -> None:
+    """Find a motor that gives less than its limit and all the last demands promised."""
+    asked = min(state.asked[0, i], state.asked[1, i], state.asked[2, i], state.limit[i])
+    missing = asked - inputs.value[MOTOR_TORQUE + i]
+    short = asked > 0.0 and missing > SHORT_SHARE * asked + SHORT_TORQUE
+    state.short_s[i] = state.short_s[i] + dt if short else 0.0
+    if state.short_s[i] >= SHORT_S:
+        state.lost[i] = 1
+
+
+@kernel
+def _follow_limit(state: Record, inputs: Record, fading: float, i: int, dt: float) -> None:
+    """Take a limit in; `fading`: what the fade at low speed will leave of it."""
+    limit: float = inputs.value[MOTOR_LIMIT + i]
+    if fresh(inputs, MOTOR_LIMIT + i):
+        fall = max((state.limit[i] - limit) / dt, 0.0)
+        state.fall[i] = max(fall, state.fall[i] + RATE_GAIN * (fall - state.fall[i]))
+        state.limit[i] = limit
+    state.ceiling[i] = max(limit - dt * state.fall[i], 0.0)
+    ahead = max(min(limit - AHEAD * state.fall[i], fading * limit), 0.0)
+    state.allowed[i] = min(ahead, state.allowed[i] + RISE * dt)
+
+
+@kernel
+def _fading(params: Record, speed: float, decel: float) -> float:
+    """Return what will be left of a motor's limit of now when it fades below `fade_speed`."""
+    if not (params.fade_speed > 0.0 and speed > params.fade_speed and decel > 0.0):
+        return 1.0
+    left: float = min(max(speed - AHEAD * decel, 0.0) / params.fade_speed, 1.0)
+    return left
+
+
+@kernel
+def update_motors(
+    params: Record, state: Record, inputs: Record, guarded: Record, speed: float, decel: float, dt: float
+) -> None:
+    """Overwrite what each motor may be asked for and planned with.
+
+    Args:
+        params: `PARAMS`.
+        state: `BLENDING_STATE`, overwritten.
+        inputs: `INPUTS`.
+        guarded: wheels whose lining is held back because they slip, shape (4,).
+        speed: of the vehicle [m/s].
+        decel: demanded [m/s^2], may be NaN.
+        dt: time since the last cycle [s].
+    """
+    value = inputs.value
+    fading = _fading(params, speed, decel)
+    forbidden = value[ABS_ACTIVE] > 0.5 or value[ESP_ACTIVE] > 0.5 or value[REVERSE] > 0.5
+    for i in range(4):
+        known = _current(inputs, MOTOR_LIMIT + i) and _current(inputs, MOTOR_TORQUE + i) and dt > 0.0
+        if known:
+            _watch_motor(state, inputs, i, dt)
+        if forbidden or guarded[i]:
+            state.ceiling[i] = state.allowed[i] = 0.0
+        elif known and not state.lost[i]:
+            _follow_limit(state, inputs, fading, i, dt)
+        else:
+            state.ceiling[i] = max(state.ceiling[i] - FADE * dt, 0.0)
+            state.allowed[i] = 0.0
+
+
+@kernel
+def share_torque(params: Record, state: Record, torque: Record, dt: float) -> None:
+    """Overwrite what the linings are asked for and what is planned for the motors.
+
+    Args:
+        params: `PARAMS`.
+        state: `BLENDING_STATE`, after `update_motors`.
+        torque: demanded of the wheels [N m], shape (4,); may be NaN.
+        dt: time since the last cycle [s].
+    """
+    for i in range(4):
+        demand = max(torque[i], 0.0) if math.isfinite(torque[i]) else 0.0
+        rise = max((demand - state.torque[i]) / dt, 0.0) if dt > 0.0 else 0.0
+        state.rise[i] += RATE_GAIN * (rise - state.rise[i])
+        state.torque[i] = demand
+        allowed = max(state.allowed[i] - AHEAD * state.rise[i], 0.0)
+        plan = min(params.blending[i] * demand, allowed)
+        later = LATER * max(state.slow[i] - plan, 0.0)
+        state.slow[i] += (1.0 - math.exp(-dt / LATER_S)) * (plan - state.slow[i])
+        state.plan[i] = min(plan + later, demand)
+        state.lining[i] = torque[i] - state.plan[i]
+        if demand == 0.0:
+            state.lost[i] = 0
+
+
+@kernel
+def motor_torque_demand(params: Record, state: Record, lag: float, i: int) -> float:
+    """Return the torque to ask of a wheel's motor [N m]; `lag` [N m] is what its lining still lacks."""
+    motor: float = min(max(state.plan[i] + lag, 0.0), state.torque[i], state.ceiling[i])
+    if not (params.blending[i] > 0.0 and math.isfinite(motor)):
+        motor = 0.0
+    state.asked[2, i], state.asked[1, i], state.asked[0, i] = state.asked[1, i], state.asked[0, i], motor
+    return motor

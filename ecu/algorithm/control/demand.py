@@ -1,0 +1,157 @@
+"""What is asked for: pedal to deceleration, the automated demand, holding the car that stands.
+
+a_dem = max(pedal map, valid decel_demand), while the car is held: at least `hold_decel`
+
+A car that has stood for 0.5 s with its brakes asked for is held until the pedal is back at rest and no
+automated demand is left, or until the accelerator is pressed; then the holding demand fades out. It is
+enough for the steepest grade of the configuration, see `new_params`. There is no creep function: without a
+request nothing is braked.
+
+A pedal whose position is lost while its switch is not is taken to stay where it was until the switch opens;
+one that is pressed only then asks for `SECONDARY_DECEL`.
+"""
+
+import math
+
+import numpy as np
+
+from ecu.algorithm.estimation.motion import mean_wheel_speed, usable
+from ecu.contract.params import PEDAL_POINTS
+from ecu.contract.signals import (
+    ACCELERATOR_POSITION,
+    DECEL_DEMAND,
+    DECEL_DEMAND_VALID,
+    PEDAL_POSITION,
+    PEDAL_PRESSED,
+    USABLE,
+    WHEEL_SPEED,
+)
+from ecu.jit import Record, kernel
+
+DEMAND_STATE = np.dtype(
+    [
+        ("standing_s", "f8"),  # how long the car has stood [s]
+        ("held", "u1"),
+        ("hold", "f8"),  # holding demand [m/s^2], fades in and out
+        ("pedal", "f8"),  # last position known, or taken for it [%]
+    ],
+    align=True,
+)
+
+MAX_DECEL = 12.0  # m/s^2: no tyre on a road car holds more
+STANDSTILL = 0.3  # m/s
+STANDING_TIME = 0.5  # s
+LEAST_REQUEST = 0.05  # m/s^2, below it nobody brakes
+ACCELERATOR_PRESSED = 3.0  # %
+SECONDARY_DECEL = 2.44  # m/s^2, of a secondary braking system (ECE R13-H, Annex 3, 2.2)
+HOLD_RATE = 5.0  # m/s^3: let go within 0.7 s, as fast as a foot changes the pedal
+
+
+@kernel
+def pedal_to_decel(params: Record, position: float) -> float:
+    """Return the deceleration [m/s^2] of a pedal position [%]: linear between the points of the map."""
+    x, y = params.pedal_position, params.pedal_decel
+    decel: float = y[0]
+    for j in range(1, PEDAL_POINTS):
+        if position > x[j - 1] and x[j] > x[j - 1]:
+            decel = y[j - 1] + (y[j] - y[j - 1]) * min((position - x[j - 1]) / (x[j] - x[j - 1]), 1.0)
+    return decel
+
+
+@kernel
+def _position_for(params: Record, decel: float) -> float:
+    """Return the pedal position [%] that asks for a deceleration [m/s^2]."""
+    x, y = params.pedal_position, params.pedal_decel
+    for j in range(1, PEDAL_POINTS):
+        if y[j] >= decel and y[j] > y[j - 1]:
+            found: float = x[j - 1] + (x[j] - x[j - 1]) * (decel - y[j - 1]) / (y[j] - y[j - 1])
+            return found
+    last: float = x[PEDAL_POINTS - 1]
+    return last
+
+
+@kernel
+def pedal_known(params: Record, inputs: Record) -> bool:
+    """Return whether the pedal's position arrives, or at least its switch does."""
+    switch = params.mapped[PEDAL_POSITION] != 0 and usable(inputs, PEDAL_PRESSED)
+    return usable(inputs, PEDAL_POSITION) or switch
+
+
+@kernel
+def hold_pedal(params: Record, state: Record, inputs: Record) -> None:
+    """Overwrite a lost pedal position by what its switch leaves of the last one.
+
+    Args:
+        params: `PARAMS`.
+        state: `DEMAND_STATE`; `pedal` is overwritten.
+        inputs: the trusted `INPUTS`.
+    """
+    if usable(inputs, PEDAL_POSITION):
+        state.pedal = inputs.value[PEDAL_POSITION]
+        return
+    if not pedal_known(params, inputs):
+        return
+    if inputs.value[PEDAL_PRESSED] < 0.5:
+        state.pedal = 0.0
+    elif pedal_to_decel(params, state.pedal) < LEAST_REQUEST:
+        state.pedal = _position_for(params, SECONDARY_DECEL)
+    inputs.value[PEDAL_POSITION], inputs.verdict[PEDAL_POSITION] = state.pedal, USABLE
+
+
+@kernel
+def automated_demand_valid(inputs: Record) -> bool:
+    """Return whether an automated driver asks for a deceleration and vouches for it."""
+    return (
+        usable(inputs, DECEL_DEMAND)
+        and usable(inputs, DECEL_DEMAND_VALID)
+        and inputs.value[DECEL_DEMAND_VALID] > 0.5
+    )
+
+
+@kernel
+def requested_decel(params: Record, inputs: Record) -> float:
+    """Return the deceleration asked for [m/s^2], NaN where neither pedal nor demand is usable."""
+    decel = math.nan
+    if usable(inputs, PEDAL_POSITION):
+        decel = pedal_to_decel(params, inputs.value[PEDAL_POSITION])
+    if automated_demand_valid(inputs):
+        asked = inputs.value[DECEL_DEMAND]
+        decel = asked if math.isnan(decel) else max(decel, asked)
+    return min(max(decel, 0.0), MAX_DECEL) if math.isfinite(decel) else math.nan
+
+
+@kernel
+def _stands(params: Record, inputs: Record, speed: float) -> bool:
+    """Return whether wheels and vehicle speed [m/s, NaN: unknown] say that the car stands."""
+    for i in range(4):
+        if not usable(inputs, WHEEL_SPEED + i):
+            return False
+    return mean_wheel_speed(params, inputs) < STANDSTILL and not abs(speed) >= STANDSTILL
+
+
+@kernel
+def update_demand(params: Record, state: Record, inputs: Record, speed: float, dt: float) -> float:
+    """Return the deceleration demanded [m/s^2], NaN where neither pedal nor demand is usable.
+
+    Args:
+        params: `PARAMS`.
+        state: `DEMAND_STATE`, overwritten.
+        inputs: `INPUTS`.
+        speed: of the vehicle [m/s], NaN: unknown.
+        dt: time since the last cycle [s].
+    """
+    asked = requested_decel(params, inputs)
+    if math.isnan(asked):
+        return asked
+    state.standing_s = state.standing_s + dt if _stands(params, inputs, speed) else 0.0
+    driving_off = (
+        usable(inputs, ACCELERATOR_POSITION) and inputs.value[ACCELERATOR_POSITION] > ACCELERATOR_PRESSED
+    )
+    if driving_off or asked < LEAST_REQUEST:
+        state.held = 0
+    elif state.standing_s >= STANDING_TIME:
+        state.held = 1
+    target = params.hold_decel if state.held else 0.0
+    state.hold += min(max(target - state.hold, -HOLD_RATE * dt), HOLD_RATE * dt)
+    held: float = state.hold
+    return min(max(asked, held), MAX_DECEL)

@@ -1,0 +1,231 @@
+"""Torque per wheel: the demand shared between the axles (5.1, Figure 4.2), the trailing axle kept behind.
+
+    T_b,dem = m a_dem r                                     (5.1)
+    ideal       front share (l_r + z h) / L, z = a_dem / g: both axles use the same share of their grip
+    fixed       front share constant
+    electronic  front share constant until the ideal one passes it, then the ideal one: the rear is held back
+
+Friction of the linings is known to its sigma only, so none of the three keeps the order of the axles by
+itself. Two things do (ECE R13-H, Annex 5: the rear uses no more grip than the front):
+
+- `watch_trailing`: where a rear wheel slips more than the front one of its side by more than
+  `rear_slip_margin`, the torque of the rear axle is taken back until it does not. That needs no friction.
+  Beside a front wheel whose brake has failed it may slip `LONE_SLIP`.
+- `cap_trailing`: compensation raises the rear's pressure relative to the front's only as far as the observer
+  is sure of it, with the rear at mu + 2 sigma and the front at mu - 2 sigma.
+
+Of a car that drives backwards the front axle trails and is relieved: there z is negative in the ideal share,
+and both look at the front.
+"""
+
+import math
+
+import numpy as np
+
+from ecu.algorithm.estimation.motion import corner_speed, fresh
+from ecu.algorithm.estimation.tyre import rolling_radius
+from ecu.contract.params import DISTRIBUTIONS, GRAVITY
+from ecu.contract.signals import WHEEL_SPEED
+from ecu.jit import Record, kernel
+
+DISTRIBUTION_STATE = np.dtype(
+    [
+        ("torque", "f8", (4,)),  # demanded of each wheel [N m], >= 0; NaN without a request
+        ("trailing", "f8"),  # what of its torque the trailing axle is left, LEAST_TRAILING to 1
+        ("beyond", "f8", (2,)),  # slip of a trailing wheel beyond the leading one of its side, low-passed
+        ("offset", "f8", (2,)),  # of a rear wheel beyond the front one while rolling freely: the radii
+        ("free_s", "f8", (2,)),  # how long that was learned, at most LEARNING_TIME
+    ],
+    align=True,
+)
+
+IDEAL, FIXED, ELECTRONIC = range(len(DISTRIBUTIONS))
+LEAST_TRAILING = 0.3  # what the trailing axle keeps whatever its wheels seem to do
+TAKE_BACK = 600.0  # 1/s per slip: 1 % too much takes back the torque at 6 1/s
+GIVE_BACK = 0.3  # 1/s
+SMOOTHING = 0.2  # per sample: 50 ms; leaves a fifth of the wheel speeds' noise
+LEARNING_TIME = 2.0  # s
+RADIUS_DOUBT = 0.008  # until then: radii within 0.3 % and what else differs, two standard deviations
+FREE_ACCEL, FREE_YAW_RATE = 0.5, 0.03  # m/s^2, rad/s
+RULED_FROM = 0.15  # z from which on Annex 5 orders the axles
+FASTEST = 1.02  # of the ground below it
+LONE_SLIP = 0.04  # of a trailing wheel beside one that rolls: tyres have their peak at 0.1 on a dry road
+ROUNDING = 1e-9
+
+
+@kernel
+def ideal_front_share(params: Record, decel: float) -> float:
+    """Return the front axle's share of the brake force with equal adhesion of the axles, 0 to 1.
+
+    `decel` [m/s^2] is positive driving forwards, negative driving backwards.
+    """
+    share: float = (params.rear_axle + decel / GRAVITY * params.cog_height) / params.wheelbase
+    return min(max(share, 0.0), 1.0)
+
+
+@kernel
+def front_share(params: Record, decel: float) -> float:
+    """Return the front axle's share of the brake force; `decel` as for `ideal_front_share`."""
+    ideal = ideal_front_share(params, decel)
+    if params.distribution == IDEAL:
+        return ideal
+    share: float = params.front_share
+    if params.distribution == ELECTRONIC:
+        share = min(share, ideal) if decel < 0.0 else max(share, ideal)
+    return share
+
+
+@kernel
+def _rear_beyond_front(
+    params: Record, inputs: Record, motion: Record, load: Record, speed: float, side: int
+) -> float:
+    """Return how much more than the front wheel of its side a rear wheel slips.
+
+    NaN without new samples, or where a wheel turns faster than a braked one can: its sensor keeps a value.
+    """
+    slips, forwards = 0.0, 1.0 if speed > 0.0 else -1.0
+    for i in (side, side + 2):
+        ground = forwards * corner_speed(params, motion, speed, i)
+        if not (fresh(inputs, WHEEL_SPEED + i) and ground > 0.0):
+            return math.nan
+        radius = rolling_radius(load[i], params.unloaded_radius[i], params.vertical_stiffness[i])
+        rolled = abs(inputs.value[WHEEL_SPEED + i]) * radius / ground
+        if rolled > FASTEST:
+            return math.nan
+        slips += rolled if i == side else -rolled
+    return slips
+
+
+@kernel
+def watch_trailing(
+    params: Record,
+    state: Record,
+    inputs: Record,
+    motion: Record,
+    load: Record,
+    failed: Record,
+    decel: float,
+    speed: float,
+    dt: float,
+) -> None:
+    """Move what the trailing axle is left, by the slip of its wheels beyond that of the leading ones.
+
+    Wheel speeds are compared with each other, at the radii of their loads (A.4): a trailing wheel on its way
+    to lock is what observers reject as an outlier. What the radii differ beside that is learned while the car
+    rolls freely.
+
+    Args:
+        params: `PARAMS`.
+        state: `DISTRIBUTION_STATE`; all but `torque` is overwritten.
+        inputs: `INPUTS`.
+        motion: `MOTION_STATE`.
+        load: of the wheels [N].
+        failed: wheels whose brake gives nothing, shape (4,).
+        decel: demanded [m/s^2]; the axle has all of its torque again once nobody brakes.
+        speed: of the vehicle [m/s], NaN: unknown. Slower than `min_speed` slip says nothing.
+        dt: time since the last cycle [s].
+    """
+    brakes = decel > 0.0
+    free = not brakes and abs(motion.accel_x) < FREE_ACCEL and abs(motion.yaw_rate) < FREE_YAW_RATE
+    worst, trailing = 0.0, 1.0 if speed > 0.0 else -1.0
+    for side in range(2):
+        beyond = math.nan
+        if abs(speed) > params.min_speed:
+            beyond = _rear_beyond_front(params, inputs, motion, load, speed, side)
+        if math.isnan(beyond):
+            state.beyond[side] = 0.0
+            continue
+        if free:
+            state.free_s[side] = min(state.free_s[side] + dt, LEARNING_TIME)
+            state.offset[side] += dt / state.free_s[side] * (beyond - state.offset[side])
+        state.beyond[side] += SMOOTHING * (trailing * (beyond - state.offset[side]) - state.beyond[side])
+        doubt = params.sigma_wheel_speed * params.wheel_radius[side] / abs(speed)
+        if state.free_s[side] < LEARNING_TIME:
+            doubt += RADIUS_DOUBT
+        leading = side if trailing > 0.0 else side + 2
+        margin = LONE_SLIP if failed[leading] else params.rear_slip_margin
+        worst = max(worst, state.beyond[side] - margin - doubt)
+    change = -TAKE_BACK * worst if worst > 0.0 else GIVE_BACK
+    state.trailing = min(max(state.trailing + change * dt, LEAST_TRAILING), 1.0) if brakes else 1.0
+
+
+@kernel
+def distribute(params: Record, state: Record, mass: float, decel: float, backwards: bool) -> None:
+    """Overwrite the torque demanded of each wheel [N m]; NaN for an unknown deceleration [m/s^2].
+
+    `mass` [kg] is that of the car as it is known now; `backwards`: it drives so.
+    """
+    front = front_share(params, -decel if backwards else decel)
+    for i in range(4):
+        axle = front if i < 2 else 1.0 - front
+        if (i < 2) == backwards:
+            axle *= state.trailing
+        state.torque[i] = 0.5 * axle * mass * decel * params.wheel_radius[i]
+
+
+@kernel
+def cap_trailing(
+    params: Record,
+    state: Record,
+    decel: float,
+    lining: Record,
+    friction: Record,
+    pressure: Record,
+    failed: Record,
+    backwards: bool,
+) -> None:
+    """Keep compensation from raising the trailing axle's share beyond the line of Annex 5.
+
+    The ratio of the trailing to the leading axle's pressure may exceed that of nominal friction only up to
+    where the trailing axle with mu + 2 sigma still uses no more grip than the leading one with mu - 2 sigma.
+
+    Args:
+        params: `PARAMS`.
+        state: `DISTRIBUTION_STATE`.
+        decel: demanded [m/s^2].
+        lining: torque [N m] that the lining of each wheel is asked for; the motors have the rest.
+        friction: `FRICTION_STATE`, what the observer claims.
+        pressure: compensated demands [Pa], shape (4,); those of the trailing axle are overwritten.
+        failed: wheels whose brake gives nothing, shape (4,); the rule is then one of the wheels that brake.
+        backwards: the car drives so.
+    """
+    if not decel >= RULED_FROM * GRAVITY:
+        return
+    # Sums over an axle: pressure that acts, the same at nominal friction, force of the linings at the end of
+    # their interval, force of the motors.
+    lead, lead_nominal, lead_force, lead_motors = 0.0, 0.0, 0.0, 0.0
+    trail, trail_nominal, trail_force, trail_motors = 0.0, 0.0, 0.0, 0.0
+    leading, trailing = 0, 0
+    for i in range(4):
+        if failed[i]:
+            continue
+        lever = 2.0 * params.piston_area[i] * params.effective_radius[i]
+        acts = max(pressure[i] - params.push_out_pressure[i], 0.0)
+        nominal = max(lining[i], 0.0) / (lever * params.mu_nominal[i])
+        mu, sigma = friction.mu[i], friction.sigma[i]
+        motor = (state.torque[i] - lining[i]) / params.wheel_radius[i]
+        if (i < 2) != backwards:
+            leading += 1
+            lead += acts
+            lead_nominal += nominal
+            lead_force += acts * lever * max(mu - 2.0 * sigma, 0.0) / params.wheel_radius[i]
+            lead_motors += motor
+        else:
+            trailing += 1
+            trail += acts
+            trail_nominal += nominal
+            trail_force += acts * lever * (mu + 2.0 * sigma) / params.wheel_radius[i]
+            trail_motors += motor
+    if not (trail > 0.0 and trail_force > 0.0 and leading > 0):
+        return
+    share = ideal_front_share(params, -decel if backwards else decel)
+    share = 1.0 - share if backwards else share
+    line = (lead_force + lead_motors) * (1.0 - share) / share * trailing / leading
+    allowed = (line - trail_motors) / trail_force
+    as_nominal = trail_nominal / trail * (lead / lead_nominal if lead_nominal > 0.0 else 1.0)
+    factor = max(allowed, as_nominal)
+    if factor < 1.0 - ROUNDING:
+        first = 0 if backwards else 2
+        for i in range(first, first + 2):
+            push_out = min(params.push_out_pressure[i], pressure[i])
+            pressure[i] = push_out + (pressure[i] - push_out) * factor

@@ -1,0 +1,227 @@
+"""A calliper or a circuit that gives nothing: how that is seen, and who brakes in its place.
+
+A pressure far below what was demanded is a brake that fails or a sensor that does. The car tells which: the
+force of the linings by the pressures that should be there, less that by acceleration (4.16), is what the
+suspected wheels should give, or nothing.
+
+    failed       pressure below `FOLLOWING` of what follows from the demands, and more than half of the force
+                 that these wheels owe is missing, both for `SURE_S`
+    sound again  the pressure follows, or early in another braking no force is missing, for `SURE_S`
+
+Force is expected by the friction that a braking begins with, corrected by what it is while all pressures
+follow: what is learned with a wheel believed dead would confirm that belief.
+
+Torque of failed brakes goes to their own motors as far as these may be asked, the rest to the other wheels,
+so that each uses the same share of its load: no rear wheel more grip than a front one that brakes (ECE R13-H,
+Annex 5). Beyond `GRIP` that comes slowly, and what it adds is limited by the yaw moment that it makes,
+`YAW_LIMIT`. A failed brake is asked as before: if it is there after all, or comes back, that is how it shows.
+"""
+
+import math
+
+import numpy as np
+
+from ecu.algorithm.control.distribution import ideal_front_share
+from ecu.algorithm.estimation.force import total_tyre_force
+from ecu.algorithm.estimation.motion import motor_torque, usable
+from ecu.contract.params import BAR, GRAVITY
+from ecu.contract.signals import ABS_ACTIVE, CALLIPER_PRESSURE, ESP_ACTIVE
+from ecu.jit import Record, kernel
+
+FAILED_BRAKES_STATE = np.dtype(
+    [
+        ("failed", "u1", (4,)),
+        ("any", "u1"),
+        ("owed", "f8", (4,)),  # force by the pressures that follow from the demands [N], low-passed
+        ("given", "f8"),  # force of all linings by the acceleration [N], low-passed
+        ("scale", "f8"),  # of what is given over what is owed while all pressures follow, in this braking
+        ("settled_s", "f8"),  # for this long the forces could be judged in this braking
+        ("doubt_s", "f8", (4,)),  # for this long the verdict has been contradicted
+        ("sent", "f8", (4,)),  # pressures demanded of the brakes that give some [Pa]
+        ("moved", "f8"),  # of the torque of the failed brakes, 0 to 1
+        ("grip", "f8"),  # force over load that the others may be asked for
+        ("force", "f8", (4,)),  # that each wheel is to have [N]
+        ("share", "f8", (4,)),  # of the load, of those that brake
+    ],
+    align=True,
+)
+
+LEAST = 8.0  # bar expected, below it nothing is said
+FOLLOWING = 0.5  # of what is expected
+MISSING = 0.5  # of what is owed
+SURE_S = 0.05
+LAG = 0.05  # s: hydraulics, tyres and accelerometer behind the model of the pressure
+SETTLED_FROM, SETTLED = 0.05, 0.1  # of the weight, of the force
+SCALE_S, LARGEST_SCALE = 0.3, 1.5
+AGAIN_S = 0.3  # of a braking, in which a verdict of the one before is looked at again
+MOVE_S = 0.05
+GRIP, GRIP_RATE = (
+    0.6,
+    0.5,
+)  # at once or what they had before, then by 1/s: slip is to be seen before a wheel locks
+YAW_LIMIT = 0.15
+"""Lateral force of the front tyres that holds the car straight, over their load at rest: 1 % of their
+longitudinal grip, and some 20 degrees at the steering wheel."""
+
+
+@kernel
+def _owed_force(params: Record, law: Record, pressure: float, i: int) -> float:
+    """Return the force [N] of a wheel's lining at a pressure [bar]."""
+    lever: float = 2.0 * params.piston_area[i] * params.effective_radius[i] / params.wheel_radius[i]
+    force: float = lever * law.base[i] * max(BAR * pressure - params.push_out_pressure[i], 0.0)
+    return force
+
+
+@kernel
+def watch_brakes(
+    params: Record,
+    state: Record,
+    inputs: Record,
+    motion: Record,
+    law: Record,
+    expected: Record,
+    zero: Record,
+    speed: float,
+    sent: bool,
+    dt: float,
+) -> None:
+    """Overwrite `state.failed`.
+
+    Args:
+        params: `PARAMS`.
+        state: `FAILED_BRAKES_STATE`.
+        inputs: `INPUTS`.
+        motion: `MOTION_STATE`.
+        law: `PRESSURE_LAW_STATE`, for the friction.
+        expected: pressures that follow from the demands sent, shape (4,) [bar].
+        zero: what the sensors read without pressure, shape (4,) [bar].
+        speed: of the car [m/s].
+        sent: the demands were valid; else, and while another controller brakes, nothing is judged.
+        dt: time since the last cycle [s].
+    """
+    gain = 1.0 - math.exp(-dt / LAG)
+    weight = params.mass * GRAVITY
+    given = -total_tyre_force(params, motion, speed) - params.rolling_resistance * weight
+    due, total, suspected, braked = 0.0, 0.0, 0.0, False
+    for i in range(4):
+        force = _owed_force(params, law, expected[i], i)
+        state.owed[i] += gain * (force - state.owed[i])
+        given -= motor_torque(inputs, i) / params.wheel_radius[i]
+        due += force
+        total += state.owed[i]
+        braked = braked or expected[i] > LEAST
+        if _lacks(inputs, expected[i], zero[i], i):
+            suspected += state.owed[i]
+    state.given += gain * (given - state.given)
+    if not braked:
+        state.settled_s, state.scale = 0.0, 1.0
+    others = inputs.value[ABS_ACTIVE] > 0.5 or inputs.value[ESP_ACTIVE] > 0.5
+    judged = sent and not others and motion.measured != 0 and motion.backwards == 0
+    judged = judged and total > SETTLED_FROM * weight and abs(due - total) < SETTLED * total
+    if judged:
+        state.settled_s += dt
+        if suspected == 0.0 and state.any == 0:
+            scale = min(max(state.given / total, 1.0 / LARGEST_SCALE), LARGEST_SCALE)
+            state.scale += dt / SCALE_S * (scale - state.scale)
+    missing = state.scale * total - state.given > MISSING * state.scale * suspected
+    state.any = 0
+    for i in range(4):
+        known = judged and expected[i] > LEAST and usable(inputs, CALLIPER_PRESSURE + i)
+        stays = state.failed[i] != 0 and state.settled_s > AGAIN_S
+        fails = _lacks(inputs, expected[i], zero[i], i) and (missing or stays)
+        state.doubt_s[i] = state.doubt_s[i] + dt if known and fails != (state.failed[i] != 0) else 0.0
+        if state.doubt_s[i] >= SURE_S:
+            state.failed[i], state.doubt_s[i] = 1 if fails else 0, 0.0
+        state.any = max(state.any, state.failed[i])
+
+
+@kernel
+def _lacks(inputs: Record, expected: float, zero: float, i: int) -> bool:
+    reading = inputs.value[CALLIPER_PRESSURE + i] - zero
+    lacks: bool = (
+        expected > LEAST and usable(inputs, CALLIPER_PRESSURE + i) and reading < FOLLOWING * expected
+    )
+    return lacks
+
+
+@kernel
+def _shares(params: Record, state: Record, trailing: float, decel: float, backwards: bool) -> float:
+    """Overwrite the shares of the load of the wheels that brake; return their sum."""
+    front, total = ideal_front_share(params, -decel if backwards else decel), 0.0
+    for i in range(4):
+        state.share[i] = 0.0 if state.failed[i] else 0.5 * (front if i < 2 else 1.0 - front)
+        if (i < 2) == backwards:
+            state.share[i] *= trailing
+        total += state.share[i]
+    return total
+
+
+@kernel
+def replace_failed(
+    params: Record,
+    state: Record,
+    distribution: Record,
+    allowed: Record,
+    decel: float,
+    backwards: bool,
+    dt: float,
+) -> None:
+    """Move the torque of failed brakes to motors and to the wheels that brake.
+
+    Args:
+        params: `PARAMS`.
+        state: `FAILED_BRAKES_STATE`, after `watch_brakes`.
+        distribution: `DISTRIBUTION_STATE`; `torque` is overwritten.
+        allowed: what each motor may be asked for [N m], shape (4,).
+        decel: demanded [m/s^2].
+        backwards: the car drives so.
+        dt: time since the last cycle [s].
+    """
+    step = dt / MOVE_S
+    state.moved = min(state.moved + step, 1.0) if state.any else max(state.moved - step, 0.0)
+    if state.moved == 0.0 or not decel > 0.0:
+        state.grip = max(decel / GRAVITY, GRIP)
+        return
+    state.grip += GRIP_RATE * dt
+    shares = _shares(params, state, distribution.trailing, decel, backwards)
+    if shares == 0.0:
+        return
+    wanted = 0.0
+    for i in range(4):
+        torque = distribution.torque[i]
+        state.force[i] = torque
+        if state.failed[i]:
+            state.force[i] = min(torque, allowed[i]) if params.blending[i] > 0.0 else 0.0
+        state.force[i] /= params.wheel_radius[i]
+        wanted += torque / params.wheel_radius[i]
+        if state.failed[i]:
+            wanted -= state.force[i]
+    wanted = min(wanted, state.grip * shares * params.mass * GRAVITY)
+    for i in range(4):
+        if not state.failed[i]:
+            state.force[i] += state.moved * (wanted * state.share[i] / shares - state.force[i])
+    _limit_yaw(params, state, distribution)
+    for i in range(4):
+        if not state.failed[i]:
+            distribution.torque[i] = state.force[i] * params.wheel_radius[i]
+
+
+@kernel
+def _limit_yaw(params: Record, state: Record, distribution: Record) -> None:
+    """Take back of the forces of one side what it has more than the other and than may be; none of them falls
+    below what its wheel was asked for before."""
+    most = 2.0 * YAW_LIMIT * params.mass * GRAVITY * params.rear_axle / params.track
+    apart = state.force[0] + state.force[2] - state.force[1] - state.force[3]
+    side = 0 if apart > 0.0 else 1
+    added = 0.0
+    for i in (side, side + 2):
+        if not state.failed[i]:
+            added += max(state.force[i] - distribution.torque[i] / params.wheel_radius[i], 0.0)
+    excess = abs(apart) - most
+    if excess <= 0.0 or added <= 0.0:
+        return
+    left = max(1.0 - excess / added, 0.0)
+    for i in (side, side + 2):
+        before = distribution.torque[i] / params.wheel_radius[i]
+        if not state.failed[i] and state.force[i] > before:
+            state.force[i] = before + left * (state.force[i] - before)

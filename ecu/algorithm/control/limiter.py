@@ -1,0 +1,182 @@
+"""The last word before the bus: a limiter that trusts nobody, for both wheels of an axle in one call.
+
+For each corner, given the demand of the uncompensated law and the compensated one:
+
+1. not finite, or moving against the uncompensated demand: the uncompensated demand counts until the
+   compensated one comes back;
+2. T(p, nominal friction) stays within 0.6–1.6 of the torque demanded;
+3. left and right differ by no more than `LEFT_RIGHT_SHARE` of the torque demanded, T(p, nominal friction)
+   over it: learned friction, compensation and fallbacks of one side together. What one side gives up the
+   other gets, so that the axle brakes the same;
+4. 0–180 bar, and no more than the accumulator holds or the slip guard lets through;
+5. rise at most `max_pressure_rate` (at least 1500 bar/s: an emergency stop is not delayed); a fall is
+   unlimited while the demand falls or to stay below 2 and 4, and as slow as a rise while it does not.
+
+So published pressures break 3 only at a wheel that the slip guard holds, where the hydraulics have no more to
+give, and while a corner is on its way at the rate of 5: 60 ms at most. A lost sensor is no reason.
+
+Small on purpose, so that it can be tested exhaustively.
+"""
+
+import math
+
+import numpy as np
+
+from ecu.algorithm.estimation.motion import usable
+from ecu.contract.params import BAR
+from ecu.contract.signals import ACCUMULATOR_PRESSURE
+from ecu.jit import Record, kernel
+
+LIMITER_STATE = np.dtype(
+    [
+        ("pressure", "f8", (4,)),  # last output [Pa]
+        ("uncompensated", "f8", (4,)),  # last uncompensated demand [Pa]
+        ("wanted", "f8", (4,)),  # last compensated demand [Pa]
+        ("ceiling", "f8", (4,)),  # highest pressure that a corner may have [Pa]
+        ("share", "f8", (4,)),  # T(target, nominal friction) over the torque demanded, 0: none is
+        ("asked", "f8", (4,)),  # compensated demand with what left and right leave of it [Pa]
+        ("falls", "u1", (4,)),  # the demand of the corner falls
+        ("limited", "u1"),
+        ("starved", "u1"),  # the accumulator holds less than is demanded
+    ],
+    align=True,
+)
+
+LEAST_TORQUE, GREATEST_TORQUE = 0.6, 1.6
+LEFT_RIGHT_SHARE = 0.10
+BEYOND_ANY = 1e12  # Pa; of two pressures that are both infinite there is no share
+# A demand that rises while its compensated twin falls by more than this in one cycle is a fault [Pa].
+AGAINST_DEMAND = 5e5
+EMPTY = 10.0 * BAR  # far below the gas pressure of any accumulator
+
+
+@kernel
+def reads_empty(inputs: Record) -> bool:
+    """Return whether an accumulator tells a pressure at which nothing would brake."""
+    told: bool = usable(inputs, ACCUMULATOR_PRESSURE)
+    return told and BAR * inputs.value[ACCUMULATOR_PRESSURE] <= EMPTY
+
+
+@kernel
+def available_pressure(params: Record, inputs: Record) -> float:
+    """Return the highest pressure [Pa] that the hydraulics can give: the accumulator's, where it is known.
+
+    One that reads empty limits nothing: if it is, there is nothing to hold back; if the sensor lies, all is.
+    """
+    available: float = params.max_pressure
+    if usable(inputs, ACCUMULATOR_PRESSURE) and not reads_empty(inputs):
+        available = min(BAR * inputs.value[ACCUMULATOR_PRESSURE], available)
+    return available
+
+
+@kernel
+def _nominal_pressure(params: Record, torque: float, corner: int) -> float:
+    """Return the pressure [Pa] beyond the push-out pressure that makes a torque at nominal friction."""
+    lever: float = 2.0 * params.piston_area[corner] * params.effective_radius[corner]
+    nominal: float = min(torque / (lever * params.mu_nominal[corner]), BEYOND_ANY)
+    return nominal
+
+
+@kernel
+def _bound(
+    params: Record, state: Record, corner: int, wanted: float, uncompensated: float, torque: float
+) -> None:
+    """Overwrite `state.share` and `state.asked`: what the corner is to have by rules 1 and 2."""
+    state.share[corner] = 0.0
+    state.asked[corner] = wanted
+    if not (math.isfinite(torque) and torque > 0.0):
+        state.uncompensated[corner] = state.wanted[corner] = 0.0
+        return
+    nominal = _nominal_pressure(params, torque, corner)
+    push_out = params.push_out_pressure[corner]
+    if not (math.isfinite(uncompensated) and uncompensated >= 0.0):
+        uncompensated = push_out + nominal
+    demand_change = uncompensated - state.uncompensated[corner]
+    wanted_change = wanted - state.wanted[corner]
+    against = state.wanted[corner] > 0.0 and (
+        (demand_change >= 0.0 and wanted_change < -AGAINST_DEMAND)
+        or (demand_change <= 0.0 and wanted_change > AGAINST_DEMAND)
+    )
+    state.falls[corner] = 1 if demand_change < 0.0 else 0
+    state.uncompensated[corner] = uncompensated
+    if math.isfinite(wanted) and not against:
+        state.wanted[corner] = pressure = wanted
+    else:
+        pressure = uncompensated
+        state.limited = 1
+    share = (pressure - push_out) / nominal
+    state.share[corner] = min(max(share, LEAST_TORQUE), GREATEST_TORQUE)
+    allowed = min(push_out + state.share[corner] * nominal, params.max_pressure)
+    if abs(allowed - pressure) > 1.0:
+        state.limited = 1
+
+
+@kernel
+def _level(params: Record, state: Record, left: int, torque: Record) -> None:
+    """Move the shares of an axle towards each other until they hold rule 3."""
+    right = left + 1
+    if state.share[left] == 0.0 or state.share[right] == 0.0:
+        return
+    apart = state.share[left] - state.share[right]
+    excess = max(abs(apart) - LEFT_RIGHT_SHARE, 0.0)
+    if excess == 0.0:
+        return
+    state.limited = 1
+    both = torque[left] + torque[right]
+    for i in (left, right):
+        other = right if i == left else left
+        down = excess * (torque[other] / both) * (1.0 if (i == left) == (apart > 0.0) else -1.0)
+        state.share[i] -= down
+        state.asked[i] -= down * _nominal_pressure(params, torque[i], i)
+
+
+@kernel
+def _approach(params: Record, state: Record, corner: int, torque: float, dt: float) -> None:
+    """Overwrite `state.pressure` by rules 4 and 5."""
+    if state.share[corner] == 0.0:
+        state.pressure[corner] = 0.0
+        return
+    ceiling = state.ceiling[corner]
+    if not 0.0 <= ceiling <= params.max_pressure:
+        ceiling = params.max_pressure
+    nominal, push_out = _nominal_pressure(params, torque, corner), params.push_out_pressure[corner]
+    high = min(push_out + GREATEST_TORQUE * nominal, ceiling)
+    bounded = min(push_out + state.share[corner] * nominal, ceiling)
+    last = state.pressure[corner]
+    if not 0.0 <= last <= params.max_pressure:
+        last = 0.0
+    step = params.max_pressure_rate * dt if 0.0 < dt < 1.0 else 0.0
+    if bounded > last + step:
+        bounded = last + step
+    elif bounded < last - step and not state.falls[corner]:
+        bounded = min(last - step, high)
+    state.pressure[corner] = bounded
+
+
+@kernel
+def limit_axle(
+    params: Record,
+    state: Record,
+    left: int,
+    wanted: Record,
+    uncompensated: Record,
+    torque: Record,
+    dt: float,
+) -> None:
+    """Overwrite `state.pressure` of an axle: what may be sent [Pa]; all arguments may be NaN.
+
+    Args:
+        params: `PARAMS`.
+        state: `LIMITER_STATE`, overwritten but for `ceiling`; one that cannot be a pressure counts as
+            `max_pressure`.
+        left: the axle's left corner, 0 or 2.
+        wanted: compensated pressures [Pa], shape (4,).
+        uncompensated: pressures by the base friction [Pa], shape (4,).
+        torque: friction torques demanded of the corners [N m], shape (4,).
+        dt: time since the last cycle [s].
+    """
+    for i in (left, left + 1):
+        _bound(params, state, i, wanted[i], uncompensated[i], torque[i])
+    _level(params, state, left, torque)
+    for i in (left, left + 1):
+        _approach(params, state, i, torque[i], dt)

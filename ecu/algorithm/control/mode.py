@@ -1,0 +1,100 @@
+"""The ECU's mode and the faults that the inputs show.
+
+starting   until every needed input was seen, at most one second
+ready      inputs good, nobody brakes
+active     brakes are asked for or applied
+degraded   a needed input is lost: friction is held or nominal, braking goes on
+failed     neither pedal, nor its switch, nor demand arrives: demand 0, flagged invalid, the hydraulic
+           fallback takes over
+"""
+
+import numpy as np
+
+from ecu.algorithm.control.demand import automated_demand_valid, pedal_known
+from ecu.algorithm.estimation.motion import motor_torque_known, usable
+from ecu.contract.faults import (
+    DEGRADING,
+    HYDRAULICS_NOT_READY,
+    IMU_LOST,
+    MOTOR_TORQUE_LOST,
+    PEDAL_IMPLAUSIBLE,
+    PEDAL_LOST,
+    PRESSURE_LOST,
+    REQUEST_LOST,
+    STEERING_LOST,
+    WHEEL_SPEED_LOST,
+)
+from ecu.contract.signals import (
+    ACCEL_X,
+    ACCEL_Y,
+    ACTIVE,
+    CALLIPER_PRESSURE,
+    DEGRADED,
+    FAILED,
+    HYDRAULIC_READY,
+    PEDAL_POSITION,
+    PEDAL_PRESSED,
+    READY,
+    STARTING,
+    STEERING_ANGLE,
+    WHEEL_SPEED,
+    YAW_RATE,
+)
+from ecu.jit import Record, kernel
+
+MODE_STATE = np.dtype([("age_s", "f8"), ("complete", "u1")], align=True)
+
+START_UP = 1.0  # s
+PEDAL_REST = 5.0  # %
+
+
+@kernel
+def _lost(params: Record, inputs: Record, place: int) -> bool:
+    return params.mapped[place] != 0 and not usable(inputs, place)
+
+
+@kernel
+def input_faults(params: Record, inputs: Record) -> int:
+    """Return the fault bits that the inputs show."""
+    faults = 0
+    for i in range(4):
+        if not usable(inputs, WHEEL_SPEED + i):
+            faults |= WHEEL_SPEED_LOST
+        if not usable(inputs, CALLIPER_PRESSURE + i):
+            faults |= PRESSURE_LOST
+        if not motor_torque_known(inputs, i):
+            faults |= MOTOR_TORQUE_LOST
+    if not usable(inputs, ACCEL_X):
+        faults |= IMU_LOST
+    if not pedal_known(params, inputs) and not automated_demand_valid(inputs):
+        faults |= REQUEST_LOST
+    if _lost(params, inputs, PEDAL_POSITION):
+        faults |= PEDAL_LOST
+    for place in (STEERING_ANGLE, YAW_RATE, ACCEL_Y):
+        if _lost(params, inputs, place):
+            faults |= STEERING_LOST
+    if (
+        usable(inputs, PEDAL_POSITION)
+        and usable(inputs, PEDAL_PRESSED)
+        and inputs.value[PEDAL_POSITION] > PEDAL_REST
+        and inputs.value[PEDAL_PRESSED] < 0.5
+    ):
+        faults |= PEDAL_IMPLAUSIBLE
+    if usable(inputs, HYDRAULIC_READY) and inputs.value[HYDRAULIC_READY] < 0.5:
+        faults |= HYDRAULICS_NOT_READY
+    return faults
+
+
+@kernel
+def decide_mode(state: Record, faults: int, braking: bool, dt: float) -> int:
+    """Return the mode for this cycle's faults."""
+    state.age_s += dt
+    if (faults & (DEGRADING | REQUEST_LOST)) == 0:
+        state.complete = 1
+    if not state.complete and state.age_s < START_UP:
+        return STARTING
+    if faults & REQUEST_LOST:
+        return FAILED
+    if faults & DEGRADING:
+        return DEGRADED
+    return ACTIVE if braking else READY

@@ -1,0 +1,150 @@
+"""Torque to pressure with the friction known, and its compensation while braking (5.4–5.8).
+
+    p_0,dem = T / (2 A_k mu_0 r_eff) + p_push                          (5.4), mu_0: base friction
+    e = sat_{+-0.3}((mu - mu_0) / mu_0)                                (5.6)
+    p* = p_push + (p_0,dem - p_push) (1 - e + e^2)                     corrected 5.7, 5.8: "second-order"
+    p* = p_push + (p_0,dem - p_push) / (1 + e)                         what they approximate: "inverse"
+
+Corrected: the printed form scales the push-out pressure too, and takes T_b where the motors brake as well;
+T is what the lining shall give (5.4). The second order leaves e^3 of torque, 2.7 % at the limit, and beyond
+it would turn back; the inverse has no such limit. "off" takes nominal friction always. The base changes
+between applications only, so a noisy estimate divides nothing. The friction used moves at most
+`FRICTION_RATE` a second: the loop through estimator and hydraulics (26 ms dead time) stays slow against both.
+Where a pressure cannot be had it does not fall on: no more would come of it.
+
+Many linings rub harder as speed falls and begin the next braking lower again (assumption; those of the
+simulated car's rear by a sixth). So the base is the learned friction times what the last braking began with
+over what it ended with, and the estimate, at first still that of the end, is followed once it was observed
+for `EARLY_S`.
+"""
+
+import math
+
+import numpy as np
+
+from ecu.algorithm.estimation.friction import GREATEST_RATIO, LEAST_RATIO, well_observed
+from ecu.contract.params import INVERSE, OFF
+from ecu.jit import Record, kernel
+
+PRESSURE_LAW_STATE = np.dtype(
+    [
+        ("base", "f8", (4,)),  # mu_0
+        ("used", "f8", (4,)),  # friction in use
+        ("mu_override", "f8", (4,)),  # the laboratory's ideal controller is given the true friction; NaN: off
+        ("early", "f8", (4,)),  # friction soon after this braking began, 0: not observed yet
+        ("start", "f8", (4,)),  # friction at the begin of a braking over that at the end of the one before
+        ("cut", "u1", (4,)),  # the last pressure was cut on its way out
+        ("limit_s", "f8"),  # for this long the deceleration has not been kept
+        ("at_limit", "u1"),  # it was too long in this braking
+    ],
+    align=True,
+)
+
+SURE = 0.05
+GREATEST_CHANGE = 0.3  # relative to the base (5.6)
+FRICTION_RATE = 0.5  # 1/s
+LIMIT_S = 0.3
+EARLY_S = 0.6  # of observing
+LARGEST_START = 0.25  # relative
+
+
+@kernel
+def pressure_for_torque(params: Record, torque: float, mu: float, corner: int) -> float:
+    """Return the pressure [Pa] for a brake torque [N m] at friction `mu` (5.4); 0 for no torque."""
+    if torque <= 0.0:
+        return 0.0
+    lever: float = 2.0 * params.piston_area[corner] * params.effective_radius[corner]
+    push_out: float = params.push_out_pressure[corner]
+    return torque / (lever * mu) + push_out
+
+
+@kernel
+def follow_friction(params: Record, state: Record, friction: Record, dt: float) -> None:
+    """Move the friction in use towards the estimate, within what friction can be.
+
+    An estimate above the base counts only as far as it is sure: rather too hard a braking than too weak a
+    one. While it still is what the last braking ended with, and that braking began with another, it waits.
+    """
+    if params.compensation == OFF:
+        return
+    step, mu = FRICTION_RATE * dt, friction.mu
+    for i in range(4):
+        if friction.observed_s[i] < EARLY_S and state.start[i] != 1.0:
+            continue
+        if state.early[i] == 0.0 and friction.observed_s[i] >= EARLY_S:
+            state.early[i] = mu[i]
+        base: float = state.base[i]
+        target = mu[i] if math.isfinite(mu[i]) else base
+        doubt = max(friction.sigma[i] / max(mu[i], 0.1) - SURE, 0.0)
+        if target > base:
+            target = max(target * math.exp(-2.0 * doubt), base)
+        target = min(max(target, LEAST_RATIO * params.mu_nominal[i]), GREATEST_RATIO * params.mu_nominal[i])
+        least = 0.0 if state.cut[i] else -step
+        state.used[i] += min(max(target - state.used[i], least), step)
+
+
+@kernel
+def set_base(params: Record, state: Record, learned: Record) -> None:
+    """Take the learned friction as the base; only between applications."""
+    for i in range(4):
+        base = learned.mu_b[i] * state.start[i]
+        state.base[i] = params.mu_nominal[i] if params.compensation == OFF else base
+        state.used[i] = state.base[i]
+
+
+@kernel
+def learn_start(state: Record, friction: Record, learned: Record) -> None:
+    """At the end of a braking: keep what it began with over what it ended with, where both are known."""
+    for i in range(4):
+        known = state.early[i] > 0.0 and well_observed(friction, i)
+        if known:
+            change = state.early[i] / learned.mu_b[i]
+            state.start[i] = min(max(change, 1.0 - LARGEST_START), 1.0 + LARGEST_START)
+        state.early[i] = 0.0
+
+
+@kernel
+def friction_in_use(state: Record, corner: int) -> float:
+    """Return the friction that the law counts on now."""
+    override: float = state.mu_override[corner]
+    used: float = state.used[corner]
+    return override if math.isfinite(override) else used
+
+
+@kernel
+def compensated_pressure(params: Record, state: Record, pressure: float, corner: int) -> float:
+    """Return the pressure [Pa] corrected for the friction in use (corrected 5.8)."""
+    base: float = state.base[corner]
+    used = friction_in_use(state, corner)
+    if params.compensation == INVERSE or math.isfinite(state.mu_override[corner]):
+        factor = base / used
+    else:
+        e = min(max((used - base) / base, -GREATEST_CHANGE), GREATEST_CHANGE)
+        factor = 1.0 - e + e * e
+    push_out: float = min(params.push_out_pressure[corner], pressure)
+    compensated: float = push_out + (pressure - push_out) * factor
+    return compensated
+
+
+@kernel
+def watch_limit(params: Record, state: Record, mu: Record, guarded: Record, asked: bool, dt: float) -> None:
+    """Tell, until the braking is over, that the pedal's deceleration could not be kept for `LIMIT_S`.
+
+    Args:
+        params: `PARAMS`.
+        state: `PRESSURE_LAW_STATE`; `at_limit` and `limit_s` are overwritten.
+        mu: friction as estimated, shape (4,).
+        guarded: wheels whose pressure is cut because they slip, shape (4,): no limit of compensation.
+        asked: a deceleration is asked for.
+        dt: time since the last cycle [s].
+    """
+    short = False
+    for i in range(4):
+        e = (mu[i] - state.base[i]) / state.base[i]
+        faded = params.compensation != OFF and e < -GREATEST_CHANGE
+        short = short or faded or (state.cut[i] != 0 and guarded[i] == 0)
+    state.limit_s = state.limit_s + dt if short and asked else 0.0
+    if not asked:
+        state.at_limit = 0
+    elif state.limit_s > LIMIT_S:
+        state.at_limit = 1

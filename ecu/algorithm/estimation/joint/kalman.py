@@ -1,0 +1,92 @@
+"""Prediction and correction of the joint observer's state; one scalar measurement at a time.
+
+Correction after Schmidt: a state that is not free keeps its value and variance, but its covariances act, so
+that what it leaves uncertain is not counted as known. Innovations beyond `GATE` standard deviations count
+with a variance that puts them on the gate, and while friction is not observed correct speed and slope alone:
+what a car is learns from what fits. Beyond four gates they are rejected."""
+
+import math
+
+from ecu.algorithm.estimation.joint.layout import BIAS, LEVEL, SLOPE, N, V
+from ecu.jit import Record, kernel
+
+GATE = 3.0
+REJECT = 4.0 * GATE
+
+
+@kernel
+def forget(state: Record, i: int, variance: float) -> None:
+    """Let a state have `variance` and no covariance."""
+    for j in range(N):
+        state.p[i, j] = state.p[j, i] = 0.0
+    state.p[i, i] = variance
+
+
+@kernel
+def clear_state(state: Record, i: int, variance: float) -> None:
+    """Let a state be zero with `variance` and no covariance."""
+    state.x[i] = 0.0
+    forget(state, i, variance)
+
+
+@kernel
+def clear_derivatives(state: Record) -> None:
+    """Begin a measurement that depends on nothing."""
+    for j in range(N):
+        state.h[j] = 0.0
+
+
+@kernel
+def drift_speed(state: Record, time: float) -> None:
+    """Let bias and slope act on the covariance of speed over `time` [s]: v' = a - b - g sin(slope)."""
+    p = state.p
+    for j in range(N):
+        if j != V:
+            p[V, j] -= time * (p[BIAS, j] + p[SLOPE, j])
+            p[j, V] = p[V, j]
+    both = p[BIAS, BIAS] + 2.0 * p[BIAS, SLOPE] + p[SLOPE, SLOPE]
+    p[V, V] -= time * (2.0 * (p[V, BIAS] + p[V, SLOPE]) + time * both)
+
+
+@kernel
+def _corrects(free: Record, i: int, only_speed: bool) -> bool:
+    allowed: bool = free[i] != 0 and (not only_speed or i in (V, SLOPE))
+    return allowed
+
+
+@kernel
+def correct(state: Record, innovation: float, variance: float) -> float:
+    """Fuse a measurement with derivatives `state.h` and noise `variance`; returns its test ratio."""
+    p, h, ph, x, free = state.p, state.h, state.ph, state.x, state.free
+    total = variance
+    for i in range(N):
+        ph[i] = 0.0
+    for j in range(N):  # most derivatives are zero
+        if h[j] != 0.0:
+            for i in range(N):
+                ph[i] += p[j, i] * h[j]
+    for i in range(N):
+        total += ph[i] * h[i]
+    ratio = innovation * innovation / total
+    if not math.isfinite(ratio) or ratio > REJECT * REJECT:
+        return ratio
+    outlier = ratio > GATE * GATE
+    if outlier:
+        total = innovation * innovation / (GATE * GATE)
+    only_speed = outlier and not free[LEVEL]
+    scale = innovation / total
+    for i in range(N):
+        if _corrects(free, i, only_speed):
+            x[i] += scale * ph[i]
+    inverse = 1.0 / total
+    for i in range(N):
+        if _corrects(free, i, only_speed):
+            gain = ph[i] * inverse
+            for j in range(N):
+                p[i, j] -= gain * ph[j]
+    for i in range(N):
+        if not _corrects(free, i, only_speed):
+            for j in range(N):
+                if _corrects(free, j, only_speed):
+                    p[i, j] = p[j, i]
+    return ratio

@@ -1,0 +1,321 @@
+"""The joint observer: one filter for speed, tyres, mass, sensors and the friction of all four linings.
+
+A window of a few cycles is one step: the state walks, then the speed reference, each wheel's speed and the
+car's longitudinal balance correct it. Which states they may correct depends on what the car does:
+
+friction braking   speed, frictions, tyre stiffness and peak, radii, slope; the rest is considered only
+motors alone       everything but friction and pressure offsets: known torque shows mass, drag, stiffness
+rolling            speed, radii, slope; bias and drag where motor torque is reported
+below 3.4 m/s, sliding, ABS, ESP, driver or motors driving against the brakes: speed and slope only
+
+When a wheel runs past the tyre's range, or most wheels contradict the tyres that are known, all but the speed
+goes back to what was known 0.2 to 0.4 s before.
+"""
+
+import math
+
+from ecu.algorithm.control.demand import LEAST_REQUEST, requested_decel
+from ecu.algorithm.estimation.friction import driver_accelerates, drives_against
+from ecu.algorithm.estimation.joint.correction import APPLIED, correct_by_balance, correct_by_wheel
+from ecu.algorithm.estimation.joint.drive import KNOWN, measure_drive
+from ecu.algorithm.estimation.joint.kalman import clear_derivatives, correct, forget
+from ecu.algorithm.estimation.joint.layout import (
+    BIAS,
+    CHANGE,
+    DELAY,
+    DRAG,
+    LEVEL,
+    LOAD,
+    MASS,
+    MOTOR,
+    OVERRUN,
+    PEAK,
+    RADIUS,
+    RATE,
+    RATIO,
+    ROLLING,
+    SINKING,
+    SLOPE,
+    STIFFNESS,
+    N,
+    V,
+)
+from ecu.algorithm.estimation.joint.prior import (
+    forget_rate,
+    keep_within_bounds,
+    note_change,
+    pressure_change,
+    set_prior,
+    walk,
+)
+from ecu.algorithm.estimation.joint.sliding import (
+    HOLD_S,
+    share_force,
+    watch_tyres,
+    wheel_slides,
+    wheels_agree,
+)
+from ecu.algorithm.estimation.joint.snapshot import go_back, keep, keep_newer
+from ecu.algorithm.estimation.joint.wheel import (
+    brake_torque,
+    predict_balance,
+    unknown_share,
+)
+from ecu.algorithm.estimation.joint.window import close_window, gather, open_window
+from ecu.algorithm.estimation.joint.zero import settle_zero
+from ecu.algorithm.estimation.motion import STANDING, mean_wheel_speed, speed_backwards, usable
+from ecu.contract.signals import (
+    ABS_ACTIVE,
+    ACCEL_X,
+    CALLIPER_PRESSURE,
+    ESP_ACTIVE,
+    WHEEL_SPEED,
+)
+from ecu.jit import Record, kernel
+
+WINDOW_S = 0.05
+LEAST_SPEED = 3.4  # m/s
+FREE = 0.4  # bar above push-out, mean of the wheels: the brakes are released
+STRAIGHT = 0.05  # lateral acceleration over gravity: more, and wheels roll by their own loads and angles
+VARIES_FROM, VARIES = 0.3, 0.2  # m/s^2: acceleration that tells a mass, and its change within seconds
+MOTORS = 100.0  # N m of all motors: their torque is worth looking at
+BELIEVED_AFTER = 3.0  # s without a wheel that rolls, brakes released
+RELEASE = 0.15  # relative fall in a window: pressure, slip and force lag differently and teach nothing
+SNAPSHOT_S = 0.2
+
+UNEXPLAINED = 0.15  # m/s^2 while rolling: someone drives or brakes the car without saying so
+TWIN = 3.0  # bar, of a pressure taken from the other side
+JUMP = 100.0  # squared test ratio: from here a reference is believed at once that wheels cannot deny
+
+
+@kernel
+def start_joint(state: Record) -> None:
+    """Begin with what the state knows, the speed apart."""
+    state.started = 0
+    open_window(state)
+    keep(state, 0)
+    keep(state, 1)
+
+
+@kernel
+def _start_speed(params: Record, state: Record, inputs: Record) -> None:
+    for i in range(4):
+        if not usable(inputs, WHEEL_SPEED + i):
+            return
+    state.x[V] = mean_wheel_speed(params, inputs)
+    state.started, state.hold_s = 1, HOLD_S
+
+
+@kernel
+def _axle_unknown(inputs: Record, left: int) -> bool:
+    """Return whether neither pressure of an axle is usable: one alone stands for both."""
+    pressure = CALLIPER_PRESSURE + left
+    return not (usable(inputs, pressure) or usable(inputs, pressure + 1))
+
+
+@kernel
+def _learning_forbidden(params: Record, state: Record, inputs: Record, braking: bool) -> bool:
+    value, w = inputs.value, state.window
+    motors, brakes = 0.0, 0.0
+    for i in range(4):
+        motors += w.motor[i]
+        brakes += brake_torque(params, state, i, w.pressure[i])
+    against = braking and (driver_accelerates(inputs) or drives_against(motors, brakes))
+    unknown = braking and (_axle_unknown(inputs, 0) or _axle_unknown(inputs, 2))
+    forbidden: bool = against or unknown or value[ABS_ACTIVE] > 0.5 or value[ESP_ACTIVE] > 0.5
+    return forbidden
+
+
+@kernel
+def _watch_release(state: Record, braking: bool) -> None:
+    """When the brakes are released, friction goes back to what it was before that could disturb it."""
+    falling = braking and min(pressure_change(state, 0), pressure_change(state, 2)) < -RELEASE
+    if falling and not state.releasing:
+        for i in range(LEVEL, LEVEL + 4):
+            state.x[i] = state.kept_x[1, i]
+        for i in range(CHANGE, CHANGE + 2):
+            state.x[i] = state.kept_x[1, i]
+    state.releasing = 1 if falling else 0
+
+
+@kernel
+def _accelerates(state: Record) -> bool:
+    """Return whether acceleration varies: what does not cannot tell mass from bias, drag and slope."""
+    accel = state.window.accel
+    varies: bool = abs(accel) > VARIES_FROM and abs(accel - state.mean_accel) > VARIES
+    return varies
+
+
+@kernel
+def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> None:
+    free = state.free
+    if not (braking and learning) or state.releasing:
+        forget_rate(state)
+    for i in range(N):
+        free[i] = 0
+    free[V], free[SLOPE] = 1, 1 if state.x[V] > STANDING else 0
+    if not learning:
+        return
+    for i in range(4):
+        free[RADIUS + i] = 1
+        free[LEVEL + i] = 1 if braking and not state.releasing else 0
+    free[RATE] = free[CHANGE] = free[CHANGE + 1] = free[LEVEL]
+    free[DELAY] = 1
+    free[ROLLING] = 1 if state.window.reference_samples > 0 else 0
+    if state.releasing:
+        return
+    if braking:
+        free[STIFFNESS] = free[PEAK] = free[OVERRUN] = 1
+    else:
+        free[BIAS] = free[DRAG] = 1 if state.window.motor_reported and state.drive_known > KNOWN else 0
+        if motors:
+            for i in (STIFFNESS, RATIO, LOAD, PEAK, SINKING):
+                free[i] = 1
+            free[MASS] = free[MOTOR] = 1 if _accelerates(state) else 0
+
+
+@kernel
+def update_joint(
+    params: Record,
+    state: Record,
+    inputs: Record,
+    motion: Record,
+    load: Record,
+    demand: Record,
+    braking: bool,
+    dt: float,
+) -> None:
+    """Take this cycle's samples in and, at the end of a window, correct the state by them."""
+    if state.closed:
+        open_window(state)
+    state.reset = state.closed = 0
+    if not state.started:
+        _start_speed(params, state, inputs)
+        if not state.started:
+            return
+    if motion.backwards:
+        state.x[V] = speed_backwards(params, inputs, motion, state.x[V], dt)
+        state.reversing = 1
+        return
+    if state.reversing:
+        state.x[V], state.p[V, V], state.reversing = mean_wheel_speed(params, inputs), 0.25, 0
+        open_window(state)
+    state.released = 1 if not braking and _released(params, state, inputs) else 0
+    gather(params, state, inputs, motion, load, demand, state.released != 0, dt)
+    if braking and usable(inputs, ACCEL_X):
+        share_force(params, state, inputs, motion.accel_x, load)
+    state.hold_s = max(state.hold_s - dt, 0.0)
+    if state.window.time < WINDOW_S - 0.001:
+        return
+    close_window(params, state)
+    _fuse(params, state, inputs, braking)
+    if not braking and usable(inputs, ACCEL_X):
+        measure_drive(params, state)
+    _look_after(params, state, braking)
+    state.closed = 1
+
+
+@kernel
+def _released(params: Record, state: Record, inputs: Record) -> bool:
+    """Return whether nobody brakes by the linings, not even a little."""
+    asked = requested_decel(params, inputs)
+    if not params.transmit and asked > LEAST_REQUEST:
+        return False
+    total = 0.0
+    for i in range(4):
+        total += state.smooth_pressure[i]
+    return total < 4.0 * FREE
+
+
+@kernel
+def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
+    w, x = state.window, state.x
+    time = w.time
+    motors = 0.0
+    for i in range(4):
+        if state.released:
+            settle_zero(state.zero, i)
+        if not usable(inputs, CALLIPER_PRESSURE + i):
+            twin = i ^ 1
+            w.pressure[i], w.common_pressure[i] = w.pressure[twin], w.common_pressure[twin]
+            w.pressure_variance[i] = TWIN**2
+        if not braking and state.smooth_pressure[i] < APPLIED:
+            w.pressure[i] = w.common_pressure[i] = state.smooth_pressure[i] = 0.0  # noise is no torque
+        motors += abs(w.motor[i])
+    moving = x[V] > LEAST_SPEED
+    state.drive_known = 1.0 - unknown_share(params, state)
+    walk(state, braking and moving, time)
+    _watch_release(state, braking)
+    learning = moving and state.hold_s <= 0.0 and w.motor_known != 0
+    learning = learning and not _learning_forbidden(params, state, inputs, braking)
+    if not braking:
+        learning = learning and abs(w.across) < STRAIGHT and state.released != 0
+    if learning and not braking and motors <= MOTORS:
+        learning = w.balanced and abs(predict_balance(params, state, False)) < UNEXPLAINED
+    _choose_free(state, braking, motors > MOTORS, learning)
+    before = x[V]
+    for channel in range(6):
+        state.ratio[channel] = math.nan
+    state.reference_s += time
+    if w.reference_samples > 0:
+        state.reference_s = 0.0
+        clear_derivatives(state)
+        state.h[V], state.h[DELAY] = 1.0, -w.reference_change
+        state.ratio[5] = correct(state, w.reference, params.sigma_vehicle_speed**2 / w.reference_samples)
+        wheels_slide = state.hold_s > 0.0
+        if state.ratio[5] > JUMP and (wheels_slide or wheels_agree(params, state, x[V] + w.reference)):
+            x[V] += w.reference
+            state.p[V, V] += 0.25
+    state.untrusted_s += time
+    seen = 0
+    for i in range(4):
+        state.observed[i], state.pull[i] = 0, 0.0
+        if w.omega_samples[i] == 0:
+            continue
+        seen += 1
+        state.slides[i] = 1 if wheel_slides(params, state, i) else 0
+        if not state.slides[i]:
+            state.untrusted_s = 0.0
+            correct_by_wheel(params, state, i, before, moving, learning and braking)
+    if state.free[LEVEL]:
+        weight = 0.0
+        for i in range(4):
+            weight += max(state.smooth_pressure[i], 0.0)
+        if weight > 4.0 * APPLIED:
+            note_change(state, weight)
+    watch_tyres(state, learning and braking)
+    if seen and learning and w.balanced and (braking or w.motor_reported):
+        correct_by_balance(params, state, braking)
+    state.pressed = max(abs(pressure_change(state, 0)), abs(pressure_change(state, 2)))
+    state.last_accel, state.last_smooth_accel = w.accel, state.smooth_accel
+    for i in range(4):
+        state.motors.last_smooth[i] = state.motors.smooth[i]
+        state.last_pressure[i], state.last_smooth[i] = w.pressure[i], state.smooth_pressure[i]
+
+
+@kernel
+def _look_after(params: Record, state: Record, braking: bool) -> None:
+    """Keep snapshots, go back when a wheel slides, begin anew when a value is not finite."""
+    w, x = state.window, state.x
+    total = 0.0
+    for i in range(N):
+        total += x[i] + state.p[i, i]
+    if not math.isfinite(total):
+        set_prior(params, state)
+        start_joint(state)
+        state.reset = 1
+        return
+    if state.untrusted_s > BELIEVED_AFTER and not braking:
+        state.started = 0  # then it is the speed that is wrong
+        state.untrusted_s = 0.0
+        forget(state, V, 0.25)
+    state.kept_s += w.time
+    sliding = state.slides[0] + state.slides[1] + state.slides[2] + state.slides[3]
+    if sliding > state.sliding and braking and state.hold_s <= 0.0:
+        go_back(state)
+    if sliding > 1 or sliding != state.sliding:
+        state.hold_s = HOLD_S
+    state.sliding = sliding
+    if state.hold_s <= 0.0 and not state.releasing and state.kept_s >= SNAPSHOT_S:
+        keep_newer(state)
+    state.at_bound = 1 if keep_within_bounds(state) else 0

@@ -1,0 +1,78 @@
+"""Wheels that leave what is known of their tyres: what is believed of them, and what goes back."""
+
+from ecu.algorithm.estimation.joint.kalman import GATE, forget
+from ecu.algorithm.estimation.joint.layout import STIFFNESS, V
+from ecu.algorithm.estimation.joint.prior import PRIOR
+from ecu.algorithm.estimation.joint.snapshot import go_back
+from ecu.algorithm.estimation.joint.wheel import car_force
+from ecu.algorithm.estimation.motion import fresh
+from ecu.contract.signals import WHEEL_SPEED
+from ecu.jit import Record, kernel
+
+LARGE_SLIP = 0.12
+YIELDING = 0.06  # slip from which the force along the car says more of a wheel's force than its torque
+AGREEING = 0.05  # slip within which a wheel confirms a speed
+SLIDING_FLOOR = 5.0  # m/s, that slip is relative to at least
+HOLD_S = 0.2
+OTHER_TYRES = 2.5  # wheels on the gate at once
+
+
+@kernel
+def _beyond(rolled: float, ground: float, slip: float) -> bool:
+    """Return whether a wheel's speed differs from that of the ground [m/s] by more than a slip."""
+    return abs(rolled - ground) > slip * max(ground, rolled, SLIDING_FLOOR)
+
+
+@kernel
+def share_force(params: Record, state: Record, inputs: Record, accel: float, load: Record) -> None:
+    """Give the wheels that begin to slide, by their loads, the force along the car that the others leave."""
+    left, loaded = car_force(params, state, accel), 0.0
+    for i in range(4):
+        rolled = inputs.value[WHEEL_SPEED + i] * params.wheel_radius[i]
+        if fresh(inputs, WHEEL_SPEED + i):
+            state.yields[i] = 1 if _beyond(rolled, state.x[V], YIELDING) else 0
+        if state.yields[i]:
+            loaded += load[i]
+        else:
+            left -= state.force[i]
+    for i in range(4):
+        if state.yields[i]:
+            state.force[i] = left * load[i] / loaded
+
+
+@kernel
+def wheel_slides(params: Record, state: Record, i: int) -> bool:
+    """Return whether a wheel is so far from the car's speed that it does not tell it."""
+    w = state.window
+    return _beyond(w.omega[i] * params.wheel_radius[i], w.ground[i], LARGE_SLIP)
+
+
+@kernel
+def wheels_agree(params: Record, state: Record, speed: float) -> bool:
+    """Return whether three wheels at least roll at a speed [m/s]."""
+    count = 0
+    for i in range(4):
+        rolled = state.window.omega[i] * params.wheel_radius[i]
+        if state.window.omega_samples[i] > 0 and not _beyond(rolled, speed, AGREEING):
+            count += 1
+    return count > 2
+
+
+@kernel
+def watch_tyres(state: Record, observing: bool) -> None:
+    """Let friction go back and stiffness be unknown where most wheels contradict the known tyres alike."""
+    against = 0.0
+    for i in range(4):
+        against += state.pull[i]
+    known = state.p[STIFFNESS, STIFFNESS] < (0.5 * PRIOR[STIFFNESS]) ** 2
+    if observing and known and abs(against) > OTHER_TYRES * GATE * GATE:
+        go_back(state)
+        forget(state, STIFFNESS, PRIOR[STIFFNESS] ** 2)
+
+
+@kernel
+def mistrust_wheels(state: Record) -> None:
+    """Learn nothing for a while: a wheel slips beyond its tyre's range, whatever this filter sees of it."""
+    if state.hold_s <= 0.0:
+        go_back(state)
+    state.hold_s = HOLD_S

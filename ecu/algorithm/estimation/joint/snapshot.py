@@ -1,0 +1,43 @@
+"""Snapshots of what was known a moment ago, to go back to when it was learned from a wheel about to slide."""
+
+from ecu.algorithm.estimation.joint.kalman import forget
+from ecu.algorithm.estimation.joint.layout import N, V
+from ecu.jit import Record, kernel
+
+
+@kernel
+def keep(state: Record, row: int) -> None:
+    """Write what is known now over snapshot `row`."""
+    for i in range(N):
+        state.kept_x[row, i] = state.x[i]
+        for j in range(N):
+            state.kept_p[row, i, j] = state.p[i, j]
+
+
+@kernel
+def _copy(state: Record, row: int, to: int) -> None:
+    for i in range(N):
+        state.kept_x[to, i] = state.kept_x[row, i]
+        for j in range(N):
+            state.kept_p[to, i, j] = state.kept_p[row, i, j]
+
+
+@kernel
+def go_back(state: Record) -> None:
+    """Return to the older snapshot in all but the speed, of which little is sure now."""
+    for i in range(N):
+        if i != V:
+            state.x[i] = state.kept_x[1, i]
+        for j in range(N):
+            state.p[i, j] = state.kept_p[1, i, j]
+    forget(state, V, 0.25)
+    _copy(state, 1, 0)
+    state.kept_s = 0.0
+
+
+@kernel
+def keep_newer(state: Record) -> None:
+    """Make the newer snapshot the older one and take a new one."""
+    _copy(state, 0, 1)
+    keep(state, 0)
+    state.kept_s = 0.0

@@ -1,0 +1,178 @@
+"""Samples of a few cycles gathered to means, each sample against the prediction at its own time.
+
+Pressure noise as a factor of the unknown friction would ruin the filter, and filtering the pressure alone
+would set it against faster signals. Means of all signals over the same cycles keep them in step, their noise
+is white from window to window, and what did not arrive is simply not in the mean."""
+
+import math
+
+from ecu.algorithm.estimation.joint.layout import BIAS, DELAY, SLOPE, V
+from ecu.algorithm.estimation.joint.motors import follow_motors
+from ecu.algorithm.estimation.joint.pressure import correct_pressure, follow_demand, follows
+from ecu.algorithm.estimation.joint.sampling import (
+    ACCEL,
+    add_sample,
+    advance_common_time,
+    at_common_time,
+    close_sampling,
+    open_sampling,
+)
+from ecu.algorithm.estimation.joint.zero import note_rest
+from ecu.algorithm.estimation.motion import corner_speed, fresh, motor_torque, motor_torque_known, usable
+from ecu.contract.params import BAR, GRAVITY
+from ecu.contract.signals import (
+    ACCEL_X,
+    CALLIPER_PRESSURE,
+    MOTOR_TORQUE,
+    VEHICLE_SPEED,
+    VEHICLE_SPEED_VALID,
+    WHEEL_SPEED,
+)
+from ecu.jit import Record, kernel
+
+OLDEST_S = 0.06  # of an acceleration or torque that is set against others
+COPIES, LEAST_COMPARED = 20, 2.0  # samples in a row, bar: that a reading is a copy
+NEW_SHARE = 0.2  # of the model's variance that is another one in the next window
+SMOOTHING = 0.2  # s, of pressure and acceleration that derivatives use
+STEADY = 5.0  # s, over which an acceleration that varies is told from one that lasts
+
+
+@kernel
+def open_window(state: Record) -> None:
+    """Begin a window."""
+    w = state.window
+    w.time, w.cycles, w.accel, w.lateral, w.across, w.change = 0.0, 0, 0.0, 0.0, 0.0, 0.0
+    w.reference, w.reference_change, w.reference_samples, w.balanced = 0.0, 0.0, 0, 0
+    open_sampling(state.sampling)
+    w.motor_known, w.motor_reported = 1, 0
+    for i in range(4):
+        w.load[i] = w.motor[i] = w.omega[i] = w.ground[i] = w.pressure[i] = 0.0
+        w.tracked[i] = 0.0
+        w.omega_samples[i] = w.pressure_samples[i] = w.tracked_cycles[i] = 0
+
+
+@kernel
+def speed_change(state: Record, motion: Record) -> float:
+    """Return dv/dt [m/s^2] by the accelerometer and what is known of its bias and the slope."""
+    change: float = motion.accel_x - state.x[BIAS] - state.x[SLOPE] + motion.yaw_rate * motion.lateral_speed
+    return change
+
+
+@kernel
+def _current(inputs: Record, place: int) -> bool:
+    """Return whether a value is of now: alive, but not kept over a gap."""
+    current: bool = usable(inputs, place) and inputs.age_ns[place] < 1e9 * OLDEST_S
+    return current
+
+
+@kernel
+def _compare_pressures(state: Record, inputs: Record) -> None:
+    """Count the samples in which an axle's pressures are one reading, copied: no noise makes them equal."""
+    for axle in range(2):
+        left = CALLIPER_PRESSURE + 2 * axle
+        pressure = inputs.value[left]
+        if fresh(inputs, left) and fresh(inputs, left + 1) and pressure > LEAST_COMPARED:
+            state.copies[axle] = state.copies[axle] + 1 if pressure == inputs.value[left + 1] else 0
+
+
+@kernel
+def gather(
+    params: Record,
+    state: Record,
+    inputs: Record,
+    motion: Record,
+    load: Record,
+    demand: Record,
+    released: bool,
+    dt: float,
+) -> None:
+    """Move the speed on by `dt` [s] and add this cycle's samples to the window."""
+    w, x, value = state.window, state.x, inputs.value
+    _compare_pressures(state, inputs)
+    change = speed_change(state, motion)
+    x[V] = max(x[V] + dt * change, 0.0)
+    w.time += dt
+    w.cycles += 1
+    w.accel += motion.accel_x
+    state.sampling.now += dt
+    if fresh(inputs, ACCEL_X):
+        add_sample(state.sampling, ACCEL, motion.accel_x, 1e-9 * inputs.age_ns[ACCEL_X])
+    w.change += change
+    gain = 1.0 - math.exp(-dt / SMOOTHING)
+    state.smooth_accel += gain * (motion.accel_x - state.smooth_accel)
+    state.mean_accel += (1.0 - math.exp(-dt / STEADY)) * (motion.accel_x - state.mean_accel)
+    follow_motors(state.motors, inputs, dt)
+    front_lateral = params.mass * motion.accel_y * params.rear_axle / params.wheelbase
+    w.across += motion.accel_y / GRAVITY
+    w.lateral += front_lateral * math.sin(motion.steering)
+    for i in range(4):
+        w.load[i] += load[i]
+        w.motor[i] += motor_torque(inputs, i)
+        stale = usable(inputs, MOTOR_TORQUE + i) and not _current(inputs, MOTOR_TORQUE + i)
+        if stale or not motor_torque_known(inputs, i):
+            w.motor_known = 0
+        if usable(inputs, MOTOR_TORQUE + i):
+            w.motor_reported = 1
+        place = WHEEL_SPEED + i
+        if fresh(inputs, place):
+            w.omega[i] += value[place]
+            w.ground[i] += corner_speed(params, motion, x[V] - 1e-9 * inputs.age_ns[place] * change, i)
+            w.omega_samples[i] += 1
+        place = CALLIPER_PRESSURE + i
+        push_out = params.push_out_pressure[i] / BAR
+        if params.transmit:
+            follow_demand(state.pressures, i, demand[i] / BAR, dt)
+        if fresh(inputs, place):
+            if released:
+                note_rest(state.zero, i, value[place])
+            reading = value[place] - state.zero.value[i]
+            above = reading - push_out
+            add_sample(state.sampling, i, above, 1e-9 * inputs.age_ns[place])
+            w.pressure_samples[i] += 1
+            if params.transmit:
+                correct_pressure(state.pressures, i, reading, params.sigma_pressure / BAR, dt)
+        if follows(state.pressures, i):
+            w.tracked[i] += state.pressures.value[i] - push_out
+            w.tracked_cycles[i] += 1
+    place = VEHICLE_SPEED
+    if fresh(inputs, place) and (value[VEHICLE_SPEED_VALID] > 0.5 or not params.mapped[VEHICLE_SPEED_VALID]):
+        delay = params.vehicle_speed_delay + x[DELAY] + 1e-9 * inputs.age_ns[place]
+        w.reference += value[place] - (x[V] - delay * change)
+        w.reference_change += change
+        w.reference_samples += 1
+
+
+@kernel
+def close_window(params: Record, state: Record) -> None:
+    """Turn the sums into means."""
+    w = state.window
+    n = w.cycles
+    close_sampling(state.sampling)
+    w.balanced = 1 if advance_common_time(state.sampling) else 0
+    w.common_accel = at_common_time(state.sampling, ACCEL)
+    gain = 1.0 - math.exp(-w.time / SMOOTHING)
+    w.accel /= n
+    w.change /= n
+    w.lateral /= n
+    w.across /= n
+    for i in range(4):
+        w.load[i] /= n
+        w.motor[i] /= n
+        if w.omega_samples[i] > 0:
+            w.omega[i] /= w.omega_samples[i]
+            w.ground[i] /= w.omega_samples[i]
+        sampled = state.sampling.samples[i]
+        w.pressure[i] = state.sampling.value[i]
+        w.common_pressure[i] = at_common_time(state.sampling, i)
+        w.pressure_variance[i] = (params.sigma_pressure / BAR) ** 2 / max(sampled, 1)
+        if state.copies[i // 2] > COPIES:
+            w.pressure_variance[i] *= 2.0  # one noise in both wheels of an axle
+        if w.tracked_cycles[i] == n and w.pressure_samples[i] > 0:
+            w.pressure[i] = w.common_pressure[i] = w.tracked[i] / n
+            w.pressure_variance[i] = NEW_SHARE * state.pressures.variance[i]
+            state.smooth_pressure[i] = w.pressure[i]
+        else:
+            state.smooth_pressure[i] += gain * (w.pressure[i] - state.smooth_pressure[i])
+    if w.reference_samples > 0:
+        w.reference /= w.reference_samples
+        w.reference_change /= w.reference_samples

@@ -1,0 +1,150 @@
+"""What the inertial and steering signals say in road axes, before any filter.
+
+The accelerometer is fixed to the body and off the centre of gravity (ISO 8855: pitch theta positive nose
+down), so it reads
+
+    a_s = a_x cos(theta) - g sin(theta) - psi_dot^2 x_s
+
+With the quasi-static pitch theta = -k a_x (k: `pitch_gradient`) this is a_s = a_x (1 + g k) to first order.
+At 8 m/s^2 and 2 deg/g that is 0.28 m/s^2. On a slope the reading contains gravity, which is why m a_x is
+the sum of tyre forces and drag on any slope (corrected 4.16); speed needs the slope removed (`speed.py`).
+
+The lateral speed at the centre of gravity is that of a rear axle with a small slip angle:
+v_y = l_r psi_dot - v_x a_y / (c_alpha g). Of yaw rate and lateral acceleration one tells the other in steady
+cornering, a_y = v_x psi_dot.
+"""
+
+import math
+
+import numpy as np
+
+from ecu.contract.params import GRAVITY
+from ecu.contract.signals import (
+    ACCEL_X,
+    ACCEL_Y,
+    MOTOR_TORQUE,
+    REVERSE,
+    STEERING_ANGLE,
+    USABLE,
+    WHEEL_SPEED,
+    YAW_RATE,
+)
+from ecu.jit import Record, kernel
+
+STANDING = 0.3  # m/s, below: the brakes hold rather than brake
+SLOPE = 2.0  # m/s^2, of a slope of 20 %
+LEAST_CORNERING_SPEED = 5.0  # m/s, from which lateral acceleration tells the yaw rate
+
+MOTION_STATE = np.dtype(
+    [
+        ("accel_x", "f8"),  # specific force in road axes at the centre of gravity [m/s^2]
+        ("accel_x_model", "f8"),  # the same by the torques of brakes and motors and by drag
+        ("measured", "u1"),  # `accel_x` is, else it is the model's
+        ("backwards", "u1"),  # the car drives so
+        ("accel_y", "f8"),
+        ("yaw_rate", "f8"),  # rad/s
+        ("steering", "f8"),  # rad at the road wheel
+        ("lateral_speed", "f8"),  # m/s
+        ("ground_speed", "f8", (4,)),  # of each wheel in its rolling direction per (A.5) [m/s]
+    ],
+    align=True,
+)
+
+
+@kernel
+def usable(inputs: Record, place: int) -> bool:
+    """Return whether an input is alive, valid and finite."""
+    return (inputs.verdict[place] & USABLE) == USABLE and math.isfinite(inputs.value[place])
+
+
+@kernel
+def fresh(inputs: Record, place: int) -> bool:
+    """Return whether a valid sample of an input came in this cycle."""
+    return inputs.new[place] != 0 and math.isfinite(inputs.value[place])
+
+
+@kernel
+def motor_torque(inputs: Record, corner: int) -> float:
+    """Return the motor torque [N m] of a wheel, positive regenerates; 0 where none is reported."""
+    place = MOTOR_TORQUE + corner
+    return inputs.value[place] if usable(inputs, place) else 0.0
+
+
+@kernel
+def motor_torque_known(inputs: Record, corner: int) -> bool:
+    """Return whether the motor torque is reported, or was never more than zero: a car without such motors."""
+    place = MOTOR_TORQUE + corner
+    return usable(inputs, place) or inputs.value[place] == 0.0
+
+
+@kernel
+def mean_wheel_speed(params: Record, inputs: Record) -> float:
+    """Return the mean speed of the wheels [m/s] by their last samples, without a sign."""
+    total = 0.0
+    for i in range(4):
+        total += abs(inputs.value[WHEEL_SPEED + i]) * params.wheel_radius[i]
+    return 0.25 * total
+
+
+@kernel
+def _drives_backwards(params: Record, inputs: Record) -> bool:
+    """Return whether the car is in reverse, or rolls back by wheel speed sensors that know a sign."""
+    back = 0
+    for i in range(4):
+        place = WHEEL_SPEED + i
+        if usable(inputs, place) and inputs.value[place] * params.wheel_radius[i] < -STANDING:
+            back += 1
+    told: bool = usable(inputs, REVERSE) and inputs.value[REVERSE] > 0.5
+    return told or back > 2
+
+
+@kernel
+def speed_backwards(params: Record, inputs: Record, motion: Record, speed: float, dt: float) -> float:
+    """Return the speed [m/s], negative, of a car that drives backwards, from the last one.
+
+    It is that of the fastest wheel, of sensors that know a sign or do not. Wheels that fall faster than the
+    accelerometer allows on a slope have begun to lock.
+    """
+    slower: float = abs(speed) - (abs(motion.accel_x) + SLOPE) * dt
+    for i in range(4):
+        if usable(inputs, WHEEL_SPEED + i):
+            slower = max(slower, abs(inputs.value[WHEEL_SPEED + i]) * params.wheel_radius[i])
+    return -slower
+
+
+@kernel
+def update_motion(params: Record, state: Record, inputs: Record, speed: float, brake_torque: Record) -> None:
+    """Overwrite accelerations, yaw rate, steering and lateral speed; what nothing tells counts as zero.
+
+    Longitudinal acceleration is the model's while its sensor is lost; brake torques [N m] act against travel.
+    """
+    value = inputs.value
+    state.steering = value[STEERING_ANGLE] if usable(inputs, STEERING_ANGLE) else 0.0
+    yaw, across = usable(inputs, YAW_RATE), usable(inputs, ACCEL_Y)
+    state.yaw_rate = value[YAW_RATE] if yaw else 0.0
+    state.accel_y = value[ACCEL_Y] if across else state.yaw_rate * speed
+    if across and not yaw and speed > LEAST_CORNERING_SPEED:
+        state.yaw_rate = state.accel_y / speed
+    state.backwards = 1 if _drives_backwards(params, inputs) else 0
+    against = -1.0 if state.backwards else 1.0 if speed > STANDING else 0.0
+    force = -params.drag_area * speed * abs(speed)
+    for i in range(4):
+        force -= (against * brake_torque[i] + motor_torque(inputs, i)) / params.wheel_radius[i]
+    state.accel_x_model = force / params.mass
+    state.accel_x, state.measured = state.accel_x_model, 0
+    if usable(inputs, ACCEL_X):
+        reading = value[ACCEL_X] + state.yaw_rate**2 * params.imu_x
+        state.accel_x, state.measured = reading / (1.0 + GRAVITY * params.pitch_gradient), 1
+    slip_angle = state.accel_y / (params.cornering_stiffness * GRAVITY)
+    state.lateral_speed = params.rear_axle * state.yaw_rate - speed * slip_angle
+
+
+@kernel
+def corner_speed(params: Record, state: Record, speed: float, corner: int) -> float:
+    """Return the ground speed [m/s] of a wheel in its rolling direction (A.5) at vehicle speed `speed`."""
+    half_track = 0.5 * params.track * (1.0 if corner % 2 == 1 else -1.0)
+    along: float = speed + state.yaw_rate * half_track
+    if corner >= 2:
+        return along
+    across: float = state.lateral_speed + state.yaw_rate * params.front_axle
+    return along * math.cos(state.steering) + across * math.sin(state.steering)

@@ -1,0 +1,292 @@
+"""An accelerometer that jumps or sticks: what neither the wheels nor the torques confirm.
+
+Three say how hard the car brakes, each as a mean over a block of 0.1 s:
+
+    a   the accelerometer, in road axes, cornering removed
+    w   the wheels: dv/dt of v = mean(omega r) (1 - a / (g C)), the slip that the force needs taken off, and
+        of mean(omega r) itself: tyres may be stiffer than C; what is less counts
+    f   the torques: -(sum of linings and motors) / (r m), with the friction that the braking began with
+
+A slope is in w and not in a or f; a lining that changes is in a and w alike, and not in f. So where a has
+moved against both, to the same side, the sensor is wrong. The last three blocks are set against four that end
+0.1 s before them; what w and f may err by grows with the noise of the sensors and with the range that f ran
+through in 1.2 s:
+
+    |a - w| > least + (SLIP + SLIP_BY_SPEED v) range(f)        |a - f| > least + FORCE range(f)
+
+with least = max(LEAST, NOISE sigma), sigma of a - w by the noise that the sensors are configured with.
+
+A reading beyond any road (`SLOPE`) that the torques deny for a second is wrong as well, whatever it was
+before. From then on it is not used until it agrees with the wheels or with the torques as it did before, or
+the car stands: on what slope, nobody knows. Where the drive's torque is not reported, or known badly, the
+torques neither accuse nor confirm: what is beyond any road by the wheels alone is doubted, and believed again
+when it no longer is. Nothing is said of wheels that slide, under ABS or ESP. A bias that was always there, or
+comes slowly, is not seen.
+
+Assumption: all constants; found with the simulated vehicle, whose sound sensor stays below a third of `LEAST`
+in all shipped scenarios.
+"""
+
+import math
+
+import numpy as np
+
+from ecu.algorithm.estimation.motion import fresh, motor_torque, usable
+from ecu.contract.params import GRAVITY
+from ecu.contract.signals import (
+    ABS_ACTIVE,
+    ACCEL_X,
+    CALLIPER_PRESSURE,
+    ESP_ACTIVE,
+    MOTOR_TORQUE,
+    REVERSE,
+    WHEEL_SPEED,
+)
+from ecu.jit import Record, kernel
+
+A, W, F, ROLLED = range(4)
+KINDS = 4
+BLOCKS = 12
+ACCELERATION_STATE = np.dtype(
+    [
+        ("time", "f8"),  # of the block that is gathered [s]
+        ("cycles", "i8"),
+        ("good", "u1"),  # every cycle of it tells something
+        ("known", "u1"),  # the drive's torque is reported, and well known, in every cycle of it
+        ("readings", "i8"),  # new ones in it
+        ("sum", "f8", (KINDS,)),
+        # Of the last blocks, the newest in row 0: a [m/s^2], v [m/s], f [m/s^2], mean of omega r [m/s].
+        ("mean", "f8", (BLOCKS, KINDS)),
+        ("good_blocks", "i8"),  # in a row
+        ("known_blocks", "i8"),  # in a row
+        ("sigma", "f8"),  # of a - w by the sensors' noise [m/s^2]
+        ("beyond", "i8"),  # blocks in a row that are beyond any road
+        ("agreed", "i8"),  # blocks in a row that agree again
+        ("usual", "f8"),  # a - w before the jump [m/s^2]
+        ("usual_force", "f8"),  # a - f before the jump [m/s^2]
+        ("implausible", "u1"),
+    ],
+    align=True,
+)
+
+BLOCK_S = 0.1
+LONGEST_BLOCK_S = 0.125  # cycles were missed
+OLDEST_S = 0.06  # of a reading
+LEAST_SPEED = 3.0  # m/s
+ROLLING = 0.06  # of the speed, that a rolling wheel differs by at most
+LEAST, NOISE = 0.25, 6.0  # m/s^2, times sigma
+SLIP, SLIP_BY_SPEED = 0.1, 0.01  # -, s/m
+FORCE = 0.3  # friction may be wrong by so much
+KNOWN_MOTORS = 0.1  # relative error of a motor torque that still tells a force
+SLOPE = 2.0  # m/s^2, of a slope of 20 %
+DENIED = 1.0  # m/s^2
+SECOND = 10  # blocks
+AGAIN, AGREED = 0.5, 2  # of LEAST, blocks
+STANDSTILL = 0.1  # m/s
+
+
+@kernel
+def _tells(params: Record, inputs: Record, speed: float) -> bool:
+    """Return whether this cycle's readings are of now and the linings' pressures known."""
+    value = inputs.value
+    oldest = 1e9 * OLDEST_S
+    told = speed > LEAST_SPEED and usable(inputs, ACCEL_X) and inputs.age_ns[ACCEL_X] < oldest
+    for i in range(4):
+        wheel = WHEEL_SPEED + i
+        rolls = abs(value[wheel] * params.wheel_radius[i] - speed) < ROLLING * speed
+        told = told and rolls and usable(inputs, wheel) and inputs.age_ns[wheel] < oldest
+        told = told and usable(inputs, CALLIPER_PRESSURE + i)
+    works = value[ABS_ACTIVE] > 0.5 or value[ESP_ACTIVE] > 0.5 or value[REVERSE] > 0.5
+    return told and not works
+
+
+@kernel
+def _drive_known(params: Record, inputs: Record) -> bool:
+    reported = False
+    for i in range(4):
+        reported = reported or usable(inputs, MOTOR_TORQUE + i)
+    return reported and params.sigma_motor_torque <= KNOWN_MOTORS
+
+
+@kernel
+def _gather(
+    params: Record,
+    state: Record,
+    inputs: Record,
+    motion: Record,
+    friction: Record,
+    base: Record,
+    braking: bool,
+) -> None:
+    value = inputs.value
+    force, wheels = 0.0, 0.0
+    for i in range(4):
+        radius = params.wheel_radius[i]
+        lining = friction.torque[i] * base[i] / friction.mu[i] if braking else 0.0
+        force -= (lining + motor_torque(inputs, i)) / (radius * params.mass)
+        wheels += 0.25 * value[WHEEL_SPEED + i] * radius
+    reading = value[ACCEL_X] / (1.0 + GRAVITY * params.pitch_gradient)
+    state.sum[A] += reading + motion.yaw_rate * motion.lateral_speed
+    state.sum[W] += wheels * (1.0 - reading / (GRAVITY * params.slip_stiffness[0]))
+    state.sum[F] += force
+    state.sum[ROLLED] += wheels
+    state.readings += 1 if fresh(inputs, ACCEL_X) else 0
+    state.cycles += 1
+
+
+@kernel
+def _close_block(params: Record, state: Record) -> None:
+    turns = 0.5 * params.wheel_radius[0] * params.sigma_wheel_speed
+    variance = 0.6 * params.sigma_accel**2 + 2.0 * (turns / (2.0 * BLOCK_S)) ** 2
+    state.sigma = math.sqrt(variance / max(state.readings, 1))
+    for k in range(BLOCKS - 1, 0, -1):
+        for j in range(KINDS):
+            state.mean[k, j] = state.mean[k - 1, j]
+    for j in range(KINDS):
+        state.mean[0, j] = state.sum[j] / state.cycles
+        state.sum[j] = 0.0
+    sound = state.good != 0 and state.time < LONGEST_BLOCK_S
+    state.good_blocks = state.good_blocks + 1 if sound else 0
+    state.known_blocks = state.known_blocks + 1 if sound and state.known else 0
+    state.time, state.cycles, state.readings, state.good, state.known = 0.0, 0, 0, 1, 1
+
+
+@kernel
+def _now(mean: Record, j: int) -> float:
+    now: float = (mean[0, j] + mean[1, j] + mean[2, j]) / 3.0
+    return now
+
+
+@kernel
+def _before(mean: Record, j: int) -> float:
+    before: float = 0.25 * (mean[4, j] + mean[5, j] + mean[6, j] + mean[7, j])
+    return before
+
+
+@kernel
+def _beside_wheels(mean: Record, j: int) -> float:
+    """Return a - dv/dt now, v in column `j` [m/s^2]."""
+    beside: float = _now(mean, A) - (mean[0, j] - mean[2, j]) / (2.0 * BLOCK_S)
+    return beside
+
+
+@kernel
+def _usually_beside_wheels(mean: Record, j: int) -> float:
+    """Return a - dv/dt before, of a straight line through four blocks [m/s^2]."""
+    change = (3.0 * (mean[4, j] - mean[7, j]) + mean[5, j] - mean[6, j]) / (10.0 * BLOCK_S)
+    beside: float = _before(mean, A) - change
+    return beside
+
+
+@kernel
+def _moved_against_wheels(mean: Record) -> float:
+    """Return by how much a has moved against the wheels, of whatever stiffness [m/s^2]."""
+    slipping = _beside_wheels(mean, W) - _usually_beside_wheels(mean, W)
+    rolling = _beside_wheels(mean, ROLLED) - _usually_beside_wheels(mean, ROLLED)
+    if slipping * rolling <= 0.0:
+        return 0.0
+    return slipping if abs(slipping) < abs(rolling) else rolling
+
+
+@kernel
+def _agrees(state: Record) -> bool:
+    """Return whether a doubted reading is again what it was before."""
+    mean = state.mean
+    least = AGAIN * max(LEAST, NOISE * state.sigma)
+    against_wheels = _beside_wheels(mean, W)
+    if state.known_blocks < 3:
+        on_a_road: bool = abs(against_wheels) < SLOPE
+        return on_a_road and state.good_blocks >= SECOND
+    against_force = _now(mean, A) - _now(mean, F)
+    by_force = state.known_blocks >= SECOND and abs(against_force - state.usual_force) < least
+    by_wheels: bool = abs(against_wheels - state.usual) < least
+    return by_force or by_wheels
+
+
+@kernel
+def _jumped(state: Record) -> bool:
+    """Return whether the reading has moved against wheels and torques."""
+    mean = state.mean
+    least, greatest = mean[0, F], mean[0, F]
+    for k in range(1, BLOCKS):
+        least, greatest = min(least, mean[k, F]), max(greatest, mean[k, F])
+    moved = greatest - least
+    wheels = _moved_against_wheels(mean)
+    force = _now(mean, A) - _now(mean, F) - (_before(mean, A) - _before(mean, F))
+    noise = max(LEAST, NOISE * state.sigma)
+    wheels_err = noise + (SLIP + SLIP_BY_SPEED * _now(mean, W)) * moved
+    force_err = noise + FORCE * moved
+    up: bool = wheels > wheels_err and force > force_err
+    return up or (wheels < -wheels_err and force < -force_err)
+
+
+@kernel
+def _beyond_any_road(state: Record) -> bool:
+    mean = state.mean
+    against_wheels = _beside_wheels(mean, W)
+    if state.known_blocks < 8:
+        far: bool = abs(against_wheels) > SLOPE + NOISE * state.sigma
+        return far
+    against_force = _now(mean, A) - _now(mean, F)
+    denied = DENIED + FORCE * abs(_now(mean, F))
+    up: bool = against_wheels > SLOPE and against_force > denied
+    return up or (against_wheels < -SLOPE and against_force < -denied)
+
+
+@kernel
+def _judge(state: Record) -> None:
+    """Compare the last blocks with those before, or with what was usual before the sensor jumped."""
+    mean = state.mean
+    if state.implausible:
+        agrees = state.good_blocks >= 3 and _agrees(state)
+        state.agreed = state.agreed + 1 if agrees else 0
+        if state.agreed >= AGREED:
+            state.implausible, state.good_blocks, state.known_blocks = 0, 0, 0
+        return
+    if state.good_blocks < 8:
+        state.beyond = 0
+        return
+    state.beyond = state.beyond + 1 if _beyond_any_road(state) else 0
+    jumped = state.known_blocks >= 8 and _jumped(state)
+    if jumped or state.beyond >= SECOND:
+        state.implausible, state.agreed = 1, 0
+        state.usual = _usually_beside_wheels(mean, W) if jumped else 0.0
+        state.usual_force = _before(mean, A) - _before(mean, F) if jumped else 0.0
+
+
+@kernel
+def watch_acceleration(
+    params: Record,
+    state: Record,
+    inputs: Record,
+    motion: Record,
+    friction: Record,
+    base: Record,
+    speed: float,
+    braking: bool,
+    dt: float,
+) -> None:
+    """Overwrite `state.implausible` from this cycle's readings.
+
+    Args:
+        params: `PARAMS`.
+        state: `ACCELERATION_STATE`, overwritten.
+        inputs: `INPUTS`.
+        motion: `MOTION_STATE` of the last cycle.
+        friction: `FRICTION_STATE` of the last cycle.
+        base: friction that this braking began with, shape (4,).
+        speed: of the car [m/s].
+        braking: a brake application lasts.
+        dt: time since the last cycle [s].
+    """
+    if speed < STANDSTILL:
+        state.implausible = 0
+    if not _tells(params, inputs, speed):
+        state.good = 0
+    if not _drive_known(params, inputs):
+        state.known = 0
+    _gather(params, state, inputs, motion, friction, base, braking)
+    state.time += dt
+    if state.time > BLOCK_S - 0.001:
+        _close_block(params, state)
+        _judge(state)

@@ -1,0 +1,53 @@
+"""Brake applications: when one starts and when it ends.
+
+An application starts when a calliper pressure has been 1 bar above the push-out pressure for 0.1 s and ends
+when all have been below for 0.1 s. With 1.8 bar of sensor noise single samples of a released brake cross the
+threshold all the time, so "below for 0.1 s" is judged by the mean of those 0.1 s. A pressure that is not
+usable neither starts nor prolongs an application.
+"""
+
+import numpy as np
+
+from ecu.algorithm.estimation.motion import usable
+from ecu.contract.signals import CALLIPER_PRESSURE
+from ecu.jit import Record, kernel
+
+WINDOW = 10  # cycles of 10 ms
+MARGIN = 1e5  # Pa
+
+APPLICATION_STATE = np.dtype(
+    [
+        ("braking", "u1"),
+        ("started", "u1"),  # in this cycle
+        ("ended", "u1"),  # in this cycle
+        ("above", "i8", (4,)),  # cycles in a row above the threshold
+        ("recent", "f8", (4, WINDOW)),  # pressure above push-out [Pa]
+        ("place", "i8"),
+        ("duration_s", "f8"),
+    ],
+    align=True,
+)
+
+
+@kernel
+def update_application(params: Record, state: Record, inputs: Record, dt: float) -> None:
+    """Overwrite whether the brakes are applied, from the measured pressures."""
+    long_enough, applied = False, False
+    state.place = (state.place + 1) % WINDOW
+    for i in range(4):
+        place = CALLIPER_PRESSURE + i
+        above = 1e5 * inputs.value[place] - params.push_out_pressure[i] if usable(inputs, place) else 0.0
+        state.above[i] = state.above[i] + 1 if above > MARGIN else 0
+        state.recent[i, state.place] = above
+        mean = 0.0
+        for j in range(WINDOW):
+            mean += state.recent[i, j] / WINDOW
+        long_enough = long_enough or state.above[i] >= WINDOW
+        applied = applied or mean > MARGIN
+    state.started, state.ended = 0, 0
+    if state.braking:
+        state.duration_s += dt
+        if not applied:
+            state.braking, state.ended = 0, 1
+    elif long_enough:
+        state.braking, state.started, state.duration_s = 1, 1, 0.0

@@ -1,0 +1,151 @@
+"""The temperature of the four discs from what the ECU knows anyway, with its standard deviation.
+
+Model. Each disc is one lump of heat, theta [K] above the air (3.7):
+
+    theta' = xi T_b |omega| - (delta_0 + delta_1 v) theta
+
+T_b is the ECU's own brake torque, v its vehicle speed, xi constant as in Table C.1. The disc is taken to
+follow the air's temperature at once and so is never colder. Solved exactly over a cycle of constant power and
+speed.
+
+Error. Each cause is one unknown that stays the same, so that its effect adds up linearly along the model;
+different causes add as squares:
+
+    heating     s_h' = e_h xi T_b |omega| - delta s_h    e_h: heat capacity, heat split, friction
+    cooling     s_c' = e_c delta theta - delta s_c       e_c: relative error of delta
+    start       s_0' = -delta s_0                        the unknown rest before the first cycle
+    air         constant
+
+So the standard deviation grows with the heat put in and falls towards that of the air at rest.
+
+Start. Nobody knows how long the car stood. The disc is somewhere between the air and the hottest that the
+last braking left it (`learned.disc_excess`), each value as likely as the other.
+Where a pressure is lost, its share by load of all that slows the car counts as heat, and as its error too.
+
+Source. Sections 3.4 and 7.6.1 (rain), Table C.1. Assumptions: all constants below without a source.
+"""
+
+import math
+
+import numpy as np
+
+from ecu.algorithm.estimation.motion import usable
+from ecu.contract.signals import AMBIENT_TEMPERATURE, CALLIPER_PRESSURE, OBSERVING, RAIN, WHEEL_SPEED
+from ecu.jit import Record, kernel
+
+DISC_STATE = np.dtype(
+    [
+        ("excess", "f8", (4,)),  # theta, above the air [K]
+        ("sigma_heating", "f8", (4,)),  # K
+        ("sigma_cooling", "f8", (4,)),
+        ("sigma_start", "f8", (4,)),
+        ("sigma", "f8", (4,)),  # of the temperature, all causes [K]
+        ("temperature", "f8", (4,)),  # degC
+        ("observed_at", "f8", (4,)),  # temperature when friction was last observed [degC]
+        ("ambient", "f8"),  # degC
+        ("power", "f8", (4,)),  # of friction, W
+        ("omega", "f8", (4,)),  # of the wheel, rad/s
+    ],
+    align=True,
+)
+
+UNKNOWN_EXCESS = 200.0  # K above the air at most, where nothing was ever saved
+HEATING_ERROR = 0.10  # section 3.4: c_p is 450 to 550 J/(kg K); mass of the disc and heat split beside it
+COOLING_ERROR = 0.20
+WET = 1.5  # rain on delta_1; Figure 7.15 shows more cooling at speed, but has no numbers in print
+WET_ERROR = 0.40  # of delta in rain, or where nobody says whether it rains
+AMBIENT_ERROR = 3.0  # K: the air at the wheel is not that at the sensor
+AMBIENT_UNKNOWN = 15.0  # K: no sensor, or a silent one
+FRICTION_PER_KELVIN = 0.04 / 100.0  # relative change of friction, its sign unknown
+UNIFORM = math.sqrt(3.0)  # half the width of a uniform distribution per standard deviation
+
+
+@kernel
+def start_discs(params: Record, state: Record, learned: Record) -> None:
+    """Begin after a rest of unknown length: between the air and `learned.disc_excess` [K] above it."""
+    state.ambient = params.ambient_temperature
+    for i in range(4):
+        half = 0.5 * learned.disc_excess[i]
+        state.excess[i], state.sigma_start[i] = half, half / UNIFORM
+        state.observed_at[i] = state.ambient + half
+
+
+@kernel
+def update_discs(
+    params: Record,
+    state: Record,
+    learned: Record,
+    inputs: Record,
+    friction: Record,
+    application: Record,
+    load: Record,
+    total_force: float,
+    speed: float,
+    dt: float,
+) -> None:
+    """Overwrite temperature and standard deviation of every disc after `dt` [s].
+
+    `total_force` [N] of the tyres, negative when braking, and the wheel loads [N] serve where a pressure is
+    lost. At the end of a braking `learned.disc_excess` becomes the most the disc can have above the air.
+    """
+    sigma_ambient = AMBIENT_UNKNOWN
+    if usable(inputs, AMBIENT_TEMPERATURE):
+        state.ambient, sigma_ambient = inputs.value[AMBIENT_TEMPERATURE], AMBIENT_ERROR
+    by_speed, cooling_error = abs(speed), WET_ERROR
+    if usable(inputs, RAIN):
+        if inputs.value[RAIN] > 0.5:
+            by_speed *= WET
+        else:
+            cooling_error = COOLING_ERROR
+    load_sum = load[0] + load[1] + load[2] + load[3]
+    for i in range(4):
+        seen = usable(inputs, WHEEL_SPEED + i)
+        omega = abs(inputs.value[WHEEL_SPEED + i]) if seen else abs(speed) / params.wheel_radius[i]
+        if usable(inputs, CALLIPER_PRESSURE + i):
+            # The noise of a released brake has no mean of zero once negative torque is cut off.
+            power = friction.torque[i] * omega if application.braking else 0.0
+            heating_error = math.hypot(HEATING_ERROR, friction.sigma[i] / friction.mu[i])
+        else:
+            power = max(-total_force, 0.0) * load[i] / load_sum * abs(speed)
+            heating_error = 1.0
+        state.power[i], state.omega[i] = power, omega
+        _advance(params, state, i, power, heating_error, by_speed, cooling_error, dt)
+        parts = state.sigma_heating[i] ** 2 + state.sigma_cooling[i] ** 2 + state.sigma_start[i] ** 2
+        state.sigma[i] = math.sqrt(parts + sigma_ambient**2)
+        state.temperature[i] = state.ambient + state.excess[i]
+        if friction.mode[i] == OBSERVING:
+            state.observed_at[i] = state.temperature[i]
+        if application.ended:
+            learned.disc_excess[i] = state.excess[i] + UNIFORM * state.sigma[i]
+
+
+@kernel
+def _advance(
+    params: Record,
+    state: Record,
+    i: int,
+    power: float,
+    heating_error: float,
+    by_speed: float,
+    cooling_error: float,
+    dt: float,
+) -> None:
+    """Advance the excess and its errors of one disc; `by_speed` [m/s] is the speed that cools."""
+    rate = params.disc_cooling[i] + params.disc_cooling_by_speed[i] * by_speed
+    stays = math.exp(-rate * dt)
+    gain = (1.0 - stays) / rate
+    warming = params.disc_heating[i] * power
+    state.sigma_heating[i] = stays * state.sigma_heating[i] + heating_error * gain * warming
+    state.sigma_cooling[i] = stays * state.sigma_cooling[i] + cooling_error * rate * gain * state.excess[i]
+    state.sigma_start[i] *= stays
+    state.excess[i] = stays * state.excess[i] + gain * warming
+
+
+@kernel
+def heat_widening(state: Record, i: int) -> float:
+    """Return the relative standard deviation that a friction observed earlier has gained by the disc's heat.
+
+    From the change of temperature since, in either direction; never a map of friction over temperature.
+    """
+    change: float = state.temperature[i] - state.observed_at[i]
+    return FRICTION_PER_KELVIN * abs(change)

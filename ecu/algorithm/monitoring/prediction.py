@@ -1,0 +1,126 @@
+"""Is braking predicted better with what was learned than with what is configured? A book of it.
+
+Each application is judged by specific force, which no slope is in. Over its windows
+
+    measured     -(1 + sum I_i / (r_i^2 m)) (a - b) - overrun - (drag + rolling + sum M_i / r_i) / m
+    predicted    sum 2 A_i r_eff mu_i (p_i - p_0) / r_i / m        mu_i as it was before the application
+
+twice: with the learned friction, mass, bias and overrun, and with the configured ones. The relative errors
+of the two means go into the book, where an application counts by a memory of `MEMORY` of them. Where the
+learned friction is off by more than the configured one beyond doubt, it is given up and learned anew.
+"""
+
+import math
+
+import numpy as np
+
+from ecu.algorithm.estimation.friction import driver_accelerates
+from ecu.algorithm.estimation.joint.layout import BIAS, DRAG, LEVEL, MASS, MOTOR, OVERRUN, V
+from ecu.algorithm.estimation.joint.wheel import brake_lever
+from ecu.contract.params import GRAVITY
+from ecu.contract.signals import ABS_ACTIVE, ESP_ACTIVE
+from ecu.jit import Record, kernel
+
+LEARNED_WAY, CONFIGURED_WAY = range(2)
+
+PREDICTION_STATE = np.dtype(
+    [
+        ("mu", "f8", (2, 4)),  # before this application: learned, configured
+        ("mass", "f8", (2,)),  # kg, likewise
+        ("measured", "f8", (2,)),  # sums over the windows that count [m/s^2]
+        ("predicted", "f8", (2,)),
+        ("samples", "i8"),
+        ("error", "f8", (2,)),  # relative, of the last application
+        ("applications", "f8"),  # in the book
+        ("worse", "f8"),  # mean of |learned| - |configured|
+        ("spread", "f8"),  # variance of that
+        ("told_s", "f8"),  # the fault bit is shown for this much longer [s]
+    ],
+    align=True,
+)
+
+LEAST_SPEED = 3.4  # m/s
+LEAST_SAMPLES = 8  # windows
+STEADY = 0.10  # relative change of a pressure in a window; force follows a change later
+LEAST_DECEL = 0.8  # m/s^2, of the linings
+MEMORY = 10.0  # applications
+LEAST_APPLICATIONS = 4.0
+LEAST_WORSE = 0.02  # of the deceleration
+BEYOND_DOUBT = 2.5  # standard errors
+TOLD_S = 60.0
+
+
+@kernel
+def begin_prediction(params: Record, state: Record, joint: Record) -> None:
+    """Note what an application is predicted with."""
+    state.mass[LEARNED_WAY] = params.mass * math.exp(joint.x[MASS])
+    state.mass[CONFIGURED_WAY] = params.mass
+    state.samples = 0
+    for way in range(2):
+        state.measured[way] = state.predicted[way] = 0.0
+    for i in range(4):
+        state.mu[LEARNED_WAY, i] = params.mu_nominal[i] * math.exp(joint.x[LEVEL + i])
+        state.mu[CONFIGURED_WAY, i] = params.mu_nominal[i]
+
+
+@kernel
+def _counts(inputs: Record, joint: Record) -> bool:
+    """Return whether the last window tells how well the car is predicted."""
+    works = inputs.value[ABS_ACTIVE] > 0.5 or inputs.value[ESP_ACTIVE] > 0.5
+    rolls = joint.x[V] > LEAST_SPEED and joint.sliding == 0
+    counts: bool = joint.pressed < STEADY and rolls and joint.window.balanced != 0 and not works
+    return counts and not driver_accelerates(inputs)
+
+
+@kernel
+def add_window(params: Record, state: Record, joint: Record, inputs: Record) -> None:
+    """Take the last window of an application in: what it measured, all at one time."""
+    if not _counts(inputs, joint):
+        return
+    state.samples += 1
+    x, w = joint.x, joint.window
+    speed = x[V]
+    motors, learned, configured, wheels = 0.0, 0.0, 0.0, 0.0
+    for i in range(4):
+        r = params.wheel_radius[i]
+        motors += w.motor[i] / r
+        wheels += params.wheel_inertia[i] / (r * r * params.mass)
+        force = brake_lever(params, i) * w.common_pressure[i] / r
+        learned += force * state.mu[LEARNED_WAY, i]
+        configured += force * state.mu[CONFIGURED_WAY, i]
+    rolling, drag = params.rolling_resistance * GRAVITY, params.drag_area * speed * speed
+    mass = state.mass[LEARNED_WAY]
+    rest = rolling + (drag * math.exp(x[DRAG] + x[MASS]) + motors * math.exp(x[MOTOR])) / mass
+    state.measured[LEARNED_WAY] += -(1.0 + wheels) * (w.common_accel - x[BIAS]) - x[OVERRUN] - rest
+    state.predicted[LEARNED_WAY] += learned / mass
+    mass = state.mass[CONFIGURED_WAY]
+    state.measured[CONFIGURED_WAY] += -(1.0 + wheels) * w.common_accel - rolling - (drag + motors) / mass
+    state.predicted[CONFIGURED_WAY] += configured / mass
+
+
+@kernel
+def end_prediction(state: Record) -> bool:
+    """Book an application; return whether learning is worse than not learning, beyond doubt."""
+    n = state.samples
+    if n < LEAST_SAMPLES or state.measured[CONFIGURED_WAY] < LEAST_DECEL * n:
+        return False
+    if state.measured[LEARNED_WAY] < 0.5 * LEAST_DECEL * n:
+        return False
+    for way in range(2):
+        state.error[way] = state.predicted[way] / state.measured[way] - 1.0
+    difference = abs(state.error[LEARNED_WAY]) - abs(state.error[CONFIGURED_WAY])
+    state.applications = min(state.applications + 1.0, MEMORY)
+    gain = 1.0 / state.applications
+    before = state.worse
+    state.worse += gain * (difference - before)
+    state.spread += gain * ((difference - before) * (difference - state.worse) - state.spread)
+    doubt = BEYOND_DOUBT * math.sqrt(state.spread / max(state.applications - 1.0, 1.0))
+    worse: bool = state.worse > max(LEAST_WORSE, doubt)
+    return worse and state.applications >= LEAST_APPLICATIONS
+
+
+@kernel
+def close_book(state: Record) -> None:
+    """Begin the book anew: what it judged was given up."""
+    state.applications = state.worse = state.spread = 0.0
+    state.told_s = TOLD_S

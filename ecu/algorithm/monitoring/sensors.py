@@ -1,0 +1,75 @@
+"""Which readings the others deny, what is said of it, and what is left out of the inputs.
+
+Accelerometer, wheel speeds and calliper pressures are held against each other before anything is estimated
+from them in this cycle, by what the last one estimated.
+"""
+
+from ecu.algorithm.control.failed_brakes import watch_brakes
+from ecu.algorithm.monitoring.acceleration import watch_acceleration
+from ecu.algorithm.monitoring.plausibility import watch_pressures, watch_wheels, wheel_speed_implausible
+from ecu.contract.faults import (
+    ACCEL_IMPLAUSIBLE,
+    BRAKE_FAILED,
+    PRESSURE_NOT_FOLLOWING,
+    WHEEL_SPEED_IMPLAUSIBLE,
+)
+from ecu.contract.signals import ACCEL_X, CALLIPER_PRESSURE, WHEEL_SPEED
+from ecu.jit import Record, kernel
+
+LEFT_OUT_S = 0.03  # that a pressure is not what was demanded
+
+
+@kernel
+def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> int:
+    """Return the fault bits of sensors whose readings contradict the others.
+
+    Args:
+        p: `PARAMS`.
+        s: `STATE` of `ecu.algorithm.step`; the parts of `monitoring` are overwritten.
+        u: `INPUTS`.
+        dt: time since the last cycle [s].
+    """
+    faults = 0
+    doubted = s.acceleration.implausible != 0
+    if s.speed.started:
+        watch_acceleration(
+            p, s.acceleration, u, s.motion, s.friction, s.control.base, s.speed.speed,
+            s.application.braking != 0, dt,
+        )  # fmt: skip
+        watch_wheels(p, s.plausibility, u, s.motion, s.speed.speed, s.friction.torque, dt)
+        if wheel_speed_implausible(p, s.plausibility, u, s.motion, s.speed.speed, s.friction.torque, dt):
+            faults |= WHEEL_SPEED_IMPLAUSIBLE
+    if s.acceleration.implausible:
+        faults |= ACCEL_IMPLAUSIBLE
+    begins = s.acceleration.implausible != 0 and not doubted
+    watch_pressures(s.plausibility, u, s.friction_torque.model, s.joint.zero.value, dt)
+    if s.plausibility.pressure:
+        faults |= PRESSURE_NOT_FOLLOWING
+    failed = s.failed_brakes.any != 0
+    watch_brakes(
+        p, s.failed_brakes, u, s.motion, s.control, s.friction_torque.model, s.joint.zero.value,
+        s.speed.speed, s.plausibility.sent != 0, dt,
+    )  # fmt: skip
+    fails = s.failed_brakes.any != 0 and not failed
+    if s.failed_brakes.any:
+        faults |= BRAKE_FAILED
+    s.friction.held = 1 if begins or fails or u.e2e_faults else 0
+    return faults
+
+
+@kernel
+def leave_out(p: Record, s: Record, u: Record) -> None:
+    """Overwrite the trusted inputs: `u` without what is implausible."""
+    s.trusted = u
+    if s.acceleration.implausible or abs(u.value[ACCEL_X]) > p.accel_range:
+        _distrust(s.trusted, ACCEL_X)
+    for i in range(4):
+        if s.plausibility.fell[i]:
+            _distrust(s.trusted, WHEEL_SPEED + i)
+        if s.plausibility.apart_s[i] > LEFT_OUT_S and not s.failed_brakes.failed[i]:
+            _distrust(s.trusted, CALLIPER_PRESSURE + i)
+
+
+@kernel
+def _distrust(inputs: Record, place: int) -> None:
+    inputs.verdict[place] = inputs.new[place] = 0

@@ -1,0 +1,245 @@
+"""`brake-ecu doctor`: what this machine, configuration and bus lack, each with its remedy.
+
+The rights are asked for in a process of its own, so that looking changes nothing.
+"""
+
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numba
+import numpy as np
+
+from ecu import jit
+from ecu.bus.channel import Channel, open_channel
+from ecu.bus.freshness import NEVER, begin_cycle
+from ecu.bus.receive import ReceivePlan, Reception, new_reception, receive
+from ecu.bus.signal_map import receive_plan
+from ecu.bus.transmit import contract_transmit_plan
+from ecu.contract.records import FRAME, INPUTS, new_record
+from ecu.contract.signals import CYCLE_NS, INPUT, INPUT_SIGNALS
+from ecu.errors import UserError
+from ecu.runtime.cycle import new_ecu
+from ecu.settings.config import load_config, new_params
+from ecu.settings.resources import resource
+from ecu.warm import warm_up
+
+LISTEN_S: Final = 2.0
+SLEEPS: Final = 50
+OPTIONAL: Final = frozenset(
+    place
+    for place in INPUT.values()
+    if INPUT_SIGNALS[place].message.startswith(("VehicleSpeed", "WheelForce"))
+)
+
+
+UNIT_FOLDERS: Final = tuple(
+    map(Path, ("/etc/systemd/system", "/run/systemd/system", "/usr/lib/systemd/system"))
+)
+UNIT_NEEDS: Final = ("Type=notify", "WatchdogSec=", "Restart=", "RestartPreventExitStatus=2")
+
+
+class Check(NamedTuple):
+    """One line of the table."""
+
+    name: str
+    good: bool
+    found: str
+    remedy: str = ""
+
+
+def doctor(config: Path | None, map: Path | None, interface: str | None, channel: str | None) -> int:
+    """Print every check; return 0 if all are good, 1 if not.
+
+    Raises:
+        UserError: configuration, map or database are not usable, or only one of the two names a bus.
+    """
+    if (interface is None) != (channel is None):
+        raise UserError("doctor", "-i, -c", "give both or none")
+    plan = receive_plan(map)
+    checks = [*machine(), kernels(config, plan)]
+    if interface is not None and channel is not None:
+        checks += bus(interface, channel, plan, config)
+    _show(checks)
+    return 0 if all(check.good for check in checks) else 1
+
+
+def machine() -> list[Check]:
+    """Check Python, the rights for real time, the clock and the place of compiled kernels."""
+    version = sys.version_info[:2]
+    return [
+        Check("Python", (3, 11) <= version <= (3, 13), platform.python_version(), "use Python 3.11 to 3.13"),
+        *_rights(),
+        _clock_source(),
+        _wake_up(),
+        _cache(),
+        unit(),
+    ]
+
+
+_ASK: Final = """
+import structlog
+structlog.configure(logger_factory=structlog.ReturnLoggerFactory())
+from ecu.runtime.realtime import make_realtime
+for verdict in make_realtime():
+    print(verdict.name, int(verdict.granted), verdict.reason, verdict.remedy, sep="\\t")
+"""
+
+
+def _rights() -> list[Check]:
+    paths = os.pathsep.join([str(Path(jit.__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
+    asked = subprocess.run(
+        [sys.executable, "-c", _ASK],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": paths},
+        check=False,
+    )
+    verdicts = (line.split("\t") for line in asked.stdout.splitlines())
+    return [
+        Check(name, granted == "1", "granted" if granted == "1" else reason, remedy)
+        for name, granted, reason, remedy in verdicts
+    ]
+
+
+def _clock_source() -> Check:
+    source = Path("/sys/devices/system/clocksource/clocksource0/current_clocksource")
+    name = source.read_text().strip() if source.exists() else "unknown"
+    resolution_s = time.clock_getres(time.CLOCK_MONOTONIC)
+    good = resolution_s <= 1e-6 and name not in ("jiffies", "refined-jiffies")
+    return Check("clock", good, f"{name}, {resolution_s * 1e9:.0f} ns", "boot with another clocksource=")
+
+
+def _wake_up() -> Check:
+    """Sleep a few times without any rights: what is late here is the machine's load."""
+    late_ns = []
+    for _ in range(SLEEPS):
+        deadline = time.monotonic_ns() + 2_000_000
+        time.sleep(0.002)
+        late_ns.append(time.monotonic_ns() - deadline)
+    median, worst = float(np.median(late_ns)) / 1e3, max(late_ns) / 1e3
+    return Check(
+        "wake-up",
+        median < CYCLE_NS / 1e3 / 10,
+        f"{median:.0f} us late (median), {worst:.0f} us at worst",
+        "take load off the machine",
+    )
+
+
+def _cache() -> Check:
+    folder = Path(numba.config.CACHE_DIR)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        return Check(
+            "kernel cache", False, f"{folder}: {error.strerror}", "set NUMBA_CACHE_DIR to a folder of yours"
+        )
+    return Check("kernel cache", True, f"{folder} can be written")
+
+
+def unit(folders: tuple[Path, ...] = UNIT_FOLDERS) -> Check:
+    """Check that an installed systemd unit has what the daemon relies on; point to ours if there is none."""
+    ours = resource("tools/deploy/brake-ecu.service")
+    installed = [path for folder in folders for path in sorted(folder.glob("brake-ecu*.service"))]
+    if not installed:
+        return Check("systemd unit", True, f"not installed; {ours} is one")
+    for path in installed:
+        lines = {line.partition("#")[0].strip() for line in path.read_text("utf-8").splitlines()}
+        missing = [key for key in UNIT_NEEDS if not any(line.startswith(key) for line in lines)]
+        if missing:
+            found = f"{path} lacks {', '.join(missing)}"
+            return Check("systemd unit", False, found, f"take them from {ours}")
+    return Check("systemd unit", True, ", ".join(map(str, installed)))
+
+
+def kernels(config: Path | None, plan: ReceivePlan) -> Check:
+    """Make every kernel ready; good if none had to be compiled."""
+    compiled = jit.CompileCounter()
+    began = time.monotonic()
+    params = new_params(load_config(config or resource("config/suv.toml")))
+    warm_up(
+        new_ecu(params, None, plan, contract_transmit_plan(resource("dbc/brake_ecu.dbc"), "BrakeEcu")),
+        compiled,
+    )
+    found = f"{compiled.count} compiled, ready after {time.monotonic() - began:.1f} s"
+    return Check("kernels", compiled.count == 0, found, "they are cached now; a second look will find none")
+
+
+def bus(interface: str, channel: str, plan: ReceivePlan, config: Path | None) -> list[Check]:
+    """Listen for two seconds and check every message that the plan expects."""
+    fd = load_config(config).can_fd if config else False
+    opened = open_channel(interface, channel, receive_ids=plan.ids.tolist(), fd=fd)
+    try:
+        reception = listen(opened, plan, LISTEN_S)
+        status = opened.status()
+    finally:
+        opened.close()
+    off = "off" if status.bus_off else "error passive" if status.error_passive else "active"
+    line = Check(
+        f"bus {channel}", off == "active", off, "check wiring, termination, bit rate; ip -details link"
+    )
+    return [line, *messages(plan, reception, LISTEN_S)]
+
+
+def listen(channel: Channel, plan: ReceivePlan, seconds: float) -> Reception:
+    """Return what was received in that time."""
+    reception, inputs, frames = new_reception(plan), new_record(INPUTS), new_record(FRAME, 4096)
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        count = channel.drain(frames, 0)
+        begin_cycle(inputs[0], time.time_ns(), CYCLE_NS)
+        receive(plan, reception, frames, 0, count, inputs[0])
+        time.sleep(0.01)
+    return reception
+
+
+def messages(plan: ReceivePlan, reception: Reception, seconds: float) -> list[Check]:
+    """Judge each expected message by what was received of it."""
+    return [
+        _message(plan, expected, counters, seconds)
+        for expected, counters in zip(plan.messages, reception.messages, strict=True)
+        if not expected["foreign"]
+    ]
+
+
+def _message(plan: ReceivePlan, expected: np.void, counters: np.void, seconds: float) -> Check:
+    name, first = str(expected["name"]), int(expected["first"])
+    places = plan.signals["place"][first : first + int(expected["count"])]
+    received, accepted = int(counters["received"]), int(counters["accepted"])
+    if counters["stamp_ns"] == NEVER:
+        if OPTIONAL.issuperset(places.tolist()):
+            return Check(name, True, "not seen, optional")
+        return Check(name, False, "not seen", "check its sender, the channel, --map")
+    rate = f"{received / seconds:.0f}/s"
+    wrong = {
+        "checksum": int(counters["checksum_errors"]),
+        "counter": int(counters["sequence_errors"]) + int(counters["repeated"]),
+        "length": int(counters["length_errors"]),
+    }
+    if accepted < received:
+        kinds = ", ".join(f"{count} {kind}" for kind, count in wrong.items() if count)
+        return Check(
+            name, False, f"{rate}, {received - accepted} of {received} refused: {kinds}", "see its sender"
+        )
+    longest_ns = float(plan.expected["longest_ns"][places].max(initial=0.0))
+    if longest_ns and received < int(seconds * 1e9 / longest_ns):
+        return Check(name, False, f"{rate}, {1e9 / longest_ns:.1f}/s is the least", "is the bus overloaded?")
+    return Check(name, True, f"{rate}, all accepted")
+
+
+def _show(checks: list[Check]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("", "check", "found", "remedy", box=None, pad_edge=False)
+    for check in checks:
+        mark = "[green]ok[/]" if check.good else "[red]no[/]"
+        table.add_row(mark, check.name, check.found, "" if check.good else check.remedy)
+    Console(width=None if sys.stdout.isatty() else 120).print(table)

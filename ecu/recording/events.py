@@ -1,0 +1,84 @@
+"""Events from the cycles' records: a line when the mode, a fault or a counter changes, never one a cycle."""
+
+from typing import Any, Final
+
+import numpy as np
+import structlog
+
+from ecu.contract.faults import FAULTS, fault_names
+from ecu.contract.records import RecordArray
+from ecu.contract.signals import STARTING
+from ecu.recording.log import Throttle
+
+_INPUT_FAULTS: Final = 0xFFFF  # while starting nothing has come yet, which is no event
+MODES: Final = ("starting", "ready", "active", "degraded", "failed")
+
+
+class EventLog:
+    """Follows one run, batch by batch."""
+
+    def __init__(self, throttle: Throttle | None = None) -> None:
+        self._log = structlog.get_logger("ecu")
+        self._throttle = throttle or Throttle()
+        self._mode, self._faults, self._overruns, self._dropped, self._lost = 0, 0, 0, 0, 0
+        self._speaks: bool | None = None
+
+    def begin_after(self, record: RecordArray) -> None:
+        """Take over from another one that had seen `record` (`RECORDED`, shape (1,)) and said so."""
+        cycle, outputs = record["cycle"][0], record["outputs"][0]
+        self._mode, self._faults = (int(np.nan_to_num(outputs[name])) for name in ("mode", "active_faults"))
+        self._overruns, self._dropped = int(cycle["overruns"]), int(cycle["dropped"])
+        self._speaks = bool(cycle["speaks"])
+
+    def look(self, records: RecordArray, lost_cycles: int, lost_frames: int) -> None:
+        """Log what changed within `records` (`RECORDED`, shape (n,)); `lost_*`: what the reader missed."""
+        cycles, outputs = records["cycle"], records["outputs"]
+        mode = np.nan_to_num(outputs["mode"]).astype(np.int64)
+        faults = np.nan_to_num(outputs["active_faults"]).astype(np.int64)
+        faults[mode == STARTING] &= ~_INPUT_FAULTS
+        changed = (mode != np.r_[self._mode, mode[:-1]]) | (faults != np.r_[self._faults, faults[:-1]])
+        for row in np.flatnonzero(changed):
+            self._look_at(int(cycles["number"][row]), int(mode[row]), int(faults[row]))
+        speaks = cycles["speaks"] != 0
+        if self._speaks is None:
+            self._speaks = bool(speaks[0])
+        for row in np.flatnonzero(speaks != np.r_[self._speaks, speaks[:-1]]):
+            self._say("takes_over" if speaks[row] else "falls_silent", cycle=int(cycles["number"][row]))
+        self._speaks = bool(speaks[-1])
+        last = cycles[-1]
+        overruns, dropped = int(last["overruns"]), int(last["dropped"])
+        if overruns > self._overruns:
+            self._say("missed", missed=overruns - self._overruns, total=overruns)
+            self._overruns = overruns
+        if dropped > self._dropped:
+            self._say("frames_dropped", dropped=dropped - self._dropped, total=dropped)
+            self._dropped = dropped
+        if lost_cycles + lost_frames > self._lost:
+            self._say("ring_overtaken", lost_cycles=lost_cycles, lost_frames=lost_frames)
+            self._lost = lost_cycles + lost_frames
+
+    def _look_at(self, cycle: int, mode: int, faults: int) -> None:
+        if mode != self._mode:
+            self._say("mode", MODES[mode], cycle=cycle, was=MODES[self._mode], now=MODES[mode])
+        for fault in FAULTS:
+            if fault.bit & faults & ~self._faults:
+                self._say("fault", fault.name, cycle=cycle, fault=fault.name, remedy=fault.remedy)
+        for name in fault_names(self._faults & ~faults):
+            self._say("fault_gone", name, cycle=cycle, fault=name)
+        self._mode, self._faults = mode, faults
+
+    def _say(self, event: str, cause: str = "", **content: Any) -> None:
+        held = self._throttle.passes(f"{event} {cause}")
+        if held is None:
+            return
+        if held:
+            content["held_back"] = held
+        serious = event in (
+            "missed",
+            "frames_dropped",
+            "ring_overtaken",
+            "fault",
+            "takes_over",
+            "falls_silent",
+        )
+        (self._log.warning if serious else self._log.info)(event, **content)

@@ -1,0 +1,344 @@
+"""A ring in shared memory: the cycle writes it and waits for nobody, any process may read along.
+
+The file holds a header, a description (JSON), the state before the first cycle, a slot per cycle, what is
+learned (of the last two cycles, in turn) and a ring of frames. A slot carries its number before and after its
+content is written (-1 between), so a reader that was overtaken notices and counts what it lost. Frames are
+claimed before they are overwritten.
+
+The file is its owner's alone: made anew (O_EXCL, O_NOFOLLOW), mode 0600, and read only if it belongs to the
+reader's user. Whoever wrote it holds a lock on it for as long as it lives, in whatever namespace.
+"""
+
+import fcntl
+import json
+import mmap
+import os
+import secrets
+import stat
+import tempfile
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ecu.contract.records import CYCLE, FRAME, LEARNED, OUTPUTS, RecordArray
+from ecu.errors import UserError
+from ecu.jit import kernel
+
+SLOTS: Final = 2400  # 24 s of cycles
+FRAMES: Final = 131072  # 29 s of a classical bus at 45 frames per cycle
+
+# One cycle as it stands in the ring's slots and in a recording's cycles.bin.
+RECORDED: Final = np.dtype([("cycle", CYCLE), ("outputs", OUTPUTS)], align=True)
+_SLOT: Final = np.dtype([("number", "i8"), ("first_frame", "i8"), ("recorded", RECORDED)], align=True)
+_LAST_WORDS_BYTES: Final = 3072
+_HEADER: Final = np.dtype(
+    [
+        ("magic", "u8"),
+        ("slots", "i8"),
+        ("frames", "i8"),
+        ("description_bytes", "i8"),
+        ("initial_bytes", "i8"),
+        ("written", "i8"),  # cycles so far
+        ("frames_claimed", "i8"),
+        ("frames_written", "i8"),
+        ("closed", "i8"),
+        ("followed", "i8"),  # the last cycle that the side process is known to have handled, -1: none
+        ("last_words", f"S{_LAST_WORDS_BYTES}"),  # JSON
+    ]
+)
+_MAGIC: Final = int.from_bytes(b"ecuring3", "little")
+_PAGE: Final = 4096
+
+
+class Ring(NamedTuple):
+    """The mapped parts of a ring."""
+
+    path: Path
+    memory: mmap.mmap
+    header: RecordArray
+    slots: RecordArray
+    learned: RecordArray
+    """LEARNED, shape (2,): after cycle k in row k % 2."""
+    frames: RecordArray
+
+
+def _folder() -> Path:
+    """Memory, not a disk, where the machine has such a folder."""
+    shared = Path("/dev/shm")
+    return shared if os.access(shared, os.W_OK) else Path(tempfile.gettempdir())
+
+
+def living_rings() -> list[Path]:
+    """Return our user's rings whose writers live; those that dead ones left behind are removed."""
+    folder, rings = _folder(), []
+    for path in sorted([*folder.glob("brake-ecu.*.ring"), *folder.glob("brake-ecu.*.new")]):
+        try:
+            handle = _open_own(path)
+        except OSError:  # another user's, or gone meanwhile
+            continue
+        try:
+            fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            remove_ring(path)
+        except BlockingIOError:
+            rings += [path] if path.suffix == ".ring" else []
+        finally:
+            os.close(handle)
+    return rings
+
+
+def _open_own(path: Path) -> int:
+    """Open a regular file that is ours and that nobody else may write. Raises OSError for any other."""
+    handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+    found = os.fstat(handle)
+    others = stat.S_IWGRP | stat.S_IWOTH
+    if stat.S_ISREG(found.st_mode) and found.st_uid == os.geteuid() and not found.st_mode & others:
+        return handle
+    os.close(handle)
+    raise PermissionError(1, "not a file of this user alone")
+
+
+def ring_path(pid: int) -> Path:
+    """Return where the ring of process `pid` is. Containers that share the folder have pids of their own."""
+    living_rings()
+    try:
+        namespace = os.stat("/proc/self/ns/pid").st_ino
+    except OSError:
+        namespace = 0
+    return _folder() / f"brake-ecu.{namespace}.{pid}.ring"
+
+
+def _round_up(size: int) -> int:
+    return -(-size // _PAGE) * _PAGE
+
+
+def _is_ring(memory: mmap.mmap) -> bool:
+    """Whether header and size fit together."""
+    if len(memory) < _PAGE:
+        return False
+    row = np.frombuffer(memory, _HEADER, 1)[0]
+    sizes = [int(row[name]) for name in ("slots", "frames", "description_bytes", "initial_bytes")]
+    if int(row["magic"]) != _MAGIC or min(sizes[:2]) < 1 or min(sizes[2:]) < 0:
+        return False
+    parts = (_HEADER.itemsize, sum(sizes[2:]), sizes[0] * _SLOT.itemsize, 2 * LEARNED.itemsize)
+    return sum(map(_round_up, (*parts, sizes[1] * FRAME.itemsize))) == len(memory)
+
+
+def _map(path: Path, memory: mmap.mmap) -> Ring:
+    header = np.frombuffer(memory, _HEADER, 1)
+    row = header[0]
+    at = _round_up(_HEADER.itemsize) + _round_up(int(row["description_bytes"]) + int(row["initial_bytes"]))
+    slots = np.frombuffer(memory, _SLOT, int(row["slots"]), at)
+    at += _round_up(slots.nbytes)
+    learned = np.frombuffer(memory, LEARNED, 2, at)
+    frames = np.frombuffer(memory, FRAME, int(row["frames"]), at + _round_up(learned.nbytes))
+    return Ring(path, memory, header, slots, learned, frames)
+
+
+def create_ring(
+    path: Path, description: dict[str, Any], initial: bytes, *, slots: int = SLOTS, frames: int = FRAMES
+) -> Ring:
+    """Make the ring with all its pages in memory; it appears at `path` when it is complete.
+
+    `description` tells readers what the records mean; `initial` is the state before the first cycle.
+
+    Raises:
+        UserError: no room for it.
+    """
+    text = json.dumps(description).encode()
+    head = _round_up(_HEADER.itemsize) + _round_up(len(text) + len(initial))
+    parts = (slots * _SLOT.itemsize, 2 * LEARNED.itemsize, frames * FRAME.itemsize)
+    size = head + sum(map(_round_up, parts))
+    unfinished = path.with_name(f"{path.name}.{secrets.token_hex(4)}.new")
+    try:
+        handle = os.open(unfinished, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o600)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)  # the mapping keeps it
+            os.posix_fallocate(handle, 0, size)
+            memory = mmap.mmap(handle, size, mmap.MAP_SHARED | mmap.MAP_POPULATE)
+        finally:
+            os.close(handle)
+    except OSError as error:
+        remove_ring(unfinished)
+        raise UserError(
+            str(path), "", f"cannot make a ring of {size >> 20} MB there: {error.strerror}"
+        ) from None
+    header = np.frombuffer(memory, _HEADER, 1)
+    row = header[0]
+    row["slots"], row["frames"], row["followed"] = slots, frames, -1
+    row["description_bytes"], row["initial_bytes"] = len(text), len(initial)
+    at = _round_up(_HEADER.itemsize)
+    memory[at : at + len(text) + len(initial)] = text + initial
+    ring = _map(path, memory)
+    ring.slots["number"] = -1
+    row["magic"] = _MAGIC
+    try:
+        unfinished.rename(path)
+    except OSError as error:
+        remove_ring(unfinished)
+        raise UserError(str(path), "", f"cannot be replaced: {error.strerror}; remove it") from None
+    return ring
+
+
+def publish(
+    ring: Ring,
+    cycle: RecordArray,
+    outputs: RecordArray,
+    learned: RecordArray,
+    frames: RecordArray,
+) -> None:
+    """Write one cycle with its `cycle["frames"]` frames, the first of `frames`; never waits.
+
+    The claims stand outside the kernel that fills: a compiler may not move or drop them there.
+    """
+    header = ring.header[0]
+    number, begin = int(header["written"]), int(header["frames_written"])
+    end = begin + int(cycle["frames"][0])
+    place = number % len(ring.slots)
+    numbers = ring.slots["number"]
+    numbers[place] = -1
+    header["frames_claimed"] = end
+    _fill(ring.slots, place, ring.frames, begin, end, cycle, outputs, frames)
+    ring.learned[number % 2] = learned[0]
+    header["frames_written"] = end
+    numbers[place] = number
+    header["written"] = number + 1
+
+
+# Arrays, not records: handing a numpy record to a kernel costs 10 us, an array 0.6 us.
+@kernel
+def _fill(
+    slots: RecordArray,
+    place: int,
+    ring_frames: RecordArray,
+    begin: int,
+    end: int,
+    cycle: RecordArray,
+    outputs: RecordArray,
+    frames: RecordArray,
+) -> None:
+    for i in range(begin, end):
+        ring_frames[i % len(ring_frames)] = frames[i - begin]
+    slot = slots[place]
+    slot.first_frame = begin
+    slot.recorded.cycle = cycle[0]
+    slot.recorded.outputs = outputs[0]
+
+
+def close_ring(ring: Ring, last_words: dict[str, Any] | None = None) -> None:
+    """Tell readers that no more cycles come; the file goes when the last of them lets go of it."""
+    ring.header[0]["last_words"] = json.dumps(last_words or {}).encode()
+    ring.header[0]["closed"] = 1
+
+
+class Batch(NamedTuple):
+    """Cycles read from a ring, in order."""
+
+    records: RecordArray
+    """RECORDED, shape (n,)."""
+    frames: RecordArray
+    """FRAME, the frames of these cycles in the order they were consumed."""
+
+
+class RingReader:
+    """Reads a ring behind its writer, from the oldest cycle that is still there."""
+
+    def __init__(self, path: Path) -> None:
+        try:
+            handle = _open_own(path)
+            try:
+                memory = mmap.mmap(handle, 0, prot=mmap.PROT_READ)
+            finally:
+                os.close(handle)
+        except (OSError, ValueError) as error:
+            raise UserError(str(path), "", f"no ring to read here: {error}") from None
+        if not _is_ring(memory):
+            raise UserError(str(path), "", "not a ring of this version; start the service anew")
+        self.ring = _map(path, memory)
+        row = self.ring.header[0]
+        at = _round_up(_HEADER.itemsize)
+        end = at + int(row["description_bytes"])
+        try:
+            self.description: dict[str, Any] = dict(json.loads(memory[at:end]))
+        except (ValueError, TypeError):
+            raise UserError(str(path), "", "not a ring: its description cannot be read") from None
+        self.initial: bytes = memory[end : end + int(row["initial_bytes"])]
+        self.lost_cycles = self.lost_frames = 0
+        self._next = max(0, int(row["written"]) - len(self.ring.slots))
+
+    @property
+    def closed(self) -> bool:
+        """Whether the writer said that no more cycles come."""
+        return bool(self.ring.header[0]["closed"])
+
+    @property
+    def last_read(self) -> int:
+        """The number of the last cycle that was read, -1 before the first."""
+        return self._next - 1
+
+    @property
+    def last_words(self) -> dict[str, Any]:
+        """What the writer said when it closed the ring."""
+        words: dict[str, Any] = json.loads(bytes(self.ring.header[0]["last_words"]) or b"{}")
+        return words
+
+    def go_on_after(self, number: int) -> RecordArray | None:
+        """Read on behind the cycle `number`; return that cycle (`RECORDED`, shape (1,)) if it is there."""
+        place = number % len(self.ring.slots)
+        slot = self.ring.slots[place : place + 1].copy()
+        self._next = number + 1
+        return slot["recorded"] if slot["number"][0] == number >= 0 else None
+
+    def frames_before(self, number: int) -> int | None:
+        """Return how many frames all cycles before `number` consumed; None: not known any more."""
+        header = self.ring.header[0]
+        slot = self.ring.slots[number % len(self.ring.slots)].copy()
+        if slot["number"] == number:
+            return int(slot["first_frame"])
+        total = int(header["frames_written"])
+        return total if header["written"] == number else None
+
+    def learned(self) -> RecordArray | None:
+        """Return what is learned as of the last cycle (`LEARNED`, shape (1,)), None while there is none."""
+        for _ in range(10):  # the writer may overtake us
+            written = int(self.ring.header[0]["written"])
+            row = (written - 1) % 2
+            copied = self.ring.learned[row : row + 1].copy()
+            if written and written == int(self.ring.header[0]["written"]):
+                return copied
+        return None
+
+    def read(self, limit: int = 256) -> Batch:
+        """Return up to `limit` cycles that were not read yet; what was overwritten is counted as lost."""
+        header, slots = self.ring.header[0], self.ring.slots
+        written = int(header["written"])
+        oldest = written - len(slots)
+        if self._next < oldest:
+            self.lost_cycles += oldest - self._next
+            self._next = oldest
+        wanted = np.arange(self._next, min(written, self._next + limit))
+        copied = slots[wanted % len(slots)]
+        intact = (copied["number"] == wanted) & (slots["number"][wanted % len(slots)] == wanted)
+        self.lost_cycles += int(len(wanted) - intact.sum())
+        self._next += len(wanted)
+        copied = copied[intact]
+        return Batch(copied["recorded"], self._frames(copied))
+
+    def _frames(self, slots: RecordArray) -> RecordArray:
+        ring = self.ring.frames
+        counts = slots["recorded"]["cycle"]["frames"].astype(np.int64)
+        total = int(counts.sum())
+        starts = np.repeat(slots["first_frame"] - (np.cumsum(counts) - counts), counts)
+        places: NDArray[np.int64] = starts + np.arange(total)
+        copied = ring[places % len(ring)]
+        intact = places >= int(self.ring.header[0]["frames_claimed"]) - len(ring)
+        self.lost_frames += int(total - intact.sum())
+        return copied[intact]
+
+
+def remove_ring(path: Path) -> None:
+    """Take the ring's name away; whoever has it mapped keeps it."""
+    with suppress(OSError):
+        path.unlink()

@@ -1,0 +1,336 @@
+"""What was learned, kept like money: sqlite, WAL, synchronous FULL, a CRC and a revision per row.
+
+Only the side process writes. A row that fails its CRC or its ranges is passed over for the revision before
+it; a file that sqlite cannot read, or that holds another table, another schema or values of another kind, is
+set aside and a new one made. What another version of the algorithm has learned stays in the file and is not
+used. The folder is its owner's alone.
+
+What the linings have worn off and what the brakes have emitted is also kept as rows of their own, in the same
+transaction, by the vehicle's name alone: it outlives a new version and a configuration that changes.
+"""
+
+import fcntl
+import math
+import sqlite3
+import time
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import structlog
+from numpy.typing import NDArray
+
+from ecu.contract.records import DUST, LEARNED, N_MEASURED, WEAR, RecordArray
+from ecu.errors import UserError
+
+FILE: Final = "learned.sqlite"
+DAMAGED: Final = (sqlite3.Error, ValueError, OverflowError, TypeError)
+"""What sqlite3 raises over a damaged file: text that is no UTF-8, and numbers that cannot be, among them."""
+LOCK: Final = "in-use"
+REVISIONS_KEPT: Final = 20
+SAVE_INTERVAL_S: Final = 60.0
+MU_RANGE: Final = (0.5, 1.5)  # of nominal
+RADIUS_ERROR_LIMIT: Final = 0.03
+DISC_EXCESS_LIMIT: Final = 2000.0  # K above the air, with its error
+JOINT_LIMIT: Final = 1.5
+"""Of any state of the joint observer: logarithms, and the rest is smaller still."""
+FARTHEST: Final = 1e10  # m, of an odometer
+THICKEST: Final = 50.0  # mm
+LEAST_EIGENVALUE: Final = 1e-6  # of a correlation matrix, below zero: rounding
+
+_TABLE: Final = """CREATE TABLE learned (
+    key TEXT NOT NULL, revision INTEGER NOT NULL, saved_at TEXT NOT NULL,
+    record BLOB NOT NULL, crc INTEGER NOT NULL,
+    PRIMARY KEY (key, revision)
+)"""
+_FILE_FORMATS: Final = (b"\x01\x01", b"\x02\x02")  # bytes 18 and 19: rollback journal, WAL
+_LARGEST_REVISION: Final = 1 << 53
+_OF_ANOTHER_KIND: Final = f"""SELECT count(*) FROM learned WHERE typeof(key) != 'text'
+    OR typeof(saved_at) != 'text' OR typeof(record) != 'blob' OR typeof(crc) != 'integer'
+    OR typeof(revision) != 'integer' OR revision NOT BETWEEN 1 AND {_LARGEST_REVISION}"""
+
+
+def open_store(folder: Path) -> sqlite3.Connection:
+    """Open the store in `folder`, made if missing; a file that is no sqlite database any more is set aside.
+
+    Raises:
+        UserError: the folder cannot be written.
+    """
+    path = folder / FILE
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        try:
+            return _connect(path)
+        except DAMAGED as error:
+            if isinstance(error, sqlite3.OperationalError) and not _is_damaged(error):
+                raise
+            _set_aside(path, str(error))
+            return _connect(path)
+    except (OSError, *DAMAGED) as error:
+        raise UserError(
+            str(path), "", f"cannot be opened: {error}; give a folder that can be written"
+        ) from None
+
+
+@contextmanager
+def in_use(folder: Path) -> Iterator[None]:
+    """Let no one change by hand what is kept in `folder` while a daemon keeps it."""
+    with (folder / LOCK).open("a") as file:
+        fcntl.flock(file, fcntl.LOCK_SH)
+        yield
+
+
+@contextmanager
+def alone(folder: Path) -> Iterator[None]:
+    """Change what is kept in `folder` by hand.
+
+    Raises:
+        UserError: a daemon keeps it, or the folder cannot be written.
+    """
+    try:
+        with (folder / LOCK).open("a") as file:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            yield
+    except BlockingIOError:
+        raise UserError(
+            str(folder), "", "a daemon keeps it and would overwrite this; stop it first"
+        ) from None
+    except OSError as error:
+        raise UserError(str(folder), "", f"cannot be written: {error.strerror}") from None
+
+
+def _is_damaged(error: sqlite3.OperationalError) -> bool:
+    """Whether the file is at fault and not its surroundings (rights, a full disk, a lock)."""
+    code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR)  # Python's own, over text, has none
+    return code & 0xFF in (sqlite3.SQLITE_IOERR, sqlite3.SQLITE_ERROR)
+
+
+def _connect(path: Path) -> sqlite3.Connection:
+    with suppress(FileNotFoundError), path.open("rb") as file:
+        if file.read(20)[18:] not in (b"", *_FILE_FORMATS):  # sqlite would take it as read-only
+            raise sqlite3.DatabaseError("its format is another's")
+    store = sqlite3.connect(path, isolation_level=None, timeout=0.5)
+    try:
+        store.execute("PRAGMA journal_mode=WAL")
+        store.execute("PRAGMA synchronous=FULL")
+        with _transaction(store):
+            schema = store.execute(
+                "SELECT type, name, sql FROM sqlite_schema WHERE sql IS NOT NULL"
+            ).fetchall()
+            if not schema:
+                store.execute(_TABLE)
+            store.execute("PRAGMA user_version = 1")  # one that cannot be written shows now
+        if schema and schema != [("table", "learned", _TABLE)]:
+            raise sqlite3.DatabaseError("it holds another schema")
+        verdict = store.execute("PRAGMA integrity_check(1)").fetchone()[0]
+        if verdict != "ok":
+            raise sqlite3.DatabaseError(verdict)
+        if store.execute(_OF_ANOTHER_KIND).fetchone()[0]:
+            raise sqlite3.DatabaseError("it holds values of another kind")
+    except BaseException:
+        store.close()
+        raise
+    return store
+
+
+def _set_aside(path: Path, reason: str) -> None:
+    aside = path.with_name(f"{path.name}.damaged-{time.time_ns()}")
+    for suffix in ("", "-wal", "-shm"):
+        part = path.with_name(path.name + suffix)
+        if part.exists():
+            part.rename(aside.with_name(aside.name + suffix))
+    structlog.get_logger("store").error(
+        "store_damaged",
+        file=str(path),
+        reason=reason,
+        set_aside=str(aside),
+        remedy="learned values start anew",
+    )
+
+
+def _crc(key: str, revision: int, record: bytes) -> int:
+    return zlib.crc32(f"{key}\0{revision}\0".encode() + record)
+
+
+def save(store: sqlite3.Connection, key: str, learned: RecordArray) -> int:
+    """Add `learned` (`LEARNED`, shape (1,)) as the next revision of `key`, durable on return; returns it."""
+    with _transaction(store):
+        for part in PARTS:
+            _add(store, part_key(key, part), learned[part].tobytes())
+        return _add(store, key, learned.tobytes())
+
+
+def _add(store: sqlite3.Connection, key: str, record: bytes) -> int:
+    last = store.execute("SELECT max(revision) FROM learned WHERE key = ?", (key,)).fetchone()[0]
+    revision = int(last or 0) + 1
+    now = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
+    crc = _crc(key, revision, record)
+    store.execute("INSERT INTO learned VALUES (?, ?, ?, ?, ?)", (key, revision, now, record, crc))
+    store.execute("DELETE FROM learned WHERE key = ? AND revision <= ?", (key, revision - REVISIONS_KEPT))
+    return revision
+
+
+def part_key(key: str, part: str) -> str:
+    """Return what one of `PARTS` is kept under: the vehicle of `key` and the version of its layout."""
+    return f"{key.rsplit('/', 2)[0]}/{part}/1"
+
+
+@contextmanager
+def _transaction(store: sqlite3.Connection) -> Iterator[None]:
+    store.execute("BEGIN IMMEDIATE")
+    try:
+        yield
+    except BaseException:
+        store.execute("ROLLBACK")
+        raise
+    store.execute("COMMIT")
+
+
+def restore(
+    store: sqlite3.Connection, key: str, mu_nominal: NDArray[np.float64]
+) -> tuple[int, RecordArray] | None:
+    """Return the newest good revision of `key` and its record (`LEARNED`, shape (1,)); None without one.
+
+    `mu_nominal` has shape (4,). Good: the CRC holds and every value lies in its range. Wear and dust
+    are the vehicle's where these went on since.
+    """
+    found = _newest_good(store, key, LEARNED, lambda learned: out_of_range(learned, mu_nominal))
+    if not found:
+        _tell_of_other_versions(store, key)
+        return None
+    for part, (_, _, way) in PARTS.items():
+        own = restore_part(store, key, part)
+        if own is not None and own[way][0] >= found[1][part][way][0]:
+            found[1][part] = own
+    return found
+
+
+def restore_part(store: sqlite3.Connection, key: str, part: str) -> RecordArray | None:
+    """Return the vehicle's wear or dust (`PARTS`, shape (1,)) by its newest good row, None without one."""
+    dtype, wrong, _ = PARTS[part]
+    found = _newest_good(store, part_key(key, part), dtype, wrong)
+    return found[1] if found else None
+
+
+def _newest_good(
+    store: sqlite3.Connection, key: str, dtype: np.dtype[Any], wrong: Callable[[RecordArray], str]
+) -> tuple[int, RecordArray] | None:
+    rows = store.execute(
+        "SELECT revision, record, crc FROM learned WHERE key = ? ORDER BY revision DESC", (key,)
+    )
+    for revision, record, crc in rows.fetchall():
+        if not isinstance(record, bytes) or len(record) != dtype.itemsize:
+            reason = "another layout"
+        elif crc != _crc(key, revision, record):
+            reason = "CRC"
+        else:
+            reason = wrong(np.frombuffer(record, dtype))
+        if not reason:
+            return revision, np.frombuffer(record, dtype).copy()
+        structlog.get_logger("store").warning(
+            "revision_refused", revision=revision, reason=reason, remedy="the one before it is tried"
+        )
+    return None
+
+
+def _tell_of_other_versions(store: sqlite3.Connection, key: str) -> None:
+    vehicle = key.rpartition("/")[0]
+    keys = {row[0] for row in store.execute("SELECT DISTINCT key FROM learned")} - {key}
+    others = sorted(other for other in keys if other.rpartition("/")[0] == vehicle)
+    if others:
+        structlog.get_logger("store").warning(
+            "learned_by_another_version", key=others[-1], remedy="it stays in the store; learning begins anew"
+        )
+
+
+def out_of_range(learned: RecordArray, mu_nominal: NDArray[np.float64]) -> str:
+    """Return the name of the first value of `learned` (shape (1,)) that cannot be, empty if there is none."""
+    row = learned[0]
+    known = row["observed_s"] > 0  # of a corner that was never observed the friction says nothing
+    share = row["mu_b"] / mu_nominal
+    sigma = row["sigma_mu_b"]
+    p = covariance_of(row["joint_covariance"])
+    checks = {
+        "observed_s": np.isfinite(row["observed_s"]) & (row["observed_s"] >= 0),
+        "mu_b": ~known | ((share >= MU_RANGE[0]) & (share <= MU_RANGE[1])),
+        "sigma_mu_b": ~known | (np.isfinite(sigma) & (sigma > 0)),
+        "radius_error": np.abs(row["radius_error"]) <= RADIUS_ERROR_LIMIT,
+        "radius_sigma": np.isfinite(row["radius_sigma"]) & (row["radius_sigma"] > 0),
+        "joint": np.abs(row["joint"]) <= JOINT_LIMIT,
+        "joint_covariance": np.asarray(not row["joint_known"] or is_covariance(p)),
+        "disc_excess": (row["disc_excess"] >= 0) & (row["disc_excess"] <= DISC_EXCESS_LIMIT),
+        "brakings": np.asarray(row["brakings"] >= 0),
+    }
+    first = next((name for name, good in checks.items() if not good.all()), "")
+    return first or wear_out_of_range(learned["wear"]) or dust_out_of_range(learned["dust"])
+
+
+def wear_out_of_range(wear: RecordArray) -> str:
+    """Return the name of the first value of `wear` (shape (1,)) that cannot be, empty if there is none."""
+    row = wear[0]
+    sums = ("regressors", "friction_error", "temperature_error", "leg_ends", "measured_at")
+    checks = {name: np.isfinite(row[name]) & (row[name] >= 0) for name in sums}
+    checks["odometer"] = np.asarray(0 <= row["odometer"] <= FARTHEST)
+    checks["fitted_at"] = (row["fitted_at"] >= 0) & (row["fitted_at"] <= row["odometer"])
+    checks["told"] = np.isin(row["told"], (0, 1))
+    checks["measurements"] = (row["measurements"] >= 0) & (row["measurements"] <= N_MEASURED)
+    used = np.arange(N_MEASURED)[:, None] < row["measurements"]
+    checks["measured_wear"] = ~used | (np.abs(row["measured_wear"]) <= THICKEST)
+    checks["measured_sigma"] = ~used | ((row["measured_sigma"] > 0) & (row["measured_sigma"] <= THICKEST))
+    checks["legs"] = np.asarray(0 <= row["legs"] <= FARTHEST)
+    return next((name for name, good in checks.items() if not good.all()), "")
+
+
+def dust_out_of_range(dust: RecordArray) -> str:
+    """Return the name of the first value of `dust` (shape (1,)) that cannot be, empty if there is none."""
+    row = dust[0]
+    checks = {name: np.isfinite(row[name]) and row[name] >= 0 for name in ("particles", "work", "told_work")}
+    checks["way"] = 0 <= row["way"] <= FARTHEST
+    checks["applications"] = row["applications"] >= 0
+    return next((name for name, good in checks.items() if not good), "")
+
+
+PARTS: Final = {
+    "wear": (WEAR, wear_out_of_range, "odometer"),
+    "dust": (DUST, dust_out_of_range, "way"),
+}
+"""What belongs to the vehicle and its pads: layout, check, and the way [m] by which it went on."""
+
+
+def covariance_of(triangle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the symmetric matrix whose lower triangle, by rows, is `triangle`."""
+    n = int(math.sqrt(2 * len(triangle)))
+    matrix = np.zeros((n, n))
+    matrix[np.tril_indices(n)] = triangle
+    return matrix + np.tril(matrix, -1).T
+
+
+def is_covariance(matrix: NDArray[np.float64]) -> bool:
+    """Whether a symmetric matrix, shape (n, n), can be one: finite, no variance or eigenvalue below 0."""
+    if not np.isfinite(matrix).all() or (np.diag(matrix) < 0).any():
+        return False
+    sigma = np.sqrt(np.maximum(np.diag(matrix), 1e-30))
+    return bool(np.linalg.eigvalsh(matrix / np.outer(sigma, sigma)).min() > -LEAST_EIGENVALUE)
+
+
+class Keeper(NamedTuple):
+    """When to save: the last saved record and when that was [s, monotonic]."""
+
+    saved: bytes
+    brakings: int
+    at_s: float
+
+
+def first_keeper(learned: RecordArray, now_s: float) -> Keeper:
+    """Return the keeper of a record that stands in the store, or need not: what the run started with."""
+    return Keeper(learned.tobytes(), int(learned["brakings"][0]), now_s)
+
+
+def is_due(keeper: Keeper, learned: RecordArray, now_s: float) -> bool:
+    """Whether to save now: after a braking at once, any other change after at most a minute."""
+    if learned.tobytes() == keeper.saved:
+        return False
+    return int(learned["brakings"][0]) > keeper.brakings or now_s - keeper.at_s >= SAVE_INTERVAL_S

@@ -1,0 +1,156 @@
+"""The 10 ms grid: absolute deadlines on the monotonic clock, missed periods, lateness statistics.
+
+A cycle that overruns is not made up for in a burst: the periods that passed are counted, and the next
+deadline is the next one on the grid. T_k exists on two clocks: the monotonic one schedules, the real-time
+one is compared with the frames' stamps.
+"""
+
+import ctypes
+import math
+import os
+import time
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ecu.contract.signals import CYCLE_NS
+
+MICROSECOND_NS: Final = 1000
+
+
+class TimeSource(NamedTuple):
+    """The two clocks in ns and a sleep until a monotonic instant; a test puts its own in their place."""
+
+    monotonic_ns: Callable[[], int]
+    realtime_ns: Callable[[], int]
+    sleep_until: Callable[[int], None]
+
+
+class _Timespec(ctypes.Structure):
+    _fields_ = (("seconds", ctypes.c_long), ("nanoseconds", ctypes.c_long))
+
+
+def _absolute_sleep() -> Callable[[int], None]:
+    """Return clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME), or time.sleep where libc has none."""
+    nanosleep = getattr(ctypes.CDLL(None), "clock_nanosleep", None) if os.name == "posix" else None
+    if nanosleep is None:
+        return lambda deadline_ns: time.sleep(max(0, deadline_ns - time.monotonic_ns()) / 1e9)
+    nanosleep.argtypes = (ctypes.c_int, ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)
+    until = _Timespec()
+    address = ctypes.addressof(until)
+    absolute = 1  # TIMER_ABSTIME
+
+    def sleep_until(deadline_ns: int) -> None:
+        until.seconds, until.nanoseconds = divmod(deadline_ns, 1_000_000_000)
+        nanosleep(time.CLOCK_MONOTONIC, absolute, address, None)
+
+    return sleep_until
+
+
+def system_time() -> TimeSource:
+    """Return the machine's clocks."""
+    return TimeSource(time.monotonic_ns, time.time_ns, _absolute_sleep())
+
+
+class Tick(NamedTuple):
+    """One deadline that was waited for."""
+
+    t_ns: int
+    """T_k on the real-time clock, whole microseconds."""
+    t_mono_ns: int
+    missed: int
+    """Periods that passed unserved since the cycle before."""
+    lateness_ns: int
+    """How long after its deadline the cycle woke."""
+
+
+class Grid:
+    """Deadlines every `period_ns`, the first one a period after the start."""
+
+    def __init__(self, source: TimeSource, period_ns: int = CYCLE_NS) -> None:
+        self.source, self.period_ns = source, period_ns
+        self.deadline_ns = source.monotonic_ns()
+        self.offset_ns, self._spread_ns = self._sample_offset()
+
+    def wait(self) -> Tick:
+        """Sleep until the next deadline that has not passed; a signal may wake it early, it sleeps on."""
+        period = self.period_ns
+        now = self.source.monotonic_ns()
+        missed = max(0, (now - self.deadline_ns) // period)
+        self.deadline_ns += (missed + 1) * period
+        while now < self.deadline_ns:
+            self.source.sleep_until(self.deadline_ns)
+            now = self.source.monotonic_ns()
+        self._follow_realtime()
+        t_ns = (self.deadline_ns + self.offset_ns) // MICROSECOND_NS * MICROSECOND_NS
+        return Tick(t_ns, self.deadline_ns, missed, now - self.deadline_ns)
+
+    def _sample_offset(self) -> tuple[int, int]:
+        before = self.source.monotonic_ns()
+        real = self.source.realtime_ns()
+        after = self.source.monotonic_ns()
+        return real - (before + after) // 2, after - before
+
+    def _follow_realtime(self) -> None:
+        """Take a new offset only if the real-time clock was set: readings between which we slept lie."""
+        offset, spread = self._sample_offset()
+        if abs(offset - self.offset_ns) > spread + self._spread_ns:
+            self.offset_ns, self._spread_ns = offset, spread
+
+
+class Welford:
+    """Count, mean, deviation, minimum and maximum in O(1) memory; NaN while empty."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._mean = self._squares = 0.0
+        self.minimum = self.maximum = math.nan
+
+    def add(self, value: float) -> None:
+        """Take one value into account."""
+        self.count += 1
+        step = value - self._mean
+        self._mean += step / self.count
+        self._squares += step * (value - self._mean)
+        if not value >= self.minimum:
+            self.minimum = value
+        if not value <= self.maximum:
+            self.maximum = value
+
+    @property
+    def mean(self) -> float:
+        """Arithmetic mean."""
+        return self._mean if self.count else math.nan
+
+    @property
+    def deviation(self) -> float:
+        """Sample standard deviation; NaN below two values."""
+        return math.sqrt(self._squares / (self.count - 1)) if self.count > 1 else math.nan
+
+
+BINS_PER_OCTAVE: Final = 8
+OCTAVES: Final = 36  # 1 ns to 68 s
+
+
+class Histogram:
+    """Counts of durations in log-spaced bins (9 % wide), preallocated, with the running moments."""
+
+    def __init__(self) -> None:
+        self.counts: NDArray[np.int64] = np.zeros(BINS_PER_OCTAVE * OCTAVES, np.int64)
+        self.moments = Welford()
+
+    def add(self, duration_ns: int) -> None:
+        """Count one duration [ns]."""
+        place = int(BINS_PER_OCTAVE * math.log2(duration_ns)) if duration_ns > 1 else 0
+        self.counts[min(place, len(self.counts) - 1)] += 1
+        self.moments.add(duration_ns)
+
+    def quantile(self, share: float) -> float:
+        """Return the duration [ns] that `share` of all stay below or at: a bin's upper edge, at most the
+        largest value seen. NaN while empty."""
+        if not self.moments.count:
+            return math.nan
+        place = int(np.searchsorted(np.cumsum(self.counts), share * self.moments.count))
+        return float(min(2.0 ** ((place + 1) / BINS_PER_OCTAVE), self.moments.maximum))

@@ -1,0 +1,273 @@
+"""The cycle: wait, drain, receive, step, transmit, send, publish, a hundred times a second.
+
+`cycle_once` works on memory that `new_ecu` laid out and on an open channel, ring and grid. It allocates
+nothing that stays, logs nothing and waits for nothing but its deadline.
+"""
+
+import time
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ecu.algorithm.step import new_state, step
+from ecu.bus.channel import BusStatus, Channel
+from ecu.bus.freshness import begin_cycle, end_cycle
+from ecu.bus.receive import ReceivePlan, Reception, new_reception, receive
+from ecu.bus.transmit import Transmission, TransmitPlan, frame_buffer, new_transmission, transmit
+from ecu.contract import faults
+from ecu.contract.records import (
+    CYCLE,
+    EXTENDED_ID,
+    FRAME,
+    FRAME_EXTENDED,
+    INPUTS,
+    OUTPUTS,
+    STAGES,
+    RecordArray,
+    new_record,
+    output_vector,
+)
+from ecu.contract.signals import CYCLE_NS
+from ecu.jit import CompileCounter, kernel
+from ecu.recording.ring import Ring, publish
+from ecu.runtime.clock import MICROSECOND_NS, Grid, Histogram, Tick
+from ecu.runtime.standby import Claim, Standby
+
+WAITING_FRAMES: Final = 4096  # room for what waits: a second of a saturated bus
+HOLD_CYCLES: Final = 100  # a passing fault of the service shows for a second
+FAREWELLS: Final = 3  # one may be lost
+_COUNTED: Final = (faults.SEND_FAILED, faults.FRAMES_DROPPED, faults.FOREIGN_SENDER, faults.LATE)
+
+
+class Ecu(NamedTuple):
+    """All memory of the cycle, laid out before the first one."""
+
+    params: RecordArray
+    state: RecordArray
+    inputs: RecordArray
+    outputs: RecordArray
+    vector: NDArray[np.float64]
+    """The outputs as `transmit` reads them."""
+    learned: RecordArray
+    """A view into the state."""
+    cycle: RecordArray
+    receive_plan: ReceivePlan
+    reception: Reception
+    transmit_plan: TransmitPlan
+    transmission: Transmission
+    waiting: RecordArray
+    """Frames received and not consumed yet, from index 0."""
+    sending: RecordArray
+
+
+def new_ecu(
+    params: RecordArray, learned: RecordArray | None, receive_plan: ReceivePlan, transmit_plan: TransmitPlan
+) -> Ecu:
+    """Return an ECU before its first cycle, with what it has `learned` before (None: nothing)."""
+    params = params.copy()
+    params["mapped"] = receive_plan.mapped
+    state = new_state(params, learned)
+    outputs = new_record(OUTPUTS)
+    return Ecu(
+        params,
+        state,
+        new_record(INPUTS),
+        outputs,
+        output_vector(outputs),
+        state["learned"],
+        new_record(CYCLE),
+        receive_plan,
+        new_reception(receive_plan),
+        transmit_plan,
+        new_transmission(transmit_plan),
+        new_record(FRAME, WAITING_FRAMES),
+        frame_buffer(transmit_plan),
+    )
+
+
+class Timing:
+    """Lateness and stage times of a run."""
+
+    def __init__(self) -> None:
+        self.lateness = Histogram()
+        self.stages = tuple(Histogram() for _ in STAGES)
+
+    def add(self, lateness_ns: int, stages_ns: tuple[int, ...]) -> None:
+        """Take one cycle into account."""
+        self.lateness.add(lateness_ns)
+        for histogram, duration_ns in zip(self.stages, stages_ns, strict=True):
+            histogram.add(duration_ns)
+
+
+class Watch:
+    """Fault bits that only the service sees. A counter that rose shows its bit for `HOLD_CYCLES`."""
+
+    def __init__(self, start: BusStatus, compiled: CompileCounter) -> None:
+        self._compiled, self._compiled_at_start = compiled, compiled.count
+        self._seen = [start.send_failures, start.dropped, 0, 0]
+        self._until = [0, 0, 0, 0]
+        self.kept = True
+        """Whether the side process keeps what it is given."""
+
+    def look(self, number: int, status: BusStatus, foreign: int, overruns: int) -> int:
+        """Return the bits in cycle `number`."""
+        bits = faults.BUS_OFF if status.bus_off else 0
+        if status.error_passive:
+            bits |= faults.ERROR_PASSIVE
+        if not self.kept:
+            bits |= faults.NOT_KEPT
+        if self._compiled.count > self._compiled_at_start:
+            bits |= faults.COMPILED
+        counters = (status.send_failures, status.dropped, foreign, overruns)
+        for place, bit in enumerate(_COUNTED):
+            if counters[place] > self._seen[place]:
+                self._seen[place] = counters[place]
+                self._until[place] = number + HOLD_CYCLES
+            if number < self._until[place]:
+                bits |= bit
+        return bits
+
+
+class Progress:
+    """What is carried from cycle to cycle beside the ECU's own records."""
+
+    def __init__(self, watch: Watch, standby: Standby | None = None) -> None:
+        self.watch, self.standby, self.claim, self.timing = watch, standby, Claim(), Timing()
+        self.number = self.overruns = self.waiting = self.foreign = 0
+        self.worst_lateness_ns = self.previous_t_ns = 0
+
+    @property
+    def speaks(self) -> bool:
+        """Whether this daemon sends."""
+        return self.standby is None or self.standby.speaks
+
+
+def cycle_once(ecu: Ecu, channel: Channel, ring: Ring, grid: Grid, run: Progress) -> None:
+    """Run one cycle: the ECU, from the socket to the socket."""
+    clock = grid.source.monotonic_ns
+    tick = grid.wait()
+    woken = clock()
+    run.waiting += channel.drain(ecu.waiting, run.waiting)
+    drained = clock()
+    consumed, late, foreign = _gather(
+        ecu.receive_plan,
+        ecu.transmit_plan.ids,
+        ecu.reception,
+        ecu.waiting,
+        run.waiting,
+        ecu.inputs,
+        tick.t_ns,
+        (tick.missed + 1) * CYCLE_NS,
+        run.previous_t_ns,
+        grid.source.realtime_ns(),
+    )
+    if run.standby is None:
+        run.foreign += foreign
+        if run.claim.is_lost(foreign, tick.missed):
+            run.standby = Standby(yielded=True)
+    if run.standby is not None:
+        run.standby.listen(ecu.transmit_plan, ecu.transmission, ecu.waiting, run.waiting, tick.t_mono_ns)
+    status = channel.status()
+    _note_service(ecu, run, tick, status)
+    received = clock()
+    step(ecu.params, ecu.state, ecu.inputs, ecu.outputs)
+    stepped = clock()
+    due = 0
+    if run.speaks:
+        due = transmit(ecu.transmit_plan, ecu.transmission, ecu.vector, run.number, ecu.sending)
+    encoded = clock()
+    channel.send(ecu.sending, due)
+    sent = clock()
+
+    stages = (drained - woken, received - drained, stepped - received, encoded - stepped, sent - encoded)
+    _note_cycle(ecu, run, tick, consumed, late, status.dropped, stages)
+    publish(ring, ecu.cycle, ecu.outputs, ecu.learned, ecu.waiting)
+    run.waiting = _keep_rest(ecu.waiting, consumed, run.waiting)
+    run.timing.add(tick.lateness_ns, stages)
+    run.previous_t_ns = tick.t_ns
+    run.number += 1
+
+
+def _note_service(ecu: Ecu, run: Progress, tick: Tick, status: BusStatus) -> None:
+    """Tell `step` what only the service knows."""
+    run.overruns += tick.missed
+    run.worst_lateness_ns = max(run.worst_lateness_ns, tick.lateness_ns + tick.missed * CYCLE_NS)
+    inputs = ecu.inputs
+    inputs["bus_faults"] = run.watch.look(run.number, status, run.foreign, run.overruns)
+    inputs["overruns"] = run.overruns
+    inputs["worst_lateness_us"] = run.worst_lateness_ns / MICROSECOND_NS
+
+
+def _note_cycle(
+    ecu: Ecu, run: Progress, tick: Tick, consumed: int, late: int, dropped: int, stages_ns: tuple[int, ...]
+) -> None:
+    cycle = ecu.cycle
+    cycle["number"], cycle["t_ns"], cycle["t_mono_ns"] = run.number, tick.t_ns, tick.t_mono_ns
+    cycle["missed"], cycle["lateness_ns"] = tick.missed, tick.lateness_ns
+    for name in ("bus_faults", "overruns", "worst_lateness_us"):
+        cycle[name] = ecu.inputs[name]
+    cycle["frames"], cycle["late_frames"], cycle["dropped"] = consumed, late, dropped
+    cycle["stage_ns"], cycle["speaks"] = stages_ns, run.speaks
+
+
+@kernel
+def _gather(
+    plan: ReceivePlan,
+    own_ids: NDArray[np.uint32],
+    reception: Reception,
+    frames: Any,
+    count: int,
+    inputs: Any,
+    t_ns: int,
+    dt_ns: int,
+    previous_t_ns: int,
+    now_ns: int,
+) -> tuple[int, int, int]:
+    """Fill `inputs` from the frames stamped up to `t_ns`.
+
+    Returns how many those are, how many of them came late and how many bear one of our own identifiers. A
+    stamp from the future means that the clock was set back since: it becomes now.
+    """
+    now_us = now_ns // MICROSECOND_NS * MICROSECOND_NS
+    for i in range(count):
+        if frames[i].stamp_ns > now_us:
+            frames[i].stamp_ns = now_us
+    begin_cycle(inputs[0], t_ns, dt_ns)
+    consumed = receive(plan, reception, frames, 0, count, inputs[0])
+    end_cycle(inputs[0], reception.freshness)
+    late = foreign = 0
+    for i in range(consumed):
+        if frames[i].stamp_ns <= previous_t_ns:
+            late += 1
+        identifier = np.int64(frames[i].can_id) | (EXTENDED_ID if frames[i].flags & FRAME_EXTENDED else 0)
+        for own in own_ids:
+            if own == identifier:
+                foreign += 1
+    return consumed, late, foreign
+
+
+@kernel
+def _keep_rest(frames: Any, first: int, count: int) -> int:
+    """Move `frames[first:count]` to the front; return how many they are."""
+    for i in range(first, count):
+        frames[i - first] = frames[i]
+    return count - first
+
+
+def send_farewell(
+    ecu: Ecu, channel: Channel, number: int, sleep: Callable[[float], None] = time.sleep
+) -> None:
+    """Send what is due with demand 0 flagged invalid, in three cycles from `number` on.
+
+    The hydraulic fallback takes over at once. It works whatever the cycle was in the middle of.
+    """
+    outputs = ecu.outputs
+    outputs["pressure_demand"] = outputs["pressure_demand_valid"] = outputs["motor_demand_valid"] = 0.0
+    outputs["motor_demand"] = np.nan
+    for cycle in range(number, number + FAREWELLS):
+        if cycle > number:
+            sleep(CYCLE_NS * 1e-9)
+        due = transmit(ecu.transmit_plan, ecu.transmission, ecu.vector, cycle, ecu.sending)
+        channel.send(ecu.sending, due)

@@ -1,0 +1,201 @@
+"""Everything that `run` does before READY: afterwards nothing is compiled, allocated, started or logged.
+
+Configuration, bus, side process, learned values, kernels, listening, ring, rights: in that order. A signal
+ends it at any time (`start.left_at_once`). It listens for a whole second after the kernels are ready, and
+to nothing that waited meanwhile.
+"""
+
+import os
+import sys
+import time
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numba
+import numpy as np
+import structlog
+
+from ecu import __version__
+from ecu.algorithm.step import STATE
+from ecu.bus.channel import Channel, open_channel
+from ecu.bus.foreign import discard, listen_before_send
+from ecu.bus.signal_map import receive_plan
+from ecu.bus.transmit import contract_transmit_plan
+from ecu.contract.records import RecordArray
+from ecu.contract.signals import CYCLE_NS, INPUT_SIGNALS, OUTPUT_SIGNALS
+from ecu.errors import UserError
+from ecu.jit import CompileCounter
+from ecu.recording import store as state_store
+from ecu.recording.recorder import interface_name, layout
+from ecu.recording.restored import restored
+from ecu.recording.ring import Ring, create_ring, remove_ring, ring_path
+from ecu.runtime.cycle import Ecu, new_ecu
+from ecu.runtime.notify import Manager
+from ecu.runtime.realtime import make_realtime, settle
+from ecu.runtime.side import Side
+from ecu.runtime.standby import Standby, learned_by_first
+from ecu.runtime.start import like_others
+from ecu.settings.config import Config, config_hash, load_config, new_params, store_key
+from ecu.settings.resources import resource
+from ecu.warm import warm_up
+
+LISTEN_S: Final = 1.0
+TELL_PROGRESS_S: Final = 5.0
+
+
+class RunOptions(NamedTuple):
+    """Arguments of `brake-ecu run`."""
+
+    config: Path
+    interface: str
+    channel: str
+    map: Path | None = None
+    record: Path | None = None
+    record_limit: float | None = None
+    """GB of all recordings in `record`."""
+    state: Path | None = None
+    standby: bool = False
+
+
+class Session(NamedTuple):
+    """Everything that a run holds open."""
+
+    ecu: Ecu
+    channel: Channel
+    ring: Ring
+    side: Side
+    compiled: CompileCounter
+    standby: Standby | None
+    manager: Manager
+
+
+class CompileProgress:
+    """Says that kernels are compiled, and how far it has come; nothing any more once it `is_over`."""
+
+    def __init__(self, manager: Manager) -> None:
+        self._manager, self._told_s, self.is_over = manager, 0.0, False
+
+    def __call__(self, count: int) -> None:
+        """Take note that one more is begun after `count`."""
+        now_s = time.monotonic()
+        if self.is_over or (count and now_s - self._told_s < TELL_PROGRESS_S):
+            return
+        if not count:
+            like_others()  # minutes of compiling are not worth anyone's standing still
+        self._told_s = now_s
+        self._manager.tell(f"STATUS=compiling kernels, {count} done")
+        structlog.get_logger("ecu").info(
+            "compiling",
+            done=count,
+            lasts="one to four minutes, once per version",
+            remedy="python -m ecu.warm compiles beforehand",
+        )
+
+
+def prepare(options: RunOptions) -> Session:
+    """Return all that the cycle needs.
+
+    Raises:
+        UserError: bad arguments or configuration, a bus that cannot be opened, or someone else already sends
+            one of our frames.
+    """
+    manager = Manager()
+    progress = CompileProgress(manager)
+    compiled = CompileCounter(progress)
+    config = load_config(options.config)
+    receiving = receive_plan(options.map)
+    sending = contract_transmit_plan(resource("dbc/brake_ecu.dbc"), "BrakeEcu")
+    params = new_params(config)
+    description = _describe(options, config)
+    path = ring_path(os.getpid())
+    remove_ring(path)  # of one that had our process id before: the side process takes the one that appears
+    channel = open_channel(
+        options.interface,
+        options.channel,
+        receive_ids=[*receiving.ids.tolist(), *sending.ids.tolist()],
+        fd=config.can_fd,
+    )
+    began = time.monotonic()
+    side = Side(path, _side_arguments(options))
+    try:
+        learned = _restored(options.state, config, params)
+        if options.standby:
+            from_first = learned_by_first(description, params["mu_nominal"][0])
+            learned = learned if from_first is None else from_first
+        ecu = new_ecu(params, learned, receiving, sending)
+        warm_up(ecu, compiled)
+        progress.is_over = True
+        settle()
+        warm_s = time.monotonic() - began
+        discard(channel)
+        if not options.standby:
+            listen_before_send(channel, f"{options.interface} {options.channel}", sending, LISTEN_S)
+        ring = create_ring(path, description, ecu.state.tobytes())
+        side.await_ready()
+    except BaseException:
+        side.abandon()
+        remove_ring(path)
+        channel.close()
+        raise
+    verdicts = make_realtime()
+    structlog.get_logger("ecu").info(
+        "ready",
+        channel=options.channel,
+        armed=config.transmit,
+        standby=options.standby,
+        warm_up_s=round(warm_s, 2),
+        compiled=compiled.count,
+        realtime={verdict.name: verdict.granted for verdict in verdicts},
+        ring=str(path),
+    )
+    if not manager.tell("READY=1"):
+        structlog.get_logger("ecu").warning(
+            "not_notified", remedy=f"NOTIFY_SOCKET is {os.environ['NOTIFY_SOCKET']}: unset it or mend it"
+        )
+    return Session(ecu, channel, ring, side, compiled, Standby() if options.standby else None, manager)
+
+
+def _restored(folder: Path | None, config: Config, params: RecordArray) -> RecordArray | None:
+    """Return what was learned before, None if there is nothing to go by: the side process says why."""
+    if folder is None:
+        return None
+    try:
+        found = restored(folder, config, params)
+    except (UserError, *state_store.DAMAGED):
+        return None
+    if found is None:
+        return None
+    revision, learned = found
+    structlog.get_logger("ecu").info(
+        "restored", revision=revision, mu_b=learned["mu_b"][0].tolist(), brakings=int(learned["brakings"][0])
+    )
+    return learned
+
+
+def _describe(options: RunOptions, config: Config) -> dict[str, Any]:
+    """Return what a recording says of itself."""
+    return {
+        "name": config.name,
+        "channel": interface_name(options.channel),
+        "interface": options.interface,
+        "start_ns": time.time_ns(),
+        "period_ns": CYCLE_NS,
+        "config": str(options.config),
+        "map": None if options.map is None else str(options.map),
+        "config_hash": config_hash(config),
+        "store_key": store_key(config),
+        "versions": {
+            "brake-ecu": __version__,
+            "python": ".".join(map(str, sys.version_info[:3])),
+            "numpy": np.__version__,
+            "numba": numba.__version__,
+        },
+        "units": {signal.name: signal.unit for signal in OUTPUT_SIGNALS},
+        "input_units": {signal.name: signal.unit for signal in INPUT_SIGNALS},
+        "state": layout(STATE),
+    }
+
+
+def _side_arguments(options: RunOptions) -> list[str]:
+    given = {"--record": options.record, "--record-limit": options.record_limit, "--state": options.state}
+    return [word for name, value in given.items() if value is not None for word in (name, str(value))]

@@ -1,0 +1,119 @@
+"""A second daemon that follows the bus in silence and speaks once the first one has fallen silent.
+
+It runs the whole cycle on the same frames, so its estimates, limiter and mode are warm at any time; only
+sending is left out. It takes over when none of the ECU's identifiers was heard for `SILENCE_NS` on the
+monotonic clock, and falls silent again in the cycle in which it hears one: two never talk side by side. It
+has to have heard a first one, so two that are started together do not race; where none was ever heard it
+stays silent. One standby per bus: two of them would take over together.
+
+A daemon that sends and hears another sender of its frames asks who was there first (`Claim`): a newcomer
+yields and goes on as a standby would, an established one stays. Reasons: docs/safety.md.
+
+The alive counters go on where those of the first one stopped, so that receivers see no foreign sequence.
+
+What was learned comes out of the first one's ring at the start, if it runs on this machine; from then on the
+own estimate counts, not what the ring says at the end. It saw the same frames through the same code, it
+exists where the first one's memory is gone or wrong, and nothing has to be read in the cycle that matters.
+"""
+
+import random
+from typing import Any, Final
+
+import numpy as np
+import structlog
+from numpy.typing import NDArray
+
+from ecu.bus.e2e import P01_MODULO
+from ecu.bus.transmit import Transmission, TransmitPlan
+from ecu.contract.records import EXTENDED_ID, FRAME_EXTENDED, RecordArray
+from ecu.contract.signals import CYCLE_NS
+from ecu.errors import UserError
+from ecu.jit import kernel
+from ecu.recording.ring import RingReader, living_rings
+from ecu.recording.store import out_of_range
+
+SILENCE_NS: Final = 50_000_000
+"""Five cycles without a frame of the first one."""
+SPREAD_CYCLES: Final = 16
+"""Two that yielded to each other wait a random number of cycles more, below this: one of them is first."""
+NEWCOMER_CYCLES: Final = 200
+"""After two seconds of sending a daemon is established: whoever starts now has heard it, and refused."""
+BESIDE_CYCLES: Final = 10
+"""So long another one has to be heard. A standby is silent after one, frames held up come in one."""
+
+
+class Claim:
+    """Whether a daemon that sends has to yield to another sender of its frames."""
+
+    def __init__(self) -> None:
+        self._spoken = self._beside = 0
+
+    def is_lost(self, foreign: int, missed: int) -> bool:
+        """Take a cycle with `foreign` frames of our identifiers into account, after `missed` periods."""
+        if missed * CYCLE_NS >= SILENCE_NS:  # receivers missed us: somebody may have come in good faith
+            self._spoken = 0
+        self._spoken += 1
+        self._beside = self._beside + 1 if foreign else max(0, self._beside - 1)
+        return self._beside == BESIDE_CYCLES and self._spoken <= NEWCOMER_CYCLES + BESIDE_CYCLES
+
+
+class Standby:
+    """Whether the second daemon speaks. `yielded`: to another that may be doing the same."""
+
+    def __init__(self, *, yielded: bool = False) -> None:
+        self.speaks = False
+        self._heard_ns: int | None = None
+        self._yielded = yielded
+        self._silence_ns = self._draw()
+
+    def _draw(self) -> int:
+        return SILENCE_NS + (random.randrange(SPREAD_CYCLES) * CYCLE_NS if self._yielded else 0)
+
+    def listen(
+        self, plan: TransmitPlan, sent: Transmission, frames: RecordArray, count: int, now_ns: int
+    ) -> None:
+        """Take the first `count` frames that wait into account; `now_ns` is T_k on the monotonic clock."""
+        if _adopt_counters(plan, sent, frames, count):
+            self._heard_ns = now_ns
+            if self.speaks:
+                self._silence_ns = self._draw()
+        self.speaks = self._heard_ns is not None and now_ns - self._heard_ns >= self._silence_ns
+
+
+@kernel
+def _adopt_counters(plan: TransmitPlan, sent: Transmission, frames: Any, count: int) -> int:
+    """Return how many of the frames bear an identifier of ours; go on counting where they stopped."""
+    heard = 0
+    for i in range(count):
+        identifier = np.int64(frames[i].can_id) | (EXTENDED_ID if frames[i].flags & FRAME_EXTENDED else 0)
+        for place in range(len(plan.ids)):
+            if plan.ids[place] == identifier:
+                heard += 1
+                if plan.messages[place].data_id != 0:
+                    sent.counter[place] = ((frames[i].data[1] & 0xF) + 1) % P01_MODULO
+    return heard
+
+
+def learned_by_first(description: dict[str, Any], mu_nominal: NDArray[np.float64]) -> RecordArray | None:
+    """Return what a living daemon on the same bus has learned (`LEARNED`, shape (1,)), None without one.
+
+    `description` is that of one's own ring: bus, vehicle and layout must be the same. `mu_nominal` has
+    shape (4,).
+    """
+    same = ("interface", "channel", "store_key", "state")
+    for path in living_rings():
+        try:
+            reader = RingReader(path)
+        except UserError:  # another user's, or another version's
+            continue
+        if any(reader.description.get(name) != description[name] for name in same):
+            continue
+        learned = reader.learned()
+        if learned is None:
+            continue
+        wrong = out_of_range(learned, mu_nominal)
+        if not wrong:
+            structlog.get_logger("ecu").info("learned_from_ring", ring=str(path))
+            return learned
+        structlog.get_logger("ecu").warning("ring_refused", ring=str(path), reason=wrong)
+    return None

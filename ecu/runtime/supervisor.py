@@ -1,0 +1,83 @@
+"""The supervisor of the recorder: `python -m ecu.runtime.supervisor SOCKET --ring RING …`.
+
+The loop starts nothing once it is READY, so a small process of its own does. It loads next to nothing and
+waits. It ends with the recorder when the loop is done (exit code 0) or the user has to mend something (2). A
+recorder whose supervisor died becomes one itself (`become`).
+"""
+
+import json
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Final, NoReturn
+
+from ecu.recording.sink import free_output
+from ecu.runtime.side import AWAY
+from ecu.runtime.start import ENDING, like_others
+
+PAUSE_S: Final = 0.1
+LONGEST_PAUSE_S: Final = 10.0  # less than the ring holds
+CALM_S: Final = 60.0  # one that lived that long begins with the short pause again
+FINAL_EXITS: Final = (0, 2)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Keep a recorder alive as long as the loop lives; returns its last exit code."""
+    free_output()
+    for number in ENDING:
+        signal.signal(number, signal.SIG_IGN)
+    leash = socket.socket(fileno=int(arguments[0]))
+    leash.setblocking(False)
+    again = "--again" in arguments
+    rest = [argument for argument in arguments[1:] if argument != "--again"]
+    command = [
+        sys.executable,
+        "-m",
+        "ecu.recording.side_process",
+        "--leash",
+        arguments[0],
+        "--parent",
+        str(os.getpid()),
+        *rest,
+    ]
+    pause_s, loop_is_gone = PAUSE_S, False
+    while True:
+        began = time.monotonic()
+        code = subprocess.Popen(command + ["--again"] * again, pass_fds=[leash.fileno()]).wait()
+        if code in FINAL_EXITS or loop_is_gone:
+            return code
+        _say_away(leash, code)
+        like_others()
+        again = True
+        if time.monotonic() - began > CALM_S:
+            pause_s = PAUSE_S
+        loop_is_gone = bool(select.select([leash], [], [], pause_s)[0])  # the loop never sends: its end
+        pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
+
+
+def _say_away(leash: socket.socket, code: int) -> None:
+    line = {
+        "event": "recorder_gone",
+        "level": "error",
+        "exit_code": code,
+        "remedy": "it is started again and goes on where it was",
+    }
+    sys.stderr.write(json.dumps(line) + "\n")
+    with suppress(OSError):  # the loop is gone, or will notice the silence
+        leash.send(AWAY)
+
+
+def become(leash: int, arguments: Sequence[str]) -> NoReturn:
+    """Turn this process into a supervisor that starts a recorder to go on."""
+    command = [sys.executable, "-m", "ecu.runtime.supervisor", str(leash), "--again", *arguments]
+    os.execv(sys.executable, command)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(sys.argv[1:]))

@@ -1,0 +1,34 @@
+"""The files that are shipped with the program: databases, vehicles, signal maps, scenarios."""
+
+from pathlib import Path
+from typing import Final
+
+from ecu.errors import UserError
+
+_PACKAGE = Path(__file__).parents[1]
+
+
+def resource(name: str) -> Path:
+    """Path of a shipped file or folder, e.g. `dbc/brake_ecu.dbc`, `config/suv.toml`: of the checkout, or of
+    the installed package."""
+    installed = _PACKAGE / "data"
+    return (installed if installed.is_dir() else _PACKAGE.parent) / name
+
+
+SCENARIOS: Final = ("config/scenarios", "config/scenarios/faults")
+
+
+def named(name: str, *folders: str) -> Path:
+    """Path of the file `name`; where no such file exists a bare name means a shipped one in `folders`.
+
+    `named("suv", "config")` is the shipped `config/suv.toml`. Raises UserError for a bare name that is
+    neither; any other path is returned as it is.
+    """
+    path = Path(name)
+    if path.is_file() or path.suffix or len(path.parts) != 1:
+        return path
+    shipped = {file.stem: file for folder in folders for file in sorted(resource(folder).glob("*.toml"))}
+    if name in shipped:
+        return shipped[name]
+    names = ", ".join(shipped)
+    raise UserError(name, "", f"no such file, and none that is shipped ({names})")

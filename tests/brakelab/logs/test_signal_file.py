@@ -1,0 +1,222 @@
+"""Signal files: what is read, and the one line that each damaged input gives."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from brakelab.logs import signal_file
+from brakelab.logs.signal_file import SignalQuality, read_signals
+from ecu.contract.signals import ACCEL_X, INPUT
+from ecu.errors import UserError
+
+
+def write(path: Path, content: str | bytes | dict[str, list[Any]]) -> Path:
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+    elif isinstance(content, str):
+        path.write_text(content, newline="")
+    else:
+        pq.write_table(pa.table(content), path)
+    return path
+
+
+def test_rates_may_be_mixed_and_unknown_columns_are_listed(tmp_path: Path) -> None:
+    content = {
+        "t": [0.0, 0.005, 0.01],
+        "accel_x": [-1.0, None, math.nan],
+        "pedal_pressed": [True, False, None],
+        "note": ["a", "b", "c"],
+    }
+    quality = SignalQuality()
+    (block,) = read_signals(write(tmp_path / "drive.parquet", content), quality)
+    assert list(block.t_ns) == [0, 5_000_000, 10_000_000]
+    assert list(block.places) == [ACCEL_X, INPUT["pedal_pressed"]]
+    np.testing.assert_array_equal(block.values, [[-1, 1], [np.nan, 0], [np.nan, np.nan]])
+    assert (quality.rows, quality.samples, quality.unknown_columns) == (3, 3, ["note"])
+
+
+def test_csv_and_parquet_read_alike(tmp_path: Path) -> None:
+    csv = write(tmp_path / "drive.csv", "t,accel_x,x\n0,1e0,\n0.01,,7\n0.02,nan,a b\n0.03,-0.25,\n")
+    parquet = write(
+        tmp_path / "drive.parquet", {"t": [0, 0.01, 0.02, 0.03], "accel_x": [1, None, None, -0.25]}
+    )
+    (a,), (b,) = read_signals(csv, SignalQuality()), read_signals(parquet, SignalQuality())
+    np.testing.assert_array_equal(a.values, b.values)
+    np.testing.assert_array_equal(a.t_ns, b.t_ns)
+
+
+@pytest.mark.parametrize("start", [0.0, -3.7, 1.6e9 + 0.123])
+def test_a_10_ms_input_lies_on_the_grid_wherever_it_starts(tmp_path: Path, start: float) -> None:
+    t = start + np.arange(20_000) * 0.01
+    path = write(tmp_path / "drive.parquet", {"t": list(t), "accel_x": [0.0] * len(t)})
+    blocks = list(read_signals(path, SignalQuality()))
+    t_ns = np.concatenate([block.t_ns for block in blocks])
+    assert set(np.diff(t_ns)) == {10_000_000}
+    np.testing.assert_array_equal(np.concatenate([block.t for block in blocks]), t)
+
+
+def test_blocks_join_without_a_seam(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    t = np.arange(100) * 0.01
+    path = write(tmp_path / "drive.parquet", {"t": list(t), "accel_x": list(t)})
+    monkeypatch.setattr(signal_file, "BLOCK_ROWS", 7)
+    quality = SignalQuality()
+    values = np.concatenate([block.values for block in read_signals(path, quality)])
+    np.testing.assert_array_equal(values[:, 0], t)
+    assert quality.rows == 100
+
+
+DAMAGED = {
+    "infinite value, Parquet": (
+        {"t": [0.0, 0.01], "accel_x": [1.0, math.inf]},
+        "row 1, accel_x: infinite value",
+    ),
+    "infinite value, CSV": ("t,accel_x\n0,1\n0.01,-inf\n", "line 3, accel_x: infinite value"),
+    "no number at all": ("t,accel_x\n0,fast\n\n0.01,1.2.3\n", "line 2, accel_x: 'fast' is no number"),
+    "decimal commas between commas": (
+        "t,accel_x\n0,0,1,5\n0,1,1,6\n",
+        "line 2 (4 cells instead of 2): no row",
+    ),
+    "no time in any row": ({"t": [None, math.nan], "accel_x": [1.0, 2.0]}, "row 0, t: time is missing"),
+    "time falling": (
+        {"t": [0.1, 0.0], "accel_x": [1.0, 2.0]},
+        "row 1, t: time falls by 0.1 s to 0 s; sort the rows, or split the file",
+    ),
+    "a clock set back": ("t,accel_x\n11,1\n\n1,2\n", "line 4, t: time falls by 10 s to 1 s"),
+    "UTF-16": (
+        "\ufefft,accel_x\n0,1\n".encode("utf-16-le"),
+        "line 1: this is UTF-16; save it as CSV in UTF-8",
+    ),
+    "lines that end in CR": ("t,accel_x\r0,1\r", "line 1: does not end; every line has to end in LF"),
+    "a first line of 3 MB": ("t" * 3_000_000, "line 1: does not end"),
+    "garbage": (bytes(range(128, 256)) + b"\n\xff,\xfe,\n" * 3, "line 1: column t is missing"),
+    "a jump": ({"t": [0.0, 0.01, 3600.1], "accel_x": [1.0] * 3}, "row 2, t: time jumps by more than an hour"),
+    "a jump far away": ("t,accel_x\n0,1\n1e9,1\n", "line 3, t: time jumps by more than an hour"),
+    "gaps alone": (
+        {"t": [3000.0 * k for k in range(4)], "accel_x": [1.0] * 4},
+        "row 2, t: so far less than a row a second",
+    ),
+    "time in ms": (
+        {"t": [10.0 * k for k in range(100)], "accel_x": [1.0] * 100},
+        "t: t is in seconds, but the rows are 10 s apart; convert it from ms",
+    ),
+    "Unix time in ns": (
+        {"t": [1.7e18, 1.7e18 + 1e7], "accel_x": [1.0, 1.0]},
+        "t: t is in seconds, but a value is 1.7e+18 s",
+    ),
+    "no time": ("accel_x\n1\n2\n", "line 1: column t is missing"),
+    "no known column": ({"t": [0.0], "speed": [1.0]}, "columns: no known input among t, speed"),
+    "column twice": ("t,accel_x,accel_x\n0,1,1\n", "line 1: column accel_x stands twice"),
+    "text in a Parquet column": ({"t": [0.0], "accel_x": ["fast"]}, "row 0, accel_x: 'fast' is no number"),
+    "no rows": ("t,accel_x\n", "line 2: no row that can be read"),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGED)
+def test_a_damaged_input_gives_one_line(tmp_path: Path, damage: str) -> None:
+    content, line = DAMAGED[damage]
+    path = write(tmp_path / ("drive.parquet" if isinstance(content, dict) else "drive.csv"), content)
+    with pytest.raises(UserError) as error:
+        list(read_signals(path, SignalQuality()))
+    assert str(error.value).startswith(f"{path}: {line}")
+
+
+# What is damaged: the file, the values of accel_x that are read, how many pieces are not and where.
+MENDED: dict[str, tuple[Any, list[float], int, str]] = {
+    "a cell that is no number": (
+        "t,accel_x\n0,1\n\n1,x\n2,3\n",
+        [1, math.nan, 3],
+        1,
+        "line 4, accel_x ('x' is no number)",
+    ),
+    "cells missing": ("t,accel_x\n0,1\n1\n2,3\n", [1, 3], 1, "line 3 (1 cell instead of 2)"),
+    "time missing": ("t,accel_x\n0,1\n,2\ninf,3\n3,4\n", [1, 4], 2, "line 3, t (missing)"),
+    "time missing, Parquet": (
+        {"t": [0.0, None, 2.0], "accel_x": [1.0, 2.0, 3.0]},
+        [1, 3],
+        1,
+        "row 1, t (missing)",
+    ),
+    "bytes that are no text": (
+        b"t,accel_x\n0,1\n\xff\xfe,\x8c,\n2,3\n",
+        [1, 3],
+        1,
+        "line 3 (3 cells instead of 2)",
+    ),
+    "a quote that is never closed": (
+        't,accel_x\n0,1\n1,"2\n2,3\n',
+        [1, 3],
+        1,
+        "line 3 (1 cell instead of 2)",
+    ),
+    "a line of 3 MB": ("t,accel_x\n0,1\n" + "7" * 3_000_000 + "\n2,3\n", [1, 3], 1, "line 3"),
+    "a line of 3 MB at the end": ("t,accel_x\n0,1\n2,3\n" + "7" * 3_000_000, [1, 3], 1, "line 4"),
+    "a last line that is cut off": ("t,accel_x\n0,1\n2,3\n3", [1, 3], 0, "line 4: the last line is cut off"),
+    "a last line without its end": ("t,accel_x\n0,1\n2,3", [1, 3], 0, ""),
+    "a line of units": ("t,accel_x\ns,m/s^2\n0,1\n2,3\n", [1, 3], 2, "line 2, t ('s' is no number)"),
+    "semicolons and decimal commas": ("t;accel_x\n0,5;1,25\n1,5;-3,5\n", [1.25, -3.5], 0, ""),
+    "tabs": ('"t"\t"accel_x"\r\n0.5\t"1.25"\r\n', [1.25], 0, ""),
+    "two samples at one instant": ("t,accel_x\n0,1\n0,2\n1,3\n", [1, 2, 3], 0, ""),
+}
+
+
+@pytest.mark.parametrize("damage", MENDED)
+def test_what_can_be_read_is_read_and_the_rest_has_its_place(tmp_path: Path, damage: str) -> None:
+    content, values, damaged, place = MENDED[damage]
+    path = write(tmp_path / ("drive.parquet" if isinstance(content, dict) else "drive.CSV"), content)
+    quality = SignalQuality()
+    blocks = list(read_signals(path, quality))
+    np.testing.assert_array_equal(np.concatenate([block.values[:, 0] for block in blocks]), values)
+    assert quality.damaged == damaged
+    assert (quality.first_damaged or quality.cut)[: len(place) or None] == place
+    assert quality.stamps_repeated == (1 if damage == "two samples at one instant" else 0)
+
+
+def test_of_a_parquet_file_the_row_groups_before_the_damage_are_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(signal_file, "BLOCK_ROWS", 1000)
+    path, t = tmp_path / "drive.parquet", np.arange(3000) * 0.01
+    pq.write_table(pa.table({"t": t, "accel_x": t}), path, row_group_size=1000)
+    content = bytearray(path.read_bytes())
+    content[2 * len(content) // 3 : 2 * len(content) // 3 + 2000] = bytes(2000)
+    path.write_bytes(content)
+    quality = SignalQuality()
+    rows = sum(len(block.t) for block in read_signals(path, quality))
+    assert rows == quality.rows == 2000 or rows == 1000
+    assert quality.cut.startswith(f"row {rows}: cannot be read (")
+
+
+@pytest.mark.parametrize("first", [0.0, 5.0])
+def test_the_date_of_a_parquet_file_is_that_of_its_first_row(tmp_path: Path, first: float) -> None:
+    table = pa.table({"t": [first, first + 1.0], "accel_x": [0.0, 0.0]})
+    path, quality = tmp_path / "drive.parquet", SignalQuality()
+    pq.write_table(table.replace_schema_metadata({"start_time_ns": "1700000000000000000"}), path)
+    (block,) = read_signals(path, quality)
+    assert quality.zero_ns is not None
+    assert quality.zero_ns + block.t_ns[0] == 1_700_000_000_000_000_000
+
+
+def test_a_parquet_file_in_name_only_gives_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "drive.parquet"
+    path.write_text("(1600000000.000100) can0 123#0102\n")
+    with pytest.raises(UserError, match="no readable Parquet file"):
+        list(read_signals(path, SignalQuality()))
+
+
+def test_a_jump_between_two_blocks_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    t = [0.01 * k + 4000.0 * (k >= 14) for k in range(20)]
+    path = write(tmp_path / "drive.parquet", {"t": t, "accel_x": t})
+    monkeypatch.setattr(signal_file, "BLOCK_ROWS", 7)
+    with pytest.raises(UserError, match="row 14, t: time jumps"):
+        list(read_signals(path, SignalQuality()))
+
+
+def test_hours_without_a_row_are_allowed_where_enough_rows_were_written(tmp_path: Path) -> None:
+    t = [*(0.5 * k for k in range(8000)), 7000.0]
+    path = write(tmp_path / "drive.parquet", {"t": t, "accel_x": t})
+    assert sum(len(block.t) for block in read_signals(path, SignalQuality())) == 8001

@@ -1,0 +1,84 @@
+"""Two results side by side: what differs comes first, what does not matters not."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from brakelab.replay.command import replay
+from brakelab.results.compare import compare, differences
+from ecu import cli
+from ecu.settings.resources import resource
+
+LOG = Path(__file__).parents[2] / "golden" / "mustang_braking.log.gz"
+UNITS = {"vehicle_speed": "m/s", "mu_b_fl": "-", "mode_fl": "-", "calliper_pressure_fl": "bar"}
+N = 200
+
+# column, value of a, change of b in one row, times what matters
+CHANGES = [
+    ("vehicle_speed", 20.0, 0.1, 0.5),  # 1 % of 20 m/s is more than 0.05 m/s
+    ("vehicle_speed", 2.0, 0.1, 2.0),
+    ("calliper_pressure_fl", 10.0, 1.5, 3.0),
+    ("mu_b_fl", 0.40, 0.02, 5.0),
+    ("mode_fl", 1.0, 1.0, 2.0),
+]
+
+
+@pytest.mark.parametrize(("name", "value", "change", "weight"), CHANGES)
+def test_a_difference_is_weighed_by_what_matters(
+    name: str, value: float, change: float, weight: float
+) -> None:
+    a, b = np.full(N, value), np.full(N, value)
+    b[17] += change
+    (found,) = differences({name: a, "k_f": a}, {name: b, "k_f": a}, UNITS)
+    assert (found.name, found.place, found.nulls) == (name, 17, 0)
+    assert found.greatest == pytest.approx(change)
+    assert found.rms == pytest.approx(change / np.sqrt(N))
+    assert found.weight == pytest.approx(weight, rel=1e-6)
+
+
+def test_a_value_that_only_one_has_matters() -> None:
+    a, b = np.full(N, 0.4), np.full(N, 0.4)
+    b[5:8] = np.nan
+    (found,) = differences({"mu_b_fl": a}, {"mu_b_fl": b}, UNITS)
+    assert (found.place, found.nulls) == (5, 3)
+    assert found.weight > 1.0
+
+
+def test_the_weightiest_comes_first() -> None:
+    a = {"mu_b_fl": np.full(N, 0.4), "vehicle_speed": np.full(N, 20.0)}
+    b = {"mu_b_fl": a["mu_b_fl"] + 0.02, "vehicle_speed": a["vehicle_speed"] + 0.3}
+    assert [row.name for row in differences(a, b, UNITS)] == ["mu_b_fl", "vehicle_speed"]
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("results")
+    found = {}
+    for observer in ("joint", "observer2"):
+        found[observer] = folder / f"{observer}.parquet"
+        car, map = resource("config/mustang.toml"), resource("config/maps/mustang.toml")
+        replay([LOG], car, map, observer, None, found[observer])
+    return found
+
+
+def test_a_result_equals_itself(results, capsys) -> None:
+    assert compare(results["joint"], results["joint"]) == 0
+    assert "0 columns differ" in capsys.readouterr().out
+
+
+def test_another_observer_is_told_and_shown(results, capsys) -> None:
+    assert cli.main(["compare", str(results["joint"]), str(results["observer2"])]) == 1
+    said = capsys.readouterr().out
+    print(said)
+    assert "observer: joint -> observer2" in said
+    assert "mu_b" in said
+    assert "braking 1" in said
+
+
+def test_what_is_no_result_is_one_line(results, capsys) -> None:
+    brakes = results["joint"].with_name("joint.brakes.parquet")
+    assert cli.main(["compare", str(results["joint"]), str(brakes)]) == 2
+    assert capsys.readouterr().err == (
+        f"brake-ecu: {brakes}: columns: no result; give what `brake-ecu replay` wrote\n"
+    )

@@ -1,0 +1,275 @@
+"""Every kind of fault: what it does to frames, signals and the car, and what the ECU makes of it."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brakelab.simulation.closed_loop import Drive, Loop, new_loop, run
+from brakelab.simulation.deaths import START_UP
+from brakelab.simulation.faults import HELD, KINDS, Fault, convey, fault_records, new_way
+from brakelab.simulation.scenario import load_scenario
+from ecu.contract import faults as bits
+from ecu.contract.records import FRAME, new_record
+from ecu.contract.signals import CORNERS, DEGRADED, FAULT, OBSERVING
+from ecu.errors import UserError
+from ecu.settings.config import load_config
+from ecu.settings.resources import resource
+
+ROOT = Path(__file__).parents[3]
+CONFIG = load_config(ROOT / "config" / "suv.toml")
+
+
+def identifier(name: str) -> int:
+    return Fault(kind="lost", t=0.0, message=[name]).ids()[0]
+
+
+def way(fault: dict[str, Any], cycles: int, name: str = "Imu") -> list[list[int]]:
+    """Return which numbers arrive in each cycle of 10 ms when one frame numbered by its cycle is sent."""
+    records, way, noise = fault_records([Fault(**fault)]), new_way(), np.random.default_rng(0)
+    frames = new_record(FRAME)
+    frames["can_id"], frames["length"] = identifier(name), 8
+    arrived = []
+    for cycle in range(cycles):
+        frames["data"][0, :] = cycle % 256
+        count = convey(records, way, 0.01 * cycle, noise, frames, 1)
+        arrived.append([int(frame["data"][7]) for frame in way.arrived[:count]])
+    return arrived
+
+
+WAYS = {
+    "lost": ({"kind": "lost", "t": 0.02, "duration": 0.02}, [[0], [1], [], [], [4], [5]]),
+    "doubled": ({"kind": "doubled", "t": 0.02, "duration": 0.02}, [[0], [1], [2, 2], [3, 3], [4], [5]]),
+    "late": ({"kind": "late", "t": 0.01, "duration": 0.02, "delay": 0.02}, [[0], [], [], [1, 3], [2, 4]]),
+    "bus off": ({"kind": "bus_off", "t": 0.03}, [[0], [1], [2], [], [], []]),
+    "another message": ({"kind": "lost", "t": 0.0, "message": ["Steering"]}, [[k] for k in range(6)]),
+    "not the ECU's": ({"kind": "lost", "t": 0.0}, [[k] for k in range(6)]),
+}
+
+
+@pytest.mark.parametrize("case", WAYS)
+def test_what_arrives(case: str) -> None:
+    fault, expected = WAYS[case]
+    name = "PressureDemandFront" if case == "not the ECU's" else "Imu"
+    assert way(fault, len(expected), name) == expected
+
+
+def test_a_share_of_the_frames_is_hit() -> None:
+    kept = sum(map(len, way({"kind": "lost", "t": 0.0, "share": 0.25}, 4000)))
+    print(f"{kept} of 4000 frames kept")
+    assert kept == pytest.approx(3000, abs=4 * (4000 * 0.25 * 0.75) ** 0.5)
+
+
+def test_a_corrupted_frame_differs_in_one_bit() -> None:
+    records, noise = fault_records([Fault(kind="corrupted", t=0.0)]), np.random.default_rng(1)
+    frames, way, hit = new_record(FRAME), new_way(), set()
+    frames["can_id"], frames["length"] = identifier("Imu"), 8
+    for _ in range(600):
+        assert convey(records, way, 0.0, noise, frames, 1) == 1
+        changed = np.unpackbits(way.arrived["data"][0] ^ frames["data"][0], bitorder="little")
+        assert changed.sum() == 1
+        hit.add(int(changed.argmax()))
+    assert hit == set(range(64))
+
+
+def test_frames_beyond_what_can_be_held_up_are_lost_not_written_elsewhere() -> None:
+    records = fault_records([Fault(kind="late", t=0.0, delay=0.2)])
+    frames, way, noise = new_record(FRAME, 40), new_way(), np.random.default_rng(0)
+    frames["can_id"] = identifier("Imu")
+    assert sum(convey(records, way, 0.0, noise, frames, 40) for _ in range(20)) == 0
+    assert np.isfinite(way.release).sum() == HELD
+
+
+# A braking from 20 m/s; faults act from 2.0 s on.
+STOP = """
+plant = "suv"
+draw = "nominal"
+initial_speed = 20.0
+{keys}
+[[phase]]
+kind = "coast"
+seconds = 0.5
+[[phase]]
+kind = "brake"
+decel = 4.0
+seconds = 3.5
+[[fault]]
+t = 2.0
+duration = 1.0
+{fault}
+"""
+
+
+def driven(tmp_path: Path, fault: str, keys: str = "") -> tuple[Loop, Drive]:
+    path = tmp_path / "stop.toml"
+    path.write_text(STOP.format(fault=fault, keys=keys), "utf-8")
+    loop = new_loop(load_scenario(path), CONFIG, 1)
+    return loop, run(loop)
+
+
+def rows(drive: Drive, begin: float, end: float) -> Any:
+    return (drive.t >= begin - 1e-6) & (drive.t < end - 1e-6)
+
+
+def decel_of(drive: Drive, within: Any) -> float:
+    return float(-np.polyfit(drive.t[within], drive.truth["vehicle_speed"][within], 1)[0])
+
+
+def raised(drive: Drive, begin: float, end: float) -> int:
+    masks = np.nan_to_num(drive.outputs["active_faults"][rows(drive, begin, end)]).astype(int)
+    return int(np.bitwise_or.reduce(masks))
+
+
+@pytest.mark.parametrize(
+    ("fault", "seen"),
+    [
+        ('kind = "lost"\nmessage = ["Imu"]', bits.IMU_LOST | bits.STEERING_LOST),
+        ('kind = "lost"\nmessage = ["WheelSpeedFront"]', bits.WHEEL_SPEED_LOST),
+        ('kind = "bus_off"', bits.REQUEST_LOST | bits.IMU_LOST | bits.PRESSURE_LOST),
+        ('kind = "lost"\nshare = 0.05', 0),
+        ('kind = "doubled"', bits.E2E_REJECTIONS),
+        ('kind = "late"\ndelay = 0.05', 0),  # at its end frames of before and of now come together
+        ('kind = "corrupted"\nshare = 0.2', bits.E2E_REJECTIONS),
+    ],
+)
+def test_the_ecu_says_what_is_lost_within_its_time_out_and_takes_it_back(
+    tmp_path: Path, fault: str, seen: int
+) -> None:
+    _, drive = driven(tmp_path, fault)
+    assert raised(drive, 1.0, 2.0) == 0
+    assert raised(drive, 2.0, 2.05) == 0  # 0.1 s of silence come first
+    assert raised(drive, 2.0, 3.0) & seen == seen
+    assert bool(raised(drive, 2.0, 3.0)) == bool(seen)
+    assert raised(drive, 3.05, 3.9) & ~bits.E2E_REJECTIONS == 0  # that one is shown for a second
+
+
+def test_doubled_and_corrupted_frames_are_rejected(tmp_path: Path) -> None:
+    for fault in ('kind = "doubled"', 'kind = "corrupted"'):
+        loop, _ = driven(tmp_path, fault)
+        received = loop.sides.ecu_reception
+        protected = received.messages[received.messages["received"] > 350]
+        assert (protected["received"] - protected["accepted"]).min() >= 49, fault
+
+
+def test_without_demands_the_hydraulics_brake_on_their_own(tmp_path: Path) -> None:
+    _, drive = driven(tmp_path, 'kind = "lost"\nmessage = ["PressureDemandFront"]')
+    heard = drive.truth["demand_heard"]
+    assert heard[rows(drive, 1.0, 2.02)].all()  # the last one came at 1.99 s and counts for 30 ms
+    assert not heard[rows(drive, 2.02, 3.01)].any()
+    assert heard[rows(drive, 3.01, 3.9)].all()
+
+
+@pytest.mark.parametrize(
+    ("fault", "name", "shift", "spread"),
+    [
+        ('kind = "stuck"\nsignal = ["calliper_pressure_fl"]', "calliper_pressure_fl", None, 0.0),
+        ('kind = "biased"\nsignal = ["accel_x"]\namount = 0.5', "accel_x", 0.5, 0.012),
+        ('kind = "noisy"\nsignal = ["calliper_pressure"]\namount = 6.0', "calliper_pressure_rr", 0.0, 6.3),
+    ],
+)
+def test_a_signal_is_spoilt_as_asked(
+    tmp_path: Path, fault: str, name: str, shift: float | None, spread: float
+) -> None:
+    _, drive = driven(tmp_path, fault)
+    within = rows(drive, 2.01, 3.0)
+    if shift is None:
+        assert np.ptp(drive.inputs[name][within]) == spread
+        return
+    error = drive.inputs[name][within] - drive.truth[name][within]
+    print(f"{name}: {error.mean():.3f} ± {error.std():.3f}")
+    assert error.mean() == pytest.approx(shift, abs=4 * spread / 10 + 0.01)
+    assert error.std() == pytest.approx(spread, rel=0.25)
+
+
+@pytest.mark.parametrize(
+    ("signal", "amount", "keys", "bit", "after"),
+    [
+        ("accel_x", 0.7, "", bits.ACCEL_IMPLAUSIBLE, 0.4),
+        ("accel_x", -0.7, "", bits.ACCEL_IMPLAUSIBLE, 0.4),
+        ("accel_x", 0.7, "motor_share = 0.5", bits.ACCEL_IMPLAUSIBLE, 0.4),
+        ("accel_x", 0.15, "", 0, 0.0),
+        ("calliper_pressure_fl", 20.0, "", bits.PRESSURE_NOT_FOLLOWING, 0.45),
+        ("calliper_pressure_fl", 3.0, "", 0, 0.0),
+    ],
+)
+def test_a_sensor_that_contradicts_the_others_is_told_and_not_followed(
+    tmp_path: Path, signal: str, amount: float, keys: str, bit: int, after: float
+) -> None:
+    fault = f'kind = "biased"\nsignal = ["{signal}"]\namount = {amount}'
+    _, drive = driven(tmp_path, fault, keys)
+    assert raised(drive, 0.0, 2.0) == 0
+    assert raised(drive, 2.0 + after, 3.0) == bit
+    assert raised(drive, 3.6, 3.9) == 0
+    if not bit:
+        return
+    within = rows(drive, 2.0 + after, 3.0)
+    assert np.all(drive.outputs["mode"][within] == DEGRADED)
+    error = drive.outputs["mu_b_fl"][within] / drive.truth["mu_b_fl"][within] - 1.0
+    before, decel = decel_of(drive, rows(drive, 1.2, 2.0)), decel_of(drive, within)
+    print(f"friction off by {error.min():+.1%} to {error.max():+.1%}, {before:.2f} then {decel:.2f} m/s^2")
+    assert np.abs(error).max() < 0.13  # 0.7 m/s^2 are 17 %
+    assert decel == pytest.approx(before, rel=0.06)  # braking goes on as it was
+    assert decel == pytest.approx(4.0, rel=0.10)
+    of_corner = (
+        FAULT if bit == bits.PRESSURE_NOT_FOLLOWING else OBSERVING
+    )  # then the other side's pressure counts
+    assert drive.outputs["mode_fl"][within][-1] == of_corner
+
+
+def test_motors_fail_and_come_back(tmp_path: Path) -> None:
+    _, drive = driven(tmp_path, 'kind = "motor_lost"\ncorner = ["rl", "rr"]', "motor_share = 0.3")
+    torque = {corner: drive.truth[f"motor_torque_{corner}"] for corner in CORNERS}
+    for begin, end, gone in ((1.2, 2.0, ()), (2.1, 3.0, ("rl", "rr")), (3.2, 3.9, ())):
+        for corner in CORNERS:
+            working = float(np.abs(torque[corner][rows(drive, begin, end)]).max())
+            assert (working < 1.0) == (corner in gone), (begin, corner, working)
+    assert np.nanmax(drive.inputs["motor_limit_rl"][rows(drive, 2.02, 3.0)]) == 0.0
+
+
+def test_an_accumulator_that_is_low_limits_the_pressure(tmp_path: Path) -> None:
+    _, drive = driven(tmp_path, 'kind = "accumulator_low"\namount = 20.0')
+    pressure = drive.truth["calliper_pressure_fl"]
+    assert pressure[rows(drive, 1.5, 2.0)].max() > 30.0
+    assert pressure[rows(drive, 2.3, 3.0)].max() <= 20.0
+    assert pressure[rows(drive, 3.5, 3.9)].max() > 30.0
+    for begin, end, ready in ((1.0, 2.0, True), (2.05, 3.0, False), (3.05, 3.9, True)):
+        assert bool(raised(drive, begin, end) & bits.HYDRAULICS_NOT_READY) != ready
+
+
+@pytest.mark.parametrize(("standby", "silent"), [(False, 1.0 + START_UP), (True, 0.06)])
+def test_a_killed_daemon_is_silent_and_knows_its_friction_afterwards(
+    tmp_path: Path, standby: bool, silent: float
+) -> None:
+    scenario = load_scenario(resource("config/scenarios/faults/killed.toml"))
+    fault = Fault(kind="daemon_killed", t=9.0, standby=standby, duration=None if standby else 1.0)
+    drive = run(new_loop(scenario.model_copy(update={"fault": [fault]}), CONFIG, 1))
+    dead = np.isnan(drive.outputs["mode"])
+    assert dead.sum() == pytest.approx(100 * silent, abs=1)
+    assert drive.t[dead][0] == pytest.approx(9.0)
+    before, after = (drive.outputs["mu_b_fl"][place] for place in np.flatnonzero(dead)[[0, -1]] + [-1, 1])
+    print(f"friction {before:.3f} before, {after:.3f} after")
+    # The store has the mean of the braking before, a standby what it estimated itself.
+    assert after == pytest.approx(before, rel=0.01 if standby else 0.15)
+
+
+@pytest.mark.parametrize(
+    ("fault", "line"),
+    [
+        ('kind = "broken"', "fault.0.kind"),
+        ('kind = "late"', "'late' needs delay"),
+        ('kind = "stuck"', "'stuck' needs signal"),
+        ('kind = "lost"\nsignal = ["accel_x"]', "signal does not belong to the kind 'lost'"),
+        ('kind = "lost"\nmessage = ["Imo"]', "no 'Imo' in the database"),
+        ('kind = "biased"\nsignal = ["accel_w"]\namount = 1.0', "'accel_w' is none of the ECU's inputs"),
+    ],
+)
+def test_a_mistake_is_one_line(tmp_path: Path, fault: str, line: str) -> None:
+    with pytest.raises(UserError) as raised:
+        driven(tmp_path, fault)
+    assert line in str(raised.value)
+
+
+def test_every_kind_is_shipped_as_a_scenario() -> None:
+    shipped = [load_scenario(path) for path in resource("config/scenarios/faults").glob("*.toml")]
+    assert {fault.kind for scenario in shipped for fault in scenario.fault} == set(KINDS)

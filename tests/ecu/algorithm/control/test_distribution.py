@@ -1,0 +1,363 @@
+"""Torque per wheel: equal use of grip, (5.1), the trailing axle behind the other whatever the linings do."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ecu.algorithm.control.distribution import (
+    DISTRIBUTION_STATE,
+    ELECTRONIC,
+    FIXED,
+    IDEAL,
+    LEAST_TRAILING,
+    cap_trailing,
+    distribute,
+    front_share,
+    watch_trailing,
+)
+from ecu.algorithm.estimation.friction import FRICTION_STATE
+from ecu.algorithm.estimation.motion import MOTION_STATE
+from ecu.algorithm.estimation.tyre import rolling_radius
+from ecu.contract.signals import WHEEL_SPEED
+from ecu.settings.config import load_config, new_params
+
+G, DT = 9.81, 0.01
+CONFIGS = Path(__file__).parents[4] / "config"
+
+
+@pytest.fixture
+def state():
+    state = np.zeros(1, DISTRIBUTION_STATE)
+    state["trailing"] = 1.0
+    return state
+
+
+@pytest.mark.parametrize("z", [-0.6, -0.3, -0.1, 0.0, 0.1, 0.15, 0.3, 0.5, 0.8, 1.0])
+def test_ideal_both_axles_use_the_same_share_of_their_grip(params, z: float) -> None:
+    """Moments about the other axle's contact; z is negative where the car drives backwards."""
+    p = params[0]
+    share = front_share(p, z * G)
+    weight, length, h = p["mass"] * G, p["wheelbase"], p["cog_height"]
+    front_load = weight * (p["rear_axle"] + z * h) / length
+    rear_load = weight * (p["front_axle"] - z * h) / length
+    front, rear = share * z * weight / front_load, (1 - share) * z * weight / rear_load
+    assert front == pytest.approx(z)
+    assert rear == pytest.approx(z)
+
+
+# The SUV's ideal share is 0.520 + 0.244 z: it passes 0.65 at z = 0.534, 5.2 m/s^2.
+SHARES = [
+    # distribution, front_share, z, share
+    (IDEAL, 0.0, 0.0, 0.5197),
+    (IDEAL, 0.0, 0.8, 0.7148),
+    (IDEAL, 0.0, 3.0, 1.0),
+    (FIXED, 0.65, 0.1, 0.65),
+    (FIXED, 0.65, 0.8, 0.65),
+    (ELECTRONIC, 0.65, 0.1, 0.65),
+    (ELECTRONIC, 0.65, 0.53, 0.65),
+    (ELECTRONIC, 0.65, 0.54, 0.6514),
+    (ELECTRONIC, 0.65, 0.8, 0.7148),
+    # Backwards the front axle trails: the ideal share falls with z and passes 0.45 at z = -0.287.
+    (IDEAL, 0.0, -0.3, 0.4466),
+    (IDEAL, 0.0, -3.0, 0.0),
+    (FIXED, 0.65, -0.3, 0.65),
+    (ELECTRONIC, 0.45, -0.1, 0.45),
+    (ELECTRONIC, 0.45, -0.4, 0.4222),
+    (ELECTRONIC, 0.65, -0.1, 0.4953),
+]
+
+
+@pytest.mark.parametrize(("kind", "given", "z", "share"), SHARES)
+def test_the_share_of_each_distribution(params, kind: int, given: float, z: float, share: float) -> None:
+    params["distribution"], params["front_share"] = kind, given
+    assert front_share(params[0], z * G) == pytest.approx(share, abs=1e-4)
+
+
+@pytest.mark.parametrize("kind", [IDEAL, FIXED, ELECTRONIC])
+@pytest.mark.parametrize("decel", [0.5, 2.0, 4.0, 8.0, 12.0])
+def test_torques_add_up_to_the_force_that_is_asked_for(params, state, kind: int, decel: float) -> None:
+    """(5.1): sum T_b / r = m a; nothing on either side of the car is larger than the other."""
+    params["distribution"], params["front_share"] = kind, 0.65
+    p = params[0]
+    distribute(p, state[0], p["mass"], decel, False)
+    torques = state[0]["torque"]
+    assert np.sum(torques / p["wheel_radius"]) == pytest.approx(p["mass"] * decel)
+    assert torques[0] == torques[1] > torques[2] == torques[3] >= 0
+
+
+@pytest.mark.parametrize("backwards", [False, True], ids=["forwards", "backwards"])
+@pytest.mark.parametrize("mass", [1600.0, 2105.0, 2700.0])
+def test_the_force_is_that_of_the_mass_as_it_is_known_now(
+    params, state, mass: float, backwards: bool
+) -> None:
+    distribute(params[0], state[0], mass, 3.0, backwards)
+    assert np.sum(state[0]["torque"] / params[0]["wheel_radius"]) == pytest.approx(mass * 3.0)
+
+
+@pytest.mark.parametrize("decel", [0.5, 2.0, 4.0, 6.0])
+def test_backwards_every_wheel_uses_the_grip_that_its_axle_has(params, state, decel: float) -> None:
+    """The front axle trails and is relieved by m a h / L: torque over radius and axle load is z at both."""
+    p = params[0]
+    distribute(p, state[0], p["mass"], decel, True)
+    force = state[0]["torque"] / p["wheel_radius"]
+    shift = p["mass"] * decel * p["cog_height"] / p["wheelbase"]
+    at_rest = p["mass"] * G * np.array([p["rear_axle"], p["front_axle"]]) / p["wheelbase"]
+    used = [force[:2].sum() / (at_rest[0] - shift), force[2:].sum() / (at_rest[1] + shift)]
+    assert used == pytest.approx([decel / G, decel / G])
+    distribute(p, state[0], p["mass"], decel, False)
+    assert force[0] < state[0]["torque"][0] / p["wheel_radius"][0]
+
+
+def test_no_request_is_no_torque_and_an_unknown_one_is_unknown(params, state) -> None:
+    mass = params[0]["mass"]
+    distribute(params[0], state[0], mass, 0.0, False)
+    assert state["torque"].tolist() == [[0.0] * 4]
+    distribute(params[0], state[0], mass, math.nan, False)
+    assert np.isnan(state["torque"]).all()
+
+
+@pytest.mark.parametrize(
+    ("backwards", "left"),
+    [
+        pytest.param(False, (1, 1, 0.6, 0.6), id="forwards the rear trails"),
+        pytest.param(True, (0.6, 0.6, 1, 1), id="backwards the front trails"),
+    ],
+)
+def test_what_the_trailing_axle_is_not_left_is_not_given_to_the_other(params, state, backwards, left) -> None:
+    mass = params[0]["mass"]
+    distribute(params[0], state[0], mass, 5.0, backwards)
+    before = state[0]["torque"].copy()
+    state["trailing"] = 0.6
+    distribute(params[0], state[0], mass, 5.0, backwards)
+    assert state[0]["torque"] == pytest.approx(before * left)
+
+
+class Watch:
+    """A car whose wheels slip as told; radii by their loads and errors."""
+
+    def __init__(self, params, state, feed, learned: float = 2.0) -> None:
+        self.params, self.state, self.feed = params[0], state[0], feed
+        self.motion = np.zeros(1, MOTION_STATE)[0]
+        self.load = np.array(self.params["static_load"])
+        self.error, self.failed = np.zeros(4), np.zeros(4, np.uint8)
+        params["rear_slip_margin"] = 0.005
+        self.state["free_s"] = learned
+
+    def run(self, slip, seconds=0.1, decel=5.0, speed=20.0, noise=0.0, lost=None) -> float:
+        """Return what the trailing axle is left after some time with a constant slip [%] of fl, fr, rl, rr.
+
+        Wheel speeds carry no sign, as most sensors of them."""
+        random = np.random.default_rng(0)
+        p = self.params
+        radius = [
+            rolling_radius(*of)
+            for of in zip(self.load, p["unloaded_radius"], p["vertical_stiffness"], strict=True)
+        ]
+        for _ in range(round(seconds / DT)):
+            omega = abs(speed) * (1 + np.array(slip) / 100) / (np.array(radius) * (1 + self.error))
+            inputs = self.feed(wheel_speed=omega + noise * random.standard_normal(4))
+            if lost is not None:
+                inputs[0]["new"][WHEEL_SPEED + lost] = 0
+            watch_trailing(p, self.state, inputs[0], self.motion, self.load, self.failed, decel, speed, DT)
+        return float(self.state["trailing"])
+
+
+@pytest.fixture
+def watch(params, state, feed) -> Watch:
+    return Watch(params, state, feed)
+
+
+LEAST = (LEAST_TRAILING, LEAST_TRAILING)
+EQUAL, WORSE, BEYOND = (-3, -3, -3, -3), (-3, -3, -6, -6), (-3, -3, -4.5, -4.5)
+WATCHED = [
+    # case, slip fl fr rl rr [%], other, what the rear is left after a second
+    ("equal slip", EQUAL, {}, (1.0, 1.0)),
+    ("rear 0.4 % beyond: within the margin", (-3, -3, -3.4, -3.4), {}, (1.0, 1.0)),
+    ("rear 0.6 % beyond: within margin and noise", (-3, -3, -3.6, -3.6), {}, (1.0, 1.0)),
+    ("rear 1.5 % beyond", BEYOND, {}, LEAST),
+    # 0.82 % over margin and noise, 0.05 s late: 1 - 6 * 0.82 * (0.2 - 0.05) = 0.3
+    ("rear 1.5 % beyond for 0.15 s", BEYOND, {"seconds": 0.15}, (0.4, 0.65)),
+    ("one side is enough: the bend's inner wheels", (-3, -2, -4.5, -2), {"seconds": 0.15}, (0.4, 0.65)),
+    ("front beyond the rear", (-5, -5, -3, -3), {}, (1.0, 1.0)),
+    ("rear locked", (-3, -3, -100, -100), {"seconds": 0.05}, LEAST),
+    ("both locked", (-100, -100, -100, -100), {}, (1.0, 1.0)),
+    ("the front drives", (0.3, 0.3, 0.1, 0.1), {}, (1.0, 1.0)),
+    ("noise of the wheel speeds at 20 m/s", (-3, -3, -3.4, -3.4), {"noise": 0.1}, (0.99, 1.0)),
+    ("noise at 6 m/s", (-3, -3, -3.4, -3.4), {"noise": 0.1, "speed": 6.0}, (0.97, 1.0)),
+    ("too slow for slip", WORSE, {"speed": 4.0}, (1.0, 1.0)),
+    ("speed unknown", WORSE, {"speed": math.nan}, (1.0, 1.0)),
+    (
+        "a rear wheel's speed lost: the other side watches",
+        WORSE,
+        {"lost": 2},
+        LEAST,
+    ),
+    ("nobody brakes", WORSE, {"decel": 0.0}, (1.0, 1.0)),
+    ("request lost", WORSE, {"decel": math.nan}, (1.0, 1.0)),
+    ("backwards, equal slip", EQUAL, {"speed": -8.0}, (1.0, 1.0)),
+    ("backwards, front beyond the rear", (-5, -5, -3, -3), {"speed": -8.0}, LEAST),
+    ("backwards, one front wheel locked", (-100, -3, -3, -3), {"speed": -8.0, "seconds": 0.05}, (0.3, 0.3)),
+    ("backwards, rear beyond the front", WORSE, {"speed": -8.0}, (1.0, 1.0)),
+    ("backwards, too slow for slip", (-5, -5, -3, -3), {"speed": -4.0}, (1.0, 1.0)),
+]
+
+
+@pytest.mark.parametrize(("case", "slip", "other", "rear"), WATCHED, ids=[row[0] for row in WATCHED])
+def test_a_trailing_axle_that_slips_more_than_the_leading_one_is_taken_back(
+    watch, case, slip, other, rear
+) -> None:
+    left = watch.run(slip, **{"seconds": 1.0} | other)
+    assert rear[0] - 1e-9 <= left <= rear[1], case
+
+
+BESIDE_FAILED = [
+    # failed, slip fl fr rl rr [%], what the rear is left after a second
+    ("a rear wheel alone on its side may slip 4 %", (0,), (0, -3, -4, -3), 1.0),
+    ("not 6 %", (0,), (0, -3, -6, -3), LEAST_TRAILING),
+    ("the other side is watched as ever", (0,), (0, -3, -3, -4.5), LEAST_TRAILING),
+    ("both rear wheels alone", (0, 1), (0, 0, -4, -4), 1.0),
+    ("a rear brake failed: nothing changes", (2,), (-3, -3, 0, -4.5), LEAST_TRAILING),
+]
+
+
+@pytest.mark.parametrize(("case", "failed", "slip", "rear"), BESIDE_FAILED, ids=[c[0] for c in BESIDE_FAILED])
+def test_beside_a_failed_front_brake_a_rear_wheel_may_slip_more(watch, case, failed, slip, rear) -> None:
+    watch.failed[list(failed)] = 1
+    assert watch.run(slip, seconds=1.0) == pytest.approx(rear), case
+
+
+def test_the_radii_that_load_transfer_changes_are_no_slip(watch) -> None:
+    """At 8 m/s^2 the front's radius is 0.3 % smaller, the rear's larger: 0.6 % of slip that is not there."""
+    watch.load += np.array([1, 1, -1, -1]) * 0.5 * 2105 * 8.0 * 0.65 / 2.665
+    assert watch.run((-5, -5, -5.4, -5.4), seconds=2.0) == 1.0
+
+
+def test_what_the_radii_differ_is_learned_while_rolling_freely(params, state, feed) -> None:
+    watch = Watch(params, state, feed, learned=0.0)
+    watch.error[2:] = 0.006
+    assert watch.run((-3, -3, -3.4, -3.4)) == 1.0, "not learned yet: doubted"
+    watch.run((0, 0, 0, 0), seconds=3.0, decel=0.0, noise=0.1)
+    assert state["offset"][0] == pytest.approx([0.006, 0.006], abs=1e-3)
+    assert watch.run((-3, -3, -3.4, -3.4)) == 1.0
+    assert watch.run(BEYOND, seconds=0.5) < 0.6
+
+
+@pytest.mark.parametrize("moving", [{"accel_x": 1.0}, {"yaw_rate": 0.1}])
+def test_nothing_is_learned_while_the_car_does_not_roll_freely(params, state, feed, moving) -> None:
+    watch = Watch(params, state, feed, learned=0.0)
+    for name, value in moving.items():
+        watch.motion[name] = value
+    watch.run((0, 0, -1, -1), seconds=3.0, decel=0.0)
+    assert state["offset"].tolist() == [[0.0, 0.0]]
+
+
+def test_the_rear_comes_back_slowly_and_at_once_with_the_next_braking(watch) -> None:
+    watch.state["trailing"] = 0.4
+    assert watch.run(EQUAL, seconds=1.0) == pytest.approx(0.7)
+    assert watch.run(EQUAL, seconds=DT, decel=0.0) == 1.0
+
+
+def torques_of(params, pressure, mu) -> np.ndarray:
+    p = params[0]
+    acts = np.maximum(np.array(pressure) - p["push_out_pressure"], 0.0)
+    return 2 * p["piston_area"] * p["effective_radius"] * acts * mu
+
+
+NONE = np.zeros(4, np.uint8)
+
+
+def capped(
+    params, state, z, wanted, mu, sigma, motor=(0.0, 0.0), backwards=False, failed=NONE
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return pressures before and after the cap; `wanted`: friction that front and rear count on."""
+    p, decel = params[0], z * G
+    distribute(p, state[0], p["mass"], decel, backwards)
+    lining = state[0]["torque"] * (1 - np.repeat(motor, 2))
+    lever = 2 * p["piston_area"] * p["effective_radius"]
+    before = lining / (lever * np.repeat(wanted, 2)) + p["push_out_pressure"]
+    friction, after = np.zeros(1, FRICTION_STATE), before.copy()
+    friction["mu"], friction["sigma"] = np.repeat(mu, 2), np.repeat(sigma, 2)
+    cap_trailing(p, state[0], decel, lining, friction[0], after, failed, backwards)
+    return before, after
+
+
+CAPS = [
+    # case, z, compensated by (front, rear), mu, sigma, motors' share, rear torque left at mu
+    ("nominal friction, nothing known", 0.5, (0.45, 0.45), (0.45, 0.45), (0.07, 0.07), (0, 0), 1.0),
+    ("rear 20 % rough: its pressure falls", 0.5, (0.45, 0.54), (0.45, 0.54), (0.02, 0.02), (0, 0), 1.0),
+    ("both 20 % smooth: the share is kept", 0.5, (0.36, 0.36), (0.36, 0.36), (0.05, 0.05), (0, 0), 1.0),
+    # 0.36 / 0.45: the rear keeps the pressure of nominal friction, 0.8 of the torque asked for
+    ("rear 20 % smooth, not sure", 0.5, (0.45, 0.36), (0.45, 0.36), (0.045, 0.045), (0, 0), 0.8),
+    # (0.45 - 0.02) / 0.45 * 0.36 / (0.36 + 0.02) = 0.905
+    (
+        "rear 20 % smooth, sure to 1 sigma = 0.01",
+        0.5,
+        (0.45, 0.36),
+        (0.45, 0.36),
+        (0.01, 0.01),
+        (0, 0),
+        0.905,
+    ),
+    ("rear 20 % smooth, certain", 0.5, (0.45, 0.36), (0.45, 0.36), (0.0, 0.0), (0, 0), 1.0),
+    # 0.45 / 0.54: the front falls to 5/6 of its pressure and takes the rear with it
+    ("front 20 % rough, not sure", 0.5, (0.54, 0.45), (0.54, 0.45), (0.05, 0.05), (0, 0), 0.8333),
+    ("below z 0.15 nothing is ruled", 0.14, (0.45, 0.36), (0.45, 0.36), (0.045, 0.045), (0, 0), 1.0),
+    # of T = 1: front lining 0.5 * 0.43/0.45 + motor 0.5 = 0.9778; rear (0.9778 - 0.5) * 0.36/0.38 / 0.5
+    ("the same half on motors", 0.5, (0.45, 0.36), (0.45, 0.36), (0.01, 0.01), (0.5, 0.5), 0.905),
+    ("front on motors alone", 0.5, (0.45, 0.36), (0.45, 0.36), (0.01, 0.01), (1.0, 0.0), 0.947),
+]
+
+
+@pytest.mark.parametrize(
+    ("case", "z", "wanted", "mu", "sigma", "motor", "left"), CAPS, ids=[row[0] for row in CAPS]
+)
+def test_compensation_raises_the_rear_only_as_far_as_it_is_sure(
+    params, state, case, z, wanted, mu, sigma, motor, left
+) -> None:
+    before, after = capped(params, state, z, wanted, mu, sigma, motor)
+    was, now = (torques_of(params, pressure, np.repeat(mu, 2)) for pressure in (before, after))
+    assert after[:2] == pytest.approx(before[:2]), "the front is never touched"
+    assert now[2:] / was[2:] == pytest.approx(left, abs=5e-4), case
+
+
+@pytest.mark.parametrize(
+    ("case", "z", "wanted", "mu", "sigma", "motor", "left"), CAPS, ids=[row[0] for row in CAPS]
+)
+def test_backwards_compensation_raises_the_front_only_as_far_as_it_is_sure(
+    params, state, case, z, wanted, mu, sigma, motor, left
+) -> None:
+    """The same cases with the axles' places exchanged: which share of the torque an axle has cancels."""
+    ends = [of[::-1] for of in (wanted, mu, sigma, motor)]
+    before, after = capped(params, state, z, *ends, backwards=True)
+    was, now = (torques_of(params, pressure, np.repeat(ends[1], 2)) for pressure in (before, after))
+    assert after[2:] == pytest.approx(before[2:]), "the rear leads and is never touched"
+    assert now[:2] / was[:2] == pytest.approx(left, abs=5e-4), case
+
+
+@pytest.mark.parametrize("z", [0.2, 0.5])
+def test_backwards_within_the_claimed_interval_the_front_stays_behind(params, state, z: float) -> None:
+    """As forwards, with the loads that a braking backwards gives: z is taken off the front."""
+    p = params[0]
+    _, after = capped(params, state, z, (0.36, 0.45), (0.36, 0.45), (0.012, 0.01), backwards=True)
+    torque = torques_of(params, after, np.array([0.384, 0.384, 0.43, 0.43]))
+    front, rear = torque[:2].sum() / p["wheel_radius"][0], torque[2:].sum() / p["wheel_radius"][2]
+    on_front = (p["rear_axle"] - z * p["cog_height"]) / p["wheelbase"]
+    assert front / on_front == pytest.approx(rear / (1 - on_front))
+
+
+def test_within_the_claimed_interval_the_rear_stays_behind_once_it_is_raised(params, state) -> None:
+    """Utilisations by axle loads, rear at mu + 2 sigma, front at mu - 2 sigma: equal where the cap binds."""
+    p = params[0]
+    for z in (0.2, 0.5, 0.8):
+        _, after = capped(params, state, z, (0.45, 0.36), (0.45, 0.36), (0.01, 0.012))
+        torque = torques_of(params, after, np.array([0.43, 0.43, 0.384, 0.384]))
+        front, rear = torque[:2].sum() / p["wheel_radius"][0], torque[2:].sum() / p["wheel_radius"][2]
+        on_front = (p["rear_axle"] + z * p["cog_height"]) / p["wheelbase"]
+        assert rear / (1 - on_front) == pytest.approx(front / on_front)
+
+
+@pytest.mark.parametrize("name", ["suv", "sedan", "lcv", "mustang"])
+def test_shipped_configurations_have_the_ideal_distribution(name: str) -> None:
+    assert new_params(load_config(CONFIGS / f"{name}.toml"))[0]["distribution"] == IDEAL

@@ -1,0 +1,188 @@
+"""The slip guard: which wheel is capped, when, at which pressure, and how it is let go."""
+
+import math
+
+import numpy as np
+import pytest
+
+from ecu.algorithm.control.slip_guard import SLIP_GUARD_STATE, guard_slip
+from ecu.algorithm.estimation.motion import MOTION_STATE
+from ecu.contract.signals import INPUT
+
+BAR, DT = 1e5, 0.01
+SENT = np.array([60.0, 60.0, 40.0, 40.0]) * BAR
+
+
+class Wheels:
+    """A car that keeps its speed while the front-left wheel does what it is told.
+
+    `turns`: the sign that its sensors give a wheel speed."""
+
+    def __init__(self, params, feed, speed: float = 20.0, turns: float = 1.0, **flags: float) -> None:
+        self.params, self.feed, self.flags, self.turns = params[0], feed, flags, turns
+        self.state, self.motion = np.zeros(1, SLIP_GUARD_STATE)[0], np.zeros(1, MOTION_STATE)[0]
+        self.inputs, self.speed = feed(), speed
+        self.sent, self.wanted = SENT.copy(), SENT.copy()
+
+    def cycle(self, slip: float) -> float:
+        """Run a cycle; return the front-left wheel's cap [bar], infinite if it has none."""
+        omega = self.turns * abs(self.speed) / self.params["wheel_radius"]
+        omega[0] *= 1.0 + slip
+        self.feed(self.inputs, wheel_speed=omega, **self.flags)
+        pressures = self.sent, self.wanted, self.wanted
+        guard_slip(self.params, self.state, self.inputs[0], self.motion, self.speed, *pressures, DT)
+        assert not self.state["capped"][1:].any()
+        assert self.state["acting"] == self.state["capped"][0]
+        if not self.state["capped"][0]:
+            return math.inf
+        self.sent[0] = min(self.wanted[0], self.state["cap"][0])
+        return float(self.state["cap"][0] / BAR)
+
+    def run_into(self, slip: float, seconds: float = 0.1) -> list[float]:
+        """Let the wheel fall behind at a constant rate from rolling to `slip`."""
+        n = round(seconds / DT)
+        return [self.cycle(0.0) for _ in range(5)] + [self.cycle(slip * (k + 1) / n) for k in range(n)]
+
+
+@pytest.fixture
+def wheels(params, feed) -> Wheels:
+    return Wheels(params, feed)
+
+
+def test_a_wheel_that_falls_behind_is_capped_from_a_tenth_of_slip_on(wheels: Wheels) -> None:
+    caps = wheels.run_into(-0.5)
+    assert all(math.isinf(cap) for cap in caps[: 5 + 2])  # 5 and 10 % of slip
+    assert caps[5 + 2] == pytest.approx(56.0)  # 15 %: the last demand, less a cycle of 400 bar/s
+    assert np.diff(caps[5 + 2 :]) == pytest.approx(np.full(7, -4.0))
+
+
+def test_cut_down_to_the_push_out_pressure_and_no_further(wheels: Wheels) -> None:
+    wheels.run_into(-1.0)
+    assert [wheels.cycle(-1.0) for _ in range(30)][-1] == pytest.approx(0.5)
+
+
+def test_held_while_the_wheel_comes_back_then_given_back_at_200_bar_a_second(wheels: Wheels) -> None:
+    caps = wheels.run_into(-0.4)
+    slips = np.linspace(-0.4, -0.11, 8)
+    held = [wheels.cycle(slip) for slip in slips][2:]  # the growth is low-passed
+    assert held == pytest.approx([held[0]] * len(held))
+    assert held[0] < caps[-1]
+    given = [wheels.cycle(-0.02) for _ in range(10)]
+    assert np.diff([held[-1], *given]) == pytest.approx(np.full(10, 2.0))
+    released = [wheels.cycle(-0.02) for _ in range(30)]
+    assert math.isinf(released[-1])
+    below = [cap for cap in (*given, *released) if math.isfinite(cap)]
+    assert max(below) <= 60.0  # let go where the demand is reached, not before
+
+
+@pytest.mark.parametrize(
+    ("case", "slip", "seconds"),
+    [
+        ("a braking at the limit of a dry road", -0.08, 0.3),
+        ("a speed that is wrong by a tenth and drifts", -0.15, 3.0),
+        ("a driven wheel", 0.4, 0.1),
+    ],
+)
+def test_what_caps_nothing(wheels: Wheels, case: str, slip: float, seconds: float) -> None:
+    assert all(math.isinf(cap) for cap in wheels.run_into(slip, seconds)), case
+
+
+@pytest.mark.parametrize(
+    ("case", "speed"),
+    [("walking pace", 2.5), ("walking pace backwards", -2.5), ("speed unknown", math.nan)],
+)
+def test_where_nothing_is_capped(params, feed, case, speed) -> None:
+    assert all(math.isinf(cap) for cap in Wheels(params, feed, speed).run_into(-0.9)), case
+
+
+@pytest.mark.parametrize("turns", [1.0, -1.0], ids=["wheel speeds without a sign", "with their sign"])
+def test_backwards_a_wheel_is_capped_as_forwards(params, feed, turns: float) -> None:
+    forwards = Wheels(params, feed, 8.0).run_into(-0.9)
+    backwards = Wheels(params, feed, -8.0, turns, reverse=1.0).run_into(-0.9)
+    assert any(math.isfinite(cap) for cap in forwards)
+    assert backwards == pytest.approx(forwards)
+
+
+@pytest.mark.parametrize("flag", ["abs_active", "esp_active"])
+def test_beside_an_abs_the_demand_is_held_and_not_cut(params, feed, flag: str) -> None:
+    wheels = Wheels(params, feed, **{flag: 1.0})
+    caps = wheels.run_into(-0.95) + [wheels.cycle(-0.95) for _ in range(20)]
+    assert [cap for cap in caps if math.isfinite(cap)] == pytest.approx([60.0] * 29)
+    wheels.wanted[0] = 100 * BAR
+    assert wheels.cycle(-1.0) == pytest.approx(60.0)
+
+
+def test_a_lost_wheel_speed_caps_nothing(wheels: Wheels) -> None:
+    place = INPUT["wheel_speed_fl"]
+    wheels.run_into(-0.05)
+    wheels.inputs[0]["new"][place] = wheels.inputs[0]["verdict"][place] = 0
+    assert all(math.isinf(wheels.cycle(-1.0)) for _ in range(20))
+
+
+def test_a_frame_that_is_missing_does_not_make_a_wheel_fall_faster(wheels: Wheels) -> None:
+    """Slip grows by 9 m/s^2, below what is taken for a wheel that locks; every second sample is missing."""
+    place, found = INPUT["wheel_speed_fl"], []
+    for k in range(60):
+        wheels.inputs[0]["new"][place] = k % 2
+        found.append(wheels.cycle(-9.0 * k * DT / 20.0))
+    assert all(math.isinf(cap) for cap in found)
+
+
+def test_without_a_demand_the_cap_is_gone(wheels: Wheels) -> None:
+    wheels.run_into(-1.0)
+    wheels.wanted[:] = 0.0
+    assert math.isinf(wheels.cycle(-1.0))
+
+
+def test_a_value_that_is_not_finite_leaves_no_trace(wheels: Wheels) -> None:
+    wheels.run_into(-0.05)
+    wheels.cycle(math.nan)
+    wheels.cycle(math.inf)
+    caps = [wheels.cycle(0.0) for _ in range(20)] + wheels.run_into(-0.5)
+    assert math.isinf(caps[0])
+    assert math.isfinite(caps[-1])
+    assert np.isfinite(wheels.state["growth"]).all()
+
+
+@pytest.mark.parametrize(("growth", "capped"), [(9.5, False), (10.5, True)])
+def test_a_wheel_falls_behind_from_ten_metres_per_second_squared_on(wheels, growth, capped) -> None:
+    caps = [wheels.cycle(-growth * k * DT / 20.0) for k in range(60)]
+    assert any(map(math.isfinite, caps)) == capped
+
+
+def test_an_old_sample_is_not_taken_twice(wheels: Wheels) -> None:
+    """A wheel at 30 % of slip whose next frame is late: growth is known by the frames alone."""
+    place = INPUT["wheel_speed_fl"]
+    wheels.run_into(-0.05)
+    before = wheels.state["growth"][0], wheels.state["lag"][0]
+    omega = wheels.inputs[0]["value"].copy()
+    wheels.inputs[0]["new"][place] = 0
+    pressures = wheels.sent, wheels.wanted, wheels.wanted
+    for _ in range(3):
+        guard_slip(wheels.params, wheels.state, wheels.inputs[0], wheels.motion, 30.0, *pressures, DT)
+    assert (wheels.inputs[0]["value"] == omega).all()
+    assert (wheels.state["growth"][0], wheels.state["lag"][0]) == before
+    assert wheels.state["age"][0] == pytest.approx(3 * DT)
+
+
+def test_of_a_lost_wheel_speed_nothing_is_kept(wheels: Wheels) -> None:
+    place = INPUT["wheel_speed_fl"]
+    wheels.run_into(-0.4)
+    wheels.inputs[0]["new"][place] = wheels.inputs[0]["verdict"][place] = 0
+    pressures = wheels.sent, wheels.wanted, wheels.wanted
+    guard_slip(wheels.params, wheels.state, wheels.inputs[0], wheels.motion, 20.0, *pressures, DT)
+    assert wheels.state["lag"][0] == wheels.state["growth"][0] == 0.0
+
+
+def test_growth_that_is_not_finite_is_forgotten_while_the_sensor_lives(wheels: Wheels) -> None:
+    wheels.run_into(-0.05)
+    wheels.state["growth"][0] = math.nan
+    wheels.cycle(-0.05)
+    assert wheels.state["growth"][0] == wheels.state["lag"][0] == 0.0
+
+
+def test_a_cap_is_set_once_and_not_raised_by_the_demand(wheels: Wheels) -> None:
+    """While the wheel locks the demand that was sent is the cap itself, whatever the driver adds."""
+    caps = [cap for cap in wheels.run_into(-0.9) if math.isfinite(cap)]
+    wheels.sent[0] = 150.0 * BAR
+    assert wheels.cycle(-0.95) == pytest.approx(caps[-1] - 4.0)

@@ -1,0 +1,185 @@
+"""Wheel speeds and calliper pressures that cannot be: what is said, and after how long."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ecu.algorithm.estimation.motion import MOTION_STATE
+from ecu.algorithm.monitoring.plausibility import (
+    PLAUSIBILITY_STATE,
+    watch_pressures,
+    watch_wheels,
+    wheel_speed_implausible,
+)
+from ecu.contract.signals import CALLIPER_PRESSURE, MOTOR_TORQUE, WHEEL_SPEED
+
+CASES = [
+    # what, turns over ground, brake torque [N m], motor torque [N m], car's speed [m/s], implausible
+    ("rolls", 1.00, 0.0, 0.0, 20.0, False),
+    ("brakes", 0.98, 800.0, 0.0, 20.0, False),
+    ("slides", 0.60, 800.0, 0.0, 20.0, False),
+    ("locked", 0.00, 800.0, 0.0, 20.0, False),
+    ("stuck while the car slows", 1.10, 800.0, 0.0, 20.0, True),
+    ("stuck while it regenerates too", 1.10, 800.0, 300.0, 20.0, True),
+    ("spins under the motor", 1.30, 800.0, -900.0, 20.0, False),
+    ("a small tyre", 1.04, 800.0, 0.0, 20.0, False),
+    ("too slow to tell", 1.30, 800.0, 0.0, 3.0, False),
+    ("not braked", 1.30, 20.0, 0.0, 20.0, False),
+    ("hardly braked", 1.30, 99.0, 0.0, 20.0, False),
+    ("braked just enough to tell", 1.30, 101.0, 0.0, 20.0, True),
+]
+
+
+@pytest.mark.parametrize(("what", "turns", "torque", "motor", "speed", "implausible"), CASES)
+@pytest.mark.parametrize("wheel", [0, 3])
+def test_a_wheel_that_brakes_is_not_faster_than_the_car(
+    params,
+    feed,
+    wheel: int,
+    what: str,
+    turns: float,
+    torque: float,
+    motor: float,
+    speed: float,
+    implausible: bool,
+) -> None:
+    state, motion = np.zeros(1, PLAUSIBILITY_STATE)[0], np.zeros(1, MOTION_STATE)[0]
+    inputs = feed()
+    torques = np.full(4, torque)
+    inputs[0]["value"][WHEEL_SPEED : WHEEL_SPEED + 4] = 0.98 * speed / params[0]["wheel_radius"]
+    inputs[0]["value"][WHEEL_SPEED + wheel] = turns * speed / params[0]["wheel_radius"][wheel]
+    inputs[0]["value"][MOTOR_TORQUE : MOTOR_TORQUE + 4] = motor
+    said = [
+        wheel_speed_implausible(params[0], state, inputs[0], motion, speed, torques, 0.01) for _ in range(50)
+    ]
+    assert any(said) == implausible
+    if implausible:
+        assert said.index(True) == pytest.approx(30, abs=1)
+
+
+def fallen(speeds: list[float], torque: float, params, feed, period: float = 0.01) -> list[bool]:
+    """Wheel fl at each sample [rad/s] of a car at the first one's speed that brakes with `torque` [N m]."""
+    state, motion = np.zeros(1, PLAUSIBILITY_STATE)[0], np.zeros(1, MOTION_STATE)[0]
+    ground, said = speeds[0] * params[0]["wheel_radius"][0], []
+    for speed in speeds:
+        inputs = feed(wheel_speed=[speed, *[speeds[0]] * 3])
+        watch_wheels(params[0], state, inputs[0], motion, ground, np.full(4, torque), period)
+        said.append(bool(state["fell"][0]))
+        assert not state["fell"][1:].any()
+    return said
+
+
+def locking(torque: float, inertia: float, period: float = 0.01) -> list[float]:
+    """A wheel of 60 rad/s whose road gives way: T / I, no tyre holds it."""
+    return [max(60.0 - torque / inertia * period * k, 0.0) for k in range(30)]
+
+
+@pytest.mark.parametrize("torque", [100.0, 500.0, 1500.0, 4000.0])
+@pytest.mark.parametrize("period", [0.01, 0.02, 0.05])
+def test_no_wheel_that_its_brake_locks_is_left_out(params, feed, torque: float, period: float) -> None:
+    speeds = locking(torque, params[0]["wheel_inertia"][0], period)
+    assert speeds[-1] < 60.0
+    assert not any(fallen(speeds, torque, params, feed, period))
+
+
+def test_a_wheel_whose_wire_breaks_is_left_out_until_it_agrees_again(params, feed) -> None:
+    speeds = [60.0] * 5 + [0.0] * 50 + [30.0] * 5 + [59.0] * 5
+    assert fallen(speeds, 800.0, params, feed) == [False] * 5 + [True] * 55 + [False] * 5
+    assert fallen([60.0, 0.0, 60.0, 60.0], 0.0, params, feed) == [False, True, False, False]
+
+
+@pytest.mark.parametrize("stuck", [1, 2])
+@pytest.mark.parametrize("car", [0.93, 1.0], ids=["speed 7 % low", "speed right"])
+def test_wheels_are_held_against_each_other_too(params, feed, stuck: int, car: float) -> None:
+    state, motion = np.zeros(1, PLAUSIBILITY_STATE)[0], np.zeros(1, MOTION_STATE)[0]
+    turns = np.array([1.2] * stuck + [0.99] * (4 - stuck)) * 20.0 / params[0]["wheel_radius"]
+    sound = np.full(4, 0.99) * 20.0 / params[0]["wheel_radius"]
+    for speeds, expected in ((sound, False), (turns, True)):
+        said = [
+            wheel_speed_implausible(
+                params[0], state, feed(wheel_speed=speeds)[0], motion, car * 20.0, np.full(4, 800.0), 0.01
+            )
+            for _ in range(50)
+        ]
+        assert any(said) == expected
+
+
+PRESSURES: list[tuple[str, list[float], list[float], dict[str, Any], bool]] = [
+    # what, demanded [bar], measured [bar], beside it, does not follow
+    ("all follow", [30, 30, 12, 12], [30, 30, 12, 12], {}, False),
+    ("as far as the model goes", [60, 60, 20, 20], [48, 72, 24, 16], {}, False),
+    ("one keeps its value", [0, 0, 0, 0], [30, 0, 0, 0], {}, True),
+    ("one does not rise", [30, 30, 12, 12], [30, 0, 12, 12], {}, True),
+    ("an axle does not rise", [30, 30, 12, 12], [0, 0, 12, 12], {}, False),
+    ("the car's own hydraulics brake", [30, 30, 30, 30], [0, 0, 0, 0], {}, False),
+    ("a shadow", [30, 30, 12, 12], [30, 0, 12, 12], {"sent": 0}, False),
+    ("an ABS works", [30, 30, 12, 12], [30, 0, 12, 12], {"abs_active": 1.0}, False),
+    ("ESP works", [0, 0, 0, 0], [30, 0, 0, 0], {"esp_active": 1.0}, False),
+    ("the sensor is lost", [30, 30, 12, 12], [30, 0, 12, 12], {"lost": 1}, False),
+    ("an ABS that is half said to work", [30, 30, 12, 12], [30, 0, 12, 12], {"abs_active": 0.5}, True),
+    ("an ABS that is rather said to work", [30, 30, 12, 12], [30, 0, 12, 12], {"abs_active": 0.51}, False),
+]
+
+
+@pytest.mark.parametrize(
+    ("what", "demanded", "measured", "beside", "apart"), PRESSURES, ids=lambda value: str(value)[:24]
+)
+def test_a_pressure_follows_its_demand_if_any_does(
+    feed, what: str, demanded: list[float], measured: list[float], beside: dict[str, Any], apart: bool
+) -> None:
+    rng, zero = np.random.default_rng(3), np.full(4, 0.7)
+    state = np.zeros(1, PLAUSIBILITY_STATE)[0]
+    state["sent"] = beside.get("sent", 1)
+    inputs = feed(**{name: value for name, value in beside.items() if name.endswith("active")})
+    if "lost" in beside:
+        inputs[0]["verdict"][CALLIPER_PRESSURE + 1] = 0
+    said = []
+    for _ in range(60):
+        feed(inputs, calliper_pressure=measured + zero + rng.normal(0.0, 1.8, 4))
+        watch_pressures(state, inputs[0], np.array(demanded, float), zero, 0.01)
+        said.append(bool(state["pressure"]))
+    assert any(said) == apart
+    if apart:
+        assert said.index(True) == pytest.approx(30, abs=1)
+
+
+def test_noise_of_6_bar_is_no_pressure_that_does_not_follow(feed) -> None:
+    rng, state = np.random.default_rng(3), np.zeros(1, PLAUSIBILITY_STATE)[0]
+    state["sent"], inputs = 1, feed()
+    for _ in range(20_000):
+        feed(inputs, calliper_pressure=30.0 + rng.normal(0.0, 6.0, 4))
+        watch_pressures(state, inputs[0], np.full(4, 30.0), np.zeros(4), 0.01)
+        assert not state["pressure"]
+
+
+def test_a_pressure_that_follows_again_is_believed_again(feed) -> None:
+    state, inputs = np.zeros(1, PLAUSIBILITY_STATE)[0], feed()
+    state["sent"] = 1
+    said = []
+    for k in range(1000):
+        feed(inputs, calliper_pressure=[0.0 if k < 600 else 30.0, 30.0, 12.0, 12.0])
+        watch_pressures(state, inputs[0], np.array([30.0, 30.0, 12.0, 12.0]), np.zeros(4), 0.01)
+        said.append(bool(state["pressure"]))
+    assert said[599]
+    assert not any(said[632:])
+
+
+def test_a_lost_wheel_does_not_count_among_the_others(params, feed) -> None:
+    """Three wheels 8 % fast are the car's speed that is wrong; a lost one that reads 0 does not hide that."""
+    state, motion = np.zeros(1, PLAUSIBILITY_STATE)[0], np.zeros(1, MOTION_STATE)[0]
+    inputs = feed(wheel_speed=np.array([1.08, 1.08, 1.08, 0.0]) * 20.0 / params[0]["wheel_radius"])
+    inputs[0]["verdict"][WHEEL_SPEED + 3] = 0
+    for _ in range(60):
+        assert not wheel_speed_implausible(params[0], state, inputs[0], motion, 20.0, np.full(4, 800.0), 0.01)
+
+
+@pytest.mark.parametrize(
+    ("age", "left_out"),
+    [(0.09, True), (0.0999, True), (0.1, False), (0.105, False), (0.2, False)],
+)
+def test_a_sample_is_compared_with_one_that_is_younger_than_0_1_s(params, feed, age, left_out) -> None:
+    state, motion = np.zeros(1, PLAUSIBILITY_STATE)[0], np.zeros(1, MOTION_STATE)[0]
+    state["omega"], ground = 60.0, 60.0 * float(params[0]["wheel_radius"][0])
+    watch_wheels(params[0], state, feed(wheel_speed=0.0)[0], motion, ground, np.zeros(4), age)
+    assert bool(state["fell"][0]) == left_out

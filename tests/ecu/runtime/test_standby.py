@@ -1,0 +1,224 @@
+"""The second daemon: silent beside a living one, speaking 50 ms after it fell silent."""
+
+import json
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ecu.bus.channel import BusStatus
+from ecu.bus.e2e import P01_MODULO
+from ecu.bus.receive import contract_receive_plan
+from ecu.bus.transmit import contract_transmit_plan, new_transmission
+from ecu.contract.faults import FOREIGN_SENDER
+from ecu.contract.records import CYCLE, FRAME, LEARNED, OUTPUTS, new_record
+from ecu.contract.signals import CYCLE_NS
+from ecu.jit import CompileCounter
+from ecu.recording import ring as ring_module
+from ecu.recording.ring import RingReader, create_ring, publish
+from ecu.runtime.clock import Grid, TimeSource
+from ecu.runtime.cycle import Progress, Watch, cycle_once, new_ecu
+from ecu.runtime.standby import SILENCE_NS, Claim, Standby, learned_by_first
+from ecu.settings.config import load_config, new_params
+
+ROOT = Path(__file__).parents[3]
+DBC = ROOT / "dbc" / "brake_ecu.dbc"
+FINE = BusStatus(False, False, 0, 0)
+NOMINAL = np.full(4, 0.45)
+MS = 1_000_000
+
+
+def listened(*heard_ms: int) -> list[int]:
+    """Return in which of 40 cycles a standby speaks that hears a frame in the cycles at `heard_ms`."""
+    plan = contract_transmit_plan(DBC, "BrakeEcu")
+    standby, sent, frames = Standby(), new_transmission(plan), new_record(FRAME)
+    frames["can_id"] = plan.ids[0]
+    spoken = []
+    for t_ms in range(0, 400, 10):
+        standby.listen(plan, sent, frames, int(t_ms in heard_ms), t_ms * MS)
+        if standby.speaks:
+            spoken.append(t_ms)
+    return spoken
+
+
+@pytest.mark.parametrize(
+    ("heard", "first", "last"),
+    [
+        (range(0, 100, 10), 140, 390),  # the first one died after its frame at 90 ms
+        (range(0, 400, 10), None, None),  # it lives
+        ((), None, None),  # there never was one: two that start together would race
+        ((0, 40, 80, 120), 170, 390),  # it stumbles by less than 50 ms
+        ((0, 390), 50, 380),  # it comes back: silent in the same cycle
+    ],
+    ids=["dies", "lives", "never heard", "stumbles", "comes back"],
+)
+def test_it_speaks_when_the_first_one_was_silent_for_50_ms(heard, first, last):
+    spoken = listened(*heard)
+    assert (spoken[:1], spoken[-1:]) == ([first] if first is not None else [], [last] if last else [])
+
+
+class Wire:
+    """One bus for two daemons on one clock; what one sends the other drains."""
+
+    def __init__(self) -> None:
+        self.name, self.waiting, self.other = "wire", [], None
+        self.sent, self.cut = [], False
+
+    def drain(self, frames, start):
+        for i, frame in enumerate(self.waiting):
+            frames[start + i] = frame
+        count = len(self.waiting)
+        self.waiting.clear()
+        return count
+
+    def send(self, frames, count):
+        self.sent += [(int(frame["can_id"]), int(frame["data"][1] & 0xF)) for frame in frames[:count]]
+        if not self.cut:
+            self.other.waiting += [frame.copy() for frame in frames[:count]]
+        return count
+
+    def status(self):
+        return FINE
+
+    def close(self):
+        pass
+
+
+def unit(folder, clock, standby=None):
+    """Return what one daemon needs for `cycle_once`."""
+    params = new_params(load_config(ROOT / "config" / "suv.toml"))
+    ecu = new_ecu(params, None, contract_receive_plan(DBC), contract_transmit_plan(DBC, "BrakeEcu"))
+    progress = Progress(Watch(FINE, CompileCounter()), standby)
+    return ecu, Wire(), create_ring(folder, {}, b"", slots=64, frames=512), Grid(clock), progress
+
+
+def test_one_goes_on_counting_where_the_other_stopped(tmp_path):
+    now = [0]
+    clock = TimeSource(lambda: now[0], lambda: now[0], lambda until_ns: now.__setitem__(0, until_ns))
+    first, second = unit(tmp_path / "1", clock), unit(tmp_path / "2", clock, Standby())
+    first[1].other, second[1].other = second[1], first[1]
+
+    def cycle(*units):
+        for ecu, wire, ring, grid, progress in units:
+            grid.deadline_ns = now[0] // CYCLE_NS * CYCLE_NS
+            cycle_once(ecu, wire, ring, grid, progress)
+            now[0] -= CYCLE_NS  # both live through the same period
+        now[0] += CYCLE_NS
+
+    for _ in range(33):
+        cycle(first, second)
+    assert second[1].sent == []
+    demand = first[1].sent[0][0]
+    counters = [counter for can_id, counter in first[1].sent if can_id == demand]
+    for _ in range(20):
+        cycle(second)
+    counters += [counter for can_id, counter in second[1].sent if can_id == demand]
+    assert counters == [k % P01_MODULO for k in range(len(counters))]
+    assert len(counters) == 33 + 20 - (SILENCE_NS // CYCLE_NS - 1)  # it speaks 50 ms after the last frame
+    assert int(second[4].foreign) == 0
+    assert not int(second[0].cycle["bus_faults"][0]) & FOREIGN_SENDER
+    before = len(second[1].sent)
+    for _ in range(10):
+        cycle(first, second)  # it was only held up
+    assert len(second[1].sent) == before
+
+
+def yields_after(foreign, missed=(), cycles=2000):
+    """Return in which cycle a daemon yields that hears another one in the cycles `foreign`; None: never."""
+    claim = Claim()
+    for cycle in range(cycles):
+        if claim.is_lost(int(cycle in foreign), 30 if cycle in missed else 0):
+            return cycle
+    return None
+
+
+# cycles in which another sender is heard, cycles after a gap of 0.3 s -> the cycle in which it yields
+CLAIMS = {
+    "nobody else": ((), (), None),
+    "another that began with it": (range(2000), (), 9),
+    "another within two seconds": (range(150, 2000), (), 159),
+    "another every second cycle": (range(0, 2000, 2), (), None),  # half a sender is none
+    "one that came later": (range(210, 2000), (), None),
+    "one that came much later": (range(1500, 2000), (), None),
+    "what waited while it was held up": ([1000], [1000], None),
+    "one that came while it was held up": (range(1000, 2000), [1000], 1009),
+    "a standby that falls silent when it hears us": ([1000, 1001], [1000], None),
+}
+
+
+@pytest.mark.parametrize(("foreign", "missed", "cycle"), CLAIMS.values(), ids=CLAIMS)
+def test_who_spoke_first_goes_on_and_a_newcomer_yields(foreign, missed, cycle):
+    assert yields_after(foreign, missed) == cycle
+
+
+@pytest.mark.parametrize("apart", [0, 1, 7, 50])
+def test_of_two_that_began_together_one_speaks_before_long(tmp_path, apart):
+    """Eight seeds of the draw; `apart`: cycles between their starts."""
+    longest = 0
+    for seed in range(8):
+        random.seed(seed)
+        now = [0]
+        clock = TimeSource(
+            lambda now=now: now[0], lambda now=now: now[0], lambda until, now=now: now.__setitem__(0, until)
+        )
+        units = [unit(tmp_path / f"{seed}.{name}", clock) for name in (1, 2)]
+        units[0][1].other, units[1][1].other = units[1][1], units[0][1]
+        silence, spoke = 0, []
+        for cycle in range(apart + 150):
+            before = [len(one[1].sent) for one in units]
+            for ecu, wire, ring, grid, progress in units if cycle >= apart else units[:1]:
+                now[0] = grid.deadline_ns = cycle * CYCLE_NS  # both live through the same period
+                cycle_once(ecu, wire, ring, grid, progress)
+            spoke.append(sum(len(one[1].sent) > count for one, count in zip(units, before, strict=True)))
+            silence = 0 if spoke[-1] else silence + 1
+            longest = max(longest, silence)
+        assert set(spoke[-60:]) == {1}, seed
+    assert longest <= 21  # 50 ms, and at most 150 ms drawn
+
+
+DESCRIPTION = {"interface": "socketcan", "channel": "can0", "store_key": "suv/1", "state": {"itemsize": 8}}
+
+
+@pytest.fixture
+def first_ring(tmp_path, monkeypatch):
+    """Return a ring of this process into which what was learned can be published."""
+    monkeypatch.setattr(ring_module, "_folder", lambda: tmp_path)
+    ring = create_ring(ring_module.ring_path(1), DESCRIPTION, b"", slots=8, frames=8)
+
+    def learned(mu_b, cycles=3):
+        record = new_record(LEARNED)
+        record["mu_b"], record["sigma_mu_b"], record["observed_s"] = mu_b, 0.01, 5.0
+        record["radius_sigma"] = 0.001
+        for number in range(cycles):
+            cycle = new_record(CYCLE)
+            cycle["number"] = number
+            publish(ring, cycle, new_record(OUTPUTS), record, new_record(FRAME))
+        return ring
+
+    return learned
+
+
+@pytest.mark.parametrize(
+    ("mu_b", "description", "found"),
+    [
+        (0.40, DESCRIPTION, True),
+        (0.10, DESCRIPTION, False),  # no lining has that
+        (0.40, {**DESCRIPTION, "channel": "can1"}, False),
+        (0.40, {**DESCRIPTION, "store_key": "lcv/1"}, False),
+        (0.40, {**DESCRIPTION, "state": {"itemsize": 9}}, False),
+    ],
+    ids=["same car and bus", "out of range", "another bus", "another car", "another version"],
+)
+def test_what_the_first_one_learned_comes_out_of_its_ring(first_ring, mu_b, description, found):
+    first_ring(mu_b)
+    learned = learned_by_first(json.loads(json.dumps(description)), NOMINAL)
+    assert (learned is not None) == found
+    if learned is not None:
+        assert learned["mu_b"][0].tolist() == [mu_b] * 4
+
+
+def test_before_its_first_cycle_a_ring_tells_nothing(first_ring):
+    ring = first_ring(0.4, cycles=0)
+    assert RingReader(ring.path).learned() is None
+    assert learned_by_first(DESCRIPTION, NOMINAL) is None

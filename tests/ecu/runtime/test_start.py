@@ -1,0 +1,66 @@
+"""What a start may do to be soon: precedence until something has to be compiled, and less to load."""
+
+import importlib
+import os
+import signal
+import subprocess
+import sys
+import threading
+
+import numba
+import pytest
+
+from ecu.jit import CompileCounter
+from ecu.runtime.start import ahead_of_others, kept_out, left_at_once, like_others
+
+
+def test_what_is_kept_out_is_not_found_and_comes_back_afterwards(monkeypatch, tmp_path):
+    (tmp_path / "library_of_nobody.py").write_text("", "utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    with kept_out("library_of_nobody", "os"), pytest.raises(ImportError):
+        importlib.import_module("library_of_nobody")
+    assert importlib.import_module("library_of_nobody")
+    assert sys.modules["os"] is os  # was loaded before
+    with kept_out("library_of_nobody"):
+        assert importlib.import_module("library_of_nobody")
+
+
+def test_each_compilation_is_told_before_it_begins():
+    told = []
+    counter = CompileCounter(told.append)
+    for result in (1, 2):
+        numba.njit(lambda result=result: result)()
+    assert (told, counter.count) == ([0, 1], 2)
+
+
+def test_a_signal_ends_what_compiles_at_once_and_nobody_s_business_else():
+    script = (
+        "import ctypes, os, signal\n"
+        "from ecu.runtime.start import left_at_once\n"
+        "signal.signal(signal.SIGTERM, lambda *_: None)\n"
+        "with left_at_once():\n"
+        "    print('compiling', flush=True)\n"
+        "    ctypes.CDLL(None).sleep(60)\n"  # as the compiler: no Python, no handler
+        "raise SystemExit(9)\n"
+    )
+    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE)
+    assert process.stdout.readline() == b"compiling\n"
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(10) == 0
+    before = threading.active_count()
+    with left_at_once():
+        assert threading.active_count() == before + 1
+    assert threading.active_count() == before  # the loop has no thread beside it
+
+
+def test_precedence_is_real_time_below_every_cycle_and_goes_back():
+    try:
+        ahead_of_others()
+        granted = os.sched_getscheduler(0) == os.SCHED_FIFO
+        priority = os.sched_getparam(0).sched_priority
+    finally:
+        like_others()
+    assert os.sched_getscheduler(0) == os.SCHED_OTHER
+    if not granted:
+        pytest.skip("SCHED_FIFO is not granted here")
+    assert priority == 1

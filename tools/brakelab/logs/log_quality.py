@@ -1,0 +1,215 @@
+"""What is wrong in a CAN log, whatever its format: damage that its reader meets, stamps that do not fit.
+
+Readers hand over `FrameBlock`s. `checked` counts stamps that repeat or step back and gaps, leaves out the
+single frame whose stamp is far from its neighbours (a flipped bit), lets time go on where the clock was set
+back, and refuses a log whose clock jumps by more than an hour.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ecu.contract.records import RecordArray, new_record
+from ecu.errors import UserError
+from ecu.jit import Record, kernel
+
+BLOCK_FRAMES: Final = 1 << 14  # 1.3 MB: they stay in the processor's cache until they are decoded
+# A step of the clock beyond this is no gap in the drive but a wrong stamp or two logs in one file.
+MAX_JUMP_NS: Final = 3_600_000_000_000
+# Assumption: no adapter holds a frame back for longer; an older stamp comes from a clock that was set.
+STEP_NS: Final = 1_000_000_000
+_FARTHEST_NS: Final = 1 << 61  # the year 2043: sums of two such stamps are still numbers
+_AHEAD: Final = 4096  # frames among which the next of the same interface is looked for
+
+_STAMPS: Final = np.dtype(
+    [
+        ("started", "i8"),
+        ("latest_ns", "i8"),
+        ("backwards", "i8"),
+        ("repeated", "i8"),
+        ("gaps", "i8"),
+        ("longest_ns", "i8"),
+        ("longest_at", "i8"),  # index of the frame behind the longest gap, if it is in this block
+        ("set_back", "i8"),
+        ("set_back_ns", "i8"),  # by how much the clock was set back first …
+        ("set_back_at", "i8"),  # … and the index, if it is in this block
+        ("jump", "i8"),  # index of the frame from which on the clock is another
+        ("known", "i8", (256,)),  # by interface, as the two that follow
+        ("last_ns", "i8", (256,)),
+        ("shift_ns", "i8", (256,)),  # since its clock was set back
+    ]
+)
+
+
+@dataclass
+class Damage:
+    """What could not be read of a log."""
+
+    damaged: int = 0
+    """Lines, objects or cells that were skipped."""
+    first_damaged: str = ""
+    """Place of the first of them."""
+    cut: str = ""
+    """Place and cause, if the end of the log is missing."""
+    stamps_repeated: int = 0
+    """Against the frame before on the same interface, or the row before."""
+
+    def note_damage(self, count: int, place: str) -> None:
+        """Count damage whose first piece is at `place`."""
+        if count:
+            self.damaged += count
+            self.first_damaged = self.first_damaged or place
+
+
+@dataclass
+class LogQuality(Damage):
+    """What was found wrong in a CAN log."""
+
+    frames: int = 0
+    stamps_backwards: int = 0
+    """Against the frame before on the same interface."""
+    clock_set_back: int = 0
+    """How often an interface's clock was, by more than a second."""
+    first_set_back: str = ""
+    """Place of the first of them, and by how much."""
+    gaps: int = 0
+    """Times of more than a second without any frame."""
+    longest_gap_s: float = 0.0
+    longest_gap: str = ""
+    """Place of the frame behind it."""
+
+
+class FrameBlock(NamedTuple):
+    """Frames in the order of the log."""
+
+    frames: RecordArray
+    """FRAME, shape (n,)."""
+    places: NDArray[np.int64]
+    """Where each stands in its file, in the reader's own unit, shape (n,)."""
+    unit: str
+    """Of `places`: line, byte, record."""
+
+
+@kernel
+def _next_on(frames: RecordArray, i: int) -> int:
+    """Return the index of the next frame of the interface of frame `i`; -1: none is near, -2: none here."""
+    end = min(len(frames), i + 1 + _AHEAD)
+    for j in range(i + 1, end):
+        if frames[j].bus == frames[i].bus:
+            return j
+    return -1 if end == i + 1 + _AHEAD else -2
+
+
+@kernel
+def _stamp(frames: RecordArray, i: int, state: Record) -> int:
+    """Return the stamp of frame `i` on the clock that its interface had first."""
+    stamp = min(max(frames[i].stamp_ns, -_FARTHEST_NS), _FARTHEST_NS)
+    return int(stamp + state.shift_ns[frames[i].bus])
+
+
+@kernel
+def _check(frames: RecordArray, kept: NDArray[np.bool_], state: Record, mended: bool, last: bool) -> int:
+    """Judge frames until one whose verdict takes those of the next block (`last`: there is none)."""
+    state.longest_at = state.set_back_at = state.jump = -1
+    for i in range(len(frames)):
+        bus = frames[i].bus
+        stamp = _stamp(frames, i, state)
+        before = state.last_ns[bus] if state.known[bus] else state.latest_ns
+        step = stamp - before
+        if mended and state.started and abs(step) > STEP_NS:
+            follower = _next_on(frames, i)
+            if follower == -2 and not last:
+                return i
+            alone = follower < 0
+            goes_on = stamp if alone else _stamp(frames, follower, state)
+            if abs(goes_on - before) <= STEP_NS < abs(goes_on - stamp):
+                kept[i] = False
+                continue
+            if abs(step) > MAX_JUMP_NS:
+                if alone or abs(goes_on - stamp) > MAX_JUMP_NS:
+                    kept[i] = False
+                    continue
+                state.jump = i
+                return i
+            if step < 0 and state.known[bus]:
+                if state.set_back == 0:
+                    state.set_back_at, state.set_back_ns = i, -step
+                state.set_back += 1
+                state.shift_ns[bus] -= step
+                stamp = before
+        if state.known[bus]:
+            state.backwards += step < 0 and stamp != before
+            state.repeated += step == 0
+        silent = stamp - state.latest_ns
+        if state.started and silent > STEP_NS:
+            state.gaps += 1
+            if silent > state.longest_ns:
+                state.longest_ns, state.longest_at = silent, i
+        state.latest_ns = max(stamp, state.latest_ns) if state.started else stamp
+        state.last_ns[bus] = stamp
+        state.known[bus] = state.started = 1
+        frames[i].stamp_ns = stamp
+    return len(frames)
+
+
+def checked(
+    path: Path, blocks: Iterator[FrameBlock], quality: LogQuality, mended: bool = True
+) -> Iterator[RecordArray]:
+    """Yield the frames of `blocks` whose stamps are possible; `quality` is kept up to date.
+
+    `mended` is False for what the daemon recorded: it met the stamps as they are.
+
+    Raises:
+        UserError: the clock jumps by more than an hour and stays there.
+    """
+    state = new_record(_STAMPS)
+    stamps = state[0]
+    rest: FrameBlock | None = None
+    for following in chain(blocks, [None]):
+        block = _joined(rest, following)
+        if block is None:
+            return
+        kept = np.ones(len(block.frames), np.bool_)
+        judged = _check(block.frames, kept, stamps, mended, following is None)
+        if stamps["jump"] >= 0:
+            raise UserError(
+                str(path),
+                _place(block, stamps["jump"]),
+                "time jumps by more than an hour; mend it here or split the log",
+            )
+        if stamps["set_back_at"] >= 0:
+            seconds = 1e-9 * int(stamps["set_back_ns"])
+            quality.first_set_back = f"{_place(block, stamps['set_back_at'])}, by {seconds:.1f} s"
+        if stamps["longest_at"] >= 0:
+            quality.longest_gap = _place(block, stamps["longest_at"])
+            quality.longest_gap_s = round(1e-9 * int(stamps["longest_ns"]), 6)
+        rest = FrameBlock(block.frames[judged:], block.places[judged:], block.unit)
+        frames, kept = block.frames[:judged], kept[:judged]
+        outliers = np.flatnonzero(~kept)
+        if len(outliers):
+            quality.note_damage(len(outliers), _place(block, outliers[0]))
+            frames = frames[kept]
+        quality.stamps_backwards = int(stamps["backwards"])
+        quality.stamps_repeated = int(stamps["repeated"])
+        quality.clock_set_back, quality.gaps = int(stamps["set_back"]), int(stamps["gaps"])
+        quality.frames += len(frames)
+        if len(frames):
+            yield frames
+
+
+def _joined(rest: FrameBlock | None, following: FrameBlock | None) -> FrameBlock | None:
+    if rest is None or not len(rest.frames):
+        return following
+    if following is None:
+        return rest
+    frames, places = zip(rest[:2], following[:2], strict=True)
+    return FrameBlock(np.concatenate(frames), np.concatenate(places), following.unit)
+
+
+def _place(block: FrameBlock, index: int) -> str:
+    return f"{block.unit} {block.places[index]}"

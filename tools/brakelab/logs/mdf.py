@@ -1,0 +1,255 @@
+"""Reads MDF4 with asammdf: CAN bus logging into frames, channels with the contract's names into signals.
+
+A file that has a group with a channel `CAN_DataFrame` (ASAM MDF bus logging) holds frames; `CAN_RemoteFrame`
+and `CAN_ErrorFrame` may stand beside it, each in groups of its own. Records are taken in windows, so that a
+file of any length fits in memory, and the groups are merged by time. Stamps are rounded to whole
+microseconds, as the ECU has them. `BusChannel` n becomes interface number n.
+
+asammdf is in an extra: where it is installed, `import can` takes longer (see `ecu/bus/__init__.py`).
+"""
+
+import gc
+import logging
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any, Final, Protocol, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakelab.logs.log_quality import BLOCK_FRAMES, FrameBlock, LogQuality
+from brakelab.logs.text_log import FD_LENGTHS
+from ecu.contract.records import FRAME, FRAME_ERROR, FRAME_EXTENDED, FRAME_FD, FRAME_REMOTE, RecordArray
+from ecu.errors import UserError
+
+WINDOW: Final = 1 << 18  # records
+_KINDS: Final = {"CAN_DataFrame": 0, "CAN_RemoteFrame": FRAME_REMOTE, "CAN_ErrorFrame": FRAME_ERROR}
+_PLACED: Final = np.dtype([("frame", FRAME), ("place", "i8")])
+
+
+class Column(Protocol):
+    """What is needed of `asammdf.Signal`."""
+
+    samples: NDArray[Any]
+    timestamps: NDArray[np.float64]
+    invalidation_bits: NDArray[np.bool_] | None
+
+
+class Measurement:
+    """What is needed of `asammdf.MDF`, which has no useful types."""
+
+    def __init__(self, path: Path) -> None:
+        """Raises UserError if asammdf is not installed or cannot read the file."""
+        try:
+            from asammdf import MDF
+        except ImportError:
+            raise UserError(str(path), "", "MDF4 needs asammdf: pip install 'brake-ecu[mdf]'") from None
+        logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # the same, in one line, comes from here
+        # Where its constructor fails its destructor does so too, and Python would print that.
+        hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
+        try:
+            try:
+                measurement: Any = MDF
+                self._mdf: Any = measurement(path, process_bus_logging=False)
+                return
+            except Exception as error:  # a damaged file makes it raise anything
+                reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+            gc.collect()
+        finally:
+            sys.unraisablehook = hook
+        raise UserError(
+            str(path), "", f"no readable MDF4 file ({reason}); save it again where it was recorded"
+        )
+
+    def channels(self) -> Iterator[tuple[str, int, int]]:
+        """Yield name, group and place in it of every channel."""
+        for group, content in enumerate(self._mdf.groups):
+            for index, channel in enumerate(content.channels):
+                yield str(channel.name), group, index
+
+    def rows(self, group: int) -> int:
+        """Return how many records a group has."""
+        return int(self._mdf.groups[group].channel_group.cycles_nr)
+
+    def is_plain(self, group: int, prefix: str) -> bool:
+        """Return whether all channels with this prefix lie on whole bytes."""
+        channels = [c for c in self._mdf.groups[group].channels if str(c.name).startswith(prefix)]
+        return all(not c.bit_offset and c.bit_count % 8 == 0 for c in channels)
+
+    def master(self, group: int) -> int | None:
+        """Return the place of the time channel."""
+        return cast("int | None", self._mdf.masters_db.get(group))
+
+    def column(self, group: int, index: int, first: int, count: int, raw: bool) -> Column:
+        """Return records `first` to `first + count` of a channel, `raw`: without its conversion."""
+        return cast(
+            Column,
+            self._mdf.get(
+                group=group,
+                index=index,
+                raw=raw,
+                record_offset=first,
+                record_count=count,
+                ignore_invalidation_bits=True,
+            ),
+        )
+
+    def start_ns(self) -> int:
+        """Return the start of the measurement as Unix time [ns], whole microseconds."""
+        start = self._mdf.start_time
+        seconds = int(start.replace(microsecond=0).timestamp())
+        return seconds * 1_000_000_000 + int(start.microsecond) * 1000
+
+    def close(self) -> None:
+        """Close the file."""
+        self._mdf.close()
+
+
+@cache
+def _holds_frames(path: Path, changed_ns: int) -> bool:
+    measurement = Measurement(path)
+    try:
+        return any(name in _KINDS for name, _, _ in measurement.channels())
+    finally:
+        measurement.close()
+
+
+def holds_frames(path: Path) -> bool:
+    """Return whether an MDF4 file holds frames, not channels. Raises UserError if it cannot be read."""
+    return _holds_frames(path, path.stat().st_mtime_ns)
+
+
+def in_step(
+    sources: Sequence[Iterator[RecordArray]], stamps: Callable[[RecordArray], NDArray[Any]]
+) -> Iterator[list[tuple[int, RecordArray]]]:
+    """Yield what several sources have up to one common time after the other: (source, its records).
+
+    `stamps` gives the times of records; where they fall within a source, its order is kept.
+    """
+    waiting = [next(source, None) for source in sources]
+    while True:
+        rising = [None if block is None else np.maximum.accumulate(stamps(block)) for block in waiting]
+        latest = [times[-1] for times in rising if times is not None]
+        if not latest:
+            return
+        horizon = min(latest)
+        ready = []
+        for place, (block, times) in enumerate(zip(waiting, rising, strict=True)):
+            if block is None or times is None:
+                continue
+            count = int(np.searchsorted(times, horizon, "right"))
+            if count:
+                ready.append((place, block[:count]))
+            waiting[place] = block[count:] if count < len(block) else next(sources[place], None)
+        yield ready
+
+
+def read_mdf(
+    path: Path, quality: LogQuality, advance: Callable[[int], None] | None = None
+) -> Iterator[FrameBlock]:
+    """Yield the frames of an MDF4 bus logging file in blocks; `bus` is the channel's number.
+
+    `quality` is kept up to date; `advance(bytes)` hears of progress. Raises UserError where there
+    is no frame.
+    """
+    measurement = Measurement(path)
+    groups = [
+        (group, index, name)
+        for name, group, index in measurement.channels()
+        if name in _KINDS and measurement.rows(group)
+    ]
+    total = sum(measurement.rows(group) for group, _, _ in groups)
+    sources = [_frames(measurement, *group, quality) for group in groups]
+    read = 0
+    try:
+        for ready in in_step(sources, lambda block: block["frame"]["stamp_ns"]):
+            merged = ready[0][1]
+            if len(ready) > 1:
+                merged = np.concatenate([block for _, block in ready])
+                rising = [np.maximum.accumulate(block["frame"]["stamp_ns"]) for _, block in ready]
+                merged = merged[np.argsort(np.concatenate(rising), kind="stable")]
+            read += len(merged)
+            if advance:
+                advance(path.stat().st_size * len(merged) // total)
+            yield FrameBlock(np.ascontiguousarray(merged["frame"]), merged["place"], "record")
+    finally:
+        measurement.close()
+    if not read:
+        raise UserError(
+            str(path), quality.cut or "CAN_DataFrame", "no frame in this MDF4 file; record it again"
+        )
+
+
+def _frames(
+    measurement: Measurement, group: int, index: int, kind: str, quality: LogQuality
+) -> Iterator[RecordArray]:
+    """Yield the frames of a group as `_PLACED`."""
+    places = {
+        name.partition(".")[2]: place
+        for name, of, place in measurement.channels()
+        if of == group and name.startswith(f"{kind}.")
+    }
+    plain = measurement.is_plain(group, f"{kind}.")
+    start_ns = measurement.start_ns()
+    rows = measurement.rows(group)
+    for first in range(0, rows, WINDOW):
+        try:
+            if plain:
+                whole = measurement.column(group, index, first, WINDOW, raw=True)
+                stamps = whole.timestamps
+                columns = {
+                    name: whole.samples[f"{kind}.{name}"]
+                    for name in places
+                    if f"{kind}.{name}" in (whole.samples.dtype.names or ())
+                }
+            else:
+                parts = {
+                    name: measurement.column(group, place, first, WINDOW, raw=True)
+                    for name, place in places.items()
+                }
+                stamps = parts["ID"].timestamps
+                columns = {name: part.samples for name, part in parts.items()}
+        except Exception as error:  # a damaged file makes asammdf raise anything
+            quality.cut = f"record {first} of group {group}: cannot be read ({error}), the rest is missing"
+            return
+        if len(stamps) < min(WINDOW, rows - first):
+            end = first + len(stamps)
+            quality.cut = f"record {end} of group {group}: {rows - end} records are missing"
+        for begin in range(0, len(stamps), BLOCK_FRAMES):
+            part = slice(begin, begin + BLOCK_FRAMES)
+            block = np.zeros(len(stamps[part]), _PLACED)
+            block["place"] = np.arange(first + begin, first + begin + len(block))
+            block["frame"]["stamp_ns"] = start_ns + np.rint(stamps[part] * 1e6).astype(np.int64) * 1000
+            _fill(block["frame"], {name: column[part] for name, column in columns.items()}, _KINDS[kind])
+            yield block
+        if quality.cut:
+            return
+
+
+def _fill(frames: RecordArray, columns: dict[str, NDArray[Any]], kind: int) -> None:
+    """Write what bus logging knows of each frame; `kind`: what all of them are."""
+
+    def flag(name: str) -> NDArray[np.bool_]:
+        return columns[name].astype(np.int64) != 0 if name in columns else np.zeros(len(frames), np.bool_)
+
+    number = columns["ID"].astype(np.int64) if "ID" in columns else np.zeros(len(frames), np.int64)
+    frames["can_id"] = number & 0x1FFFFFFF
+    extended = flag("IDE") | (number & 0x80000000 != 0)
+    frames["flags"] = kind | FRAME_EXTENDED * extended | FRAME_FD * flag("EDL")
+    frames["bus"] = columns["BusChannel"].astype(np.int64) & 0xFF if "BusChannel" in columns else 1
+    data = columns.get("DataBytes", np.zeros((len(frames), 0), np.uint8))
+    if data.ndim == 1:  # bytes of one length as a word each
+        data = np.ascontiguousarray(data).view(np.uint8).reshape(len(frames), -1)
+    width = data.shape[1]
+    if "DataLength" in columns:
+        length = columns["DataLength"].astype(np.int64)
+    elif "DLC" in columns:
+        length = FD_LENGTHS[columns["DLC"].astype(np.int64) & 0x0F]
+    else:
+        length = np.full(len(frames), width)
+    frames["length"] = np.clip(length, 0, 64 if kind else min(width, 64))
+    frames["data"][:, : min(width, 64)] = data[:, :64]
+    beyond = np.arange(64)[:width] >= frames["length"][:, np.newaxis]
+    frames["data"][:, : min(width, 64)][beyond] = 0

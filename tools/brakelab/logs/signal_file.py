@@ -1,0 +1,284 @@
+"""Reads decoded signals: Parquet or CSV with `t` [s] and columns with the contract's input names, or MDF4.
+
+Rates may be mixed: null or NaN in a cell means that there is no new sample. Times are cut to whole
+microseconds relative to the first row, so that 0.1 + 0.2 and 0.3 are one instant; of several samples of one
+input at one instant the last counts.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from brakelab.logs.csv_rows import csv_columns, csv_rows
+from brakelab.logs.log_quality import MAX_JUMP_NS, Damage
+from brakelab.logs.mdf_channels import open_channels, read_channels
+from ecu.bus.freshness import input_freshness
+from ecu.contract.records import RecordArray
+from ecu.contract.signals import INPUT, INPUT_SIGNALS
+from ecu.errors import UserError
+
+BLOCK_ROWS: Final = 1 << 16
+FEW_ROWS: Final = 10  # too few to judge their distance
+SLOWEST_STEP: Final = 0.9  # s, above: no input would stay alive, so t is probably not in seconds
+SLOWEST_S: Final = 0.3
+"""Between samples of a signal that still counts as one."""
+LATEST: Final = 9e9  # s, the year 2255 as Unix time
+_SHOWN: Final = 20  # names in a line
+_REMEDY: Final = f"give t [s] and columns such as {', '.join(list(INPUT)[:3])} (contract input names)"
+
+
+class SampleBlock(NamedTuple):
+    """Rows of a signal file, in the order of time."""
+
+    t: NDArray[np.float64]
+    """As it stands in the file [s], shape (rows,)."""
+    t_ns: NDArray[np.int64]
+    places: NDArray[np.int64]
+    """Place of each column in `inputs.value`, shape (columns,)."""
+    values: NDArray[np.float64]
+    """NaN: no sample, shape (rows, columns), units of the contract."""
+
+
+@dataclass
+class SignalQuality(Damage):
+    """What was found in a signal file."""
+
+    rows: int = 0
+    samples: int = 0
+    unknown_columns: list[str] = field(default_factory=list)
+    zero_ns: int | None = None
+    """Date of t = 0 as Unix time, if the file says so."""
+
+
+def freshness_at_any_rate() -> RecordArray:
+    """Return FRESHNESS per input, nothing received yet: a signal file promises no rate.
+
+    Time-outs follow the rate of the samples, down to `SLOWEST_S` between them.
+    """
+    any_rate = {place: (0.0, signal.timeout_s) for place, signal in enumerate(INPUT_SIGNALS)}
+    freshness = input_freshness(any_rate, {})
+    freshness["patience_ns"] = np.maximum(freshness["patience_ns"], round(1e9 * SLOWEST_S))
+    return freshness
+
+
+class _Batch(NamedTuple):
+    """Some rows of a file."""
+
+    rows: pa.RecordBatch
+    places: NDArray[np.int64]
+    """Of each row: its line in a CSV file, else its number from 0, shape (rows,)."""
+
+
+def _is_csv(path: Path) -> bool:
+    return path.suffix.lower() == ".csv"
+
+
+def _place(path: Path, number: int) -> str:
+    """Return how a user finds what `_Batch.places` names."""
+    return f"line {number}" if _is_csv(path) else f"row {number}"
+
+
+def read_signals(path: Path, quality: SignalQuality) -> Iterator[SampleBlock]:
+    """Yield a signal file in blocks of rows; `quality` is kept up to date.
+
+    Cells that are no number and rows without `t` are left out and counted. Raises UserError with file, row
+    and column for a `t` that falls, jumps or is not in seconds, an infinite value, a column without any
+    number, and a file without any known column or row.
+    """
+    if path.suffix.lower() == ".mf4":
+        batches = _mdf_batches(path, quality)
+    else:
+        batches = _csv_batches(path, quality) if _is_csv(path) else _parquet_batches(path, quality)
+    origin_ns: int | None = None
+    last_ns = 0
+    columns: list[str] = []
+    for batch, places in batches:
+        if not columns:
+            columns = _known_columns(path, batch.schema.names, quality)
+        t = _column(path, batch, "t", places, quality)
+        known = np.isfinite(t)
+        if not known.all():
+            if not known.any():
+                remedy = "time is missing or not finite; give t in seconds in every row"
+                raise UserError(str(path), f"{_place(path, places[0])}, t", remedy)
+            missing = np.flatnonzero(~known)
+            quality.note_damage(len(missing), f"{_place(path, places[missing[0]])}, t (missing)")
+            batch, places, t = batch.filter(pa.array(known)), places[known], t[known]
+        if not len(t):
+            continue
+        _check_unit(path, t)
+        if origin_ns is None:
+            origin = float(t[0])
+            origin_ns = last_ns = round(origin * 1e6) * 1000
+        t_ns = origin_ns + np.rint((t - origin) * 1e6).astype(np.int64) * 1000
+        steps = np.diff(t_ns, prepend=last_ns)
+        falling = np.flatnonzero(steps < 0)
+        if len(falling):
+            row = int(falling[0])
+            raise UserError(
+                str(path),
+                f"{_place(path, places[row])}, t",
+                f"time falls by {-1e-9 * steps[row]:g} s to {t[row]:g} s; sort the rows, or split the file"
+                " here if its clock was set back",
+            )
+        quality.stamps_repeated += int(np.count_nonzero(steps[quality.rows == 0 :] == 0))
+        _check_span(path, t_ns, last_ns, origin_ns, places, quality.rows)
+        last_ns = int(t_ns[-1])
+        values = np.empty((len(t), len(columns)))
+        for column, name in enumerate(columns):
+            values[:, column] = _column(path, batch, name, places, quality)
+            infinite = np.flatnonzero(np.isinf(values[:, column]))
+            if len(infinite):
+                raise UserError(
+                    str(path),
+                    f"{_place(path, places[infinite[0]])}, {name}",
+                    "infinite value; write null or NaN where there is no sample",
+                )
+        quality.rows += len(t)
+        quality.samples += int(np.count_nonzero(~np.isnan(values)))
+        yield SampleBlock(np.array(t), t_ns, np.array([INPUT[name] for name in columns], np.int64), values)
+    if quality.rows == 0:
+        remedy = quality.cut or f"no row that can be read; {_REMEDY}"
+        raise UserError(str(path), quality.first_damaged or _place(path, 2 * _is_csv(path)), remedy)
+
+
+def _check_unit(path: Path, t: NDArray[np.float64]) -> None:
+    step = float(np.median(np.diff(t))) if len(t) > FEW_ROWS else 0.0
+    found = f"the rows are {step:g} s apart" if step > SLOWEST_STEP else ""
+    if np.abs(t).max() > LATEST:
+        found = f"a value is {t[np.abs(t).argmax()]:g} s"
+    if found:
+        remedy = f"t is in seconds, but {found}; convert it from ms, us or ns, or give every sample"
+        raise UserError(str(path), "t", remedy)
+
+
+def _check_span(
+    path: Path,
+    t_ns: NDArray[np.int64],
+    last_ns: int,
+    origin_ns: int,
+    places: NDArray[np.int64],
+    rows: int,
+) -> None:
+    """Refuse a jump, and gaps that add up to a result of far more rows than the file has."""
+    jumps = np.flatnonzero(np.diff(t_ns, prepend=last_ns) > MAX_JUMP_NS)
+    if len(jumps):
+        raise UserError(
+            str(path),
+            f"{_place(path, places[jumps[0]])}, t",
+            "time jumps by more than an hour; mend the row or split the file here",
+        )
+    seconds = np.arange(rows, rows + len(t_ns)) * 1_000_000_000
+    empty = np.flatnonzero(t_ns - origin_ns > MAX_JUMP_NS + seconds)
+    if len(empty):
+        raise UserError(
+            str(path),
+            f"{_place(path, places[empty[0]])}, t",
+            "so far less than a row a second and more than an hour without any; split the file at its gaps",
+        )
+
+
+def _known_columns(path: Path, names: list[str], quality: SignalQuality) -> list[str]:
+    where = _place(path, 1) if _is_csv(path) else "columns"
+    if "t" not in names:
+        raise UserError(str(path), where, f"column t is missing; {_REMEDY}")
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise UserError(str(path), where, f"column {twice[0]} stands twice; keep one")
+    known = [name for name in names if name in INPUT]
+    quality.unknown_columns = [name for name in names if name not in INPUT and name != "t"]
+    if not known:
+        shown = f"{', '.join(names[:_SHOWN])}{', …' if len(names) > _SHOWN else ''}"
+        raise UserError(str(path), where, f"no known input among {shown}; {_REMEDY}")
+    return known
+
+
+def _column(
+    path: Path, batch: pa.RecordBatch, name: str, places: NDArray[np.int64], quality: SignalQuality
+) -> NDArray[np.float64]:
+    column = batch.column(name)
+    if pa.types.is_null(column.type):
+        return np.full(batch.num_rows, np.nan)
+    try:
+        return np.asarray(column.cast(pa.float64()).to_numpy(zero_copy_only=False), np.float64)
+    except (pa.ArrowInvalid, pa.ArrowNotImplementedError):
+        if not pa.types.is_string(column.type):
+            remedy = f"type {column.type} is no number; write float64"
+            raise UserError(str(path), name, remedy) from None
+    values = np.full(len(column), np.nan)
+    wrong: list[int] = []
+    for row, cell in enumerate(column.to_pylist()):
+        try:
+            values[row] = float(cell) if cell is not None else np.nan
+        except ValueError:
+            wrong.append(row)
+    if wrong:
+        place = f"{_place(path, places[wrong[0]])}, {name}"
+        reason = f"{str(column[wrong[0]])[:_SHOWN]!r} is no number"
+        if len(wrong) == len(column) - column.null_count:
+            raise UserError(str(path), place, f"{reason}; leave the cell empty if unknown")
+        quality.note_damage(len(wrong), f"{place} ({reason})")
+    return values
+
+
+def _numbered(batches: Iterator[pa.RecordBatch]) -> Iterator[_Batch]:
+    done = 0
+    for batch in batches:
+        yield _Batch(batch, np.arange(done, done + batch.num_rows))
+        done += batch.num_rows
+
+
+def _names_only(names: list[str]) -> _Batch:
+    """Return no row of these columns: what is not known is listed, not read."""
+    rows = pa.RecordBatch.from_arrays([pa.array([], pa.null())] * len(names), names=names)
+    return _Batch(rows, np.empty(0, np.int64))
+
+
+def _parquet_batches(path: Path, quality: SignalQuality) -> Iterator[_Batch]:
+    try:
+        with pq.ParquetFile(path) as source:
+            names = source.schema_arrow.names
+            yield _names_only(names)
+            _note_start(source, quality)
+            wanted = [name for name in names if name == "t" or name in INPUT]
+            yield from _numbered(source.iter_batches(BLOCK_ROWS, columns=wanted))
+    except (pa.ArrowInvalid, OSError) as error:
+        reason = str(error).splitlines()[0].rstrip(".")
+        if not quality.rows:
+            remedy = f"no readable Parquet file ({reason}); write it again"
+            raise UserError(str(path), "", remedy) from None
+        quality.cut = f"row {quality.rows}: cannot be read ({reason}), the rest is missing"
+
+
+def _note_start(source: pq.ParquetFile, quality: SignalQuality) -> None:
+    """Note the date of t = 0 where the metadata has that of the first row, as our own files do."""
+    start = (source.metadata.metadata or {}).get(b"start_time_ns", b"").decode("ascii", "replace")
+    if start.isdecimal() and source.metadata.num_rows:
+        first = next(source.iter_batches(1, columns=["t"])).column(0)[0].as_py()
+        if isinstance(first, float):
+            quality.zero_ns = int(start) - round(first * 1e6) * 1000
+
+
+def _mdf_batches(path: Path, quality: SignalQuality) -> Iterator[_Batch]:
+    channels = open_channels(path)
+    try:
+        quality.zero_ns = channels.measurement.start_ns()
+        inputs = [name for places in channels.groups.values() for name in places]
+        yield _names_only(["t", *inputs, *channels.unknown])
+        yield from _numbered(read_channels(path, channels, quality))
+    finally:
+        channels.measurement.close()
+
+
+def _csv_batches(path: Path, quality: SignalQuality) -> Iterator[_Batch]:
+    names, delimiter = csv_columns(path)
+    yield _names_only(names)
+    wanted = [name for name in names if name == "t" or name in INPUT]
+    for lines, rows in csv_rows(path, names, delimiter, wanted, quality):
+        yield _Batch(rows, lines)

@@ -1,0 +1,188 @@
+"""Results as files: `RESULT.parquet` with one row every 10 ms and `RESULT.brakes.parquet` beside it, or both
+as the channel groups of one `RESULT.mf4`.
+
+Names and units are the contract's. A quantity that is not available is null. The unit of a column stands in
+its field's metadata, the provenance (version, hashes, start, quality of the input) in the schema's.
+"""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from brakelab.replay.engine import MEASURED_INPUTS
+from brakelab.results.brakes import BRAKE_UNITS, BrakeBook, BrakeRow
+from brakelab.results.mdf import SUFFIX, load_asammdf, refuse_mdf, write_mdf
+from ecu.contract.records import RecordArray
+from ecu.contract.signals import INPUT_SIGNALS, OUTPUT_COLUMNS, OUTPUT_SIGNALS, column_names
+from ecu.errors import UserError
+
+MEASURED: Final = tuple(INPUT_SIGNALS[place] for place in MEASURED_INPUTS)
+"""Inputs that a reader needs beside the outputs, as last received."""
+ROW_COLUMNS: Final = OUTPUT_COLUMNS + tuple(signal.name for signal in MEASURED)
+"""A row of results without `t`: the outputs as a vector, then `MEASURED`."""
+N_ROW: Final = len(ROW_COLUMNS)
+
+_SMALL: Final = {"mode", "mode_mu_b", "pressure_demand_valid", "motor_demand_valid", "braking"}
+_COUNTS: Final = {"active_faults", "overruns"}
+
+
+def _row_schema() -> pa.Schema:
+    fields: list[pa.Field[Any]] = [pa.field("t", pa.float64(), nullable=False, metadata={"unit": "s"})]
+    for signal in OUTPUT_SIGNALS:
+        kind: pa.DataType = (
+            pa.int8() if signal.name in _SMALL else pa.uint32() if signal.name in _COUNTS else pa.float64()
+        )
+        fields += [pa.field(name, kind, metadata={"unit": signal.unit}) for name in column_names(signal)]
+    fields += [pa.field(signal.name, pa.float64(), metadata={"unit": signal.unit}) for signal in MEASURED]
+    return pa.schema(fields)
+
+
+def _brake_schema() -> pa.Schema:
+    kinds = {"brake": pa.int32(), **dict.fromkeys(("corner", "learning", "left_out"), pa.string())}
+    return pa.schema(
+        [
+            pa.field(name, kinds.get(name, pa.float64()), metadata={"unit": u})
+            for name, u in BRAKE_UNITS.items()
+        ]
+    )
+
+
+ROW_SCHEMA: Final = _row_schema()
+BRAKE_SCHEMA: Final = _brake_schema()
+
+
+def brakes_path(result: Path) -> Path:
+    """Return where the brake applications of `result` are: `<name>.brakes.parquet`, or in an MDF4 file."""
+    return result if result.suffix == SUFFIX else result.with_name(result.stem + ".brakes.parquet")
+
+
+def _table(schema: pa.Schema, columns: Sequence[NDArray[Any] | list[Any]]) -> pa.Table:
+    arrays = []
+    for field, column in zip(schema, columns, strict=True):
+        if pa.types.is_integer(field.type):
+            values = np.asarray(column, np.float64)
+            known = np.isfinite(values)
+            whole = np.where(known, values, 0.0).astype(field.type.to_pandas_dtype())
+            arrays.append(pa.array(whole, field.type, mask=~known))
+        else:
+            arrays.append(pa.array(column, field.type, from_pandas=True))
+    return pa.Table.from_arrays(arrays, schema=schema)
+
+
+def brakes_table(rows: Sequence[BrakeRow]) -> pa.Table:
+    """Return the table of brake applications, without metadata."""
+    columns = [[getattr(row, name) for row in rows] for name in BRAKE_UNITS]
+    return _table(BRAKE_SCHEMA, columns)
+
+
+def _encoded(metadata: dict[str, Any]) -> dict[str, str]:
+    return {name: value if isinstance(value, str) else json.dumps(value) for name, value in metadata.items()}
+
+
+class ResultWriter:
+    """Writes a result row group by row group; its files appear when the run is complete, or not at all."""
+
+    def __init__(self, path: Path, params: RecordArray) -> None:
+        """`params`: the parameters of `step`, shape (1,): geometry of the brakes, mass, resistances.
+
+        Raises UserError for a `path` that ends in .mf4 where asammdf is not installed.
+        """
+        if path.suffix == SUFFIX:
+            load_asammdf(path)
+        self.path = path
+        self.brakes = BrakeBook(params)
+        self.provenance: dict[str, Any] = {}
+        """Into the schema's metadata with the first rows: text as it is, everything else as JSON."""
+        self.quality: list[dict[str, Any]] = []
+        """What is known at the end only: into the file's metadata under `quality`."""
+        self.rows = 0
+        self._unfinished = path.with_name(f".{path.name}.unfinished")
+        self._file: pq.ParquetWriter | None = None
+
+    def write(self, t: NDArray[np.float64], rows: NDArray[np.float64]) -> None:
+        """Append rows: `t` [s], shape (n,), `rows` in the order of `ROW_COLUMNS`, shape (n, N_ROW)."""
+        self._open().write_table(_table(ROW_SCHEMA, [t, *np.ascontiguousarray(rows.T)]))
+        self.brakes.add(t, rows)
+        self.rows += len(t)
+
+    def _open(self) -> pq.ParquetWriter:
+        if self._file is None:
+            schema = ROW_SCHEMA.with_metadata(_encoded(self.provenance))
+            try:
+                self.path.parent.mkdir(parents=True, exist_ok=True)
+                # Dictionaries of numbers that hardly ever repeat take as long as all else, and more room.
+                self._file = pq.ParquetWriter(
+                    self._unfinished, schema, compression="zstd", use_dictionary=False
+                )
+            except OSError as error:
+                raise _not_written(self.path, error) from None
+        return self._file
+
+    def __enter__(self) -> "ResultWriter":
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: object, trace: TracebackType | None) -> None:
+        if kind is not None:
+            if self._file is not None:
+                self._file.close()
+            self._unfinished.unlink(missing_ok=True)
+            return
+        file = self._open()
+        file.add_key_value_metadata({"quality": json.dumps(self.quality)})
+        file.close()
+        self.brakes.end_log()
+        table = brakes_table(self.brakes.rows).replace_schema_metadata(_encoded(self.provenance))
+        if self.path.suffix == SUFFIX:
+            try:
+                write_mdf(self._unfinished, table, self.path)
+            finally:
+                self._unfinished.unlink()
+            return
+        pq.write_table(table, brakes_path(self.path), compression="zstd")
+        self._unfinished.replace(self.path)
+
+
+def _not_written(path: Path, error: OSError) -> UserError:
+    return UserError(str(path), "", f"cannot be written ({error.strerror or error}); choose another --out")
+
+
+class Result(NamedTuple):
+    """A result file in memory."""
+
+    columns: dict[str, NDArray[Any]]
+    """By name, float64 (text: object); null is NaN; shape (rows,)."""
+    units: dict[str, str]
+    metadata: dict[str, str]
+
+
+def read_result(path: Path) -> Result:
+    """Return the columns, units and provenance of a result (or of its brakes).
+
+    Raises UserError if it cannot be read.
+    """
+    refuse_mdf(path)
+    try:
+        table = pq.read_table(path)
+        stored = pq.read_metadata(path).metadata or {}
+    except FileNotFoundError:
+        raise UserError(str(path), "", "no such file; give a result of `brake-ecu replay`") from None
+    except (pa.ArrowInvalid, OSError):
+        raise UserError(
+            str(path), "", "no readable Parquet file; give a result of `brake-ecu replay`"
+        ) from None
+    columns: dict[str, NDArray[Any]] = {}
+    units = {}
+    for field in table.schema:
+        column = table.column(field.name)
+        kind = field.type if pa.types.is_string(field.type) else pa.float64()
+        columns[field.name] = column.cast(kind).to_numpy(zero_copy_only=False)
+        units[field.name] = (field.metadata or {}).get(b"unit", b"").decode()
+    metadata = {key.decode(): value.decode() for key, value in stored.items() if key != b"ARROW:schema"}
+    return Result(columns, units, metadata)

@@ -1,0 +1,208 @@
+"""What a brake application is expected to do, from its pressures and what was known before it.
+
+Where no sensor tells the friction, an estimate can only be judged by what it predicts:
+
+    f = [sum (2 A_i r_eff mu_i (p_i - z_i - p_0)+ + M_i) / r_i + drag v^2 + rolling g m]
+        / (m + sum I_i / r_i^2) + overrun
+
+mu_i, mass m, overrun (drag of a drive that nobody reports) and the pressure sensors' zeros z_i are those
+known before the application; pressures p_i, motor torques M_i (positive brakes) and the speed v are its own,
+I_i is a wheel's inertia. f is a specific force, what an accelerometer reads, so no slope is in it.
+
+    specific_force_predicted   mean of f            over the rows in which the vehicle moves and the driver
+    specific_force_mean        mean of b - a_x      does not drive against the brakes
+    decel_predicted            mean of f over all rows; of a vehicle that stands it is 0
+
+b is the accelerometer's zero as known before. `specific_force_configured` is the first with the configured
+friction and mass and without overrun: what an ECU that never learns would predict.
+
+The standard deviation is that of the force of all linings at equal pressures, and of the motor torque.
+"""
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ecu.algorithm.estimation.friction import DRIVEN
+from ecu.contract.params import BAR, GRAVITY
+from ecu.contract.records import RecordArray
+from ecu.contract.signals import N_OUTPUTS, OUTPUT
+
+Vector = NDArray[np.float64]
+
+STANDING: Final = 0.3  # m/s, below: the vehicle stands
+SHORT: Final = 0.5  # s, shorter: a tap on the pedal
+WEAK: Final = 0.5  # m/s^2, below: an error of it in per cent says nothing
+PRESSED: Final = 2.0  # %, of the accelerator; the ECU learns nothing above it either
+LEAST_ROWS: Final = 40
+"""That count, of an application that is judged."""
+
+
+class Prediction(NamedTuple):
+    """What an application is expected to do, and what it did, all [m/s^2]."""
+
+    decel: float
+    """Mean over all of it."""
+    force: float
+    """Mean over the rows that count, as everything below."""
+    sigma: float
+    configured: float
+    """With the configured friction."""
+    rest: float
+    """Part of `force` that is not the linings'."""
+    configured_rest: float
+    measured: float
+    """Mean specific force, positive braking; NaN: the accelerometer was not usable."""
+    too_few: str
+    """Why too few rows count, empty where enough do."""
+
+
+def corners(rows: Vector, name: str) -> Vector:
+    """Return the four columns of a corner output of `rows`, shape (..., N_ROW) to (..., 4)."""
+    first = OUTPUT[f"{name}_fl"]
+    return rows[..., first : first + 4]
+
+
+def mean(values: Vector, weights: Vector | None = None) -> float:
+    """Return the mean of what is known, NaN if nothing is; `weights` of the shape of `values`."""
+    known = np.isfinite(values)
+    weights = np.ones_like(values) if weights is None else weights
+    total = float(weights[known].sum())
+    return float(values[known] @ weights[known]) / total if total > 0.0 else float("nan")
+
+
+def _motor_torques(rows: Vector) -> Vector:
+    return np.nan_to_num(rows[:, N_OUTPUTS : N_OUTPUTS + 4])
+
+
+def _linings(rows: Vector, before: Vector, params: RecordArray) -> Vector:
+    """Return the force of each lining over its friction [N], shape (n, 4)."""
+    p = params[0]
+    zero = np.nan_to_num(corners(before, "pressure_zero")) * BAR
+    acts = np.maximum(corners(rows, "calliper_pressure") * BAR - zero - p["push_out_pressure"], 0.0)
+    return np.asarray(2.0 * p["piston_area"] * p["effective_radius"] / p["wheel_radius"] * acts)
+
+
+def that_count(rows: Vector, before: Vector, params: RecordArray) -> NDArray[np.bool_]:
+    """Return which rows of an application count: moving, nobody drives against the brakes, shape (n,)."""
+    brakes = _linings(rows, before, params) @ corners(before, "mu_b")
+    motors = (_motor_torques(rows) / params[0]["wheel_radius"]).sum(axis=1)
+    moves = rows[:, OUTPUT["vehicle_speed"]] > STANDING
+    accelerates = rows[:, N_OUTPUTS + 4] > PRESSED
+    felt = np.isfinite(rows[:, OUTPUT["accel_x_road"]])
+    return np.asarray(moves & ~accelerates & ~(-motors > DRIVEN * brakes) & (felt | ~felt.any()))
+
+
+def _too_few(speed: Vector, count: int) -> str:
+    """Return why too few rows count; `speed` [m/s] of all rows, shape (n,), `count` of those that do."""
+    if count >= LEAST_ROWS:
+        return ""
+    if np.isnan(speed).sum() > len(speed) - LEAST_ROWS:
+        return "inputs lost"
+    return "stands" if (speed > STANDING).sum() < LEAST_ROWS else "driven against the brakes"
+
+
+class _Car(NamedTuple):
+    """What a prediction takes the car for."""
+
+    mu_b: Vector
+    mass: float
+    overrun: float
+
+
+def _forces(rows: Vector, before: Vector, car: _Car, params: RecordArray) -> tuple[Vector, Vector]:
+    """Return the specific force of the linings and the rest of it [m/s^2], shape (n,)."""
+    p = params[0]
+    inert = car.mass + (p["wheel_inertia"] / p["wheel_radius"] ** 2).sum()
+    motors = (_motor_torques(rows) / p["wheel_radius"]).sum(axis=1)
+    resistance = p["drag_area"] * rows[:, OUTPUT["vehicle_speed"]] ** 2
+    resistance += p["rolling_resistance"] * GRAVITY * car.mass
+    return _linings(rows, before, params) @ car.mu_b / inert, (motors + resistance) / inert + car.overrun
+
+
+def predict(rows: Vector, before: Vector, params: RecordArray) -> Prediction:
+    """Return what to expect of an application.
+
+    Args:
+        rows: of the application, shape (n, N_ROW).
+        before: the row that precedes it, shape (N_ROW,), whose knowledge is used.
+        params: `PARAMS`, shape (1,).
+    """
+    p = params[0]
+    mass, overrun = float(before[OUTPUT["vehicle_mass"]]), float(np.nan_to_num(before[OUTPUT["overrun"]]))
+    mass = mass if np.isfinite(mass) else float(p["mass"])
+    learned = _Car(corners(before, "mu_b"), mass, overrun)
+    configured = _Car(p["mu_nominal"], float(p["mass"]), 0.0)
+    speed = rows[:, OUTPUT["vehicle_speed"]]
+    decel = mean(np.where(speed > STANDING, sum(_forces(rows, before, learned, params)), 0.0))
+    rows = rows[that_count(rows, before, params)]
+    brakes, rest = map(mean, _forces(rows, before, learned, params))
+    configured_brakes, configured_rest = map(mean, _forces(rows, before, configured, params))
+    motors = mean((_motor_torques(rows) / p["wheel_radius"]).sum(axis=1)) / mass
+    relative = before[OUTPUT["sigma_brake_force"]]
+    if np.isnan(relative):  # of one wheel's observers: taken as one error common to all
+        relative = float(np.mean(corners(before, "sigma_mu_b") / corners(before, "mu_b")))
+    sigma = float(np.hypot(relative * brakes, p["sigma_motor_torque"] * motors))
+    felt = rows[:, OUTPUT["accel_x_road"]] - np.nan_to_num(before[OUTPUT["accel_x_zero"]])
+    return Prediction(
+        decel, brakes + rest, sigma, configured_brakes + configured_rest, rest, configured_rest,
+        -mean(felt), _too_few(speed, len(rows)),
+    )  # fmt: skip
+
+
+def left_out(duration: float, measured: float, predicted: float, too_few: str = "") -> str:
+    """Return why the prediction of an application does not count, empty where it does."""
+    if duration < SHORT:
+        return f"shorter than {SHORT} s"
+    if too_few:
+        return too_few
+    if not np.isfinite([measured, predicted]).all():
+        return "inputs lost"
+    return f"below {WEAK} m/s²" if measured < WEAK else ""
+
+
+def running_average(measured: Sequence[float], configured: Sequence[float], rest: Sequence[float]) -> Vector:
+    """Return what a running average of the friction's scale would have predicted, shape (n,).
+
+    Each application is predicted with the mean of 1 and the scales of those before it: what the linings did
+    over what configured friction expects. All three [m/s^2]; `rest` is not the linings'.
+    """
+    linings = np.asarray(configured) - np.asarray(rest)
+    scales = (np.asarray(measured) - np.asarray(rest)) / linings
+    known = np.concatenate(([1.0], scales[:-1])) if len(scales) else np.empty(0)
+    return np.asarray(np.cumsum(known) / np.arange(1, len(known) + 1) * linings + np.asarray(rest))
+
+
+def one_scale(measured: Sequence[float], configured: Sequence[float], rest: Sequence[float]) -> Vector:
+    """Return what one scale of the friction, chosen in hindsight, would have predicted, shape (n,)."""
+    linings = np.asarray(configured) - np.asarray(rest)
+    scales = (np.asarray(measured) - np.asarray(rest)) / linings
+    off = [np.abs((scale * linings + rest) / measured - 1.0).mean() for scale in scales]
+    return np.asarray(scales[int(np.argmin(off))] * linings + rest) if len(scales) else np.empty(0)
+
+
+class Errors(NamedTuple):
+    """How far predictions are from what was measured, as shares of the measured; NaN where none counts."""
+
+    counted: int
+    mean: float
+    """Of the magnitude."""
+    median: float
+    """Of the magnitude."""
+    worst: float
+    """Of the magnitude."""
+    bias: float
+    """Mean; positive: more was predicted than came."""
+
+
+def errors(measured: Sequence[float], predicted: Sequence[float] | Vector) -> Errors:
+    """Return the errors of predictions that count, one place each; decelerations in m/s^2."""
+    if not len(measured):
+        return Errors(0, *[float("nan")] * 4)
+    shares = np.asarray(predicted) / np.asarray(measured) - 1.0
+    off = np.abs(shares)
+    return Errors(
+        len(shares), float(off.mean()), float(np.median(off)), float(off.max()), float(shares.mean())
+    )

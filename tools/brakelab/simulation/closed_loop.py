@@ -1,0 +1,313 @@
+"""The simulated vehicle and the ECU closed in memory over real frames, and `brake-ecu simulate`.
+
+One cycle k: the driver acts, the vehicle measures and sends; its frames arrive shortly before T_k; the ECU
+receives, steps and sends; the vehicle understands the demands and moves on by 10 ms. All of it runs in one
+kernel with the ECU's own kernels, so that what is simulated is what is driven. Frames of both directions pass
+the scenario's faults (`brakelab.simulation.faults`) on their way.
+"""
+
+import math
+from collections.abc import Iterator
+from functools import cache
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from brakelab.plant.driver import drive
+from brakelab.simulation.deaths import killed
+from brakelab.simulation.faults import Way, convey, new_way
+from brakelab.simulation.scenario import LONGEST, Scenario
+from brakelab.simulation.vehicle_bus import (
+    N_TRUTH,
+    TRUTH_COLUMNS,
+    Vehicle,
+    carry_on,
+    new_noise,
+    new_values,
+    new_vehicle,
+    sense,
+    understand,
+    write_truth,
+)
+from ecu.algorithm.step import new_state, step
+from ecu.bus.freshness import begin_cycle, end_cycle, target_dtype
+from ecu.bus.receive import (
+    ReceivePlan,
+    Reception,
+    contract_listen_plan,
+    contract_receive_plan,
+    new_reception,
+    receive,
+)
+from ecu.bus.transmit import (
+    Transmission,
+    TransmitPlan,
+    contract_transmit_plan,
+    frame_buffer,
+    new_transmission,
+    transmit,
+)
+from ecu.contract.records import FRAME, INPUTS, OUTPUTS, RecordArray, new_record, output_vector
+from ecu.contract.signals import CYCLE_NS, INPUT_SIGNALS, N_INPUTS, N_OUTPUTS, OUTPUT_COLUMNS
+from ecu.jit import kernel
+from ecu.settings.config import Config, new_params
+from ecu.settings.resources import resource
+
+START_NS: Final = 1_700_000_000_000_000_000
+"""T_0 of every simulation on the real-time clock."""
+SPACING_NS: Final = 10_000  # between frames of one burst
+CHUNK: Final = 1000  # cycles that one call of the kernel runs at most
+VEHICLE_BUS: Final = "can0"
+
+
+class Plans(NamedTuple):
+    """Who sends and understands what."""
+
+    vehicle_sends: TransmitPlan
+    vehicle_hears: ReceivePlan
+    ecu_sends: TransmitPlan
+    ecu_hears: ReceivePlan
+
+
+class Sides(NamedTuple):
+    """Vehicle and ECU, each with its ends of the bus."""
+
+    vehicle: Vehicle
+    values: NDArray[np.float64]
+    vehicle_sent: Transmission
+    heard: RecordArray
+    vehicle_reception: Reception
+    params: RecordArray
+    state: RecordArray
+    inputs: RecordArray
+    outputs: RecordArray
+    output_vector: NDArray[np.float64]
+    ecu_sent: Transmission
+    ecu_reception: Reception
+    vehicle_frames: RecordArray
+    ecu_frames: RecordArray
+    to_ecu: Way
+    to_vehicle: Way
+
+
+class Loop(NamedTuple):
+    """One closed loop."""
+
+    sides: Sides
+    noise: Generator
+
+
+class Told(NamedTuple):
+    """The friction that the ECU's pressure law is told to use in place of its own."""
+
+    true_share: float = 0.0
+    """Of the true friction: 1 makes the ideal controller; 0: not told."""
+    front: float = 0.0
+    """Amplitude of a sine about the base friction, relative to it, of the front axle."""
+    rear: float = 0.0
+    frequency: float = 0.0
+    """Of the sine [Hz]; 0: not told."""
+
+
+class Drive(NamedTuple):
+    """A simulated drive, one row per cycle; names and units of the contract."""
+
+    t: NDArray[np.float64]
+    """T_k since the start [s], shape (n,)."""
+    inputs: dict[str, NDArray[np.float64]]
+    """As the ECU decoded them; NaN where no new sample arrived."""
+    outputs: dict[str, NDArray[np.float64]]
+    truth: dict[str, NDArray[np.float64]]
+    """At T_k, by `TRUTH_COLUMNS`."""
+    frames: RecordArray
+    """`FRAME` of both directions in the order of their stamps."""
+
+
+class Block(NamedTuple):
+    """Some cycles of a `Drive`, a row each, of shape (n, N_INPUTS), (n, N_OUTPUTS), (n, N_TRUTH); frames."""
+
+    decoded: NDArray[np.float64]
+    outputs: NDArray[np.float64]
+    truth: NDArray[np.float64]
+    frames: RecordArray
+
+
+@cache
+def plans() -> Plans:
+    """Return the plans of the contract's database.
+
+    A frame without any new sample is not sent: that is how a sensor is slow or dead.
+    """
+    dbc = resource("dbc/brake_ecu.dbc")
+    vehicle_sends = contract_transmit_plan(dbc, "Vehicle")
+    vehicle_sends.messages["optional"] = 1
+    return Plans(
+        vehicle_sends,
+        contract_listen_plan(dbc),
+        contract_transmit_plan(dbc, "BrakeEcu"),
+        contract_receive_plan(dbc),
+    )
+
+
+def new_loop(scenario: Scenario, config: Config, seed: int, armed: bool = True) -> Loop:
+    """Return a closed loop before its first cycle; car and noise are drawn from `seed`.
+
+    `armed`: the ECU's demands count, whatever `config.transmit` says; else the vehicle's fallback brakes.
+
+    Raises:
+        UserError: the plant's file cannot be read or is wrong.
+    """
+    params = new_params(config)
+    params["transmit"] = armed
+    outputs = new_record(OUTPUTS)
+    plan = plans()
+    sides = Sides(
+        new_vehicle(scenario, seed),
+        new_values(),
+        new_transmission(plan.vehicle_sends),
+        np.zeros(1, target_dtype(N_OUTPUTS)),
+        new_reception(plan.vehicle_hears),
+        params,
+        new_state(params),
+        new_record(INPUTS),
+        outputs,
+        output_vector(outputs),
+        new_transmission(plan.ecu_sends),
+        new_reception(plan.ecu_hears),
+        frame_buffer(plan.vehicle_sends),
+        frame_buffer(plan.ecu_sends),
+        new_way(),
+        new_way(),
+    )
+    return Loop(sides, new_noise(seed))
+
+
+@kernel
+def _hand_over(frames: Any, count: int, first_ns: int, spacing_ns: int, kept: Any, place: int) -> int:
+    """Stamp `count` frames and keep copies from `place` on; returns the place behind them."""
+    for i in range(count):
+        frames[i].stamp_ns = first_ns + i * spacing_ns
+        kept[place + i] = frames[i]
+    return place + count
+
+
+@kernel
+def _tell(told: Told, control: Any, true: Any, t: float) -> None:
+    """Tell the pressure law a friction: `control` is its state, `true` the car's friction, `t` time [s]."""
+    for i in range(4):
+        if told.true_share > 0.0:
+            control.mu_override[i] = told.true_share * true[i]
+        elif told.frequency > 0.0:
+            amplitude = told.front if i < 2 else told.rear
+            wave = 1.0 + amplitude * math.sin(2.0 * math.pi * told.frequency * t)
+            control.mu_override[i] = control.base[i] * wave
+
+
+@kernel
+def _run(
+    plan: Plans,
+    loop: Sides,
+    noise: Generator,
+    told: Told,
+    alive: bool,
+    first_cycle: int,
+    decoded: NDArray[np.float64],
+    outputs: NDArray[np.float64],
+    truth: NDArray[np.float64],
+    kept: Any,
+) -> tuple[int, int, bool]:
+    """Run cycles until the rows are full or the script has ended.
+
+    Returns rows and frames written, and whether the script goes on.
+    """
+    vehicle, inputs, heard = loop.vehicle, loop.inputs[0], loop.heard[0]
+    place = 0
+    for row in range(len(truth)):
+        if not drive(vehicle.script, vehicle.params[0], vehicle.state[0], vehicle.driver[0], 1e-9 * CYCLE_NS):
+            return row, place, False
+        cycle = first_cycle + row
+        t_ns = START_NS + cycle * CYCLE_NS
+        sense(vehicle, noise, loop.values)
+        write_truth(vehicle, truth[row])
+        sent = transmit(plan.vehicle_sends, loop.vehicle_sent, loop.values, cycle, loop.vehicle_frames)
+        t = 1e-9 * (cycle * CYCLE_NS)
+        sent = convey(vehicle.faults, loop.to_ecu, t, noise, loop.vehicle_frames, sent)
+        arrived = loop.to_ecu.arrived
+        # A log's time grid starts at its first frame: the first burst bears T_0 itself.
+        spacing = SPACING_NS if cycle > 0 else 0
+        place = _hand_over(arrived, sent, t_ns - sent * spacing, spacing, kept, place)
+
+        if not alive:
+            decoded[row] = outputs[row] = np.nan
+            carry_on(vehicle)
+            continue
+        begin_cycle(inputs, t_ns, CYCLE_NS)
+        receive(plan.ecu_hears, loop.ecu_reception, arrived, 0, sent, inputs)
+        end_cycle(inputs, loop.ecu_reception.freshness)
+        for i in range(N_INPUTS):
+            decoded[row, i] = inputs.value[i] if inputs.new[i] else np.nan
+        _tell(told, loop.state[0].control, vehicle.state[0].mu_b, t)
+        step(loop.params, loop.state, loop.inputs, loop.outputs)
+        outputs[row] = loop.output_vector
+
+        sent = transmit(plan.ecu_sends, loop.ecu_sent, loop.output_vector, cycle, loop.ecu_frames)
+        sent = convey(vehicle.faults, loop.to_vehicle, t, noise, loop.ecu_frames, sent)
+        arrived = loop.to_vehicle.arrived
+        place = _hand_over(arrived, sent, t_ns + 10 * SPACING_NS, SPACING_NS, kept, place)
+        begin_cycle(heard, t_ns + CYCLE_NS // 2, CYCLE_NS)
+        receive(plan.vehicle_hears, loop.vehicle_reception, arrived, 0, sent, heard)
+        understand(heard, vehicle.demand[0])
+        carry_on(vehicle)
+    return len(truth), place, True
+
+
+def _start_anew(sides: Sides) -> None:
+    """Let the ECU begin with what its side process kept of the one before."""
+    learned = sides.state["learned"].copy()
+    sides.state[:] = new_state(sides.params, learned)
+    memory: tuple[NDArray[Any], ...] = (*sides.ecu_reception, *sides.ecu_sent)
+    fresh = (*new_reception(plans().ecu_hears), *new_transmission(plans().ecu_sends))
+    for old, new in zip(memory, fresh, strict=True):
+        old[:] = new
+
+
+def run_blocks(loop: Loop, seconds: float = LONGEST, told: Told | None = None) -> Iterator[Block]:
+    """Run a new loop as `run` does, yielding blocks of its cycles: the next one overwrites the arrays."""
+    told, sides = told or Told(), loop.sides
+    decoded, outputs, truth = (np.empty((CHUNK, width)) for width in (N_INPUTS, N_OUTPUTS, N_TRUTH))
+    kept = new_record(FRAME, CHUNK * 2 * (len(sides.vehicle_frames) + len(sides.ecu_frames)))
+    first, last, running = 0, round(seconds * 1e9 / CYCLE_NS), True
+    deaths = killed(sides.vehicle.faults)
+    while running and first < last:
+        if deaths and first >= deaths[0].end:
+            if not deaths.pop(0).standby:
+                _start_anew(sides)
+            continue
+        alive = not deaths or first < deaths[0].begin
+        until = (deaths[0].begin if alive else deaths[0].end) if deaths else last
+        size = min(CHUNK, last - first, until - first)
+        rows = decoded[:size], outputs[:size], truth[:size]
+        done, count, running = _run(plans(), sides, loop.noise, told, alive, first, *rows, kept)
+        yield Block(decoded[:done], outputs[:done], truth[:done], kept[:count])
+        first += done
+
+
+def run(loop: Loop, ideal: bool = False, seconds: float = LONGEST, told: Told | None = None) -> Drive:
+    """Run a new loop to the end of its script, or for `seconds`, and return what happened.
+
+    `ideal`: the ECU's pressure law is given the true friction, to compare a compensated controller with;
+    `told`: another one. Where the scenario kills the daemon, its outputs are NaN until it, or its standby,
+    sends again.
+    """
+    running = run_blocks(loop, seconds, told or Told(1.0 if ideal else 0.0))
+    blocks = [tuple(map(np.copy, block)) for block in running]
+    decoded, outputs, truth, frames = (np.concatenate(values) for values in zip(*blocks, strict=True))
+    return Drive(
+        np.arange(len(truth), dtype=np.float64) * (1e-9 * CYCLE_NS),
+        dict(zip((signal.name for signal in INPUT_SIGNALS), decoded.T, strict=True)),
+        dict(zip(OUTPUT_COLUMNS, outputs.T, strict=True)),
+        dict(zip(TRUTH_COLUMNS, truth.T, strict=True)),
+        frames,
+    )

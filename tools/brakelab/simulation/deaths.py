@@ -1,0 +1,35 @@
+"""When a daemon is killed in memory, and for how long nobody sends."""
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from brakelab.simulation.faults import DAEMON_KILLED
+from brakelab.simulation.scenario import LONGEST
+from ecu.contract.records import RecordArray
+from ecu.contract.signals import CYCLE_NS
+from ecu.runtime.standby import SILENCE_NS
+
+START_UP: Final = 2.5
+"""s from the start of a daemon to its first frame. Assumption, see docs/rig.md"""
+TAKEOVER: Final = 1e-9 * (SILENCE_NS + CYCLE_NS)
+"""s from the last frame of the first daemon to the first of its standby."""
+
+
+class Death(NamedTuple):
+    """The ECU does not send in cycles `begin` to `end`; then it is a new one, or the standby."""
+
+    begin: int
+    end: int
+    standby: bool
+
+
+def killed(faults: RecordArray) -> list[Death]:
+    """Return the deaths in `faults` (`FAULT`, shape (n,)) in their order."""
+    deaths = []
+    for fault in np.sort(faults[faults["kind"] == DAEMON_KILLED], order="begin"):
+        begin, standby = float(fault["begin"]), bool(fault["standby"])
+        end = begin + TAKEOVER if standby else float(fault["end"]) + START_UP
+        first, last = (round(min(instant, LONGEST) * 1e9 / CYCLE_NS) for instant in (begin, end))
+        deaths.append(Death(first, last, standby))
+    return deaths

@@ -1,0 +1,35 @@
+"""What the ECU of a simulated drive had as its inputs: decoded once, stepped through as often as wanted."""
+
+from typing import Any
+
+import numpy as np
+
+from brakelab.simulation.closed_loop import START_NS, plans
+from ecu.bus.freshness import begin_cycle, end_cycle
+from ecu.bus.receive import ReceivePlan, Reception, new_reception, receive
+from ecu.contract.records import INPUTS, RecordArray, new_record
+from ecu.contract.signals import CYCLE_NS
+from ecu.jit import kernel
+
+
+def vehicle_frames(frames: RecordArray) -> RecordArray:
+    """Return those frames of a drive that the vehicle sent."""
+    return frames[~np.isin(frames["can_id"], plans().ecu_sends.ids)]
+
+
+def ecu_inputs(frames: RecordArray, cycles: int) -> RecordArray:
+    """Return `INPUTS` of a drive's first `cycles`, shape (cycles,), from the vehicle's frames."""
+    plan = plans().ecu_hears
+    inputs = new_record(INPUTS, cycles)
+    _decode(plan, new_reception(plan), frames, new_record(INPUTS), inputs)
+    return inputs
+
+
+@kernel
+def _decode(plan: ReceivePlan, reception: Reception, frames: Any, now: Any, inputs: Any) -> None:
+    first = 0
+    for k in range(len(inputs)):
+        begin_cycle(now[0], START_NS + k * CYCLE_NS, CYCLE_NS)
+        first = receive(plan, reception, frames, first, len(frames), now[0])
+        end_cycle(now[0], reception.freshness)
+        inputs[k] = now[0]

@@ -1,0 +1,310 @@
+"""Faults put into a drive: `[[fault]]` tables of a scenario, and the kernels that make them happen.
+
+```
+[[fault]]
+kind = "lost"                # what, see `KINDS`
+t = 4.0                      # s since the car set off
+duration = 1.0               # s; without it to the end of the drive
+message = ["Imu"]            # of the database, either way; without it all that the vehicle sends
+share = 0.5                  # of these frames
+```
+| kind | keys beside t and duration | what happens |
+| --- | --- | --- |
+| lost, doubled, corrupted | message, share | frames do not come, come twice, come with one bit turned |
+| late | message, share, delay [s] | frames come `delay` later |
+| stuck | signal | a signal on the bus keeps its value, its frames come on |
+| invalid | signal | a signal is sent as not available |
+| biased, noisy | signal, amount | `amount` is added; white noise of that standard deviation is added |
+| bus_off | | the ECU's controller is off the bus: neither side hears the other |
+| daemon_killed | standby | SIGKILL at `t`, a new start after `duration`; `standby`: a second one stands by |
+| motor_lost | corner | motors give no torque and say that they can regenerate none |
+| calliper_dead | corner | callipers get no pressure: one, or those of a circuit |
+| accumulator_low | amount [bar] | the hydraulics reach this pressure at most and say "not ready" |
+
+Frames are spoilt on their way, after the sender protected them; a signal is spoilt before, so that its frame
+is intact.
+"""
+
+import math
+from collections.abc import Sequence
+from functools import cache
+from typing import Annotated, Any, Final, Literal, NamedTuple, get_args
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from ecu.bus.transmit import contract_transmit_plan
+from ecu.contract import signals
+from ecu.contract.records import FRAME, RecordArray, new_record
+from ecu.contract.signals import CORNERS, INPUT, N_INPUTS
+from ecu.jit import Record, kernel
+from ecu.settings.resources import resource
+
+Kind = Literal[
+    "late",
+    "lost",
+    "doubled",
+    "corrupted",
+    "stuck",
+    "invalid",
+    "biased",
+    "noisy",
+    "bus_off",
+    "daemon_killed",
+    "motor_lost",
+    "calliper_dead",
+    "accumulator_low",
+]
+KINDS: Final[tuple[str, ...]] = get_args(Kind)
+LATE, LOST, DOUBLED, CORRUPTED, STUCK, INVALID, BIASED, NOISY, BUS_OFF, DAEMON_KILLED = range(10)
+MOTOR_LOST, CALLIPER_DEAD, ACCUMULATOR_LOW = range(10, len(KINDS))
+_FRAMES: Final = {"message", "share"}
+_BELONGS: Final[dict[str, set[str]]] = {
+    "late": {*_FRAMES, "delay"},
+    "lost": _FRAMES,
+    "doubled": _FRAMES,
+    "corrupted": _FRAMES,
+    "stuck": {"signal"},
+    "invalid": {"signal"},
+    "biased": {"signal", "amount"},
+    "noisy": {"signal", "amount"},
+    "bus_off": set(),
+    "daemon_killed": {"standby"},
+    "motor_lost": {"corner"},
+    "calliper_dead": {"corner"},
+    "accumulator_low": {"amount"},
+}
+_NEEDED: Final = {"delay", "signal", "amount"}
+
+FAULT: Final = np.dtype(
+    [
+        ("kind", "i4"),
+        ("begin", "f8"),  # s
+        ("end", "f8"),
+        ("share", "f8"),
+        ("delay", "f8"),
+        ("amount", "f8"),
+        ("ids", "u4", (32,)),
+        ("n_ids", "i4"),
+        ("place", "u1", (N_INPUTS,)),  # 1: this input is spoilt
+        ("held", "f8", (N_INPUTS,)),  # NaN: nothing held
+        ("corner", "u1", (4,)),
+        ("standby", "u1"),
+    ],
+    align=True,
+)
+SLACK: Final = 1e-4  # s by which the sum of all steps may fall short of a cycle's time
+HELD: Final = 256  # frames held up at a time
+ROOM: Final = 512  # frames that arrive at once
+
+
+@cache
+def _messages() -> dict[str, dict[str, int]]:
+    """Identifiers by name, of the vehicle and of the ECU."""
+    named: dict[str, dict[str, int]] = {}
+    senders: tuple[Literal["Vehicle", "BrakeEcu"], ...] = ("Vehicle", "BrakeEcu")
+    for sender in senders:
+        plan = contract_transmit_plan(resource("dbc/brake_ecu.dbc"), sender)
+        named[sender] = dict(zip(plan.messages["name"].tolist(), plan.ids.tolist(), strict=True))
+    return named
+
+
+class Fault(BaseModel):
+    """One `[[fault]]` table."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    kind: Kind
+    t: Annotated[float, Field(ge=0.0)]
+    duration: Annotated[float, Field(gt=0.0)] | None = None
+    message: list[str] = []
+    share: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
+    delay: Annotated[float, Field(gt=0.0, le=0.2)] = 0.0
+    signal: list[str] = []
+    amount: float = 0.0
+    corner: list[Literal["fl", "fr", "rl", "rr"]] = ["fl", "fr", "rl", "rr"]
+    standby: bool = False
+
+    @model_validator(mode="after")
+    def _complete(self) -> "Fault":
+        belongs = _BELONGS[self.kind]
+        given = self.model_fields_set - {"kind", "t", "duration"}
+        for name in sorted(given - belongs):
+            raise ValueError(f"{name} does not belong to the kind {self.kind!r}; remove it")
+        for name in sorted(belongs & _NEEDED - given):
+            raise ValueError(f"the kind {self.kind!r} needs {name}")
+        known = _messages()
+        for name in self.message:
+            if not any(name in of_sender for of_sender in known.values()):
+                raise ValueError(f"message: no {name!r} in the database")
+        for name in self.signal:
+            if not _places(name):
+                raise ValueError(f"signal: {name!r} is none of the ECU's inputs")
+        return self
+
+    @property
+    def end(self) -> float:
+        """When it is over [s], inf: never."""
+        return math.inf if self.duration is None else self.t + self.duration
+
+    def ids(self) -> list[int]:
+        """Return the identifiers of the frames that it spoils."""
+        vehicle, unit = _messages()["Vehicle"], _messages()["BrakeEcu"]
+        if self.kind == "bus_off":
+            return [*vehicle.values(), *unit.values()]
+        if self.message:
+            return [{**vehicle, **unit}[name] for name in self.message]
+        return list(vehicle.values())
+
+
+def _places(name: str) -> list[int]:
+    """Return the inputs of that name; one without a corner means all four."""
+    names = (name, *(f"{name}_{corner}" for corner in CORNERS))
+    return [INPUT[one] for one in names if one in INPUT]
+
+
+def fault_records(faults: Sequence[Fault]) -> RecordArray:
+    """Return the faults for the kernels, `FAULT`, shape (n,)."""
+    rows = new_record(FAULT, len(faults))
+    for row, fault in zip(rows, faults, strict=True):
+        row["kind"], row["begin"], row["end"] = KINDS.index(fault.kind), fault.t, fault.end
+        row["share"], row["delay"], row["amount"] = fault.share, fault.delay, fault.amount
+        ids = fault.ids()
+        row["ids"][: len(ids)], row["n_ids"] = ids, len(ids)
+        for name in fault.signal:
+            row["place"][_places(name)] = 1
+        row["held"] = np.nan
+        row["corner"] = [corner in fault.corner for corner in CORNERS]
+        row["standby"] = fault.standby
+    return rows
+
+
+class Way(NamedTuple):
+    """One direction of the bus."""
+
+    held: RecordArray
+    """`FRAME`s that come later, and when:"""
+    release: NDArray[np.float64]
+    """s, inf where nothing is held."""
+    arrived: RecordArray
+    """Room for what `convey` hands over."""
+
+
+def new_way() -> Way:
+    """Return a way on which nothing is held up."""
+    return Way(new_record(FRAME, HELD), np.full(HELD, np.inf), new_record(FRAME, ROOM))
+
+
+@kernel
+def is_on(fault: Record, t: float) -> bool:
+    """Return whether the fault acts at `t` [s]."""
+    return bool(fault.begin <= t + SLACK < fault.end)
+
+
+@kernel
+def _hits(fault: Record, can_id: int, t: float, noise: Generator) -> bool:
+    if not is_on(fault, t):
+        return False
+    for i in range(fault.n_ids):
+        if fault.ids[i] == can_id:
+            return bool(fault.share >= 1.0 or noise.random() < fault.share)
+    return False
+
+
+@kernel
+def _hold_up(way: Way, frame: Record, release: float, delay: float) -> None:
+    for place in range(len(way.release)):
+        if math.isinf(way.release[place]):
+            way.held[place] = frame
+            way.held[place].stamp_ns += np.int64(1e9 * delay)
+            way.release[place] = release
+            return
+
+
+@kernel
+def convey(faults: Any, way: Way, t: float, noise: Generator, frames: Any, count: int) -> int:
+    """Write into `way.arrived` what arrives of `frames[:count]`, sent at `t` [s], and of what was held up
+    before; returns how many."""
+    arrived = 0
+    for place in range(len(way.release)):
+        if way.release[place] <= t + SLACK:
+            way.arrived[arrived] = way.held[place]
+            way.release[place] = np.inf
+            arrived += 1
+    for i in range(count):
+        kept, copies = True, 1
+        way.arrived[arrived] = frames[i]
+        for j in range(len(faults)):
+            fault = faults[j]
+            kind = fault.kind
+            if kind != LOST and kind != BUS_OFF and kind != LATE and kind != DOUBLED and kind != CORRUPTED:
+                continue
+            if not _hits(fault, frames[i].can_id, t, noise):
+                continue
+            if kind == CORRUPTED:
+                bit = int(noise.random() * 8 * frames[i].length)
+                way.arrived[arrived].data[bit // 8] ^= 1 << (bit % 8)
+            elif kind == DOUBLED:
+                copies = 2
+            else:
+                kept = False
+                if kind == LATE:
+                    _hold_up(way, frames[i], t + fault.delay, fault.delay)
+        if kept:
+            arrived += 1
+            if copies == 2:
+                way.arrived[arrived] = way.arrived[arrived - 1]
+                arrived += 1
+    return arrived
+
+
+@kernel
+def _spoil_signals(fault: Record, on: bool, noise: Generator, values: NDArray[np.float64]) -> None:
+    for place in range(len(fault.place)):
+        if not fault.place[place]:
+            continue
+        if not on:
+            fault.held[place] = np.nan
+        elif fault.kind == INVALID:
+            values[place] = np.nan
+        elif fault.kind == BIASED:
+            values[place] += fault.amount
+        elif fault.kind == NOISY:
+            values[place] += fault.amount * noise.standard_normal()
+        elif math.isnan(fault.held[place]):
+            fault.held[place] = values[place]
+        elif not math.isnan(values[place]):
+            values[place] = fault.held[place]
+
+
+@kernel
+def spoil_car(
+    faults: Any, t: float, noise: Generator, sound: Record, params: Record, values: NDArray[np.float64]
+) -> None:
+    """Let faults of sensors and actuators act on what is sent, shape (N_INPUTS,), and on the car.
+
+    `sound` are the car's parameters without a fault.
+    """
+    for i in range(4):
+        params.motor_share[i] = sound.motor_share[i]
+        params.pressure_limit[i] = sound.pressure_limit[i]
+    for j in range(len(faults)):
+        fault = faults[j]
+        on = is_on(fault, t)
+        if fault.kind == STUCK or fault.kind == INVALID or fault.kind == BIASED or fault.kind == NOISY:
+            _spoil_signals(fault, on, noise, values)
+        elif on and fault.kind == MOTOR_LOST:
+            for i in range(4):
+                if fault.corner[i]:
+                    params.motor_share[i] = 0.0
+        elif on and fault.kind == CALLIPER_DEAD:
+            for i in range(4):
+                if fault.corner[i]:
+                    params.pressure_limit[i] = 0.0
+        elif on and fault.kind == ACCUMULATOR_LOW:
+            for i in range(4):
+                params.pressure_limit[i] = min(params.pressure_limit[i], 1e5 * fault.amount)
+            values[signals.ACCUMULATOR_PRESSURE] = fault.amount
+            values[signals.HYDRAULIC_READY] = 0.0

@@ -1,0 +1,22 @@
+"""Real-time rights for what stands in for a vehicle on a bus."""
+
+import os
+from typing import Final
+
+from ecu.runtime.realtime import settle
+
+PRIORITY: Final = 10
+"""SCHED_FIFO, below the daemon's: a vehicle does not wait for others, and the ECU does not wait for it."""
+
+
+def ask_for_priority() -> str:
+    """Be woken in time where the machine grants it; return why it does not, "" if it does.
+
+    What is alive now settles (`ecu.runtime.realtime`): call it after the preparations.
+    """
+    settle()
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+    except (OSError, AttributeError) as error:
+        return str(error)
+    return ""

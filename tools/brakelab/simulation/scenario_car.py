@@ -1,0 +1,50 @@
+"""The car that a scenario names: its file, its load, and how far the car of a seed is from the file."""
+
+from typing import get_args
+
+from brakelab.plant.description import Plant, PlantFileError, load_plant
+from brakelab.plant.draw import Widths, load_widths
+from brakelab.simulation.scenario import Scenario
+from ecu.errors import UserError
+from ecu.settings.resources import named, resource
+
+
+def scenario_plant(scenario: Scenario) -> Plant:
+    """Return the car of a scenario.
+
+    Raises:
+        UserError: the plant's file cannot be read or is wrong.
+    """
+    try:
+        plant = load_plant(named(scenario.plant, "config/plant"))
+    except PlantFileError as error:
+        raise UserError(error.where, error.place, error.remedy) from None
+    if scenario.payload is None:
+        return plant
+    laden = plant.vehicle.model_copy(update={"body": scenario.payload.body(plant.vehicle.body)})
+    return plant.model_copy(update={"vehicle": laden})
+
+
+def with_draw(scenario: Scenario, draw: str) -> Scenario:
+    """Return a scenario whose cars are drawn from that width, "wide" or "nominal".
+
+    Raises:
+        UserError: there is no such width.
+    """
+    known = get_args(Scenario.model_fields["draw"].annotation)
+    if draw not in known:
+        raise UserError("--draw", draw, f"no such draw of cars; choose {' or '.join(known)}")
+    return scenario.model_copy(update={"draw": draw})
+
+
+def scenario_widths(scenario: Scenario) -> Widths:
+    """Return how far the cars of a scenario are drawn: by the file beside the car's, or the shipped one.
+
+    Raises:
+        UserError: the file is wrong.
+    """
+    own = named(scenario.plant, "config/plant").with_name("draw.toml")
+    try:
+        return load_widths(own if own.is_file() else resource("config/plant/draw.toml"), scenario.draw)
+    except PlantFileError as error:
+        raise UserError(error.where, error.place, error.remedy) from None

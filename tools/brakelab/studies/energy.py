@@ -1,0 +1,69 @@
+"""Where the energy of every shipped scenario goes, and what of it is found nowhere."""
+
+from pathlib import Path
+from typing import Final
+
+from brakelab.plant.energy import Energy, energy
+from brakelab.simulation.closed_loop import new_loop, run
+from brakelab.simulation.scenario import load_scenario
+from brakelab.studies.table import Table
+from ecu.settings.config import Config
+
+SUSPENDED: Final = "suv14"
+SOURCES: Final = ("motion", "gravity", "driven")
+LOSSES: Final = ("brakes", "regenerated", "tyres", "drag", "rolling", "dampers")
+SHOWN: Final = 5e-5  # share, from which it has a digit in the table
+
+
+def scenario_energy(path: Path, config: Config, car: str | None = None) -> tuple[float, Energy]:
+    """Drive a scenario with its own car or `car`, seed 0; return its duration [s] and its energy.
+
+    Raises:
+        UserError: a file cannot be read or is wrong.
+    """
+    scenario = load_scenario(path)
+    loop = new_loop(scenario.model_copy(update={"plant": car or scenario.plant}), config, 0)
+    vehicle = loop.sides.vehicle
+    start = vehicle.state.copy()
+    seconds = float(run(loop).t[-1])
+    return seconds, energy(vehicle.params, start, vehicle.state)
+
+
+def energy_tables(scenarios: Path, config: Config) -> list[Table]:
+    """Return the table of the scenarios in a folder."""
+    rows = []
+    for path in sorted(scenarios.glob("*.toml")):
+        _, own = scenario_energy(path, config)
+        seconds, found = scenario_energy(path, config, SUSPENDED)
+        shares = (getattr(found, term) / found.turned_over for term in (*SOURCES, *LOSSES))
+        rows.append(
+            (
+                path.stem,
+                f"{seconds:.0f}",
+                f"{1e-3 * found.turned_over:.0f}",
+                *(f"{100.0 * share:.2f}" if abs(share) > SHOWN else "–" for share in shares),
+                f"{100.0 * found.missing:.1e}",
+                f"{100.0 * own.missing:.1e}",
+            )
+        )
+    columns = (
+        "scenario",
+        "duration [s]",
+        "turned over [kJ]",
+        "from motion",
+        "from gravity",
+        "from motors",
+        "brakes",
+        "to motors",
+        "tyres",
+        "drag",
+        "rolling",
+        "dampers",
+        "missing",
+        "missing, own car",
+    )
+    below = (
+        f"Shares of what was turned over, in %, with the car {SUSPENDED} (14 degrees of freedom); negative: "
+        "gained instead of given. Springs store less than 0.05 %. Own car: the one that the scenario names."
+    )
+    return [Table("Energy of the scenarios [%]", columns, rows, below)]

@@ -1,0 +1,308 @@
+"""What the observers are judged by: drives with goals, and what may be wrong about car, sensors or road.
+
+A goal is the nRMSE [%] of front and rear friction that the joint observer should not exceed: `cold` with
+nominal configuration and nothing learned, `driven_in` after `config/scenarios/ordinary.toml`. Those of
+`NOMINAL` are for cars of the nominal draw. A disturbance whose sign can be either has that of its car: odd
+seeds are below, even ones above.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any, Final, NamedTuple
+
+from brakelab.plant.sensor_errors import ABSENT, SensorErrors
+from brakelab.simulation.scenario import Phase, RoadByPlace, Scenario, SteeringFile, load_scenario
+from ecu.settings.config import Config, load_config
+from ecu.settings.resources import resource
+
+KMH_100: Final = 27.778  # m/s
+EVERY_SENSOR: Final = (
+    *("accel_x", "accel_y", "yaw_rate", "vehicle_speed"),
+    *("wheel_speed", "calliper_pressure", "motor_torque", "steering_angle"),
+)
+GAP, BETWEEN_GAPS = 0.180, 2.0  # s, means
+LASTING: Final = 0.5  # s, of a motor torque's error that is not white
+LOST_IN_GAPS: Final = GAP / (GAP + BETWEEN_GAPS)
+SLOW_PERIODS: Final = dict.fromkeys(("accel_x", "accel_y", "yaw_rate", "wheel_speed"), 1.0 / 66.0)
+"""s; the other sensors have 33 Hz."""
+
+
+class Setup(NamedTuple):
+    """One car on one drive."""
+
+    scenario: Scenario
+    config: Config
+    car: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    """Parameters of the drawn car and factors upon them per wheel."""
+    any_rate: bool = False
+    """The ECU expects inputs at whatever rate they come."""
+
+
+Change = Callable[[Setup, float], Setup]
+"""Makes a setup of another; the number is the sign of the car."""
+Goal = tuple[float, float]
+"""Front and rear [%]."""
+
+
+def _as_is(setup: Setup, sign: float) -> Setup:
+    return setup
+
+
+def _unguarded(setup: Setup, sign: float) -> Setup:
+    """Let wheels lock: what is measured is what the observers make of it (Figure 5.5)."""
+    control = setup.config.control.model_copy(update={"slip_guard": False})
+    return setup._replace(config=setup.config.model_copy(update={"control": control}))
+
+
+class Case(NamedTuple):
+    """One line of a table."""
+
+    scenario: Scenario
+    cold: Goal | None = None
+    """None: better than the nominal constant."""
+    driven_in: Goal | None = None
+    thesis: str = "–"
+    """nRMSE of Observer 2 there, front/rear [%]."""
+    change: Change = _as_is
+    lasting: bool = False
+    """The change is there in ordinary driving too."""
+    beside: str = ""
+    """The case whose errors it may exceed by a quarter."""
+
+
+@cache
+def shipped(name: str) -> Scenario:
+    """Return a scenario of config/scenarios."""
+    return load_scenario(resource(f"config/scenarios/{name}.toml"))
+
+
+@cache
+def configured() -> Config:
+    """Return the configuration that is judged."""
+    return load_config(resource("config/suv.toml"))
+
+
+def _stop(**brake: Any) -> Scenario:
+    """Return one stop from 100 km/h, the first of `sensitivity` with another braking."""
+    base = shipped("sensitivity")
+    return base.model_copy(update={"phase": [base.phase[0], Phase(kind="brake", until_speed=0.0, **brake)]})
+
+
+def _accuracy() -> dict[str, Case]:
+    cases = {
+        f"stop #{test}": Case(shipped(f"stop-{test}"), cold, driven_in, thesis)
+        for test, cold, driven_in, thesis in (
+            (1, (2.5, 4.0), (1.3, 1.8), "4.74/7.23"),
+            (2, (2.5, 4.0), (1.3, 1.8), "3.34/6.96"),
+            (3, (2.5, 4.0), (1.3, 1.8), "4.55/8.51"),
+            (4, (2.5, 4.0), (1.3, 1.8), "3.13/7.87"),
+        )
+    }
+    for decel in (0.7, 1.0, 1.3, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0):
+        cold = (4.0, 4.0) if decel >= 1.0 else None
+        reached = 3.0 if decel <= 2.0 else 2.0
+        cases[f"{decel:g} m/s²"] = Case(_stop(decel=decel), cold, (reached, reached))
+    slippery = _stop(decel=5.6).model_copy(update={"road_friction": [(0.0, 0.7)]})
+    cases["5.6 m/s² where 0.7 holds"] = Case(slippery, (2.5, 3.3), (2.0, 2.5))
+    for percent, cold, reached, thesis in (
+        (20, (5.4, 8.2), 1.2, "5.42/8.16"),
+        (40, (8.3, 11.3), 1.2, "8.27/11.33"),
+        (60, (11.9, 15.9), 2.0, "11.89/15.87"),
+        (80, (13.4, 20.5), 4.0, "13.43/20.46"),
+    ):
+        name = f"blending {percent / 100:g}"
+        cases[name] = Case(shipped(f"blending-{percent}"), cold, (reached, reached), thesis)
+    for pedal, thesis in ((20.0, "8.84/22.44"), (28.0, "7.35/15.88"), (48.0, "3.75/10.11")):
+        reached = 3.0 if pedal < 40.0 else 2.0
+        cases[f"pedal {pedal:g} %"] = Case(_stop(pedal=pedal), (4.0, 7.0), (reached, reached), thesis)
+    cases["fade"] = Case(shipped("fade"), (3.0, 5.0), (1.5, 1.5), "3.8–9.6/4.7–22")
+    return cases
+
+
+def _changed(**factors: float) -> Change:
+    """Return the change of configured values by 1 ± a share, by section and key with two underlines."""
+
+    def change(setup: Setup, sign: float) -> Setup:
+        config = setup.config
+        for name, share in factors.items():
+            place, key = name.split("__")
+            section = getattr(config, place)
+            value = getattr(section, key) * (1.0 + sign * share)
+            config = config.model_copy(update={place: section.model_copy(update={key: value})})
+        return setup._replace(config=config)
+
+    return change
+
+
+def _sensing(sign_of: Callable[[float], dict[str, SensorErrors]]) -> Change:
+    """Return the change of sensors; `sign_of` gives them for a sign."""
+    return lambda setup, sign: _scenario(setup, sensor=sign_of(sign))
+
+
+def _scenario(setup: Setup, **update: Any) -> Setup:
+    return setup._replace(scenario=setup.scenario.model_copy(update=update))
+
+
+def _late_speed(setup: Setup, sign: float) -> Setup:
+    sensors = setup.config.sensors.model_copy(update={"vehicle_speed_delay": 0.15})
+    setup = setup._replace(config=setup.config.model_copy(update={"sensors": sensors}))
+    return _scenario(setup, vehicle_speed="gnss")
+
+
+def _slow_inputs(setup: Setup, sign: float) -> Setup:
+    sensor = {}
+    for name in EVERY_SENSOR:
+        period = SLOW_PERIODS.get(name, 1.0 / 33.0)
+        sensor[name] = SensorErrors(period=period, dropout=period / BETWEEN_GAPS, dropout_length=GAP / period)
+    return _scenario(setup, sensor=sensor)._replace(any_rate=True)
+
+
+def _radii(setup: Setup, sign: float) -> Setup:
+    share = 0.005 * sign  # front against rear looks like slip
+    return setup._replace(car=(("free_radius", (1.0 + share, 1.0 + share, 1.0 - share, 1.0 - share)),))
+
+
+def _unequal(setup: Setup, sign: float) -> Setup:
+    left, right = 1.0 + 0.1 * sign, 1.0 - 0.1 * sign
+    return setup._replace(car=(("friction_scale", (left, right, left, right)),))
+
+
+def _robustness() -> dict[str, Case]:
+    stop = shipped("stop-1")
+    lasting: dict[str, Change] = {
+        "mass ±10 %": _changed(vehicle__mass=0.1),
+        "rolling radius ±0.5 %, rear ∓": _radii,
+        "tyre stiffness ±30 %": _changed(front__slip_stiffness=0.3, rear__slip_stiffness=0.3),
+        "pressure offset ±1 bar": _sensing(
+            lambda sign: {"calliper_pressure": SensorErrors(bias=(sign, sign))}
+        ),
+        "accelerometer bias ±0.1 m/s²": _sensing(
+            lambda sign: {"accel_x": SensorErrors(bias=(0.1 * sign, 0.1 * sign))}
+        ),
+        "pitch gradient ±30 %": _changed(vehicle__pitch_gradient=0.3),
+        "centre of gravity height ±10 %": _changed(vehicle__cog_height=0.1),
+        "brakes unequal by 20 %": _unequal,
+        "motor torque ±3 %": _sensing(lambda sign: {"motor_torque": SensorErrors(scale=1.0 + 0.03 * sign)}),
+        "no vehicle speed": lambda setup, sign: _scenario(setup, vehicle_speed="none"),
+        "vehicle speed at 10 Hz, 100–200 ms late": _late_speed,
+        "5 % of the samples lost": _sensing(
+            lambda sign: {name: SensorErrors(dropout=0.05) for name in EVERY_SENSOR}
+        ),
+        "inputs at 33–66 Hz, gaps of 180 ms": _slow_inputs,
+    }
+    passing: dict[str, Change] = {
+        "nothing": _as_is,
+        "wheel sensor lost while braking": _sensing(
+            lambda sign: {"wheel_speed_fl": SensorErrors(lost_from=8.0)}
+        ),
+        "grade ±8 %": lambda setup, sign: _scenario(setup, grade=[(0.0, 0.08 * sign)]),
+        "friction 0.5 left, 1.0 right": lambda setup, sign: _scenario(
+            setup, road=RoadByPlace(friction=[(0.0, 1.0, 1.0), (230.0, 1.0, 1.0), (230.1, 0.5, 1.0)])
+        ),
+    }
+    twice = (2.6, 3.6)
+    cases = {name: Case(stop, None, twice, change=change) for name, change in passing.items()}
+    cases |= {name: Case(stop, None, twice, change=change, lasting=True) for name, change in lasting.items()}
+    curve = shipped("curve")
+    assert curve.steering is not None
+    gentler = SteeringFile(angle=[(t, 0.8 * angle) for t, angle in curve.steering.angle])
+    cases["braking in a curve, 4 m/s² across"] = Case(
+        curve.model_copy(update={"steering": gentler}), None, twice
+    )
+    cases["split friction, left wheels lock"] = Case(shipped("split"), None, twice, change=_unguarded)
+    return cases
+
+
+def _after_cruise(seconds: float, grade: float, motor_torque: SensorErrors) -> Scenario:
+    """Return a stop of 4 m/s² after a cruise at 100 km/h."""
+    stop = _stop(decel=4.0)
+    cruise = stop.phase[0].model_copy(update={"seconds": seconds})
+    sensor = stop.sensor | {"motor_torque": motor_torque}
+    changed = {"phase": [cruise, stop.phase[1]], "grade": [(0.0, grade)], "sensor": sensor}
+    return stop.model_copy(update=changed)
+
+
+def _sensors() -> dict[str, Case]:
+    """Return cases with sensors as cars have them, each after the case that it is compared with."""
+    quiet = SensorErrors(noise=0.0)
+    lasting = SensorErrors(noise=0.0, drift=10.0 * (2.0 / LASTING) ** 0.5, drift_time=LASTING)
+    cases = {}
+    for road, grade in (("level road", 0.0), ("5 % climb", 0.05)):
+        base = f"a minute on a {road}, no noise"
+        cases[base] = Case(_after_cruise(60.0, grade, quiet))
+        for noise in (3.0, 20.0):
+            name = f"a minute on a {road}, {noise:g} N m"
+            cases[name] = Case(_after_cruise(60.0, grade, SensorErrors(noise=noise)), beside=base)
+        cases[f"a minute on a {road}, 10 N m that last {LASTING:g} s"] = Case(
+            _after_cruise(60.0, grade, lasting), beside=base
+        )
+    cases["an hour, 10 N m"] = Case(
+        _after_cruise(3600.0, 0.0, SensorErrors(noise=10.0)), beside="a minute on a level road, no noise"
+    )
+    floored = _sensing(lambda sign: {"calliper_pressure": SensorErrors(floor=0.0)})
+    for decel in (1.0, 4.0):
+        base = f"{decel:g} m/s², every signal"
+        cases[base] = Case(_stop(decel=decel))
+        name = f"{decel:g} m/s², no pressure below zero"
+        cases[name] = Case(_stop(decel=decel), change=floored, lasting=True, beside=base)
+    lacking: dict[str, Change] = {
+        "no yaw rate, no steering angle": _sensing(
+            lambda sign: dict.fromkeys(("yaw_rate", "steering_angle"), ABSENT)
+        ),
+        "accelerometer at 10 Hz": _sensing(lambda sign: {"accel_x": SensorErrors(period=0.1)}),
+        "pressures at 20 Hz": _sensing(lambda sign: {"calliper_pressure": SensorErrors(period=0.05)}),
+        "motor torque not told": _sensing(lambda sign: {"motor_torque": ABSENT}),
+    }
+    for name, change in lacking.items():
+        at_any_rate = _at_any_rate(change)
+        cases[name] = Case(_stop(decel=4.0), change=at_any_rate, lasting=True, beside=base)
+    return cases
+
+
+def _at_any_rate(change: Change) -> Change:
+    return lambda setup, sign: change(setup, sign)._replace(any_rate=True)
+
+
+ACCURACY: Final = _accuracy()
+ROBUSTNESS: Final = _robustness()
+SENSORS: Final = _sensors()
+NOMINAL: Final[dict[str, tuple[Goal, Goal]]] = {
+    "stop #1": ((2.4, 3.6), (0.8, 0.9)),
+    "stop #2": ((1.7, 3.5), (1.2, 1.2)),
+    "stop #3": ((2.3, 4.3), (0.9, 1.0)),
+    "stop #4": ((1.6, 3.9), (1.5, 1.5)),
+}
+"""Goals, cold and driven in, of cases that cars of the nominal draw should do better."""
+
+
+def goals(name: str, draw: str) -> tuple[Goal | None, Goal | None]:
+    """Return the goals of a case, cold and driven in, for cars drawn so."""
+    case = CASES[name]
+    if draw != "nominal":
+        return case.cold, case.driven_in
+    if name in ROBUSTNESS:
+        return case.cold, (1.6, 1.8)
+    return NOMINAL.get(name, (case.cold, case.driven_in))
+
+
+WRONG_START: Final = "linings 25 % off"
+
+
+def _wrong_start(setup: Setup, sign: float) -> Setup:
+    """Configure nominal frictions a quarter above those of config/plant/suv.toml."""
+    config = setup.config
+    for place, true in (("front", 0.3825), ("rear", 0.495)):
+        axle = getattr(config, place).model_copy(update={"mu_nominal": 1.25 * true})
+        config = config.model_copy(update={place: axle})
+    return setup._replace(config=config)
+
+
+EVENTS: Final = {
+    WRONG_START: Case(shipped("stop-1"), change=_wrong_start),
+    "tyre stiffness × 0.67": Case(shipped("tyre-stiffness")),
+    "low-grip patch": Case(shipped("low-grip"), change=_unguarded),
+}
+"""Drives of which times are told."""
+LONGEST: Final = {"tyre stiffness × 0.67": 0.10, "low-grip patch": 0.30}
+"""How long their events may be felt [s]: as in the thesis, read off Figures 4.11 and 5.5."""
+CASES: Final = ACCURACY | ROBUSTNESS | SENSORS | EVENTS

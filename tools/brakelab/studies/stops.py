@@ -1,0 +1,205 @@
+"""Accuracy, not speed: the stops of the thesis's Table 4.2 with cars drawn per seed.
+
+Counted from 0.5 s after the deceleration demand has its full value, down to 15 km/h:
+
+friction      nRMSE = sqrt(mean((estimate - truth)^2)) / mean(truth) over both wheels of an axle, beside
+              Observer 2 of Table 4.3 and beside the configured nominal friction taken as the estimate
+deceleration  sum over the wheels of (brake torque + motor torque) / rolling radius, over the mass, all true
+compensation  mean of |achieved - wanted| / wanted; wanted is the demand, or what the same controller
+              achieves in the same car when it is told the true friction
+"""
+
+from collections.abc import Callable, Iterable
+from functools import partial
+from itertools import product
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakelab.bench.measure import Figure, figure
+from brakelab.simulation.closed_loop import Drive, Loop, new_loop, run
+from brakelab.simulation.scenario import Scenario, load_scenario
+from brakelab.simulation.scenario_car import with_draw
+from ecu.contract.signals import CORNERS
+from ecu.settings.config import Config
+from ecu.settings.resources import resource
+
+Vector = NDArray[np.float64]
+
+TESTS: Final = (1, 2, 3, 4)
+SEEDS: Final = 20
+AXLES: Final = {"front": CORNERS[:2], "rear": CORNERS[2:]}
+TABLE_4_3: Final = {
+    1: {"front": 4.74, "rear": 7.23},
+    2: {"front": 3.34, "rear": 6.96},
+    3: {"front": 4.55, "rear": 8.51},
+    4: {"front": 3.13, "rear": 7.87},
+}
+"""nRMSE of Observer 2 in %."""
+SETTLING_S: Final = 0.5
+LOWEST_SPEED: Final = 15.0 / 3.6  # m/s
+FULL: Final = 0.999  # of the demand
+
+
+class Friction(NamedTuple):
+    """Errors of one axle's friction over the seeds, in %."""
+
+    test: int
+    vehicle_speed: bool
+    axle: str
+    nrmse: Figure
+    inside_2_sigma: float
+    """Share of the samples whose truth lies within ±2σ."""
+    thesis: float
+    nominal: Figure
+    """nRMSE of the configured nominal friction."""
+
+
+class Compensation(NamedTuple):
+    """Relative errors of the deceleration over the seeds, in %."""
+
+    test: int
+    vehicle_speed: bool
+    to_demand: Figure
+    to_demand_uncompensated: Figure
+    to_ideal: Figure
+    to_ideal_uncompensated: Figure
+
+
+class Stops(NamedTuple):
+    """Result of all stops."""
+
+    friction: list[Friction]
+    compensation: list[Compensation]
+
+
+class _Stop(NamedTuple):
+    drive: Drive
+    decel: Vector
+
+
+def _brake(scenario: Scenario, config: Config, seed: int, ideal: bool = False) -> _Stop:
+    loop = new_loop(scenario, config, seed)
+    drive = run(loop, ideal)
+    return _Stop(drive, achieved_decel(loop, drive))
+
+
+def achieved_decel(loop: Loop, drive: Drive) -> Vector:
+    """Return the deceleration [m/s^2] by the torques of a drive and the mass of its car, shape (n,)."""
+    truth = drive.truth
+    force = sum(
+        (truth[f"brake_torque_{c}"] + truth[f"motor_torque_{c}"]) / truth[f"rolling_radius_{c}"]
+        for c in CORNERS
+    )
+    return np.asarray(force) / float(loop.sides.vehicle.params["mass"][0])
+
+
+def window(drive: Drive) -> NDArray[np.bool_]:
+    """Return the rows that count, shape (n,)."""
+    demand, speed = drive.truth["decel_demand"], drive.truth["vehicle_speed"]
+    reached = drive.t[np.argmax(demand >= FULL * demand.max())]
+    rows: NDArray[np.bool_] = (drive.t >= reached + SETTLING_S) & (speed > LOWEST_SPEED)
+    return rows
+
+
+def nrmse(estimate: Vector, true: Vector) -> float:
+    """Return the root mean square error over the mean of the truth [%]."""
+    return float(100.0 * np.sqrt(np.mean((estimate - true) ** 2)) / np.mean(true))
+
+
+def columns(table: dict[str, Vector], stem: str, axle: str, rows: NDArray[np.bool_]) -> Vector:
+    """Return both wheels of an axle, shape (2, rows)."""
+    return np.stack([table[f"{stem}_{corner}"][rows] for corner in AXLES[axle]])
+
+
+def estimate_errors(drive: Drive, rows: NDArray[np.bool_], axle: str) -> tuple[float, float]:
+    """Return nRMSE [%] and share inside 2σ of an axle's friction over `rows`."""
+    true = columns(drive.truth, "mu_b", axle, rows)
+    estimate = columns(drive.outputs, "mu_b", axle, rows)
+    sigma = columns(drive.outputs, "sigma_mu_b", axle, rows)
+    return nrmse(estimate, true), float(np.mean(np.abs(estimate - true) <= 2.0 * sigma))
+
+
+def friction_errors(
+    drive: Drive, rows: NDArray[np.bool_], axle: str, nominal: float
+) -> tuple[float, float, float]:
+    """Return nRMSE [%], share inside 2σ and nRMSE of the nominal friction [%] over `rows`."""
+    true = columns(drive.truth, "mu_b", axle, rows)
+    return *estimate_errors(drive, rows, axle), nrmse(np.full_like(true, nominal), true)
+
+
+def _relative_error(stop: _Stop, wanted: Vector) -> float:
+    """Return the mean relative error of the deceleration [%] while both runs last."""
+    n = min(len(stop.decel), len(wanted))
+    rows = window(stop.drive)[:n]
+    achieved, wanted = stop.decel[:n][rows], wanted[:n][rows]
+    return float(100.0 * np.mean(np.abs(achieved - wanted) / wanted))
+
+
+class _Seed(NamedTuple):
+    """One car's stop."""
+
+    friction: dict[str, tuple[float, float, float]]
+    compensation: tuple[float, float, float, float]
+
+
+def _one_car(scenario: Scenario, config: Config, seed: int) -> _Seed:
+    plain = config.model_copy(update={"control": config.control.model_copy(update={"compensation": "off"})})
+    ours = _brake(scenario, config, seed)
+    uncompensated = _brake(scenario, plain, seed)
+    ideal = _brake(scenario, config, seed, ideal=True)
+    nominal = {"front": config.front.mu_nominal, "rear": config.rear.mu_nominal}
+    rows = window(ours.drive)
+    return _Seed(
+        {axle: friction_errors(ours.drive, rows, axle, nominal[axle]) for axle in AXLES},
+        (
+            _relative_error(ours, ours.drive.truth["decel_demand"]),
+            _relative_error(uncompensated, uncompensated.drive.truth["decel_demand"]),
+            _relative_error(ours, ideal.decel),
+            _relative_error(uncompensated, ideal.decel),
+        ),
+    )
+
+
+Named = tuple[bool, int]
+"""With or without `vehicle_speed`, and the number of a test."""
+Result = tuple[list[Friction], Compensation]
+
+
+def case_result(config: Config, seeds: int, draw: str, case: Named) -> Result:
+    """Drive one test with cars 0 to `seeds` - 1; figures are median, least and greatest over them."""
+    speed_known, test = case
+    stop = with_draw(load_scenario(resource(f"config/scenarios/stop-{test}.toml")), draw)
+    scenario = stop.model_copy(update={"vehicle_speed": "ideal" if speed_known else "none"})
+    cars = [_one_car(scenario, config, seed) for seed in range(seeds)]
+    friction = []
+    for axle in AXLES:
+        errors, inside, nominal = zip(*(car.friction[axle] for car in cars), strict=True)
+        share = 100.0 * float(np.mean(inside))
+        thesis = TABLE_4_3[test][axle]
+        friction.append(Friction(test, speed_known, axle, figure(errors), share, thesis, figure(nominal)))
+    errors_of = zip(*(car.compensation for car in cars), strict=True)
+    return friction, Compensation(test, speed_known, *map(figure, errors_of))
+
+
+Case = Callable[[Named], Result]
+Spread = Callable[[Case, list[Named]], Iterable[Result]]
+"""As `map` does it: results in the order of the cases, which may be driven side by side."""
+
+
+def stops(
+    config: Config,
+    seeds: int = SEEDS,
+    tests: tuple[int, ...] = TESTS,
+    spread: Spread = map,
+    draw: str = "wide",
+) -> Stops:
+    """Drive all tests with and without `vehicle_speed` and return their results."""
+    result = Stops([], [])
+    for friction, compensation in spread(
+        partial(case_result, config, seeds, draw), list(product((True, False), tests))
+    ):
+        result.friction.extend(friction)
+        result.compensation.append(compensation)
+    return result

@@ -1,0 +1,195 @@
+"""What stands above the tables of each bench."""
+
+from typing import Final
+
+from brakelab.studies import failures
+from brakelab.studies.blending import CARS
+
+STOPS_TEXT: Final = (
+    "Stops from 120 km/h to standstill, Table 4.2 of the thesis: #1 4, #2 7 m/s² on a dry road (1.2), #3 4, "
+    "#4 6 m/s² on a wet one (0.7). The car is that of config/plant/suv.toml, drawn per seed; its linings "
+    "have 0.85 (front) and 1.10 (rear) of the 0.45 that the ECU is configured with. Nothing was learned "
+    "before. Counted from 0.5 s after the demand has its full value, down to 15 km/h."
+)
+
+OBSERVERS_TEXT: Final = (
+    "Cars and their sensors are drawn per seed about config/plant/suv.toml and Table 4.1. Cold: the "
+    "configuration as it is, nothing learned. Driven in: after ten minutes of "
+    "config/scenarios/ordinary.toml in the same car, with what the state store keeps of them. Every "
+    "observer closes the loop itself; figures stand for front/rear. Counted while the brakes of both axles "
+    "have been on for 0.8 s, above 15 km/h.\n\n"
+    "![Error of the friction over 2σ, and the squared innovations](images/observers.svg)"
+)
+
+ABLATION_TEXT: Final = (
+    "Each line takes one thing away from the joint observer; the rest is as in "
+    "[observers.md](observers.md). What is withheld or worthless is so in the ten minutes before too, "
+    "what was learned is forgotten after them. Balance of forces: the accelerometer still drives the "
+    "speed. Pressure by the demand: the same drives seen by a shadow, which has the samples alone. Motor "
+    "torque: it is there in the case itself. Friction's rate, the zeros of the pressure sensors and the "
+    "changing share of front and rear cannot be taken away from outside."
+)
+
+BOUND_TEXT: Final = (
+    "How well friction could be known at all with the noise of Table 4.1: a posterior Cramér-Rao bound. "
+    "The drives of [observers.md](observers.md), driven in, become a linear system about what really "
+    "happened, 27 states in the simulated car's own structure, apart from the code of the ECU. Kalman's "
+    "filter of it is the best there is. *Learned*: it starts with the standard deviations that the joint "
+    "observer kept of the ten minutes. *Ten minutes*: with what they show at best, to one who knew the "
+    "spread of the drawn cars. *Car known*: friction alone is unknown. In these three friction changes by "
+    "a rate of each axle, random, but as fast and for as long as in that very stop. *Course known*: as "
+    "ten minutes, but how friction changes is known, as if a law of friction told it. Assumed: friction "
+    "at the beginning of an application is known from the one before to 5 % in common and 3 % an axle; "
+    "pressure follows the demand to 5 % of its change; motor torque is exact, as it is in these cars. "
+    "With 20 % or 15 % instead, stop #1 of the first car changes by 0.04 (ten minutes)."
+)
+
+FRICTION_TEXT: Final = (
+    "What the friction laws of tools/brakelab/plant/friction, the disc and the brake unit of the simulated "
+    "vehicle reproduce of the thesis, on the simulated dynamometer. Numbers: config/plant/linings.toml."
+)
+
+LAB_TEXT: Final = """\
+From the recording of a dynamometer to a friction law, with the methods of chapters 2 and 3, beside what
+the thesis prints. The dynamometer is simulated; on it are three drawn pads that follow none of the laws
+(tools/brakelab/friction_lab/patches.py): contact patches that temperature builds and wear destroys, a
+film, chance, and memory of the stop before. Its numbers and the thesis's are of different pads: what can
+be compared is order, size and cause.
+
+## A stranger's CSV in five commands
+
+A recording needs time, line pressure, brake torque, speed and disc temperature, a row per sample, 50 Hz
+and more. What its columns mean, and what stood on the rig, is a file of columns, `mine.toml`:
+
+```toml
+name = "mine"
+
+[columns]                       # name in the file, and its unit
+time = ["Zeit", "ms"]           # s, ms, min
+pressure = ["P_Line", "psi"]    # bar, kPa, MPa, Pa, psi
+torque = ["M_B", "kN m"]        # N m, kN m, lbf ft
+speed = ["n", "rpm"]            # of the disc: rpm, rad/s; of the car: km/h, m/s, mph
+temperature = ["T_Scheibe", "°F"]
+
+[brake]
+piston_area = 2.827e-3          # m², all pistons of one side
+pad_area = 7.125e-3             # m²
+effective_radius = 0.1459       # m
+tyre_radius = 0.360             # m
+
+[rig]
+inertia = 129.1                 # kg m²; without, it is found from torque and slowing
+pads = 2                        # whose torque the sensor shows
+push_out_pressure = 0.5         # bar
+```
+
+`.csv` (commas, semicolons or tabs; decimal commas), `.parquet` and `.mf4` are read. Rows that are
+damaged are left out and counted. What makes no physical sense is refused in one line with the remedy: a
+pressure in another unit, the torque of one pad, °F, a thermocouple in the backing plate.
+
+```sh
+brake-ecu lab look strange.csv --columns mine.toml
+brake-ecu identify friction strange.csv --columns mine.toml --out brake.toml
+brake-ecu lab run cpc --linings brake.toml --brake mine --law SIM --out own.csv
+brake-ecu lab look own.csv
+cp brake.toml linings.toml
+```
+
+The first shows what moves friction; the second identifies seven laws, one line each, chooses one and
+writes all (`--held-out` names a second recording to choose by, `--profile ilvo` adds the profile
+likelihood of a law). The third runs the chosen law on the simulated dynamometer through the constant
+pressure cycle, the fourth looks at that as at the original. `linings.toml` beside a vehicle file of the
+simulator is read with it; its `lining = "mine"` puts the brake on an axle. Without a recording of your
+own, `brake-ecu lab run cpc --brake A --seed 1 --out cpc.csv` makes one.
+"""
+
+ENERGY_TEXT: Final = (
+    "Every scenario of config/scenarios in closed loop with the ECU of config/suv.toml. The simulated "
+    "vehicle sums what leaves and enters in its own steps (tools/brakelab/plant/energy.py)."
+)
+
+BLENDING_TEXT: Final = (
+    "Brakings from 75 km/h in closed loop with the ECU of config/suv.toml, whose motors take the share f on "
+    f"both axles. {CARS} cars, drawn from config/plant/suv.toml; figures are median (least–greatest) over "
+    "them. Torque is that of linings and motors, true; the demand is m a r with mass and radius of the "
+    "configuration (5.1). Cars of the wide draw: their hydraulics, motors and frictions are not those that "
+    "the ECU knows. Where it is told the true friction, what is left is the error of blending."
+)
+
+FAILURES_TEXT: Final = (
+    "In the second of two brakings from 28 m/s, by a driver who keeps the lane, a brake gives nothing "
+    f"any more from t = {failures.FAILS:g} s on. Deceleration is that of the second that begins "
+    f"{1e3 * failures.AFTER:g} ms after it, against the same car without the fault. What the front axle's "
+    "circuit takes at 4 m/s² and more, and the diagonal one at 6 m/s², the grip of the other wheels does not "
+    "give at once; what one front calliper takes at 6 m/s² the limit of the yaw moment does not. "
+    f"{failures.CARS} cars of the wide draw, median (least–greatest). "
+    "[control.md](control.md#brakes-that-fail) says how."
+)
+
+RECORDED_TEXT: Final = (
+    "Ten brakings of 1.5 to 7 m/s² from 30 m/s by cars whose front and rear pressures are proportional, "
+    "braked by an ECU that corrects nothing. Replayed is what a logger has: wheel speeds at 100 Hz, one "
+    "pressure per axle at 20 Hz, the accelerometer at 50 or 10 Hz; no speed reference, no motor torque. The "
+    "cars have no engine that drags, where the observer assumes one of 0.2 ± 0.3 m/s²."
+)
+
+COMPENSATION_TEXT: Final = (
+    "Manoeuvres of section 5.7 and fade (6.2.3) in closed loop with the ECU of config/suv.toml, motors at "
+    "rest but where it says so (then the ECU blends, f = 0.7 on both axles); cars are drawn per seed from "
+    "config/plant/suv.toml, nothing was learned before. Ideal: the same controller in the same car, told "
+    "the true friction. Achieved: brake and motor torque over radius and mass, all true. Uncompensated: "
+    "nominal friction always. Under, over: told 1.15 and 0.85 of the true friction (section 5.6).\n\n"
+    "![Figures 5.8 to 5.12 with car 0](images/compensation.svg)\n\nCar 0; pedal curves of its second "
+    "application. In 5.8 friction is a constant that the configuration has 15 % too high or too low."
+)
+
+MARGINS_TEXT: Final = (
+    "How far the loop through pressure law, hydraulics, car and observer is from instability, measured "
+    "with the loop cut at the friction in use (tools/brakelab/studies/margins.py). The loop gain is far "
+    "below 1 at every frequency: an estimate of friction is torque over pressure, and more pressure gives "
+    "more torque, so to first order the estimate does not see what the law does. What comes back is lag "
+    "between the signals and what friction really owes to pressure.\n\n![Loop gain and distance from "
+    "+1](images/control-margins.svg)"
+)
+
+LATENESS_TEXT: Final = (
+    "Daemon and simulated vehicle as processes in real time, with a busy process on every core. The bare "
+    "loop wakes every 10 ms on the daemon's core, above its priority, and does nothing: what the machine "
+    "allows."
+)
+
+REPLAY_TEXT: Final = (
+    "One drive of ten minutes in closed loop (config/scenarios/ordinary.toml) as a log of every format, "
+    "written by python-can and asammdf."
+)
+
+PLAY_TEXT: Final = (
+    "Traffic of a bus of 500 kbit/s with 40 % load: 40 identifiers every 10 to 100 ms with jitter, one frame "
+    "after another, 1620 a second. Only ours has an option for the speed; the others get the log with its "
+    "stamps divided by it. How late a frame was is the kernel's stamp of its arrival at a socket of the "
+    "bench's own against its stamp in the log over the speed; 0 is the frame of the run that came earliest "
+    "against the log, for every player alike. Nothing sent: ours on a bus that takes every frame and does "
+    "nothing, against the schedule itself."
+)
+
+WEAR_TEXT: Final = (
+    "How wear is kept, measured and identified: [pad-wear.md](pad-wear.md). Cars are drawn (wide) from "
+    "config/plant/suv.toml; each is driven in closed loop, without a speed reference, through one trip of "
+    "real driving by a calm, a usual and a lively driver in winter, spring and summer, its ECU going on with "
+    "what it has learned. Parts of these trips (town, country, motorway) are drawn into 30,000 km, one mix "
+    "of them between two measurements. True wear follows the plant's own law (tools/brakelab/plant/wear.py: "
+    "Archard with a regime of heat, running in, a lot of each axle, a climate that changes over 1,000 km), "
+    "which nothing on board knows. The ECU's law comes from the dynamometer with linings of another lot on "
+    "another car's brake. A thickness is measured to ± 0.1 mm (standard deviation). `scatter` and `walk` of "
+    "the linings were chosen on cars 0 and 1.\n\n![True and predicted wear](images/wear.svg)"
+)
+
+DUST_TEXT: Final = (
+    "How dust is counted, identified and told: [brake-dust.md](brake-dust.md). Vans are drawn (wide) from "
+    "config/plant/lcv.toml with linings whose emission follows the plant's own law "
+    "(tools/brakelab/plant/emission.py: effects (i) to (v) of section 8.1), which nothing on board and no "
+    "model knows. Their front right brake runs in an enclosure with a counter, read once a second, over "
+    "eight generated trips (tools/brakelab/identification/dust_trips.py); trips 1 to 7 train, trip 8 is "
+    "held out. Trips and correlations below are those of the first draw.\n\n"
+    "![Background by speed, predicted over counted emission factor](images/dust.svg)"
+)

@@ -1,0 +1,121 @@
+"""A trip as plain text: Tables 1.1 and 1.2 beside what was found, its brakings, how its brakes were used."""
+
+from typing import Final
+
+import numpy as np
+
+from brakelab.report.drive import Drive
+from brakelab.trip.table import KMH, RURAL, URBAN, Array, Brakings, Row, distance_driven, trip_rows
+from ecu.contract.signals import CORNERS
+
+DRIVE_COLUMNS: Final = (
+    "vehicle_speed",
+    "grade",
+    *(f"{stem}_{c}" for stem in ("brake_torque", "wheel_speed", "disc_temperature") for c in CORNERS),
+)
+"""Columns of the truth that `brake_lines` and the tables need."""
+BIN: Final = 0.5  # m/s^2, of the histogram
+
+
+def _limits(row: Row) -> str:
+    if np.isinf(row.low):
+        return f"< {row.high:.0f}"
+    if np.isinf(row.high):
+        return f"> {row.low:.0f}"
+    return f"{row.low:.0f} to {row.high:.0f}"
+
+
+def trip_lines(t: Array, speed: Array, grade: Array, found: Brakings) -> list[str]:
+    """Return Tables 1.1 and 1.2 beside a trip (as for `trip_rows`) and its brakings."""
+    lines = [f"{'Table 1.1':26}{'unit':>10}{'required':>12}{'Ilmenau':>10}{'here':>10}  met"]
+    for row in trip_rows(t, speed, grade):
+        verdict = "yes" if row.met else "NO"
+        lines.append(
+            f"{row.name:26}{row.unit:>10}{_limits(row):>12}{row.ilmenau:10.0f}{row.value:10.1f}  {verdict}"
+        )
+    decel = found.mean_decel
+    if len(decel) == 0:
+        return [*lines, "", "No braking"]
+    kilometres = distance_driven(t, speed)[-1] / 1e3
+
+    def share(low: float, high: float) -> float:
+        return 100.0 * float(np.mean((decel >= low) & (decel < high)))
+
+    lines += ["", f"{'Table 1.2, mean decelerations':36}{'unit':>7}{'printed':>20}{'here':>9}"]
+    for name, unit, printed, value in (
+        ("Mean", "m/s^2", "1.59, 1.70, 1.82", decel.mean()),
+        ("Standard deviation", "m/s^2", "0.35, 0.61, 0.51", decel.std()),
+        ("Below 1 m/s^2", "%", "", share(0.0, 1.0)),
+        ("1 to 2 m/s^2", "%", "60 to 80", share(1.0, 2.0)),
+        ("2 to 3 m/s^2", "%", "10 to 30", share(2.0, 3.0)),
+        ("Above 3 m/s^2", "%", "very rarely", share(3.0, np.inf)),
+        ("Brakings (printed: Table 8.1, a van)", "", "78 to 121", len(decel)),
+        ("Brakings per km", "1/km", "", len(decel) / kilometres),
+    ):
+        lines.append(f"{name:36}{unit:>7}{printed:>20}{value:9.2f}")
+    lines += ["", "Mean deceleration [m/s^2], a # for each braking"]
+    edges = np.arange(0.0, max(float(decel.max()), 3.0) + BIN, BIN)
+    for low, number in zip(edges, np.histogram(decel, edges)[0], strict=False):
+        lines.append(f"{low:4.1f} to {low + BIN:3.1f}{number:5d}  {'#' * number}".rstrip())
+    return lines
+
+
+def part_lines(t: Array, speed: Array, discs: Array, found: Brakings) -> list[str]:
+    """Return number and means of the brakings of each part of a trip, told apart by the speed before them.
+
+    `discs` are temperatures [degC] of shape (n, 4), or (n, 0) where they are not known. After Figures 7.3
+    and 7.4.
+    """
+    lines = [f"{'Brakings, means':16}{'number':>8}{'per 100 km':>12}{'from [km/h]':>13}{'by [m/s^2]':>12}"]
+    if discs.size:
+        lines[0] += "  discs before, front and rear [degC]"
+    metres = np.diff(distance_driven(t, speed))
+    for name, low, high in (("Urban", -np.inf, URBAN), ("Rural", URBAN, RURAL), ("Motorway", RURAL, np.inf)):
+        here = (found.speed_in > low) & (found.speed_in <= high)
+        kilometres = metres[(speed[1:] > low) & (speed[1:] <= high)].sum() / 1e3
+        if kilometres == 0.0:
+            continue
+        number = int(here.sum())
+        line = f"{name:16}{number:8d}{100.0 * number / kilometres:12.0f}"
+        if number:
+            line += f"{found.speed_in[here].mean() / KMH:13.1f}{found.mean_decel[here].mean():12.2f}"
+            if discs.size:
+                before = discs[np.searchsorted(t, found.start[here])].mean(axis=0)
+                line += f"{before[:2].mean():10.0f}{before[2:].mean():8.0f}"
+        lines.append(line)
+    return lines
+
+
+def braking_lines(found: Brakings) -> list[str]:
+    """Return one line for each braking, speeds in km/h."""
+    lines = ["start [s]  lasts [s]  from [km/h]  to [km/h]  mean deceleration [m/s^2]"]
+    for start, lasts, v_in, v_out, decel in zip(*found, strict=True):
+        lines.append(f"{start:9.1f}{lasts:11.1f}{v_in / KMH:13.1f}{max(v_out, 0.0) / KMH:11.1f}{decel:27.2f}")
+    return lines
+
+
+def follow_line(t: Array, speed: Array, trip_t: Array, trip_speed: Array) -> str:
+    """Return how well a drive, `t` [s] and `speed` [m/s], followed a trip."""
+    error = speed - np.interp(t, trip_t, trip_speed)
+    away = distance_driven(t, speed)[-1] - distance_driven(trip_t, trip_speed)[-1]
+    return (
+        f"Speed error {np.sqrt(np.mean(error**2)):.2f} m/s rms, {np.abs(error).max():.2f} m/s at most; "
+        f"distance {away:+.0f} m"
+    )
+
+
+def brake_lines(drive: Drive) -> list[str]:
+    """Return temperature, energy and use of each brake of a drive with `DRIVE_COLUMNS`."""
+    power = drive.corners("brake_torque") * np.abs(drive.corners("wheel_speed"))
+    energy = np.diff(drive.t) @ (0.5 * (power[1:] + power[:-1])) * 1e-6
+    discs = drive.corners("disc_temperature")
+    lines = [f"{'Brakes':24}" + "".join(f"{corner:>9}" for corner in CORNERS)]
+    for name, values in (
+        ("Disc, mean [degC]", discs.mean(axis=0)),
+        ("Disc, 95 % below [degC]", np.quantile(discs, 0.95, axis=0)),
+        ("Disc, highest [degC]", discs.max(axis=0)),
+        ("Friction energy [MJ]", energy),
+        ("Time applied [%]", 100.0 * np.mean(power > 0.0, axis=0)),
+    ):
+        lines.append(f"{name:24}" + "".join(f"{value:9.2f}" for value in values))
+    return lines
