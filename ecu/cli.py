@@ -42,6 +42,8 @@ LABORATORY = ("bokeh", "jinja2", "pyarrow", "pymoo", "scipy")
 """What the extra `lab` installs, by the names that are imported."""
 FLEET = ("distributed", "fsspec")
 """What the extra `fleet` installs."""
+LEARN = ("sklearn",)
+"""What the extra `learn` installs."""
 
 app = Commands(
     help="Real-time brake ECU: estimates brake lining friction and corrects pressure demands by it.",
@@ -156,6 +158,11 @@ def _describe(error: Exception) -> tuple[str, int]:
             return f"{name} is missing: this command needs the laboratory, pip install 'brake-ecu[lab]'", 2
         case ModuleNotFoundError(name=str(name)) if name.partition(".")[0] in (*FLEET, "dask"):
             return f"{name} is missing: fleets need Dask, pip install 'brake-ecu[lab,fleet]'", 2
+        case ModuleNotFoundError(name=str(name)) if name.partition(".")[0] in LEARN:
+            return (
+                f"{name} is missing: emission models need scikit-learn, pip install 'brake-ecu[lab,learn]'",
+                2,
+            )
         case OSError(filename=str(filename), strerror=str(reason)):
             return f"{filename}: {reason.lower()}", 2
         case OSError(errno=errno.ENOSPC):

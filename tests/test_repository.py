@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from ecu import __version__
-from ecu.cli import FLEET, LABORATORY
+from ecu.cli import FLEET, LABORATORY, LEARN
 
 ROOT = Path(__file__).parent.parent
 LOCKS = sorted((ROOT / "requirements").glob("*.txt"))
@@ -96,6 +96,7 @@ def test_the_locks_hold_what_the_project_asks_for() -> None:
     laboratory = names(extras["lab"])
     assert laboratory == set(LABORATORY)
     assert names(extras["fleet"]) == set(FLEET)
+    assert names(extras["learn"]) == {"scikit-learn"}, "installs sklearn"
     assert onboard <= _requirements(ROOT / "requirements/onboard.txt").keys()
     assert onboard | laboratory <= _requirements(ROOT / "requirements/lab.txt").keys()
     assert names(extras["dev"]) - {"brake-ecu"} <= _requirements(ROOT / "requirements/dev.txt").keys()
@@ -121,7 +122,7 @@ def test_onboard_code_loads_no_laboratory() -> None:
     done = subprocess.run(
         [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True
     )
-    laboratory = {"brakelab", "matplotlib", "asammdf", *LABORATORY}
+    laboratory = {"brakelab", "matplotlib", "asammdf", *LABORATORY, *LEARN}
     # numba loads scipy wherever it finds it.
     assert not (laboratory - {"scipy"}) & set(done.stdout.split())
 
@@ -129,7 +130,7 @@ def test_onboard_code_loads_no_laboratory() -> None:
 def test_ecu_never_imports_the_laboratory() -> None:
     for path in (ROOT / "ecu").rglob("*.py"):
         for name, _ in _imports(path):
-            assert name.partition(".")[0] not in {"brakelab", *LABORATORY, *FLEET}, f"{path}: {name}"
+            assert name.partition(".")[0] not in {"brakelab", *LABORATORY, *FLEET, *LEARN}, f"{path}: {name}"
 
 
 def test_the_simulated_vehicle_knows_nothing_of_the_ecu() -> None:

@@ -61,7 +61,7 @@ def checkout(tmp_path: Path) -> Path:
         (
             {
                 "ecu/control/brake.py": BRAKE,
-                "tools/brakelab/bench/brake.py": BENCH.replace("ecu", "ecu.algorithm.control"),
+                "tools/brakelab/bench/brake.py": BENCH.replace("ecu", "ecu.control"),
             },
             "",
         ),

@@ -58,7 +58,9 @@ def publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: in
     _publish_car(p, s, y)
     y.braking = s.application.braking
     y.test_ratio_balance, y.test_ratio_speed = _test_ratio(p, s, 4), _test_ratio(p, s, 5)
-    y.particles_last_brake = y.particles_per_km = math.nan
+    y.particles_last_brake, y.particles_per_km = s.dust.particles, s.dust.per_km
+    y.particles_last_brake_low, y.particles_last_brake_high = s.dust.low, s.dust.high
+    y.particle_mass_per_km = s.dust.mass_per_km
     for i in range(4):
         y.slip[i] = s.wheels.slip[i] if rolls else math.nan
         y.wheel_force_x[i] = s.force.virtual[i] if rolls else math.nan

@@ -4,7 +4,7 @@
 daemon, replay and closed-loop simulation get the same bits from the same inputs. Order of one cycle:
 
     brake application -> accelerations -> wheel loads, radii -> brake torques, expected slip -> speed -> slip
-    -> tyre forces -> friction -> disc temperature -> wear -> demand -> distribution -> blending
+    -> tyre forces -> friction -> disc temperature -> wear -> dust -> demand -> distribution -> blending
     -> pressure law -> slip guard -> limiter -> mode
 """
 
@@ -80,6 +80,7 @@ from ecu.algorithm.monitoring.disc_temperature import (
     start_discs,
     update_discs,
 )
+from ecu.algorithm.monitoring.dust import DUST_STATE, restore_dust, update_dust
 from ecu.algorithm.monitoring.plausibility import PLAUSIBILITY_STATE
 from ecu.algorithm.monitoring.prediction import (
     PREDICTION_STATE,
@@ -121,6 +122,7 @@ STATE = np.dtype(
         ("application", APPLICATION_STATE),
         ("discs", DISC_STATE),
         ("wear", WEAR_STATE),
+        ("dust", DUST_STATE),
         ("demand", DEMAND_STATE),
         ("distribution", DISTRIBUTION_STATE),
         ("failed_brakes", FAILED_BRAKES_STATE),
@@ -170,6 +172,7 @@ def _begin(params: Record, state: Record) -> None:
     set_base(p, s.control, s.learned)
     start_discs(p, s.discs, s.learned)
     restore_wear(p, s.wear, s.learned)
+    restore_dust(p, s.dust, s.learned, s.wear)
     update_wheel_load(p, s.wheel_load, 0.0, 0.0, 0.0, 1.0)
     update_radius(p, s.wheels, s.learned, s.wheel_load.load)
 
@@ -196,6 +199,7 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
         total_tyre_force(p, s.motion, s.speed.speed), s.speed.speed, dt,
     )  # fmt: skip
     update_wear(p, s.wear, s.learned, u, s.friction, s.discs, s.application, s.speed.speed, dt)
+    update_dust(p, s.dust, s.learned, u, s.friction, s.discs, s.wear, s.application, s.speed.speed, dt)
     decel = _control(p, s, u, y, dt)
     if s.friction.reset:
         faults |= FILTER_RESET

@@ -4,6 +4,7 @@ from typing import Final
 
 import numpy as np
 
+from ecu.contract.dust import MOST
 from ecu.contract.signals import N_INPUTS
 
 # Points of the pedal map; a shorter map is padded with its last point.
@@ -64,6 +65,16 @@ PARAMS: Final = np.dtype(
         ("pad_life", "f8", (4,)),  # mm from new to worn
         ("chamfer_depth", "f8", (4,)),  # mm
         ("chamfer_share", "f8", (4,)),  # of the area that chamfers take off new pads
+        # dust, see monitoring/dust.py
+        ("dust_model", "i8", (4,)),  # MODELS of ecu/dust.py, NONE without
+        ("dust_numbers", "f8", (4, MOST)),
+        ("dust_low", "f8", (4, 6)),  # FEATURES that a model was trained on
+        ("dust_high", "f8", (4, 6)),
+        ("dust_factor", "f8", (4,)),  # mean of the particles over ten to the emission factor
+        ("dust_below", "f8", (4,)),  # ends of the 95 % interval of the emission factor
+        ("dust_above", "f8", (4,)),
+        ("dust_version", "i8"),  # tells these models from others
+        ("airborne_share", "f8", (4,)),  # of what the pads lose, as particles up to 10 um
         # sensors
         ("sigma_wheel_speed", "f8"),  # rad/s
         ("sigma_accel", "f8"),  # m/s^2

@@ -98,6 +98,18 @@ WEAR: Final = np.dtype(
     ],
     align=True,
 )
+# What the brakes have emitted, by the emission models of one version; see monitoring/dust.py.
+DUST: Final = np.dtype(
+    [
+        ("version", "i8"),  # of the models that counted it
+        ("particles", "f8"),
+        ("way", "f8"),  # m, since these models count
+        ("work", "f8"),  # J, of the brakes that have a model
+        ("told_work", "f8"),  # J, of the applications whose particles are in it
+        ("applications", "i8"),  # these
+    ],
+    align=True,
+)
 # What the ECU has learned and must not lose: carried between brakings, drives and restarts.
 LEARNED: Final = np.dtype(
     [
@@ -113,6 +125,7 @@ LEARNED: Final = np.dtype(
         ("disc_excess", "f8", (4,)),  # most that the last braking left the disc above the air [K]
         ("brakings", "i8"),  # brake applications since the record was first made
         ("wear", WEAR),
+        ("dust", DUST),
     ],
     align=True,
 )

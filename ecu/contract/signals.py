@@ -153,6 +153,9 @@ OUTPUT_SIGNALS: Final[tuple[OutputSignal, ...]] = (
     OutputSignal("pressure_uncompensated", "bar", True, ""),  # the demand with the base friction
     OutputSignal("sigma_disc_temperature", "K", True, ""),
     OutputSignal("sigma_pad_wear", "mm", True, ""),
+    OutputSignal("particles_last_brake_low", "-", False, ""),  # 95 % of what is told of the last application
+    OutputSignal("particles_last_brake_high", "-", False, ""),
+    OutputSignal("particle_mass_per_km", "mg/km", False, ""),  # of all linings, up to 10 um
     # Squared innovation over its variance and squared gate, last window: beyond 1 it counts less. Joint only.
     OutputSignal("test_ratio", "-", True, ""),  # of wheel speed
     OutputSignal("test_ratio_balance", "-", False, ""),  # of the forces along the car

@@ -5,14 +5,14 @@ from pathlib import Path
 
 from ecu.algorithm.step import new_state
 from ecu.contract.records import RecordArray
-from ecu.recording.store import open_store, restore, restore_wear
+from ecu.recording.store import PARTS, open_store, restore, restore_part
 from ecu.settings.config import Config, store_key
 
 
 def restored(folder: Path, config: Config, params: RecordArray) -> tuple[int, RecordArray] | None:
     """Return the revision and record (`LEARNED`, shape (1,)) in the store of `folder`, None if it is empty.
 
-    Revision 0: nothing was learned with these brakes or by this version, but the wear goes on.
+    Revision 0: nothing was learned with these brakes or by this version, but wear and dust go on.
 
     Raises:
         UserError: the folder cannot be written.
@@ -20,9 +20,11 @@ def restored(folder: Path, config: Config, params: RecordArray) -> tuple[int, Re
     key = store_key(config)
     with closing(open_store(folder)) as store:
         found = restore(store, key, params["mu_nominal"][0])
-        wear = None if found else restore_wear(store, key)
-    if wear is None:
+        kept = {} if found else {part: restore_part(store, key, part) for part in PARTS}
+    if not any(record is not None for record in kept.values()):
         return found
     learned: RecordArray = new_state(params)["learned"].copy()
-    learned["wear"] = wear
+    for part, record in kept.items():
+        if record is not None:
+            learned[part] = record
     return 0, learned

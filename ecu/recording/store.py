@@ -5,9 +5,8 @@ it; a file that sqlite cannot read, or that holds another table, another schema 
 set aside and a new one made. What another version of the algorithm has learned stays in the file and is not
 used. The folder is its owner's alone.
 
-What the linings have done is also kept as rows of its own, in the same transaction, by the vehicle's name
-alone: it outlives a new version and a configuration that changes, and belongs to the pads, not to the brakes'
-parameters.
+What the linings have worn off and what the brakes have emitted is also kept as rows of their own, in the same
+transaction, by the vehicle's name alone: it outlives a new version and a configuration that changes.
 """
 
 import fcntl
@@ -24,7 +23,7 @@ import numpy as np
 import structlog
 from numpy.typing import NDArray
 
-from ecu.contract.records import LEARNED, N_MEASURED, WEAR, RecordArray
+from ecu.contract.records import DUST, LEARNED, N_MEASURED, WEAR, RecordArray
 from ecu.errors import UserError
 
 FILE: Final = "learned.sqlite"
@@ -159,7 +158,8 @@ def _crc(key: str, revision: int, record: bytes) -> int:
 def save(store: sqlite3.Connection, key: str, learned: RecordArray) -> int:
     """Add `learned` (`LEARNED`, shape (1,)) as the next revision of `key`, durable on return; returns it."""
     with _transaction(store):
-        _add(store, wear_key(key), learned["wear"].tobytes())
+        for part in PARTS:
+            _add(store, part_key(key, part), learned[part].tobytes())
         return _add(store, key, learned.tobytes())
 
 
@@ -173,9 +173,9 @@ def _add(store: sqlite3.Connection, key: str, record: bytes) -> int:
     return revision
 
 
-def wear_key(key: str) -> str:
-    """Return what the linings' wear is kept under: the vehicle of `key` and the version of its layout."""
-    return f"{key.rsplit('/', 2)[0]}/wear/1"
+def part_key(key: str, part: str) -> str:
+    """Return what one of `PARTS` is kept under: the vehicle of `key` and the version of its layout."""
+    return f"{key.rsplit('/', 2)[0]}/{part}/1"
 
 
 @contextmanager
@@ -194,22 +194,24 @@ def restore(
 ) -> tuple[int, RecordArray] | None:
     """Return the newest good revision of `key` and its record (`LEARNED`, shape (1,)); None without one.
 
-    `mu_nominal` has shape (4,). Good: the CRC holds and every value lies in its range. Its wear is the
-    vehicle's where that went on since.
+    `mu_nominal` has shape (4,). Good: the CRC holds and every value lies in its range. Wear and dust
+    are the vehicle's where these went on since.
     """
     found = _newest_good(store, key, LEARNED, lambda learned: out_of_range(learned, mu_nominal))
     if not found:
         _tell_of_other_versions(store, key)
         return None
-    wear = restore_wear(store, key)
-    if wear is not None and wear["odometer"][0] >= found[1]["wear"]["odometer"][0]:
-        found[1]["wear"] = wear
+    for part, (_, _, way) in PARTS.items():
+        own = restore_part(store, key, part)
+        if own is not None and own[way][0] >= found[1][part][way][0]:
+            found[1][part] = own
     return found
 
 
-def restore_wear(store: sqlite3.Connection, key: str) -> RecordArray | None:
-    """Return the vehicle's wear (`WEAR`, shape (1,)) by its newest good row, None without one."""
-    found = _newest_good(store, wear_key(key), WEAR, wear_out_of_range)
+def restore_part(store: sqlite3.Connection, key: str, part: str) -> RecordArray | None:
+    """Return the vehicle's wear or dust (`PARTS`, shape (1,)) by its newest good row, None without one."""
+    dtype, wrong, _ = PARTS[part]
+    found = _newest_good(store, part_key(key, part), dtype, wrong)
     return found[1] if found else None
 
 
@@ -263,7 +265,7 @@ def out_of_range(learned: RecordArray, mu_nominal: NDArray[np.float64]) -> str:
         "brakings": np.asarray(row["brakings"] >= 0),
     }
     first = next((name for name, good in checks.items() if not good.all()), "")
-    return first or wear_out_of_range(learned["wear"])
+    return first or wear_out_of_range(learned["wear"]) or dust_out_of_range(learned["dust"])
 
 
 def wear_out_of_range(wear: RecordArray) -> str:
@@ -280,6 +282,22 @@ def wear_out_of_range(wear: RecordArray) -> str:
     checks["measured_sigma"] = ~used | ((row["measured_sigma"] > 0) & (row["measured_sigma"] <= THICKEST))
     checks["legs"] = np.asarray(0 <= row["legs"] <= FARTHEST)
     return next((name for name, good in checks.items() if not good.all()), "")
+
+
+def dust_out_of_range(dust: RecordArray) -> str:
+    """Return the name of the first value of `dust` (shape (1,)) that cannot be, empty if there is none."""
+    row = dust[0]
+    checks = {name: np.isfinite(row[name]) and row[name] >= 0 for name in ("particles", "work", "told_work")}
+    checks["way"] = 0 <= row["way"] <= FARTHEST
+    checks["applications"] = row["applications"] >= 0
+    return next((name for name, good in checks.items() if not good), "")
+
+
+PARTS: Final = {
+    "wear": (WEAR, wear_out_of_range, "odometer"),
+    "dust": (DUST, dust_out_of_range, "way"),
+}
+"""What belongs to the vehicle and its pads: layout, check, and the way [m] by which it went on."""
 
 
 def covariance_of(triangle: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -20,6 +20,7 @@ from ecu.contract.params import BAR, COMPENSATIONS, DISTRIBUTIONS, GRAVITY, OBSE
 from ecu.contract.records import RecordArray
 from ecu.errors import UserError
 from ecu.settings.annex5 import Load, annex_5_violation
+from ecu.settings.dust import Dust, set_dust, set_dust_version
 from ecu.settings.pad import Pad, set_pad
 from ecu.settings.toml_file import Section, describe, read_toml
 
@@ -96,6 +97,8 @@ class Axle(Section):
     disc_cooling_by_speed: Annotated[float, Field(ge=0, lt=0.01)] = 9.108e-5
     """delta_1 of (3.7), 1/m. Table C.1 prints ten times as much: 400 to 100 degC in a minute at 100 km/h."""
     pad: Pad = Pad()
+    dust: Dust | None = None
+    """What its brakes emit; without: nothing is told of it."""
 
 
 class Sensors(Section):
@@ -272,11 +275,12 @@ def config_hash(config: Config) -> str:
 def store_key(config: Config) -> str:
     """Return what learned values belong to: vehicle, brakes and the version of the algorithm.
 
-    Not the linings' wear law: wear is kept in a form that any law can be applied to later.
+    Not the linings' wear law: wear is kept in a form that any law can be applied to later. Not their dust:
+    its totals carry the version of their model.
     """
-    axles = [axle.model_dump(exclude={"pad"}) for axle in (config.front, config.rear)]
+    axles = [axle.model_dump(exclude={"pad", "dust"}) for axle in (config.front, config.rear)]
     brakes = json.dumps(axles, sort_keys=True)
-    return f"{config.name}/{hashlib.sha256(brakes.encode()).hexdigest()[:8]}/4"
+    return f"{config.name}/{hashlib.sha256(brakes.encode()).hexdigest()[:8]}/5"
 
 
 def new_params(config: Config) -> RecordArray:
@@ -310,6 +314,8 @@ def new_params(config: Config) -> RecordArray:
         for name in ("disc_heating", "disc_cooling", "disc_cooling_by_speed"):
             row[name][corner] = getattr(axle, name)
         set_pad(row, corner, axle.pad)
+        set_dust(row, corner, axle.dust)
+    set_dust_version(row)
     row["sigma_wheel_speed"], row["sigma_accel"] = sensors.wheel_speed, sensors.accel
     row["accel_range"] = sensors.accel_range
     row["sigma_pressure"] = sensors.pressure * BAR

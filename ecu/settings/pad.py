@@ -39,6 +39,10 @@ class Pad(Section):
     """Standard deviation of the mass over the square root of the mass, sqrt(g): weather and roads, some 10 %
     that stay the same over some 6 g."""
 
+    airborne_share: Annotated[float, Field(ge=0, le=1)] = 0.5
+    """Of the mass worn off, what stays in the air: about half (Grigoratos and Martini 2015); 0.02 to 0.21
+    were measured for non-asbestos organic linings (Hagino et al. 2016). The disc's own is not in it."""
+
     @model_validator(mode="after")
     def _something_to_wear(self) -> "Pad":
         if self.thickness_worn >= self.thickness_new:
@@ -52,6 +56,7 @@ def set_pad(row: Any, corner: int, pad: Pad) -> None:
     row["wear_law"][:, corner] = pad.road_scale * np.multiply(pad.coefficients, used)
     row["wear_sigma"][corner], row["wear_walk"][corner] = pad.sigma, pad.walk
     row["wear_scatter"][corner] = pad.scatter
+    row["airborne_share"][corner] = pad.airborne_share
     row["pad_mass"][corner] = 2.0 * pad.density * pad.area  # kg/m is g/mm
     row["pad_life"][corner] = pad.thickness_new - pad.thickness_worn
     row["chamfer_depth"][corner], row["chamfer_share"][corner] = pad.chamfer_depth, pad.chamfer_share

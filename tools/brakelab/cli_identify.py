@@ -64,3 +64,18 @@ def wear(
     from brakelab.identification import wear_command
 
     return wear_command.identify_wear(manifest, config, axle, out)
+
+
+@app.command()
+def dust(
+    manifest: Annotated[
+        Path, typer.Argument(metavar="MANIFEST.csv", help="Trips with a particle counter: trip, file, test")
+    ],
+    config: Config,
+    out: Annotated[Path, typer.Option("--out", metavar="CAR.toml", help="A CONFIG; CAR.md beside")],
+    axle: Annotated[str, typer.Option("--axle", metavar="AXLE", help="Whose brakes: front, rear")] = "front",
+) -> int:
+    """What a brake emits, from trips with a particle counter. Writes a CONFIG."""
+    from brakelab.identification import dust_command
+
+    return dust_command.identify_dust(manifest, config, axle, out)

@@ -49,8 +49,8 @@ def of_data_sheet(cars: NDArray[np.void], base: Any) -> NDArray[np.float64]:
     return np.asarray(cars["friction_scale"] / base["friction_scale"] * [0.85, 0.85, 1.10, 1.10])[:, AXLES]
 
 
-def worn(cars: NDArray[np.void], base: Any) -> NDArray[np.float64]:
-    return np.asarray(cars["wear_scale"][:, AXLES] / base["wear_scale"][AXLES])
+def relative_level(name: str) -> Quantity:
+    return lambda cars, base: np.asarray(cars[name][:, AXLES] / base[name][AXLES])
 
 
 AXLES = [0, 2]
@@ -77,7 +77,8 @@ WIDTHS: list[tuple[str, set[str], Quantity]] = [
     ("push_out_pressure", {"push_out_pressure"}, pushed),
     ("disc_heating", {"heating"}, relative("heating", AXLES)),
     ("disc_cooling", {"cooling", "cooling_by_speed"}, relative("cooling_by_speed", AXLES)),
-    ("wear_lot", {"wear_scale"}, worn),
+    ("wear_lot", {"wear_scale"}, relative_level("wear_scale")),
+    ("emission_lot", {"emission_scale"}, relative_level("emission_scale")),
     ("hydraulic_inertia", {"build_up", "release"}, relative("build_up", 0)),
     ("hydraulic_damping", {"build_up", "release"}, relative("release", 1)),
     ("hydraulic_dead_time", {"build_up", "release"}, relative("release", 2)),
@@ -123,13 +124,15 @@ def check_even(drawn: NDArray[np.float64], width: float | tuple[float, float]) -
 
 
 def test_every_width_of_the_file_is_looked_at() -> None:
-    assert {row[0] for row in WIDTHS} | SENSORS | {"friction_laws", "wear_climate"} == set(
-        Widths.model_fields
-    )
+    assert {row[0] for row in WIDTHS} | SENSORS | {"friction_laws", *DAYS} == set(Widths.model_fields)
 
 
-def test_days_differ_by_the_logarithm_of_their_climate(suv: Plant) -> None:
-    days = np.log(cars_of(suv, Widths(wear_climate=0.1))["wear_scale"])
+DAYS = {"wear_climate": "wear_scale", "emission_day": "emission_scale"}
+
+
+@pytest.mark.parametrize(("key", "changes"), DAYS.items(), ids=DAYS)
+def test_days_differ_by_the_logarithm_of_their_climate(suv: Plant, key: str, changes: str) -> None:
+    days = np.log(cars_of(suv, Widths(**{key: 0.1}))[changes])
     assert np.all(np.ptp(days, axis=1) < 1e-12)  # the same for all pads
     assert days[:, 0].mean() == pytest.approx(0.0, abs=4 * 0.1 / np.sqrt(len(days)))
     assert days[:, 0].std() == pytest.approx(0.1, rel=4 / np.sqrt(2 * len(days)))
@@ -141,7 +144,14 @@ def wide_cars(suv: Plant) -> NDArray[np.void]:
 
 
 # Two keys are widths of one parameter: each is looked at alone.
-SHARED = {"slip_stiffness", "slip_stiffness_axle", "friction_axle", "friction_wheel", "wear_lot"}
+SHARED = {
+    "slip_stiffness",
+    "slip_stiffness_axle",
+    "friction_axle",
+    "friction_wheel",
+    "wear_lot",
+    "emission_lot",
+}
 
 
 def alone(key: str) -> Widths:

@@ -40,7 +40,7 @@ SEEN = (  # inputs of a car with everything but a speed reference
     "decel_demand",
 )
 # What is NaN by contract because nothing computes it yet, or the speed reference that nobody sends.
-NOT_BUILT = ("motor_demand_", "particles", "test_ratio")  # ratios: of what was fused alone
+NOT_BUILT = ("motor_demand_", "particle", "test_ratio")  # ratios: of what was fused alone
 PROMISED = [k for k, name in enumerate(OUTPUT_COLUMNS) if not name.startswith(NOT_BUILT)]
 
 

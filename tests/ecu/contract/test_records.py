@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from ecu.contract.records import FRAME, LEARNED, WEAR
+from ecu.contract.records import DUST, FRAME, LEARNED, WEAR
 
 
-@pytest.mark.parametrize("record", [FRAME, LEARNED, WEAR], ids=["frame", "learned", "wear"])
+@pytest.mark.parametrize("record", [FRAME, LEARNED, WEAR, DUST], ids=["frame", "learned", "wear", "dust"])
 def test_every_byte_of_a_record_belongs_to_a_field(record: np.dtype) -> None:
     assert sum(record[name].itemsize for name in record.names) == record.itemsize
 

@@ -1,4 +1,5 @@
 import itertools
+import math
 import multiprocessing
 import random
 import sqlite3
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 from structlog.testing import capture_logs
 
-from ecu.contract.records import LEARNED, N_KEPT, N_MEASURED, WEAR, new_record
+from ecu.contract.records import DUST, LEARNED, N_KEPT, N_MEASURED, WEAR, new_record
 from ecu.errors import UserError
 from ecu.recording.store import (
     FILE,
@@ -21,7 +22,7 @@ from ecu.recording.store import (
     is_due,
     open_store,
     restore,
-    restore_wear,
+    restore_part,
     save,
 )
 
@@ -200,8 +201,8 @@ def test_wear_outlives_a_new_version_and_another_configuration_of_the_brakes(tmp
     store = open_store(tmp_path)
     save(store, KEY, learned(wear=wear(regressors=3.0)))
     assert restore(store, "suv/9999/2", NOMINAL) is None
-    assert restore_wear(store, "suv/9999/2")["regressors"].min() == 3.0
-    assert restore_wear(store, "van/1234/1") is None
+    assert restore_part(store, "suv/9999/2", "wear")["regressors"].min() == 3.0
+    assert restore_part(store, "van/1234/1", "wear") is None
 
 
 def test_wear_goes_on_from_where_the_car_is_and_not_from_where_these_brakes_were_last(tmp_path):
@@ -219,6 +220,34 @@ def test_a_damaged_row_of_wear_leaves_that_of_the_whole_record(tmp_path):
     store.execute("UPDATE learned SET crc = crc + 1 WHERE revision = 2 AND key LIKE '%/wear/%'")
     with capture_logs():
         assert restore(store, KEY, NOMINAL)[1]["wear"]["regressors"].max() == 2.0
+
+
+def dust(**values: float) -> np.ndarray:
+    record = np.zeros(1, DUST)
+    for name, value in values.items():
+        record[name] = value
+    return record
+
+
+def test_dust_outlives_a_new_version_too(tmp_path):
+    store = open_store(tmp_path)
+    save(store, KEY, learned(dust=dust(way=5e6, particles=1e13, version=7)))
+    found = restore_part(store, "suv/9999/2", "dust")
+    assert (found["particles"][0], found["version"][0]) == (1e13, 7)
+
+
+CANNOT_BE = {"way": -1.0, "particles": math.nan, "told_work": -1.0, "applications": -1}
+
+
+@pytest.mark.parametrize(("name", "value"), CANNOT_BE.items(), ids=CANNOT_BE)
+def test_dust_that_cannot_be_is_refused(tmp_path, name, value):
+    store = open_store(tmp_path)
+    save(store, KEY, learned(7, dust=dust(way=1e6)))
+    save(store, KEY, learned(8, dust=dust(**{"way": 2e6, name: value})))
+    with capture_logs() as lines:
+        _, found = restore(store, KEY, NOMINAL)
+    assert (found["brakings"][0], found["dust"]["way"][0]) == (7, 1e6)
+    assert lines[0]["reason"] == name
 
 
 def test_nobody_changes_it_by_hand_while_a_daemon_keeps_it(tmp_path):

@@ -216,6 +216,7 @@ def test_learned_values_are_taken_over(tmp_path):
     learned["mu_b"], learned["sigma_mu_b"], learned["observed_s"] = 0.38, 0.02, 9.0
     learned["radius_sigma"], learned["brakings"] = 0.002, 4
     params = new_params(load_config(ROOT / "config" / "suv.toml"))
+    learned["dust"]["version"] = params["dust_version"]
     ecu = new_ecu(params, learned, contract_receive_plan(DBC), contract_transmit_plan(DBC, "BrakeEcu"))
     assert ecu.learned.tobytes() == learned.tobytes()
 

@@ -4,14 +4,14 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from multiprocessing import get_context
-from typing import Final, NamedTuple, TypeVar
+from typing import Final, TypeVar
 
 from rich.console import Console
 from rich.progress import track
 
-from brakelab.bench import codec, cycle, plant, step
-from brakelab.bench.measure import NOT_INSTALLED, Row, machine
+from brakelab.bench.measure import NOT_INSTALLED, machine
 from brakelab.bench.output import PICTURES, plain_row, print_json, print_tables, write_page
+from brakelab.bench.times import BENCHES
 from brakelab.studies import (
     ablation,
     bound,
@@ -37,6 +37,7 @@ from brakelab.studies.texts import (
     BLENDING_TEXT,
     BOUND_TEXT,
     COMPENSATION_TEXT,
+    DUST_TEXT,
     ENERGY_TEXT,
     FAILURES_TEXT,
     FRICTION_TEXT,
@@ -69,48 +70,11 @@ MARGINS: Final = "margins"
 LATENESS: Final = "lateness"
 RECORDED: Final = "recorded"
 WEAR: Final = "wear"
+DUST: Final = "dust"
 REPLAY: Final = "replay"
 PLAY: Final = "play"
 
 Car = TypeVar("Car")
-
-
-class Bench(NamedTuple):
-    """One bench of times."""
-
-    rows: Callable[[], list[Row]]
-    title: str
-    below: str
-
-
-BENCHES: Final = {
-    "step": Bench(
-        step.step_rows,
-        "step",
-        f"Processor time of a cycle with four wheels, {step.CYCLES} cycles of braking in each of "
-        f"{step.ROUNDS} rounds. All filters get the same inputs and give the same friction.",
-    ),
-    "codec": Bench(
-        codec.codec_rows,
-        "codec",
-        f"Processor time of a message: the 13 protected inputs of the contract, {codec.CYCLES} cycles in "
-        f"each of {codec.ROUNDS} rounds. Ours with CRC, counter and (decoding) freshness, the peer without.",
-    ),
-    "plant": Bench(
-        plant.plant_rows,
-        "plant",
-        f"Time of the simulated vehicle per millisecond of its drive: {plant.STEPS} steps of 1 ms in each of "
-        f"{plant.ROUNDS} rounds, braking in a curve on a rough road from 50 m/s. Processor time "
-        "unless by the clock.",
-    ),
-    "cycle": Bench(
-        cycle.cycle_rows,
-        "cycle",
-        f"Time by the clock, {cycle.CYCLES} cycles of 10 ms in each of {cycle.ROUNDS} rounds, in real time "
-        "but without real-time rights: 39 frames in, 6 out, over a socket pair that carries can_frames. Ours "
-        "is the daemon's cycle; the peer checks nothing and runs the four filters alone.",
-    ),
-}
 
 
 def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0, draw: str = WIDE) -> int:
@@ -139,6 +103,7 @@ def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0, 
         FAILURES: _failures,
         RECORDED: partial(_recorded, seeds=seeds),
         WEAR: partial(_wear, seeds=seeds),
+        DUST: partial(_dust, seeds=seeds),
         LATENESS: partial(_lateness, seconds=seconds),
         REPLAY: _replay,
         PLAY: partial(_play, seconds=seconds),
@@ -254,6 +219,13 @@ def _wear(json: bool, seeds: int) -> int:
         picture = resource(PICTURES) / "wear.svg"
         write_chart(picture, wear.wear_panels(lives, len(cars)), wear.LEGEND)
     return _page(WEAR, "Wear", WEAR_TEXT, wear.wear_tables(cars, laws, lives), json)
+
+
+def _dust(json: bool, seeds: int) -> int:
+    from brakelab.studies import dust
+
+    tables = dust.dust_page(partial(_each_car, DUST), min(seeds, dust.DRAWS), not json)
+    return _page(DUST, "Dust", DUST_TEXT, tables, json)
 
 
 def _friction(json: bool) -> int:

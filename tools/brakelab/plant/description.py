@@ -268,6 +268,8 @@ def nominal(plant: Plant) -> RecordArray:
         set_lining(car, wheel, lining, brake.friction, level)
         car["wear_row"][wheel] = lining.wear.row(lining.brake.pad_area)
         car["wear_scale"][wheel] = 1.0
+        car["emission_row"][wheel] = lining.emission.row()
+        car["emission_scale"][wheel] = 1.0
     leverage = 4.0 * hydraulics.fallback_friction
     leverage *= sum(car["piston_area"][wheel] * car["effective_radius"][wheel] for wheel in (0, 2))
     car["fallback_gain"] = body.mass * tyre.free_radius / leverage

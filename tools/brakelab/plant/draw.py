@@ -59,6 +59,10 @@ class Widths(Section):
     """Of each axle's linings."""
     wear_climate: NotNegative = 0.0
     """Standard deviation of its logarithm, of a day: air and dirt."""
+    emission_lot: Factors = SAME
+    """Of each axle's linings."""
+    emission_day: NotNegative = 0.0
+    """Standard deviation of its logarithm, of a day: air, dirt, humidity."""
     hydraulic_inertia: NotNegative = 0.0
     hydraulic_damping: NotNegative = 0.0
     hydraulic_dead_time: NotNegative = 0.0
@@ -130,6 +134,9 @@ def draw(plant: Plant, seed: int, width: Widths) -> RecordArray:
     wear = np.random.default_rng([seed, 7])
     car["wear_scale"] *= np.repeat(wear.uniform(*width.wear_lot, 2), 2)
     car["wear_scale"] *= np.exp(width.wear_climate * wear.standard_normal())
+    dust = np.random.default_rng([seed, 8])
+    car["emission_scale"] *= np.repeat(dust.uniform(*width.emission_lot, 2), 2)
+    car["emission_scale"] *= np.exp(width.emission_day * dust.standard_normal())
     return params
 
 

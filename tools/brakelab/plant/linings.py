@@ -3,6 +3,7 @@
 from typing import Final
 
 from brakelab.plant.dynamometer import AMBIENT, RIG
+from brakelab.plant.emission import EmissionLaw
 from brakelab.plant.friction.law import NotNegative, Positive, RigBrake, Section
 from brakelab.plant.friction.laws import AnyLaw, law_row
 from brakelab.plant.records import RecordArray, new_record
@@ -27,6 +28,7 @@ class Lining(Section):
     disc: Disc
     friction: dict[str, AnyLaw]
     wear: WearLaw = WearLaw()
+    emission: EmissionLaw = EmissionLaw()
 
 
 class Linings(Section):

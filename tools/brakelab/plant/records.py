@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.plant.emission import EMISSION_ROW
 from brakelab.plant.friction.law import ROW
 from brakelab.plant.wear import WEAR_ROW
 
@@ -70,6 +71,8 @@ PARAMS: Final = np.dtype(
         ("cooling_by_speed", "f8", (4,)),  # 1/m (delta_1)
         ("wear_row", "f8", (4, WEAR_ROW)),  # numbers of wear.py
         ("wear_scale", "f8", (4,)),  # -, lot of the lining and climate of the day
+        ("emission_row", "f8", (4, EMISSION_ROW)),  # numbers of emission.py
+        ("emission_scale", "f8", (4,)),  # -, lot of the lining and the day
         ("motor_share", "f8", (4,)),  # -, of a total torque
         ("motor_torque_limit", "f8"),  # N m at the wheel
         ("motor_power_limit", "f8"),  # W
@@ -141,6 +144,8 @@ STATE: Final = np.dtype(
         ("lining_memory", "f8", (4,)),  # of the friction law, e.g. normalised contact area
         ("disc_temperature", "f8", (4,)),  # degC
         ("pad_wear_mass", "f8", (4,)),  # g, of both pads
+        ("particles", "f8", (4,)),  # emitted, 23 nm to 2.5 um
+        ("treatment", "f8", (4,)),  # -, of the surface by heat
         # integrated with a suspension only; heights from the design position, up
         ("heave", "f8"),  # m, of the body's centre of gravity
         ("heave_rate", "f8"),

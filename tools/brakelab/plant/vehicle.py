@@ -9,6 +9,7 @@ import numpy as np
 
 from brakelab.plant.body import advance_attitude, advance_planar, hub_velocity, set_wheel_loads
 from brakelab.plant.chassis import advance_chassis, settle
+from brakelab.plant.emission import advance_emission
 from brakelab.plant.friction.law import START
 from brakelab.plant.hydraulics import advance_pressure
 from brakelab.plant.jit import Record, kernel
@@ -43,6 +44,7 @@ def advance(params: Record, state: Record, commands: Record, dt: float) -> None:
     if not params.suspended:
         advance_attitude(params, state, dt)
     advance_wear(params, state, dt)
+    advance_emission(params, state, dt)
     advance_disc_temperature(params, state, commands.ambient_temperature, commands.wetness, dt)
     state.t += dt
 

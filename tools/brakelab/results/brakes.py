@@ -13,6 +13,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from brakelab.replay.dust import dust_of
 from brakelab.replay.wear import wear_of
 from brakelab.results.prediction import STANDING, Vector, corners, left_out, mean, predict
 from ecu.algorithm.monitoring.wear import REGRESSORS
@@ -59,6 +60,9 @@ BRAKE_UNITS: Final = {
     "learned_before": "-",
     "left_out": "-",
     "sigma_pad_wear_mass": "g",
+    "emission_factor_low": "log10(particles)",
+    "emission_factor_high": "log10(particles)",
+    "particle_mass": "mg",
     **dict(REGRESSORS),
 }
 
@@ -103,6 +107,9 @@ class BrakeRow(NamedTuple):
     left_out: str
     """Why the prediction does not count, empty where it does."""
     sigma_pad_wear_mass: float
+    emission_factor_low: float
+    emission_factor_high: float
+    particle_mass: float
     wear_energy: float
     wear_energy_t: float
     wear_energy_t2: float
@@ -170,7 +177,7 @@ def application(
     prediction = predict(rows, before, params)
     torque, pressure = corners(rows, "brake_torque"), corners(rows, "calliper_pressure")
     slip, heat = np.nan_to_num(corners(rows, "slip")), corners(rows, "disc_temperature")
-    wear = wear_of(rows, params)
+    wear, dust = wear_of(rows, params), dust_of(rows, params)
     lines = []
     for i, corner in enumerate(CORNERS):
         lever = float(2.0 * p["piston_area"][i] * p["effective_radius"][i])
@@ -195,7 +202,7 @@ def application(
                 float(heat[0, i]),
                 mean(heat[:, i]),
                 float(wear.mass[i]),
-                float("nan"),
+                float(dust.factor[i]),
                 float(corners(after, "mu_b")[i]),
                 float(corners(after, "sigma_mu_b")[i]),
                 PERIOD * float(np.count_nonzero(_modes(rows, i) == OBSERVING)),
@@ -211,6 +218,9 @@ def application(
                 int(_modes(before, i) == HOLDING),
                 left_out(duration, prediction.measured, prediction.force, prediction.too_few),
                 float(wear.sigma[i]),
+                float(dust.low[i]),
+                float(dust.high[i]),
+                float(1e3 * p["airborne_share"][i] * wear.mass[i]),
                 *wear.regressors[:, i].tolist(),
             )
         )

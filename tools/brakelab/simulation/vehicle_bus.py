@@ -74,10 +74,11 @@ _CORNER_TRUTH: Final = (
     "rolling_radius",
     "pad_wear",
     "pad_wear_mass",
+    "particles",
 )
 TRUTH_COLUMNS: Final = _SCALAR_TRUTH + tuple(f"{name}_{c}" for name in _CORNER_TRUTH for c in CORNERS)
 """True values by the contract's names; beyond it: distance and position [m], pitch, heading and grade [rad],
-rolling radius [m]."""
+rolling radius [m], particles emitted so far."""
 N_TRUTH: Final = len(TRUTH_COLUMNS)
 _FIRST_CORNER: Final = len(_SCALAR_TRUTH)
 
@@ -239,6 +240,7 @@ def write_truth(vehicle: Vehicle, row: NDArray[np.float64]) -> None:
         row[corner + 36] = state.rolling_radius[i]
         row[corner + 40] = pad_wear(vehicle.params[0].wear_row[i], state.pad_wear_mass[i])
         row[corner + 44] = state.pad_wear_mass[i]
+        row[corner + 48] = state.particles[i]
 
 
 def new_values() -> NDArray[Any]:

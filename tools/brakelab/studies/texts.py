@@ -183,3 +183,13 @@ WEAR_TEXT: Final = (
     "another car's brake. A thickness is measured to ± 0.1 mm (standard deviation). `scatter` and `walk` of "
     "the linings were chosen on cars 0 and 1.\n\n![True and predicted wear](images/wear.svg)"
 )
+
+DUST_TEXT: Final = (
+    "How dust is counted, identified and told: [brake-dust.md](../brake-dust.md). Vans are drawn (wide) from "
+    "config/plant/lcv.toml with linings whose emission follows the plant's own law "
+    "(tools/brakelab/plant/emission.py: effects (i) to (v) of section 8.1), which nothing on board and no "
+    "model knows. Their front right brake runs in an enclosure with a counter, read once a second, over "
+    "eight generated trips (tools/brakelab/identification/dust_trips.py); trips 1 to 7 train, trip 8 is "
+    "held out. Trips and correlations below are those of the first draw.\n\n"
+    "![Background by speed, predicted over counted emission factor](images/dust.svg)"
+)

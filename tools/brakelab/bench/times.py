@@ -1,0 +1,45 @@
+"""The benches of times: what each measures and what stands below its table."""
+
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+from brakelab.bench import codec, cycle, plant, step
+from brakelab.bench.measure import Row
+
+
+class Bench(NamedTuple):
+    """One bench of times."""
+
+    rows: Callable[[], list[Row]]
+    title: str
+    below: str
+
+
+BENCHES: Final = {
+    "step": Bench(
+        step.step_rows,
+        "step",
+        f"Processor time of a cycle with four wheels, {step.CYCLES} cycles of braking in each of "
+        f"{step.ROUNDS} rounds. All filters get the same inputs and give the same friction.",
+    ),
+    "codec": Bench(
+        codec.codec_rows,
+        "codec",
+        f"Processor time of a message: the 13 protected inputs of the contract, {codec.CYCLES} cycles in "
+        f"each of {codec.ROUNDS} rounds. Ours with CRC, counter and (decoding) freshness, the peer without.",
+    ),
+    "plant": Bench(
+        plant.plant_rows,
+        "plant",
+        f"Time of the simulated vehicle per millisecond of its drive: {plant.STEPS} steps of 1 ms in each of "
+        f"{plant.ROUNDS} rounds, braking in a curve on a rough road from 50 m/s. Processor time "
+        "unless by the clock.",
+    ),
+    "cycle": Bench(
+        cycle.cycle_rows,
+        "cycle",
+        f"Time by the clock, {cycle.CYCLES} cycles of 10 ms in each of {cycle.ROUNDS} rounds, in real time "
+        "but without real-time rights: 39 frames in, 6 out, over a socket pair that carries can_frames. Ours "
+        "is the daemon's cycle; the peer checks nothing and runs the four filters alone.",
+    ),
+}

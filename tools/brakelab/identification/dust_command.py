@@ -1,0 +1,124 @@
+"""`brake-ecu identify dust`: emission models from trips with a particle counter, as a CONFIG; a page."""
+
+import os
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from brakelab.identification.dust_features import Applications, Array
+from brakelab.identification.dust_fit import Judged, choose, judge_all, ranges
+from brakelab.identification.dust_models import LEAST
+from brakelab.identification.dust_reader import read_trips
+from brakelab.identification.dust_tables import model_table, spearman_table, trip_table
+from brakelab.results.outputs import check_outputs
+from brakelab.studies.chart import BLUE, GREY, ORANGE, PINK, Line, Panel, write_chart
+from brakelab.studies.table import markdown
+from ecu.contract.dust import MODELS
+from ecu.errors import UserError
+from ecu.settings.config import Axle, load_config, new_params
+
+LEGEND: Final = (("chosen", BLUE), ("others", ORANGE), ("95 %, and the background's line", PINK))
+
+
+def _numbers(values: Array) -> str:
+    return "[" + ", ".join(f"{value:.6g}" for value in values) + "]"
+
+
+def dust_toml(axle: str, chosen: Judged, trained: tuple[Array, Array]) -> str:
+    """Return the section `[front.dust]` or `[rear.dust]` of a configuration."""
+    model = chosen.model
+    assert model.on_board is not None
+    return (
+        f"[{axle}.dust]\n# of one brake; what the numbers are: ecu/algorithm/monitoring/emission_factor.py\n"
+        f'model = "{MODELS[model.on_board]}"\nnumbers = {_numbers(model.numbers)}\n'
+        "# v_in, v_end [m/s], torque [N m], disc [degC], duration [s], pressure [bar]: trained on this\n"
+        f"low = {_numbers(trained[0])}\nhigh = {_numbers(trained[1])}\n"
+        f"factor = {chosen.factor:.4f} # mean of the particles over ten to the emission factor\n"
+        f"below = {chosen.below:.4f} # 95 % of the emission factor, conformal\nabove = {chosen.above:.4f}\n"
+    )
+
+
+def car_toml(config: Path, out: Path, section: str) -> str:
+    """Return a configuration that takes everything else from `config`."""
+    include = os.path.relpath(config, out.parent).replace("\\", "/")
+    return f'include = "{include}"\n\n{section}'
+
+
+def _pairs(judged: Judged, trips: list[Applications]) -> tuple[Array, Array]:
+    """Return counted and predicted EF in the order of the counted one."""
+    features, sequences, counted = (
+        np.concatenate([getattr(trip, name) for trip in trips])
+        for name in ("features", "sequences", "particles")
+    )
+    known = counted > LEAST
+    measured = np.log10(counted[known])
+    order = np.argsort(measured)
+    return measured[order], judged.model.predict(features, sequences)[known][order]
+
+
+def dust_panels(trips: list[Applications], judged: list[Judged], chosen: Judged) -> list[Panel]:
+    """Return Figures 8.2 and 8.8: background by speed, and predicted over counted EF of the tests."""
+    shown = [trip for trip in trips if trip.test] or trips
+    first = shown[0].background
+    top = 1.3 * float(max(first.levels.max(initial=1.0), first.still))
+    speed = np.linspace(0.0, 35.0, 50)
+    line = first.still + first.by_speed * speed
+    panels = [
+        Panel("background [1/cm³]", "speed [m/s]", (0.0, 35.0), (0.0, max(top, float(line[-1]))), [
+            Line(first.speeds, first.levels, BLUE), Line(speed, line, PINK, True),
+        ])
+    ]  # fmt: skip
+    for one in judged:
+        if one is not chosen and one.name not in ("LUT", "static ANN"):
+            continue
+        counted, said = _pairs(one, shown)
+        ends = float(np.floor(min(counted.min(), said.min()))), float(np.ceil(max(counted.max(), said.max())))
+        diagonal = np.array(ends)
+        lines = [
+            Line(counted, said, BLUE if one is chosen else ORANGE),
+            Line(diagonal, diagonal, GREY),
+            Line(diagonal, diagonal - one.below, PINK, True),
+            Line(diagonal, diagonal - one.above, PINK, True),
+        ]
+        panels.append(Panel(f"EF by {one.name}", "EF counted", ends, ends, lines))
+    return panels
+
+
+def write_page(page: Path, trips: list[Applications], judged: list[Judged], chosen: Judged) -> None:
+    """Write the tables with Figures 8.2 and 8.8 above them."""
+    picture = page.with_suffix(".svg")
+    write_chart(picture, dust_panels(trips, judged, chosen), LEGEND)
+    tables = [model_table(judged, chosen), trip_table(trips), spearman_table(trips)]
+    head = f"# Emission of one brake by {len(trips)} trips\n\n![Figures 8.2 and 8.8]({picture.name})\n\n"
+    page.write_text(head + "\n".join(map(markdown, tables)).rstrip() + "\n", encoding="utf-8")
+
+
+def identify_dust(manifest: Path, config: Path, axle: str, out: Path) -> int:
+    """Identify the emission of an axle's brakes; write `out` and `out`.md, return 0.
+
+    Raises:
+        UserError: an argument or a file is not right.
+    """
+    if axle not in ("front", "rear"):
+        raise UserError("--axle", axle, "choose front or rear")
+    vehicle = load_config(config)
+    page = out.with_suffix(".md")
+    check_outputs(out, (out, page, out.with_suffix(".svg")), [manifest, config])
+    brake: Axle = getattr(vehicle, axle)
+    radius = float(new_params(vehicle)[0]["wheel_radius"][0 if axle == "front" else 2])
+    trips = read_trips(manifest, brake.push_out_pressure, radius)
+    trained, test = [trip for trip in trips if not trip.test], [trip for trip in trips if trip.test]
+    judged = judge_all(trained, test)
+    chosen = choose(judged)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    section = dust_toml(axle, chosen, ranges(trained))
+    out.write_text(car_toml(config, out, section), encoding="utf-8")
+    write_page(page, trips, judged, chosen)
+    said = f", test trips {100 * chosen.test.sum_error:+.1f} %" if chosen.test else ""
+    print(
+        f"{out}: {chosen.name}, {chosen.model.size} numbers, from {len(trained)} trips; particles of a trip "
+        f"left out within {100 * chosen.left_out_sum:.0f} % RMS{said}"
+    )
+    print(f"{page}: models beside each other, background, correlations")
+    return 0

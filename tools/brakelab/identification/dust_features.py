@@ -1,0 +1,213 @@
+"""What a trip with a particle counter says of each brake application (section 8.4, Figures 8.2 to 8.4).
+
+Background: what the counter shows when cruising, long after a braking, against speed (Figure 8.2): a line
+through the medians of speeds, and about it a slow factor by what was seen within two minutes.
+
+Applications are found by pressure and end with the standstill, for a disc that stands emits nothing. Their
+conditions are those of (8.2) and the mean pressure; their emission is (8.1)
+
+    EF = log10 of the integral of Q (c - background) over the application, later by the way of the air
+
+with the air's way found where the counter follows the friction power best, and a tail for what mixes.
+"""
+
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+PERIOD: Final = 0.1  # s, grid of a trip
+PRESSED: Final = 1.5  # bar, of the mean over SMOOTH
+SMOOTH: Final = 5  # samples
+MOVING: Final = 0.5  # m/s: below it the car stands
+SHORTEST: Final = 0.5  # s
+LEAST_WORK: Final = 500.0  # J: below it a pressure is only felt
+CLEAR_S: Final = 25.0  # after a braking the counter shows background again
+STEADY: Final = 0.4  # m/s^2
+SPEED_BIN: Final = 4.0  # m/s
+NEAR_S: Final = 60.0  # standard deviation of the window of the slow factor
+NEAR_COUNT: Final = 10.0  # samples that the line counts as, beside those near
+LONGEST_WAY_S: Final = 8.0
+BEFORE_S: Final = 2.0  # the plume begins this much before its middle
+TAIL_S: Final = 5.0
+SEQUENCE: Final = 12  # points of a sequence (8.3)
+FEATURES: Final = ("v_in", "v_end", "torque", "temperature", "duration", "pressure")
+UNITS: Final = ("m/s", "m/s", "N m", "degC", "s", "bar")
+
+
+class Recorded(NamedTuple):
+    """A trip at `PERIOD`; each array of shape (n,)."""
+
+    name: str
+    test: bool
+    t: Array
+    speed: Array
+    pressure: Array
+    """bar above push-out"""
+    torque: Array
+    temperature: Array
+    concentration: Array
+    """1/cm^3, linear between the counter's samples"""
+    flow: Array
+
+
+class Background(NamedTuple):
+    """Of a trip."""
+
+    still: float
+    """1/cm^3"""
+    by_speed: float
+    """1/cm^3 per m/s"""
+    speeds: Array
+    levels: Array
+    """Medians by speed, 1/cm^3; as Figure 8.2"""
+    factor: Array
+    """About the line, shape (n,)."""
+
+    def at(self, speed: Array) -> Array:
+        """Return the background [1/cm^3] along the trip."""
+        return np.asarray(self.factor * (self.still + self.by_speed * speed))
+
+
+class Applications(NamedTuple):
+    """Of one trip; m applications."""
+
+    trip: str
+    test: bool
+    km: float
+    start: Array
+    """s"""
+    features: Array
+    """Shape (m, 6), `FEATURES`."""
+    sequences: Array
+    """Speed, torque, temperature at `SEQUENCE` points each, and the duration; shape (m, 3 SEQUENCE + 1)."""
+    particles: Array
+    """Counted, may be negative for the weakest."""
+    energy: Array
+    """J"""
+    decel: Array
+    """m/s^2, mean"""
+    background: Background
+    way_s: float
+    """s of the air from disc to counter"""
+
+    @property
+    def factor(self) -> Array:
+        """EF (8.1); NaN where no particles could be told from the background."""
+        return np.asarray(np.log10(np.where(self.particles > 0.0, self.particles, np.nan)))
+
+
+def find_applications(trip: Recorded) -> list[tuple[int, int]]:
+    """Return first row and row after the last of each application."""
+    kernel = np.full(SMOOTH, 1.0 / SMOOTH)
+    pressed = (np.convolve(trip.pressure, kernel, "same") > PRESSED) & (trip.speed > MOVING)
+    edges = np.flatnonzero(np.diff(pressed, prepend=False, append=False))
+    found = []
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        above = first + np.flatnonzero(trip.pressure[first:last] > PRESSED)  # smoothing widens
+        if not len(above):
+            continue
+        start, end = above[0], above[-1] + 1
+        part = slice(start, end)
+        work = PERIOD * float(np.sum(trip.torque[part] * trip.speed[part]))
+        if (end - start) * PERIOD >= SHORTEST and work > LEAST_WORK:
+            found.append((int(start), int(end)))
+    return found
+
+
+def find_background(trip: Recorded, applications: list[tuple[int, int]]) -> Background:
+    """Return the background of a trip (Figure 8.2)."""
+    since = np.full(len(trip.t), np.inf)
+    for start, end in applications:
+        since[start:] = 0.0
+        since[end:] = PERIOD * np.arange(len(trip.t) - end)
+    accel = np.gradient(np.convolve(trip.speed, np.full(11, 1 / 11), "same"), PERIOD)
+    every = np.zeros(len(trip.t), bool)
+    every[:: round(1.0 / PERIOD)] = True
+    clear = every & (since > CLEAR_S) & (np.abs(accel) < STEADY) & (trip.speed > MOVING)
+    v, c = trip.speed[clear], trip.concentration[clear]
+    bins = np.floor(v / SPEED_BIN).astype(int)
+    speeds, levels, counts = [], [], []
+    for place in np.unique(bins):
+        inside = bins == place
+        if np.count_nonzero(inside) >= 10:
+            speeds.append(float(np.median(v[inside])))
+            levels.append(float(np.median(c[inside])))
+            counts.append(np.count_nonzero(inside))
+    if len(speeds) < 2:
+        level = float(np.percentile(trip.concentration, 10))
+        return Background(level, 0.0, np.array(speeds), np.array(levels), np.ones(len(trip.t)))
+    slope, still = np.polyfit(speeds, levels, 1, w=np.sqrt(counts))
+    slope, still = max(float(slope), 0.0), max(float(still), 1.0)
+    ratio = np.log(np.maximum(c, 1.0) / (still + slope * v))
+    ratio = np.clip(ratio - np.median(ratio), -1.0, 1.0)
+    coarse = trip.t[:: round(5.0 / PERIOD)]
+    weight = np.exp(-0.5 * ((coarse[:, None] - trip.t[clear][None, :]) / NEAR_S) ** 2)
+    local = weight @ ratio / (weight.sum(axis=1) + NEAR_COUNT)
+    factor = np.exp(np.interp(trip.t, coarse, local))
+    return Background(still, slope, np.array(speeds), np.array(levels), factor)
+
+
+def way_of_air(trip: Recorded, excess: Array) -> float:
+    """Return the time [s] after which the counter follows the friction power best."""
+    power = trip.torque * trip.speed
+    power = power - power.mean()
+    shown = excess - excess.mean()
+    lags = range(round(LONGEST_WAY_S / PERIOD))
+    sums = [float(power[: len(power) - lag] @ shown[lag:]) for lag in lags]
+    return PERIOD * int(np.argmax(sums))
+
+
+def _conditions(trip: Recorded, start: int, end: int) -> tuple[float, ...]:
+    part = slice(start, end)
+    return (
+        float(trip.speed[start]),
+        float(trip.speed[end - 1]),
+        float(trip.torque[part].mean()),
+        float(trip.temperature[part].mean()),
+        PERIOD * (end - start),
+        float(trip.pressure[part].mean()),
+    )
+
+
+def _sequence(trip: Recorded, start: int, end: int) -> Array:
+    """Return speed, torque and temperature stretched to one length, and the duration (Figure 8.4)."""
+    places = np.linspace(start, end - 1, SEQUENCE)
+    rows = np.arange(start, end)
+    curves = [np.interp(places, rows, y[start:end]) for y in (trip.speed, trip.torque, trip.temperature)]
+    return np.concatenate([*curves, [PERIOD * (end - start)]])
+
+
+def extract(trip: Recorded, radius: float) -> Applications:
+    """Return the applications of a trip; `radius` of the tyre [m]."""
+    places = find_applications(trip)
+    background = find_background(trip, places)
+    excess = trip.concentration - background.at(trip.speed)
+    way = way_of_air(trip, excess)
+    emitted = np.cumsum(1e6 * trip.flow * excess) * PERIOD
+    particles, energy = [], []
+    for k, (start, end) in enumerate(places):
+        first = start + round(max(way - BEFORE_S, 0.0) / PERIOD)
+        last = end + round((way + TAIL_S) / PERIOD)
+        if k + 1 < len(places):
+            last = min(last, places[k + 1][0] + round(max(way - BEFORE_S, 0.0) / PERIOD))
+        last = min(max(last, first + 1), len(emitted) - 1)
+        particles.append(float(emitted[last] - emitted[min(first, last)]))
+        part = slice(start, end)
+        energy.append(PERIOD * float(np.sum(trip.torque[part] * trip.speed[part])) / radius)
+    features = np.array([_conditions(trip, *place) for place in places]).reshape(-1, len(FEATURES))
+    return Applications(
+        trip.name,
+        trip.test,
+        1e-3 * PERIOD * float(trip.speed.sum()),
+        trip.t[[start for start, _ in places]],
+        features,
+        np.array([_sequence(trip, *place) for place in places]).reshape(-1, 3 * SEQUENCE + 1),
+        np.array(particles),
+        np.array(energy),
+        (features[:, 0] - features[:, 1]) / features[:, 4],
+        background,
+        way,
+    )
