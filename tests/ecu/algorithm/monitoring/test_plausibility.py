@@ -183,3 +183,107 @@ def test_a_sample_is_compared_with_one_that_is_younger_than_0_1_s(params, feed, 
     state["omega"], ground = 60.0, 60.0 * float(params[0]["wheel_radius"][0])
     watch_wheels(params[0], state, feed(wheel_speed=0.0)[0], motion, ground, np.zeros(4), age)
     assert bool(state["fell"][0]) == left_out
+
+
+def sample(params, feed, corner: int, omega: float, state=None, torque=0.0, age=0.01, ground=None, **beside):
+    """Take a sample of one wheel [rad/s] that turned at 60 before; return the state."""
+    if state is None:
+        state = np.zeros(1, PLAUSIBILITY_STATE)[0]
+        state["omega"] = 60.0
+    wheels = np.full(4, 60.0)
+    wheels[corner] = omega
+    inputs, motion = feed(wheel_speed=wheels), np.zeros(1, MOTION_STATE)[0]
+    inputs[0]["value"][MOTOR_TORQUE + corner] = beside.get("motor", 0.0)
+    inputs[0]["new"][WHEEL_SPEED + corner] = beside.get("new", 1)
+    if beside.get("pressure_lost"):
+        inputs[0]["verdict"][CALLIPER_PRESSURE + corner] = 0
+    speed = 60.0 * float(params[0]["wheel_radius"][0]) if ground is None else ground
+    watch_wheels(params[0], state, inputs[0], motion, speed, np.full(4, torque), age)
+    return state
+
+
+@pytest.mark.parametrize("corner", range(4))
+@pytest.mark.parametrize(("torque", "motor"), [(0.0, 0.0), (800.0, 0.0), (500.0, 300.0), (500.0, -300.0)])
+@pytest.mark.parametrize("age", [0.01, 0.02])
+def test_a_wheel_falls_by_8_rad_s_and_thrice_what_its_brake_does_at_most(
+    params, feed, corner: int, torque: float, motor: float, age: float
+) -> None:
+    free = (torque + abs(motor)) / params[0]["wheel_inertia"][corner] * age
+    for share, fell in ((0.99, 0), (1.01, 1)):
+        omega = 60.0 - share * (8.0 + 3.0 * free)
+        state = sample(params, feed, corner, omega, torque=torque, age=age, motor=motor)
+        assert state["fell"].tolist() == [fell * (i == corner) for i in range(4)]
+
+
+@pytest.mark.parametrize("corner", range(4))
+def test_what_is_no_new_sample_or_has_no_pressure_beside_it_is_not_judged(params, feed, corner: int) -> None:
+    assert not sample(params, feed, corner, 0.0, pressure_lost=True)["fell"].any()
+    late = sample(params, feed, corner, 0.0, new=0)
+    assert not late["fell"].any()
+    assert (late["omega"][corner], late["age_s"][corner]) == (60.0, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("case", "turns", "ground", "fell"),
+    [
+        ("5 % off the car", 0.95, None, 0),
+        ("7 % off the car", 0.93, None, 1),
+        ("the car stands", 0.0, 0.05, 0),
+        ("the car hardly moves", 0.0, 0.15, 1),
+    ],
+)
+def test_a_wheel_is_believed_again_where_it_agrees_with_the_car(
+    params, feed, case, turns, ground, fell
+) -> None:
+    state = sample(params, feed, 1, 0.0)
+    assert state["fell"].tolist() == [0, 1, 0, 0]
+    state = sample(params, feed, 1, 60.0 * turns, state, ground=ground)
+    assert state["fell"][1] == fell, case
+
+
+@pytest.mark.parametrize("fast", range(4))
+@pytest.mark.parametrize(
+    ("case", "lost", "speed", "implausible"),
+    [
+        ("6 m/s", (), 6.0, True),
+        ("4.5 m/s", (), 4.5, False),
+        ("one other wheel is left", (1, 2), 20.0, True),
+        ("itself is lost", (0,), 20.0, False),
+    ],
+)
+def test_a_fast_wheel_beside_the_others(params, feed, fast, case, lost, speed, implausible) -> None:
+    """`lost`: counted from the fast wheel on."""
+    state, motion = np.zeros(1, PLAUSIBILITY_STATE)[0], np.zeros(1, MOTION_STATE)[0]
+    omega = speed / params[0]["wheel_radius"]
+    omega[fast] *= 1.2
+    inputs = feed(wheel_speed=omega)
+    for other in lost:
+        inputs[0]["verdict"][WHEEL_SPEED + (fast + other) % 4] = 0
+    said = False
+    for _ in range(40):
+        said = wheel_speed_implausible(params[0], state, inputs[0], motion, speed, np.full(4, 800.0), 0.01)
+    assert bool(said) == implausible, case
+
+
+@pytest.mark.parametrize(
+    ("expected", "off", "others", "beside", "apart"),
+    [
+        # bar; too far is 8 bar and a fifth of the pressure, three quarters of that follow
+        (0.0, 7.5, 0.0, {}, 0),
+        (0.0, 8.5, 0.0, {}, 1),
+        (0.0, -8.5, 0.0, {}, 1),
+        (30.0, 13.5, 0.0, {}, 0),
+        (30.0, 14.5, 0.0, {}, 1),
+        (30.0, -14.5, 0.0, {}, 1),
+        (30.0, 20.0, 10.0, {}, 1),
+        (30.0, 20.0, 11.0, {}, 0),
+        (30.0, 20.0, 0.0, {"esp_active": 0.5}, 1),
+    ],
+)
+def test_how_far_apart_is_too_far(feed, expected, off, others, beside, apart) -> None:
+    state, zero = np.zeros(1, PLAUSIBILITY_STATE)[0], np.full(4, 0.7)
+    state["sent"] = 1
+    inputs = feed(**beside, calliper_pressure=expected + zero + np.array([others, off, others, others]))
+    for _ in range(40):
+        watch_pressures(state, inputs[0], np.full(4, expected), zero, 0.01)
+    assert state["pressure"] == apart
