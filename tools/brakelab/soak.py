@@ -43,7 +43,7 @@ from ecu.settings.resources import resource
 from ecu.warm import warm_up
 
 HOUR: Final = 360_000  # cycles
-RESTART: Final = 6 * HOUR
+RESTART: Final = 6 * HOUR + 7  # no multiple of 15: its E2E counters begin elsewhere
 TURN: Final = 200  # cycles between two turns of the recorder; it reads 256 at once
 SETTLED: Final = 25  # cycles: frames of 20 ms are accepted again after 0.15 s
 WRAP: Final = 1 << 32
