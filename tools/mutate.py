@@ -33,15 +33,18 @@ CHECKOUT = Path(__file__).parent.parent
 ARGUED = CHECKOUT / "tools" / "mutants.toml"
 
 TESTS = {
-    "ecu/algorithm/control/limiter.py": ("control/test_limiter.py", "control/test_left_right.py"),
-    "ecu/algorithm/control/mode.py": ("control/test_mode.py",),
-    "ecu/algorithm/control/slip_guard.py": ("control/test_slip_guard.py",),
+    "ecu/algorithm/control/limiter.py": (
+        "algorithm/control/test_limiter.py",
+        "algorithm/control/test_left_right.py",
+    ),
+    "ecu/algorithm/control/mode.py": ("algorithm/control/test_mode.py",),
+    "ecu/algorithm/control/slip_guard.py": ("algorithm/control/test_slip_guard.py",),
     "ecu/bus/e2e.py": ("bus/test_e2e.py", "bus/test_request.py"),
     "ecu/bus/link.py": ("bus/test_link.py",),
     "ecu/bus/request.py": ("bus/test_request.py",),
     "ecu/bus/freshness.py": ("bus/test_freshness.py",),
-    "ecu/algorithm/monitoring/plausibility.py": ("monitoring/test_plausibility.py",),
-    "ecu/algorithm/estimation/joint/kalman.py": ("estimation/joint/test_kalman.py",),
+    "ecu/algorithm/monitoring/plausibility.py": ("algorithm/monitoring/test_plausibility.py",),
+    "ecu/algorithm/estimation/joint/kalman.py": ("algorithm/estimation/joint/test_kalman.py",),
 }
 """The modules that are held to it, and their tests in tests/ecu."""
 TIMEOUT_S, SLOWER = 5.0, 3.0  # what a mutant may take at least, and over what the tests take without it
