@@ -310,7 +310,7 @@ def bench(
     times     step, codec, plant, cycle, lateness, replay, play
     accuracy  stops, observers, ablation, bound, recorded
     control   compensation, margins, blending, failures
-    physics   friction, lab, energy, wear
+    physics   friction, lab, energy, wear, dust
     """
     from brakelab.bench import command
 
