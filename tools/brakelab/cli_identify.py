@@ -39,11 +39,15 @@ def friction(
         str | None,
         typer.Option("--profile", metavar="LAW", help="Compute profile likelihoods of this law's parameters"),
     ] = None,
+    own: Annotated[
+        list[str] | None,
+        typer.Option("--own", metavar="LAW.py", help="A law of your own: a file, or an entry point's name"),
+    ] = None,
 ) -> int:
     """Identify a friction law from dynamometer recordings. Fit all laws, choose one, state its limits."""
     from brakelab.friction_lab import command
 
-    return command.friction(data, columns, held_out, out, profile)
+    return command.friction(data, columns, held_out, out, profile, tuple(own or ()))
 
 
 @app.command()

@@ -17,6 +17,7 @@ from brakelab.friction_lab.stops import Stops, find_stops
 from brakelab.plant.description import read_file
 from brakelab.plant.dynamometer import nominal_friction
 from brakelab.plant.friction.constant import Constant
+from brakelab.plant.friction.own import Own
 from brakelab.plant.linings import Lining, Linings, rig_with
 from ecu.errors import UserError
 
@@ -52,7 +53,7 @@ def test_a_law_is_identified_and_runs_on_the_rig(
 ) -> None:
     """The lining file has the chosen law as SIM; its nominal friction is what the recording shows."""
     few = [c for c in identification.candidates(stops, lining.brake) if c.name in FEW]
-    monkeypatch.setattr(identification, "candidates", lambda stops, brake: few)
+    monkeypatch.setattr(identification, "candidates", lambda stops, brake, own: few)
     monkeypatch.setattr(identification, "ProcessPoolExecutor", InThisProcess)
     monkeypatch.setattr(identification, "as_completed", list)
     data, out = tmp_path / "own.parquet", tmp_path / "brake.toml"
@@ -67,6 +68,48 @@ def test_a_law_is_identified_and_runs_on_the_rig(
     near = np.abs(stops.held_pressure - 30e5) < 5e5
     seen = np.interp(100.0, stops.start_temperature[near], stops.mean[near])
     assert nominal == pytest.approx(seen, rel=0.1)
+
+
+def test_a_law_of_one_s_own_is_identified_with_the_others(
+    tmp_path: Path, recording: Recording, lining: Lining, columns: Columns, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is written names the file, from where it lies, and reads as what was fitted."""
+    every = identification.candidates
+    monkeypatch.setattr(
+        identification,
+        "candidates",
+        lambda stops, brake, own: [c for c in every(stops, brake, own) if c.name in ("constant", "line")],
+    )
+    monkeypatch.setattr(identification, "ProcessPoolExecutor", InThisProcess)
+    monkeypatch.setattr(identification, "as_completed", list)
+    (tmp_path / "laws").mkdir()
+    own, data, out = tmp_path / "laws" / "line.py", tmp_path / "own.parquet", tmp_path / "brake.toml"
+    own.write_text(
+        'NUMBERS = {"mu": ("–", 0.1, 0.8), "heat": ("1/K", -2e-3, 2e-3)}\n\n\n'
+        "def step(numbers, memory, pressure, speed, slowing, temperature, dt):\n"
+        "    return memory, numbers[0] * (1.0 + numbers[1] * (temperature - 100.0))\n"
+    )
+    assert columns.rig.inertia is not None
+    write_recording(data, recording, lining, columns.rig.inertia)
+    assert command.friction([data], None, None, out, own=(str(own),)) == 0
+    assert 'code = "laws/line.py"' in out.read_text()
+    found = read_file(out, Linings).lining["mine"].friction["line"]
+    assert isinstance(found, Own)
+    stops = find_stops(recording, columns, "x")
+    heat = stops.temperature[stops.block_first[:, None] + np.arange(stops.per_block)].mean(axis=1)
+    slope, level = np.polyfit(heat - 100.0, stops.mu, 1)
+    assert found.numbers["mu"] == pytest.approx(level, rel=1e-3)
+    assert found.numbers["heat"] * found.numbers["mu"] == pytest.approx(slope, rel=1e-2)
+
+
+def test_a_law_of_one_s_own_must_have_a_name_of_its_own(tmp_path: Path) -> None:
+    own, data = tmp_path / "ilvo.py", tmp_path / "cpc.csv"
+    own.write_text(
+        'NUMBERS = {"mu": ("–", 0.1, 0.8)}\n\n\ndef step(numbers, memory, *u):\n    return memory, 0.4\n'
+    )
+    command.run("ams", "A", 0, data)
+    with pytest.raises(UserError, match="ilvo: two laws of this name"):
+        command.friction([data, data], None, None, tmp_path / "out.toml", own=(str(own),))
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 import re
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -38,7 +38,7 @@ def test_five_commands(
     """With the two quickest laws; all seven: `brake-ecu bench lab`."""
     every = identification.candidates
 
-    def quick(stops: Stops, brake: RigBrake) -> list[Candidate]:
+    def quick(stops: Stops, brake: RigBrake, own: Sequence[str]) -> list[Candidate]:
         return [candidate for candidate in every(stops, brake) if candidate.name in ("constant", "ilvo")]
 
     monkeypatch.setattr(identification, "candidates", quick)

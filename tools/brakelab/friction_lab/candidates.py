@@ -6,25 +6,28 @@ inertia.
 """
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.friction_lab.stops import Stops
-from brakelab.plant.friction import table as table_law
 from brakelab.plant.friction.constant import Constant
 from brakelab.plant.friction.ilvo import Ilvo
 from brakelab.plant.friction.ilvo_bounded import KNOTS, IlvoBounded
 from brakelab.plant.friction.law import Law, RigBrake
 from brakelab.plant.friction.ostermeyer import Ostermeyer
 from brakelab.plant.friction.ostermeyer_revised import OstermeyerRevised
+from brakelab.plant.friction.own import Own, read_code
 from brakelab.plant.friction.surface import Surface
 from brakelab.plant.friction.table import Table
 
 Vector = NDArray[np.float64]
 
 EVEN_STEP: Final = 40.0  # K, least distance of knots over temperature
+TEMPERATURES: Final = 6  # knots of a table
+PRESSURES: Final = 3
 
 
 class Free(NamedTuple):
@@ -72,10 +75,14 @@ class Candidate(NamedTuple):
         return [free.value(share) for free, share in zip(self.free, shares, strict=True)]
 
 
-def candidates(stops: Stops, brake: RigBrake) -> list[Candidate]:
-    """Return all laws for a recording, the simplest first."""
+def candidates(stops: Stops, brake: RigBrake, own: Sequence[str] = ()) -> list[Candidate]:
+    """Return all laws for a recording, the simplest first; at last those of one's `own`: files, entry points.
+
+    Raises:
+        ValueError: a law of one's own cannot be read, or has the name of another; one line.
+    """
     mass = stops.inertia / brake.tyre_radius**2
-    return [
+    shipped = [
         _constant(mass),
         _table(stops, mass),
         _surface(mass),
@@ -84,6 +91,23 @@ def candidates(stops: Stops, brake: RigBrake) -> list[Candidate]:
         _ilvo(mass),
         _bounded(stops, mass),
     ]
+    laws = [*shipped, *(own_candidate(code, mass) for code in own)]
+    names = [law.name for law in laws]
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(f"{name}: two laws of this name; give the file another")
+    return laws
+
+
+def own_candidate(code: str, mass: float) -> Candidate:
+    """Return the law of the file or entry point `code` for a rig of `mass` [kg]. Raises `ValueError`."""
+    given = read_code(code).numbers
+    free = tuple(Free(name, unit, low, high) for name, (unit, low, high) in given.items())
+
+    def law(values: Sequence[float]) -> Law:
+        return Own(law="own", rig_mass=mass, code=code, numbers=dict(zip(given, values, strict=True)))
+
+    return Candidate(Path(code).stem, free, law, extrapolates="as its author says")
 
 
 def _constant(mass: float) -> Candidate:
@@ -103,8 +127,8 @@ def _spread(values: Vector, count: int, least: float) -> list[float]:
 
 
 def _table(stops: Stops, mass: float) -> Candidate:
-    temperatures = tuple(_spread(stops.temperature, table_law.TEMPERATURES, 5.0))
-    pressures = tuple(_spread(1e-5 * stops.held_pressure, table_law.PRESSURES, 5.0))
+    temperatures = tuple(_spread(stops.temperature, TEMPERATURES, 5.0))
+    pressures = tuple(_spread(1e-5 * stops.held_pressure, PRESSURES, 5.0))
     free = tuple(
         Free(f"mu({temperature:.0f} °C, {pressure:.0f} bar)", "–", 0.05, 1.0, friction=True)
         for pressure in pressures
@@ -112,7 +136,7 @@ def _table(stops: Stops, mass: float) -> Candidate:
     )
 
     def law(values: Sequence[float]) -> Law:
-        rows = tuple(map(tuple, np.reshape(values, (table_law.PRESSURES, table_law.TEMPERATURES)).tolist()))
+        rows = tuple(map(tuple, np.reshape(values, (PRESSURES, TEMPERATURES)).tolist()))
         return Table(law="table", rig_mass=mass, temperature=temperatures, pressure=pressures, mu=rows)
 
     return Candidate("table", free, law, extrapolates="constant beyond its knots; knows no speed")

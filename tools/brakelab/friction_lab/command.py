@@ -86,24 +86,34 @@ def look(data: list[Path], columns: Path | None) -> int:
 
 
 def friction(
-    data: list[Path], columns: Path | None, held_out: Path | None, out: Path, profile: str | None = None
+    data: list[Path],
+    columns: Path | None,
+    held_out: Path | None,
+    out: Path,
+    profile: str | None = None,
+    own: tuple[str, ...] = (),
 ) -> int:
     """Identify all laws, print them, and write them with the chosen one as a lining file. Returns 0.
 
     `data` are recordings of one brake; `columns` describes them all, default: the file beside each;
-    `held_out` is a recording that the choice is made by.
+    `held_out` is a recording that the choice is made by; `own` are laws of one's own.
 
     Raises:
         UserError: a file cannot be read or makes no physical sense, or holds too few stops; one line.
     """
     measured = _read(data, columns)
     _need(measured.stops, data[0])
-    laws = {candidate.name: candidate for candidate in candidates(measured.stops, measured.columns.brake)}
+    own = tuple(str(Path(code).resolve()) if code.endswith(".py") else code for code in own)
+    try:
+        known = candidates(measured.stops, measured.columns.brake, own)
+    except ValueError as error:
+        raise UserError("--own", "", str(error)) from None
+    laws = {candidate.name: candidate for candidate in known}
     if profile is not None and profile not in laws:
         raise UserError("--profile", profile, f"no such law; choose one of {', '.join(laws)}")
     unseen = None if held_out is None else _read([held_out], columns).stops
     described = "the fifth of the stops that begins hottest" if held_out is None else str(held_out)
-    identified = identify(measured.columns, measured.stops, unseen, _tell)
+    identified = identify(measured.columns, measured.stops, unseen, _tell, own)
     tables = [
         *law_tables(identified, described),
         number_table(identified.chosen),

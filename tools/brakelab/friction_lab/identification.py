@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from brakelab.friction_lab.candidates import Candidate, candidates
+from brakelab.friction_lab.candidates import candidates
 from brakelab.friction_lab.columns import Columns
 from brakelab.friction_lab.fitting import Fitted, error_of, fit, refit
 from brakelab.friction_lab.stops import Stops, some
@@ -56,6 +56,7 @@ class _Job(NamedTuple):
     brake: RigBrake
     stops: Stops
     unseen: Stops | None
+    own: tuple[str, ...]
 
 
 def hottest(stops: Stops) -> tuple[Stops, Stops]:
@@ -66,14 +67,18 @@ def hottest(stops: Stops) -> tuple[Stops, Stops]:
 
 
 def identify(
-    columns: Columns, stops: Stops, unseen: Stops | None, progress: Callable[[str], None]
+    columns: Columns,
+    stops: Stops,
+    unseen: Stops | None,
+    progress: Callable[[str], None],
+    own: tuple[str, ...] = (),
 ) -> Identified:
     """Return all laws identified on `stops` and judged on `unseen`, by default the hottest of `stops`.
 
-    `progress` is told a line for each law. Two processes.
+    `progress` is told a line for each law; `own`: files and entry points of laws of one's own. Two processes.
     """
-    names = [candidate.name for candidate in candidates(stops, columns.brake)]
-    jobs = [_Job(name, columns.brake, stops, unseen) for name in names]
+    names = [candidate.name for candidate in candidates(stops, columns.brake, own)]
+    jobs = [_Job(name, columns.brake, stops, unseen, own) for name in names]
     done: dict[str, Judged] = {}
     with ProcessPoolExecutor(PROCESSES, mp_context=get_context("spawn")) as pool:
         running = [pool.submit(judge, job) for job in reversed(jobs)]  # the slowest first
@@ -97,7 +102,7 @@ def identify(
 
 def judge(job: _Job) -> Judged:
     """Return one law identified and judged."""
-    candidate = _named(job.name, job.stops, job.brake)
+    candidate = next(c for c in candidates(job.stops, job.brake, job.own) if c.name == job.name)
     fitted = fit(candidate, job.brake, job.stops)
     if job.unseen is None:
         seen, unseen = hottest(job.stops)
@@ -135,10 +140,6 @@ def choose(laws: tuple[Judged, ...]) -> Judged:
     least = min(judged.held_out for judged in laws)
     tied = [judged for judged in laws if judged.held_out <= TIE * least]
     return min(tied, key=lambda judged: judged.criterion)
-
-
-def _named(name: str, stops: Stops, brake: RigBrake) -> Candidate:
-    return next(candidate for candidate in candidates(stops, brake) if candidate.name == name)
 
 
 def _span(values: np.ndarray) -> tuple[float, float]:

@@ -1,11 +1,13 @@
 """Writes what was identified as a lining file, which the simulated vehicle and the rig read."""
 
+import os
 from pathlib import Path
 from typing import Any
 
 from brakelab.friction_lab.columns import Columns
 from brakelab.friction_lab.identification import Identified
 from brakelab.plant.description import read_file
+from brakelab.plant.friction.own import Own
 from brakelab.plant.linings import Disc, Linings
 
 CHOSEN = "SIM"
@@ -31,7 +33,10 @@ def write_lining(path: Path, columns: Columns, heating: float, identified: Ident
     for title, section in (("brake", columns.brake), ("disc", disc)):
         lines += ["", f"[{head}.{title}]", *_entries(section.model_dump())]
     for name, judged in [(CHOSEN, identified.chosen), *((law.name, law) for law in identified.laws)]:
-        lines += ["", f"[{head}.friction.{name}]", *_entries(judged.law.model_dump())]
+        given = judged.law.model_dump()
+        if isinstance(judged.law, Own) and judged.law.code.endswith(".py"):
+            given["code"] = Path(os.path.relpath(judged.law.code, path.parent)).as_posix()
+        lines += ["", f"[{head}.friction.{_key(name)}]", *_entries(given)]
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text("\n".join([*lines, ""]), encoding="utf-8")
     return read_file(path, Linings)
@@ -47,7 +52,9 @@ def _entries(values: dict[str, Any]) -> list[str]:
 
 def _toml(value: Any) -> str:
     if isinstance(value, str):
-        return f'"{value}"'
+        return _key(value)
     if isinstance(value, list | tuple):
         return f"[{', '.join(_toml(each) for each in value)}]"
+    if isinstance(value, dict):
+        return f"{{ {', '.join(f'{_key(name)} = {_toml(each)}' for name, each in value.items())} }}"
     return repr(float(value))

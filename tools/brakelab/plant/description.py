@@ -186,7 +186,8 @@ Model = TypeVar("Model", bound=BaseModel)
 def read_file(path: Path, model: type[Model]) -> Model:
     """Return the TOML file `path` as a `model`. Raises `PlantFileError`, one line."""
     try:
-        return model.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        return model.model_validate(content, context={"folder": path.parent})
     except OSError as error:
         raise PlantFileError(str(path), "", error.strerror or "cannot be read") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

@@ -8,5 +8,6 @@ step    a kernel `(row, memory, pressure, speed, slowing, temperature, dt) -> (m
         `slowing` [rad/s^2] of the rig's disc under this brake torque, `temperature` [degC] of the disc.
 class   a `Law`: its entry in `config/plant/linings.toml`, and how that becomes a row.
 
-`laws.py` lists them: to add one, write its file and name it there, in the union and in the dispatch.
+`laws.py` lists them. A law of one's own needs no place there: `own.py` takes it from a file that the lining
+file names.
 """

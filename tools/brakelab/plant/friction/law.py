@@ -14,7 +14,7 @@ NotNegative = Annotated[float, Field(ge=0.0)]
 Bounds = tuple[float, float]
 """What is drawn between, evenly."""
 
-ROW: Final = 32  # numbers that a law may have
+ROW: Final = 1024  # numbers that a law may have
 START: Final = 0  # place in every row: the memory at the start of an application
 KELVIN: Final = 273.15  # K at 0 degC
 

@@ -2,6 +2,8 @@
 
 from typing import Annotated, Final
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from brakelab.plant.friction import (
@@ -10,6 +12,7 @@ from brakelab.plant.friction import (
     ilvo_bounded,
     ostermeyer,
     ostermeyer_revised,
+    own,
     surface,
     table,
 )
@@ -19,6 +22,7 @@ from brakelab.plant.friction.ilvo_bounded import IlvoBounded
 from brakelab.plant.friction.law import ROW, Law, RigBrake
 from brakelab.plant.friction.ostermeyer import Ostermeyer
 from brakelab.plant.friction.ostermeyer_revised import OstermeyerRevised
+from brakelab.plant.friction.own import Own
 from brakelab.plant.friction.surface import Surface
 from brakelab.plant.friction.table import Table
 from brakelab.plant.jit import Record, kernel
@@ -31,17 +35,20 @@ LAWS: Final[tuple[type[Law], ...]] = (
     Constant,
     Table,
     Surface,
+    Own,
 )
 AnyLaw = Annotated[
-    IlvoBounded | Ilvo | Ostermeyer | OstermeyerRevised | Constant | Table | Surface,
+    IlvoBounded | Ilvo | Ostermeyer | OstermeyerRevised | Constant | Table | Surface | Own,
     Field(discriminator="law"),
 ]
 
 
-def law_row(law: Law, brake: RigBrake) -> tuple[int, list[float]]:
+def law_row(law: Law, brake: RigBrake) -> tuple[int, NDArray[np.float64]]:
     """Return the law's number, which `friction` wants, and its row of `ROW` numbers."""
-    row = list(law.row(brake))
-    return LAWS.index(type(law)), row + [0.0] * (ROW - len(row))
+    given = law.row(brake)
+    row = np.zeros(ROW)
+    row[: len(given)] = given
+    return LAWS.index(type(law)), row
 
 
 @kernel
@@ -68,4 +75,6 @@ def friction(
         return constant.step(row, memory, pressure, speed, slowing, temperature, dt)
     if law == 5:
         return table.step(row, memory, pressure, speed, slowing, temperature, dt)
-    return surface.step(row, memory, pressure, speed, slowing, temperature, dt)
+    if law == 6:
+        return surface.step(row, memory, pressure, speed, slowing, temperature, dt)
+    return own.step(row, memory, pressure, speed, slowing, temperature, dt)

@@ -1,6 +1,6 @@
 """Friction from a table over disc temperature and pressure: no memory, what a test bench hands over.
 
-Bilinear between the knots, constant outside.
+Bilinear between the knots, constant outside. Of any size that the row holds: 30 by 30, say.
 """
 
 from collections.abc import Sequence
@@ -9,34 +9,39 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
-from brakelab.plant.friction.law import Law, Positive, RigBrake
+from brakelab.plant.friction.law import ROW, Law, Positive, RigBrake
 from brakelab.plant.jit import Record, kernel
 
-TEMPERATURES: Final = 6
-PRESSURES: Final = 3
-TEMPERATURE: Final = 1
-PRESSURE: Final = TEMPERATURE + TEMPERATURES
-MU: Final = PRESSURE + PRESSURES
+TEMPERATURES: Final = 1  # place of the number of knots
+PRESSURES: Final = 2  # likewise
+KNOTS: Final = 3  # place of the first knot: temperatures, pressures, then friction
 
-Row = Annotated[tuple[Positive, ...], Field(min_length=TEMPERATURES, max_length=TEMPERATURES)]
+Knots = Annotated[tuple[float, ...], Field(min_length=2)]
+Row = Annotated[tuple[Positive, ...], Field(min_length=2)]
 
 
 class Table(Law):
     law: Literal["table"]
-    temperature: Annotated[tuple[float, ...], Field(min_length=TEMPERATURES, max_length=TEMPERATURES)]  # degC
-    pressure: Annotated[tuple[float, ...], Field(min_length=PRESSURES, max_length=PRESSURES)]  # bar
-    mu: Annotated[tuple[Row, ...], Field(min_length=PRESSURES, max_length=PRESSURES)]  # a row per pressure
+    temperature: Knots  # degC
+    pressure: Knots  # bar
+    mu: Annotated[tuple[Row, ...], Field(min_length=2)]  # a row per pressure
 
     @model_validator(mode="after")
     def _rising(self) -> Self:
         for name, knots in (("temperature", self.temperature), ("pressure", self.pressure)):
             if any(low >= high for low, high in pairwise(knots)):
                 raise ValueError(f"the knots of {name} must rise")
+        columns, rows = len(self.temperature), len(self.pressure)
+        if len(self.mu) != rows or any(len(row) != columns for row in self.mu):
+            raise ValueError(f"give mu {rows} rows, one per pressure, of {columns}, one per temperature")
+        if KNOTS + columns + rows + columns * rows > ROW:
+            raise ValueError(f"{columns} temperatures by {rows} pressures are too many: 30 by 30 fit")
         return self
 
     def row(self, brake: RigBrake) -> Sequence[float]:
         pascal = (1e5 * bar for bar in self.pressure)
-        return (1.0, *self.temperature, *pascal, *(mu for line in self.mu for mu in line))
+        counts = float(len(self.temperature)), float(len(self.pressure))
+        return (1.0, *counts, *self.temperature, *pascal, *(mu for line in self.mu for mu in line))
 
 
 @kernel
@@ -60,10 +65,11 @@ def step(
     dt: float,
 ) -> tuple[float, float]:
     """Return the memory as it was, and the table's friction."""
-    i, along = place_of(row, TEMPERATURE, TEMPERATURES, temperature)
-    j, up = place_of(row, PRESSURE, PRESSURES, pressure)
-    low = MU + TEMPERATURES * j + i
-    high = low + TEMPERATURES
+    columns, rows = int(row[TEMPERATURES]), int(row[PRESSURES])
+    i, along = place_of(row, KNOTS, columns, temperature)
+    j, up = place_of(row, KNOTS + columns, rows, pressure)
+    low = KNOTS + columns + rows + columns * j + i
+    high = low + columns
     below = row[low] + along * (row[low + 1] - row[low])
     above = row[high] + along * (row[high + 1] - row[high])
     return memory, below + up * (above - below)

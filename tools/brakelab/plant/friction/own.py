@@ -1,0 +1,228 @@
+"""A law of one's own: a Python file that the lining file names, compiled alone when it is read.
+
+The file, or an entry point of the group `brakelab.friction_laws` that loads such a module, has
+
+NUMBERS  name: (unit, least, greatest) of what the law is given, in the order in which `step` finds them;
+         between the two `brake-ecu identify friction --own` searches
+START    the memory at the start of an application; without, 1
+step     `(numbers, memory, pressure, speed, slowing, temperature, dt) -> (memory, mu_b)` in what numba
+         compiles; inputs as in the package
+
+`step` becomes a C function whose address stands in the law's row, where `friction` calls it: no other kernel
+is compiled again. An address holds in the process that made the row; laws, not rows, go to other processes.
+"""
+
+import importlib.metadata
+import importlib.util
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Final, Literal, NamedTuple, Self
+
+import numba
+import numpy as np
+from llvmlite import ir  # type: ignore[import-untyped]
+from numba.core import cgutils, errors
+from numba.extending import intrinsic
+from pydantic import ValidationInfo, field_validator, model_validator
+
+from brakelab.plant.friction.law import ROW, Law, RigBrake
+from brakelab.plant.jit import Record, kernel
+
+GROUP: Final = "brakelab.friction_laws"
+ADDRESS: Final = 1
+NUMBERS: Final = 2  # place of the first number in the row
+MOST: Final = ROW - NUMBERS
+TRIED: Final = (1.0, 30e5, 5.0, 30.0, 100.0, 1e-3)
+"""Inputs after the numbers at which a law must give a friction: 30 bar, 5 m/s, 30 rad/s^2, 100 degC, 1 ms."""
+
+DOUBLE: Final = numba.types.float64
+POINTER: Final = numba.types.CPointer(DOUBLE)
+
+Step = Callable[..., tuple[float, float]]
+
+
+class Code(NamedTuple):
+    """A law's file, read and compiled."""
+
+    numbers: dict[str, tuple[str, float, float]]  # unit, least, greatest
+    start: float
+    address: int
+    keeps: Any  # what the address dies with
+
+
+class Own(Law):
+    law: Literal["own"]
+    code: str  # FILE.py beside the lining file, or the name of an entry point
+    numbers: dict[str, float]
+
+    @field_validator("code")
+    @classmethod
+    def _beside(cls, code: str, info: ValidationInfo) -> str:
+        if code.endswith(".py") and info.context:
+            return str(Path(info.context["folder"], code).resolve())
+        return code
+
+    @model_validator(mode="after")
+    def _known(self) -> Self:
+        wanted = read_code(self.code).numbers
+        for name in (*wanted, *self.numbers):
+            if name not in self.numbers or name not in wanted:
+                remedy = f"{Path(self.code).name} wants {', '.join(wanted)}"
+                raise ValueError(
+                    f"numbers.{name} is {'unknown' if name not in wanted else 'missing'}; {remedy}"
+                )
+        return self
+
+    def row(self, brake: RigBrake) -> Sequence[float]:
+        code = read_code(self.code)
+        return (code.start, float(code.address), *(self.numbers[name] for name in code.numbers))
+
+
+_READ: dict[str, tuple[int, Code]] = {}
+_PLAIN: dict[int, Step] = {}
+
+
+def read_code(code: str) -> Code:
+    """Return what the file or entry point `code` holds, compiled once per version. Raises `ValueError`."""
+    path = Path(code)
+    try:
+        changed = path.stat().st_mtime_ns if code.endswith(".py") else 0
+    except OSError as error:
+        raise ValueError(f"{code}: {error.strerror}") from error
+    if code not in _READ or _READ[code][0] != changed:
+        _READ[code] = changed, _checked(code, _module(code))
+    return _READ[code][1]
+
+
+def _module(code: str) -> ModuleType:
+    if not code.endswith(".py"):
+        found = list(importlib.metadata.entry_points(group=GROUP, name=code))
+        if not found:
+            raise ValueError(f"{code}: no file that ends in .py, and no entry point of {GROUP}")
+        loaded = found[0].load()
+        if not isinstance(loaded, ModuleType):
+            raise ValueError(f"{code}: the entry point must name a module")
+        return loaded
+    spec = importlib.util.spec_from_file_location(f"own_law_{Path(code).stem}", code)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise ValueError(f"{code}: {_one_line(error)}") from error
+    return module
+
+
+def _checked(code: str, module: ModuleType) -> Code:
+    given, law = getattr(module, "NUMBERS", None), getattr(module, "step", None)
+    try:
+        numbers = {str(name): (str(u), float(low), float(high)) for name, (u, low, high) in given.items()}  # type: ignore[union-attr]
+    except (AttributeError, TypeError, ValueError):
+        raise ValueError(f"{code}: give NUMBERS = {{name: (unit, least, greatest)}}") from None
+    for name, (_, low, high) in numbers.items():
+        if not low < high:
+            raise ValueError(f"{code}: NUMBERS[{name!r}]: least {low:g} is not below greatest {high:g}")
+    if len(numbers) > MOST:
+        raise ValueError(f"{code}: {len(numbers)} numbers; at most {MOST}")
+    if not callable(law):
+        raise ValueError(f"{code}: has no function step")
+    try:
+        address, keeps = _compiled(law, len(numbers))
+    except errors.NumbaError as error:
+        raise ValueError(f"{code}: numba cannot compile step: {_one_line(error)}") from error
+    compiled = Code(numbers, float(getattr(module, "START", 1.0)), address, keeps)
+    middle = [0.5 * (low + high) for _, low, high in numbers.values()]
+    _, mu = step(_padded(compiled, middle), *TRIED)
+    if not math.isfinite(mu):
+        raise ValueError(f"{code}: step gives {mu} at 30 bar, 5 m/s, 100 °C and the middle of its numbers")
+    return compiled
+
+
+def _padded(code: Code, values: list[float]) -> Any:
+    row = np.zeros(ROW)
+    row[ADDRESS], row[NUMBERS : NUMBERS + len(values)] = code.address, values
+    return row
+
+
+def _one_line(error: Exception) -> str:
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    telling = [
+        line for line in lines if not line.startswith(("Failed in nopython", "During:", "- Resolution"))
+    ]
+    return (telling or lines or [type(error).__name__])[0]
+
+
+def _compiled(step: Any, count: int) -> tuple[int, Any]:
+    """Return the address of `step` as a C function (numbers, out, six inputs), and what keeps it alive."""
+    plain = getattr(step, "py_func", step)
+    if numba.config.DISABLE_JIT:
+        _PLAIN[len(_PLAIN) + 1] = plain
+        return len(_PLAIN), plain
+    law = numba.njit(error_model="numpy")(plain)
+
+    def call(
+        numbers: Any, out: Any, memory: float, p: float, v: float, slowing: float, heat: float, dt: float
+    ) -> None:
+        remembered, mu = law(numba.carray(numbers, count), memory, p, v, slowing, heat, dt)
+        out[0], out[1] = remembered, mu
+
+    made = numba.cfunc(numba.types.void(POINTER, POINTER, *[DOUBLE] * 6))(call)
+    return int(made.address), made
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _call(
+    context: Any,
+    address: Any,
+    row: Any,
+    memory: Any,
+    pressure: Any,
+    speed: Any,
+    slowing: Any,
+    temperature: Any,
+    dt: Any,
+) -> Any:
+    """Call the C function at `address` with the numbers of `row`."""
+    returned = numba.types.UniTuple(DOUBLE, 2)
+    signature = returned(numba.types.int64, row, *[DOUBLE] * 6)
+
+    def generate(target: Any, builder: Any, sig: Any, given: Any) -> Any:
+        double = ir.DoubleType()
+        numbers = target.make_array(sig.args[1])(target, builder, given[1]).data
+        numbers = builder.gep(numbers, [ir.Constant(ir.IntType(64), NUMBERS)])
+        out = cgutils.alloca_once(builder, double, size=2)
+        places = [builder.gep(out, [ir.Constant(ir.IntType(64), k)]) for k in range(2)]
+        builder.store(given[2], places[0])
+        builder.store(ir.Constant(double, float("nan")), places[1])
+        kind = ir.FunctionType(ir.VoidType(), [double.as_pointer()] * 2 + [double] * 6)
+        builder.call(builder.inttoptr(given[0], kind.as_pointer()), [numbers, out, *given[2:]])
+        return target.make_tuple(builder, sig.return_type, [builder.load(place) for place in places])
+
+    return signature, generate
+
+
+def _call_plain(address: int, row: Any, *inputs: float) -> tuple[float, float]:
+    memory, mu = _PLAIN[address](row[NUMBERS:], *inputs)
+    return float(memory), float(mu)
+
+
+call_law: Any = _call_plain if numba.config.DISABLE_JIT else _call
+
+
+@kernel
+def step(
+    row: Record,
+    memory: float,
+    pressure: float,
+    speed: float,
+    slowing: float,
+    temperature: float,
+    dt: float,
+) -> tuple[float, float]:
+    """Return memory and friction of the law at the row's address; NaN if it gave none."""
+    address = int(row[ADDRESS])
+    called: tuple[float, float] = call_law(address, row, memory, pressure, speed, slowing, temperature, dt)
+    return called
