@@ -13,7 +13,7 @@ app = Commands(help="Run a simulated brake dynamometer and analyse recordings.",
 @app.command()
 def run(
     programme: Annotated[
-        str, typer.Argument(metavar="PROGRAMME", help="cpc, ams, or a file as in config/rig")
+        str, typer.Argument(metavar="PROGRAMME", help="cpc, ams, ak-master, or a file as in config/rig")
     ],
     out: Annotated[
         Path,

@@ -69,6 +69,8 @@ class Candidate(NamedTuple):
     starts_at_measured: bool = False
     extrapolates: str = ""
     """Where the law must not be used beyond the data, and why."""
+    bounded: bool = False
+    """Beyond the data it stays what it is at their edge."""
 
     def values(self, shares: Sequence[float] | Vector) -> list[float]:
         """Return the numbers at these shares."""
@@ -115,7 +117,7 @@ def _constant(mass: float) -> Candidate:
         return Constant(law="constant", rig_mass=mass, mu=values[0])
 
     return Candidate(
-        "constant", (Free("mu", "–", 0.05, 1.0, friction=True),), law, extrapolates="knows no fade"
+        "constant", (Free("mu", "–", 0.05, 1.0, friction=True),), law, False, "knows no fade", True
     )
 
 
@@ -139,7 +141,9 @@ def _table(stops: Stops, mass: float) -> Candidate:
         rows = tuple(map(tuple, np.reshape(values, (PRESSURES, TEMPERATURES)).tolist()))
         return Table(law="table", rig_mass=mass, temperature=temperatures, pressure=pressures, mu=rows)
 
-    return Candidate("table", free, law, extrapolates="constant beyond its knots; knows no speed")
+    return Candidate(
+        "table", free, law, extrapolates="constant beyond its knots; knows no speed", bounded=True
+    )
 
 
 def _surface(mass: float) -> Candidate:
@@ -261,4 +265,4 @@ def _bounded(stops: Stops, mass: float) -> Candidate:
         )
 
     limit = "kappa constant beyond its knots; contact between 0.85 and 1.2"
-    return Candidate("ilvo_bounded", free, law, extrapolates=limit)
+    return Candidate("ilvo_bounded", free, law, extrapolates=limit, bounded=True)

@@ -17,6 +17,7 @@ from brakelab.friction_lab.lining_file import write_lining
 from brakelab.friction_lab.plausibility import refuse_nonsense
 from brakelab.friction_lab.reader import read_recording
 from brakelab.friction_lab.recording import Recording, joined, write_recording
+from brakelab.friction_lab.sections import has_sections, load_sequence, means_table, run_sequence
 from brakelab.friction_lab.stops import Stops, find_stops
 from brakelab.friction_lab.tables import (
     component_table,
@@ -35,6 +36,7 @@ from ecu.settings.resources import named, resource
 
 FEWEST: Final = 10
 """Stops that identification needs."""
+HELD_OUT: Final = "the fifth of the stops that begins hottest"
 BETWEEN: Final = 600.0
 """s between recordings."""
 
@@ -44,8 +46,8 @@ def run(
 ) -> int:
     """Run a programme on the simulated dynamometer and write its recording. Returns 0.
 
-    `programme`: a file, or cpc, ams; `brake`: A, B or C, of which `seed` draws a pad and the sensors, or a
-    lining of the file `linings`; `law`: of the lining, instead of a pad.
+    `programme`: a file, or cpc, ams, ak-master, whose table of means is printed; `brake`: A, B or C, of which
+    `seed` draws a pad and the sensors, or a lining of the file `linings`; `law`: of the lining, not a pad.
 
     Raises:
         UserError: a programme, brake or law of that name does not exist, or `out` ends in something else.
@@ -67,9 +69,16 @@ def run(
             last = time.monotonic()
             _tell(f"{done} of {of} stops")
 
-    recording = run_programme(bench, load_programme(named(programme, "config/rig")), progress)
+    path = named(programme, "config/rig")
     rig = bench.rig[0]
-    beside = write_recording(out, recording, lining, float(rig["mass"] * rig["tyre_radius"] ** 2))
+    inertia = float(rig["mass"] * rig["tyre_radius"] ** 2)
+    if has_sections(path):
+        sequence = load_sequence(path)
+        recording, means = run_sequence(bench, sequence, Columns.own(lining, inertia), progress)
+        show(Console(), means_table(f"{sequence.title}, {brake}", means))
+    else:
+        recording = run_programme(bench, load_programme(path), progress)
+    beside = write_recording(out, recording, lining, inertia)
     hours, minutes = bench.time / 3600.0, recording.time.size / 200.0 / 60.0
     _tell(f"{hours:.1f} h on the rig, {minutes:.0f} min recorded: {out}, {beside}")
     return 0
@@ -112,7 +121,7 @@ def friction(
     if profile is not None and profile not in laws:
         raise UserError("--profile", profile, f"no such law; choose one of {', '.join(laws)}")
     unseen = None if held_out is None else _read([held_out], columns).stops
-    described = "the fifth of the stops that begins hottest" if held_out is None else str(held_out)
+    described = HELD_OUT if held_out is None else str(held_out)
     identified = identify(measured.columns, measured.stops, unseen, _tell, own)
     tables = [
         *law_tables(identified, described),

@@ -2,8 +2,10 @@
 
 Choice. Every law is identified twice: on all stops, and without those held out. Held out is the programme
 that was given for it, else the fifth of the stops that begin hottest: a law that only copies what it saw
-shows itself there. Least error on what is held out wins; of laws within 5 % of it, the least information
-criterion (Schwarz's, with stops as observations, since the residuals of one stop hang together).
+shows itself there. Least error on what is held out wins. Among laws within 5 % of it the data do not tell:
+then one that stays what it is beyond the data comes before one that goes on, since a car brakes hotter and
+harder than a programme; and then the least information criterion (Schwarz's, with stops as observations,
+since the residuals of one stop hang together).
 """
 
 from collections.abc import Callable
@@ -33,6 +35,7 @@ class Judged(NamedTuple):
     free: int
     error: float  # nRMSE [%] on what it was identified with
     held_out: float  # nRMSE [%] on what it had not seen
+    bounded: bool  # beyond the data stays what it is at their edge
     criterion: float  # less is better
     numbers: tuple[tuple[str, str, float, float], ...]  # name, unit, value, half of the interval of 95 %
     unidentified: tuple[str, ...]
@@ -117,6 +120,7 @@ def judge(job: _Job) -> Judged:
         len(candidate.free),
         100.0 * float(np.sqrt(np.mean(fitted.residuals**2)) / np.mean(job.stops.mu)),
         held_out,
+        candidate.bounded,
         criterion(fitted, job.stops),
         tuple(
             (free.name, free.unit, value, float(half))
@@ -136,10 +140,10 @@ def criterion(fitted: Fitted, stops: Stops) -> float:
 
 
 def choose(laws: tuple[Judged, ...]) -> Judged:
-    """Return the law of least error on what it had not seen; of those that tie, of the least criterion."""
+    """Return the law of least error on what it had not seen; of those that tie, see above."""
     least = min(judged.held_out for judged in laws)
     tied = [judged for judged in laws if judged.held_out <= TIE * least]
-    return min(tied, key=lambda judged: judged.criterion)
+    return min(tied, key=lambda judged: (not judged.bounded, judged.criterion))
 
 
 def _span(values: np.ndarray) -> tuple[float, float]:
