@@ -39,11 +39,11 @@ from ecu.arguments import (
 from ecu.errors import RunFault, UserError
 
 LABORATORY = ("bokeh", "jinja2", "pyarrow", "pymoo", "scipy")
-"""What the extra `lab` installs, by the names that are imported."""
+"""Packages of the extra `lab`, by the names that are imported."""
 FLEET = ("distributed", "fsspec")
-"""What the extra `fleet` installs."""
+"""Packages of the extra `fleet`."""
 LEARN = ("sklearn",)
-"""What the extra `learn` installs."""
+"""Packages of the extra `learn`."""
 
 app = Commands(
     help="Real-time brake ECU: estimates brake lining friction and corrects pressure demands by it.",

@@ -1,4 +1,4 @@
-"""What the ECU tells of a cycle: estimates and state, as far as anything is known; NaN elsewhere."""
+"""Outputs of a cycle: estimates and state, NaN where nothing is known."""
 
 import math
 

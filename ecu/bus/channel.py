@@ -31,7 +31,7 @@ logging.getLogger("can").addHandler(logging.NullHandler())  # its exceptions say
 
 
 class BusStatus(NamedTuple):
-    """How the line is."""
+    """State of the bus."""
 
     bus_off: bool
     error_passive: bool

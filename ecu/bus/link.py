@@ -1,4 +1,4 @@
-"""How good is a protected stream? AUTOSAR's E2E state machine, and whether too much comes or is rejected.
+"""Quality of a protected stream: AUTOSAR's E2E state machine, and too many or rejected frames.
 
 The machine (PRS E2E Protocol, E2E_SMCheck) looks at the last `WINDOW` checks of a message:
 

@@ -36,7 +36,7 @@ SIGNAL: Final = np.dtype(
 
 
 class SignalUse(NamedTuple):
-    """What is wanted of one signal of a message."""
+    """Use of one signal of a message."""
 
     signal: str
     place: int

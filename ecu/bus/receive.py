@@ -73,7 +73,7 @@ TOTALS: Final = np.dtype(
 
 
 class ReceivePlan(NamedTuple):
-    """What is taken from which frames; `messages` in ascending order of identifiers. Never written to."""
+    """Signals to take from frames; `messages` in ascending order of identifiers. Never written to."""
 
     ids: NDArray[np.uint32]
     """Identifiers, those of 29 bits with EXTENDED_ID: what kernel filters must let through."""
@@ -87,7 +87,7 @@ class ReceivePlan(NamedTuple):
 
 
 class Reception(NamedTuple):
-    """What has been received. Kernels write to it."""
+    """State of reception. Kernels write to it."""
 
     messages: RecordArray
     """`MESSAGE_COUNTERS` in the order of the plan's messages."""
@@ -100,7 +100,7 @@ class Reception(NamedTuple):
 
 
 class MessageUse(NamedTuple):
-    """What is wanted of one message; `period_s` to `slowest_s` is the range of intervals it may come at."""
+    """Use of one message; `period_s` to `slowest_s` is the range of intervals it may come at."""
 
     message: Message
     signals: Sequence[SignalUse]

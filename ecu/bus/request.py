@@ -1,4 +1,4 @@
-"""What the driver asks for while it is in doubt who says so: a request is not lowered by a stream in doubt.
+"""The driver's request while its sender is in doubt: a stream in doubt does not lower it.
 
 While more than one may send the request (`e2e.in_doubt`) pedal position, pedal switch and the automated
 demand are the largest of the last 60 to 120 ms: longer than five frames that the living sender loses. Every

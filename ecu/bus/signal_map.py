@@ -34,7 +34,7 @@ class Validity(_Table):
 
 
 class MappedInput(_Table):
-    """Where one input comes from."""
+    """Source of one input."""
 
     message: str
     signal: str
@@ -58,7 +58,7 @@ class Counter(_Table):
 
 
 class MappedMessage(_Table):
-    """How a message comes and how it is protected."""
+    """Rate and protection of a message."""
 
     period: float | None = Field(default=None, gt=0.0)
     """Seconds; the database's GenMsgCycleTime if it is not given."""

@@ -30,7 +30,7 @@ SENT_MESSAGE: Final = np.dtype(
 
 
 class TransmitPlan(NamedTuple):
-    """What is sent when, in ascending order of identifiers. Never written to."""
+    """Schedule of frames to send, in ascending order of identifiers. Never written to."""
 
     ids: NDArray[np.uint32]
     messages: RecordArray
@@ -38,7 +38,7 @@ class TransmitPlan(NamedTuple):
 
 
 class Transmission(NamedTuple):
-    """What has been sent. Kernels write to it."""
+    """State of transmission. Kernels write to it."""
 
     counter: NDArray[np.uint8]
     """Of the next frame, per message."""

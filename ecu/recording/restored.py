@@ -1,4 +1,4 @@
-"""What a run begins with: what was learned of this car and its brakes, and what its linings have done."""
+"""Restored state of a run: learned values of this car and its brakes, and wear of its linings."""
 
 from contextlib import closing
 from pathlib import Path

@@ -115,7 +115,7 @@ def _round_up(size: int) -> int:
 
 
 def _is_ring(memory: mmap.mmap) -> bool:
-    """Whether header and size fit together."""
+    """Return whether header and size fit together."""
     if len(memory) < _PAGE:
         return False
     row = np.frombuffer(memory, _HEADER, 1)[0]
@@ -270,7 +270,7 @@ class RingReader:
 
     @property
     def closed(self) -> bool:
-        """Whether the writer said that no more cycles come."""
+        """True once the writer has ended the stream of cycles."""
         return bool(self.ring.header[0]["closed"])
 
     @property
@@ -280,7 +280,7 @@ class RingReader:
 
     @property
     def last_words(self) -> dict[str, Any]:
-        """What the writer said when it closed the ring."""
+        """Last message of the writer, from when it closed the ring."""
         words: dict[str, Any] = json.loads(bytes(self.ring.header[0]["last_words"]) or b"{}")
         return words
 

@@ -111,7 +111,7 @@ class Recorder:
 
     @property
     def kept(self) -> bool:
-        """Whether what is learned is kept, as far as that is wanted."""
+        """True while learned values are stored, or need not be."""
         return not self._refused
 
     def turn(self) -> int:
@@ -252,7 +252,7 @@ def main() -> int:
 
 
 def _passed_on(arguments: list[str]) -> list[str]:
-    """What the next one is given: everything but what a supervisor adds."""
+    """Arguments for the next process: all but those that a supervisor adds."""
     kept = [argument for argument in arguments if argument != "--again"]
     for name in ("--leash", "--parent"):
         at = kept.index(name)

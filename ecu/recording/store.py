@@ -1,4 +1,4 @@
-"""What was learned, kept like money: sqlite, WAL, synchronous FULL, a CRC and a revision per row.
+"""Store of learned values: sqlite, WAL, synchronous FULL, a CRC and a revision per row.
 
 Only the side process writes. A row that fails its CRC or its ranges is passed over for the revision before
 it; a file that sqlite cannot read, or that holds another table, another schema or values of another kind, is
@@ -28,7 +28,7 @@ from ecu.errors import UserError
 
 FILE: Final = "learned.sqlite"
 DAMAGED: Final = (sqlite3.Error, ValueError, OverflowError, TypeError)
-"""What sqlite3 raises over a damaged file: text that is no UTF-8, and numbers that cannot be, among them."""
+"""Errors of sqlite3 over a damaged file: text that is no UTF-8 and impossible numbers among them."""
 LOCK: Final = "in-use"
 REVISIONS_KEPT: Final = 20
 SAVE_INTERVAL_S: Final = 60.0
@@ -317,7 +317,7 @@ def is_covariance(matrix: NDArray[np.float64]) -> bool:
 
 
 class Keeper(NamedTuple):
-    """When to save: the last saved record and when that was [s, monotonic]."""
+    """Schedule of saving: the last saved record and its time [s, monotonic]."""
 
     saved: bytes
     brakings: int

@@ -131,7 +131,7 @@ class Watch:
 
 
 class Progress:
-    """What is carried from cycle to cycle beside the ECU's own records."""
+    """State of the loop beside the ECU's own records."""
 
     def __init__(self, watch: Watch, standby: Standby | None = None) -> None:
         self.watch, self.standby, self.claim, self.timing = watch, standby, Claim(), Timing()

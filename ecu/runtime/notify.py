@@ -1,4 +1,4 @@
-"""What systemd hears (Type=notify): READY, STOPPING, and WATCHDOG=1 from the cycle. It never waits.
+"""Notification of systemd (Type=notify): READY, STOPPING, and WATCHDOG=1 from the cycle. It never waits.
 
 Protocol: sd_notify(3), sd_watchdog_enabled(3).
 """

@@ -1,4 +1,4 @@
-"""What a process asks of the kernel to be woken in time; each refusal is one warning with its remedy."""
+"""Real-time rights of a process; each one that the kernel refuses is one warning with its remedy."""
 
 import ctypes
 import gc
@@ -14,7 +14,7 @@ _MCL_CURRENT, _MCL_FUTURE = 1, 2
 
 
 class Verdict(NamedTuple):
-    """What became of one request."""
+    """Result of one request."""
 
     name: str
     granted: bool

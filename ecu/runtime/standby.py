@@ -43,7 +43,7 @@ BESIDE_CYCLES: Final = 10
 
 
 class Claim:
-    """Whether a daemon that sends has to yield to another sender of its frames."""
+    """Rule by which a sending daemon yields to another sender of its frames."""
 
     def __init__(self) -> None:
         self._spoken = self._beside = 0
@@ -58,7 +58,7 @@ class Claim:
 
 
 class Standby:
-    """Whether the second daemon speaks. `yielded`: to another that may be doing the same."""
+    """State of the second daemon. `yielded`: to another that may be doing the same."""
 
     def __init__(self, *, yielded: bool = False) -> None:
         self.speaks = False

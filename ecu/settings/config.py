@@ -189,7 +189,7 @@ class Control(Section):
 
 
 class Blending(Section):
-    """What the motors take of the brake torque, f of (5.2): 0 off, 1 series phasing, parallel in between."""
+    """Share f of the brake torque for the motors (5.2): 0 off, 1 series phasing, parallel in between."""
 
     front: Annotated[float, Field(ge=0, le=1)] = 0.0
     rear: Annotated[float, Field(ge=0, le=1)] = 0.0

@@ -34,7 +34,7 @@ class Pad(Section):
     sigma: Annotated[float, Field(gt=0, lt=1)] = 0.15
     """Of the law, relative, for linings that were never measured."""
     walk: Annotated[float, Field(ge=0, lt=0.2)] = 0.01
-    """What the scale of the law changes by as the lining wears, per square root of a gram."""
+    """Random walk of the law's scale as the lining wears, per square root of a gram."""
     scatter: Annotated[float, Field(ge=0, lt=5)] = 0.35
     """Standard deviation of the mass over the square root of the mass, sqrt(g): weather and roads, some 10 %
     that stay the same over some 6 g."""

@@ -39,7 +39,7 @@ _WANTED = {
     "too_long": "give at most {max_length} values",
     "value_error": "{error}",
 }
-"""What is right, by pydantic's kind of finding."""
+"""Allowed values, by pydantic's kind of finding."""
 
 
 def describe(error: ValidationError, where: str) -> UserError:

@@ -75,7 +75,7 @@ class Node(NamedTuple):
 
 
 class Truth(NamedTuple):
-    """What really happened, one row per cycle."""
+    """True values of the drive, one row per cycle."""
 
     start_ns: int
     """First T_k on the real-time clock."""

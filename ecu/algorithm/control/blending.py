@@ -1,4 +1,4 @@
-"""Who brakes a wheel: motor or lining (corrected 5.2, 5.3).
+"""Brake blending: division of a wheel's torque between motor and lining (corrected 5.2, 5.3).
 
     T_EM,plan = sat_0^T_max(f T_b)        T_EHB = T_b - T_EM,plan          f: 0 off, 1 series, else parallel
     T_EM      = sat_0^T_max(T_EM,plan + what the lining still lacks of T_EHB)

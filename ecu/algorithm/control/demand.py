@@ -1,4 +1,4 @@
-"""What is asked for: pedal to deceleration, the automated demand, holding the car that stands.
+"""Deceleration demand: pedal map, automated demand, holding the car at standstill.
 
 a_dem = max(pedal map, valid decel_demand), while the car is held: at least `hold_decel`
 

@@ -1,4 +1,4 @@
-"""How far the linings' torque lags behind what they are to have: what motors can make up for.
+"""Lag of the linings' torque behind their demand, which motors can make up for.
 
 Model. Of the demands sent, what the hydraulics let through after their dead time (A.17, A.18: a rise after
 26, a fall after 15 ms; here 25 and 15, half cycles) drives a pressure of second order,

@@ -32,7 +32,7 @@ PRESSURE_LAW_STATE = np.dtype(
         ("used", "f8", (4,)),  # friction in use
         ("mu_override", "f8", (4,)),  # the laboratory's ideal controller is given the true friction; NaN: off
         ("early", "f8", (4,)),  # friction soon after this braking began, 0: not observed yet
-        ("start", "f8", (4,)),  # friction at the begin of a braking over that at the end of the one before
+        ("start", "f8", (4,)),  # friction at the beginning over that at the end of the application before
         ("cut", "u1", (4,)),  # the last pressure was cut on its way out
         ("limit_s", "f8"),  # for this long the deceleration has not been kept
         ("at_limit", "u1"),  # it was too long in this braking
@@ -94,7 +94,7 @@ def set_base(params: Record, state: Record, learned: Record) -> None:
 
 @kernel
 def learn_start(state: Record, friction: Record, learned: Record) -> None:
-    """At the end of a braking: keep what it began with over what it ended with, where both are known."""
+    """Keep the ratio of first to last friction of a brake application, where both are known."""
     for i in range(4):
         known = state.early[i] > 0.0 and well_observed(friction, i)
         if known:

@@ -1,4 +1,4 @@
-"""When friction is observed, what is held and what is handed over between brakings (4.4, 4.13).
+"""Observing, holding and handing over friction between brake applications (4.4, 4.13).
 
 A corner observes while its pressure acts, the car is fast enough (15 km/h) and decelerates enough for its
 axle, the wheel stays in the tyre's linear range and every signal it needs is usable. It holds the last

@@ -1,4 +1,4 @@
-"""What the inertial and steering signals say in road axes, before any filter.
+"""Inertial and steering signals in road axes, before any filter.
 
 The accelerometer is fixed to the body and off the centre of gravity (ISO 8855: pitch theta positive nose
 down), so it reads

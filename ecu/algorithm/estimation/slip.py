@@ -1,4 +1,4 @@
-"""Wheel slip with the load-dependent rolling radius (A.4, A.6), and what it needs to be known beforehand.
+"""Wheel slip with the load-dependent rolling radius (A.4, A.6), and its learned radius errors.
 
 Rolling radius: r_i = r(F_Z,i) (1 + d_i) with a free error d_i, learned while the wheels roll nearly free;
 without it a radius error of 0.3 % would be 15 % of the slip at 4 m/s^2.

@@ -1,4 +1,4 @@
-"""What a wheel speed and a calliper pressure cannot be.
+"""Plausibility of wheel speeds and calliper pressures.
 
 A wheel that brakes does not turn faster than the car, nor than the other wheels: if all do, the car's speed
 is wrong. A sensor that keeps its last value looks like that as soon as the car slows down; its frames are

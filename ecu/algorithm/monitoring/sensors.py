@@ -1,4 +1,4 @@
-"""Which readings the others deny, what is said of it, and what is left out of the inputs.
+"""Cross-checks between sensors: fault bits, and implausible inputs that are masked out.
 
 Accelerometer, wheel speeds and calliper pressures are held against each other before anything is estimated
 from them in this cycle, by what the last one estimated.

@@ -1,4 +1,4 @@
-"""How much of the linings is worn off, and how sure that is: the wear law corrected by measured thicknesses.
+"""Lining wear with its uncertainty: the wear law corrected by measured thicknesses.
 
 States, of each corner: the mass M worn off at the last measurement and one factor s on the law's wear, which
 the thesis scales its dynamometer law to the road by (7.6, from one measurement; here from all of them):

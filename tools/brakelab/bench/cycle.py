@@ -34,7 +34,7 @@ OFFSETS: Final = (0, 0x200, 0x500)
 """Each of the 13 input messages under three identifiers: 39 frames, a full 500 kbit/s bus."""
 FRAMES_IN: Final = len(OFFSETS) * MESSAGES_IN
 PERIOD_NS: Final = 1_000_000
-"""What the E2E check takes for the period: how this bench sends depends on how late it wakes."""
+"""Period for the E2E check: how this bench sends depends on how late it wakes."""
 SIX_DUE: Final = 3
 """A cycle in which six frames are due: four demands, BlcfRear, DiscTemperature."""
 

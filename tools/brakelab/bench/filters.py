@@ -41,7 +41,7 @@ FILTER_INPUT: Final = np.dtype(
 
 
 class Constants(NamedTuple):
-    """What does not change from cycle to cycle; arrays of shape (4,)."""
+    """Constants of all cycles; arrays of shape (4,)."""
 
     torque_per_mu: NDArray[np.float64]
     """Per pressure, m^3."""

@@ -1,4 +1,4 @@
-"""How late the daemon's cycles begin while other processes keep every core busy, and when they end.
+"""Lateness of the daemon's cycles, start and end, while other processes keep every core busy.
 
 Daemon and simulated vehicle are processes on a bus of their own. Beside them, on the daemon's own core and
 above its priority, a bare loop wakes every 10 ms and does nothing: the floor that this machine sets.
@@ -33,7 +33,7 @@ SHARES: Final = (0.5, 0.99, 0.999, 1.0)
 
 
 class Lateness(NamedTuple):
-    """What was measured; times in us, shape (cycles,)."""
+    """Measured times [us], shape (cycles,)."""
 
     bare: NDArray[np.float64]
     woken: NDArray[np.float64]

@@ -35,7 +35,7 @@ class Row(NamedTuple):
 
     @property
     def ratio(self) -> float | None:
-        """How many times the peer's median is ours; None without a peer."""
+        """Ratio of the peer's median to ours; None without a peer."""
         return None if self.peer is None else self.peer.median / self.ours.median
 
 

@@ -1,4 +1,4 @@
-"""What a bench puts out: tables on the terminal, JSON, and pages of the documentation."""
+"""Output of a bench: tables on the terminal, JSON, and pages of the documentation."""
 
 import json as json_format
 from typing import Any, Final

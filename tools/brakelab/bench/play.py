@@ -1,4 +1,4 @@
-"""How late frames reach a bus: `brake-ecu play` beside canplayer and python-can, at several speeds.
+"""Lateness of frames on a bus: `brake-ecu play` beside canplayer and python-can, at several speeds.
 
 All play the same log one after another, with the same real-time rights. The kernel's stamps of a socket of
 the bench's own say when each frame came.
@@ -122,7 +122,7 @@ class Listener:
 
 
 class Player(NamedTuple):
-    """Who plays."""
+    """A program that plays logs."""
 
     name: str
     command: Callable[[Bus, str, float], list[str]]

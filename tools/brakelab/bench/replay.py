@@ -39,7 +39,7 @@ from ecu.settings.resources import resource
 ROUNDS: Final = 3
 SCENARIO: Final = "ordinary"
 PART_S: Final = 20.0
-"""What the programs in Python are given [s]."""
+"""Length of drive for the programs in Python [s]."""
 _DBC: Final = "dbc/brake_ecu.dbc"
 _NAMES: Final = {".log": "candump", ".asc": "ASC", ".blf": "BLF", ".trc": "TRC", ".mf4": "MDF4"}
 

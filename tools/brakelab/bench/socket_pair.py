@@ -45,7 +45,7 @@ def socket_pair() -> SocketPair:
 
 
 class _OpenedBus(NamedTuple):
-    """What the daemon's channel uses of a python-can bus."""
+    """The part of a python-can bus that the daemon's channel uses."""
 
     socket: socket.socket
 

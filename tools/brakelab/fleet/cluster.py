@@ -1,4 +1,4 @@
-"""Where the drives are replayed: processes of this machine, or the workers of a Dask scheduler."""
+"""Workers that replay the drives: processes of this machine, or those of a Dask scheduler."""
 
 import logging
 import os

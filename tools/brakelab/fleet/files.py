@@ -14,7 +14,7 @@ from fsspec.implementations.local import LocalFileSystem
 from ecu.errors import UserError
 
 CHANGES: Final = ("ETag", "md5Hash", "mtime", "LastModified", "created")
-"""What tells that a file changed, the first that its file system knows, beside its size."""
+"""Marks of a changed file beside its size, the first that its file system knows."""
 
 
 def _opened(url: str) -> tuple[Any, str]:

@@ -32,7 +32,7 @@ class Job:
 
 
 class Outcome(NamedTuple):
-    """What comes back."""
+    """Result of a job."""
 
     summary: dict[str, Any]
     """By `SUMMARY_SCHEMA`; with a `fault` there are no brakings, and what was learned is as before."""

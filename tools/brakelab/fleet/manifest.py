@@ -1,4 +1,4 @@
-"""Which drives a fleet has: by a pattern of file names, or by a manifest.
+"""Drives of a fleet, by a pattern of file names or by a manifest.
 
 ```
 vehicle,log,time,config,map                  # CSV; time, config and map may be missing or empty

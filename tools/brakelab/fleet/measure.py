@@ -1,4 +1,4 @@
-"""What a fleet costs beyond its replays, how long 30,000 km take, what memory a long log takes.
+"""Cost of a fleet: time beyond its replays, time for 30,000 km, memory for a long log.
 
 ```
 python -m brakelab.fleet.measure scaling MANIFEST [--rounds 3] [--drives 100]

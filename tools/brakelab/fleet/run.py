@@ -57,7 +57,7 @@ class Chain:
     """Bytes to go."""
     place: int = 0
     learned: dict[str, bytes] = field(default_factory=dict)
-    """What was learned, by what it belongs to: other brakes start anew, as in the state store."""
+    """Learned values, by the brakes they belong to: other brakes start anew, as in the state store."""
     tries: int = 1
 
     def add(self, planned: Planned) -> None:

@@ -1,4 +1,4 @@
-"""What a fleet's drives say together: over its vehicles, over weeks, and who stands out.
+"""Statistics of a fleet: over its vehicles, over weeks, and outliers.
 
 A vehicle stands out by its distance from the median of the vehicles with the same configuration, in units of
 their spread, (x − median) / (1.4826 · median |x − median|); 3.5 is the usual limit (Iglewicz and Hoaglin,
@@ -26,7 +26,7 @@ LEAST_METRES: Final = 500.0
 
 
 class Quantity(NamedTuple):
-    """What vehicles are compared by."""
+    """A quantity by which vehicles are compared."""
 
     name: str
     title: str
@@ -67,7 +67,7 @@ class Outlier(NamedTuple):
 
 
 class Note(NamedTuple):
-    """What is told of one drive."""
+    """A note on one drive."""
 
     vehicle: str
     drive: str

@@ -1,4 +1,4 @@
-"""What a worker does: one drive, from its logs to its brakings, its summary and what was learned."""
+"""Task of a worker: one drive, from its logs to its brake applications, summary and learned values."""
 
 import io
 import shutil

@@ -17,7 +17,7 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 LEVEL_STEPS = (1.0, 5e5, 12.5)
-"""What initial speed (sliding, m/s), pressure (Pa) and initial temperature (K) are rounded to as levels."""
+"""Rounding of initial speed (sliding, m/s), pressure (Pa) and initial temperature (K) to levels."""
 
 
 class Components(NamedTuple):

@@ -26,7 +26,7 @@ COLDEST: Final = -40.0  # degC
 
 
 class Mistake(NamedTuple):
-    """What a mistake multiplies the three numbers by, and what to do."""
+    """A mistake of units: its factors on the three numbers, and its remedy."""
 
     friction: float
     inertia: float

@@ -29,7 +29,7 @@ class Read(NamedTuple):
     recording: Recording
     columns: Columns
     damaged: str
-    """What was left out, one line; empty if nothing."""
+    """Rows that were left out, one line; empty if none."""
 
 
 def read_recording(path: Path, columns: Path | None = None) -> Read:

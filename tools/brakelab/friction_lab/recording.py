@@ -1,4 +1,4 @@
-"""What a dynamometer hands over, and how ours does: CSV or Parquet, with a file of columns beside it."""
+"""Recording of a dynamometer: CSV or Parquet, with a file of columns beside it."""
 
 from pathlib import Path
 from typing import Final, NamedTuple

@@ -1,4 +1,4 @@
-"""What was identified, as tables."""
+"""Tables of identified models."""
 
 from collections.abc import Callable
 

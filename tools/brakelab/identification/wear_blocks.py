@@ -49,7 +49,7 @@ class Block(NamedTuple):
 
 
 class Heat(NamedTuple):
-    """What the disc of the brake is configured to do (3.7)."""
+    """Configured heating and cooling of the disc (3.7)."""
 
     heating: float
     cooling: float

@@ -65,7 +65,7 @@ class _Piece(NamedTuple):
     offset: int
     """Where its container stands in the file."""
     damage: str
-    """What is wrong with it, empty: nothing."""
+    """Its damage, empty if none."""
 
 
 @kernel

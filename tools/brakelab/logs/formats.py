@@ -1,4 +1,4 @@
-"""Which format a log is in, by its name and by its content, and the frames of any of them."""
+"""Format of a log, by its name and its content, and a reader of its frames."""
 
 import gzip
 import re

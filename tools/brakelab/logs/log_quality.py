@@ -1,4 +1,4 @@
-"""What is wrong in a CAN log, whatever its format: damage that its reader meets, stamps that do not fit.
+"""Quality of a CAN log of any format: damage that its reader meets, stamps that do not fit.
 
 Readers hand over `FrameBlock`s. `checked` counts stamps that repeat or step back and gaps, leaves out the
 single frame whose stamp is far from its neighbours (a flipped bit), lets time go on where the clock was set
@@ -48,7 +48,7 @@ _STAMPS: Final = np.dtype(
 
 @dataclass
 class Damage:
-    """What could not be read of a log."""
+    """Unreadable parts of a log."""
 
     damaged: int = 0
     """Lines, objects or cells that were skipped."""
@@ -68,7 +68,7 @@ class Damage:
 
 @dataclass
 class LogQuality(Damage):
-    """What was found wrong in a CAN log."""
+    """Errors found in a CAN log."""
 
     frames: int = 0
     stamps_backwards: int = 0

@@ -1,4 +1,4 @@
-"""What a car is: `config/plant/*.toml`, checked, turned into the parameters of the car as described.
+"""Description of a car, `config/plant/*.toml`: checked, and turned into parameters.
 
 `config/plant/linings.toml`, beside every vehicle file, holds the linings that vehicles name.
 """
@@ -42,7 +42,7 @@ class Body(Section):
 
 
 class Attitude(Section):
-    """How the body of a car without a suspension leans; see `body.py`."""
+    """Attitude of the body of a car without a suspension; see `body.py`."""
 
     frequency: Positive  # Hz
     damping: Positive
@@ -55,7 +55,7 @@ DamperForce = Annotated[tuple[float, ...], Field(min_length=DAMPER_KNOTS, max_le
 
 
 class Suspension(Section):
-    """What makes a car one of fourteen degrees of freedom; see `chassis.py`. All at the wheel."""
+    """Suspension of a car of fourteen degrees of freedom; see `chassis.py`. All at the wheel."""
 
     unsprung_mass_front: Positive
     unsprung_mass_rear: Positive

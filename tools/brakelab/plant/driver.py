@@ -46,7 +46,7 @@ class Script(NamedTuple):
     """While brakes are asked for the motors do what the ECU asks; otherwise they rest in braking phases, but
     for `motor_share`."""
     road: Road = LEVEL
-    """What is described by place goes before what is described by time."""
+    """A description by place goes before one by time."""
     steering: Steering = HANDS_OFF
     trace: NDArray[np.float64] = np.zeros((1, 2))
     """Rows of time [s] in a FOLLOW phase and speed [m/s], shape (n, 2)."""

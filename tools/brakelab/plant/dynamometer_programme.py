@@ -34,7 +34,7 @@ Levels = Annotated[tuple[Positive, ...], Field(min_length=1)]
 
 
 class Gate(Section):
-    """How the disc is brought to a temperature."""
+    """Preparation of the disc's temperature."""
 
     warm_speed: Positive  # km/h
     warm_pressure: Positive  # bar

@@ -1,4 +1,4 @@
-"""Where the energy of a drive went.
+"""Energy balance of a drive.
 
 Kinetic energy (translation, yaw, spin, heave, pitch, roll, unsprung masses) and what springs, stops, bars and
 tyres store are functions of the state. What leaves or enters is summed by the plant in its own steps (J in
@@ -51,7 +51,7 @@ class Energy(NamedTuple):
 
     @property
     def missing(self) -> float:
-        """What was released and is found nowhere, as a share of what was turned over."""
+        """Released energy that is found nowhere, as a share of the energy turned over."""
         return (sum(self[:5]) - sum(self[5:])) / self.turned_over
 
 

@@ -1,4 +1,4 @@
-"""What a lining and its disc are: entries of `config/plant/linings.toml`, and the rig that carries one."""
+"""Lining and disc: entries of `config/plant/linings.toml`, and the dynamometer that carries one."""
 
 from typing import Final
 

@@ -1,4 +1,4 @@
-"""What stands between a quantity and its signal, sensor by sensor: from a file to the kernel that applies it.
+"""Sensor errors between a quantity and its signal: from a file to the kernel that applies them.
 
 x(t) true   x_d = x(t - delay)                          linear between the cycles before and after
             b' = -b / tau + q w                         Gauss-Markov drift, tau = inf: random walk, var q^2 t
@@ -128,7 +128,7 @@ SPEED_SOURCES: Final[Mapping[str, SensorErrors]] = {
     "gnss": SensorErrors(noise=0.027, period=0.1, delay=(0.1, 0.2)),
     "none": SensorErrors(noise=0.027, lost_from=0.0),
 }
-"""What the car's speed over ground can come from."""
+"""Sources of the car's speed over ground."""
 
 
 def new_sensors(layers: Iterable[Mapping[str, SensorErrors]], seed: int) -> RecordArray:

@@ -1,4 +1,4 @@
-"""What the car's sensors make of the truth: positions, the body's attitude and their errors.
+"""Sensors of the car: positions, the body's attitude and their errors.
 
 The accelerometer is fixed to the body: pitched nose down by theta it reads f_x cos(theta) - f_z sin(theta),
 f being specific force in road axes at the sensor's place, so gravity's part on a slope is in the reading. f_z

@@ -25,7 +25,7 @@ LARGEST_RATE: Final = 0.8  # rad/s: 730 deg/s of the steering wheel at a ratio o
 
 
 class Steering(NamedTuple):
-    """What is steered; without rows: straight on."""
+    """Steering by time; without rows: straight on."""
 
     angle: NDArray[np.float64]
     """Rows of time [s] and angle [rad], shape (n, 2)."""

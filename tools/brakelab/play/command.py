@@ -71,7 +71,7 @@ class Waker:
 
 @dataclass
 class Sent:
-    """What left."""
+    """Frames that were sent."""
 
     offered: int = 0
     taken: int = 0

@@ -1,4 +1,4 @@
-"""What `brake-ecu play` sends of a log, and when.
+"""Frames that `brake-ecu play` sends of a log, with their times.
 
 Without a map the log's frames go out as they are. With one (and for a file of decoded signals) the log is
 decoded every 10 ms and encoded as the contract's input frames with fresh counters and checksums; what is

@@ -1,5 +1,5 @@
-"""What became of the inputs that the ECU needs: one line for each group that was of no use, one that says
-what those cost that a log does not have, and one for the faults that lasted most of a drive.
+"""Report on the inputs that the ECU needs: one line for each unusable group, one for the cost of inputs that
+a log does not have, and one for the faults that lasted most of a drive.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""What a log held and what was wrong in it: counters for the metadata, one line for each kind of damage."""
+"""Contents and damage of a log: counters for the metadata, one line for each kind of damage."""
 
 from collections import Counter
 from dataclasses import dataclass, field
@@ -34,7 +34,7 @@ ABSOLUTE_NS: Final = 10**18
 
 @dataclass
 class Findings:
-    """What one log held; filled while it is read."""
+    """Contents of one log; filled while it is read."""
 
     path: Path
     start_ns: int = 0
@@ -47,9 +47,9 @@ class Findings:
     other_interfaces: int = 0
     """Frames of interfaces that the map does not name."""
     freshness: RecordArray | None = None
-    """What became of the samples of each input, shape (N_INPUTS,)."""
+    """Freshness of each input, with counts of its samples, shape (N_INPUTS,)."""
     seen: RecordArray | None = None
-    """What its samples were like, shape (N_INPUTS,)."""
+    """Statistics of its samples, shape (N_INPUTS,)."""
     mapped: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(N_INPUTS, np.bool_))
     """Where the log can hold an input, shape (N_INPUTS,)."""
     dropped: int = 0

@@ -1,4 +1,4 @@
-"""What the samples of each input were like: gaps, extremes, ends of the range, implausible jumps.
+"""Statistics of each input's samples: gaps, extremes, ends of the range, implausible jumps.
 
 Looked at once a cycle, after the samples of these 10 ms: a faster input counts with its last one.
 """

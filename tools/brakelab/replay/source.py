@@ -1,4 +1,4 @@
-"""What the frames of a log mean: the contract's database, or a signal map with a database of its own."""
+"""Meaning of a log's frames: the contract's database, or a signal map with a database of its own."""
 
 import hashlib
 from collections.abc import Iterable, Iterator
@@ -14,7 +14,7 @@ from ecu.settings.resources import resource
 
 
 class Source(NamedTuple):
-    """What the frames of a log mean."""
+    """Meaning of a log's frames."""
 
     plan: ReceivePlan
     bus: str

@@ -1,4 +1,4 @@
-"""What `replay` prints of the brakings: a line for each, and how well they were predicted."""
+"""Summary that `replay` prints: a line per brake application, and the errors of their prediction."""
 
 import math
 from collections import Counter

@@ -1,4 +1,4 @@
-"""What one brake application wore off, from its rows: the integrals of (7.16) and their mass.
+"""Wear of one brake application, from its rows: the integrals of (7.16) and their mass.
 
 The same integrals as `ecu/algorithm/monitoring/wear.py` keeps, by what results hold: the wheel turns at
 v (1 + slip) / r, its slope is taken over 0.2 s to either side, and the temperature is in degC.

@@ -1,4 +1,4 @@
-"""How far the estimated friction is from the true one, counted as in the thesis's Table 4.3.
+"""Error of the estimated friction, counted as in the thesis's Table 4.3.
 
 nRMSE = sqrt(mean((estimate - truth)^2)) / mean(truth), over both wheels of an axle, in every braking from
 0.5 s after the demand is reached down to 15 km/h.

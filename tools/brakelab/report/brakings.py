@@ -56,7 +56,7 @@ class Braking(NamedTuple):
     predicted: float
     """Of `achieved`, from pressures and what was known before this application."""
     friction: Vector
-    """What is known after the braking, per corner, shape (4,): what the next one is predicted with."""
+    """Friction known after the application, per corner, shape (4,): the next one is predicted with it."""
     friction_sigma: Vector
     temperature_in: Vector
     """Of the discs at the start [degC], shape (4,)."""
@@ -64,7 +64,7 @@ class Braking(NamedTuple):
     """Into the four brakes [J]."""
     force: Force
     before: Vector
-    """What was known before the braking, per corner, shape (4,)."""
+    """Friction known before the brake application, per corner, shape (4,)."""
     before_sigma: Vector
     left_out: str
     """Why the prediction does not count, empty where it does."""

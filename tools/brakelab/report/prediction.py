@@ -1,4 +1,4 @@
-"""How well the deceleration of each braking was predicted: rows of the table, errors and two plots.
+"""Prediction of each brake application's deceleration: rows of the table, errors and two plots.
 
 Where no sensor tells the friction, this is how an estimate is judged.
 """

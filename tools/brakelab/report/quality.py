@@ -1,4 +1,4 @@
-"""What the logs behind a result held, and how fast they were replayed: from the result's metadata."""
+"""Contents of the logs behind a result and speed of their replay, from the result's metadata."""
 
 import json
 from collections.abc import Sequence
@@ -41,11 +41,11 @@ class Log(NamedTuple):
     seconds: float
     """That its replay took, NaN: not known."""
     found: str
-    """What was damaged, empty: nothing."""
+    """Damage, empty if none."""
 
 
 class Quality(NamedTuple):
-    """What a result says of its inputs."""
+    """Quality of a result's inputs."""
 
     logs: list[Log]
     inputs: list[tuple[str, list[Cell]]]

@@ -1,4 +1,4 @@
-"""What the head of the page says: where the result comes from, and the drive in a few numbers."""
+"""Head of the page: origin of the result, and the drive in a few numbers."""
 
 import math
 from datetime import UTC, datetime

@@ -44,7 +44,7 @@ Columns = Mapping[str, NDArray[Any]]
 
 
 class Difference(NamedTuple):
-    """How a column differs between two results."""
+    """Difference of a column between two results."""
 
     name: str
     rms: float

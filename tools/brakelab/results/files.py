@@ -101,7 +101,7 @@ class ResultWriter:
         self.provenance: dict[str, Any] = {}
         """Into the schema's metadata with the first rows: text as it is, everything else as JSON."""
         self.quality: list[dict[str, Any]] = []
-        """What is known at the end only: into the file's metadata under `quality`."""
+        """Findings known at the end only: into the file's metadata under `quality`."""
         self.rows = 0
         self._unfinished = path.with_name(f".{path.name}.unfinished")
         self._file: pq.ParquetWriter | None = None

@@ -1,4 +1,4 @@
-"""What a brake application is expected to do, from its pressures and what was known before it.
+"""Prediction of a brake application's deceleration, from its pressures and the values known before it.
 
 Where no sensor tells the friction, an estimate can only be judged by what it predicts:
 
@@ -41,7 +41,7 @@ LEAST_ROWS: Final = 40
 
 
 class Prediction(NamedTuple):
-    """What an application is expected to do, and what it did, all [m/s^2]."""
+    """Expected and measured deceleration of a brake application, all [m/s^2]."""
 
     decel: float
     """Mean over all of it."""
@@ -105,7 +105,7 @@ def _too_few(speed: Vector, count: int) -> str:
 
 
 class _Car(NamedTuple):
-    """What a prediction takes the car for."""
+    """The car as a prediction assumes it."""
 
     mu_b: Vector
     mass: float
@@ -184,7 +184,7 @@ def one_scale(measured: Sequence[float], configured: Sequence[float], rest: Sequ
 
 
 class Errors(NamedTuple):
-    """How far predictions are from what was measured, as shares of the measured; NaN where none counts."""
+    """Errors of predictions as shares of the measured values; NaN where none counts."""
 
     counted: int
     mean: float

@@ -31,7 +31,7 @@ TURN_S: Final = 0.05
 
 
 class Bus(NamedTuple):
-    """Where daemon and vehicle meet."""
+    """Bus between daemon and vehicle."""
 
     interface: str
     channel: str
@@ -87,7 +87,7 @@ def armed_config(config: Path, out: Path) -> Path:
 
 
 class Recorded(NamedTuple):
-    """What a drive in real time left behind."""
+    """Recordings of a drive in real time."""
 
     truth: Path
     recordings: list[Path]

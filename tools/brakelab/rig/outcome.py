@@ -21,7 +21,7 @@ _REMEDY = "run the rig again"
 
 
 class Outcome(NamedTuple):
-    """What came of one scenario; NaN where there is nothing to say."""
+    """Outcome of one scenario; NaN where there is nothing to say."""
 
     scenario: str
     seconds: float

@@ -1,4 +1,4 @@
-"""What the ECU did about a fault, and how long that took, from results and truth on one time axis."""
+"""Reaction of the ECU to a fault and its delay, from results and truth on one time axis."""
 
 import math
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from ecu.contract.signals import DEGRADED
 from ecu.recording.events import MODES
 
 AFTER_S = 3.0
-"""What shows up this long after the end of a fault still counts as its consequence."""
+"""Effects up to this long after the end of a fault count as its consequences."""
 FIRST_HEARD_S = 0.05
 """The vehicle sets off at the ECU's first frame: from then on it has heard demands."""
 HELD_UP_S = 0.05

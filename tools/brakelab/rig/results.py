@@ -24,7 +24,7 @@ from ecu.settings.config import Config, config_hash, new_params
 
 
 class Frames(NamedTuple):
-    """What became of the vehicle's frames."""
+    """Counts of the vehicle's frames at the ECU."""
 
     received: int = 0
     rejected: int = 0

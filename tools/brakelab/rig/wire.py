@@ -21,7 +21,7 @@ from typing import Final
 from ecu.errors import UserError
 
 CHANNEL: Final = "slcan"
-"""What the rig's `-c` says for a wire of its own."""
+"""Value of the rig's `-c` for a wire of its own."""
 PRIORITY: Final = 10  # of SCHED_FIFO: the vehicle's
 QUEUE: Final = 256  # frames that a device keeps; the default of 10 is less than a car sends at once
 

@@ -63,7 +63,7 @@ VEHICLE_BUS: Final = "can0"
 
 
 class Plans(NamedTuple):
-    """Who sends and understands what."""
+    """Frames that each side sends and understands."""
 
     vehicle_sends: TransmitPlan
     vehicle_hears: ReceivePlan

@@ -1,4 +1,4 @@
-"""When a daemon is killed in memory, and for how long nobody sends."""
+"""Outages of the daemon in the closed loop in memory: times of its death and of its return."""
 
 from typing import Final, NamedTuple
 

@@ -1,4 +1,4 @@
-"""What the ECU of a simulated drive had as its inputs: decoded once, stepped through as often as wanted."""
+"""Inputs of the ECU in a simulated drive: decoded once, stepped through as often as wanted."""
 
 from typing import Any
 

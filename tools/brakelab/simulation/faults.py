@@ -146,7 +146,7 @@ class Fault(BaseModel):
 
     @property
     def end(self) -> float:
-        """When it is over [s], inf: never."""
+        """End of the fault [s], inf: never."""
         return math.inf if self.duration is None else self.t + self.duration
 
     def ids(self) -> list[int]:

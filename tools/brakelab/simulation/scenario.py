@@ -87,7 +87,7 @@ class _Section(BaseModel):
 
 
 class Phase(_Section):
-    """What the driver does for a while."""
+    """One phase of the driver's actions."""
 
     kind: Literal["cruise", "coast", "brake", "follow"]
     speed: NotNegative | None = None
@@ -142,7 +142,7 @@ class Trace(_Section):
 
 
 class SteeringFile(_Section):
-    """What is steered: see `brakelab.plant.steering`."""
+    """Steering by file: see `brakelab.plant.steering`."""
 
     angle: list[Row] = []
     path: list[Row] = []
@@ -165,7 +165,7 @@ class TyreFault(_Section):
 
 
 class Payload(_Section):
-    """What the car carries beside its driver, a point of mass `mass` [kg]."""
+    """Load beside the driver, a point of mass `mass` [kg]."""
 
     mass: Positive
     behind: float
@@ -223,14 +223,14 @@ class Scenario(_Section):
     road_friction: ByTime = [(0.0, 1.2)]
     grade: ByTime = [(0.0, 0.0)]
     road: RoadByPlace = RoadByPlace()
-    """What it describes must not be described by time as well."""
+    """Quantities in it must not be described by time as well."""
     steering: SteeringFile | None = None
     """Without it the car is steered straight on."""
     wetness: Share = 0.0
     """Of the discs, 0 dry to 1 rain; above 0 the bus says that it rains."""
     tyre_fault: TyreFault | None = None
     vehicle_speed: Literal["ideal", "optical", "gnss", "none"] = "ideal"
-    """What the speed on the bus comes from; see `brakelab.plant.sensor_errors.SPEED_SOURCES`."""
+    """Source of the speed on the bus; see `brakelab.plant.sensor_errors.SPEED_SOURCES`."""
     wheel_transducers: bool = False
     """The bus carries wheel forces and torques."""
     sensor: Sensors = {}
@@ -238,14 +238,14 @@ class Scenario(_Section):
     blending: bool = False
     """While brakes are asked for the motors do what the ECU asks; otherwise they rest."""
     charge_limit: ByTime = []
-    """What the battery takes, W, instead of what the car's file says; at 0 its motors cannot brake."""
+    """Charging limit of the battery [W], instead of that of the car's file; at 0 its motors cannot brake."""
     motor_share: Share = 0.0
     """Of each deceleration asked for, what the motors take; the brakes are asked for the rest (5.2)."""
     trace: Trace | None = None
     repeat: Annotated[int, Field(ge=1)] = 1
     """How often the phases are driven."""
     fault: list[Fault] = []
-    """What goes wrong on the way; see `brakelab.simulation.faults`."""
+    """Faults on the way; see `brakelab.simulation.faults`."""
     phase: Annotated[list[Phase], Field(min_length=1)]
 
     @model_validator(mode="after")

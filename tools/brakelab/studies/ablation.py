@@ -1,4 +1,4 @@
-"""What each ingredient of the joint observer brings: its errors with one of them taken away.
+"""Ablation of the joint observer: its errors with one ingredient taken away.
 
 Nothing in the ECU knows of this. A signal is withheld by the scenario, a measurement by a standard deviation
 that makes it worthless, what was learned by giving its place in `LEARNED` the prior; the demand as a model of
@@ -47,7 +47,7 @@ UNKNOWN: Final = 1e3
 
 
 class Ablation(NamedTuple):
-    """What is taken away."""
+    """The ingredient that is taken away."""
 
     withheld: tuple[str, ...] = ()
     """Signals."""

@@ -78,7 +78,7 @@ class Limit(NamedTuple):
 
     filter: Vector
     smoother: Vector
-    """Which knows the rest of the drive too."""
+    """Bound of a smoother, which knows the rest of the drive too."""
 
 
 class Bound(NamedTuple):
@@ -86,7 +86,7 @@ class Bound(NamedTuple):
 
     case: str
     joint: tuple[float, float]
-    """What the joint observer reached, driven in [%]."""
+    """Error that the joint observer reached, adapted [%]."""
     limits: dict[str, Limit]
     """By level."""
 

@@ -1,4 +1,4 @@
-"""What the sensors show of a car, linearised about what happened: for the bound of `bound.py`.
+"""Sensor models of a car, linearised about the true drive: for the bound of `bound.py`.
 
 Written for the simulated car's own structure and apart from the observers of the ECU: tyres by the inverse
 Magic Formula with its curvature, degressions in proportion to the load, radii by deflection, and derivatives

@@ -1,4 +1,4 @@
-"""What the benches work on: a simulated stop (`config/scenarios/stop-1.toml`) as frames and as inputs.
+"""Workload of the benches: a simulated stop (`config/scenarios/stop-1.toml`) as frames and as inputs.
 
 The wheel transducers are on, so that every 10 and 20 ms message of the contract is on the bus.
 """
@@ -32,7 +32,7 @@ class Stop(NamedTuple):
     inputs: RecordArray
     """`INPUTS` of every cycle, shape (n,)."""
     values: NDArray[np.float64]
-    """What the vehicle sends, the last sample held, shape (n, N_INPUTS)."""
+    """Values that the vehicle sends, the last sample held, shape (n, N_INPUTS)."""
     braking: int
     """The first cycle in which all four corners observe their friction."""
 

@@ -1,4 +1,4 @@
-"""What compensation is worth: the manoeuvres of section 5.7 and fade, with cars drawn per seed.
+"""Benefit of compensation: the manoeuvres of section 5.7 and fade, with cars drawn per seed.
 
 ideal           the same controller in the same car, told the true friction
 compensated     as configured, nothing learned before
@@ -184,7 +184,7 @@ def drive_all(name: str, config: Config, seed: int) -> dict[str, Run]:
 
 
 class Car(NamedTuple):
-    """What one car did."""
+    """Results of one car."""
 
     errors: dict[tuple[str, str], list[float]]
     """By manoeuvre and run, one per application."""

@@ -1,4 +1,4 @@
-"""Where the energy of every shipped scenario goes, and what of it is found nowhere."""
+"""Energy balance of every shipped scenario, with its residual."""
 
 from pathlib import Path
 from typing import Final

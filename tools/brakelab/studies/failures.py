@@ -29,7 +29,7 @@ HALF: Final = {"front": 0.5, "rear": 0.5}
 
 
 class Left(NamedTuple):
-    """What a failure leaves of one braking."""
+    """Braking that is left after a failure, in one brake application."""
 
     deceleration: float
     """In the second from `AFTER` on, against the sound car [%]."""

@@ -1,4 +1,4 @@
-"""How well the state of a linear system can be known at all: Kalman's filter and its smoother, of errors.
+"""Lower bound of the error of a linear system's state: Kalman's filter and smoother.
 
     x_k = A_k x_k-1 + w, w ~ (0, Q_k)          z_k = H_k x_k + v, v ~ (0, 1)
 

@@ -53,7 +53,7 @@ class Margins(NamedTuple):
 
     @property
     def at_hz(self) -> float:
-        """Where that is."""
+        """Frequency of that eigenvalue [Hz]."""
         return FREQUENCIES[int(np.abs(self.eigenvalues).max(axis=1).argmax())]
 
     @property

@@ -54,7 +54,7 @@ NEVER: Final = float("inf")
 
 
 class Task(NamedTuple):
-    """What one process does at a time: cases of one car, which share its ordinary driving."""
+    """Task of one process: cases of one car, which share its ordinary driving."""
 
     observer: str
     seed: int

@@ -1,4 +1,4 @@
-"""What the observers are judged by: drives with goals, and what may be wrong about car, sensors or road.
+"""Cases for the observers: drives with goals, and errors of car, sensors or road.
 
 A goal is the nRMSE [%] of front and rear friction that the joint observer should not exceed: `cold` with
 nominal configuration and nothing learned, `driven_in` after `config/scenarios/ordinary.toml`. Those of

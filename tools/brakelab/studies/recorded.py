@@ -39,7 +39,7 @@ PRESSURE_EVERY: Final = 5  # cycles: 20 Hz
 
 
 class Logger(NamedTuple):
-    """What a logger has of a drive."""
+    """Signals that a logger has of a drive."""
 
     accel_every: int
     """Cycles between samples of the accelerometer."""

@@ -1,4 +1,4 @@
-"""What stands above the tables of each bench."""
+"""Texts above the tables of each bench."""
 
 from typing import Final
 

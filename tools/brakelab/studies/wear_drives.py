@@ -47,7 +47,7 @@ class Part(NamedTuple):
 
 
 class CarDrives(NamedTuple):
-    """What the drives of one car gave."""
+    """Results of one car's drives."""
 
     seed: int
     parts: list[Part]

@@ -59,7 +59,7 @@ class Cycle(NamedTuple):
 
 
 class _End(NamedTuple):
-    """What ends a leg."""
+    """End of a leg."""
 
     share: float
     speed: tuple[float, float]
@@ -102,7 +102,7 @@ FREEWAY: Final = _Road(
 
 
 class _Driver(NamedTuple):
-    """How the one who drives brakes and accelerates."""
+    """Braking and acceleration of a driver."""
 
     braking: float
     """m/s^2, median of the plateau"""

@@ -35,7 +35,7 @@ WIDTH: Final = 110  # columns of the table where no terminal says how wide it is
 
 
 class Budget(NamedTuple):
-    """How long is searched, and from which seed."""
+    """Length of the search, and its seed."""
 
     generations: int
     population: int

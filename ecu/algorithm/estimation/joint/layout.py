@@ -1,4 +1,4 @@
-"""The states of the joint observer: what one filter for the whole vehicle knows and how well.
+"""States of the joint observer, one filter for the whole vehicle.
 
 Friction of a lining is its level, which outlives the brake application, times its axle's change within the
 application. Friction, stiffness, mass, motor scale and drag are logarithms of the ratio to the configuration:
@@ -45,7 +45,7 @@ PASSING: Final = (
     *(V, SLOPE, RATE, CHANGE, CHANGE + 1, MEAN, MEAN + 1),
     *(DRIVE, DRIVE + 1, SLIP_ERROR, SLIP_ERROR + 1),
 )
-"""What a brake application, or a drive, leaves behind: kept nowhere."""
+"""States of one brake application or drive, which are not stored."""
 
 WINDOW_STATE: Final = np.dtype(
     [

@@ -1,4 +1,4 @@
-"""What the joint observer gives to the rest of the ECU, and what it keeps between drives.
+"""Outputs of the joint observer to the rest of the ECU, and its states that are stored between drives.
 
 Kept are the states that outlive a drive, with their whole covariance: what a car's pressures cannot tell
 apart stays together after a restart as well. What may have changed in between (load, tyres, weather) is less

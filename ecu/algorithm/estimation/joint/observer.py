@@ -128,7 +128,7 @@ def _learning_forbidden(params: Record, state: Record, inputs: Record, braking: 
 
 @kernel
 def _watch_release(state: Record, braking: bool) -> None:
-    """When the brakes are released, friction goes back to what it was before that could disturb it."""
+    """Restore friction to its value before the release of the brakes, which disturbs it."""
     falling = braking and min(pressure_change(state, 0), pressure_change(state, 2)) < -RELEASE
     if falling and not state.releasing:
         for i in range(LEVEL, LEVEL + 4):

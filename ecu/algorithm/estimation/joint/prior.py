@@ -1,5 +1,5 @@
-"""What is known before anything is learned, what a brake application begins with, and how fast each state
-may wander from it."""
+"""Prior of the joint observer, its values at the start of a brake application, and the random walks of its
+states."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Wheels that leave what is known of their tyres: what is believed of them, and what goes back."""
+"""Wheels beyond the linear range of their tyres: suspended learning and restored states."""
 
 from ecu.algorithm.estimation.joint.kalman import GATE, forget
 from ecu.algorithm.estimation.joint.layout import STIFFNESS, V
@@ -42,7 +42,7 @@ def share_force(params: Record, state: Record, inputs: Record, accel: float, loa
 
 @kernel
 def wheel_slides(params: Record, state: Record, i: int) -> bool:
-    """Return whether a wheel is so far from the car's speed that it does not tell it."""
+    """Return whether a wheel locks or spins: its speed does not tell the car's."""
     w = state.window
     return _beyond(w.omega[i] * params.wheel_radius[i], w.ground[i], LARGE_SLIP)
 
@@ -60,7 +60,7 @@ def wheels_agree(params: Record, state: Record, speed: float) -> bool:
 
 @kernel
 def watch_tyres(state: Record, observing: bool) -> None:
-    """Let friction go back and stiffness be unknown where most wheels contradict the known tyres alike."""
+    """Restore friction and forget stiffness where most wheels contradict the known tyres alike."""
     against = 0.0
     for i in range(4):
         against += state.pull[i]
@@ -72,7 +72,7 @@ def watch_tyres(state: Record, observing: bool) -> None:
 
 @kernel
 def mistrust_wheels(state: Record) -> None:
-    """Learn nothing for a while: a wheel slips beyond its tyre's range, whatever this filter sees of it."""
+    """Suspend learning: a wheel slips beyond its tyre's range, whatever this filter sees of it."""
     if state.hold_s <= 0.0:
         go_back(state)
     state.hold_s = HOLD_S

@@ -1,4 +1,4 @@
-"""Snapshots of what was known a moment ago, to go back to when it was learned from a wheel about to slide."""
+"""Snapshots of the state, to restore when it was learned from a wheel about to lock."""
 
 from ecu.algorithm.estimation.joint.kalman import forget
 from ecu.algorithm.estimation.joint.layout import N, V
@@ -7,7 +7,7 @@ from ecu.jit import Record, kernel
 
 @kernel
 def keep(state: Record, row: int) -> None:
-    """Write what is known now over snapshot `row`."""
+    """Save the present state and covariance over snapshot `row`."""
     for i in range(N):
         state.kept_x[row, i] = state.x[i]
         for j in range(N):
@@ -24,7 +24,7 @@ def _copy(state: Record, row: int, to: int) -> None:
 
 @kernel
 def go_back(state: Record) -> None:
-    """Return to the older snapshot in all but the speed, of which little is sure now."""
+    """Restore the older snapshot in all but the speed, which is uncertain now."""
     for i in range(N):
         if i != V:
             state.x[i] = state.kept_x[1, i]

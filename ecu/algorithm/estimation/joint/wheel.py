@@ -1,4 +1,4 @@
-"""What one wheel and the whole car should show, given the states, with analytic derivatives.
+"""Measurement models of one wheel and of the whole car, with analytic derivatives by the states.
 
 Wheel: torque T = s_m T_m + T_b + M_R and the wheel's inertia stand against the tyre force, the force over
 load gives slip by the inverse of the tyre's curve, slip and radius give wheel speed.

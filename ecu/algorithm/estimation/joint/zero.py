@@ -1,4 +1,4 @@
-"""What a pressure sensor reads without pressure, learned while the brakes are released.
+"""Zero of a pressure sensor, learned while the brakes are released.
 
 Many cars cannot report a pressure below zero. Of a reading N(z, s) that is cut off there
 

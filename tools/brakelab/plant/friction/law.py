@@ -1,4 +1,4 @@
-"""What a friction law is to the files that describe it."""
+"""Interface of a friction law to the files that describe it."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from brakelab.plant.jit import kernel
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 Bounds = tuple[float, float]
-"""What is drawn between, evenly."""
+"""Bounds of an even distribution."""
 
 ROW: Final = 1024  # numbers that a law may have
 START: Final = 0  # place in every row: the memory at the start of an application
