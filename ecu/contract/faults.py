@@ -57,7 +57,7 @@ FAULTS: Final = (
     Fault(DEMAND_LIMITED, "demand limited", "the output limiter replaced or cut a demand", "compare friction and demand in the report"),
     Fault(FILTER_RESET, "filter reset", "an estimator met a value that is not finite and began anew", "look at the inputs at that time"),
     Fault(PEDAL_LOST, "pedal lost", "the pedal position is stale or invalid: it is taken to stay as it was while the switch of the pedal is closed", "check the sender of BrakeRequest"),
-    Fault(MOTOR_TORQUE_LOST, "motor torque lost", "a motor torque came before and is stale: its wheel learns nothing", "check the sender of Motor*"),
+    Fault(MOTOR_TORQUE_LOST, "motor torque lost", "a motor torque that was reported before is stale: nothing is learned from its wheel", "check the sender of Motor*"),
     Fault(BRAKE_FADE, "compensation at its limit", "friction more than 30 % below its base, or a pressure that cannot be had: the car brakes less than the pedal asks for", "brake earlier and let the brakes cool; look at the linings and at friction in the report"),
     Fault(WHEEL_SLIPS, "wheel slips", "a wheel ran past its tyre's range: its pressure demand is held back", "look at slip in the report; an ABS is not part of this ECU"),
     Fault(ACCUMULATOR_LOW, "accumulator low", "the accumulator holds less than is demanded: the demand is cut to it; one that reads below 10 bar cuts nothing", "check the hydraulic unit and the sender of HydraulicStatus"),

@@ -7,7 +7,8 @@ import pytest
 
 from brakelab.tuning.recording import Errors
 from brakelab.tuning.search import RANGES, Best, fitness, genes, search, tuned
-from ecu.settings.config import Config
+from ecu.settings.config import Config, Observer
+from ecu.settings.resources import resource
 
 GOAL = {
     "omega_walk": 5.0,
@@ -71,3 +72,13 @@ def test_what_is_shipped_can_be_found(manual: Config) -> None:
     for key, (low, high) in RANGES.items():
         assert low < getattr(manual.observer, key) < high
     assert values(tuned(manual, genes(values(manual)))) == pytest.approx(values(manual), rel=1e-3)
+
+
+def test_the_page_shows_the_shipped_tuning_and_the_ranges() -> None:
+    """docs/tuning.md, its first table: defaults of `[observer]`, which the SUV has, and `RANGES`."""
+    page = resource("docs/tuning.md").read_text("utf-8")
+    for key, (low, high) in RANGES.items():
+        (row,) = [line for line in page.splitlines() if line.startswith(f"| `{key}` |")]
+        _, _, manual, searched, _ = (cell.strip() for cell in row.strip("|").split("|"))
+        assert float(manual) == getattr(Observer(), key), key
+        assert tuple(float(bound) for bound in searched.split("–")) == (low, high), key

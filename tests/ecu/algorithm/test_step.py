@@ -39,7 +39,7 @@ SEEN = (  # inputs of a car with everything but a speed reference
     "pedal_position",
     "decel_demand",
 )
-# What is NaN by contract because nothing computes it yet, or the speed reference that nobody sends.
+# NaN here: the car does not blend, has no emission model, and a test ratio needs its measurement.
 NOT_BUILT = ("motor_demand_", "particle", "test_ratio")  # ratios: of what was fused alone
 PROMISED = [k for k, name in enumerate(OUTPUT_COLUMNS) if not name.startswith(NOT_BUILT)]
 
