@@ -37,7 +37,7 @@ _CACHE_ROOT = Path(
 
 
 _CONSTANTS = frozenset(
-    {"clock.py", "faults.py", "jit.py", "layout.py", "params.py", "records.py", "signals.py"}
+    {"clock.py", "dust.py", "faults.py", "jit.py", "layout.py", "params.py", "records.py", "signals.py"}
 )
 
 

@@ -151,13 +151,13 @@ def test_a_signal_ends_it_with_three_demands_flagged_invalid(number, daemon, car
 
 BROKEN = """
 import itertools, sys
-import ecu.{module}
-count, whole = itertools.count(), ecu.{module}.{function}
+import ecu.runtime.{module}
+count, whole = itertools.count(), ecu.runtime.{module}.{function}
 def broken(*arguments):
     if next(count) == 400:
         raise {error}
     return whole(*arguments)
-ecu.{module}.{function} = broken
+ecu.runtime.{module}.{function} = broken
 from ecu.cli import main
 sys.exit(main(sys.argv[1:]))
 """

@@ -203,7 +203,6 @@ def _tell(memory: list[float], learned: RecordArray, rig: Rig) -> None:
 
 def soak_virtual(hours: float, seed: int, folder: Path) -> list[Check]:
     """Run hours of virtual time; return the checks."""
-    structlog.configure(wrapper_class=structlog.make_filtering_bound_logger(50))
     total = round(hours * HOUR)
     rig = Rig("real-driving", 1e-2 * total, seed)
     memory: list[float] = []
@@ -316,6 +315,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1, help="of the drawn car and its noise")
     parser.add_argument("--out", type=Path, help="folder for recording and store, kept")
     wanted = parser.parse_args(arguments)
+    if wanted.kind == "virtual":  # hours of events, none of them to look at
+        structlog.configure(wrapper_class=structlog.make_filtering_bound_logger(50))
     soak = soak_virtual if wanted.kind == "virtual" else soak_live
     with tempfile.TemporaryDirectory() as scratch:
         folder = wanted.out or Path(scratch)
