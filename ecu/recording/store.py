@@ -297,7 +297,7 @@ PARTS: Final = {
     "wear": (WEAR, wear_out_of_range, "odometer"),
     "dust": (DUST, dust_out_of_range, "way"),
 }
-"""What belongs to the vehicle and its pads: layout, check, and the way [m] by which it went on."""
+"""Record of the vehicle and its pads: layout, check, and the distance [m] by which it went on."""
 
 
 def covariance_of(triangle: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -98,7 +98,7 @@ class Axle(Section):
     """delta_1 of (3.7), 1/m. Table C.1 prints ten times as much: 400 to 100 degC in a minute at 100 km/h."""
     pad: Pad = Pad()
     dust: Dust | None = None
-    """What its brakes emit; without: nothing is told of it."""
+    """Particle emission of its brakes; without it the outputs are not available."""
 
 
 class Sensors(Section):

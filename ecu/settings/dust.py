@@ -1,4 +1,4 @@
-"""What a brake of an axle emits, as CONFIG has it: `[front.dust]`, `[rear.dust]` by `identify dust`."""
+"""Emission model of an axle's brake in CONFIG: `[front.dust]`, `[rear.dust]` by `identify dust`."""
 
 import zlib
 from typing import Annotated, Any, Literal

@@ -174,7 +174,8 @@ def test_a_file_of_that_name_comes_first(
     "command",
     [
         *("run", "demo", "simulate", "rig", "replay", "play", "report", "fleet", "wear", "compare", "tune"),
-        *("bench", "doctor", "map suggest", "lab run", "lab look", "identify friction", "identify wear"),
+        *("bench", "doctor", "map suggest", "lab run", "lab look"),
+        *("identify friction", "identify wear", "identify dust"),
     ],
 )
 def test_help_is_an_imperative_and_shows_no_python_types(

@@ -76,10 +76,12 @@ def dust(
         Path, typer.Argument(metavar="MANIFEST.csv", help="Trips with a particle counter: trip, file, test")
     ],
     config: Config,
-    out: Annotated[Path, typer.Option("--out", metavar="CAR.toml", help="A CONFIG; CAR.md beside")],
-    axle: Annotated[str, typer.Option("--axle", metavar="AXLE", help="Whose brakes: front, rear")] = "front",
+    out: Annotated[Path, typer.Option("--out", metavar="CAR.toml", help="CONFIG to write, CAR.md beside it")],
+    axle: Annotated[
+        str, typer.Option("--axle", metavar="AXLE", help="Axle of the brakes: front or rear")
+    ] = "front",
 ) -> int:
-    """What a brake emits, from trips with a particle counter. Writes a CONFIG."""
+    """Identify the particle emission of a brake from trips with a particle counter. Write a CONFIG."""
     from brakelab.identification import dust_command
 
     return dust_command.identify_dust(manifest, config, axle, out)

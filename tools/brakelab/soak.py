@@ -53,7 +53,7 @@ FINE: Final = BusStatus(bus_off=False, error_passive=False, send_failures=0, dro
 
 
 class Check(NamedTuple):
-    """What was looked at, what was seen and whether that is right."""
+    """A check: its subject, its finding and its verdict."""
 
     what: str
     seen: str
@@ -136,7 +136,7 @@ class Life(NamedTuple):
     starts anew has to be accepted again."""
     wrapped: bool
     kept: str
-    """What is wrong with what was learned or with what was stored of it."""
+    """Errors of the learned values, or of the stored ones."""
 
 
 def run_one(rig: Rig, folder: Path, first: int, cycles: int, memory: list[float]) -> Life:

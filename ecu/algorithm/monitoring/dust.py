@@ -1,4 +1,4 @@
-"""What the brakes emit, application by application, by the emission models of CONFIG.
+"""Particle emission of the brakes per application, by the emission models of CONFIG.
 
 While the car moves and brakes, means are taken of what the models want (8.2). At the end of an application
 each corner's model gives its emission factor, and

@@ -21,7 +21,7 @@ SEED: Final = 1
 
 
 class Draw(NamedTuple):
-    """What was found in one recording; the shot terms are None where that was not asked."""
+    """Terms found in one recording; those by shooting are None where that was not asked."""
 
     brake: str
     noise: float
@@ -30,7 +30,7 @@ class Draw(NamedTuple):
 
 
 class PadTerms(NamedTuple):
-    """What was found in CPC of a pad that follows no law."""
+    """Terms found in CPC of a pad that follows no law."""
 
     brake: str
     terms: Support

@@ -1,4 +1,4 @@
-"""What a trip with a particle counter says of each brake application (section 8.4, Figures 8.2 to 8.4).
+"""Features of each brake application on a trip with a particle counter (section 8.4, Figures 8.2 to 8.4).
 
 Background: what the counter shows when cruising, long after a braking, against speed (Figure 8.2): a line
 through the medians of speeds, and about it a slow factor by what was seen within two minutes.

@@ -1,4 +1,4 @@
-"""Which emission model is right, and how far: models judged by trips that they have not seen.
+"""Choice of an emission model and its error, by trips that it has not seen.
 
 Every trip but the tests is left out once; the others fit the model, which then predicts it (the left-out
 predictions, of what lies within the others: outside nothing is told). From these follow

@@ -30,7 +30,7 @@ _PLACED: Final = np.dtype([("frame", FRAME), ("place", "i8")])
 
 
 class Column(Protocol):
-    """What is needed of `asammdf.Signal`."""
+    """The part of `asammdf.Signal` that is used."""
 
     samples: NDArray[Any]
     timestamps: NDArray[np.float64]
@@ -38,7 +38,7 @@ class Column(Protocol):
 
 
 class Measurement:
-    """What is needed of `asammdf.MDF`, which has no useful types."""
+    """The part of `asammdf.MDF` that is used; it has no useful types."""
 
     def __init__(self, path: Path) -> None:
         """Raises UserError if asammdf is not installed or cannot read the file."""

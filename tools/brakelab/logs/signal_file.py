@@ -47,7 +47,7 @@ class SampleBlock(NamedTuple):
 
 @dataclass
 class SignalQuality(Damage):
-    """What was found in a signal file."""
+    """Findings in a signal file."""
 
     rows: int = 0
     samples: int = 0

@@ -1,4 +1,4 @@
-"""What text logs of every format have in common: a stream of whole lines, packed or not, a block at a time.
+"""Text logs of every format: a stream of whole lines, packed or not, a block at a time.
 
 A damaged line is skipped and counted; a last line without its end is never used: its bytes may be missing.
 """

@@ -1,4 +1,4 @@
-"""What names of signals and units give away."""
+"""Hints in the names and units of signals."""
 
 import re
 from typing import Final

@@ -1,4 +1,4 @@
-"""Which signals behave like the inputs of the ECU.
+"""Signals that behave like the inputs of the ECU.
 
 Wheel speeds are known by their names and by going together; everything else is set against them:
 
@@ -54,7 +54,7 @@ class Found(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """How the car moved by its wheels, on a grid of `RATE`."""
+    """Motion of the car by its wheels, on a grid of `RATE`."""
 
     t: Vector
     speed: Vector

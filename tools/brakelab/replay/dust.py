@@ -1,4 +1,4 @@
-"""What one brake application emitted at each corner, from its rows, by the models that the ECU runs.
+"""Emission of one brake application at each corner, from its rows, by the models that the ECU runs.
 
 The same means as `ecu/algorithm/monitoring/dust.py` takes, of what results hold. Outside what a model was
 trained on, and where there is none, nothing is told.

@@ -52,7 +52,7 @@ class Draw(NamedTuple):
     floor: float
     """Error of the law that emits, which knows all but scatter and day, with a level from trips 1 to 7."""
     counted: float
-    """What was counted on trip 8 over what was emitted, minus 1."""
+    """Count on trip 8 over the true emission, minus 1."""
 
 
 class OnBoard(NamedTuple):
