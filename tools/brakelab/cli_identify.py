@@ -81,7 +81,7 @@ def dust(
         str, typer.Option("--axle", metavar="AXLE", help="Axle of the brakes: front or rear")
     ] = "front",
 ) -> int:
-    """Identify the particle emission of a brake from trips with a particle counter. Write a CONFIG."""
+    """Identify particle emission from trips with a counter. Write a CONFIG."""
     from brakelab.identification import dust_command
 
     return dust_command.identify_dust(manifest, config, axle, out)
