@@ -100,8 +100,9 @@ def dust_tables(draws: list[Draw], quiet: list[Draw], cars: list[OnBoard]) -> li
             "predicted over counted, minus 1; VAF and nRMSE as Table 8.3. Goals: best model within "
             f"±{GOAL_MEDIAN:.0f} % in the median, ±{GOAL_WORST:.0f} % at worst. Last row: no model can "
             "be expected to do better than the law itself, whose level is known from trips 1 to 7: "
-            "applications scatter by a factor of e^0.45, days by e^0.10 (standard deviations). Beside that law: "
-            "against what it says of trip 8 instead of what was counted. Chosen: by trips left out, of those that run on board. "
+            "applications scatter by a factor of e^0.45, days by e^0.10 (standard deviations). Beside that "
+            "law: against what it says of trip 8 instead of what was counted. Chosen: by trips left out, of "
+            "those that run on board. "
             f"Counted is {np.median(missed):+.1f} % of what was emitted (some settles on the way); "
             f"{known:.1f} % of the work of trip 8 was within what was trained on.",
         ),
