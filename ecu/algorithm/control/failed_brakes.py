@@ -55,10 +55,8 @@ SETTLED_FROM, SETTLED = 0.05, 0.1  # of the weight, of the force
 SCALE_S, LARGEST_SCALE = 0.3, 1.5
 AGAIN_S = 0.3  # of a braking, in which a verdict of the one before is looked at again
 MOVE_S = 0.05
-GRIP, GRIP_RATE = (
-    0.6,
-    0.5,
-)  # at once or what they had before, then by 1/s: slip is to be seen before a wheel locks
+GRIP = 0.6  # at once, or what they had before
+GRIP_RATE = 0.5  # 1/s from there on: slip shows before a wheel locks
 YAW_LIMIT = 0.15
 """Lateral force of the front tyres that holds the car straight, over their load at rest: 1 % of their
 longitudinal grip, and some 20 degrees at the steering wheel."""
