@@ -22,8 +22,8 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.estimation.motion import fresh, usable
-from ecu.contract.signals import ABS_ACTIVE, ESP_ACTIVE, MOTOR_LIMIT, MOTOR_TORQUE, REVERSE
+from ecu.algorithm.estimation.motion import fresh, others_brake, usable
+from ecu.contract.signals import MOTOR_LIMIT, MOTOR_TORQUE, REVERSE
 from ecu.jit import Record, kernel
 
 BLENDING_STATE = np.dtype(
@@ -117,7 +117,7 @@ def update_motors(
     """
     value = inputs.value
     fading = _fading(params, speed, decel)
-    forbidden = value[ABS_ACTIVE] > 0.5 or value[ESP_ACTIVE] > 0.5 or value[REVERSE] > 0.5
+    forbidden = others_brake(inputs) or value[REVERSE] > 0.5
     for i in range(4):
         known = _current(inputs, MOTOR_LIMIT + i) and _current(inputs, MOTOR_TORQUE + i) and dt > 0.0
         if known:

@@ -22,6 +22,7 @@ import math
 
 import numpy as np
 
+from ecu.algorithm.brake import brake_gain
 from ecu.algorithm.estimation.motion import corner_speed, fresh
 from ecu.algorithm.estimation.tyre import rolling_radius
 from ecu.contract.params import DISTRIBUTIONS, GRAVITY
@@ -199,7 +200,7 @@ def cap_trailing(
     for i in range(4):
         if failed[i]:
             continue
-        lever = 2.0 * params.piston_area[i] * params.effective_radius[i]
+        lever = brake_gain(params, i)
         acts = max(pressure[i] - params.push_out_pressure[i], 0.0)
         nominal = max(lining[i], 0.0) / (lever * params.mu_nominal[i])
         mu, sigma = friction.mu[i], friction.sigma[i]

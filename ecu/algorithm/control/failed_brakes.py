@@ -21,11 +21,12 @@ import math
 
 import numpy as np
 
+from ecu.algorithm.brake import brake_gain
 from ecu.algorithm.control.distribution import ideal_front_share
 from ecu.algorithm.estimation.force import total_tyre_force
-from ecu.algorithm.estimation.motion import motor_torque, usable
+from ecu.algorithm.estimation.motion import motor_torque, others_brake, usable
 from ecu.contract.params import BAR, GRAVITY
-from ecu.contract.signals import ABS_ACTIVE, CALLIPER_PRESSURE, ESP_ACTIVE
+from ecu.contract.signals import CALLIPER_PRESSURE
 from ecu.jit import Record, kernel
 
 FAILED_BRAKES_STATE = np.dtype(
@@ -65,7 +66,7 @@ longitudinal grip, and some 20 degrees at the steering wheel."""
 @kernel
 def _owed_force(params: Record, law: Record, pressure: float, i: int) -> float:
     """Return the force [N] of a wheel's lining at a pressure [bar]."""
-    lever: float = 2.0 * params.piston_area[i] * params.effective_radius[i] / params.wheel_radius[i]
+    lever: float = brake_gain(params, i) / params.wheel_radius[i]
     force: float = lever * law.base[i] * max(BAR * pressure - params.push_out_pressure[i], 0.0)
     return force
 
@@ -113,8 +114,7 @@ def watch_brakes(
     state.given += gain * (given - state.given)
     if not braked:
         state.settled_s, state.scale = 0.0, 1.0
-    others = inputs.value[ABS_ACTIVE] > 0.5 or inputs.value[ESP_ACTIVE] > 0.5
-    judged = sent and not others and motion.measured != 0 and motion.backwards == 0
+    judged = sent and not others_brake(inputs) and motion.measured != 0 and motion.backwards == 0
     judged = judged and total > SETTLED_FROM * weight and abs(due - total) < SETTLED * total
     if judged:
         state.settled_s += dt

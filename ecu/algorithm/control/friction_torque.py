@@ -13,6 +13,7 @@ law uses: this is about lags, not about what the law does not know, or holds bac
 
 import numpy as np
 
+from ecu.algorithm.brake import brake_gain
 from ecu.algorithm.control.pressure_law import friction_in_use
 from ecu.algorithm.estimation.joint.pressure import correct_pressure
 from ecu.algorithm.estimation.motion import fresh
@@ -101,7 +102,7 @@ def lagging_torque(params: Record, state: Record, law: Record, wanted: float, i:
         wanted: the pressure that it is to have now [Pa].
         i: wheel.
     """
-    lever: float = 2.0 * params.piston_area[i] * params.effective_radius[i]
+    lever = brake_gain(params, i)
     push_out = params.push_out_pressure[i]
     missing = max(wanted - push_out, 0.0) - max(BAR * state.value[i] - push_out, 0.0)
     torque: float = lever * friction_in_use(law, i) * missing

@@ -22,6 +22,7 @@ import math
 
 import numpy as np
 
+from ecu.algorithm.brake import brake_gain
 from ecu.algorithm.estimation.motion import usable
 from ecu.contract.params import BAR
 from ecu.contract.signals import ACCUMULATOR_PRESSURE
@@ -72,8 +73,7 @@ def available_pressure(params: Record, inputs: Record) -> float:
 @kernel
 def _nominal_pressure(params: Record, torque: float, corner: int) -> float:
     """Return the pressure [Pa] beyond the push-out pressure that makes a torque at nominal friction."""
-    lever: float = 2.0 * params.piston_area[corner] * params.effective_radius[corner]
-    nominal: float = min(torque / (lever * params.mu_nominal[corner]), BEYOND_ANY)
+    nominal: float = min(torque / (brake_gain(params, corner) * params.mu_nominal[corner]), BEYOND_ANY)
     return nominal
 
 

@@ -22,6 +22,7 @@ import math
 
 import numpy as np
 
+from ecu.algorithm.brake import brake_gain
 from ecu.algorithm.estimation.friction import GREATEST_RATIO, LEAST_RATIO, well_observed
 from ecu.contract.params import INVERSE, OFF
 from ecu.jit import Record, kernel
@@ -53,9 +54,8 @@ def pressure_for_torque(params: Record, torque: float, mu: float, corner: int) -
     """Return the pressure [Pa] for a brake torque [N m] at friction `mu` (5.4); 0 for no torque."""
     if torque <= 0.0:
         return 0.0
-    lever: float = 2.0 * params.piston_area[corner] * params.effective_radius[corner]
     push_out: float = params.push_out_pressure[corner]
-    return torque / (lever * mu) + push_out
+    return torque / (brake_gain(params, corner) * mu) + push_out
 
 
 @kernel

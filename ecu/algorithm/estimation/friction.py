@@ -17,8 +17,9 @@ import math
 
 import numpy as np
 
+from ecu.algorithm.brake import brake_gain
 from ecu.algorithm.control.demand import requested_decel
-from ecu.algorithm.estimation.motion import motor_torque, motor_torque_known, usable
+from ecu.algorithm.estimation.motion import motor_torque, motor_torque_known, others_brake, usable
 from ecu.algorithm.estimation.observer2 import (
     correct_force,
     correct_omega,
@@ -30,11 +31,9 @@ from ecu.algorithm.estimation.observer2 import (
 from ecu.algorithm.estimation.slip import CUT_OFF
 from ecu.algorithm.estimation.tyre import slip_stiffness
 from ecu.contract.signals import (
-    ABS_ACTIVE,
     ACCEL_X,
     ACCELERATOR_POSITION,
     CALLIPER_PRESSURE,
-    ESP_ACTIVE,
     FAULT,
     HOLDING,
     NOMINAL,
@@ -151,15 +150,13 @@ def drives_against(motors: float, brakes: float) -> bool:
 
 @kernel
 def _hold_all(inputs: Record, torque: Record) -> bool:
-    value = inputs.value
     motors, brakes = 0.0, 0.0
     for i in range(4):
         motors += motor_torque(inputs, i)
         brakes += torque[i]
     return (
-        value[ABS_ACTIVE] > 0.5
-        or value[ESP_ACTIVE] > 0.5
-        or value[REVERSE] > 0.5
+        others_brake(inputs)
+        or inputs.value[REVERSE] > 0.5
         or driver_accelerates(inputs)
         or drives_against(motors, brakes)
     )
@@ -173,8 +170,7 @@ def update_pressure(params: Record, state: Record, inputs: Record, dt: float) ->
         above = 1e5 * inputs.value[CALLIPER_PRESSURE + i] - params.push_out_pressure[i]
         if math.isfinite(above):
             state.pressure[i] += gain * (above - state.pressure[i])
-        k = 2.0 * params.piston_area[i] * params.effective_radius[i]
-        state.torque[i] = k * state.mu[i] * max(state.pressure[i], 0.0)
+        state.torque[i] = brake_gain(params, i) * state.mu[i] * max(state.pressure[i], 0.0)
 
 
 @kernel

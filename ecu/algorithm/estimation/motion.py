@@ -20,8 +20,10 @@ import numpy as np
 
 from ecu.contract.params import GRAVITY
 from ecu.contract.signals import (
+    ABS_ACTIVE,
     ACCEL_X,
     ACCEL_Y,
+    ESP_ACTIVE,
     MOTOR_TORQUE,
     REVERSE,
     STEERING_ANGLE,
@@ -61,6 +63,13 @@ def usable(inputs: Record, place: int) -> bool:
 def fresh(inputs: Record, place: int) -> bool:
     """Return whether a valid sample of an input came in this cycle."""
     return inputs.new[place] != 0 and math.isfinite(inputs.value[place])
+
+
+@kernel
+def others_brake(inputs: Record) -> bool:
+    """Return whether an ABS or ESP says that it works: pressures are then not those that were demanded."""
+    works: bool = inputs.value[ABS_ACTIVE] > 0.5 or inputs.value[ESP_ACTIVE] > 0.5
+    return works
 
 
 @kernel

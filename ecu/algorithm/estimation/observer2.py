@@ -22,6 +22,7 @@ import math
 
 import numpy as np
 
+from ecu.algorithm.brake import brake_gain
 from ecu.jit import Record, kernel
 
 OBSERVER_STATE = np.dtype(
@@ -76,7 +77,7 @@ def predict_observer(
     `force_input` is F_L^(VS) [N] with the variance of its noise [N^2]; `noise` from `process_noise`.
     """
     inertia = params.wheel_inertia[i]
-    lever = 2.0 * params.piston_area[i] * params.effective_radius[i]
+    lever = brake_gain(params, i)
     torque_per_mu = lever * pressure
     keep = math.exp(-dt * max(speed, 1.0) / params.relaxation_length)
     before = state.force[i]

@@ -31,13 +31,11 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.estimation.motion import fresh, motor_torque, usable
+from ecu.algorithm.estimation.motion import fresh, motor_torque, others_brake, usable
 from ecu.contract.params import GRAVITY
 from ecu.contract.signals import (
-    ABS_ACTIVE,
     ACCEL_X,
     CALLIPER_PRESSURE,
-    ESP_ACTIVE,
     MOTOR_TORQUE,
     REVERSE,
     WHEEL_SPEED,
@@ -96,7 +94,7 @@ def _tells(params: Record, inputs: Record, speed: float) -> bool:
         rolls = abs(value[wheel] * params.wheel_radius[i] - speed) < ROLLING * speed
         told = told and rolls and usable(inputs, wheel) and inputs.age_ns[wheel] < oldest
         told = told and usable(inputs, CALLIPER_PRESSURE + i)
-    works = value[ABS_ACTIVE] > 0.5 or value[ESP_ACTIVE] > 0.5 or value[REVERSE] > 0.5
+    works = others_brake(inputs) or value[REVERSE] > 0.5
     return told and not works
 
 

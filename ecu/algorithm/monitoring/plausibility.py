@@ -16,8 +16,8 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.estimation.motion import corner_speed, fresh, motor_torque, usable
-from ecu.contract.signals import ABS_ACTIVE, CALLIPER_PRESSURE, ESP_ACTIVE, WHEEL_SPEED
+from ecu.algorithm.estimation.motion import corner_speed, fresh, motor_torque, others_brake, usable
+from ecu.contract.signals import CALLIPER_PRESSURE, WHEEL_SPEED
 from ecu.jit import Record, kernel
 
 PLAUSIBILITY_STATE = np.dtype(
@@ -129,7 +129,7 @@ def watch_pressures(state: Record, inputs: Record, expected: Record, zero: Recor
         zero: what the sensors read without pressure, shape (4,) [bar].
         dt: time since the last cycle [s].
     """
-    others = inputs.value[ABS_ACTIVE] > 0.5 or inputs.value[ESP_ACTIVE] > 0.5
+    others = others_brake(inputs)
     following = 0
     for i in range(4):
         following += 1 if _gap(inputs, i, expected[i], zero[i]) < FOLLOWS else 0

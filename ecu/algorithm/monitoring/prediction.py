@@ -17,8 +17,8 @@ import numpy as np
 from ecu.algorithm.estimation.friction import driver_accelerates
 from ecu.algorithm.estimation.joint.layout import BIAS, DRAG, LEVEL, MASS, MOTOR, OVERRUN, V
 from ecu.algorithm.estimation.joint.wheel import brake_lever
+from ecu.algorithm.estimation.motion import others_brake
 from ecu.contract.params import GRAVITY
-from ecu.contract.signals import ABS_ACTIVE, ESP_ACTIVE
 from ecu.jit import Record, kernel
 
 LEARNED_WAY, CONFIGURED_WAY = range(2)
@@ -66,10 +66,9 @@ def begin_prediction(params: Record, state: Record, joint: Record) -> None:
 @kernel
 def _counts(inputs: Record, joint: Record) -> bool:
     """Return whether the last window tells how well the car is predicted."""
-    works = inputs.value[ABS_ACTIVE] > 0.5 or inputs.value[ESP_ACTIVE] > 0.5
     rolls = joint.x[V] > LEAST_SPEED and joint.sliding == 0
-    counts: bool = joint.pressed < STEADY and rolls and joint.window.balanced != 0 and not works
-    return counts and not driver_accelerates(inputs)
+    counts: bool = joint.pressed < STEADY and rolls and joint.window.balanced != 0
+    return counts and not others_brake(inputs) and not driver_accelerates(inputs)
 
 
 @kernel

@@ -63,12 +63,10 @@ from ecu.algorithm.estimation.joint.wheel import (
 )
 from ecu.algorithm.estimation.joint.window import close_window, gather, open_window
 from ecu.algorithm.estimation.joint.zero import settle_zero
-from ecu.algorithm.estimation.motion import STANDING, mean_wheel_speed, speed_backwards, usable
+from ecu.algorithm.estimation.motion import STANDING, mean_wheel_speed, others_brake, speed_backwards, usable
 from ecu.contract.signals import (
-    ABS_ACTIVE,
     ACCEL_X,
     CALLIPER_PRESSURE,
-    ESP_ACTIVE,
     WHEEL_SPEED,
 )
 from ecu.jit import Record, kernel
@@ -115,14 +113,14 @@ def _axle_unknown(inputs: Record, left: int) -> bool:
 
 @kernel
 def _learning_forbidden(params: Record, state: Record, inputs: Record, braking: bool) -> bool:
-    value, w = inputs.value, state.window
+    w = state.window
     motors, brakes = 0.0, 0.0
     for i in range(4):
         motors += w.motor[i]
         brakes += brake_torque(params, state, i, w.pressure[i])
     against = braking and (driver_accelerates(inputs) or drives_against(motors, brakes))
     unknown = braking and (_axle_unknown(inputs, 0) or _axle_unknown(inputs, 2))
-    forbidden: bool = against or unknown or value[ABS_ACTIVE] > 0.5 or value[ESP_ACTIVE] > 0.5
+    forbidden: bool = against or unknown or others_brake(inputs)
     return forbidden
 
 
