@@ -6,14 +6,10 @@ has `t` [s], `vehicle_speed` [m/s], `calliper_pressure_fr` [bar], `brake_torque_
 Rows without a value are between two samples: the counter has one a second, the rest some ten.
 """
 
-import csv
 from pathlib import Path
 from typing import Final
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.csv as pa_csv
-import pyarrow.parquet as pq
 
 from brakelab.identification.dust_features import (
     PERIOD,
@@ -22,6 +18,7 @@ from brakelab.identification.dust_features import (
     Recorded,
     extract,
 )
+from brakelab.identification.measurement_files import check_celsius, read_columns, read_manifest
 from ecu.errors import UserError
 
 CORNER: Final = "fr"
@@ -53,13 +50,8 @@ def read_trips(manifest: Path, push_out: float, radius: float) -> list[Applicati
     Raises:
         UserError: a file, a row or a value of it is not right.
     """
-    try:
-        with manifest.open(encoding="utf-8", newline="") as file:
-            rows = list(csv.DictReader(file))
-    except (OSError, UnicodeDecodeError) as error:
-        raise UserError(str(manifest), "", f"cannot be read: {error}; give a CSV manifest") from None
     trips = []
-    for line, row in enumerate(rows, 2):
+    for line, row in enumerate(read_manifest(manifest), 2):
         if not row.get("trip") or not row.get("file") or row.get("test") not in ("0", "1"):
             raise UserError(str(manifest), f"line {line}", "needs trip, file and test (1: held out, else 0)")
         path = manifest.parent / row["file"]
@@ -77,19 +69,9 @@ def read_trips(manifest: Path, push_out: float, radius: float) -> list[Applicati
 
 
 def _read_trip(path: Path, name: str, test: bool, push_out: float) -> Recorded:
-    try:
-        table = pq.read_table(path) if path.suffix == ".parquet" else pa_csv.read_csv(path)
-    except (OSError, pa.ArrowInvalid) as error:
-        reason = str(error).splitlines()[0]
-        raise UserError(str(path), "", f"cannot be read as CSV or Parquet: {reason}") from None
-    if missing := [column for column in COLUMNS if column not in table.column_names]:
-        raise UserError(str(path), missing[0], f"no such column; a trip has {', '.join(COLUMNS)}")
-    try:
-        columns = {c: table[c].cast(pa.float64()).to_numpy(zero_copy_only=False) for c in COLUMNS}
-    except pa.ArrowInvalid:
-        raise UserError(str(path), "", f"{', '.join(COLUMNS)} must be numbers") from None
+    columns = read_columns(path, COLUMNS, "trip")
     t = columns["t"]
-    if len(t) < 2 or not np.all(np.diff(t) > 0.0):
+    if len(t) < 2:
         raise UserError(str(path), "t", "must rise from row to row")
     grid = np.arange(t[0], t[-1], PERIOD)
     even = {c: _on_grid(path, c, t, columns[c], grid) for c in COLUMNS[1:]}
@@ -115,10 +97,7 @@ def _check_ranges(path: Path, even: dict[str, Array]) -> None:
     flow, count = even["tunnel_flow"], even["particle_concentration"]
     if speed.max() > FASTEST:
         raise UserError(str(path), "vehicle_speed", f"up to {speed.max():.0f} m/s: km/h? convert it to m/s")
-    if heat.min() > 250.0 or heat.max() > HOTTEST or heat.min() < -60.0:
-        place = f"disc_temperature_{CORNER}"
-        remedy = f"{heat.min():.0f} to {heat.max():.0f} cannot be degC; convert it"
-        raise UserError(str(path), place, remedy)
+    check_celsius(path, f"disc_temperature_{CORNER}", heat, HOTTEST)
     if not 0.0 < flow.min() <= flow.max() < MOST_FLOW:
         remedy = f"{flow.min():.3g} to {flow.max():.3g} cannot be m^3/s of a tunnel; convert it"
         raise UserError(str(path), "tunnel_flow", remedy)

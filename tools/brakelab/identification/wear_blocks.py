@@ -6,17 +6,14 @@ Parquet) has `t` [s], `omega` [rad/s], `calliper_pressure` [bar], `brake_torque`
 [degC]; stops are found by the pressure.
 """
 
-import csv
 import math
 from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.csv as pa_csv
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from brakelab.identification.measurement_files import check_celsius, read_columns, read_manifest
 from brakelab.replay.wear import regressors_of
 from ecu.errors import UserError
 from ecu.settings.pad import Pad
@@ -61,11 +58,7 @@ def read_blocks(manifest: Path, pad: Pad, heat: Heat) -> list[Block]:
     Raises:
         UserError: a file, a row or a value of it is not right.
     """
-    try:
-        with manifest.open(encoding="utf-8", newline="") as file:
-            rows = list(csv.DictReader(file))
-    except (OSError, UnicodeDecodeError) as error:
-        raise UserError(str(manifest), "", f"cannot be read: {error}; give a CSV manifest") from None
+    rows = read_manifest(manifest)
     if not rows:
         raise UserError(str(manifest), "", "no blocks; give a row with block, file, mass_before, mass_after")
     return [_block(manifest, number, row, pad, heat) for number, row in enumerate(rows, 2)]
@@ -124,19 +117,7 @@ def read_stops(path: Path) -> list[dict[str, Array]]:
     Raises:
         UserError: the file cannot be read or lacks a column.
     """
-    try:
-        table = pq.read_table(path) if path.suffix == ".parquet" else pa_csv.read_csv(path)
-    except (OSError, pa.ArrowInvalid) as error:
-        reason = str(error).splitlines()[0]
-        raise UserError(str(path), "", f"cannot be read as CSV or Parquet: {reason}") from None
-    if missing := [name for name in COLUMNS if name not in table.column_names]:
-        raise UserError(str(path), missing[0], f"no such column; a block has {', '.join(COLUMNS)}")
-    try:
-        columns = {name: table[name].cast(pa.float64()).to_numpy() for name in COLUMNS}
-    except pa.ArrowInvalid:
-        raise UserError(str(path), "", f"{', '.join(COLUMNS)} must be numbers") from None
-    if np.any(np.diff(columns["t"]) <= 0.0):
-        raise UserError(str(path), "t", "must rise from row to row")
+    columns = read_columns(path, COLUMNS, "block")
     pressed = columns["calliper_pressure"] > PRESSED
     edges = np.flatnonzero(np.diff(pressed, prepend=False, append=False))
     stops = [
@@ -158,9 +139,7 @@ def _check_temperature(path: Path, stops: list[dict[str, Array]], heat: Heat) ->
     everything = np.concatenate([stop["disc_temperature"] for stop in stops])
     if not np.isfinite(everything).all():
         raise UserError(str(path), "disc_temperature", "has gaps while the brake is applied; fill them")
-    if everything.min() > 250.0 or everything.max() > HOTTEST or everything.min() < -60.0:
-        low, high = everything.min(), everything.max()
-        raise UserError(str(path), "disc_temperature", f"{low:.0f} to {high:.0f} cannot be degC; convert it")
+    check_celsius(path, "disc_temperature", everything, HOTTEST)
     ratios = []
     for stop in stops:
         seconds = stop["t"][-1] - stop["t"][0]

@@ -1,0 +1,70 @@
+"""Manifests and tables of measurements: read, and refused in one line where they are not right."""
+
+import csv
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pa_csv
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from ecu.errors import UserError
+
+Array = NDArray[np.float64]
+
+WARMEST_COLD: Final = 250.0
+"""degC: a disc that is never cooler is given in K."""
+COLDEST: Final = -60.0  # degC
+
+
+def read_manifest(path: Path) -> list[dict[str, str]]:
+    """Return the rows of a CSV manifest.
+
+    Raises:
+        UserError: it cannot be read.
+    """
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            return list(csv.DictReader(file))
+    except (OSError, UnicodeDecodeError) as error:
+        raise UserError(str(path), "", f"cannot be read: {error}; give a CSV manifest") from None
+
+
+def read_columns(path: Path, names: tuple[str, ...], what: str) -> dict[str, Array]:
+    """Return columns of a CSV or Parquet file, each of shape (n,); NaN where a row has no value.
+
+    Args:
+        path: of the file.
+        names: of the columns, among them `t` [s].
+        what: the file is one of.
+
+    Raises:
+        UserError: it cannot be read, lacks a column, holds what is no number, or time does not rise.
+    """
+    try:
+        table = pq.read_table(path) if path.suffix == ".parquet" else pa_csv.read_csv(path)
+    except (OSError, pa.ArrowInvalid) as error:
+        reason = str(error).splitlines()[0]
+        raise UserError(str(path), "", f"cannot be read as CSV or Parquet: {reason}") from None
+    if missing := [name for name in names if name not in table.column_names]:
+        raise UserError(str(path), missing[0], f"no such column; a {what} has {', '.join(names)}")
+    try:
+        columns = {name: table[name].cast(pa.float64()).to_numpy(zero_copy_only=False) for name in names}
+    except pa.ArrowInvalid:
+        raise UserError(str(path), "", f"{', '.join(names)} must be numbers") from None
+    if not np.all(np.diff(columns["t"]) > 0.0):
+        raise UserError(str(path), "t", "must rise from row to row")
+    return columns
+
+
+def check_celsius(path: Path, name: str, values: Array, hottest: float) -> None:
+    """Refuse temperatures of a disc that cannot be degC.
+
+    Raises:
+        UserError: they are none.
+    """
+    low, high = values.min(), values.max()
+    if low > WARMEST_COLD or high > hottest or low < COLDEST:
+        raise UserError(str(path), name, f"{low:.0f} to {high:.0f} cannot be degC; convert it")
