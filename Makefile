@@ -20,7 +20,7 @@ demo: .venv/lab
 	.venv/bin/brake-ecu demo $(ARGS)
 
 test: .venv/dev
-	.venv/bin/python -m pytest -n auto --maxprocesses 4 --dist loadgroup $(ARGS)
+	.venv/bin/python -m pytest -n auto --maxprocesses 4 --dist loadfile $(ARGS)
 
 check: .venv/dev
 	.venv/bin/ruff check .

@@ -41,18 +41,7 @@ def _has_multicast() -> bool:
     return True
 
 
-def _share_out(items: list[pytest.Item]) -> None:
-    """Keep the tests of a file together; those of whole processes, which wait rather than work, come first
-    and one after the other, beside the others."""
-    folder = CHECKOUT / "tests" / "system"
-    for item in items:
-        whole = item.path.is_relative_to(folder)
-        item.add_marker(pytest.mark.xdist_group("system" if whole else item.path.stem))
-    items.sort(key=lambda item: not item.path.is_relative_to(folder))
-
-
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    _share_out(items)
     absent = {}
     if not Path("/sys/class/net/vcan0").exists():
         absent["socketcan"] = "no interface vcan0"
