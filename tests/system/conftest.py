@@ -10,7 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from brakelab.simulation.priority import PRIORITY
 from ecu.bus.channel import Channel, open_channel
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
 from ecu.contract.records import FRAME, new_record
@@ -134,6 +135,20 @@ def wait_for(fact: Callable[[], bool]) -> None:
         time.sleep(0.01)
 
 
+@contextmanager
+def priority() -> Iterator[None]:
+    """SCHED_FIFO for this thread, not for what it starts: a vehicle does not wait for a busy machine."""
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(PRIORITY))
+    except OSError:
+        yield
+        return
+    try:
+        yield
+    finally:
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+
+
 class Vehicle:
     """Sends every frame of the vehicle at its rate for as long as it is told to, and hears what it must."""
 
@@ -178,14 +193,15 @@ def demand_ids() -> tuple[int, ...]:
 
 @pytest.fixture
 def vehicle() -> Iterator[Callable[..., Vehicle]]:
-    """Open a vehicle on a bus."""
+    """Open a vehicle on a bus; the test that drives it runs in real time where that is granted."""
     opened: list[Vehicle] = []
 
     def start(interface: str, channel: str) -> Vehicle:
         opened.append(Vehicle(open_channel(interface, channel, receive_ids=demand_ids())))
         return opened[-1]
 
-    yield start
+    with priority():
+        yield start
     for one in opened:
         one.channel.close()
 
