@@ -11,6 +11,7 @@ import sys
 import time
 from collections import deque
 from collections.abc import Iterable
+from contextlib import suppress
 from typing import Any, Final, NamedTuple, Protocol
 
 import can
@@ -113,10 +114,16 @@ def _open(interface: str, channel: str, special: dict[str, Any]) -> can.BusABC |
 
 
 def _hear_own_group_only(bus: can.BusABC) -> None:
-    """Leave the groups alone that other processes joined: Linux hands them to every socket of the port."""
+    """Leave the groups alone that other processes joined: Linux hands them to every socket of the port.
+
+    What came in before the socket was told so is thrown away.
+    """
     if sys.platform == "linux":
         with socket.socket(fileno=os.dup(bus.fileno())) as own:
             own.setsockopt(socket.IPPROTO_IP, _IP_MULTICAST_ALL, 0)
+            with suppress(BlockingIOError):
+                while True:
+                    own.recv(1, socket.MSG_DONTWAIT)
 
 
 def _is_malformed(error: Exception) -> bool:

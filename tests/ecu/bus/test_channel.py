@@ -1,5 +1,6 @@
 import gc
 import logging
+import select
 import threading
 import time
 
@@ -235,6 +236,24 @@ def test_another_group_of_the_same_machine_is_another_bus():
     finally:
         for one in (other, sender, hearer):
             one.close()
+
+
+@pytest.mark.multicast
+def test_what_another_group_sends_while_a_channel_is_opened_is_not_heard(monkeypatch):
+    other = open_channel("udp_multicast", "239.74.163.5", receive_ids=[])
+    begin = can.Bus
+
+    def begin_slowly(**arguments):
+        bus = begin(**arguments)
+        other.send(frame(0x10), 1)
+        assert select.select([bus.fileno()], [], [], 60)[0]  # Linux hands it over until told not to
+        return bus
+
+    monkeypatch.setattr(can, "Bus", begin_slowly)
+    hearer = open_channel("udp_multicast", "239.74.163.6", receive_ids=[0x10])
+    assert hearer.drain(new_record(FRAME, 8), 0) == 0
+    for one in (other, hearer):
+        one.close()
 
 
 @pytest.mark.parametrize("error", [NameError("no canlib"), AttributeError("windll"), OSError("no device")])
