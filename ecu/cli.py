@@ -95,14 +95,18 @@ def run(
         bool,
         typer.Option("--standby", help="Stay silent beside a running daemon; take over when it falls silent"),
     ] = False,
+    armed: Annotated[
+        bool,
+        typer.Option("--armed", help="Flag the demands valid, as `transmit = true` in CONFIG does"),
+    ] = False,
 ) -> int:
-    """Run the daemon on a CAN bus. Its demands are flagged invalid unless `transmit = true` in CONFIG."""
+    """Run the daemon on a CAN bus. Its demands are flagged invalid unless it is armed."""
     with kept_out("rich", "scipy"):  # structlog's tracebacks, and BLAS that no kernel of the cycle calls
         import numba.np.arraymath  # noqa: F401
 
         from ecu.runtime import prepare, service
     return service.run(
-        prepare.RunOptions(config, interface, channel, map, record, record_limit, state, standby)
+        prepare.RunOptions(config, interface, channel, map, record, record_limit, state, standby, armed)
     )
 
 

@@ -55,6 +55,8 @@ class RunOptions(NamedTuple):
     """GB of all recordings in `record`."""
     state: Path | None = None
     standby: bool = False
+    armed: bool = False
+    """Whatever the configuration says."""
 
 
 class Session(NamedTuple):
@@ -103,6 +105,8 @@ def prepare(options: RunOptions) -> Session:
     progress = CompileProgress(manager)
     compiled = CompileCounter(progress)
     config = load_config(options.config)
+    if options.armed:
+        config = config.model_copy(update={"transmit": True})
     receiving = receive_plan(options.map)
     sending = contract_transmit_plan(resource("dbc/brake_ecu.dbc"), "BrakeEcu")
     params = new_params(config)
@@ -183,6 +187,7 @@ def _describe(options: RunOptions, config: Config) -> dict[str, Any]:
         "config": str(options.config),
         "map": None if options.map is None else str(options.map),
         "config_hash": config_hash(config),
+        "armed": config.transmit,
         "store_key": store_key(config),
         "versions": {
             "brake-ecu": __version__,

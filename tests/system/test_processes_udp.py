@@ -25,13 +25,9 @@ GROUP = f"239.76.{os.getpid() >> 8 & 0xFF}.{os.getpid() & 0xFF}"
 
 
 @pytest.fixture
-def bus(tmp_path):
+def bus():
     """Arguments of an armed daemon."""
-    config = tmp_path / "armed.toml"
-    text = (ROOT / "config" / "suv.toml").read_text()
-    config.write_text(text.replace("transmit = false", "transmit = true"))
-    assert "transmit = true" in config.read_text()
-    return ("--config", config, "-i", "udp_multicast", "-c", GROUP)
+    return ("--config", ROOT / "config" / "suv.toml", "--armed", "-i", "udp_multicast", "-c", GROUP)
 
 
 @pytest.fixture

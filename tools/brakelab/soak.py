@@ -20,7 +20,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import structlog
 
-from brakelab.rig.live import armed_config, choose_bus, drive
+from brakelab.rig.live import choose_bus, drive
 from brakelab.simulation.closed_loop import START_NS, plans
 from brakelab.simulation.scenario import load_scenario
 from brakelab.simulation.vehicle_bus import N_TRUTH
@@ -271,7 +271,7 @@ def soak_live(hours: float, seed: int, folder: Path) -> list[Check]:
     scenario = folder / "soak.toml"
     scenario.write_text(f"repeat = {max(1, round(3600.0 * hours / once))}\n{text}", "utf-8")
     looks, bus = Looks(), choose_bus()
-    left = drive(bus, scenario, armed_config(resource("config/suv.toml"), folder), [], folder, seed, looks)
+    left = drive(bus, scenario, resource("config/suv.toml"), [], folder, seed, looks)
     recorded = read_recording(left.recordings[0])
     cycles = recorded.cycles
     lines = sum(block.count(b"\n") for block in _blocks(recorded.frames))

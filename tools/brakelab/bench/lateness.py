@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.rig.live import Processes, armed_config, choose_bus
+from brakelab.rig.live import Processes, choose_bus
 from brakelab.studies.table import Table
 from ecu.contract.signals import CYCLE_NS
 from ecu.recording.recorder import read_recording
@@ -70,9 +70,8 @@ def measure(seconds: float) -> Lateness:
     busy: list[subprocess.Popen[bytes]] = []
     with tempfile.TemporaryDirectory() as folder:
         out, stop = Path(folder), Path(folder) / "stop"
-        config = armed_config(resource("config/suv.toml"), out)
         with (out / "daemon.log").open("wb") as log:
-            processes = Processes(bus, config, out, log)
+            processes = Processes(bus, resource("config/suv.toml"), out, log)
             bare = None
             try:
                 processes.start_vehicle(resource(SCENARIO), SEED)

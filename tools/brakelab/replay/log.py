@@ -49,10 +49,11 @@ def read_cycles(recording: Recording) -> RecordArray:
 
 
 def start_as_recorded(ecu: Ecu, recording: Recording) -> None:
-    """Overwrite the ECU's state with the one before the first recorded cycle."""
+    """Overwrite the ECU's state with the one before the first recorded cycle; arm it if it was armed."""
     if recording.initial.dtype != ecu.state.dtype:
         raise _other_version(recording)
     ecu.state[:] = recording.initial
+    ecu.params[0]["transmit"] = recording.about.get("armed", ecu.params[0]["transmit"])
 
 
 def _other_version(recording: Recording) -> UserError:

@@ -15,7 +15,7 @@ from rich.console import Console
 
 from brakelab.report.command import report
 from brakelab.report.drive import Drive
-from brakelab.rig.live import Bus, armed_config, choose_bus, drive, named_bus
+from brakelab.rig.live import Bus, choose_bus, drive, make_folder, named_bus
 from brakelab.rig.outcome import Outcome, Undisturbed, outcome, stopping_distance
 from brakelab.rig.page import summary, write_page, write_tables
 from brakelab.rig.results import write_recorded, write_simulated
@@ -68,12 +68,8 @@ def rig(
         RunFault: a daemon or the vehicle ended early.
     """
     scenarios = [(path, load_scenario(path)) for path in found(names)]
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        armed = armed_config(config, out)
-    except OSError as error:
-        raise UserError("--out", str(out), f"cannot be written ({error.strerror}); choose another") from None
-    vehicle = load_config(armed)
+    make_folder(out)
+    vehicle = load_config(config)
     meeting = None
     if not lock_step:
         meeting = choose_bus() if bus is None else named_bus(*bus)
@@ -91,7 +87,7 @@ def rig(
             if meeting is None:
                 outcomes.append(_in_memory(path.stem, scenario, vehicle, folder, seed))
             else:
-                outcomes.append(_in_real_time(path, scenario, meeting, armed, vehicle, folder, seed))
+                outcomes.append(_in_real_time(path, scenario, meeting, config, vehicle, folder, seed))
     finally:
         if meeting is not None:
             meeting.close()
@@ -124,9 +120,9 @@ def _in_memory(name: str, scenario: Scenario, vehicle: Config, folder: Path, see
 
 
 def _in_real_time(
-    path: Path, scenario: Scenario, bus: Bus, armed: Path, vehicle: Config, folder: Path, seed: int
+    path: Path, scenario: Scenario, bus: Bus, config: Path, vehicle: Config, folder: Path, seed: int
 ) -> Outcome:
-    recorded = drive(bus, path, armed, scenario.fault, folder, seed)
+    recorded = drive(bus, path, config, scenario.fault, folder, seed)
     written = write_recorded(recorded.recordings, vehicle, folder)
     report(written.result, recorded.truth, folder / "report.html", recorded.recordings[0])
     undisturbed = _undisturbed(scenario, vehicle, seed)

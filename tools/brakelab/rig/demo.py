@@ -15,14 +15,13 @@ import numpy as np
 from rich.console import Console
 
 from brakelab.report.command import report
-from brakelab.rig.live import Bus, armed_config, choose_bus, drive
+from brakelab.rig.live import Bus, choose_bus, drive, make_folder
 from brakelab.rig.results import write_recorded
 from brakelab.simulation.closed_loop import plans
 from brakelab.simulation.scenario import load_scenario
 from brakelab.vehicle_node import drive_in_real_time, new_node, wait_for_ecu, warm_up, write_truth_file
 from ecu.bus.channel import open_channel
 from ecu.contract.records import RecordArray
-from ecu.errors import UserError
 from ecu.recording.recorder import read_recording
 from ecu.recording.ring import RingReader, ring_path
 from ecu.runtime.clock import system_time
@@ -83,14 +82,8 @@ def demo(out: Path) -> int:
         UserError: `out` cannot be written.
         RunFault: daemon or vehicle ended with an error.
     """
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        config = armed_config(resource("config/suv.toml"), out)
-    except OSError as error:
-        raise UserError(
-            "--out", str(out), f"cannot be written ({error.strerror}); choose another folder"
-        ) from None
-    bus = choose_bus()
+    make_folder(out)
+    config, bus = resource("config/suv.toml"), choose_bus()
     say(f"bus: {bus.why}")
     say("compiling what is not in the cache yet, about a minute the first time")
     warm_up(load_scenario(resource(SCENARIO)))
@@ -128,5 +121,5 @@ def _in_one_process(bus: Bus, config: Path, out: Path) -> list[Path]:
 
     over = threading.Event()
     threading.Thread(target=drive_then_stop).start()
-    run(RunOptions(config, bus.interface, bus.channel, record=out / "drive"))
+    run(RunOptions(config, bus.interface, bus.channel, record=out / "drive", armed=True))
     return [read_recording(out / "drive").folder]

@@ -4,9 +4,9 @@ The vehicle (`brakelab.vehicle_node`) sets off when it hears the ECU. What a sce
 sensors and actuators happens in it; what they do to the daemon happens here, at the same T_0.
 """
 
+import ctypes
 import math
 import os
-import re
 import shutil
 import signal
 import subprocess
@@ -28,6 +28,30 @@ from ecu.runtime.start import ahead_of_others
 MULTICAST: Final = f"239.74.163.{os.getpid() % 250 + 2}"  # a group of its own: two rigs do not meet
 PATIENCE_S: Final = 180.0  # for a slow machine to get ready
 TURN_S: Final = 0.05
+LIBC: Final = ctypes.CDLL(None)
+PR_SET_PDEATHSIG: Final = 1
+
+
+def make_folder(out: Path) -> None:
+    """Make the folder `out`. Raises UserError if nothing can be written into it."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        reason = "" if os.access(out, os.W_OK | os.X_OK) else "permission denied"
+    except OSError as error:
+        reason = error.strerror or str(error)
+    if reason:
+        raise UserError("--out", str(out), f"cannot be written ({reason}); choose another folder")
+
+
+def end_with_parent() -> None:
+    """Get SIGTERM when the parent process ends, however it does: between fork and exec."""
+    LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+
+
+def start_as_service() -> None:
+    """Start as a service manager would start the daemon, and end with the parent: between fork and exec."""
+    end_with_parent()
+    ahead_of_others()
 
 
 class Bus(NamedTuple):
@@ -70,22 +94,6 @@ def choose_bus() -> Bus:
     return Bus("udp_multicast", MULTICAST, "UDP multicast that stays on this machine (there is no vcan0)")
 
 
-def armed_config(config: Path, out: Path) -> Path:
-    """Write the configuration with the demands armed into `out` and return its path."""
-    text, found = re.subn(
-        r"^transmit *=.*$", "transmit = true", config.read_text(encoding="utf-8"), flags=re.MULTILINE
-    )
-    text = re.sub(
-        r'^include *= *"(.*)"',
-        lambda match: f'include = "{(config.parent / match[1]).resolve()}"',
-        text,
-        flags=re.MULTILINE,
-    )
-    path = out / f"{config.stem}.toml"
-    path.write_text(text if found else f"transmit = true\n{text}", encoding="utf-8")
-    return path
-
-
 class Recorded(NamedTuple):
     """Recordings of a drive in real time."""
 
@@ -115,16 +123,17 @@ class Processes:
         command = [sys.executable, "-m", "brakelab.vehicle_node", str(scenario), "-i", self._bus.interface]
         command += ["-c", self._bus.channel] if wire is None else ["-c", wire.ends[1].name, "--bus-goes-off"]
         command += ["--with-ecu", "--seed", str(seed), "--truth", str(self.truth)]
-        self.vehicle = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=self._log, text=True)
+        self.vehicle = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=self._log, text=True, preexec_fn=end_with_parent
+        )
         self._line("ready")
 
     def start_daemon(self, folder: str, *options: str) -> RingReader | None:
         """Start a daemon that records into `folder` and wait for its ring; None: it ended at once."""
-        command = [sys.executable, "-m", "ecu.cli", "run", "--config", str(self._config)]
+        command = [sys.executable, "-m", "ecu.cli", "run", "--armed", "--config", str(self._config)]
         command += ["-i", self._bus.interface, "-c", self._bus.channel]
         command += ["--record", str(self.out / folder), "--state", str(self.out / folder / "state")]
-        # As a service manager would start it.
-        daemon = subprocess.Popen([*command, *options], stderr=self._log, preexec_fn=ahead_of_others)
+        daemon = subprocess.Popen([*command, *options], stderr=self._log, preexec_fn=start_as_service)
         self.daemons.append(daemon)
         deadline = time.monotonic() + PATIENCE_S
         while time.monotonic() < deadline and daemon.poll() is None:
@@ -171,7 +180,7 @@ def drive(
     seed: int,
     look: Callable[[RingReader], Any] = lambda ring: None,
 ) -> Recorded:
-    """Drive a scenario with the armed `config`; `look` sees the daemon's ring every 50 ms.
+    """Drive a scenario with the ECU of `config`, armed; `look` sees the daemon's ring every 50 ms.
 
     Raises:
         RunFault: a daemon or the vehicle ended early.
@@ -195,9 +204,9 @@ def drive(
             exits = processes.end()
             if bus.wire is not None:
                 bus.wire.ends[0].restart()
+    _check(exits, faults, log)
     if not processes.truth.exists():
         raise RunFault(f"the vehicle ended early; {log} says why")
-    _check(exits, faults, log)
     recordings = [path.parent for name in ("drive", "standby") for path in _recordings(out / name)]
     return Recorded(processes.truth, recordings, exits)
 
@@ -226,10 +235,10 @@ def _act(
     ring: RingReader,
     look: Callable[[RingReader], Any],
 ) -> None:
-    """Kill and restart daemons, and their controller, in time until the drive is over."""
+    """Kill and restart daemons, and their controller, in time until the drive is over, or lost."""
     t_0 = processes.departure()
-    victim = processes.daemons[-1]
-    while processes.driving():
+    victim, may_end = processes.daemons[-1], bool(actions)
+    while processes.driving() and (may_end or victim.poll() is None):
         if actions and time.monotonic() >= t_0 + actions[0][0]:
             match actions.pop(0)[1]:
                 case "kill":
