@@ -1,8 +1,8 @@
 """One way to compile a kernel, and a cache that cannot go stale.
 
 numba's disk cache looks at a function's own file only: after an edit in a callee it would silently run
-the old code. Kernels are therefore cached in a folder named after the text of every kernel module of
-their package (and of `ecu`, whose kernels the laboratory calls).
+the old code. Kernels are therefore cached in a folder named after the text of every module with kernels or
+constants of their package (and of `ecu`, whose kernels the laboratory calls).
 
 `NUMBA_CACHE_DIR` chooses the place, default `~/.cache/brake-ecu`. With `NUMBA_DISABLE_JIT=1` kernels run as
 plain Python (`ecu/interpreted.py`).
@@ -10,7 +10,8 @@ plain Python (`ecu/interpreted.py`).
 
 import hashlib
 import os
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -36,33 +37,41 @@ _CACHE_ROOT = Path(
 )
 
 
-_CONSTANTS = frozenset(
-    {"clock.py", "dust.py", "faults.py", "jit.py", "layout.py", "params.py", "records.py", "signals.py"}
-)
+_IMPORTED = re.compile(rb"^from ([\w.]+) import (\([^)]*\)|.*)$", re.MULTILINE)
+_CONSTANT = re.compile(rb"\b[A-Z][A-Z0-9_]+\b")
 
 
-def is_source_of_kernels(path: Path) -> bool:
-    """Return whether a module holds kernels, or constants that are compiled into them."""
-    return path.name in _CONSTANTS or b"@kernel" in path.read_bytes()
+def sources_of_kernels(packages: Iterable[str]) -> dict[str, bytes]:
+    """Return the text of every module with kernels, or with constants that kernels may hold, by name.
+
+    A constant is upper case and imported by name.
+    """
+    texts = dict(_texts(packages))
+    found = [name for name, text in texts.items() if b"@kernel" in text]
+    for name in found:  # grows
+        for module, names in _IMPORTED.findall(texts[name]):
+            if (source := module.decode()) in texts and source not in found and _CONSTANT.search(names):
+                found.append(source)
+    return {name: texts[name] for name in sorted(found)}
 
 
-@cache
-def _digest(package: str) -> str:
-    text = hashlib.sha256(numba.__version__.encode())
-    for name in sorted({"ecu", package}):
-        spec = find_spec(name)
+def _texts(packages: Iterable[str]) -> Iterator[tuple[str, bytes]]:
+    for package in packages:
+        spec = find_spec(package)
         for root in (spec.submodule_search_locations or []) if spec else []:
-            for path in sorted(Path(root).rglob("*.py")):
-                if is_source_of_kernels(path):
-                    text.update(path.name.encode())
-                    text.update(path.read_bytes())
-    return text.hexdigest()[:16]
+            for path in Path(root).rglob("*.py"):
+                parts = path.relative_to(root).with_suffix("").parts
+                yield ".".join((package, *parts)).removesuffix(".__init__"), path.read_bytes()
 
 
 @cache
-def _folder(package: str) -> str:
-    """Return where the kernels of a package are kept. numba would turn to a place that can go stale."""
-    folder = _CACHE_ROOT / f"{package}-{_digest(package)}"
+def _folder(cache_name: str, packages: frozenset[str]) -> str:
+    """Return where kernels are kept. numba would turn to a place that can go stale."""
+    digest = hashlib.sha256(numba.__version__.encode())
+    for name, text in sources_of_kernels(packages).items():
+        digest.update(name.encode())
+        digest.update(text)
+    folder = _CACHE_ROOT / f"{cache_name}-{digest.hexdigest()[:16]}"
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:
@@ -74,16 +83,26 @@ def _folder(package: str) -> str:
     return str(folder)
 
 
-def kernel(function: Function) -> Function:
+def compile_kernel(
+    function: Function, cache_name: str, packages: frozenset[str], parallel: bool = False
+) -> Function:
     """Compile `function` with numba (no Python objects, no fastmath) and cache it on disk.
+
+    `cache_name` begins the name of the cache's folder, `packages` hold what it may be made of.
 
     Raises:
         UserError: there is no place for the cache.
     """
     if numba.config.DISABLE_JIT:
         return interpreted(function)
-    numba.config.CACHE_DIR = _folder(function.__module__.partition(".")[0])
-    return cast(Function, numba.njit(**OPTIONS)(function))
+    numba.config.CACHE_DIR = _folder(cache_name, packages)
+    return cast(Function, numba.njit(**OPTIONS, parallel=parallel)(function))
+
+
+def kernel(function: Function) -> Function:
+    """Compile a function of the ECU or of the laboratory. Raises UserError: see `compile_kernel`."""
+    package = function.__module__.partition(".")[0]
+    return compile_kernel(function, package, frozenset({"ecu", package}))
 
 
 class CompileCounter(numba_event.Listener):  # type: ignore[misc]
