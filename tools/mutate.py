@@ -35,7 +35,7 @@ ARGUED = CHECKOUT / "tools" / "mutants.toml"
 TESTS = {
     "ecu/algorithm/control/limiter.py": (
         "algorithm/control/test_limiter.py",
-        "algorithm/control/test_left_right.py",
+        "algorithm/control/test_limiter_left_right.py",
     ),
     "ecu/algorithm/control/mode.py": ("algorithm/control/test_mode.py",),
     "ecu/algorithm/control/slip_guard.py": ("algorithm/control/test_slip_guard.py",),
