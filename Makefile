@@ -1,17 +1,19 @@
-# make demo | test | check | coverage | mutants | fuzz | soak | clean. Sets up .venv itself; PYTHON=... chooses the interpreter.
+# make demo | test | studies | check | coverage | mutants | fuzz | soak | screenshot | clean. Sets up .venv itself; PYTHON=... chooses the interpreter.
 PIP := .venv/bin/python -m pip --disable-pip-version-check install --quiet
 PINNED := $(PIP) --require-hashes --requirement requirements/build.txt
 
-.PHONY: help demo test check coverage mutants fuzz soak clean
+.PHONY: help demo test studies check coverage mutants fuzz soak screenshot clean
 
 help:
 	@echo "make demo    the ECU brakes a simulated car on a bus, in real time; a report at the end"
-	@echo "make test    every test"
+	@echo "make test    every test but the studies"
+	@echo "make studies   tests that draw many cars, brakes or trips: minutes"
 	@echo "make check   ruff, format and types"
 	@echo "make coverage  lines and branches of ecu/algorithm/control and ecu/bus, kernels as plain Python: all of them"
 	@echo "make mutants   one change at a time in what brakes: which one do the tests not notice?"
 	@echo "make fuzz      damaged files by the thousand"
 	@echo "make soak      24 h in virtual time; ARGS='live --hours 1': in real time"
+	@echo "make screenshot  the picture of the README, by demo and chromium"
 	@echo "make clean   remove .venv, results and caches"
 	@echo "The first call installs what it needs into .venv. PYTHON=/path/to/python3.12 chooses a Python;"
 	@echo "ARGS=... goes to the command: make test ARGS=tests/ecu, make demo ARGS='--out out/first'."
@@ -20,7 +22,10 @@ demo: .venv/lab
 	.venv/bin/brake-ecu demo $(ARGS)
 
 test: .venv/dev
-	.venv/bin/python -m pytest -n auto --maxprocesses 4 --dist loadfile $(ARGS)
+	.venv/bin/python -m pytest -n auto --maxprocesses 4 --dist loadfile -m "not study" $(ARGS)
+
+studies: .venv/dev
+	.venv/bin/python -m pytest -n auto --maxprocesses 4 --dist load -m study $(ARGS)
 
 check: .venv/dev
 	.venv/bin/ruff check .
@@ -39,6 +44,12 @@ fuzz: .venv/dev
 
 soak: .venv/dev
 	.venv/bin/python -m brakelab.soak $(or $(ARGS),virtual --hours 24)
+
+screenshot: .venv/lab
+	.venv/bin/brake-ecu demo --out out/screenshot
+	$$(command -v chromium || command -v chromium-browser) --headless --no-sandbox --disable-gpu --hide-scrollbars \
+		--virtual-time-budget=10000 --window-size=1000,1200 --screenshot=docs/images/report.png \
+		"file://$(CURDIR)/out/screenshot/report.html"
 
 clean:
 	rm -rf .venv out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -9,7 +9,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from brakelab.report.brakings import Braking, Force, brakes_path
+from brakelab.report.brakings import Braking, Force
+from brakelab.results.files import brakes_path
 from ecu.contract.signals import CORNERS, OUTPUT_COLUMNS
 from ecu.recording.recorder import ABOUT_FILE, CYCLES_FILE, INITIAL_FILE, layout
 from ecu.recording.ring import RECORDED

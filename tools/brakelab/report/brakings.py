@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.report.drive import Drive, Vector, numbers, read_parquet
+from brakelab.results.files import brakes_path
 from brakelab.results.prediction import SHORT, left_out
 from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
@@ -68,11 +69,6 @@ class Braking(NamedTuple):
     before_sigma: Vector
     left_out: str
     """Why the prediction does not count, empty where it does."""
-
-
-def brakes_path(result: Path) -> Path:
-    """Return where replay writes the table of brakings that belongs to `result`."""
-    return result.with_suffix(".brakes.parquet")
 
 
 def brakings(drive: Drive, result: Path) -> list[Braking]:
