@@ -267,7 +267,7 @@ class Looks:
 def soak_live(hours: float, seed: int, folder: Path) -> list[Check]:
     """Run `brake-ecu run` for hours of real time; return the checks."""
     text = resource("config/scenarios/demo.toml").read_text("utf-8")
-    once = 60.0  # s, about
+    once = 56.0  # s, about
     scenario = folder / "soak.toml"
     scenario.write_text(f"repeat = {max(1, round(3600.0 * hours / once))}\n{text}", "utf-8")
     looks, bus = Looks(), choose_bus()
