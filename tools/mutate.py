@@ -3,9 +3,9 @@
     python tools/mutate.py [MODULE…] [--every N]       of `TESTS`, or all of them
 
 Changes one comparison, operator, constant or condition at a time and runs the module's tests, with kernels as
-plain Python; each mutant is a fork of the process that has collected them. Prints what survives. Exit code 1
-if anything does that `tools/mutants.toml` does not argue, or if that file argues for a mutant that is killed
-or no longer exists.
+plain Python; each mutant is a fork of the process that has collected them, and ends with the first test that
+fails: those that killed most of the others go first. Prints what survives. Exit code 1 if anything does that
+`tools/mutants.toml` does not argue, or if that file argues for a mutant that is killed or no longer exists.
 """
 
 import argparse
@@ -14,6 +14,8 @@ import copy
 import importlib
 import inspect
 import json
+import math
+import mmap
 import os
 import signal
 import sys
@@ -27,7 +29,9 @@ from typing import Any
 
 os.environ |= {"NUMBA_DISABLE_JIT": "1", "OMP_NUM_THREADS": "1"}
 
+import numpy as np
 import pytest
+from hypothesis import Phase, settings
 
 CHECKOUT = Path(__file__).parent.parent
 ARGUED = CHECKOUT / "tools" / "mutants.toml"
@@ -47,7 +51,7 @@ TESTS = {
     "ecu/algorithm/estimation/joint/kalman.py": ("algorithm/estimation/joint/test_kalman.py",),
 }
 """The modules that are held to it, and their tests in tests/ecu."""
-TIMEOUT_S, SLOWER = 5.0, 3.0  # what a mutant may take at least, and over what the tests take without it
+PATIENCE_S, SLOWER = 2.0, 5.0  # of the processor's time, that a test may take beside its own and over it
 COMPARISONS: dict[type[ast.cmpop], type[ast.cmpop]] = {
     ast.Lt: ast.LtE,
     ast.LtE: ast.Lt,
@@ -152,19 +156,27 @@ class Mutation:
 
     def __init__(self, module: str, every: int, workers: int) -> None:
         self._module, self._every, self._workers = module, every, workers
-        self.tried, self._patience_s = 0, 600.0
+        self.tried = 0
         self.names: set[str] = set()
         self.survivors: list[str] = []
         self._running: dict[int, str] = {}
+        self._test = 0
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_collection(self) -> None:
+        """Take the same examples as ever; of one that fails the smallest need not be found."""
+        phases = (Phase.explicit, Phase.generate)
+        settings.register_profile("mutants", settings.default, phases=phases, print_blob=False)
+        settings.load_profile("mutants")
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
         """Fork a process for each."""
         module = importlib.import_module(self._module.removesuffix(".py").replace("/", "."))
-        began_s = time.monotonic()
+        # What the processes tell: seconds that a test takes, how many mutants it was the first to kill
+        self._seconds, self._kills = np.frombuffer(mmap.mmap(-1, 16 * len(session.items))).reshape(2, -1)
         self._start(session, module, "", None)
         self._await_one()
-        self._patience_s = TIMEOUT_S + SLOWER * (time.monotonic() - began_s)
         if not self.survivors:
             raise pytest.UsageError(f"{self._module}: its tests fail without any change")
         self.survivors.clear()
@@ -180,6 +192,17 @@ class Mutation:
             self._await_one()
         return True
 
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_makereport(self, call: pytest.CallInfo[None]) -> None:
+        """Stop at the first failure, before anything is reported."""
+        if call.excinfo is None:
+            return
+        if call.excinfo.errisinstance(pytest.skip.Exception):
+            self._seconds[self._test] = math.nan
+        else:
+            self._kills[self._test] += 1.0
+            os._exit(1)
+
     def _start(
         self, session: pytest.Session, module: ModuleType, name: str, statement: ast.stmt | None
     ) -> None:
@@ -188,16 +211,27 @@ class Mutation:
             self._running[child] = name
             return
         try:
-            signal.setitimer(signal.ITIMER_REAL, self._patience_s)
             if statement is not None:
                 _apply(module, statement)
-            for item, following in pairwise([*session.items, None]):
-                session.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
-                if session.testsfailed:
-                    os._exit(1)
+            self._run_tests(session, statement is None)
             os._exit(0)
         finally:
             os._exit(2)
+
+    def _run_tests(self, session: pytest.Session, measure: bool) -> None:
+        """Run those first that kill most a second; measured: all of them, else all that are not skipped."""
+        order = range(len(session.items))
+        if not measure:
+            rate = (1.0 + self._kills) / self._seconds
+            order = [k for k in np.argsort(-rate) if math.isfinite(rate[k])]
+        for k, following in pairwise([*order, None]):
+            self._test = k
+            began_s = time.process_time()
+            signal.setitimer(signal.ITIMER_PROF, 0.0 if measure else PATIENCE_S + SLOWER * self._seconds[k])
+            nextitem = None if following is None else session.items[following]
+            session.config.hook.pytest_runtest_protocol(item=session.items[k], nextitem=nextitem)
+            if measure:
+                self._seconds[k] += time.process_time() - began_s
 
     def _await_one(self) -> None:
         pid, status = os.wait()
@@ -216,7 +250,9 @@ def _run(module: str, every: int, workers: int) -> dict[str, Any]:
             os.dup2(quiet, stream)
         mutation = Mutation(module, every, workers)
         tests = [str(CHECKOUT / "tests" / "ecu" / name) for name in TESTS[module]]
-        code = pytest.main(["-x", "-qq", "-p", "no:cacheprovider", "--capture=no", *tests], [mutation])
+        code = pytest.main(
+            ["-qq", "-p", "no:cacheprovider", "-p", "no:timeout", "--capture=no", *tests], [mutation]
+        )
         found = {"tried": mutation.tried, "survivors": mutation.survivors, "names": [*mutation.names]}
         with os.fdopen(writing, "w") as pipe:
             json.dump(found if code in (0, 5) else {}, pipe)
