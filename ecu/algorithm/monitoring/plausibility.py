@@ -79,7 +79,7 @@ def wheel_speed_implausible(
         over = _over_ground(params, inputs, motion, speed, i)
         braked = torque[i] > BRAKED and motor_torque(inputs, i) >= 0.0
         fast = usable(inputs, WHEEL_SPEED + i) and speed > LEAST_SPEED and over > FASTER
-        alone = wheels > 1 and over > FASTER * (total - over) / (wheels - 1)
+        alone = over * (wheels - 1) > FASTER * (total - over)  # than the others' mean; no other: 0 > 0
         state.for_s[i] = state.for_s[i] + dt if fast and alone and braked else 0.0
         found = found or state.for_s[i] > DOUBT_S
     return found

@@ -25,8 +25,9 @@ CASES = [
     ("spins under the motor", 1.30, 800.0, -900.0, 20.0, False),
     ("a small tyre", 1.04, 800.0, 0.0, 20.0, False),
     ("too slow to tell", 1.30, 800.0, 0.0, 3.0, False),
+    ("no faster than where it can be told", 1.30, 800.0, 0.0, 5.0, False),
     ("not braked", 1.30, 20.0, 0.0, 20.0, False),
-    ("hardly braked", 1.30, 99.0, 0.0, 20.0, False),
+    ("hardly braked", 1.30, 100.0, 0.0, 20.0, False),
     ("braked just enough to tell", 1.30, 101.0, 0.0, 20.0, True),
 ]
 
@@ -209,8 +210,10 @@ def test_a_wheel_falls_by_8_rad_s_and_thrice_what_its_brake_does_at_most(
     params, feed, corner: int, torque: float, motor: float, age: float
 ) -> None:
     free = (torque + abs(motor)) / params[0]["wheel_inertia"][corner] * age
-    for share, fell in ((0.99, 0), (1.01, 1)):
-        omega = 60.0 - share * (8.0 + 3.0 * free)
+    for beyond, fell in ((-0.1, 0), (0.0, 0), (0.1, 1)):
+        if beyond == 0.0 and free > 0.0:
+            continue  # rounding decides
+        omega = 60.0 - (8.0 + 3.0 * free + beyond)
         state = sample(params, feed, corner, omega, torque=torque, age=age, motor=motor)
         assert state["fell"].tolist() == [fell * (i == corner) for i in range(4)]
 
@@ -229,7 +232,7 @@ def test_what_is_no_new_sample_or_has_no_pressure_beside_it_is_not_judged(params
         ("5 % off the car", 0.95, None, 0),
         ("7 % off the car", 0.93, None, 1),
         ("the car stands", 0.0, 0.05, 0),
-        ("the car hardly moves", 0.0, 0.15, 1),
+        ("the car hardly moves", 0.0, 0.1, 1),
     ],
 )
 def test_a_wheel_is_believed_again_where_it_agrees_with_the_car(
@@ -248,6 +251,7 @@ def test_a_wheel_is_believed_again_where_it_agrees_with_the_car(
         ("6 m/s", (), 6.0, True),
         ("4.5 m/s", (), 4.5, False),
         ("one other wheel is left", (1, 2), 20.0, True),
+        ("no other wheel is left", (1, 2, 3), 20.0, False),
         ("itself is lost", (0,), 20.0, False),
     ],
 )
@@ -269,7 +273,7 @@ def test_a_fast_wheel_beside_the_others(params, feed, fast, case, lost, speed, i
     ("expected", "off", "others", "beside", "apart"),
     [
         # bar; too far is 8 bar and a fifth of the pressure, three quarters of that follow
-        (0.0, 7.5, 0.0, {}, 0),
+        (0.0, 8.0, 0.0, {}, 0),
         (0.0, 8.5, 0.0, {}, 1),
         (0.0, -8.5, 0.0, {}, 1),
         (30.0, 13.5, 0.0, {}, 0),
@@ -277,13 +281,31 @@ def test_a_fast_wheel_beside_the_others(params, feed, fast, case, lost, speed, i
         (30.0, -14.5, 0.0, {}, 1),
         (30.0, 20.0, 10.0, {}, 1),
         (30.0, 20.0, 11.0, {}, 0),
+        (0.0, 20.0, 5.9, {}, 1),
+        (0.0, 20.0, 6.0, {}, 0),
         (30.0, 20.0, 0.0, {"esp_active": 0.5}, 1),
     ],
 )
 def test_how_far_apart_is_too_far(feed, expected, off, others, beside, apart) -> None:
-    state, zero = np.zeros(1, PLAUSIBILITY_STATE)[0], np.full(4, 0.7)
+    state, zero = np.zeros(1, PLAUSIBILITY_STATE)[0], np.full(4, 0.5)
     state["sent"] = 1
     inputs = feed(**beside, calliper_pressure=expected + zero + np.array([others, off, others, others]))
     for _ in range(40):
         watch_pressures(state, inputs[0], np.full(4, expected), zero, 0.01)
     assert state["pressure"] == apart
+
+
+def test_what_lasts_0_3_s_is_not_said_yet(params, feed) -> None:
+    """Cycles of 0.15 s: the second one makes just 0.3 s of it."""
+    state, motion = np.zeros(1, PLAUSIBILITY_STATE)[0], np.zeros(1, MOTION_STATE)[0]
+    state["sent"] = 1
+    turns = np.array([1.2, 0.99, 0.99, 0.99]) * 20.0 / params[0]["wheel_radius"]
+    inputs = feed(wheel_speed=turns, calliper_pressure=[30.0, 0.0, 0.0, 0.0])
+    wheels, pressures = [], []
+    for _ in range(3):
+        wheels.append(
+            wheel_speed_implausible(params[0], state, inputs[0], motion, 20.0, np.full(4, 800.0), 0.15)
+        )
+        watch_pressures(state, inputs[0], np.zeros(4), np.zeros(4), 0.15)
+        pressures.append(bool(state["pressure"]))
+    assert wheels == pressures == [False, False, True]
