@@ -40,7 +40,7 @@ def note_request(state: Record, stamp_ns: int) -> None:
     """Take a frame's samples into the largest ones."""
     age = stamp_ns - state.since_ns
     if not 0 <= age < HALF_NS:
-        kept = 1.0 if 0 <= age < 2 * HALF_NS else 0.0
+        kept = 1.0 if HALF_NS <= age < 2 * HALF_NS else 0.0
         for i in range(4):
             state.older[i], state.newer[i] = kept * state.newer[i], 0.0
         state.since_ns = stamp_ns

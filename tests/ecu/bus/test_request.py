@@ -154,28 +154,39 @@ def test_a_restarted_sender_is_followed_within_100_ms() -> None:
         assert wire.run(100, 1.0)["verdict"][10:, DECEL_DEMAND].min() & USABLE == USABLE, "never lost"
 
 
-def test_a_request_that_is_not_vouched_for_adds_nothing() -> None:
-    state, inputs = np.zeros(1, REQUEST)[0], new_record(INPUTS)[0]
-    begin_request(state)
-    state["sample"][DECEL_DEMAND - FIRST] = 12.0
-    note_request(state, T0)
-    hold_request(state, inputs)
-    assert inputs["value"][DECEL_DEMAND] == inputs["value"][DECEL_DEMAND_VALID] == 0.0
+# Frames of the request: instant [ms], pedal [%], switch, deceleration [m/s²] and whether it is vouched for;
+# NAN: no valid sample of it
+NAN = np.nan
+PRESSED, FREE = (40.0, 1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)
+GENTLE, FIRM = (0.0, 0.0, 0.5, 1.0), (0.0, 0.0, 3.0, 1.0)
+HELD = [
+    ("pressed in this frame", [(0, PRESSED)], PRESSED),
+    ("released 59.9 ms later", [(0, PRESSED), (59.9, FREE)], PRESSED),
+    ("released 60 ms later", [(0, PRESSED), (60, FREE)], PRESSED),
+    ("released 119 ms later", [(0, PRESSED), (119, FREE)], PRESSED),
+    ("released 120 ms later", [(0, PRESSED), (120, FREE)], FREE),
+    ("released a second later", [(0, PRESSED), (1000, FREE)], FREE),
+    ("the clock is set back", [(0, PRESSED), (-10, FREE)], FREE),
+    ("two in one instant", [(0, PRESSED), (0, FREE), (60, FREE)], PRESSED),
+    ("pressed once more at 60 ms", [(0, PRESSED), (60, PRESSED), (120, FREE)], PRESSED),
+    ("an automated driver brakes gently", [(0, GENTLE), (10, FREE)], GENTLE),
+    ("… and more firmly", [(0, GENTLE), (10, FIRM), (20, GENTLE)], FIRM),
+    ("pedal and automated driver", [(0, PRESSED), (10, FIRM)], (40.0, 1.0, 3.0, 1.0)),
+    ("nobody vouches for the deceleration", [(0, (0.0, 0.0, 12.0, 0.0))], FREE),
+    ("… nor denies it, nor tells anything else", [(0, (NAN, NAN, 12.0, NAN))], FREE),
+]
 
 
-@pytest.mark.parametrize(
-    ("age_ms", "held"),
-    [(0, 40.0), (59.9, 40.0), (60, 40.0), (119, 40.0), (120, 0.0), (1000, 0.0), (-10, 0.0)],
-)
-def test_the_largest_of_the_last_60_to_120_ms(age_ms: float, held: float) -> None:
+@pytest.mark.parametrize(("case", "frames", "held"), HELD)
+def test_the_largest_of_the_last_60_to_120_ms(case: str, frames: Any, held: Any) -> None:
     state, inputs = np.zeros(1, REQUEST)[0], new_record(INPUTS)[0]
-    begin_request(state)
-    state["sample"][0] = 40.0
-    note_request(state, T0)
-    begin_request(state)
-    note_request(state, T0 + int(age_ms * MS))
+    for ms, samples in frames:
+        begin_request(state)
+        valid = np.isfinite(samples)
+        state["sample"][valid] = np.array(samples)[valid]
+        note_request(state, T0 + int(ms * MS))
     hold_request(state, inputs)
-    assert inputs["value"][PEDAL_POSITION] == held
+    assert inputs["value"][FIRST : LAST + 1].tolist() == list(held), case
 
 
 def test_places_lie_side_by_side() -> None:
