@@ -97,7 +97,7 @@ def _bound(
         (demand_change >= 0.0 and wanted_change < -AGAINST_DEMAND)
         or (demand_change <= 0.0 and wanted_change > AGAINST_DEMAND)
     )
-    state.falls[corner] = 1 if demand_change < 0.0 else 0
+    state.falls[corner] = demand_change < 0.0
     state.uncompensated[corner] = uncompensated
     if math.isfinite(wanted) and not against:
         state.wanted[corner] = pressure = wanted
@@ -118,14 +118,13 @@ def _level(params: Record, state: Record, left: int, torque: Record) -> None:
     if state.share[left] == 0.0 or state.share[right] == 0.0:
         return
     apart = state.share[left] - state.share[right]
-    excess = max(abs(apart) - LEFT_RIGHT_SHARE, 0.0)
+    excess = math.copysign(max(abs(apart) - LEFT_RIGHT_SHARE, 0.0), apart)
     if excess == 0.0:
         return
     state.limited = 1
     both = torque[left] + torque[right]
-    for i in (left, right):
-        other = right if i == left else left
-        down = excess * (torque[other] / both) * (1.0 if (i == left) == (apart > 0.0) else -1.0)
+    for i, other, high in ((left, right, excess), (right, left, -excess)):
+        down = high * (torque[other] / both)
         state.share[i] -= down
         state.asked[i] -= down * _nominal_pressure(params, torque[i], i)
 

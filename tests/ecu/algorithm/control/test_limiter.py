@@ -136,10 +136,11 @@ def test_torque_stays_within_its_window_in_a_dense_sweep(corner: int, torque: fl
 
 
 def test_the_window_holds_for_the_uncompensated_demand_too() -> None:
-    """A learned friction of half the nominal one would ask for twice the pressure."""
+    """A learned friction of half the nominal one would ask for twice the pressure; none asks for none."""
     torque = 400.0
-    doubled = PUSH_OUT + 2 * torque / PER_PASCAL[0]
-    assert settle(fresh(), 0, NAN, doubled, torque) == pytest.approx(PUSH_OUT + 1.6 * torque / PER_PASCAL[0])
+    for uncompensated, share in ((PUSH_OUT + 2 * torque / PER_PASCAL[0], 1.6), (0.0, 0.6)):
+        sent = settle(fresh(), 0, NAN, uncompensated, torque)
+        assert sent == pytest.approx(PUSH_OUT + share * torque / PER_PASCAL[0])
 
 
 # ---------------------------------------------------------------- what the hydraulics can give, and slip
@@ -432,7 +433,7 @@ def test_what_is_no_cycle_lets_nothing_rise(dt: float) -> None:
 @pytest.mark.parametrize("last", [-1.0, -1e9, 180 * BAR + 1, 1e9, NAN, INF])
 def test_a_last_output_that_cannot_have_been_counts_as_none(last: float) -> None:
     torque = (150 * BAR - PUSH_OUT) * PER_PASCAL[0]
-    assert limit(PARAMS, fresh(0, last), 0, 150 * BAR, 150 * BAR, torque, DT) == pytest.approx(STEP)
+    assert limit(PARAMS, fresh(0, last), 0, 150 * BAR, 150 * BAR, torque, DT) == pytest.approx(STEP, abs=0.1)
 
 
 @settings(max_examples=200, deadline=None)
