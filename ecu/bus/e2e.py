@@ -132,9 +132,15 @@ SEQUENCE: Final = [
 
 
 @kernel
+def _lasts(told_ns: int, stamp_ns: int) -> bool:
+    """Return whether what was told, 0: never, still counts."""
+    return told_ns > 0 and stamp_ns - told_ns < DOUBT_NS
+
+
+@kernel
 def in_doubt(state: Record, stamp_ns: int) -> bool:
     """Return whether more than one may send what is accepted: told in the last second."""
-    doubt: bool = state.doubted_ns > 0 and stamp_ns - state.doubted_ns < DOUBT_NS
+    doubt: bool = _lasts(state.doubted_ns, stamp_ns)
     return doubt
 
 
@@ -172,7 +178,7 @@ def _resynchronise(
 ) -> Any:
     """Take a frame that does not fit as a candidate; of a sender that is gone accept the third one."""
     cycles = (stamp_ns - state.candidate_ns + period_ns // 2) // period_ns
-    consistent = state.consistent > 0 and 1 <= (counter - state.candidate) % modulo <= cycles
+    consistent = 1 <= (counter - state.candidate) % modulo <= cycles
     state.consistent = min(state.consistent + 1, _FRAMES_TO_RESYNCHRONISE) if consistent else 1
     state.candidate = counter
     state.candidate_ns = stamp_ns
@@ -223,7 +229,7 @@ def check_counter(
             _accept(state, counter, stamp_ns, stamp_ns)
             return found
         return _resynchronise(state, counter, modulo, stamp_ns, period_ns, gone)
-    disputed = state.disputed_ns > 0 and stamp_ns - state.disputed_ns < DOUBT_NS
+    disputed = _lasts(state.disputed_ns, stamp_ns)
     tolerance = period_ns // 4 if disputed else period_ns // 2
     early = step * period_ns - elapsed
     if early > tolerance or (disputed and elapsed - step * slowest_ns > tolerance):

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import ecu.bus.e2e as protection
 from ecu.bus.e2e import (
     CROSSED,
     FORD_ACCEL_DATA,
@@ -26,6 +27,7 @@ from ecu.bus.e2e import (
     WRONG_SEQUENCE,
     check_counter,
     checksum_holds,
+    in_doubt,
     p01_crc,
     p01_protect,
 )
@@ -90,6 +92,32 @@ def test_no_burst_of_up_to_eight_bits_passes(data: bytes, first: int, flips: int
     number = int.from_bytes(sent.tobytes(), "big") ^ (flips << first)
     broken = np.frombuffer(number.to_bytes(8, "big"), np.uint8)
     assert not checksum_holds(1, broken, 8, 0x50, 0x5A01)
+
+
+@pytest.mark.parametrize(
+    ("rule", "highest"),
+    [
+        ("autosar_p01", 1),  # the counter
+        ("ford_brake_sn_4", 3),  # the counter
+        ("ford_accel_data", 7),
+    ],
+)
+def test_the_shortest_payload_ends_with_the_highest_byte_of_the_rule(rule: str, highest: int) -> None:
+    assert protection.SHORTEST[rule] == highest + 1
+
+
+@given(data=st.binary(min_size=8, max_size=8))
+def test_without_a_rule_every_payload_holds(data: bytes) -> None:
+    assert checksum_holds(protection.NO_CHECKSUM, np.frombuffer(data, np.uint8), 8, 0x50, 0)
+
+
+def test_profile_1_counts_to_14_in_the_low_nibble_of_byte_1() -> None:
+    assert protection.P01_MODULO == 14 + 1
+    data = np.full(8, 0xFF, np.uint8)
+    p01_protect(data, 8, 0x123, 9)
+    number = int.from_bytes(data.tobytes(), "little") >> protection.P01_COUNTER_START
+    assert number & ((1 << protection.P01_COUNTER_LENGTH) - 1) == 9
+    assert data[1:].tolist() == [0xF9, *[0xFF] * 6]
 
 
 @pytest.mark.parametrize(
@@ -162,6 +190,14 @@ SEQUENCES = {
         [(5, 1), (7.4, 6), (17.5, 7)],
         [BAD, BAD, LOST],
     ),
+    "a quarter early, just, while another claims it": ([(5, 1), (7.5, 6)], [BAD, OK]),
+    "a quarter late, just, while another claims it": ([(5, 1), (12.5, 6)], [BAD, OK]),
+    "later than a quarter while another claims it": ([(5, 1), (12.6, 6)], [BAD, BAD]),
+    "half a cycle late, just, and the next early": ([(15, 6), (19, 7)], [OK, OK]),
+    "somebody spoke for one that goes on": ([(25, 6), (60, 11), (70, 12)], [OK, LOST, OK]),
+    "… and is half a cycle late at its last": ([(25, 6), (65, 11)], [OK, LOST]),
+    "… off its grid": ([(25, 6), (60, 12)], [OK, BAD]),
+    "… after its time": ([(25, 6), (66, 12)], [OK, BAD]),
     "the doubt is over": (
         [(5, 1)] + [(10 * k, 5 + k) for k in range(1, 101)] + [(1006, 106)],
         [BAD] + [OK] * 101,
@@ -172,6 +208,17 @@ SEQUENCES = {
     "… which lost a sixth": ([(60, 10), (66, 12)], [LOST, BAD]),
     "gone: any step that the time allows": ([(66, 13), (76, 14)], [LOST, OK]),
     "gone: a step larger than the time allows": ([(66, 14)], [BAD]),
+    "alive for 65 ms: no step the time does not allow": ([(65, 13)], [BAD]),
+    "gone: half a cycle early, just": ([(75, 14)], [LOST]),
+    "gone: earlier than half a cycle": ([(74.9, 14)], [BAD]),
+    "gone: back with the third frame whatever it counts": ([(66, 14), (76, 15), (86, 16)], [BAD, BAD, SYNC]),
+    "… and one of them lost, half a cycle early": ([(66, 14), (81, 16), (91, 17)], [BAD, BAD, SYNC]),
+    "… too early for a lost one": ([(66, 14), (80.9, 16), (90.9, 17), (100.9, 18)], [BAD, BAD, BAD, SYNC]),
+    "… that repeat do not count": ([(66, 16), (76, 16), (86, 17), (96, 18)], [BAD, BAD, BAD, SYNC]),
+    "… nor one from before the last accepted": (
+        [(10, 6), (11, 1), *((10 * k, 5 + k) for k in range(2, 7)), (130, 20), (140, 21), (150, 22)],
+        [OK, BAD, *[OK] * 5, BAD, BAD, SYNC],
+    ),
     "stuck": ([(10, 5), (20, 5), (200, 5)], [REP, REP, REP]),
     "stuck, then going on": ([(10, 5), *((10 * k, 4 + k) for k in range(2, 8))], [REP, *[BAD] * 5, LOST]),
     "held up by three cycles": ([(40, 6), (50, 7), (60, 8)], [OK, OK, OK]),
@@ -183,6 +230,7 @@ SEQUENCES = {
         [LOST, OK, OK, OK, OK, OK],
     ),
     "counter 15 does not exist": ([(10, NO_COUNTER), (20, 7)], [BAD, LOST]),
+    "… nor where 0 is due": ([(60, 11), (90, 14), (100, NO_COUNTER)], [LOST, LOST, BAD]),
     "jumps ahead too far": ([(10, 9), (20, 7)], [BAD, LOST]),
     "sender restarts at 0": ([(10 * k, k - 1) for k in range(1, 9)], [BAD] * 5 + [REP, OK, OK]),
     "sender restarts far ahead": ([(10 * k, 12 + k) for k in range(1, 9)], [BAD] * 6 + [SYNC, OK]),
@@ -202,6 +250,8 @@ SEQUENCES = {
         [OK, BAD, BAD, BAD, BAD, LOST],
     ),
     "the clock is set back": ([(-500, 6), (-490, 7)], [OK, OK]),
+    "… by more than a cycle, just": ([(-10.1, 6)], [OK]),
+    "a cycle early is no clock set back": ([(-10, 6)], [BAD]),
 }
 
 
@@ -216,6 +266,47 @@ def test_counter(name: str) -> None:
     state = np.zeros(1, np.dtype(SEQUENCE))[0]
     assert judge(state, 5, 0) == IN_SEQUENCE, "a log may start anywhere"
     assert [judge(state, counter, ms) for ms, counter in frames] == verdicts
+
+
+@pytest.mark.parametrize(
+    ("told_ns", "stamp_ns", "doubt"),
+    [
+        (0, 500 * MS, False),  # never told, early in a log that begins at 0
+        (2_000 * MS, 2_000 * MS, True),
+        (2_000 * MS, 2_999 * MS, True),
+        (2_000 * MS, 3_000 * MS, False),
+    ],
+)
+def test_doubt_lasts_for_a_second(told_ns: int, stamp_ns: int, doubt: bool) -> None:
+    state = np.zeros(1, np.dtype(SEQUENCE))[0]
+    state["doubted_ns"] = told_ns
+    assert bool(in_doubt(state, stamp_ns)) == doubt
+
+
+@pytest.mark.parametrize(
+    ("late_ms", "doubt"),
+    [(-2.6, True), (-2.5, False), (0.0, False), (2.5, False), (2.6, True), (5.0, True), (5.1, True)],
+)
+def test_a_frame_off_its_place_by_more_than_a_quarter_of_a_period_is_told(
+    late_ms: float, doubt: bool
+) -> None:
+    state = np.zeros(1, np.dtype(SEQUENCE))[0]
+    judge(state, 5, 0)
+    assert judge(state, 6, 10 + late_ms) == IN_SEQUENCE
+    assert bool(in_doubt(state, 1_010 * MS)) == doubt
+
+
+@pytest.mark.parametrize(("late_ms", "moved_ms"), [(2.0, 0.5), (-2.0, -0.5), (0.0, 0.0)])
+def test_a_late_frame_moves_the_grid_by_a_quarter_of_it_in_doubt_by_a_sixteenth(
+    late_ms: float, moved_ms: float
+) -> None:
+    for doubted_ns, share in ((0, 1.0), (1_000 * MS, 0.25)):
+        state = np.zeros(1, np.dtype(SEQUENCE))[0]
+        judge(state, 5, 0)
+        state["doubted_ns"] = doubted_ns
+        assert judge(state, 6, 10 + late_ms) == IN_SEQUENCE
+        assert state["expected_ns"] == 1_010 * MS
+        assert state["grid_ns"] == 1_010 * MS + int(share * moved_ms * MS)
 
 
 @given(lost=st.lists(st.booleans(), min_size=20, max_size=200))
@@ -257,6 +348,7 @@ def test_a_sender_that_may_choose_its_rate_has_no_grid(interval: int) -> None:
     for k in range(40):
         stamp_ns = 1_000 * MS + k * interval * MS
         assert check_counter(state, k % 15, 15, stamp_ns, PERIOD, 10 * PERIOD) == IN_SEQUENCE
+        assert not in_doubt(state, stamp_ns)
 
 
 @pytest.mark.parametrize("off", [0.95, 0.98, 1.02, 1.05])
