@@ -10,7 +10,7 @@ help:
 	@echo "make studies   tests that draw many cars, brakes or trips: minutes"
 	@echo "make check   ruff, format and types"
 	@echo "make coverage  lines and branches of ecu/algorithm/control and ecu/bus, kernels as plain Python: all of them"
-	@echo "make mutants   one change at a time in what brakes: which one do the tests not notice?"
+	@echo "make mutants   one change at a time in what brakes: which one do the tests not notice? a few minutes"
 	@echo "make fuzz      damaged files by the thousand"
 	@echo "make soak      24 h in virtual time; ARGS='live --hours 1': in real time"
 	@echo "make screenshot  the picture of the README, by demo and chromium"
