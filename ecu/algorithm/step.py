@@ -59,7 +59,7 @@ from ecu.algorithm.estimation.joint.learned import (
 from ecu.algorithm.estimation.joint.observer import update_joint
 from ecu.algorithm.estimation.joint.prior import begin_application, end_application, forget_levels
 from ecu.algorithm.estimation.joint.sliding import mistrust_wheels
-from ecu.algorithm.estimation.motion import MOTION_STATE, update_motion, usable
+from ecu.algorithm.estimation.motion import MOTION_STATE, update_motion
 from ecu.algorithm.estimation.observer2 import OBSERVER_STATE
 from ecu.algorithm.estimation.slip import (
     RADIUS_START,
@@ -71,6 +71,7 @@ from ecu.algorithm.estimation.slip import (
 )
 from ecu.algorithm.estimation.speed import SPEED_STATE, update_speed
 from ecu.algorithm.estimation.wheel_load import WHEEL_LOAD_STATE, update_wheel_load
+from ecu.algorithm.inputs import usable
 from ecu.algorithm.monitoring.acceleration import ACCELERATION_STATE
 from ecu.algorithm.monitoring.application import APPLICATION_STATE, update_application
 from ecu.algorithm.monitoring.disc_temperature import (

@@ -22,7 +22,7 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.estimation.motion import fresh, others_brake, usable
+from ecu.algorithm.inputs import current, fresh, others_brake
 from ecu.contract.signals import MOTOR_LIMIT, MOTOR_TORQUE, REVERSE
 from ecu.jit import Record, kernel
 
@@ -59,12 +59,6 @@ def blends(params: Record) -> bool:
     """Return whether any wheel's motor is to brake."""
     blending: bool = params.blending[0] + params.blending[2] > 0.0
     return blending
-
-
-@kernel
-def _current(inputs: Record, place: int) -> bool:
-    current: bool = usable(inputs, place) and inputs.age_ns[place] < 1e9 * OLDEST_S
-    return current
 
 
 @kernel
@@ -119,7 +113,11 @@ def update_motors(
     fading = _fading(params, speed, decel)
     forbidden = others_brake(inputs) or value[REVERSE] > 0.5
     for i in range(4):
-        known = _current(inputs, MOTOR_LIMIT + i) and _current(inputs, MOTOR_TORQUE + i) and dt > 0.0
+        known = (
+            current(inputs, MOTOR_LIMIT + i, OLDEST_S)
+            and current(inputs, MOTOR_TORQUE + i, OLDEST_S)
+            and dt > 0.0
+        )
         if known:
             _watch_motor(state, inputs, i, dt)
         if forbidden or guarded[i]:

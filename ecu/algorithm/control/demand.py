@@ -15,12 +15,18 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.estimation.motion import mean_wheel_speed, usable
+from ecu.algorithm.inputs import (
+    LEAST_REQUEST,
+    MAX_DECEL,
+    mean_wheel_speed,
+    pedal_known,
+    pedal_to_decel,
+    requested_decel,
+    usable,
+)
 from ecu.contract.params import PEDAL_POINTS
 from ecu.contract.signals import (
     ACCELERATOR_POSITION,
-    DECEL_DEMAND,
-    DECEL_DEMAND_VALID,
     PEDAL_POSITION,
     PEDAL_PRESSED,
     USABLE,
@@ -38,24 +44,11 @@ DEMAND_STATE = np.dtype(
     align=True,
 )
 
-MAX_DECEL = 12.0  # m/s^2: no tyre on a road car holds more
 STANDSTILL = 0.3  # m/s
 STANDING_TIME = 0.5  # s
-LEAST_REQUEST = 0.05  # m/s^2, below it nobody brakes
 ACCELERATOR_PRESSED = 3.0  # %
 SECONDARY_DECEL = 2.44  # m/s^2, of a secondary braking system (ECE R13-H, Annex 3, 2.2)
 HOLD_RATE = 5.0  # m/s^3: let go within 0.7 s, as fast as a foot changes the pedal
-
-
-@kernel
-def pedal_to_decel(params: Record, position: float) -> float:
-    """Return the deceleration [m/s^2] of a pedal position [%]: linear between the points of the map."""
-    x, y = params.pedal_position, params.pedal_decel
-    decel: float = y[0]
-    for j in range(1, PEDAL_POINTS):
-        if position > x[j - 1] and x[j] > x[j - 1]:
-            decel = y[j - 1] + (y[j] - y[j - 1]) * min((position - x[j - 1]) / (x[j] - x[j - 1]), 1.0)
-    return decel
 
 
 @kernel
@@ -68,13 +61,6 @@ def _position_for(params: Record, decel: float) -> float:
             return found
     last: float = x[PEDAL_POINTS - 1]
     return last
-
-
-@kernel
-def pedal_known(params: Record, inputs: Record) -> bool:
-    """Return whether the pedal's position arrives, or at least its switch does."""
-    switch = params.mapped[PEDAL_POSITION] != 0 and usable(inputs, PEDAL_PRESSED)
-    return usable(inputs, PEDAL_POSITION) or switch
 
 
 @kernel
@@ -96,28 +82,6 @@ def hold_pedal(params: Record, state: Record, inputs: Record) -> None:
     elif pedal_to_decel(params, state.pedal) < LEAST_REQUEST:
         state.pedal = _position_for(params, SECONDARY_DECEL)
     inputs.value[PEDAL_POSITION], inputs.verdict[PEDAL_POSITION] = state.pedal, USABLE
-
-
-@kernel
-def automated_demand_valid(inputs: Record) -> bool:
-    """Return whether an automated driver asks for a deceleration and vouches for it."""
-    return (
-        usable(inputs, DECEL_DEMAND)
-        and usable(inputs, DECEL_DEMAND_VALID)
-        and inputs.value[DECEL_DEMAND_VALID] > 0.5
-    )
-
-
-@kernel
-def requested_decel(params: Record, inputs: Record) -> float:
-    """Return the deceleration asked for [m/s^2], NaN where neither pedal nor demand is usable."""
-    decel = math.nan
-    if usable(inputs, PEDAL_POSITION):
-        decel = pedal_to_decel(params, inputs.value[PEDAL_POSITION])
-    if automated_demand_valid(inputs):
-        asked = inputs.value[DECEL_DEMAND]
-        decel = asked if math.isnan(decel) else max(decel, asked)
-    return min(max(decel, 0.0), MAX_DECEL) if math.isfinite(decel) else math.nan
 
 
 @kernel

@@ -23,8 +23,9 @@ import math
 import numpy as np
 
 from ecu.algorithm.brake import brake_gain
-from ecu.algorithm.estimation.motion import corner_speed, fresh
+from ecu.algorithm.estimation.motion import corner_speed
 from ecu.algorithm.estimation.tyre import rolling_radius
+from ecu.algorithm.inputs import fresh
 from ecu.contract.params import DISTRIBUTIONS, GRAVITY
 from ecu.contract.signals import WHEEL_SPEED
 from ecu.jit import Record, kernel

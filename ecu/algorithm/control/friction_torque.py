@@ -16,7 +16,7 @@ import numpy as np
 from ecu.algorithm.brake import brake_gain
 from ecu.algorithm.control.pressure_law import friction_in_use
 from ecu.algorithm.estimation.joint.pressure import correct_pressure
-from ecu.algorithm.estimation.motion import fresh
+from ecu.algorithm.inputs import fresh
 from ecu.contract.params import BAR
 from ecu.contract.signals import CALLIPER_PRESSURE, CYCLE_NS
 from ecu.jit import Record, kernel

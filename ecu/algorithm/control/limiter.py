@@ -23,7 +23,7 @@ import math
 import numpy as np
 
 from ecu.algorithm.brake import brake_gain
-from ecu.algorithm.estimation.motion import usable
+from ecu.algorithm.inputs import usable
 from ecu.contract.params import BAR
 from ecu.contract.signals import ACCUMULATOR_PRESSURE
 from ecu.jit import Record, kernel

@@ -10,8 +10,7 @@ failed     neither pedal, nor its switch, nor demand arrives: demand 0, flagged 
 
 import numpy as np
 
-from ecu.algorithm.control.demand import automated_demand_valid, pedal_known
-from ecu.algorithm.estimation.motion import motor_torque_known, usable
+from ecu.algorithm.inputs import automated_demand_valid, motor_torque_known, pedal_known, usable
 from ecu.contract.faults import (
     DEGRADING,
     HYDRAULICS_NOT_READY,

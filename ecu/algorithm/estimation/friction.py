@@ -18,8 +18,6 @@ import math
 import numpy as np
 
 from ecu.algorithm.brake import brake_gain
-from ecu.algorithm.control.demand import requested_decel
-from ecu.algorithm.estimation.motion import motor_torque, motor_torque_known, others_brake, usable
 from ecu.algorithm.estimation.observer2 import (
     correct_force,
     correct_omega,
@@ -30,9 +28,16 @@ from ecu.algorithm.estimation.observer2 import (
 )
 from ecu.algorithm.estimation.slip import CUT_OFF
 from ecu.algorithm.estimation.tyre import slip_stiffness
+from ecu.algorithm.inputs import (
+    driver_accelerates,
+    motor_torque,
+    motor_torque_known,
+    others_brake,
+    requested_decel,
+    usable,
+)
 from ecu.contract.signals import (
     ACCEL_X,
-    ACCELERATOR_POSITION,
     CALLIPER_PRESSURE,
     FAULT,
     HOLDING,
@@ -133,13 +138,6 @@ def resting_mode(params: Record, state: Record, learned: Record, good: bool, i: 
     if not good and params.mapped[WHEEL_SPEED + i] and params.mapped[CALLIPER_PRESSURE + i]:
         return FAULT
     return HOLDING if state.observed_s[i] > 0.0 or learned.observed_s[i] > 0.0 else NOMINAL
-
-
-@kernel
-def driver_accelerates(inputs: Record) -> bool:
-    """Return whether the accelerator is known to be pressed."""
-    pressed: bool = usable(inputs, ACCELERATOR_POSITION) and inputs.value[ACCELERATOR_POSITION] > 2.0
-    return pressed
 
 
 @kernel

@@ -18,16 +18,13 @@ import math
 
 import numpy as np
 
+from ecu.algorithm.inputs import motor_torque, usable
 from ecu.contract.params import GRAVITY
 from ecu.contract.signals import (
-    ABS_ACTIVE,
     ACCEL_X,
     ACCEL_Y,
-    ESP_ACTIVE,
-    MOTOR_TORQUE,
     REVERSE,
     STEERING_ANGLE,
-    USABLE,
     WHEEL_SPEED,
     YAW_RATE,
 )
@@ -51,48 +48,6 @@ MOTION_STATE = np.dtype(
     ],
     align=True,
 )
-
-
-@kernel
-def usable(inputs: Record, place: int) -> bool:
-    """Return whether an input is alive, valid and finite."""
-    return (inputs.verdict[place] & USABLE) == USABLE and math.isfinite(inputs.value[place])
-
-
-@kernel
-def fresh(inputs: Record, place: int) -> bool:
-    """Return whether a valid sample of an input came in this cycle."""
-    return inputs.new[place] != 0 and math.isfinite(inputs.value[place])
-
-
-@kernel
-def others_brake(inputs: Record) -> bool:
-    """Return whether an ABS or ESP says that it works: pressures are then not those that were demanded."""
-    works: bool = inputs.value[ABS_ACTIVE] > 0.5 or inputs.value[ESP_ACTIVE] > 0.5
-    return works
-
-
-@kernel
-def motor_torque(inputs: Record, corner: int) -> float:
-    """Return the motor torque [N m] of a wheel, positive regenerates; 0 where none is reported."""
-    place = MOTOR_TORQUE + corner
-    return inputs.value[place] if usable(inputs, place) else 0.0
-
-
-@kernel
-def motor_torque_known(inputs: Record, corner: int) -> bool:
-    """Return whether the motor torque is reported, or was never more than zero: a car without such motors."""
-    place = MOTOR_TORQUE + corner
-    return usable(inputs, place) or inputs.value[place] == 0.0
-
-
-@kernel
-def mean_wheel_speed(params: Record, inputs: Record) -> float:
-    """Return the mean speed of the wheels [m/s] by their last samples, without a sign."""
-    total = 0.0
-    for i in range(4):
-        total += abs(inputs.value[WHEEL_SPEED + i]) * params.wheel_radius[i]
-    return 0.25 * total
 
 
 @kernel

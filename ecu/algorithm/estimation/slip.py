@@ -11,8 +11,9 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.estimation.motion import corner_speed, fresh, motor_torque
+from ecu.algorithm.estimation.motion import corner_speed
 from ecu.algorithm.estimation.tyre import longitudinal_slip, rolling_radius, slip_stiffness
+from ecu.algorithm.inputs import fresh, motor_torque
 from ecu.contract.signals import WHEEL_SPEED
 from ecu.jit import Record, kernel
 

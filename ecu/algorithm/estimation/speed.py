@@ -16,7 +16,8 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.estimation.motion import corner_speed, fresh, speed_backwards, usable
+from ecu.algorithm.estimation.motion import corner_speed, speed_backwards
+from ecu.algorithm.inputs import fresh, usable
 from ecu.contract.signals import ACCEL_X, VEHICLE_SPEED, VEHICLE_SPEED_VALID, WHEEL_SPEED
 from ecu.jit import Record, kernel
 

@@ -31,7 +31,7 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.estimation.motion import fresh, motor_torque, others_brake, usable
+from ecu.algorithm.inputs import fresh, motor_torque, others_brake, usable
 from ecu.contract.params import GRAVITY
 from ecu.contract.signals import (
     ACCEL_X,

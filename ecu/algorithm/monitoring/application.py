@@ -8,7 +8,7 @@ usable neither starts nor prolongs an application.
 
 import numpy as np
 
-from ecu.algorithm.estimation.motion import usable
+from ecu.algorithm.inputs import usable
 from ecu.contract.signals import CALLIPER_PRESSURE
 from ecu.jit import Record, kernel
 

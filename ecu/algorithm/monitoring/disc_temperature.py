@@ -29,7 +29,7 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.estimation.motion import usable
+from ecu.algorithm.inputs import usable
 from ecu.contract.signals import AMBIENT_TEMPERATURE, CALLIPER_PRESSURE, OBSERVING, RAIN, WHEEL_SPEED
 from ecu.jit import Record, kernel
 

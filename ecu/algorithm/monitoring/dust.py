@@ -22,7 +22,7 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.estimation.motion import usable
+from ecu.algorithm.inputs import usable
 from ecu.algorithm.monitoring.emission_factor import (
     DURATION,
     N_FEATURES,

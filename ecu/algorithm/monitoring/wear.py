@@ -25,7 +25,7 @@ from typing import Final
 
 import numpy as np
 
-from ecu.algorithm.estimation.motion import usable
+from ecu.algorithm.inputs import usable
 from ecu.algorithm.monitoring.wear_belief import BELIEF, believe, worn
 from ecu.contract.params import MEGA
 from ecu.contract.records import N_LEGS

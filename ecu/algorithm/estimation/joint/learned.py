@@ -30,7 +30,7 @@ from ecu.algorithm.estimation.joint.observer import WINDOW_S, start_joint
 from ecu.algorithm.estimation.joint.pressure import follows
 from ecu.algorithm.estimation.joint.prior import limit_variance, set_prior, widen_levels
 from ecu.algorithm.estimation.joint.wheel import brake_lever, friction
-from ecu.algorithm.estimation.motion import usable
+from ecu.algorithm.inputs import usable
 from ecu.contract.signals import CALLIPER_PRESSURE, OBSERVING, WHEEL_SPEED
 from ecu.jit import Record, kernel
 

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.estimation.motion import fresh, motor_torque
+from ecu.algorithm.inputs import fresh, motor_torque
 from ecu.contract.signals import MOTOR_TORQUE
 from ecu.jit import Record, kernel
 

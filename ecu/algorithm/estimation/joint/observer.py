@@ -14,8 +14,7 @@ goes back to what was known 0.2 to 0.4 s before.
 
 import math
 
-from ecu.algorithm.control.demand import LEAST_REQUEST, requested_decel
-from ecu.algorithm.estimation.friction import driver_accelerates, drives_against
+from ecu.algorithm.estimation.friction import drives_against
 from ecu.algorithm.estimation.joint.correction import APPLIED, correct_by_balance, correct_by_wheel
 from ecu.algorithm.estimation.joint.drive import KNOWN, measure_drive
 from ecu.algorithm.estimation.joint.kalman import clear_derivatives, correct, forget
@@ -63,7 +62,15 @@ from ecu.algorithm.estimation.joint.wheel import (
 )
 from ecu.algorithm.estimation.joint.window import close_window, gather, open_window
 from ecu.algorithm.estimation.joint.zero import settle_zero
-from ecu.algorithm.estimation.motion import STANDING, mean_wheel_speed, others_brake, speed_backwards, usable
+from ecu.algorithm.estimation.motion import STANDING, speed_backwards
+from ecu.algorithm.inputs import (
+    LEAST_REQUEST,
+    driver_accelerates,
+    mean_wheel_speed,
+    others_brake,
+    requested_decel,
+    usable,
+)
 from ecu.contract.signals import (
     ACCEL_X,
     CALLIPER_PRESSURE,

@@ -5,7 +5,7 @@ from ecu.algorithm.estimation.joint.layout import STIFFNESS, V
 from ecu.algorithm.estimation.joint.prior import PRIOR
 from ecu.algorithm.estimation.joint.snapshot import go_back
 from ecu.algorithm.estimation.joint.wheel import car_force
-from ecu.algorithm.estimation.motion import fresh
+from ecu.algorithm.inputs import fresh
 from ecu.contract.signals import WHEEL_SPEED
 from ecu.jit import Record, kernel
 

@@ -18,7 +18,8 @@ from ecu.algorithm.estimation.joint.sampling import (
     open_sampling,
 )
 from ecu.algorithm.estimation.joint.zero import note_rest
-from ecu.algorithm.estimation.motion import corner_speed, fresh, motor_torque, motor_torque_known, usable
+from ecu.algorithm.estimation.motion import corner_speed
+from ecu.algorithm.inputs import current, fresh, motor_torque, motor_torque_known, usable
 from ecu.contract.params import BAR, GRAVITY
 from ecu.contract.signals import (
     ACCEL_X,
@@ -56,13 +57,6 @@ def speed_change(state: Record, motion: Record) -> float:
     """Return dv/dt [m/s^2] by the accelerometer and what is known of its bias and the slope."""
     change: float = motion.accel_x - state.x[BIAS] - state.x[SLOPE] + motion.yaw_rate * motion.lateral_speed
     return change
-
-
-@kernel
-def _current(inputs: Record, place: int) -> bool:
-    """Return whether a value is of now: alive, but not kept over a gap."""
-    current: bool = usable(inputs, place) and inputs.age_ns[place] < 1e9 * OLDEST_S
-    return current
 
 
 @kernel
@@ -108,7 +102,7 @@ def gather(
     for i in range(4):
         w.load[i] += load[i]
         w.motor[i] += motor_torque(inputs, i)
-        stale = usable(inputs, MOTOR_TORQUE + i) and not _current(inputs, MOTOR_TORQUE + i)
+        stale = usable(inputs, MOTOR_TORQUE + i) and not current(inputs, MOTOR_TORQUE + i, OLDEST_S)
         if stale or not motor_torque_known(inputs, i):
             w.motor_known = 0
         if usable(inputs, MOTOR_TORQUE + i):

@@ -1,0 +1,121 @@
+"""What is asked of the inputs: is a signal there, what do motors give, who brakes, what is demanded.
+
+All functions read `INPUTS` alone, as they came or as `monitoring/sensors.py` left them.
+"""
+
+import math
+
+from ecu.contract.params import PEDAL_POINTS
+from ecu.contract.signals import (
+    ABS_ACTIVE,
+    ACCELERATOR_POSITION,
+    DECEL_DEMAND,
+    DECEL_DEMAND_VALID,
+    ESP_ACTIVE,
+    MOTOR_TORQUE,
+    PEDAL_POSITION,
+    PEDAL_PRESSED,
+    USABLE,
+    WHEEL_SPEED,
+)
+from ecu.jit import Record, kernel
+
+MAX_DECEL = 12.0  # m/s^2: no tyre on a road car holds more
+LEAST_REQUEST = 0.05  # m/s^2, below it nobody brakes
+ACCELERATES = 2.0  # % of the accelerator's way
+
+
+@kernel
+def usable(inputs: Record, place: int) -> bool:
+    """Return whether an input is alive, valid and finite."""
+    return (inputs.verdict[place] & USABLE) == USABLE and math.isfinite(inputs.value[place])
+
+
+@kernel
+def fresh(inputs: Record, place: int) -> bool:
+    """Return whether a valid sample of an input came in this cycle."""
+    return inputs.new[place] != 0 and math.isfinite(inputs.value[place])
+
+
+@kernel
+def current(inputs: Record, place: int, oldest_s: float) -> bool:
+    """Return whether an input is usable and younger than `oldest_s` [s]: not kept over a gap."""
+    young: bool = inputs.age_ns[place] < 1e9 * oldest_s
+    return usable(inputs, place) and young
+
+
+@kernel
+def others_brake(inputs: Record) -> bool:
+    """Return whether an ABS or ESP says that it works: pressures are then not those that were demanded."""
+    works: bool = inputs.value[ABS_ACTIVE] > 0.5 or inputs.value[ESP_ACTIVE] > 0.5
+    return works
+
+
+@kernel
+def motor_torque(inputs: Record, corner: int) -> float:
+    """Return the motor torque [N m] of a wheel, positive regenerates; 0 where none is reported."""
+    place = MOTOR_TORQUE + corner
+    return inputs.value[place] if usable(inputs, place) else 0.0
+
+
+@kernel
+def motor_torque_known(inputs: Record, corner: int) -> bool:
+    """Return whether the motor torque is reported, or was never more than zero: a car without such motors."""
+    place = MOTOR_TORQUE + corner
+    return usable(inputs, place) or inputs.value[place] == 0.0
+
+
+@kernel
+def mean_wheel_speed(params: Record, inputs: Record) -> float:
+    """Return the mean speed of the wheels [m/s] by their last samples, without a sign."""
+    total = 0.0
+    for i in range(4):
+        total += abs(inputs.value[WHEEL_SPEED + i]) * params.wheel_radius[i]
+    return 0.25 * total
+
+
+@kernel
+def driver_accelerates(inputs: Record) -> bool:
+    """Return whether the accelerator is known to be pressed."""
+    pressed: bool = usable(inputs, ACCELERATOR_POSITION) and inputs.value[ACCELERATOR_POSITION] > ACCELERATES
+    return pressed
+
+
+@kernel
+def pedal_to_decel(params: Record, position: float) -> float:
+    """Return the deceleration [m/s^2] of a pedal position [%]: linear between the points of the map."""
+    x, y = params.pedal_position, params.pedal_decel
+    decel: float = y[0]
+    for j in range(1, PEDAL_POINTS):
+        if position > x[j - 1] and x[j] > x[j - 1]:
+            decel = y[j - 1] + (y[j] - y[j - 1]) * min((position - x[j - 1]) / (x[j] - x[j - 1]), 1.0)
+    return decel
+
+
+@kernel
+def pedal_known(params: Record, inputs: Record) -> bool:
+    """Return whether the pedal's position arrives, or at least its switch does."""
+    switch = params.mapped[PEDAL_POSITION] != 0 and usable(inputs, PEDAL_PRESSED)
+    return usable(inputs, PEDAL_POSITION) or switch
+
+
+@kernel
+def automated_demand_valid(inputs: Record) -> bool:
+    """Return whether an automated driver asks for a deceleration and vouches for it."""
+    return (
+        usable(inputs, DECEL_DEMAND)
+        and usable(inputs, DECEL_DEMAND_VALID)
+        and inputs.value[DECEL_DEMAND_VALID] > 0.5
+    )
+
+
+@kernel
+def requested_decel(params: Record, inputs: Record) -> float:
+    """Return the deceleration asked for [m/s^2], NaN where neither pedal nor demand is usable."""
+    decel = math.nan
+    if usable(inputs, PEDAL_POSITION):
+        decel = pedal_to_decel(params, inputs.value[PEDAL_POSITION])
+    if automated_demand_valid(inputs):
+        asked = inputs.value[DECEL_DEMAND]
+        decel = asked if math.isnan(decel) else max(decel, asked)
+    return min(max(decel, 0.0), MAX_DECEL) if math.isfinite(decel) else math.nan
