@@ -35,13 +35,7 @@ from ecu.algorithm.control.pressure_law import (
     watch_limit,
 )
 from ecu.algorithm.control.slip_guard import SLIP_GUARD_STATE, guard_slip
-from ecu.algorithm.estimation.force import (
-    FORCE_STATE,
-    reset_force,
-    take_measured_force,
-    total_tyre_force,
-    update_force,
-)
+from ecu.algorithm.estimation.force import FORCE_STATE, reset_force, take_measured_force, update_force
 from ecu.algorithm.estimation.friction import (
     FRICTION_STATE,
     hand_over,
@@ -93,6 +87,7 @@ from ecu.algorithm.monitoring.prediction import (
 from ecu.algorithm.monitoring.sensors import leave_out, watch_sensors
 from ecu.algorithm.monitoring.wear import WEAR_STATE, restore_wear, update_wear
 from ecu.algorithm.publish import publish
+from ecu.algorithm.vehicle import total_tyre_force
 from ecu.contract.faults import (
     ACCUMULATOR_LOW,
     BRAKE_FADE,

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, ValidationError, field_validator, model_validator
 
-from ecu.algorithm.estimation.tyre import rolling_radius
+from ecu.algorithm.vehicle import rolling_radius
 from ecu.contract.params import BAR, COMPENSATIONS, DISTRIBUTIONS, GRAVITY, OBSERVERS, PARAMS, PEDAL_POINTS
 from ecu.contract.records import RecordArray
 from ecu.errors import UserError

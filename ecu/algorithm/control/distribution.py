@@ -23,9 +23,8 @@ import math
 import numpy as np
 
 from ecu.algorithm.brake import brake_gain
-from ecu.algorithm.estimation.motion import corner_speed
-from ecu.algorithm.estimation.tyre import rolling_radius
 from ecu.algorithm.inputs import fresh
+from ecu.algorithm.vehicle import corner_speed, rolling_radius
 from ecu.contract.params import DISTRIBUTIONS, GRAVITY
 from ecu.contract.signals import WHEEL_SPEED
 from ecu.jit import Record, kernel

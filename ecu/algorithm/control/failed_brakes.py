@@ -23,8 +23,8 @@ import numpy as np
 
 from ecu.algorithm.brake import brake_gain
 from ecu.algorithm.control.distribution import ideal_front_share
-from ecu.algorithm.estimation.force import total_tyre_force
 from ecu.algorithm.inputs import motor_torque, others_brake, usable
+from ecu.algorithm.vehicle import total_tyre_force
 from ecu.contract.params import BAR, GRAVITY
 from ecu.contract.signals import CALLIPER_PRESSURE
 from ecu.jit import Record, kernel

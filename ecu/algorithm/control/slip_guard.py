@@ -19,8 +19,8 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.estimation.motion import corner_speed
 from ecu.algorithm.inputs import fresh, usable
+from ecu.algorithm.vehicle import corner_speed
 from ecu.contract.params import BAR
 from ecu.contract.signals import ABS_ACTIVE, ESP_ACTIVE, WHEEL_SPEED
 from ecu.jit import Record, kernel

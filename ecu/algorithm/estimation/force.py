@@ -54,15 +54,6 @@ MIN_MODEL_FORCE = 300.0
 
 
 @kernel
-def total_tyre_force(params: Record, motion: Record, speed: float) -> float:
-    """Return the sum of longitudinal tyre forces [N] in wheel axes from acceleration and drag (4.16)."""
-    inertial: float = params.mass * motion.accel_x
-    drag: float = params.drag_area * speed * abs(speed)
-    front_lateral: float = params.mass * motion.accel_y * params.rear_axle / params.wheelbase
-    return inertial + drag + front_lateral * math.sin(motion.steering)
-
-
-@kernel
 def reset_force(state: Record) -> None:
     """Begin the regression anew from the last k_f, as at the start of a braking."""
     state.covariance = COVARIANCE_START

@@ -14,8 +14,6 @@ v_y = l_r psi_dot - v_x a_y / (c_alpha g). Of yaw rate and lateral acceleration 
 cornering, a_y = v_x psi_dot.
 """
 
-import math
-
 import numpy as np
 
 from ecu.algorithm.inputs import motor_torque, usable
@@ -101,14 +99,3 @@ def update_motion(params: Record, state: Record, inputs: Record, speed: float, b
         state.accel_x, state.measured = reading / (1.0 + GRAVITY * params.pitch_gradient), 1
     slip_angle = state.accel_y / (params.cornering_stiffness * GRAVITY)
     state.lateral_speed = params.rear_axle * state.yaw_rate - speed * slip_angle
-
-
-@kernel
-def corner_speed(params: Record, state: Record, speed: float, corner: int) -> float:
-    """Return the ground speed [m/s] of a wheel in its rolling direction (A.5) at vehicle speed `speed`."""
-    half_track = 0.5 * params.track * (1.0 if corner % 2 == 1 else -1.0)
-    along: float = speed + state.yaw_rate * half_track
-    if corner >= 2:
-        return along
-    across: float = state.lateral_speed + state.yaw_rate * params.front_axle
-    return along * math.cos(state.steering) + across * math.sin(state.steering)

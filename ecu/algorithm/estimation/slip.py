@@ -11,9 +11,9 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.estimation.motion import corner_speed
-from ecu.algorithm.estimation.tyre import longitudinal_slip, rolling_radius, slip_stiffness
+from ecu.algorithm.estimation.tyre import longitudinal_slip, slip_stiffness
 from ecu.algorithm.inputs import fresh, motor_torque
+from ecu.algorithm.vehicle import corner_speed, rolling_radius
 from ecu.contract.signals import WHEEL_SPEED
 from ecu.jit import Record, kernel
 

@@ -16,8 +16,9 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.estimation.motion import corner_speed, speed_backwards
+from ecu.algorithm.estimation.motion import speed_backwards
 from ecu.algorithm.inputs import fresh, usable
+from ecu.algorithm.vehicle import corner_speed
 from ecu.contract.signals import ACCEL_X, VEHICLE_SPEED, VEHICLE_SPEED_VALID, WHEEL_SPEED
 from ecu.jit import Record, kernel
 

@@ -1,10 +1,4 @@
-"""Tyre kinematics and the linear tyre model of the observer.
-
-Rolling radius (A.4; corrected: the printed form lacks the factor r_0, without which F_Z -> 0 gives 1)
-
-    r_w = r_0 sin(theta) / theta,   theta = arccos(1 - F_Z / (r_0 K_Z))
-
-so that the radius falls by about F_Z / (3 K_Z): 1.2 mm under the load transfer of 4 m/s^2, where slip is 2 %.
+"""Slip and the linear tyre model of the observer.
 
 Longitudinal slip (A.6), negative while braking: lambda = (r_w omega - v_L) / max(r_w omega, v_L).
 
@@ -31,16 +25,6 @@ from ecu.jit import Record, kernel
 MIN_SLIP_SPEED = 1.0
 CURVE = 0.25  # loss of the secant per adhesion used
 BURCKHARDT = 1.2801, 23.99 / 22.0, 0.52  # c_1, c_2 F_Z / C_L and c_3 of dry asphalt
-
-
-@kernel
-def rolling_radius(load: float, unloaded_radius: float, vertical_stiffness: float) -> float:
-    """Return the effective rolling radius [m] for a wheel load [N] (A.4, corrected); r_0 without load."""
-    deflection = max(load, 0.0) / (unloaded_radius * vertical_stiffness)
-    if deflection < 1e-9:
-        return unloaded_radius
-    theta = math.acos(1.0 - min(deflection, 0.5))
-    return unloaded_radius * math.sin(theta) / theta
 
 
 @kernel

@@ -16,8 +16,8 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.estimation.motion import corner_speed
 from ecu.algorithm.inputs import fresh, motor_torque, others_brake, usable
+from ecu.algorithm.vehicle import corner_speed
 from ecu.contract.signals import CALLIPER_PRESSURE, WHEEL_SPEED
 from ecu.jit import Record, kernel
 

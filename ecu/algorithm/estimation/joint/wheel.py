@@ -37,7 +37,7 @@ from ecu.algorithm.estimation.joint.layout import (
     V,
 )
 from ecu.algorithm.estimation.joint.prior import SCALE_ONLY, UNKNOWN_PER_ERROR
-from ecu.algorithm.estimation.tyre import rolling_radius
+from ecu.algorithm.vehicle import rolling_radius
 from ecu.contract.params import BAR
 from ecu.jit import Record, kernel
 

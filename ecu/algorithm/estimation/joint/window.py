@@ -18,8 +18,8 @@ from ecu.algorithm.estimation.joint.sampling import (
     open_sampling,
 )
 from ecu.algorithm.estimation.joint.zero import note_rest
-from ecu.algorithm.estimation.motion import corner_speed
 from ecu.algorithm.inputs import current, fresh, motor_torque, motor_torque_known, usable
+from ecu.algorithm.vehicle import corner_speed
 from ecu.contract.params import BAR, GRAVITY
 from ecu.contract.signals import (
     ACCEL_X,

@@ -19,7 +19,7 @@ from ecu.algorithm.control.distribution import (
 )
 from ecu.algorithm.estimation.friction import FRICTION_STATE
 from ecu.algorithm.estimation.motion import MOTION_STATE
-from ecu.algorithm.estimation.tyre import rolling_radius
+from ecu.algorithm.vehicle import rolling_radius
 from ecu.contract.signals import WHEEL_SPEED
 from ecu.settings.config import load_config, new_params
 

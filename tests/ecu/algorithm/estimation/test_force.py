@@ -1,43 +1,18 @@
-"""Virtual force sensor: total force from first principles, K_f against batch weighted least squares."""
+"""Virtual force sensor: K_f against batch weighted least squares."""
 
 import math
 
 import numpy as np
 import pytest
 
-from ecu.algorithm.estimation.force import FORCE_STATE, reset_force, total_tyre_force, update_force
-from ecu.algorithm.estimation.motion import MOTION_STATE, update_motion
+from ecu.algorithm.estimation.force import FORCE_STATE, reset_force, update_force
+from ecu.algorithm.estimation.motion import MOTION_STATE
 from ecu.algorithm.estimation.slip import WHEELS_STATE
 from ecu.algorithm.estimation.tyre import CURVE
+from ecu.algorithm.vehicle import total_tyre_force
 
 G = 9.81
 DT = 0.01
-
-
-@pytest.mark.parametrize("grade", [-0.15, -0.05, 0.0, 0.08, 0.15])
-@pytest.mark.parametrize("force", [-12000.0, -4000.0, 0.0, 3000.0])
-def test_total_force_does_not_depend_on_the_slope(params, feed, grade: float, force: float) -> None:
-    p, speed = params[0], 25.0
-    drag = 0.5 * 1.2 * 0.35 * 2.32 * speed**2
-    acceleration = (force - drag) / p["mass"] - G * math.sin(grade)  # Newton along the road
-    specific = acceleration + G * math.sin(grade)  # what a sensor feels
-    pitch = -p["pitch_gradient"] * specific
-    reading = specific * math.cos(pitch) - G * math.cos(grade) * math.sin(pitch)
-    motion = np.zeros(1, MOTION_STATE)[0]
-    update_motion(p, motion, feed(accel_x=reading)[0], speed, np.zeros(4))
-    assert total_tyre_force(p, motion, speed) == pytest.approx(force, abs=25.0 + 0.002 * abs(force))
-
-
-@pytest.mark.parametrize(("accel_y", "steering"), [(4.0, 0.05), (-4.0, -0.05), (3.0, 0.2)])
-def test_in_a_curve_the_front_tyres_side_force_is_taken_out(params, accel_y: float, steering: float) -> None:
-    """(A.1a): m a_x = F_L - F_S,f sin(delta) - drag with F_S,f = m a_y l_r / L (steady turn)."""
-    p, speed, longitudinal = params[0], 15.0, -5000.0
-    side = p["mass"] * accel_y * p["rear_axle"] / p["wheelbase"]
-    motion = np.zeros(1, MOTION_STATE)[0]
-    drag = 0.5 * 1.2 * 0.35 * 2.32 * speed**2
-    motion["accel_x"] = (longitudinal - side * math.sin(steering) - drag) / p["mass"]
-    motion["accel_y"], motion["steering"] = accel_y, steering
-    assert total_tyre_force(p, motion, speed) == pytest.approx(longitudinal)
 
 
 def test_k_f_compares_the_forces_of_the_wheels_turned_into_the_chassis(params) -> None:

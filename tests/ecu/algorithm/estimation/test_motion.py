@@ -1,11 +1,11 @@
-"""Accelerations in road axes and corner speeds, against a car that is pitched and turned as a rigid body."""
+"""Accelerations in road axes, against a car that is pitched as a rigid body."""
 
 import math
 
 import numpy as np
 import pytest
 
-from ecu.algorithm.estimation.motion import MOTION_STATE, corner_speed, update_motion
+from ecu.algorithm.estimation.motion import MOTION_STATE, update_motion
 from ecu.contract.signals import ACCEL_X, ALIVE, STEERING_ANGLE, VALID, YAW_RATE
 
 G = 9.81
@@ -46,38 +46,6 @@ def test_a_sensor_ahead_of_the_centre_of_gravity_sees_the_centripetal_accelerati
     inputs = feed(accel_x=reading(params, -3.0, 0.0, yaw_rate=0.8), yaw_rate=0.8)
     update_motion(params[0], state[0], inputs[0], 20.0, np.zeros(4))
     assert state[0]["accel_x"] == pytest.approx(-3.0, abs=0.02)
-
-
-def rigid_body_speed(
-    params, speed: float, lateral: float, yaw_rate: float, steering: float, corner: int
-) -> float:
-    """Return v + omega x r of a wheel hub, projected on its rolling direction."""
-    p = params[0]
-    x = p["front_axle"] if corner < 2 else -p["rear_axle"]
-    y = 0.5 * p["track"] * (1 if corner % 2 == 0 else -1)  # left is positive
-    hub = np.array([speed, lateral, 0.0]) + np.cross([0.0, 0.0, yaw_rate], [x, y, 0.0])
-    angle = steering if corner < 2 else 0.0
-    return float(hub @ [math.cos(angle), math.sin(angle), 0.0])
-
-
-@pytest.mark.parametrize("corner", range(4))
-@pytest.mark.parametrize(
-    ("manoeuvre", "speed", "lateral", "yaw_rate", "steering"),
-    [
-        ("straight", 30.0, 0.0, 0.0, 0.0),
-        ("left turn", 15.0, 0.2, 0.4, 0.08),
-        ("right turn", 15.0, -0.2, -0.4, -0.08),
-        ("tight left turn at low speed", 4.0, 0.5, 0.9, 0.5),
-        ("skid", 20.0, -2.0, 0.3, -0.2),
-    ],
-)
-def test_corner_speeds_are_those_of_a_rigid_body(
-    params, manoeuvre: str, speed: float, lateral: float, yaw_rate: float, steering: float, corner: int
-) -> None:
-    state = np.zeros(1, MOTION_STATE)
-    state["lateral_speed"], state["yaw_rate"], state["steering"] = lateral, yaw_rate, steering
-    expected = rigid_body_speed(params, speed, lateral, yaw_rate, steering, corner)
-    assert corner_speed(params[0], state[0], speed, corner) == pytest.approx(expected, abs=1e-12), manoeuvre
 
 
 def test_lateral_speed_of_a_car_that_turns_on_its_rear_axle(params, feed) -> None:

@@ -1,55 +1,11 @@
-"""Rolling radius (A.4) and slip (A.6) against geometry that is worked out here."""
+"""Slip (A.6) and the tyre model against forms that are worked out here."""
 
 import math
 
 import numpy as np
 import pytest
 
-from ecu.algorithm.estimation.tyre import (
-    initial_stiffness,
-    longitudinal_slip,
-    rolling_radius,
-    slip_stiffness,
-    tyre_force,
-)
-
-RADIUS, STIFFNESS = 0.3705, 250e3
-
-
-def chord_per_arc(load: float) -> float:
-    """Return contact length over the tread that passes it: an inextensible belt of radius r_0 flattened at
-    the height r_0 - F/K has a half chord sqrt(r_0^2 - h^2); the wheel turns by its half angle meanwhile."""
-    height = RADIUS - load / STIFFNESS
-    half_chord = math.sqrt(RADIUS**2 - height**2)
-    return half_chord / math.atan2(half_chord, height)
-
-
-@pytest.mark.parametrize("load", [50.0, 500.0, 2000.0, 5000.0, 8000.0, 12000.0])
-def test_the_radius_is_the_chord_of_the_contact_over_its_angle(load: float) -> None:
-    assert rolling_radius(load, RADIUS, STIFFNESS) == pytest.approx(chord_per_arc(load), rel=1e-12)
-
-
-@pytest.mark.parametrize(("load", "expected"), [(0.0, RADIUS), (1e-6, RADIUS), (-500.0, RADIUS)])
-def test_an_unloaded_wheel_rolls_on_its_unloaded_radius(load: float, expected: float) -> None:
-    assert rolling_radius(load, RADIUS, STIFFNESS) == pytest.approx(expected, rel=1e-9)
-
-
-def test_small_deflection_takes_a_third_of_it_from_the_radius() -> None:
-    deflection = 1e-5
-    lost = RADIUS - rolling_radius(deflection * STIFFNESS, RADIUS, STIFFNESS)
-    assert lost == pytest.approx(deflection / 3, rel=1e-4)
-
-
-def test_load_transfer_of_4_m_s2_is_about_a_millimetre() -> None:
-    static, transfer = 5300.0, 2105 * 4 * 0.65 / (2 * 2.665)
-    change = rolling_radius(static, RADIUS, STIFFNESS) - rolling_radius(static + transfer, RADIUS, STIFFNESS)
-    assert change == pytest.approx(1.2e-3, rel=0.25)
-
-
-def test_the_radius_falls_with_every_newton_and_stays_positive_for_absurd_loads() -> None:
-    radii = [rolling_radius(load, RADIUS, STIFFNESS) for load in range(0, 40_000, 500)]
-    assert (np.diff(radii) < 0).all()
-    assert 0 < rolling_radius(1e9, RADIUS, STIFFNESS) < RADIUS
+from ecu.algorithm.estimation.tyre import initial_stiffness, longitudinal_slip, slip_stiffness, tyre_force
 
 
 @pytest.mark.parametrize(
