@@ -24,7 +24,7 @@ from brakelab.bench.log_formats import convert
 from brakelab.logs.formats import kind_of, read_frames
 from brakelab.logs.log_quality import LogQuality
 from brakelab.logs.signal_file import SignalQuality, read_signals
-from ecu.algorithm.step import STATE, new_state
+from ecu.algorithm.step import INITIAL, new_state
 from ecu.bus.database import load_database
 from ecu.bus.signal_map import receive_plan
 from ecu.errors import RunFault, UserError
@@ -173,7 +173,7 @@ def _store(folder: Path, head: Path) -> Path:
 
 
 def _recording(folder: Path, head: Path) -> Path:
-    about = {"start_ns": 1, "record": layout(RECORDED), "state": layout(STATE), "channel": "can0"}
+    about = {"start_ns": 1, "record": layout(RECORDED), "state": layout(INITIAL), "channel": "can0"}
     (folder / "recording.json").write_text(json.dumps(about))
     return folder / "recording.json"
 
@@ -242,7 +242,7 @@ def _write(kind: str, path: Path, content: bytes) -> None:
     path.chmod(0o600)
     if kind == "recording":
         (path.parent / "cycles.bin").write_bytes(bytes(3 * RECORDED.itemsize))
-        (path.parent / "initial.bin").write_bytes(bytes(STATE.itemsize))
+        (path.parent / "initial.bin").write_bytes(bytes(INITIAL.itemsize))
         (path.parent / "frames.log").write_text("(1.000000) can0 123#00\n" * 3)
 
 

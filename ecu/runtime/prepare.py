@@ -16,7 +16,7 @@ import numpy as np
 import structlog
 
 from ecu import __version__
-from ecu.algorithm.step import STATE
+from ecu.algorithm.step import INITIAL, initial_part
 from ecu.bus.channel import Channel, open_channel
 from ecu.bus.foreign import discard, listen_before_send
 from ecu.bus.signal_map import receive_plan
@@ -134,7 +134,7 @@ def prepare(options: RunOptions) -> Session:
         discard(channel)
         if not options.standby:
             listen_before_send(channel, f"{options.interface} {options.channel}", sending, LISTEN_S)
-        ring = create_ring(path, description, ecu.state.tobytes())
+        ring = create_ring(path, description, initial_part(ecu.state).tobytes())
         side.await_ready()
     except BaseException:
         side.abandon()
@@ -197,7 +197,7 @@ def _describe(options: RunOptions, config: Config) -> dict[str, Any]:
         },
         "units": {signal.name: signal.unit for signal in OUTPUT_SIGNALS},
         "input_units": {signal.name: signal.unit for signal in INPUT_SIGNALS},
-        "state": layout(STATE),
+        "state": layout(INITIAL),
     }
 
 

@@ -25,7 +25,7 @@ from brakelab.simulation.closed_loop import START_NS, plans
 from brakelab.simulation.scenario import load_scenario
 from brakelab.simulation.vehicle_bus import N_TRUTH
 from brakelab.vehicle_node import live_through, new_node
-from ecu.algorithm.step import STATE
+from ecu.algorithm.step import INITIAL, initial_part
 from ecu.bus.channel import BusStatus
 from ecu.bus.signal_map import receive_plan
 from ecu.contract.records import RecordArray
@@ -149,8 +149,8 @@ def run_one(rig: Rig, folder: Path, first: int, cycles: int, memory: list[float]
     ecu = new_ecu(params, stored[1] if stored else None, receive_plan(None), sending)
     compiled = CompileCounter()
     warm_up(ecu, compiled)
-    about = {"channel": "soak", "store_key": store_key(config), "state": layout(STATE)}
-    ring = create_ring(folder / "ring", about, ecu.state.tobytes())
+    about = {"channel": "soak", "store_key": store_key(config), "state": layout(INITIAL)}
+    ring = create_ring(folder / "ring", about, initial_part(ecu.state).tobytes())
     recorder = Recorder(RingReader(ring.path), None, folder)
     progress, grid = Progress(Watch(FINE, compiled)), Grid(rig.source())
     progress.number = first

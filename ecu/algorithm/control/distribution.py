@@ -77,19 +77,17 @@ def front_share(params: Record, decel: float) -> float:
 
 
 @kernel
-def _rear_beyond_front(
-    params: Record, inputs: Record, motion: Record, load: Record, speed: float, side: int
-) -> float:
+def _rear_beyond_front(params: Record, inputs: Record, estimate: Record, speed: float, side: int) -> float:
     """Return how much more than the front wheel of its side a rear wheel slips.
 
     NaN without new samples, or where a wheel turns faster than a braked one can: its sensor keeps a value.
     """
     slips, forwards = 0.0, 1.0 if speed > 0.0 else -1.0
     for i in (side, side + 2):
-        ground = forwards * corner_speed(params, motion, speed, i)
+        ground = forwards * corner_speed(params, estimate, speed, i)
         if not (fresh(inputs, WHEEL_SPEED + i) and ground > 0.0):
             return math.nan
-        radius = rolling_radius(load[i], params.unloaded_radius[i], params.vertical_stiffness[i])
+        radius = rolling_radius(estimate.load[i], params.unloaded_radius[i], params.vertical_stiffness[i])
         rolled = abs(inputs.value[WHEEL_SPEED + i]) * radius / ground
         if rolled > FASTEST:
             return math.nan
@@ -102,8 +100,7 @@ def watch_trailing(
     params: Record,
     state: Record,
     inputs: Record,
-    motion: Record,
-    load: Record,
+    estimate: Record,
     failed: Record,
     decel: float,
     speed: float,
@@ -119,20 +116,19 @@ def watch_trailing(
         params: `PARAMS`.
         state: `DISTRIBUTION_STATE`; all but `torque` is overwritten.
         inputs: `INPUTS`.
-        motion: `MOTION_STATE`.
-        load: of the wheels [N].
+        estimate: `ESTIMATE`.
         failed: wheels whose brake gives nothing, shape (4,).
         decel: demanded [m/s^2]; the axle has all of its torque again once nobody brakes.
         speed: of the vehicle [m/s], NaN: unknown. Slower than `min_speed` slip says nothing.
         dt: time since the last cycle [s].
     """
     brakes = decel > 0.0
-    free = not brakes and abs(motion.accel_x) < FREE_ACCEL and abs(motion.yaw_rate) < FREE_YAW_RATE
+    free = not brakes and abs(estimate.accel_x) < FREE_ACCEL and abs(estimate.yaw_rate) < FREE_YAW_RATE
     worst, trailing = 0.0, 1.0 if speed > 0.0 else -1.0
     for side in range(2):
         beyond = math.nan
         if abs(speed) > params.min_speed:
-            beyond = _rear_beyond_front(params, inputs, motion, load, speed, side)
+            beyond = _rear_beyond_front(params, inputs, estimate, speed, side)
         if math.isnan(beyond):
             state.beyond[side] = 0.0
             continue
@@ -170,7 +166,7 @@ def cap_trailing(
     state: Record,
     decel: float,
     lining: Record,
-    friction: Record,
+    estimate: Record,
     pressure: Record,
     failed: Record,
     backwards: bool,
@@ -185,7 +181,7 @@ def cap_trailing(
         state: `DISTRIBUTION_STATE`.
         decel: demanded [m/s^2].
         lining: torque [N m] that the lining of each wheel is asked for; the motors have the rest.
-        friction: `FRICTION_STATE`, what the observer claims.
+        estimate: `ESTIMATE`, for friction and its standard deviation.
         pressure: compensated demands [Pa], shape (4,); those of the trailing axle are overwritten.
         failed: wheels whose brake gives nothing, shape (4,); the rule is then one of the wheels that brake.
         backwards: the car drives so.
@@ -203,7 +199,7 @@ def cap_trailing(
         lever = brake_gain(params, i)
         acts = max(pressure[i] - params.push_out_pressure[i], 0.0)
         nominal = max(lining[i], 0.0) / (lever * params.mu_nominal[i])
-        mu, sigma = friction.mu[i], friction.sigma[i]
+        mu, sigma = estimate.mu[i], estimate.sigma[i]
         motor = (state.torque[i] - lining[i]) / params.wheel_radius[i]
         if (i < 2) != backwards:
             leading += 1

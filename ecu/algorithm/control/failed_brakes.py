@@ -24,7 +24,6 @@ import numpy as np
 from ecu.algorithm.brake import brake_gain
 from ecu.algorithm.control.distribution import ideal_front_share
 from ecu.algorithm.inputs import motor_torque, others_brake, usable
-from ecu.algorithm.vehicle import total_tyre_force
 from ecu.contract.params import BAR, GRAVITY
 from ecu.contract.signals import CALLIPER_PRESSURE
 from ecu.jit import Record, kernel
@@ -76,11 +75,10 @@ def watch_brakes(
     params: Record,
     state: Record,
     inputs: Record,
-    motion: Record,
+    estimate: Record,
     law: Record,
     expected: Record,
     zero: Record,
-    speed: float,
     sent: bool,
     dt: float,
 ) -> None:
@@ -90,17 +88,16 @@ def watch_brakes(
         params: `PARAMS`.
         state: `FAILED_BRAKES_STATE`.
         inputs: `INPUTS`.
-        motion: `MOTION_STATE`.
+        estimate: `ESTIMATE` of the last cycle.
         law: `PRESSURE_LAW_STATE`, for the friction.
         expected: pressures that follow from the demands sent, shape (4,) [bar].
         zero: what the sensors read without pressure, shape (4,) [bar].
-        speed: of the car [m/s].
         sent: the demands were valid; else, and while another controller brakes, nothing is judged.
         dt: time since the last cycle [s].
     """
     gain = 1.0 - math.exp(-dt / LAG)
     weight = params.mass * GRAVITY
-    given = -total_tyre_force(params, motion, speed) - params.rolling_resistance * weight
+    given = -estimate.tyre_force - params.rolling_resistance * weight
     due, total, suspected, braked = 0.0, 0.0, 0.0, False
     for i in range(4):
         force = _owed_force(params, law, expected[i], i)
@@ -114,7 +111,7 @@ def watch_brakes(
     state.given += gain * (given - state.given)
     if not braked:
         state.settled_s, state.scale = 0.0, 1.0
-    judged = sent and not others_brake(inputs) and motion.measured != 0 and motion.backwards == 0
+    judged = sent and not others_brake(inputs) and estimate.measured != 0 and estimate.backwards == 0
     judged = judged and total > SETTLED_FROM * weight and abs(due - total) < SETTLED * total
     if judged:
         state.settled_s += dt
@@ -140,6 +137,13 @@ def _lacks(inputs: Record, expected: float, zero: float, i: int) -> bool:
         expected > LEAST and usable(inputs, CALLIPER_PRESSURE + i) and reading < FOLLOWING * expected
     )
     return lacks
+
+
+@kernel
+def note_sent(state: Record, pressure: Record) -> None:
+    """Overwrite `state.sent`: the pressures demanded last [Pa], shape (4,), of the brakes that give some."""
+    for i in range(4):
+        state.sent[i] = 0.0 if state.failed[i] else pressure[i]
 
 
 @kernel

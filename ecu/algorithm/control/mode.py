@@ -85,6 +85,13 @@ def input_faults(params: Record, inputs: Record) -> int:
 
 
 @kernel
+def speaks(params: Record, mode: int) -> bool:
+    """Return whether the demands of this cycle are flagged valid."""
+    armed: bool = params.transmit != 0
+    return armed and mode != STARTING and mode != FAILED
+
+
+@kernel
 def decide_mode(state: Record, faults: int, braking: bool, dt: float) -> int:
     """Return the mode for this cycle's faults."""
     state.age_s += dt

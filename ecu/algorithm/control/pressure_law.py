@@ -23,7 +23,7 @@ import math
 import numpy as np
 
 from ecu.algorithm.brake import brake_gain
-from ecu.algorithm.estimation.friction import GREATEST_RATIO, LEAST_RATIO, well_observed
+from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO, well_observed
 from ecu.contract.params import INVERSE, OFF
 from ecu.jit import Record, kernel
 
@@ -59,7 +59,7 @@ def pressure_for_torque(params: Record, torque: float, mu: float, corner: int) -
 
 
 @kernel
-def follow_friction(params: Record, state: Record, friction: Record, dt: float) -> None:
+def follow_friction(params: Record, state: Record, estimate: Record, dt: float) -> None:
     """Move the friction in use towards the estimate, within what friction can be.
 
     An estimate above the base counts only as far as it is sure: rather too hard a braking than too weak a
@@ -67,15 +67,15 @@ def follow_friction(params: Record, state: Record, friction: Record, dt: float) 
     """
     if params.compensation == OFF:
         return
-    step, mu = FRICTION_RATE * dt, friction.mu
+    step, mu = FRICTION_RATE * dt, estimate.mu
     for i in range(4):
-        if friction.observed_s[i] < EARLY_S and state.start[i] != 1.0:
+        if estimate.observed_s[i] < EARLY_S and state.start[i] != 1.0:
             continue
-        if state.early[i] == 0.0 and friction.observed_s[i] >= EARLY_S:
+        if state.early[i] == 0.0 and estimate.observed_s[i] >= EARLY_S:
             state.early[i] = mu[i]
         base: float = state.base[i]
         target = mu[i] if math.isfinite(mu[i]) else base
-        doubt = max(friction.sigma[i] / max(mu[i], 0.1) - SURE, 0.0)
+        doubt = max(estimate.sigma[i] / max(mu[i], 0.1) - SURE, 0.0)
         if target > base:
             target = max(target * math.exp(-2.0 * doubt), base)
         target = min(max(target, LEAST_RATIO * params.mu_nominal[i]), GREATEST_RATIO * params.mu_nominal[i])
@@ -93,10 +93,10 @@ def set_base(params: Record, state: Record, learned: Record) -> None:
 
 
 @kernel
-def learn_start(state: Record, friction: Record, learned: Record) -> None:
+def learn_start(state: Record, estimate: Record, learned: Record) -> None:
     """Keep the ratio of first to last friction of a brake application, where both are known."""
     for i in range(4):
-        known = state.early[i] > 0.0 and well_observed(friction, i)
+        known = state.early[i] > 0.0 and well_observed(estimate, i)
         if known:
             change = state.early[i] / learned.mu_b[i]
             state.start[i] = min(max(change, 1.0 - LARGEST_START), 1.0 + LARGEST_START)

@@ -70,7 +70,7 @@ def guard_slip(
     params: Record,
     state: Record,
     inputs: Record,
-    motion: Record,
+    estimate: Record,
     speed: float,
     sent: Record,
     wanted: Record,
@@ -83,7 +83,7 @@ def guard_slip(
         params: `PARAMS`.
         state: `SLIP_GUARD_STATE`, overwritten.
         inputs: `INPUTS`.
-        motion: `MOTION_STATE`.
+        estimate: `ESTIMATE`.
         speed: of the car [m/s], negative backwards, NaN where it is not known.
         sent: pressures demanded in the last cycle [Pa], shape (4,).
         wanted: pressures that the pressure law asks for now [Pa], shape (4,).
@@ -94,7 +94,7 @@ def guard_slip(
     other = _flag(inputs, ABS_ACTIVE) or _flag(inputs, ESP_ACTIVE)
     state.acting = 0
     for i in range(4):
-        ground = abs(corner_speed(params, motion, speed, i)) if watching else 0.0
+        ground = abs(corner_speed(params, estimate, speed, i)) if watching else 0.0
         _follow_lag(params, state, inputs, ground, i, dt)
         slipping = watching and state.lag[i] > RANGE * max(ground, LEAST_SPEED)
         if slipping and not state.capped[i] and state.growth[i] > GROWING:

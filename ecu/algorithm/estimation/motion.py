@@ -16,6 +16,7 @@ cornering, a_y = v_x psi_dot.
 
 import numpy as np
 
+from ecu.algorithm.estimate import STANDING
 from ecu.algorithm.inputs import motor_torque, usable
 from ecu.contract.params import GRAVITY
 from ecu.contract.signals import (
@@ -28,7 +29,6 @@ from ecu.contract.signals import (
 )
 from ecu.jit import Record, kernel
 
-STANDING = 0.3  # m/s, below: the brakes hold rather than brake
 SLOPE = 2.0  # m/s^2, of a slope of 20 %
 LEAST_CORNERING_SPEED = 5.0  # m/s, from which lateral acceleration tells the yaw rate
 
@@ -99,3 +99,12 @@ def update_motion(params: Record, state: Record, inputs: Record, speed: float, b
         state.accel_x, state.measured = reading / (1.0 + GRAVITY * params.pitch_gradient), 1
     slip_angle = state.accel_y / (params.cornering_stiffness * GRAVITY)
     state.lateral_speed = params.rear_axle * state.yaw_rate - speed * slip_angle
+
+
+@kernel
+def tell_motion(state: Record, estimate: Record) -> None:
+    """Overwrite accelerations, yaw rate, steering and lateral speed in `estimate`."""
+    estimate.accel_x, estimate.accel_x_model = state.accel_x, state.accel_x_model
+    estimate.measured, estimate.backwards = state.measured, state.backwards
+    estimate.accel_y, estimate.yaw_rate = state.accel_y, state.yaw_rate
+    estimate.steering, estimate.lateral_speed = state.steering, state.lateral_speed

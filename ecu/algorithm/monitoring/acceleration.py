@@ -111,8 +111,7 @@ def _gather(
     params: Record,
     state: Record,
     inputs: Record,
-    motion: Record,
-    friction: Record,
+    estimate: Record,
     base: Record,
     braking: bool,
 ) -> None:
@@ -120,11 +119,11 @@ def _gather(
     force, wheels = 0.0, 0.0
     for i in range(4):
         radius = params.wheel_radius[i]
-        lining = friction.torque[i] * base[i] / friction.mu[i] if braking else 0.0
+        lining = estimate.brake_torque[i] * base[i] / estimate.mu[i] if braking else 0.0
         force -= (lining + motor_torque(inputs, i)) / (radius * params.mass)
         wheels += 0.25 * value[WHEEL_SPEED + i] * radius
     reading = value[ACCEL_X] / (1.0 + GRAVITY * params.pitch_gradient)
-    state.sum[A] += reading + motion.yaw_rate * motion.lateral_speed
+    state.sum[A] += reading + estimate.yaw_rate * estimate.lateral_speed
     state.sum[W] += wheels * (1.0 - reading / (GRAVITY * params.slip_stiffness[0]))
     state.sum[F] += force
     state.sum[ROLLED] += wheels
@@ -257,10 +256,8 @@ def watch_acceleration(
     params: Record,
     state: Record,
     inputs: Record,
-    motion: Record,
-    friction: Record,
+    estimate: Record,
     base: Record,
-    speed: float,
     braking: bool,
     dt: float,
 ) -> None:
@@ -270,20 +267,18 @@ def watch_acceleration(
         params: `PARAMS`.
         state: `ACCELERATION_STATE`, overwritten.
         inputs: `INPUTS`.
-        motion: `MOTION_STATE` of the last cycle.
-        friction: `FRICTION_STATE` of the last cycle.
+        estimate: `ESTIMATE` of the last cycle.
         base: friction that this braking began with, shape (4,).
-        speed: of the car [m/s].
         braking: a brake application lasts.
         dt: time since the last cycle [s].
     """
-    if speed < STANDSTILL:
+    if estimate.speed < STANDSTILL:
         state.implausible = 0
-    if not _tells(params, inputs, speed):
+    if not _tells(params, inputs, estimate.speed):
         state.good = 0
     if not _drive_known(params, inputs):
         state.known = 0
-    _gather(params, state, inputs, motion, friction, base, braking)
+    _gather(params, state, inputs, estimate, base, braking)
     state.time += dt
     if state.time > BLOCK_S - 0.001:
         _close_block(params, state)

@@ -76,21 +76,19 @@ def update_discs(
     state: Record,
     learned: Record,
     inputs: Record,
-    friction: Record,
+    estimate: Record,
     application: Record,
-    load: Record,
-    total_force: float,
-    speed: float,
     dt: float,
 ) -> None:
     """Overwrite temperature and standard deviation of every disc after `dt` [s].
 
-    `total_force` [N] of the tyres, negative when braking, and the wheel loads [N] serve where a pressure is
+    The force of all tyres, negative when braking, and the wheel loads of `estimate` serve where a pressure is
     lost. At the end of a braking `learned.disc_excess` becomes the most the disc can have above the air.
     """
     sigma_ambient = AMBIENT_UNKNOWN
     if usable(inputs, AMBIENT_TEMPERATURE):
         state.ambient, sigma_ambient = inputs.value[AMBIENT_TEMPERATURE], AMBIENT_ERROR
+    speed, load = estimate.speed, estimate.load
     by_speed, cooling_error = abs(speed), WET_ERROR
     if usable(inputs, RAIN):
         if inputs.value[RAIN] > 0.5:
@@ -103,17 +101,17 @@ def update_discs(
         omega = abs(inputs.value[WHEEL_SPEED + i]) if seen else abs(speed) / params.wheel_radius[i]
         if usable(inputs, CALLIPER_PRESSURE + i):
             # The noise of a released brake has no mean of zero once negative torque is cut off.
-            power = friction.torque[i] * omega if application.braking else 0.0
-            heating_error = math.hypot(HEATING_ERROR, friction.sigma[i] / friction.mu[i])
+            power = estimate.brake_torque[i] * omega if application.braking else 0.0
+            heating_error = math.hypot(HEATING_ERROR, estimate.sigma[i] / estimate.mu[i])
         else:
-            power = max(-total_force, 0.0) * load[i] / load_sum * abs(speed)
+            power = max(-estimate.tyre_force, 0.0) * load[i] / load_sum * abs(speed)
             heating_error = 1.0
         state.power[i], state.omega[i] = power, omega
         _advance(params, state, i, power, heating_error, by_speed, cooling_error, dt)
         parts = state.sigma_heating[i] ** 2 + state.sigma_cooling[i] ** 2 + state.sigma_start[i] ** 2
         state.sigma[i] = math.sqrt(parts + sigma_ambient**2)
         state.temperature[i] = state.ambient + state.excess[i]
-        if friction.mode[i] == OBSERVING:
+        if estimate.mode[i] == OBSERVING:
             state.observed_at[i] = state.temperature[i]
         if application.ended:
             learned.disc_excess[i] = state.excess[i] + UNIFORM * state.sigma[i]

@@ -86,14 +86,14 @@ def update_dust(
     state: Record,
     learned: Record,
     inputs: Record,
-    friction: Record,
+    estimate: Record,
     discs: Record,
     wear: Record,
     application: Record,
-    speed: float,
     dt: float,
 ) -> None:
-    """Take in a cycle of `dt` [s] at `speed` [m/s]; at the end of an application, count what it emitted."""
+    """Take in a cycle of `dt` [s]; at the end of an application, count what it emitted."""
+    speed = estimate.speed
     learned.dust.way += abs(speed) * dt
     if application.started:
         _clear(state)
@@ -104,7 +104,7 @@ def update_dust(
                 x[V_IN] = speed
             x[V_END] = speed
             x[DURATION] += dt
-            x[TORQUE] += friction.torque[i] * dt
+            x[TORQUE] += estimate.brake_torque[i] * dt
             x[TEMPERATURE] += discs.temperature[i] * dt
             place = CALLIPER_PRESSURE + i
             pressure = inputs.value[place] - params.push_out_pressure[i] / BAR

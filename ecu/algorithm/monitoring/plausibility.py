@@ -47,16 +47,16 @@ FOLLOWS = 0.75  # of that
 
 
 @kernel
-def _over_ground(params: Record, inputs: Record, motion: Record, speed: float, i: int) -> float:
+def _over_ground(params: Record, inputs: Record, estimate: Record, i: int) -> float:
     """Return how fast a wheel turns over what the ground below it does."""
     turns = inputs.value[WHEEL_SPEED + i] * params.wheel_radius[i]
-    over: float = turns / corner_speed(params, motion, speed, i)
+    over: float = turns / corner_speed(params, estimate, estimate.speed, i)
     return over
 
 
 @kernel
 def wheel_speed_implausible(
-    params: Record, state: Record, inputs: Record, motion: Record, speed: float, torque: Record, dt: float
+    params: Record, state: Record, inputs: Record, estimate: Record, dt: float
 ) -> bool:
     """Return whether a wheel has been too fast for `DOUBT_S`, or has fallen too fast.
 
@@ -64,22 +64,20 @@ def wheel_speed_implausible(
         params: `PARAMS`.
         state: `PLAUSIBILITY_STATE`, overwritten.
         inputs: `INPUTS`, as they came.
-        motion: `MOTION_STATE`.
-        speed: of the car [m/s].
-        torque: of the linings, shape (4,) [N m], >= 0.
+        estimate: `ESTIMATE` of the last cycle.
         dt: time since the last cycle [s].
     """
     found = False
     total, wheels = 0.0, 0
     for i in range(4):
         if usable(inputs, WHEEL_SPEED + i):
-            total += _over_ground(params, inputs, motion, speed, i)
+            total += _over_ground(params, inputs, estimate, i)
             wheels += 1
     for i in range(4):
         found = found or state.fell[i] != 0
-        over = _over_ground(params, inputs, motion, speed, i)
-        braked = torque[i] > BRAKED and motor_torque(inputs, i) >= 0.0
-        fast = usable(inputs, WHEEL_SPEED + i) and speed > LEAST_SPEED and over > FASTER
+        over = _over_ground(params, inputs, estimate, i)
+        braked = estimate.brake_torque[i] > BRAKED and motor_torque(inputs, i) >= 0.0
+        fast = usable(inputs, WHEEL_SPEED + i) and estimate.speed > LEAST_SPEED and over > FASTER
         alone = over * (wheels - 1) > FASTER * (total - over)  # than the others' mean; no other: 0 > 0
         state.for_s[i] = state.for_s[i] + dt if fast and alone and braked else 0.0
         found = found or state.for_s[i] > DOUBT_S
@@ -87,9 +85,7 @@ def wheel_speed_implausible(
 
 
 @kernel
-def watch_wheels(
-    params: Record, state: Record, inputs: Record, motion: Record, speed: float, torque: Record, dt: float
-) -> None:
+def watch_wheels(params: Record, state: Record, inputs: Record, estimate: Record, dt: float) -> None:
     """Overwrite `state.fell`: whose speed has fallen faster than a wheel's can.
 
     Arguments as for `wheel_speed_implausible`.
@@ -98,16 +94,16 @@ def watch_wheels(
         state.age_s[i] += dt
         if fresh(inputs, WHEEL_SPEED + i):
             omega = inputs.value[WHEEL_SPEED + i]
-            braked = torque[i] + abs(motor_torque(inputs, i))
+            braked = estimate.brake_torque[i] + abs(motor_torque(inputs, i))
             possible = FALL + FALL_SHARE * braked / params.wheel_inertia[i] * state.age_s[i]
-            ground = corner_speed(params, motion, speed, i)
+            ground = corner_speed(params, estimate, estimate.speed, i)
             known = state.age_s[i] < OLDEST_S and usable(inputs, CALLIPER_PRESSURE + i)
             if known and state.omega[i] - omega > possible:
                 state.fell[i] = 1
             elif abs(omega * params.wheel_radius[i] - ground) < ROLLING * ground:
                 state.fell[i] = 0
             state.omega[i], state.age_s[i] = omega, 0.0
-        if speed < STANDSTILL:
+        if estimate.speed < STANDSTILL:
             state.fell[i] = 0
 
 

@@ -20,8 +20,8 @@ LEFT_OUT_S = 0.03  # that a pressure is not what was demanded
 
 
 @kernel
-def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> int:
-    """Return the fault bits of sensors whose readings contradict the others.
+def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool]:
+    """Return the fault bits of sensors whose readings contradict the others, and whether one begins to.
 
     Args:
         p: `PARAMS`.
@@ -31,30 +31,27 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> int:
     """
     faults = 0
     doubted = s.acceleration.implausible != 0
-    if s.speed.started:
-        watch_acceleration(
-            p, s.acceleration, u, s.motion, s.friction, s.control.base, s.speed.speed,
-            s.application.braking != 0, dt,
-        )  # fmt: skip
-        watch_wheels(p, s.plausibility, u, s.motion, s.speed.speed, s.friction.torque, dt)
-        if wheel_speed_implausible(p, s.plausibility, u, s.motion, s.speed.speed, s.friction.torque, dt):
+    estimate = s.estimate
+    if estimate.started:
+        watch_acceleration(p, s.acceleration, u, estimate, s.control.base, s.application.braking != 0, dt)
+        watch_wheels(p, s.plausibility, u, estimate, dt)
+        if wheel_speed_implausible(p, s.plausibility, u, estimate, dt):
             faults |= WHEEL_SPEED_IMPLAUSIBLE
     if s.acceleration.implausible:
         faults |= ACCEL_IMPLAUSIBLE
     begins = s.acceleration.implausible != 0 and not doubted
-    watch_pressures(s.plausibility, u, s.friction_torque.model, s.joint.zero.value, dt)
+    watch_pressures(s.plausibility, u, s.friction_torque.model, estimate.pressure_zero, dt)
     if s.plausibility.pressure:
         faults |= PRESSURE_NOT_FOLLOWING
     failed = s.failed_brakes.any != 0
     watch_brakes(
-        p, s.failed_brakes, u, s.motion, s.control, s.friction_torque.model, s.joint.zero.value,
-        s.speed.speed, s.plausibility.sent != 0, dt,
+        p, s.failed_brakes, u, estimate, s.control, s.friction_torque.model, estimate.pressure_zero,
+        s.plausibility.sent != 0, dt,
     )  # fmt: skip
     fails = s.failed_brakes.any != 0 and not failed
     if s.failed_brakes.any:
         faults |= BRAKE_FAILED
-    s.friction.held = 1 if begins or fails or u.e2e_faults else 0
-    return faults
+    return faults, begins or fails
 
 
 @kernel

@@ -83,15 +83,14 @@ def update_wear(
     state: Record,
     learned: Record,
     inputs: Record,
-    friction: Record,
+    estimate: Record,
     discs: Record,
     application: Record,
-    speed: float,
     dt: float,
 ) -> None:
-    """Add what a cycle of `dt` [s] at `speed` [m/s] has worn to `learned.wear`."""
+    """Add what a cycle of `dt` [s] has worn to `learned.wear`."""
     wear = learned.wear
-    wear.odometer += abs(speed) * dt
+    wear.odometer += abs(estimate.speed) * dt
     gain = dt / (LOW_PASS + dt)
     for i in range(4):
         slope = (discs.omega[i] - state.speed[i]) / (LOW_PASS + dt)
@@ -115,7 +114,7 @@ def update_wear(
         state.since_s += dt
     if application.ended or state.since_s >= RENEWED_S:
         state.since_s = 0.0
-        _count_errors(state, wear, inputs, friction, discs)
+        _count_errors(state, wear, inputs, estimate, discs)
         for i in range(4):
             _renew(params, state, wear, i)
         if wear.odometer >= (wear.legs + 1) * LEG:
@@ -127,12 +126,12 @@ def update_wear(
 
 
 @kernel
-def _count_errors(state: Record, wear: Record, inputs: Record, friction: Record, discs: Record) -> None:
+def _count_errors(state: Record, wear: Record, inputs: Record, estimate: Record, discs: Record) -> None:
     """Add the errors of what was worn since the last time, with the deviations of now."""
     x, counted = wear.regressors, state.counted
     for i in range(4):
         known = usable(inputs, CALLIPER_PRESSURE + i)
-        share = friction.sigma[i] / friction.mu[i] if known else LOST
+        share = estimate.sigma[i] / estimate.mu[i] if known else LOST
         sigma, error = discs.sigma[i], wear.temperature_error
         error[ENERGY_T, i] += sigma * (x[ENERGY, i] - counted[ENERGY, i])
         error[ENERGY_T2, i] += 2.0 * sigma * (x[ENERGY_T, i] - counted[ENERGY_T, i])

@@ -11,7 +11,7 @@ from brakelab.replay.engine import new_ecu
 from brakelab.replay.quality import Findings
 from brakelab.replay.source import load_source
 from brakelab.results.files import read_result
-from ecu.algorithm.step import step
+from ecu.algorithm.step import INITIAL, initial_part, step
 from ecu.bus.freshness import begin_cycle, end_cycle
 from ecu.bus.receive import contract_receive_plan, new_reception, receive
 from ecu.contract.records import RecordArray
@@ -58,7 +58,7 @@ def record(tmp_path: Path, frames: RecordArray) -> tuple[Path, RecordArray]:
     params["mapped"] = plan.mapped
     ecu, reception = new_ecu(params, None), new_reception(plan)
     ecu.state["learned"]["mu_b"] = 0.5
-    initial = ecu.state.tobytes()
+    initial = initial_part(ecu.state).tobytes()
     records = np.zeros(CYCLES, RECORDED)
     first = begin = int(np.searchsorted(frames["stamp_ns"], START_NS + 10 * CYCLE_NS))
     t_ns = START_NS + 10 * CYCLE_NS
@@ -75,7 +75,7 @@ def record(tmp_path: Path, frames: RecordArray) -> tuple[Path, RecordArray]:
         end_cycle(ecu.inputs[0], reception.freshness)
         step(*ecu[:4])
         records["outputs"][k] = ecu.outputs[0]
-    about = {"start_ns": START_NS, "state": layout(ecu.state.dtype)}
+    about = {"start_ns": START_NS, "state": layout(INITIAL)}
     files = start_recording(tmp_path / "record", about, initial)
     write_batch(files, Batch(records, frames[begin:first]), "can0")
     return files.folder, records

@@ -58,7 +58,7 @@ def test_forgotten_linings_are_nominal() -> None:
     params = new_params(configured())
     state = new_state(params, forget(ABLATIONS["learned friction"], _learned()))
     joint = state["joint"][0]
-    np.testing.assert_allclose(state["friction"]["mu"], 0.45)
+    np.testing.assert_allclose(state["estimate"]["mu"], 0.45)
     np.testing.assert_allclose(joint["x"][LEVEL : LEVEL + 4], 0.0)
     level = joint["p"][LEVEL : LEVEL + 4, LEVEL : LEVEL + 4]
     prior = LEVEL_COMMON**2 + LEVEL_AXLE**2 + LEVEL_WHEEL**2

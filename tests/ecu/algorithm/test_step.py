@@ -8,7 +8,7 @@ import pytest
 from numba.core.runtime import rtsys
 from numba.core.runtime._nrt_python import memsys_enable_stats
 
-from ecu.algorithm.step import new_state, step
+from ecu.algorithm.step import STATE, initial_part, new_state, resume, step
 from ecu.contract.faults import ACCUMULATOR_LOW, BRAKE_FADE, DEMAND_LIMITED, REQUEST_LOST, WHEEL_SLIPS
 from ecu.contract.params import OFF
 from ecu.contract.records import OUTPUTS, output_vector
@@ -354,7 +354,7 @@ def test_no_demand_beyond_what_the_accumulator_holds_and_the_driver_is_told(car:
 
 def test_a_wheel_that_locks_is_let_go_and_nothing_is_learned_from_it(car: Car) -> None:
     car.drive((0.0, 2.0), (60.0, 3.0))
-    known = car.state["friction"][0]["mu"].copy()
+    known = car.state["estimate"][0]["mu"].copy()
     car.overwrite = {"wheel_speed_fl": 0.6 * car.speed / 0.36}
     car.drive((60.0, 0.02))
     car.overwrite = {"wheel_speed_fl": 0.3 * car.speed / 0.36}
@@ -365,7 +365,7 @@ def test_a_wheel_that_locks_is_let_go_and_nothing_is_learned_from_it(car: Car) -
     assert column(locked, "pressure_demand_fr")[-1] > 25.0
     assert not (faults & (DEMAND_LIMITED | BRAKE_FADE)).any()
     assert [column(locked, f"mode_{c}")[-1] for c in CORNERS] == [HOLDING] * 4
-    assert car.state["friction"][0]["mu"] == pytest.approx(known, rel=0.02)
+    assert car.state["estimate"][0]["mu"] == pytest.approx(known, rel=0.02)
 
 
 @pytest.mark.parametrize("missed", [1, 5])
@@ -403,9 +403,19 @@ def test_heat_put_in_since_friction_was_observed_widens_it(params, feed) -> None
         car = Car(params, feed)
         car.drive((0.0, 1.0), (60.0, 2.0), (0.0, 1.0))
         car.state["discs"][0]["observed_at"] -= change
-        before = car.state["friction"][0]["mu"].copy()
+        before = car.state["estimate"][0]["mu"].copy()
         rows = car.drive((60.0, 0.25))
         widest = int(column(rows, "sigma_mu_b_fl").argmax())
         greatest.append(column(rows, "sigma_mu_b_fl")[widest] / column(rows, "mu_b_fl")[widest])
         assert column(rows, "mu_b_fl")[widest] == pytest.approx(before[0], rel=0.02)
     assert greatest[1] ** 2 - greatest[0] ** 2 == pytest.approx(0.08**2, rel=0.2)
+
+
+def test_a_recording_keeps_all_of_a_first_state_but_the_estimate_which_follows(params) -> None:
+    learned = new_state(params)["learned"].copy()
+    learned["mu_b"], learned["sigma_mu_b"], learned["observed_s"] = 0.4, 0.02, 30.0
+    state, other = new_state(params, learned), new_state(params)
+    assert state["estimate"]["mu"] == pytest.approx(0.4)
+    resume(other, initial_part(state))
+    for name in STATE.names or ():
+        assert other[name].tobytes() == state[name].tobytes(), name

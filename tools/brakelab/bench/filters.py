@@ -1,4 +1,4 @@
-"""Four observer filters (`ecu/algorithm/estimation/observer2.py`) three times: ours, plain numpy, filterpy.
+"""Four filters of `ecu/algorithm/estimation/thesis/observer2.py` three times: ours, plain numpy, filterpy.
 
 All get the same inputs (`FILTER_INPUT`, as `update_friction` forms them) and start alike; plain Kalman
 algebra, without our gates, must give the same friction.
@@ -10,14 +10,14 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ecu.algorithm.estimation.observer2 import (
+from ecu.algorithm.estimation.thesis.observer2 import (
     OBSERVER_STATE,
     correct_force,
     correct_omega,
     predict_observer,
     start_observer,
 )
-from ecu.algorithm.estimation.tyre import slip_stiffness
+from ecu.algorithm.estimation.thesis.tyre import slip_stiffness
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CYCLE_NS, MOTOR_TORQUE, WHEEL_SPEED
 from ecu.jit import Record, kernel
@@ -80,16 +80,16 @@ def constants(params: RecordArray) -> Constants:
 def note_inputs(params: Record, state: Record, inputs: Record, row: Any) -> None:
     """Write what the four filters were given in the step just done, `row` of shape (4,)."""
     for i in range(4):
-        load, radius = state.wheel_load.load[i], state.wheels.radius[i]
-        stiffness = state.force.k_f * slip_stiffness(params, i, load, state.wheels.expected_force[i])
-        noise = params.sigma_wheel_speed * radius / max(state.speed.speed, 1.0)
+        load, radius = state.estimate.load[i], state.wheels.radius[i]
+        stiffness = state.estimate.k_f * slip_stiffness(params, i, load, state.wheels.expected_force[i])
+        noise = params.sigma_wheel_speed * radius / max(state.estimate.speed, 1.0)
         given = row[i]
         given.pressure = max(state.friction.pressure[i], 0.0)
         given.outer_torque = inputs.value[MOTOR_TORQUE + i] + params.rolling_resistance * load * radius
-        given.force = state.force.virtual[i]
+        given.force = state.estimate.force[i]
         given.radius = radius
         given.load = load
-        given.speed = state.speed.speed
+        given.speed = state.estimate.speed
         given.omega = inputs.value[WHEEL_SPEED + i]
         given.force_variance = (stiffness * noise) ** 2
 

@@ -13,6 +13,7 @@ from brakelab.replay.engine import Ecu, Rows, run_frames, run_samples
 from brakelab.replay.quality import Findings, identifier, note_faults
 from brakelab.replay.seen import set_raw_ends
 from brakelab.replay.source import Source, only_interface
+from ecu.algorithm.step import INITIAL, resume
 from ecu.bus.receive import ReceivePlan, new_reception
 from ecu.contract.faults import FOREIGN_SENDER
 from ecu.contract.records import CYCLE, EXTENDED_ID, FRAME_ERROR, FRAME_EXTENDED, RecordArray
@@ -50,9 +51,9 @@ def read_cycles(recording: Recording) -> RecordArray:
 
 def start_as_recorded(ecu: Ecu, recording: Recording) -> None:
     """Overwrite the ECU's state with the one before the first recorded cycle; arm it if it was armed."""
-    if recording.initial.dtype != ecu.state.dtype:
+    if recording.initial.dtype != INITIAL:
         raise _other_version(recording)
-    ecu.state[:] = recording.initial
+    resume(ecu.state, recording.initial)
     ecu.params[0]["transmit"] = recording.about.get("armed", ecu.params[0]["transmit"])
 
 

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from brakelab.results.brakes import LEARNED, BrakeRow
 from brakelab.results.prediction import SHORT, Vector, errors, one_scale, running_average
-from ecu.algorithm.estimation.friction import GREATEST_RATIO, LEAST_RATIO
+from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
 from ecu.contract.signals import CORNERS
 
 

@@ -1,4 +1,4 @@
-"""Outputs of the joint observer to the rest of the ECU, and its states that are stored between drives.
+"""States of the joint observer that are stored between drives.
 
 Kept are the states that outlive a drive, with their whole covariance: what a car's pressures cannot tell
 apart stays together after a restart as well. What may have changed in between (load, tyres, weather) is less
@@ -8,11 +8,11 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.estimation.friction import GREATEST_RATIO, LEAST_RATIO, resting_mode
+from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
+from ecu.algorithm.estimation.joint.estimates import sigma_friction
 from ecu.algorithm.estimation.joint.kalman import clear_state
 from ecu.algorithm.estimation.joint.layout import (
     BIAS,
-    CHANGE,
     DELAY,
     DRAG,
     LEVEL,
@@ -21,17 +21,12 @@ from ecu.algorithm.estimation.joint.layout import (
     PASSING,
     PEAK,
     RADIUS,
-    RATE,
     ROLLING,
     STIFFNESS,
     N,
 )
-from ecu.algorithm.estimation.joint.observer import WINDOW_S, start_joint
-from ecu.algorithm.estimation.joint.pressure import follows
+from ecu.algorithm.estimation.joint.observer import start_joint
 from ecu.algorithm.estimation.joint.prior import limit_variance, set_prior, widen_levels
-from ecu.algorithm.estimation.joint.wheel import brake_lever, friction
-from ecu.algorithm.inputs import usable
-from ecu.contract.signals import CALLIPER_PRESSURE, OBSERVING, WHEEL_SPEED
 from ecu.jit import Record, kernel
 
 KEPT = np.array([i for i in range(N) if i not in PASSING])
@@ -84,81 +79,13 @@ def keep_joint(params: Record, state: Record, learned: Record) -> None:
             place += 1
     for i in range(4):
         mu = params.mu_nominal[i] * math.exp(learned.joint[LEVEL + i])
-        learned.mu_b[i], learned.sigma_mu_b[i] = mu, mu * _sigma(params, state, i, False)
+        learned.mu_b[i], learned.sigma_mu_b[i] = mu, mu * sigma_friction(params, state, i, False)
 
 
 @kernel
-def hand_over_level(observed: Record, learned: Record) -> None:
+def hand_over_level(estimate: Record, learned: Record) -> None:
     """At the end of a braking: count what it observed."""
     learned.brakings += 1
     for i in range(4):
-        learned.observed_s[i] += observed.observed_s[i]
-        observed.observed_s[i] = 0.0
-
-
-@kernel
-def _at_bound(ratio: float) -> bool:
-    return ratio < 1.001 * LEAST_RATIO or ratio > 0.999 * GREATEST_RATIO
-
-
-@kernel
-def friction_now(state: Record, i: int) -> float:
-    """Return ln of friction over nominal: what the middle of the last window had, moved on by its rate."""
-    ahead = 0.5 * WINDOW_S + (0.0 if state.closed else state.window.time)
-    moved: float = state.x[LEVEL + i] + state.x[CHANGE + i // 2] + state.x[RATE] * ahead
-    return moved
-
-
-@kernel
-def _sigma(params: Record, state: Record, i: int, now: bool) -> float:
-    """Return the standard deviation of ln friction: of the level, or of what it is `now`."""
-    p, level, change = state.p, LEVEL + i, CHANGE + i // 2
-    variance = p[level, level]
-    if now:
-        variance += 2.0 * p[level, change] + p[change, change]
-    if _at_bound(math.exp(state.x[level])):
-        variance = max(variance, params.sigma_mu_initial**2)
-    return math.sqrt(max(variance, 0.0))
-
-
-@kernel
-def _sigma_force(params: Record, state: Record) -> float:
-    """Return the relative standard deviation of the force of all linings together, at equal pressures."""
-    h, total, variance = state.h, 0.0, 0.0
-    for i in range(LEVEL, LEVEL + 4):
-        h[i] = brake_lever(params, i - LEVEL) * friction(params, state, i - LEVEL)
-        h[i] /= params.wheel_radius[i - LEVEL]
-        total += h[i]
-    for i in range(LEVEL, LEVEL + 4):
-        for j in range(LEVEL, LEVEL + 4):
-            variance += h[i] * h[j] * state.p[i, j]
-    return math.sqrt(max(variance, 0.0)) / total
-
-
-@kernel
-def publish_friction(
-    params: Record,
-    state: Record,
-    published: Record,
-    learned: Record,
-    inputs: Record,
-    braking: bool,
-    dt: float,
-) -> None:
-    """Overwrite friction, its standard deviation and mode of every corner from the joint observer."""
-    published.reset = state.reset
-    if state.closed:
-        state.sigma_force = _sigma_force(params, state)
-    for i in range(4):
-        mu = params.mu_nominal[i] * math.exp(friction_now(state, i))
-        sigma = _sigma(params, state, i, True)
-        if state.observed[i] and follows(state.pressures, i):
-            above = max(state.smooth_pressure[i], 1.0)
-            sigma = math.sqrt(sigma * sigma + state.pressures.variance[i] / (above * above))
-        published.mu[i], published.sigma[i] = mu, mu * sigma
-        good = usable(inputs, WHEEL_SPEED + i) and usable(inputs, CALLIPER_PRESSURE + i)
-        if braking and state.observed[i] and good:
-            published.observed_s[i] += dt
-            published.mode[i] = OBSERVING
-        else:
-            published.mode[i] = resting_mode(params, published, learned, good, i)
+        learned.observed_s[i] += estimate.observed_s[i]
+        estimate.observed_s[i] = 0.0

@@ -14,6 +14,7 @@ goes back to what was known 0.2 to 0.4 s before.
 
 import math
 
+from ecu.algorithm.estimate import STANDING
 from ecu.algorithm.estimation.friction import drives_against
 from ecu.algorithm.estimation.joint.correction import APPLIED, correct_by_balance, correct_by_wheel
 from ecu.algorithm.estimation.joint.drive import KNOWN, measure_drive
@@ -62,7 +63,7 @@ from ecu.algorithm.estimation.joint.wheel import (
 )
 from ecu.algorithm.estimation.joint.window import close_window, gather, open_window
 from ecu.algorithm.estimation.joint.zero import settle_zero
-from ecu.algorithm.estimation.motion import STANDING, speed_backwards
+from ecu.algorithm.estimation.motion import speed_backwards
 from ecu.algorithm.inputs import (
     LEAST_REQUEST,
     driver_accelerates,

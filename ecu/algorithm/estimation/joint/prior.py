@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.estimation.friction import GREATEST_RATIO, LEAST_RATIO
+from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
 from ecu.algorithm.estimation.joint.kalman import clear_derivatives, clear_state, correct, drift_speed, forget
 from ecu.algorithm.estimation.joint.layout import (
     BIAS,

@@ -17,8 +17,7 @@ from ecu.algorithm.control.distribution import (
     front_share,
     watch_trailing,
 )
-from ecu.algorithm.estimation.friction import FRICTION_STATE
-from ecu.algorithm.estimation.motion import MOTION_STATE
+from ecu.algorithm.estimate import ESTIMATE
 from ecu.algorithm.vehicle import rolling_radius
 from ecu.contract.signals import WHEEL_SPEED
 from ecu.settings.config import load_config, new_params
@@ -139,8 +138,8 @@ class Watch:
 
     def __init__(self, params, state, feed, learned: float = 2.0) -> None:
         self.params, self.state, self.feed = params[0], state[0], feed
-        self.motion = np.zeros(1, MOTION_STATE)[0]
-        self.load = np.array(self.params["static_load"])
+        self.estimate = np.zeros(1, ESTIMATE)[0]
+        self.estimate["load"] = self.params["static_load"]
         self.error, self.failed = np.zeros(4), np.zeros(4, np.uint8)
         params["rear_slip_margin"] = 0.005
         self.state["free_s"] = learned
@@ -153,14 +152,14 @@ class Watch:
         p = self.params
         radius = [
             rolling_radius(*of)
-            for of in zip(self.load, p["unloaded_radius"], p["vertical_stiffness"], strict=True)
+            for of in zip(self.estimate["load"], p["unloaded_radius"], p["vertical_stiffness"], strict=True)
         ]
         for _ in range(round(seconds / DT)):
             omega = abs(speed) * (1 + np.array(slip) / 100) / (np.array(radius) * (1 + self.error))
             inputs = self.feed(wheel_speed=omega + noise * random.standard_normal(4))
             if lost is not None:
                 inputs[0]["new"][WHEEL_SPEED + lost] = 0
-            watch_trailing(p, self.state, inputs[0], self.motion, self.load, self.failed, decel, speed, DT)
+            watch_trailing(p, self.state, inputs[0], self.estimate, self.failed, decel, speed, DT)
         return float(self.state["trailing"])
 
 
@@ -231,7 +230,7 @@ def test_beside_a_failed_front_brake_a_rear_wheel_may_slip_more(watch, case, fai
 
 def test_the_radii_that_load_transfer_changes_are_no_slip(watch) -> None:
     """At 8 m/s^2 the front's radius is 0.3 % smaller, the rear's larger: 0.6 % of slip that is not there."""
-    watch.load += np.array([1, 1, -1, -1]) * 0.5 * 2105 * 8.0 * 0.65 / 2.665
+    watch.estimate["load"] += np.array([1, 1, -1, -1]) * 0.5 * 2105 * 8.0 * 0.65 / 2.665
     assert watch.run((-5, -5, -5.4, -5.4), seconds=2.0) == 1.0
 
 
@@ -249,7 +248,7 @@ def test_what_the_radii_differ_is_learned_while_rolling_freely(params, state, fe
 def test_nothing_is_learned_while_the_car_does_not_roll_freely(params, state, feed, moving) -> None:
     watch = Watch(params, state, feed, learned=0.0)
     for name, value in moving.items():
-        watch.motion[name] = value
+        watch.estimate[name] = value
     watch.run((0, 0, -1, -1), seconds=3.0, decel=0.0)
     assert state["offset"].tolist() == [[0.0, 0.0]]
 
@@ -278,9 +277,9 @@ def capped(
     lining = state[0]["torque"] * (1 - np.repeat(motor, 2))
     lever = 2 * p["piston_area"] * p["effective_radius"]
     before = lining / (lever * np.repeat(wanted, 2)) + p["push_out_pressure"]
-    friction, after = np.zeros(1, FRICTION_STATE), before.copy()
-    friction["mu"], friction["sigma"] = np.repeat(mu, 2), np.repeat(sigma, 2)
-    cap_trailing(p, state[0], decel, lining, friction[0], after, failed, backwards)
+    estimate, after = np.zeros(1, ESTIMATE), before.copy()
+    estimate["mu"], estimate["sigma"] = np.repeat(mu, 2), np.repeat(sigma, 2)
+    cap_trailing(p, state[0], decel, lining, estimate[0], after, failed, backwards)
     return before, after
 
 

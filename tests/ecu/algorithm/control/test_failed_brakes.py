@@ -14,11 +14,12 @@ from ecu.algorithm.control.failed_brakes import (
     GRIP,
     GRIP_RATE,
     YAW_LIMIT,
+    note_sent,
     replace_failed,
     watch_brakes,
 )
 from ecu.algorithm.control.pressure_law import PRESSURE_LAW_STATE
-from ecu.algorithm.estimation.motion import MOTION_STATE
+from ecu.algorithm.estimate import ESTIMATE
 from ecu.settings.config import load_config, new_params
 from ecu.settings.resources import resource
 
@@ -49,16 +50,15 @@ class Watched:
     def run(self, seconds, demand, true, read, sent=True, **other) -> list[int]:
         """Brake: pressures demanded, true and read [bar]; return which brakes are held for failed."""
         p = self.params
-        motion = np.zeros(1, MOTION_STATE)[0]
-        motion["measured"] = other.pop("measured", 1)
+        estimate = np.zeros(1, ESTIMATE)[0]
+        estimate["measured"] = other.pop("measured", 1)
         motor = np.array(other.get("motor_torque", np.zeros(4)))
         braked = self.force(true) + (motor / p["wheel_radius"]).sum()
-        resists = p["rolling_resistance"] * p["mass"] * G + p["drag_area"] * 20.0**2
-        motion["accel_x"] = -(braked + resists) / p["mass"]
+        estimate["tyre_force"] = -(braked + p["rolling_resistance"] * p["mass"] * G)
         inputs = self.feed(calliper_pressure=np.array(read, float), **other)[0]
         for _ in range(round(seconds / DT)):
             watch_brakes(
-                p, self.state, inputs, motion, self.law, np.array(demand, float), np.zeros(4), 20.0, sent, DT
+                p, self.state, inputs, estimate, self.law, np.array(demand, float), np.zeros(4), sent, DT
             )
         return np.flatnonzero(self.state["failed"]).tolist()
 
@@ -236,3 +236,10 @@ def test_the_axle_that_slips_is_relieved_here_too(params) -> None:
 def test_with_no_brake_left_nothing_is_moved(params) -> None:
     car = Replaced(params, (FL, FR, RL, RR), 3.0)
     assert car.force == pytest.approx(car.before)
+
+
+def test_of_a_failed_brake_nothing_counts_as_sent() -> None:
+    state = np.zeros(1, FAILED_BRAKES_STATE)[0]
+    state["failed"] = [0, 1, 0, 0]
+    note_sent(state, np.array([40e5, 40e5, 20e5, 0.0]))
+    np.testing.assert_array_equal(state["sent"], [40e5, 0.0, 20e5, 0.0])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ecu.algorithm.control.mode import MODE_STATE, decide_mode, input_faults
+from ecu.algorithm.control.mode import MODE_STATE, decide_mode, input_faults, speaks
 from ecu.contract.faults import (
     BUS_OFF,
     DEMAND_LIMITED,
@@ -178,3 +178,15 @@ def test_the_start_ends_when_everything_is_there_and_does_not_come_back() -> Non
 @pytest.mark.parametrize(("age", "mode"), [(0.99, STARTING), (1.0, DEGRADED)])
 def test_the_start_is_over_after_a_second(age: float, mode: int) -> None:
     assert decide_mode(np.zeros(1, MODE_STATE)[0], IMU_LOST, False, age) == mode
+
+
+@pytest.mark.parametrize(
+    ("mode", "armed"),
+    [(STARTING, False), (READY, True), (ACTIVE, True), (DEGRADED, True), (FAILED, False)],
+)
+def test_demands_are_valid_where_the_ecu_is_armed_and_neither_starts_nor_has_failed(
+    params, mode: int, armed: bool
+) -> None:
+    for transmit in (0, 1):
+        params[0]["transmit"] = transmit
+        assert speaks(params[0], mode) == (armed and transmit == 1)

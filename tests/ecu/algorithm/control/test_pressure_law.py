@@ -15,7 +15,7 @@ from ecu.algorithm.control.pressure_law import (
     set_base,
     watch_limit,
 )
-from ecu.algorithm.estimation.friction import FRICTION_STATE
+from ecu.algorithm.estimate import ESTIMATE
 from ecu.contract.params import INVERSE, OFF, SECOND_ORDER
 from ecu.contract.records import LEARNED
 from ecu.settings.config import load_config, new_params
@@ -40,9 +40,9 @@ def law(base: float = 0.45, used: float = 0.45):
 
 def estimated(mu: object, sigma: float = 0.02, observed_s: float = 2.0):
     """Return what the observer says."""
-    friction = np.zeros(1, FRICTION_STATE)
-    friction["mu"], friction["sigma"], friction["observed_s"] = mu, sigma, observed_s
-    return friction[0]
+    estimate = np.zeros(1, ESTIMATE)
+    estimate["mu"], estimate["sigma"], estimate["observed_s"] = mu, sigma, observed_s
+    return estimate[0]
 
 
 @pytest.mark.parametrize("corner", range(4))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ecu.algorithm.control.slip_guard import SLIP_GUARD_STATE, guard_slip
-from ecu.algorithm.estimation.motion import MOTION_STATE
+from ecu.algorithm.estimate import ESTIMATE
 from ecu.contract.signals import INPUT
 
 BAR, DT = 1e5, 0.01
@@ -20,7 +20,7 @@ class Wheels:
 
     def __init__(self, params, feed, speed: float = 20.0, turns: float = 1.0, **flags: float) -> None:
         self.params, self.feed, self.flags, self.turns = params[0], feed, flags, turns
-        self.state, self.motion = np.zeros(1, SLIP_GUARD_STATE)[0], np.zeros(1, MOTION_STATE)[0]
+        self.state, self.estimate = np.zeros(1, SLIP_GUARD_STATE)[0], np.zeros(1, ESTIMATE)[0]
         self.inputs, self.speed = feed(), speed
         self.sent, self.wanted = SENT.copy(), SENT.copy()
 
@@ -30,7 +30,7 @@ class Wheels:
         omega[0] *= 1.0 + slip
         self.feed(self.inputs, wheel_speed=omega, **self.flags)
         pressures = self.sent, self.wanted, self.wanted
-        guard_slip(self.params, self.state, self.inputs[0], self.motion, self.speed, *pressures, DT)
+        guard_slip(self.params, self.state, self.inputs[0], self.estimate, self.speed, *pressures, DT)
         assert not self.state["capped"][1:].any()
         assert self.state["acting"] == self.state["capped"][0]
         if not self.state["capped"][0]:
@@ -159,7 +159,7 @@ def test_an_old_sample_is_not_taken_twice(wheels: Wheels) -> None:
     wheels.inputs[0]["new"][place] = 0
     pressures = wheels.sent, wheels.wanted, wheels.wanted
     for _ in range(3):
-        guard_slip(wheels.params, wheels.state, wheels.inputs[0], wheels.motion, 30.0, *pressures, DT)
+        guard_slip(wheels.params, wheels.state, wheels.inputs[0], wheels.estimate, 30.0, *pressures, DT)
     assert (wheels.inputs[0]["value"] == omega).all()
     assert (wheels.state["growth"][0], wheels.state["lag"][0]) == before
     assert wheels.state["age"][0] == pytest.approx(3 * DT)
@@ -170,7 +170,7 @@ def test_of_a_lost_wheel_speed_nothing_is_kept(wheels: Wheels) -> None:
     wheels.run_into(-0.4)
     wheels.inputs[0]["new"][place] = wheels.inputs[0]["verdict"][place] = 0
     pressures = wheels.sent, wheels.wanted, wheels.wanted
-    guard_slip(wheels.params, wheels.state, wheels.inputs[0], wheels.motion, 20.0, *pressures, DT)
+    guard_slip(wheels.params, wheels.state, wheels.inputs[0], wheels.estimate, 20.0, *pressures, DT)
     assert wheels.state["lag"][0] == wheels.state["growth"][0] == 0.0
 
 
@@ -225,7 +225,7 @@ def test_within_the_range_a_fast_growing_slip_caps_nothing(wheels: Wheels) -> No
 @pytest.mark.parametrize("corner", range(4))
 @pytest.mark.parametrize("lost", [False, True])
 def test_each_wheel_is_watched_by_its_own_sensor(params, feed, corner: int, lost: bool) -> None:
-    state, motion = np.zeros(1, SLIP_GUARD_STATE)[0], np.zeros(1, MOTION_STATE)[0]
+    state, estimate = np.zeros(1, SLIP_GUARD_STATE)[0], np.zeros(1, ESTIMATE)[0]
     place, inputs = INPUT["wheel_speed_fl"] + corner, feed()
     for k in range(12):
         omega = 20.0 / params[0]["wheel_radius"]
@@ -233,13 +233,13 @@ def test_each_wheel_is_watched_by_its_own_sensor(params, feed, corner: int, lost
         feed(inputs, wheel_speed=omega)
         if lost:
             inputs[0]["new"][place] = inputs[0]["verdict"][place] = 0
-        guard_slip(params[0], state, inputs[0], motion, 20.0, SENT, SENT, SENT, DT)
+        guard_slip(params[0], state, inputs[0], estimate, 20.0, SENT, SENT, SENT, DT)
     assert state["capped"].tolist() == [int(i == corner and not lost) for i in range(4)]
 
 
 @pytest.mark.parametrize("corner", range(4))
 def test_a_late_sample_is_waited_for_and_a_lost_one_forgotten(params, feed, corner: int) -> None:
-    state, motion = np.zeros(1, SLIP_GUARD_STATE)[0], np.zeros(1, MOTION_STATE)[0]
+    state, estimate = np.zeros(1, SLIP_GUARD_STATE)[0], np.zeros(1, ESTIMATE)[0]
     place, inputs = INPUT["wheel_speed_fl"] + corner, feed()
     lags = []
     for k in range(8):
@@ -248,7 +248,7 @@ def test_a_late_sample_is_waited_for_and_a_lost_one_forgotten(params, feed, corn
         feed(inputs, wheel_speed=omega)
         inputs[0]["new"][place] = k < 5
         inputs[0]["verdict"][place] *= k < 7
-        guard_slip(params[0], state, inputs[0], motion, 20.0, SENT, SENT, SENT, DT)
+        guard_slip(params[0], state, inputs[0], estimate, 20.0, SENT, SENT, SENT, DT)
         lags.append(float(state["lag"][corner]))
     assert lags == pytest.approx([20.0 * 0.07 * k for k in (0, 1, 2, 3, 4, 4, 4)] + [0.0])
     assert state["growth"][corner] == 0.0
@@ -258,6 +258,6 @@ def test_no_time_between_two_cycles_changes_nothing(wheels: Wheels) -> None:
     wheels.run_into(-0.08)
     before = wheels.state.copy()
     pressures = wheels.sent, wheels.wanted, wheels.wanted
-    guard_slip(wheels.params, wheels.state, wheels.inputs[0], wheels.motion, 20.0, *pressures, 0.0)
+    guard_slip(wheels.params, wheels.state, wheels.inputs[0], wheels.estimate, 20.0, *pressures, 0.0)
     assert wheels.state["growth"].tolist() == before["growth"].tolist()
     assert wheels.state["lag"].tolist() == before["lag"].tolist()

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ecu.algorithm.estimation.friction import FRICTION_STATE
-from ecu.algorithm.estimation.motion import MOTION_STATE
+from ecu.algorithm.estimate import ESTIMATE
 from ecu.algorithm.monitoring.acceleration import ACCELERATION_STATE, watch_acceleration
 from ecu.contract.params import GRAVITY
 from ecu.contract.records import RecordArray
@@ -85,9 +84,8 @@ def drive(
     """
     rng = np.random.default_rng(7)
     p = params[0]
-    state, motion = np.zeros(1, ACCELERATION_STATE)[0], np.zeros(1, MOTION_STATE)[0]
-    friction = np.zeros(1, FRICTION_STATE)[0]
-    friction["mu"] = p["mu_nominal"]
+    state, estimate = np.zeros(1, ACCELERATION_STATE)[0], np.zeros(1, ESTIMATE)[0]
+    estimate["mu"] = p["mu_nominal"]
     base = p["mu_nominal"].copy()
     inputs, speed, said = feed(), 30.0, []
     for k in range(round(100 * seconds)):
@@ -102,7 +100,8 @@ def drive(
         feed(inputs, **(values | disturbed if t >= JUMP else values))
         if not motors:
             inputs[0]["verdict"][MOTOR_TORQUE : MOTOR_TORQUE + 4] = 0
-        watch_acceleration(p, state, inputs[0], motion, friction, base, speed, False, 0.01)
+        estimate["speed"] = speed
+        watch_acceleration(p, state, inputs[0], estimate, base, False, 0.01)
         said.append(bool(state["implausible"]))
     return said
 

@@ -38,23 +38,26 @@ class Discs:
         self.params, self.feed, self.p = params, feed, params[0]
         self.inputs = feed(ambient_temperature=AIR, rain=0.0, calliper_pressure=0.0)
         self.s = new_state(params)[0]
-        self.s["friction"]["mu"], self.s["friction"]["sigma"] = 0.45, 0.0
-        self.s["friction"]["mode"] = HOLDING
-        self.s["wheel_load"]["load"] = 5000.0
+        self.s["estimate"]["mu"], self.s["estimate"]["sigma"] = 0.45, 0.0
+        self.s["estimate"]["mode"] = HOLDING
+        self.s["estimate"]["load"] = 5000.0
         self.d = self.s["discs"]
         self.d["excess"] = self.d["sigma_start"] = 0.0
 
     def go(self, seconds: float, torque=0.0, speed: float = 0.0, force: float = 0.0, dt: float = 0.01):
         """Return temperatures [degC], shape (4,), after `seconds` of constant torque and speed."""
-        self.s["friction"]["torque"] = torque
+        self.s["estimate"]["brake_torque"] = torque
         self.s["application"]["braking"] = np.any(np.asarray(torque) > 0)
+        self.s["estimate"]["speed"], self.s["estimate"]["tyre_force"] = speed, force
         self.feed(self.inputs, wheel_speed=speed / RADIUS)
         for _ in range(round(seconds / dt)):
-            update_discs(
-                self.p, self.d, self.s["learned"], self.inputs[0], self.s["friction"], self.s["application"],
-                self.s["wheel_load"]["load"], force, speed, dt,
-            )  # fmt: skip
+            self.step(dt)
         return self.d["temperature"].copy()
+
+    def step(self, dt: float = 0.01) -> None:
+        """Run one cycle with the inputs and the estimate as they are."""
+        s = self.s
+        update_discs(self.p, self.d, s["learned"], self.inputs[0], s["estimate"], s["application"], dt)
 
     def rate(self, speed: float, wet: float = 1.0):
         """Return delta [1/s], shape (4,)."""
@@ -146,7 +149,7 @@ def test_a_part_of_sigma_is_what_a_wrong_parameter_does(params, feed, cause, par
 
 
 def test_friction_that_is_not_known_is_an_error_of_the_heat(discs: Discs) -> None:
-    discs.s["friction"]["sigma"] = 0.15 * 0.45
+    discs.s["estimate"]["sigma"] = 0.15 * 0.45
     discs.go(5.0, TORQUE, 20.0)
     assert discs.d["sigma_heating"] / discs.d["excess"] == pytest.approx(np.full(4, math.hypot(0.10, 0.15)))
 
@@ -185,7 +188,7 @@ def test_after_a_restart_every_rest_since_the_last_braking_is_inside_the_band(pa
     again = Discs(params, feed)
     again.s = new_state(params, learned)[0]
     again.d = again.s["discs"]
-    again.s["friction"]["mode"] = HOLDING
+    again.s["estimate"]["mode"] = HOLDING
     found = again.go(0.01)
     off = (found - true) / again.d["sigma"]
     print(f"rest {rest_s:.0f} s: true {np.round(true)}, found {np.round(found)}, {np.round(off, 2)} sigma")
@@ -245,14 +248,13 @@ def test_a_disc_is_never_colder_than_the_air(discs: Discs) -> None:
 def test_noise_of_released_brakes_does_not_heat(discs: Discs) -> None:
     """Cut off at zero, 1.8 bar of noise would be a torque of 9 N m: 20 K after three minutes of motorway."""
     random, s = np.random.default_rng(3), discs.s
+    s["estimate"]["speed"] = 30.0
     for _ in range(20_000):
         discs.feed(discs.inputs, calliper_pressure=0.5 + 1.8 * random.standard_normal(4), wheel_speed=80.0)
         update_application(discs.p, s["application"], discs.inputs[0], 0.01)
-        update_pressure(discs.p, s["friction"], discs.inputs[0], 0.01)
-        update_discs(
-            discs.p, discs.d, s["learned"], discs.inputs[0], s["friction"], s["application"],
-            s["wheel_load"]["load"], 0.0, 30.0, 0.01,
-        )  # fmt: skip
+        update_pressure(discs.p, s["friction"], s["estimate"]["mu"], discs.inputs[0], 0.01)
+        s["estimate"]["brake_torque"] = s["friction"]["torque"]
+        discs.step()
     assert (discs.d["excess"] < 0.5).all()
 
 
@@ -279,12 +281,9 @@ def test_a_value_that_is_not_finite_leaves_no_trace(params, feed, name, value) -
         disc.go(2.0, TORQUE, 20.0)
     good = dirty.inputs[0]["value"].copy()
     feed(dirty.inputs, **{name: value})
-    s = dirty.s
+    dirty.s["estimate"]["tyre_force"] = -6000.0
     for _ in range(5):
-        update_discs(
-            dirty.p, dirty.d, s["learned"], dirty.inputs[0], s["friction"], s["application"],
-            s["wheel_load"]["load"], -6000.0, 20.0, 0.01,
-        )  # fmt: skip
+        dirty.step()
         assert np.isfinite(dirty.d["temperature"]).all()
         assert np.isfinite(dirty.d["sigma"]).all()
     dirty.inputs[0]["value"] = good
@@ -303,10 +302,10 @@ def test_without_a_pressure_signal_there_is_no_temperature(params, feed) -> None
 
 @pytest.mark.parametrize(("excess", "expected"), [(0.0, 0.04), (100.0, 0.0), (200.0, 0.04), (350.0, 0.10)])
 def test_friction_gets_less_certain_by_4_percent_per_100_kelvin_either_way(discs, excess, expected) -> None:
-    discs.s["friction"]["mode"] = OBSERVING
+    discs.s["estimate"]["mode"] = OBSERVING
     discs.d["excess"] = 100.0
     discs.go(0.001, dt=0.001)
-    discs.s["friction"]["mode"] = HOLDING
+    discs.s["estimate"]["mode"] = HOLDING
     discs.d["excess"] = excess
     discs.go(0.001, dt=0.001)
     assert heat_widening(discs.d, 0) == pytest.approx(expected, abs=1e-5)

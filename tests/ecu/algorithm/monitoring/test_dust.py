@@ -45,13 +45,13 @@ class Car:
 
     def cycle(self, speed: float, torque: float, heat: float, pressure: float) -> None:
         s, u = self.s, self.inputs[0]
-        s["friction"]["torque"], s["discs"]["temperature"] = torque, heat
+        s["estimate"]["brake_torque"], s["estimate"]["speed"] = torque, speed
+        s["discs"]["temperature"] = heat
         s["discs"]["power"] = torque * speed / RADIUS
         u["value"][CALLIPER_PRESSURE : CALLIPER_PRESSURE + 4] = pressure
         u["verdict"][CALLIPER_PRESSURE : CALLIPER_PRESSURE + 4] |= USABLE
         update_dust(
-            self.p, s["dust"], s["learned"], u, s["friction"], s["discs"], s["wear"], s["application"], speed,
-            DT,
+            self.p, s["dust"], s["learned"], u, s["estimate"], s["discs"], s["wear"], s["application"], DT
         )  # fmt: skip
 
     def stop(
@@ -137,11 +137,12 @@ def test_a_lost_pressure_tells_nothing(car):
     application["started"] = application["braking"] = 1
     for _ in range(300):
         s, u = car.s, car.inputs[0]
-        s["friction"]["torque"], s["discs"]["temperature"] = 500.0, 90.0
+        s["estimate"]["brake_torque"], s["estimate"]["speed"] = 500.0, 15.0
+        s["discs"]["temperature"] = 90.0
         s["discs"]["power"] = 500.0 * 15.0 / RADIUS
         u["verdict"][CALLIPER_PRESSURE] = 0
         update_dust(
-            car.p, s["dust"], s["learned"], u, s["friction"], s["discs"], s["wear"], application, 15.0, DT
+            car.p, s["dust"], s["learned"], u, s["estimate"], s["discs"], s["wear"], application, DT
         )  # fmt: skip
         application["started"] = 0
     application["ended"], application["braking"] = 1, 0

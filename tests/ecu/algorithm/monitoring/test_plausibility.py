@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ecu.algorithm.estimation.motion import MOTION_STATE
+from ecu.algorithm.estimate import ESTIMATE
 from ecu.algorithm.monitoring.plausibility import (
     PLAUSIBILITY_STATE,
     watch_pressures,
@@ -32,6 +32,13 @@ CASES = [
 ]
 
 
+def estimated(speed: float, torque: float):
+    """`ESTIMATE` of a car that drives straight [m/s], brake torque of its linings [N m]."""
+    estimate = np.zeros(1, ESTIMATE)[0]
+    estimate["speed"], estimate["brake_torque"] = speed, torque
+    return estimate
+
+
 @pytest.mark.parametrize(("what", "turns", "torque", "motor", "speed", "implausible"), CASES)
 @pytest.mark.parametrize("wheel", [0, 3])
 def test_a_wheel_that_brakes_is_not_faster_than_the_car(
@@ -45,14 +52,14 @@ def test_a_wheel_that_brakes_is_not_faster_than_the_car(
     speed: float,
     implausible: bool,
 ) -> None:
-    state, motion = np.zeros(1, PLAUSIBILITY_STATE)[0], np.zeros(1, MOTION_STATE)[0]
+    state = np.zeros(1, PLAUSIBILITY_STATE)[0]
     inputs = feed()
-    torques = np.full(4, torque)
     inputs[0]["value"][WHEEL_SPEED : WHEEL_SPEED + 4] = 0.98 * speed / params[0]["wheel_radius"]
     inputs[0]["value"][WHEEL_SPEED + wheel] = turns * speed / params[0]["wheel_radius"][wheel]
     inputs[0]["value"][MOTOR_TORQUE : MOTOR_TORQUE + 4] = motor
     said = [
-        wheel_speed_implausible(params[0], state, inputs[0], motion, speed, torques, 0.01) for _ in range(50)
+        wheel_speed_implausible(params[0], state, inputs[0], estimated(speed, torque), 0.01)
+        for _ in range(50)
     ]
     assert any(said) == implausible
     if implausible:
@@ -61,11 +68,11 @@ def test_a_wheel_that_brakes_is_not_faster_than_the_car(
 
 def fallen(speeds: list[float], torque: float, params, feed, period: float = 0.01) -> list[bool]:
     """Wheel fl at each sample [rad/s] of a car at the first one's speed that brakes with `torque` [N m]."""
-    state, motion = np.zeros(1, PLAUSIBILITY_STATE)[0], np.zeros(1, MOTION_STATE)[0]
+    state = np.zeros(1, PLAUSIBILITY_STATE)[0]
     ground, said = speeds[0] * params[0]["wheel_radius"][0], []
     for speed in speeds:
         inputs = feed(wheel_speed=[speed, *[speeds[0]] * 3])
-        watch_wheels(params[0], state, inputs[0], motion, ground, np.full(4, torque), period)
+        watch_wheels(params[0], state, inputs[0], estimated(ground, torque), period)
         said.append(bool(state["fell"][0]))
         assert not state["fell"][1:].any()
     return said
@@ -93,13 +100,13 @@ def test_a_wheel_whose_wire_breaks_is_left_out_until_it_agrees_again(params, fee
 @pytest.mark.parametrize("stuck", [1, 2])
 @pytest.mark.parametrize("car", [0.93, 1.0], ids=["speed 7 % low", "speed right"])
 def test_wheels_are_held_against_each_other_too(params, feed, stuck: int, car: float) -> None:
-    state, motion = np.zeros(1, PLAUSIBILITY_STATE)[0], np.zeros(1, MOTION_STATE)[0]
+    state = np.zeros(1, PLAUSIBILITY_STATE)[0]
     turns = np.array([1.2] * stuck + [0.99] * (4 - stuck)) * 20.0 / params[0]["wheel_radius"]
     sound = np.full(4, 0.99) * 20.0 / params[0]["wheel_radius"]
     for speeds, expected in ((sound, False), (turns, True)):
         said = [
             wheel_speed_implausible(
-                params[0], state, feed(wheel_speed=speeds)[0], motion, car * 20.0, np.full(4, 800.0), 0.01
+                params[0], state, feed(wheel_speed=speeds)[0], estimated(car * 20.0, 800.0), 0.01
             )
             for _ in range(50)
         ]
@@ -168,11 +175,11 @@ def test_a_pressure_that_follows_again_is_believed_again(feed) -> None:
 
 def test_a_lost_wheel_does_not_count_among_the_others(params, feed) -> None:
     """Three wheels 8 % fast are the car's speed that is wrong; a lost one that reads 0 does not hide that."""
-    state, motion = np.zeros(1, PLAUSIBILITY_STATE)[0], np.zeros(1, MOTION_STATE)[0]
+    state = np.zeros(1, PLAUSIBILITY_STATE)[0]
     inputs = feed(wheel_speed=np.array([1.08, 1.08, 1.08, 0.0]) * 20.0 / params[0]["wheel_radius"])
     inputs[0]["verdict"][WHEEL_SPEED + 3] = 0
     for _ in range(60):
-        assert not wheel_speed_implausible(params[0], state, inputs[0], motion, 20.0, np.full(4, 800.0), 0.01)
+        assert not wheel_speed_implausible(params[0], state, inputs[0], estimated(20.0, 800.0), 0.01)
 
 
 @pytest.mark.parametrize(
@@ -180,9 +187,9 @@ def test_a_lost_wheel_does_not_count_among_the_others(params, feed) -> None:
     [(0.09, True), (0.0999, True), (0.1, False), (0.105, False), (0.2, False)],
 )
 def test_a_sample_is_compared_with_one_that_is_younger_than_0_1_s(params, feed, age, left_out) -> None:
-    state, motion = np.zeros(1, PLAUSIBILITY_STATE)[0], np.zeros(1, MOTION_STATE)[0]
+    state = np.zeros(1, PLAUSIBILITY_STATE)[0]
     state["omega"], ground = 60.0, 60.0 * float(params[0]["wheel_radius"][0])
-    watch_wheels(params[0], state, feed(wheel_speed=0.0)[0], motion, ground, np.zeros(4), age)
+    watch_wheels(params[0], state, feed(wheel_speed=0.0)[0], estimated(ground, 0.0), age)
     assert bool(state["fell"][0]) == left_out
 
 
@@ -193,13 +200,13 @@ def sample(params, feed, corner: int, omega: float, state=None, torque=0.0, age=
         state["omega"] = 60.0
     wheels = np.full(4, 60.0)
     wheels[corner] = omega
-    inputs, motion = feed(wheel_speed=wheels), np.zeros(1, MOTION_STATE)[0]
+    inputs = feed(wheel_speed=wheels)
     inputs[0]["value"][MOTOR_TORQUE + corner] = beside.get("motor", 0.0)
     inputs[0]["new"][WHEEL_SPEED + corner] = beside.get("new", 1)
     if beside.get("pressure_lost"):
         inputs[0]["verdict"][CALLIPER_PRESSURE + corner] = 0
     speed = 60.0 * float(params[0]["wheel_radius"][0]) if ground is None else ground
-    watch_wheels(params[0], state, inputs[0], motion, speed, np.full(4, torque), age)
+    watch_wheels(params[0], state, inputs[0], estimated(speed, torque), age)
     return state
 
 
@@ -257,7 +264,7 @@ def test_a_wheel_is_believed_again_where_it_agrees_with_the_car(
 )
 def test_a_fast_wheel_beside_the_others(params, feed, fast, case, lost, speed, implausible) -> None:
     """`lost`: counted from the fast wheel on."""
-    state, motion = np.zeros(1, PLAUSIBILITY_STATE)[0], np.zeros(1, MOTION_STATE)[0]
+    state = np.zeros(1, PLAUSIBILITY_STATE)[0]
     omega = speed / params[0]["wheel_radius"]
     omega[fast] *= 1.2
     inputs = feed(wheel_speed=omega)
@@ -265,7 +272,7 @@ def test_a_fast_wheel_beside_the_others(params, feed, fast, case, lost, speed, i
         inputs[0]["verdict"][WHEEL_SPEED + (fast + other) % 4] = 0
     said = False
     for _ in range(40):
-        said = wheel_speed_implausible(params[0], state, inputs[0], motion, speed, np.full(4, 800.0), 0.01)
+        said = wheel_speed_implausible(params[0], state, inputs[0], estimated(speed, 800.0), 0.01)
     assert bool(said) == implausible, case
 
 

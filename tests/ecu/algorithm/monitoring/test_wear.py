@@ -25,7 +25,7 @@ class Brakes:
     def __init__(self, params, feed) -> None:
         self.params, self.p, self.inputs = params, params[0], feed()
         self.s = new_state(params)[0]
-        self.s["friction"]["mu"], self.s["friction"]["sigma"] = 0.45, 0.0
+        self.s["estimate"]["mu"], self.s["estimate"]["sigma"] = 0.45, 0.0
         self.s["discs"]["sigma"] = 0.0
         self.s["application"]["braking"] = 1
 
@@ -36,9 +36,10 @@ class Brakes:
     def cycle(self, omega: float, torque: float = TORQUE, heat: float = HEAT, speed: float = 0.0) -> None:
         discs = self.s["discs"]
         discs["omega"], discs["power"], discs["temperature"] = omega, torque * omega, heat
+        self.s["estimate"]["speed"] = speed
         update_wear(
-            self.p, self.s["wear"], self.s["learned"], self.inputs[0], self.s["friction"], discs,
-            self.s["application"], speed, DT,
+            self.p, self.s["wear"], self.s["learned"], self.inputs[0], self.s["estimate"], discs,
+            self.s["application"], DT,
         )  # fmt: skip
 
     def settle(self, omega: float, slope: float) -> None:
@@ -136,14 +137,14 @@ def test_a_restart_goes_on_where_it_was_and_counts_nothing_twice(params, feed):
             low_pass = broken.s["wear"]["speed"].copy(), broken.s["wear"]["slowing"].copy()
             broken.s = new_state(params, learned)[0]
             broken.s["application"]["braking"] = 1
-            broken.s["friction"]["mu"] = 0.45
+            broken.s["estimate"]["mu"] = 0.45
             broken.s["wear"]["speed"], broken.s["wear"]["slowing"] = low_pass
     assert broken.kept["regressors"].tobytes() == whole.kept["regressors"].tobytes()
 
 
 def test_friction_and_temperature_widen_as_finite_differences_say(brakes, params):
     """d ln m of friction: once for work, twice for power squared; of temperature: the law's slope."""
-    brakes.s["friction"]["sigma"], brakes.s["discs"]["sigma"] = 0.05 * 0.45, 8.0
+    brakes.s["estimate"]["sigma"], brakes.s["discs"]["sigma"] = 0.05 * 0.45, 8.0
     x = brakes.stop(4.0, 80.0, -10.0)
     brakes.end()
     kept, p = brakes.kept, brakes.p

@@ -1,4 +1,4 @@
-"""What is kept between drives: values with their covariance, a pause less sure; and what is published."""
+"""What is kept between drives: values with their covariance, a pause less sure."""
 
 import math
 from pathlib import Path
@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ecu.algorithm.estimation.friction import FRICTION_STATE, GREATEST_RATIO, LEAST_RATIO
+from ecu.algorithm.estimate import ESTIMATE, GREATEST_RATIO, LEAST_RATIO
 from ecu.algorithm.estimation.joint.layout import (
     CHANGE,
     JOINT_STATE,
@@ -17,7 +17,6 @@ from ecu.algorithm.estimation.joint.layout import (
     MEAN,
     PASSING,
     PEAK,
-    RATE,
     N,
     V,
 )
@@ -27,14 +26,10 @@ from ecu.algorithm.estimation.joint.learned import (
     PAUSE,
     hand_over_level,
     keep_joint,
-    publish_friction,
     restore_joint,
 )
-from ecu.algorithm.estimation.joint.observer import WINDOW_S
-from ecu.algorithm.estimation.joint.pressure import AGREED_S
 from ecu.algorithm.estimation.joint.prior import set_prior
 from ecu.contract.records import LEARNED, N_KEPT
-from ecu.contract.signals import CALLIPER_PRESSURE, OBSERVING
 from ecu.recording.store import JOINT_LIMIT, out_of_range
 from ecu.settings.config import load_config, new_params
 
@@ -201,102 +196,14 @@ def test_amid_an_application_what_it_has_shown_so_far_is_kept() -> None:
     assert restored(learned)["x"][LEVEL : LEVEL + 4] == pytest.approx([-0.05, -0.05, 0.07, 0.07])
 
 
-def published(state, feed, braking: bool, friction=None):
-    friction = np.zeros(1, FRICTION_STATE)[0] if friction is None else friction
-    learned = np.zeros(1, LEARNED)[0]
-    publish_friction(SUV, state, friction, learned, feed()[0], braking, 0.01)
-    return friction
-
-
-AHEAD = [
-    # a window has just ended; time [s] since, by which friction has moved on from that window's middle
-    (True, 0.0, 0.5 * WINDOW_S),
-    (False, 0.01, 0.5 * WINDOW_S + 0.01),
-    (False, 0.04, 0.5 * WINDOW_S + 0.04),
-]
-
-
-@pytest.mark.parametrize(("closed", "since", "ahead"), AHEAD)
-def test_published_friction_is_level_and_change_moved_on_by_its_rate(feed, closed, since, ahead) -> None:
-    state = driven(4)
-    state["closed"], state["window"]["time"] = closed, WINDOW_S if closed else since
-    state["x"][RATE] = 0.3
-    mu = SUV["mu_nominal"] * np.exp(state["x"][LEVELS] + state["x"][AXLE] + 0.3 * ahead)
-    np.testing.assert_allclose(published(state, feed, True)["mu"], mu, rtol=1e-12)
-
-
-def test_published_sigma_is_that_of_level_and_change_together(feed) -> None:
-    state = driven(5)
-    A = np.zeros((4, N))
-    A[range(4), LEVELS] = A[range(4), AXLE] = 1.0
-    got = published(state, feed, False)
-    relative = np.sqrt(np.diag(A @ state["p"] @ A.T))
-    np.testing.assert_allclose(got["sigma"] / got["mu"], relative, rtol=1e-12)
-
-
-@pytest.mark.parametrize("follows", [True, False])
-@pytest.mark.parametrize("observed", [True, False])
-def test_an_observed_friction_is_as_unsure_as_the_pressure_it_is_set_against(feed, follows, observed) -> None:
-    """Where the pressure is a model's, it may be off for a while: its error is friction's then."""
-    state = driven(5)
-    plain = published(state, feed, True)
-    state["observed"], state["smooth_pressure"] = observed, [20.0, 20.0, 10.0, 0.5]
-    state["pressures"]["agreed_s"] = 2 * AGREED_S * follows
-    state["pressures"]["variance"] = 0.5**2
-    more = published(state, feed, True)
-    added = (more["sigma"] / more["mu"]) ** 2 - (plain["sigma"] / plain["mu"]) ** 2
-    expected = np.array([0.5 / 20, 0.5 / 20, 0.5 / 10, 0.5]) ** 2 * (follows and observed)
-    np.testing.assert_allclose(added, expected, atol=1e-15)
-
-
-MODES = [
-    # braking, observed, pressure usable; friction is being observed
-    (True, True, True, True),
-    (True, False, True, False),
-    (True, True, False, False),
-    (False, True, True, False),
-]
-
-
-@pytest.mark.parametrize(("braking", "observed", "usable", "observing"), MODES)
-def test_a_corner_is_observed_while_its_signals_show_friction(
-    feed, braking: bool, observed: bool, usable: bool, observing: bool
-) -> None:
-    state, friction = driven(6), np.zeros(1, FRICTION_STATE)[0]
-    inputs, learned = feed()[0], np.zeros(1, LEARNED)[0]
-    state["observed"] = observed
-    inputs["verdict"][CALLIPER_PRESSURE + 1] *= usable
-    for _ in range(5):
-        publish_friction(SUV, state, friction, learned, inputs, braking, 0.01)
-    assert (friction["mode"][1] == OBSERVING) == observing
-    assert friction["observed_s"][1] == pytest.approx(0.05 * observing)
-    assert (friction["mode"][0] == OBSERVING) == (braking and observed)
-
-
-def test_the_sigma_of_all_linings_force_is_that_of_its_logarithms_gradient(feed) -> None:
-    """At equal pressures: force of each is 2 A r_m mu / r; by differences."""
-    state = driven(7)
-    lever = SUV["piston_area"] * SUV["effective_radius"] / SUV["wheel_radius"]
-
-    def force(levels: np.ndarray) -> float:
-        return math.log((lever * SUV["mu_nominal"] * np.exp(levels + state["x"][AXLE])).sum())
-
-    at, step = state["x"][LEVELS], 1e-6
-    by = [(force(at + step * e) - force(at - step * e)) / (2 * step) for e in np.eye(4)]
-    expected = math.sqrt(by @ state["p"][np.ix_(LEVELS, LEVELS)] @ by)
-    state["closed"] = 1
-    published(state, feed, True)
-    assert state["sigma_force"] == pytest.approx(expected, rel=1e-7)
-
-
 def test_the_end_of_a_braking_counts_what_it_observed() -> None:
-    friction, learned = np.zeros(1, FRICTION_STATE)[0], np.zeros(1, LEARNED)[0]
+    estimate, learned = np.zeros(1, ESTIMATE)[0], np.zeros(1, LEARNED)[0]
     learned["observed_s"], learned["brakings"] = 10.0, 3
-    friction["observed_s"] = [1.0, 2.0, 0.0, 0.5]
-    hand_over_level(friction, learned)
+    estimate["observed_s"] = [1.0, 2.0, 0.0, 0.5]
+    hand_over_level(estimate, learned)
     np.testing.assert_allclose(learned["observed_s"], [11.0, 12.0, 10.0, 10.5])
     assert learned["brakings"] == 4
-    np.testing.assert_array_equal(friction["observed_s"], 0.0)
+    np.testing.assert_array_equal(estimate["observed_s"], 0.0)
 
 
 def test_what_pressures_cannot_tell_apart_stays_together() -> None:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from ecu.algorithm.estimation.motion import MOTION_STATE
-from ecu.algorithm.estimation.slip import WHEELS_STATE
-from ecu.algorithm.estimation.speed import (
+from ecu.algorithm.estimation.thesis.slip import WHEELS_STATE
+from ecu.algorithm.estimation.thesis.speed import (
     BIAS_DRIFT,
     BIAS_START,
     RADIUS_SAMPLES,

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from ecu.algorithm.estimation.friction import hand_over, restore_friction, update_friction, update_pressure
+from ecu.algorithm.estimation.friction import update_pressure
+from ecu.algorithm.estimation.thesis.friction import hand_over, restore_friction, update_friction
 from ecu.algorithm.step import STATE
 from ecu.contract.signals import (
     ACCEL_X,
@@ -55,7 +56,7 @@ class Stop:
         s["force"]["virtual"] = -(PER_MU * self.mu * acts + rolling + self.motor - inertia) / RADIUS
         s["application"]["braking"] = bool((self.pressure > 1.5).any())
         s["application"]["duration_s"] += DT
-        update_pressure(self.params, s["friction"], self.inputs[0], DT)
+        update_pressure(self.params, s["friction"], s["friction"]["mu"], self.inputs[0], DT)
         update_friction(
             self.params,
             s["friction"],

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ecu.algorithm.estimation.friction import FRICTION_STATE, update_pressure
-from ecu.algorithm.estimation.observer2 import (
+from ecu.algorithm.estimation.friction import CUT_OFF, update_pressure
+from ecu.algorithm.estimation.thesis.friction import FRICTION_STATE
+from ecu.algorithm.estimation.thesis.observer2 import (
     OBSERVER_STATE,
     correct_force,
     correct_omega,
@@ -20,7 +21,6 @@ from ecu.algorithm.estimation.observer2 import (
     process_noise,
     start_observer,
 )
-from ecu.algorithm.estimation.slip import CUT_OFF
 
 DT = 0.01
 INERTIA, LENGTH, RADIUS, LOAD = 1.5, 0.25, 0.36, 5400.0  # config/suv.toml
@@ -186,7 +186,8 @@ def test_friction_is_observable_if_and_only_if_pressure_exceeds_push_out(
     """(4.37, corrected): rank of [C; CA; CA^2], states in units of their usual uncertainty; any mu."""
     friction = np.zeros(1, FRICTION_STATE)[0]
     assert params[0]["push_out_pressure"][corner] == 0.5 * BAR
-    update_pressure(params[0], friction, feed(calliper_pressure=bar)[0], 1e3)  # long enough to settle
+    bar_inputs = feed(calliper_pressure=bar)[0]
+    update_pressure(params[0], friction, friction["mu"], bar_inputs, 1e3)  # long enough to settle
     A, C = system_matrices(params[0], corner, max(float(friction["pressure"][corner]), 0.0), speed, mu)
     scale = np.diag([1.0, 1000.0, 0.1])
     A, C = np.linalg.inv(scale) @ A @ scale, np.diag([1.0, 1e-3]) @ C @ scale

@@ -11,7 +11,8 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.estimation.tyre import longitudinal_slip, slip_stiffness
+from ecu.algorithm.estimation.friction import CUT_OFF
+from ecu.algorithm.estimation.thesis.tyre import longitudinal_slip, slip_stiffness
 from ecu.algorithm.inputs import fresh, motor_torque
 from ecu.algorithm.vehicle import corner_speed, rolling_radius
 from ecu.contract.signals import WHEEL_SPEED
@@ -29,7 +30,6 @@ WHEELS_STATE = np.dtype(
     align=True,
 )
 
-CUT_OFF = 16.0  # Hz
 RADIUS_START = 0.004  # standard deviation of a radius error before anything is learned
 RADIUS_FLOOR = 0.00015
 RADIUS_DRIFT = 1e-5  # 1/sqrt(s): temperature and pressure of the tyre

@@ -22,7 +22,7 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.estimation.tyre import initial_stiffness, linear_force, tyre_force
+from ecu.algorithm.estimation.thesis.tyre import initial_stiffness, linear_force, tyre_force
 from ecu.algorithm.inputs import usable
 from ecu.contract.signals import WHEEL_FORCE_X
 from ecu.jit import Record, kernel

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ecu.algorithm.estimation.joint.layout import BIAS, DRAG, JOINT_STATE, LEVEL, MASS, MOTOR, OVERRUN, V
-from ecu.algorithm.monitoring.prediction import (
+from ecu.algorithm.estimation.joint.prediction import (
     CONFIGURED_WAY,
     LEARNED_WAY,
     PREDICTION_STATE,

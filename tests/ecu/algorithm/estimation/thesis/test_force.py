@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from ecu.algorithm.estimation.force import FORCE_STATE, reset_force, update_force
 from ecu.algorithm.estimation.motion import MOTION_STATE
-from ecu.algorithm.estimation.slip import WHEELS_STATE
-from ecu.algorithm.estimation.tyre import CURVE
+from ecu.algorithm.estimation.thesis.force import FORCE_STATE, reset_force, update_force
+from ecu.algorithm.estimation.thesis.slip import WHEELS_STATE
+from ecu.algorithm.estimation.thesis.tyre import CURVE
 from ecu.algorithm.vehicle import total_tyre_force
 
 G = 9.81

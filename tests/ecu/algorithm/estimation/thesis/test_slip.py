@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from ecu.algorithm.estimation.slip import expect_slip, learn_radius, update_radius, update_slip
-from ecu.algorithm.estimation.tyre import CURVE
+from ecu.algorithm.estimation.thesis.slip import expect_slip, learn_radius, update_radius, update_slip
+from ecu.algorithm.estimation.thesis.tyre import CURVE
 from ecu.algorithm.step import STATE
 from ecu.contract.signals import INPUT, WHEEL_SPEED
 

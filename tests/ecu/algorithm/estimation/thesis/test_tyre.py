@@ -5,7 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from ecu.algorithm.estimation.tyre import initial_stiffness, longitudinal_slip, slip_stiffness, tyre_force
+from ecu.algorithm.estimation.thesis.tyre import (
+    initial_stiffness,
+    longitudinal_slip,
+    slip_stiffness,
+    tyre_force,
+)
 
 
 @pytest.mark.parametrize(

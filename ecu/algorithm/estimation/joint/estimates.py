@@ -1,0 +1,122 @@
+"""What the joint observer says of the car: its states turned into `ESTIMATE`."""
+
+import math
+
+from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
+from ecu.algorithm.estimation.friction import resting_mode
+from ecu.algorithm.estimation.joint.kalman import GATE
+from ecu.algorithm.estimation.joint.layout import BIAS, CHANGE, LEVEL, MASS, OVERRUN, RATE, STIFFNESS, V
+from ecu.algorithm.estimation.joint.observer import WINDOW_S
+from ecu.algorithm.estimation.joint.pressure import follows
+from ecu.algorithm.estimation.joint.wheel import brake_lever, friction
+from ecu.algorithm.inputs import usable
+from ecu.contract.signals import CALLIPER_PRESSURE, OBSERVING, WHEEL_SPEED
+from ecu.jit import Record, kernel
+
+
+@kernel
+def friction_now(state: Record, i: int) -> float:
+    """Return ln of friction over nominal: what the middle of the last window had, moved on by its rate."""
+    ahead = 0.5 * WINDOW_S + (0.0 if state.closed else state.window.time)
+    moved: float = state.x[LEVEL + i] + state.x[CHANGE + i // 2] + state.x[RATE] * ahead
+    return moved
+
+
+@kernel
+def _at_bound(ratio: float) -> bool:
+    return ratio < 1.001 * LEAST_RATIO or ratio > 0.999 * GREATEST_RATIO
+
+
+@kernel
+def sigma_friction(params: Record, state: Record, i: int, now: bool) -> float:
+    """Return the standard deviation of ln friction: of the level, or of what it is `now`."""
+    p, level, change = state.p, LEVEL + i, CHANGE + i // 2
+    variance = p[level, level]
+    if now:
+        variance += 2.0 * p[level, change] + p[change, change]
+    if _at_bound(math.exp(state.x[level])):
+        variance = max(variance, params.sigma_mu_initial**2)
+    return math.sqrt(max(variance, 0.0))
+
+
+@kernel
+def _sigma_force(params: Record, state: Record) -> float:
+    """Return the relative standard deviation of the force of all linings together, at equal pressures."""
+    h, total, variance = state.h, 0.0, 0.0
+    for i in range(LEVEL, LEVEL + 4):
+        h[i] = brake_lever(params, i - LEVEL) * friction(params, state, i - LEVEL)
+        h[i] /= params.wheel_radius[i - LEVEL]
+        total += h[i]
+    for i in range(LEVEL, LEVEL + 4):
+        for j in range(LEVEL, LEVEL + 4):
+            variance += h[i] * h[j] * state.p[i, j]
+    return math.sqrt(max(variance, 0.0)) / total
+
+
+@kernel
+def _tell_friction(
+    params: Record,
+    state: Record,
+    estimate: Record,
+    learned: Record,
+    inputs: Record,
+    braking: bool,
+    dt: float,
+) -> None:
+    """Overwrite friction, its standard deviation and mode of every corner."""
+    if state.closed:
+        state.sigma_force = _sigma_force(params, state)
+    estimate.sigma_force = state.sigma_force
+    for i in range(4):
+        mu = params.mu_nominal[i] * math.exp(friction_now(state, i))
+        sigma = sigma_friction(params, state, i, True)
+        if state.observed[i] and follows(state.pressures, i):
+            above = max(state.smooth_pressure[i], 1.0)
+            sigma = math.sqrt(sigma * sigma + state.pressures.variance[i] / (above * above))
+        estimate.mu[i], estimate.sigma[i] = mu, mu * sigma
+        good = usable(inputs, WHEEL_SPEED + i) and usable(inputs, CALLIPER_PRESSURE + i)
+        if braking and state.observed[i] and good:
+            estimate.observed_s[i] += dt
+            estimate.mode[i] = OBSERVING
+        else:
+            estimate.mode[i] = resting_mode(params, estimate, learned, good, i)
+
+
+@kernel
+def _test_ratio(state: Record, channel: int) -> float:
+    ratio: float = state.ratio[channel] / (GATE * GATE)
+    return ratio if state.started else math.nan
+
+
+@kernel
+def tell_joint(
+    params: Record,
+    state: Record,
+    estimate: Record,
+    learned: Record,
+    inputs: Record,
+    braking: bool,
+    dt: float,
+) -> None:
+    """Overwrite what this observer knows of the car, the tyres and the linings.
+
+    Args:
+        params: `PARAMS`.
+        state: `JOINT_STATE`, after `update_joint`.
+        estimate: `ESTIMATE`; what the inertial signals and the pressures say is in it already.
+        learned: `LEARNED`.
+        inputs: `INPUTS`.
+        braking: a brake application lasts.
+        dt: time since the last cycle [s].
+    """
+    x = state.x
+    estimate.started, estimate.reset, estimate.at_bound = state.started, state.reset, state.at_bound
+    estimate.speed, estimate.k_f = x[V], math.exp(x[STIFFNESS])
+    estimate.mass = params.mass * math.exp(x[MASS])
+    estimate.accel_bias, estimate.overrun = x[BIAS], x[OVERRUN]
+    _tell_friction(params, state, estimate, learned, inputs, braking, dt)
+    estimate.test_ratio_balance, estimate.test_ratio_speed = _test_ratio(state, 4), _test_ratio(state, 5)
+    for i in range(4):
+        estimate.slip[i], estimate.force[i] = state.slip[i], state.force[i]
+        estimate.test_ratio[i] = _test_ratio(state, i)
+        estimate.pressure_zero[i] = state.zero.value[i]

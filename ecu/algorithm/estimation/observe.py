@@ -1,0 +1,127 @@
+"""One cycle of estimation: inertial signals, loads and brake torques, then the observer that is configured.
+
+Of `STATE` it changes its own records, what is learned, and `estimate`, which the rest of the ECU reads.
+"""
+
+from ecu.algorithm.estimation.friction import update_pressure
+from ecu.algorithm.estimation.joint.estimates import tell_joint
+from ecu.algorithm.estimation.joint.learned import hand_over_level, keep_joint
+from ecu.algorithm.estimation.joint.observer import update_joint
+from ecu.algorithm.estimation.joint.prediction import (
+    add_window,
+    begin_prediction,
+    close_book,
+    end_prediction,
+)
+from ecu.algorithm.estimation.joint.prior import begin_application, end_application, forget_levels
+from ecu.algorithm.estimation.joint.sliding import mistrust_wheels
+from ecu.algorithm.estimation.motion import tell_motion, update_motion
+from ecu.algorithm.estimation.thesis.estimates import tell_friction, tell_wheels
+from ecu.algorithm.estimation.thesis.force import reset_force, take_measured_force, update_force
+from ecu.algorithm.estimation.thesis.friction import hand_over, update_friction
+from ecu.algorithm.estimation.thesis.slip import expect_slip, learn_radius, update_radius, update_slip
+from ecu.algorithm.estimation.thesis.speed import update_speed
+from ecu.algorithm.estimation.wheel_load import update_wheel_load
+from ecu.algorithm.inputs import usable
+from ecu.algorithm.vehicle import total_tyre_force
+from ecu.contract.params import JOINT, OBSERVER1
+from ecu.contract.signals import ACCEL_X
+from ecu.jit import Record, kernel
+
+KEEP_S = 1.0  # between two copies of what the joint observer knows, while no application ends
+
+
+@kernel
+def keep_application(p: Record, s: Record) -> None:
+    """At the end of a brake application: keep what the joint observer has learned in it."""
+    if p.observer == JOINT:
+        end_application(s.joint)
+        if end_prediction(s.prediction):
+            forget_levels(s.joint)
+            close_book(s.prediction)
+        keep_joint(p, s.joint, s.learned)
+
+
+@kernel
+def hand_over_application(p: Record, s: Record) -> None:
+    """After `keep_application`: hand what was observed over to the next application."""
+    if p.observer == JOINT:
+        hand_over_level(s.estimate, s.learned)
+    else:
+        hand_over(s.friction, s.learned)
+        tell_friction(s.friction, s.estimate)
+
+
+@kernel
+def observe(
+    p: Record, s: Record, u: Record, sent: Record, heat: Record, guarded: bool, contradicted: bool, dt: float
+) -> None:
+    """Overwrite the estimate of the last cycle by that of this one.
+
+    Args:
+        p: `PARAMS`.
+        s: `STATE` of `ecu.algorithm.step`.
+        u: `INPUTS` without what is implausible.
+        sent: pressures demanded last [Pa] of the brakes that give some, shape (4,).
+        heat: relative standard deviation that each friction has gained by its disc's temperature, shape (4,).
+        guarded: the slip guard holds a wheel back: what was learned last goes back.
+        contradicted: a sensor or a stream begins to be wrong: likewise.
+        dt: time since the last cycle [s].
+    """
+    braking, e = s.application.braking != 0, s.estimate
+    update_motion(p, s.motion, u, e.speed, e.brake_torque)
+    update_wheel_load(p, s.wheel_load, s.motion.accel_x, s.motion.accel_y, e.speed, dt)
+    update_pressure(p, s.friction, e.mu, u, dt)
+    tell_motion(s.motion, e)
+    for i in range(4):
+        e.load[i], e.brake_torque[i] = s.wheel_load.load[i], s.friction.torque[i]
+    if p.observer == JOINT:
+        _observe_jointly(p, s, u, sent, heat, guarded or contradicted, braking, dt)
+    else:
+        s.friction.held = 1 if contradicted else 0
+        _observe_by_wheel(p, s, u, braking, dt)
+    e.tyre_force = total_tyre_force(p, e, e.speed)
+
+
+@kernel
+def _observe_jointly(
+    p: Record, s: Record, u: Record, sent: Record, heat: Record, doubted: bool, braking: bool, dt: float
+) -> None:
+    joint = s.joint
+    if s.application.started:
+        begin_prediction(p, s.prediction, joint)
+        begin_application(joint, heat)
+    if doubted:
+        mistrust_wheels(joint)
+    update_joint(p, joint, u, s.motion, s.wheel_load.load, sent, braking, dt)
+    if braking and joint.closed:
+        add_window(p, s.prediction, joint, u)
+    s.prediction.told_s = max(s.prediction.told_s - dt, 0.0)
+    tell_joint(p, joint, s.estimate, s.learned, u, braking, dt)
+    s.estimate.given_up = 1 if s.prediction.told_s > 0.0 else 0
+    joint.unkept_s += dt
+    if joint.unkept_s > KEEP_S:
+        keep_joint(p, joint, s.learned)
+
+
+@kernel
+def _observe_by_wheel(p: Record, s: Record, u: Record, braking: bool, dt: float) -> None:
+    if s.application.started:
+        reset_force(s.force)
+    update_radius(p, s.wheels, s.learned, s.wheel_load.load)
+    s.force.total = total_tyre_force(p, s.motion, s.speed.speed)
+    expect_slip(p, s.wheels, u, s.wheel_load.load, s.force.total, s.friction.torque)
+    update_speed(p, s.speed, s.motion, s.wheels, s.learned, u, braking, dt)
+    accel = s.motion.accel_x - s.speed.bias
+    update_slip(p, s.wheels, s.motion, u, s.speed.speed, accel, dt)
+    if s.speed.started:
+        learn_radius(p, s.wheels, s.learned, s.motion, u, s.speed, braking, dt)
+    regress = braking and s.speed.speed > p.min_speed and usable(u, ACCEL_X)
+    update_force(p, s.force, s.motion, s.wheels, s.wheel_load.load, regress, dt)
+    if p.observer == OBSERVER1:
+        take_measured_force(s.force, u)
+    update_friction(
+        p, s.friction, s.observer, s.learned, u, s.motion, s.wheels, s.wheel_load.load, s.force, s.speed,
+        s.application, dt,
+    )  # fmt: skip
+    tell_wheels(p, s.friction, s.estimate, s.speed, s.wheels, s.force)
