@@ -5,7 +5,19 @@ import math
 from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
 from ecu.algorithm.estimation.friction import resting_mode
 from ecu.algorithm.estimation.joint.kalman import GATE
-from ecu.algorithm.estimation.joint.layout import BIAS, CHANGE, LEVEL, MASS, OVERRUN, RATE, STIFFNESS, V
+from ecu.algorithm.estimation.joint.layout import (
+    BALANCE_RATIO,
+    BIAS,
+    CHANGE,
+    LEVEL,
+    MASS,
+    OVERRUN,
+    RATE,
+    REFERENCE_RATIO,
+    STIFFNESS,
+    WHEEL_RATIO,
+    V,
+)
 from ecu.algorithm.estimation.joint.observer import WINDOW_S
 from ecu.algorithm.estimation.joint.pressure import follows
 from ecu.algorithm.estimation.joint.wheel import brake_lever, friction
@@ -83,8 +95,8 @@ def _tell_friction(
 
 
 @kernel
-def _test_ratio(state: Record, channel: int) -> float:
-    ratio: float = state.ratio[channel] / (GATE * GATE)
+def _test_ratio(state: Record, place: int) -> float:
+    ratio: float = state.ratio[place] / (GATE * GATE)
     return ratio if state.started else math.nan
 
 
@@ -115,8 +127,9 @@ def tell_joint(
     estimate.mass = params.mass * math.exp(x[MASS])
     estimate.accel_bias, estimate.overrun = x[BIAS], x[OVERRUN]
     _tell_friction(params, state, estimate, learned, inputs, braking, dt)
-    estimate.test_ratio_balance, estimate.test_ratio_speed = _test_ratio(state, 4), _test_ratio(state, 5)
+    estimate.test_ratio_balance = _test_ratio(state, BALANCE_RATIO)
+    estimate.test_ratio_speed = _test_ratio(state, REFERENCE_RATIO)
     for i in range(4):
         estimate.slip[i], estimate.force[i] = state.slip[i], state.force[i]
-        estimate.test_ratio[i] = _test_ratio(state, i)
+        estimate.test_ratio[i] = _test_ratio(state, WHEEL_RATIO + i)
         estimate.pressure_zero[i] = state.zero.value[i]

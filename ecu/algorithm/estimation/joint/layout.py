@@ -41,6 +41,12 @@ OVERRUN: Final = 34  # drag of a drive that nobody reports, while braking, over 
 MEAN: Final = 32  # two: mean of CHANGE over this application, weighted by pressure
 N: Final = N_JOINT
 
+# Places among the test ratios.
+WHEEL_RATIO: Final = 0  # four
+BALANCE_RATIO: Final = 4
+REFERENCE_RATIO: Final = 5
+RATIOS: Final = 6
+
 PASSING: Final = (
     *(V, SLOPE, RATE, CHANGE, CHANGE + 1, MEAN, MEAN + 1),
     *(DRIVE, DRIVE + 1, SLIP_ERROR, SLIP_ERROR + 1),
@@ -123,7 +129,7 @@ JOINT_STATE: Final = np.dtype(
         ("observed", "u1", (4,)),  # friction was corrected in the last window
         ("sigma_force", "f8"),  # of the force of all linings at equal pressures, relative
         ("heat", "f8", (4,)),  # relative standard deviation of friction by its disc's temperature
-        ("ratio", "f8", (6,)),  # squared innovation over its variance: wheels, total force, speed reference
+        ("ratio", "f8", (RATIOS,)),  # squared innovations over their variances
         ("pull", "f8", (4,)),  # the wheels' test ratios up to the gate, with the sign of the innovation
         ("at_bound", "u1"),  # a learned state is at its bound
         ("reversing", "u1"),

@@ -16,9 +16,9 @@ import math
 
 from ecu.algorithm.estimate import STANDING
 from ecu.algorithm.estimation.friction import drives_against
-from ecu.algorithm.estimation.joint.correction import APPLIED, correct_by_balance, correct_by_wheel
+from ecu.algorithm.estimation.joint.balance import correct_by_balance, predict_balance
 from ecu.algorithm.estimation.joint.drive import KNOWN, measure_drive
-from ecu.algorithm.estimation.joint.kalman import clear_derivatives, correct, forget
+from ecu.algorithm.estimation.joint.kalman import forget
 from ecu.algorithm.estimation.joint.layout import (
     BIAS,
     CHANGE,
@@ -33,6 +33,7 @@ from ecu.algorithm.estimation.joint.layout import (
     RADIUS,
     RATE,
     RATIO,
+    RATIOS,
     ROLLING,
     SINKING,
     SLOPE,
@@ -48,19 +49,15 @@ from ecu.algorithm.estimation.joint.prior import (
     set_prior,
     walk,
 )
+from ecu.algorithm.estimation.joint.reference import correct_by_reference
 from ecu.algorithm.estimation.joint.sliding import (
     HOLD_S,
     share_force,
     watch_tyres,
-    wheel_slides,
-    wheels_agree,
 )
 from ecu.algorithm.estimation.joint.snapshot import go_back, keep, keep_newer
-from ecu.algorithm.estimation.joint.wheel import (
-    brake_torque,
-    predict_balance,
-    unknown_share,
-)
+from ecu.algorithm.estimation.joint.wheel import APPLIED, brake_torque, unknown_share
+from ecu.algorithm.estimation.joint.wheel_speed import correct_by_wheels
 from ecu.algorithm.estimation.joint.window import close_window, gather, open_window
 from ecu.algorithm.estimation.joint.zero import settle_zero
 from ecu.algorithm.estimation.motion import speed_backwards
@@ -91,7 +88,6 @@ SNAPSHOT_S = 0.2
 
 UNEXPLAINED = 0.15  # m/s^2 while rolling: someone drives or brakes the car without saying so
 TWIN = 3.0  # bar, of a pressure taken from the other side
-JUMP = 100.0  # squared test ratio: from here a reference is believed at once that wheels cannot deny
 
 
 @kernel
@@ -260,29 +256,14 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
         learning = w.balanced and abs(predict_balance(params, state, False)) < UNEXPLAINED
     _choose_free(state, braking, motors > MOTORS, learning)
     before = x[V]
-    for channel in range(6):
-        state.ratio[channel] = math.nan
+    for place in range(RATIOS):
+        state.ratio[place] = math.nan
     state.reference_s += time
     if w.reference_samples > 0:
         state.reference_s = 0.0
-        clear_derivatives(state)
-        state.h[V], state.h[DELAY] = 1.0, -w.reference_change
-        state.ratio[5] = correct(state, w.reference, params.sigma_vehicle_speed**2 / w.reference_samples)
-        wheels_slide = state.hold_s > 0.0
-        if state.ratio[5] > JUMP and (wheels_slide or wheels_agree(params, state, x[V] + w.reference)):
-            x[V] += w.reference
-            state.p[V, V] += 0.25
+        correct_by_reference(params, state)
     state.untrusted_s += time
-    seen = 0
-    for i in range(4):
-        state.observed[i], state.pull[i] = 0, 0.0
-        if w.omega_samples[i] == 0:
-            continue
-        seen += 1
-        state.slides[i] = 1 if wheel_slides(params, state, i) else 0
-        if not state.slides[i]:
-            state.untrusted_s = 0.0
-            correct_by_wheel(params, state, i, before, moving, learning and braking)
+    seen = correct_by_wheels(params, state, before, moving, learning and braking)
     if state.free[LEVEL]:
         weight = 0.0
         for i in range(4):

@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from ecu.algorithm.estimation.joint.balance import predict_balance
 from ecu.algorithm.estimation.joint.layout import DRAG, MASS, MOTOR
 from ecu.algorithm.estimation.joint.motors import LARGEST_STEP, MEMORY, MOTORS_STATE, SMOOTHING, follow_motors
 from ecu.algorithm.estimation.joint.observer import WINDOW_S
-from ecu.algorithm.estimation.joint.wheel import predict_balance, predict_wheel
+from ecu.algorithm.estimation.joint.wheel_speed import predict_wheel
 from ecu.contract.signals import MOTOR_TORQUE
 
 DT = 0.01

@@ -6,6 +6,7 @@ Truth, noise and measurements are drawn here, linear in numpy; the observer's wa
 import numpy as np
 import pytest
 
+from ecu.algorithm.estimation.joint.balance import predict_balance
 from ecu.algorithm.estimation.joint.kalman import correct
 from ecu.algorithm.estimation.joint.layout import (
     BIAS,
@@ -38,7 +39,7 @@ from ecu.algorithm.estimation.joint.prior import (
     set_prior,
     walk,
 )
-from ecu.algorithm.estimation.joint.wheel import predict_balance, predict_wheel
+from ecu.algorithm.estimation.joint.wheel_speed import predict_wheel
 
 STEP = 0.05  # s
 SIGMA_WHEEL, SIGMA_BALANCE, SIGMA_REFERENCE = 0.1, 0.03, 0.03  # rad/s, m/s^2, m/s

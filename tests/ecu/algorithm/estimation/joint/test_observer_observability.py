@@ -9,7 +9,7 @@ import math
 import numpy as np
 import pytest
 
-from ecu.algorithm.estimation.joint.correction import BALANCE_FLOOR
+from ecu.algorithm.estimation.joint.balance import BALANCE_FLOOR, predict_balance
 from ecu.algorithm.estimation.joint.layout import (
     BIAS,
     CHANGE,
@@ -29,7 +29,7 @@ from ecu.algorithm.estimation.joint.layout import (
 )
 from ecu.algorithm.estimation.joint.observer import WINDOW_S
 from ecu.algorithm.estimation.joint.prior import CHANGE_COMMON, LEVEL_AXLE, LEVEL_COMMON, LEVEL_WHEEL, PRIOR
-from ecu.algorithm.estimation.joint.wheel import predict_balance, predict_wheel
+from ecu.algorithm.estimation.joint.wheel_speed import predict_wheel
 from ecu.contract.signals import ACCEL_X, MOTOR_TORQUE
 
 LEVELS = list(range(LEVEL, LEVEL + 4))

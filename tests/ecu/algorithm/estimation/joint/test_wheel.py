@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 from ecu.algorithm.estimation.joint import layout
-from ecu.algorithm.estimation.joint.correction import BALANCE_FLOOR, BALANCE_SHARE
+from ecu.algorithm.estimation.joint.balance import BALANCE_FLOOR, BALANCE_SHARE, predict_balance
 from ecu.algorithm.estimation.joint.layout import (
     CHANGE,
     DRIVE,
@@ -34,11 +34,10 @@ from ecu.algorithm.estimation.joint.wheel import (
     STEEPEST,
     combined_slip,
     peak_adhesion,
-    predict_balance,
-    predict_wheel,
     slip_of_force,
     unknown_share,
 )
+from ecu.algorithm.estimation.joint.wheel_speed import predict_wheel
 
 
 def name_of(place: int) -> str:

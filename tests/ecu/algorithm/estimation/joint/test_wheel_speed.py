@@ -5,9 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from ecu.algorithm.estimation.joint.correction import correct_by_wheel
-from ecu.algorithm.estimation.joint.layout import OFFSET, V
-from ecu.algorithm.estimation.joint.wheel import predict_wheel
+from ecu.algorithm.estimation.joint.layout import OFFSET, WHEEL_RATIO, V
+from ecu.algorithm.estimation.joint.wheel_speed import correct_by_wheel, predict_wheel
 
 SPEED, PRESSURES, SAMPLES, OFF = 20.0, (35.0, 28.0), 5, 0.3  # m/s, bar, -, rad/s
 
@@ -30,7 +29,12 @@ def variance_of(params, state, i: int) -> tuple[float, float, float, float]:
     h, P = state["h"].copy(), state["p"].copy()
     slip, curved = float(state["slip"][i]), float(state["curved"])
     correct_by_wheel(params[0], state, i, SPEED, True, True)
-    return OFF**2 / float(state["ratio"][i]) - h @ P @ h, slip, curved, float(h[OFFSET + i // 2])
+    return (
+        OFF**2 / float(state["ratio"][WHEEL_RATIO + i]) - h @ P @ h,
+        slip,
+        curved,
+        float(h[OFFSET + i // 2]),
+    )
 
 
 @pytest.mark.parametrize("noise_bar", [0.0, 1.8])

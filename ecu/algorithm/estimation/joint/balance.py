@@ -1,0 +1,100 @@
+"""Measurement of the force balance along the car: acceleration, drag and all torques must cancel.
+
+    m (a_x - b) + drag + sum (T_i + I_i domega_i/dt) / r_i = 0
+
+over the configured mass, taken at one time for all signals. What lags, lasts or is not reported stands in the
+variance.
+"""
+
+import math
+
+from ecu.algorithm.estimation.joint.kalman import clear_derivatives, correct
+from ecu.algorithm.estimation.joint.layout import (
+    BALANCE_RATIO,
+    BIAS,
+    CHANGE,
+    DRAG,
+    DRIVE,
+    LEVEL,
+    MASS,
+    MOTOR,
+    OFFSET,
+    OVERRUN,
+    V,
+)
+from ecu.algorithm.estimation.joint.noise import COLOURED, motor_variance, skew
+from ecu.algorithm.estimation.joint.prior import SCALE_ONLY, UNKNOWN_KICKS
+from ecu.algorithm.estimation.joint.sampling import ACCEL
+from ecu.algorithm.estimation.joint.wheel import brake_lever, brake_torque, friction, radius
+from ecu.contract.params import GRAVITY
+from ecu.jit import Record, kernel
+
+SLIDING_FORCE = 0.3  # relative error of the force of a wheel that seems too fast, taken for its brake force
+BALANCE_FLOOR = 0.01  # m/s^2 that the balance leaves out
+BALANCE_SHARE = 0.004  # of the deceleration
+ACROSS = 0.4  # of the lateral acceleration: stands for less that lasts a second
+SKEW_ACCEL = 0.5  # windows between acceleration and torques
+
+
+@kernel
+def predict_balance(params: Record, state: Record, braking: bool) -> float:
+    """Return what is left of the car's balance over the configured mass [m/s^2]; sets `state.h`."""
+    x, h, w, mass = state.x, state.h, state.window, params.mass
+    clear_derivatives(state)
+    speed, heavier = x[V], math.exp(x[MASS])
+    drag = heavier * math.exp(x[DRAG]) * params.drag_area * speed * abs(speed) / mass
+    left = heavier * (w.common_accel - x[BIAS] + w.lateral / mass) + drag
+    # What grows with the mass, by the accelerometer of before: free of the noise of this window's torques.
+    inert = heavier * (state.last_smooth_accel - x[BIAS] + w.lateral / mass) + drag
+    linings = 0.0
+    for i in range(4):
+        r, _ = radius(params, state, i, w.load[i])
+        driven = w.motor[i] * math.exp(x[MOTOR])
+        own = heavier * (params.rolling_resistance * w.load[i] * r + params.wheel_inertia[i] * w.change / r)
+        inert += own / (r * mass)
+        left += (brake_torque(params, state, i, w.common_pressure[i]) + driven + own) / (r * mass)
+        smooth = state.last_smooth[i]
+        linings += brake_torque(params, state, i, smooth) / (r * mass)
+        per_bar = brake_lever(params, i) * friction(params, state, i) / (r * mass)
+        h[LEVEL + i] = per_bar * max(smooth - x[OFFSET + i // 2], 0.0)
+        h[CHANGE + i // 2] += h[LEVEL + i]
+        if smooth > 0.5:
+            h[OFFSET + i // 2] -= per_bar
+    h[MASS], h[MOTOR] = inert, -inert - linings
+    h[BIAS] = -heavier
+    h[DRAG] = drag
+    h[DRIVE] = h[DRIVE + 1] = -1.0
+    if braking:
+        left += x[OVERRUN]
+        h[OVERRUN] = 1.0
+    result: float = left
+    return result
+
+
+@kernel
+def correct_by_balance(params: Record, state: Record, braking: bool) -> None:
+    """Correct the state by the force balance along the car; not where a wheel holds what the road gives."""
+    w, wild = state.window, 0.0
+    left = predict_balance(params, state, braking)
+    variance = (
+        params.sigma_accel**2 / max(state.sampling.samples[ACCEL], 1)
+        + BALANCE_FLOOR**2
+        + (BALANCE_SHARE * w.accel) ** 2
+    )
+    variance += (SKEW_ACCEL * (w.accel - state.last_accel)) ** 2
+    variance += (ACROSS * w.across * GRAVITY) ** 2 + (UNKNOWN_KICKS * (1.0 - state.drive_known)) ** 2
+    for i in range(4):
+        per_bar = brake_lever(params, i) * friction(params, state, i)
+        per_torque = 1.0 / (params.wheel_radius[i] * params.mass)
+        per_bar *= per_torque
+        variance += per_torque**2 * motor_variance(state, i, braking)
+        wild += per_torque * abs(w.motor[i])
+        if state.smooth_pressure[i] > 0.5:
+            variance += per_bar**2 * (w.pressure_variance[i] + skew(state, i) ** 2)
+        if state.slides[i] and w.omega[i] * params.wheel_radius[i] < w.ground[i]:
+            return  # what it holds is the road's to say
+        if state.slides[i]:
+            variance += (SLIDING_FORCE * per_bar * w.pressure[i]) ** 2
+    wild *= max(params.sigma_motor_torque - SCALE_ONLY, 0.0)
+    variance += wild * wild * (1.0 if braking else COLOURED)
+    state.ratio[BALANCE_RATIO] = correct(state, -left, variance)

@@ -1,0 +1,22 @@
+"""What a window's pressures and motor torques may err by, wherever a measurement is predicted from them."""
+
+from ecu.algorithm.estimation.joint.pressure import follows
+from ecu.jit import Record, kernel
+
+COLOURED = 20.0  # times the variance of white noise: what an inverter's torque errs by is not white
+SKEW_FOLLOWED, SKEW_REPORTED = 0.5, 3.0  # windows between pressure and force; a foreign log is worse
+
+
+@kernel
+def skew(state: Record, i: int) -> float:
+    """Return what a pressure [bar] may be off because it acts earlier or later than it is told."""
+    windows = SKEW_FOLLOWED if follows(state.pressures, i) else SKEW_REPORTED
+    apart: float = windows * (state.smooth_pressure[i] - state.last_smooth[i])
+    return apart
+
+
+@kernel
+def motor_variance(state: Record, i: int, braking: bool) -> float:
+    """Return the variance of a wheel's mean motor torque in this window [(N m)^2]."""
+    variance: float = state.motors.variance[i] / state.window.cycles
+    return variance if braking else COLOURED * variance

@@ -1,0 +1,183 @@
+"""Measurement of a wheel's speed, by tyre, brake and radius.
+
+The torque T = s_m T_m + T_b + M_R and the wheel's inertia stand against the tyre force F; the force over load
+gives slip by the inverse of the tyre's curve (`wheel.py`), slip and radius give wheel speed.
+
+    F = -(T + I dv/dt / r) / r        n = F / F_Z     n_xy^2 = n_x^2 + n_y^2
+    omega = v_i (1 + slip) / r        braking; v_i / ((1 - slip) r) driving (A.6)
+
+What the model leaves out stands in the variance: a pressure that lags, a slip that changes, a tyre near its
+peak, a curve, and the noise of the torques that the prediction was made from.
+"""
+
+import math
+
+from ecu.algorithm.estimation.joint.kalman import GATE, clear_derivatives, correct
+from ecu.algorithm.estimation.joint.layout import (
+    CHANGE,
+    DRIVE,
+    LEVEL,
+    LOAD,
+    MASS,
+    MOTOR,
+    OFFSET,
+    PEAK,
+    PEAK_LOAD,
+    RADIUS,
+    RATIO,
+    ROLLING,
+    SIDE,
+    SINKING,
+    SLIP_ERROR,
+    STIFFNESS,
+    WHEEL_RATIO,
+    V,
+)
+from ecu.algorithm.estimation.joint.noise import motor_variance, skew
+from ecu.algorithm.estimation.joint.sliding import wheel_slides
+from ecu.algorithm.estimation.joint.wheel import (
+    APPLIED,
+    LEAST_OF_PEAK,
+    brake_lever,
+    brake_torque,
+    combined_slip,
+    friction,
+    peak_adhesion,
+    radius,
+)
+from ecu.jit import Record, kernel
+
+TRANSIENT = 1.0  # of a slip's change since the last window
+CURVED = 1.0  # of a slip's part beyond that of a linear tyre: what the peak is not known for
+CORNERING = 1.0  # of slip, per squared adhesion used sideways: then load and slip angle are not well known
+LOW_SPEED_NOISE = 0.15  # m/s
+
+
+@kernel
+def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float:
+    """Return the mean speed of a wheel [rad/s] to expect of this window.
+
+    Sets `state.h`, and slip and force of the wheel. Derivatives are taken at the last window's smooth
+    pressure: were the noise of this window's own in both, it would bias what is learned.
+
+    Args:
+        params: `PARAMS`.
+        state: `JOINT_STATE`.
+        i: wheel.
+        ground: speed of the wheel over ground in its direction [m/s].
+    """
+    x, h, w = state.x, state.h, state.window
+    load, pressure, smooth = w.load[i], w.pressure[i], state.last_smooth[i]
+    r, sinking = radius(params, state, i, load)
+    motor = w.motor[i] * math.exp(x[MOTOR])
+    # With the mass, so that nothing but air drag tells a scale common to mass and all torques.
+    heavier = math.exp(x[MASS])
+    own = heavier * (params.rolling_resistance * load * r + params.wheel_inertia[i] * w.change / r)
+    force = -(brake_torque(params, state, i, pressure) + motor + own) / r
+    scale = 1.0 / (heavier * load)
+    relative = load / params.static_load[i]
+    exponent = params.stiffness_degression[i] + x[LOAD]
+    rear = x[RATIO] if i >= 2 else 0.0
+    side = 0.5 * x[SIDE] if i % 2 == 0 else -0.5 * x[SIDE]
+    stiffness = params.slip_stiffness[i] * math.exp(x[STIFFNESS] + rear + side) * relative**-exponent
+    peak = peak_adhesion(state, relative)
+    used = force * scale
+    slip, _, _ = combined_slip(used, w.across, stiffness, peak)
+    state.slip[i], state.force[i] = slip, force
+    state.curved = slip - used / stiffness
+    if slip < 0.0:
+        omega, by_slip = ground * (1.0 + slip) / r, ground / r
+    else:
+        keep = max(1.0 - slip, 0.1)
+        omega, by_slip = ground / (keep * r), ground / (keep * keep * r)
+    driven = state.motors.last_smooth[i] * math.exp(x[MOTOR])
+    later = brake_torque(params, state, i, pressure) - brake_torque(params, state, i, smooth)
+    used += (later + motor - driven) * scale / r
+    slip, slope, by_peak = combined_slip(used, w.across, stiffness, peak)
+    state.unsettled = state.slip[i] - slip
+    clear_derivatives(state)
+    h[V] = omega / max(ground, 0.1)
+    mu = friction(params, state, i)
+    lever = brake_lever(params, i)
+    by_force = by_slip * slope * scale
+    state.per_torque = -by_force / r
+    h[LEVEL + i] = -by_force * lever * mu * max(smooth - x[OFFSET + i // 2], 0.0) / r
+    h[CHANGE + i // 2] = h[LEVEL + i]
+    h[OFFSET + i // 2] = by_force * lever * mu / r if smooth > 0.5 else 0.0
+    h[MOTOR] = -by_force * driven / r
+    h[MASS] = -by_slip * slope * (used + own * scale / r)
+    h[STIFFNESS] = -by_slip * slip
+    if i >= 2:
+        h[RATIO] = -by_slip * slip
+    h[LOAD] = by_slip * slip * math.log(relative)
+    h[PEAK] = by_slip * by_peak / max(1.0 - 4.0 * x[PEAK], LEAST_OF_PEAK)
+    h[PEAK_LOAD] = by_slip * by_peak * math.log(relative)
+    h[SIDE] = -by_slip * slip * (0.5 if i % 2 == 0 else -0.5)
+    h[SLIP_ERROR + i // 2] = by_slip
+    h[RADIUS + i] = h[ROLLING] = -omega - by_slip * slope * used  # a larger wheel needs less force
+    h[SINKING] = h[RADIUS + i] * sinking / r
+    h[DRIVE + i // 2] = 0.5 * by_force * params.mass
+    return omega
+
+
+@kernel
+def correct_by_wheel(
+    params: Record, state: Record, i: int, before: float, moving: bool, observing: bool
+) -> None:
+    """Correct the state by a wheel's mean speed in this window.
+
+    Args:
+        params: `PARAMS`.
+        state: `JOINT_STATE`, overwritten.
+        i: wheel.
+        before: the car's speed before the first correction of this window [m/s].
+        moving: the car is fast enough for slip to mean something; else the wheel tells the speed alone.
+        observing: the brakes are on and something is learned.
+    """
+    w, x = state.window, state.x
+    n = w.omega_samples[i]
+    ground = max(w.ground[i] + x[V] - before, 0.0)
+    omega = predict_wheel(params, state, i, ground)
+    if not moving:
+        clear_derivatives(state)
+        r = params.wheel_radius[i]
+        state.h[V] = 1.0 / r
+        correct(
+            state, w.omega[i] - ground / r, (params.sigma_wheel_speed**2 + (LOW_SPEED_NOISE / r) ** 2) / n
+        )
+        return
+    per_bar = state.h[OFFSET + i // 2]
+    variance = params.sigma_wheel_speed**2 / n
+    variance += per_bar**2 * (w.pressure_variance[i] + skew(state, i) ** 2)
+    transient = TRANSIENT * state.unsettled * ground / params.wheel_radius[i]
+    corner = CORNERING * w.across * w.across * state.slip[i] * ground / params.wheel_radius[i]
+    curved = CURVED * state.curved * ground / params.wheel_radius[i]
+    variance += transient * transient + corner * corner + curved * curved
+    state.last_slip[i] = state.slip[i]
+    variance += state.per_torque**2 * motor_variance(state, i, observing)
+    innovation = w.omega[i] - omega
+    mass, motor = state.free[MASS], state.free[MOTOR]
+    state.free[MASS] = state.free[MOTOR] = 0
+    state.ratio[WHEEL_RATIO + i] = correct(state, innovation, variance)
+    state.free[MASS], state.free[MOTOR] = mass, motor
+    state.pull[i] = math.copysign(min(state.ratio[WHEEL_RATIO + i], GATE * GATE), innovation)
+    state.observed[i] = 1 if observing and state.smooth_pressure[i] > 2.0 * APPLIED else 0
+
+
+@kernel
+def correct_by_wheels(params: Record, state: Record, before: float, moving: bool, observing: bool) -> bool:
+    """Correct the state by every wheel that tells the car's speed; return whether any wheel speed came.
+
+    Arguments as for `correct_by_wheel`.
+    """
+    w, came = state.window, False
+    for i in range(4):
+        state.observed[i], state.pull[i] = 0, 0.0
+        if w.omega_samples[i] == 0:
+            continue
+        came = True
+        state.slides[i] = 1 if wheel_slides(params, state, i) else 0
+        if not state.slides[i]:
+            state.untrusted_s = 0.0
+            correct_by_wheel(params, state, i, before, moving, observing)
+    return came
