@@ -145,6 +145,41 @@ def test_the_ecu_knows_nothing_of_the_simulated_vehicle() -> None:
         assert "config/plant" not in path.read_text("utf-8"), path
 
 
+SHARED = ("brake", "estimate", "inputs", "vehicle")
+WALLS = [
+    # part of the algorithm, what it may not import: between them is ESTIMATE
+    ("control", "estimation"),
+    ("monitoring", "estimation"),
+    ("publish", "estimation"),
+    ("estimation", "control"),
+    ("estimation", "monitoring"),
+    ("estimation/joint", "estimation/thesis"),
+    ("estimation/thesis", "estimation/joint"),
+    *((shared, part) for shared in SHARED for part in ("control", "estimation", "monitoring")),
+]
+
+
+@pytest.mark.parametrize(("part", "other"), WALLS)
+def test_estimating_and_using_know_each_other_by_the_estimate_alone(part: str, other: str) -> None:
+    algorithm = ROOT / "ecu/algorithm"
+    paths = [*algorithm.glob(f"{part}.py"), *(algorithm / part).rglob("*.py")]
+    assert paths
+    for path in paths:
+        for name, _ in _imports(path):
+            assert not name.startswith(f"ecu.algorithm.{other.replace('/', '.')}"), f"{path}: {name}"
+
+
+OF_OBSERVERS = re.compile(r"\bs\.(motion|wheel_load|speed|joint|wheels|force|observer|friction|prediction)\b")
+
+
+@pytest.mark.parametrize("part", ["control", "monitoring", "publish"])
+def test_what_uses_estimates_reads_no_record_of_an_observer(part: str) -> None:
+    """Where all of the state is handed over, as `s`."""
+    algorithm = ROOT / "ecu/algorithm"
+    for path in [*algorithm.glob(f"{part}.py"), *(algorithm / part).rglob("*.py")]:
+        assert not OF_OBSERVERS.search(path.read_text("utf-8")), path
+
+
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_a_module_is_one_idea(path: Path) -> None:
     assert len(path.read_text("utf-8").splitlines()) <= 350, "split it: 300 lines are the aim, 350 the limit"

@@ -11,7 +11,7 @@ Ground speed of a wheel in its rolling direction (A.5), of a rigid body (x forwa
     rear    v_x -+ psi_dot b / 2                                             left -, right +
     front   (v_x -+ psi_dot b / 2) cos(delta) + (v_y + psi_dot l_f) sin(delta)
 
-Sum of the tyres' forces along the car (corrected 4.16), see `estimation/force.py`.
+Sum of the tyres' forces along the car (corrected 4.16), see `estimation/thesis/force.py`.
 
 `motion` is any record with the fields that a function reads: `MOTION_STATE` or `ESTIMATE`.
 """

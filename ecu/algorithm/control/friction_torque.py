@@ -13,9 +13,8 @@ law uses: this is about lags, not about what the law does not know, or holds bac
 
 import numpy as np
 
-from ecu.algorithm.brake import brake_gain
+from ecu.algorithm.brake import brake_gain, correct_pressure
 from ecu.algorithm.control.pressure_law import friction_in_use
-from ecu.algorithm.estimation.joint.pressure import correct_pressure
 from ecu.algorithm.inputs import fresh
 from ecu.contract.params import BAR
 from ecu.contract.signals import CALLIPER_PRESSURE, CYCLE_NS

@@ -8,6 +8,7 @@ variance.
 
 import math
 
+from ecu.algorithm.brake import brake_lever
 from ecu.algorithm.estimation.joint.kalman import clear_derivatives, correct
 from ecu.algorithm.estimation.joint.layout import (
     BALANCE_RATIO,
@@ -25,7 +26,7 @@ from ecu.algorithm.estimation.joint.layout import (
 from ecu.algorithm.estimation.joint.noise import COLOURED, motor_variance, skew
 from ecu.algorithm.estimation.joint.prior import SCALE_ONLY, UNKNOWN_KICKS
 from ecu.algorithm.estimation.joint.sampling import ACCEL
-from ecu.algorithm.estimation.joint.wheel import brake_lever, brake_torque, friction, radius
+from ecu.algorithm.estimation.joint.wheel import brake_torque, friction, radius
 from ecu.contract.params import GRAVITY
 from ecu.jit import Record, kernel
 

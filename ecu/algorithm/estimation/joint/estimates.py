@@ -2,6 +2,7 @@
 
 import math
 
+from ecu.algorithm.brake import brake_lever
 from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
 from ecu.algorithm.estimation.friction import resting_mode
 from ecu.algorithm.estimation.joint.kalman import GATE
@@ -20,7 +21,7 @@ from ecu.algorithm.estimation.joint.layout import (
 )
 from ecu.algorithm.estimation.joint.observer import WINDOW_S
 from ecu.algorithm.estimation.joint.pressure import follows
-from ecu.algorithm.estimation.joint.wheel import brake_lever, friction
+from ecu.algorithm.estimation.joint.wheel import friction
 from ecu.algorithm.inputs import usable
 from ecu.contract.signals import CALLIPER_PRESSURE, OBSERVING, WHEEL_SPEED
 from ecu.jit import Record, kernel

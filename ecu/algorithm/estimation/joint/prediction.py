@@ -14,8 +14,8 @@ import math
 
 import numpy as np
 
+from ecu.algorithm.brake import brake_lever
 from ecu.algorithm.estimation.joint.layout import BIAS, DRAG, LEVEL, MASS, MOTOR, OVERRUN, V
-from ecu.algorithm.estimation.joint.wheel import brake_lever
 from ecu.algorithm.inputs import driver_accelerates, others_brake
 from ecu.contract.params import GRAVITY
 from ecu.jit import Record, kernel

@@ -28,8 +28,6 @@ DEAD_CYCLES = 3  # 26 ms (A.17)
 LAG = 0.040  # s, between build-up (A.17) and release (A.18)
 WALK = 0.1  # bar/sqrt(s)
 SHARE = 0.15  # of a change, one standard deviation
-DISAGREEMENT_LAG = 0.4  # s
-TOLERANCE = 3.0  # standard deviations
 AGREED_S = 0.3
 
 
@@ -44,25 +42,6 @@ def follow_demand(state: Record, i: int, demand: float, dt: float) -> None:
     state.model[i] += change
     state.value[i] += change
     state.variance[i] += WALK**2 * dt + (SHARE * change) ** 2
-
-
-@kernel
-def correct_pressure(state: Record, i: int, measured: float, sigma: float, dt: float) -> None:
-    """Fuse a sample [bar] of standard deviation `sigma`; judge whether the pressure follows the demand."""
-    innovation = measured - state.value[i]
-    gain = 1.0 - math.exp(-dt / DISAGREEMENT_LAG)
-    state.disagreement[i] += gain * (innovation - state.disagreement[i])
-    averaged = sigma * math.sqrt(0.5 * gain) + math.sqrt(state.variance[i])
-    limit = TOLERANCE * averaged
-    if abs(state.disagreement[i]) > limit:
-        state.value[i], state.variance[i] = measured, sigma * sigma
-        state.disagreement[i] = state.agreed_s[i] = 0.0
-        return
-    state.agreed_s[i] += dt
-    total = state.variance[i] + sigma * sigma
-    weight = state.variance[i] / total
-    state.value[i] += weight * innovation
-    state.variance[i] *= 1.0 - weight
 
 
 @kernel

@@ -8,6 +8,7 @@ Slip by the adhesion used n (force over load), and its derivatives; stiffness C 
 
 import math
 
+from ecu.algorithm.brake import brake_lever
 from ecu.algorithm.estimation.joint.layout import (
     BIAS,
     CHANGE,
@@ -24,7 +25,6 @@ from ecu.algorithm.estimation.joint.layout import (
 )
 from ecu.algorithm.estimation.joint.prior import SCALE_ONLY, UNKNOWN_PER_ERROR
 from ecu.algorithm.vehicle import rolling_radius
-from ecu.contract.params import BAR
 from ecu.jit import Record, kernel
 
 SHAPE = 1.6  # c of the Magic Formula
@@ -56,13 +56,6 @@ def combined_slip(used: float, across: float, stiffness: float, peak: float) -> 
     along = used / both
     by_used = slope * along * along + slip / both * (1.0 - along * along)
     return slip * along, by_used, along * (slip - slope * both)
-
-
-@kernel
-def brake_lever(params: Record, i: int) -> float:
-    """Return brake torque per friction and pressure [N m/bar] of a wheel."""
-    lever: float = 2.0 * BAR * params.piston_area[i] * params.effective_radius[i]
-    return lever
 
 
 @kernel

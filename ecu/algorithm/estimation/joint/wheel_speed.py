@@ -12,6 +12,7 @@ peak, a curve, and the noise of the torques that the prediction was made from.
 
 import math
 
+from ecu.algorithm.brake import brake_lever
 from ecu.algorithm.estimation.joint.kalman import GATE, clear_derivatives, correct
 from ecu.algorithm.estimation.joint.layout import (
     CHANGE,
@@ -38,7 +39,6 @@ from ecu.algorithm.estimation.joint.sliding import wheel_slides
 from ecu.algorithm.estimation.joint.wheel import (
     APPLIED,
     LEAST_OF_PEAK,
-    brake_lever,
     brake_torque,
     combined_slip,
     friction,

@@ -6,9 +6,10 @@ is white from window to window, and what did not arrive is simply not in the mea
 
 import math
 
+from ecu.algorithm.brake import correct_pressure
 from ecu.algorithm.estimation.joint.layout import BIAS, DELAY, SLOPE, V
 from ecu.algorithm.estimation.joint.motors import follow_motors
-from ecu.algorithm.estimation.joint.pressure import correct_pressure, follow_demand, follows
+from ecu.algorithm.estimation.joint.pressure import follow_demand, follows
 from ecu.algorithm.estimation.joint.sampling import (
     ACCEL,
     add_sample,

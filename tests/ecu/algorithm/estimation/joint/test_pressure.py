@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.signal import lsim
 
+from ecu.algorithm.brake import correct_pressure
 from ecu.algorithm.estimation.joint.pressure import (
     AGREED_S,
     DEAD_CYCLES,
     LAG,
     PRESSURE_STATE,
-    correct_pressure,
     follow_demand,
     follows,
 )
