@@ -22,10 +22,11 @@ from ecu.algorithm.estimation.thesis.friction import hand_over, update_friction
 from ecu.algorithm.estimation.thesis.slip import expect_slip, learn_radius, update_radius, update_slip
 from ecu.algorithm.estimation.thesis.speed import update_speed
 from ecu.algorithm.estimation.wheel_load import update_wheel_load
-from ecu.algorithm.inputs import usable
+from ecu.algorithm.estimation.zero import FREE, note_rest, settle_zero
+from ecu.algorithm.inputs import LEAST_REQUEST, fresh, requested_decel, usable
 from ecu.algorithm.vehicle import total_tyre_force
-from ecu.contract.params import JOINT, OBSERVER1
-from ecu.contract.signals import ACCEL_X
+from ecu.contract.params import BAR, JOINT, OBSERVER1
+from ecu.contract.signals import ACCEL_X, CALLIPER_PRESSURE
 from ecu.jit import Record, kernel
 
 KEEP_S = 1.0  # between two copies of what the joint observer knows, while no application ends
@@ -79,6 +80,8 @@ def observe(
         _observe_jointly(p, s, u, sent, heat, guarded or contradicted, braking, dt)
     else:
         s.friction.held = 1 if contradicted else 0
+        if _at_rest(p, s, u):
+            _learn_zeros(s.joint.zero, u)
         _observe_by_wheel(p, s, u, braking, dt)
     e.tyre_force = total_tyre_force(p, e, e.speed)
 
@@ -105,6 +108,28 @@ def _observe_jointly(
 
 
 @kernel
+def _at_rest(p: Record, s: Record, u: Record) -> bool:
+    """Return whether nobody brakes by the linings, not even a little."""
+    if s.application.braking != 0 or requested_decel(p, u) > LEAST_REQUEST:
+        return False
+    recent, total = s.application.recent, 0.0
+    for i in range(4):
+        total -= s.joint.zero.value[i]
+        for k in range(recent.shape[1]):
+            total += recent[i, k] / (recent.shape[1] * BAR)
+    return total < 4.0 * FREE
+
+
+@kernel
+def _learn_zeros(zero: Record, u: Record) -> None:
+    """Take the readings of released brakes in; `zero` is with the joint observer's record in recordings."""
+    for i in range(4):
+        if fresh(u, CALLIPER_PRESSURE + i):
+            note_rest(zero, i, u.value[CALLIPER_PRESSURE + i])
+            settle_zero(zero, i)
+
+
+@kernel
 def _observe_by_wheel(p: Record, s: Record, u: Record, braking: bool, dt: float) -> None:
     if s.application.started:
         reset_force(s.force)
@@ -125,3 +150,5 @@ def _observe_by_wheel(p: Record, s: Record, u: Record, braking: bool, dt: float)
         s.application, dt,
     )  # fmt: skip
     tell_wheels(p, s.friction, s.estimate, s.speed, s.wheels, s.force)
+    for i in range(4):
+        s.estimate.pressure_zero[i] = s.joint.zero.value[i]

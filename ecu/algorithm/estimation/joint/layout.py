@@ -12,7 +12,7 @@ import numpy as np
 from ecu.algorithm.estimation.joint.motors import MOTORS_STATE
 from ecu.algorithm.estimation.joint.pressure import PRESSURE_STATE
 from ecu.algorithm.estimation.joint.sampling import SAMPLING_STATE
-from ecu.algorithm.estimation.joint.zero import ZERO_STATE
+from ecu.algorithm.estimation.zero import ZERO_STATE
 from ecu.contract.records import N_JOINT
 
 V: Final = 0  # vehicle speed [m/s]

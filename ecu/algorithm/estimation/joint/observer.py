@@ -59,8 +59,8 @@ from ecu.algorithm.estimation.joint.snapshot import go_back, keep, keep_newer
 from ecu.algorithm.estimation.joint.wheel import APPLIED, brake_torque, unknown_share
 from ecu.algorithm.estimation.joint.wheel_speed import correct_by_wheels
 from ecu.algorithm.estimation.joint.window import close_window, gather, open_window
-from ecu.algorithm.estimation.joint.zero import settle_zero
 from ecu.algorithm.estimation.motion import speed_backwards
+from ecu.algorithm.estimation.zero import FREE, settle_zero
 from ecu.algorithm.inputs import (
     LEAST_REQUEST,
     driver_accelerates,
@@ -78,7 +78,6 @@ from ecu.jit import Record, kernel
 
 WINDOW_S = 0.05
 LEAST_SPEED = 3.4  # m/s
-FREE = 0.4  # bar above push-out, mean of the wheels: the brakes are released
 STRAIGHT = 0.05  # lateral acceleration over gravity: more, and wheels roll by their own loads and angles
 VARIES_FROM, VARIES = 0.3, 0.2  # m/s^2: acceleration that tells a mass, and its change within seconds
 MOTORS = 100.0  # N m of all motors: their torque is worth looking at

@@ -18,7 +18,7 @@ from ecu.algorithm.estimation.joint.sampling import (
     close_sampling,
     open_sampling,
 )
-from ecu.algorithm.estimation.joint.zero import note_rest
+from ecu.algorithm.estimation.zero import note_rest
 from ecu.algorithm.inputs import current, fresh, motor_torque, motor_torque_known, usable
 from ecu.algorithm.vehicle import corner_speed
 from ecu.contract.params import BAR, GRAVITY

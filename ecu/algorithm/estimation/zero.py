@@ -29,6 +29,7 @@ ZERO_STATE = np.dtype(
 )
 
 START, MEMORY = 100, 12_000  # samples: of the prior, and until older ones are forgotten
+FREE = 0.4  # bar above push-out, mean of the wheels: the brakes are released
 LIMIT = 8.0  # bar, more is neither zero nor noise
 LEAST_SHARE = 0.05  # at the floor, of a floored sensor
 NEARLY_ALL = 0.97

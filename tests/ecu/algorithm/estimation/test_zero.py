@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm, truncnorm
 
-from ecu.algorithm.estimation.joint.zero import (
+from ecu.algorithm.estimation.zero import (
     LEAST_SHARE,
     LEAST_SIGMA,
     LIMIT,

@@ -1,0 +1,62 @@
+"""One cycle of estimation, whichever observer is in use: what each must say of the car."""
+
+import numpy as np
+import pytest
+
+from ecu.algorithm.estimate import ESTIMATE
+from ecu.algorithm.step import new_state, step
+from ecu.contract.params import JOINT, OBSERVER1, OBSERVER2
+from ecu.contract.records import OUTPUTS
+
+OBSERVERS = [JOINT, OBSERVER1, OBSERVER2]
+SPEED = 20.0  # m/s
+RATIOS = {"test_ratio", "test_ratio_balance", "test_ratio_speed"}
+NOT_TOLD = {
+    JOINT: {"test_ratio_balance", "test_ratio_speed"},  # nothing brakes or drives, and there is no reference
+    OBSERVER1: {"sigma_force", *RATIOS},  # only a filter of the whole car knows these
+    OBSERVER2: {"sigma_force", *RATIOS},
+}
+
+
+def roll(params, feed, observer: int, seconds: float, bars=(0.0, 0.0, 0.0, 0.0), **values):
+    """Let a car roll at 20 m/s with the pressure readings `bars`, 0.1 bar of noise; return its estimate."""
+    params[0]["observer"] = observer
+    state, outputs, random = new_state(params), np.zeros(1, OUTPUTS), np.random.default_rng(5)
+    inputs = feed(wheel_speed=SPEED / params[0]["wheel_radius"], **values)
+    for _ in range(round(100 * seconds)):
+        feed(inputs, calliper_pressure=np.array(bars) + 0.1 * random.standard_normal(4))
+        step(params, state, inputs, outputs)
+    return state["estimate"][0]
+
+
+@pytest.mark.parametrize("observer", OBSERVERS)
+def test_every_observer_says_all_that_it_knows(params, feed, observer: int) -> None:
+    estimate = roll(params, feed, observer, 1.0, vehicle_speed_valid=0.0)
+    unknown = {name for name in ESTIMATE.names or () if not np.isfinite(estimate[name]).all()}
+    assert unknown == NOT_TOLD[observer]
+    assert estimate["started"]
+    assert estimate["speed"] == pytest.approx(SPEED, abs=0.2)
+    assert estimate["mass"] == pytest.approx(params[0]["mass"], rel=0.05)
+    assert estimate["load"].sum() == pytest.approx(params[0]["mass"] * 9.81, rel=0.01)
+    assert estimate["mu"] == pytest.approx(params[0]["mu_nominal"])
+
+
+@pytest.mark.parametrize("observer", OBSERVERS)
+def test_every_observer_learns_what_the_pressure_sensors_read_at_rest(params, feed, observer: int) -> None:
+    """Readings of 0.1 s counts: n samples beside the hundred of the prior."""
+    bars = np.array([0.3, -0.3, 0.2, 0.0])
+    found = roll(params, feed, observer, 6.0, bars)["pressure_zero"]
+    assert found == pytest.approx(bars * 600 / 700, abs=0.03)
+
+
+@pytest.mark.parametrize("observer", OBSERVERS)
+def test_nothing_is_learned_while_a_deceleration_is_asked_for(params, feed, observer: int) -> None:
+    params[0]["transmit"] = 0
+    found = roll(params, feed, observer, 3.0, (0.4, 0.4, 0.4, 0.4), pedal_position=30.0)["pressure_zero"]
+    assert np.abs(found).max() < 0.01
+
+
+@pytest.mark.parametrize("observer", [OBSERVER1, OBSERVER2])
+def test_nothing_is_learned_of_a_brake_that_is_applied_a_little(params, feed, observer: int) -> None:
+    """0.9 bar above push-out: no application yet, and nobody says why. The first 50 ms tell nothing of it."""
+    assert np.abs(roll(params, feed, observer, 3.0, (1.4, 1.4, 1.4, 1.4))["pressure_zero"]).max() < 0.1
