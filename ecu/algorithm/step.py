@@ -40,28 +40,21 @@ from ecu.algorithm.control.pressure_law import (
 from ecu.algorithm.control.slip_guard import SLIP_GUARD_STATE, guard_slip
 from ecu.algorithm.estimate import ESTIMATE
 from ecu.algorithm.estimation.joint.layout import JOINT_STATE
-from ecu.algorithm.estimation.joint.learned import (
-    restore_joint,
-)
-from ecu.algorithm.estimation.joint.prediction import (
-    PREDICTION_STATE,
-)
+from ecu.algorithm.estimation.joint.prediction import PREDICTION_STATE
 from ecu.algorithm.estimation.motion import MOTION_STATE
-from ecu.algorithm.estimation.observe import hand_over_application, keep_application, observe
-from ecu.algorithm.estimation.thesis.estimates import tell_friction
+from ecu.algorithm.estimation.observe import (
+    hand_over_application,
+    keep_application,
+    observe,
+    start_estimate,
+    start_estimation,
+)
 from ecu.algorithm.estimation.thesis.force import FORCE_STATE
-from ecu.algorithm.estimation.thesis.friction import (
-    FRICTION_STATE,
-    restore_friction,
-)
+from ecu.algorithm.estimation.thesis.friction import FRICTION_STATE
 from ecu.algorithm.estimation.thesis.observer2 import OBSERVER_STATE
-from ecu.algorithm.estimation.thesis.slip import (
-    RADIUS_START,
-    WHEELS_STATE,
-    update_radius,
-)
+from ecu.algorithm.estimation.thesis.slip import RADIUS_START, WHEELS_STATE
 from ecu.algorithm.estimation.thesis.speed import SPEED_STATE
-from ecu.algorithm.estimation.wheel_load import WHEEL_LOAD_STATE, update_wheel_load
+from ecu.algorithm.estimation.wheel_load import WHEEL_LOAD_STATE
 from ecu.algorithm.monitoring.acceleration import ACCELERATION_STATE
 from ecu.algorithm.monitoring.application import APPLICATION_STATE, update_application
 from ecu.algorithm.monitoring.disc_temperature import (
@@ -163,26 +156,22 @@ def resume(state: RecordArray, initial: RecordArray) -> None:
     state[:] = np.zeros(1, STATE)
     for name in INITIAL.names or ():
         state[name] = initial[name]
-    _start_estimate(state)
+    _resume(state)
 
 
 @kernel
-def _start_estimate(state: Record) -> None:
-    tell_friction(state[0].friction, state[0].estimate)
+def _resume(state: Record) -> None:
+    start_estimate(state[0])
 
 
 @kernel
 def _begin(params: Record, state: Record) -> None:
     p, s = params[0], state[0]
-    restore_friction(p, s.friction, s.learned)
-    _start_estimate(state)
-    restore_joint(p, s.joint, s.learned)
+    start_estimation(p, s)
     set_base(p, s.control, s.learned)
     start_discs(p, s.discs, s.learned)
     restore_wear(p, s.wear, s.learned)
     restore_dust(p, s.dust, s.learned, s.wear)
-    update_wheel_load(p, s.wheel_load, 0.0, 0.0, 0.0, 1.0)
-    update_radius(p, s.wheels, s.learned, s.wheel_load.load)
 
 
 @kernel

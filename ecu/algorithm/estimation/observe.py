@@ -5,7 +5,7 @@ Of `STATE` it changes its own records, what is learned, and `estimate`, which th
 
 from ecu.algorithm.estimation.friction import update_pressure
 from ecu.algorithm.estimation.joint.estimates import tell_joint
-from ecu.algorithm.estimation.joint.learned import hand_over_level, keep_joint
+from ecu.algorithm.estimation.joint.learned import hand_over_level, keep_joint, restore_joint
 from ecu.algorithm.estimation.joint.observer import update_joint
 from ecu.algorithm.estimation.joint.prediction import (
     add_window,
@@ -18,7 +18,7 @@ from ecu.algorithm.estimation.joint.sliding import mistrust_wheels
 from ecu.algorithm.estimation.motion import tell_motion, update_motion
 from ecu.algorithm.estimation.thesis.estimates import tell_friction, tell_wheels
 from ecu.algorithm.estimation.thesis.force import reset_force, take_measured_force, update_force
-from ecu.algorithm.estimation.thesis.friction import hand_over, update_friction
+from ecu.algorithm.estimation.thesis.friction import hand_over, restore_friction, update_friction
 from ecu.algorithm.estimation.thesis.slip import expect_slip, learn_radius, update_radius, update_slip
 from ecu.algorithm.estimation.thesis.speed import update_speed
 from ecu.algorithm.estimation.wheel_load import update_wheel_load
@@ -30,6 +30,22 @@ from ecu.contract.signals import ACCEL_X, CALLIPER_PRESSURE
 from ecu.jit import Record, kernel
 
 KEEP_S = 1.0  # between two copies of what the joint observer knows, while no application ends
+
+
+@kernel
+def start_estimation(p: Record, s: Record) -> None:
+    """Begin with what was learned, of a car that stands."""
+    restore_friction(p, s.friction, s.learned)
+    restore_joint(p, s.joint, s.learned)
+    update_wheel_load(p, s.wheel_load, 0.0, 0.0, 0.0, 1.0)
+    update_radius(p, s.wheels, s.learned, s.wheel_load.load)
+    start_estimate(s)
+
+
+@kernel
+def start_estimate(s: Record) -> None:
+    """Overwrite the estimate by that before the first cycle: friction is what was learned."""
+    tell_friction(s.friction, s.estimate)
 
 
 @kernel
