@@ -9,7 +9,7 @@ help:
 	@echo "make test    every test but the studies"
 	@echo "make studies   tests that draw many cars, brakes or trips: minutes"
 	@echo "make check   ruff, format and types"
-	@echo "make coverage  lines and branches of ecu/algorithm/control and ecu/bus, kernels as plain Python: all of them"
+	@echo "make coverage  lines and branches of ecu/algorithm/control, inputs.py and ecu/bus, kernels as plain Python: all of them"
 	@echo "make mutants   one change at a time in what brakes: which one do the tests not notice? a few minutes"
 	@echo "make fuzz      damaged files by the thousand"
 	@echo "make soak      24 h in virtual time; ARGS='live --hours 1': in real time"
@@ -34,7 +34,7 @@ check: .venv/dev
 
 coverage: .venv/dev
 	NUMBA_DISABLE_JIT=1 .venv/bin/python -m pytest -n auto --maxprocesses 4 \
-		tests/ecu/algorithm/control tests/ecu/bus $(ARGS) --cov
+		tests/ecu/algorithm/control tests/ecu/algorithm/test_inputs.py tests/ecu/bus $(ARGS) --cov
 
 mutants: .venv/dev
 	.venv/bin/python tools/mutate.py $(ARGS)
