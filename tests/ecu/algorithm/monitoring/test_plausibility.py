@@ -304,15 +304,13 @@ def test_how_far_apart_is_too_far(feed, expected, off, others, beside, apart) ->
 
 def test_what_lasts_0_3_s_is_not_said_yet(params, feed) -> None:
     """Cycles of 0.15 s: the second one makes just 0.3 s of it."""
-    state, motion = np.zeros(1, PLAUSIBILITY_STATE)[0], np.zeros(1, MOTION_STATE)[0]
+    state = np.zeros(1, PLAUSIBILITY_STATE)[0]
     state["sent"] = 1
     turns = np.array([1.2, 0.99, 0.99, 0.99]) * 20.0 / params[0]["wheel_radius"]
     inputs = feed(wheel_speed=turns, calliper_pressure=[30.0, 0.0, 0.0, 0.0])
     wheels, pressures = [], []
     for _ in range(3):
-        wheels.append(
-            wheel_speed_implausible(params[0], state, inputs[0], motion, 20.0, np.full(4, 800.0), 0.15)
-        )
+        wheels.append(wheel_speed_implausible(params[0], state, inputs[0], estimated(20.0, 800.0), 0.15))
         watch_pressures(state, inputs[0], np.zeros(4), np.zeros(4), 0.15)
         pressures.append(bool(state["pressure"]))
     assert wheels == pressures == [False, False, True]
