@@ -8,10 +8,10 @@ Exit code 0 on success, 1 when the run found a fault, 2 for bad arguments, confi
 import sys
 
 from ecu.recording.sink import free_output
-from ecu.runtime.start import ahead_of_others, kept_out
+from ecu.runtime.start import raise_priority, without_modules
 
 if sys.argv[1:2] == ["run"]:  # under load, loading the command line alone would take a second
-    ahead_of_others()
+    raise_priority()
     free_output()
 
 import errno
@@ -101,7 +101,7 @@ def run(
     ] = False,
 ) -> int:
     """Run the daemon on a CAN bus. Its demands are flagged invalid unless it is armed."""
-    with kept_out("rich", "scipy"):  # structlog's tracebacks, and BLAS that no kernel of the cycle calls
+    with without_modules("rich", "scipy"):  # of structlog's tracebacks, and BLAS that the cycle never calls
         import numba.np.arraymath  # noqa: F401
 
         from ecu.runtime import prepare, service

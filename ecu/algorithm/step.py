@@ -66,7 +66,7 @@ from ecu.algorithm.monitoring.disc_temperature import (
 )
 from ecu.algorithm.monitoring.dust import DUST_STATE, restore_dust, update_dust
 from ecu.algorithm.monitoring.plausibility import PLAUSIBILITY_STATE
-from ecu.algorithm.monitoring.sensors import leave_out, watch_sensors
+from ecu.algorithm.monitoring.sensors import mask_implausible, watch_sensors
 from ecu.algorithm.monitoring.wear import WEAR_STATE, restore_wear, update_wear
 from ecu.algorithm.publish import publish
 from ecu.contract.faults import (
@@ -189,7 +189,7 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
     faults, contradicted = watch_sensors(p, s, u, dt)
     contradicted = contradicted or u.e2e_faults != 0
     faults |= u.bus_faults | u.e2e_faults | input_faults(p, u)
-    leave_out(p, s, u)
+    mask_implausible(p, s, u)
     u = s.trusted
     hold_pedal(p, s.demand, u)
     _estimate(p, s, u, contradicted, dt)

@@ -39,7 +39,7 @@ from ecu.recording.recorder import (
 from ecu.recording.ring import Batch, RingReader, remove_ring
 from ecu.recording.sink import free_output
 from ecu.runtime.side import KEPT, NOT_KEPT, READY, REFUSED, word
-from ecu.runtime.start import ENDING, like_others
+from ecu.runtime.start import ENDING, lower_priority
 from ecu.runtime.supervisor import become
 
 PERIOD_S: Final = 0.1
@@ -240,7 +240,7 @@ def main() -> int:
         return 2
     if not options.again:
         _say(leash, READY)
-    like_others()
+    lower_priority()
     if not _follow(recorder, leash, options.parent):
         recorder.finish()
         structlog.get_logger("recorder").error("supervisor_gone", remedy="this process takes its place")

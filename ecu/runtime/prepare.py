@@ -31,10 +31,10 @@ from ecu.recording.restored import restored
 from ecu.recording.ring import Ring, create_ring, remove_ring, ring_path
 from ecu.runtime.cycle import Ecu, new_ecu
 from ecu.runtime.notify import Manager
-from ecu.runtime.realtime import make_realtime, settle
+from ecu.runtime.realtime import freeze_memory, make_realtime
 from ecu.runtime.side import Side
 from ecu.runtime.standby import Standby, learned_by_first
-from ecu.runtime.start import like_others
+from ecu.runtime.start import lower_priority
 from ecu.settings.config import Config, config_hash, load_config, new_params, store_key
 from ecu.settings.resources import resource
 from ecu.warm import warm_up
@@ -83,7 +83,7 @@ class CompileProgress:
         if self.is_over or (count and now_s - self._told_s < TELL_PROGRESS_S):
             return
         if not count:
-            like_others()  # minutes of compiling are not worth anyone's standing still
+            lower_priority()  # minutes of compiling are not worth anyone's standing still
         self._told_s = now_s
         self._manager.tell(f"STATUS=compiling kernels, {count} done")
         structlog.get_logger("ecu").info(
@@ -129,7 +129,7 @@ def prepare(options: RunOptions) -> Session:
         ecu = new_ecu(params, learned, receiving, sending)
         warm_up(ecu, compiled)
         progress.is_over = True
-        settle()
+        freeze_memory()
         warm_s = time.monotonic() - began
         discard(channel)
         if not options.standby:

@@ -55,7 +55,7 @@ REQUESTS: Final[tuple[tuple[str, Callable[[], None], str], ...]] = (
 AFFINITY: Final = ("affinity", _last_cpu, "let the cpuset of this process hold a CPU of its own")
 
 
-def settle() -> None:
+def freeze_memory() -> None:
     """Freeze what is alive, collect no garbage any more, have all of it in memory: after the warm-up.
 
     What the kernel took out of its page cache comes from the disk, which can take a second.
@@ -72,7 +72,7 @@ def make_realtime() -> list[Verdict]:
 
     A refusal is logged and the service goes on.
     """
-    settle()
+    freeze_memory()
     verdicts = [_attempt(*request) for request in REQUESTS]
     if verdicts[0].granted:  # tied to one CPU without priority it could not dodge a busy neighbour
         verdicts.append(_attempt(*AFFINITY))

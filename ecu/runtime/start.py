@@ -25,13 +25,13 @@ ENDING: Final = (
 PRIORITY: Final = 1  # of SCHED_FIFO: before every ordinary process, after whatever runs in real time
 
 
-def ahead_of_others() -> None:
+def raise_priority() -> None:
     """Run before ordinary processes do, where that is granted, and collect no garbage. So do children."""
     _schedule("SCHED_FIFO", PRIORITY)
     gc.disable()
 
 
-def like_others() -> None:
+def lower_priority() -> None:
     """Take turns with ordinary processes again."""
     _schedule("SCHED_OTHER", 0)
     gc.enable()
@@ -43,7 +43,7 @@ def _schedule(policy: str, priority: int) -> None:
 
 
 @contextmanager
-def kept_out(*names: str) -> Iterator[None]:
+def without_modules(*names: str) -> Iterator[None]:
     """Let libraries that load `names` where they find them, for what is not needed here, not find them.
 
     What is loaded already stays; afterwards anyone may import them.

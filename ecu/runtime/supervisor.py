@@ -19,7 +19,7 @@ from typing import Final, NoReturn
 
 from ecu.recording.sink import free_output
 from ecu.runtime.side import AWAY
-from ecu.runtime.start import ENDING, like_others
+from ecu.runtime.start import ENDING, lower_priority
 
 PAUSE_S: Final = 0.1
 LONGEST_PAUSE_S: Final = 10.0  # less than the ring holds
@@ -53,7 +53,7 @@ def main(arguments: Sequence[str]) -> int:
         if code in FINAL_EXITS or loop_is_gone:
             return code
         _say_away(leash, code)
-        like_others()
+        lower_priority()
         again = True
         if time.monotonic() - began > CALM_S:
             pause_s = PAUSE_S

@@ -16,7 +16,7 @@ from brakelab.plant.records import BRAKE
 from brakelab.replay.command import replay
 from brakelab.results.files import read_result
 from brakelab.simulation.scenario import load_scenario
-from brakelab.simulation.vehicle_bus import carry_on, new_noise, new_values, new_vehicle, sense
+from brakelab.simulation.vehicle_bus import advance, new_noise, new_values, new_vehicle, sense
 from ecu.contract.signals import CORNERS, INPUT_SIGNALS
 from ecu.settings.resources import resource
 
@@ -51,7 +51,7 @@ def drive_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
             driver["motor_demand"], driver["accelerator_position"] = -DRIVING, 30.0
         sense(vehicle, noise, values)
         rows.append(values.copy())
-        carry_on(vehicle)
+        advance(vehicle)
     names = [signal.name for signal in INPUT_SIGNALS]
     columns = dict(zip(names, np.array(rows).T, strict=True))
     table = {"t": np.arange(len(rows)) * 0.01} | {

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from brakelab.plant.driver import drive
 from brakelab.simulation.closed_loop import Plans, plans
-from brakelab.simulation.faults import Way, convey, new_way
+from brakelab.simulation.faults import Link, deliver, new_link
 from brakelab.simulation.priority import ask_for_priority
 from brakelab.simulation.scenario import Scenario, load_scenario
 from brakelab.simulation.simulate import write_columns
@@ -29,12 +29,12 @@ from brakelab.simulation.vehicle_bus import (
     N_TRUTH,
     TRUTH_COLUMNS,
     Vehicle,
-    carry_on,
+    advance,
+    decode_demands,
     new_noise,
     new_values,
     new_vehicle,
     sense,
-    understand,
     write_truth,
 )
 from ecu.bus.channel import Channel, open_channel
@@ -63,8 +63,8 @@ class Side(NamedTuple):
     reception: Reception
     frames_out: RecordArray
     frames_in: RecordArray
-    to_ecu: Way
-    to_vehicle: Way
+    to_ecu: Link
+    to_vehicle: Link
 
 
 class Node(NamedTuple):
@@ -100,8 +100,8 @@ def new_node(scenario: Scenario, seed: int) -> Node:
         new_reception(plan.vehicle_hears),
         frame_buffer(plan.vehicle_sends),
         np.zeros(RECEIVED_AT_ONCE, FRAME),
-        new_way(),
-        new_way(),
+        new_link(),
+        new_link(),
     )
     return Node(side, new_noise(seed))
 
@@ -124,18 +124,18 @@ def live_through(
     vehicle = side.vehicle
     t = 1e-9 * (cycle * CYCLE_NS)
     begin_cycle(side.heard[0], now_ns, CYCLE_NS)
-    received = convey(vehicle.faults, side.to_vehicle, t, noise, side.frames_in, received)
+    received = deliver(vehicle.faults, side.to_vehicle, t, noise, side.frames_in, received)
     receive(plan.vehicle_hears, side.reception, side.to_vehicle.arrived, 0, received, side.heard[0])
-    understand(side.heard[0], vehicle.demand[0])
+    decode_demands(side.heard[0], vehicle.demand[0])
     for _ in range(periods):
         if vehicle.driver[0].started:
-            carry_on(vehicle)
+            advance(vehicle)
         if not drive(vehicle.script, vehicle.params[0], vehicle.state[0], vehicle.driver[0], 1e-9 * CYCLE_NS):
             return -1
     sense(vehicle, noise, side.values)
     write_truth(vehicle, row)
     count = transmit(plan.vehicle_sends, side.sent, side.values, cycle, side.frames_out)
-    return int(convey(vehicle.faults, side.to_ecu, t, noise, side.frames_out, count))
+    return int(deliver(vehicle.faults, side.to_ecu, t, noise, side.frames_out, count))
 
 
 def drive_in_real_time(

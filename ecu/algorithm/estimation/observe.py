@@ -14,7 +14,7 @@ from ecu.algorithm.estimation.joint.prediction import (
     end_prediction,
 )
 from ecu.algorithm.estimation.joint.prior import begin_application, end_application, forget_levels
-from ecu.algorithm.estimation.joint.sliding import mistrust_wheels
+from ecu.algorithm.estimation.joint.sliding import suspend_learning
 from ecu.algorithm.estimation.motion import tell_motion, update_motion
 from ecu.algorithm.estimation.thesis.estimates import tell_friction, tell_wheels
 from ecu.algorithm.estimation.thesis.force import reset_force, take_measured_force, update_force
@@ -111,7 +111,7 @@ def _observe_jointly(
         begin_prediction(p, s.prediction, joint)
         begin_application(joint, heat)
     if doubted:
-        mistrust_wheels(joint)
+        suspend_learning(joint)
     update_joint(p, joint, u, s.motion, s.wheel_load.load, sent, braking, dt)
     if braking and joint.closed:
         add_window(p, s.prediction, joint, u)

@@ -55,7 +55,7 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
 
 
 @kernel
-def leave_out(p: Record, s: Record, u: Record) -> None:
+def mask_implausible(p: Record, s: Record, u: Record) -> None:
     """Overwrite the trusted inputs: `u` without what is implausible."""
     s.trusted = u
     if s.acceleration.implausible or abs(u.value[ACCEL_X]) > p.accel_range:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from brakelab.simulation.closed_loop import Drive, Loop, new_loop, run
-from brakelab.simulation.deaths import START_UP
-from brakelab.simulation.faults import HELD, KINDS, Fault, convey, fault_records, new_way
+from brakelab.simulation.faults import HELD, KINDS, Fault, deliver, fault_records, new_link
+from brakelab.simulation.outages import START_UP
 from brakelab.simulation.scenario import load_scenario
 from ecu.contract import faults as bits
 from ecu.contract.records import FRAME, new_record
@@ -27,14 +27,14 @@ def identifier(name: str) -> int:
 
 def way(fault: dict[str, Any], cycles: int, name: str = "Imu") -> list[list[int]]:
     """Return which numbers arrive in each cycle of 10 ms when one frame numbered by its cycle is sent."""
-    records, way, noise = fault_records([Fault(**fault)]), new_way(), np.random.default_rng(0)
+    records, link, noise = fault_records([Fault(**fault)]), new_link(), np.random.default_rng(0)
     frames = new_record(FRAME)
     frames["can_id"], frames["length"] = identifier(name), 8
     arrived = []
     for cycle in range(cycles):
         frames["data"][0, :] = cycle % 256
-        count = convey(records, way, 0.01 * cycle, noise, frames, 1)
-        arrived.append([int(frame["data"][7]) for frame in way.arrived[:count]])
+        count = deliver(records, link, 0.01 * cycle, noise, frames, 1)
+        arrived.append([int(frame["data"][7]) for frame in link.arrived[:count]])
     return arrived
 
 
@@ -63,11 +63,11 @@ def test_a_share_of_the_frames_is_hit() -> None:
 
 def test_a_corrupted_frame_differs_in_one_bit() -> None:
     records, noise = fault_records([Fault(kind="corrupted", t=0.0)]), np.random.default_rng(1)
-    frames, way, hit = new_record(FRAME), new_way(), set()
+    frames, link, hit = new_record(FRAME), new_link(), set()
     frames["can_id"], frames["length"] = identifier("Imu"), 8
     for _ in range(600):
-        assert convey(records, way, 0.0, noise, frames, 1) == 1
-        changed = np.unpackbits(way.arrived["data"][0] ^ frames["data"][0], bitorder="little")
+        assert deliver(records, link, 0.0, noise, frames, 1) == 1
+        changed = np.unpackbits(link.arrived["data"][0] ^ frames["data"][0], bitorder="little")
         assert changed.sum() == 1
         hit.add(int(changed.argmax()))
     assert hit == set(range(64))
@@ -75,10 +75,10 @@ def test_a_corrupted_frame_differs_in_one_bit() -> None:
 
 def test_frames_beyond_what_can_be_held_up_are_lost_not_written_elsewhere() -> None:
     records = fault_records([Fault(kind="late", t=0.0, delay=0.2)])
-    frames, way, noise = new_record(FRAME, 40), new_way(), np.random.default_rng(0)
+    frames, link, noise = new_record(FRAME, 40), new_link(), np.random.default_rng(0)
     frames["can_id"] = identifier("Imu")
-    assert sum(convey(records, way, 0.0, noise, frames, 40) for _ in range(20)) == 0
-    assert np.isfinite(way.release).sum() == HELD
+    assert sum(deliver(records, link, 0.0, noise, frames, 40) for _ in range(20)) == 0
+    assert np.isfinite(link.release).sum() == HELD
 
 
 # A braking from 20 m/s; faults act from 2.0 s on.

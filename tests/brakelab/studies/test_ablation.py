@@ -111,7 +111,7 @@ def test_the_table_has_medians_and_dashes() -> None:
         for car in (1, 2, 9)
     ]
     table = ablation_table(cars)
-    assert table.columns[:3] == ("without", "stop #1, cold", "stop #1, driven in")
+    assert table.columns[:3] == ("without", "stop #1, cold", "stop #1, adapted")
     assert table.rows[0][:3] == ("nothing", "3.00/4.00", "2.00/4.00")
     assert {line[1] for line in table.rows[1:]} == {"–"}
     assert "3 cars" in table.below

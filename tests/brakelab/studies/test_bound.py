@@ -179,7 +179,7 @@ def test_whoever_knows_more_errs_less(stop: Bound) -> None:
 
 def test_the_table_tells_what_a_goal_would_take(monkeypatch: pytest.MonkeyPatch) -> None:
     case = "stop #1"
-    monkeypatch.setattr(bound, "ACCURACY", {case: ACCURACY[case]._replace(driven_in=(0.8, 0.9))})
+    monkeypatch.setattr(bound, "ACCURACY", {case: ACCURACY[case]._replace(adapted=(0.8, 0.9))})
 
     def verdicts(joint: float, minutes: float, car: float, course: float) -> tuple[str, str]:
         of = dict(zip(LEVELS, (9.0, minutes, car, course), strict=True))

@@ -47,7 +47,7 @@ STOP = "stop #1"
 @pytest.fixture(scope="module")
 def rows() -> dict[bool, Row]:
     todo = [Task(JOINT, seed, (STOP,)) for seed in (0, 1)]
-    return {row.driven_in: row for row in observer_rows(todo)}
+    return {row.adapted: row for row in observer_rows(todo)}
 
 
 def test_a_stop_with_two_cars(rows: dict[bool, Row]) -> None:
@@ -60,9 +60,9 @@ def test_a_stop_with_two_cars(rows: dict[bool, Row]) -> None:
         assert all(0.0 <= share <= 100.0 for share in row.inside_2_sigma)
         assert np.isnan(row.seconds.median)
     for axle in (0, 1):  # the same cars, but known
-        cold, driven_in = rows[False], rows[True]
-        assert cold.nominal[axle].median == pytest.approx(driven_in.nominal[axle].median, rel=0.05)
-        assert cold.nrmse[axle] != driven_in.nrmse[axle]
+        cold, adapted = rows[False], rows[True]
+        assert cold.nominal[axle].median == pytest.approx(adapted.nominal[axle].median, rel=0.05)
+        assert cold.nrmse[axle] != adapted.nrmse[axle]
 
 
 def test_only_what_the_store_keeps_is_carried_over() -> None:
@@ -183,7 +183,7 @@ def test_verdicts() -> None:
         "low-grip patch": "missed: force",
     }
     worse = _pages(_samples(11.0))
-    missed = "missed: cold front, cold rear, driven in front, driven in rear"
+    missed = "missed: cold front, cold rear, adapted front, adapted rear"
     assert worse["Joint observer, disturbed"]["mass ±10 %"][-1] == missed
     assert worse["Joint observer"]["0.7 m/s²"][4:6] == ("constant", "missed: front, rear")
 

@@ -9,7 +9,7 @@ from ecu.runtime.notify import Manager
 def test_compiling_is_a_line_at_once_then_every_five_seconds_and_none_in_operation(monkeypatch):
     now_s = [100.0]
     monkeypatch.setattr(prepare.time, "monotonic", lambda: now_s[0])
-    monkeypatch.setattr(prepare, "like_others", lambda: None)
+    monkeypatch.setattr(prepare, "lower_priority", lambda: None)
     progress = prepare.CompileProgress(Manager({}))
     with capture_logs() as lines:
         for count in range(60):

@@ -11,17 +11,17 @@ import numba
 import pytest
 
 from ecu.jit import CompileCounter
-from ecu.runtime.start import ahead_of_others, kept_out, left_at_once, like_others
+from ecu.runtime.start import left_at_once, lower_priority, raise_priority, without_modules
 
 
 def test_what_is_kept_out_is_not_found_and_comes_back_afterwards(monkeypatch, tmp_path):
     (tmp_path / "library_of_nobody.py").write_text("", "utf-8")
     monkeypatch.syspath_prepend(tmp_path)
-    with kept_out("library_of_nobody", "os"), pytest.raises(ImportError):
+    with without_modules("library_of_nobody", "os"), pytest.raises(ImportError):
         importlib.import_module("library_of_nobody")
     assert importlib.import_module("library_of_nobody")
     assert sys.modules["os"] is os  # was loaded before
-    with kept_out("library_of_nobody"):
+    with without_modules("library_of_nobody"):
         assert importlib.import_module("library_of_nobody")
 
 
@@ -55,11 +55,11 @@ def test_a_signal_ends_what_compiles_at_once_and_nobody_s_business_else():
 
 def test_precedence_is_real_time_below_every_cycle_and_goes_back():
     try:
-        ahead_of_others()
+        raise_priority()
         granted = os.sched_getscheduler(0) == os.SCHED_FIFO
         priority = os.sched_getparam(0).sched_priority
     finally:
-        like_others()
+        lower_priority()
     assert os.sched_getscheduler(0) == os.SCHED_OTHER
     if not granted:
         pytest.skip("SCHED_FIFO is not granted here")

@@ -36,7 +36,7 @@ def test_it_is_started_again_with_pauses_that_grow(codes, gone_after, starts, pa
     monkeypatch.setattr(supervisor.select, "select", wait)
     monkeypatch.setattr(supervisor, "free_output", lambda: None)
     monkeypatch.setattr(supervisor.signal, "signal", lambda *_: None)
-    monkeypatch.setattr(supervisor, "like_others", lambda: None)
+    monkeypatch.setattr(supervisor, "lower_priority", lambda: None)
     assert supervisor.main([str(theirs.detach()), "--ring", "x"]) == codes[starts - 1]
     assert len(commands) == starts
     assert waited == pytest.approx(pauses)

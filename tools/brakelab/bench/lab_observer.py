@@ -36,7 +36,7 @@ class OnTrip(NamedTuple):
     """One car: nRMSE [%] of the front axle by kind."""
 
     cold: dict[str, float]  # nothing learned before
-    driven_in: dict[str, float]
+    adapted: dict[str, float]
     nominal: dict[str, float]  # the configured constant
 
 
@@ -67,7 +67,7 @@ def brakings(drive: Drive) -> list[NDArray[np.bool_]]:
 
 
 def on_trip(seed: int) -> OnTrip:
-    """Return the errors of the joint observer in one car, cold and driven in."""
+    """Return the errors of the joint observer in one car, cold and adapted."""
     config = configured()
     trip, kinds = trip_of_kinds(seed)
     setup = Setup(with_draw(trip, WIDE), config)
@@ -75,8 +75,8 @@ def on_trip(seed: int) -> OnTrip:
     _, learned = drive_car(before, JOINT, seed)
     kept = None if out_of_range(learned, new_params(config)["mu_nominal"][0]) else learned
     cold, nominal = _errors(drive_car(setup, JOINT, seed)[0], kinds)
-    driven_in, _ = _errors(drive_car(setup, JOINT, seed, kept)[0], kinds)
-    return OnTrip(cold, driven_in, nominal)
+    adapted, _ = _errors(drive_car(setup, JOINT, seed, kept)[0], kinds)
+    return OnTrip(cold, adapted, nominal)
 
 
 def _errors(drive: Drive, kinds: str) -> tuple[dict[str, float], dict[str, float]]:

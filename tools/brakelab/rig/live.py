@@ -23,7 +23,7 @@ from brakelab.simulation.faults import Fault
 from ecu.bus.channel import open_channel
 from ecu.errors import RunFault, UserError
 from ecu.recording.ring import RingReader, ring_path
-from ecu.runtime.start import ahead_of_others
+from ecu.runtime.start import raise_priority
 
 MULTICAST: Final = f"239.74.163.{os.getpid() % 250 + 2}"  # a group of its own: two rigs do not meet
 PATIENCE_S: Final = 180.0  # for a slow machine to get ready
@@ -51,7 +51,7 @@ def end_with_parent() -> None:
 def start_as_service() -> None:
     """Start as a service manager would start the daemon, and end with the parent: between fork and exec."""
     end_with_parent()
-    ahead_of_others()
+    raise_priority()
 
 
 class Bus(NamedTuple):

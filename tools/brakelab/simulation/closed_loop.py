@@ -16,19 +16,19 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from brakelab.plant.driver import drive
-from brakelab.simulation.deaths import killed
-from brakelab.simulation.faults import Way, convey, new_way
+from brakelab.simulation.faults import Link, deliver, new_link
+from brakelab.simulation.outages import find_outages
 from brakelab.simulation.scenario import LONGEST, Scenario
 from brakelab.simulation.vehicle_bus import (
     N_TRUTH,
     TRUTH_COLUMNS,
     Vehicle,
-    carry_on,
+    advance,
+    decode_demands,
     new_noise,
     new_values,
     new_vehicle,
     sense,
-    understand,
     write_truth,
 )
 from ecu.algorithm.step import new_state, step
@@ -88,8 +88,8 @@ class Sides(NamedTuple):
     ecu_reception: Reception
     vehicle_frames: RecordArray
     ecu_frames: RecordArray
-    to_ecu: Way
-    to_vehicle: Way
+    to_ecu: Link
+    to_vehicle: Link
 
 
 class Loop(NamedTuple):
@@ -99,16 +99,16 @@ class Loop(NamedTuple):
     noise: Generator
 
 
-class Told(NamedTuple):
+class FrictionOverride(NamedTuple):
     """The friction that the ECU's pressure law is told to use in place of its own."""
 
     true_share: float = 0.0
-    """Of the true friction: 1 makes the ideal controller; 0: not told."""
+    """Of the true friction: 1 makes the ideal controller; 0: not override."""
     front: float = 0.0
     """Amplitude of a sine about the base friction, relative to it, of the front axle."""
     rear: float = 0.0
     frequency: float = 0.0
-    """Of the sine [Hz]; 0: not told."""
+    """Of the sine [Hz]; 0: not override."""
 
 
 class Drive(NamedTuple):
@@ -178,8 +178,8 @@ def new_loop(scenario: Scenario, config: Config, seed: int, armed: bool = True) 
         new_reception(plan.ecu_hears),
         frame_buffer(plan.vehicle_sends),
         frame_buffer(plan.ecu_sends),
-        new_way(),
-        new_way(),
+        new_link(),
+        new_link(),
     )
     return Loop(sides, new_noise(seed))
 
@@ -194,14 +194,14 @@ def _hand_over(frames: Any, count: int, first_ns: int, spacing_ns: int, kept: An
 
 
 @kernel
-def _tell(told: Told, control: Any, true: Any, t: float) -> None:
+def _override_friction(override: FrictionOverride, control: Any, true: Any, t: float) -> None:
     """Tell the pressure law a friction: `control` is its state, `true` the car's friction, `t` time [s]."""
     for i in range(4):
-        if told.true_share > 0.0:
-            control.mu_override[i] = told.true_share * true[i]
-        elif told.frequency > 0.0:
-            amplitude = told.front if i < 2 else told.rear
-            wave = 1.0 + amplitude * math.sin(2.0 * math.pi * told.frequency * t)
+        if override.true_share > 0.0:
+            control.mu_override[i] = override.true_share * true[i]
+        elif override.frequency > 0.0:
+            amplitude = override.front if i < 2 else override.rear
+            wave = 1.0 + amplitude * math.sin(2.0 * math.pi * override.frequency * t)
             control.mu_override[i] = control.base[i] * wave
 
 
@@ -210,7 +210,7 @@ def _run(
     plan: Plans,
     loop: Sides,
     noise: Generator,
-    told: Told,
+    override: FrictionOverride,
     alive: bool,
     first_cycle: int,
     decoded: NDArray[np.float64],
@@ -233,7 +233,7 @@ def _run(
         write_truth(vehicle, truth[row])
         sent = transmit(plan.vehicle_sends, loop.vehicle_sent, loop.values, cycle, loop.vehicle_frames)
         t = 1e-9 * (cycle * CYCLE_NS)
-        sent = convey(vehicle.faults, loop.to_ecu, t, noise, loop.vehicle_frames, sent)
+        sent = deliver(vehicle.faults, loop.to_ecu, t, noise, loop.vehicle_frames, sent)
         arrived = loop.to_ecu.arrived
         # A log's time grid starts at its first frame: the first burst bears T_0 itself.
         spacing = SPACING_NS if cycle > 0 else 0
@@ -241,25 +241,25 @@ def _run(
 
         if not alive:
             decoded[row] = outputs[row] = np.nan
-            carry_on(vehicle)
+            advance(vehicle)
             continue
         begin_cycle(inputs, t_ns, CYCLE_NS)
         receive(plan.ecu_hears, loop.ecu_reception, arrived, 0, sent, inputs)
         end_cycle(inputs, loop.ecu_reception.freshness)
         for i in range(N_INPUTS):
             decoded[row, i] = inputs.value[i] if inputs.new[i] else np.nan
-        _tell(told, loop.state[0].control, vehicle.state[0].mu_b, t)
+        _override_friction(override, loop.state[0].control, vehicle.state[0].mu_b, t)
         step(loop.params, loop.state, loop.inputs, loop.outputs)
         outputs[row] = loop.output_vector
 
         sent = transmit(plan.ecu_sends, loop.ecu_sent, loop.output_vector, cycle, loop.ecu_frames)
-        sent = convey(vehicle.faults, loop.to_vehicle, t, noise, loop.ecu_frames, sent)
+        sent = deliver(vehicle.faults, loop.to_vehicle, t, noise, loop.ecu_frames, sent)
         arrived = loop.to_vehicle.arrived
         place = _hand_over(arrived, sent, t_ns + 10 * SPACING_NS, SPACING_NS, kept, place)
         begin_cycle(heard, t_ns + CYCLE_NS // 2, CYCLE_NS)
         receive(plan.vehicle_hears, loop.vehicle_reception, arrived, 0, sent, heard)
-        understand(heard, vehicle.demand[0])
-        carry_on(vehicle)
+        decode_demands(heard, vehicle.demand[0])
+        advance(vehicle)
     return len(truth), place, True
 
 
@@ -273,35 +273,39 @@ def _start_anew(sides: Sides) -> None:
         old[:] = new
 
 
-def run_blocks(loop: Loop, seconds: float = LONGEST, told: Told | None = None) -> Iterator[Block]:
+def run_blocks(
+    loop: Loop, seconds: float = LONGEST, override: FrictionOverride | None = None
+) -> Iterator[Block]:
     """Run a new loop as `run` does, yielding blocks of its cycles: the next one overwrites the arrays."""
-    told, sides = told or Told(), loop.sides
+    override, sides = override or FrictionOverride(), loop.sides
     decoded, outputs, truth = (np.empty((CHUNK, width)) for width in (N_INPUTS, N_OUTPUTS, N_TRUTH))
     kept = new_record(FRAME, CHUNK * 2 * (len(sides.vehicle_frames) + len(sides.ecu_frames)))
     first, last, running = 0, round(seconds * 1e9 / CYCLE_NS), True
-    deaths = killed(sides.vehicle.faults)
+    outages = find_outages(sides.vehicle.faults)
     while running and first < last:
-        if deaths and first >= deaths[0].end:
-            if not deaths.pop(0).standby:
+        if outages and first >= outages[0].end:
+            if not outages.pop(0).standby:
                 _start_anew(sides)
             continue
-        alive = not deaths or first < deaths[0].begin
-        until = (deaths[0].begin if alive else deaths[0].end) if deaths else last
+        alive = not outages or first < outages[0].begin
+        until = (outages[0].begin if alive else outages[0].end) if outages else last
         size = min(CHUNK, last - first, until - first)
         rows = decoded[:size], outputs[:size], truth[:size]
-        done, count, running = _run(plans(), sides, loop.noise, told, alive, first, *rows, kept)
+        done, count, running = _run(plans(), sides, loop.noise, override, alive, first, *rows, kept)
         yield Block(decoded[:done], outputs[:done], truth[:done], kept[:count])
         first += done
 
 
-def run(loop: Loop, ideal: bool = False, seconds: float = LONGEST, told: Told | None = None) -> Drive:
+def run(
+    loop: Loop, ideal: bool = False, seconds: float = LONGEST, override: FrictionOverride | None = None
+) -> Drive:
     """Run a new loop to the end of its script, or for `seconds`, and return what happened.
 
     `ideal`: the ECU's pressure law is given the true friction, to compare a compensated controller with;
-    `told`: another one. Where the scenario kills the daemon, its outputs are NaN until it, or its standby,
-    sends again.
+    `override`: another one. Where the scenario kills the daemon, its outputs are NaN until it, or its
+    standby, sends again.
     """
-    running = run_blocks(loop, seconds, told or Told(1.0 if ideal else 0.0))
+    running = run_blocks(loop, seconds, override or FrictionOverride(1.0 if ideal else 0.0))
     blocks = [tuple(map(np.copy, block)) for block in running]
     decoded, outputs, truth, frames = (np.concatenate(values) for values in zip(*blocks, strict=True))
     return Drive(

@@ -181,7 +181,7 @@ def fault_records(faults: Sequence[Fault]) -> RecordArray:
     return rows
 
 
-class Way(NamedTuple):
+class Link(NamedTuple):
     """One direction of the bus."""
 
     held: RecordArray
@@ -189,12 +189,12 @@ class Way(NamedTuple):
     release: NDArray[np.float64]
     """s, inf where nothing is held."""
     arrived: RecordArray
-    """Room for what `convey` hands over."""
+    """Room for what `deliver` hands over."""
 
 
-def new_way() -> Way:
-    """Return a way on which nothing is held up."""
-    return Way(new_record(FRAME, HELD), np.full(HELD, np.inf), new_record(FRAME, ROOM))
+def new_link() -> Link:
+    """Return a link on which nothing is held up."""
+    return Link(new_record(FRAME, HELD), np.full(HELD, np.inf), new_record(FRAME, ROOM))
 
 
 @kernel
@@ -214,28 +214,28 @@ def _hits(fault: Record, can_id: int, t: float, noise: Generator) -> bool:
 
 
 @kernel
-def _hold_up(way: Way, frame: Record, release: float, delay: float) -> None:
-    for place in range(len(way.release)):
-        if math.isinf(way.release[place]):
-            way.held[place] = frame
-            way.held[place].stamp_ns += np.int64(1e9 * delay)
-            way.release[place] = release
+def _hold_up(link: Link, frame: Record, release: float, delay: float) -> None:
+    for place in range(len(link.release)):
+        if math.isinf(link.release[place]):
+            link.held[place] = frame
+            link.held[place].stamp_ns += np.int64(1e9 * delay)
+            link.release[place] = release
             return
 
 
 @kernel
-def convey(faults: Any, way: Way, t: float, noise: Generator, frames: Any, count: int) -> int:
-    """Write into `way.arrived` what arrives of `frames[:count]`, sent at `t` [s], and of what was held up
+def deliver(faults: Any, link: Link, t: float, noise: Generator, frames: Any, count: int) -> int:
+    """Write into `link.arrived` what arrives of `frames[:count]`, sent at `t` [s], and of what was held up
     before; returns how many."""
     arrived = 0
-    for place in range(len(way.release)):
-        if way.release[place] <= t + SLACK:
-            way.arrived[arrived] = way.held[place]
-            way.release[place] = np.inf
+    for place in range(len(link.release)):
+        if link.release[place] <= t + SLACK:
+            link.arrived[arrived] = link.held[place]
+            link.release[place] = np.inf
             arrived += 1
     for i in range(count):
         kept, copies = True, 1
-        way.arrived[arrived] = frames[i]
+        link.arrived[arrived] = frames[i]
         for j in range(len(faults)):
             fault = faults[j]
             kind = fault.kind
@@ -245,17 +245,17 @@ def convey(faults: Any, way: Way, t: float, noise: Generator, frames: Any, count
                 continue
             if kind == CORRUPTED:
                 bit = int(noise.random() * 8 * frames[i].length)
-                way.arrived[arrived].data[bit // 8] ^= 1 << (bit % 8)
+                link.arrived[arrived].data[bit // 8] ^= 1 << (bit % 8)
             elif kind == DOUBLED:
                 copies = 2
             else:
                 kept = False
                 if kind == LATE:
-                    _hold_up(way, frames[i], t + fault.delay, fault.delay)
+                    _hold_up(link, frames[i], t + fault.delay, fault.delay)
         if kept:
             arrived += 1
             if copies == 2:
-                way.arrived[arrived] = way.arrived[arrived - 1]
+                link.arrived[arrived] = link.arrived[arrived - 1]
                 arrived += 1
     return arrived
 

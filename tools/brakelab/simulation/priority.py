@@ -3,7 +3,7 @@
 import os
 from typing import Final
 
-from ecu.runtime.realtime import settle
+from ecu.runtime.realtime import freeze_memory
 
 PRIORITY: Final = 10
 """SCHED_FIFO, below the daemon's: a vehicle does not wait for others, and the ECU does not wait for it."""
@@ -14,7 +14,7 @@ def ask_for_priority() -> str:
 
     What is alive now settles (`ecu.runtime.realtime`): call it after the preparations.
     """
-    settle()
+    freeze_memory()
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
     except (OSError, AttributeError) as error:

@@ -177,7 +177,7 @@ def sense(vehicle: Vehicle, noise: Generator, values: NDArray[np.float64]) -> No
 
 
 @kernel
-def understand(heard: Record, demand: Record) -> None:
+def decode_demands(heard: Record, demand: Record) -> None:
     """Take over the ECU's demands that arrived in this cycle; `heard` is a record of `OUTPUT_COLUMNS`."""
     if heard.new[PRESSURE_DEMAND] and heard.new[PRESSURE_DEMAND + 2]:
         demand.pressure_age = 0.0
@@ -192,7 +192,7 @@ def understand(heard: Record, demand: Record) -> None:
 
 
 @kernel
-def carry_on(vehicle: Vehicle) -> None:
+def advance(vehicle: Vehicle) -> None:
     """Move the car on by one cycle with the demands that were understood."""
     move(
         vehicle.script,

@@ -22,6 +22,7 @@ from brakelab.studies.stops import AXLES, Vector, estimate_errors
 from brakelab.studies.table import Table
 from ecu.algorithm.estimation.joint.layout import (
     BIAS,
+    DEFLECTION_GAIN,
     DRAG,
     LEVEL,
     LOAD,
@@ -30,7 +31,6 @@ from ecu.algorithm.estimation.joint.layout import (
     RADIUS,
     RATIO,
     ROLLING,
-    SINKING,
     STIFFNESS,
 )
 from ecu.algorithm.estimation.joint.learned import KEPT
@@ -79,7 +79,7 @@ ABLATIONS: Final = {
     "learned stiffness and peak": Ablation(forgotten=(STIFFNESS, PEAK)),
     "learned stiffness ratio and exponent": Ablation(forgotten=(RATIO, LOAD)),
     "learned radii": Ablation(forgotten=(*range(RADIUS, RADIUS + 4), ROLLING)),
-    "learned change of radius with load": Ablation(forgotten=(SINKING,)),
+    "learned change of radius with load": Ablation(forgotten=(DEFLECTION_GAIN,)),
     "learned accelerometer bias and drag": Ablation(forgotten=(BIAS, DRAG)),
     "learned friction": Ablation(linings=True),
 }
@@ -90,7 +90,7 @@ class Sample(NamedTuple):
 
     ablation: str
     case: str
-    driven_in: bool
+    adapted: bool
     nrmse: tuple[float, float]
     """Front and rear [%]."""
 
@@ -179,7 +179,7 @@ def ablation_table(cars: Iterable[list[Sample]]) -> Table:
     groups: dict[tuple[str, str, bool], list[tuple[float, float]]] = {}
     every = list(cars)
     for sample in chain.from_iterable(every):
-        groups.setdefault((sample.ablation, sample.case, sample.driven_in), []).append(sample.nrmse)
+        groups.setdefault((sample.ablation, sample.case, sample.adapted), []).append(sample.nrmse)
 
     def cell(key: tuple[str, str, bool]) -> str:
         if key not in groups:
@@ -190,7 +190,7 @@ def ablation_table(cars: Iterable[list[Sample]]) -> Table:
     states = tuple(product(CASES, (False, True)))
     return Table(
         "Friction without one ingredient: nRMSE [%]",
-        ("without", *(f"{case}, {'driven in' if driven_in else 'cold'}" for case, driven_in in states)),
+        ("without", *(f"{case}, {'adapted' if adapted else 'cold'}" for case, adapted in states)),
         [(name, *(cell((name, *state)) for state in states)) for name in ABLATIONS],
         f"Front/rear, medians over {len(every)} cars. –: as with nothing taken away.",
     )

@@ -1,4 +1,4 @@
-"""Can the goals of the driven-in joint observer be met at all with these sensors?
+"""Can the goals of the adapted joint observer be met at all with these sensors?
 
 The drives of `observers` as a linear system about what really happened (`bound_car.py`), bounded by
 `linear_bound.py`. What is known at the start of a case:
@@ -21,6 +21,7 @@ from brakelab.simulation.scenario_car import with_draw
 from brakelab.simulation.vehicle_bus import new_vehicle
 from brakelab.studies.bound_car import (
     BIAS,
+    DEFLECTION_GAIN,
     DEGRESSION,
     DRAG,
     MASS,
@@ -32,7 +33,6 @@ from brakelab.studies.bound_car import (
     RATE,
     RATIO,
     ROLLING,
-    SINKING,
     SLOPE,
     STIFFNESS,
     TRANSFER,
@@ -103,7 +103,7 @@ def as_learned(params: RecordArray, learned: RecordArray, wander: Wander) -> Vec
         (RATIO, layout.RATIO),
         (DEGRESSION, layout.LOAD),
         (PEAK, layout.PEAK),
-        (SINKING, layout.SINKING),
+        (DEFLECTION_GAIN, layout.DEFLECTION_GAIN),
         *((RADIUS + i, layout.RADIUS + i) for i in range(4)),
         *((PUSH_OUT + i, layout.OFFSET + i) for i in range(2)),
         *((MU + i, layout.LEVEL + i) for i in range(4)),
@@ -195,7 +195,7 @@ def bound_table(bounds: Iterable[list[Bound]]) -> Table:
         ]
         lines.append((case, f"{goal[0]:g}/{goal[1]:g}", _pair(joint), *cells, *verdicts))
     return Table(
-        "Friction, driven in: the least nRMSE [%] that the sensors allow, as a filter (as a smoother)",
+        "Friction, adapted: the least nRMSE [%] that the sensors allow, as a filter (as a smoother)",
         ("case", "goal", "joint", *LEVELS, "front", "rear"),
         lines,
         BELOW.format(len(cars)),

@@ -35,7 +35,7 @@ STIFFNESS: Final = 7
 RATIO: Final = 8  # stiffness rear over front
 DEGRESSION: Final = 9  # of stiffness, added
 PEAK: Final = 10  # adhesion
-SINKING: Final = 11  # change of the radius with load
+DEFLECTION_GAIN: Final = 11  # change of the radius with load
 TRANSFER: Final = 12  # of load
 RADIUS: Final = 13  # four
 PUSH_OUT: Final = 17  # two: pressure lost before the pads [bar]
@@ -134,7 +134,7 @@ def shown(car: Any, course: Course, error: Vector) -> Vector:
     load = at_rest + np.exp(d[TRANSFER]) * (course.load - at_rest)
     deflection = course.load / (3.0 * np.asarray(car["vertical_stiffness"]))
     rest = at_rest / (3.0 * np.asarray(car["vertical_stiffness"]))
-    radius = np.asarray(car["free_radius"]) - rest - np.exp(d[SINKING]) * (deflection - rest)
+    radius = np.asarray(car["free_radius"]) - rest - np.exp(d[DEFLECTION_GAIN]) * (deflection - rest)
     radius = radius * np.exp(d[RADIUS : RADIUS + 4])
     axle = np.repeat(d[PUSH_OUT : PUSH_OUT + 2] - d[FOLLOWING : FOLLOWING + 2], 2)
     pressure = np.where(course.pressure > RUBBING, course.pressure - axle, course.pressure)

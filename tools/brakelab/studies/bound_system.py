@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from brakelab.studies.bound_car import (
     BIAS,
+    DEFLECTION_GAIN,
     DEGRESSION,
     DRAG,
     FOLLOWING,
@@ -22,7 +23,6 @@ from brakelab.studies.bound_car import (
     RATIO,
     ROLLING,
     RUBBING,
-    SINKING,
     SLOPE,
     SLOWEST,
     SPEED_REFERENCE,
@@ -50,7 +50,7 @@ PRIOR[ROLLING] = 0.1  # 0.011 configured, 0.010 true
 PRIOR[STIFFNESS], PRIOR[RATIO] = 0.09, 0.01  # drawn within 15 %, 1 % an axle
 PRIOR[DEGRESSION] = 0.03  # 0.07 configured, 0.10 true
 PRIOR[PEAK] = 0.25  # roads
-PRIOR[SINKING] = 0.04  # 250 kN/m configured, 260 true
+PRIOR[DEFLECTION_GAIN] = 0.04  # 250 kN/m configured, 260 true
 PRIOR[TRANSFER] = 0.033  # height drawn within 5 %, 1.5 % off
 PRIOR[RADIUS : RADIUS + 4] = 0.0017  # drawn within 0.3 %
 PRIOR[PUSH_OUT : PUSH_OUT + 2] = 0.17  # bar, drawn within 0.3

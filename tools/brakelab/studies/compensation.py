@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.simulation.closed_loop import Drive, Told, new_loop, run
+from brakelab.simulation.closed_loop import Drive, FrictionOverride, new_loop, run
 from brakelab.simulation.scenario import Scenario, load_scenario
 from brakelab.studies.chart import BLUE, GREEN, GREY, ORANGE, PINK
 from brakelab.studies.stops import LOWEST_SPEED, Vector, achieved_decel, columns
@@ -94,7 +94,7 @@ def drive_as(kind: str, scenario: Scenario, config: Config, seed: int) -> Run:
         control = config.control.model_copy(update={"compensation": "off"})
         config = config.model_copy(update={"control": control})
     loop = new_loop(scenario, config, seed)
-    drive = run(loop, told=Told(TOLD.get(kind, 0.0)))
+    drive = run(loop, override=FrictionOverride(TOLD.get(kind, 0.0)))
     return Run(drive, achieved_decel(loop, drive))
 
 

@@ -20,7 +20,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.simulation.closed_loop import Told, new_loop, run
+from brakelab.simulation.closed_loop import FrictionOverride, new_loop, run
 from brakelab.simulation.scenario import Phase, Scenario, load_scenario
 from brakelab.studies.chart import BLUE, GREEN, GREY, ORANGE, PINK, Line, Panel
 from brakelab.studies.stops import AXLES, columns
@@ -94,9 +94,11 @@ def in_phase(t: NDArray[np.float64], y: NDArray[np.float64], frequency: float) -
     return complex(sine, cosine)
 
 
-def _estimates(config: Config, seed: int, told: Told) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _estimates(
+    config: Config, seed: int, override: FrictionOverride
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return time [s] and ln of the friction estimated at both axles, shape (2, n), of a braking."""
-    drive = run(new_loop(braking(), config, seed), told=told)
+    drive = run(new_loop(braking(), config, seed), override=override)
     rows = (drive.t > 1.0 + SETTLED_S) & (drive.truth["vehicle_speed"] > LEAST_SPEED)
     return drive.t[rows], np.stack(
         [np.log(columns(drive.outputs, "mu_b", a, rows)).mean(axis=0) for a in AXLES]
@@ -111,7 +113,7 @@ def margins_of(config: Config, seed: int) -> Margins:
             both = []
             for sign in (1.0, -1.0):
                 size = [sign * AMPLITUDE if axle == other else 0.0 for other in range(2)]
-                both.append(_estimates(config, seed, Told(0.0, size[0], size[1], frequency)))
+                both.append(_estimates(config, seed, FrictionOverride(0.0, size[0], size[1], frequency)))
             n = min(len(both[0][0]), len(both[1][0]))
             change = 0.5 * (both[0][1][:, :n] - both[1][1][:, :n]) / AMPLITUDE
             for back in range(2):

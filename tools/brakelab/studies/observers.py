@@ -2,7 +2,7 @@
 
 Every observer drives its own closed loop with the same cars and the same noise. Counted are the rows in
 which the brakes of both axles have been on for 0.8 s (the demand's ramp of 0.3 s and the half second of
-`stops.window`), above 15 km/h; nRMSE as there. *Driven in*: what the state store would have kept of ten
+`stops.window`), above 15 km/h; nRMSE as there. *Adapted*: what the state store would have kept of ten
 minutes of `config/scenarios/ordinary.toml` in the same car is given to a new state.
 """
 
@@ -68,7 +68,7 @@ class Sample(NamedTuple):
 
     case: str
     observer: str
-    driven_in: bool
+    adapted: bool
     nrmse: tuple[float, float]
     """Front and rear [%]."""
     inside_2_sigma: tuple[float, float]
@@ -175,7 +175,7 @@ def _event(name: str, drive: Drive) -> tuple[float, float]:
     return settling(drive, last, first), abs(force)
 
 
-def _sample(name: str, task: Task, driven_in: bool, learned: RecordArray | None) -> Sample:
+def _sample(name: str, task: Task, adapted: bool, learned: RecordArray | None) -> Sample:
     setup = _setup(CASES[name], task)
     drive, _ = drive_car(setup, task.observer, task.seed, learned)
     rows, config = counted(drive), setup.config
@@ -183,11 +183,11 @@ def _sample(name: str, task: Task, driven_in: bool, learned: RecordArray | None)
     rear = friction_errors(drive, rows, "rear", config.rear.mu_nominal)
     event = _event(name, drive) if name in EVENTS else (float("nan"), float("nan"))
     error, inside, nominal = ((front[k], rear[k]) for k in range(3))
-    return Sample(name, task.observer, driven_in, error, inside, nominal, *event)
+    return Sample(name, task.observer, adapted, error, inside, nominal, *event)
 
 
 def drive_task(task: Task) -> list[Sample]:
-    """Drive the cases of a task, cold and driven in."""
+    """Drive the cases of a task, cold and adapted."""
     samples = []
     ordinary: dict[tuple[str, str], RecordArray | None] = {}
     for name in task.cases:
@@ -223,7 +223,7 @@ class Row(NamedTuple):
 
     case: str
     observer: str
-    driven_in: bool
+    adapted: bool
     nrmse: tuple[Figure, Figure]
     """Front and rear [%]."""
     inside_2_sigma: tuple[float, float]
@@ -242,7 +242,7 @@ def observer_rows(todo: list[Task], spread: Drivers = map) -> list[Row]:
     groups: dict[tuple[str, str, bool], list[Sample]] = {}
     for samples in spread(drive_task, todo):
         for sample in samples:
-            groups.setdefault((sample.case, sample.observer, sample.driven_in), []).append(sample)
+            groups.setdefault((sample.case, sample.observer, sample.adapted), []).append(sample)
 
     def axles(values: list[tuple[float, float]]) -> tuple[Figure, Figure]:
         front, rear = zip(*values, strict=True)

@@ -1,7 +1,7 @@
 """Cases for the observers: drives with goals, and errors of car, sensors or road.
 
 A goal is the nRMSE [%] of front and rear friction that the joint observer should not exceed: `cold` with
-nominal configuration and nothing learned, `driven_in` after `config/scenarios/ordinary.toml`. Those of
+nominal configuration and nothing learned, `adapted` after `config/scenarios/ordinary.toml`. Those of
 `NOMINAL` are for cars of the nominal draw. A disturbance whose sign can be either has that of its car: odd
 seeds are below, even ones above.
 """
@@ -60,7 +60,7 @@ class Case(NamedTuple):
     scenario: Scenario
     cold: Goal | None = None
     """None: better than the nominal constant."""
-    driven_in: Goal | None = None
+    adapted: Goal | None = None
     thesis: str = "–"
     """nRMSE of Observer 2 there, front/rear [%]."""
     change: Change = _as_is
@@ -90,8 +90,8 @@ def _stop(**brake: Any) -> Scenario:
 
 def _accuracy() -> dict[str, Case]:
     cases = {
-        f"stop #{test}": Case(shipped(f"stop-{test}"), cold, driven_in, thesis)
-        for test, cold, driven_in, thesis in (
+        f"stop #{test}": Case(shipped(f"stop-{test}"), cold, adapted, thesis)
+        for test, cold, adapted, thesis in (
             (1, (2.5, 4.0), (1.3, 1.8), "4.74/7.23"),
             (2, (2.5, 4.0), (1.3, 1.8), "3.34/6.96"),
             (3, (2.5, 4.0), (1.3, 1.8), "4.55/8.51"),
@@ -272,17 +272,17 @@ NOMINAL: Final[dict[str, tuple[Goal, Goal]]] = {
     "stop #3": ((2.3, 4.3), (0.9, 1.0)),
     "stop #4": ((1.6, 3.9), (1.5, 1.5)),
 }
-"""Goals, cold and driven in, of cases that cars of the nominal draw should do better."""
+"""Goals, cold and adapted, of cases that cars of the nominal draw should do better."""
 
 
 def goals(name: str, draw: str) -> tuple[Goal | None, Goal | None]:
-    """Return the goals of a case, cold and driven in, for cars drawn so."""
+    """Return the goals of a case, cold and adapted, for cars drawn so."""
     case = CASES[name]
     if draw != "nominal":
-        return case.cold, case.driven_in
+        return case.cold, case.adapted
     if name in ROBUSTNESS:
         return case.cold, (1.6, 1.8)
-    return NOMINAL.get(name, (case.cold, case.driven_in))
+    return NOMINAL.get(name, (case.cold, case.adapted))
 
 
 WRONG_START: Final = "linings 25 % off"

@@ -21,11 +21,11 @@ EVERY: Final = 10  # cycles
 LEFT, WIDTH, TOP, HEIGHT, GAP = 44.0, 520.0, 24.0, 96.0, 40.0
 SECONDS, LARGEST = 7.0, 2.0  # of the panels' axes
 BIN, BINS = 0.25, 16
-COLOURS: Final = ("#9aa5b1", "#d55e00")  # cold, driven in
+COLOURS: Final = ("#9aa5b1", "#d55e00")  # cold, adapted
 
 
 class Consistency(NamedTuple):
-    """One car's stop #1, cold and driven in."""
+    """One car's stop #1, cold and adapted."""
 
     t: tuple[Vector, Vector]
     """s since the first row that counts."""
@@ -54,7 +54,7 @@ def innovations(drive: Drive, rows: NDArray[np.bool_]) -> Vector:
 
 
 def consistency_of(seed: int) -> Consistency:
-    """Drive stop #1 with one car, cold and driven in."""
+    """Drive stop #1 with one car, cold and adapted."""
     _, kept = drive_car(Setup(shipped(ORDINARY), configured()), JOINT, seed)
     t, error, ratio = [], [], []
     for learned in (None, kept):
@@ -67,7 +67,7 @@ def consistency_of(seed: int) -> Consistency:
 
 
 def mean_ratio(cars: list[Consistency], state: int, channels: slice) -> float:
-    """Return the mean squared innovation of some channels; `state` 0: cold, 1: driven in."""
+    """Return the mean squared innovation of some channels; `state` 0: cold, 1: adapted."""
     return float(np.mean(np.concatenate([car.ratio[state][channels].ravel() for car in cars])))
 
 
@@ -128,7 +128,7 @@ def write_picture(path: Path, cars: list[Consistency]) -> None:
         return
     names = " and ".join(
         f'<tspan style="fill:{colour}">{name}</tspan>'
-        for name, colour in zip(("cold", "driven in"), COLOURS, strict=True)
+        for name, colour in zip(("cold", "adapted"), COLOURS, strict=True)
     )
     body: list[str] = []
     for axle, name in enumerate(AXLES):

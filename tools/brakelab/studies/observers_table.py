@@ -73,8 +73,8 @@ def _goal(goal: Goal | None) -> str:
 def _accuracy(rows: Rows, draw: str) -> Table:
     lines = []
     for name, case in ACCURACY.items():
-        cold, driven_in = rows[name, JOINT, False], rows[name, JOINT, True]
-        cold_goal, driven_in_goal = goals(name, draw)
+        cold, adapted = rows[name, JOINT, False], rows[name, JOINT, True]
+        cold_goal, adapted_goal = goals(name, draw)
         lines.append(
             (
                 name,
@@ -83,17 +83,17 @@ def _accuracy(rows: Rows, draw: str) -> Table:
                 _with_worst(cold.nrmse),
                 _goal(cold_goal),
                 _verdict(_above(cold, cold_goal)),
-                _with_worst(driven_in.nrmse),
-                _goal(driven_in_goal),
-                _verdict(_above(driven_in, driven_in_goal)),
+                _with_worst(adapted.nrmse),
+                _goal(adapted_goal),
+                _verdict(_above(adapted, adapted_goal)),
             )
         )
     met = [sum(line[place] == "met" for line in lines) for place in (5, 8)]
     return Table(
         "Joint observer: nRMSE [%]",
-        ("case", "thesis, Obs. 2", "constant", "cold", "goal", "", "driven in", "goal", " "),
+        ("case", "thesis, Obs. 2", "constant", "cold", "goal", "", "adapted", "goal", " "),
         lines,
-        f"Median (worst car). Goals met: cold {met[0]}, driven in {met[1]} of {len(lines)}. Constant: the "
+        f"Median (worst car). Goals met: cold {met[0]}, adapted {met[1]} of {len(lines)}. Constant: the "
         "configured 0.45 taken as the estimate. Thesis: Tables 4.3, 5.1, 6.1 (tuned) and 6.3. Pedal: stops "
         "from 100 km/h at about 1, 1.5 and 3 m/s², as Table 6.1 has them; the pedal maps differ.",
     )
@@ -104,14 +104,14 @@ def _others(rows: Rows) -> Table:
         (
             name,
             *(
-                _with_worst(rows[name, observer, driven_in].nrmse)
+                _with_worst(rows[name, observer, adapted].nrmse)
                 for observer in ("observer1", "observer2")
-                for driven_in in (False, True)
+                for adapted in (False, True)
             ),
         )
         for name in ACCURACY
     ]
-    columns = ("case", "Obs. 1 cold", "Obs. 1 driven in", "Obs. 2 cold", "Obs. 2 driven in")
+    columns = ("case", "Obs. 1 cold", "Obs. 1 adapted", "Obs. 2 cold", "Obs. 2 adapted")
     return Table(
         "The thesis's observers: nRMSE [%]",
         columns,
@@ -131,9 +131,9 @@ def _honesty(shares: tuple[float, float]) -> list[str]:
 
 def _uncertainty(rows: Rows) -> Table:
     def cells(name: str, shares: list[tuple[float, float]]) -> tuple[str, ...]:
-        observer2, cold, driven_in = shares
-        words = _verdict(_honesty(cold)), _verdict(_honesty(driven_in))
-        return name, _shares(observer2), _shares(cold), words[0], _shares(driven_in), words[1]
+        observer2, cold, adapted = shares
+        words = _verdict(_honesty(cold)), _verdict(_honesty(adapted))
+        return name, _shares(observer2), _shares(cold), words[0], _shares(adapted), words[1]
 
     keys = (("observer2", False), (JOINT, False), (JOINT, True))
     shares = {name: [rows[name, *key].inside_2_sigma for key in keys] for name in ACCURACY}
@@ -143,22 +143,22 @@ def _uncertainty(rows: Rows) -> Table:
     met = [sum(line[place] == "met" for line in lines[:-1]) for place in (3, 5)]
     return Table(
         "Truth inside 2σ [%]",
-        ("case", "Obs. 2 cold", "joint cold", "", "joint driven in", " "),
+        ("case", "Obs. 2 cold", "joint cold", "", "joint adapted", " "),
         lines,
         f"Share of all rows of all cars. Goal: {HONEST[0]:.0f} to {HONEST[1]:.0f} on each axle; met cold by "
-        f"{met[0]}, driven in by {met[1]} of {len(ACCURACY)}. Small, large: so is σ beside the errors. An "
+        f"{met[0]}, adapted by {met[1]} of {len(ACCURACY)}. Small, large: so is σ beside the errors. An "
         "error hardly changes within a stop, so each car counts about once.",
     )
 
 
 def _robust_line(name: str, rows: Rows, draw: str) -> tuple[str, ...]:
-    cold, driven_in = rows[name, JOINT, False], rows[name, JOINT, True]
+    cold, adapted = rows[name, JOINT, False], rows[name, JOINT, True]
     _, goal = goals(name, draw)
     missed = [f"cold {axle}" for axle in _above(cold, None)]
-    missed += [f"driven in {axle}" for axle in _above(driven_in, goal)]
+    missed += [f"adapted {axle}" for axle in _above(adapted, goal)]
     missed += [
         f"σ {word} {axle}"
-        for word, row in (("cold", cold), ("driven in", driven_in))
+        for word, row in (("cold", cold), ("adapted", adapted))
         for axle, share in zip(AXLES, row.inside_2_sigma, strict=True)
         if round(share) < HONEST[0]
     ]
@@ -167,9 +167,9 @@ def _robust_line(name: str, rows: Rows, draw: str) -> tuple[str, ...]:
         _medians(cold.nominal),
         _with_worst(cold.nrmse),
         _shares(cold.inside_2_sigma),
-        _with_worst(driven_in.nrmse),
+        _with_worst(adapted.nrmse),
         _goal(goal),
-        _shares(driven_in.inside_2_sigma),
+        _shares(adapted.inside_2_sigma),
         _verdict(missed),
     )
 
@@ -179,10 +179,10 @@ def _robustness(rows: Rows, draw: str) -> Table:
     met = sum(line[-1] == "met" for line in lines)
     return Table(
         "Joint observer, disturbed: nRMSE [%] and truth inside 2σ [%]",
-        ("case", "constant", "cold", "inside 2σ", "driven in", "goal", "inside 2σ ", ""),
+        ("case", "constant", "cold", "inside 2σ", "adapted", "goal", "inside 2σ ", ""),
         lines,
         f"Stop #1 unless said otherwise, one car of four; met by {met} of {len(lines)}. Goals: cold better "
-        "than the constant, driven in within twice the goal of stop #1, at least 93 % of the truth inside "
+        "than the constant, adapted within twice the goal of stop #1, at least 93 % of the truth inside "
         "2σ. Signs change from car to car. Wrong masses, stiffnesses, gradients and heights stand in the "
         "configuration, the car keeps its own. A disturbance of car or sensors is there in the ten minutes "
         "before, one of the road, and the loss of a wheel sensor, is not. Samples are lost sensor by sensor, "
@@ -199,16 +199,16 @@ def _sensors(rows: Rows) -> Table:
     lines = []
     for name, case in SENSORS.items():
         line, missed = [name, case.beside or "–"], []
-        for state, driven_in in (("cold", False), ("driven in", True)):
-            row = rows[name, JOINT, driven_in]
+        for state, adapted in (("cold", False), ("adapted", True)):
+            row = rows[name, JOINT, adapted]
             line += [_with_worst(row.nrmse), _shares(row.inside_2_sigma)]
             if case.beside:
-                limit = _quarter_more(rows[case.beside, JOINT, driven_in].nrmse)
+                limit = _quarter_more(rows[case.beside, JOINT, adapted].nrmse)
                 missed += [f"{state} {axle}" for axle in _above(row, limit)]
         lines.append((*line, _verdict(missed) if case.beside else "–"))
     return Table(
         "Joint observer with sensors as cars have them: nRMSE [%] and truth inside 2σ [%]",
-        ("case", "beside", "cold", "inside 2σ", "driven in", "inside 2σ ", ""),
+        ("case", "beside", "cold", "inside 2σ", "adapted", "inside 2σ ", ""),
         lines,
         "One car of four, stops of 4 m/s² unless said otherwise. Goal: within a quarter of the case beside "
         "it. Cruises are at 100 km/h, with that noise of each wheel's motor torque. A case with less of a "
@@ -228,7 +228,7 @@ def _event_verdict(row: Row, rows: Rows) -> str:
     longest = LONGEST.get(row.case)
     if longest is None or row.observer != JOINT:
         return "–"
-    half = 0.5 * rows[row.case, "observer2", row.driven_in].force.median
+    half = 0.5 * rows[row.case, "observer2", row.adapted].force.median
     missed = ["time"] if row.seconds.median > longest + ROUNDING_S else []
     return _verdict(missed + (["force"] if row.force.median > half else []))
 
@@ -241,7 +241,7 @@ def _events(rows: Rows) -> Table:
         longest = LONGEST.get(row.case)
         lines.append(
             (
-                f"{row.case}, {row.observer}, {'driven in' if row.driven_in else 'cold'}",
+                f"{row.case}, {row.observer}, {'adapted' if row.adapted else 'cold'}",
                 _seconds(row.seconds),
                 f"{longest:.2f}" if longest is not None else "–",
                 f"{row.force.median:.1f}" if math.isfinite(row.force.median) else "–",
@@ -254,7 +254,7 @@ def _events(rows: Rows) -> Table:
         ("event", "until within 5 % [s]", "goal", "force, nRMSE [%]", "friction, nRMSE [%]", ""),
         lines,
         "Linings 25 % off: nominal friction configured a quarter above that of the car's file, from the "
-        "first 2 bar until the mean friction of both axles stays within 5 % of the truth; driven in, the "
+        "first 2 bar until the mean friction of both axles stays within 5 % of the truth; adapted, the "
         "linings are new and the rest is known. The other two (Figures 4.11 and 5.5): from the change, or "
         "from when the last wheel slides by less than 12 %, until no axle's error differs by more than 5 % "
         "from what it was before. Goals of the joint observer: these times, and half the force error of "
@@ -277,7 +277,7 @@ def _consistency(cars: list[Consistency]) -> Table:
     lines = [
         (state, f"{mean_ratio(cars, place, slice(0, 2)):.2f}", f"{mean_ratio(cars, place, slice(2, 4)):.2f}",
          f"{mean_ratio(cars, place, slice(4, 5)):.2f}")
-        for place, state in enumerate(("cold", "driven in"))
+        for place, state in enumerate(("cold", "adapted"))
     ]  # fmt: skip
     return Table(
         "Squared innovations over their variance, mean",
@@ -291,7 +291,7 @@ def observer_tables(
     rows: list[Row], times: dict[str, Figure], cars: list[Consistency], draw: str
 ) -> list[Table]:
     """Return all tables."""
-    found = {(row.case, row.observer, row.driven_in): row for row in rows}
+    found = {(row.case, row.observer, row.adapted): row for row in rows}
     return [
         _accuracy(found, draw),
         _others(found),

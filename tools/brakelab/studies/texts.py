@@ -14,7 +14,7 @@ STOPS_TEXT: Final = (
 
 OBSERVERS_TEXT: Final = (
     "Cars and their sensors are drawn per seed about config/plant/suv.toml and Table 4.1. Cold: the "
-    "configuration as it is, nothing learned. Driven in: after ten minutes of "
+    "configuration as it is, nothing learned. Adapted: after ten minutes of "
     "config/scenarios/ordinary.toml in the same car, with what the state store keeps of them. Every "
     "observer closes the loop itself; figures stand for front/rear. Counted while the brakes of both axles "
     "have been on for 0.8 s, above 15 km/h.\n\n"
@@ -32,7 +32,7 @@ ABLATION_TEXT: Final = (
 
 BOUND_TEXT: Final = (
     "How well friction could be known at all with the noise of Table 4.1: a posterior Cramér-Rao bound. "
-    "The drives of [observers.md](observers.md), driven in, become a linear system about what really "
+    "The drives of [observers.md](observers.md), adapted, become a linear system about what really "
     "happened, 27 states in the simulated car's own structure, apart from the code of the ECU. Kalman's "
     "filter of it is the best there is. *Learned*: it starts with the standard deviations that the joint "
     "observer kept of the ten minutes. *Ten minutes*: with what they show at best, to one who knew the "

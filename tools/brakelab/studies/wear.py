@@ -78,7 +78,7 @@ def _friction_rows(cars: list[CarDrives]) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = []
     for name, trips, goal in (
         ("cold: first trip", slice(0, 1), "5"),
-        ("driven in: the others", slice(1, 3), "2"),
+        ("adapted: the others", slice(1, 3), "2"),
     ):
         for axle, part in AXLES.items():
             errors = 100.0 * np.array([car.friction_share[trips, part] for car in cars]).ravel()

@@ -25,7 +25,7 @@ SLOPE: Final = 12  # gravity along the road [m/s^2], uphill positive
 MASS: Final = 13  # ln of mass over configured
 PEAK: Final = 14  # of the tyres' peak adhesion, see `peak_adhesion`
 LOAD: Final = 15  # exponent of stiffness over load, beyond configured
-SINKING: Final = 16  # ln of the radius's change per load over (A.4)
+DEFLECTION_GAIN: Final = 16  # ln of the radius's change per load over (A.4)
 MOTOR: Final = 17  # ln of motor torque over reported
 DRAG: Final = 18  # ln of air drag per mass over configured
 OFFSET: Final = 19  # two: pressure [bar] lost beyond push-out and sensor, per axle
@@ -108,7 +108,11 @@ JOINT_STATE: Final = np.dtype(
         ("started", "u1"),
         ("slides", "u1", (4,)),  # 1: the wheel is too far from the car's speed to tell it
         ("sliding", "i8"),  # number of such wheels
-        ("yields", "u1", (4,)),  # 1: so far from the car's speed that its torque does not tell its force
+        (
+            "beyond_linear",
+            "u1",
+            (4,),
+        ),  # 1: past the linear range of its tyre, its torque does not tell its force
         ("releasing", "u1"),
         ("released", "u1"),  # nobody brakes by the linings
         ("untrusted_s", "f8"),  # time since a wheel was last believed [s]
@@ -130,7 +134,11 @@ JOINT_STATE: Final = np.dtype(
         ("sigma_force", "f8"),  # of the force of all linings at equal pressures, relative
         ("heat", "f8", (4,)),  # relative standard deviation of friction by its disc's temperature
         ("ratio", "f8", (RATIOS,)),  # squared innovations over their variances
-        ("pull", "f8", (4,)),  # the wheels' test ratios up to the gate, with the sign of the innovation
+        (
+            "signed_ratio",
+            "f8",
+            (4,),
+        ),  # test ratio up to the gate, with the sign of the innovation
         ("at_bound", "u1"),  # a learned state is at its bound
         ("reversing", "u1"),
         ("reset", "u1"),

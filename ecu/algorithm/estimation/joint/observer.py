@@ -22,6 +22,7 @@ from ecu.algorithm.estimation.joint.kalman import forget
 from ecu.algorithm.estimation.joint.layout import (
     BIAS,
     CHANGE,
+    DEFLECTION_GAIN,
     DELAY,
     DRAG,
     LEVEL,
@@ -35,7 +36,6 @@ from ecu.algorithm.estimation.joint.layout import (
     RATIO,
     RATIOS,
     ROLLING,
-    SINKING,
     SLOPE,
     STIFFNESS,
     N,
@@ -55,7 +55,7 @@ from ecu.algorithm.estimation.joint.sliding import (
     share_force,
     watch_tyres,
 )
-from ecu.algorithm.estimation.joint.snapshot import go_back, keep, keep_newer
+from ecu.algorithm.estimation.joint.snapshot import restore_snapshot, save_newer_snapshot, save_snapshot
 from ecu.algorithm.estimation.joint.wheel import APPLIED, brake_torque, unknown_share
 from ecu.algorithm.estimation.joint.wheel_speed import correct_by_wheels
 from ecu.algorithm.estimation.joint.window import close_window, gather, open_window
@@ -94,8 +94,8 @@ def start_joint(state: Record) -> None:
     """Begin with what the state knows, the speed apart."""
     state.started = 0
     open_window(state)
-    keep(state, 0)
-    keep(state, 1)
+    save_snapshot(state, 0)
+    save_snapshot(state, 1)
 
 
 @kernel
@@ -170,7 +170,7 @@ def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> 
     else:
         free[BIAS] = free[DRAG] = 1 if state.window.motor_reported and state.drive_known > KNOWN else 0
         if motors:
-            for i in (STIFFNESS, RATIO, LOAD, PEAK, SINKING):
+            for i in (STIFFNESS, RATIO, LOAD, PEAK, DEFLECTION_GAIN):
                 free[i] = 1
             free[MASS] = free[MOTOR] = 1 if _accelerates(state) else 0
 
@@ -298,10 +298,10 @@ def _look_after(params: Record, state: Record, braking: bool) -> None:
     state.kept_s += w.time
     sliding = state.slides[0] + state.slides[1] + state.slides[2] + state.slides[3]
     if sliding > state.sliding and braking and state.hold_s <= 0.0:
-        go_back(state)
+        restore_snapshot(state)
     if sliding > 1 or sliding != state.sliding:
         state.hold_s = HOLD_S
     state.sliding = sliding
     if state.hold_s <= 0.0 and not state.releasing and state.kept_s >= SNAPSHOT_S:
-        keep_newer(state)
+        save_newer_snapshot(state)
     state.at_bound = 1 if keep_within_bounds(state) else 0

@@ -10,6 +10,7 @@ from ecu.algorithm.estimation.joint.kalman import clear_derivatives, clear_state
 from ecu.algorithm.estimation.joint.layout import (
     BIAS,
     CHANGE,
+    DEFLECTION_GAIN,
     DELAY,
     DRAG,
     DRIVE,
@@ -27,7 +28,6 @@ from ecu.algorithm.estimation.joint.layout import (
     RATIO,
     ROLLING,
     SIDE,
-    SINKING,
     SLIP_ERROR,
     SLOPE,
     STIFFNESS,
@@ -41,7 +41,7 @@ PRIOR = np.zeros(N)
 """Standard deviations before anything is learned; friction, motor scale and speed are set apart."""
 PRIOR[STIFFNESS], PRIOR[RATIO] = 0.25, 0.06
 PRIOR[BIAS], PRIOR[SLOPE] = 0.1, 0.3
-PRIOR[MASS], PRIOR[PEAK], PRIOR[LOAD], PRIOR[SINKING] = 0.03, 0.25, 0.05, 0.10
+PRIOR[MASS], PRIOR[PEAK], PRIOR[LOAD], PRIOR[DEFLECTION_GAIN] = 0.03, 0.25, 0.05, 0.10
 PRIOR[DRAG] = 0.10
 PRIOR[RADIUS : RADIUS + 4], PRIOR[ROLLING] = 0.0025, 0.004
 PRIOR[OFFSET : OFFSET + 2] = 0.3
@@ -66,7 +66,9 @@ UNKNOWN_KICKS = 3.0  # m/s^2, white from window to window: stands for 0.3 that l
 UNKNOWN_SLIP, UNKNOWN_SLIP_REST, UNKNOWN_SLIP_BY_ACCEL = 0.003, 0.005, 0.1
 UNKNOWN_SLIP_S = 2.0  # after which that is another one
 
-LASTING = np.array([STIFFNESS, RATIO, BIAS, MASS, PEAK, LOAD, SINKING, DRAG, ROLLING, DELAY, SIDE, PEAK_LOAD])
+LASTING = np.array(
+    [STIFFNESS, RATIO, BIAS, MASS, PEAK, LOAD, DEFLECTION_GAIN, DRAG, ROLLING, DELAY, SIDE, PEAK_LOAD]
+)
 """States of which time alone makes nothing less sure than before anything was learned."""
 
 # Random walks per square root of a second.
@@ -76,7 +78,7 @@ WALK[STIFFNESS], WALK[RATIO] = 0.01, 0.0005
 WALK[RADIUS : RADIUS + 4] = WALK[ROLLING] = 1e-5
 WALK[BIAS], WALK[SLOPE] = 0.001, 0.05
 SLOPE_S = 100.0  # after which a slope is forgotten: no road climbs for ever
-WALK[PEAK], WALK[LOAD], WALK[SINKING] = 0.01, 0.0005, 0.0005
+WALK[PEAK], WALK[LOAD], WALK[DEFLECTION_GAIN] = 0.01, 0.0005, 0.0005
 WALK[MASS], WALK[MOTOR], WALK[DRAG] = 1e-5, 1e-5, 0.005
 WALK[DELAY] = 1e-4
 RATE_WALK = 0.05
@@ -94,7 +96,7 @@ LOWEST[MASS], HIGHEST[MASS] = math.log(0.85), math.log(1.30)
 LOWEST[PEAK], HIGHEST[PEAK] = -1.0, 0.2
 LOWEST[RATIO], HIGHEST[RATIO] = -0.4, 0.4
 LOWEST[LOAD], HIGHEST[LOAD] = -0.3, 0.3
-LOWEST[SINKING], HIGHEST[SINKING] = -1.2, 1.2
+LOWEST[DEFLECTION_GAIN], HIGHEST[DEFLECTION_GAIN] = -1.2, 1.2
 LOWEST[MOTOR], HIGHEST[MOTOR] = math.log(0.6), math.log(1.6)
 LOWEST[DRAG], HIGHEST[DRAG] = math.log(0.5), math.log(2.0)
 LOWEST[ROLLING], HIGHEST[ROLLING] = -0.03, 0.03

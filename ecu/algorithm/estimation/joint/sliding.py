@@ -3,7 +3,7 @@
 from ecu.algorithm.estimation.joint.kalman import GATE, forget
 from ecu.algorithm.estimation.joint.layout import STIFFNESS, V
 from ecu.algorithm.estimation.joint.prior import PRIOR
-from ecu.algorithm.estimation.joint.snapshot import go_back
+from ecu.algorithm.estimation.joint.snapshot import restore_snapshot
 from ecu.algorithm.estimation.joint.wheel import car_force
 from ecu.algorithm.inputs import fresh
 from ecu.contract.signals import WHEEL_SPEED
@@ -30,13 +30,13 @@ def share_force(params: Record, state: Record, inputs: Record, accel: float, loa
     for i in range(4):
         rolled = inputs.value[WHEEL_SPEED + i] * params.wheel_radius[i]
         if fresh(inputs, WHEEL_SPEED + i):
-            state.yields[i] = 1 if _beyond(rolled, state.x[V], YIELDING) else 0
-        if state.yields[i]:
+            state.beyond_linear[i] = 1 if _beyond(rolled, state.x[V], YIELDING) else 0
+        if state.beyond_linear[i]:
             loaded += load[i]
         else:
             left -= state.force[i]
     for i in range(4):
-        if state.yields[i]:
+        if state.beyond_linear[i]:
             state.force[i] = left * load[i] / loaded
 
 
@@ -63,16 +63,16 @@ def watch_tyres(state: Record, observing: bool) -> None:
     """Restore friction and forget stiffness where most wheels contradict the known tyres alike."""
     against = 0.0
     for i in range(4):
-        against += state.pull[i]
+        against += state.signed_ratio[i]
     known = state.p[STIFFNESS, STIFFNESS] < (0.5 * PRIOR[STIFFNESS]) ** 2
     if observing and known and abs(against) > OTHER_TYRES * GATE * GATE:
-        go_back(state)
+        restore_snapshot(state)
         forget(state, STIFFNESS, PRIOR[STIFFNESS] ** 2)
 
 
 @kernel
-def mistrust_wheels(state: Record) -> None:
+def suspend_learning(state: Record) -> None:
     """Suspend learning: a wheel slips beyond its tyre's range, whatever this filter sees of it."""
     if state.hold_s <= 0.0:
-        go_back(state)
+        restore_snapshot(state)
     state.hold_s = HOLD_S

@@ -6,7 +6,7 @@ from ecu.jit import Record, kernel
 
 
 @kernel
-def keep(state: Record, row: int) -> None:
+def save_snapshot(state: Record, row: int) -> None:
     """Save the present state and covariance over snapshot `row`."""
     for i in range(N):
         state.kept_x[row, i] = state.x[i]
@@ -23,7 +23,7 @@ def _copy(state: Record, row: int, to: int) -> None:
 
 
 @kernel
-def go_back(state: Record) -> None:
+def restore_snapshot(state: Record) -> None:
     """Restore the older snapshot in all but the speed, which is uncertain now."""
     for i in range(N):
         if i != V:
@@ -36,8 +36,8 @@ def go_back(state: Record) -> None:
 
 
 @kernel
-def keep_newer(state: Record) -> None:
+def save_newer_snapshot(state: Record) -> None:
     """Make the newer snapshot the older one and take a new one."""
     _copy(state, 0, 1)
-    keep(state, 0)
+    save_snapshot(state, 0)
     state.kept_s = 0.0

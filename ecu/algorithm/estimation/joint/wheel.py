@@ -12,6 +12,7 @@ from ecu.algorithm.brake import brake_lever
 from ecu.algorithm.estimation.joint.layout import (
     BIAS,
     CHANGE,
+    DEFLECTION_GAIN,
     DRAG,
     LEVEL,
     MASS,
@@ -20,7 +21,6 @@ from ecu.algorithm.estimation.joint.layout import (
     PEAK_LOAD,
     RADIUS,
     ROLLING,
-    SINKING,
     V,
 )
 from ecu.algorithm.estimation.joint.prior import SCALE_ONLY, UNKNOWN_PER_ERROR
@@ -60,10 +60,10 @@ def combined_slip(used: float, across: float, stiffness: float, peak: float) -> 
 
 @kernel
 def radius(params: Record, state: Record, i: int, load: float) -> tuple[float, float]:
-    """Return the rolling radius [m] of a wheel and its derivative by the logarithm of its sinking."""
+    """Return the rolling radius [m] of a wheel and its derivative by the logarithm of its deflection_gain."""
     at_rest = params.wheel_radius[i]
     nominal = rolling_radius(load, params.unloaded_radius[i], params.vertical_stiffness[i])
-    change = (nominal - at_rest) * math.exp(state.x[SINKING])
+    change = (nominal - at_rest) * math.exp(state.x[DEFLECTION_GAIN])
     scale = math.exp(state.x[ROLLING] + state.x[RADIUS + i])
     return (at_rest + change) * scale, change * scale
 

@@ -16,6 +16,7 @@ from ecu.algorithm.brake import brake_lever
 from ecu.algorithm.estimation.joint.kalman import GATE, clear_derivatives, correct
 from ecu.algorithm.estimation.joint.layout import (
     CHANGE,
+    DEFLECTION_GAIN,
     DRIVE,
     LEVEL,
     LOAD,
@@ -28,7 +29,6 @@ from ecu.algorithm.estimation.joint.layout import (
     RATIO,
     ROLLING,
     SIDE,
-    SINKING,
     SLIP_ERROR,
     STIFFNESS,
     WHEEL_RATIO,
@@ -68,7 +68,7 @@ def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float
     """
     x, h, w = state.x, state.h, state.window
     load, pressure, smooth = w.load[i], w.pressure[i], state.last_smooth[i]
-    r, sinking = radius(params, state, i, load)
+    r, deflection_gain = radius(params, state, i, load)
     motor = w.motor[i] * math.exp(x[MOTOR])
     # With the mass, so that nothing but air drag tells a scale common to mass and all torques.
     heavier = math.exp(x[MASS])
@@ -115,7 +115,7 @@ def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float
     h[SIDE] = -by_slip * slip * (0.5 if i % 2 == 0 else -0.5)
     h[SLIP_ERROR + i // 2] = by_slip
     h[RADIUS + i] = h[ROLLING] = -omega - by_slip * slope * used  # a larger wheel needs less force
-    h[SINKING] = h[RADIUS + i] * sinking / r
+    h[DEFLECTION_GAIN] = h[RADIUS + i] * deflection_gain / r
     h[DRIVE + i // 2] = 0.5 * by_force * params.mass
     return omega
 
@@ -160,7 +160,7 @@ def correct_by_wheel(
     state.free[MASS] = state.free[MOTOR] = 0
     state.ratio[WHEEL_RATIO + i] = correct(state, innovation, variance)
     state.free[MASS], state.free[MOTOR] = mass, motor
-    state.pull[i] = math.copysign(min(state.ratio[WHEEL_RATIO + i], GATE * GATE), innovation)
+    state.signed_ratio[i] = math.copysign(min(state.ratio[WHEEL_RATIO + i], GATE * GATE), innovation)
     state.observed[i] = 1 if observing and state.smooth_pressure[i] > 2.0 * APPLIED else 0
 
 
@@ -172,7 +172,7 @@ def correct_by_wheels(params: Record, state: Record, before: float, moving: bool
     """
     w, came = state.window, False
     for i in range(4):
-        state.observed[i], state.pull[i] = 0, 0.0
+        state.observed[i], state.signed_ratio[i] = 0, 0.0
         if w.omega_samples[i] == 0:
             continue
         came = True

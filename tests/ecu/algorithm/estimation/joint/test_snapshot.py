@@ -3,7 +3,7 @@
 import numpy as np
 
 from ecu.algorithm.estimation.joint.layout import JOINT_STATE, N, V
-from ecu.algorithm.estimation.joint.snapshot import go_back, keep, keep_newer
+from ecu.algorithm.estimation.joint.snapshot import restore_snapshot, save_newer_snapshot, save_snapshot
 
 
 def marked(value: float):
@@ -15,7 +15,7 @@ def marked(value: float):
 
 def test_a_snapshot_goes_to_its_row() -> None:
     state = marked(3.0)
-    keep(state, 1)
+    save_snapshot(state, 1)
     assert (state["kept_x"] == [[0.0] * N, [3.0] * N]).all()
     assert (state["kept_p"][1] == 3.0).all()
     assert (state["kept_p"][0] == 0.0).all()
@@ -25,7 +25,7 @@ def test_the_newer_becomes_the_older() -> None:
     state = marked(1.0)
     for value in (1.0, 2.0, 3.0):
         state["x"], state["p"], state["kept_s"] = value, value, 0.2
-        keep_newer(state)
+        save_newer_snapshot(state)
         assert state["kept_s"] == 0.0
     assert (state["kept_x"][0] == 3.0).all()
     assert (state["kept_x"][1] == 2.0).all()
@@ -35,10 +35,10 @@ def test_the_newer_becomes_the_older() -> None:
 
 def test_the_older_comes_back_in_all_but_the_speed() -> None:
     state = marked(1.0)
-    keep(state, 1)
+    save_snapshot(state, 1)
     state["x"], state["p"] = 7.0, 7.0
-    keep(state, 0)
-    go_back(state)
+    save_snapshot(state, 0)
+    restore_snapshot(state)
     others = np.arange(N) != V
     assert state["x"][V] == 7.0
     assert (state["x"][others] == 1.0).all()

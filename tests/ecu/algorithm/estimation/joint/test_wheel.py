@@ -10,6 +10,7 @@ from ecu.algorithm.estimation.joint import layout
 from ecu.algorithm.estimation.joint.balance import BALANCE_FLOOR, BALANCE_SHARE, predict_balance
 from ecu.algorithm.estimation.joint.layout import (
     CHANGE,
+    DEFLECTION_GAIN,
     DRIVE,
     LEVEL,
     LOAD,
@@ -21,7 +22,6 @@ from ecu.algorithm.estimation.joint.layout import (
     RADIUS,
     ROLLING,
     SIDE,
-    SINKING,
     SLIP_ERROR,
     STIFFNESS,
     N,
@@ -174,7 +174,11 @@ def differences(state, predict, steps: np.ndarray) -> np.ndarray:
 
 STEPS = np.full(N, 1e-5)
 STEPS[V] = STEPS[OFFSET : OFFSET + 2] = 1e-3
-LATER = [SINKING, ROLLING, *range(RADIUS, RADIUS + 4)]  # their share in rolling resistance is left out
+LATER = [
+    DEFLECTION_GAIN,
+    ROLLING,
+    *range(RADIUS, RADIUS + 4),
+]  # without their share in rolling resistance
 
 
 def both_derivatives(car, state, point: str, i: int) -> tuple[np.ndarray, np.ndarray, float]:

@@ -16,7 +16,7 @@ TAKEOVER: Final = 1e-9 * (SILENCE_NS + CYCLE_NS)
 """s from the last frame of the first daemon to the first of its standby."""
 
 
-class Death(NamedTuple):
+class Outage(NamedTuple):
     """The ECU does not send in cycles `begin` to `end`; then it is a new one, or the standby."""
 
     begin: int
@@ -24,12 +24,12 @@ class Death(NamedTuple):
     standby: bool
 
 
-def killed(faults: RecordArray) -> list[Death]:
-    """Return the deaths in `faults` (`FAULT`, shape (n,)) in their order."""
-    deaths = []
+def find_outages(faults: RecordArray) -> list[Outage]:
+    """Return the outages in `faults` (`FAULT`, shape (n,)) in their order."""
+    outages = []
     for fault in np.sort(faults[faults["kind"] == DAEMON_KILLED], order="begin"):
         begin, standby = float(fault["begin"]), bool(fault["standby"])
         end = begin + TAKEOVER if standby else float(fault["end"]) + START_UP
         first, last = (round(min(instant, LONGEST) * 1e9 / CYCLE_NS) for instant in (begin, end))
-        deaths.append(Death(first, last, standby))
-    return deaths
+        outages.append(Outage(first, last, standby))
+    return outages
