@@ -17,7 +17,7 @@ def brake_gain(params: Record, i: int) -> float:
 
 
 @kernel
-def brake_lever(params: Record, i: int) -> float:
+def brake_gain_per_bar(params: Record, i: int) -> float:
     """Return brake torque per friction and pressure [N m/bar] of a wheel."""
     lever: float = 2.0 * BAR * params.piston_area[i] * params.effective_radius[i]
     return lever

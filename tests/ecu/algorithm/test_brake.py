@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from ecu.algorithm.brake import TOLERANCE, brake_gain, brake_lever, correct_pressure
+from ecu.algorithm.brake import TOLERANCE, brake_gain, brake_gain_per_bar, correct_pressure
 
 PRESSURE = np.dtype([(name, "f8", (4,)) for name in ("value", "variance", "disagreement", "agreed_s")])
 SIGMA, DT = 1.8, 0.01  # bar (Table 4.1), s
@@ -17,7 +17,7 @@ def test_two_pads_press_with_the_pistons_area_at_the_effective_radius(params, co
     force = 30e5 * car["piston_area"][corner]
     torque = 2 * 0.45 * force * car["effective_radius"][corner]
     assert brake_gain(car, corner) * 0.45 * 30e5 == pytest.approx(torque)
-    assert brake_lever(car, corner) * 0.45 * 30.0 == pytest.approx(torque)
+    assert brake_gain_per_bar(car, corner) * 0.45 * 30.0 == pytest.approx(torque)
 
 
 def test_a_sample_counts_by_the_variances() -> None:

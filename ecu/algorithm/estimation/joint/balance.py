@@ -8,7 +8,7 @@ variance.
 
 import math
 
-from ecu.algorithm.brake import brake_lever
+from ecu.algorithm.brake import brake_gain_per_bar
 from ecu.algorithm.estimation.joint.kalman import clear_derivatives, correct
 from ecu.algorithm.estimation.joint.layout import (
     BALANCE_RATIO,
@@ -56,7 +56,7 @@ def predict_balance(params: Record, state: Record, braking: bool) -> float:
         left += (brake_torque(params, state, i, w.common_pressure[i]) + driven + own) / (r * mass)
         smooth = state.last_smooth[i]
         linings += brake_torque(params, state, i, smooth) / (r * mass)
-        per_bar = brake_lever(params, i) * friction(params, state, i) / (r * mass)
+        per_bar = brake_gain_per_bar(params, i) * friction(params, state, i) / (r * mass)
         h[LEVEL + i] = per_bar * max(smooth - x[OFFSET + i // 2], 0.0)
         h[CHANGE + i // 2] += h[LEVEL + i]
         if smooth > 0.5:
@@ -85,7 +85,7 @@ def correct_by_balance(params: Record, state: Record, braking: bool) -> None:
     variance += (SKEW_ACCEL * (w.accel - state.last_accel)) ** 2
     variance += (ACROSS * w.across * GRAVITY) ** 2 + (UNKNOWN_KICKS * (1.0 - state.drive_known)) ** 2
     for i in range(4):
-        per_bar = brake_lever(params, i) * friction(params, state, i)
+        per_bar = brake_gain_per_bar(params, i) * friction(params, state, i)
         per_torque = 1.0 / (params.wheel_radius[i] * params.mass)
         per_bar *= per_torque
         variance += per_torque**2 * motor_variance(state, i, braking)

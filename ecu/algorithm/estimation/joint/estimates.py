@@ -2,7 +2,7 @@
 
 import math
 
-from ecu.algorithm.brake import brake_lever
+from ecu.algorithm.brake import brake_gain_per_bar
 from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
 from ecu.algorithm.estimation.friction import resting_mode
 from ecu.algorithm.estimation.joint.kalman import GATE
@@ -57,7 +57,7 @@ def _sigma_force(params: Record, state: Record) -> float:
     """Return the relative standard deviation of the force of all linings together, at equal pressures."""
     h, total, variance = state.h, 0.0, 0.0
     for i in range(LEVEL, LEVEL + 4):
-        h[i] = brake_lever(params, i - LEVEL) * friction(params, state, i - LEVEL)
+        h[i] = brake_gain_per_bar(params, i - LEVEL) * friction(params, state, i - LEVEL)
         h[i] /= params.wheel_radius[i - LEVEL]
         total += h[i]
     for i in range(LEVEL, LEVEL + 4):

@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.brake import brake_lever
+from ecu.algorithm.brake import brake_gain_per_bar
 from ecu.algorithm.estimation.joint.layout import BIAS, DRAG, LEVEL, MASS, MOTOR, OVERRUN, V
 from ecu.algorithm.inputs import driver_accelerates, others_brake
 from ecu.contract.params import GRAVITY
@@ -83,7 +83,7 @@ def add_window(params: Record, state: Record, joint: Record, inputs: Record) -> 
         r = params.wheel_radius[i]
         motors += w.motor[i] / r
         wheels += params.wheel_inertia[i] / (r * r * params.mass)
-        force = brake_lever(params, i) * w.common_pressure[i] / r
+        force = brake_gain_per_bar(params, i) * w.common_pressure[i] / r
         learned += force * state.mu[LEARNED_WAY, i]
         configured += force * state.mu[CONFIGURED_WAY, i]
     rolling, drag = params.rolling_resistance * GRAVITY, params.drag_area * speed * speed

@@ -8,7 +8,7 @@ Slip by the adhesion used n (force over load), and its derivatives; stiffness C 
 
 import math
 
-from ecu.algorithm.brake import brake_lever
+from ecu.algorithm.brake import brake_gain_per_bar
 from ecu.algorithm.estimation.joint.layout import (
     BIAS,
     CHANGE,
@@ -94,7 +94,7 @@ def brake_torque(params: Record, state: Record, i: int, pressure: float) -> floa
     if pressure == 0.0:
         return 0.0
     acts = pressure - state.x[OFFSET + i // 2]
-    torque: float = brake_lever(params, i) * friction(params, state, i) * acts
+    torque: float = brake_gain_per_bar(params, i) * friction(params, state, i) * acts
     return torque
 
 

@@ -12,7 +12,7 @@ peak, a curve, and the noise of the torques that the prediction was made from.
 
 import math
 
-from ecu.algorithm.brake import brake_lever
+from ecu.algorithm.brake import brake_gain_per_bar
 from ecu.algorithm.estimation.joint.kalman import GATE, clear_derivatives, correct
 from ecu.algorithm.estimation.joint.layout import (
     CHANGE,
@@ -98,7 +98,7 @@ def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float
     clear_derivatives(state)
     h[V] = omega / max(ground, 0.1)
     mu = friction(params, state, i)
-    lever = brake_lever(params, i)
+    lever = brake_gain_per_bar(params, i)
     by_force = by_slip * slope * scale
     state.per_torque = -by_force / r
     h[LEVEL + i] = -by_force * lever * mu * max(smooth - x[OFFSET + i // 2], 0.0) / r
