@@ -12,15 +12,13 @@ TOLERANCE = 3.0  # standard deviations
 @kernel
 def brake_gain(params: Record, i: int) -> float:
     """Return a wheel's brake torque per friction and pressure [N m/Pa], 2 A_k r_eff."""
-    gain: float = 2.0 * params.piston_area[i] * params.effective_radius[i]
-    return gain
+    return 2.0 * params.piston_area[i] * params.effective_radius[i]
 
 
 @kernel
 def brake_gain_per_bar(params: Record, i: int) -> float:
     """Return brake torque per friction and pressure [N m/bar] of a wheel."""
-    lever: float = 2.0 * BAR * params.piston_area[i] * params.effective_radius[i]
-    return lever
+    return 2.0 * BAR * params.piston_area[i] * params.effective_radius[i]
 
 
 @kernel

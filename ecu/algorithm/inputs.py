@@ -47,8 +47,7 @@ def current(inputs: Record, place: int, oldest_s: float) -> bool:
 @kernel
 def others_brake(inputs: Record) -> bool:
     """Return whether an ABS or ESP says that it works: pressures are then not those that were demanded."""
-    works: bool = inputs.value[ABS_ACTIVE] > 0.5 or inputs.value[ESP_ACTIVE] > 0.5
-    return works
+    return inputs.value[ABS_ACTIVE] > 0.5 or inputs.value[ESP_ACTIVE] > 0.5
 
 
 @kernel
@@ -77,8 +76,7 @@ def mean_wheel_speed(params: Record, inputs: Record) -> float:
 @kernel
 def driver_accelerates(inputs: Record) -> bool:
     """Return whether the accelerator is known to be pressed."""
-    pressed: bool = usable(inputs, ACCELERATOR_POSITION) and inputs.value[ACCELERATOR_POSITION] > ACCELERATES
-    return pressed
+    return usable(inputs, ACCELERATOR_POSITION) and inputs.value[ACCELERATOR_POSITION] > ACCELERATES
 
 
 @kernel

@@ -140,8 +140,7 @@ def _lasts(told_ns: int, stamp_ns: int) -> bool:
 @kernel
 def in_doubt(state: Record, stamp_ns: int) -> bool:
     """Return whether more than one may send what is accepted: told in the last second."""
-    doubt: bool = _lasts(state.doubted_ns, stamp_ns)
-    return doubt
+    return _lasts(state.doubted_ns, stamp_ns)
 
 
 @kernel

@@ -57,8 +57,7 @@ SHORT_S = 0.03
 @kernel
 def blends(params: Record) -> bool:
     """Return whether any wheel's motor is to brake."""
-    blending: bool = params.blending[0] + params.blending[2] > 0.0
-    return blending
+    return params.blending[0] + params.blending[2] > 0.0
 
 
 @kernel
@@ -90,8 +89,7 @@ def _fading(params: Record, speed: float, decel: float) -> float:
     """Return what will be left of a motor's limit of now when it fades below `fade_speed`."""
     if not (params.fade_speed > 0.0 and speed > params.fade_speed and decel > 0.0):
         return 1.0
-    left: float = min(max(speed - AHEAD * decel, 0.0) / params.fade_speed, 1.0)
-    return left
+    return min(max(speed - AHEAD * decel, 0.0) / params.fade_speed, 1.0)
 
 
 @kernel

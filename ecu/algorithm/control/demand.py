@@ -57,10 +57,8 @@ def _position_for(params: Record, decel: float) -> float:
     x, y = params.pedal_position, params.pedal_decel
     for j in range(1, PEDAL_POINTS):
         if y[j] >= decel and y[j] > y[j - 1]:
-            found: float = x[j - 1] + (x[j] - x[j - 1]) * (decel - y[j - 1]) / (y[j] - y[j - 1])
-            return found
-    last: float = x[PEDAL_POINTS - 1]
-    return last
+            return x[j - 1] + (x[j] - x[j - 1]) * (decel - y[j - 1]) / (y[j] - y[j - 1])
+    return x[PEDAL_POINTS - 1]
 
 
 @kernel

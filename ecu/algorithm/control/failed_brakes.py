@@ -66,8 +66,7 @@ longitudinal grip, and some 20 degrees at the steering wheel."""
 def _owed_force(params: Record, law: Record, pressure: float, i: int) -> float:
     """Return the force [N] of a wheel's lining at a pressure [bar]."""
     lever: float = brake_gain(params, i) / params.wheel_radius[i]
-    force: float = lever * law.base[i] * max(BAR * pressure - params.push_out_pressure[i], 0.0)
-    return force
+    return lever * law.base[i] * max(BAR * pressure - params.push_out_pressure[i], 0.0)
 
 
 @kernel
@@ -133,10 +132,7 @@ def watch_brakes(
 @kernel
 def _lacks(inputs: Record, expected: float, zero: float, i: int) -> bool:
     reading = inputs.value[CALLIPER_PRESSURE + i] - zero
-    lacks: bool = (
-        expected > LEAST and usable(inputs, CALLIPER_PRESSURE + i) and reading < FOLLOWING * expected
-    )
-    return lacks
+    return expected > LEAST and usable(inputs, CALLIPER_PRESSURE + i) and reading < FOLLOWING * expected
 
 
 @kernel

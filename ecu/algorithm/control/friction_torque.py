@@ -104,5 +104,4 @@ def lagging_torque(params: Record, state: Record, law: Record, wanted: float, i:
     lever = brake_gain(params, i)
     push_out = params.push_out_pressure[i]
     missing = max(wanted - push_out, 0.0) - max(BAR * state.value[i] - push_out, 0.0)
-    torque: float = lever * friction_in_use(law, i) * missing
-    return torque
+    return lever * friction_in_use(law, i) * missing

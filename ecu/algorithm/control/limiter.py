@@ -73,8 +73,7 @@ def available_pressure(params: Record, inputs: Record) -> float:
 @kernel
 def _nominal_pressure(params: Record, torque: float, corner: int) -> float:
     """Return the pressure [Pa] beyond the push-out pressure that makes a torque at nominal friction."""
-    nominal: float = min(torque / (brake_gain(params, corner) * params.mu_nominal[corner]), BEYOND_ANY)
-    return nominal
+    return min(torque / (brake_gain(params, corner) * params.mu_nominal[corner]), BEYOND_ANY)
 
 
 @kernel

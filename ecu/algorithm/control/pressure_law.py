@@ -122,8 +122,7 @@ def compensated_pressure(params: Record, state: Record, pressure: float, corner:
         e = min(max((used - base) / base, -GREATEST_CHANGE), GREATEST_CHANGE)
         factor = 1.0 - e + e * e
     push_out: float = min(params.push_out_pressure[corner], pressure)
-    compensated: float = push_out + (pressure - push_out) * factor
-    return compensated
+    return push_out + (pressure - push_out) * factor
 
 
 @kernel

@@ -48,8 +48,7 @@ RETURN = 200.0 * BAR  # Pa/s
 
 @kernel
 def _flag(inputs: Record, place: int) -> bool:
-    told: bool = usable(inputs, place) and inputs.value[place] > 0.5
-    return told
+    return usable(inputs, place) and inputs.value[place] > 0.5
 
 
 @kernel

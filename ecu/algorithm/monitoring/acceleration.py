@@ -150,29 +150,25 @@ def _close_block(params: Record, state: Record) -> None:
 
 @kernel
 def _now(mean: Record, j: int) -> float:
-    now: float = (mean[0, j] + mean[1, j] + mean[2, j]) / 3.0
-    return now
+    return (mean[0, j] + mean[1, j] + mean[2, j]) / 3.0
 
 
 @kernel
 def _before(mean: Record, j: int) -> float:
-    before: float = 0.25 * (mean[4, j] + mean[5, j] + mean[6, j] + mean[7, j])
-    return before
+    return 0.25 * (mean[4, j] + mean[5, j] + mean[6, j] + mean[7, j])
 
 
 @kernel
 def _beside_wheels(mean: Record, j: int) -> float:
     """Return a - dv/dt now, v in column `j` [m/s^2]."""
-    beside: float = _now(mean, A) - (mean[0, j] - mean[2, j]) / (2.0 * BLOCK_S)
-    return beside
+    return _now(mean, A) - (mean[0, j] - mean[2, j]) / (2.0 * BLOCK_S)
 
 
 @kernel
 def _usually_beside_wheels(mean: Record, j: int) -> float:
     """Return a - dv/dt before, of a straight line through four blocks [m/s^2]."""
     change = (3.0 * (mean[4, j] - mean[7, j]) + mean[5, j] - mean[6, j]) / (10.0 * BLOCK_S)
-    beside: float = _before(mean, A) - change
-    return beside
+    return _before(mean, A) - change
 
 
 @kernel
@@ -222,8 +218,7 @@ def _beyond_any_road(state: Record) -> bool:
     mean = state.mean
     against_wheels = _beside_wheels(mean, W)
     if state.known_blocks < 8:
-        far: bool = abs(against_wheels) > SLOPE + NOISE * state.sigma
-        return far
+        return abs(against_wheels) > SLOPE + NOISE * state.sigma
     against_force = _now(mean, A) - _now(mean, F)
     denied = DENIED + FORCE * abs(_now(mean, F))
     up: bool = against_wheels > SLOPE and against_force > denied

@@ -39,8 +39,7 @@ def law_term(features: Record, k: int) -> float:
     heat: float = SCALE * features[TEMPERATURE]
     if k == 3:
         return heat
-    bent: float = max(heat - SCALE * KNOT_PLACES[k - 4], 0.0)
-    return bent
+    return max(heat - SCALE * KNOT_PLACES[k - 4], 0.0)
 
 
 @kernel
@@ -62,8 +61,7 @@ def _network(numbers: Record, features: Record) -> float:
             drive += numbers[place + i] * z
         total += numbers[2 * INPUTS + 2 + HIDDEN * (INPUTS + 1) + k] * math.tanh(drive)
         place += INPUTS + 1
-    found: float = numbers[2 * INPUTS] + numbers[2 * INPUTS + 1] * total
-    return found
+    return numbers[2 * INPUTS] + numbers[2 * INPUTS + 1] * total
 
 
 @kernel
@@ -83,8 +81,7 @@ def _table(numbers: Record, features: Record) -> float:
     at = 2 * NODES + i * NODES + j
     near = (1.0 - b) * numbers[at] + b * numbers[at + 1]
     far = (1.0 - b) * numbers[at + NODES] + b * numbers[at + NODES + 1]
-    found: float = (1.0 - a) * near + a * far
-    return found
+    return (1.0 - a) * near + a * far
 
 
 @kernel

@@ -22,8 +22,7 @@ def mass_of(params: Record, i: int, wear: float) -> float:
         missing = share * (wear - 0.5 * wear * wear / depth)
     else:
         missing = 0.5 * share * depth
-    mass: float = params.pad_mass[i] * (wear - missing)
-    return mass
+    return params.pad_mass[i] * (wear - missing)
 
 
 @kernel
@@ -34,11 +33,9 @@ def thickness_lost(params: Record, i: int, mass: float) -> float:
     if depth <= 0.0 or share <= 0.0:
         return equal
     if equal >= depth * (1.0 - 0.5 * share):
-        beyond: float = equal + 0.5 * share * depth
-        return beyond
+        return equal + 0.5 * share * depth
     rest = 1.0 - share
-    root: float = depth / share * (math.sqrt(max(rest * rest + 2.0 * share * equal / depth, 0.0)) - rest)
-    return root
+    return depth / share * (math.sqrt(max(rest * rest + 2.0 * share * equal / depth, 0.0)) - rest)
 
 
 @kernel
@@ -47,5 +44,4 @@ def area_share(params: Record, i: int, wear: float) -> float:
     depth, share = params.chamfer_depth[i], params.chamfer_share[i]
     if depth <= 0.0 or wear >= depth:
         return 1.0
-    left: float = 1.0 - share * (1.0 - max(wear, 0.0) / depth)
-    return left
+    return 1.0 - share * (1.0 - max(wear, 0.0) / depth)

@@ -50,8 +50,7 @@ FOLLOWS = 0.75  # of that
 def _over_ground(params: Record, inputs: Record, estimate: Record, i: int) -> float:
     """Return how fast a wheel turns over what the ground below it does."""
     turns = inputs.value[WHEEL_SPEED + i] * params.wheel_radius[i]
-    over: float = turns / corner_speed(params, estimate, estimate.speed, i)
-    return over
+    return turns / corner_speed(params, estimate, estimate.speed, i)
 
 
 @kernel

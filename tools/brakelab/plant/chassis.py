@@ -37,8 +37,7 @@ from brakelab.plant.records import DAMPER_KNOTS, GRAVITY
 def sprung_mass(params: Record) -> float:
     """Return the mass of the body [kg] (A.1: m_s = m_v - sum m_us)."""
     unsprung = params.unsprung_mass
-    body: float = params.mass - unsprung[0] - unsprung[1] - unsprung[2] - unsprung[3]
-    return body
+    return params.mass - unsprung[0] - unsprung[1] - unsprung[2] - unsprung[3]
 
 
 @kernel
@@ -47,8 +46,7 @@ def sprung_front_length(params: Record) -> float:
     unsprung = params.unsprung_mass
     base = params.front_length + params.rear_length
     rear = (unsprung[2] + unsprung[3]) * base
-    length: float = (params.mass * params.front_length - rear) / sprung_mass(params)
-    return length
+    return (params.mass * params.front_length - rear) / sprung_mass(params)
 
 
 @kernel
@@ -60,8 +58,7 @@ def damper_force(params: Record, wheel: int, speed: float) -> float:
         k += 1
     low = params.damper_force[wheel, k - 1]
     slope = (params.damper_force[wheel, k] - low) / (knots[k] - knots[k - 1])
-    force: float = low + slope * (speed - knots[k - 1])
-    return force
+    return low + slope * (speed - knots[k - 1])
 
 
 @kernel

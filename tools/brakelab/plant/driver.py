@@ -84,8 +84,7 @@ def pedal_for(decel: float) -> float:
 
     60 % gives about 4 m/s^2 (section 5.5). Assumption: progressive, 100 % gives 9.4.
     """
-    position: float = min(60.0 * (max(decel, 0.0) / 4.0) ** 0.6, 100.0)
-    return position
+    return min(60.0 * (max(decel, 0.0) / 4.0) ** 0.6, 100.0)
 
 
 @kernel

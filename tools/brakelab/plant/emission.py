@@ -84,8 +84,7 @@ def emission_rate(row: Record, power: float, speed: float, heat: float) -> float
     contact = heat + row[FLASH] * power
     ultrafine = row[ULTRAFINE] / (1.0 + math.exp(-(contact - row[HOT_FROM]) / row[HOT_WIDTH]))
     shape = (power / REFERENCE_POWER) ** row[BY_POWER] * (speed / REFERENCE_SPEED) ** row[BY_SPEED]
-    rate: float = row[RATE] * power * shape * (row[COARSE] + ultrafine)
-    return rate
+    return row[RATE] * power * shape * (row[COARSE] + ultrafine)
 
 
 @kernel

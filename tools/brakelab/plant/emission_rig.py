@@ -65,8 +65,7 @@ def _asked(car: Record, wheel: int, speed: float, accel: float, grade: float, ov
     length = car.front_length + car.rear_length
     transfer = car.cog_height * max(-accel, 0.0) / GRAVITY
     share = (car.rear_length + transfer if wheel < 2 else car.front_length - transfer) / length
-    asked: float = 0.5 * share * car.mass * brakes * car.free_radius[wheel]
-    return asked
+    return 0.5 * share * car.mass * brakes * car.free_radius[wheel]
 
 
 @kernel

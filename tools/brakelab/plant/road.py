@@ -50,8 +50,7 @@ def value_at(table: NDArray[np.float64], place: float, column: int) -> float:
         else:
             high = middle
     part = (place - table[low, 0]) / (table[high, 0] - table[low, 0])
-    value: float = table[low, column] + part * (table[high, column] - table[low, column])
-    return value
+    return table[low, column] + part * (table[high, column] - table[low, column])
 
 
 @kernel

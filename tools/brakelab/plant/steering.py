@@ -40,8 +40,7 @@ HANDS_OFF: Final = Steering(np.empty((0, 2)), np.empty((0, 2)))
 def understeer_gradient(params: Record) -> float:
     """Return EG [rad per m/s^2]; the stiffnesses are per load, so masses and lengths cancel."""
     front, rear = params.cornering_stiffness[0], params.cornering_stiffness[2]
-    gradient: float = (1.0 / front - 1.0 / rear) / GRAVITY
-    return gradient
+    return (1.0 / front - 1.0 / rear) / GRAVITY
 
 
 @kernel

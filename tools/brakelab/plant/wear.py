@@ -61,22 +61,19 @@ def wear_rate(row: Record, force: float, speed: float, pressure: float, heat: fl
     contact = heat + row[FLASH] * work
     activated = 1.0 + row[HOT] / (1.0 + math.exp(-(contact - row[HOT_FROM]) / row[HOT_WIDTH]))
     shape = (pressure / REFERENCE_PRESSURE) ** row[BY_PRESSURE] * (speed / REFERENCE_SPEED) ** row[BY_SPEED]
-    rate: float = MEGA * row[RATE] * work * shape * activated
-    return rate
+    return MEGA * row[RATE] * work * shape * activated
 
 
 @kernel
 def running_in(row: Record, mass: float) -> float:
     """Return the factor on the wear of a lining that has lost `mass` [g]."""
-    factor: float = 1.0 + row[RUN_IN] * math.exp(-mass / row[RUN_IN_MASS])
-    return factor
+    return 1.0 + row[RUN_IN] * math.exp(-mass / row[RUN_IN_MASS])
 
 
 @kernel
 def pad_wear(row: Record, mass: float) -> float:
     """Return the wear [mm] that goes with `mass` [g] of both pads."""
-    wear: float = mass / (2.0 * row[DENSITY] * row[AREA])
-    return wear
+    return mass / (2.0 * row[DENSITY] * row[AREA])
 
 
 @kernel

@@ -68,8 +68,7 @@ def predict_balance(params: Record, state: Record, braking: bool) -> float:
     if braking:
         left += x[OVERRUN]
         h[OVERRUN] = 1.0
-    result: float = left
-    return result
+    return left
 
 
 @kernel

@@ -31,8 +31,7 @@ from ecu.jit import Record, kernel
 def friction_now(state: Record, i: int) -> float:
     """Return ln of friction over nominal: what the middle of the last window had, moved on by its rate."""
     ahead = 0.5 * WINDOW_S + (0.0 if state.closed else state.window.time)
-    moved: float = state.x[LEVEL + i] + state.x[CHANGE + i // 2] + state.x[RATE] * ahead
-    return moved
+    return state.x[LEVEL + i] + state.x[CHANGE + i // 2] + state.x[RATE] * ahead
 
 
 @kernel

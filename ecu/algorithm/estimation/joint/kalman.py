@@ -50,8 +50,7 @@ def drift_speed(state: Record, time: float) -> None:
 
 @kernel
 def _corrects(free: Record, i: int, only_speed: bool) -> bool:
-    allowed: bool = free[i] != 0 and (not only_speed or i in (V, SLOPE))
-    return allowed
+    return free[i] != 0 and (not only_speed or i in (V, SLOPE))
 
 
 @kernel

@@ -11,8 +11,7 @@ SKEW_FOLLOWED, SKEW_REPORTED = 0.5, 3.0  # windows between pressure and force; a
 def skew(state: Record, i: int) -> float:
     """Return what a pressure [bar] may be off because it acts earlier or later than it is told."""
     windows = SKEW_FOLLOWED if follows(state.pressures, i) else SKEW_REPORTED
-    apart: float = windows * (state.smooth_pressure[i] - state.last_smooth[i])
-    return apart
+    return windows * (state.smooth_pressure[i] - state.last_smooth[i])
 
 
 @kernel

@@ -123,8 +123,7 @@ def _learning_forbidden(params: Record, state: Record, inputs: Record, braking: 
         brakes += brake_torque(params, state, i, w.pressure[i])
     against = braking and (driver_accelerates(inputs) or drives_against(motors, brakes))
     unknown = braking and (_axle_unknown(inputs, 0) or _axle_unknown(inputs, 2))
-    forbidden: bool = against or unknown or others_brake(inputs)
-    return forbidden
+    return against or unknown or others_brake(inputs)
 
 
 @kernel
@@ -143,8 +142,7 @@ def _watch_release(state: Record, braking: bool) -> None:
 def _accelerates(state: Record) -> bool:
     """Return whether acceleration varies: what does not cannot tell mass from bias, drag and slope."""
     accel = state.window.accel
-    varies: bool = abs(accel) > VARIES_FROM and abs(accel - state.mean_accel) > VARIES
-    return varies
+    return abs(accel) > VARIES_FROM and abs(accel - state.mean_accel) > VARIES
 
 
 @kernel

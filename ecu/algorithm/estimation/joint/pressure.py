@@ -47,5 +47,4 @@ def follow_demand(state: Record, i: int, demand: float, dt: float) -> None:
 @kernel
 def follows(state: Record, i: int) -> bool:
     """Return whether a wheel's pressure has followed the demand for a while."""
-    agreed: bool = state.agreed_s[i] > AGREED_S
-    return agreed
+    return state.agreed_s[i] > AGREED_S

@@ -254,8 +254,7 @@ def pressure_change(state: Record, left: int) -> float:
     """Return the relative change of an axle's pressure since the last window."""
     before = state.last_pressure[left] + state.last_pressure[left + 1]
     now = state.window.pressure[left] + state.window.pressure[left + 1]
-    change: float = (now - before) / (0.5 * abs(now + before) + 20.0)
-    return change
+    return (now - before) / (0.5 * abs(now + before) + 20.0)
 
 
 @kernel

@@ -68,8 +68,7 @@ def slope(state: Record, i: int) -> float:
 @kernel
 def at_common_time(state: Record, i: int) -> float:
     """Return channel `i` at the common time."""
-    value: float = state.value[i] - slope(state, i) * (state.at[i] - state.common)
-    return value
+    return state.value[i] - slope(state, i) * (state.at[i] - state.common)
 
 
 @kernel

@@ -71,8 +71,7 @@ def radius(params: Record, state: Record, i: int, load: float) -> tuple[float, f
 @kernel
 def friction(params: Record, state: Record, i: int) -> float:
     """Return the lining friction of a wheel."""
-    mu: float = params.mu_nominal[i] * math.exp(state.x[LEVEL + i] + state.x[CHANGE + i // 2])
-    return mu
+    return params.mu_nominal[i] * math.exp(state.x[LEVEL + i] + state.x[CHANGE + i // 2])
 
 
 @kernel
@@ -84,8 +83,7 @@ def peak_adhesion(state: Record, relative: float) -> float:
     """
     y = state.x[PEAK]
     at_rest: float = NOMINAL_PEAK * max(1.0 - 4.0 * y, LEAST_OF_PEAK) ** -0.25
-    peak: float = at_rest * relative ** (state.x[PEAK_LOAD] - PEAK_DEGRESSION)
-    return peak
+    return at_rest * relative ** (state.x[PEAK_LOAD] - PEAK_DEGRESSION)
 
 
 @kernel
@@ -94,8 +92,7 @@ def brake_torque(params: Record, state: Record, i: int, pressure: float) -> floa
     if pressure == 0.0:
         return 0.0
     acts = pressure - state.x[OFFSET + i // 2]
-    torque: float = brake_gain_per_bar(params, i) * friction(params, state, i) * acts
-    return torque
+    return brake_gain_per_bar(params, i) * friction(params, state, i) * acts
 
 
 @kernel
@@ -110,5 +107,4 @@ def car_force(params: Record, state: Record, accel: float) -> float:
     """Return the force of all tyres along the car [N] at a specific force [m/s^2], with what is learned."""
     x = state.x
     drag = math.exp(x[DRAG]) * params.drag_area * x[V] * abs(x[V])
-    force: float = math.exp(x[MASS]) * (params.mass * (accel - x[BIAS]) + drag)
-    return force
+    return math.exp(x[MASS]) * (params.mass * (accel - x[BIAS]) + drag)

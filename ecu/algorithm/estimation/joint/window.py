@@ -56,8 +56,7 @@ def open_window(state: Record) -> None:
 @kernel
 def speed_change(state: Record, motion: Record) -> float:
     """Return dv/dt [m/s^2] by the accelerometer and what is known of its bias and the slope."""
-    change: float = motion.accel_x - state.x[BIAS] - state.x[SLOPE] + motion.yaw_rate * motion.lateral_speed
-    return change
+    return motion.accel_x - state.x[BIAS] - state.x[SLOPE] + motion.yaw_rate * motion.lateral_speed
 
 
 @kernel

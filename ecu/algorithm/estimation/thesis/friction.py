@@ -218,8 +218,7 @@ def _systematic(params: Record, wheels: Record, speed: Record, i: int) -> float:
     shift = math.sqrt(speed.p_vv) / max(speed.speed, 1.0) * abs(1.0 / own - 1.0 / mean)
     curve = TYRE_CURVE * own
     constant = params.sigma_mass**2 + params.sigma_slip_stiffness_ratio**2
-    total: float = constant + zero**2 + shift**2 + curve**2
-    return total
+    return constant + zero**2 + shift**2 + curve**2
 
 
 @kernel

@@ -40,8 +40,7 @@ def longitudinal_slip(rolling_speed: float, ground_speed: float) -> float:
 def initial_stiffness(params: Record, corner: int, load: float) -> float:
     """Return the slip stiffness dF_L / dlambda [N] of a wheel at no slip and a load [N]."""
     relative = load / params.static_load[corner]
-    stiffness: float = params.slip_stiffness[corner] * load * relative ** -params.stiffness_degression[corner]
-    return stiffness
+    return params.slip_stiffness[corner] * load * relative ** -params.stiffness_degression[corner]
 
 
 @kernel

@@ -51,8 +51,7 @@ def adhesion(row: Record, temperature: float) -> float:
     while k < KNOT + KNOTS - 2 and temperature >= row[k + 1]:
         k += 1
     part = min(max((temperature - row[k]) / (row[k + 1] - row[k]), 0.0), 1.0)
-    kappa: float = row[k + KNOTS] + part * (row[k + KNOTS + 1] - row[k + KNOTS])
-    return kappa
+    return row[k + KNOTS] + part * (row[k + KNOTS + 1] - row[k + KNOTS])
 
 
 @kernel
