@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.identification.measurement_files import check_celsius, read_columns, read_manifest
-from brakelab.replay.wear import regressors_of
+from brakelab.results.wear import regressors_of
 from ecu.errors import UserError
 from ecu.settings.pad import Pad
 

@@ -14,8 +14,8 @@ from brakelab.logs.formats import read_frames
 from brakelab.mapping.names import converts, words
 from brakelab.mapping.physics import RADIUS, Found, propose
 from brakelab.mapping.series import Series, read_series
-from brakelab.replay.command import WIDTH
 from brakelab.replay.quality import Findings, damage_lines
+from brakelab.results.console import WIDTH
 from ecu.bus.database import load_database
 from ecu.bus.signal_map import load_signal_map
 from ecu.bus.units import spelled

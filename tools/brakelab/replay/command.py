@@ -5,11 +5,9 @@ from collections.abc import Sequence
 from contextlib import closing
 from itertools import chain
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 
 from brakelab.logs.formats import kind_of
 from brakelab.replay.drive import replay_drive
@@ -19,6 +17,7 @@ from brakelab.replay.progress import progress_bar
 from brakelab.replay.quality import Findings, quality_counts, quality_lines
 from brakelab.replay.source import load_source, map_unused
 from brakelab.replay.summary import brakings_table, prediction_lines, taps
+from brakelab.results.console import new_console
 from brakelab.results.files import ResultWriter, brakes_path
 from brakelab.results.mdf import SUFFIX
 from brakelab.results.outputs import check_outputs
@@ -34,8 +33,6 @@ from ecu.recording.recorder import read_recording
 from ecu.recording.restored import restored
 from ecu.recording.store import open_store, save
 from ecu.settings.config import Config, config_hash, load_config, new_params, store_key
-
-WIDTH: Final = 110  # columns of the table where no terminal says how wide it is
 
 
 def replay(
@@ -133,9 +130,7 @@ def _tell(
         about = (quality_lines(found, plan), needed_lines(found), lacking_line(found), fault_lines(found))
         for line in chain.from_iterable(about):
             print(line, file=sys.stderr)
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=WIDTH)
+    console = new_console()
     brakings = writer.brakes.rows
     short = taps(brakings)
     if len(brakings) > short * len(CORNERS):

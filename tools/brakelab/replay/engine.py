@@ -14,19 +14,17 @@ from numpy.typing import NDArray
 
 from brakelab.logs.signal_file import SampleBlock
 from brakelab.replay.seen import look_at, new_seen
+from brakelab.results.row import MEASURED_INPUTS, N_ROW
 from ecu.algorithm.step import new_state, step
 from ecu.bus.freshness import accept, begin_cycle, end_cycle
 from ecu.bus.receive import ReceivePlan, Reception, receive
 from ecu.contract.records import CYCLE, FRAME, INPUTS, OUTPUTS, RecordArray, new_record, output_vector
-from ecu.contract.signals import ACCELERATOR_POSITION, CYCLE_NS, MOTOR_TORQUE, N_OUTPUTS, USABLE
+from ecu.contract.signals import CYCLE_NS, N_OUTPUTS, USABLE
 from ecu.jit import Record, kernel
 
 Vector = NDArray[np.float64]
 Block = TypeVar("Block")
 
-MEASURED_INPUTS: Final = (*range(MOTOR_TORQUE, MOTOR_TORQUE + 4), ACCELERATOR_POSITION)
-N_ROW: Final = N_OUTPUTS + len(MEASURED_INPUTS)
-"""A row: the outputs as a vector, then `MEASURED_INPUTS` as received, NaN where not usable."""
 BLOCK_CYCLES: Final = 16384
 
 _EVERYTHING: Final = 1 << 62

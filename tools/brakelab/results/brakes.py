@@ -13,9 +13,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from brakelab.replay.dust import dust_of
-from brakelab.replay.wear import wear_of
+from brakelab.results.dust import dust_of
 from brakelab.results.prediction import STANDING, Vector, corners, left_out, mean, predict
+from brakelab.results.wear import wear_of
 from ecu.algorithm.monitoring.wear import REGRESSORS
 from ecu.contract.params import BAR
 from ecu.contract.records import RecordArray

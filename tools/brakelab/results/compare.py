@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from brakelab.replay.command import WIDTH
+from brakelab.results.console import new_console
 from brakelab.results.files import Result, brakes_path, read_result
 from ecu.contract.signals import CORNERS, without_corner
 from ecu.errors import UserError
@@ -144,9 +144,7 @@ def compare(a: Path, b: Path) -> int:
     Raises:
         UserError: a file cannot be read, is no result, or the two have no row in common.
     """
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=WIDTH)
+    console = new_console()
     matters = 0
     first, second = read_result(a), read_result(b)
     for path, result in ((a, first), (b, second)):

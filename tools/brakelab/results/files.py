@@ -16,9 +16,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from brakelab.replay.engine import MEASURED_INPUTS
 from brakelab.results.brakes import BRAKE_UNITS, BrakeBook, BrakeRow
 from brakelab.results.mdf import SUFFIX, load_asammdf, refuse_mdf, write_mdf
+from brakelab.results.row import MEASURED_INPUTS
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import INPUT_SIGNALS, OUTPUT_COLUMNS, OUTPUT_SIGNALS, column_names
 from ecu.errors import UserError

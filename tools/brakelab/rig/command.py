@@ -15,6 +15,7 @@ from rich.console import Console
 
 from brakelab.report.command import report
 from brakelab.report.drive import Drive
+from brakelab.results.console import new_console
 from brakelab.rig.live import Bus, choose_bus, drive, make_folder, named_bus
 from brakelab.rig.outcome import Outcome, Undisturbed, outcome, stopping_distance
 from brakelab.rig.page import summary, write_page, write_tables
@@ -91,9 +92,7 @@ def rig(
     finally:
         if meeting is not None:
             meeting.close()
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=WIDTH)
+    console = new_console(WIDTH)
     console.print(summary(outcomes))
     write_tables(outcomes, out)
     page = out / "rig.html"

@@ -4,9 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from rich.console import Console
-
 from brakelab.replay.progress import progress_bar
+from brakelab.results.console import new_console
 from brakelab.results.outputs import check_outputs
 from brakelab.simulation.observer import with_observer
 from brakelab.simulation.scenario import Scenario, load_scenario
@@ -31,7 +30,6 @@ LATER_SESSIONS: Final = ("fixed-decel", "fade")
 """Sections 6.2.2 and 6.2.3, validation."""
 TABLE_6_1: Final = "12.7 to 7.6 % in front (40 % less), 20.8 to 16.1 % at the rear (22 % less)"
 """Means over its six runs."""
-WIDTH: Final = 110  # columns of the table where no terminal says how wide it is
 
 
 class Budget(NamedTuple):
@@ -167,9 +165,7 @@ def _tell(out: Path, of: str, rows: Sequence[Row], seeds: int) -> None:
         f"Means over brake applications and {seeds} cars; other cars: none of those that were tuned on, in "
         f"closed loop. The thesis on a car of its own, Table 6.1: {TABLE_6_1}."
     )
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=WIDTH)
+    console = new_console()
     console.print(f"brake-ecu tune, {of}", highlight=False)
     show(console, Table("Friction by Observer 2: nRMSE [%]", columns, lines, below))
     console.print(f"written: {out}", highlight=False)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brakelab.replay.wear import regressors_of, wear_of
+from brakelab.results.wear import regressors_of, wear_of
 from brakelab.simulation.closed_loop import new_loop, run_blocks
 from brakelab.simulation.scenario import load_scenario
 from ecu.contract.signals import OUTPUT

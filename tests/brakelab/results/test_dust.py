@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brakelab.replay.dust import dust_of
+from brakelab.results.dust import dust_of
 from ecu.contract.dust import LAW_TERMS
 from ecu.contract.signals import N_OUTPUTS, OUTPUT
 from ecu.settings.config import load_config, new_params

@@ -1,0 +1,8 @@
+"""A row of a result: the outputs as a vector, then measured inputs as received, NaN where not usable."""
+
+from typing import Final
+
+from ecu.contract.signals import ACCELERATOR_POSITION, MOTOR_TORQUE, N_OUTPUTS
+
+MEASURED_INPUTS: Final = (*range(MOTOR_TORQUE, MOTOR_TORQUE + 4), ACCELERATOR_POSITION)
+N_ROW: Final = N_OUTPUTS + len(MEASURED_INPUTS)
