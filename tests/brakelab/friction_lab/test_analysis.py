@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from brakelab.friction_lab.analysis import history_effect, principal_components
+from brakelab.friction_lab.analysis import history_effect, levels, principal_components
 from brakelab.friction_lab.stops import Stops
 
 
@@ -56,6 +56,15 @@ def test_levels_explain_what_a_line_does_not(stops: Stops) -> None:
     found = principal_components(replace(made, mean=made.mean - 0.05 * scaled**2))
     assert found.correlation[2] ** 2 < 0.01
     assert found.any_form[2] > 0.95
+
+
+def test_levels_are_told_apart_wherever_they_lie() -> None:
+    """Speeds about 13.5 m/s, where rounding would make two of them."""
+    random = np.random.default_rng(0)
+    speed, bar, temperature = np.array(list(product((6.7, 13.5, 14.6), (10.0, 20.0), (50.0, 75.0)))).T
+    noise = 0.02 * random.standard_normal(len(speed))
+    found = levels(np.stack([speed + noise, 1e5 * (bar + noise), temperature + 50.0 * noise], axis=1))
+    assert found.tolist() == [list(place) for place in product(range(3), range(2), range(2))]
 
 
 @pytest.mark.parametrize("effect", [0.0, 0.03])

@@ -12,7 +12,8 @@ def test_a_sound_recording_passes(recording: Recording, columns: Columns) -> Non
     numbers = refuse_nonsense(recording, columns, "cpc.csv")
     assert numbers.friction == pytest.approx(0.44, abs=0.05)
     assert numbers.inertia == pytest.approx(129.1, rel=0.02)
-    assert numbers.heating == pytest.approx(2.111e-4, rel=0.12)
+    # The thermocouple lags, the air cools, and the heat capacity rises: all three heat the disc less.
+    assert numbers.heating == pytest.approx(2.111e-4, rel=0.18)
 
 
 @pytest.mark.parametrize(
@@ -56,3 +57,16 @@ def test_a_temperature_is_doubted_by_what_the_energy_heats(
 def test_kelvin_is_no_disc(recording: Recording, columns: Columns) -> None:
     with pytest.raises(UserError, match="no brake disc is that"):
         refuse_nonsense(recording._replace(temperature=recording.temperature + 800.0), columns, "cpc.csv")
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e-3])
+def test_milliseconds_are_no_seconds(recording: Recording, columns: Columns, factor: float) -> None:
+    with pytest.raises(UserError, match=r"time, .* s between samples: check its unit"):
+        refuse_nonsense(recording._replace(time=recording.time * factor), columns, "cpc.csv")
+
+
+def test_kelvin_that_a_disc_could_have_is_known_by_its_coldest(
+    recording: Recording, columns: Columns
+) -> None:
+    with pytest.raises(UserError, match='reads like K: give the unit "K"'):
+        refuse_nonsense(recording._replace(temperature=recording.temperature + 273.15), columns, "cpc.csv")

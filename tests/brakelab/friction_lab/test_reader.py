@@ -4,6 +4,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from brakelab.friction_lab.columns import Columns, columns_text
@@ -36,9 +38,50 @@ def test_a_stranger_s_units_become_si(tmp_path: Path, recording: Recording, stra
 
 
 def test_damaged_rows_are_left_out_and_counted(tmp_path: Path, recording: Recording, strange: Write) -> None:
-    read = read_recording(strange(tmp_path, recording, damaged=True))
-    assert "3 rows left out" in read.damaged
+    path = strange(tmp_path, recording, damaged=True)
+    read = read_recording(path)
+    assert read.damaged == f"{path}: 3 rows left out, first: line 52 (2 cells instead of 5)"
     assert len(read.recording.time) == len(recording.time) - 3
+
+
+@pytest.mark.parametrize(
+    ("row", "spoilt", "place"),
+    [
+        (10, "1;2", "line 12 (2 cells instead of 5)"),
+        (20, ";1;1;1;1", "line 22 (Zeit is no number)"),
+        (30, "1;1;off;1;1", "line 32 (M_B is no number)"),
+        (40, "0;1;1;1;1", "line 42 (time does not rise)"),
+    ],
+)
+def test_a_damaged_row_is_named_as_an_editor_counts(
+    tmp_path: Path, recording: Recording, strange: Write, row: int, spoilt: str, place: str
+) -> None:
+    """The address holds behind an empty line too."""
+    path = strange(tmp_path, recording)
+    lines = path.read_text("utf-8").splitlines()
+    lines[row + 1] = spoilt
+    path.write_text("\n".join(lines) + "\n", "utf-8")
+    assert read_recording(path).damaged == f"{path}: 1 row left out, first: {place}"
+    path.write_text("\n".join([lines[0], "", *lines[1:]]) + "\n", "utf-8")
+    assert read_recording(path).damaged.endswith(place.replace(str(row + 2), str(row + 3)))
+
+
+def test_a_column_of_words_in_parquet_is_named(tmp_path: Path, columns: Columns) -> None:
+    path = tmp_path / "own.parquet"
+    names = [name for name, _ in columns.columns.model_dump().values()]
+    pq.write_table(pa.table({name: ["a", "b"] for name in names}), path)
+    path.with_suffix(".toml").write_text(columns_text(columns), "utf-8")
+    with pytest.raises(UserError, match="time_s: is string, not numbers"):
+        read_recording(path)
+
+
+def test_a_row_of_parquet_is_named(tmp_path: Path, recording: Recording, lining: Lining) -> None:
+    path = tmp_path / "own.parquet"
+    write_recording(path, recording, lining, 129.0)
+    table = pq.read_table(path).to_pydict()
+    table["torque_Nm"][7] = float("nan")
+    pq.write_table(pa.table(table), path)
+    assert read_recording(path).damaged.endswith("1 row left out, first: row 8 (torque_Nm is no number)")
 
 
 def test_channels_of_mdf4(tmp_path: Path, recording: Recording, columns: Columns) -> None:

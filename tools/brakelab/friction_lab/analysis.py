@@ -16,8 +16,8 @@ from brakelab.friction_lab.stops import Stops
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-LEVEL_STEPS = (1.0, 5e5, 12.5)
-"""Rounding of initial speed (sliding, m/s), pressure (Pa) and initial temperature (K) to levels."""
+LEVEL_GAPS = (0.4, 2.5e5, 6.0)
+"""Initial speeds (sliding, m/s), pressures (Pa), initial temperatures (K) this far apart are two levels."""
 
 
 class Components(NamedTuple):
@@ -45,6 +45,16 @@ def inputs_of(stops: Stops) -> Matrix:
     return np.stack([stops.start_speed, stops.held_pressure, stops.start_temperature], axis=1)
 
 
+def levels(inputs: Matrix) -> NDArray[np.int64]:
+    """Return the number of the level of each input, shape as `inputs`, counted from the least."""
+    out = np.empty(inputs.shape, np.int64)
+    for place, gap in enumerate(LEVEL_GAPS):
+        order = np.argsort(inputs[:, place], kind="stable")
+        steps = np.diff(inputs[order, place], prepend=inputs[order[0], place]) > gap
+        out[order, place] = np.cumsum(steps)
+    return out
+
+
 def principal_components(stops: Stops) -> Components:
     """Return the components of the correlation matrix of inputs and mean friction (B.3)."""
     data = np.column_stack([inputs_of(stops), stops.mean])
@@ -58,8 +68,7 @@ def principal_components(stops: Stops) -> Components:
     shares = values / values.sum()
     with_friction = correlations[3, :3]
     inverse = np.linalg.inv(correlations[:3, :3])
-    levels = [np.round(column / step) for column, step in zip(inputs_of(stops).T, LEVEL_STEPS, strict=True)]
-    any_form = np.array([_explained(stops.mean, level) for level in levels])
+    any_form = np.array([_explained(stops.mean, level) for level in levels(inputs_of(stops)).T])
     return Components(
         vectors[:, :3],
         shares,

@@ -7,7 +7,7 @@ inertia.
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,7 +90,7 @@ def candidates(stops: Stops, brake: RigBrake, own: Sequence[str] = ()) -> list[C
         _surface(mass),
         _ostermeyer(mass),
         _revised(mass),
-        _ilvo(mass),
+        ilvo(mass),
         _bounded(stops, mass),
     ]
     laws = [*shipped, *(own_candidate(code, mass) for code in own)]
@@ -216,8 +216,8 @@ DEBRIS: Final = Free("b", "s", 0.0, 0.1)
 HEAT: Final = Free("c", "m²/(N K s)", -1e-9, 2e-9)
 
 
-def _ilvo(mass: float) -> Candidate:
-    """3.22c as corrected in `plant/friction/ilvo.py`, kelvin throughout, the stress on the pad (set R1)."""
+def ilvo(mass: float, stress: Literal["pad", "line"] = "pad", heat_zero: float = 0.0) -> Candidate:
+    """Return 3.22c as corrected in `plant/friction/ilvo.py`; by default its two open choices are R1's."""
     kappa = (Free("kappa_0", "–", -0.6, 1.0), Free("kappa_1", "1/K", -2e-3, 2e-3))
 
     def law(values: Sequence[float]) -> Law:
@@ -230,8 +230,8 @@ def _ilvo(mass: float) -> Candidate:
             speed_gain=-a,
             debris=b,
             heat_loss=c,
-            stress="pad",
-            heat_zero=0.0,
+            stress=stress,
+            heat_zero=heat_zero,
         )
 
     limit = "contact vanishes when hot and long pressed; knows no pressure; not for blended braking"

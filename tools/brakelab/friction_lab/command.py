@@ -12,15 +12,18 @@ from brakelab.friction_lab.candidates import candidates
 from brakelab.friction_lab.columns import Columns
 from brakelab.friction_lab.dynamometer import new_bench, run_programme
 from brakelab.friction_lab.fitting import fit
+from brakelab.friction_lab.heat_capacity import heat_capacity
 from brakelab.friction_lab.identification import identify
 from brakelab.friction_lab.lining_file import write_lining
 from brakelab.friction_lab.plausibility import refuse_nonsense
 from brakelab.friction_lab.reader import read_recording
 from brakelab.friction_lab.recording import Recording, joined, write_recording
+from brakelab.friction_lab.report_page import write_report
 from brakelab.friction_lab.sections import has_sections, load_sequence, means_table, run_sequence
 from brakelab.friction_lab.stops import Stops, find_stops
 from brakelab.friction_lab.tables import (
     component_table,
+    heat_line,
     history_line,
     law_tables,
     number_table,
@@ -85,12 +88,14 @@ def run(
 
 
 def look(data: list[Path], columns: Path | None) -> int:
-    """Print the principal components of a programme's stops and the effect of the stop before. Returns 0."""
-    stops = _read(data, columns).stops
+    """Print what moves friction in a programme, the effect of the stop before, the disc's heat. Returns 0."""
+    measured = _read(data, columns)
+    stops = measured.stops
     _need(stops, data[0])
     console = Console()
     show(console, component_table(principal_components(stops)))
     console.print(history_line(history_effect(stops)), highlight=False)
+    console.print(heat_line(heat_capacity(stops, measured.columns)), highlight=False)
     return 0
 
 
@@ -103,6 +108,8 @@ def friction(
     own: tuple[str, ...] = (),
 ) -> int:
     """Identify all laws, print them, and write them with the chosen one as a lining file. Returns 0.
+
+    A page with the law's fit is written beside it, with the ending .html.
 
     `data` are recordings of one brake; `columns` describes them all, default: the file beside each;
     `held_out` is a recording that the choice is made by; `own` are laws of one's own.
@@ -134,7 +141,9 @@ def friction(
     for table in tables:
         show(Console(), table)
     write_lining(out, measured.columns, measured.heating, identified)
-    _tell(f"written: {out}, the law chosen under the name SIM")
+    page = out.with_suffix(".html")
+    write_report(page, measured.columns, measured.stops, identified, tables)
+    _tell(f"written: {out}, the law chosen under the name SIM; {page}, how well and how far it holds")
     return 0
 
 

@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from brakelab.friction_lab.candidates import candidates
 from brakelab.friction_lab.fitting import fit, replayed
@@ -19,7 +20,8 @@ Estimator = Callable[[Stops], Vector]
 """Friction of every block, shape (blocks,), from pressure, speed and temperature."""
 
 STEADY: Final = 0.03  # relative change of pressure in a block that passes as quasi-static
-CONSTANT, SURFACE, OSTERMEYER, NETWORK = "constant", "response surface", "Ostermeyer", "ANN"
+CONSTANT, SURFACE, LUGRE = "constant", "response surface", "static LuGre"
+OSTERMEYER, NETWORK = "Ostermeyer", "ANN"
 
 
 def block_inputs(stops: Stops) -> NDArray[np.float64]:
@@ -29,13 +31,18 @@ def block_inputs(stops: Stops) -> NDArray[np.float64]:
     return np.stack([column[at].mean(axis=1) for column in columns], axis=1)
 
 
-def response_surface(stops: Stops) -> Estimator:
-    """Return the second-order surface over speed and pressure, from quasi-static blocks."""
+def quasi_static(stops: Stops) -> NDArray[np.bool_]:
+    """Return which blocks pass as quasi-static, shape (blocks,), as 2.4.1 takes them after SAE J2707."""
     at = stops.block_first[:, None] + np.arange(stops.per_block)
     half = stops.per_block // 2
     pressure = stops.pressure[at]
     change = np.abs(pressure[:, half:].mean(axis=1) / pressure[:, :half].mean(axis=1) - 1.0)
-    steady = change < STEADY
+    return np.asarray(change < STEADY)
+
+
+def response_surface(stops: Stops) -> Estimator:
+    """Return the second-order surface over speed and pressure, from quasi-static blocks."""
+    steady = quasi_static(stops)
     known = block_inputs(stops)[steady, :2]
     low, high = known.min(axis=0), known.max(axis=0)
 
@@ -45,9 +52,30 @@ def response_surface(stops: Stops) -> Estimator:
         v, p = ((np.clip(inputs, low, high) - middle) / scale).T
         return np.stack([np.ones(len(v)), v, p, v * v, v * p, p * p], axis=1)
 
-    found, _, _, _ = np.linalg.lstsq(terms(known), stops.mu[steady], rcond=None)
-    weights: Vector = found
+    weights = np.linalg.lstsq(terms(known), stops.mu[steady], rcond=None)[0]
     return lambda other: np.asarray(terms(block_inputs(other)[:, :2]) @ weights)
+
+
+def static_lugre(stops: Stops) -> Estimator:
+    """Return the steady sliding friction of the LuGre model, from quasi-static blocks.
+
+    mu = mu_C + (mu_S - mu_C) exp(-(v / v_S)^2) + sigma_2 v: Coulomb, static, Stribeck's speed, viscous.
+    """
+    steady = quasi_static(stops)
+    speed, mu = block_inputs(stops)[steady, 0], stops.mu[steady]
+    mean, fast = float(mu.mean()), float(speed.max())
+
+    def law(numbers: Vector, v: Vector) -> Vector:
+        coulomb, static, stribeck, viscous = numbers
+        return np.asarray(coulomb + (static - coulomb) * np.exp(-((v / stribeck) ** 2)) + viscous * v)
+
+    bounds = ([0.0, 0.0, 0.05 * fast, -mean / fast], [2.0 * mean, 3.0 * mean, 2.0 * fast, mean / fast])
+    fits = [
+        least_squares(lambda n: law(n, speed) - mu, [mean, mean, share * fast, 0.0], bounds=bounds)
+        for share in (0.1, 0.3, 1.0)
+    ]
+    best = min(fits, key=lambda fit: float(fit.cost)).x
+    return lambda other: law(best, block_inputs(other)[:, 0])
 
 
 def estimators(stops: Stops, brake: RigBrake, seed: int) -> dict[str, Estimator]:
@@ -59,6 +87,7 @@ def estimators(stops: Stops, brake: RigBrake, seed: int) -> dict[str, Estimator]
     return {
         CONSTANT: lambda other: np.full(len(other.mu), mean),
         SURFACE: response_surface(stops),
+        LUGRE: static_lugre(stops),
         OSTERMEYER: lambda other: replayed(law, brake, other, False),
         NETWORK: lambda other: network(block_inputs(other)),
     }

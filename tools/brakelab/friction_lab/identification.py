@@ -2,10 +2,11 @@
 
 Choice. Every law is identified twice: on all stops, and without those held out. Held out is the programme
 that was given for it, else the fifth of the stops that begin hottest: a law that only copies what it saw
-shows itself there. Least error on what is held out wins. Among laws within 5 % of it the data do not tell:
-then one that stays what it is beyond the data comes before one that goes on, since a car brakes hotter and
-harder than a programme; and then the least information criterion (Schwarz's, with stops as observations,
-since the residuals of one stop hang together).
+shows itself there. Least error on what is held out wins; of laws within 5 % of it, the least information
+criterion (Schwarz's, with stops as observations, since the residuals of one stop hang together). But what is
+held out lies 25 K beyond the rest, and a car brakes 100 K hotter than a programme: a law that goes on beyond
+the data must be better by a quarter than every one that stays what it is at their edge; of those within the
+quarter, the least criterion.
 """
 
 from collections.abc import Callable
@@ -23,6 +24,7 @@ from brakelab.plant.friction.law import Law, RigBrake
 
 HELD_OUT: Final = 0.2
 TIE: Final = 1.05
+STAYS: Final = 1.25  # of the least error, up to which a law that is bounded comes first
 PROCESSES: Final = 2
 
 
@@ -140,10 +142,11 @@ def criterion(fitted: Fitted, stops: Stops) -> float:
 
 
 def choose(laws: tuple[Judged, ...]) -> Judged:
-    """Return the law of least error on what it had not seen; of those that tie, see above."""
+    """Return the law of least error on what it had not seen; see above for ties."""
     least = min(judged.held_out for judged in laws)
+    staying = [judged for judged in laws if judged.bounded and judged.held_out <= STAYS * least]
     tied = [judged for judged in laws if judged.held_out <= TIE * least]
-    return min(tied, key=lambda judged: (not judged.bounded, judged.criterion))
+    return min(staying or tied, key=lambda judged: judged.criterion)
 
 
 def _span(values: np.ndarray) -> tuple[float, float]:

@@ -11,7 +11,8 @@ pressure, v sliding speed and T disc temperature; w the way that the pad has rub
 
 x is a first-order Markov process over the way (5 m, `ripple`), x_stop a draw per application (`scatter`).
 At the release half of what n differs from its value at rest is lost. T_c is not measured, n and f outlive
-the stop: so the same stop depends on what was before it.
+the stop: so the same stop depends on what was before it. The disc's heat capacity rises with temperature
+(xi of 3.7, Figure 3.6a), which the lining file and every lumped model leave out: theirs holds at 100 degC.
 
 Source. The ingredients are those of sections 2.3 and 3.3 (plateaus that temperature, pressure and shear build
 and wear destroys; decay above a critical temperature); the form and the numbers are an assumption, chosen so
@@ -72,6 +73,8 @@ RIPPLE_WAY: Final = 5.0  # m
 PRESSURE: Final = 30e5  # Pa
 POWER: Final = 30e6  # Pa m/s
 LEAST_DEMAND: Final = 0.3  # of a demand that falls
+CAPACITY_RISE: Final = 8e-4  # 1/K, of the heat capacity; the straight line of EN 1993-1-2 (steel) to 400 degC
+CAPACITY_AT: Final = 100.0  # degC
 
 
 def draw_pad(brake: str, random: Generator) -> RecordArray:
@@ -170,7 +173,8 @@ def run_pad(
         now.t, now.share, now.pressure, now.speed = t, share, pressure, speed
         now.temperature, now.memory, now.mu_b, now.torque = temperature, state.plateaus, mu, torque
         cooling = cooling_rate(rig.cooling, rig.cooling_by_speed, speed, rig.wetness)
-        temperature = disc_step(temperature, rig.heating, cooling, torque * omega, rig.ambient, dt)
+        heating = rig.heating / (1.0 + CAPACITY_RISE * (temperature - CAPACITY_AT))
+        temperature = disc_step(temperature, heating, cooling, torque * omega, rig.ambient, dt)
         if stop.control != DRAG:
             omega -= dt * torque / inertia
         steps += 1

@@ -23,6 +23,8 @@ DOUBTFUL: Final = 2.0  # standard deviations
 CLEARER: Final = 4.0  # a mistake must explain the numbers better by this much, in squares
 HOTTEST: Final = 900.0  # degC
 COLDEST: Final = -40.0  # degC
+WARM: Final = 250.0  # degC; no programme keeps a disc above this all the time
+SAMPLES: Final = (1e-4, 0.05)  # s between them, least and greatest
 
 
 class Mistake(NamedTuple):
@@ -101,6 +103,11 @@ def refuse_nonsense(recording: Recording, columns: Columns, where: str) -> Numbe
     if hottest > HOTTEST or coldest < COLDEST:
         place = f"temperature {coldest:.0f} to {hottest:.0f} °C"
         raise UserError(where, place, "no brake disc is that; check its unit, and the thermocouple")
+    if coldest > WARM:
+        raise UserError(where, f"temperature {coldest:.0f} °C and more", 'reads like K: give the unit "K"')
+    between = float(np.median(np.diff(recording.time)))
+    if not SAMPLES[0] <= between <= SAMPLES[1]:
+        raise UserError(where, f"time, {between:.3g} s between samples", "check its unit; 50 Hz are needed")
     if np.ptp(recording.speed) < 1e-3:
         raise UserError(where, "speed", "does not change; give the column of the disc's speed")
     numbers, _ = measure(recording, columns, where)

@@ -4,6 +4,7 @@ Where a profile stays flat the number is not told by the data, whatever its inte
 height is scaled as `fitting.clustered` has it: a quadratic cost gives the same interval as the slopes.
 """
 
+from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -28,8 +29,51 @@ class Interval(NamedTuple):
     high: float
 
 
+class Profile(NamedTuple):
+    """Of one number."""
+
+    name: str
+    values: Vector  # (points,), of the number
+    rise: Vector  # (points,), of the cost, the others following; 1 is the height of 95 %
+
+
 def profile_interval(fitted: Fitted, brake: RigBrake, stops: Stops, place: int) -> Interval:
     """Return the interval of 95 % of the number at `place`."""
+    free, best = fitted.candidate.free[place], float(fitted.shares[place])
+    rise, half = _rise_of(fitted, brake, stops, place)
+
+    def end(sign: float) -> float:
+        edge = float(np.clip(best + sign * REACH * half, 0.0, 1.0))
+        if rise(edge) < 1.0:
+            return sign * np.inf
+        found, _ = brentq(
+            lambda share: rise(share) - 1.0,
+            best,
+            edge,
+            xtol=0.01 * half,
+            maxiter=20,
+            full_output=True,
+            disp=False,
+        )
+        return free.value(float(found))
+
+    return Interval(free.name, end(-1.0), end(1.0))
+
+
+def profile_over(fitted: Fitted, brake: RigBrake, stops: Stops, place: int, points: int) -> Profile:
+    """Return the profile of the number at `place`, two half intervals to both sides."""
+    free = fitted.candidate.free[place]
+    rise, half = _rise_of(fitted, brake, stops, place)
+    shares = np.clip(fitted.shares[place] + half * np.linspace(-2.0, 2.0, points), 0.0, 1.0)
+    return Profile(
+        free.name, np.array([free.value(s) for s in shares]), np.array([rise(float(s)) for s in shares])
+    )
+
+
+def _rise_of(
+    fitted: Fitted, brake: RigBrake, stops: Stops, place: int
+) -> tuple[Callable[[float], float], float]:
+    """Return the rise of the cost over the share of the number at `place`, and half its interval."""
     free = fitted.candidate.free[place]
     best = fitted.shares
     residuals = residual_function(fitted.candidate, brake, stops)
@@ -52,16 +96,8 @@ def profile_interval(fitted: Fitted, brake: RigBrake, stops: Stops, place: int) 
 
         start = np.clip(whole[others], 1e-6, 1.0 - 1e-6)
         if not len(start):
-            return float(np.sum(residuals(whole) ** 2)) - least - height
+            return (float(np.sum(residuals(whole) ** 2)) - least) / height
         found = least_squares(held, start, bounds=(0.0, 1.0), diff_step=STEP, max_nfev=EVALUATIONS)
-        return 2.0 * float(found.cost) - least - height
+        return (2.0 * float(found.cost) - least) / height
 
-    def end(sign: float) -> float:
-        edge = float(np.clip(best[place] + sign * REACH * half, 0.0, 1.0))
-        if rise(edge) < 0.0:
-            return sign * np.inf
-        inside = float(best[place])
-        found, _ = brentq(rise, inside, edge, xtol=0.01 * half, maxiter=20, full_output=True, disp=False)
-        return free.value(float(found))
-
-    return Interval(free.name, end(-1.0), end(1.0))
+    return rise, half

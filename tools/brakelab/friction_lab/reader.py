@@ -6,7 +6,7 @@ turned to be positive; torque of one pad is doubled where the file of columns sa
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,11 @@ from brakelab.logs.log_quality import Damage
 from ecu.errors import UserError
 
 Vector = NDArray[np.float64]
+Places = NDArray[np.int64]
 
 LEAST_SAMPLES = 100
-ENDINGS = (".csv", ".txt", ".parquet", ".mf4")
+PLACES = {".csv": ("line", 2), ".txt": ("line", 2), ".parquet": ("row", 1), ".mf4": ("sample", 1)}
+"""What a row of each ending is called, and the number of the first."""
 
 
 class Read(NamedTuple):
@@ -40,8 +42,8 @@ def read_recording(path: Path, columns: Path | None = None) -> Read:
     """
     if not path.is_file():
         raise UserError(str(path), "", "no such file")
-    if path.suffix.lower() not in ENDINGS:
-        raise UserError(str(path), "", f"ends in none of {' '.join(ENDINGS)}; export it as CSV")
+    if path.suffix.lower() not in PLACES:
+        raise UserError(str(path), "", f"ends in none of {' '.join(PLACES)}; export it as CSV")
     beside = columns or path.with_suffix(".toml")
     if not beside.is_file():
         raise UserError(
@@ -50,42 +52,68 @@ def read_recording(path: Path, columns: Path | None = None) -> Read:
     described = load_columns(beside)
     names = [getattr(described.columns, quantity)[0] for quantity in NAMES]
     damage = Damage()
-    raw = np.concatenate(list(_rows(path, names, damage)) or [np.empty((5, 0))], axis=1)
-    whole = np.isfinite(raw).all(axis=0)
-    damage.note_damage(int((~whole).sum()), f"row {int(np.argmin(whole)) + 1} (a number is missing)")
-    raw = raw[:, whole]
-    rising = np.concatenate([[True], raw[0, 1:] > np.maximum.accumulate(raw[0])[:-1]])[: raw.shape[1]]
-    damage.note_damage(int((~rising).sum()), "time does not rise")
-    raw = raw[:, rising]
+    word, first = PLACES[path.suffix.lower()]
+    lines, raw = _joined(list(_rows(path, names, damage, first)))
+    whole = np.isfinite(raw)
+    missing = ~whole.all(axis=0)
+    if missing.any():
+        row = int(np.argmax(missing))
+        name = names[int(np.argmin(whole[:, row]))]
+        damage.note_damage(int(missing.sum()), f"{word} {lines[row]} ({name} is no number)")
+    lines, raw = lines[~missing], raw[:, ~missing]
+    back = np.concatenate([[False], raw[0, 1:] <= np.maximum.accumulate(raw[0])[:-1]])[: raw.shape[1]]
+    if back.any():
+        damage.note_damage(int(back.sum()), f"{word} {lines[int(np.argmax(back))]} (time does not rise)")
+    raw = raw[:, ~back]
     if raw.shape[1] < LEAST_SAMPLES:
-        raise UserError(str(path), "", f"only {raw.shape[1]} whole rows; needs {LEAST_SAMPLES}")
-    note = f"{path}: {damage.damaged} rows left out, first: {damage.first_damaged}" if damage.damaged else ""
-    return Read(_in_si(raw, described), described, "; ".join(part for part in (note, damage.cut) if part))
+        because = f"; first left out: {damage.first_damaged}" if damage.damaged else ""
+        raise UserError(str(path), "", f"only {raw.shape[1]} whole rows; needs {LEAST_SAMPLES}{because}")
+    rows = "row" if damage.damaged == 1 else "rows"
+    note = (
+        f"{path}: {damage.damaged} {rows} left out, first: {damage.first_damaged}" if damage.damaged else ""
+    )
+    cut = f"{path}: {damage.cut}" if damage.cut else ""
+    return Read(_in_si(raw, described), described, "; ".join(part for part in (note, cut) if part))
 
 
-def _rows(path: Path, names: list[str], damage: Damage) -> Iterator[Vector]:
-    """Yield blocks of columns, shape (5, rows), as numbers in the units of the file."""
+def _joined(blocks: list[tuple[Places, Vector]]) -> tuple[Places, Vector]:
+    lines = [lines for lines, _ in blocks]
+    rows = [rows for _, rows in blocks]
+    return np.concatenate([np.empty(0, np.int64), *lines]), np.concatenate([np.empty((5, 0)), *rows], axis=1)
+
+
+def _rows(path: Path, names: list[str], damage: Damage, first: int) -> Iterator[tuple[Places, Vector]]:
+    """Yield where rows stand in the file, and their columns as numbers in its units, shape (5, rows)."""
     if path.suffix.lower() == ".mf4":
-        yield _mdf(path, names)
+        channels = _mdf(path, names)
+        yield first + np.arange(channels.shape[1]), channels
         return
     if path.suffix.lower() == ".parquet":
         import pyarrow.parquet as pq
 
         _refuse_missing(path, names, pq.read_schema(path).names)
         table = pq.read_table(path, columns=names)
-        yield np.array([table[name].to_numpy().astype(float) for name in names])
+        columns = np.array([_column(path, name, table[name]) for name in names])
+        yield first + np.arange(columns.shape[1]), columns
         return
     found, delimiter = csv_columns(path)
     _refuse_missing(path, names, found)
-    for _, batch in csv_rows(path, found, delimiter, list(dict.fromkeys(names)), damage):
-        columns = {name: _numbers(batch.column(name).to_pylist()) for name in dict.fromkeys(names)}
-        yield np.array([columns[name] for name in names])
+    for lines, batch in csv_rows(path, found, delimiter, list(dict.fromkeys(names)), damage):
+        cells = {name: _numbers(batch.column(name).to_pylist()) for name in dict.fromkeys(names)}
+        yield lines, np.array([cells[name] for name in names])
 
 
 def _refuse_missing(path: Path, names: list[str], found: list[str]) -> None:
     for name in names:
         if name not in found:
             raise UserError(str(path), name, f"no such column; the file has {', '.join(found[:20])}")
+
+
+def _column(path: Path, name: str, column: Any) -> Vector:
+    try:
+        return np.asarray(column.to_numpy().astype(float))
+    except (TypeError, ValueError):
+        raise UserError(str(path), name, f"is {column.type}, not numbers; write it as float") from None
 
 
 def _numbers(cells: list[str | None]) -> Vector:

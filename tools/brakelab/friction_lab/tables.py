@@ -7,6 +7,7 @@ import numpy as np
 from brakelab.friction_lab.analysis import Components, History
 from brakelab.friction_lab.columns import Columns
 from brakelab.friction_lab.fitting import Fitted, replayed
+from brakelab.friction_lab.heat_capacity import HeatCapacity
 from brakelab.friction_lab.identification import Identified, Judged
 from brakelab.friction_lab.profile import profile_interval
 from brakelab.friction_lab.stops import Stops
@@ -126,4 +127,12 @@ def history_line(found: History) -> str:
     return (
         f"A stop after one that ended 100 K hotter has {100 * found.slope:+.2f} ± {100 * found.half:.2f} % "
         "friction, all else equal."
+    )
+
+
+def heat_line(found: HeatCapacity) -> str:
+    """Return one sentence on the disc's heat capacity."""
+    return (
+        f"Disc: {found.at_100:.0f} ± {found.half:.0f} J/K at 100 °C, {100 * found.rise:+.3f} ± "
+        f"{100 * found.rise_half:.3f} % per K; the thermocouple lags {found.lag:.2f} s."
     )

@@ -62,6 +62,7 @@ def test_five_commands(
             continue
         done = CliRunner().invoke(app, words)
         assert done.exit_code == 0, f"{line}: {done.output} {done.exception}"
-        said += done.stderr
-    assert "3 rows left out" in said
+        said += done.output
+    assert "3 rows left out, first: line 52" in " ".join(said.split())
+    assert "J/K at 100 °C" in said
     assert set(read_file(Path("linings.toml"), Linings).lining) == {"mine"}
