@@ -1,5 +1,7 @@
 """The bench of the friction laboratory: the printed tables it stands beside, and its own arithmetic."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,18 @@ from brakelab.friction_lab.stops import Stops, find_stops
 from brakelab.plant.dynamometer_programme import load_programme
 from brakelab.plant.friction.constant import Constant
 from brakelab.studies.friction import LOADINGS, TABLE_3_4, TEMPERATURES
-from brakelab.studies.lab import NOISE, linings, on_ams, r1_recording, recovery
+from brakelab.studies.lab import (
+    NOISE,
+    OnAms,
+    Recovered,
+    linings,
+    on_ams,
+    r1_recording,
+    recovery,
+    table_errors,
+)
+from brakelab.studies.lab_bad_input import answers
+from brakelab.studies.lab_choice import choice_of, met
 from brakelab.studies.lab_table import PRINTED, TABLE_3_4_NRMSE
 from ecu.settings.resources import resource
 
@@ -54,10 +67,52 @@ def test_a_constant_on_ams_errs_by_its_distance(ams: Stops) -> None:
 
 def test_coverage_counts_draws_inside() -> None:
     truth = np.array([1.0, 2.0])
-    draws = [("A", np.array([1.0 + off, 2.0]), np.array([0.1, 0.2]), truth) for off in (0.05, 0.2, -0.09)]
-    found = recovery("A", [*draws, ("B", truth, truth, truth)])
+    draws = [
+        Recovered("R1", "A", np.array([1.0 + off, 2.0]), np.array([0.1, 0.2]), truth, np.zeros(6))
+        for off in (0.05, 0.2, -0.09)
+    ]
+    others = [Recovered(*of, truth + 9.0, truth, truth, np.zeros(6)) for of in (("R1", "B"), ("R2", "A"))]
+    found = recovery("A", [*draws, *others])
     assert found.inside == pytest.approx([2.0 / 3.0, 1.0])
     assert found.width == pytest.approx([10.0, 10.0])
+
+
+def test_the_error_of_table_3_4_is_that_of_all_brakes() -> None:
+    """Two draws: 3, 4 and 0 % off in every mean give 100 sqrt((9 + 16) / 3) / 100; the other none."""
+    means = {"A": 0.03, "B": 0.04, "C": 0.0}
+    one = np.ones(1)
+    found = [
+        Recovered("R1", brake, one, one, one, off * draw * np.ones(6))
+        for draw in (1.0, 0.0)
+        for brake, off in means.items()
+    ]
+    assert table_errors("R1", found) == pytest.approx([5.0 / np.sqrt(3.0), 0.0])
+
+
+def test_a_choice_is_judged_by_ams_alone() -> None:
+    """The chosen law is no rival of its own; the best in hindsight may be none of the thesis's."""
+    found = {"table": 4.0, "constant": 9.0, "ilvo": 5.0, "ostermeyer": 6.0, "ostermeyer_revised": 7.0}
+    zero = np.zeros(6)
+    ams = {name: OnAms(zero, zero, zero, whole) for name, whole in found.items()}
+    law = Constant(law="constant", rig_mass=996.0, mu=0.40)
+    seen = [
+        choice_of(
+            "A",
+            3,
+            SimpleNamespace(
+                identified=SimpleNamespace(chosen=Judged(name, law, False, 1, 0, 0, True, 0, (), (), "", "")),
+                ams=ams,
+                seconds=1.0,
+            ),
+        )
+        for name in ("table", "ilvo", "constant")
+    ]
+    assert [(each.rival, each.best) for each in seen] == [
+        ("ilvo", "table"),
+        ("ostermeyer", "table"),
+        ("ilvo", "table"),
+    ]
+    assert met(seen) == (2, 0)
 
 
 def test_the_noise_of_a_recovery_is_one_percent() -> None:
@@ -65,3 +120,22 @@ def test_the_noise_of_a_recovery_is_one_percent() -> None:
     one, two = (r1_recording(lining, NOISE, seed).torque for seed in (0, 1))
     on = one > 100.0
     assert np.std(one[on] / two[on] - 1.0) == pytest.approx(0.01 * np.sqrt(2.0), rel=0.03)
+
+
+def test_every_bad_input_gets_one_line_of_its_own() -> None:
+    """Refused, or read with the place of what was left out; nothing wrong passes in silence."""
+    found = answers()
+    assert all(each.line and "\n" not in each.line for each in found), found
+    assert len({each.line for each in found}) == len(found)
+    assert all("mine." in each.line for each in found)
+    read = {each.what: each.line for each in found if not each.is_refused}
+    assert list(read) == [
+        "a row with two cells",
+        "a word among the numbers",
+        "a row twice",
+        "the last row cut off",
+    ]
+    for line, place in zip(
+        read.values(), ("line 52", "line 62", "line 73", "the last line is cut off"), strict=True
+    ):
+        assert place in line

@@ -41,7 +41,6 @@ from brakelab.studies.texts import (
     ENERGY_TEXT,
     FAILURES_TEXT,
     FRICTION_TEXT,
-    LAB_TEXT,
     LATENESS_TEXT,
     MARGINS_TEXT,
     OBSERVERS_TEXT,
@@ -233,12 +232,16 @@ def _friction(json: bool) -> int:
 
 
 def _lab(json: bool) -> int:
-    from brakelab.studies.lab import run_lab
+    from brakelab.studies.lab_pictures import write_pictures
+    from brakelab.studies.lab_run import run_lab
     from brakelab.studies.lab_table import lab_tables
+    from brakelab.studies.lab_text import LAB_TEXT
 
     console = Console(stderr=True)
-    tables = lab_tables(run_lab(lambda line: console.print(line, highlight=False, markup=False)))
-    return _page(LAB, "The friction laboratory", LAB_TEXT, tables, json, "friction-lab")
+    lab = run_lab(lambda line: console.print(line, highlight=False, markup=False))
+    if not json:
+        write_pictures(resource(PICTURES), lab)
+    return _page(LAB, "The friction laboratory", LAB_TEXT, lab_tables(lab), json, "friction-lab")
 
 
 def _energy(json: bool) -> int:

@@ -1,39 +1,46 @@
 """The friction laboratory beside chapters 2 and 3: three drawn pads, all laws, all estimators."""
 
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from itertools import product
-from multiprocessing import get_context
+from time import monotonic
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.friction_lab.analysis import Components, History, history_effect, principal_components
-from brakelab.friction_lab.candidates import candidates
+from brakelab.friction_lab.analysis import (
+    Components,
+    History,
+    history_effect,
+    inputs_of,
+    principal_components,
+)
+from brakelab.friction_lab.candidates import ilvo
 from brakelab.friction_lab.columns import Columns
-from brakelab.friction_lab.dynamometer import new_bench, run_programme
-from brakelab.friction_lab.estimators import error_by_temperature, errors_by_manoeuvre, estimators
+from brakelab.friction_lab.dynamometer import Bench, new_bench, run_programme
 from brakelab.friction_lab.fitting import fit, replayed
+from brakelab.friction_lab.heat_capacity import HeatCapacity, heat_capacity
 from brakelab.friction_lab.identification import Identified, Judged, identify
 from brakelab.friction_lab.recording import THRESHOLD, Recording, joined
 from brakelab.friction_lab.stops import Stops, find_stops
-from brakelab.friction_lab.trips import drive
 from brakelab.plant.description import read_file
-from brakelab.plant.dynamometer import DECELERATION, PRESSURE, mean_friction, new_stop, run_stop
+from brakelab.plant.dynamometer import DECELERATION, PRESSURE, REPLAY, mean_friction, new_stop, run_stop
 from brakelab.plant.dynamometer_programme import load_programme
+from brakelab.plant.friction.ilvo import Ilvo
 from brakelab.plant.linings import Lining, Linings, rig_with
-from brakelab.studies.friction import TEMPERATURES
-from brakelab.studies.heat import BRAKES, KMH
+from brakelab.studies.friction import TABLE_3_4, TEMPERATURES, stop_means
+from brakelab.studies.heat import BRAKES, KMH, PRINTED
 from ecu.settings.resources import resource
 
 Vector = NDArray[np.float64]
 
 SEED: Final = 1
 DRAWS: Final = 20
+R2_DRAWS: Final = 5
 NOISE: Final = 0.01  # of the torque
+BY_DISTANCE: Final = {"R1": False, "R2": True}
+"""How each set averages a stop of Table 3.4."""
 GRAVITY: Final = 9.81  # m/s^2
-FACTORS: Final = (0.6, 0.8, 1.0, 1.2, 1.4)  # of a wrong temperature
 
 
 class OnAms(NamedTuple):
@@ -48,11 +55,15 @@ class OnAms(NamedTuple):
 class Brake(NamedTuple):
     """One brake: what CPC shows, the laws identified on it, and these on AMS."""
 
+    inputs: Vector  # (stops, 3), of CPC, as `inputs_of`
+    mean: Vector  # (stops,), mean friction
     components: Components
     history: History
+    heat: HeatCapacity
     identified: Identified
     measured: Vector  # (6,), mean friction of the AMS stops
     ams: dict[str, OnAms]
+    seconds: float  # CPC simulated and all laws identified
 
 
 class Recovery(NamedTuple):
@@ -62,15 +73,6 @@ class Recovery(NamedTuple):
     truth: Vector
     inside: Vector  # (free,), share of draws within the interval of 95 %
     width: Vector  # (free,), median half interval over the value [%]
-
-
-class Lab(NamedTuple):
-    """All that the bench measures."""
-
-    brakes: dict[str, Brake]
-    recovery: dict[str, Recovery]
-    manoeuvres: dict[str, dict[str, float]]  # nRMSE [%] by estimator and manoeuvre
-    wrong_temperature: dict[str, list[float]]  # nRMSE [%] by estimator, at FACTORS
 
 
 def linings() -> Linings:
@@ -84,20 +86,34 @@ def columns_of(lining: Lining, law: str = "SIM") -> Columns:
     return Columns.own(lining, float(rig["mass"] * rig["tyre_radius"] ** 2))
 
 
-def measure(brake: str, progress: Callable[[str], None]) -> Brake:
+def run(bench: Bench, programme: str, columns: Columns) -> Stops:
+    """Return the stops of a shipped programme on a bench."""
+    found = load_programme(resource(f"config/rig/{programme}.toml"))
+    return find_stops(run_programme(bench, found, lambda done, of: None), columns, programme)
+
+
+def measure(brake: str, progress: Callable[[str], None], seed: int = SEED) -> Brake:
     """Return a drawn pad of brake A, B or C measured and identified."""
+    begin = monotonic()
     lining = linings().lining[brake]
     columns = columns_of(lining)
-    bench = new_bench(lining, brake, SEED)
-
-    def stops_of(programme: str) -> Stops:
-        found = load_programme(resource(f"config/rig/{programme}.toml"))
-        return find_stops(run_programme(bench, found, lambda done, of: None), columns, programme)
-
-    cpc, ams = stops_of("cpc"), stops_of("ams")
-    identified = identify(columns, cpc, None, lambda line: progress(f"{brake}: {line}"))
+    bench = new_bench(lining, brake, seed)
+    cpc = run(bench, "cpc", columns)
+    identified = identify(columns, cpc, None, lambda line: progress(f"{brake}, pad {seed}: {line}"))
+    seconds = monotonic() - begin
+    ams = run(bench, "ams", columns)
     laws = {judged.name: on_ams(judged, lining, ams) for judged in identified.laws}
-    return Brake(principal_components(cpc), history_effect(cpc), identified, ams.mean, laws)
+    return Brake(
+        inputs_of(cpc),
+        cpc.mean,
+        principal_components(cpc),
+        history_effect(cpc),
+        heat_capacity(cpc, columns),
+        identified,
+        ams.mean,
+        laws,
+        seconds,
+    )
 
 
 def on_ams(judged: Judged, lining: Lining, stops: Stops) -> OnAms:
@@ -120,23 +136,49 @@ def on_ams(judged: Judged, lining: Lining, stops: Stops) -> OnAms:
     )
 
 
-def recovered(job: tuple[str, int]) -> tuple[str, Vector, Vector, Vector]:
-    """Return brake, values, half intervals and truth of ILVO identified from a noisy recording of R1."""
-    brake, draw = job
+class Recovered(NamedTuple):
+    """A published set of ILVO's numbers, identified from a recording of itself."""
+
+    numbers: str
+    brake: str
+    values: Vector  # (free,)
+    half: Vector
+    truth: Vector
+    means: Vector  # (6,), relative error of the means of Table 3.4's ILVO column, with the values found
+
+
+def recovered(job: tuple[str, str, int]) -> Recovered:
+    """Return what is identified from a noisy recording; `job`: R1 or R2, brake and draw."""
+    numbers, brake, draw = job
     lining = linings().lining[brake]
-    columns = columns_of(lining, "R1")
-    stops = find_stops(r1_recording(lining, NOISE, draw), columns, "R1")
-    candidate = next(c for c in candidates(stops, lining.brake) if c.name == "ilvo")
+    stops = find_stops(own_recording(lining, numbers, NOISE, draw), columns_of(lining, numbers), numbers)
+    law = lining.friction[numbers]
+    assert isinstance(law, Ilvo)
+    candidate = ilvo(stops.inertia / lining.brake.tyre_radius**2, law.stress, law.heat_zero)
     fitted = fit(candidate, lining.brake, stops, draw)
-    law = lining.friction["R1"].model_dump()
-    truth = [law["kappa_0"], law["kappa_1"], -law["speed_gain"], law["debris"], law["heat_loss"]]
-    return brake, np.array(fitted.values), fitted.half, np.array(truth)
+    rig = rig_with(lining.model_copy(update={"friction": {"it": fitted.law}}), "it")
+    rig["cooling_by_speed"] *= PRINTED
+    means = stop_means(rig, REPLAY, BY_DISTANCE[numbers], TABLE_3_4["measured"][brake])
+    truth = [law.kappa_0, law.kappa_1, -law.speed_gain, law.debris, law.heat_loss]
+    return Recovered(
+        numbers,
+        brake,
+        np.array(fitted.values),
+        fitted.half,
+        np.array(truth),
+        means / np.array(TABLE_3_4["ILVO"][brake]) - 1.0,
+    )
 
 
 def r1_recording(lining: Lining, noise: float, seed: int) -> Recording:
-    """Return 36 stops of R1 at constant pressure in steps of 0.25 ms, with `noise` relative to the torque."""
+    """Return stops of R1; see below."""
+    return own_recording(lining, "R1", noise, seed)
+
+
+def own_recording(lining: Lining, law: str, noise: float, seed: int) -> Recording:
+    """Return 36 stops of a law at constant pressure, in steps of 0.25 ms, `noise` relative to the torque."""
     random = np.random.default_rng(seed)
-    rig = rig_with(lining, "R1")
+    rig = rig_with(lining, law)
     parts = []
     grid = product((50.0, 80.0, 110.0, 140.0, 170.0, 200.0), (80.0, 120.0), (15.0, 40.0, 70.0))
     for place, (temperature, speed, bar) in enumerate(grid):
@@ -152,36 +194,23 @@ def r1_recording(lining: Lining, noise: float, seed: int) -> Recording:
     return joined(parts)
 
 
-def recovery(brake: str, found: list[tuple[str, Vector, Vector, Vector]]) -> Recovery:
-    """Return the coverage of the intervals over all draws of a brake."""
-    ours = [each[1:] for each in found if each[0] == brake]
-    values, halves, truths = (np.array(column) for column in zip(*ours, strict=True))
+def recovery(brake: str, found: list[Recovered]) -> Recovery:
+    """Return the coverage of the intervals over all draws of R1 of a brake."""
+    ours = [each for each in found if (each.numbers, each.brake) == ("R1", brake)]
+    values, halves, truths = (
+        np.array([getattr(each, name) for each in ours]) for name in ("values", "half", "truth")
+    )
     names = ("kappa_0", "kappa_1", "a", "b", "c")
     inside = np.mean(np.abs(values - truths) < halves, axis=0)
     return Recovery(names, truths[0], inside, 100.0 * np.median(halves / np.abs(truths), axis=0))
 
 
-def trips() -> tuple[dict[str, dict[str, float]], dict[str, list[float]]]:
-    """Return the estimators' errors by manoeuvre, and with a wrong temperature, on a pad's second trip."""
-    lining = linings().lining["A"]
-    columns = columns_of(lining)
-    bench = new_bench(lining, "A", SEED)
-    first, second = drive(bench, columns, 1), drive(bench, columns, 2)
-    found = estimators(first.stops, lining.brake, SEED)
-    radius = lining.brake.tyre_radius / lining.brake.effective_radius
-    wrong = {
-        name: [error_by_temperature(estimator, second.stops, factor) for factor in FACTORS]
-        for name, estimator in found.items()
-    }
-    return errors_by_manoeuvre(found, second, radius), wrong
-
-
-def run_lab(progress: Callable[[str], None]) -> Lab:
-    """Return all results; `progress` is told a line at a time. Minutes, on two cores."""
-    brakes = {brake: measure(brake, progress) for brake in BRAKES}
-    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        on_road = pool.submit(trips)
-        draws = list(pool.map(recovered, product(BRAKES, range(DRAWS))))
-        progress(f"recovery: {len(draws)} draws")
-        manoeuvres, wrong = on_road.result()
-    return Lab(brakes, {brake: recovery(brake, draws) for brake in BRAKES}, manoeuvres, wrong)
+def table_errors(numbers: str, found: list[Recovered]) -> Vector:
+    """Return the RMS error [%] of Table 3.4 by a set as it was identified, shape (draws,)."""
+    squares = np.array(
+        [
+            [np.mean(each.means**2) for each in found if (each.numbers, each.brake) == (numbers, b)]
+            for b in BRAKES
+        ]
+    )
+    return np.asarray(100.0 * np.sqrt(squares.mean(axis=0)))

@@ -129,4 +129,5 @@ def markdown(table: Table) -> str:
 
 
 def _line(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"
+    bars = [cell.replace("|", "\\|") for cell in cells]
+    return f"| {' | '.join(bars)} |"

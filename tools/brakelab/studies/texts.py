@@ -49,60 +49,6 @@ FRICTION_TEXT: Final = (
     "vehicle reproduce of the thesis, on the simulated dynamometer. Numbers: config/plant/linings.toml."
 )
 
-LAB_TEXT: Final = """\
-From the recording of a dynamometer to a friction law, with the methods of chapters 2 and 3, beside what
-the thesis prints. The dynamometer is simulated; on it are three drawn pads that follow none of the laws
-(tools/brakelab/friction_lab/patches.py): contact patches that temperature builds and wear destroys, a
-film, chance, and memory of the stop before. Its numbers and the thesis's are of different pads: what can
-be compared is order, size and cause.
-
-## A stranger's CSV in five commands
-
-A recording needs time, line pressure, brake torque, speed and disc temperature, a row per sample, 50 Hz
-and more. What its columns mean, and what stood on the rig, is a file of columns, `mine.toml`:
-
-```toml
-name = "mine"
-
-[columns]                       # name in the file, and its unit
-time = ["Zeit", "ms"]           # s, ms, min
-pressure = ["P_Line", "psi"]    # bar, kPa, MPa, Pa, psi
-torque = ["M_B", "kN m"]        # N m, kN m, lbf ft
-speed = ["n", "rpm"]            # of the disc: rpm, rad/s; of the car: km/h, m/s, mph
-temperature = ["T_Scheibe", "°F"]
-
-[brake]
-piston_area = 2.827e-3          # m², all pistons of one side
-pad_area = 7.125e-3             # m²
-effective_radius = 0.1459       # m
-tyre_radius = 0.360             # m
-
-[rig]
-inertia = 129.1                 # kg m²; without, it is found from torque and slowing
-pads = 2                        # whose torque the sensor shows
-push_out_pressure = 0.5         # bar
-```
-
-`.csv` (commas, semicolons or tabs; decimal commas), `.parquet` and `.mf4` are read. Rows that are
-damaged are left out and counted. What makes no physical sense is refused in one line with the remedy: a
-pressure in another unit, the torque of one pad, °F, a thermocouple in the backing plate.
-
-```sh
-brake-ecu lab look strange.csv --columns mine.toml
-brake-ecu identify friction strange.csv --columns mine.toml --out brake.toml
-brake-ecu lab run cpc --linings brake.toml --brake mine --law SIM --out own.csv
-brake-ecu lab look own.csv
-cp brake.toml linings.toml
-```
-
-The first shows what moves friction; the second identifies seven laws, one line each, chooses one and
-writes all (`--held-out` names a second recording to choose by, `--profile ilvo` adds the profile
-likelihood of a law). The third runs the chosen law on the simulated dynamometer through the constant
-pressure cycle, the fourth looks at that as at the original. `linings.toml` beside a vehicle file of the
-simulator is read with it; its `lining = "mine"` puts the brake on an axle. Without a recording of your
-own, `brake-ecu lab run cpc --brake A --seed 1 --out cpc.csv` makes one.
-"""
-
 ENERGY_TEXT: Final = (
     "Every scenario of config/scenarios in closed loop with the ECU of config/suv.toml. The simulated "
     "vehicle sums what leaves and enters in its own steps (tools/brakelab/plant/energy.py)."

@@ -4,9 +4,15 @@ A trip of brakings of the kinds of `friction_lab.trips` in closed loop, cars of 
 knows of the car what its configuration says and what ten minutes of ordinary driving taught it; its front
 linings are of brake A under one of three laws, of a level that is not the configured one. Counted as in
 `bench observers`: from 0.8 s after the brakes of both axles came on, above 15 km/h.
+
+What limits it is measured by cars of which one thing is as the configuration has it, all else as drawn.
 """
 
+import re
+import shutil
 from itertools import pairwise
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -21,6 +27,7 @@ from brakelab.studies.observers_cases import Setup, configured, shipped
 from brakelab.studies.stops import friction_errors
 from ecu.recording.store import out_of_range
 from ecu.settings.config import new_params
+from ecu.settings.resources import resource
 
 CARS: Final = 8
 BRAKINGS: Final = 6  # of each kind
@@ -32,9 +39,25 @@ SOFTEST: Final = 0.5  # m/s^2
 HARDEST: Final = 3.5
 
 
+AS_DRAWN: Final = "as drawn"
+CAUSES: Final[dict[str, dict[str, str]]] = {
+    AS_DRAWN: {},
+    "zeros of accelerometer and pressure sensors known": {"accel_zero": "0.0", "pressure_zero": "0.0"},
+    "drag and rolling resistance known": {"drag": "0.0", "rolling_resistance": "0.0"},
+    "half the noise of every sensor": {"sensor_noise": "[0.5, 0.5]"},
+    "torque of the motors known": {"motor_torque_scale": "0.0", "motor_torque_noise": "[0.0, 0.0]"},
+    "mass and centre of gravity known": {"mass": "0.0", "cog_height": "0.0", "cog_place": "0.0"},
+    "push-out pressure known": {"push_out_pressure": "0.0"},
+    "linings all of SIM": {"friction_laws": '["SIM"]'},
+    "push-out pressure known, linings of SIM": {"push_out_pressure": "0.0", "friction_laws": '["SIM"]'},
+}
+"""Lines of the draw's file that are changed."""
+
+
 class OnTrip(NamedTuple):
     """One car: nRMSE [%] of the front axle by kind."""
 
+    cause: str
     cold: dict[str, float]  # nothing learned before
     adapted: dict[str, float]
     nominal: dict[str, float]  # the configured constant
@@ -66,17 +89,33 @@ def brakings(drive: Drive) -> list[NDArray[np.bool_]]:
     return [rows & (place >= begin) & (place < end) for begin, end in spans]
 
 
-def on_trip(seed: int) -> OnTrip:
-    """Return the errors of the joint observer in one car, cold and adapted."""
+def plant_files(folder: Path, changes: dict[str, str]) -> str:
+    """Write the shipped cars into `folder`, their wide draw with `changes`; return the path of the SUV."""
+    for path in resource("config/plant").glob("*.toml"):
+        shutil.copy(path, folder)
+    draw = folder / "draw.toml"
+    wide, rest = draw.read_text("utf-8").split("[nominal]")
+    for key, value in changes.items():
+        wide, count = re.subn(rf"^{key} = .*$", f"{key} = {value}", wide, flags=re.MULTILINE)
+        assert count == 1, key
+    draw.write_text(f"{wide}[nominal]{rest}", "utf-8")
+    return str(folder / "suv.toml")
+
+
+def on_trip(job: tuple[str, int]) -> OnTrip:
+    """Return the errors of the joint observer in one car, cold and adapted; `job`: cause and seed."""
+    cause, seed = job
     config = configured()
     trip, kinds = trip_of_kinds(seed)
-    setup = Setup(with_draw(trip, WIDE), config)
-    before = Setup(with_draw(shipped(ORDINARY), WIDE), config)
-    _, learned = drive_car(before, JOINT, seed)
-    kept = None if out_of_range(learned, new_params(config)["mu_nominal"][0]) else learned
-    cold, nominal = _errors(drive_car(setup, JOINT, seed)[0], kinds)
-    adapted, _ = _errors(drive_car(setup, JOINT, seed, kept)[0], kinds)
-    return OnTrip(cold, adapted, nominal)
+    with TemporaryDirectory() as name:
+        car = {"plant": plant_files(Path(name), CAUSES[cause])}
+        setup = Setup(with_draw(trip.model_copy(update=car), WIDE), config)
+        before = Setup(with_draw(shipped(ORDINARY).model_copy(update=car), WIDE), config)
+        _, learned = drive_car(before, JOINT, seed)
+        kept = None if out_of_range(learned, new_params(config)["mu_nominal"][0]) else learned
+        cold, nominal = _errors(drive_car(setup, JOINT, seed)[0], kinds)
+        adapted, _ = _errors(drive_car(setup, JOINT, seed, kept)[0], kinds)
+    return OnTrip(cause, cold, adapted, nominal)
 
 
 def _errors(drive: Drive, kinds: str) -> tuple[dict[str, float], dict[str, float]]:
