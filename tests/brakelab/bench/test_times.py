@@ -12,11 +12,11 @@ from brakelab.bench import command, output, times
 from brakelab.bench.codec import codec_rows, plan_of_the_bench, protected_frames
 from brakelab.bench.cycle import bursts, cycle_rows, our_side, python_side, run_cycles, thrice
 from brakelab.bench.filters import FilterpyFilters, NumpyFilters, constants, filter_cycles, new_observer
-from brakelab.bench.measure import Figure, Row
 from brakelab.bench.plant import cars, plant_rows
 from brakelab.bench.socket_pair import put
 from brakelab.bench.step import filter_table, step_rows
 from brakelab.studies.braking import MESSAGES_IN, simulated_stop
+from brakelab.studies.measure import Figure, Row
 from ecu.bus.receive import contract_receive_plan, new_reception, receive
 from ecu.contract.records import FRAME, INPUTS, STAGES, new_record
 from ecu.contract.signals import INPUT

@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from brakelab.bench import command, output
-from brakelab.bench.measure import Figure
 from brakelab.simulation.closed_loop import Drive
+from brakelab.studies.measure import Figure
 from brakelab.studies.observers import (
     JOINT,
     NEVER,

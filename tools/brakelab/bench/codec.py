@@ -5,8 +5,8 @@ from typing import Any, Final
 import cantools
 import numpy as np
 
-from brakelab.bench.measure import Row, alternate, installed, timed
 from brakelab.studies.braking import ALL_DUE, MESSAGES_IN, Stop, simulated_stop
+from brakelab.studies.measure import Row, alternate, installed, timed
 from ecu.bus.receive import ReceivePlan, contract_receive_plan, new_reception, receive
 from ecu.bus.transmit import (
     Transmission,

@@ -9,7 +9,7 @@ from typing import Final, TypeVar
 from rich.console import Console
 from rich.progress import track
 
-from brakelab.bench.measure import NOT_INSTALLED, machine
+from brakelab.bench.observer_times import step_times
 from brakelab.bench.output import PICTURES, plain_row, print_json, print_tables, write_page
 from brakelab.bench.times import BENCHES
 from brakelab.studies import (
@@ -27,7 +27,8 @@ from brakelab.studies.chart import write_chart
 from brakelab.studies.energy import energy_tables
 from brakelab.studies.failures import failure_tables
 from brakelab.studies.friction import friction_tables
-from brakelab.studies.observers import WIDE, Sample, Task, observer_rows, step_times, tasks
+from brakelab.studies.measure import NOT_INSTALLED, machine
+from brakelab.studies.observers import WIDE, Sample, Task, observer_rows, tasks
 from brakelab.studies.observers_cases import configured
 from brakelab.studies.observers_picture import PICTURED, consistency_of, write_picture
 from brakelab.studies.observers_table import finite, observer_tables
@@ -223,7 +224,8 @@ def _wear(json: bool, seeds: int) -> int:
 def _dust(json: bool, seeds: int) -> int:
     from brakelab.studies import dust
 
-    tables = dust.dust_page(partial(_each_car, DUST), min(seeds, dust.DRAWS), not json)
+    picture = None if json else resource(PICTURES) / "dust.svg"
+    tables = dust.dust_page(partial(_each_car, DUST), min(seeds, dust.DRAWS), picture)
     return _page(DUST, "Dust", DUST_TEXT, tables, json)
 
 

@@ -5,8 +5,8 @@ from typing import Any, Final
 
 from rich.console import Console
 
-from brakelab.bench.measure import Figure, Row
 from brakelab.bench.provenance import measured_on
+from brakelab.studies.measure import Figure, Row
 from brakelab.studies.table import Table, markdown, show
 from ecu.settings.resources import resource
 

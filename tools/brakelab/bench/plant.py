@@ -13,13 +13,13 @@ from typing import Any, Final
 import numba
 import numpy as np
 
-from brakelab.bench.measure import Figure, Row, Task, alternate, installed, timed
 from brakelab.plant.description import load_plant
 from brakelab.plant.draw import draw, load_widths
 from brakelab.plant.fleet import advance_fleet
 from brakelab.plant.jit import kernel
 from brakelab.plant.records import COMMANDS, RecordArray
 from brakelab.plant.vehicle import STEP, advance, new_state
+from brakelab.studies.measure import Figure, Row, Task, alternate, installed, timed
 from ecu.settings.resources import resource
 
 ROUNDS: Final = 11

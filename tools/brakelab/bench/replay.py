@@ -18,7 +18,6 @@ import numpy as np
 from asammdf import MDF
 
 from brakelab.bench.log_formats import FORMATS, convert
-from brakelab.bench.measure import Figure, Row, Task, alternate, installed
 from brakelab.bench.python_ecu import PythonEcu
 from brakelab.bench.step import run_steps
 from brakelab.logs.candump_text import candump_text
@@ -27,6 +26,7 @@ from brakelab.logs.log_quality import LogQuality
 from brakelab.replay.command import replay
 from brakelab.simulation.closed_loop import VEHICLE_BUS, new_loop, run
 from brakelab.simulation.scenario import load_scenario
+from brakelab.studies.measure import Figure, Row, Task, alternate, installed
 from brakelab.studies.table import Table, time_table
 from ecu.algorithm.step import new_state
 from ecu.bus.freshness import begin_cycle, end_cycle

@@ -14,8 +14,8 @@ from brakelab.bench.filters import (
     new_observer,
     note_inputs,
 )
-from brakelab.bench.measure import NOT_INSTALLED, Figure, Row, alternate, installed, timed
 from brakelab.studies.braking import simulated_stop
+from brakelab.studies.measure import NOT_INSTALLED, Figure, Row, alternate, installed, timed
 from ecu.algorithm.step import new_state, step
 from ecu.contract.records import OUTPUTS, RecordArray, new_record
 from ecu.jit import kernel

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 from brakelab.bench import codec, cycle, plant, step
-from brakelab.bench.measure import Row
+from brakelab.studies.measure import Row
 
 
 class Bench(NamedTuple):

@@ -13,13 +13,13 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.bench.measure import figure
 from brakelab.plant.friction.constant import Constant
 from brakelab.plant.friction.laws import LAWS
 from brakelab.plant.sensor_errors import SensorErrors
 from brakelab.simulation.closed_loop import Drive, Loop, new_loop, run
 from brakelab.simulation.faults import Fault
 from brakelab.simulation.scenario import Phase, Scenario
+from brakelab.studies.measure import figure
 from brakelab.studies.observers import JOINT, ORDINARY, drive_car
 from brakelab.studies.observers_cases import Setup, shipped
 from brakelab.studies.stops import FULL, window

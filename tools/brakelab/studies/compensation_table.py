@@ -4,7 +4,6 @@ from typing import Final
 
 import numpy as np
 
-from brakelab.bench.measure import Figure, figure
 from brakelab.studies.compensation import (
     CURVES,
     FADE_RUNS,
@@ -14,6 +13,7 @@ from brakelab.studies.compensation import (
     SETTLED_S,
     Car,
 )
+from brakelab.studies.measure import Figure, figure
 from brakelab.studies.stops import Vector
 from brakelab.studies.table import Table
 

@@ -2,17 +2,16 @@
 
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from brakelab.bench.output import PICTURES
 from brakelab.identification.dust_command import LEGEND, dust_panels
 from brakelab.identification.dust_tables import THESIS, spearman_table, trip_table
 from brakelab.studies.chart import write_chart
 from brakelab.studies.dust_study import Draw, OnBoard, draw_trips, drive_on_board, pictured
 from brakelab.studies.table import Table
-from ecu.settings.resources import resource
 
 DRAWS: Final = 20
 QUIET_DRAWS: Final = 10
@@ -130,14 +129,13 @@ def dust_tables(draws: list[Draw], quiet: list[Draw], cars: list[OnBoard]) -> li
     ]  # fmt: skip
 
 
-def dust_page(each: Callable[..., list[Any]], draws: int, pictured_too: bool) -> list[Table]:
+def dust_page(each: Callable[..., list[Any]], draws: int, picture: Path | None) -> list[Table]:
     """Return the tables of the page and draw its figures; `each(function, count)` calls a function for 0 to
     count - 1."""
     many = each(draw_trips, draws)
     quiet = each(partial(draw_trips, quiet=True), min(draws, QUIET_DRAWS))
     cars = each(drive_on_board, min(draws, CARS))
     trips, judged, chosen = pictured()
-    if pictured_too:
-        picture = resource(PICTURES) / "dust.svg"
+    if picture is not None:
         write_chart(picture, dust_panels(trips, judged, chosen), LEGEND)
     return [*dust_tables(many, quiet, cars), trip_table(trips), spearman_table(trips)]

@@ -8,10 +8,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from brakelab.bench.measure import figure
 from brakelab.simulation.closed_loop import Drive, new_loop, run
 from brakelab.simulation.faults import Fault
 from brakelab.simulation.scenario import Phase, Scenario
+from brakelab.studies.measure import figure
 from brakelab.studies.observers_cases import shipped
 from brakelab.studies.table import Table, spread
 from ecu.contract.faults import BRAKE_FAILED

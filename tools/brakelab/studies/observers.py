@@ -12,13 +12,11 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.bench.measure import Figure, alternate, figure, timed
-from brakelab.bench.step import CYCLES, ROUNDS, run_steps
 from brakelab.logs.signal_file import freshness_at_any_rate
 from brakelab.simulation.closed_loop import Drive, new_loop, run
 from brakelab.simulation.observer import with_observer
 from brakelab.simulation.scenario_car import with_draw
-from brakelab.studies.braking import simulated_stop
+from brakelab.studies.measure import Figure, figure
 from brakelab.studies.observers_cases import (
     ACCURACY,
     CASES,
@@ -34,7 +32,7 @@ from brakelab.studies.observers_cases import (
 from brakelab.studies.stops import AXLES, LOWEST_SPEED, Vector, columns, friction_errors, nrmse
 from ecu.algorithm.step import new_state
 from ecu.contract.params import OBSERVERS
-from ecu.contract.records import OUTPUTS, RecordArray, new_record
+from ecu.contract.records import RecordArray
 from ecu.contract.signals import CORNERS
 from ecu.recording.store import out_of_range
 from ecu.settings.config import new_params
@@ -263,28 +261,3 @@ def observer_rows(todo: list[Task], spread: Drivers = map) -> list[Row]:
             )
         )
     return rows
-
-
-def step_times() -> dict[str, Figure]:
-    """Return the processor time of a whole cycle with each observer [µs]."""
-    stop = simulated_stop()
-    inputs = stop.inputs[: stop.braking + CYCLES]
-    measured = []
-    for observer in OBSERVERS:
-        params = new_params(with_observer(configured(), observer))
-        params["mapped"] = stop.params["mapped"]
-        state, outputs = new_state(params), new_record(OUTPUTS)
-        run_steps(params, state, inputs[: stop.braking], outputs)
-        measured.append(_timed(params, state, inputs[stop.braking :], outputs))
-    return dict(zip(OBSERVERS, alternate(ROUNDS, measured), strict=True))
-
-
-def _timed(
-    params: RecordArray, start: RecordArray, inputs: RecordArray, outputs: RecordArray
-) -> Callable[[], float]:
-    state = start.copy()
-
-    def reset() -> None:
-        state[:] = start
-
-    return timed(lambda: run_steps(params, state, inputs, outputs), len(inputs), reset)

@@ -5,7 +5,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from brakelab.bench.measure import Figure
+from brakelab.studies.measure import Figure
 from brakelab.studies.observers import JOINT, NEVER, Row
 from brakelab.studies.observers_cases import (
     ACCURACY,

@@ -13,7 +13,6 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.bench.measure import figure
 from brakelab.replay.drive import replay_drive
 from brakelab.replay.quality import Findings
 from brakelab.replay.source import load_source
@@ -23,6 +22,7 @@ from brakelab.results.prediction import corners, errors
 from brakelab.simulation.closed_loop import Drive, new_loop, run
 from brakelab.simulation.scenario import Phase, Scenario
 from brakelab.simulation.simulate import write_columns
+from brakelab.studies.measure import figure
 from brakelab.studies.observers_cases import shipped
 from brakelab.studies.table import Table, spread
 from ecu.contract.signals import CORNERS

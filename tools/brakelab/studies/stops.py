@@ -17,10 +17,10 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.bench.measure import Figure, figure
 from brakelab.simulation.closed_loop import Drive, Loop, new_loop, run
 from brakelab.simulation.scenario import Scenario, load_scenario
 from brakelab.simulation.scenario_car import with_draw
+from brakelab.studies.measure import Figure, figure
 from ecu.contract.signals import CORNERS
 from ecu.settings.config import Config
 from ecu.settings.resources import resource

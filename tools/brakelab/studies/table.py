@@ -6,7 +6,7 @@ from typing import NamedTuple
 from rich.console import Console
 from rich.table import Table as RichTable
 
-from brakelab.bench.measure import Figure, Row
+from brakelab.studies.measure import Figure, Row
 from brakelab.studies.stops import Stops
 
 
