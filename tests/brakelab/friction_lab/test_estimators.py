@@ -58,6 +58,7 @@ def test_a_second_order_surface_finds_a_second_order_surface(stops: Stops) -> No
     assert response_surface(made)(made) == pytest.approx(made.mu, abs=1e-3)
 
 
+@pytest.mark.study
 def test_the_ranking_of_table_2_1(two_trips: tuple[Trip, Trip], lining: Lining) -> None:
     """The network first over all manoeuvres, of which a trip of 40 brakings has few each (in each of them:
     `bench lab`); a wrong temperature costs it, and the surface nothing."""

@@ -31,6 +31,7 @@ def r1_columns(lining: Lining) -> Columns:
     return Columns.own(lining, float(rig["mass"] * rig["tyre_radius"] ** 2))
 
 
+@pytest.mark.study
 def test_ilvo_is_found_in_its_own_data_within_its_intervals(
     lining: Lining, r1_columns: Columns, ilvo_recording: Run
 ) -> None:

@@ -34,6 +34,7 @@ def test_a_law_without_scatter_is_found_exactly():
     assert fit.r2 > 0.9999
 
 
+@pytest.mark.study
 def test_the_true_mass_is_predicted_within_its_scatter_and_confidence_holds_over_seeds():
     """New blocks by the identified law; and gamma_10 + ... where the three true terms were chosen."""
     held, counted, errors = 0, 0, []

@@ -43,6 +43,7 @@ def test_errors_of_what_is_told_leave_the_rest_out():
     assert _told_error(rows) == pytest.approx(0.10)
 
 
+@pytest.mark.study
 def test_one_draw_of_the_trips():
     found = draw_trips(4)
     assert set(found.models) == set(FITS)

@@ -115,6 +115,7 @@ CRUISES = [
 ]
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("name", "mean", "swing"), CRUISES, ids=[row[0] for row in CRUISES])
 def test_a_minute_of_noisy_motors_does_not_move_the_mass(new_car, name: str, mean, swing: float) -> None:
     """10 N m at each motor: were its square in what is learned, it would push the mass up for ever."""
