@@ -16,8 +16,9 @@ import numba
 import numpy as np
 
 from ecu import jit
-from ecu.bus.channel import Channel, open_channel
+from ecu.bus.channel import open_channel
 from ecu.bus.freshness import NEVER, begin_cycle
+from ecu.bus.protocol import Channel
 from ecu.bus.receive import ReceivePlan, Reception, new_reception, receive
 from ecu.bus.signal_map import receive_plan
 from ecu.bus.transmit import contract_transmit_plan

@@ -9,7 +9,7 @@ import itertools
 import tempfile
 from pathlib import Path
 
-from ecu.bus.channel import BusStatus
+from ecu.bus.protocol import BusStatus
 from ecu.bus.signal_map import receive_plan
 from ecu.bus.transmit import contract_transmit_plan
 from ecu.contract.records import RecordArray

@@ -1,7 +1,7 @@
-"""A bus as the cycle sees it: drain what waits, send without blocking, say how the line is.
+"""Channels on every interface of python-can.
 
-python-can opens every interface. On SocketCAN the bus's own socket is then drained directly
-(`ecu/bus/socketcan.py`); every other interface goes through python-can's messages.
+On SocketCAN the bus's own socket is drained directly (`ecu/bus/socketcan.py`); every other interface goes
+through python-can's messages.
 """
 
 import logging
@@ -12,11 +12,12 @@ import time
 from collections import deque
 from collections.abc import Iterable
 from contextlib import suppress
-from typing import Any, Final, NamedTuple, Protocol
+from typing import Any, Final
 
 import can
 
 from ecu.bus.database import closest
+from ecu.bus.protocol import BusStatus, Channel
 from ecu.contract.records import EXTENDED_ID, FRAME_EXTENDED, FRAME_FD, RecordArray
 from ecu.errors import UserError
 
@@ -29,35 +30,6 @@ _MALFORMED_AT_ONCE: Final = 200  # messages that cannot be read, per cycle: the 
 _KNOWN: Final = sorted(can.VALID_INTERFACES)
 
 logging.getLogger("can").addHandler(logging.NullHandler())  # its exceptions say it again, in one line
-
-
-class BusStatus(NamedTuple):
-    """State of the bus."""
-
-    bus_off: bool
-    error_passive: bool
-    send_failures: int
-    """Frames that were not taken, or not acknowledged, so far."""
-    dropped: int
-    """Received frames that the kernel dropped so far."""
-
-
-class Channel(Protocol):
-    """One open bus."""
-
-    name: str
-
-    def drain(self, frames: RecordArray, start: int) -> int:
-        """Write every frame that waits, from `frames[start]` on; return how many, at most what fits."""
-
-    def send(self, frames: RecordArray, count: int) -> int:
-        """Hand over the first `count` frames without blocking; return how many were taken."""
-
-    def status(self) -> BusStatus:
-        """Return how the line is now."""
-
-    def close(self) -> None:
-        """Leave the bus."""
 
 
 def open_channel(interface: str, channel: str, *, receive_ids: Iterable[int], fd: bool = False) -> Channel:

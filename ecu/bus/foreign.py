@@ -3,7 +3,7 @@
 import time
 from typing import Final
 
-from ecu.bus.channel import Channel
+from ecu.bus.protocol import Channel
 from ecu.bus.transmit import TransmitPlan
 from ecu.contract.records import EXTENDED_ID, FRAME, FRAME_EXTENDED, new_record
 from ecu.errors import UserError

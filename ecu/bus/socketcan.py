@@ -16,7 +16,7 @@ import can
 import numpy as np
 from numpy.typing import NDArray
 
-from ecu.bus.channel import BusStatus
+from ecu.bus.protocol import BusStatus
 from ecu.contract.records import EXTENDED_ID, FRAME, FRAME_EXTENDED, FRAME_FD, RecordArray, new_record
 from ecu.errors import UserError
 from ecu.jit import kernel

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ecu.algorithm.step import new_state, step
-from ecu.bus.channel import BusStatus, Channel
 from ecu.bus.freshness import begin_cycle, end_cycle
+from ecu.bus.protocol import BusStatus, Channel
 from ecu.bus.receive import ReceivePlan, Reception, new_reception, receive
 from ecu.bus.transmit import Transmission, TransmitPlan, frame_buffer, new_transmission, transmit
 from ecu.contract import faults

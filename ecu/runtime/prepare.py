@@ -17,8 +17,9 @@ import structlog
 
 from ecu import __version__
 from ecu.algorithm.step import INITIAL, initial_part
-from ecu.bus.channel import Channel, open_channel
+from ecu.bus.channel import open_channel
 from ecu.bus.foreign import discard, listen_before_send
+from ecu.bus.protocol import Channel
 from ecu.bus.signal_map import receive_plan
 from ecu.bus.transmit import contract_transmit_plan
 from ecu.contract.records import RecordArray

@@ -12,7 +12,7 @@ from brakelab.simulation.faults import Fault
 from brakelab.simulation.scenario import Scenario, load_scenario
 from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS
 from brakelab.vehicle_node import drive_in_real_time, main, new_node, write_truth_file
-from ecu.bus.channel import BusStatus
+from ecu.bus.protocol import BusStatus
 from ecu.bus.transmit import frame_buffer, new_transmission, transmit
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import N_OUTPUTS, OUTPUT

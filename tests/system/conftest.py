@@ -19,7 +19,8 @@ import numpy as np
 import pytest
 
 from brakelab.simulation.priority import PRIORITY
-from ecu.bus.channel import Channel, open_channel
+from ecu.bus.channel import open_channel
+from ecu.bus.protocol import Channel
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
 from ecu.contract.records import FRAME, new_record
 from ecu.contract.signals import INPUT, N_INPUTS

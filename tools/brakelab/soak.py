@@ -26,7 +26,7 @@ from brakelab.simulation.scenario import load_scenario
 from brakelab.simulation.vehicle_bus import N_TRUTH
 from brakelab.vehicle_node import live_through, new_node
 from ecu.algorithm.step import INITIAL, initial_part
-from ecu.bus.channel import BusStatus
+from ecu.bus.protocol import BusStatus
 from ecu.bus.signal_map import receive_plan
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CYCLE_NS

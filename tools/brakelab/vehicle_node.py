@@ -37,8 +37,9 @@ from brakelab.simulation.vehicle_bus import (
     sense,
     write_truth,
 )
-from ecu.bus.channel import Channel, open_channel
+from ecu.bus.channel import open_channel
 from ecu.bus.freshness import begin_cycle, target_dtype
+from ecu.bus.protocol import Channel
 from ecu.bus.receive import Reception, new_reception, receive
 from ecu.bus.transmit import Transmission, frame_buffer, new_transmission, transmit
 from ecu.contract.records import FRAME, RecordArray

@@ -12,8 +12,8 @@ from brakelab.play.command import INTERRUPTED, Sent, Waker, play, send_on_schedu
 from brakelab.play.play_log import contract_frames, raw_frames, timed, timed_frames
 from brakelab.replay.quality import Findings
 from brakelab.replay.source import load_source
-from ecu.bus.channel import BusStatus
 from ecu.bus.freshness import begin_cycle, end_cycle
+from ecu.bus.protocol import BusStatus
 from ecu.bus.receive import contract_receive_plan, new_reception, receive
 from ecu.contract.records import FRAME, INPUTS, RecordArray, new_record
 from ecu.contract.signals import ACCEL_X, CYCLE_NS, STEERING_ANGLE, USABLE, WHEEL_SPEED

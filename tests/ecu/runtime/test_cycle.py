@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numba.core.runtime import _nrt_python, rtsys
 
-from ecu.bus.channel import BusStatus
+from ecu.bus.protocol import BusStatus
 from ecu.bus.receive import contract_receive_plan
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
 from ecu.contract import faults

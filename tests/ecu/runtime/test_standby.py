@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ecu.bus.channel import BusStatus
 from ecu.bus.e2e import P01_MODULO
+from ecu.bus.protocol import BusStatus
 from ecu.bus.receive import contract_receive_plan
 from ecu.bus.transmit import contract_transmit_plan, new_transmission
 from ecu.contract.faults import FOREIGN_SENDER

@@ -19,7 +19,8 @@ from brakelab.play.read_ahead import ReadAhead
 from brakelab.replay.quality import Findings, damage_lines
 from brakelab.replay.source import map_unused
 from brakelab.simulation.priority import PRIORITY, ask_for_priority
-from ecu.bus.channel import Channel, open_channel
+from ecu.bus.channel import open_channel
+from ecu.bus.protocol import Channel
 from ecu.contract.records import FRAME_FD, RecordArray
 from ecu.errors import UserError
 from ecu.runtime.clock import Histogram, TimeSource, system_time
