@@ -92,6 +92,26 @@ def test_logs_of_can_logconvert(tmp_path: Path, end: str) -> None:
     np.testing.assert_array_equal(np.diff(frames["stamp_ns"]), np.diff(expected["stamp_ns"]))
 
 
+@pytest.mark.parametrize("name", ["can0", "can1", "1", "2"])
+def test_a_bus_of_an_mdf_file_by_python_can_is_that_of_the_other_formats(
+    kona: dict[str, Path], tmp_path: Path, name: str
+) -> None:
+    """Its writer counts channels from 0, all others from 1."""
+    head = tmp_path / "head.log"
+    head.write_bytes(b"".join(kona["sorted"].read_bytes().splitlines(keepends=True)[:400]))
+    out = tmp_path / "head.mf4"
+    subprocess.run([sys.executable, "-m", "can.logconvert", head, out], check=True)
+    chosen = []
+    for path in (head, out):
+        findings = Findings(path)
+        blocks = read_frames(path, findings.interfaces, findings.log)
+        chosen.append(np.concatenate(list(only_interface(blocks, name, findings))))
+        assert sorted(findings.interfaces) == ["can0", "can1"]
+    assert 0 < len(chosen[0]) < 400
+    for column in ("can_id", "length", "data"):
+        np.testing.assert_array_equal(chosen[1][column], chosen[0][column])
+
+
 @pytest.mark.parametrize("end", FORMATS)
 @pytest.mark.parametrize("name", ["can1", "2"])
 def test_a_bus_is_chosen_by_its_interface_or_channel(kona: dict[str, Path], end: str, name: str) -> None:

@@ -3,7 +3,8 @@
 A file that has a group with a channel `CAN_DataFrame` (ASAM MDF bus logging) holds frames; `CAN_RemoteFrame`
 and `CAN_ErrorFrame` may stand beside it, each in groups of its own. Records are taken in windows, so that a
 file of any length fits in memory, and the groups are merged by time. Stamps are rounded to whole
-microseconds, as the ECU has them. `BusChannel` n becomes interface number n.
+microseconds, as the ECU has them. `BusChannel` n becomes channel n; a file that has a channel 0 counts from 0
+(python-can's writer does), and its n becomes channel n + 1.
 
 asammdf is in an extra: where it is installed, `import can` takes longer (see `ecu/bus/__init__.py`).
 """
@@ -161,7 +162,8 @@ def read_mdf(
         if name in _KINDS and measurement.rows(group)
     ]
     total = sum(measurement.rows(group) for group, _, _ in groups)
-    sources = [_frames(measurement, *group, quality) for group in groups]
+    shift = int(_counts_from_zero(measurement, groups))
+    sources = [_frames(measurement, *group, shift, quality) for group in groups]
     read = 0
     try:
         for ready in in_step(sources, lambda block: block["frame"]["stamp_ns"]):
@@ -182,10 +184,26 @@ def read_mdf(
         )
 
 
+def _counts_from_zero(measurement: Measurement, groups: Sequence[tuple[int, int, str]]) -> bool:
+    """Return whether any frame is on channel 0; looked for until the first one."""
+    for group, _, kind in groups:
+        places = [
+            place for name, of, place in measurement.channels() if (of, name) == (group, f"{kind}.BusChannel")
+        ]
+        for first in range(0, measurement.rows(group), WINDOW) if places else ():
+            try:
+                column = measurement.column(group, places[0], first, WINDOW, raw=True)
+            except Exception:  # a damaged file makes asammdf raise anything; `_frames` tells where
+                break
+            if (column.samples == 0).any():
+                return True
+    return False
+
+
 def _frames(
-    measurement: Measurement, group: int, index: int, kind: str, quality: LogQuality
+    measurement: Measurement, group: int, index: int, kind: str, shift: int, quality: LogQuality
 ) -> Iterator[RecordArray]:
-    """Yield the frames of a group as `_PLACED`."""
+    """Yield the frames of a group as `_PLACED`; `shift` is added to the number of a channel."""
     places = {
         name.partition(".")[2]: place
         for name, of, place in measurement.channels()
@@ -223,6 +241,7 @@ def _frames(
             block["place"] = np.arange(first + begin, first + begin + len(block))
             block["frame"]["stamp_ns"] = start_ns + np.rint(stamps[part] * 1e6).astype(np.int64) * 1000
             _fill(block["frame"], {name: column[part] for name, column in columns.items()}, _KINDS[kind])
+            block["frame"]["bus"] += shift if "BusChannel" in columns else 0
             yield block
         if quality.cut:
             return

@@ -90,6 +90,7 @@ def replay_log(
     set_raw_ends(ecu.seen, plan.signals)
     reception = findings.reception = new_reception(plan)
     findings.freshness, findings.mapped = reception.freshness, plan.mapped
+    findings.bus = source.bus
     blocks = read_frames(log, findings.interfaces, findings.log, advance, mended=not counted)
     if source.bus and not counted:
         blocks = only_interface(blocks, source.bus, findings)

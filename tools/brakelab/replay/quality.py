@@ -44,6 +44,8 @@ class Findings:
     log: LogQuality = field(default_factory=LogQuality)
     signals: SignalQuality = field(default_factory=SignalQuality)
     reception: Reception | None = None
+    bus: str = ""
+    """The interface that the map names, empty: all."""
     other_interfaces: int = 0
     """Frames of interfaces that the map does not name."""
     freshness: RecordArray | None = None
@@ -139,7 +141,9 @@ def quality_lines(findings: Findings, plan: ReceivePlan) -> list[str]:
         if not counter["received"] and not message["foreign"]
     ]
     if silent:
-        lines.append(f"{name}: never received: {', '.join(silent)}")
+        where = f" on {findings.bus}" if findings.bus else ""
+        has = f"; the log has {', '.join(findings.interfaces)}" if findings.interfaces else ""
+        lines.append(f"{name}: never received{where}: {', '.join(silent)}{has}")
     return lines
 
 
