@@ -179,6 +179,7 @@ app.add_typer(map_app, name="map")
 def suggest(
     log: Annotated[Path, typer.Argument(metavar="LOG", help="Recorded drive")],
     dbc: Annotated[Path, typer.Option("--dbc", metavar="DB", help="CAN database of the car")],
+    config: Annotated[Path | None, CONFIG_OPTION] = None,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="MAP.toml", help="Map to write; default: print it")
     ] = None,
@@ -186,7 +187,7 @@ def suggest(
     """Propose a map by names, units and physics, for you to edit."""
     from brakelab.mapping import command
 
-    return command.suggest(log, dbc, out)
+    return command.suggest(log, dbc, config, out)
 
 
 @app.command()

@@ -1,5 +1,6 @@
 """A map proposed from a log: what physics and names say, against cars whose map is known."""
 
+import re
 from pathlib import Path
 
 import cantools
@@ -8,16 +9,20 @@ import pytest
 
 from brakelab.logs.formats import read_frames
 from brakelab.logs.log_quality import LogQuality
+from brakelab.mapping.command import timeout
+from brakelab.mapping.line import fit
 from brakelab.mapping.names import corner_of, words
-from brakelab.mapping.physics import Found, fit, propose
-from brakelab.mapping.series import read_series
+from brakelab.mapping.physics import Found, motion_of, propose, wheel_speeds
+from brakelab.mapping.series import Series, read_series
+from brakelab.mapping.torque import brake_torque, stand_in
 from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.ecu_inputs import vehicle_frames
 from brakelab.studies.observers_cases import shipped
 from ecu import cli
 from ecu.bus.database import load_database
 from ecu.bus.signal_map import load_signal_map, read_signal_map
-from ecu.settings.config import load_config
+from ecu.contract.signals import CORNERS
+from ecu.settings.config import load_config, new_params
 from ecu.settings.resources import resource
 
 LOGS = Path(__file__).parents[2] / "data"
@@ -157,6 +162,118 @@ def test_real_cars_get_what_their_maps_say(car: str) -> None:
             assert np.sign(one.factor) == np.sign(known.factor)
         checked += 1
     assert checked >= 5
+
+
+def scaled(text: str, signal: str, by: float) -> str:
+    """Return the database with the scale of a signal multiplied, its offset too."""
+
+    def changed(match: re.Match[str]) -> str:
+        return f"{match[1]}({by * float(match[2]):.12g},{by * float(match[3]):.12g})"
+
+    return re.sub(rf"( SG_ {signal} [^(]*)\(([^,]*),([^)]*)\)", changed, text)
+
+
+@pytest.mark.parametrize(
+    ("signal", "by", "said"),
+    [
+        ("accel_x", 1.0, ""),
+        ("accel_x", -1.45, "slope -1.6"),
+        ("accel_x", 1 / 9.80665, "it would fit g"),
+        ("yaw_rate", 57.29578, "it would fit deg/s"),
+    ],
+)
+def test_a_slope_that_is_not_one_is_told(drive, signal: str, by: float, said: str) -> None:
+    """Beside the 1.12 of the tyres, whose radius is 0.37 m instead of the 0.33 m assumed."""
+    warning = proposed(drive, scaled(contract(), signal, by))[signal].warning
+    assert (said in warning) if said else not warning
+
+
+def test_a_zero_error_is_taken_off(drive) -> None:
+    """Of an accelerometer that reads 0.45 m/s² too much, upside down; one below 0.05 m/s² is not."""
+    text = re.sub(
+        r"( SG_ accel_x [^(]*)\(([^,]*),([^)]*)\)",
+        lambda m: f"{m[1]}({-float(m[2]):.12g},{-float(m[3]) + 0.45:.12g})",
+        contract(),
+    )
+    right, wrong = proposed(drive, contract())["accel_x"], proposed(drive, text)["accel_x"]
+    assert (right.factor, wrong.factor) == (1.0, -1.0)
+    assert wrong.offset - right.offset == pytest.approx(0.45, abs=0.06)
+    assert abs(right.offset) < 0.1
+
+
+def series_of(target: str, period: float, gap: float) -> Found:
+    t = np.arange(0.0, 10.0, period)
+    t[t > 5.0] += gap - period
+    one = Series("M", target, "", 0, period, False, t, np.sin(t))
+    return Found(target, one, 1.0, 0.0, "", "", True)
+
+
+@pytest.mark.parametrize(
+    ("target", "gap", "expected"),
+    [
+        ("accel_x", 0.02, None),
+        ("accel_x", 0.06, None),
+        ("accel_x", 0.10, 0.15),
+        ("calliper_pressure_fl", 0.18, 0.30),
+        ("calliper_pressure_fl", 3.0, 0.75),
+        ("vehicle_speed", 0.20, None),
+    ],
+)
+def test_a_timeout_spans_the_longest_gap(target: str, gap: float, expected: float | None) -> None:
+    assert timeout(series_of(target, 0.02, gap)) == expected
+
+
+def test_the_faster_of_two_that_follow_equally_well_is_taken(drive) -> None:
+    series = read_series([drive], cantools.database.load_string(contract(), "dbc"))
+    (own,) = (one for one in series if one.signal == "accel_x")
+    slow = own._replace(message="Gateway", t=own.t[::10], value=own.value[::10])
+    for order in ([slow, *series], [*series, slow]):
+        found, _ = propose(order)
+        (taken,) = (one for one in found if one.target == "accel_x")
+        assert taken.series.message == "Imu"
+
+
+TORQUE = {"calliper_pressure_fl": "BrkTot_Tq_Actl", "calliper_pressure_fr": "S2"} | {
+    "calliper_pressure_rl": "S3",
+    "calliper_pressure_rr": "S4",
+}
+
+
+def test_a_brake_torque_stands_in_for_pressures(drive) -> None:
+    """As many bar as give the torque at nominal friction, by the force on the pads and the lever."""
+    text = renamed(contract(), **TORQUE)
+    text = re.sub(r'( SG_ BrkTot_Tq_Actl .*)"bar"', r'\1"Nm"', text)
+    text = re.sub(r'( SG_ S[234] .*)"bar"', r'\1""', text)
+    series = read_series([drive], cantools.database.load_string(text, "dbc"))
+    found, _ = propose(series)
+    assert not [one for one in found if one.target.startswith("calliper")]
+    torque = brake_torque(series, motion_of(wheel_speeds(series)))
+    assert torque is not None
+    assert torque[0].signal == "BrkTot_Tq_Actl"
+    config = load_config(resource("config/mustang.toml"))
+    pressures = stand_in(torque, new_params(config)[0])
+    assert [one.target for one in pressures] == [f"calliper_pressure_{c}" for c in CORNERS]
+    total = 0.0
+    for one, axle in zip(pressures, (config.front, config.front, config.rear, config.rear), strict=True):
+        clamp = axle.pistons * np.pi * (0.5 * axle.piston_diameter) ** 2 * 1e5 * 1000.0 * one.factor
+        total += 2.0 * axle.mu_nominal * clamp * axle.effective_radius
+    assert total == pytest.approx(1000.0)
+    shipped_map = read_signal_map(resource("config/maps/mustang.toml")).inputs
+    for one in pressures:
+        assert one.factor == pytest.approx(shipped_map[one.target].factor, rel=0.02)
+
+
+@pytest.mark.drives
+def test_the_whole_mustang_gets_what_its_shipped_map_has(drives: Path, tmp_path: Path) -> None:
+    log, out = drives / "mustang" / "mustang_s550.candump.log", tmp_path / "map.toml"
+    database = resource("dbc/cars/mustang.dbc")
+    words = ["map", "suggest", str(log), "--dbc", str(database), "--config", "mustang", "--out", str(out)]
+    assert cli.main(words) == 0
+    found = read_signal_map(out).inputs
+    assert (found["accel_x"].message, found["accel_x"].timeout) == ("BrakeSnData_3", 0.15)
+    assert found["accel_x"].offset == pytest.approx(-0.45, abs=0.03)
+    assert found["calliper_pressure_fl"].signal == "BrkTot_Tq_Actl"
+    assert found["calliper_pressure_rr"].timeout == 0.3
 
 
 def test_the_written_map_is_one(drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,5 +1,6 @@
 """`brake-ecu map suggest`: proposes a signal map that the user then edits."""
 
+import math
 import os
 import sys
 from pathlib import Path
@@ -12,29 +13,37 @@ from rich.table import Table
 
 from brakelab.logs.formats import read_frames
 from brakelab.mapping.names import converts, words
-from brakelab.mapping.physics import RADIUS, Found, propose
+from brakelab.mapping.physics import RADIUS, Found, motion_of, propose, wheel_speeds
 from brakelab.mapping.series import Series, read_series
+from brakelab.mapping.torque import FORMULA, brake_torque, stand_in
 from brakelab.replay.quality import Findings, damage_lines
 from brakelab.results.console import WIDTH
 from ecu.bus.database import load_database
 from ecu.bus.signal_map import load_signal_map
 from ecu.bus.units import spelled
-from ecu.contract.signals import without_corner
+from ecu.contract.signals import INPUT, INPUT_SIGNALS, without_corner
 from ecu.errors import UserError
+from ecu.settings.config import load_config, new_params
 
 COUNTING: Final = {"counter", "count", "cnt", "cntr", "alive", "ctr", "no"}
 WANTED: Final = (
     *("wheel_speed_fl", "accel_x", "accel_y", "yaw_rate", "steering_angle", "calliper_pressure_fl"),
     *("pedal_position", "accelerator_position", "motor_torque_fl", "abs_active"),
 )
+SPARE: Final = 1.5  # time-out over the longest gap seen
+LONGEST: Final = 0.5  # s, a gap beyond it is a sender that fell silent
+STEP: Final = 0.05  # s, time-outs are rounded up to it
 
 
-def suggest(log: Path, dbc: Path, out: Path | None) -> int:
+def suggest(log: Path, dbc: Path, config: Path | None, out: Path | None) -> int:
     """Print a proposal with its evidence; write it to `out`, or print it where there is none. Returns 0.
 
+    `config` is of the car: where it sends a brake torque in place of pressures, its brakes turn one into the
+    others.
+
     Raises:
-        UserError: the log, the database or `out` is not right, or no wheel speeds were found, against which
-            everything else is judged.
+        UserError: the log, the database, `config` or `out` is not right, or no wheel speeds were found,
+            against which everything else is judged.
     """
     database, strict = _load(dbc)
     findings = Findings(log)
@@ -47,8 +56,19 @@ def suggest(log: Path, dbc: Path, out: Path | None) -> int:
         raise UserError(str(dbc), "", f"names no four wheel speeds in {log}; give the database of this car")
     bus = found[0].series.bus
     here = [one for one in series if one.bus == bus]
-    text = map_text(found, here, (out or Path("map.toml")), dbc, strict, interfaces, bus)
+    hints = []
+    if not any(one.target.startswith("calliper_pressure") for one in found):
+        torque = brake_torque(here, motion_of(wheel_speeds(series)))
+        if torque and config:
+            found += stand_in(torque, new_params(load_config(config))[0])
+        elif torque:
+            name = f"{torque[0].message}.{torque[0].signal} [{torque[0].unit}]"
+            remedy = f"a brake torque can stand in for pressures, {FORMULA}; --config CONFIG writes it"
+            hints = [f"{name} follows the deceleration: {remedy}"]
+    text = map_text(found, here, (out or Path("map.toml")), dbc, strict, interfaces, bus, hints)
     _show(found, drives)
+    for line in hints + [f"{one.target}: {one.warning}" for one in found if one.warning]:
+        print(line, file=sys.stderr)
     if out is None:
         print(text)
         return 0
@@ -109,6 +129,13 @@ def _counter(series: list[Series], message: str) -> str | None:
     return None
 
 
+def timeout(found: Found) -> float | None:
+    """Return the time-out [s] that spans the gaps of a signal, None: the contract's does."""
+    usual = INPUT_SIGNALS[INPUT[found.target]].timeout_s
+    wanted = SPARE * min(found.series.longest_gap, LONGEST)
+    return round(STEP * math.ceil(wanted / STEP - 1e-9), 3) if wanted > usual else None
+
+
 def map_text(
     found: list[Found],
     series: list[Series],
@@ -117,8 +144,9 @@ def map_text(
     strict: bool,
     interfaces: list[str],
     bus: int,
+    hints: list[str],
 ) -> str:
-    """Return the proposal as the text of a signal map whose place will be `out`."""
+    """Return the proposal as the text of a signal map whose place will be `out`; `hints` become comments."""
     database = os.path.relpath(dbc.resolve(), out.resolve().parent)
     lines = [
         "# Proposed from a recorded drive: check every line, above all the signs (ISO 8855).",
@@ -136,9 +164,8 @@ def map_text(
     for message in dict.fromkeys(one.series.message for one in found):
         first = next(one.series for one in found if one.series.message == message)
         lines += ["", f"[messages.{message}]", f"period = {first.period:.3g}"]
-        mean = (first.t[-1] - first.t[0]) / max(len(first.t) - 1, 1)
-        if mean > 1.5 * first.period:
-            lines.append(f"slowest_period = {mean:.2g}      # frames are lost or irregular")
+        if first.mean_interval > 1.5 * first.period:
+            lines.append(f"slowest_period = {first.mean_interval:.2g}      # frames are lost or irregular")
         counter = _counter(series, message)
         if counter:
             lines.append(f'counter = {{ signal = "{counter}" }}')
@@ -148,6 +175,8 @@ def map_text(
         if one.evidence != told:
             lines.append(f"# {one.evidence}")
             told = one.evidence
+        if one.warning:
+            lines.append(f"# CHECK: {one.warning}")
         entry = f'message = "{one.series.message}", signal = "{one.series.signal}"'
         if one.factor != 1.0:
             entry += f", factor = {_number(one.factor)}"
@@ -155,5 +184,13 @@ def map_text(
             entry += f", offset = {_number(one.offset)}"
         if one.unit != spelled(one.series.unit):
             entry += f', unit = "{one.unit}"'
+        after = timeout(one)
+        if after:
+            entry += f", timeout = {after:g}"
         lines.append(f"{one.target} = {{ {entry} }}")
+        if one.series.longest_gap > LONGEST:
+            lines.append(
+                f"# {one.target}: no value for {one.series.longest_gap:.2f} s: look at the log there"
+            )
+    lines += [f"# {hint}" for hint in hints]
     return "\n".join(lines) + "\n"

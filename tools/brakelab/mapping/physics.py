@@ -20,22 +20,24 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.mapping.line import RATE, Fit, Vector, fit, smooth
 from brakelab.mapping.names import converts, corner_of, names_itself, score
 from brakelab.mapping.series import Series
 from ecu.bus.units import CONVERSIONS, spelled
 from ecu.contract.signals import CORNERS, INPUT, INPUT_SIGNALS
 
-Vector = NDArray[np.float64]
-
-RATE: Final = 50.0  # Hz, of the common grid
-SMOOTH_S: Final = 0.4
-LAGS: Final = range(-10, 11)  # grid steps
 TRACK, WHEELBASE, RADIUS = 1.55, 2.7, 0.33  # m, of a car that is not known yet. Assumption
 STEERING_RATIO: Final = 16.0  # likewise
 MOVING: Final = 3.0  # m/s
 BRAKING: Final = 0.7  # m/s^2
 LEAST: Final = 0.5  # correlation that speaks for a signal
 PER_WORD: Final = 0.1  # of correlation, that a word of the name is worth
+NEAR: Final = 0.02  # of correlation, by which two signals follow equally well
+FASTER: Final = 0.8  # of the interval, from which on the other of them is taken
+UNIT_SLOPE: Final = 1.25  # and its inverse: beyond, neither sign nor unit explains it
+LEAST_YAW: Final = 0.4  # of a yaw rate over that of the wheels: the outer tyre is pressed flat, turns faster
+CLEAN: Final = 0.95  # correlation, below which noise of the reference alone makes a slope small
+LEAST_ZERO: Final = 0.05  # m/s^2, a zero error worth a line
 IN_DEGREES: Final = 10.0  # slope against radians, of a signal without a unit, from which it must be degrees
 
 
@@ -51,6 +53,7 @@ class Found(NamedTuple):
     evidence: str
     sure: bool
     """Physics agrees; else the name alone speaks for it."""
+    warning: str = ""
 
 
 class Motion(NamedTuple):
@@ -70,15 +73,6 @@ class Motion(NamedTuple):
         return bool(np.mean(self.speed > MOVING) > 0.02)
 
 
-class Fit(NamedTuple):
-    """A line through a signal over a reference."""
-
-    correlation: float
-    slope: float
-    """Signal per reference."""
-    intercept: float
-
-
 def contract_unit(target: str) -> str:
     """Return the contract's unit of an input."""
     return INPUT_SIGNALS[INPUT[target]].unit
@@ -90,27 +84,6 @@ def on_grid(series: Series, t: Vector) -> Vector:
     if not known.any():
         return np.full(len(t), np.nan)
     return np.interp(t, series.t[known], series.value[known])
-
-
-def _smooth(values: Vector) -> Vector:
-    width = max(int(SMOOTH_S * RATE), 1)
-    padded = np.pad(values, (width // 2, width - 1 - width // 2), mode="edge")
-    return np.convolve(padded, np.full(width, 1.0 / width), mode="valid")
-
-
-def fit(signal: Vector, reference: Vector, rows: NDArray[np.bool_]) -> Fit:
-    """Return the line of the best of a few lags between a signal and what it should show."""
-    best = Fit(0.0, 0.0, 0.0)
-    for lag in LAGS:
-        shifted = np.roll(signal, lag)
-        s, r = shifted[rows], reference[rows]
-        if len(s) < 2 * RATE or s.std() == 0.0 or r.std() == 0.0:
-            continue
-        correlation = float(np.corrcoef(s, r)[0, 1])
-        if abs(correlation) > abs(best.correlation):
-            slope = float(np.cov(s, r)[0, 1] / r.var(ddof=1))
-            best = Fit(correlation, slope, float(s.mean() - slope * r.mean()))
-    return best
 
 
 def wheel_speeds(series: Iterable[Series]) -> dict[str, Series]:
@@ -151,7 +124,7 @@ def motion_of(wheels: dict[str, Series]) -> Motion:
     end = min(one.t[-1] for one in wheels.values())
     t = np.arange(start, end, 1.0 / RATE)
     metres = _metres_per_second(wheels["fl"])
-    fl, fr, rl, rr = (_smooth(np.abs(metres(on_grid(wheels[corner], t)))) for corner in CORNERS)
+    fl, fr, rl, rr = (smooth(np.abs(metres(on_grid(wheels[corner], t)))) for corner in CORNERS)
     speed = 0.25 * (fl + fr + rl + rr)
     front, rear = (fr - fl) / TRACK, (rr - rl) / TRACK
     return Motion(t, speed, np.gradient(speed, 1.0 / RATE), (0.5 * (front + rear), front, rear))
@@ -170,21 +143,25 @@ def _best(
     `fixed_sign`: of the slope, where a signal of the other sign is another quantity; 0: either.
     """
     unit = contract_unit(target)
-    best: tuple[float, Series, Fit] | None = None
+    fitting: list[tuple[float, Series, Fit]] = []
     for one in series:
         points = score(one.signal, target)
         if one.flag or points < 0 or not (converts(one.unit, unit) or (not one.unit and points >= 1)):
             continue
         if unit == "%" and points < 1:
             continue
-        found = fit(_smooth(on_grid(one, motion.t)), reference, rows)
+        found = fit(smooth(on_grid(one, motion.t)), reference, rows)
         strength = found.correlation * fixed_sign if fixed_sign else abs(found.correlation)
         if strength < LEAST or not math.isfinite(strength):
             continue
-        # Between signals that follow equally well the name decides.
-        if best is None or strength + PER_WORD * points > best[0]:
-            best = strength + PER_WORD * points, one, found
-    return best[1:] if best else None
+        # Between signals that follow equally well the name decides, then the rate.
+        fitting.append((strength + PER_WORD * points, one, found))
+    if not fitting:
+        return None
+    best = max(fitting, key=lambda candidate: candidate[0])
+    near = [candidate for candidate in fitting if candidate[0] > best[0] - NEAR]
+    fastest = min(near, key=lambda candidate: candidate[1].mean_interval)
+    return (fastest if fastest[1].mean_interval < FASTER * best[1].mean_interval else best)[1:]
 
 
 def _by_name(series: Iterable[Series], target: str) -> Series | None:
@@ -210,6 +187,24 @@ def _unit(target: str, one: Series, slope: float = math.inf) -> str:
     return unit.replace("rad", "deg") if abs(slope) > IN_DEGREES else unit
 
 
+def _slope_warning(slope: float, correlation: float, least: float) -> str:
+    """Return what to look into where a slope is not 1 and noise of the reference does not make it small.
+
+    `least` slope is usual.
+    """
+    size = abs(slope)
+    if size <= UNIT_SLOPE and (size >= least or correlation < CLEAN):
+        return ""
+    looks = [
+        f"; it would fit {unit}"
+        for units in (CONVERSIONS["rad/s"], CONVERSIONS["m/s^2"])
+        for unit, (scale, _) in units.items()
+        if scale != 1.0 and least < size * scale < UNIT_SLOPE
+    ]
+    likely = looks[0] if looks else f"; or the wheels do not have the {RADIUS} m assumed"
+    return f"slope {slope:+.2f} instead of {math.copysign(1.0, slope):+.0f}: check unit and scale{likely}"
+
+
 def inertial(series: list[Series], motion: Motion) -> list[Found]:
     """Return accelerations, yaw rate and steering angle of a car that drives."""
     fast = motion.speed > MOVING
@@ -224,7 +219,13 @@ def inertial(series: list[Series], motion: Motion) -> list[Found]:
         unit = _unit(target, one, line.slope)
         slope = line.slope * CONVERSIONS[contract_unit(target)][unit][0]
         evidence = f"against {what}: correlation {abs(line.correlation):.2f}, slope {slope:+.2f}"
-        found.append(Found(target, one, math.copysign(1.0, slope), 0.0, unit, evidence, True))
+        factor, offset = math.copysign(1.0, slope), 0.0
+        if target == "accel_x" and abs(line.intercept * CONVERSIONS["m/s^2"][unit][0]) > LEAST_ZERO:
+            offset = -factor * line.intercept
+            evidence += f"; {line.intercept:+.2f} {unit} at constant speed, with the slope of the road"
+        least = LEAST_YAW if target == "yaw_rate" else 1.0 / UNIT_SLOPE
+        warning = _slope_warning(slope, abs(line.correlation), least)
+        found.append(Found(target, one, factor, offset, unit, evidence, True, warning))
 
     take("accel_x", motion.change, "dv/dt")
     yaw_rate = max(motion.yaw_rates, key=lambda wheels: _strength(series, motion, wheels, fast))
@@ -232,7 +233,7 @@ def inertial(series: list[Series], motion: Motion) -> list[Found]:
     for known in found:
         if known.target == "yaw_rate":
             scale = known.factor * CONVERSIONS["rad/s"][known.unit][0]
-            yaw_rate = _smooth(on_grid(known.series, motion.t)) * scale
+            yaw_rate = smooth(on_grid(known.series, motion.t)) * scale
     take("accel_y", motion.speed * yaw_rate, "speed times yaw rate")
     wanted = np.arctan(WHEELBASE * yaw_rate / np.maximum(motion.speed, MOVING))
     best = _best(series, "steering_angle", motion, wanted, fast)

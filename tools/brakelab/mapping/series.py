@@ -1,5 +1,6 @@
 """Every signal of a log that its database knows, as a series over time."""
 
+import math
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
@@ -37,6 +38,17 @@ class Series(NamedTuple):
     def name(self) -> str:
         """Message and signal."""
         return f"{self.message}.{self.signal}"
+
+    @property
+    def mean_interval(self) -> float:
+        """Mean time between frames [s], lost ones included."""
+        return float((self.t[-1] - self.t[0]) / max(len(self.t) - 1, 1))
+
+    @property
+    def longest_gap(self) -> float:
+        """Longest time between two values [s]."""
+        t = self.t[np.isfinite(self.value)]
+        return float(np.diff(t).max()) if len(t) > 1 else math.inf
 
 
 @kernel
