@@ -12,6 +12,7 @@ from ecu.arguments import (
     CHANNEL_OPTION,
     CONFIG_OPTION,
     INTERFACE_OPTION,
+    MAP_OPTION,
     Channel,
     Commands,
     Config,
@@ -188,6 +189,18 @@ def suggest(
     from brakelab.mapping import command
 
     return command.suggest(log, dbc, config, out)
+
+
+@map_app.command()
+def check(
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="Recorded drive")],
+    map: Annotated[Path, MAP_OPTION],
+    config: Annotated[Path | None, CONFIG_OPTION] = None,
+) -> int:
+    """Check a map on a drive: what feeds each input, and the physics. Exit code 1: it is wrong."""
+    from brakelab.mapping import check
+
+    return check.check(log, map, config)
 
 
 @app.command()

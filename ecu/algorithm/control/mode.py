@@ -5,7 +5,7 @@ ready      inputs good, nobody brakes
 active     brakes are asked for or applied
 degraded   a needed input is lost: friction is held or nominal, braking goes on
 failed     neither pedal, nor its switch, nor demand arrives: demand 0, flagged invalid, the hydraulic
-           fallback takes over
+           fallback takes over; not a shadow for which none of them is mapped, since nobody asks it
 """
 
 import numpy as np
@@ -28,6 +28,7 @@ from ecu.contract.signals import (
     ACCEL_Y,
     ACTIVE,
     CALLIPER_PRESSURE,
+    DECEL_DEMAND,
     DEGRADED,
     FAILED,
     HYDRAULIC_READY,
@@ -53,6 +54,13 @@ def _lost(params: Record, inputs: Record, place: int) -> bool:
 
 
 @kernel
+def _asked_by_nobody(params: Record) -> bool:
+    """Return whether this is a shadow without any source of a demand: a recorded car, say."""
+    shadow: bool = params.transmit == 0
+    return shadow and params.mapped[PEDAL_POSITION] == 0 and params.mapped[DECEL_DEMAND] == 0
+
+
+@kernel
 def input_faults(params: Record, inputs: Record) -> int:
     """Return the fault bits that the inputs show."""
     faults = 0
@@ -65,7 +73,8 @@ def input_faults(params: Record, inputs: Record) -> int:
             faults |= MOTOR_TORQUE_LOST
     if not usable(inputs, ACCEL_X):
         faults |= IMU_LOST
-    if not pedal_known(params, inputs) and not automated_demand_valid(inputs):
+    known = pedal_known(params, inputs) or automated_demand_valid(inputs) or _asked_by_nobody(params)
+    if not known:
         faults |= REQUEST_LOST
     if _lost(params, inputs, PEDAL_POSITION):
         faults |= PEDAL_LOST

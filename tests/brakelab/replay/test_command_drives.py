@@ -9,8 +9,10 @@ from brakelab.bench.log_formats import FORMATS, convert
 from brakelab.logs.formats import read_frames
 from brakelab.logs.log_quality import LogQuality
 from brakelab.replay.command import replay
+from brakelab.report.command import report
 from brakelab.results.files import read_result
 from brakelab.results.prediction import SHORT
+from ecu.contract.signals import FAILED
 from ecu.settings.resources import resource
 
 pytestmark = pytest.mark.drives
@@ -76,3 +78,19 @@ def test_every_format_gives_the_results_of_candump(
     found, _ = run(other, car, config, tmp_path / "b.parquet")
     for name, column in expected.items():
         np.testing.assert_array_equal(found[name], column, err_msg=name)
+
+
+def test_a_recorded_car_without_pressure_or_demand_is_no_alarm(
+    drives: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    columns, _ = run(drives / "rav4" / "rav4_bus0_bus1.candump.log", "rav4", "suv", tmp_path / "out.parquet")
+    out, err = capsys.readouterr()
+    assert out.startswith("no brakings and no friction: no calliper pressure")
+    assert "mu_b" not in out
+    assert err.count("not mapped") == 1
+    assert "request lost" not in err
+    assert not (columns["mode"] == FAILED).any()
+    report(tmp_path / "out.parquet", None, tmp_path / "out.html")
+    page = (tmp_path / "out.html").read_text("utf-8")
+    assert "nothing about brakings and friction can be told" in page
+    assert "Friction front [-]" not in page

@@ -4,9 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from brakelab.replay.needed import fault_lines
+from brakelab.logs.signal_file import freshness_at_any_rate
+from brakelab.replay.needed import fault_lines, needed_lines, request_line
 from brakelab.replay.quality import Findings
-from ecu.contract.faults import PEDAL_LOST, WHEEL_SPEED_LOST
+from ecu.contract.faults import PEDAL_LOST, PRESSURE_LOST, WHEEL_SPEED_LOST
+from ecu.contract.signals import CORNERS, INPUT
 
 
 @pytest.mark.parametrize(
@@ -30,3 +32,29 @@ def test_faults_are_told_with_how_long_they_lasted(faulty, by_fault, said) -> No
     found = Findings(Path("d.log"), rows=1000, faulty_rows=faulty)
     found.fault_rows.update(by_fault)
     assert fault_lines(found) == said
+
+
+def came(*names: str) -> Findings:
+    """A log in which these inputs came and no other is mapped."""
+    found = Findings(Path("d.log"), rows=1000, freshness=freshness_at_any_rate())
+    for name in names:
+        found.freshness["taken"][INPUT[name]], found.mapped[INPUT[name]] = 1000, True
+    return found
+
+
+def test_a_log_without_pressures_is_told_once_and_not_as_a_fault() -> None:
+    found = came("accel_x", *(f"wheel_speed_{corner}" for corner in CORNERS))
+    found.faulty_rows = 980
+    found.fault_rows[PRESSURE_LOST] = 980
+    (line,) = needed_lines(found)
+    assert line.startswith("d.log: no calliper pressure, so nothing about friction can be told")
+    assert fault_lines(found) == []
+
+
+@pytest.mark.parametrize(
+    ("names", "told"), [(["accel_x", "pedal_pressed"], 1), (["pedal_position"], 0), (["decel_demand"], 0)]
+)
+def test_a_car_without_a_demand_is_told_so(names: list[str], told: int) -> None:
+    lines = request_line(came(*names))
+    assert len(lines) == told
+    assert all("not mapped; nothing is demanded" in line for line in lines)

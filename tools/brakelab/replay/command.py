@@ -12,7 +12,16 @@ from numpy.typing import NDArray
 from brakelab.logs.formats import kind_of
 from brakelab.replay.drive import replay_drive
 from brakelab.replay.log import log_hash, log_size
-from brakelab.replay.needed import NEEDED, fault_lines, lacking_line, needed_lines, nothing_usable
+from brakelab.replay.needed import (
+    NEEDED,
+    NO_PRESSURE,
+    fault_lines,
+    has_pressure,
+    lacking_line,
+    needed_lines,
+    nothing_usable,
+    request_line,
+)
 from brakelab.replay.progress import progress_bar
 from brakelab.replay.quality import Findings, quality_counts, quality_lines
 from brakelab.replay.source import load_source, map_unused
@@ -127,10 +136,20 @@ def _tell(
     writer: ResultWriter, findings: Sequence[Findings], plan: ReceivePlan, nominal: Sequence[float]
 ) -> None:
     for found in findings:
-        about = (quality_lines(found, plan), needed_lines(found), lacking_line(found), fault_lines(found))
-        for line in chain.from_iterable(about):
+        about = (
+            *(quality_lines(found, plan), needed_lines(found), request_line(found)),
+            *(lacking_line(found), fault_lines(found)),
+        )
+        judged = (f"{found.path}: {line}" for line in found.physics.lines)
+        for line in chain(*about, judged):
             print(line, file=sys.stderr)
     console = new_console()
+    frames = sum(found.log.frames for found in findings)
+    samples = sum(found.signals.samples for found in findings)
+    written = f"{writer.path}: {writer.rows} rows from {frames} frames and {samples} samples"
+    if not any(has_pressure(found) for found in findings):
+        print(f"no brakings and no friction: {NO_PRESSURE.partition(',')[0]} in this drive\n{written}")
+        return
     brakings = writer.brakes.rows
     short = taps(brakings)
     if len(brakings) > short * len(CORNERS):
@@ -141,6 +160,4 @@ def _tell(
         print(f"{short} applications shorter than {SHORT} s are in {brakes_path(writer.path).name} only")
     for line in prediction_lines(brakings):
         print(line)
-    frames = sum(found.log.frames for found in findings)
-    samples = sum(found.signals.samples for found in findings)
-    print(f"{writer.path}: {writer.rows} rows from {frames} frames and {samples} samples")
+    print(written)

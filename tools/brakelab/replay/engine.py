@@ -19,12 +19,31 @@ from ecu.algorithm.step import new_state, step
 from ecu.bus.freshness import accept, begin_cycle, end_cycle
 from ecu.bus.receive import ReceivePlan, Reception, receive
 from ecu.contract.records import CYCLE, FRAME, INPUTS, OUTPUTS, RecordArray, new_record, output_vector
-from ecu.contract.signals import CYCLE_NS, N_OUTPUTS, USABLE
+from ecu.contract.signals import (
+    ACCEL_X,
+    ACCEL_Y,
+    CALLIPER_PRESSURE,
+    CYCLE_NS,
+    MOTOR_TORQUE,
+    N_OUTPUTS,
+    STEERING_ANGLE,
+    USABLE,
+    VEHICLE_SPEED,
+    WHEEL_SPEED,
+    YAW_RATE,
+)
 from ecu.jit import Record, kernel
 
 Vector = NDArray[np.float64]
 Block = TypeVar("Block")
 
+SAMPLED: Final = (
+    *range(WHEEL_SPEED, WHEEL_SPEED + 4),
+    *(ACCEL_X, ACCEL_Y, YAW_RATE, STEERING_ANGLE, VEHICLE_SPEED),
+    *range(CALLIPER_PRESSURE, CALLIPER_PRESSURE + 4),
+    *range(MOTOR_TORQUE, MOTOR_TORQUE + 4),
+)
+"""Inputs whose samples are kept beside the rows, to be judged by the physics of the drive."""
 BLOCK_CYCLES: Final = 16384
 
 _EVERYTHING: Final = 1 << 62
@@ -53,6 +72,8 @@ class Rows(NamedTuple):
     """T_k as the input states it [s], else NaN, shape (n,)."""
     values: Vector
     """Shape (n, N_ROW)."""
+    samples: Vector
+    """Of `SAMPLED`, NaN in a cycle without a valid one, shape (n, len(SAMPLED))."""
 
 
 def new_ecu(params: RecordArray, learned: RecordArray | None) -> Ecu:
@@ -70,7 +91,15 @@ def _open_cycle(inputs: Record, cycle: Record) -> None:
 
 @kernel
 def _close_cycle(
-    params: Any, state: Any, inputs: Any, outputs: Any, seen: Any, vector: Vector, freshness: Any, row: Vector
+    params: Any,
+    state: Any,
+    inputs: Any,
+    outputs: Any,
+    seen: Any,
+    vector: Vector,
+    freshness: Any,
+    row: Vector,
+    samples: Vector,
 ) -> None:
     end_cycle(inputs[0], freshness)
     look_at(inputs[0], seen)
@@ -80,6 +109,9 @@ def _close_cycle(
         place = MEASURED_INPUTS[i]
         usable = inputs[0].verdict[place] & USABLE == USABLE
         row[N_OUTPUTS + i] = inputs[0].value[place] if usable else np.nan
+    for i in range(len(SAMPLED)):
+        place = SAMPLED[i]
+        samples[i] = inputs[0].value[place] if inputs[0].new[place] else np.nan
 
 
 @kernel
@@ -96,6 +128,7 @@ def _run_frames(
     frames: Any,
     cycles: Any,
     values: Vector,
+    samples: Vector,
     at: Any,
     last: bool,
 ) -> None:
@@ -116,7 +149,17 @@ def _run_frames(
         run.cursor = cursor
         if cursor == len(frames) and run.left > 0 and not last:
             return
-        _close_cycle(params, state, inputs, outputs, seen, vector, reception.freshness, values[run.done])
+        _close_cycle(
+            params,
+            state,
+            inputs,
+            outputs,
+            seen,
+            vector,
+            reception.freshness,
+            values[run.done],
+            samples[run.done],
+        )
         run.done += 1
         run.open = 0
 
@@ -134,6 +177,7 @@ def _run_samples(
     cycles: Any,
     t: Vector,
     values: Vector,
+    samples: Vector,
     at: Any,
     last: bool,
 ) -> None:
@@ -155,7 +199,9 @@ def _run_samples(
             run.cursor += 1
         if run.cursor == len(block.t_ns) and not last:
             return
-        _close_cycle(params, state, inputs, outputs, seen, vector, freshness, values[run.done])
+        _close_cycle(
+            params, state, inputs, outputs, seen, vector, freshness, values[run.done], samples[run.done]
+        )
         run.done += 1
         run.open = 0
 
@@ -188,7 +234,9 @@ def run_frames(
     vector = output_vector(ecu.outputs)
 
     def advance(frames: RecordArray, rows: Rows, chunk: RecordArray, at: RecordArray, last: bool) -> None:
-        _run_frames(*ecu, vector, plan, reception, counted, frames, chunk, rows.values, at, last)
+        _run_frames(
+            *ecu, vector, plan, reception, counted, frames, chunk, rows.values, rows.samples, at, last
+        )
 
     return _run(blocks, new_record(FRAME, 0), lambda frames: frames["stamp_ns"], cycles, advance)
 
@@ -199,7 +247,7 @@ def run_samples(ecu: Ecu, freshness: RecordArray, blocks: Iterable[SampleBlock])
     end = SampleBlock(np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 0)))
 
     def advance(block: SampleBlock, rows: Rows, chunk: RecordArray, at: RecordArray, last: bool) -> None:
-        _run_samples(*ecu, vector, freshness, block, chunk, rows.t, rows.values, at, last)
+        _run_samples(*ecu, vector, freshness, block, chunk, rows.t, rows.values, rows.samples, at, last)
 
     return _run(blocks, end, lambda block: block.t_ns, None, advance)
 
@@ -243,9 +291,13 @@ def _run(
             if at[0]["done"] < len(chunk):
                 break
             if len(chunk) < whole:
-                yield Rows(rows.t_ns[: len(chunk)], rows.t[: len(chunk)], rows.values[: len(chunk)])
+                n = len(chunk)
+                yield Rows(rows.t_ns[:n], rows.t[:n], rows.values[:n], rows.samples[:n])
                 return
 
 
 def _new_rows(cycles: RecordArray) -> Rows:
-    return Rows(cycles["t_ns"], np.full(len(cycles), np.nan), np.empty((len(cycles), N_ROW)))
+    count = len(cycles)
+    return Rows(
+        cycles["t_ns"], np.full(count, np.nan), np.empty((count, N_ROW)), np.empty((count, len(SAMPLED)))
+    )

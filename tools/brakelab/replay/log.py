@@ -9,6 +9,8 @@ import numpy as np
 from brakelab.logs.formats import Advance, kind_of, read_frames
 from brakelab.logs.log_quality import LogQuality
 from brakelab.logs.signal_file import SampleBlock, freshness_at_any_rate, read_signals
+from brakelab.mapping.drive_samples import Collector, car_of
+from brakelab.mapping.log_physics import judge
 from brakelab.replay.engine import Ecu, Rows, run_frames, run_samples
 from brakelab.replay.quality import Findings, identifier, note_faults
 from brakelab.replay.seen import set_raw_ends
@@ -79,7 +81,7 @@ def replay_log(
     findings.seen = ecu.seen
     kind = kind_of(path)
     if kind == "signals":
-        yield from _noted(_replay_signals(path, ecu, findings, advance), findings)
+        yield from _noted(_replay_signals(path, ecu, findings, advance), findings, ecu)
         return
     counted = kind == "recording"
     if counted:
@@ -106,7 +108,7 @@ def replay_log(
             if counted:
                 blocks = _expected_only(blocks, plan)
         rows = run_frames(ecu, plan, reception, blocks, cycles, counted)
-    yield from _noted(rows, findings)
+    yield from _noted(rows, findings, ecu)
     if not reception.messages["accepted"].any():
         raise _foreign(path, source, findings)
 
@@ -139,13 +141,16 @@ def _expected_only(blocks: Iterator[RecordArray], plan: ReceivePlan) -> Iterator
             yield expected
 
 
-def _noted(rows: Iterator[Rows], findings: Findings) -> Iterator[Rows]:
+def _noted(rows: Iterator[Rows], findings: Findings, ecu: Ecu) -> Iterator[Rows]:
+    collector = Collector()
     for block in rows:
         if not findings.rows:
             findings.start_ns = int(block.t_ns[0])
         findings.rows += len(block.t_ns)
         note_faults(findings, block.values)
+        collector.add(block.samples)
         yield block
+    findings.physics = judge(collector.drive(), car_of(ecu.params[0]))
 
 
 def _replay_signals(path: Path, ecu: Ecu, findings: Findings, advance: Advance) -> Iterator[Rows]:

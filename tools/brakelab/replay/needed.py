@@ -8,12 +8,13 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from brakelab.replay.quality import Findings
-from ecu.contract.faults import DEGRADING, FAULTS, REQUEST_LOST
+from ecu.contract.faults import DEGRADING, FAULTS, PRESSURE_LOST, REQUEST_LOST
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import (
     ACCEL_X,
     ACCEL_Y,
     CALLIPER_PRESSURE,
+    CORNERS,
     CYCLE_NS,
     DECEL_DEMAND,
     INPUT_SIGNALS,
@@ -55,6 +56,10 @@ HELPFUL: Final = (
     (Group("steering_angle", (STEERING_ANGLE,)), "cornering forces of the front axle are not told apart"),
 )
 """Inputs that a car may lack, and what is known less well without them."""
+NO_PRESSURE: Final = (
+    "no calliper pressure, so nothing about friction can be told; map the pressures, or a brake torque "
+    "in their place (docs/signal-maps.md)"
+)
 MOST: Final = 0.5
 """Share of the samples, or of the drive, from which on it is told."""
 
@@ -66,6 +71,9 @@ def needed_lines(found: Findings) -> list[str]:
     lines = []
     for group in NEEDED:
         places = [place for place in group.places if found.mapped[place] or not group.alternatives]
+        if group.places[0] == CALLIPER_PRESSURE and not has_pressure(found):
+            lines.append(f"{found.path}: {NO_PRESSURE}")
+            continue
         causes = {place: _cause(found, place) for place in places}
         bad = [place for place in places if causes[place]]
         if group.alternatives and any(found.freshness["taken"][list(group.places)]):
@@ -75,6 +83,21 @@ def needed_lines(found: Findings) -> list[str]:
             names = group.name if len(shown) == len(group.places) else _names(shown)
             lines.append(f"{found.path}: {names}: {_share(found.freshness, shown)}{cause}")
     return lines
+
+
+def has_pressure(found: Findings) -> bool:
+    """Return whether this log has any calliper pressure, usable or not."""
+    if found.freshness is None:
+        return True
+    known = found.freshness[CALLIPER_PRESSURE : CALLIPER_PRESSURE + len(CORNERS)]
+    return any(known[kind].any() for kind in ("taken", "outside", "invalid"))
+
+
+def request_line(found: Findings) -> list[str]:
+    """Return the line for a log of a car that nobody could ask to brake: no demand is mapped."""
+    if found.freshness is None or found.mapped[[PEDAL_POSITION, DECEL_DEMAND]].any():
+        return []
+    return [f"{found.path}: pedal_position, decel_demand: not mapped; nothing is demanded of this ECU"]
 
 
 def lacking_line(found: Findings) -> list[str]:
@@ -103,13 +126,16 @@ def fault_lines(found: Findings) -> list[str]:
     def extent(rows: int) -> str:
         return _percent(rows / found.rows) if rows > MOST * found.rows else f"{1e-9 * CYCLE_NS * rows:.2f} s"
 
-    causes = [fault for fault in FAULTS if fault.bit & (DEGRADING | REQUEST_LOST)]
+    told = 0 if has_pressure(found) else PRESSURE_LOST
+    causes = [fault for fault in FAULTS if fault.bit & (DEGRADING | REQUEST_LOST) & ~told]
     lasting = sorted(causes, key=lambda fault: -found.fault_rows[fault.bit])
     names = [
         f"{fault.name} ({extent(found.fault_rows[fault.bit])})"
         for fault in lasting
         if found.fault_rows[fault.bit]
     ]
+    if not names:
+        return []
     return [
         f"{found.path}: degraded or failed for {extent(found.faulty_rows)} of the drive: {', '.join(names)}"
     ]

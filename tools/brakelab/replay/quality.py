@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from brakelab.logs.log_quality import Damage, LogQuality
 from brakelab.logs.signal_file import SignalQuality
+from brakelab.mapping.log_physics import Judged
 from ecu.bus.freshness import RATE_TOLERANCE
 from ecu.bus.receive import ReceivePlan, Reception
 from ecu.contract.faults import FAULTS
@@ -54,6 +55,8 @@ class Findings:
     """Statistics of its samples, shape (N_INPUTS,)."""
     mapped: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(N_INPUTS, np.bool_))
     """Where the log can hold an input, shape (N_INPUTS,)."""
+    physics: Judged = field(default_factory=lambda: Judged([], []))
+    """What the motion of the car says of its inputs."""
     dropped: int = 0
     """Frames that the kernel dropped in a recorded run."""
     seconds: float = 0.0

@@ -20,7 +20,7 @@ from brakelab.report.prediction import (
     prediction_errors,
     prediction_rows,
 )
-from brakelab.report.quality import quality_tiles, read_quality
+from brakelab.report.quality import lacks_pressure, only_told, quality_tiles, read_quality
 from brakelab.report.sparkline import sparklines
 from brakelab.report.summary import facts, faults, tiles
 from brakelab.report.timing import read_timing, spreads
@@ -63,6 +63,9 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
     drive = read_drive(
         result, ("vehicle_speed", *_FRICTION), "give a RESULT.parquet that `brake-ecu replay` or `demo` wrote"
     )
+    quality = read_quality(drive, result)
+    without_pressure = lacks_pressure(drive, quality)
+    drive = only_told(drive, without_pressure)
     true = None
     if truth is not None and truth.resolve() == result.resolve():
         raise UserError(str(truth), "", "this is the result; give true values as --truth, or none")
@@ -74,7 +77,6 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
     if accuracy is not None and not any(row.seconds for row in accuracy.values()):
         accuracy = None
     loop = None if timing is None else read_timing(timing)
-    quality = read_quality(drive, result)
     rows = [_row(*pair) for pair in zip(found, sparklines(drive, found), strict=True)]
     predicted = prediction_errors(found)
     page = fill(
@@ -93,6 +95,7 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
                 *(quality_tiles(quality) if quality else []),
             ],
             "brakings": rows,
+            "without_pressure": without_pressure,
             "with_temperature": any(np.isfinite(row.temperature_front) for row in rows),
             "with_sparklines": any(row.sparkline for row in rows),
             "with_energy": any(np.isfinite(row.kilojoules) for row in rows),

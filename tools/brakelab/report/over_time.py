@@ -59,6 +59,7 @@ def plots_over_time(drive: Drive, truth: Drive | None, found: list[Braking]) -> 
         "k-f": _tyre_factor(source, span),
         "modes": modes_plot(drive, _coarse(grid), span),
     }
+    plots = {name: plot for name, plot in plots.items() if plot.renderers}
     shades = [
         BoxAnnotation(
             left=braking.t_start, right=braking.t_end, fill_color=SHADE, fill_alpha=1.0, line_color=None,

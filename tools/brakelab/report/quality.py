@@ -7,6 +7,7 @@ from typing import Any, Final, NamedTuple
 
 from brakelab.report.drive import Drive
 from brakelab.report.page import Tile, fixed
+from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
 
 PERIOD: Final = 0.01  # s, one row
@@ -163,3 +164,23 @@ def _message(row: dict[str, Any], seconds: float) -> list[Cell]:
         Cell(f"{expected:.3g}" if expected else "any"),
         *(Cell(f"{row[kind]}", row[kind] > 0) for kind in _MESSAGE),
     ]
+
+
+def lacks_pressure(drive: Drive, quality: Quality | None) -> bool:
+    """Return whether the logs are known to hold no calliper pressure: then no friction was estimated."""
+    pressure = drive.column("calliper_pressure_fl")
+    if quality is None or not (pressure == 0.0).all():
+        return False
+    came = {name for name, _ in quality.inputs} - set(quality.silent)
+    return not any(name.startswith("calliper_pressure") for name in came)
+
+
+def only_told(drive: Drive, without_pressure: bool) -> Drive:
+    """Return the drive without the columns that stand for nothing.
+
+    Friction without a pressure is the configured one, a demand that nobody made is zero.
+    """
+    nothing = ["mu_b", "sigma_mu_b", "calliper_pressure", "brake_torque"] if without_pressure else []
+    nothing += [] if drive.has("decel_demand_total") else ["pressure_demand"]
+    left_out = {f"{stem}_{corner}" for stem in nothing for corner in CORNERS}
+    return drive._replace(columns={k: v for k, v in drive.columns.items() if k not in left_out})

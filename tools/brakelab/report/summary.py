@@ -108,7 +108,8 @@ def _friction(drive: Drive, accuracy: dict[str, Accuracy] | None) -> list[Tile]:
     shown = []
     for axle, wheels in AXLES.items():
         last, band = _last(mu[:, wheels]), 2.0 * _last(sigma[:, wheels])
-        note, warns = "at the end of the drive", False
+        note = "at the end of the drive" if np.isfinite(last) else "no calliper pressure, nothing to tell"
+        warns = False
         if accuracy is not None:
             row = accuracy[axle]
             note = f"nRMSE {percent(row.nrmse, 1)} %, truth inside ±2σ {percent(row.inside, 0)} %"

@@ -150,6 +150,27 @@ def test_a_steering_angle_that_the_car_does_not_have_is_not_lost(params, feed) -
 
 
 @pytest.mark.parametrize(
+    ("mapped", "armed", "bits"),
+    [
+        ([], 0, 0),
+        ([], 1, REQUEST_LOST),
+        (["pedal_position"], 0, PEDAL_LOST | REQUEST_LOST),
+        (["decel_demand"], 0, REQUEST_LOST),
+        (["pedal_position", "decel_demand"], 1, PEDAL_LOST | REQUEST_LOST),
+    ],
+)
+def test_a_shadow_without_any_source_of_a_demand_misses_none(params, feed, mapped, armed, bits) -> None:
+    """A recorded car; an armed ECU that nobody can ask is one whose request is lost."""
+    inputs = feed(**ALL_GOOD | {"decel_demand_valid": 0.0})
+    params[0]["transmit"] = armed
+    for name in ("pedal_position", "pedal_pressed", "decel_demand"):
+        inputs[0]["verdict"][INPUT[name]] = 0
+    for name in ("pedal_position", "decel_demand"):
+        params[0]["mapped"][INPUT[name]] = name in mapped
+    assert input_faults(params[0], inputs[0]) == bits
+
+
+@pytest.mark.parametrize(
     ("fault", "mode"),
     [(BUS_OFF, DEGRADED), (FOREIGN_SENDER, DEGRADED), (DEMAND_LIMITED, READY), (FILTER_RESET, READY)],
 )

@@ -1,0 +1,100 @@
+"""`brake-ecu map check`: a dry run of a map: what feeds each input, how it comes, whether physics agrees."""
+
+from pathlib import Path
+from typing import Any, Final
+
+from rich.box import SIMPLE
+from rich.table import Table
+
+from brakelab.logs.formats import kind_of
+from brakelab.mapping.drive_samples import ANY_CAR, Collector, car_of
+from brakelab.mapping.log_physics import judge, range_lines
+from brakelab.replay.engine import new_ecu
+from brakelab.replay.log import log_size, replay_log
+from brakelab.replay.needed import needed_lines
+from brakelab.replay.progress import progress_bar
+from brakelab.replay.quality import Findings, quality_counts, quality_lines
+from brakelab.replay.source import load_source
+from brakelab.results.console import new_console
+from ecu.bus.signal_map import MappedInput, read_signal_map
+from ecu.contract.signals import without_corner
+from ecu.errors import UserError
+from ecu.settings.config import load_config, new_params
+from ecu.settings.resources import resource
+
+WIDTH: Final = 140  # columns where no terminal says how wide it is
+JUDGED: Final = ("wheel_speed", "accel_x", "yaw_rate", "accel_y", "steering_angle", "calliper_pressure")
+
+
+def check(log: Path, map: Path, config: Path | None) -> int:
+    """Print which signal feeds what and what the drive says of it; return 1 if it says that one is wrong.
+
+    `config` is of the car: with its tyres and brakes scales and pressures are judged closer.
+
+    Raises:
+        UserError: the map, its database, `config` or the log is not right.
+    """
+    if kind_of(log) == "signals":
+        raise UserError(str(log), "", "holds signals that are decoded already; no map is needed")
+    inputs, source, findings = read_signal_map(map).inputs, load_source(map), Findings(log)
+    params = new_params(load_config(config or resource("config/suv.toml")))
+    collector = Collector()
+    with progress_bar("map check", log_size(log)) as advance:
+        for rows in replay_log(log, new_ecu(params, None), source, None, findings, advance):
+            collector.add(rows.samples)
+    assert findings.freshness is not None
+    judged = judge(collector.drive(), car_of(params[0]) if config else ANY_CAR)
+    counts = quality_counts(findings, source.plan)
+    new_console(WIDTH).print(_table(inputs, counts))
+    wrong = [*range_lines(findings.freshness), *judged.lines]
+    for line in (*quality_lines(findings, source.plan), *needed_lines(findings), *wrong):
+        print(line)
+    open_ = [name for name in JUDGED if name not in judged.checked]
+    if not wrong:
+        print(
+            f"physics agrees: {', '.join(judged.checked)}"
+            if judged.checked
+            else "physics: the car hardly moves"
+        )
+    if judged.checked and open_:
+        print(f"not judged, for it is not mapped or the drive shows too little: {', '.join(open_)}")
+    return 1 if wrong else 0
+
+
+def _table(inputs: dict[str, MappedInput], counts: dict[str, Any]) -> Table:
+    """Return a row for each input; wheels that are mapped alike share one."""
+    table = Table(box=SIMPLE)
+    table.add_column("input", no_wrap=True)
+    table.add_column("message.signal", overflow="fold")
+    for name in ("factor", "offset", "per s", "gap s", "time-out s", "refused", "least … greatest"):
+        table.add_column(name, justify="right", no_wrap=True)
+    seconds = 0.01 * max(counts["rows"], 1)
+    groups: dict[tuple[str, str, float, float], list[dict[str, Any]]] = {}
+    for seen in counts["inputs"]:
+        one = inputs[seen["name"]]
+        stem = without_corner(seen["name"])
+        groups.setdefault((stem, one.message, one.factor, one.offset), []).append(seen)
+    for (stem, message, factor, offset), ones in groups.items():
+        signals = dict.fromkeys(inputs[seen["name"]].signal for seen in ones)
+        name = ones[0]["name"] if len(ones) == 1 else f"{stem}_{' '.join(seen['name'][-2:] for seen in ones)}"
+        samples, gap = min(seen["samples"] for seen in ones), max(seen["greatest_gap_s"] for seen in ones)
+        refused = sum(seen["invalid"] + seen["outside"] for seen in ones)
+        known = [seen for seen in ones if seen["least"] is not None]
+        span = (
+            f"{min(s['least'] for s in known):.4g} … {max(s['greatest'] for s in known):.4g}"
+            if known
+            else "–"
+        )
+        late = " !" if gap > ones[0]["timeout_s"] else ""
+        table.add_row(
+            name,
+            f"{message}.{' '.join(signals)}",
+            f"{factor:.4g}",
+            f"{offset:+.4g}" if offset else "",
+            f"{samples / seconds:.1f}",
+            f"{gap:.3f}{late}" if samples else "never came",
+            f"{ones[0]['timeout_s']:g}",
+            f"{100.0 * refused / sum(seen['samples'] for seen in ones):.1f} %" if refused else "",
+            f"{span} {ones[0]['unit']}",
+        )
+    return table

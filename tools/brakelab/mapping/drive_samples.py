@@ -1,0 +1,108 @@
+"""Samples of a drive on a grid of their own, and the car that they are judged by.
+
+Kept while a log is read: the mean of the valid samples of 20 ms, of the first hour.
+"""
+
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakelab.mapping.line import RATE, Vector, smooth
+from brakelab.replay.engine import SAMPLED
+from ecu.contract.params import BAR
+from ecu.contract.signals import CORNERS, INPUT_SIGNALS
+
+CYCLES: Final = 2  # of 10 ms in a row of the grid
+MOST_ROWS: Final = int(3600 * RATE)
+BRIDGED: Final = int(0.5 * RATE)  # rows without a sample that a straight line may fill
+FEWEST: Final = 100  # samples
+
+Rows = NDArray[np.bool_]
+
+
+class Car(NamedTuple):
+    """Lengths of a car, and what its brakes do."""
+
+    radius: Vector
+    """m, shape (4,)."""
+    track: float
+    """m"""
+    wheelbase: float
+    """m"""
+    decel_per_bar: Vector | None
+    """Of each calliper [m/s^2/bar], shape (4,); None: not known."""
+    decel_per_torque: Vector | None
+    """Of each wheel [m/s^2/(N m)], shape (4,)."""
+    known: bool
+    """By a configuration; else of any passenger car."""
+
+
+ANY_CAR: Final = Car(np.full(4, 0.33), 1.55, 2.7, None, None, known=False)
+
+
+def car_of(params: Any) -> Car:
+    """Return the car of one `PARAMS`."""
+    torque = BAR * 2.0 * params["piston_area"] * params["effective_radius"] * params["mu_nominal"]
+    radius = np.array(params["wheel_radius"])
+    per_torque = 1.0 / radius / float(params["mass"])
+    lengths = float(params["track"]), float(params["wheelbase"])
+    return Car(radius, *lengths, torque * per_torque, per_torque, known=True)
+
+
+class Collector:
+    """Takes the samples of a log as they come."""
+
+    def __init__(self) -> None:
+        self._rows: list[NDArray[np.float32]] = []
+        self._count = 0
+
+    def add(self, samples: Vector) -> None:
+        """Take samples of cycles, shape (n, len(SAMPLED)), NaN: none; an odd last cycle is left out."""
+        if self._count >= MOST_ROWS:
+            return
+        pairs = samples[: len(samples) // CYCLES * CYCLES].reshape(-1, CYCLES, samples.shape[1])
+        there = np.isfinite(pairs)
+        with np.errstate(invalid="ignore"):
+            mean = np.where(there, pairs, 0.0).sum(axis=1) / there.sum(axis=1)
+        self._rows.append(mean.astype(np.float32))
+        self._count += len(mean)
+
+    def drive(self) -> "Drive":
+        """Return what was collected."""
+        rows = np.concatenate(self._rows) if self._rows else np.zeros((0, len(SAMPLED)), np.float32)
+        return Drive(rows.astype(np.float64))
+
+
+class Drive:
+    """Inputs of a drive by name: smoothed on the grid, with the rows where they are known."""
+
+    def __init__(self, samples: Vector) -> None:
+        """Take rows of the grid, shape (n, len(SAMPLED))."""
+        self._values: dict[str, Vector] = {}
+        self.known = np.ones(len(samples), np.bool_)
+        """Rows where every input that there is has samples near, shape (n,)."""
+        places = np.arange(len(samples))
+        for column, place in enumerate(SAMPLED):
+            there = np.flatnonzero(np.isfinite(samples[:, column]))
+            if len(there) < FEWEST:
+                continue
+            name = INPUT_SIGNALS[place].name
+            self._values[name] = smooth(np.interp(places, there, samples[there, column]))
+            after = np.minimum(np.searchsorted(there, places), len(there) - 1)
+            before = np.maximum(after - 1, 0)
+            near = np.minimum(np.abs(there[after] - places), np.abs(places - there[before]))
+            self.known &= near <= BRIDGED
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._values
+
+    def __getitem__(self, name: str) -> Vector:
+        return self._values[name]
+
+    def corners(self, stem: str) -> Vector | None:
+        """Return the four of a wheel's quantity, shape (n, 4); None: not all are there."""
+        names = [f"{stem}_{corner}" for corner in CORNERS]
+        if not all(name in self for name in names):
+            return None
+        return np.stack([self[name] for name in names], axis=1)
