@@ -36,6 +36,7 @@ from ecu.arguments import (
     Map,
     State,
 )
+from ecu.cli_config import app as config_app
 from ecu.errors import RunFault, UserError
 
 LABORATORY = ("bokeh", "jinja2", "pyarrow", "pymoo", "scipy")
@@ -51,6 +52,9 @@ app = Commands(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
+
+
+app.add_typer(config_app, name="config")
 
 
 def _show_version(wanted: bool) -> None:

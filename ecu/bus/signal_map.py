@@ -98,7 +98,7 @@ def read_signal_map(path: Path) -> SignalMap:
     try:
         return SignalMap.model_validate(content)
     except ValidationError as error:
-        raise describe(error, str(path)) from None
+        raise describe(error, str(path), SignalMap) from None
 
 
 def load_signal_map(path: Path) -> MappedBus:

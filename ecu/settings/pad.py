@@ -5,23 +5,23 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from ecu.settings.toml_file import Section
+from ecu.settings.toml_file import Section, Unit
 
 
 class Pad(Section):
     """The linings of an axle and what they wear by. Thickness in mm, without the backplate."""
 
-    area: Annotated[float, Field(gt=5e-4, lt=0.05)] = 7.125e-3
+    area: Annotated[float, Field(gt=5e-4, lt=0.05), Unit("m^2")] = 7.125e-3
     """Of one pad, m^2: Table 3.1, brake A."""
-    density: Annotated[float, Field(gt=500, lt=8000)] = 2500.0
+    density: Annotated[float, Field(gt=500, lt=8000), Unit("kg/m^3")] = 2500.0
     """kg/m^3"""
-    thickness_new: Annotated[float, Field(gt=2, lt=40)] = 12.0
+    thickness_new: Annotated[float, Field(gt=2, lt=40), Unit("mm")] = 12.0
     """mm, section 7.6.2."""
-    thickness_worn: Annotated[float, Field(ge=0, lt=20)] = 3.0
+    thickness_worn: Annotated[float, Field(ge=0, lt=20), Unit("mm")] = 3.0
     """mm, at which pads are replaced."""
-    chamfer_depth: Annotated[float, Field(ge=0, lt=20)] = 0.0
+    chamfer_depth: Annotated[float, Field(ge=0, lt=20), Unit("mm")] = 0.0
     """mm, from the new surface to where the chamfers end."""
-    chamfer_share: Annotated[float, Field(ge=0, lt=0.9)] = 0.0
+    chamfer_share: Annotated[float, Field(ge=0, lt=0.9), Unit("-")] = 0.0
     """Of the area, missing at the new surface; falls linearly to nothing at the depth."""
     law: Literal["extended", "quasi-static"] = "extended"
     """(7.13), or (7.14): its first three coefficients alone."""
@@ -29,17 +29,17 @@ class Pad(Section):
         default=[0.1016, 0.0, 0.3984e-6, 0.4887, 0.0, 0.0, 0.66e-2], min_length=7, max_length=7
     )
     """gamma_10 to gamma_31 of Table 7.1, of both pads of a calliper; the disc's temperature in degC."""
-    road_scale: Annotated[float, Field(gt=0.1, lt=10)] = 1.0
+    road_scale: Annotated[float, Field(gt=0.1, lt=10), Unit("-")] = 1.0
     """Wear on the road over that on the dynamometer (section 7.6)."""
-    sigma: Annotated[float, Field(gt=0, lt=1)] = 0.15
+    sigma: Annotated[float, Field(gt=0, lt=1), Unit("-")] = 0.15
     """Of the law, relative, for linings that were never measured."""
-    walk: Annotated[float, Field(ge=0, lt=0.2)] = 0.01
+    walk: Annotated[float, Field(ge=0, lt=0.2), Unit("1/sqrt(g)")] = 0.01
     """Random walk of the law's scale as the lining wears, per square root of a gram."""
-    scatter: Annotated[float, Field(ge=0, lt=5)] = 0.35
+    scatter: Annotated[float, Field(ge=0, lt=5), Unit("sqrt(g)")] = 0.35
     """Standard deviation of the mass over the square root of the mass, sqrt(g): weather and roads, some 10 %
     that stay the same over some 6 g."""
 
-    airborne_share: Annotated[float, Field(ge=0, le=1)] = 0.5
+    airborne_share: Annotated[float, Field(ge=0, le=1), Unit("-")] = 0.5
     """Of the mass worn off, what stays in the air: about half (Grigoratos and Martini 2015); 0.02 to 0.21
     were measured for non-asbestos organic linings (Hagino et al. 2016). The disc's own is not in it."""
 

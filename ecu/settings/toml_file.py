@@ -1,18 +1,33 @@
 """Reading TOML that a person wrote: what is wrong is one line that names the file, the key and the remedy."""
 
 import tomllib
+from collections.abc import Callable
+from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic.fields import FieldInfo
 
 from ecu.errors import UserError
+
+
+class Unit(NamedTuple):
+    """Unit of a key; stands in its `Annotated`."""
+
+    name: str
+
+    def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> dict[str, Any]:
+        """Return the schema of the key with its unit."""
+        return {**handler(core), "unit": self.name}
 
 
 class Section(BaseModel):
     """A table of a TOML file: no key but those it knows, no value but of the kind it has."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, strict=True, use_attribute_docstrings=True
+    )
 
 
 _NUMBER, _WHOLE = "give a number", "give a whole number"
@@ -42,20 +57,71 @@ _WANTED = {
 """Allowed values, by pydantic's kind of finding."""
 
 
-def describe(error: ValidationError, where: str) -> UserError:
-    """Turn the first finding of pydantic into one line with the key's path."""
-    finding = error.errors(include_url=False)[0]
-    place = ".".join(str(part) for part in finding["loc"])
-    more = error.error_count() - 1
+def describe(error: ValidationError, where: str, model: type[BaseModel]) -> UserError:
+    """Turn the findings of pydantic into one line: the first, and how many more there are."""
+    return summarised(findings(error, lambda _: where, model))
+
+
+def summarised(found: list[UserError]) -> UserError:
+    """Return the first of several findings with the number of the others."""
+    first, more = found[0], len(found) - 1
+    return UserError(first.where, first.place, first.remedy + (f" ({more} more findings)" if more else ""))
+
+
+def findings(
+    error: ValidationError, file_of: Callable[[tuple[int | str, ...]], str], model: type[BaseModel]
+) -> list[UserError]:
+    """Return every finding of pydantic as the line of its key, unknown keys first.
+
+    `file_of` names the file of a key; `model` is what was validated: its keys and units are named.
+    """
+    found = sorted(error.errors(include_url=False), key=lambda one: one["type"] != "extra_forbidden")
+    return [
+        UserError(file_of(one["loc"]), ".".join(map(str, one["loc"])), _remedy(one, model)) for one in found
+    ]
+
+
+def _remedy(finding: Any, model: type[BaseModel]) -> str:
+    keys = [str(part) for part in finding["loc"]]
+    table = _table(model, keys[:-1])
     if finding["type"] == "missing":
-        remedy = "missing; add this key"
-    elif finding["type"] == "extra_forbidden":
-        remedy = "unknown key; remove it or correct its spelling"
-    else:
-        wanted = _WANTED.get(finding["type"], finding["msg"]).format(**finding.get("ctx", {}))
-        one_value = place and not isinstance(finding["input"], dict)
-        remedy = f"{wanted} (found {finding['input']!r})" if one_value else wanted
-    return UserError(where, place, remedy + (f" ({more} more findings)" if more else ""))
+        return "missing; add this key"
+    if finding["type"] == "extra_forbidden":
+        near = get_close_matches(keys[-1], table.model_fields, 1, 0.5) if table else []
+        return (
+            f"unknown key; did you mean {near[0]}?"
+            if near
+            else "unknown key; remove it or correct its spelling"
+        )
+    wanted: str = _WANTED.get(finding["type"], finding["msg"]).format(**finding.get("ctx", {}))
+    if not keys or isinstance(finding["input"], dict):
+        return wanted
+    unit = _unit(table, keys) if finding["type"].startswith(("greater_than", "less_than")) else ""
+    return f"{wanted}{unit} (found {finding['input']!r})"
+
+
+def _table(model: type[BaseModel], keys: list[str]) -> type[BaseModel] | None:
+    """Return the model of the table that `keys` lead to, None: it is none of ours."""
+    table: type[BaseModel] | None = model
+    for key in keys:
+        field = table.model_fields.get(key) if table else None
+        kinds = () if field is None else (field.annotation, *get_args(field.annotation))
+        table = next((kind for kind in kinds if isinstance(kind, type) and issubclass(kind, BaseModel)), None)
+    return table
+
+
+def _unit(table: type[BaseModel] | None, keys: list[str]) -> str:
+    """Return the unit of a key behind a blank, empty for a pure number."""
+    field = table.model_fields.get(keys[-1]) if table else None
+    unit = unit_of(field) if field else None
+    return f" {unit}" if unit and unit != "-" else ""
+
+
+def unit_of(field: FieldInfo) -> str | None:
+    """Return the unit of a key, None: it has none."""
+    kinds = (field.annotation, *get_args(field.annotation))
+    of_kinds = (note for kind in kinds for note in getattr(kind, "__metadata__", ()))
+    return next((note.name for note in (*field.metadata, *of_kinds) if isinstance(note, Unit)), None)
 
 
 def read_toml(path: Path) -> dict[str, Any]:

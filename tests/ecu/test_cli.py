@@ -195,7 +195,7 @@ VERBS = {
 
 
 def test_commands_fit_one_line_each(capsys: pytest.CaptureFixture[str]) -> None:
-    for group in ([], ["lab"], ["identify"], ["map"]):
+    for group in ([], ["lab"], ["identify"], ["map"], ["config"]):
         assert cli.main([*group, "--help"]) == 0
         assert "..." not in capsys.readouterr().out.partition("Commands:")[2]
 

@@ -163,7 +163,7 @@ WRONG = [
     ("axle behind the car", change("vehicle.front_axle", "3.0"), ["vehicle.front_axle"]),
     ("a slow limiter", change("control.max_pressure_rate", "1000.0"), ["control.max_pressure_rate"]),
     ("a ceiling beyond 180 bar", change("control.max_pressure", "200.0"), ["control.max_pressure"]),
-    ("no section", lambda: SUV.replace("[rear]", "[back]"), ["rear"]),
+    ("no section", lambda: SUV.replace("[rear]", "[back]"), ["back: unknown key", "more findings"]),
     ("a section that is a number", lambda: "vehicle = 3\n" + SUV.split("[vehicle]")[0], ["vehicle"]),
     ("not TOML", lambda: SUV + "\n[[[", ["TOML"]),
     ("YAML", lambda: "name: suv\nvehicle:\n  mass: 2105\n", ["TOML", "line 1"]),
@@ -230,7 +230,7 @@ def test_the_hash_follows_what_changes_results_and_nothing_else(tmp_path: Path) 
 PLAIN = [
     # key, value, what the line says of it
     ("vehicle.mass", '"heavy"', "give a number (found 'heavy')"),
-    ("vehicle.mass", "-3.0", "give a value above 200 (found -3.0)"),
+    ("vehicle.mass", "-3.0", "give a value above 200 kg (found -3.0)"),
     ("vehicle.mass", "nan", "give a finite number (found nan)"),
     ("vehicle.rolling_resistance", "-0.1", "give a value of at least 0 (found -0.1)"),
     ("front.pistons", "1.5", "give a whole number (found 1.5)"),
@@ -318,5 +318,5 @@ def test_what_the_car_itself_has_wrong_is_not_blamed_on_the_included_file(tmp_pa
     (tmp_path / "tuned.toml").write_text("[vehicle]\nmass = 2000.0\n", encoding="utf-8")
     path = tmp_path / "car.toml"
     path.write_text(f'include = "tuned.toml"\n{change("vehicle.mass", "1.0")()}', encoding="utf-8")
-    with pytest.raises(UserError, match=r"car\.toml: vehicle\.mass: give a value above 200"):
+    with pytest.raises(UserError, match=r"car\.toml: vehicle\.mass: give a value above 200 kg"):
         load_config(path)

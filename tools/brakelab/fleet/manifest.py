@@ -116,7 +116,7 @@ def _from_toml(path: Path, config: Path | None, map: Path | None) -> list[Drive]
     try:
         manifest = _Manifest.model_validate(read_toml(path))
     except ValidationError as error:
-        raise describe(error, str(path)) from None
+        raise describe(error, str(path), _Manifest) from None
     drives = []
     for vehicle in manifest.vehicle:
         own = _setting(path, vehicle.config, "config", config)

@@ -92,7 +92,7 @@ def load_columns(path: Path) -> Columns:
     try:
         return Columns.model_validate(read_toml(path))
     except ValidationError as error:
-        raise describe(error, str(path)) from None
+        raise describe(error, str(path), Columns) from None
 
 
 def columns_text(columns: Columns) -> str:

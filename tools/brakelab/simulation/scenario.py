@@ -331,4 +331,4 @@ def load_scenario(path: Path) -> Scenario:
     try:
         return Scenario.model_validate(content)
     except ValidationError as error:
-        raise describe(error, str(path)) from None
+        raise describe(error, str(path), Scenario) from None

@@ -1,0 +1,92 @@
+"""`brake-ecu config check`: everything that is wrong with a CONFIG file, and what the car comes to.
+
+The figures are for reading: torque per pressure, pressures of a braking, the distribution beside the ideal
+one and how far it is from what Annex 5 of ECE R13-H forbids. Swapped numbers that are possible show there.
+"""
+
+import sys
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from ecu.algorithm.control.distribution import front_share
+from ecu.contract.params import BAR, GRAVITY
+from ecu.settings.annex5 import K_RULED, Z_ORDERED, Load, annex_5_violation, shares, utilisation
+from ecu.settings.config import Config, new_params, validate_config
+
+RATES: Final = (0.2, 0.4, 0.6, 0.8)  # braking rates z
+
+
+def check(path: Path) -> int:
+    """Print what is wrong with a CONFIG file, each in a line, and return 2; or what the car comes to, and 0.
+
+    Raises UserError for a file that is no TOML.
+    """
+    config = validate_config(path)
+    if not isinstance(config, Config):
+        for finding in config:
+            print(f"brake-ecu: {finding}", file=sys.stderr)
+        return 2
+    params = new_params(config)[0]
+    violation = annex_5_violation(params, config.vehicle.loads())
+    for line in figures(config, params):
+        print(line)
+    if violation:
+        print(f"brake-ecu: {path}: control.distribution: {violation}", file=sys.stderr)
+        return 2
+    print(f"{path}: nothing wrong")
+    return 0
+
+
+def figures(config: Config, params: Any) -> list[str]:
+    """Return what the car comes to, as lines; `params` is one `PARAMS` of `config`."""
+    front_load = params["rear_axle"] / params["wheelbase"]
+    per_bar = torque_per_bar(params)
+    lines = [
+        f"car           {config.name}: {params['mass']:.0f} kg, {100 * front_load:.0f} % on the front axle, "
+        f"rolling radius {params['wheel_radius'][0]:.3f} and {params['wheel_radius'][2]:.3f} m",
+        f"brakes        front {per_bar[0]:.1f}, rear {per_bar[1]:.1f} N m per bar and axle, nominal friction",
+    ]
+    for z in RATES:
+        share = float(front_share(params, z * GRAVITY))
+        ideal = front_load + z * float(params["cog_height"] / params["wheelbase"])
+        front, rear = pressures(params, z)
+        lines.append(
+            f"z = {z:.1f}       front share {100 * share:4.1f} %, ideal {100 * ideal:4.1f} %; "
+            f"{front:5.1f} bar in front, {rear:5.1f} bar in the rear"
+        )
+    return lines + [line for load in config.vehicle.loads() for line in margins(params, load)]
+
+
+def torque_per_bar(params: Any) -> tuple[float, float]:
+    """Return the torque of the front and the rear axle at nominal friction [N m/bar], 4 A_k r_eff mu."""
+    both = 2.0 * 2.0 * BAR * params["piston_area"] * params["effective_radius"] * params["mu_nominal"]
+    return float(both[0]), float(both[2])
+
+
+def pressures(params: Any, z: float) -> tuple[float, float]:
+    """Return the pressures of both axles [bar] that brake the car at the rate z by its linings alone."""
+    share = float(front_share(params, z * GRAVITY))
+    force = z * GRAVITY * float(params["mass"])
+    found = [
+        part * force * params["wheel_radius"][i] / per_bar + params["push_out_pressure"][i] / BAR
+        for part, per_bar, i in zip((share, 1.0 - share), torque_per_bar(params), (0, 2), strict=True)
+    ]
+    return float(found[0]), float(found[1])
+
+
+def margins(params: Any, load: Load) -> list[str]:
+    """Return how far the distribution is from what Annex 5, 3.1 forbids, at nominal friction."""
+    curve = utilisation(params, shares(params), load)
+    ordered = (curve.z >= Z_ORDERED[0]) & (curve.z <= Z_ORDERED[1])
+    ahead = np.where(ordered, curve.front - curve.rear, np.inf)
+    k = np.maximum(curve.front, curve.rear)
+    ruled = (k >= K_RULED[0]) & (k <= K_RULED[1])
+    spare = np.where(ruled, curve.z - 0.1 - 0.7 * (k - 0.2), np.inf)
+    a, b = int(np.argmin(ahead)), int(np.argmin(spare))
+    least_ahead, least_spare = (round(float(least), 3) + 0.0 for least in (ahead[a], spare[b]))
+    return [
+        f"Annex 5       {load.name}: adhesion used in front less rear {least_ahead:.3f} at least (3.1 A, "
+        f"z = {curve.z[a]:.2f}); braking rate less what is asked {least_spare:.3f} (3.1 B, k = {k[b]:.2f})"
+    ]

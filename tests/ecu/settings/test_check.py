@@ -1,0 +1,102 @@
+"""`config check`: all mistakes of a file at once, and a car's figures by balances of force and moment."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ecu import cli
+from ecu.settings.check import figures, pressures, torque_per_bar
+from ecu.settings.config import load_config, new_params
+
+CONFIGS = Path(__file__).parents[3] / "config"
+SUV = (CONFIGS / "suv.toml").read_text(encoding="utf-8")
+CARS = sorted(CONFIGS.glob("*.toml"))
+
+
+def changed(to: Path, **values: str) -> Path:
+    text = SUV
+    for key, value in values.items():
+        text, count = re.subn(rf"(?m)^{key} *= *[^#\n]*", value, text)
+        assert count
+    out = to / "car.toml"
+    out.write_text(text, encoding="utf-8")
+    return out
+
+
+def test_all_mistakes_are_told_at_once_unknown_keys_first(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = changed(
+        tmp_path,
+        mass="mas = 1620.0 ",
+        piston_diameter="piston_diameter = 60.0 ",
+        mu_nominal='mu_nominal = "good" ',
+    )
+    assert cli.main(["config", "check", str(path)]) == 2
+    assert capsys.readouterr().err.splitlines() == [
+        f"brake-ecu: {path}: {line}"
+        for line in (
+            "vehicle.mas: unknown key; did you mean mass?",
+            "vehicle.mass: missing; add this key",
+            "front.piston_diameter: give a value below 0.15 m (found 60.0)",
+            "front.mu_nominal: give a number (found 'good')",
+            "rear.piston_diameter: give a value below 0.15 m (found 60.0)",
+            "rear.mu_nominal: give a number (found 'good')",
+        )
+    ]
+
+
+def test_other_commands_tell_the_first_and_how_many_more(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = changed(tmp_path, mass="mas = 1620.0 ")
+    assert cli.main(["simulate", "stop-1", "--config", str(path), "--out", str(tmp_path / "x")]) == 2
+    assert "vehicle.mas: unknown key; did you mean mass? (1 more findings)" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("path", CARS, ids=lambda path: path.stem)
+def test_a_shipped_car_is_told_in_figures(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["config", "check", str(path)]) == 0
+    out = capsys.readouterr().out
+    assert out.endswith("nothing wrong\n")
+    assert "Annex 5       laden" in out
+    assert "-0.000" not in out
+
+
+@pytest.mark.parametrize("path", CARS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("z", [0.3, 0.7])
+def test_pressures_brake_the_car_at_the_rate_and_use_both_axles_alike(path: Path, z: float) -> None:
+    """By the clamping force of the pistons on both pads, and moments about the contact of the rear tyres."""
+    config = load_config(path)
+    car, axles = config.vehicle, (config.front, config.rear)
+    params = new_params(config)[0]
+    forces = []
+    for axle, pressure, radius in zip(axles, pressures(params, z), params["wheel_radius"][::2], strict=True):
+        clamp = (pressure - axle.push_out_pressure) * 1e5 * axle.pistons * np.pi / 4 * axle.piston_diameter**2
+        forces.append(2.0 * 2.0 * axle.mu_nominal * clamp * axle.effective_radius / radius)
+    assert sum(forces) == pytest.approx(z * 9.81 * car.mass)
+    behind = car.wheelbase - car.front_axle
+    on_front = car.mass * 9.81 * (behind + z * car.cog_height) / car.wheelbase
+    assert forces[0] / on_front == pytest.approx(forces[1] / (car.mass * 9.81 - on_front))
+
+
+def test_pistons_counted_on_both_sides_show_as_twice_the_torque(tmp_path: Path) -> None:
+    right = new_params(load_config(CONFIGS / "suv.toml"))[0]
+    config = load_config(changed(tmp_path, pistons="pistons = 2 "))
+    wrong = new_params(config)[0]
+    assert torque_per_bar(wrong) == pytest.approx([2.0 * one for one in torque_per_bar(right)])
+    assert f"front {torque_per_bar(wrong)[0]:.1f}," in figures(config, wrong)[1]
+
+
+def test_a_distribution_that_is_forbidden_is_shown_with_its_figures(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = SUV.replace("[control]", '[control]\ndistribution = "fixed"\nfront_share = 0.6')
+    path = tmp_path / "car.toml"
+    path.write_text(text, encoding="utf-8")
+    assert cli.main(["config", "check", str(path)]) == 2
+    said = capsys.readouterr()
+    assert "3.1 A" in said.err
+    assert "front share 60.0 %" in said.out
