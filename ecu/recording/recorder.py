@@ -208,8 +208,9 @@ def read_recording(folder: Path) -> Recording:
         kind = dtype_of(about["record"])
         content = (folder / CYCLES_FILE).read_bytes()
         records = np.frombuffer(content, kind, len(content) // kind.itemsize)
+        cycles, outputs = records["cycle"], records["outputs"]
         initial = np.frombuffer((folder / INITIAL_FILE).read_bytes(), dtype_of(about["state"]))
     except (OSError, ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         reason = " ".join(str(error).split())[:200]
         raise UserError(str(folder), "", f"not a complete recording: {reason}") from None
-    return Recording(folder, about, records["cycle"], records["outputs"], initial, folder / FRAMES_FILE)
+    return Recording(folder, about, cycles, outputs, initial, folder / FRAMES_FILE)

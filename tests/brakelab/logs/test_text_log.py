@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from brakelab.logs.asc import date_ns
 from brakelab.logs.formats import read_frames
 from brakelab.logs.log_quality import LogQuality
+from brakelab.logs.trc import days_ns
 from ecu.contract.records import FRAME_ERROR, FRAME_EXTENDED, FRAME_FD, FRAME_REMOTE, RecordArray
 from ecu.errors import UserError
 
@@ -213,12 +214,18 @@ def test_a_later_trigger_block_that_starts_again_has_its_own_date(
         ("Mit Dez 7 20:15:30.5 2022", 1_670_440_530.5),
         ("Mit M\ufffdr 9 20:15:30 2022", 1_646_853_330.0),
         ("Wed Foo 20 08:15:30.123 am 2022", None),
+        ("Wed Apr 20 08:15:30 am 9022", None),
         ("yesterday", None),
     ],
 )
 def test_dates_of_asc(text: str, seconds: float | None) -> None:
     found = date_ns(text)
     assert (found is None) if seconds is None else (found == round(seconds * 1e3) * 1_000_000)
+
+
+@pytest.mark.parametrize("days", ["yesterday", "1e308", "nan", "2000000", "-1e9"])
+def test_days_that_are_no_date_of_a_trc(days: str) -> None:
+    assert days_ns(days) is None
 
 
 TRC = {

@@ -21,7 +21,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.logs.log_quality import FrameBlock, LogQuality
+from brakelab.logs.log_quality import FrameBlock, LogQuality, known_date
 from brakelab.logs.text_log import (
     DAMAGED,
     DATA,
@@ -86,7 +86,7 @@ def date_ns(text: str) -> int | None:
         seconds = int(date.timestamp())
     except (ValueError, OverflowError):
         return None
-    return seconds * 1_000_000_000 + int((found["f"] or "0").ljust(9, "0")[:9])
+    return known_date(seconds * 1_000_000_000 + int((found["f"] or "0").ljust(9, "0")[:9]))
 
 
 def _read_header(state: RecordArray) -> Callable[[str], bool]:

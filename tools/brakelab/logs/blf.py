@@ -20,7 +20,7 @@ from typing import IO, Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.logs.log_quality import BLOCK_FRAMES, FrameBlock, LogQuality
+from brakelab.logs.log_quality import BLOCK_FRAMES, FrameBlock, LogQuality, known_date
 from brakelab.logs.text_log import FD_LENGTHS, IS_FD_LENGTH
 from ecu.contract.records import (
     FRAME,
@@ -200,7 +200,7 @@ def start_time_ns(header: bytes) -> int:
         seconds = int(datetime(year, month, day, hour, minute, second).timestamp())
     except (ValueError, OverflowError):
         return 0
-    return seconds * 1_000_000_000 + int(millisecond) * 1_000_000
+    return known_date(seconds * 1_000_000_000 + int(millisecond) * 1_000_000) or 0
 
 
 def _unpack(packed: bytes, method: int) -> tuple[bytes, str]:

@@ -46,6 +46,11 @@ _STAMPS: Final = np.dtype(
 )
 
 
+def known_date(stamp_ns: int) -> int | None:
+    """Return a date [ns] as it is, None where it lies beyond every stamp that a log may have."""
+    return stamp_ns if abs(stamp_ns) <= _FARTHEST_NS else None
+
+
 @dataclass
 class Damage:
     """Unreadable parts of a log."""

@@ -248,7 +248,7 @@ def _parquet_batches(path: Path, quality: SignalQuality) -> Iterator[_Batch]:
             _note_start(source, quality)
             wanted = [name for name in names if name == "t" or name in INPUT]
             yield from _numbered(source.iter_batches(BLOCK_ROWS, columns=wanted))
-    except (pa.ArrowInvalid, OSError) as error:
+    except (pa.ArrowInvalid, OSError, UnicodeDecodeError) as error:
         reason = str(error).splitlines()[0].rstrip(".")
         if not quality.rows:
             remedy = f"no readable Parquet file ({reason}); write it again"

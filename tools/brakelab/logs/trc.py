@@ -18,14 +18,14 @@ Bus n becomes interface number n, without such a column 1.
 import re
 from collections.abc import Callable, Iterator
 from datetime import datetime, timedelta
-from decimal import Decimal, InvalidOperation
+from decimal import Decimal
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.logs.log_quality import FrameBlock, LogQuality
+from brakelab.logs.log_quality import FrameBlock, LogQuality, known_date
 from brakelab.logs.text_log import (
     DAMAGED,
     DATA,
@@ -62,8 +62,8 @@ def days_ns(days: str) -> int | None:
         whole, rest = divmod(Decimal(days) * 86_400, 1)
         start = datetime(1899, 12, 30) + timedelta(seconds=int(whole))
         # A date of this size has 16 digits at most, the last of them about a microsecond.
-        return int(start.timestamp()) * 1_000_000_000 + round(rest * 1_000_000) * 1000
-    except (InvalidOperation, OverflowError, ValueError, OSError):
+        return known_date(int(start.timestamp()) * 1_000_000_000 + round(rest * 1_000_000) * 1000)
+    except (ArithmeticError, ValueError, OSError):
         return None
 
 
@@ -77,7 +77,7 @@ def date_ns(text: str) -> int | None:
         seconds = int(datetime.strptime(f"{day} {found['t']}", "%Y-%m-%d %H:%M:%S").timestamp())
     except (ValueError, OverflowError):
         return None
-    return seconds * 1_000_000_000 + int((found["f"] or ".0")[1:].ljust(9, "0")[:9])
+    return known_date(seconds * 1_000_000_000 + int((found["f"] or ".0")[1:].ljust(9, "0")[:9]))
 
 
 def _set_columns(state: RecordArray, names: str) -> None:
