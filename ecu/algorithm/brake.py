@@ -23,9 +23,9 @@ def brake_gain_per_bar(params: Record, i: int) -> float:
 
 @kernel
 def correct_pressure(state: Record, i: int, measured: float, sigma: float, dt: float) -> None:
-    """Fuse a sample of a calliper pressure with its model; judge whether the pressure follows the demand.
+    """Fuse a calliper pressure sample with its model; judge whether the pressure follows the demand.
 
-    Where model and sensor disagree for longer, the sample counts alone until both agree again.
+    Where model and sensor disagree persistently, the sample alone counts until both agree again.
 
     Args:
         state: record whose `value` [bar], `variance` [bar^2], `disagreement` [bar] and `agreed_s` [s], shape

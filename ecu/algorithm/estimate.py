@@ -1,8 +1,8 @@
-"""What estimation says of the car, its tyres and its brakes: the one record between estimating and using.
+"""Estimate of car, tyres and brakes: the one record between estimation and its users.
 
-The observer in use overwrites it once in a cycle; control, monitoring and publishing read it and nothing else
-of estimation. What is watched before anything is estimated reads that of the last cycle. It follows from the
-states of the observers, so neither store nor recording keeps it.
+The observer in use overwrites it once per cycle; control, monitoring and publishing read nothing else of
+estimation. Checks that run before estimation read that of the last cycle. It follows from the observers'
+states, so neither store nor recording keeps it.
 """
 
 import numpy as np
@@ -11,10 +11,10 @@ from ecu.jit import Record, kernel
 
 ESTIMATE = np.dtype(
     [
-        # The car. Its speed means nothing, and no slip and force are known, before `started`.
+        # The car. Before `started` its speed is meaningless, and slip and force are unknown.
         ("speed", "f8"),  # m/s, negative backwards
-        ("accel_x", "f8"),  # specific force in road axes [m/s^2], where it is not `measured` the model's
-        ("accel_x_model", "f8"),  # by the torques of brakes and motors and by drag [m/s^2]
+        ("accel_x", "f8"),  # specific force in road axes [m/s^2]; modelled where not `measured`
+        ("accel_x_model", "f8"),  # the same by the torques of brakes and motors and by drag [m/s^2]
         ("accel_y", "f8"),  # m/s^2
         ("yaw_rate", "f8"),  # rad/s
         ("steering", "f8"),  # rad at the road wheel
@@ -22,7 +22,7 @@ ESTIMATE = np.dtype(
         ("tyre_force", "f8"),  # of all tyres along the car (4.16) [N]
         ("mass", "f8"),  # kg
         ("accel_bias", "f8"),  # of the accelerometer [m/s^2]
-        ("overrun", "f8"),  # drag of a drive that nobody reports, while braking, over mass [m/s^2]
+        ("overrun", "f8"),  # unreported engine drag while braking, over mass [m/s^2]
         # The wheels.
         ("load", "f8", (4,)),  # N
         ("slip", "f8", (4,)),  # (A.6)
@@ -31,26 +31,26 @@ ESTIMATE = np.dtype(
         # The brakes.
         ("mu", "f8", (4,)),  # lining friction
         ("sigma", "f8", (4,)),  # its standard deviation
-        ("sigma_force", "f8"),  # of the force of all linings at equal pressures, relative; NaN: not known
-        ("observed_s", "f8", (4,)),  # for this long friction was observed in this application [s]
+        ("sigma_force", "f8"),  # of the force of all linings at equal pressures, relative; NaN: unknown
+        ("observed_s", "f8", (4,)),  # time for which friction was observed in this application [s]
         ("mode", "i8", (4,)),  # of friction: nominal, observing, holding, fault
         ("brake_torque", "f8", (4,)),  # of the linings [N m], >= 0
-        ("pressure_zero", "f8", (4,)),  # what the sensors read without pressure [bar]
-        # How well the measurements fit: test ratios, NaN for what was not fused in the last window.
+        ("pressure_zero", "f8", (4,)),  # pressure zero [bar]
+        # Fit of the measurements: test ratios, NaN where nothing was fused in the last window.
         ("test_ratio", "f8", (4,)),  # of the wheels
         ("test_ratio_balance", "f8"),  # of the forces along the car
         ("test_ratio_speed", "f8"),  # of the speed reference
         ("started", "u1"),
         ("measured", "u1"),  # `accel_x` is
-        ("backwards", "u1"),  # the car drives so
-        ("reset", "u1"),  # a filter met a value that is not finite
-        ("at_bound", "u1"),  # something learned is at its bound
-        ("given_up", "u1"),  # what was learned predicted worse than the configuration, not long ago
+        ("backwards", "u1"),  # in reverse
+        ("reset", "u1"),  # a filter met a non-finite value
+        ("at_bound", "u1"),  # a learned state is at its bound
+        ("given_up", "u1"),  # learned values recently predicted worse than the configuration
     ],
     align=True,
 )
 
-STANDING = 0.3  # m/s, below: the brakes hold rather than brake
+STANDING = 0.3  # m/s, below: the brakes hold the car at standstill
 LEAST_RATIO, GREATEST_RATIO = 0.5, 1.5  # of friction over nominal
 SIGMA_FOR_LEARNING = 0.10
 SECONDS_FOR_LEARNING = 1.0
@@ -58,6 +58,6 @@ SECONDS_FOR_LEARNING = 1.0
 
 @kernel
 def well_observed(estimate: Record, i: int) -> bool:
-    """Return whether the friction of a corner in this application may be learned."""
+    """Return whether a corner's friction in this application may be learned."""
     sure: bool = estimate.sigma[i] < SIGMA_FOR_LEARNING * estimate.mu[i]
     return sure and estimate.observed_s[i] >= SECONDS_FOR_LEARNING

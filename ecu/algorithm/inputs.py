@@ -1,6 +1,6 @@
-"""What is asked of the inputs: is a signal there, what do motors give, who brakes, what is demanded.
+"""Queries of the inputs: availability of signals, motor torques, brake activity, demands.
 
-All functions read `INPUTS` alone, as they came or as `monitoring/sensors.py` left them.
+All functions read `INPUTS` alone, as received or as masked by `monitoring/sensors.py`.
 """
 
 import math
@@ -20,9 +20,9 @@ from ecu.contract.signals import (
 )
 from ecu.jit import Record, kernel
 
-MAX_DECEL = 12.0  # m/s^2: no tyre on a road car holds more
-LEAST_REQUEST = 0.05  # m/s^2, below it nobody brakes
-ACCELERATES = 2.0  # % of the accelerator's way
+MAX_DECEL = 12.0  # m/s^2: beyond the adhesion of any road car
+LEAST_REQUEST = 0.05  # m/s^2, below it no brake is demanded
+ACCELERATES = 2.0  # % of the accelerator's travel
 
 
 @kernel
@@ -33,20 +33,20 @@ def usable(inputs: Record, place: int) -> bool:
 
 @kernel
 def fresh(inputs: Record, place: int) -> bool:
-    """Return whether a valid sample of an input came in this cycle."""
+    """Return whether a valid sample of an input arrived in this cycle."""
     return inputs.new[place] != 0 and math.isfinite(inputs.value[place])
 
 
 @kernel
 def current(inputs: Record, place: int, oldest_s: float) -> bool:
-    """Return whether an input is usable and younger than `oldest_s` [s]: not kept over a gap."""
+    """Return whether an input is usable and younger than `oldest_s` [s], not held over a gap."""
     young: bool = inputs.age_ns[place] < 1e9 * oldest_s
     return usable(inputs, place) and young
 
 
 @kernel
 def others_brake(inputs: Record) -> bool:
-    """Return whether an ABS or ESP says that it works: pressures are then not those that were demanded."""
+    """Return whether ABS or ESP report activity: pressures then differ from those demanded."""
     return inputs.value[ABS_ACTIVE] > 0.5 or inputs.value[ESP_ACTIVE] > 0.5
 
 
@@ -59,14 +59,14 @@ def motor_torque(inputs: Record, corner: int) -> float:
 
 @kernel
 def motor_torque_known(inputs: Record, corner: int) -> bool:
-    """Return whether the motor torque is reported, or was never more than zero: a car without such motors."""
+    """Return whether motor torque is reported, or was never above zero: a car without such motors."""
     place = MOTOR_TORQUE + corner
     return usable(inputs, place) or inputs.value[place] == 0.0
 
 
 @kernel
 def mean_wheel_speed(params: Record, inputs: Record) -> float:
-    """Return the mean speed of the wheels [m/s] by their last samples, without a sign."""
+    """Return the mean speed of the wheels [m/s] by their last samples, unsigned."""
     total = 0.0
     for i in range(4):
         total += abs(inputs.value[WHEEL_SPEED + i]) * params.wheel_radius[i]
@@ -92,14 +92,14 @@ def pedal_to_decel(params: Record, position: float) -> float:
 
 @kernel
 def pedal_known(params: Record, inputs: Record) -> bool:
-    """Return whether the pedal's position arrives, or at least its switch does."""
+    """Return whether the pedal's position, or at least its switch, is received."""
     switch = params.mapped[PEDAL_POSITION] != 0 and usable(inputs, PEDAL_PRESSED)
     return usable(inputs, PEDAL_POSITION) or switch
 
 
 @kernel
 def automated_demand_valid(inputs: Record) -> bool:
-    """Return whether an automated driver asks for a deceleration and vouches for it."""
+    """Return whether an automated driver demands a deceleration and flags it valid."""
     return (
         usable(inputs, DECEL_DEMAND)
         and usable(inputs, DECEL_DEMAND_VALID)
@@ -109,7 +109,7 @@ def automated_demand_valid(inputs: Record) -> bool:
 
 @kernel
 def requested_decel(params: Record, inputs: Record) -> float:
-    """Return the deceleration asked for [m/s^2], NaN where neither pedal nor demand is usable."""
+    """Return the deceleration demanded [m/s^2], NaN where neither pedal nor automated demand is usable."""
     decel = math.nan
     if usable(inputs, PEDAL_POSITION):
         decel = pedal_to_decel(params, inputs.value[PEDAL_POSITION])

@@ -10,16 +10,16 @@ from ecu.jit import Record, kernel
 
 @kernel
 def publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: int, mode: int) -> None:
-    """Overwrite the outputs that no part before wrote.
+    """Overwrite the outputs not yet written.
 
     Args:
         p: `PARAMS`.
         s: `STATE`.
-        u: `INPUTS` without what is implausible.
-        y: `OUTPUTS`; pressures and motor torques demanded are there.
+        u: `INPUTS` with implausible ones masked out.
+        y: `OUTPUTS`, already holding the demanded pressures and motor torques.
         decel: demanded [m/s^2], may be NaN.
         faults: the bits of `active_faults`.
-        mode: that of the ECU.
+        mode: of the ECU.
     """
     e = s.estimate
     started = e.started != 0

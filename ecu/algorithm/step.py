@@ -1,14 +1,15 @@
-"""The whole algorithm as one function of its arguments alone.
+"""One cycle of the whole algorithm as a function of its arguments alone.
 
 `step(params, state, inputs, outputs)` overwrites preallocated records and depends on nothing else, so the
-daemon, replay and closed-loop simulation get the same bits from the same inputs. Order of one cycle:
+daemon, replay and closed-loop simulation produce identical outputs to the bit from the same inputs. Order of
+one cycle:
 
     cross-checks of the sensors, by the last estimate -> brake application
     -> estimation: accelerations -> wheel loads -> brake torques -> observer -> ESTIMATE
     -> disc temperature -> wear -> dust
     -> demand -> distribution -> blending -> pressure law -> slip guard -> limiter -> mode -> outputs
 
-What comes after estimation reads `ESTIMATE` (`estimate.py`) and nothing else of it.
+All later stages read `ESTIMATE` (`estimate.py`) and nothing else of estimation.
 """
 
 import math
@@ -108,13 +109,13 @@ INITIAL = np.dtype(
         ("plausibility", PLAUSIBILITY_STATE),
         ("acceleration", ACCELERATION_STATE),
         ("prediction", PREDICTION_STATE),
-        ("trusted", INPUTS),  # the inputs without what is implausible
+        ("trusted", INPUTS),  # inputs with implausible ones masked out
         ("mode", MODE_STATE),
         ("learned", LEARNED),
     ],
     align=True,
 )
-"""What a recording keeps of the state before the first cycle: all of it but the estimate, which follows."""
+"""State before the first cycle as a recording stores it: without the estimate, which follows from it."""
 
 STATE = np.dtype(
     [*((name, INITIAL[name]) for name in INITIAL.names or ()), ("estimate", ESTIMATE)], align=True
@@ -126,7 +127,7 @@ def new_state(params: RecordArray, learned: RecordArray | None = None) -> Record
 
     Args:
         params: `PARAMS`, shape (1,).
-        learned: `LEARNED`, shape (1,), as the state store keeps it; None: nothing is known.
+        learned: `LEARNED`, shape (1,), from the state store; None: unadapted.
     """
     state = np.zeros(1, STATE)
     row = state[0]
@@ -144,7 +145,7 @@ def new_state(params: RecordArray, learned: RecordArray | None = None) -> Record
 
 
 def initial_part(state: RecordArray) -> RecordArray:
-    """Return what a recording keeps of a state before the first cycle, `INITIAL`, shape (1,)."""
+    """Return the part of a state before the first cycle that a recording stores, `INITIAL`, shape (1,)."""
     kept = np.zeros(1, INITIAL)
     for name in INITIAL.names or ():
         kept[name] = state[name]
@@ -152,7 +153,7 @@ def initial_part(state: RecordArray) -> RecordArray:
 
 
 def resume(state: RecordArray, initial: RecordArray) -> None:
-    """Overwrite a state by the one before the first cycle of which a recording kept `initial`, shape (1,)."""
+    """Restore the state before the first cycle from the `initial` of a recording, shape (1,)."""
     state[:] = np.zeros(1, STATE)
     for name in INITIAL.names or ():
         state[name] = initial[name]

@@ -1,21 +1,21 @@
 """Brake blending: division of a wheel's torque between motor and lining (corrected 5.2, 5.3).
 
     T_EM,plan = sat_0^T_max(f T_b)        T_EHB = T_b - T_EM,plan          f: 0 off, 1 series, else parallel
-    T_EM      = sat_0^T_max(T_EM,plan + what the lining still lacks of T_EHB)
+    T_EM      = sat_0^T_max(T_EM,plan + torque that the lining still lacks of T_EHB)
 
-Corrected: in print max(0, T_EM - T_max) is zero always, T_EM having been cut already.
+Corrected: the printed max(0, T_EM - T_max) is always zero, since T_EM is limited already.
 
-The linings are asked for what the motor is planned to leave, and the motor gives beside its plan what they do
-not give yet (`friction_torque.py`): it is ten times as fast as the hydraulics (26 ms dead time, 90 % after
-0.1 s), so their sum follows the demand while torque changes hands. For that the plan has to be early: it goes
-by what limit and demand will be `AHEAD` from now where one falls or the other rises. Towards standstill the
-limit fades with the speed below `fade_speed`, which is known before it begins. The motor takes more again at
-a rate that the hydraulics follow. Where the plan drops, the last part of the linings' share comes later: the
-pressure overshoots a step by 6 %, and a motor that is gone makes up for nothing.
+The linings are demanded the torque left by the planned motor torque, and the motor adds the torque that they
+still lack (`friction_torque.py`): it is ten times as fast as the hydraulics (26 ms dead time, 90 % after 0.1
+s), so their sum follows the demand while torque changes hands. The plan must therefore lead: it uses limit
+and demand predicted `AHEAD` from now where one falls or the other rises. Towards standstill the limit fades
+with the speed below `fade_speed`, which is known before it begins. The motor takes more again at a rate that
+the hydraulics follow. Where the plan drops, the last part of the linings' share comes later: the pressure
+overshoots a step by 6 %, and a motor that is no longer available cannot compensate for that.
 
-A motor whose limit or torque is unknown, or which does not give what it is asked for, is planned for no
-longer; its demand fades while the linings take over. It is tried again in the next braking. Under ABS or ESP,
-in reverse and at a wheel that the slip guard holds, the motor is asked for nothing at once.
+A motor whose limit or torque is unknown, or whose torque falls short of its demand, leaves the plan; its
+demand fades while the linings take over. It is tried again in the next brake application. Under ABS or ESP,
+in reverse and at a wheel that the slip guard holds, the motor demand drops to zero at once.
 """
 
 import math
@@ -28,29 +28,29 @@ from ecu.jit import Record, kernel
 
 BLENDING_STATE = np.dtype(
     [
-        ("limit", "f8", (4,)),  # last one known [N m]
+        ("limit", "f8", (4,)),  # last known value [N m]
         ("fall", "f8", (4,)),  # of the limit, low-passed [N m/s]
         ("torque", "f8", (4,)),  # last demand [N m]
         ("rise", "f8", (4,)),  # of the demand, low-passed [N m/s]
-        ("ceiling", "f8", (4,)),  # the motor may be asked for this much [N m]
-        ("allowed", "f8", (4,)),  # the plan may count on this much [N m]
+        ("ceiling", "f8", (4,)),  # greatest motor torque demand [N m]
+        ("allowed", "f8", (4,)),  # greatest motor torque planned [N m]
         ("asked", "f8", (3, 4)),  # motor demands of the last cycles [N m], the newest in row 0
-        ("short_s", "f8", (4,)),  # for this long the motor has given too little
-        ("lost", "u1", (4,)),  # it gave too little in this braking
+        ("short_s", "f8", (4,)),  # time for which the motor has given too little
+        ("lost", "u1", (4,)),  # it gave too little in this application
         ("slow", "f8", (4,)),  # plan, low-passed [N m]
-        ("lining", "f8", (4,)),  # torque that the lining is asked for [N m]
-        ("plan", "f8", (4,)),  # the rest of the demand [N m]
+        ("lining", "f8", (4,)),  # torque demanded of the lining [N m]
+        ("plan", "f8", (4,)),  # rest of the demand [N m]
     ],
     align=True,
 )
 
-AHEAD = 0.12  # s: dead time and lag of the hydraulics, and something for the motor to fill
-RATE_GAIN = 0.5  # of a new sample in a rate
-RISE = 2000.0  # N m/s, of what the plan counts on
-FADE = 6000.0  # N m/s, of the demand to a motor that is planned for no longer
+AHEAD = 0.12  # s: dead time and lag of the hydraulics, and a margin for the motor
+RATE_GAIN = 0.5  # weight of a new sample in a rate
+RISE = 2000.0  # N m/s, of the planned torque
+FADE = 6000.0  # N m/s, of the demand to a motor that has left the plan
 LATER, LATER_S = 0.16, 0.06  # -, s: settles a step of (A.17) within 1 % in 0.11 s instead of 0.18 s
 OLDEST_S = 0.05  # of a limit or torque
-SHORT_SHARE, SHORT_TORQUE = 0.15, 50.0  # of the demand, N m: the motor gives too little
+SHORT_SHARE, SHORT_TORQUE = 0.15, 50.0  # of the demand, N m: beyond it the motor gives too little
 SHORT_S = 0.03
 
 
@@ -62,7 +62,7 @@ def blends(params: Record) -> bool:
 
 @kernel
 def _watch_motor(state: Record, inputs: Record, i: int, dt: float) -> None:
-    """Find a motor that gives less than its limit and all the last demands promised."""
+    """Detect a motor that gives less than its limit and all recent demands allow."""
     asked = min(state.asked[0, i], state.asked[1, i], state.asked[2, i], state.limit[i])
     missing = asked - inputs.value[MOTOR_TORQUE + i]
     short = asked > 0.0 and missing > SHORT_SHARE * asked + SHORT_TORQUE
@@ -73,7 +73,7 @@ def _watch_motor(state: Record, inputs: Record, i: int, dt: float) -> None:
 
 @kernel
 def _follow_limit(state: Record, inputs: Record, fading: float, i: int, dt: float) -> None:
-    """Take a limit in; `fading`: what the fade at low speed will leave of it."""
+    """Update the motor's limit; `fading`: share that the fade at low speed will leave of it."""
     limit: float = inputs.value[MOTOR_LIMIT + i]
     if fresh(inputs, MOTOR_LIMIT + i):
         fall = max((state.limit[i] - limit) / dt, 0.0)
@@ -86,7 +86,7 @@ def _follow_limit(state: Record, inputs: Record, fading: float, i: int, dt: floa
 
 @kernel
 def _fading(params: Record, speed: float, decel: float) -> float:
-    """Return what will be left of a motor's limit of now when it fades below `fade_speed`."""
+    """Return the share left of a motor's present limit when it fades below `fade_speed`."""
     if not (params.fade_speed > 0.0 and speed > params.fade_speed and decel > 0.0):
         return 1.0
     return min(max(speed - AHEAD * decel, 0.0) / params.fade_speed, 1.0)
@@ -96,7 +96,7 @@ def _fading(params: Record, speed: float, decel: float) -> float:
 def update_motors(
     params: Record, state: Record, inputs: Record, guarded: Record, speed: float, decel: float, dt: float
 ) -> None:
-    """Overwrite what each motor may be asked for and planned with.
+    """Overwrite each motor's greatest demand and greatest planned torque.
 
     Args:
         params: `PARAMS`.
@@ -129,7 +129,7 @@ def update_motors(
 
 @kernel
 def share_torque(params: Record, state: Record, torque: Record, dt: float) -> None:
-    """Overwrite what the linings are asked for and what is planned for the motors.
+    """Overwrite the torque demanded of the linings and planned for the motors.
 
     Args:
         params: `PARAMS`.
@@ -154,7 +154,7 @@ def share_torque(params: Record, state: Record, torque: Record, dt: float) -> No
 
 @kernel
 def motor_torque_demand(params: Record, state: Record, lag: float, i: int) -> float:
-    """Return the torque to ask of a wheel's motor [N m]; `lag` [N m] is what its lining still lacks."""
+    """Return the demand to a wheel's motor [N m]; `lag` [N m] is the torque its lining still lacks."""
     motor: float = min(max(state.plan[i] + lag, 0.0), state.torque[i], state.ceiling[i])
     if not (params.blending[i] > 0.0 and math.isfinite(motor)):
         motor = 0.0

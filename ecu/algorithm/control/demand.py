@@ -2,13 +2,13 @@
 
 a_dem = max(pedal map, valid decel_demand), while the car is held: at least `hold_decel`
 
-A car that has stood for 0.5 s with its brakes asked for is held until the pedal is back at rest and no
-automated demand is left, or until the accelerator is pressed; then the holding demand fades out. It is
-enough for the steepest grade of the configuration, see `new_params`. There is no creep function: without a
-request nothing is braked.
+A car that has stood for 0.5 s with a brake demand is held until the pedal is back at rest and no automated
+demand is left, or until the accelerator is pressed; then the holding demand fades out. It is enough for the
+steepest grade of the configuration, see `new_params`. There is no creep function: without a request there is
+no brake demand.
 
-A pedal whose position is lost while its switch is not is taken to stay where it was until the switch opens;
-one that is pressed only then asks for `SECONDARY_DECEL`.
+A pedal whose position is lost while its switch still works keeps its last position until the switch opens;
+one pressed only afterwards demands `SECONDARY_DECEL`.
 """
 
 import math
@@ -36,10 +36,10 @@ from ecu.jit import Record, kernel
 
 DEMAND_STATE = np.dtype(
     [
-        ("standing_s", "f8"),  # how long the car has stood [s]
+        ("standing_s", "f8"),  # time at standstill [s]
         ("held", "u1"),
         ("hold", "f8"),  # holding demand [m/s^2], fades in and out
-        ("pedal", "f8"),  # last position known, or taken for it [%]
+        ("pedal", "f8"),  # last known or assumed position [%]
     ],
     align=True,
 )
@@ -48,12 +48,12 @@ STANDSTILL = 0.3  # m/s
 STANDING_TIME = 0.5  # s
 ACCELERATOR_PRESSED = 3.0  # %
 SECONDARY_DECEL = 2.44  # m/s^2, of a secondary braking system (ECE R13-H, Annex 3, 2.2)
-HOLD_RATE = 5.0  # m/s^3: let go within 0.7 s, as fast as a foot changes the pedal
+HOLD_RATE = 5.0  # m/s^3: released within 0.7 s, as fast as a foot changes the pedal
 
 
 @kernel
 def _position_for(params: Record, decel: float) -> float:
-    """Return the pedal position [%] that asks for a deceleration [m/s^2]."""
+    """Return the pedal position [%] that demands a deceleration [m/s^2]."""
     x, y = params.pedal_position, params.pedal_decel
     for j in range(1, PEDAL_POINTS):
         if y[j] >= decel and y[j] > y[j - 1]:
@@ -63,7 +63,7 @@ def _position_for(params: Record, decel: float) -> float:
 
 @kernel
 def hold_pedal(params: Record, state: Record, inputs: Record) -> None:
-    """Overwrite a lost pedal position by what its switch leaves of the last one.
+    """Substitute a lost pedal position by the last one, as far as the switch confirms it.
 
     Args:
         params: `PARAMS`.
@@ -84,7 +84,7 @@ def hold_pedal(params: Record, state: Record, inputs: Record) -> None:
 
 @kernel
 def _stands(params: Record, inputs: Record, speed: float) -> bool:
-    """Return whether wheels and vehicle speed [m/s, NaN: unknown] say that the car stands."""
+    """Return whether wheels and vehicle speed [m/s, NaN: unknown] indicate standstill."""
     for i in range(4):
         if not usable(inputs, WHEEL_SPEED + i):
             return False

@@ -1,21 +1,21 @@
-"""Torque per wheel: the demand shared between the axles (5.1, Figure 4.2), the trailing axle kept behind.
+"""Brake force distribution: the torque demand shared between the axles (5.1, Figure 4.2), rear axle limited.
 
     T_b,dem = m a_dem r                                     (5.1)
     ideal       front share (l_r + z h) / L, z = a_dem / g: both axles use the same share of their grip
     fixed       front share constant
     electronic  front share constant until the ideal one passes it, then the ideal one: the rear is held back
 
-Friction of the linings is known to its sigma only, so none of the three keeps the order of the axles by
-itself. Two things do (ECE R13-H, Annex 5: the rear uses no more grip than the front):
+Lining friction is uncertain, so none of the three alone guarantees the order in which the axles lock. Two
+functions do (ECE R13-H, Annex 5: the rear uses no more grip than the front):
 
 - `watch_trailing`: where a rear wheel slips more than the front one of its side by more than
-  `rear_slip_margin`, the torque of the rear axle is taken back until it does not. That needs no friction.
-  Beside a front wheel whose brake has failed it may slip `LONE_SLIP`.
-- `cap_trailing`: compensation raises the rear's pressure relative to the front's only as far as the observer
-  is sure of it, with the rear at mu + 2 sigma and the front at mu - 2 sigma.
+  `rear_slip_margin`, the torque of the rear axle is reduced until it no longer does. This needs no friction
+  estimate. Beside a front wheel whose brake has failed it may slip `LONE_SLIP`.
+- `cap_trailing`: compensation raises the rear's pressure relative to the front's only as far as the estimate
+is certain, with the rear at mu + 2 sigma and the front at mu - 2 sigma.
 
-Of a car that drives backwards the front axle trails and is relieved: there z is negative in the ideal share,
-and both look at the front.
+In reverse the front axle trails and is unloaded: z is negative in the ideal share, and both functions apply
+to the front axle.
 """
 
 import math
@@ -32,31 +32,31 @@ from ecu.jit import Record, kernel
 DISTRIBUTION_STATE = np.dtype(
     [
         ("torque", "f8", (4,)),  # demanded of each wheel [N m], >= 0; NaN without a request
-        ("trailing", "f8"),  # what of its torque the trailing axle is left, LEAST_TRAILING to 1
-        ("beyond", "f8", (2,)),  # slip of a trailing wheel beyond the leading one of its side, low-passed
-        ("offset", "f8", (2,)),  # of a rear wheel beyond the front one while rolling freely: the radii
-        ("free_s", "f8", (2,)),  # how long that was learned, at most LEARNING_TIME
+        ("trailing", "f8"),  # share of its torque that the trailing axle keeps, LEAST_TRAILING to 1
+        ("beyond", "f8", (2,)),  # slip of a trailing wheel less that of the leading one, low-passed
+        ("offset", "f8", (2,)),  # the same of a rear wheel while rolling freely: error of the radii
+        ("free_s", "f8", (2,)),  # learning time of that, at most LEARNING_TIME
     ],
     align=True,
 )
 
 IDEAL, FIXED, ELECTRONIC = range(len(DISTRIBUTIONS))
-LEAST_TRAILING = 0.3  # what the trailing axle keeps whatever its wheels seem to do
-TAKE_BACK = 600.0  # 1/s per slip: 1 % too much takes back the torque at 6 1/s
+LEAST_TRAILING = 0.3  # share that the trailing axle always keeps
+TAKE_BACK = 600.0  # 1/s per slip: 1 % excess reduces the torque at 6 1/s
 GIVE_BACK = 0.3  # 1/s
-SMOOTHING = 0.2  # per sample: 50 ms; leaves a fifth of the wheel speeds' noise
+SMOOTHING = 0.2  # per 50 ms sample; leaves a fifth of the wheel speeds' noise
 LEARNING_TIME = 2.0  # s
-RADIUS_DOUBT = 0.008  # until then: radii within 0.3 % and what else differs, two standard deviations
+RADIUS_DOUBT = 0.008  # before learning: radii within 0.3 % and other differences, two standard deviations
 FREE_ACCEL, FREE_YAW_RATE = 0.5, 0.03  # m/s^2, rad/s
-RULED_FROM = 0.15  # z from which on Annex 5 orders the axles
+RULED_FROM = 0.15  # z above which Annex 5 orders the axles
 FASTEST = 1.02  # of the ground below it
-LONE_SLIP = 0.04  # of a trailing wheel beside one that rolls: tyres have their peak at 0.1 on a dry road
+LONE_SLIP = 0.04  # of a trailing wheel beside one that rolls freely: tyres peak at 0.1 on a dry road
 ROUNDING = 1e-9
 
 
 @kernel
 def ideal_front_share(params: Record, decel: float) -> float:
-    """Return the front axle's share of the brake force with equal adhesion of the axles, 0 to 1.
+    """Return the front axle's share of the brake force at equal adhesion utilisation of the axles, 0 to 1.
 
     `decel` [m/s^2] is positive driving forwards, negative driving backwards.
     """
@@ -78,9 +78,9 @@ def front_share(params: Record, decel: float) -> float:
 
 @kernel
 def _rear_beyond_front(params: Record, inputs: Record, estimate: Record, speed: float, side: int) -> float:
-    """Return how much more than the front wheel of its side a rear wheel slips.
+    """Return the slip of a rear wheel less that of the front wheel on its side.
 
-    NaN without new samples, or where a wheel turns faster than a braked one can: its sensor keeps a value.
+    NaN without new samples, or where a wheel turns faster than a braked one can: its sensor is stuck.
     """
     slips, forwards = 0.0, 1.0 if speed > 0.0 else -1.0
     for i in (side, side + 2):
@@ -106,10 +106,10 @@ def watch_trailing(
     speed: float,
     dt: float,
 ) -> None:
-    """Move what the trailing axle is left, by the slip of its wheels beyond that of the leading ones.
+    """Adjust the torque share of the trailing axle by the slip of its wheels relative to the leading ones.
 
-    Wheel speeds are compared with each other, at the radii of their loads (A.4): a trailing wheel on its way
-    to lock is what observers reject as an outlier. What the radii differ beside that is learned while the car
+    Wheel speeds are compared with each other, at the radii of their loads (A.4): an observer would reject a
+    trailing wheel about to lock as an outlier. The remaining difference of the radii is learned while the car
     rolls freely.
 
     Args:
@@ -117,9 +117,9 @@ def watch_trailing(
         state: `DISTRIBUTION_STATE`; all but `torque` is overwritten.
         inputs: `INPUTS`.
         estimate: `ESTIMATE`.
-        failed: wheels whose brake gives nothing, shape (4,).
-        decel: demanded [m/s^2]; the axle has all of its torque again once nobody brakes.
-        speed: of the vehicle [m/s], NaN: unknown. Slower than `min_speed` slip says nothing.
+        failed: wheels whose brake has failed, shape (4,).
+        decel: demanded [m/s^2]; the axle regains its full torque once no brake is demanded.
+        speed: of the vehicle [m/s], NaN: unknown. Below `min_speed` slip is not evaluated.
         dt: time since the last cycle [s].
     """
     brakes = decel > 0.0
@@ -150,7 +150,7 @@ def watch_trailing(
 def distribute(params: Record, state: Record, mass: float, decel: float, backwards: bool) -> None:
     """Overwrite the torque demanded of each wheel [N m]; NaN for an unknown deceleration [m/s^2].
 
-    `mass` [kg] is that of the car as it is known now; `backwards`: it drives so.
+    `mass` [kg] is the current estimate; `backwards`: the car is in reverse.
     """
     front = front_share(params, -decel if backwards else decel)
     for i in range(4):
@@ -171,7 +171,7 @@ def cap_trailing(
     failed: Record,
     backwards: bool,
 ) -> None:
-    """Keep compensation from raising the trailing axle's share beyond the line of Annex 5.
+    """Limit compensation such that the trailing axle's share stays within the line of Annex 5.
 
     The ratio of the trailing to the leading axle's pressure may exceed that of nominal friction only up to
     where the trailing axle with mu + 2 sigma still uses no more grip than the leading one with mu - 2 sigma.
@@ -180,11 +180,11 @@ def cap_trailing(
         params: `PARAMS`.
         state: `DISTRIBUTION_STATE`.
         decel: demanded [m/s^2].
-        lining: torque [N m] that the lining of each wheel is asked for; the motors have the rest.
+        lining: torque [N m] demanded of each wheel's lining; the motors supply the rest.
         estimate: `ESTIMATE`, for friction and its standard deviation.
         pressure: compensated demands [Pa], shape (4,); those of the trailing axle are overwritten.
-        failed: wheels whose brake gives nothing, shape (4,); the rule is then one of the wheels that brake.
-        backwards: the car drives so.
+        failed: wheels whose brake has failed, shape (4,); the rule then applies to the wheels that brake.
+        backwards: the car is in reverse.
     """
     if not decel >= RULED_FROM * GRAVITY:
         return

@@ -1,20 +1,20 @@
-"""A calliper or a circuit that gives nothing: how that is seen, and who brakes in its place.
+"""Failed callipers and circuits: their detection, and redistribution of their torque.
 
-A pressure far below what was demanded is a brake that fails or a sensor that does. The car tells which: the
-force of the linings by the pressures that should be there, less that by acceleration (4.16), is what the
-suspected wheels should give, or nothing.
+A pressure far below its demand means a failed brake or a failed sensor. The car's deceleration tells which:
+lining force by the expected pressures, less that by acceleration (4.16), equals the force owed by the
+suspected wheels, or zero.
 
-    failed       pressure below `FOLLOWING` of what follows from the demands, and more than half of the force
-                 that these wheels owe is missing, both for `SURE_S`
-    sound again  the pressure follows, or early in another braking no force is missing, for `SURE_S`
+    failed       pressure below `FOLLOWING` of the modelled response to the demands, and more than half of the
+                 force that these wheels owe is missing, both for `SURE_S`
+    sound again  the pressure follows, or early in another application no force is missing, for `SURE_S`
 
-Force is expected by the friction that a braking begins with, corrected by what it is while all pressures
-follow: what is learned with a wheel believed dead would confirm that belief.
+The expected force uses the friction at the start of the application, corrected by its change while all
+pressures follow: friction learned with a wheel believed failed would confirm that belief.
 
-Torque of failed brakes goes to their own motors as far as these may be asked, the rest to the other wheels,
-so that each uses the same share of its load: no rear wheel more grip than a front one that brakes (ECE R13-H,
-Annex 5). Beyond `GRIP` that comes slowly, and what it adds is limited by the yaw moment that it makes,
-`YAW_LIMIT`. A failed brake is asked as before: if it is there after all, or comes back, that is how it shows.
+Torque of failed brakes goes to their own motors up to these motors' greatest demand, the rest to the other
+wheels, so that each uses the same share of its load: no rear wheel more grip than a front one that brakes
+(ECE R13-H, Annex 5). Beyond `GRIP` torque is added slowly, limited by the resulting yaw moment, `YAW_LIMIT`.
+The demand to a failed brake continues, so that a wrong verdict or a recovery shows.
 """
 
 import math
@@ -32,31 +32,31 @@ FAILED_BRAKES_STATE = np.dtype(
     [
         ("failed", "u1", (4,)),
         ("any", "u1"),
-        ("owed", "f8", (4,)),  # force by the pressures that follow from the demands [N], low-passed
+        ("owed", "f8", (4,)),  # lining force by the modelled response to the demands [N], low-passed
         ("given", "f8"),  # force of all linings by the acceleration [N], low-passed
-        ("scale", "f8"),  # of what is given over what is owed while all pressures follow, in this braking
-        ("settled_s", "f8"),  # for this long the forces could be judged in this braking
-        ("doubt_s", "f8", (4,)),  # for this long the verdict has been contradicted
-        ("sent", "f8", (4,)),  # pressures demanded of the brakes that give some [Pa]
+        ("scale", "f8"),  # delivered over owed force while all pressures follow, in this application
+        ("settled_s", "f8"),  # time for which the forces could be judged in this application
+        ("doubt_s", "f8", (4,)),  # time for which the verdict has been contradicted
+        ("sent", "f8", (4,)),  # pressures demanded of the working brakes [Pa]
         ("moved", "f8"),  # of the torque of the failed brakes, 0 to 1
-        ("grip", "f8"),  # force over load that the others may be asked for
-        ("force", "f8", (4,)),  # that each wheel is to have [N]
-        ("share", "f8", (4,)),  # of the load, of those that brake
+        ("grip", "f8"),  # force over load that the other wheels may be demanded
+        ("force", "f8", (4,)),  # force demanded of each wheel [N]
+        ("share", "f8", (4,)),  # of the load, of the wheels that brake
     ],
     align=True,
 )
 
-LEAST = 8.0  # bar expected, below it nothing is said
-FOLLOWING = 0.5  # of what is expected
-MISSING = 0.5  # of what is owed
+LEAST = 8.0  # bar expected, below it nothing is judged
+FOLLOWING = 0.5  # of the expected pressure
+MISSING = 0.5  # of the owed force
 SURE_S = 0.05
-LAG = 0.05  # s: hydraulics, tyres and accelerometer behind the model of the pressure
+LAG = 0.05  # s: lag of hydraulics, tyres and accelerometer behind the modelled pressure
 SETTLED_FROM, SETTLED = 0.05, 0.1  # of the weight, of the force
 SCALE_S, LARGEST_SCALE = 0.3, 1.5
-AGAIN_S = 0.3  # of a braking, in which a verdict of the one before is looked at again
+AGAIN_S = 0.3  # of an application, in which the previous verdict is re-examined
 MOVE_S = 0.05
-GRIP = 0.6  # at once, or what they had before
-GRIP_RATE = 0.5  # 1/s from there on: slip shows before a wheel locks
+GRIP = 0.6  # reached at once, or the previous value
+GRIP_RATE = 0.5  # 1/s beyond it: slip shows before a wheel locks
 YAW_LIMIT = 0.15
 """Lateral force of the front tyres that holds the car straight, over their load at rest: 1 % of their
 longitudinal grip, and some 20 degrees at the steering wheel."""
@@ -90,8 +90,8 @@ def watch_brakes(
         estimate: `ESTIMATE` of the last cycle.
         law: `PRESSURE_LAW_STATE`, for the friction.
         expected: pressures that follow from the demands sent, shape (4,) [bar].
-        zero: what the sensors read without pressure, shape (4,) [bar].
-        sent: the demands were valid; else, and while another controller brakes, nothing is judged.
+        zero: pressure zeros, shape (4,) [bar].
+        sent: the demands were valid; otherwise, and while another controller brakes, nothing is judged.
         dt: time since the last cycle [s].
     """
     gain = 1.0 - math.exp(-dt / LAG)
@@ -137,7 +137,7 @@ def _lacks(inputs: Record, expected: float, zero: float, i: int) -> bool:
 
 @kernel
 def note_sent(state: Record, pressure: Record) -> None:
-    """Overwrite `state.sent`: the pressures demanded last [Pa], shape (4,), of the brakes that give some."""
+    """Overwrite `state.sent`: the pressures demanded last [Pa], shape (4,), of the working brakes."""
     for i in range(4):
         state.sent[i] = 0.0 if state.failed[i] else pressure[i]
 
@@ -170,9 +170,9 @@ def replace_failed(
         params: `PARAMS`.
         state: `FAILED_BRAKES_STATE`, after `watch_brakes`.
         distribution: `DISTRIBUTION_STATE`; `torque` is overwritten.
-        allowed: what each motor may be asked for [N m], shape (4,).
+        allowed: greatest demand to each motor [N m], shape (4,).
         decel: demanded [m/s^2].
-        backwards: the car drives so.
+        backwards: the car is in reverse.
         dt: time since the last cycle [s].
     """
     step = dt / MOVE_S
@@ -206,8 +206,8 @@ def replace_failed(
 
 @kernel
 def _limit_yaw(params: Record, state: Record, distribution: Record) -> None:
-    """Take back of the forces of one side what it has more than the other and than may be; none of them falls
-    below what its wheel was asked for before."""
+    """Reduce the forces of one side to the greatest admissible difference from the other, no force below its
+    wheel's earlier demand."""
     most = 2.0 * YAW_LIMIT * params.mass * GRAVITY * params.rear_axle / params.track
     apart = state.force[0] + state.force[2] - state.force[1] - state.force[3]
     side = 0 if apart > 0.0 else 1

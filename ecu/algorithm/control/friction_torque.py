@@ -1,14 +1,14 @@
-"""Lag of the linings' torque behind their demand, which motors can make up for.
+"""Lag of the lining torque behind its demand, which motors can compensate.
 
-Model. Of the demands sent, what the hydraulics let through after their dead time (A.17, A.18: a rise after
-26, a fall after 15 ms; here 25 and 15, half cycles) drives a pressure of second order,
+Model. The demands sent, after the dead time of the hydraulics (A.17, A.18: 26 ms for a rise, 15 ms for a
+fall; here 25 and 15, half cycles), drive a second-order pressure,
 
     inertia p'' + damping p' + p = min(rise, fall)
 
 by the trapezoidal rule. The dead time is longer than a cycle, so the coming one is known already. The
-sensor's 1.8 bar of noise is some 50 N m at a front wheel: its samples correct the course of the model, the
-more the more that has moved. Torque is 2 A_k r_eff mu (p - p_0) (A.19) with the friction that the pressure
-law uses: this is about lags, not about what the law does not know, or holds back.
+sensor's 1.8 bar of noise is some 50 N m at a front wheel: its samples correct the model, with greater weight
+the more the pressure has changed. Torque is 2 A_k r_eff mu (p - p_0) (A.19) with the friction of the pressure
+law: only the lag is modelled, neither errors of the law nor its limits.
 """
 
 import numpy as np
@@ -28,7 +28,7 @@ FRICTION_TORQUE_STATE = np.dtype(
         ("value", "f8", (4,)),  # the same pressure, corrected by the sensor [bar]
         ("variance", "f8", (4,)),  # bar^2
         ("disagreement", "f8", (4,)),  # low-passed innovation [bar]
-        ("agreed_s", "f8", (4,)),  # for this long model and sensor have agreed
+        ("agreed_s", "f8", (4,)),  # time for which model and sensor have agreed
     ],
     align=True,
 )
@@ -69,15 +69,15 @@ def _advance_cycle(state: Record, i: int, sent: float) -> None:
 def follow_pressure(
     params: Record, state: Record, inputs: Record, sent: Record, zero: Record, dt: float
 ) -> None:
-    """Take in the demands of the last cycle and the pressures measured now.
+    """Update the model by the demands of the last cycle and the pressures measured now.
 
     Args:
         params: `PARAMS`.
         state: `FRICTION_TORQUE_STATE`, overwritten.
         inputs: `INPUTS`.
         sent: pressure demands of the last cycle [Pa], shape (4,).
-        zero: what the sensors read without pressure [bar], shape (4,).
-        dt: time since the last cycle [s]; cycles missed in between have held the demand.
+        zero: pressure zeros [bar], shape (4,).
+        dt: time since the last cycle [s]; missed cycles held the demand.
     """
     missed = min(max(round(dt / CYCLE), 1), LONGEST_GAP) - 1
     for i in range(4):
@@ -92,13 +92,13 @@ def follow_pressure(
 
 @kernel
 def lagging_torque(params: Record, state: Record, law: Record, wanted: float, i: int) -> float:
-    """Return what a wheel's lining lacks of the torque it is to have, at the end of the coming cycle [N m].
+    """Return the torque that a wheel's lining lacks of its demand at the end of the coming cycle [N m].
 
     Args:
         params: `PARAMS`.
         state: `FRICTION_TORQUE_STATE`.
         law: `PRESSURE_LAW_STATE`, for the friction.
-        wanted: the pressure that it is to have now [Pa].
+        wanted: pressure demanded now [Pa].
         i: wheel.
     """
     lever = brake_gain(params, i)

@@ -1,19 +1,18 @@
-"""The last word before the bus: a limiter that trusts nobody, for both wheels of an axle in one call.
+"""Output limiter: bounds of pressure, its rate and the left-right difference, one axle per call.
 
 For each corner, given the demand of the uncompensated law and the compensated one:
 
 1. not finite, or moving against the uncompensated demand: the uncompensated demand counts until the
-   compensated one comes back;
-2. T(p, nominal friction) stays within 0.6–1.6 of the torque demanded;
-3. left and right differ by no more than `LEFT_RIGHT_SHARE` of the torque demanded, T(p, nominal friction)
-   over it: learned friction, compensation and fallbacks of one side together. What one side gives up the
-   other gets, so that the axle brakes the same;
+compensated one recovers; 2. T(p, nominal friction) stays within 0.6–1.6 of the torque demanded; 3. left and
+right differ by no more than `LEFT_RIGHT_SHARE` of the torque demanded, T(p, nominal friction)
+   over it: learned friction, compensation and fallbacks of one side together. Torque taken from one side is
+   added to the other, so that the axle torque is unchanged;
 4. 0–180 bar, and no more than the accumulator holds or the slip guard lets through;
 5. rise at most `max_pressure_rate` (at least 1500 bar/s: an emergency stop is not delayed); a fall is
    unlimited while the demand falls or to stay below 2 and 4, and as slow as a rise while it does not.
 
-So published pressures break 3 only at a wheel that the slip guard holds, where the hydraulics have no more to
-give, and while a corner is on its way at the rate of 5: 60 ms at most. A lost sensor is no reason.
+So published pressures violate 3 only at a wheel held by the slip guard, where the hydraulics are exhausted,
+and while a corner moves at the rate of 5: 60 ms at most. A lost sensor is no reason.
 
 Small on purpose, so that it can be tested exhaustively.
 """
@@ -33,9 +32,9 @@ LIMITER_STATE = np.dtype(
         ("pressure", "f8", (4,)),  # last output [Pa]
         ("uncompensated", "f8", (4,)),  # last uncompensated demand [Pa]
         ("wanted", "f8", (4,)),  # last compensated demand [Pa]
-        ("ceiling", "f8", (4,)),  # highest pressure that a corner may have [Pa]
-        ("share", "f8", (4,)),  # T(target, nominal friction) over the torque demanded, 0: none is
-        ("asked", "f8", (4,)),  # compensated demand with what left and right leave of it [Pa]
+        ("ceiling", "f8", (4,)),  # highest pressure admitted at a corner [Pa]
+        ("share", "f8", (4,)),  # T(target, nominal friction) over the torque demanded, 0: no demand
+        ("asked", "f8", (4,)),  # compensated demand after the left-right limit [Pa]
         ("falls", "u1", (4,)),  # the demand of the corner falls
         ("limited", "u1"),
         ("starved", "u1"),  # the accumulator holds less than is demanded
@@ -45,7 +44,7 @@ LIMITER_STATE = np.dtype(
 
 LEAST_TORQUE, GREATEST_TORQUE = 0.6, 1.6
 LEFT_RIGHT_SHARE = 0.10
-BEYOND_ANY = 1e12  # Pa; of two pressures that are both infinite there is no share
+BEYOND_ANY = 1e12  # Pa; two infinite pressures have no ratio
 # A demand that rises while its compensated twin falls by more than this in one cycle is a fault [Pa].
 AGAINST_DEMAND = 5e5
 EMPTY = 10.0 * BAR  # far below the gas pressure of any accumulator
@@ -53,16 +52,17 @@ EMPTY = 10.0 * BAR  # far below the gas pressure of any accumulator
 
 @kernel
 def reads_empty(inputs: Record) -> bool:
-    """Return whether an accumulator tells a pressure at which nothing would brake."""
+    """Return whether an accumulator reports a pressure at which no brake would work."""
     told: bool = usable(inputs, ACCUMULATOR_PRESSURE)
     return told and BAR * inputs.value[ACCUMULATOR_PRESSURE] <= EMPTY
 
 
 @kernel
 def available_pressure(params: Record, inputs: Record) -> float:
-    """Return the highest pressure [Pa] that the hydraulics can give: the accumulator's, where it is known.
+    """Return the highest pressure [Pa] available from the hydraulics: the accumulator's, where it is known.
 
-    One that reads empty limits nothing: if it is, there is nothing to hold back; if the sensor lies, all is.
+    A reading of an empty accumulator does not limit: if true, no pressure is lost; if the sensor errs, all
+    would be.
     """
     available: float = params.max_pressure
     if usable(inputs, ACCUMULATOR_PRESSURE) and not reads_empty(inputs):
@@ -72,7 +72,7 @@ def available_pressure(params: Record, inputs: Record) -> float:
 
 @kernel
 def _nominal_pressure(params: Record, torque: float, corner: int) -> float:
-    """Return the pressure [Pa] beyond the push-out pressure that makes a torque at nominal friction."""
+    """Return the pressure [Pa] beyond push-out that makes a torque at nominal friction."""
     return min(torque / (brake_gain(params, corner) * params.mu_nominal[corner]), BEYOND_ANY)
 
 
@@ -80,7 +80,7 @@ def _nominal_pressure(params: Record, torque: float, corner: int) -> float:
 def _bound(
     params: Record, state: Record, corner: int, wanted: float, uncompensated: float, torque: float
 ) -> None:
-    """Overwrite `state.share` and `state.asked`: what the corner is to have by rules 1 and 2."""
+    """Overwrite `state.share` and `state.asked`, the corner's demand by rules 1 and 2."""
     state.share[corner] = 0.0
     state.asked[corner] = wanted
     if not (math.isfinite(torque) and torque > 0.0):
@@ -112,7 +112,7 @@ def _bound(
 
 @kernel
 def _level(params: Record, state: Record, left: int, torque: Record) -> None:
-    """Move the shares of an axle towards each other until they hold rule 3."""
+    """Move the shares of an axle towards each other until they meet rule 3."""
     right = left + 1
     if state.share[left] == 0.0 or state.share[right] == 0.0:
         return
@@ -161,17 +161,13 @@ def limit_axle(
     torque: Record,
     dt: float,
 ) -> None:
-    """Overwrite `state.pressure` of an axle: what may be sent [Pa]; all arguments may be NaN.
+    """Overwrite `state.pressure` of an axle, the pressures to send [Pa]; all arguments may be NaN.
 
     Args:
-        params: `PARAMS`.
-        state: `LIMITER_STATE`, overwritten but for `ceiling`; one that cannot be a pressure counts as
-            `max_pressure`.
-        left: the axle's left corner, 0 or 2.
-        wanted: compensated pressures [Pa], shape (4,).
-        uncompensated: pressures by the base friction [Pa], shape (4,).
-        torque: friction torques demanded of the corners [N m], shape (4,).
-        dt: time since the last cycle [s].
+        params: `PARAMS`. state: `LIMITER_STATE`, overwritten except `ceiling`; an invalid ceiling counts as
+        `max_pressure`. left: the axle's left corner, 0 or 2. wanted: compensated pressures [Pa], shape (4,).
+        uncompensated: pressures by the base friction [Pa], shape (4,). torque: friction torques demanded of
+        the corners [N m], shape (4,). dt: time since the last cycle [s].
     """
     for i in (left, left + 1):
         _bound(params, state, i, wanted[i], uncompensated[i], torque[i])

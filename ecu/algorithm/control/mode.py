@@ -1,9 +1,9 @@
 """The ECU's mode and the faults that the inputs show.
 
 starting   until every needed input was seen, at most one second
-ready      inputs good, nobody brakes
-active     brakes are asked for or applied
-degraded   a needed input is lost: friction is held or nominal, braking goes on
+ready      inputs good, no brake demand
+active     brakes are demanded or applied
+degraded   a needed input is lost: friction is held or nominal, braking continues
 failed     neither pedal, nor its switch, nor demand arrives: demand 0, flagged invalid, the hydraulic
            fallback takes over; not a shadow for which none of them is mapped, since nobody asks it
 """

@@ -1,21 +1,21 @@
-"""Torque to pressure with the friction known, and its compensation while braking (5.4–5.8).
+"""Pressure law: pressure for a torque at the known friction, compensated while braking (5.4–5.8).
 
     p_0,dem = T / (2 A_k mu_0 r_eff) + p_push                          (5.4), mu_0: base friction
     e = sat_{+-0.3}((mu - mu_0) / mu_0)                                (5.6)
     p* = p_push + (p_0,dem - p_push) (1 - e + e^2)                     corrected 5.7, 5.8: "second-order"
-    p* = p_push + (p_0,dem - p_push) / (1 + e)                         what they approximate: "inverse"
+    p* = p_push + (p_0,dem - p_push) / (1 + e)                         exact form: "inverse"
 
-Corrected: the printed form scales the push-out pressure too, and takes T_b where the motors brake as well;
-T is what the lining shall give (5.4). The second order leaves e^3 of torque, 2.7 % at the limit, and beyond
-it would turn back; the inverse has no such limit. "off" takes nominal friction always. The base changes
-between applications only, so a noisy estimate divides nothing. The friction used moves at most
+Corrected: the printed form scales the push-out pressure too, and takes T_b where the motors brake as well; T
+is the torque of the lining alone (5.4). The second order leaves a torque error of e^3, 2.7 % at the limit,
+and reverses beyond it; the inverse has no such limit. "off" takes nominal friction always. The base changes
+between applications only, so that a noisy estimate never is a divisor. The friction used moves at most
 `FRICTION_RATE` a second: the loop through estimator and hydraulics (26 ms dead time) stays slow against both.
-Where a pressure cannot be had it does not fall on: no more would come of it.
+Where a pressure is unavailable it falls no further, which would gain nothing.
 
-Many linings rub harder as speed falls and begin the next braking lower again (assumption; those of the
-simulated car's rear by a sixth). So the base is the learned friction times what the last braking began with
-over what it ended with, and the estimate, at first still that of the end, is followed once it was observed
-for `EARLY_S`.
+Many linings rub harder as speed falls and start the next application lower again (assumption; the simulated
+car's rear linings by a sixth). So the base is the learned friction times the ratio of initial to final
+friction of the last application, and the estimate, at first still the final one, is followed once it was
+observed for `EARLY_S`.
 """
 
 import math
@@ -31,12 +31,12 @@ PRESSURE_LAW_STATE = np.dtype(
     [
         ("base", "f8", (4,)),  # mu_0
         ("used", "f8", (4,)),  # friction in use
-        ("mu_override", "f8", (4,)),  # the laboratory's ideal controller is given the true friction; NaN: off
-        ("early", "f8", (4,)),  # friction soon after this braking began, 0: not observed yet
-        ("start", "f8", (4,)),  # friction at the beginning over that at the end of the application before
-        ("cut", "u1", (4,)),  # the last pressure was cut on its way out
-        ("limit_s", "f8"),  # for this long the deceleration has not been kept
-        ("at_limit", "u1"),  # it was too long in this braking
+        ("mu_override", "f8", (4,)),  # true friction, for the laboratory's ideal controller alone; NaN: off
+        ("early", "f8", (4,)),  # friction soon after this application began, 0: not observed yet
+        ("start", "f8", (4,)),  # initial over final friction of the last application
+        ("cut", "u1", (4,)),  # the last pressure was cut by limiter or slip guard
+        ("limit_s", "f8"),  # time for which the deceleration has not been reached
+        ("at_limit", "u1"),  # it was too long in this application
     ],
     align=True,
 )
@@ -60,10 +60,11 @@ def pressure_for_torque(params: Record, torque: float, mu: float, corner: int) -
 
 @kernel
 def follow_friction(params: Record, state: Record, estimate: Record, dt: float) -> None:
-    """Move the friction in use towards the estimate, within what friction can be.
+    """Move the friction in use towards the estimate, within its admissible range.
 
-    An estimate above the base counts only as far as it is sure: rather too hard a braking than too weak a
-    one. While it still is what the last braking ended with, and that braking began with another, it waits.
+    An estimate above the base counts only as far as it is certain: too much torque is preferred to too
+    little. While it still is the final friction of the last application, whose initial friction differed, it
+    waits.
     """
     if params.compensation == OFF:
         return
@@ -94,7 +95,7 @@ def set_base(params: Record, state: Record, learned: Record) -> None:
 
 @kernel
 def learn_start(state: Record, estimate: Record, learned: Record) -> None:
-    """Keep the ratio of first to last friction of a brake application, where both are known."""
+    """Store the ratio of initial to final friction of a brake application, where both are known."""
     for i in range(4):
         known = state.early[i] > 0.0 and well_observed(estimate, i)
         if known:
@@ -105,7 +106,7 @@ def learn_start(state: Record, estimate: Record, learned: Record) -> None:
 
 @kernel
 def friction_in_use(state: Record, corner: int) -> float:
-    """Return the friction that the law counts on now."""
+    """Return the friction that the law currently uses."""
     override: float = state.mu_override[corner]
     used: float = state.used[corner]
     return override if math.isfinite(override) else used
@@ -127,14 +128,14 @@ def compensated_pressure(params: Record, state: Record, pressure: float, corner:
 
 @kernel
 def watch_limit(params: Record, state: Record, mu: Record, guarded: Record, asked: bool, dt: float) -> None:
-    """Tell, until the braking is over, that the pedal's deceleration could not be kept for `LIMIT_S`.
+    """Report, until the application ends, that the demanded deceleration was not reached for `LIMIT_S`.
 
     Args:
         params: `PARAMS`.
         state: `PRESSURE_LAW_STATE`; `at_limit` and `limit_s` are overwritten.
         mu: friction as estimated, shape (4,).
-        guarded: wheels whose pressure is cut because they slip, shape (4,): no limit of compensation.
-        asked: a deceleration is asked for.
+        guarded: wheels held by the slip guard, shape (4,): not a limit of compensation.
+        asked: a deceleration is demanded.
         dt: time since the last cycle [s].
     """
     short = False

@@ -1,16 +1,16 @@
-"""Holds the pressure back at a wheel that runs past its tyre's range, and gives it back when it rolls again.
+"""Slip guard: holds the pressure at a wheel beyond its tyre's range, returns it once the wheel recovers.
 
-    lag    = |v_i| - |omega| r                       what a wheel is behind the car [m/s]; slip = -lag / |v_i|
-    growth = d lag / dt, low-passed                  how fast it falls behind [m/s^2]
+    lag    = |v_i| - |omega| r                       speed deficit of a wheel [m/s]; slip = -lag / |v_i|
+    growth = d lag / dt, low-passed                  rate of that deficit [m/s^2]
 
 begins   slip beyond `RANGE` while the lag grows: the cap is the pressure demanded last
 cut      slip beyond `RANGE` and the wheel is not coming back: the cap falls
 hold     slip beyond `RANGE`, the wheel comes back: the cap stays
-return   slip within `RANGE`, or the car slower than `LEAST_SPEED`: the cap rises until it caps nothing
+return   slip within `RANGE`, or the car slower than `LEAST_SPEED`: the cap rises until it no longer acts
 
-A wheel must be seen to fall behind, so a car's speed that is wrong by a tenth caps nothing. Where an ABS or
-ESP says that it works, the cap never falls: two controllers would cut the same wheel. This is no ABS: it
-looks for no best slip, knows no yaw and leaves each wheel to itself.
+The deficit must grow, so a vehicle speed wrong by a tenth caps nothing. While ABS or ESP report activity the
+cap never falls: two controllers would cut the same wheel. This is no ABS: it seeks no optimal slip, has no
+yaw control and treats each wheel alone.
 
 Assumption: all constants; found with the simulated vehicle on friction of 0.2 to 1.2.
 """
@@ -29,7 +29,7 @@ SLIP_GUARD_STATE = np.dtype(
     [
         ("capped", "u1", (4,)),
         ("cap", "f8", (4,)),  # Pa, where capped
-        ("lag", "f8", (4,)),  # last one known [m/s]
+        ("lag", "f8", (4,)),  # last known [m/s]
         ("growth", "f8", (4,)),  # m/s^2
         ("age", "f8", (4,)),  # of the lag [s]
         ("acting", "u1"),  # on any wheel
@@ -53,7 +53,7 @@ def _flag(inputs: Record, place: int) -> bool:
 
 @kernel
 def _follow_lag(params: Record, state: Record, inputs: Record, ground: float, i: int, dt: float) -> None:
-    """Take in a new wheel speed; a wheel whose speed is lost lags by nothing."""
+    """Update the lag by a new wheel speed; a wheel whose speed is lost has no lag."""
     state.age[i] += dt
     if fresh(inputs, WHEEL_SPEED + i) and state.age[i] > 0.0:
         lag = ground - abs(inputs.value[WHEEL_SPEED + i]) * params.wheel_radius[i]
@@ -76,7 +76,7 @@ def guard_slip(
     torque: Record,
     dt: float,
 ) -> None:
-    """Overwrite which wheels are capped, and at which pressure.
+    """Overwrite the set of capped wheels and their pressure caps.
 
     Args:
         params: `PARAMS`.
@@ -85,8 +85,8 @@ def guard_slip(
         estimate: `ESTIMATE`.
         speed: of the car [m/s], negative backwards, NaN where it is not known.
         sent: pressures demanded in the last cycle [Pa], shape (4,).
-        wanted: pressures that the pressure law asks for now [Pa], shape (4,).
-        torque: demanded of the wheels, of motors and linings [N m], shape (4,).
+        wanted: pressures demanded by the pressure law now [Pa], shape (4,).
+        torque: demanded of each wheel's motor and lining together [N m], shape (4,).
         dt: time since the last cycle [s].
     """
     watching = abs(speed) > LEAST_SPEED

@@ -1,4 +1,4 @@
-"""What all observers say alike of a brake: its torque, and its friction's mode while none is observed."""
+"""Brake torque of a corner, and its friction mode while none is observed, shared by all observers."""
 
 import math
 
@@ -7,7 +7,7 @@ from ecu.contract.signals import CALLIPER_PRESSURE, FAULT, HOLDING, NOMINAL, WHE
 from ecu.jit import Record, kernel
 
 CUT_OFF = 16.0  # Hz, of pressure and slip (4.3.3): all signals lag alike
-DRIVEN = 0.2  # of the brakes' torque: motors that drive with more drive against the brakes
+DRIVEN = 0.2  # of the brakes' torque: above it the drive acts against the brakes
 
 
 @kernel
@@ -23,7 +23,7 @@ def update_pressure(params: Record, state: Record, mu: Record, inputs: Record, d
 
 @kernel
 def resting_mode(params: Record, state: Record, learned: Record, good: bool, i: int) -> int:
-    """Return the mode of a corner that does not observe; `good`: its inputs are usable."""
+    """Return the mode of a corner that is not observed; `good`: its inputs are usable."""
     if not good and params.mapped[WHEEL_SPEED + i] and params.mapped[CALLIPER_PRESSURE + i]:
         return FAULT
     return HOLDING if state.observed_s[i] > 0.0 or learned.observed_s[i] > 0.0 else NOMINAL

@@ -6,12 +6,12 @@ down), so it reads
     a_s = a_x cos(theta) - g sin(theta) - psi_dot^2 x_s
 
 With the quasi-static pitch theta = -k a_x (k: `pitch_gradient`) this is a_s = a_x (1 + g k) to first order.
-At 8 m/s^2 and 2 deg/g that is 0.28 m/s^2. On a slope the reading contains gravity, which is why m a_x is
+At 8 m/s^2 and 2 deg/g that is 0.28 m/s^2. On a slope the reading contains gravity, so m a_x is
 the sum of tyre forces and drag on any slope (corrected 4.16); speed needs the slope removed (`speed.py`).
 
-The lateral speed at the centre of gravity is that of a rear axle with a small slip angle:
-v_y = l_r psi_dot - v_x a_y / (c_alpha g). Of yaw rate and lateral acceleration one tells the other in steady
-cornering, a_y = v_x psi_dot.
+The lateral speed at the centre of gravity is that of a rear axle with a small slip angle: v_y = l_r psi_dot -
+v_x a_y / (c_alpha g). In steady cornering yaw rate and lateral acceleration follow from each other, a_y = v_x
+psi_dot.
 """
 
 import numpy as np
@@ -30,14 +30,14 @@ from ecu.contract.signals import (
 from ecu.jit import Record, kernel
 
 SLOPE = 2.0  # m/s^2, of a slope of 20 %
-LEAST_CORNERING_SPEED = 5.0  # m/s, from which lateral acceleration tells the yaw rate
+LEAST_CORNERING_SPEED = 5.0  # m/s, above which lateral acceleration yields the yaw rate
 
 MOTION_STATE = np.dtype(
     [
         ("accel_x", "f8"),  # specific force in road axes at the centre of gravity [m/s^2]
         ("accel_x_model", "f8"),  # the same by the torques of brakes and motors and by drag
-        ("measured", "u1"),  # `accel_x` is, else it is the model's
-        ("backwards", "u1"),  # the car drives so
+        ("measured", "u1"),  # `accel_x` is measured, otherwise modelled
+        ("backwards", "u1"),  # in reverse
         ("accel_y", "f8"),
         ("yaw_rate", "f8"),  # rad/s
         ("steering", "f8"),  # rad at the road wheel
@@ -50,7 +50,7 @@ MOTION_STATE = np.dtype(
 
 @kernel
 def _drives_backwards(params: Record, inputs: Record) -> bool:
-    """Return whether the car is in reverse, or rolls back by wheel speed sensors that know a sign."""
+    """Return whether the car is in reverse gear, or rolls back by wheel speed sensors with direction."""
     back = 0
     for i in range(4):
         place = WHEEL_SPEED + i
@@ -62,9 +62,9 @@ def _drives_backwards(params: Record, inputs: Record) -> bool:
 
 @kernel
 def speed_backwards(params: Record, inputs: Record, motion: Record, speed: float, dt: float) -> float:
-    """Return the speed [m/s], negative, of a car that drives backwards, from the last one.
+    """Return the speed [m/s], negative, of a car in reverse, from the previous one.
 
-    It is that of the fastest wheel, of sensors that know a sign or do not. Wheels that fall faster than the
+    It is that of the fastest wheel, with or without direction in its sensor. Wheels that slow faster than the
     accelerometer allows on a slope have begun to lock.
     """
     slower: float = abs(speed) - (abs(motion.accel_x) + SLOPE) * dt
@@ -76,9 +76,9 @@ def speed_backwards(params: Record, inputs: Record, motion: Record, speed: float
 
 @kernel
 def update_motion(params: Record, state: Record, inputs: Record, speed: float, brake_torque: Record) -> None:
-    """Overwrite accelerations, yaw rate, steering and lateral speed; what nothing tells counts as zero.
+    """Overwrite accelerations, yaw rate, steering and lateral speed; unknown quantities count as zero.
 
-    Longitudinal acceleration is the model's while its sensor is lost; brake torques [N m] act against travel.
+    Longitudinal acceleration is modelled while its sensor is lost; brake torques [N m] oppose travel.
     """
     value = inputs.value
     state.steering = value[STEERING_ANGLE] if usable(inputs, STEERING_ANGLE) else 0.0

@@ -1,6 +1,6 @@
-"""One cycle of estimation: inertial signals, loads and brake torques, then the observer that is configured.
+"""One cycle of estimation: inertial signals, loads and brake torques, then the configured observer.
 
-Of `STATE` it changes its own records, what is learned, and `estimate`, which the rest of the ECU reads.
+It changes its own records of `STATE`, the learned values, and `estimate`, which the rest of the ECU reads.
 """
 
 from ecu.algorithm.estimation.friction import update_pressure
@@ -29,12 +29,12 @@ from ecu.contract.params import BAR, JOINT, OBSERVER1
 from ecu.contract.signals import ACCEL_X, CALLIPER_PRESSURE
 from ecu.jit import Record, kernel
 
-KEEP_S = 1.0  # between two copies of what the joint observer knows, while no application ends
+KEEP_S = 1.0  # between stores of the joint observer's states, while no application ends
 
 
 @kernel
 def start_estimation(p: Record, s: Record) -> None:
-    """Begin with what was learned, of a car that stands."""
+    """Start with the learned values, at standstill."""
     restore_friction(p, s.friction, s.learned)
     restore_joint(p, s.joint, s.learned)
     update_wheel_load(p, s.wheel_load, 0.0, 0.0, 0.0, 1.0)
@@ -44,13 +44,13 @@ def start_estimation(p: Record, s: Record) -> None:
 
 @kernel
 def start_estimate(s: Record) -> None:
-    """Overwrite the estimate by that before the first cycle: friction is what was learned."""
+    """Initialise the estimate before the first cycle: friction is the learned one."""
     tell_friction(s.friction, s.estimate)
 
 
 @kernel
 def keep_application(p: Record, s: Record) -> None:
-    """At the end of a brake application: keep what the joint observer has learned in it."""
+    """At the end of a brake application: store the joint observer's learned states."""
     if p.observer == JOINT:
         end_application(s.joint)
         if end_prediction(s.prediction):
@@ -61,7 +61,7 @@ def keep_application(p: Record, s: Record) -> None:
 
 @kernel
 def hand_over_application(p: Record, s: Record) -> None:
-    """After `keep_application`: hand what was observed over to the next application."""
+    """After `keep_application`: prepare the observed values for the next application."""
     if p.observer == JOINT:
         hand_over_level(s.estimate, s.learned)
     else:
@@ -73,16 +73,16 @@ def hand_over_application(p: Record, s: Record) -> None:
 def observe(
     p: Record, s: Record, u: Record, sent: Record, heat: Record, guarded: bool, contradicted: bool, dt: float
 ) -> None:
-    """Overwrite the estimate of the last cycle by that of this one.
+    """Overwrite the estimate of the last cycle.
 
     Args:
         p: `PARAMS`.
         s: `STATE` of `ecu.algorithm.step`.
-        u: `INPUTS` without what is implausible.
-        sent: pressures demanded last [Pa] of the brakes that give some, shape (4,).
+        u: `INPUTS` with implausible ones masked out.
+        sent: pressures demanded last [Pa] of the working brakes, shape (4,).
         heat: relative standard deviation that each friction has gained by its disc's temperature, shape (4,).
-        guarded: the slip guard holds a wheel back: what was learned last goes back.
-        contradicted: a sensor or a stream begins to be wrong: likewise.
+        guarded: the slip guard holds a wheel: the last snapshot is restored.
+        contradicted: a sensor or a stream has just become implausible: likewise.
         dt: time since the last cycle [s].
     """
     braking, e = s.application.braking != 0, s.estimate
@@ -125,7 +125,7 @@ def _observe_jointly(
 
 @kernel
 def _at_rest(p: Record, s: Record, u: Record) -> bool:
-    """Return whether nobody brakes by the linings, not even a little."""
+    """Return whether no friction brake is applied, not even slightly."""
     if s.application.braking != 0 or requested_decel(p, u) > LEAST_REQUEST:
         return False
     recent, total = s.application.recent, 0.0
@@ -138,7 +138,7 @@ def _at_rest(p: Record, s: Record, u: Record) -> bool:
 
 @kernel
 def _learn_zeros(zero: Record, u: Record) -> None:
-    """Take the readings of released brakes in; `zero` is with the joint observer's record in recordings."""
+    """Learn the pressure zeros from released brakes; recordings keep `zero` in the joint observer's part."""
     for i in range(4):
         if fresh(u, CALLIPER_PRESSURE + i):
             note_rest(zero, i, u.value[CALLIPER_PRESSURE + i])

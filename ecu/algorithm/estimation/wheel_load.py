@@ -3,9 +3,9 @@
     F_Z,f = m g l_r / (2 L) - m a_x h / (2 L) -+ m a_y h l_r / (b L)     left -, right +
     F_Z,r = m g l_f / (2 L) + m a_x h / (2 L) -+ m a_y h l_f / (b L)
 
-Corrected: the rear lines stand with l_f, static and lateral (printed: l_r, so that the loads do not add up
-to m g). Accelerations are specific forces in road axes, first-order lagged because the body takes time to
-pitch and roll.
+Corrected: the rear lines use l_f, static and lateral (printed: l_r, with which the loads do not sum to m g).
+Accelerations are specific forces in road axes, first-order lagged because the body takes time to pitch and
+roll.
 """
 
 import math
@@ -17,7 +17,7 @@ from ecu.jit import Record, kernel
 
 WHEEL_LOAD_STATE = np.dtype([("accel_x", "f8"), ("accel_y", "f8"), ("load", "f8", (4,))], align=True)
 
-# A wheel is never taken as lifted: slip and stiffness would lose their meaning.
+# A wheel load never falls to zero: slip and stiffness would be undefined.
 MIN_LOAD_SHARE = 0.1
 
 
@@ -27,7 +27,7 @@ def update_wheel_load(
 ) -> None:
     """Overwrite `state.load` [N] from specific forces in road axes [m/s^2] and speed [m/s].
 
-    Air drag acts at the centre of gravity (assumption); the tyres that hold against it pitch the car too.
+    Air drag acts at the centre of gravity (assumption), so the tyre forces that balance it transfer load too.
     """
     gain = 1.0 - math.exp(-dt / max(params.load_transfer_lag, 1e-6))
     state.accel_x += gain * (accel_x - state.accel_x)

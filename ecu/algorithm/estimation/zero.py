@@ -1,12 +1,12 @@
-"""Zero of a pressure sensor, learned while the brakes are released.
+"""Pressure zero of a sensor, learned while the brakes are released.
 
-Many cars cannot report a pressure below zero. Of a reading N(z, s) that is cut off there
+Many cars cannot report a pressure below zero. A reading N(z, s) truncated there has
 
     mean = s phi(a) + z Phi(a)        share at the floor = Phi(-a)        a = z / s
 
 so its mean at rest is not the zero: with z = 0 and s = 1.8 bar it is 0.7 bar. Both equations give z and s
 from mean and share, without any configured noise. A sensor is floored if it never reads less than zero and
-reads zero often; where nearly all samples are at the floor, all that is known of z is that it is negative.
+reads zero often; where nearly all samples are at the floor, z is only known to be negative.
 """
 
 import math
@@ -22,7 +22,7 @@ ZERO_STATE = np.dtype(
         ("mean", "f8", (4,)),  # of the readings at rest [bar]
         ("square", "f8", (4,)),  # of their squares [bar^2]
         ("at_floor", "f8", (4,)),  # share of the readings
-        ("below", "u1", (4,)),  # one was negative
+        ("below", "u1", (4,)),  # a reading was negative
         ("samples", "i8", (4,)),
     ],
     align=True,
@@ -33,8 +33,8 @@ FREE = 0.4  # bar above push-out, mean of the wheels: the brakes are released
 LIMIT = 8.0  # bar, more is neither zero nor noise
 LEAST_SHARE = 0.05  # at the floor, of a floored sensor
 NEARLY_ALL = 0.97
-UNKNOWN = 0.7  # bar, standard deviation of a zero that nothing tells
-LEAST_SIGMA = 0.05  # bar, of one that is known
+UNKNOWN = 0.7  # bar, standard deviation of an unknown zero
+LEAST_SIGMA = 0.05  # bar, of a known zero
 
 
 @kernel
@@ -62,7 +62,7 @@ def floored_zero(mean: float, at_floor: float) -> tuple[float, float]:
 
 @kernel
 def note_rest(state: Record, i: int, reading: float) -> None:
-    """Take a reading [bar] of a released brake in."""
+    """Add a reading [bar] of a released brake."""
     if not abs(reading) < LIMIT:
         return
     state.samples[i] = min(state.samples[i] + 1, MEMORY)
@@ -76,7 +76,7 @@ def note_rest(state: Record, i: int, reading: float) -> None:
 
 @kernel
 def settle_zero(state: Record, i: int) -> None:
-    """Overwrite the zero of a sensor and its variance by what was noted."""
+    """Overwrite a sensor's zero and its variance from the readings added."""
     n = state.samples[i]
     zero, sigma = state.mean[i], math.sqrt(max(state.square[i] - state.mean[i] ** 2, 0.0))
     known = n / (n + START)

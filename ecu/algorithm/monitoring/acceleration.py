@@ -1,27 +1,26 @@
-"""An accelerometer that jumps or sticks: what neither the wheels nor the torques confirm.
+"""Plausibility of the accelerometer: jumps and stuck readings that neither wheels nor torques confirm.
 
-Three say how hard the car brakes, each as a mean over a block of 0.1 s:
+Three sources give the deceleration, each as a mean over a block of 0.1 s:
 
     a   the accelerometer, in road axes, cornering removed
-    w   the wheels: dv/dt of v = mean(omega r) (1 - a / (g C)), the slip that the force needs taken off, and
-        of mean(omega r) itself: tyres may be stiffer than C; what is less counts
-    f   the torques: -(sum of linings and motors) / (r m), with the friction that the braking began with
+    w   the wheels: dv/dt of v = mean(omega r) (1 - a / (g C)), corrected for the slip that the force
+        needs, and of mean(omega r) itself: tyres may be stiffer than C; the lesser counts
+    f   the torques: -(sum of linings and motors) / (r m), with the friction at the start of the application
 
-A slope is in w and not in a or f; a lining that changes is in a and w alike, and not in f. So where a has
-moved against both, to the same side, the sensor is wrong. The last three blocks are set against four that end
-0.1 s before them; what w and f may err by grows with the noise of the sensors and with the range that f ran
-through in 1.2 s:
+A slope affects w but not a or f; a change of friction affects a and w alike, but not f. So where a has moved
+against both, to the same side, the sensor is wrong. The last three blocks are set against four that end 0.1 s
+before them; the tolerance grows with the noise of the sensors and with the range of f over 1.2 s:
 
     |a - w| > least + (SLIP + SLIP_BY_SPEED v) range(f)        |a - f| > least + FORCE range(f)
 
-with least = max(LEAST, NOISE sigma), sigma of a - w by the noise that the sensors are configured with.
+with least = max(LEAST, NOISE sigma), sigma of a - w by the configured noise of the sensors.
 
-A reading beyond any road (`SLOPE`) that the torques deny for a second is wrong as well, whatever it was
-before. From then on it is not used until it agrees with the wheels or with the torques as it did before, or
-the car stands: on what slope, nobody knows. Where the drive's torque is not reported, or known badly, the
-torques neither accuse nor confirm: what is beyond any road by the wheels alone is doubted, and believed again
-when it no longer is. Nothing is said of wheels that slide, under ABS or ESP. A bias that was always there, or
-comes slowly, is not seen.
+A reading beyond any road (`SLOPE`) that the torques contradict for a second is wrong as well, regardless of
+its history. From then on it is not used until it agrees with the wheels or with the torques as before, or the
+car is at standstill, on an unknown slope. Where the drive torque is unreported or uncertain, the torques
+neither contradict nor confirm: a reading beyond any road by the wheels alone is doubted until it no longer
+is. No verdict is given while wheels slide or ABS or ESP act. A constant or slowly growing bias is not
+detected.
 
 Assumption: all constants; found with the simulated vehicle, whose sound sensor stays below a third of `LEAST`
 in all shipped scenarios.
@@ -49,17 +48,17 @@ ACCELERATION_STATE = np.dtype(
     [
         ("time", "f8"),  # of the block that is gathered [s]
         ("cycles", "i8"),
-        ("good", "u1"),  # every cycle of it tells something
-        ("known", "u1"),  # the drive's torque is reported, and well known, in every cycle of it
-        ("readings", "i8"),  # new ones in it
+        ("good", "u1"),  # every cycle of it is usable
+        ("known", "u1"),  # the drive's torque is reported and certain in every cycle of it
+        ("readings", "i8"),  # new samples in it
         ("sum", "f8", (KINDS,)),
         # Of the last blocks, the newest in row 0: a [m/s^2], v [m/s], f [m/s^2], mean of omega r [m/s].
         ("mean", "f8", (BLOCKS, KINDS)),
         ("good_blocks", "i8"),  # in a row
         ("known_blocks", "i8"),  # in a row
         ("sigma", "f8"),  # of a - w by the sensors' noise [m/s^2]
-        ("beyond", "i8"),  # blocks in a row that are beyond any road
-        ("agreed", "i8"),  # blocks in a row that agree again
+        ("beyond", "i8"),  # consecutive blocks beyond any road
+        ("agreed", "i8"),  # consecutive blocks that agree again
         ("usual", "f8"),  # a - w before the jump [m/s^2]
         ("usual_force", "f8"),  # a - f before the jump [m/s^2]
         ("implausible", "u1"),
@@ -71,11 +70,11 @@ BLOCK_S = 0.1
 LONGEST_BLOCK_S = 0.125  # cycles were missed
 OLDEST_S = 0.06  # of a reading
 LEAST_SPEED = 3.0  # m/s
-ROLLING = 0.06  # of the speed, that a rolling wheel differs by at most
+ROLLING = 0.06  # of the speed, greatest difference of a rolling wheel
 LEAST, NOISE = 0.25, 6.0  # m/s^2, times sigma
 SLIP, SLIP_BY_SPEED = 0.1, 0.01  # -, s/m
-FORCE = 0.3  # friction may be wrong by so much
-KNOWN_MOTORS = 0.1  # relative error of a motor torque that still tells a force
+FORCE = 0.3  # possible error of friction
+KNOWN_MOTORS = 0.1  # greatest relative error of a motor torque that still yields a force
 SLOPE = 2.0  # m/s^2, of a slope of 20 %
 DENIED = 1.0  # m/s^2
 SECOND = 10  # blocks
@@ -85,7 +84,7 @@ STANDSTILL = 0.1  # m/s
 
 @kernel
 def _tells(params: Record, inputs: Record, speed: float) -> bool:
-    """Return whether this cycle's readings are of now and the linings' pressures known."""
+    """Return whether this cycle's readings are current and the linings' pressures known."""
     value = inputs.value
     oldest = 1e9 * OLDEST_S
     told = speed > LEAST_SPEED and usable(inputs, ACCEL_X) and inputs.age_ns[ACCEL_X] < oldest
@@ -173,7 +172,7 @@ def _usually_beside_wheels(mean: Record, j: int) -> float:
 
 @kernel
 def _moved_against_wheels(mean: Record) -> float:
-    """Return by how much a has moved against the wheels, of whatever stiffness [m/s^2]."""
+    """Return by how much a has moved against the wheels, for any tyre stiffness [m/s^2]."""
     slipping = _beside_wheels(mean, W) - _usually_beside_wheels(mean, W)
     rolling = _beside_wheels(mean, ROLLED) - _usually_beside_wheels(mean, ROLLED)
     if slipping * rolling <= 0.0:
@@ -183,7 +182,7 @@ def _moved_against_wheels(mean: Record) -> float:
 
 @kernel
 def _agrees(state: Record) -> bool:
-    """Return whether a doubted reading is again what it was before."""
+    """Return whether a doubted reading agrees as before."""
     mean = state.mean
     least = AGAIN * max(LEAST, NOISE * state.sigma)
     against_wheels = _beside_wheels(mean, W)
@@ -227,7 +226,7 @@ def _beyond_any_road(state: Record) -> bool:
 
 @kernel
 def _judge(state: Record) -> None:
-    """Compare the last blocks with those before, or with what was usual before the sensor jumped."""
+    """Compare the last blocks with those before, or with the values before the sensor jumped."""
     mean = state.mean
     if state.implausible:
         agrees = state.good_blocks >= 3 and _agrees(state)
@@ -263,7 +262,7 @@ def watch_acceleration(
         state: `ACCELERATION_STATE`, overwritten.
         inputs: `INPUTS`.
         estimate: `ESTIMATE` of the last cycle.
-        base: friction that this braking began with, shape (4,).
+        base: friction at the start of this application, shape (4,).
         braking: a brake application lasts.
         dt: time since the last cycle [s].
     """

@@ -1,9 +1,9 @@
-"""Brake applications: when one starts and when it ends.
+"""Brake applications: detection of their start and end.
 
 An application starts when a calliper pressure has been 1 bar above the push-out pressure for 0.1 s and ends
-when all have been below for 0.1 s. With 1.8 bar of sensor noise single samples of a released brake cross the
-threshold all the time, so "below for 0.1 s" is judged by the mean of those 0.1 s. A pressure that is not
-usable neither starts nor prolongs an application.
+when all have been below for 0.1 s. With 1.8 bar of sensor noise single samples of a released brake often
+cross the threshold, so "below for 0.1 s" is judged by the mean of those 0.1 s. A pressure that is not usable
+neither starts nor prolongs an application.
 """
 
 import numpy as np

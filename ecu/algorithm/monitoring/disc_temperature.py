@@ -1,15 +1,14 @@
-"""The temperature of the four discs from what the ECU knows anyway, with its standard deviation.
+"""Temperature of the four discs by a thermal model of the ECU's own estimates, with its standard deviation.
 
 Model. Each disc is one lump of heat, theta [K] above the air (3.7):
 
     theta' = xi T_b |omega| - (delta_0 + delta_1 v) theta
 
-T_b is the ECU's own brake torque, v its vehicle speed, xi constant as in Table C.1. The disc is taken to
-follow the air's temperature at once and so is never colder. Solved exactly over a cycle of constant power and
-speed.
+T_b is the ECU's own brake torque, v its vehicle speed, xi constant as in Table C.1. The disc follows a change
+of air temperature at once and so is never colder. Solved exactly over a cycle of constant power and speed.
 
-Error. Each cause is one unknown that stays the same, so that its effect adds up linearly along the model;
-different causes add as squares:
+Error. Each cause is one constant unknown whose effect accumulates linearly along the model; independent
+causes add as squares:
 
     heating     s_h' = e_h xi T_b |omega| - delta s_h    e_h: heat capacity, heat split, friction
     cooling     s_c' = e_c delta theta - delta s_c       e_c: relative error of delta
@@ -18,9 +17,9 @@ different causes add as squares:
 
 So the standard deviation grows with the heat put in and falls towards that of the air at rest.
 
-Start. Nobody knows how long the car stood. The disc is somewhere between the air and the hottest that the
-last braking left it (`learned.disc_excess`), each value as likely as the other.
-Where a pressure is lost, its share by load of all that slows the car counts as heat, and as its error too.
+Start. The duration of the rest is unknown. The disc temperature is uniformly distributed between that of the
+air and the highest left by the last application (`learned.disc_excess`). Where a pressure is lost, the
+wheel's share by load of the total tyre force counts as heat, and as its error.
 
 Source. Sections 3.4 and 7.6.1 (rain), Table C.1. Assumptions: all constants below without a source.
 """
@@ -53,16 +52,16 @@ UNKNOWN_EXCESS = 200.0  # K above the air at most, where nothing was ever saved
 HEATING_ERROR = 0.10  # section 3.4: c_p is 450 to 550 J/(kg K); mass of the disc and heat split beside it
 COOLING_ERROR = 0.20
 WET = 1.5  # rain on delta_1; Figure 7.15 shows more cooling at speed, but has no numbers in print
-WET_ERROR = 0.40  # of delta in rain, or where nobody says whether it rains
-AMBIENT_ERROR = 3.0  # K: the air at the wheel is not that at the sensor
-AMBIENT_UNKNOWN = 15.0  # K: no sensor, or a silent one
+WET_ERROR = 0.40  # of delta in rain, or where rain is not reported
+AMBIENT_ERROR = 3.0  # K: difference between the air at the wheel and at the sensor
+AMBIENT_UNKNOWN = 15.0  # K: no sensor, or none received
 FRICTION_PER_KELVIN = 0.04 / 100.0  # relative change of friction, its sign unknown
 UNIFORM = math.sqrt(3.0)  # half the width of a uniform distribution per standard deviation
 
 
 @kernel
 def start_discs(params: Record, state: Record, learned: Record) -> None:
-    """Begin after a rest of unknown length: between the air and `learned.disc_excess` [K] above it."""
+    """Start after a rest of unknown length: between the air and `learned.disc_excess` [K] above it."""
     state.ambient = params.ambient_temperature
     for i in range(4):
         half = 0.5 * learned.disc_excess[i]
@@ -83,7 +82,8 @@ def update_discs(
     """Overwrite temperature and standard deviation of every disc after `dt` [s].
 
     The force of all tyres, negative when braking, and the wheel loads of `estimate` serve where a pressure is
-    lost. At the end of a braking `learned.disc_excess` becomes the most the disc can have above the air.
+    lost. At the end of an application `learned.disc_excess` becomes the greatest possible excess over the
+    air.
     """
     sigma_ambient = AMBIENT_UNKNOWN
     if usable(inputs, AMBIENT_TEMPERATURE):
@@ -100,7 +100,7 @@ def update_discs(
         seen = usable(inputs, WHEEL_SPEED + i)
         omega = abs(inputs.value[WHEEL_SPEED + i]) if seen else abs(speed) / params.wheel_radius[i]
         if usable(inputs, CALLIPER_PRESSURE + i):
-            # The noise of a released brake has no mean of zero once negative torque is cut off.
+            # The noise of a released brake has a mean above zero once negative torque is cut off.
             power = estimate.brake_torque[i] * omega if application.braking else 0.0
             heating_error = math.hypot(HEATING_ERROR, estimate.sigma[i] / estimate.mu[i])
         else:
@@ -143,7 +143,8 @@ def _advance(
 def heat_widening(state: Record, i: int) -> float:
     """Return the relative standard deviation that a friction observed earlier has gained by the disc's heat.
 
-    From the change of temperature since, in either direction; never a map of friction over temperature.
+    It follows from the temperature change since, in either direction, not from a map of friction over
+    temperature.
     """
     change: float = state.temperature[i] - state.observed_at[i]
     return FRICTION_PER_KELVIN * abs(change)

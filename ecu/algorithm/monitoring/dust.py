@@ -1,19 +1,19 @@
 """Particle emission of the brakes per application, by the emission models of CONFIG.
 
-While the car moves and brakes, means are taken of what the models want (8.2). At the end of an application
+While the car moves and brakes, the models' features are averaged (8.2). At the end of an application
 each corner's model gives its emission factor, and
 
     particles = sum over corners of factor 10^EF
 
-with the interval of each corner's model; the ends add up too, as if all erred together. Nothing is told of an
-application in which a corner did more than `LEAST_WORK` outside what its model was trained on, and the sum is
-without it. Axles without a model are not in it.
+with the interval of each corner's model; its ends are summed too, as for fully correlated errors. An
+application in which a corner did more than `LEAST_WORK` outside its model's training range is not reported
+and not summed. Axles without a model are excluded.
 
-Kept for life, with the version of the models that counted it: particles, way, the work of all applications
-and that of those that were told. Other models begin anew: their sum would be another quantity. Per kilometre
-is told while no more than `UNTOLD` of the work was outside.
+Stored permanently, with the version of the models: particles, distance, the work of all applications and of
+the reported ones. Other models start from zero: their sum is a different quantity. Emission per kilometre is
+reported while no more than `UNTOLD` of the work was outside.
 
-Mass is `airborne_share` of what the linings lost (`wear.py`), up to 10 um; the discs' own is not in it.
+Mass is `airborne_share` of the linings' wear (`wear.py`), up to 10 um, without that of the discs.
 
 Source: sections 8.1, 8.4; equation 8.4. Assumption: all constants below.
 """
@@ -39,17 +39,17 @@ from ecu.contract.params import BAR
 from ecu.contract.signals import CALLIPER_PRESSURE
 from ecu.jit import Record, kernel
 
-MOVING = 0.5  # m/s: a disc that stands emits nothing
-LEAST_WORK = 500.0  # J: less is only felt
+MOVING = 0.5  # m/s: a disc at standstill emits nothing
+LEAST_WORK = 500.0  # J: below it an application counts as negligible
 UNTOLD = 0.10  # share of the work
-LEAST_WAY = 1e3  # m, before anything is told per kilometre
-LEAST_WEAR_WAY = 50e3  # m with these linings, before mass is told per kilometre
+LEAST_WAY = 1e3  # m, before emission per kilometre is reported
+LEAST_WEAR_WAY = 50e3  # m with these linings, before mass per kilometre is reported
 
 DUST_STATE = np.dtype(
     [
         ("features", "f8", (4, N_FEATURES)),  # sums while an application lasts, means after it
         ("work", "f8", (4,)),  # J, in this application
-        ("particles", "f8"),  # of the last application; NaN: not told
+        ("particles", "f8"),  # of the last application; NaN: not reported
         ("low", "f8"),
         ("high", "f8"),
         ("per_km", "f8"),
@@ -61,7 +61,7 @@ DUST_STATE = np.dtype(
 
 @kernel
 def restore_dust(params: Record, state: Record, learned: Record, wear: Record) -> None:
-    """Begin with what is kept, or anew where other models counted it."""
+    """Restore the stored sums, or start from zero where other models counted them."""
     dust = learned.dust
     if dust.version != params.dust_version:
         dust.version = params.dust_version
@@ -92,7 +92,7 @@ def update_dust(
     application: Record,
     dt: float,
 ) -> None:
-    """Take in a cycle of `dt` [s]; at the end of an application, count what it emitted."""
+    """Add a cycle of `dt` [s]; at the end of an application, add its emission."""
     speed = estimate.speed
     learned.dust.way += abs(speed) * dt
     if application.started:
@@ -144,7 +144,7 @@ def _count(params: Record, state: Record, dust: Record) -> None:
 
 @kernel
 def _renew(params: Record, state: Record, learned: Record, wear: Record) -> None:
-    """Overwrite what is told per kilometre; `wear` is `WEAR_STATE`."""
+    """Overwrite the emission per kilometre; `wear` is `WEAR_STATE`."""
     dust, state.per_km, state.mass_per_km = learned.dust, math.nan, 0.0
     if dust.way >= LEAST_WAY and dust.told_work > 0.0 and dust.told_work >= (1.0 - UNTOLD) * dust.work:
         state.per_km = 1e3 * dust.particles / dust.way

@@ -27,7 +27,7 @@ N_KNOTS: Final = len(KNOTS)
 
 @kernel
 def law_term(features: Record, k: int) -> float:
-    """Return what coefficient k + 1 of the law stands beside; `features`, shape (6,), all above zero."""
+    """Return the regressor of the law's coefficient k + 1; `features`, shape (6,), all above zero."""
     speed: float = 0.5 * (features[V_IN] + features[V_END])
     power: float = math.log10(features[TORQUE] * speed)
     if k == 0:
@@ -44,7 +44,7 @@ def law_term(features: Record, k: int) -> float:
 
 @kernel
 def network_input(features: Record, i: int) -> float:
-    """Return input i of the network before it is scaled; `features`, shape (6,), all above zero."""
+    """Return unscaled input i of the network; `features`, shape (6,), all above zero."""
     value: float = features[i]
     if i in (TORQUE, DURATION):
         value = math.log10(value)
@@ -66,7 +66,7 @@ def _network(numbers: Record, features: Record) -> float:
 
 @kernel
 def node_below(numbers: Record, first: int, value: float) -> tuple[int, float]:
-    """Return the node below `value` in `numbers[first:]`, and the share of the way to the next, 0 to 1."""
+    """Return the node below `value` in `numbers[first:]`, and the fraction of the way to the next, 0 to 1."""
     k = 0
     while k < NODES - 2 and value >= numbers[first + k + 1]:
         k += 1
@@ -106,7 +106,7 @@ def emission_factors(model: int, numbers: Record, features: Record, out: Record)
 
 @kernel
 def inside(low: Record, high: Record, features: Record) -> bool:
-    """Return whether `features` lie within what a model was trained on."""
+    """Return whether `features` lie within a model's training range."""
     known = True
     for i in range(N_FEATURES):
         known = known and low[i] <= features[i] <= high[i]

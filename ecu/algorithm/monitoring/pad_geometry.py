@@ -1,6 +1,6 @@
 """Wear as mass and as thickness of the two pads of one calliper, which have chamfers.
 
-Both pads lose `pad_mass` G [g/mm]. Chamfers take the share s off the new surface and end at the depth c, so
+Both pads lose `pad_mass` G [g/mm]. Chamfers remove the share s of the new surface and end at the depth c, so
 that at depth h the area is 1 - s (1 - h/c) of the whole:
 
     m = G (h - s (h - h^2 / 2c))    h < c
@@ -27,7 +27,7 @@ def mass_of(params: Record, i: int, wear: float) -> float:
 
 @kernel
 def thickness_lost(params: Record, i: int, mass: float) -> float:
-    """Return the wear [mm] of corner i that goes with `mass` [g] of both pads."""
+    """Return the wear [mm] of corner i that corresponds to `mass` [g] of both pads."""
     depth, share = params.chamfer_depth[i], params.chamfer_share[i]
     equal: float = mass / params.pad_mass[i]
     if depth <= 0.0 or share <= 0.0:
@@ -40,7 +40,7 @@ def thickness_lost(params: Record, i: int, mass: float) -> float:
 
 @kernel
 def area_share(params: Record, i: int, wear: float) -> float:
-    """Return the area at `wear` [mm] over the whole."""
+    """Return the area at `wear` [mm] over the full area."""
     depth, share = params.chamfer_depth[i], params.chamfer_share[i]
     if depth <= 0.0 or wear >= depth:
         return 1.0

@@ -1,15 +1,15 @@
 """Plausibility of wheel speeds and calliper pressures.
 
-A wheel that brakes does not turn faster than the car, nor than the other wheels: if all do, the car's speed
-is wrong. A sensor that keeps its last value looks like that as soon as the car slows down; its frames are
-new, intact and on time. A wheel that is slower than the car may slide, so nothing is said of it.
+A braked wheel does not turn faster than the car, nor than the other wheels: if all do, the vehicle speed is
+wrong. A stuck sensor shows this as soon as the car slows down; its frames are new, intact and on time. A
+wheel slower than the car may slide, so it is not judged.
 
-A wheel whose speed falls by more than its brake could make it has no wheel behind that reading: wires break
-to 0. It is left out until it agrees with the car again, or the car stands.
+A wheel speed that falls faster than the brake could cause is a sensor fault: a broken wire reads 0. It is
+masked out until it agrees with the vehicle speed again, or the car is at standstill.
 
 A pressure follows the demands that were sent (`control/friction_torque.py` models how) if the three others
-do. Where more than one does not, somebody else brakes, or nobody listens: nothing is said of a sensor or a
-valve then.
+do. Where more than one does not, another controller brakes, or the demands are not executed: no sensor or
+valve is blamed.
 """
 
 import math
@@ -23,32 +23,32 @@ from ecu.jit import Record, kernel
 
 PLAUSIBILITY_STATE = np.dtype(
     [
-        ("for_s", "f8", (4,)),  # a wheel has been too fast for this long
+        ("for_s", "f8", (4,)),  # time for which a wheel has been too fast
         ("omega", "f8", (4,)),  # last sample of a wheel [rad/s]
         ("age_s", "f8", (4,)),  # of it
-        ("fell", "u1", (4,)),  # faster than a wheel can
-        ("apart_s", "f8", (4,)),  # a pressure has not been what was demanded, longer than it was
-        ("pressure", "u1"),  # one has been for too long
+        ("fell", "u1", (4,)),  # fell faster than a wheel can
+        ("apart_s", "f8", (4,)),  # excess time for which a pressure deviated from its demand
+        ("pressure", "u1"),  # one pressure has deviated for too long
         ("sent", "u1"),  # the last demands were valid
     ],
     align=True,
 )
 
-FASTER = 1.05  # than the ground below it: radii, curves and the car's speed are known better
+FASTER = 1.05  # share above ground speed: radii, cornering and vehicle speed are known better
 BRAKED = 100.0  # N m
 LEAST_SPEED = 5.0  # m/s
 DOUBT_S = 0.3
-FALL, FALL_SHARE = 8.0, 3.0  # rad/s, of what the brake's torque does to the free wheel
-OLDEST_S = 0.1  # of a sample that the next is compared with
-ROLLING = 0.06  # of the speed, that a rolling wheel differs by at most
+FALL, FALL_SHARE = 8.0, 3.0  # rad/s, effect of the brake torque on the free wheel
+OLDEST_S = 0.1  # age of a sample that the next is compared with
+ROLLING = 0.06  # of the speed, greatest difference of a rolling wheel
 STANDSTILL = 0.1  # m/s
-APART, APART_SHARE = 8.0, 0.2  # bar, of the pressure: noise, and what the model of the hydraulics leaves
-FOLLOWS = 0.75  # of that
+APART, APART_SHARE = 8.0, 0.2  # bar, of the pressure: noise and error of the hydraulics model
+FOLLOWS = 0.75  # of that pressure
 
 
 @kernel
 def _over_ground(params: Record, inputs: Record, estimate: Record, i: int) -> float:
-    """Return how fast a wheel turns over what the ground below it does."""
+    """Return the relative excess of a wheel's speed over the ground speed below it."""
     turns = inputs.value[WHEEL_SPEED + i] * params.wheel_radius[i]
     return turns / corner_speed(params, estimate, estimate.speed, i)
 
@@ -62,7 +62,7 @@ def wheel_speed_implausible(
     Args:
         params: `PARAMS`.
         state: `PLAUSIBILITY_STATE`, overwritten.
-        inputs: `INPUTS`, as they came.
+        inputs: `INPUTS` as received.
         estimate: `ESTIMATE` of the last cycle.
         dt: time since the last cycle [s].
     """
@@ -77,7 +77,7 @@ def wheel_speed_implausible(
         over = _over_ground(params, inputs, estimate, i)
         braked = estimate.brake_torque[i] > BRAKED and motor_torque(inputs, i) >= 0.0
         fast = usable(inputs, WHEEL_SPEED + i) and estimate.speed > LEAST_SPEED and over > FASTER
-        alone = over * (wheels - 1) > FASTER * (total - over)  # than the others' mean; no other: 0 > 0
+        alone = over * (wheels - 1) > FASTER * (total - over)  # than the mean of the others; no other: 0 > 0
         state.for_s[i] = state.for_s[i] + dt if fast and alone and braked else 0.0
         found = found or state.for_s[i] > DOUBT_S
     return found
@@ -85,7 +85,7 @@ def wheel_speed_implausible(
 
 @kernel
 def watch_wheels(params: Record, state: Record, inputs: Record, estimate: Record, dt: float) -> None:
-    """Overwrite `state.fell`: whose speed has fallen faster than a wheel's can.
+    """Overwrite `state.fell`: wheels whose speed has fallen faster than a wheel's can.
 
     Arguments as for `wheel_speed_implausible`.
     """
@@ -108,7 +108,7 @@ def watch_wheels(params: Record, state: Record, inputs: Record, estimate: Record
 
 @kernel
 def _gap(inputs: Record, i: int, expected: float, zero: float) -> float:
-    """Return how far a pressure is from what is expected of it, over what is too far; NaN: not known."""
+    """Return the deviation of a pressure from its expected value over the tolerance; NaN: unknown."""
     place = CALLIPER_PRESSURE + i
     gap = abs(inputs.value[place] - zero - expected) / (APART + APART_SHARE * expected)
     return gap if usable(inputs, place) else math.nan
@@ -116,13 +116,13 @@ def _gap(inputs: Record, i: int, expected: float, zero: float) -> float:
 
 @kernel
 def watch_pressures(state: Record, inputs: Record, expected: Record, zero: Record, dt: float) -> None:
-    """Overwrite `state.pressure`: whether a pressure has been apart from its demand for `DOUBT_S`.
+    """Overwrite `state.pressure`: pressures that deviated from their demand for `DOUBT_S`.
 
     Args:
         state: `PLAUSIBILITY_STATE`, overwritten.
         inputs: `INPUTS`.
-        expected: pressures by the demands that were sent, shape (4,) [bar].
-        zero: what the sensors read without pressure, shape (4,) [bar].
+        expected: modelled response to the demands sent, shape (4,) [bar].
+        zero: pressure zeros, shape (4,) [bar].
         dt: time since the last cycle [s].
     """
     others = others_brake(inputs)

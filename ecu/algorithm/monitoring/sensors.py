@@ -1,7 +1,7 @@
 """Cross-checks between sensors: fault bits, and implausible inputs that are masked out.
 
-Accelerometer, wheel speeds and calliper pressures are held against each other before anything is estimated
-from them in this cycle, by what the last one estimated.
+Accelerometer, wheel speeds and calliper pressures are compared with each other before this cycle's
+estimation, by the estimate of the last cycle.
 """
 
 from ecu.algorithm.control.failed_brakes import watch_brakes
@@ -21,7 +21,7 @@ LEFT_OUT_S = 0.03  # that a pressure is not what was demanded
 
 @kernel
 def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool]:
-    """Return the fault bits of sensors whose readings contradict the others, and whether one begins to.
+    """Return the fault bits of sensors whose readings contradict the others, and whether one is new.
 
     Args:
         p: `PARAMS`.
@@ -56,7 +56,7 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
 
 @kernel
 def mask_implausible(p: Record, s: Record, u: Record) -> None:
-    """Overwrite the trusted inputs: `u` without what is implausible."""
+    """Overwrite the trusted inputs: `u` with implausible inputs masked out."""
     s.trusted = u
     if s.acceleration.implausible or abs(u.value[ACCEL_X]) > p.accel_range:
         _distrust(s.trusted, ACCEL_X)

@@ -1,7 +1,7 @@
-"""Wear of the brake linings from the work that the ECU sees them do anyway.
+"""Wear of the brake linings from friction work as estimated by the ECU.
 
-Model. The two pads of a calliper lose the mass (7.15), corrected: |omega'|, for with the print's sign slowing
-down would put material back
+Model. The two pads of a calliper lose the mass (7.15), corrected: |omega'|, since with the printed sign
+deceleration would restore material
 
     m' = (g10 + g11 tau + g12 tau^2) T_b w + (g20 + g21 tau) T_b |w'| + (g30 + g31 tau) (T_b w)^2
 
@@ -9,14 +9,14 @@ with the brake torque T_b by the ECU's own friction, the wheel's speed w and the
 degC. (The thesis does not say K or degC. A wrong temperature hardly matters to its quasi-static law, Figure
 7.10, which in K would shift by 2 % per 10 K; and in degC the regressors are much less alike.)
 
-What is kept is not m but the integrals beside the coefficients, (7.16): the regressors. Wear by any law that
-is linear in them, a better one next year too, is their scalar product with its coefficients.
+Stored are not m but the regressors, the integrals (7.16) that the coefficients multiply. Wear by any law
+linear in them, including a later and better one, is their scalar product with its coefficients.
 
 w' of a noisy speed would be rectified noise: it is the slope of a low-passed speed, low-passed again.
 
-Error. Friction and temperature are each one unknown that stays the same, so that their effects on a
-regressor add up linearly; the sums are kept beside the regressors. Together with the law's own spread they
-are the prior of one factor on the law's wear, which measured thicknesses correct (7.6): `wear_belief.py`.
+Error. Friction and temperature have one constant unknown error each, whose effects on a regressor add up
+linearly; the sums are stored with the regressors. Together with the law's own spread they are the prior of
+one factor on the law's wear, which measured thicknesses correct (7.6): `wear_belief.py`.
 
 Source. Sections 7.2, 7.4, Table 7.1.
 """
@@ -44,8 +44,8 @@ REGRESSORS: Final = (
 """Name and unit of the integrals of (7.16), in the order of Table 7.1's coefficients."""
 ENERGY, ENERGY_T, ENERGY_T2, RATE, RATE_T, POWER2, POWER2_T = range(7)
 
-LOW_PASS = 0.1  # s, each of the two on the wheel's speed: 0.1 rad/s of noise leave 0.2 rad/s^2
-LEAST_SPEED = 0.3  # rad/s: a wheel that stands wears nothing off
+LOW_PASS = 0.1  # s, each of the two low-passes on wheel speed: 0.1 rad/s of noise leave 0.2 rad/s^2
+LEAST_SPEED = 0.3  # rad/s: a wheel at standstill causes no wear
 RENEWED_S = 1.0  # while braking; the period of PadWear
 LEG = 250e3  # m
 LOST = 1.0  # relative error of a torque whose pressure is lost
@@ -54,8 +54,8 @@ WEAR_STATE = np.dtype(
     [
         ("speed", "f8", (4,)),  # of the wheel, low-passed [rad/s]
         ("slowing", "f8", (4,)),  # minus its slope, low-passed [rad/s^2]
-        ("counted", "f8", (7, 4)),  # regressors that are in the errors
-        ("since_s", "f8"),  # since mass and thickness were renewed
+        ("counted", "f8", (7, 4)),  # regressors contained in the errors
+        ("since_s", "f8"),  # distance since mass and thickness were updated
         ("belief", BELIEF),
         ("mass", "f8", (4,)),  # worn off, g
         ("wear", "f8", (4,)),  # mm
@@ -67,7 +67,7 @@ WEAR_STATE = np.dtype(
 
 @kernel
 def restore_wear(params: Record, state: Record, learned: Record) -> None:
-    """Begin with what is kept: the belief follows from it and the law alone."""
+    """Restore the stored regressors: the belief follows from them and the law alone."""
     wear = learned.wear
     for i in range(4):
         for j in range(7):
@@ -88,7 +88,7 @@ def update_wear(
     application: Record,
     dt: float,
 ) -> None:
-    """Add what a cycle of `dt` [s] has worn to `learned.wear`."""
+    """Add the wear of a cycle of `dt` [s] to `learned.wear`."""
     wear = learned.wear
     wear.odometer += abs(estimate.speed) * dt
     gain = dt / (LOW_PASS + dt)
@@ -127,7 +127,7 @@ def update_wear(
 
 @kernel
 def _count_errors(state: Record, wear: Record, inputs: Record, estimate: Record, discs: Record) -> None:
-    """Add the errors of what was worn since the last time, with the deviations of now."""
+    """Add the errors of the wear since the last call, with the present deviations."""
     x, counted = wear.regressors, state.counted
     for i in range(4):
         known = usable(inputs, CALLIPER_PRESSURE + i)
@@ -145,5 +145,5 @@ def _count_errors(state: Record, wear: Record, inputs: Record, estimate: Record,
 
 @kernel
 def _renew(params: Record, state: Record, wear: Record, i: int) -> None:
-    """Overwrite mass, thickness and standard deviation of a corner."""
+    """Update mass, thickness and standard deviation of a corner."""
     state.mass[i], state.wear[i], state.sigma[i] = worn(params, state.belief, wear, i)

@@ -1,15 +1,15 @@
 """Lining wear with its uncertainty: the wear law corrected by measured thicknesses.
 
-States, of each corner: the mass M worn off at the last measurement and one factor s on the law's wear, which
-the thesis scales its dynamometer law to the road by (7.6, from one measurement; here from all of them):
+States, of each corner: the mass M worn off at the last measurement and one factor s on the law's wear, by
+which the thesis scales its dynamometer law to the road (7.6, from one measurement; here from all of them):
 
     M(t) = M_k + s g(t)        g: mass by the law since then, coefficients times regressors
     s' = noise, walk^2 per gram; beside it M scatters by weather and roads, scatter^2 per gram
 
-s begins at 1 with the law's spread and, relative to the mass so far, what friction and temperature may be
-off by. A measured thickness is a measured M (`pad_geometry.py`); both states are corrected by Kalman's rule.
-All of it is computed anew from what is kept, so that another law changes what the same regressors and
-measurements are worth. Linings that nobody said were new when counting began may be anything up to worn.
+s starts at 1 with the law's spread and, relative to the mass so far, the errors of friction and temperature.
+A measured thickness is a measured M (`pad_geometry.py`); both states are corrected by Kalman's rule. All of
+it is computed anew from the stored values, so that another law reinterprets the same regressors and
+measurements. Linings not registered as new when counting began may have any wear.
 """
 
 import math
@@ -22,7 +22,7 @@ from ecu.jit import Record, kernel
 BELIEF = np.dtype(
     [
         ("mass", "f8", (4,)),  # worn off at the last measurement, or when counting began [g]
-        ("law", "f8", (4,)),  # mass by the law then [g]
+        ("law", "f8", (4,)),  # mass by the law at that time [g]
         ("scale", "f8", (4,)),
         ("mass_variance", "f8", (4,)),  # g^2
         ("covariance", "f8", (4,)),  # of mass and scale [g]
@@ -31,8 +31,8 @@ BELIEF = np.dtype(
     align=True,
 )
 
-NEW_SIGMA = 0.15  # mm: how thick new linings are, and what running in takes beyond the law (Figure 7.12)
-UNIFORM = math.sqrt(12.0)  # width of an even distribution over its standard deviation
+NEW_SIGMA = 0.15  # mm: spread of new linings, and run-in wear beyond the law (Figure 7.12)
+UNIFORM = math.sqrt(12.0)  # width of a uniform distribution over its standard deviation
 LEAST_SCALE = 0.2
 
 
@@ -70,7 +70,7 @@ def _ahead(params: Record, state: Record, i: int, law: float) -> tuple[float, fl
 
 @kernel
 def believe(params: Record, state: Record, wear: Record, i: int) -> None:
-    """Overwrite the belief of corner i by all that is kept of it in `wear`."""
+    """Compute the belief of corner i from all values stored in `wear`."""
     start = NEW_SIGMA if wear.told[i] else params.pad_life[i] / UNIFORM
     sigma = start * params.pad_mass[i] * area_share(params, i, 0.0)
     state.mass[i] = state.law[i] = state.covariance[i] = 0.0
@@ -96,7 +96,7 @@ def believe(params: Record, state: Record, wear: Record, i: int) -> None:
 
 @kernel
 def worn(params: Record, state: Record, wear: Record, i: int) -> tuple[float, float, float]:
-    """Return what corner i has lost: mass [g] of both pads, thickness [mm], its standard deviation [mm]."""
+    """Return the wear of corner i: mass [g] of both pads, thickness [mm], its standard deviation [mm]."""
     law = mass_by_law(params, wear.regressors, i)
     mass, variance, _, _ = _ahead(params, state, i, law)
     if wear.measurements[i] == 0:

@@ -2,8 +2,8 @@
 
     m (a_x - b) + drag + sum (T_i + I_i domega_i/dt) / r_i = 0
 
-over the configured mass, taken at one time for all signals. What lags, lasts or is not reported stands in the
-variance.
+over the configured mass, taken at one time for all signals. Lags, persistent errors and unreported torques
+enter the variance.
 """
 
 import math
@@ -30,22 +30,22 @@ from ecu.algorithm.estimation.joint.wheel import brake_torque, friction, radius
 from ecu.contract.params import GRAVITY
 from ecu.jit import Record, kernel
 
-SLIDING_FORCE = 0.3  # relative error of the force of a wheel that seems too fast, taken for its brake force
-BALANCE_FLOOR = 0.01  # m/s^2 that the balance leaves out
+SLIDING_FORCE = 0.3  # relative error of the brake force taken for that of a wheel that seems too fast
+BALANCE_FLOOR = 0.01  # m/s^2, unmodelled in the balance
 BALANCE_SHARE = 0.004  # of the deceleration
-ACROSS = 0.4  # of the lateral acceleration: stands for less that lasts a second
+ACROSS = 0.4  # of the lateral acceleration: stands for a smaller error that lasts a second
 SKEW_ACCEL = 0.5  # windows between acceleration and torques
 
 
 @kernel
 def predict_balance(params: Record, state: Record, braking: bool) -> float:
-    """Return what is left of the car's balance over the configured mass [m/s^2]; sets `state.h`."""
+    """Return the residual of the car's balance over the configured mass [m/s^2]; sets `state.h`."""
     x, h, w, mass = state.x, state.h, state.window, params.mass
     clear_derivatives(state)
     speed, heavier = x[V], math.exp(x[MASS])
     drag = heavier * math.exp(x[DRAG]) * params.drag_area * speed * abs(speed) / mass
     left = heavier * (w.common_accel - x[BIAS] + w.lateral / mass) + drag
-    # What grows with the mass, by the accelerometer of before: free of the noise of this window's torques.
+    # Mass-dependent terms use the earlier accelerometer mean: free of the noise of this window's torques.
     inert = heavier * (state.last_smooth_accel - x[BIAS] + w.lateral / mass) + drag
     linings = 0.0
     for i in range(4):
@@ -73,7 +73,7 @@ def predict_balance(params: Record, state: Record, braking: bool) -> float:
 
 @kernel
 def correct_by_balance(params: Record, state: Record, braking: bool) -> None:
-    """Correct the state by the force balance along the car; not where a wheel holds what the road gives."""
+    """Correct the state by the force balance along the car, unless a wheel's force is limited by the road."""
     w, wild = state.window, 0.0
     left = predict_balance(params, state, braking)
     variance = (
@@ -92,7 +92,7 @@ def correct_by_balance(params: Record, state: Record, braking: bool) -> None:
         if state.smooth_pressure[i] > 0.5:
             variance += per_bar**2 * (w.pressure_variance[i] + skew(state, i) ** 2)
         if state.slides[i] and w.omega[i] * params.wheel_radius[i] < w.ground[i]:
-            return  # what it holds is the road's to say
+            return  # its force is limited by the road's adhesion
         if state.slides[i]:
             variance += (SLIDING_FORCE * per_bar * w.pressure[i]) ** 2
     wild *= max(params.sigma_motor_torque - SCALE_ONLY, 0.0)

@@ -1,23 +1,23 @@
-"""Force and slip of driven wheels whose torque is known badly: by the accelerometer and by wheel speeds.
+"""Force and slip of driven wheels with uncertain torque, from accelerometer and wheel speeds.
 
-An engine's torque in a log is that before gears and losses, known to half. While nobody brakes, the force
-along the car that the other wheels leave is theirs, shared as the reported torques are.
+A logged engine torque is that before gears and losses, known to about half. While no brake is applied, the
+force along the car not explained by the other wheels is theirs, shared in proportion to the reported torques.
 """
 
 from ecu.algorithm.estimation.joint.wheel import car_force
 from ecu.jit import Record, kernel
 
-KNOWN = 0.5  # share of the drive from which its torque is believed
-DRIVES = 20.0  # N m of a wheel
+KNOWN = 0.5  # share of the drive above which its torque is trusted
+DRIVES = 20.0  # N m per wheel
 
 
 @kernel
 def measure_drive(params: Record, state: Record) -> None:
-    """Overwrite force [N] and slip of the driven wheels by what this window measured.
+    """Overwrite force [N] and slip of the driven wheels by this window's measurements.
 
     Args:
         params: `PARAMS`.
-        state: `JOINT_STATE` at the end of a window in which nobody braked.
+        state: `JOINT_STATE` at the end of a window without braking.
     """
     w = state.window
     if state.drive_known > KNOWN:

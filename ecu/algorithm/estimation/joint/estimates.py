@@ -1,4 +1,4 @@
-"""What the joint observer says of the car: its states turned into `ESTIMATE`."""
+"""Estimates of the joint observer: its states turned into `ESTIMATE`."""
 
 import math
 
@@ -29,7 +29,7 @@ from ecu.jit import Record, kernel
 
 @kernel
 def friction_now(state: Record, i: int) -> float:
-    """Return ln of friction over nominal: what the middle of the last window had, moved on by its rate."""
+    """Return ln of friction over nominal: at the middle of the last window, extrapolated by its rate."""
     ahead = 0.5 * WINDOW_S + (0.0 if state.closed else state.window.time)
     return state.x[LEVEL + i] + state.x[CHANGE + i // 2] + state.x[RATE] * ahead
 
@@ -41,7 +41,7 @@ def _at_bound(ratio: float) -> bool:
 
 @kernel
 def sigma_friction(params: Record, state: Record, i: int, now: bool) -> float:
-    """Return the standard deviation of ln friction: of the level, or of what it is `now`."""
+    """Return the standard deviation of ln friction: of the level, or, with `now`, of its present value."""
     p, level, change = state.p, LEVEL + i, CHANGE + i // 2
     variance = p[level, level]
     if now:
@@ -110,12 +110,12 @@ def tell_joint(
     braking: bool,
     dt: float,
 ) -> None:
-    """Overwrite what this observer knows of the car, the tyres and the linings.
+    """Overwrite the estimate of car, tyres and linings by this observer's states.
 
     Args:
         params: `PARAMS`.
         state: `JOINT_STATE`, after `update_joint`.
-        estimate: `ESTIMATE`; what the inertial signals and the pressures say is in it already.
+        estimate: `ESTIMATE`, already holding inertial signals and pressures.
         learned: `LEARNED`.
         inputs: `INPUTS`.
         braking: a brake application lasts.

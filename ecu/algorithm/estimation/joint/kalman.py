@@ -1,9 +1,9 @@
 """Prediction and correction of the joint observer's state; one scalar measurement at a time.
 
 Correction after Schmidt: a state that is not free keeps its value and variance, but its covariances act, so
-that what it leaves uncertain is not counted as known. Innovations beyond `GATE` standard deviations count
-with a variance that puts them on the gate, and while friction is not observed correct speed and slope alone:
-what a car is learns from what fits. Beyond four gates they are rejected."""
+that the uncertainty it causes is accounted for. Innovations beyond `GATE` standard deviations count with a
+variance that puts them on the gate and, while friction is not observed, correct speed and slope alone:
+vehicle parameters learn only from consistent measurements. Beyond four gates they are rejected."""
 
 import math
 
@@ -16,7 +16,7 @@ REJECT = 4.0 * GATE
 
 @kernel
 def forget(state: Record, i: int, variance: float) -> None:
-    """Let a state have `variance` and no covariance."""
+    """Reset a state's variance and clear its covariances."""
     for j in range(N):
         state.p[i, j] = state.p[j, i] = 0.0
     state.p[i, i] = variance
@@ -24,21 +24,21 @@ def forget(state: Record, i: int, variance: float) -> None:
 
 @kernel
 def clear_state(state: Record, i: int, variance: float) -> None:
-    """Let a state be zero with `variance` and no covariance."""
+    """Set a state to zero, with `variance` and no covariance."""
     state.x[i] = 0.0
     forget(state, i, variance)
 
 
 @kernel
 def clear_derivatives(state: Record) -> None:
-    """Begin a measurement that depends on nothing."""
+    """Zero the derivatives of a measurement."""
     for j in range(N):
         state.h[j] = 0.0
 
 
 @kernel
 def drift_speed(state: Record, time: float) -> None:
-    """Let bias and slope act on the covariance of speed over `time` [s]: v' = a - b - g sin(slope)."""
+    """Propagate bias and slope into the covariance of speed over `time` [s]: v' = a - b - g sin(slope)."""
     p = state.p
     for j in range(N):
         if j != V:
@@ -55,7 +55,7 @@ def _corrects(free: Record, i: int, only_speed: bool) -> bool:
 
 @kernel
 def correct(state: Record, innovation: float, variance: float) -> float:
-    """Fuse a measurement with derivatives `state.h` and noise `variance`; returns its test ratio."""
+    """Fuse a measurement with derivatives `state.h` and noise `variance`; return its test ratio."""
     p, h, ph, x, free = state.p, state.h, state.ph, state.x, state.free
     total = variance
     for i in range(N):

@@ -31,13 +31,13 @@ DRAG: Final = 18  # ln of air drag per mass over configured
 OFFSET: Final = 19  # two: pressure [bar] lost beyond push-out and sensor, per axle
 DELAY: Final = 21  # of the speed reference beyond configured [s]
 DRIVE: Final = 22  # two: unknown drive of an axle over mass [m/s^2]; only considered
-ROLLING: Final = 24  # ln of all rolling radii: nothing but a speed reference tells it
+ROLLING: Final = 24  # ln of all rolling radii: observable by a speed reference alone
 RATE: Final = 25  # change of CHANGE, of both axles [1/s]
 CHANGE: Final = 26  # two: ln of an axle's friction over its level, within an application
-SLIP_ERROR: Final = 28  # two: of an axle's slip, by drive that nobody reports; only considered
+SLIP_ERROR: Final = 28  # two: of an axle's slip, by unreported drive; only considered
 SIDE: Final = 30  # ln of the stiffness of the left tyres over the right ones; only considered
 PEAK_LOAD: Final = 31  # exponent of peak adhesion over load, beyond the usual; only considered
-OVERRUN: Final = 34  # drag of a drive that nobody reports, while braking, over mass [m/s^2]
+OVERRUN: Final = 34  # unreported engine drag while braking, over mass [m/s^2]
 MEAN: Final = 32  # two: mean of CHANGE over this application, weighted by pressure
 N: Final = N_JOINT
 
@@ -69,7 +69,7 @@ WINDOW_STATE: Final = np.dtype(
         ("pressure", "f8", (4,)),  # above push-out, in the window [bar]
         ("common_pressure", "f8", (4,)),  # likewise, at the common time of all signals
         ("common_accel", "f8"),  # at that time [m/s^2]
-        ("balanced", "u1"),  # that time is another one than that of the last balance
+        ("balanced", "u1"),  # that time differs from that of the last balance
         ("pressure_samples", "i8", (4,)),
         ("tracked", "f8", (4,)),  # by the model, sum then mean [bar]
         ("tracked_cycles", "i8", (4,)),
@@ -87,7 +87,7 @@ JOINT_STATE: Final = np.dtype(
     [
         ("x", "f8", (N,)),
         ("p", "f8", (N, N)),
-        ("free", "u1", (N,)),  # states that this window may correct; the others are considered only
+        ("free", "u1", (N,)),  # states that this window may correct; the others are consider states
         ("h", "f8", (N,)),  # derivatives of one measurement
         ("ph", "f8", (N,)),
         ("drive_known", "f8"),  # share of the drive torque that is reported
@@ -96,28 +96,28 @@ JOINT_STATE: Final = np.dtype(
         ("kept_x", "f8", (2, N)),  # snapshots: the newer in row 0
         ("kept_p", "f8", (2, N, N)),
         ("kept_s", "f8"),  # age of the newer one [s]
-        ("unkept_s", "f8"),  # since it was last written into what is learned [s]
+        ("unkept_s", "f8"),  # since it was last stored into the learned values [s]
         ("window", WINDOW_STATE),
         ("pressures", PRESSURE_STATE),
         ("motors", MOTORS_STATE),
         ("sampling", SAMPLING_STATE),
         ("copies", "i8", (2,)),  # samples in which both pressures of an axle were equal
         ("zero", ZERO_STATE),
-        ("pressed", "f8"),  # relative change of a pressure in the last window, of either axle the greater
+        ("pressed", "f8"),  # relative change of a pressure in the last window, greater of both axles
         ("closed", "u1"),  # a window ended in this cycle
         ("started", "u1"),
-        ("slides", "u1", (4,)),  # 1: the wheel is too far from the car's speed to tell it
+        ("slides", "u1", (4,)),  # 1: the wheel is too far from the car's speed to indicate it
         ("sliding", "i8"),  # number of such wheels
         (
             "beyond_linear",
             "u1",
             (4,),
-        ),  # 1: past the linear range of its tyre, its torque does not tell its force
+        ),  # 1: beyond the linear range of its tyre, its torque does not indicate its force
         ("releasing", "u1"),
-        ("released", "u1"),  # nobody brakes by the linings
-        ("untrusted_s", "f8"),  # time since a wheel was last believed [s]
-        ("hold_s", "f8"),  # no learning for this long, a wheel had left the tyre's range
-        ("reference_s", "f8"),  # time since a speed reference came [s]
+        ("released", "u1"),  # no friction brake is applied
+        ("untrusted_s", "f8"),  # time since a wheel was last trusted [s]
+        ("hold_s", "f8"),  # time for which learning stays suspended after a wheel left its tyre's range
+        ("reference_s", "f8"),  # time since the last speed reference [s]
         ("smooth_pressure", "f8", (4,)),  # bar above push-out
         ("last_accel", "f8"),  # of the last window [m/s^2]
         ("smooth_accel", "f8"),  # low-passed [m/s^2]
@@ -127,7 +127,7 @@ JOINT_STATE: Final = np.dtype(
         ("last_pressure", "f8", (4,)),  # of the last window [bar]
         ("last_slip", "f8", (4,)),
         ("slip", "f8", (4,)),
-        ("unsettled", "f8"),  # its slip less that at the torque of a moment ago
+        ("unsettled", "f8"),  # its slip less that at its torque shortly before
         ("curved", "f8"),  # part of the last wheel's slip beyond that of a linear tyre
         ("force", "f8", (4,)),  # N
         ("observed", "u1", (4,)),  # friction was corrected in the last window

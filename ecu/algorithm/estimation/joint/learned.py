@@ -1,8 +1,8 @@
 """States of the joint observer that are stored between drives.
 
-Kept are the states that outlive a drive, with their whole covariance: what a car's pressures cannot tell
-apart stays together after a restart as well. What may have changed in between (load, tyres, weather) is less
-sure then; the peak belongs to the road and is forgotten."""
+Stored are the states that outlive a drive, with their full covariance, so that states correlated for lack of
+observability stay so after a restart. States that may have changed meanwhile (load, tyres, weather) become
+less certain; the peak belongs to the road and is not stored."""
 
 import math
 
@@ -31,18 +31,18 @@ from ecu.jit import Record, kernel
 
 KEPT = np.array([i for i in range(N) if i not in PASSING])
 
-# Standard deviations that a pause of unknown length adds.
+# Standard deviations added for a pause of unknown length.
 PAUSE = np.zeros(N)
 PAUSE[STIFFNESS] = 0.05
 PAUSE[RADIUS : RADIUS + 4] = PAUSE[ROLLING] = 0.0003
 PAUSE[BIAS], PAUSE[MASS], PAUSE[DRAG] = 0.005, 0.005, 0.02
 PAUSE[DELAY] = 0.001
-LEVEL_PAUSE = 0.03  # of all levels alike
+LEVEL_PAUSE = 0.03  # common to all levels
 
 
 @kernel
 def restore_joint(params: Record, state: Record, learned: Record) -> None:
-    """Begin with what was learned; with the prior where nothing was."""
+    """Restore learned states; use the prior where nothing was learned."""
     set_prior(params, state)
     x, p = state.x, state.p
     if learned.joint_known:
@@ -65,14 +65,14 @@ def restore_joint(params: Record, state: Record, learned: Record) -> None:
 
 @kernel
 def keep_joint(params: Record, state: Record, learned: Record) -> None:
-    """Write what is known now into `learned`."""
+    """Write the present states into `learned`."""
     learned.joint_known, state.unkept_s = 1, 0.0
     place = 0
     for k in range(len(KEPT)):
         i = KEPT[k]
         learned.joint[i] = state.x[i]
         if LEVEL <= i < LEVEL + 4:
-            level = state.x[i] + state.x[MEAN + (i - LEVEL) // 2]  # what an application has shown so far
+            level = state.x[i] + state.x[MEAN + (i - LEVEL) // 2]  # as observed in this application so far
             learned.joint[i] = min(max(level, math.log(LEAST_RATIO)), math.log(GREATEST_RATIO))
         for m in range(k + 1):
             learned.joint_covariance[place] = state.p[i, KEPT[m]]
@@ -84,7 +84,7 @@ def keep_joint(params: Record, state: Record, learned: Record) -> None:
 
 @kernel
 def hand_over_level(estimate: Record, learned: Record) -> None:
-    """At the end of a braking: count what it observed."""
+    """At the end of a brake application: count the time it was observed for."""
     learned.brakings += 1
     for i in range(4):
         learned.observed_s[i] += estimate.observed_s[i]

@@ -1,9 +1,9 @@
-"""Motor torque as a regressor: its noise told apart from the torque.
+"""Motor torque as a regressor, with its noise separated.
 
 With a reading T + n the balance has the innovation -c n and the regressor -c (T + n): their product has the
-mean c^2 sigma^2 in every window, whatever the car does, and would push the mass up for ever. So derivatives
-use the torque low-passed up to the end of the last window, which knows nothing of this window's noise, and
-the noise of the readings, by their second differences, is in the variance of the measurement.
+mean c^2 sigma^2 in every window, and would bias the mass upwards without end. So derivatives use the torque
+low-passed up to the end of the last window, independent of this window's noise, and the variance of the
+measurement includes the noise of the readings, estimated from their second differences.
 """
 
 import math
@@ -27,12 +27,12 @@ MOTORS_STATE = np.dtype(
 
 SMOOTHING = 0.2  # s
 MEMORY = 100  # samples, of the variance
-LARGEST_STEP = 200.0  # N m between samples: more is a demand that steps, not noise
+LARGEST_STEP = 200.0  # N m between samples: beyond it the demand has stepped, which is not noise
 
 
 @kernel
 def follow_motors(state: Record, inputs: Record, dt: float) -> None:
-    """Take this cycle's readings in."""
+    """Update the filters by this cycle's readings."""
     gain = 1.0 - math.exp(-dt / SMOOTHING)
     for i in range(4):
         torque = motor_torque(inputs, i)

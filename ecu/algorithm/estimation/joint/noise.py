@@ -1,15 +1,15 @@
-"""What a window's pressures and motor torques may err by, wherever a measurement is predicted from them."""
+"""Errors of a window's pressures and motor torques, for every measurement predicted from them."""
 
 from ecu.algorithm.estimation.joint.pressure import follows
 from ecu.jit import Record, kernel
 
-COLOURED = 20.0  # times the variance of white noise: what an inverter's torque errs by is not white
-SKEW_FOLLOWED, SKEW_REPORTED = 0.5, 3.0  # windows between pressure and force; a foreign log is worse
+COLOURED = 20.0  # factor on the variance of white noise: the error of an inverter's torque is not white
+SKEW_FOLLOWED, SKEW_REPORTED = 0.5, 3.0  # windows between pressure and force; more in foreign logs
 
 
 @kernel
 def skew(state: Record, i: int) -> float:
-    """Return what a pressure [bar] may be off because it acts earlier or later than it is told."""
+    """Return the error of a pressure [bar] that acts earlier or later than its time stamp."""
     windows = SKEW_FOLLOWED if follows(state.pressures, i) else SKEW_REPORTED
     return windows * (state.smooth_pressure[i] - state.last_smooth[i])
 

@@ -1,15 +1,15 @@
-"""The joint observer: one filter for speed, tyres, mass, sensors and the friction of all four linings.
+"""Joint observer: one filter for speed, tyres, mass, sensors and the friction of all four linings.
 
-A window of a few cycles is one step: the state walks, then the speed reference, each wheel's speed and the
-car's longitudinal balance correct it. Which states they may correct depends on what the car does:
+A window of a few cycles is one step: the random walk, then corrections by the speed reference, each wheel's
+speed and the car's longitudinal balance. The states corrected depend on the driving situation:
 
 friction braking   speed, frictions, tyre stiffness and peak, radii, slope; the rest is considered only
 motors alone       everything but friction and pressure offsets: known torque shows mass, drag, stiffness
 rolling            speed, radii, slope; bias and drag where motor torque is reported
 below 3.4 m/s, sliding, ABS, ESP, driver or motors driving against the brakes: speed and slope only
 
-When a wheel runs past the tyre's range, or most wheels contradict the tyres that are known, all but the speed
-goes back to what was known 0.2 to 0.4 s before.
+When a wheel leaves its tyre's range, or most wheels contradict the known tyres, all states but the speed are
+restored from a snapshot 0.2 to 0.4 s old.
 """
 
 import math
@@ -78,20 +78,20 @@ from ecu.jit import Record, kernel
 
 WINDOW_S = 0.05
 LEAST_SPEED = 3.4  # m/s
-STRAIGHT = 0.05  # lateral acceleration over gravity: more, and wheels roll by their own loads and angles
-VARIES_FROM, VARIES = 0.3, 0.2  # m/s^2: acceleration that tells a mass, and its change within seconds
-MOTORS = 100.0  # N m of all motors: their torque is worth looking at
-BELIEVED_AFTER = 3.0  # s without a wheel that rolls, brakes released
-RELEASE = 0.15  # relative fall in a window: pressure, slip and force lag differently and teach nothing
+STRAIGHT = 0.05  # lateral acceleration over gravity: above it wheels roll at unequal loads and angles
+VARIES_FROM, VARIES = 0.3, 0.2  # m/s^2: acceleration at which mass is observable, and its change
+MOTORS = 100.0  # N m of all motors: above it their torque is evaluated
+BELIEVED_AFTER = 3.0  # s without a freely rolling wheel, brakes released
+RELEASE = 0.15  # relative fall in a window: beyond it lags differ too much to learn
 SNAPSHOT_S = 0.2
 
-UNEXPLAINED = 0.15  # m/s^2 while rolling: someone drives or brakes the car without saying so
+UNEXPLAINED = 0.15  # m/s^2 while rolling: beyond it the car is driven or braked by an unreported torque
 TWIN = 3.0  # bar, of a pressure taken from the other side
 
 
 @kernel
 def start_joint(state: Record) -> None:
-    """Begin with what the state knows, the speed apart."""
+    """Initialise the observer: its states but the speed stand in the state already."""
     state.started = 0
     open_window(state)
     save_snapshot(state, 0)
@@ -109,7 +109,7 @@ def _start_speed(params: Record, state: Record, inputs: Record) -> None:
 
 @kernel
 def _axle_unknown(inputs: Record, left: int) -> bool:
-    """Return whether neither pressure of an axle is usable: one alone stands for both."""
+    """Return whether neither pressure of an axle is usable: one alone serves both."""
     pressure = CALLIPER_PRESSURE + left
     return not (usable(inputs, pressure) or usable(inputs, pressure + 1))
 
@@ -140,7 +140,7 @@ def _watch_release(state: Record, braking: bool) -> None:
 
 @kernel
 def _accelerates(state: Record) -> bool:
-    """Return whether acceleration varies: what does not cannot tell mass from bias, drag and slope."""
+    """Return whether acceleration varies: a constant one cannot separate mass from bias, drag and slope."""
     accel = state.window.accel
     return abs(accel) > VARIES_FROM and abs(accel - state.mean_accel) > VARIES
 
@@ -184,7 +184,7 @@ def update_joint(
     braking: bool,
     dt: float,
 ) -> None:
-    """Take this cycle's samples in and, at the end of a window, correct the state by them."""
+    """Add this cycle's samples and, at the end of a window, correct the state by them."""
     if state.closed:
         open_window(state)
     state.reset = state.closed = 0
@@ -216,7 +216,7 @@ def update_joint(
 
 @kernel
 def _released(params: Record, state: Record, inputs: Record) -> bool:
-    """Return whether nobody brakes by the linings, not even a little."""
+    """Return whether no friction brake is applied, not even slightly."""
     asked = requested_decel(params, inputs)
     if not params.transmit and asked > LEAST_REQUEST:
         return False
@@ -279,7 +279,7 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
 
 @kernel
 def _look_after(params: Record, state: Record, braking: bool) -> None:
-    """Keep snapshots, go back when a wheel slides, begin anew when a value is not finite."""
+    """Keep snapshots, restore one when a wheel slides, reset when a value is not finite."""
     w, x = state.window, state.x
     total = 0.0
     for i in range(N):
@@ -290,7 +290,7 @@ def _look_after(params: Record, state: Record, braking: bool) -> None:
         state.reset = 1
         return
     if state.untrusted_s > BELIEVED_AFTER and not braking:
-        state.started = 0  # then it is the speed that is wrong
+        state.started = 0  # then the speed itself is wrong
         state.untrusted_s = 0.0
         forget(state, V, 0.25)
     state.kept_s += w.time

@@ -1,13 +1,13 @@
-"""Is braking predicted better with what was learned than with what is configured? A book of it.
+"""Prediction record: deceleration predicted with learned and with configured values, compared by application.
 
-Each application is judged by specific force, which no slope is in. Over its windows
+Each application is judged by specific force, which is free of slope. Over its windows
 
     measured     -(1 + sum I_i / (r_i^2 m)) (a - b) - overrun - (drag + rolling + sum M_i / r_i) / m
     predicted    sum 2 A_i r_eff mu_i (p_i - p_0) / r_i / m        mu_i as it was before the application
 
-twice: with the learned friction, mass, bias and overrun, and with the configured ones. The relative errors
-of the two means go into the book, where an application counts by a memory of `MEMORY` of them. Where the
-learned friction is off by more than the configured one beyond doubt, it is given up and learned anew.
+twice: with the learned friction, mass, bias and overrun, and with the configured ones. The relative errors of
+the two means enter the record, with a memory of `MEMORY` applications. Where the error of the learned
+friction significantly exceeds that of the configured one, it is discarded and learned anew.
 """
 
 import math
@@ -30,17 +30,17 @@ PREDICTION_STATE = np.dtype(
         ("predicted", "f8", (2,)),
         ("samples", "i8"),
         ("error", "f8", (2,)),  # relative, of the last application
-        ("applications", "f8"),  # in the book
+        ("applications", "f8"),  # in the record
         ("worse", "f8"),  # mean of |learned| - |configured|
         ("spread", "f8"),  # variance of that
-        ("told_s", "f8"),  # the fault bit is shown for this much longer [s]
+        ("told_s", "f8"),  # remaining time of the fault bit [s]
     ],
     align=True,
 )
 
 LEAST_SPEED = 3.4  # m/s
 LEAST_SAMPLES = 8  # windows
-STEADY = 0.10  # relative change of a pressure in a window; force follows a change later
+STEADY = 0.10  # relative change of a pressure in a window; force lags a change
 LEAST_DECEL = 0.8  # m/s^2, of the linings
 MEMORY = 10.0  # applications
 LEAST_APPLICATIONS = 4.0
@@ -51,7 +51,7 @@ TOLD_S = 60.0
 
 @kernel
 def begin_prediction(params: Record, state: Record, joint: Record) -> None:
-    """Note what an application is predicted with."""
+    """Store the values with which an application is predicted."""
     state.mass[LEARNED_WAY] = params.mass * math.exp(joint.x[MASS])
     state.mass[CONFIGURED_WAY] = params.mass
     state.samples = 0
@@ -64,7 +64,7 @@ def begin_prediction(params: Record, state: Record, joint: Record) -> None:
 
 @kernel
 def _counts(inputs: Record, joint: Record) -> bool:
-    """Return whether the last window tells how well the car is predicted."""
+    """Return whether the last window is suited to judge the prediction."""
     rolls = joint.x[V] > LEAST_SPEED and joint.sliding == 0
     counts: bool = joint.pressed < STEADY and rolls and joint.window.balanced != 0
     return counts and not others_brake(inputs) and not driver_accelerates(inputs)
@@ -72,7 +72,7 @@ def _counts(inputs: Record, joint: Record) -> bool:
 
 @kernel
 def add_window(params: Record, state: Record, joint: Record, inputs: Record) -> None:
-    """Take the last window of an application in: what it measured, all at one time."""
+    """Add the last window of an application: its measurements, all at one time."""
     if not _counts(inputs, joint):
         return
     state.samples += 1
@@ -98,7 +98,7 @@ def add_window(params: Record, state: Record, joint: Record, inputs: Record) -> 
 
 @kernel
 def end_prediction(state: Record) -> bool:
-    """Book an application; return whether learning is worse than not learning, beyond doubt."""
+    """Record an application; return whether learned values predict significantly worse than configured."""
     n = state.samples
     if n < LEAST_SAMPLES or state.measured[CONFIGURED_WAY] < LEAST_DECEL * n:
         return False
@@ -119,6 +119,6 @@ def end_prediction(state: Record) -> bool:
 
 @kernel
 def close_book(state: Record) -> None:
-    """Begin the book anew: what it judged was given up."""
+    """Reset the record: the values it judged were discarded."""
     state.applications = state.worse = state.spread = 0.0
     state.told_s = TOLD_S

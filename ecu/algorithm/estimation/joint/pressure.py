@@ -1,10 +1,10 @@
-"""Calliper pressure as a state that the ECU's own demand drives, wherever the car follows it.
+"""Calliper pressure as a state driven by the ECU's own demand, wherever the car follows it.
 
-The sensor's noise (Table 4.1: 1.8 bar) multiplies the unknown friction, and only time takes it away. Where
-the hydraulics follow the demand, its course is known (A.17, A.18 to first order: a dead time and a lag) and
-time is there; the variance grows with the change, so that another lag or gain does no harm. Where the sensor
-disagrees for longer (a shadow, a fallback, a recording of another controller) the raw samples count until
-both agree again."""
+The sensor's noise (Table 4.1: 1.8 bar) multiplies the unknown friction, and only averaging over time reduces
+it. Where the hydraulics follow the demand, the pressure is predictable (A.17, A.18 to first order: a dead
+time and a lag) and can be averaged; the variance grows with the change, which covers errors of lag and gain.
+Where the sensor disagrees persistently (a shadow, a fallback, a recording of another controller) the raw
+samples count until both agree again."""
 
 import math
 
@@ -19,7 +19,7 @@ PRESSURE_STATE = np.dtype(
         ("value", "f8", (4,)),  # bar
         ("variance", "f8", (4,)),  # bar^2
         ("disagreement", "f8", (4,)),  # low-passed innovation [bar]
-        ("agreed_s", "f8", (4,)),  # for this long model and sensor have agreed
+        ("agreed_s", "f8", (4,)),  # time for which model and sensor have agreed
     ],
     align=True,
 )
@@ -33,7 +33,7 @@ AGREED_S = 0.3
 
 @kernel
 def follow_demand(state: Record, i: int, demand: float, dt: float) -> None:
-    """Move a wheel's pressure on by `dt` [s] as the hydraulics follow the last `demand` [bar] sent."""
+    """Advance a wheel's modelled pressure by `dt` [s] towards the last `demand` [bar] sent."""
     row = state.demand
     for k in range(DEAD_CYCLES, 0, -1):
         row[k, i] = row[k - 1, i]
@@ -46,5 +46,5 @@ def follow_demand(state: Record, i: int, demand: float, dt: float) -> None:
 
 @kernel
 def follows(state: Record, i: int) -> bool:
-    """Return whether a wheel's pressure has followed the demand for a while."""
+    """Return whether a wheel's pressure has followed the demand for some time."""
     return state.agreed_s[i] > AGREED_S

@@ -38,7 +38,7 @@ from ecu.contract.params import GRAVITY
 from ecu.jit import Record, kernel
 
 PRIOR = np.zeros(N)
-"""Standard deviations before anything is learned; friction, motor scale and speed are set apart."""
+"""Unadapted standard deviations; friction, motor scale and speed are set apart."""
 PRIOR[STIFFNESS], PRIOR[RATIO] = 0.25, 0.06
 PRIOR[BIAS], PRIOR[SLOPE] = 0.1, 0.3
 PRIOR[MASS], PRIOR[PEAK], PRIOR[LOAD], PRIOR[DEFLECTION_GAIN] = 0.03, 0.25, 0.05, 0.10
@@ -50,26 +50,26 @@ PRIOR[SIDE], PRIOR[PEAK_LOAD] = 0.02, 0.08
 
 # Standard deviations of friction's prior, of its logarithm: all four together, per axle, per wheel.
 LEVEL_COMMON, LEVEL_AXLE, LEVEL_WHEEL = 0.13, 0.17, 0.04
-# By how much the level of an application differs from that of the one before.
+# Difference between the levels of successive applications.
 STEP_COMMON, STEP_AXLE, STEP_WHEEL = 0.03, 0.02, 0.005
-# How far friction goes from its level within an application, and how long it takes to forget that.
+# Deviation of friction from its level within an application, and time constant of its return.
 CHANGE_COMMON, CHANGE_AXLE, CHANGE_S = 0.08, 0.03, 4.0
 CHANGE_BY_PRESSURE = 0.05  # of an axle's friction, per relative change of its pressure
 MEAN_ZERO = 0.003  # the mean of changes within an application
-RATE_SIGMA = 0.1  # 1/s, where the drive is known; an engine's kicks look like a rate
-SCALE_ONLY = 0.03  # relative error of a motor's torque that is its scale; what is beyond changes
-UNKNOWN_PER_ERROR = 2.0  # an engine's torque that is known to half only may as well not be known
+RATE_SIGMA = 0.1  # 1/s, where the drive is known; torque steps of an engine resemble a rate
+SCALE_ONLY = 0.03  # relative error of a motor torque up to which it is a constant scale; the excess varies
+UNKNOWN_PER_ERROR = 2.0  # an engine's torque known to half only counts as unknown
 OVERRUN_MEAN, OVERRUN_SIGMA = 0.2, 0.3  # m/s^2, drag of an engine in gear
 UNKNOWN_DRIVE = 0.1  # m/s^2 per axle, drag of an engine in this application
 UNKNOWN_KICKS = 3.0  # m/s^2, white from window to window: stands for 0.3 that last seconds (down-shifts)
-# Of an axle's slip by it: with a speed reference, and what comes without one, per acceleration over gravity.
+# Of an axle's slip by it: with a speed reference, and more without one, per acceleration over gravity.
 UNKNOWN_SLIP, UNKNOWN_SLIP_REST, UNKNOWN_SLIP_BY_ACCEL = 0.003, 0.005, 0.1
-UNKNOWN_SLIP_S = 2.0  # after which that is another one
+UNKNOWN_SLIP_S = 2.0  # after which its value is independent
 
 LASTING = np.array(
     [STIFFNESS, RATIO, BIAS, MASS, PEAK, LOAD, DEFLECTION_GAIN, DRAG, ROLLING, DELAY, SIDE, PEAK_LOAD]
 )
-"""States of which time alone makes nothing less sure than before anything was learned."""
+"""States whose variance never grows with time beyond that of the prior."""
 
 # Random walks per square root of a second.
 WALK = np.zeros(N)
@@ -82,10 +82,10 @@ WALK[PEAK], WALK[LOAD], WALK[DEFLECTION_GAIN] = 0.01, 0.0005, 0.0005
 WALK[MASS], WALK[MOTOR], WALK[DRAG] = 1e-5, 1e-5, 0.005
 WALK[DELAY] = 1e-4
 RATE_WALK = 0.05
-LEVEL_WALK = 0.01  # of all levels alike while the pads rub
+LEVEL_WALK = 0.01  # common to all levels while the pads rub
 
 
-# Bounds of what is learned: beyond them it is a fault that is learned, not a car. Of friction: `friction.py`.
+# Bounds of learned states: beyond them a fault was learned, not a car. Of friction: `friction.py`.
 LOWEST, HIGHEST = np.full(N, -np.inf), np.full(N, np.inf)
 LOWEST[LEVEL : LEVEL + 4], HIGHEST[LEVEL : LEVEL + 4] = math.log(LEAST_RATIO), math.log(GREATEST_RATIO)
 LOWEST[STIFFNESS], HIGHEST[STIFFNESS] = math.log(0.4), math.log(2.5)
@@ -105,7 +105,7 @@ LOWEST[DELAY], HIGHEST[DELAY] = -0.1, 0.1
 
 @kernel
 def limit_variance(state: Record, i: int, most: float) -> None:
-    """Let a state be no less sure than `most`, a variance: its covariances shrink with it."""
+    """Raise no state's variance above `most`: its covariances shrink with it."""
     p = state.p
     if p[i, i] > most:
         scale = math.sqrt(most / p[i, i])
@@ -116,11 +116,10 @@ def limit_variance(state: Record, i: int, most: float) -> None:
 
 @kernel
 def keep_within_bounds(state: Record) -> bool:
-    """Put learned states that have left their bounds back on them; return whether there was one.
+    """Return learned states to their bounds; return whether any had left them.
 
-    The others follow as their covariances say: what the one may not explain is theirs to explain. Left where
-    they are they would drift for as long as it is pushed. Peak and slope are the road's: to be far off is no
-    fault.
+    The other states follow by their covariances and explain the remainder; otherwise they would drift for as
+    long as the bound acts. Peak and slope belong to the road: at their bounds they are no fault.
     """
     x, p, free, found = state.x, state.p, state.free, False
     for i in range(N):
@@ -136,7 +135,7 @@ def keep_within_bounds(state: Record) -> bool:
 
 @kernel
 def widen_levels(state: Record, common: float, axle: float, wheel: float) -> None:
-    """Add to the variance of the four levels: of all together, of each axle, of each wheel."""
+    """Add to the variance of the four levels: common, per axle, per wheel."""
     p = state.p
     for i in range(4):
         for j in range(4):
@@ -150,7 +149,7 @@ def widen_levels(state: Record, common: float, axle: float, wheel: float) -> Non
 
 @kernel
 def set_prior(params: Record, state: Record) -> None:
-    """Set the state before anything is learned."""
+    """Set the unadapted state."""
     x, p = state.x, state.p
     for i in range(N):
         x[i] = 0.0
@@ -164,7 +163,7 @@ def set_prior(params: Record, state: Record) -> None:
 
 @kernel
 def forget_levels(state: Record) -> None:
-    """Let friction be the configured one again, as little known as before anything was learned."""
+    """Reset friction to the configured one, as uncertain as before learning."""
     for i in range(LEVEL, LEVEL + 4):
         clear_state(state, i, 0.0)
     widen_levels(state, LEVEL_COMMON**2, LEVEL_AXLE**2, LEVEL_WHEEL**2)
@@ -172,7 +171,7 @@ def forget_levels(state: Record) -> None:
 
 @kernel
 def begin_application(state: Record, heat: Record) -> None:
-    """Let the level have changed since the last application, and begin with friction at its level.
+    """Widen the levels by their change since the last application, and start with friction at its level.
 
     Args:
         state: `JOINT_STATE`, overwritten.
@@ -195,7 +194,7 @@ def begin_application(state: Record, heat: Record) -> None:
     forget_rate(state)
     if unknown <= 0.0:
         clear_state(state, OVERRUN, 0.0)
-    elif p[OVERRUN, OVERRUN] == 0.0 or unknown < 1.0:  # the torque of an engine errs by another value
+    elif p[OVERRUN, OVERRUN] == 0.0 or unknown < 1.0:  # an engine's torque error differs each time
         clear_state(state, OVERRUN, (OVERRUN_SIGMA * unknown) ** 2)
         state.x[OVERRUN] = OVERRUN_MEAN if unknown >= 1.0 else 0.0
     for axle in range(2):
@@ -204,9 +203,9 @@ def begin_application(state: Record, heat: Record) -> None:
 
 @kernel
 def end_application(state: Record) -> None:
-    """Let the level be the mean of the friction in this application, and stand for it again.
+    """Set the level to the mean friction of this application, from which the next begins.
 
-    Changes are from the mean: that theirs is zero, where they were observed, is known now.
+    Changes are relative to that mean: where they were observed, their mean is now known to be zero.
     """
     free = state.free
     for i in range(N):
@@ -227,7 +226,7 @@ def end_application(state: Record) -> None:
 
 @kernel
 def note_change(state: Record, weight: float) -> None:
-    """Take friction's change of now into its mean, by `weight` [bar]."""
+    """Update the mean of friction changes by the present one, with `weight` [bar]."""
     x, p = state.x, state.p
     state.weight += weight
     share = weight / state.weight
@@ -244,7 +243,7 @@ def note_change(state: Record, weight: float) -> None:
 
 @kernel
 def forget_rate(state: Record) -> None:
-    """Let friction's rate be unknown."""
+    """Reset friction's rate to unknown."""
     state.x[RATE] = 0.0
     forget(state, RATE, (RATE_SIGMA * state.drive_known) ** 2)
 
@@ -259,7 +258,7 @@ def pressure_change(state: Record, left: int) -> float:
 
 @kernel
 def _change_friction(state: Record, time: float) -> None:
-    """Move friction on: it returns to its level, driven by its rate and by what is new."""
+    """Propagate friction: it returns to its level, driven by its rate and by process noise."""
     x, p = state.x, state.p
     stays = math.exp(-time / CHANGE_S)
     for axle in range(2):
@@ -281,7 +280,7 @@ def _change_friction(state: Record, time: float) -> None:
 
 @kernel
 def _change_slip(state: Record, time: float) -> None:
-    """Move on what an axle's slip is off by drive that nobody reports: the more the tyres have to hold."""
+    """Propagate the slip error of an axle by unreported drive: it grows with the force on the tyres."""
     p, w, unknown = state.p, state.window, 1.0 - state.drive_known
     held = math.hypot(w.accel / GRAVITY, w.across)
     without = (UNKNOWN_SLIP_REST + UNKNOWN_SLIP_BY_ACCEL * held) * unknown * min(state.reference_s, 1.0)
@@ -305,7 +304,7 @@ def _forget_slope(state: Record, stays: float) -> None:
 
 @kernel
 def walk(state: Record, rubbing: bool, time: float) -> None:
-    """Add to the covariance what may have changed over `time` [s]; friction changes while the pads rub."""
+    """Add the process noise of `time` [s] to the covariance; friction changes while the pads rub."""
     p = state.p
     drift_speed(state, time)
     if state.x[V] > 1.0:

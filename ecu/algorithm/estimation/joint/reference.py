@@ -1,11 +1,11 @@
-"""Measurement of the car's speed by a reference, its delay a state."""
+"""Measurement of vehicle speed by a reference whose delay is a state."""
 
 from ecu.algorithm.estimation.joint.kalman import clear_derivatives, correct
 from ecu.algorithm.estimation.joint.layout import DELAY, REFERENCE_RATIO, V
 from ecu.algorithm.estimation.joint.sliding import wheels_agree
 from ecu.jit import Record, kernel
 
-JUMP = 100.0  # squared test ratio: from here a reference is believed at once that wheels cannot deny
+JUMP = 100.0  # test ratio squared: above it a reference that no wheel contradicts is trusted at once
 
 
 @kernel

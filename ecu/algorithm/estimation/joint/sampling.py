@@ -1,9 +1,9 @@
-"""Signals of any rate brought to one time: where the slowest of them was measured last.
+"""Synchronisation of signals of any rate: all are taken at the latest common sample time.
 
-A balance of what was measured at different times is wrong whenever something changes, and a signal that is
-held is late by half its period on the mean. Samples of a window count as one, at their mean time; between the
-last two of these every signal is taken at the oldest of the last times, so nothing is extrapolated. Where all
-signals come in every cycle, that is the middle of the window, and nothing is interpolated either.
+A balance of signals measured at different times is wrong during any change, and a held signal lags by half
+its period on average. Samples of a window count as one, at their mean time; every signal is interpolated
+between its last two such means at the oldest of the last times, never extrapolated. Where all signals arrive
+in every cycle, that is the middle of the window, without interpolation.
 """
 
 import numpy as np
@@ -23,14 +23,14 @@ SAMPLING_STATE = np.dtype(
         ("at", "f8", (CHANNELS,)),  # its time [s]
         ("before", "f8", (CHANNELS,)),  # likewise, of the one before
         ("before_at", "f8", (CHANNELS,)),
-        ("samples", "i8", (CHANNELS,)),  # of which `value` is the mean
-        ("common", "f8"),  # time that the last balance was taken at [s]
+        ("samples", "i8", (CHANNELS,)),  # number of samples in `value`
+        ("common", "f8"),  # time of the last balance [s]
     ],
     align=True,
 )
 
-OLDEST_S = 0.5  # between samples that are set against others
-LEAST_ADVANCE_S = 0.02  # of the common time, for another balance
+OLDEST_S = 0.5  # between samples that are compared
+LEAST_ADVANCE_S = 0.02  # advance of the common time that allows another balance
 
 
 @kernel
@@ -42,7 +42,7 @@ def open_sampling(state: Record) -> None:
 
 @kernel
 def add_sample(state: Record, i: int, value: float, age: float) -> None:
-    """Take a sample of channel `i` in that is `age` [s] old."""
+    """Add a sample of channel `i` that is `age` [s] old."""
     state.sum[i] += value
     state.sum_at[i] += state.now - age
     state.count[i] += 1
@@ -73,7 +73,7 @@ def at_common_time(state: Record, i: int) -> float:
 
 @kernel
 def advance_common_time(state: Record) -> bool:
-    """Move the common time on; return whether there is something new to be set against each other."""
+    """Advance the common time; return whether a new comparison is possible."""
     oldest = state.at[0]
     for i in range(1, CHANNELS):
         oldest = min(oldest, state.at[i])

@@ -10,22 +10,22 @@ from ecu.contract.signals import WHEEL_SPEED
 from ecu.jit import Record, kernel
 
 LARGE_SLIP = 0.12
-YIELDING = 0.06  # slip from which the force along the car says more of a wheel's force than its torque
+YIELDING = 0.06  # slip above which the force along the car indicates a wheel's force better than its torque
 AGREEING = 0.05  # slip within which a wheel confirms a speed
-SLIDING_FLOOR = 5.0  # m/s, that slip is relative to at least
+SLIDING_FLOOR = 5.0  # m/s, least reference speed of that slip
 HOLD_S = 0.2
 OTHER_TYRES = 2.5  # wheels on the gate at once
 
 
 @kernel
 def _beyond(rolled: float, ground: float, slip: float) -> bool:
-    """Return whether a wheel's speed differs from that of the ground [m/s] by more than a slip."""
+    """Return whether a wheel's speed differs from ground speed [m/s] by more than a slip."""
     return abs(rolled - ground) > slip * max(ground, rolled, SLIDING_FLOOR)
 
 
 @kernel
 def share_force(params: Record, state: Record, inputs: Record, accel: float, load: Record) -> None:
-    """Give the wheels that begin to slide, by their loads, the force along the car that the others leave."""
+    """Share the residual force along the car among the wheels that begin to slide, by their loads."""
     left, loaded = car_force(params, state, accel), 0.0
     for i in range(4):
         rolled = inputs.value[WHEEL_SPEED + i] * params.wheel_radius[i]
@@ -42,14 +42,14 @@ def share_force(params: Record, state: Record, inputs: Record, accel: float, loa
 
 @kernel
 def wheel_slides(params: Record, state: Record, i: int) -> bool:
-    """Return whether a wheel locks or spins: its speed does not tell the car's."""
+    """Return whether a wheel locks or spins, so that its speed does not indicate the car's."""
     w = state.window
     return _beyond(w.omega[i] * params.wheel_radius[i], w.ground[i], LARGE_SLIP)
 
 
 @kernel
 def wheels_agree(params: Record, state: Record, speed: float) -> bool:
-    """Return whether three wheels at least roll at a speed [m/s]."""
+    """Return whether at least three wheels roll at a speed [m/s]."""
     count = 0
     for i in range(4):
         rolled = state.window.omega[i] * params.wheel_radius[i]
@@ -60,7 +60,7 @@ def wheels_agree(params: Record, state: Record, speed: float) -> bool:
 
 @kernel
 def watch_tyres(state: Record, observing: bool) -> None:
-    """Restore friction and forget stiffness where most wheels contradict the known tyres alike."""
+    """Restore friction and reset stiffness where most wheels contradict the known tyres alike."""
     against = 0.0
     for i in range(4):
         against += state.signed_ratio[i]
@@ -72,7 +72,7 @@ def watch_tyres(state: Record, observing: bool) -> None:
 
 @kernel
 def suspend_learning(state: Record) -> None:
-    """Suspend learning: a wheel slips beyond its tyre's range, whatever this filter sees of it."""
+    """Suspend learning: a wheel is beyond its tyre's range, even if this filter does not detect it."""
     if state.hold_s <= 0.0:
         restore_snapshot(state)
     state.hold_s = HOLD_S

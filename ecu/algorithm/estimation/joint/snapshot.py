@@ -1,4 +1,4 @@
-"""Snapshots of the state, to restore when it was learned from a wheel about to lock."""
+"""Snapshots of the state, restored when it was learned from a wheel about to lock."""
 
 from ecu.algorithm.estimation.joint.kalman import forget
 from ecu.algorithm.estimation.joint.layout import N, V
@@ -24,7 +24,7 @@ def _copy(state: Record, row: int, to: int) -> None:
 
 @kernel
 def restore_snapshot(state: Record) -> None:
-    """Restore the older snapshot in all but the speed, which is uncertain now."""
+    """Restore the older snapshot except the speed, which becomes uncertain."""
     for i in range(N):
         if i != V:
             state.x[i] = state.kept_x[1, i]
@@ -37,7 +37,7 @@ def restore_snapshot(state: Record) -> None:
 
 @kernel
 def save_newer_snapshot(state: Record) -> None:
-    """Make the newer snapshot the older one and take a new one."""
+    """Make the newer snapshot the older one and save a new one."""
     _copy(state, 0, 1)
     save_snapshot(state, 0)
     state.kept_s = 0.0

@@ -1,9 +1,9 @@
-"""Tyre and brake of a wheel, and the force along the car, as the states know them.
+"""Tyre and brake of a wheel, and the force along the car, as functions of the states.
 
 Slip by the adhesion used n (force over load), and its derivatives; stiffness C and peak D over load as well:
 
     u = n / D         slip = (c D / C) tan(asin(u) / c)     inverse Magic Formula with E = 0
-    slip_x = slip(n_xy) n_x / n_xy                          n_xy^2 = n_x^2 + n_y^2, as a tyre that corners
+    slip_x = slip(n_xy) n_x / n_xy                          n_xy^2 = n_x^2 + n_y^2, for a cornering tyre
 """
 
 import math
@@ -30,8 +30,8 @@ from ecu.jit import Record, kernel
 SHAPE = 1.6  # c of the Magic Formula
 NOMINAL_PEAK = 0.9  # adhesion
 PEAK_DEGRESSION = 0.05  # adhesion falls a little with load (Figure A.6)
-LEAST_OF_PEAK = 0.2  # of 1 - 4 y: a peak half as high again as usual
-STEEPEST = 0.93  # of the peak; the curve goes on straight from there
+LEAST_OF_PEAK = 0.2  # of 1 - 4 y: a peak 1.5 times the usual
+STEEPEST = 0.93  # of the peak; the curve continues linearly from there
 APPLIED = 1.0  # bar above push-out: the brakes act
 
 
@@ -47,7 +47,7 @@ def slip_of_force(used: float, stiffness: float, peak: float) -> tuple[float, fl
 
 @kernel
 def combined_slip(used: float, across: float, stiffness: float, peak: float) -> tuple[float, float, float]:
-    """Return slip along and its derivatives by `used` and ln `peak`, of a tyre that carries `across`."""
+    """Return slip along the wheel and its derivatives by `used` and ln `peak`, `across` used sideways."""
     if across == 0.0:
         slip, slope = slip_of_force(used, stiffness, peak)
         return slip, slope, slip - slope * used
@@ -60,7 +60,7 @@ def combined_slip(used: float, across: float, stiffness: float, peak: float) -> 
 
 @kernel
 def radius(params: Record, state: Record, i: int, load: float) -> tuple[float, float]:
-    """Return the rolling radius [m] of a wheel and its derivative by the logarithm of its deflection_gain."""
+    """Return the rolling radius [m] of a wheel and its derivative by the logarithm of its deflection gain."""
     at_rest = params.wheel_radius[i]
     nominal = rolling_radius(load, params.unloaded_radius[i], params.vertical_stiffness[i])
     change = (nominal - at_rest) * math.exp(state.x[DEFLECTION_GAIN])
@@ -78,8 +78,8 @@ def friction(params: Record, state: Record, i: int) -> float:
 def peak_adhesion(state: Record, relative: float) -> float:
     """Return the tyres' peak adhesion at a load over that at rest.
 
-    D = D_0 (1 - 4 y)^(-1/4): slip near the peak is about linear in y, so a y that noise has pushed up can
-    come back; in ln D its derivative would be gone by then.
+    D = D_0 (1 - 4 y)^(-1/4): slip near the peak is about linear in y, so a y raised by noise can recover; in
+    ln D its derivative would have vanished.
     """
     y = state.x[PEAK]
     at_rest: float = NOMINAL_PEAK * max(1.0 - 4.0 * y, LEAST_OF_PEAK) ** -0.25
@@ -97,14 +97,14 @@ def brake_torque(params: Record, state: Record, i: int, pressure: float) -> floa
 
 @kernel
 def unknown_share(params: Record, state: Record) -> float:
-    """Return what is unknown of the drive, over that of a car that reports no motor torque."""
+    """Return the unknown share of the drive, relative to that of a car that reports no motor torque."""
     share: float = min(UNKNOWN_PER_ERROR * max(params.sigma_motor_torque - SCALE_ONLY, 0.0), 1.0)
     return share if state.motors.samples[0] + state.motors.samples[2] > 0 else 1.0
 
 
 @kernel
 def car_force(params: Record, state: Record, accel: float) -> float:
-    """Return the force of all tyres along the car [N] at a specific force [m/s^2], with what is learned."""
+    """Return the force of all tyres along the car [N] at a specific force [m/s^2], by the learned states."""
     x = state.x
     drag = math.exp(x[DRAG]) * params.drag_area * x[V] * abs(x[V])
     return math.exp(x[MASS]) * (params.mass * (accel - x[BIAS]) + drag)

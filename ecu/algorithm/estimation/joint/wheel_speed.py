@@ -6,8 +6,8 @@ gives slip by the inverse of the tyre's curve (`wheel.py`), slip and radius give
     F = -(T + I dv/dt / r) / r        n = F / F_Z     n_xy^2 = n_x^2 + n_y^2
     omega = v_i (1 + slip) / r        braking; v_i / ((1 - slip) r) driving (A.6)
 
-What the model leaves out stands in the variance: a pressure that lags, a slip that changes, a tyre near its
-peak, a curve, and the noise of the torques that the prediction was made from.
+Unmodelled effects enter the variance: lag of pressure, change of slip, a tyre near its peak, cornering, and
+the noise of the torques used for the prediction.
 """
 
 import math
@@ -48,17 +48,17 @@ from ecu.algorithm.estimation.joint.wheel import (
 from ecu.jit import Record, kernel
 
 TRANSIENT = 1.0  # of a slip's change since the last window
-CURVED = 1.0  # of a slip's part beyond that of a linear tyre: what the peak is not known for
-CORNERING = 1.0  # of slip, per squared adhesion used sideways: then load and slip angle are not well known
+CURVED = 1.0  # of the part of a slip beyond that of a linear tyre: uncertainty of the peak
+CORNERING = 1.0  # of slip, per squared lateral adhesion: load and slip angle are then uncertain
 LOW_SPEED_NOISE = 0.15  # m/s
 
 
 @kernel
 def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float:
-    """Return the mean speed of a wheel [rad/s] to expect of this window.
+    """Return the expected mean speed of a wheel [rad/s] in this window.
 
     Sets `state.h`, and slip and force of the wheel. Derivatives are taken at the last window's smooth
-    pressure: were the noise of this window's own in both, it would bias what is learned.
+    pressure: this window's noise in both would bias the learned states.
 
     Args:
         params: `PARAMS`.
@@ -70,7 +70,7 @@ def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float
     load, pressure, smooth = w.load[i], w.pressure[i], state.last_smooth[i]
     r, deflection_gain = radius(params, state, i, load)
     motor = w.motor[i] * math.exp(x[MOTOR])
-    # With the mass, so that nothing but air drag tells a scale common to mass and all torques.
+    # With the mass, so that air drag alone reveals a scale common to mass and all torques.
     heavier = math.exp(x[MASS])
     own = heavier * (params.rolling_resistance * load * r + params.wheel_inertia[i] * w.change / r)
     force = -(brake_torque(params, state, i, pressure) + motor + own) / r
@@ -131,8 +131,8 @@ def correct_by_wheel(
         state: `JOINT_STATE`, overwritten.
         i: wheel.
         before: the car's speed before the first correction of this window [m/s].
-        moving: the car is fast enough for slip to mean something; else the wheel tells the speed alone.
-        observing: the brakes are on and something is learned.
+        moving: the car is fast enough for slip to be defined; otherwise the wheel corrects the speed alone.
+        observing: the brakes are applied and learning is active.
     """
     w, x = state.window, state.x
     n = w.omega_samples[i]
@@ -166,7 +166,7 @@ def correct_by_wheel(
 
 @kernel
 def correct_by_wheels(params: Record, state: Record, before: float, moving: bool, observing: bool) -> bool:
-    """Correct the state by every wheel that tells the car's speed; return whether any wheel speed came.
+    """Correct the state by every wheel that indicates vehicle speed; return whether a wheel speed arrived.
 
     Arguments as for `correct_by_wheel`.
     """

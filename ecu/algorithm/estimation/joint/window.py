@@ -1,8 +1,8 @@
-"""Samples of a few cycles gathered to means, each sample against the prediction at its own time.
+"""Window means of a few cycles, each sample compared with the prediction at its own time.
 
-Pressure noise as a factor of the unknown friction would ruin the filter, and filtering the pressure alone
-would set it against faster signals. Means of all signals over the same cycles keep them in step, their noise
-is white from window to window, and what did not arrive is simply not in the mean."""
+Pressure noise multiplying the unknown friction would ruin the filter, and a low-pass on pressure alone would
+delay it against the other signals. Means of all signals over the same cycles keep them aligned, with noise
+white from window to window, and missing samples are simply not in the mean."""
 
 import math
 
@@ -32,11 +32,11 @@ from ecu.contract.signals import (
 )
 from ecu.jit import Record, kernel
 
-OLDEST_S = 0.06  # of an acceleration or torque that is set against others
-COPIES, LEAST_COMPARED = 20, 2.0  # samples in a row, bar: that a reading is a copy
-NEW_SHARE = 0.2  # of the model's variance that is another one in the next window
-SMOOTHING = 0.2  # s, of pressure and acceleration that derivatives use
-STEADY = 5.0  # s, over which an acceleration that varies is told from one that lasts
+OLDEST_S = 0.06  # of an acceleration or torque that is compared
+COPIES, LEAST_COMPARED = 20, 2.0  # equal samples in a row, bar: the reading is then a copy
+NEW_SHARE = 0.2  # share of the model's variance that is independent in the next window
+SMOOTHING = 0.2  # s, low-pass of pressure and acceleration in derivatives
+STEADY = 5.0  # s, time constant separating varying from lasting acceleration
 
 
 @kernel
@@ -55,13 +55,13 @@ def open_window(state: Record) -> None:
 
 @kernel
 def speed_change(state: Record, motion: Record) -> float:
-    """Return dv/dt [m/s^2] by the accelerometer and what is known of its bias and the slope."""
+    """Return dv/dt [m/s^2] by the accelerometer, corrected for estimated bias and slope."""
     return motion.accel_x - state.x[BIAS] - state.x[SLOPE] + motion.yaw_rate * motion.lateral_speed
 
 
 @kernel
 def _compare_pressures(state: Record, inputs: Record) -> None:
-    """Count the samples in which an axle's pressures are one reading, copied: no noise makes them equal."""
+    """Count the samples in which an axle's pressures are copies of one reading: noise would differ."""
     for axle in range(2):
         left = CALLIPER_PRESSURE + 2 * axle
         pressure = inputs.value[left]
@@ -80,7 +80,7 @@ def gather(
     released: bool,
     dt: float,
 ) -> None:
-    """Move the speed on by `dt` [s] and add this cycle's samples to the window."""
+    """Advance the speed by `dt` [s] and add this cycle's samples to the window."""
     w, x, value = state.window, state.x, inputs.value
     _compare_pressures(state, inputs)
     change = speed_change(state, motion)
@@ -160,7 +160,7 @@ def close_window(params: Record, state: Record) -> None:
         w.common_pressure[i] = at_common_time(state.sampling, i)
         w.pressure_variance[i] = (params.sigma_pressure / BAR) ** 2 / max(sampled, 1)
         if state.copies[i // 2] > COPIES:
-            w.pressure_variance[i] *= 2.0  # one noise in both wheels of an axle
+            w.pressure_variance[i] *= 2.0  # common noise in both wheels of an axle
         if w.tracked_cycles[i] == n and w.pressure_samples[i] > 0:
             w.pressure[i] = w.common_pressure[i] = w.tracked[i] / n
             w.pressure_variance[i] = NEW_SHARE * state.pressures.variance[i]

@@ -1,4 +1,4 @@
-"""What Observers 1 and 2 say of the car: the records of the single wheels turned into `ESTIMATE`."""
+"""Estimates of Observers 1 and 2: the records of the single wheels turned into `ESTIMATE`."""
 
 import math
 
@@ -7,7 +7,7 @@ from ecu.jit import Record, kernel
 
 @kernel
 def tell_friction(state: Record, estimate: Record) -> None:
-    """Overwrite friction, its standard deviation and mode as these observers know them."""
+    """Overwrite friction, its standard deviation and mode by these observers' states."""
     for i in range(4):
         estimate.mu[i], estimate.sigma[i], estimate.mode[i] = state.mu[i], state.sigma[i], state.mode[i]
         estimate.observed_s[i] = state.observed_s[i]
@@ -17,7 +17,7 @@ def tell_friction(state: Record, estimate: Record) -> None:
 def tell_wheels(
     params: Record, state: Record, estimate: Record, speed: Record, wheels: Record, force: Record
 ) -> None:
-    """Overwrite what Observers 1 and 2 know of the car, the tyres and the linings.
+    """Overwrite the estimate of car, tyres and linings by Observer 1 or 2.
 
     Args:
         params: `PARAMS`.

@@ -1,4 +1,4 @@
-"""Virtual force sensor of Observer 2: the total tyre force, shared out by the tyre model (4.16–4.24).
+"""Virtual force sensor of Observer 2: total tyre force, shared out by the tyre model (4.16–4.24).
 
     F_X^(VS) = m a_x + F_drag                 corrected 4.16: plus, as in (A.1a); a_x in road axes holds the
                                               grade, so this is the sum of the tyre forces on any slope
@@ -9,13 +9,13 @@
 From wheel to chassis (corrected 4.25: a rotation by delta for each front wheel, by nothing for a rear one)
 F_X,f = F_L cos(delta) - F_S sin(delta), F_Y,f = F_L sin(delta) + F_S cos(delta). The balance of yaw moments
 gives F_Y,f = m a_y l_r / L without a tyre model; F_S eliminated, F_X + F_Y,f tan(delta) = F_L,f / cos(delta)
-+ F_L,r. So K_f compares longitudinal forces alone: the norms of (4.18) would thin it by side forces.
++ F_L,r. So K_f compares longitudinal forces alone: the norms of (4.18) would dilute it by lateral forces.
 
-Slip stiffness newly estimated (4.34–4.36; corrected: denominator lambda_f + lambda_r F_Z,r / F_Z,f): K_f that
-stays outside its band while the car brakes straight with little slip is an error of the tyre's stiffness.
-C_L,f = F_X^(VS) / (lambda_f + lambda_r C_L,r / C_L,f), where (4.35) makes the ratio of stiffnesses that of
-loads, and F_X^(VS) is the filtered K_f F_X^(TM), freed of the curve of the tyre. K_f begins anew at 1.
-Forces are ISO 8855: negative while braking.
+Re-estimation of slip stiffness (4.34–4.36; corrected: denominator lambda_f + lambda_r F_Z,r / F_Z,f): a K_f
+that stays outside its band in straight braking at small slip is an error of the tyre's stiffness. C_L,f =
+F_X^(VS) / (lambda_f + lambda_r C_L,r / C_L,f), where (4.35) makes the ratio of stiffnesses that of loads, and
+F_X^(VS) is the filtered K_f F_X^(TM), freed of the curve of the tyre. K_f restarts at 1. Forces are ISO
+8855: negative while braking.
 """
 
 import math
@@ -37,7 +37,7 @@ FORCE_STATE = np.dtype(
         ("residual", "f8"),  # mean square of the relative residual
         ("model", "f8", (4,)),  # F_L^(TM) [N]
         ("virtual", "f8", (4,)),  # F_L^(VS) [N]
-        ("measured", "u1", (4,)),  # Observer 1: a transducer stands in for it
+        ("measured", "u1", (4,)),  # Observer 1: a transducer replaces it
     ],
     align=True,
 )
@@ -46,16 +46,16 @@ K_F_LOW, K_F_HIGH = 0.1, 4.0
 K_F_BAND = 1.25  # k_f beyond it, or below its inverse, is an error of slip stiffness …
 OUTSIDE = 0.1  # … when it lasts so long [s]
 STIFFNESS_RANGE = 3.0  # of the configured one, and its inverse
-# Slip stiffness is observable: little slip, measurable slip, a straight line.
+# Slip stiffness is observable: small but measurable slip, straight driving.
 LITTLE_SLIP, MEASURABLE_DECEL, STRAIGHT_ACCEL, STRAIGHT_STEERING = 0.04, 2.0, 0.5, 0.02
-COVARIANCE_START = 1e-7  # 1/N^2: the first newtons of model force count little against k_f = 1
+COVARIANCE_START = 1e-7  # 1/N^2: the first newtons of model force weigh little against k_f = 1
 # Below this modelled total force the ratio is noise [N].
 MIN_MODEL_FORCE = 300.0
 
 
 @kernel
 def reset_force(state: Record) -> None:
-    """Begin the regression anew from the last k_f, as at the start of a braking."""
+    """Restart the regression from the last k_f, as at the start of a brake application."""
     state.covariance = COVARIANCE_START
     state.residual = 0.0
 
@@ -64,7 +64,7 @@ def reset_force(state: Record) -> None:
 def _renew_stiffness(
     params: Record, state: Record, motion: Record, wheels: Record, load: Record, dt: float
 ) -> None:
-    """Move what k_f found outside its band to the slip stiffness of both axles (4.36)."""
+    """Transfer a k_f outside its band to the slip stiffness of both axles (4.36)."""
     slip, found, assumed = 0.0, 0.0, 0.0
     for i in range(4):
         slip = max(slip, abs(wheels.slip[i]))
@@ -116,7 +116,7 @@ def update_force(
 
 @kernel
 def take_measured_force(state: Record, inputs: Record) -> None:
-    """Let measured wheel forces stand in for the virtual sensor where they are there (Observer 1, 4.3)."""
+    """Replace the virtual sensor by measured wheel forces where available (Observer 1, 4.3)."""
     for i in range(4):
         state.measured[i] = 1 if usable(inputs, WHEEL_FORCE_X + i) else 0
         if state.measured[i]:

@@ -1,16 +1,16 @@
-"""Observing, holding and handing over friction between brake applications (4.4, 4.13).
+"""Friction between and during brake applications: observing, holding and handing over (4.4, 4.13).
 
 A corner observes while its pressure acts, the car is fast enough (15 km/h) and decelerates enough for its
 axle, the wheel stays in the tyre's linear range and every signal it needs is usable. It holds the last
 estimate otherwise, always while `abs_active` or `esp_active` is set, while the driver accelerates or motors
 drive against the brakes, and in reverse.
 
-What one braking learned becomes the base of the next compensation only if it was observed for a second or
-more with a standard deviation below 10 % (`learned`). Friction stays within 0.5–1.5 of nominal.
+The friction of one application becomes the base of the next compensation only if it was observed for a second
+or more with a standard deviation below 10 % (`learned`). Friction stays within 0.5–1.5 of nominal.
 
-The moments before observing ends teach nothing: pressure, slip and force fall with different lags when the
-brakes are released, and a wheel past the linear range has a force that was shared out wrongly. The estimate
-goes back to what was known 0.2 to 0.4 s before, of all corners when a wheel ran past the range.
+The last moments of observing are unreliable: pressure, slip and force fall with different lags when the
+brakes are released, and a wheel beyond the linear range was assigned a wrong force. The estimate is restored
+from a snapshot 0.2 to 0.4 s old, at all corners when a wheel left the range.
 """
 
 import math
@@ -54,13 +54,13 @@ FRICTION_STATE = np.dtype(
         ("mode", "i8", (4,)),
         ("active", "u1", (4,)),
         ("settled_s", "f8", (4,)),  # time that the conditions have held [s]
-        ("observed_s", "f8", (4,)),  # in this braking [s]
+        ("observed_s", "f8", (4,)),  # in this application [s]
         ("pressure", "f8", (4,)),  # above push-out, low-passed [Pa]
         ("torque", "f8", (4,)),  # brake torque [N m]
         ("kept_mu", "f8", (2, 4)),  # snapshots: the newer in row 0
         ("kept_sigma", "f8", (2, 4)),
         ("kept_s", "f8"),  # age of the newer one [s]
-        ("held", "u1"),  # a signal became implausible, or a pressure is: what was learned last goes back
+        ("held", "u1"),  # a signal has become implausible, or a pressure is: the last snapshot is restored
         ("slipping", "u1"),  # a wheel has left the linear range
         ("reset", "u1"),  # a filter met a value that is not finite
     ],
@@ -68,21 +68,21 @@ FRICTION_STATE = np.dtype(
 )
 
 LINEAR_SLIP = 0.10  # beyond, the linear tyre model does not hold
-POSITIVE_SLIP = 0.005  # a braked wheel that seems to drive by more: slip is not known well enough
+POSITIVE_SLIP = 0.005  # excess of a braked wheel that seems to drive: slip is too uncertain
 MIN_PRESSURE = 3e5  # Pa above push-out
 RESIDUAL_LIMIT = 0.3  # relative: K_f varies this strongly where slip is too small to be measured (4.4)
 SNAPSHOT = 0.2  # s between snapshots
-SETTLE = 0.15  # s: load, pressure and slip lag the first moments of a braking differently
-FORGET_WITHIN = 0.8  # a condition to go on is this share of the condition to start
+SETTLE = 0.15  # s: at the start of an application load, pressure and slip lag differently
+FORGET_WITHIN = 0.8  # a condition to continue is this share of the condition to start
 TYRE_CURVE = 1.0  # relative error of the linear tyre per slip: 5 % at 5 % of slip
-SLIP_FLOOR = 0.0004  # error of slip that does not average out: radius, speed
+SLIP_FLOOR = 0.0004  # slip error that does not average out: radius, speed
 TRANSDUCER_NOISE = 10.0  # N, of a wheel force transducer (Table 4.1)
 HELD_GROWTH = 0.002  # growth of sigma while holding, 1/sqrt(s)
 
 
 @kernel
 def restore_friction(params: Record, state: Record, learned: Record) -> None:
-    """Begin with what was learned, or with nominal friction where nothing was."""
+    """Start with the learned friction, or with the nominal one where nothing was learned."""
     for i in range(4):
         if learned.observed_s[i] > 0.0:
             state.mu[i], state.sigma[i], state.mode[i] = learned.mu_b[i], learned.sigma_mu_b[i], HOLDING
@@ -100,7 +100,7 @@ def _keep(state: Record, row: int) -> None:
 
 @kernel
 def _guard_slip(state: Record, wheels: Record, application: Record, dt: float) -> None:
-    """Keep snapshots while slip is linear; go back to the older one when a wheel leaves the range."""
+    """Save snapshots while slip is linear; restore the older one when a wheel leaves the range."""
     slipping = False
     for i in range(4):
         slipping = slipping or abs(wheels.slip[i]) > LINEAR_SLIP
@@ -206,9 +206,9 @@ def update_friction(
 def _systematic(params: Record, wheels: Record, speed: Record, i: int) -> float:
     """Return the relative variance of friction that does not average out.
 
-    Mass; front to rear stiffness; the zero of each slip; the curve of the tyre beyond its linear start; and
-    an error of speed, which shifts all slips alike: K_f takes up its mean, a wheel that slips less than the
-    mean of all feels the rest.
+    Contributions: mass; front to rear stiffness; zero error of each slip; curvature of the tyre; and an error
+    of speed, which shifts all slips alike: K_f absorbs its mean, the rest affects wheels that slip less than
+    the mean.
     """
     mean = 0.0
     for j in range(4):
@@ -264,7 +264,7 @@ def _observe(
 
 @kernel
 def hand_over(state: Record, learned: Record) -> None:
-    """At the end of a braking: keep what was observed well enough as the base of the next."""
+    """At the end of a brake application: store well observed friction as the base of the next."""
     learned.brakings += 1
     for i in range(4):
         if well_observed(state, i):

@@ -13,9 +13,9 @@ Discretised exactly for F_L (10 ms is twice the relaxation time at 30 m/s: expli
 with the mean of F_L over the step for omega. The tyre model enters already scaled by K_f, so model and
 measurement agree. The pressure is low-passed at the slip's 16 Hz: all signals lag alike.
 
-The process noise of omega and F_L is scheduled (section 4.4): its standard deviation grows linearly below
-2 m/s^2 of demanded deceleration, to three times at none, and likewise below 30 km/h, where the model fails at
-predicting the states. The breakpoint of speed and the growth are assumptions.
+The process noise of omega and F_L is scheduled (section 4.4): its standard deviation grows linearly below 2
+m/s^2 of demanded deceleration, to three times at zero, and likewise below 30 km/h, where the model predicts
+the states badly. The speed breakpoint and the growth are assumptions.
 """
 
 import math

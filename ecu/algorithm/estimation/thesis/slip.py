@@ -1,10 +1,9 @@
-"""Wheel slip with the load-dependent rolling radius (A.4, A.6), and its learned radius errors.
+"""Wheel slip with load-dependent rolling radius (A.4, A.6) and learned radius errors.
 
 Rolling radius: r_i = r(F_Z,i) (1 + d_i) with a free error d_i, learned while the wheels roll nearly free;
-without it a radius error of 0.3 % would be 15 % of the slip at 4 m/s^2.
-Expected slip: the total tyre force m a_x + drag, shared among the wheels as their torques are, over the
-nominal slip stiffness; it corrects the wheels for the speed filter and is never used as a measurement.
-Slip is low-passed at 16 Hz (4.3.3).
+without it a radius error of 0.3 % would be 15 % of the slip at 4 m/s^2. Expected slip: the total tyre force m
+a_x + drag, shared in proportion to the wheels' torques, over the nominal slip stiffness; it corrects the
+wheels for the speed filter and is never used as a measurement. Slip is low-passed at 16 Hz (4.3.3).
 """
 
 import math
@@ -30,7 +29,7 @@ WHEELS_STATE = np.dtype(
     align=True,
 )
 
-RADIUS_START = 0.004  # standard deviation of a radius error before anything is learned
+RADIUS_START = 0.004  # standard deviation of a radius error before learning
 RADIUS_FLOOR = 0.00015
 RADIUS_DRIFT = 1e-5  # 1/sqrt(s): temperature and pressure of the tyre
 RADIUS_LIMIT = 0.03
@@ -125,7 +124,7 @@ def learn_radius(
             0.3 * state.expected_slip[i]
         ) ** 2
         gain = variance / (variance + noise)
-        # A radius taken too large shows as slip that is not there.
+        # A radius taken too large appears as slip.
         error = learned.radius_error[i] - gain * (slip - state.expected_slip[i] - mean)
         learned.radius_error[i] = min(max(error, -RADIUS_LIMIT), RADIUS_LIMIT)
         learned.radius_sigma[i] = max(math.sqrt((1.0 - gain) * variance), RADIUS_FLOOR)

@@ -1,15 +1,15 @@
 """Vehicle speed from accelerometer, wheels and, where there is one, a speed reference (4.26–4.32).
 
-States   v [m/s], b [m/s^2]: what the accelerometer reads beside dv/dt (bias and road grade together)
+States   v [m/s], b [m/s^2]: offset of the accelerometer from dv/dt (bias and road grade together)
 Model    dv/dt = a_x - b + psi_dot v_y (corrected 4.27: grade, not banking), b a random walk
 Inputs   a_x in road axes; wheels omega_i; vehicle_speed with its delay
 
-The thesis's pair (a, v) with the acceleration measured is this filter with the measured acceleration as
-its input. Corrected 4.31: v_k+1 = v_k + dt a_k. The thesis takes four braked wheels as vehicle speed, which
-drives slip to zero: here the slip expected of each wheel is removed first, and its variance grows with
-that slip. An error of expected slip lasts as long as the braking, so its variance is multiplied by the
-number of samples that share it. A wheel that slides or spins is left out; with all four locked the
-accelerometer alone carries the speed. In reverse the wheels are taken as they are.
+The thesis's pair (a, v) with the acceleration measured is this filter with the measured acceleration as its
+input. Corrected 4.31: v_k+1 = v_k + dt a_k. The thesis equates vehicle speed with four braked wheels, which
+drives slip to zero: here each wheel's expected slip is removed first, and its variance grows with that slip.
+An error of expected slip lasts as long as the braking, so its variance is multiplied by the number of samples
+that share it. A wheel that slides or spins is excluded; with all four locked the accelerometer alone gives
+the speed. In reverse the wheel speeds are used without correction.
 """
 
 import math
@@ -30,7 +30,7 @@ SPEED_STATE = np.dtype(
         ("p_vb", "f8"),
         ("p_bb", "f8"),
         ("started", "u1"),
-        ("untrusted_s", "f8"),  # time since a wheel was last believed [s]
+        ("untrusted_s", "f8"),  # time since a wheel was last trusted [s]
         ("reference_s", "f8"),  # time since the speed reference was last used [s]
     ],
     align=True,
@@ -39,16 +39,16 @@ SPEED_STATE = np.dtype(
 BIAS_START = 0.3  # standard deviation of bias and grade at the start [m/s^2]
 BIAS_DRIFT = 0.02  # random walk of bias and grade while driving [m/s^2/sqrt(s)]
 BIAS_DRIFT_BRAKING = 0.005
-SPEED_WALK = 0.02  # what pitch correction and lateral terms leave out, random walk of v [m/s/sqrt(s)]
+SPEED_WALK = 0.02  # errors of pitch correction and lateral terms, random walk of v [m/s/sqrt(s)]
 TORQUE_ACCEL = 1.0  # error of an acceleration taken from the torques [m/s^2]
 SLIP_UNCERTAINTY = 0.3  # of the expected slip, relative (stiffness, load, road)
 SHARED_SAMPLES = 800.0  # samples of all wheels that share one error of expected slip
 RADIUS_SAMPLES = 100.0  # samples that share one error of a radius
-SLIDING = 0.10  # a wheel this far from the car's speed slides or spins: it does not tell the car's speed
-SLIDING_FLOOR = 5.0  # m/s that SLIDING is relative to at least
-SLIDING_DECEL = 0.3  # m/s^2: a braked car that slides decelerates at least this much
-BELIEVED_AFTER = 3.0  # s without a believable wheel, brakes released: then it is the estimate that is wrong
-GATE = 5.0  # innovations beyond this many standard deviations are cut to it
+SLIDING = 0.10  # relative difference from vehicle speed at which a wheel slides or spins
+SLIDING_FLOOR = 5.0  # m/s, least reference speed of SLIDING
+SLIDING_DECEL = 0.3  # m/s^2, least deceleration of a braked car that slides
+BELIEVED_AFTER = 3.0  # s without a trusted wheel, brakes released: then the estimate is wrong
+GATE = 5.0  # innovations beyond this many standard deviations are clipped
 
 
 @kernel
@@ -96,7 +96,7 @@ def update_speed(
     accel = motion.accel_x + motion.yaw_rate * motion.lateral_speed
     noise = params.sigma_accel**2
     if not usable(inputs, ACCEL_X):
-        # The torques stand in for the sensor; the bias is kept for when it returns.
+        # The torques replace the sensor; the bias is kept for its return.
         noise, state.p_vb = TORQUE_ACCEL**2, 0.0
     drift = BIAS_DRIFT_BRAKING if braking else BIAS_DRIFT
     state.speed += dt * (accel - state.bias)

@@ -10,10 +10,10 @@ of a peak of 1 a brush tyre has lost 15 %, a Magic Formula with C = 1.6 5 %; the
 As a function of slip this is F_L = C_L lambda / (1 + CURVE C_L |lambda| / F_Z).
 
 Large slip (section 5.4): Burckhardt's law of dry asphalt, F_Z (c_1 (1 - exp(-c_2 s)) - c_3 s), where it lies
-below that, from about 5 % of slip on. Its c_2 = 23.99 is taken for a tyre of C_L = 22 F_Z (assumption) and is
-as much larger as a tyre is stiffer. Combined slip: s^2 = lambda^2 + lambda_y^2 stands for lambda, the force
-has its direction, and lambda_y = (a_y / g) F_Z / C_L is the slip that carries the car's lateral acceleration,
-the same at all wheels (assumption: a steady turn of a nearly neutral car).
+below that, from about 5 % of slip on. Its c_2 = 23.99 is taken for a tyre of C_L = 22 F_Z (assumption) and
+scales with stiffness. Combined slip: s^2 = lambda^2 + lambda_y^2 stands for lambda, the force has its
+direction, and lambda_y = (a_y / g) F_Z / C_L is the slip that carries the car's lateral acceleration, the
+same at all wheels (assumption: a steady turn of a nearly neutral car).
 """
 
 import math
@@ -51,7 +51,7 @@ def slip_stiffness(params: Record, corner: int, load: float, force: float) -> fl
 
 @kernel
 def linear_force(load: float, force: float) -> float:
-    """Return what a linear tyre would hold [N] at the (small) slip at which this one holds `force` [N]."""
+    """Return the force of a linear tyre [N] at the (small) slip at which this tyre transmits `force` [N]."""
     return force / max(1.0 - CURVE * abs(force) / load, 0.5)
 
 
