@@ -1,3 +1,3 @@
-"""Brake ECU: what runs in the vehicle, and nothing else."""
+"""Brake ECU: the onboard software alone."""
 
 __version__ = "0.1.0"

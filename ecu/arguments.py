@@ -1,4 +1,4 @@
-"""Options and arguments that several commands of `brake-ecu` take, and the look of their help."""
+"""Options and arguments shared by commands of `brake-ecu`, and the layout of their help."""
 
 import re
 from collections.abc import Callable
@@ -15,7 +15,7 @@ class PlainHelp(TyperCommand):
     """A command whose help names its arguments as the README does: `LOG...`, without Python types."""
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
-        """Return what stands behind the command's name in its usage line."""
+        """Return the parts of the usage line after the command's name."""
         pieces: list[str] = super().collect_usage_pieces(ctx)
         return [re.sub(r"^{(.*)}", r"\1", piece) for piece in pieces]
 

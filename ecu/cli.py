@@ -1,6 +1,6 @@
-"""The command line `brake-ecu`: arguments in, one line out for whatever the user can mend.
+"""Command line `brake-ecu`: parses arguments, reports errors that the user can mend in one line.
 
-Every command imports what it needs when it is called. Other distributions add commands by the entry point
+Every command imports its modules when called. Other distributions add commands by the entry point
 group `brake_ecu.commands`, as the laboratory does (`tools/pyproject.toml`); the daemon starts without them.
 Exit code 0 on success, 1 when the run found a fault, 2 for bad arguments, configuration or input.
 """
@@ -10,7 +10,7 @@ import sys
 from ecu.recording.sink import free_output
 from ecu.runtime.start import raise_priority, without_modules
 
-if sys.argv[1:2] == ["run"]:  # under load, loading the command line alone would take a second
+if sys.argv[1:2] == ["run"]:  # under load, importing the command line alone would take a second
     raise_priority()
     free_output()
 
@@ -151,7 +151,7 @@ def doctor(
 
 
 def _describe(error: Exception) -> tuple[str, int]:
-    """Return the one line that the user reads, and the exit code."""
+    """Return the one-line message for the user, and the exit code."""
     match error:
         case UserError():
             return str(error), 2
@@ -185,7 +185,7 @@ def _describe(error: Exception) -> tuple[str, int]:
 
 @cache
 def _add_commands(to: typer.Typer = app) -> int:
-    """Add the commands of other distributions, once; return how many distributions these are."""
+    """Add the commands of other distributions, once; return the number of these distributions."""
     others = entry_points(group="brake_ecu.commands")
     for point in others:
         to.add_typer(point.load())

@@ -1,6 +1,6 @@
-"""`brake-ecu doctor`: what this machine, configuration and bus lack, each with its remedy.
+"""Check of machine, configuration and bus (`brake-ecu doctor`): every deficiency with its remedy.
 
-The rights are asked for in a process of its own, so that looking changes nothing.
+The rights are requested in a separate process, so that the check changes nothing.
 """
 
 import os
@@ -58,7 +58,7 @@ def doctor(config: Path | None, map: Path | None, interface: str | None, channel
     """Print every check; return 0 if all are good, 1 if not.
 
     Raises:
-        UserError: configuration, map or database are not usable, or only one of the two names a bus.
+        UserError: configuration, map or database are not usable, or only one of the two defines a bus.
     """
     if (interface is None) != (channel is None):
         raise UserError("doctor", "-i, -c", "give both or none")
@@ -71,7 +71,7 @@ def doctor(config: Path | None, map: Path | None, interface: str | None, channel
 
 
 def machine() -> list[Check]:
-    """Check Python, the rights for real time, the clock and the place of compiled kernels."""
+    """Check Python, the rights for real time, the clock and the cache of compiled kernels."""
     version = sys.version_info[:2]
     return [
         Check("Python", (3, 11) <= version <= (3, 13), platform.python_version(), "use Python 3.11 to 3.13"),
@@ -117,7 +117,7 @@ def _clock_source() -> Check:
 
 
 def _wake_up() -> Check:
-    """Sleep a few times without any rights: what is late here is the machine's load."""
+    """Sleep a few times without any rights: the lateness measured is the machine's load."""
     late_ns = []
     for _ in range(SLEEPS):
         deadline = time.monotonic_ns() + 2_000_000
@@ -146,7 +146,7 @@ def _cache() -> Check:
 
 
 def unit(folders: tuple[Path, ...] = UNIT_FOLDERS) -> Check:
-    """Check that an installed systemd unit has what the daemon relies on; point to ours if there is none."""
+    """Check the settings of an installed systemd unit that the daemon needs; point to ours if none."""
     ours = resource("tools/deploy/brake-ecu.service")
     installed = [path for folder in folders for path in sorted(folder.glob("brake-ecu*.service"))]
     if not installed:
@@ -161,7 +161,7 @@ def unit(folders: tuple[Path, ...] = UNIT_FOLDERS) -> Check:
 
 
 def kernels(config: Path | None, plan: ReceivePlan) -> Check:
-    """Make every kernel ready; good if none had to be compiled."""
+    """Prepare every kernel; good if none had to be compiled."""
     compiled = jit.CompileCounter()
     began = time.monotonic()
     params = new_params(load_config(config or resource("config/suv.toml")))
@@ -174,7 +174,7 @@ def kernels(config: Path | None, plan: ReceivePlan) -> Check:
 
 
 def bus(interface: str, channel: str, plan: ReceivePlan, config: Path | None) -> list[Check]:
-    """Listen for two seconds and check every message that the plan expects."""
+    """Listen for two seconds and check every message of the plan."""
     fd = load_config(config).can_fd if config else False
     opened = open_channel(interface, channel, receive_ids=plan.ids.tolist(), fd=fd)
     try:
@@ -190,7 +190,7 @@ def bus(interface: str, channel: str, plan: ReceivePlan, config: Path | None) ->
 
 
 def listen(channel: Channel, plan: ReceivePlan, seconds: float) -> Reception:
-    """Return what was received in that time."""
+    """Return the frames received in that time."""
     reception, inputs, frames = new_reception(plan), new_record(INPUTS), new_record(FRAME, 4096)
     end = time.monotonic() + seconds
     while time.monotonic() < end:
@@ -202,7 +202,7 @@ def listen(channel: Channel, plan: ReceivePlan, seconds: float) -> Reception:
 
 
 def messages(plan: ReceivePlan, reception: Reception, seconds: float) -> list[Check]:
-    """Judge each expected message by what was received of it."""
+    """Judge each expected message by its reception."""
     return [
         _message(plan, expected, counters, seconds)
         for expected, counters in zip(plan.messages, reception.messages, strict=True)

@@ -1,4 +1,4 @@
-"""Errors that a user can mend: one line that names the file, the place in it and what would be right."""
+"""Errors that a user can mend: one line with file, place and remedy."""
 
 
 class UserError(Exception):
@@ -12,9 +12,9 @@ class UserError(Exception):
         super().__init__(": ".join(part for part in (where, place, remedy) if part))
 
     def __reduce__(self) -> tuple[type["UserError"], tuple[str, str, str]]:
-        """Cross to another process as what it was made of."""
+        """Pickle by the constructor's arguments, for use across processes."""
         return type(self), (self.where, self.place, self.remedy)
 
 
 class RunFault(Exception):
-    """The run itself found a fault (a bus that went off, no input). The command exits with 1."""
+    """Fault found by the run itself (bus off, no input). The command exits with 1."""

@@ -1,7 +1,7 @@
-"""Kernels as plain Python, hundreds of times as slowly: for coverage, mutation and debuggers.
+"""Kernels as plain Python, several hundred times slower: for coverage, mutation tests and debuggers.
 
-A record then has its fields as attributes, as numba gives them. Fields come first: numpy's own records
-hide a field that is called like something of numpy's (`sum`, `mean`, `data`).
+A record then has its fields as attributes, as under numba. Fields take precedence: numpy's own records hide a
+field named like a numpy attribute (`sum`, `mean`, `data`).
 """
 
 from collections.abc import Callable
@@ -68,7 +68,7 @@ def _with_attributes(value: Any) -> Any:
 
 
 def interpreted(function: Function) -> Function:
-    """Return a kernel as plain Python. From then on numpy is silent where IEEE 754 says what comes."""
+    """Return a kernel as plain Python; from then on numpy does not warn where IEEE 754 defines the result."""
     np.seterr(all="ignore")
 
     @wraps(function)

@@ -1,6 +1,6 @@
-"""One way to compile a kernel, and a cache that cannot go stale.
+"""Compilation of kernels, and a cache that cannot go stale.
 
-numba's disk cache looks at a function's own file only: after an edit in a callee it would silently run
+numba's disk cache checks a function's own file only: after an edit in a callee it would silently run
 the old code. Kernels are therefore cached in a folder named after the text of every module with kernels or
 constants of their package (and of `ecu`, whose kernels the laboratory calls).
 
@@ -42,7 +42,7 @@ _CONSTANT = re.compile(rb"\b[A-Z][A-Z0-9_]+\b")
 
 
 def sources_of_kernels(packages: Iterable[str]) -> dict[str, bytes]:
-    """Return the text of every module with kernels, or with constants that kernels may hold, by name.
+    """Return the text of every module with kernels, or with constants used in kernels, by name.
 
     A constant is upper case and imported by name.
     """
@@ -66,7 +66,7 @@ def _texts(packages: Iterable[str]) -> Iterator[tuple[str, bytes]]:
 
 @cache
 def _folder(cache_name: str, packages: frozenset[str]) -> str:
-    """Return where kernels are kept. numba would turn to a place that can go stale."""
+    """Return the folder of compiled kernels; numba would fall back to one that can go stale."""
     digest = hashlib.sha256(numba.__version__.encode())
     for name, text in sources_of_kernels(packages).items():
         digest.update(name.encode())
@@ -88,7 +88,7 @@ def compile_kernel(
 ) -> Function:
     """Compile `function` with numba (no Python objects, no fastmath) and cache it on disk.
 
-    `cache_name` begins the name of the cache's folder, `packages` hold what it may be made of.
+    `cache_name` is the prefix of the cache's folder, `packages` hold the sources it depends on.
 
     Raises:
         UserError: there is no place for the cache.
@@ -106,7 +106,7 @@ def kernel(function: Function) -> Function:
 
 
 class CompileCounter(numba_event.Listener):  # type: ignore[misc]
-    """Counts compilations from now on: after the warm-up there must be none. `begins` is called before."""
+    """Counter of compilations, none of which may follow the warm-up; `begins` is called before each."""
 
     def __init__(self, begins: Callable[[int], None] = lambda count: None) -> None:
         self.count = 0

@@ -1,4 +1,4 @@
-"""`brake-ecu wear`: what is left of the brake pads and how far it goes; new pads, measured thicknesses."""
+"""Pad state (`brake-ecu wear`): remaining thickness and distance; registration of new and measured pads."""
 
 import math
 from contextlib import closing, nullcontext
@@ -20,8 +20,8 @@ from ecu.settings.pad import Pad
 
 GAUGE: Final = 0.1  # mm, standard deviation of a thickness measured on the car
 TWO_SIDED: Final = 1.96  # standard deviations of a band of 95 %
-LEAST_DISTANCE: Final = 50e3  # m with these pads, before they are told how far they go
-FEW_LEGS: Final = 0.3  # relative, of the wear per distance while fewer than three legs tell
+LEAST_DISTANCE: Final = 50e3  # m with these pads, before a remaining distance is given
+FEW_LEGS: Final = 0.3  # relative, of the wear per distance with fewer than three legs
 AXLES: Final = {"front": (0, 1), "rear": (2, 3)}
 
 
@@ -33,16 +33,16 @@ class Corner(NamedTuple):
     sigma: float
     wear: float
     mass: float
-    """Worn off both pads, g."""
+    """Wear of both pads, g."""
     scale: float
-    """Wear over what the law gives, as measured thicknesses have it."""
+    """Wear by measured thicknesses over wear by the law."""
     driven: float
     remaining: float
     remaining_low: float
     remaining_high: float
     measurements: int
     told: bool
-    """Somebody said that these pads were new when counting began."""
+    """These pads were registered as new when counting began."""
 
 
 def pads(config: Config) -> tuple[Pad, Pad, Pad, Pad]:
@@ -51,7 +51,7 @@ def pads(config: Config) -> tuple[Pad, Pad, Pad, Pad]:
 
 
 def fit_new(wear: Any, axle: str) -> None:
-    """Begin anew with new pads on an axle; `wear` is one `WEAR`."""
+    """Register new pads on an axle; `wear` is one `WEAR`."""
     for i in AXLES[axle]:
         for name in ("regressors", "friction_error", "temperature_error", "measured_at", "leg_ends"):
             wear[name][..., i] = 0.0
@@ -61,7 +61,7 @@ def fit_new(wear: Any, axle: str) -> None:
 
 
 def add_measurement(wear: Any, i: int, lost: float, sigma: float) -> None:
-    """Keep that corner i has been measured at `lost` [mm] below new; the oldest of too many goes."""
+    """Store a measurement of corner i at `lost` [mm] below new; drop the oldest of too many."""
     n = int(wear["measurements"][i])
     if n == N_MEASURED:
         for name in ("measured_wear", "measured_sigma", "measured_at"):
@@ -73,7 +73,7 @@ def add_measurement(wear: Any, i: int, lost: float, sigma: float) -> None:
 
 
 def measure(wear: Any, pad: Pad, i: int, thickness: float) -> None:
-    """Keep a thickness [mm] that was measured at corner i.
+    """Store a thickness [mm] measured at corner i.
 
     Raises:
         UserError: the pad would be thicker than new, than at the last measurement, or none at all.
@@ -111,7 +111,7 @@ def rate_per_metre(params: Any, wear: Any, i: int) -> tuple[float, float]:
 
 
 def appraise(params: RecordArray, learned: RecordArray, config: Config) -> list[Corner]:
-    """Return what is left of the pads by what is kept in `learned` (`LEARNED`, shape (1,))."""
+    """Return the state of the pads by `learned` (`LEARNED`, shape (1,))."""
     p, wear = params[0], learned[0]["wear"]
     state = np.zeros(1, WEAR_STATE)[0]
     restore_wear(p, state, learned[0])
@@ -146,7 +146,7 @@ def appraise(params: RecordArray, learned: RecordArray, config: Config) -> list[
 
 
 def lines(corners: list[Corner]) -> list[str]:
-    """Return them as a table with a sentence on what is not known."""
+    """Return the pads as a table, with a sentence on unknown values."""
     table = ["corner  lining [mm]  ± 95 %  worn off [g]  left [km]     95 % band [km]"]
     for c in corners:
         if math.isfinite(c.remaining):
@@ -186,10 +186,10 @@ def parse_measured(text: str) -> dict[int, float]:
 
 
 def wear_command(config: Path, state: Path, new_pads: str | None, measured: str | None) -> int:
-    """Print what is left of the pads, after what was changed or measured; return 0.
+    """Print the state of the pads, after registering new or measured ones; return 0.
 
     Raises:
-        UserError: an argument is not right, or a daemon keeps the store.
+        UserError: an argument is wrong, or a daemon holds the store.
     """
     vehicle = load_config(config)
     params = new_params(vehicle)

@@ -1,7 +1,7 @@
 """`python -m ecu.warm [--check]`: compile every kernel of the cycle, or load it from the cache.
 
-Runs what `brake-ecu run` runs before READY, and prints how many kernels had to be compiled. With `--check` it
-exits 1 if there was one: an installation whose cache is complete compiles nothing.
+Runs the preparation of `brake-ecu run`, and prints how many kernels had to be compiled. With `--check` it
+exits 1 if there was any: an installation whose cache is complete compiles nothing.
 """
 
 import argparse
@@ -24,12 +24,12 @@ from ecu.settings.resources import resource
 
 
 class Silence:
-    """A bus on which nothing happens, see `ecu.bus.channel.Channel`."""
+    """A bus without traffic, see `ecu.bus.channel.Channel`."""
 
     name = ""
 
     def drain(self, frames: RecordArray, start: int) -> int:
-        """Hear nothing."""
+        """Receive nothing."""
         return 0
 
     def send(self, frames: RecordArray, count: int) -> int:
@@ -37,7 +37,7 @@ class Silence:
         return count
 
     def status(self) -> BusStatus:
-        """Return that all is well."""
+        """Return an error-free status."""
         return BusStatus(False, False, 0, 0)
 
     def close(self) -> None:
@@ -45,7 +45,7 @@ class Silence:
 
 
 def warm_up(ecu: Ecu, compiled: CompileCounter) -> None:
-    """Run a few cycles of an ECU like this one on a bus of its own, so that every kernel is compiled."""
+    """Run a few cycles of an identical ECU on a bus of its own, so that every kernel is compiled."""
     twin = new_ecu(ecu.params, None, ecu.receive_plan, ecu.transmit_plan)
     with tempfile.TemporaryDirectory(prefix="brake-ecu-") as folder:
         ring = create_ring(Path(folder) / "ring", {}, b"", slots=2, frames=1)
@@ -58,7 +58,7 @@ def warm_up(ecu: Ecu, compiled: CompileCounter) -> None:
 
 
 def warm() -> int:
-    """Make every kernel of the cycle ready to run and return how many had to be compiled."""
+    """Prepare every kernel of the cycle; return how many had to be compiled."""
     compiled = CompileCounter()
     params = new_params(load_config(resource("config/suv.toml")))
     sending = contract_transmit_plan(resource("dbc/brake_ecu.dbc"), "BrakeEcu")

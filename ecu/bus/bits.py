@@ -1,9 +1,9 @@
 """Integer bit fields of a CAN payload, for both byte orders, 1 to 64 bits, payloads up to 64 bytes.
 
-`start` is the place of the field's first bit. Little endian: of its least significant bit, counted from
-bit 0 of byte 0 upwards, as a DBC writes it. Big endian: of its most significant bit, counted from bit 7 of
-byte 0 downwards, so that a field is `length` consecutive places (a DBC's start s is 8 (s // 8) + 7 − s % 8).
-The caller guarantees that the field lies within `data`.
+`start` is the position of the field's first bit. Little endian: its least significant bit, counted from bit 0
+of byte 0 upwards, as a DBC writes it. Big endian: its most significant bit, counted from bit 7 of byte 0
+downwards, so that a field is `length` consecutive positions (a DBC's start s is 8 (s // 8) + 7 − s % 8). The
+caller guarantees that the field lies within `data`.
 """
 
 from typing import Any
@@ -18,7 +18,7 @@ UNSIGNED, SIGNED, FLOAT16, FLOAT32, FLOAT64 = range(5)
 
 
 def first_bit(dbc_start: int, big_endian: bool) -> int:
-    """Return the place that `extract` and `insert` take for a start bit as a DBC writes it."""
+    """Return the position used by `extract` and `insert` for a start bit in DBC notation."""
     return 8 * (dbc_start // 8) + 7 - dbc_start % 8 if big_endian else dbc_start
 
 
@@ -86,7 +86,7 @@ def _float_from_half(raw: Any) -> float:
 
 @kernel
 def number(raw: Any, length: int, kind: int) -> float:
-    """Return what the field's bits (uint64) mean before scale and offset, as float64."""
+    """Return the value of the field's bits (uint64) before scale and offset, as float64."""
     if kind == UNSIGNED:
         return float(raw)
     if kind == SIGNED:

@@ -21,22 +21,22 @@ from ecu.bus.protocol import BusStatus, Channel
 from ecu.contract.records import EXTENDED_ID, FRAME_EXTENDED, FRAME_FD, RecordArray
 from ecu.errors import UserError
 
-# Frames of one identifier that may be on their way back to us: 0.3 s of a 10 ms frame.
+# Frames of one identifier that may be echoed back: 0.3 s of a 10 ms frame.
 _ECHOES: Final = 32
-# A driver's stamp that far from the real-time clock counts from another origin (e.g. the adapter's start).
+# A driver's stamp that far from the real-time clock has another origin (e.g. the adapter's start).
 _FOREIGN_ORIGIN_NS: Final = 5_000_000_000
 _IP_MULTICAST_ALL: Final = 49  # linux/in.h
-_MALFORMED_AT_ONCE: Final = 200  # messages that cannot be read, per cycle: the rest waits
+_MALFORMED_AT_ONCE: Final = 200  # unreadable messages per cycle; the rest waits
 _KNOWN: Final = sorted(can.VALID_INTERFACES)
 
-logging.getLogger("can").addHandler(logging.NullHandler())  # its exceptions say it again, in one line
+logging.getLogger("can").addHandler(logging.NullHandler())  # its exceptions repeat it, in one line
 
 
 def open_channel(interface: str, channel: str, *, receive_ids: Iterable[int], fd: bool = False) -> Channel:
     """Open `channel` of python-can's `interface` for the identifiers `receive_ids`.
 
-    A 29-bit identifier carries `EXTENDED_ID`. Include one's own output identifiers, so that a foreign sender
-    of them is seen: one's own frames do not come back. With `fd`, CAN FD frames are received too.
+    A 29-bit identifier carries `EXTENDED_ID`. Include the own output identifiers to detect a foreign sender:
+    own frames do not come back. With `fd`, CAN FD frames are received too.
 
     Raises:
         UserError: the bus cannot be opened.
@@ -45,7 +45,7 @@ def open_channel(interface: str, channel: str, *, receive_ids: Iterable[int], fd
     special: dict[str, Any] = {}
     if interface == "udp_multicast":
         special["hop_limit"] = 0  # stay on this machine
-    # python-can's udp_multicast, told not to take FD frames, ends a burst at the first one.
+    # python-can's udp_multicast ends a burst at the first FD frame if FD is off.
     if fd or interface == "udp_multicast":
         special["fd"] = True
     if interface not in can.VALID_INTERFACES:
@@ -72,13 +72,13 @@ def open_channel(interface: str, channel: str, *, receive_ids: Iterable[int], fd
 
 
 def _open(interface: str, channel: str, special: dict[str, Any]) -> can.BusABC | str:
-    """Return the bus, or why it cannot be opened."""
+    """Return the bus, or the reason why it cannot be opened."""
     log = logging.getLogger("can.bus")
     log.disabled = True
     try:
         return can.Bus(interface=interface, channel=channel, **special)
-    except Exception as error:  # python-can's drivers let errors of many kinds through
-        # The bus that was begun ends here, with those who hold it; it would complain of no shutdown.
+    except Exception as error:  # python-can's drivers raise errors of many kinds
+        # The partly opened bus is destroyed here; it would warn about a missing shutdown.
         error.__traceback__ = error.__context__ = None
         return str(error)
     finally:
@@ -86,9 +86,9 @@ def _open(interface: str, channel: str, special: dict[str, Any]) -> can.BusABC |
 
 
 def _hear_own_group_only(bus: can.BusABC) -> None:
-    """Leave the groups alone that other processes joined: Linux hands them to every socket of the port.
+    """Ignore groups joined by other processes: Linux delivers them to every socket of the port.
 
-    What came in before the socket was told so is thrown away.
+    Messages received before the option was set are discarded.
     """
     if sys.platform == "linux":
         with socket.socket(fileno=os.dup(bus.fileno())) as own:
@@ -99,16 +99,16 @@ def _hear_own_group_only(bus: can.BusABC) -> None:
 
 
 def _is_malformed(error: Exception) -> bool:
-    """Whether the driver could not read one message: the line says nothing of itself by that.
+    """Return whether the driver could not read one message, which says nothing about the line.
 
-    python-can names no kind of its own for it; what fails about the line has a reason from the system.
+    python-can has no error class for it; line failures carry a reason of the operating system.
     """
     reason = error.__cause__
     return isinstance(error, can.CanOperationError) and reason is not None and not isinstance(reason, OSError)
 
 
 class GenericChannel:
-    """Any interface of python-can, message by message."""
+    """Channel on any interface of python-can, message by message."""
 
     def __init__(
         self, bus: can.BusABC, name: str, receive_ids: frozenset[int], *, fd: bool, hears_itself: bool
@@ -145,7 +145,7 @@ class GenericChannel:
         return count
 
     def _is_echo(self, identifier: int, data: bytes) -> bool:
-        """Whether this is a frame of ours that comes back: each sent frame explains one."""
+        """Return whether a frame is an echo of ours: each sent frame explains one."""
         sent = self._echoes.get(identifier) if self._echoes is not None else None
         if sent is None or data not in sent:
             return False

@@ -1,4 +1,4 @@
-"""Databases: loaded and checked by cantools, refused in one line that names the place and the remedy."""
+"""Databases: loaded and checked by cantools; errors are one line with place and remedy."""
 
 import re
 from difflib import get_close_matches
@@ -12,7 +12,7 @@ from ecu.bus.bits import first_bit
 from ecu.errors import UserError
 
 LONGEST_PAYLOAD: Final = 64  # bytes, CAN FD
-SHOWN: Final = 6  # names, of those that could be meant
+SHOWN: Final = 6  # suggested names
 
 _SYNTAX = re.compile(r'Invalid syntax at line (\d+), column (\d+): "(.*?)"{1,2}$', re.DOTALL)
 _OVERLAP = re.compile(r"The signals (\S+) and (\S+) are overlapping in message (\S+?)\.?\"?$")
@@ -50,7 +50,7 @@ def load_database(path: Path, strict: bool = True) -> Database:
         raise UserError(str(path), "", "the file is empty; give a database (.dbc, .arxml, .kcd, .sym)")
     try:
         database = cantools.database.load_file(path, strict=strict)
-    except Exception as error:  # cantools' parsers let errors of many kinds through
+    except Exception as error:  # cantools' parsers raise errors of many kinds
         raise _refusal(path, error) from None
     if not isinstance(database, Database):
         raise UserError(str(path), "", "a diagnostics database; give one that describes CAN messages")
@@ -58,7 +58,7 @@ def load_database(path: Path, strict: bool = True) -> Database:
 
 
 def attribute(message: Message, name: str, default: int = 0) -> int:
-    """Return an integer message attribute of a DBC, or what it says for all, or `default`."""
+    """Return an integer message attribute of a DBC, else its default there, else `default`."""
     specifics = message.dbc
     if specifics is not None and name in specifics.attributes:
         return int(specifics.attributes[name].value)
@@ -66,7 +66,7 @@ def attribute(message: Message, name: str, default: int = 0) -> int:
 
 
 def find_message(database: Database, name: str, where: Path, key: str) -> Message:
-    """Return the message `name`, which `key` of the file `where` asks for; raises UserError if it is none."""
+    """Return the message `name` requested by `key` of the file `where`; raises UserError if there is none."""
     try:
         return database.get_message_by_name(name)
     except KeyError:
@@ -76,7 +76,7 @@ def find_message(database: Database, name: str, where: Path, key: str) -> Messag
 
 
 def find_signal(message: Message, name: str, path: Path, where: Path, key: str) -> Any:
-    """Return the signal `name` of the message, which `key` of the file `where` asks for.
+    """Return the signal `name` of the message, as requested by `key` of the file `where`.
 
     Raises UserError when there is none, or none that can be read (`path` is the database's).
     """
@@ -94,18 +94,18 @@ def find_signal(message: Message, name: str, path: Path, where: Path, key: str) 
 
 
 def fits(signal: Any, length: int) -> bool:
-    """Return whether the signal lies within a payload of `length` bytes that a frame can have."""
+    """Return whether the signal lies within a valid frame payload of `length` bytes."""
     start = first_bit(signal.start, signal.byte_order == "big_endian")
     return length <= LONGEST_PAYLOAD and bool(start + signal.length <= 8 * length)
 
 
 def _choice(name: str, names: list[str]) -> str:
-    """Return the name that was probably meant, or what there is."""
+    """Return the name probably meant, or the available ones."""
     more = f", … ({len(names)} in all)" if len(names) > SHOWN else ""
     return closest(name, names) or f"; it has {', '.join(sorted(names)[:SHOWN])}{more}"
 
 
 def closest(name: str, names: list[str]) -> str:
-    """Return a hint at the name that was probably meant, or nothing."""
+    """Return a hint at the name probably meant, or nothing."""
     near = get_close_matches(name, names, 1, 0.5)
     return f"; did you mean {near[0]}?" if near else ""

@@ -1,4 +1,4 @@
-"""End-to-end protection: is a frame intact, and is it the next one of its sender?
+"""End-to-end protection: checks that a frame is intact and the next one of its sender.
 
 Checksum rules, by the names that signal maps use:
 
@@ -14,15 +14,14 @@ hyundai_xor      high nibble of the last byte = XOR of all other nibbles (0x2B0)
 
 Each maker's rule holds for every frame of the recorded drives that the tests read.
 
-Counter: a sender keeps a grid, one count a period. While it lives (an accepted frame not older than
-`LIVING` periods) a frame fits where its counter says that its place on the grid is: half a period either
-way, a quarter while anything else claims the sequence. So a stream that is replayed beside its sender does
-not fit, whatever was lost meanwhile, unless it runs in the very phase of the sender: then two frames claim
-one place, which is told (CROSSED), and the nearer one keeps the grid. Frames that come later than the grid
-says, where nobody disputes them, are those of a sender that was held up: it has a new grid, unless a frame
-of the former one comes after all. A sender that is gone is taken again as AUTOSAR's P01 check does, by any
-step that the time since then allows, or after three consistent frames: so one that restarts is back after
-`LIVING` periods and two. `link.py` judges the stream.
+Counter: a sender keeps a grid, one count a period. While it lives (an accepted frame not older than `LIVING`
+periods) a frame fits if it arrives at the grid position given by its counter: within half a period, or a
+quarter while another stream claims the sequence. So a stream replayed beside its sender does not fit,
+regardless of lost frames, unless it is in phase with the sender: then two frames claim one position, which is
+reported (CROSSED), and the nearer one keeps the grid. Undisputed frames later than the grid belong to a
+delayed sender: it gets a new grid, unless a frame of the former one still arrives. A lost sender is accepted
+again as by AUTOSAR's P01 check, with any counter step that the elapsed time allows, or after three consistent
+frames: so after a restart it is back within `LIVING` periods and two. `link.py` judges the stream.
 """
 
 from typing import Any, Final
@@ -47,14 +46,14 @@ SHORTEST: Final = {"autosar_p01": 2, "ford_brake_sn_4": 4, "ford_accel_data": 8}
 P01_MODULO: Final = 15  # counter 0–14
 P01_COUNTER_START, P01_COUNTER_LENGTH = 8, 4
 
-# What the counter says of a frame
+# Results of the counter check
 IN_SEQUENCE, SOME_LOST, RESYNCHRONISED, REPEATED, WRONG_SEQUENCE, CROSSED = range(6)
 LIVING: Final = 6.5
 """Periods without a frame that a sender may lose, five frames and their jitter, before it is gone."""
-_FRAMES_TO_RESYNCHRONISE: Final = 3  # the first out of sequence and two consistent with it
+_FRAMES_TO_RESYNCHRONISE: Final = 3  # first frame out of sequence and two consistent with it
 _GRID_GAIN: Final = 0.25  # of a frame's lateness in the grid: slower than jitter, faster than drift
-_DOUBTED_GAIN: Final = 0.0625  # five frames of another sender do not draw it away
-DOUBT_NS: Final = 1_000_000_000  # that one frame out of place lasts
+_DOUBTED_GAIN: Final = 0.0625  # five frames of another sender do not shift it
+DOUBT_NS: Final = 1_000_000_000  # duration of the doubt after one frame out of place
 
 
 def _crc8_table() -> NDArray[np.uint8]:
@@ -113,15 +112,15 @@ def checksum_holds(rule: int, data: NDArray[np.uint8], length: int, can_id: int,
     return True
 
 
-# What is remembered of a sender's counter between frames; wide, since kernels compute with it
+# Stored state of a sender's counter between frames; wide types, since kernels compute with them
 SEQUENCE: Final = [
     ("accepted_ns", "i8"),  # stamp of the last frame accepted
-    ("expected_ns", "i8"),  # where its place on the grid was
-    ("grid_ns", "i8"),  # the same, with what it says of the grid itself
-    ("disputed_ns", "i8"),  # stamp of the last frame that claimed the sequence and did not fit
-    ("doubted_ns", "i8"),  # stamp of the last reason to doubt whose frames are accepted
+    ("expected_ns", "i8"),  # its position on the grid
+    ("grid_ns", "i8"),  # the same, with the grid's own correction
+    ("disputed_ns", "i8"),  # stamp of the last frame that claimed the sequence without fitting
+    ("doubted_ns", "i8"),  # stamp of the last reason to doubt the sender of accepted frames
     ("candidate_ns", "i8"),
-    ("former_ns", "i8"),  # grid of a sender that seemed held up, for as long as it may live
+    ("former_ns", "i8"),  # grid of a sender that seemed delayed, while it may be alive
     ("former_until_ns", "i8"),
     ("former", "i8"),  # its counter
     ("counter", "i8"),
@@ -133,13 +132,13 @@ SEQUENCE: Final = [
 
 @kernel
 def _lasts(told_ns: int, stamp_ns: int) -> bool:
-    """Return whether what was told, 0: never, still counts."""
+    """Return whether a report is still in force; 0: never made."""
     return told_ns > 0 and stamp_ns - told_ns < DOUBT_NS
 
 
 @kernel
 def in_doubt(state: Record, stamp_ns: int) -> bool:
-    """Return whether more than one may send what is accepted: told in the last second."""
+    """Return whether accepted frames may have more than one sender: reported within the last second."""
     return _lasts(state.doubted_ns, stamp_ns)
 
 
@@ -161,7 +160,7 @@ def _dispute(state: Record, stamp_ns: int) -> None:
 
 @kernel
 def _takes_back(state: Record, counter: int, modulo: int, stamp_ns: int, period_ns: int) -> bool:
-    """Accept a frame that fits the former grid: its sender was not held up, another one spoke for it."""
+    """Accept a frame that fits the former grid: its sender was not delayed, another one had sent."""
     expected_ns = state.former_ns + (counter - state.former) % modulo * period_ns
     fits: bool = stamp_ns <= state.former_until_ns and abs(stamp_ns - expected_ns) <= period_ns // 2
     if fits:
@@ -175,7 +174,7 @@ def _takes_back(state: Record, counter: int, modulo: int, stamp_ns: int, period_
 def _resynchronise(
     state: Record, counter: int, modulo: int, stamp_ns: int, period_ns: int, gone: bool
 ) -> Any:
-    """Take a frame that does not fit as a candidate; of a sender that is gone accept the third one."""
+    """Take a frame that does not fit as a candidate; accept the third one of a lost sender."""
     cycles = (stamp_ns - state.candidate_ns + period_ns // 2) // period_ns
     consistent = 1 <= (counter - state.candidate) % modulo <= cycles
     state.consistent = min(state.consistent + 1, _FRAMES_TO_RESYNCHRONISE) if consistent else 1
@@ -192,18 +191,18 @@ def _resynchronise(
 def check_counter(
     state: Record, counter: int, modulo: int, stamp_ns: int, period_ns: int, slowest_ns: int
 ) -> Any:
-    """Judge a frame's counter and remember it in `state` (fields of `SEQUENCE`); the first frame is accepted.
+    """Judge a frame's counter and store it in `state` (fields of `SEQUENCE`); the first frame is accepted.
 
     Args:
         state: fields of `SEQUENCE`, overwritten.
         counter: of the frame.
-        modulo: that the counter runs to.
+        modulo: of the counter.
         stamp_ns: of the frame.
         period_ns: between two frames.
-        slowest_ns: the same of a sender that may choose; with it there is no grid.
+        slowest_ns: the longest period of a sender with a variable one; with it there is no grid.
 
     Returns IN_SEQUENCE, SOME_LOST or RESYNCHRONISED (accepted), REPEATED, WRONG_SEQUENCE or CROSSED: a second
-    frame for the place in the sequence that the last one accepted has (rejected).
+    frame at the sequence position of the last accepted one (rejected).
     """
     if counter >= modulo:
         return WRONG_SEQUENCE

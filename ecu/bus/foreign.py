@@ -1,4 +1,4 @@
-"""Before the first frame is sent: is somebody else already sending as we would?"""
+"""Detection of a foreign sender of our frames, before the first frame is sent."""
 
 import time
 from typing import Final
@@ -9,11 +9,11 @@ from ecu.contract.records import EXTENDED_ID, FRAME, FRAME_EXTENDED, new_record
 from ecu.errors import UserError
 
 _AT_ONCE: Final = 1024
-_DISCARD_S: Final = 0.5  # a bus that brings more than can be thrown away in that time is listened to as it is
+_DISCARD_S: Final = 0.5  # a bus too busy to be emptied in that time is listened to at once
 
 
 def discard(channel: Channel) -> None:
-    """Throw away what waits in the channel: it tells of the past."""
+    """Discard the frames waiting in the channel, which are outdated."""
     frames = new_record(FRAME, _AT_ONCE)
     end = time.monotonic() + _DISCARD_S
     while channel.drain(frames, 0) and time.monotonic() < end:
@@ -21,10 +21,10 @@ def discard(channel: Channel) -> None:
 
 
 def listen_before_send(channel: Channel, where: str, plan: TransmitPlan, seconds: float) -> None:
-    """Listen for a while and refuse if someone else already sends one of our frames.
+    """Listen for a while and refuse to start if another node already sends one of our frames.
 
     Raises:
-        UserError: someone does.
+        UserError: a foreign sender was heard.
     """
     names = dict(zip(plan.ids.tolist(), plan.messages["name"].tolist(), strict=True))
     frames = new_record(FRAME, _AT_ONCE)

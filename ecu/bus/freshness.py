@@ -1,6 +1,6 @@
-"""From samples to inputs: value, `new`, age and three verdicts.
+"""Freshness of inputs: value, `new`, age and three verdicts derived from samples.
 
-Every target place has a time-out, a range of intervals that passes for its rate, and a physical range.
+Every target place has a time-out, a range of admissible sample intervals, and a physical range.
 ALIVE: the last sample, valid or not, is younger than the time-out. RATE_OK: alive, and the mean interval of
 its samples lies within the range. VALID: the last sample was available, within the physical range and
 declared valid.
@@ -23,14 +23,14 @@ FRESHNESS: Final = np.dtype(
         ("least_timeout_ns", "i8"),
         ("patience_ns", "i8"),  # between samples of a signal whose time-out follows its rate
         ("shortest_ns", "f8"),  # mean intervals from here …
-        ("longest_ns", "f8"),  # … to here are about the rate expected
+        ("longest_ns", "f8"),  # … to here count as rate ok
         ("interval_ns", "f8"),  # mean interval measured
         ("low", "f8"),
         ("high", "f8"),
         ("samples", "u4"),  # counted since the signal was last lost, at most `_AVERAGED`
         ("valid", "u1"),
         ("taken", "u4"),  # valid samples so far
-        ("outside", "u4"),  # … refused for the physical range
+        ("outside", "u4"),  # … outside the physical range
         ("invalid", "u4"),  # … not available, or declared invalid
     ],
     align=True,
@@ -48,9 +48,9 @@ PERIODS_UNTIL_LOST: Final = 3.0
 def new_freshness(
     timeout_s: ArrayLike, period_s: ArrayLike, slowest_s: ArrayLike, low: ArrayLike, high: ArrayLike
 ) -> RecordArray:
-    """Return what to expect of each target place, nothing received yet, shape (places,).
+    """Return the expectation for each target place, nothing received yet, shape (places,).
 
-    `period_s` to `slowest_s` is the range of intervals that the sender may choose from.
+    `period_s` to `slowest_s` is the range of the sender's admissible intervals.
     """
     freshness = np.zeros(len(np.atleast_1d(timeout_s)), FRESHNESS)
     freshness["stamp_ns"] = NEVER
@@ -64,7 +64,7 @@ def new_freshness(
 
 
 def input_freshness(periods_s: dict[int, tuple[float, float]], timeouts_s: dict[int, float]) -> RecordArray:
-    """Return what to expect of the contract's inputs: period ranges and special time-outs [s]."""
+    """Return the expectation for the contract's inputs: period ranges and special time-outs [s]."""
     places = range(len(INPUT_SIGNALS))
     return new_freshness(
         [timeouts_s.get(place, INPUT_SIGNALS[place].timeout_s) for place in places],
@@ -76,7 +76,7 @@ def input_freshness(periods_s: dict[int, tuple[float, float]], timeouts_s: dict[
 
 
 def target_dtype(places: int) -> np.dtype[Any]:
-    """Return a record that kernels fill as they fill `INPUTS`, with another number of places."""
+    """Return the dtype of a record that kernels fill like `INPUTS`, with another number of places."""
     return np.dtype(
         [
             ("t_ns", "i8"),
@@ -104,8 +104,8 @@ def begin_cycle(inputs: Record, t_ns: int, dt_ns: int) -> None:
 def accept(inputs: Record, freshness: Any, place: int, value: float, stamp_ns: int, valid: bool) -> None:
     """Take one sample.
 
-    An invalid one (not `valid`, not finite or out of range) proves that its sender lives, but leaves the
-    value and `new` alone. One older than the last is ignored, unless the clock was set back meanwhile.
+    An invalid one (not `valid`, not finite or out of range) proves its sender alive, but leaves value and
+    `new` unchanged. One older than the last is ignored, unless the clock was set back.
     """
     known = freshness[place]
     last = known.stamp_ns

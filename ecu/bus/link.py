@@ -1,19 +1,19 @@
-"""Quality of a protected stream: AUTOSAR's E2E state machine, and too many or rejected frames.
+"""Quality of a protected stream: AUTOSAR's E2E state machine, and detection of excess frames.
 
 The machine (PRS E2E Protocol, E2E_SMCheck) looks at the last `WINDOW` checks of a message:
 
-    NODATA   nothing intact has come
+    NODATA   no intact frame yet
     INIT     -> VALID with MIN_OK checks OK, -> INVALID with more than MAX_ERROR errors
     VALID    -> INVALID with fewer than MIN_OK OK, or more than MAX_ERROR errors
     INVALID  -> VALID with MIN_OK_AGAIN OK and at most MAX_ERROR_AGAIN errors
 
-A check is one frame, or one period without any (NONEWDATA; counted when the next frame comes: until then
-freshness tells the silence). OK is an accepted frame, ERROR a wrong checksum or length; a frame repeated or
+A check is one frame, or one period without any (NONEWDATA; counted when the next frame arrives: until then
+freshness reports the silence). OK is an accepted frame, ERROR a wrong checksum or length; a frame repeated or
 out of sequence is neither, as in AUTOSAR. One window serves all states, so MIN_OK holds for INIT too.
 
-A stream is loud, and told as a fault for `TOLD_NS`, where `MANY_REJECTED` of the window were rejected for
-whatever reason, or where more frames come than a sender makes: beyond `FASTER` times its rate they fill a
-bucket, and `CROWD` periods in it are too many.
+A stream is loud, and reported as a fault for `TOLD_NS`, if `MANY_REJECTED` frames of the window were rejected
+for any reason, or if it carries more frames than one sender makes: those beyond `FASTER` times its rate fill
+a bucket, whose limit is `CROWD` periods.
 """
 
 from typing import Any, Final
@@ -27,8 +27,8 @@ WINDOW: Final = 16  # checks; the windows are kept as bits
 MIN_OK, MAX_ERROR = 9, 5
 MIN_OK_AGAIN, MAX_ERROR_AGAIN = 12, 2
 MANY_REJECTED: Final = 8
-FASTER: Final = 1.25  # than its rate a sender may be: its clock, and frames that caught up
-CROWD: Final = 16.0  # periods: a sender that was held up for 0.16 s and sends all at once is no crowd
+FASTER: Final = 1.25  # times its rate, limit of one sender: clock error, and late frames caught up
+CROWD: Final = 16.0  # periods: frames held up for 0.16 s and then sent at once are no excess
 TOLD_NS: Final = 1_000_000_000
 _MASK: Final = (1 << WINDOW) - 1
 
@@ -36,11 +36,11 @@ LINK: Final = [
     ("ok_window", "i8"),  # the last checks as bits, the newest is bit 0
     ("error_window", "i8"),
     ("rejected_window", "i8"),
-    ("ok_count", "i8"),  # how many bits are set
+    ("ok_count", "i8"),  # number of bits set
     ("error_count", "i8"),
     ("rejected_count", "i8"),
     ("link", "i8"),  # NODATA, INIT, VALID or INVALID
-    ("crowd", "f8"),  # frames beyond what a sender makes
+    ("crowd", "f8"),  # frames in excess of one sender
     ("checked_ns", "i8"),  # stamp of the last frame checked
     ("told_ns", "i8"),  # stamp of the last frame that made it loud
 ]
@@ -48,7 +48,7 @@ LINK: Final = [
 
 @kernel
 def add_check(state: Record, status: int) -> None:
-    """Take one check into the window and run the state machine.
+    """Add one check to the window and run the state machine.
 
     Args:
         state: fields of `LINK`, overwritten.
@@ -82,14 +82,14 @@ def add_check(state: Record, status: int) -> None:
 
 @kernel
 def judge_link(state: Record, status: int, stamp_ns: int, period_ns: int, slowest_ns: int) -> Any:
-    """Take one frame's check, and the silence before it; return whether the stream is loud by this frame.
+    """Judge one frame's check and the silence before it; return whether the stream is loud by this frame.
 
     Args:
         state: fields of `LINK`, overwritten.
         status: of the frame's check.
         stamp_ns: of the frame.
         period_ns: between two frames.
-        slowest_ns: the same, where the sender may choose.
+        slowest_ns: longest period, where the sender's is variable.
     """
     elapsed = max(stamp_ns - state.checked_ns, 0)
     if state.link != NODATA:

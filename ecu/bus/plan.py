@@ -1,4 +1,4 @@
-"""Decode and encode plans: what a database says of a message's signals, as rows that kernels read."""
+"""Decode and encode plans: a database's description of signals, as rows that kernels read."""
 
 from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
@@ -19,12 +19,12 @@ SIGNAL: Final = np.dtype(
         ("offset", "f8"),
         ("raw_low", "i8"),  # codes that a value may be sent as
         ("raw_high", "i8"),
-        ("not_available", "u8"),  # the bits that say so
+        ("not_available", "u8"),  # bits that mark it
         ("start", "i2"),
         ("length", "u1"),
         ("big_endian", "u1"),
         ("kind", "u1"),
-        ("place", "i2"),  # in the vector of values, −1: none
+        ("place", "i2"),  # index in the vector of values, −1: none
         ("selector", "i2"),  # row of the multiplexer that selects this signal, −1: always there
         ("selected", "i4", (2,)),  # codes: selector's values
         ("refused", "i4", (2,)),  # codes: not available, sentinels
@@ -49,7 +49,7 @@ class SignalUse(NamedTuple):
 
 
 class SignalRows(NamedTuple):
-    """Rows of one message: those wanted first, in the order given, then the helpers they refer to."""
+    """Rows of one message: wanted signals first, in the order given, then the helpers they refer to."""
 
     rows: RecordArray
     wanted: int
@@ -63,7 +63,7 @@ def _kind(signal: Any) -> int:
 
 
 def not_available_code(signal: Any) -> int | None:
-    """Return the raw code that the database names "not_available", None without one."""
+    """Return the raw code named "not_available" in the database, None without one."""
     for code, name in (signal.choices or {}).items():
         if str(name) == "not_available":
             return int(code)
@@ -94,7 +94,7 @@ def _raw_range(signal: Any) -> tuple[int, int]:
 
 
 def signal_row(signal: Any) -> RecordArray:
-    """Return the layout of a cantools signal as one `SIGNAL` row that belongs to nothing yet, shape (1,)."""
+    """Return the layout of a cantools signal as one unassigned `SIGNAL` row, shape (1,)."""
     row = np.zeros(1, SIGNAL)
     big_endian = signal.byte_order == "big_endian"
     row["start"] = bits.first_bit(signal.start, big_endian)
@@ -115,7 +115,7 @@ def signal_row(signal: Any) -> RecordArray:
 def compile_signals(
     message: Message, uses: Sequence[SignalUse], first_row: int = 0, first_code: int = 0
 ) -> SignalRows:
-    """Return the rows that decode or encode `uses`, as they stand from row `first_row` of a larger plan.
+    """Return the rows that decode or encode `uses`, numbered from row `first_row` of a larger plan.
 
     Every name in `uses` must exist in the message (see `database.find_signal`).
     """
@@ -158,7 +158,7 @@ def compile_signals(
 
 
 class MessagePlan(NamedTuple):
-    """Codec of all signals of one message, each at the place of its name in `names`."""
+    """Codec of all signals of one message, each at the index of its name in `names`."""
 
     signals: RecordArray
     codes: NDArray[np.int64]
@@ -172,7 +172,7 @@ def compile_message(message: Message) -> MessagePlan:
     names = tuple(signal.name for signal in inside)
     rows = compile_signals(message, [SignalUse(name, place) for place, name in enumerate(names)])
     signals = rows.rows[: rows.wanted].copy()
-    for place, name in enumerate(names):  # every helper is also wanted: refer to that row
+    for place, name in enumerate(names):  # every helper is itself wanted: refer to that row
         selector = next(signal.multiplexer_signal for signal in inside if signal.name == name)
         if selector is not None:
             signals[place]["selector"] = names.index(selector)
@@ -225,7 +225,7 @@ def is_valid(signals: Any, codes: NDArray[np.int64], row: int, code: int, data: 
 
 @kernel
 def physical(row: Record, code: int) -> float:
-    """Return what a `raw_code` is in the unit of the target; a float signal may give NaN or ±inf."""
+    """Return the physical value of a `raw_code` in the target's unit; a float signal may give NaN or ±inf."""
     return float(bits.number(np.uint64(code), row.length, row.kind) * row.scale + row.offset)
 
 
@@ -233,7 +233,7 @@ def physical(row: Record, code: int) -> float:
 def decode(
     signals: Any, codes: NDArray[np.int64], data: NDArray[np.uint8], values: NDArray[np.float64]
 ) -> None:
-    """Write every signal's value to its place; NaN where the multiplexers select others."""
+    """Write every signal's value to its place; NaN for signals that the multiplexers deselect."""
     for row in range(len(signals)):
         present = is_present(signals, codes, row, data)
         values[signals[row].place] = (
@@ -243,7 +243,7 @@ def decode(
 
 @kernel
 def encode_signal(row: Record, data: NDArray[np.uint8], value: float) -> None:
-    """Write one value: NaN as "not available", what is out of range as the nearest value that can be sent."""
+    """Write one value: NaN as "not available", an out-of-range value as the nearest that can be sent."""
     code = np.uint64(row.not_available)
     if not np.isnan(value):
         scaled = (value - row.offset) / row.scale
@@ -264,7 +264,7 @@ def encode_signal(row: Record, data: NDArray[np.uint8], value: float) -> None:
 def encode(
     signals: Any, codes: NDArray[np.int64], values: NDArray[np.float64], data: NDArray[np.uint8]
 ) -> None:
-    """Write the value of every signal that is selected; selectors are written first."""
+    """Write the value of every selected signal; selectors are written first."""
     for row in range(len(signals)):
         if signals[row].selector < 0:
             encode_signal(signals[row], data, values[signals[row].place])

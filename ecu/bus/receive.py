@@ -1,7 +1,7 @@
-"""From frames to inputs: identifier, length, checksum, counter, multiplexer, bits, validity, freshness.
+"""Reception of frames into inputs: identifier, length, checksum, counter, bits, validity, freshness.
 
-A `ReceivePlan` is what a database (and a signal map) says, a `Reception` what has come so far. A frame
-that is rejected changes nothing that it carries, only the counters.
+A `ReceivePlan` is compiled from a database (and a signal map), a `Reception` holds the state of reception. A
+rejected frame changes the counters alone, none of its signals.
 """
 
 from collections.abc import Sequence
@@ -33,8 +33,8 @@ MESSAGE: Final = np.dtype(
         ("count", "i4"),
         ("rule", "u1"),
         ("length", "u1"),
-        ("foreign", "u1"),  # nobody else may send it
-        ("request", "u1"),  # it carries what the driver asks for
+        ("foreign", "u1"),  # own identifier, never expected from another sender
+        ("request", "u1"),  # carries the driver's request
         ("modulo", "i2"),  # of the counter, 0: none
         ("counter_start", "i2"),
         ("counter_length", "u1"),
@@ -52,7 +52,7 @@ MESSAGE_COUNTERS: Final = np.dtype(
         ("sequence_errors", "u4"),
         ("repeated", "u4"),
         ("length_errors", "u4"),
-        ("lost", "u4"),  # accepted frames that a counter step above one preceded
+        ("lost", "u4"),  # accepted frames after a counter step above one
         ("resynchronised", "u4"),
         ("stamp_ns", "i8"),  # of the last frame received
         *e2e.SEQUENCE,
@@ -73,7 +73,7 @@ TOTALS: Final = np.dtype(
 
 
 class ReceivePlan(NamedTuple):
-    """Signals to take from frames; `messages` in ascending order of identifiers. Never written to."""
+    """Signals to take from frames; `messages` in ascending order of identifiers. Read only."""
 
     ids: NDArray[np.uint32]
     """Identifiers, those of 29 bits with EXTENDED_ID: what kernel filters must let through."""
@@ -100,7 +100,7 @@ class Reception(NamedTuple):
 
 
 class MessageUse(NamedTuple):
-    """Use of one message; `period_s` to `slowest_s` is the range of intervals it may come at."""
+    """Use of one message; `period_s` to `slowest_s` is the range of its admissible intervals."""
 
     message: Message
     signals: Sequence[SignalUse]
@@ -115,7 +115,7 @@ class MessageUse(NamedTuple):
 
 
 def compile_receive(uses: Sequence[MessageUse], expected: RecordArray) -> ReceivePlan:
-    """Return the plan that takes `uses` into as many target places as `expected` has."""
+    """Return the plan that receives `uses` into as many target places as `expected` has."""
     uses = sorted(uses, key=_identifier)
     messages = np.zeros(len(uses), MESSAGE)
     rows: list[RecordArray] = [np.zeros(0, SIGNAL)]
@@ -175,9 +175,9 @@ def _find(ids: NDArray[np.uint32], identifier: int) -> int:
 
 @kernel
 def check_frame(message: Record, counters: Record, frame: Record) -> Any:
-    """Return what a frame's check says, P_OK where it is complete, intact and the next of its sender.
+    """Return a frame's check result, P_OK if it is complete, intact and the next of its sender.
 
-    Counts what it is not.
+    Failed checks are counted.
     """
     if frame.length < message.length or (message.rule != e2e.NO_CHECKSUM and frame.length != message.length):
         counters.length_errors += 1
@@ -217,11 +217,11 @@ def _tell_links(totals: Record, inputs: Record) -> None:
 def receive(
     plan: ReceivePlan, reception: Reception, frames: Any, first: int, count: int, inputs: Record
 ) -> int:
-    """Consume `frames[first:count]` in order up to the first that is stamped after `inputs.t_ns`.
+    """Consume `frames[first:count]` in order up to the first one stamped after `inputs.t_ns`.
 
     Returns the index of the first frame left. `inputs` is `INPUTS` or a `target_dtype` record.
     """
-    # Fields of tuples are taken out once: in the loop each would be counted as a reference, atomically.
+    # Tuple fields are taken out once: in the loop each would cost an atomic reference count.
     ids, messages, signals, codes = plan.ids, plan.messages, plan.signals, plan.codes
     counted, freshness, totals = reception.messages, reception.freshness, reception.totals[0]
     request = reception.request[0]
@@ -281,7 +281,7 @@ def receive(
 
 
 def _protected(message: Message, places: dict[str, int]) -> MessageUse:
-    """Return what is wanted of a contract message: every signal that has a place."""
+    """Return the wanted signals of a contract message: every signal that has a place."""
     names = [signal.name for signal in message.signals]
     period_s = attribute(message, "GenMsgCycleTime") * 1e-3
     slowest_s = attribute(message, "CycleTimeSlowest") * 1e-3 or period_s
@@ -299,7 +299,7 @@ def _protected(message: Message, places: dict[str, int]) -> MessageUse:
 
 
 def contract_receive_plan(dbc_path: Path) -> ReceivePlan:
-    """Return the ECU's own plan: input frames into `INPUTS`; a frame like the ECU's own counts as foreign."""
+    """Return the ECU's own plan: input frames into `INPUTS`; frames like the ECU's own are foreign."""
     messages = load_database(dbc_path).messages
     uses = [_protected(message, INPUT) for message in messages if "BrakeEcu" not in message.senders]
     watched = [MessageUse(m, [], 0.0, 0.0, foreign=True) for m in messages if "BrakeEcu" in m.senders]
@@ -308,10 +308,10 @@ def contract_receive_plan(dbc_path: Path) -> ReceivePlan:
 
 
 def contract_listen_plan(dbc_path: Path) -> ReceivePlan:
-    """Return the plan of who listens to the ECU: its output frames into a vector of `OUTPUT_COLUMNS`.
+    """Return the plan of a listener to the ECU: its output frames into a vector of `OUTPUT_COLUMNS`.
 
     The target is a `target_dtype(N_OUTPUTS)` record. A value sent in two messages (`pressure_demand_valid`)
-    comes at twice the rate.
+    arrives at twice the rate.
     """
     messages = load_database(dbc_path).messages
     uses = [_protected(message, OUTPUT) for message in messages if "BrakeEcu" in message.senders]

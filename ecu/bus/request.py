@@ -1,9 +1,9 @@
-"""The driver's request while its sender is in doubt: a stream in doubt does not lower it.
+"""Driver's request while its sender is in doubt: a doubtful stream cannot lower it.
 
-While more than one may send the request (`e2e.in_doubt`) pedal position, pedal switch and the automated
-demand are the largest of the last 60 to 120 ms: longer than five frames that the living sender loses. Every
-frame that claims the sender's place counts; one out of sequence does not. The pedal goes first: an automated
-demand counts only as far as its own frame vouches for it, and can only add to the pedal's.
+While the request may have more than one sender (`e2e.in_doubt`), pedal position, pedal switch and automated
+demand are the largest of the last 60 to 120 ms, longer than five lost frames of the true sender. Every frame
+at the sender's sequence position counts; one out of sequence does not. The pedal has priority: an automated
+demand counts only if its own frame flags it valid, and can only add to the pedal's.
 """
 
 from typing import Final
@@ -19,10 +19,10 @@ HALF_NS: Final = 60_000_000
 
 REQUEST: Final = np.dtype(
     [
-        ("since_ns", "i8"),  # when `newer` began
+        ("since_ns", "i8"),  # start of `newer`
         ("sample", "f8", (4,)),  # of this frame, from FIRST on; 0: none, or not valid
         ("newer", "f8", (4,)),  # largest since then
-        ("older", "f8", (4,)),  # largest of the `HALF_NS` before
+        ("older", "f8", (4,)),  # largest of the preceding `HALF_NS`
     ],
     align=True,
 )
@@ -30,14 +30,14 @@ REQUEST: Final = np.dtype(
 
 @kernel
 def begin_request(state: Record) -> None:
-    """Forget the samples of the frame before."""
+    """Reset the samples of the previous frame."""
     for i in range(4):
         state.sample[i] = 0.0
 
 
 @kernel
 def note_request(state: Record, stamp_ns: int) -> None:
-    """Take a frame's samples into the largest ones."""
+    """Update the largest values by a frame's samples."""
     age = stamp_ns - state.since_ns
     if not 0 <= age < HALF_NS:
         kept = 1.0 if HALF_NS <= age < 2 * HALF_NS else 0.0

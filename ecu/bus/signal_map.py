@@ -1,4 +1,4 @@
-"""Signal maps: which message and signal of another maker's database is which input of ours.
+"""Signal maps: assignment of messages and signals of another maker's database to the ECU's inputs.
 
 A map is a TOML file; `docs/signal-maps.md` explains it with an example. A value becomes
 ((raw as the database scales it) · factor + offset) in `unit`, and that is converted to the contract's unit.
@@ -43,14 +43,14 @@ class MappedInput(_Table):
     factor: float = 1.0
     offset: float = 0.0
     sentinels: tuple[float, ...] = ()
-    """Values as the database scales them that are no measurement."""
+    """Values in the database's scaling that are no measurement."""
     validity: Validity | None = None
     timeout: float | None = Field(default=None, gt=0.0)
     """Seconds, if not the contract's."""
 
 
 class Counter(_Table):
-    """The signal that counts a message's frames: 0 … `modulo` − 1."""
+    """Frame counter of a message: 0 … `modulo` − 1."""
 
     signal: str
     modulo: int | None = Field(default=None, ge=2)
@@ -69,7 +69,7 @@ class MappedMessage(_Table):
 
 
 class SignalMap(_Table):
-    """A whole map file."""
+    """Content of a map file."""
 
     database: str
     """Path, relative to the map file."""
@@ -119,7 +119,7 @@ def load_signal_map(path: Path) -> MappedBus:
 
 
 def receive_plan(map_file: Path | None) -> ReceivePlan:
-    """Return what is taken from the bus: the contract's frames, or what a signal map names.
+    """Return the receive plan of the bus: the contract's frames, or those of a signal map.
 
     Raises UserError for a map or a database that is not usable.
     """

@@ -1,8 +1,9 @@
 """SocketCAN drained in one burst: `recvmmsg` into preallocated memory, parsed by a kernel into frames.
 
 The socket is the one that python-can opened. The kernel filters by identifier, stamps every frame (cut to
-whole microseconds, what candump keeps), counts what it dropped (SO_RXQ_OVFL) and reports the controller's
-state in error frames: during bus-off it takes frames to send without complaint, so only these tell.
+whole microseconds, as in candump logs), counts the frames it dropped (SO_RXQ_OVFL) and reports the
+controller's state in error frames: during bus-off it accepts frames to send without an error, so only error
+frames reveal it.
 """
 
 import ctypes
@@ -52,7 +53,7 @@ _WIRE: Final = np.dtype(
     [("can_id", "u4"), ("length", "u1"), ("flags", "u1"), ("spare", "u2"), ("data", "u1", (64,))]
 )
 _CONTROL_BYTES: Final = 64  # a timespec (32 with its header) and a counter (24)
-# What a kernel finds out about the line, as places in an array.
+# State of the line as found by a kernel; indices in an array.
 _BUS_OFF, _PASSIVE, _NOT_ACKNOWLEDGED, _DROPPED = range(4)
 
 
@@ -104,7 +105,7 @@ class SocketcanChannel:
         _format(frames, 0, 0, self._outgoing.wire, self._outgoing.vectors)
 
     def drain(self, frames: RecordArray, start: int) -> int:
-        """See `Channel`. Error frames change the status and are not handed on."""
+        """See `Channel`. Error frames change the status and are not returned."""
         incoming, count = self._incoming, 0
         while (room := len(frames) - start - count) > 0:
             got = self._recvmmsg(self._handle, incoming.address, min(BURST, room), socket.MSG_DONTWAIT, None)
@@ -120,7 +121,7 @@ class SocketcanChannel:
         return count
 
     def send(self, frames: RecordArray, count: int) -> int:
-        """See `Channel`. What the kernel does not take at once is counted as failed, not kept."""
+        """See `Channel`. Frames that the kernel does not take at once are counted as failed and dropped."""
         outgoing, taken = self._outgoing, 0
         while taken < count:
             part = min(BURST, count - taken)
@@ -150,7 +151,7 @@ class SocketcanChannel:
         self._bus.shutdown()
 
     def _discard(self) -> None:
-        """Throw away what arrived before the filters were set."""
+        """Discard frames that arrived before the filters were set."""
         while select.select([self._socket], [], [], 0)[0]:
             try:
                 self._socket.recv(_CANFD_MTU)
@@ -159,7 +160,7 @@ class SocketcanChannel:
 
 
 def _configure(handle: socket.socket, receive_ids: frozenset[int]) -> None:
-    """Filters, error frames, drop counter, stamps and a large receive buffer."""
+    """Set filters, error frames, drop counter, stamps and a large receive buffer."""
     exact = EXTENDED_ID | _RTR  # these bits count too: 11 against 29 bits, data against remote
     filters = b"".join(
         struct.pack("=II", number, exact | (_EFF_MASK if number & EXTENDED_ID else _SFF_MASK))
@@ -187,7 +188,7 @@ def _parse(
     start: int,
     line: NDArray[np.int64],
 ) -> int:
-    """Turn `count` messages into frames from `frames[start]` on; return how many of them were frames."""
+    """Turn `count` messages into frames from `frames[start]` on; return the number of frames."""
     written = 0
     for i in range(count):
         raw = wire[i]
@@ -209,7 +210,7 @@ def _parse(
         if raw.can_id & _ERR:
             _note_line(raw.can_id, raw.data[1], line)
             continue
-        if line[_BUS_OFF]:  # a controller that takes part again starts error active
+        if line[_BUS_OFF]:  # after bus-off a controller restarts error active
             line[_BUS_OFF] = line[_PASSIVE] = 0
         frame = frames[start + written]
         fd = messages[i].length == _CANFD_MTU
@@ -229,7 +230,7 @@ def _parse(
 
 @kernel
 def _note_line(error_class: int, controller: int, line: NDArray[np.int64]) -> None:
-    """Follow the controller's state through an error frame."""
+    """Update the controller's state by an error frame."""
     if error_class & _ERR_BUSOFF:
         line[_BUS_OFF] = 1
     if error_class & _ERR_RESTARTED:
@@ -248,7 +249,7 @@ def _note_line(error_class: int, controller: int, line: NDArray[np.int64]) -> No
 
 @kernel
 def _format(frames: RecordArray, first: int, count: int, wire: RecordArray, vectors: RecordArray) -> None:
-    """Lay `count` frames out as the kernel wants them."""
+    """Lay `count` frames out in the kernel's format."""
     for i in range(count):
         frame, raw = frames[first + i], wire[i]
         raw.can_id = frame.can_id | (EXTENDED_ID if frame.flags & FRAME_EXTENDED else 0)

@@ -1,4 +1,4 @@
-"""From values to frames: what is due in this cycle is scaled, packed, counted and protected."""
+"""Transmission: values due in this cycle are scaled, packed, counted and protected."""
 
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple
@@ -30,7 +30,7 @@ SENT_MESSAGE: Final = np.dtype(
 
 
 class TransmitPlan(NamedTuple):
-    """Schedule of frames to send, in ascending order of identifiers. Never written to."""
+    """Schedule of frames to send, in ascending order of identifiers. Read only."""
 
     ids: NDArray[np.uint32]
     messages: RecordArray
@@ -47,9 +47,9 @@ class Transmission(NamedTuple):
 
 
 def contract_transmit_plan(dbc_path: Path, sender: Literal["BrakeEcu", "Vehicle"]) -> TransmitPlan:
-    """Return what `sender` puts on the bus, from a vector of `OUTPUT_COLUMNS` or of `INPUT_SIGNALS`.
+    """Return the transmit plan of `sender`, from a vector of `OUTPUT_COLUMNS` or of `INPUT_SIGNALS`.
 
-    NaN is sent as "not available"; a value out of range as the nearest that can be sent.
+    NaN is sent as "not available"; an out-of-range value as the nearest that can be sent.
     """
     places = OUTPUT if sender == "BrakeEcu" else INPUT
     chosen = [message for message in load_database(dbc_path).messages if sender in message.senders]
@@ -74,7 +74,7 @@ def new_transmission(plan: TransmitPlan) -> Transmission:
 
 
 def frame_buffer(plan: TransmitPlan) -> RecordArray:
-    """Return room for all frames of a cycle."""
+    """Return a buffer for all frames of a cycle."""
     return np.zeros(len(plan.messages), FRAME)
 
 
@@ -90,7 +90,7 @@ def _has_value(plan: TransmitPlan, message: Record, values: NDArray[np.float64])
 def transmit(
     plan: TransmitPlan, transmission: Transmission, values: NDArray[np.float64], cycle: int, frames: Any
 ) -> int:
-    """Write the frames that are due in this cycle to `frames` from index 0, unstamped; returns how many."""
+    """Write the frames due in this cycle to `frames` from index 0, unstamped; return their number."""
     count = 0
     for place in range(len(plan.messages)):
         message = plan.messages[place]

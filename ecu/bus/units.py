@@ -1,4 +1,4 @@
-"""Units that signal maps may name, and how they turn into the contract's."""
+"""Units accepted in signal maps, and their conversion into the contract's."""
 
 from typing import Final
 
@@ -23,7 +23,7 @@ CONVERSIONS: Final[dict[str, dict[str, tuple[float, float]]]] = {
     "%": {"%": (1.0, 0.0), "-": (100.0, 0.0)},
     "-": {"-": (1.0, 0.0), "%": (0.01, 0.0)},
 }
-# How databases spell them
+# Spellings in databases
 _SPELLINGS: Final = {
     "": "-", "1": "-", "SED": "-", "unitless": "-", "kph": "km/h", "kmh": "km/h", "degrees": "deg",
     "Deg": "deg", "°": "deg", "deg/sec": "deg/s", "degrees/sec": "deg/s", "°/s": "deg/s",
@@ -33,7 +33,7 @@ _SPELLINGS: Final = {
 
 
 def spelled(unit: str) -> str:
-    """Return a unit as this module spells it."""
+    """Return a unit in this module's spelling."""
     return _SPELLINGS.get(unit.strip(), unit.strip())
 
 
@@ -42,7 +42,7 @@ def conversion(
 ) -> tuple[float, float]:
     """Return factor and offset from `unit` to the contract's unit `target`.
 
-    A speed turns into a wheel speed by the rolling radius [m]. Raises UserError for a unit that does not.
+    A speed is converted into a wheel speed by the rolling radius [m]. Raises UserError for other units.
     """
     name = spelled(unit)
     known = CONVERSIONS[target]

@@ -1,6 +1,6 @@
-"""`active_faults`: one bit for each thing that is wrong, with what it means and what to do.
+"""Fault bits of `active_faults`, each with its meaning and remedy.
 
-The table is the single list: events, reports and docs/faults.md repeat it.
+The table is the single source: events, reports and docs/faults.md repeat it.
 """
 
 from typing import Final, NamedTuple

@@ -1,4 +1,4 @@
-"""The parameters of one vehicle as kernels read them: SI units, one value per corner where corners differ."""
+"""Parameters of one vehicle as kernels read them: SI units, one value per corner where corners differ."""
 
 from typing import Final
 
@@ -24,7 +24,7 @@ SECOND_ORDER, INVERSE, OFF = range(3)
 PARAMS: Final = np.dtype(
     [
         ("transmit", "u1"),  # armed: demands are flagged valid
-        ("mapped", "u1", (N_INPUTS,)),  # inputs that some frame or column feeds
+        ("mapped", "u1", (N_INPUTS,)),  # inputs fed by a frame or column
         # vehicle
         ("mass", "f8"),  # kg
         ("wheelbase", "f8"),  # m
@@ -58,27 +58,27 @@ PARAMS: Final = np.dtype(
         ("ambient_temperature", "f8"),  # where no sensor reports it, degC
         # linings, see monitoring/wear.py
         ("wear_law", "f8", (7, 4)),  # coefficients of (7.15) on the road, of both pads of a calliper
-        ("wear_sigma", "f8", (4,)),  # relative, of the law for linings that were never measured
-        ("wear_walk", "f8", (4,)),  # what that changes by per gram worn off, 1/sqrt(g)
-        ("wear_scatter", "f8", (4,)),  # what weather and roads add to a gram, sqrt(g)
+        ("wear_sigma", "f8", (4,)),  # relative, of the law for unmeasured linings
+        ("wear_walk", "f8", (4,)),  # its change per gram worn, 1/sqrt(g)
+        ("wear_scatter", "f8", (4,)),  # scatter by weather and roads per gram, sqrt(g)
         ("pad_mass", "f8", (4,)),  # of a millimetre of both pads, g/mm
         ("pad_life", "f8", (4,)),  # mm from new to worn
         ("chamfer_depth", "f8", (4,)),  # mm
-        ("chamfer_share", "f8", (4,)),  # of the area that chamfers take off new pads
+        ("chamfer_share", "f8", (4,)),  # of the area, removed by chamfers on new pads
         # dust, see monitoring/dust.py
         ("dust_model", "i8", (4,)),  # MODELS of ecu/dust.py, NONE without
         ("dust_numbers", "f8", (4, MOST)),
-        ("dust_low", "f8", (4, 6)),  # FEATURES that a model was trained on
+        ("dust_low", "f8", (4, 6)),  # training range of a model's FEATURES
         ("dust_high", "f8", (4, 6)),
         ("dust_factor", "f8", (4,)),  # mean of the particles over ten to the emission factor
         ("dust_below", "f8", (4,)),  # ends of the 95 % interval of the emission factor
         ("dust_above", "f8", (4,)),
-        ("dust_version", "i8"),  # tells these models from others
-        ("airborne_share", "f8", (4,)),  # of what the pads lose, as particles up to 10 um
+        ("dust_version", "i8"),  # identifies these models
+        ("airborne_share", "f8", (4,)),  # share of pad wear emitted as particles up to 10 um
         # sensors
         ("sigma_wheel_speed", "f8"),  # rad/s
         ("sigma_accel", "f8"),  # m/s^2
-        ("accel_range", "f8"),  # m/s^2: what is read beyond is no reading
+        ("accel_range", "f8"),  # m/s^2: readings beyond are invalid
         ("sigma_pressure", "f8"),  # Pa
         ("sigma_vehicle_speed", "f8"),  # m/s
         ("vehicle_speed_delay", "f8"),  # s
@@ -98,10 +98,10 @@ PARAMS: Final = np.dtype(
         # control
         ("pedal_position", "f8", (PEDAL_POINTS,)),  # %
         ("pedal_decel", "f8", (PEDAL_POINTS,)),  # m/s^2
-        ("hold_decel", "f8"),  # that the standing car is held with at least, m/s^2
+        ("hold_decel", "f8"),  # least demand that holds the car at standstill, m/s^2
         ("distribution", "i8"),  # DISTRIBUTIONS
         ("front_share", "f8"),  # of the brake force, where the distribution has one
-        ("rear_slip_margin", "f8"),  # a rear wheel may slip this much more than the front one
+        ("rear_slip_margin", "f8"),  # admissible slip of a rear wheel beyond the front one
         ("max_pressure", "f8"),  # Pa
         ("max_pressure_rate", "f8"),  # Pa/s
         ("compensation", "i8"),  # COMPENSATIONS

@@ -1,7 +1,7 @@
-"""The records that `step` reads and overwrites, and the frame: memory laid out once, shared by all lives.
+"""Records that `step` reads and overwrites, and the frame: one memory layout for all users.
 
-Every record is a numpy structured array of length 1 (kernels take `array[0]`), so that the daemon, replay
-and simulation hand over the same bytes and the ring can copy them as they are.
+Every record is a numpy structured array of length 1 (kernels take `array[0]`), so that daemon, replay and
+simulation pass identical bytes and the ring can copy them unchanged.
 """
 
 from typing import Any, Final
@@ -14,7 +14,7 @@ from ecu.contract.signals import N_INPUTS, N_OUTPUTS, OUTPUT_SIGNALS
 RecordArray = NDArray[np.void]
 
 # One CAN frame as received. `stamp_ns` is the kernel's receive time on the real-time clock, cut to whole
-# microseconds: what `candump -l` keeps, so that its log replays to the same bits.
+# microseconds as in candump logs, so that a log replays to the same bits.
 FRAME: Final = np.dtype(
     [
         ("stamp_ns", "i8"),
@@ -31,7 +31,7 @@ FRAME_EXTENDED, FRAME_REMOTE, FRAME_ERROR, FRAME_FD = 1, 2, 4, 8
 EXTENDED_ID: Final = 1 << 31
 """Marks a 29-bit identifier wherever one number stands for an identifier."""
 
-# What step reads in cycle k. `value` keeps a signal's last valid sample (never NaN).
+# Inputs of step in cycle k. `value` keeps a signal's last valid sample (never NaN).
 INPUTS: Final = np.dtype(
     [
         ("t_ns", "i8"),  # T_k
@@ -40,8 +40,8 @@ INPUTS: Final = np.dtype(
         ("age_ns", "i8", (N_INPUTS,)),  # T_k minus the stamp of the last sample
         ("new", "u1", (N_INPUTS,)),  # a valid sample arrived in this cycle
         ("verdict", "u1", (N_INPUTS,)),  # ALIVE | RATE_OK | VALID
-        ("bus_faults", "u4"),  # fault bits that only the service can see (bus off, foreign sender, …)
-        ("e2e_faults", "u4"),  # fault bits that only the receiver can see: streams that cannot be trusted
+        ("bus_faults", "u4"),  # fault bits known to the service alone (bus off, foreign sender, …)
+        ("e2e_faults", "u4"),  # fault bits known to the receiver alone: streams that cannot be trusted
         ("overruns", "u4"),
         ("spare", "u4"),  # a gap would be left undefined by copies
         ("worst_lateness_us", "f8"),
@@ -56,7 +56,7 @@ OUTPUTS: Final = np.dtype(
 )
 assert OUTPUTS.itemsize == 8 * N_OUTPUTS
 
-# What the service notes of each cycle beside the outputs; with it and the frames replay repeats the run.
+# Cycle record of the service beside the outputs; with it and the frames a replay repeats the run.
 CYCLE: Final = np.dtype(
     [
         ("number", "i8"),
@@ -71,7 +71,7 @@ CYCLE: Final = np.dtype(
         ("worst_lateness_us", "f8"),
         ("lateness_ns", "i8"),
         ("stage_ns", "i8", (5,)),  # drain, receive, step, transmit, send
-        ("speaks", "i8"),  # 0: a standby that is silent, or one that yielded; nothing was sent
+        ("speaks", "i8"),  # 0: a silent standby, or one that yielded; nothing was sent
     ],
     align=True,
 )
@@ -80,7 +80,7 @@ N_KEPT: Final = 24
 N_REGRESSORS: Final = 7
 N_MEASURED: Final = 8
 N_LEGS: Final = 8
-# What the linings have done since they were fitted, in a form that no wear law is in: (7.16) and its errors.
+# Work of the linings since they were fitted, independent of the wear law: (7.16) and its errors.
 WEAR: Final = np.dtype(
     [
         ("regressors", "f8", (N_REGRESSORS, 4)),  # see `REGRESSORS` of monitoring/wear.py
@@ -88,29 +88,29 @@ WEAR: Final = np.dtype(
         ("temperature_error", "f8", (N_REGRESSORS, 4)),  # by that of the disc's temperature
         ("odometer", "f8"),  # m, since the record was first made
         ("fitted_at", "f8", (4,)),  # m of the odometer
-        ("told", "i8", (4,)),  # 1: somebody said that these linings were new then
-        ("measurements", "i8", (4,)),  # that are kept
+        ("told", "i8", (4,)),  # 1: these linings were registered as new then
+        ("measurements", "i8", (4,)),  # number of measurements stored
         ("measured_wear", "f8", (N_MEASURED, 4)),  # mm below new
         ("measured_sigma", "f8", (N_MEASURED, 4)),  # mm
         ("measured_at", "f8", (N_MEASURED, N_REGRESSORS, 4)),  # regressors then
-        ("legs", "i8"),  # of equal length that were driven
-        ("leg_ends", "f8", (N_LEGS, N_REGRESSORS, 4)),  # regressors at the end of the last ones, in a ring
+        ("legs", "i8"),  # distance legs of equal length driven
+        ("leg_ends", "f8", (N_LEGS, N_REGRESSORS, 4)),  # regressors at the end of the last legs, in a ring
     ],
     align=True,
 )
-# What the brakes have emitted, by the emission models of one version; see monitoring/dust.py.
+# Emission of the brakes by the emission models of one version; see monitoring/dust.py.
 DUST: Final = np.dtype(
     [
         ("version", "i8"),  # of the models that counted it
         ("particles", "f8"),
         ("way", "f8"),  # m, since these models count
-        ("work", "f8"),  # J, of the brakes that have a model
-        ("told_work", "f8"),  # J, of the applications whose particles are in it
-        ("applications", "i8"),  # these
+        ("work", "f8"),  # J, of the brakes with a model
+        ("told_work", "f8"),  # J, of the applications whose particles are counted
+        ("applications", "i8"),  # the particles
     ],
     align=True,
 )
-# What the ECU has learned and must not lose: carried between brakings, drives and restarts.
+# Learned values, carried between brake applications, drives and restarts.
 LEARNED: Final = np.dtype(
     [
         ("mu_b", "f8", (4,)),  # base of the next compensation
@@ -119,10 +119,10 @@ LEARNED: Final = np.dtype(
         ("radius_error", "f8", (4,)),  # relative error of the free rolling radius
         ("radius_sigma", "f8", (4,)),
         ("joint", "f8", (N_JOINT,)),  # the joint observer's states, see its layout
-        ("joint_covariance", "f8", (N_KEPT * (N_KEPT + 1) // 2,)),  # of those kept: lower triangle by rows
+        ("joint_covariance", "f8", (N_KEPT * (N_KEPT + 1) // 2,)),  # covariance, lower triangle by rows
         ("joint_known", "u1"),  # 0: nothing learned yet
         ("spare", "u1", (7,)),  # a gap would be left undefined by copies, and the bytes are compared
-        ("disc_excess", "f8", (4,)),  # most that the last braking left the disc above the air [K]
+        ("disc_excess", "f8", (4,)),  # greatest excess over the air left by the last application [K]
         ("brakings", "i8"),  # brake applications since the record was first made
         ("wear", WEAR),
         ("dust", DUST),

@@ -1,8 +1,8 @@
-"""The table of every signal: its name, unit, message and time-out. Everything else is derived from it.
+"""Table of every signal: its name, unit, message and time-out. Everything else is derived from it.
 
 Names and units are the project's public contract: add, but never rename, remove or change a unit.
 A four-wheel quantity stands as four signals in the order `CORNERS`; `INPUT[name]` is a signal's place in
-`inputs.value`, and a constant such as `WHEEL_SPEED` is the place of its front-left one.
+`inputs.value`, and a constant such as `WHEEL_SPEED` is the place of the front-left one.
 """
 
 from typing import Final, NamedTuple
@@ -11,12 +11,12 @@ CORNERS: Final = ("fl", "fr", "rl", "rr")
 
 
 def without_corner(name: str) -> str:
-    """Return a name without the corner that it ends with."""
+    """Return a name without its corner suffix."""
     return name[:-3] if name[-3:] in {f"_{corner}" for corner in CORNERS} else name
 
 
 class InputSignal(NamedTuple):
-    """A quantity that the ECU reads."""
+    """Quantity that the ECU reads."""
 
     name: str
     unit: str
@@ -62,7 +62,7 @@ INPUT_SIGNALS: Final[tuple[InputSignal, ...]] = (
     InputSignal("rain", "-", "Ambient", 3.0, 0.0, 1.0),
     *_corners("wheel_force_x", "N", "WheelForce", 0.1, -40000.0, 40000.0),
     *_corners("wheel_torque_y", "N m", "WheelForce", 0.1, -10000.0, 10000.0),
-    # A reference in recordings only: no message of ours carries it.
+    # A reference in recordings only: not in any message of ours.
     *_corners("disc_temperature_measured", "degC", "", 3.0, -60.0, 1200.0),
 )
 INPUT: Final = {signal.name: place for place, signal in enumerate(INPUT_SIGNALS)}
@@ -95,7 +95,7 @@ RAIN: Final = INPUT["rain"]
 
 # The three verdicts on an input, as bits of `inputs.verdict`.
 ALIVE: Final = 1  # a sample arrived within its time-out
-RATE_OK: Final = 2  # samples arrive at about the rate that is expected
+RATE_OK: Final = 2  # samples arrive at about the expected rate
 VALID: Final = 4  # the last sample was available, in range and declared valid by its sender
 USABLE: Final = ALIVE | VALID
 
@@ -106,7 +106,7 @@ NOMINAL, OBSERVING, HOLDING, FAULT = range(4)
 
 
 class OutputSignal(NamedTuple):
-    """A quantity that the ECU sends or writes into results. NaN means "not available"."""
+    """Quantity that the ECU sends or writes into results. NaN means "not available"."""
 
     name: str
     unit: str
@@ -139,24 +139,24 @@ OUTPUT_SIGNALS: Final[tuple[OutputSignal, ...]] = (
     OutputSignal("active_faults", "-", False, "EcuStatus"),
     OutputSignal("overruns", "-", False, "EcuStatus"),
     OutputSignal("worst_lateness_us", "us", False, "EcuStatus"),
-    # Beyond the contract: what a reader of results needs to judge the rest.
+    # Beyond the contract: quantities for the interpretation of results.
     OutputSignal("decel_demand_total", "m/s^2", False, ""),  # the larger of pedal map and decel_demand
     OutputSignal("accel_x_road", "m/s^2", False, ""),  # specific force in road axes, pitch removed
     OutputSignal("accel_x_model", "m/s^2", False, ""),  # the same by torques and drag
     OutputSignal("accel_x_zero", "m/s^2", False, ""),  # zero error of the accelerometer, as learned
     OutputSignal("vehicle_mass", "kg", False, ""),  # as learned
     OutputSignal("sigma_brake_force", "-", False, ""),  # of all linings together at equal pressures, relative
-    OutputSignal("overrun", "m/s^2", False, ""),  # deceleration by a drive that nobody reports, while braking
+    OutputSignal("overrun", "m/s^2", False, ""),  # unreported engine drag while braking
     OutputSignal("braking", "-", False, ""),  # 1 while a brake application lasts
     OutputSignal("calliper_pressure", "bar", True, ""),  # as measured, last sample
-    OutputSignal("pressure_zero", "bar", True, ""),  # what its sensor reads without pressure
+    OutputSignal("pressure_zero", "bar", True, ""),  # pressure zero
     OutputSignal("pressure_uncompensated", "bar", True, ""),  # the demand with the base friction
     OutputSignal("sigma_disc_temperature", "K", True, ""),
     OutputSignal("sigma_pad_wear", "mm", True, ""),
-    OutputSignal("particles_last_brake_low", "-", False, ""),  # 95 % of what is told of the last application
+    OutputSignal("particles_last_brake_low", "-", False, ""),  # 95 % interval of the last application
     OutputSignal("particles_last_brake_high", "-", False, ""),
     OutputSignal("particle_mass_per_km", "mg/km", False, ""),  # of all linings, up to 10 um
-    # Squared innovation over its variance and squared gate, last window: beyond 1 it counts less. Joint only.
+    # Test ratio of the last window: above 1 a measurement counts less. Joint observer only.
     OutputSignal("test_ratio", "-", True, ""),  # of wheel speed
     OutputSignal("test_ratio_balance", "-", False, ""),  # of the forces along the car
     OutputSignal("test_ratio_speed", "-", False, ""),  # of the speed reference
@@ -164,7 +164,7 @@ OUTPUT_SIGNALS: Final[tuple[OutputSignal, ...]] = (
 
 
 def column_names(signal: OutputSignal) -> tuple[str, ...]:
-    """Names of an output in results and on the bus, one per corner for a four-wheel quantity."""
+    """Return the names of an output in results and on the bus, one per corner where it has four."""
     if not signal.corners:
         return (signal.name,)
     stem = "mode" if signal.name == "mode_mu_b" else signal.name

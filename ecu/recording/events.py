@@ -1,4 +1,4 @@
-"""Events from the cycles' records: a line when the mode, a fault or a counter changes, never one a cycle."""
+"""Events from the cycles' records: one line per change of mode, fault or counter."""
 
 from typing import Any, Final
 
@@ -10,12 +10,12 @@ from ecu.contract.records import RecordArray
 from ecu.contract.signals import STARTING
 from ecu.recording.log import Throttle
 
-_INPUT_FAULTS: Final = 0xFFFF  # while starting nothing has come yet, which is no event
+_INPUT_FAULTS: Final = 0xFFFF  # while starting nothing was received yet, which is no event
 MODES: Final = ("starting", "ready", "active", "degraded", "failed")
 
 
 class EventLog:
-    """Follows one run, batch by batch."""
+    """Event log of one run, written batch by batch."""
 
     def __init__(self, throttle: Throttle | None = None) -> None:
         self._log = structlog.get_logger("ecu")
@@ -24,14 +24,14 @@ class EventLog:
         self._speaks: bool | None = None
 
     def begin_after(self, record: RecordArray) -> None:
-        """Take over from another one that had seen `record` (`RECORDED`, shape (1,)) and said so."""
+        """Continue after an earlier log that ended with `record` (`RECORDED`, shape (1,))."""
         cycle, outputs = record["cycle"][0], record["outputs"][0]
         self._mode, self._faults = (int(np.nan_to_num(outputs[name])) for name in ("mode", "active_faults"))
         self._overruns, self._dropped = int(cycle["overruns"]), int(cycle["dropped"])
         self._speaks = bool(cycle["speaks"])
 
     def look(self, records: RecordArray, lost_cycles: int, lost_frames: int) -> None:
-        """Log what changed within `records` (`RECORDED`, shape (n,)); `lost_*`: what the reader missed."""
+        """Log the changes within `records` (`RECORDED`, shape (n,)); `lost_*`: missed by the reader."""
         cycles, outputs = records["cycle"], records["outputs"]
         mode = np.nan_to_num(outputs["mode"]).astype(np.int64)
         faults = np.nan_to_num(outputs["active_faults"]).astype(np.int64)

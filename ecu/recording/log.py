@@ -27,7 +27,7 @@ def configure_logging() -> None:
 
 
 class Throttle:
-    """Lets one event a second pass per cause; the next that passes says how many did not."""
+    """Rate limit of one event a second per cause; the next one passed states how many were suppressed."""
 
     def __init__(self, now_s: Callable[[], float] = time.monotonic) -> None:
         self._now_s = now_s
@@ -35,7 +35,7 @@ class Throttle:
         self._held: dict[str, int] = {}
 
     def passes(self, cause: str) -> int | None:
-        """Return how many events of this cause were held back since the last that passed; None: hold it."""
+        """Return how many events of this cause were suppressed since the last; None: suppress this one."""
         now = self._now_s()
         if now - self._last.get(cause, -QUIET_S) < QUIET_S:
             self._held[cause] = self._held.get(cause, 0) + 1

@@ -1,6 +1,6 @@
-"""A recording: its files, written while the ECU runs, gone on with by another process, and read.
+"""Recording of a run: its files, written while the ECU runs, resumable by another process, and read back.
 
-A folder holds the frames (candump text), the cycles (`RECORDED`, raw), what they mean (JSON) and the state
+A folder holds the frames (candump text), the cycles (`RECORDED`, raw), their description (JSON) and the state
 before the first cycle.
 """
 
@@ -37,7 +37,7 @@ def layout(dtype: np.dtype[Any]) -> dict[str, Any]:
 
 
 def dtype_of(described: dict[str, Any]) -> np.dtype[Any]:
-    """Return the dtype that `layout` described."""
+    """Return the dtype described by `layout`."""
     fields = described["fields"]
     bases = [dtype_of(kind) if isinstance(kind, dict) else kind for kind, _, _ in fields.values()]
     return np.dtype(
@@ -53,7 +53,7 @@ def dtype_of(described: dict[str, Any]) -> np.dtype[Any]:
 
 
 def interface_name(channel: str) -> str:
-    """Return a channel's name as a candump log can bear it: at most 15 characters (IFNAMSIZ), no blanks."""
+    """Return a channel's name as allowed in a candump log: at most 15 characters (IFNAMSIZ), no blanks."""
     return "".join(c if c.isalnum() or c in "._-" else "_" for c in channel)[:15]
 
 
@@ -110,11 +110,10 @@ def start_recording(parent: Path, description: dict[str, Any], initial: bytes) -
 def resume_recording(
     parent: Path, description: dict[str, Any], frames_before: Callable[[int], int | None]
 ) -> tuple[RecordingFiles, int] | None:
-    """Open the recording of the run that `description` is of to go on; None: there is none.
+    """Open the recording of the run with this `description` to continue it; None: there is none.
 
-    Returns the files and the number of the last cycle in them, -1 for none. What was written of a cycle that
-    is not there in whole is cut off; `frames_before(n)` says how many frames the cycles before n consumed.
-    Raises OSError.
+    Returns the files and the number of the last cycle in them, -1 for none. An incomplete last cycle is cut
+    off; `frames_before(n)` says how many frames the cycles before n consumed. Raises OSError.
     """
     for about in sorted(parent.glob(f"*/{ABOUT_FILE}"), reverse=True):
         if json.loads(about.read_text(encoding="utf-8"))["start_ns"] == description["start_ns"]:
@@ -147,7 +146,7 @@ def _end_of_lines(file: BinaryIO, count: int | None) -> int:
 
 
 def make_room(folder: Path, limit_bytes: float) -> bool:
-    """Remove the oldest other recordings beside `folder` until all are within the limit.
+    """Remove the oldest other recordings beside `folder` until the total is within the limit.
 
     Returns False when this one alone is larger. Raises OSError.
     """
@@ -161,14 +160,14 @@ def make_room(folder: Path, limit_bytes: float) -> bool:
         if one != folder:
             for file in files[one]:
                 file.unlink()
-            with suppress(OSError):  # somebody put something else there
+            with suppress(OSError):  # a foreign file
                 one.rmdir()
             total -= sizes[one]
     return total <= limit_bytes
 
 
 def write_batch(files: RecordingFiles, batch: Batch, channel: str) -> None:
-    """Append one batch; frames first, so that a cycle in cycles.bin has its frames. Raises OSError."""
+    """Append one batch; frames first, so that every cycle in cycles.bin has its frames. Raises OSError."""
     _write_all(files.frames, candump_lines(batch.frames, channel))
     _write_all(files.cycles, batch.records.tobytes())
 
@@ -180,7 +179,7 @@ def _write_all(file: BinaryIO, data: bytes) -> None:
 
 
 class Recording(NamedTuple):
-    """A recording, read back. Cycle k stands in row k of both arrays."""
+    """A recording, read back. Cycle k is row k of both arrays."""
 
     folder: Path
     about: dict[str, Any]
@@ -193,7 +192,7 @@ class Recording(NamedTuple):
 
 
 def read_recording(folder: Path) -> Recording:
-    """Read the recording in `folder`, or the latest of those in it; a torn last cycle is left out.
+    """Return the recording in `folder`, or the latest one below it, without an incomplete last cycle.
 
     Raises:
         UserError: there is no recording.

@@ -10,9 +10,9 @@ from ecu.settings.config import Config, store_key
 
 
 def restored(folder: Path, config: Config, params: RecordArray) -> tuple[int, RecordArray] | None:
-    """Return the revision and record (`LEARNED`, shape (1,)) in the store of `folder`, None if it is empty.
+    """Return revision and record (`LEARNED`, shape (1,)) of the store in `folder`, None if it is empty.
 
-    Revision 0: nothing was learned with these brakes or by this version, but wear and dust go on.
+    Revision 0: unadapted for these brakes or this version, but wear and dust continue.
 
     Raises:
         UserError: the folder cannot be written.

@@ -1,12 +1,12 @@
-"""A ring in shared memory: the cycle writes it and waits for nobody, any process may read along.
+"""Ring in shared memory: written by the cycle without waiting, read by any process.
 
-The file holds a header, a description (JSON), the state before the first cycle, a slot per cycle, what is
-learned (of the last two cycles, in turn) and a ring of frames. A slot carries its number before and after its
-content is written (-1 between), so a reader that was overtaken notices and counts what it lost. Frames are
-claimed before they are overwritten.
+The file holds a header, a description (JSON), the state before the first cycle, a slot per cycle, the learned
+values (of the last two cycles, in turn) and a ring of frames. A slot carries its number before and after its
+content is written (-1 between), so an overtaken reader notices and counts its losses. Frames are claimed
+before they are overwritten.
 
 The file is its owner's alone: made anew (O_EXCL, O_NOFOLLOW), mode 0600, and read only if it belongs to the
-reader's user. Whoever wrote it holds a lock on it for as long as it lives, in whatever namespace.
+reader's user. Its writer holds a lock on it for its lifetime, across namespaces.
 """
 
 import fcntl
@@ -30,7 +30,7 @@ from ecu.jit import kernel
 SLOTS: Final = 2400  # 24 s of cycles
 FRAMES: Final = 131072  # 29 s of a classical bus at 45 frames per cycle
 
-# One cycle as it stands in the ring's slots and in a recording's cycles.bin.
+# One cycle as stored in the ring's slots and in a recording's cycles.bin.
 RECORDED: Final = np.dtype([("cycle", CYCLE), ("outputs", OUTPUTS)], align=True)
 _SLOT: Final = np.dtype([("number", "i8"), ("first_frame", "i8"), ("recorded", RECORDED)], align=True)
 _LAST_WORDS_BYTES: Final = 3072
@@ -45,7 +45,7 @@ _HEADER: Final = np.dtype(
         ("frames_claimed", "i8"),
         ("frames_written", "i8"),
         ("closed", "i8"),
-        ("followed", "i8"),  # the last cycle that the side process is known to have handled, -1: none
+        ("followed", "i8"),  # last cycle that the side process reported as handled, -1: none
         ("last_words", f"S{_LAST_WORDS_BYTES}"),  # JSON
     ]
 )
@@ -66,18 +66,18 @@ class Ring(NamedTuple):
 
 
 def _folder() -> Path:
-    """Memory, not a disk, where the machine has such a folder."""
+    """Return the folder of rings: in memory, not on a disk, where the machine has one."""
     shared = Path("/dev/shm")
     return shared if os.access(shared, os.W_OK) else Path(tempfile.gettempdir())
 
 
 def living_rings() -> list[Path]:
-    """Return our user's rings whose writers live; those that dead ones left behind are removed."""
+    """Return our user's rings whose writers live; remove those of dead ones."""
     folder, rings = _folder(), []
     for path in sorted([*folder.glob("brake-ecu.*.ring"), *folder.glob("brake-ecu.*.new")]):
         try:
             handle = _open_own(path)
-        except OSError:  # another user's, or gone meanwhile
+        except OSError:  # another user's, or removed meanwhile
             continue
         try:
             fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -90,7 +90,7 @@ def living_rings() -> list[Path]:
 
 
 def _open_own(path: Path) -> int:
-    """Open a regular file that is ours and that nobody else may write. Raises OSError for any other."""
+    """Open a regular file that is ours and writable by nobody else. Raises OSError for any other."""
     handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
     found = os.fstat(handle)
     others = stat.S_IWGRP | stat.S_IWOTH
@@ -101,7 +101,7 @@ def _open_own(path: Path) -> int:
 
 
 def ring_path(pid: int) -> Path:
-    """Return where the ring of process `pid` is. Containers that share the folder have pids of their own."""
+    """Return the path of the ring of process `pid`. Containers sharing the folder have pids of their own."""
     living_rings()
     try:
         namespace = os.stat("/proc/self/ns/pid").st_ino
@@ -115,7 +115,7 @@ def _round_up(size: int) -> int:
 
 
 def _is_ring(memory: mmap.mmap) -> bool:
-    """Return whether header and size fit together."""
+    """Return whether header and size agree."""
     if len(memory) < _PAGE:
         return False
     row = np.frombuffer(memory, _HEADER, 1)[0]
@@ -140,9 +140,9 @@ def _map(path: Path, memory: mmap.mmap) -> Ring:
 def create_ring(
     path: Path, description: dict[str, Any], initial: bytes, *, slots: int = SLOTS, frames: int = FRAMES
 ) -> Ring:
-    """Make the ring with all its pages in memory; it appears at `path` when it is complete.
+    """Create the ring with all its pages in memory; it appears at `path` when complete.
 
-    `description` tells readers what the records mean; `initial` is the state before the first cycle.
+    `description` defines the records for readers; `initial` is the state before the first cycle.
 
     Raises:
         UserError: no room for it.
@@ -191,7 +191,7 @@ def publish(
 ) -> None:
     """Write one cycle with its `cycle["frames"]` frames, the first of `frames`; never waits.
 
-    The claims stand outside the kernel that fills: a compiler may not move or drop them there.
+    The claims are outside the kernel that fills, where a compiler could move or drop them.
     """
     header = ring.header[0]
     number, begin = int(header["written"]), int(header["frames_written"])
@@ -228,7 +228,7 @@ def _fill(
 
 
 def close_ring(ring: Ring, last_words: dict[str, Any] | None = None) -> None:
-    """Tell readers that no more cycles come; the file goes when the last of them lets go of it."""
+    """Tell readers that the stream has ended; the file is freed when the last of them closes it."""
     ring.header[0]["last_words"] = json.dumps(last_words or {}).encode()
     ring.header[0]["closed"] = 1
 
@@ -243,7 +243,7 @@ class Batch(NamedTuple):
 
 
 class RingReader:
-    """Reads a ring behind its writer, from the oldest cycle that is still there."""
+    """Reader of a ring behind its writer, from the oldest cycle still present."""
 
     def __init__(self, path: Path) -> None:
         try:
@@ -285,14 +285,14 @@ class RingReader:
         return words
 
     def go_on_after(self, number: int) -> RecordArray | None:
-        """Read on behind the cycle `number`; return that cycle (`RECORDED`, shape (1,)) if it is there."""
+        """Continue after cycle `number`; return that cycle (`RECORDED`, shape (1,)) if it is present."""
         place = number % len(self.ring.slots)
         slot = self.ring.slots[place : place + 1].copy()
         self._next = number + 1
         return slot["recorded"] if slot["number"][0] == number >= 0 else None
 
     def frames_before(self, number: int) -> int | None:
-        """Return how many frames all cycles before `number` consumed; None: not known any more."""
+        """Return the number of frames consumed by all cycles before `number`; None: no longer known."""
         header = self.ring.header[0]
         slot = self.ring.slots[number % len(self.ring.slots)].copy()
         if slot["number"] == number:
@@ -301,7 +301,7 @@ class RingReader:
         return total if header["written"] == number else None
 
     def learned(self) -> RecordArray | None:
-        """Return what is learned as of the last cycle (`LEARNED`, shape (1,)), None while there is none."""
+        """Return the learned values of the last cycle (`LEARNED`, shape (1,)), None while there are none."""
         for _ in range(10):  # the writer may overtake us
             written = int(self.ring.header[0]["written"])
             row = (written - 1) % 2
@@ -311,7 +311,7 @@ class RingReader:
         return None
 
     def read(self, limit: int = 256) -> Batch:
-        """Return up to `limit` cycles that were not read yet; what was overwritten is counted as lost."""
+        """Return up to `limit` unread cycles; overwritten ones are counted as lost."""
         header, slots = self.ring.header[0], self.ring.slots
         written = int(header["written"])
         oldest = written - len(slots)
@@ -339,6 +339,6 @@ class RingReader:
 
 
 def remove_ring(path: Path) -> None:
-    """Take the ring's name away; whoever has it mapped keeps it."""
+    """Unlink the ring; processes that have it mapped keep it."""
     with suppress(OSError):
         path.unlink()

@@ -1,10 +1,10 @@
-"""The side process of `run`: it reads the ring, writes the recording, keeps the state store and logs events.
+"""Side process of `run`: reads the ring, writes the recording, keeps the state store and logs events.
 
-`python -m ecu.recording.side_process --ring RING --leash SOCKET --parent PID [--record DIR
-[--record-limit GB]] [--state DIR] [--again]`, started by `ecu/runtime/supervisor.py`. It ends when the ring
-is closed or the loop is gone, after everything in the ring is written; signals to the group are left to the
-loop. A disk that is full ends the recording, nothing else; a store that cannot be written is tried again at
-the next change. `--again`: another one died, this one goes on where it was.
+`python -m ecu.recording.side_process --ring RING --leash SOCKET --parent PID [--record DIR [--record-limit
+GB]] [--state DIR] [--again]`, started by `ecu/runtime/supervisor.py`. It ends when the ring is closed or the
+loop has died, after everything in the ring is written; signals to the group are left to the loop. A full disk
+ends the recording, nothing else; an unwritable store is tried again at the next change. `--again`: continue
+after an earlier one that died.
 """
 
 import argparse
@@ -48,7 +48,7 @@ LOOK_AT_SIZE_S: Final = 10.0  # a megabyte
 
 
 class Recorder:
-    """Everything the side process does with one ring."""
+    """Side process of one ring: recording, state store and events."""
 
     def __init__(
         self,
@@ -115,7 +115,7 @@ class Recorder:
         return not self._refused
 
     def turn(self) -> int:
-        """Handle what came since the last turn; return how many cycles that was."""
+        """Process the cycles since the last turn; return their number."""
         batch = self.reader.read()
         if len(batch.records):
             if self.files:
@@ -141,7 +141,7 @@ class Recorder:
         self.files = None
 
     def _keep(self) -> None:
-        """Save after a braking, or a minute after another change."""
+        """Save after a brake application, or a minute after another change."""
         now_s, learned = time.monotonic(), self.reader.learned()
         if learned is not None and state_store.is_due(self.keeper, learned, now_s):
             self._save(learned, now_s)
@@ -158,10 +158,10 @@ class Recorder:
         except state_store.DAMAGED as error:
             self._refuse(str(error))
             self.store.close()
-            self.store = None  # opened anew, and set aside if it is damaged, at the next change
+            self.store = None  # reopened, and set aside if damaged, at the next change
 
     def finish(self) -> None:
-        """Write out the rest: the ring, then what was learned since the last save."""
+        """Write the rest: the ring, then the values learned since the last save."""
         while self.turn():
             pass
         learned = self.reader.learned()
@@ -184,18 +184,18 @@ class Recorder:
 
 
 def _say(leash: socket.socket, what: bytes) -> None:
-    """A loop that does not read what it is told, or is gone, is no matter here."""
+    """Send a message; a loop that does not read it, or has died, is ignored."""
     with suppress(OSError):
         leash.send(what, socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL)
 
 
 def _loop_is_gone(leash: socket.socket, patience_s: float) -> bool:
-    """Wait that long; the loop says nothing, so anything to read is its end."""
+    """Wait that long; the loop sends nothing, so anything readable is its end."""
     return bool(select.select([leash], [], [], patience_s)[0])
 
 
 def _follow(recorder: Recorder, leash: socket.socket, parent: int) -> bool:
-    """Turn until the loop is done or gone; False: the supervisor is gone, take its place."""
+    """Turn until the loop has ended or died; False: the supervisor has died, take its place."""
     while not recorder.reader.closed:
         recorder.turn()
         _say(leash, word(KEPT if recorder.kept else NOT_KEPT, recorder.reader.last_read))
@@ -207,7 +207,7 @@ def _follow(recorder: Recorder, leash: socket.socket, parent: int) -> bool:
 
 
 def main() -> int:
-    """Follow the ring until its writer is done or gone."""
+    """Follow the ring until its writer has ended or died."""
     parser = argparse.ArgumentParser(
         prog="python -m ecu.recording.side_process", description="The side process of run."
     )
@@ -252,7 +252,7 @@ def main() -> int:
 
 
 def _passed_on(arguments: list[str]) -> list[str]:
-    """Arguments for the next process: all but those that a supervisor adds."""
+    """Return the arguments for the next process: all but those added by a supervisor."""
     kept = [argument for argument in arguments if argument != "--again"]
     for name in ("--leash", "--parent"):
         at = kept.index(name)

@@ -1,7 +1,7 @@
-"""Standard output and error that cannot harm who writes: nothing blocks, nothing raises.
+"""Standard output and error that never block and never raise.
 
-A reader that is gone, stops reading, or a disk that is full costs lines, never the brakes. They are counted,
-and the next one that gets out is preceded by their number.
+A lost or stalled reader or a full disk costs lines of output, never a cycle. Lost lines are counted, and the
+next line written is preceded by their number.
 """
 
 import io
@@ -32,7 +32,7 @@ class Sink(io.TextIOBase):
             self._handle = -1
 
     def write(self, text: str) -> int:
-        """Write what can be written now; returns the length of `text` in any case."""
+        """Write as much as possible now; return the length of `text` in any case."""
         data = text.encode(errors="replace")
         if self.dropped:
             data = b'{"event": "lines_dropped", "count": %d}\n' % self.dropped + data
@@ -59,20 +59,20 @@ class Sink(io.TextIOBase):
         return os.write(self._handle, data[:_ATOMIC])
 
     def writable(self) -> bool:
-        """It always is."""
+        """Return True."""
         return True
 
     def isatty(self) -> bool:
-        """Whether it is a terminal."""
+        """Return whether it is a terminal."""
         return self._handle >= 0 and os.isatty(self._handle)
 
     def fileno(self) -> int:
-        """The file descriptor."""
+        """Return the file descriptor."""
         return self._handle
 
 
 def _set_free(handle: int) -> bool:
-    """Let the descriptor lead to the same file without waiting; return whether that could be done.
+    """Make the descriptor non-blocking on the same file; return whether that was possible.
 
     It is opened anew: O_NONBLOCK on the old description would hold for the shell that gave it, too.
     """

@@ -1,12 +1,12 @@
 """Store of learned values: sqlite, WAL, synchronous FULL, a CRC and a revision per row.
 
-Only the side process writes. A row that fails its CRC or its ranges is passed over for the revision before
-it; a file that sqlite cannot read, or that holds another table, another schema or values of another kind, is
-set aside and a new one made. What another version of the algorithm has learned stays in the file and is not
-used. The folder is its owner's alone.
+Only the side process writes. A row that fails its CRC or its ranges is skipped for the previous revision; a
+file that sqlite cannot read, or that holds another table, another schema or values of another kind, is set
+aside and a new one made. Values learned by another version of the algorithm stay in the file unused.
+The folder is its owner's alone.
 
-What the linings have worn off and what the brakes have emitted is also kept as rows of their own, in the same
-transaction, by the vehicle's name alone: it outlives a new version and a configuration that changes.
+Wear of the linings and emission of the brakes are also stored in rows of their own, in the same transaction,
+by the vehicle's name alone: they outlive a new version and a changed configuration.
 """
 
 import fcntl
@@ -54,7 +54,7 @@ _OF_ANOTHER_KIND: Final = f"""SELECT count(*) FROM learned WHERE typeof(key) != 
 
 
 def open_store(folder: Path) -> sqlite3.Connection:
-    """Open the store in `folder`, made if missing; a file that is no sqlite database any more is set aside.
+    """Open the store in `folder`, created if missing; a file that is no valid sqlite database is set aside.
 
     Raises:
         UserError: the folder cannot be written.
@@ -77,7 +77,7 @@ def open_store(folder: Path) -> sqlite3.Connection:
 
 @contextmanager
 def in_use(folder: Path) -> Iterator[None]:
-    """Let no one change by hand what is kept in `folder` while a daemon keeps it."""
+    """Hold the store in `folder` against changes by hand while a daemon uses it."""
     with (folder / LOCK).open("a") as file:
         fcntl.flock(file, fcntl.LOCK_SH)
         yield
@@ -85,10 +85,10 @@ def in_use(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def alone(folder: Path) -> Iterator[None]:
-    """Change what is kept in `folder` by hand.
+    """Hold the store in `folder` for a change by hand.
 
     Raises:
-        UserError: a daemon keeps it, or the folder cannot be written.
+        UserError: a daemon holds it, or the folder cannot be written.
     """
     try:
         with (folder / LOCK).open("a") as file:
@@ -103,7 +103,7 @@ def alone(folder: Path) -> Iterator[None]:
 
 
 def _is_damaged(error: sqlite3.OperationalError) -> bool:
-    """Whether the file is at fault and not its surroundings (rights, a full disk, a lock)."""
+    """Return whether the file itself is damaged, not its surroundings (rights, a full disk, a lock)."""
     code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR)  # Python's own, over text, has none
     return code & 0xFF in (sqlite3.SQLITE_IOERR, sqlite3.SQLITE_ERROR)
 
@@ -122,7 +122,7 @@ def _connect(path: Path) -> sqlite3.Connection:
             ).fetchall()
             if not schema:
                 store.execute(_TABLE)
-            store.execute("PRAGMA user_version = 1")  # one that cannot be written shows now
+            store.execute("PRAGMA user_version = 1")  # an unwritable one shows now
         if schema and schema != [("table", "learned", _TABLE)]:
             raise sqlite3.DatabaseError("it holds another schema")
         verdict = store.execute("PRAGMA integrity_check(1)").fetchone()[0]
@@ -156,7 +156,7 @@ def _crc(key: str, revision: int, record: bytes) -> int:
 
 
 def save(store: sqlite3.Connection, key: str, learned: RecordArray) -> int:
-    """Add `learned` (`LEARNED`, shape (1,)) as the next revision of `key`, durable on return; returns it."""
+    """Save `learned` (`LEARNED`, shape (1,)), durably, as the next revision of `key`; return that."""
     with _transaction(store):
         for part in PARTS:
             _add(store, part_key(key, part), learned[part].tobytes())
@@ -174,7 +174,7 @@ def _add(store: sqlite3.Connection, key: str, record: bytes) -> int:
 
 
 def part_key(key: str, part: str) -> str:
-    """Return what one of `PARTS` is kept under: the vehicle of `key` and the version of its layout."""
+    """Return the key of one of `PARTS`: the vehicle of `key` and the version of its layout."""
     return f"{key.rsplit('/', 2)[0]}/{part}/1"
 
 
@@ -194,8 +194,8 @@ def restore(
 ) -> tuple[int, RecordArray] | None:
     """Return the newest good revision of `key` and its record (`LEARNED`, shape (1,)); None without one.
 
-    `mu_nominal` has shape (4,). Good: the CRC holds and every value lies in its range. Wear and dust
-    are the vehicle's where these went on since.
+    `mu_nominal` has shape (4,). Good: the CRC holds and every value lies in its range. Wear and dust are the
+    vehicle's where these are newer.
     """
     found = _newest_good(store, key, LEARNED, lambda learned: out_of_range(learned, mu_nominal))
     if not found:
@@ -247,9 +247,9 @@ def _tell_of_other_versions(store: sqlite3.Connection, key: str) -> None:
 
 
 def out_of_range(learned: RecordArray, mu_nominal: NDArray[np.float64]) -> str:
-    """Return the name of the first value of `learned` (shape (1,)) that cannot be, empty if there is none."""
+    """Return the name of the first implausible value of `learned` (shape (1,)), empty if there is none."""
     row = learned[0]
-    known = row["observed_s"] > 0  # of a corner that was never observed the friction says nothing
+    known = row["observed_s"] > 0  # of a corner never observed, the friction is not checked
     share = row["mu_b"] / mu_nominal
     sigma = row["sigma_mu_b"]
     p = covariance_of(row["joint_covariance"])
@@ -269,7 +269,7 @@ def out_of_range(learned: RecordArray, mu_nominal: NDArray[np.float64]) -> str:
 
 
 def wear_out_of_range(wear: RecordArray) -> str:
-    """Return the name of the first value of `wear` (shape (1,)) that cannot be, empty if there is none."""
+    """Return the name of the first implausible value of `wear` (shape (1,)), empty if there is none."""
     row = wear[0]
     sums = ("regressors", "friction_error", "temperature_error", "leg_ends", "measured_at")
     checks = {name: np.isfinite(row[name]) & (row[name] >= 0) for name in sums}
@@ -285,7 +285,7 @@ def wear_out_of_range(wear: RecordArray) -> str:
 
 
 def dust_out_of_range(dust: RecordArray) -> str:
-    """Return the name of the first value of `dust` (shape (1,)) that cannot be, empty if there is none."""
+    """Return the name of the first implausible value of `dust` (shape (1,)), empty if there is none."""
     row = dust[0]
     checks = {name: np.isfinite(row[name]) and row[name] >= 0 for name in ("particles", "work", "told_work")}
     checks["way"] = 0 <= row["way"] <= FARTHEST
@@ -309,7 +309,7 @@ def covariance_of(triangle: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def is_covariance(matrix: NDArray[np.float64]) -> bool:
-    """Whether a symmetric matrix, shape (n, n), can be one: finite, no variance or eigenvalue below 0."""
+    """Return whether a symmetric matrix, shape (n, n), is a covariance: finite, no eigenvalue below 0."""
     if not np.isfinite(matrix).all() or (np.diag(matrix) < 0).any():
         return False
     sigma = np.sqrt(np.maximum(np.diag(matrix), 1e-30))
@@ -325,12 +325,12 @@ class Keeper(NamedTuple):
 
 
 def first_keeper(learned: RecordArray, now_s: float) -> Keeper:
-    """Return the keeper of a record that stands in the store, or need not: what the run started with."""
+    """Return the keeper of a record already stored, or not to be stored: the one the run started with."""
     return Keeper(learned.tobytes(), int(learned["brakings"][0]), now_s)
 
 
 def is_due(keeper: Keeper, learned: RecordArray, now_s: float) -> bool:
-    """Whether to save now: after a braking at once, any other change after at most a minute."""
+    """Return whether to save: after a brake application at once, other changes within a minute."""
     if learned.tobytes() == keeper.saved:
         return False
     return int(learned["brakings"][0]) > keeper.brakings or now_s - keeper.at_s >= SAVE_INTERVAL_S

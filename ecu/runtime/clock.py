@@ -1,8 +1,8 @@
-"""The 10 ms grid: absolute deadlines on the monotonic clock, missed periods, lateness statistics.
+"""Time grid of 10 ms: absolute deadlines on the monotonic clock, missed periods, lateness statistics.
 
-A cycle that overruns is not made up for in a burst: the periods that passed are counted, and the next
-deadline is the next one on the grid. T_k exists on two clocks: the monotonic one schedules, the real-time
-one is compared with the frames' stamps.
+An overrun is not caught up in a burst: missed periods are counted, and the next deadline is the next one on
+the grid. T_k exists on two clocks: the monotonic one schedules, the real-time one is compared with the
+frames' stamps.
 """
 
 import ctypes
@@ -21,7 +21,7 @@ MICROSECOND_NS: Final = 1000
 
 
 class TimeSource(NamedTuple):
-    """The two clocks in ns and a sleep until a monotonic instant; a test puts its own in their place."""
+    """The two clocks in ns and a sleep until a monotonic instant; tests substitute their own."""
 
     monotonic_ns: Callable[[], int]
     realtime_ns: Callable[[], int]
@@ -55,7 +55,7 @@ def system_time() -> TimeSource:
 
 
 class Tick(NamedTuple):
-    """One deadline that was waited for."""
+    """One deadline after its wait."""
 
     t_ns: int
     """T_k on the real-time clock, whole microseconds."""
@@ -75,7 +75,7 @@ class Grid:
         self.offset_ns, self._spread_ns = self._sample_offset()
 
     def wait(self) -> Tick:
-        """Sleep until the next deadline that has not passed; a signal may wake it early, it sleeps on."""
+        """Sleep until the next deadline; a signal may interrupt the sleep, which then continues."""
         period = self.period_ns
         now = self.source.monotonic_ns()
         missed = max(0, (now - self.deadline_ns) // period)
@@ -94,7 +94,7 @@ class Grid:
         return real - (before + after) // 2, after - before
 
     def _follow_realtime(self) -> None:
-        """Take a new offset only if the real-time clock was set: readings between which we slept lie."""
+        """Take a new offset only if the real-time clock was set: a sleep between readings falsifies it."""
         offset, spread = self._sample_offset()
         if abs(offset - self.offset_ns) > spread + self._spread_ns:
             self.offset_ns, self._spread_ns = offset, spread
@@ -109,7 +109,7 @@ class Welford:
         self.minimum = self.maximum = math.nan
 
     def add(self, value: float) -> None:
-        """Take one value into account."""
+        """Add one value."""
         self.count += 1
         step = value - self._mean
         self._mean += step / self.count
@@ -148,7 +148,7 @@ class Histogram:
         self.moments.add(duration_ns)
 
     def quantile(self, share: float) -> float:
-        """Return the duration [ns] that `share` of all stay below or at: a bin's upper edge, at most the
+        """Return the duration [ns] not exceeded by a `share` of all: a bin's upper edge, at most the
         largest value seen. NaN while empty."""
         if not self.moments.count:
             return math.nan

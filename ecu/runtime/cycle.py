@@ -1,7 +1,7 @@
-"""The cycle: wait, drain, receive, step, transmit, send, publish, a hundred times a second.
+"""The 10 ms cycle: wait, drain, receive, step, transmit, send, publish.
 
-`cycle_once` works on memory that `new_ecu` laid out and on an open channel, ring and grid. It allocates
-nothing that stays, logs nothing and waits for nothing but its deadline.
+`cycle_once` works on memory allocated by `new_ecu` and on an open channel, ring and grid. It makes no lasting
+allocation, logs nothing and waits for its deadline alone.
 """
 
 import time
@@ -35,14 +35,14 @@ from ecu.recording.ring import Ring, publish
 from ecu.runtime.clock import MICROSECOND_NS, Grid, Histogram, Tick
 from ecu.runtime.standby import Claim, Standby
 
-WAITING_FRAMES: Final = 4096  # room for what waits: a second of a saturated bus
-HOLD_CYCLES: Final = 100  # a passing fault of the service shows for a second
+WAITING_FRAMES: Final = 4096  # buffer of received frames: a second of a saturated bus
+HOLD_CYCLES: Final = 100  # a transient fault of the service shows for a second
 FAREWELLS: Final = 3  # one may be lost
 _COUNTED: Final = (faults.SEND_FAILED, faults.FRAMES_DROPPED, faults.FOREIGN_SENDER, faults.LATE)
 
 
 class Ecu(NamedTuple):
-    """All memory of the cycle, laid out before the first one."""
+    """Memory of the cycle, allocated before the first one."""
 
     params: RecordArray
     state: RecordArray
@@ -65,7 +65,7 @@ class Ecu(NamedTuple):
 def new_ecu(
     params: RecordArray, learned: RecordArray | None, receive_plan: ReceivePlan, transmit_plan: TransmitPlan
 ) -> Ecu:
-    """Return an ECU before its first cycle, with what it has `learned` before (None: nothing)."""
+    """Return an ECU before its first cycle, with the values `learned` before (None: unadapted)."""
     params = params.copy()
     params["mapped"] = receive_plan.mapped
     state = new_state(params, learned)
@@ -95,21 +95,21 @@ class Timing:
         self.stages = tuple(Histogram() for _ in STAGES)
 
     def add(self, lateness_ns: int, stages_ns: tuple[int, ...]) -> None:
-        """Take one cycle into account."""
+        """Add one cycle."""
         self.lateness.add(lateness_ns)
         for histogram, duration_ns in zip(self.stages, stages_ns, strict=True):
             histogram.add(duration_ns)
 
 
 class Watch:
-    """Fault bits that only the service sees. A counter that rose shows its bit for `HOLD_CYCLES`."""
+    """Fault bits known to the service alone. A counter that rose shows its bit for `HOLD_CYCLES`."""
 
     def __init__(self, start: BusStatus, compiled: CompileCounter) -> None:
         self._compiled, self._compiled_at_start = compiled, compiled.count
         self._seen = [start.send_failures, start.dropped, 0, 0]
         self._until = [0, 0, 0, 0]
         self.kept = True
-        """Whether the side process keeps what it is given."""
+        """Whether the side process stores its data."""
 
     def look(self, number: int, status: BusStatus, foreign: int, overruns: int) -> int:
         """Return the bits in cycle `number`."""
@@ -140,7 +140,7 @@ class Progress:
 
     @property
     def speaks(self) -> bool:
-        """Whether this daemon sends."""
+        """Return whether this daemon sends."""
         return self.standby is None or self.standby.speaks
 
 
@@ -191,7 +191,7 @@ def cycle_once(ecu: Ecu, channel: Channel, ring: Ring, grid: Grid, run: Progress
 
 
 def _note_service(ecu: Ecu, run: Progress, tick: Tick, status: BusStatus) -> None:
-    """Tell `step` what only the service knows."""
+    """Pass the service's own findings to `step`."""
     run.overruns += tick.missed
     run.worst_lateness_ns = max(run.worst_lateness_ns, tick.lateness_ns + tick.missed * CYCLE_NS)
     inputs = ecu.inputs
@@ -227,8 +227,8 @@ def _gather(
 ) -> tuple[int, int, int]:
     """Fill `inputs` from the frames stamped up to `t_ns`.
 
-    Returns how many those are, how many of them came late and how many bear one of our own identifiers. A
-    stamp from the future means that the clock was set back since: it becomes now.
+    Returns their number, and how many of them were late and how many have one of our own identifiers. A stamp
+    in the future means that the clock was set back: it becomes now.
     """
     now_us = now_ns // MICROSECOND_NS * MICROSECOND_NS
     for i in range(count):
@@ -250,7 +250,7 @@ def _gather(
 
 @kernel
 def _keep_rest(frames: Any, first: int, count: int) -> int:
-    """Move `frames[first:count]` to the front; return how many they are."""
+    """Move `frames[first:count]` to the front; return their number."""
     for i in range(first, count):
         frames[i - first] = frames[i]
     return count - first
@@ -259,9 +259,9 @@ def _keep_rest(frames: Any, first: int, count: int) -> int:
 def send_farewell(
     ecu: Ecu, channel: Channel, number: int, sleep: Callable[[float], None] = time.sleep
 ) -> None:
-    """Send what is due with demand 0 flagged invalid, in three cycles from `number` on.
+    """Send all frames due with demand 0 flagged invalid, in three cycles from `number` on.
 
-    The hydraulic fallback takes over at once. It works whatever the cycle was in the middle of.
+    The hydraulic fallback takes over at once. It works at any point of an interrupted cycle.
     """
     outputs = ecu.outputs
     outputs["pressure_demand"] = outputs["pressure_demand_valid"] = outputs["motor_demand_valid"] = 0.0

@@ -1,4 +1,4 @@
-"""Notification of systemd (Type=notify): READY, STOPPING, and WATCHDOG=1 from the cycle. It never waits.
+"""Notification of systemd (Type=notify): READY, STOPPING, and WATCHDOG=1 from the cycle, without waiting.
 
 Protocol: sd_notify(3), sd_watchdog_enabled(3).
 """
@@ -10,11 +10,11 @@ from typing import Final
 
 from ecu.contract.signals import CYCLE_NS
 
-_SHARE: Final = 4  # of the watchdog's time between two signs of life; sd_watchdog_enabled(3) asks for 2
+_SHARE: Final = 4  # of the watchdog's time between two notifications; sd_watchdog_enabled(3) asks for 2
 
 
 class Manager:
-    """The service manager that started us, if one did; one that is gone is no matter."""
+    """The service manager that started us, if any; one that has gone is ignored."""
 
     def __init__(self, environment: Mapping[str, str] = os.environ) -> None:
         self._socket: socket.socket | None = None
@@ -23,10 +23,10 @@ class Manager:
             self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
             self._socket.setblocking(False)
         self.watchdog_cycles = _watchdog_cycles(environment) if self._address else 0
-        """Cycles between two signs of life, 0: nobody waits for one."""
+        """Cycles between two watchdog notifications, 0: no watchdog."""
 
     def tell(self, state: str) -> bool:
-        """Send one state; return whether it was taken (True where nobody asked)."""
+        """Send one state; return whether it was taken (True without a manager)."""
         if self._socket is None:
             return True
         address = "\0" + self._address[1:] if self._address.startswith("@") else self._address

@@ -1,8 +1,8 @@
-"""Everything that `run` does before READY: afterwards nothing is compiled, allocated, started or logged.
+"""Preparation of `run` until READY: afterwards nothing is compiled, allocated, started or logged.
 
 Configuration, bus, side process, learned values, kernels, listening, ring, rights: in that order. A signal
-ends it at any time (`start.left_at_once`). It listens for a whole second after the kernels are ready, and
-to nothing that waited meanwhile.
+ends it at any time (`start.left_at_once`). Listening lasts a whole second after the kernels are ready,
+without frames that waited meanwhile.
 """
 
 import os
@@ -61,7 +61,7 @@ class RunOptions(NamedTuple):
 
 
 class Session(NamedTuple):
-    """Everything that a run holds open."""
+    """Resources held open by a run."""
 
     ecu: Ecu
     channel: Channel
@@ -73,13 +73,13 @@ class Session(NamedTuple):
 
 
 class CompileProgress:
-    """Says that kernels are compiled, and how far it has come; nothing any more once it `is_over`."""
+    """Report that kernels are being compiled, and the progress; silent once it `is_over`."""
 
     def __init__(self, manager: Manager) -> None:
         self._manager, self._told_s, self.is_over = manager, 0.0, False
 
     def __call__(self, count: int) -> None:
-        """Take note that one more is begun after `count`."""
+        """Note that another compilation begins after `count`."""
         now_s = time.monotonic()
         if self.is_over or (count and now_s - self._told_s < TELL_PROGRESS_S):
             return
@@ -96,7 +96,7 @@ class CompileProgress:
 
 
 def prepare(options: RunOptions) -> Session:
-    """Return all that the cycle needs.
+    """Return all resources of the cycle.
 
     Raises:
         UserError: bad arguments or configuration, a bus that cannot be opened, or someone else already sends
@@ -113,7 +113,7 @@ def prepare(options: RunOptions) -> Session:
     params = new_params(config)
     description = _describe(options, config)
     path = ring_path(os.getpid())
-    remove_ring(path)  # of one that had our process id before: the side process takes the one that appears
+    remove_ring(path)  # of an earlier process with our id: the side process takes the one that appears
     channel = open_channel(
         options.interface,
         options.channel,
@@ -161,7 +161,7 @@ def prepare(options: RunOptions) -> Session:
 
 
 def _restored(folder: Path | None, config: Config, params: RecordArray) -> RecordArray | None:
-    """Return what was learned before, None if there is nothing to go by: the side process says why."""
+    """Return the values learned before, None without usable ones: the side process logs the reason."""
     if folder is None:
         return None
     try:
@@ -178,7 +178,7 @@ def _restored(folder: Path | None, config: Config, params: RecordArray) -> Recor
 
 
 def _describe(options: RunOptions, config: Config) -> dict[str, Any]:
-    """Return what a recording says of itself."""
+    """Return the description stored with a recording."""
     return {
         "name": config.name,
         "channel": interface_name(options.channel),

@@ -1,4 +1,4 @@
-"""Real-time rights of a process; each one that the kernel refuses is one warning with its remedy."""
+"""Real-time rights of a process; each refused one is a warning with its remedy."""
 
 import ctypes
 import gc
@@ -14,7 +14,7 @@ _MCL_CURRENT, _MCL_FUTURE = 1, 2
 
 
 class Verdict(NamedTuple):
-    """Result of one request."""
+    """Result of one request for a right."""
 
     name: str
     granted: bool
@@ -34,7 +34,7 @@ def _lock_memory(which: int = _MCL_CURRENT | _MCL_FUTURE) -> None:
 
 
 def _last_cpu() -> None:
-    """Stay on the last CPU allowed: interrupts are served by the first ones."""
+    """Pin to the last CPU allowed: interrupts are served by the first ones."""
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
 
 
@@ -56,9 +56,9 @@ AFFINITY: Final = ("affinity", _last_cpu, "let the cpuset of this process hold a
 
 
 def freeze_memory() -> None:
-    """Freeze what is alive, collect no garbage any more, have all of it in memory: after the warm-up.
+    """Freeze live objects, disable garbage collection, load all memory pages: after the warm-up.
 
-    What the kernel took out of its page cache comes from the disk, which can take a second.
+    Pages that the kernel has evicted are read from the disk, which can take a second.
     """
     gc.collect()
     gc.freeze()
@@ -68,9 +68,9 @@ def freeze_memory() -> None:
 
 
 def make_realtime() -> list[Verdict]:
-    """Settle what has not settled, ask for SCHED_FIFO, locked memory and one CPU; return the verdicts.
+    """Freeze memory, request SCHED_FIFO, locked memory and one CPU; return the verdicts.
 
-    A refusal is logged and the service goes on.
+    A refusal is logged and the service continues.
     """
     freeze_memory()
     verdicts = [_attempt(*request) for request in REQUESTS]

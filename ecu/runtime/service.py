@@ -1,8 +1,8 @@
-"""`brake-ecu run`: prepare (`ecu/runtime/prepare.py`), cycle until something ends it, say farewell, leave.
+"""Service `brake-ecu run`: prepare (`ecu/runtime/prepare.py`), cycle until a signal or fault, farewell, exit.
 
-From READY on the loop neither logs nor waits for anything but its deadline. Whatever ends it, but for SIGKILL
-and a crash of the interpreter, the last frames flag every demand invalid (`send_farewell`). What there is to
-say goes through the ring to the side process (`ecu/recording/side_process.py`).
+From READY on the loop logs nothing and waits for its deadline alone. However it ends, except by SIGKILL or a
+crash of the interpreter, the last frames flag every demand invalid (`send_farewell`). Events reach the log
+through the ring and the side process (`ecu/recording/side_process.py`).
 """
 
 import signal
@@ -29,7 +29,7 @@ def run(options: RunOptions) -> int:
     Raises:
         UserError: bad arguments or configuration, a bus that cannot be opened, or someone else already sends
             one of our frames.
-        RunFault: no frame that the ECU knows came in the whole run, or the bus was off at its end.
+        RunFault: no frame known to the ECU was received in the run, or the bus was off at its end.
     """
     configure_logging()
     stopping: list[int] = []
@@ -51,12 +51,12 @@ def run(options: RunOptions) -> int:
         words["by"] = signal.Signals(stopping[0]).name
     except BaseException as error:
         words["by"] = f"{type(error).__name__}: {error}"
-        if isinstance(error, OSError):  # of the machine, not of an argument: starting again may help
+        if isinstance(error, OSError):  # of the machine, not of an argument: a restart may help
             raise RunFault(f"the loop ended: {error}") from error
         raise
     finally:
         if progress.speaks:
-            with suppress(Exception):  # whatever is broken, what follows is still to be done
+            with suppress(Exception):  # even after an error the rest is still to be done
                 send_farewell(session.ecu, session.channel, progress.number)
         _leave(session, {**words, **_summary(progress)})
     where = f"{options.interface} {options.channel}"

@@ -1,8 +1,8 @@
-"""The loop's end of its side process: start it, hear that it lives, never wait for it.
+"""Loop's end of its side process: starts and monitors it without ever waiting for it.
 
 The two ends of a socket: the supervisor (`supervisor.py`) and the recorder (`ecu/recording/recorder.py`) hold
-one, the loop the other. The loop's death is the end of file there, theirs is one here. They say `KEPT` or
-`NOT_KEPT` with the number of the last cycle they handled, ten times a second.
+one, the loop the other. The death of either end is an end of file at the other. The side process sends `KEPT`
+or `NOT_KEPT` with the number of the last cycle it handled, ten times a second.
 """
 
 import os
@@ -19,13 +19,13 @@ from ecu.errors import UserError
 
 READY, KEPT, NOT_KEPT, AWAY, REFUSED = b"r", b"+", b"-", b"x", b"!"
 SILENCE_NS: Final = 5_000_000_000
-"""Without a word that long it hangs. The ring holds 24 s."""
+"""Silent for that long, it hangs. The ring holds 24 s."""
 START_PATIENCE_S: Final = 20.0
 _WORDS_AT_ONCE: Final = 16
 
 
 def word(kind: bytes, followed: int) -> bytes:
-    """Return what the side process says after the cycle `followed`."""
+    """Return the message of the side process after the cycle `followed`."""
     return kind + struct.pack("=q", followed)
 
 
@@ -56,10 +56,10 @@ class Side:
         self._kept, self._heard_ns = False, 0
 
     def await_ready(self) -> None:
-        """Wait until it has opened the ring and what it writes; one that does not come is away.
+        """Wait until it has opened the ring and its files; one that does not answer counts as lost.
 
         Raises:
-            UserError: it says what the user can mend.
+            UserError: an error that it reports for the user to mend.
         """
         self._socket.settimeout(START_PATIENCE_S)
         try:
@@ -72,7 +72,7 @@ class Side:
         self._socket.setblocking(False)
 
     def look(self, now_ns: int) -> bool:
-        """Return whether what the loop hands over is kept; `now_ns` on the monotonic clock."""
+        """Return whether data of the loop are being stored; `now_ns` on the monotonic clock."""
         self._heard_ns = self._heard_ns or now_ns
         for _ in range(_WORDS_AT_ONCE):
             try:
@@ -105,5 +105,5 @@ class Side:
         return True
 
     def abandon(self) -> None:
-        """Let go of it: it ends by itself."""
+        """Close the socket: the process then ends by itself."""
         self._socket.close()

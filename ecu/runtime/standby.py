@@ -1,19 +1,18 @@
-"""A second daemon that follows the bus in silence and speaks once the first one has fallen silent.
+"""Standby: a second daemon that follows the bus in silence and takes over when the first one falls silent.
 
 It runs the whole cycle on the same frames, so its estimates, limiter and mode are warm at any time; only
 sending is left out. It takes over when none of the ECU's identifiers was heard for `SILENCE_NS` on the
-monotonic clock, and falls silent again in the cycle in which it hears one: two never talk side by side. It
-has to have heard a first one, so two that are started together do not race; where none was ever heard it
-stays silent. One standby per bus: two of them would take over together.
+monotonic clock, and falls silent again in the cycle in which it hears one: two never send side by side. It
+must have heard a first daemon, so two started together do not race; without one it stays silent. One standby
+per bus: two of them would take over together.
 
-A daemon that sends and hears another sender of its frames asks who was there first (`Claim`): a newcomer
-yields and goes on as a standby would, an established one stays. Reasons: docs/safety.md.
+When a sending daemon hears another sender of its frames, precedence decides (`Claim`): a newcomer yields and
+continues as a standby, an established one stays. Reasons: docs/safety.md.
 
-The alive counters go on where those of the first one stopped, so that receivers see no foreign sequence.
-
-What was learned comes out of the first one's ring at the start, if it runs on this machine; from then on the
-own estimate counts, not what the ring says at the end. It saw the same frames through the same code, it
-exists where the first one's memory is gone or wrong, and nothing has to be read in the cycle that matters.
+The alive counters continue from those of the first one, so that receivers see one sequence. Learned values
+are read from the first one's ring at the start, if it runs on this machine; afterwards the own estimate
+counts, not the ring's final content. It comes from the same frames and the same code, exists where the first
+one's memory is lost or wrong, and needs no reading in the cycle of the take-over.
 """
 
 import random
@@ -35,11 +34,11 @@ from ecu.recording.store import out_of_range
 SILENCE_NS: Final = 50_000_000
 """Five cycles without a frame of the first one."""
 SPREAD_CYCLES: Final = 16
-"""Two that yielded to each other wait a random number of cycles more, below this: one of them is first."""
+"""Upper bound of the random extra cycles of two that yielded to each other: one becomes first."""
 NEWCOMER_CYCLES: Final = 200
-"""After two seconds of sending a daemon is established: whoever starts now has heard it, and refused."""
+"""After two seconds of sending a daemon is established: a new one has heard it, and refused."""
 BESIDE_CYCLES: Final = 10
-"""So long another one has to be heard. A standby is silent after one, frames held up come in one."""
+"""Least duration of another sender: a standby falls silent after one cycle, delayed frames come in one."""
 
 
 class Claim:
@@ -49,8 +48,8 @@ class Claim:
         self._spoken = self._beside = 0
 
     def is_lost(self, foreign: int, missed: int) -> bool:
-        """Take a cycle with `foreign` frames of our identifiers into account, after `missed` periods."""
-        if missed * CYCLE_NS >= SILENCE_NS:  # receivers missed us: somebody may have come in good faith
+        """Add a cycle with `foreign` frames of our identifiers, after `missed` periods."""
+        if missed * CYCLE_NS >= SILENCE_NS:  # receivers missed us: a take-over was legitimate
             self._spoken = 0
         self._spoken += 1
         self._beside = self._beside + 1 if foreign else max(0, self._beside - 1)
@@ -58,7 +57,7 @@ class Claim:
 
 
 class Standby:
-    """State of the second daemon. `yielded`: to another that may be doing the same."""
+    """State of the second daemon. `yielded`: to another that may do the same."""
 
     def __init__(self, *, yielded: bool = False) -> None:
         self.speaks = False
@@ -72,7 +71,7 @@ class Standby:
     def listen(
         self, plan: TransmitPlan, sent: Transmission, frames: RecordArray, count: int, now_ns: int
     ) -> None:
-        """Take the first `count` frames that wait into account; `now_ns` is T_k on the monotonic clock."""
+        """Check the first `count` waiting frames; `now_ns` is T_k on the monotonic clock."""
         if _adopt_counters(plan, sent, frames, count):
             self._heard_ns = now_ns
             if self.speaks:
@@ -82,7 +81,7 @@ class Standby:
 
 @kernel
 def _adopt_counters(plan: TransmitPlan, sent: Transmission, frames: Any, count: int) -> int:
-    """Return how many of the frames bear an identifier of ours; go on counting where they stopped."""
+    """Return the number of frames with one of our identifiers; continue their counters."""
     heard = 0
     for i in range(count):
         identifier = np.int64(frames[i].can_id) | (EXTENDED_ID if frames[i].flags & FRAME_EXTENDED else 0)
@@ -95,7 +94,7 @@ def _adopt_counters(plan: TransmitPlan, sent: Transmission, frames: Any, count: 
 
 
 def learned_by_first(description: dict[str, Any], mu_nominal: NDArray[np.float64]) -> RecordArray | None:
-    """Return what a living daemon on the same bus has learned (`LEARNED`, shape (1,)), None without one.
+    """Return the values learned by a living daemon on the same bus (`LEARNED`, shape (1,)), None without one.
 
     `description` is that of one's own ring: bus, vehicle and layout must be the same. `mu_nominal` has
     shape (4,).

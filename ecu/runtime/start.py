@@ -1,6 +1,6 @@
 """Fast restart of the daemon: raised priority while it loads, and fewer modules to load.
 
-Nothing here imports what takes time.
+No slow import here.
 """
 
 import gc
@@ -22,17 +22,17 @@ ENDING: Final = (
     signal.SIGUSR2,
 )
 """End a run in order; a group's are left to the loop by its side processes."""
-PRIORITY: Final = 1  # of SCHED_FIFO: before every ordinary process, after whatever runs in real time
+PRIORITY: Final = 1  # of SCHED_FIFO: above every ordinary process, below every real-time one
 
 
 def raise_priority() -> None:
-    """Run before ordinary processes do, where that is granted, and collect no garbage. So do children."""
+    """Raise priority above ordinary processes where granted, disable garbage collection, for children too."""
     _schedule("SCHED_FIFO", PRIORITY)
     gc.disable()
 
 
 def lower_priority() -> None:
-    """Take turns with ordinary processes again."""
+    """Return to ordinary priority."""
     _schedule("SCHED_OTHER", 0)
     gc.enable()
 
@@ -44,9 +44,9 @@ def _schedule(policy: str, priority: int) -> None:
 
 @contextmanager
 def without_modules(*names: str) -> Iterator[None]:
-    """Let libraries that load `names` where they find them, for what is not needed here, not find them.
+    """Hide optional modules `names` from libraries that would load them needlessly.
 
-    What is loaded already stays; afterwards anyone may import them.
+    Modules loaded already stay; afterwards all can be imported again.
     """
     absent = [name for name in names if name not in sys.modules]
     for name in absent:
@@ -60,10 +60,10 @@ def without_modules(*names: str) -> Iterator[None]:
 
 @contextmanager
 def left_at_once() -> Iterator[None]:
-    """Let any signal that has a handler end this process with exit code 0, whatever compiles at the time.
+    """Let any signal that has a handler end this process with exit code 0, even during a compilation.
 
-    A handler would run when the compiler is done, which takes a minute. Nothing was sent yet, and whatever
-    was started ends when it sees that we are gone.
+    A handler would run only after the compilation, which takes a minute. Nothing was sent yet, and child
+    processes end when they notice our exit.
     """
     reading, writing = os.pipe()
     os.set_blocking(writing, False)

@@ -1,8 +1,8 @@
-"""The supervisor of the recorder: `python -m ecu.runtime.supervisor SOCKET --ring RING …`.
+"""Supervisor of the recorder: `python -m ecu.runtime.supervisor SOCKET --ring RING …`.
 
-The loop starts nothing once it is READY, so a small process of its own does. It loads next to nothing and
-waits. It ends with the recorder when the loop is done (exit code 0) or the user has to mend something (2). A
-recorder whose supervisor died becomes one itself (`become`).
+The loop starts no process once it is READY, so this small one does. It imports next to nothing and waits. It
+ends with the recorder when the loop has ended (exit code 0) or on a user error (2). A recorder whose
+supervisor died becomes one itself (`become`).
 """
 
 import json
@@ -23,12 +23,12 @@ from ecu.runtime.start import ENDING, lower_priority
 
 PAUSE_S: Final = 0.1
 LONGEST_PAUSE_S: Final = 10.0  # less than the ring holds
-CALM_S: Final = 60.0  # one that lived that long begins with the short pause again
+CALM_S: Final = 60.0  # a recorder that lived that long restarts after the short pause again
 FINAL_EXITS: Final = (0, 2)
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Keep a recorder alive as long as the loop lives; returns its last exit code."""
+    """Keep a recorder alive as long as the loop lives; return its last exit code."""
     free_output()
     for number in ENDING:
         signal.signal(number, signal.SIG_IGN)
@@ -69,12 +69,12 @@ def _say_away(leash: socket.socket, code: int) -> None:
         "remedy": "it is started again and goes on where it was",
     }
     sys.stderr.write(json.dumps(line) + "\n")
-    with suppress(OSError):  # the loop is gone, or will notice the silence
+    with suppress(OSError):  # the loop has died, or will notice the silence
         leash.send(AWAY)
 
 
 def become(leash: int, arguments: Sequence[str]) -> NoReturn:
-    """Turn this process into a supervisor that starts a recorder to go on."""
+    """Turn this process into a supervisor that starts a recorder to continue."""
     command = [sys.executable, "-m", "ecu.runtime.supervisor", str(leash), "--again", *arguments]
     os.execv(sys.executable, command)
 

@@ -5,12 +5,12 @@
 
 Corrected: the printed max(0, T_EM - T_max) is always zero, since T_EM is limited already.
 
-The linings are demanded the torque left by the planned motor torque, and the motor adds the torque that they
-still lack (`friction_torque.py`): it is ten times as fast as the hydraulics (26 ms dead time, 90 % after 0.1
-s), so their sum follows the demand while torque changes hands. The plan must therefore lead: it uses limit
-and demand predicted `AHEAD` from now where one falls or the other rises. Towards standstill the limit fades
-with the speed below `fade_speed`, which is known before it begins. The motor takes more again at a rate that
-the hydraulics follow. Where the plan drops, the last part of the linings' share comes later: the pressure
+The lining demand is the torque that the plan leaves, and the motor adds the torque that the linings still
+lack (`friction_torque.py`): it is ten times as fast as the hydraulics (26 ms dead time, 90 % after 0.1 s), so
+their sum follows the demand while torque changes hands. The plan must therefore lead: it uses limit and
+demand predicted `AHEAD` from now where one falls or the other rises. Towards standstill the limit fades with
+the speed below `fade_speed`, which is known before it begins. The motor takes more again at a rate that the
+hydraulics follow. Where the plan drops, the last part of the linings' share comes later: the pressure
 overshoots a step by 6 %, and a motor that is no longer available cannot compensate for that.
 
 A motor whose limit or torque is unknown, or whose torque falls short of its demand, leaves the plan; its
