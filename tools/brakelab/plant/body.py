@@ -3,9 +3,9 @@
 Model. Planar: A.1 (corrected: psi' v_y carries the mass), wheel positions A.2 and A.5 (corrected: rear axle
 at l_r), road grade and bank, drag at the height of the centre of gravity (assumption). Signs: ISO 8855.
 
-Attitude without a suspension (seven degrees of freedom): what springs and tyres have taken up of the
-acceleration follows it as a second-order lag; pitch, roll and load transfer are in proportion to that, so
-loads lag behind the forces. With a suspension `chassis.py` takes its place.
+Attitude without a suspension (seven degrees of freedom): the acceleration absorbed by springs and tyres is a
+second-order lag of the acceleration; pitch, roll and load transfer are proportional to it, so loads lag
+behind the forces. With a suspension `chassis.py` replaces it.
 """
 
 import math
@@ -14,12 +14,12 @@ from brakelab.plant.hydraulics import second_order
 from brakelab.plant.jit import Record, kernel
 from brakelab.plant.records import GRAVITY
 
-SMALLEST_LOAD = 50.0  # N. A lifted wheel keeps this, so that the tyre's equations stay finite
+SMALLEST_LOAD = 50.0  # N. Least load of a lifted wheel, so that the tyre's equations stay finite
 
 
 @kernel
 def set_wheel_loads(params: Record, state: Record, grade: float, bank: float) -> None:
-    """Set the four wheel loads [N] from what is taken up so far (sum: m g cos(grade) cos(bank))."""
+    """Set the four wheel loads [N] from the absorbed acceleration (sum: m g cos(grade) cos(bank))."""
     base = params.front_length + params.rear_length
     weight = params.mass * GRAVITY * math.cos(grade) * math.cos(bank)
     transfer = params.mass * state.felt_accel[0] * params.cog_height / base
@@ -74,7 +74,7 @@ def tyre_forces(params: Record, state: Record, steering_angle: float) -> tuple[f
 def advance_planar(
     params: Record, state: Record, steering_angle: float, grade: float, bank: float, dt: float
 ) -> None:
-    """Move speed, yaw rate and place on by `dt` [s] under the tyre forces (A.1, corrected).
+    """Advance speed, yaw rate and position by `dt` [s] under the tyre forces (A.1, corrected).
 
     The axes turn with the car at its mean yaw rate, trapezoidal: turning alone changes no energy.
     """

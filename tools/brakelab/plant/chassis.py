@@ -1,4 +1,4 @@
-"""The sprung body on its suspension: heave, pitch, roll and four unsprung masses over a road with height.
+"""Sprung body on its suspension: heave, pitch, roll and four unsprung masses over a road with height.
 
 With the road plane's motion (`body.py`) and four spins (`wheel.py`) these are fourteen degrees of freedom.
 States: heave z_s, pitch theta (nose down), roll phi (right side down), unsprung heights z_us, their rates;
@@ -19,7 +19,7 @@ the road, h below its centre of gravity, so a leaning body's weight leans with i
 gravity across the road.
 
 Assumptions: links carry no vertical force (no anti-dive; roll axis on the ground), the tyre has no vertical
-damping, gyroscopic terms of the body are left out, the body's centre of gravity stands over the axles so that
+damping, gyroscopic terms of the body are neglected, the body's centre of gravity lies such that
 the whole car's is at l_f, l_r.
 
 Discretisation: positions at half the step, one evaluation of the forces there, rates over the whole step,
@@ -42,7 +42,7 @@ def sprung_mass(params: Record) -> float:
 
 @kernel
 def sprung_front_length(params: Record) -> float:
-    """Return how far the body's centre of gravity is behind the front axle [m]."""
+    """Return the distance of the body's centre of gravity behind the front axle [m]."""
     unsprung = params.unsprung_mass
     base = params.front_length + params.rear_length
     rear = (unsprung[2] + unsprung[3]) * base
@@ -79,7 +79,7 @@ def tyre_load(params: Record, wheel: int, height: float) -> float:
 
 @kernel
 def raise_road(params: Record, state: Record, commands: Record) -> None:
-    """Take over the heights under the wheels, and the work [J] that they do on the tyres at once."""
+    """Set the heights under the wheels, and the work [J] that a change does on the tyres at once."""
     for wheel in range(4):
         height = commands.road_height[wheel]
         if height != state.road_height[wheel]:
@@ -91,7 +91,7 @@ def raise_road(params: Record, state: Record, commands: Record) -> None:
 
 @kernel
 def advance_chassis(params: Record, state: Record, commands: Record, dt: float) -> None:
-    """Move body and unsprung masses on by `dt` [s] and set the wheel loads at half the step [N]."""
+    """Advance body and unsprung masses by `dt` [s] and set the wheel loads at half the step [N]."""
     half = 0.5 * dt
     body_mass = sprung_mass(params)
     front = sprung_front_length(params)
@@ -170,7 +170,7 @@ def advance_chassis(params: Record, state: Record, commands: Record, dt: float) 
 def settle(params: Record, state: Record) -> None:
     """Put the car at rest on its springs on a level road: heights, pitch, wheel loads.
 
-    The weight's lean at that pitch is left out; stops must not be reached.
+    The weight's lean at that pitch is neglected; stops must not be reached.
     """
     base = params.front_length + params.rear_length
     front = sprung_front_length(params)

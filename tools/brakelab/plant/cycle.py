@@ -1,4 +1,4 @@
-"""One 10 ms cycle of the simulated vehicle: what the actuators are told, ten steps of the car.
+"""One 10 ms cycle of the simulated vehicle: actuator commands, then ten steps of the car.
 
 Fallback: when the pressure demand is flagged invalid, or none was accepted for 30 ms, the hydraulics brake on
 their own: equal pressure on all wheels in proportion to the driver's demand, with nominal friction.
@@ -22,7 +22,7 @@ BAR: Final = 1e5  # Pa
 def set_commands(
     script: Script, params: Record, state: Record, driver: Record, demand: Record, commands: Record
 ) -> None:
-    """Set what the actuators do in the coming cycle, and the road as far as it is described by time."""
+    """Set the actuators for the coming cycle, and the road as far as it is described by time."""
     heard = demand.pressure_valid == 1 and demand.pressure_age < DEMAND_TIMEOUT
     decel = max(driver.decel_demand, 0.01 * driver.pedal_position * FULL_PEDAL_DECEL)
     asks = driver.braking == 1 or decel > 0.0
@@ -45,9 +45,9 @@ def set_commands(
 def move(
     script: Script, params: Record, state: Record, driver: Record, demand: Record, commands: Record
 ) -> None:
-    """Move the car on by one cycle, after `drive` has let the driver act.
+    """Advance the car by one cycle, after `drive` has moved the driver.
 
-    `demand` is what was understood of the ECU up to now; its ages grow by a cycle.
+    `demand` holds the ECU's demands decoded so far; its ages grow by a cycle.
     """
     set_commands(script, params, state, driver, demand, commands)
     if round(state.t / CYCLE) == script.fault_cycle:

@@ -215,7 +215,7 @@ def load_plant(path: Path) -> Plant:
 
 
 def set_lining(car: Any, wheel: int, lining: Lining, law: str, mu_nominal: float) -> None:
-    """Let a wheel of `car`, one `PARAMS`, have a lining under one of its laws, of that nominal friction."""
+    """Fit a wheel of `car`, one `PARAMS`, with a lining under one of its laws, of that nominal friction."""
     entry = lining.friction[law]
     car["friction_law"][wheel], car["friction_row"][wheel] = law_row(entry, lining.brake)
     car["friction_scale"][wheel] = mu_nominal / nominal_friction(rig_with(lining, law))

@@ -1,11 +1,11 @@
-"""The brake disc as one lump of heat.
+"""Brake disc as a lumped thermal mass.
 
 Model. tau' = xi T_b |omega| - (delta_0 + delta_1 v)(tau - tau_env) (3.7), air speed v the car's. xi is
 constant, as the thesis holds it in Table C.1 (Figure 3.6a has a slope of the heat capacity, but no number).
 Wet: rain multiplies delta_1 by WET. Assumption: the thesis shows (Figure 7.15) that rain adds cooling at
 high speed, but no figures.
 
-Source. 3.7, Table C.1 (corrected: delta_1 a tenth of the print; as printed a disc falls from 400 to 100 degC
+Source. 3.7, Table C.1 (corrected: delta_1 a tenth of the print; as printed a disc cools from 400 to 100 degC
 in a minute at 100 km/h). A lump is justified while the Biot number (3.1) is below 0.1.
 """
 

@@ -1,7 +1,7 @@
-"""One car of a series: everything that a configuration cannot know, drawn from a seed.
+"""One car of a series: all properties unknown to a configuration, drawn from a seed.
 
-`config/plant/draw.toml` has the widths: "wide" is what cars and sensors differ by that share one
-configuration, "nominal" a kinder one that leaves brakes, hydraulics and sensors as they are described.
+`config/plant/draw.toml` has the widths: "wide" is the scatter of cars and sensors that share one
+configuration, "nominal" a smaller one that leaves brakes, hydraulics and sensors as described.
 """
 
 from collections.abc import Mapping
@@ -23,7 +23,7 @@ SAME: Final = (1.0, 1.0)
 
 
 class Widths(Section):
-    """Half the width of an even distribution, relative unless said; factors have both of their bounds."""
+    """Half-widths of uniform distributions, relative unless stated; factors have both of their bounds."""
 
     mass: NotNegative = 0.0
     cog_height: NotNegative = 0.0
@@ -104,7 +104,7 @@ def draw(plant: Plant, seed: int, width: Widths) -> RecordArray:
     """Return the parameters of one car of the series, shape (1,); the same for the same `seed`.
 
     Raises:
-        PlantFileError: a friction law that is drawn is not in the lining file.
+        PlantFileError: a drawn friction law is not in the lining file.
     """
     body, rest = np.random.default_rng(seed), np.random.default_rng([seed, 5])
     params = nominal(plant)
@@ -176,9 +176,9 @@ def _draw_hydraulics(car: Any, width: Widths, random: Generator) -> None:
 
 
 def draw_sensors(known: Mapping[str, SensorErrors], seed: int, width: Widths) -> dict[str, SensorErrors]:
-    """Return what the sensors of one car have instead of what is `known` of them, by name of the signal.
+    """Return the drawn properties of one car's sensors that deviate from those `known`, by signal name.
 
-    A sensor whose noise is given as nothing stays without, but for the motors' torque.
+    A sensor without configured noise stays without, except for the motors' torque.
     """
     random = np.random.default_rng([seed, 6])
     low, high = np.log(width.sensor_noise)

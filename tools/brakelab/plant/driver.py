@@ -1,10 +1,10 @@
-"""The driver: a script of phases becomes pedals, requests, motor torque and steering.
+"""Driver model: a script of phases becomes pedals, requests, motor torque and steering.
 
 A phase holds a speed on the motors, coasts, follows a speed trace, or brakes: by deceleration demand, by a
-fixed pedal, or by whatever pedal keeps a deceleration, as the expert driver of section 6.2.2 does who watches
+fixed pedal, or by the pedal that keeps a deceleration, like the expert driver of section 6.2.2, who watches
 the measured one. It ends after its time or when the speed passes `until_speed`. Demand and pedal move at a
-finite rate between phases too. A driver knows mass and resistance of the car and about how hard it brakes for
-a pedal position; the rest is found missing.
+finite rate between phases too. The driver knows mass and resistance of the car and roughly its deceleration
+by pedal position; the error is learned.
 """
 
 import math
@@ -26,14 +26,14 @@ LARGEST_CORRECTION: Final = 4.0  # m/s^2. Assumption
 LOOK_AHEAD: Final = 0.3  # s; covers the brakes' dead time and build-up. Assumption
 GLANCE: Final = 1.0  # s over which the trace's acceleration is seen. Assumption
 LIFT_OFF_DECEL: Final = 0.4  # m/s^2 that the motors give with both pedals free. Assumption
-RELEASE_DECEL: Final = 0.1  # m/s^2, below which the brake pedal is let go. Assumption
+RELEASE_DECEL: Final = 0.1  # m/s^2, below which the brake pedal is released. Assumption
 HOLDING_PEDAL: Final = 30.0  # %, at rest. Assumption
 STANDSTILL: Final = 0.05  # m/s
-AT_REST: Final = 0.3  # m/s, below which a trace asks for rest. Assumption
+AT_REST: Final = 0.3  # m/s, below which a trace demands standstill. Assumption
 
 
 class Script(NamedTuple):
-    """A scenario in arrays: what driver and road do."""
+    """A scenario in arrays: actions of the driver, and the road."""
 
     phases: NDArray[Any]
     """PHASE records."""
@@ -94,7 +94,7 @@ def _towards(value: float, target: float, step: float) -> float:
 
 @kernel
 def _learn(driver: Record, more: float) -> None:
-    """Correct what the driver expected by `more` [m/s^2]."""
+    """Correct the driver's expectation by `more` [m/s^2]."""
     driver.correction = min(max(driver.correction + more, -LARGEST_CORRECTION), LARGEST_CORRECTION)
 
 
@@ -110,7 +110,7 @@ def _resistance(params: Record, state: Record, grade: float, rolling: bool) -> f
 
 @kernel
 def _drive_on(params: Record, state: Record, driver: Record, accel: float, force: float, full: float) -> None:
-    """Let the motors push with `force` [N], the accelerator at `accel` of `full` [m/s^2]."""
+    """Drive the motors with `force` [N], the accelerator at `accel` of `full` [m/s^2]."""
     for wheel in range(4):
         driver.motor_demand[wheel] = -force * state.rolling_radius[0] * params.motor_share[wheel]
     driver.accelerator_position = min(max(100.0 * accel / full, 0.0), 100.0)
@@ -125,7 +125,7 @@ def _hold_speed(params: Record, state: Record, driver: Record, phase: Record, gr
 
 @kernel
 def _follow(script: Script, params: Record, state: Record, driver: Record, phase: Record, dt: float) -> float:
-    """Drive or coast on the motors after the trace; return the pedal [%] wanted where that does not do."""
+    """Drive or coast on the motors after the trace; return the pedal [%] for the remainder."""
     trace = script.trace
     soon = driver.elapsed + LOOK_AHEAD
     asked = value_at(trace, driver.elapsed, 1)
@@ -154,14 +154,14 @@ def _keep_decel(state: Record, driver: Record, wanted: float, dt: float) -> floa
     """Return the pedal [%] that brings the measured deceleration to `wanted` [m/s^2]."""
     pedal = pedal_for(wanted + driver.correction)
     if abs(pedal - driver.pedal_position) < 1.0:
-        # Only once the foot is where it was meant to be.
+        # Only once the pedal is where it was meant to be.
         _learn(driver, DECEL_PATIENCE * dt * (wanted + state.accel_x))
     return pedal
 
 
 @kernel
 def _share(script: Script, params: Record, state: Record, driver: Record) -> None:
-    """Split the deceleration asked for between the motors, as far as they can, and the brakes."""
+    """Split the demanded deceleration between the motors, up to their limits, and the brakes."""
     covered = 0.0
     radius = state.rolling_radius[0]
     torque = script.motor_share * params.mass * driver.asked_decel * radius
@@ -174,7 +174,7 @@ def _share(script: Script, params: Record, state: Record, driver: Record) -> Non
 
 @kernel
 def _next_phase(script: Script, state: Record, driver: Record, dt: float) -> bool:
-    """Go on in the script where a phase is over; return whether there is one left."""
+    """Go to the next phase of the script where one has ended; return whether there is one."""
     phases = script.phases
     if driver.phase < len(phases) and driver.started:
         phase = phases[driver.phase]
@@ -202,9 +202,9 @@ def _next_phase(script: Script, state: Record, driver: Record, dt: float) -> boo
 
 @kernel
 def drive(script: Script, params: Record, state: Record, driver: Record, dt: float) -> bool:
-    """Let the driver act for the coming `dt` [s]; return whether the script is still running.
+    """Advance the driver by the coming `dt` [s]; return whether the script is still running.
 
-    In a braking phase the driver leaves the motors alone, but for the script's `motor_share`.
+    In a braking phase the driver does not use the motors, except for the script's `motor_share`.
     """
     if not _next_phase(script, state, driver, dt):
         return False

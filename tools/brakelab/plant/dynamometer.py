@@ -1,9 +1,9 @@
-"""The brake dynamometer: one brake, a flywheel for a quarter car, and what is imposed on them (3.2).
+"""Brake dynamometer: one brake, a flywheel for a quarter car, and the conditions imposed on them (3.2).
 
 A stop runs from a speed to a speed, or for a time, or up to a temperature, under one of four controls:
 
 PRESSURE      a pressure is held, the flywheel runs free
-DECELERATION  the pressure, up to 210 bar, follows from the present friction to slow the flywheel as asked
+DECELERATION  the pressure, up to 210 bar, follows from the present friction for the demanded deceleration
 REPLAY        a measured pressure and the speed are imposed, friction is observed; the heat is measured too
 DRAG          pressure and speed are held
 
@@ -30,12 +30,12 @@ HIGHEST_PRESSURE: Final = 210e5  # Pa (3.2)
 SMALLEST_LEVER: Final = 1e-9  # m^3, keeps the quotient finite for a brake without friction
 PRESSURE, DECELERATION, REPLAY, DRAG = range(4)
 
-# What stands on the rig.
+# Test object on the rig.
 RIG: Final = np.dtype(
     [
         ("law", "i8"),
         ("row", "f8", (ROW,)),
-        ("mass", "f8"),  # kg, of the quarter car that the flywheel stands for
+        ("mass", "f8"),  # kg, of the quarter car represented by the flywheel
         ("gain", "f8"),  # rad/s^2 per Pa, 2 A_k r_eff / I
         ("piston_area", "f8"),  # m^2
         ("effective_radius", "f8"),  # m
@@ -49,7 +49,7 @@ RIG: Final = np.dtype(
     align=True,
 )
 
-# What one stop asks for.
+# Demands of one stop.
 STOP: Final = np.dtype(
     [
         ("control", "i8"),
@@ -65,7 +65,7 @@ STOP: Final = np.dtype(
     align=True,
 )
 
-# What is recorded at every step.
+# Recorded at every step.
 TRACE: Final = np.dtype(
     [
         ("t", "f8"),  # s
@@ -89,7 +89,7 @@ def run(rig: Record, stop: Record, trace: Record, dt: float) -> int:
     omega = stop.speed / rig.tyre_radius
     temperature = stop.temperature
     memory = rig.row[START]
-    # The friction that control starts from: the law's at the first contact.
+    # Initial friction for the control: the law's at the first contact.
     sliding = rig.effective_radius * omega
     memory, mu = friction(rig.law, rig.row, memory, 0.0, sliding, 0.0, temperature, 0.0)
     wanted = rig.mass * stop.deceleration * rig.tyre_radius
@@ -136,7 +136,7 @@ def new_stop(
     measured_mu: float = 0.0,
     end_temperature: float = np.inf,
 ) -> RecordArray:
-    """Return what a stop asks for, shape (1,): speeds [m/s], temperatures [degC], pressure [Pa]."""
+    """Return the demands of a stop, shape (1,): speeds [m/s], temperatures [degC], pressure [Pa]."""
     record = new_record(STOP)
     record[0] = (
         control,

@@ -58,7 +58,7 @@ class StopResult(NamedTuple):
 
     speed: float  # km/h
     level: float
-    temperature: float  # degC, asked for
+    temperature: float  # degC, demanded
     start_temperature: float  # degC, reached by the gate
     gate_seconds: float
     seconds: float
@@ -79,9 +79,9 @@ def load_programme(path: Path) -> Programme:
 
 
 def bring_to(rig: RecordArray, gate: Gate, temperature: float, wanted: float) -> Gated:
-    """Return how long it takes to bring the disc from `temperature` to `wanted` [degC], and what is reached.
+    """Return the time to bring the disc from `temperature` to `wanted` [degC], and the temperature reached.
 
-    A brake that fades before it is warm enough gives up after 100 drags.
+    The attempt ends after 100 drags, for a brake that fades before it is warm enough.
     """
     if temperature > wanted:
         return Gated(cool(rig, KMH * gate.cool_speed, temperature, wanted), wanted)

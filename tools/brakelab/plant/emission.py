@@ -1,4 +1,4 @@
-"""Particles that the simulated brakes emit, by a law of its own: power, sliding, heat, what was before.
+"""Particle emission of the simulated brakes, by a law of its own: power, sliding speed, heat, history.
 
 The number of particles of one brake grows by
 
@@ -75,7 +75,7 @@ class EmissionLaw(Section):
 
 @kernel
 def emission_rate(row: Record, power: float, speed: float, heat: float) -> float:
-    """Return particles per second of a surface that is run in and was never hot.
+    """Return particles per second of a run-in surface without heat treatment.
 
     `power` of friction [W], `speed` of sliding [m/s], `heat` of the disc [degC].
     """
@@ -96,7 +96,7 @@ def conditioning(row: Record, work: float, treatment: float) -> float:
 
 @kernel
 def treat(row: Record, treatment: float, power: float, heat: float, dt: float) -> float:
-    """Return how far heat has treated the surface `dt` [s] later; `power` [W], `heat` of the disc [degC]."""
+    """Return the heat treatment of the surface `dt` [s] later; `power` [W], `heat` of the disc [degC]."""
     contact = heat + row[FLASH] * power
     ends_at = 1.0 / (1.0 + math.exp(-(contact - row[TREATED_FROM]) / row[HOT_WIDTH]))
     stays = math.exp(-dt * power / row[TREATED_WORK])
@@ -105,7 +105,7 @@ def treat(row: Record, treatment: float, power: float, heat: float, dt: float) -
 
 @kernel
 def advance_emission(params: Record, state: Record, dt: float) -> None:
-    """Count what the four brakes emit in `dt` [s]: the mean, without scatter."""
+    """Add the emission of the four brakes in `dt` [s]: the mean, without scatter."""
     for wheel in range(4):
         power = state.brake_work[wheel] / dt
         if power <= 0.0:

@@ -1,14 +1,14 @@
-"""A brake in its enclosure on the road: what a trip does to it, what it emits, what the counter shows.
+"""Brake in its enclosure on the road: load by a trip, emission, and the counter's reading.
 
-The brake of one corner follows a speed trace: the brakes take what drag, rolling, grade and engine do not.
-Air is drawn through the enclosure and a tunnel (Figure 8.1); on the way
+The brake of one corner follows a speed trace: the brakes supply the force not given by drag, rolling, grade
+and engine. Air is drawn through the enclosure and a tunnel (Figure 8.1); on the way
 
     n' = (1 - d) N' + s / T_s - n / T_m             n mixes in the enclosure
     s' = d N' - s / T_s                             a share d settles and comes off later, while driving
     c(t) = n(t - delay) / (T_m Q) + background      Q: flow of the tunnel
 
 and the counter answers with a lag and is read once a second. The background grows with speed; traffic makes
-it wander log-normally. What an application emits scatters log-normally about the law of `emission.py`.
+it wander log-normally. The emission of an application scatters log-normally about the law of `emission.py`.
 
 Source: sections 8.2 to 8.4. Assumption: all constants below.
 """
@@ -27,11 +27,11 @@ from brakelab.plant.records import GRAVITY
 STEP: Final = 0.01  # s
 SAMPLE: Final = 10  # steps: 10 Hz
 COUNTED: Final = 100  # steps: the counter is read once a second
-STORED: Final = 200  # steps that the air may be on its way
-PRESSES: Final = 0.30  # m/s^2 of the brakes, from which the driver takes to the pedal
+STORED: Final = 200  # steps, longest transport delay of the air
+PRESSES: Final = 0.30  # m/s^2 of the brakes, from which the driver presses the pedal
 LEAVES: Final = 0.05  # m/s^2
 ACTUATION: Final = 0.12  # s, lag of the torque
-HELD: Final = 12e5  # Pa, while the car stands
+HELD: Final = 12e5  # Pa, at standstill
 CUBIC_METRE: Final = 1e6  # cm^3
 
 TRIP: Final = np.dtype(
@@ -39,12 +39,12 @@ TRIP: Final = np.dtype(
         ("overrun", "f8"),  # m/s^2, by the engine, foot off
         ("ambient", "f8"),  # degC
         ("flow", "f8"),  # m^3/s of the tunnel
-        ("delay", "f8"),  # s of the air on its way
+        ("delay", "f8"),  # s, transport delay of the air
         ("mixing", "f8"),  # s
         ("response", "f8"),  # s of the counter
         ("settles", "f8"),  # share that settles in enclosure and tunnel
         ("settled_for", "f8"),  # s
-        ("background", "f8"),  # 1/cm^3 of the air that stands
+        ("background", "f8"),  # 1/cm^3 of still air
         ("background_by_speed", "f8"),  # 1/cm^3 per m/s
         ("work", "f8"),  # J of this brake before the trip
         ("treatment", "f8"),  # -, of its surface before the trip
@@ -58,7 +58,7 @@ T, SPEED, PRESSURE, TORQUE, HEAT, CONCENTRATION, EMITTED = range(7)
 
 @kernel
 def _asked(car: Record, wheel: int, speed: float, accel: float, grade: float, overrun: float) -> float:
-    """Return the torque [N m] that this brake would have to give, ideally distributed; may be negative."""
+    """Return the torque [N m] demanded of this brake, ideally distributed; may be negative."""
     drag = car.drag_factor * speed * speed / car.mass
     rest = drag + GRAVITY * (car.rolling_resistance + grade) + overrun
     brakes = -accel - rest

@@ -1,13 +1,14 @@
 """Energy balance of a drive.
 
-Kinetic energy (translation, yaw, spin, heave, pitch, roll, unsprung masses) and what springs, stops, bars and
-tyres store are functions of the state. What leaves or enters is summed by the plant in its own steps (J in
-`STATE`): each part's force times its own mean speed, as the integrator moves it. For the planar motion and
-the spins this is exact to rounding; what does not close is the error of the suspension's integration.
+Kinetic energy (translation, yaw, spin, heave, pitch, roll, unsprung masses) and the energy stored in springs,
+stops, bars and tyres are functions of the state. Energy that leaves or enters is summed by the plant in its
+own steps (J in `STATE`): each part's force times its own mean speed, as the integrator moves it. For the
+planar motion and the spins this is exact to rounding; the residual is the error of the suspension's
+integration.
 
 A tyre whose force lags (A.13, A.14) is a spring K in series with its slip: it stores F^2 / (2 K). `tyres` is
-what remains of the work that went into them, the loss by slip. A force acts on the car with the end of a
-step and on the wheel with its middle, so `tyres` also holds half a step of it while it builds up.
+the rest of the work done on them, the loss by slip. A force acts on the car with the end of a step and on the
+wheel with its middle, so `tyres` also holds half a step of it while it builds up.
 
 A height of the road lifts a wheel without holding the car back, as a shaker would (assumption: slopes of a
 profile are small); this work enters as `road`. The reduced car's body leans without energy.
@@ -24,7 +25,7 @@ from brakelab.plant.records import RecordArray
 
 
 class Energy(NamedTuple):
-    """Energy [J] that was released (first four) and where it went (the rest)."""
+    """Energy [J] released (first four) and its destinations (the rest)."""
 
     motion: float
     """Kinetic energy lost; negative: gained."""
@@ -51,7 +52,7 @@ class Energy(NamedTuple):
 
     @property
     def missing(self) -> float:
-        """Released energy that is found nowhere, as a share of the energy turned over."""
+        """Residual: released energy without destination, as a share of the energy turned over."""
         return (sum(self[:5]) - sum(self[5:])) / self.turned_over
 
 
@@ -80,7 +81,7 @@ def strut_travel(params: Record, state: Record) -> NDArray[np.float64]:
 
 
 def in_springs(params: Record, state: Record) -> float:
-    """Return what springs, stops, bars (A.9) and the tyres under their loads (A.8) store [J]."""
+    """Return the energy stored in springs, stops, bars (A.9) and the tyres under their loads (A.8) [J]."""
     if not params["suspended"]:
         return 0.0
     travel = strut_travel(params, state)
@@ -95,16 +96,16 @@ def in_springs(params: Record, state: Record) -> float:
 
 
 def in_carcasses(params: Record, state: Record) -> float:
-    """Return what the tyres store along and across [J]: F^2 / (2 K)."""
+    """Return the energy stored in the tyres, longitudinal and lateral [J]: F^2 / (2 K)."""
     along = np.sum(state["force_x"] ** 2) / params["longitudinal_stiffness"]
     across = np.sum(state["force_y"] ** 2) / params["lateral_stiffness"]
     return float(0.5 * (along + across))
 
 
 def energy(params: RecordArray, before: RecordArray, after: RecordArray) -> Energy:
-    """Return where the energy of a car went between two of its states; shape (1,) each.
+    """Return the energy balance of a car between two of its states; shape (1,) each.
 
-    `before` is a copy that was made then, for a whole drive one of the new state.
+    `before` is a copy of the earlier state, for a whole drive that of the new state.
     """
     car, old, new = params[0], before[0], after[0]
 

@@ -1,14 +1,13 @@
-"""The electro-hydraulic brake: from a pressure demand to the pressure in the calliper.
+"""Electro-hydraulic brake: from a pressure demand to the calliper pressure.
 
-Model. Second order with dead time, one set for build-up (A.17) and one for release (A.18), which `BUILD_UP`
-and `RELEASE` hold; a drawn unit has its own.
-States: pressure and its rate, which both models share, so that a change of model makes no jump.
-Input: the smaller of the demands 15 ms and 26 ms ago: a rise is seen after the longer, a fall after the
-shorter dead time. The direction of that input chooses the model; it has turned when it is HYSTERESIS away
-from its last extreme. The unit settles below high demands (offset map after Figure A.10a, straight from a
-starting pressure on; assumption, the figure has no numbers) and its controller inverts the map it knows; an
-exact inverse leaves nothing of it. The accumulator limits the pressure. Discretised by the trapezoidal rule
-(stable at every step, second order).
+Model. Second order with dead time, one parameter set for build-up (A.17) and one for release (A.18),
+`BUILD_UP` and `RELEASE`; a drawn unit has its own. States: pressure and its rate, shared by both models, so
+that a change of model is continuous. Input: the smaller of the demands 15 ms and 26 ms ago: a rise is seen
+after the longer, a fall after the shorter dead time. The direction of that input chooses the model; it has
+turned when it is HYSTERESIS away from its last extreme. The unit settles below high demands (offset map after
+Figure A.10a, straight from a starting pressure on; assumption, the figure has no numbers) and its controller
+inverts its own map; an exact inverse cancels the offset. The accumulator limits the pressure. Discretised by
+the trapezoidal rule (stable at every step, second order).
 """
 
 from typing import Final
@@ -35,13 +34,13 @@ def second_order(
 
 @kernel
 def look_back(dead_time: float, dt: float, place: int) -> int:
-    """Return the place in a history of the sample that is `dead_time` [s] old, the newest at `place`."""
+    """Return the index in a history of the sample that is `dead_time` [s] old, the newest at `place`."""
     return (place - round(dead_time / dt)) % HISTORY
 
 
 @kernel
 def settled_pressure(start: float, slope: float, command: float) -> float:
-    """Return where [Pa] the unit settles for a command: `slope` of what exceeds `start` [Pa] is lost."""
+    """Return the settled pressure [Pa] for a command: `slope` of its excess over `start` [Pa] is lost."""
     return command - slope * max(command - start, 0.0)
 
 
@@ -53,7 +52,7 @@ def command_for(start: float, slope: float, wanted: float) -> float:
 
 @kernel
 def advance_pressure(params: Record, state: Record, dt: float) -> None:
-    """Move the four calliper pressures on by `dt` [s]; the newest demand is in the history already."""
+    """Advance the four calliper pressures by `dt` [s]; the newest demand is in the history already."""
     rising = look_back(params.build_up[DEAD_TIME], dt, state.place)
     falling = look_back(params.release[DEAD_TIME], dt, state.place)
     for wheel in range(4):

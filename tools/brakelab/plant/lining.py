@@ -13,7 +13,7 @@ from brakelab.plant.jit import Record, kernel
 
 @kernel
 def advance_lining(params: Record, state: Record, dt: float) -> None:
-    """Move memory and friction of the four linings on by `dt` [s] and set the brake torque [N m]."""
+    """Advance memory and friction of the four linings by `dt` [s] and set the brake torque [N m]."""
     for wheel in range(4):
         pressure = state.pressure[wheel] - params.push_out_pressure[wheel]
         row = params.friction_row[wheel]
@@ -24,7 +24,7 @@ def advance_lining(params: Record, state: Record, dt: float) -> None:
         elif not state.applied[wheel]:
             state.applied[wheel] = 1
             state.lining_memory[wheel] = row[START]
-        # At standstill nothing slides: friction is that of the contact as it is.
+        # At standstill nothing slides: friction is that of the resting contact.
         slides = dt if state.wheel_speed[wheel] != 0.0 else 0.0
         memory, mu_b = friction(
             params.friction_law[wheel],

@@ -22,7 +22,7 @@ class Disc(Section):
 
 
 class Lining(Section):
-    """A lining with the brake and the disc it was measured on, and its friction laws by name."""
+    """Lining with the brake and the disc of its measurement, and its friction laws by name."""
 
     brake: RigBrake
     disc: Disc

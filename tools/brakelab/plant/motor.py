@@ -1,10 +1,10 @@
 """Four motors, each with its half shaft: first order with dead time (A.16), limited by map and battery.
 
 Torque is that at the wheel, positive when it brakes (regenerates). The map has Figure A.7's shape: constant
-torque, then constant power; below a wheel speed regeneration fades out. Beyond the nominal limits lies a peak
-that the motor bears for a time (30 s, Table A.1): what it takes of the peak empties a reserve, rest fills it
-again, and the last second of the reserve fades the peak out. The battery's limits are shared equally by the
-motors.
+torque, then constant power; below a wheel speed regeneration fades out. Above the nominal limits lies a peak
+that the motor sustains for a time (30 s, Table A.1): use of the peak empties a reserve, which refills
+otherwise, and the last second of the reserve fades the peak out. The battery's limits are shared equally by
+the motors.
 """
 
 import math
@@ -27,7 +27,7 @@ def map_torque(torque_limit: float, power_limit: float, speed: float) -> float:
 
 @kernel
 def advance_motors(params: Record, state: Record, dt: float) -> None:
-    """Move the four motor torques on by `dt` [s]; the newest demand is in the history already."""
+    """Advance the four motor torques by `dt` [s]; the newest demand is in the history already."""
     asked = look_back(DEAD_TIME, dt, state.place)
     motors = 0
     for wheel in range(4):

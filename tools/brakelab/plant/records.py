@@ -1,4 +1,4 @@
-"""The records of the simulated vehicle: what it is, what it does, what is asked of it. SI units, Pa, degC.
+"""Records of the simulated vehicle: parameters, state and commands. SI units, Pa, degC.
 
 Wheels stand in the order front left, front right, rear left, rear right; axes and signs after ISO 8855.
 """
@@ -15,11 +15,11 @@ from brakelab.plant.wear import WEAR_ROW
 RecordArray = NDArray[np.void]
 
 GRAVITY: Final = 9.81  # m/s^2
-HISTORY: Final = 80  # samples of demand that a dead time can look back: 40 ms at steps of 0.5 ms
-LOOK_BACK: Final = 64  # cycles that a delayed sensor can look back: 0.64 s
+HISTORY: Final = 80  # demand samples in the history: 40 ms at steps of 0.5 ms
+LOOK_BACK: Final = 64  # cycles in a sensor's history: 0.64 s
 DAMPER_KNOTS: Final = 7  # of a damper's force over speed
 
-# What one car is: nominal or drawn.
+# Parameters of one car: nominal or drawn.
 PARAMS: Final = np.dtype(
     [
         ("mass", "f8"),  # kg
@@ -52,8 +52,8 @@ PARAMS: Final = np.dtype(
         ("effective_radius", "f8", (4,)),  # m
         ("push_out_pressure", "f8", (4,)),  # Pa
         ("pressure_limit", "f8", (4,)),  # Pa
-        ("offset_start", "f8"),  # Pa, from which the brake unit settles below its command
-        ("offset_slope", "f8"),  # -, lost of what exceeds it
+        ("offset_start", "f8"),  # Pa, above which the brake unit settles below its command
+        ("offset_slope", "f8"),  # -, share lost of the excess
         ("offset_known", "f8"),  # -, slope that the unit's inverse map corrects
         ("build_up", "f8", (3,)),  # s^2, s, dead time s (A.17)
         ("release", "f8", (3,)),  # likewise (A.18)
@@ -99,7 +99,7 @@ PARAMS: Final = np.dtype(
     align=True,
 )
 
-# What is asked of it from outside: actuators and road, held over a step.
+# Commands from outside: actuators and road, held over a step.
 COMMANDS: Final = np.dtype(
     [
         ("pressure_demand", "f8", (4,)),  # Pa
@@ -129,7 +129,7 @@ STATE: Final = np.dtype(
         ("wheel_speed", "f8", (4,)),  # rad/s
         ("force_x", "f8", (4,)),  # N, tyre on car, wheel axes
         ("force_y", "f8", (4,)),
-        ("felt_accel", "f8", (2,)),  # m/s^2, what springs and tyres have taken up so far, x and y
+        ("felt_accel", "f8", (2,)),  # m/s^2, absorbed by springs and tyres so far, x and y
         ("felt_rate", "f8", (2,)),
         ("pressure", "f8", (4,)),  # Pa
         ("pressure_rate", "f8", (4,)),  # Pa/s
@@ -139,7 +139,7 @@ STATE: Final = np.dtype(
         ("motor_history", "f8", (HISTORY, 4)),
         ("place", "i8"),  # of the newest sample in the histories
         ("motor_torque", "f8", (4,)),  # N m at the wheel, positive brakes
-        ("peak_reserve", "f8", (4,)),  # s of a motor's peak that is left
+        ("peak_reserve", "f8", (4,)),  # s left of a motor's peak
         ("applied", "u1", (4,)),  # pads touch the disc
         ("lining_memory", "f8", (4,)),  # of the friction law, e.g. normalised contact area
         ("disc_temperature", "f8", (4,)),  # degC
@@ -156,7 +156,7 @@ STATE: Final = np.dtype(
         ("road_height", "f8", (4,)),  # m under each wheel
         # J since the start, see energy.py
         ("brake_heat", "f8", (4,)),
-        ("tyre_work", "f8"),  # into the tyres: slip and what their carcasses store
+        ("tyre_work", "f8"),  # into the tyres: slip and energy stored in the carcasses
         ("drag_loss", "f8"),
         ("rolling_loss", "f8"),
         ("damper_heat", "f8"),
@@ -197,8 +197,8 @@ SENSOR: Final = np.dtype(
         ("scale", "f8"),
         ("floor", "f8"),
         ("bias", "f8"),
-        ("drift_step", "f8"),  # standard deviation of what a cycle adds
-        ("drift_decay", "f8"),  # of what was there, in a cycle
+        ("drift_step", "f8"),  # standard deviation of the increment per cycle
+        ("drift_decay", "f8"),  # of the present value, per cycle
         ("dropout_begin", "f8"),  # probability per sample
         ("dropout_end", "f8"),
         ("period", "f8"),  # s
@@ -208,7 +208,7 @@ SENSOR: Final = np.dtype(
     align=True,
 )
 
-# What that sensor remembers.
+# State of that sensor.
 SENSING: Final = np.dtype(
     [
         ("history", "f8", (LOOK_BACK,)),  # true values by cycle
@@ -221,13 +221,13 @@ SENSING: Final = np.dtype(
     align=True,
 )
 
-# What the driver does in one phase of a script.
+# Actions of the driver in one phase of a script.
 PHASE: Final = np.dtype(
     [
         ("kind", "i8"),  # CRUISE, COAST, BRAKE or FOLLOW
         ("speed", "f8"),  # m/s, to be held on the motors
         ("accel", "f8"),  # m/s^2, largest acceleration on the way to that speed
-        ("decel", "f8"),  # m/s^2, asked for as a deceleration demand, or NaN
+        ("decel", "f8"),  # m/s^2, as a deceleration demand, or NaN
         ("pedal", "f8"),  # %, or NaN
         ("kept_decel", "f8"),  # m/s^2, to be reached and kept by the pedal, or NaN
         ("ramp", "f8"),  # m/s^3, of the deceleration demand
@@ -239,15 +239,15 @@ PHASE: Final = np.dtype(
 )
 CRUISE, COAST, BRAKE, FOLLOW = range(4)
 
-# What the driver does now.
+# State of the driver.
 DRIVER: Final = np.dtype(
     [
-        ("phase", "i8"),  # place in the script; beyond its end: finished
+        ("phase", "i8"),  # index in the script; beyond its end: finished
         ("started", "u1"),
         ("above", "u1"),  # the phase began above its `until_speed`
         ("braking", "u1"),
         ("elapsed", "f8"),  # s, in this phase
-        ("correction", "f8"),  # m/s^2, what the driver has found to be missing
+        ("correction", "f8"),  # m/s^2, error of the expectation as learned by the driver
         ("asked_decel", "f8"),  # m/s^2, of brakes and motors together
         ("decel_demand", "f8"),  # m/s^2, of the brakes
         ("decel_demand_valid", "f8"),
@@ -259,7 +259,7 @@ DRIVER: Final = np.dtype(
     align=True,
 )
 
-# What the ECU asks of the vehicle, as the vehicle has understood it.
+# Demands of the ECU as decoded by the vehicle.
 DEMAND: Final = np.dtype(
     [
         ("pressure", "f8", (4,)),  # bar

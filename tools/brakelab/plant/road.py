@@ -1,8 +1,8 @@
-"""The road by place: friction and height under each side, grade and bank, over the distance driven.
+"""Road by distance: friction and height under each side, grade and bank.
 
 Friction tells left from right, so that a table describes a patch, a change of surface or a split road (dry
-about 1.2, wet 0.7, ice 0.2). An axle meets a place when it gets there: the front axle `front_length` before
-the centre of gravity.
+about 1.2, wet 0.7, ice 0.2). Each axle meets a place when it reaches it: the front axle is `front_length`
+ahead of the centre of gravity.
 """
 
 from typing import Final, NamedTuple
@@ -55,13 +55,13 @@ def value_at(table: NDArray[np.float64], place: float, column: int) -> float:
 
 @kernel
 def is_described(road: Road) -> bool:
-    """Return whether anything is described by place."""
+    """Return whether the road is described by distance."""
     return len(road.friction) > 0 or len(road.height) > 0 or len(road.grade) > 0 or len(road.bank) > 0
 
 
 @kernel
 def set_road(road: Road, params: Record, state: Record, commands: Record) -> None:
-    """Set what the car stands on now, as far as the road is described by place."""
+    """Set the road under the car, as far as it is described by distance."""
     if len(road.friction) > 0 or len(road.height) > 0:
         for wheel in range(4):
             along = params.front_length if wheel < 2 else -params.rear_length

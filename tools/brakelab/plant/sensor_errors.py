@@ -1,4 +1,4 @@
-"""Sensor errors between a quantity and its signal: from a file to the kernel that applies them.
+"""Sensor errors between a quantity and its signal, from their description to the kernel that applies them.
 
 x(t) true   x_d = x(t - delay)                          linear between the cycles before and after
             b' = -b / tau + q w                         Gauss-Markov drift, tau = inf: random walk, var q^2 t
@@ -6,11 +6,11 @@ x(t) true   x_d = x(t - delay)                          linear between the cycle
             y = max(resolution * round(y / resolution), floor)
 
 A sample has no value (NaN) before its `period` is over, in a burst of dropout, and from `lost_from` on.
-Bursts begin with probability `dropout` after a sample that was there and last `dropout_length` on the mean
+Bursts begin with probability `dropout` after a present sample and last `dropout_length` on average
 (Gilbert's channel), so the share p L / (1 + p L) of all samples is missing.
 
-Draws come in the order of the signals and only where a sensor needs them: the noise of a car without other
-errors depends on the seed alone.
+Draws are made in the order of the signals and only where a sensor needs them, so the noise of a car without
+other errors depends on the seed alone.
 """
 
 import math
@@ -44,9 +44,9 @@ Delay = Annotated[float, Field(ge=0.0, le=LONGEST_DELAY)]
 
 
 class SensorErrors(Section):
-    """A sensor as a file describes it, in the unit of its signal.
+    """Sensor errors as a file describes them, in the unit of the signal.
 
-    Two bounds are drawn between, evenly, per car and corner; one number is itself.
+    Between two bounds a value is drawn uniformly per car and corner; one number is used as it is.
     """
 
     model_config = ConfigDict(allow_inf_nan=False)
@@ -134,7 +134,7 @@ SPEED_SOURCES: Final[Mapping[str, SensorErrors]] = {
 def new_sensors(layers: Iterable[Mapping[str, SensorErrors]], seed: int) -> RecordArray:
     """Return SENSOR of one car's sensors in the order of SIGNALS, shape (len(SIGNALS),).
 
-    Key by key a later layer goes before an earlier one, and a corner's name before that of all four.
+    For each key a later layer overrides an earlier one, and a corner's name that of all four.
     """
     random = np.random.default_rng([seed, 3])
     rows = np.zeros(len(SIGNALS), SENSOR)
@@ -169,7 +169,7 @@ def new_sensing() -> RecordArray:
 
 @kernel
 def _pass_time(sensor: Record, sensing: Record, true: float, cycle: int, noise: Generator) -> None:
-    """Live through the cycles since the last call, in which the true value is taken as constant."""
+    """Propagate through the cycles since the last call, in which the true value is taken as constant."""
     for k in range(min(sensing.cycle + 1, cycle), cycle + 1):
         sensing.history[k % LOOK_BACK] = true
     sensing.cycle = cycle
@@ -188,7 +188,7 @@ def _delayed(sensor: Record, sensing: Record) -> float:
 
 @kernel
 def _is_there(sensor: Record, sensing: Record, t: float, noise: Generator) -> bool:
-    """Return whether there is a sample at `t` and it is not lost."""
+    """Return whether a sample is due at `t` and not lost."""
     if sensor.period > 0.0:
         sample = math.floor(t / sensor.period)
         if sample == sensing.sample:
@@ -204,9 +204,9 @@ def _is_there(sensor: Record, sensing: Record, t: float, noise: Generator) -> bo
 def disturb(
     sensors: RecordArray, sensing: RecordArray, t: float, noise: Generator, values: NDArray[np.float64]
 ) -> None:
-    """Replace true `values` at `t` [s], shape (len(SIGNALS),), by what the sensors say; NaN: no new sample.
+    """Replace true `values` at `t` [s], shape (len(SIGNALS),), by sensor readings; NaN: no new sample.
 
-    To be called once in every cycle of 10 ms; where one was missed, delays stay what they are.
+    To be called once per 10 ms cycle; a missed call leaves delays unchanged.
     """
     t += SLACK
     cycle = int(t / CYCLE)

@@ -25,7 +25,7 @@ STEERING_ANGLE: Final = SIGNALS.index("steering_angle")
 
 @kernel
 def body_accelerations(params: Record, state: Record, grade: float) -> tuple[float, float]:
-    """Return what a noise-free accelerometer at the sensor's place reads, x and y [m/s^2]."""
+    """Return the readings of a noise-free accelerometer at the sensor's place, x and y [m/s^2]."""
     x = params.sensor_position[0]
     y = params.sensor_position[1]
     z = params.sensor_position[2]
@@ -48,7 +48,7 @@ def true_readings(
     over_ground: bool,
     readings: NDArray[np.float64],
 ) -> None:
-    """Write what faultless sensors read into `readings`, shape (len(SIGNALS),), units of the signals.
+    """Write the readings of error-free sensors into `readings`, shape (len(SIGNALS),), units of the signals.
 
     `over_ground`: the speed's magnitude, as a satellite receiver knows it, instead of its part along the car.
     """

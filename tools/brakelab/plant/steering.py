@@ -1,9 +1,9 @@
-"""Steering: an angle by time, or a driver who looks at a point of a path ahead.
+"""Steering: an angle by time, or a driver who follows a path by preview.
 
-Model. The driver looks PREVIEW seconds ahead, sees by how much the path there lies beside where the car is
-heading, and steers for the circle that leads there. Over the distance D an offset e takes the curvature
-2 e / D^2; a curvature k takes the angle (L + EG v^2) k, with the wheelbase L and the understeer gradient
-EG = m / L (l_r / C_f - l_f / C_r) of the linear one-track model. Hands turn the wheel at a finite rate.
+Model. The driver looks PREVIEW seconds ahead, takes the lateral offset of the path there from the car's
+heading, and steers for the circle that leads there. Over the distance D an offset e takes the curvature 2 e /
+D^2; a curvature k takes the angle (L + EG v^2) k, with the wheelbase L and the understeer gradient EG = m / L
+(l_r / C_f - l_f / C_r) of the linear one-track model. Hands turn the wheel at a finite rate.
 
 Signs: ISO 8855, left positive. Angles are those of the road wheel.
 """

@@ -1,4 +1,4 @@
-"""The tyre: how far it rolls, how much it grips, how fast it answers.
+"""Tyre: rolling radius, steady-state forces, relaxation.
 
 Model. Magic Formula on one normalised slip (similarity method): the linear forces k_x = C_L slip and
 k_y = C_S tan(alpha) are combined to k = |(k_x, k_y)|, the force is D sin{C arctan[Bx - E (Bx - arctan Bx)]}

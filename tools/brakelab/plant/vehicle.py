@@ -1,4 +1,4 @@
-"""The whole simulated car: one call moves it on by one step.
+"""Whole simulated car: one call advances it by one step.
 
 Fourteen degrees of freedom with a suspension (car: x, y, yaw, heave, pitch, roll; four unsprung masses; four
 spins), seven without, plus the lags of tyres, hydraulics and motors, and the slow states of the brakes. The
@@ -25,7 +25,7 @@ STEP = 1e-3  # s
 
 @kernel
 def advance(params: Record, state: Record, commands: Record, dt: float) -> None:
-    """Move the car on by `dt` [s] (1 ms; 0.5 to 2 ms are meant to work) with `commands` held."""
+    """Advance the car by `dt` [s] (designed for 1 ms, 0.5 to 2 ms) with `commands` held."""
     state.place = (state.place + 1) % HISTORY
     for wheel in range(4):
         state.demand_history[state.place, wheel] = commands.pressure_demand[wheel]

@@ -1,13 +1,14 @@
 """Wear of the simulated pads, by a law of its own: Archard's with a temperature-activated regime.
 
-Both pads of a calliper together lose, by normal force and way (friction does not matter to Archard),
+Both pads of a calliper together lose, by normal force and sliding distance (independent of friction, after
+Archard),
 
     m' = k u (p / p_r)^n_p (v / v_r)^n_v H(tau_c) R(m) 2 p A_k v        v = r_eff |omega|
     H = 1 + h / (1 + exp(-(tau_c - tau_h) / w))       above tau_h the binder of the lining goes
     R = 1 + r exp(-m / m_r)                           a new lining runs in
-    tau_c = tau + f 2 p A_k v                         the contact is hotter than the disc, as the power has it
+    tau_c = tau + f 2 p A_k v                         the contact is hotter than the disc, by the power
 
-u is what nobody on board knows: the lot of the lining, and air and dirt of the day. Wear in mm is
+u is unknown on board: the lot of the lining, and air and dirt of the day. Wear in mm is
 m / (2 rho A): pads without chamfers.
 
 Source: the shape is Archard's; that heat raises it is in refs [93-101] of the thesis, whose own laws are
@@ -51,7 +52,7 @@ class WearLaw(Section):
 
 @kernel
 def wear_rate(row: Record, force: float, speed: float, pressure: float, heat: float) -> float:
-    """Return what a lining that has run in loses [g/s].
+    """Return the wear rate of a run-in lining [g/s].
 
     `force` 2 p A_k [N], `speed` of sliding [m/s], `pressure` above push-out [Pa], `heat` of the disc [degC].
     """
@@ -72,7 +73,7 @@ def running_in(row: Record, mass: float) -> float:
 
 @kernel
 def pad_wear(row: Record, mass: float) -> float:
-    """Return the wear [mm] that goes with `mass` [g] of both pads."""
+    """Return the wear [mm] that corresponds to `mass` [g] of both pads."""
     return mass / (2.0 * row[DENSITY] * row[AREA])
 
 

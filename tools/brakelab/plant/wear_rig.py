@@ -1,8 +1,8 @@
-"""The dynamometer that wears pads: one brake of a car, its flywheel, applications by speed and deceleration.
+"""Wear dynamometer: one brake of a car and its flywheel, applications by speed and deceleration.
 
 Between applications the flywheel runs up and the disc is cooled for as long as on the road, by less air;
-within one the deceleration is held from speed to speed (Figure 7.5). No drag and no rolling resistance help
-the brake, as on the road they do (7.20, 7.21).
+within one the deceleration is held from speed to speed (Figure 7.5). Unlike on the road, no drag and no
+rolling resistance assist the brake (7.20, 7.21).
 """
 
 from typing import Final
@@ -31,7 +31,7 @@ def wear_block(
     Args:
         car: the plant's parameters.
         wheel: the corner.
-        mass: that the flywheel stands for [kg].
+        mass: represented by the flywheel [kg].
         radius: of the tyre [m].
         stops: speed before and after [m/s], deceleration [m/s^2], seconds before; shape (n, 4).
         worn: off both pads before [g].

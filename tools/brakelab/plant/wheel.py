@@ -1,4 +1,4 @@
-"""One wheel between brake, motor and road: spin, slip and the force that the tyre has built up.
+"""One wheel between brake, motor and road: spin, slip and tyre force.
 
 Model. I omega' = -T_motor - r F_L - (T_b + f_r r F_z) sign(omega) (A.3; slip and F_L negative in braking),
 tau F_L' + F_L = F_L(slip) (A.13), slip = (r omega - v_L) / max(r omega, v_L) (A.6).
@@ -6,7 +6,7 @@ tau F_L' + F_L = F_L(slip) (A.13), slip = (r omega - v_L) / max(r omega, v_L) (A
 Discretisation. Both equations are stiff (r^2 C / (I v) is some 300 1/s at 30 m/s, and at standstill the
 carcass is a spring against the wheel), so they are solved together by the trapezoidal rule, linearised in
 omega. Brake and rolling resistance are Coulomb friction: they can stop the wheel within a step but never
-turn it back. Work of a step is torque times mean spin, which is just what the spin's energy changes by.
+turn it back. Work of a step is torque times mean spin, exactly the change of the spin's energy.
 """
 
 import math
@@ -26,7 +26,7 @@ from brakelab.plant.tyre import (
 def advance_wheel(
     params: Record, state: Record, wheel: int, speed_long: float, speed_lat: float, friction: float, dt: float
 ) -> None:
-    """Move spin [rad/s] and tyre forces [N] of `wheel` on by `dt` [s].
+    """Advance spin [rad/s] and tyre forces [N] of `wheel` by `dt` [s].
 
     `speed_long`, `speed_lat` [m/s]: of the hub in the wheel's axes; `friction`: of the road.
     """

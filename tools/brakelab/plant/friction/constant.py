@@ -1,4 +1,4 @@
-"""Constant friction: what a controller assumes, and the law under which everything has a closed form."""
+"""Constant friction: a controller's assumption, and the law with closed-form solutions throughout."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -25,5 +25,5 @@ def step(
     temperature: float,
     dt: float,
 ) -> tuple[float, float]:
-    """Return the memory as it was, and the constant."""
+    """Return the memory unchanged, and the constant."""
     return memory, row[1]

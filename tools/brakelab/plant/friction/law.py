@@ -14,18 +14,18 @@ NotNegative = Annotated[float, Field(ge=0.0)]
 Bounds = tuple[float, float]
 """Bounds of an even distribution."""
 
-ROW: Final = 1024  # numbers that a law may have
-START: Final = 0  # place in every row: the memory at the start of an application
+ROW: Final = 1024  # numbers of a law at most
+START: Final = 0  # index in every row: the memory at the start of an application
 KELVIN: Final = 273.15  # K at 0 degC
 
 
 def as_bounds(given: Any) -> Any:
-    """Return a number as the two bounds that it is."""
+    """Return a number as a pair of equal bounds."""
     return given if isinstance(given, list | tuple) else (given, given)
 
 
 def in_order(bounds: Bounds) -> Bounds:
-    """Return `bounds` if the lower comes first. Raises `ValueError`."""
+    """Return `bounds` if they ascend. Raises `ValueError`."""
     if bounds[0] > bounds[1]:
         raise ValueError("give the lower bound first")
     return bounds
@@ -36,7 +36,7 @@ class Section(BaseModel):
 
 
 class RigBrake(Section):
-    """The brake with which a lining was measured (Table 3.1)."""
+    """Brake with which a lining was measured (Table 3.1)."""
 
     piston_area: Positive  # m^2, all pistons of one side
     pad_area: Positive  # m^2
@@ -62,7 +62,7 @@ class Law(Section, ABC):
         """Return the law's numbers for its kernel, at most `ROW`, the first being the starting memory."""
 
     def drawn(self, random: Generator) -> Self:
-        """Return the law of one lining of the series."""
+        """Return the law of one drawn lining of the series."""
         return self
 
 

@@ -1,4 +1,4 @@
-"""All friction laws: their numbers, and the one kernel that calls the right one."""
+"""All friction laws: their numbers, and the kernel that dispatches to them."""
 
 from typing import Annotated, Final
 
@@ -44,7 +44,7 @@ AnyLaw = Annotated[
 
 
 def law_row(law: Law, brake: RigBrake) -> tuple[int, NDArray[np.float64]]:
-    """Return the law's number, which `friction` wants, and its row of `ROW` numbers."""
+    """Return the law's number, as used by `friction`, and its row of `ROW` numbers."""
     given = law.row(brake)
     row = np.zeros(ROW)
     row[: len(given)] = given

@@ -1,11 +1,11 @@
-"""A revised Ostermeyer law: its three parameters vary with pressure and sliding speed. A guess.
+"""Revised Ostermeyer law: its three parameters vary with pressure and sliding speed. A conjecture.
 
 Model. As `ostermeyer.py`, with p_i = p_i0 + p_ip p + p_iv r_eff |omega|, i = 1, 2, 3: nine parameters.
 
 Source. The thesis names a revision with nine parameters and says that the original three cannot be constant
-during a stop and depend on more (2.4.1, 3.6); it gives neither equations nor numbers. That the nine are
-three constants, three pressure and three speed slopes is a guess. Of them the shipped sets use four: those
-of Table C.3 with p_3 and its pressure slope fitted to the published column "Ost. imp." of Table 3.4.
+during a stop and depend on more (2.4.1, 3.6); it gives neither equations nor numbers. That the nine are three
+constants, three pressure and three speed slopes is a conjecture. Of them the shipped sets use four: those of
+Table C.3 with p_3 and its pressure slope fitted to the published column "Ost. imp." of Table 3.4.
 """
 
 from collections.abc import Sequence

@@ -1,15 +1,16 @@
-"""A law of one's own: a Python file that the lining file names, compiled alone when it is read.
+"""User-defined friction law: a Python file named in the lining file, compiled by itself when read.
 
 The file, or an entry point of the group `brakelab.friction_laws` that loads such a module, has
 
-NUMBERS  name: (unit, least, greatest) of what the law is given, in the order in which `step` finds them;
-         between the two `brake-ecu identify friction --own` searches
+NUMBERS  name: (unit, least, greatest) of the law's parameters, in the order in which `step` reads them;
+         `brake-ecu identify friction --own` searches between the two
 START    the memory at the start of an application; without, 1
-step     `(numbers, memory, pressure, speed, slowing, temperature, dt) -> (memory, mu_b)` in what numba
-         compiles; inputs as in the package
+step     `(numbers, memory, pressure, speed, slowing, temperature, dt) -> (memory, mu_b)`, compilable by
+         numba; inputs as in the package
 
-`step` becomes a C function whose address stands in the law's row, where `friction` calls it: no other kernel
-is compiled again. An address holds in the process that made the row; laws, not rows, go to other processes.
+`step` becomes a C function whose address is stored in the law's row, where `friction` calls it: no other
+kernel is recompiled. An address is valid in the process that made the row; laws, not rows, are passed to
+other processes.
 """
 
 import importlib.metadata
@@ -32,7 +33,7 @@ from brakelab.plant.jit import Record, kernel
 
 GROUP: Final = "brakelab.friction_laws"
 ADDRESS: Final = 1
-NUMBERS: Final = 2  # place of the first number in the row
+NUMBERS: Final = 2  # index of the first number in the row
 MOST: Final = ROW - NUMBERS
 TRIED: Final = (1.0, 30e5, 5.0, 30.0, 100.0, 1e-3)
 """Inputs after the numbers at which a law must give a friction: 30 bar, 5 m/s, 30 rad/s^2, 100 degC, 1 ms."""
@@ -44,12 +45,12 @@ Step = Callable[..., tuple[float, float]]
 
 
 class Code(NamedTuple):
-    """A law's file, read and compiled."""
+    """File of a law, read and compiled."""
 
     numbers: dict[str, tuple[str, float, float]]  # unit, least, greatest
     start: float
     address: int
-    keeps: Any  # what the address dies with
+    keeps: Any  # objects that keep the address valid
 
 
 class Own(Law):
@@ -85,7 +86,7 @@ _PLAIN: dict[int, Step] = {}
 
 
 def read_code(code: str) -> Code:
-    """Return what the file or entry point `code` holds, compiled once per version. Raises `ValueError`."""
+    """Return the file or entry point `code`, compiled once per version. Raises `ValueError`."""
     path = Path(code)
     try:
         changed = path.stat().st_mtime_ns if code.endswith(".py") else 0
@@ -156,7 +157,7 @@ def _one_line(error: Exception) -> str:
 
 
 def _compiled(step: Any, count: int) -> tuple[int, Any]:
-    """Return the address of `step` as a C function (numbers, out, six inputs), and what keeps it alive."""
+    """Return the address of `step` as a C function (numbers, out, six inputs), and its owner."""
     plain = getattr(step, "py_func", step)
     if numba.config.DISABLE_JIT:
         _PLAIN[len(_PLAIN) + 1] = plain

@@ -1,13 +1,13 @@
-"""Friction as a product of curves over pressure, sliding speed, disc temperature and way: any lining's shape.
+"""Friction as a product of curves over pressure, sliding speed, disc temperature and distance.
 
-Model. With the way w that the pads have rubbed in this application, and memory m = 1 - exp(-w / way),
+Model. With the sliding distance w of the pads in this application, and memory m = 1 - exp(-w / way),
 
     mu_b = mu (p / 30 bar)^pressure (v / 5 m/s)^speed (1 - fall ((tau - best) / 100 K)^2) (1 + bite m)
 
 p and v within 5 to 150 bar and 0.5 to 20 m/s, the factor of the temperature at least 0.6.
 
 Source. Response surfaces over pressure, speed and temperature as in section 2.4; the form is an assumption.
-Two bounds of a number are drawn between, evenly, per car; the car as described has their mean.
+Between two bounds a number is drawn uniformly per car; the nominal car has their mean.
 """
 
 import math

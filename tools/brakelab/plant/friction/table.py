@@ -1,6 +1,6 @@
-"""Friction from a table over disc temperature and pressure: no memory, what a test bench hands over.
+"""Friction from a table over disc temperature and pressure, as test benches supply it, without memory.
 
-Bilinear between the knots, constant outside. Of any size that the row holds: 30 by 30, say.
+Bilinear between the knots, constant outside. Of any size that fits the row, e.g. 30 by 30.
 """
 
 from collections.abc import Sequence
@@ -12,9 +12,9 @@ from pydantic import Field, model_validator
 from brakelab.plant.friction.law import ROW, Law, Positive, RigBrake
 from brakelab.plant.jit import Record, kernel
 
-TEMPERATURES: Final = 1  # place of the number of knots
+TEMPERATURES: Final = 1  # index of the number of knots
 PRESSURES: Final = 2  # likewise
-KNOTS: Final = 3  # place of the first knot: temperatures, pressures, then friction
+KNOTS: Final = 3  # index of the first knot: temperatures, pressures, then friction
 
 Knots = Annotated[tuple[float, ...], Field(min_length=2)]
 Row = Annotated[tuple[Positive, ...], Field(min_length=2)]
@@ -46,7 +46,7 @@ class Table(Law):
 
 @kernel
 def place_of(row: Record, first: int, count: int, value: float) -> tuple[int, float]:
-    """Return the knot below `value` among the `count` from `first` on, and the share of the next one."""
+    """Return the knot below `value` among the `count` from `first` on, and the weight of the next one."""
     knot = 0
     while knot < count - 2 and value >= row[first + knot + 1]:
         knot += 1
@@ -64,7 +64,7 @@ def step(
     temperature: float,
     dt: float,
 ) -> tuple[float, float]:
-    """Return the memory as it was, and the table's friction."""
+    """Return the memory unchanged, and the table's friction."""
     columns, rows = int(row[TEMPERATURES]), int(row[PRESSURES])
     i, along = place_of(row, KNOTS, columns, temperature)
     j, up = place_of(row, KNOTS + columns, rows, pressure)
