@@ -1,9 +1,9 @@
-"""The simulated vehicle and the ECU closed in memory over real frames, and `brake-ecu simulate`.
+"""Closed loop of simulated vehicle and ECU in memory, over real frames (`brake-ecu simulate`).
 
 One cycle k: the driver acts, the vehicle measures and sends; its frames arrive shortly before T_k; the ECU
-receives, steps and sends; the vehicle understands the demands and moves on by 10 ms. All of it runs in one
-kernel with the ECU's own kernels, so that what is simulated is what is driven. Frames of both directions pass
-the scenario's faults (`brakelab.simulation.faults`) on their way.
+receives, steps and sends; the vehicle decodes the demands and advances by 10 ms. All of it runs in one kernel
+with the ECU's own kernels, so that simulated and driven code are the same. Frames of both directions pass the
+scenario's faults (`brakelab.simulation.faults`) on their way.
 """
 
 import math
@@ -58,12 +58,12 @@ from ecu.settings.resources import resource
 START_NS: Final = 1_700_000_000_000_000_000
 """T_0 of every simulation on the real-time clock."""
 SPACING_NS: Final = 10_000  # between frames of one burst
-CHUNK: Final = 1000  # cycles that one call of the kernel runs at most
+CHUNK: Final = 1000  # cycles per call of the kernel at most
 VEHICLE_BUS: Final = "can0"
 
 
 class Plans(NamedTuple):
-    """Frames that each side sends and understands."""
+    """Frames that each side sends and decodes."""
 
     vehicle_sends: TransmitPlan
     vehicle_hears: ReceivePlan
@@ -100,7 +100,7 @@ class Loop(NamedTuple):
 
 
 class FrictionOverride(NamedTuple):
-    """The friction that the ECU's pressure law is told to use in place of its own."""
+    """Friction imposed on the ECU's pressure law in place of its own."""
 
     true_share: float = 0.0
     """Of the true friction: 1 makes the ideal controller; 0: not override."""
@@ -126,7 +126,7 @@ class Drive(NamedTuple):
 
 
 class Block(NamedTuple):
-    """Some cycles of a `Drive`, a row each, of shape (n, N_INPUTS), (n, N_OUTPUTS), (n, N_TRUTH); frames."""
+    """Some cycles of a `Drive`, one per row, of shape (n, N_INPUTS), (n, N_OUTPUTS), (n, N_TRUTH); frames."""
 
     decoded: NDArray[np.float64]
     outputs: NDArray[np.float64]
@@ -138,7 +138,7 @@ class Block(NamedTuple):
 def plans() -> Plans:
     """Return the plans of the contract's database.
 
-    A frame without any new sample is not sent: that is how a sensor is slow or dead.
+    A frame without any new sample is not sent, which represents a slow or dead sensor.
     """
     dbc = resource("dbc/brake_ecu.dbc")
     vehicle_sends = contract_transmit_plan(dbc, "Vehicle")
@@ -154,7 +154,7 @@ def plans() -> Plans:
 def new_loop(scenario: Scenario, config: Config, seed: int, armed: bool = True) -> Loop:
     """Return a closed loop before its first cycle; car and noise are drawn from `seed`.
 
-    `armed`: the ECU's demands count, whatever `config.transmit` says; else the vehicle's fallback brakes.
+    `armed`: the ECU's demands count, overriding `config.transmit`; otherwise the vehicle's fallback brakes.
 
     Raises:
         UserError: the plant's file cannot be read or is wrong.
@@ -186,7 +186,7 @@ def new_loop(scenario: Scenario, config: Config, seed: int, armed: bool = True) 
 
 @kernel
 def _hand_over(frames: Any, count: int, first_ns: int, spacing_ns: int, kept: Any, place: int) -> int:
-    """Stamp `count` frames and keep copies from `place` on; returns the place behind them."""
+    """Stamp `count` frames and copy them from index `place` on; return the index behind them."""
     for i in range(count):
         frames[i].stamp_ns = first_ns + i * spacing_ns
         kept[place + i] = frames[i]
@@ -195,7 +195,7 @@ def _hand_over(frames: Any, count: int, first_ns: int, spacing_ns: int, kept: An
 
 @kernel
 def _override_friction(override: FrictionOverride, control: Any, true: Any, t: float) -> None:
-    """Tell the pressure law a friction: `control` is its state, `true` the car's friction, `t` time [s]."""
+    """Impose a friction on the pressure law, of state `control`; `true`: the car's friction; `t` [s]."""
     for i in range(4):
         if override.true_share > 0.0:
             control.mu_override[i] = override.true_share * true[i]
@@ -220,7 +220,7 @@ def _run(
 ) -> tuple[int, int, bool]:
     """Run cycles until the rows are full or the script has ended.
 
-    Returns rows and frames written, and whether the script goes on.
+    Returns rows and frames written, and whether the script continues.
     """
     vehicle, inputs, heard = loop.vehicle, loop.inputs[0], loop.heard[0]
     place = 0
@@ -235,7 +235,7 @@ def _run(
         t = 1e-9 * (cycle * CYCLE_NS)
         sent = deliver(vehicle.faults, loop.to_ecu, t, noise, loop.vehicle_frames, sent)
         arrived = loop.to_ecu.arrived
-        # A log's time grid starts at its first frame: the first burst bears T_0 itself.
+        # A log's time grid starts at its first frame: the first burst is stamped T_0.
         spacing = SPACING_NS if cycle > 0 else 0
         place = _hand_over(arrived, sent, t_ns - sent * spacing, spacing, kept, place)
 
@@ -264,7 +264,7 @@ def _run(
 
 
 def _start_anew(sides: Sides) -> None:
-    """Let the ECU begin with what its side process kept of the one before."""
+    """Restart the ECU with the values stored by the side process of the former one."""
     learned = sides.state["learned"].copy()
     sides.state[:] = new_state(sides.params, learned)
     memory: tuple[NDArray[Any], ...] = (*sides.ecu_reception, *sides.ecu_sent)
@@ -276,7 +276,7 @@ def _start_anew(sides: Sides) -> None:
 def run_blocks(
     loop: Loop, seconds: float = LONGEST, override: FrictionOverride | None = None
 ) -> Iterator[Block]:
-    """Run a new loop as `run` does, yielding blocks of its cycles: the next one overwrites the arrays."""
+    """Run a new loop like `run`, yielding blocks of its cycles; each block overwrites the last."""
     override, sides = override or FrictionOverride(), loop.sides
     decoded, outputs, truth = (np.empty((CHUNK, width)) for width in (N_INPUTS, N_OUTPUTS, N_TRUTH))
     kept = new_record(FRAME, CHUNK * 2 * (len(sides.vehicle_frames) + len(sides.ecu_frames)))
@@ -299,11 +299,10 @@ def run_blocks(
 def run(
     loop: Loop, ideal: bool = False, seconds: float = LONGEST, override: FrictionOverride | None = None
 ) -> Drive:
-    """Run a new loop to the end of its script, or for `seconds`, and return what happened.
+    """Run a new loop to the end of its script, or for `seconds`, and return the drive.
 
-    `ideal`: the ECU's pressure law is given the true friction, to compare a compensated controller with;
-    `override`: another one. Where the scenario kills the daemon, its outputs are NaN until it, or its
-    standby, sends again.
+    `ideal`: the ECU's pressure law uses the true friction, as a reference for compensation; `override`: an
+    imposed one. During a daemon outage outputs are NaN until the daemon, or its standby, sends again.
     """
     running = run_blocks(loop, seconds, override or FrictionOverride(1.0 if ideal else 0.0))
     blocks = [tuple(map(np.copy, block)) for block in running]

@@ -1,4 +1,4 @@
-"""Inputs of the ECU in a simulated drive: decoded once, stepped through as often as wanted."""
+"""Inputs of the ECU in a simulated drive: decoded once, for any number of runs of `step`."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ from ecu.jit import kernel
 
 
 def vehicle_frames(frames: RecordArray) -> RecordArray:
-    """Return those frames of a drive that the vehicle sent."""
+    """Return the frames of a drive that the vehicle sent."""
     return frames[~np.isin(frames["can_id"], plans().ecu_sends.ids)]
 
 

@@ -1,28 +1,24 @@
-"""Faults put into a drive: `[[fault]]` tables of a scenario, and the kernels that make them happen.
+"""Fault injection: `[[fault]]` tables of a scenario, and the kernels that apply them.
 
 ```
 [[fault]]
 kind = "lost"                # what, see `KINDS`
 t = 4.0                      # s since the car set off
 duration = 1.0               # s; without it to the end of the drive
-message = ["Imu"]            # of the database, either way; without it all that the vehicle sends
+message = ["Imu"]            # of the database, either way; without it all frames of the vehicle
 share = 0.5                  # of these frames
-```
-| kind | keys beside t and duration | what happens |
-| --- | --- | --- |
-| lost, doubled, corrupted | message, share | frames do not come, come twice, come with one bit turned |
-| late | message, share, delay [s] | frames come `delay` later |
-| stuck | signal | a signal on the bus keeps its value, its frames come on |
-| invalid | signal | a signal is sent as not available |
-| biased, noisy | signal, amount | `amount` is added; white noise of that standard deviation is added |
-| bus_off | | the ECU's controller is off the bus: neither side hears the other |
-| daemon_killed | standby | SIGKILL at `t`, a new start after `duration`; `standby`: a second one stands by |
-| motor_lost | corner | motors give no torque and say that they can regenerate none |
-| calliper_dead | corner | callipers get no pressure: one, or those of a circuit |
-| accumulator_low | amount [bar] | the hydraulics reach this pressure at most and say "not ready" |
+``` | kind keys beside t and duration effect | | --- | --- | --- | | lost, doubled, corrupted | message, share
+| frames are lost, arrive twice, arrive with one bit flipped | | late | message, share, delay [s] | frames
+arrive `delay` later | | stuck | signal | a signal on the bus keeps its value, its frames continue | | invalid
+| signal | a signal is sent as not available | | biased, noisy | signal, amount | `amount` is added; white
+noise of that standard deviation is added | | bus_off | | the ECU's controller is off the bus: neither side
+receives the other | | daemon_killed | standby | SIGKILL at `t`, restart after `duration`; `standby`: a second
+daemon runs as standby | | motor_lost | corner | motors give no torque and report no regenerative torque
+available | | calliper_dead | corner | callipers get no pressure: one, or those of a circuit | |
+accumulator_low | amount [bar] | the hydraulics reach this pressure at most and report "not ready" |
 
-Frames are spoilt on their way, after the sender protected them; a signal is spoilt before, so that its frame
-is intact.
+Frames are disturbed in transit, after end-to-end protection; a signal is disturbed before it, so that its
+frame is intact.
 """
 
 import math
@@ -88,21 +84,21 @@ FAULT: Final = np.dtype(
         ("amount", "f8"),
         ("ids", "u4", (32,)),
         ("n_ids", "i4"),
-        ("place", "u1", (N_INPUTS,)),  # 1: this input is spoilt
-        ("held", "f8", (N_INPUTS,)),  # NaN: nothing held
+        ("place", "u1", (N_INPUTS,)),  # 1: this input is disturbed
+        ("held", "f8", (N_INPUTS,)),  # NaN: no value held
         ("corner", "u1", (4,)),
         ("standby", "u1"),
     ],
     align=True,
 )
 SLACK: Final = 1e-4  # s by which the sum of all steps may fall short of a cycle's time
-HELD: Final = 256  # frames held up at a time
-ROOM: Final = 512  # frames that arrive at once
+HELD: Final = 256  # delayed frames at a time
+ROOM: Final = 512  # frames that arrive in one cycle
 
 
 @cache
 def _messages() -> dict[str, dict[str, int]]:
-    """Identifiers by name, of the vehicle and of the ECU."""
+    """Return identifiers by name, of the vehicle and of the ECU."""
     named: dict[str, dict[str, int]] = {}
     senders: tuple[Literal["Vehicle", "BrakeEcu"], ...] = ("Vehicle", "BrakeEcu")
     for sender in senders:
@@ -150,7 +146,7 @@ class Fault(BaseModel):
         return math.inf if self.duration is None else self.t + self.duration
 
     def ids(self) -> list[int]:
-        """Return the identifiers of the frames that it spoils."""
+        """Return the identifiers of the frames that it disturbs."""
         vehicle, unit = _messages()["Vehicle"], _messages()["BrakeEcu"]
         if self.kind == "bus_off":
             return [*vehicle.values(), *unit.values()]
@@ -160,7 +156,7 @@ class Fault(BaseModel):
 
 
 def _places(name: str) -> list[int]:
-    """Return the inputs of that name; one without a corner means all four."""
+    """Return the inputs of that name; a name without a corner means all four."""
     names = (name, *(f"{name}_{corner}" for corner in CORNERS))
     return [INPUT[one] for one in names if one in INPUT]
 
@@ -193,7 +189,7 @@ class Link(NamedTuple):
 
 
 def new_link() -> Link:
-    """Return a link on which nothing is held up."""
+    """Return a link without delayed frames."""
     return Link(new_record(FRAME, HELD), np.full(HELD, np.inf), new_record(FRAME, ROOM))
 
 
@@ -225,8 +221,8 @@ def _hold_up(link: Link, frame: Record, release: float, delay: float) -> None:
 
 @kernel
 def deliver(faults: Any, link: Link, t: float, noise: Generator, frames: Any, count: int) -> int:
-    """Write into `link.arrived` what arrives of `frames[:count]`, sent at `t` [s], and of what was held up
-    before; returns how many."""
+    """Write the frames that arrive into `link.arrived`: of `frames[:count]`, sent at `t` [s], and of delayed
+    ones; return their number."""
     arrived = 0
     for place in range(len(link.release)):
         if link.release[place] <= t + SLACK:
@@ -283,7 +279,7 @@ def _spoil_signals(fault: Record, on: bool, noise: Generator, values: NDArray[np
 def spoil_car(
     faults: Any, t: float, noise: Generator, sound: Record, params: Record, values: NDArray[np.float64]
 ) -> None:
-    """Let faults of sensors and actuators act on what is sent, shape (N_INPUTS,), and on the car.
+    """Apply faults of sensors and actuators to the values to send, shape (N_INPUTS,), and to the car.
 
     `sound` are the car's parameters without a fault.
     """

@@ -1,4 +1,4 @@
-"""A configuration with another observer, or another tuning of it."""
+"""Configuration with another observer, or another tuning of it."""
 
 from ecu.contract.params import OBSERVERS
 from ecu.errors import UserError
@@ -8,7 +8,7 @@ from ecu.settings.config import Config
 def with_observer(config: Config, kind: str | None = None, **keys: float) -> Config:
     """Return `config` with these keys of [observer]; `kind` None: its own.
 
-    Raises UserError for a `kind` that is not known.
+    Raises UserError for an unknown `kind`.
     """
     if kind is not None and kind not in OBSERVERS:
         raise UserError("--observer", kind, f"not known; take {', '.join(OBSERVERS)}")

@@ -1,4 +1,4 @@
-"""Outages of the daemon in the closed loop in memory: times of its death and of its return."""
+"""Daemon outages of the closed loop in memory: times of death and return."""
 
 from typing import Final, NamedTuple
 
@@ -17,7 +17,7 @@ TAKEOVER: Final = 1e-9 * (SILENCE_NS + CYCLE_NS)
 
 
 class Outage(NamedTuple):
-    """The ECU does not send in cycles `begin` to `end`; then it is a new one, or the standby."""
+    """The ECU does not send in cycles `begin` to `end`; afterwards it is a new one, or the standby."""
 
     begin: int
     end: int

@@ -1,4 +1,4 @@
-"""Real-time rights for what stands in for a vehicle on a bus."""
+"""Real-time rights of a process that stands in for a vehicle on a bus."""
 
 import os
 from typing import Final
@@ -10,9 +10,9 @@ PRIORITY: Final = 10
 
 
 def ask_for_priority() -> str:
-    """Be woken in time where the machine grants it; return why it does not, "" if it does.
+    """Request real-time priority; return the reason of a refusal, "" if granted.
 
-    What is alive now settles (`ecu.runtime.realtime`): call it after the preparations.
+    Live objects are frozen (`ecu.runtime.realtime`): call it after the preparations.
     """
     freeze_memory()
     try:

@@ -1,8 +1,8 @@
-"""Scenario files: which car, on which road, what its driver does, in TOML.
+"""Scenario files in TOML: the car, the road and the driver's actions.
 
 ```
 plant = "suv"                    # of config/plant
-draw = "wide"                    # or "nominal": cars of the series that differ little
+draw = "wide"                    # or "nominal": less scatter between cars of the series
 initial_speed = 33.33            # m/s
 road_friction = [[0.0, 1.2], [9.0, 1.2], [9.01, 0.7]]      # or one number
 
@@ -43,9 +43,9 @@ height = 0.80                    # m
 
 [steering]
 angle = [[0.0, 0.0], [2.0, 0.03]]          # s, rad at the road wheel, left positive
-path = [[0.0, 0.0], [30.0, 3.5]]           # or m, m: what the driver steers after
+path = [[0.0, 0.0], [30.0, 3.5]]           # or m, m: path that the driver follows
 ```
-What goes wrong on the bus, at a sensor or an actuator is told by `[[fault]]` tables: `faults.py`.
+Faults of the bus, a sensor or an actuator are described by `[[fault]]` tables: `faults.py`.
 """
 
 import math
@@ -117,7 +117,7 @@ class Phase(_Section):
 
 
 class Trace(_Section):
-    """The speed that a `follow` phase follows, from one of three sources."""
+    """Speed trace of a `follow` phase, from one of three sources."""
 
     speed: list[Row] | None = None
     file: str | None = None
@@ -158,14 +158,14 @@ class SteeringFile(_Section):
 
 
 class TyreFault(_Section):
-    """From `time` [s] on the tyres' slip stiffness is `stiffness` times what it was (section 4.6)."""
+    """Change of the tyres' slip stiffness by the factor `stiffness` from `time` [s] on (section 4.6)."""
 
     time: NotNegative
     stiffness: Positive
 
 
 class Payload(_Section):
-    """Load beside the driver, a point of mass `mass` [kg]."""
+    """Payload beside the driver, a point mass of `mass` [kg]."""
 
     mass: Positive
     behind: float
@@ -274,7 +274,7 @@ class Scenario(_Section):
         return self
 
     def script(self) -> Script:
-        """Return what driver and road do as arrays for the kernels.
+        """Return the actions of driver and road as arrays for the kernels.
 
         Raises:
             UserError: the trace's file cannot be read or is wrong.

@@ -1,4 +1,4 @@
-"""The car that a scenario names: its file, its load, and how far the car of a seed is from the file."""
+"""Car of a scenario: its file, its payload, and the width of its draw."""
 
 from typing import get_args
 
@@ -26,7 +26,7 @@ def scenario_plant(scenario: Scenario) -> Plant:
 
 
 def with_draw(scenario: Scenario, draw: str) -> Scenario:
-    """Return a scenario whose cars are drawn from that width, "wide" or "nominal".
+    """Return a scenario whose cars are drawn with that width, "wide" or "nominal".
 
     Raises:
         UserError: there is no such width.
@@ -38,7 +38,7 @@ def with_draw(scenario: Scenario, draw: str) -> Scenario:
 
 
 def scenario_widths(scenario: Scenario) -> Widths:
-    """Return how far the cars of a scenario are drawn: by the file beside the car's, or the shipped one.
+    """Return the draw widths of a scenario's cars: of the file beside the car's, or the shipped one.
 
     Raises:
         UserError: the file is wrong.

@@ -30,7 +30,7 @@ def write_columns(
 def simulate(scenario: Path, config: Path, out: Path, seed: int = 0, draw: str | None = None) -> int:
     """Run a scenario with the ECU of `config`, armed; write OUT.log, OUT.parquet, OUT.truth.parquet.
 
-    `draw`: how far the car differs from its file, see `Scenario.draw`; None: as the scenario says.
+    `draw`: width of the car's draw, see `Scenario.draw`; None: that of the scenario.
 
     Raises:
         UserError: a file cannot be read, is wrong, or cannot be written.

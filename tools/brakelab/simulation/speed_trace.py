@@ -1,4 +1,4 @@
-"""Speed traces: what a driver is to follow, from a file or from the generator of real driving.
+"""Speed traces to follow, from a file or from the generator of real driving.
 
 A CSV file has the columns `t` [s] and `speed` [m/s]:
 ```
@@ -50,7 +50,7 @@ def read_trace(path: Path) -> SpeedTrace:
     """Read a CSV file.
 
     Raises:
-        UserError: the file cannot be read, or a line is not what it should be.
+        UserError: the file cannot be read, or a line is invalid.
     """
     try:
         with path.open(newline="", encoding="utf-8") as file:

@@ -1,4 +1,4 @@
-"""The simulated vehicle at the bus: its sensors and driver as signals out, the ECU's demands in.
+"""Bus interface of the simulated vehicle: sensors and driver as signals out, the ECU's demands in.
 
 Shared by the closed loop in memory and by the vehicle in real time.
 """
@@ -46,7 +46,7 @@ MOTOR_DEMAND_VALID: Final = OUTPUT["motor_demand_valid"]
 _SCALAR_TRUTH: Final = (
     "vehicle_speed",
     "distance",
-    "accel_x",  # as a perfect accelerometer reads it
+    "accel_x",  # reading of an ideal accelerometer
     "accel_x_road",  # specific force in road axes
     "accel_y",
     "yaw_rate",
@@ -142,14 +142,14 @@ def new_vehicle(scenario: Scenario, seed: int) -> Vehicle:
 
 
 def new_noise(seed: int) -> Generator:
-    """Return the source of the sensors' noise. It goes to kernels beside the records: within a tuple numba
-    would need milliseconds in each call to see what it is."""
+    """Return the source of the sensors' noise. Kernels take it beside the records: inside a tuple numba would
+    need milliseconds per call to determine its type."""
     return np.random.default_rng([seed, 1])
 
 
 @kernel
 def sense(vehicle: Vehicle, noise: Generator, values: NDArray[np.float64]) -> None:
-    """Write what the vehicle sends now into `values`, shape (N_INPUTS,); NaN: not available."""
+    """Write the values that the vehicle sends now into `values`, shape (N_INPUTS,); NaN: not available."""
     state, driver, measured = vehicle.state[0], vehicle.driver[0], vehicle.measured
     grade = grade_now(vehicle.script, state)
     steering = vehicle.commands[0].steering_angle
@@ -171,14 +171,14 @@ def sense(vehicle: Vehicle, noise: Generator, values: NDArray[np.float64]) -> No
     if not np.isnan(values[signals.VEHICLE_SPEED]):
         values[signals.VEHICLE_SPEED_VALID] = 1.0
     for i in range(4):
-        if not np.isnan(values[signals.MOTOR_TORQUE + i]):  # both are one frame's
+        if not np.isnan(values[signals.MOTOR_TORQUE + i]):  # both are in one frame
             values[signals.MOTOR_LIMIT + i] = state.motor_limit[i]
     spoil_car(vehicle.faults, state.t, noise, vehicle.sound[0], vehicle.params[0], values)
 
 
 @kernel
 def decode_demands(heard: Record, demand: Record) -> None:
-    """Take over the ECU's demands that arrived in this cycle; `heard` is a record of `OUTPUT_COLUMNS`."""
+    """Decode the ECU's demands that arrived in this cycle; `heard` is a record of `OUTPUT_COLUMNS`."""
     if heard.new[PRESSURE_DEMAND] and heard.new[PRESSURE_DEMAND + 2]:
         demand.pressure_age = 0.0
         demand.pressure_valid = heard.value[PRESSURE_DEMAND_VALID] == 1.0
@@ -193,7 +193,7 @@ def decode_demands(heard: Record, demand: Record) -> None:
 
 @kernel
 def advance(vehicle: Vehicle) -> None:
-    """Move the car on by one cycle with the demands that were understood."""
+    """Advance the car by one cycle with the decoded demands."""
     move(
         vehicle.script,
         vehicle.params[0],
@@ -206,7 +206,7 @@ def advance(vehicle: Vehicle) -> None:
 
 @kernel
 def write_truth(vehicle: Vehicle, row: NDArray[np.float64]) -> None:
-    """Write the true values of now into `row`, shape (N_TRUTH,), in the order of `TRUTH_COLUMNS`."""
+    """Write the present true values into `row`, shape (N_TRUTH,), in the order of `TRUTH_COLUMNS`."""
     state, driver = vehicle.state[0], vehicle.driver[0]
     grade = grade_now(vehicle.script, state)
     row[0] = state.speed_x
@@ -244,5 +244,5 @@ def write_truth(vehicle: Vehicle, row: NDArray[np.float64]) -> None:
 
 
 def new_values() -> NDArray[Any]:
-    """Return room for what the vehicle sends, shape (N_INPUTS,)."""
+    """Return a buffer for the vehicle's values to send, shape (N_INPUTS,)."""
     return np.full(N_INPUTS, np.nan)
