@@ -29,7 +29,7 @@ from ecu.settings.config import Config, load_config
 from ecu.settings.resources import SCENARIOS, named, resource
 from ecu.warm import warm
 
-WIDTH: Final = 150  # columns of the table where no terminal says how wide it is
+WIDTH: Final = 150  # columns of the table if the terminal's width is unknown
 
 say = Console(highlight=False, soft_wrap=True, stderr=True).print
 
@@ -38,7 +38,7 @@ def found(names: Sequence[str]) -> list[Path]:
     """Return the scenarios of `names`: files, shipped ones by name, and all of a folder (shipped: faults).
 
     Raises:
-        UserError: there is none of that name.
+        UserError: there is no scenario of that name.
     """
     paths: list[Path] = []
     for name in names:
@@ -60,12 +60,12 @@ def rig(
     lock_step: bool,
     seed: int,
 ) -> int:
-    """Run every scenario; return 0, or 1 if one of them showed what no fault of it explains.
+    """Run every scenario; return 0, or 1 if one of them showed a fault bit unexplained by its faults.
 
-    `bus`: interface and channel, None: the best that this machine has.
+    `bus`: interface and channel, None: the best available.
 
     Raises:
-        UserError: a scenario, the configuration or the bus is not right, or `out` cannot be written.
+        UserError: a scenario, the configuration or the bus is invalid, or `out` cannot be written.
         RunFault: a daemon or the vehicle ended early.
     """
     scenarios = [(path, load_scenario(path)) for path in found(names)]
@@ -102,7 +102,7 @@ def rig(
 
 
 def _undisturbed(scenario: Scenario, vehicle: Config, seed: int) -> Undisturbed:
-    """Return what the same drive is without the scenario's faults."""
+    """Return the same drive without the scenario's faults."""
     if not scenario.fault:
         return Undisturbed(math.nan, frozenset())
     sound = run(new_loop(scenario.model_copy(update={"fault": []}), vehicle, seed))

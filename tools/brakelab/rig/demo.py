@@ -1,7 +1,7 @@
-"""`brake-ecu demo`: one scenario on the rig (`brakelab.rig`), in real time; a report at the end.
+"""Demonstration (`brake-ecu demo`): one scenario on the rig (`brakelab.rig`), in real time, with a report.
 
 On vcan0 where it exists, else over UDP multicast that stays on the machine, as two processes. Where neither
-is to be had, both sides run as threads of one process on python-can's `virtual` bus.
+is available, both sides run as threads of one process on python-can's `virtual` bus.
 """
 
 import os
@@ -39,7 +39,7 @@ say = Console(highlight=False, soft_wrap=True).print
 
 
 def braking_line(number: int, duration: float, rows: RecordArray) -> str:
-    """Return what one braking of `duration` [s] was like, from its outputs (`OUTPUTS`, shape (n,))."""
+    """Return a line on one brake application of `duration` [s], from its outputs (`OUTPUTS`, shape (n,))."""
     last = rows[-1]
     demand = np.nan_to_num(rows["decel_demand_total"])
     rolling = rows["vehicle_speed"] > MEASURED_ABOVE
@@ -56,7 +56,7 @@ def braking_line(number: int, duration: float, rows: RecordArray) -> str:
 
 
 class Brakings:
-    """Says a line per braking as it ends."""
+    """Printer of one line per brake application, at its end."""
 
     def __init__(self) -> None:
         self._number = 0
@@ -64,7 +64,7 @@ class Brakings:
         self._rows: list[np.void] = []
 
     def look(self, reader: RingReader) -> None:
-        """Take the cycles into account that came since the last look."""
+        """Process the cycles since the last look."""
         for record in reader.read().records:
             if record["outputs"]["braking"]:
                 self._t.append(1e-9 * record["cycle"]["t_mono_ns"])

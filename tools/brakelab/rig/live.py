@@ -1,7 +1,7 @@
-"""One scenario in real time: daemon and vehicle as processes of their own that meet on a bus.
+"""One scenario in real time: daemon and vehicle as processes of their own on a common bus.
 
-The vehicle (`brakelab.vehicle_node`) sets off when it hears the ECU. What a scenario's faults do to frames,
-sensors and actuators happens in it; what they do to the daemon happens here, at the same T_0.
+The vehicle (`brakelab.vehicle_node`) sets off when it hears the ECU. The vehicle applies a scenario's faults
+of frames, sensors and actuators; faults of the daemon are applied here, with the same T_0.
 """
 
 import ctypes
@@ -25,15 +25,15 @@ from ecu.errors import RunFault, UserError
 from ecu.recording.ring import RingReader, ring_path
 from ecu.runtime.start import raise_priority
 
-MULTICAST: Final = f"239.74.163.{os.getpid() % 250 + 2}"  # a group of its own: two rigs do not meet
-PATIENCE_S: Final = 180.0  # for a slow machine to get ready
+MULTICAST: Final = f"239.74.163.{os.getpid() % 250 + 2}"  # a group of its own: two rigs do not interfere
+PATIENCE_S: Final = 180.0  # start-up time of a slow machine
 TURN_S: Final = 0.05
 LIBC: Final = ctypes.CDLL(None)
 PR_SET_PDEATHSIG: Final = 1
 
 
 def make_folder(out: Path) -> None:
-    """Make the folder `out`. Raises UserError if nothing can be written into it."""
+    """Create the folder `out`. Raises UserError if nothing can be written into it."""
     try:
         out.mkdir(parents=True, exist_ok=True)
         reason = "" if os.access(out, os.W_OK | os.X_OK) else "permission denied"
@@ -44,7 +44,7 @@ def make_folder(out: Path) -> None:
 
 
 def end_with_parent() -> None:
-    """Get SIGTERM when the parent process ends, however it does: between fork and exec."""
+    """Arrange for SIGTERM when the parent process ends, in any way: between fork and exec."""
     LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
@@ -64,7 +64,7 @@ class Bus(NamedTuple):
     """Its first end is the daemon's `channel`, the vehicle is at the second."""
 
     def close(self) -> None:
-        """Leave nothing behind."""
+        """Remove everything that it created."""
         if self.wire is not None:
             self.wire.close()
 
@@ -73,7 +73,7 @@ def named_bus(interface: str, channel: str) -> Bus:
     """Return the bus of python-can's names, or a wire of two controllers for `socketcan slcan`.
 
     Raises:
-        UserError: there can be no such wire here.
+        UserError: no such wire is possible here.
     """
     if (interface, channel) != ("socketcan", CHANNEL):
         return Bus(interface, channel, f"{interface} {channel}")
@@ -82,7 +82,7 @@ def named_bus(interface: str, channel: str) -> Bus:
 
 
 def choose_bus() -> Bus:
-    """Return the best bus this machine has."""
+    """Return the best bus of this machine."""
     if Path("/sys/class/net/vcan0").exists():
         return Bus("socketcan", "vcan0", "vcan0")
     try:
@@ -117,7 +117,7 @@ class Processes:
         """Start the vehicle and wait until it is on the bus.
 
         Raises:
-            RunFault: it did not get there.
+            RunFault: it did not start.
         """
         wire = self._bus.wire
         command = [sys.executable, "-m", "brakelab.vehicle_node", str(scenario), "-i", self._bus.interface]
@@ -155,12 +155,12 @@ class Processes:
         return line
 
     def driving(self) -> bool:
-        """Whether the drive goes on."""
+        """Return whether the drive continues."""
         assert self.vehicle is not None
         return self.vehicle.poll() is None and not self.truth.exists()
 
     def end(self) -> list[int]:
-        """End whoever still runs; return the daemons' exits."""
+        """End the processes still running; return the daemons' exits."""
         for daemon in self.daemons:
             if daemon.poll() is None:
                 daemon.send_signal(signal.SIGTERM)
@@ -218,7 +218,7 @@ def _recordings(folder: Path) -> list[Path]:
 
 
 def _actions(faults: list[Fault], wire: Wire | None) -> list[tuple[float, str]]:
-    """Return what has to be done when [s after T_0], in order."""
+    """Return the actions with their times [s after T_0], in order."""
     actions = []
     for fault in faults:
         if fault.kind == "daemon_killed":
@@ -235,7 +235,7 @@ def _act(
     ring: RingReader,
     look: Callable[[RingReader], Any],
 ) -> None:
-    """Kill and restart daemons, and their controller, in time until the drive is over, or lost."""
+    """Kill and restart daemons, and their controller, on time until the drive has ended or failed."""
     t_0 = processes.departure()
     victim, may_end = processes.daemons[-1], bool(actions)
     while processes.driving() and (may_end or victim.poll() is None):
@@ -258,7 +258,7 @@ def _act(
 
 
 def _check(exits: list[int], faults: list[Fault], log: Path) -> None:
-    """Raise `RunFault` if a daemon ended that was not meant to."""
+    """Raise `RunFault` if a daemon ended unexpectedly."""
     allowed = {0}
     for fault in faults:
         if fault.kind == "bus_off" and fault.duration is None:

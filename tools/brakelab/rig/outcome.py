@@ -1,4 +1,4 @@
-"""One scenario of a rig run in numbers."""
+"""Outcome of one scenario of a rig run, in figures."""
 
 import math
 from pathlib import Path
@@ -21,7 +21,7 @@ _REMEDY = "run the rig again"
 
 
 class Outcome(NamedTuple):
-    """Outcome of one scenario; NaN where there is nothing to say."""
+    """Outcome of one scenario; NaN where not applicable."""
 
     scenario: str
     seconds: float
@@ -87,7 +87,7 @@ def outcome(
     undisturbed: Undisturbed,
     recordings: list[Path],
 ) -> Outcome:
-    """Return what the files of one drive say; a fault bit that the same car shows without them is its own."""
+    """Return the outcome by the files of one drive, without fault bits shown without the faults too."""
     drive = read_drive(written.result, ("vehicle_speed",), _REMEDY)
     own = read_drive(truth_path, ("vehicle_speed",), _REMEDY)
     truth = onto(drive, own, truth_path)

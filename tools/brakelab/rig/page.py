@@ -18,12 +18,12 @@ from ecu.settings.config import Config, config_hash
 
 
 def more_distance(outcome: Outcome) -> float:
-    """Return how much longer the stopping distance was than without the faults, as a share."""
+    """Return the relative increase of the stopping distance by the faults."""
     return outcome.stopping_distance / outcome.undisturbed - 1.0
 
 
 def bits_text(reaction: Reaction) -> str:
-    """Return the fault bits that were raised, with the ms after which."""
+    """Return the fault bits raised, with their delays in ms."""
     return ", ".join(f"{name} {after:.0f}" for name, after in reaction.bits) or "none"
 
 

@@ -23,7 +23,7 @@ SHOWN_S = 1.0
 
 
 class Reaction(NamedTuple):
-    """The ECU's answer to one fault. Times in ms after the fault began, NaN: never."""
+    """Reaction of the ECU to one fault. Times in ms after the fault began, NaN: never."""
 
     kind: str
     what: str
@@ -65,10 +65,10 @@ def _until(drive: Drive, limit: float) -> Drive:
 
 
 def unexplained(drive: Drive, truth: Drive, faults: list[Fault]) -> list[str]:
-    """Return the names of fault bits that were raised outside of any fault's time and `AFTER_S` behind.
+    """Return the names of fault bits raised outside of any fault's time and `AFTER_S` after it.
 
-    What the machine's load does is none of them: "late", and what is missed where the vehicle was held up
-    for more than `HELD_UP_S`.
+    Effects of the machine's load are excluded: "late", and inputs lost where the vehicle was delayed by more
+    than `HELD_UP_S`.
     """
     masks = fault_masks(drive) & ~LATE
     rises = masks & ~np.concatenate([[0], masks[:-1]])
@@ -81,12 +81,12 @@ def unexplained(drive: Drive, truth: Drive, faults: list[Fault]) -> list[str]:
 
 
 def _end(fault: Fault) -> float:
-    """Return when the fault is over; a killed daemon stays dead, but its absence is what is looked at."""
+    """Return the end of the fault; a killed daemon stays dead, but its outage is evaluated."""
     return fault.t if fault.kind == "daemon_killed" and fault.standby else fault.end
 
 
 def _first(t: NDArray[np.float64], rows: NDArray[np.bool_], since: float) -> float:
-    """Return when the first of `rows` is, in ms after `since`; NaN: none."""
+    """Return the time of the first of `rows`, in ms after `since`; NaN: none."""
     places = np.flatnonzero(rows)
     return 1e3 * (float(t[places[0]]) - since) if len(places) else math.nan
 
@@ -122,7 +122,7 @@ def _reaction(drive: Drive, truth: Drive, fault: Fault) -> Reaction:
 
 
 def _recovered(drive: Drive, truth: Drive, fault: Fault, usual: int) -> float:
-    """Return when the last trace of the fault was gone, in ms after its end."""
+    """Return when the last effect of the fault disappeared, in ms after its end."""
     since = fault.t if fault.kind == "daemon_killed" else _end(fault)
     if math.isinf(since):
         return math.nan

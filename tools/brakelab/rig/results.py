@@ -1,4 +1,4 @@
-"""Results of a rig's drive as files, whether it was driven in real time or in memory."""
+"""Result files of a rig's drive, whether driven in real time or in memory."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -74,13 +74,13 @@ def write_simulated(loop: Loop, drive: Simulated, config: Config, out: Path) -> 
 
 
 def _held(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a column whose gaps keep the last value."""
+    """Return a column with gaps filled by the last value."""
     places = np.maximum.accumulate(np.where(np.isfinite(values), np.arange(len(values)), 0))
     return values[places]
 
 
 def write_recorded(recordings: Iterable[Path], config: Config, out: Path) -> Written:
-    """Replay what the daemons recorded, one after the other, into result.parquet; compare every value."""
+    """Replay the daemons' recordings, one after the other, into result.parquet; compare every value."""
     result, source = out / "result.parquet", load_source(None)
     frames, differing, start_ns, last_ns = Frames(), 0, 0, 0
     params = new_params(config)
@@ -96,7 +96,7 @@ def write_recorded(recordings: Iterable[Path], config: Config, out: Path) -> Wri
                 start_ns = start_ns or int(rows.t_ns[0])
                 if not writer.provenance:
                     _provenance(writer, config, start_ns)
-                later = rows.t_ns >= last_ns + CYCLE_NS // 2  # a standby goes on where the first one ended
+                later = rows.t_ns >= last_ns + CYCLE_NS // 2  # a standby continues where the first one ended
                 if later.any():
                     t = np.array(1e-9 * (rows.t_ns[later] - start_ns), np.float64)
                     writer.write(np.round(t, 9), rows.values[later])
@@ -105,7 +105,7 @@ def write_recorded(recordings: Iterable[Path], config: Config, out: Path) -> Wri
 
 
 def _differing(recording: Recording, blocks: list[Rows]) -> int:
-    """Return how many of the values that the daemon computed replay did not give again, bit by bit."""
+    """Return the number of daemon values that replay did not reproduce bit by bit."""
     live = np.ascontiguousarray(recording.outputs).view(np.float64).reshape(len(recording.outputs), -1)
     again = np.concatenate([rows.values[:, :N_OUTPUTS] for rows in blocks])
     if live.shape != again.shape:

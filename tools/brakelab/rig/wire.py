@@ -1,7 +1,7 @@
 """Two CAN controllers on one wire: the kernel's slcan driver, with this program as the adapters.
 
 Each adapter is a pseudo-terminal whose kernel side has the slcan line discipline, so the network device has a
-bit rate and a controller state. What one sends is given to the other; a controller's state and missing
+bit rate and a controller state. Frames sent by one are passed to the other; a controller's state and missing
 acknowledgements can be reported to it as an adapter would. Needs root, `ip`, and the kernel's slcan driver.
 
 The driver has no restart after bus-off of its own (it refuses `restart-ms`): the device is taken down and up.
@@ -63,30 +63,30 @@ class Controller:
         subprocess.run(["ip", "link", "set", self.name, *arguments], check=True)
 
     def go_off(self) -> None:
-        """Go bus-off by way of the states before it; the line neither hears nor reaches it any more."""
+        """Go bus-off through the preceding states; afterwards the line is disconnected."""
         self.off = True
         for state in (WARNING, PASSIVE, BUS_OFF):
             self.report(state)
 
     def restart(self) -> None:
-        """Take part again, if it was off."""
+        """Rejoin the bus, if it was off."""
         if self.off:
             self._set("down")
             self._set("up")
             self.off = False
 
     def report(self, line: str) -> None:
-        """Tell the driver something, as the adapter's firmware would."""
+        """Send the driver a status message, as the adapter's firmware would."""
         os.write(self.adapter, line.encode() + b"\r")
 
     def state(self) -> str:
-        """Return the controller's state as the kernel has it."""
+        """Return the controller's state as seen by the kernel."""
         command = ["ip", "-json", "-details", "link", "show", self.name]
         (device,) = json.loads(subprocess.run(command, check=True, capture_output=True).stdout)
         return str(device["linkinfo"]["info_data"]["state"])
 
     def close(self) -> None:
-        """Take the device away."""
+        """Remove the device."""
         with contextlib.suppress(subprocess.CalledProcessError):
             self._set("down")
         for end in (self._kernel, self.adapter):
@@ -95,7 +95,7 @@ class Controller:
 
 
 class Wire:
-    """Carries frames between two controllers until it is closed; `cut`: nobody is there to acknowledge."""
+    """Link that passes frames between two controllers until it is closed; `cut`: no node acknowledges."""
 
     def __init__(self) -> None:
         self.ends = (Controller(), Controller())
@@ -130,7 +130,7 @@ class Wire:
                 os.write(there.adapter, line + b"\r")
 
     def close(self) -> None:
-        """Stop carrying and take both devices away."""
+        """Stop passing frames and remove both devices."""
         os.write(self._stop, b"x")
         self._thread.join()
         for end in self.ends:
@@ -140,10 +140,10 @@ class Wire:
 
 
 def lay_wire() -> Wire:
-    """Return a wire between two controllers that are up.
+    """Return a wire between two running controllers.
 
     Raises:
-        UserError: this machine, or this user, cannot make one.
+        UserError: not possible on this machine, or for this user.
     """
     try:
         return Wire()
