@@ -1,12 +1,12 @@
-"""Book of the brake applications: one row per application and corner, from the rows of results.
+"""Table of brake applications: one row per application and corner, from the rows of results.
 
 An application is a run of rows with `braking` = 1. For corner i with piston area A_i of one side, effective
 radius r_eff, push-out pressure p_0 and tyre radius r:
 
     mu_b_mean       = ∫ T_b / (2 A_i r_eff (p − p_0)) ds / ∫ ds
 
-from 90 % of the steady pressure (the median of what lies above half of the highest) until release or 5 km/h.
-What it was expected to do: `brakelab.results.prediction`.
+from 90 % of the steady pressure (the median of values above half of the highest) until release or 5 km/h.
+Expected deceleration: `brakelab.results.prediction`.
 """
 
 from typing import Final, NamedTuple
@@ -43,12 +43,12 @@ BRAKE_UNITS: Final = {
     "disc_temperature_mean": "degC",
     "pad_wear_mass": "g",
     "emission_factor": "log10(particles)",
-    # Beyond the contract: what was known after the application, for the next one.
+    # Beyond the contract: learned values after the application, for the next one.
     "mu_b_end": "-",
     "sigma_mu_b_end": "-",
     "observed": "s",
     "learning": "-",
-    # Beyond the contract: what the prediction is worth, see `brakelab.results.prediction`.
+    # Beyond the contract: quality of the prediction, see `brakelab.results.prediction`.
     "mu_b_before": "-",
     "sigma_mu_b_before": "-",
     "specific_force_mean": "m/s^2",
@@ -149,7 +149,7 @@ def _modes(rows: Vector, i: int) -> Vector:
 
 
 def learning(rows: Vector, i: int, params: RecordArray) -> str:
-    """Return `LEARNED` if corner i was observed in `rows`, shape (n, N_ROW), else why it was not."""
+    """Return `LEARNED` if corner i was observed in `rows`, shape (n, N_ROW), else the reason why not."""
     p = params[0]
     if np.any(_modes(rows, i) == OBSERVING):
         return LEARNED
@@ -228,8 +228,8 @@ def application(
 
 
 class BrakeBook:
-    """Collects applications from rows that come in blocks; it keeps only the rows of the one that lasts, and
-    the one before it."""
+    """Collector of applications from blocks of rows; it keeps the rows of the current application
+    and the row before it."""
 
     def __init__(self, params: RecordArray) -> None:
         self.rows: list[BrakeRow] = []
@@ -249,7 +249,7 @@ class BrakeBook:
         self._t, self._rows = t[kept:].copy(), rows[kept:].copy()
 
     def end_log(self) -> None:
-        """End a log: an application that still lasts ends with it, and the next row follows nothing."""
+        """End a log: an unfinished application ends with it, and the next row starts anew."""
         if len(self._t) and self._rows[-1, OUTPUT["braking"]] == 1.0:
             first = int(np.argmax(self._rows[:, OUTPUT["braking"]] == 1.0))
             self._close(self._t, self._rows, first, len(self._t))

@@ -1,8 +1,8 @@
-"""`brake-ecu compare`: two results side by side, what differs most first.
+"""Comparison of two results (`brake-ecu compare`), largest differences first.
 
-Rows are set against each other by `t`, brake applications by their number. A difference matters where it
-exceeds what an engineer would read off a plot: `MATTERS` in the quantity's unit or 1 % of its root mean
-square, whichever is more; of a mode, a flag or a mask of faults any difference matters.
+Rows are matched by `t`, brake applications by their number. A difference matters where it would be visible in
+a plot: beyond `MATTERS` in the quantity's unit and 1 % of its root mean square; of a mode, a flag or a fault
+mask any difference matters.
 """
 
 import json
@@ -32,7 +32,7 @@ MATTERS: Final = {
     "J": 500.0,
     "mm": 1e-4,
     "g": 1e-3,
-    "us": np.inf,  # times of the machine
+    "us": np.inf,  # timing of the machine
 }
 """Least difference that matters, by unit."""
 OF_RMS: Final = 0.01
@@ -66,7 +66,7 @@ def _threshold(name: str, unit: str, values: NDArray[np.float64]) -> float:
 
 
 def differences(a: Columns, b: Columns, units: Mapping[str, str]) -> list[Difference]:
-    """Return how the columns that both have differ, the weightiest first; equal ones are left out.
+    """Return the differences of columns common to both, largest first; equal ones are omitted.
 
     Columns are float64 of one length; two NaN are equal.
     """
@@ -139,7 +139,7 @@ def _provenance(a: Result, b: Result) -> list[str]:
 
 
 def compare(a: Path, b: Path) -> int:
-    """Print how result `b` differs from `a`; return 1 where a difference matters, else 0.
+    """Print the differences of result `b` from `a`; return 1 if one matters, else 0.
 
     Raises:
         UserError: a file cannot be read, is no result, or the two have no row in common.

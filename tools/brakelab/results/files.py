@@ -1,8 +1,8 @@
 """Results as files: `RESULT.parquet` with one row every 10 ms and `RESULT.brakes.parquet` beside it, or both
 as the channel groups of one `RESULT.mf4`.
 
-Names and units are the contract's. A quantity that is not available is null. The unit of a column stands in
-its field's metadata, the provenance (version, hashes, start, quality of the input) in the schema's.
+Names and units are the contract's. A quantity that is not available is null. Each field's metadata holds the
+unit, the schema's metadata the provenance (version, hashes, start, quality of the input).
 """
 
 import json
@@ -87,7 +87,7 @@ def _encoded(metadata: dict[str, Any]) -> dict[str, str]:
 
 
 class ResultWriter:
-    """Writes a result row group by row group; its files appear when the run is complete, or not at all."""
+    """Writer of a result by row groups; its files appear when the run is complete, or not at all."""
 
     def __init__(self, path: Path, params: RecordArray) -> None:
         """`params`: the parameters of `step`, shape (1,): geometry of the brakes, mass, resistances.
@@ -117,7 +117,7 @@ class ResultWriter:
             schema = ROW_SCHEMA.with_metadata(_encoded(self.provenance))
             try:
                 self.path.parent.mkdir(parents=True, exist_ok=True)
-                # Dictionaries of numbers that hardly ever repeat take as long as all else, and more room.
+                # Dictionaries of rarely repeated numbers cost as much time as all else, and more space.
                 self._file = pq.ParquetWriter(
                     self._unfinished, schema, compression="zstd", use_dictionary=False
                 )

@@ -1,8 +1,8 @@
 """A result as MDF4 (ASAM MDF 4.1): rows in one channel group, brake applications in another.
 
-Names, units and numbers are those of the Parquet files. A null is NaN, of whole numbers an invalid sample.
-The start of the measurement is the instant of `t` = 0; the provenance stands in the header's comment, under
-the names that the Parquet schema has for it.
+Names, units and numbers are those of the Parquet files. A null is NaN, for integers an invalid sample. The
+start of the measurement is the instant of `t` = 0; the header's comment holds the provenance, under the names
+of the Parquet schema.
 
 asammdf is in an extra: where it is installed, `import can` takes longer (see `ecu/bus/__init__.py`).
 """
@@ -27,7 +27,7 @@ Samples = tuple[NDArray[Any], NDArray[np.bool_] | None]
 
 
 def load_asammdf(path: Path) -> Any:
-    """Return asammdf, which is to write `path`. Raises UserError if it is not installed."""
+    """Return asammdf for writing `path`. Raises UserError if it is not installed."""
     try:
         import asammdf
     except ImportError:
@@ -36,7 +36,7 @@ def load_asammdf(path: Path) -> Any:
 
 
 def refuse_mdf(path: Path) -> None:
-    """Raise UserError for a result in MDF4, which is for other programs: ours read Parquet."""
+    """Raise UserError for a result in MDF4: this program reads results from Parquet alone."""
     if path.suffix == SUFFIX:
         raise UserError(str(path), "", "results are read from Parquet; `replay` with --out RESULT.parquet")
 

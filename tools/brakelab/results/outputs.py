@@ -1,4 +1,4 @@
-"""Files that a command is about to write: none may be a folder, or one of those that it reads."""
+"""Output files of a command: none may be a folder, or one of its inputs."""
 
 import os
 from collections.abc import Sequence
@@ -8,7 +8,7 @@ from ecu.errors import UserError
 
 
 def check_outputs(out: Path, written: Sequence[Path], read: Sequence[Path]) -> None:
-    """Refuse an `--out` by which one of `written` would be a folder or replace one of `read`.
+    """Refuse an `--out` by which a file of `written` would be a folder or replace one of `read`.
 
     Raises UserError. Links are followed; files that do not exist yet are compared by their path.
     """

@@ -1,20 +1,20 @@
 """Prediction of a brake application's deceleration, from its pressures and the values known before it.
 
-Where no sensor tells the friction, an estimate can only be judged by what it predicts:
+Without a friction sensor an estimate can only be judged by its prediction:
 
     f = [sum (2 A_i r_eff mu_i (p_i - z_i - p_0)+ + M_i) / r_i + drag v^2 + rolling g m]
         / (m + sum I_i / r_i^2) + overrun
 
-mu_i, mass m, overrun (drag of a drive that nobody reports) and the pressure sensors' zeros z_i are those
-known before the application; pressures p_i, motor torques M_i (positive brakes) and the speed v are its own,
-I_i is a wheel's inertia. f is a specific force, what an accelerometer reads, so no slope is in it.
+mu_i, mass m, overrun (unreported engine drag) and the pressure zeros z_i are those known before the
+application; pressures p_i, motor torques M_i (positive brakes) and the speed v are its own, I_i is a wheel's
+inertia. f is a specific force, the reading of an accelerometer, so it is free of slope.
 
     specific_force_predicted   mean of f            over the rows in which the vehicle moves and the driver
     specific_force_mean        mean of b - a_x      does not drive against the brakes
     decel_predicted            mean of f over all rows; of a vehicle that stands it is 0
 
 b is the accelerometer's zero as known before. `specific_force_configured` is the first with the configured
-friction and mass and without overrun: what an ECU that never learns would predict.
+friction and mass and without overrun: the prediction of an ECU without learning.
 
 The standard deviation is that of the force of all linings at equal pressures, and of the motor torque.
 """
@@ -32,9 +32,9 @@ from ecu.contract.signals import N_OUTPUTS, OUTPUT
 
 Vector = NDArray[np.float64]
 
-STANDING: Final = 0.3  # m/s, below: the vehicle stands
+STANDING: Final = 0.3  # m/s, below: standstill
 SHORT: Final = 0.5  # s, shorter: a tap on the pedal
-WEAK: Final = 0.5  # m/s^2, below: an error of it in per cent says nothing
+WEAK: Final = 0.5  # m/s^2, below: its relative error is meaningless
 PRESSED: Final = 2.0  # %, of the accelerator; the ECU learns nothing above it either
 LEAST_ROWS: Final = 40
 """That count, of an application that is judged."""
@@ -66,7 +66,7 @@ def corners(rows: Vector, name: str) -> Vector:
 
 
 def mean(values: Vector, weights: Vector | None = None) -> float:
-    """Return the mean of what is known, NaN if nothing is; `weights` of the shape of `values`."""
+    """Return the mean of the known values, NaN without any; `weights` of the shape of `values`."""
     known = np.isfinite(values)
     weights = np.ones_like(values) if weights is None else weights
     total = float(weights[known].sum())
@@ -86,7 +86,7 @@ def _linings(rows: Vector, before: Vector, params: RecordArray) -> Vector:
 
 
 def that_count(rows: Vector, before: Vector, params: RecordArray) -> NDArray[np.bool_]:
-    """Return which rows of an application count: moving, nobody drives against the brakes, shape (n,)."""
+    """Return the rows of an application that count: moving, driver not accelerating, shape (n,)."""
     brakes = _linings(rows, before, params) @ corners(before, "mu_b")
     motors = (_motor_torques(rows) / params[0]["wheel_radius"]).sum(axis=1)
     moves = rows[:, OUTPUT["vehicle_speed"]] > STANDING
@@ -96,7 +96,7 @@ def that_count(rows: Vector, before: Vector, params: RecordArray) -> NDArray[np.
 
 
 def _too_few(speed: Vector, count: int) -> str:
-    """Return why too few rows count; `speed` [m/s] of all rows, shape (n,), `count` of those that do."""
+    """Return the reason why too few rows count; `speed` [m/s] of all rows, `count` of counted ones."""
     if count >= LEAST_ROWS:
         return ""
     if np.isnan(speed).sum() > len(speed) - LEAST_ROWS:
@@ -123,11 +123,11 @@ def _forces(rows: Vector, before: Vector, car: _Car, params: RecordArray) -> tup
 
 
 def predict(rows: Vector, before: Vector, params: RecordArray) -> Prediction:
-    """Return what to expect of an application.
+    """Return the prediction of an application.
 
     Args:
         rows: of the application, shape (n, N_ROW).
-        before: the row that precedes it, shape (N_ROW,), whose knowledge is used.
+        before: the preceding row, shape (N_ROW,), with the values known then.
         params: `PARAMS`, shape (1,).
     """
     p = params[0]
@@ -153,7 +153,7 @@ def predict(rows: Vector, before: Vector, params: RecordArray) -> Prediction:
 
 
 def left_out(duration: float, measured: float, predicted: float, too_few: str = "") -> str:
-    """Return why the prediction of an application does not count, empty where it does."""
+    """Return why the prediction of an application is excluded, empty if it counts."""
     if duration < SHORT:
         return f"shorter than {SHORT} s"
     if too_few:
@@ -164,10 +164,10 @@ def left_out(duration: float, measured: float, predicted: float, too_few: str = 
 
 
 def running_average(measured: Sequence[float], configured: Sequence[float], rest: Sequence[float]) -> Vector:
-    """Return what a running average of the friction's scale would have predicted, shape (n,).
+    """Return the prediction by a running average of the friction's scale, shape (n,).
 
-    Each application is predicted with the mean of 1 and the scales of those before it: what the linings did
-    over what configured friction expects. All three [m/s^2]; `rest` is not the linings'.
+    Each application is predicted with the mean of 1 and the scales of the earlier ones; a scale is the lining
+    force over that by configured friction. All three [m/s^2]; `rest` excludes the linings.
     """
     linings = np.asarray(configured) - np.asarray(rest)
     scales = (np.asarray(measured) - np.asarray(rest)) / linings
@@ -176,7 +176,7 @@ def running_average(measured: Sequence[float], configured: Sequence[float], rest
 
 
 def one_scale(measured: Sequence[float], configured: Sequence[float], rest: Sequence[float]) -> Vector:
-    """Return what one scale of the friction, chosen in hindsight, would have predicted, shape (n,)."""
+    """Return the prediction by one friction scale, chosen in hindsight, shape (n,)."""
     linings = np.asarray(configured) - np.asarray(rest)
     scales = (np.asarray(measured) - np.asarray(rest)) / linings
     off = [np.abs((scale * linings + rest) / measured - 1.0).mean() for scale in scales]
@@ -198,7 +198,7 @@ class Errors(NamedTuple):
 
 
 def errors(measured: Sequence[float], predicted: Sequence[float] | Vector) -> Errors:
-    """Return the errors of predictions that count, one place each; decelerations in m/s^2."""
+    """Return the errors of counted predictions, one element each; decelerations in m/s^2."""
     if not len(measured):
         return Errors(0, *[float("nan")] * 4)
     shares = np.asarray(predicted) / np.asarray(measured) - 1.0
