@@ -1,1 +1,1 @@
-"""The report: one self-contained HTML page on a result."""
+"""Report: one self-contained HTML page on a result."""

@@ -1,7 +1,7 @@
 """Error of the estimated friction, counted as in the thesis's Table 4.3.
 
-nRMSE = sqrt(mean((estimate - truth)^2)) / mean(truth), over both wheels of an axle, in every braking from
-0.5 s after the demand is reached down to 15 km/h.
+nRMSE = sqrt(mean((estimate - truth)^2)) / mean(truth), over both wheels of an axle, in every brake
+application from 0.5 s after the demand is reached down to 15 km/h.
 """
 
 from typing import NamedTuple
@@ -18,7 +18,7 @@ SETTLING_S = 0.5  # after the demand is reached: pressure and slip have settled
 LOWEST_SPEED = 15.0 / 3.6  # m/s, the observers switch off below (thesis, 4.4)
 # The demand counts as reached at this share: before compensation the friction may be 20 % low.
 REACHED = 0.8
-# Motors that brake with more than this share of the brakes' torque, and not on the ECU's demand, hide it.
+# Motors braking with more than this share of the brakes' torque, and not on the ECU's demand, mask it.
 MOTORS = 0.1
 
 
@@ -40,7 +40,7 @@ def achieved_deceleration(drive: Drive, truth: Drive | None) -> Vector:
 
 
 def evaluated(drive: Drive, truth: Drive | None, found: list[Braking]) -> NDArray[np.bool_]:
-    """Return the rows that count, shape (n,); `truth` lies on the time axis of `drive`."""
+    """Return the rows evaluated, shape (n,); `truth` lies on the time axis of `drive`."""
     demand = drive.column("decel_demand_total")
     achieved = achieved_deceleration(drive, truth)
     speed = (truth if truth and truth.has("vehicle_speed") else drive).column("vehicle_speed")
@@ -55,9 +55,9 @@ def evaluated(drive: Drive, truth: Drive | None, found: list[Braking]) -> NDArra
 
 
 def tracking(drive: Drive, truth: Drive | None, found: list[Braking]) -> list[float]:
-    """Return per braking how much more was achieved than demanded, as a share.
+    """Return per brake application the relative excess of achieved over demanded deceleration.
 
-    NaN: nothing to evaluate, or motors braked on somebody else's demand.
+    NaN: nothing to evaluate, or motors braked on another controller's demand.
     """
     rows = evaluated(drive, truth, found)
     demand, achieved = drive.column("decel_demand_total"), achieved_deceleration(drive, truth)
@@ -90,7 +90,7 @@ def accuracy(estimate: Vector, sigma: Vector, true: Vector, dt: float) -> Accura
 
 
 def accuracy_per_axle(drive: Drive, truth: Drive, found: list[Braking]) -> dict[str, Accuracy]:
-    """Return the accuracy of the front and the rear axle over all brakings."""
+    """Return the accuracy of the front and the rear axle over all brake applications."""
     rows = evaluated(drive, truth, found)
     dt = float(np.median(np.diff(drive.t)))
     estimate, sigma, true = drive.corners("mu_b"), drive.corners("sigma_mu_b"), truth.corners("mu_b")

@@ -1,4 +1,4 @@
-"""The brakings of a drive: from `<name>.brakes.parquet` where replay left one, else from the result."""
+"""Brake applications of a drive, from `<name>.brakes.parquet` where present, else from the result."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -13,7 +13,7 @@ from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
 
 PERIOD = 0.01  # s, one row
-STANDING = 0.3  # m/s, below: the vehicle stands and decelerates no further
+STANDING = 0.3  # m/s, below: standstill, without further deceleration
 
 _PER_BRAKE = ("t_start", "duration", "v_in", "v_end", "decel_mean", "decel_predicted")
 _REMEDY = "write it again with `brake-ecu replay`, or remove it: the report then uses the result alone"
@@ -72,7 +72,7 @@ class Braking(NamedTuple):
 
 
 def brakings(drive: Drive, result: Path) -> list[Braking]:
-    """Return the brakings of a drive in order, without taps shorter than `SHORT`.
+    """Return the brake applications of a drive in order, without taps shorter than `SHORT`.
 
     Raises UserError when their file is damaged.
     """
@@ -83,7 +83,7 @@ def brakings(drive: Drive, result: Path) -> list[Braking]:
 
 
 def inside(drive: Drive, braking: Braking) -> NDArray[np.bool_]:
-    """Return which rows belong to the braking, shape (n,)."""
+    """Return the rows of the brake application, shape (n,)."""
     return np.asarray((drive.t >= braking.t_start) & (drive.t <= braking.t_end))
 
 

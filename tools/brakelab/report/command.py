@@ -1,4 +1,4 @@
-"""`brake-ecu report RESULT.parquet [--truth TRUTH.parquet] --out REPORT.html`"""
+"""Report command: `brake-ecu report RESULT.parquet [--truth TRUTH.parquet] --out REPORT.html`."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -32,7 +32,7 @@ _FRICTION = tuple(f"mu_b_{corner}" for corner in CORNERS)
 
 
 class Row(NamedTuple):
-    """A line of the table of brakings, in the page's units."""
+    """A line of the table of brake applications, in the page's units."""
 
     number: int
     t_start: float
@@ -52,9 +52,9 @@ class Row(NamedTuple):
 
 
 def report(result: Path, truth: Path | None, out: Path, timing: Path | None = None) -> None:
-    """Write the page on `result` to `out`; it needs no other file and asks the network for nothing.
+    """Write the page on `result` to `out`; it needs no other file and no network.
 
-    `result` is what replay or the closed loop wrote, `truth` the plant's true values (`simulate` writes
+    `result` is a file of replay or the closed loop, `truth` the plant's true values (`simulate` writes
     them), `timing` a recording's folder or its `cycles.bin`. Raises UserError with one line for any of
     them that is missing or damaged, and when `out` cannot be written.
     """

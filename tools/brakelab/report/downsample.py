@@ -1,4 +1,4 @@
-"""Fewer points that look the same: per bucket the extremes stay, in the order in which they occurred."""
+"""Downsampling that preserves appearance: each bucket keeps its extremes, in their order."""
 
 from typing import NamedTuple
 
@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from brakelab.report.drive import Vector
 
-# A braking is a small part of a drive and what a reader zooms into.
+# A brake application is a small part of a drive and the part that readers zoom into.
 BUSY_WEIGHT = 5.0
 
 
 class Buckets(NamedTuple):
-    """Consecutive rows that are drawn as two points: `first[i] … last[i]`, both inclusive."""
+    """Consecutive rows drawn as two points: `first[i] … last[i]`, both inclusive."""
 
     first: NDArray[np.int64]
     last: NDArray[np.int64]
@@ -60,5 +60,5 @@ def extremes(grid: Buckets, values: Vector) -> Vector:
 
 
 def worst(grid: Buckets, levels: Vector) -> Vector:
-    """Return the largest value of each bucket: of a mode the most severe one, shape (buckets,)."""
+    """Return the largest value of each bucket, of a mode the most severe one, shape (buckets,)."""
     return np.asarray(np.fmax.reduceat(levels, grid.first))

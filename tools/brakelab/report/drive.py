@@ -1,4 +1,4 @@
-"""A drive as the report sees it: columns over one time axis, read from Parquet, the truth brought onto it."""
+"""Drive as read by the report: columns over one time axis from Parquet, with the truth mapped onto it."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -26,11 +26,11 @@ class Drive(NamedTuple):
     metadata: Mapping[str, str]
 
     def column(self, name: str) -> Vector:
-        """Return a column, all NaN when the drive does not have it, shape (n,)."""
+        """Return a column, all NaN if the drive lacks it, shape (n,)."""
         return self.columns[name] if name in self.columns else np.full(len(self.t), np.nan)
 
     def has(self, name: str) -> bool:
-        """Whether the column holds at least one number."""
+        """Return whether the column holds at least one number."""
         return bool(np.isfinite(self.column(name)).any())
 
     def corners(self, stem: str) -> Vector:
@@ -100,8 +100,8 @@ def start_ns(drive: Drive) -> int | None:
 def onto(drive: Drive, truth: Drive, truth_path: Path) -> Drive:
     """Return the truth on the time axis of `drive`, NaN outside its span.
 
-    The two axes are brought together by the dates of their first rows when both files state theirs, else
-    both are taken to have the same zero. Raises UserError when the spans do not overlap.
+    The axes are aligned by the dates of their first rows if both files state them, else by a common zero.
+    Raises UserError when the spans do not overlap.
     """
     starts = start_ns(drive), start_ns(truth)
     shift = 0.0

@@ -1,4 +1,4 @@
-"""Friction against disc temperature, speed and pressure, as it was observed in the brakings of a drive."""
+"""Friction over disc temperature, speed and pressure, as observed in the brake applications of a drive."""
 
 from typing import Any, Final
 
@@ -74,7 +74,7 @@ def _plot(
     side = np.repeat([0, 1], [len(places) for _, places in observed])
     centre, mean = _binned(at, mu[place, side])
     spread = 2.0 * _binned(at, sigma[place, side])[1]
-    # Points and means set the range: a wide band would flatten them.
+    # Points and means set the range: a wide band would compress them.
     shown = list(plot.renderers)
     if len(centre) > 1:
         plot.varea(
@@ -90,7 +90,7 @@ def _plot(
 
 
 def _binned(at: Vector, values: Vector) -> tuple[Vector, Vector]:
-    """Return the mean of `values` in stretches of `at`, and the stretches' own; few rows make no mean."""
+    """Return the mean of `values` in intervals of `at`, and the intervals' own mean; few rows give none."""
     known = np.isfinite(values)
     at, values = at[known], values[known]
     if not len(at) or np.ptp(at) == 0.0:

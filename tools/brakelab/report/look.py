@@ -1,4 +1,4 @@
-"""Colours and figure style. Colours mean the same everywhere and stay apart for colour-blind readers.
+"""Colours and figure style. Each colour has one meaning throughout, distinct for colour-blind readers.
 
 Left and right, estimated and demanded come from the palette of Okabe and Ito (2008); truth is always dashed.
 """
@@ -23,7 +23,7 @@ FAILED: Final = "#a8123a"
 SHADE: Final = "#eef1f4"
 STAGE_COLOURS: Final = ("#0074b4", "#e69f01", "#007e5c", "#b0588f", "#5b6471")
 
-# What the page's script puts in place of each colour on a dark screen; no value stands on both sides.
+# Replacement of each colour on a dark screen by the page's script; no value stands on both sides.
 DARK: Final = {
     INK: "#e8ebef",
     QUIET: "#a3acb8",

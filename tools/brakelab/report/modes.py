@@ -12,7 +12,7 @@ from brakelab.report.look import DEGRADED, ESTIMATE, FAILED, HOLDING, IDLE, new_
 from ecu.contract.faults import FAULTS
 from ecu.contract.signals import CORNERS, STARTING
 
-# What each state looks like: (label of the legend, colour)
+# Appearance of each state: (label of the legend, colour)
 _KINDS = {
     "idle": ("ready, no estimate yet", IDLE),
     "working": ("active, observing", ESTIMATE),
@@ -38,7 +38,7 @@ class Bar(NamedTuple):
 def fault_masks(drive: Drive) -> np.ndarray[Any, np.dtype[np.int64]]:
     """Return `active_faults` per row, 0 where it is not available, shape (n,).
 
-    While the ECU starts, nothing has arrived yet and everything counts as lost: that is no fault.
+    While the ECU starts, inputs not yet received count as lost, which is no fault.
     """
     masks = np.where(drive.column("mode") == STARTING, 0.0, drive.column("active_faults"))
     return np.asarray(np.nan_to_num(masks).astype(np.int64))

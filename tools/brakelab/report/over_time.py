@@ -1,4 +1,4 @@
-"""The linked plots over a drive: speed, deceleration, friction, pressures, discs, K_f and modes."""
+"""Linked plots over a drive: speed, deceleration, friction, pressures, discs, K_f and modes."""
 
 from typing import Any, NamedTuple
 
@@ -29,7 +29,7 @@ class _Estimated(NamedTuple):
     """Of the axis, in the quantity's unit."""
 
 
-# Least span of the other axes: a drive in which nothing happens is drawn flat.
+# Least span of the other axes: a drive without events is drawn flat.
 _LEAST_KMH, _LEAST_DECELERATION, _LEAST_BAR, _LEAST_FACTOR = 10.0, 1.0, 20.0, 0.2
 
 _FRICTION = _Estimated("mu_b", "0.000", 0.2)
@@ -74,7 +74,7 @@ def plots_over_time(drive: Drive, truth: Drive | None, found: list[Braking]) -> 
 
 
 def _coarse(grid: Buckets) -> Buckets:
-    """Half the buckets: neighbours joined, because a bar of a mode needs no two points per pixel."""
+    """Return half the buckets: neighbours joined, because a bar of a mode needs no two points per pixel."""
     last = grid.last[1::2]
     if len(grid.first) % 2:
         last = np.append(last, grid.last[-1])
@@ -82,7 +82,7 @@ def _coarse(grid: Buckets) -> Buckets:
 
 
 def _lines(drive: Drive, truth: Drive | None) -> dict[str, Vector]:
-    """Return every quantity that has a number somewhere, in the units of the plots."""
+    """Return every quantity with at least one number, in the units of the plots."""
     lines = {
         "speed": drive.column("vehicle_speed") * KMH,
         "demanded": drive.column("decel_demand_total"),
@@ -108,7 +108,7 @@ def _lines(drive: Drive, truth: Drive | None) -> dict[str, Vector]:
 
 
 def _line(plot: Any, source: ColumnDataSource, name: str, label: str, colour: str, **style: Any) -> None:
-    """Draw a line and enter it in the legend, unless the drive does not have it."""
+    """Draw a line and enter it in the legend, if the drive has it."""
     if name in source.column_names:
         style = {"line_width": 1.6, **style}
         plot.line("t", name, source=source, line_color=colour, legend_label=label, **style)
@@ -159,7 +159,7 @@ def _estimate(
     for corner, side, _ in sides:
         dash = "dashed" if side == "left" else "dotted"
         _line(plot, source, f"{name}_true_{corner}", f"{side}, true", INK, line_dash=dash, line_width=1.3)
-    # The lines set the range: a band that is wide for an instant would flatten everything.
+    # The lines set the range: a band that is briefly wide would compress everything.
     plot.y_range.update(renderers=plot.renderers[bands:], range_padding=0.5, min_interval=what.least_span)
     rows = [(f"{side}{kind}", f"{name}{true}_{corner}", what.digits)
             for corner, side, _ in sides for kind, true in (("", ""), (" true", "_true"))]  # fmt: skip

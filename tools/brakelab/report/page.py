@@ -1,4 +1,4 @@
-"""Fills the page's template: facts, tiles, tables and the plots with the browser code they need."""
+"""Report page: fills the template with facts, tiles, tables and plots with their browser code."""
 
 import json
 import math
@@ -28,7 +28,7 @@ class Tile(NamedTuple):
 
 
 def fixed(value: float, digits: int) -> str:
-    """Return the number with `digits` decimals and a true minus sign, a dash when it is not known."""
+    """Return the number with `digits` decimals and a true minus sign, a dash if unknown."""
     return f"{value:.{digits}f}".replace("-", "\N{MINUS SIGN}") if math.isfinite(value) else _NONE
 
 

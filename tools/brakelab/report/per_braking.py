@@ -1,4 +1,4 @@
-"""Plots with one place per braking: how friction moved and whether the car did what was asked."""
+"""Plots with one point per brake application: change of friction, and tracking of the demand."""
 
 from typing import Any
 
@@ -20,7 +20,7 @@ _DECELERATIONS = (
 
 
 def plots_per_braking(found: list[Braking]) -> dict[str, Any]:
-    """Return the two figures by name, linked to each other; empty for fewer than two brakings."""
+    """Return the two figures by name, linked to each other; empty for fewer than two applications."""
     if len(found) < 2:
         return {}
     number = np.array([braking.number for braking in found], float)

@@ -1,6 +1,6 @@
 """Prediction of each brake application's deceleration: rows of the table, errors and two plots.
 
-Where no sensor tells the friction, this is how an estimate is judged.
+Without a friction sensor this is the criterion of an estimate.
 """
 
 from typing import Any, Final, NamedTuple
@@ -38,7 +38,7 @@ class Row(NamedTuple):
 
 
 def prediction_rows(found: list[Braking]) -> list[Row]:
-    """Return a row for each braking, none where nothing was predicted."""
+    """Return a row for each brake application, none without predictions."""
     if not any(np.isfinite(braking.force.predicted) for braking in found):
         return []
     return [
@@ -71,7 +71,7 @@ def friction_text(friction: Vector, sigma: Vector) -> str:
 
 
 def prediction_errors(found: list[Braking]) -> Errors:
-    """Return the errors of the predictions that count."""
+    """Return the errors of the predictions evaluated."""
     counted = _counted(found)
     return errors([force.measured for force in counted], [force.predicted for force in counted])
 
@@ -81,7 +81,7 @@ def _counted(found: list[Braking]) -> list[Force]:
 
 
 def peer_errors(found: list[Braking]) -> dict[str, Errors]:
-    """Return the errors of what else could have predicted these brakings, by name; empty: not known."""
+    """Return the errors of alternative predictors for these applications, by name; empty: not known."""
     counted = _counted(found)
     measured = [force.measured for force in counted]
     configured = [force.configured for force in counted]
@@ -98,7 +98,7 @@ def peer_errors(found: list[Braking]) -> dict[str, Errors]:
 
 
 def plots_of_prediction(found: list[Braking]) -> dict[str, Any]:
-    """Return predicted over measured and error over number by name; empty where no prediction counts."""
+    """Return predicted over measured and error over number by name; empty without evaluated predictions."""
     counted = [row for row in prediction_rows(found) if not row.left_out]
     if not counted:
         return {}
@@ -159,7 +159,7 @@ def _over_number(source: ColumnDataSource, count: int) -> Any:
 
 
 def _reach(source: ColumnDataSource, points: tuple[str, ...], *bars: str) -> float:
-    """Return how far an axis goes to show all points and nine in ten of the bars."""
+    """Return the range of an axis that shows all points and nine in ten of the bars."""
     farthest = max(float(np.abs(np.asarray(source.data[name])).max()) for name in points)
     ends = np.abs(np.concatenate([np.asarray(source.data[name]) for name in bars]))
     return 1.08 * max(farthest, float(np.quantile(ends, 0.9)) if np.isfinite(ends).all() else 0.0)

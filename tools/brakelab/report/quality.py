@@ -58,7 +58,7 @@ class Quality(NamedTuple):
 
 
 def read_quality(drive: Drive, path: Path) -> Quality | None:
-    """Return what `replay` left in the metadata of `path`, None: nothing.
+    """Return the quality stored by `replay` in the metadata of `path`, None: nothing.
 
     Raises UserError if it is damaged.
     """
@@ -86,7 +86,7 @@ def read_quality(drive: Drive, path: Path) -> Quality | None:
 
 
 def quality_tiles(quality: Quality) -> list[Tile]:
-    """Return how many inputs or messages are marked, and the speed of the replay."""
+    """Return tiles with the number of marked inputs or messages, and the speed of the replay."""
     table = [*quality.inputs, *quality.messages]
     marked = [name for name, cells in table if any(cell.warns for cell in cells)]
     damaged = [log for log in quality.logs if log.found]
@@ -113,7 +113,7 @@ def _log(counts: dict[str, Any], name: str) -> Log:
 
 
 def _together(counts: Sequence[dict[str, Any]], kind: str) -> list[dict[str, Any]]:
-    """Return the rows of all logs by name: counters added, gaps and extremes the farthest."""
+    """Return the rows of all logs by name: counters summed, gaps and extremes the largest."""
     farthest = {"greatest_gap_s": max, "least": min, "greatest": max}
     rows: dict[str, dict[str, Any]] = {}
     for log in counts:

@@ -1,4 +1,4 @@
-"""A braking in a few hundred bytes: deceleration demanded and achieved as SVG, one scale for the drive."""
+"""Sparkline of a brake application: demanded and achieved deceleration as SVG, one scale for the drive."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ _LEAST_SCALE = 2.0  # m/s^2
 
 
 def sparklines(drive: Drive, found: list[Braking]) -> list[str]:
-    """Return an SVG for each braking, empty where nothing is known; stretches are drawn by their means."""
+    """Return an SVG for each application, empty without data; intervals are drawn by their means."""
     decelerations = drive.column("decel_demand_total"), -drive.column("accel_x_road")
     lines = []
     for braking in found:
@@ -23,7 +23,7 @@ def sparklines(drive: Drive, found: list[Braking]) -> list[str]:
 
 
 def _means(t: Vector, values: Vector) -> tuple[Vector, Vector]:
-    """Return at most `POINTS` means of what is known, and where they are as a share of the braking."""
+    """Return at most `POINTS` means of known values, and their positions as shares of the application."""
     known = np.isfinite(values)
     if known.sum() < 2:
         return np.empty(0), np.empty(0)

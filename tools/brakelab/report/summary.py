@@ -1,4 +1,4 @@
-"""Head of the page: origin of the result, and the drive in a few numbers."""
+"""Head of the page: origin of the result, and the drive in a few figures."""
 
 import math
 from datetime import UTC, datetime
@@ -15,7 +15,7 @@ from brakelab.report.timing import Timing, spread
 from brakelab.results.prediction import Errors
 from ecu.contract.faults import FAULTS
 
-# Beyond these a tile is marked: what an engineer would look into first.
+# Limits beyond which a tile is marked for an engineer's attention.
 _HONEST_SHARE = 0.8
 _DEMAND_ERROR = 0.1
 _PREDICTION_ERROR = 0.1
@@ -31,7 +31,7 @@ class FaultSeen(NamedTuple):
 
 
 def facts(drive: Drive) -> list[tuple[str, str]]:
-    """Return label and value of what the result says about its origin."""
+    """Return label and value of each statement of the result on its origin."""
     start = start_ns(drive)
     when = ""
     if start is not None:
@@ -54,7 +54,7 @@ def tiles(
     accuracy: dict[str, Accuracy] | None,
     timing: Timing | None,
 ) -> list[Tile]:
-    """Return the summary in reading order; `shares`: what `tracking` returned."""
+    """Return the summary in reading order; `shares`: the result of `tracking`."""
     shown = [_drive(drive), _brakings(found), *_friction(drive, accuracy)]
     if found:
         shown.append(_deceleration(shares))
@@ -70,7 +70,7 @@ def tiles(
 
 
 def faults(drive: Drive) -> list[FaultSeen]:
-    """Return every fault that was active, with when and how long."""
+    """Return every fault that was active, with time and duration."""
     masks = fault_masks(drive)
     dt = np.append(np.diff(drive.t), 0.0)
     remedies = {fault.bit: fault.remedy for fault in FAULTS}
@@ -98,7 +98,7 @@ def _brakings(found: list[Braking]) -> Tile:
 
 
 def _while_moving(braking: Braking) -> float:
-    """Return the mean specific force [m/s^2], where it is known: a mean over a standing end says little."""
+    """Return the mean specific force [m/s^2] without the standstill at the end, where it is known."""
     measured = braking.force.measured
     return measured if math.isfinite(measured) else braking.achieved
 

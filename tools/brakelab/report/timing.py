@@ -1,4 +1,4 @@
-"""Loop timing of a recording: how late each cycle began and how long its stages took."""
+"""Loop timing of a recording: lateness of each cycle and duration of its stages."""
 
 from pathlib import Path
 from typing import NamedTuple
