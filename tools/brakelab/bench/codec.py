@@ -51,7 +51,7 @@ def protected_frames(stop: Stop, cycles: int) -> RecordArray:
 
 
 def plan_of_the_bench() -> ReceivePlan:
-    """Return what the ECU receives, every message once in 10 ms: as `protected_frames` has them."""
+    """Return the receive plan of the ECU, every message once in 10 ms, as in `protected_frames`."""
     plan = contract_receive_plan(resource("dbc/brake_ecu.dbc"))
     plan.messages["period_ns"] = plan.messages["slowest_ns"] = CYCLE_NS
     return plan

@@ -1,4 +1,4 @@
-"""`brake-ecu bench`: measures on this machine, beside what else could do the job."""
+"""Benchmarks (`brake-ecu bench`), measured on this machine beside alternatives."""
 
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
@@ -80,11 +80,11 @@ Car = TypeVar("Car")
 def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0, draw: str = WIDE) -> int:
     """Run one bench, or without a name all that measure time; print tables, or JSON. Returns 0.
 
-    In a checkout, a run of all times renews docs/results/benchmarks.md, `stops` observer-accuracy.md
-    beside it, each other bench the page of its name; `play` keeps the tables of other buses.
-    `seeds`: how many cars `stops` and `observers` draw, the others at most;
-    `draw`: how far those of `stops` and `observers` differ from their file, pages are of the wide one;
-    `seconds`: how long `lateness` drives and all players of `play` send.
+    In a checkout, a run of all times renews docs/results/benchmarks.md, `stops` observer-accuracy.md beside
+    it, each other bench the page of its name; `play` keeps the tables of other buses. `seeds`: number of cars
+    drawn by `stops` and `observers`, upper bound for the others; `draw`: width of the draw of `stops` and
+    `observers`, pages use the wide one; `seconds`: duration of the drive of `lateness`, and of all players of
+    `play`.
 
     Raises:
         UserError: there is no such bench.
@@ -187,7 +187,7 @@ def _observers(json: bool, seeds: int, draw: str) -> int:
 
 
 def _each_car(name: str, drive: Callable[[int], Car], cars: int) -> list[Car]:
-    """Return what `drive` makes of the cars 0 to `cars` - 1, on all cores."""
+    """Return the results of `drive` for the cars 0 to `cars` - 1, on all cores."""
     console = Console(stderr=True)
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
         return list(track(pool.map(drive, range(cars)), name, cars, console=console, transient=True))

@@ -52,7 +52,7 @@ class Side(NamedTuple):
 
 
 def thrice(plan: ReceivePlan) -> ReceivePlan:
-    """Return the plan that takes every message under all `OFFSETS` of its identifier."""
+    """Return the plan that receives every message under all `OFFSETS` of its identifier."""
     inputs = plan.messages[plan.messages["foreign"] == 0]
     messages = np.concatenate([inputs] * len(OFFSETS))
     messages["id"] += np.repeat(np.array(OFFSETS, np.uint32), len(inputs))
@@ -62,7 +62,7 @@ def thrice(plan: ReceivePlan) -> ReceivePlan:
 
 
 def bursts(stop: Stop, cycles: int) -> list[list[bytes]]:
-    """Return what the vehicle sends in each of `cycles` of braking: 39 frames, counters running on."""
+    """Return the vehicle's frames in each of `cycles` of braking: 39 frames with continuous counters."""
     plan = contract_transmit_plan(resource("dbc/brake_ecu.dbc"), "Vehicle")
     transmission, frames = new_transmission(plan), frame_buffer(plan)
     sent: list[list[bytes]] = []
@@ -152,7 +152,7 @@ def run_cycles(side: Side, sent: list[list[bytes]]) -> NDArray[np.float64]:
 def cycle_rows(rounds: int = ROUNDS, cycles: int = CYCLES) -> list[Row]:
     """Return p50, p99 and the longest of each stage; figures over the rounds.
 
-    `cycles` of a round: a multiple of 15, so that the counters of rounds follow each other.
+    `cycles` of a round: a multiple of 15, so that counters continue from round to round.
     """
     stop = simulated_stop()
     sent = bursts(stop, cycles)

@@ -1,4 +1,4 @@
-"""Four filters of `ecu/algorithm/estimation/thesis/observer2.py` three times: ours, plain numpy, filterpy.
+"""The four filters of `ecu/algorithm/estimation/thesis/observer2.py` in three forms: ours, numpy, filterpy.
 
 All get the same inputs (`FILTER_INPUT`, as `update_friction` forms them) and start alike; plain Kalman
 algebra, without our gates, must give the same friction.
@@ -24,7 +24,7 @@ from ecu.jit import Record, kernel
 
 DT: Final = 1e-9 * CYCLE_NS
 
-# What one filter is given in one cycle.
+# Inputs of one filter in one cycle.
 FILTER_INPUT: Final = np.dtype(
     [
         ("pressure", "f8"),  # above push-out, Pa
@@ -78,7 +78,7 @@ def constants(params: RecordArray) -> Constants:
 
 @kernel
 def note_inputs(params: Record, state: Record, inputs: Record, row: Any) -> None:
-    """Write what the four filters were given in the step just done, `row` of shape (4,)."""
+    """Write the inputs of the four filters in the step just done, `row` of shape (4,)."""
     for i in range(4):
         load, radius = state.estimate.load[i], state.wheels.radius[i]
         stiffness = state.estimate.k_f * slip_stiffness(params, i, load, state.wheels.expected_force[i])

@@ -1,7 +1,7 @@
 """Lateness of the daemon's cycles, start and end, while other processes keep every core busy.
 
 Daemon and simulated vehicle are processes on a bus of their own. Beside them, on the daemon's own core and
-above its priority, a bare loop wakes every 10 ms and does nothing: the floor that this machine sets.
+above its priority, a bare loop wakes every 10 ms and does nothing: the floor of this machine.
 """
 
 import json
@@ -48,7 +48,7 @@ class Lateness(NamedTuple):
 
 
 def bare_loop() -> None:
-    """Wake every 10 ms until standard input closes, then print how late each time was [ns], as JSON."""
+    """Wake every 10 ms until standard input closes, then print the lateness of each wake-up [ns], as JSON."""
     make_realtime()
     os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY + 1))
     late: list[int] = []

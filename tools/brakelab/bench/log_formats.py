@@ -26,7 +26,7 @@ FORMATS: Final = (*WRITERS, ".mf4")
 
 
 def convert(log: Path, out: Path) -> Path:
-    """Write a log as `out`, in the format that its name says; return `out`."""
+    """Write a log as `out`, in the format of its suffix; return `out`."""
     interfaces: list[str] = []
     frames = np.concatenate(list(read_frames(log, interfaces, LogQuality())))
     if out.suffix == ".mf4":
@@ -35,7 +35,7 @@ def convert(log: Path, out: Path) -> Path:
 
 
 def write(out: Path, sent: Iterable[can.Message], **options: Any) -> Path:
-    """Write messages with python-can's writer for the end of the name; return `out`."""
+    """Write messages with python-can's writer for the suffix of the name; return `out`."""
     with WRITERS[out.suffix](out, **options) as writer:
         for message in sent:
             writer.on_message_received(message)

@@ -16,7 +16,7 @@ PICTURES: Final = f"{RESULTS}/images"
 
 
 def plain_row(row: Any) -> dict[str, Any]:
-    """Return a row as JSON has it: figures become objects, times get their ratio."""
+    """Return a row for JSON: figures become objects, times get their ratio."""
     values = row._asdict().items()
     plain = {key: value._asdict() if isinstance(value, Figure) else value for key, value in values}
     return plain | {"ratio": row.ratio} if isinstance(row, Row) else plain
@@ -36,7 +36,7 @@ def print_tables(line: str, tables: list[Table]) -> None:
 
 
 def write_page(name: str, title: str, text: str, tables: list[Table], keep: bool = False) -> None:
-    """Renew a page; with `keep` the sections of other titles stay: of other buses, measured elsewhere."""
+    """Renew a page; with `keep` sections with other titles stay: of other buses, measured elsewhere."""
     folder = resource(RESULTS)
     if folder.is_dir():
         sections = {table.title: markdown(table) for table in tables}

@@ -1,7 +1,8 @@
 """Time of the simulated vehicle per millisecond of its drive, with fourteen and seven degrees of freedom.
 
-The car brakes, steers and drives over a rough road, so that nothing rests. Beside it the multi-body model of
-commonroad-vehicle-models under scipy, where both are installed: a braking and a step-steer of its own car.
+The car brakes, steers and drives over a rough road, so that all states are excited. Beside it the multi-body
+model of commonroad-vehicle-models under scipy, where both are installed: a braking and a step-steer of its
+own car.
 """
 
 import time
@@ -64,7 +65,7 @@ def _alone(name: str, steps: int) -> Task:
 
 
 def _fleet(name: str, steps: int, cores: int) -> Task:
-    """Return a task that times by the clock: the processor time of one thread says nothing of the others."""
+    """Return a task timed by the clock: the processor time of one thread excludes the others."""
     params, states, commands = cars(name, CARS)
     start = states.copy()
 

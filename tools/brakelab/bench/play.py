@@ -1,7 +1,7 @@
 """Lateness of frames on a bus: `brake-ecu play` beside canplayer and python-can, at several speeds.
 
-All play the same log one after another, with the same real-time rights. The kernel's stamps of a socket of
-the bench's own say when each frame came.
+All play the same log one after another, with the same real-time rights. Arrival times are kernel stamps of a
+socket of the bench's own.
 """
 
 import json
@@ -44,13 +44,13 @@ PERIODS_MS: Final = {10: 8, 20: 10, 50: 10, 100: 12}
 JITTER: Final = 0.1  # of a period
 PORT: Final = 43113  # python-can's, of UDP multicast
 QUIET_S: Final = 0.3
-BUFFER: Final = 64 << 20  # bytes: on a machine of one core nobody listens while a player keeps it busy
+BUFFER: Final = 64 << 20  # bytes: on a single-core machine nobody listens while a player keeps it busy
 
 _SO_RCVBUFFORCE, _SO_TIMESTAMPNS, _IP_MULTICAST_ALL = 33, 35, 49  # asm-generic/socket.h, linux/in.h
 
 
 def bus_times(seconds: float) -> NDArray[np.int64]:
-    """Return when the frames of a busy bus begin [us], one after another, shape (n,)."""
+    """Return the start times of the frames of a busy bus [us], one after another, shape (n,)."""
     draw = np.random.default_rng(SEED)
     wanted = []
     for period_ms, identifiers in PERIODS_MS.items():
@@ -95,7 +95,7 @@ class Listener:
         self._socket.setblocking(False)
 
     def wait(self) -> None:
-        """Wait until a frame is there."""
+        """Wait for a frame."""
         select.select([self._socket], [], [])
 
     def hear(self, player: "subprocess.Popen[str]") -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -133,7 +133,7 @@ class Player(NamedTuple):
 
 
 def play_in_memory(log: str, interface: str, channel: str, options: str) -> None:
-    """Play a log that was read before with python-can's `MessageSync`."""
+    """Play a log read in advance with python-can's `MessageSync`."""
     messages = list(can.LogReader(log))
     with can.Bus(interface=interface, channel=channel, **_bus_options(options)) as bus:
         for message in can.MessageSync(messages):
@@ -141,7 +141,7 @@ def play_in_memory(log: str, interface: str, channel: str, options: str) -> None
 
 
 def play_nowhere(log: str, speed: float) -> None:
-    """Keep the times of a log and send nothing; print quantiles of the lateness [us], as JSON."""
+    """Follow the times of a log and send nothing; print quantiles of the lateness [us], as JSON."""
     blocks = list(timed_frames(Path(log), None, "", speed, Findings(Path(log))))
     ask_for_priority()
     sent = Sent()
@@ -186,7 +186,7 @@ PLAYERS: Final = (
 
 
 def _with_priority() -> None:
-    """In the child: the real-time rights that ours asks for itself."""
+    """Acquire, in the child, the real-time rights that ours requests itself."""
     with suppress(OSError):
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
 
@@ -200,7 +200,7 @@ def _granted() -> bool:
 def errors_us(
     times_us: NDArray[np.int64], speed: float, numbers: NDArray[np.int64], stamps_ns: NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """Return by how much each frame that came was late [us], against the one that was earliest."""
+    """Return the lateness of each received frame [us], relative to the earliest one."""
     wanted = (times_us[numbers] - times_us[0]) / speed
     late = 1e-3 * (stamps_ns - stamps_ns.min()) - wanted
     return np.asarray(late - late.min())

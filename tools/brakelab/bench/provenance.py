@@ -1,4 +1,4 @@
-"""Commit and configuration that a page of results was measured on."""
+"""Commit and configuration behind a page of results."""
 
 import subprocess
 from typing import Final
@@ -14,8 +14,8 @@ CODE: Final = ("ecu", "tools/brakelab", "config", "dbc")
 def measured_on() -> str:
     """Return the line of a page that `tools/stale_pages.py` reads.
 
-    "Measured on commit 1a2b3c4, config/suv.toml 0123456789ab.", the commit with `-dirty` where code was
-    changed since, `unknown` outside a checkout.
+    "Measured on commit 1a2b3c4, config/suv.toml 0123456789ab.", the commit with `-dirty` after a change of
+    code, `unknown` outside a checkout.
     """
     name = resource(CONFIGURATION)
     commit = _git("rev-parse", "--short=7", "HEAD") or "unknown"

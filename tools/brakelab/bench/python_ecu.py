@@ -1,5 +1,5 @@
-"""The cycle as one writes it with python-can, cantools and numpy: no checksums, no counters, no time-outs, of
-the algorithm the four friction filters and the nominal pressure law alone."""
+"""Plain cycle with python-can, cantools and numpy: no checksums, no counters, no time-outs; of the algorithm, the
+four friction filters and the nominal pressure law alone."""
 
 from collections.abc import Iterable
 from typing import Any, Final
@@ -43,7 +43,7 @@ class PythonEcu:
         self.latest: dict[str, float] = {}
 
     def drain(self) -> list[can.Message]:
-        """Return what waits."""
+        """Return the waiting frames."""
         received = []
         while (message := self.bus.recv(timeout=0)) is not None:
             received.append(message)
@@ -77,7 +77,7 @@ class PythonEcu:
         return limited
 
     def transmit(self, demand: NDArray[np.float64]) -> list[can.Message]:
-        """Encode the six messages that are due."""
+        """Encode the six messages due."""
         values = {"crc": 0.0, "alive_counter": 0.0, "pressure_demand_valid": 1.0, "motor_demand_valid": 0.0}
         values |= _per_corner("pressure_demand", demand) | _per_corner("motor_demand", [0.0] * 4)
         values |= _per_corner("mu_b", np.clip(self.filters.x[:, 2], 0.2, 0.7))

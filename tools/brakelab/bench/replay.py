@@ -1,8 +1,8 @@
 """Time of replaying a drive from a log of every format, beside python-can, cantools, asammdf and numpy.
 
 Ten minutes of closed loop (config/scenarios/ordinary.toml) are written as a log of every format by
-python-can's and asammdf's writers. Programs in Python get its first 20 s, whose time a frame is that of any
-other.
+python-can's and asammdf's writers. Programs in Python get its first 20 s, whose time per frame is
+representative.
 """
 
 import contextlib
@@ -107,7 +107,7 @@ def _asammdf_read(log: Path) -> None:
 
 
 def _inputs_of_cycles(log: Path) -> RecordArray:
-    """Return what `step` reads in every cycle of a drive, shape (cycles,)."""
+    """Return the inputs of `step` in every cycle of a drive, shape (cycles,)."""
     plan = contract_receive_plan(resource(_DBC))
     reception, inputs = new_reception(plan), new_record(INPUTS)
     frames = np.concatenate(list(_blocks(log)))
@@ -142,7 +142,7 @@ def replay_tables(rounds: int = ROUNDS, scenario: str = SCENARIO, part_s: float 
 
 
 def _write(log: Path, frames: RecordArray) -> dict[str, Path]:
-    """Write a log in every format; return each by the end of its name."""
+    """Write a log in every format; return the paths by suffix."""
     log.write_bytes(candump_text(frames, VEHICLE_BUS))
     return {end: log if end == ".log" else convert(log, log.with_suffix(end)) for end in FORMATS}
 

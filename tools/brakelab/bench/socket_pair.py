@@ -19,7 +19,7 @@ _TIMESTAMPNS: Final = 35  # SO_TIMESTAMPNS, asm-generic/socket.h
 
 
 class _CanSocket(socket.socket):
-    """A Unix socket that lets pass what only a CAN socket can be told: filters and error frames."""
+    """A Unix socket that accepts, without effect, options of CAN sockets: filters and error frames."""
 
     def setsockopt(self, level: int, *option: Any) -> None:
         if level != socket.SOL_CAN_RAW:
@@ -59,7 +59,7 @@ def daemon_channel(end: socket.socket, receive_ids: NDArray[np.uint32]) -> Socke
 
 
 class PythonCanBus(SocketcanBus):
-    """python-can's SocketCAN bus on one end; only the opening of its socket is left out."""
+    """python-can's SocketCAN bus on one end, without the opening of its socket."""
 
     def __init__(self, end: socket.socket) -> None:
         self.socket, self.channel, self._bcm_sockets = end, "socket pair", {}
@@ -69,7 +69,7 @@ class PythonCanBus(SocketcanBus):
 
 
 def wire_format(frames: RecordArray) -> list[bytes]:
-    """Return every frame as the kernel hands it over."""
+    """Return every frame in the kernel's format."""
     return [
         _CAN_FRAME.pack(int(frame["can_id"]), int(frame["length"]), frame["data"][:8].tobytes())
         for frame in frames
@@ -83,7 +83,7 @@ def put(end: socket.socket, packets: list[bytes]) -> None:
 
 
 def take(end: socket.socket) -> int:
-    """Throw away what waits; return how many frames those were."""
+    """Discard waiting frames; return their number."""
     count = 0
     while True:
         try:

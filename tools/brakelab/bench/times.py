@@ -1,4 +1,4 @@
-"""The benches of times: what each measures and what stands below its table."""
+"""Benches of times: subject of each, and the note below its table."""
 
 from collections.abc import Callable
 from typing import Final, NamedTuple

@@ -1,4 +1,4 @@
-"""Discovery of C.1 on trial: whose terms are found in whose stops."""
+"""Trial of the discovery of C.1: terms found, by the stops searched."""
 
 from collections import Counter
 from collections.abc import Iterable
@@ -21,7 +21,7 @@ SEED: Final = 1
 
 
 class Draw(NamedTuple):
-    """Terms found in one recording; those by shooting are None where that was not asked."""
+    """Terms found in one recording; those by shooting are None where not requested."""
 
     brake: str
     noise: float
@@ -61,7 +61,7 @@ def pad_terms(brake: str) -> PadTerms:
 
 
 def discovery_tables(draws: list[Draw], pads: list[PadTerms]) -> list[Table]:
-    """Return what was found in ILVO's stops, and in those of pads."""
+    """Return the terms found in ILVO's stops, and in those of pads."""
     rows = []
     for brake, noise in product(BRAKES, NOISES):
         ours = [draw for draw in draws if (draw.brake, draw.noise) == (brake, noise)]

@@ -1,9 +1,9 @@
 """The joint observer in the four manoeuvres of Table 2.1: in a car, without a dynamometer.
 
 A trip of brakings of the kinds of `friction_lab.trips` in closed loop, cars of the wide draw. The observer
-knows of the car what its configuration says and what ten minutes of ordinary driving taught it; its front
-linings are of brake A under one of three laws, of a level that is not the configured one. Counted as in
-`bench observers`: from 0.8 s after the brakes of both axles came on, above 15 km/h.
+has the car's configuration and the learned values of ten minutes of ordinary driving; the front linings are
+of brake A under one of three laws, at a level other than the configured one. Counted as in `bench observers`:
+from 0.8 s after the brakes of both axles are applied, above 15 km/h.
 
 What limits it is measured by cars of which one thing is as the configuration has it, all else as drawn.
 """
@@ -58,7 +58,7 @@ class OnTrip(NamedTuple):
     """One car: nRMSE [%] of the front axle by kind."""
 
     cause: str
-    cold: dict[str, float]  # nothing learned before
+    cold: dict[str, float]  # unadapted
     adapted: dict[str, float]
     nominal: dict[str, float]  # the configured constant
 
@@ -80,7 +80,7 @@ def trip_of_kinds(seed: int) -> tuple[Scenario, str]:
 
 
 def brakings(drive: Drive) -> list[NDArray[np.bool_]]:
-    """Return the rows that count of each braking, in order; shape (n,) each."""
+    """Return the counted rows of each brake application, in order; shape (n,) each."""
     asked = drive.truth["decel_demand"] > 0.05
     edges = np.flatnonzero(np.diff(np.concatenate([[False], asked, [False]]).astype(int)))
     rows = counted(drive)

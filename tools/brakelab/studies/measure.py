@@ -1,4 +1,4 @@
-"""Times of two programs beside each other: in one run, in alternating rounds, medians with their spread."""
+"""Times of two programs in one run, in alternating rounds: medians with their spread."""
 
 import gc
 import os
