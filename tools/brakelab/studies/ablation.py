@@ -1,9 +1,9 @@
 """Ablation of the joint observer: its errors with one ingredient taken away.
 
-Nothing in the ECU knows of this. A signal is withheld by the scenario, a measurement by a standard deviation
-that makes it worthless, what was learned by giving its place in `LEARNED` the prior; the demand as a model of
-the pressure by stepping a recorded drive with `transmit = false`, as a shadow. What is withheld was so in the
-ten minutes before as well.
+The ECU is unchanged. A signal is withheld by the scenario, a measurement by a standard deviation that makes
+it worthless, a learned value by setting it to the prior in `LEARNED`; the demand as a model of the pressure
+by stepping a recorded drive with `transmit = false`, as a shadow. The same was withheld in the ten minutes
+before.
 """
 
 from collections.abc import Iterable
@@ -47,7 +47,7 @@ UNKNOWN: Final = 1e3
 
 
 class Ablation(NamedTuple):
-    """The ingredient that is taken away."""
+    """The ingredient withheld."""
 
     withheld: tuple[str, ...] = ()
     """Signals."""
@@ -96,7 +96,7 @@ class Sample(NamedTuple):
 
 
 def without(ablation: Ablation, scenario: Scenario, before: bool) -> Scenario:
-    """Return a scenario without what is withheld; `before`: the ten minutes."""
+    """Return a scenario without the withheld signals; `before`: the ten minutes."""
     if ablation.only_before and not before:
         return scenario
     sensor = scenario.sensor | dict.fromkeys(ablation.withheld, ABSENT)
@@ -104,7 +104,7 @@ def without(ablation: Ablation, scenario: Scenario, before: bool) -> Scenario:
 
 
 def forget(ablation: Ablation, learned: RecordArray) -> RecordArray:
-    """Return `LEARNED`, shape (1,), with the prior of what is forgotten; it tells nothing of the rest."""
+    """Return `LEARNED`, shape (1,), with the prior of the forgotten values, uncorrelated with the rest."""
     learned = learned.copy()
     states = list(ablation.forgotten)
     if ablation.linings:

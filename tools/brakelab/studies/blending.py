@@ -1,9 +1,9 @@
-"""Brake blending in closed loop: torque that changes hands, motors that are lost, and what friction that is
-wrong does to the sum (sections 5.3, 5.7; Figure 5.8).
+"""Brake blending in closed loop: hand-over of torque, loss of motors, effect of wrong friction on the torque sum
+(sections 5.3, 5.7; Figure 5.8).
 
 Torque is that of linings and motors of all wheels, true; the demand is m a r (5.1) with the radius of the
-configuration and the mass that the ECU knows. Counted from the full demand down to 1 km/h. Where the ECU is
-told the true friction, what is left is the error of blending with hydraulics that are not those it knows.
+configuration and the mass that the ECU knows. Counted from the full demand down to 1 km/h. Where the ECU uses
+the true friction, the remaining error is that of blending with hydraulics other than modelled.
 """
 
 from collections.abc import Callable
@@ -42,7 +42,7 @@ SHARES: Final = (0.0, 0.2, 0.4, 0.6, 0.8)
 
 
 class Changing(NamedTuple):
-    """Torque of one braking while it changes hands."""
+    """Torque during the hand-over in one brake application."""
 
     below: float
     """The demand by at most [%]."""
@@ -56,7 +56,7 @@ class Changing(NamedTuple):
 
 
 class Loss(NamedTuple):
-    """Torque of one braking whose motors were lost."""
+    """Torque in one brake application with a loss of its motors."""
 
     within_ms: float
     """After the loss; from then on the sum is within `TOLERANCE` of the demand."""
@@ -94,9 +94,9 @@ def torques(drive: Drive) -> tuple[Vector, Vector]:
 
 
 def demanded(drive: Drive, config: Config) -> Vector:
-    """Return the torque demanded (5.1) that the sum of the same row should be [N m], shape (n,).
+    """Return the demanded torque (5.1) for the sum of the same row [N m], shape (n,).
 
-    Of the mass that the ECU knows by then: it is learned.
+    By the mass learned by the ECU so far.
     """
     radius = float(new_params(config)["wheel_radius"].mean())
     torque = drive.outputs["vehicle_mass"] * drive.outputs["decel_demand_total"] * radius
@@ -114,13 +114,13 @@ def counted(drive: Drive) -> NDArray[np.bool_]:
 
 
 def _longest(flags: NDArray[np.bool_]) -> int:
-    """Return how many are true in a row at most."""
+    """Return the length of the longest run of true values."""
     ends = np.flatnonzero(~np.concatenate([[False], flags, [False]]))
     return int(np.diff(ends).max()) - 1
 
 
 def changing(drive: Drive, config: Config) -> Changing:
-    """Return how well the sum was kept."""
+    """Return how well the sum followed the demand."""
     rows = counted(drive)
     linings, motors = (torque[rows] for torque in torques(drive))
     error = 100.0 * ((linings + motors) / demanded(drive, config)[rows] - 1.0)
@@ -133,7 +133,7 @@ def changing(drive: Drive, config: Config) -> Changing:
 
 
 def loss(drive: Drive, config: Config) -> Loss:
-    """Return how a loss at `LOSS` was made up for."""
+    """Return the compensation of a loss at `LOSS`."""
     linings, motors = torques(drive)
     rows = counted(drive) & (drive.t > LOSS + LIMIT_SHOWS)
     wanted = demanded(drive, config)[rows]
@@ -147,7 +147,7 @@ def loss(drive: Drive, config: Config) -> Loss:
 
 
 def freeze_friction(loop: Loop) -> None:
-    """Make the linings' friction the constant that it is now and keep the discs as warm as they are."""
+    """Freeze the linings' friction at its present value, and the discs' temperature."""
     params, constant = loop.sides.vehicle.params, LAWS.index(Constant)
     params["friction_law"], params["friction_scale"] = constant, 1.0
     params["friction_row"][0, :, :2] = [(1.0, mu) for mu in loop.sides.vehicle.state["mu_b"][0]]
@@ -186,7 +186,7 @@ def wrong_friction(share: float, ratio: float, compensate: bool, seed: int) -> f
 
 
 def _over_cars(of: Callable[[int], NamedTuple], cars: int) -> list[str]:
-    """Return each field of what `of` gives for a seed as median (least–greatest) over the cars."""
+    """Return each field of the results of `of` as median (least–greatest) over the cars."""
     return [spread(figure(values)) for values in zip(*map(of, range(cars)), strict=True)]
 
 

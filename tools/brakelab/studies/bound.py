@@ -1,12 +1,12 @@
-"""Can the goals of the adapted joint observer be met at all with these sensors?
+"""Lower bound of the adapted joint observer's error: whether its goals can be met with these sensors.
 
-The drives of `observers` as a linear system about what really happened (`bound_car.py`), bounded by
-`linear_bound.py`. What is known at the start of a case:
+The drives of `observers` as a linear system about the true drive (`bound_car.py`), bounded by
+`linear_bound.py`. Prior knowledge in a case:
 
-learned          what the joint observer starts with, by its own standard deviations
-ten minutes      what a filter of this structure knows after config/scenarios/ordinary.toml at best
+learned          that of the joint observer, by its own standard deviations
+ten minutes      the best of a filter of this structure after config/scenarios/ordinary.toml
 car known        car and sensors exactly; only friction is left
-course known     as ten minutes, and how friction is going to change, so that its level alone is left
+course known     as ten minutes, with the change of friction known, so that its level alone is left
 
 But for the last, friction changes by a rate per axle, a Gauss-Markov process whose covariance and correlation
 time are those of the very drive. Draws of the errors are judged as `observers` judges its drives.
@@ -110,7 +110,7 @@ def as_learned(params: RecordArray, learned: RecordArray, wander: Wander) -> Vec
     ):
         turn[mine, its] = 1.0
     turn[RADIUS : RADIUS + 4, layout.ROLLING] = 1.0
-    turn[DRAG, layout.MASS] = 1.0  # there it is drag over mass
+    turn[DRAG, layout.MASS] = 1.0  # in `ordinary` it is drag over mass
     p = turn @ new_state(params, learned)["joint"]["p"][0] @ turn.T
     for state in (V, SLOPE, ROLLING, TRANSFER):
         p[state, state] = PRIOR[state] ** 2
@@ -165,7 +165,7 @@ def bounds_of(seed: int, names: Sequence[str] = tuple(ACCURACY)) -> list[Bound]:
 
 
 def _verdict(goal: float, reached: float, limits: dict[str, float]) -> str:
-    """Return what it would take to meet a goal [%] that was missed."""
+    """Return the change needed to meet a goal [%] that was missed."""
     if reached <= goal + ROUNDING:
         return "met"
     enough = [level for level in LEVELS[1:] if limits[level] <= goal + ROUNDING]

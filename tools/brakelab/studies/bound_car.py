@@ -8,8 +8,8 @@ by central differences. Means over windows of five cycles:
     a = f + bias          v' = f - slope          omega_i = v_i (1 + slip_i) / r_i
     T_b = 2 mu A r_eff (p - p_0)
 
-Lateral forces and angles count as known and as without effect on longitudinal slip, so that a curve shows
-more here than it can: the bound is on the safe side.
+Lateral forces and angles are taken as known and without effect on longitudinal slip, which overstates the
+information in a curve: the bound is on the safe side.
 """
 
 from typing import Any, Final, NamedTuple
@@ -27,7 +27,7 @@ WINDOW_S: Final = 0.01 * CYCLES
 V: Final = 0  # m/s
 SLOPE: Final = 1  # gravity along the road [m/s^2]
 BIAS: Final = 2  # of the accelerometer [m/s^2]
-MASS: Final = 3  # from here on logarithms but where a unit is told
+MASS: Final = 3  # from here on logarithms unless a unit is given
 DRAG: Final = 4
 MOTOR: Final = 5  # torque over reported
 ROLLING: Final = 6  # rolling resistance
@@ -39,7 +39,7 @@ DEFLECTION_GAIN: Final = 11  # change of the radius with load
 TRANSFER: Final = 12  # of load
 RADIUS: Final = 13  # four
 PUSH_OUT: Final = 17  # two: pressure lost before the pads [bar]
-FOLLOWING: Final = 19  # two: pressure beyond what the demand lets expect [bar]
+FOLLOWING: Final = 19  # two: pressure beyond the response to the demand [bar]
 MU: Final = 21  # four
 RATE: Final = 25  # two: change of friction of an axle [1/s]
 N: Final = 27
@@ -57,7 +57,7 @@ NEAR_PEAK: Final = 0.98
 
 
 class Course(NamedTuple):
-    """A drive as it really was, in windows of `WINDOW_S`; four wheels where there is a second axis."""
+    """A true drive in windows of `WINDOW_S`; four wheels where there is a second axis."""
 
     speed: Vector
     """m/s"""
@@ -127,7 +127,7 @@ def slip_of(used: Vector, stiffness: Vector, peak: Vector, c: float, e: float) -
 def shown(car: Any, course: Course, error: Vector) -> Vector:
     """Return wheel speeds [rad/s] and specific force [m/s^2] of all windows, shape (n, 5).
 
-    `error`: what car and drive are beyond the truth, shape (N,).
+    `error`: deviation of car and drive from the truth, shape (N,).
     """
     d = error
     at_rest = np.asarray(car["nominal_load"])

@@ -1,4 +1,4 @@
-"""A drive as a linear system of what is not known of it, for `bound.py`: priors, friction, steps."""
+"""A drive as a linear system of its unknowns, for `bound.py`: priors, friction, steps."""
 
 from typing import Final, NamedTuple
 
@@ -40,7 +40,7 @@ from brakelab.studies.stops import Vector
 LAG: Final = 10  # windows
 
 PRIOR: Final = np.zeros(N)
-"""Before the ten minutes: spread of the drawn cars and what config/suv.toml is off them; else assumed."""
+"""Before the ten minutes: spread of the drawn cars and error of config/suv.toml; else assumed."""
 PRIOR[V], PRIOR[SLOPE] = 0.5, 0.3
 PRIOR[BIAS] = 0.05  # assumption
 PRIOR[MASS] = 0.017  # drawn within 3 %
@@ -57,12 +57,13 @@ PRIOR[PUSH_OUT : PUSH_OUT + 2] = 0.17  # bar, drawn within 0.3
 MU_COMMON, MU_AXLE, MU_WHEEL = 0.13, 0.17, 0.02  # left and right are alike: assumption
 
 JUMP_COMMON, JUMP_AXLE = 0.05, 0.03
-"""What is unknown of friction's fall from the end of one application to the beginning of the next; assumed,
+"""Uncertainty of friction's fall from the end of one application to the beginning of the next; assumed,
 it falls by 22 to 28 %."""
 SLOPE_WALK: Final = 0.02  # m/s^2 per root second
 WHEEL_WALK: Final = 0.002  # of friction, per root second
 FOLLOWING_WALK, FOLLOWING_SHARE = 0.1, 0.05
-"""bar per root second, and of a change: how far the pressure is from what its demand lets expect. Assumed."""
+"""Deviation of the pressure from the modelled response to its demand: bar per root second, and of a change.
+Assumed."""
 
 
 class Wander(NamedTuple):
@@ -75,7 +76,7 @@ class Wander(NamedTuple):
 
 
 def wander_of(course: Course) -> Wander:
-    """Return how friction changes in the windows that count."""
+    """Return the change of friction in the counted windows."""
     logarithm = np.log(course.mu.reshape(-1, 2, 2).mean(axis=2))
     rate = np.diff(logarithm, axis=0) / WINDOW_S
     rate = rate[course.counted[1:] & course.counted[:-1]]
@@ -126,7 +127,7 @@ def system_of(course: Course, shown: Vector, wander: Wander, car_known: bool) ->
 
 
 def prior(car_known: bool, wander: Wander) -> Vector:
-    """Return the covariance before anything is learned."""
+    """Return the unadapted covariance."""
     p: Vector = np.diag(PRIOR**2)
     if car_known:
         known = [state for state in range(N) if state not in (V, SLOPE)]
@@ -141,7 +142,7 @@ def prior(car_known: bool, wander: Wander) -> Vector:
 
 
 def before_stop(p: Vector, wander: Wander, car_known: bool) -> Vector:
-    """Return what is left of a drive's knowledge for another one on another road."""
+    """Return the knowledge left from a drive for another one on another road."""
     p = p.copy()
     for state in (V, SLOPE, PEAK, FOLLOWING, FOLLOWING + 1, RATE, RATE + 1):
         p[state] = p[:, state] = 0.0

@@ -1,9 +1,9 @@
 """Benefit of compensation: the manoeuvres of section 5.7 and fade, with cars drawn per seed.
 
 ideal           the same controller in the same car, told the true friction
-compensated     as configured, nothing learned before
+compensated     as configured, unadapted
 uncompensated   nominal friction always (`control.compensation = "off"`)
-under, over     the controller is told 1.15 and 0.85 of the true friction (section 5.6)
+under, over     the controller uses 1.15 and 0.85 of the true friction (section 5.6)
 
 Achieved is the sum over the wheels of (brake torque + motor torque) / rolling radius, over the mass, all
 true. Errors are against the ideal at the same time, above 15 km/h.
@@ -38,7 +38,7 @@ MOTORS: Final = 0.7  # f of section 5.7.2
 
 
 class Manoeuvre(NamedTuple):
-    """A scenario and what is changed in it."""
+    """A scenario and its changes."""
 
     scenario: str
     pedal: float | None = None
@@ -60,7 +60,7 @@ MANOEUVRES: Final = {
 CURVES: Final = tuple(name for name, how in MANOEUVRES.items() if how.pedal)
 ASKED: Final = 0.2  # m/s^2
 FULL: Final = 0.98  # of the demand
-SETTLED_S: Final = 2.5  # of a braking with a kept deceleration
+SETTLED_S: Final = 2.5  # of an application with a kept deceleration
 
 
 class Run(NamedTuple):
@@ -131,7 +131,7 @@ def application_errors(run: Run, ideal: Run) -> list[float]:
 def pedal_curve(run: Run, rows: NDArray[np.int_]) -> Vector:
     """Return the pedal [%] at which the deceleration of an application first passes each of `LEVELS`.
 
-    NaN where a level is not reached while the pedal moves: there the pedal says nothing.
+    NaN where a level is not reached while the pedal moves.
     """
     pedal, decel = run.drive.truth["pedal_position"][rows], np.maximum.accumulate(run.decel[rows])
     crossed = np.searchsorted(decel, LEVELS)
@@ -198,7 +198,7 @@ FADE_RUNS: Final = ("ideal", "compensated", "uncompensated")
 
 
 def one_car(config: Config, seed: int) -> Car:
-    """Drive every manoeuvre in every way."""
+    """Drive every manoeuvre in every variant."""
     vehicle = new_loop(manoeuvre("single application"), config, seed).sides.vehicle
     mass = float(vehicle.params["mass"][0])
     car = Car({}, {}, {}, 100.0 * (mass / config.vehicle.mass - 1.0))

@@ -35,7 +35,7 @@ FIGURES: Final = (
     ("5.12a", CURVES[1], "at 50 mm/s compensated on the desired curve as well"),
     ("5.12b", CURVES[3], "the same with motors"),
 )
-"""Of section 5.7: number, manoeuvre, what the text says."""
+"""Of section 5.7: number, manoeuvre, statement."""
 
 
 def _figure_table(cars: list[Car]) -> Table:
@@ -97,7 +97,7 @@ def _level_table(cars: list[Car]) -> Table:
 
 
 def mass_table(cars: list[Car]) -> Table:
-    """Set the curve's errors beside the cars' masses, which the ECU does not know."""
+    """Return the curve's errors beside the cars' masses, which the ECU does not know."""
     rows, rest = [], []
     for seed, car in enumerate(cars):
         means = [np.nanmean(car.levels[name, "compensated"][0], axis=0)[::2] for name in CURVES[:2]]

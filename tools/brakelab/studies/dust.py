@@ -28,7 +28,7 @@ def _errors(draws: list[Draw], name: str, key: str) -> np.ndarray:
 
 
 def model_rows(draws: list[Draw]) -> list[tuple[str, ...]]:
-    """Return a row a model, and what could be had at all."""
+    """Return a row a model, and the achievable error."""
     rows: list[tuple[str, ...]] = []
     for name in draws[0].models:
         errors, plain, beside = (

@@ -1,5 +1,5 @@
-"""Draws of eight trips with a particle counter, the last held out: what emission models make of it, what
-could be had at all, and what the ECU says on board of a simulated car with the same linings."""
+"""Draws of eight trips with a particle counter, the last held out: errors of emission models, achievable error,
+and the on-board result of the ECU in a simulated car with the same linings."""
 
 from typing import Final, NamedTuple
 
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 PARTICLES: Final = TRUTH_COLUMNS.index("particles_fl")
 BRAKING, LAST = OUTPUT["braking"], OUTPUT["particles_last_brake"]
-LATER: Final = 20  # rows, that an application is known at most after it began
+LATER: Final = 20  # rows, latest report of an application after it began
 QUIET: Final = (0.03, 0.15)
 """Standard deviations of the logarithm, of a day and of an application, of brakes that repeat better."""
 
@@ -35,7 +35,7 @@ class Outcome(NamedTuple):
     sum_error: float
     without_factor: float
     beside_law: float
-    """Of the sum, to what the law without scatter emits, as it is counted."""
+    """Of the sum, relative to the counted emission of the law without scatter."""
     vaf: float
     nrmse: float
     covered: float
@@ -70,11 +70,11 @@ class OnBoard(NamedTuple):
     mass_per_km: float
     """mg/km of all linings, by the ECU."""
     true_mass_per_km: float
-    """mg/km, the same share of what was truly worn off."""
+    """mg/km, the same share of the true wear."""
 
 
 def as_recorded(trip: Trip, name: str, test: bool, push_out: float) -> Recorded:
-    """Return a simulated trip as a file of it would be read; `push_out` [bar]."""
+    """Return a simulated trip in the form read from its file; `push_out` [bar]."""
     t, speed, pressure, torque, heat, counted, flow = (trip.columns[column] for column in COLUMNS)
     known = np.isfinite(counted)
     shown = np.interp(t, t[known], counted[known])
@@ -91,7 +91,7 @@ def _applications(made: list[Trip]) -> list[Applications]:
 
 
 def draw_trips(seed: int, quiet: bool = False) -> Draw:
-    """Return what the models make of the trips of a seed."""
+    """Return the models' results for the trips of a seed."""
     made = campaign(seed, *QUIET) if quiet else campaign(seed)
     trips = _applications(made)
     trained, test = trips[:-1], trips[-1:]
@@ -100,7 +100,7 @@ def draw_trips(seed: int, quiet: bool = False) -> Draw:
     emitted, expected = (np.array([getattr(trip, n)[-1] for trip in made]) for n in ("emitted", "expected"))
     level = emitted[:-1].sum() / expected[:-1].sum()
     counts = np.array([trip.particles.sum() for trip in trips])
-    shown = counts[:-1].sum() / emitted[:-1].sum()  # what the counter misses
+    shown = counts[:-1].sum() / emitted[:-1].sum()  # particles missed by the counter
     models = {}
     for one in judged:
         assert one.test is not None
@@ -128,7 +128,7 @@ def pictured(seed: int = 0) -> tuple[list[Applications], list[Judged], Judged]:
 
 
 def section(chosen: Judged, trained: list[Applications]) -> Dust:
-    """Return the model of an axle's brakes as CONFIG has it."""
+    """Return the model of an axle's brakes in CONFIG's form."""
     assert chosen.model.on_board is not None
     low, high = ranges(trained)
     return Dust(
@@ -138,7 +138,7 @@ def section(chosen: Judged, trained: list[Applications]) -> Dust:
 
 
 def _told_error(rows: Array) -> float:
-    """Return the error of the applications of which is told; rows of braking, last told, emitted so far."""
+    """Return the error of the reported applications; rows of braking, last reported, emitted so far."""
     edges = np.flatnonzero(np.diff(rows[:, 0], prepend=0.0, append=0.0))
     starts, ends = edges[::2], edges[1::2]
     emitted = rows[np.minimum(ends, len(rows) - 1), 2] - rows[np.maximum(starts - LATER, 0), 2]
@@ -148,7 +148,7 @@ def _told_error(rows: Array) -> float:
 
 
 def drive_on_board(seed: int) -> OnBoard:
-    """Drive a van in closed loop whose ECU runs the model of the trips with its own linings."""
+    """Drive a van in closed loop whose ECU runs the trips' model for its own linings."""
     trips = _applications(campaign(seed))
     judged = judge_all(trips[:-1], [], seed)
     chosen = choose(judged)

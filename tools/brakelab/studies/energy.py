@@ -12,7 +12,7 @@ from ecu.settings.config import Config
 SUSPENDED: Final = "suv14"
 SOURCES: Final = ("motion", "gravity", "driven")
 LOSSES: Final = ("brakes", "regenerated", "tyres", "drag", "rolling", "dampers")
-SHOWN: Final = 5e-5  # share, from which it has a digit in the table
+SHOWN: Final = 5e-5  # share, above which it shows a digit in the table
 
 
 def scenario_energy(path: Path, config: Config, car: str | None = None) -> tuple[float, Energy]:

@@ -1,6 +1,6 @@
-"""A brake, a circuit or half of the pedal fails in the middle of a braking: what is left of the deceleration.
+"""Failure of a brake, a circuit or half of the pedal during a brake application: remaining deceleration.
 
-Deceleration is the fall of the true speed, against the same braking of the same car without the fault in the
+Deceleration is the fall of the true speed, relative to the same car and application without the fault in the
 same time; from 300 ms after the fault on, down to `LOWEST_SPEED`. The driver keeps to a straight line.
 """
 
@@ -20,7 +20,7 @@ from ecu.settings.config import Config, load_config
 from ecu.settings.resources import resource
 
 CARS: Final = 5
-FAILS: Final = 9.0  # s, in the second braking
+FAILS: Final = 9.0  # s, in the second application
 AFTER: Final = 0.3  # s
 LONG: Final = 1.0  # s
 LOWEST_SPEED: Final = 5.0  # m/s
@@ -29,7 +29,7 @@ HALF: Final = {"front": 0.5, "rear": 0.5}
 
 
 class Left(NamedTuple):
-    """Braking that is left after a failure, in one brake application."""
+    """Remaining deceleration after a failure, in one brake application."""
 
     deceleration: float
     """In the second from `AFTER` on, against the sound car [%]."""
@@ -44,14 +44,14 @@ class Left(NamedTuple):
 
 
 def braking(decel: float, motors: bool, fault: list[Fault]) -> Scenario:
-    """Return the drive of the shipped faults with another deceleration of its second braking [m/s^2]."""
+    """Return the drive of the shipped faults with another deceleration of its second application [m/s^2]."""
     base = shipped("faults/circuit-dead")
     phases = [*base.phase[:-2], Phase(kind="brake", decel=decel, until_speed=LOWEST_SPEED)]
     return base.model_copy(update={"phase": phases, "fault": fault, "blending": motors})
 
 
 def left_of(drive: Drive, sound: Drive) -> Left:
-    """Return what is left, of drives of the same car and seed."""
+    """Return the remaining deceleration, by drives of the same car and seed."""
     begin = FAILS + AFTER
 
     def decel(one: Drive) -> float:

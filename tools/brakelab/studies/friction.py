@@ -1,4 +1,4 @@
-"""The friction laws on the dynamometer: what of the thesis's Chapter 3 they reproduce.
+"""Friction laws on the dynamometer: reproduction of the thesis's Chapter 3.
 
 Table 3.4 with the measured pressure replayed and in closed loop, the nominal friction, the constant pressure
 cycle against Table 3.2, heating and cooling of the disc, and the staircase of the electro-hydraulic brake.
@@ -66,7 +66,7 @@ LOADINGS: Final = {
 
 
 class Run(NamedTuple):
-    """A column of ours: a law under a control, and the published column it stands beside."""
+    """One of our columns: a law under a control, and the published column beside it."""
 
     title: str
     law: str
@@ -74,7 +74,7 @@ class Run(NamedTuple):
     by_distance: bool
     delta_1: float  # factor on the lining file's
     beside: str
-    reachable: str  # what an audit of the thesis found, RMS in %
+    reachable: str  # found by an audit of the thesis, RMS in %
 
 
 RUNS: Final = (

@@ -3,8 +3,8 @@
     x_k = A_k x_k-1 + w, w ~ (0, Q_k)          z_k = H_k x_k + v, v ~ (0, 1)
 
 No estimator has a smaller mean square error; for a system linearised about the truth that is the posterior
-Cramer-Rao bound (Tichavsky, Muravchik and Nehorai 1998), as far as the derivatives hardly change within the
-errors. The smoother is that of Bryson and Frazier: it inverts no covariance of a state. Units of the
+Cramer-Rao bound (Tichavsky, Muravchik and Nehorai 1998), provided that the derivatives hardly change within
+the errors. The smoother is that of Bryson and Frazier: it inverts no covariance of a state. Units of the
 measurements are their standard deviations.
 """
 
@@ -56,7 +56,7 @@ def filtered(system: System, start: Vector) -> Filtered:
 def sampled(
     system: System, known: Filtered, start: Vector, draws: int, random: np.random.Generator
 ) -> tuple[Vector, Vector]:
-    """Return errors as the filter and as the smoother would make them, both of shape (n, N, draws)."""
+    """Return errors drawn from the filter's and the smoother's distributions, both of shape (n, N, draws)."""
     n, m, states = system.see.shape
     error = _root(start) @ random.standard_normal((states, draws))
     after, innovation = np.empty((n, states, draws)), np.empty((n, m, draws))

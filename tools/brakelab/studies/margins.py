@@ -1,16 +1,16 @@
 """Gain and phase margin of the loop through pressure law, hydraulics, car and friction observer.
 
-The loop: friction in use -> pressure demand (5.8) -> hydraulics -> brake torque, wheel speed, deceleration
--> observer -> friction estimate -> friction in use. It is cut at the friction in use, where the simulated
-driver's braking is disturbed by a sine of `AMPLITUDE`, at one axle after the other; what comes back is the
+The loop: friction in use -> pressure demand (5.8) -> hydraulics -> brake torque, wheel speed, deceleration ->
+observer -> friction estimate -> friction in use. It is cut at the friction in use, where a sine of
+`AMPLITUDE` disturbs the simulated brake application, at one axle after the other; the response is the
 estimate. Each drive is run with the sine and with its negative, so that noise, drift and temperature cancel:
 
     L_ij = ln mu_i(+) - ln mu_i(-), in phase with the sine, over 2 amplitude_j        i, j: front, rear
 
 Closed, the loop feeds L back with a positive sign; it is stable where no eigenvalue of L encircles +1. Gain
-margin is 1 / the largest modulus of an eigenvalue (by how much the loop may be more lively, whatever its
-phase), phase margin the least phase where a modulus is 1, distance the least |1 - eigenvalue|. The limit of
-`FRICTION_RATE` on the friction in use is left out: it makes the loop slower still.
+margin is 1 / the largest modulus of an eigenvalue (admissible factor on the loop gain, at any phase), phase
+margin the least phase where a modulus is 1, distance the least |1 - eigenvalue|. The limit of `FRICTION_RATE`
+on the friction in use is neglected: it makes the loop slower still.
 """
 
 from collections.abc import Callable, Iterable
@@ -32,7 +32,7 @@ CARS: Final = 5
 FREQUENCIES: Final = (0.2, 0.35, 0.6, 1.0, 1.7, 2.8, 4.5, 7.0)  # Hz; the observer's windows end at 10
 AMPLITUDE: Final = 0.05
 DECEL: Final = 2.5  # m/s^2
-SETTLED_S, LEAST_SPEED = 2.0, 6.0  # of what counts: since the begin of the braking, m/s
+SETTLED_S, LEAST_SPEED = 2.0, 6.0  # of the counted part: since the begin of the application, m/s
 COLOURS: Final = (GREY, ORANGE, BLUE, GREEN, PINK)
 
 Complex = NDArray[np.complex128]
@@ -69,7 +69,7 @@ class Margins(NamedTuple):
 
 
 def braking() -> Scenario:
-    """Return one long braking from 144 km/h."""
+    """Return one long brake application from 144 km/h."""
     phases = [
         Phase(kind="cruise", speed=40.0, seconds=1.0),
         Phase(kind="brake", decel=DECEL, until_speed=0.5 * LEAST_SPEED),
@@ -97,7 +97,7 @@ def in_phase(t: NDArray[np.float64], y: NDArray[np.float64], frequency: float) -
 def _estimates(
     config: Config, seed: int, override: FrictionOverride
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return time [s] and ln of the friction estimated at both axles, shape (2, n), of a braking."""
+    """Return time [s] and ln of the friction estimated at both axles, shape (2, n), of an application."""
     drive = run(new_loop(braking(), config, seed), override=override)
     rows = (drive.t > 1.0 + SETTLED_S) & (drive.truth["vehicle_speed"] > LEAST_SPEED)
     return drive.t[rows], np.stack(

@@ -1,9 +1,9 @@
-"""The friction observers over `observers_cases`: the thesis's two, the joint one and a constant.
+"""Comparison of friction observers over `observers_cases`: the thesis's two, the joint one and a constant.
 
-Every observer drives its own closed loop with the same cars and the same noise. Counted are the rows in
-which the brakes of both axles have been on for 0.8 s (the demand's ramp of 0.3 s and the half second of
-`stops.window`), above 15 km/h; nRMSE as there. *Adapted*: what the state store would have kept of ten
-minutes of `config/scenarios/ordinary.toml` in the same car is given to a new state.
+Every observer drives its own closed loop with the same cars and the same noise. Counted are the rows in which
+the brakes of both axles have been on for 0.8 s (the demand's ramp of 0.3 s and the half second of
+`stops.window`), above 15 km/h; nRMSE as there. *Adapted*: a new state starts with the learned values that the
+state store would keep after ten minutes of `config/scenarios/ordinary.toml` in the same car.
 """
 
 from collections.abc import Callable, Iterable
@@ -93,9 +93,9 @@ def counted(drive: Drive) -> NDArray[np.bool_]:
 def drive_car(
     setup: Setup, observer: str, seed: int, learned: RecordArray | None = None
 ) -> tuple[Drive, RecordArray]:
-    """Return the drive of one car and what was learned (`LEARNED`, shape (1,)) at its end.
+    """Return the drive of one car and the learned values (`LEARNED`, shape (1,)) at its end.
 
-    `learned`: what was known before; None: nothing. Only `observer1` has wheel transducers.
+    `learned`: values learned before; None: unadapted. Only `observer1` has wheel force transducers.
     """
     config = with_observer(setup.config, observer)
     transducers = {"wheel_transducers": observer == "observer1"}
@@ -116,9 +116,9 @@ def _setup(case: Case, task: Task) -> Setup:
 
 
 def _ordinary(case: Case, task: Task) -> RecordArray | None:
-    """Return what ten minutes of ordinary driving teach; of `case` only the car and what lasts is there.
+    """Return the values learned in ordinary driving (ten minutes); of `case` the car and lasting errors apply.
 
-    None: the store would not give it back.
+    None: the store would reject them.
     """
     ordinary = Case(shipped(ORDINARY).model_copy(update={"plant": case.scenario.plant}))
     if case.lasting:
@@ -136,9 +136,9 @@ def _axle_error(drive: Drive, axle: str) -> Vector:
 
 
 def settling(drive: Drive, start: int, against: int | None) -> float:
-    """Return how long after row `start` the friction of some axle is off by more than 5 % [s].
+    """Return the time after row `start` until friction stays within 5 % at both axles [s].
 
-    Off the truth; with `against` off the error in the half second before that row. `NEVER`: it still is at
+    Relative to the truth; with `against`, to the error in the half second before that row. `NEVER`: not by
     the end.
     """
     rows = np.flatnonzero(counted(drive))
@@ -185,7 +185,7 @@ def _sample(name: str, task: Task, adapted: bool, learned: RecordArray | None) -
 
 
 def drive_task(task: Task) -> list[Sample]:
-    """Drive the cases of a task, cold and adapted."""
+    """Drive the cases of a task, unadapted and adapted."""
     samples = []
     ordinary: dict[tuple[str, str], RecordArray | None] = {}
     for name in task.cases:
@@ -202,7 +202,7 @@ def drive_task(task: Task) -> list[Sample]:
 
 
 def tasks(seeds: int, draw: str = WIDE) -> list[Task]:
-    """Return all there is to do with cars 0 to `seeds` - 1, the longest first."""
+    """Return all tasks with cars 0 to `seeds` - 1, the longest first."""
     few = ROBUSTNESS | SENSORS
     passing = tuple(name for name, case in few.items() if not case.lasting)
     lasting = tuple(name for name, case in few.items() if case.lasting)

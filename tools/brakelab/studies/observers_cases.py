@@ -2,8 +2,8 @@
 
 A goal is the nRMSE [%] of front and rear friction that the joint observer should not exceed: `cold` with
 nominal configuration and nothing learned, `adapted` after `config/scenarios/ordinary.toml`. Those of
-`NOMINAL` are for cars of the nominal draw. A disturbance whose sign can be either has that of its car: odd
-seeds are below, even ones above.
+`NOMINAL` are for cars of the nominal draw. A disturbance of either sign takes that of its car: negative for
+odd seeds, positive for even ones.
 """
 
 from collections.abc import Callable
@@ -35,7 +35,7 @@ class Setup(NamedTuple):
     car: tuple[tuple[str, tuple[float, ...]], ...] = ()
     """Parameters of the drawn car and factors upon them per wheel."""
     any_rate: bool = False
-    """The ECU expects inputs at whatever rate they come."""
+    """The ECU expects inputs at any rate."""
 
 
 Change = Callable[[Setup, float], Setup]
@@ -49,7 +49,7 @@ def _as_is(setup: Setup, sign: float) -> Setup:
 
 
 def _unguarded(setup: Setup, sign: float) -> Setup:
-    """Let wheels lock: what is measured is what the observers make of it (Figure 5.5)."""
+    """Let wheels lock: the behaviour of the observers is measured (Figure 5.5)."""
     control = setup.config.control.model_copy(update={"slip_guard": False})
     return setup._replace(config=setup.config.model_copy(update={"control": control}))
 
@@ -78,7 +78,7 @@ def shipped(name: str) -> Scenario:
 
 @cache
 def configured() -> Config:
-    """Return the configuration that is judged."""
+    """Return the configuration under test."""
     return load_config(resource("config/suv.toml"))
 
 
@@ -158,7 +158,7 @@ def _slow_inputs(setup: Setup, sign: float) -> Setup:
 
 
 def _radii(setup: Setup, sign: float) -> Setup:
-    share = 0.005 * sign  # front against rear looks like slip
+    share = 0.005 * sign  # front against rear resembles slip
     return setup._replace(car=(("free_radius", (1.0 + share, 1.0 + share, 1.0 - share, 1.0 - share)),))
 
 
@@ -276,7 +276,7 @@ NOMINAL: Final[dict[str, tuple[Goal, Goal]]] = {
 
 
 def goals(name: str, draw: str) -> tuple[Goal | None, Goal | None]:
-    """Return the goals of a case, cold and adapted, for cars drawn so."""
+    """Return the goals of a case, unadapted and adapted, for cars drawn so."""
     case = CASES[name]
     if draw != "nominal":
         return case.cold, case.adapted

@@ -1,4 +1,4 @@
-"""Is the joint observer as sure as it may be? Errors over 2σ in stop #1 and squared innovations, as SVG."""
+"""Consistency of the joint observer: errors over 2σ in stop #1 and squared innovations, as SVG."""
 
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -95,7 +95,7 @@ def _error_panel(title: str, axle: int, top: float, cars: list[Consistency]) -> 
 
 
 def _histogram(title: str, top: float, cars: list[Consistency]) -> list[str]:
-    """Draw the innovations over their σ without sign beside the Gaussian that they should be."""
+    """Draw the absolute innovations over their σ beside the ideal Gaussian."""
     parts = _frame(title, top)
     edges = BIN * np.arange(BINS + 1)
     gauss = np.sqrt(2.0 / np.pi) * np.exp(-0.5 * edges**2)

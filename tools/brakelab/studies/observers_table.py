@@ -30,7 +30,7 @@ Rows = dict[tuple[str, str, bool], Row]
 
 
 def finite(value: Any) -> Any:
-    """Return JSON content with null for what is not finite."""
+    """Return JSON content with null for non-finite values."""
     if isinstance(value, dict):
         return {key: finite(item) for key, item in value.items()}
     if isinstance(value, Figure):
@@ -57,7 +57,7 @@ def _verdict(missed: list[str]) -> str:
 
 
 def _above(row: Row, goal: Goal | None) -> list[str]:
-    """Return the axles whose median is above the goal, or not below the constant where there is none."""
+    """Return the axles whose median exceeds the goal, or, without one, is not below the constant."""
     limits = goal or tuple(figure.median for figure in row.nominal)
     return [
         axle
@@ -121,7 +121,7 @@ def _others(rows: Rows) -> Table:
 
 
 def _honesty(shares: tuple[float, float]) -> list[str]:
-    """Return the axles of which ±2σ hold too little or too much."""
+    """Return the axles whose ±2σ contains too little or too much."""
     return [
         f"{axle} {'small' if share < HONEST[0] else 'large'}"
         for axle, share in zip(AXLES, shares, strict=True)

@@ -1,8 +1,8 @@
-"""Simulated cars as loggers record them: what the joint observer learns as a bystander, braking by braking.
+"""Simulated cars as recorded by loggers: learning of the joint observer as a bystander, by application.
 
-A driver brakes a car whose front and rear pressures are proportional, with an ECU that corrects nothing. Of
-its drive only what such a logger has is replayed: wheel speeds, one pressure per axle, accelerations and yaw
-rate; no speed reference and no motor torque. Each application is predicted from what was known before it.
+A driver brakes a car whose front and rear pressures are proportional, with an ECU that corrects nothing. Only
+the signals of such a logger are replayed: wheel speeds, one pressure per axle, accelerations and yaw rate; no
+speed reference and no motor torque. Each application is predicted from the values known before it.
 """
 
 from collections.abc import Iterable
@@ -33,13 +33,13 @@ Vector = NDArray[np.float64]
 
 CARS: Final = 20
 SHARE: Final = 0.68  # of the brake force in front
-FIRST: Final = 2  # the third application: from here on it counts
+FIRST: Final = 2  # the third application: counted from here on
 DECELS: Final = (2.0, 5.0, 3.0, 6.5, 1.5, 4.0, 7.0, 2.5, 5.5, 3.5)  # m/s^2
 PRESSURE_EVERY: Final = 5  # cycles: 20 Hz
 
 
 class Logger(NamedTuple):
-    """Signals that a logger has of a drive."""
+    """Signals of a drive that a logger has."""
 
     accel_every: int
     """Cycles between samples of the accelerometer."""
@@ -86,7 +86,7 @@ def _scenario() -> Scenario:
 
 
 def _columns(drive: Drive, logger: Logger) -> dict[str, Vector]:
-    """Return what the logger writes of a drive, a row a cycle."""
+    """Return the logger's columns of a drive, a row a cycle."""
     rows = np.arange(len(drive.t))
     columns = {name: drive.inputs[name].copy() for name in drive.inputs if name.startswith("wheel_speed")}
     columns["accel_x"] = np.where(rows % logger.accel_every == 0, drive.inputs["accel_x"], np.nan)
@@ -145,7 +145,7 @@ def _judge(drive: Drive, rows: Vector, found: list[BrakeRow], config: Config) ->
 
 
 def recorded_of(seed: int) -> list[Recorded]:
-    """Drive one car and replay it as each logger has it."""
+    """Drive one car and replay it with each logger's signals."""
     config = _uncorrected()
     drive = run(new_loop(_scenario(), config, seed))
     return [_judge(drive, *_replay(drive, logger, config), config) for logger in LOGGERS.values()]

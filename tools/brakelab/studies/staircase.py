@@ -1,4 +1,4 @@
-"""The staircase of the electro-hydraulic brake (A.2.3): dead time and rise time of 13 pressure steps.
+"""Staircase of the electro-hydraulic brake (A.2.3): dead time and rise time of 13 pressure steps.
 
 Dead time: until the pressure has moved by 1 bar. Rise time: until it has 90 % of the step.
 Both count from the demand on. The thesis gives them as figures only. Its 13 steps "with 10 bar pressure
@@ -47,7 +47,7 @@ def respond(start: float, end: float) -> NDArray[np.float64]:
 
 
 def measure_step(start: float, end: float) -> Step:
-    """Return what a step of the demand from `start` to `end` [bar] is answered with."""
+    """Return the response to a step of the demand from `start` to `end` [bar]."""
     moved = (respond(start, end) - start) * np.sign(end - start)
     dead = (int(np.argmax(moved >= 1.0)) + 1) * DT
     rise = (int(np.argmax(moved >= 0.9 * abs(end - start))) + 1) * DT

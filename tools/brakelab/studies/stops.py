@@ -1,12 +1,12 @@
-"""Accuracy, not speed: the stops of the thesis's Table 4.2 with cars drawn per seed.
+"""Accuracy in the stops of the thesis's Table 4.2, with cars drawn per seed.
 
 Counted from 0.5 s after the deceleration demand has its full value, down to 15 km/h:
 
 friction      nRMSE = sqrt(mean((estimate - truth)^2)) / mean(truth) over both wheels of an axle, beside
               Observer 2 of Table 4.3 and beside the configured nominal friction taken as the estimate
 deceleration  sum over the wheels of (brake torque + motor torque) / rolling radius, over the mass, all true
-compensation  mean of |achieved - wanted| / wanted; wanted is the demand, or what the same controller
-              achieves in the same car when it is told the true friction
+compensation  mean of |achieved - wanted| / wanted; wanted is the demand, or the deceleration
+              achieved by the same controller in the same car with the true friction
 """
 
 from collections.abc import Callable, Iterable
@@ -96,7 +96,7 @@ def achieved_decel(loop: Loop, drive: Drive) -> Vector:
 
 
 def window(drive: Drive) -> NDArray[np.bool_]:
-    """Return the rows that count, shape (n,)."""
+    """Return the counted rows, shape (n,)."""
     demand, speed = drive.truth["decel_demand"], drive.truth["vehicle_speed"]
     reached = drive.t[np.argmax(demand >= FULL * demand.max())]
     rows: NDArray[np.bool_] = (drive.t >= reached + SETTLING_S) & (speed > LOWEST_SPEED)

@@ -1,4 +1,4 @@
-"""Results as tables of words: for the terminal (rich) and for the documentation (Markdown)."""
+"""Results as tables of text: for the terminal (rich) and for the documentation (Markdown)."""
 
 from collections.abc import Sequence
 from typing import NamedTuple

@@ -1,7 +1,7 @@
-"""Drives for the study of wear: cars in closed loop over trips of several drivers and seasons, in a chain.
+"""Drives for the wear study: cars in closed loop over trips of several drivers and seasons, in a chain.
 
-Each car's ECU goes on with what it has learned. Of every part of a trip (town, country, motorway) the study
-keeps what the ECU added to its regressors and what was truly worn, as run-in pads wear on a mean day.
+Each car's ECU keeps its learned values. For every part of a trip (town, country, motorway) the study stores
+the increments of the ECU's regressors and the true wear of run-in pads on a mean day.
 """
 
 from typing import Any, Final, NamedTuple
@@ -27,7 +27,7 @@ DRIVERS: Final = {"calm": (0.95, 1.10, 5.0), "usual": (1.0, 1.0, 18.0), "lively"
 """Factors on speed and on time; ambient temperature [degC]."""
 PARTS: Final = {"town": 0.335, "country": 0.715, "motorway": np.inf}
 """Share of the trip's way at which it ends."""
-EVERY: Final = 2  # samples of the generated trip that the scenario's trace has
+EVERY: Final = 2  # thinning of the generated trip for the scenario's trace, in samples
 GRADE_EVERY: Final = 50
 
 
@@ -86,7 +86,7 @@ def _true_mass(outputs: Array, truth: Array, law: Array) -> Array:
 
 
 class _Kept(NamedTuple):
-    """Sums so far: way [m], worn [g], regressors and their errors."""
+    """Sums so far: distance [m], wear [g], regressors and their errors."""
 
     way: float
     worn: Array
@@ -114,7 +114,7 @@ def _part(driver: str, road: str, before: _Kept, after: _Kept) -> Part:
 
 
 def drive_car(seed: int) -> CarDrives:
-    """Drive the car of a seed through one trip of every driver; the ECU keeps what it learns."""
+    """Drive the car of a seed through one trip of every driver; the ECU keeps its learned values."""
     config = load_config(resource("config/suv.toml"))
     law = new_params(config)[0]["wear_law"]
     lot = drawn_car(seed)

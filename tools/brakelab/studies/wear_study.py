@@ -1,5 +1,5 @@
-"""Thirty thousand kilometres of wear (Figure 7.16): routes drawn from the parts that cars were driven over,
-what is true and what the ECU says, with a thickness measured every 2,500 km."""
+"""Thirty thousand kilometres of wear (Figure 7.16): routes drawn from the parts driven by cars, with true and
+estimated wear and a thickness measured every 2,500 km."""
 
 from typing import Any, Final, NamedTuple
 
@@ -32,7 +32,7 @@ LIFE_KM: Final = 30_000.0
 EVERY_KM: Final = 2_500.0
 CLIMATE: Final = 0.10  # standard deviation of the logarithm
 CLIMATE_KM: Final = 1_000.0  # over which it changes
-EVENNESS: Final = 0.7  # of the mix of drivers and roads between two measurements; small: one of them rules
+EVENNESS: Final = 0.7  # of the mix of drivers and roads between two measurements; small: one dominates
 DYNAMOMETER_CAR: Final = 1000  # its linings are of another lot
 MEASURED_ONCE: Final = 4  # point, at 10,000 km
 MODES: Final = ("law alone", "one measurement", "every measurement")
@@ -78,7 +78,7 @@ def _measured(block: WornBlock, pad_mass: float, random: Generator) -> tuple[Arr
 
 
 def dynamometer_laws() -> dict[str, Law]:
-    """Return the laws that the blocks of another lot of linings give, by `LAWS`."""
+    """Return the laws identified from blocks of another lot of linings, by `LAWS`."""
     config = load_config(resource("config/suv.toml"))
     params = new_params(config)[0]
     car = drawn_car(DYNAMOMETER_CAR)
@@ -106,7 +106,7 @@ def dynamometer_laws() -> dict[str, Law]:
 
 
 def _route(car: CarDrives, random: Generator) -> list[int]:
-    """Return the parts driven, at least over `LIFE_KM`; between two measurements one mix of them."""
+    """Return the parts driven, at least over `LIFE_KM`; one mix of them between two measurements."""
     chosen: list[int] = []
     driven = 0.0
     for period in range(1, round(LIFE_KM / EVERY_KM) + 1):
