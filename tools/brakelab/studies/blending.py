@@ -1,5 +1,5 @@
-"""Brake blending in closed loop: hand-over of torque, loss of motors, effect of wrong friction on the torque sum
-(sections 5.3, 5.7; Figure 5.8).
+"""Brake blending in closed loop: hand-over of torque, loss of motors, effect of wrong friction on the
+sum (sections 5.3, 5.7; Figure 5.8).
 
 Torque is that of linings and motors of all wheels, true; the demand is m a r (5.1) with the radius of the
 configuration and the mass that the ECU knows. Counted from the full demand down to 1 km/h. Where the ECU uses

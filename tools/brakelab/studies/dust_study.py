@@ -1,5 +1,5 @@
-"""Draws of eight trips with a particle counter, the last held out: errors of emission models, achievable error,
-and the on-board result of the ECU in a simulated car with the same linings."""
+"""Draws of eight trips with a particle counter, the last one for tests: errors of emission models, achievable
+error, and the on-board result of the ECU in a simulated car with the same linings."""
 
 from typing import Final, NamedTuple
 

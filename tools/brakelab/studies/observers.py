@@ -116,7 +116,7 @@ def _setup(case: Case, task: Task) -> Setup:
 
 
 def _ordinary(case: Case, task: Task) -> RecordArray | None:
-    """Return the values learned in ordinary driving (ten minutes); of `case` the car and lasting errors apply.
+    """Return the values learned in ordinary driving (ten minutes); of `case` the car and lasting errors hold.
 
     None: the store would reject them.
     """
