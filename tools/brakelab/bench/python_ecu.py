@@ -1,4 +1,4 @@
-"""Plain cycle with python-can, cantools and numpy: no checksums, no counters, no time-outs; of the algorithm, the
+"""Cycle with python-can, cantools and numpy: no checksums, no counters, no time-outs; of the algorithm the
 four friction filters and the nominal pressure law alone."""
 
 from collections.abc import Iterable
