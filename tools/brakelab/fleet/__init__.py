@@ -1,1 +1,1 @@
-"""Thousands of recorded drives through the code of the ECU, on this machine or a Dask cluster."""
+"""Fleet replay: thousands of recorded drives through the code of the ECU, locally or on a Dask cluster."""

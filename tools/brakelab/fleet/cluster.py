@@ -19,11 +19,10 @@ ONE_THREAD: Final = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBL
 log is new memory from the kernel, which took a third more processor time."""
 
 LOCAL: Final = {
-    # A drive whose worker died comes back to the client, which counts and tells it.
+    # A drive whose worker died returns to the client, which counts and reports it.
     "distributed.scheduler.allowed-failures": 0,
     "distributed.nanny.pre-spawn-environ": ONE_THREAD,
-    # Dask watches itself up to a hundred times a second, for pages that nobody looks at here; on two cores
-    # that was 6 % of them.
+    # Dask monitors itself up to a hundred times a second, for pages unused here; on two cores that took 6 %.
     "distributed.worker.profile.enabled": False,
     "distributed.admin.tick.interval": "1s",
     "distributed.admin.system-monitor.interval": "5s",
@@ -34,10 +33,10 @@ LOCAL: Final = {
 
 @contextmanager
 def connect(scheduler: str | None, workers: int | None) -> Iterator[Client]:
-    """Give a client of the scheduler at an address; None: of `workers` processes here (None: one a core).
+    """Return a client of the scheduler at an address; None: of `workers` local processes (None: one a core).
 
     Raises:
-        UserError: nobody answers at the address, or its workers have another version of this program.
+        UserError: no answer from the address, or its workers have another version of this program.
     """
     if scheduler is None:
         yield from _local(workers or _cores())
@@ -73,7 +72,7 @@ def _local(workers: int) -> Iterator[Client]:
 
 
 def dask_setup(worker: Any) -> None:
-    """Make ready a worker of this machine, which Dask calls it for: Ctrl-C is for the client alone."""
+    """Prepare a local worker, called by Dask: Ctrl-C is for the client alone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 

@@ -1,4 +1,4 @@
-"""`brake-ecu fleet`: recorded drives of many vehicles, one task a drive, what was learned carried along."""
+"""Fleet replay (`brake-ecu fleet`): recorded drives of many vehicles, learned values carried along."""
 
 import sys
 from collections import Counter
@@ -37,13 +37,13 @@ def fleet(
     out: Path,
     rows: bool = False,
 ) -> int:
-    """Replay the drives that `given` names into `out`; return 0, or 1 if drives failed.
+    """Replay the drives selected by `given` into `out`; return 0, or 1 if drives failed.
 
-    What `out` holds of an earlier run is not done again. On Ctrl-C what is done stays, with its tables and
-    its page; returns 130.
+    Results of an earlier run in `out` are reused. After Ctrl-C completed drives stay, with their tables and
+    page; returns 130.
 
     Raises:
-        UserError: an argument, a manifest, a configuration or a map is not right.
+        UserError: an argument, a manifest, a configuration or a map is invalid.
         RunFault: the scheduler was lost.
     """
     chains = plan(find_drives(given, config, map, out), observer)
@@ -123,7 +123,7 @@ def _tell(done: Sequence[dict[str, Any]], replayed: int, total: int, out: Path) 
 
 
 def disorder(done: Sequence[dict[str, Any]]) -> list[str]:
-    """Return a line for each vehicle of which a log starts before the one that was taken before it."""
+    """Return a line for each vehicle with a log that starts before its predecessor."""
     latest: dict[str, dict[str, Any]] = {}
     lines: dict[str, str] = {}
     for summary in done:

@@ -28,7 +28,7 @@ def _opened(url: str) -> tuple[Any, str]:
 
 
 def expand(pattern: str) -> list[str]:
-    """Return the files and folders that `pattern` names, in natural order (drive-2 before drive-10)."""
+    """Return the files and folders matching `pattern`, in natural order (drive-2 before drive-10)."""
     system, path = _opened(pattern)
     found = system.glob(path) if re.search(r"[*?\[]", path) else [path] if system.exists(path) else []
     return sorted((_name(system, str(one)) for one in found), key=natural)
@@ -47,8 +47,8 @@ def _name(system: Any, path: str) -> str:
 def state_of(url: str) -> tuple[int, str]:
     """Return size in bytes of a file (or of all in a folder), and a mark that changes with its content.
 
-    The mark is made of size and time (or what else of `CHANGES` there is): nothing is read. Raises UserError
-    if there is no such file.
+    The mark consists of size and time (or other entries of `CHANGES`), without reading. Raises UserError if
+    there is no such file.
     """
     system, path = _opened(url)
     try:
@@ -68,7 +68,7 @@ def state_of(url: str) -> tuple[int, str]:
 
 @contextmanager
 def local_copies(urls: Sequence[str]) -> Iterator[list[Path]]:
-    """Give each file (or folder) of `urls` as a local path: itself, or a copy that is gone afterwards."""
+    """Yield each file (or folder) of `urls` as a local path: itself, or a temporary copy."""
     with TemporaryDirectory(prefix="brake-ecu-fleet-") as folder:
         paths = []
         for number, url in enumerate(urls):

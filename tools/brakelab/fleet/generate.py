@@ -1,10 +1,10 @@
-"""A fleet of simulated cars, to try `brake-ecu fleet` on.
+"""Fleet of simulated cars, as test data for `brake-ecu fleet`.
 
 ```
 python -m brakelab.fleet.generate --vehicles 20 --drives 10 --seconds 60 --out FOLDER [--damage]
 ```
 writes `FOLDER/<vehicle>/<drive>.log` (of every fourth vehicle `.parquet`, decoded) and a `manifest.toml`.
-A car is drawn once, its drives have a course, a weather and a noise of their own, half a week apart.
+A car is drawn once; its drives, half a week apart, differ in route, weather and noise.
 """
 
 import argparse
@@ -35,12 +35,12 @@ BETWEEN_NS: Final = 302_400_000_000_000  # half a week
 
 
 def plant_of(vehicle: int) -> str:
-    """Return the kind of a car: its name in config/ and config/plant."""
+    """Return the model of a car: its name in config/ and config/plant."""
     return PLANTS[vehicle % len(PLANTS)]
 
 
 def scenario_of(vehicle: int, drive: int, seconds: float) -> Scenario:
-    """Return a drive of about `seconds` with a braking every 10 to 30 s (assumption)."""
+    """Return a drive of about `seconds` with a brake application every 10 to 30 s (assumption)."""
     draw = np.random.default_rng([vehicle, drive, 7])
     speed = float(draw.uniform(8.0, 25.0))
     initial, left = speed, seconds
@@ -87,7 +87,7 @@ def write_drive(vehicle: int, drive: int, seconds: float, path: Path) -> None:
 
 
 def simulate_and_replay(job: Job) -> Outcome:
-    """Simulate the drive `<vehicle>/<drive>/<seconds>` that the job names, replay it and forget it.
+    """Simulate the drive `<vehicle>/<drive>/<seconds>` of the job, replay it and discard it.
 
     The summary has `simulate_seconds` too.
     """
@@ -103,7 +103,7 @@ def simulate_and_replay(job: Job) -> Outcome:
 
 
 def damage(logs: list[Path]) -> None:
-    """Spoil five logs, one in each way: cut, bytes flipped, emptied, another suffix, garbage."""
+    """Damage five logs, one in each way: cut, bytes flipped, emptied, another suffix, garbage."""
     draw = np.random.default_rng(5)
     cut, flipped, emptied, renamed, garbage = logs
     cut.write_bytes(cut.read_bytes()[: cut.stat().st_size // 2 + 7])
@@ -120,7 +120,7 @@ def _task(task: tuple[int, int, float, Path]) -> None:
 
 
 def main() -> None:
-    """Write the fleet that the command line asks for."""
+    """Write the fleet requested on the command line."""
     parser = argparse.ArgumentParser(prog="python -m brakelab.fleet.generate")
     for name, default in (("vehicles", 20), ("drives", 10), ("workers", 2)):
         parser.add_argument(f"--{name}", type=int, default=default)

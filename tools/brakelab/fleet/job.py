@@ -1,4 +1,4 @@
-"""A drive as it goes to a worker, what comes back, and how an earlier run's outcome is known again."""
+"""Job and outcome of a drive on a worker, and recognition of an earlier run's outcome."""
 
 import base64
 import hashlib
@@ -35,9 +35,9 @@ class Outcome(NamedTuple):
     """Result of a job."""
 
     summary: dict[str, Any]
-    """By `SUMMARY_SCHEMA`; with a `fault` there are no brakings, and what was learned is as before."""
+    """By `SUMMARY_SCHEMA`; with a `fault` there are no applications, and learned values are unchanged."""
     file: bytes
-    """Parquet: the brakings, and in the metadata what the next run needs; empty with a `fault`."""
+    """Parquet: the applications, and in the metadata the data for the next run; empty with a `fault`."""
     learned: bytes
 
 
@@ -47,7 +47,7 @@ def failed(job: Job, fault: str) -> Outcome:
 
 
 def provenance(job: Job) -> dict[str, Any]:
-    """Return the part of the summary that is known before the drive."""
+    """Return the part of the summary known before the drive."""
     return {
         "vehicle": job.vehicle,
         "drive": job.drive,
@@ -60,7 +60,7 @@ def provenance(job: Job) -> dict[str, Any]:
 
 
 def key_of(job: Job) -> str:
-    """Return a hash of all that the outcome follows from."""
+    """Return a hash of all inputs of the outcome."""
     parts = (
         *(__version__, str(LEARNED.descr), job.mark, config_hash(job.config), job.source.database_hash),
         *(job.source.bus, hashlib.sha256(job.learned).hexdigest()),
@@ -78,7 +78,7 @@ def metadata_of(job: Job, outcome: Outcome) -> dict[bytes, bytes]:
 
 
 def outcome_of(job: Job, metadata: dict[bytes, bytes]) -> Outcome | None:
-    """Return the outcome that a file's metadata holds; None if it is not that of this very job."""
+    """Return the outcome in a file's metadata; None if it is not that of this very job."""
     if metadata.get(KEY) != key_of(job).encode():
         return None
     return Outcome(json.loads(metadata[b"summary"]), b"", base64.b64decode(metadata[b"learned"]))

@@ -8,7 +8,7 @@ car-7,2026/0002a.log;2026/0002b.log,2026-05-01T17:30:00Z,suv,        # two logs 
 ```
 [[vehicle]]                                  # TOML
 name = "car-7"
-config = "suv"                               # else that of the command line
+config = "suv"                               # default: that of the command line
 map = "kona"
 drives = ["2026/0001.log", ["2026/0002a.log", "2026/0002b.log"]]     # in the order of driving
 ```
@@ -59,13 +59,13 @@ class _Manifest(BaseModel):
 
 
 def find_drives(given: Sequence[str], config: Path | None, map: Path | None, out: Path) -> list[Drive]:
-    """Return the drives that the command line names, those of a vehicle in order.
+    """Return the drives selected on the command line, those of a vehicle in order.
 
     `given` is one manifest, or patterns and names of logs: then the vehicle is the parent folder's name, and
-    names are in natural order. What lies in `out` is no log.
+    names are in natural order. Files in `out` are not logs.
 
     Raises:
-        UserError: a manifest is not right, nothing is found, or a drive has no configuration.
+        UserError: a manifest is invalid, nothing is found, or a drive has no configuration.
     """
     if len(given) == 1 and Path(given[0]).suffix == ".toml":
         drives = _from_toml(Path(given[0]), config, map)

@@ -1,14 +1,12 @@
 """Cost of a fleet: time beyond its replays, time for 30,000 km, memory for a long log.
 
-```
-python -m brakelab.fleet.measure scaling MANIFEST [--rounds 3] [--drives 100]
-python -m brakelab.fleet.measure distance [--kilometres 30000] [--minutes 5] [--workers 2]
-python -m brakelab.fleet.measure length [--gigabytes 10]
-```
-`scaling` replays the same drives without Dask, by one worker and by two, in turn. `distance` simulates drives
-of ten minutes, replays and forgets them one by one, and keeps their brakings until its end; what it does not
-reach in its time, or before Ctrl-C, it extrapolates. `length` replays one log that long: a drive of ten
-minutes again and again, with a jump of speed and counters at each seam.
+``` python -m brakelab.fleet.measure scaling MANIFEST [--rounds 3] [--drives 100] python -m
+brakelab.fleet.measure distance [--kilometres 30000] [--minutes 5] [--workers 2] python -m
+brakelab.fleet.measure length [--gigabytes 10] ``` `scaling` replays the same drives without Dask, by one
+worker and by two, in turn. `distance` simulates drives of ten minutes, replays and forgets them one by one,
+and keeps their brake applications until its end; distance not reached in time, or before Ctrl-C, is
+extrapolated. `length` replays one log that long: a drive of ten minutes again and again, with a jump of speed
+and counters at each seam.
 """
 
 import argparse
@@ -52,7 +50,7 @@ TELL_S: Final = 30.0
 
 @contextmanager
 def _warm(workers: int, chains: Sequence[Chain], task: Task = replay_job) -> Iterator[Client]:
-    """Give a client whose workers have all the code loaded."""
+    """Yield a client whose workers have all the code loaded."""
     with connect(None, workers) as client:
         job = chains[0].job(Path(), rows=False)
         for worker in client.nthreads():
@@ -61,7 +59,7 @@ def _warm(workers: int, chains: Sequence[Chain], task: Task = replay_job) -> Ite
 
 
 def _peak_megabytes() -> float:
-    """Return the most memory that this process has held, without that of the one that started it."""
+    """Return the peak memory of this process, without that of its parent."""
     held = re.search(r"VmHWM:\s*(\d+) kB", Path("/proc/self/status").read_text("ascii"))
     return int(held[1]) / 1024.0 if held else float("nan")
 
@@ -86,7 +84,7 @@ def _by_workers(workers: int, drives: Sequence[Drive]) -> dict[str, float]:
 
 
 def _alone(drives: Sequence[Drive]) -> tuple[float, float]:
-    """Replay without Dask; returns wall time and processor time in all."""
+    """Replay without Dask; return wall time and total processor time."""
     began, work = time.perf_counter(), time.process_time()
     for chain in plan(drives, None):
         while chain.place < len(chain.drives):
@@ -97,8 +95,8 @@ def _alone(drives: Sequence[Drive]) -> tuple[float, float]:
 def scaling(manifest: Path, rounds: int, count: int) -> None:
     """Print times of the same drives without Dask, by one worker and by two.
 
-    Wall times hold where nothing else runs. Of processor time others take none: the share of the replays in
-    all that was spent is what a machine with nothing else to do would come to.
+    Wall times are valid on an idle machine. Processor time is not affected by others: the replays' share in
+    its total is the efficiency of an idle machine.
     """
     drives = find_drives([str(manifest)], None, None, Path("out"))[:count]
     _alone(drives[:1])
@@ -123,7 +121,7 @@ def scaling(manifest: Path, rounds: int, count: int) -> None:
 
 
 def _simulated(kilometres: float) -> list[Chain]:
-    """Return chains that hold more drives than needed."""
+    """Return chains with more drives than needed."""
     source = load_source(None)
     drives = int(kilometres / 5.0 / VEHICLES) + 1
     chains = []
@@ -143,7 +141,7 @@ def _work(client: Client) -> float:
 
 
 def distance(kilometres: float, minutes: float, workers: int) -> None:
-    """Print how far simulated drives came in `minutes` or until Ctrl-C, and what `kilometres` would take."""
+    """Print the distance simulated in `minutes` or until Ctrl-C, and the time needed for `kilometres`."""
     done: list[dict[str, Any]] = []
     driven = wall = told = 0.0
     chains = _simulated(kilometres)
@@ -209,7 +207,7 @@ def _replay_long(log: Path) -> tuple[float, float]:
 
 
 def length(gigabytes: float) -> None:
-    """Print what the replay of a log of `gigabytes` takes, in a process of its own."""
+    """Print the cost of replaying a log of `gigabytes`, in a process of its own."""
     spawn = get_context("spawn")
     with TemporaryDirectory() as folder:
         log = Path(folder, "long.log")
@@ -226,7 +224,7 @@ def length(gigabytes: float) -> None:
 
 
 def main() -> None:
-    """Measure what the command line asks for."""
+    """Run the measurement requested on the command line."""
     parser = argparse.ArgumentParser(prog="python -m brakelab.fleet.measure")
     what = parser.add_subparsers(dest="what", required=True)
     one = what.add_parser("scaling")

@@ -1,8 +1,8 @@
 """The folder that a fleet leaves: `brakes/vehicle=…/<drive>.parquet`, with `--rows` `rows/` likewise, then
 `drives.parquet` and `report.html`.
 
-The file of brakings is what makes a drive done: it appears last and at once, and holds in its metadata the
-drive's summary, what was learned, and the key of everything that it was made from.
+A drive is complete once its file of brake applications exists: it appears last and atomically, and its
+metadata hold the drive's summary, the learned values, and the key of all inputs.
 """
 
 from collections.abc import Iterator
@@ -16,17 +16,17 @@ from brakelab.fleet.job import Job, Outcome, outcome_of
 
 
 def brakes_file(out: Path, vehicle: str, drive: str) -> Path:
-    """Return where the brakings of a drive are."""
+    """Return the path of a drive's brake applications."""
     return out / "brakes" / f"vehicle={quote(vehicle, safe='')}" / f"{quote(drive, safe='')}.parquet"
 
 
 def rows_file(out: Path, vehicle: str, drive: str) -> Path:
-    """Return where the rows of a drive are."""
+    """Return the path of a drive's rows."""
     return out / "rows" / f"vehicle={quote(vehicle, safe='')}" / f"{quote(drive, safe='')}.parquet"
 
 
 def standing(out: Path, job: Job) -> Outcome | None:
-    """Return what an earlier run left of this very job, without its file; None: it is to be done."""
+    """Return the result of an earlier run of this very job, without its file; None: still to be done."""
     if job.rows and not Path(job.rows).exists():
         return None
     try:
@@ -37,7 +37,7 @@ def standing(out: Path, job: Job) -> Outcome | None:
 
 
 def keep(out: Path, outcome: Outcome) -> None:
-    """Write what a drive gave; of one that failed nothing stays of an earlier run either."""
+    """Write the results of a drive; of a failed one earlier results are removed too."""
     names = outcome.summary["vehicle"], outcome.summary["drive"]
     path = brakes_file(out, *names)
     if outcome.summary["fault"]:
@@ -54,5 +54,5 @@ def keep(out: Path, outcome: Outcome) -> None:
 
 
 def others(out: Path, wanted: set[Path]) -> Iterator[Path]:
-    """Yield the files of brakings that are none of `wanted`."""
+    """Yield the files of brake applications that are none of `wanted`."""
     yield from (path for path in sorted(out.glob("brakes/vehicle=*/*.parquet")) if path not in wanted)

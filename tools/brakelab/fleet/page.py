@@ -1,4 +1,4 @@
-"""The page on a fleet: what stands out, how friction, prediction and energy spread, what failed."""
+"""Fleet page: outliers, spread of friction, prediction and energy, failed drives."""
 
 from collections.abc import Sequence
 from importlib.resources import files
@@ -90,7 +90,7 @@ def _tiles(done: Sequence[Summary], good: Sequence[Summary], vehicles: Vehicles)
 
 
 def _spread_tile(title: str, values: Any, scale: float, digits: int, among: str) -> Tile:
-    """Return the median, and the range in which nine of ten lie."""
+    """Return the median, and the range of nine in ten."""
     name, _, unit = title.rstrip("]").partition(" [")
     known = values[np.isfinite(values)] * scale
     low, middle, high = np.percentile(known, (5, 50, 95)) if len(known) else [float("nan")] * 3

@@ -1,8 +1,8 @@
 """The drives of every vehicle in order, different vehicles side by side.
 
-A vehicle has one drive on the cluster at a time: what that one taught goes into the next. A drive that fails
-teaches nothing, and the next starts with what was known before it. So the scheduler never knows more than a
-few drives for each worker, however many there are; vehicles with the longest way to go come first.
+A vehicle has one drive on the cluster at a time: the learned values of one go into the next. A failed drive
+teaches nothing, and the next starts with the values before it. So the scheduler holds a few drives per worker
+at most, independent of their number; vehicles with the longest remaining distance come first.
 """
 
 import math
@@ -24,7 +24,7 @@ from ecu.errors import RunFault
 from ecu.settings.config import Config, store_key
 
 TRIES: Final = 3
-"""After so many lost workers the drive is held to be what killed them."""
+"""After so many lost workers the drive is held to be the cause."""
 COUNT_S: Final = 2.0
 """Between looks at how many workers there are."""
 QUEUED: Final = 2
@@ -35,7 +35,7 @@ Task = Callable[[Job], Outcome]
 
 
 class Planned(NamedTuple):
-    """A drive with all that is known before it is replayed."""
+    """A drive with the information available before its replay."""
 
     drive: Drive
     config: Config
@@ -50,7 +50,7 @@ class Planned(NamedTuple):
 
 @dataclass
 class Chain:
-    """The drives of one vehicle, in order, and how far it has come."""
+    """The drives of one vehicle, in order, and the progress."""
 
     drives: list[Planned] = field(default_factory=list)
     left: int = 0
@@ -61,7 +61,7 @@ class Chain:
     tries: int = 1
 
     def add(self, planned: Planned) -> None:
-        """Add the drive after the last."""
+        """Append a drive."""
         self.drives.append(planned)
         self.left += planned.size
 
@@ -73,7 +73,7 @@ class Chain:
         return Job(drive.vehicle, drive.name, drive.logs, config, source, learned, mark, file)
 
     def finish(self, outcome: Outcome) -> dict[str, Any]:
-        """Go on to the drive after this one; return its summary."""
+        """Go to the next drive; return the summary of this one."""
         planned = self.drives[self.place]
         self.learned[store_key(planned.config)] = outcome.learned
         summary = outcome.summary | {"tries": outcome.summary.get("tries", self.tries)}
@@ -88,7 +88,7 @@ def run_fleet(
     rows: bool = False,
     task: Task = replay_job,
 ) -> Iterator[tuple[Planned, dict[str, Any], bool]]:
-    """Yield each drive, its summary and whether it was replayed just now, as they get done.
+    """Yield each drive, its summary and whether it was replayed just now, as they are completed.
 
     Raises:
         RunFault: the scheduler was lost.
@@ -128,7 +128,7 @@ def run_fleet(
 
 
 def _skip(chain: Chain, out: Path, rows: bool) -> Iterator[tuple[Planned, dict[str, Any]]]:
-    """Pass the drives that stand already, and those that cannot be replayed."""
+    """Skip drives already complete, and those that cannot be replayed."""
     while chain.place < len(chain.drives):
         planned = chain.drives[chain.place]
         job = chain.job(out, rows)
@@ -144,7 +144,7 @@ def _skip(chain: Chain, out: Path, rows: bool) -> Iterator[tuple[Planned, dict[s
 
 
 def _outcome(future: Future, job: Job) -> Outcome | None:
-    """Return what became of a job, None: its worker died."""
+    """Return the outcome of a job, None: its worker died."""
     if future.status in ("cancelled", "lost"):
         raise RunFault(
             "the Dask scheduler was lost; what is done stays, the same command goes on with the rest"

@@ -26,7 +26,7 @@ LEAST_METRES: Final = 500.0
 
 
 class Quantity(NamedTuple):
-    """A quantity by which vehicles are compared."""
+    """Quantity by which vehicles are compared."""
 
     name: str
     title: str
@@ -55,7 +55,7 @@ class Vehicles(NamedTuple):
 
 
 class Outlier(NamedTuple):
-    """A vehicle that stands out by one quantity."""
+    """Vehicle that stands out by one quantity."""
 
     vehicle: str
     drives: int
@@ -85,7 +85,7 @@ class Weeks(NamedTuple):
 
 
 def values_of(done: Sequence[Summary], name: str) -> Vector:
-    """Return a quantity of each drive, NaN where it is not known, shape (drives,)."""
+    """Return a quantity of each drive, NaN where unknown, shape (drives,)."""
     if name == "energy_per_distance":
         return np.array(
             [
@@ -97,7 +97,7 @@ def values_of(done: Sequence[Summary], name: str) -> Vector:
 
 
 def per_vehicle(done: Sequence[Summary]) -> Vehicles:
-    """Return the vehicles of drives that are done."""
+    """Return the vehicles of completed drives."""
     names = list(dict.fromkeys(row["vehicle"] for row in done))
     place = {name: k for k, name in enumerate(names)}
     owner = np.array([place[row["vehicle"]] for row in done], np.int64)
@@ -133,7 +133,7 @@ def outliers(vehicles: Vehicles) -> list[Outlier]:
 
 
 def told(row: Summary, column: str) -> list[str]:
-    """Return the lines of `fault` or `notes` without the names of the logs, which the drive's stands for."""
+    """Return the lines of `fault` or `notes` without the names of the logs, implied by the drive's."""
     text = row[column]
     for log in row["logs"].splitlines():
         text = text.replace(f"{log}: ", "")
@@ -141,7 +141,7 @@ def told(row: Summary, column: str) -> list[str]:
 
 
 def notes(done: Sequence[Summary]) -> list[Note]:
-    """Return what is peculiar to a drive's logs: not what more than half of the vehicle's drives have."""
+    """Return the peculiarities of a drive's logs, not shared by more than half of the vehicle's drives."""
     drives = Counter(row["vehicle"] for row in done)
     times = Counter((row["vehicle"], line) for row in done for line in set(told(row, "notes")))
     found = []

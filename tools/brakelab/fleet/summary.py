@@ -1,4 +1,4 @@
-"""One line for a drive: what `drives.parquet` holds, gathered while its rows go by."""
+"""Summary of a drive, a line of `drives.parquet`, collected while its rows are written."""
 
 import math
 from collections.abc import Sequence
@@ -54,7 +54,7 @@ at least one corner, `predicted` those whose prediction counts; friction is that
 
 
 class DriveBook:
-    """Takes the rows of a drive and keeps its brakings and what else the summary needs."""
+    """Collector of the brake applications of a drive and other data for the summary."""
 
     def __init__(self, params: RecordArray) -> None:
         self.brakes = BrakeBook(params)
@@ -70,7 +70,7 @@ class DriveBook:
         self._last = rows[-1].copy()
 
     def summary(self, findings: Sequence[Findings]) -> dict[str, Any]:
-        """Return the columns that follow from the rows and the logs."""
+        """Return the columns derived from the rows and the logs."""
         brakings = self.brakes.rows
         applications = [brakings[k : k + 4] for k in range(0, len(brakings), len(CORNERS))]
         counted = [four for four in applications if not four[0].left_out]
@@ -113,7 +113,7 @@ def known(value: float) -> float | None:
 
 
 def summary_table(rows: Sequence[dict[str, Any]]) -> pa.Table:
-    """Return summaries as a table; what one does not have is null."""
+    """Return summaries as a table; missing values are null."""
     return pa.Table.from_pylist(
         [{name: row.get(name) for name, *_ in _COLUMNS} for row in rows], SUMMARY_SCHEMA
     )

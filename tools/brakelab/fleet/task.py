@@ -28,7 +28,7 @@ from ecu.settings.config import new_params
 
 
 def replay_job(job: Job) -> Outcome:
-    """Replay one drive. Whatever goes wrong with it is in the outcome: nothing is raised."""
+    """Replay one drive. Any error is part of the outcome: nothing is raised."""
     began = time.perf_counter()
     paths: list[Path] = []
     brakes = None
@@ -46,7 +46,7 @@ def replay_job(job: Job) -> Outcome:
 
 
 def _file(job: Job, outcome: Outcome, brakes: pa.Table) -> bytes:
-    """Return the Parquet file of a drive's brakings, with all that an earlier run is known by."""
+    """Return the Parquet file of a drive's brake applications, with the metadata that identify the run."""
     file = io.BytesIO()
     pq.write_table(brakes.replace_schema_metadata(metadata_of(job, outcome)), file, compression="zstd")
     return file.getvalue()
@@ -95,7 +95,7 @@ def _replay(job: Job, paths: Sequence[Path]) -> tuple[Outcome, pa.Table]:
 
 
 def _put(file: Path, target: Path) -> None:
-    """Let `file` appear as `target` complete or not at all."""
+    """Write `file` to `target` atomically."""
     unfinished = target.with_name(f".{target.name}.unfinished")
     target.parent.mkdir(parents=True, exist_ok=True)
     shutil.copyfile(file, unfinished)
