@@ -1,4 +1,4 @@
-"""`brake-ecu identify dust`: emission models from trips with a particle counter, as a CONFIG; a page."""
+"""Identification of dust (`brake-ecu identify dust`): emission models from trips with a particle counter."""
 
 import os
 from pathlib import Path
@@ -40,7 +40,7 @@ def dust_toml(axle: str, chosen: Judged, trained: tuple[Array, Array]) -> str:
 
 
 def car_toml(config: Path, out: Path, section: str) -> str:
-    """Return a configuration that takes everything else from `config`."""
+    """Return a configuration that takes all other values from `config`."""
     include = os.path.relpath(config, out.parent).replace("\\", "/")
     return f'include = "{include}"\n\n{section}'
 
@@ -98,7 +98,7 @@ def identify_dust(manifest: Path, config: Path, axle: str, out: Path) -> int:
     """Identify the emission of an axle's brakes; write `out` and `out`.md, return 0.
 
     Raises:
-        UserError: an argument or a file is not right.
+        UserError: an argument or a file is invalid.
     """
     if axle not in ("front", "rear"):
         raise UserError("--axle", axle, "choose front or rear")

@@ -1,14 +1,14 @@
 """Features of each brake application on a trip with a particle counter (section 8.4, Figures 8.2 to 8.4).
 
-Background: what the counter shows when cruising, long after a braking, against speed (Figure 8.2): a line
-through the medians of speeds, and about it a slow factor by what was seen within two minutes.
+Background: the counter's reading when cruising, long after a brake application, against speed (Figure 8.2): a
+line through the medians by speed, times a slow factor by the readings within two minutes.
 
-Applications are found by pressure and end with the standstill, for a disc that stands emits nothing. Their
+Applications are found by pressure and end at standstill, where a disc emits nothing. Their
 conditions are those of (8.2) and the mean pressure; their emission is (8.1)
 
-    EF = log10 of the integral of Q (c - background) over the application, later by the way of the air
+    EF = log10 of the integral of Q (c - background) over the application, delayed by the air's transport
 
-with the air's way found where the counter follows the friction power best, and a tail for what mixes.
+with the transport delay of best correlation between counter and friction power, and a tail for mixing.
 """
 
 from typing import Final, NamedTuple
@@ -21,14 +21,14 @@ Array = NDArray[np.float64]
 PERIOD: Final = 0.1  # s, grid of a trip
 PRESSED: Final = 1.5  # bar, of the mean over SMOOTH
 SMOOTH: Final = 5  # samples
-MOVING: Final = 0.5  # m/s: below it the car stands
+MOVING: Final = 0.5  # m/s: below, the car is at standstill
 SHORTEST: Final = 0.5  # s
-LEAST_WORK: Final = 500.0  # J: below it a pressure is only felt
-CLEAR_S: Final = 25.0  # after a braking the counter shows background again
+LEAST_WORK: Final = 500.0  # J: below it an application counts as negligible
+CLEAR_S: Final = 25.0  # after an application, until the counter shows background again
 STEADY: Final = 0.4  # m/s^2
 SPEED_BIN: Final = 4.0  # m/s
 NEAR_S: Final = 60.0  # standard deviation of the window of the slow factor
-NEAR_COUNT: Final = 10.0  # samples that the line counts as, beside those near
+NEAR_COUNT: Final = 10.0  # prior weight of the line in samples
 LONGEST_WAY_S: Final = 8.0
 BEFORE_S: Final = 2.0  # the plume begins this much before its middle
 TAIL_S: Final = 5.0
@@ -95,7 +95,7 @@ class Applications(NamedTuple):
 
     @property
     def factor(self) -> Array:
-        """EF (8.1); NaN where no particles could be told from the background."""
+        """Return EF (8.1); NaN where particles cannot be distinguished from the background."""
         return np.asarray(np.log10(np.where(self.particles > 0.0, self.particles, np.nan)))
 
 
@@ -151,7 +151,7 @@ def find_background(trip: Recorded, applications: list[tuple[int, int]]) -> Back
 
 
 def way_of_air(trip: Recorded, excess: Array) -> float:
-    """Return the time [s] after which the counter follows the friction power best."""
+    """Return the transport delay [s] with which the counter follows the friction power best."""
     power = trip.torque * trip.speed
     power = power - power.mean()
     shown = excess - excess.mean()

@@ -1,7 +1,7 @@
-"""Choice of an emission model and its error, by trips that it has not seen.
+"""Choice of an emission model and its error, by trips not used in its fit.
 
 Every trip but the tests is left out once; the others fit the model, which then predicts it (the left-out
-predictions, of what lies within the others: outside nothing is told). From these follow
+predictions, for applications within the range of the others). From these follow
 
     factor       sum of particles over sum of 10^EF: a model of the logarithm gives the median, not the mean,
                  and sums of medians are too small (Table 8.2 has all of its models low)
@@ -27,7 +27,7 @@ MARGIN: Final = 0.02  # of a range, beyond the outermost application
 
 
 class Judged(NamedTuple):
-    """A model beside what was counted. Errors are predicted over counted minus 1."""
+    """A model beside the counted emission. Errors are predicted over counted minus 1."""
 
     name: str
     model: Model
@@ -52,9 +52,9 @@ class Kpis(NamedTuple):
     covered: float
     """Share of applications whose EF lies in the interval."""
     known: float
-    """Share of the work that lies within what was trained on."""
+    """Share of the work within the training range."""
     known_sum_error: float
-    """Of applications within what was trained on."""
+    """Of applications within the training range."""
 
 
 def ranges(trips: list[Applications]) -> tuple[Array, Array]:
@@ -66,7 +66,7 @@ def ranges(trips: list[Applications]) -> tuple[Array, Array]:
 
 
 def inside_of(features: Array, trained: tuple[Array, Array]) -> NDArray[np.bool_]:
-    """Return whether each of `features`, shape (n, 6), lies within what was trained on, shape (n,)."""
+    """Return whether each of `features`, shape (n, 6), lies within the training range, shape (n,)."""
     return np.asarray(np.all((features >= trained[0]) & (features <= trained[1]), axis=1))
 
 
@@ -85,7 +85,7 @@ def kpis(
     interval: tuple[float, float],
     trained: tuple[Array, Array],
 ) -> Kpis:
-    """Return how a model does on held-out trips."""
+    """Return the KPIs of a model on held-out trips."""
     features, sequences, counted, energy = (
         np.concatenate([getattr(trip, name) for trip in test])
         for name in ("features", "sequences", "particles", "energy")
@@ -136,7 +136,7 @@ def judge_all(trips: list[Applications], test: list[Applications], seed: int = 0
 
 
 def choose(judged: list[Judged]) -> Judged:
-    """Return the model that runs on board and has the least error of trips left out."""
+    """Return the on-board model with the least error on left-out trips."""
     return min((one for one in judged if one.model.on_board is not None), key=lambda one: one.left_out_rms)
 
 

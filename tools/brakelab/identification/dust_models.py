@@ -1,9 +1,9 @@
-"""Emission models of one brake: what runs on board (table, static network, law) and their peers in the
-laboratory (dynamic network, gradient boosting).
+"""Emission models of one brake: on board (table, static network, law) and in the laboratory (dynamic network,
+gradient boosting).
 
-Each is fitted to EF = log10 of the particles of an application. Applications of which the background is a
-large part count less. Before a network is trained, applications are resampled so that every emission factor
-is as frequent as the others (Figure 8.4).
+Each is fitted to EF = log10 of the particles of an application. Applications with a large share of background
+have less weight. Before a network is trained, applications are resampled so that every emission factor is as
+frequent as the others (Figure 8.4).
 """
 
 import warnings
@@ -29,12 +29,12 @@ Array = NDArray[np.float64]
 Predictor = Callable[[Array, Array], Array]
 """EF, shape (n,), of features, shape (n, 6), and sequences, shape (n, ·)."""
 
-LEAST: Final = 2e7  # particles: fewer cannot be told from the background
+LEAST: Final = 2e7  # particles: fewer are indistinguishable from the background
 SCATTER: Final = 0.2  # of EF, application by application
-BACKGROUND_ERROR: Final = 1e8  # particles, what the background leaves in an application
+BACKGROUND_ERROR: Final = 1e8  # particles, error of an application by the background
 SMOOTH: Final = 0.3  # weight of the table's bends
-EVENLY: Final = 0.4  # of EF: width of the classes that are made equally frequent
-FEWEST: Final = 5  # of a class: a smaller one is not made more frequent
+EVENLY: Final = 0.4  # of EF: width of the classes made equally frequent
+FEWEST: Final = 5  # of a class: a smaller one is not resampled
 SHRINK: Final = 0.01  # of a network's weights, per application
 SHRINK_DYNAMIC: Final = 0.03
 HIDDEN_DYNAMIC: Final = 10
@@ -61,14 +61,14 @@ class Model(NamedTuple):
 
 
 def samples_of(trips: list[Applications]) -> Samples:
-    """Return the applications of `trips` that can be told from the background, with their weights."""
+    """Return the applications of `trips` distinguishable from the background, with their weights."""
     features, sequences, particles, energy = (
         np.concatenate([getattr(trip, name) for trip in trips])
         for name in ("features", "sequences", "particles", "energy")
     )
     known = particles > LEAST
     factor, work = np.log10(particles[known]), np.log10(energy[known])
-    # By what the work lets expect: by the count itself, those that scatter upwards would weigh more.
+    # By the count expected from work: weighting by the count itself would favour upward scatter.
     expected = 10.0 ** np.polyval(np.polyfit(work, factor, 1), work)
     weight = 1.0 / (SCATTER**2 + (BACKGROUND_ERROR / (np.log(10.0) * expected)) ** 2)
     return Samples(features[known], sequences[known], factor, weight / weight.mean())
@@ -96,7 +96,7 @@ def fit_law(samples: Samples, seed: int) -> Model:
 
 
 def fit_table(samples: Samples, seed: int) -> Model:
-    """Return the map over speed and pressure [38], its nodes at quantiles, its bends held small."""
+    """Return the map over speed and pressure [38], its nodes at quantiles, its bends regularised."""
     axes = [
         _rising(np.quantile(samples.features[:, i], np.linspace(0.0, 1.0, NODES))) for i in (V_IN, PRESSURE)
     ]
@@ -141,7 +141,7 @@ def _trained(inputs: Array, output: Array, hidden: int, shrink: float, seed: int
 
 
 def _scales(values: Array) -> tuple[Array, Array]:
-    """Return what is taken off and what it is divided by, so that values lie in -1 to 1."""
+    """Return offset and divisor that scale values to -1 to 1."""
     low, high = values.min(axis=0), values.max(axis=0)
     return 0.5 * (low + high), np.maximum(0.5 * (high - low), 1e-9)
 

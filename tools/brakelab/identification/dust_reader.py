@@ -3,7 +3,7 @@
 The manifest is a CSV file, a row a trip: `trip`, `file`, `test` (1: held out). A trip's file (CSV or Parquet)
 has `t` [s], `vehicle_speed` [m/s], `calliper_pressure_fr` [bar], `brake_torque_fr` [N m],
 `disc_temperature_fr` [degC], `particle_concentration` [1/cm^3 in the sampled flow] and `tunnel_flow` [m^3/s].
-Rows without a value are between two samples: the counter has one a second, the rest some ten.
+Rows without a value are between two samples: the counter has one a second, the others about ten.
 """
 
 from pathlib import Path
@@ -32,7 +32,7 @@ COLUMNS: Final = (
     "tunnel_flow",
 )
 LONGEST_GAP: Final = 5.0  # s between two samples
-FEWEST_TRIPS: Final = 3  # to identify with: each is left out once
+FEWEST_TRIPS: Final = 3  # for identification: each is left out once
 FEWEST: Final = 20  # applications of a trip
 FASTEST: Final = 90.0  # m/s
 HOTTEST: Final = 900.0  # degC
@@ -44,11 +44,11 @@ def read_trips(manifest: Path, push_out: float, radius: float) -> list[Applicati
 
     Args:
         manifest: CSV.
-        push_out: pressure from which the pads press [bar].
+        push_out: push-out pressure [bar].
         radius: of the tyre [m].
 
     Raises:
-        UserError: a file, a row or a value of it is not right.
+        UserError: a file, a row or a value of it is invalid.
     """
     trips = []
     for line, row in enumerate(read_manifest(manifest), 2):

@@ -1,8 +1,8 @@
-"""Eight trips of a light commercial vehicle whose front right brake is counted (Table 8.1), as a laboratory
-has them: columns at 10 Hz with sensors' errors, the counter once a second, the last trip held out.
+"""Eight trips of a light commercial vehicle with a particle counter at its front right brake (Table 8.1), as
+recorded by a laboratory: columns at 10 Hz with sensors' errors, the counter once a second, the last held out.
 
 The brake follows generated trips of real driving by drivers that differ (`driving_cycle.py`); it is not the
-whole car in closed loop. Torque is what an ECU would estimate: off by a share that stays for a trip.
+whole car in closed loop. Torque is that of an ECU's estimate, with a relative error constant over a trip.
 """
 
 import csv
@@ -45,7 +45,7 @@ COLUMNS: Final = (
     "particle_concentration",
     "tunnel_flow",
 )
-# Assumptions, all of them. Bounds of an even distribution where there are two.
+# Assumptions, all of them. Two values: bounds of a uniform distribution.
 FASTER: Final = (0.88, 1.05)  # of the trip's speed
 SLOWER: Final = (0.85, 1.30)  # of its time
 CREW: Final = 1.15  # of the mass: two people and the counter
@@ -68,7 +68,7 @@ DRIVEN: Final = (20e6, 60e6)  # J, of the brake before the first trip: bedded, a
 
 
 class Trip(NamedTuple):
-    """A trip as it was recorded, and what is true of it."""
+    """A trip as recorded, and its true values."""
 
     columns: dict[str, Array]
     """By `COLUMNS`."""
@@ -79,7 +79,7 @@ class Trip(NamedTuple):
 
 
 def _trace(random: Generator, seed: int) -> tuple[Array, float]:
-    """Return speed, acceleration and grade every `STEP`, shape (n, 3), and the way [m]."""
+    """Return speed, acceleration and grade every `STEP`, shape (n, 3), and the distance [m]."""
     trip = real_driving(seed)
     faster, slower = random.uniform(*FASTER), random.uniform(*SLOWER)
     t, speed = slower * trip.t, faster * trip.speed
@@ -133,7 +133,7 @@ def _sensed(out: Array, random: Generator) -> dict[str, Array]:
 
 
 def drawn_brake(seed: int) -> RecordArray:
-    """Return the drawn van of a seed with its crew, shape (1,), its linings' emission drawn too."""
+    """Return the drawn van of a seed with its crew, shape (1,), with drawn emission of its linings."""
     plant = load_plant(resource("config/plant/lcv.toml"))
     width = load_widths(resource("config/plant/draw.toml"), "wide").model_copy(update={"emission_day": 0.0})
     car = draw(plant, seed, width)

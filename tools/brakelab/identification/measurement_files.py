@@ -1,4 +1,4 @@
-"""Manifests and tables of measurements: read, and refused in one line where they are not right."""
+"""Manifests and tables of measurements: read, and refused with one line if invalid."""
 
 import csv
 from pathlib import Path
@@ -41,7 +41,7 @@ def read_columns(path: Path, names: tuple[str, ...], what: str) -> dict[str, Arr
         what: the file is one of.
 
     Raises:
-        UserError: it cannot be read, lacks a column, holds what is no number, or time does not rise.
+        UserError: it cannot be read, lacks a column, holds a non-number, or time does not rise.
     """
     try:
         table = pq.read_table(path) if path.suffix == ".parquet" else pa_csv.read_csv(path)
@@ -60,10 +60,10 @@ def read_columns(path: Path, names: tuple[str, ...], what: str) -> dict[str, Arr
 
 
 def check_celsius(path: Path, name: str, values: Array, hottest: float) -> None:
-    """Refuse temperatures of a disc that cannot be degC.
+    """Refuse disc temperatures that cannot be degC.
 
     Raises:
-        UserError: they are none.
+        UserError: they cannot.
     """
     low, high = values.min(), values.max()
     if low > WARMEST_COLD or high > hottest or low < COLDEST:

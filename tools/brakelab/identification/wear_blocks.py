@@ -1,4 +1,4 @@
-"""Blocks of a brake dynamometer: their manifest, their regressors (7.16) and what was worn off in each.
+"""Blocks of a brake dynamometer: their manifest, regressors (7.16) and wear.
 
 The manifest is a CSV file, a row a block: `block`, `file`, `mass_before`, `mass_after` [g, of the two pads of
 one calliper] and, where measured, `thickness_before_1…6`, `thickness_after_1…6` [mm]. A block's file (CSV or
@@ -25,7 +25,7 @@ POINTS: Final = 6
 FEWEST: Final = 100  # applications of a block; the thesis has 250 and more
 PRESSED: Final = 1.0  # bar
 SHORTEST: Final = 0.1  # s of an application
-SLOPE_S: Final = 0.2  # s to either side, over which the speed's slope is taken
+SLOPE_S: Final = 0.2  # s to either side, for the slope of the speed
 FAHRENHEIT: Final = 1.8
 HOTTEST: Final = 1100.0  # degC
 
@@ -135,7 +135,7 @@ def stop_regressors(stop: dict[str, Array]) -> Array:
 
 
 def _check_temperature(path: Path, stops: list[dict[str, Array]], heat: Heat) -> None:
-    """Refuse temperatures that cannot be degC: by their range, and by what a work warms the disc."""
+    """Refuse temperatures that cannot be degC: by their range, and by the heating per work."""
     everything = np.concatenate([stop["disc_temperature"] for stop in stops])
     if not np.isfinite(everything).all():
         raise UserError(str(path), "disc_temperature", "has gaps while the brake is applied; fill them")

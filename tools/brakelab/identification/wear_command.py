@@ -1,4 +1,4 @@
-"""`brake-ecu identify wear`: a wear law from dynamometer blocks, as a file that `--config` takes; a page."""
+"""Identification of wear (`brake-ecu identify wear`): wear law from dynamometer blocks, as a CONFIG; page."""
 
 import os
 from pathlib import Path
@@ -15,9 +15,9 @@ from brakelab.studies.table import Table, markdown
 from ecu.errors import UserError
 from ecu.settings.config import Axle, load_config
 
-COOLING_SPEED: Final = 15.0  # m/s, at which stops are taken to be cooled
+COOLING_SPEED: Final = 15.0  # m/s, speed of cooling between stops, assumed
 MOTION: Final = ((5.0, BLUE), (20.0, GREEN), (50.0, ORANGE))  # kW of friction
-ROAD: Final = 0.10  # relative: what the road differs from a laboratory by (section 7.6)
+ROAD: Final = 0.10  # relative: difference of the road from a laboratory (section 7.6)
 
 
 def specific_wear(coefficients: Array, temperature: Array, power: float, rate: float) -> Array:
@@ -31,7 +31,7 @@ def specific_wear(coefficients: Array, temperature: Array, power: float, rate: f
 
 
 def leave_one_out(fit: Fit, mass: Array) -> float:
-    """Return the root mean square of the relative error of blocks by the law of the others."""
+    """Return the RMS relative error of blocks by the law identified from the others."""
     return float(np.sqrt(np.mean((fit.left_out / mass - 1.0) ** 2)))
 
 
@@ -143,7 +143,7 @@ def identify_wear(manifest: Path, config: Path, axle: str, out: Path) -> int:
     """Identify the wear law of an axle's linings; write `out` and `out`.md, return 0.
 
     Raises:
-        UserError: an argument or a file is not right.
+        UserError: an argument or a file is invalid.
     """
     if axle not in ("front", "rear"):
         raise UserError("--axle", axle, "choose front or rear")

@@ -1,8 +1,8 @@
 """Coefficients of a wear law from blocks (7.15–7.19): scaled, weighted, not negative, few.
 
 Every column is scaled to 1, every block weighted by its standard deviation: that of the measurement and a
-share of its mass, the scatter that no law explains, found with it. All sets of terms are tried that the rank
-of the scaled regressors allows; the least information criterion (AICc) wins. Confidence: parametric
+share of its mass, the scatter unexplained by any law, estimated with it. All sets of terms admitted by the
+rank of the scaled regressors are tried; the least information criterion (AICc) wins. Confidence: parametric
 bootstrap.
 """
 
@@ -27,7 +27,7 @@ CONFIDENCE: Final = (2.5, 97.5)  # %
 
 
 class Fit(NamedTuple):
-    """A law and what it is worth."""
+    """A law with its confidence."""
 
     coefficients: Array
     """Shape (7,), terms that were pruned are 0."""
@@ -54,7 +54,7 @@ def _scaled(regressors: Array) -> tuple[Array, Array]:
 def rank_of(regressors: Array) -> tuple[int, float]:
     """Return the numerical rank of the regressors, shape (n, 7), and their condition number.
 
-    Rows count by their direction: a block twice as long says nothing else.
+    Rows count by their direction: a block twice as long adds no information.
     """
     rows = regressors / regressors[:, :1]
     columns, _ = _scaled(rows)
@@ -100,10 +100,10 @@ def fit_law(
 ) -> Fit:
     """Return the law of the blocks: `regressors` (n, 7), `mass` [g] and its `variance` [g^2] (n,).
 
-    `allowed`: places of the terms that may be in it.
+    `allowed`: indices of admissible terms.
 
     Raises:
-        UserError: there are too few blocks, or all are alike.
+        UserError: there are too few blocks, or all are similar.
     """
     if len(mass) < 3:
         raise UserError("blocks", str(len(mass)), "too few to tell one law from another; give 3 or more")

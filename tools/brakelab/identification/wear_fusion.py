@@ -1,8 +1,8 @@
-"""Linear wear and wear mass blended by what each is worth (7.7–7.11).
+"""Fusion of linear wear and wear mass, weighted by their variances (7.7–7.11).
 
 Points (x_i, y_i): linear wear [mm] and mass [g] of each block; through the origin runs the line of slope K by
-least squares (7.7). Each point moves onto it in the direction -alpha/K (7.9); the most likely place has
-alpha = (sigma_y / sigma_x)^2: small where the balance is the better one, as on a dynamometer. What comes out
+least squares (7.7). Each point moves onto it in the direction -alpha/K (7.9); the most likely position has
+alpha = (sigma_y / sigma_x)^2: small where the balance is the more accurate, as on a dynamometer. The result
 has the variance 1 / (1/sigma_y^2 + 1/(K sigma_x)^2), K's own beside it, which is the same for all points.
 """
 

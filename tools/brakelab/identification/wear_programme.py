@@ -1,7 +1,7 @@
-"""A dynamometer programme for wear: blocks of brake applications from road drives, run on the simulated rig.
+"""Dynamometer programme for wear: blocks of brake applications from road drives, run on the simulated rig.
 
-Whole trips, their town, country and motorway parts, each by a calm and by a lively driver: eight blocks as in
-section 7.4, each with 250 applications and more. After each the pads are weighed and measured at six points.
+Whole trips, their town, country and motorway parts, each by a calm and by a sporty driver: eight blocks as in
+section 7.4, each with at least 250 applications. After each the pads are weighed and measured at six points.
 """
 
 import csv
@@ -40,7 +40,7 @@ PAD_MASS: Final = 450.0  # g, two pads with their plates
 
 
 class WornBlock(NamedTuple):
-    """A block as it ran."""
+    """A block as run."""
 
     name: str
     trace: Array
@@ -70,7 +70,7 @@ def road_stops(road: str, driver: str, seed: int, count: int = APPLICATIONS) -> 
 
 
 def drawn_car(seed: int) -> RecordArray:
-    """Return the simulated SUV of a seed, shape (1,), without the climate of a day."""
+    """Return the simulated SUV of a seed, shape (1,), without the variation of climate by day."""
     scenario = load_scenario(resource("config/scenarios/real-driving.toml"))
     width = scenario_widths(scenario).model_copy(update={"wear_climate": 0.0})
     return draw(scenario_plant(scenario), seed, width)
