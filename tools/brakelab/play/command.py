@@ -1,7 +1,7 @@
-"""`brake-ecu play`: a recorded drive onto a bus, every frame on the absolute schedule of its stamps.
+"""Playback of a recorded drive onto a bus (`brake-ecu play`), every frame on the schedule of its stamps.
 
 A second process reads the log ahead (`brakelab/read_ahead.py`), this one only waits and sends. It sleeps
-until shortly before a frame is due and watches the clock for the rest.
+until shortly before a frame is due, then polls the clock.
 """
 
 import signal
@@ -32,16 +32,16 @@ LEAD_NS: Final = 10_000_000
 LEAST_MARGIN_NS, MOST_MARGIN_NS = 20_000, 250_000
 SLACK_NS: Final = 10_000
 FORGETTING: Final = 256  # wake-ups
-# Linux takes the CPU for 50 ms from a real-time process that has used more than 95 % of a second.
+# Linux throttles a real-time process that has used more than 95 % of a second, for 50 ms.
 AWAKE_NS, NAP_NS = 500_000, 40_000
 
 INTERRUPTED: Final = 130
 
 
 class Waker:
-    """Waits for instants: asleep until a margin before, then watching the clock.
+    """Wait for instants: asleep until a margin before, then polling the clock.
 
-    The margin is how late the machine woke us lately, at worst.
+    The margin is the worst recent wake-up latency.
     """
 
     def __init__(self, source: TimeSource) -> None:
@@ -50,7 +50,7 @@ class Waker:
         self._rested_ns = source.monotonic_ns()
 
     def wait(self, due_ns: int) -> int:
-        """Return at `due_ns` on the monotonic clock; returns that clock."""
+        """Wait until `due_ns` on the monotonic clock; return that clock."""
         monotonic_ns, sleep_until = self._source.monotonic_ns, self._source.sleep_until
         now = monotonic_ns()
         awake, left = now - self._rested_ns, due_ns - now
@@ -82,10 +82,10 @@ class Sent:
 
 
 def play(log: Path, interface: str, channel: str, map: Path | None, speed: float) -> int:
-    """Put `log` onto a bus, `speed` times as fast as it was; return 0, or 130 after SIGINT or SIGTERM.
+    """Send `log` to a bus, `speed` times as fast as recorded; return 0, or 130 after SIGINT or SIGTERM.
 
     Raises:
-        UserError: an argument, the map or the log is not right, or the bus cannot be opened.
+        UserError: an argument, the map or the log is invalid, or the bus cannot be opened.
     """
     least, most = SPEEDS
     if not least <= speed <= most:
@@ -138,9 +138,9 @@ def _summary(findings: Findings, sent: Sent, code: int) -> str:
 
 
 def send_on_schedule(blocks: Iterable[RecordArray], bus: Channel, source: TimeSource, sent: Sent) -> None:
-    """Send every frame when it is due, `stamp_ns` after the first; `sent` is kept up to date.
+    """Send every frame when due, `stamp_ns` after the first; `sent` is updated continuously.
 
-    Frames that are due at once leave in one call.
+    Frames due together are sent in one call.
     """
     start_ns, waker = None, Waker(source)
     for frames in blocks:

@@ -1,8 +1,8 @@
-"""Frames that `brake-ecu play` sends of a log, with their times.
+"""Frames of a log for `brake-ecu play`, with their times.
 
-Without a map the log's frames go out as they are. With one (and for a file of decoded signals) the log is
-decoded every 10 ms and encoded as the contract's input frames with fresh counters and checksums; what is
-stale or invalid in the log is sent as "not available".
+Without a map the log's frames are sent unchanged. With one (and for a file of decoded signals) the log is
+decoded every 10 ms and encoded as the contract's input frames with new counters and checksums; stale or
+invalid signals are sent as "not available".
 """
 
 from collections.abc import Iterable, Iterator
@@ -31,10 +31,10 @@ Vector = NDArray[np.float64]
 def timed_frames(
     log: Path, map: Path | None, channel: str, speed: float, findings: Findings
 ) -> Iterator[RecordArray]:
-    """Yield what is to be sent, in blocks; `stamp_ns` is when each is due after the first frame.
+    """Yield the frames to send, in blocks; `stamp_ns` is the due time after the first frame.
 
     Raises:
-        UserError: the map or the log is not right, or holds nothing to send.
+        UserError: the map or the log is invalid, or contains nothing to send.
     """
     if map is None and kind_of(log) != "signals":
         blocks = raw_frames(log, channel, findings)
@@ -51,8 +51,7 @@ def timed_frames(
 def timed(blocks: Iterable[RecordArray], speed: float) -> Iterator[RecordArray]:
     """Yield `blocks`, none of them empty, with `stamp_ns` as the time since the first frame over `speed`.
 
-    Frames leave in the order of the log: one whose stamp is before that of the frame before it is due with
-    that frame.
+    Frames keep the order of the log: one stamped before its predecessor is due with it.
     """
     first_ns = latest_ns = None
     for frames in blocks:
@@ -66,7 +65,7 @@ def timed(blocks: Iterable[RecordArray], speed: float) -> Iterator[RecordArray]:
 
 
 def raw_frames(log: Path, channel: str, findings: Findings) -> Iterator[RecordArray]:
-    """Yield the data frames of a log as they are; of several interfaces `channel`, else the first."""
+    """Yield the data frames of a log unchanged; of several interfaces `channel`, else the first."""
     path = read_recording(log).frames if log.is_dir() else log
     for block in read_frames(path, findings.interfaces, findings.log):
         name = channel if channel in findings.interfaces else findings.interfaces[0]
@@ -79,7 +78,7 @@ def raw_frames(log: Path, channel: str, findings: Findings) -> Iterator[RecordAr
 def contract_frames(log: Path, source: Source, findings: Findings) -> Iterator[RecordArray]:
     """Yield the log as the frames that a vehicle sends to the ECU, every 10 ms.
 
-    What was yielded is overwritten by the next.
+    Each block is overwritten by the next.
     """
     plan = contract_transmit_plan(resource("dbc/brake_ecu.dbc"), "Vehicle")
     transmission, frames = new_transmission(plan), frame_buffer(plan)

@@ -1,7 +1,7 @@
-"""Frames that a second process reads ahead: what reading and unpacking a log costs never delays who sends it.
+"""Read-ahead of frames by a second process, so that reading and unpacking a log never delays sending.
 
-Both share a ring of slots. A slot without frames is the end; what the reader found, or why it could not go
-on, then comes through a pipe.
+Both share a ring of slots. A slot without frames is the end; the reader's findings, or its error, then follow
+through a pipe.
 """
 
 import ctypes
@@ -30,7 +30,7 @@ Read = Callable[[Findings], Iterator[RecordArray]]
 class ReadAhead:
     """The frames of `read(findings)` in blocks, read by a process of its own.
 
-    A block is overwritten after the next was asked for. At the end `findings` are the reader's.
+    A block is overwritten once the next is requested. At the end `findings` are the reader's.
     """
 
     def __init__(self, read: Read, findings: Findings) -> None:
@@ -46,7 +46,7 @@ class ReadAhead:
             args=(read, findings, memory, self._counts, self._free, self._filled, answer),
             daemon=True,
         )
-        # Ctrl-C is for who plays: a process inherits what is blocked.
+        # Ctrl-C is for the player: a process inherits blocked signals.
         blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             self._reader.start()
@@ -91,7 +91,7 @@ def _slots(memory: Any) -> RecordArray:
 def _read(
     read: Read, findings: Findings, memory: Any, counts: Any, free: Any, filled: Any, answer: Any
 ) -> None:
-    """Fill the slots, then answer with the findings or the error; leave if nobody takes them any more."""
+    """Fill the slots, then send the findings or the error; leave if the slots are no longer read."""
     slots, order = _slots(memory), cycle(range(SLOTS))
     parent = parent_process()
     assert parent is not None
