@@ -1,9 +1,9 @@
 """A trip of some 100 minutes as real driving has it: speed and grade, drawn from a seed.
 
 The trip goes through a town, over country roads and along a motorway. Each road is a chain of legs: the
-driver accelerates to what the road allows, holds it as well as traffic lets him, lifts the foot and brakes
-for what ends the leg (a light, a junction, a bend, a queue). Accelerations are trapezia with limited jerk.
-Every trip meets Table 1.1: as on the road, one that misses a row is discarded and driven anew.
+driver accelerates to the admissible speed, holds it as traffic permits, releases the accelerator and brakes
+for the end of the leg (a light, a junction, a bend, a queue). Accelerations are trapezia with limited jerk.
+Every trip meets Table 1.1: as on the road, one that violates a row is discarded and repeated.
 
 ```
 python -m brakelab.trip.generate [--seed N] [--svg PICTURE.svg] [DRIVE.truth.parquet]
@@ -31,12 +31,12 @@ from ecu.errors import UserError
 
 DT: Final = 0.1  # s, of the samples
 # Assumptions, as all figures of roads and driver below.
-COAST: Final = 0.35  # m/s^2, foot off
+COAST: Final = 0.35  # m/s^2, accelerator released
 COAST_SECONDS: Final = (1.0, 5.0)  # before the brake is touched
 BRAKE_JERK: Final = 2.0  # m/s^3
 DRIVE_JERK: Final = 1.0  # m/s^3
 STRONGEST_BRAKING: Final = 4.0  # m/s^2
-UNEVEN: Final = 0.025  # of the speed, standard deviation of what traffic adds while it is held
+UNEVEN: Final = 0.025  # of the speed, standard deviation added by traffic while it is held
 STEEPEST: Final = 0.08  # rad
 SHORTEST_LEG: Final = 60.0  # m
 
@@ -69,7 +69,7 @@ class _End(NamedTuple):
 
 
 class _Road(NamedTuple):
-    """A kind of road. Lengths so that the parts of the trip, told apart by speed, come near Table 1.1."""
+    """Kind of road, of a length with which the parts of the trip, by speed, come near Table 1.1."""
 
     length: float
     """m"""
@@ -114,7 +114,7 @@ class _Driver(NamedTuple):
 
 @dataclass
 class _Trace:
-    """A speed trace as far as it is written."""
+    """Speed trace under construction."""
 
     pieces: list[Array] = field(default_factory=lambda: [np.zeros(1)])
     distance: float = 0.0
@@ -150,7 +150,7 @@ def _along(start: float, end: float, seconds: list[float], accel: list[float]) -
 
 
 def _ramp(start: float, end: float, peak: float, jerk: float) -> Array:
-    """Return a change of speed with at most `peak` [m/s^2]; a small one does not get there."""
+    """Return a change of speed with at most `peak` [m/s^2]; a small one stays below it."""
     change = abs(end - start)
     if change == 0.0:
         return np.empty(0)
@@ -160,7 +160,7 @@ def _ramp(start: float, end: float, peak: float, jerk: float) -> Array:
 
 
 def _brake(start: float, end: float, plateau: float, coast: float) -> Array:
-    """Return a braking with `plateau` [m/s^2] after rolling for `coast` [s]; a small one does without."""
+    """Return a brake application with `plateau` [m/s^2] after `coast` [s]; a small one has neither."""
     rises = [COAST / BRAKE_JERK, (plateau - COAST) / BRAKE_JERK, plateau / BRAKE_JERK]
     lost = COAST * (0.5 * rises[0] + coast) + 0.5 * (COAST + plateau) * rises[1] + 0.5 * plateau * rises[2]
     held = (start - end - lost) / plateau
@@ -171,7 +171,7 @@ def _brake(start: float, end: float, plateau: float, coast: float) -> Array:
 
 
 def _cruise(rng: Generator, speed: float, metres: float) -> Array:
-    """Return a speed that is held for about `metres`, in swells of some 25 s."""
+    """Return a speed held for about `metres`, with fluctuations of some 25 s."""
     seconds = metres / speed
     swells = max(round(seconds / 25.0), 1)
     samples = round(seconds / swells / DT)

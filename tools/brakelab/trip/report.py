@@ -1,4 +1,4 @@
-"""A trip as plain text: Tables 1.1 and 1.2 beside what was found, its brakings, how its brakes were used."""
+"""Trip report as plain text: Tables 1.1 and 1.2 beside the trip, its brakings and use of its brakes."""
 
 from typing import Final
 
@@ -61,9 +61,9 @@ def trip_lines(t: Array, speed: Array, grade: Array, found: Brakings) -> list[st
 
 
 def part_lines(t: Array, speed: Array, discs: Array, found: Brakings) -> list[str]:
-    """Return number and means of the brakings of each part of a trip, told apart by the speed before them.
+    """Return number and means of the brake applications of each part of a trip, by their initial speed.
 
-    `discs` are temperatures [degC] of shape (n, 4), or (n, 0) where they are not known. After Figures 7.3
+    `discs` are temperatures [degC] of shape (n, 4), or (n, 0) if unknown. After Figures 7.3
     and 7.4.
     """
     lines = [f"{'Brakings, means':16}{'number':>8}{'per 100 km':>12}{'from [km/h]':>13}{'by [m/s^2]':>12}"]
@@ -87,7 +87,7 @@ def part_lines(t: Array, speed: Array, discs: Array, found: Brakings) -> list[st
 
 
 def braking_lines(found: Brakings) -> list[str]:
-    """Return one line for each braking, speeds in km/h."""
+    """Return one line for each brake application, speeds in km/h."""
     lines = ["start [s]  lasts [s]  from [km/h]  to [km/h]  mean deceleration [m/s^2]"]
     for start, lasts, v_in, v_out, decel in zip(*found, strict=True):
         lines.append(f"{start:9.1f}{lasts:11.1f}{v_in / KMH:13.1f}{max(v_out, 0.0) / KMH:11.1f}{decel:27.2f}")

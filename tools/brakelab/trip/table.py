@@ -1,8 +1,8 @@
-"""A trip against the rules for real driving emissions (Table 1.1) and its brakings (Table 1.2).
+"""Check of a trip against the rules for real driving emissions (Table 1.1), and its brakings (Table 1.2).
 
-Works on any trip: a reference that is to be driven, or what a car has driven. Urban, rural and motorway
-operation are told apart by speed alone (up to 60, up to 90, above 90 km/h; EU 2016/427, annex IIIA), so no
-map is needed.
+Works on any trip: a reference to be driven, or a recorded one. Urban, rural and motorway operation are
+distinguished by speed alone (up to 60, up to 90, above 90 km/h; EU 2016/427, annex IIIA), so no map is
+needed.
 """
 
 from typing import Final, NamedTuple
@@ -19,8 +19,8 @@ RURAL: Final = 90.0 * KMH
 MOTORWAY: Final = 100.0 * KMH
 """The regulation counts the time on a motorway from here, though the distance from `RURAL`."""
 
-BRAKING_FROM: Final = 0.5  # m/s^2, more than rolling out gives. Assumption
-SHORTEST_GAP: Final = 0.5  # s; what is closer together is one braking. Assumption
+BRAKING_FROM: Final = 0.5  # m/s^2, more than by rolling out. Assumption
+SHORTEST_GAP: Final = 0.5  # s; events closer together are one braking. Assumption
 LEAST_LOSS: Final = 5.0 * KMH  # m/s, of speed. Assumption
 
 
@@ -37,7 +37,7 @@ class Row(NamedTuple):
 
     @property
     def met(self) -> bool:
-        """Whether the trip meets this row."""
+        """Return whether the trip meets this row."""
         return self.low < self.value < self.high
 
 
@@ -70,7 +70,7 @@ def height_gained(t: Array, speed: Array, grade: Array) -> Array:
 def trip_rows(t: Array, speed: Array, grade: Array) -> list[Row]:
     """Return the rows of Table 1.1 for a trip: `t` [s], `speed` [m/s] and `grade` [rad], all of shape (n,).
 
-    Stop time is held against the whole trip and the time on a motorway starts at 100 km/h; both are the
+    Stop time is taken relative to the whole trip and the time on a motorway starts at 100 km/h; both are the
     stricter of two readings (the regulation takes stops as a share of the urban time, the table names no
     speed).
     """
