@@ -1,4 +1,4 @@
-"""`brake-ecu tune`: the noise of Observer 2 found by a genetic algorithm (thesis, section 6.2.1)."""
+"""Tuning of Observer 2's noise by a genetic algorithm (`brake-ecu tune`; thesis, section 6.2.1)."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -41,7 +41,7 @@ class Budget(NamedTuple):
 
 
 class Row(NamedTuple):
-    """One session with the tuning to begin with and with the one that was found."""
+    """One session with the initial tuning and with the one found."""
 
     session: str
     before: Errors
@@ -94,7 +94,7 @@ def _record(config: Config, scenarios: Mapping[Path, Scenario], cars: range) -> 
 
 
 def _search(manual: Config, recordings: list[Recording], budget: Budget) -> tuple[Errors, int, Best]:
-    """Return the errors before, the generations that were bred, and the best of them all."""
+    """Return the initial errors, the number of generations, and the best tuning."""
     start = Best(manual, replay_errors(recordings, [manual])[0])
     generations, best = 0, start
     with progress_bar("tune", budget.generations) as advance:

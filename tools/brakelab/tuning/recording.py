@@ -1,4 +1,4 @@
-"""Drives recorded once, so that many tunings can be stepped through them: inputs, truth, and what counts.
+"""Drives recorded once for many tunings: inputs, truth, and the counted rows.
 
 A brake application counts from 0.5 s after its start down to 15 km/h. Its error is
 
@@ -53,7 +53,7 @@ class Errors(NamedTuple):
 
 
 def applications(drive: Drive) -> NDArray[np.int64]:
-    """Return the number of the brake application that counts in each row, -1: none; shape (n,)."""
+    """Return the number of the brake application counted in each row, -1: none; shape (n,)."""
     on = drive.outputs["braking"] > 0.5
     starts = np.flatnonzero(np.diff(on, prepend=False) & on)
     numbers = np.full(len(on), -1)
@@ -67,7 +67,7 @@ def applications(drive: Drive) -> NDArray[np.int64]:
 
 
 def drive_errors(drive: Drive) -> Errors:
-    """Return the errors of what the ECU estimated while it drove; NaN without an application."""
+    """Return the errors of the ECU's own estimate during the drive; NaN without an application."""
     braking = applications(drive)
     if braking.max() < 0:
         return Errors(np.full(len(AXLES), np.nan), np.full(len(AXLES), np.nan))
@@ -91,7 +91,7 @@ def drive_once(scenario: Scenario, config: Config, seed: int) -> Drive:
 
 
 def recording(drive: Drive) -> Recording:
-    """Return what of a drive is stepped through again."""
+    """Return the part of a drive that is stepped through again."""
     braking = applications(drive)
     inputs = ecu_inputs(vehicle_frames(drive.frames), len(drive.t))
     mu_b = np.stack([drive.truth[f"mu_b_{corner}"] for corner in CORNERS], axis=1)

@@ -1,7 +1,7 @@
 """Many tunings through recorded drives at once: open loop, a whole population in one compiled call.
 
-What the observer believes changes the pressures by little, and those by little what is measured; so a tuning
-is judged on inputs that another one drove.
+The estimate changes the pressures little, and these the measurements little; so a tuning may be judged on
+inputs recorded with another one.
 """
 
 from collections.abc import Iterable, Sequence

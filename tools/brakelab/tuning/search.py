@@ -1,12 +1,12 @@
 """The genetic algorithm of section 6.2.1 over the noise of Observer 2 (thesis, reference [90]).
 
 Genes, as in the thesis: the three components of the process covariance and the variance of the virtual force
-sensor; the wheel encoder's variance stays that of its white noise. Beyond the thesis the forgetting factor
-of K_f (4.20), as 1 - factor. All are searched on logarithmic axes, a decade or more to either side of what
-is shipped. The relaxation length is the tyre's and is not searched.
+sensor; the wheel encoder's variance stays that of its white noise. Beyond the thesis the forgetting factor of
+K_f (4.20), as 1 - factor. All are searched on logarithmic axes, a decade or more to either side of the
+shipped values. The relaxation length belongs to the tyre and is not searched.
 
-Fitness is the mean nRMSE of front and rear. The first population holds the tuning to begin with, and the
-best half of parents and children survives: no generation is worse than the one before.
+Fitness is the mean nRMSE of front and rear. The first population contains the initial tuning, and the best
+half of parents and children survives: no generation is worse than the one before.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -32,7 +32,7 @@ RANGES: Final = {
 }
 """Where each key of [observer] is searched."""
 DIGITS: Final = 4
-"""Significant digits of a tuned value, so that a file can hold exactly what was tried."""
+"""Significant digits of a tuned value, so that a file can hold exactly the value tried."""
 
 
 class Best(NamedTuple):
@@ -51,14 +51,14 @@ def fitness(errors: Errors) -> float:
 
 
 def genes(values: Sequence[float]) -> NDArray[np.float64]:
-    """Return where values of `RANGES` lie on the logarithmic axes, shape (5,)."""
+    """Return the positions of values of `RANGES` on the logarithmic axes, shape (5,)."""
     return np.log10(
         [1.0 - x if key == "rls_forgetting" else x for key, x in zip(RANGES, values, strict=True)]
     )
 
 
 def tuned(config: Config, place: NDArray[np.float64]) -> Config:
-    """Return `config` with the tuning at a place on the logarithmic axes, shape (5,)."""
+    """Return `config` with the tuning at a position on the logarithmic axes, shape (5,)."""
     values = dict(zip(RANGES, 10.0**place, strict=True))
     values["rls_forgetting"] = 1.0 - values["rls_forgetting"]
     rounded = {key: float(f"{value:.{DIGITS}g}") for key, value in values.items()}
@@ -66,7 +66,7 @@ def tuned(config: Config, place: NDArray[np.float64]) -> Config:
 
 
 def search(best: Best, judge: Judge, generations: int, population: int, seed: int) -> Iterator[Best]:
-    """Yield the best tuning after each generation, beginning with `best`."""
+    """Yield the best tuning after each generation, starting with `best`."""
     limits = np.array([genes(limit) for limit in zip(*RANGES.values(), strict=True)])
     low, high = limits.min(axis=0), limits.max(axis=0)
     random = np.random.default_rng(seed)
