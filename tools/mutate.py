@@ -1,11 +1,11 @@
-"""Mutation testing: does a module's own test notice when the module is wrong?
+"""Mutation testing: checks that a module's own test notices an error in the module.
 
     python tools/mutate.py [MODULE…] [--every N]       of `TESTS`, or all of them
 
 Changes one comparison, operator, constant or condition at a time and runs the module's tests, with kernels as
 plain Python; each mutant is a fork of the process that has collected them, and ends with the first test that
-fails: those that killed most of the others go first. Prints what survives. Exit code 1 if anything does that
-`tools/mutants.toml` does not argue, or if that file argues for a mutant that is killed or no longer exists.
+fails: those that killed most of the others go first. Prints the surviving mutants. Exit code 1 if one is not
+justified in `tools/mutants.toml`, or if that file justifies a mutant that is killed or no longer exists.
 """
 
 import argparse
@@ -51,7 +51,7 @@ TESTS = {
     "ecu/algorithm/estimation/joint/kalman.py": ("algorithm/estimation/joint/test_kalman.py",),
 }
 """The modules that are held to it, and their tests in tests/ecu."""
-PATIENCE_S, SLOWER = 2.0, 5.0  # of the processor's time, that a test may take beside its own and over it
+PATIENCE_S, SLOWER = 2.0, 5.0  # of the processor's time, allowed to a test beside its own and beyond it
 COMPARISONS: dict[type[ast.cmpop], type[ast.cmpop]] = {
     ast.Lt: ast.LtE,
     ast.LtE: ast.Lt,
@@ -71,7 +71,7 @@ OPERATORS: dict[type[ast.operator], type[ast.operator]] = {
 
 
 def mutants(source: str) -> Iterator[tuple[str, list[ast.stmt]]]:
-    """Yield the name of every change of a module, and the statements of its top level that it changes.
+    """Yield the name of every change of a module, and the top-level statements that it changes.
 
     A name is `function: line of the source: before -> after`, with a number where there are several.
     """
@@ -94,7 +94,7 @@ def mutants(source: str) -> Iterator[tuple[str, list[ast.stmt]]]:
 
 
 def _following(changed: ast.stmt, rest: list[ast.stmt]) -> list[ast.stmt]:
-    """Return the constants that are computed from what a statement defines, in their order."""
+    """Return the constants computed from those a statement defines, in their order."""
     names, follow = _defined(changed), []
     for statement in rest:
         used = {node.id for node in ast.walk(statement) if isinstance(node, ast.Name)}
@@ -112,14 +112,14 @@ def _defined(statement: ast.stmt) -> set[str]:
 
 
 def _nodes(statement: ast.stmt) -> Iterator[ast.AST]:
-    """Yield every node that runs."""
+    """Yield every node that is executed."""
     for part in statement.body if isinstance(statement, ast.FunctionDef) else [statement]:
         fields = {inner for node in ast.walk(part) if _is_field(node) for inner in ast.walk(node)}
         yield from (node for node in ast.walk(part) if node not in fields)
 
 
 def _is_field(node: ast.AST) -> bool:
-    """Whether it lays out a field of a record: name and format."""
+    """Return whether it lays out a field of a record: name and format."""
     kinds = [getattr(part, "value", None) for part in node.elts[:2]] if isinstance(node, ast.Tuple) else []
     return len(kinds) == 2 and all(isinstance(kind, str) for kind in kinds)
 
@@ -156,7 +156,7 @@ def _change(node: ast.AST, change: int) -> None:
 
 
 def _apply(module: ModuleType, statement: ast.stmt) -> None:
-    """Replace a function's code, or set a constant anew, in a module that is in use."""
+    """Replace a function's code, or redefine a constant, in a module in use."""
     if not isinstance(statement, ast.FunctionDef):
         _execute(statement, module.__dict__)
         return
@@ -172,7 +172,7 @@ def _execute(statement: ast.stmt, scope: dict[str, Any]) -> None:
 
 
 class Mutation:
-    """Runs the collected tests once for every mutant of `module`, instead of once."""
+    """Pytest plugin that runs the collected tests once for every mutant of `module`."""
 
     def __init__(self, module: str, every: int, workers: int) -> None:
         self._module, self._every, self._workers = module, every, workers
@@ -184,16 +184,16 @@ class Mutation:
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_collection(self) -> None:
-        """Take the same examples as ever; of one that fails the smallest need not be found."""
+        """Use fixed examples; a failing one need not be minimised."""
         phases = (Phase.explicit, Phase.generate)
         settings.register_profile("mutants", settings.default, phases=phases, print_blob=False)
         settings.load_profile("mutants")
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
-        """Fork a process for each."""
+        """Fork a process for each mutant."""
         module = importlib.import_module(self._module.removesuffix(".py").replace("/", "."))
-        # What the processes tell: seconds that a test takes, how many mutants it was the first to kill
+        # Reports of the processes: seconds per test, number of mutants it was the first to kill
         self._seconds, self._kills = np.frombuffer(mmap.mmap(-1, 16 * len(session.items))).reshape(2, -1)
         self._start(session, module, "", [])
         self._await_one()
@@ -214,7 +214,7 @@ class Mutation:
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_makereport(self, call: pytest.CallInfo[None]) -> None:
-        """Stop at the first failure, before anything is reported."""
+        """Stop at the first failure, before a report is made."""
         if call.excinfo is None:
             return
         if call.excinfo.errisinstance(pytest.skip.Exception):
@@ -261,7 +261,7 @@ class Mutation:
 
 
 def _run(module: str, every: int, workers: int) -> dict[str, Any]:
-    """Run the mutants of a module in a process of its own; return what it found."""
+    """Run the mutants of a module in a process of its own; return the results."""
     reading, writing = os.pipe()
     child = os.fork()
     if not child:

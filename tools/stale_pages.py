@@ -1,12 +1,12 @@
-"""Pages of docs/results that are older than the code they describe.
+"""Check for pages of docs/results that are older than the code they describe.
 
     python tools/stale_pages.py [CHECKOUT]
 
 A page names the bench that wrote it and the commit it was measured on. It is older than its code where a
 module that the bench loads (imports, and `-m` names of processes), or a file of config/ that one of them
 names, has changed since. Modules are compared by their syntax trees: docstrings, comments, imports and a move
-to another folder change no figure. The exit code is always 0: measuring again takes hours and is for people
-to decide.
+to another folder change no figure. The exit code is always 0: the decision to measure again, which takes
+hours, is left to people.
 """
 
 import ast
@@ -74,7 +74,7 @@ def _named(path: Path) -> set[str]:
 
 
 def code_of(checkout: Path, bench: str) -> set[Path]:
-    """Return the modules and configuration files that a bench rests on."""
+    """Return the modules and configuration files that a bench depends on."""
     modules = _modules(checkout)
     folders = [f"brakelab.{folder}." for folder in BENCHES]
     todo = [
@@ -110,7 +110,7 @@ def _content_at(checkout: Path, blob: str) -> bytes:
 
 
 def changed_since(checkout: Path, commit: str, files: set[Path]) -> list[str]:
-    """Return those of `files`, as paths in the checkout, whose code is nowhere in `commit`."""
+    """Return those of `files`, as paths in the checkout, whose code is not found in `commit`."""
     tree = _git(checkout, "ls-tree", "-r", commit, "--", *PACKAGES.values(), "config").decode()
     blobs = {path: line.split()[2] for line, _, path in (row.partition("\t") for row in tree.splitlines())}
     changed = {path for path in files if _content_differs(checkout, path, blobs)}

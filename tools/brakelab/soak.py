@@ -43,7 +43,7 @@ from ecu.settings.resources import resource
 from ecu.warm import warm_up
 
 HOUR: Final = 360_000  # cycles
-RESTART: Final = 6 * HOUR + 7  # no multiple of 15: its E2E counters begin elsewhere
+RESTART: Final = 6 * HOUR + 7  # no multiple of 15: its E2E counters start at another value
 TURN: Final = 200  # cycles between two turns of the recorder; it reads 256 at once
 SETTLED: Final = 25  # cycles: frames of 20 ms are accepted again after 0.15 s
 WRAP: Final = 1 << 32
@@ -82,7 +82,7 @@ class Rig:
         self._row = np.empty(N_TRUTH)
 
     def source(self) -> TimeSource:
-        """Return the clocks that only sleeping moves."""
+        """Return the clocks, advanced by sleeping alone."""
         return TimeSource(lambda: self.now_ns, lambda: self.now_ns + START_NS, self._sleep)
 
     def _sleep(self, until_ns: int) -> None:
@@ -90,7 +90,7 @@ class Rig:
         self.oversleeps = False
 
     def drain(self, frames: RecordArray, start: int) -> int:
-        """Let the car live until now and hand over what it sent."""
+        """Advance the car to the present and return its frames."""
         count = 0
         while self.periods * CYCLE_NS < self.now_ns:
             self.periods += 1
@@ -104,7 +104,7 @@ class Rig:
         return count
 
     def send(self, frames: RecordArray, count: int) -> int:
-        """Bring frames to the car."""
+        """Pass frames to the car."""
         arrived = self.node.side.frames_in[self.heard : self.heard + count]
         arrived[:] = frames[:count]
         arrived["stamp_ns"] = self.now_ns + START_NS
@@ -112,11 +112,11 @@ class Rig:
         return count
 
     def rejected(self) -> int:
-        """Return how many frames of the ECU the car did not accept so far."""
+        """Return the number of ECU frames rejected by the car so far."""
         return int(self.node.side.reception.totals["rejected"][0])
 
     def status(self) -> BusStatus:
-        """Nothing is ever wrong with this bus."""
+        """Return an error-free status."""
         return FINE
 
     def close(self) -> None:
@@ -140,7 +140,7 @@ class Life(NamedTuple):
 
 
 def run_one(rig: Rig, folder: Path, first: int, cycles: int, memory: list[float]) -> Life:
-    """Run one ECU with what is stored in `folder`, from the cycle number `first` on."""
+    """Run one ECU with the values stored in `folder`, from cycle number `first` on."""
     config = load_config(resource("config/suv.toml"))
     params = new_params(config)
     params["transmit"] = True
@@ -248,7 +248,7 @@ def _family(pid: int) -> list[int]:
 
 
 class Looks:
-    """Memory of a daemon's processes, looked at as its cycles pass."""
+    """Memory of a daemon's processes, sampled as its cycles pass."""
 
     def __init__(self) -> None:
         self.samples: dict[int, list[float]] = {}
@@ -315,7 +315,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1, help="of the drawn car and its noise")
     parser.add_argument("--out", type=Path, help="folder for recording and store, kept")
     wanted = parser.parse_args(arguments)
-    if wanted.kind == "virtual":  # hours of events, none of them to look at
+    if wanted.kind == "virtual":  # hours of events, none of interest
         structlog.configure(wrapper_class=structlog.make_filtering_bound_logger(50))
     soak = soak_virtual if wanted.kind == "virtual" else soak_live
     with tempfile.TemporaryDirectory() as scratch:

@@ -1,4 +1,4 @@
-"""The simulated vehicle as a process of its own on a real bus, in real time.
+"""Simulated vehicle as a process of its own on a real bus, in real time.
 
 `python -m brakelab.vehicle_node SCENARIO -i INTERFACE -c CHANNEL` sends the vehicle's frames every 10 ms on
 absolute deadlines, takes the ECU's demands, and leaves when the scenario has ended or on SIGTERM. It prints
@@ -118,9 +118,9 @@ def live_through(
     cycle: int,
     row: NDArray[np.float64],
 ) -> int:
-    """Take demands, live through `periods` cycles, measure.
+    """Decode the demands, advance by `periods` cycles, measure.
 
-    Returns how many frames of `side.to_ecu.arrived` to send, -1 at the end.
+    Returns the number of frames of `side.to_ecu.arrived` to send, -1 at the end.
     """
     vehicle = side.vehicle
     t = 1e-9 * (cycle * CYCLE_NS)
@@ -148,8 +148,8 @@ def drive_in_real_time(
 ) -> Truth:
     """Drive the node's scenario on `channel` to its end, or until `stopped`.
 
-    `set_off` is told T_0 on the monotonic clock.
-    Periods that were missed are lived through by the car, but not sent.
+    `set_off` is called with T_0 on the monotonic clock.
+    In missed periods the car advances without sending.
     """
     side = node.side
     grid = Grid(source)
@@ -175,13 +175,13 @@ def drive_in_real_time(
 
 
 def wait_for_ecu(node: Node, channel: Channel, stopped: Callable[[], bool]) -> None:
-    """Return when the first frame of the ECU is heard, or when `stopped`."""
+    """Wait until the first frame of the ECU is heard, or until `stopped`."""
     while not stopped() and not channel.drain(node.side.frames_in, 0):
         time.sleep(0.001)
 
 
 def stay_with_ecu(node: Node, channel: Channel, source: TimeSource, stopped: Callable[[], bool]) -> None:
-    """Keep sending what the car's sensors said last until the ECU falls silent, or until `stopped`."""
+    """Keep sending the last sensor readings until the ECU falls silent, or until `stopped`."""
     side, grid = node.side, Grid(source)
     cycle = silent = 0
     while silent < SILENCE_CYCLES and not stopped():
@@ -207,7 +207,7 @@ def write_truth_file(path: Path, truth: Truth, scenario: str, seed: int) -> None
 
 
 def warm_up(scenario: Scenario) -> None:
-    """Compile, or load from the cache, what a cycle needs."""
+    """Compile, or load from the cache, the kernels of a cycle."""
     node = new_node(scenario, 0)
     live_through(plans(), node.side, node.noise, CYCLE_NS, 0, 1, 0, np.empty(N_TRUTH))
 
@@ -235,7 +235,7 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run the process; returns its exit code."""
+    """Run the process; return its exit code."""
     arguments = _arguments(argv)
     stop: list[int] = []
 
