@@ -1,4 +1,4 @@
-"""A long run of the ECU beside the simulated car, and what must not change in it.
+"""A long run of the ECU beside the simulated car, with checks of its invariants.
 
     python -m brakelab.soak virtual --hours 24        the loop on a clock of its own, as fast as it goes
     python -m brakelab.soak live --hours 1            `brake-ecu run` with recording and store, in real time

@@ -12,7 +12,7 @@ functions do (ECE R13-H, Annex 5: the rear uses no more grip than the front):
   `rear_slip_margin`, the torque of the rear axle is reduced until it no longer does. This needs no friction
   estimate. Beside a front wheel whose brake has failed it may slip `LONE_SLIP`.
 - `cap_trailing`: compensation raises the rear's pressure relative to the front's only as far as the estimate
-is certain, with the rear at mu + 2 sigma and the front at mu - 2 sigma.
+  is certain, with the rear at mu + 2 sigma and the front at mu - 2 sigma.
 
 In reverse the front axle trails and is unloaded: z is negative in the ideal share, and both functions apply
 to the front axle.
@@ -44,7 +44,7 @@ IDEAL, FIXED, ELECTRONIC = range(len(DISTRIBUTIONS))
 LEAST_TRAILING = 0.3  # share that the trailing axle always keeps
 TAKE_BACK = 600.0  # 1/s per slip: 1 % excess reduces the torque at 6 1/s
 GIVE_BACK = 0.3  # 1/s
-SMOOTHING = 0.2  # per 50 ms sample; leaves a fifth of the wheel speeds' noise
+SMOOTHING = 0.2  # per sample: 50 ms; leaves a fifth of the wheel speeds' noise
 LEARNING_TIME = 2.0  # s
 RADIUS_DOUBT = 0.008  # before learning: radii within 0.3 % and other differences, two standard deviations
 FREE_ACCEL, FREE_YAW_RATE = 0.5, 0.03  # m/s^2, rad/s

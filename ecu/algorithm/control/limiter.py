@@ -3,8 +3,9 @@
 For each corner, given the demand of the uncompensated law and the compensated one:
 
 1. not finite, or moving against the uncompensated demand: the uncompensated demand counts until the
-compensated one recovers; 2. T(p, nominal friction) stays within 0.6–1.6 of the torque demanded; 3. left and
-right differ by no more than `LEFT_RIGHT_SHARE` of the torque demanded, T(p, nominal friction)
+   compensated one recovers;
+2. T(p, nominal friction) stays within 0.6–1.6 of the torque demanded;
+3. left and right differ by no more than `LEFT_RIGHT_SHARE` of the torque demanded, T(p, nominal friction)
    over it: learned friction, compensation and fallbacks of one side together. Torque taken from one side is
    added to the other, so that the axle torque is unchanged;
 4. 0–180 bar, and no more than the accumulator holds or the slip guard lets through;
@@ -164,10 +165,13 @@ def limit_axle(
     """Overwrite `state.pressure` of an axle, the pressures to send [Pa]; all arguments may be NaN.
 
     Args:
-        params: `PARAMS`. state: `LIMITER_STATE`, overwritten except `ceiling`; an invalid ceiling counts as
-        `max_pressure`. left: the axle's left corner, 0 or 2. wanted: compensated pressures [Pa], shape (4,).
-        uncompensated: pressures by the base friction [Pa], shape (4,). torque: friction torques demanded of
-        the corners [N m], shape (4,). dt: time since the last cycle [s].
+        params: `PARAMS`.
+        state: `LIMITER_STATE`, overwritten except `ceiling`; an invalid ceiling counts as `max_pressure`.
+        left: the axle's left corner, 0 or 2.
+        wanted: compensated pressures [Pa], shape (4,).
+        uncompensated: pressures by the base friction [Pa], shape (4,).
+        torque: friction torques demanded of the corners [N m], shape (4,).
+        dt: time since the last cycle [s].
     """
     for i in (left, left + 1):
         _bound(params, state, i, wanted[i], uncompensated[i], torque[i])

@@ -16,7 +16,7 @@ from ecu.contract.faults import (
 from ecu.contract.signals import ACCEL_X, CALLIPER_PRESSURE, WHEEL_SPEED
 from ecu.jit import Record, kernel
 
-LEFT_OUT_S = 0.03  # that a pressure is not what was demanded
+LEFT_OUT_S = 0.03  # duration of a pressure's deviation from its demand
 
 
 @kernel

@@ -39,8 +39,8 @@ def _noted_steps(params: Any, state: Any, inputs: Any, outputs: Any, table: Any)
 
 
 def filter_table(cycles: int) -> tuple[RecordArray, RecordArray, RecordArray, RecordArray]:
-    """Return parameters, the state at the beginning of `cycles` of braking, their inputs, and what the four
-    filters are given in them (`FILTER_INPUT`, shape (cycles, 4))."""
+    """Return parameters, the state at the beginning of `cycles` of braking, its inputs, and the inputs
+    of the four filters in it (`FILTER_INPUT`, shape (cycles, 4))."""
     stop = simulated_stop()
     outputs = new_record(OUTPUTS)
     state = new_state(stop.params)

@@ -1,12 +1,14 @@
 """Cost of a fleet: time beyond its replays, time for 30,000 km, memory for a long log.
 
-``` python -m brakelab.fleet.measure scaling MANIFEST [--rounds 3] [--drives 100] python -m
-brakelab.fleet.measure distance [--kilometres 30000] [--minutes 5] [--workers 2] python -m
-brakelab.fleet.measure length [--gigabytes 10] ``` `scaling` replays the same drives without Dask, by one
-worker and by two, in turn. `distance` simulates drives of ten minutes, replays and forgets them one by one,
-and keeps their brake applications until its end; distance not reached in time, or before Ctrl-C, is
-extrapolated. `length` replays one log that long: a drive of ten minutes again and again, with a jump of speed
-and counters at each seam.
+```
+python -m brakelab.fleet.measure scaling MANIFEST [--rounds 3] [--drives 100]
+python -m brakelab.fleet.measure distance [--kilometres 30000] [--minutes 5] [--workers 2]
+python -m brakelab.fleet.measure length [--gigabytes 10]
+```
+`scaling` replays the same drives without Dask, by one worker and by two, in turn. `distance` simulates drives
+of ten minutes, replays and discards them one by one, and keeps their brake applications until its end;
+distance not reached in time, or before Ctrl-C, is extrapolated. `length` replays one log that long: a drive
+of ten minutes again and again, with a jump of speed and counters at each seam.
 """
 
 import argparse

@@ -9,7 +9,7 @@ The number of particles of one brake grows by
     tau_c = tau + f P                             the contact is hotter than the disc
 
 with the friction power P = T_b |omega| (i) and the sliding speed v = r_eff |omega| (ii); pressure acts
-through P alone (iii). Counted is what lies between 23 nm and 2.5 um: e_c of the coarse and e_u of the
+through P alone (iii). The count covers 23 nm to 2.5 um: e_c of the coarse and e_u of the
 ultrafine particles, both log-normal in diameter. Beside it the number scatters from application to
 application and from day to day, log-normally; `dust_trips.py` draws that.
 

@@ -2,20 +2,24 @@
 
 ```
 [[fault]]
-kind = "lost"                # what, see `KINDS`
+kind = "lost"                # see `KINDS`
 t = 4.0                      # s since the car set off
 duration = 1.0               # s; without it to the end of the drive
 message = ["Imu"]            # of the database, either way; without it all frames of the vehicle
 share = 0.5                  # of these frames
-``` | kind keys beside t and duration effect | | --- | --- | --- | | lost, doubled, corrupted | message, share
-| frames are lost, arrive twice, arrive with one bit flipped | | late | message, share, delay [s] | frames
-arrive `delay` later | | stuck | signal | a signal on the bus keeps its value, its frames continue | | invalid
-| signal | a signal is sent as not available | | biased, noisy | signal, amount | `amount` is added; white
-noise of that standard deviation is added | | bus_off | | the ECU's controller is off the bus: neither side
-receives the other | | daemon_killed | standby | SIGKILL at `t`, restart after `duration`; `standby`: a second
-daemon runs as standby | | motor_lost | corner | motors give no torque and report no regenerative torque
-available | | calliper_dead | corner | callipers get no pressure: one, or those of a circuit | |
-accumulator_low | amount [bar] | the hydraulics reach this pressure at most and report "not ready" |
+```
+| kind | keys beside t and duration | effect |
+| --- | --- | --- |
+| lost, doubled, corrupted | message, share | frames are lost, arrive twice, arrive with one bit flipped |
+| late | message, share, delay [s] | frames arrive `delay` later |
+| stuck | signal | a signal on the bus keeps its value, its frames continue |
+| invalid | signal | a signal is sent as not available |
+| biased, noisy | signal, amount | `amount` is added; white noise of that standard deviation is added |
+| bus_off | | the ECU's controller is off the bus: neither side receives the other |
+| daemon_killed | standby | SIGKILL at `t`, restart after `duration`; `standby`: a second daemon stands by |
+| motor_lost | corner | motors give no torque and report none available |
+| calliper_dead | corner | callipers get no pressure: one, or those of a circuit |
+| accumulator_low | amount [bar] | the hydraulics reach this pressure at most and report "not ready" |
 
 Frames are disturbed in transit, after end-to-end protection; a signal is disturbed before it, so that its
 frame is intact.
