@@ -1,4 +1,4 @@
-"""A bus as the cycle sees it: drain what waits, send without blocking, say how the line is."""
+"""Bus interface of the cycle: drain received frames, send without blocking, report the line's status."""
 
 from typing import NamedTuple, Protocol
 
@@ -22,13 +22,13 @@ class Channel(Protocol):
     name: str
 
     def drain(self, frames: RecordArray, start: int) -> int:
-        """Write every frame that waits, from `frames[start]` on; return how many, at most what fits."""
+        """Write all waiting frames, from `frames[start]` on; return their number, at most the free places."""
 
     def send(self, frames: RecordArray, count: int) -> int:
         """Hand over the first `count` frames without blocking; return how many were taken."""
 
     def status(self) -> BusStatus:
-        """Return how the line is now."""
+        """Return the present status of the line."""
 
     def close(self) -> None:
         """Leave the bus."""

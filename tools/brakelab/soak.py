@@ -5,7 +5,7 @@
 
 `virtual` runs `cycle_once` with ring, recorder and state store in one process: the loop closed over
 real frames. Cycle numbers and counters of frames begin half a run below 2^32; every hour the clock
-oversleeps a period; every six hours the ECU ends and another one begins with what was stored.
+oversleeps a period; every six hours the ECU ends and another one starts with the stored values.
 `live` is daemon and car on a bus. Prints a table of checks; exit code 1 if one fails.
 """
 
