@@ -63,7 +63,7 @@ class OnBoard(NamedTuple):
     error: float
     """Particles of both front brakes by the ECU over those emitted, minus 1."""
     told_error: float
-    """The same of the applications of which it is told."""
+    """The same of the reported applications."""
     told: float
     """Share of the work."""
     particles_per_km: float

@@ -302,7 +302,7 @@ EVENTS: Final = {
     "tyre stiffness × 0.67": Case(shipped("tyre-stiffness")),
     "low-grip patch": Case(shipped("low-grip"), change=_unguarded),
 }
-"""Drives of which times are told."""
+"""Drives whose times are reported."""
 LONGEST: Final = {"tyre stiffness × 0.67": 0.10, "low-grip patch": 0.30}
 """How long their events may be felt [s]: as in the thesis, read off Figures 4.11 and 5.5."""
 CASES: Final = ACCURACY | ROBUSTNESS | SENSORS | EVENTS

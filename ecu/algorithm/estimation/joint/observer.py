@@ -91,7 +91,7 @@ TWIN = 3.0  # bar, of a pressure taken from the other side
 
 @kernel
 def start_joint(state: Record) -> None:
-    """Initialise the observer: its states but the speed stand in the state already."""
+    """Start from the present states, except the speed."""
     state.started = 0
     open_window(state)
     save_snapshot(state, 0)
