@@ -65,7 +65,7 @@ def describe(error: ValidationError, where: str, model: type[BaseModel]) -> User
 def summarised(found: list[UserError]) -> UserError:
     """Return the first of several findings with the number of the others."""
     first, more = found[0], len(found) - 1
-    return UserError(first.where, first.place, first.remedy + (f" ({more} more findings)" if more else ""))
+    return UserError(first.where, first.place, first.remedy + (f" ({more} more)" if more else ""))
 
 
 def findings(

@@ -71,7 +71,10 @@ def test_a_road_may_be_described_by_place(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (GOOD.replace("initial_speed", "initial_spede"), "initial_speed: missing"),
+        (
+            GOOD.replace("initial_speed", "initial_spede"),
+            "initial_spede: unknown key; did you mean initial_speed?",
+        ),
         (GOOD + "colour = 3\n", "phase.0.colour: unknown key"),
         (GOOD.replace('"brake"', '"skid"'), "phase.0.kind"),
         (GOOD.replace("until_speed = 0.0", ""), "never ends; give until_speed or seconds"),

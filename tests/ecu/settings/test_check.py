@@ -53,7 +53,7 @@ def test_other_commands_tell_the_first_and_how_many_more(
 ) -> None:
     path = changed(tmp_path, mass="mas = 1620.0 ")
     assert cli.main(["simulate", "stop-1", "--config", str(path), "--out", str(tmp_path / "x")]) == 2
-    assert "vehicle.mas: unknown key; did you mean mass? (1 more findings)" in capsys.readouterr().err
+    assert "vehicle.mas: unknown key; did you mean mass? (1 more)" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("path", CARS, ids=lambda path: path.stem)

@@ -163,7 +163,7 @@ WRONG = [
     ("axle behind the car", change("vehicle.front_axle", "3.0"), ["vehicle.front_axle"]),
     ("a slow limiter", change("control.max_pressure_rate", "1000.0"), ["control.max_pressure_rate"]),
     ("a ceiling beyond 180 bar", change("control.max_pressure", "200.0"), ["control.max_pressure"]),
-    ("no section", lambda: SUV.replace("[rear]", "[back]"), ["back: unknown key", "more findings"]),
+    ("no section", lambda: SUV.replace("[rear]", "[back]"), ["back: unknown key", "1 more)"]),
     ("a section that is a number", lambda: "vehicle = 3\n" + SUV.split("[vehicle]")[0], ["vehicle"]),
     ("not TOML", lambda: SUV + "\n[[[", ["TOML"]),
     ("YAML", lambda: "name: suv\nvehicle:\n  mass: 2105\n", ["TOML", "line 1"]),

@@ -30,7 +30,7 @@ from ecu.algorithm.estimation.joint.wheel import brake_torque, friction, radius
 from ecu.contract.params import GRAVITY
 from ecu.jit import Record, kernel
 
-SLIDING_FORCE = 0.3  # relative error of the brake force taken for that of a wheel that seems too fast
+SLIDING_FORCE = 0.3  # relative error of the brake force taken for the force of a wheel that seems too fast
 BALANCE_FLOOR = 0.01  # m/s^2, unmodelled in the balance
 BALANCE_SHARE = 0.004  # of the deceleration
 ACROSS = 0.4  # of the lateral acceleration: stands for a smaller error that lasts a second
