@@ -7,10 +7,10 @@ import cantools
 import numpy as np
 import pytest
 
+from brakelab.log_physics.line import fit
 from brakelab.logs.formats import read_frames
 from brakelab.logs.log_quality import LogQuality
 from brakelab.mapping.command import timeout
-from brakelab.mapping.line import fit
 from brakelab.mapping.names import corner_of, words
 from brakelab.mapping.physics import Found, motion_of, propose, wheel_speeds
 from brakelab.mapping.series import Series, read_series

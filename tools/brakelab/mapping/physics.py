@@ -20,7 +20,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.mapping.line import RATE, Fit, Vector, fit, smooth
+from brakelab.log_physics.line import RATE, Fit, Vector, fit, smooth
 from brakelab.mapping.names import converts, corner_of, names_itself, score
 from brakelab.mapping.series import Series
 from ecu.bus.units import CONVERSIONS, spelled

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from brakelab.mapping.line import Fit, Vector, fit, smooth
+from brakelab.log_physics.line import Fit, Vector, fit, smooth
 from brakelab.mapping.names import converts, words
 from brakelab.mapping.physics import BRAKING, Found, Motion, on_grid
 from brakelab.mapping.series import Series

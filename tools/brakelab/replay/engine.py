@@ -12,6 +12,7 @@ from typing import Any, Final, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.log_physics.samples import SAMPLED
 from brakelab.logs.signal_file import SampleBlock
 from brakelab.replay.seen import look_at, new_seen
 from brakelab.results.row import MEASURED_INPUTS, N_ROW
@@ -20,30 +21,15 @@ from ecu.bus.freshness import accept, begin_cycle, end_cycle
 from ecu.bus.receive import ReceivePlan, Reception, receive
 from ecu.contract.records import CYCLE, FRAME, INPUTS, OUTPUTS, RecordArray, new_record, output_vector
 from ecu.contract.signals import (
-    ACCEL_X,
-    ACCEL_Y,
-    CALLIPER_PRESSURE,
     CYCLE_NS,
-    MOTOR_TORQUE,
     N_OUTPUTS,
-    STEERING_ANGLE,
     USABLE,
-    VEHICLE_SPEED,
-    WHEEL_SPEED,
-    YAW_RATE,
 )
 from ecu.jit import Record, kernel
 
 Vector = NDArray[np.float64]
 Block = TypeVar("Block")
 
-SAMPLED: Final = (
-    *range(WHEEL_SPEED, WHEEL_SPEED + 4),
-    *(ACCEL_X, ACCEL_Y, YAW_RATE, STEERING_ANGLE, VEHICLE_SPEED),
-    *range(CALLIPER_PRESSURE, CALLIPER_PRESSURE + 4),
-    *range(MOTOR_TORQUE, MOTOR_TORQUE + 4),
-)
-"""Inputs whose samples are kept beside the rows, to be judged by the physics of the drive."""
 BLOCK_CYCLES: Final = 16384
 
 _EVERYTHING: Final = 1 << 62

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
+from brakelab.log_physics.judge import judge
+from brakelab.log_physics.samples import Collector, car_of
 from brakelab.logs.formats import Advance, kind_of, read_frames
 from brakelab.logs.log_quality import LogQuality
 from brakelab.logs.signal_file import SampleBlock, freshness_at_any_rate, read_signals
-from brakelab.mapping.drive_samples import Collector, car_of
-from brakelab.mapping.log_physics import judge
 from brakelab.replay.engine import Ecu, Rows, run_frames, run_samples
 from brakelab.replay.quality import Findings, identifier, note_faults
 from brakelab.replay.seen import set_raw_ends

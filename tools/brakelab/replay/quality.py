@@ -8,9 +8,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.log_physics.judge import Judged
 from brakelab.logs.log_quality import Damage, LogQuality
 from brakelab.logs.signal_file import SignalQuality
-from brakelab.mapping.log_physics import Judged
 from ecu.bus.freshness import RATE_TOLERANCE
 from ecu.bus.receive import ReceivePlan, Reception
 from ecu.contract.faults import FAULTS

@@ -16,10 +16,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from brakelab.mapping.drive_samples import Car, Drive, Rows
-from brakelab.mapping.line import RATE, Fit, Vector, fit
-from brakelab.mapping.pressure_physics import pressure_lines
-from brakelab.replay.engine import SAMPLED
+from brakelab.log_physics.line import RATE, Fit, Vector, fit
+from brakelab.log_physics.pressures import pressure_lines
+from brakelab.log_physics.samples import SAMPLED, Car, Drive, Rows
 from ecu.bus.units import CONVERSIONS
 from ecu.contract.params import GRAVITY
 from ecu.contract.records import RecordArray

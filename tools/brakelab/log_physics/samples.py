@@ -8,11 +8,28 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.mapping.line import RATE, Vector, smooth
-from brakelab.replay.engine import SAMPLED
+from brakelab.log_physics.line import RATE, Vector, smooth
 from ecu.contract.params import BAR
-from ecu.contract.signals import CORNERS, INPUT_SIGNALS
+from ecu.contract.signals import (
+    ACCEL_X,
+    ACCEL_Y,
+    CALLIPER_PRESSURE,
+    CORNERS,
+    INPUT_SIGNALS,
+    MOTOR_TORQUE,
+    STEERING_ANGLE,
+    VEHICLE_SPEED,
+    WHEEL_SPEED,
+    YAW_RATE,
+)
 
+SAMPLED: Final = (
+    *range(WHEEL_SPEED, WHEEL_SPEED + 4),
+    *(ACCEL_X, ACCEL_Y, YAW_RATE, STEERING_ANGLE, VEHICLE_SPEED),
+    *range(CALLIPER_PRESSURE, CALLIPER_PRESSURE + 4),
+    *range(MOTOR_TORQUE, MOTOR_TORQUE + 4),
+)
+"""Inputs whose samples are kept beside the rows, to be judged by the physics of the drive."""
 CYCLES: Final = 2  # of 10 ms in a row of the grid
 MOST_ROWS: Final = int(3600 * RATE)
 BRIDGED: Final = int(0.5 * RATE)  # rows without a sample that a straight line may fill

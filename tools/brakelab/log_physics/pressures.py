@@ -10,8 +10,8 @@ from typing import Final
 
 import numpy as np
 
-from brakelab.mapping.drive_samples import Car, Drive, Rows
-from brakelab.mapping.line import RATE, Vector, fit
+from brakelab.log_physics.line import RATE, Vector, fit
+from brakelab.log_physics.samples import Car, Drive, Rows
 from ecu.bus.units import CONVERSIONS
 
 BRAKING: Final = 0.7  # m/s^2
