@@ -228,7 +228,7 @@ def test_thousands_of_cycles_leave_no_memory_behind(bench):
     try:
         bench.run(2000)
         numba_before, blocks = rtsys.get_allocation_stats(), [sys.getallocatedblocks()]
-        for _ in range(3):
+        for _ in range(10):
             bench.run(5000)
             blocks.append(sys.getallocatedblocks())
         numba_after = rtsys.get_allocation_stats()
@@ -238,5 +238,5 @@ def test_thousands_of_cycles_leave_no_memory_behind(bench):
             _nrt_python.memsys_disable_stats()
     assert numba_after.alloc - numba_after.free == numba_before.alloc - numba_before.free
     assert numba_after.mi_alloc - numba_after.mi_free == numba_before.mi_alloc - numba_before.mi_free
-    # The interpreter takes some blocks once in a while; what cycles kept would show in each stretch.
+    # Interpreter and threads of parallel tests take some blocks now and then; a leak shows in each stretch.
     assert np.diff(blocks).min() <= 4
