@@ -96,8 +96,8 @@ def test_a_controller_that_goes_off_is_told_and_obeyed_again_after_its_restart(t
     off = faults["bus_off"]
     print({name: off[name] for name in ("bits", "fallback", "recovered")})
     assert "bus off" in off["bits"]
-    # 500 ms off, of which 30 ms count as heard; obeyed again within the second. `recovered` counts any fault bit:
-    # "send failed" is shown for a second, and a machine that holds up a cycle afterwards prolongs it by "late".
+    # 500 ms off, of which 30 ms count as heard; obeyed again within the second. `recovered` counts any bit:
+    # "send failed" is shown for a second, and a machine that holds up a cycle afterwards adds "late".
     assert 400.0 <= off["fallback"] < 1500.0
     assert drive["differing"] == 0
     assert "state of the ECU's CAN controller" in (tmp_path / "out" / "rig.html").read_text("utf-8")
