@@ -25,8 +25,8 @@ from ecu.algorithm.control.blending import (
 )
 from ecu.algorithm.control.demand import DEMAND_STATE, hold_pedal, update_demand
 from ecu.algorithm.control.distribution import DISTRIBUTION_STATE, cap_trailing, distribute, watch_trailing
-from ecu.algorithm.control.failed_brakes import FAILED_BRAKES_STATE, note_sent, replace_failed
-from ecu.algorithm.control.friction_torque import FRICTION_TORQUE_STATE, follow_pressure, lagging_torque
+from ecu.algorithm.control.failed_brakes import FAILED_BRAKES_STATE, replace_failed
+from ecu.algorithm.control.friction_torque import lagging_torque
 from ecu.algorithm.control.limiter import LIMITER_STATE, available_pressure, limit_axle, reads_empty
 from ecu.algorithm.control.mode import MODE_STATE, decide_mode, input_faults, speaks
 from ecu.algorithm.control.pressure_law import (
@@ -56,6 +56,7 @@ from ecu.algorithm.estimation.thesis.observer2 import OBSERVER_STATE
 from ecu.algorithm.estimation.thesis.slip import RADIUS_START, WHEELS_STATE
 from ecu.algorithm.estimation.thesis.speed import SPEED_STATE
 from ecu.algorithm.estimation.wheel_load import WHEEL_LOAD_STATE
+from ecu.algorithm.hydraulics import HYDRAULICS_STATE, advance_pressures, correct_pressures
 from ecu.algorithm.monitoring.acceleration import ACCELERATION_STATE
 from ecu.algorithm.monitoring.application import APPLICATION_STATE, update_application
 from ecu.algorithm.monitoring.disc_temperature import (
@@ -86,6 +87,7 @@ from ecu.jit import Record, kernel
 
 INITIAL = np.dtype(
     [
+        ("hydraulics", HYDRAULICS_STATE),
         ("motion", MOTION_STATE),
         ("wheel_load", WHEEL_LOAD_STATE),
         ("speed", SPEED_STATE),
@@ -101,7 +103,6 @@ INITIAL = np.dtype(
         ("demand", DEMAND_STATE),
         ("distribution", DISTRIBUTION_STATE),
         ("failed_brakes", FAILED_BRAKES_STATE),
-        ("friction_torque", FRICTION_TORQUE_STATE),
         ("blending", BLENDING_STATE),
         ("control", PRESSURE_LAW_STATE),
         ("guard", SLIP_GUARD_STATE),
@@ -233,8 +234,8 @@ def _estimate(p: Record, s: Record, u: Record, contradicted: bool, dt: float) ->
             s.joint.heat[i] = heat_widening(s.discs, i)
     if s.application.braking == 0:
         set_base(p, s.control, s.learned)
-    note_sent(s.failed_brakes, s.limiter.pressure)
-    observe(p, s, u, s.failed_brakes.sent, s.joint.heat, s.guard.acting != 0, contradicted, dt)
+    correct_pressures(p, s.hydraulics, u, s.limiter.pressure, s.joint.zero.value, s.failed_brakes.failed, dt)
+    observe(p, s, u, s.joint.heat, s.guard.acting != 0, contradicted, dt)
 
 
 @kernel
@@ -247,7 +248,7 @@ def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
     watch_trailing(p, s.distribution, u, e, failed, decel, speed, dt)
     distribute(p, s.distribution, e.mass, decel, backwards)
     follow_friction(p, s.control, e, dt)
-    follow_pressure(p, s.friction_torque, u, s.limiter.pressure, e.pressure_zero, dt)
+    advance_pressures(s.hydraulics, s.limiter.pressure)
     update_motors(p, s.blending, u, s.guard.capped, e.speed, decel, dt)
     replace_failed(p, s.failed_brakes, s.distribution, s.blending.allowed, decel, backwards, dt)
     share_torque(p, s.blending, s.distribution.torque, dt)
@@ -277,7 +278,7 @@ def _limit(p: Record, s: Record, y: Record, available: float, decel: float, dt: 
         s.control.cut[i] = 1 if pressure < asked - 1.0 else 0
         y.pressure_demand[i], y.pressure_uncompensated[i] = pressure / BAR, y.pressure_uncompensated[i] / BAR
         motor = motor_torque_demand(
-            p, s.blending, lagging_torque(p, s.friction_torque, s.control, asked, i), i
+            p, s.blending, lagging_torque(p, s.hydraulics.value, s.control, asked, i), i
         )
         y.motor_demand[i] = motor if blends(p) else math.nan
     watch_limit(p, s.control, s.estimate.mu, s.guard.capped, decel > 0.0, dt)

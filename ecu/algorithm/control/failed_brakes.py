@@ -37,7 +37,6 @@ FAILED_BRAKES_STATE = np.dtype(
         ("scale", "f8"),  # delivered over owed force while all pressures follow, in this application
         ("settled_s", "f8"),  # time for which the forces could be judged in this application
         ("doubt_s", "f8", (4,)),  # time for which the verdict has been contradicted
-        ("sent", "f8", (4,)),  # pressures demanded of the working brakes [Pa]
         ("moved", "f8"),  # of the torque of the failed brakes, 0 to 1
         ("grip", "f8"),  # force over load that the other wheels may be demanded
         ("force", "f8", (4,)),  # force demanded of each wheel [N]
@@ -133,13 +132,6 @@ def watch_brakes(
 def _lacks(inputs: Record, expected: float, zero: float, i: int) -> bool:
     reading = inputs.value[CALLIPER_PRESSURE + i] - zero
     return expected > LEAST and usable(inputs, CALLIPER_PRESSURE + i) and reading < FOLLOWING * expected
-
-
-@kernel
-def note_sent(state: Record, pressure: Record) -> None:
-    """Overwrite `state.sent`: the pressures demanded last [Pa], shape (4,), of the working brakes."""
-    for i in range(4):
-        state.sent[i] = 0.0 if state.failed[i] else pressure[i]
 
 
 @kernel

@@ -3,6 +3,7 @@
 import math
 
 from ecu.algorithm.brake import brake_gain
+from ecu.contract.params import BAR
 from ecu.contract.signals import CALLIPER_PRESSURE, FAULT, HOLDING, NOMINAL, WHEEL_SPEED
 from ecu.jit import Record, kernel
 
@@ -11,11 +12,22 @@ DRIVEN = 0.2  # of the brakes' torque: above it the drive acts against the brake
 
 
 @kernel
-def update_pressure(params: Record, state: Record, mu: Record, inputs: Record, dt: float) -> None:
-    """Overwrite the low-passed pressure above push-out [Pa], and the brake torque at frictions `mu`."""
+def update_pressure(
+    params: Record, state: Record, mu: Record, zero: Record, inputs: Record, dt: float
+) -> None:
+    """Overwrite the low-passed pressure above push-out [Pa], and the brake torque (A.19).
+
+    Args:
+        params: `PARAMS`.
+        state: `FRICTION_STATE`, overwritten.
+        mu: frictions, shape (4,).
+        zero: pressure zeros [bar], shape (4,).
+        inputs: `INPUTS`.
+        dt: time since the last cycle [s].
+    """
     gain = 1.0 - math.exp(-2.0 * math.pi * CUT_OFF * dt)
     for i in range(4):
-        above = 1e5 * inputs.value[CALLIPER_PRESSURE + i] - params.push_out_pressure[i]
+        above = BAR * (inputs.value[CALLIPER_PRESSURE + i] - zero[i]) - params.push_out_pressure[i]
         if math.isfinite(above):
             state.pressure[i] += gain * (above - state.pressure[i])
         state.torque[i] = brake_gain(params, i) * mu[i] * max(state.pressure[i], 0.0)

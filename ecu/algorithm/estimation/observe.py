@@ -71,7 +71,7 @@ def hand_over_application(p: Record, s: Record) -> None:
 
 @kernel
 def observe(
-    p: Record, s: Record, u: Record, sent: Record, heat: Record, guarded: bool, contradicted: bool, dt: float
+    p: Record, s: Record, u: Record, heat: Record, guarded: bool, contradicted: bool, dt: float
 ) -> None:
     """Overwrite the estimate of the last cycle.
 
@@ -79,7 +79,6 @@ def observe(
         p: `PARAMS`.
         s: `STATE` of `ecu.algorithm.step`.
         u: `INPUTS` with implausible ones masked out.
-        sent: pressures demanded last [Pa] of the working brakes, shape (4,).
         heat: relative standard deviation that each friction has gained by its disc's temperature, shape (4,).
         guarded: the slip guard holds a wheel: the last snapshot is restored.
         contradicted: a sensor or a stream has just become implausible: likewise.
@@ -88,12 +87,12 @@ def observe(
     braking, e = s.application.braking != 0, s.estimate
     update_motion(p, s.motion, u, e.speed, e.brake_torque)
     update_wheel_load(p, s.wheel_load, s.motion.accel_x, s.motion.accel_y, e.speed, dt)
-    update_pressure(p, s.friction, e.mu, u, dt)
+    update_pressure(p, s.friction, e.mu, s.joint.zero.value, u, dt)
     tell_motion(s.motion, e)
     for i in range(4):
         e.load[i], e.brake_torque[i] = s.wheel_load.load[i], s.friction.torque[i]
     if p.observer == JOINT:
-        _observe_jointly(p, s, u, sent, heat, guarded or contradicted, braking, dt)
+        _observe_jointly(p, s, u, heat, guarded or contradicted, braking, dt)
     else:
         s.friction.held = 1 if contradicted else 0
         if _at_rest(p, s, u):
@@ -104,7 +103,7 @@ def observe(
 
 @kernel
 def _observe_jointly(
-    p: Record, s: Record, u: Record, sent: Record, heat: Record, doubted: bool, braking: bool, dt: float
+    p: Record, s: Record, u: Record, heat: Record, doubted: bool, braking: bool, dt: float
 ) -> None:
     joint = s.joint
     if s.application.started:
@@ -112,11 +111,11 @@ def _observe_jointly(
         begin_application(joint, heat)
     if doubted:
         suspend_learning(joint)
-    update_joint(p, joint, u, s.motion, s.wheel_load.load, sent, braking, dt)
+    update_joint(p, joint, u, s.motion, s.wheel_load.load, s.hydraulics, braking, dt)
     if braking and joint.closed:
         add_window(p, s.prediction, joint, u)
     s.prediction.told_s = max(s.prediction.told_s - dt, 0.0)
-    tell_joint(p, joint, s.estimate, s.learned, u, braking, dt)
+    tell_joint(p, joint, s.hydraulics, s.estimate, s.learned, u, braking, dt)
     s.estimate.given_up = 1 if s.prediction.told_s > 0.0 else 0
     joint.unkept_s += dt
     if joint.unkept_s > KEEP_S:

@@ -7,7 +7,7 @@ wheel slower than the car may slide, so it is not judged.
 A wheel speed that falls faster than the brake could cause is a sensor fault: a broken wire reads 0. It is
 masked out until it agrees with the vehicle speed again, or the car is at standstill.
 
-A pressure follows the demands that were sent (`control/friction_torque.py` models how) if the three others
+A pressure follows the demands that were sent (`ecu.algorithm.hydraulics` models how) if the three others
 do. Where more than one does not, another controller brakes, or the demands are not executed: no sensor or
 valve is blamed.
 """

@@ -40,12 +40,12 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
     if s.acceleration.implausible:
         faults |= ACCEL_IMPLAUSIBLE
     begins = s.acceleration.implausible != 0 and not doubted
-    watch_pressures(s.plausibility, u, s.friction_torque.model, estimate.pressure_zero, dt)
+    watch_pressures(s.plausibility, u, s.hydraulics.model, estimate.pressure_zero, dt)
     if s.plausibility.pressure:
         faults |= PRESSURE_NOT_FOLLOWING
     failed = s.failed_brakes.any != 0
     watch_brakes(
-        p, s.failed_brakes, u, estimate, s.control, s.friction_torque.model, estimate.pressure_zero,
+        p, s.failed_brakes, u, estimate, s.control, s.hydraulics.model, estimate.pressure_zero,
         s.plausibility.sent != 0, dt,
     )  # fmt: skip
     fails = s.failed_brakes.any != 0 and not failed

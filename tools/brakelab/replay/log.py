@@ -11,6 +11,7 @@ from brakelab.log_physics.samples import Collector, car_of
 from brakelab.logs.formats import Advance, kind_of, read_frames
 from brakelab.logs.log_quality import LogQuality
 from brakelab.logs.signal_file import SampleBlock, freshness_at_any_rate, read_signals
+from brakelab.replay.earlier_layout import convert_initial
 from brakelab.replay.engine import Ecu, Rows, run_frames, run_samples
 from brakelab.replay.quality import Findings, identifier, note_faults
 from brakelab.replay.seen import set_raw_ends
@@ -53,9 +54,10 @@ def read_cycles(recording: Recording) -> RecordArray:
 
 def start_as_recorded(ecu: Ecu, recording: Recording) -> None:
     """Overwrite the ECU's state with the one before the first recorded cycle; arm it if it was armed."""
-    if recording.initial.dtype != INITIAL:
+    initial = recording.initial if recording.initial.dtype == INITIAL else convert_initial(recording.initial)
+    if initial is None:
         raise _other_version(recording)
-    resume(ecu.state, recording.initial)
+    resume(ecu.state, initial)
     ecu.params[0]["transmit"] = recording.about.get("armed", ecu.params[0]["transmit"])
 
 

@@ -20,7 +20,6 @@ from ecu.algorithm.estimation.joint.layout import (
     V,
 )
 from ecu.algorithm.estimation.joint.observer import WINDOW_S
-from ecu.algorithm.estimation.joint.pressure import follows
 from ecu.algorithm.estimation.joint.wheel import friction
 from ecu.algorithm.inputs import usable
 from ecu.contract.signals import CALLIPER_PRESSURE, OBSERVING, WHEEL_SPEED
@@ -69,6 +68,7 @@ def _sigma_force(params: Record, state: Record) -> float:
 def _tell_friction(
     params: Record,
     state: Record,
+    hydraulics: Record,
     estimate: Record,
     learned: Record,
     inputs: Record,
@@ -82,9 +82,9 @@ def _tell_friction(
     for i in range(4):
         mu = params.mu_nominal[i] * math.exp(friction_now(state, i))
         sigma = sigma_friction(params, state, i, True)
-        if state.observed[i] and follows(state.pressures, i):
+        if state.observed[i] and state.follows[i]:
             above = max(state.smooth_pressure[i], 1.0)
-            sigma = math.sqrt(sigma * sigma + state.pressures.variance[i] / (above * above))
+            sigma = math.sqrt(sigma * sigma + hydraulics.variance[i] / (above * above))
         estimate.mu[i], estimate.sigma[i] = mu, mu * sigma
         good = usable(inputs, WHEEL_SPEED + i) and usable(inputs, CALLIPER_PRESSURE + i)
         if braking and state.observed[i] and good:
@@ -104,6 +104,7 @@ def _test_ratio(state: Record, place: int) -> float:
 def tell_joint(
     params: Record,
     state: Record,
+    hydraulics: Record,
     estimate: Record,
     learned: Record,
     inputs: Record,
@@ -115,6 +116,7 @@ def tell_joint(
     Args:
         params: `PARAMS`.
         state: `JOINT_STATE`, after `update_joint`.
+        hydraulics: `HYDRAULICS_STATE` of this cycle.
         estimate: `ESTIMATE`, already holding inertial signals and pressures.
         learned: `LEARNED`.
         inputs: `INPUTS`.
@@ -126,7 +128,7 @@ def tell_joint(
     estimate.speed, estimate.k_f = x[V], math.exp(x[STIFFNESS])
     estimate.mass = params.mass * math.exp(x[MASS])
     estimate.accel_bias, estimate.overrun = x[BIAS], x[OVERRUN]
-    _tell_friction(params, state, estimate, learned, inputs, braking, dt)
+    _tell_friction(params, state, hydraulics, estimate, learned, inputs, braking, dt)
     estimate.test_ratio_balance = _test_ratio(state, BALANCE_RATIO)
     estimate.test_ratio_speed = _test_ratio(state, REFERENCE_RATIO)
     for i in range(4):

@@ -10,7 +10,6 @@ from typing import Final
 import numpy as np
 
 from ecu.algorithm.estimation.joint.motors import MOTORS_STATE
-from ecu.algorithm.estimation.joint.pressure import PRESSURE_STATE
 from ecu.algorithm.estimation.joint.sampling import SAMPLING_STATE
 from ecu.algorithm.estimation.zero import ZERO_STATE
 from ecu.contract.records import N_JOINT
@@ -98,7 +97,6 @@ JOINT_STATE: Final = np.dtype(
         ("kept_s", "f8"),  # age of the newer one [s]
         ("unkept_s", "f8"),  # since it was last stored into the learned values [s]
         ("window", WINDOW_STATE),
-        ("pressures", PRESSURE_STATE),
         ("motors", MOTORS_STATE),
         ("sampling", SAMPLING_STATE),
         ("copies", "i8", (2,)),  # samples in which both pressures of an axle were equal
@@ -130,6 +128,7 @@ JOINT_STATE: Final = np.dtype(
         ("unsettled", "f8"),  # its slip less that at its torque shortly before
         ("curved", "f8"),  # part of the last wheel's slip beyond that of a linear tyre
         ("force", "f8", (4,)),  # N
+        ("follows", "u1", (4,)),  # the pressure followed the demand throughout the last window
         ("observed", "u1", (4,)),  # friction was corrected in the last window
         ("sigma_force", "f8"),  # of the force of all linings at equal pressures, relative
         ("heat", "f8", (4,)),  # relative standard deviation of friction by its disc's temperature

@@ -1,6 +1,5 @@
 """Errors of a window's pressures and motor torques, for every measurement predicted from them."""
 
-from ecu.algorithm.estimation.joint.pressure import follows
 from ecu.jit import Record, kernel
 
 COLOURED = 20.0  # factor on the variance of white noise: the error of an inverter's torque is not white
@@ -10,7 +9,7 @@ SKEW_FOLLOWED, SKEW_REPORTED = 0.5, 3.0  # windows between pressure and force; m
 @kernel
 def skew(state: Record, i: int) -> float:
     """Return the error of a pressure [bar] that acts earlier or later than its time stamp."""
-    windows = SKEW_FOLLOWED if follows(state.pressures, i) else SKEW_REPORTED
+    windows = SKEW_FOLLOWED if state.follows[i] else SKEW_REPORTED
     return windows * (state.smooth_pressure[i] - state.last_smooth[i])
 
 

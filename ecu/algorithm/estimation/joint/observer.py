@@ -180,7 +180,7 @@ def update_joint(
     inputs: Record,
     motion: Record,
     load: Record,
-    demand: Record,
+    hydraulics: Record,
     braking: bool,
     dt: float,
 ) -> None:
@@ -200,13 +200,13 @@ def update_joint(
         state.x[V], state.p[V, V], state.reversing = mean_wheel_speed(params, inputs), 0.25, 0
         open_window(state)
     state.released = 1 if not braking and _released(params, state, inputs) else 0
-    gather(params, state, inputs, motion, load, demand, state.released != 0, dt)
+    gather(params, state, inputs, motion, load, hydraulics, state.released != 0, dt)
     if braking and usable(inputs, ACCEL_X):
         share_force(params, state, inputs, motion.accel_x, load)
     state.hold_s = max(state.hold_s - dt, 0.0)
     if state.window.time < WINDOW_S - 0.001:
         return
-    close_window(params, state)
+    close_window(params, state, hydraulics)
     _fuse(params, state, inputs, braking)
     if not braking and usable(inputs, ACCEL_X):
         measure_drive(params, state)

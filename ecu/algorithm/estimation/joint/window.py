@@ -6,10 +6,8 @@ white from window to window, and missing samples are simply not in the mean."""
 
 import math
 
-from ecu.algorithm.brake import correct_pressure
 from ecu.algorithm.estimation.joint.layout import BIAS, DELAY, SLOPE, V
 from ecu.algorithm.estimation.joint.motors import follow_motors
-from ecu.algorithm.estimation.joint.pressure import follow_demand, follows
 from ecu.algorithm.estimation.joint.sampling import (
     ACCEL,
     add_sample,
@@ -19,6 +17,7 @@ from ecu.algorithm.estimation.joint.sampling import (
     open_sampling,
 )
 from ecu.algorithm.estimation.zero import note_rest
+from ecu.algorithm.hydraulics import follows_demand
 from ecu.algorithm.inputs import current, fresh, motor_torque, motor_torque_known, usable
 from ecu.algorithm.vehicle import corner_speed
 from ecu.contract.params import BAR, GRAVITY
@@ -76,7 +75,7 @@ def gather(
     inputs: Record,
     motion: Record,
     load: Record,
-    demand: Record,
+    hydraulics: Record,
     released: bool,
     dt: float,
 ) -> None:
@@ -114,19 +113,14 @@ def gather(
             w.omega_samples[i] += 1
         place = CALLIPER_PRESSURE + i
         push_out = params.push_out_pressure[i] / BAR
-        if params.transmit:
-            follow_demand(state.pressures, i, demand[i] / BAR, dt)
         if fresh(inputs, place):
             if released:
                 note_rest(state.zero, i, value[place])
-            reading = value[place] - state.zero.value[i]
-            above = reading - push_out
+            above = value[place] - state.zero.value[i] - push_out
             add_sample(state.sampling, i, above, 1e-9 * inputs.age_ns[place])
             w.pressure_samples[i] += 1
-            if params.transmit:
-                correct_pressure(state.pressures, i, reading, params.sigma_pressure / BAR, dt)
-        if follows(state.pressures, i):
-            w.tracked[i] += state.pressures.value[i] - push_out
+        if follows_demand(params, hydraulics, i):
+            w.tracked[i] += hydraulics.value[i] - push_out
             w.tracked_cycles[i] += 1
     place = VEHICLE_SPEED
     if fresh(inputs, place) and (value[VEHICLE_SPEED_VALID] > 0.5 or not params.mapped[VEHICLE_SPEED_VALID]):
@@ -137,7 +131,7 @@ def gather(
 
 
 @kernel
-def close_window(params: Record, state: Record) -> None:
+def close_window(params: Record, state: Record, hydraulics: Record) -> None:
     """Turn the sums into means."""
     w = state.window
     n = w.cycles
@@ -161,9 +155,10 @@ def close_window(params: Record, state: Record) -> None:
         w.pressure_variance[i] = (params.sigma_pressure / BAR) ** 2 / max(sampled, 1)
         if state.copies[i // 2] > COPIES:
             w.pressure_variance[i] *= 2.0  # common noise in both wheels of an axle
-        if w.tracked_cycles[i] == n and w.pressure_samples[i] > 0:
+        state.follows[i] = 1 if w.tracked_cycles[i] == n and w.pressure_samples[i] > 0 else 0
+        if state.follows[i]:
             w.pressure[i] = w.common_pressure[i] = w.tracked[i] / n
-            w.pressure_variance[i] = NEW_SHARE * state.pressures.variance[i]
+            w.pressure_variance[i] = NEW_SHARE * hydraulics.variance[i]
             state.smooth_pressure[i] = w.pressure[i]
         else:
             state.smooth_pressure[i] += gain * (w.pressure[i] - state.smooth_pressure[i])

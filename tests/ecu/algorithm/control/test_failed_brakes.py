@@ -14,7 +14,6 @@ from ecu.algorithm.control.failed_brakes import (
     GRIP,
     GRIP_RATE,
     YAW_LIMIT,
-    note_sent,
     replace_failed,
     watch_brakes,
 )
@@ -236,10 +235,3 @@ def test_the_axle_that_slips_is_relieved_here_too(params) -> None:
 def test_with_no_brake_left_nothing_is_moved(params) -> None:
     car = Replaced(params, (FL, FR, RL, RR), 3.0)
     assert car.force == pytest.approx(car.before)
-
-
-def test_of_a_failed_brake_nothing_counts_as_sent() -> None:
-    state = np.zeros(1, FAILED_BRAKES_STATE)[0]
-    state["failed"] = [0, 1, 0, 0]
-    note_sent(state, np.array([40e5, 40e5, 20e5, 0.0]))
-    np.testing.assert_array_equal(state["sent"], [40e5, 0.0, 20e5, 0.0])

@@ -50,6 +50,23 @@ def test_every_observer_learns_what_the_pressure_sensors_read_at_rest(params, fe
 
 
 @pytest.mark.parametrize("observer", OBSERVERS)
+def test_brake_torque_is_without_the_pressure_zero(params, feed, observer: int) -> None:
+    """(A.19) by hand: 30 bar read by sensors with a known zero of 1.2 bar."""
+    car, state, outputs = params[0], new_state(params), np.zeros(1, OUTPUTS)
+    car["observer"] = observer
+    zero = state["joint"]["zero"]
+    zero["mean"], zero["square"], zero["samples"], zero["below"] = 1.2, 1.2**2 + 0.01, 12_000, 1
+    zero["value"] = 1.2
+    inputs = feed(wheel_speed=SPEED / car["wheel_radius"], calliper_pressure=30.0, accel_x=-4.0)
+    for _ in range(20):
+        mu = state["estimate"]["mu"][0].copy()
+        step(params, state, inputs, outputs)
+    force = (30.0 - 1.2) * 1e5 - car["push_out_pressure"]
+    torque = 2.0 * car["piston_area"] * car["effective_radius"] * mu * force
+    assert state["estimate"]["brake_torque"][0] == pytest.approx(torque, rel=0.01)
+
+
+@pytest.mark.parametrize("observer", OBSERVERS)
 def test_nothing_is_learned_while_a_deceleration_is_asked_for(params, feed, observer: int) -> None:
     params[0]["transmit"] = 0
     found = roll(params, feed, observer, 3.0, (0.4, 0.4, 0.4, 0.4), pedal_position=30.0)["pressure_zero"]

@@ -15,6 +15,7 @@ from ecu.algorithm.estimation.joint.layout import JOINT_STATE
 from ecu.algorithm.estimation.joint.observer import start_joint, update_joint
 from ecu.algorithm.estimation.joint.prior import begin_application, end_application, set_prior
 from ecu.algorithm.estimation.motion import MOTION_STATE
+from ecu.algorithm.hydraulics import HYDRAULICS_STATE
 from ecu.contract.signals import CALLIPER_PRESSURE, MOTOR_TORQUE, VEHICLE_SPEED, WHEEL_SPEED
 
 DT = 0.01
@@ -54,7 +55,7 @@ class Car:
         start_joint(self.state)
         self.motion = np.zeros(1, MOTION_STATE)[0]
         self.load = self.params["static_load"].copy()
-        self.demand = np.zeros(4)
+        self.hydraulics = np.zeros(1, HYDRAULICS_STATE)[0]
         self.time = 0.0
         self.braked = False
 
@@ -119,7 +120,9 @@ class Car:
             begin_application(self.state, np.zeros(4))
         self.braked = braking
         at_rest = self.params["static_load"]  # by the configured mass, as the ECU has it
-        update_joint(self.params, self.state, self.inputs[0], self.motion, at_rest, self.demand, braking, DT)
+        update_joint(
+            self.params, self.state, self.inputs[0], self.motion, at_rest, self.hydraulics, braking, DT
+        )
         self.time += DT
 
     def drive(self, seconds: float, **how: Any) -> Any:

@@ -22,8 +22,8 @@ from ecu.algorithm.estimation.joint.layout import (
     V,
 )
 from ecu.algorithm.estimation.joint.observer import WINDOW_S
-from ecu.algorithm.estimation.joint.pressure import AGREED_S
 from ecu.algorithm.estimation.joint.prior import set_prior
+from ecu.algorithm.hydraulics import HYDRAULICS_STATE
 from ecu.contract.records import LEARNED
 from ecu.contract.signals import CALLIPER_PRESSURE, OBSERVING
 from ecu.settings.config import load_config, new_params
@@ -42,10 +42,11 @@ def driven(seed: int):
     return state
 
 
-def published(state, feed, braking: bool, estimate=None):
+def published(state, feed, braking: bool, estimate=None, pressure_sigma: float = 0.0):
     estimate = np.zeros(1, ESTIMATE)[0] if estimate is None else estimate
-    learned = np.zeros(1, LEARNED)[0]
-    tell_joint(SUV, state, estimate, learned, feed()[0], braking, 0.01)
+    learned, hydraulics = np.zeros(1, LEARNED)[0], np.zeros(1, HYDRAULICS_STATE)[0]
+    hydraulics["variance"] = pressure_sigma**2
+    tell_joint(SUV, state, hydraulics, estimate, learned, feed()[0], braking, 0.01)
     return estimate
 
 
@@ -82,9 +83,8 @@ def test_an_observed_friction_is_as_unsure_as_the_pressure_it_is_set_against(fee
     state = driven(5)
     plain = published(state, feed, True)
     state["observed"], state["smooth_pressure"] = observed, [20.0, 20.0, 10.0, 0.5]
-    state["pressures"]["agreed_s"] = 2 * AGREED_S * follows
-    state["pressures"]["variance"] = 0.5**2
-    more = published(state, feed, True)
+    state["follows"] = follows
+    more = published(state, feed, True, pressure_sigma=0.5)
     added = (more["sigma"] / more["mu"]) ** 2 - (plain["sigma"] / plain["mu"]) ** 2
     expected = np.array([0.5 / 20, 0.5 / 20, 0.5 / 10, 0.5]) ** 2 * (follows and observed)
     np.testing.assert_allclose(added, expected, atol=1e-15)
@@ -105,10 +105,11 @@ def test_a_corner_is_observed_while_its_signals_show_friction(
 ) -> None:
     state, estimate = driven(6), np.zeros(1, ESTIMATE)[0]
     inputs, learned = feed()[0], np.zeros(1, LEARNED)[0]
+    hydraulics = np.zeros(1, HYDRAULICS_STATE)[0]
     state["observed"] = observed
     inputs["verdict"][CALLIPER_PRESSURE + 1] *= usable
     for _ in range(5):
-        tell_joint(SUV, state, estimate, learned, inputs, braking, 0.01)
+        tell_joint(SUV, state, hydraulics, estimate, learned, inputs, braking, 0.01)
     assert (estimate["mode"][1] == OBSERVING) == observing
     assert estimate["observed_s"][1] == pytest.approx(0.05 * observing)
     assert (estimate["mode"][0] == OBSERVING) == (braking and observed)

@@ -56,7 +56,7 @@ class Stop:
         s["force"]["virtual"] = -(PER_MU * self.mu * acts + rolling + self.motor - inertia) / RADIUS
         s["application"]["braking"] = bool((self.pressure > 1.5).any())
         s["application"]["duration_s"] += DT
-        update_pressure(self.params, s["friction"], s["friction"]["mu"], self.inputs[0], DT)
+        update_pressure(self.params, s["friction"], s["friction"]["mu"], np.zeros(4), self.inputs[0], DT)
         update_friction(
             self.params,
             s["friction"],

@@ -187,7 +187,9 @@ def test_friction_is_observable_if_and_only_if_pressure_exceeds_push_out(
     friction = np.zeros(1, FRICTION_STATE)[0]
     assert params[0]["push_out_pressure"][corner] == 0.5 * BAR
     bar_inputs = feed(calliper_pressure=bar)[0]
-    update_pressure(params[0], friction, friction["mu"], bar_inputs, 1e3)  # long enough to settle
+    update_pressure(
+        params[0], friction, friction["mu"], np.zeros(4), bar_inputs, 1e3
+    )  # long enough to settle
     A, C = system_matrices(params[0], corner, max(float(friction["pressure"][corner]), 0.0), speed, mu)
     scale = np.diag([1.0, 1000.0, 0.1])
     A, C = np.linalg.inv(scale) @ A @ scale, np.diag([1.0, 1e-3]) @ C @ scale

@@ -1,0 +1,43 @@
+"""State of a recording by a version with two models of the hydraulics, field by field."""
+
+import numpy as np
+import pytest
+
+from brakelab.replay.earlier_layout import convert_initial
+from ecu.algorithm.step import INITIAL
+
+PRESSURES = np.dtype([("model", "f8", (4,)), ("value", "f8", (4,))])  # of the observer alone
+
+
+def earlier(without: str = "") -> np.dtype:
+    """Layout of the earlier version, or of one that lacks a part."""
+    parts = []
+    for name in INITIAL.names:
+        part = INITIAL[name]
+        if name == "joint":
+            fields = [(field, part[field]) for field in part.names if field != "follows"]
+            part = np.dtype([*fields, ("pressures", PRESSURES)], align=True)
+        if name == "hydraulics":
+            part = np.dtype([(field, part[field]) for field in part.names if field != "gain_variance"])
+        parts.append(("friction_torque" if name == "hydraulics" else name, part))
+    return np.dtype([part for part in parts if part[0] != without], align=True)
+
+
+def test_every_state_goes_on_under_its_present_name() -> None:
+    old = np.zeros(1, earlier())
+    old["friction_torque"]["value"], old["friction_torque"]["agreed_s"] = [1.0, 2.0, 3.0, 4.0], 0.5
+    old["joint"]["x"], old["joint"]["zero"]["value"] = np.arange(old["joint"]["x"].shape[1]), 0.7
+    old["learned"] = np.frombuffer(bytes(range(1, 256)) * 40, old["learned"].dtype, 1)
+    new = convert_initial(old)
+    assert new.dtype == INITIAL
+    assert new["hydraulics"]["value"].tolist() == [[1.0, 2.0, 3.0, 4.0]]
+    assert new["hydraulics"]["agreed_s"].tolist() == [[0.5] * 4]
+    assert new["joint"]["zero"]["value"].tolist() == [[0.7] * 4]
+    np.testing.assert_array_equal(new["joint"]["x"], old["joint"]["x"])
+    assert new["learned"].tobytes() == old["learned"].tobytes()
+    assert not new["joint"]["follows"].any()
+
+
+@pytest.mark.parametrize("part", ["friction_torque", "joint", "limiter"])
+def test_a_state_that_lacks_a_part_is_not_converted(part: str) -> None:
+    assert convert_initial(np.zeros(1, earlier(without=part))) is None
