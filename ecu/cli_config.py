@@ -1,4 +1,4 @@
-"""`brake-ecu config …`: checks and describes CONFIG files."""
+"""`brake-ecu config …`: writes, checks and describes CONFIG files."""
 
 from pathlib import Path
 from typing import Annotated
@@ -7,7 +7,7 @@ import typer
 
 from ecu.arguments import Commands, config_file
 
-app = Commands(help="Check and describe configurations.", no_args_is_help=True)
+app = Commands(help="Write, check and describe configurations.", no_args_is_help=True)
 
 
 @app.command()
@@ -15,11 +15,30 @@ def check(
     file: Annotated[
         Path, typer.Argument(parser=config_file, metavar="CONFIG", help="Vehicle and tuning: file or name")
     ],
+    picture: Annotated[
+        bool, typer.Option("--picture", help="Draw the distribution beside what Annex 5 forbids")
+    ] = False,
 ) -> int:
     """List every mistake of a configuration, or what its car comes to."""
     from ecu.settings import check
 
-    return check.check(file)
+    return check.check(file, picture)
+
+
+@app.command()
+def new(
+    given: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Answer without being asked; as often as needed"),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="CAR.toml", help="File to write; default: the car's name")
+    ] = None,
+) -> int:
+    """Write a configuration from a data sheet: ask, or take what --set says."""
+    from ecu.settings import new
+
+    return new.new(given or [], out)
 
 
 @app.command()

@@ -13,13 +13,16 @@ import numpy as np
 from ecu.algorithm.control.distribution import front_share
 from ecu.contract.params import BAR, GRAVITY
 from ecu.settings.annex5 import K_RULED, Z_ORDERED, Load, annex_5_violation, shares, utilisation
+from ecu.settings.annex5_picture import picture
 from ecu.settings.config import Config, new_params, validate_config
 
 RATES: Final = (0.2, 0.4, 0.6, 0.8)  # braking rates z
 
 
-def check(path: Path) -> int:
+def check(path: Path, pictured: bool = False) -> int:
     """Print what is wrong with a CONFIG file, each in a line, and return 2; or what the car comes to, and 0.
+
+    `pictured` adds the distribution beside what Annex 5 forbids.
 
     Raises UserError for a file that is no TOML.
     """
@@ -32,6 +35,8 @@ def check(path: Path) -> int:
     violation = annex_5_violation(params, config.vehicle.loads())
     for line in figures(config, params):
         print(line)
+    if pictured:
+        print("\n".join(picture(params, config.vehicle.loads())))
     if violation:
         print(f"brake-ecu: {path}: control.distribution: {violation}", file=sys.stderr)
         return 2

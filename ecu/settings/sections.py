@@ -47,6 +47,7 @@ class Vehicle(Section):
     laden_front_axle: Annotated[Positive, Unit("m")] | None = None
     """Centre of gravity to front axle when laden, m."""
     laden_cog_height: Annotated[float, Field(gt=0.1, lt=3), Unit("m")] | None = None
+    """Centre of gravity above the road when laden, m."""
 
     def loads(self) -> tuple[Load, ...]:
         """Return the states of load that the car is driven in: as configured, and laden if that is given."""
