@@ -5,7 +5,7 @@ A map is a TOML file; `docs/signal-maps.md` explains it with an example. A value
 """
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from cantools.database import Database, Message
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -19,53 +19,65 @@ from ecu.bus.units import conversion
 from ecu.contract.signals import INPUT, INPUT_SIGNALS
 from ecu.errors import UserError
 from ecu.settings.resources import resource
-from ecu.settings.toml_file import describe, read_toml
+from ecu.settings.toml_file import Unit, describe, read_toml
 
 
 class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True)
 
 
 class Validity(_Table):
     """A signal of the same message that must have one of `values` (raw codes)."""
 
     signal: str
-    values: tuple[int, ...] = Field(min_length=1)
+    """Of the same message."""
+    values: Annotated[tuple[int, ...], Field(min_length=1), Unit("-")]
+    """Raw codes with which the input counts."""
 
 
 class MappedInput(_Table):
     """Source of one input."""
 
     message: str
+    """Its name in the database."""
     signal: str
+    """Its name in the database."""
     unit: str | None = None
     """Of the value after factor and offset; the database's own if it is not given."""
-    factor: float = 1.0
+    factor: Annotated[float, Unit("-")] = 1.0
+    """Of the value as the database scales it; -1 turns its sign."""
     offset: float = 0.0
+    """Added after the factor, in `unit`."""
     sentinels: tuple[float, ...] = ()
     """Values in the database's scaling that are no measurement."""
     validity: Validity | None = None
-    timeout: float | None = Field(default=None, gt=0.0)
-    """Seconds, if not the contract's."""
+    """A signal that says whether the value counts."""
+    timeout: Annotated[float, Field(gt=0.0), Unit("s")] | None = None
+    """After it the input is stale, if not after the contract's."""
 
 
 class Counter(_Table):
     """Frame counter of a message: 0 … `modulo` − 1."""
 
     signal: str
-    modulo: int | None = Field(default=None, ge=2)
-    """All values of its bits if it is not given."""
+    """Of the same message."""
+    modulo: Annotated[int, Field(ge=2), Unit("-")] | None = None
+    """Values that it counts through; all of its bits if it is not given."""
 
 
 class MappedMessage(_Table):
     """Rate and protection of a message."""
 
-    period: float | None = Field(default=None, gt=0.0)
-    """Seconds; the database's GenMsgCycleTime if it is not given."""
-    slowest_period: float | None = Field(default=None, gt=0.0)
+    period: Annotated[float, Field(gt=0.0), Unit("s")] | None = None
+    """Between frames; the database's GenMsgCycleTime if it is not given."""
+    slowest_period: Annotated[float, Field(gt=0.0), Unit("s")] | None = None
+    """Of a sender that varies its rate, or a logger that loses frames."""
     checksum: str | None = None
-    data_id: int = Field(default=0, ge=0, le=0xFFFF)
+    """Name of a rule (docs/signal-maps.md)."""
+    data_id: Annotated[int, Field(ge=0, le=0xFFFF), Unit("-")] = 0
+    """Of the rule autosar_p01."""
     counter: Counter | None = None
+    """Its frame counter."""
 
 
 class SignalMap(_Table):
@@ -76,12 +88,15 @@ class SignalMap(_Table):
     strict: bool = True
     """Refuse a database whose signals overlap."""
     bus: str | None = None
-    """Interface name in logs that hold several buses; None: every bus."""
-    rolling_radius: float | None = Field(default=None, gt=0.1, lt=2.0)
+    """Interface name in logs that hold several buses; without it every bus."""
+    rolling_radius: Annotated[float, Field(gt=0.1, lt=2.0), Unit("m")] | None = None
+    """Of the wheels, where their speeds are in km/h or m/s."""
     ignore_checksum: tuple[str, ...] = ()
     """Messages that are taken although checksum or counter are wrong."""
     messages: dict[str, MappedMessage] = {}
-    inputs: dict[str, MappedInput] = Field(min_length=1)
+    """Rate and protection, by name of the message."""
+    inputs: Annotated[dict[str, MappedInput], Field(min_length=1)]
+    """Sources, by name of the input."""
 
 
 class MappedBus(NamedTuple):

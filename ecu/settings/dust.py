@@ -14,16 +14,19 @@ class Dust(Section):
     """Emission factor of one brake, log10 of its particles in an application, by the application's means."""
 
     model: Literal["network", "table", "law"]
+    """Kind of the model that `identify dust` found."""
     numbers: list[float]
     """Of the model, in the order that its kernel takes them."""
     low: list[float] = Field(min_length=len(FEATURES), max_length=len(FEATURES))
-    """Of `FEATURES`, what it was trained on: outside nothing is told."""
+    """Of each feature, the least that it was trained on: outside nothing is told."""
     high: list[float] = Field(min_length=len(FEATURES), max_length=len(FEATURES))
+    """Of each feature, the greatest."""
     factor: Annotated[float, Field(gt=0.1, lt=10.0)] = 1.0
     """Mean of the particles over ten to the emission factor: a logarithm's mean is that of its median."""
     below: Annotated[float, Field(le=0.0, gt=-5.0)]
     """From the emission factor to the lower end of its 95 % interval."""
     above: Annotated[float, Field(ge=0.0, lt=5.0)]
+    """From the emission factor to the upper end."""
 
     @model_validator(mode="after")
     def _whole(self) -> "Dust":

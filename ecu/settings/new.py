@@ -150,7 +150,7 @@ def config_text(answers: Given, like: Config) -> str:
     name = answers.get("name", "car")
     lines = [
         f'# {name}, by `brake-ecu config new`. "data sheet": as given; "{ASSUMED}": measure it, or',
-        "# let a drive tell it (`brake-ecu identify vehicle`). All keys: docs/reference.md.",
+        "# let a drive tell it (`brake-ecu identify vehicle`). All keys: docs/reference-config.md.",
         "",
         f'name = "{name}"',
         "transmit = false  # true arms the ECU: its pressure demands are flagged valid",

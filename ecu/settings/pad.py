@@ -14,13 +14,13 @@ class Pad(Section):
     area: Annotated[float, Field(gt=5e-4, lt=0.05), Unit("m^2")] = 7.125e-3
     """Of one pad, m^2: Table 3.1, brake A."""
     density: Annotated[float, Field(gt=500, lt=8000), Unit("kg/m^3")] = 2500.0
-    """kg/m^3"""
+    """Of the lining."""
     thickness_new: Annotated[float, Field(gt=2, lt=40), Unit("mm")] = 12.0
-    """mm, section 7.6.2."""
+    """New lining, section 7.6.2."""
     thickness_worn: Annotated[float, Field(ge=0, lt=20), Unit("mm")] = 3.0
-    """mm, at which pads are replaced."""
+    """At which pads are replaced."""
     chamfer_depth: Annotated[float, Field(ge=0, lt=20), Unit("mm")] = 0.0
-    """mm, from the new surface to where the chamfers end."""
+    """From the new surface to where the chamfers end."""
     chamfer_share: Annotated[float, Field(ge=0, lt=0.9), Unit("-")] = 0.0
     """Of the area, missing at the new surface; falls linearly to nothing at the depth."""
     law: Literal["extended", "quasi-static"] = "extended"

@@ -98,6 +98,7 @@ class Axle(Section):
     disc_cooling_by_speed: Annotated[float, Field(ge=0, lt=0.01), Unit("1/m")] = 9.108e-5
     """delta_1 of (3.7), 1/m. Table C.1 prints ten times as much: 400 to 100 degC in a minute at 100 km/h."""
     pad: Pad = Pad()
+    """Its linings and what they wear by."""
     dust: Dust | None = None
     """Particle emission of its brakes; without it the outputs are not available."""
 

@@ -49,30 +49,34 @@ class SensorErrors(Section):
     Between two bounds a value is drawn uniformly per car and corner; one number is used as it is.
     """
 
-    model_config = ConfigDict(allow_inf_nan=False)
+    model_config = ConfigDict(allow_inf_nan=False, use_attribute_docstrings=True)
 
     noise: NotNegative = 0.0
     """Standard deviation, white."""
     resolution: NotNegative = 0.0
+    """Step between two readings."""
     delay: Annotated[tuple[Delay, Delay], BeforeValidator(as_bounds), AfterValidator(in_order)] = (0.0, 0.0)
-    """s"""
+    """Of the reading behind the quantity, s."""
     scale: Positive = 1.0
+    """Reading over quantity."""
     bias: Annotated[Bounds, BeforeValidator(as_bounds), AfterValidator(in_order)] = (0.0, 0.0)
+    """Zero error."""
     drift: NotNegative = 0.0
-    """q, unit per root second."""
+    """q, random walk of the zero, unit per root second."""
     drift_time: Positive = math.inf
-    """tau [s]"""
+    """tau, after which a drift is forgotten, s."""
     dropout: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    """Probability that samples fail after one that came."""
     dropout_length: Annotated[float, Field(ge=1.0)] = 1.0
-    """Samples."""
+    """Mean length of such a failure, samples."""
     floor: float = -math.inf
     """No reading is less: many cars cannot report a pressure below zero."""
     period: NotNegative = 0.0
-    """s between samples; 0: a sample in every cycle."""
+    """Between samples, s; 0: a sample in every cycle."""
     stuck_from: NotNegative = math.inf
-    """s"""
+    """From then on the reading stays, s."""
     lost_from: NotNegative = math.inf
-    """s"""
+    """From then on there is no reading, s."""
 
 
 def _known(given: dict[str, SensorErrors]) -> dict[str, SensorErrors]:

@@ -41,6 +41,7 @@ from ecu.contract.records import FRAME, RecordArray, new_record
 from ecu.contract.signals import CORNERS, INPUT, N_INPUTS
 from ecu.jit import Record, kernel
 from ecu.settings.resources import resource
+from ecu.settings.toml_file import Unit
 
 Kind = Literal[
     "late",
@@ -114,18 +115,28 @@ def _messages() -> dict[str, dict[str, int]]:
 class Fault(BaseModel):
     """One `[[fault]]` table."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True)
 
     kind: Kind
-    t: Annotated[float, Field(ge=0.0)]
-    duration: Annotated[float, Field(gt=0.0)] | None = None
+    """What fails; docs/rig.md has the effect of each."""
+    t: Annotated[float, Field(ge=0.0), Unit("s")]
+    """Since the car set off."""
+    duration: Annotated[float, Field(gt=0.0), Unit("s")] | None = None
+    """Without it to the end of the drive."""
     message: list[str] = []
-    share: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
-    delay: Annotated[float, Field(gt=0.0, le=0.2)] = 0.0
+    """Frames of these messages; none named: all of the vehicle."""
+    share: Annotated[float, Field(gt=0.0, le=1.0), Unit("-")] = 1.0
+    """Of these frames, drawn."""
+    delay: Annotated[float, Field(gt=0.0, le=0.2), Unit("s")] = 0.0
+    """Of late frames."""
     signal: list[str] = []
+    """Inputs that are disturbed."""
     amount: float = 0.0
+    """Added, or standard deviation of the noise, in the signal's unit; the accumulator's pressure, bar."""
     corner: list[Literal["fl", "fr", "rl", "rr"]] = ["fl", "fr", "rl", "rr"]
+    """Wheels whose motor or calliper fails."""
     standby: bool = False
+    """A second daemon stands by."""
 
     @model_validator(mode="after")
     def _complete(self) -> "Fault":

@@ -54,204 +54,96 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, BeforeValidator, Field, ValidationError, model_validator
 
 from brakelab.plant.cycle import CYCLE
-from brakelab.plant.description import Body
 from brakelab.plant.driver import PEDAL_TRAVEL, Script
 from brakelab.plant.records import BRAKE, COAST, CRUISE, FOLLOW, PHASE
-from brakelab.plant.road import Road
 from brakelab.plant.sensor_errors import Sensors
 from brakelab.plant.steering import Steering
 from brakelab.simulation.faults import Fault
-from brakelab.simulation.speed_trace import SpeedTrace, generated_trace, read_trace, trace_of
-from ecu.settings.toml_file import describe, read_toml
+from brakelab.simulation.scenario_tables import (
+    BRAKE_BY,
+    NotNegative,
+    Payload,
+    Phase,
+    RoadByPlace,
+    Row,
+    ScenarioTable,
+    SteeringFile,
+    Trace,
+    TyreFault,
+    as_rows,
+)
+from brakelab.simulation.speed_trace import SpeedTrace
+from ecu.settings.toml_file import Unit, describe, read_toml
 
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
+__all__ = ["LONGEST", "Payload", "Phase", "RoadByPlace", "Scenario", "SteeringFile", "Trace", "load_scenario"]
+
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
-Row = tuple[float, float]
-Sides = tuple[float, float, float]
 ByTime = Annotated[
     list[Row], BeforeValidator(lambda given: given if isinstance(given, list) else [(0.0, given)])
 ]
 """Rows of time [s] and value; a number alone holds all the time."""
 KINDS = {"cruise": CRUISE, "coast": COAST, "brake": BRAKE, "follow": FOLLOW}
-BRAKE_BY = ("decel", "pedal", "kept_decel")
 LONGEST = 10_800.0
 """s, a scenario that did not end by itself ends here."""
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Phase(_Section):
-    """One phase of the driver's actions."""
-
-    kind: Literal["cruise", "coast", "brake", "follow"]
-    speed: NotNegative | None = None
-    accel: Positive = 2.0
-    decel: NotNegative | None = None
-    pedal: Annotated[float, Field(ge=0.0, le=100.0)] | None = None
-    kept_decel: Positive | None = None
-    ramp: Positive = 13.3
-    """m/s^3; 4 m/s^2 within 0.3 s, as a pedal at 150 mm/s over some 90 mm would ask for it."""
-    pedal_speed: Positive = 150.0
-    """mm/s; sections 5.7 and 5.7.2 have 150 and 50."""
-    until_speed: NotNegative | None = None
-    seconds: Positive | None = None
-
-    @model_validator(mode="after")
-    def _complete(self) -> "Phase":
-        if self.until_speed is None and self.seconds is None and self.kind != "follow":
-            raise ValueError("never ends; give until_speed or seconds")
-        if (self.speed is None) == (self.kind == "cruise"):
-            raise ValueError("speed belongs to a cruise phase, and only there")
-        if self.kind == "cruise" and self.speed == self.until_speed:
-            raise ValueError("until_speed is never passed; give a speed beyond it")
-        given = sum(getattr(self, name) is not None for name in BRAKE_BY)
-        if given != (self.kind == "brake"):
-            raise ValueError("a brake phase needs one of decel, pedal and kept_decel, no other phase has any")
-        return self
-
-
-class Trace(_Section):
-    """Speed trace of a `follow` phase, from one of three sources."""
-
-    speed: list[Row] | None = None
-    file: str | None = None
-    generate: Literal["real-driving"] | None = None
-    seed: Annotated[int, Field(ge=0)] = 0
-
-    @model_validator(mode="after")
-    def _one_source(self) -> "Trace":
-        if sum(given is not None for given in (self.speed, self.file, self.generate)) != 1:
-            raise ValueError("give one of speed, file and generate")
-        if "seed" in self.model_fields_set and self.generate is None:
-            raise ValueError("seed belongs to generate")
-        if self.speed is not None:
-            trace_of(self.speed)
-        return self
-
-    def trace(self) -> SpeedTrace:
-        """Return the trace. Raises `UserError`: the file is wrong or cannot be read."""
-        if self.speed is not None:
-            return trace_of(self.speed)
-        return generated_trace(self.seed) if self.file is None else read_trace(Path(self.file))
-
-
-class SteeringFile(_Section):
-    """Steering by file: see `brakelab.plant.steering`."""
-
-    angle: list[Row] = []
-    path: list[Row] = []
-
-    @model_validator(mode="after")
-    def _one_that_rises(self) -> "SteeringFile":
-        if bool(self.angle) == bool(self.path):
-            raise ValueError("give either angle (by time) or path")
-        for name, rows in self:
-            if np.any(np.diff([row[0] for row in rows]) <= 0.0):
-                raise ValueError(f"{name}: give rows of rising {'time' if name == 'angle' else 'distance'}")
-        return self
-
-
-class TyreFault(_Section):
-    """Change of the tyres' slip stiffness by the factor `stiffness` from `time` [s] on (section 4.6)."""
-
-    time: NotNegative
-    stiffness: Positive
-
-
-class Payload(_Section):
-    """Payload beside the driver, a point mass of `mass` [kg]."""
-
-    mass: Positive
-    behind: float
-    """Behind the empty car's centre of gravity, m."""
-    height: Positive
-    """Over the road, m."""
-
-    def body(self, empty: Body) -> Body:
-        """Return the laden car's body: its mass, centre of gravity and yaw inertia."""
-        mass = empty.mass + self.mass
-        back = self.mass * self.behind / mass
-        update = {
-            "mass": mass,
-            "front_length": empty.front_length + back,
-            "rear_length": empty.rear_length - back,
-            "cog_height": (empty.mass * empty.cog_height + self.mass * self.height) / mass,
-            "yaw_inertia": empty.yaw_inertia + empty.mass * back * self.behind,
-        }
-        return empty.model_copy(update=update)
-
-
-class RoadByPlace(_Section):
-    """The road over the distance driven; see `brakelab.plant.road`."""
-
-    friction: list[Sides] = []
-    height: list[Sides] = []
-    grade: list[Row] = []
-    bank: list[Row] = []
-
-    @model_validator(mode="after")
-    def _tables_rise(self) -> "RoadByPlace":
-        for name, rows in self:
-            if np.any(np.diff([row[0] for row in rows]) <= 0.0):
-                raise ValueError(f"{name}: give rows of rising distance")
-        if any(min(left, right) <= 0.0 for _, left, right in self.friction):
-            raise ValueError("friction: give values above 0")
-        return self
-
-    def road(self) -> Road:
-        """Return the tables as arrays for the kernels."""
-        return Road(_rows(self.friction, 3), _rows(self.height, 3), _rows(self.grade), _rows(self.bank))
-
-
-class Scenario(_Section):
+class Scenario(BaseModel):
     """A scenario file."""
 
+    model_config = ScenarioTable.model_config
+
     plant: str
+    """Car: a file, or a name of config/plant."""
     draw: Literal["wide", "nominal"] = "wide"
     """How far the car of a seed is from its file; see `brakelab.plant.draw`."""
     payload: Payload | None = None
-    initial_speed: NotNegative
-    initial_disc_temperature: tuple[float, float] = (100.0, 100.0)
-    """Front and rear, degC; 100 as where the friction's nominal value is defined."""
-    ambient_temperature: float = 20.0
-    road_friction: ByTime = [(0.0, 1.2)]
-    grade: ByTime = [(0.0, 0.0)]
+    """What the car carries beside the driver."""
+    initial_speed: Annotated[NotNegative, Unit("m/s")]
+    """At t = 0."""
+    initial_disc_temperature: Annotated[tuple[float, float], Unit("degC")] = (100.0, 100.0)
+    """Front and rear; 100 as where the friction's nominal value is defined."""
+    ambient_temperature: Annotated[float, Unit("degC")] = 20.0
+    """Of the air."""
+    road_friction: Annotated[ByTime, Unit("s, -")] = [(0.0, 1.2)]
+    """Of road and tyre: a number, or rows of time and number."""
+    grade: Annotated[ByTime, Unit("s, rad")] = [(0.0, 0.0)]
+    """Of the road, positive uphill: a number, or rows of time and number."""
     road: RoadByPlace = RoadByPlace()
     """Quantities in it must not be described by time as well."""
     steering: SteeringFile | None = None
     """Without it the car is steered straight on."""
-    wetness: Share = 0.0
+    wetness: Annotated[Share, Unit("-")] = 0.0
     """Of the discs, 0 dry to 1 rain; above 0 the bus says that it rains."""
     tyre_fault: TyreFault | None = None
+    """Tyres that change on the way."""
     vehicle_speed: Literal["ideal", "optical", "gnss", "none"] = "ideal"
     """Source of the speed on the bus; see `brakelab.plant.sensor_errors.SPEED_SOURCES`."""
     wheel_transducers: bool = False
     """The bus carries wheel forces and torques."""
     sensor: Sensors = {}
-    """Errors of its sensors beside those that the car's file gives."""
+    """Errors of its sensors beside those that the car's file gives, by name of the input."""
     blending: bool = False
     """While brakes are asked for the motors do what the ECU asks; otherwise they rest."""
-    charge_limit: ByTime = []
-    """Charging limit of the battery [W], instead of that of the car's file; at 0 its motors cannot brake."""
-    motor_share: Share = 0.0
+    charge_limit: Annotated[ByTime, Unit("s, W")] = []
+    """Charging limit of the battery instead of that of the car's file; at 0 its motors cannot brake."""
+    motor_share: Annotated[Share, Unit("-")] = 0.0
     """Of each deceleration asked for, what the motors take; the brakes are asked for the rest (5.2)."""
     trace: Trace | None = None
-    repeat: Annotated[int, Field(ge=1)] = 1
+    """What a follow phase follows."""
+    repeat: Annotated[int, Field(ge=1), Unit("-")] = 1
     """How often the phases are driven."""
     fault: list[Fault] = []
     """Faults on the way; see `brakelab.simulation.faults`."""
     phase: Annotated[list[Phase], Field(min_length=1)]
+    """The driver's actions, one after the other."""
 
     @model_validator(mode="after")
     def _consistent(self) -> "Scenario":
         for name in ("road_friction", "grade", "charge_limit"):
-            table = _rows(getattr(self, name))
+            table = as_rows(getattr(self, name))
             if (len(table) == 0 and name != "charge_limit") or np.any(np.diff(table[:, 0]) <= 0.0):
                 raise ValueError(f"{name}: give rows of rising time [[t, value], ...]")
         if any(value <= 0.0 for _, value in self.road_friction):
@@ -286,18 +178,18 @@ class Scenario(_Section):
         fault = self.tyre_fault
         return Script(
             self._phases(float(trace.speed[-1, 0])),
-            _rows(self.road_friction),
-            _rows(self.grade),
+            as_rows(self.road_friction),
+            as_rows(self.grade),
             self.ambient_temperature,
             self.blending,
             road,
-            Steering(*(_rows(getattr(self.steering, name, [])) for name in Steering._fields)),
+            Steering(*(as_rows(getattr(self.steering, name, [])) for name in Steering._fields)),
             trace.speed,
             self.wetness,
             self.motor_share,
             -1 if fault is None else round(fault.time / CYCLE),
             1.0 if fault is None else fault.stiffness,
-            _rows(self.charge_limit),
+            as_rows(self.charge_limit),
         )
 
     def _phases(self, trace_end: float) -> NDArray[np.void]:
@@ -312,10 +204,6 @@ class Scenario(_Section):
             ends = trace_end if phase.kind == "follow" else math.inf
             row["seconds"] = ends if phase.seconds is None else min(phase.seconds, ends)
         return np.tile(phases, self.repeat)
-
-
-def _rows(rows: list[Row] | list[Sides], columns: int = 2) -> NDArray[np.float64]:
-    return np.array(rows, dtype=np.float64).reshape(-1, columns)
 
 
 def load_scenario(path: Path) -> Scenario:

@@ -1,0 +1,65 @@
+"""The reference of configurations, maps and scenarios is that of the models; every key is described."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import write_reference as reference
+
+ROOT = Path(__file__).parent.parent
+OF_THE_SIGNAL = {"noise", "resolution", "scale", "bias", "drift", "floor", "offset", "sentinels", "amount"}
+"""In the unit of a signal that the file names."""
+SAID = {"delay", "drift_time", "dropout", "dropout_length", "period", "stuck_from", "lost_from"}
+"""The simulated vehicle knows no units of the ECU; they stand in the meaning."""
+MIXED = {"coefficients", "numbers", "low", "high", "factor", "below", "above"}
+
+
+@pytest.mark.parametrize("name", reference.PAGES)
+def test_a_page_is_written_from_the_models_as_they_are(name: str) -> None:
+    page = (reference.DOCS / name).read_text("utf-8")
+    assert page == reference.page_text(name), "run python tools/write_reference.py"
+
+
+@pytest.mark.parametrize("name", reference.PAGES)
+def test_every_key_is_described_and_every_number_has_a_unit(name: str) -> None:
+    rows = re.findall(
+        r"^\| `(\w+)` \| (.*?) ?\| (.*?) \| (.*?) ?\| (.*?) ?\|$", reference.page_text(name), re.M
+    )
+    assert len(rows) > 15
+    for key, unit, values, _, meaning in rows:
+        assert meaning, key
+        if re.search(r"number|[<>≥≤]", values) and key not in OF_THE_SIGNAL | SAID | MIXED:
+            assert unit, key
+
+
+@pytest.mark.parametrize(
+    ("page", "files"),
+    [
+        ("reference-config.md", "config/*.toml"),
+        ("reference-maps.md", "config/maps/*.toml"),
+        ("reference-scenarios.md", "config/scenarios/**/*.toml"),
+    ],
+)
+def test_every_key_of_a_shipped_file_is_listed(page: str, files: str) -> None:
+    listed = set(re.findall(r"^\| `(\w+)` ", reference.page_text(page), re.M))
+
+    def keys(content: object) -> set[str]:
+        if isinstance(content, list):
+            return {key for one in content for key in keys(one)}
+        if not isinstance(content, dict):
+            return set()
+        named = {key for key, value in content.items() if not isinstance(value, dict)}
+        return named.union(*(keys(value) for value in content.values()))
+
+    for path in ROOT.glob(files):
+        assert keys(tomllib.loads(path.read_text("utf-8"))) <= listed, path
+
+
+def test_a_row_of_the_reference_says_what_the_model_does() -> None:
+    page = reference.page_text("reference-config.md")
+    assert "| `piston_diameter` | m | > 0.01, < 0.15 | **needed** | Of one piston. |" in page
+    assert "## `[front]`, `[rear]`" in page
+    scenarios = reference.page_text("reference-scenarios.md")
+    assert "| `until_speed` | m/s | ≥ 0 |  | The phase ends when the speed passes it. |" in scenarios
