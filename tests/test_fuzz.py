@@ -22,8 +22,8 @@ from hypothesis import strategies as st
 
 from brakelab.bench.log_formats import convert
 from brakelab.logs.formats import kind_of, read_frames
-from brakelab.logs.log_quality import LogQuality
-from brakelab.logs.signal_file import SignalQuality, read_signals
+from brakelab.logs.log_quality import LogQuality, SignalQuality
+from brakelab.logs.signal_file import read_signals
 from ecu.algorithm.step import INITIAL, new_state
 from ecu.bus.database import load_database
 from ecu.bus.signal_map import receive_plan

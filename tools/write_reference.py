@@ -11,6 +11,7 @@ from typing import Any, Final, NamedTuple
 
 from pydantic import BaseModel
 
+from brakelab.logs.column_map import ColumnMap
 from brakelab.simulation.scenario import Scenario
 from ecu.bus.signal_map import SignalMap
 from ecu.contract.signals import INPUT_SIGNALS, without_corner
@@ -28,6 +29,8 @@ class Page(NamedTuple):
     title: str
     text: str
     model: type[BaseModel]
+    second: tuple[str, type[BaseModel]] | None = None
+    """Heading and model of another kind of this file."""
 
 
 PAGES: Final = {
@@ -43,6 +46,7 @@ PAGES: Final = {
         "A MAP says which signal of a database, or which column of a signal file, is which input of the ECU:"
         " [signal-maps.md](signal-maps.md). Complete examples: `config/maps/`.",
         SignalMap,
+        ("Keys of a map of columns", ColumnMap),
     ),
     "reference-scenarios.md": Page(
         "Keys of a scenario",
@@ -67,8 +71,11 @@ def page_text(name: str) -> str:
         "",
         *_table(schema, schema, ""),
     ]
-    if page.model is SignalMap:
-        lines += _inputs()
+    if page.second:
+        heading, model = page.second
+        schema = model.model_json_schema()
+        below = [line.replace("## `", "### `") for line in _table(schema, schema, "")]
+        lines += ["", f"## {heading}", "", *below, *_inputs()]
     return "\n".join(lines).rstrip("\n") + "\n"
 
 

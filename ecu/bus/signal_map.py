@@ -110,6 +110,9 @@ class MappedBus(NamedTuple):
 def read_signal_map(path: Path) -> SignalMap:
     """Return the checked content of a map file; raises UserError that names the key."""
     content = read_toml(path)
+    inputs = content.get("inputs")
+    if isinstance(inputs, dict) and any("column" in one for one in inputs.values() if isinstance(one, dict)):
+        raise UserError(str(path), "inputs", "maps columns of signal files; frames need messages of a database")
     try:
         return SignalMap.model_validate(content)
     except ValidationError as error:

@@ -29,6 +29,7 @@ _SPELLINGS: Final = {
     "Deg": "deg", "°": "deg", "deg/sec": "deg/s", "degrees/sec": "deg/s", "°/s": "deg/s",
     "Nm": "N m", "N*m": "N m", "m/s2": "m/s^2", "m/s²": "m/s^2", "m/s/s": "m/s^2", "G": "g", "Bar": "bar",
     "°C": "degC", "C": "degC", "1/min": "rpm", "percent": "%",
+    "KPH": "km/h", "MPH": "mph", "PSI": "psi", "Deg/Sec": "deg/s", "dps": "deg/s",
 }  # fmt: skip
 
 

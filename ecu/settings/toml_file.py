@@ -4,7 +4,7 @@ import tomllib
 from collections.abc import Callable
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, NamedTuple, get_args
+from typing import Any, NamedTuple, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
@@ -103,9 +103,14 @@ def _remedy(finding: Any, model: type[BaseModel]) -> str:
 def _table(model: type[BaseModel], keys: list[str]) -> type[BaseModel] | None:
     """Return the model of the table that `keys` lead to, None: it is none of ours."""
     table: type[BaseModel] | None = model
+    of_several = False
     for key in keys:
+        if of_several:  # a name or a number of its own
+            of_several = False
+            continue
         field = table.model_fields.get(key) if table else None
         kinds = () if field is None else (field.annotation, *get_args(field.annotation))
+        of_several = field is not None and get_origin(field.annotation) in (dict, list)
         table = next((kind for kind in kinds if isinstance(kind, type) and issubclass(kind, BaseModel)), None)
     return table
 

@@ -172,14 +172,17 @@ def report(
     return 0
 
 
-map_app = Commands(help="Make signal maps for other CAN databases.", no_args_is_help=True)
+map_app = Commands(help="Make signal maps for other CAN databases and signal files.", no_args_is_help=True)
 app.add_typer(map_app, name="map")
 
 
 @map_app.command()
 def suggest(
     log: Annotated[Path, typer.Argument(metavar="LOG", help="Recorded drive")],
-    dbc: Annotated[Path, typer.Option("--dbc", metavar="DB", help="CAN database of the car")],
+    dbc: Annotated[
+        Path | None,
+        typer.Option("--dbc", metavar="DB", help="CAN database of the car; a signal file needs none"),
+    ] = None,
     config: Annotated[Path | None, CONFIG_OPTION] = None,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="MAP.toml", help="Map to write; default: print it")

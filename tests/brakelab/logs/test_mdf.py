@@ -12,9 +12,9 @@ from asammdf import MDF, Signal
 from brakelab.bench.log_formats import write_mdf
 from brakelab.logs import mdf as mdf_reader
 from brakelab.logs.formats import kind_of, read_frames
-from brakelab.logs.log_quality import Damage, LogQuality
+from brakelab.logs.log_quality import Damage, LogQuality, SignalQuality
 from brakelab.logs.mdf_channels import open_channels, read_channels
-from brakelab.logs.signal_file import SignalQuality, read_signals
+from brakelab.logs.signal_file import read_signals
 from ecu.contract.records import FRAME, FRAME_ERROR, FRAME_EXTENDED, FRAME_FD, RecordArray
 from ecu.contract.signals import ACCEL_X, INPUT_SIGNALS, WHEEL_SPEED
 from ecu.errors import UserError

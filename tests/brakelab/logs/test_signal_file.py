@@ -9,8 +9,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from brakelab.logs import signal_file
-from brakelab.logs.signal_file import SignalQuality, read_signals
+from brakelab.logs import signal_batches
+from brakelab.logs.log_quality import SignalQuality
+from brakelab.logs.signal_file import read_signals
 from ecu.contract.signals import ACCEL_X, INPUT
 from ecu.errors import UserError
 
@@ -63,7 +64,7 @@ def test_a_10_ms_input_lies_on_the_grid_wherever_it_starts(tmp_path: Path, start
 def test_blocks_join_without_a_seam(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     t = np.arange(100) * 0.01
     path = write(tmp_path / "drive.parquet", {"t": list(t), "accel_x": list(t)})
-    monkeypatch.setattr(signal_file, "BLOCK_ROWS", 7)
+    monkeypatch.setattr(signal_batches, "BLOCK_ROWS", 7)
     quality = SignalQuality()
     values = np.concatenate([block.values for block in read_signals(path, quality)])
     np.testing.assert_array_equal(values[:, 0], t)
@@ -179,7 +180,7 @@ def test_what_can_be_read_is_read_and_the_rest_has_its_place(tmp_path: Path, dam
 def test_of_a_parquet_file_the_row_groups_before_the_damage_are_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(signal_file, "BLOCK_ROWS", 1000)
+    monkeypatch.setattr(signal_batches, "BLOCK_ROWS", 1000)
     path, t = tmp_path / "drive.parquet", np.arange(3000) * 0.01
     pq.write_table(pa.table({"t": t, "accel_x": t}), path, row_group_size=1000)
     content = bytearray(path.read_bytes())
@@ -211,7 +212,7 @@ def test_a_parquet_file_in_name_only_gives_one_line(tmp_path: Path) -> None:
 def test_a_jump_between_two_blocks_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     t = [0.01 * k + 4000.0 * (k >= 14) for k in range(20)]
     path = write(tmp_path / "drive.parquet", {"t": t, "accel_x": t})
-    monkeypatch.setattr(signal_file, "BLOCK_ROWS", 7)
+    monkeypatch.setattr(signal_batches, "BLOCK_ROWS", 7)
     with pytest.raises(UserError, match="row 14, t: time jumps"):
         list(read_signals(path, SignalQuality()))
 

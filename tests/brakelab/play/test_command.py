@@ -323,4 +323,6 @@ def test_a_map_beside_decoded_signals_is_told_to_be_of_no_use(
 ) -> None:
     path, map = write_signals(tmp_path / "drive.csv"), resource("config/maps/mustang.toml")
     assert play(path, "virtual", "play-map", map, 20.0) == 0
-    assert capsys.readouterr().err == f"{map}: not used for {path}, whose signals are decoded already\n"
+    said = capsys.readouterr().err
+    assert said.startswith(f"{map}: not used for {path}, whose signals are decoded already;")
+    assert said.count("\n") == 1

@@ -282,7 +282,7 @@ def test_a_map_beside_decoded_signals_is_told_to_be_of_no_use(
 ) -> None:
     path, map = stop(tmp_path / "stop.parquet"), resource("config/maps/mustang.toml")
     run([path], tmp_path / "out.parquet", map=map)
-    assert f"{map}: not used for {path}, whose signals are decoded already\n" in capsys.readouterr().err
+    assert f"{map}: not used for {path}, whose signals are decoded already;" in capsys.readouterr().err
 
 
 def change(path: Path, **columns: np.ndarray | float | None) -> Path:

@@ -295,7 +295,7 @@ MISTAKES: dict[str, tuple[str, str, str]] = {
     "period of nothing": (
         "period = 0.01",
         "period = 0",
-        "messages.Wheels.period: give a value above 0 (found 0)",
+        "messages.Wheels.period: give a value above 0 s (found 0)",
     ),
     "infinite time-out": (
         ', signal = "p" }',

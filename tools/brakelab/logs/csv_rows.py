@@ -41,35 +41,51 @@ def csv_columns(path: Path) -> tuple[list[str], str]:
 
 
 def csv_rows(
-    path: Path, names: list[str], delimiter: str, wanted: list[str], damage: Damage
+    path: Path,
+    names: list[str],
+    delimiter: str,
+    wanted: list[str],
+    damage: Damage,
+    skipped: int = 1,
+    decimal_comma: bool = False,
 ) -> Iterator[tuple[NDArray[np.int64], pa.RecordBatch]]:
     """Yield the lines of some rows, shape (rows,), and these rows: the columns `wanted`, as text.
 
-    `names` and `delimiter` as `csv_columns` found them. What cannot be read goes into `damage`.
+    `names` and `delimiter` as `csv_columns` found them, in a file of `skipped` lines before its rows. What
+    cannot be read goes into `damage`. With `decimal_comma` a comma in a cell is a point whatever stands
+    between the cells.
     """
-    line, rest, too_long = 2, b"", False
+    line, rest, too_long = skipped + 1, b"", False
+    pointed = decimal_comma or delimiter != ","
     with path.open("rb") as stream:
-        stream.readline()
+        for _ in range(skipped):
+            stream.readline()
         while chunk := stream.read(BLOCK_BYTES):
             if too_long:  # its beginning was counted already
                 end = chunk.find(b"\n")
                 chunk, too_long = chunk[end + 1 :] if end >= 0 else b"", end < 0
             whole, newline, rest = (rest + chunk).rpartition(b"\n")
             if newline:
-                yield _parsed(whole + newline, line, names, wanted, delimiter, damage)
+                yield _parsed(whole + newline, line, names, wanted, delimiter, pointed, damage)
                 line += whole.count(b"\n") + 1
             if len(rest) >= BLOCK_BYTES:
                 damage.note_damage(1, f"line {line}")
                 rest, too_long, line = b"", True, line + 1
     if rest.strip():
         last = Damage()
-        yield _parsed(rest + b"\n", line, names, wanted, delimiter, last)
+        yield _parsed(rest + b"\n", line, names, wanted, delimiter, pointed, last)
         if last.damaged:
             damage.cut = f"line {line}: the last line is cut off and was not used"
 
 
 def _parsed(
-    text: bytes, line: int, names: list[str], wanted: list[str], delimiter: str, damage: Damage
+    text: bytes,
+    line: int,
+    names: list[str],
+    wanted: list[str],
+    delimiter: str,
+    pointed: bool,
+    damage: Damage,
 ) -> tuple[NDArray[np.int64], pa.RecordBatch]:
     """Parse whole lines, of which the first has the number `line`."""
     pieces = text.split(b"\n")[:-1]
@@ -104,6 +120,6 @@ def _parsed(
         damage.note_damage(len(wrong), f"line {lines[row]} ({reason})")
         lines = np.delete(lines, [row for row, _ in wrong])
     columns = [table.column(name).combine_chunks() for name in wanted]
-    if delimiter != ",":
+    if pointed:
         columns = [pc.replace_substring(column, ",", ".") for column in columns]
     return lines, pa.RecordBatch.from_arrays(columns, names=wanted)

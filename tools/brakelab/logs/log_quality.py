@@ -6,7 +6,7 @@ back, and refuses a log whose clock jumps by more than an hour.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -69,6 +69,17 @@ class Damage:
         if count:
             self.damaged += count
             self.first_damaged = self.first_damaged or place
+
+
+@dataclass
+class SignalQuality(Damage):
+    """Findings in a signal file."""
+
+    rows: int = 0
+    samples: int = 0
+    unknown_columns: list[str] = field(default_factory=list)
+    zero_ns: int | None = None
+    """Date of t = 0 as Unix time, if the file says so."""
 
 
 @dataclass

@@ -70,6 +70,12 @@ class Measurement:
             for index, channel in enumerate(content.channels):
                 yield str(channel.name), group, index
 
+    def unit(self, group: int, index: int) -> str:
+        """Return the unit of a channel as the file spells it, empty: it has none."""
+        channel = self._mdf.groups[group].channels[index]
+        own = getattr(channel, "unit", "") or getattr(getattr(channel, "conversion", None), "unit", "")
+        return str(own or "")
+
     def rows(self, group: int) -> int:
         """Return how many records a group has."""
         return int(self._mdf.groups[group].channel_group.cycles_nr)

@@ -4,7 +4,7 @@ The groups are merged by time; an input has no sample in the rows of the other g
 time [s] since its start.
 """
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -27,8 +27,8 @@ class Channels(NamedTuple):
     unknown: list[str]
 
 
-def open_channels(path: Path) -> Channels:
-    """Return what an MDF4 file has of the inputs. Raises UserError for one that stands there twice."""
+def open_channels(path: Path, wanted: Collection[str] = INPUT) -> Channels:
+    """Return what an MDF4 file has of `wanted` names. Raises UserError for one that stands there twice."""
     measurement = Measurement(path)
     groups: dict[int, dict[str, int]] = {}
     unknown = []
@@ -37,7 +37,7 @@ def open_channels(path: Path) -> Channels:
         name = name.partition("\\")[0]  # measurement programs put the device behind it
         if index == measurement.master(group):
             continue
-        if name not in INPUT:
+        if name not in wanted:
             unknown.append(name)
         elif name in known:
             raise UserError(str(path), name, "stands in this file twice; keep one channel of this name")
@@ -45,6 +45,19 @@ def open_channels(path: Path) -> Channels:
             known.add(name)
             groups.setdefault(group, {})[name] = index
     return Channels(measurement, groups, unknown)
+
+
+def channel_units(path: Path) -> dict[str, str]:
+    """Return the units of all channels but time, by name."""
+    measurement = Measurement(path)
+    try:
+        return {
+            name.partition("\\")[0]: measurement.unit(group, index)
+            for name, group, index in measurement.channels()
+            if index != measurement.master(group)
+        }
+    finally:
+        measurement.close()
 
 
 def read_channels(

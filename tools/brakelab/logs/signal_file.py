@@ -5,25 +5,22 @@ microseconds relative to the first row, so that 0.1 + 0.2 and 0.3 are one instan
 input at one instant the last counts.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from brakelab.logs.csv_rows import csv_columns, csv_rows
-from brakelab.logs.log_quality import MAX_JUMP_NS, Damage
-from brakelab.logs.mdf_channels import open_channels, read_channels
+from brakelab.logs.column_map import ColumnUse, FileUse, MappedFile
+from brakelab.logs.log_quality import MAX_JUMP_NS, SignalQuality
+from brakelab.logs.signal_batches import Batch, is_csv, mapped_batches, plain_batches
 from ecu.bus.freshness import input_freshness
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import INPUT, INPUT_SIGNALS
 from ecu.errors import UserError
 
-BLOCK_ROWS: Final = 1 << 16
 FEW_ROWS: Final = 10  # too few to judge their distance
 SLOWEST_STEP: Final = 0.9  # s, above: no input would stay alive, so t is probably not in seconds
 SLOWEST_S: Final = 0.3
@@ -31,6 +28,8 @@ SLOWEST_S: Final = 0.3
 LATEST: Final = 9e9  # s, the year 2255 as Unix time
 _SHOWN: Final = 20  # names in a line
 _REMEDY: Final = f"give t [s] and columns such as {', '.join(list(INPUT)[:3])} (contract input names)"
+
+_OR_MAP: Final = ", or the map of columns that `map suggest` proposes: --map MAP"
 
 
 class SampleBlock(NamedTuple):
@@ -45,63 +44,52 @@ class SampleBlock(NamedTuple):
     """NaN: no sample, shape (rows, columns), units of the contract."""
 
 
-@dataclass
-class SignalQuality(Damage):
-    """Findings in a signal file."""
-
-    rows: int = 0
-    samples: int = 0
-    unknown_columns: list[str] = field(default_factory=list)
-    zero_ns: int | None = None
-    """Date of t = 0 as Unix time, if the file says so."""
-
-
-def freshness_at_any_rate() -> RecordArray:
+def freshness_at_any_rate(timeouts: Mapping[int, float] | None = None) -> RecordArray:
     """Return FRESHNESS per input, nothing received yet: a signal file promises no rate.
 
-    Time-outs follow the rate of the samples, down to `SLOWEST_S` between them.
+    Time-outs follow the rate of the samples, down to `SLOWEST_S` between them, or are those that a map states
+    [s], by place.
     """
     any_rate = {place: (0.0, signal.timeout_s) for place, signal in enumerate(INPUT_SIGNALS)}
     freshness = input_freshness(any_rate, {})
     freshness["patience_ns"] = np.maximum(freshness["patience_ns"], round(1e9 * SLOWEST_S))
+    for place, timeout_s in (timeouts or {}).items():
+        for name in ("timeout_ns", "least_timeout_ns", "patience_ns"):
+            freshness[place][name] = round(1e9 * timeout_s)
     return freshness
 
 
-class _Batch(NamedTuple):
-    """Some rows of a file."""
-
-    rows: pa.RecordBatch
-    places: NDArray[np.int64]
-    """Of each row: its line in a CSV file, else its number from 0, shape (rows,)."""
-
-
-def _is_csv(path: Path) -> bool:
-    return path.suffix.lower() == ".csv"
-
-
 def _place(path: Path, number: int) -> str:
-    """Return how a user finds what `_Batch.places` names."""
-    return f"line {number}" if _is_csv(path) else f"row {number}"
+    """Return how a user finds what `Batch.places` names."""
+    return f"line {number}" if is_csv(path) else f"row {number}"
 
 
-def read_signals(path: Path, quality: SignalQuality) -> Iterator[SampleBlock]:
+def read_signals(
+    path: Path, quality: SignalQuality, mapped: MappedFile | None = None
+) -> Iterator[SampleBlock]:
     """Yield a signal file in blocks of rows; `quality` is kept up to date.
+
+    `mapped` says which of its columns are inputs; without it they have the contract's names and units.
 
     Cells that are no number and rows without `t` are left out and counted. Raises UserError with file, row
     and column for a `t` that falls, jumps or is not in seconds, an infinite value, a column without any
     number, and a file without any known column or row.
     """
-    if path.suffix.lower() == ".mf4":
-        batches = _mdf_batches(path, quality)
+    use: FileUse | None = None
+    batches: Iterator[Batch]
+    if mapped is None:
+        batches = plain_batches(path, quality)
     else:
-        batches = _csv_batches(path, quality) if _is_csv(path) else _parquet_batches(path, quality)
+        use, batches = mapped_batches(path, quality, mapped)
     origin_ns: int | None = None
     last_ns = 0
-    columns: list[str] = []
     for batch, places in batches:
-        if not columns:
-            columns = _known_columns(path, batch.schema.names, quality)
-        t = _column(path, batch, "t", places, quality)
+        if use is None:
+            known_columns = _known_columns(path, batch.schema.names, quality)
+            use = FileUse("t", 1.0, [ColumnUse(name, INPUT[name]) for name in known_columns])
+        t = _column(path, batch, use.time, places, quality)
+        if use.seconds != 1.0:
+            t = t * use.seconds
         known = np.isfinite(t)
         if not known.all():
             if not known.any():
@@ -112,7 +100,7 @@ def read_signals(path: Path, quality: SignalQuality) -> Iterator[SampleBlock]:
             batch, places, t = batch.filter(pa.array(known)), places[known], t[known]
         if not len(t):
             continue
-        _check_unit(path, t)
+        _check_unit(path, t, "" if mapped is None else f"; or state time_unit in {mapped.path}")
         if origin_ns is None:
             origin = float(t[0])
             origin_ns = last_ns = round(origin * 1e6) * 1000
@@ -130,9 +118,11 @@ def read_signals(path: Path, quality: SignalQuality) -> Iterator[SampleBlock]:
         quality.stamps_repeated += int(np.count_nonzero(steps[quality.rows == 0 :] == 0))
         _check_span(path, t_ns, last_ns, origin_ns, places, quality.rows)
         last_ns = int(t_ns[-1])
-        values = np.empty((len(t), len(columns)))
-        for column, name in enumerate(columns):
+        values = np.empty((len(t), len(use.columns)))
+        for column, (name, _, factor, offset) in enumerate(use.columns):
             values[:, column] = _column(path, batch, name, places, quality)
+            if factor != 1.0 or offset:
+                values[:, column] = values[:, column] * factor + offset
             infinite = np.flatnonzero(np.isinf(values[:, column]))
             if len(infinite):
                 raise UserError(
@@ -142,19 +132,20 @@ def read_signals(path: Path, quality: SignalQuality) -> Iterator[SampleBlock]:
                 )
         quality.rows += len(t)
         quality.samples += int(np.count_nonzero(~np.isnan(values)))
-        yield SampleBlock(np.array(t), t_ns, np.array([INPUT[name] for name in columns], np.int64), values)
+        inputs = np.array([one.place for one in use.columns], np.int64)
+        yield SampleBlock(np.array(t), t_ns, inputs, values)
     if quality.rows == 0:
         remedy = quality.cut or f"no row that can be read; {_REMEDY}"
-        raise UserError(str(path), quality.first_damaged or _place(path, 2 * _is_csv(path)), remedy)
+        raise UserError(str(path), quality.first_damaged or _place(path, 2 * is_csv(path)), remedy)
 
 
-def _check_unit(path: Path, t: NDArray[np.float64]) -> None:
+def _check_unit(path: Path, t: NDArray[np.float64], or_else: str) -> None:
     step = float(np.median(np.diff(t))) if len(t) > FEW_ROWS else 0.0
     found = f"the rows are {step:g} s apart" if step > SLOWEST_STEP else ""
     if np.abs(t).max() > LATEST:
         found = f"a value is {t[np.abs(t).argmax()]:g} s"
     if found:
-        remedy = f"t is in seconds, but {found}; convert it from ms, us or ns, or give every sample"
+        remedy = f"t is in seconds, but {found}; convert it from ms, us or ns, or give every sample{or_else}"
         raise UserError(str(path), "t", remedy)
 
 
@@ -185,9 +176,9 @@ def _check_span(
 
 
 def _known_columns(path: Path, names: list[str], quality: SignalQuality) -> list[str]:
-    where = _place(path, 1) if _is_csv(path) else "columns"
+    where = _place(path, 1) if is_csv(path) else "columns"
     if "t" not in names:
-        raise UserError(str(path), where, f"column t is missing; {_REMEDY}")
+        raise UserError(str(path), where, f"column t is missing; {_REMEDY}{_OR_MAP}")
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise UserError(str(path), where, f"column {twice[0]} stands twice; keep one")
@@ -195,7 +186,7 @@ def _known_columns(path: Path, names: list[str], quality: SignalQuality) -> list
     quality.unknown_columns = [name for name in names if name not in INPUT and name != "t"]
     if not known:
         shown = f"{', '.join(names[:_SHOWN])}{', …' if len(names) > _SHOWN else ''}"
-        raise UserError(str(path), where, f"no known input among {shown}; {_REMEDY}")
+        raise UserError(str(path), where, f"no known input among {shown}; {_REMEDY}{_OR_MAP}")
     return known
 
 
@@ -225,60 +216,3 @@ def _column(
             raise UserError(str(path), place, f"{reason}; leave the cell empty if unknown")
         quality.note_damage(len(wrong), f"{place} ({reason})")
     return values
-
-
-def _numbered(batches: Iterator[pa.RecordBatch]) -> Iterator[_Batch]:
-    done = 0
-    for batch in batches:
-        yield _Batch(batch, np.arange(done, done + batch.num_rows))
-        done += batch.num_rows
-
-
-def _names_only(names: list[str]) -> _Batch:
-    """Return no row of these columns: what is not known is listed, not read."""
-    rows = pa.RecordBatch.from_arrays([pa.array([], pa.null())] * len(names), names=names)
-    return _Batch(rows, np.empty(0, np.int64))
-
-
-def _parquet_batches(path: Path, quality: SignalQuality) -> Iterator[_Batch]:
-    try:
-        with pq.ParquetFile(path) as source:
-            names = source.schema_arrow.names
-            yield _names_only(names)
-            _note_start(source, quality)
-            wanted = [name for name in names if name == "t" or name in INPUT]
-            yield from _numbered(source.iter_batches(BLOCK_ROWS, columns=wanted))
-    except (pa.ArrowInvalid, OSError, UnicodeDecodeError) as error:
-        reason = str(error).splitlines()[0].rstrip(".")
-        if not quality.rows:
-            remedy = f"no readable Parquet file ({reason}); write it again"
-            raise UserError(str(path), "", remedy) from None
-        quality.cut = f"row {quality.rows}: cannot be read ({reason}), the rest is missing"
-
-
-def _note_start(source: pq.ParquetFile, quality: SignalQuality) -> None:
-    """Note the date of t = 0 where the metadata has that of the first row, as our own files do."""
-    start = (source.metadata.metadata or {}).get(b"start_time_ns", b"").decode("ascii", "replace")
-    if start.isdecimal() and source.metadata.num_rows:
-        first = next(source.iter_batches(1, columns=["t"])).column(0)[0].as_py()
-        if isinstance(first, float):
-            quality.zero_ns = int(start) - round(first * 1e6) * 1000
-
-
-def _mdf_batches(path: Path, quality: SignalQuality) -> Iterator[_Batch]:
-    channels = open_channels(path)
-    try:
-        quality.zero_ns = channels.measurement.start_ns()
-        inputs = [name for places in channels.groups.values() for name in places]
-        yield _names_only(["t", *inputs, *channels.unknown])
-        yield from _numbered(read_channels(path, channels, quality))
-    finally:
-        channels.measurement.close()
-
-
-def _csv_batches(path: Path, quality: SignalQuality) -> Iterator[_Batch]:
-    names, delimiter = csv_columns(path)
-    yield _names_only(names)
-    wanted = [name for name in names if name == "t" or name in INPUT]
-    for lines, rows in csv_rows(path, names, delimiter, wanted, quality):
-        yield _Batch(rows, lines)

@@ -1,22 +1,21 @@
 """`brake-ecu map check`: a dry run of a map: what feeds each input, how it comes, whether physics agrees."""
 
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from rich.box import SIMPLE
 from rich.table import Table
 
 from brakelab.log_physics.judge import judge, range_lines
 from brakelab.log_physics.samples import ANY_CAR, Collector, car_of
-from brakelab.logs.formats import kind_of
 from brakelab.replay.engine import new_ecu
 from brakelab.replay.log import log_size, replay_log
 from brakelab.replay.needed import needed_lines
 from brakelab.replay.progress import progress_bar
 from brakelab.replay.quality import Findings, quality_counts, quality_lines
-from brakelab.replay.source import load_source
+from brakelab.replay.source import Source, check_map, load_source
 from brakelab.results.console import new_console
-from ecu.bus.signal_map import MappedInput, read_signal_map
+from ecu.bus.signal_map import read_signal_map
 from ecu.contract.signals import without_corner
 from ecu.errors import UserError
 from ecu.settings.config import load_config, new_params
@@ -34,9 +33,10 @@ def check(log: Path, map: Path, config: Path | None) -> int:
     Raises:
         UserError: the map, its database, `config` or the log is not right.
     """
-    if kind_of(log) == "signals":
-        raise UserError(str(log), "", "holds signals that are decoded already; no map is needed")
-    inputs, source, findings = read_signal_map(map).inputs, load_source(map), Findings(log)
+    source, findings = load_source(map), Findings(log)
+    if unused := check_map(map, source, log):
+        raise UserError(unused, "", "map suggest proposes one")
+    inputs = _feeds(map, source)
     params = new_params(load_config(config or resource("config/suv.toml")))
     collector = Collector()
     with progress_bar("map check", log_size(log)) as advance:
@@ -61,11 +61,29 @@ def check(log: Path, map: Path, config: Path | None) -> int:
     return 1 if wrong else 0
 
 
-def _table(inputs: dict[str, MappedInput], counts: dict[str, Any]) -> Table:
+class Feed(NamedTuple):
+    """What feeds an input."""
+
+    message: str
+    """Empty: a column of a signal file."""
+    signal: str
+    factor: float
+    offset: float
+
+
+def _feeds(map: Path, source: Source) -> dict[str, Feed]:
+    if source.columns is not None:
+        columns = source.columns.content.inputs
+        return {name: Feed("", one.column, one.factor, one.offset) for name, one in columns.items()}
+    inputs = read_signal_map(map).inputs
+    return {name: Feed(one.message, one.signal, one.factor, one.offset) for name, one in inputs.items()}
+
+
+def _table(inputs: dict[str, Feed], counts: dict[str, Any]) -> Table:
     """Return a row for each input; wheels that are mapped alike share one."""
     table = Table(box=SIMPLE)
     table.add_column("input", no_wrap=True)
-    table.add_column("message.signal", overflow="fold")
+    table.add_column("message.signal or column", overflow="fold")
     for name in ("factor", "offset", "per s", "gap s", "time-out s", "refused", "least … greatest"):
         table.add_column(name, justify="right", no_wrap=True)
     seconds = 0.01 * max(counts["rows"], 1)
@@ -88,7 +106,7 @@ def _table(inputs: dict[str, MappedInput], counts: dict[str, Any]) -> Table:
         late = " !" if gap > ones[0]["timeout_s"] else ""
         table.add_row(
             name,
-            f"{message}.{' '.join(signals)}",
+            f"{message}.{' '.join(signals)}".removeprefix("."),
             f"{factor:.4g}",
             f"{offset:+.4g}" if offset else "",
             f"{samples / seconds:.1f}",

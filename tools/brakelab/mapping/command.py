@@ -11,7 +11,10 @@ from cantools.database import Database
 from rich.console import Console
 from rich.table import Table
 
-from brakelab.logs.formats import read_frames
+from brakelab.logs.column_map import read_column_map
+from brakelab.logs.formats import kind_of, read_frames
+from brakelab.logs.log_quality import SignalQuality
+from brakelab.mapping.columns import column_map_text, read_column_series
 from brakelab.mapping.names import converts, words
 from brakelab.mapping.physics import RADIUS, Found, motion_of, propose, wheel_speeds
 from brakelab.mapping.series import Series, read_series
@@ -32,10 +35,11 @@ WANTED: Final = (
 )
 SPARE: Final = 1.5  # time-out over the longest gap seen
 LONGEST: Final = 0.5  # s, a gap beyond it is a sender that fell silent
+SHOWN: Final = 20  # names in a line
 STEP: Final = 0.05  # s, time-outs are rounded up to it
 
 
-def suggest(log: Path, dbc: Path, config: Path | None, out: Path | None) -> int:
+def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) -> int:
     """Print a proposal with its evidence; write it to `out`, or print it where there is none. Returns 0.
 
     `config` is of the car: where it sends a brake torque in place of pressures, its brakes turn one into the
@@ -45,6 +49,10 @@ def suggest(log: Path, dbc: Path, config: Path | None, out: Path | None) -> int:
         UserError: the log, the database, `config` or `out` is not right, or no wheel speeds were found,
             against which everything else is judged.
     """
+    if kind_of(log) == "signals":
+        return _suggest_columns(log, out)
+    if dbc is None:
+        raise UserError("--dbc", "", f"missing; {log} holds frames: give the database of this car")
     database, strict = _load(dbc)
     findings = Findings(log)
     interfaces = findings.interfaces
@@ -69,17 +77,44 @@ def suggest(log: Path, dbc: Path, config: Path | None, out: Path | None) -> int:
     _show(found, drives)
     for line in hints + [f"{one.target}: {one.warning}" for one in found if one.warning]:
         print(line, file=sys.stderr)
+    if written := _written(text, out):
+        load_signal_map(written)
+    return 0
+
+
+def _suggest_columns(log: Path, out: Path | None) -> int:
+    """Propose a map of the columns of a signal file, as `suggest` does of frames."""
+    quality = SignalQuality()
+    columns, series = read_column_series(log, quality)
+    found, drives = propose(series)
+    if not found:
+        remedy = (
+            f"no four wheel speeds by their names among {', '.join(columns.names[:SHOWN])}; write the map"
+        )
+        raise UserError(str(log), "", f"{remedy} by hand (docs/signal-maps.md)")
+    _show(found, drives)
+    for one in found:
+        if one.warning:
+            print(f"{one.target}: {one.warning}", file=sys.stderr)
+    after = {one.target: timeout(one) for one in found}
+    if written := _written(column_map_text(log, columns, found, after), out):
+        read_column_map(written)
+        print(f"next: brake-ecu map check {log} --map {out}", file=sys.stderr)
+    return 0
+
+
+def _written(text: str, out: Path | None) -> Path | None:
+    """Print a map, or write it and return where."""
     if out is None:
         print(text)
-        return 0
+        return None
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         out.write_text(text, encoding="utf-8")
     except OSError as error:
         raise UserError(str(out), "", f"cannot be written ({error.strerror}); choose another --out") from None
-    load_signal_map(out)
     Console(stderr=True).print(f"written: {out}; check and edit it", highlight=False)
-    return 0
+    return out
 
 
 def _load(dbc: Path) -> tuple[Database, bool]:

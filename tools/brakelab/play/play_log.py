@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.logs.column_map import MappedFile
 from brakelab.logs.formats import kind_of, read_frames
 from brakelab.logs.signal_file import SampleBlock, freshness_at_any_rate, read_signals
 from brakelab.replay.quality import Findings
@@ -83,7 +84,7 @@ def contract_frames(log: Path, source: Source, findings: Findings) -> Iterator[R
     plan = contract_transmit_plan(resource("dbc/brake_ecu.dbc"), "Vehicle")
     transmission, frames = new_transmission(plan), frame_buffer(plan)
     decoded = (
-        _decoded_samples(log, findings)
+        _decoded_samples(log, source.columns, findings)
         if kind_of(log) == "signals"
         else _decoded_frames(log, source, findings)
     )
@@ -120,10 +121,13 @@ def _decoded_frames(log: Path, source: Source, findings: Findings) -> Iterator[t
             begin_cycle(inputs[0], t_ns, CYCLE_NS)
 
 
-def _decoded_samples(log: Path, findings: Findings) -> Iterator[tuple[int, Vector]]:
-    inputs, freshness = new_record(INPUTS), freshness_at_any_rate()
+def _decoded_samples(
+    log: Path, columns: MappedFile | None, findings: Findings
+) -> Iterator[tuple[int, Vector]]:
+    timeouts = columns.timeouts if columns else None
+    inputs, freshness = new_record(INPUTS), freshness_at_any_rate(timeouts)
     t_ns: int | None = None
-    for block in read_signals(log, findings.signals):
+    for block in read_signals(log, findings.signals, columns):
         for row, stamp_ns in enumerate(block.t_ns.tolist()):
             if t_ns is None:
                 t_ns = stamp_ns

@@ -24,7 +24,7 @@ from brakelab.replay.needed import (
 )
 from brakelab.replay.progress import progress_bar
 from brakelab.replay.quality import Findings, quality_counts, quality_lines
-from brakelab.replay.source import load_source, map_unused
+from brakelab.replay.source import check_map, load_source
 from brakelab.replay.summary import brakings_table, prediction_lines, taps
 from brakelab.results.console import new_console
 from brakelab.results.files import ResultWriter, brakes_path
@@ -70,8 +70,8 @@ def replay(
     source = load_source(map)
     if map:
         for log in logs:
-            if kind_of(log) == "signals":
-                print(map_unused(map, log), file=sys.stderr)
+            if line := check_map(map, source, log):
+                print(line, file=sys.stderr)
     recording = read_recording(cycles) if cycles else None
     params = new_params(vehicle)
     learned = _restore(state, vehicle, params)

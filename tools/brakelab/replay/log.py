@@ -8,6 +8,7 @@ import numpy as np
 
 from brakelab.log_physics.judge import judge
 from brakelab.log_physics.samples import Collector, car_of
+from brakelab.logs.column_map import MappedFile
 from brakelab.logs.formats import Advance, kind_of, read_frames
 from brakelab.logs.log_quality import LogQuality
 from brakelab.logs.signal_file import SampleBlock, freshness_at_any_rate, read_signals
@@ -83,7 +84,7 @@ def replay_log(
     findings.seen = ecu.seen
     kind = kind_of(path)
     if kind == "signals":
-        yield from _noted(_replay_signals(path, ecu, findings, advance), findings, ecu)
+        yield from _noted(_replay_signals(path, ecu, source.columns, findings, advance), findings, ecu)
         return
     counted = kind == "recording"
     if counted:
@@ -155,12 +156,14 @@ def _noted(rows: Iterator[Rows], findings: Findings, ecu: Ecu) -> Iterator[Rows]
     findings.physics = judge(collector.drive(), car_of(ecu.params[0]))
 
 
-def _replay_signals(path: Path, ecu: Ecu, findings: Findings, advance: Advance) -> Iterator[Rows]:
-    blocks = read_signals(path, findings.signals)
+def _replay_signals(
+    path: Path, ecu: Ecu, columns: MappedFile | None, findings: Findings, advance: Advance
+) -> Iterator[Rows]:
+    blocks = read_signals(path, findings.signals, columns)
     first = next(blocks)
     findings.mapped[first.places] = True
     ecu.params[0]["mapped"] = findings.mapped
-    freshness = findings.freshness = freshness_at_any_rate()
+    freshness = findings.freshness = freshness_at_any_rate(columns.timeouts if columns else None)
 
     def every() -> Iterator[SampleBlock]:
         yield first

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.log_physics.judge import Judged
-from brakelab.logs.log_quality import Damage, LogQuality
-from brakelab.logs.signal_file import SignalQuality
+from brakelab.logs.log_quality import Damage, LogQuality, SignalQuality
 from ecu.bus.freshness import RATE_TOLERANCE
 from ecu.bus.receive import ReceivePlan, Reception
 from ecu.contract.faults import FAULTS

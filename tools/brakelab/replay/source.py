@@ -5,11 +5,13 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from brakelab.logs.formats import interface_name
+from brakelab.logs.column_map import MappedFile, maps_columns, read_column_map
+from brakelab.logs.formats import interface_name, kind_of
 from brakelab.replay.quality import Findings
 from ecu.bus.receive import ReceivePlan, contract_receive_plan
 from ecu.bus.signal_map import load_signal_map, read_signal_map
 from ecu.contract.records import RecordArray
+from ecu.errors import UserError
 from ecu.settings.resources import resource
 
 
@@ -20,7 +22,9 @@ class Source(NamedTuple):
     bus: str
     """The interface that counts in a log of several, empty: all."""
     database_hash: str
-    """SHA-256 of the database, with a map of both."""
+    """SHA-256 of the database, with a map of both; of a map of columns."""
+    columns: MappedFile | None = None
+    """What a signal file has, None: the contract's names and units."""
 
 
 def load_source(map: Path | None) -> Source:
@@ -28,14 +32,28 @@ def load_source(map: Path | None) -> Source:
     if map is None:
         database = resource("dbc/brake_ecu.dbc")
         return Source(contract_receive_plan(database), "", _hash(database))
+    if maps_columns(map):
+        plan = contract_receive_plan(resource("dbc/brake_ecu.dbc"))
+        return Source(plan, "", _hash(map), read_column_map(map))
     mapped = load_signal_map(map)
     database = map.parent / read_signal_map(map).database
     return Source(mapped.plan, mapped.bus or "", _hash(map, database))
 
 
-def map_unused(map: Path, log: Path) -> str:
-    """Return the line for a map that comes with a file of decoded signals."""
-    return f"{map}: not used for {log}, whose signals are decoded already"
+def check_map(map: Path, source: Source, log: Path) -> str:
+    """Return a line for a map of frames that comes with a file of decoded signals, else nothing.
+
+    Raises:
+        UserError: a map of columns comes with a log of frames.
+    """
+    signals = kind_of(log) == "signals"
+    if source.columns and not signals:
+        raise UserError(
+            str(map), "inputs", f"maps columns, but {log} holds frames; map messages of a database"
+        )
+    if signals and not source.columns:
+        return f"{map}: not used for {log}, whose signals are decoded already; a map of columns would be"
+    return ""
 
 
 def _hash(*paths: Path) -> str:

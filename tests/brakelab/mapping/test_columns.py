@@ -1,0 +1,122 @@
+"""`map suggest`, `map check` and `replay` on a signal file of a logger: a drive with curves and brakings."""
+
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from ecu import cli
+
+RADIUS, TRACK, GRAVITY = 0.33, 1.55, 9.80665
+
+
+def write_drive(path: Path, seconds: float = 80.0, head: str = "") -> Path:
+    """Write a drive of 50 Hz as AiM's logger would: axes to the rear and to the right, km/h, g, deg/s."""
+    rng = np.random.default_rng(1)
+    t = np.arange(0.0, seconds, 0.02)
+    change = np.where(t % 20.0 < 10.0, 1.5, 0.0) - np.where((t % 20.0 >= 14.0) & (t % 20.0 < 19.0), 3.0, 0.0)
+    change[0:50] = 0.0
+    speed = 5.0 + np.maximum(np.cumsum(change) * 0.02, 0.0)
+    change = np.gradient(speed, 0.02)
+    yaw = 0.12 * np.sin(2.0 * np.pi * t / 13.0) * np.minimum(speed / 10.0, 1.0)
+    columns = {
+        "Time": t,
+        **{
+            f"WheelSpd_{c}": 3.6 * (speed + s * yaw * TRACK / 2)
+            for c, s in zip(("FL", "FR", "RL", "RR"), (-1, 1, -1, 1), strict=True)
+        },
+        "InlineAcc": -change / GRAVITY + rng.normal(0.0, 0.002, len(t)),
+        "LateralAcc": -speed * yaw / GRAVITY + rng.normal(0.0, 0.002, len(t)),
+        "YawRate": -np.degrees(yaw),
+        "BrakePress": np.maximum(-change, 0.0) * 10.0,
+    }
+    units = ["s", *["km/h"] * 4, "g", "g", "deg/s", "bar"]
+    rows = np.column_stack([*columns.values()])
+    text = "\n".join(",".join(f"{cell:.4f}" for cell in row) for row in rows)
+    path.write_text(f"{head}{','.join(columns)}\n{','.join(units)}\n\n{text}\n")
+    return path
+
+
+def test_suggest_check_and_replay(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = write_drive(tmp_path / "aim.csv", head='"Format","AiM CSV File"\n"Sample Rate","50"\n\n')
+    out = tmp_path / "map.toml"
+    assert cli.main(["map", "suggest", str(log), "--out", str(out)]) == 0
+    assert f"next: brake-ecu map check {log} --map {out}" in capsys.readouterr().err
+    text = out.read_text("utf-8")
+    assert 'accel_x = { column = "InlineAcc", factor = -1 }' in text
+    assert 'accel_y = { column = "LateralAcc", factor = -1 }' in text
+    assert 'yaw_rate = { column = "YawRate", factor = -1 }' in text
+    assert 'wheel_speed_rr = { column = "WheelSpd_RR" }' in text
+    assert 'calliper_pressure_fl = { column = "BrakePress" }' in text
+    assert "rolling_radius = 0.33" in text
+    assert cli.main(["map", "check", str(log), "--map", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert "physics agrees" in said
+    assert "InlineAcc" in said
+    result = tmp_path / "result.parquet"
+    assert cli.main(["replay", str(log), "--config", "suv", "--map", str(out), "--out", str(result)]) == 0
+    rows = pq.read_table(result)
+    speed = rows.column("vehicle_speed").to_numpy()
+    # the wheels turned as 18.5 m/s with the logger's radius; the car of CONFIG has 0.363 m
+    assert np.nanmax(speed) == pytest.approx(18.5 * 0.363 / RADIUS, abs=0.3)
+    brakings = pq.read_table(tmp_path / "result.brakes.parquet").to_pydict()
+    front = [
+        time for time, corner in zip(brakings["t_start"], brakings["corner"], strict=True) if corner == "fl"
+    ]
+    assert front == pytest.approx([14.0, 34.0, 54.0, 74.0], abs=0.2)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (('"InlineAcc", factor = -1', '"InlineAcc"'), "accel_x: turned against dv/dt; factor = -1"),
+        (('"YawRate", factor = -1', '"YawRate", factor = -1, unit = "rad/s"'), "yaw_rate"),
+        (('"InlineAcc"', '"LateralAcc"'), "accel_x"),
+    ],
+)
+def test_a_wrong_map_is_found_by_the_motion_of_the_car(
+    change: tuple[str, str], says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, out = write_drive(tmp_path / "aim.csv"), tmp_path / "map.toml"
+    assert cli.main(["map", "suggest", str(log), "--out", str(out)]) == 0
+    text = out.read_text("utf-8")
+    assert change[0] in text
+    out.write_text(text.replace(*change), "utf-8")
+    capsys.readouterr()
+    assert cli.main(["map", "check", str(log), "--map", str(out)]) == 1
+    assert says in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("map suggest LOG.log", "--dbc: missing"),
+        ("map suggest few.csv", "no four wheel speeds by their names among Time, ax"),
+        ("map suggest empty.csv", "the file is empty"),
+        ("replay aim.csv --config suv --out r.parquet", "or the map of columns that `map suggest` proposes"),
+        ("replay aim.csv --config suv --map bus.toml --out r.parquet", "no.dbc: no such file"),
+        (
+            "replay drive.log --config suv --map map.toml --out r.parquet",
+            "maps columns, but drive.log holds frames",
+        ),
+    ],
+)
+def test_a_mistake_is_one_line(
+    words: str, says: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_drive(tmp_path / "aim.csv", 1.0)
+    (tmp_path / "few.csv").write_text("Time,ax\ns,g\n0,1\n0.02,1\n0.04,1\n")
+    (tmp_path / "empty.csv").write_text("")
+    (tmp_path / "bus.toml").write_text(
+        'database = "no.dbc"\n[inputs]\naccel_x = { message = "M", signal = "S" }\n'
+    )
+    (tmp_path / "map.toml").write_text('[inputs]\naccel_x = { column = "ax" }\n')
+    frame = "(1.000000) can0 100#0000\n"
+    for name in ("LOG.log", "drive.log"):
+        (tmp_path / name).write_text(frame)
+    assert cli.main(words.split()) == 2
+    said = capsys.readouterr().err
+    assert says in said
+    assert said.count("\n") == 1

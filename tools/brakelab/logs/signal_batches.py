@@ -1,0 +1,188 @@
+"""Rows of signal files as they stand there: Parquet, CSV and MDF4, by the names that are wanted."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from brakelab.logs.column_map import SECONDS, FileUse, MappedFile, resolve, time_column
+from brakelab.logs.csv_header import CsvHeader, find_header
+from brakelab.logs.csv_rows import csv_columns, csv_rows
+from brakelab.logs.log_quality import SignalQuality
+from brakelab.logs.mdf_channels import channel_units, open_channels, read_channels
+from ecu.contract.signals import INPUT
+from ecu.errors import UserError
+
+BLOCK_ROWS: Final = 1 << 16
+MDF_TIME: Final = "t"
+
+
+class Batch(NamedTuple):
+    """Some rows of a file."""
+
+    rows: pa.RecordBatch
+    places: NDArray[np.int64]
+    """Of each row: its line in a CSV file, else its number from 0, shape (rows,)."""
+
+
+def is_csv(path: Path) -> bool:
+    """Return whether a file is CSV by its name."""
+    return path.suffix.lower() == ".csv"
+
+
+def _is_mdf(path: Path) -> bool:
+    return path.suffix.lower() == ".mf4"
+
+
+def plain_batches(path: Path, quality: SignalQuality) -> Iterator[Batch]:
+    """Yield the rows of a file with the contract's names; the first has no row, but all names of the file."""
+    if _is_mdf(path):
+        return _mdf_batches(path, quality)
+    return _csv_batches(path, quality) if is_csv(path) else _parquet_batches(path, quality)
+
+
+class Columns(NamedTuple):
+    """Columns of a file of whatever program."""
+
+    names: list[str]
+    units: dict[str, str]
+    """As the file spells them, by name."""
+    titles: dict[str, str]
+    """Names by what stands above the column."""
+    header: CsvHeader | None
+    """Of a CSV file."""
+
+
+def columns_of(path: Path) -> Columns:
+    """Return the columns of a file; time among them, but in MDF4. Raises UserError for a file without any."""
+    if is_csv(path):
+        header = find_header(path)
+        units = dict(zip(header.names, header.units, strict=True))
+        titles = dict(zip(header.titles, header.names, strict=True))
+        devices = [(name.partition("\\")[0], name) for name in header.names]  # INCA: signal\device:raster
+        short = [name for name, _ in devices]
+        titles |= {name: whole for name, whole in devices if short.count(name) == 1}
+        return Columns(header.names, units, titles, header)
+    if _is_mdf(path):
+        units = channel_units(path)
+        return Columns([*units], units, {}, None)
+    try:
+        schema = pq.read_schema(path)
+    except (pa.ArrowInvalid, OSError) as error:
+        raise UserError(str(path), "", f"no readable Parquet file ({error}); write it again") from None
+    units = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in schema}
+    return Columns(list(schema.names), units, {}, None)
+
+
+def mapped_batches(path: Path, quality: SignalQuality, mapped: MappedFile) -> tuple[FileUse, Iterator[Batch]]:
+    """Return what a map takes of a file, and its rows. Raises UserError for a map that does not fit it."""
+    columns = columns_of(path)
+    if _is_mdf(path):
+        if mapped.content.time is not None:
+            raise UserError(str(mapped.path), "time", f"{path} has a time of its own; remove this key")
+        known = columns._replace(names=[MDF_TIME, *columns.names])
+        use = resolve(mapped, path, known.names, {**columns.units, MDF_TIME: "s"}, {})
+    else:
+        use = resolve(mapped, path, columns.names, columns.units, columns.titles)
+    return use, rows_of(path, columns, use.names, quality)
+
+
+def time_of(path: Path, columns: Columns) -> tuple[str, float]:
+    """Return the column of time of a file and its unit in s. Raises UserError: it has none."""
+    if _is_mdf(path):
+        return MDF_TIME, 1.0
+    time = time_column(None, str(path), path, columns.names, columns.titles)
+    return time, SECONDS.get(columns.units[time].strip().lower() or "s", 1.0)
+
+
+def rows_of(path: Path, columns: Columns, wanted: Sequence[str], quality: SignalQuality) -> Iterator[Batch]:
+    """Yield the rows of a file, the columns `wanted` of it."""
+    if columns.header is not None:
+        return _headed_csv_batches(path, columns.header, list(wanted), quality)
+    if _is_mdf(path):
+        return _mdf_channels(path, [name for name in wanted if name != MDF_TIME], quality)
+    return _parquet_rows(path, list(wanted), quality)
+
+
+def _headed_csv_batches(
+    path: Path, header: CsvHeader, wanted: list[str], quality: SignalQuality
+) -> Iterator[Batch]:
+    rows = csv_rows(path, header.names, header.delimiter, wanted, quality, header.lines, decimal_comma=True)
+    for lines, batch in rows:
+        yield Batch(batch, lines)
+
+
+def _mdf_channels(path: Path, wanted: list[str], quality: SignalQuality) -> Iterator[Batch]:
+    channels = open_channels(path, wanted)
+    try:
+        quality.zero_ns = channels.measurement.start_ns()
+        yield from _numbered(read_channels(path, channels, quality))
+    finally:
+        channels.measurement.close()
+
+
+def _numbered(batches: Iterator[pa.RecordBatch]) -> Iterator[Batch]:
+    done = 0
+    for batch in batches:
+        yield Batch(batch, np.arange(done, done + batch.num_rows))
+        done += batch.num_rows
+
+
+def _names_only(names: list[str]) -> Batch:
+    """Return no row of these columns: what is not known is listed, not read."""
+    rows = pa.RecordBatch.from_arrays([pa.array([], pa.null())] * len(names), names=names)
+    return Batch(rows, np.empty(0, np.int64))
+
+
+def _parquet_batches(path: Path, quality: SignalQuality) -> Iterator[Batch]:
+    return _parquet_rows(path, None, quality)
+
+
+def _parquet_rows(path: Path, wanted: list[str] | None, quality: SignalQuality) -> Iterator[Batch]:
+    """Yield rows of the columns `wanted`; None: of the inputs, after a batch of all names."""
+    try:
+        with pq.ParquetFile(path) as source:
+            if wanted is None:
+                names = source.schema_arrow.names
+                yield _names_only(names)
+                _note_start(source, quality)
+                wanted = [name for name in names if name == "t" or name in INPUT]
+            yield from _numbered(source.iter_batches(BLOCK_ROWS, columns=wanted))
+    except (pa.ArrowInvalid, OSError, UnicodeDecodeError) as error:
+        reason = str(error).splitlines()[0].rstrip(".")
+        if not quality.rows:
+            remedy = f"no readable Parquet file ({reason}); write it again"
+            raise UserError(str(path), "", remedy) from None
+        quality.cut = f"row {quality.rows}: cannot be read ({reason}), the rest is missing"
+
+
+def _note_start(source: pq.ParquetFile, quality: SignalQuality) -> None:
+    """Note the date of t = 0 where the metadata has that of the first row, as our own files do."""
+    start = (source.metadata.metadata or {}).get(b"start_time_ns", b"").decode("ascii", "replace")
+    if start.isdecimal() and source.metadata.num_rows:
+        first = next(source.iter_batches(1, columns=["t"])).column(0)[0].as_py()
+        if isinstance(first, float):
+            quality.zero_ns = int(start) - round(first * 1e6) * 1000
+
+
+def _mdf_batches(path: Path, quality: SignalQuality) -> Iterator[Batch]:
+    channels = open_channels(path)
+    try:
+        quality.zero_ns = channels.measurement.start_ns()
+        inputs = [name for places in channels.groups.values() for name in places]
+        yield _names_only(["t", *inputs, *channels.unknown])
+        yield from _numbered(read_channels(path, channels, quality))
+    finally:
+        channels.measurement.close()
+
+
+def _csv_batches(path: Path, quality: SignalQuality) -> Iterator[Batch]:
+    names, delimiter = csv_columns(path)
+    yield _names_only(names)
+    wanted = [name for name in names if name == "t" or name in INPUT]
+    for lines, rows in csv_rows(path, names, delimiter, wanted, quality):
+        yield Batch(rows, lines)

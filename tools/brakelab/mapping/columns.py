@@ -1,0 +1,104 @@
+"""Columns of a signal file as series, and the map of columns that is proposed from them."""
+
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from brakelab.logs.column_map import SECONDS, TIMES
+from brakelab.logs.log_quality import SignalQuality
+from brakelab.logs.signal_batches import Columns, columns_of, rows_of, time_of
+from brakelab.mapping.names import converts
+from brakelab.mapping.physics import RADIUS, Found
+from brakelab.mapping.series import FEWEST, Series, Vector
+from ecu.bus.units import spelled
+from ecu.errors import UserError
+
+FLAG: Final = {0.0, 1.0}
+
+
+def read_column_series(log: Path, quality: SignalQuality) -> tuple[Columns, list[Series]]:
+    """Return the columns of a signal file, and those of numbers as series.
+
+    Raises:
+        UserError: the file has no column of time, or no row.
+    """
+    columns = columns_of(log)
+    time, seconds = time_of(log, columns)
+    names = [name for name in columns.names if name != time]
+    parts: dict[str, list[Vector]] = {name: [] for name in [time, *names]}
+    for batch, _ in rows_of(log, columns, [time, *names], quality):
+        for name, values in parts.items():
+            values.append(_numbers(batch.column(name)))
+    read = {name: np.concatenate(values) if values else np.empty(0) for name, values in parts.items()}
+    t = read[time] * seconds
+    if not np.isfinite(t).any():
+        raise UserError(str(log), time, "holds no time; give a file with rows")
+    t = t - t[np.isfinite(t)][0]
+    series = [_series(name, columns.units.get(name, ""), t, read[name]) for name in names]
+    return columns, [one for one in series if len(one.t) >= FEWEST]
+
+
+def _numbers(column: "pa.Array[Any]") -> Vector:
+    if pa.types.is_null(column.type):
+        return np.full(len(column), np.nan)
+    if pa.types.is_string(column.type):
+        text = pc.utf8_trim_whitespace(column)
+        number = pc.match_substring_regex(text, r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")
+        column = pc.if_else(number, text, pa.scalar(None, pa.string()))
+    try:
+        return np.asarray(column.cast(pa.float64()).to_numpy(zero_copy_only=False), np.float64)
+    except (pa.ArrowInvalid, pa.ArrowNotImplementedError):
+        return np.full(len(column), np.nan)
+
+
+def _series(name: str, unit: str, t: Vector, value: Vector) -> Series:
+    known = np.isfinite(t) & np.isfinite(value)
+    times, first = np.unique(t[known], return_index=True)
+    values = value[known][first]
+    period = float(np.median(np.diff(times))) if len(times) > 1 else np.nan
+    flag = set(np.unique(values[:1000]).tolist()) <= FLAG and not converts(unit, "m/s")
+    return Series("", name, unit, 0, period, flag, times, values)
+
+
+def column_map_text(
+    log: Path, columns: Columns, found: list[Found], timeouts: dict[str, float | None]
+) -> str:
+    """Return a proposal as the text of a map of columns; `timeouts` [s] by input, None: the usual one."""
+    lines = [
+        f"# Proposed from {log.name}: check every line, above all the signs (ISO 8855).",
+        "# docs/signal-maps.md explains the keys.",
+        "",
+    ]
+    time = next((name for wanted in TIMES for name in columns.names if name.strip().lower() == wanted), None)
+    unit = columns.units.get(time or "", "").strip()
+    if time is not None and columns.header is not None:
+        known = unit.lower() in SECONDS
+        lines.append(
+            f'time = "{time}"' + ("" if known else '\ntime_unit = "s"  # CHECK: the file does not say')
+        )
+    wheel = next(one.series for one in found if one.target == "wheel_speed_fl")
+    if not converts(wheel.unit, "rad/s"):
+        lines.append(f"rolling_radius = {RADIUS}  # m, assumed: give the one with which the logger works")
+    lines += ["", "[inputs]"]
+    told = ""
+    for one in found:
+        if one.evidence != told:
+            lines.append(f"# {one.evidence}")
+            told = one.evidence
+        if one.warning:
+            lines.append(f"# CHECK: {one.warning}")
+        entry = f'column = "{one.series.signal}"'
+        if one.factor != 1.0:
+            entry += f", factor = {one.factor:.6g}"
+        if one.offset:
+            entry += f", offset = {one.offset:.6g}"
+        if one.unit != spelled(one.series.unit) or not one.series.unit.strip():
+            entry += f', unit = "{one.unit}"'
+        after = timeouts[one.target]
+        if after:
+            entry += f", timeout = {after:g}"
+        lines.append(f"{one.target} = {{ {entry} }}")
+    return "\n".join(lines) + "\n"
