@@ -112,7 +112,7 @@ def read_signal_map(path: Path) -> SignalMap:
     content = read_toml(path)
     inputs = content.get("inputs")
     if isinstance(inputs, dict) and any("column" in one for one in inputs.values() if isinstance(one, dict)):
-        raise UserError(str(path), "inputs", "maps columns of signal files; frames need messages of a database")
+        raise UserError(str(path), "inputs", "maps columns of signal files; frames need messages")
     try:
         return SignalMap.model_validate(content)
     except ValidationError as error:

@@ -83,15 +83,17 @@ def contract_frames(log: Path, source: Source, findings: Findings) -> Iterator[R
     """
     plan = contract_transmit_plan(resource("dbc/brake_ecu.dbc"), "Vehicle")
     transmission, frames = new_transmission(plan), frame_buffer(plan)
-    decoded = (
-        _decoded_samples(log, source.columns, findings)
-        if kind_of(log) == "signals"
-        else _decoded_frames(log, source, findings)
-    )
-    for number, (t_ns, values) in enumerate(decoded):
+    for number, (t_ns, values) in enumerate(decoded(log, source, findings)):
         due = transmit(plan, transmission, values, number, frames)
         frames["stamp_ns"][:due] = t_ns
         yield frames[:due]
+
+
+def decoded(log: Path, source: Source, findings: Findings) -> Iterator[tuple[int, Vector]]:
+    """Yield the time [ns] and the usable inputs, NaN: none, shape (N_INPUTS,), of every 10 ms of a log."""
+    if kind_of(log) == "signals":
+        return _decoded_samples(log, source.columns, findings)
+    return _decoded_frames(log, source, findings)
 
 
 def _decoded_frames(log: Path, source: Source, findings: Findings) -> Iterator[tuple[int, Vector]]:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from contextlib import closing
 from itertools import chain
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,25 +54,59 @@ def replay(
     out: Path,
     cycles: Path | None = None,
 ) -> int:
-    """Replay `logs` as one drive into `out` (its folder is made) and `<name>.brakes.parquet`; return 0.
-
-    An `out` that ends in .mf4 holds both.
-
-    `map` is a signal map (None: the ECU's own database), `state` the folder of the state store, `cycles` a
-    recording that gives initial state, T_k and missed periods to an independent log of the same drive.
+    """Replay `logs` as one drive into `out`, tell what was found and return 0; arguments as `replay_into`.
 
     Raises:
         UserError: an argument, the configuration, the map or a log is not right.
         RunFault: the results are written, but no needed input was ever usable.
     """
+    done = replay_into(logs, config, map, observer, state, out, cycles, progress=True)
+    for line in done.notes:
+        print(line, file=sys.stderr)
+    _tell(done)
+    if nothing_usable(done.findings):
+        names = ", ".join(group.name for group in NEEDED)
+        raise RunFault(f"{out}: not one sample of the needed inputs was usable ({names})")
+    return 0
+
+
+class Replayed(NamedTuple):
+    """What a replay wrote and found."""
+
+    writer: ResultWriter
+    findings: list[Findings]
+    notes: list[str]
+    """On the map, the logs and the inputs, one line each."""
+    nominal: Sequence[float]
+    """Configured friction of each lining."""
+
+
+def replay_into(
+    logs: Sequence[Path],
+    config: Path,
+    map: Path | None,
+    observer: str | None,
+    state: Path | None,
+    out: Path,
+    cycles: Path | None = None,
+    progress: bool = False,
+) -> Replayed:
+    """Replay `logs` as one drive into `out` (its folder is made) and `<name>.brakes.parquet`.
+
+    An `out` that ends in .mf4 holds both.
+
+    `map` is a signal map (None: the ECU's own database), `state` the folder of the state store, `cycles` a
+    recording that gives initial state, T_k and missed periods to an independent log of the same drive.
+    `progress` shows a bar.
+
+    Raises:
+        UserError: an argument, the configuration, the map or a log is not right.
+    """
     vehicle = with_observer(load_config(config), observer)
     _check(logs, out, cycles)
     check_outputs(out, (out, brakes_path(out)), [*logs, config, *([map] if map else [])])
     source = load_source(map)
-    if map:
-        for log in logs:
-            if line := check_map(map, source, log):
-                print(line, file=sys.stderr)
+    notes = [line for log in logs if map and (line := check_map(map, source, log))]
     recording = read_recording(cycles) if cycles else None
     params = new_params(vehicle)
     learned = _restore(state, vehicle, params)
@@ -79,7 +114,7 @@ def replay(
     findings = [Findings(path) for path in logs]
     with (
         ResultWriter(out, params) as writer,
-        progress_bar("replay", sum(log_size(path) for path in logs)) as advance,
+        progress_bar("replay", sum(log_size(path) for path in logs), progress) as advance,
     ):
         writer.provenance = {
             "version": __version__,
@@ -102,11 +137,8 @@ def replay(
     if state and learned is not None and learned.tobytes() != before:
         with closing(open_store(state)) as store:
             save(store, store_key(vehicle), learned)
-    _tell(writer, findings, source.plan, params[0]["mu_nominal"])
-    if nothing_usable(findings):
-        names = ", ".join(group.name for group in NEEDED)
-        raise RunFault(f"{out}: not one sample of the needed inputs was usable ({names})")
-    return 0
+    notes += _notes(findings, source.plan)
+    return Replayed(writer, findings, notes, params[0]["mu_nominal"])
 
 
 def _check(logs: Sequence[Path], out: Path, cycles: Path | None) -> None:
@@ -132,17 +164,20 @@ def _restore(state: Path | None, vehicle: Config, params: RecordArray) -> Record
     return found[1] if found else None
 
 
-def _tell(
-    writer: ResultWriter, findings: Sequence[Findings], plan: ReceivePlan, nominal: Sequence[float]
-) -> None:
+def _notes(findings: Sequence[Findings], plan: ReceivePlan) -> list[str]:
+    lines: list[str] = []
     for found in findings:
         about = (
             *(quality_lines(found, plan), needed_lines(found), request_line(found)),
             *(lacking_line(found), fault_lines(found)),
         )
         judged = (f"{found.path}: {line}" for line in found.physics.lines)
-        for line in chain(*about, judged):
-            print(line, file=sys.stderr)
+        lines += chain(*about, judged)
+    return lines
+
+
+def _tell(done: Replayed) -> None:
+    writer, findings, _, nominal = done
     console = new_console()
     frames = sum(found.log.frames for found in findings)
     samples = sum(found.signals.samples for found in findings)

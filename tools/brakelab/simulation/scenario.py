@@ -96,7 +96,7 @@ class Scenario(BaseModel):
     model_config = ScenarioTable.model_config
 
     plant: str
-    """Car: a file, or a name of config/plant."""
+    """Car: a file beside the scenario, or a name of config/plant."""
     draw: Literal["wide", "nominal"] = "wide"
     """How far the car of a seed is from its file; see `brakelab.plant.draw`."""
     payload: Payload | None = None
@@ -216,6 +216,9 @@ def load_scenario(path: Path) -> Scenario:
     trace = content.get("trace")
     if isinstance(trace, dict) and isinstance(trace.get("file"), str):
         trace["file"] = str(path.parent / trace["file"])
+    plant = content.get("plant")
+    if isinstance(plant, str) and (path.parent / plant).is_file():
+        content["plant"] = str(path.parent / plant)
     try:
         return Scenario.model_validate(content)
     except ValidationError as error:

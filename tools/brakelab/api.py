@@ -1,0 +1,225 @@
+"""Python interface: read a log, replay it, simulate a scenario; what comes back are columns with units.
+
+    from brakelab.api import load, replay, simulate
+
+Files may be given by path, or configurations, maps and scenarios by the names that are shipped, as on the
+command line. Nothing is printed; what is wrong is an `ecu.errors.UserError`. docs/python.md has examples.
+"""
+
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from brakelab.play.play_log import decoded
+from brakelab.replay.command import replay_into
+from brakelab.replay.needed import NEEDED, nothing_usable
+from brakelab.replay.quality import Findings, damage_lines
+from brakelab.replay.source import check_map, load_source
+from brakelab.report.command import report as write_report
+from brakelab.results.files import brakes_path, read_result
+from brakelab.results.mdf import SUFFIX
+from brakelab.simulation.simulate import simulate as run_scenario
+from brakelab.table import Table
+from ecu.arguments import config_file, map_file, scenario_file
+from ecu.contract.signals import INPUT_SIGNALS, OUTPUT_SIGNALS
+from ecu.errors import UserError
+
+__all__ = ["Drive", "Result", "Simulation", "Table", "UserError", "load", "replay", "simulate"]
+
+AnyPath = str | os.PathLike[str]
+Change = float | int | bool | str | Sequence[float]
+TRUTH_UNITS = {
+    "t": "s",
+    "distance": "m",
+    "pitch": "rad",
+    "grade": "rad",
+    "heading": "rad",
+    "road_friction": "-",
+    "position_x": "m",
+    "position_y": "m",
+    "rolling_radius": "m",
+    "particles": "-",
+}
+"""Of true values that are neither input nor output."""
+INPUT_UNITS = {signal.name: signal.unit for signal in INPUT_SIGNALS}
+
+
+class Drive(Table):
+    """Inputs of a log as the ECU receives them: every 10 ms, held until their time-out; `t` [s]."""
+
+    def __init__(self, table: Table, notes: list[str]) -> None:
+        super().__init__(table.columns, table.units)
+        self.notes = notes
+        """On the log: what is damaged or missing, one line each."""
+
+
+class Result(Table):
+    """What the ECU made of a drive: its outputs every 10 ms, `t` [s]."""
+
+    def __init__(self, path: Path, notes: list[str], folder: TemporaryDirectory[str] | None) -> None:
+        rows, brakes = read_result(path), read_result(brakes_path(path))
+        super().__init__(rows.columns, rows.units)
+        self.brakings = Table(brakes.columns, brakes.units)
+        """Its brake applications, a row for each wheel of each."""
+        self.notes = notes
+        """On the map, the log and the inputs, one line each."""
+        self.metadata = rows.metadata
+        """Version, hashes, start."""
+        self.path = path
+        """File of the result; without `out` it is there as long as this object."""
+        self._folder = folder
+
+    def report(self, out: AnyPath, truth: AnyPath | None = None) -> Path:
+        """Write the page on this drive and return its path.
+
+        `truth`: true values of a simulated drive, `Simulation.truth_path`. Raises UserError if it cannot be
+        written.
+        """
+        write_report(self.path, Path(truth) if truth is not None else None, Path(out))
+        return Path(out)
+
+
+class Simulation:
+    """A simulated drive: its log, what its sensors say, what is true."""
+
+    def __init__(self, out: Path, folder: TemporaryDirectory[str] | None) -> None:
+        self._folder = folder
+        self.log = out.with_name(out.name + ".log")
+        """Frames on the bus, to be replayed."""
+        self.inputs_path = out.with_name(out.name + ".parquet")
+        self.truth_path = out.with_name(out.name + ".truth.parquet")
+        units = INPUT_UNITS | {"t": "s"}
+        inputs, truth = (read_result(path).columns for path in (self.inputs_path, self.truth_path))
+        self.inputs = Table(inputs, {name: units.get(name, "") for name in inputs})
+        """What its sensors say, every 10 ms; NaN: no new sample."""
+        self.truth = Table(truth, {name: _truth_unit(name) for name in truth})
+        """True values, every 10 ms."""
+
+
+def load(log: AnyPath, *, map: AnyPath | None = None) -> Drive:
+    """Return the inputs of a log of any format.
+
+    Args:
+        log: frames, signals or the folder of a recording (docs/logs.md).
+        map: signal map or map of columns; None: the contract's frames or names.
+
+    Raises:
+        UserError: the log or the map is not right.
+    """
+    path = Path(log)
+    if not path.exists():
+        raise UserError(str(path), "", "no such file; give an existing log")
+    found, source = Findings(path), load_source(map_file(os.fspath(map)) if map is not None else None)
+    notes = [line] if map is not None and (line := check_map(Path(map), source, path)) else []
+    samples = list(decoded(path, source, found))
+    t_ns = np.array([stamp for stamp, _ in samples], np.int64)
+    values = np.array([row for _, row in samples]).reshape(len(samples), len(INPUT_SIGNALS))
+    columns = {"t": 1e-9 * (t_ns - t_ns[0]) if len(t_ns) else np.empty(0)}
+    known = np.isfinite(values).any(axis=0)
+    columns |= {signal.name: values[:, place] for place, signal in enumerate(INPUT_SIGNALS) if known[place]}
+    units = {"t": "s"} | {name: INPUT_UNITS[name] for name in columns if name != "t"}
+    return Drive(Table(columns, units), [*notes, *damage_lines(found)])
+
+
+def replay(
+    logs: AnyPath | Sequence[AnyPath],
+    *,
+    config: AnyPath,
+    map: AnyPath | None = None,
+    observer: str | None = None,
+    state: AnyPath | None = None,
+    changes: Mapping[str, Change] | None = None,
+    out: AnyPath | None = None,
+) -> Result:
+    """Replay a drive of one log or several through the ECU.
+
+    Args:
+        logs: as for `load`; several are one drive in this order.
+        config: the car.
+        map: as for `load`.
+        observer: "joint", "observer1" or "observer2"; None: that of `config`.
+        state: folder of what was learned before, read and written; None: nothing is known.
+        changes: keys of `config` with other values, {"observer.mu_drift": 0.05}.
+        out: file of the result, Parquet; None: a temporary one.
+
+    Raises:
+        UserError: an argument, the configuration, the map or a log is not right, or no sample of an input
+            that is needed was usable.
+    """
+    if out is not None and Path(out).suffix == SUFFIX:
+        raise UserError("out", str(out), "is Parquet here; `brake-ecu replay` writes MDF4")
+    paths = [Path(logs)] if isinstance(logs, str | os.PathLike) else [Path(log) for log in logs]
+    folder = TemporaryDirectory(prefix="brake-ecu-") if out is None else None
+    written = Path(folder.name, f"{paths[0].stem}.parquet") if folder else Path(out or "")
+    with _changed(config, changes) as car:
+        done = replay_into(
+            paths,
+            car,
+            map_file(os.fspath(map)) if map is not None else None,
+            observer,
+            Path(state) if state is not None else None,
+            written,
+        )
+    if nothing_usable(done.findings):
+        names = ", ".join(group.name for group in NEEDED)
+        raise UserError(str(paths[0]), "", f"not one sample of the needed inputs was usable ({names})")
+    return Result(written, done.notes, folder)
+
+
+def simulate(
+    scenario: AnyPath,
+    *,
+    config: AnyPath,
+    seed: int = 0,
+    draw: str | None = None,
+    changes: Mapping[str, Change] | None = None,
+    out: AnyPath | None = None,
+) -> Simulation:
+    """Drive a scenario in closed loop with the ECU of `config`.
+
+    Args:
+        scenario: file or shipped name (docs/scenarios.md).
+        config: the car that the ECU believes in.
+        seed: of the car that is drawn and of its sensors' noise.
+        draw: "wide" or "nominal", how far that car is from its file; None: the scenario's.
+        changes: keys of `config` with other values.
+        out: begin of the names of log, inputs and truth; None: temporary files.
+
+    Raises:
+        UserError: a file is not right or cannot be written.
+    """
+    path = scenario_file(os.fspath(scenario))
+    folder = TemporaryDirectory(prefix="brake-ecu-") if out is None else None
+    written = Path(folder.name, path.stem) if folder else Path(out or "")
+    with _changed(config, changes) as car:
+        run_scenario(path, car, written, seed, draw)
+    return Simulation(written, folder)
+
+
+@contextmanager
+def _changed(config: AnyPath, changes: Mapping[str, Change] | None) -> Iterator[Path]:
+    """Yield the configuration, with some keys changed as a file that is there while the context lasts."""
+    path = config_file(os.fspath(config))
+    if not changes:
+        yield path
+        return
+    with TemporaryDirectory(prefix="brake-ecu-") as folder:
+        changed = Path(folder, f"{path.stem}-changed.toml")
+        keys = [f"{key} = {_toml(value)}" for key, value in changes.items()]
+        changed.write_text("\n".join([f"include = {_toml(str(path.resolve()))}", *keys]) + "\n", "utf-8")
+        yield changed
+
+
+def _toml(value: Change) -> str:
+    return json.dumps(list(value) if isinstance(value, tuple | np.ndarray) else value)
+
+
+def _truth_unit(name: str) -> str:
+    stem = name[:-3] if name[-3:] in ("_fl", "_fr", "_rl", "_rr") else name
+    outputs = {signal.name: signal.unit for signal in OUTPUT_SIGNALS}
+    return (TRUTH_UNITS | outputs).get(stem, INPUT_UNITS.get(name, ""))

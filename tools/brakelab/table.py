@@ -1,0 +1,68 @@
+"""Columns with their units, as the Python interface hands them out; as pandas, Polars or Arrow on request."""
+
+from collections.abc import Iterator, Mapping
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ecu.errors import UserError
+
+
+class Table:
+    """Columns of the same length."""
+
+    def __init__(self, columns: Mapping[str, NDArray[Any]], units: Mapping[str, str]) -> None:
+        self.columns = columns
+        """By name; NaN: not available; shape (rows,)."""
+        self.units = units
+        """By name, empty: none."""
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """Return a column. Raises UserError for a name that is none."""
+        try:
+            return self.columns[name]
+        except KeyError:
+            raise UserError("column", name, f"no such column; there are {', '.join(self.columns)}") from None
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return len(next(iter(self.columns.values()), ()))
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names of the columns."""
+        return iter(self.columns)
+
+    def to_pandas(self) -> Any:
+        """Return a pandas.DataFrame; `attrs["units"]` has the units. Raises UserError without pandas."""
+        frame = _module("pandas").DataFrame(dict(self.columns))
+        frame.attrs["units"] = dict(self.units)
+        return frame
+
+    def to_polars(self) -> Any:
+        """Return a polars.DataFrame; NaN becomes null. Raises UserError without Polars."""
+        polars = _module("polars")
+        return polars.from_arrow(self.to_arrow())
+
+    def to_arrow(self) -> Any:
+        """Return a pyarrow.Table; NaN becomes null, each field's metadata has its `unit`."""
+        import pyarrow as pa
+
+        arrays = {name: pa.array(column, from_pandas=True) for name, column in self.columns.items()}
+        fields = [
+            pa.field(name, array.type, metadata={"unit": self.units.get(name, "")})
+            for name, array in arrays.items()
+        ]
+        return pa.Table.from_arrays([*arrays.values()], schema=pa.schema(fields))
+
+    def where(self, rows: NDArray[np.bool_]) -> "Table":
+        """Return some rows, by a mask of shape (rows,)."""
+        return Table({name: column[rows] for name, column in self.columns.items()}, self.units)
+
+
+def _module(name: str) -> Any:
+    try:
+        return import_module(name)
+    except ModuleNotFoundError:
+        raise UserError(name, "", f"is not installed: pip install {name}; or use .columns") from None
