@@ -31,6 +31,7 @@ from brakelab.results.console import new_console
 from brakelab.results.files import ResultWriter, brakes_path
 from brakelab.results.mdf import SUFFIX
 from brakelab.results.outputs import check_outputs
+from brakelab.results.pads import pads_of
 from brakelab.results.prediction import SHORT
 from brakelab.simulation.observer import with_observer
 from ecu import __version__
@@ -134,6 +135,7 @@ def replay_into(
             findings, params, learned, source, write, writer.brakes.end_log, advance, recording
         )
         writer.quality = [quality_counts(found, source.plan) for found in findings]
+        writer.pads = [] if learned is None else pads_of(params, learned, vehicle)
     if state and learned is not None and learned.tobytes() != before:
         with closing(open_store(state)) as store:
             save(store, store_key(vehicle), learned)

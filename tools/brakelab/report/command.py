@@ -24,6 +24,7 @@ from brakelab.report.quality import lacks_pressure, only_told, quality_tiles, re
 from brakelab.report.sparkline import sparklines
 from brakelab.report.summary import facts, faults, tiles
 from brakelab.report.timing import read_timing, spreads
+from brakelab.report.wear_section import wear_section
 from brakelab.results.outputs import check_outputs
 from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
@@ -79,6 +80,7 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
     loop = None if timing is None else read_timing(timing)
     rows = [_row(*pair) for pair in zip(found, sparklines(drive, found), strict=True)]
     predicted = prediction_errors(found)
+    wear, wear_plots = wear_section(drive, true, result, quality, without_pressure)
     page = fill(
         {
             "over_time": plots_over_time(drive, true, found),
@@ -86,6 +88,7 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
             "prediction_plots": plots_of_prediction(found),
             "per_braking": plots_per_braking(found),
             "loop_plots": {} if loop is None else plots_of_loop(loop),
+            **wear_plots,
         },
         {
             "name": result.stem,
@@ -103,6 +106,7 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
             "prediction_errors": predicted,
             "prediction_peers": peer_errors(found),
             "accuracy": accuracy,
+            "wear": wear,
             "reduced": len(drive.t) > POINTS,
             "faults": faults(drive),
             "quality": quality,

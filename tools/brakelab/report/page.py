@@ -9,11 +9,13 @@ from typing import Any, Final, NamedTuple
 
 from bokeh.embed import components
 from bokeh.resources import Resources
-from jinja2 import Environment, StrictUndefined
+from jinja2 import DictLoader, Environment, StrictUndefined
 
 from brakelab.report.look import DARK
 
 PAGE: Final[Traversable] = files("brakelab.report") / "page.html.j2"
+PARTS: Final = ("wear_section.html.j2",)
+"""Sections that pages include."""
 _NONE = "–"
 
 
@@ -57,7 +59,13 @@ def fill(
     script, divs = components(figures)
     here = files("brakelab.report")
     # Autoescape: names of files and metadata come from outside.
-    page = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    page = Environment(
+        loader=DictLoader({name: (here / name).read_text("utf-8") for name in PARTS}),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     page.filters.update(fixed=fixed, percent=percent, signed_percent=signed_percent, kmh=kmh)
     return page.from_string(template.read_text("utf-8")).render(
         css=(here / "page.css").read_text("utf-8"),

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from brakelab.results.brakes import BRAKE_UNITS, BrakeBook, BrakeRow
 from brakelab.results.mdf import SUFFIX, load_asammdf, refuse_mdf, write_mdf
+from brakelab.results.pads import KEY, PadState, packed
 from brakelab.results.row import MEASURED_INPUTS
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import INPUT_SIGNALS, OUTPUT_COLUMNS, OUTPUT_SIGNALS, column_names
@@ -102,6 +103,8 @@ class ResultWriter:
         """Into the schema's metadata with the first rows: text as it is, everything else as JSON."""
         self.quality: list[dict[str, Any]] = []
         """Findings known at the end only: into the file's metadata under `quality`."""
+        self.pads: list[PadState] = []
+        """Likewise, under `pads`."""
         self.rows = 0
         self._unfinished = path.with_name(f".{path.name}.unfinished")
         self._file: pq.ParquetWriter | None = None
@@ -135,7 +138,7 @@ class ResultWriter:
             self._unfinished.unlink(missing_ok=True)
             return
         file = self._open()
-        file.add_key_value_metadata({"quality": json.dumps(self.quality)})
+        file.add_key_value_metadata({"quality": json.dumps(self.quality), KEY: json.dumps(packed(self.pads))})
         file.close()
         self.brakes.end_log()
         table = brakes_table(self.brakes.rows).replace_schema_metadata(_encoded(self.provenance))

@@ -13,6 +13,7 @@ from brakelab.replay.log import replay_log
 from brakelab.replay.quality import Findings
 from brakelab.replay.source import load_source
 from brakelab.results.files import MEASURED, ResultWriter
+from brakelab.results.pads import pads_of
 from brakelab.simulation.closed_loop import START_NS, Loop
 from brakelab.simulation.closed_loop import Drive as Simulated
 from brakelab.simulation.simulate import write_columns
@@ -67,9 +68,11 @@ def write_simulated(loop: Loop, drive: Simulated, config: Config, out: Path) -> 
     measured = [_held(drive.inputs[signal.name]) for signal in MEASURED]
     rows = np.column_stack([*(drive.outputs[name] for name in OUTPUT_COLUMNS), *measured])
     lives = np.isfinite(drive.outputs["mode"])
-    with ResultWriter(result, new_params(config)) as writer:
+    params = new_params(config)
+    with ResultWriter(result, params) as writer:
         _provenance(writer, config, START_NS)
         writer.write(drive.t[lives], rows[lives])
+        writer.pads = pads_of(params, loop.sides.state["learned"], config)
     return Written(result, Frames().plus(loop.sides.ecu_reception, 0), 0)
 
 
@@ -101,6 +104,7 @@ def write_recorded(recordings: Iterable[Path], config: Config, out: Path) -> Wri
                     t = np.array(1e-9 * (rows.t_ns[later] - start_ns), np.float64)
                     writer.write(np.round(t, 9), rows.values[later])
                     last_ns = int(rows.t_ns[-1])
+            writer.pads = pads_of(params, ecu.state["learned"], config)
     return Written(result, frames, differing)
 
 

@@ -1,0 +1,108 @@
+"""What each brake application wore and emitted, from `RESULT.brakes.parquet` and the rows after it."""
+
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+
+from brakelab.report.drive import Drive, Vector, numbers, read_parquet
+from brakelab.results.files import brakes_path
+from ecu.contract.signals import CORNERS
+
+_REMEDY: Final = "write it again with `brake-ecu replay`"
+_PER_CORNER: Final = (
+    "brake_energy", "disc_temperature_mean", "pad_wear_mass", "sigma_pad_wear_mass", "particle_mass",
+    "emission_factor", "emission_factor_low", "emission_factor_high",
+)  # fmt: skip
+AFTER: Final = 0.005  # s after an application: the ECU has counted its particles
+DIRTIEST: Final = 10
+
+
+class Application(NamedTuple):
+    """One brake application of any length; per corner shape (4,), NaN: not told."""
+
+    t_start: float
+    t_end: float
+    v_in: float
+    v_end: float
+    """m/s"""
+    energy: float
+    """Of the four brakes, J."""
+    worn: Vector
+    """Mass of both pads of a calliper, g."""
+    worn_sigma: Vector
+    mass: float
+    """Of particles, all brakes, mg."""
+    particles: float
+    """All brakes that have a model."""
+    particles_low: float
+    particles_high: float
+    heat: Vector
+    """Mean temperature of the discs, degC."""
+    energies: Vector
+    """J, per corner."""
+    factor: Vector
+    """log10(particles), per corner."""
+    factor_low: Vector
+    factor_high: Vector
+
+
+def read_applications(drive: Drive, result: Path) -> list[Application]:
+    """Return the brake applications of a drive in order; none without their file.
+
+    Raises:
+        UserError: the file is damaged.
+    """
+    path = brakes_path(result)
+    if not path.exists():
+        return []
+    table = read_parquet(path, _REMEDY)
+    corner = np.asarray(table.column("corner").to_pylist())
+    brake = numbers(table, "brake", path)
+    first = np.flatnonzero(corner == CORNERS[0])
+    order = np.array([np.flatnonzero(corner == name) for name in CORNERS])
+    if len(corner) == 0 or order.size != len(corner) or (brake[order] != brake[first]).any():
+        return []  # `brakings` has refused it, or there is none
+    t, duration, v_in, v_end = (
+        numbers(table, name, path)[first] for name in ("t_start", "duration", "v_in", "v_end")
+    )
+    energy, heat, worn, sigma, mass, factor, low, high = (
+        _optional(table, name, path)[order] for name in _PER_CORNER
+    )
+    after = np.searchsorted(drive.t, t + duration + AFTER)
+    ended = after < len(drive.t)
+    count, count_low, count_high = (
+        np.where(ended, drive.column(f"particles_last_brake{end}")[np.where(ended, after, 0)], np.nan)
+        for end in ("", "_low", "_high")
+    )
+    return [
+        Application(
+            float(t[k]), float(t[k] + duration[k]), float(v_in[k]), float(v_end[k]),
+            _total(energy[:, k]), worn[:, k], sigma[:, k], _total(mass[:, k]),
+            float(count[k]), float(count_low[k]), float(count_high[k]),
+            heat[:, k], energy[:, k], factor[:, k], low[:, k], high[:, k],
+        )
+        for k in range(len(t))
+    ]  # fmt: skip
+
+
+def _total(values: Vector) -> float:
+    """Return the sum over the corners that are known, NaN if none is."""
+    known = values[np.isfinite(values)]
+    return float(known.sum()) if known.size else float("nan")
+
+
+def _optional(table: pa.Table, name: str, path: Path) -> Vector:
+    if name in table.column_names:
+        return numbers(table, name, path)
+    return np.full(len(table), np.nan)
+
+
+def dirtiest(applications: list[Application]) -> list[Application]:
+    """Return the `DIRTIEST` applications, by particles where they are counted, else by their mass."""
+    counted = [each for each in applications if np.isfinite(each.particles)]
+    weighed = [each for each in applications if np.isfinite(each.mass) and each.mass > 0.0]
+    if counted:
+        return sorted(counted, key=lambda each: -each.particles)[:DIRTIEST]
+    return sorted(weighed, key=lambda each: -each.mass)[:DIRTIEST]

@@ -1,0 +1,144 @@
+"""The report's section on wear and dust: its tables, from what the ECU counted in the drive and for life."""
+
+import math
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from brakelab.report.drive import Drive
+from brakelab.report.page import fixed
+from brakelab.report.quality import Quality
+from brakelab.report.wear_applications import Application, dirtiest, read_applications
+from brakelab.report.wear_plots import BAND, plots_of_emission, plots_of_wear
+from brakelab.report.wear_roads import KINDS, roads, way
+from brakelab.report.wear_untold import OUTSIDE, told_share, untold
+from brakelab.results.pads import KEY, PadState, unpacked
+from ecu.contract.signals import CORNERS
+from ecu.errors import UserError
+
+LIMITS: Final = (7.0, 3.0)
+"""mg/km over the WLTP-Brake cycle, Regulation (EU) 2024/1257: cars and light vans, battery electric ones."""
+LEAST_WAY: Final = 1.0  # km, below which nothing is said per distance
+
+
+class Amount(NamedTuple):
+    """A quantity per km, as text: in this drive, since counting began, and the limit."""
+
+    name: str
+    drive: str
+    life: str
+    limit: str
+    above: bool
+    """The drive is above the limit of all cars but battery electric ones."""
+
+
+class Section(NamedTuple):
+    """What the template shows."""
+
+    pads: list[PadState]
+    thickness: list[str]
+    """Of each of `pads`, with its 95 % band."""
+    known_by: list[str]
+    roads: list[Any]
+    kinds: str
+    amounts: list[Amount]
+    linings: float
+    """Share of the brakes in the work of brakes and motors; NaN: not known."""
+    dirtiest: list[Application]
+    counted: bool
+    """The dirtiest are by particles, else by mass."""
+    untold: list[Any]
+
+
+def wear_section(
+    drive: Drive, truth: Drive | None, result: Path, quality: Quality | None, without_pressure: bool
+) -> tuple[Section, dict[str, dict[str, Any]]]:
+    """Return the section on the drive of `result` and its plots by place.
+
+    Raises:
+        UserError: the metadata or the file of brake applications are damaged.
+    """
+    try:
+        pads = unpacked(drive.metadata.get(KEY, ""))
+    except (ValueError, TypeError, AttributeError) as error:
+        remedy = f"not readable ({error!r}); write the result again with `brake-ecu replay`"
+        raise UserError(str(result), f"metadata {KEY}", remedy) from None
+    applications = read_applications(drive, result)
+    lacks = untold(drive, quality, without_pressure, pads, applications)
+    tells = not without_pressure and drive.has("vehicle_speed")
+    pads = [pad for pad in pads if tells and drive.has(f"pad_wear_{pad.corner}")]
+    worst = dirtiest(applications) if tells else []
+    section = Section(
+        pads,
+        [f"{pad.thickness:.2f} ± {BAND * pad.sigma:.2f}" for pad in pads],
+        [_known_by(pad) for pad in pads],
+        roads(drive, applications) if tells else [],
+        ", ".join(f"{name} to {high:.0f} km/h" for name, high in KINDS[:-1]) + f", {KINDS[-1][0]} above",
+        _amounts(drive, pads, applications) if tells else [],
+        _share(drive),
+        worst,
+        any(math.isfinite(each.particles) for each in worst),
+        lacks,
+    )
+    plots = {
+        "wear_plots": plots_of_wear(drive, truth, pads) if tells else {},
+        "emission_plots": plots_of_emission(applications) if tells else {},
+    }
+    return section, plots
+
+
+def _known_by(pad: PadState) -> str:
+    if pad.measurements:
+        times = "once" if pad.measurements == 1 else f"{pad.measurements} times"
+        return f"measured {times}, {pad.scale:.2f} of the law"
+    return "fitted as new, by the law" if pad.told else "by the law, from a full lining"
+
+
+def _amounts(drive: Drive, pads: list[PadState], applications: list[Application]) -> list[Amount]:
+    km = 1e-3 * float(way(drive)[-1])
+    mass = sum(each.mass for each in applications if math.isfinite(each.mass))
+    weighed = any(math.isfinite(each.mass) for each in applications)
+    per_km = mass / km if weighed and km >= LEAST_WAY else math.nan
+    worn, sigma = (
+        np.nansum([getattr(each, name) for each in applications]) for name in ("worn", "worn_sigma")
+    )
+    band = f" ± {BAND * sigma / worn * per_km:.1f}" if worn > 0.0 and math.isfinite(per_km) else ""
+    found = []
+    life = float(drive.column("particle_mass_per_km")[-1])
+    if math.isfinite(per_km) or math.isfinite(life):
+        limit = f"{LIMITS[0]:.0f}, battery electric {LIMITS[1]:.0f}"
+        above = max(v for v in (per_km, life) if math.isfinite(v)) > LIMITS[0]
+        found.append(
+            Amount(
+                "Particles of the linings up to 10 µm [mg/km]",
+                fixed(per_km, 1) + band,
+                fixed(life, 1),
+                limit,
+                above,
+            )
+        )
+    life = float(drive.column("particles_per_km")[-1])
+    told = [each for each in applications if math.isfinite(each.particles)]
+    text = fixed(math.nan, 0)
+    if told and km >= LEAST_WAY and told_share(pads, applications) >= 1.0 - OUTSIDE:
+        low, middle, high = (
+            1e-9 * sum(getattr(each, name) for each in told) / km
+            for name in ("particles_low", "particles", "particles_high")
+        )
+        text = f"{middle:.2f} ({low:.2f} to {high:.2f})"
+    if told or math.isfinite(life):
+        found.append(Amount("Particles [10⁹/km]", text, fixed(1e-9 * life, 2), "none yet", False))
+    return found
+
+
+def _share(drive: Drive) -> float:
+    """Return the share of the brakes in the work of brakes and motors while they brake."""
+    if not any(drive.has(f"motor_torque_{corner}") for corner in CORNERS):
+        return math.nan
+    speed = np.nan_to_num(np.abs(drive.column("vehicle_speed")))
+    brakes = np.nan_to_num(drive.corners("brake_torque")).clip(min=0.0).sum(axis=1)
+    brakes = float((brakes * speed)[drive.column("braking") == 1.0].sum())
+    motors = np.nan_to_num(drive.corners("motor_torque")).sum(axis=1).clip(min=0.0)
+    whole = brakes + float((motors * speed).sum())
+    return brakes / whole if whole > 0.0 else math.nan

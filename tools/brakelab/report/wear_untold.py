@@ -1,0 +1,129 @@
+"""What a result cannot tell of wear and dust, and why: one sentence each, instead of an empty plot."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from brakelab.report.drive import Drive
+from brakelab.report.quality import Quality
+from brakelab.report.wear_applications import Application
+from brakelab.results.pads import PadState
+from ecu.contract.signals import CORNERS
+from ecu.pads import LEAST_DISTANCE
+
+
+class Untold(NamedTuple):
+    """A quantity and why it is not told."""
+
+    quantity: str
+    reason: str
+
+
+def untold(
+    drive: Drive,
+    quality: Quality | None,
+    without_pressure: bool,
+    pads: list[PadState],
+    applications: list[Application],
+) -> list[Untold]:
+    """Return what cannot be told of this drive; the first alone where it holds for everything."""
+    columns = [f"pad_wear_{corner}" for corner in CORNERS]
+    if not drive.has("vehicle_speed"):
+        return [Untold("Wear and dust", "no wheel speed came in this drive: neither way nor work is known.")]
+    if not any(name in drive.columns for name in columns):
+        return [Untold("Wear and dust", "not in this result: write it again with brake-ecu replay.")]
+    missing = [corner for corner in CORNERS if not drive.has(f"pad_wear_{corner}")]
+    if without_pressure or len(missing) == len(CORNERS):
+        return [Untold("Wear and dust", "no calliper pressure came in this drive: no work is known.")]
+    found = []
+    if missing:
+        found.append(Untold(f"Wear of {', '.join(missing)}", "their calliper pressure is not in this log."))
+    own = [pad for pad in pads if pad.corner not in missing]
+    found += [*_of_pads(own), *_of_inputs(drive, quality)]
+    if not applications and drive.has("braking") and (drive.column("braking") == 1.0).any():
+        reason = "RESULT.brakes.parquet is not beside the result: keep the two together."
+        found.append(Untold("Work, mass and particles of single brakings", reason))
+    elif own:
+        found += _of_particles(own, applications)
+    return found
+
+
+def _of_pads(pads: list[PadState]) -> list[Untold]:
+    if not pads:
+        reason = "the result does not state the pads: write it again with brake-ecu replay --state."
+        return [Untold("Thickness and remaining distance", reason)]
+    found = []
+    if names := [pad.corner for pad in pads if not pad.told and not pad.measurements]:
+        reason = (
+            "nobody said what is fitted, so a full lining is counted from, with a band as wide as its life: "
+            "brake-ecu wear --new-pads or --measured says it."
+        )
+        found.append(Untold(f"Thickness of {', '.join(names)} to better than their life", reason))
+    if not any(np.isfinite(pad.remaining) for pad in pads):
+        driven = max(pad.driven for pad in pads)
+        if driven < 1e-3 * LEAST_DISTANCE:
+            reason = (
+                f"these pads were driven {driven:.1f} km and {1e-3 * LEAST_DISTANCE:.0f} km are needed: "
+                "replay the drives before this one with the same --state."
+            )
+        else:
+            reason = "nothing was worn off yet."
+        found.append(Untold("Remaining distance", reason))
+    if not all(pad.configured for pad in pads):
+        reason = "CONFIG names no [front.pad], [rear.pad]: size and law of the thesis's brake A stand in."
+        found.append(Untold("Wear of this car's own linings", reason))
+    return found
+
+
+def _of_inputs(drive: Drive, quality: Quality | None) -> list[Untold]:
+    found = []
+    if not any(drive.has(f"motor_torque_{corner}") for corner in CORNERS):
+        reason = (
+            "no motor torque is in this log; what motors brake, if there are any, counts as the linings'."
+        )
+        found.append(Untold("Share of motors in braking", reason))
+    if not any(drive.has(f"disc_temperature_{corner}") for corner in CORNERS):
+        found.append(Untold("Wear and dust against temperature", "no disc temperature is in this result."))
+    if quality is not None:
+        came = {name for name, _ in quality.inputs}
+        if not any(name.startswith("disc_temperature_measured") for name in came):
+            reason = (
+                "no measured disc temperature is in this log: wear and dust take the ECU's model, which does "
+                "not know how long the car stood before."
+            )
+            found.append(Untold("Error of the disc temperature", reason))
+        if "ambient_temperature" not in came:
+            reason = "not in this log: the discs cool to the one of CONFIG."
+            found.append(Untold("Ambient temperature", reason))
+    return found
+
+
+def _of_particles(pads: list[PadState], applications: list[Application]) -> list[Untold]:
+    without = [pad.corner for pad in pads if not pad.emission_model]
+    if without:
+        what = "Particles" if len(without) == len(pads) else f"Particles of {', '.join(without)}"
+        reason = "CONFIG has no emission model for them: brake-ecu identify dust makes one."
+        found = [Untold(what, reason)]
+        if len(without) == len(pads):
+            return found
+    else:
+        found = []
+    share = told_share(pads, applications)
+    if share < 1.0 - OUTSIDE:
+        reason = (
+            f"{100.0 * (1.0 - share):.0f} % of the work was outside what the emission model was trained on."
+        )
+        found.append(Untold("Particles per km in this drive", reason))
+    return found
+
+
+OUTSIDE = 0.10
+"""Share of the work up to which particles per km are told, as the ECU has it."""
+
+
+def told_share(pads: list[PadState], applications: list[Application]) -> float:
+    """Return the share of the work of brakes with a model of whose application particles are told."""
+    wheels = [CORNERS.index(pad.corner) for pad in pads if pad.emission_model]
+    work = np.array([np.nansum(each.energies[wheels]) for each in applications])
+    told = np.array([np.isfinite(each.particles) for each in applications], bool)
+    return float(work[told].sum() / work.sum()) if work.sum() > 0.0 else 1.0
