@@ -17,6 +17,7 @@ from brakelab.fleet.page import write_page
 from brakelab.fleet.run import Chain, Planned, run_fleet
 from brakelab.fleet.statistics import notes
 from brakelab.fleet.summary import summary_table, when
+from brakelab.fleet.wear import pads_table
 from brakelab.replay.progress import progress_bar
 from brakelab.replay.source import load_source
 from brakelab.simulation.observer import with_observer
@@ -66,6 +67,7 @@ def fleet(
     place = {(p.drive.vehicle, p.drive.name): k for k, p in enumerate(p for c in chains for p in c.drives)}
     done.sort(key=lambda summary: place[summary["vehicle"], summary["drive"]])
     pq.write_table(summary_table(done), out / "drives.parquet", compression="zstd")
+    pq.write_table(pads_table(done), out / "pads.parquet", compression="zstd")
     write_page(done, out / "report.html")
     _tell(done, replayed, sum(len(chain.drives) for chain in chains), out)
     if interrupted:

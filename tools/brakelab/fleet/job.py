@@ -29,6 +29,8 @@ class Job:
     """Changes with the content of the logs."""
     rows: str
     """File of the rows, on a disk that client and workers share; empty: none."""
+    pads: str = ""
+    """What was done to the pads before the drive, see `brakelab.fleet.manifest`."""
 
 
 class Outcome(NamedTuple):
@@ -63,7 +65,7 @@ def key_of(job: Job) -> str:
     """Return a hash of all inputs of the outcome."""
     parts = (
         *(__version__, str(LEARNED.descr), job.mark, config_hash(job.config), job.source.database_hash),
-        *(job.source.bus, hashlib.sha256(job.learned).hexdigest()),
+        *(job.source.bus, hashlib.sha256(job.learned).hexdigest(), job.pads),
     )
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 

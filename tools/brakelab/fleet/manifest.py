@@ -1,7 +1,7 @@
 """Drives of a fleet, by a pattern of file names or by a manifest.
 
 ```
-vehicle,log,time,config,map                  # CSV; time, config and map may be missing or empty
+vehicle,log,time,config,map,pads             # CSV; time, config, map and pads may be missing or empty
 car-7,2026/0001.log,2026-05-01T08:00:00Z,suv,
 car-7,2026/0002a.log;2026/0002b.log,2026-05-01T17:30:00Z,suv,        # two logs of one drive
 ```
@@ -13,7 +13,8 @@ map = "kona"
 drives = ["2026/0001.log", ["2026/0002a.log", "2026/0002b.log"]]     # in the order of driving
 ```
 Logs and files of configurations are named relative to the manifest, or as addresses. In a CSV the drives of a
-vehicle are in the order of `time` (ISO 8601 or a number); without times, in that of the rows.
+vehicle are in the order of `time` (ISO 8601 or a number); without times, in that of the rows. `pads`: done
+to the pads before the drive: `new`, `front` or `rear` (fitted), or a lining measured, `fl=9.8;fr=9.7` [mm].
 """
 
 import csv
@@ -27,10 +28,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from brakelab.fleet.files import expand
 from ecu.errors import UserError
+from ecu.pads import parse_measured
 from ecu.settings.resources import named
 from ecu.settings.toml_file import describe, read_toml
 
-COLUMNS: Final = ("vehicle", "log", "time", "config", "map")
+COLUMNS: Final = ("vehicle", "log", "time", "config", "map", "pads")
+FITTED: Final = {"new": ("front", "rear"), "front": ("front",), "rear": ("rear",)}
+"""Axles that got new pads, by the word in the column `pads`."""
 
 
 class Drive(NamedTuple):
@@ -43,6 +47,8 @@ class Drive(NamedTuple):
     """Paths or addresses of one drive, in order."""
     config: Path
     map: Path | None
+    pads: str = ""
+    """A key of `FITTED`, or measured linings as `ecu.pads.parse_measured` takes them; empty: nothing done."""
 
 
 class _Vehicle(BaseModel):
@@ -135,7 +141,7 @@ def _from_csv(path: Path, config: Path | None, map: Path | None) -> list[Drive]:
             reader = csv.DictReader(stream)
             missing = [name for name in COLUMNS[:2] if name not in (reader.fieldnames or ())]
             if missing:
-                remedy = f"column {missing[0]} is missing; a manifest has vehicle,log[,time,config,map]"
+                remedy = f"column {missing[0]} is missing; a manifest has vehicle,log[,time,config,map,pads]"
                 raise UserError(str(path), "line 1", remedy)
             rows = [(reader.line_num, row) for row in reader]
     except (OSError, UnicodeDecodeError) as error:
@@ -149,10 +155,22 @@ def _from_csv(path: Path, config: Path | None, map: Path | None) -> list[Drive]:
         own = _setting(path, row.get("config"), "config", config)
         mapped = _setting(path, row.get("map"), "config/maps", map)
         drive = _drive(row["vehicle"], logs, own, mapped, f"{path}: {place}")
+        drive = drive._replace(pads=_pads(path, place, row.get("pads")))
         timed.append((_instant(path, place, row.get("time")), drive))
     if not timed:
         raise UserError(str(path), "line 2", "no drive; give a row for each")
     return [drive for _, drive in sorted(timed, key=lambda row: row[0])]
+
+
+def _pads(path: Path, place: str, text: str | None) -> str:
+    text = (text or "").strip().replace(";", ",")
+    if text and text not in FITTED:
+        try:
+            parse_measured(text)
+        except UserError:
+            remedy = f"{text!r} is none of {', '.join(FITTED)}, nor a measured lining in mm as fl=9.8;fr=9.7"
+            raise UserError(str(path), f"{place}, pads", remedy) from None
+    return text
 
 
 def _instant(path: Path, place: str, text: str | None) -> float:

@@ -22,6 +22,7 @@ from brakelab.fleet.statistics import (
     told,
     values_of,
 )
+from brakelab.fleet.wear import Due, pads_due
 from brakelab.report.look import ESTIMATE, SHADE, new_figure
 from brakelab.report.page import Tile, fill, fixed
 from ecu import __version__
@@ -36,6 +37,7 @@ def write_page(done: Sequence[Summary], out: Path) -> None:
     """Write the page on `done`, summaries of drives; it needs no other file. Raises UserError."""
     good = [row for row in done if not row["fault"]]
     vehicles = per_vehicle(good)
+    due = pads_due(good)
     weeks = {quantity.name: by_week(good, quantity.name) for quantity in QUANTITIES}
     page = fill(
         {
@@ -49,7 +51,9 @@ def write_page(done: Sequence[Summary], out: Path) -> None:
         {
             "name": out.parent.name,
             "facts": [("Drives", f"{len(done)}"), ("brake-ecu", __version__)],
-            "tiles": _tiles(done, good, vehicles),
+            "tiles": [*_tiles(done, good, vehicles), *_next_pads(due)],
+            "due": due[:ROWS],
+            "due_left": max(len(due) - ROWS, 0),
             "outliers": outliers(vehicles)[:ROWS],
             "failed": [
                 Note(row["vehicle"], row["drive"], told(row, "fault")) for row in done if row["fault"]
@@ -87,6 +91,17 @@ def _tiles(done: Sequence[Summary], good: Sequence[Summary], vehicles: Vehicles)
         values = vehicles.values[quantity.name]
         tiles.append(_spread_tile(quantity.title, values, quantity.scale, quantity.digits, "vehicles"))
     return tiles
+
+
+def _next_pads(due: Sequence[Due]) -> list[Tile]:
+    """Return the vehicle that needs pads first, none where no remaining distance is known."""
+    if not due or not np.isfinite(due[0].pad.remaining):
+        return []
+    pad = due[0].pad
+    note = (
+        f"{due[0].vehicle}, {pad.corner}; {fixed(pad.remaining_low, 0)} to {fixed(pad.remaining_high, 0)} km"
+    )
+    return [Tile("Next pads in", fixed(pad.remaining, 0), "km", note)]
 
 
 def _spread_tile(title: str, values: Any, scale: float, digits: int, among: str) -> Tile:

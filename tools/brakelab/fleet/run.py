@@ -70,7 +70,7 @@ class Chain:
         drive, config, source, _, mark, _ = self.drives[self.place]
         file = str(rows_file(out, drive.vehicle, drive.name)) if rows else ""
         learned = self.learned.get(store_key(config), b"")
-        return Job(drive.vehicle, drive.name, drive.logs, config, source, learned, mark, file)
+        return Job(drive.vehicle, drive.name, drive.logs, config, source, learned, mark, file, drive.pads)
 
     def finish(self, outcome: Outcome) -> dict[str, Any]:
         """Go to the next drive; return the summary of this one."""

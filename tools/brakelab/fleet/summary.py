@@ -35,6 +35,9 @@ _COLUMNS: Final[tuple[tuple[str, pa.DataType, str], ...]] = (
     ("sigma_mu_b_front", pa.float64(), "-"),
     ("mu_b_rear", pa.float64(), "-"),
     ("sigma_mu_b_rear", pa.float64(), "-"),
+    ("pad_wear_mass", pa.float64(), "g"),
+    ("particle_mass_per_km", pa.float64(), "mg/km"),
+    ("particles_per_km", pa.float64(), "1/km"),
     ("degraded", pa.float64(), "s"),
     ("notes", _TEXT, "-"),
     ("logs", _TEXT, "-"),
@@ -50,7 +53,8 @@ SUMMARY_SCHEMA: Final = pa.schema(
     [pa.field(name, kind, metadata={"unit": unit}) for name, kind, unit in _COLUMNS]
 )
 """Of `drives.parquet`. `fault` is empty for a drive that is done; `learned` counts the brakings that taught
-at least one corner, `predicted` those whose prediction counts; friction is that at the end of the drive."""
+at least one corner, `predicted` those whose prediction counts; friction is that at the end of the drive.
+Emissions per km are of the life of the pads, and since the models count; `pad_wear_mass` is the drive's."""
 
 
 class DriveBook:
@@ -60,14 +64,15 @@ class DriveBook:
         self.brakes = BrakeBook(params)
         self._rows = 0
         self._metres = 0.0
-        self._last: NDArray[np.float64] = np.empty(0)
+        self.last: NDArray[np.float64] = np.empty(0)
+        """The last row, shape (N_ROW,)."""
 
     def add(self, t: NDArray[np.float64], rows: NDArray[np.float64]) -> None:
         """Add rows: `t` [s], shape (n,), and shape (n, N_ROW)."""
         self.brakes.add(t, rows)
         self._rows += len(t)
         self._metres += float(np.nan_to_num(rows[:, OUTPUT["vehicle_speed"]]).sum()) * _PERIOD
-        self._last = rows[-1].copy()
+        self.last = rows[-1].copy()
 
     def summary(self, findings: Sequence[Findings]) -> dict[str, Any]:
         """Return the columns derived from the rows and the logs."""
@@ -94,11 +99,11 @@ class DriveBook:
 
     def _friction(self) -> dict[str, float | None]:
         columns: dict[str, float | None] = {}
-        mode = corners(self._last, "mode")
+        mode = corners(self.last, "mode")
         for axle, wheels in (("front", slice(0, 2)), ("rear", slice(2, 4))):
             learned = np.isin(mode[wheels], (OBSERVING, HOLDING)).all()
             for name in ("mu_b", "sigma_mu_b"):
-                mean = float(corners(self._last, name)[wheels].mean())
+                mean = float(corners(self.last, name)[wheels].mean())
                 columns[f"{name}_{axle}"] = known(mean) if learned else None
         return columns
 

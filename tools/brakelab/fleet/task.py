@@ -16,11 +16,14 @@ from numpy.typing import NDArray
 from brakelab.fleet.files import local_copies
 from brakelab.fleet.job import Job, Outcome, failed, metadata_of, provenance
 from brakelab.fleet.summary import DriveBook
+from brakelab.fleet.wear import register_pads, wear_summary
 from brakelab.replay.drive import replay_drive
 from brakelab.replay.log import log_hash
 from brakelab.replay.needed import NEEDED, fault_lines, needed_lines, nothing_usable
 from brakelab.replay.quality import Findings, quality_lines
 from brakelab.results.files import ResultWriter, brakes_table
+from brakelab.results.pads import pads_of
+from ecu.algorithm.step import new_state
 from ecu.contract.records import LEARNED
 from ecu.errors import RunFault, UserError
 from ecu.recording.store import out_of_range
@@ -55,6 +58,9 @@ def _file(job: Job, outcome: Outcome, brakes: pa.Table) -> bytes:
 def _replay(job: Job, paths: Sequence[Path]) -> tuple[Outcome, pa.Table]:
     params = new_params(job.config)
     learned = np.frombuffer(job.learned, LEARNED).copy() if job.learned else None
+    if job.pads:
+        learned = new_state(params)["learned"].copy() if learned is None else learned
+        register_pads(learned, job.config, job.pads, f"vehicle {job.vehicle}, {job.drive}")
     findings = [Findings(path) for path in paths]
     for path in paths:
         if not path.exists():
@@ -75,6 +81,8 @@ def _replay(job: Job, paths: Sequence[Path]) -> tuple[Outcome, pa.Table]:
             after = replay_drive(
                 findings, params, learned, job.source, write, book.brakes.end_log, lambda _: None
             )
+            if writer is not None and after is not None:
+                writer.pads = pads_of(params, after, job.config)
         if nothing_usable(findings):
             names = ", ".join(group.name for group in NEEDED)
             raise RunFault(f"{paths[0]}: not one sample of the needed inputs was usable ({names})")
@@ -88,6 +96,7 @@ def _replay(job: Job, paths: Sequence[Path]) -> tuple[Outcome, pa.Table]:
         for line in (*quality_lines(found, job.source.plan), *needed_lines(found), *fault_lines(found))
     ]
     summary = provenance(job) | book.summary(findings)
+    summary |= wear_summary(params, after, job.config, book.last, book.brakes.rows)
     summary |= {"fault": "", "notes": "\n".join(notes), "sha256": "\n".join(log_hash(path) for path in paths)}
     table = brakes_table(book.brakes.rows)
     drives = pa.array([job.drive] * len(table), pa.string())

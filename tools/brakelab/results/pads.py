@@ -83,8 +83,12 @@ def unpacked(text: str) -> list[PadState]:
         ValueError: it is none.
         TypeError: a field is missing, or one too many.
     """
-    found: list[dict[str, Any]] = json.loads(text) if text else []
-    filled: list[dict[str, Any]] = [
-        {name: math.nan if value is None else value for name, value in pad.items()} for pad in found
+    return filled(json.loads(text)) if text else []
+
+
+def filled(pads: list[dict[str, Any]]) -> list[PadState]:
+    """Return the pads of `packed`. Raises TypeError: a field is missing, or one too many."""
+    known: list[dict[str, Any]] = [
+        {name: math.nan if value is None else value for name, value in pad.items()} for pad in pads
     ]
-    return [PadState(**pad) for pad in filled]
+    return [PadState(**pad) for pad in known]
