@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brakelab.identification.wear_command import identify_wear, specific_wear
+from brakelab.identification.wear_command import identify_wear
+from brakelab.identification.wear_curves import specific_wear
 from brakelab.identification.wear_programme import COLUMNS, drawn_car, programme, road_stops, write_programme
 from ecu.errors import UserError
 from ecu.settings.config import load_config
@@ -41,6 +42,31 @@ def test_a_programme_becomes_a_configuration_and_a_page(blocks, capsys):
     assert all(name in page for name in ("town-calm", "motorway-lively", "γ10", "quasi-static"))
     assert (blocks / "car.svg").is_file()
     assert "4 blocks" in capsys.readouterr().out
+
+
+def test_blocks_in_mdf4_give_the_same_law(blocks):
+    mdf = pytest.importorskip("asammdf")
+    identify_wear(blocks / "manifest.csv", CONFIG, "front", blocks / "csv.toml")
+    with (blocks / "manifest.csv").open(newline="") as file:
+        names = [row["file"] for row in csv.DictReader(file)]
+    for name in names:
+        columns = np.loadtxt(blocks / name, delimiter=",", skiprows=1).T
+        signals = [
+            mdf.Signal(samples, columns[0], name=channel)
+            for channel, samples in zip(COLUMNS[1:], columns[1:], strict=True)
+        ]
+        with mdf.MDF() as file:
+            file.append(signals)
+            file.save(blocks / Path(name).with_suffix(".mf4"), overwrite=True)
+    rewrite(blocks / "manifest.csv", lambda rows: [
+        row.update(file=row["file"].replace(".csv", ".mf4")) for row in rows
+    ])  # fmt: skip
+    identify_wear(blocks / "manifest.csv", CONFIG, "front", blocks / "mdf.toml")
+    laws = [load_config(blocks / f"{name}.toml").front.pad.coefficients for name in ("csv", "mdf")]
+    assert laws[0] == pytest.approx(laws[1], rel=1e-6)
+    (blocks / Path(names[0]).with_suffix(".mf4")).write_bytes(b"no MDF4")
+    with pytest.raises(UserError, match=r"calm.mf4: cannot be read as MDF4"):
+        identify_wear(blocks / "manifest.csv", CONFIG, "front", blocks / "mdf.toml")
 
 
 def test_a_block_has_at_least_250_applications_of_its_road():

@@ -10,6 +10,7 @@ import pyarrow.csv as pa_csv
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from brakelab.results.mdf import load_asammdf
 from ecu.errors import UserError
 
 Array = NDArray[np.float64]
@@ -33,7 +34,9 @@ def read_manifest(path: Path) -> list[dict[str, str]]:
 
 
 def read_columns(path: Path, names: tuple[str, ...], what: str) -> dict[str, Array]:
-    """Return columns of a CSV or Parquet file, each of shape (n,); NaN where a row has no value.
+    """Return columns of a CSV, Parquet or MDF4 file, each of shape (n,); NaN where a row has no value.
+
+    In MDF4 `t` is the time of the second of `names`; other channels are interpolated to it.
 
     Args:
         path: of the file.
@@ -43,6 +46,10 @@ def read_columns(path: Path, names: tuple[str, ...], what: str) -> dict[str, Arr
     Raises:
         UserError: it cannot be read, lacks a column, holds a non-number, or time does not rise.
     """
+    if path.suffix.lower() == ".mf4":
+        columns = _channels(path, names, what)
+        _check_time(path, columns["t"])
+        return columns
     try:
         table = pq.read_table(path) if path.suffix == ".parquet" else pa_csv.read_csv(path)
     except (OSError, pa.ArrowInvalid) as error:
@@ -54,9 +61,31 @@ def read_columns(path: Path, names: tuple[str, ...], what: str) -> dict[str, Arr
         columns = {name: table[name].cast(pa.float64()).to_numpy(zero_copy_only=False) for name in names}
     except pa.ArrowInvalid:
         raise UserError(str(path), "", f"{', '.join(names)} must be numbers") from None
-    if not np.all(np.diff(columns["t"]) > 0.0):
-        raise UserError(str(path), "t", "must rise from row to row")
+    _check_time(path, columns["t"])
     return columns
+
+
+def _check_time(path: Path, t: Array) -> None:
+    if not np.all(np.diff(t) > 0.0):
+        raise UserError(str(path), "t", "must rise from row to row")
+
+
+def _channels(path: Path, names: tuple[str, ...], what: str) -> dict[str, Array]:
+    load_asammdf(path)
+    from asammdf import MDF
+    from asammdf.blocks.utils import MdfException
+
+    try:
+        with MDF(path) as file:
+            if missing := [name for name in names[1:] if name not in file.channels_db]:
+                raise UserError(str(path), missing[0], f"no such channel; a {what} has {', '.join(names)}")
+            signals = [file.get(name) for name in names[1:]]
+            t = np.asarray(signals[0].timestamps, np.float64)
+            values = [np.interp(t, each.timestamps, np.asarray(each.samples, np.float64)) for each in signals]
+    except (MdfException, OSError, ValueError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise UserError(str(path), "", f"cannot be read as MDF4: {reason}") from None
+    return dict(zip(names, [t, *values], strict=True))
 
 
 def check_celsius(path: Path, name: str, values: Array, hottest: float) -> None:

@@ -7,27 +7,18 @@ from typing import Final
 import numpy as np
 
 from brakelab.identification.wear_blocks import Array, Block, Heat, read_blocks
+from brakelab.identification.wear_curves import SHARE
 from brakelab.identification.wear_fit import QUASI_STATIC, TERMS, UNITS, Fit, fit_law
 from brakelab.identification.wear_fusion import Fused, fuse
+from brakelab.identification.wear_pictures import LEGEND, law_panels
 from brakelab.results.outputs import check_outputs
-from brakelab.studies.chart import BLUE, GREEN, ORANGE, PINK, Line, Panel, write_chart
+from brakelab.studies.chart import write_chart
 from brakelab.studies.table import Table, markdown
 from ecu.errors import UserError
 from ecu.settings.config import Axle, load_config
 
 COOLING_SPEED: Final = 15.0  # m/s, speed of cooling between stops, assumed
-MOTION: Final = ((5.0, BLUE), (20.0, GREEN), (50.0, ORANGE))  # kW of friction
 ROAD: Final = 0.10  # relative: difference of the road from a laboratory (section 7.6)
-
-
-def specific_wear(coefficients: Array, temperature: Array, power: float, rate: float) -> Array:
-    """Return k_b [g/MJ] of (7.13), corrected to |omega'|, over `temperature` [degC], shape (n,).
-
-    `power` of friction [MW]; `rate` |omega'|/omega [1/s].
-    """
-    g = coefficients
-    quasi_static = g[0] + g[1] * temperature + g[2] * temperature**2
-    return np.asarray(quasi_static + (g[3] + g[4] * temperature) * rate + (g[5] + g[6] * temperature) * power)
 
 
 def leave_one_out(fit: Fit, mass: Array) -> float:
@@ -94,36 +85,15 @@ def tables(blocks: list[Block], fused: Fused, fit: Fit, static: Fit) -> list[Tab
     ]  # fmt: skip
 
 
-def write_page(page: Path, blocks: list[Block], fused: Fused, fit: Fit, static: Fit) -> None:
-    """Write the tables, Figure 7.9's surface and the residuals beside each other."""
-    heat = np.linspace(20.0, 400.0, 100)
-    rate = 0.15  # 1/s
-    lines = [
-        Line(heat, specific_wear(fit.coefficients, heat, 1e-3 * power, rate), colour)
-        for power, colour in MOTION
-    ]
-    lines.append(Line(heat, specific_wear(static.coefficients, heat, 0.0, 0.0), PINK, True))
-    top = 1.1 * max(float(line.y.max()) for line in lines)
-    most = 1.05 * float(max(fused.mass.max(), fit.predicted.max()))
-    order = np.argsort([block.temperature for block in blocks])
-    degrees = np.array([blocks[k].temperature for k in order])
-    residual = 100.0 * (fit.predicted / fused.mass - 1.0)[order]
-    wide = max(1.2 * float(np.abs(residual).max()), 1.0)
-    by_mass = np.argsort(fused.mass)
-    panels = [
-        Panel("specific wear [g/MJ]", "disc [degC]", (20.0, 400.0), (0.0, top), lines),
-        Panel("by the law over measured [g]", "measured [g]", (0.0, most), (0.0, most), [
-            Line(fused.mass[by_mass], fit.predicted[by_mass], BLUE),
-            Line(np.array([0.0, most]), np.array([0.0, most]), PINK, True),
-        ]),
-        Panel("residual [%]", "mean disc temperature [degC]", (degrees[0] - 1.0, degrees[-1] + 1.0),
-              (-wide, wide), [Line(degrees, residual, ORANGE)]),
-    ]  # fmt: skip
+def write_page(page: Path, blocks: list[Block], fused: Fused, fit: Fit, static: Fit, of_brake: float) -> None:
+    """Write the tables and the panels of the law; `of_brake`: mass that one brake slows [kg]."""
     picture = page.with_suffix(".svg")
-    legend = [(f"{power:.0f} kW", colour) for power, colour in MOTION] + [("quasi-static", PINK)]
-    write_chart(picture, panels, legend)
+    write_chart(picture, law_panels(blocks, fused.mass, fit, static, of_brake), LEGEND)
     parts = [markdown(table) for table in tables(blocks, fused, fit, static)]
-    head = f"# Wear law of {len(blocks)} blocks\n\n![Figure 7.9 and residuals]({picture.name})\n\n"
+    head = (
+        f"# Wear law of {len(blocks)} blocks\n\n![Specific wear (Figure 7.9), sensitivity (Figure 7.10), "
+        f"residuals]({picture.name})\n\n"
+    )
     page.write_text(head + "\n".join(parts).rstrip() + "\n", encoding="utf-8")
 
 
@@ -164,7 +134,7 @@ def identify_wear(manifest: Path, config: Path, axle: str, out: Path) -> int:
     sigma = float(np.hypot(leave_one_out(fit, fused.mass), ROAD))
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(car_toml(config, out, axle, fit, sigma), encoding="utf-8")
-    write_page(page, blocks, fused, fit, static)
+    write_page(page, blocks, fused, fit, static, SHARE[axle] * vehicle.vehicle.mass)
     named = zip(TERMS, fit.coefficients, UNITS, strict=True)
     kept = ", ".join(f"{name} = {value:.4g} {unit}" for name, value, unit in named if value)
     print(f"{out}: {kept}")
