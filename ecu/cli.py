@@ -37,6 +37,7 @@ from ecu.arguments import (
     State,
 )
 from ecu.cli_config import app as config_app
+from ecu.cli_watch import app as watch_app
 from ecu.errors import RunFault, UserError
 
 LABORATORY = ("bokeh", "jinja2", "pyarrow", "pymoo", "scipy")
@@ -55,6 +56,7 @@ app = Commands(
 
 
 app.add_typer(config_app, name="config")
+app.add_typer(watch_app)
 
 
 def _show_version(wanted: bool) -> None:

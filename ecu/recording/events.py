@@ -15,10 +15,10 @@ MODES: Final = ("starting", "ready", "active", "degraded", "failed")
 
 
 class EventLog:
-    """Event log of one run, written batch by batch."""
+    """Event log of one run, written batch by batch to `log`, with structlog's methods (None: structlog)."""
 
-    def __init__(self, throttle: Throttle | None = None) -> None:
-        self._log = structlog.get_logger("ecu")
+    def __init__(self, throttle: Throttle | None = None, log: Any = None) -> None:
+        self._log = log or structlog.get_logger("ecu")
         self._throttle = throttle or Throttle()
         self._mode, self._faults, self._overruns, self._dropped, self._lost = 0, 0, 0, 0, 0
         self._speaks: bool | None = None

@@ -65,7 +65,7 @@ class Ring(NamedTuple):
     frames: RecordArray
 
 
-def _folder() -> Path:
+def ring_folder() -> Path:
     """Return the folder of rings: in memory, not on a disk, where the machine has one."""
     shared = Path("/dev/shm")
     return shared if os.access(shared, os.W_OK) else Path(tempfile.gettempdir())
@@ -73,10 +73,10 @@ def _folder() -> Path:
 
 def living_rings() -> list[Path]:
     """Return our user's rings whose writers live; remove those of dead ones."""
-    folder, rings = _folder(), []
+    folder, rings = ring_folder(), []
     for path in sorted([*folder.glob("brake-ecu.*.ring"), *folder.glob("brake-ecu.*.new")]):
         try:
-            handle = _open_own(path)
+            handle = open_own(path)
         except OSError:  # another user's, or removed meanwhile
             continue
         try:
@@ -89,7 +89,7 @@ def living_rings() -> list[Path]:
     return rings
 
 
-def _open_own(path: Path) -> int:
+def open_own(path: Path) -> int:
     """Open a regular file that is ours and writable by nobody else. Raises OSError for any other."""
     handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
     found = os.fstat(handle)
@@ -107,7 +107,7 @@ def ring_path(pid: int) -> Path:
         namespace = os.stat("/proc/self/ns/pid").st_ino
     except OSError:
         namespace = 0
-    return _folder() / f"brake-ecu.{namespace}.{pid}.ring"
+    return ring_folder() / f"brake-ecu.{namespace}.{pid}.ring"
 
 
 def _round_up(size: int) -> int:
@@ -247,7 +247,7 @@ class RingReader:
 
     def __init__(self, path: Path) -> None:
         try:
-            handle = _open_own(path)
+            handle = open_own(path)
             try:
                 memory = mmap.mmap(handle, 0, prot=mmap.PROT_READ)
             finally:

@@ -211,7 +211,7 @@ def test_what_is_not_our_own_ring_is_one_line(path, forge):
 
 
 def test_rings_of_the_living_are_known_by_their_lock(tmp_path, monkeypatch):
-    monkeypatch.setattr(ring_module, "_folder", lambda: tmp_path)
+    monkeypatch.setattr(ring_module, "ring_folder", lambda: tmp_path)
     kept = Writer(
         ring_path(1), slots=8, frames=16
     )  # a process id that is not the writer's, as in a container

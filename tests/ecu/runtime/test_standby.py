@@ -183,7 +183,7 @@ DESCRIPTION = {"interface": "socketcan", "channel": "can0", "store_key": "suv/1"
 @pytest.fixture
 def first_ring(tmp_path, monkeypatch):
     """Return a ring of this process into which what was learned can be published."""
-    monkeypatch.setattr(ring_module, "_folder", lambda: tmp_path)
+    monkeypatch.setattr(ring_module, "ring_folder", lambda: tmp_path)
     ring = create_ring(ring_module.ring_path(1), DESCRIPTION, b"", slots=8, frames=8)
 
     def learned(mu_b, cycles=3):

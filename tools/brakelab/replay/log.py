@@ -55,6 +55,12 @@ def read_cycles(recording: Recording) -> RecordArray:
 
 def start_as_recorded(ecu: Ecu, recording: Recording) -> None:
     """Overwrite the ECU's state with the one before the first recorded cycle; arm it if it was armed."""
+    if recording.about.get("first_cycle", 0):
+        raise UserError(
+            str(recording.folder),
+            "recording.json",
+            "begins within a run: its cycles cannot be repeated; leave --cycles out",
+        )
     initial = recording.initial if recording.initial.dtype == INITIAL else convert_initial(recording.initial)
     if initial is None:
         raise _other_version(recording)
@@ -86,10 +92,12 @@ def replay_log(
     if kind == "signals":
         yield from _noted(_replay_signals(path, ecu, source.columns, findings, advance), findings, ecu)
         return
-    counted = kind == "recording"
+    found = read_recording(path) if kind == "recording" else None
+    log = found.frames if found else path
+    # What `watch` kept may begin within a run: with the state before it unknown, it is a log like any other.
+    counted = found is not None and not found.about.get("first_cycle", 0)
     if counted:
-        recording = read_recording(path)
-    log = recording.frames if recording and counted else path
+        recording = found
     plan = source.plan
     ecu.params[0]["mapped"] = plan.mapped
     set_raw_ends(ecu.seen, plan.signals)

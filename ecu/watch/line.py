@@ -1,0 +1,90 @@
+"""A watched daemon as one line of text or JSON, for pipes and logs."""
+
+import json
+import math
+import time
+
+from ecu.contract.faults import fault_names
+from ecu.contract.signals import CORNERS
+from ecu.recording.events import MODES
+from ecu.watch.history import COLUMN, COLUMNS, LATENESS_US, OF_CORNERS, Row
+from ecu.watch.watcher import Watcher
+
+
+def faults_of(row: Row) -> list[str]:
+    """Return the names of the faults that are active in a row."""
+    mask = row[COLUMN["active_faults"]]
+    return fault_names(int(mask)) if math.isfinite(mask) else []
+
+
+def mode_of(row: Row) -> str:
+    """Return the ECU's mode in a row by name."""
+    mode = row[COLUMN["mode"]]
+    return MODES[int(mode)] if math.isfinite(mode) and 0 <= mode < len(MODES) else "?"
+
+
+def corner_values(row: Row, name: str) -> list[float]:
+    """Return a quantity of the four corners."""
+    first = COLUMN[f"{name}_{CORNERS[0]}"]
+    return [float(value) for value in row[first : first + len(CORNERS)]]
+
+
+def whole(value: float) -> str:
+    """Return a number without decimals, a dash for one that is not available."""
+    return f"{round(value)}" if math.isfinite(value) else "–"
+
+
+def _clock(seconds: float) -> str:
+    return time.strftime("%H:%M:%S", time.localtime(seconds))
+
+
+def text_line(watcher: Watcher) -> str:
+    """Return the state now as one line of text."""
+    if watcher.trouble or not watcher.history.rows:
+        return f"{_clock(time.time())} {watcher.trouble or 'attached, no cycle yet'}"
+    row = watcher.history.rows[-1]
+    friction = " ".join(
+        f"{mu:.3f}±{sigma:.3f}"
+        for mu, sigma in zip(corner_values(row, "mu_b"), corner_values(row, "sigma_mu_b"), strict=True)
+    )
+    pressures = "/".join(whole(value) for value in corner_values(row, "calliper_pressure"))
+    discs = "/".join(whole(value) for value in corner_values(row, "disc_temperature"))
+    faults = ", ".join(faults_of(row)) or "no fault"
+    return (
+        f"{_clock(row[COLUMN['clock']])} {mode_of(row)}"
+        f" {row[COLUMN['vehicle_speed']]:.1f} m/s"
+        f" decel {row[COLUMN['decel_demand_total']]:.2f}→{-row[COLUMN['accel_x_road']]:.2f} m/s²"
+        f" mu {friction} {pressures} bar {discs} °C"
+        f" late {row[COLUMN['lateness']]:.0f} µs missed {watcher.history.missed}; {faults}"
+    )
+
+
+def json_line(watcher: Watcher) -> str:
+    """Return the state now as one line of JSON: corner quantities as lists in the order fl fr rl rr."""
+    if watcher.trouble or not watcher.history.rows:
+        return json.dumps({"clock": round(time.time(), 3), "trouble": watcher.trouble or None})
+    row = watcher.history.rows[-1]
+    plain = {
+        name: _number(row[COLUMN[name]])
+        for name in COLUMNS
+        if name[-3:] not in {f"_{corner}" for corner in CORNERS}
+    }
+    corners = {name: [_number(value) for value in corner_values(row, name)] for name in OF_CORNERS}
+    lateness = dict(zip([*map(str, LATENESS_US), "inf"], watcher.history.lateness.tolist(), strict=True))
+    return json.dumps(
+        {
+            **plain,
+            **corners,
+            **{name: round(float(row[COLUMN[name]]), 3) for name in ("t", "clock")},
+            "mode": mode_of(row),
+            "faults": faults_of(row),
+            "cycles": watcher.history.cycles,
+            "missed": watcher.history.missed,
+            "lateness_us": lateness,
+            "daemon": watcher.daemon.label if watcher.daemon else None,
+        }
+    )
+
+
+def _number(value: float) -> float | None:
+    return float(f"{value:.6g}") if math.isfinite(value) else None

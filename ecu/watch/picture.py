@@ -1,0 +1,171 @@
+"""Terminal picture of a watched daemon, for any width from 40 columns on."""
+
+import math
+import time
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+from typing import Final
+
+from rich.console import Group, RenderableType
+from rich.rule import Rule
+from rich.table import Table
+from rich.text import Text
+
+from ecu.contract.signals import CORNERS
+from ecu.watch.history import COLUMN, LATENESS_US, SHOWN_S, Row
+from ecu.watch.line import corner_values, faults_of, mode_of, whole
+from ecu.watch.watcher import Watcher
+
+BLOCKS: Final = "▁▂▃▄▅▆▇█"
+ESTIMATES: Final = ("nominal", "observing", "holding", "fault")
+STYLES: Final = {"active": "bold green", "ready": "green", "degraded": "bold yellow", "failed": "bold red"}
+KEYS: Final = "q quit  k keep  space pause  ← → 1 s  ↑ ↓ 10 s  end now"
+WIDE, MEDIUM = 100, 64
+
+
+def sparkline(values: Sequence[float], width: int, least: float) -> str:
+    """Return values as a line of blocks; `least` is the least range, NaN is left blank.
+
+    The end of the line is the end of `values`, each block the mean of its part.
+    """
+    if not values or width < 1:
+        return ""
+    edges = [round(place * len(values) / width) for place in range(width + 1)]
+    parts = [[v for v in values[a:b] if math.isfinite(v)] for a, b in pairwise(edges)]
+    means = [sum(part) / len(part) if part else math.nan for part in parts]
+    known = [mean for mean in means if math.isfinite(mean)]
+    if not known:
+        return " " * width
+    low, high = min(known), max(known)
+    low, high = (low, high) if high - low >= least else ((low + high - least) / 2, (low + high + least) / 2)
+    scale = (len(BLOCKS) - 1) / (high - low)
+    return "".join(BLOCKS[int(scale * (m - low) + 0.499)] if math.isfinite(m) else " " for m in means)
+
+
+def shown(rows: Sequence[Row], back_s: float) -> list[Row]:
+    """Return the rows of the minute that ends `back_s` before the last row."""
+    if not rows:
+        return []
+    end = rows[-1][COLUMN["t"]] - back_s
+    return [row for row in rows if end - SHOWN_S < row[COLUMN["t"]] <= end + 1e-6]
+
+
+def picture(
+    watcher: Watcher, width: int, height: int, back_s: float = 0.0, note: str = "", paused: bool = False
+) -> RenderableType:
+    """Return the whole picture: `back_s` before the last row, with a `note` to the user."""
+    rows = shown(watcher.history.rows, back_s)
+    label = watcher.daemon.label if watcher.daemon else "brake-ecu watch"
+    parts: list[RenderableType] = [Text(label, "bold", no_wrap=True, overflow="ellipsis")]
+    if watcher.trouble:
+        parts.append(Text(watcher.trouble, "bold red"))
+    if rows:
+        parts += [_state(rows[-1], back_s, paused), _corners(rows, width), *_decelerations(rows, width)]
+        parts += [Rule(style="dim"), _faults(rows[-1])]
+    if watcher.history.lateness.any():
+        parts += [Rule(style="dim"), *_lateness(watcher, width, height)]
+    parts.append(Rule(style="dim"))
+    used = 4 + sum(_height(part) for part in parts)
+    parts += _events(watcher, max(2, height - used))
+    kept = f"{watcher.history.kept_s:.0f} s can be kept"
+    parts.append(Text(note or kept, "cyan", overflow="ellipsis", no_wrap=not note))
+    parts.append(Text(KEYS, "dim", no_wrap=True, overflow="ellipsis"))
+    return Group(*parts)
+
+
+def _height(part: RenderableType) -> int:
+    return part.row_count + 1 if isinstance(part, Table) else 1
+
+
+def _state(row: Row, back_s: float, paused: bool) -> Text:
+    mode = mode_of(row)
+    when = time.strftime("%H:%M:%S", time.localtime(row[COLUMN["clock"]]))
+    line = Text(no_wrap=True, overflow="ellipsis")
+    line.append(mode.upper(), STYLES.get(mode, ""))
+    line.append(f"  {row[COLUMN['vehicle_speed']]:.1f} m/s  {when}")
+    if not row[COLUMN["speaks"]]:
+        line.append("  silent standby", "yellow")
+    if back_s > 0.0:
+        line.append(f"  {back_s:.0f} s back", "cyan")
+    if paused:
+        line.append("  paused", "cyan")
+    return line
+
+
+def _corners(rows: Sequence[Row], width: int) -> Table:
+    table = Table(
+        box=None, pad_edge=False, padding=(0, 2 if width >= MEDIUM else 1, 0, 0), header_style="dim"
+    )
+    headings = ["", "friction", "bar", "°C"]
+    headings += ["wear mm", "left %"] if width >= MEDIUM else []
+    headings += ["estimate"] if width >= MEDIUM else []
+    spark = max(0, min(60, width - 64)) if width >= WIDE else 0
+    headings += ["friction, last minute"] if spark else []
+    for heading in headings:
+        table.add_column(heading, justify="left" if heading[:1] in ("", "e") else "right", no_wrap=True)
+    row = rows[-1]
+    for place, corner in enumerate(CORNERS):
+
+        def value(name: str, place: int = place) -> float:
+            return corner_values(row, name)[place]
+
+        cells = [
+            corner,
+            f"{value('mu_b'):.3f}±{value('sigma_mu_b'):.3f}",
+            f"{whole(value('pressure_demand'))}→{whole(value('calliper_pressure'))}",
+            whole(value("disc_temperature")),
+        ]
+        if width >= MEDIUM:
+            mode = value("mode_mu_b")
+            cells += [f"{value('pad_wear'):.3f}", whole(value("pad_remaining"))]
+            cells.append(ESTIMATES[int(mode)] if math.isfinite(mode) and 0 <= mode < 4 else "?")
+        if spark:
+            place_of = COLUMN[f"mu_b_{corner}"]
+            cells.append(sparkline([float(one[place_of]) for one in rows], spark, 0.05))
+        table.add_row(*(cell.replace("nan", "–") for cell in cells))
+    return table
+
+
+def _decelerations(rows: Sequence[Row], width: int) -> Iterable[Text]:
+    row = rows[-1]
+    demanded, measured = row[COLUMN["decel_demand_total"]], -row[COLUMN["accel_x_road"]]
+    text = f"deceleration {demanded:.2f} demanded, {measured:.2f} measured m/s²"
+    yield Text(text if width >= MEDIUM else f"{demanded:.2f}→{measured:.2f} m/s²")
+    room = width - 10
+    if room >= 20:
+        for name, sign, label in (
+            ("decel_demand_total", 1.0, "demanded"),
+            ("accel_x_road", -1.0, "measured"),
+        ):
+            line = sparkline([sign * float(one[COLUMN[name]]) for one in rows], room, 1.0)
+            yield Text(f"{label:9} {line}", no_wrap=True, overflow="crop")
+
+
+def _faults(row: Row) -> Text:
+    names = faults_of(row)
+    return Text(", ".join(names), "bold red") if names else Text("no fault", "green")
+
+
+def _lateness(watcher: Watcher, width: int, height: int) -> Iterable[Text]:
+    counts = watcher.history.lateness
+    total = int(counts.sum())
+    yield Text(
+        f"{watcher.history.cycles} cycles, {watcher.history.missed} periods missed; lateness of {total} seen",
+        no_wrap=True,
+        overflow="ellipsis",
+    )
+    if height < 30:
+        return
+    labels = [f"≤ {edge} µs" for edge in LATENESS_US] + ["later"]
+    room = max(5, min(60, width - 26))
+    for label, count in zip(labels, counts.tolist(), strict=True):
+        if count:
+            bar = "█" * max(1, round(room * count / total))
+            yield Text(f"{label:>10} {bar} {100 * count / total:.2f} %", no_wrap=True, overflow="crop")
+
+
+def _events(watcher: Watcher, room: int) -> Iterable[Text]:
+    for event in list(watcher.history.events)[-room:]:
+        when = time.strftime("%H:%M:%S", time.localtime(event.clock))
+        style = "yellow" if event.serious else ""
+        yield Text(f"{when} {event.text}", style, no_wrap=True, overflow="ellipsis")

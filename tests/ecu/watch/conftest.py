@@ -1,0 +1,73 @@
+"""A daemon's ring, written by the test."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ecu.algorithm.step import INITIAL
+from ecu.contract.records import CYCLE, FRAME, LEARNED, OUTPUTS, new_record
+from ecu.contract.signals import CYCLE_NS
+from ecu.recording import ring as ring_module
+from ecu.recording.recorder import layout
+from ecu.recording.ring import close_ring, create_ring, publish
+
+START_NS = 1_800_000_000_000_000_000
+MONO_NS = 5_000_000_000_000
+
+
+class Loop:
+    """Publishes cycles as the loop does; `outputs` and `cycle` are set by name before."""
+
+    def __init__(self, path: Path, **about) -> None:
+        self.about = {
+            "name": "suv",
+            "interface": "socketcan",
+            "channel": "can0",
+            "start_ns": START_NS,
+            "map": None,
+            "state": layout(INITIAL),
+            **about,
+        }
+        self.ring = create_ring(path, self.about, new_record(INITIAL).tobytes(), slots=2400, frames=4096)
+        self.cycle, self.outputs, self.learned = new_record(CYCLE), new_record(OUTPUTS), new_record(LEARNED)
+        self.cycle["speaks"] = 1
+        self.outputs["mode"] = 1
+        self.frames = new_record(FRAME, 100)
+        self.number = 0
+
+    def publish(self, cycles: int, *, frames: int = 0, lateness_us=50.0, **outputs) -> None:
+        for name, value in outputs.items():
+            self.outputs[name] = value
+        for _ in range(cycles):
+            stamp_ns = START_NS + self.number * CYCLE_NS
+            self.cycle["number"], self.cycle["frames"], self.cycle["t_ns"] = self.number, frames, stamp_ns
+            self.cycle["t_mono_ns"] = MONO_NS + self.number * CYCLE_NS
+            self.cycle["lateness_ns"] = round(1e3 * lateness_us)
+            self.frames["stamp_ns"], self.frames["can_id"] = stamp_ns, 0x123
+            self.frames["length"], self.frames["data"] = 8, np.arange(64)
+            publish(self.ring, self.cycle, self.outputs, self.learned, self.frames)
+            self.number += 1
+
+    def close(self, **words) -> None:
+        close_ring(self.ring, words)
+
+
+@pytest.fixture
+def rings(tmp_path, monkeypatch):
+    """The folder of rings: the test's own."""
+    folder = tmp_path / "rings"
+    folder.mkdir()
+    for module in (ring_module, __import__("ecu.watch.daemons", fromlist=["daemons"])):
+        monkeypatch.setattr(module, "ring_folder", lambda: folder)
+    return folder
+
+
+@pytest.fixture
+def loop(rings):
+    """Start a loop of process `pid`."""
+
+    def start(pid: int = 4711, **about) -> Loop:
+        return Loop(rings / f"brake-ecu.1.{pid}.ring", **about)
+
+    return start

@@ -1,0 +1,52 @@
+import json
+
+import numpy as np
+import pytest
+
+from ecu.contract.faults import IMU_LOST
+from ecu.watch.line import json_line, text_line
+from ecu.watch.watcher import Watcher
+
+
+@pytest.fixture
+def watched(loop):
+    one = loop()
+    one.publish(
+        4,
+        mode=3,
+        active_faults=IMU_LOST,
+        vehicle_speed=20.04,
+        decel_demand_total=3.0,
+        accel_x_road=-2.9,
+        mu_b=[0.4, 0.41, 0.42, 0.43],
+        sigma_mu_b=0.02,
+        calliper_pressure=[30, 31, 12, -0.4],
+        disc_temperature=[100, 101, 102, np.nan],
+    )
+    watcher = Watcher(None)
+    watcher.turn()
+    yield watcher
+    assert one
+
+
+def test_the_line_of_text(watched):
+    assert text_line(watched)[9:] == (
+        "degraded 20.0 m/s decel 3.00→2.90 m/s² mu 0.400±0.020 0.410±0.020 0.420±0.020 0.430±0.020"
+        " 30/31/12/0 bar 100/101/102/– °C late 50 µs missed 0; IMU lost"
+    )
+
+
+def test_the_line_of_json(watched):
+    said = json.loads(json_line(watched))
+    assert said["mu_b"] == [0.4, 0.41, 0.42, 0.43]
+    assert said["disc_temperature"] == [100, 101, 102, None]
+    assert (said["mode"], said["faults"], said["missed"], said["cycles"]) == ("degraded", ["IMU lost"], 0, 4)
+    assert said["lateness_us"]["50"] == 4
+    assert said["clock"] == 1_800_000_000.03
+
+
+def test_without_a_daemon(rings):
+    watcher = Watcher(None)
+    watcher.turn()
+    assert "no daemon of this user runs" in text_line(watcher)
+    assert json.loads(json_line(watcher))["trouble"].startswith("no daemon")

@@ -1,0 +1,68 @@
+import math
+
+import pytest
+from rich.console import Console
+
+from ecu.contract.faults import IMU_LOST
+from ecu.watch.picture import picture, shown, sparkline
+from ecu.watch.watcher import Watcher
+
+
+@pytest.mark.parametrize(
+    ("values", "width", "line"),
+    [
+        ([], 4, ""),
+        ([math.nan] * 4, 2, "  "),
+        ([0.0, 1.0, 2.0, 3.5], 4, "▁▃▅█"),
+        ([0.0, math.nan, 7.0], 3, "▁ █"),
+        ([5.0, 5.0], 2, "▄▄"),  # one that does not move is a line in the middle
+        ([0.0, 0.0, 4.0, 4.0], 2, "▁█"),
+    ],
+)
+def test_sparkline(values, width, line):
+    assert sparkline(values, width, 1.0) == line
+
+
+def draw(watcher, width, height, **more):
+    console = Console(width=width, height=height, color_system=None)
+    with console.capture() as captured:
+        console.print(picture(watcher, width, height, **more))
+    return captured.get().splitlines()
+
+
+@pytest.fixture
+def watched(loop):
+    one = loop()
+    one.publish(400, vehicle_speed=20.0, mu_b=0.4, sigma_mu_b=0.02, pad_remaining=93)
+    one.publish(400, mode=3, active_faults=IMU_LOST, vehicle_speed=10.0, decel_demand_total=3.0)
+    watcher = Watcher(None)
+    watcher.turn()
+    yield watcher
+    assert one
+
+
+@pytest.mark.parametrize("width", [40, 64, 80, 100, 160])
+@pytest.mark.parametrize("height", [24, 50])
+def test_it_fits_any_terminal(watched, width, height):
+    lines = draw(watched, width, height)
+    assert len(lines) <= height
+    assert max(map(len, lines)) <= width
+    page = "\n".join(lines)
+    for part in ("DEGRADED", "10.0 m/s", "IMU lost", "0.400±0.020", "fl", "rr", "q quit  k keep"):
+        assert part in page
+    assert "8 s can be kept" in page
+    assert ("93" in page) == (width >= 64)
+
+
+def test_it_scrolls_back(watched):
+    page = "\n".join(draw(watched, 80, 40, back_s=5.0, paused=True))
+    assert "READY  20.0 m/s" in page
+    assert "5 s back  paused" in page
+    assert "no fault" in page
+    assert len(shown(watched.history.rows, 5.0)) == 75
+
+
+def test_without_a_daemon(rings):
+    watcher = Watcher(None)
+    watcher.turn()
+    assert "no daemon of this user runs" in "\n".join(draw(watcher, 60, 24))

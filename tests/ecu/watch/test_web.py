@@ -1,0 +1,93 @@
+import http.client
+import json
+import re
+import threading
+
+import numpy as np
+import pytest
+
+from ecu.recording.recorder import read_recording
+from ecu.watch.history import COLUMNS
+from ecu.watch.serve import Server
+from ecu.watch.watcher import Watcher
+from ecu.watch.web import Shared, new_handler, page
+
+
+@pytest.fixture
+def watched(loop, tmp_path):
+    one = loop()
+    one.publish(80, frames=1, vehicle_speed=20.0, mu_b=[0.41, np.nan, 0.43, 0.44])
+    shared = Shared(Watcher(None), tmp_path / "kept")
+    shared.turn()
+    server = Server("127.0.0.1", 0, new_handler(shared))
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    yield one, shared, server.server_port
+    server.shutdown()
+    server.server_close()
+
+
+def ask(port, method, path, **headers):
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+    connection.request(method, path, headers=headers)
+    return connection.getresponse()
+
+
+def news(answer):
+    line = answer.readline()
+    assert answer.readline() == b"\n"
+    return json.loads(line.removeprefix(b"data: "))
+
+
+def test_the_page_asks_for_nothing_elsewhere(watched):
+    _, _, port = watched
+    text = ask(port, "GET", "/").read().decode()
+    assert text.encode() == page()
+    assert not re.search(r"(src|href)=\"(?!data:)|https?://|@import|url\(", text)
+    about = json.loads(re.search(r"const ABOUT = (.*);\n", text).group(1))
+    assert tuple(about["columns"]) == COLUMNS
+
+
+def test_every_viewer_gets_all_rows_and_then_the_new_ones(watched):
+    one, shared, port = watched
+    viewers = [ask(port, "GET", "/stream") for _ in range(3)]
+    for viewer in viewers:
+        told = news(viewer)
+        assert len(told["rows"]) == 20
+        assert told["daemon"] == "suv on socketcan can0, process 4711"
+        row = dict(zip(COLUMNS, told["rows"][-1], strict=True))
+        assert (row["vehicle_speed"], row["mu_b_fl"], row["mu_b_fr"]) == (20.0, 0.41, None)
+        assert row["clock"] == pytest.approx(1_800_000_000.79)
+    one.publish(8, vehicle_speed=19.0)
+    shared.turn()
+    for viewer in viewers:
+        told = news(viewer)
+        assert [row[COLUMNS.index("vehicle_speed")] for row in told["rows"]] == [19.0, 19.0]
+        assert (told["cycles"], sum(told["lateness"])) == (88, 88)
+        viewer.close()
+
+
+def test_the_end_of_the_daemon_is_told(watched):
+    one, shared, port = watched
+    viewer = ask(port, "GET", "/stream")
+    news(viewer)
+    one.close(by="SIGTERM", cycles=80)
+    shared.turn()
+    assert "stopped by SIGTERM after 80 cycles; waiting" in news(viewer)["trouble"]
+    viewer.close()
+
+
+def test_only_the_page_itself_keeps_a_recording(watched, tmp_path):
+    _, _, port = watched
+    assert ask(port, "POST", "/keep").status == 403
+    assert ask(port, "POST", "/keep", Host="evil.example", **{"X-Brake-Ecu": "keep"}).status == 403
+    assert not (tmp_path / "kept").exists()
+    answer = ask(port, "POST", "/keep", **{"X-Brake-Ecu": "keep"})
+    assert answer.read().decode().startswith("1 s kept in ")
+    assert len(read_recording(tmp_path / "kept").cycles) == 80
+
+
+@pytest.mark.parametrize(
+    ("path", "status"), [("/", 200), ("/?x=1", 200), ("/../etc/passwd", 404), ("/keep", 404)]
+)
+def test_addresses(watched, path, status):
+    assert ask(watched[2], "GET", path).status == status
