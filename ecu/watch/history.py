@@ -82,7 +82,7 @@ def _sentence(event: str, content: dict[str, Any]) -> str:
         case "fault_gone":
             return f"{content['fault']}: gone"
         case "missed":
-            return f"{content['missed']} periods missed, {content['total']} in all"
+            return f"periods missed: {content['missed']}, in all {content['total']}"
         case "frames_dropped":
             return f"{content['dropped']} frames dropped by the kernel"
         case "ring_overtaken":

@@ -150,7 +150,7 @@ def _lateness(watcher: Watcher, width: int, height: int) -> Iterable[Text]:
     counts = watcher.history.lateness
     total = int(counts.sum())
     yield Text(
-        f"{watcher.history.cycles} cycles, {watcher.history.missed} periods missed; lateness of {total} seen",
+        f"{watcher.history.cycles} cycles, periods missed: {watcher.history.missed}; late, of {total} seen:",
         no_wrap=True,
         overflow="ellipsis",
     )

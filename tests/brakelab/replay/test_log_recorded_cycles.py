@@ -120,3 +120,19 @@ def test_a_recording_without_cycles_gives_one_line(tmp_path: Path) -> None:
     (folder / CYCLES_FILE).write_bytes(b"")
     with pytest.raises(UserError, match="no cycle was recorded"):
         replay([folder], resource("config/suv.toml"), None, None, None, tmp_path / "out.parquet")
+
+
+def test_one_that_begins_within_a_run_is_a_log_like_any_other(tmp_path: Path) -> None:
+    """As `watch` keeps it: the state before its first cycle is not known."""
+    folder, records = record(tmp_path, drive(tmp_path))
+    about = folder / ABOUT_FILE
+    about.write_text(about.read_text().replace('"start_ns"', '"first_cycle": 40, "start_ns"'))
+    config, out = resource("config/suv.toml"), tmp_path / "out.parquet"
+    assert replay([folder], config, None, None, None, out) == 0
+    columns = read_result(out).columns
+    assert abs(len(columns["t"]) - len(records) - CYCLES // 50) <= 1  # periods missed are rows here
+    np.testing.assert_array_less(
+        abs(columns["mu_b_fl"][:100] - 0.45), 1e-6
+    )  # configured, not the 0.5 learned
+    with pytest.raises(UserError, match=r"begins within a run.*leave --cycles out"):
+        replay([folder / "frames.log"], config, None, None, None, tmp_path / "other.parquet", folder)

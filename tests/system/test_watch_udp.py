@@ -1,0 +1,110 @@
+"""`brake-ecu watch` in another process, beside a daemon on a real bus."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from draw_watch import Browser, chromium
+from ecu.recording.recorder import read_recording
+
+from .conftest import ROOT, wait_for
+
+pytestmark = pytest.mark.multicast
+
+GROUP = f"239.77.{os.getpid() >> 8 & 0xFF}.{os.getpid() & 0xFF}"
+BUS = ("--config", ROOT / "config" / "suv.toml", "-i", "udp_multicast", "-c", GROUP)
+
+
+@pytest.fixture
+def watch(tmp_path):
+    """Start a watcher of the daemons on this test's bus."""
+    started = []
+
+    def start(*options):
+        command = [sys.executable, "-m", "ecu.cli", "watch", GROUP, *options]
+        paths = os.pathsep.join([str(ROOT), str(ROOT / "tools")])
+        environment = {**os.environ, "PYTHONPATH": paths}
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=tmp_path, env=environment)
+        started.append(process)
+        return process
+
+    yield start
+    for process in started:
+        process.kill()
+        process.wait()
+
+
+@pytest.fixture
+def car(vehicle):
+    car = vehicle("udp_multicast", GROUP)
+    car.set(decel_demand=3, vehicle_speed=20, vehicle_speed_valid=1)
+    car.set(**{f"wheel_speed_{corner}": 55.0 for corner in ("fl", "fr", "rl", "rr")})
+    return car
+
+
+def line_with(process, fact):
+    """Return the next line that `fact` holds for."""
+    for line in process.stdout:
+        if fact(told := json.loads(line)):
+            return told
+    raise AssertionError("the watcher ended")
+
+
+def test_it_attaches_tells_the_end_and_attaches_again(daemon, car, watch):
+    watcher = watch("--json")
+    assert line_with(watcher, lambda told: told.get("trouble"))["trouble"].startswith("no daemon")
+    first = daemon(*BUS)
+    first.wait_for("ready")
+    car.drive(150)
+    told = line_with(watcher, lambda told: told.get("mode") == "active")
+    assert told["daemon"].endswith(f"process {first.process.pid}")
+    assert told["vehicle_speed"] == pytest.approx(20, abs=1.5)
+    assert told["decel_demand_total"] == pytest.approx(3, abs=0.01)
+    first.process.kill()
+    assert "was killed" in line_with(watcher, lambda told: told.get("trouble"))["trouble"]
+    first.end(None)
+    second = daemon(*BUS)
+    second.wait_for("ready")
+    car.drive(50)
+    told = line_with(watcher, lambda told: str(told.get("daemon")).endswith(str(second.process.pid)))
+    assert told["cycles"] > 0
+    watcher.send_signal(signal.SIGTERM)
+    assert watcher.wait(20) == 0
+    assert second.end() == 0
+
+
+@pytest.mark.skipif(chromium() is None, reason="there is no chromium to open the page with")
+def test_the_page_in_a_browser(daemon, car, watch, tmp_path):
+    first = daemon(*BUS)
+    first.wait_for("ready")
+    car.drive(150)
+    watcher = watch("--web", "--port", "0")
+    address = watcher.stdout.readline().split()[0]
+    browser = Browser(chromium())
+    try:
+        browser.look(1200, 900)
+        browser.open(address)
+        wait_for(
+            lambda: car.drive(20).size > 0 and browser.evaluate("Number(document.body.dataset.rows)") > 30
+        )
+        before, t = browser.evaluate("[rows.length, rows[rows.length - 1][0]]")
+        car.drive(200)
+        after, later = browser.evaluate("[rows.length, rows[rows.length - 1][0]]")
+        assert (after - before) / (later - t) == pytest.approx(25, abs=1)  # rows a second
+        assert browser.evaluate("document.getElementById('mode').textContent") == "active"
+        assert "± 0." in browser.evaluate("document.querySelector('.card b').textContent")
+        painted = "plot => new Set(plot.canvas.getContext('2d').getImageData(0, 0, 400, 150).data).size > 9"
+        assert browser.evaluate(f"PLOTS.every({painted})")
+        browser.evaluate("dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowLeft'}))")
+        wait_for(lambda: browser.evaluate("id('where').textContent").endswith("s back"))
+        browser.evaluate("id('keep').click()")
+        wait_for(lambda: "kept in" in browser.evaluate("id('note').textContent"))
+        assert len(read_recording(tmp_path / "out/watch").cycles) > 300
+        assert first.end() == 0
+        wait_for(lambda: "waiting for the next one" in browser.evaluate("id('trouble').textContent"))
+    finally:
+        browser.close()
