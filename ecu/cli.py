@@ -105,14 +105,30 @@ def run(
         bool,
         typer.Option("--armed", help="Flag the demands valid, as `transmit = true` in CONFIG does"),
     ] = False,
+    metrics_port: Annotated[
+        int | None,
+        typer.Option(
+            "--metrics-port",
+            metavar="N",
+            min=1,
+            max=65535,
+            help="Serve metrics for Prometheus and /health at this port",
+        ),
+    ] = None,
+    metrics_address: Annotated[
+        str, typer.Option("--metrics-address", metavar="IP", help="Address to serve metrics on")
+    ] = "127.0.0.1",
 ) -> int:
     """Run the daemon on a CAN bus. Its demands are flagged invalid unless it is armed."""
     with without_modules("rich", "scipy"):  # of structlog's tracebacks, and BLAS that the cycle never calls
         import numba.np.arraymath  # noqa: F401
 
         from ecu.runtime import prepare, service
+    metrics = f"{metrics_address}:{metrics_port}" if metrics_port else None
     return service.run(
-        prepare.RunOptions(config, interface, channel, map, record, record_limit, state, standby, armed)
+        prepare.RunOptions(
+            config, interface, channel, map, record, record_limit, state, standby, armed, metrics
+        )
     )
 
 

@@ -97,6 +97,7 @@ def test_the_locks_hold_what_the_project_asks_for() -> None:
     assert laboratory == set(LABORATORY)
     assert names(extras["fleet"]) == set(FLEET)
     assert names(extras["learn"]) == {"scikit-learn"}, "installs sklearn"
+    assert not names(extras["metrics"]) & _requirements(ROOT / "requirements/onboard.txt").keys()
     assert onboard <= _requirements(ROOT / "requirements/onboard.txt").keys()
     assert onboard | laboratory <= _requirements(ROOT / "requirements/lab.txt").keys()
     assert names(extras["dev"]) - {"brake-ecu"} <= _requirements(ROOT / "requirements/dev.txt").keys()
@@ -122,7 +123,7 @@ def test_onboard_code_loads_no_laboratory() -> None:
     done = subprocess.run(
         [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True
     )
-    laboratory = {"brakelab", "matplotlib", "asammdf", *LABORATORY, *LEARN}
+    laboratory = {"brakelab", "matplotlib", "asammdf", "prometheus_client", "tornado", *LABORATORY, *LEARN}
     # numba loads scipy wherever it finds it.
     assert not (laboratory - {"scipy"}) & set(done.stdout.split())
 

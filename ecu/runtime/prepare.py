@@ -8,6 +8,7 @@ without frames that waited meanwhile.
 import os
 import sys
 import time
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -58,6 +59,8 @@ class RunOptions(NamedTuple):
     standby: bool = False
     armed: bool = False
     """Whatever the configuration says."""
+    metrics: str | None = None
+    """ADDRESS:PORT on which metrics are served."""
 
 
 class Session(NamedTuple):
@@ -102,6 +105,8 @@ def prepare(options: RunOptions) -> Session:
         UserError: bad arguments or configuration, a bus that cannot be opened, or someone else already sends
             one of our frames.
     """
+    if options.metrics is not None and find_spec("prometheus_client") is None:
+        raise UserError("--metrics-port", "", "needs prometheus-client: pip install 'brake-ecu[metrics]'")
     manager = Manager()
     progress = CompileProgress(manager)
     compiled = CompileCounter(progress)
@@ -203,5 +208,10 @@ def _describe(options: RunOptions, config: Config) -> dict[str, Any]:
 
 
 def _side_arguments(options: RunOptions) -> list[str]:
-    given = {"--record": options.record, "--record-limit": options.record_limit, "--state": options.state}
+    given = {
+        "--record": options.record,
+        "--record-limit": options.record_limit,
+        "--state": options.state,
+        "--metrics": options.metrics,
+    }
     return [word for name, value in given.items() if value is not None for word in (name, str(value))]

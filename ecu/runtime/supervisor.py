@@ -2,7 +2,8 @@
 
 The loop starts no process once it is READY, so this small one does. It imports next to nothing and waits. It
 ends with the recorder when the loop has ended (exit code 0) or on a user error (2). A recorder whose
-supervisor died becomes one itself (`become`).
+supervisor died becomes one itself (`become`). With `--metrics
+ADDRESS:PORT` it also starts the process that serves them.
 """
 
 import json
@@ -18,6 +19,7 @@ from contextlib import suppress
 from typing import Final, NoReturn
 
 from ecu.recording.sink import free_output
+from ecu.runtime.companion import Companion
 from ecu.runtime.side import AWAY
 from ecu.runtime.start import ENDING, lower_priority
 
@@ -46,11 +48,15 @@ def main(arguments: Sequence[str]) -> int:
         str(os.getpid()),
         *rest,
     ]
+    metrics = _metrics(rest)
     pause_s, loop_is_gone = PAUSE_S, False
     while True:
         began = time.monotonic()
-        code = subprocess.Popen(command + ["--again"] * again, pass_fds=[leash.fileno()]).wait()
+        recorder = subprocess.Popen(command + ["--again"] * again, pass_fds=[leash.fileno()])
+        code = metrics.await_end_of(recorder) if metrics else recorder.wait()
         if code in FINAL_EXITS or loop_is_gone:
+            if metrics:
+                metrics.end()
             return code
         _say_away(leash, code)
         lower_priority()
@@ -59,6 +65,14 @@ def main(arguments: Sequence[str]) -> int:
             pause_s = PAUSE_S
         loop_is_gone = bool(select.select([leash], [], [], pause_s)[0])  # the loop never sends: its end
         pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
+
+
+def _metrics(arguments: Sequence[str]) -> Companion | None:
+    """Start the process that serves metrics, if `arguments` ask for it."""
+    if "--metrics" not in arguments:
+        return None
+    ring, place = (arguments[arguments.index(name) + 1] for name in ("--ring", "--metrics"))
+    return Companion("ecu.watch.metrics_process", ["--ring", ring, "--metrics", place])
 
 
 def _say_away(leash: socket.socket, code: int) -> None:

@@ -44,3 +44,30 @@ def test_it_is_started_again_with_pauses_that_grow(codes, gone_after, starts, pa
     lines = [json.loads(line)["event"] for line in capsys.readouterr().err.splitlines()]
     assert lines == ["recorder_gone"] * len(pauses)
     assert all(ours.recv(9) == b"x" for _ in pauses)
+
+
+def test_metrics_are_served_by_a_process_beside_the_recorder(monkeypatch):
+    """The recorder knows of them, too: it may become the supervisor."""
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    said = []
+
+    class Beside:
+        def __init__(self, module, arguments):
+            said.append((module, arguments))
+
+        def await_end_of(self, recorder):
+            return 0
+
+        def end(self):
+            said.append("ended")
+
+    monkeypatch.setattr(supervisor, "Companion", Beside)
+    monkeypatch.setattr(supervisor.subprocess, "Popen", lambda command, pass_fds: said.append(command))
+    monkeypatch.setattr(supervisor, "free_output", lambda: None)
+    monkeypatch.setattr(supervisor.signal, "signal", lambda *_: None)
+    metrics = ["--metrics", "127.0.0.1:9476"]
+    assert supervisor.main([str(theirs.detach()), "--ring", "x", *metrics]) == 0
+    assert said[0] == ("ecu.watch.metrics_process", ["--ring", "x", *metrics])
+    assert said[1][-2:] == metrics
+    assert said[2] == "ended"
+    ours.close()

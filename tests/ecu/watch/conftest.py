@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from ecu.algorithm.step import INITIAL
+from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
 from ecu.contract.records import CYCLE, FRAME, LEARNED, OUTPUTS, new_record
-from ecu.contract.signals import CYCLE_NS
+from ecu.contract.signals import CYCLE_NS, N_INPUTS
 from ecu.recording import ring as ring_module
 from ecu.recording.recorder import layout
 from ecu.recording.ring import close_ring, create_ring, publish
+from ecu.settings.resources import resource
 
 START_NS = 1_800_000_000_000_000_000
 MONO_NS = 5_000_000_000_000
@@ -49,6 +51,12 @@ class Loop:
             publish(self.ring, self.cycle, self.outputs, self.learned, self.frames)
             self.number += 1
 
+    def publish_frames(self, frames) -> None:
+        """Publish a cycle that consumed `frames`."""
+        self.cycle["number"], self.cycle["frames"] = self.number, len(frames)
+        publish(self.ring, self.cycle, self.outputs, self.learned, frames)
+        self.number += 1
+
     def close(self, **words) -> None:
         close_ring(self.ring, words)
 
@@ -71,3 +79,21 @@ def loop(rings):
         return Loop(rings / f"brake-ecu.1.{pid}.ring", **about)
 
     return start
+
+
+@pytest.fixture
+def contract_frames():
+    """Make good frames of one message, one every 10 ms."""
+
+    def make(name: str, count: int):
+        plan = contract_transmit_plan(resource("dbc/brake_ecu.dbc"), "Vehicle")
+        counters, buffer = new_transmission(plan), frame_buffer(plan)
+        can_id = plan.ids[plan.messages["name"].tolist().index(name)]
+        frames = new_record(FRAME, count)
+        for number in range(count):
+            sent = transmit(plan, counters, np.zeros(N_INPUTS), number, buffer)
+            frames[number] = buffer[:sent][buffer["can_id"][:sent] == can_id][0]
+            frames["stamp_ns"][number] = START_NS + number * CYCLE_NS
+        return frames
+
+    return make

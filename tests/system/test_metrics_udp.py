@@ -1,0 +1,80 @@
+"""`run --metrics-port` on a real bus: what a scraper gets, and what a crash or hanging clients cost."""
+
+import http.client
+import os
+import signal
+import socket
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from ecu.recording.recorder import read_recording
+
+from .conftest import ROOT, wait_for
+
+pytestmark = pytest.mark.multicast
+
+GROUP = f"239.78.{os.getpid() >> 8 & 0xFF}.{os.getpid() & 0xFF}"
+
+
+def free_port():
+    with socket.create_server(("127.0.0.1", 0)) as one:
+        return one.getsockname()[1]
+
+
+def ask(port, path):
+    """Return status and text, 0 while nobody answers."""
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+    with suppress(OSError):
+        connection.request("GET", path)
+        answer = connection.getresponse()
+        return answer.status, answer.read().decode()
+    return 0, ""
+
+
+def server_of(family):
+    for pid in family:
+        if b"metrics_process" in Path(f"/proc/{pid}/cmdline").read_bytes():
+            return pid
+    return None
+
+
+def test_loop_and_recorder_do_not_care_for_the_metrics(daemon, vehicle, tmp_path):
+    port = free_port()
+    config = ROOT / "config" / "suv.toml"
+    bus = ("--config", config, "-i", "udp_multicast", "-c", GROUP)
+    one = daemon(*bus, "--record", tmp_path, "--metrics-port", port)
+    one.wait_for("ready")
+    car = vehicle("udp_multicast", GROUP)
+    wait_for(lambda: car.drive(20).size > 0 and ask(port, "/health")[0] == 200)
+    text = ask(port, "/metrics")[1]
+    assert 'brake_ecu_frames_received_total{message="Imu"}' in text
+    assert 'car="suv"' in text
+    hanging = [socket.create_connection(("127.0.0.1", port)) for _ in range(30)]
+    first = server_of(one.family())
+    os.kill(first, signal.SIGKILL)
+    for number in (signal.SIGTERM, signal.SIGINT):  # a group's are left to the loop
+        with suppress(OSError):
+            os.kill(server_of(one.family()) or first, number)
+    wait_for(lambda: car.drive(20).size > 0 and ask(port, "/health")[0] == 200)
+    last = server_of(one.family())
+    assert last not in (None, first)
+    assert not one.said("recorder_gone")
+    assert one.end() == 0
+    wait_for(lambda: not Path(f"/proc/{last}").exists())
+    numbers = read_recording(tmp_path).cycles["number"]
+    assert numbers.tolist() == list(range(len(numbers)))
+    assert one.wait_for("stopped")["cycles"] == len(numbers)
+    for client in hanging:
+        client.close()
+
+
+def test_without_prometheus_client_it_is_one_line(daemon):
+    hide = "import sys; sys.modules['prometheus_client'] = None; sys.argv[0] = 'brake-ecu'\n"
+    program = hide + "from ecu.cli import main; raise SystemExit(main())"
+    one = daemon("--config", "suv", "-i", "virtual", "-c", "x", "--metrics-port", "9476", program=program)
+    assert one.end(None) == 2
+    assert one.other == [
+        "brake-ecu: --metrics-port: needs prometheus-client: pip install 'brake-ecu[metrics]'"
+    ]
