@@ -55,6 +55,11 @@ PARAMS: Final = np.dtype(
         ("disc_heating", "f8", (4,)),  # xi (3.7), K/J
         ("disc_cooling", "f8", (4,)),  # delta_0 (3.7), 1/s
         ("disc_cooling_by_speed", "f8", (4,)),  # delta_1 (3.7), 1/m
+        ("disc_cooling_wet", "f8", (4,)),  # delta_0 in rain, 1/s
+        ("disc_cooling_by_speed_wet", "f8", (4,)),  # delta_1 in rain, 1/m
+        ("sigma_disc_heating", "f8", (4,)),  # relative, of xi
+        ("sigma_disc_cooling", "f8", (4,)),  # relative, of the cooling rate
+        ("sigma_disc_cooling_wet", "f8", (4,)),
         ("ambient_temperature", "f8"),  # where no sensor reports it, degC
         # linings, see monitoring/wear.py
         ("wear_law", "f8", (7, 4)),  # coefficients of (7.15) on the road, of both pads of a calliper

@@ -104,9 +104,10 @@ def store_key(config: Config) -> str:
     """Return what learned values belong to: vehicle, brakes and the version of the algorithm.
 
     Not the linings' wear law: wear is kept in a form that any law can be applied to later. Not their dust:
-    its totals carry the version of their model.
+    its totals carry the version of their model. Not the discs' temperature model: friction is the lining's.
     """
-    axles = [axle.model_dump(exclude={"pad", "dust"}) for axle in (config.front, config.rear)]
+    apart = {"pad", "dust", *(name for name in Axle.model_fields if "disc_" in name)}
+    axles = [axle.model_dump(exclude=apart) for axle in (config.front, config.rear)]
     brakes = json.dumps(axles, sort_keys=True)
     return f"{config.name}/{hashlib.sha256(brakes.encode()).hexdigest()[:8]}/5"
 
@@ -141,6 +142,9 @@ def new_params(config: Config) -> RecordArray:
             row[name][corner] = getattr(axle, name)
         for name in ("disc_heating", "disc_cooling", "disc_cooling_by_speed"):
             row[name][corner] = getattr(axle, name)
+        for name in ("sigma_disc_heating", "sigma_disc_cooling", "sigma_disc_cooling_wet"):
+            row[name][corner] = getattr(axle, name)
+        row["disc_cooling_wet"][corner], row["disc_cooling_by_speed_wet"][corner] = axle.wet_cooling()
         set_pad(row, corner, axle.pad)
         set_dust(row, corner, axle.dust)
     set_dust_version(row)

@@ -14,6 +14,9 @@ from ecu.settings.toml_file import Section, Unit
 Positive = Annotated[float, Field(gt=0)]
 Share = Annotated[float, Field(gt=0, lt=1)]
 
+WET = 1.5
+"""Rain on delta_1 where CONFIG has no number for it: Figure 7.15 shows more cooling at speed, no numbers."""
+
 
 class Vehicle(Section):
     """Masses and lengths of the car as driven."""
@@ -97,10 +100,28 @@ class Axle(Section):
     """At standstill, delta_0 of (3.7), 1/s."""
     disc_cooling_by_speed: Annotated[float, Field(ge=0, lt=0.01), Unit("1/m")] = 9.108e-5
     """delta_1 of (3.7), 1/m. Table C.1 prints ten times as much: 400 to 100 degC in a minute at 100 km/h."""
+    disc_cooling_wet: Annotated[float, Field(gt=0, lt=0.1), Unit("1/s")] | None = None
+    """delta_0 in rain, 1/s; without it as dry."""
+    disc_cooling_by_speed_wet: Annotated[float, Field(ge=0, lt=0.02), Unit("1/m")] | None = None
+    """delta_1 in rain, 1/m; without it 1.5 times the dry one: Figure 7.15 has no numbers in print."""
+    sigma_disc_heating: Annotated[float, Field(gt=0, lt=1), Unit("-")] = 0.10
+    """Relative standard deviation of disc_heating: section 3.4 has c_p of 450 to 550 J/(kg K)."""
+    sigma_disc_cooling: Annotated[float, Field(gt=0, lt=1), Unit("-")] = 0.20
+    """Of the cooling rate, relative. Assumption."""
+    sigma_disc_cooling_wet: Annotated[float, Field(gt=0, lt=1), Unit("-")] = 0.40
+    """Of the cooling rate in rain, relative. Assumption."""
     pad: Pad = Pad()
     """Its linings and what they wear by."""
     dust: Dust | None = None
     """Particle emission of its brakes; without it the outputs are not available."""
+
+    def wet_cooling(self) -> tuple[float, float]:
+        """Return delta_0 [1/s] and delta_1 [1/m] in rain."""
+        still, by_speed = self.disc_cooling_wet, self.disc_cooling_by_speed_wet
+        return (
+            self.disc_cooling if still is None else still,
+            WET * self.disc_cooling_by_speed if by_speed is None else by_speed,
+        )
 
 
 class Sensors(Section):

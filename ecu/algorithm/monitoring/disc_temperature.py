@@ -4,8 +4,10 @@ Model. Each disc is one lump of heat, theta [K] above the air (3.7):
 
     theta' = xi T_b |omega| - (delta_0 + delta_1 v) theta
 
-T_b is the ECU's own brake torque, v its vehicle speed, xi constant as in Table C.1. The disc follows a change
-of air temperature at once and so is never colder. Solved exactly over a cycle of constant power and speed.
+T_b is the ECU's own brake torque, v its vehicle speed, xi constant as in Table C.1; in rain delta_0 and
+delta_1 are those of a wet disc (Figure 7.15). The disc follows a change of air temperature at once and so is
+never colder. Solved exactly over a cycle of constant power and speed. `brake-ecu identify thermal` fits xi,
+both pairs of delta and their errors to a car.
 
 Error. Each cause is one constant unknown whose effect accumulates linearly along the model; independent
 causes add as squares:
@@ -49,10 +51,7 @@ DISC_STATE = np.dtype(
 )
 
 UNKNOWN_EXCESS = 200.0  # K above the air at most, where nothing was ever saved
-HEATING_ERROR = 0.10  # section 3.4: c_p is 450 to 550 J/(kg K); mass of the disc and heat split beside it
-COOLING_ERROR = 0.20
-WET = 1.5  # rain on delta_1; Figure 7.15 shows more cooling at speed, but has no numbers in print
-WET_ERROR = 0.40  # of delta in rain, or where rain is not reported
+RAIN_UNKNOWN_ERROR = 0.40  # of delta where rain is not reported
 AMBIENT_ERROR = 3.0  # K: difference between the air at the wheel and at the sensor
 AMBIENT_UNKNOWN = 15.0  # K: no sensor, or none received
 FRICTION_PER_KELVIN = 0.04 / 100.0  # relative change of friction, its sign unknown
@@ -89,12 +88,8 @@ def update_discs(
     if usable(inputs, AMBIENT_TEMPERATURE):
         state.ambient, sigma_ambient = inputs.value[AMBIENT_TEMPERATURE], AMBIENT_ERROR
     speed, load = estimate.speed, estimate.load
-    by_speed, cooling_error = abs(speed), WET_ERROR
-    if usable(inputs, RAIN):
-        if inputs.value[RAIN] > 0.5:
-            by_speed *= WET
-        else:
-            cooling_error = COOLING_ERROR
+    rain_known = usable(inputs, RAIN)
+    wet = rain_known and inputs.value[RAIN] > 0.5
     load_sum = load[0] + load[1] + load[2] + load[3]
     for i in range(4):
         seen = usable(inputs, WHEEL_SPEED + i)
@@ -102,12 +97,18 @@ def update_discs(
         if usable(inputs, CALLIPER_PRESSURE + i):
             # The noise of a released brake has a mean above zero once negative torque is cut off.
             power = estimate.brake_torque[i] * omega if application.braking else 0.0
-            heating_error = math.hypot(HEATING_ERROR, estimate.sigma[i] / estimate.mu[i])
+            heating_error = math.hypot(params.sigma_disc_heating[i], estimate.sigma[i] / estimate.mu[i])
         else:
             power = max(-estimate.tyre_force, 0.0) * load[i] / load_sum * abs(speed)
             heating_error = 1.0
         state.power[i], state.omega[i] = power, omega
-        _advance(params, state, i, power, heating_error, by_speed, cooling_error, dt)
+        if wet:
+            rate = params.disc_cooling_wet[i] + params.disc_cooling_by_speed_wet[i] * abs(speed)
+            cooling_error = params.sigma_disc_cooling_wet[i]
+        else:
+            rate = params.disc_cooling[i] + params.disc_cooling_by_speed[i] * abs(speed)
+            cooling_error = params.sigma_disc_cooling[i] if rain_known else RAIN_UNKNOWN_ERROR
+        _advance(state, i, params.disc_heating[i] * power, heating_error, rate, cooling_error, dt)
         parts = state.sigma_heating[i] ** 2 + state.sigma_cooling[i] ** 2 + state.sigma_start[i] ** 2
         state.sigma[i] = math.sqrt(parts + sigma_ambient**2)
         state.temperature[i] = state.ambient + state.excess[i]
@@ -119,20 +120,17 @@ def update_discs(
 
 @kernel
 def _advance(
-    params: Record,
     state: Record,
     i: int,
-    power: float,
+    warming: float,
     heating_error: float,
-    by_speed: float,
+    rate: float,
     cooling_error: float,
     dt: float,
 ) -> None:
-    """Advance the excess and its errors of one disc; `by_speed` [m/s] is the speed that cools."""
-    rate = params.disc_cooling[i] + params.disc_cooling_by_speed[i] * by_speed
+    """Advance the excess and its errors of one disc by `warming` [K/s] and cooling at `rate` [1/s]."""
     stays = math.exp(-rate * dt)
     gain = (1.0 - stays) / rate
-    warming = params.disc_heating[i] * power
     state.sigma_heating[i] = stays * state.sigma_heating[i] + heating_error * gain * warming
     state.sigma_cooling[i] = stays * state.sigma_cooling[i] + cooling_error * rate * gain * state.excess[i]
     state.sigma_start[i] *= stays

@@ -225,6 +225,28 @@ def test_the_hash_follows_what_changes_results_and_nothing_else(tmp_path: Path) 
     assert len({config_hash(c) for c in (suv, heavy, bigger)}) == 3
     assert store_key(suv) == store_key(heavy) == store_key(armed)
     assert store_key(suv) != store_key(bigger), "another brake has another friction"
+    hotter = of(change("front.disc_heating", "3e-4")())
+    assert config_hash(suv) != config_hash(hotter)
+    assert store_key(suv) == store_key(hotter), "a lining's friction is not that of its disc's model"
+
+
+@pytest.mark.parametrize(
+    ("own", "expected"),
+    [
+        ("", (1.792e-3, 1.5 * 9.108e-5)),
+        ("disc_cooling_wet = 2.5e-3\n", (2.5e-3, 1.5 * 9.108e-5)),
+        ("disc_cooling_by_speed_wet = 3e-4\n", (1.792e-3, 3e-4)),
+    ],
+)
+def test_rain_cools_as_given_or_by_half_more_at_speed(tmp_path: Path, own, expected) -> None:
+    path = tmp_path / "car.toml"
+    path.write_text(f'include = "{CONFIGS / "suv.toml"}"\n[front]\n{own}', encoding="utf-8")
+    row = new_params(load_config(path))[0]
+    found = row["disc_cooling_wet"][0], row["disc_cooling_by_speed_wet"][0]
+    assert found == pytest.approx(expected)
+    assert row["disc_cooling_wet"][2] == row["disc_cooling"][2]
+    assert (row["sigma_disc_heating"][0], row["sigma_disc_cooling"][0]) == (0.10, 0.20)
+    assert row["sigma_disc_cooling_wet"][0] == 0.40
 
 
 PLAIN = [

@@ -13,10 +13,13 @@ from ecu.contract.params import BAR
 from ecu.contract.signals import (
     ACCEL_X,
     ACCEL_Y,
+    AMBIENT_TEMPERATURE,
     CALLIPER_PRESSURE,
     CORNERS,
+    INPUT,
     INPUT_SIGNALS,
     MOTOR_TORQUE,
+    RAIN,
     STEERING_ANGLE,
     VEHICLE_SPEED,
     WHEEL_SPEED,
@@ -29,7 +32,14 @@ SAMPLED: Final = (
     *range(CALLIPER_PRESSURE, CALLIPER_PRESSURE + 4),
     *range(MOTOR_TORQUE, MOTOR_TORQUE + 4),
 )
-"""Inputs whose samples are kept beside the rows, to be judged by the physics of the drive."""
+"""Inputs whose samples are judged by the physics of the drive."""
+DISC_TEMPERATURE_MEASURED: Final = INPUT["disc_temperature_measured_fl"]
+KEPT: Final = (
+    *SAMPLED,
+    *(AMBIENT_TEMPERATURE, RAIN),
+    *range(DISC_TEMPERATURE_MEASURED, DISC_TEMPERATURE_MEASURED + 4),
+)
+"""Inputs whose samples are kept beside the rows."""
 CYCLES: Final = 2  # of 10 ms in a row of the grid
 MOST_ROWS: Final = int(3600 * RATE)
 BRIDGED: Final = int(0.5 * RATE)  # rows without a sample that a straight line may fill
@@ -75,10 +85,11 @@ class Collector:
         self._count = 0
 
     def add(self, samples: Vector) -> None:
-        """Take samples of cycles, shape (n, len(SAMPLED)), NaN: none; an odd last cycle is left out."""
+        """Take samples of cycles, `SAMPLED` first, shape (n, …), NaN: none; an odd last one is left out."""
         if self._count >= MOST_ROWS:
             return
-        pairs = samples[: len(samples) // CYCLES * CYCLES].reshape(-1, CYCLES, samples.shape[1])
+        judged = samples[: len(samples) // CYCLES * CYCLES, : len(SAMPLED)]
+        pairs = judged.reshape(-1, CYCLES, len(SAMPLED))
         there = np.isfinite(pairs)
         with np.errstate(invalid="ignore"):
             mean = np.where(there, pairs, 0.0).sum(axis=1) / there.sum(axis=1)

@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.log_physics.samples import SAMPLED
+from brakelab.log_physics.samples import KEPT
 from brakelab.logs.signal_file import SampleBlock
 from brakelab.replay.seen import look_at, new_seen
 from brakelab.results.row import MEASURED_INPUTS, N_ROW
@@ -59,7 +59,7 @@ class Rows(NamedTuple):
     values: Vector
     """Shape (n, N_ROW)."""
     samples: Vector
-    """Of `SAMPLED`, NaN in a cycle without a valid one, shape (n, len(SAMPLED))."""
+    """Of `KEPT`, NaN in a cycle without a valid one, shape (n, len(KEPT))."""
 
 
 def new_ecu(params: RecordArray, learned: RecordArray | None) -> Ecu:
@@ -95,8 +95,8 @@ def _close_cycle(
         place = MEASURED_INPUTS[i]
         usable = inputs[0].verdict[place] & USABLE == USABLE
         row[N_OUTPUTS + i] = inputs[0].value[place] if usable else np.nan
-    for i in range(len(SAMPLED)):
-        place = SAMPLED[i]
+    for i in range(len(KEPT)):
+        place = KEPT[i]
         samples[i] = inputs[0].value[place] if inputs[0].new[place] else np.nan
 
 
@@ -285,5 +285,5 @@ def _run(
 def _new_rows(cycles: RecordArray) -> Rows:
     count = len(cycles)
     return Rows(
-        cycles["t_ns"], np.full(count, np.nan), np.empty((count, N_ROW)), np.empty((count, len(SAMPLED)))
+        cycles["t_ns"], np.full(count, np.nan), np.empty((count, N_ROW)), np.empty((count, len(KEPT)))
     )

@@ -16,7 +16,6 @@ from ecu.algorithm.monitoring.disc_temperature import (
     AMBIENT_ERROR,
     AMBIENT_UNKNOWN,
     UNKNOWN_EXCESS,
-    WET,
     heat_widening,
     update_discs,
 )
@@ -59,9 +58,9 @@ class Discs:
         s = self.s
         update_discs(self.p, self.d, s["learned"], self.inputs[0], s["estimate"], s["application"], dt)
 
-    def rate(self, speed: float, wet: float = 1.0):
-        """Return delta [1/s], shape (4,)."""
-        return self.p["disc_cooling"] + self.p["disc_cooling_by_speed"] * wet * speed
+    def rate(self, speed: float, wet: str = ""):
+        """Return delta [1/s], shape (4,); `wet`: "_wet" in rain."""
+        return self.p[f"disc_cooling{wet}"] + self.p[f"disc_cooling_by_speed{wet}"] * speed
 
     def silence(self, name: str) -> None:
         """Let a signal die."""
@@ -85,7 +84,7 @@ def test_constant_power_heats_towards_power_over_cooling(discs: Discs, speed, se
 
 
 @pytest.mark.parametrize("kmh", [0.0, 30.0, 100.0, 130.0])
-@pytest.mark.parametrize(("rain", "wet"), [(0.0, 1.0), (1.0, WET)])
+@pytest.mark.parametrize(("rain", "wet"), [(0.0, ""), (1.0, "_wet")])
 @pytest.mark.parametrize("dt", [0.01, 0.05])
 def test_a_disc_cools_exponentially_at_constant_speed(discs: Discs, kmh, rain, wet, dt) -> None:
     discs.feed(discs.inputs, rain=rain)
