@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ecu.arguments import Commands, Config
+from ecu.arguments import Commands, Config, Map
 
 app = Commands(help="Identify models from your own measurements.", no_args_is_help=True)
 
@@ -85,3 +85,21 @@ def dust(
     from brakelab.identification import dust_command
 
     return dust_command.identify_dust(manifest, config, axle, out)
+
+
+@app.command()
+def thermal(
+    logs: Annotated[
+        list[Path],
+        typer.Argument(metavar="LOG", help="Drives with disc_temperature_measured_*, any log format"),
+    ],
+    config: Config,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="CAR.toml", help="CONFIG to write, CAR.md and CAR.svg beside it")
+    ],
+    map: Map = None,
+) -> int:
+    """Identify the disc temperature model, dry and wet. Write a CONFIG."""
+    from brakelab.identification import thermal_command
+
+    return thermal_command.identify_thermal(logs, config, map, out)
