@@ -49,6 +49,7 @@ from brakelab.studies.texts import (
     RECORDED_TEXT,
     REPLAY_TEXT,
     STOPS_TEXT,
+    THERMAL_TEXT,
     WEAR_TEXT,
 )
 from ecu import __version__
@@ -71,6 +72,7 @@ LATENESS: Final = "lateness"
 RECORDED: Final = "recorded"
 WEAR: Final = "wear"
 DUST: Final = "dust"
+THERMAL: Final = "thermal"
 REPLAY: Final = "replay"
 PLAY: Final = "play"
 
@@ -104,6 +106,7 @@ def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0, 
         RECORDED: partial(_recorded, seeds=seeds),
         WEAR: partial(_wear, seeds=seeds),
         DUST: partial(_dust, seeds=seeds),
+        THERMAL: partial(_thermal, seeds=seeds),
         LATENESS: partial(_lateness, seconds=seconds),
         REPLAY: _replay,
         PLAY: partial(_play, seconds=seconds),
@@ -227,6 +230,16 @@ def _dust(json: bool, seeds: int) -> int:
     picture = None if json else resource(PICTURES) / "dust.svg"
     tables = dust.dust_page(partial(_each_car, DUST), min(seeds, dust.DRAWS), picture)
     return _page(DUST, "Dust", DUST_TEXT, tables, json)
+
+
+def _thermal(json: bool, seeds: int) -> int:
+    from brakelab.studies import thermal, thermal_study
+
+    cars = _each_car(THERMAL, thermal_study.drive_car, min(seeds, thermal.CARS))
+    if not json:
+        write_chart(resource(PICTURES) / "disc-temperature.svg", thermal.thermal_panels(cars), thermal.LEGEND)
+    tables = thermal.thermal_tables(cars)
+    return _page(THERMAL, "Disc temperature", THERMAL_TEXT, tables, json, "disc-temperature")
 
 
 def _friction(json: bool) -> int:

@@ -28,6 +28,7 @@ GUST: Final = 3.0  # m/s along the car
 AIR_AT_WHEEL: Final = 2.0  # K: standard deviation of the air at the discs about that at the sensor, of a day
 SAMPLE: Final = 10  # cycles between two samples of a thermocouple
 ROW_CYCLES: Final = round(100 * ROW)
+RAINFALL: Final = 0.3  # standard deviation of the logarithm of the water on the discs, of a day
 LAG: Final = (1.0, 4.0)  # s
 NOISE: Final = (0.5, 1.5)  # K
 OFFSET: Final = 1.5  # K, standard deviation
@@ -137,7 +138,7 @@ def drive_measured(
     pace = speeds[: rows * ROW_CYCLES].reshape(rows, ROW_CYCLES).mean(axis=1)
     day = np.random.default_rng([seed, 43, round(seconds), len(outputs)])
     along = pace + wind(rows, ROW, GUST, day)
-    wet = np.full(rows, wetness)
+    wet = np.full(rows, wetness * np.exp(RAINFALL * day.standard_normal()))
     around = air + AIR_AT_WHEEL * day.standard_normal()
     true = np.column_stack(
         [heat_discs(axles[k], mean[:, 2 * k : 2 * k + 2], along, around, wet, start, ROW) for k in (0, 1)]

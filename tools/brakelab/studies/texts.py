@@ -139,3 +139,16 @@ DUST_TEXT: Final = (
     "held out. Trips and correlations below are those of the first draw.\n\n"
     "![Background by speed, predicted over counted emission factor](images/dust.svg)"
 )
+
+THERMAL_TEXT: Final = (
+    "How disc temperature is computed and identified: [disc-temperature.md](../disc-temperature.md). "
+    "Cars are drawn (wide) from config/plant/suv.toml. Their discs are measured and judged by a model "
+    "that is no lump (tools/brakelab/plant/disc_nodes.py: ring and hat, heat capacity by temperature, "
+    "radiation, convection by the 0.8th power of the air's speed, a film of water), about the drawn "
+    "numbers, with wind, air at the wheel and rain of the day; thermocouples lag by 1 to 4 s, scatter, "
+    "and are off by a constant and a factor. Each car is identified on one dry trip of real driving and "
+    "on a rainy one beyond the town, by the ECU's own torque, and judged on another of each by another "
+    "driver in other weather, the ECU with what it learned of friction, after a night of rest. "
+    "`HEAT_CAPACITY`, `AIR_FLOW` and `RAIN`, which widen the σ of a fit, were chosen on cars 0 and 2.\n\n"
+    "![Figures 7.13 to 7.15](images/disc-temperature.svg)"
+)
