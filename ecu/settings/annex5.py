@@ -78,7 +78,7 @@ def utilisation(params: Any, share: Row, load: Load, front: float = 1.0, rear: f
 
 
 def annex_5_violation(params: Any, loads: tuple[Load, ...]) -> str | None:
-    """Return where the distribution violates Annex 5 and what helps, None if it does not."""
+    """Return where the distribution violates Annex 5 and the remedy, None if it does not."""
     doubt = 2.0 * float(params["sigma_mu_initial"])
     low, high, share = 1.0 - doubt, 1.0 + doubt, shares(params)
     for load in loads:

@@ -1,4 +1,4 @@
-"""`brake-ecu config check`: everything that is wrong with a CONFIG file, and what the car comes to.
+"""`brake-ecu config check`: every mistake of a CONFIG file, or the figures of its car.
 
 The figures are for reading: torque per pressure, pressures of a braking, the distribution beside the ideal
 one and how far it is from what Annex 5 of ECE R13-H forbids. Swapped numbers that are possible show there.
@@ -20,7 +20,7 @@ RATES: Final = (0.2, 0.4, 0.6, 0.8)  # braking rates z
 
 
 def check(path: Path, pictured: bool = False) -> int:
-    """Print what is wrong with a CONFIG file, each in a line, and return 2; or what the car comes to, and 0.
+    """Print each mistake of a CONFIG file in a line and return 2; or the figures of its car, and 0.
 
     `pictured` adds the distribution beside what Annex 5 forbids.
 
@@ -45,7 +45,7 @@ def check(path: Path, pictured: bool = False) -> int:
 
 
 def figures(config: Config, params: Any) -> list[str]:
-    """Return what the car comes to, as lines; `params` is one `PARAMS` of `config`."""
+    """Return the figures of the car, as lines; `params` is one `PARAMS` of `config`."""
     front_load = params["rear_axle"] / params["wheelbase"]
     per_bar = torque_per_bar(params)
     lines = [

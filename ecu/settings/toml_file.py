@@ -1,4 +1,4 @@
-"""Reading TOML that a person wrote: what is wrong is one line that names the file, the key and the remedy."""
+"""Reading TOML that a person wrote: a mistake is one line that names the file, the key and the remedy."""
 
 import tomllib
 from collections.abc import Callable
@@ -130,7 +130,7 @@ def unit_of(field: FieldInfo) -> str | None:
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """Read a TOML file; what cannot be read is one line."""
+    """Read a TOML file; a mistake is one line."""
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:

@@ -99,7 +99,7 @@ def second_order(inputs: Matrix) -> Matrix:
 
 
 def history_effect(stops: Stops) -> History:
-    """Return what the end temperature of the stop before does to mean friction, inputs accounted for."""
+    """Return the effect of the previous stop's end temperature on mean friction, inputs accounted for."""
     ends = np.array([stops.temperature[end - 1] for end in stops.first[1:]])
     terms = second_order(inputs_of(stops))[1:]
     before = ends[:-1] / 100.0

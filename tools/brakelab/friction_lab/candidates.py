@@ -1,4 +1,4 @@
-"""The laws that are identified: what of each is free, between which bounds, and the law that numbers make.
+"""The laws that are identified: free parameters of each, their bounds, the law that given numbers make.
 
 A free number is searched on its own scale: `log` between its bounds, or even. What is fixed follows from
 the recording: knots of the tables span its temperatures and pressures, the debris term has the flywheel's

@@ -1,4 +1,4 @@
-"""The file that says what the columns of a dynamometer's recording mean, and what stood on it.
+"""Description of a dynamometer's recording: meaning of its columns, brake and inertia on it.
 
 name = "front axle"                # of the lining that is written
 [columns]                          # name in the file, and its unit
@@ -75,7 +75,7 @@ class Columns(Section):
 
     @classmethod
     def own(cls, lining: Lining, inertia: float) -> Self:
-        """Return what describes our own recordings of `lining` on a flywheel of `inertia` [kg m^2]."""
+        """Return the description of our own recordings of `lining` on a flywheel of `inertia` [kg m^2]."""
         names = Names(
             time=("time_s", "s"),
             pressure=("pressure_bar", "bar"),

@@ -88,7 +88,7 @@ def run(
 
 
 def look(data: list[Path], columns: Path | None) -> int:
-    """Print what moves friction in a programme, the effect of the stop before, the disc's heat. Returns 0."""
+    """Print principal components, the effect of the previous stop and the disc's heat. Returns 0."""
     measured = _read(data, columns)
     stops = measured.stops
     _need(stops, data[0])

@@ -105,12 +105,12 @@ class Bench:
         self.time += PAUSE
 
     def measure(self, stop: RecordArray, fall: float = 0.0) -> Recording:
-        """Return what the sensors show of a stop."""
+        """Return the sensors' recording of a stop."""
         begin = self.time
         return self.sense(self.run(stop, fall), begin)
 
     def sense(self, trace: RecordArray, begin: float) -> Recording:
-        """Return what the sensors show of a true trace that began at `begin` [s]."""
+        """Return the sensors' readings of a true trace that began at `begin` [s]."""
         dt = float(trace["t"][1] - trace["t"][0])
         every = max(round(1.0 / (RATE * dt)), 1)
         shown = lagged(trace["temperature"], dt, self.noise.thermocouple)[::every]

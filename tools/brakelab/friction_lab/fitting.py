@@ -111,7 +111,7 @@ def block_means(values: Record, first: Record, per_block: int, out: Record) -> N
 
 
 def replayed(law: Law, brake: RigBrake, stops: Stops, starts_at_measured: bool) -> Vector:
-    """Return the law's friction in every block, shape (blocks,), with what was measured as inputs."""
+    """Return the law's friction in every block, shape (blocks,), with the measured inputs."""
     number, row = law_row(law, brake)
     starts = np.full(len(stops), row[START])
     if starts_at_measured:

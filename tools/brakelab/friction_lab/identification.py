@@ -142,7 +142,7 @@ def criterion(fitted: Fitted, stops: Stops) -> float:
 
 
 def choose(laws: tuple[Judged, ...]) -> Judged:
-    """Return the law of least error on what it had not seen; see above for ties."""
+    """Return the law of least error on held-out data; see above for ties."""
     least = min(judged.held_out for judged in laws)
     staying = [judged for judged in laws if judged.bounded and judged.held_out <= STAYS * least]
     tied = [judged for judged in laws if judged.held_out <= TIE * least]

@@ -1,4 +1,4 @@
-"""Writes what was identified as a lining file, which the simulated vehicle and the rig read."""
+"""Lining file of an identified law, which the simulated vehicle and the rig read."""
 
 import os
 from pathlib import Path
@@ -15,7 +15,7 @@ CHOSEN = "SIM"
 
 
 def write_lining(path: Path, columns: Columns, heating: float, identified: Identified) -> Linings:
-    """Write the file and return what reading it gives: the brake, the disc and all laws.
+    """Write the file and return its contents as read back: the brake, the disc and all laws.
 
     `heating` [K/J] is used where `columns` gives none. The law that was chosen is called SIM, and there is
     each law under its own name.

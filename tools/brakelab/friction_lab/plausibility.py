@@ -60,7 +60,7 @@ def _factor(factor: float, columns: Columns) -> float:
 
 
 def _effect(quantity: str, ratio: float) -> tuple[float, float, float]:
-    """Return what friction, inertia, heating are multiplied by; `ratio`: of the true unit to the given."""
+    """Return the factors on friction, inertia and heating; `ratio`: of the true unit to the given."""
     return {
         "pressure": (ratio, 1.0, 1.0),
         "torque": (1.0 / ratio, 1.0 / ratio, ratio),
@@ -97,7 +97,7 @@ def refuse_nonsense(recording: Recording, columns: Columns, where: str) -> Numbe
     """Return the three numbers of a recording that makes sense.
 
     Raises:
-        UserError: it does not; names the column, what was found and the remedy.
+        UserError: it does not; names the column, the finding and the remedy.
     """
     hottest, coldest = float(recording.temperature.max()), float(recording.temperature.min())
     if hottest > HOTTEST or coldest < COLDEST:

@@ -26,7 +26,7 @@ PLACES = {".csv": ("line", 2), ".txt": ("line", 2), ".parquet": ("row", 1), ".mf
 
 
 class Read(NamedTuple):
-    """A recording with what describes it."""
+    """Recording with its description."""
 
     recording: Recording
     columns: Columns

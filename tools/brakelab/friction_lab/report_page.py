@@ -1,4 +1,4 @@
-"""The page beside what `identify friction` writes: fit per stop, residuals, numbers, where the law ends.
+"""Report of `identify friction`: fit per stop, residuals, numbers, where the law ends.
 
 One HTML file without scripts or anything from elsewhere; its charts are SVG.
 """
@@ -38,7 +38,7 @@ STYLE: Final = (
 def write_report(
     path: Path, columns: Columns, stops: Stops, identified: Identified, tables: Sequence[Table]
 ) -> None:
-    """Write the page: what was chosen, its fit, its residuals, where it ends, and `tables`."""
+    """Write the page: the chosen law, its fit, its residuals, where it ends, and `tables`."""
     chosen = identified.chosen
     law = replayed(chosen.law, columns.brake, stops, chosen.starts_at_measured)
     off = 100.0 * (law - stops.mu) / stops.mu.mean()

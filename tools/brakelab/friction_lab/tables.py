@@ -18,7 +18,7 @@ PARTS = 5
 
 
 def law_tables(identified: Identified, unseen: str) -> list[Table]:
-    """Return all laws with their errors, and where each must not be used; `unseen` says what was held out."""
+    """Return all laws with their errors, and where not to use each; `unseen` names the data held out."""
     errors = [
         (
             _name(judged, identified),
@@ -79,7 +79,7 @@ def profile_table(fitted: Fitted, brake: RigBrake, stops: Stops, progress: Calla
 
 
 def residual_table(judged: Judged, columns: Columns, stops: Stops) -> Table:
-    """Return what a law leaves, in fifths of the blocks over temperature, sliding speed and pressure."""
+    """Return the residuals of a law, in fifths of the blocks over temperature, sliding speed and pressure."""
     left = replayed(judged.law, columns.brake, stops, judged.starts_at_measured) - stops.mu
     inputs = (
         ("temperature [°C]", stops.temperature[stops.block_first]),

@@ -1,1 +1,1 @@
-"""Physics of a log: signals of one drive against each other, a line for what cannot be."""
+"""Physics of a log: signals of one drive against each other, a line for each contradiction."""

@@ -1,4 +1,4 @@
-"""Physics of a log: what its inputs must show if each is what the map says, in one line where it does not.
+"""Physics of a log: relations that its inputs must obey if the map is right; one line where they do not.
 
     wheels            against each other, and their speed v against the reference
     accel_x           dv/dt
@@ -40,7 +40,7 @@ OUTSIDE: Final = 0.02  # of the samples
 
 
 class Judged(NamedTuple):
-    """What a drive says of its inputs."""
+    """Findings of a drive about its inputs."""
 
     lines: list[str]
     """One for each input that cannot be what the map says, with the remedy."""
@@ -49,7 +49,7 @@ class Judged(NamedTuple):
 
 
 class _Relations(NamedTuple):
-    """Lines through an input over what the others say it should be; None: not to be seen in this drive."""
+    """Lines through an input over its value by the others; None: not observable in this drive."""
 
     accel_x: Fit | None
     swapped: bool
@@ -59,7 +59,7 @@ class _Relations(NamedTuple):
 
 
 def judge(drive: Drive, car: Car) -> Judged:
-    """Return what the physics of a drive says of its inputs."""
+    """Return the findings of a drive's physics about its inputs."""
     omega = drive.corners("wheel_speed")
     if omega is None or not len(drive.known):
         return Judged([], [])
@@ -231,7 +231,7 @@ def _longitudinal(line: Fit | None, car: Car) -> list[str]:
 
 
 def _lateral(relations: _Relations, car: Car) -> list[str]:
-    """Judge signs by what most of wheels, yaw rate, lateral acceleration and steering say, then scales."""
+    """Judge signs by the majority of wheels, yaw rate, lateral acceleration and steering, then scales."""
     lines: list[str] = []
     fits = {
         "wheels": relations.yaw_rate,

@@ -29,7 +29,7 @@ def smooth(values: Vector) -> Vector:
 
 
 def fit(signal: Vector, reference: Vector, rows: NDArray[np.bool_]) -> Fit:
-    """Return the line of the best of a few lags between a signal and what it should show."""
+    """Return the line of the best of a few lags between a signal and its expected value."""
     best = Fit(0.0, 0.0, 0.0)
     for lag in LAGS:
         shifted = np.roll(signal, lag)

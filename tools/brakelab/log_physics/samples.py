@@ -49,7 +49,7 @@ Rows = NDArray[np.bool_]
 
 
 class Car(NamedTuple):
-    """Lengths of a car, and what its brakes do."""
+    """Lengths of a car, and torque per pressure of its brakes."""
 
     radius: Vector
     """m, shape (4,)."""
@@ -97,7 +97,7 @@ class Collector:
         self._count += len(mean)
 
     def drive(self) -> "Drive":
-        """Return what was collected."""
+        """Return the collected samples."""
         rows = np.concatenate(self._rows) if self._rows else np.zeros((0, len(SAMPLED)), np.float32)
         return Drive(rows.astype(np.float64))
 

@@ -139,7 +139,7 @@ def _bytes(text: NDArray[np.uint8], at: int, end: int, base: int, count: int, da
 def _classical(
     text: NDArray[np.uint8], at: int, end: int, base: int, frame: Record, data: NDArray[np.uint8]
 ) -> int:
-    """Parse what follows the channel."""
+    """Parse the fields after the channel."""
     last = word_end(text, at, end)
     if is_word(text, at, last, b"errorframe"):
         frame.can_id, frame.flags, frame.length = 0, FRAME_ERROR, 0
@@ -177,7 +177,7 @@ def _classical(
 
 @kernel
 def _fd(text: NDArray[np.uint8], at: int, end: int, base: int, frame: Record, data: NDArray[np.uint8]) -> int:
-    """Parse what follows CANFD: channel, direction, identifier, name, BRS, ESI, DLC, length, data, flags."""
+    """Parse CANFD fields: channel, direction, identifier, name, BRS, ESI, DLC, length, data, flags."""
     last = word_end(text, at, end)
     channel = number(text, at, last, 10)
     if not 0 <= channel <= 255:
@@ -302,7 +302,7 @@ def read_asc(
 ) -> Iterator[FrameBlock]:
     """Yield the frames of a Vector ASC log in blocks; `bus` is the channel's number.
 
-    `quality` and `advance`: see `read_text`. Raises UserError for what is no ASC log.
+    `quality` and `advance`: see `read_text`. Raises UserError if the file is no ASC log.
     """
     state = new_record(_STATE)
     state["base"] = 16

@@ -204,7 +204,7 @@ def start_time_ns(header: bytes) -> int:
 
 
 def _unpack(packed: bytes, method: int) -> tuple[bytes, str]:
-    """Return what a container holds, and what is wrong with it."""
+    """Return the contents of a container, and its damage."""
     if method == 0:
         return packed, ""
     if method != 2:
@@ -220,7 +220,7 @@ def _unpack(packed: bytes, method: int) -> tuple[bytes, str]:
 
 
 def _pieces(stream: IO[bytes], advance: Callable[[int], None] | None) -> Iterator[_Piece]:
-    """Yield what containers hold, and objects that stand outside of any."""
+    """Yield the contents of containers, and objects outside of any."""
     while True:
         offset = stream.tell()
         header = stream.read(_HEADER)

@@ -131,7 +131,7 @@ def holds_frames(path: Path) -> bool:
 def in_step(
     sources: Sequence[Iterator[RecordArray]], stamps: Callable[[RecordArray], NDArray[Any]]
 ) -> Iterator[list[tuple[int, RecordArray]]]:
-    """Yield what several sources have up to one common time after the other: (source, its records).
+    """Yield the records of several sources up to common times, one after the other: (source, its records).
 
     `stamps` gives the times of records; where they fall within a source, its order is kept.
     """
@@ -254,7 +254,7 @@ def _frames(
 
 
 def _fill(frames: RecordArray, columns: dict[str, NDArray[Any]], kind: int) -> None:
-    """Write what bus logging knows of each frame; `kind`: what all of them are."""
+    """Write the fields that bus logging has of each frame; `kind`: type of all of them."""
 
     def flag(name: str) -> NDArray[np.bool_]:
         return columns[name].astype(np.int64) != 0 if name in columns else np.zeros(len(frames), np.bool_)

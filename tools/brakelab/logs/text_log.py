@@ -42,7 +42,7 @@ line is a header's."""
 def note_line(
     found: int, counts: Record, lines: NDArray[np.int64], data: NDArray[np.uint8], count: int
 ) -> int:
-    """Count a line that is what `found` says; return how many frames there are now."""
+    """Count a line of the kind `found`; return the number of frames so far."""
     if found == DATA:
         lines[count] = counts.line
         return count + 1

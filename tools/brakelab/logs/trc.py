@@ -136,7 +136,7 @@ def _payload(
 
 @kernel
 def _type(text: NDArray[np.uint8], at: int, end: int, old: bool, frame: Record) -> int:
-    """Note what sort of message it is."""
+    """Note the type of message."""
     if old:
         if is_word(text, at, end, b"rx") or is_word(text, at, end, b"tx"):
             return DATA
@@ -257,7 +257,7 @@ def read_trc(
 ) -> Iterator[FrameBlock]:
     """Yield the frames of a PEAK TRC log in blocks; `bus` is the number of its bus.
 
-    `quality` and `advance`: see `read_text`. Raises UserError for what is no TRC log.
+    `quality` and `advance`: see `read_text`. Raises UserError if the file is no TRC log.
     """
     state = new_record(_STATE)
     state["old"] = 1

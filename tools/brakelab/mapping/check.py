@@ -1,4 +1,4 @@
-"""`brake-ecu map check`: a dry run of a map: what feeds each input, how it comes, whether physics agrees."""
+"""`brake-ecu map check`: a dry run of a map: the signal of each input, its rate and gaps, its physics."""
 
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -26,7 +26,7 @@ JUDGED: Final = ("wheel_speed", "accel_x", "yaw_rate", "accel_y", "steering_angl
 
 
 def check(log: Path, map: Path, config: Path | None) -> int:
-    """Print which signal feeds what and what the drive says of it; return 1 if it says that one is wrong.
+    """Print the signal of each input and the drive's findings; return 1 if one is wrong.
 
     `config` is of the car: with its tyres and brakes scales and pressures are judged closer.
 
@@ -62,7 +62,7 @@ def check(log: Path, map: Path, config: Path | None) -> int:
 
 
 class Feed(NamedTuple):
-    """What feeds an input."""
+    """Signal of an input."""
 
     message: str
     """Empty: a column of a signal file."""

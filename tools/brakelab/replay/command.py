@@ -55,7 +55,7 @@ def replay(
     out: Path,
     cycles: Path | None = None,
 ) -> int:
-    """Replay `logs` as one drive into `out`, tell what was found and return 0; arguments as `replay_into`.
+    """Replay `logs` as one drive into `out`, print the findings and return 0; arguments as `replay_into`.
 
     Raises:
         UserError: an argument, the configuration, the map or a log is not right.
@@ -72,7 +72,7 @@ def replay(
 
 
 class Replayed(NamedTuple):
-    """What a replay wrote and found."""
+    """Files and findings of a replay."""
 
     writer: ResultWriter
     findings: list[Findings]

@@ -1,4 +1,4 @@
-"""A drive of one log or several through one ECU: what was learned is carried over, time goes on."""
+"""A drive of one log or several through one ECU: learned values are carried over, time goes on."""
 
 from collections.abc import Callable, Sequence
 from time import perf_counter
@@ -31,7 +31,7 @@ def replay_drive(
     advance: Advance,
     recording: Recording | None = None,
 ) -> RecordArray | None:
-    """Replay the logs that `findings` name, in order, and return what was learned, LEARNED of shape (1,).
+    """Replay the logs that `findings` name, in order, and return the learned values, LEARNED of shape (1,).
 
     `learned` is from before the drive. `write(t, rows)` takes the rows as they come: t [s], shape (n,), and
     shape (n, N_ROW); `end_log()` is told where a log ends, `advance(bytes)` of progress. `recording` gives

@@ -1,8 +1,8 @@
 """Frames or samples through the ECU's own kernels, cycle by cycle: rows of results come out.
 
-Cycle k consumes what is stamped up to T_k, then `step` runs, exactly as in the daemon. T_k is either the grid
-t_0 + k·10 ms from the first frame or sample up to the last, or what a recording notes of its cycles: its T_k,
-missed periods and what only the service could see.
+Cycle k consumes the frames stamped up to T_k, then `step` runs, exactly as in the daemon. T_k is either the
+grid t_0 + k·10 ms from the first frame or sample up to the last, or that of a recording, which notes the T_k,
+missed periods and bus faults of its cycles.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -39,7 +39,7 @@ _AT: Final = np.dtype([("cursor", "i8"), ("done", "i8"), ("open", "i8"), ("left"
 
 
 class Ecu(NamedTuple):
-    """The records of one ECU, each of shape (1,), and what its inputs were like."""
+    """The records of one ECU, each of shape (1,), and the quality of its inputs."""
 
     params: RecordArray
     state: RecordArray

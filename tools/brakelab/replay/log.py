@@ -125,7 +125,7 @@ def replay_log(
 
 
 def _from_first_recorded(blocks: Iterator[RecordArray], recording: Recording) -> Iterator[RecordArray]:
-    """Leave out what was on the bus before the recorded run heard its first frame."""
+    """Leave out the frames before the first one that the recorded run heard."""
     own = next(read_frames(recording.frames, [], LogQuality(), mended=False))
     for block in blocks:
         later = block[np.maximum.accumulate(block["stamp_ns"]) >= own["stamp_ns"][0]]
@@ -143,7 +143,7 @@ def _heard_everything(cycles: RecordArray) -> bool:
 
 
 def _expected_only(blocks: Iterator[RecordArray], plan: ReceivePlan) -> Iterator[RecordArray]:
-    """Leave out what the kernel's filter kept from the recorded run, and what it sent itself."""
+    """Leave out frames that the kernel's filter kept from the recorded run, and its own."""
     wanted = plan.ids[plan.messages["foreign"] == 0]
     for block in blocks:
         extended = np.where(block["flags"] & FRAME_EXTENDED, EXTENDED_ID, 0).astype(np.uint32)

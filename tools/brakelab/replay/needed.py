@@ -101,7 +101,7 @@ def request_line(found: Findings) -> list[str]:
 
 
 def lacking_line(found: Findings) -> list[str]:
-    """Return one line that names the helpful inputs that this log does not have, and what each costs."""
+    """Return one line that names the helpful inputs that this log does not have, and the cost of each."""
     if found.freshness is None:
         return []
     lacking = [
@@ -142,7 +142,7 @@ def fault_lines(found: Findings) -> list[str]:
 
 
 def _cause(found: Findings, place: int) -> str:
-    """Return what is wrong with an input and what would be right, empty: nothing."""
+    """Return the fault of an input and its remedy, empty: none."""
     assert found.freshness is not None
     known, signal = found.freshness[place], INPUT_SIGNALS[place]
     taken, outside, invalid = int(known["taken"]), int(known["outside"]), int(known["invalid"])

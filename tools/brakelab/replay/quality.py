@@ -73,7 +73,7 @@ class Findings:
 
 
 def note_faults(findings: Findings, values: NDArray[np.float64]) -> None:
-    """Count what was wrong in rows of results, shape (n, N_ROW)."""
+    """Count the faults in rows of results, shape (n, N_ROW)."""
     faulty = values[:, OUTPUT["mode"]] >= DEGRADED
     masks = values[faulty, OUTPUT["active_faults"]].astype(np.int64)
     findings.faulty_rows += len(masks)
@@ -88,7 +88,7 @@ def identifier(message: Any) -> str:
 
 
 def damage_lines(findings: Findings) -> list[str]:
-    """Return one line for each kind of damage in the file itself: what is missing, stamps that do not fit."""
+    """Return one line for each kind of damage in the file itself: missing parts, stamps that do not fit."""
     name, log, signals = str(findings.path), findings.log, findings.signals
     lines = []
     for found in (log, signals):
@@ -177,7 +177,7 @@ def quality_counts(findings: Findings, plan: ReceivePlan) -> dict[str, Any]:
 
 
 def _input_counts(findings: Findings) -> list[dict[str, Any]]:
-    """Return what became of each input that the log can hold."""
+    """Return the counts of each input that the log can hold."""
     if findings.freshness is None or findings.seen is None:
         return []
     inputs = []

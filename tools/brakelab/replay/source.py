@@ -28,7 +28,7 @@ class Source(NamedTuple):
 
 
 def load_source(map: Path | None) -> Source:
-    """Return what a signal map says, None: the contract. Raises UserError for a map that is not right."""
+    """Return the source by a signal map, None: the contract. Raises UserError for a map that is not right."""
     if map is None:
         database = resource("dbc/brake_ecu.dbc")
         return Source(contract_receive_plan(database), "", _hash(database))

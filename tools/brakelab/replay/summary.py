@@ -75,7 +75,7 @@ def prediction_lines(rows: Sequence[BrakeRow]) -> list[str]:
 
 
 def peers(rows: Sequence[BrakeRow]) -> dict[str, Vector]:
-    """Return what else could have predicted the applications of `rows`, one row each, by name [m/s^2]."""
+    """Return alternative predictions of the applications of `rows`, one row each, by name [m/s^2]."""
     measured = [row.specific_force_mean for row in rows]
     configured = [row.specific_force_configured for row in rows]
     rest = [row.specific_force_configured_rest for row in rows]

@@ -53,7 +53,7 @@ class OnAms(NamedTuple):
 
 
 class Brake(NamedTuple):
-    """One brake: what CPC shows, the laws identified on it, and these on AMS."""
+    """One brake: its CPC analysis, the laws identified on it, and these on AMS."""
 
     inputs: Vector  # (stops, 3), of CPC, as `inputs_of`
     mean: Vector  # (stops,), mean friction
@@ -81,7 +81,7 @@ def linings() -> Linings:
 
 
 def columns_of(lining: Lining, law: str = "SIM") -> Columns:
-    """Return what describes recordings of `lining` on the flywheel of a law."""
+    """Return the description of recordings of `lining` on the flywheel of a law."""
     rig = rig_with(lining, law)[0]
     return Columns.own(lining, float(rig["mass"] * rig["tyre_radius"] ** 2))
 
@@ -148,7 +148,7 @@ class Recovered(NamedTuple):
 
 
 def recovered(job: tuple[str, str, int]) -> Recovered:
-    """Return what is identified from a noisy recording; `job`: R1 or R2, brake and draw."""
+    """Return the laws identified from a noisy recording; `job`: R1 or R2, brake and draw."""
     numbers, brake, draw = job
     lining = linings().lining[brake]
     stops = find_stops(own_recording(lining, numbers, NOISE, draw), columns_of(lining, numbers), numbers)

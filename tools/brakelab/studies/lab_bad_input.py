@@ -1,4 +1,4 @@
-"""What a wrong recording is answered with: files are spoilt in the usual ways and given to the reader."""
+"""Answers to wrong recordings: files are spoilt in the usual ways and given to the reader."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -47,7 +47,7 @@ def _columns(old: str, new: str) -> Spoil:
 
 
 def _row(place: int, text: str) -> Spoil:
-    """Return what replaces the line `place` (1 is the first)."""
+    """Return the replacement of the line `place` (1 is the first)."""
     return _rows(lambda lines: [*lines[: place - 1], text, *lines[place:]])
 
 
@@ -129,7 +129,7 @@ def answers() -> list[Answer]:
 
 
 def bad_input_table() -> Table:
-    """Return what wrong recordings are answered with."""
+    """Return the answers to wrong recordings."""
     rows = [(each.what, each.line, "refused" if each.is_refused else "read") for each in answers()]
     below = "AMS of brake A as a file of our own, spoilt. Lines as they are printed, folders left out."
     return Table("Bad input", ("what", "line", ""), rows, below)

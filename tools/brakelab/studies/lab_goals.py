@@ -1,4 +1,4 @@
-"""The goals of the friction laboratory with what was found, and causes of what is missed."""
+"""Goals of the friction laboratory beside their results, and causes of misses."""
 
 from typing import Final
 

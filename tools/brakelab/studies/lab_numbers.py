@@ -25,7 +25,7 @@ TABLE_C_3: Final = {
 
 
 def number_tables(lab: Lab) -> list[Table]:
-    """Return what was identified beside Tables C.1, C.2 and C.3."""
+    """Return the identified numbers beside Tables C.1, C.2 and C.3."""
     return [_heating(lab), _ilvo(lab), _ostermeyer(lab)]
 
 

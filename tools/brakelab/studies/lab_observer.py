@@ -5,7 +5,7 @@ has the car's configuration and the learned values of ten minutes of ordinary dr
 of brake A under one of three laws, at a level other than the configured one. Counted as in `bench observers`:
 from 0.8 s after the brakes of both axles are applied, above 15 km/h.
 
-What limits it is measured by cars of which one thing is as the configuration has it, all else as drawn.
+Its limits are measured by cars with one thing as configured, all else as drawn.
 """
 
 import re

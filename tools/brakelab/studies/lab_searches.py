@@ -41,7 +41,7 @@ def searches() -> Searches:
 
 
 def search_table(found: Searches) -> Table:
-    """Return what both searches found, and whether the cost is convex."""
+    """Return the results of both searches, and whether the cost is convex."""
     rows = [
         (
             f"{name}: {cost.names[0]}, {cost.names[1]}",

@@ -1,4 +1,4 @@
-"""Head of docs/results/friction-lab.md: what it is, the tutorial, the figures."""
+"""Head of docs/results/friction-lab.md: purpose, tutorial, figures."""
 
 from typing import Final
 

@@ -1,4 +1,4 @@
-"""The estimators of section 2.4 on a pad's second trip: Table 2.1 and what Figures 2.6 to 2.9 draw."""
+"""The estimators of section 2.4 on a pad's second trip: Table 2.1 and the data of Figures 2.6 to 2.9."""
 
 from typing import Final, NamedTuple
 
@@ -57,7 +57,7 @@ class OnTrips(NamedTuple):
 
 
 def trips() -> OnTrips:
-    """Return the estimators' errors and what they look like."""
+    """Return the estimators' errors and their traces."""
     lining = linings().lining["A"]
     columns = columns_of(lining)
     bench = new_bench(lining, "A", SEED)
