@@ -325,7 +325,7 @@ def bench(
 
     \b
     times     step, codec, plant, cycle, lateness, replay, play
-    accuracy  stops, observers, ablation, bound, recorded
+    accuracy  stops, observers, ablation, bound, recorded, vehicle
     control   compensation, margins, blending, failures
     physics   friction, lab, energy, wear, dust
     """

@@ -103,3 +103,23 @@ def thermal(
     from brakelab.identification import thermal_command
 
     return thermal_command.identify_thermal(logs, config, map, out)
+
+
+@app.command()
+def vehicle(
+    drives: Annotated[
+        list[Path], typer.Argument(metavar="DRIVE", help="Logs (with --map) or files of decoded signals")
+    ],
+    config: Config,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="CAR.toml", help="CONFIG to write, with a page CAR.md beside it")
+    ],
+    map: Map = None,
+    closed: Annotated[
+        bool, typer.Option("--closed", help="State that each drive ends at the height where it began")
+    ] = False,
+) -> int:
+    """Identify a car from its drives: radii, mass, resistance, tyres, brakes, zeros. Write a CONFIG."""
+    from brakelab.identification import vehicle_command
+
+    return vehicle_command.identify_vehicle(drives, config, map, closed, out)

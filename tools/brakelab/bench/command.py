@@ -18,6 +18,7 @@ from brakelab.studies import (
     compensation,
     compensation_picture,
     compensation_table,
+    identified,
     margins,
     recorded,
 )
@@ -50,6 +51,7 @@ from brakelab.studies.texts import (
     REPLAY_TEXT,
     STOPS_TEXT,
     THERMAL_TEXT,
+    VEHICLE_TEXT,
     WEAR_TEXT,
 )
 from ecu import __version__
@@ -70,6 +72,7 @@ COMPENSATION: Final = "compensation"
 MARGINS: Final = "margins"
 LATENESS: Final = "lateness"
 RECORDED: Final = "recorded"
+VEHICLE: Final = "vehicle"
 WEAR: Final = "wear"
 DUST: Final = "dust"
 THERMAL: Final = "thermal"
@@ -104,6 +107,7 @@ def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0, 
         BLENDING: _blending,
         FAILURES: _failures,
         RECORDED: partial(_recorded, seeds=seeds),
+        VEHICLE: partial(_vehicle, seeds=seeds),
         WEAR: partial(_wear, seeds=seeds),
         DUST: partial(_dust, seeds=seeds),
         THERMAL: partial(_thermal, seeds=seeds),
@@ -210,6 +214,12 @@ def _bound(json: bool, seeds: int) -> int:
 def _recorded(json: bool, seeds: int) -> int:
     table = recorded.recorded_table(_each_car(RECORDED, recorded.recorded_of, min(seeds, recorded.CARS)))
     return _page(RECORDED, "Cars as loggers record them", RECORDED_TEXT, [table], json, "recorded-cars")
+
+
+def _vehicle(json: bool, seeds: int) -> int:
+    cars = _each_car(VEHICLE, identified.identified_of, min(seeds, identified.CARS))
+    tables = identified.identified_tables(cars)
+    return _page(VEHICLE, "Cars identified from a drive", VEHICLE_TEXT, tables, json, "identified-cars")
 
 
 def _wear(json: bool, seeds: int) -> int:

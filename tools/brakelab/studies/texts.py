@@ -79,6 +79,14 @@ RECORDED_TEXT: Final = (
     "cars have no engine that drags, where the observer assumes one of 0.2 ± 0.3 m/s²."
 )
 
+VEHICLE_TEXT: Final = (
+    "`brake-ecu identify vehicle --closed` on config/scenarios/identify.toml (689 s, hills shifted by the "
+    "seed), driven by cars of the wide draw with an ECU of config/suv.toml; START is that configuration with "
+    "masses, tyres and brakes 20 % off, up or down by the seed, rear apart from front. The scale of the "
+    "motors' torque, drawn within ±3 %, cannot be seen: it is that of mass, resistance and brakes alike, is "
+    "in their σ, and cancels in what is divided by mass, as in every prediction of a deceleration."
+)
+
 COMPENSATION_TEXT: Final = (
     "Manoeuvres of section 5.7 and fade (6.2.3) in closed loop with the ECU of config/suv.toml, motors at "
     "rest but where it says so (then the ECU blends, f = 0.7 on both axles); cars are drawn per seed from "

@@ -1,0 +1,60 @@
+"""`brake-ecu identify vehicle`: a car's parameters from its drives, as a CONFIG; page and map beside it."""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from brakelab.identification.vehicle_drive import read_drives
+from brakelab.identification.vehicle_file import map_toml, offsets, write_car
+from brakelab.identification.vehicle_identify import identify
+from brakelab.identification.vehicle_page import write_page
+from brakelab.identification.vehicle_parameters import parameters_of
+from brakelab.results.outputs import check_outputs
+from ecu.errors import UserError
+from ecu.settings.config import load_config, new_params
+
+
+def identify_vehicle(drives: Sequence[Path], config: Path, map: Path | None, closed: bool, out: Path) -> int:
+    """Identify the car of `drives`; write `out`, a page and, with a `map`, that without zeros. Return 0.
+
+    Raises:
+        UserError: an argument or a file is not right, or the drives tell nothing.
+    """
+    if out.suffix != ".toml":
+        raise UserError("--out", str(out), "a CONFIG is written; let the name end in .toml")
+    start = load_config(config)
+    page, own_map = out.with_suffix(".md"), out.with_name(f"{out.stem}-map.toml")
+    written = [out, page, page.with_suffix(".svg"), *([own_map] if map else [])]
+    check_outputs(out, written, [*drives, config, *([map] if map else [])])
+    for drive in drives:
+        if not drive.exists():
+            raise UserError(str(drive), "", "no such file; give a log or a file of signals")
+    params = new_params(start)
+    found = identify(read_drives(drives, params, map), params, closed)
+    names = [drive.name for drive in drives]
+    parameters = write_car(config, out, parameters_of(found, start), start, names)
+    try:
+        load_config(out)
+    except UserError as error:
+        print(f"{error}", file=sys.stderr)
+    write_page(page, found, parameters, params[0], names)
+    zeros = offsets(found.zeros)
+    if map and zeros:
+        own_map.write_text(map_toml(map, own_map, zeros), encoding="utf-8")
+    for one in parameters:
+        unit = "" if one.unit == "-" else f" {one.unit}"
+        if one.remedy:
+            print(f"{one.key}: not told; {one.remedy} would tell it")
+        else:
+            print(f"{one.key} = {one.value:.5g} ± {one.sigma:.2g}{unit} ({one.source}; was {one.start:.5g})")
+    for name, zero in zeros.items():
+        print(
+            f"{name}: reads {zero:+.4g} at 0"
+            + ("" if map else f"; a map would take it off: offset = {-zero:.4g}")
+        )
+    also = f", {own_map} (zeros taken off)" if map and zeros else ""
+    with_map = f" --map {own_map if zeros else map}" if map else ""
+    print(
+        f"{out}: written, fits in {page}{also}; next: brake-ecu replay {drives[0]} --config {out}{with_map}"
+    )
+    return 0
