@@ -59,7 +59,7 @@ FACTS = {
     "fixed-pedal": Fact(LONG, CUT_OFF, 27.8, (0.9, 1.1)),  # Table 6.1: about 1
     "hand-over": Fact((7, 8), 0.0, 20.8, (3.9, 4.4)),
     "motor-loss": Fact((7, 8), 0.0, 20.8, (3.9, 4.4)),
-    "identify": Fact(LONG, CUT_OFF, 15.1, (0.0, 0.0), (1.5, 2.9)),  # on the motors for the first minute
+    "identify": Fact(LONG, CUT_OFF, 24.9, (0.0, 0.0), (1.5, 2.9)),  # on the motors for the first minute
     "lane-change": Fact((8.9, 9.1), 22.2, 22.3, (-0.2, 0.2), (4.0, 7.0)),
     "low-grip": Fact((5, 8), 0.0, 20.8, (4.0, 5.0)),
     "ordinary": Fact(LONG, CUT_OFF, 25.0, (0.0, 0.0), (1.5, 2.6)),  # on the motors for the first minute
