@@ -21,8 +21,7 @@ from brakelab.replay.needed import NEEDED, nothing_usable
 from brakelab.replay.quality import Findings, damage_lines
 from brakelab.replay.source import check_map, load_source
 from brakelab.report.command import report as write_report
-from brakelab.results.files import brakes_path, read_result
-from brakelab.results.mdf import SUFFIX
+from brakelab.results.files import EXPORTS, brakes_path, read_result
 from brakelab.simulation.simulate import simulate as run_scenario
 from brakelab.table import Table
 from ecu.arguments import config_file, map_file, scenario_file
@@ -151,8 +150,8 @@ def replay(
         UserError: an argument, the configuration, the map or a log is not right, or no sample of an input
             that is needed was usable.
     """
-    if out is not None and Path(out).suffix == SUFFIX:
-        raise UserError("out", str(out), "is Parquet here; `brake-ecu replay` writes MDF4")
+    if out is not None and Path(out).suffix in EXPORTS:
+        raise UserError("out", str(out), "is Parquet here; `brake-ecu replay` writes MDF4 and MCAP")
     paths = [Path(logs)] if isinstance(logs, str | os.PathLike) else [Path(log) for log in logs]
     folder = TemporaryDirectory(prefix="brake-ecu-") if out is None else None
     written = Path(folder.name, f"{paths[0].stem}.parquet") if folder else Path(out or "")

@@ -109,7 +109,9 @@ def replay(
     out: Annotated[
         Path,
         typer.Option(
-            "--out", metavar="RESULT.parquet", help="Results to write, a row per 10 ms: .parquet or .mf4"
+            "--out",
+            metavar="RESULT.parquet",
+            help="Results to write, a row per 10 ms: .parquet .mf4 .mcap",
         ),
     ],
     map: Map = None,

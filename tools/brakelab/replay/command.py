@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.logs.formats import kind_of
-from brakelab.replay.drive import replay_drive
+from brakelab.replay.drive import drive_frames, replay_drive
 from brakelab.replay.log import log_hash, log_size
 from brakelab.replay.needed import (
     NEEDED,
@@ -28,8 +28,7 @@ from brakelab.replay.quality import Findings, quality_counts, quality_lines
 from brakelab.replay.source import check_map, load_source
 from brakelab.replay.summary import brakings_table, prediction_lines, taps
 from brakelab.results.console import new_console
-from brakelab.results.files import ResultWriter, brakes_path
-from brakelab.results.mdf import SUFFIX
+from brakelab.results.files import EXPORTS, ResultWriter, brakes_path
 from brakelab.results.outputs import check_outputs
 from brakelab.results.pads import pads_of
 from brakelab.results.prediction import SHORT
@@ -94,7 +93,7 @@ def replay_into(
 ) -> Replayed:
     """Replay `logs` as one drive into `out` (its folder is made) and `<name>.brakes.parquet`.
 
-    An `out` that ends in .mf4 holds both.
+    An `out` that ends in .mf4 or .mcap holds both, the latter the frames of the logs, too.
 
     `map` is a signal map (None: the ECU's own database), `state` the folder of the state store, `cycles` a
     recording that gives initial state, T_k and missed periods to an independent log of the same drive.
@@ -135,6 +134,7 @@ def replay_into(
             findings, params, learned, source, write, writer.brakes.end_log, advance, recording
         )
         writer.quality = [quality_counts(found, source.plan) for found in findings]
+        writer.frames = drive_frames(findings)
         writer.pads = [] if learned is None else pads_of(params, learned, vehicle)
     if state and learned is not None and learned.tobytes() != before:
         with closing(open_store(state)) as store:
@@ -144,8 +144,8 @@ def replay_into(
 
 
 def _check(logs: Sequence[Path], out: Path, cycles: Path | None) -> None:
-    if out.suffix not in (".parquet", SUFFIX):
-        remedy = f"results are written as Parquet or MDF4; let the name end in .parquet or {SUFFIX}"
+    if out.suffix not in (".parquet", *EXPORTS):
+        remedy = f"results are Parquet, MDF4 or MCAP; let the name end in .parquet, {' or '.join(EXPORTS)}"
         raise UserError("--out", str(out), remedy)
     for log in logs:
         if not log.exists():

@@ -39,6 +39,8 @@ class Findings:
     path: Path
     start_ns: int = 0
     """Of its first row, on the log's own clock."""
+    shift_s: float = 0.0
+    """Of its rows within a drive of several logs."""
     rows: int = 0
     interfaces: list[str] = field(default_factory=list)
     log: LogQuality = field(default_factory=LogQuality)

@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from brakelab.results.mdf import refuse_mdf
+from brakelab.results.files import refuse_export
 from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
 
@@ -40,7 +40,7 @@ class Drive(NamedTuple):
 
 def read_parquet(path: Path, remedy: str) -> pa.Table:
     """Return the table; UserError with `remedy` when there is none or it cannot be read."""
-    refuse_mdf(path)
+    refuse_export(path)
     if not path.is_file():
         raise UserError(str(path), "no such file", remedy)
     try:

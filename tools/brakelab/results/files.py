@@ -1,12 +1,12 @@
 """Results as files: `RESULT.parquet` with one row every 10 ms and `RESULT.brakes.parquet` beside it, or both
-as the channel groups of one `RESULT.mf4`.
+as the channel groups of one `RESULT.mf4` or the topics of one `RESULT.mcap`.
 
 Names and units are the contract's. A quantity that is not available is null. Each field's metadata holds the
 unit, the schema's metadata the provenance (version, hashes, start, quality of the input).
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, NamedTuple
@@ -16,8 +16,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from brakelab.results import mcap_file, mdf
 from brakelab.results.brakes import BRAKE_UNITS, BrakeBook, BrakeRow
-from brakelab.results.mdf import SUFFIX, load_asammdf, refuse_mdf, write_mdf
 from brakelab.results.pads import KEY, PadState, packed
 from brakelab.results.row import MEASURED_INPUTS
 from ecu.contract.records import RecordArray
@@ -59,9 +59,19 @@ ROW_SCHEMA: Final = _row_schema()
 BRAKE_SCHEMA: Final = _brake_schema()
 
 
+EXPORTS: Final = (mdf.SUFFIX, mcap_file.SUFFIX)
+"""Endings of results for other programs; this one does not read them."""
+
+
+def refuse_export(path: Path) -> None:
+    """Raise UserError for a result in a form for other programs."""
+    if path.suffix in EXPORTS:
+        raise UserError(str(path), "", "results are read from Parquet; `replay` with --out RESULT.parquet")
+
+
 def brakes_path(result: Path) -> Path:
-    """Return where the brake applications of `result` are: `<name>.brakes.parquet`, or in an MDF4 file."""
-    return result if result.suffix == SUFFIX else result.with_name(result.stem + ".brakes.parquet")
+    """Return where the brake applications of `result` are: `<name>.brakes.parquet`, or in the same file."""
+    return result if result.suffix in EXPORTS else result.with_name(result.stem + ".brakes.parquet")
 
 
 def _table(schema: pa.Schema, columns: Sequence[NDArray[Any] | list[Any]]) -> pa.Table:
@@ -93,10 +103,12 @@ class ResultWriter:
     def __init__(self, path: Path, params: RecordArray) -> None:
         """`params`: the parameters of `step`, shape (1,): geometry of the brakes, mass, resistances.
 
-        Raises UserError for a `path` that ends in .mf4 where asammdf is not installed.
+        Raises UserError for a `path` that ends in .mf4 or .mcap where the package for it is not installed.
         """
-        if path.suffix == SUFFIX:
-            load_asammdf(path)
+        if path.suffix == mdf.SUFFIX:
+            mdf.load_asammdf(path)
+        elif path.suffix == mcap_file.SUFFIX:
+            mcap_file.load_mcap(path)
         self.path = path
         self.brakes = BrakeBook(params)
         self.provenance: dict[str, Any] = {}
@@ -105,6 +117,8 @@ class ResultWriter:
         """Findings known at the end only: into the file's metadata under `quality`."""
         self.pads: list[PadState] = []
         """Likewise, under `pads`."""
+        self.frames: Iterable[mcap_file.Frames] = ()
+        """Of the logs, for a result as MCAP; read when everything else is complete."""
         self.rows = 0
         self._unfinished = path.with_name(f".{path.name}.unfinished")
         self._file: pq.ParquetWriter | None = None
@@ -142,9 +156,12 @@ class ResultWriter:
         file.close()
         self.brakes.end_log()
         table = brakes_table(self.brakes.rows).replace_schema_metadata(_encoded(self.provenance))
-        if self.path.suffix == SUFFIX:
+        if self.path.suffix in EXPORTS:
             try:
-                write_mdf(self._unfinished, table, self.path)
+                if self.path.suffix == mdf.SUFFIX:
+                    mdf.write_mdf(self._unfinished, table, self.path)
+                else:
+                    mcap_file.write_mcap(self._unfinished, table, self.frames, self.path)
             finally:
                 self._unfinished.unlink()
             return
@@ -170,7 +187,7 @@ def read_result(path: Path) -> Result:
 
     Raises UserError if it cannot be read.
     """
-    refuse_mdf(path)
+    refuse_export(path)
     try:
         table = pq.read_table(path)
         stored = pq.read_metadata(path).metadata or {}

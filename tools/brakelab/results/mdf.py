@@ -35,12 +35,6 @@ def load_asammdf(path: Path) -> Any:
     return asammdf
 
 
-def refuse_mdf(path: Path) -> None:
-    """Raise UserError for a result in MDF4: this program reads results from Parquet alone."""
-    if path.suffix == SUFFIX:
-        raise UserError(str(path), "", "results are read from Parquet; `replay` with --out RESULT.parquet")
-
-
 def write_mdf(rows: Path, brakes: pa.Table, out: Path) -> None:
     """Write the finished Parquet file `rows` and the applications `brakes` as `out`."""
     asammdf = load_asammdf(out)
