@@ -2,6 +2,7 @@
 
 Daemon and simulated vehicle are processes on a bus of their own. Beside them, on the daemon's own core and
 above its priority, a bare loop wakes every 10 ms and does nothing: the floor of this machine.
+The daemon serves metrics; every other five seconds it is watched, in two ways, and scraped.
 """
 
 import json
@@ -16,6 +17,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.bench.watchers import BLOCK_S, PORTS, VIEWERS, Block, Watchers, alternate, inside
 from brakelab.rig.live import Processes, choose_bus
 from brakelab.studies.table import Table
 from ecu.contract.signals import CYCLE_NS
@@ -42,6 +44,12 @@ class Lateness(NamedTuple):
     """End of its last stage after its deadline."""
     missed: int
     """Periods without a cycle of their own."""
+    t_ns: NDArray[np.int64]
+    """Deadlines on the monotonic clock [ns]."""
+    blocks: list[Block]
+    """With watchers and without, in turns."""
+    messages: float
+    """That each viewer of the page got, a second."""
     bus: str
     busy: int
     """Processes that kept the cores busy."""
@@ -72,10 +80,11 @@ def measure(seconds: float) -> Lateness:
         out, stop = Path(folder), Path(folder) / "stop"
         with (out / "daemon.log").open("wb") as log:
             processes = Processes(bus, resource("config/suv.toml"), out, log)
-            bare = None
+            bare = watchers = None
             try:
                 processes.start_vehicle(resource(SCENARIO), SEED)
-                processes.start_daemon("drive")
+                processes.start_daemon("drive", "--metrics-port", str(PORTS[1]))
+                watchers = Watchers(processes.daemons[-1].pid)
                 processes.departure()
                 busy = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in os.sched_getaffinity(0)]
                 bare = subprocess.Popen(
@@ -83,12 +92,13 @@ def measure(seconds: float) -> Lateness:
                     stdout=subprocess.PIPE,
                     text=True,
                 )
-                deadline = time.monotonic() + seconds + SETTLING_S
-                while time.monotonic() < deadline and processes.driving():
-                    time.sleep(0.5)
+                time.sleep(SETTLING_S)
+                blocks = alternate(watchers, seconds, processes.driving)
                 stop.touch()
                 floor = np.array(json.loads(bare.communicate()[0]), np.float64)
             finally:
+                if watchers is not None:
+                    watchers.end()
                 others: list[subprocess.Popen[Any]] = [*busy, *([bare] if bare else [])]
                 for process in others:
                     process.kill()
@@ -103,6 +113,9 @@ def measure(seconds: float) -> Lateness:
         woken,
         woken + cycles["stage_ns"].sum(axis=1) * 1e-3,
         int(cycles["missed"].sum()),
+        cycles["t_mono_ns"],
+        blocks,
+        watchers.messages_a_second(blocks),
         bus.why,
         len(busy),
     )
@@ -120,10 +133,17 @@ def lateness_tables(seconds: float) -> list[Table]:
         row("bare loop wakes", found.bare, "–"),
         row("daemon's cycle begins", found.woken, "p99.9 ≤ 500"),
         row("daemon's cycle ends", found.ended, "≤ 10000"),
+        *(
+            row(f"begins, {'watched' if watched else 'not watched'}", found.woken[chosen], "no difference")
+            for watched in (False, True)
+            if (chosen := inside(found.blocks, found.t_ns, watched)).any()
+        ),
     ]
     below = (
         f"µs after the deadline, {len(found.woken)} cycles of 10 ms on {found.bus}, {found.busy} other "
         f"processes busy on as many cores. {found.missed} periods missed, {late_ends} cycles ended after the "
-        "next deadline (goal: none)."
+        f"next deadline (goal: none). Watched: every other {BLOCK_S:g} s by `watch --json` and `watch --web` "
+        f"with {VIEWERS} viewers, {found.messages:.1f} messages a second each, and scraped every second; "
+        "else these and the process of the metrics stand still."
     )
     return [Table("lateness", ("what", "p50", "p99", "p99.9", "worst", "goal"), rows, below)]
