@@ -9,6 +9,7 @@ import os
 import sys
 import time
 from importlib.util import find_spec
+from ipaddress import IPv4Address
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -105,8 +106,8 @@ def prepare(options: RunOptions) -> Session:
         UserError: bad arguments or configuration, a bus that cannot be opened, or someone else already sends
             one of our frames.
     """
-    if options.metrics is not None and find_spec("prometheus_client") is None:
-        raise UserError("--metrics-port", "", "needs prometheus-client: pip install 'brake-ecu[metrics]'")
+    if options.metrics is not None:
+        _check_metrics(options.metrics)
     manager = Manager()
     progress = CompileProgress(manager)
     compiled = CompileCounter(progress)
@@ -163,6 +164,17 @@ def prepare(options: RunOptions) -> Session:
             "not_notified", remedy=f"NOTIFY_SOCKET is {os.environ['NOTIFY_SOCKET']}: unset it or mend it"
         )
     return Session(ecu, channel, ring, side, compiled, Standby() if options.standby else None, manager)
+
+
+def _check_metrics(place: str) -> None:
+    """Raise UserError for metrics that can never be served at `place`, ADDRESS:PORT."""
+    if find_spec("prometheus_client") is None:
+        raise UserError("--metrics-port", "", "needs prometheus-client: pip install 'brake-ecu[metrics]'")
+    address = place.rpartition(":")[0]
+    try:
+        IPv4Address(address)
+    except ValueError:
+        raise UserError("--metrics-address", address, "give an IPv4 address, 127.0.0.1 or 0.0.0.0") from None
 
 
 def _restored(folder: Path | None, config: Config, params: RecordArray) -> RecordArray | None:

@@ -108,7 +108,7 @@ def open_server(place: str, handler: type[Handler], goes_on: Callable[[], bool])
         except UserError as error:
             if not told:
                 structlog.get_logger("metrics").error(
-                    "no_metrics", reason=str(error), remedy="free the port; it is tried again every 5 s"
+                    "no_metrics", reason=str(error), remedy="it is tried again every 5 s"
                 )
             told = True
             time.sleep(AGAIN_S)

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from typing import Final
 
+from ecu.errors import UserError
 from ecu.recording.ring import RingReader
 from ecu.watch.daemons import Daemon, choose, is_held, running
 from ecu.watch.history import History
@@ -58,8 +59,11 @@ class Watcher:
                 others = "; ".join(daemon.label for daemon in daemons)
                 self.trouble = f"no daemon answers to {self._wanted}; there run: {others}"
             return
-        self.daemon, self.reader = found, RingReader(found.path)
-        self.source = self.reader
+        try:
+            reader = RingReader(found.path)
+        except UserError:  # it ended just now
+            return
+        self.daemon, self.reader, self.source = found, reader, reader
         self.history.begin_run()
         self.history.tell(f"attached to {found.label}")
         self.trouble, self._seen_s = "", self._now_s()

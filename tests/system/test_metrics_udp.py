@@ -78,3 +78,10 @@ def test_without_prometheus_client_it_is_one_line(daemon):
     assert one.other == [
         "brake-ecu: --metrics-port: needs prometheus-client: pip install 'brake-ecu[metrics]'"
     ]
+
+
+def test_an_address_that_is_none(daemon):
+    place = ("--metrics-port", "9476", "--metrics-address", "every")
+    one = daemon("--config", "suv", "-i", "virtual", "-c", "x", *place)
+    assert one.end(None) == 2
+    assert one.other == ["brake-ecu: --metrics-address: every: give an IPv4 address, 127.0.0.1 or 0.0.0.0"]

@@ -93,3 +93,15 @@ def test_the_ring_is_only_read(loop, clock):
         fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
     with pytest.raises(ValueError, match="read-only"):
         watcher.reader.ring.header["written"] = 0
+
+
+def test_one_that_ends_while_it_is_attached_to(loop, clock, monkeypatch):
+    one, watcher = loop(), Watcher(None, clock)
+
+    def gone(path):
+        raise UserError(str(path), "", "no ring to read here")
+
+    monkeypatch.setattr(module, "RingReader", gone)
+    assert turn(watcher, clock) == 0
+    assert watcher.daemon is None
+    assert one
