@@ -15,6 +15,7 @@ from brakelab.logs.column_map import read_column_map
 from brakelab.logs.formats import kind_of, read_frames
 from brakelab.logs.log_quality import SignalQuality
 from brakelab.mapping.columns import column_map_text, read_column_series
+from brakelab.mapping.drive_torque import motors
 from brakelab.mapping.names import converts, words
 from brakelab.mapping.physics import RADIUS, Found, motion_of, propose, wheel_speeds
 from brakelab.mapping.series import Series, read_series
@@ -73,6 +74,9 @@ def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) 
             name = f"{torque[0].message}.{torque[0].signal} [{torque[0].unit}]"
             remedy = f"a brake torque can stand in for pressures, {FORMULA}; --config CONFIG writes it"
             hints = [f"{name} follows the deceleration: {remedy}"]
+    if not any(one.target.startswith("motor_torque") for one in found):
+        wheels = wheel_speeds(series)
+        found += motors(here, wheels, motion_of(wheels))
     text = map_text(found, here, (out or Path("map.toml")), dbc, strict, interfaces, bus, hints)
     _show(found, drives)
     for line in hints + [f"{one.target}: {one.warning}" for one in found if one.warning]:
