@@ -4,6 +4,7 @@ Noise of the two halves of a signal is independent. A derivative by one half and
 no noise in common, so a regression over them is not attenuated (`vehicle_fit`).
 """
 
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -19,7 +20,7 @@ from brakelab.replay.log import log_size, replay_log
 from brakelab.replay.needed import nothing_usable
 from brakelab.replay.progress import progress_bar
 from brakelab.replay.quality import Findings
-from brakelab.replay.source import load_source
+from brakelab.replay.source import check_map, load_source
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CORNERS, INPUT_SIGNALS
 from ecu.errors import UserError
@@ -93,6 +94,8 @@ def read_drives(paths: Sequence[Path], params: RecordArray, map: Path | None) ->
     source, drives = load_source(map), []
     with progress_bar("identify vehicle", sum(log_size(path) for path in paths)) as advance:
         for path in paths:
+            if map and (line := check_map(map, source, path)):
+                print(line, file=sys.stderr)
             findings, rows, collector = Findings(path), [], Collector()
             for block in replay_log(path, new_ecu(params.copy(), None), source, None, findings, advance):
                 rows.append(block.samples.copy())
