@@ -62,6 +62,7 @@ def new(given: list[str], out: Path | None) -> int:
         config = Config.model_validate(tomllib.loads(text))
     except ValidationError as error:
         raise describe(error, "config new", Config) from None
+    out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(text, "utf-8")
     return _tell(out, config)
 

@@ -158,13 +158,18 @@ def _number(value: float) -> str:
 
 
 def _counter(series: list[Series], message: str) -> str | None:
-    """Return the signal that counts a message's frames."""
+    """Return the signal that counts a message's frames, as the value of a map's key, None: there is none.
+
+    A counter that starts again before its bits are full, as AUTOSAR's at 15, has a modulo.
+    """
     for one in series:
         if one.message != message or not COUNTING & set(words(one.signal)):
             continue
         steps = np.diff(one.value)
         if len(steps) and np.mean(np.isin(steps, (1.0, -one.value.max()))) > 0.7 and one.value.max() > 1:
-            return one.signal
+            modulo = int(one.value.max()) + 1
+            early = bool(np.any(steps == 1 - modulo)) and modulo & (modulo - 1) != 0
+            return f'{{ signal = "{one.signal}"{f", modulo = {modulo}" if early else ""} }}'
     return None
 
 
@@ -207,7 +212,7 @@ def map_text(
             lines.append(f"slowest_period = {first.mean_interval:.2g}      # frames are lost or irregular")
         counter = _counter(series, message)
         if counter:
-            lines.append(f'counter = {{ signal = "{counter}" }}')
+            lines.append(f"counter = {counter}")
     lines += ["", "[inputs]"]
     told = ""
     for one in found:

@@ -33,7 +33,10 @@ AGAINST: Final = {
     "pedal_pressed": ("park", "epb", "accelerator", "gas", "throttle", "clutch", "fault", "hold", "lamp"),
     "steering_angle": ("rate", "speed", "torque", "tq", "sign", "offset"),
     "yaw_rate": ("offset", "accel", "steer", "sas"),
-    "calliper_pressure": ("oil", "tire", "tyre", "fuel", "booster", "vacuum", "turbo", "rail", "ac"),
+    "calliper_pressure": (
+        *("oil", "tire", "tyre", "fuel", "booster", "vacuum", "turbo", "rail", "ac"),
+        *("demand", "dmnd", "request", "req", "target", "setpoint", "soll"),
+    ),
     "accelerator_position": ("brake", "brk", "accel_x", "long", "lat"),
     "pedal_position": ("accelerator", "gas", "throttle", "clutch", "aped"),
     "abs_active": ("fail", "fault", "warn", "lamp", "def", "pas", "off", "diag"),
