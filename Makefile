@@ -22,6 +22,7 @@ demo: .venv/lab
 	.venv/bin/brake-ecu demo $(ARGS)
 
 test: .venv/dev
+	.venv/bin/python -m brakelab.warm
 	.venv/bin/python -m pytest -n auto --maxprocesses 4 --dist loadfile -m "not study" $(ARGS)
 
 studies: .venv/dev
