@@ -119,7 +119,7 @@ def vehicle(
         bool, typer.Option("--closed", help="State that each drive ends at the height where it began")
     ] = False,
 ) -> int:
-    """Identify a car from its drives: radii, mass, resistance, tyres, brakes, zeros. Write a CONFIG."""
+    """Identify radii, mass, drag, tyres and brakes of a car. Write a CONFIG."""
     from brakelab.identification import vehicle_command
 
     return vehicle_command.identify_vehicle(drives, config, map, closed, out)

@@ -34,7 +34,7 @@ def _both(values: Array) -> str:
 
 
 def _judged_rows(cars: Sequence[Car]) -> list[tuple[str, ...]]:
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for number, trip in enumerate(JUDGED):
         for axle, part in AXLES.items():
             each = [car.trips[number] for car in cars]
@@ -57,7 +57,7 @@ def _judged_rows(cars: Sequence[Car]) -> list[tuple[str, ...]]:
 
 
 def _car_rows(cars: Sequence[Car]) -> list[tuple[str, ...]]:
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for car in cars:
         for axle, part in zip(car.axles, AXLES.values(), strict=True):
             new, old = (values_of(fit.heating, fit.cooling) for fit in (axle.fit, axle.before))
