@@ -4,10 +4,10 @@
     a_y,m = c v psi' + b_y
 
 *Dive.* While the acceleration is steady (the body's swinging has ended), within a manoeuvre the grade is a
-line in time; what is left of a_x,m follows what is left of v' by kappa. *Zero of accel_x.* The mean of
-a_x,m / kappa - v' by distance is b / kappa + g (mean grade). A drive that ends where it began has no mean
-grade; of another the grade of its blocks says how sure the mean is. Each standstill shows b + g grade of
-its place. Speeds are those of the wheels by the model of `vehicle_model`.
+parabola of the place; what is left of a_x,m follows what is left of v' by kappa. *Zero of accel_x.* The
+mean of a_x,m / kappa - v' by distance is b / kappa + g (mean grade). A drive that ends where it began has
+no mean grade; of another the grade of its blocks says how sure the mean is. Each standstill shows b + g
+grade of its place. Speeds are those of the wheels by the model of `vehicle_model`.
 """
 
 from typing import Any, Final, NamedTuple
@@ -20,7 +20,7 @@ from brakelab.identification.vehicle_windows import SECONDS, Windows
 from brakelab.log_physics.line import Vector
 from ecu.contract.params import GRAVITY
 
-MANOEUVRE: Final = 12.0  # s, in which the grade is a line
+MANOEUVRE: Final = 12.0  # s, in which the grade is a parabola of the place
 LIVELY: Final = 0.8  # m/s^2, range of v' that shows dive
 LONGEST_STEP: Final = 20.0  # s between two speeds
 BLOCK: Final = 500.0  # m, of road whose grade is of its own
@@ -89,7 +89,7 @@ def dive_of(steps: Steps, prior: Told) -> tuple[float, float, int] | None:
         own = np.flatnonzero((number == place) & good)
         if len(own) >= 6 and np.ptp(steps.change[:, own].mean(axis=0)) > LIVELY:
             rows.append(own)
-            segments.append(_without_line(steps.at[own]))
+            segments.append(_without_grade(np.cumsum((steps.seconds * steps.speed)[own])))
     if not rows:
         return None
 
@@ -104,10 +104,11 @@ def dive_of(steps: Steps, prior: Told) -> tuple[float, float, int] | None:
     return float(found.theta[0]), float(found.sigma[0]), len(cluster)
 
 
-def _without_line(t: Vector) -> Vector:
-    """Return the matrix that takes mean and slope over `t` out of values, shape (n, n)."""
-    basis, _ = np.linalg.qr(np.stack([np.ones_like(t), t - t.mean()], axis=1))
-    return np.asarray(np.eye(len(t)) - basis @ basis.T)
+def _without_grade(place: Vector) -> Vector:
+    """Return the matrix that takes a parabola over `place` [m] out of values, shape (n, n)."""
+    along = (place - place.mean()) / max(float(np.ptp(place)), 1.0)
+    basis, _ = np.linalg.qr(np.stack([along**k for k in range(3)], axis=1))
+    return np.asarray(np.eye(len(place)) - basis @ basis.T)
 
 
 def accel_zero(windows: Windows, steps: Steps, pitch_gradient: float, closed: bool) -> Told:

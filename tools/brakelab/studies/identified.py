@@ -223,7 +223,10 @@ def identified_tables(cars: Iterable[Car]) -> list[Table]:
         z = error / np.array([each.parameter.sigma for each in told])
         sigma = np.median([each.parameter.sigma / max(abs(each.truth), 1e-9) for each in told])
         if one.parameter.key.endswith("delay"):
-            relative, sigma = np.full(len(told), np.nan), np.nan
+            spread = f"{1e3 * np.median(np.abs(error)):.1f} ms", f"{1e3 * np.abs(error).max():.1f} ms"
+            inside = f"{np.sum(np.abs(z) <= 2.0)} of {len(told)}"
+            rows.append((one.parameter.key, f"{len(told)} of {len(every)}", *spread, "–", inside, "–"))
+            continue
         rows.append((
             one.parameter.key, f"{len(told)} of {len(every)}", f"{np.median(relative):.2f}",
             f"{relative.max():.2f}", f"{100 * sigma:.2f}", f"{np.sum(np.abs(z) <= 2.0)} of {len(told)}",
