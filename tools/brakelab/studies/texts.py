@@ -84,9 +84,9 @@ VEHICLE_TEXT: Final = (
     "seed), driven by cars of the wide draw with an ECU of config/suv.toml; START is that configuration with "
     "masses, tyres and brakes 20 % off, up or down by the seed, rear apart from front. The scale of the "
     "motors' torque, drawn within ±3 %, cannot be seen: it is that of mass, resistance and brakes alike, is "
-    "in their σ, and cancels in what is divided by mass, as in every prediction of a deceleration. Its friction "
-    "is that of this drive, which begins with discs of 100 °C; the stranger's begins at 20 °C, so where a car's "
-    "linings depend much on temperature the configured friction is wrong there, and only learning helps."
+    "in their σ, and cancels in what is divided by mass, as in every prediction of a deceleration. Friction "
+    "is that of this drive, which begins with discs of 100 °C; the stranger's begins at 20 °C, so where a "
+    "car's linings depend much on temperature the configured friction is wrong there: only learning helps."
 )
 
 COMPENSATION_TEXT: Final = (
