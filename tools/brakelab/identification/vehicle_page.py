@@ -116,7 +116,7 @@ def panels_of(found: Identified, params: Any) -> list[Panel]:
     slip = 100.0 * (roll[:, None] * (1.0 + sink) * pair / reference - 1.0)
     force = 1e-3 * moving.force
     stiffness = stiffness_of(theta)
-    ends = _ends(force[:, used].reshape(-1))
+    ends = _ends(force[:, used].reshape(-1), 0.0, 100.0)
     line = np.array(ends)
     slips = Panel("slip [%] of the axles", "force [kN]", ends, _ends(slip[:, used].reshape(-1)), [
         *(Line(force[k, used], slip[k, used], colour, marks=True) for k, colour in enumerate((BLUE, ORANGE))),
@@ -131,9 +131,9 @@ def panels_of(found: Identified, params: Any) -> list[Panel]:
     change = steps.change.mean(axis=0)
     short = steps.straight & (steps.seconds <= 1.0)
     dive = steps.felt.mean(axis=0) - change - theta[Place.ZERO]
-    ends = _ends(change[short])
+    ends = _ends(change[short], 0.0, 100.0)
     return [coast, slips, radii, Panel(
-        "accelerometer beyond v' [m/s^2]: dive, and the road's slope", "v' [m/s^2]", ends, _ends(dive[short]),
+        "accelerometer beyond v' [m/s^2]: dive, slopes", "v' [m/s^2]", ends, _ends(dive[short]),
         [Line(change[short], dive[short], BLUE, marks=True),
          Line(np.array(ends), (kappa - 1.0) * np.array(ends), PINK)],
     )]  # fmt: skip
