@@ -117,8 +117,8 @@ def panels_of(found: Identified, params: Any) -> list[Panel]:
     force = 1e-3 * moving.force
     stiffness = stiffness_of(theta)
     ends = _ends(force[:, used].reshape(-1), 0.0, 100.0)
-    line = np.array(ends)
-    slips = Panel("slip [%] of the axles", "force [kN]", ends, _ends(slip[:, used].reshape(-1)), [
+    line = np.linspace(*ends, 60)
+    slips = Panel("slip [%] of the axles", "force [kN]", ends, _ends(slip[:, used].reshape(-1), 0.0, 100.0), [
         *(Line(force[k, used], slip[k, used], colour, marks=True) for k, colour in enumerate((BLUE, ORANGE))),
         *(Line(line, 1e5 * line / stiffness[k], colour) for k, colour in enumerate((BLUE, ORANGE))),
     ])  # fmt: skip
@@ -133,9 +133,9 @@ def panels_of(found: Identified, params: Any) -> list[Panel]:
     dive = steps.felt.mean(axis=0) - change - theta[Place.ZERO]
     ends = _ends(change[short], 0.0, 100.0)
     return [coast, slips, radii, Panel(
-        "accelerometer beyond v' [m/s^2]: dive, slopes", "v' [m/s^2]", ends, _ends(dive[short]),
+        "accelerometer beyond v' [m/s^2]: dive, slopes", "v' [m/s^2]", ends, _ends(dive[short], 0.0, 100.0),
         [Line(change[short], dive[short], BLUE, marks=True),
-         Line(np.array(ends), (kappa - 1.0) * np.array(ends), PINK)],
+         Line(np.linspace(*ends, 60), (kappa - 1.0) * np.linspace(*ends, 60), PINK)],
     )]  # fmt: skip
 
 
