@@ -5,14 +5,18 @@ from pathlib import Path
 
 from ecu.algorithm.step import new_state
 from ecu.contract.records import RecordArray
-from ecu.recording.store import PARTS, open_store, restore, restore_part
+from ecu.recording.rest import cool_discs, rest_of
+from ecu.recording.store import PARTS, open_store, restore, restore_part, saved_at
 from ecu.settings.config import Config, store_key
 
 
-def restored(folder: Path, config: Config, params: RecordArray) -> tuple[int, RecordArray] | None:
+def restored(
+    folder: Path, config: Config, params: RecordArray, now: float | None = None
+) -> tuple[int, RecordArray] | None:
     """Return revision and record (`LEARNED`, shape (1,)) of the store in `folder`, None if it is empty.
 
-    Revision 0: unadapted for these brakes or this version, but wear and dust continue.
+    Revision 0: unadapted for these brakes or this version, but wear and dust continue. `now`: Unix time [s],
+    the discs have cooled since the store was written; None: nobody knows how long ago that was.
 
     Raises:
         UserError: the folder cannot be written.
@@ -21,6 +25,8 @@ def restored(folder: Path, config: Config, params: RecordArray) -> tuple[int, Re
     with closing(open_store(folder)) as store:
         found = restore(store, key, params["mu_nominal"][0])
         kept = {} if found else {part: restore_part(store, key, part) for part in PARTS}
+        if found and now is not None:
+            cool_discs(found[1], params, rest_of(saved_at(store, key, found[0]), now))
     if not any(record is not None for record in kept.values()):
         return found
     learned: RecordArray = new_state(params)["learned"].copy()

@@ -208,6 +208,13 @@ def restore(
     return found
 
 
+def saved_at(store: sqlite3.Connection, key: str, revision: int) -> str:
+    """Return when a revision was saved (UTC, ISO 8601), by the clock of that machine; empty: no such row."""
+    row = store.execute("SELECT saved_at FROM learned WHERE key = ? AND revision = ?", (key, revision))
+    found = row.fetchone()
+    return str(found[0]) if found else ""
+
+
 def restore_part(store: sqlite3.Connection, key: str, part: str) -> RecordArray | None:
     """Return the vehicle's wear or dust (`PARTS`, shape (1,)) by its newest good row, None without one."""
     dtype, wrong, _ = PARTS[part]

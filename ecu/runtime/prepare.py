@@ -182,7 +182,7 @@ def _restored(folder: Path | None, config: Config, params: RecordArray) -> Recor
     if folder is None:
         return None
     try:
-        found = restored(folder, config, params)
+        found = restored(folder, config, params, time.time())
     except (UserError, *state_store.DAMAGED):
         return None
     if found is None:

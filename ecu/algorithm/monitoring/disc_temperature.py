@@ -19,9 +19,10 @@ causes add as squares:
 
 So the standard deviation grows with the heat put in and falls towards that of the air at rest.
 
-Start. The duration of the rest is unknown. The disc temperature is uniformly distributed between that of the
-air and the highest left by the last application (`learned.disc_excess`). Where a pressure is lost, the
-wheel's share by load of the total tyre force counts as heat, and as its error.
+Start. The disc temperature is uniformly distributed between that of the air and the highest that the last
+application can have left (`learned.disc_excess`; the daemon lowers it by a rest that its clock tells).
+
+Where a pressure is lost, the wheel's share by load of the total tyre force counts as heat, and as its error.
 
 Source. Sections 3.4 and 7.6.1 (rain), Table C.1. Assumptions: all constants below without a source.
 """
