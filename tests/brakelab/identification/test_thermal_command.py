@@ -1,5 +1,6 @@
 """`brake-ecu identify thermal`: from a simulated drive to a configuration; what bad arguments give."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -50,9 +51,22 @@ def identify(*arguments: object) -> int:
     return cli.main(["identify", "thermal", *map(str, arguments)])
 
 
-def test_a_drive_becomes_a_configuration_and_a_page(log, tmp_path, capsys) -> None:
-    out = tmp_path / "car.toml"
-    assert identify(log, "--config", CONFIG, "--out", out) == 0
+def documented() -> list[list[str]]:
+    """Return the commands of the documentation's page, words without the program's name."""
+    blocks = re.findall(r"```sh\n(.*?)```", (ROOT / "docs/disc-temperature.md").read_text("utf-8"), re.DOTALL)
+    lines = [line.split() for block in blocks for line in block.splitlines()]
+    return [words[1:] for words in lines if words[0] == "brake-ecu"]
+
+
+def test_the_documented_commands_make_a_configuration_a_page_and_a_result(
+    log, tmp_path, capsys, monkeypatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "dry.parquet").symlink_to(log)
+    fit, replay = documented()
+    fit.remove("rain.parquet")
+    assert cli.main(fit) == 0
+    out = Path("out/car.toml")
     config, before = load_config(out), load_config(CONFIG)
     assert store_key(config) == store_key(before)  # what was learned of friction goes on
     assert config.front.disc_heating != before.front.disc_heating
@@ -64,11 +78,14 @@ def test_a_drive_becomes_a_configuration_and_a_page(log, tmp_path, capsys) -> No
         "next: brake-ecu replay LOG --config " + f"{out} --out drive.parquet"
     )
     page = out.with_suffix(".md").read_text()
-    assert "| drive.parquet | rl |" in page
-    assert "| drive.parquet | rr |" not in page
-    before_now = [line.split("|")[8:10] for line in page.splitlines() if line.startswith("| drive.parquet")]
+    assert "| dry.parquet | rl |" in page
+    assert "| dry.parquet | rr |" not in page
+    before_now = [line.split("|")[8:10] for line in page.splitlines() if line.startswith("| dry.parquet")]
     assert all(float(now) < 5.0 for _, now in before_now)
     assert out.with_suffix(".svg").is_file()
+    assert cli.main(replay) == 0
+    said = pq.read_table("out/drive.parquet")["disc_temperature_fl"].to_numpy()
+    assert 60.0 < np.nanmax(said) < 500.0
 
 
 def change(path: Path, out: Path, **columns) -> Path:
