@@ -80,6 +80,8 @@ PARAMS: Final = np.dtype(
         ("dust_above", "f8", (4,)),
         ("dust_version", "i8"),  # identifies these models
         ("airborne_share", "f8", (4,)),  # share of pad wear emitted as particles up to 10 um
+        ("airborne_low", "f8", (4,)),  # the least and the most that it may be
+        ("airborne_high", "f8", (4,)),
         # sensors
         ("sigma_wheel_speed", "f8"),  # rad/s
         ("sigma_accel", "f8"),  # m/s^2

@@ -40,13 +40,19 @@ class Pad(Section):
     that stay the same over some 6 g."""
 
     airborne_share: Annotated[float, Field(ge=0, le=1), Unit("-")] = 0.5
-    """Of the mass worn off, what stays in the air: about half (Grigoratos and Martini 2015); 0.02 to 0.21
-    were measured for non-asbestos organic linings (Hagino et al. 2016). The disc's own is not in it."""
+    """Of the mass worn off, what stays in the air: about half (Grigoratos and Martini 2015). The disc's own
+    is not in it."""
+    airborne_low: Annotated[float, Field(ge=0, le=1), Unit("-")] = 0.02
+    """The least that it may be: 0.02 to 0.21 for non-asbestos organic linings (Hagino et al. 2016)."""
+    airborne_high: Annotated[float, Field(ge=0, le=1), Unit("-")] = 0.70
+    """The most: 0.5 to 0.7 of the collected debris of three kinds of linings (Sanders et al. 2002)."""
 
     @model_validator(mode="after")
     def _something_to_wear(self) -> "Pad":
         if self.thickness_worn >= self.thickness_new:
             raise ValueError("thickness_worn must be smaller than thickness_new")
+        if not self.airborne_low <= self.airborne_share <= self.airborne_high:
+            raise ValueError("airborne_share must lie between airborne_low and airborne_high")
         return self
 
 
@@ -57,6 +63,7 @@ def set_pad(row: Any, corner: int, pad: Pad) -> None:
     row["wear_sigma"][corner], row["wear_walk"][corner] = pad.sigma, pad.walk
     row["wear_scatter"][corner] = pad.scatter
     row["airborne_share"][corner] = pad.airborne_share
+    row["airborne_low"][corner], row["airborne_high"][corner] = pad.airborne_low, pad.airborne_high
     row["pad_mass"][corner] = 2.0 * pad.density * pad.area  # kg/m is g/mm
     row["pad_life"][corner] = pad.thickness_new - pad.thickness_worn
     row["chamfer_depth"][corner], row["chamfer_share"][corner] = pad.chamfer_depth, pad.chamfer_share

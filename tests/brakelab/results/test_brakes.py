@@ -193,3 +193,19 @@ def test_what_a_braking_taught_or_why_nothing(
     t, rows = stop(params)
     change(rows)
     assert book(params, t, rows).rows[0].learning == why
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.4])
+def test_the_mass_of_particles_is_of_the_wear_that_the_ecu_believes(params: RecordArray, scale) -> None:
+    """Pads that a measured thickness says to wear 0.4 times as fast as the law emit so much less."""
+    t, rows = stop(params)
+    corners(rows, "slip")[:] = 0.0
+    corners(rows, "disc_temperature")[:], corners(rows, "sigma_disc_temperature")[:] = 100.0, 5.0
+    corners(rows, "pad_wear_mass")[:] = 10.0
+    by_law = np.array([line.pad_wear_mass for line in book(params, t, rows).rows])
+    corners(rows, "pad_wear_mass")[600:] += scale * by_law
+    for line, mass in zip(book(params, t, rows).rows, by_law, strict=True):
+        assert line.pad_wear_mass == pytest.approx(mass)  # the contract: regressors times coefficients
+        assert line.particle_mass == pytest.approx(1e3 * 0.5 * scale * mass)
+        assert line.particle_mass_low < 0.02 / 0.5 * line.particle_mass
+        assert line.particle_mass_high > 0.70 / 0.5 * line.particle_mass

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brakelab.results.dust import dust_of
+from brakelab.results.dust import airborne_mass, dust_of
 from ecu.contract.dust import LAW_TERMS
 from ecu.contract.signals import N_OUTPUTS, OUTPUT
 from ecu.settings.config import load_config, new_params
@@ -64,3 +64,13 @@ def test_what_is_not_told(params, given):
 def test_a_car_without_models_tells_nothing():
     found = dust_of(rows(20.0, 10.0, 5.0), new_params(load_config(CONFIG)))
     assert np.isnan(found.factor).all()
+
+
+def test_the_mass_in_the_air_has_the_band_of_the_wear_and_of_its_share(params):
+    worn, error = np.array([0.1, 0.2, 0.05, -1e-9]), np.array([0.15, 0.15, 0.15, 0.6])
+    mass, low, high = airborne_mass(worn, error, params)
+    assert mass == pytest.approx([50.0, 100.0, 25.0, 0.0])
+    assert low[:3] == pytest.approx(1e3 * 0.02 * worn[:3] * (1.0 - 1.96 * 0.15))
+    assert high[:3] == pytest.approx(1e3 * 0.70 * worn[:3] * (1.0 + 1.96 * 0.15))
+    assert (low <= mass).all()
+    assert (mass <= high).all()

@@ -18,6 +18,7 @@ from ecu.contract.records import RecordArray
 from ecu.contract.signals import OUTPUT
 
 PERIOD: Final = 0.01  # s, one row
+TWO_SIDED: Final = 1.96  # standard deviations, 95 %
 
 Corners = NDArray[np.float64]
 
@@ -29,6 +30,18 @@ class Dust(NamedTuple):
     low: Corners
     """Ends of the 95 % interval."""
     high: Corners
+
+
+def airborne_mass(worn: Corners, error: Corners, params: RecordArray) -> tuple[Corners, Corners, Corners]:
+    """Return what stays in the air of the mass `worn` [g] and its 95 % band [mg], shapes (4,).
+
+    `error`: relative standard deviation of the wear. The share in the air is anything within its bounds: no
+    signal of a car tells it.
+    """
+    p = params[0]
+    worn = np.maximum(worn, 0.0)
+    low, high = worn * np.maximum(1.0 - TWO_SIDED * error, 0.0), worn * (1.0 + TWO_SIDED * error)
+    return 1e3 * p["airborne_share"] * worn, 1e3 * p["airborne_low"] * low, 1e3 * p["airborne_high"] * high
 
 
 def dust_of(rows: Vector, params: RecordArray) -> Dust:

@@ -14,8 +14,11 @@ from brakelab.plant.wear import RUN_IN as WEAR_RUN_IN
 from brakelab.simulation.closed_loop import new_loop, run_blocks
 from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS
 from brakelab.studies.wear_drives import trip_scenario
+from ecu.algorithm.monitoring.wear import WEAR_STATE, restore_wear
 from ecu.contract.dust import MODELS
+from ecu.contract.records import RecordArray
 from ecu.contract.signals import OUTPUT
+from ecu.pads import GAUGE, add_measurement
 from ecu.settings.config import load_config, new_params
 from ecu.settings.dust import Dust
 from ecu.settings.resources import resource
@@ -24,6 +27,7 @@ Array = NDArray[np.float64]
 
 PARTICLES: Final = TRUTH_COLUMNS.index("particles_fl")
 BRAKING, LAST = OUTPUT["braking"], OUTPUT["particles_last_brake"]
+MEASURED_AT: Final = 10e6  # m
 LATER: Final = 20  # rows, latest report of an application after it began
 QUIET: Final = (0.03, 0.15)
 """Standard deviations of the logarithm, of a day and of an application, of brakes that repeat better."""
@@ -69,6 +73,8 @@ class OnBoard(NamedTuple):
     particles_per_km: float
     mass_per_km: float
     """mg/km of all linings, by the ECU."""
+    measured_mass_per_km: float
+    """mg/km, once the thickness of the linings was measured."""
     true_mass_per_km: float
     """mg/km, the same share of the true wear."""
 
@@ -137,6 +143,25 @@ def section(chosen: Judged, trained: list[Applications]) -> Dust:
     )  # fmt: skip
 
 
+def mass_after_measurement(params: RecordArray, learned: RecordArray, worn: Array, seed: int) -> float:
+    """Return the ECU's mass of particles per kilometre [mg/km] after `MEASURED_AT` like the trip driven.
+
+    The thickness of every lining is measured there, to `GAUGE`; `worn`: true wear of the trip [g], (4,).
+    """
+    wear = learned[0]["wear"]
+    times = MEASURED_AT / float(wear["odometer"])
+    for name in ("regressors", "friction_error", "temperature_error", "odometer"):
+        wear[name] *= times
+    wear["told"], wear["fitted_at"] = 1, 0.0
+    random = np.random.default_rng([seed, 47])
+    lost = times * worn / params[0]["pad_mass"] + random.normal(0.0, GAUGE, 4)
+    for i in range(4):
+        add_measurement(wear, i, float(lost[i]), GAUGE)
+    state = np.zeros(1, WEAR_STATE)[0]
+    restore_wear(params[0], state, learned[0])
+    return float(1e6 * (params[0]["airborne_share"] * state["mass"]).sum() / MEASURED_AT)
+
+
 def _told_error(rows: Array) -> float:
     """Return the error of the reported applications; rows of braking, last reported, emitted so far."""
     edges = np.flatnonzero(np.diff(rows[:, 0], prepend=0.0, append=0.0))
@@ -172,6 +197,7 @@ def drive_on_board(seed: int) -> OnBoard:
     kept = loop.sides.state[0]["learned"]["dust"]
     km = 1e-3 * float(car["distance"])
     params = loop.sides.params[0]
+    learned = loop.sides.state["learned"].copy()
     return OnBoard(
         seed,
         chosen.name,
@@ -180,5 +206,6 @@ def drive_on_board(seed: int) -> OnBoard:
         float(kept["told_work"] / kept["work"]),
         float(told[OUTPUT["particles_per_km"]]),
         float(told[OUTPUT["particle_mass_per_km"]]),
+        mass_after_measurement(loop.sides.params, learned, car["pad_wear_mass"], seed),
         float(1e3 * (params["airborne_share"] * car["pad_wear_mass"]).sum() / km),
     )
