@@ -61,7 +61,7 @@ def test_a_shipped_car_comes_out_of_its_data_sheet(name: str, tmp_path: Path) ->
     assert made.sensors == car.sensors
     for section in ("vehicle", "front", "rear"):
         for key, value in getattr(car, section):
-            if key not in ("pad", "dust"):
+            if key not in ("pad", "dust") and value is not None:
                 assert getattr(getattr(made, section), key) == pytest.approx(value, rel=1e-3), key
 
 
