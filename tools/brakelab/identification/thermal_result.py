@@ -23,8 +23,8 @@ HEAT_CAPACITY: Final = 0.02
 """Relative: c_p where other drives are hotter or colder (section 3.4: 450 to 550 J/(kg K)). Assumption."""
 AIR_FLOW: Final = 0.05
 """Relative: wind, traffic ahead and load change the cooling from drive to drive. Assumption."""
-RAIN: Final = 0.15
-"""Relative: one rain is not another. Assumption."""
+RAIN: Final = 0.21
+"""Relative: the water of the day that was identified and of another, 15 % of the cooling each. Assumption."""
 WARMS: Final = "brake harder and more often, from higher speeds"
 RESTS: Final = "let the hot discs cool for ten minutes, standing or at walking pace"
 CRUISES: Final = "cruise at 100 km/h and more for ten minutes, the discs hot before"
