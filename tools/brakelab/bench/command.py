@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import track
 
 from brakelab.bench.observer_times import step_times
-from brakelab.bench.output import PICTURES, plain_row, print_json, print_tables, write_page
+from brakelab.bench.output import PICTURES, plain_row, print_json, print_tables, results_page, write_page
 from brakelab.bench.times import BENCHES
 from brakelab.studies import (
     ablation,
@@ -33,10 +33,11 @@ from brakelab.studies.observers import WIDE, Sample, Task, observer_rows, tasks
 from brakelab.studies.observers_cases import configured
 from brakelab.studies.observers_picture import PICTURED, consistency_of, write_picture
 from brakelab.studies.observers_table import finite, observer_tables
-from brakelab.studies.table import Table, stop_tables, time_table
+from brakelab.studies.table import stop_tables, time_table
 from brakelab.studies.texts import (
     ABLATION_TEXT,
     BLENDING_TEXT,
+    BLOCKS_TEXT,
     BOUND_TEXT,
     COMPENSATION_TEXT,
     DUST_TEXT,
@@ -76,6 +77,7 @@ VEHICLE: Final = "vehicle"
 WEAR: Final = "wear"
 DUST: Final = "dust"
 THERMAL: Final = "thermal"
+BLOCKS: Final = "blocks"
 REPLAY: Final = "replay"
 PLAY: Final = "play"
 
@@ -111,6 +113,7 @@ def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0, 
         WEAR: partial(_wear, seeds=seeds),
         DUST: partial(_dust, seeds=seeds),
         THERMAL: partial(_thermal, seeds=seeds),
+        BLOCKS: partial(_blocks, seeds=seeds),
         LATENESS: partial(_lateness, seconds=seconds),
         REPLAY: _replay,
         PLAY: partial(_play, seconds=seconds),
@@ -203,23 +206,27 @@ def _each_car(name: str, drive: Callable[[int], Car], cars: int) -> list[Car]:
 def _ablation(json: bool, seeds: int) -> int:
     cars = _each_car(ABLATION, ablation.samples_of, min(seeds, ablation.CARS))
     table = ablation.ablation_table(cars)
-    return _page(ABLATION, "What carries the joint observer", ABLATION_TEXT, [table], json)
+    return results_page(ABLATION, "What carries the joint observer", ABLATION_TEXT, [table], json)
 
 
 def _bound(json: bool, seeds: int) -> int:
     table = bound.bound_table(_each_car(BOUND, bound.bounds_of, min(seeds, bound.CARS)))
-    return _page(BOUND, "What the sensors allow", BOUND_TEXT, [table], json)
+    return results_page(BOUND, "What the sensors allow", BOUND_TEXT, [table], json)
 
 
 def _recorded(json: bool, seeds: int) -> int:
     table = recorded.recorded_table(_each_car(RECORDED, recorded.recorded_of, min(seeds, recorded.CARS)))
-    return _page(RECORDED, "Cars as loggers record them", RECORDED_TEXT, [table], json, "recorded-cars")
+    return results_page(
+        RECORDED, "Cars as loggers record them", RECORDED_TEXT, [table], json, "recorded-cars"
+    )
 
 
 def _vehicle(json: bool, seeds: int) -> int:
     cars = _each_car(VEHICLE, identified.identified_of, min(seeds, identified.CARS))
     tables = identified.identified_tables(cars)
-    return _page(VEHICLE, "Cars identified from a drive", VEHICLE_TEXT, tables, json, "identified-cars")
+    return results_page(
+        VEHICLE, "Cars identified from a drive", VEHICLE_TEXT, tables, json, "identified-cars"
+    )
 
 
 def _wear(json: bool, seeds: int) -> int:
@@ -231,7 +238,7 @@ def _wear(json: bool, seeds: int) -> int:
     if not json:
         picture = resource(PICTURES) / "wear.svg"
         write_chart(picture, wear.wear_panels(lives, len(cars)), wear.LEGEND)
-    return _page(WEAR, "Wear", WEAR_TEXT, wear.wear_tables(cars, laws, lives), json)
+    return results_page(WEAR, "Wear", WEAR_TEXT, wear.wear_tables(cars, laws, lives), json)
 
 
 def _dust(json: bool, seeds: int) -> int:
@@ -239,7 +246,7 @@ def _dust(json: bool, seeds: int) -> int:
 
     picture = None if json else resource(PICTURES) / "dust.svg"
     tables = dust.dust_page(partial(_each_car, DUST), min(seeds, dust.DRAWS), picture)
-    return _page(DUST, "Dust", DUST_TEXT, tables, json)
+    return results_page(DUST, "Dust", DUST_TEXT, tables, json)
 
 
 def _thermal(json: bool, seeds: int) -> int:
@@ -249,11 +256,22 @@ def _thermal(json: bool, seeds: int) -> int:
     if not json:
         write_chart(resource(PICTURES) / "disc-temperature.svg", thermal.thermal_panels(cars), thermal.LEGEND)
     tables = thermal.thermal_tables(cars)
-    return _page(THERMAL, "Disc temperature", THERMAL_TEXT, tables, json, "disc-temperature")
+    return results_page(THERMAL, "Disc temperature", THERMAL_TEXT, tables, json, "disc-temperature")
+
+
+def _blocks(json: bool, seeds: int) -> int:
+    from brakelab.studies import blocks
+
+    tables, panels = blocks.blocks_page(min(seeds, blocks.CARS))
+    if not json:
+        write_chart(resource(PICTURES) / "blocks.svg", panels, blocks.LEGEND)
+    return results_page(BLOCKS, "Road blocks on the dynamometer", BLOCKS_TEXT, tables, json)
 
 
 def _friction(json: bool) -> int:
-    return _page(FRICTION, "Friction laws, disc and brake unit", FRICTION_TEXT, friction_tables(), json)
+    return results_page(
+        FRICTION, "Friction laws, disc and brake unit", FRICTION_TEXT, friction_tables(), json
+    )
 
 
 def _lab(json: bool) -> int:
@@ -266,12 +284,12 @@ def _lab(json: bool) -> int:
     lab = run_lab(lambda line: console.print(line, highlight=False, markup=False))
     if not json:
         write_pictures(resource(PICTURES), lab)
-    return _page(LAB, "The friction laboratory", LAB_TEXT, lab_tables(lab), json, "friction-lab")
+    return results_page(LAB, "The friction laboratory", LAB_TEXT, lab_tables(lab), json, "friction-lab")
 
 
 def _energy(json: bool) -> int:
     tables = energy_tables(resource("config/scenarios"), load_config(resource("config/suv.toml")))
-    return _page(ENERGY, "Where the energy goes", ENERGY_TEXT, tables, json)
+    return results_page(ENERGY, "Where the energy goes", ENERGY_TEXT, tables, json)
 
 
 def _compensation(json: bool) -> int:
@@ -282,7 +300,7 @@ def _compensation(json: bool) -> int:
     if not json:
         picture = resource(PICTURES) / "compensation.svg"
         write_chart(picture, compensation_picture.pictured(config), compensation_picture.LEGEND)
-    return _page(COMPENSATION, "What compensation is worth", COMPENSATION_TEXT, tables, json)
+    return results_page(COMPENSATION, "What compensation is worth", COMPENSATION_TEXT, tables, json)
 
 
 def _margins(json: bool) -> int:
@@ -293,22 +311,22 @@ def _margins(json: bool) -> int:
         picture = resource(PICTURES) / "control-margins.svg"
         write_chart(picture, margins.margin_panels(cars), margins.LEGEND)
     tables = margins.margin_tables(cars)
-    return _page(MARGINS, "Margins of the control loop", MARGINS_TEXT, tables, json, "control-margins")
+    return results_page(MARGINS, "Margins of the control loop", MARGINS_TEXT, tables, json, "control-margins")
 
 
 def _blending(json: bool) -> int:
-    return _page(BLENDING, "Motors and linings brake together", BLENDING_TEXT, blending_tables(), json)
+    return results_page(BLENDING, "Motors and linings brake together", BLENDING_TEXT, blending_tables(), json)
 
 
 def _failures(json: bool) -> int:
-    return _page(FAILURES, "Brakes that fail", FAILURES_TEXT, failure_tables(), json)
+    return results_page(FAILURES, "Brakes that fail", FAILURES_TEXT, failure_tables(), json)
 
 
 def _lateness(json: bool, seconds: float) -> int:
     from brakelab.bench.lateness import lateness_tables
 
     text = f"{machine()}. {LATENESS_TEXT}"
-    return _page(LATENESS, "Lateness under load", text, lateness_tables(seconds), json)
+    return results_page(LATENESS, "Lateness under load", text, lateness_tables(seconds), json)
 
 
 def _replay(json: bool) -> int:
@@ -316,7 +334,7 @@ def _replay(json: bool) -> int:
         from brakelab.bench.replay import replay_tables
     except ImportError:
         raise UserError("bench", REPLAY, NOT_INSTALLED.format("asammdf")) from None
-    return _page(
+    return results_page(
         REPLAY, "Speed of replay", f"{machine()}. {REPLAY_TEXT}", replay_tables(), json, "replay-speed"
     )
 
@@ -324,22 +342,4 @@ def _replay(json: bool) -> int:
 def _play(json: bool, seconds: float) -> int:
     from brakelab.bench.play import play_tables
 
-    return _page(PLAY, "How late frames are played", PLAY_TEXT, play_tables(seconds), json, keep=True)
-
-
-def _page(
-    name: str,
-    title: str,
-    text: str,
-    tables: list[Table],
-    json: bool,
-    file: str | None = None,
-    keep: bool = False,
-) -> int:
-    of = f"`brake-ecu bench {name}`, version {__version__}"
-    if json:
-        print_json({"of": of, "tables": [table._asdict() for table in tables]})
-        return 0
-    print_tables(of, tables)
-    write_page(f"{file or name}.md", title, f"{of}. {text}", tables, keep)
-    return 0
+    return results_page(PLAY, "How late frames are played", PLAY_TEXT, play_tables(seconds), json, keep=True)

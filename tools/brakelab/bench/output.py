@@ -8,6 +8,7 @@ from rich.console import Console
 from brakelab.bench.provenance import measured_on
 from brakelab.studies.measure import Figure, Row
 from brakelab.studies.table import Table, markdown, show
+from ecu import __version__
 from ecu.settings.resources import resource
 
 RESULTS: Final = "docs/results"
@@ -47,3 +48,22 @@ def write_page(name: str, title: str, text: str, tables: list[Table], keep: bool
         content = "\n".join([f"# {title}", "", measured_on(), "", text, "", *sections.values()])
         (folder / name).write_text(content.rstrip() + "\n", encoding="utf-8")
         Console(stderr=True).print(f"written: {RESULTS}/{name}", highlight=False)
+
+
+def results_page(
+    name: str,
+    title: str,
+    text: str,
+    tables: list[Table],
+    json: bool,
+    file: str | None = None,
+    keep: bool = False,
+) -> int:
+    """Print the tables of bench `name`, or JSON; renew its page, `file` or its name. Returns 0."""
+    of = f"`brake-ecu bench {name}`, version {__version__}"
+    if json:
+        print_json({"of": of, "tables": [table._asdict() for table in tables]})
+        return 0
+    print_tables(of, tables)
+    write_page(f"{file or name}.md", title, f"{of}. {text}", tables, keep)
+    return 0

@@ -38,7 +38,7 @@ def surface_panel(coefficients: Array, mass: float, name: str) -> Panel:
     speed, heat = (0.5 * (edges[1:] + edges[:-1]) for edges in (SPEED, HEAT))
     value = wear_surface(coefficients, speed / 3.6, heat, DECEL, mass)
     low, high = 0.0, float(value.max())
-    title = f"{name}: {value.min():.2f} (pale) to {high:.2f} (dark) g/MJ, disc [degC]"
+    title = f"{name}, {value.min():.2f} to {high:.2f} (dark) g/MJ; disc [degC]"
     cells = Cells(SPEED, HEAT, value, low, high)
     ends = ((float(SPEED[0]), float(SPEED[-1])), (float(HEAT[0]), float(HEAT[-1])))
     return Panel(title, f"speed [km/h], at {DECEL:.0f} m/s²", *ends, [], cells=cells)

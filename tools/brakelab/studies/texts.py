@@ -162,3 +162,14 @@ THERMAL_TEXT: Final = (
     "`HEAT_CAPACITY`, `AIR_FLOW` and `RAIN`, which widen the σ of a fit, were chosen on cars 0 and 2.\n\n"
     "![Figures 7.13 to 7.15](images/disc-temperature.svg)"
 )
+
+BLOCKS_TEXT: Final = (
+    "How well a dynamometer reproduces the wear of real driving (sections 7.3 to 7.5). Blocks of 300 "
+    "applications from generated trips run twice with the plant's friction and wear "
+    "(tools/brakelab/studies/blocks_rig.py): on the road with drag and rolling resistance, and under the "
+    "rule-based controller of Figure 7.5, which waits for the disc, runs up and holds the road's "
+    "deceleration with the brake alone.\n\n"
+    "![Specific wear by Table 7.1, its sensitivity, energy error, a block repeated](images/blocks.svg)\n\n"
+    "In the picture: Figure 7.9 (both laws of Table 7.1), Figure 7.10 (a and b), Figure 7.11, Figure 7.12 "
+    "(dashed: settled). Blue and orange in the sensitivities are the extended law."
+)

@@ -62,7 +62,7 @@ class Life(NamedTuple):
     sigma: dict[str, Array]
 
 
-def _measured(block: WornBlock, pad_mass: float, random: Generator) -> tuple[Array, float, float]:
+def measured_block(block: WornBlock, pad_mass: float, random: Generator) -> tuple[Array, float, float]:
     """Return a block's regressors, the mass by the balance [g] and the linear wear by six points [mm]."""
     named = dict(zip(COLUMNS, block.trace.T, strict=True))
     edges = np.flatnonzero(named["calliper_pressure"] == 0.0)
@@ -87,7 +87,7 @@ def dynamometer_laws() -> dict[str, Law]:
     for wheel in (0, 2):
         random = np.random.default_rng([DYNAMOMETER_CAR, wheel])
         rows = [
-            _measured(block, float(params["pad_mass"][wheel]), random)
+            measured_block(block, float(params["pad_mass"][wheel]), random)
             for block in programme(car, wheel, DYNAMOMETER_CAR)
         ]
         x, mass, wear = (np.array(values) for values in zip(*rows, strict=True))
