@@ -1,0 +1,73 @@
+"""docs/tutorial-pad-life.md, command by command: its wear half with short drives, or all of it."""
+
+import re
+import shlex
+import sys
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from brakelab.fleet import generate
+from ecu.cli import main
+from ecu.settings.resources import resource
+
+PAGE = (resource("docs") / "tutorial-pad-life.md").read_text("utf-8")
+
+
+def _run(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    words = shlex.split(line)
+    match words:
+        case ["brake-ecu", *arguments]:
+            assert main(arguments) == 0, line
+        case ["python", "-c", code]:
+            exec(compile(code, "tutorial", "exec"), {})
+        case ["python", "-m", "brakelab.fleet.generate", *arguments]:
+            monkeypatch.setattr(sys, "argv", ["generate", *arguments])
+            generate.main()
+        case ["mkdir", "-p", folder]:
+            Path(folder).mkdir(parents=True)
+        case ["sed", "-n", _, source, ">>", target]:
+            section = re.search(r"^\[front\.dust\].*", Path(source).read_text(), re.DOTALL | re.MULTILINE)
+            assert section
+            with Path(target).open("a") as file:
+                file.write(section[0])
+        case _:
+            pytest.fail(f"the tutorial has a command that nobody tests: {line}")
+
+
+def _follow(page: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    for kind, block in re.findall(r"```(sh|csv)\n(.*?)```", page, re.DOTALL):
+        if kind == "csv":
+            Path("out/fleet.csv").write_text(block)
+        else:
+            for line in block.splitlines():
+                _run(line, monkeypatch)
+
+
+def test_the_wear_half_with_short_drives(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    wear, _, _ = PAGE.replace("--seconds 2400", "--seconds 30").partition("## Dust")
+    _follow(wear.replace("--workers 2", "--workers 1"), tmp_path, monkeypatch)
+    said = capsys.readouterr().out
+    for line in re.findall(r"^(out/car\..*)$", PAGE, re.MULTILINE):
+        assert line in said  # what the page shows
+    assert "as measured: fl" in said
+    report = Path("out/second.html").read_text("utf-8")
+    assert "fitted as new, by the law" in report
+    assert "50 km are needed" in report
+    pads = pq.read_table("out/fleet/pads.parquet")
+    assert pads.column("vehicle").to_pylist() == ["suv-000"] * 4 + ["sedan-001"] * 4
+    assert pads.column("measurements").to_pylist() == [1, 1, *[0] * 6]
+    assert "Who needs pads when" in Path("out/fleet/report.html").read_text("utf-8")
+
+
+@pytest.mark.study
+def test_all_of_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _follow(PAGE, tmp_path, monkeypatch)
+    pads = pq.read_table("out/fleet/pads.parquet")
+    assert all(low is not None for low in pads.column("remaining_low").to_pylist())
+    report = Path("out/third.html").read_text("utf-8")
+    assert "dirtiest brakings, by particles" in report
