@@ -69,6 +69,12 @@ def test_blocks_in_mdf4_give_the_same_law(blocks):
         identify_wear(blocks / "manifest.csv", CONFIG, "front", blocks / "mdf.toml")
 
 
+def test_a_configuration_that_includes_another_is_refused_before_it_is_included(blocks):
+    nested = CONFIG.with_name("suv-blended.toml")
+    with pytest.raises(UserError, match=r"suv-blended.toml: include: .* give --config suv.toml"):
+        identify_wear(blocks / "manifest.csv", nested, "front", blocks / "car.toml")
+
+
 def test_a_block_has_at_least_250_applications_of_its_road():
     stops = road_stops("motorway", "lively", 2)
     assert len(stops) >= 250

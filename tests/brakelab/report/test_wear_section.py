@@ -191,6 +191,17 @@ def test_without_its_table_of_brakings(tmp_path: Path) -> None:
     assert "dirtiest" not in page
 
 
+def test_a_drive_without_braking_says_so(tmp_path: Path) -> None:
+    result = made_up(tmp_path, {"braking": 0.0, "particles_last_brake": NAN})
+    brakes = brakes_path(result)
+    pq.write_table(pq.read_table(brakes).slice(0, 0), brakes)
+    page = page_of(result)
+    assert "dirtiest" not in page
+    assert "No braking was found in this drive." in result.with_name("report.html").read_text("utf-8")
+    assert "mg/km] – 6.5" in page
+    assert "nan" not in page
+
+
 @pytest.mark.parametrize("text", ["{", "[3]", '[{"corner": "fl"}]'])
 def test_damaged_metadata_are_one_line(tmp_path: Path, text: str) -> None:
     result = made_up(tmp_path)

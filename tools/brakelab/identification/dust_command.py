@@ -11,6 +11,7 @@ from brakelab.identification.dust_fit import Judged, choose, judge_all, ranges
 from brakelab.identification.dust_models import LEAST
 from brakelab.identification.dust_reader import read_trips
 from brakelab.identification.dust_tables import model_table, spearman_table, trip_table
+from brakelab.identification.measurement_files import refuse_nested
 from brakelab.results.outputs import check_outputs
 from brakelab.studies.chart import BLUE, GREY, ORANGE, PINK, Line, Panel, write_chart
 from brakelab.studies.table import markdown
@@ -103,6 +104,7 @@ def identify_dust(manifest: Path, config: Path, axle: str, out: Path) -> int:
     if axle not in ("front", "rear"):
         raise UserError("--axle", axle, "choose front or rear")
     vehicle = load_config(config)
+    refuse_nested(config)
     page = out.with_suffix(".md")
     check_outputs(out, (out, page, out.with_suffix(".svg")), [manifest, config])
     brake: Axle = getattr(vehicle, axle)

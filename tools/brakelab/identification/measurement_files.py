@@ -1,6 +1,7 @@
 """Manifests and tables of measurements: read, and refused with one line if invalid."""
 
 import csv
+import tomllib
 from pathlib import Path
 from typing import Final
 
@@ -46,6 +47,8 @@ def read_columns(path: Path, names: tuple[str, ...], what: str) -> dict[str, Arr
     Raises:
         UserError: it cannot be read, lacks a column, holds a non-number, or time does not rise.
     """
+    if not path.is_file():
+        raise UserError(str(path), "", f"no such file; the manifest names the file of each {what}, beside it")
     if path.suffix.lower() == ".mf4":
         columns = _channels(path, names, what)
         _check_time(path, columns["t"])
@@ -86,6 +89,18 @@ def _channels(path: Path, names: tuple[str, ...], what: str) -> dict[str, Array]
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise UserError(str(path), "", f"cannot be read as MDF4: {reason}") from None
     return dict(zip(names, [t, *values], strict=True))
+
+
+def refuse_nested(config: Path) -> None:
+    """Refuse a CONFIG that includes another: what is written would include it, and may not.
+
+    Raises:
+        UserError: it does.
+    """
+    inner = tomllib.loads(config.read_text("utf-8")).get("include")
+    if inner is not None:
+        remedy = f"the file written would include {config}, which may include none: give --config {inner}"
+        raise UserError(str(config), "include", f"{remedy}, and copy the sections into one file")
 
 
 def check_celsius(path: Path, name: str, values: Array, hottest: float) -> None:

@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from brakelab.identification.measurement_files import refuse_nested
 from brakelab.identification.wear_blocks import Array, Block, Heat, read_blocks
 from brakelab.identification.wear_curves import SHARE
 from brakelab.identification.wear_fit import QUASI_STATIC, TERMS, UNITS, Fit, fit_law
@@ -118,6 +119,7 @@ def identify_wear(manifest: Path, config: Path, axle: str, out: Path) -> int:
     if axle not in ("front", "rear"):
         raise UserError("--axle", axle, "choose front or rear")
     vehicle = load_config(config)
+    refuse_nested(config)
     page = out.with_suffix(".md")
     check_outputs(out, (out, page), [manifest, config])
     brake: Axle = getattr(vehicle, axle)

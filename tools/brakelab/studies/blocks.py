@@ -19,6 +19,7 @@ from brakelab.identification.wear_programme import (
 from brakelab.studies.blocks_rig import Corner, Done, corner_of, energy_error, run_stops
 from brakelab.studies.chart import BLUE, GREY, ORANGE, PINK, Cells, Line, Panel
 from brakelab.studies.table import Table
+from brakelab.studies.wear_bad_input import bad_input_table
 from brakelab.studies.wear_study import CLIMATE, measured_block
 
 Array = NDArray[np.float64]
@@ -213,6 +214,7 @@ def blocks_page(cars: int = CARS) -> tuple[list[Table], list[Panel]]:
         road_table(pairs),
         claims_table([pair for seed in range(cars) for pair in car_pairs(seed)], repeats, stops["trip-calm"]),
         sensitivity_table(regressors),
+        bad_input_table(),
     ]
     panels = [
         *(surface_panel(law, corner.mass, f"7.9 {name}") for name, law in TABLE_7_1.items()),
