@@ -94,6 +94,7 @@ def test_a_wrong_map_is_found_by_the_motion_of_the_car(
         ("map suggest LOG.log", "--dbc: missing"),
         ("map suggest few.csv", "no four wheel speeds by their names among Time, ax"),
         ("map suggest empty.csv", "the file is empty"),
+        ("map suggest race.log", "this is a CSV file; let its name end in .csv"),
         ("replay aim.csv --config suv --out r.parquet", "or the map of columns that `map suggest` proposes"),
         ("replay aim.csv --config suv --map bus.toml --out r.parquet", "no.dbc: no such file"),
         (
@@ -113,6 +114,7 @@ def test_a_mistake_is_one_line(
         'database = "no.dbc"\n[inputs]\naccel_x = { message = "M", signal = "S" }\n'
     )
     (tmp_path / "map.toml").write_text('[inputs]\naccel_x = { column = "ax" }\n')
+    (tmp_path / "race.log").write_text('"Interval"|"ms"|0|0|1,"AccelX"|"G"|-3.0|3.0|25\n1,2\n')
     frame = "(1.000000) can0 100#0000\n"
     for name in ("LOG.log", "drive.log"):
         (tmp_path / name).write_text(frame)

@@ -10,8 +10,8 @@ import pytest
 from brakelab.log_physics.line import fit
 from brakelab.logs.formats import read_frames
 from brakelab.logs.log_quality import LogQuality
-from brakelab.mapping.command import timeout
-from brakelab.mapping.names import corner_of, words
+from brakelab.mapping.command import map_text, timeout
+from brakelab.mapping.names import corner_of, score, words
 from brakelab.mapping.physics import Found, motion_of, propose, wheel_speeds
 from brakelab.mapping.series import Series, read_series
 from brakelab.mapping.torque import brake_torque, stand_in
@@ -284,6 +284,19 @@ def test_the_written_map_is_one(drive, tmp_path: Path, capsys: pytest.CaptureFix
     assert plan.mapped.sum() >= 7
     assert "check every line" in out.read_text(encoding="utf-8")
     assert "written" in capsys.readouterr().err
+
+
+def test_a_counter_that_starts_again_early_has_a_modulo(drive) -> None:
+    """AUTOSAR's counts to 14 in four bits; without a modulo every fifteenth frame would be refused."""
+    series = read_series([drive], cantools.database.load_string(contract(), "dbc"))
+    found, _ = propose(series)
+    text = map_text(found, series, Path("m.toml"), resource("dbc/brake_ecu.dbc"), True, ["can0"], 0, [])
+    assert 'counter = { signal = "alive_counter", modulo = 15 }' in text
+
+
+def test_a_demand_is_no_pressure() -> None:
+    target = "calliper_pressure_fl"
+    assert score("pressure_demand_fl", target) <= score("calliper_pressure_fl", target) - 3
 
 
 def test_another_cars_database_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:

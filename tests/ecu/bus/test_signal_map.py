@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import cantools
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from ecu.bus.units import CONVERSIONS, conversion
 from ecu.contract.records import INPUTS, RecordArray, new_record
 from ecu.contract.signals import ALIVE, CYCLE_NS, INPUT, INPUT_SIGNALS, VALID
 from ecu.errors import UserError
+from ecu.settings.resources import resource
 
 ReadLog = Callable[[Path, str], RecordArray]
 CARS = ("mustang", "rav4", "kona")
@@ -357,3 +359,20 @@ def test_a_rule_that_needs_more_bytes_than_the_message_has(tmp_path: Path) -> No
 def test_without_a_map_the_contract_is_received(tmp_path: Path) -> None:
     assert 0x60 in receive_plan(None).ids
     assert receive_plan(write(tmp_path)).ids.tolist() == [10]
+
+
+@pytest.mark.parametrize("kind", ["kcd", "sym"])
+def test_a_database_of_another_kind_gives_the_same_inputs(tmp_path: Path, kind: str) -> None:
+    """The Mustang's DBC written by cantools as KCD (Kayak) and SYM (PEAK); both keep no cycle times."""
+    dbc = resource("dbc/cars/mustang.dbc")
+    database = cantools.database.load_file(dbc, strict=False)
+    text = database.as_kcd_string() if kind == "kcd" else database.as_sym_string()
+    (tmp_path / f"car.{kind}").write_text(text, "utf-8")
+    of_dbc = resource("config/maps/mustang.toml")
+    shipped = of_dbc.read_text("utf-8").replace("../../dbc/cars/mustang.dbc", f"car.{kind}")
+    (tmp_path / "map.toml").write_text(shipped, "utf-8")
+    other, plan = load_signal_map(tmp_path / "map.toml").plan, load_signal_map(of_dbc).plan
+    for name in ("place", "scale", "offset"):
+        np.testing.assert_allclose(other.signals[name], plan.signals[name])
+    assert other.ids.tolist() == plan.ids.tolist()
+    assert other.mapped.tolist() == plan.mapped.tolist()

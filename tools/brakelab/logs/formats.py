@@ -38,6 +38,7 @@ _BEGINS: Final = (
     (re.compile(rb"LOGG"), ".blf"),
     (re.compile(rb"MDF     |UnFinMF "), ".mf4"),
     (re.compile(rb"PAR1"), ".parquet"),
+    (re.compile(rb'"?Interval"?\|"ms"\|'), ".csv"),  # RaceCapture
     (re.compile(rb"\s*\(\d+\.\d+\) +\S+ +[0-9A-Fa-f]+#"), ".log"),
     (re.compile(rb"\s*(date |base +(hex|dec)|\d+\.\d+ +(\d+|CANFD) +\S+ )", re.IGNORECASE), ".asc"),
     (re.compile(rb"\s*(;|\d+\) +\d)"), ".trc"),
