@@ -218,7 +218,7 @@ def _axle(axle: str, answers: Given, like: Config) -> dict[str, Value]:
     values = {
         key: Value(value, f"as {like.name}, {ASSUMED}")
         for key, value in usual
-        if key not in ("pad", "dust") and value is not None
+        if value is not None and not isinstance(value, Section)
     }
 
     def given(name: str) -> Any:
