@@ -19,7 +19,7 @@ def check(
         bool, typer.Option("--picture", help="Draw the distribution beside what Annex 5 forbids")
     ] = False,
 ) -> int:
-    """List every mistake of a configuration, or the figures that its car results in."""
+    """List every mistake of a configuration, or what its car comes to."""
     from ecu.settings import check
 
     return check.check(file, picture)
@@ -35,7 +35,7 @@ def new(
         Path | None, typer.Option("--out", metavar="CAR.toml", help="File to write; default: the car's name")
     ] = None,
 ) -> int:
-    """Write a configuration from a data sheet: ask, or take the values of --set."""
+    """Write a configuration from a data sheet."""
     from ecu.settings import new
 
     return new.new(given or [], out)
