@@ -211,7 +211,7 @@ def test_a_log_that_cannot_be_replayed_gives_one_line_and_no_result(tmp_path: Pa
     ("change", "line"),
     [
         ({"observer": "best"}, "--observer: best: not known; take joint"),
-        ({"out": Path("result.csv")}, "--out: result.csv: results are written as Parquet or MDF4"),
+        ({"out": Path("result.csv")}, "--out: result.csv: results are Parquet, MDF4 or MCAP"),
         ({"logs": [Path("no.log")]}, "no.log: no such file"),
     ],
 )
