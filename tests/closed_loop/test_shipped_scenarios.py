@@ -79,6 +79,7 @@ FACTS = {
     "type-0": Fact((5, 6), 0.0, 27.8, (8.0, 8.7)),
     "type-0-laden": Fact((5, 6), 0.0, 27.8, (8.0, 8.7)),
     "tyre-stiffness": Fact((8, 10), 0.0, 27.8, (3.9, 4.4)),
+    "wltp-brake": Fact(LONG, CUT_OFF, math.nan, (0.0, 2.5), disc=(20, 60)),
 }
 
 

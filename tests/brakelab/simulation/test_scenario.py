@@ -107,6 +107,12 @@ def test_a_road_may_be_described_by_place(tmp_path: Path) -> None:
         (FOLLOW + "[trace]", "trace: give one of speed, file and generate"),
         (FOLLOW + "[trace]\nspeed = [[0.0, 0.0]]", "rows of rising time from 0.0 on"),
         (FOLLOW + "[trace]\nspeed = [[0.0, 0.0], [1.0, 1.0]]\nseed = 1", "seed belongs to generate"),
+        (FOLLOW + '[trace]\ngenerate = "wltp-brake"\nseed = 1', "seed belongs to generate"),
+        (FOLLOW + '[trace]\ngenerate = "real-driving"\ntrip = 1', "trip belongs to generate"),
+        (
+            FOLLOW + '[trace]\ngenerate = "wltp-brake"\ntrip = 11',
+            "trace.trip: give a value of at most 10 (found 11)",
+        ),
         ("grade = 0.1" + FOLLOW + '[trace]\ngenerate = "real-driving"', "a generated trace has its own"),
         (CRUISE_TO_20, "until_speed is never passed; give a speed beyond it"),
         ("x = = 1", "not valid TOML"),

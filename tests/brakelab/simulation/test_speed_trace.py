@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from brakelab.simulation.scenario import load_scenario
-from brakelab.simulation.speed_trace import generated_trace, read_trace
+from brakelab.simulation.speed_trace import generated_trace, read_trace, wltp_brake_trace
 from ecu.errors import UserError
 
 SCENARIO = """
@@ -34,6 +34,16 @@ def test_the_generated_cycle_brings_its_hills(tmp_path: Path) -> None:
     assert np.array_equal(script.trace, cycle.speed)
     assert np.array_equal(script.road.grade, cycle.grade)
     assert script.phases["seconds"][0] == cycle.speed[-1, 0] > 90 * 60
+
+
+def test_the_wltp_brake_cycle_is_followed_whole_or_by_trip_on_a_level_road(tmp_path: Path) -> None:
+    (tmp_path / "cycle.toml").write_text(SCENARIO + 'generate = "wltp-brake"\n')
+    (tmp_path / "trip.toml").write_text(SCENARIO + 'generate = "wltp-brake"\ntrip = 6\n')
+    whole, trip = (load_scenario(tmp_path / name).script() for name in ("cycle.toml", "trip.toml"))
+    assert whole.phases["seconds"][0] == pytest.approx(15_826.0)
+    assert np.array_equal(trip.trace, wltp_brake_trace(6).speed)
+    assert trip.phases["seconds"][0] == pytest.approx(700.0)
+    assert len(whole.road.grade) == 0
 
 
 @pytest.mark.parametrize(

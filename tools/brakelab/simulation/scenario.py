@@ -23,6 +23,8 @@ A phase ends after `seconds` or when the speed passes `until_speed`, whichever c
 file = "town.csv"                # beside the scenario; or `speed = [[0.0, 0.0], [9.0, 14.0]]`
 generate = "real-driving"        # or that of brakelab.trip.generate, with its grade
 seed = 1
+generate = "wltp-brake"          # or that of brakelab.trip.wltp_brake, on a level road
+trip = 3                         # one of its ten; all of them without
 ```
 The road can be described by place instead of time, with friction and height of each side, and the steering:
 ```
@@ -64,6 +66,7 @@ from brakelab.plant.steering import Steering
 from brakelab.simulation.faults import Fault
 from brakelab.simulation.scenario_tables import (
     BRAKE_BY,
+    REAL_DRIVING,
     NotNegative,
     Payload,
     Phase,
@@ -86,7 +89,7 @@ ByTime = Annotated[
 ]
 """Rows of time [s] and value; a number alone holds all the time."""
 KINDS = {"cruise": CRUISE, "coast": COAST, "brake": BRAKE, "follow": FOLLOW}
-LONGEST = 10_800.0
+LONGEST = 21_600.0
 """s, a scenario that did not end by itself ends here."""
 
 
@@ -157,7 +160,7 @@ class Scenario(BaseModel):
             raise ValueError("a follow phase needs [trace], and [trace] a follow phase")
         if (
             self.trace is not None
-            and self.trace.generate
+            and self.trace.generate == REAL_DRIVING
             and (self.road.grade or "grade" in self.model_fields_set)
         ):
             raise ValueError("grade: a generated trace has its own; remove this key")

@@ -9,7 +9,14 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from brakelab.plant.description import Body
 from brakelab.plant.road import Road
-from brakelab.simulation.speed_trace import SpeedTrace, generated_trace, read_trace, trace_of
+from brakelab.simulation.speed_trace import (
+    N_TRIPS,
+    SpeedTrace,
+    generated_trace,
+    read_trace,
+    trace_of,
+    wltp_brake_trace,
+)
 from ecu.settings.toml_file import Unit
 
 Positive = Annotated[float, Field(gt=0.0)]
@@ -17,6 +24,7 @@ NotNegative = Annotated[float, Field(ge=0.0)]
 Row = tuple[float, float]
 Sides = tuple[float, float, float]
 BRAKE_BY = ("decel", "pedal", "kept_decel")
+REAL_DRIVING, WLTP_BRAKE = "real-driving", "wltp-brake"
 
 
 def as_rows(rows: list[Row] | list[Sides], columns: int = 2) -> NDArray[np.float64]:
@@ -75,17 +83,21 @@ class Trace(ScenarioTable):
     """Rows of time and speed."""
     file: str | None = None
     """CSV file of time and speed, beside the scenario."""
-    generate: Literal["real-driving"] | None = None
-    """A trip of `brakelab.trip.generate`, with its grade."""
+    generate: Literal["real-driving", "wltp-brake"] | None = None
+    """A trip of `brakelab.trip.generate`, with its grade, or the cycle of `brakelab.trip.wltp_brake`."""
     seed: Annotated[int, Field(ge=0), Unit("-")] = 0
-    """Of the generated trip."""
+    """Of the trip of real driving."""
+    trip: Annotated[int, Field(ge=1, le=N_TRIPS), Unit("-")] | None = None
+    """Of the WLTP-Brake cycle; without it all trips in a row."""
 
     @model_validator(mode="after")
     def _one_source(self) -> "Trace":
         if sum(given is not None for given in (self.speed, self.file, self.generate)) != 1:
             raise ValueError("give one of speed, file and generate")
-        if "seed" in self.model_fields_set and self.generate is None:
-            raise ValueError("seed belongs to generate")
+        if "seed" in self.model_fields_set and self.generate != REAL_DRIVING:
+            raise ValueError(f'seed belongs to generate = "{REAL_DRIVING}"')
+        if self.trip is not None and self.generate != WLTP_BRAKE:
+            raise ValueError(f'trip belongs to generate = "{WLTP_BRAKE}"')
         if self.speed is not None:
             trace_of(self.speed)
         return self
@@ -94,7 +106,9 @@ class Trace(ScenarioTable):
         """Return the trace. Raises `UserError`: the file is wrong or cannot be read."""
         if self.speed is not None:
             return trace_of(self.speed)
-        return generated_trace(self.seed) if self.file is None else read_trace(Path(self.file))
+        if self.file is not None:
+            return read_trace(Path(self.file))
+        return wltp_brake_trace(self.trip) if self.generate == WLTP_BRAKE else generated_trace(self.seed)
 
 
 class SteeringFile(ScenarioTable):

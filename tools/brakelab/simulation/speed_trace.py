@@ -1,4 +1,4 @@
-"""Speed traces to follow, from a file or from the generator of real driving.
+"""Speed traces to follow, from a file or from a generator: real driving, or a WLTP-Brake cycle.
 
 A CSV file has the columns `t` [s] and `speed` [m/s]:
 ```
@@ -19,9 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.trip.generate import real_driving
+from brakelab.trip.wltp_brake import TRIPS, wltp_brake
 from ecu.errors import UserError
 
 HEADER = ["t", "speed"]
+N_TRIPS = len(TRIPS)
+"""Of the WLTP-Brake cycle."""
 
 
 class SpeedTrace(NamedTuple):
@@ -80,3 +83,8 @@ def generated_trace(seed: int) -> SpeedTrace:
     """Return the real-driving cycle of `seed`."""
     cycle = real_driving(seed)
     return SpeedTrace(np.column_stack([cycle.t, cycle.speed]), np.ascontiguousarray(cycle.grade))
+
+
+def wltp_brake_trace(trip: int | None) -> SpeedTrace:
+    """Return a trip of the WLTP-Brake cycle, 1 to `N_TRIPS`, or all in a row; the road is level."""
+    return SpeedTrace(wltp_brake(trip), np.empty((0, 2)))
