@@ -23,8 +23,15 @@ from ecu.algorithm.control.blending import (
     share_torque,
     update_motors,
 )
+from ecu.algorithm.control.cleaner_share import CALM_ACROSS, CLEANER_STATE, lean
 from ecu.algorithm.control.demand import DEMAND_STATE, hold_pedal, update_demand
-from ecu.algorithm.control.distribution import DISTRIBUTION_STATE, cap_trailing, distribute, watch_trailing
+from ecu.algorithm.control.distribution import (
+    DISTRIBUTION_STATE,
+    cap_trailing,
+    distribute,
+    front_share,
+    watch_trailing,
+)
 from ecu.algorithm.control.failed_brakes import FAILED_BRAKES_STATE, replace_failed
 from ecu.algorithm.control.friction_torque import lagging_torque
 from ecu.algorithm.control.limiter import LIMITER_STATE, available_pressure, limit_axle, reads_empty
@@ -57,6 +64,7 @@ from ecu.algorithm.estimation.thesis.slip import RADIUS_START, WHEELS_STATE
 from ecu.algorithm.estimation.thesis.speed import SPEED_STATE
 from ecu.algorithm.estimation.wheel_load import WHEEL_LOAD_STATE
 from ecu.algorithm.hydraulics import HYDRAULICS_STATE, advance_pressures, correct_pressures
+from ecu.algorithm.inputs import others_brake
 from ecu.algorithm.monitoring.acceleration import ACCELERATION_STATE
 from ecu.algorithm.monitoring.application import APPLICATION_STATE, update_application
 from ecu.algorithm.monitoring.disc_temperature import (
@@ -102,6 +110,7 @@ INITIAL = np.dtype(
         ("dust", DUST_STATE),
         ("demand", DEMAND_STATE),
         ("distribution", DISTRIBUTION_STATE),
+        ("cleaner", CLEANER_STATE),
         ("failed_brakes", FAILED_BRAKES_STATE),
         ("blending", BLENDING_STATE),
         ("control", PRESSURE_LAW_STATE),
@@ -247,6 +256,8 @@ def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
     failed = s.failed_brakes.failed
     watch_trailing(p, s.distribution, u, e, failed, decel, speed, dt)
     distribute(p, s.distribution, e.mass, decel, backwards)
+    if p.minimised:
+        _lean(p, s, u, decel, backwards, dt)
     follow_friction(p, s.control, e, dt)
     advance_pressures(s.hydraulics, s.limiter.pressure)
     update_motors(p, s.blending, u, s.guard.capped, e.speed, decel, dt)
@@ -261,6 +272,16 @@ def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
         guard_slip(p, s.guard, u, e, speed, s.limiter.pressure, y.pressure_demand, s.distribution.torque, dt)
     _limit(p, s, y, available_pressure(p, u), decel, dt)
     return decel
+
+
+@kernel
+def _lean(p: Record, s: Record, u: Record, decel: float, backwards: bool, dt: float) -> None:
+    calm = not backwards and s.distribution.trailing == 1.0 and s.guard.acting == 0 and not others_brake(u)
+    calm = calm and abs(s.estimate.accel_y) <= CALM_ACROSS
+    for i in range(4):
+        calm = calm and s.failed_brakes.failed[i] == 0
+    front, torque, motors = front_share(p, decel), s.distribution.torque, s.blending.allowed
+    lean(p, s.cleaner, torque, motors, s.discs.temperature, front, s.estimate.mass, decel, calm, dt)
 
 
 @kernel

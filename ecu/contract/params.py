@@ -18,6 +18,11 @@ OBSERVERS: Final = ("joint", "observer1", "observer2")
 JOINT, OBSERVER1, OBSERVER2 = range(3)
 
 DISTRIBUTIONS: Final = ("ideal", "fixed", "electronic")
+MINIMISED: Final = ("off", "dust", "wear")
+HEAT_NODES: Final = 13  # of the share that emits or wears least, in each direction
+HEAT_STEP: Final = 25.0  # K, from 0 degC on
+RATE_NODES: Final = 81  # of the shares that Annex 5 admits
+RATE_STEP: Final = 0.01  # of the braking rate z, from 0 on
 COMPENSATIONS: Final = ("second-order", "inverse", "off")
 SECOND_ORDER, INVERSE, OFF = range(3)
 
@@ -109,6 +114,10 @@ PARAMS: Final = np.dtype(
         ("distribution", "i8"),  # DISTRIBUTIONS
         ("front_share", "f8"),  # of the brake force, where the distribution has one
         ("rear_slip_margin", "f8"),  # admissible slip of a rear wheel beyond the front one
+        ("minimised", "i8"),  # MINIMISED
+        ("wanted_share", "f8", (HEAT_NODES, HEAT_NODES)),  # front's of the linings' torque, by discs' heat
+        ("least_share", "f8", (RATE_NODES,)),  # front's of the brake force that Annex 5 admits, by z
+        ("most_share", "f8", (RATE_NODES,)),
         ("max_pressure", "f8"),  # Pa
         ("max_pressure_rate", "f8"),  # Pa/s
         ("compensation", "i8"),  # COMPENSATIONS

@@ -96,10 +96,43 @@ def annex_5_violation(params: Any, loads: tuple[Load, ...]) -> str | None:
     return None
 
 
+def admissible(params: Any, share: Row, loads: tuple[Load, ...]) -> NDArray[np.bool_]:
+    """Return at which of `DEMANDED` a front share of `share` there is within Annex 5, shape (n,)."""
+    doubt = 2.0 * float(params["sigma_mu_initial"])
+    low, high = 1.0 - doubt, 1.0 + doubt
+    good = np.ones(len(DEMANDED), dtype=np.bool_)
+    for load in loads:
+        for curve in (
+            utilisation(params, share, load),
+            utilisation(params, share, load, low, LEAST_TRAILING * high),
+        ):
+            good &= _ahead(curve) <= ROUNDING
+        for front in (low, high):
+            for rear in (low, high):
+                good &= _missing(utilisation(params, share, load, front, rear)) <= ROUNDING
+    return good
+
+
+def _ahead(curve: Utilisation) -> Row:
+    """Return how much more the rear uses than the front, where (A) rules."""
+    ordered = (curve.z >= Z_ORDERED[0] - ROUNDING) & (curve.z <= Z_ORDERED[1] + ROUNDING)
+    return np.where(ordered, curve.rear - curve.front, -np.inf)
+
+
+def _missing(curve: Utilisation) -> Row:
+    """Return by how much the braking rate is too small, where (B) rules."""
+    k = np.maximum(curve.front, curve.rear)
+    ruled = (k >= K_RULED[0] - ROUNDING) & (k <= K_RULED[1] + ROUNDING)
+    return np.where(ruled, _least_rate(k) - curve.z, -np.inf)
+
+
+def _least_rate(k: Row) -> Row:
+    return np.asarray(0.1 + 0.7 * (k - 0.2))
+
+
 def _rear_ahead(curve: Utilisation) -> str:
     """Find the braking rate of (A) at which the rear uses most more than the front."""
-    ordered = (curve.z >= Z_ORDERED[0] - ROUNDING) & (curve.z <= Z_ORDERED[1] + ROUNDING)
-    ahead = np.where(ordered, curve.rear - curve.front, -np.inf)
+    ahead = _ahead(curve)
     worst = int(np.argmax(ahead))
     if ahead[worst] <= ROUNDING:
         return ""
@@ -109,10 +142,9 @@ def _rear_ahead(curve: Utilisation) -> str:
 
 def _too_little(curve: Utilisation) -> str:
     """Find the adhesion of (B) at which the braking rate is most too small."""
+    missing = _missing(curve)
     k = np.maximum(curve.front, curve.rear)
-    least = 0.1 + 0.7 * (k - 0.2)
-    ruled = (k >= K_RULED[0] - ROUNDING) & (k <= K_RULED[1] + ROUNDING)
-    missing = np.where(ruled, least - curve.z, -np.inf)
+    least = _least_rate(k)
     worst = int(np.argmax(missing))
     if missing[worst] <= ROUNDING:
         return ""

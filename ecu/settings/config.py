@@ -15,11 +15,21 @@ import numpy as np
 from pydantic import ValidationError
 
 from ecu.algorithm.vehicle import rolling_radius
-from ecu.contract.params import BAR, COMPENSATIONS, DISTRIBUTIONS, GRAVITY, OBSERVERS, PARAMS, PEDAL_POINTS
+from ecu.contract.params import (
+    BAR,
+    COMPENSATIONS,
+    DISTRIBUTIONS,
+    GRAVITY,
+    MINIMISED,
+    OBSERVERS,
+    PARAMS,
+    PEDAL_POINTS,
+)
 from ecu.contract.records import RecordArray
 from ecu.errors import UserError
 from ecu.settings.annex5 import annex_5_violation
 from ecu.settings.dust import set_dust, set_dust_version
+from ecu.settings.lining_share import set_lining_share
 from ecu.settings.pad import set_pad
 from ecu.settings.sections import Axle, Config, Observer
 from ecu.settings.toml_file import findings, read_toml, summarised
@@ -169,4 +179,7 @@ def new_params(config: Config) -> RecordArray:
     row["front_share"], row["rear_slip_margin"] = control.front_share or 0.0, control.rear_slip_margin
     row["max_pressure"] = control.max_pressure * BAR
     row["max_pressure_rate"] = control.max_pressure_rate * BAR
+    row["minimised"] = MINIMISED.index(control.minimise)
+    if row["minimised"]:
+        set_lining_share(row, vehicle.loads())
     return params

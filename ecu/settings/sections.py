@@ -188,6 +188,9 @@ class Control(Section):
     """Of the brake force, for the distributions "fixed" and "electronic"."""
     rear_slip_margin: Annotated[float, Field(ge=0.002, le=0.05), Unit("-")] = 0.01
     """Slip of a rear wheel beyond the front one of its side that takes back the torque of the rear."""
+    minimise: Literal["off", "dust", "wear"] = "off"
+    """Share the linings' part between the axles, within Annex 5, for least particles or least worn mass, and
+    leave to the motors what they can take."""
     max_pressure: Annotated[float, Field(gt=20, le=180), Unit("bar")] = 180.0
     """Of a demand."""
     max_pressure_rate: Annotated[float, Field(ge=1500), Unit("bar/s")] = 3000.0
@@ -266,4 +269,8 @@ class Config(Section):
     def _axles(self) -> "Config":
         if self.vehicle.front_axle >= self.vehicle.wheelbase:
             raise ValueError("vehicle.front_axle must be smaller than vehicle.wheelbase")
+        if self.control.minimise == "dust" and None in (self.front.dust, self.rear.dust):
+            raise ValueError(
+                'control.minimise = "dust" needs front.dust and rear.dust; find them by `identify dust`'
+            )
         return self
