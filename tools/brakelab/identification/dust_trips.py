@@ -151,9 +151,19 @@ def drawn_brake(seed: int) -> RecordArray:
     return car
 
 
-def campaign(seed: int, day: float = DAY, application: float = APPLICATION, trips: int = TRIPS) -> list[Trip]:
-    """Return the trips of one vehicle; `day` as `DAY`, `application` as `APPLICATION`."""
-    car = drawn_brake(seed)
+def campaign(
+    seed: int,
+    day: float = DAY,
+    application: float = APPLICATION,
+    trips: int = TRIPS,
+    car: RecordArray | None = None,
+    corner: int = CORNER,
+) -> list[Trip]:
+    """Return the trips of one vehicle; `day` as `DAY`, `application` as `APPLICATION`.
+
+    `car`: parameters of the plant, shape (1,), the drawn van without; `corner`: whose brake is enclosed.
+    """
+    car = drawn_brake(seed) if car is None else car
     random = np.random.default_rng([seed, 82])
     work, found = random.uniform(*DRIVEN), []
     for number in range(trips):
@@ -163,11 +173,11 @@ def campaign(seed: int, day: float = DAY, application: float = APPLICATION, trip
         scatter = np.exp(application * random.normal(size=600) - 0.5 * application**2)
         wander = _wander(random, len(drive))
         out, mean = (np.zeros((len(drive) // 10 + 1, EMITTED + 1)) for _ in range(2))
-        rows, _ = run_trip(car[0], CORNER, conditions[0], drive, wander, scatter, out)
+        rows, _ = run_trip(car[0], corner, conditions[0], drive, wander, scatter, out)
         work += float(np.trapezoid(out[:rows, TORQUE] * out[:rows, SPEED], out[:rows, T])) / 0.33
         plain = conditions.copy()
         plain["day"] = 1.0
-        run_trip(car[0], CORNER, plain[0], drive, wander, np.ones(1), mean)
+        run_trip(car[0], corner, plain[0], drive, wander, np.ones(1), mean)
         columns = _sensed(out[:rows], random)
         found.append(Trip(columns, out[:rows, EMITTED].copy(), mean[:rows, EMITTED].copy()))
     return found
