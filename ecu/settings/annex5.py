@@ -97,7 +97,10 @@ def annex_5_violation(params: Any, loads: tuple[Load, ...]) -> str | None:
 
 
 def admissible(params: Any, share: Row, loads: tuple[Load, ...]) -> NDArray[np.bool_]:
-    """Return at which of `DEMANDED` a front share of `share` there is within Annex 5, shape (n,)."""
+    """Return at which of `DEMANDED` a front share of `share` there is within Annex 5, shape (n,).
+
+    (B) is asked beyond k = 0.8 too: friction less far off may rule there.
+    """
     doubt = 2.0 * float(params["sigma_mu_initial"])
     low, high = 1.0 - doubt, 1.0 + doubt
     good = np.ones(len(DEMANDED), dtype=np.bool_)
@@ -109,7 +112,8 @@ def admissible(params: Any, share: Row, loads: tuple[Load, ...]) -> NDArray[np.b
             good &= _ahead(curve) <= ROUNDING
         for front in (low, high):
             for rear in (low, high):
-                good &= _missing(utilisation(params, share, load, front, rear)) <= ROUNDING
+                curve = utilisation(params, share, load, front, rear)
+                good &= _missing(curve, np.inf) <= ROUNDING
     return good
 
 
@@ -119,10 +123,10 @@ def _ahead(curve: Utilisation) -> Row:
     return np.where(ordered, curve.rear - curve.front, -np.inf)
 
 
-def _missing(curve: Utilisation) -> Row:
-    """Return by how much the braking rate is too small, where (B) rules."""
+def _missing(curve: Utilisation, greatest: float = K_RULED[1]) -> Row:
+    """Return by how much the braking rate is too small, where (B) rules; up to `greatest` of k."""
     k = np.maximum(curve.front, curve.rear)
-    ruled = (k >= K_RULED[0] - ROUNDING) & (k <= K_RULED[1] + ROUNDING)
+    ruled = (k >= K_RULED[0] - ROUNDING) & (k <= greatest + ROUNDING)
     return np.where(ruled, _least_rate(k) - curve.z, -np.inf)
 
 

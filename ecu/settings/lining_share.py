@@ -39,8 +39,11 @@ V_IN, V_END, DECEL = 14.0, 4.0, 1.3  # m/s, m/s, m/s^2, of the reference applica
 LEAST_EACH: Final = 0.10  # of the linings' torque: discs stay clean, friction stays known
 SHARES: Final = np.linspace(LEAST_EACH, 1.0 - LEAST_EACH, 81)
 FLAT: Final = 0.005
+HEADROOM: Final = 40.0  # K that the next brakings may add, and that a temperature may be too low
+UNKNOWN: Final = 30.0  # K in which emission is taken to grow e-fold, hotter than the model was trained on
 ADMITTED: Final = np.linspace(0.0, 1.0, 201)
 STEEPEST: Final = 8.0  # rise of the least share per braking rate
+EARLIER: Final = 3  # nodes, before what Annex 5 asks of the rear: linings may give more than is counted on
 TORQUE, TEMPERATURE = FEATURES.index("torque"), FEATURES.index("temperature")
 FRONT, REAR = 0, 2
 
@@ -64,11 +67,13 @@ def particles(row: Any, corner: int, torque: Array, heat: float) -> Array:
     """Return particles of a corner's brake in the reference application; `torque` [N m], shape (n,)."""
     features = np.empty((len(torque), len(FEATURES)))
     pressure = torque / (brake_gain(row, corner) * row["mu_nominal"][corner]) / BAR
-    for k, value in enumerate((V_IN, V_END, torque, heat, (V_IN - V_END) / DECEL, pressure)):
+    hot = heat + HEADROOM
+    for k, value in enumerate((V_IN, V_END, torque, hot, (V_IN - V_END) / DECEL, pressure)):
         features[:, k] = np.clip(value, row["dust_low"][corner, k], row["dust_high"][corner, k])
     factors = np.empty(len(torque))
     emission_factors(row["dust_model"][corner], row["dust_numbers"][corner], features, factors)
-    counted: Array = row["dust_factor"][corner] * 10.0**factors * torque / features[:, TORQUE]
+    beyond = np.exp((hot - features[:, TEMPERATURE]) / UNKNOWN)
+    counted: Array = row["dust_factor"][corner] * 10.0**factors * torque / features[:, TORQUE] * beyond
     return counted
 
 
@@ -87,14 +92,14 @@ def admitted_shares(row: Any, loads: tuple[Load, ...]) -> tuple[Array, Array]:
     Shares between them are admissible, and the configured one is among them.
     """
     good = np.array([admissible(row, np.full(len(DEMANDED), share), loads) for share in ADMITTED])
-    least, most = np.empty(RATE_NODES), np.empty(RATE_NODES)
+    base = np.array([front_share(row, max(k, 1) * RATE_STEP * GRAVITY) for k in range(RATE_NODES)])
+    least, most, step = np.empty(RATE_NODES), np.empty(RATE_NODES), ADMITTED[1]
     for node in range(RATE_NODES):
-        k = max(node - 1, 0)  # of `DEMANDED`, which begins with a step
-        base = front_share(row, max(node, 1) * RATE_STEP * GRAVITY)
-        above, below = ADMITTED[~good[:, k] & (base < ADMITTED)], ADMITTED[~good[:, k] & (base > ADMITTED)]
-        step = ADMITTED[1]
-        least[node] = min(base, below.max() + step if len(below) else 0.0)
-        most[node] = max(base, above.min() - step if len(above) else 1.0)
+        bad = ADMITTED[~good[:, max(node - 1, 0)]]  # `DEMANDED` begins with a step
+        above, below = bad[bad > base[node]], bad[bad < base[node]]
+        least[node] = below.max() + step if len(below) else 0.0
+        most[node] = above.min() - step if len(above) else 1.0
+    least = np.array([least[node : node + EARLIER + 1].max() for node in range(RATE_NODES)])
     for node in range(RATE_NODES - 2, -1, -1):
         least[node] = max(least[node], least[node + 1] - STEEPEST * RATE_STEP)
-    return least, most
+    return np.minimum(least, base), np.maximum(most, base)
