@@ -40,6 +40,7 @@ from brakelab.studies.texts import (
     BLOCKS_TEXT,
     BOUND_TEXT,
     COMPENSATION_TEXT,
+    CYCLES_TEXT,
     DUST_TEXT,
     ENERGY_TEXT,
     FAILURES_TEXT,
@@ -78,6 +79,7 @@ WEAR: Final = "wear"
 DUST: Final = "dust"
 THERMAL: Final = "thermal"
 BLOCKS: Final = "blocks"
+CYCLES: Final = "cycles"
 REPLAY: Final = "replay"
 PLAY: Final = "play"
 
@@ -114,6 +116,7 @@ def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0, 
         DUST: partial(_dust, seeds=seeds),
         THERMAL: partial(_thermal, seeds=seeds),
         BLOCKS: partial(_blocks, seeds=seeds),
+        CYCLES: _cycles,
         LATENESS: partial(_lateness, seconds=seconds),
         REPLAY: _replay,
         PLAY: partial(_play, seconds=seconds),
@@ -266,6 +269,13 @@ def _blocks(json: bool, seeds: int) -> int:
     if not json:
         write_chart(resource(PICTURES) / "blocks.svg", panels, blocks.LEGEND)
     return results_page(BLOCKS, "Road blocks on the dynamometer", BLOCKS_TEXT, tables, json)
+
+
+def _cycles(json: bool) -> int:
+    from brakelab.studies.cycles import cycles_page
+
+    tables = cycles_page(partial(_each_car, CYCLES))
+    return results_page(CYCLES, "Dust and wear over two cycles", CYCLES_TEXT, tables, json)
 
 
 def _friction(json: bool) -> int:
