@@ -89,7 +89,8 @@ def worn_mass(row: Any, corner: int, torque: Array, heat: float) -> Array:
 def admitted_shares(row: Any, loads: tuple[Load, ...]) -> tuple[Array, Array]:
     """Return least and most of the front axle's share of the force at each braking rate, shape (n,) each.
 
-    Shares between them are admissible, and the configured one is among them.
+    Shares between them are admissible with a step to spare, for linings between the ends of 2 sigma, and the
+    configured one is among them.
     """
     good = np.array([admissible(row, np.full(len(DEMANDED), share), loads) for share in ADMITTED])
     base = np.array([front_share(row, max(k, 1) * RATE_STEP * GRAVITY) for k in range(RATE_NODES)])
@@ -97,8 +98,8 @@ def admitted_shares(row: Any, loads: tuple[Load, ...]) -> tuple[Array, Array]:
     for node in range(RATE_NODES):
         bad = ADMITTED[~good[:, max(node - 1, 0)]]  # `DEMANDED` begins with a step
         above, below = bad[bad > base[node]], bad[bad < base[node]]
-        least[node] = below.max() + step if len(below) else 0.0
-        most[node] = above.min() - step if len(above) else 1.0
+        least[node] = below.max() + 2.0 * step if len(below) else 0.0
+        most[node] = above.min() - 2.0 * step if len(above) else 1.0
     least = np.array([least[node : node + EARLIER + 1].max() for node in range(RATE_NODES)])
     for node in range(RATE_NODES - 2, -1, -1):
         least[node] = max(least[node], least[node + 1] - STEEPEST * RATE_STEP)
