@@ -329,7 +329,7 @@ def bench(
     times     step, codec, plant, cycle, lateness, replay, play
     accuracy  stops, observers, ablation, bound, recorded, vehicle
     control   compensation, margins, blending, failures
-    physics   friction, lab, energy, wear, dust, thermal, blocks
+    physics   friction, lab, energy, wear, dust, thermal, blocks, cycles
     """
     from brakelab.bench import command
 

@@ -72,16 +72,8 @@ BLENDING: Final = "blending"
 FAILURES: Final = "failures"
 COMPENSATION: Final = "compensation"
 MARGINS: Final = "margins"
-LATENESS: Final = "lateness"
-RECORDED: Final = "recorded"
-VEHICLE: Final = "vehicle"
-WEAR: Final = "wear"
-DUST: Final = "dust"
-THERMAL: Final = "thermal"
-BLOCKS: Final = "blocks"
-CYCLES: Final = "cycles"
-REPLAY: Final = "replay"
-PLAY: Final = "play"
+LATENESS, RECORDED, VEHICLE, WEAR, DUST = "lateness", "recorded", "vehicle", "wear", "dust"
+THERMAL, BLOCKS, CYCLES, REPLAY, PLAY = "thermal", "blocks", "cycles", "replay", "play"
 
 Car = TypeVar("Car")
 
