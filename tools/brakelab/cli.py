@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from brakelab.cli_bench import bench
 from brakelab.cli_identify import app as identify_app
 from brakelab.cli_lab import app as lab_app
 from ecu.arguments import (
@@ -307,30 +308,4 @@ def tune(
     return command.tune(config, trained, validated, seeds, command.Budget(generations, population, seed), out)
 
 
-@app.command()
-def bench(
-    name: Annotated[
-        str | None, typer.Argument(metavar="NAME", help="Bench to run; default: step, codec, plant, cycle")
-    ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables")] = False,
-    seeds: Annotated[
-        int, typer.Option(metavar="N", min=1, help="Number of cars that are drawn, at most")
-    ] = 20,
-    seconds: Annotated[
-        float, typer.Option(metavar="S", min=5.0, max=580.0, help="Duration of lateness and play")
-    ] = 60.0,
-    draw: Annotated[
-        str, typer.Option(metavar="WIDTH", help="Spread of the cars of stops and observers: wide or nominal")
-    ] = "wide",
-) -> int:
-    """Measure times, accuracy, control and physics. Print tables.
-
-    \b
-    times     step, codec, plant, cycle, lateness, replay, play
-    accuracy  stops, observers, ablation, bound, recorded, vehicle
-    control   compensation, margins, blending, failures
-    physics   friction, lab, energy, wear, dust, thermal, blocks, cycles
-    """
-    from brakelab.bench import command
-
-    return command.bench(name, json, seeds, seconds, draw)
+app.command()(bench)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from brakelab.simulation.closed_loop import Drive
-from brakelab.studies.recorded import LOGGERS, Logger, _columns, recorded_of, recorded_table
+from brakelab.studies.recorded import LOGGERS, Logger, logger_columns, recorded_of, recorded_table
 from ecu.contract.records import FRAME, new_record
 from ecu.contract.signals import CORNERS
 
@@ -19,7 +19,7 @@ def test_a_logger_has_one_pressure_per_axle_at_20_hz_and_no_reference() -> None:
     names = [f"{stem}_{c}" for stem in ("wheel_speed", "calliper_pressure", "motor_torque") for c in CORNERS]
     names += ["accel_x", "accel_y", "yaw_rate", "vehicle_speed", "pedal_pressed"]
     inputs = {name: np.random.default_rng(1).normal(30.0, 1.0, n) for name in names}
-    columns = _columns(Drive(np.arange(n) * 0.01, inputs, {}, {}, new_record(FRAME)), Logger(10, False))
+    columns = logger_columns(Drive(np.arange(n) * 0.01, inputs, {}, {}, new_record(FRAME)), Logger(10, False))
     assert set(columns) == {*names[:8], "accel_x", "pedal_pressed"}
     front = columns["calliper_pressure_fl"]
     np.testing.assert_array_equal(front, columns["calliper_pressure_fr"])

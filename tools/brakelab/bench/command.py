@@ -4,14 +4,16 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from multiprocessing import get_context
-from typing import Final, TypeVar
+from typing import Final
 
 from rich.console import Console
 from rich.progress import track
 
+from brakelab.bench.cars import each_car
 from brakelab.bench.observer_times import step_times
 from brakelab.bench.output import PICTURES, plain_row, print_json, print_tables, results_page, write_page
 from brakelab.bench.times import BENCHES
+from brakelab.entries.command import ENTRIES, NOBODY, Entered, bench_entries
 from brakelab.studies import (
     ablation,
     bound,
@@ -75,17 +77,22 @@ MARGINS: Final = "margins"
 LATENESS, RECORDED, VEHICLE, WEAR, DUST = "lateness", "recorded", "vehicle", "wear", "dust"
 THERMAL, BLOCKS, CYCLES, REPLAY, PLAY = "thermal", "blocks", "cycles", "replay", "play"
 
-Car = TypeVar("Car")
 
-
-def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0, draw: str = WIDE) -> int:
+def bench(
+    name: str | None,
+    json: bool,
+    seeds: int = 20,
+    seconds: float = 60.0,
+    draw: str = WIDE,
+    who: Entered = NOBODY,
+) -> int:
     """Run one bench, or without a name all that measure time; print tables, or JSON. Returns 0.
 
     In a checkout, a run of all times renews docs/results/benchmarks.md, `stops` observer-accuracy.md beside
     it, each other bench the page of its name; `play` keeps the tables of other buses. `seeds`: number of cars
     drawn by `stops` and `observers`, upper bound for the others; `draw`: width of the draw of `stops` and
     `observers`, pages use the wide one; `seconds`: duration of the drive of `lateness`, and of all players of
-    `play`.
+    `play`; `who`: what `entries` is told.
 
     Raises:
         UserError: there is no such bench.
@@ -93,6 +100,7 @@ def bench(name: str | None, json: bool, seeds: int = 20, seconds: float = 60.0, 
     others: dict[str, Callable[[bool], int]] = {
         STOPS: partial(_stops, seeds=seeds, draw=draw),
         OBSERVERS: partial(_observers, seeds=seeds, draw=draw),
+        ENTRIES: partial(bench_entries, seeds=seeds, entered=who),
         ABLATION: partial(_ablation, seeds=seeds),
         BOUND: partial(_bound, seeds=seeds),
         FRICTION: _friction,
@@ -191,33 +199,26 @@ def _observers(json: bool, seeds: int, draw: str) -> int:
     return 0
 
 
-def _each_car(name: str, drive: Callable[[int], Car], cars: int) -> list[Car]:
-    """Return the results of `drive` for the cars 0 to `cars` - 1, on all cores."""
-    console = Console(stderr=True)
-    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
-        return list(track(pool.map(drive, range(cars)), name, cars, console=console, transient=True))
-
-
 def _ablation(json: bool, seeds: int) -> int:
-    cars = _each_car(ABLATION, ablation.samples_of, min(seeds, ablation.CARS))
+    cars = each_car(ABLATION, ablation.samples_of, min(seeds, ablation.CARS))
     table = ablation.ablation_table(cars)
     return results_page(ABLATION, "What carries the joint observer", ABLATION_TEXT, [table], json)
 
 
 def _bound(json: bool, seeds: int) -> int:
-    table = bound.bound_table(_each_car(BOUND, bound.bounds_of, min(seeds, bound.CARS)))
+    table = bound.bound_table(each_car(BOUND, bound.bounds_of, min(seeds, bound.CARS)))
     return results_page(BOUND, "What the sensors allow", BOUND_TEXT, [table], json)
 
 
 def _recorded(json: bool, seeds: int) -> int:
-    table = recorded.recorded_table(_each_car(RECORDED, recorded.recorded_of, min(seeds, recorded.CARS)))
+    table = recorded.recorded_table(each_car(RECORDED, recorded.recorded_of, min(seeds, recorded.CARS)))
     return results_page(
         RECORDED, "Cars as loggers record them", RECORDED_TEXT, [table], json, "recorded-cars"
     )
 
 
 def _vehicle(json: bool, seeds: int) -> int:
-    cars = _each_car(VEHICLE, identified.identified_of, min(seeds, identified.CARS))
+    cars = each_car(VEHICLE, identified.identified_of, min(seeds, identified.CARS))
     tables = identified.identified_tables(cars)
     return results_page(
         VEHICLE, "Cars identified from a drive", VEHICLE_TEXT, tables, json, "identified-cars"
@@ -227,7 +228,7 @@ def _vehicle(json: bool, seeds: int) -> int:
 def _wear(json: bool, seeds: int) -> int:
     from brakelab.studies import wear, wear_drives, wear_study
 
-    cars = _each_car(WEAR, wear_drives.drive_car, min(seeds, wear.CARS))
+    cars = each_car(WEAR, wear_drives.drive_car, min(seeds, wear.CARS))
     laws = wear_study.dynamometer_laws()
     lives = wear.wear_lives(cars, laws)
     if not json:
@@ -240,14 +241,14 @@ def _dust(json: bool, seeds: int) -> int:
     from brakelab.studies import dust
 
     picture = None if json else resource(PICTURES) / "dust.svg"
-    tables = dust.dust_page(partial(_each_car, DUST), min(seeds, dust.DRAWS), picture)
+    tables = dust.dust_page(partial(each_car, DUST), min(seeds, dust.DRAWS), picture)
     return results_page(DUST, "Dust", DUST_TEXT, tables, json)
 
 
 def _thermal(json: bool, seeds: int) -> int:
     from brakelab.studies import thermal, thermal_study
 
-    cars = _each_car(THERMAL, thermal_study.drive_car, min(seeds, thermal.CARS))
+    cars = each_car(THERMAL, thermal_study.drive_car, min(seeds, thermal.CARS))
     if not json:
         write_chart(resource(PICTURES) / "disc-temperature.svg", thermal.thermal_panels(cars), thermal.LEGEND)
     tables = thermal.thermal_tables(cars)
@@ -266,7 +267,7 @@ def _blocks(json: bool, seeds: int) -> int:
 def _cycles(json: bool) -> int:
     from brakelab.studies.cycles import cycles_page
 
-    tables = cycles_page(partial(_each_car, CYCLES))
+    tables = cycles_page(partial(each_car, CYCLES))
     return results_page(CYCLES, "Dust and wear over two cycles", CYCLES_TEXT, tables, json)
 
 

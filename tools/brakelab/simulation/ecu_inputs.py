@@ -17,9 +17,12 @@ def vehicle_frames(frames: RecordArray) -> RecordArray:
     return frames[~np.isin(frames["can_id"], plans().ecu_sends.ids)]
 
 
-def ecu_inputs(frames: RecordArray, cycles: int) -> RecordArray:
-    """Return `INPUTS` of a drive's first `cycles`, shape (cycles,), from the vehicle's frames."""
-    plan = plans().ecu_hears
+def ecu_inputs(frames: RecordArray, cycles: int, plan: ReceivePlan | None = None) -> RecordArray:
+    """Return `INPUTS` of a drive's first `cycles`, shape (cycles,), from the vehicle's frames.
+
+    `plan`: what is received; None: the contract's messages. The first cycle ends at `START_NS`.
+    """
+    plan = plan or plans().ecu_hears
     inputs = new_record(INPUTS, cycles)
     _decode(plan, new_reception(plan), frames, new_record(INPUTS), inputs)
     return inputs

@@ -66,13 +66,15 @@ class Recorded(NamedTuple):
     """The same of the peers, in the order of their names."""
 
 
-def _uncorrected() -> Config:
+def uncorrected() -> Config:
+    """Return the configuration of an ECU that corrects nothing; pressures are proportional."""
     config = load_config(resource("config/suv.toml"))
     changed = {"distribution": "fixed", "front_share": SHARE, "compensation": "off"}
     return config.model_copy(update={"control": config.control.model_copy(update=changed)})
 
 
-def _scenario() -> Scenario:
+def recorded_scenario() -> Scenario:
+    """Return ten brakings by the driver, without a speed reference."""
     base = shipped("sensitivity")
     phases = []
     for decel in DECELS:
@@ -85,7 +87,7 @@ def _scenario() -> Scenario:
     return base.model_copy(update={"phase": phases, "vehicle_speed": "none"})
 
 
-def _columns(drive: Drive, logger: Logger) -> dict[str, Vector]:
+def logger_columns(drive: Drive, logger: Logger) -> dict[str, Vector]:
     """Return the logger's columns of a drive, a row a cycle."""
     rows = np.arange(len(drive.t))
     columns = {name: drive.inputs[name].copy() for name in drive.inputs if name.startswith("wheel_speed")}
@@ -112,7 +114,7 @@ def _replay(drive: Drive, logger: Logger, config: Config) -> tuple[Vector, list[
 
     with TemporaryDirectory(prefix="brake-ecu-recorded-") as folder:
         path = Path(folder, "drive.parquet")
-        write_columns(path, drive.t, _columns(drive, logger), {})
+        write_columns(path, drive.t, logger_columns(drive, logger), {})
         replay_drive([Findings(path)], params, None, load_source(None), write, book.end_log, lambda _: None)
     return np.concatenate(rows), book.rows
 
@@ -146,8 +148,8 @@ def _judge(drive: Drive, rows: Vector, found: list[BrakeRow], config: Config) ->
 
 def recorded_of(seed: int) -> list[Recorded]:
     """Drive one car and replay it with each logger's signals."""
-    config = _uncorrected()
-    drive = run(new_loop(_scenario(), config, seed))
+    config = uncorrected()
+    drive = run(new_loop(recorded_scenario(), config, seed))
     return [_judge(drive, *_replay(drive, logger, config), config) for logger in LOGGERS.values()]
 
 

@@ -1,0 +1,47 @@
+"""`brake-ecu bench …`: imports what it needs when it is called."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def bench(
+    name: Annotated[
+        str | None, typer.Argument(metavar="NAME", help="Bench to run; default: step, codec, plant, cycle")
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables")] = False,
+    seeds: Annotated[
+        int, typer.Option(metavar="N", min=1, help="Number of cars that are drawn, at most")
+    ] = 20,
+    seconds: Annotated[
+        float, typer.Option(metavar="S", min=5.0, max=580.0, help="Duration of lateness and play")
+    ] = 60.0,
+    draw: Annotated[
+        str, typer.Option(metavar="WIDTH", help="Spread of the cars of stops and observers: wide or nominal")
+    ] = "wide",
+    observer: Annotated[
+        list[str] | None,
+        typer.Option(metavar="MODULE:CLASS", help="Enter this observer in entries; may be repeated"),
+    ] = None,
+    drive: Annotated[
+        str | None, typer.Option(metavar="CAR:LOG", help="Recorded drive that entries predict")
+    ] = None,
+    export: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Write the drives of entries there, run nothing")
+    ] = None,
+) -> int:
+    """Measure times, accuracy, control and physics. Print tables.
+
+    \b
+    times     step, codec, plant, cycle, lateness, replay, play
+    accuracy  stops, observers, entries, ablation, bound, recorded, vehicle
+    control   compensation, margins, blending, failures
+    physics   friction, lab, energy, wear, dust, thermal, blocks, cycles
+    """
+    from brakelab.bench import command
+    from brakelab.entries.command import Entered, refuse
+
+    entered = Entered(tuple(observer or ()), drive, export)
+    refuse(entered, name)
+    return command.bench(name, json, seeds, seconds, draw, entered)

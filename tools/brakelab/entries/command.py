@@ -1,0 +1,114 @@
+"""`brake-ecu bench entries`: friction observers of anybody, side by side."""
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from rich.console import Console
+from rich.progress import track
+
+from brakelab.bench.cars import each_car
+from brakelab.bench.output import print_json, print_tables, write_page
+from brakelab.entries.drives import car_tracks, real_drive
+from brakelab.entries.export import export_car, new_folder
+from brakelab.entries.ours import OURS
+from brakelab.entries.table import entry_tables, standings
+from brakelab.studies.entries import class_of, judge_car, predict_all
+from brakelab.studies.measure import machine
+from brakelab.studies.observers_table import finite
+from ecu import __version__
+from ecu.errors import UserError
+from ecu.settings.resources import resource
+
+ENTRIES: Final = "entries"
+CARS: Final = 10
+SHIPPED: Final = ("mustang", "tests/golden/mustang_braking.log.gz")
+TEXT: Final = (
+    "Every entry hears the same recorded inputs, open loop, and gives the friction of four brakes with its "
+    "standard deviation in every cycle ([benchmark.md](../benchmark.md) says how to enter). Cars of the wide "
+    "draw, braked once by the ECU of config/suv.toml. Stops: Table 4.2 of the thesis, from 120 km/h. Cold: "
+    "nothing heard before; driven in: after the ten minutes of config/scenarios/ordinary.toml, which are "
+    "*everyday* and begin cold. Counted while the brakes of both axles have been on for 0.8 s, above "
+    "15 km/h. The ECU's observers run as a shadow: they do not know the demand, only pressure. "
+    "Observer 1 alone hears the forces of measuring wheels; the simulated loggers and the real car have none."
+)
+
+
+class Entered(NamedTuple):
+    """What the command line says about entries."""
+
+    observers: Sequence[str] = ()
+    """As `load_class` takes them."""
+    drive: str | None = None
+    """CAR:LOG; None: the shipped one, where the tests are."""
+    export: Path | None = None
+    """Write the drives there instead."""
+
+
+NOBODY: Final = Entered()
+
+
+def refuse(entered: Entered, name: str | None) -> None:
+    """Raise UserError where options of this bench are given to another one."""
+    if entered != NOBODY and name != ENTRIES:
+        raise UserError("bench", name or "", f"has no --observer, --drive, --export; `bench {ENTRIES}` has")
+
+
+def bench_entries(json: bool, seeds: int, entered: Entered) -> int:
+    """Play the drives of cars 0 to `seeds` - 1 (at most `CARS`) to ours and the entered observers; returns 0.
+
+    Without observers, drive or export the page docs/results/entries.md is renewed.
+
+    Raises:
+        UserError: an observer cannot be loaded, a log not read, or the folder not written.
+    """
+    cars, console = min(seeds, CARS), Console(stderr=True)
+    for name in entered.observers:
+        class_of(name)
+    if entered.export is not None:
+        return _export(entered.export, cars, console)
+    names = tuple(dict.fromkeys((*OURS, *entered.observers)))
+    car, log = _drive(entered.drive)
+    real = None if log is None else real_drive(car, log)
+    console.print(f"{cars} cars are driven and heard by {len(names)} entries: minutes", highlight=False)
+    results = each_car(ENTRIES, partial(judge_car, names), cars)
+    predictions = {} if real is None else predict_all(names, real)
+    found = standings(results, predictions)
+    of = f"`brake-ecu bench {ENTRIES}`, version {__version__}, wide draw, seeds 0–{cars - 1}. {machine()}"
+    if json:
+        rows = [{"rank_error": one.rank_error, **_plain(one)} for one in found]
+        print_json(finite({"of": of, "entries": rows}))
+        return 0
+    tables = entry_tables(found, cars, "" if log is None else f"{car}, {log.name}")
+    print_tables(of, tables)
+    if entered == NOBODY:
+        write_page("entries.md", "Friction observers, side by side", f"{of}. {TEXT}", tables)
+    return 0
+
+
+def _plain(one: NamedTuple) -> dict[str, object]:
+    values = one._asdict()
+    told = values["prediction"]
+    return values | {"prediction": None if told is None else told._asdict()}
+
+
+def _drive(named: str | None) -> tuple[str, Path | None]:
+    if named is None:
+        shipped = resource(SHIPPED[1])
+        return SHIPPED[0], shipped if shipped.is_file() else None
+    car, _, log = named.partition(":")
+    if not car or not log:
+        raise UserError("--drive", named, "give CAR:LOG, for example mustang:drive.log")
+    return car, Path(log)
+
+
+def _export(folder: Path, cars: int, console: Console) -> int:
+    new_folder(folder)
+    console.print(f"{cars} cars are driven: minutes", highlight=False)
+    for seed in track(range(cars), ENTRIES, console=console, transient=True):
+        export_car(folder, seed, car_tracks(seed))
+    console.print(
+        f"written: {folder}, inputs and truth of {cars} cars; next: docs/benchmark.md", highlight=False
+    )
+    return 0

@@ -1,0 +1,55 @@
+"""What an entry hears in one cycle: the samples that arrived, by the names of the contract."""
+
+from difflib import get_close_matches
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ecu.contract.signals import INPUT_SIGNALS, without_corner
+
+Vector = NDArray[np.float64]
+
+TRANSDUCERS: Final = ("wheel_force_x", "wheel_torque_y")
+"""Of measuring wheels: heard by entries with the attribute `wheel_transducers` alone."""
+
+
+def _places() -> dict[str, int | slice]:
+    places: dict[str, int | slice] = {}
+    for place, signal in enumerate(INPUT_SIGNALS):
+        stem = without_corner(signal.name)
+        if stem == signal.name:
+            places[stem] = place
+        elif stem not in places:
+            places[stem] = slice(place, place + 4)
+    return places
+
+
+PLACES: Final = _places()
+"""Place of an input's value among all, or of its four, in the order fl, fr, rl, rr."""
+
+
+class Inputs:
+    """Samples of one cycle, read-only: `inputs.accel_x` is a float, `inputs.wheel_speed` of shape (4,).
+
+    Names and units are those of `INPUT_SIGNALS`; NaN: no new sample in this cycle.
+    """
+
+    __slots__ = ("dt", "signals", "t", "values")
+
+    def __init__(self, values: Vector, t: float, dt: float, signals: frozenset[str]) -> None:
+        self.values = values
+        """All of them in the order of `INPUT_SIGNALS`, shape (N_INPUTS,)."""
+        self.t = t
+        """Since the drive began [s]; 0 is the first cycle of another drive of the same car."""
+        self.dt = dt
+        """Since the last cycle [s]."""
+        self.signals = signals
+        """Names of the inputs of which this drive has samples at all."""
+
+    def __getattr__(self, name: str) -> Any:
+        place = PLACES.get(name)
+        if place is None:
+            close = get_close_matches(name, PLACES, 1)
+            raise AttributeError(f"inputs.{name}: no such signal" + (f"; {close[0]}?" if close else ""))
+        return self.values[place] if isinstance(place, slice) else float(self.values[place])
