@@ -138,7 +138,7 @@ def test_cycle_rows() -> None:
 def one_bench(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """The command with one instant bench, in a checkout whose documentation is empty."""
     rows = [Row("a", FIGURE, Figure(6.0, 6.0, 6.0), "µs", "peer"), Row("b", FIGURE, None, "µs", "none")]
-    monkeypatch.setattr(command, "BENCHES", {"step": times.Bench(lambda: rows, "step", "Below.")})
+    monkeypatch.setattr(times, "BENCHES", {"step": times.Bench(lambda: rows, "step", "Below.")})
     (tmp_path / "docs" / "results").mkdir(parents=True)
     monkeypatch.setattr(output, "resource", lambda name: tmp_path / name)
     return tmp_path / "docs" / "results" / "benchmarks.md"

@@ -12,7 +12,7 @@ from rich.progress import track
 from brakelab.bench.cars import each_car
 from brakelab.bench.observer_times import step_times
 from brakelab.bench.output import PICTURES, plain_row, print_json, print_tables, results_page, write_page
-from brakelab.bench.times import BENCHES
+from brakelab.bench.times import BENCHES, run_times
 from brakelab.entries.command import ENTRIES, NOBODY, Entered, bench_entries
 from brakelab.studies import (
     ablation,
@@ -35,7 +35,7 @@ from brakelab.studies.observers import WIDE, Sample, Task, observer_rows, tasks
 from brakelab.studies.observers_cases import configured
 from brakelab.studies.observers_picture import PICTURED, consistency_of, write_picture
 from brakelab.studies.observers_table import finite, observer_tables
-from brakelab.studies.table import stop_tables, time_table
+from brakelab.studies.table import stop_tables
 from brakelab.studies.texts import (
     ABLATION_TEXT,
     BLENDING_TEXT,
@@ -123,23 +123,7 @@ def bench(
     }
     if name is not None and name not in (*BENCHES, *others):
         raise UserError("bench", name, f"no such bench; choose one of {', '.join((*BENCHES, *others))}")
-    return others[name](json) if name in others else _times(name, json)
-
-
-def _times(name: str | None, json: bool) -> int:
-    line = machine()
-    chosen = {key: value for key, value in BENCHES.items() if name in (None, key)}
-    rows = {key: value.rows() for key, value in chosen.items()}
-    if json:
-        print_json(
-            {"machine": line, **{key: [plain_row(row) for row in value] for key, value in rows.items()}}
-        )
-        return 0
-    tables = [time_table(chosen[key].title, rows[key], chosen[key].below) for key in rows]
-    print_tables(line, tables)
-    if name is None:
-        write_page("benchmarks.md", "Times", f"`brake-ecu bench`, version {__version__}. {line}.", tables)
-    return 0
+    return others[name](json) if name in others else run_times(name, json)
 
 
 def _stops(json: bool, seeds: int, draw: str) -> int:

@@ -4,7 +4,10 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 from brakelab.bench import codec, cycle, plant, step
-from brakelab.studies.measure import Row
+from brakelab.bench.output import plain_row, print_json, print_tables, write_page
+from brakelab.studies.measure import Row, machine
+from brakelab.studies.table import time_table
+from ecu import __version__
 
 
 class Bench(NamedTuple):
@@ -43,3 +46,20 @@ BENCHES: Final = {
         "is the daemon's cycle; the peer checks nothing and runs the four filters alone.",
     ),
 }
+
+
+def run_times(name: str | None, json: bool) -> int:
+    """Run one of `BENCHES`, or all; print tables, or JSON; of all renew the page. Returns 0."""
+    line = machine()
+    chosen = {key: value for key, value in BENCHES.items() if name in (None, key)}
+    rows = {key: value.rows() for key, value in chosen.items()}
+    if json:
+        print_json(
+            {"machine": line, **{key: [plain_row(row) for row in value] for key, value in rows.items()}}
+        )
+        return 0
+    tables = [time_table(chosen[key].title, rows[key], chosen[key].below) for key in rows]
+    print_tables(line, tables)
+    if name is None:
+        write_page("benchmarks.md", "Times", f"`brake-ecu bench`, version {__version__}. {line}.", tables)
+    return 0
