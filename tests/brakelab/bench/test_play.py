@@ -5,12 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brakelab.bench import command, output
+from brakelab.bench import command
 from brakelab.bench import play as bench
 from brakelab.logs.formats import read_frames
 from brakelab.logs.log_quality import LogQuality
+from brakelab.results.text_table import Table
 from brakelab.rig.live import Bus
-from brakelab.studies.table import Table
+from brakelab.studies import output
 from ecu.contract.records import RecordArray
 
 

@@ -9,7 +9,7 @@ from brakelab.friction_lab.identification import Identified, Judged
 from brakelab.friction_lab.report_page import write_report
 from brakelab.friction_lab.stops import Stops
 from brakelab.plant.friction.constant import Constant
-from brakelab.studies.table import Table
+from brakelab.results.text_table import Table
 
 
 def test_the_page_of_a_constant(tmp_path: Path, columns: Columns, stops: Stops) -> None:

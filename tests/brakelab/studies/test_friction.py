@@ -5,6 +5,7 @@ import pytest
 from brakelab.bench import command
 from brakelab.plant.description import load_plant
 from brakelab.plant.linings import Linings
+from brakelab.studies import output
 from brakelab.studies.friction import (
     BRAKES,
     RUNS,
@@ -54,7 +55,7 @@ def test_every_column_of_table_3_4_is_complete() -> None:
 
 def test_the_bench_writes_its_page(monkeypatch: pytest.MonkeyPatch) -> None:
     written = []
-    monkeypatch.setattr(command, "write_page", lambda name, *rest: written.append((name, len(rest[2]))))
+    monkeypatch.setattr(output, "write_page", lambda name, *rest: written.append((name, len(rest[2]))))
     assert command.bench("friction", json=False) == 0
     assert written == [("friction.md", len(friction_tables()))]
 

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brakelab.bench import command, output
+from brakelab.bench import command
+from brakelab.results.text_table import markdown
 from brakelab.simulation.closed_loop import Drive
+from brakelab.studies import output
 from brakelab.studies.measure import Figure
 from brakelab.studies.observers import (
     JOINT,
@@ -36,7 +38,6 @@ from brakelab.studies.observers_cases import (
 )
 from brakelab.studies.observers_picture import HEIGHT, LEFT, TOP, Consistency, write_picture
 from brakelab.studies.observers_table import finite, observer_tables
-from brakelab.studies.table import markdown
 from ecu.contract.params import OBSERVERS
 from ecu.contract.records import FRAME, new_record
 from ecu.contract.signals import CORNERS

@@ -5,10 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brakelab.bench import command, output
+from brakelab.bench import command
+from brakelab.results.text_table import markdown
 from brakelab.simulation.closed_loop import Drive
+from brakelab.studies import output
 from brakelab.studies.stops import TABLE_4_3, Stops, nrmse, stops, window
-from brakelab.studies.table import markdown, stop_tables
+from brakelab.studies.table import stop_tables
 from ecu.contract.records import FRAME, new_record
 from ecu.settings.config import load_config
 from ecu.settings.resources import resource

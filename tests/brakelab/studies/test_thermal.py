@@ -9,8 +9,8 @@ from brakelab.identification.thermal_fit import Fit
 from brakelab.identification.thermal_model import Cooling
 from brakelab.identification.thermal_page import Judged
 from brakelab.identification.thermal_result import Errors
-from brakelab.studies.chart import chart_svg
-from brakelab.studies.table import markdown
+from brakelab.results.chart import chart_svg
+from brakelab.results.text_table import markdown
 from brakelab.studies.thermal import LEGEND, thermal_panels, thermal_tables
 from brakelab.studies.thermal_study import Appraised, Car, Course
 from ecu.settings.config import load_config

@@ -9,11 +9,10 @@ from typing import Final
 from rich.console import Console
 from rich.progress import track
 
-from brakelab.bench.cars import each_car
 from brakelab.bench.observer_times import step_times
-from brakelab.bench.output import PICTURES, plain_row, print_json, print_tables, results_page, write_page
 from brakelab.bench.times import BENCHES, run_times
 from brakelab.entries.command import ENTRIES, NOBODY, Entered, bench_entries
+from brakelab.results.chart import write_chart
 from brakelab.studies import (
     ablation,
     bound,
@@ -26,7 +25,7 @@ from brakelab.studies import (
 )
 from brakelab.studies import stops as stops_bench
 from brakelab.studies.blending import blending_tables
-from brakelab.studies.chart import write_chart
+from brakelab.studies.cars import each_car
 from brakelab.studies.energy import energy_tables
 from brakelab.studies.failures import failure_tables
 from brakelab.studies.friction import friction_tables
@@ -35,6 +34,7 @@ from brakelab.studies.observers import WIDE, Sample, Task, observer_rows, tasks
 from brakelab.studies.observers_cases import configured
 from brakelab.studies.observers_picture import PICTURED, consistency_of, write_picture
 from brakelab.studies.observers_table import finite, observer_tables
+from brakelab.studies.output import PICTURES, plain_row, print_json, print_tables, results_page, write_page
 from brakelab.studies.table import stop_tables
 from brakelab.studies.texts import (
     ABLATION_TEXT,

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.bench.watchers import BLOCK_S, PORTS, VIEWERS, Block, Watchers, alternate, inside
+from brakelab.results.text_table import Table
 from brakelab.rig.live import Processes, choose_bus
-from brakelab.studies.table import Table
 from ecu.contract.signals import CYCLE_NS
 from ecu.recording.recorder import read_recording
 from ecu.runtime.clock import Grid, system_time

@@ -26,10 +26,10 @@ from numpy.typing import NDArray
 from brakelab.play.command import Sent, send_on_schedule
 from brakelab.play.play_log import timed_frames
 from brakelab.replay.quality import Findings
+from brakelab.results.text_table import Table
 from brakelab.rig.live import Bus, choose_bus
 from brakelab.simulation.priority import PRIORITY, ask_for_priority
 from brakelab.studies.measure import installed, machine
-from brakelab.studies.table import Table
 from ecu.runtime.clock import system_time
 from ecu.warm import Silence
 

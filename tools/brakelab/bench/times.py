@@ -4,8 +4,8 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 from brakelab.bench import codec, cycle, plant, step
-from brakelab.bench.output import plain_row, print_json, print_tables, write_page
 from brakelab.studies.measure import Row, machine
+from brakelab.studies.output import plain_row, print_json, print_tables, write_page
 from brakelab.studies.table import time_table
 from ecu import __version__
 

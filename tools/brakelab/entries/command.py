@@ -8,15 +8,15 @@ from typing import Final, NamedTuple
 from rich.console import Console
 from rich.progress import track
 
-from brakelab.bench.cars import each_car
-from brakelab.bench.output import print_json, print_tables, write_page
 from brakelab.entries.drives import car_tracks, real_drive
 from brakelab.entries.export import export_car, new_folder
 from brakelab.entries.ours import OURS
+from brakelab.entries.study import class_of, judge_car, predict_all
 from brakelab.entries.table import entry_tables, standings
-from brakelab.studies.entries import class_of, judge_car, predict_all
+from brakelab.studies.cars import each_car
 from brakelab.studies.measure import machine
 from brakelab.studies.observers_table import finite
+from brakelab.studies.output import print_json, print_tables, write_page
 from ecu import __version__
 from ecu.errors import UserError
 from ecu.settings.resources import resource

@@ -6,9 +6,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from brakelab.entries.drives import SETS
+from brakelab.entries.study import GROUPS, CarScore, CarScores
 from brakelab.results.prediction import Errors
-from brakelab.studies.entries import GROUPS, CarScore, CarScores
-from brakelab.studies.table import Table
+from brakelab.results.text_table import Table
 
 
 class Standing(NamedTuple):

@@ -33,7 +33,7 @@ from brakelab.friction_lab.tables import (
 from brakelab.plant.description import PlantFileError, read_file
 from brakelab.plant.dynamometer_programme import load_programme
 from brakelab.plant.linings import Lining, Linings
-from brakelab.studies.table import show
+from brakelab.results.text_table import show
 from ecu.errors import UserError
 from ecu.settings.resources import named, resource
 

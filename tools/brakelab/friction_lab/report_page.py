@@ -16,8 +16,8 @@ from brakelab.friction_lab.columns import Columns
 from brakelab.friction_lab.fitting import replayed
 from brakelab.friction_lab.identification import Identified
 from brakelab.friction_lab.stops import Stops
-from brakelab.studies.chart import BLUE, GREY, ORANGE, Line, Panel, chart_svg
-from brakelab.studies.table import Table
+from brakelab.results.chart import BLUE, GREY, ORANGE, Line, Panel, chart_svg
+from brakelab.results.text_table import Table
 
 Vector = NDArray[np.float64]
 

@@ -21,7 +21,7 @@ from brakelab.plant.description import read_file
 from brakelab.plant.dynamometer import DECELERATION, PRESSURE, new_stop
 from brakelab.plant.dynamometer_programme import BAR, KMH, Gate, Levels
 from brakelab.plant.friction.law import Positive, Section
-from brakelab.studies.table import Table
+from brakelab.results.text_table import Table
 
 
 class Applications(Section):

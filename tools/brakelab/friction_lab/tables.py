@@ -12,7 +12,7 @@ from brakelab.friction_lab.identification import Identified, Judged
 from brakelab.friction_lab.profile import profile_interval
 from brakelab.friction_lab.stops import Stops
 from brakelab.plant.friction.law import RigBrake
-from brakelab.studies.table import Table
+from brakelab.results.text_table import Table
 
 PARTS = 5
 

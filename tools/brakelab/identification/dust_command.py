@@ -12,9 +12,9 @@ from brakelab.identification.dust_models import LEAST
 from brakelab.identification.dust_reader import read_trips
 from brakelab.identification.dust_tables import model_table, spearman_table, trip_table
 from brakelab.identification.measurement_files import refuse_nested
+from brakelab.results.chart import BLUE, GREY, ORANGE, PINK, Line, Panel, write_chart
 from brakelab.results.outputs import check_outputs
-from brakelab.studies.chart import BLUE, GREY, ORANGE, PINK, Line, Panel, write_chart
-from brakelab.studies.table import markdown
+from brakelab.results.text_table import markdown
 from ecu.contract.dust import MODELS
 from ecu.errors import UserError
 from ecu.settings.config import Axle, load_config, new_params

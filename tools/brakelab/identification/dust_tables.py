@@ -6,7 +6,7 @@ import numpy as np
 
 from brakelab.identification.dust_features import Applications
 from brakelab.identification.dust_fit import Judged, spearman
-from brakelab.studies.table import Table
+from brakelab.results.text_table import Table
 
 THESIS: Final = {"LUT": -32.68, "static ANN": -9.07, "dynamic ANN": -3.95}
 """%, sum of particles of Trip 8, Table 8.2."""

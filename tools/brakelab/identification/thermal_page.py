@@ -9,8 +9,8 @@ import numpy as np
 from brakelab.identification.thermal_fit import Disc, Fit
 from brakelab.identification.thermal_model import ROW, Array, Cooling
 from brakelab.identification.thermal_result import KEYS, REMEDIES, SYMBOLS, Errors, Told, values_of
-from brakelab.studies.chart import BLUE, GREEN, GREY, ORANGE, PINK, Line, Panel, write_chart
-from brakelab.studies.table import Table, markdown
+from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Line, Panel, write_chart
+from brakelab.results.text_table import Table, markdown
 from ecu.contract.signals import CORNERS
 from ecu.settings.config import Axle
 

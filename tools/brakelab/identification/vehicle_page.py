@@ -11,8 +11,8 @@ from brakelab.identification.vehicle_identify import Identified
 from brakelab.identification.vehicle_model import Place, motion, stiffness_of
 from brakelab.identification.vehicle_parameters import ROUGH, Parameter
 from brakelab.log_physics.line import Vector
-from brakelab.studies.chart import BLUE, ORANGE, PINK, Line, Panel, write_chart
-from brakelab.studies.table import Table, markdown
+from brakelab.results.chart import BLUE, ORANGE, PINK, Line, Panel, write_chart
+from brakelab.results.text_table import Table, markdown
 from ecu.contract.params import GRAVITY
 
 SPEEDS: Final = (3.0, 8.0, 14.0, 20.0, 26.0, 32.0, 45.0)  # m/s, of the table of overrun

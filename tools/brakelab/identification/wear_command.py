@@ -12,9 +12,9 @@ from brakelab.identification.wear_curves import SHARE
 from brakelab.identification.wear_fit import QUASI_STATIC, TERMS, UNITS, Fit, fit_law
 from brakelab.identification.wear_fusion import Fused, fuse
 from brakelab.identification.wear_pictures import LEGEND, law_panels
+from brakelab.results.chart import write_chart
 from brakelab.results.outputs import check_outputs
-from brakelab.studies.chart import write_chart
-from brakelab.studies.table import Table, markdown
+from brakelab.results.text_table import Table, markdown
 from ecu.errors import UserError
 from ecu.settings.config import Axle, load_config
 

@@ -7,7 +7,7 @@ import numpy as np
 from brakelab.identification.wear_blocks import Block
 from brakelab.identification.wear_curves import Array, sensitivity, specific_wear, wear_surface
 from brakelab.identification.wear_fit import Fit
-from brakelab.studies.chart import BLUE, GREEN, GREY, ORANGE, PINK, Cells, Line, Panel
+from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Cells, Line, Panel
 
 MOTION: Final = ((5.0, BLUE), (20.0, GREEN), (50.0, ORANGE))  # kW of friction
 DECEL: Final = 2.0  # m/s^2 of the surface

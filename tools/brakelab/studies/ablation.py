@@ -13,13 +13,13 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from brakelab.plant.sensor_errors import ABSENT
+from brakelab.results.text_table import Table
 from brakelab.simulation.closed_loop import Drive, new_loop, plans, run
 from brakelab.simulation.ecu_inputs import ecu_inputs, vehicle_frames
 from brakelab.simulation.scenario import Scenario
 from brakelab.studies.observers import ORDINARY, counted
 from brakelab.studies.observers_cases import ACCURACY, configured, shipped
 from brakelab.studies.stops import AXLES, Vector, estimate_errors
-from brakelab.studies.table import Table
 from ecu.algorithm.estimation.joint.layout import (
     BIAS,
     DEFLECTION_GAIN,

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from brakelab.plant.friction.constant import Constant
 from brakelab.plant.friction.laws import LAWS
 from brakelab.plant.sensor_errors import SensorErrors
+from brakelab.results.text_table import Table
 from brakelab.simulation.closed_loop import Drive, Loop, new_loop, run
 from brakelab.simulation.faults import Fault
 from brakelab.simulation.scenario import Phase, Scenario
@@ -23,7 +24,7 @@ from brakelab.studies.measure import figure
 from brakelab.studies.observers import JOINT, ORDINARY, drive_car
 from brakelab.studies.observers_cases import Setup, shipped
 from brakelab.studies.stops import FULL, window
-from brakelab.studies.table import Table, spread
+from brakelab.studies.table import spread
 from ecu.contract.signals import CORNERS
 from ecu.settings.config import Config, load_config, new_params
 from ecu.settings.resources import resource

@@ -16,9 +16,9 @@ from brakelab.identification.wear_programme import (
     programme,
     road_stops,
 )
+from brakelab.results.chart import BLUE, GREY, ORANGE, PINK, Cells, Line, Panel
+from brakelab.results.text_table import Table
 from brakelab.studies.blocks_rig import Corner, Done, corner_of, energy_error, run_stops
-from brakelab.studies.chart import BLUE, GREY, ORANGE, PINK, Cells, Line, Panel
-from brakelab.studies.table import Table
 from brakelab.studies.wear_bad_input import bad_input_table
 from brakelab.studies.wear_study import CLIMATE, measured_block
 

@@ -17,6 +17,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from brakelab.results.text_table import Table
 from brakelab.simulation.scenario_car import with_draw
 from brakelab.simulation.vehicle_bus import new_vehicle
 from brakelab.studies.bound_car import (
@@ -48,7 +49,6 @@ from brakelab.studies.observers import JOINT, ORDINARY, counted, drive_car
 from brakelab.studies.observers_cases import ACCURACY, Setup, configured, goals, shipped
 from brakelab.studies.observers_table import ROUNDING
 from brakelab.studies.stops import AXLES, Vector, estimate_errors
-from brakelab.studies.table import Table
 from ecu.algorithm.estimation.joint import layout
 from ecu.algorithm.step import new_state
 from ecu.contract.records import RecordArray

@@ -4,8 +4,8 @@ from typing import Final
 
 import numpy as np
 
+from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Line, Panel
 from brakelab.studies.blending import SHARES, WRONG, wrong_friction
-from brakelab.studies.chart import BLUE, GREEN, GREY, ORANGE, PINK, Line, Panel
 from brakelab.studies.compensation import CURVES, RUNS, Run, applications, drive_all
 from brakelab.studies.stops import AXLES, columns
 from ecu.settings.config import Config

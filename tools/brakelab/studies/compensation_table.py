@@ -4,6 +4,7 @@ from typing import Final
 
 import numpy as np
 
+from brakelab.results.text_table import Table
 from brakelab.studies.compensation import (
     CURVES,
     FADE_RUNS,
@@ -15,7 +16,6 @@ from brakelab.studies.compensation import (
 )
 from brakelab.studies.measure import Figure, figure
 from brakelab.studies.stops import Vector
-from brakelab.studies.table import Table
 
 
 def _cell(value: Figure) -> str:

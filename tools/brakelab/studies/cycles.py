@@ -6,6 +6,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from brakelab.results.text_table import Table
 from brakelab.studies.cycle_cars import (
     SHIPPED,
     Shipped,
@@ -16,7 +17,6 @@ from brakelab.studies.cycle_cars import (
 )
 from brakelab.studies.cycle_drives import CYCLES, REAL_DRIVING, WLTP_BRAKE, CycleDrive, drive_cycle
 from brakelab.studies.cycle_open import OpenDrive, drive_open, real_driving_profile, wltp_brake_profile
-from brakelab.studies.table import Table
 from ecu.settings.config import Config, new_params
 
 CAR: Final = 1

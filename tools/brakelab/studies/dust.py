@@ -9,9 +9,9 @@ import numpy as np
 
 from brakelab.identification.dust_command import LEGEND, dust_panels
 from brakelab.identification.dust_tables import THESIS, spearman_table, trip_table
-from brakelab.studies.chart import write_chart
+from brakelab.results.chart import write_chart
+from brakelab.results.text_table import Table
 from brakelab.studies.dust_study import Draw, OnBoard, draw_trips, drive_on_board, pictured
-from brakelab.studies.table import Table
 
 DRAWS: Final = 20
 QUIET_DRAWS: Final = 10

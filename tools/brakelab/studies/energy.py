@@ -4,9 +4,9 @@ from pathlib import Path
 from typing import Final
 
 from brakelab.plant.energy import Energy, energy
+from brakelab.results.text_table import Table
 from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.scenario import load_scenario
-from brakelab.studies.table import Table
 from ecu.settings.config import Config
 
 SUSPENDED: Final = "suv14"

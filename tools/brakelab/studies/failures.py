@@ -8,12 +8,13 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from brakelab.results.text_table import Table
 from brakelab.simulation.closed_loop import Drive, new_loop, run
 from brakelab.simulation.faults import Fault
 from brakelab.simulation.scenario import Phase, Scenario
 from brakelab.studies.measure import figure
 from brakelab.studies.observers_cases import shipped
-from brakelab.studies.table import Table, spread
+from brakelab.studies.table import spread
 from ecu.contract.faults import BRAKE_FAILED
 from ecu.contract.signals import CORNERS
 from ecu.settings.config import Config, load_config

@@ -23,9 +23,9 @@ from brakelab.plant.dynamometer import (
 from brakelab.plant.dynamometer_programme import load_programme, run_programme
 from brakelab.plant.linings import Linings
 from brakelab.plant.records import RecordArray
+from brakelab.results.text_table import Table
 from brakelab.studies.heat import BRAKES, KMH, PRINTED, heat_tables, rig_of
 from brakelab.studies.staircase import staircase_table
-from brakelab.studies.table import Table
 from ecu.settings.resources import resource
 
 Vector = NDArray[np.float64]

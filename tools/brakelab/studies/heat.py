@@ -6,7 +6,7 @@ from brakelab.plant.disc import WET, biot_number, cooling_rate
 from brakelab.plant.dynamometer import PRESSURE, cool, new_stop, run_stop
 from brakelab.plant.linings import Linings, rig_with
 from brakelab.plant.records import RecordArray
-from brakelab.studies.table import Table
+from brakelab.results.text_table import Table
 
 KMH: Final = 1.0 / 3.6  # m/s
 BRAKES: Final = ("A", "B", "C")

@@ -25,11 +25,11 @@ from brakelab.replay.quality import Findings
 from brakelab.replay.source import load_source
 from brakelab.results.brakes import BrakeBook
 from brakelab.results.prediction import errors
+from brakelab.results.text_table import Table
 from brakelab.simulation.closed_loop import Drive, new_loop, run
 from brakelab.simulation.scenario import Scenario, Trace
 from brakelab.simulation.simulate import write_columns
 from brakelab.studies.observers_cases import shipped
-from brakelab.studies.table import Table
 from ecu.contract.signals import CORNERS
 from ecu.settings.config import Config, load_config, new_params
 from ecu.settings.resources import resource

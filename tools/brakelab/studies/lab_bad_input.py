@@ -10,8 +10,8 @@ from brakelab.friction_lab.plausibility import refuse_nonsense
 from brakelab.friction_lab.reader import read_recording
 from brakelab.friction_lab.recording import write_recording
 from brakelab.plant.dynamometer_programme import load_programme
+from brakelab.results.text_table import Table
 from brakelab.studies.lab import SEED, columns_of, linings
-from brakelab.studies.table import Table
 from ecu.errors import UserError
 from ecu.settings.resources import resource
 

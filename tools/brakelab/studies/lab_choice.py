@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
+from brakelab.results.text_table import Table
 from brakelab.studies.heat import BRAKES
 from brakelab.studies.lab import Brake, measure
-from brakelab.studies.table import Table
 
 SEEDS: Final = (3, 4, 5, 6)
 """Of pads that the rule of the choice was not made on."""

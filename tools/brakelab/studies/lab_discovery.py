@@ -9,9 +9,9 @@ from brakelab.friction_lab.discovery import ILVO, NAMES, Support, greedy, librar
 from brakelab.friction_lab.dynamometer import new_bench, run_programme
 from brakelab.friction_lab.stops import find_stops
 from brakelab.plant.dynamometer_programme import load_programme
+from brakelab.results.text_table import Table
 from brakelab.studies.heat import BRAKES
 from brakelab.studies.lab import columns_of, linings, r1_recording
-from brakelab.studies.table import Table
 from ecu.settings.resources import resource
 
 DRAWS: Final = 20

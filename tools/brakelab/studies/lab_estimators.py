@@ -4,11 +4,11 @@ from typing import Final
 
 import numpy as np
 
+from brakelab.results.text_table import Table
 from brakelab.studies.lab_goals import OBSERVER_GOAL, as_drawn, same_ranking
 from brakelab.studies.lab_observer import CAUSES, KINDS
 from brakelab.studies.lab_run import Lab
 from brakelab.studies.lab_trips import FACTORS
-from brakelab.studies.table import Table
 
 TABLE_2_1: Final = {
     "response surface": (28.14, 17.74, 18.35, 12.27),

@@ -6,13 +6,13 @@ import numpy as np
 
 from brakelab.friction_lab.discovery import ILVO
 from brakelab.friction_lab.estimators import NETWORK, OSTERMEYER, SURFACE
+from brakelab.results.text_table import Table
 from brakelab.studies.heat import BRAKES
 from brakelab.studies.lab import SEED, recovery, table_errors
 from brakelab.studies.lab_choice import choice_of, met
 from brakelab.studies.lab_discovery import NOISES
 from brakelab.studies.lab_observer import AS_DRAWN, KINDS, OnTrip
 from brakelab.studies.lab_run import Lab
-from brakelab.studies.table import Table
 
 OBSERVER_GOAL: Final = 3.0  # %
 INSIDE: Final = (90.0, 99.0)  # %

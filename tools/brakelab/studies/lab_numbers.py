@@ -4,9 +4,9 @@ from typing import Final
 
 from brakelab.friction_lab.identification import Judged
 from brakelab.plant.disc import DISC_SHARE
+from brakelab.results.text_table import Table
 from brakelab.studies.heat import BRAKES
 from brakelab.studies.lab_run import Lab
-from brakelab.studies.table import Table
 
 TABLE_C_1: Final = (2.111e-4, 2.668e-4, 1.700e-4)
 """xi [K/J]; the print's unit is 1/(m N) K, which is the same."""

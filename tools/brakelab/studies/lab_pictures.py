@@ -11,7 +11,7 @@ from brakelab.friction_lab.analysis import Components, levels
 from brakelab.friction_lab.cost import Cost
 from brakelab.friction_lab.estimators import NETWORK, OSTERMEYER, SURFACE
 from brakelab.friction_lab.heat_capacity import AT, HeatCapacity
-from brakelab.studies.chart import BLUE, GREEN, GREY, ORANGE, PINK, Cells, Line, Panel, write_chart
+from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Cells, Line, Panel, write_chart
 from brakelab.studies.heat import BRAKES
 from brakelab.studies.lab import Brake
 from brakelab.studies.lab_run import Lab

@@ -7,8 +7,8 @@ from brakelab.friction_lab.cost import Cost, cost_over
 from brakelab.friction_lab.dynamometer import new_bench
 from brakelab.friction_lab.fitting import fit
 from brakelab.friction_lab.profile import Profile, profile_over
+from brakelab.results.text_table import Table
 from brakelab.studies.lab import SEED, columns_of, linings, run
-from brakelab.studies.table import Table
 
 PICTURED: Final = {"ilvo": ((3, 4), (0.15, 0.15)), "ostermeyer": ((0, 2), (0.25, 0.25))}
 """Places of two numbers (b and c; p_1 and p_3 / p_2), and how far to draw, in shares of their bounds."""

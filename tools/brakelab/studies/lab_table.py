@@ -7,6 +7,7 @@ import numpy as np
 from brakelab.friction_lab.dynamometer import Noise
 from brakelab.friction_lab.patches import CAPACITY_RISE
 from brakelab.plant.disc import DISC_SHARE
+from brakelab.results.text_table import Table
 from brakelab.studies.friction import LOADINGS, TABLE_3_4, TEMPERATURES
 from brakelab.studies.heat import BRAKES
 from brakelab.studies.lab import DRAWS, SEED, linings, recovery, table_errors
@@ -18,7 +19,6 @@ from brakelab.studies.lab_goals import goal_table
 from brakelab.studies.lab_numbers import number_tables
 from brakelab.studies.lab_run import Lab
 from brakelab.studies.lab_searches import search_table
-from brakelab.studies.table import Table
 
 TABLE_B_1: Final = {
     "initial speed": (-0.0961, 0.9907, 0.0),

@@ -20,11 +20,11 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Line, Panel
+from brakelab.results.text_table import Table
 from brakelab.simulation.closed_loop import FrictionOverride, new_loop, run
 from brakelab.simulation.scenario import Phase, Scenario, load_scenario
-from brakelab.studies.chart import BLUE, GREEN, GREY, ORANGE, PINK, Line, Panel
 from brakelab.studies.stops import AXLES, columns
-from brakelab.studies.table import Table
 from ecu.settings.config import Config
 from ecu.settings.resources import resource
 

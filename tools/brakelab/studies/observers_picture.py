@@ -6,8 +6,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.results.chart import write_svg
 from brakelab.simulation.closed_loop import Drive
-from brakelab.studies.chart import write_svg
 from brakelab.studies.observers import JOINT, ORDINARY, counted, drive_car
 from brakelab.studies.observers_cases import Setup, configured, shipped
 from brakelab.studies.stops import AXLES, Vector, columns

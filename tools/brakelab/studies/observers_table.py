@@ -5,6 +5,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from brakelab.results.text_table import Table
 from brakelab.studies.measure import Figure
 from brakelab.studies.observers import JOINT, NEVER, Row
 from brakelab.studies.observers_cases import (
@@ -18,7 +19,6 @@ from brakelab.studies.observers_cases import (
     goals,
 )
 from brakelab.studies.observers_picture import Consistency, mean_ratio
-from brakelab.studies.table import Table
 
 AXLES: Final = ("front", "rear")
 HONEST: Final = (93.0, 99.0)

@@ -19,12 +19,13 @@ from brakelab.replay.source import load_source
 from brakelab.replay.summary import peers
 from brakelab.results.brakes import BrakeBook, BrakeRow
 from brakelab.results.prediction import corners, errors
+from brakelab.results.text_table import Table
 from brakelab.simulation.closed_loop import Drive, new_loop, run
 from brakelab.simulation.scenario import Phase, Scenario
 from brakelab.simulation.simulate import write_columns
 from brakelab.studies.measure import figure
 from brakelab.studies.observers_cases import shipped
-from brakelab.studies.table import Table, spread
+from brakelab.studies.table import spread
 from ecu.contract.signals import CORNERS
 from ecu.settings.config import Config, load_config, new_params
 from ecu.settings.resources import resource

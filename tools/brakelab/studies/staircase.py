@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from brakelab.plant.hydraulics import BUILD_UP, RELEASE, advance_pressure
 from brakelab.plant.records import HISTORY, PARAMS, STATE, new_record
-from brakelab.studies.table import Table
+from brakelab.results.text_table import Table
 
 BAR: Final = 1e5  # Pa
 STEPS: Final = 13

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.identification.thermal_command import AXLES, judge_axle, with_fits
-from brakelab.identification.thermal_drives import BEYOND_TOWN, Measured, drive_measured, measured_trip
 from brakelab.identification.thermal_fit import Disc
 from brakelab.identification.thermal_log import Drive
 from brakelab.identification.thermal_model import Array, Cooling, respond
 from brakelab.identification.thermal_page import Judged
 from brakelab.identification.thermal_result import start_of
 from brakelab.simulation.closed_loop import new_loop
+from brakelab.studies.thermal_drives import BEYOND_TOWN, Measured, drive_measured, measured_trip
 from ecu.algorithm.step import new_state
 from ecu.contract.records import RecordArray
 from ecu.recording.rest import cool_discs

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.identification.wear_fit import TERMS
-from brakelab.studies.chart import BLUE, GREY, ORANGE, PINK, Line, Panel
-from brakelab.studies.table import Table
+from brakelab.results.chart import BLUE, GREY, ORANGE, PINK, Line, Panel
+from brakelab.results.text_table import Table
 from brakelab.studies.wear_drives import CarDrives
 from brakelab.studies.wear_study import LAWS, MODES, Law, Life, live
 from ecu.contract.signals import CORNERS

@@ -13,8 +13,8 @@ from brakelab.identification.dust_command import identify_dust
 from brakelab.identification.dust_trips import campaign, write_campaign
 from brakelab.identification.wear_command import identify_wear
 from brakelab.identification.wear_programme import drawn_car, programme, write_programme
+from brakelab.results.text_table import Table
 from brakelab.studies.lab_bad_input import Answer
-from brakelab.studies.table import Table
 from ecu.errors import UserError
 from ecu.settings.resources import resource
 

@@ -4,7 +4,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from brakelab.identification.thermal_drives import LAG, measured_trip, thermocouples, write_drives
+from brakelab.studies.thermal_drives import LAG, measured_trip, thermocouples, write_drives
 
 
 def test_thermocouples_lag_scatter_and_are_off() -> None:

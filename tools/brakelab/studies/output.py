@@ -5,9 +5,9 @@ from typing import Any, Final
 
 from rich.console import Console
 
-from brakelab.bench.provenance import measured_on
+from brakelab.results.text_table import Table, markdown, show
 from brakelab.studies.measure import Figure, Row
-from brakelab.studies.table import Table, markdown, show
+from brakelab.studies.provenance import measured_on
 from ecu import __version__
 from ecu.settings.resources import resource
 

@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from brakelab.studies.chart import BLUE, HEIGHT, LEFT, SCALE, TOP, WIDTH, Cells, Line, Panel, write_chart
+from brakelab.results.chart import BLUE, HEIGHT, LEFT, SCALE, TOP, WIDTH, Cells, Line, Panel, write_chart
 
 
 def drawn(tmp_path: Path, panel: Panel) -> str:

@@ -13,8 +13,8 @@ from brakelab.entries.inputs import Inputs, Vector
 from brakelab.entries.observer import EntryError, load_class
 from brakelab.entries.ours import OURS, Configured, EcuObserver
 from brakelab.entries.play import new_entry, play, reset
+from brakelab.entries.study import ADAPTED, COLD, EVERYDAY, CarScore, force_error, judge, judge_all
 from brakelab.entries.table import entry_tables, standings
-from brakelab.studies.entries import ADAPTED, COLD, EVERYDAY, CarScore, force_error, judge, judge_all
 from brakelab.studies.observers_cases import configured, shipped
 from ecu.contract.signals import INPUT
 from ecu.settings.config import Config

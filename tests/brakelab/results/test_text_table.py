@@ -1,6 +1,6 @@
 """Tables as Markdown."""
 
-from brakelab.studies.table import Table, markdown
+from brakelab.results.text_table import Table, markdown
 
 
 def test_a_bar_in_a_cell_is_no_new_cell() -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from brakelab.bench import provenance
+from brakelab.studies import provenance
 from ecu.settings.config import config_hash, load_config
 from ecu.settings.resources import resource
 
