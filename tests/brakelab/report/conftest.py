@@ -10,10 +10,12 @@ import pyarrow.parquet as pq
 import pytest
 
 from brakelab.report.brakings import Braking, Force
+from brakelab.results.car import car_of
 from brakelab.results.files import brakes_path
 from ecu.contract.signals import CORNERS, OUTPUT_COLUMNS
 from ecu.recording.recorder import ABOUT_FILE, CYCLES_FILE, INITIAL_FILE, layout
 from ecu.recording.ring import RECORDED
+from ecu.settings.config import load_config
 
 STOPS = ((5.0, 4.0), (22.0, 6.0), (40.0, 8.0))  # start [s], deceleration [m/s^2]
 V_IN = 100.0 / 3.6
@@ -74,6 +76,8 @@ def made_up_drive(seconds: float = 60.0) -> tuple[dict[str, Any], dict[str, Any]
         result[f"pressure_demand_{corner}"] = pressure
         result[f"calliper_pressure_{corner}"] = pressure + rng.normal(0.0, 1.8, t.shape)
         truth[f"mu_b_{corner}"] = true
+        result[f"brake_torque_{corner}"] = result[f"mu_b_{corner}"] * pressure * 60.0
+        result[f"slip_{corner}"] = np.where(speed > 1.0, -0.01 * braking, np.nan)
     brakes: dict[str, list[Any]] = {}
     for number, (start, deceleration) in enumerate(STOPS):
         learned = number > 0
@@ -131,7 +135,7 @@ def write_drive(folder: Path) -> dict[str, Path]:
     result, truth, brakes = made_up_drive()
     metadata = {
         "start_time_ns": "1717240000000000000", "vehicle": "SUV", "config_hash": "0123456789abcdef",
-        "version": "0.1.0",
+        "version": "0.1.0", "car": json.dumps(car_of(load_config(Path("config/suv.toml")))),
         "inputs": json.dumps([{"name": "stops.log", "sha256": ""}]),
         "quality": json.dumps([{
             "rows": 6000, "frames": 90000, "samples": 0, "seconds": 0.2, "dropped": 3,

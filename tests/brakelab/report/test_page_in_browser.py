@@ -18,7 +18,7 @@ OPTIONS = (
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync",
     "--disable-dev-shm-usage",
     "--disable-background-networking", "--disable-component-update", "--enable-logging=stderr",
-    "--virtual-time-budget=10000", "--window-size=1400,6000",
+    "--virtual-time-budget=10000",
 )  # fmt: skip
 
 # Leaves what it saw in the title, which --dump-dom shows.
@@ -35,6 +35,15 @@ setTimeout(() => {
     look(figure);
     return canvases.some(inked);
   });
+  const legends = [], find = (node) => {
+    if (node.className?.includes?.("bk-Legend")) legends.push(node);
+    for (const child of [...node.children, ...(node.shadowRoot ? node.shadowRoot.children : [])]) find(child);
+  };
+  document.querySelectorAll(".plots figure").forEach(find);
+  const cut = legends.filter((legend) => {
+    const box = legend.getBoundingClientRect();
+    return box.left < 0 || box.right > innerWidth;
+  });
   document.querySelectorAll("button[data-from]")[1].click();
   const range = [...Bokeh.documents[0].all_models].find((model) => model.name === "drive-time");
   const colours = [...Bokeh.documents[0].all_models].flatMap((model) => model.axis_label_text_color ?? []);
@@ -42,27 +51,40 @@ setTimeout(() => {
     figures: document.querySelectorAll(".plots figure").length, drawn: drawn.length,
     loaded: performance.getEntriesByType("resource").map((entry) => entry.name),
     window: [range.start, range.end], ink: [...new Set(colours)].map((colour) => colour.value ?? colour),
-    overflow: document.documentElement.scrollWidth - innerWidth,
+    legends: legends.length, cut: cut.length, overflow: document.documentElement.scrollWidth - innerWidth,
   });
 }, 6000);
 </script></body>"""
 
 
-@pytest.mark.parametrize(("scheme", "ink"), [(1, "#1b1f24"), (0, "#e8ebef")], ids=["light", "dark"])
-def test_every_plot_is_drawn(drive_files: dict[str, Path], tmp_path: Path, scheme: int, ink: str) -> None:
+@pytest.mark.parametrize(
+    ("scheme", "ink", "width"), [(1, "#1b1f24", 1400), (0, "#e8ebef", 400)], ids=["light", "dark and narrow"]
+)
+def test_every_plot_is_drawn(
+    drive_files: dict[str, Path], tmp_path: Path, scheme: int, ink: str, width: int
+) -> None:
     page = tmp_path / "report.html"
     report(drive_files["result"], drive_files["truth"], page, drive_files["timing"])
     probed = tmp_path / "probed.html"
     probed.write_text(page.read_text("utf-8").replace("</body>", PROBE), "utf-8")
     profile = f"--user-data-dir={tmp_path / 'profile'}"
     shade = f"--blink-settings=preferredColorScheme={scheme}"
-    command = [str(CHROMIUM), *OPTIONS, profile, shade, "--dump-dom", probed.as_uri()]
+    command = [
+        str(CHROMIUM),
+        *OPTIONS,
+        f"--window-size={width},9000",
+        profile,
+        shade,
+        "--dump-dom",
+        probed.as_uri(),
+    ]
     short = {**os.environ, "TMPDIR": "/tmp"}  # where it makes a socket, whose name has at most 107 letters
     done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False, env=short)
     title = re.search(r"<title>(.*?)</title>", done.stdout)
     assert title, done.stderr[-2000:]
     seen = json.loads(title[1])
-    assert seen["figures"] == seen["drawn"] == 22
+    assert seen["figures"] == seen["drawn"] == 36
+    assert (seen["legends"] > 30, seen["cut"]) == (True, 0)
     assert seen["loaded"] == []
     assert seen["window"] == pytest.approx([21.5, 27.13], abs=0.05)
     assert seen["ink"] == [ink]

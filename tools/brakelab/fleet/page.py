@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 from bokeh.models import ColumnDataSource, HoverTool
 
+from brakelab.fleet.lines import FEW, lines_of_vehicles
 from brakelab.fleet.statistics import (
     QUANTITIES,
     Note,
@@ -46,7 +47,7 @@ def write_page(done: Sequence[Summary], out: Path) -> None:
                 for q in QUANTITIES
                 if len(weeks[q.name].drives) > 1
             },
-            "by_vehicle": {f"vehicle-{q.name}": _spread(q, vehicles.values[q.name]) for q in QUANTITIES},
+            "by_vehicle": _by_vehicle(good, vehicles),
         },
         {
             "name": out.parent.name,
@@ -59,6 +60,7 @@ def write_page(done: Sequence[Summary], out: Path) -> None:
                 Note(row["vehicle"], row["drive"], told(row, "fault")) for row in done if row["fault"]
             ],
             "noted": notes(good),
+            "few": len(vehicles.names) <= FEW,
             "undated": sum(row["start_time"] is None for row in good),
             "rows": ROWS,
         },
@@ -83,7 +85,7 @@ def _tiles(done: Sequence[Summary], good: Sequence[Summary], vehicles: Vehicles)
             "km",
             f"{hours / 3600.0:.1f} h, {len(vehicles.names)} vehicles",
         ),
-        Tile("Brakings", f"{brakings}", "", f"{taught} of them taught friction"),
+        Tile("Brakings", f"{brakings}", "", f"{taught} of them taught friction", brakings > 0 == taught),
     ]
     errors = values_of(good, "prediction_error")
     tiles.append(_spread_tile("Prediction error [%]", errors, 100.0, 1, "drives"))
@@ -130,17 +132,26 @@ def _weeks(quantity: Quantity, weeks: Weeks) -> Any:
     return plot
 
 
+def _by_vehicle(good: Sequence[Summary], vehicles: Vehicles) -> dict[str, Any]:
+    """Return a line per vehicle when they are few, else their spread; unknown quantities are left out."""
+    plots = {}
+    for quantity in QUANTITIES:
+        values = vehicles.values[quantity.name]
+        if np.isfinite(values).any():
+            few = len(vehicles.names) <= FEW
+            plot = lines_of_vehicles(good, quantity) if few else _spread(quantity, values)
+            plots[f"vehicle-{quantity.name}"] = plot
+    return plots
+
+
 def _spread(quantity: Quantity, values: Any) -> Any:
     plot = new_figure(quantity.title, "Vehicles")
     known = values[np.isfinite(values)] * quantity.scale
-    if len(known):
-        counts, edges = np.histogram(known, min(BINS, max(5, len(known) // 3)))
-        source = ColumnDataSource({"left": edges[:-1], "right": edges[1:], "count": counts})
-        bars = plot.quad("left", "right", "count", 0, source=source, fill_color=ESTIMATE, line_color=SHADE)
-        plot.y_range.start = 0
-        plot.add_tools(
-            HoverTool(
-                renderers=[bars], tooltips=[("vehicles", "@count"), ("from", "@left"), ("to", "@right")]
-            )
-        )
+    counts, edges = np.histogram(known, min(BINS, max(5, len(known) // 3)))
+    source = ColumnDataSource({"left": edges[:-1], "right": edges[1:], "count": counts})
+    bars = plot.quad("left", "right", "count", 0, source=source, fill_color=ESTIMATE, line_color=SHADE)
+    plot.y_range.start = 0
+    plot.add_tools(
+        HoverTool(renderers=[bars], tooltips=[("vehicles", "@count"), ("from", "@left"), ("to", "@right")])
+    )
     return plot

@@ -21,6 +21,8 @@ from brakelab.replay.drive import replay_drive
 from brakelab.replay.log import log_hash
 from brakelab.replay.needed import NEEDED, fault_lines, needed_lines, nothing_usable
 from brakelab.replay.quality import Findings, quality_lines
+from brakelab.results.car import KEY as CAR
+from brakelab.results.car import car_of
 from brakelab.results.files import ResultWriter, brakes_table
 from brakelab.results.pads import pads_of
 from ecu.algorithm.step import new_state
@@ -75,7 +77,9 @@ def _replay(job: Job, paths: Sequence[Path]) -> tuple[Outcome, pa.Table]:
                 if writer is not None:
                     began_ns = findings[0].began_ns
                     start = {} if began_ns is None else {"start_time_ns": str(began_ns)}
-                    writer.provenance = writer.provenance or provenance(job) | start
+                    writer.provenance = writer.provenance or provenance(job) | start | {
+                        CAR: car_of(job.config)
+                    }
                     writer.write(t, rows)
 
             after = replay_drive(

@@ -27,6 +27,8 @@ from brakelab.replay.progress import progress_bar
 from brakelab.replay.quality import Findings, quality_counts, quality_lines
 from brakelab.replay.source import check_map, load_source
 from brakelab.replay.summary import brakings_table, prediction_lines, taps
+from brakelab.results.car import KEY as CAR
+from brakelab.results.car import car_of
 from brakelab.results.console import new_console
 from brakelab.results.files import EXPORTS, ResultWriter, brakes_path
 from brakelab.results.outputs import check_outputs
@@ -121,6 +123,7 @@ def replay_into(
             "vehicle": vehicle.name,
             "observer": vehicle.observer.kind,
             "config_hash": config_hash(vehicle),
+            CAR: car_of(vehicle),
             "database_hash": source.database_hash,
             "inputs": [{"name": path.name, "sha256": log_hash(path)} for path in logs],
         }

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from brakelab.report.accuracy import accuracy_per_axle, tracking
+from brakelab.report.brakes_section import brakes_section
 from brakelab.report.brakings import Braking, brakings
 from brakelab.report.drive import onto, read_drive
 from brakelab.report.friction import plots_of_friction
@@ -81,6 +82,7 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
     rows = [_row(*pair) for pair in zip(found, sparklines(drive, found), strict=True)]
     predicted = prediction_errors(found)
     wear, wear_plots = wear_section(drive, true, result, quality, without_pressure)
+    brakes, brakes_plots = brakes_section(drive, true, result, found, without_pressure)
     page = fill(
         {
             "over_time": plots_over_time(drive, true, found),
@@ -88,6 +90,7 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
             "prediction_plots": plots_of_prediction(found),
             "per_braking": plots_per_braking(found),
             "loop_plots": {} if loop is None else plots_of_loop(loop),
+            **brakes_plots,
             **wear_plots,
         },
         {
@@ -106,6 +109,7 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
             "prediction_errors": predicted,
             "prediction_peers": peer_errors(found),
             "accuracy": accuracy,
+            "brakes": brakes,
             "wear": wear,
             "reduced": len(drive.t) > POINTS,
             "faults": faults(drive),

@@ -11,6 +11,7 @@ from brakelab.report.downsample import Buckets, buckets, extremes, times
 from brakelab.report.drive import Drive, Vector
 from brakelab.report.look import DEMAND, ESTIMATE, INK, LEFT, RIGHT, SHADE, link_crosshair, new_figure
 from brakelab.report.modes import modes_plot
+from brakelab.report.wheels import plots_of_wheels
 
 # Points per line: 60 s of drive at full resolution, and 40 lines of them stay near 1 MB.
 POINTS = 6000
@@ -56,6 +57,7 @@ def plots_over_time(drive: Drive, truth: Drive | None, found: list[Braking]) -> 
         "pressure-rear": _pressure(source, span, "rear", _REAR),
         "disc-front": _estimate(source, span, "Disc front [°C]", _FRONT, _DISC),
         "disc-rear": _estimate(source, span, "Disc rear [°C]", _REAR, _DISC),
+        **plots_of_wheels(drive, truth, _coarse(_coarse(grid)), span),
         "k-f": _tyre_factor(source, span),
         "modes": modes_plot(drive, _coarse(grid), span),
     }
@@ -74,7 +76,7 @@ def plots_over_time(drive: Drive, truth: Drive | None, found: list[Braking]) -> 
 
 
 def _coarse(grid: Buckets) -> Buckets:
-    """Return half the buckets: neighbours joined, because a bar of a mode needs no two points per pixel."""
+    """Return half the buckets: neighbours joined, for what needs no two points per pixel."""
     last = grid.last[1::2]
     if len(grid.first) % 2:
         last = np.append(last, grid.last[-1])

@@ -41,11 +41,43 @@
   document.getElementById("whole")?.addEventListener("click", () => show(-1));
   document.getElementById("previous")?.addEventListener("click", () => step(-1));
   document.getElementById("next")?.addEventListener("click", () => step(1));
+  // Legends on as many lines as their names need, and the width that print scales the plots from.
+  const pen = document.createElement("canvas").getContext("2d");
+  function fit() {
+    const drawn = document.querySelector(".plots figure")?.clientWidth;
+    if (!drawn || printing.matches) return;
+    const paper = drawn < 460 ? 340 : 690;
+    document.documentElement.style.setProperty("--drawn", `${drawn}px`);
+    document.documentElement.style.setProperty("--zoom", `${paper / drawn}`);
+    for (const plot of models().filter((model) => model.type === "Figure" || model.type === "Plot")) {
+      const free = drawn - 84 - (plot.right.some((axis) => axis.type === "LinearAxis") ? 58 : 0);
+      for (const legend of plot.above.filter((model) => model.type === "Legend")) {
+        pen.font = `${legend.label_text_font_size} ${legend.label_text_font}`;
+        const widths = legend.items.map((item) => legend.glyph_width + 7 + pen.measureText(item.label.value).width);
+        const row = widths.reduce((sum, width) => sum + width + legend.spacing, 0);
+        const columns = Math.max(1, Math.floor(free / (Math.max(...widths) + legend.spacing)));
+        const wanted = row <= free ? "auto" : columns;
+        if (legend.ncols === wanted) continue;
+        const lines = (count) => (count === "auto" ? 1 : Math.ceil(widths.length / count));
+        plot.height += 19 * (lines(wanted) - lines(legend.ncols));
+        legend.ncols = wanted;
+        const figure = document.querySelector(`[data-root-id="${plot.id}"]`)?.closest("figure");
+        figure?.style.setProperty("--height", `${plot.height}px`);
+      }
+    }
+  }
+
+  let waiting = 0;
+  addEventListener("resize", () => {
+    clearTimeout(waiting);
+    waiting = setTimeout(fit, 100);
+  });
   screenIsDark.addEventListener("change", recolour);
 
   const started = setInterval(() => {
     if (Bokeh.documents.length === 0) return;
     clearInterval(started);
     recolour();
+    fit();
   }, 20);
 })();

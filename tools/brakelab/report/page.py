@@ -14,7 +14,7 @@ from jinja2 import DictLoader, Environment, StrictUndefined
 from brakelab.report.look import DARK
 
 PAGE: Final[Traversable] = files("brakelab.report") / "page.html.j2"
-PARTS: Final = ("wear_section.html.j2",)
+PARTS: Final = ("brakes_section.html.j2", "wear_section.html.j2")
 """Sections that pages include."""
 _NONE = "–"
 

@@ -1,15 +1,18 @@
 """Plots with one point per brake application: change of friction, and tracking of the demand."""
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from bokeh.models import ColumnDataSource, HoverTool, Range1d, SingleIntervalTicker
+from bokeh.models.annotations import Span
 
 from brakelab.report.brakings import Braking
+from brakelab.report.drive import Vector
 from brakelab.report.look import DEMAND, ESTIMATE, LEFT, RIGHT, new_figure
 from ecu.contract.signals import CORNERS
 
-_MARKERS = (("front left", LEFT, "circle"), ("front right", RIGHT, "circle"),
+CORNER_MARKS = (("front left", LEFT, "circle"), ("front right", RIGHT, "circle"),
             ("rear left", LEFT, "triangle"), ("rear right", RIGHT, "triangle"))  # fmt: skip
 
 _DECELERATIONS = (
@@ -17,6 +20,48 @@ _DECELERATIONS = (
     ("achieved", ESTIMATE, "circle", 8),
     ("predicted", RIGHT, "x", 9),
 )
+
+
+class Series(NamedTuple):
+    """One quantity of every brake application."""
+
+    label: str
+    colour: str
+    marker: str
+    values: Vector
+    """NaN: not known, shape (brakings,)."""
+
+
+def points_by_braking(
+    numbers: Sequence[int], series: Sequence[Series], label: str, least_span: float, zero: str | None = None
+) -> Any:
+    """Return the figure, None for fewer than two brake applications or nothing known.
+
+    Args:
+        numbers: of the brake applications.
+        series: drawn beside each other.
+        label: of the axis.
+        least_span: of the axis.
+        zero: colour of a line at 0.
+    """
+    told = [one for one in series if np.isfinite(one.values).any()]
+    if len(numbers) < 2 or not told:
+        return None
+    plot = _figure(Range1d(start=0.5, end=numbers[-1] + 0.5, bounds="auto"), label, len(numbers), least_span)
+    columns: dict[str, Any] = {"number": np.array(numbers, float)}
+    for place, one in enumerate(told):
+        columns[f"at_{place}"] = columns["number"] + (place - 0.5 * (len(told) - 1)) * 0.15
+        columns[f"value_{place}"] = one.values
+    source = ColumnDataSource(columns)
+    for place, one in enumerate(told):
+        plot.scatter(
+            f"at_{place}", f"value_{place}", source=source, marker=one.marker, size=8, line_color=one.colour,
+            fill_color=one.colour, fill_alpha=0.7, line_width=2, legend_label=one.label,
+        )  # fmt: skip
+    if zero is not None:
+        plot.add_layout(Span(location=0.0, dimension="width", line_color=zero, line_width=1))
+    _hover(plot, [(one.label, f"@value_{place}{{0.00}}") for place, one in enumerate(told)])
+    return plot
 
 
 def plots_per_braking(found: list[Braking]) -> dict[str, Any]:
@@ -36,7 +81,7 @@ def plots_per_braking(found: list[Braking]) -> dict[str, Any]:
     source = ColumnDataSource(columns)
     span = Range1d(start=0.5, end=len(found) + 0.5, bounds="auto")
     friction = _figure(span, "Friction after it [-]", len(found), 0.1)
-    for place, (corner, (label, colour, marker)) in enumerate(zip(CORNERS, _MARKERS, strict=True)):
+    for place, (corner, (label, colour, marker)) in enumerate(zip(CORNERS, CORNER_MARKS, strict=True)):
         if np.isfinite(mean[:, place]).any():
             friction.line(f"at_{corner}", corner, source=source, line_color=colour, line_alpha=0.35)
             friction.scatter(

@@ -12,6 +12,8 @@ from brakelab.replay.engine import Rows, new_ecu
 from brakelab.replay.log import replay_log
 from brakelab.replay.quality import Findings
 from brakelab.replay.source import load_source
+from brakelab.results.car import KEY as CAR
+from brakelab.results.car import car_of
 from brakelab.results.files import MEASURED, ResultWriter
 from brakelab.results.pads import pads_of
 from brakelab.simulation.closed_loop import START_NS, Loop
@@ -56,6 +58,7 @@ def _provenance(writer: ResultWriter, config: Config, start_ns: int) -> None:
         "vehicle": config.name,
         "observer": config.observer.kind,
         "config_hash": config_hash(config),
+        CAR: car_of(config),
         "start_time_ns": str(start_ns),
     }
 

@@ -1,0 +1,151 @@
+"""Brake force of the axles beside the ideal distribution and what Annex 5 of ECE R13-H forbids.
+
+F = (brake torque + braking motor torque) / rolling radius of an axle, as the ECU estimates the torques; the
+braking rate is z = (F_front + F_rear) / (m g) with the mass of CONFIG. Ideal: F_front / F = (l_r + z h) / L.
+"""
+
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from bokeh.models import ColumnDataSource, Range1d
+
+from brakelab.report.brakings import Braking, inside
+from brakelab.report.drive import Drive, Vector
+from brakelab.report.look import DEGRADED, DEMAND, ESTIMATE, GRID, INK, QUIET, new_figure
+from brakelab.report.torque import binned
+from brakelab.results.car import RATES, Car
+from ecu.contract.params import GRAVITY
+from ecu.settings.annex5_picture import forbidden
+
+POINTS: Final = 900
+LEAST_RATE: Final = 0.05
+"""Below it the share is noise of the sensors."""
+_LEAST_ROWS: Final = 50
+_SHARES: Final = np.arange(0.300, 1.0001, 0.005)
+_STEP: Final = 0.02  # of the braking rate
+
+
+class Forces(NamedTuple):
+    """Brake forces of the axles over the weight of the car, shape (n,)."""
+
+    front: Vector
+    rear: Vector
+
+
+def plots_of_distribution(
+    drive: Drive, truth: Drive | None, found: list[Braking], car: Car
+) -> dict[str, Any]:
+    """Return the two figures by name, empty where no braking is told."""
+    rows = np.zeros(len(drive.t), bool)
+    for braking in found:
+        rows |= inside(drive, braking)
+    forces = forces_of(drive, car)
+    z = forces.front + forces.rear
+    places = np.flatnonzero(rows & (z >= LEAST_RATE))  # NaN is not
+    if len(places) < _LEAST_ROWS:
+        return {}
+    some = places[:: max(1, -(-len(places) // POINTS))]
+    source = ColumnDataSource(
+        {
+            "z": z[some].astype("f4"),
+            "share": (100.0 * forces.front[some] / z[some]).astype("f4"),
+            "front": forces.front[some].astype("f4"),
+            "rear": forces.rear[some].astype("f4"),
+        }
+    )
+    end = max(0.5, min(1.2, 1.15 * float(z[some].max())))
+    true = None
+    if truth is not None and truth.has("brake_torque_fl"):
+        told = forces_of(truth, car)
+        rate = told.front[places] + told.rear[places]
+        true = binned(rate, 100.0 * told.front[places] / np.where(rate > LEAST_RATE, rate, np.nan))
+    return {"distribution": _shares(car, source, end, true), "forces": _forces(car, source, end)}
+
+
+def forces_of(drive: Drive, car: Car) -> Forces:
+    """Return the brake forces of the axles over the weight; what motors drive counts against them."""
+    torque = drive.corners("brake_torque") + np.nan_to_num(drive.corners("motor_torque"))
+    weight = car.mass * GRAVITY
+    return Forces(
+        np.asarray(torque[:, :2].sum(axis=1) / (car.radius[0] * weight)),
+        np.asarray(torque[:, 2:].sum(axis=1) / (car.radius[1] * weight)),
+    )
+
+
+def ideal_share(car: Car, z: Vector) -> Vector:
+    """Return the front share at which both axles use the same adhesion, 0 to 1."""
+    return np.asarray(np.clip((car.rear_axle + z * car.cog_height) / car.wheelbase, 0.0, 1.0))
+
+
+def forbidden_stretches(car: Car, end: float) -> dict[str, list[float]]:
+    """Return rectangles of braking rate and front share [%] that Annex 5 forbids in any state of load."""
+    found: dict[str, list[float]] = {"left": [], "right": [], "bottom": [], "top": []}
+    sizes = {"mass": car.mass, "wheelbase": car.wheelbase}
+    half = 0.5 * (_SHARES[1] - _SHARES[0])
+    for z in np.arange(0.5 * _STEP, end, _STEP):
+        wrong = np.any([forbidden(sizes, float(z), load, _SHARES) for load in car.loads], axis=0)
+        edges = np.flatnonzero(np.diff(wrong.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
+        for first, after in edges:
+            found["left"].append(round(float(z) - 0.5 * _STEP, 3))
+            found["right"].append(round(min(float(z) + 0.5 * _STEP, end), 3))
+            found["bottom"].append(round(100.0 * float(_SHARES[first] - half), 2))
+            found["top"].append(round(100.0 * float(_SHARES[after - 1] + half), 2))
+    return found
+
+
+def _shares(car: Car, source: ColumnDataSource, end: float, true: tuple[Vector, Vector] | None) -> Any:
+    low = min(float(np.percentile(source.data["share"], 1)), 100.0 * float(ideal_share(car, RATES).min()))
+    plot = new_figure(
+        "Braking rate z [-]", "Front share [%]", height=300, tools="pan,box_zoom,reset,save",
+        active_drag="box_zoom", x_range=Range1d(start=0.0, end=end),
+        y_range=Range1d(start=max(30.0, low - 8.0), end=100.0),
+    )  # fmt: skip
+    stretches = forbidden_stretches(car, end)
+    if stretches["left"]:
+        plot.quad(
+            "left", "right", "bottom", "top", source=ColumnDataSource(stretches), fill_color=DEGRADED,
+            fill_alpha=0.22, line_color=None, legend_label="forbidden by Annex 5",
+        )  # fmt: skip
+    plot.scatter(
+        "z", "share", source=source, size=3, line_color=None, fill_color=ESTIMATE, fill_alpha=0.4,
+        legend_label="this drive",
+    )  # fmt: skip
+    shown = end >= RATES
+    plot.line(
+        RATES[shown], 100.0 * np.array(car.share)[shown], line_color=DEMAND, line_width=2.0,
+        legend_label="control, by CONFIG",
+    )  # fmt: skip
+    plot.line(
+        RATES[shown], 100.0 * ideal_share(car, RATES)[shown], line_color=QUIET, line_width=1.6,
+        legend_label="ideal",
+    )  # fmt: skip
+    if true is not None and len(true[0]) > 1:
+        plot.line(*true, line_color=INK, line_dash="dashed", line_width=1.3, legend_label="mean, true")
+    return plot
+
+
+def _forces(car: Car, source: ColumnDataSource, end: float) -> Any:
+    z = np.linspace(0.0, end, 41)
+    front, rear = z * ideal_share(car, z), z * (1.0 - ideal_share(car, z))
+    tallest = 1.15 * max(float(rear.max()), float(np.percentile(source.data["rear"], 99)))
+    plot = new_figure(
+        "Front brake force over weight [-]", "Rear over weight [-]", height=300,
+        tools="pan,box_zoom,reset,save", active_drag="box_zoom", x_range=Range1d(start=0.0, end=end),
+        y_range=Range1d(start=0.0, end=tallest),
+    )  # fmt: skip
+    rates = np.arange(0.2, 1.2 * end, 0.2)
+    plot.multi_line(
+        [[0.0, rate] for rate in rates], [[rate, 0.0] for rate in rates], line_color=GRID, line_width=1.5,
+        legend_label="z = 0.2, 0.4, …",
+    )  # fmt: skip
+    plot.scatter(
+        "front", "rear", source=source, size=3, line_color=None, fill_color=ESTIMATE, fill_alpha=0.4,
+        legend_label="this drive",
+    )  # fmt: skip
+    share = np.array(car.share)
+    plot.line(
+        RATES * share, RATES * (1.0 - share), line_color=DEMAND, line_width=2.0,
+        legend_label="control, by CONFIG",
+    )  # fmt: skip
+    plot.line(front, rear, line_color=QUIET, line_width=1.6, legend_label="ideal")
+    return plot

@@ -1,0 +1,131 @@
+"""Linked plots over a drive: slip and speeds of the wheels, torques of brakes and motors, pedals."""
+
+from typing import Any, Final
+
+import numpy as np
+from bokeh.models import ColumnDataSource, Range1d
+
+from brakelab.report.downsample import Buckets, extremes, times
+from brakelab.report.drive import Drive, Vector
+from brakelab.report.look import DEMAND, ESTIMATE, INK, LEFT, QUIET, RIGHT, STAGE_COLOURS, new_figure
+from ecu.contract.signals import CORNERS
+
+TIME: Final = "Time [s]"
+LEAST_TORQUE: Final = 100.0
+"""N m of brakes and motors together, below which a share is noise."""
+_LEAST_SLIP, _LEAST_KMH, _LEAST_TORQUE, _LEAST_PERCENT = 2.0, 10.0, 200.0, 20.0
+_SIDES: Final = (("left", LEFT, "dashed"), ("right", RIGHT, "dotted"))
+# Label, colour, dash of each wheel's speed.
+_WHEELS: Final = {
+    "fl": ("FL", LEFT, "solid"),
+    "fr": ("FR", RIGHT, "solid"),
+    "rl": ("RL", LEFT, "dashed"),
+    "rr": ("RR", RIGHT, "dashed"),
+}
+# Column, label, colour: of a plot.
+_TORQUES: Final = (
+    ("brakes", "brakes", ESTIMATE),
+    ("motors_front", "motors front", STAGE_COLOURS[3]),
+    ("motors_rear", "motors rear", STAGE_COLOURS[1]),
+)
+_PEDALS: Final = (("pedal", "brake", DEMAND), ("accelerator", "accelerator", STAGE_COLOURS[1]))
+
+
+def plots_of_wheels(drive: Drive, truth: Drive | None, grid: Buckets, span: Range1d) -> dict[str, Any]:
+    """Return the figures by name in reading order, all over the range `span`; those without a line, too."""
+    lines = {name: v for name, v in _lines(drive, truth).items() if np.isfinite(v).any()}
+    source = ColumnDataSource(
+        {"t": times(grid, drive.t), **{name: extremes(grid, v).astype("f4") for name, v in lines.items()}}
+    )
+    return {
+        "slip-front": _slip(source, span, "front", ("fl", "fr")),
+        "slip-rear": _slip(source, span, "rear", ("rl", "rr")),
+        "wheel-speed": _speeds(source, span),
+        "torques": _few(source, span, "Braking torque [N m]", _LEAST_TORQUE, _TORQUES),
+        "motor-share": _few(
+            source, span, "Motors' share [%]", _LEAST_PERCENT, (("share", "of the braking torque", ESTIMATE),)
+        ),
+        "pedals": _few(source, span, "Pedals [%]", _LEAST_PERCENT, _PEDALS),
+    }
+
+
+def motors_share(drive: Drive) -> Vector:
+    """Return the motors' part of the braking torque [%], shape (n,); NaN where nothing brakes."""
+    if not any(drive.has(f"motor_torque_{corner}") for corner in CORNERS):
+        return np.full(len(drive.t), np.nan)
+    motors = np.nan_to_num(drive.corners("motor_torque")).sum(axis=1).clip(min=0.0)
+    brakes = np.nan_to_num(drive.corners("brake_torque")).sum(axis=1).clip(min=0.0)
+    both = brakes + motors
+    brakes_now = (drive.column("braking") == 1.0) & (both > LEAST_TORQUE)
+    return np.where(brakes_now, 100.0 * motors / np.maximum(both, LEAST_TORQUE), np.nan)
+
+
+def _lines(drive: Drive, truth: Drive | None) -> dict[str, Vector]:
+    speed = 3.6 * np.abs(drive.column("vehicle_speed"))
+    lines = {"speed": speed}
+    for corner in CORNERS:
+        slip = drive.column(f"slip_{corner}")
+        lines[f"slip_{corner}"] = 100.0 * slip
+        lines[f"speed_{corner}"] = speed * (1.0 + slip)
+        if truth is not None:
+            # Standing and creeping wheels slip by anything; the ECU tells none there.
+            true = np.where(np.isfinite(slip), truth.column(f"slip_{corner}"), np.nan)
+            lines[f"slip_true_{corner}"] = 100.0 * true
+    motors = drive.corners("motor_torque")
+    if np.isfinite(motors).any() and (motors != 0.0).any():
+        for axle, wheels in (("front", slice(0, 2)), ("rear", slice(2, 4))):
+            if np.nan_to_num(motors[:, wheels]).any():
+                lines[f"motors_{axle}"] = motors[:, wheels].sum(axis=1)
+        lines["share"] = motors_share(drive)
+        lines["brakes"] = drive.corners("brake_torque").sum(axis=1)
+    pedal = drive if drive.has("pedal_position") or truth is None else truth
+    for name, values in (
+        ("pedal", pedal.column("pedal_position")),
+        ("accelerator", drive.column("accelerator_position")),
+    ):
+        if np.nan_to_num(values).any():
+            lines[name] = values
+    return lines
+
+
+def _slip(source: ColumnDataSource, span: Range1d, axle: str, corners: tuple[str, str]) -> Any:
+    plot = new_figure(TIME, f"Slip {axle} [%]", x_range=span, window_axis="x")
+    plot.y_range.min_interval = _LEAST_SLIP
+    for corner, (side, colour, _) in zip(corners, _SIDES, strict=True):
+        _line(plot, source, f"slip_{corner}", side, colour)
+    for corner, (side, _, dash) in zip(corners, _SIDES, strict=True):
+        _line(plot, source, f"slip_true_{corner}", f"{side}, true", INK, line_dash=dash, line_width=1.2)
+    return plot
+
+
+def _speeds(source: ColumnDataSource, span: Range1d) -> Any:
+    plot = new_figure(TIME, "Wheels [km/h]", x_range=span, window_axis="x")
+    plot.y_range.min_interval = _LEAST_KMH
+    if not any(f"speed_{corner}" in source.column_names for corner in _WHEELS):
+        return plot
+    _line(plot, source, "speed", "car", QUIET, line_width=3.0, line_alpha=0.5)
+    for corner, (label, colour, dash) in _WHEELS.items():
+        _line(plot, source, f"speed_{corner}", label, colour, line_dash=dash, line_width=1.2)
+    return plot
+
+
+def _few(
+    source: ColumnDataSource,
+    span: Range1d,
+    label: str,
+    least_span: float,
+    lines: tuple[tuple[str, str, str], ...],
+) -> Any:
+    plot = new_figure(TIME, label, x_range=span, window_axis="x")
+    plot.y_range.min_interval = least_span
+    if label.endswith("[%]"):
+        plot.y_range.start = 0.0
+    for name, of, colour in lines:
+        _line(plot, source, name, of, colour)
+    return plot
+
+
+def _line(plot: Any, source: ColumnDataSource, name: str, label: str, colour: str, **style: Any) -> None:
+    if name in source.column_names:
+        style = {"line_width": 1.4, **style}
+        plot.line("t", name, source=source, line_color=colour, legend_label=label, **style)
