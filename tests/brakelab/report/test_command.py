@@ -1,6 +1,7 @@
 import re
 from collections.abc import Callable
 from pathlib import Path
+from urllib.parse import unquote
 
 import numpy as np
 import pyarrow as pa
@@ -112,6 +113,29 @@ def test_columns_of_the_contract_alone_are_enough(drive_files: Files) -> None:
     change(drive_files["result"], lambda table: table.select(names))
     drive_files["brakes"].unlink()
     assert "No braking was found" in visible(written(drive_files))
+
+
+@pytest.mark.parametrize("rows", [400, 6000])
+def test_a_drive_without_brakings_draws_nothing_empty(
+    drive_files: Files, caplog: pytest.LogCaptureFixture, rows: int
+) -> None:
+    def still(table: pa.Table) -> pa.Table:
+        names = [name for name in table.column_names if name.split("_")[0] in {"braking", "decel", "k"}]
+        return table.drop_columns(names).slice(0, rows)
+
+    change(drive_files["result"], still)
+    drive_files["brakes"].unlink()
+    page = written(drive_files, truth=False, timing=False)
+    assert "No braking was found" in visible(page)
+    assert "brakings.csv" not in page
+    assert caplog.records == []
+
+
+def test_brakings_as_csv_are_in_the_page(drive_files: Files) -> None:
+    page = written(drive_files)
+    address = re.search(r'<a download="stops\.brakings\.csv" href="data:text/csv[^,]*,([^"]*)"', page)
+    assert address
+    assert len(unquote(address[1]).splitlines()) == 1 + 3
 
 
 def test_names_from_outside_are_text(drive_files: Files) -> None:

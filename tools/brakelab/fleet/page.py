@@ -111,7 +111,9 @@ def _spread_tile(title: str, values: Any, scale: float, digits: int, among: str)
     name, _, unit = title.rstrip("]").partition(" [")
     known = values[np.isfinite(values)] * scale
     low, middle, high = np.percentile(known, (5, 50, 95)) if len(known) else [float("nan")] * 3
-    note = f"median; {fixed(low, digits)} … {fixed(high, digits)} are 90 % of the {among}"
+    ends = fixed(low, digits), fixed(high, digits)
+    note = f"median; {ends[0]} … {ends[1]} are 90 % of the {among}" if ends[0] != ends[1] else "median"
+    note = note if len(known) else f"not known of any of the {among}"
     return Tile(name, fixed(middle, digits), unit.replace("-", ""), note)
 
 
