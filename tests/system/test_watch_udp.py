@@ -5,6 +5,8 @@ import os
 import signal
 import subprocess
 import sys
+import threading
+import time
 
 import pytest
 
@@ -46,32 +48,51 @@ def car(vehicle):
     return car
 
 
-def line_with(process, fact):
-    """Return the next line that `fact` holds for."""
-    for line in process.stdout:
-        if fact(told := json.loads(line)):
-            return told
-    raise AssertionError("the watcher ended")
+class Lines:
+    """Facts that a watcher prints, line by line."""
+
+    def __init__(self, process):
+        self.told, self.process = [], process
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self):
+        for line in self.process.stdout:
+            self.told.append(json.loads(line))
+
+    def wait_for(self, fact, meanwhile=lambda: time.sleep(0.1)):
+        """Return the first line not yet asked for that `fact` holds of; lines before it are left out."""
+        found = []
+
+        def looked():
+            meanwhile()
+            while self.told and not found:
+                found.extend(filter(fact, [self.told.pop(0)]))
+            return found
+
+        wait_for(looked)
+        return found[0]
 
 
 def test_it_attaches_tells_the_end_and_attaches_again(daemon, car, watch):
     watcher = watch("--json")
-    assert line_with(watcher, lambda told: told.get("trouble"))["trouble"].startswith("no daemon")
+    lines = Lines(watcher)
+    assert lines.wait_for(lambda told: told.get("trouble"))["trouble"].startswith("no daemon")
     first = daemon(*BUS)
     first.wait_for("ready")
-    car.drive(150)
-    told = line_with(watcher, lambda told: told.get("mode") == "active")
+    told = lines.wait_for(lambda told: told.get("mode") == "active", lambda: car.drive(20))
     assert told["daemon"].endswith(f"process {first.process.pid}")
     assert told["vehicle_speed"] == pytest.approx(20, abs=1.5)
     assert told["decel_demand_total"] == pytest.approx(3, abs=0.01)
     first.process.kill()
-    assert "was killed" in line_with(watcher, lambda told: told.get("trouble"))["trouble"]
+    assert "was killed" in lines.wait_for(lambda told: told.get("trouble"))["trouble"]
     first.end(None)
     second = daemon(*BUS)
     second.wait_for("ready")
-    car.drive(50)
-    told = line_with(watcher, lambda told: str(told.get("daemon")).endswith(str(second.process.pid)))
-    assert told["cycles"] > 0
+
+    def of_the_second(told):
+        return str(told.get("daemon")).endswith(str(second.process.pid))
+
+    assert lines.wait_for(of_the_second, lambda: car.drive(20))["cycles"] > 0
     watcher.send_signal(signal.SIGTERM)
     assert watcher.wait(20) == 0
     assert second.end() == 0
