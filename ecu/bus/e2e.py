@@ -229,6 +229,8 @@ def check_counter(
         return _resynchronise(state, counter, modulo, stamp_ns, period_ns, gone)
     disputed = _lasts(state.disputed_ns, stamp_ns)
     tolerance = period_ns // 4 if disputed else period_ns // 2
+    if slowest_ns > period_ns:
+        tolerance = period_ns  # without a grid the frame before may have been the late one
     early = step * period_ns - elapsed
     if early > tolerance or (disputed and elapsed - step * slowest_ns > tolerance):
         if _takes_back(state, counter, modulo, stamp_ns, period_ns):

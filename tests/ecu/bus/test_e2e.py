@@ -351,6 +351,19 @@ def test_a_sender_that_may_choose_its_rate_has_no_grid(interval: int) -> None:
         assert not in_doubt(state, stamp_ns)
 
 
+@pytest.mark.parametrize(
+    "late_ms",
+    [[0, 0, 5.8, 0, 0, 0], [0, 9, 0, 0, 9, 0], [0, 40, 30, 20, 10, 0], [0, 15, 5.1, 0, 20, 10, 0]],
+    ids=["one late", "twice by nearly a period", "four held up, sent at once", "again and again"],
+)
+def test_a_sender_without_a_grid_may_be_held_up(late_ms: list[float]) -> None:
+    """A frame that is late makes the next one early: both are its sender's."""
+    state = np.zeros(1, np.dtype(SEQUENCE))[0]
+    for k, late in enumerate(late_ms * 5):
+        stamp_ns = 1_000 * MS + k * PERIOD + int(late * MS)
+        assert check_counter(state, k % 15, 15, stamp_ns, PERIOD, 10 * PERIOD) == IN_SEQUENCE, k
+
+
 @pytest.mark.parametrize("off", [0.95, 0.98, 1.02, 1.05])
 def test_a_senders_clock_may_be_off(off: float) -> None:
     state = np.zeros(1, np.dtype(SEQUENCE))[0]
