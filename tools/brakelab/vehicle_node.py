@@ -12,6 +12,8 @@ import signal
 import sys
 import time
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -216,6 +218,10 @@ def _tell_set_off(t_mono_ns: int) -> None:
     print(f"driving {t_mono_ns}", flush=True)
 
 
+def _ends(stop: list[int], written: Future[None] | None) -> bool:
+    return bool(stop) or (written is not None and written.done() and written.exception() is not None)
+
+
 def _arguments(argv: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="python -m brakelab.vehicle_node", description="The simulated vehicle on a bus, in real time."
@@ -260,10 +266,14 @@ def main(argv: list[str] | None = None) -> int:
         if arguments.with_ecu:
             wait_for_ecu(node, channel, stopped)
         truth = drive_in_real_time(node, channel, source, stopped, _tell_set_off)
-        if arguments.truth is not None:
-            write_truth_file(arguments.truth, truth, path.stem, arguments.seed)
-        if arguments.with_ecu:
-            stay_with_ecu(node, channel, source, stopped)
+        with ThreadPoolExecutor(1) as beside:  # a car that writes is no car that is silent
+            written: Future[None] | None = None
+            if arguments.truth is not None:
+                written = beside.submit(write_truth_file, arguments.truth, truth, path.stem, arguments.seed)
+            if arguments.with_ecu:
+                stay_with_ecu(node, channel, source, partial(_ends, stop, written))
+        if written is not None:
+            written.result()
         channel.close()
     except UserError as error:
         print(error, file=sys.stderr)
