@@ -185,7 +185,8 @@ def application(
     slip, heat = np.nan_to_num(corners(rows, "slip")), corners(rows, "disc_temperature")
     wear, dust = wear_of(rows, params), dust_of(rows, params)
     worn = corners(after, "pad_wear_mass") - corners(before, "pad_wear_mass")
-    airborne = airborne_mass(worn, wear.sigma / wear.mass, params)
+    relative = np.divide(wear.sigma, wear.mass, out=np.full_like(wear.sigma, np.nan), where=wear.mass > 0.0)
+    airborne = airborne_mass(worn, relative, params)
     lines = []
     for i, corner in enumerate(CORNERS):
         lever = float(2.0 * p["piston_area"][i] * p["effective_radius"][i])
