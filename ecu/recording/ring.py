@@ -9,7 +9,6 @@ The file is its owner's alone: made anew (O_EXCL, O_NOFOLLOW), mode 0600, and re
 reader's user. Its writer holds a lock on it for its lifetime, across namespaces.
 """
 
-import fcntl
 import json
 import mmap
 import os
@@ -26,6 +25,7 @@ from numpy.typing import NDArray
 from ecu.contract.records import CYCLE, FRAME, LEARNED, OUTPUTS, RecordArray
 from ecu.errors import UserError
 from ecu.jit import kernel
+from ecu.recording.lock import lock
 
 SLOTS: Final = 2400  # 24 s of cycles
 FRAMES: Final = 131072  # 29 s of a classical bus at 45 frames per cycle
@@ -80,7 +80,7 @@ def living_rings() -> list[Path]:
         except OSError:  # another user's, or removed meanwhile
             continue
         try:
-            fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            lock(handle, shared=True)
             remove_ring(path)
         except BlockingIOError:
             rings += [path] if path.suffix == ".ring" else []
@@ -155,7 +155,7 @@ def create_ring(
     try:
         handle = os.open(unfinished, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o600)
         try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)  # the mapping keeps it
+            lock(handle)  # the mapping keeps it
             os.posix_fallocate(handle, 0, size)
             memory = mmap.mmap(handle, size, mmap.MAP_SHARED | mmap.MAP_POPULATE)
         finally:

@@ -9,7 +9,6 @@ Wear of the linings and emission of the brakes are also stored in rows of their 
 by the vehicle's name alone: they outlive a new version and a changed configuration.
 """
 
-import fcntl
 import math
 import sqlite3
 import time
@@ -25,6 +24,7 @@ from numpy.typing import NDArray
 
 from ecu.contract.records import DUST, LEARNED, N_MEASURED, WEAR, RecordArray
 from ecu.errors import UserError
+from ecu.recording.lock import lock
 
 FILE: Final = "learned.sqlite"
 DAMAGED: Final = (sqlite3.Error, ValueError, OverflowError, TypeError)
@@ -79,7 +79,7 @@ def open_store(folder: Path) -> sqlite3.Connection:
 def in_use(folder: Path) -> Iterator[None]:
     """Hold the store in `folder` against changes by hand while a daemon uses it."""
     with (folder / LOCK).open("a") as file:
-        fcntl.flock(file, fcntl.LOCK_SH)
+        lock(file.fileno(), shared=True, wait=True)
         yield
 
 
@@ -92,7 +92,7 @@ def alone(folder: Path) -> Iterator[None]:
     """
     try:
         with (folder / LOCK).open("a") as file:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock(file.fileno())
             yield
     except BlockingIOError:
         raise UserError(

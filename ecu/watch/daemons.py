@@ -4,13 +4,13 @@ Looking takes no lock that a starting daemon could meet and removes nothing: a r
 another name until its writer holds it.
 """
 
-import fcntl
 import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from ecu.errors import UserError
+from ecu.recording.lock import lock
 from ecu.recording.ring import RingReader, open_own, ring_folder
 
 
@@ -47,7 +47,7 @@ def is_held(path: Path) -> bool:
     except OSError:
         return False
     try:
-        fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        lock(handle, shared=True)
     except BlockingIOError:
         return True
     finally:
