@@ -322,6 +322,11 @@ MISTAKES: dict[str, tuple[str, str, str]] = {
         "rolling_radius: give a number",
     ),
     "missing key": (', signal = "p" }', " }", f"{PRESSURE}.signal: missing; add this key"),
+    "map of columns": (
+        ', signal = "p" }',
+        ', signal = "p", column = "p" }',
+        "inputs: maps columns of signal files; frames need messages",
+    ),
     "no TOML": ("[inputs]", "[inputs", "not valid TOML:"),
     "no database": ('"car.dbc"', '"cat.dbc"', "cat.dbc: no such file"),
 }
