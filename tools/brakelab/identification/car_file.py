@@ -10,20 +10,23 @@ Section = dict[str, tuple[str, str]]
 """Keys of a section, each with its value as TOML and a comment."""
 
 
-def _toml(value: Any) -> str:
+def toml_value(value: Any) -> str:
+    """Return a value as TOML writes it."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):
         return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
     if isinstance(value, list):
-        return f"[{', '.join(_toml(each) for each in value)}]"
+        return f"[{', '.join(toml_value(each) for each in value)}]"
     return repr(value)
 
 
 def _lines(path: str, own: dict[str, Any], sections: dict[str, Section]) -> list[str]:
     """Return the keys of table `path` that `own` has, then those fitted, then the tables within."""
     new = sections.get(path, {})
-    plain = [f"{key} = {_toml(v)}" for key, v in own.items() if not isinstance(v, dict) and key not in new]
+    plain = [
+        f"{key} = {toml_value(v)}" for key, v in own.items() if not isinstance(v, dict) and key not in new
+    ]
     plain += [f"{key} = {value}  # {comment}" for key, (value, comment) in new.items()]
     lines = ["", f"[{path}]", *plain] if plain and path else plain
     for key, value in own.items():
@@ -32,17 +35,18 @@ def _lines(path: str, own: dict[str, Any], sections: dict[str, Section]) -> list
     return lines
 
 
-def car_toml(config: Path, out: Path, head: str, sections: dict[str, Section]) -> str:
-    """Return a configuration that takes all but `sections` from `config`; `head` are its first lines.
+def split_include(config: Path) -> tuple[Path, dict[str, Any]]:
+    """Return the file that a new CONFIG includes in place of `config`, and the keys that it must repeat.
 
-    An included file includes no other: what `config` adds to one of its own is repeated.
+    An included file includes no other: `config` itself, or the one that it includes and its own keys.
     """
     own = read_toml(config)
-    source = config
-    if "include" in own:
-        source = config.parent / own.pop("include")
-    else:
-        own = {}
+    return (config.parent / str(own.pop("include")), own) if "include" in own else (config, {})
+
+
+def car_toml(config: Path, out: Path, head: str, sections: dict[str, Section]) -> str:
+    """Return a configuration that takes all but `sections` from `config`; `head` are its first lines."""
+    source, own = split_include(config)
     include = Path(os.path.relpath(source, out.parent)).as_posix()
     for name in sections:
         own.setdefault(name, {})

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from brakelab.identification.car_file import split_include, toml_value
 from brakelab.identification.vehicle_identify import Zeros
 from brakelab.identification.vehicle_parameters import ROUGH, Parameter
 from ecu.errors import UserError
 from ecu.settings.config import Config, validate_config
-from ecu.settings.toml_file import read_toml
 
 SECTIONS: Final = ("vehicle", "front", "rear", "sensors")
 SURE: Final = 2.0  # standard deviations: a zero that is one
@@ -22,9 +22,7 @@ def car_toml(
     start: Path, out: Path, parameters: Sequence[Parameter], config: Config, drives: Sequence[str]
 ) -> str:
     """Return CAR: START's content by an `include`, the fitted keys, and as comments what was not told."""
-    own = read_toml(start)
-    source = start.parent / str(own.pop("include")) if "include" in own else start
-    kept = own if source != start else {}
+    source, kept = split_include(start)
     include = os.path.relpath(source.resolve(), out.resolve().parent).replace("\\", "/")
     told = [one for one in parameters if not one.remedy]
     lines = [
@@ -68,17 +66,7 @@ def _laden(fitted: dict[str, Parameter], config: Config) -> list[str]:
 
 
 def _entries(values: dict[str, Any]) -> list[str]:
-    return [f"{name} = {_toml(value)}" for name, value in values.items()]
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
-    if isinstance(value, list):
-        return f"[{', '.join(map(_toml, value))}]"
-    return repr(value)
+    return [f"{name} = {toml_value(value)}" for name, value in values.items()]
 
 
 def write_car(
