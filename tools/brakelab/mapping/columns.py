@@ -10,10 +10,10 @@ import pyarrow.compute as pc
 from brakelab.logs.column_map import SECONDS, TIMES
 from brakelab.logs.log_quality import SignalQuality
 from brakelab.logs.signal_batches import Columns, columns_of, rows_of, time_of
+from brakelab.mapping.map_text import input_lines
 from brakelab.mapping.names import converts
 from brakelab.mapping.physics import RADIUS, Found
 from brakelab.mapping.series import FEWEST, Series, Vector
-from ecu.bus.units import spelled
 from ecu.errors import UserError
 
 FLAG: Final = {0.0, 1.0}
@@ -83,22 +83,8 @@ def column_map_text(
     if not converts(wheel.unit, "rad/s"):
         lines.append(f"rolling_radius = {RADIUS}  # m, assumed: give the one with which the logger works")
     lines += ["", "[inputs]"]
-    told = ""
-    for one in found:
-        if one.evidence != told:
-            lines.append(f"# {one.evidence}")
-            told = one.evidence
-        if one.warning:
-            lines.append(f"# CHECK: {one.warning}")
-        entry = f'column = "{one.series.signal}"'
-        if one.factor != 1.0:
-            entry += f", factor = {one.factor:.6g}"
-        if one.offset:
-            entry += f", offset = {one.offset:.6g}"
-        if one.unit != spelled(one.series.unit) or not one.series.unit.strip():
-            entry += f', unit = "{one.unit}"'
-        after = timeouts[one.target]
-        if after:
-            entry += f", timeout = {after:g}"
-        lines.append(f"{one.target} = {{ {entry} }}")
+    for before, one in zip([None, *found], found, strict=False):
+        source = f'column = "{one.series.signal}"'
+        unit_told = bool(one.series.unit.strip())
+        lines += input_lines(one, before, source, timeouts[one.target], unit_told)
     return "\n".join(lines) + "\n"

@@ -16,6 +16,7 @@ from brakelab.logs.formats import kind_of, read_frames
 from brakelab.logs.log_quality import SignalQuality
 from brakelab.mapping.columns import column_map_text, read_column_series
 from brakelab.mapping.drive_torque import motors
+from brakelab.mapping.map_text import input_lines
 from brakelab.mapping.names import converts, words
 from brakelab.mapping.physics import RADIUS, Found, motion_of, propose, wheel_speeds
 from brakelab.mapping.series import Series, read_series
@@ -24,7 +25,6 @@ from brakelab.replay.quality import Findings, damage_lines
 from brakelab.results.console import WIDTH
 from ecu.bus.database import load_database
 from ecu.bus.signal_map import load_signal_map
-from ecu.bus.units import spelled
 from ecu.contract.signals import INPUT, INPUT_SIGNALS, without_corner
 from ecu.errors import UserError
 from ecu.settings.config import load_config, new_params
@@ -153,10 +153,6 @@ def _show(found: list[Found], drives: bool) -> None:
         console.print("the car stands in this log: signs and scales could not be checked", highlight=False)
 
 
-def _number(value: float) -> str:
-    return f"{value:.6g}"
-
-
 def _counter(series: list[Series], message: str) -> str | None:
     """Return the signal that counts a message's frames, as the value of a map's key, None: there is none.
 
@@ -214,24 +210,9 @@ def map_text(
         if counter:
             lines.append(f"counter = {counter}")
     lines += ["", "[inputs]"]
-    told = ""
-    for one in found:
-        if one.evidence != told:
-            lines.append(f"# {one.evidence}")
-            told = one.evidence
-        if one.warning:
-            lines.append(f"# CHECK: {one.warning}")
-        entry = f'message = "{one.series.message}", signal = "{one.series.signal}"'
-        if one.factor != 1.0:
-            entry += f", factor = {_number(one.factor)}"
-        if one.offset:
-            entry += f", offset = {_number(one.offset)}"
-        if one.unit != spelled(one.series.unit):
-            entry += f', unit = "{one.unit}"'
-        after = timeout(one)
-        if after:
-            entry += f", timeout = {after:g}"
-        lines.append(f"{one.target} = {{ {entry} }}")
+    for before, one in zip([None, *found], found, strict=False):
+        source = f'message = "{one.series.message}", signal = "{one.series.signal}"'
+        lines += input_lines(one, before, source, timeout(one))
         if one.series.longest_gap > LONGEST:
             lines.append(
                 f"# {one.target}: no value for {one.series.longest_gap:.2f} s: look at the log there"

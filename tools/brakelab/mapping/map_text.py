@@ -1,0 +1,31 @@
+"""Text of an input in a proposed map, for frames and columns alike: evidence, scale, unit, time-out."""
+
+from brakelab.mapping.physics import Found
+from ecu.bus.units import spelled
+
+
+def input_lines(
+    one: Found, before: Found | None, source: str, after: float | None, unit_told: bool = True
+) -> list[str]:
+    """Return the lines of one input.
+
+    Args:
+        one: the signal found for it.
+        before: the one above it, whose evidence is not repeated.
+        source: keys that say where its values come from.
+        after: its time-out [s]; None or 0: the usual one.
+        unit_told: the map's reader knows the signal's own unit.
+    """
+    lines = [f"# {one.evidence}"] if before is None or one.evidence != before.evidence else []
+    if one.warning:
+        lines.append(f"# CHECK: {one.warning}")
+    entry = source
+    if one.factor != 1.0:
+        entry += f", factor = {one.factor:.6g}"
+    if one.offset:
+        entry += f", offset = {one.offset:.6g}"
+    if one.unit != spelled(one.series.unit) or not unit_told:
+        entry += f', unit = "{one.unit}"'
+    if after:
+        entry += f", timeout = {after:g}"
+    return [*lines, f"{one.target} = {{ {entry} }}"]
