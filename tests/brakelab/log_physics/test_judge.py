@@ -83,6 +83,7 @@ WRONG = [
     ("reference in km/h", times([PLACE["vehicle_speed"]], 3.6), "vehicle_speed: reads", 'unit = "km/h"'),
     ("pressures in MPa", times(PRESSURES, 0.1), "calliper_pressure_*: the car brakes", 'unit = "MPa"'),
     ("one pressure 25 % less", times(PRESSURES[:1], 0.75), "calliper_pressure_*: front left", "25 % less"),
+    ("pressures turned", times(PRESSURES, -0.1), "calliper_pressure_*: turned", "factor = -1"),
     ("pressures off by 8", times(PRESSURES, 1.0, 8.0), "calliper_pressure_*: reads +8 bar", "offset"),
 ]  # fmt: skip
 
@@ -118,6 +119,27 @@ def test_a_wrong_copy_without_a_reference_gives_the_same_line(right: Samples, ca
     (line,) = lines_of(wrong, SUV)
     assert line.startswith(begins)
     assert advises in line
+
+
+def test_two_witnesses_that_disagree_are_both_named(right: Samples) -> None:
+    wrong = right.copy()
+    wrong[:, [PLACE[name] for name in ("vehicle_speed", "accel_y", "steering_angle")]] = np.nan
+    wrong[:, ACCEL_X + YAW] *= (1.25, -1.0)
+    accel_x, yaw_rate = lines_of(wrong, SUV)
+    assert accel_x.startswith("accel_x: reads 1.2")
+    assert "or those of the wheels" in accel_x
+    assert yaw_rate.startswith("yaw_rate: turned")
+    assert "unless left and right" in yaw_rate
+
+
+@pytest.mark.parametrize(("factor", "told"), [(1.0, []), (1.25, ["accel_x: reads 1.2"])])
+def test_a_driven_axle_that_slips_hides_no_scale(right: Samples, factor: float, told: list[str]) -> None:
+    slipping = right.copy()
+    slipping[:, WHEELS[2:]] *= 1.0 + 0.15 * np.clip(np.nan_to_num(right[:, ACCEL_X]), 0.0, 1.0)
+    slipping[:, ACCEL_X] *= factor
+    slipping[:, PLACE["vehicle_speed"]] = np.nan
+    lines = lines_of(slipping, SUV)
+    assert [line.startswith(begins) for line, begins in zip(lines, told, strict=True)] == [True] * len(told)
 
 
 def test_a_turned_pressure_falls_out_of_its_range() -> None:

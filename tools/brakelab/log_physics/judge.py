@@ -12,6 +12,7 @@ A wrong input breaks every relation it stands in, so the one that explains most 
 the others are not. What a drive does not show is not judged: a scale wants a correlation of `CLEAN`.
 """
 
+from collections.abc import Iterable
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -80,7 +81,8 @@ def judge(drive: Drive, car: Car) -> Judged:
     if relations.swapped:
         lines.append("accel_x and accel_y are swapped: each follows what the other should; exchange them")
     else:
-        lines += _longitudinal(relations.accel_x, car)
+        alone = "vehicle_speed" not in drive and not _is_clean(relations.accel_y)
+        lines += _longitudinal(relations.accel_x, car, alone)
     lines += _lateral(relations, car)
     pressures, seen = pressure_lines(drive, car, speed / factor, rows)
     return Judged(lines + pressures, checked + seen)
@@ -126,15 +128,22 @@ def _wheels(wheels: Vector, rows: Rows, car: Car) -> tuple[list[str], Vector]:
 
 def _relate(drive: Drive, car: Car, wheels: Vector, rows: Rows) -> _Relations:
     speed = wheels.mean(axis=1)
-    change = np.gradient(speed, 1.0 / RATE)
 
     def line(name: str, reference: Vector, least: float, where: Rows = rows) -> Fit | None:
         if name not in drive or where.sum() < LEAST_ROWS or reference[where].std() < least:
             return None
         return fit(drive[name], reference, where)
 
-    accel_x = line("accel_x", change, LEAST_CHANGE)
-    across = line("accel_y", change, LEAST_CHANGE)
+    def cleanest(name: str, references: Iterable[Vector], least: float) -> Fit | None:
+        """Of all wheels and of each axle: one that slips or is pressed flat tells less."""
+        lines = (line(name, reference, least) for reference in references)
+        return max(filter(None, lines), key=lambda one: abs(one.correlation), default=None)
+
+    changes = [
+        np.gradient(wheels[:, axle].mean(axis=1), 1.0 / RATE) for axle in (slice(4), slice(2), slice(2, 4))
+    ]
+    accel_x = cleanest("accel_x", changes, LEAST_CHANGE)
+    across = cleanest("accel_y", changes, LEAST_CHANGE)
     swapped = bool(
         accel_x
         and across
@@ -142,8 +151,7 @@ def _relate(drive: Drive, car: Car, wheels: Vector, rows: Rows) -> _Relations:
         and abs(accel_x.correlation) < abs(across.correlation) - 0.3
     )
     turns = (wheels[:, 1] - wheels[:, 0]) / car.track, (wheels[:, 3] - wheels[:, 2]) / car.track
-    by_axle = [line("yaw_rate", turn, LEAST_TURN) for turn in (0.5 * (turns[0] + turns[1]), *turns)]
-    yaw_rate = max(filter(None, by_axle), key=lambda one: abs(one.correlation), default=None)
+    yaw_rate = cleanest("yaw_rate", (0.5 * (turns[0] + turns[1]), *turns), LEAST_TURN)
     if "yaw_rate" not in drive:
         return _Relations(accel_x, swapped, None, None, None)
     yaw = drive["yaw_rate"]
@@ -165,7 +173,7 @@ def _speed_scale(
     by_accel = [
         1.0 / abs(line.slope)
         for line in (relations.accel_x, relations.accel_y)
-        if line is not None and abs(line.correlation) > CLEAN and line.slope
+        if line is not None and _is_clean(line) and line.slope
     ]
     if "vehicle_speed" in drive:
         reference = drive["vehicle_speed"]
@@ -218,12 +226,15 @@ def _rescaled(relations: _Relations, factor: float) -> _Relations:
     )
 
 
-def _longitudinal(line: Fit | None, car: Car) -> list[str]:
+def _longitudinal(line: Fit | None, car: Car, alone: bool) -> list[str]:
+    """Judge accel_x; `alone`: nothing else tells whether it or the wheels' speed is off."""
     if line is None:
         return []
     if abs(line.correlation) < LOST:
         return [f"accel_x: does not follow dv/dt (correlation {line.correlation:.2f}); is it another signal?"]
     told = _sign_and_scale("accel_x", "dv/dt", line, car)
+    if told and alone and told[0].endswith("factor"):
+        return [f"{told[0]}, or those of the wheels and rolling_radius"]
     if told or abs(line.intercept) < LEAST_ZERO:
         return told
     zero = f"accel_x: reads {line.intercept:+.2f} m/s^2 at constant speed"
@@ -243,7 +254,8 @@ def _lateral(relations: _Relations, car: Car) -> list[str]:
     for_yaw = 1 + len(votes) - len(against)
     yaw_is_wrong = len(against) > for_yaw or (len(against) == for_yaw and "wheels" in against)
     if yaw_is_wrong:
-        lines.append("yaw_rate: turned against the wheels, or what else tells curves; factor = -1")
+        alone = ", unless left and right wheels are exchanged" if list(votes) == ["wheels"] else ""
+        lines.append(f"yaw_rate: turned against the wheels, or what else tells curves; factor = -1{alone}")
         against = [name for name in votes if name not in against]
     for name in against:
         if name == "wheels":
@@ -259,6 +271,11 @@ def _lateral(relations: _Relations, car: Car) -> list[str]:
         return [*lines, 'yaw_rate: reads some 57 times what the wheels turn; unit = "deg/s"']
     if wheels and abs(wheels.correlation) > CLEAN - 0.1 and abs(wheels.slope) < 2.0 / 57.3:
         return [*lines, 'yaw_rate: reads a 57th of what the wheels turn; unit = "rad/s"']
+    if relations.accel_y and abs(relations.accel_y.correlation) > SIGNED:
+        for slope, unit in ((np.pi / 180.0, "deg/s"), (180.0 / np.pi, "rad/s")):
+            if not _beyond(abs(relations.accel_y.slope) / slope, UNIT):
+                told = f"yaw_rate: reads {_times(1.0 / abs(relations.accel_y.slope))} what accel_y says"
+                return [*lines, f'{told}; unit = "{unit}"']
     if relations.accel_y and not any(line.startswith("accel_y") for line in lines):
         if _yaw_explains(relations, car):
             factor = 1.0 / abs(relations.accel_y.slope)
@@ -303,6 +320,10 @@ def _unit_of(target: str, wanted: float) -> str:
             if scale != 1.0 and 1.0 / UNIT < wanted / factor < UNIT and _beyond(wanted, 1.8):
                 return f'; unit = "{name}"'
     return "; check unit and factor"
+
+
+def _is_clean(line: Fit | None) -> bool:
+    return line is not None and abs(line.correlation) > CLEAN
 
 
 def _beyond(ratio: float, tolerated: float) -> bool:

@@ -20,6 +20,7 @@ FRICTION: Final = 2.5  # by which friction and mass together may be off
 SIDES: Final = 0.2  # by which the sides of an axle may differ
 LEAST_BAR: Final = 3.0  # on the mean, from which sides are compared
 REST: Final = 5.0  # bar, that a released brake may read
+TURNED: Final = 0.6  # correlation with the deceleration
 OVERRUN: Final = 0.3  # m/s^2, drag and engine
 
 
@@ -48,6 +49,8 @@ def pressure_lines(drive: Drive, car: Car, speed: Vector, rows: Rows) -> tuple[l
     if pressed.sum() < LEAST_ROWS:
         return [], []
     line = fit(total, np.maximum(-change, 0.0), rows)
+    if line.correlation < -TURNED:
+        return ["calliper_pressure_*: turned: falls as the car brakes; factor = -1"], ["calliper_pressure"]
     if line.correlation < 0.2:
         told = f"calliper_pressure_*: does not follow the deceleration (correlation {line.correlation:.2f})"
         return [f"{told}; is it another signal?"], ["calliper_pressure"]
