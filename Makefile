@@ -13,7 +13,7 @@ help:
 	@echo "make mutants   one change at a time in what brakes: which one do the tests not notice? a few minutes"
 	@echo "make fuzz      damaged files by the thousand"
 	@echo "make soak      24 h in virtual time; ARGS='live --hours 1': in real time"
-	@echo "make screenshot  the picture of the README, by demo and chromium"
+	@echo "make screenshot  the pictures of the README and of the first steps, with chromium"
 	@echo "make clean   remove .venv, results and caches"
 	@echo "The first call installs what it needs into .venv. PYTHON=/path/to/python3.12 chooses a Python;"
 	@echo "ARGS=... goes to the command: make test ARGS=tests/ecu, make demo ARGS='--out out/first'."
@@ -51,6 +51,7 @@ screenshot: .venv/lab
 	$$(command -v chromium || command -v chromium-browser) --headless --no-sandbox --disable-gpu --hide-scrollbars \
 		--virtual-time-budget=10000 --window-size=1000,1200 --screenshot=docs/images/report.png \
 		"file://$(CURDIR)/out/screenshot/report.html"
+	.venv/bin/python tools/first_steps.py
 
 clean:
 	rm -rf .venv out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis
