@@ -7,7 +7,7 @@ import pytest
 
 from brakelab.report.brakings import Braking
 from brakelab.report.drive import Drive
-from brakelab.report.sparkline import HEIGHT, POINTS, sparklines
+from brakelab.report.sparkline import DRIVE_POINTS, HEIGHT, POINTS, drive_sparkline, sparklines
 
 from .conftest import braking_between
 
@@ -37,6 +37,16 @@ def test_equal_decelerations_have_equal_heights(two_brakings: tuple[Drive, list[
         np.testing.assert_allclose(heights(svg, name), 0.5 * (top + base), atol=0.4)
     assert len(heights(first, "achieved")) == POINTS
     assert len(first) < 1500
+
+
+def test_a_whole_drive_has_both_brakings(two_brakings: tuple[Drive, list[Braking]]) -> None:
+    demanded = heights(drive_sparkline(two_brakings[0]), "demanded")
+    assert len(demanded) == DRIVE_POINTS
+    at = np.linspace(0.0, 30.0, DRIVE_POINTS)
+    top, base = 2.0, HEIGHT - 2.0
+    for t, height in ((1.0, base), (5.0, 0.5 * (top + base)), (10.0, base), (15.0, top), (25.0, base)):
+        assert demanded[np.searchsorted(at, t)] == pytest.approx(height, abs=0.1)
+    assert drive_sparkline(Drive(T, {}, {})) == ""
 
 
 def test_what_is_not_known_is_not_drawn(two_brakings: tuple[Drive, list[Braking]]) -> None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from brakelab.report.accuracy import accuracy_per_axle, achieved_deceleration, evaluated
 from brakelab.report.brakings import brakings
 from brakelab.report.drive import Drive, Vector, onto, read_drive, start_ns
+from brakelab.report.sparkline import drive_sparkline
 from brakelab.report.timing import Spread, read_timing, spread
 from brakelab.rig.reaction import Reaction, reactions, unexplained
 from brakelab.rig.results import Frames, Written
@@ -46,6 +47,8 @@ class Outcome(NamedTuple):
     missed: int
     lateness: Spread
     """µs"""
+    curve: str
+    """Demanded and achieved deceleration as SVG."""
     folder: Path
 
 
@@ -116,5 +119,6 @@ def outcome(
         cycles=len(drive.t),
         missed=sum(timing.missed for timing in timings),
         lateness=spread(lateness),
+        curve=drive_sparkline(drive),
         folder=written.result.parent,
     )

@@ -3,7 +3,9 @@
 import math
 from importlib.resources import files
 from pathlib import Path
+from typing import NamedTuple
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 from jinja2 import Environment, StrictUndefined
@@ -73,6 +75,37 @@ def write_tables(outcomes: list[Outcome], out: Path) -> None:
         pq.write_table(pa.Table.from_pylist(injected), out / "faults.parquet")
 
 
+class Tile(NamedTuple):
+    """A figure of all scenarios."""
+
+    name: str
+    value: str
+    unit: str
+    note: str
+    warns: bool
+
+
+def _tiles(outcomes: list[Outcome], live: bool) -> list[Tile]:
+    disturbed = sum(bool(one.reactions) for one in outcomes)
+    tiles = [Tile("Scenarios", str(len(outcomes)), "", f"{disturbed} with injected faults", False)]
+    worst = max(outcomes, key=lambda one: np.nan_to_num(one.decel_error, nan=-1.0))
+    if not math.isnan(worst.decel_error):
+        note = f"largest in settled braking: {worst.scenario}"
+        tiles.append(Tile("Deceleration error", fixed(worst.decel_error, 2), "m/s²", note, False))
+    longest = max(outcomes, key=lambda one: np.nan_to_num(more_distance(one), nan=-1.0))
+    if not math.isnan(more_distance(longest)):
+        more = signed_percent(more_distance(longest), 1)
+        tiles.append(Tile("Stopping distance", more, "%", f"longest by faults: {longest.scenario}", False))
+    count = sum(len(one.unexplained) for one in outcomes)
+    note = "by no injected fault"
+    tiles.append(Tile("Unexplained faults", str(count), "", note, count > 0))
+    if live:
+        missed = sum(one.missed for one in outcomes)
+        note = f"of {sum(one.cycles for one in outcomes)}"
+        tiles.append(Tile("Missed periods", str(missed), "", note, missed > 0))
+    return tiles
+
+
 def write_page(outcomes: list[Outcome], bus: Bus | None, config: Config, seed: int) -> str:
     """Return the page; it needs no other file but links to the reports beside it."""
     page = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
@@ -81,6 +114,7 @@ def write_page(outcomes: list[Outcome], bus: Bus | None, config: Config, seed: i
     return page.from_string(source).render(
         css=(files("brakelab.report") / "page.css").read_text("utf-8"),
         outcomes=outcomes,
+        tiles=_tiles(outcomes, bus is not None),
         more_distance=more_distance,
         bits_text=bits_text,
         live=bus is not None,
