@@ -1,4 +1,4 @@
-"""Run the pages of first steps as a newcomer would: seconds a command, and pictures of what they end with.
+"""Run the pages of first steps as a newcomer would: seconds a command, and pictures of the result.
 
     python tools/first_steps.py [FOLDER]
 
@@ -23,7 +23,7 @@ ENDS_WITH: Final = {
     "first-steps-hil": ("rack/rig/rig.html", 700),
     "first-steps-law": ("law/result.html", 1250),
 }
-"""What a reader has in the end, and how much of it is shown [pixels]."""
+"""Page in the end, and how much of it is shown [pixels]."""
 ABOUT_THIS_MACHINE: Final = {"doctor"}
 """Commands whose exit code is about the machine."""
 
@@ -32,7 +32,7 @@ class Block(NamedTuple):
     """A block of a page."""
 
     kind: str
-    """`sh`: commands; `text`: what they print."""
+    """`sh`: commands; `text`: their output."""
     text: str
 
 

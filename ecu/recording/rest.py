@@ -1,4 +1,4 @@
-"""What a rest of known length leaves of the heat in the discs.
+"""Disc temperatures after a rest of known length.
 
 The store knows when it was last written, which is after the last braking. Heat decays by delta_0 at least;
 half of it is assumed, since a warm garage is not in the model. A clock that was set back, or not yet set,

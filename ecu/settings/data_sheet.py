@@ -1,4 +1,4 @@
-"""What `config new` asks for: figures of a data sheet, with their units and what is possible.
+"""Questions of `config new`: figures of a data sheet with their units and limits.
 
 Lengths are asked in mm and masses in kg, as data sheets have them; an answer may bring its own unit. What a
 data sheet does not have (tyre stiffness, inertias, sensors) is taken from the nearest shipped car.
@@ -171,7 +171,7 @@ def needed(answers: Answers) -> list[Question]:
 
 
 def default(key: str, answers: Answers, like: Config) -> str | float | None:
-    """Return what stands in for an answer, in the unit asked for, from the car `like`; None: nothing."""
+    """Return the default of an answer, in the unit asked for, from the car `like`; None: there is none."""
     section, _, name = key.rpartition(".")
     car = like.vehicle
     scale = float(answers.get("vehicle.wheelbase", 1000.0 * car.wheelbase)) / (1000.0 * car.wheelbase)

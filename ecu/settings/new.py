@@ -1,4 +1,4 @@
-"""`brake-ecu config new`: a CONFIG file from what is on a car's data sheet, every line with its origin.
+"""`brake-ecu config new`: a CONFIG file from a car's data sheet, every line with its origin.
 
 Derived by statics and geometry:
 
@@ -26,7 +26,7 @@ from ecu.settings.sections import Axle, Control, Sensors, Vehicle
 from ecu.settings.toml_file import Section, describe, unit_of
 
 CARS: Final = ("suv", "sedan", "lcv")
-"""Shipped cars of a data sheet; the nearest stands in for what is not given."""
+"""Shipped cars of a data sheet; the nearest gives the figures that the user leaves out."""
 MOTOR_SHARE: Final = 0.7
 """Of the brake torque, where motors brake (thesis, section 5.7.2)."""
 ASSUMED: Final = "assumed"

@@ -1,4 +1,4 @@
-"""What a watcher remembers of a run: rows to look at, events, lateness, and whole cycles to keep.
+"""Memory of a watcher: rows to look at, events, lateness, and whole cycles to keep.
 
 A row is the state after every `EVERY`th cycle; its lateness is the worst of the cycles since the row before.
 """
@@ -19,7 +19,7 @@ from ecu.recording.ring import Batch, RingReader
 EVERY: Final = 4  # cycles: 25 rows a second
 SHOWN_S: Final = 60.0
 REMEMBERED_S: Final = 120.0
-"""Of rows: what is shown, and as much before it to scroll back to."""
+"""Of rows: those shown, and as many before them to scroll back to."""
 KEPT_S: Final = 300.0
 """Of whole cycles with their frames: 27 MB, and up to 110 MB of frames on a saturated bus."""
 EVENTS: Final = 200

@@ -44,7 +44,7 @@ class Shared:
         self._ring = ring
 
     def turn(self) -> None:
-        """Count what is new."""
+        """Count the new cycles."""
         with self.lock:
             if self.tally is None:
                 if not self._ring.exists():

@@ -48,7 +48,7 @@ class Tally:
             pass
 
     def follow(self) -> None:
-        """Count what is new in the ring."""
+        """Count the new cycles of the ring."""
         while len((batch := self.reader.read(2400)).records):
             self._add(batch)
 

@@ -28,7 +28,7 @@ END: Final = (b"\x1b[F", b"\x1bOF", b"\x1b[4~", b"e")
 
 
 class Screen:
-    """What the user looks at: a place in the history, held or moving along."""
+    """Place in the history that the user looks at, held or moving along."""
 
     def __init__(self, watcher: Watcher, folder: Path) -> None:
         self.watcher, self.folder = watcher, folder

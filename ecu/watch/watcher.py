@@ -30,12 +30,12 @@ class Watcher:
         self.source: RingReader | None = None
         """Of the cycles in `history`, also after the end of the run."""
         self.trouble = NONE_RUNS
-        """What the user should know beside the rows, empty while cycles come."""
+        """State of the connection in words, empty while cycles come."""
         self._wanted, self._now_s = wanted, now_s
         self._looked_s = self._seen_s = -LOOK_S
 
     def turn(self) -> int:
-        """Read what is new, or look for a daemon; return the number of new cycles.
+        """Read new cycles, or look for a daemon; return their number.
 
         Raises:
             UserError: several daemons run, and none is named.

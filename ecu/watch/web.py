@@ -25,7 +25,7 @@ from ecu.watch.serve import Handler, Server
 from ecu.watch.watcher import PERIOD_S, Watcher
 
 QUIET_S: Final = 1.0
-"""Without rows a viewer still hears that often what is going on."""
+"""Interval at which a viewer gets the state when there are no rows."""
 
 
 class Shared:
@@ -37,13 +37,13 @@ class Shared:
         self._keeping = threading.Lock()
 
     def turn(self) -> None:
-        """Read what is new; wake the viewers. Raises UserError: see `Watcher.turn`."""
+        """Read new cycles; wake the viewers. Raises UserError: see `Watcher.turn`."""
         with self.changed:
             if self.watcher.turn():
                 self.changed.notify_all()
 
     def news(self, seen: int) -> tuple[int, dict[str, Any]]:
-        """Return what came after the first `seen` rows, and how many there are now; waits for some."""
+        """Return the rows after the first `seen`, and their number by now; waits for some."""
         with self.changed:
             history = self.watcher.history
             self.changed.wait_for(lambda: history.added != seen, QUIET_S)

@@ -1,4 +1,4 @@
-"""Python interface: read a log, replay it, simulate a scenario; what comes back are columns with units.
+"""Python interface: read a log, replay it, simulate a scenario; results are columns with units.
 
     from brakelab.api import load, replay, simulate
 
@@ -54,11 +54,11 @@ class Drive(Table):
     def __init__(self, table: Table, notes: list[str]) -> None:
         super().__init__(table.columns, table.units)
         self.notes = notes
-        """On the log: what is damaged or missing, one line each."""
+        """Findings on the log: damage and gaps, one line each."""
 
 
 class Result(Table):
-    """What the ECU made of a drive: its outputs every 10 ms, `t` [s]."""
+    """Result of a replay: outputs of the ECU every 10 ms, `t` [s]."""
 
     def __init__(self, path: Path, notes: list[str], folder: TemporaryDirectory[str] | None) -> None:
         rows, brakes = read_result(path), read_result(brakes_path(path))
@@ -84,7 +84,7 @@ class Result(Table):
 
 
 class Simulation:
-    """A simulated drive: its log, what its sensors say, what is true."""
+    """A simulated drive: its log, sensor signals and true values."""
 
     def __init__(self, out: Path, folder: TemporaryDirectory[str] | None) -> None:
         self._folder = folder
@@ -95,7 +95,7 @@ class Simulation:
         units = INPUT_UNITS | {"t": "s"}
         inputs, truth = (read_result(path).columns for path in (self.inputs_path, self.truth_path))
         self.inputs = Table(inputs, {name: units.get(name, "") for name in inputs})
-        """What its sensors say, every 10 ms; NaN: no new sample."""
+        """Sensor signals, every 10 ms; NaN: no new sample."""
         self.truth = Table(truth, {name: _truth_unit(name) for name in truth})
         """True values, every 10 ms."""
 

@@ -36,7 +36,7 @@ TEXT: Final = (
 
 
 class Entered(NamedTuple):
-    """What the command line says about entries."""
+    """Options of the command line about entries."""
 
     observers: Sequence[str] = ()
     """As `load_class` takes them."""

@@ -1,4 +1,4 @@
-"""What an entry hears in one cycle: the samples that arrived, by the names of the contract."""
+"""Inputs of an entry in one cycle: the samples that arrived, by the names of the contract."""
 
 from difflib import get_close_matches
 from typing import Any, Final

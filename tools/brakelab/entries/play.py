@@ -15,7 +15,7 @@ from ecu.settings.config import Config
 
 
 class Known(NamedTuple):
-    """What an entry knows beyond friction; NaN: it does not say."""
+    """Further estimates of an entry beside friction; NaN: it gives none."""
 
     mass: float = float("nan")
     overrun: float = float("nan")

@@ -1,4 +1,4 @@
-"""How far the friction of an entry is from the truth, and what it would have predicted."""
+"""Error of an entry's friction against the truth, and of its predictions."""
 
 from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
@@ -106,7 +106,7 @@ def class_of(name: str) -> type[Observer]:
 
 
 def judge_all(names: Sequence[str], car: CarTracks) -> CarScores:
-    """Return what each entry reaches with a car, or how it failed."""
+    """Return the errors of each entry with a car, or how it failed."""
     scores: CarScores = {}
     for name in names:
         try:
@@ -117,7 +117,7 @@ def judge_all(names: Sequence[str], car: CarTracks) -> CarScores:
 
 
 def judge_car(names: Sequence[str], seed: int) -> CarScores:
-    """Drive the car `seed` once and return what each entry makes of what it hears."""
+    """Drive the car `seed` once and return the estimates of each entry."""
     return judge_all(names, car_tracks(seed))
 
 

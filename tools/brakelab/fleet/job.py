@@ -30,7 +30,7 @@ class Job:
     rows: str
     """File of the rows, on a disk that client and workers share; empty: none."""
     pads: str = ""
-    """What was done to the pads before the drive, see `brakelab.fleet.manifest`."""
+    """Work on the pads before the drive, see `brakelab.fleet.manifest`."""
 
 
 class Outcome(NamedTuple):

@@ -62,7 +62,7 @@ class Due(NamedTuple):
 
 
 def register_pads(learned: RecordArray, config: Config, text: str, where: str) -> None:
-    """Write what was done to the pads before a drive into `learned`, LEARNED of shape (1,).
+    """Write the work on the pads before a drive into `learned`, LEARNED of shape (1,).
 
     Raises:
         UserError: a measured lining is thicker than before.

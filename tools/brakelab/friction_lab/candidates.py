@@ -70,7 +70,7 @@ class Candidate(NamedTuple):
     extrapolates: str = ""
     """Where the law must not be used beyond the data, and why."""
     bounded: bool = False
-    """Beyond the data it stays what it is at their edge."""
+    """Beyond the data it keeps its value at their edge."""
 
     def values(self, shares: Sequence[float] | Vector) -> list[float]:
         """Return the numbers at these shares."""

@@ -22,7 +22,7 @@ Places = NDArray[np.int64]
 
 LEAST_SAMPLES = 100
 PLACES = {".csv": ("line", 2), ".txt": ("line", 2), ".parquet": ("row", 1), ".mf4": ("sample", 1)}
-"""What a row of each ending is called, and the number of the first."""
+"""Name of a row for each file ending, and the number of the first."""
 
 
 class Read(NamedTuple):

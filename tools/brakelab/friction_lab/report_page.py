@@ -22,7 +22,7 @@ from brakelab.results.text_table import Table
 Vector = NDArray[np.float64]
 
 WORD: Final = re.compile("[a-z]{3}")
-"""What makes a column one of words, set from the left."""
+"""Mark of a column of words, which is set from the left."""
 MOST: Final = 1500  # points of a chart
 PARTS: Final = 12  # of a running mean
 STYLE: Final = (

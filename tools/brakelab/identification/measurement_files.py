@@ -92,7 +92,7 @@ def _channels(path: Path, names: tuple[str, ...], what: str) -> dict[str, Array]
 
 
 def refuse_nested(config: Path) -> None:
-    """Refuse a CONFIG that includes another: what is written would include it, and may not.
+    """Refuse a CONFIG that includes another: the written file would include it, and may not.
 
     Raises:
         UserError: it does.

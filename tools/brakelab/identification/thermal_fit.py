@@ -93,14 +93,14 @@ def cooling_of(start: Cooling, x: Array) -> Cooling:
 
 
 class _Weights(NamedTuple):
-    """What a residual counts by: a row's share by outlierness, and the standard deviation [K] of all."""
+    """Weights of the residuals: of each row by its outlierness, and the standard deviation [K] of all."""
 
     rows: list[Array]
     noise: float
 
 
 def _shown(disc: Disc, cooling: Cooling, lag: float) -> tuple[Array, Array, Array]:
-    """Return what the sensor shows of the air, per xi and per starting excess, shapes (n,)."""
+    """Return the sensor's response to the air, per xi and per starting excess, shapes (n,)."""
     course = disc.course
     heat, decay = respond(cooling.rate(course.speed, course.wet), course.power[:, disc.corner])
     return lagged(course.air, lag), lagged(heat, lag), lagged(decay, lag)

@@ -74,7 +74,7 @@ def respond(rate: Array, power: Array) -> tuple[Array, Array]:
 
 
 def lagged(values: Array, lag: float) -> Array:
-    """Return what a sensor of time constant `lag` [s] shows of `values`, shape (n,), settled at the first."""
+    """Return the reading of a sensor of time constant `lag` [s], settled at the first value, shape (n,)."""
     stays = float(np.exp(-ROW / lag))
     shown, _ = lfilter([1.0 - stays], [1.0, -stays], values, zi=[stays * values[0]])
     return np.asarray(shown)

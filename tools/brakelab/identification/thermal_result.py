@@ -1,4 +1,4 @@
-"""What a fit is worth: predicted temperature with its band beside the measured one, and keys for a CONFIG."""
+"""Quality of a thermal fit: predicted beside measured temperature, with band; and keys for a CONFIG."""
 
 from typing import Final, NamedTuple
 
@@ -60,7 +60,7 @@ class Errors(NamedTuple):
 
 
 class Told(NamedTuple):
-    """One disc in one log beside what was measured; shapes (n,)."""
+    """One disc in one log, predicted and measured; shapes (n,)."""
 
     predicted: Array
     """By the fit from the fitted start, as the sensor shows it [degC]."""
@@ -84,7 +84,7 @@ def values_of(heating: float, cooling: Cooling) -> tuple[float, ...]:
 
 
 def errors_of(fit: Fit, axle: Axle) -> Errors:
-    """Return the errors of a fit, widened by what one drive cannot know; without data those configured."""
+    """Return the errors of a fit, widened by the spread between drives; without data those configured."""
     heating = float(np.hypot(fit.stated[0], HEAT_CAPACITY)) if fit.told[HEATING] else axle.sigma_disc_heating
     cooling, wet = axle.sigma_disc_cooling, axle.sigma_disc_cooling_wet
     if fit.told[[STILL, BY_SPEED]].any():
@@ -112,7 +112,7 @@ def predict(
 
 
 def judge(disc: Disc, friction: Array, fit: Fit, number: int, errors: Errors, before: Fit) -> Told:
-    """Return the fit of disc `number` beside what was measured; `before` is that of the configuration."""
+    """Return the fit of disc `number` beside the measurement; `before` is that of the configuration."""
     seen = disc.seen
     measured = disc.course.measured[seen, disc.corner]
 

@@ -82,7 +82,7 @@ class ColumnUse(NamedTuple):
 
 
 class FileUse(NamedTuple):
-    """What is read of a file."""
+    """Columns read of a file."""
 
     time: str
     """Column of time."""
@@ -120,7 +120,7 @@ def read_column_map(path: Path) -> MappedFile:
 def resolve(
     mapped: MappedFile, log: Path, names: Sequence[str], units: Mapping[str, str], titles: Mapping[str, str]
 ) -> FileUse:
-    """Return what of a file is read.
+    """Return the columns that are read of a file.
 
     Args:
         mapped: the map.

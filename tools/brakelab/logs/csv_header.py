@@ -24,13 +24,13 @@ Row = list[str]
 
 
 class CsvHeader(NamedTuple):
-    """Where the numbers of a file begin, and what its columns are."""
+    """Line at which the numbers of a file begin, and its columns."""
 
     names: list[str]
     units: list[str]
     """Of each column as the file spells it, empty: it does not say."""
     titles: list[str]
-    """What stands above each column, unit and all."""
+    """Heading of each column with its unit."""
     delimiter: str
     lines: int
     """Lines before the first row of numbers."""

@@ -24,7 +24,7 @@ _NO_SAMPLE: Final = ["", "null", "NULL", "NA"]
 
 
 def csv_columns(path: Path) -> tuple[list[str], str]:
-    """Return the names in the first line, and what stands between them.
+    """Return the names in the first line, and their separator.
 
     Raises:
         UserError: the first line has no names, or the file cannot be opened.

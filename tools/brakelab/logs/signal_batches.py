@@ -52,7 +52,7 @@ class Columns(NamedTuple):
     units: dict[str, str]
     """As the file spells them, by name."""
     titles: dict[str, str]
-    """Names by what stands above the column."""
+    """Names by the heading of the column."""
     header: CsvHeader | None
     """Of a CSV file."""
 
@@ -79,7 +79,7 @@ def columns_of(path: Path) -> Columns:
 
 
 def mapped_batches(path: Path, quality: SignalQuality, mapped: MappedFile) -> tuple[FileUse, Iterator[Batch]]:
-    """Return what a map takes of a file, and its rows. Raises UserError for a map that does not fit it."""
+    """Return the mapped columns of a file, and its rows. Raises UserError for a map that does not fit it."""
     columns = columns_of(path)
     if _is_mdf(path):
         if mapped.content.time is not None:
@@ -133,7 +133,7 @@ def _numbered(batches: Iterator[pa.RecordBatch]) -> Iterator[Batch]:
 
 
 def _names_only(names: list[str]) -> Batch:
-    """Return no row of these columns: what is not known is listed, not read."""
+    """Return no row of these columns: unknown ones are listed, not read."""
     rows = pa.RecordBatch.from_arrays([pa.array([], pa.null())] * len(names), names=names)
     return Batch(rows, np.empty(0, np.int64))
 

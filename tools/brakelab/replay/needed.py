@@ -55,7 +55,7 @@ HELPFUL: Final = (
     (Group("yaw_rate", (YAW_RATE,)), "yaw rate by lateral acceleration and speed"),
     (Group("steering_angle", (STEERING_ANGLE,)), "cornering forces of the front axle are not told apart"),
 )
-"""Inputs that a car may lack, and what is known less well without them."""
+"""Inputs that a car may lack, and the estimates that suffer without them."""
 NO_PRESSURE: Final = (
     "no calliper pressure, so nothing about friction can be told; map the pressures, or a brake torque "
     "in their place (docs/signal-maps.md)"

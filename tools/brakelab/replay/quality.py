@@ -57,7 +57,7 @@ class Findings:
     mapped: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(N_INPUTS, np.bool_))
     """Where the log can hold an input, shape (N_INPUTS,)."""
     physics: Judged = field(default_factory=lambda: Judged([], []))
-    """What the motion of the car says of its inputs."""
+    """Findings of the physics check about the inputs."""
     dropped: int = 0
     """Frames that the kernel dropped in a recorded run."""
     seconds: float = 0.0

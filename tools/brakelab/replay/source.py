@@ -24,7 +24,7 @@ class Source(NamedTuple):
     database_hash: str
     """SHA-256 of the database, with a map of both; of a map of columns."""
     columns: MappedFile | None = None
-    """What a signal file has, None: the contract's names and units."""
+    """Columns of a signal file, None: the contract's names and units."""
 
 
 def load_source(map: Path | None) -> Source:

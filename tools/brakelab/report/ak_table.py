@@ -130,7 +130,7 @@ def _class(limits: tuple[float, ...], place: int) -> str:
 
 
 def fade(axle: str, rows: list[Observed]) -> str:
-    """Return what the drive shows of fade and recovery of an axle, or why it shows none."""
+    """Return fade and recovery of an axle in the drive, or why it shows none."""
     known = [row for row in rows if np.isfinite(row.temperature)]
     if not known:
         return f"Fade {axle}: no disc temperature at the start of a braking is known."

@@ -1,4 +1,4 @@
-"""The report's section on the brakes: torque, distribution, response, work, what a drive does not tell."""
+"""The report's section on the brakes: torque, distribution, response, work, and the gaps of a drive."""
 
 import math
 from pathlib import Path
@@ -24,7 +24,7 @@ _AGAIN = "the result does not state its car: write it again with brake-ecu repla
 
 
 class Section(NamedTuple):
-    """What the template shows."""
+    """Content of the template."""
 
     conditions: list[Conditions]
     fades: list[str]
@@ -119,7 +119,7 @@ def _of_plots(
 
 
 def _of_drive(drive: Drive) -> list[Untold]:
-    """Return what the plots over the drive leave out."""
+    """Return the reasons for plots over the drive that are left out."""
     found = []
     if not any(drive.has(f"slip_{corner}") for corner in CORNERS):
         reason = "no slip is in this result: no wheel speed came in, or the car never rolled."

@@ -55,7 +55,7 @@ class Braking(NamedTuple):
     achieved: float
     """(v_in - v_end) / duration."""
     predicted: float
-    """Of `achieved`, from pressures and what was known before this application."""
+    """Of `achieved`, from pressures and the friction known before this application."""
     friction: Vector
     """Friction known after the application, per corner, shape (4,): the next one is predicted with it."""
     friction_sigma: Vector

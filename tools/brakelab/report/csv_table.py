@@ -29,7 +29,7 @@ HEAD = (
 
 
 def csv_of(found: Sequence[Braking], rows: Sequence[Response]) -> str:
-    """Return the brake applications as text; what is not known is empty."""
+    """Return the brake applications as text; unknown values are empty."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\r\n")
     writer.writerow(HEAD)

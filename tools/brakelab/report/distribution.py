@@ -63,7 +63,7 @@ def plots_of_distribution(
 
 
 def forces_of(drive: Drive, car: Car) -> Forces:
-    """Return the brake forces of the axles over the weight; what motors drive counts against them."""
+    """Return the brake forces of the axles over the weight; driving motors count against them."""
     torque = drive.corners("brake_torque") + np.nan_to_num(drive.corners("motor_torque"))
     weight = car.mass * GRAVITY
     return Forces(

@@ -76,7 +76,7 @@ def plots_over_time(drive: Drive, truth: Drive | None, found: list[Braking]) -> 
 
 
 def _coarse(grid: Buckets) -> Buckets:
-    """Return half the buckets: neighbours joined, for what needs no two points per pixel."""
+    """Return half the buckets: neighbours joined, for curves that need no two points per pixel."""
     last = grid.last[1::2]
     if len(grid.first) % 2:
         last = np.append(last, grid.last[-1])

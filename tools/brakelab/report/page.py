@@ -20,7 +20,7 @@ _NONE = "–"
 
 
 class Tile(NamedTuple):
-    """One figure of the summary; `warns` marks what needs attention."""
+    """One figure of the summary; `warns`: it needs attention."""
 
     title: str
     value: str

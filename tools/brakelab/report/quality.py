@@ -12,7 +12,7 @@ from ecu.errors import UserError
 
 PERIOD: Final = 0.01  # s, one row
 RATE_OFF: Final = 0.1
-"""Share by which a rate may miss what is expected before it is marked."""
+"""Share by which a rate may miss the expected one before it is marked."""
 LONG: Final = 60_000
 """Rows from which on a replay's speed is not that of its start."""
 _DAMAGE: Final = {
@@ -27,7 +27,7 @@ _MESSAGE: Final = ("checksum_errors", "sequence_errors", "repeated", "length_err
 
 
 class Cell(NamedTuple):
-    """A place of a table; `warns` marks what needs attention."""
+    """A place of a table; `warns`: it needs attention."""
 
     text: str
     warns: bool = False

@@ -27,7 +27,7 @@ _DASHES: Final = ("solid", "dashed", "dotdash")
 
 
 class Classes(NamedTuple):
-    """What is drawn over, and the classes that have a colour each."""
+    """Abscissa, and the classes that have a colour each."""
 
     stem: str
     label: str

@@ -1,4 +1,4 @@
-"""What each brake application wore and emitted, from `RESULT.brakes.parquet` and the rows after it."""
+"""Wear and emission of each brake application, from `RESULT.brakes.parquet` and the rows after it."""
 
 from pathlib import Path
 from typing import Final, NamedTuple

@@ -1,4 +1,4 @@
-"""The report's section on wear and dust: its tables, from what the ECU counted in the drive and for life."""
+"""The report's section on wear and dust: its tables, from the ECU's counts in the drive and for life."""
 
 import math
 from pathlib import Path
@@ -34,7 +34,7 @@ class Amount(NamedTuple):
 
 
 class Section(NamedTuple):
-    """What the template shows."""
+    """Content of the template."""
 
     pads: list[PadState]
     thickness: list[str]

@@ -1,4 +1,4 @@
-"""What a result cannot tell of wear and dust, and why: one sentence each, instead of an empty plot."""
+"""Gaps of a result on wear and dust with their reasons: one sentence each, instead of an empty plot."""
 
 from typing import NamedTuple
 
@@ -26,7 +26,7 @@ def untold(
     pads: list[PadState],
     applications: list[Application],
 ) -> list[Untold]:
-    """Return what cannot be told of this drive; the first alone where it holds for everything."""
+    """Return the gaps of this drive; the first alone where it holds for everything."""
     columns = [f"pad_wear_{corner}" for corner in CORNERS]
     if not drive.has("vehicle_speed"):
         return [Untold("Wear and dust", "no wheel speed came in this drive: neither way nor work is known.")]

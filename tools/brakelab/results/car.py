@@ -1,4 +1,4 @@
-"""What a result says of its car beside the rows, in the metadata: `car`, JSON."""
+"""The car of a result, beside the rows in the metadata: `car`, JSON."""
 
 import json
 import math
@@ -43,7 +43,7 @@ class Car(NamedTuple):
 
 
 def car_of(config: Config) -> dict[str, Any]:
-    """Return the car of a configuration as JSON takes it; what is not known is null."""
+    """Return the car of a configuration as JSON takes it; unknown values are null."""
     params = new_params(config)[0]
     return {
         **{name: float(params[name]) for name in ("mass", "wheelbase", "rear_axle", "cog_height")},

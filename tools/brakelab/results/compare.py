@@ -55,7 +55,7 @@ class Difference(NamedTuple):
     nulls: int
     """Rows in which only one has a value."""
     weight: float
-    """Greatest difference over what matters; above 1 it does."""
+    """Greatest difference over the least that matters; above 1 it does."""
 
 
 def _threshold(name: str, unit: str, values: NDArray[np.float64]) -> float:

@@ -33,7 +33,7 @@ class Dust(NamedTuple):
 
 
 def airborne_mass(worn: Corners, error: Corners, params: RecordArray) -> tuple[Corners, Corners, Corners]:
-    """Return what stays in the air of the mass `worn` [g] and its 95 % band [mg], shapes (4,).
+    """Return the airborne mass of `worn` [g] and its 95 % band [mg], shapes (4,).
 
     `error`: relative standard deviation of the wear. The share in the air is anything within its bounds: no
     signal of a car tells it.

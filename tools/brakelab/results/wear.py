@@ -33,7 +33,7 @@ class Wear(NamedTuple):
 def regressors_of(
     torque: Vector, omega: Vector, temperature: Vector, period: float, half_width: int
 ) -> NDArray[np.float64]:
-    """Return the integrals of (7.16), shape (7, ...), over the first axis of what is given.
+    """Return the integrals of (7.16), shape (7, ...), over the first axis of the arguments.
 
     `torque` [N m], `omega` [rad/s] and `temperature` [degC], shape (n, ...), every `period` [s]; the slope of
     `omega` is taken over `half_width` samples to either side.

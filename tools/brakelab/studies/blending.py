@@ -62,7 +62,7 @@ class Loss(NamedTuple):
     within_ms: float
     """After the loss; from then on the sum is within `TOLERANCE` of the demand."""
     missing: float
-    """Of what the linings gave before, at most [% of the demand]."""
+    """Of the linings' earlier share, at most [% of the demand]."""
     above: float
     """The demand after the loss by at most [%]."""
 

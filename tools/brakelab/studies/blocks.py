@@ -133,7 +133,7 @@ def road_table(pairs: dict[str, Pair]) -> Table:
 
 
 def claims_table(pairs: list[Pair], repeats: Repeats, stops: Array) -> Table:
-    """Return what the thesis says of Figures 7.10 to 7.12 beside what was found."""
+    """Return the thesis's claims of Figures 7.10 to 7.12 beside the findings."""
     offsets = np.array([100.0 * pair.offset for pair in pairs])
     errors = np.array([100.0 * pair.energy_error for pair in pairs])
     settled = repeats.rig[SETTLED:].mean() / repeats.road[SETTLED:].mean() - 1.0

@@ -31,7 +31,7 @@ MOVING: Final = 3.0  # m/s
 
 
 class CycleDrive(NamedTuple):
-    """What a car has done over a cycle. Four wheels: shape (4,)."""
+    """Sums of a car over a cycle. Four wheels: shape (4,)."""
 
     distance: float
     """m"""
@@ -57,11 +57,11 @@ class CycleDrive(NamedTuple):
     mass_per_km: float
     """mg/km, by the ECU."""
     true_mass_per_km: float
-    """mg/km: the airborne share of what the linings lost."""
+    """mg/km: the airborne share of the linings' lost mass."""
 
 
 class _Sums:
-    """What is collected block by block."""
+    """Sums collected block by block."""
 
     def __init__(self) -> None:
         self.hottest, self.rear_ahead = np.zeros(4), -1.0

@@ -67,7 +67,7 @@ def drive_shipped(number: int) -> Driven:
 
 
 def draw_car(number: int, name: str) -> Drawn:
-    """Return what the policies save on a drawn car."""
+    """Return the savings of the policies on a drawn car."""
     seed = FIRST_DRAW + number
     car, models = drawn(name, seed), emission_models(name, name, seed)
     saved: dict[tuple[str, str, str], float] = {}

@@ -1,4 +1,4 @@
-"""Cars identified from a drive, beside the truth: values, sigma, and what a stranger's drive makes of them.
+"""Cars identified from a drive, beside the truth: values, sigma, and predictions of a stranger's drive.
 
 A car of the wide draw drives `config/scenarios/identify.toml`; START is config/suv.toml with every key of
 masses, tyres and brakes 20 % off, up or down by the seed, but for what a data sheet says (wheelbase,
@@ -46,7 +46,7 @@ KEYS: Final = {
     "front": ("unloaded_radius", "vertical_stiffness", "wheel_inertia", "slip_stiffness",
               "stiffness_degression", "effective_radius", "mu_nominal", "push_out_pressure"),
 }  # fmt: skip
-"""What START has wrong; the rear axle as the front one."""
+"""Errors of START; the rear axle as the front one."""
 
 Vector = NDArray[np.float64]
 

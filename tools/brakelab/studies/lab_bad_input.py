@@ -105,7 +105,7 @@ CASES: Final[dict[str, Spoil]] = {
 
 
 def answers() -> list[Answer]:
-    """Return the line that each wrong input gets; what is read all the same tells what it lost."""
+    """Return the line that each wrong input gets; one that is read all the same names its losses."""
     lining = linings().lining["A"]
     inertia = columns_of(lining).rig.inertia
     assert inertia is not None

@@ -62,7 +62,7 @@ class Measured(NamedTuple):
 
 
 def thermocouples(true: Array, cycles: int, random: Generator) -> Array:
-    """Return what thermocouples on discs of `true` temperature show, rows to cycles, shape (cycles, 4)."""
+    """Return readings of thermocouples on discs of `true` temperature, rows to cycles, shape (cycles, 4)."""
     found = np.full((cycles, 4), np.nan)
     at = np.arange(0, cycles, SAMPLE)
     rows = (np.arange(len(true)) + 1.0) * ROW_CYCLES

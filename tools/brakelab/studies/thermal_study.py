@@ -58,7 +58,7 @@ class Appraised(NamedTuple):
     before: Array
     """RMSE [K] of the configuration before, from a cold start, by the ECU's power."""
     after: Array
-    """RMSE [K] of the ECU itself with what was identified."""
+    """RMSE [K] of the ECU itself with the identified keys."""
     bias: Array
     """Mean error of the ECU [K]."""
     inside: Array
@@ -89,7 +89,7 @@ class Car(NamedTuple):
     trips: list[Appraised]
     courses: list[Course]
     unknown_rest: Array
-    """RMSE [K] of the ECU with what was identified on the dry trip, had the rest been unknown; shape (4,)."""
+    """RMSE [K] of the ECU with the keys of the dry trip, had the rest been unknown; shape (4,)."""
 
 
 def _go(
@@ -166,7 +166,7 @@ def drive_car(seed: int) -> Car:
 
 
 def _decay(rate: Cooling, drive: Drive, excess: float) -> NDArray[np.float64]:
-    """Return what a wrong start of `excess` [K] leaves, shape (n,)."""
+    """Return the remainder of a wrong start of `excess` [K], shape (n,)."""
     course = drive.course
     _, decay = respond(rate.rate(course.speed, course.wet), course.power[:, 0])
     return np.asarray(excess * decay)

@@ -1,4 +1,4 @@
-"""What wrong blocks, trips and drives are answered with: files are spoilt in the usual ways and given."""
+"""Answers to wrong blocks, trips and drives: files are spoilt in the usual ways and given."""
 
 import csv
 import shutil
@@ -127,7 +127,7 @@ def answers() -> list[Answer]:
 
 
 def bad_input_table() -> Table:
-    """Return what wrong blocks and trips are answered with."""
+    """Return the answers to wrong blocks and trips."""
     rows = [(each.what, each.line, "refused" if each.is_refused else "read") for each in answers()]
     below = "Four blocks, eight trips, one of them spoilt. Lines as they are printed, folders left out."
     return Table("Bad input", ("what", "line", ""), rows, below)

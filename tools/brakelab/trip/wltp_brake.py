@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 
 class Totals(NamedTuple):
-    """What is published of the cycle."""
+    """Published figures of the cycle."""
 
     seconds: float
     metres: float
@@ -78,7 +78,7 @@ SEED: Final = 24
 
 
 class _Draws(NamedTuple):
-    """What is drawn of a trip's brakings; shape (n,)."""
+    """Random draws of a trip's brakings; shape (n,)."""
 
     speed: Array
     """Relative."""
