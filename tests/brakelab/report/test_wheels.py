@@ -8,7 +8,7 @@ from bokeh.models import Range1d
 
 from brakelab.report.downsample import buckets
 from brakelab.report.drive import Drive
-from brakelab.report.wheels import motors_share, plots_of_wheels
+from brakelab.report.wheels import motors_share, plots_of_wheels, road_speed
 from ecu.contract.signals import CORNERS
 
 T = np.arange(0.0, 10.0, 0.01)
@@ -59,6 +59,17 @@ def test_motors_share_while_braking_only() -> None:
 )
 def test_only_what_is_told_is_drawn(columns: dict[str, np.ndarray], plots: set[str]) -> None:
     assert names(drive(**columns)) == plots
+
+
+def test_a_measured_wheel_is_drawn_where_slip_is_not_known() -> None:
+    slip = np.where((T > 4.0) & (T < 5.0), np.nan, -0.1)
+    turned = np.full_like(T, 20.0 * 0.9 / 0.33)
+    turned[T > 8.0] = 0.0
+    np.testing.assert_allclose(
+        road_speed(turned, 72.0 * (1.0 + slip)), np.where(T > 8.0, 0.0, 3.6 * 18.0), rtol=1e-12
+    )
+    unmeasured = np.full_like(T, np.nan)
+    np.testing.assert_array_equal(np.isnan(road_speed(unmeasured, slip)), np.isnan(slip))
 
 
 def test_pedal_of_the_truth() -> None:

@@ -34,7 +34,7 @@ CYCLE_LAW: Final = "SIM"
 """The law of the lining file whose rig mass the flywheel has."""
 
 RunStop = Callable[[RecordArray], RecordArray]
-"""Trace of a stop, dtype TRACE, of what stands on the rig."""
+"""Trace of a stop, dtype TRACE, of the brake on the rig."""
 
 
 class Noise(NamedTuple):

@@ -13,6 +13,7 @@ from ecu.contract.signals import CORNERS
 TIME: Final = "Time [s]"
 LEAST_TORQUE: Final = 100.0
 """N m of brakes and motors together, below which a share is noise."""
+ROLLS: Final = 10.0  # rad/s
 _LEAST_SLIP, _LEAST_KMH, _LEAST_TORQUE, _LEAST_PERCENT = 2.0, 10.0, 200.0, 20.0
 _SIDES: Final = (("left", LEFT, "dashed"), ("right", RIGHT, "dotted"))
 # Label, colour, dash of each wheel's speed.
@@ -66,7 +67,7 @@ def _lines(drive: Drive, truth: Drive | None) -> dict[str, Vector]:
     for corner in CORNERS:
         slip = drive.column(f"slip_{corner}")
         lines[f"slip_{corner}"] = 100.0 * slip
-        lines[f"speed_{corner}"] = speed * (1.0 + slip)
+        lines[f"speed_{corner}"] = road_speed(drive.column(f"wheel_speed_{corner}"), speed * (1.0 + slip))
         if truth is not None:
             # Standing and creeping wheels slip by anything; the ECU tells none there.
             true = np.where(np.isfinite(slip), truth.column(f"slip_{corner}"), np.nan)
@@ -86,6 +87,15 @@ def _lines(drive: Drive, truth: Drive | None) -> dict[str, Vector]:
         if np.nan_to_num(values).any():
             lines[name] = values
     return lines
+
+
+def road_speed(turned: Vector, by_slip: Vector) -> Vector:
+    """Return a wheel's speed over the road [km/h]: measured [rad/s] if the result has it, else by its slip.
+
+    Its rolling radius is the one that its slip was computed with.
+    """
+    both = np.isfinite(by_slip) & (turned > ROLLS)
+    return turned * np.median(by_slip[both] / turned[both]) if both.any() else by_slip
 
 
 def _slip(source: ColumnDataSource, span: Range1d, axle: str, corners: tuple[str, str]) -> Any:

@@ -29,7 +29,7 @@ REFERENCE_FRICTION: Final = 0.4  # pressure and normal force for wear
 
 
 class OpenDrive(NamedTuple):
-    """What the brakes of a car have done over a cycle; shape (4,) each."""
+    """Sums of a car's brakes over a cycle; shape (4,) each."""
 
     particles: Array
     worn: Array
@@ -106,7 +106,7 @@ def _brake(
 def drive_open(
     car: RecordArray, params: Params, trips: list[tuple[float, Array]], ambient: float = 20.0
 ) -> OpenDrive:
-    """Return what a drawn car's brakes do on `trips`; `params` of its ECU, shape (1,)."""
+    """Return the sums of a drawn car's brakes on `trips`; `params` of its ECU, shape (1,)."""
     sums, treatment = np.zeros((4, 4)), np.zeros(4)
     for begins, drive in trips:
         cleaner = np.zeros(1, CLEANER_STATE)
