@@ -74,7 +74,7 @@ def machine() -> list[Check]:
     """Check Python, the rights for real time, the clock and the cache of compiled kernels."""
     version = sys.version_info[:2]
     return [
-        Check("Python", (3, 11) <= version <= (3, 13), platform.python_version(), "use Python 3.11 to 3.13"),
+        Check("Python", (3, 11) <= version <= (3, 14), platform.python_version(), "use Python 3.11 to 3.14"),
         *_rights(),
         _clock_source(),
         _wake_up(),

@@ -112,6 +112,20 @@ def test_the_version_is_stated_once_for_package_and_program() -> None:
     assert f"## {__version__}" in (ROOT / "CHANGELOG.md").read_text("utf-8")
 
 
+def test_the_supported_pythons_are_the_same_everywhere() -> None:
+    first, beyond = re.fullmatch(r">=3\.(\d+),<3\.(\d+)", PROJECT["project"]["requires-python"]).groups()
+    minors = range(int(first), int(beyond))
+    laboratory = tomllib.loads((ROOT / "tools/pyproject.toml").read_text("utf-8"))["project"]
+    assert laboratory["requires-python"] == PROJECT["project"]["requires-python"]
+    stated = [one for one in PROJECT["project"]["classifiers"] if one.startswith("Programming Language")]
+    assert stated == [f"Programming Language :: Python :: 3.{minor}" for minor in minors]
+    finder = (ROOT / "tools/find-python.sh").read_text("utf-8")
+    assert " | ".join(f"3.{minor}.*" for minor in minors) in finder
+    assert f"use Python 3.{minors[0]} to 3.{minors[-1]}" in (ROOT / "ecu/doctor.py").read_text("utf-8")
+    assert f"Python 3.{minors[0]} to 3.{minors[-1]} " in (ROOT / "README.md").read_text("utf-8")
+    assert f"--python-version 3.{minors[0]} " in (ROOT / "tools/lock.sh").read_text("utf-8")
+
+
 def test_onboard_code_loads_no_laboratory() -> None:
     """Every module of `ecu` is imported in a process of its own; then none of these may be loaded."""
     script = (
