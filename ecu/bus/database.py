@@ -1,6 +1,7 @@
-"""Databases: loaded and checked by cantools; errors are one line with place and remedy."""
+"""Databases (DBC, KCD, SYM, ARXML), loaded and checked by cantools; errors are one line: place and remedy."""
 
 import re
+import xml.etree.ElementTree as ET
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Final
@@ -13,10 +14,13 @@ from ecu.errors import UserError
 
 LONGEST_PAYLOAD: Final = 64  # bytes, CAN FD
 SHOWN: Final = 6  # suggested names
+KINDS: Final = ".dbc, .arxml, .kcd, .sym"
+BEGINNING: Final = {"0", "7"}  # start position of a PDU that begins with its frame, little- and big-endian
 
 _SYNTAX = re.compile(r'Invalid syntax at line (\d+), column (\d+): "(.*?)"{1,2}$', re.DOTALL)
 _OVERLAP = re.compile(r"The signals (\S+) and (\S+) are overlapping in message (\S+?)\.?\"?$")
 _OUTSIDE = re.compile(r"The signal (\S+) does not fit in message (\S+?)\.?\"?$")
+_XML = re.compile(r"([a-z (),-]+): line (\d+), column (\d+)\W*$")
 
 
 def _refusal(path: Path, error: Exception) -> UserError:
@@ -35,6 +39,14 @@ def _refusal(path: Path, error: Exception) -> UserError:
         signal, message = found.groups()
         remedy = "does not fit its message; if it is not used, set strict = false in the map"
         return UserError(str(path), f"{message}.{signal}", remedy)
+    if found := _XML.search(text):
+        what, line, column = found.groups()
+        remedy = f"no XML from there on ({what.strip()}); the file is cut off or damaged, export it again"
+        return UserError(str(path), f"line {line}, column {column}", remedy)
+    if "NoneType" in text:  # of AUTOSAR's elements, which cantools takes for granted
+        text = (
+            "an element that describes messages is missing; export a system description with its CAN cluster"
+        )
     reason = " ".join(text.split()) or type(error).__name__
     return UserError(str(path), "", f"not a database that can be read ({reason})")
 
@@ -45,16 +57,30 @@ def load_database(path: Path, strict: bool = True) -> Database:
     Raises UserError naming line and column, or message and signal.
     """
     if not path.is_file():
-        raise UserError(str(path), "", "no such file; give the path of a database (.dbc, .arxml, .kcd, .sym)")
+        raise UserError(str(path), "", f"no such file; give the path of a database ({KINDS})")
     if path.stat().st_size == 0:
-        raise UserError(str(path), "", "the file is empty; give a database (.dbc, .arxml, .kcd, .sym)")
+        raise UserError(str(path), "", f"the file is empty; give a database ({KINDS})")
     try:
         database = cantools.database.load_file(path, strict=strict)
     except Exception as error:  # cantools' parsers raise errors of many kinds
         raise _refusal(path, error) from None
     if not isinstance(database, Database):
         raise UserError(str(path), "", "a diagnostics database; give one that describes CAN messages")
+    if not database.messages:
+        where = "no CAN cluster with a frame" if path.suffix.lower() == ".arxml" else "no message"
+        raise UserError(str(path), "", f"{where} in it; give the database of a CAN bus")
+    if path.suffix.lower() == ".arxml":
+        _check_pdus(path)
     return database
+
+
+def _check_pdus(path: Path) -> None:
+    """Refuse frames whose PDU does not begin with them: cantools would read it from the first byte."""
+    for frame in ET.parse(path).iterfind(".//{*}CAN-FRAME"):
+        for start in frame.iterfind(".//{*}PDU-TO-FRAME-MAPPING/{*}START-POSITION"):
+            if (start.text or "").strip() not in BEGINNING:
+                remedy = f"its PDU begins at bit {start.text}, which is not read; give a database as DBC"
+                raise UserError(str(path), frame.findtext("{*}SHORT-NAME", ""), remedy)
 
 
 def attribute(message: Message, name: str, default: int = 0) -> int:
@@ -101,6 +127,8 @@ def fits(signal: Any, length: int) -> bool:
 
 def _choice(name: str, names: list[str]) -> str:
     """Return the name probably meant, or the available ones."""
+    if not names:
+        return "; it has none that can be read (containers of AUTOSAR are not)"
     more = f", … ({len(names)} in all)" if len(names) > SHOWN else ""
     return closest(name, names) or f"; it has {', '.join(sorted(names)[:SHOWN])}{more}"
 

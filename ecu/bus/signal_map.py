@@ -11,7 +11,7 @@ from cantools.database import Database, Message
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ecu.bus import e2e
-from ecu.bus.database import attribute, closest, find_message, find_signal, load_database
+from ecu.bus.database import closest, find_message, find_signal, load_database
 from ecu.bus.freshness import input_freshness
 from ecu.bus.plan import SignalUse
 from ecu.bus.receive import MessageUse, ReceivePlan, compile_receive, contract_receive_plan
@@ -69,7 +69,7 @@ class MappedMessage(_Table):
     """Rate and protection of a message."""
 
     period: Annotated[float, Field(gt=0.0), Unit("s")] | None = None
-    """Between frames; the database's GenMsgCycleTime if it is not given."""
+    """Between frames; the database's cycle time (DBC: GenMsgCycleTime) if it is not given."""
     slowest_period: Annotated[float, Field(gt=0.0), Unit("s")] | None = None
     """Of a sender that varies its rate, or a logger that loses frames."""
     checksum: str | None = None
@@ -172,7 +172,7 @@ def _message_use(
     message = find_message(database, name, path, f"inputs.{first}.message")
     settings = signal_map.messages.get(name, MappedMessage())
     key = f"messages.{name}"
-    period_s = settings.period or attribute(message, "GenMsgCycleTime") * 1e-3
+    period_s = settings.period or float(message.cycle_time or 0) * 1e-3
     if not period_s:
         raise UserError(str(path), f"{key}.period", "missing, and the database has none; give it in seconds")
     signals = [

@@ -184,7 +184,11 @@ def suggest(
     log: Annotated[Path, typer.Argument(metavar="LOG", help="Recorded drive")],
     dbc: Annotated[
         Path | None,
-        typer.Option("--dbc", metavar="DB", help="CAN database of the car; a signal file needs none"),
+        typer.Option(
+            "--dbc",
+            metavar="DB",
+            help="CAN database of the car: DBC, KCD, SYM, ARXML; none for a signal file",
+        ),
     ] = None,
     config: Annotated[Path | None, CONFIG_OPTION] = None,
     out: Annotated[
