@@ -79,6 +79,16 @@ def test_tables_for_pandas_and_arrow(result: Result) -> None:
     assert 0 < len(moving) < len(result)
 
 
+def test_polars_has_the_values_of_pandas(result: Result) -> None:
+    pytest.importorskip("polars", reason="Polars is not installed")
+    for table in (result, result.brakings):
+        frame, pandas = table.to_polars(), table.to_pandas()
+        assert frame.columns == list(pandas.columns)
+        assert frame.height == len(pandas) > 0
+        for name in frame.columns:
+            np.testing.assert_array_equal(frame[name].to_numpy(), pandas[name].to_numpy(), err_msg=name)
+
+
 def test_a_package_that_is_missing_is_one_line(result: Result, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "polars", None)
     with pytest.raises(UserError, match=r"^polars: is not installed: pip install polars; or use \.columns$"):
