@@ -15,3 +15,4 @@ printf 'hatchling\neditables\n' | lock build - "$@"
 lock dev pyproject.toml --extra dev "$@"
 lock lab pyproject.toml --extra lab --constraint requirements/dev.txt
 lock onboard pyproject.toml --constraint requirements/dev.txt
+echo "Now install requirements/dev.txt and run: python tools/write_third_party.py && python tools/write_sbom.py"

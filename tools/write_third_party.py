@@ -9,7 +9,7 @@ installed.
 import re
 from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 ROOT: Final = Path(__file__).parent.parent
 PAGE: Final = ROOT / "docs/third-party.md"
@@ -18,10 +18,30 @@ UNSTATED: Final = {"colorama": "BSD-3-Clause (Windows alone)", "graphemeu": "MIT
 SETS: Final = {"onboard": "on the vehicle", "lab": "laboratory"}
 
 
+class Pin(NamedTuple):
+    """One version of a package in a pinned set."""
+
+    name: str
+    version: str
+    marker: str
+    """Pythons or systems that it is for, empty: all."""
+    sha256: tuple[str, ...]
+    """Of the files that may be installed."""
+
+
+def pins(name: str) -> list[Pin]:
+    """Return what a pinned set holds, sorted."""
+    text = (ROOT / f"requirements/{name}.txt").read_text("utf-8").replace("\\\n", " ")
+    found = re.findall(r"^([\w.\-]+)==([^\s;]+)(?: ; (.+?))?\s+(--hash.*)$", text, re.MULTILINE)
+    return sorted(
+        Pin(package, version, marker, tuple(sorted(re.findall(r"sha256:([0-9a-f]{64})", hashes))))
+        for package, version, marker, hashes in found
+    )
+
+
 def pinned(name: str) -> list[str]:
     """Return the packages of a pinned set, each once."""
-    text = (ROOT / f"requirements/{name}.txt").read_text("utf-8")
-    return sorted(set(re.findall(r"^([\w.\-]+)==", text, re.MULTILINE)))
+    return sorted({pin.name for pin in pins(name)})
 
 
 def licence(package: str) -> str:
@@ -54,7 +74,12 @@ def page_text() -> str:
         "Databases and recorded drives of cars have notices beside them: `dbc/cars/LICENSE.opendbc`,",
         "`tests/data/LICENSE.*`.",
         "",
-        "Written by `python tools/write_third_party.py` from the packages' metadata.",
+        "[brake-ecu.cdx.json](../requirements/brake-ecu.cdx.json) is the bill of materials (SBOM,",
+        "CycloneDX 1.6) for tools that look for known vulnerabilities or judge licences: versions, hashes of",
+        "all files that may be installed, licences. The wheel has it in `brake_ecu-….dist-info/sboms/`.",
+        "",
+        "Written by `python tools/write_third_party.py` and `python tools/write_sbom.py` from the pinned",
+        "versions and the packages' metadata.",
         "",
         "| package | licence | part of |",
         "| --- | --- | --- |",
