@@ -1,5 +1,6 @@
 """A request in doubt is not lowered: the table of replayed streams, at the inputs that `step` reads."""
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from ecu.contract.signals import (
     PEDAL_PRESSED,
     USABLE,
 )
+from ecu.jit import kernel
 
 CONTRACT = Path(__file__).parents[3] / "dbc" / "brake_ecu.dbc"
 PLAN = contract_receive_plan(CONTRACT)
@@ -45,32 +47,46 @@ LIVING, RELEASED = request_frames(3.0), request_frames(0.0)
 PEDAL, PEDAL_FREE = request_frames(np.nan, 40.0), request_frames(np.nan, 0.0)
 
 
+@cache
+def protected(frame: bytes) -> RecordArray:
+    """Return one frame with each of the 15 counters and its checksum; shape (15,)."""
+    frames = np.frombuffer(frame * 15, FRAME).copy()
+    for counter in range(15):
+        p01_protect(frames["data"][counter], 8, DATA_ID, counter)
+    return frames
+
+
 class Wire:
     """Frames with their instants, handed to the ECU cycle by cycle."""
 
     def __init__(self) -> None:
-        self.frames: list[tuple[int, RecordArray]] = []
+        self.frames: list[RecordArray] = []
 
-    def send(self, frame: RecordArray, counter: int, ms: float) -> None:
-        sent = frame.copy()
-        p01_protect(sent["data"][0], 8, DATA_ID, counter % 15)
-        sent["stamp_ns"] = T0 + int(ms * MS)
-        self.frames.append((int(sent["stamp_ns"][0]), sent))
+    def send(self, frame: RecordArray, counter: Any, ms: Any) -> None:
+        """Send a frame once, or once for each of an array of counters and instants."""
+        sent = protected(frame.tobytes())[np.atleast_1d(counter) % 15]
+        sent["stamp_ns"] = T0 + (np.asarray(ms) * MS).astype(np.int64)
+        self.frames.append(sent)
 
     def run(self, cycles: int, deadline_ms: float) -> RecordArray:
         """Inputs behind each cycle, the first ends at `deadline_ms`."""
-        self.frames.sort(key=lambda frame: frame[0])
-        frames = np.concatenate([frame for _, frame in self.frames])
-        inputs, reception = new_record(INPUTS), new_reception(PLAN)
+        frames = np.concatenate(self.frames)
+        frames = frames[np.argsort(frames["stamp_ns"], kind="stable")]
         kept = np.zeros(cycles, INPUTS)
-        now: Any = inputs[0]
-        first = 0
-        for k in range(cycles):
-            begin_cycle(now, T0 + int((10 * k + deadline_ms) * MS), CYCLE_NS)
-            first = receive(PLAN, reception, frames, first, len(frames), now)
-            end_cycle(now, reception.freshness)
-            kept[k] = inputs[0]
+        ends = np.array([T0 + int((10 * k + deadline_ms) * MS) for k in range(cycles)])
+        receive_cycles(PLAN, new_reception(PLAN), frames, ends, new_record(INPUTS), kept)
         return kept
+
+
+@kernel
+def receive_cycles(plan: Any, reception: Any, frames: Any, ends: Any, inputs: Any, kept: Any) -> None:
+    """Receive in cycles that end at `ends`; keep the inputs of each."""
+    first = 0
+    for k in range(len(ends)):
+        begin_cycle(inputs[0], ends[k], CYCLE_NS)
+        first = receive(plan, reception, frames, first, len(frames), inputs[0])
+        end_cycle(inputs[0], reception.freshness)
+        kept[k] = inputs[0]
 
 
 def asked(inputs: RecordArray) -> Any:
@@ -82,13 +98,11 @@ def asked(inputs: RecordArray) -> Any:
 
 def duel(phase: int, lost: int, offset: float, deadline: float, seed: int, begin: int) -> RecordArray:
     """The sender asks for 3 m/s², beside it a stream of `RELEASED`; 1 ms of jitter each. 400 cycles."""
-    random, wire = np.random.default_rng(seed), Wire()
-    for k in range(400):
-        living_ms, replayed_ms = random.uniform(-1.0, 1.0, 2)
-        if k < 60 or k % 30 >= lost:
-            wire.send(LIVING, k, 10 * k + living_ms)
-        if k >= begin:
-            wire.send(RELEASED, k + phase, 10 * k + offset + replayed_ms)
+    wire, k = Wire(), np.arange(400)
+    living_ms, replayed_ms = np.random.default_rng(seed).uniform(-1.0, 1.0, (400, 2)).T
+    sent, replayed = (k < 60) | (k % 30 >= lost), k >= begin
+    wire.send(LIVING, k[sent], (10 * k + living_ms)[sent])
+    wire.send(RELEASED, (k + phase)[replayed], (10 * k + offset + replayed_ms)[replayed])
     return wire.run(400, deadline)
 
 
