@@ -7,6 +7,7 @@ from importlib.resources import files
 from importlib.resources.abc import Traversable
 from typing import Any, Final, NamedTuple
 
+from bokeh.document import Document
 from bokeh.embed import components
 from bokeh.resources import Resources
 from jinja2 import DictLoader, Environment, StrictUndefined
@@ -56,6 +57,10 @@ def fill(
 ) -> str:
     """Return the page; `plots` maps the template's places to figures by name, `content` is the rest."""
     figures = {name: plot for group in plots.values() for name, plot in group.items()}
+    document = Document()
+    with document.models.freeze():  # else every figure added walks through all of them once more
+        for figure in figures.values():
+            document.add_root(figure)
     script, divs = components(figures)
     here = files("brakelab.report")
     # Autoescape: names of files and metadata come from outside.
