@@ -60,7 +60,7 @@ def rig(
     lock_step: bool,
     seed: int,
 ) -> int:
-    """Run every scenario; return 0, or 1 if one of them showed a fault bit unexplained by its faults.
+    """Run every scenario; return 0, or 1 if one showed a fault bit that nothing of it accounts for.
 
     `bus`: interface and channel, None: the best available.
 
@@ -115,7 +115,7 @@ def _in_memory(name: str, scenario: Scenario, vehicle: Config, folder: Path, see
     written = write_simulated(loop, run(loop), vehicle, folder)
     truth = folder / "truth.parquet"
     report(written.result, truth, folder / "report.html")
-    return outcome(name, written, truth, scenario.fault, _undisturbed(scenario, vehicle, seed), [])
+    return outcome(name, written, truth, scenario.fault, vehicle, _undisturbed(scenario, vehicle, seed), [])
 
 
 def _in_real_time(
@@ -125,4 +125,6 @@ def _in_real_time(
     written = write_recorded(recorded.recordings, vehicle, folder)
     report(written.result, recorded.truth, folder / "report.html", recorded.recordings[0])
     undisturbed = _undisturbed(scenario, vehicle, seed)
-    return outcome(path.stem, written, recorded.truth, scenario.fault, undisturbed, recorded.recordings)
+    return outcome(
+        path.stem, written, recorded.truth, scenario.fault, vehicle, undisturbed, recorded.recordings
+    )

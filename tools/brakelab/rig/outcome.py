@@ -12,9 +12,12 @@ from brakelab.report.brakings import brakings
 from brakelab.report.drive import Drive, Vector, onto, read_drive, start_ns
 from brakelab.report.sparkline import drive_sparkline
 from brakelab.report.timing import Spread, read_timing, spread
-from brakelab.rig.reaction import Reaction, reactions, unexplained
+from brakelab.rig.linings import OF_LININGS, beyond_compensation, tell_linings
+from brakelab.rig.reaction import Reaction, raised_alone, reactions
 from brakelab.rig.results import Frames, Written
 from brakelab.simulation.faults import Fault
+from ecu.contract.faults import FAULTS
+from ecu.settings.config import Config
 
 STANDSTILL = 0.2  # m/s
 SETTLED_ROWS = 50  # 0.5 s
@@ -38,7 +41,9 @@ class Outcome(NamedTuple):
     undisturbed: float
     """The same without the scenario's faults [m]."""
     unexplained: list[str]
-    """Fault bits that no injected fault accounts for."""
+    """Fault bits that neither an injected fault nor the car's linings account for."""
+    of_linings: list[str]
+    """Fault bits that the car's linings account for, with what is told by them."""
     reactions: list[Reaction]
     frames: Frames
     differing: int
@@ -82,15 +87,34 @@ class Undisturbed(NamedTuple):
     """Names of the fault bits that it shows: of a car beyond what compensation may do, for one."""
 
 
+def account_for(
+    drive: Drive, truth: Drive, faults: list[Fault], vehicle: Config, usual: frozenset[str]
+) -> tuple[list[str], list[str]]:
+    """Return the fault bits that nothing accounts for, and those that the car's linings account for.
+
+    `drive` are the ECU's results, `truth` the vehicle's on its own axis; `usual`: bits shown without the
+    scenario's faults too.
+    """
+    rises = raised_alone(drive, truth, faults)
+    beyond = beyond_compensation(truth, vehicle)
+    at = np.clip(np.searchsorted(truth.t, drive.t, side="right") - 1, 0, len(truth.t) - 1)
+    of_linings = np.where(beyond[at], rises & OF_LININGS, 0)
+    rises &= ~of_linings
+    alone = [fault.name for fault in FAULTS if (rises & fault.bit).any() and fault.name not in usual]
+    why = tell_linings(truth, vehicle) if of_linings.any() else ""
+    return alone, [f"{fault.name}: {why}" for fault in FAULTS if (of_linings & fault.bit).any()]
+
+
 def outcome(
     name: str,
     written: Written,
     truth_path: Path,
     faults: list[Fault],
+    vehicle: Config,
     undisturbed: Undisturbed,
     recordings: list[Path],
 ) -> Outcome:
-    """Return the outcome by the files of one drive, without fault bits shown without the faults too."""
+    """Return the outcome by the files of one drive; fault bits shown without the faults too do not count."""
     drive = read_drive(written.result, ("vehicle_speed",), _REMEDY)
     own = read_drive(truth_path, ("vehicle_speed",), _REMEDY)
     truth = onto(drive, own, truth_path)
@@ -103,6 +127,7 @@ def outcome(
     timings = [read_timing(folder) for folder in recordings]
     lateness = np.concatenate([timing.lateness for timing in timings]) if timings else np.array([np.nan])
     from_start = drive._replace(t=drive.t + 1e-9 * ((start_ns(drive) or 0) - (start_ns(own) or 0)))
+    alone, of_linings = account_for(from_start, own, faults, vehicle, undisturbed.faults)
     return Outcome(
         scenario=name,
         seconds=float(own.t[-1]),
@@ -112,7 +137,8 @@ def outcome(
         nrmse_rear=accuracy["rear"].nrmse,
         stopping_distance=stopping_distance(own),
         undisturbed=undisturbed.stopping_distance,
-        unexplained=[name for name in unexplained(from_start, own, faults) if name not in undisturbed.faults],
+        unexplained=alone,
+        of_linings=of_linings,
         reactions=reactions(from_start, own, faults),
         frames=written.frames,
         differing=written.differing,

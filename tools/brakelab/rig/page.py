@@ -47,7 +47,7 @@ def summary(outcomes: list[Outcome]) -> Table:
             signed_percent(more_distance(one), 1),
             str(one.missed),
             str(one.frames.lost),
-            "; ".join([*seen, *(f"unexplained: {name}" for name in one.unexplained)]),
+            "; ".join([*seen, *(f"unexplained: {name}" for name in one.unexplained), *one.of_linings]),
         )
     return table
 
@@ -62,7 +62,7 @@ def write_tables(outcomes: list[Outcome], out: Path) -> None:
         {name: getattr(one, name) for name in flat}
         | {f"frames_{name}": value for name, value in one.frames._asdict().items()}
         | {f"lateness_{name}_us": value for name, value in one.lateness._asdict().items()}
-        | {"unexplained": ", ".join(one.unexplained)}
+        | {"unexplained": ", ".join(one.unexplained), "of_linings": "; ".join(one.of_linings)}
         for one in outcomes
     ]
     pq.write_table(pa.Table.from_pylist(rows), out / "scenarios.parquet")

@@ -64,8 +64,8 @@ def _until(drive: Drive, limit: float) -> Drive:
     )
 
 
-def unexplained(drive: Drive, truth: Drive, faults: list[Fault]) -> list[str]:
-    """Return the names of fault bits raised outside of any fault's time and `AFTER_S` after it.
+def raised_alone(drive: Drive, truth: Drive, faults: list[Fault]) -> NDArray[np.int64]:
+    """Return the fault bits raised in each row, not within a fault or `AFTER_S` after it, shape (n,).
 
     Effects of the machine's load are excluded: "late", and inputs lost where the vehicle was delayed by more
     than `HELD_UP_S`.
@@ -77,7 +77,7 @@ def unexplained(drive: Drive, truth: Drive, faults: list[Fault]) -> list[str]:
     rises[drive.t > truth.t[-1]] = 0  # the vehicle writes its files
     for place in np.flatnonzero(np.diff(truth.t) > HELD_UP_S):
         rises[(drive.t >= truth.t[place]) & (drive.t < truth.t[place + 1] + SHOWN_S)] = 0
-    return [fault.name for fault in FAULTS if (rises & fault.bit).any()]
+    return rises
 
 
 def _end(fault: Fault) -> float:
