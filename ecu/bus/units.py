@@ -12,6 +12,7 @@ CONVERSIONS: Final[dict[str, dict[str, tuple[float, float]]]] = {
     "bar": {
         "bar": (1.0, 0.0),
         "Pa": (1e-5, 0.0),
+        "mbar": (1e-3, 0.0),
         "kPa": (0.01, 0.0),
         "MPa": (10.0, 0.0),
         "psi": (0.0689475729, 0.0),
@@ -23,19 +24,31 @@ CONVERSIONS: Final[dict[str, dict[str, tuple[float, float]]]] = {
     "%": {"%": (1.0, 0.0), "-": (100.0, 0.0)},
     "-": {"-": (1.0, 0.0), "%": (0.01, 0.0)},
 }
-# Spellings in databases
+# Spellings in databases, small letters without blanks; the prefix `Unit_` is a habit of some makers
 _SPELLINGS: Final = {
-    "": "-", "1": "-", "SED": "-", "unitless": "-", "kph": "km/h", "kmh": "km/h", "degrees": "deg",
-    "Deg": "deg", "°": "deg", "deg/sec": "deg/s", "degrees/sec": "deg/s", "°/s": "deg/s",
-    "Nm": "N m", "N*m": "N m", "m/s2": "m/s^2", "m/s²": "m/s^2", "m/s/s": "m/s^2", "G": "g", "Bar": "bar",
-    "°C": "degC", "C": "degC", "1/min": "rpm", "percent": "%",
-    "KPH": "km/h", "MPH": "mph", "PSI": "psi", "Deg/Sec": "deg/s", "dps": "deg/s",
+    "": "-", "1": "-", "sed": "-", "unitless": "-", "none": "-",
+    "kph": "km/h", "kmh": "km/h", "kmph": "km/h", "km/hr": "km/h", "kilometerperhour": "km/h",
+    "mi/h": "mph", "m/sec": "m/s", "mps": "m/s", "meterpersecon": "m/s", "knots": "kn", "kt": "kn",
+    "degree": "deg", "degrees": "deg", "°": "deg", "degreofarc": "deg",
+    "deg/sec": "deg/s", "degree/s": "deg/s", "degree/sec": "deg/s", "degrees/s": "deg/s",
+    "degrees/sec": "deg/s", "°/s": "deg/s", "°/sec": "deg/s", "dps": "deg/s", "degreofarcpersecon": "deg/s",
+    "rad/sec": "rad/s", "1/min": "rpm", "r/min": "rpm", "u/min": "rpm", "min-1": "rpm", "minutinver": "rpm",
+    "nm": "N m", "n*m": "N m", "n.m": "N m", "n-m": "N m", "newtometer": "N m", "knm": "kN m",
+    "m/s2": "m/s^2", "m/s²": "m/s^2", "m/s/s": "m/s^2", "m/s**2": "m/s^2", "m/sec2": "m/s^2",
+    "m/sec^2": "m/s^2", "mps2": "m/s^2", "mss": "m/s^2", "meterperseconsquar": "m/s^2",
+    "forceofgravi": "g", "millibar": "mbar", "hpa": "mbar",
+    "°c": "degC", "c": "degC", "degrecelsi": "degC", "°f": "degF", "percent": "%", "pct": "%",
 }  # fmt: skip
+_OWN: Final = {name.lower().replace(" ", ""): name for known in CONVERSIONS.values() for name in known}
 
 
 def spelled(unit: str) -> str:
-    """Return a unit in this module's spelling."""
-    return _SPELLINGS.get(unit.strip(), unit.strip())
+    """Return a unit in this module's spelling, as it came where it is not known."""
+    name = unit.strip()
+    if any(name in known for known in CONVERSIONS.values()):
+        return name
+    plain = name.lower().replace(" ", "").removeprefix("unit_")
+    return _SPELLINGS.get(plain, _OWN.get(plain, name))
 
 
 def conversion(

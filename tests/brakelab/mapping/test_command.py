@@ -11,8 +11,9 @@ from brakelab.log_physics.line import fit
 from brakelab.logs.formats import read_frames
 from brakelab.logs.log_quality import LogQuality
 from brakelab.mapping.command import map_text, timeout
+from brakelab.mapping.motion import Found, motion_of, wheel_speeds
 from brakelab.mapping.names import corner_of, score, words
-from brakelab.mapping.physics import Found, motion_of, propose, wheel_speeds
+from brakelab.mapping.physics import propose
 from brakelab.mapping.series import Series, read_series
 from brakelab.mapping.torque import brake_torque, stand_in
 from brakelab.simulation.closed_loop import new_loop, run

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from brakelab.mapping.drive_torque import drive_torque, driven_wheels, motors
-from brakelab.mapping.physics import motion_of
+from brakelab.mapping.motion import motion_of
 from brakelab.mapping.series import Series
 from ecu.contract.signals import CORNERS
 

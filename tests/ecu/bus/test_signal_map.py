@@ -249,8 +249,8 @@ def test_a_signal_that_cannot_be_read(tmp_path: Path, bent: str) -> None:
 MISTAKES: dict[str, tuple[str, str, str]] = {
     "unknown unit": (
         '"p" }',
-        '"p", unit = "kpa" }',
-        f'{PRESSURE}.unit: "kpa" does not turn into bar; known here: bar, Pa',
+        '"p", unit = "mmHg" }',
+        f'{PRESSURE}.unit: "mmHg" does not turn into bar; known here: bar, Pa',
     ),
     "unit of the database": (
         '"v_fl"',

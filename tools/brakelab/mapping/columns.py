@@ -7,12 +7,13 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from brakelab.log_physics.samples import Car
 from brakelab.logs.column_map import SECONDS, TIMES
 from brakelab.logs.log_quality import SignalQuality
 from brakelab.logs.signal_batches import Columns, columns_of, rows_of, time_of
-from brakelab.mapping.map_text import input_lines
+from brakelab.mapping.map_text import input_lines, radius_line
+from brakelab.mapping.motion import Found
 from brakelab.mapping.names import converts
-from brakelab.mapping.physics import RADIUS, Found
 from brakelab.mapping.series import FEWEST, Series, Vector
 from ecu.errors import UserError
 
@@ -64,7 +65,7 @@ def _series(name: str, unit: str, t: Vector, value: Vector) -> Series:
 
 
 def column_map_text(
-    log: Path, columns: Columns, found: list[Found], timeouts: dict[str, float | None]
+    log: Path, columns: Columns, found: list[Found], timeouts: dict[str, float | None], car: Car
 ) -> str:
     """Return a proposal as the text of a map of columns; `timeouts` [s] by input, None: the usual one."""
     lines = [
@@ -81,7 +82,7 @@ def column_map_text(
         )
     wheel = next(one.series for one in found if one.target == "wheel_speed_fl")
     if not converts(wheel.unit, "rad/s"):
-        lines.append(f"rolling_radius = {RADIUS}  # m, assumed: give the one with which the logger works")
+        lines.append(radius_line(car))
     lines += ["", "[inputs]"]
     for before, one in zip([None, *found], found, strict=False):
         source = f'column = "{one.series.signal}"'

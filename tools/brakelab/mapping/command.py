@@ -11,14 +11,16 @@ from cantools.database import Database
 from rich.console import Console
 from rich.table import Table
 
+from brakelab.log_physics.samples import ANY_CAR, Car, car_of
 from brakelab.logs.column_map import read_column_map
 from brakelab.logs.formats import kind_of, read_frames
 from brakelab.logs.log_quality import SignalQuality
 from brakelab.mapping.columns import column_map_text, read_column_series
 from brakelab.mapping.drive_torque import motors
-from brakelab.mapping.map_text import input_lines
+from brakelab.mapping.map_text import input_lines, radius_line
+from brakelab.mapping.motion import Found, motion_of, wheel_speeds
 from brakelab.mapping.names import converts, words
-from brakelab.mapping.physics import RADIUS, Found, motion_of, propose, wheel_speeds
+from brakelab.mapping.physics import propose
 from brakelab.mapping.series import Series, read_series
 from brakelab.mapping.torque import FORMULA, brake_torque, stand_in
 from brakelab.replay.quality import Findings, damage_lines
@@ -37,6 +39,7 @@ WANTED: Final = (
 SPARE: Final = 1.5  # time-out over the longest gap seen
 LONGEST: Final = 0.5  # s, a gap beyond it is a sender that fell silent
 SHOWN: Final = 20  # names in a line
+PERIODS: Final = 3.0  # likewise, of a sender that is slow
 STEP: Final = 0.05  # s, time-outs are rounded up to it
 
 
@@ -50,8 +53,10 @@ def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) 
         UserError: the log, the database, `config` or `out` is not right, or no wheel speeds were found,
             against which everything else is judged.
     """
+    params = new_params(load_config(config))[0] if config else None
+    car = ANY_CAR if params is None else car_of(params)
     if kind_of(log) == "signals":
-        return _suggest_columns(log, out)
+        return _suggest_columns(log, out, car)
     if dbc is None:
         raise UserError("--dbc", "", f"missing; {log} holds frames: give the database of this car")
     database, strict = _load(dbc)
@@ -60,48 +65,57 @@ def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) 
     series = read_series(read_frames(log, interfaces, findings.log), database)
     for line in damage_lines(findings):
         print(line, file=sys.stderr)
-    found, drives = propose(series)
+    found, drives = propose(series, car)
     if not found:
         raise UserError(str(dbc), "", f"names no four wheel speeds in {log}; give the database of this car")
     bus = found[0].series.bus
     here = [one for one in series if one.bus == bus]
-    hints = []
+    hints: list[str] = []
+    motion = motion_of(wheel_speeds(series), car)
     if not any(one.target.startswith("calliper_pressure") for one in found):
-        torque = brake_torque(here, motion_of(wheel_speeds(series)))
-        if torque and config:
-            found += stand_in(torque, new_params(load_config(config))[0])
+        torque = brake_torque(here, motion)
+        if torque and params is not None:
+            found += stand_in(torque, params)
         elif torque:
             name = f"{torque[0].message}.{torque[0].signal} [{torque[0].unit}]"
             remedy = f"a brake torque can stand in for pressures, {FORMULA}; --config CONFIG writes it"
             hints = [f"{name} follows the deceleration: {remedy}"]
     if not any(one.target.startswith("motor_torque") for one in found):
-        wheels = wheel_speeds(series)
-        found += motors(here, wheels, motion_of(wheels))
-    text = map_text(found, here, (out or Path("map.toml")), dbc, strict, interfaces, bus, hints)
+        found += motors(here, wheel_speeds(series), motion)
+    text = map_text(found, here, (out or Path("map.toml")), dbc, strict, interfaces, bus, hints, car)
     _show(found, drives)
-    for line in hints + [f"{one.target}: {one.warning}" for one in found if one.warning]:
+    for line in hints + _warnings(found):
         print(line, file=sys.stderr)
     if written := _written(text, out):
         load_signal_map(written)
     return 0
 
 
-def _suggest_columns(log: Path, out: Path | None) -> int:
+def _warnings(found: list[Found]) -> list[str]:
+    """Return a line for each thing to look into; wheels that share it share the line."""
+    told: dict[tuple[str, str], str] = {}
+    for one in found:
+        stem = without_corner(one.target)
+        several = (stem, one.warning) in told
+        told[stem, one.warning] = f"{stem}_*" if several else one.target
+    return [f"{name}: {warning}" for (_, warning), name in told.items() if warning]
+
+
+def _suggest_columns(log: Path, out: Path | None, car: Car) -> int:
     """Propose a map of the columns of a signal file, as `suggest` does of frames."""
     quality = SignalQuality()
     columns, series = read_column_series(log, quality)
-    found, drives = propose(series)
+    found, drives = propose(series, car)
     if not found:
         remedy = (
             f"no four wheel speeds by their names among {', '.join(columns.names[:SHOWN])}; write the map"
         )
         raise UserError(str(log), "", f"{remedy} by hand (docs/signal-maps.md)")
     _show(found, drives)
-    for one in found:
-        if one.warning:
-            print(f"{one.target}: {one.warning}", file=sys.stderr)
+    for line in _warnings(found):
+        print(line, file=sys.stderr)
     after = {one.target: timeout(one) for one in found}
-    if written := _written(column_map_text(log, columns, found, after), out):
+    if written := _written(column_map_text(log, columns, found, after, car), out):
         read_column_map(written)
         print(f"next: brake-ecu map check {log} --map {out}", file=sys.stderr)
     return 0
@@ -172,7 +186,8 @@ def _counter(series: list[Series], message: str) -> str | None:
 def timeout(found: Found) -> float | None:
     """Return the time-out [s] that spans the gaps of a signal, None: the contract's does."""
     usual = INPUT_SIGNALS[INPUT[found.target]].timeout_s
-    wanted = SPARE * min(found.series.longest_gap, LONGEST)
+    silent = max(LONGEST, PERIODS * found.series.period)
+    wanted = SPARE * min(found.series.longest_gap, silent)
     return round(STEP * math.ceil(wanted / STEP - 1e-9), 3) if wanted > usual else None
 
 
@@ -185,6 +200,7 @@ def map_text(
     interfaces: list[str],
     bus: int,
     hints: list[str],
+    car: Car = ANY_CAR,
 ) -> str:
     """Return the proposal as the text of a signal map whose place will be `out`; `hints` become comments."""
     database = os.path.relpath(dbc.resolve(), out.resolve().parent)
@@ -200,7 +216,7 @@ def map_text(
         lines.append(f'bus = "{interfaces[bus]}"')
     wheel = next(one.series for one in found if one.target == "wheel_speed_fl")
     if not converts(wheel.unit, "rad/s"):
-        lines.append(f"rolling_radius = {RADIUS}       # m, assumed: give that of your tyres")
+        lines.append(radius_line(car))
     for message in dict.fromkeys(one.series.message for one in found):
         first = next(one.series for one in found if one.series.message == message)
         lines += ["", f"[messages.{message}]", f"period = {first.period:.3g}"]
@@ -213,7 +229,7 @@ def map_text(
     for before, one in zip([None, *found], found, strict=False):
         source = f'message = "{one.series.message}", signal = "{one.series.signal}"'
         lines += input_lines(one, before, source, timeout(one))
-        if one.series.longest_gap > LONGEST:
+        if one.series.longest_gap > max(LONGEST, PERIODS * one.series.period):
             lines.append(
                 f"# {one.target}: no value for {one.series.longest_gap:.2f} s: look at the log there"
             )

@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 
 from brakelab.log_physics.line import Fit, fit, smooth
+from brakelab.mapping.motion import BRAKING, MOVING, Found, Motion, on_grid
 from brakelab.mapping.names import converts, words
-from brakelab.mapping.physics import BRAKING, MOVING, Found, Motion, on_grid
 from brakelab.mapping.series import Series
 from ecu.bus.units import CONVERSIONS, spelled
 from ecu.contract.signals import CORNERS

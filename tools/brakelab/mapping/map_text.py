@@ -1,6 +1,7 @@
 """Text of an input in a proposed map, for frames and columns alike: evidence, scale, unit, time-out."""
 
-from brakelab.mapping.physics import Found
+from brakelab.log_physics.samples import Car
+from brakelab.mapping.motion import Found
 from ecu.bus.units import spelled
 
 
@@ -17,7 +18,7 @@ def input_lines(
         unit_told: the map's reader knows the signal's own unit.
     """
     lines = [f"# {one.evidence}"] if before is None or one.evidence != before.evidence else []
-    if one.warning:
+    if one.warning and (before is None or one.warning != before.warning):
         lines.append(f"# CHECK: {one.warning}")
     entry = source
     if one.factor != 1.0:
@@ -29,3 +30,13 @@ def input_lines(
     if after:
         entry += f", timeout = {after:g}"
     return [*lines, f"{one.target} = {{ {entry} }}"]
+
+
+def radius_line(car: Car) -> str:
+    """Return the line that turns speeds of wheels into their rotation.
+
+    The car made these speeds with a radius of its own; they are speeds over ground if CONFIG's wheels roll on
+    the radius that turns them back.
+    """
+    origin = "that of CONFIG's wheels" if car.known else "assumed: give that of CONFIG's wheels"
+    return f"rolling_radius = {float(car.radius.mean()):.4g}       # m, {origin}"

@@ -7,38 +7,74 @@ from ecu.bus.units import CONVERSIONS, spelled
 from ecu.contract.signals import without_corner
 
 _CORNERS: Final = (
-    ("fl", ("fl", "lf", "frontleft", "leftfront", "frtlft", "lftfrt", "vl", "lhf", "flh")),
-    ("fr", ("fr", "rf", "frontright", "rightfront", "frtrght", "rghtfrt", "vr", "rhf", "frh")),
-    ("rl", ("rl", "lr", "rearleft", "leftrear", "rrlft", "lftrr", "hl", "lhr", "rlh")),
-    ("rr", ("rr", "rearright", "rightrear", "rrrght", "rghtrr", "hr", "rhr", "rrh")),
+    (
+        "fl",
+        ("fl", "lf", "frontleft", "leftfront", "frtlft", "lftfrt", "frl", "vl", "vornelinks", "lhf", "flh"),
+    ),
+    (
+        "fr",
+        (
+            "fr",
+            "rf",
+            "frontright",
+            "rightfront",
+            "frtrght",
+            "rghtfrt",
+            "frr",
+            "vr",
+            "vornerechts",
+            "rhf",
+            "frh",
+        ),
+    ),
+    ("rl", ("rl", "lr", "rearleft", "leftrear", "rrlft", "lftrr", "rel", "hl", "hintenlinks", "lhr", "rlh")),
+    ("rr", ("rr", "rearright", "rightrear", "rrrght", "rghtrr", "rer", "hr", "hintenrechts", "rhr", "rrh")),
 )
 """Spellings of a corner: English in either order, German (vorn/hinten, links/rechts)."""
 
 WORDS: Final = {
-    "wheel_speed": ("whl", "wheel", "wss", "spd", "speed", "rad"),
-    "accel_x": ("long", "lgt", "ax", "longitudinal", "accel"),
-    "accel_y": ("lat", "ay", "lateral", "quer", "accel"),
+    "wheel_speed": ("whl", "wheel", "wss", "spd", "speed", "rad", "radgeschw", "raddrehzahl"),
+    "accel_x": ("long", "lgt", "ax", "x", "longitudinal", "laengs", "längs", "accel", "acc"),
+    "accel_y": ("lat", "ay", "y", "lateral", "quer", "accel", "acc"),
     "yaw_rate": ("yaw", "gier", "yawrate", "rate"),
-    "steering_angle": ("steer", "steering", "sas", "stw", "lenk", "pinion", "angle", "whl"),
-    "calliper_pressure": ("press", "pressure", "pres", "prs", "cyl", "brk", "brake", "mc", "druck"),
-    "pedal_pressed": ("brake", "brk", "bped", "pedal", "pressed", "press", "appl", "drv"),
-    "pedal_position": ("brake", "brk", "bped", "pedal", "pedl", "stroke", "trvl"),
-    "accelerator_position": ("aped", "accelerator", "gas", "throttle", "accel", "pedal", "pedl"),
+    "steering_angle": ("steer", "steering", "sas", "stw", "lenk", "lrw", "pinion", "angle", "whl"),
+    "calliper_pressure": (
+        "press",
+        "pressure",
+        "pres",
+        "prs",
+        "cyl",
+        "brk",
+        "brake",
+        "mc",
+        "druck",
+        "bremsdruck",
+    ),
+    "pedal_pressed": ("brake", "brk", "bped", "pedal", "pressed", "press", "appl", "drv", "brems"),
+    "pedal_position": ("brake", "brk", "bped", "pedal", "pedl", "stroke", "trvl", "position"),
+    "accelerator_position": ("aped", "accelerator", "gas", "throttle", "accel", "pedal", "pedl", "fahrpedal"),
     "motor_torque": ("tq", "trq", "torque", "mot", "motor", "whl", "wheel", "prpl", "axle"),
     "abs_active": ("abs", "active", "act", "actv", "brk"),
     "esp_active": ("esp", "esc", "vdc", "vsc", "stab", "active", "act", "actv", "ctl"),
 }
 """Words that speak for an input."""
+_ASKED: Final = (
+    *("demand", "dmnd", "request", "req", "rq", "cmd", "command", "desired", "target", "tgt", "setpoint"),
+    *("soll", "ziel", "min", "max", "limit", "lim"),
+)
+"""Words of what somebody asks for, which is no measurement."""
 AGAINST: Final = {
     "pedal_pressed": ("park", "epb", "accelerator", "gas", "throttle", "clutch", "fault", "hold", "lamp"),
-    "steering_angle": ("rate", "speed", "torque", "tq", "sign", "offset"),
-    "yaw_rate": ("offset", "accel", "steer", "sas"),
+    "accel_x": ("pedal", "gas", "throttle", "position", "pos", "percentage", *_ASKED),
+    "accel_y": ("pedal", "gas", "throttle", "position", "pos", *_ASKED),
+    "steering_angle": ("rate", "speed", "torque", "tq", "sign", "offset", "geschw", "moment", *_ASKED),
+    "yaw_rate": ("offset", "accel", "steer", "sas", *_ASKED),
     "calliper_pressure": (
-        *("oil", "tire", "tyre", "fuel", "booster", "vacuum", "turbo", "rail", "ac"),
-        *("demand", "dmnd", "request", "req", "target", "setpoint", "soll"),
+        *("oil", "tire", "tyre", "fuel", "booster", "vacuum", "turbo", "rail", "ac", "gradient", "torque"),
+        *("pedal", "position", "pos", "stroke", "travel", "trvl", "light", "switch", *_ASKED),
     ),
-    "accelerator_position": ("brake", "brk", "accel_x", "long", "lat"),
-    "pedal_position": ("accelerator", "gas", "throttle", "clutch", "aped"),
+    "accelerator_position": ("brake", "brk", "accel_x", "long", "lat", "inverted"),
+    "pedal_position": ("accelerator", "gas", "throttle", "clutch", "aped", "pressure", "torque"),
     "abs_active": ("fail", "fault", "warn", "lamp", "def", "pas", "off", "diag"),
     "esp_active": ("fail", "fault", "warn", "lamp", "def", "pas", "off", "diag"),
 }
@@ -54,7 +90,7 @@ def words(name: str) -> list[str]:
 def corner_of(name: str) -> tuple[str, str]:
     """Return the corner that a name speaks of and the name without it; empty: of none."""
     parts = words(name)
-    for length in (1, 2):
+    for length in (2, 1):
         for place in range(len(parts) - length + 1):
             joined = "".join(parts[place : place + length])
             for corner, spellings in _CORNERS:
@@ -72,6 +108,12 @@ def score(name: str, target: str) -> float:
         return any(part == word or (len(word) > 3 and part.startswith(word)) for part in parts)
 
     return float(sum(map(speaks, WORDS[stem])) - 3 * sum(map(speaks, AGAINST.get(stem, ()))))
+
+
+def tells_pressure(message: str, signal: str) -> bool:
+    """Return whether a signal's name, or its message's, speaks of a pressure."""
+    told = ("press", "pres", "prs", "druck", "cyl")
+    return any(part.startswith(told) or "druck" in part for part in (*words(message), *words(signal)))
 
 
 def names_itself(name: str, target: str) -> bool:

@@ -12,8 +12,8 @@ from typing import Any, Final
 import numpy as np
 
 from brakelab.log_physics.line import Fit, Vector, fit, smooth
+from brakelab.mapping.motion import BRAKING, Found, Motion, on_grid
 from brakelab.mapping.names import converts, words
-from brakelab.mapping.physics import BRAKING, Found, Motion, on_grid
 from brakelab.mapping.series import Series
 from ecu.bus.units import CONVERSIONS, spelled
 from ecu.contract.params import BAR

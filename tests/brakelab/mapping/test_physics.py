@@ -1,0 +1,250 @@
+"""What a drive says of its signals: wheels, curves, brakes and scales of cars that no simulation made."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from brakelab.log_physics.samples import ANY_CAR, car_of
+from brakelab.mapping.brakes import brakes, flags
+from brakelab.mapping.curves import at_rest, curves
+from brakelab.mapping.motion import motion_of, wheel_speeds
+from brakelab.mapping.scale import scale_of
+from brakelab.mapping.series import Series
+from ecu.contract.signals import CORNERS
+from ecu.settings.config import load_config, new_params
+from ecu.settings.resources import resource
+
+Vector = NDArray[np.float64]
+RATIO, UNDERSTEER, FLAT = 15.0, 2e-3, 1.5e-3  # -, s²/m², s²/m²: of the wheels' yaw rate over the true one
+
+
+class Road(NamedTuple):
+    """What the car does."""
+
+    t: Vector
+    speed: Vector
+    change: Vector
+    yaw_rate: Vector
+    hand_wheel: Vector
+    """deg"""
+    wheels: dict[str, Series]
+
+
+def series(signal: str, values: Vector, unit: str = "", message: str = "Esp", period: float = 0.02) -> Series:
+    t = np.arange(len(values)) * period
+    return Series(message, signal, unit, 0, period, len(np.unique(values)) <= 2, t, values)
+
+
+def drive(seconds: float = 240.0, slowest: float = 5.0) -> Road:
+    """Curves of 2 m/s² at every speed between `slowest` and 30 m/s, with brakings of up to 3 m/s²."""
+    rng = np.random.default_rng(16)
+    t = np.arange(0.0, seconds, 0.02)
+    middle, half = 0.5 * (30.0 + slowest), 0.5 * (30.0 - slowest)
+    speed = middle - half * np.cos(2.0 * np.pi * t / 60.0) + 0.8 * np.sin(2.0 * np.pi * t / 2.4)
+    change = np.gradient(speed, 0.02)
+    yaw = 2.0 * np.sin(2.0 * np.pi * t / 11.0) / np.maximum(speed, 8.0)
+    turn = yaw * (1.0 + FLAT * speed**2) * ANY_CAR.track
+    hand = np.degrees(yaw * ANY_CAR.wheelbase / speed * (1.0 + UNDERSTEER * speed**2)) * RATIO
+    wheels = {
+        corner: series(
+            f"Wheel_{corner.upper()}",
+            3.6 * (speed + side * 0.5 * turn) + rng.normal(0.0, 0.03, len(t)),
+            "kph",
+            "WheelSpeeds",
+        )
+        for corner, side in zip(CORNERS, (-1, 1, -1, 1), strict=True)
+    }
+    return Road(t, speed, change, yaw, hand, wheels)
+
+
+ROAD = drive()
+MOTION = motion_of(ROAD.wheels)
+NAMES = {
+    "Tesla": ("ESP_wheelSpeedFrL", "ESP_wheelSpeedFrR", "ESP_wheelSpeedReL", "ESP_wheelSpeedReR"),
+    "Volkswagen": (
+        "ESP_VL_Radgeschw_02",
+        "ESP_VR_Radgeschw_02",
+        "ESP_HL_Radgeschw_02",
+        "ESP_HR_Radgeschw_02",
+    ),
+    "Subaru": ("FL", "FR", "RL", "RR"),
+}
+
+
+def named(names, message="Wheels", step=0.0):
+    values = [ROAD.wheels[corner].value for corner in CORNERS]
+    coarse = [np.round(each / step) * step if step else each for each in values]
+    return [
+        series(name, each, "Unit_KiloMeterPerHour", message) for name, each in zip(names, coarse, strict=True)
+    ]
+
+
+@pytest.mark.parametrize("maker", NAMES)
+def test_wheels_are_known_by_the_names_of_many_makers(maker):
+    found = wheel_speeds(named(NAMES[maker]))
+    assert tuple(found[corner].signal for corner in CORNERS) == NAMES[maker]
+
+
+@pytest.mark.parametrize("coarse_first", [True, False])
+def test_the_finer_of_two_messages_of_the_same_names_is_taken(coarse_first):
+    names = [f"WHEEL_SPEED_{corner.upper()}" for corner in CORNERS]
+    sets = [named(names, "ROUGH_WHEEL_SPEED", 1.0), named(names, "WHEEL_SPEEDS", 0.01)]
+    first, second = sets if coarse_first else sets[::-1]
+    assert {one.message for one in wheel_speeds([*first, *second]).values()} == {"WHEEL_SPEEDS"}
+
+
+def test_axles_may_come_in_messages_of_their_own():
+    wheels = named([f"WHEEL_SPEED_{corner.upper()}" for corner in CORNERS])
+    apart = [one._replace(message="FRONT" if i < 2 else "REAR") for i, one in enumerate(wheels)]
+    assert [wheel_speeds(apart)[corner].message for corner in CORNERS] == ["FRONT", "FRONT", "REAR", "REAR"]
+
+
+YAW = np.degrees(ROAD.yaw_rate)
+LATERAL = ROAD.speed * ROAD.yaw_rate
+
+
+def turning(*others):
+    return {one.target: one for one in curves([*ROAD.wheels.values(), *others], MOTION, ANY_CAR, set())}
+
+
+def test_the_slope_at_rest_is_that_of_an_undeformed_tyre():
+    t = np.arange(0.0, 200.0, 0.02)
+    speed, true = 15.0 + 12.0 * np.sin(t / 20.0), np.sin(t / 2.0)
+    line = at_rest(0.8 * true * (1.0 + FLAT * speed**2) + 0.001 * speed, true, speed, speed > 3.0)
+    assert line.slope == pytest.approx(0.8, rel=0.01)
+
+
+def test_at_one_speed_the_slope_at_rest_is_not_told():
+    t = np.arange(0.0, 200.0, 0.02)
+    speed, true = np.full(len(t), 20.0), np.sin(t / 2.0)
+    noisy = true + np.random.default_rng(1).normal(0.0, 0.2, len(t))
+    assert at_rest(noisy, true, speed, speed > 3.0) is None
+
+
+@pytest.mark.parametrize("factor", [1.0, -1.0])
+def test_a_yaw_rate_in_a_unit_keeps_its_scale(factor):
+    one = turning(series("YAW_RATE", factor * YAW, "deg/s"))["yaw_rate"]
+    assert (one.factor, one.unit, one.warning) == (factor, "deg/s", "")
+    assert f"slope {factor:+.1f}" in one.evidence
+
+
+def test_counts_without_a_unit_get_the_scale_of_the_wheels_at_walking_speed():
+    one = turning(series("YawRate", YAW / 0.005))["yaw_rate"]
+    assert one.unit == "deg/s"
+    assert one.factor == pytest.approx(0.005, rel=0.03)
+    assert "no unit" in one.warning
+
+
+def test_a_large_zero_is_taken_off():
+    """A database whose offset is wrong: 10 bit around 512 with a scale of 0.02 m/s²."""
+    one = turning(series("LAT_ACCEL", -501.76 - LATERAL, "m/s2"))["accel_y"]
+    assert one.factor == -1.0
+    assert one.offset == pytest.approx(-501.76, abs=0.1)
+
+
+def test_a_usual_zero_is_left_to_the_ecu():
+    assert turning(series("YAW_RATE", YAW + 0.3, "deg/s"))["yaw_rate"].offset == 0.0
+
+
+SENSORS = {
+    "yaw rate": [series("YAW_RATE", YAW, "deg/s")],
+    "accel_y": [series("LAT_ACCEL", LATERAL, "m/s2")],
+    "wheels alone": [],
+}
+
+
+@pytest.mark.parametrize("sensors", SENSORS)
+def test_the_steering_ratio_is_that_at_rest_whatever_tells_the_curve(sensors):
+    """Above all without a yaw rate: the wheels' is half as much again at 18 m/s."""
+    one = turning(series("STEER_ANGLE", ROAD.hand_wheel, "deg"), *SENSORS[sensors])["steering_angle"]
+    assert 1.0 / one.factor == pytest.approx(RATIO, rel=0.06)
+
+
+def test_a_lateral_acceleration_is_not_blamed_for_flat_tyres():
+    one = turning(series("LAT_ACCEL", LATERAL, "m/s2"))["accel_y"]
+    assert (one.factor, one.warning) == (1.0, "")
+
+
+DECEL = np.maximum(-ROAD.change, 0.0)
+SUV = car_of(new_params(load_config(resource("config/suv.toml")))[0])
+PER_BAR = float(SUV.decel_per_bar.sum())  # m/s² per bar in all callipers
+BAR = np.maximum(DECEL - 0.3, 0.0) / PER_BAR
+
+
+def found(*others, car=SUV):
+    return {one.target: one for one in [*brakes(list(others), MOTION, car), *flags(list(others), MOTION)]}
+
+
+@pytest.mark.parametrize("counts", [3.2, 0.25, 10.0])
+def test_a_pressure_without_a_unit_gets_the_scale_of_configured_brakes(counts):
+    one = found(series("BRAKE_PRESSURE", counts * BAR))["calliper_pressure_rl"]
+    assert one.unit == "bar"
+    assert one.factor == pytest.approx(1.0 / counts, rel=0.2)
+    assert "friction is relative" in one.warning
+
+
+def test_a_pressure_without_a_unit_that_fits_is_taken_for_bar():
+    one = found(series("BRAKE_PRESSURE", BAR))["calliper_pressure_fl"]
+    assert one.factor == 1.0
+    assert "taken for bar" in one.warning
+
+
+def test_without_a_configuration_its_scale_is_not_known():
+    one = found(series("BRAKE_PRESSURE", 3.2 * BAR), car=ANY_CAR)["calliper_pressure_fl"]
+    assert "--config" in one.warning
+
+
+def test_a_pressure_in_bar_keeps_its_scale_whatever_the_brakes():
+    one = found(series("CYL_PRES", 3.2 * BAR, "Bar"))["calliper_pressure_fl"]
+    assert (one.factor, one.warning) == (1.0, "")
+
+
+@pytest.mark.parametrize("name", ["BRAKE_POSITION", "BrakePedal_Travel"])
+def test_the_way_of_a_pedal_is_no_pressure(name):
+    told = found(series(name, 8.0 * BAR))
+    assert "calliper_pressure_fl" not in told
+    assert told["pedal_position"].factor == pytest.approx(100.0 / (8.0 * BAR.max()))
+
+
+def test_a_pressure_is_no_pedal():
+    told = found(series("BRAKE_PRESSURE", 3.0 * BAR))
+    assert "pedal_position" not in told
+
+
+def test_a_pedal_in_per_cent_keeps_its_scale():
+    assert found(series("BrakePedalPos", 8.0 * BAR, "%"))["pedal_position"].factor == 1.0
+
+
+def test_states_are_no_pedal_position():
+    states = series("BRAKE_PEDAL_STATE", np.round(2.0 * DECEL / DECEL.max()))
+    assert "pedal_position" not in found(states)
+
+
+@pytest.mark.parametrize(("share", "taken"), [(0.0, True), (0.05, True), (0.6, False), (1.0, False)])
+def test_a_flag_that_is_on_for_most_of_the_drive_is_not_esp_at_work(share, taken):
+    """It would hold back every braking from teaching friction."""
+    on = (np.arange(len(ROAD.t)) < share * len(ROAD.t)).astype(float)
+    flag = series("CF_Esc_Act", on)._replace(flag=True)
+    assert ("esp_active" in found(flag)) == taken
+
+
+CASES = [
+    # unit, slope, correlation, in curves -> factor, said
+    ("m/s2", 1.04, 0.99, False, 1.0, ""),
+    ("m/s2", -1.04, 0.99, False, -1.0, ""),
+    ("m/s2", -1.45, 0.99, False, -1.0, "slope -1.45"),
+    ("m/s2", 0.102, 0.99, False, 1.0, "it would fit g"),
+    ("", 0.98, 0.99, False, 1.0, ""),
+    ("", -41.8, 0.99, False, -0.0239, "no unit"),
+    ("deg/s", 0.6, 0.96, True, 1.0, ""),
+    ("deg/s", 0.6, 0.96, False, 1.0, "slope +0.60"),
+]
+
+
+@pytest.mark.parametrize(("unit", "slope", "correlation", "in_curves", "factor", "said"), CASES)
+def test_a_scale_is_the_drives_where_no_unit_tells_it(unit, slope, correlation, in_curves, factor, said):
+    told = scale_of(series("A", np.arange(9.0), unit), slope, correlation, in_curves)
+    assert told.factor == pytest.approx(factor)
+    assert (said in told.warning) if said else not told.warning

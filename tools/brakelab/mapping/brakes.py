@@ -1,0 +1,119 @@
+"""Calliper pressures, pedals and flags of the brakes, by the deceleration of the car."""
+
+from typing import Final
+
+import numpy as np
+
+from brakelab.log_physics.line import Fit, Vector, smooth
+from brakelab.log_physics.samples import Car
+from brakelab.mapping.candidates import best_of, by_name, unit_of
+from brakelab.mapping.motion import BRAKING, MOVING, Found, Motion, on_grid
+from brakelab.mapping.names import converts, corner_of, score, tells_pressure
+from brakelab.mapping.series import Series
+from ecu.contract.signals import CORNERS
+
+READS_AS_BAR: Final = 1.25  # and its inverse: of a scale that friction explains
+OVERRUN: Final = 0.3  # m/s^2, drag and engine
+SELDOM: Final = 0.3  # of a drive, that ABS or ESP may act
+FULL: Final = 100.0  # %
+
+
+def brakes(series: list[Series], motion: Motion, car: Car) -> list[Found]:
+    """Return calliper pressures, one for all where there is one alone, and the pedals."""
+    slows = motion.drives and bool(np.any(motion.change < -BRAKING))
+    decel = np.maximum(-motion.change, 0.0)
+    fast = motion.speed > 1.0
+    pressed = best_of(series, "calliper_pressure_fl", motion, decel, fast, 1) if slows else None
+    best = pressed[0] if pressed else by_name(series, "calliper_pressure_fl")
+    found = []
+    if best is not None and np.nanstd(best.value) > 0.0:
+        found = _pressures(best, pressed[1] if pressed else None, series, motion, car)
+    taken = {one.series.name for one in found}
+    for target, sign, what in (("pedal_position", -1, "deceleration"), ("accelerator_position", 1, "dv/dt")):
+        reference = np.maximum(sign * motion.change, 0.0)
+        free = [one for one in series if one.name not in taken]
+        best_pedal = best_of(free, target, motion, reference, fast, 1) if motion.drives else None
+        if best_pedal:
+            one, line = best_pedal
+            evidence = f"against {what}: correlation {line.correlation:.2f}"
+            factor = _percent(one)
+            if factor != 1.0:
+                evidence += f"; no unit: its largest value, {FULL / factor:g}, taken for {FULL:g} %"
+            found.append(Found(target, one, factor, 0.0, unit_of(target, one), evidence, True))
+    return found
+
+
+def _percent(one: Series) -> float:
+    """Return the factor of a pedal: of one without a unit, that of its largest value in this drive."""
+    largest = float(np.nanmax(one.value))
+    counts = not one.unit.strip() and (largest > FULL or largest <= 1.0) and largest > 0.0
+    return FULL / largest if counts else 1.0
+
+
+def _pressures(best: Series, line: Fit | None, series: list[Series], motion: Motion, car: Car) -> list[Found]:
+    evidence = "by its name; the drive shows no braking to check it by"
+    if line:
+        evidence = f"against deceleration: correlation {line.correlation:.2f}"
+    _, stem = corner_of(best.signal)
+    others = {corner_of(one.signal)[0]: one for one in series if corner_of(one.signal)[1] == stem}
+    whole = set(CORNERS) <= set(others)
+    factor, warning = 1.0, ""
+    if not converts(best.unit, "bar"):
+        each = [others[corner] if whole else best for corner in CORNERS]
+        factor, warning = _without_unit(each, motion, car)
+        if not tells_pressure(best.message, best.signal):
+            warning += "; nor does its name say that it is a pressure"
+    found = []
+    for corner in CORNERS:
+        one = others[corner] if whole else best
+        told = evidence if whole else f"{evidence}; one pressure for all wheels"
+        unit = unit_of("calliper_pressure_fl", one)
+        name = f"calliper_pressure_{corner}"
+        found.append(Found(name, one, factor, 0.0, unit, told, line is not None, warning))
+    return found
+
+
+def _without_unit(each: list[Series], motion: Motion, car: Car) -> tuple[float, str]:
+    """Return factor and warning of pressures without a unit: what the brakes of CONFIG need."""
+    told = "the database states no unit"
+    if car.decel_per_bar is None:
+        return 1.0, f"{told}, taken for bar: friction is off by its scale; --config CONFIG tells more"
+    pressures = np.stack([smooth(on_grid(one, motion.t)) for one in each], axis=1)
+    braking = (motion.speed > MOVING) & (motion.change < -BRAKING)
+    released = (motion.speed > MOVING) & (motion.change > 0.2)
+    zero = np.median(pressures[released], axis=0) if released.any() else np.zeros(len(CORNERS))
+    expected = _decel(pressures[braking] - zero, car.decel_per_bar)
+    measured = float((-motion.change[braking] - OVERRUN).sum())
+    factor = measured / expected if expected > 0.0 else 1.0
+    if 1.0 / READS_AS_BAR < factor < READS_AS_BAR:
+        return 1.0, f"{told}, taken for bar, as which it fits CONFIG's brakes"
+    factor = float(f"{factor:.3g}")
+    return factor, f"{told}; factor {factor:g} is what CONFIG's brakes need: friction is relative to it"
+
+
+def _decel(pressures: Vector, per_bar: Vector) -> float:
+    return float((pressures @ per_bar).sum())
+
+
+def flags(series: list[Series], motion: Motion) -> list[Found]:
+    """Return what says that the driver brakes, and by name alone what says that ABS or ESP acts."""
+    found = []
+    best: tuple[float, Series] | None = None
+    for one in series:
+        on = on_grid(one, motion.t) > 0.5
+        if not one.flag or score(one.signal, "pedal_pressed") < 1 or not motion.drives:
+            continue
+        if 0.01 < np.mean(on) < 0.9:
+            slower = float(np.mean(motion.change[~on]) - np.mean(motion.change[on]))
+            if slower > 0.5 * BRAKING and (best is None or slower > best[0]):
+                best = slower, one
+    if best:
+        evidence = f"while it is on the car slows by {best[0]:.1f} m/s² more"
+        found.append(Found("pedal_pressed", best[1], 1.0, 0.0, "-", evidence, True))
+    seldom = [one for one in series if one.flag and np.nanmean(one.value != 0.0) < SELDOM]
+    for target in ("abs_active", "esp_active"):
+        named = by_name(seldom, target)
+        if named:
+            evidence = "by its name, and it is seldom on"
+            found.append(Found(target, named, 1.0, 0.0, "-", evidence, False))
+    return found

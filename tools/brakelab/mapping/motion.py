@@ -1,0 +1,113 @@
+"""Motion of a car that is told by its four wheel speeds, and what is known of the car beforehand."""
+
+from collections.abc import Callable, Iterable
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from brakelab.log_physics.line import RATE, Vector, smooth
+from brakelab.log_physics.samples import ANY_CAR, Car
+from brakelab.mapping.names import converts, corner_of, score
+from brakelab.mapping.series import Series
+from ecu.bus.units import CONVERSIONS, spelled
+from ecu.contract.signals import CORNERS, INPUT, INPUT_SIGNALS
+
+MOVING: Final = 3.0  # m/s
+STANDING: Final = 0.1  # m/s
+BRAKING: Final = 0.7  # m/s^2
+
+
+class Found(NamedTuple):
+    """A signal proposed for an input."""
+
+    target: str
+    series: Series
+    factor: float
+    offset: float
+    """In `unit`, as the value after the factor."""
+    unit: str
+    evidence: str
+    sure: bool
+    """Physics agrees; else the name alone speaks for it."""
+    warning: str = ""
+
+
+class Motion(NamedTuple):
+    """Motion of the car by its wheels, on a grid of `RATE`."""
+
+    t: Vector
+    speed: Vector
+    """m/s"""
+    change: Vector
+    """dv/dt [m/s^2]"""
+    yaw_rates: tuple[Vector, ...]
+    """rad/s, positive to the left; of both axles, the front and the rear one"""
+
+    @property
+    def drives(self) -> bool:
+        """Whether the car drove far enough for physics to tell anything."""
+        return bool(np.mean(self.speed > MOVING) > 0.02)
+
+
+def contract_unit(target: str) -> str:
+    """Return the contract's unit of an input."""
+    return INPUT_SIGNALS[INPUT[target]].unit
+
+
+def on_grid(series: Series, t: Vector) -> Vector:
+    """Return the series on the grid `t` [s], straight lines between its samples."""
+    known = np.isfinite(series.value)
+    if not known.any():
+        return np.full(len(t), np.nan)
+    return np.interp(t, series.t[known], series.value[known])
+
+
+def wheel_speeds(series: Iterable[Series]) -> dict[str, Series]:
+    """Return the four wheel speeds by corner, empty if there are none.
+
+    Four signals whose names differ by the corner alone, in a unit of speed or rotation, or named as wheels;
+    of one message where one has all four. A car may send them twice: the finer ones are taken.
+    """
+    groups: dict[tuple[str, int], dict[str, dict[str, Series]]] = {}
+    for one in series:
+        corner, stem = corner_of(one.signal)
+        fitting = converts(one.unit, "rad/s") or converts(one.unit, "m/s")
+        if not corner or one.flag or not (fitting or score(one.signal, "wheel_speed") >= 2):
+            continue
+        groups.setdefault((stem, one.bus), {}).setdefault(one.message, {}).setdefault(corner, one)
+    sets: list[dict[str, Series]] = []
+    for messages in groups.values():
+        parts = [group for group in messages.values() if len(group) < len(CORNERS)]
+        sets += [group for group in messages.values() if len(group) == len(CORNERS)]
+        sets.append({corner: one for group in reversed(parts) for corner, one in group.items()})
+    whole = [group for group in sets if len(group) == len(CORNERS)]
+
+    def worth(group: dict[str, Series]) -> tuple[bool, float, int, float]:
+        means = np.array([np.nanmean(np.abs(one.value)) for one in group.values()])
+        together = bool(means.max() <= 1.1 * means.min() + 0.5)
+        name = score(group["fl"].name, "wheel_speed")
+        return together, name, len(np.unique(group["fl"].value)), -group["fl"].period
+
+    best = max(whole, key=worth, default=None)
+    return {} if best is None else {corner: best[corner] for corner in CORNERS}
+
+
+def _metres_per_second(series: Series, radius: float) -> Callable[[Vector], Vector]:
+    unit = spelled(series.unit)
+    if unit in CONVERSIONS["m/s"]:
+        scale = CONVERSIONS["m/s"][unit][0]
+    else:
+        scale = CONVERSIONS["rad/s"].get(unit, (1.0, 0.0))[0] * radius
+    return lambda values: values * scale
+
+
+def motion_of(wheels: dict[str, Series], car: Car = ANY_CAR) -> Motion:
+    """Return how the car moved by its four wheel speeds."""
+    start = max(one.t[0] for one in wheels.values())
+    end = min(one.t[-1] for one in wheels.values())
+    t = np.arange(start, end, 1.0 / RATE)
+    metres = _metres_per_second(wheels["fl"], float(car.radius.mean()))
+    fl, fr, rl, rr = (smooth(np.abs(metres(on_grid(wheels[corner], t)))) for corner in CORNERS)
+    speed = 0.25 * (fl + fr + rl + rr)
+    front, rear = (fr - fl) / car.track, (rr - rl) / car.track
+    return Motion(t, speed, np.gradient(speed, 1.0 / RATE), (0.5 * (front + rear), front, rear))
