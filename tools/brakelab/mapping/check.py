@@ -13,7 +13,7 @@ from brakelab.replay.log import log_size, replay_log
 from brakelab.replay.needed import needed_lines
 from brakelab.replay.progress import progress_bar
 from brakelab.replay.quality import Findings, quality_counts, quality_lines
-from brakelab.replay.source import Source, check_map, load_source
+from brakelab.replay.source import Source, check_map, load_source, radius_line
 from brakelab.results.console import new_console
 from ecu.bus.signal_map import read_signal_map
 from ecu.contract.signals import without_corner
@@ -47,6 +47,8 @@ def check(log: Path, map: Path, config: Path | None) -> int:
     counts = quality_counts(findings, source.plan)
     new_console(WIDTH).print(_table(inputs, counts))
     wrong = [*range_lines(findings.freshness), *judged.lines]
+    if config and (line := radius_line(map, source, params[0])):
+        print(line)
     for line in (*quality_lines(findings, source.plan), *needed_lines(findings), *wrong):
         print(line)
     open_ = [name for name in JUDGED if name not in judged.checked]

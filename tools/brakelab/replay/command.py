@@ -25,7 +25,7 @@ from brakelab.replay.needed import (
 )
 from brakelab.replay.progress import progress_bar
 from brakelab.replay.quality import Findings, quality_counts, quality_lines
-from brakelab.replay.source import check_map, load_source
+from brakelab.replay.source import check_map, load_source, radius_line
 from brakelab.replay.summary import brakings_table, prediction_lines, taps
 from brakelab.results.car import KEY as CAR
 from brakelab.results.car import car_of
@@ -111,6 +111,7 @@ def replay_into(
     notes = [line for log in logs if map and (line := check_map(map, source, log))]
     recording = read_recording(cycles) if cycles else None
     params = new_params(vehicle)
+    notes += [line] if (line := radius_line(map, source, params[0])) else []
     learned = _restore(state, vehicle, params)
     before = new_state(params, learned)["learned"].tobytes()
     findings = [Findings(path) for path in logs]

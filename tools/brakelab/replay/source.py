@@ -3,7 +3,7 @@
 import hashlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, Final, NamedTuple
 
 from brakelab.logs.column_map import MappedFile, maps_columns, read_column_map
 from brakelab.logs.formats import interface_name, kind_of
@@ -13,6 +13,8 @@ from ecu.bus.signal_map import load_signal_map, read_signal_map
 from ecu.contract.records import RecordArray
 from ecu.errors import UserError
 from ecu.settings.resources import resource
+
+NEAR: Final = 0.02  # of a radius, that tyres and loads differ by
 
 
 class Source(NamedTuple):
@@ -25,6 +27,8 @@ class Source(NamedTuple):
     """SHA-256 of the database, with a map of both; of a map of columns."""
     columns: MappedFile | None = None
     """Columns of a signal file, None: the contract's names and units."""
+    rolling_radius: float | None = None
+    """m, with which the map makes rotation of the wheels' speeds; None: they need none."""
 
 
 def load_source(map: Path | None) -> Source:
@@ -34,10 +38,12 @@ def load_source(map: Path | None) -> Source:
         return Source(contract_receive_plan(database), "", _hash(database))
     if maps_columns(map):
         plan = contract_receive_plan(resource("dbc/brake_ecu.dbc"))
-        return Source(plan, "", _hash(map), read_column_map(map))
+        columns = read_column_map(map)
+        return Source(plan, "", _hash(map), columns, columns.content.rolling_radius)
     mapped = load_signal_map(map)
-    database = map.parent / read_signal_map(map).database
-    return Source(mapped.plan, mapped.bus or "", _hash(map, database))
+    content = read_signal_map(map)
+    database = map.parent / content.database
+    return Source(mapped.plan, mapped.bus or "", _hash(map, database), None, content.rolling_radius)
 
 
 def check_map(map: Path, source: Source, log: Path) -> str:
@@ -54,6 +60,18 @@ def check_map(map: Path, source: Source, log: Path) -> str:
     if signals and not source.columns:
         return f"{map}: not used for {log}, whose signals are decoded already; a map of columns would be"
     return ""
+
+
+def radius_line(map: Path | None, source: Source, params: Any) -> str:
+    """Return a line where the wheels of `params` (one `PARAMS`) do not roll as the map says, else nothing."""
+    radius = float(params["wheel_radius"].mean())
+    if map is None or source.rolling_radius is None or abs(source.rolling_radius / radius - 1.0) < NEAR:
+        return ""
+    off = 100.0 * (radius / source.rolling_radius - 1.0)
+    told = (
+        f"the wheels of CONFIG roll on {radius:.4g} m, so that speeds are read {off:+.0f} % beside the log's"
+    )
+    return f"{map}: rolling_radius: {told}; give {radius:.4g}, unless the log's speeds are wrong by as much"
 
 
 def _hash(*paths: Path) -> str:
