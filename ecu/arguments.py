@@ -2,13 +2,56 @@
 
 import re
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperCommand
+from typer.core import TyperCommand, TyperGroup
 
+from ecu.completion import known, shipped
+from ecu.output import Level, asked, policy
 from ecu.settings.resources import SCENARIOS, named
+
+
+def _set_level(level: Level) -> Callable[[bool], None]:
+    def set_level(wanted: bool) -> None:
+        if wanted:
+            policy().level = level
+
+    return set_level
+
+
+def _set_json(wanted: bool) -> None:
+    policy().json = policy().json or wanted
+
+
+def _unseen(flags: tuple[str, ...], callback: Callable[[bool], None], help: str) -> Any:
+    """Return an option that sets the policy; the command itself does not see it."""
+    return typer.Option(*flags, callback=callback, expose_value=False, is_eager=True, help=help)
+
+
+@cache
+def output_options() -> tuple[Any, ...]:
+    """Return the options on output, which every command has: `--quiet`, `--verbose`, `--json`."""
+    probe = typer.Typer(add_completion=False)
+
+    @probe.command()
+    def _(
+        quiet: Annotated[
+            bool, _unseen(("--quiet", "-q"), _set_level(Level.QUIET), "Print nothing but results and errors")
+        ] = False,
+        verbose: Annotated[
+            bool,
+            _unseen(("--verbose", "-v"), _set_level(Level.VERBOSE), "Say what is read and compiled, too"),
+        ] = False,
+        json: Annotated[
+            bool, _unseen(("--json",), _set_json, "Print the result as JSON; words go to standard error")
+        ] = False,
+    ) -> None:
+        pass
+
+    return tuple(typer.main.get_command(probe).params)
 
 
 class PlainHelp(TyperCommand):
@@ -30,12 +73,35 @@ class PlainHelp(TyperCommand):
                     formatter.write_dl(lines)
 
 
+class Result(PlainHelp):
+    """A command with a result: it has the options on output and keeps to them."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.params += output_options()
+
+    def invoke(self, ctx: Any) -> Any:
+        """Call the command's function."""
+        with asked():
+            return super().invoke(ctx)
+
+
+class TopLevel(TyperGroup):
+    """The program: its options on output hold for the command that follows."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.params += output_options()
+
+
 class Commands(typer.Typer):
     """A group of commands with plain help."""
 
-    def command(self, name: str | None = None, **options: Any) -> Callable[[Any], Any]:
+    def command(  # type: ignore[override]
+        self, name: str | None = None, cls: type[PlainHelp] = Result, **options: Any
+    ) -> Callable[[Any], Any]:
         """Decorate a function as a command of this group."""
-        return super().command(name, cls=PlainHelp, **options)
+        return super().command(name, cls=cls, **options)
 
 
 def config_file(name: str) -> Path:
@@ -56,23 +122,38 @@ def scenario_file(name: str) -> Path:
 CONFIG_OPTION = typer.Option(
     "--config",
     parser=config_file,
+    autocompletion=shipped("config"),
     metavar="CONFIG",
     help="Vehicle and tuning: file or name (suv, …)",
 )
 MAP_OPTION = typer.Option(
-    "--map", parser=map_file, metavar="MAP", help="Signal map: file or name (mustang, …)"
+    "--map",
+    parser=map_file,
+    autocompletion=shipped("config/maps"),
+    metavar="MAP",
+    help="Signal map: file or name (mustang, …)",
 )
 INTERFACE_OPTION = typer.Option(
-    "-i", "--interface", metavar="INTERFACE", help="Interface of python-can: socketcan, …"
+    "-i",
+    "--interface",
+    autocompletion=known("socketcan", "udp_multicast", "virtual"),
+    metavar="INTERFACE",
+    help="Interface of python-can: socketcan, …",
 )
 CHANNEL_OPTION = typer.Option("-c", "--channel", metavar="CHANNEL", help="Channel of the interface: can0, …")
 OBSERVER_OPTION = typer.Option(
-    "--observer", metavar="OBSERVER", help="joint, observer1 or observer2; default: CONFIG's"
+    "--observer",
+    autocompletion=known("joint", "observer1", "observer2"),
+    metavar="OBSERVER",
+    help="joint, observer1 or observer2; default: CONFIG's",
 )
 STATE_OPTION = typer.Option("--state", metavar="DIR", help="Folder that keeps learned values between runs")
 
 DRAW_OPTION = typer.Option(
-    "--draw", metavar="WIDTH", help="Spread of the drawn cars: wide or nominal; default: SCENARIO's"
+    "--draw",
+    autocompletion=known("wide", "nominal"),
+    metavar="WIDTH",
+    help="Spread of the drawn cars: wide or nominal; default: SCENARIO's",
 )
 
 Config = Annotated[Path, CONFIG_OPTION]

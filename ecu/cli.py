@@ -8,9 +8,9 @@ Exit code 0 on success, 1 when the run found a fault, 2 for bad arguments, confi
 import sys
 
 from ecu.recording.sink import free_output
-from ecu.runtime.start import raise_priority, without_modules
+from ecu.runtime.start import is_run, raise_priority, without_modules
 
-if sys.argv[1:2] == ["run"]:  # under load, importing the command line alone would take a second
+if is_run(sys.argv[1:]):  # under load, importing the command line alone would take a second
     raise_priority()
     free_output()
 
@@ -34,11 +34,15 @@ from ecu.arguments import (
     Config,
     Interface,
     Map,
+    PlainHelp,
     State,
+    TopLevel,
 )
 from ecu.cli_config import app as config_app
 from ecu.cli_watch import app as watch_app
+from ecu.completion import known
 from ecu.errors import RunFault, UserError
+from ecu.output import LOG_FORMATS, Level, fault, give, log_as, new_policy, policy, print_given
 
 LABORATORY = ("bokeh", "jinja2", "pyarrow", "pymoo", "scipy")
 """Packages of the extra `lab`, by the names that are imported."""
@@ -47,9 +51,12 @@ FLEET = ("distributed", "fsspec")
 LEARN = ("sklearn",)
 """Packages of the extra `learn`."""
 
+COMPLETE = "_BRAKE_ECU_COMPLETE"
+"""Set by the shell that asks for completion."""
+
 app = Commands(
+    cls=TopLevel,
     help="Real-time brake ECU: estimates brake lining friction and corrects pressure demands by it.",
-    add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
@@ -75,7 +82,7 @@ def _options(
     pass
 
 
-@app.command()
+@app.command(cls=PlainHelp)
 def run(
     config: Config,
     interface: Interface,
@@ -118,6 +125,19 @@ def run(
     metrics_address: Annotated[
         str, typer.Option("--metrics-address", metavar="IP", help="Address to serve metrics on")
     ] = "127.0.0.1",
+    log_format: Annotated[
+        str | None,
+        typer.Option(
+            "--log-format",
+            metavar="FORMAT",
+            autocompletion=known(*LOG_FORMATS),
+            help="console or json; default: console on a terminal, json elsewhere",
+        ),
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Log warnings and errors only")] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Log what is read and compiled, too")
+    ] = False,
 ) -> int:
     """Run the daemon on a CAN bus. Its demands are flagged invalid unless it is armed."""
     with without_modules("rich", "scipy"):  # of structlog's tracebacks, and BLAS that the cycle never calls
@@ -125,6 +145,8 @@ def run(
 
         from ecu.runtime import prepare, service
     metrics = f"{metrics_address}:{metrics_port}" if metrics_port else None
+    level = Level.QUIET if quiet else Level.VERBOSE if verbose else policy().level
+    log_as(log_format, level)
     return service.run(
         prepare.RunOptions(
             config, interface, channel, map, record, record_limit, state, standby, armed, metrics
@@ -213,18 +235,29 @@ def _add_commands(to: typer.Typer = app) -> int:
 def main(arguments: list[str] | None = None) -> int:
     """Run one command line and return its exit code."""
     arguments = arguments or sys.argv[1:] or ["--help"]
-    try:
-        if arguments[0] != "run":
-            _add_commands()
-        return app(arguments, prog_name="brake-ecu", standalone_mode=False) or 0
-    except (KeyboardInterrupt, typer.Abort):
-        return 130
-    except Exception as error:
-        if os.environ.get("BRAKE_ECU_DEBUG") == "1":
-            traceback.print_exc()
-        line, code = _describe(error)
-        print(f"brake-ecu: {' '.join(line.split())}", file=sys.stderr)
+    with new_policy() as asked:
+        try:
+            code = _run(arguments)
+        except (KeyboardInterrupt, typer.Abort):
+            return 130
+        except Exception as error:
+            if COMPLETE in os.environ:
+                return 1  # nothing to complete after a mistake
+            if os.environ.get("BRAKE_ECU_DEBUG") == "1":
+                traceback.print_exc()
+            line, code = _describe(error)
+            line = " ".join(line.split())
+            give(error=line)
+            fault(f"brake-ecu: {line}")
+        if asked.json and asked.given:
+            print_given()
         return code
+
+
+def _run(arguments: list[str]) -> int:
+    if not is_run(arguments):
+        _add_commands()
+    return app(arguments, prog_name="brake-ecu", standalone_mode=False) or 0
 
 
 if __name__ == "__main__":

@@ -5,12 +5,12 @@ from typing import Annotated
 
 import typer
 
-from ecu.arguments import Commands
+from ecu.arguments import Commands, PlainHelp
 
 app = Commands()
 
 
-@app.command()
+@app.command(cls=PlainHelp)
 def watch(
     daemon: Annotated[
         str | None,

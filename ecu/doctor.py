@@ -22,9 +22,11 @@ from ecu.bus.protocol import Channel
 from ecu.bus.receive import ReceivePlan, Reception, new_reception, receive
 from ecu.bus.signal_map import receive_plan
 from ecu.bus.transmit import contract_transmit_plan
+from ecu.compiling import compiling_told
 from ecu.contract.records import FRAME, INPUTS, new_record
 from ecu.contract.signals import CYCLE_NS, INPUT, INPUT_SIGNALS
 from ecu.errors import UserError
+from ecu.output import give, say
 from ecu.runtime.cycle import new_ecu
 from ecu.settings.config import load_config, new_params
 from ecu.settings.resources import resource
@@ -63,10 +65,13 @@ def doctor(config: Path | None, map: Path | None, interface: str | None, channel
     if (interface is None) != (channel is None):
         raise UserError("doctor", "-i, -c", "give both or none")
     plan = receive_plan(map)
-    checks = [*machine(), kernels(config, plan)]
+    with compiling_told():
+        checks = [*machine(), kernels(config, plan)]
     if interface is not None and channel is not None:
+        say(f"listening to {channel} for {LISTEN_S:.0f} s")
         checks += bus(interface, channel, plan, config)
     _show(checks)
+    give(checks=checks)
     return 0 if all(check.good for check in checks) else 1
 
 

@@ -13,6 +13,7 @@ from ecu.algorithm.step import new_state
 from ecu.contract.records import N_LEGS, N_MEASURED, RecordArray
 from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
+from ecu.output import give
 from ecu.recording.restored import restored
 from ecu.recording.store import alone, open_store, save
 from ecu.settings.config import Config, load_config, new_params, store_key
@@ -210,5 +211,7 @@ def wear_command(config: Path, state: Path, new_pads: str | None, measured: str 
         if changes:
             with closing(open_store(state)) as store:
                 save(store, store_key(vehicle), learned)
-    print("\n".join(lines(appraise(params, learned, vehicle))))
+    corners = appraise(params, learned, vehicle)
+    print("\n".join(lines(corners)))
+    give(corners=corners)
     return 0

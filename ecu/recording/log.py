@@ -1,6 +1,11 @@
-"""Structured logging to stderr: readable on a terminal, JSON elsewhere; one line a second per cause."""
+"""Structured logging to stderr: readable on a terminal, JSON elsewhere; one line a second per cause.
+
+`BRAKE_ECU_LOG_FORMAT` (console, json) and `BRAKE_ECU_LOG_LEVEL` (quiet, normal, verbose) say otherwise, as
+`run --log-format`, `-q` and `-v` do.
+"""
 
 import logging
+import os
 import sys
 import time
 from collections.abc import Callable
@@ -8,20 +13,30 @@ from typing import Any, Final
 
 import structlog
 
+from ecu.output import LOG_FORMAT, LOG_LEVEL
+
 QUIET_S: Final = 1.0
+LEVELS: Final = {"quiet": logging.WARNING, "normal": logging.INFO, "verbose": logging.DEBUG}
 
 
 def configure_logging() -> None:
     """Send every event of this process to stderr."""
     terminal = sys.stderr is not None and sys.stderr.isatty()
-    renderer: Any = structlog.dev.ConsoleRenderer() if terminal else structlog.processors.JSONRenderer()
+    form = os.environ.get(LOG_FORMAT) or ("console" if terminal else "json")
+    renderer: Any = (
+        structlog.dev.ConsoleRenderer(colors=terminal)
+        if form == "console"
+        else structlog.processors.JSONRenderer()
+    )
     structlog.configure(
         processors=[
             structlog.processors.add_log_level,
             structlog.processors.TimeStamper(fmt="iso", utc=True),
             renderer,
         ],
-        wrapper_class=structlog.make_filtering_bound_logger(logging.INFO),
+        wrapper_class=structlog.make_filtering_bound_logger(
+            LEVELS.get(os.environ.get(LOG_LEVEL, ""), logging.INFO)
+        ),
         logger_factory=structlog.WriteLoggerFactory(file=sys.stderr),
     )
 

@@ -118,6 +118,12 @@ def prepare(options: RunOptions) -> Session:
     sending = contract_transmit_plan(resource("dbc/brake_ecu.dbc"), "BrakeEcu")
     params = new_params(config)
     description = _describe(options, config)
+    structlog.get_logger("ecu").debug(
+        "read",
+        **{key: description[key] for key in ("name", "config", "config_hash", "map", "versions")},
+        observer=config.observer.kind,
+        messages=[str(message["name"]) for message in receiving.messages],
+    )
     path = ring_path(os.getpid())
     remove_ring(path)  # of an earlier process with our id: the side process takes the one that appears
     channel = open_channel(

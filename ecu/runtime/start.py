@@ -25,6 +25,11 @@ ENDING: Final = (
 PRIORITY: Final = 1  # of SCHED_FIFO: above every ordinary process, below every real-time one
 
 
+def is_run(arguments: list[str]) -> bool:
+    """Return whether a command line, without the program's name, starts the daemon."""
+    return next((word for word in arguments if not word.startswith("-")), "") == "run"
+
+
 def raise_priority() -> None:
     """Raise priority above ordinary processes where granted, disable garbage collection, for children too."""
     _schedule("SCHED_FIFO", PRIORITY)

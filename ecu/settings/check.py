@@ -4,7 +4,6 @@ The figures are for reading: torque per pressure, pressures of a braking, the di
 one and how far it is from what Annex 5 of ECE R13-H forbids. Swapped numbers that are possible show there.
 """
 
-import sys
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,6 +11,7 @@ import numpy as np
 
 from ecu.algorithm.control.distribution import front_share
 from ecu.contract.params import BAR, GRAVITY
+from ecu.output import fault, give
 from ecu.settings.annex5 import K_RULED, Z_ORDERED, Load, annex_5_violation, shares, utilisation
 from ecu.settings.annex5_picture import picture
 from ecu.settings.config import Config, new_params, validate_config
@@ -29,19 +29,40 @@ def check(path: Path, pictured: bool = False) -> int:
     config = validate_config(path)
     if not isinstance(config, Config):
         for finding in config:
-            print(f"brake-ecu: {finding}", file=sys.stderr)
+            fault(f"brake-ecu: {finding}")
+        give(config=path, mistakes=[str(finding) for finding in config])
         return 2
     params = new_params(config)[0]
     violation = annex_5_violation(params, config.vehicle.loads())
     for line in figures(config, params):
         print(line)
+    give(config=path, mistakes=[violation] if violation else [], figures=figures_of(config, params))
     if pictured:
         print("\n".join(picture(params, config.vehicle.loads())))
     if violation:
-        print(f"brake-ecu: {path}: control.distribution: {violation}", file=sys.stderr)
+        fault(f"brake-ecu: {path}: control.distribution: {violation}")
         return 2
     print(f"{path}: nothing wrong")
     return 0
+
+
+def figures_of(config: Config, params: Any) -> dict[str, Any]:
+    """Return the figures of the car by name: torque per pressure [N m/bar], pressures [bar]."""
+    front, rear = torque_per_bar(params)
+    return {
+        "car": config.name,
+        "mass_kg": float(params["mass"]),
+        "torque_per_bar_front": front,
+        "torque_per_bar_rear": rear,
+        "braking": [
+            {
+                "rate": z,
+                "front_share": float(front_share(params, z * GRAVITY)),
+                **dict(zip(("pressure_front", "pressure_rear"), pressures(params, z), strict=True)),
+            }
+            for z in RATES
+        ],
+    }
 
 
 def figures(config: Config, params: Any) -> list[str]:

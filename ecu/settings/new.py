@@ -8,7 +8,6 @@ Derived by statics and geometry:
     effective_radius = (disc - piston) / 2, where it is not known: the piston's edge is at the disc's
 """
 
-import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,6 +16,7 @@ from typing import Any, Final, NamedTuple
 from pydantic import ValidationError
 
 from ecu.errors import UserError
+from ecu.output import fault, give
 from ecu.settings import data_sheet as sheet
 from ecu.settings.annex5 import annex_5_violation
 from ecu.settings.check import figures
@@ -292,7 +292,8 @@ def _tell(out: Path, config: Config) -> int:
         print(line)
     print(f'{out}: written; lines that end in "{ASSUMED}" are another car\'s')
     print(f"next: brake-ecu config check {out}")
+    give(written=[out], next=f"brake-ecu config check {out}")
     print(f"      brake-ecu identify vehicle DRIVE… --config {out} --out {out.stem}-identified.toml")
     if violation:
-        print(f"brake-ecu: {out}: control.distribution: {violation}", file=sys.stderr)
+        fault(f"brake-ecu: {out}: control.distribution: {violation}")
     return 1 if violation else 0

@@ -27,8 +27,18 @@ def named(name: str, *folders: str) -> Path:
     path = Path(name)
     if path.is_file() or path.suffix or len(path.parts) != 1:
         return path
-    shipped = {file.stem: file for folder in folders for file in sorted(resource(folder).glob("*.toml"))}
+    shipped = shipped_in(*folders)
     if name in shipped:
         return shipped[name]
     names = ", ".join(shipped)
     raise UserError(name, "", f"no such file, and none that is shipped ({names})")
+
+
+def command_name(path: Path) -> str:
+    """Return what names a file on the command line: a shipped one's name, else its path."""
+    return path.stem if path in shipped_in("config", "config/maps", *SCENARIOS).values() else str(path)
+
+
+def shipped_in(*folders: str) -> dict[str, Path]:
+    """Return the shipped files of `folders` by the names that `named` takes."""
+    return {file.stem: file for folder in folders for file in sorted(resource(folder).glob("*.toml"))}

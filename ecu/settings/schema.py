@@ -3,12 +3,14 @@
 import json
 from typing import Any
 
+from ecu.output import give
 from ecu.settings.sections import Config
 
 
 def schema() -> int:
     """Print the schema; return 0."""
-    print(json.dumps(config_schema(), indent=1, ensure_ascii=False))
+    give(**(found := config_schema()))
+    print(json.dumps(found, indent=1, ensure_ascii=False))
     return 0
 
 

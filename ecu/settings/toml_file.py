@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
 
 from ecu.errors import UserError
+from ecu.output import detail
 
 
 class Unit(NamedTuple):
@@ -131,6 +132,7 @@ def unit_of(field: FieldInfo) -> str | None:
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file; a mistake is one line."""
+    detail(f"reading {path}")
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:

@@ -135,6 +135,13 @@ def test_without_arguments_the_commands_are_listed(
     assert all(f"\n  {command} " in listed for command in COMMANDS)
 
 
+def test_help_of_every_command_names_the_options_on_output(capsys: pytest.CaptureFixture[str]) -> None:
+    for line in ("replay", "config check", "map suggest", "identify vehicle", "bench", "lab run", "doctor"):
+        assert cli.main([*line.split(), "--help"]) == 0
+        said = capsys.readouterr().out
+        assert all(said.count(f"{option} ") == 1 for option in ("--quiet", "--verbose", "--json")), line
+
+
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["--version"]) == 0
     assert capsys.readouterr().out == f"brake-ecu {__version__}\n"

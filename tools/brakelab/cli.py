@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from brakelab.cli_bench import HELP as BENCH_HELP
 from brakelab.cli_bench import bench
 from brakelab.cli_identify import app as identify_app
 from brakelab.cli_lab import app as lab_app
@@ -24,11 +25,20 @@ from ecu.arguments import (
     State,
     scenario_file,
 )
+from ecu.completion import fitting, shipped
 from ecu.errors import UserError
+from ecu.output import say, wrote
+from ecu.settings.resources import SCENARIOS, resource
 
 app = Commands()
 app.add_typer(lab_app, name="lab")
 app.add_typer(identify_app, name="identify")
+
+
+def scenarios_and_folders(incomplete: str) -> list[str]:
+    """Return shipped scenarios, files, and shipped folders of scenarios that begin like that."""
+    folders = sorted(path.name for path in resource(SCENARIOS[0]).iterdir() if path.is_dir())
+    return fitting(folders, incomplete) + shipped(*SCENARIOS)(incomplete)
 
 
 @app.command()
@@ -48,7 +58,10 @@ def simulate(
     scenario: Annotated[
         Path,
         typer.Argument(
-            parser=scenario_file, metavar="SCENARIO", help="Scenario file, or name of a shipped one"
+            parser=scenario_file,
+            autocompletion=shipped(*SCENARIOS),
+            metavar="SCENARIO",
+            help="Scenario file, or name of a shipped one",
         ),
     ],
     config: Config,
@@ -71,7 +84,9 @@ def rig(
     scenario: Annotated[
         list[str],
         typer.Argument(
-            metavar="SCENARIO", help="Scenario files, folders of them, or shipped names: faults, …"
+            autocompletion=scenarios_and_folders,
+            metavar="SCENARIO",
+            help="Scenario files, folders of them, or shipped names: faults, …",
         ),
     ],
     config: Config,
@@ -171,7 +186,9 @@ def report(
     """Write results as a page of linked figures."""
     from brakelab.report import command
 
+    say(f"reading {result}")
     command.report(result, truth, out, timing)
+    wrote(out)
     return 0
 
 
@@ -272,6 +289,7 @@ def tune(
         typer.Option(
             "--scenario",
             parser=scenario_file,
+            autocompletion=shipped(*SCENARIOS),
             metavar="SCENARIO",
             help="Scenario to tune on, repeatable; default: fixed-pedal, bursts",
         ),
@@ -281,6 +299,7 @@ def tune(
         typer.Option(
             "--validate",
             parser=scenario_file,
+            autocompletion=shipped(*SCENARIOS),
             metavar="SCENARIO",
             help="Scenario to validate on, repeatable; default: fixed-decel, fade",
         ),
@@ -312,4 +331,4 @@ def tune(
     return command.tune(config, trained, validated, seeds, command.Budget(generations, population, seed), out)
 
 
-app.command()(bench)
+app.command(help=BENCH_HELP)(bench)

@@ -1,16 +1,40 @@
 """`brake-ecu bench …`: imports what it needs when it is called."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
+
+from ecu.completion import fitting
+from ecu.output import policy
+
+NAMES: Final = {
+    "times": "step, codec, plant, cycle, lateness, replay, play",
+    "accuracy": "stops, observers, entries, ablation, bound, recorded, vehicle",
+    "control": "compensation, margins, blending, failures",
+    "physics": "friction, lab, energy, wear, dust, thermal, blocks, cycles",
+}
+"""Benches by what they measure."""
+HELP: Final = "\n".join(
+    [
+        "Measure times, accuracy, control and physics. Print tables.\n\n\b",
+        *(f"{what:8}  {these}" for what, these in NAMES.items()),
+    ]
+)
+
+
+def names(incomplete: str) -> list[str]:
+    """Return the benches that begin like that."""
+    return fitting(", ".join(NAMES.values()).split(", "), incomplete)
 
 
 def bench(
     name: Annotated[
-        str | None, typer.Argument(metavar="NAME", help="Bench to run; default: step, codec, plant, cycle")
+        str | None,
+        typer.Argument(
+            autocompletion=names, metavar="NAME", help="Bench to run; default: step, codec, plant, cycle"
+        ),
     ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables")] = False,
     seeds: Annotated[
         int, typer.Option(metavar="N", min=1, help="Number of cars that are drawn, at most")
     ] = 20,
@@ -31,17 +55,10 @@ def bench(
         Path | None, typer.Option(metavar="DIR", help="Write the drives of entries there, run nothing")
     ] = None,
 ) -> int:
-    """Measure times, accuracy, control and physics. Print tables.
-
-    \b
-    times     step, codec, plant, cycle, lateness, replay, play
-    accuracy  stops, observers, entries, ablation, bound, recorded, vehicle
-    control   compensation, margins, blending, failures
-    physics   friction, lab, energy, wear, dust, thermal, blocks, cycles
-    """
+    """Run one bench, see `HELP`."""
     from brakelab.bench import command
     from brakelab.entries.command import Entered, refuse
 
     entered = Entered(tuple(observer or ()), drive, export)
     refuse(entered, name)
-    return command.bench(name, json, seeds, seconds, draw, entered)
+    return command.bench(name, policy().json, seeds, seconds, draw, entered)

@@ -1,19 +1,43 @@
 """`brake-ecu lab …`: the brake dynamometer. Each command imports what it needs when it is called."""
 
+import tomllib
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from ecu.arguments import Commands
+from ecu.completion import fitting, shipped
+from ecu.settings.resources import resource
 
 app = Commands(help="Run a simulated brake dynamometer and analyse recordings.", no_args_is_help=True)
+
+
+def _linings() -> dict[str, Any]:
+    """Return the shipped linings as they are written, for completion."""
+    written = tomllib.loads(resource("config/plant/linings.toml").read_text("utf-8"))["lining"]
+    return dict(written)
+
+
+def brakes(incomplete: str) -> list[str]:
+    """Return the shipped brakes that begin like that."""
+    return fitting(_linings(), incomplete)
+
+
+def laws(incomplete: str) -> list[str]:
+    """Return the friction laws of shipped brakes that begin like that."""
+    return fitting(dict.fromkeys(law for one in _linings().values() for law in one["friction"]), incomplete)
 
 
 @app.command()
 def run(
     programme: Annotated[
-        str, typer.Argument(metavar="PROGRAMME", help="cpc, ams, ak-master, or a file as in config/rig")
+        str,
+        typer.Argument(
+            autocompletion=shipped("config/rig"),
+            metavar="PROGRAMME",
+            help="cpc, ams, ak-master, or a file as in config/rig",
+        ),
     ],
     out: Annotated[
         Path,
@@ -22,14 +46,22 @@ def run(
         ),
     ],
     brake: Annotated[
-        str, typer.Option("--brake", metavar="BRAKE", help="Brake A, B or C, or a lining of LININGS")
+        str,
+        typer.Option(
+            "--brake", autocompletion=brakes, metavar="BRAKE", help="Brake A, B or C, or a lining of LININGS"
+        ),
     ] = "A",
     seed: Annotated[
         int, typer.Option("--seed", metavar="N", min=0, help="Seed of the pad, its scatter and the sensors")
     ] = 0,
     law: Annotated[
         str | None,
-        typer.Option("--law", metavar="LAW", help="Use this friction law of the lining instead of a pad"),
+        typer.Option(
+            "--law",
+            autocompletion=laws,
+            metavar="LAW",
+            help="Use this friction law of the lining instead of a pad",
+        ),
     ] = None,
     linings: Annotated[
         Path | None,

@@ -18,6 +18,7 @@ from brakelab.bench.step import filter_table, step_rows
 from brakelab.studies import output
 from brakelab.studies.braking import MESSAGES_IN, simulated_stop
 from brakelab.studies.measure import Figure, Row
+from ecu import cli
 from ecu.bus.receive import contract_receive_plan, new_reception, receive
 from ecu.contract.records import FRAME, INPUTS, STAGES, new_record
 from ecu.contract.signals import INPUT
@@ -146,7 +147,7 @@ def one_bench(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
 
 
 def test_json_holds_machine_figures_and_ratio(one_bench: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert command.bench(None, json=True) == 0
+    assert cli.main(["bench", "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert "Python" in printed["machine"]
     assert printed["step"][0]["ours"] == {"median": 2.0, "low": 1.0, "high": 4.0}

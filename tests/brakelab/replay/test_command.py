@@ -349,7 +349,9 @@ def test_needed_inputs_of_no_use_are_told(
     columns, lines = WORTHLESS[case]
     path = change(stop(tmp_path / "stop.parquet"), **columns)
     run([path], tmp_path / "out.parquet")
-    assert capsys.readouterr().err.splitlines() == [f"{path}: {line}" for line in lines]
+    *notes, written = capsys.readouterr().err.splitlines()
+    assert notes == [f"{path}: {line}" for line in lines]
+    assert written.startswith(f"written: {tmp_path / 'out.parquet'}, ")
 
 
 def test_a_drive_without_any_needed_input_is_a_fault_of_the_run(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from brakelab.studies.friction import (
     rms_row,
     run_means,
 )
+from ecu import cli
 from ecu.settings.resources import resource
 
 
@@ -61,5 +62,5 @@ def test_the_bench_writes_its_page(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_bench_prints_json(capsys: pytest.CaptureFixture[str]) -> None:
-    assert command.bench("friction", json=True) == 0
+    assert cli.main(["bench", "friction", "--json"]) == 0
     assert '"Nominal friction"' in capsys.readouterr().out

@@ -11,6 +11,7 @@ from brakelab.simulation.closed_loop import Drive
 from brakelab.studies import output
 from brakelab.studies.stops import TABLE_4_3, Stops, nrmse, stops, window
 from brakelab.studies.table import stop_tables
+from ecu import cli
 from ecu.contract.records import FRAME, new_record
 from ecu.settings.config import load_config
 from ecu.settings.resources import resource
@@ -88,5 +89,5 @@ def test_page_names_config_seeds_and_every_figure(
     for table in stop_tables(result, 20):
         assert markdown(table).rstrip() in page
     assert f"| #1 rear | yes | {result.friction[1].nrmse.median:.2f} |" in page
-    assert command.bench("stops", json=True, seeds=20) == 0
+    assert cli.main(["bench", "stops", "--json"]) == 0
     assert '"to_ideal_uncompensated"' in capsys.readouterr().out

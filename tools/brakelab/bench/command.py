@@ -34,7 +34,7 @@ from brakelab.studies.observers import WIDE, Sample, Task, observer_rows, tasks
 from brakelab.studies.observers_cases import configured
 from brakelab.studies.observers_picture import PICTURED, consistency_of, write_picture
 from brakelab.studies.observers_table import finite, observer_tables
-from brakelab.studies.output import PICTURES, plain_row, print_json, print_tables, results_page, write_page
+from brakelab.studies.output import PICTURES, plain_row, print_tables, results_page, write_page
 from brakelab.studies.table import stop_tables
 from brakelab.studies.texts import (
     ABLATION_TEXT,
@@ -60,6 +60,7 @@ from brakelab.studies.texts import (
 )
 from ecu import __version__
 from ecu.errors import UserError
+from ecu.output import give
 from ecu.settings.config import Config, config_hash, load_config
 from ecu.settings.resources import resource
 
@@ -142,7 +143,7 @@ def _stops(json: bool, seeds: int, draw: str) -> int:
     of = _of(path.name, config, draw, seeds)
     if json:
         plain = {key: [plain_row(row) for row in rows] for key, rows in result._asdict().items()}
-        print_json({"of": of, **plain})
+        give(of=of, **plain)
         return 0
     tables = stop_tables(result, seeds)
     print_tables(of, tables)
@@ -171,7 +172,7 @@ def _observers(json: bool, seeds: int, draw: str) -> int:
     of = _of("suv.toml", configured(), draw, seeds)
     if json:
         plain = {name: value._asdict() for name, value in times.items()}
-        print_json(finite({"of": of, "rows": [plain_row(row) for row in rows], "step_us": plain}))
+        give(**finite({"of": of, "rows": [plain_row(row) for row in rows], "step_us": plain}))
         return 0
     tables = observer_tables(rows, times, consistency, draw)
     print_tables(of, tables)

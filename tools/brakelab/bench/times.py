@@ -5,9 +5,10 @@ from typing import Final, NamedTuple
 
 from brakelab.bench import codec, cycle, plant, step
 from brakelab.studies.measure import Row, machine
-from brakelab.studies.output import plain_row, print_json, print_tables, write_page
+from brakelab.studies.output import plain_row, print_tables, write_page
 from brakelab.studies.table import time_table
 from ecu import __version__
+from ecu.output import give
 
 
 class Bench(NamedTuple):
@@ -54,9 +55,7 @@ def run_times(name: str | None, json: bool) -> int:
     chosen = {key: value for key, value in BENCHES.items() if name in (None, key)}
     rows = {key: value.rows() for key, value in chosen.items()}
     if json:
-        print_json(
-            {"machine": line, **{key: [plain_row(row) for row in value] for key, value in rows.items()}}
-        )
+        give(machine=line, **{key: [plain_row(row) for row in value] for key, value in rows.items()})
         return 0
     tables = [time_table(chosen[key].title, rows[key], chosen[key].below) for key in rows]
     print_tables(line, tables)

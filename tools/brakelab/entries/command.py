@@ -16,9 +16,10 @@ from brakelab.entries.table import entry_tables, standings
 from brakelab.studies.cars import each_car
 from brakelab.studies.measure import machine
 from brakelab.studies.observers_table import finite
-from brakelab.studies.output import print_json, print_tables, write_page
+from brakelab.studies.output import print_tables, write_page
 from ecu import __version__
 from ecu.errors import UserError
+from ecu.output import give
 from ecu.settings.resources import resource
 
 ENTRIES: Final = "entries"
@@ -78,7 +79,7 @@ def bench_entries(json: bool, seeds: int, entered: Entered) -> int:
     of = f"`brake-ecu bench {ENTRIES}`, version {__version__}, wide draw, seeds 0–{cars - 1}. {machine()}"
     if json:
         rows = [{"rank_error": one.rank_error, **_plain(one)} for one in found]
-        print_json(finite({"of": of, "entries": rows}))
+        give(**finite({"of": of, "entries": rows}))
         return 0
     tables = entry_tables(found, cars, "" if log is None else f"{car}, {log.name}")
     print_tables(of, tables)

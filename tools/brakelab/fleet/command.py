@@ -1,6 +1,5 @@
 """Fleet replay (`brake-ecu fleet`): recorded drives of many vehicles, learned values carried along."""
 
-import sys
 from collections import Counter
 from collections.abc import Sequence
 from functools import cache
@@ -22,6 +21,7 @@ from brakelab.replay.progress import progress_bar
 from brakelab.replay.source import load_source
 from brakelab.simulation.observer import with_observer
 from ecu.errors import UserError
+from ecu.output import fault, give, say, wrote
 from ecu.settings.config import load_config
 
 SHOWN: Final = 20
@@ -71,7 +71,7 @@ def fleet(
     write_page(done, out / "report.html")
     _tell(done, replayed, sum(len(chain.drives) for chain in chains), out)
     if interrupted:
-        print("interrupted: the same command goes on with the rest", file=sys.stderr)
+        say("interrupted: the same command goes on with the rest")
         return 130
     return 1 if any(summary["fault"] for summary in done) else 0
 
@@ -97,22 +97,21 @@ def plan(drives: Sequence[Drive], observer: str | None) -> list[Chain]:
 def _tell(done: Sequence[dict[str, Any]], replayed: int, total: int, out: Path) -> None:
     faults = [summary for summary in done if summary["fault"]]
     for summary in faults[:SHOWN]:
-        print(f"failed: {summary['fault']}", file=sys.stderr)
+        fault(f"failed: {summary['fault']}")
     if len(faults) > SHOWN:
-        print(f"failed: {len(faults) - SHOWN} more, see {out / 'report.html'}", file=sys.stderr)
+        fault(f"failed: {len(faults) - SHOWN} more, see {out / 'report.html'}")
     again = [summary for summary in done if summary["tries"] > 1]
     for summary in again[:SHOWN]:
         names = f"{summary['vehicle']}/{summary['drive']}"
-        print(f"tried again: {names}: its worker died, {summary['tries']} tries", file=sys.stderr)
+        say(f"tried again: {names}: its worker died, {summary['tries']} tries")
     for line in disorder(done):
-        print(line, file=sys.stderr)
+        say(line)
     known = {brakes_file(out, summary["vehicle"], summary["drive"]) for summary in done}
     left = Counter(path.parent.name for path in others(out, known)) if len(done) == total else Counter()
     if left:
-        print(
+        say(
             f"{out / 'brakes'}: {left.total()} files are of drives not named now; they stay, remove them or"
-            " name another --out",
-            file=sys.stderr,
+            " name another --out"
         )
     noted = len(notes([summary for summary in done if not summary["fault"]]))
     hours = sum(summary.get("duration") or 0.0 for summary in done) / 3600.0
@@ -122,6 +121,9 @@ def _tell(done: Sequence[dict[str, Any]], replayed: int, total: int, out: Path) 
         f"{out}: {len(done) - len(faults)} of {total} drives of {vehicles} vehicles, {hours:.1f} h, "
         f"{kilometres:.0f} km; {replayed} replayed now, {len(faults)} failed, {noted} with notes on the log"
     )
+    give(drives=total, done=len(done) - len(faults), replayed=replayed, with_notes=noted)
+    give(vehicles=vehicles, hours=hours, kilometres=kilometres, failed=[one["fault"] for one in faults])
+    wrote(out / "drives.parquet", out / "pads.parquet", out / "report.html")
 
 
 def disorder(done: Sequence[dict[str, Any]]) -> list[str]:

@@ -35,6 +35,7 @@ from brakelab.plant.dynamometer_programme import load_programme
 from brakelab.plant.linings import Lining, Linings
 from brakelab.results.text_table import show
 from ecu.errors import UserError
+from ecu.output import give, say
 from ecu.settings.resources import named, resource
 
 FEWEST: Final = 10
@@ -70,7 +71,7 @@ def run(
         nonlocal last
         if time.monotonic() - last > 1.0 or done == of:
             last = time.monotonic()
-            _tell(f"{done} of {of} stops")
+            say(f"{done} of {of} stops")
 
     path = named(programme, "config/rig")
     rig = bench.rig[0]
@@ -83,7 +84,9 @@ def run(
         recording = run_programme(bench, load_programme(path), progress)
     beside = write_recording(out, recording, lining, inertia)
     hours, minutes = bench.time / 3600.0, recording.time.size / 200.0 / 60.0
-    _tell(f"{hours:.1f} h on the rig, {minutes:.0f} min recorded: {out}, {beside}")
+    say(f"{hours:.1f} h on the rig, {minutes:.0f} min recorded: {out}, {beside}")
+    give(written=[out, beside], hours=hours, minutes_recorded=minutes)
+    say(f"next: brake-ecu lab look {out}; brake-ecu identify friction {out} --out brake.toml")
     return 0
 
 
@@ -94,6 +97,7 @@ def look(data: list[Path], columns: Path | None) -> int:
     _need(stops, data[0])
     console = Console()
     show(console, component_table(principal_components(stops)))
+    give(stops=len(stops))
     console.print(history_line(history_effect(stops)), highlight=False)
     console.print(heat_line(heat_capacity(stops, measured.columns)), highlight=False)
     return 0
@@ -129,7 +133,7 @@ def friction(
         raise UserError("--profile", profile, f"no such law; choose one of {', '.join(laws)}")
     unseen = None if held_out is None else _read([held_out], columns).stops
     described = HELD_OUT if held_out is None else str(held_out)
-    identified = identify(measured.columns, measured.stops, unseen, _tell, own)
+    identified = identify(measured.columns, measured.stops, unseen, say, own)
     tables = [
         *law_tables(identified, described),
         number_table(identified.chosen),
@@ -137,13 +141,14 @@ def friction(
     ]
     if profile is not None:
         fitted = fit(laws[profile], measured.columns.brake, measured.stops)
-        tables.append(profile_table(fitted, measured.columns.brake, measured.stops, _tell))
+        tables.append(profile_table(fitted, measured.columns.brake, measured.stops, say))
     for table in tables:
         show(Console(), table)
     write_lining(out, measured.columns, measured.heating, identified)
     page = out.with_suffix(".html")
     write_report(page, measured.columns, measured.stops, identified, tables)
-    _tell(f"written: {out}, the law chosen under the name SIM; {page}, how well and how far it holds")
+    give(written=[out, page], chosen=identified.chosen.name, stops=identified.stops)
+    say(f"written: {out}, the law chosen under the name SIM; {page}, how well and how far it holds")
     return 0
 
 
@@ -171,7 +176,7 @@ def _read(data: list[Path], columns: Path | None) -> _Measured:
     for path in data:
         read = read_recording(path, columns)
         if read.damaged:
-            _tell(read.damaged)
+            say(read.damaged)
         if first is None:
             first = read.columns
         elif (read.columns.brake, read.columns.rig) != (first.brake, first.rig):
@@ -189,7 +194,3 @@ def _read(data: list[Path], columns: Path | None) -> _Measured:
 def _need(stops: Stops, path: Path) -> None:
     if len(stops) < FEWEST:
         raise UserError(str(path), "", f"{len(stops)} stops; needs {FEWEST}")
-
-
-def _tell(line: str) -> None:
-    Console(stderr=True).print(line, highlight=False, markup=False, soft_wrap=True)

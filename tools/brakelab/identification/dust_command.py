@@ -17,6 +17,7 @@ from brakelab.results.outputs import check_outputs
 from brakelab.results.text_table import markdown
 from ecu.contract.dust import MODELS
 from ecu.errors import UserError
+from ecu.output import give, say
 from ecu.settings.config import Axle, load_config, new_params
 
 LEGEND: Final = (("chosen", BLUE), ("others", ORANGE), ("95 %, and the background's line", PINK))
@@ -123,4 +124,6 @@ def identify_dust(manifest: Path, config: Path, axle: str, out: Path) -> int:
         f"left out within {100 * chosen.left_out_sum:.0f} % RMS{said}"
     )
     print(f"{page}: models beside each other, background, correlations")
+    give(written=[out, page], model=chosen.name, left_out=chosen.left_out_sum, trips=len(trained))
+    say(f"next: brake-ecu replay LOG --config {out} --out drive.parquet")
     return 0

@@ -14,6 +14,7 @@ from brakelab.identification.thermal_page import Judged, untold, write_page
 from brakelab.identification.thermal_result import errors_of, judge, section_of, start_of
 from brakelab.results.outputs import check_outputs
 from ecu.errors import UserError
+from ecu.output import give
 from ecu.settings.config import Axle, Config, load_config
 
 AXLES: Final = {"front": (0, 1), "rear": (2, 3)}
@@ -97,6 +98,7 @@ def identify_thermal(logs: Sequence[Path], config: Path, map: Path | None, out: 
     for axle in axles:
         for line in untold(axle):
             print(line)
+    give(written=[out, page], axles=sections)
     for axle in axles:
         fit, inside = axle.fit, 100.0 * float(np.mean([told.inside for told in axle.told]))
         print(

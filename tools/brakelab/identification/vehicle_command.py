@@ -1,6 +1,5 @@
 """`brake-ecu identify vehicle`: a car's parameters from its drives, as a CONFIG; page and map beside it."""
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from brakelab.identification.vehicle_page import write_page
 from brakelab.identification.vehicle_parameters import parameters_of
 from brakelab.results.outputs import check_outputs
 from ecu.errors import UserError
+from ecu.output import give, say
 from ecu.settings.config import load_config, new_params
 
 
@@ -36,11 +36,12 @@ def identify_vehicle(drives: Sequence[Path], config: Path, map: Path | None, clo
     try:
         load_config(out)
     except UserError as error:
-        print(f"{error}", file=sys.stderr)
+        say(f"{error}")
     write_page(page, found, parameters, params[0], names)
     zeros = offsets(found.zeros)
     if map and zeros:
         own_map.write_text(map_toml(map, own_map, zeros), encoding="utf-8")
+    give(parameters=parameters, zeros=zeros, written=written)
     for one in parameters:
         unit = "" if one.unit == "-" else f" {one.unit}"
         if one.remedy:

@@ -4,7 +4,6 @@ Noise of the two halves of a signal is independent. A derivative by one half and
 no noise in common, so a regression over them is not attenuated (`vehicle_fit`).
 """
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -24,6 +23,7 @@ from brakelab.replay.source import check_map, load_source
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CORNERS, INPUT_SIGNALS
 from ecu.errors import UserError
+from ecu.output import say
 
 RATE: Final = 100.0  # Hz, of the grid
 GAP: Final = 0.15  # s to the nearest sample, beyond which a signal is not known
@@ -95,7 +95,7 @@ def read_drives(paths: Sequence[Path], params: RecordArray, map: Path | None) ->
     with progress_bar("identify vehicle", sum(log_size(path) for path in paths)) as advance:
         for path in paths:
             if map and (line := check_map(map, source, path)):
-                print(line, file=sys.stderr)
+                say(line)
             findings, rows, collector = Findings(path), [], Collector()
             for block in replay_log(path, new_ecu(params.copy(), None), source, None, findings, advance):
                 rows.append(block.samples.copy())

@@ -18,6 +18,7 @@ from brakelab.results.console import new_console
 from ecu.bus.signal_map import read_signal_map
 from ecu.contract.signals import without_corner
 from ecu.errors import UserError
+from ecu.output import give
 from ecu.settings.config import load_config, new_params
 from ecu.settings.resources import resource
 
@@ -51,6 +52,8 @@ def check(log: Path, map: Path, config: Path | None) -> int:
         print(line)
     for line in (*quality_lines(findings, source.plan), *needed_lines(findings), *wrong):
         print(line)
+    give(inputs=counts["inputs"], wrong=wrong, checked=judged.checked)
+    give(notes=[*quality_lines(findings, source.plan), *needed_lines(findings)])
     open_ = [name for name in JUDGED if name not in judged.checked]
     if not wrong:
         print(

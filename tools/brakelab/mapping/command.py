@@ -2,7 +2,6 @@
 
 import math
 import os
-import sys
 from pathlib import Path
 from typing import Final
 
@@ -29,6 +28,7 @@ from ecu.bus.database import load_database
 from ecu.bus.signal_map import load_signal_map
 from ecu.contract.signals import INPUT, INPUT_SIGNALS, without_corner
 from ecu.errors import UserError
+from ecu.output import give, say
 from ecu.settings.config import load_config, new_params
 
 COUNTING: Final = {"counter", "count", "cnt", "cntr", "alive", "ctr", "no"}
@@ -64,7 +64,7 @@ def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) 
     interfaces = findings.interfaces
     series = read_series(read_frames(log, interfaces, findings.log), database)
     for line in damage_lines(findings):
-        print(line, file=sys.stderr)
+        say(line)
     found, drives = propose(series, car)
     if not found:
         raise UserError(str(dbc), "", f"names no four wheel speeds in {log}; give the database of this car")
@@ -85,9 +85,10 @@ def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) 
     text = map_text(found, here, (out or Path("map.toml")), dbc, strict, interfaces, bus, hints, car)
     _show(found, drives)
     for line in hints + _warnings(found):
-        print(line, file=sys.stderr)
+        say(line)
     if written := _written(text, out):
         load_signal_map(written)
+        _say_next(log, written)
     return 0
 
 
@@ -113,16 +114,23 @@ def _suggest_columns(log: Path, out: Path | None, car: Car) -> int:
         raise UserError(str(log), "", f"{remedy} by hand (docs/signal-maps.md)")
     _show(found, drives)
     for line in _warnings(found):
-        print(line, file=sys.stderr)
+        say(line)
     after = {one.target: timeout(one) for one in found}
     if written := _written(column_map_text(log, columns, found, after, car), out):
         read_column_map(written)
-        print(f"next: brake-ecu map check {log} --map {out}", file=sys.stderr)
+        _say_next(log, written)
     return 0
+
+
+def _say_next(log: Path, out: Path) -> None:
+    following = f"brake-ecu map check {log} --map {out}"
+    give(next=following)
+    say(f"next: {following}")
 
 
 def _written(text: str, out: Path | None) -> Path | None:
     """Print a map, or write it and return where."""
+    give(map=text)
     if out is None:
         print(text)
         return None
@@ -131,7 +139,8 @@ def _written(text: str, out: Path | None) -> Path | None:
         out.write_text(text, encoding="utf-8")
     except OSError as error:
         raise UserError(str(out), "", f"cannot be written ({error.strerror}); choose another --out") from None
-    Console(stderr=True).print(f"written: {out}; check and edit it", highlight=False)
+    say(f"written: {out}; check and edit it")
+    give(written=[out])
     return out
 
 
@@ -159,12 +168,18 @@ def _show(found: list[Found], drives: bool) -> None:
         first = ones[0]
         table.add_row(stem, first.series.message, signals, first.unit, f"{first.factor:.4g}", evidence)
     console.print(table)
+    told = ("target", "factor", "offset", "unit", "evidence", "sure", "warning")
+    give(inputs=[{name: getattr(one, name) for name in told} | _source(one) for one in found])
     targets = {one.target for one in found}
     missing = [without_corner(name) for name in WANTED if name not in targets]
     if missing:
         console.print(f"nothing found for {', '.join(missing)}", highlight=False)
     if not drives:
         console.print("the car stands in this log: signs and scales could not be checked", highlight=False)
+
+
+def _source(found: Found) -> dict[str, str]:
+    return {"message": found.series.message, "signal": found.series.signal}
 
 
 def _counter(series: list[Series], message: str) -> str | None:

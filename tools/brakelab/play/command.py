@@ -5,7 +5,6 @@ until shortly before a frame is due, then polls the clock.
 """
 
 import signal
-import sys
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import partial
@@ -22,6 +21,7 @@ from ecu.bus.channel import open_channel
 from ecu.bus.protocol import Channel
 from ecu.contract.records import FRAME_FD, RecordArray
 from ecu.errors import UserError
+from ecu.output import give, say
 from ecu.runtime.clock import Histogram, TimeSource, system_time
 
 SPEEDS: Final = (0.1, 20.0)
@@ -35,6 +35,7 @@ FORGETTING: Final = 256  # wake-ups
 AWAKE_NS, NAP_NS = 500_000, 40_000
 
 INTERRUPTED: Final = 130
+SHARES: Final = (("p50", 0.5), ("p99", 0.99))
 
 
 class Waker:
@@ -92,7 +93,7 @@ def play(log: Path, interface: str, channel: str, map: Path | None, speed: float
     if not log.exists():
         raise UserError(str(log), "", "no such file; give an existing log")
     if map and (line := check_map(map, load_source(map), log)):
-        print(line, file=sys.stderr)
+        say(line)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)  # a shell's background jobs ignore SIGINT
     sent, code = Sent(), 0
@@ -109,17 +110,22 @@ def play(log: Path, interface: str, channel: str, map: Path | None, speed: float
         finally:
             bus.close()
     print(_summary(ahead.findings, sent, code))
+    give(
+        log=log,
+        sent=sent.taken,
+        refused=sent.offered - sent.taken,
+        late_us={name: 1e-3 * sent.late.quantile(share) for name, share in SHARES} if sent.taken else None,
+    )
     for line in damage_lines(ahead.findings):
-        print(line, file=sys.stderr)
+        say(line)
     return code
 
 
 def _warn_of_no_priority(reason: str) -> None:
     if reason:
-        print(
+        say(
             f"SCHED_FIFO: {reason}: frames may leave late; grant CAP_SYS_NICE, or `rtprio {PRIORITY}` in "
-            "/etc/security/limits.conf",
-            file=sys.stderr,
+            "/etc/security/limits.conf"
         )
 
 

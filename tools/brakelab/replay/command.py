@@ -1,6 +1,5 @@
 """`brake-ecu replay`: recorded logs, one drive in the order given, through the code of the ECU."""
 
-import sys
 from collections.abc import Sequence
 from contextlib import closing
 from itertools import chain
@@ -26,7 +25,7 @@ from brakelab.replay.needed import (
 from brakelab.replay.progress import progress_bar
 from brakelab.replay.quality import Findings, quality_counts, quality_lines
 from brakelab.replay.source import check_map, load_source, radius_line
-from brakelab.replay.summary import brakings_table, prediction_lines, taps
+from brakelab.replay.summary import brakings_table, prediction_errors, prediction_lines, taps
 from brakelab.results.car import KEY as CAR
 from brakelab.results.car import car_of
 from brakelab.results.console import new_console
@@ -41,6 +40,7 @@ from ecu.bus.receive import ReceivePlan
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CORNERS
 from ecu.errors import RunFault, UserError
+from ecu.output import detail, give, say, wrote
 from ecu.recording.recorder import read_recording
 from ecu.recording.restored import restored
 from ecu.recording.store import open_store, save
@@ -64,8 +64,13 @@ def replay(
     """
     done = replay_into(logs, config, map, observer, state, out, cycles, progress=True)
     for line in done.notes:
-        print(line, file=sys.stderr)
+        say(line)
     _tell(done)
+    give(notes=done.notes)
+    if out.suffix in EXPORTS:
+        wrote(out)
+    else:
+        wrote(out, brakes_path(out), next=f"brake-ecu report {out} --out {out.with_suffix('.html')}")
     if nothing_usable(done.findings):
         names = ", ".join(group.name for group in NEEDED)
         raise RunFault(f"{out}: not one sample of the needed inputs was usable ({names})")
@@ -108,6 +113,7 @@ def replay_into(
     _check(logs, out, cycles)
     check_outputs(out, (out, brakes_path(out)), [*logs, config, *([map] if map else [])])
     source = load_source(map)
+    detail(f"{vehicle.name}, {vehicle.observer.kind}, {map or 'the database of the ECU'}")
     notes = [line for log in logs if map and (line := check_map(map, source, log))]
     recording = read_recording(cycles) if cycles else None
     params = new_params(vehicle)
@@ -187,6 +193,8 @@ def _tell(done: Replayed) -> None:
     console = new_console()
     frames = sum(found.log.frames for found in findings)
     samples = sum(found.signals.samples for found in findings)
+    give(result=writer.path, rows=writer.rows, frames=frames, samples=samples, brakes=writer.brakes.rows)
+    give(prediction=prediction_errors(writer.brakes.rows))
     written = f"{writer.path}: {writer.rows} rows from {frames} frames and {samples} samples"
     if not any(has_pressure(found) for found in findings):
         print(f"no brakings and no friction: {NO_PRESSURE.partition(',')[0]} in this drive\n{written}")

@@ -9,7 +9,7 @@ from rich.box import SIMPLE
 from rich.table import Table
 
 from brakelab.results.brakes import LEARNED, BrakeRow
-from brakelab.results.prediction import SHORT, Vector, errors, one_scale, running_average
+from brakelab.results.prediction import SHORT, Errors, Vector, errors, one_scale, running_average
 from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
 from ecu.contract.signals import CORNERS
 
@@ -46,6 +46,13 @@ def brakings_table(rows: Sequence[BrakeRow], nominal: Sequence[float]) -> Table:
 def taps(rows: Sequence[BrakeRow]) -> int:
     """Return how many applications in `rows` are too short for the table."""
     return sum(row.duration < SHORT for row in rows[:: len(CORNERS)])
+
+
+def prediction_errors(rows: Sequence[BrakeRow]) -> Errors | None:
+    """Return how far the predictions of the applications in `rows` were off, None: none counts."""
+    counted = [row for row in rows[:: len(CORNERS)] if not row.left_out]
+    measured = [row.specific_force_mean for row in counted]
+    return errors(measured, [row.specific_force_predicted for row in counted]) if counted else None
 
 
 def prediction_lines(rows: Sequence[BrakeRow]) -> list[str]:

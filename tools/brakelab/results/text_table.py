@@ -6,6 +6,8 @@ from typing import NamedTuple
 from rich.console import Console
 from rich.table import Table as RichTable
 
+from ecu.output import give_table
+
 
 class Table(NamedTuple):
     """A table with a sentence below."""
@@ -18,6 +20,7 @@ class Table(NamedTuple):
 
 def show(console: Console, table: Table) -> None:
     """Print it."""
+    give_table(table)
     printed = RichTable(title=table.title, caption=table.below, title_justify="left", caption_justify="left")
     for place, column in enumerate(table.columns):
         printed.add_column(column, justify="left" if place == 0 or column == "note" else "right")

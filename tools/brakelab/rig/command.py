@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from rich.console import Console
 
 from brakelab.report.command import report
 from brakelab.report.drive import Drive
@@ -25,13 +24,12 @@ from brakelab.simulation.scenario import Scenario, load_scenario
 from brakelab.vehicle_node import warm_up
 from ecu.contract.faults import fault_names
 from ecu.errors import RunFault, UserError
+from ecu.output import give, say
 from ecu.settings.config import Config, load_config
 from ecu.settings.resources import SCENARIOS, named, resource
 from ecu.warm import warm
 
 WIDTH: Final = 150  # columns of the table if the terminal's width is unknown
-
-say = Console(highlight=False, soft_wrap=True, stderr=True).print
 
 
 def found(names: Sequence[str]) -> list[Path]:
@@ -94,10 +92,12 @@ def rig(
             meeting.close()
     console = new_console(WIDTH)
     console.print(summary(outcomes))
+    give(scenarios=outcomes)
     write_tables(outcomes, out)
     page = out / "rig.html"
     page.write_text(write_page(outcomes, meeting, vehicle, seed), "utf-8")
     say(f"report: {page.resolve()}")
+    give(written=[page, out / "scenarios.parquet", out / "faults.parquet"])
     return int(any(result.unexplained or result.differing for result in outcomes))
 
 

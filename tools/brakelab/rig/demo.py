@@ -22,6 +22,7 @@ from brakelab.simulation.scenario import load_scenario
 from brakelab.vehicle_node import drive_in_real_time, new_node, wait_for_ecu, warm_up, write_truth_file
 from ecu.bus.channel import open_channel
 from ecu.contract.records import RecordArray
+from ecu.output import give
 from ecu.recording.recorder import read_recording
 from ecu.recording.ring import RingReader, ring_path
 from ecu.runtime.clock import system_time
@@ -97,6 +98,7 @@ def demo(out: Path) -> int:
     page = out / "report.html"
     report(written.result, out / "truth.parquet", page, recordings[0])
     say(f"report: {page.resolve()}")
+    give(written=[page, written.result, out / "truth.parquet"])
     return 0
 
 

@@ -1,6 +1,5 @@
 """Output of a bench: tables on the terminal, JSON, and pages of the documentation."""
 
-import json as json_format
 from typing import Any, Final
 
 from rich.console import Console
@@ -9,6 +8,7 @@ from brakelab.results.text_table import Table, markdown, show
 from brakelab.studies.measure import Figure, Row
 from brakelab.studies.provenance import measured_on
 from ecu import __version__
+from ecu.output import give, say
 from ecu.settings.resources import resource
 
 RESULTS: Final = "docs/results"
@@ -21,11 +21,6 @@ def plain_row(row: Any) -> dict[str, Any]:
     values = row._asdict().items()
     plain = {key: value._asdict() if isinstance(value, Figure) else value for key, value in values}
     return plain | {"ratio": row.ratio} if isinstance(row, Row) else plain
-
-
-def print_json(content: dict[str, Any]) -> None:
-    """Print it, indented."""
-    print(json_format.dumps(content, indent=1, ensure_ascii=False))
 
 
 def print_tables(line: str, tables: list[Table]) -> None:
@@ -47,7 +42,7 @@ def write_page(name: str, title: str, text: str, tables: list[Table], keep: bool
             sections = kept | sections
         content = "\n".join([f"# {title}", "", measured_on(), "", text, "", *sections.values()])
         (folder / name).write_text(content.rstrip() + "\n", encoding="utf-8")
-        Console(stderr=True).print(f"written: {RESULTS}/{name}", highlight=False)
+        say(f"written: {RESULTS}/{name}")
 
 
 def results_page(
@@ -59,10 +54,10 @@ def results_page(
     file: str | None = None,
     keep: bool = False,
 ) -> int:
-    """Print the tables of bench `name`, or JSON; renew its page, `file` or its name. Returns 0."""
+    """Print the tables of bench `name`, or give JSON; renew its page, `file` or its name. Returns 0."""
     of = f"`brake-ecu bench {name}`, version {__version__}"
     if json:
-        print_json({"of": of, "tables": [table._asdict() for table in tables]})
+        give(of=of, tables=tables)
         return 0
     print_tables(of, tables)
     write_page(f"{file or name}.md", title, f"{of}. {text}", tables, keep)

@@ -22,6 +22,7 @@ from brakelab.tuning.replay import replay_errors
 from brakelab.tuning.search import RANGES, Best, search
 from ecu import __version__
 from ecu.errors import UserError
+from ecu.output import give, say
 from ecu.settings.config import Config, config_hash, load_config
 
 FIRST_SESSION: Final = ("fixed-pedal", "bursts")
@@ -169,3 +170,5 @@ def _tell(out: Path, of: str, rows: Sequence[Row], seeds: int) -> None:
     console.print(f"brake-ecu tune, {of}", highlight=False)
     show(console, Table("Friction by Observer 2: nRMSE [%]", columns, lines, below))
     console.print(f"written: {out}", highlight=False)
+    give(written=[out], sessions=rows)
+    say(f'next: brake-ecu replay LOG --config CAR.toml --out drive.parquet, CAR.toml with include = "{out}"')
