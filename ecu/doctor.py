@@ -71,7 +71,7 @@ def doctor(config: Path | None, map: Path | None, interface: str | None, channel
         say(f"listening to {channel} for {LISTEN_S:.0f} s")
         checks += bus(interface, channel, plan, config)
     _show(checks)
-    give(checks=checks)
+    give(checks=[check._replace(remedy="") if check.good else check for check in checks])
     return 0 if all(check.good for check in checks) else 1
 
 
