@@ -175,7 +175,7 @@ def prepare(options: RunOptions) -> Session:
 def _check_metrics(place: str) -> None:
     """Raise UserError for metrics that can never be served at `place`, ADDRESS:PORT."""
     if find_spec("prometheus_client") is None:
-        raise UserError("--metrics-port", "", "needs prometheus-client: pip install 'brake-ecu[metrics]'")
+        raise UserError("--metrics-port", "", "needs prometheus-client: pip install prometheus-client")
     address = place.rpartition(":")[0]
     try:
         IPv4Address(address)

@@ -131,7 +131,7 @@ def _mdf(path: Path, names: list[str]) -> Vector:
     try:
         from asammdf import MDF
     except ImportError:
-        raise UserError(str(path), "", "needs the extra mdf: pip install 'brake-ecu[mdf]'") from None
+        raise UserError(str(path), "", "MDF4 needs asammdf: pip install asammdf") from None
     with MDF(path) as file:
         _refuse_missing(path, names[1:], list(file.channels_db))
         pressure = file.get(names[1])

@@ -46,7 +46,7 @@ class Measurement:
         try:
             from asammdf import MDF
         except ImportError:
-            raise UserError(str(path), "", "MDF4 needs asammdf: pip install 'brake-ecu[mdf]'") from None
+            raise UserError(str(path), "", "MDF4 needs asammdf: pip install asammdf") from None
         logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # the same, in one line, comes from here
         # Where its constructor fails its destructor does so too, and Python would print that.
         hook, sys.unraisablehook = sys.unraisablehook, lambda _: None

@@ -54,7 +54,7 @@ def load_mcap(path: Path) -> Any:
     try:
         from mcap.writer import Writer
     except ImportError:
-        raise UserError(str(path), "", "MCAP needs mcap: pip install 'brake-ecu[mcap]'") from None
+        raise UserError(str(path), "", "MCAP needs mcap: pip install mcap") from None
     return Writer
 
 

@@ -31,7 +31,7 @@ def load_asammdf(path: Path) -> Any:
     try:
         import asammdf
     except ImportError:
-        raise UserError(str(path), "", "MDF4 needs asammdf: pip install 'brake-ecu[mdf]'") from None
+        raise UserError(str(path), "", "MDF4 needs asammdf: pip install asammdf") from None
     return asammdf
 
 
