@@ -44,8 +44,14 @@ def visible(page: str) -> str:
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory) -> str:
-    return visible(written(write_drive(tmp_path_factory.mktemp("drive"))))
+def source(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The page on the whole drive, as written."""
+    return written(write_drive(tmp_path_factory.mktemp("drive")))
+
+
+@pytest.fixture(scope="module")
+def page(source: str) -> str:
+    return visible(source)
 
 
 @pytest.mark.parametrize(
@@ -76,11 +82,10 @@ def test_page_says(page: str, text: str) -> None:
     assert text in page
 
 
-def test_page_is_small_and_names_no_address(drive_files: Files) -> None:
-    page = written(drive_files)
-    assert len(page.encode()) < 3_000_000
-    assert not re.search(r"<(script|link|img|iframe)[^>]+(src|href)=", page)
-    assert "default-src 'none'" in page
+def test_page_is_small_and_names_no_address(source: str) -> None:
+    assert len(source.encode()) < 3_000_000
+    assert not re.search(r"<(script|link|img|iframe)[^>]+(src|href)=", source)
+    assert "default-src 'none'" in source
 
 
 def test_a_quarter_of_an_hour_with_45_brakings_stays_small(drive_files: Files) -> None:
@@ -131,9 +136,8 @@ def test_a_drive_without_brakings_draws_nothing_empty(
     assert caplog.records == []
 
 
-def test_brakings_as_csv_are_in_the_page(drive_files: Files) -> None:
-    page = written(drive_files)
-    address = re.search(r'<a download="stops\.brakings\.csv" href="data:text/csv[^,]*,([^"]*)"', page)
+def test_brakings_as_csv_are_in_the_page(source: str) -> None:
+    address = re.search(r'<a download="stops\.brakings\.csv" href="data:text/csv[^,]*,([^"]*)"', source)
     assert address
     assert len(unquote(address[1]).splitlines()) == 1 + 3
 
@@ -145,17 +149,16 @@ def test_names_from_outside_are_text(drive_files: Files) -> None:
     assert "&lt;script&gt;alert(1)" in written(drive_files)
 
 
-def test_truth_is_shifted_by_the_dates_of_the_first_rows(drive_files: Files) -> None:
+def test_truth_is_shifted_by_the_dates_of_the_first_rows(drive_files: Files, page: str) -> None:
     date = {"start_time_ns": "1717240000000000000"}
 
     def start_earlier(table: pa.Table) -> pa.Table:
         moved = pa.array(table.column("t").to_numpy() + 1.0)
         return table.set_column(0, "t", moved).replace_schema_metadata(date)
 
-    plain = visible(written(drive_files))
     change(drive_files["truth"], start_earlier)
     row = re.compile(r"front (\S+) (\S+) \d+ \S+ rear")
-    assert row.search(visible(written(drive_files))).groups() == row.search(plain).groups()  # type: ignore[union-attr]
+    assert row.search(visible(written(drive_files))).groups() == row.search(page).groups()  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize(

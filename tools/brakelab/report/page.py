@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping
 from importlib.resources import files
 from importlib.resources.abc import Traversable
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, cast
 
 from bokeh.document import Document
 from bokeh.embed import components
@@ -50,6 +50,15 @@ def kmh(speed: float) -> str:
     return fixed(abs(speed) * 3.6, 0)
 
 
+def embed(figures: Mapping[str, Any]) -> tuple[str, dict[str, str]]:
+    """Return the script that draws the figures, and the place of each, by name."""
+    document = Document()
+    with document.models.freeze():  # else every figure added walks through all of them once more
+        for figure in figures.values():
+            document.add_root(figure)
+    return cast(tuple[str, dict[str, str]], components(dict(figures)))
+
+
 def fill(
     plots: Mapping[str, Mapping[str, Any]],
     content: Mapping[str, Any],
@@ -57,11 +66,7 @@ def fill(
 ) -> str:
     """Return the page; `plots` maps the template's places to figures by name, `content` is the rest."""
     figures = {name: plot for group in plots.values() for name, plot in group.items()}
-    document = Document()
-    with document.models.freeze():  # else every figure added walks through all of them once more
-        for figure in figures.values():
-            document.add_root(figure)
-    script, divs = components(figures)
+    script, divs = embed(figures)
     here = files("brakelab.report")
     # Autoescape: names of files and metadata come from outside.
     page = Environment(
