@@ -18,7 +18,8 @@ for name in ("BRAKE_ECU_DEBUG", "NOTIFY_SOCKET", "COLUMNS", "FORCE_COLOR", "GITH
     os.environ.pop(name, None)
 
 # Small matrices: threads of their own in every worker cost more than they give.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+    os.environ.setdefault(name, "1")
 
 CHECKOUT = Path(__file__).parent.parent
 
