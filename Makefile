@@ -19,6 +19,8 @@ help:
 	@echo "ARGS=... goes to the command: make test ARGS=tests/ecu, make demo ARGS='--out out/first'."
 
 demo: .venv/lab
+	@echo "Compiling what is not in the cache yet: minutes the first time, seconds later"
+	@.venv/bin/python -m brakelab.warm
 	.venv/bin/brake-ecu demo $(ARGS)
 
 test: .venv/dev

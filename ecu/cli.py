@@ -173,8 +173,10 @@ def wear(
 ) -> int:
     """Show how thick the brake pads are and how far they last. Register new and measured ones."""
     from ecu import pads
+    from ecu.compiling import compiling_told
 
-    return pads.wear_command(config, state, new_pads, measured)
+    with compiling_told():
+        return pads.wear_command(config, state, new_pads, measured)
 
 
 @app.command()

@@ -18,7 +18,8 @@ class _Words(numba_event.Listener):  # type: ignore[misc]
             say("compiling kernels that are not in the cache yet: once per version, minutes at most")
         self.told = True
         function = event.data["dispatcher"].py_func
-        detail(f"compiling {function.__module__}.{function.__qualname__}")
+        if not function.__module__.startswith("numba."):
+            detail(f"compiling {function.__module__}.{function.__qualname__}")
 
     def on_end(self, event: Any) -> None:
         pass

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -13,3 +14,20 @@ def test_what_was_compiled_once_is_loaded_by_the_next_process() -> None:
         for _ in range(2)
     ]
     assert runs[1].stdout.splitlines() == ["0 kernels compiled", "0 kernels of the laboratory compiled"]
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("scenario", ["fade", "blending-40", "low-grip"])
+def test_a_first_drive_compiles_nothing(scenario: str, tmp_path: Path) -> None:
+    """Other linings, motors and roads than the one that warming drives."""
+    subprocess.run([sys.executable, "-m", "brakelab.warm"], capture_output=True, check=True)
+    brake_ecu = [sys.executable, "-m", "ecu.cli", "--verbose"]
+    for line in (
+        f"simulate {scenario} --config suv --out drive",
+        "replay drive.log --config suv --out result.parquet",
+    ):
+        done = subprocess.run(
+            [*brake_ecu, *line.split()], cwd=tmp_path, capture_output=True, text=True, check=True
+        )
+        assert "compiling" not in done.stderr
+        assert "next: brake-ecu " in done.stderr

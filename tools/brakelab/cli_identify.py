@@ -46,8 +46,10 @@ def friction(
 ) -> int:
     """Identify a friction law from dynamometer recordings. Fit all laws, choose one, state its limits."""
     from brakelab.friction_lab import command
+    from ecu.compiling import compiling_told
 
-    return command.friction(data, columns, held_out, out, profile, tuple(own or ()))
+    with compiling_told():
+        return command.friction(data, columns, held_out, out, profile, tuple(own or ()))
 
 
 @app.command()

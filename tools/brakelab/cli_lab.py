@@ -70,8 +70,10 @@ def run(
 ) -> int:
     """Run a programme on the dynamometer. Record at 200 Hz; the pad follows none of the friction laws."""
     from brakelab.friction_lab import command
+    from ecu.compiling import compiling_told
 
-    return command.run(programme, brake, seed, out, law, linings)
+    with compiling_told():
+        return command.run(programme, brake, seed, out, law, linings)
 
 
 @app.command()

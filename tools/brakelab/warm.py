@@ -1,10 +1,13 @@
-"""`python -m brakelab.warm`: compile the kernels of daemon and simulated vehicle, each once, on two cores.
+"""`python -m brakelab.warm`: compile the kernels of daemon, simulated vehicle and replay, on two cores.
 
+Afterwards `simulate`, `replay`, `rig` and `demo` compile nothing, whatever scenario and friction law.
 Processes that start together on an empty cache would each compile all they use.
 """
 
 import subprocess
 import sys
+import tempfile
+from pathlib import Path
 
 import numpy as np
 
@@ -12,9 +15,13 @@ from brakelab.plant.description import load_plant
 from brakelab.plant.draw import draw, load_widths
 from brakelab.plant.records import COMMANDS
 from brakelab.plant.vehicle import STEP, advance, new_state
+from brakelab.replay.command import replay_into
 from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.scenario import load_scenario
+from brakelab.simulation.simulate import simulate
+from brakelab.vehicle_node import warm_up
 from ecu.jit import CompileCounter
+from ecu.output import Level, asked, new_policy
 from ecu.settings.config import load_config
 from ecu.settings.resources import resource
 
@@ -33,12 +40,25 @@ def compile_closed_loop() -> None:
     run(new_loop(scenario, load_config(resource("config/suv.toml")), 0), seconds=0.05)
 
 
+def compile_commands() -> None:
+    """Compile what `simulate` and `replay` do around that: frames to text and back, the rows of a result."""
+    scenario, config = resource("config/scenarios/stop-1.toml"), resource("config/suv.toml")
+    with tempfile.TemporaryDirectory(prefix="brake-ecu-") as folder, new_policy() as policy:
+        policy.level = Level.QUIET
+        drive = Path(folder) / "drive"
+        with asked():
+            simulate(scenario, config, drive)
+            replay_into([Path(f"{drive}.log")], config, None, None, None, Path(folder) / "result.parquet")
+
+
 def main() -> int:
     compiled = CompileCounter()
     daemon = subprocess.Popen([sys.executable, "-m", "ecu.warm"])
     compile_vehicle()
     failed = daemon.wait()
     compile_closed_loop()
+    warm_up(load_scenario(resource("config/scenarios/demo.toml")))
+    compile_commands()
     print(f"{compiled.count} kernels of the laboratory compiled")
     return failed
 

@@ -6,13 +6,11 @@ from functools import partial
 from multiprocessing import get_context
 from typing import Final
 
-from rich.console import Console
-from rich.progress import track
-
 from brakelab.bench.observer_times import step_times
 from brakelab.bench.times import BENCHES, run_times
 from brakelab.entries.command import ENTRIES, NOBODY, Entered, bench_entries
 from brakelab.results.chart import write_chart
+from brakelab.results.progress import tracked
 from brakelab.studies import (
     ablation,
     bound,
@@ -60,7 +58,7 @@ from brakelab.studies.texts import (
 )
 from ecu import __version__
 from ecu.errors import UserError
-from ecu.output import give
+from ecu.output import give, say
 from ecu.settings.config import Config, config_hash, load_config
 from ecu.settings.resources import resource
 
@@ -130,14 +128,13 @@ def bench(
 def _stops(json: bool, seeds: int, draw: str) -> int:
     path = resource("config/suv.toml")
     config = load_config(path)
-    console = Console(stderr=True)
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
 
         def all_cores(
             drive: stops_bench.Case, cases: list[stops_bench.Named]
         ) -> Iterable[stops_bench.Result]:
             results = pool.map(drive, cases)
-            return track(results, "stops", len(cases), console=console, transient=True)
+            return tracked(results, "stops", len(cases))
 
         result = stops_bench.stops(config, seeds, spread=all_cores, draw=draw)
     of = _of(path.name, config, draw, seeds)
@@ -159,12 +156,11 @@ def _of(name: str, config: Config, draw: str, seeds: int) -> str:
 
 
 def _observers(json: bool, seeds: int, draw: str) -> int:
-    console = Console(stderr=True)
     todo = tasks(seeds, draw)
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
 
         def all_cores(drive: Callable[[Task], list[Sample]], cars: list[Task]) -> Iterable[list[Sample]]:
-            return track(pool.map(drive, cars), OBSERVERS, len(cars), console=console, transient=True)
+            return tracked(pool.map(drive, cars), OBSERVERS, len(cars))
 
         rows = observer_rows(todo, all_cores)
         consistency = list(pool.map(consistency_of, range(min(seeds, PICTURED))))
@@ -268,8 +264,7 @@ def _lab(json: bool) -> int:
     from brakelab.studies.lab_table import lab_tables
     from brakelab.studies.lab_text import LAB_TEXT
 
-    console = Console(stderr=True)
-    lab = run_lab(lambda line: console.print(line, highlight=False, markup=False))
+    lab = run_lab(say)
     if not json:
         write_pictures(resource(PICTURES), lab)
     return results_page(LAB, "The friction laboratory", LAB_TEXT, lab_tables(lab), json, "friction-lab")

@@ -5,21 +5,19 @@ from functools import partial
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from rich.console import Console
-from rich.progress import track
-
 from brakelab.entries.drives import car_tracks, real_drive
 from brakelab.entries.export import export_car, new_folder
 from brakelab.entries.ours import OURS
 from brakelab.entries.study import class_of, judge_car, predict_all
 from brakelab.entries.table import entry_tables, standings
+from brakelab.results.progress import tracked
 from brakelab.studies.cars import each_car
 from brakelab.studies.measure import machine
 from brakelab.studies.observers_table import finite
 from brakelab.studies.output import print_tables, write_page
 from ecu import __version__
 from ecu.errors import UserError
-from ecu.output import give
+from ecu.output import give, say
 from ecu.settings.resources import resource
 
 ENTRIES: Final = "entries"
@@ -64,15 +62,15 @@ def bench_entries(json: bool, seeds: int, entered: Entered) -> int:
     Raises:
         UserError: an observer cannot be loaded, a log not read, or the folder not written.
     """
-    cars, console = min(seeds, CARS), Console(stderr=True)
+    cars = min(seeds, CARS)
     for name in entered.observers:
         class_of(name)
     if entered.export is not None:
-        return _export(entered.export, cars, console)
+        return _export(entered.export, cars)
     names = tuple(dict.fromkeys((*OURS, *entered.observers)))
     car, log = _drive(entered.drive)
     real = None if log is None else real_drive(car, log)
-    console.print(f"{cars} cars are driven and heard by {len(names)} entries: minutes", highlight=False)
+    say(f"{cars} cars are driven and heard by {len(names)} entries: minutes")
     results = each_car(ENTRIES, partial(judge_car, names), cars)
     predictions = {} if real is None else predict_all(names, real)
     found = standings(results, predictions)
@@ -104,12 +102,11 @@ def _drive(named: str | None) -> tuple[str, Path | None]:
     return car, Path(log)
 
 
-def _export(folder: Path, cars: int, console: Console) -> int:
+def _export(folder: Path, cars: int) -> int:
     new_folder(folder)
-    console.print(f"{cars} cars are driven: minutes", highlight=False)
-    for seed in track(range(cars), ENTRIES, console=console, transient=True):
+    say(f"{cars} cars are driven: minutes")
+    for seed in tracked(range(cars), ENTRIES, cars):
         export_car(folder, seed, car_tracks(seed))
-    console.print(
-        f"written: {folder}, inputs and truth of {cars} cars; next: docs/benchmark.md", highlight=False
-    )
+    say(f"written: {folder}, inputs and truth of {cars} cars; next: docs/benchmark.md")
+    give(written=[folder])
     return 0

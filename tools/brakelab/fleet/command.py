@@ -17,8 +17,8 @@ from brakelab.fleet.run import Chain, Planned, run_fleet
 from brakelab.fleet.statistics import notes
 from brakelab.fleet.summary import summary_table, when
 from brakelab.fleet.wear import pads_table
-from brakelab.replay.progress import progress_bar
 from brakelab.replay.source import load_source
+from brakelab.results.progress import progress_bar
 from brakelab.simulation.observer import with_observer
 from ecu.errors import UserError
 from ecu.output import fault, give, say, wrote

@@ -22,7 +22,7 @@ import numpy as np
 from brakelab.fleet.job import Job, Outcome
 from brakelab.fleet.task import replay_job
 from brakelab.logs.candump_text import candump_text
-from brakelab.replay.progress import progress_bar
+from brakelab.results.progress import progress_bar
 from brakelab.simulation.closed_loop import START_NS, VEHICLE_BUS, new_loop, run, run_blocks
 from brakelab.simulation.scenario import Scenario
 from brakelab.simulation.simulate import write_columns

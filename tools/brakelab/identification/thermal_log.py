@@ -15,9 +15,9 @@ from brakelab.identification.thermal_model import ROW, Array, Course
 from brakelab.log_physics.samples import DISC_TEMPERATURE_MEASURED, KEPT
 from brakelab.replay.engine import new_ecu
 from brakelab.replay.log import log_size, replay_log
-from brakelab.replay.progress import progress_bar
 from brakelab.replay.quality import Findings
 from brakelab.replay.source import load_source
+from brakelab.results.progress import progress_bar
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import AMBIENT_TEMPERATURE, CALLIPER_PRESSURE, CYCLE_NS, OUTPUT, RAIN, WHEEL_SPEED
 from ecu.settings.config import Config, new_params

@@ -17,9 +17,9 @@ from brakelab.log_physics.samples import ANY_CAR, SAMPLED, Collector
 from brakelab.replay.engine import new_ecu
 from brakelab.replay.log import log_size, replay_log
 from brakelab.replay.needed import nothing_usable
-from brakelab.replay.progress import progress_bar
 from brakelab.replay.quality import Findings
 from brakelab.replay.source import check_map, load_source
+from brakelab.results.progress import progress_bar
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CORNERS, INPUT_SIGNALS
 from ecu.errors import UserError

@@ -11,10 +11,10 @@ from brakelab.log_physics.samples import ANY_CAR, Collector, car_of
 from brakelab.replay.engine import new_ecu
 from brakelab.replay.log import log_size, replay_log
 from brakelab.replay.needed import needed_lines
-from brakelab.replay.progress import progress_bar
 from brakelab.replay.quality import Findings, quality_counts, quality_lines
 from brakelab.replay.source import Source, check_map, load_source, radius_line
 from brakelab.results.console import new_console
+from brakelab.results.progress import progress_bar
 from ecu.bus.signal_map import read_signal_map
 from ecu.contract.signals import without_corner
 from ecu.errors import UserError

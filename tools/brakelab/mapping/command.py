@@ -55,6 +55,7 @@ def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) 
     """
     params = new_params(load_config(config))[0] if config else None
     car = ANY_CAR if params is None else car_of(params)
+    say(f"reading {log}")
     if kind_of(log) == "signals":
         return _suggest_columns(log, out, car)
     if dbc is None:

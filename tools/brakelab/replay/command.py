@@ -22,7 +22,6 @@ from brakelab.replay.needed import (
     nothing_usable,
     request_line,
 )
-from brakelab.replay.progress import progress_bar
 from brakelab.replay.quality import Findings, quality_counts, quality_lines
 from brakelab.replay.source import check_map, load_source, radius_line
 from brakelab.replay.summary import brakings_table, prediction_errors, prediction_lines, taps
@@ -33,6 +32,7 @@ from brakelab.results.files import EXPORTS, ResultWriter, brakes_path
 from brakelab.results.outputs import check_outputs
 from brakelab.results.pads import pads_of
 from brakelab.results.prediction import SHORT
+from brakelab.results.progress import progress_bar
 from brakelab.simulation.observer import with_observer
 from ecu import __version__
 from ecu.algorithm.step import new_state

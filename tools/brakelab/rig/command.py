@@ -22,6 +22,7 @@ from brakelab.rig.results import write_recorded, write_simulated
 from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.scenario import Scenario, load_scenario
 from brakelab.vehicle_node import warm_up
+from ecu.compiling import compiling_told
 from ecu.contract.faults import fault_names
 from ecu.errors import RunFault, UserError
 from ecu.output import give, say
@@ -79,14 +80,15 @@ def rig(
         warm()
     outcomes = []
     try:
-        for path, scenario in scenarios:
-            folder = out / path.stem
-            folder.mkdir(exist_ok=True)
-            say(f"driving {path.stem}")
-            if meeting is None:
-                outcomes.append(_in_memory(path.stem, scenario, vehicle, folder, seed))
-            else:
-                outcomes.append(_in_real_time(path, scenario, meeting, config, vehicle, folder, seed))
+        with compiling_told():
+            for path, scenario in scenarios:
+                folder = out / path.stem
+                folder.mkdir(exist_ok=True)
+                say(f"driving {path.stem}")
+                if meeting is None:
+                    outcomes.append(_in_memory(path.stem, scenario, vehicle, folder, seed))
+                else:
+                    outcomes.append(_in_real_time(path, scenario, meeting, config, vehicle, folder, seed))
     finally:
         if meeting is not None:
             meeting.close()

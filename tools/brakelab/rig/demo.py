@@ -22,7 +22,7 @@ from brakelab.simulation.scenario import load_scenario
 from brakelab.vehicle_node import drive_in_real_time, new_node, wait_for_ecu, warm_up, write_truth_file
 from ecu.bus.channel import open_channel
 from ecu.contract.records import RecordArray
-from ecu.output import give
+from ecu.output import Level, give, policy
 from ecu.recording.recorder import read_recording
 from ecu.recording.ring import RingReader, ring_path
 from ecu.runtime.clock import system_time
@@ -76,6 +76,11 @@ class Brakings:
                 self._t, self._rows = [], []
 
 
+def _say_on_the_way(line: str) -> None:
+    if policy().level > Level.QUIET:
+        say(line)
+
+
 def demo(out: Path) -> int:
     """Run the demonstration; leave report, recording, truth and results in `out`; return the exit code 0.
 
@@ -85,11 +90,11 @@ def demo(out: Path) -> int:
     """
     make_folder(out)
     config, bus = resource("config/suv.toml"), choose_bus()
-    say(f"bus: {bus.why}")
-    say("compiling what is not in the cache yet, about a minute the first time")
+    _say_on_the_way(f"bus: {bus.why}")
+    _say_on_the_way("compiling what is not in the cache yet, about a minute the first time")
     warm_up(load_scenario(resource(SCENARIO)))
     warm()
-    say("driving: a staircase of 1 to 5 m/s² and three stops, about 70 s")
+    _say_on_the_way("driving: a staircase of 1 to 5 m/s² and three stops, about 70 s")
     if bus.interface == "virtual":
         recordings = _in_one_process(bus, config, out)
     else:

@@ -8,8 +8,8 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from brakelab.logs.candump_text import candump_text
-from brakelab.replay.progress import progress_bar
 from brakelab.results.outputs import check_outputs
+from brakelab.results.progress import progress_bar
 from brakelab.simulation.closed_loop import START_NS, VEHICLE_BUS, new_loop, run
 from brakelab.simulation.scenario import load_scenario
 from brakelab.simulation.scenario_car import with_draw
@@ -43,21 +43,22 @@ def simulate(scenario: Path, config: Path, out: Path, seed: int = 0, draw: str |
     driven = load_scenario(scenario)
     if draw is not None:
         driven = with_draw(driven, draw)
-    with progress_bar("simulate", None):
-        result = run(new_loop(driven, load_config(config), seed))
     metadata = {
         "start_time_ns": str(START_NS),
         "scenario": scenario.stem,
         "seed": str(seed),
         "draw": driven.draw,
     }
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        log.write_bytes(candump_text(result.frames, VEHICLE_BUS))
-        write_columns(inputs, result.t, result.inputs, metadata)
-        write_columns(truth, result.t, result.truth, metadata)
-    except OSError as error:
-        raise UserError(str(out), "", f"cannot be written ({error.strerror}); choose another --out") from None
+    with progress_bar("simulate", None):
+        result = run(new_loop(driven, load_config(config), seed))
+        try:
+            out.parent.mkdir(parents=True, exist_ok=True)
+            log.write_bytes(candump_text(result.frames, VEHICLE_BUS))
+            write_columns(inputs, result.t, result.inputs, metadata)
+            write_columns(truth, result.t, result.truth, metadata)
+        except OSError as error:
+            remedy = f"cannot be written ({error.strerror}); choose another --out"
+            raise UserError(str(out), "", remedy) from None
     give(seconds=float(result.t[-1]), frames=len(result.frames))
     again = f"brake-ecu replay {log} --config {command_name(config)} --out {out}.result.parquet"
     wrote(log, inputs, truth, next=again)

@@ -5,14 +5,12 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from typing import TypeVar
 
-from rich.console import Console
-from rich.progress import track
+from brakelab.results.progress import tracked
 
 Car = TypeVar("Car")
 
 
 def each_car(name: str, drive: Callable[[int], Car], cars: int) -> list[Car]:
     """Return the results of `drive` for the cars 0 to `cars` - 1; `name` stands before the progress."""
-    console = Console(stderr=True)
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
-        return list(track(pool.map(drive, range(cars)), name, cars, console=console, transient=True))
+        return list(tracked(pool.map(drive, range(cars)), name, cars))

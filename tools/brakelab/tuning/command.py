@@ -4,9 +4,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from brakelab.replay.progress import progress_bar
 from brakelab.results.console import new_console
 from brakelab.results.outputs import check_outputs
+from brakelab.results.progress import progress_bar
 from brakelab.results.text_table import Table, show
 from brakelab.simulation.observer import with_observer
 from brakelab.simulation.scenario import Scenario, load_scenario

@@ -2,7 +2,7 @@
 
 import pytest
 
-from brakelab.replay.progress import Lines, progress_bar
+from brakelab.results.progress import Lines, progress_bar
 
 
 def test_long_work_says_how_far_it_is_every_ten_seconds(capsys: pytest.CaptureFixture[str]) -> None:

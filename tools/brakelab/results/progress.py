@@ -1,9 +1,9 @@
 """Progress of long work on stderr: a bar on a terminal, elsewhere a line every ten seconds."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import Final
+from typing import Final, TypeVar
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
@@ -12,6 +12,7 @@ from ecu.compiling import compiling_told
 from ecu.output import say
 
 PERIOD_S: Final = 10.0
+Item = TypeVar("Item")
 
 
 @contextmanager
@@ -32,6 +33,14 @@ def progress_bar(text: str, total: float | None, shown: bool = True) -> Iterator
         with Progress(*columns, console=console, transient=True) as progress:
             task = progress.add_task(text, total=total)
             yield lambda amount: progress.advance(task, amount)
+
+
+def tracked(items: Iterable[Item], text: str, total: int) -> Iterator[Item]:
+    """Yield `items`, of which there are `total`, with their progress."""
+    with progress_bar(text, total) as advance:
+        for item in items:
+            yield item
+            advance(1.0)
 
 
 class Lines:
