@@ -1,20 +1,35 @@
 """Progress where no terminal is: lines, and none for what is short."""
 
+import time
+
 import pytest
 
-from brakelab.results.progress import Lines, progress_bar
+from brakelab.results import progress
+from brakelab.results.progress import progress_bar, tracked
 
 
-def test_long_work_says_how_far_it_is_every_ten_seconds(capsys: pytest.CaptureFixture[str]) -> None:
-    clock = iter([0.0, 4.0, 11.0, 12.0, 25.0])
-    lines = Lines("replay", 200.0, lambda: next(clock))
-    for _ in range(4):
-        lines.advance(40.0)
-    assert capsys.readouterr().err == "replay: 40 %, 11 s\nreplay: 80 %, 25 s\n"
+def _wait_for(capsys: pytest.CaptureFixture[str], line: str) -> None:
+    said, end = "", time.monotonic() + 20.0
+    while line not in said and time.monotonic() < end:
+        said += capsys.readouterr().err
+    assert line in said.splitlines()
+
+
+def test_long_work_says_how_far_it_is(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(progress, "PERIOD_S", 0.01)
+    with progress_bar("replay", 200.0) as advance:
+        advance(80.0)
+        _wait_for(capsys, "replay: 40 %, 0 s")
+        advance(80.0)
+        _wait_for(capsys, "replay: 80 %, 0 s")
+    with progress_bar("simulate", None):
+        _wait_for(capsys, "simulate: 0 s")
 
 
 def test_short_work_and_work_from_python_say_nothing(capsys: pytest.CaptureFixture[str]) -> None:
-    for shown in (True, False):
-        with progress_bar("replay", 2.0, shown) as advance:
-            advance(1.0)
+    assert list(tracked("abc", "cars", 3)) == ["a", "b", "c"]
+    with progress_bar("replay", 2.0, shown=False) as advance:
+        advance(1.0)
     assert capsys.readouterr().err == ""

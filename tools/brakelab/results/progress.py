@@ -1,5 +1,6 @@
 """Progress of long work on stderr: a bar on a terminal, elsewhere a line every ten seconds."""
 
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -27,7 +28,8 @@ def progress_bar(text: str, total: float | None, shown: bool = True) -> Iterator
     console = Console(stderr=True)
     with compiling_told():
         if not console.is_terminal:
-            yield Lines(text, total).advance
+            with _lines(text, total) as advance:
+                yield advance
             return
         columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn()
         with Progress(*columns, console=console, transient=True) as progress:
@@ -43,19 +45,24 @@ def tracked(items: Iterable[Item], text: str, total: int) -> Iterator[Item]:
             advance(1.0)
 
 
-class Lines:
-    """Progress as lines, one every `PERIOD_S`; work that is shorter says nothing."""
+@contextmanager
+def _lines(text: str, total: float | None) -> Iterator[Callable[[float], None]]:
+    """Say every `PERIOD_S` how much is done; work that is shorter says nothing."""
+    done, over, began_s = 0.0, threading.Event(), time.monotonic()
 
-    def __init__(self, text: str, total: float | None, now_s: Callable[[], float] = time.monotonic) -> None:
-        self._text, self._total, self._done, self._now_s = text, total, 0.0, now_s
-        self._began_s = self._told_s = now_s()
+    def tell() -> None:
+        while not over.wait(PERIOD_S):
+            share = f"{100.0 * done / total:.0f} %, " if total else ""
+            say(f"{text}: {share}{time.monotonic() - began_s:.0f} s")
 
-    def advance(self, amount: float) -> None:
-        """Note that so much more of the total is done."""
-        self._done += amount
-        now_s = self._now_s()
-        if now_s - self._told_s < PERIOD_S:
-            return
-        self._told_s = now_s
-        share = f"{100.0 * self._done / self._total:.0f} %, " if self._total else ""
-        say(f"{self._text}: {share}{now_s - self._began_s:.0f} s")
+    def advance(amount: float) -> None:
+        nonlocal done
+        done += amount
+
+    teller = threading.Thread(target=tell, daemon=True)
+    teller.start()
+    try:
+        yield advance
+    finally:
+        over.set()
+        teller.join()
