@@ -93,6 +93,7 @@ def test_a_wrong_map_is_found_by_the_motion_of_the_car(
     [
         ("map suggest LOG.log", "--dbc: missing"),
         ("map suggest few.csv", "no four wheel speeds by their names among Time, ax"),
+        ("map suggest gps.csv", "the speed of the car alone (GPS Speed) starts no estimate: record all four"),
         ("map suggest empty.csv", "the file is empty"),
         ("map suggest race.log", "this is a CSV file; let its name end in .csv"),
         ("replay aim.csv --config suv --out r.parquet", "or the map of columns that `map suggest` proposes"),
@@ -108,6 +109,8 @@ def test_a_mistake_is_one_line(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     write_drive(tmp_path / "aim.csv", 1.0)
+    rows = "".join(f"{0.1 * k:.1f},{50 + k},0.1\n" for k in range(30))
+    (tmp_path / "gps.csv").write_text(f"Time,GPS Speed,ax\ns,km/h,g\n{rows}")
     (tmp_path / "few.csv").write_text("Time,ax\ns,g\n0,1\n0.02,1\n0.04,1\n")
     (tmp_path / "empty.csv").write_text("")
     (tmp_path / "bus.toml").write_text(

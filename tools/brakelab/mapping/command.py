@@ -68,7 +68,8 @@ def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) 
         say(line)
     found, drives = propose(series, car)
     if not found:
-        raise UserError(str(dbc), "", f"names no four wheel speeds in {log}; give the database of this car")
+        remedy = _speed_alone(series) or "give the database of this car"
+        raise UserError(str(dbc), "", f"names no four wheel speeds in {log}; {remedy}")
     bus = found[0].series.bus
     here = [one for one in series if one.bus == bus]
     hints: list[str] = []
@@ -103,16 +104,26 @@ def _warnings(found: list[Found]) -> list[str]:
     return [f"{name}: {warning}" for (_, warning), name in told.items() if warning]
 
 
+def _speed_alone(series: list[Series]) -> str:
+    """Return what to do with a log that has a speed of the car but not of its wheels; empty: it has none."""
+    names = [one.signal for one in series if not one.flag and converts(one.unit, "m/s")]
+    if not names:
+        return ""
+    return (
+        f"the speed of the car alone ({names[0]}) starts no estimate: record all four wheel speeds, "
+        "or name them in a map by hand (docs/signal-maps.md)"
+    )
+
+
 def _suggest_columns(log: Path, out: Path | None, car: Car) -> int:
     """Propose a map of the columns of a signal file, as `suggest` does of frames."""
     quality = SignalQuality()
     columns, series = read_column_series(log, quality)
     found, drives = propose(series, car)
     if not found:
-        remedy = (
-            f"no four wheel speeds by their names among {', '.join(columns.names[:SHOWN])}; write the map"
-        )
-        raise UserError(str(log), "", f"{remedy} by hand (docs/signal-maps.md)")
+        among = f"no four wheel speeds by their names among {', '.join(columns.names[:SHOWN])}"
+        remedy = _speed_alone(series) or "write the map by hand (docs/signal-maps.md)"
+        raise UserError(str(log), "", f"{among}; {remedy}")
     _show(found, drives)
     for line in _warnings(found):
         say(line)
