@@ -30,6 +30,8 @@ SIGNAL: Final = np.dtype(
         ("refused", "i4", (2,)),  # codes: not available, sentinels
         ("validity", "i2"),  # row of the signal that declares this one valid, −1: none
         ("valid", "i4", (2,)),  # codes: validity's values
+        ("sign", "i2"),  # row of the signal that turns this magnitude negative, −1: none
+        ("negative", "i4", (2,)),  # codes: sign's values
     ],
     align=True,
 )
@@ -46,6 +48,9 @@ class SignalUse(NamedTuple):
     """Sentinels: values, in the database's unit, that are no measurement."""
     validity: str = ""
     valid: tuple[int, ...] = ()
+    sign: str = ""
+    """Signal that says on which side of zero a magnitude is."""
+    negative: tuple[int, ...] = ()
 
 
 class SignalRows(NamedTuple):
@@ -103,7 +108,7 @@ def signal_row(signal: Any) -> RecordArray:
     row["kind"] = _kind(signal)
     row["scale"], row["offset"] = signal.scale, signal.offset
     row["raw_low"], row["raw_high"] = _raw_range(signal)
-    row["place"] = row["selector"] = row["validity"] = -1
+    row["place"] = row["selector"] = row["validity"] = row["sign"] = -1
     code = not_available_code(signal)
     if signal.is_float:
         row["not_available"] = {16: 0x7E00, 32: 0x7FC00000, 64: 0x7FF8000000000000}[signal.length]
@@ -147,6 +152,9 @@ def compile_signals(
         if use.validity:
             row["validity"] = helper(use.validity)
             row["valid"] = listed(use.valid)
+        if use.sign:
+            row["sign"] = helper(use.sign)
+            row["negative"] = listed(use.negative)
     place = 0
     while place < len(rows):  # a selector can itself be multiplexed
         signal = known[names[place]]
@@ -227,6 +235,18 @@ def is_valid(signals: Any, codes: NDArray[np.int64], row: int, code: int, data: 
 def physical(row: Record, code: int) -> float:
     """Return the physical value of a `raw_code` in the target's unit; a float signal may give NaN or ±inf."""
     return float(bits.number(np.uint64(code), row.length, row.kind) * row.scale + row.offset)
+
+
+@kernel
+def signed_value(
+    signals: Any, codes: NDArray[np.int64], row: int, code: int, data: NDArray[np.uint8]
+) -> float:
+    """Return the physical value of a signal's `raw_code`, negative where another signal says so."""
+    signal = signals[row]
+    value = physical(signal, code)
+    if signal.sign >= 0 and _listed(codes, signal.negative, raw_code(signals[signal.sign], data)):
+        return float(2.0 * signal.offset - value)  # the offset belongs to the value, not to its magnitude
+    return value
 
 
 @kernel

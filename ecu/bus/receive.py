@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ecu.bus import bits, e2e, link
 from ecu.bus.database import attribute, load_database
 from ecu.bus.freshness import NEVER, accept, input_freshness, new_freshness
-from ecu.bus.plan import SIGNAL, SignalUse, compile_signals, is_present, is_valid, physical, raw_code
+from ecu.bus.plan import SIGNAL, SignalUse, compile_signals, is_present, is_valid, raw_code, signed_value
 from ecu.bus.request import FIRST, LAST, REQUEST, begin_request, hold_request, note_request
 from ecu.contract.faults import E2E_REJECTIONS
 from ecu.contract.records import EXTENDED_ID, FRAME_ERROR, FRAME_EXTENDED, FRAME_REMOTE, RecordArray
@@ -265,7 +265,7 @@ def receive(
                 signal = signals[row]
                 code = raw_code(signal, frame.data)
                 valid = is_valid(signals, codes, row, code, frame.data)
-                value = physical(signal, code)
+                value = signed_value(signals, codes, row, code, frame.data)
                 asked = message.request != 0 and FIRST <= signal.place <= LAST
                 if (doubt and asked and not valid) or (status != link.P_OK and not asked):
                     continue

@@ -35,6 +35,15 @@ class Validity(_Table):
     """Raw codes with which the input counts."""
 
 
+class Sign(_Table):
+    """A signal of the same message that turns the value negative with one of `values` (raw codes)."""
+
+    signal: str
+    """Of the same message."""
+    values: Annotated[tuple[int, ...], Field(min_length=1), Unit("-")]
+    """Raw codes with which the value is negative."""
+
+
 class MappedInput(_Table):
     """Source of one input."""
 
@@ -52,6 +61,8 @@ class MappedInput(_Table):
     """Values in the database's scaling that are no measurement."""
     validity: Validity | None = None
     """A signal that says whether the value counts."""
+    sign: Sign | None = None
+    """A signal that says on which side of zero it is, where it is sent as a magnitude."""
     timeout: Annotated[float, Field(gt=0.0), Unit("s")] | None = None
     """After it the input is stale, if not after the contract's."""
 
@@ -227,6 +238,13 @@ def _signal_use(
     )
     if mapped.validity is not None:
         find_signal(message, mapped.validity.signal, database_path, path, f"{key}.validity.signal")
+    if mapped.sign is not None:
+        find_signal(message, mapped.sign.signal, database_path, path, f"{key}.sign.signal")
+        if signal.offset or signal.is_signed:
+            remedy = (
+                f"{signal.name} has a sign or an offset of its own, so is no magnitude; leave the key out"
+            )
+            raise UserError(str(path), f"{key}.sign", remedy)
     return SignalUse(
         mapped.signal,
         place,
@@ -235,4 +253,6 @@ def _signal_use(
         mapped.sentinels,
         mapped.validity.signal if mapped.validity else "",
         mapped.validity.values if mapped.validity else (),
+        mapped.sign.signal if mapped.sign else "",
+        mapped.sign.values if mapped.sign else (),
     )

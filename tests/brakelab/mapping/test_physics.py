@@ -11,7 +11,7 @@ from brakelab.mapping.brakes import brakes, flags
 from brakelab.mapping.curves import at_rest, curves
 from brakelab.mapping.motion import motion_of, wheel_speeds
 from brakelab.mapping.scale import scale_of
-from brakelab.mapping.series import Series
+from brakelab.mapping.series import Series, with_signs
 from ecu.contract.signals import CORNERS
 from ecu.settings.config import load_config, new_params
 from ecu.settings.resources import resource
@@ -135,6 +135,22 @@ def test_counts_without_a_unit_get_the_scale_of_the_wheels_at_walking_speed():
     assert one.unit == "deg/s"
     assert one.factor == pytest.approx(0.005, rel=0.03)
     assert "no unit" in one.warning
+
+
+def test_a_magnitude_is_known_with_the_flag_that_is_its_sign():
+    """Volkswagen sends the yaw rate as a magnitude; beside its sign are flags that are not."""
+    flag = {
+        "ESP_QBit": np.zeros(len(YAW)),
+        "ESP_VZ_Gierrate": (YAW < 0.0).astype(float),
+        "ESP_VZ_Lenkradw_Geschw": (np.gradient(YAW) < 0.0).astype(float),
+        "ESP_Anf": (np.arange(len(YAW)) % 500 < 100).astype(float),
+    }
+    message = [series("ESP_Gierrate", np.abs(YAW), "Unit_DegreOfArcPerSecon")]
+    message += [series(name, values)._replace(flag=True) for name, values in flag.items()]
+    signed = with_signs(message)
+    assert [one.sign for one in signed] == ["ESP_VZ_Gierrate"]
+    assert turning(*message, *signed)["yaw_rate"].series.sign == "ESP_VZ_Gierrate"
+    assert "yaw_rate" not in turning(*message)
 
 
 def test_a_large_zero_is_taken_off():

@@ -218,6 +218,17 @@ def test_a_sentinel_is_no_measurement(tmp_path: Path, frame: Callable[..., Recor
         assert bool(found.new[0, INPUT["calliper_pressure_fl"]]) is taken
 
 
+@pytest.mark.parametrize(("status", "expected"), [(0, 30.0), (1, -50.0), (2, 30.0)])
+def test_a_magnitude_takes_its_sign_from_another_signal(
+    tmp_path: Path, frame: Callable[..., RecordArray], status: int, expected: float
+) -> None:
+    """4000 kPa as 40 deg/s, the offset of -10 deg/s after the sign."""
+    magnitude = 'sign = { signal = "ok", values = [1] }, factor = 0.01, offset = -10, unit = "deg/s" }'
+    path = write(tmp_path, "calliper_pressure_fl = {", f"yaw_rate = {{ {magnitude[:-2]}, ")
+    found = drive(load_signal_map(path), frame(10**18, 10, bytes([0, 0, 0, 0, 1 | status << 4, 0, 40, 0])))
+    assert np.degrees(found["yaw_rate"][0]) == pytest.approx(expected)
+
+
 def test_a_checksum_can_be_ignored_by_name(tmp_path: Path, frame: Callable[..., RecordArray]) -> None:
     frames = np.concatenate(
         [frame(10**18 + k * CYCLE_NS, 10, bytes([0, 0, 0, 0, 0x12, 0, 0, 0])) for k in range(5)]
@@ -282,6 +293,11 @@ MISTAKES: dict[str, tuple[str, str, str]] = {
         '"ok"',
         '"okay"',
         ".validity.signal: message Wheels has no signal okay; did you mean ok?",
+    ),
+    "no such sign": (
+        '"p" }',
+        '"p", sign = { signal = "okay", values = [1] } }',
+        ".sign.signal: message Wheels has no signal okay; did you mean ok?",
     ),
     "an input unlike any": (
         "wheel_speed_fl =",

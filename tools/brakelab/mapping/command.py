@@ -255,6 +255,8 @@ def map_text(
     lines += ["", "[inputs]"]
     for before, one in zip([None, *found], found, strict=False):
         source = f'message = "{one.series.message}", signal = "{one.series.signal}"'
+        if one.series.sign:
+            source += f', sign = {{ signal = "{one.series.sign}", values = [1] }}'
         lines += input_lines(one, before, source, timeout(one))
         if one.series.longest_gap > max(LONGEST, PERIODS * one.series.period):
             lines.append(

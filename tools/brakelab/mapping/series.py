@@ -10,11 +10,15 @@ from numpy.typing import NDArray
 
 from ecu.bus.database import fits
 from ecu.bus.plan import compile_message, decode
+from ecu.bus.units import spelled
 from ecu.contract.records import EXTENDED_ID, FRAME_ERROR, FRAME_EXTENDED, FRAME_REMOTE, RecordArray
 from ecu.jit import kernel
 
 Vector = NDArray[np.float64]
 FEWEST = 20  # frames of a message
+MAGNITUDES = {"deg", "rad", "deg/s", "rad/s", "m/s^2", "g", "N m"}  # units of what has two sides
+TURNS = 4  # of a sign, in a drive
+ZERO = 0.05  # of the largest value, that a magnitude is below where its sign turns
 
 
 class Series(NamedTuple):
@@ -33,6 +37,8 @@ class Series(NamedTuple):
     """s since the first frame of the log, rising."""
     value: Vector
     """As the database scales it, NaN where the multiplexer selects others."""
+    sign: str = ""
+    """Signal of the same message that is 1 where the value, sent as a magnitude, is negative."""
 
     @property
     def name(self) -> str:
@@ -83,7 +89,28 @@ def read_series(blocks: Iterable[RecordArray], database: Database) -> list[Serie
         for bus in np.unique(mine["bus"]):
             here = mine[mine["bus"] == bus]
             if len(here) >= FEWEST:
-                found += _series(message, here, int(bus), int(start))
+                one = _series(message, here, int(bus), int(start))
+                found += [*one, *with_signs(one)]
+    return found
+
+
+def with_signs(series: list[Series]) -> list[Series]:
+    """Return the series of one message that may be magnitudes, with each flag that may be their sign.
+
+    A magnitude passes through zero where its sign turns; which flag is the sign, motion tells.
+    """
+    flags = [one for one in series if one.flag and set(np.unique(one.value)) == {0.0, 1.0}]
+    found = []
+    for one in series:
+        large = np.nanpercentile(one.value, 99) if len(one.value) else 0.0
+        if one.flag or spelled(one.unit) not in MAGNITUDES or not large > np.nanmin(one.value) == 0.0:
+            continue
+        for flag in flags:
+            turns = np.flatnonzero(np.diff(flag.value))
+            beside = np.minimum(one.value[turns], one.value[turns + 1])
+            if len(turns) >= TURNS and np.quantile(beside, 0.9) < ZERO * large:
+                value = one.value * (1.0 - 2.0 * flag.value)
+                found.append(one._replace(value=value, sign=flag.signal))
     return found
 
 
