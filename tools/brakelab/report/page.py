@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping
 from importlib.resources import files
 from importlib.resources.abc import Traversable
-from typing import Any, Final, NamedTuple, cast
+from typing import Any, Final, NamedTuple
 
 from bokeh.document import Document
 from bokeh.embed import components
@@ -56,7 +56,7 @@ def embed(figures: Mapping[str, Any]) -> tuple[str, dict[str, str]]:
     with document.models.freeze():  # else every figure added walks through all of them once more
         for figure in figures.values():
             document.add_root(figure)
-    return cast(tuple[str, dict[str, str]], components(dict(figures)))
+    return components(dict(figures))
 
 
 def fill(
