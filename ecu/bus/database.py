@@ -43,6 +43,8 @@ def _refusal(path: Path, error: Exception) -> UserError:
         what, line, column = found.groups()
         remedy = f"no XML from there on ({what.strip()}); the file is cut off or damaged, export it again"
         return UserError(str(path), f"line {line}, column {column}", remedy)
+    if text.startswith("expected database format"):
+        return UserError(str(path), "", f"no database by its name; let it end as its content is ({KINDS})")
     if "NoneType" in text:  # of AUTOSAR's elements, which cantools takes for granted
         text = (
             "an element that describes messages is missing; export a system description with its CAN cluster"

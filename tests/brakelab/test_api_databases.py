@@ -127,7 +127,7 @@ def test_a_truncated_database_ends_a_command_with_one_line(
         ],
     }[command]
     assert cli.main(arguments) == 2
-    said = capsys.readouterr().err.strip()
-    assert "car.arxml: line " in said
-    assert "\n" not in said
-    assert "cut off or damaged" in said
+    said = [line for line in capsys.readouterr().err.splitlines() if not line.startswith("reading ")]
+    assert len(said) == 1
+    assert "car.arxml: line " in said[0]
+    assert "cut off or damaged" in said[0]

@@ -149,6 +149,11 @@ BAD: dict[str, tuple[str, str, str]] = {
         NO_SIGNAL,
         r"not a database .*dangling reference I-SIGNAL-REF .*WhlFl",
     ),
+    "a name that tells nothing": (
+        "xml",
+        ARXML,
+        r"no database by its name; let it end as its content is \(\.dbc, \.a",
+    ),
     "no bus": (
         "kcd",
         re.sub(r"<Bus.*</Bus>", "", TEXT["kcd"], flags=re.DOTALL),
