@@ -61,6 +61,13 @@ def test_a_run_without_any_frame_found_a_fault(daemon):
     assert any("no frame of the database came in" in line for line in unit.other)
 
 
+def test_a_quiet_daemon_logs_warnings_and_errors_alone_from_all_its_processes(daemon):
+    unit = daemon(*BUS, "--log-format", "json", "--quiet")
+    unit.wait_for("fault")  # told by the side process
+    unit.end(signal.SIGINT)
+    assert {line["level"] for line in unit.seen} == {"warning"}
+
+
 def test_a_restart_after_kill_has_what_was_learned(daemon, vehicle, tmp_path):
     config = load_config(CONFIG)
     learned = np.zeros(1, LEARNED)
@@ -101,8 +108,9 @@ def test_the_side_process_writes_out_the_ring_when_the_daemon_is_killed(daemon, 
         (("--config", "nosuch.toml", "-i", "virtual", "-c", "x"), "nosuch.toml"),
         (("--config", CONFIG, "-i", "nonsense", "-c", "x"), "nonsense x: cannot be opened"),
         ((*BUS, "--record", CONFIG), "cannot record here"),
+        ((*BUS, "--log-format", "xml"), "--log-format: xml: not known; take console or json"),
     ],
-    ids=["config", "interface", "record"],
+    ids=["config", "interface", "record", "log format"],
 )
 def test_what_the_user_can_mend_is_one_line_and_exit_code_2(daemon, arguments, line):
     unit = daemon(*arguments)

@@ -41,7 +41,7 @@ def identify_vehicle(drives: Sequence[Path], config: Path, map: Path | None, clo
     zeros = offsets(found.zeros)
     if map and zeros:
         own_map.write_text(map_toml(map, own_map, zeros), encoding="utf-8")
-    give(parameters=parameters, zeros=zeros, written=written)
+    give(parameters=parameters, zeros=zeros, written=[path for path in written if path.exists()])
     for one in parameters:
         unit = "" if one.unit == "-" else f" {one.unit}"
         if one.remedy:
