@@ -38,4 +38,4 @@ echo "Compiling the kernels"
 export NUMBA_CPU_NAME=generic NUMBA_CACHE_DIR="$prefix/cache"
 mkdir "$NUMBA_CACHE_DIR"
 "$prefix/bin/python" -P -m ecu.warm
-echo "Done: $prefix/bin/brake-ecu"
+echo "Done: $prefix/bin/brake-ecu; next: $prefix/bin/brake-ecu doctor --config suv -i socketcan -c can0"

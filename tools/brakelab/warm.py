@@ -7,15 +7,20 @@ Processes that start together on an empty cache would each compile all they use.
 import subprocess
 import sys
 import tempfile
+from itertools import islice
 from pathlib import Path
+from typing import Final
 
 import numpy as np
+from can import Logger, LogReader
 
+from brakelab.logs.formats import read_frames
 from brakelab.plant.description import load_plant
 from brakelab.plant.draw import draw, load_widths
 from brakelab.plant.records import COMMANDS
 from brakelab.plant.vehicle import STEP, advance, new_state
 from brakelab.replay.command import replay_into
+from brakelab.replay.quality import Findings
 from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.scenario import load_scenario
 from brakelab.simulation.simulate import simulate
@@ -24,6 +29,9 @@ from ecu.jit import CompileCounter
 from ecu.output import Level, asked, new_policy
 from ecu.settings.config import load_config
 from ecu.settings.resources import resource
+
+FRAMES: Final = 50
+"""Of a log in each format."""
 
 
 def compile_vehicle() -> None:
@@ -49,6 +57,18 @@ def compile_commands() -> None:
         with asked():
             simulate(scenario, config, drive)
             replay_into([Path(f"{drive}.log")], config, None, None, None, Path(folder) / "result.parquet")
+            for ending in (".asc", ".blf", ".trc"):
+                _read_as(drive.with_suffix(ending), Path(f"{drive}.log"))
+
+
+def _read_as(log: Path, frames: Path) -> None:
+    """Read some frames of a candump log in another format."""
+    with LogReader(frames) as reader, Logger(log) as writer:
+        for message in islice(reader, FRAMES):
+            writer(message)
+    findings = Findings(log)
+    for _ in read_frames(log, findings.interfaces, findings.log):
+        pass
 
 
 def main() -> int:
