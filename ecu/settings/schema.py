@@ -3,14 +3,15 @@
 import json
 from typing import Any
 
-from ecu.output import give
+from ecu.output import give, policy
 from ecu.settings.sections import Config
 
 
 def schema() -> int:
     """Print the schema; return 0."""
     give(**(found := config_schema()))
-    print(json.dumps(found, indent=1, ensure_ascii=False))
+    if not policy().json:  # it is printed as it was given
+        print(json.dumps(found, indent=1, ensure_ascii=False))
     return 0
 
 
