@@ -5,10 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from brakelab.plant.description import Plant, load_plant, nominal
 from brakelab.plant.friction.ilvo_bounded import DEBRIS, HEAT, SPEED
+from brakelab.plant.jit import kernel
 from brakelab.plant.records import COMMANDS, RecordArray, new_record
 from brakelab.plant.vehicle import STEP, advance, new_state
 
@@ -17,7 +19,7 @@ CONFIG = Path(__file__).parents[3] / "config" / "plant"
 
 @dataclass
 class Car:
-    """One car on a dry road; `run` moves it on and shows every step to `watch`."""
+    """One car on a dry road; `run` moves it on and shows every step to `watch`, `states` keeps every one."""
 
     params: RecordArray
     state: RecordArray
@@ -28,10 +30,19 @@ class Car:
         return self.state[0]
 
     def run(self, seconds: float, dt: float = STEP, watch: Callable[[Any], None] | None = None) -> None:
-        for _ in range(round(seconds / dt)):
+        steps = round(seconds / dt)
+        if watch is None:
+            advance_steps(self.params, self.state, self.commands, dt, steps, self.state[:0])
+            return
+        for _ in range(steps):
             advance(self.params[0], self.state[0], self.commands[0], dt)
-            if watch is not None:
-                watch(self.state[0])
+            watch(self.state[0])
+
+    def states(self, seconds: float) -> RecordArray:
+        """Run on and return the states after every step, shape (steps,)."""
+        seen = np.zeros(round(seconds / STEP), self.state.dtype)
+        advance_steps(self.params, self.state, self.commands, STEP, len(seen), seen)
+        return seen
 
     def press(self, front_bar: float, rear_bar: float) -> None:
         """Hold these pressures, as if they had been asked for long ago."""
@@ -45,6 +56,15 @@ class Car:
         self.params["friction_row"][0, :, [DEBRIS, SPEED, HEAT]] = 0.0
         for name in ("heating", "cooling", "cooling_by_speed"):
             self.params[name] = 0.0
+
+
+@kernel
+def advance_steps(params: Any, state: Any, commands: Any, dt: float, steps: int, seen: Any) -> None:
+    """Advance one car; keep its states in `seen`, shape (steps,) or (0,)."""
+    for k in range(steps):
+        advance(params[0], state[0], commands[0], dt)
+        if k < len(seen):
+            seen[k] = state[0]
 
 
 def make_car(params: RecordArray, speed: float) -> Car:

@@ -50,9 +50,9 @@ def drive(shipped: Maker, name: str, manoeuvre: str) -> tuple[Any, Any, Energy]:
         car.press(bar, bar)
     for command, value in given.items():
         car.commands[command] = value
-    states = [car.state.copy()]
-    car.run(3.0, watch=lambda _: states.append(car.state.copy()))
-    return car, np.concatenate(states), energy(car.params, states[0], car.state)
+    start = car.state.copy()
+    states = np.concatenate([start, car.states(3.0)])
+    return car, states, energy(car.params, start, car.state)
 
 
 def compression(seen: Any) -> NDArray[np.float64]:

@@ -14,6 +14,7 @@ from brakelab.plant.friction.constant import Constant
 from brakelab.plant.friction.laws import LAWS, law_row
 from brakelab.plant.friction.own import Own
 from brakelab.plant.friction.table import Table
+from brakelab.plant.jit import kernel
 from brakelab.plant.lining import advance_disc_temperature, advance_lining
 from brakelab.plant.linings import rig_with
 from brakelab.plant.records import STATE, new_record
@@ -41,9 +42,14 @@ def brake(
     state["wheel_speed"] = spin
     for pressure in (0.0, pressure_bar):
         state["pressure"] = 1e5 * pressure
-        for _ in range(round(seconds / DT)):
-            advance_lining(params[0], state[0], DT)
+        advance_linings(params, state, round(seconds / DT))
     return state[0]
+
+
+@kernel
+def advance_linings(params: Any, state: Any, steps: int) -> None:
+    for _ in range(steps):
+        advance_lining(params[0], state[0], DT)
 
 
 @pytest.mark.parametrize("law", ["SIM", "R1", "R2", "Ost", "Ost_revised"])

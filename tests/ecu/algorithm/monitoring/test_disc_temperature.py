@@ -22,6 +22,7 @@ from ecu.algorithm.monitoring.disc_temperature import (
 from ecu.algorithm.step import new_state, step
 from ecu.contract.records import OUTPUTS
 from ecu.contract.signals import CALLIPER_PRESSURE, CORNERS, HOLDING, INPUT, OBSERVING, OUTPUT
+from ecu.jit import kernel
 from ecu.settings.config import Config, load_config
 
 CONFIG = Path(__file__).parents[4] / "config"
@@ -49,8 +50,9 @@ class Discs:
         self.s["application"]["braking"] = np.any(np.asarray(torque) > 0)
         self.s["estimate"]["speed"], self.s["estimate"]["tyre_force"] = speed, force
         self.feed(self.inputs, wheel_speed=speed / RADIUS)
-        for _ in range(round(seconds / dt)):
-            self.step(dt)
+        s, cycles = self.s, round(seconds / dt)
+        estimate, application = s["estimate"], s["application"]
+        update_cycles(self.p, self.d, s["learned"], self.inputs, estimate, application, dt, cycles)
         return self.d["temperature"].copy()
 
     def step(self, dt: float = 0.01) -> None:
@@ -65,6 +67,12 @@ class Discs:
     def silence(self, name: str) -> None:
         """Let a signal die."""
         self.inputs[0]["verdict"][INPUT[name]] = 0
+
+
+@kernel
+def update_cycles(params, discs, learned, inputs, estimate, application, dt, cycles):
+    for _ in range(cycles):
+        update_discs(params, discs, learned, inputs[0], estimate, application, dt)
 
 
 @pytest.fixture
