@@ -25,7 +25,7 @@ demo: .venv/lab
 
 test: .venv/dev
 	.venv/bin/python -m brakelab.warm
-	.venv/bin/python -m pytest -n auto --maxprocesses 4 --dist loadfile -m "not study" $(ARGS)
+	.venv/bin/python -m pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder -m "not study" $(ARGS)
 
 studies: .venv/dev
 	.venv/bin/python -m pytest -n auto --maxprocesses 4 --dist load -m study $(ARGS)

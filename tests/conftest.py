@@ -1,6 +1,7 @@
 """What tests need around them: a SocketCAN bus, UDP multicast, the recorded drives; else they are skipped."""
 
 import os
+import re
 import socket
 from pathlib import Path
 
@@ -20,6 +21,9 @@ for name in ("BRAKE_ECU_DEBUG", "NOTIFY_SOCKET", "COLUMNS", "FORCE_COLOR", "GITH
 # Small matrices: threads of their own in every worker cost more than they give.
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(name, "1")
+
+LONG = re.compile(r"tests/(system/|test_|brakelab/(identification|fleet|report)/)")
+"""Files whose tests run processes, trainings or browsers."""
 
 CHECKOUT = Path(__file__).parent.parent
 
@@ -45,7 +49,15 @@ def _has_multicast() -> bool:
     return True
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """One worker more than there are cores: tests of whole processes wait for most of their time."""
+    return len(os.sched_getaffinity(0)) + 1
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    # Long tests first (`--no-loadscope-reorder`), lest all workers but one wait for them at the end.
+    items.sort(key=lambda item: LONG.match(item.nodeid) is None)
     absent = {}
     if not Path("/sys/class/net/vcan0").exists():
         absent["socketcan"] = "no interface vcan0"
