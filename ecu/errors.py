@@ -1,5 +1,8 @@
 """Errors that a user can mend: one line with file, place and remedy."""
 
+from collections.abc import Iterable
+from difflib import get_close_matches
+
 
 class UserError(Exception):
     """Bad arguments, configuration or input. The command prints its one line and exits with 2.
@@ -18,3 +21,9 @@ class UserError(Exception):
 
 class RunFault(Exception):
     """Fault found by the run itself (bus off, no input). The command exits with 1."""
+
+
+def closest(name: str, names: Iterable[str]) -> str:
+    """Return a hint at the name probably meant, or nothing."""
+    near = get_close_matches(name, names, 1, 0.5)
+    return f"; did you mean {near[0]}?" if near else ""

@@ -16,10 +16,9 @@ from typing import Any, Final
 
 import can
 
-from ecu.bus.database import closest
 from ecu.bus.protocol import BusStatus, Channel
 from ecu.contract.records import EXTENDED_ID, FRAME_EXTENDED, FRAME_FD, RecordArray
-from ecu.errors import UserError
+from ecu.errors import UserError, closest
 
 # Frames of one identifier that may be echoed back: 0.3 s of a 10 ms frame.
 _ECHOES: Final = 32

@@ -2,7 +2,6 @@
 
 import re
 import xml.etree.ElementTree as ET
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Final
 
@@ -10,7 +9,7 @@ import cantools
 from cantools.database import Database, Message
 
 from ecu.bus.bits import first_bit
-from ecu.errors import UserError
+from ecu.errors import UserError, closest
 
 LONGEST_PAYLOAD: Final = 64  # bytes, CAN FD
 SHOWN: Final = 6  # suggested names
@@ -133,9 +132,3 @@ def _choice(name: str, names: list[str]) -> str:
         return "; it has none that can be read (containers of AUTOSAR are not)"
     more = f", … ({len(names)} in all)" if len(names) > SHOWN else ""
     return closest(name, names) or f"; it has {', '.join(sorted(names)[:SHOWN])}{more}"
-
-
-def closest(name: str, names: list[str]) -> str:
-    """Return a hint at the name probably meant, or nothing."""
-    near = get_close_matches(name, names, 1, 0.5)
-    return f"; did you mean {near[0]}?" if near else ""

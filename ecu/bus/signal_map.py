@@ -11,13 +11,13 @@ from cantools.database import Database, Message
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ecu.bus import e2e
-from ecu.bus.database import closest, find_message, find_signal, load_database
+from ecu.bus.database import find_message, find_signal, load_database
 from ecu.bus.freshness import input_freshness
 from ecu.bus.plan import SignalUse
 from ecu.bus.receive import MessageUse, ReceivePlan, compile_receive, contract_receive_plan
 from ecu.bus.units import conversion
 from ecu.contract.signals import INPUT, INPUT_SIGNALS
-from ecu.errors import UserError
+from ecu.errors import UserError, closest
 from ecu.settings.resources import resource
 from ecu.settings.toml_file import Unit, describe, read_toml
 

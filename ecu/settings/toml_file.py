@@ -2,14 +2,13 @@
 
 import tomllib
 from collections.abc import Callable
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, NamedTuple, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
 
-from ecu.errors import UserError
+from ecu.errors import UserError, closest
 from ecu.output import detail
 
 
@@ -88,12 +87,8 @@ def _remedy(finding: Any, model: type[BaseModel]) -> str:
     if finding["type"] == "missing":
         return "missing; add this key"
     if finding["type"] == "extra_forbidden":
-        near = get_close_matches(keys[-1], table.model_fields, 1, 0.5) if table else []
-        return (
-            f"unknown key; did you mean {near[0]}?"
-            if near
-            else "unknown key; remove it or correct its spelling"
-        )
+        meant = closest(keys[-1], table.model_fields) if table else ""
+        return "unknown key" + (meant or "; remove it or correct its spelling")
     wanted: str = _WANTED.get(finding["type"], finding["msg"]).format(**finding.get("ctx", {}))
     if not keys or isinstance(finding["input"], dict):
         return wanted

@@ -1,12 +1,12 @@
 """Inputs of an entry in one cycle: the samples that arrived, by the names of the contract."""
 
-from difflib import get_close_matches
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ecu.contract.signals import INPUT_SIGNALS, without_corner
+from ecu.errors import closest
 
 Vector = NDArray[np.float64]
 
@@ -50,6 +50,5 @@ class Inputs:
     def __getattr__(self, name: str) -> Any:
         place = PLACES.get(name)
         if place is None:
-            close = get_close_matches(name, PLACES, 1)
-            raise AttributeError(f"inputs.{name}: no such signal" + (f"; {close[0]}?" if close else ""))
+            raise AttributeError(f"inputs.{name}: no such signal{closest(name, PLACES)}")
         return self.values[place] if isinstance(place, slice) else float(self.values[place])

@@ -14,10 +14,9 @@ from typing import Annotated, Final, Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from ecu.bus.database import closest
 from ecu.bus.units import conversion
 from ecu.contract.signals import INPUT, INPUT_SIGNALS
-from ecu.errors import UserError
+from ecu.errors import UserError, closest
 from ecu.settings.toml_file import Unit, describe, read_toml
 
 TIMES: Final = ("t", "time", "timestamp", "timestamps", "interval", "zeit", "elapsed time", "offset")
