@@ -14,7 +14,7 @@ from ecu.contract.params import BAR, GRAVITY
 from ecu.output import fault, give
 from ecu.settings.annex5 import K_RULED, Z_ORDERED, Load, annex_5_violation, shares, utilisation
 from ecu.settings.annex5_picture import picture
-from ecu.settings.config import Config, new_params, validate_config
+from ecu.settings.config import Config, new_params, torque_per_bar, validate_config
 
 RATES: Final = (0.2, 0.4, 0.6, 0.8)  # braking rates z
 
@@ -68,7 +68,7 @@ def figures_of(config: Config, params: Any) -> dict[str, Any]:
 def figures(config: Config, params: Any) -> list[str]:
     """Return the figures of the car, as lines; `params` is one `PARAMS` of `config`."""
     front_load = params["rear_axle"] / params["wheelbase"]
-    per_bar = torque_per_bar(params)
+    per_bar = axle_torque_per_bar(params)
     lines = [
         f"car           {config.name}: {params['mass']:.0f} kg, {100 * front_load:.0f} % on the front axle, "
         f"rolling radius {params['wheel_radius'][0]:.3f} and {params['wheel_radius'][2]:.3f} m",
@@ -85,9 +85,9 @@ def figures(config: Config, params: Any) -> list[str]:
     return lines + [line for load in config.vehicle.loads() for line in margins(params, load)]
 
 
-def torque_per_bar(params: Any) -> tuple[float, float]:
+def axle_torque_per_bar(params: Any) -> tuple[float, float]:
     """Return the torque of the front and the rear axle at nominal friction [N m/bar], 4 A_k r_eff mu."""
-    both = 2.0 * 2.0 * BAR * params["piston_area"] * params["effective_radius"] * params["mu_nominal"]
+    both = 2.0 * torque_per_bar(params)
     return float(both[0]), float(both[2])
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from ecu.algorithm.vehicle import rolling_radius
@@ -42,6 +43,7 @@ __all__ = [
     "load_config",
     "new_params",
     "store_key",
+    "torque_per_bar",
     "validate_config",
 ]
 
@@ -183,3 +185,8 @@ def new_params(config: Config) -> RecordArray:
     if row["minimised"]:
         set_lining_share(row, vehicle.loads())
     return params
+
+
+def torque_per_bar(params: Any) -> NDArray[np.float64]:
+    """Return torques at nominal friction [N m/bar], 2 A_k r_eff mu, shape (4,), of one `PARAMS`."""
+    return np.asarray(BAR * 2.0 * params["piston_area"] * params["effective_radius"] * params["mu_nominal"])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ecu import cli
-from ecu.settings.check import figures, pressures, torque_per_bar
+from ecu.settings.check import axle_torque_per_bar, figures, pressures
 from ecu.settings.config import load_config, new_params
 
 CONFIGS = Path(__file__).parents[3] / "config"
@@ -86,8 +86,8 @@ def test_pistons_counted_on_both_sides_show_as_twice_the_torque(tmp_path: Path) 
     right = new_params(load_config(CONFIGS / "suv.toml"))[0]
     config = load_config(changed(tmp_path, pistons="pistons = 2 "))
     wrong = new_params(config)[0]
-    assert torque_per_bar(wrong) == pytest.approx([2.0 * one for one in torque_per_bar(right)])
-    assert f"front {torque_per_bar(wrong)[0]:.1f}," in figures(config, wrong)[1]
+    assert axle_torque_per_bar(wrong) == pytest.approx([2.0 * one for one in axle_torque_per_bar(right)])
+    assert f"front {axle_torque_per_bar(wrong)[0]:.1f}," in figures(config, wrong)[1]
 
 
 def test_a_distribution_that_is_forbidden_is_shown_with_its_figures(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ecu.errors import UserError
-from ecu.settings.config import config_hash, load_config, new_params, store_key
+from ecu.settings.config import config_hash, load_config, new_params, store_key, torque_per_bar
 
 CONFIGS = Path(__file__).parents[3] / "config"
 SUV = (CONFIGS / "suv.toml").read_text(encoding="utf-8")
@@ -73,6 +73,7 @@ def test_every_shipped_configuration_is_a_car(path: Path) -> None:
 def test_units_of_params() -> None:
     p = new_params(load_config(CONFIGS / "suv.toml"))[0]
     assert p["piston_area"] == pytest.approx([math.pi * 0.03**2] * 2 + [math.pi * 0.017**2] * 2)
+    assert torque_per_bar(p) == pytest.approx([30.663] * 2 + [10.525] * 2, abs=1e-3)  # by hand, N m/bar
     assert p["push_out_pressure"] == pytest.approx([0.5e5] * 4)
     assert p["sigma_pressure"] == pytest.approx(1.8e5)
     assert p["drag_area"] == pytest.approx(0.5 * 1.2 * 0.35 * 2.32)

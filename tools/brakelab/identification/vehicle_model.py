@@ -21,6 +21,7 @@ from brakelab.identification.vehicle_fit import Places, Prior, Residuals
 from brakelab.identification.vehicle_windows import Windows
 from brakelab.log_physics.line import Vector
 from ecu.contract.params import BAR, GRAVITY
+from ecu.settings.config import torque_per_bar
 
 GENTLE: Final = 0.6  # of the weight: no stronger braking is used
 COASTING: Final = 0.3  # m/s^2, where a drive that nobody reports pulls or drags little
@@ -99,7 +100,7 @@ def prior_of(params: Any, told: Told) -> Prior:
     base, gravity = float(p["wheelbase"]), GRAVITY
     height = float(p["cog_height"])
     load = np.asarray(p["static_load"])
-    per_bar = 2.0 * p["piston_area"] * p["effective_radius"] * p["mu_nominal"] * BAR
+    per_bar = torque_per_bar(p)
     stiffness = p["slip_stiffness"] * load
     sink = float(p["mass"]) * height / (2.0 * base) / (3.0 * float(np.mean(p["vertical_stiffness"])))
     rows = {

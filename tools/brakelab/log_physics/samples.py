@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.log_physics.line import RATE, Vector, smooth
-from ecu.contract.params import BAR
 from ecu.contract.signals import (
     ACCEL_X,
     ACCEL_Y,
@@ -25,6 +24,7 @@ from ecu.contract.signals import (
     WHEEL_SPEED,
     YAW_RATE,
 )
+from ecu.settings.config import torque_per_bar
 
 SAMPLED: Final = (
     *range(WHEEL_SPEED, WHEEL_SPEED + 4),
@@ -70,7 +70,7 @@ ANY_CAR: Final = Car(np.full(4, 0.33), 1.55, 2.7, None, None, known=False)
 
 def car_of(params: Any) -> Car:
     """Return the car of one `PARAMS`."""
-    torque = BAR * 2.0 * params["piston_area"] * params["effective_radius"] * params["mu_nominal"]
+    torque = torque_per_bar(params)
     radius = np.array(params["wheel_radius"])
     per_torque = 1.0 / radius / float(params["mass"])
     lengths = float(params["track"]), float(params["wheelbase"])

@@ -18,6 +18,7 @@ from brakelab.mapping.series import Series
 from ecu.bus.units import CONVERSIONS, spelled
 from ecu.contract.params import BAR
 from ecu.contract.signals import CORNERS
+from ecu.settings.config import torque_per_bar
 
 FOLLOWS: Final = 0.7  # correlation with the deceleration, from which a torque is one of the brakes
 NEAR: Final = 0.02
@@ -43,7 +44,7 @@ def brake_torque(series: list[Series], motion: Motion) -> tuple[Series, Fit] | N
 
 def pressure_per_torque(params: Any) -> tuple[Vector, Vector]:
     """Return factor [bar per N m of the total] and offset [bar] of every corner; `params` is one `PARAMS`."""
-    per_bar = BAR * 2.0 * params["piston_area"] * params["effective_radius"] * params["mu_nominal"]
+    per_bar = torque_per_bar(params)
     share = per_bar / per_bar.sum()
     if params["front_share"] > 0.0:
         front = 0.5 * float(params["front_share"])
