@@ -158,3 +158,16 @@ def test_a_car_that_stands_is_not_judged(right: Samples) -> None:
     standing[:, WHEELS] = 0.0
     standing[:, ACCEL_X] *= -1.0
     assert lines_of(standing, SUV) == []
+
+
+@pytest.mark.parametrize("noise", [0.1, 1.8])
+def test_pressures_of_a_drive_without_a_braking_are_not_judged(right: Samples, noise: float) -> None:
+    """On the motors alone the car slows down too: released brakes are no signal of something else."""
+    samples = right.copy()
+    random = np.random.default_rng(4)
+    samples[:, PRESSURES] = random.normal(0.5, noise, (len(samples), 4))
+    collector = Collector()
+    collector.add(samples)
+    judged = judge(collector.drive(), SUV)
+    assert not judged.lines
+    assert "calliper_pressure" not in judged.checked

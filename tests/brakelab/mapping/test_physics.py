@@ -10,6 +10,7 @@ from brakelab.log_physics.samples import ANY_CAR, car_of
 from brakelab.mapping.brakes import brakes, flags
 from brakelab.mapping.curves import at_rest, curves
 from brakelab.mapping.motion import motion_of, wheel_speeds
+from brakelab.mapping.physics import propose
 from brakelab.mapping.scale import scale_of
 from brakelab.mapping.series import Series, with_signs
 from ecu.contract.signals import CORNERS
@@ -153,6 +154,34 @@ def test_a_magnitude_is_known_with_the_flag_that_is_its_sign():
     assert "yaw_rate" not in turning(*message)
 
 
+def test_without_a_curve_names_propose_what_curves_would_tell():
+    straight = [one._replace(value=3.6 * ROAD.speed) for one in ROAD.wheels.values()]
+    zeros = np.random.default_rng(2).normal(0.0, 0.1, len(ROAD.t))
+    others = [series("YAW_RATE", zeros, "deg/s"), series("LAT_ACCEL", zeros, "m/s2")]
+    found = {one.target: one for one in propose([*straight, *others])[0]}
+    assert found["yaw_rate"].series.signal == "YAW_RATE"
+    assert found["accel_y"].series.signal == "LAT_ACCEL"
+    assert "hardly a curve: check sign" in found["yaw_rate"].warning
+    curved = [*ROAD.wheels.values(), *others]
+    assert not {one.target for one in propose(curved)[0]} & {"yaw_rate", "accel_y"}
+
+
+def paused(one: Series, pause: float, at: float = 120.0) -> Series:
+    """Return a series whose recorder, or clock, jumps ahead by `pause` [s]."""
+    return one._replace(t=np.where(one.t > at, one.t + pause, one.t))
+
+
+def test_a_pause_of_the_recorder_changes_nothing():
+    """A straight line over 1000 s would be four times the drive."""
+    sensors = [series("YAW_RATE", -YAW, "deg/s"), series("LAT_ACCEL", LATERAL, "m/s2")]
+    sensors += [series("STEER_ANGLE", ROAD.hand_wheel, "deg"), series("LONG_ACCEL", -ROAD.change, "m/s2")]
+    whole, _ = propose([*ROAD.wheels.values(), *sensors])
+    jumped, drives = propose([paused(one, 1000.0) for one in (*ROAD.wheels.values(), *sensors)])
+    assert drives
+    assert [one.target for one in jumped] == [one.target for one in whole]
+    assert [one.factor for one in jumped] == pytest.approx([one.factor for one in whole], rel=0.02)
+
+
 def test_a_large_zero_is_taken_off():
     """A database whose offset is wrong: 10 bit around 512 with a scale of 0.02 m/s²."""
     one = turning(series("LAT_ACCEL", -501.76 - LATERAL, "m/s2"))["accel_y"]
@@ -222,6 +251,15 @@ def test_the_way_of_a_pedal_is_no_pressure(name):
     told = found(series(name, 8.0 * BAR))
     assert "calliper_pressure_fl" not in told
     assert told["pedal_position"].factor == pytest.approx(100.0 / (8.0 * BAR.max()))
+
+
+def test_a_pressure_that_no_braking_checks_needs_a_name_of_brakes():
+    """A log without the brakes' message: the pump of the transmission has a pressure, too."""
+    level = 5.0 + np.sin(ROAD.t / 50.0)
+    pump = series("CF_Ems_PumpTPres", level, "bar", "EMS20")
+    brake = series("CYL_PRES", level, "bar", "ESP12")
+    assert "calliper_pressure_fl" not in found(pump)
+    assert "calliper_pressure_fl" in found(brake)
 
 
 def test_a_pressure_is_no_pedal():

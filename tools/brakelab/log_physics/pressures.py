@@ -21,6 +21,7 @@ SIDES: Final = 0.2  # by which the sides of an axle may differ
 LEAST_BAR: Final = 3.0  # on the mean, from which sides are compared
 REST: Final = 5.0  # bar, that a released brake may read
 TURNED: Final = 0.6  # correlation with the deceleration
+NOISE: Final = 4.0  # standard deviations of released brakes, that braking stands out by
 OVERRUN: Final = 0.3  # m/s^2, drag and engine
 
 
@@ -44,8 +45,13 @@ def pressure_lines(drive: Drive, car: Car, speed: Vector, rows: Rows) -> tuple[l
             )
             return lines, ["calliper_pressure"]
     total = pressures.sum(axis=1)
+    greatest = np.percentile(np.abs(total[rows]), 99)
+    if idle.sum() > LEAST_ROWS:
+        released = total[idle]
+        if np.percentile(np.abs(total[rows] - np.median(released)), 99) < NOISE * released.std():
+            return [], []
     brakes = rows & (change < -BRAKING)
-    pressed = brakes & (np.abs(total) > 0.3 * np.percentile(np.abs(total[rows]), 99))
+    pressed = brakes & (np.abs(total) > 0.3 * greatest)
     if pressed.sum() < LEAST_ROWS:
         return [], []
     line = fit(total, np.maximum(-change, 0.0), rows)

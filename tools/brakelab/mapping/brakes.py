@@ -7,8 +7,8 @@ import numpy as np
 from brakelab.log_physics.line import Fit, Vector, smooth
 from brakelab.log_physics.samples import Car
 from brakelab.mapping.candidates import best_of, by_name, unit_of
-from brakelab.mapping.motion import BRAKING, MOVING, Found, Motion, on_grid
-from brakelab.mapping.names import converts, corner_of, score, tells_pressure
+from brakelab.mapping.motion import BRAKING, MOVING, Found, Motion, is_near, on_grid
+from brakelab.mapping.names import converts, corner_of, score, tells_brake, tells_pressure
 from brakelab.mapping.series import Series
 from ecu.contract.signals import CORNERS
 
@@ -22,9 +22,11 @@ def brakes(series: list[Series], motion: Motion, car: Car) -> list[Found]:
     """Return calliper pressures, one for all where there is one alone, and the pedals."""
     slows = motion.drives and bool(np.any(motion.change < -BRAKING))
     decel = np.maximum(-motion.change, 0.0)
-    fast = motion.speed > 1.0
+    fast = motion.faster(1.0)
     pressed = best_of(series, "calliper_pressure_fl", motion, decel, fast, 1) if slows else None
     best = pressed[0] if pressed else by_name(series, "calliper_pressure_fl")
+    if not pressed and best is not None and not tells_brake(best.message, best.signal):
+        best = None
     found = []
     if best is not None and np.nanstd(best.value) > 0.0:
         found = _pressures(best, pressed[1] if pressed else None, series, motion, car)
@@ -79,8 +81,8 @@ def _without_unit(each: list[Series], motion: Motion, car: Car) -> tuple[float, 
     if car.decel_per_bar is None:
         return 1.0, f"{told}, taken for bar: friction is off by its scale; --config CONFIG tells more"
     pressures = np.stack([smooth(on_grid(one, motion.t)) for one in each], axis=1)
-    braking = (motion.speed > MOVING) & (motion.change < -BRAKING)
-    released = (motion.speed > MOVING) & (motion.change > 0.2)
+    braking = motion.faster(MOVING) & (motion.change < -BRAKING)
+    released = motion.faster(MOVING) & (motion.change > 0.2)
     zero = np.median(pressures[released], axis=0) if released.any() else np.zeros(len(CORNERS))
     expected = _decel(pressures[braking] - zero, car.decel_per_bar)
     measured = float((-motion.change[braking] - OVERRUN).sum())
@@ -100,11 +102,11 @@ def flags(series: list[Series], motion: Motion) -> list[Found]:
     found = []
     best: tuple[float, Series] | None = None
     for one in series:
-        on = on_grid(one, motion.t) > 0.5
+        on, known = on_grid(one, motion.t) > 0.5, motion.known & is_near(one, motion.t)
         if not one.flag or score(one.signal, "pedal_pressed") < 1 or not motion.drives:
             continue
-        if 0.01 < np.mean(on) < 0.9:
-            slower = float(np.mean(motion.change[~on]) - np.mean(motion.change[on]))
+        if known.any() and 0.01 < np.mean(on[known]) < 0.9:
+            slower = float(np.mean(motion.change[known & ~on]) - np.mean(motion.change[known & on]))
             if slower > 0.5 * BRAKING and (best is None or slower > best[0]):
                 best = slower, one
     if best:

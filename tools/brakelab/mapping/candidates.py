@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.log_physics.line import Fit, Vector, fit, smooth
-from brakelab.mapping.motion import Motion, contract_unit, on_grid
+from brakelab.mapping.motion import Motion, contract_unit, is_near, on_grid
 from brakelab.mapping.names import converts, names_itself, score
 from brakelab.mapping.series import Series
 from ecu.bus.units import spelled
 
 LEAST: Final = 0.5  # correlation that speaks for a signal
-LEAST_WITHOUT_UNIT: Final = 0.8  # for one of which the database says no unit
+LEAST_ALONE: Final = 0.8  # for one whose unit or name says nothing
 PER_WORD: Final = 0.1  # of correlation, that a word of the name is worth
 NEAR: Final = 0.02  # of correlation, by which two signals follow equally well
 STEPS: Final = 8  # fewer values are states, and nothing measured
@@ -42,9 +42,10 @@ def best_of(
             continue
         if (unit == "%" and points < 1) or len(np.unique(one.value)) <= STEPS:
             continue
-        found = fit(smooth(on_grid(one, motion.t)), reference, rows)
+        found = fit(smooth(on_grid(one, motion.t)), reference, rows & is_near(one, motion.t))
         strength = found.correlation * fixed_sign if fixed_sign else abs(found.correlation)
-        least = LEAST if one.unit.strip() or unit == "%" else LEAST_WITHOUT_UNIT
+        told = points > 0 and (one.unit.strip() or unit == "%")
+        least = LEAST if told else LEAST_ALONE
         if not strength >= least:
             continue
         # Between signals that follow equally well the name decides, then the rate.

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from brakelab.log_physics.line import LAGS, RATE, Vector, smooth
 from brakelab.log_physics.samples import Car
 from brakelab.mapping.candidates import best_of, unit_of
-from brakelab.mapping.motion import MOVING, STANDING, Found, Motion, contract_unit, on_grid
+from brakelab.mapping.motion import MOVING, STANDING, Found, Motion, contract_unit, is_near, on_grid
 from brakelab.mapping.scale import scale_of
 from brakelab.mapping.series import Series
 from ecu.bus.units import CONVERSIONS
@@ -70,7 +70,7 @@ def at_rest(signal: Vector, reference: Vector, speed: Vector, rows: Rows) -> AtR
 
 def curves(series: list[Series], motion: Motion, car: Car, taken: set[str]) -> list[Found]:
     """Return yaw rate, lateral acceleration and steering angle; `taken`: names of signals already used."""
-    fast = motion.speed > MOVING
+    fast = motion.faster(MOVING)
     found: list[Found] = []
     wheels = motion.yaw_rates[0]
     yaw_rate = _yaw_rate(series, motion, fast, taken)
@@ -103,7 +103,7 @@ def _yaw_rate(series: list[Series], motion: Motion, fast: Rows, taken: set[str])
         return None
     (one, line), wheels = max(known, key=lambda each: abs(each[0][1].correlation))
     signal = smooth(on_grid(one, motion.t))
-    slow = at_rest(wheels, signal, motion.speed, fast)
+    slow = at_rest(wheels, signal, motion.speed, fast & is_near(one, motion.t))
     slope = 1.0 / slow.slope if slow else line.slope
     where = " at low speed" if slow else ""
     unit = unit_of("yaw_rate", one, slope)
@@ -112,7 +112,7 @@ def _yaw_rate(series: list[Series], motion: Motion, fast: Rows, taken: set[str])
     evidence = (
         f"against right less left wheels: correlation {abs(line.correlation):.2f}, slope {slope:+.2f}{where}"
     )
-    stood = motion.speed < STANDING
+    stood = (motion.speed < STANDING) & motion.known & is_near(one, motion.t)
     zero = float(np.median(signal[stood])) if stood.sum() > LEAST_STOOD else line.intercept
     return _with_zero("yaw_rate", one, told.factor, unit, zero, evidence, told.warning)
 
@@ -129,7 +129,7 @@ def _accel_y(
     slope, where, slow = line.slope, "", None
     if yaw_rate is motion.yaw_rates[0]:  # the wheels', which tyres pressed flat disturb
         turns = (signal - line.intercept) / np.maximum(motion.speed, MOVING)
-        slow = at_rest(yaw_rate, turns, motion.speed, fast)
+        slow = at_rest(yaw_rate, turns, motion.speed, fast & is_near(one, motion.t))
         if slow:
             slope, where = 1.0 / slow.slope, " at low speed"
     unit = unit_of("accel_y", one, slope)
@@ -165,7 +165,7 @@ def _steering(
     if best is None:
         return None
     one, line = best
-    signal = smooth(on_grid(one, motion.t))
+    signal, fast = smooth(on_grid(one, motion.t)), fast & is_near(one, motion.t)
     unit = unit_of("steering_angle", one, line.slope)
     if power:
         turns = yaw_rate * speed ** (power - 1)

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from brakelab.log_physics.line import Fit, fit, smooth
-from brakelab.mapping.motion import BRAKING, MOVING, Found, Motion, on_grid
+from brakelab.mapping.motion import BRAKING, MOVING, Found, Motion, is_near, on_grid
 from brakelab.mapping.names import converts, words
 from brakelab.mapping.series import Series
 from ecu.bus.units import CONVERSIONS, spelled
@@ -27,7 +27,7 @@ PER_TORQUE: Final = (250.0, 2000.0)  # N m per m/s^2: mass times radius of a car
 
 def drive_torque(series: list[Series], motion: Motion) -> tuple[Series, Fit] | None:
     """Return the torque at the wheels [N m] that the car's acceleration follows best; None: there is none."""
-    rows = (motion.speed > MOVING) & (motion.change > -BRAKING)
+    rows = motion.faster(MOVING) & (motion.change > -BRAKING)
     if not motion.drives or rows.sum() < 2 or motion.change[rows].std() < LEAST:
         return None
     found = []
@@ -35,7 +35,7 @@ def drive_torque(series: list[Series], motion: Motion) -> tuple[Series, Fit] | N
         parts = set(words(one.signal))
         if one.flag or not converts(one.unit, "N m") or not parts & WHEEL or parts & (BRAKES | ASKED):
             continue
-        line = fit(smooth(on_grid(one, motion.t)), motion.change, rows)
+        line = fit(smooth(on_grid(one, motion.t)), motion.change, rows & is_near(one, motion.t))
         scaled = line.slope * CONVERSIONS["N m"][spelled(one.unit)][0]
         if line.correlation > FOLLOWS and PER_TORQUE[0] < scaled < PER_TORQUE[1]:
             found.append((line.correlation, one, line))
@@ -46,7 +46,7 @@ def driven_wheels(torque: Series, wheels: dict[str, Series], motion: Motion) -> 
     """Return the share of each wheel in the torque, in the order of CORNERS, and what it is told by."""
     drive = smooth(on_grid(torque, motion.t))
     fl, fr, rl, rr = (smooth(np.abs(on_grid(wheels[corner], motion.t))) for corner in CORNERS)
-    rows = motion.speed > MOVING
+    rows = motion.faster(MOVING)
     ahead = (rl + rr - fl - fr)[rows] / np.maximum(fl + fr, 1e-6)[rows]
     if rows.sum() < 2 or ahead.std() == 0.0 or drive[rows].std() == 0.0:
         return (0.25,) * 4, "all wheels, assumed"

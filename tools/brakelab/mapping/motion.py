@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from brakelab.log_physics.line import RATE, Vector, smooth
 from brakelab.log_physics.samples import ANY_CAR, Car
@@ -15,6 +16,11 @@ from ecu.contract.signals import CORNERS, INPUT, INPUT_SIGNALS
 MOVING: Final = 3.0  # m/s
 STANDING: Final = 0.1  # m/s
 BRAKING: Final = 0.7  # m/s^2
+BRIDGED: Final = 0.5  # s without a sample that a straight line may fill
+PERIODS: Final = 3.0  # likewise, of a sender that is slow
+MARGIN: Final = 0.5  # s beside a gap, that smoothing and delay reach
+
+Rows = NDArray[np.bool_]
 
 
 class Found(NamedTuple):
@@ -42,11 +48,17 @@ class Motion(NamedTuple):
     """dv/dt [m/s^2]"""
     yaw_rates: tuple[Vector, ...]
     """rad/s, positive to the left; of both axles, the front and the rear one"""
+    known: Rows
+    """Where samples of all wheels are near."""
 
     @property
     def drives(self) -> bool:
         """Whether the car drove far enough for physics to tell anything."""
-        return bool(np.mean(self.speed > MOVING) > 0.02)
+        return bool(np.mean(self.faster(MOVING)) > 0.02)
+
+    def faster(self, speed: float) -> Rows:
+        """Return where the car is known to be faster than `speed` [m/s]."""
+        return (self.speed > speed) & self.known
 
 
 def contract_unit(target: str) -> str:
@@ -60,6 +72,20 @@ def on_grid(series: Series, t: Vector) -> Vector:
     if not known.any():
         return np.full(len(t), np.nan)
     return np.interp(t, series.t[known], series.value[known])
+
+
+def is_near(series: Series, t: Vector) -> Rows:
+    """Return where the grid `t` [s] has samples of the series before and after it, not far away."""
+    times = series.t[np.isfinite(series.value)]
+    if len(times) < 2:
+        return np.zeros(len(t), np.bool_)
+    widest = max(BRIDGED, PERIODS * series.period)
+    gaps = np.flatnonzero(np.diff(times) > widest)
+    near = (t >= times[0]) & (t <= times[-1])
+    for begin, end in zip(times[gaps], times[gaps + 1], strict=True):
+        first, last = np.searchsorted(t, (begin - MARGIN, end + MARGIN))
+        near[first:last] = False
+    return near
 
 
 def wheel_speeds(series: Iterable[Series]) -> dict[str, Series]:
@@ -86,7 +112,7 @@ def wheel_speeds(series: Iterable[Series]) -> dict[str, Series]:
         means = np.array([np.nanmean(np.abs(one.value)) for one in group.values()])
         together = bool(means.max() <= 1.1 * means.min() + 0.5)
         name = score(group["fl"].name, "wheel_speed")
-        return together, name, len(np.unique(group["fl"].value)), -group["fl"].period
+        return together, name, len(np.unique(group["fl"].value)), -round(group["fl"].period, 3)
 
     best = max(whole, key=worth, default=None)
     return {} if best is None else {corner: best[corner] for corner in CORNERS}
@@ -110,4 +136,6 @@ def motion_of(wheels: dict[str, Series], car: Car = ANY_CAR) -> Motion:
     fl, fr, rl, rr = (smooth(np.abs(metres(on_grid(wheels[corner], t)))) for corner in CORNERS)
     speed = 0.25 * (fl + fr + rl + rr)
     front, rear = (fr - fl) / car.track, (rr - rl) / car.track
-    return Motion(t, speed, np.gradient(speed, 1.0 / RATE), (0.5 * (front + rear), front, rear))
+    known = np.logical_and.reduce([is_near(one, t) for one in wheels.values()])
+    change = np.where(known, np.gradient(speed, 1.0 / RATE), 0.0)
+    return Motion(t, speed, change, (0.5 * (front + rear), front, rear), known)

@@ -116,6 +116,12 @@ def tells_pressure(message: str, signal: str) -> bool:
     return any(part.startswith(told) or "druck" in part for part in (*words(message), *words(signal)))
 
 
+def tells_brake(message: str, signal: str) -> bool:
+    """Return whether a pressure by name, or its message by its own, is one of the brakes."""
+    told = ("brk", "brake", "brems", "cyl", "calliper", "caliper", "esp", "esc", "abs", "vsa", "ibst", "ehb")
+    return any(part.startswith(told) for part in (*words(message), *words(signal)))
+
+
 def names_itself(name: str, target: str) -> bool:
     """Return whether the name of a flag holds the first word of the input's own, in one of its spellings."""
     own = ("abs",) if target == "abs_active" else WORDS[target][:5]

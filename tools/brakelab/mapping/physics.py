@@ -13,6 +13,7 @@ A regression over the drive gives sign and scale, so swapped or inverted axes sh
 left). Once a yaw rate is found it replaces that of the wheels, which their slip disturbs.
 """
 
+from collections.abc import Iterable
 from typing import Final
 
 from brakelab.log_physics.samples import ANY_CAR, Car
@@ -25,12 +26,14 @@ from brakelab.mapping.series import Series
 from ecu.bus.units import CONVERSIONS, spelled
 
 STEERING_RATIO: Final = 16.0  # of a car that is not known. Assumption
+CURVES: Final = ("yaw_rate", "accel_y", "steering_angle")
+LEAST_CURVES: Final = 0.3  # m/s^2, standard deviation of v times yaw rate
 LEAST_ZERO: Final = 0.05  # m/s^2, a zero error worth a line
 
 
 def accel_x(series: list[Series], motion: Motion) -> list[Found]:
     """Return the longitudinal acceleration of a car that drives, its zero error taken off, or nothing."""
-    best = best_of(series, "accel_x", motion, motion.change, motion.speed > MOVING)
+    best = best_of(series, "accel_x", motion, motion.change, motion.faster(MOVING))
     if best is None:
         return []
     one, line = best
@@ -46,16 +49,23 @@ def accel_x(series: list[Series], motion: Motion) -> list[Found]:
     return [Found("accel_x", one, told.factor, offset, unit, evidence, True, told.warning)]
 
 
-def named_only(series: list[Series]) -> list[Found]:
-    """Return what names alone say of inertial sensors and steering, for a car that stands."""
-    found = []
-    for target in ("accel_x", "accel_y", "yaw_rate", "steering_angle"):
-        one = by_name(series, target)
+def named_only(series: list[Series], targets: Iterable[str], because: str) -> list[Found]:
+    """Return what names alone say of inertial sensors and steering, `because` the drive says nothing."""
+    found: list[Found] = []
+    for target in targets:
+        one = by_name([one for one in series if not one.sign], target)
         if one:
             factor = 1.0 / STEERING_RATIO if target == "steering_angle" else 1.0
-            evidence = "by its name; the car stands: check sign and unit"
-            found.append(Found(target, one, factor, 0.0, unit_of(target, one), evidence, False))
+            evidence = f"by its name; {because}"
+            warning = f"its name alone speaks for it, {because}: check sign and unit"
+            found.append(Found(target, one, factor, 0.0, unit_of(target, one), evidence, False, warning))
     return found
+
+
+def _curved(motion: Motion) -> bool:
+    """Return whether the drive has curves enough to tell what follows them."""
+    fast = motion.faster(MOVING)
+    return bool((motion.speed * motion.yaw_rates[0])[fast].std() > LEAST_CURVES)
 
 
 def propose(series: list[Series], car: Car = ANY_CAR) -> tuple[list[Found], bool]:
@@ -73,8 +83,11 @@ def propose(series: list[Series], car: Car = ANY_CAR) -> tuple[list[Found], bool
         for corner, one in wheels.items()
     ]
     if motion.drives:
-        along = accel_x(here, motion)
-        found += [*along, *curves(here, motion, car, {one.series.name for one in along})]
+        found += accel_x(here, motion)
+        found += curves(here, motion, car, {one.series.name for one in found})
+        if not _curved(motion):
+            open_ = [name for name in CURVES if name not in {one.target for one in found}]
+            found += named_only(here, open_, "the drive has hardly a curve")
     else:
-        found += named_only(here)
+        found += named_only(here, ("accel_x", *CURVES), "the car stands")
     return found + brakes(here, motion, car) + flags(here, motion), motion.drives

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from brakelab.log_physics.line import Fit, Vector, fit, smooth
-from brakelab.mapping.motion import BRAKING, Found, Motion, on_grid
+from brakelab.mapping.motion import BRAKING, Found, Motion, is_near, on_grid
 from brakelab.mapping.names import converts, words
 from brakelab.mapping.series import Series
 from ecu.bus.units import CONVERSIONS, spelled
@@ -36,7 +36,7 @@ def brake_torque(series: list[Series], motion: Motion) -> tuple[Series, Fit] | N
         parts = set(words(one.signal))
         if one.flag or not converts(one.unit, "N m") or not parts & {"brk", "brake", "brakes", "bremse"}:
             continue
-        line = fit(smooth(on_grid(one, motion.t)), decel, motion.speed > 1.0)
+        line = fit(smooth(on_grid(one, motion.t)), decel, motion.faster(1.0) & is_near(one, motion.t))
         if line.correlation > FOLLOWS:
             found.append((line.correlation + (NEAR if parts & MEASURED else 0.0), one, line))
     return max(found, key=lambda candidate: candidate[0])[1:] if found else None
