@@ -157,7 +157,8 @@ def test_a_magnitude_is_known_with_the_flag_that_is_its_sign():
 def test_without_a_curve_names_propose_what_curves_would_tell():
     straight = [one._replace(value=3.6 * ROAD.speed) for one in ROAD.wheels.values()]
     zeros = np.random.default_rng(2).normal(0.0, 0.1, len(ROAD.t))
-    others = [series("YAW_RATE", zeros, "deg/s"), series("LAT_ACCEL", zeros, "m/s2")]
+    others = [series("YAW_RATE", zeros, "deg/s"), series("ACCEL_BASE_ACC", zeros, "m/s2")]
+    others += [series("LAT_ACCEL", zeros, "m/s2")]
     found = {one.target: one for one in propose([*straight, *others])[0]}
     assert found["yaw_rate"].series.signal == "YAW_RATE"
     assert found["accel_y"].series.signal == "LAT_ACCEL"

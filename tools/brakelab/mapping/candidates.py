@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from brakelab.log_physics.line import Fit, Vector, fit, smooth
 from brakelab.mapping.motion import Motion, contract_unit, is_near, on_grid
-from brakelab.mapping.names import converts, names_itself, score
+from brakelab.mapping.names import converts, names_itself, score, tells_direction
 from brakelab.mapping.series import Series
 from ecu.bus.units import spelled
 
@@ -66,7 +66,7 @@ def by_name(series: Iterable[Series], target: str) -> Series | None:
         points = score(one.signal, target)
         if unit == "-":
             return one.flag and points >= 2 and names_itself(one.signal, target)
-        fits = converts(one.unit, unit)
+        fits = converts(one.unit, unit) and tells_direction(one.signal, target)
         return not one.flag and (points >= 1 if fits else points >= 2 and unit.startswith(("m/s", "rad")))
 
     fitting = [one for one in series if speaks(one)]

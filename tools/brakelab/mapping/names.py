@@ -34,8 +34,8 @@ _CORNERS: Final = (
 
 WORDS: Final = {
     "wheel_speed": ("whl", "wheel", "wss", "spd", "speed", "rad", "radgeschw", "raddrehzahl"),
-    "accel_x": ("long", "lgt", "ax", "x", "longitudinal", "laengs", "längs", "accel", "acc"),
-    "accel_y": ("lat", "ay", "y", "lateral", "quer", "accel", "acc"),
+    "accel_x": ("long", "lgt", "ax", "x", "longitudinal", "laengs", "längs", "accel"),
+    "accel_y": ("lat", "ay", "y", "lateral", "quer", "accel"),
     "yaw_rate": ("yaw", "gier", "yawrate", "rate"),
     "steering_angle": ("steer", "steering", "sas", "stw", "lenk", "lrw", "pinion", "angle", "whl"),
     "calliper_pressure": (
@@ -60,7 +60,7 @@ WORDS: Final = {
 """Words that speak for an input."""
 _ASKED: Final = (
     *("demand", "dmnd", "request", "req", "rq", "cmd", "command", "desired", "target", "tgt", "setpoint"),
-    *("soll", "ziel", "min", "max", "limit", "lim"),
+    *("soll", "ziel", "ref", "min", "max", "limit", "lim"),
 )
 """Words of what somebody asks for, which is no measurement."""
 AGAINST: Final = {
@@ -108,6 +108,16 @@ def score(name: str, target: str) -> float:
         return any(part == word or (len(word) > 3 and part.startswith(word)) for part in parts)
 
     return float(sum(map(speaks, WORDS[stem])) - 3 * sum(map(speaks, AGAINST.get(stem, ()))))
+
+
+def tells_direction(name: str, target: str) -> bool:
+    """Return whether a name says which of two accelerations it is; True of other inputs."""
+    if not target.startswith("accel_"):
+        return True
+    own = [word for word in WORDS[target] if word != "accel"]
+    return any(
+        part == word or (len(word) > 3 and part.startswith(word)) for part in words(name) for word in own
+    )
 
 
 def tells_pressure(message: str, signal: str) -> bool:
