@@ -231,6 +231,13 @@ def test_a_pressure_without_a_unit_gets_the_scale_of_configured_brakes(counts):
     assert "friction is relative" in one.warning
 
 
+def test_decelerations_on_the_motors_alone_scale_no_pressure():
+    """Two in five decelerations are the motors': they would make the scale too large."""
+    brakes_act = ROAD.t % 20.0 > 8.0
+    one = found(series("BRAKE_PRESSURE", np.where(brakes_act, 3.2 * BAR, 0.0)))["calliper_pressure_fl"]
+    assert one.factor == pytest.approx(1.0 / 3.2, rel=0.2)
+
+
 def test_a_pressure_without_a_unit_that_fits_is_taken_for_bar():
     one = found(series("BRAKE_PRESSURE", BAR))["calliper_pressure_fl"]
     assert one.factor == 1.0

@@ -13,6 +13,7 @@ from brakelab.mapping.series import Series
 from ecu.contract.signals import CORNERS
 
 READS_AS_BAR: Final = 1.25  # and its inverse: of a scale that friction explains
+APPLIED: Final = 0.3  # of the greatest pressure
 OVERRUN: Final = 0.3  # m/s^2, drag and engine
 SELDOM: Final = 0.3  # of a drive, that ABS or ESP may act
 FULL: Final = 100.0  # %
@@ -84,7 +85,10 @@ def _without_unit(each: list[Series], motion: Motion, car: Car) -> tuple[float, 
     braking = motion.faster(MOVING) & (motion.change < -BRAKING)
     released = motion.faster(MOVING) & (motion.change > 0.2)
     zero = np.median(pressures[released], axis=0) if released.any() else np.zeros(len(CORNERS))
-    expected = _decel(pressures[braking] - zero, car.decel_per_bar)
+    pressures = pressures - zero
+    applied = pressures.sum(axis=1)  # not by motors alone
+    braking &= applied > APPLIED * np.percentile(applied[motion.faster(MOVING)], 99)
+    expected = _decel(pressures[braking], car.decel_per_bar)
     measured = float((-motion.change[braking] - OVERRUN).sum())
     factor = measured / expected if expected > 0.0 else 1.0
     if 1.0 / READS_AS_BAR < factor < READS_AS_BAR:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from brakelab.log_physics.line import Fit, Vector, fit, smooth
 from brakelab.mapping.motion import Motion, contract_unit, is_near, on_grid
-from brakelab.mapping.names import converts, names_itself, score, tells_direction
+from brakelab.mapping.names import converts, names_itself, score, tells_direction, tells_pressure
 from brakelab.mapping.series import Series
 from ecu.bus.units import spelled
 
@@ -44,7 +44,8 @@ def best_of(
             continue
         found = fit(smooth(on_grid(one, motion.t)), reference, rows & is_near(one, motion.t))
         strength = found.correlation * fixed_sign if fixed_sign else abs(found.correlation)
-        told = points > 0 and (one.unit.strip() or unit == "%")
+        said = one.unit.strip() or unit == "%" or (unit == "bar" and tells_pressure(one.message, one.signal))
+        told = points > 0 and said
         least = LEAST if told else LEAST_ALONE
         if not strength >= least:
             continue
