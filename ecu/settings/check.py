@@ -48,7 +48,7 @@ def check(path: Path, pictured: bool = False) -> int:
 
 def figures_of(config: Config, params: Any) -> dict[str, Any]:
     """Return the figures of the car by name: torque per pressure [N m/bar], pressures [bar]."""
-    front, rear = torque_per_bar(params)
+    front, rear = axle_torque_per_bar(params)
     return {
         "car": config.name,
         "mass_kg": float(params["mass"]),
@@ -97,7 +97,7 @@ def pressures(params: Any, z: float) -> tuple[float, float]:
     force = z * GRAVITY * float(params["mass"])
     found = [
         part * force * params["wheel_radius"][i] / per_bar + params["push_out_pressure"][i] / BAR
-        for part, per_bar, i in zip((share, 1.0 - share), torque_per_bar(params), (0, 2), strict=True)
+        for part, per_bar, i in zip((share, 1.0 - share), axle_torque_per_bar(params), (0, 2), strict=True)
     ]
     return float(found[0]), float(found[1])
 

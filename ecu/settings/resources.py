@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Final
 
-from ecu.errors import UserError
+from ecu.errors import UserError, closest
 
 _PACKAGE = Path(__file__).parents[1]
 
@@ -31,7 +31,7 @@ def named(name: str, *folders: str) -> Path:
     if name in shipped:
         return shipped[name]
     names = ", ".join(shipped)
-    raise UserError(name, "", f"no such file, and none that is shipped ({names})")
+    raise UserError(name, "", f"no such file, and none that is shipped ({names}){closest(name, shipped)}")
 
 
 def command_name(path: Path) -> str:
