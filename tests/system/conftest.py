@@ -207,6 +207,15 @@ def vehicle() -> Iterator[Callable[..., Vehicle]]:
         one.channel.close()
 
 
+@pytest.fixture
+def car(vehicle: Callable[..., Vehicle], request: pytest.FixtureRequest) -> Vehicle:
+    """A car on the module's multicast group `GROUP`; it rolls at 20 m/s and asks for 3 m/s²."""
+    car = vehicle("udp_multicast", request.module.GROUP)
+    car.set(decel_demand=3, vehicle_speed=20, vehicle_speed_valid=1)
+    car.set(**{f"wheel_speed_{corner}": 55.0 for corner in ("fl", "fr", "rl", "rr")})
+    return car
+
+
 class Witness:
     """candump on vcan0, the log that knows nothing of the daemon."""
 

@@ -30,15 +30,6 @@ def bus():
     return ("--config", ROOT / "config" / "suv.toml", "--armed", "-i", "udp_multicast", "-c", GROUP)
 
 
-@pytest.fixture
-def car(vehicle):
-    """A car that asks for 3 m/s²."""
-    car = vehicle("udp_multicast", GROUP)
-    car.set(decel_demand=3, vehicle_speed=20, vehicle_speed_valid=1)
-    car.set(**{f"wheel_speed_{corner}": 55.0 for corner in ("fl", "fr", "rl", "rr")})
-    return car
-
-
 def demands(heard):
     """Return stamps, valid flags and alive counters of the front demand, as heard."""
     front = heard[heard["can_id"] == demand_ids()[0]]

@@ -40,14 +40,6 @@ def watch(tmp_path):
         process.wait()
 
 
-@pytest.fixture
-def car(vehicle):
-    car = vehicle("udp_multicast", GROUP)
-    car.set(decel_demand=3, vehicle_speed=20, vehicle_speed_valid=1)
-    car.set(**{f"wheel_speed_{corner}": 55.0 for corner in ("fl", "fr", "rl", "rr")})
-    return car
-
-
 class Lines:
     """Facts that a watcher prints, line by line."""
 
