@@ -14,6 +14,8 @@ from ecu.algorithm.hydraulics import (
     correct_pressures,
     follows_demand,
 )
+from ecu.contract.signals import CALLIPER_PRESSURE
+from ecu.jit import kernel
 
 BAR = 1e5
 DT = 0.01
@@ -135,14 +137,25 @@ def test_missed_cycles_have_held_the_demand(params, feed) -> None:
 
 def follow(callipers: Callipers, demand: np.ndarray, pressure: np.ndarray, seed: int):
     """Return value, variance, whether it follows and the raw sample, at the start of each cycle."""
-    random, rows = np.random.default_rng(seed), []
     callipers.start(demand[0])
-    for k, truth in enumerate(pressure):
-        sent = demand[max(k - 1, 0)]
-        sample = truth + SIGMA * random.standard_normal()
-        rows.append((*callipers.correct(sent, sample), sample))
-        advance_pressures(callipers.state, np.full(4, sent * BAR))
-    return np.array(rows).T
+    sent = np.concatenate([demand[:1], demand])[: len(pressure)]
+    samples = pressure + SIGMA * np.random.default_rng(seed).standard_normal(len(pressure))
+    c, rows = callipers, np.empty((len(pressure), 3))
+    follow_cycles(c.p, c.state, c.inputs, c.zero, c.failed, sent, samples, rows)
+    return np.array([*rows.T, samples])
+
+
+@kernel
+def follow_cycles(params, state, inputs, zero, failed, sent, samples, rows):
+    """Run cycles as `Callipers.cycle` does; rows of value, variance and whether it follows."""
+    pressures = np.empty(4)
+    for k in range(len(samples)):
+        pressures[:] = sent[k] * BAR
+        inputs[0].value[CALLIPER_PRESSURE : CALLIPER_PRESSURE + 4] = samples[k]
+        correct_pressures(params, state, inputs[0], pressures, zero, failed, DT)
+        rows[k, 0], rows[k, 1] = state.value[0], state.variance[0]
+        rows[k, 2] = follows_demand(params, state, 0)
+        advance_pressures(state, pressures)
 
 
 def rms(errors) -> float:

@@ -19,15 +19,21 @@ from ecu.algorithm.estimation.zero import (
     quantile,
     settle_zero,
 )
+from ecu.jit import kernel
 
 
 def settled(readings: np.ndarray, wheel: int = 0):
     """Return `ZERO_STATE` after readings [bar] at rest of one wheel."""
     state = np.zeros(1, ZERO_STATE)[0]
-    for reading in readings:
-        note_rest(state, wheel, reading)
+    note_rests(state, wheel, np.asarray(readings, float))
     settle_zero(state, wheel)
     return state
+
+
+@kernel
+def note_rests(state, wheel, readings):
+    for reading in readings:
+        note_rest(state, wheel, reading)
 
 
 def known(count: int) -> float:
