@@ -1,15 +1,11 @@
-"""Disc temperature on board: closed forms, energy, error bars, lost signals, and beside the simulated car."""
+"""Disc temperature on board: closed forms, energy, error bars and lost signals."""
 
 import itertools
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from brakelab.simulation.closed_loop import Drive, new_loop, run
-from brakelab.simulation.scenario import load_scenario
-from brakelab.simulation.scenario_car import with_draw
 from ecu.algorithm.estimation.friction import update_pressure
 from ecu.algorithm.monitoring.application import update_application
 from ecu.algorithm.monitoring.disc_temperature import (
@@ -23,9 +19,7 @@ from ecu.algorithm.step import new_state, step
 from ecu.contract.records import OUTPUTS
 from ecu.contract.signals import CALLIPER_PRESSURE, CORNERS, HOLDING, INPUT, OBSERVING, OUTPUT
 from ecu.jit import kernel
-from ecu.settings.config import Config, load_config
 
-CONFIG = Path(__file__).parents[4] / "config"
 AIR = 20.0  # degC
 RADIUS = 0.36  # m
 TORQUE = np.array([800.0, 800.0, 400.0, 400.0])  # N m
@@ -316,65 +310,3 @@ def test_friction_gets_less_certain_by_4_percent_per_100_kelvin_either_way(discs
     discs.d["excess"] = excess
     discs.go(0.001, dt=0.001)
     assert heat_widening(discs.d, 0) == pytest.approx(expected, abs=1e-5)
-
-
-# Beside the simulated car
-
-
-def changed(config: Config, heating: float, cooling: float) -> Config:
-    """Return the configuration of a car whose discs differ from those of the simulated one."""
-    axles = {
-        name: axle.model_copy(
-            update={
-                "disc_heating": heating * axle.disc_heating,
-                "disc_cooling": cooling * axle.disc_cooling,
-                "disc_cooling_by_speed": cooling * axle.disc_cooling_by_speed,
-            }
-        )
-        for name, axle in (("front", config.front), ("rear", config.rear))
-    }
-    return config.model_copy(update=axles)
-
-
-def driven(name: str, config: Config, known: bool) -> Drive:
-    """Return a whole drive; `known`: the ECU is told how hot the discs are at the start."""
-    scenario = with_draw(load_scenario(CONFIG / "scenarios" / f"{name}.toml"), "nominal")
-    loop = new_loop(scenario, config, 1)
-    if known:
-        disc = loop.sides.state["discs"][0]
-        disc["excess"] = np.repeat(scenario.initial_disc_temperature, 2) - scenario.ambient_temperature
-        disc["ambient"], disc["sigma_start"] = scenario.ambient_temperature, 0.0
-    return run(loop, seconds=400.0)
-
-
-def corners(columns: dict[str, np.ndarray], name: str) -> np.ndarray:
-    return np.array([columns[f"{name}_{corner}"] for corner in CORNERS])
-
-
-SCENARIOS = ("single", "stop-1", "demo", "fade", "downhill", "rain")
-
-
-@pytest.mark.parametrize("name", SCENARIOS)
-@pytest.mark.parametrize(
-    ("heating", "cooling"), [(1.0, 1.0), (0.85, 1.0), (1.15, 1.0), (0.9, 1.2), (1.1, 0.8)]
-)
-def test_the_true_disc_is_within_two_sigma_though_the_brake_is_another(name, heating, cooling) -> None:
-    drive = driven(name, changed(load_config(CONFIG / "suv.toml"), heating, cooling), known=True)
-    true, found = corners(drive.truth, "disc_temperature"), corners(drive.outputs, "disc_temperature")
-    sigma = corners(drive.outputs, "sigma_disc_temperature")
-    off = np.abs((found - true) / sigma).max()
-    rise = true.max(axis=1) - true[:, 0]
-    print(
-        f"{name}, heating x {heating}, cooling x {cooling}: true {true.max():.0f} degC, error at the end "
-        f"{np.round((found - true)[:, -1], 1)} K, sigma {np.round(sigma[:, -1], 1)} K, {off:.2f} sigma"
-    )
-    assert off < 2.0
-    assert (sigma[:, -1] < (0.7 if name == "rain" else 0.3) * rise + 3.0).all()  # the band says something
-
-
-@pytest.mark.parametrize("name", SCENARIOS)
-def test_the_true_disc_is_within_two_sigma_after_an_unknown_rest(name) -> None:
-    drive = driven(name, load_config(CONFIG / "suv.toml"), known=False)
-    true, found = corners(drive.truth, "disc_temperature"), corners(drive.outputs, "disc_temperature")
-    sigma = corners(drive.outputs, "sigma_disc_temperature")
-    assert np.abs((found - true) / sigma).max() < 2.0
