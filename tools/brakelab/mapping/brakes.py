@@ -15,7 +15,7 @@ from ecu.contract.signals import CORNERS
 READS_AS_BAR: Final = 1.25  # and its inverse: of a scale that friction explains
 APPLIED: Final = 0.3  # of the greatest pressure
 OVERRUN: Final = 0.3  # m/s^2, drag and engine
-SELDOM: Final = 0.3  # of a drive, that ABS or ESP may act
+SELDOM: Final = 0.1  # of a drive, that ABS or ESP may act
 FULL: Final = 100.0  # %
 
 
