@@ -27,7 +27,7 @@ from ecu.arguments import (
 )
 from ecu.completion import fitting, shipped
 from ecu.errors import UserError
-from ecu.output import say, wrote
+from ecu.output import wrote
 from ecu.settings.resources import SCENARIOS, resource
 
 app = Commands()
@@ -185,9 +185,10 @@ def report(
 ) -> int:
     """Write results as a page of linked figures."""
     from brakelab.report import command
+    from brakelab.results.progress import progress_bar
 
-    say(f"reading {result}")
-    command.report(result, truth, out, timing)
+    with progress_bar("report", None):
+        command.report(result, truth, out, timing)
     wrote(out)
     return 0
 

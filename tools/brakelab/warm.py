@@ -56,7 +56,8 @@ def compile_commands() -> None:
         drive = Path(folder) / "drive"
         with asked():
             simulate(scenario, config, drive)
-            replay_into([Path(f"{drive}.log")], config, None, None, None, Path(folder) / "result.parquet")
+            for log in (Path(f"{drive}.log"), Path(f"{drive}.parquet")):
+                replay_into([log], config, None, None, None, Path(folder) / "result.parquet")
             for ending in (".asc", ".blf", ".trc"):
                 _read_as(drive.with_suffix(ending), Path(f"{drive}.log"))
 

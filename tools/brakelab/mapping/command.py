@@ -22,8 +22,10 @@ from brakelab.mapping.names import converts, words
 from brakelab.mapping.physics import propose
 from brakelab.mapping.series import Series, read_series
 from brakelab.mapping.torque import FORMULA, brake_torque, stand_in
+from brakelab.replay.log import log_size
 from brakelab.replay.quality import Findings, damage_lines
 from brakelab.results.console import WIDTH
+from brakelab.results.progress import progress_bar
 from ecu.bus.database import load_database
 from ecu.bus.signal_map import load_signal_map
 from ecu.contract.signals import INPUT, INPUT_SIGNALS, without_corner
@@ -55,7 +57,6 @@ def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) 
     """
     params = new_params(load_config(config))[0] if config else None
     car = ANY_CAR if params is None else car_of(params)
-    say(f"reading {log}")
     if kind_of(log) == "signals":
         return _suggest_columns(log, out, car)
     if dbc is None:
@@ -63,7 +64,8 @@ def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) 
     database, strict = _load(dbc)
     findings = Findings(log)
     interfaces = findings.interfaces
-    series = read_series(read_frames(log, interfaces, findings.log), database)
+    with progress_bar("map suggest", log_size(log)) as advance:
+        series = read_series(read_frames(log, interfaces, findings.log, advance), database)
     for line in damage_lines(findings):
         say(line)
     found, drives = propose(series, car)

@@ -104,6 +104,7 @@ def play(log: Path, interface: str, channel: str, map: Path | None, speed: float
         bus = open_channel(interface, channel, receive_ids=(), fd=fd)
         try:
             _warn_of_no_priority(ask_for_priority())
+            say(f"playing {log} onto {interface} {channel}; Ctrl-C ends it")
             send_on_schedule(chain([first], blocks), bus, system_time(), sent)
         except KeyboardInterrupt:
             code = INTERRUPTED
