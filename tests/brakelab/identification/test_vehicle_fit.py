@@ -44,6 +44,23 @@ def test_sigma_holds_errors_that_a_manoeuvre_shares(shared):
     assert np.all((rms > 0.4) & (rms < 1.35)), rms  # rather too wide: it is never less than the weights say
 
 
+def test_sigma_of_a_slope_that_few_manoeuvres_tell_is_that_of_the_jackknife():
+    """Five brakings of unequal strength, each with a slope of its own: beside fits that leave one out."""
+    own = 2.0 + 0.1 * np.array([-1.0, 0.9, -0.4, 0.6, -0.5])
+    cluster = np.repeat(np.arange(5), 40)
+    x = np.tile(np.linspace(-1.0, 1.0, 40), 5) * np.array([1.0, 1.2, 1.0, 1.5, 2.0])[cluster]
+    y = own[cluster] * x + 1.0
+
+    def of(theta, half):
+        return y - theta[0] * x - theta[1]
+
+    found = fit(Residuals(of, 0 * cluster, cluster, np.full(len(x), 0.01)), WIDE)
+    whole = np.polyfit(x, y, 1)[0]
+    without = [np.polyfit(x[cluster != g], y[cluster != g], 1)[0] for g in range(5)]
+    assert found.theta[0] == pytest.approx(whole, abs=0.01)
+    assert found.sigma[0] == pytest.approx(np.sqrt(0.8 * np.sum((np.array(without) - whole) ** 2)), rel=0.1)
+
+
 def test_a_prior_holds_what_the_residuals_do_not_show():
     residuals, _, _ = line(1, 0.0)
     blind = Residuals(lambda theta, half: residuals.of(theta[:2], half), *residuals[1:])

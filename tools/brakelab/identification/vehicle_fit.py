@@ -8,7 +8,13 @@ independent. With Jacobians J_0, J_1 of the two, weights W and priors N(m, P), a
 Each Jacobian is an instrument for the other: E[J_1' n_0] = 0 although both regressors are noisy, so slopes
 are not attenuated as those of least squares are. Weights: residuals beyond three robust standard deviations
 of their kind count less (Huber); a kind whose residuals are correlated within a manoeuvre counts as fewer
-(its design effect). The covariance is the sandwich over manoeuvres, plus what the priors leave.
+(its design effect). The covariance is the sandwich over manoeuvres, plus what the priors leave. A manoeuvre
+that tells much of a parameter pulls it towards its own errors, so that its residuals are too small: its score
+is taken as it would be had the manoeuvre not been in the fit (the jackknife's correction, CR3),
+
+    s_g -> (1 - A_g M^-1)^-1 s_g          A_g = J_g' W J_g, M: the matrix above
+
+and few manoeuvres do not make sigma too small.
 """
 
 from collections.abc import Callable
@@ -135,6 +141,16 @@ def fit(residuals: Residuals, prior: Prior, start: Vector | None = None) -> Fit:
     return _found(residuals, theta, weight, huber, prior, free)
 
 
+def _left_out(cluster: Places, scores: Vector, j: list[Vector], weight: Vector, inverse: Vector) -> Vector:
+    """Return the scores of the manoeuvres, shape (k, n), each by parameters fitted without it."""
+    outer = np.empty_like(scores)
+    for number, score in enumerate(scores):
+        rows = cluster == number
+        own = j[0][rows].T @ (weight[rows, None] * j[1][rows])
+        outer[number] = np.linalg.solve(np.eye(len(score)) - 0.5 * (own + own.T) @ inverse, score)
+    return outer
+
+
 def _found(
     residuals: Residuals, theta: Vector, weight: Vector, huber: Vector, prior: Prior, free: Places
 ) -> Fit:
@@ -146,8 +162,9 @@ def _found(
     inverse = _inverse(0.5 * (cross + cross.T) + np.diag(1.0 / prior.sigma[free] ** 2))
     each = 0.5 * (j[1] * (weight * r[0])[:, None] + j[0] * (weight * r[1])[:, None])
     scores = np.stack([np.bincount(residuals.cluster, column) for column in each.T], axis=1)
+    scores = _left_out(residuals.cluster, scores, j, weight, inverse)
     there = int(np.count_nonzero(np.bincount(residuals.cluster)))
-    meat = scores.T @ scores * there / max(there - 1, 1)
+    meat = scores.T @ scores * (there - 1) / there
     model = 0.5 * (cross + cross.T)
     # Few manoeuvres understate their own scatter: never less than what the weights themselves say.
     sandwich = inverse @ (meat + np.diag(1.0 / prior.sigma[free] ** 2)) @ inverse

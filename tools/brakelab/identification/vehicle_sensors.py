@@ -5,9 +5,10 @@
 
 *Dive.* While the acceleration is steady (the body's swinging has ended), within a manoeuvre the grade is a
 parabola of the place; what is left of a_x,m follows what is left of v' by kappa. *Zero of accel_x.* The
-mean of a_x,m / kappa - v' by distance is b / kappa + g (mean grade). A drive that ends where it began has
-no mean grade; of another the grade of its blocks says how sure the mean is. Each standstill shows b + g
-grade of its place. Speeds are those of the wheels by the model of `vehicle_model`.
+mean of a_x,m / kappa - v' by distance is b / kappa + g (mean grade), beside what curves add. A drive that ends
+where it began has no mean grade; of another the grade of its blocks says how sure the mean is. What curves add
+is told beside the grade of their places, which a closed drive does not cancel: the blocks say how far that may
+mislead. Each standstill shows b + g grade of its place. Speeds are those of the wheels by the model of `vehicle_model`.
 """
 
 from typing import Any, Final, NamedTuple
@@ -15,7 +16,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from brakelab.identification.vehicle_drive import Rows
-from brakelab.identification.vehicle_fit import Prior, Residuals, fit
+from brakelab.identification.vehicle_fit import Places, Prior, Residuals, fit
 from brakelab.identification.vehicle_windows import SECONDS, Windows
 from brakelab.log_physics.line import Vector
 from ecu.contract.params import GRAVITY
@@ -134,8 +135,27 @@ def accel_zero(windows: Windows, steps: Steps, pitch_gradient: float, closed: bo
     else:
         rolled = float(np.hypot(GRAVITY * ELSEWHERE / distance, MODEL))
         rolled = float(np.hypot(grade / np.sqrt(max(count, 1)), rolled))
+    rolled = float(np.hypot(rolled, _by_curves(wide[:, 1:], weight, grade, block)))
     estimates = [(kappa * float(found[0]), kappa * rolled), *_standing(windows, steps, max(grade, 0.05))]
     return _combined(estimates)
+
+
+def _by_curves(columns: Vector, weight: Vector, grade: float, block: Places) -> float:
+    """Return the standard deviation of the mean effect of curves [m/s^2], by the grade of the blocks.
+
+    Args:
+        columns: regressors of the effect, shape (n, k).
+        weight: distance of each step [m].
+        grade: of a block of road, standard deviation [m/s^2].
+        block: that a step is in; its grade is of its own.
+    """
+    if not columns.shape[1]:
+        return 0.0
+    mean = weight @ columns / weight.sum()
+    apart = columns - mean
+    inverse = np.linalg.pinv(apart.T @ (weight[:, None] * apart))
+    scores = np.stack([np.bincount(block, grade * weight * one) for one in apart.T], axis=1)
+    return float(np.linalg.norm(scores @ inverse @ mean))
 
 
 def _standing(windows: Windows, steps: Steps, grade: float) -> list[Told]:

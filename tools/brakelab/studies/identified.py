@@ -36,7 +36,7 @@ from ecu.settings.resources import resource
 
 CARS: Final = 10
 OFF: Final = 0.20
-DRIVEN: Final = 12700.0  # m, by the scenario
+DRIVEN: Final = 12700.0  # m, by the scenario, roughly: a car's brakes make it up to 250 m more or less
 OVER_MASS: Final = ("vehicle.drag_coefficient", "front.mu_nominal", "rear.mu_nominal")
 PERIOD: Final = 4800.0  # m, of the scenario's hills at most
 STRANGER: Final = 900.0  # s of the other trip
@@ -134,18 +134,17 @@ def true_theta(car: Any, drive: Drive, sensors: Any, push_out: Sequence[float]) 
     return theta
 
 
-def _on_own_road(scenario: Scenario, seed: int) -> Scenario:
+def _on_own_road(scenario: Scenario, seed: int, driven: float) -> Scenario:
     """Return the scenario on hills that begin elsewhere: a road in common would be an error in common.
 
-    They end as high as they began.
+    They end as high as they began, after the `driven` metres of this car.
     """
     begin = float(np.random.default_rng([seed, 17]).uniform(0.0, PERIOD))
     rows = scenario.road.grade
     shifted = [(place - begin, grade) for place, grade in rows if place > begin]
     first = float(np.interp(begin, *np.transpose(rows)))
     place, grade = np.transpose([(0.0, first), *shifted])
-    driven = np.linspace(0.0, DRIVEN, 4000)
-    grade -= np.interp(driven, place, grade).mean()
+    grade -= np.interp(np.linspace(0.0, driven, 4000), place, grade).mean()
     level = list(zip(place.tolist(), grade.tolist(), strict=True))
     road = scenario.road.model_copy(update={"grade": level})
     return scenario.model_copy(update={"road": road})
@@ -154,9 +153,12 @@ def _on_own_road(scenario: Scenario, seed: int) -> Scenario:
 def beside_truth(seed: int) -> tuple[list[Beside], Config]:
     """Drive one car and identify it; return its keys and the CONFIG that results."""
     start = start_of(seed)
-    loop = new_loop(_on_own_road(shipped("identify"), seed), load_config(resource("config/suv.toml")), seed)
-    car, sensors = loop.sides.vehicle.params[0].copy(), loop.sides.vehicle.sensors.copy()
-    drive = run(loop)
+    suv, driven = load_config(resource("config/suv.toml")), DRIVEN
+    for _ in range(2):  # the first drive tells how far it is
+        loop = new_loop(_on_own_road(shipped("identify"), seed, driven), suv, seed)
+        car, sensors = loop.sides.vehicle.params[0].copy(), loop.sides.vehicle.sensors.copy()
+        drive = run(loop)
+        driven = float(np.ptp(drive.truth["distance"]))
     with TemporaryDirectory(prefix="brake-ecu-identified-") as folder:
         path = Path(folder, "drive.parquet")
         write_columns(path, drive.t, drive.inputs, {})
