@@ -4,11 +4,15 @@ An application starts when a calliper pressure has been 1 bar above the push-out
 when all have been below for 0.1 s. With 1.8 bar of sensor noise single samples of a released brake often
 cross the threshold, so "below for 0.1 s" is judged by the mean of those 0.1 s. A pressure that is not usable
 neither starts nor prolongs an application.
+
+A held sample is no new evidence: two samples of a sensor with 20 Hz fill 0.1 s, and noise would start an
+application every second or so. So the samples above the threshold must also add up to ten times the least
+excess: ten that are just above it, as at 100 Hz, or fewer of a greater pressure.
 """
 
 import numpy as np
 
-from ecu.algorithm.inputs import usable
+from ecu.algorithm.inputs import fresh, usable
 from ecu.contract.signals import CALLIPER_PRESSURE
 from ecu.jit import Record, kernel
 
@@ -21,6 +25,7 @@ APPLICATION_STATE = np.dtype(
         ("started", "u1"),  # in this cycle
         ("ended", "u1"),  # in this cycle
         ("above", "i8", (4,)),  # cycles in a row above the threshold
+        ("shown", "f8", (4,)),  # sum of the samples in that time [Pa]
         ("recent", "f8", (4, WINDOW)),  # pressure above push-out [Pa]
         ("place", "i8"),
         ("duration_s", "f8"),
@@ -38,11 +43,15 @@ def update_application(params: Record, state: Record, inputs: Record, dt: float)
         place = CALLIPER_PRESSURE + i
         above = 1e5 * inputs.value[place] - params.push_out_pressure[i] if usable(inputs, place) else 0.0
         state.above[i] = state.above[i] + 1 if above > MARGIN else 0
+        if state.above[i] == 0:
+            state.shown[i] = 0.0
+        elif fresh(inputs, place):
+            state.shown[i] += above
         state.recent[i, state.place] = above
         mean = 0.0
         for j in range(WINDOW):
             mean += state.recent[i, j] / WINDOW
-        long_enough = long_enough or state.above[i] >= WINDOW
+        long_enough = long_enough or (state.above[i] >= WINDOW and state.shown[i] >= WINDOW * MARGIN)
         applied = applied or mean > MARGIN
     state.started, state.ended = 0, 0
     if state.braking:

@@ -61,7 +61,7 @@ SCALE_ONLY = 0.03  # relative error of a motor torque up to which it is a consta
 UNKNOWN_PER_ERROR = 2.0  # an engine's torque known to half only counts as unknown
 OVERRUN_MEAN, OVERRUN_SIGMA = 0.2, 0.3  # m/s^2, drag of an engine in gear
 UNKNOWN_DRIVE = 0.1  # m/s^2 per axle, drag of an engine in this application
-UNKNOWN_KICKS = 3.0  # m/s^2, white from window to window: stands for 0.3 that last seconds (down-shifts)
+UNKNOWN_KICKS = 1.5  # m/s^2, white from window to window: stands for 0.2 that last 1.5 s (down-shifts)
 # Of an axle's slip by it: with a speed reference, and more without one, per acceleration over gravity.
 UNKNOWN_SLIP, UNKNOWN_SLIP_REST, UNKNOWN_SLIP_BY_ACCEL = 0.003, 0.005, 0.1
 UNKNOWN_SLIP_S = 2.0  # after which its value is independent

@@ -18,11 +18,13 @@ class Brake:
         self.params, self.feed, self.inputs = params[0], feed, feed()
         self.state = np.zeros(1, APPLICATION_STATE)[0]
 
-    def hold(self, pressure, seconds: float) -> list[tuple[bool, bool, bool]]:
-        """Return (braking, started, ended) of each cycle."""
+    def hold(self, pressure, seconds: float, every: int = 1) -> list[tuple[bool, bool, bool]]:
+        """Return (braking, started, ended) of each cycle; a sample arrives `every` so many."""
         rows = []
-        for _ in range(round(seconds / DT)):
-            self.feed(self.inputs, calliper_pressure=pressure() if callable(pressure) else pressure)
+        for k in range(round(seconds / DT)):
+            self.inputs["new"] = k % every == 0
+            if k % every == 0:
+                self.feed(self.inputs, calliper_pressure=pressure() if callable(pressure) else pressure)
             update_application(self.params, self.state, self.inputs[0], DT)
             rows.append(tuple(bool(self.state[k]) for k in ("braking", "started", "ended")))
         return rows
@@ -91,6 +93,24 @@ def test_sensor_noise_at_rest_starts_none(brake: Brake, rest: float) -> None:
     rows = brake.hold(lambda: rest + SIGMA * random.standard_normal(4), 300.0)
     print(f"rest at {rest} bar: {sum(r[1] for r in rows)} starts in 300 s")
     assert not any(row[1] for row in rows)
+
+
+@pytest.mark.parametrize(("every", "sigma", "most"), [(5, 0.8, 0), (10, 0.8, 0), (5, 1.1, 3)])
+def test_noise_of_a_slow_sensor_starts_hardly_one(brake: Brake, every: int, sigma: float, most: int) -> None:
+    """A held sample is no second one: counted as such, 0.8 bar at 20 Hz would start 250."""
+    random = np.random.default_rng(1)
+    rows = brake.hold(lambda: PUSH_OUT + sigma * random.standard_normal(4), 300.0, every)
+    starts = sum(row[1] for row in rows)
+    print(f"a sample every {every} cycles, {sigma} bar: {starts} starts in 300 s")
+    assert starts <= most
+
+
+@pytest.mark.parametrize(("every", "pressure", "latest"), [(5, 13.0, 0.15), (10, 13.0, 0.2), (10, 4.0, 0.4)])
+def test_a_slow_sensor_shows_a_braking(brake: Brake, every: int, pressure: float, latest: float) -> None:
+    brake.hold(0.0, 1.0, every)
+    start = first(brake.hold(pressure, 1.0, every), 1)
+    assert start is not None
+    assert start * DT <= latest
 
 
 @pytest.mark.parametrize("rest", [0.0, PUSH_OUT])
