@@ -19,6 +19,8 @@ def earlier(without: str = "") -> np.dtype:
             part = np.dtype([*fields, ("pressures", PRESSURES)], align=True)
         if name == "hydraulics":
             part = np.dtype([(field, part[field]) for field in part.names if field != "gain_variance"])
+        if name == "application":
+            part = np.dtype([(field, part[field]) for field in part.names if field != "shown"])
         parts.append(("friction_torque" if name == "hydraulics" else name, part))
     return np.dtype([part for part in parts if part[0] != without], align=True)
 
@@ -36,6 +38,7 @@ def test_every_state_goes_on_under_its_present_name() -> None:
     np.testing.assert_array_equal(new["joint"]["x"], old["joint"]["x"])
     assert new["learned"].tobytes() == old["learned"].tobytes()
     assert not new["joint"]["follows"].any()
+    assert not new["application"]["shown"].any()
 
 
 @pytest.mark.parametrize("part", ["friction_torque", "joint", "limiter"])
