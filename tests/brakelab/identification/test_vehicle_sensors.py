@@ -49,7 +49,7 @@ def test_a_closed_drive_tells_the_zero_of_the_accelerometer():
 
 
 def slalom_on_hills(begin: float):
-    """Return windows and steps of a drive with curves from 100 to 150 s, on hills of 2400 m that end level."""
+    """Return windows and steps of a drive with curves from 100 to 150 s, on closed hills of 2400 m."""
     speed = 20.0 + 4.0 * np.sin(2 * np.pi * T / 50.0)
     change = np.gradient(speed, 0.01)
     place = np.cumsum(speed) * 0.01

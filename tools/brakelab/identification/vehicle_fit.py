@@ -161,10 +161,11 @@ def _found(
     cross = j[0].T @ (weight[:, None] * j[1])
     inverse = _inverse(0.5 * (cross + cross.T) + np.diag(1.0 / prior.sigma[free] ** 2))
     each = 0.5 * (j[1] * (weight * r[0])[:, None] + j[0] * (weight * r[1])[:, None])
-    scores = np.stack([np.bincount(residuals.cluster, column) for column in each.T], axis=1)
-    scores = _left_out(residuals.cluster, scores, j, weight, inverse)
+    sums = [np.asarray(np.bincount(residuals.cluster, column), np.float64) for column in each.T]
+    scores = np.stack(sums, axis=1)
     there = int(np.count_nonzero(np.bincount(residuals.cluster)))
-    meat = scores.T @ scores * (there - 1) / there
+    alone = _left_out(residuals.cluster, scores, j, weight, inverse)
+    meat = alone.T @ alone * (there - 1) / there
     model = 0.5 * (cross + cross.T)
     # Few manoeuvres understate their own scatter: never less than what the weights themselves say.
     sandwich = inverse @ (meat + np.diag(1.0 / prior.sigma[free] ** 2)) @ inverse

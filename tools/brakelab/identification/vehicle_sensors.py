@@ -5,10 +5,11 @@
 
 *Dive.* While the acceleration is steady (the body's swinging has ended), within a manoeuvre the grade is a
 parabola of the place; what is left of a_x,m follows what is left of v' by kappa. *Zero of accel_x.* The
-mean of a_x,m / kappa - v' by distance is b / kappa + g (mean grade), beside what curves add. A drive that ends
-where it began has no mean grade; of another the grade of its blocks says how sure the mean is. What curves add
-is told beside the grade of their places, which a closed drive does not cancel: the blocks say how far that may
-mislead. Each standstill shows b + g grade of its place. Speeds are those of the wheels by the model of `vehicle_model`.
+mean of a_x,m / kappa - v' by distance is b / kappa + g (mean grade), beside what curves add. A drive that
+ends where it began has no mean grade; of another the grade of its blocks says how sure the mean is. What
+curves add is told beside the grade of their places, which a closed drive does not cancel: the grade of the
+blocks says how far that may mislead. Each standstill shows b + g grade of its place. Speeds are those of the
+wheels by the model of `vehicle_model`.
 """
 
 from typing import Any, Final, NamedTuple
