@@ -394,7 +394,7 @@ def test_without_asammdf_mdf_names_the_remedy(
     path = tmp_path / "drive.mf4"
     shutil.copy(kona[".mf4"], path)
     monkeypatch.setitem(sys.modules, "asammdf", None)
-    with pytest.raises(UserError, match=r"MDF4 needs asammdf: pip install 'brake-ecu\[mdf\]'"):
+    with pytest.raises(UserError, match=r"MDF4 needs asammdf: pip install asammdf"):
         kind_of(path)
 
 
