@@ -51,6 +51,11 @@ class Series(NamedTuple):
         return float((self.t[-1] - self.t[0]) / max(len(self.t) - 1, 1))
 
     @property
+    def is_known(self) -> bool:
+        """Whether any value came; none does of a signal that the multiplexer never selects."""
+        return bool(np.isfinite(self.value).any())
+
+    @property
     def longest_gap(self) -> float:
         """Longest time between two values [s]."""
         t = self.t[np.isfinite(self.value)]
@@ -89,8 +94,8 @@ def read_series(blocks: Iterable[RecordArray], database: Database) -> list[Serie
         for bus in np.unique(mine["bus"]):
             here = mine[mine["bus"] == bus]
             if len(here) >= FEWEST:
-                one = _series(message, here, int(bus), int(start))
-                found += [*one, *with_signs(one)]
+                own = [one for one in _series(message, here, int(bus), int(start)) if one.is_known]
+                found += [*own, *with_signs(own)]
     return found
 
 
@@ -102,7 +107,7 @@ def with_signs(series: list[Series]) -> list[Series]:
     flags = [one for one in series if one.flag and set(np.unique(one.value)) == {0.0, 1.0}]
     found = []
     for one in series:
-        large = np.nanpercentile(one.value, 99) if len(one.value) else 0.0
+        large = np.nanpercentile(one.value, 99)
         if one.flag or spelled(one.unit) not in MAGNITUDES or not large > np.nanmin(one.value) == 0.0:
             continue
         for flag in flags:
