@@ -10,7 +10,6 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
-from contextvars import ContextVar
 from dataclasses import asdict, dataclass, field, is_dataclass
 from enum import IntEnum
 from pathlib import Path
@@ -42,23 +41,23 @@ class Policy:
     """Standard error while `asked` has replaced it."""
 
 
-_policy: ContextVar[Policy] = ContextVar("policy")
-_policy.set(Policy())
+_policies: list[Policy] = [Policy()]
+"""Of the whole process: threads print by it, too. The last one is that of the command line that runs."""
 
 
 @contextmanager
 def new_policy() -> Iterator[Policy]:
     """Begin a command line, with the policy that is yielded."""
-    before = _policy.set(Policy())
+    _policies.append(Policy())
     try:
-        yield _policy.get()
+        yield policy()
     finally:
-        _policy.reset(before)
+        _policies.pop()
 
 
 def policy() -> Policy:
     """Return the policy of this command line."""
-    return _policy.get()
+    return _policies[-1]
 
 
 @contextmanager

@@ -1,6 +1,7 @@
 """One policy for what commands print: what stands on standard output and what on standard error."""
 
 import json
+import threading
 from pathlib import Path
 from typing import NamedTuple
 
@@ -133,3 +134,12 @@ def test_the_log_of_the_daemon(monkeypatch: pytest.MonkeyPatch) -> None:
         assert environment == {LOG_FORMAT: "console", LOG_LEVEL: "verbose"}
         with pytest.raises(UserError, match="--log-format: xml: not known; take console or json"):
             log_as("xml", Level.NORMAL)
+
+
+def test_a_thread_says_details_by_the_same_policy(capsys: pytest.CaptureFixture[str]) -> None:
+    with new_policy() as policy:
+        policy.level = Level.VERBOSE
+        thread = threading.Thread(target=detail, args=("compiling",))
+        thread.start()
+        thread.join()
+    assert capsys.readouterr().err == "compiling\n"

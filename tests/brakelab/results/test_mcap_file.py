@@ -118,5 +118,5 @@ def test_it_is_not_read_here(both):
 def test_without_mcap(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "mcap.writer", None)
     params = new_params(load_config(CONFIG))
-    with pytest.raises(UserError, match=r"drive\.mcap: MCAP needs mcap: pip install 'brake-ecu\[mcap\]'"):
+    with pytest.raises(UserError, match=r"drive\.mcap: MCAP needs mcap: pip install mcap$"):
         ResultWriter(tmp_path / "drive.mcap", params)
