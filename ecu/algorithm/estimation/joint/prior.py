@@ -50,8 +50,8 @@ PRIOR[SIDE], PRIOR[PEAK_LOAD] = 0.02, 0.08
 
 # Standard deviations of friction's prior, of its logarithm: all four together, per axle, per wheel.
 LEVEL_COMMON, LEVEL_AXLE, LEVEL_WHEEL = 0.13, 0.17, 0.04
-# Difference between the levels of successive applications.
-STEP_COMMON, STEP_AXLE, STEP_WHEEL = 0.03, 0.02, 0.005
+# Difference between the levels of successive applications; linings that are driven in rise by 5 % in one.
+STEP_COMMON, STEP_AXLE, STEP_WHEEL = 0.05, 0.02, 0.005
 # Deviation of friction from its level within an application, and time constant of its return.
 CHANGE_COMMON, CHANGE_AXLE, CHANGE_S = 0.08, 0.03, 4.0
 CHANGE_BY_PRESSURE = 0.05  # of an axle's friction, per relative change of its pressure
