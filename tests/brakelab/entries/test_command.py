@@ -7,6 +7,7 @@ import pytest
 
 from brakelab.entries.command import NOBODY, Entered, bench_entries, refuse
 from brakelab.entries.ours import OURS
+from ecu.cli import main
 from ecu.errors import UserError
 
 ROOT = Path(__file__).parents[3]
@@ -39,7 +40,7 @@ def test_other_benches_have_no_entries() -> None:
 def test_a_car_is_heard_by_all(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     own = tmp_path / "own.py"
     own.write_text("class Fails:\n    def reset(self, config): ...\n    def step(self, inputs): 1 / 0\n")
-    assert bench_entries(True, 1, Entered((f"{own}:Fails",))) == 0
+    assert main(["bench", "entries", "--json", "--seeds", "1", "--observer", f"{own}:Fails"]) == 0
     entries = json.loads(capsys.readouterr().out)["entries"]
     assert {entry["name"] for entry in entries} == {*OURS, f"{own}:Fails"}
     errors = {entry["name"]: entry["rank_error"] for entry in entries}
