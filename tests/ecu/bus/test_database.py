@@ -57,6 +57,13 @@ def test_names_that_are_missing_get_a_hint(contract: Path) -> None:
         find_signal(database.get_message_by_name("Imu"), "accel_z", contract, Path("map.toml"), "x.signal")
 
 
+def test_a_message_without_signals_is_told(tmp_path: Path) -> None:
+    (tmp_path / "car.dbc").write_text('VERSION ""\nBU_: A\nBO_ 10 Empty: 8 A\n')
+    (empty,) = load_database(tmp_path / "car.dbc").messages
+    with pytest.raises(UserError, match="message Empty has no signal v; it has none that can be read"):
+        find_signal(empty, "v", tmp_path / "car.dbc", Path("map.toml"), "x.signal")
+
+
 def test_attributes(contract: Path) -> None:
     database = load_database(contract)
     assert attribute(database.get_message_by_name("VehicleSpeed"), "CycleTimeSlowest") == 100

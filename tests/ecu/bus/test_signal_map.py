@@ -257,6 +257,14 @@ def test_a_signal_that_cannot_be_read(tmp_path: Path, bent: str) -> None:
         load_signal_map(path)
 
 
+@pytest.mark.parametrize("own", ["48|8@1- (100,0)", "48|8@1+ (100,-50)"], ids=["signed", "offset"])
+def test_a_signal_with_a_sign_of_its_own_is_no_magnitude(tmp_path: Path, own: str) -> None:
+    path = write(tmp_path, '"p" }', '"p", sign = { signal = "ok", values = [1] } }')
+    (tmp_path / "car.dbc").write_text(DATABASE.replace("48|8@1+ (100,0)", own))
+    with pytest.raises(UserError, match=rf"{PRESSURE}\.sign: p has a sign or an offset of its own"):
+        load_signal_map(path)
+
+
 MISTAKES: dict[str, tuple[str, str, str]] = {
     "unknown unit": (
         '"p" }',
