@@ -180,7 +180,7 @@ def drive(
     seed: int,
     look: Callable[[RingReader], Any] = lambda ring: None,
 ) -> Recorded:
-    """Drive a scenario with the ECU of `config`, armed; `look` sees the daemon's ring every 50 ms.
+    """Drive a scenario with the ECU of `config`, armed; `look` sees the daemon's ring every 50 ms and at the end.
 
     Raises:
         RunFault: a daemon or the vehicle ended early.
@@ -199,11 +199,12 @@ def drive(
             ring = processes.start_daemon("drive")
             if ring is None:
                 raise RunFault(f"the daemon did not become ready; {log} says why")
-            _act(processes, _actions(faults, bus.wire), bus.wire, ring, look)
+            ring = _act(processes, _actions(faults, bus.wire), bus.wire, ring, look)
         finally:
             exits = processes.end()
             if bus.wire is not None:
                 bus.wire.ends[0].restart()
+    look(ring)  # what came after the last turn
     _check(exits, faults, log)
     if not processes.truth.exists():
         raise RunFault(f"the vehicle ended early; {log} says why")
@@ -234,8 +235,11 @@ def _act(
     wire: Wire | None,
     ring: RingReader,
     look: Callable[[RingReader], Any],
-) -> None:
-    """Kill and restart daemons, and their controller, on time until the drive has ended or failed."""
+) -> RingReader:
+    """Kill and restart daemons, and their controller, on time until the drive has ended or failed.
+
+    Returns the ring of the last daemon.
+    """
     t_0 = processes.departure()
     victim, may_end = processes.daemons[-1], bool(actions)
     while processes.driving() and (may_end or victim.poll() is None):
@@ -255,6 +259,7 @@ def _act(
         look(ring)
         due = t_0 + actions[0][0] - time.monotonic() if actions else TURN_S
         time.sleep(min(max(due, 0.0), TURN_S))
+    return ring
 
 
 def _check(exits: list[int], faults: list[Fault], log: Path) -> None:
