@@ -70,10 +70,15 @@ class Brakings:
             if record["outputs"]["braking"]:
                 self._t.append(1e-9 * record["cycle"]["t_mono_ns"])
                 self._rows.append(record["outputs"])
-            elif self._rows:
-                self._number += 1
-                say(braking_line(self._number, self._t[-1] - self._t[0], np.array(self._rows)))
-                self._t, self._rows = [], []
+            else:
+                self.end()
+
+    def end(self) -> None:
+        """Print the application that lasts, if there is one."""
+        if self._rows:
+            self._number += 1
+            say(braking_line(self._number, self._t[-1] - self._t[0], np.array(self._rows)))
+            self._t, self._rows = [], []
 
 
 def _say_on_the_way(line: str) -> None:
@@ -98,7 +103,9 @@ def demo(out: Path) -> int:
     if bus.interface == "virtual":
         recordings = _in_one_process(bus, config, out)
     else:
-        recordings = drive(bus, resource(SCENARIO), config, [], out, SEED, Brakings().look).recordings
+        brakings = Brakings()
+        recordings = drive(bus, resource(SCENARIO), config, [], out, SEED, brakings.look).recordings
+        brakings.end()
     written = write_recorded(recordings, load_config(config), out)
     page = out / "report.html"
     report(written.result, out / "truth.parquet", page, recordings[0])

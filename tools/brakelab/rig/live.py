@@ -180,7 +180,7 @@ def drive(
     seed: int,
     look: Callable[[RingReader], Any] = lambda ring: None,
 ) -> Recorded:
-    """Drive a scenario with the ECU of `config`, armed; `look` sees the daemon's ring every 50 ms and at the end.
+    """Drive a scenario with the ECU of `config`, armed; `look` sees its ring every 50 ms and at the end.
 
     Raises:
         RunFault: a daemon or the vehicle ended early.
