@@ -12,9 +12,10 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Final, NamedTuple
+
+from draw_watch import chromium
 
 CHECKOUT: Final = Path(__file__).resolve().parent.parent
 PAGES: Final = sorted((CHECKOUT / "docs").glob("first-steps-*.md"))
@@ -42,7 +43,7 @@ def blocks(page: Path) -> list[Block]:
     return [Block(kind, text) for kind, text in found]
 
 
-def commands(block: Block) -> Iterator[str]:
+def commands(block: Block) -> list[str]:
     """Return the commands of a block; what stands between two of `brake-ecu` is one script of the shell."""
     found: list[str] = []
     for line in block.text.replace("\\\n", " ").splitlines(keepends=True):
@@ -50,7 +51,7 @@ def commands(block: Block) -> Iterator[str]:
             found.append(line)
         else:
             found[-1] += line
-    return iter(found)
+    return found
 
 
 def is_about_this_machine(command: str) -> bool:
@@ -88,7 +89,7 @@ def _walk(page: Path, folder: Path) -> bool:
 
 
 def _photograph(page: Path, folder: Path) -> None:
-    program = shutil.which("chromium") or shutil.which("chromium-browser")
+    program = chromium()
     shown, height = ENDS_WITH[page.stem]
     if program is None:
         print("no chromium: no picture", file=sys.stderr)
