@@ -13,7 +13,7 @@ the others are not. What a drive does not show is not judged: a scale wants a co
 """
 
 from collections.abc import Iterable
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeGuard
 
 import numpy as np
 
@@ -38,6 +38,7 @@ LEAST_ZERO: Final = 0.35  # m/s^2: a road that falls by less on the mean is usua
 LEAST_TURN: Final = 0.008  # rad/s, standard deviation
 HAND_WHEEL: Final = 4.0
 OUTSIDE: Final = 0.02  # of the samples
+CHECK: Final = "check unit and factor"
 
 
 class Judged(NamedTuple):
@@ -173,7 +174,7 @@ def _speed_scale(
     by_accel = [
         1.0 / abs(line.slope)
         for line in (relations.accel_x, relations.accel_y)
-        if line is not None and _is_clean(line) and line.slope
+        if _is_clean(line) and line.slope
     ]
     if "vehicle_speed" in drive:
         reference = drive["vehicle_speed"]
@@ -184,7 +185,7 @@ def _speed_scale(
                 if not by_accel or any(not _beyond(one / by_reference, tolerated) for one in by_accel):
                     return by_reference, [_speed_line(by_reference, car, "vehicle_speed says")]
                 told = f"vehicle_speed: reads {_times(1.0 / by_reference)} what wheels and accelerations say"
-                return 1.0, [f"{told}{_unit_of('m/s', by_reference)}"]
+                return 1.0, [f"{told}{_unit_of('m/s', by_reference, CHECK)}"]
             return 1.0, []
     if len(by_accel) == 2 and all(_beyond(one, tolerated) for one in by_accel):
         both = float(np.sqrt(by_accel[0] * by_accel[1]))
@@ -232,9 +233,8 @@ def _longitudinal(line: Fit | None, car: Car, alone: bool) -> list[str]:
         return []
     if abs(line.correlation) < LOST:
         return [f"accel_x: does not follow dv/dt (correlation {line.correlation:.2f}); is it another signal?"]
-    told = _sign_and_scale("accel_x", "dv/dt", line, car)
-    if told and alone and told[0].endswith("factor"):
-        return [f"{told[0]}, or those of the wheels and rolling_radius"]
+    remedy = f"{CHECK}, or those of the wheels and rolling_radius" if alone else CHECK
+    told = _sign_and_scale("accel_x", "dv/dt", line, car, remedy)
     if told or abs(line.intercept) < LEAST_ZERO:
         return told
     zero = f"accel_x: reads {line.intercept:+.2f} m/s^2 at constant speed"
@@ -284,7 +284,7 @@ def _lateral(relations: _Relations, car: Car) -> list[str]:
         else:
             flat = relations.accel_y._replace(slope=abs(relations.accel_y.slope))
             flat = flat._replace(correlation=abs(flat.correlation))
-            lines += _sign_and_scale("accel_y", "speed times yaw rate", flat, car)
+            lines += _sign_and_scale("accel_y", "speed times yaw rate", flat, car, CHECK)
     steering = relations.steering
     if steering and abs(steering.correlation) > SIGNED and abs(steering.slope) > HAND_WHEEL:
         ratio = f"factor = {1.0 / abs(steering.slope):.3g}"
@@ -296,33 +296,33 @@ def _lateral(relations: _Relations, car: Car) -> list[str]:
 def _yaw_explains(relations: _Relations, car: Car) -> bool:
     """Return whether lateral acceleration and steering are both off as one wrong yaw rate would make them."""
     lateral, steering = relations.accel_y, relations.steering
-    if not lateral or not steering or min(abs(lateral.correlation), abs(steering.correlation)) < CLEAN:
+    if not _is_clean(lateral) or not _is_clean(steering):
         return False
     tolerated = 1.0 + SCALE[car.known]
     alike = not _beyond(abs(lateral.slope) / abs(steering.slope), 1.15)
     return alike and _beyond(abs(lateral.slope), tolerated)
 
 
-def _sign_and_scale(name: str, what: str, line: Fit, car: Car) -> list[str]:
+def _sign_and_scale(name: str, what: str, line: Fit, car: Car, remedy: str) -> list[str]:
     size, problems = abs(line.slope), []
     if line.correlation < -SIGNED:
         problems.append(f"turned against {what}; factor = -1")
-    scaled = abs(line.correlation) > CLEAN and _beyond(size, 1.0 + SCALE[car.known])
+    scaled = _is_clean(line) and _beyond(size, 1.0 + SCALE[car.known])
     if scaled or _beyond(size, 3.0):
-        problems.append(f"reads {_times(size)} {what}{_unit_of('m/s^2', 1.0 / size)}")
+        problems.append(f"reads {_times(size)} {what}{_unit_of('m/s^2', 1.0 / size, remedy)}")
     return [f"{name}: {'; '.join(problems)}"] if problems else []
 
 
-def _unit_of(target: str, wanted: float) -> str:
-    """Return the unit whose factor is about `wanted`, as a remedy."""
+def _unit_of(target: str, wanted: float, otherwise: str) -> str:
+    """Return the unit whose factor is about `wanted`, as a remedy; without one `otherwise`."""
     for unit, (scale, _) in CONVERSIONS[target].items():
         for factor, name in ((scale, unit), (1.0 / scale, target)):
             if scale != 1.0 and 1.0 / UNIT < wanted / factor < UNIT and _beyond(wanted, 1.8):
                 return f'; unit = "{name}"'
-    return "; check unit and factor"
+    return f"; {otherwise}"
 
 
-def _is_clean(line: Fit | None) -> bool:
+def _is_clean(line: Fit | None) -> TypeGuard[Fit]:
     return line is not None and abs(line.correlation) > CLEAN
 
 

@@ -76,14 +76,21 @@ def _sides(pressures: Vector) -> list[str]:
     return lines
 
 
+def scale_by_brakes(pressures: Vector, decel: Vector, per_bar: Vector) -> float:
+    """Return the factor with which pressures make the brakes' deceleration; 1 if they make none.
+
+    `pressures` [bar], shape (n, 4); `decel` by the brakes alone [m/s^2], shape (n,); `per_bar`: see `Car`.
+    """
+    expected = float((pressures @ per_bar).sum())
+    return float(decel.sum()) / expected if expected > 0.0 else 1.0
+
+
 def _unit(drive: Drive, car: Car, pressures: Vector, change: Vector, pressed: Rows) -> list[str]:
     if car.decel_per_bar is None or car.decel_per_torque is None:
         return []
     motors = drive.corners("motor_torque")
     others = OVERRUN if motors is None else OVERRUN + motors[pressed] @ car.decel_per_torque
-    expected = float((pressures[pressed] @ car.decel_per_bar).sum())
-    measured = float((-change[pressed] - others).sum())
-    wanted = measured / expected if expected > 0.0 else 1.0
+    wanted = scale_by_brakes(pressures[pressed], -change[pressed] - others, car.decel_per_bar)
     if 1.0 / FRICTION <= wanted <= FRICTION:
         return []
     fitting = [

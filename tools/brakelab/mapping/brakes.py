@@ -4,7 +4,8 @@ from typing import Final
 
 import numpy as np
 
-from brakelab.log_physics.line import Fit, Vector, smooth
+from brakelab.log_physics.line import Fit, smooth
+from brakelab.log_physics.pressures import OVERRUN, scale_by_brakes
 from brakelab.log_physics.samples import Car
 from brakelab.mapping.candidates import best_of, by_name, unit_of
 from brakelab.mapping.motion import BRAKING, MOVING, Found, Motion, is_near, on_grid
@@ -14,7 +15,6 @@ from ecu.contract.signals import CORNERS
 
 READS_AS_BAR: Final = 1.25  # and its inverse: of a scale that friction explains
 APPLIED: Final = 0.3  # of the greatest pressure
-OVERRUN: Final = 0.3  # m/s^2, drag and engine
 SELDOM: Final = 0.1  # of a drive, that ABS or ESP may act
 FULL: Final = 100.0  # %
 
@@ -88,17 +88,11 @@ def _without_unit(each: list[Series], motion: Motion, car: Car) -> tuple[float, 
     pressures = pressures - zero
     applied = pressures.sum(axis=1)  # not by motors alone
     braking &= applied > APPLIED * np.percentile(applied[motion.faster(MOVING)], 99)
-    expected = _decel(pressures[braking], car.decel_per_bar)
-    measured = float((-motion.change[braking] - OVERRUN).sum())
-    factor = measured / expected if expected > 0.0 else 1.0
+    factor = scale_by_brakes(pressures[braking], -motion.change[braking] - OVERRUN, car.decel_per_bar)
     if 1.0 / READS_AS_BAR < factor < READS_AS_BAR:
         return 1.0, f"{told}, taken for bar, as which it fits CONFIG's brakes"
     factor = float(f"{factor:.3g}")
     return factor, f"{told}; factor {factor:g} is what CONFIG's brakes need: friction is relative to it"
-
-
-def _decel(pressures: Vector, per_bar: Vector) -> float:
-    return float((pressures @ per_bar).sum())
 
 
 def flags(series: list[Series], motion: Motion) -> list[Found]:

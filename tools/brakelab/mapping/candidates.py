@@ -5,9 +5,9 @@ from collections.abc import Iterable
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brakelab.log_physics.line import Fit, Vector, fit, smooth
+from brakelab.log_physics.samples import Rows
 from brakelab.mapping.motion import Motion, contract_unit, is_near, on_grid
 from brakelab.mapping.names import converts, names_itself, score, tells_direction, tells_pressure
 from brakelab.mapping.series import Series
@@ -27,7 +27,7 @@ def best_of(
     target: str,
     motion: Motion,
     reference: Vector,
-    rows: NDArray[np.bool_],
+    rows: Rows,
     fixed_sign: int = 0,
 ) -> tuple[Series, Fit] | None:
     """Return the signal that follows `reference` best among those whose unit or name fits the input.

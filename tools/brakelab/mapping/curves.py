@@ -12,10 +12,9 @@ its value at rest taken: the scale of a yaw rate, of a lateral acceleration, the
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brakelab.log_physics.line import LAGS, RATE, Vector, smooth
-from brakelab.log_physics.samples import Car
+from brakelab.log_physics.samples import Car, Rows
 from brakelab.mapping.candidates import best_of, unit_of
 from brakelab.mapping.motion import MOVING, STANDING, Found, Motion, contract_unit, is_near, on_grid
 from brakelab.mapping.scale import scale_of
@@ -32,8 +31,6 @@ LEAST_ZERO: Final = {
 }  # rad/s, m/s^2: what a sensor's zero is usually within
 
 RATIOS: Final = (0.3, 60.0)  # of steerings: the road wheels' own angle, a lorry's hand wheel
-
-Rows = NDArray[np.bool_]
 
 
 class AtRest(NamedTuple):

@@ -4,10 +4,9 @@ from collections.abc import Callable, Iterable
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brakelab.log_physics.line import RATE, Vector, smooth
-from brakelab.log_physics.samples import ANY_CAR, Car
+from brakelab.log_physics.samples import ANY_CAR, Car, Rows
 from brakelab.mapping.names import converts, corner_of, score
 from brakelab.mapping.series import Series
 from ecu.bus.units import CONVERSIONS, spelled
@@ -19,8 +18,6 @@ BRAKING: Final = 0.7  # m/s^2
 BRIDGED: Final = 0.5  # s without a sample that a straight line may fill
 PERIODS: Final = 3.0  # likewise, of a sender that is slow
 MARGIN: Final = 0.5  # s beside a gap, that smoothing and delay reach
-
-Rows = NDArray[np.bool_]
 
 
 class Found(NamedTuple):
