@@ -54,33 +54,32 @@ def figures_of(config: Config, params: Any) -> dict[str, Any]:
         "mass_kg": float(params["mass"]),
         "torque_per_bar_front": front,
         "torque_per_bar_rear": rear,
-        "braking": [
-            {
-                "rate": z,
-                "front_share": float(front_share(params, z * GRAVITY)),
-                **dict(zip(("pressure_front", "pressure_rear"), pressures(params, z), strict=True)),
-            }
-            for z in RATES
-        ],
+        "braking": [_braking(params, z) for z in RATES],
     }
+
+
+def _braking(params: Any, z: float) -> dict[str, float]:
+    front, rear = pressures(params, z)
+    share = float(front_share(params, z * GRAVITY))
+    return {"rate": z, "front_share": share, "pressure_front": front, "pressure_rear": rear}
 
 
 def figures(config: Config, params: Any) -> list[str]:
     """Return the figures of the car, as lines; `params` is one `PARAMS` of `config`."""
     front_load = params["rear_axle"] / params["wheelbase"]
-    per_bar = axle_torque_per_bar(params)
+    found = figures_of(config, params)
     lines = [
         f"car           {config.name}: {params['mass']:.0f} kg, {100 * front_load:.0f} % on the front axle, "
         f"rolling radius {params['wheel_radius'][0]:.3f} and {params['wheel_radius'][2]:.3f} m",
-        f"brakes        front {per_bar[0]:.1f}, rear {per_bar[1]:.1f} N m per bar and axle, nominal friction",
+        f"brakes        front {found['torque_per_bar_front']:.1f}, rear {found['torque_per_bar_rear']:.1f} "
+        "N m per bar and axle, nominal friction",
     ]
-    for z in RATES:
-        share = float(front_share(params, z * GRAVITY))
+    for braking in found["braking"]:
+        z, share = braking["rate"], braking["front_share"]
         ideal = front_load + z * float(params["cog_height"] / params["wheelbase"])
-        front, rear = pressures(params, z)
         lines.append(
             f"z = {z:.1f}       front share {100 * share:4.1f} %, ideal {100 * ideal:4.1f} %; "
-            f"{front:5.1f} bar in front, {rear:5.1f} bar in the rear"
+            f"{braking['pressure_front']:5.1f} bar in front, {braking['pressure_rear']:5.1f} bar in the rear"
         )
     return lines + [line for load in config.vehicle.loads() for line in margins(params, load)]
 
