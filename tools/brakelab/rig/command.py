@@ -94,7 +94,7 @@ def rig(
             meeting.close()
     console = new_console(WIDTH)
     console.print(summary(outcomes))
-    give(scenarios=outcomes)
+    give(scenarios=[{k: v for k, v in one._asdict().items() if k != "curve"} for one in outcomes])
     write_tables(outcomes, out)
     page = out / "rig.html"
     page.write_text(write_page(outcomes, meeting, vehicle, seed), "utf-8")
