@@ -1,6 +1,5 @@
-import itertools
-
 import numpy as np
+import pytest
 
 from brakelab.bench import watchers
 from brakelab.bench.watchers import Block, Watchers, alternate, inside
@@ -14,18 +13,52 @@ def test_cycles_between_two_blocks_count_for_neither():
     assert t_ns[inside(BLOCKS, t_ns, True)].tolist() == [250, 349]
 
 
-def test_it_begins_without_and_takes_turns(monkeypatch):
-    monkeypatch.setattr(watchers, "BLOCK_S", 0.02)
-    monkeypatch.setattr(watchers, "AFTER_CHANGE_S", 0.005)
+class Clock:
+    """Stands in for `time`: moves on by what is slept, and by `late_ns` that a busy machine adds."""
+
+    def __init__(self, late_ns):
+        self.now_ns, self.late_ns = 0, late_ns
+
+    def sleep(self, s):
+        self.now_ns += round(1e9 * s) + self.late_ns
+
+    def monotonic_ns(self):
+        return self.now_ns
+
+    def monotonic(self):
+        return self.now_ns * 1e-9
+
+
+@pytest.mark.parametrize(
+    ("seconds", "late_s", "blocks"),
+    [
+        (20.0, 0.0, [(0.5, 5), (5.5, 10), (10.5, 15), (15.5, 20)]),
+        (12.0, 0.0, [(0.5, 5), (5.5, 10), (10.5, 12)]),
+        (12.0, 3.0, [(0.5, 8), (8.5, 15)]),
+    ],
+    ids=["whole blocks", "the last is cut", "a machine that wakes late"],
+)
+def test_it_begins_without_and_takes_turns(monkeypatch, seconds, late_s, blocks):
+    monkeypatch.setattr(watchers, "time", Clock(round(1e9 * late_s)))
     told = []
 
     class Told:
         run = staticmethod(told.append)
 
-    blocks = alternate(Told(), 0.1, lambda: len(told) < 4)
-    assert told == [False, True, False, True] == [block.watched for block in blocks]
-    assert all(0.01e9 < block.end_ns - block.begin_ns < 0.1e9 for block in blocks)
-    assert all(a.end_ns <= b.begin_ns - 5_000_000 for a, b in itertools.pairwise(blocks))
+    found = alternate(Told(), seconds, lambda: True)
+    assert told == [bool(i % 2) for i in range(len(blocks))] == [block.watched for block in found]
+    edges_s = np.array([(block.begin_ns, block.end_ns) for block in found]) * 1e-9
+    np.testing.assert_allclose(edges_s, blocks)
+
+
+def test_a_run_that_ended_takes_no_more_turns(monkeypatch):
+    monkeypatch.setattr(watchers, "time", Clock(0))
+    goes_on = iter([True, True, False])
+
+    class Told:
+        run = staticmethod(lambda on: None)
+
+    assert len(alternate(Told(), 60.0, lambda: next(goes_on))) == 2
 
 
 def test_messages_a_second_of_being_watched():
