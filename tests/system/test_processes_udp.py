@@ -251,7 +251,7 @@ def test_while_it_compiles_it_says_so_and_obeys(daemon, bus, tmp_path):
     assert "ecu.warm" in unit.wait_for("compiling")["remedy"]
     began = time.monotonic()
     assert unit.end() == 0
-    assert time.monotonic() - began < 1.0 + 1.0  # its side process ends, too
+    assert time.monotonic() - began < 15.0  # long before all is compiled; its side process ends, too
     assert not any_ring_of(unit)
 
 
