@@ -8,6 +8,7 @@ import pytest
 from brakelab.plant.description import Plant, PlantFileError, load_plant, nominal
 
 CONFIG = Path(__file__).parents[3] / "config" / "plant"
+ENGINE = "drag_torque = 30.0\nlowest_speed = 130.0\nratios = [6.0, 3.0]\nshare_front = 1.0\n"
 
 
 @pytest.mark.parametrize(
@@ -39,6 +40,8 @@ def test_shipped_cars_are_those_of_appendix_d(
         (lambda text: text.replace("[motor]", "[motor]\ncolour = 3"), "motor.colour"),
         (lambda text: text.replace('lining = "A"', 'lining = "Z"'), "brake_front.lining"),
         (lambda text: text.replace('lining = "A"', 'lining = "A"\nfriction = "Z"'), "brake_front.friction"),
+        (lambda text: f"{text}\n[engine]\n{ENGINE}".replace("[6.0, 3.0]", "[3.0, 6.0]"), "engine"),
+        (lambda text: f"{text}\n[engine]\n{ENGINE}".replace("[6.0, 3.0]", "[]"), "engine.ratios"),
         (lambda text: text.replace("[body]", "[body"), "not valid TOML"),
     ],
 )
@@ -104,3 +107,13 @@ def test_a_file_may_choose_burckhardts_tyre(tmp_path: Path) -> None:
     path.write_text(text.replace("magic_c = 1.6", "burckhardt_fall = 0.406").replace("magic_e = 0.2", ""))
     (tmp_path / "linings.toml").write_text((CONFIG / "linings.toml").read_text())
     assert nominal(load_plant(path))["burckhardt_fall"] == 0.406
+
+
+def test_an_engine_that_the_file_describes(tmp_path: Path) -> None:
+    path = tmp_path / "car.toml"
+    path.write_text(f"{(CONFIG / 'suv.toml').read_text()}\n[engine]\n{ENGINE}")
+    (tmp_path / "linings.toml").write_text((CONFIG / "linings.toml").read_text())
+    car = nominal(load_plant(path))[0]
+    assert car["engine_ratio"].tolist() == [6.0, 3.0, *[0.0] * 8]
+    assert car["engine_share"].tolist() == [0.5, 0.5, 0.0, 0.0]
+    assert (car["engine_drag_torque"], car["engine_lowest_speed"]) == (30.0, 130.0)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brakelab.plant.description import Plant, PlantFileError, nominal
+from brakelab.plant.description import Engine, Plant, PlantFileError, load_plant, nominal
 from brakelab.plant.draw import Widths, draw, draw_sensors, load_widths
 from brakelab.plant.sensor_errors import STANDARD
 
@@ -82,6 +82,7 @@ WIDTHS: list[tuple[str, set[str], Quantity]] = [
     ("hydraulic_inertia", {"build_up", "release"}, relative("build_up", 0)),
     ("hydraulic_damping", {"build_up", "release"}, relative("release", 1)),
     ("hydraulic_dead_time", {"build_up", "release"}, relative("release", 2)),
+    ("engine_drag", {"engine_drag_torque", "engine_drag_growth"}, relative("engine_drag_growth")),
 ]
 SENSORS = {
     "motor_torque_scale",
@@ -92,6 +93,16 @@ SENSORS = {
     "steering_zero",
     "pressure_zero",
 }
+
+
+@pytest.fixture(scope="module")
+def suv() -> Plant:
+    """Return the car as described, with an engine."""
+    plant = load_plant(DRAW.with_name("suv.toml"))
+    engine = Engine(
+        drag_torque=25.0, drag_growth=0.06, lowest_speed=126.0, ratios=(6.0, 3.0), share_front=1.0
+    )
+    return plant.model_copy(update={"vehicle": plant.vehicle.model_copy(update={"engine": engine})})
 
 
 def cars_of(plant: Plant, width: Widths, seeds: range = MANY) -> NDArray[np.void]:

@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Annotated, Any, Final, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from brakelab.plant.dynamometer import nominal_friction
 from brakelab.plant.friction.law import NotNegative, Positive, Section
 from brakelab.plant.friction.laws import law_row
 from brakelab.plant.hydraulics import BUILD_UP, RELEASE
 from brakelab.plant.linings import VEHICLE_LAW, Lining, Linings, rig_with
-from brakelab.plant.records import DAMPER_KNOTS, GRAVITY, PARAMS, RecordArray, new_record
+from brakelab.plant.records import DAMPER_KNOTS, GEARS, GRAVITY, PARAMS, RecordArray, new_record
 from brakelab.plant.sensor_errors import SensorFile
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -146,6 +146,29 @@ class Motor(Section):
         return self
 
 
+class Engine(Section):
+    """Combustion engine with automatic gearbox, in overrun; see `brakelab.plant.engine`."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
+
+    drag_torque: NotNegative
+    """N m, of the crankshaft at rest, throttle closed."""
+    drag_growth: NotNegative = 0.0
+    """N m per rad/s of the crankshaft."""
+    lowest_speed: Positive
+    """rad/s of the crankshaft: there the gearbox shifts down."""
+    ratios: Annotated[tuple[Positive, ...], Field(min_length=1, max_length=GEARS)]
+    """Crankshaft over wheels, from first gear on."""
+    share_front: Share
+    """Of its torque, at the front wheels."""
+
+    @model_validator(mode="after")
+    def _falling(self) -> "Engine":
+        if any(np.diff(self.ratios) >= 0.0):
+            raise ValueError("ratios: give falling ones, first gear first")
+        return self
+
+
 class VehicleFile(Section):
     body: Body
     attitude: Attitude | None = None
@@ -155,6 +178,7 @@ class VehicleFile(Section):
     brake_rear: Brake
     hydraulics: Hydraulics
     motor: Motor
+    engine: Engine | None = None
     sensor: SensorFile
 
     @model_validator(mode="after")
@@ -233,6 +257,13 @@ def _set_suspension(car: Any, suspension: Suspension) -> None:
     car["spring_preload"] = car["nominal_load"] - GRAVITY * car["unsprung_mass"]
 
 
+def _set_engine(car: Any, engine: Engine) -> None:
+    for name in ("drag_torque", "drag_growth", "lowest_speed"):
+        car[f"engine_{name}"] = getattr(engine, name)
+    car["engine_ratio"][: len(engine.ratios)] = engine.ratios
+    car["engine_share"] = 0.5 * np.repeat((engine.share_front, 1.0 - engine.share_front), 2)
+
+
 def nominal(plant: Plant) -> RecordArray:
     """Return the parameters of the car exactly as described, shape (1,)."""
     params = new_record(PARAMS)
@@ -282,5 +313,7 @@ def nominal(plant: Plant) -> RecordArray:
     car["motor_peak_time"] = motor.peak_time
     car["charge_limit"], car["discharge_limit"] = motor.charge_limit, motor.discharge_limit
     car["motor_fade_speed"] = motor.fade_speed
+    if plant.vehicle.engine is not None:
+        _set_engine(car, plant.vehicle.engine)
     car["sensor_position"] = plant.vehicle.sensor.position
     return params

@@ -71,6 +71,8 @@ class Widths(Section):
     motor_torque_scale: NotNegative = 0.0
     motor_torque_noise: Factors = (0.0, 0.0)
     """N m, of each wheel."""
+    engine_drag: NotNegative = 0.0
+    """Of a combustion engine, both numbers: size, oil, auxiliaries."""
     accel_zero: NotNegative = 0.0
     """m/s^2, of each axis."""
     yaw_rate_zero: NotNegative = 0.0
@@ -137,6 +139,9 @@ def draw(plant: Plant, seed: int, width: Widths) -> RecordArray:
     dust = np.random.default_rng([seed, 8])
     car["emission_scale"] *= np.repeat(dust.uniform(*width.emission_lot, 2), 2)
     car["emission_scale"] *= np.exp(width.emission_day * dust.standard_normal())
+    engine = _around_one(np.random.default_rng([seed, 9]), width.engine_drag)
+    car["engine_drag_torque"] *= engine
+    car["engine_drag_growth"] *= engine
     return params
 
 

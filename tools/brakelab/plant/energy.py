@@ -44,6 +44,8 @@ class Energy(NamedTuple):
     dampers: float
     regenerated: float
     """To the motors."""
+    engine: float
+    """To an engine in overrun."""
 
     @property
     def turned_over(self) -> float:
@@ -125,4 +127,5 @@ def energy(params: RecordArray, before: RecordArray, after: RecordArray) -> Ener
         rolling=grown("rolling_loss"),
         dampers=grown("damper_heat"),
         regenerated=grown("regenerated"),
+        engine=grown("engine_loss"),
     )

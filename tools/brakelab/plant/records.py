@@ -18,6 +18,7 @@ GRAVITY: Final = 9.81  # m/s^2
 HISTORY: Final = 80  # demand samples in the history: 40 ms at steps of 0.5 ms
 LOOK_BACK: Final = 64  # cycles in a sensor's history: 0.64 s
 DAMPER_KNOTS: Final = 7  # of a damper's force over speed
+GEARS: Final = 10  # of a gearbox, at most
 
 # Parameters of one car: nominal or drawn.
 PARAMS: Final = np.dtype(
@@ -82,6 +83,12 @@ PARAMS: Final = np.dtype(
         ("charge_limit", "f8"),  # W, of the battery
         ("discharge_limit", "f8"),  # W
         ("motor_fade_speed", "f8"),  # rad/s of the wheel: below it regeneration fades out
+        # of the car with a combustion engine, see engine.py
+        ("engine_drag_torque", "f8"),  # N m at the crankshaft
+        ("engine_drag_growth", "f8"),  # N m per rad/s
+        ("engine_lowest_speed", "f8"),  # rad/s of the crankshaft
+        ("engine_ratio", "f8", (GEARS,)),  # -, crankshaft over wheels, falling; 0: no such gear
+        ("engine_share", "f8", (4,)),  # -, of the engine's torque
         ("sensor_position", "f8", (3,)),  # m, from the centre of gravity
         # of the car with a suspension: fourteen degrees of freedom instead of seven
         ("suspended", "u1"),
@@ -140,6 +147,7 @@ STATE: Final = np.dtype(
         ("place", "i8"),  # of the newest sample in the histories
         ("motor_torque", "f8", (4,)),  # N m at the wheel, positive brakes
         ("peak_reserve", "f8", (4,)),  # s left of a motor's peak
+        ("engine_torque", "f8", (4,)),  # N m at the wheel that an engine in overrun takes
         ("applied", "u1", (4,)),  # pads touch the disc
         ("lining_memory", "f8", (4,)),  # of the friction law, e.g. normalised contact area
         ("disc_temperature", "f8", (4,)),  # degC
@@ -162,6 +170,7 @@ STATE: Final = np.dtype(
         ("damper_heat", "f8"),
         ("regenerated", "f8"),  # into the motors
         ("driven", "f8"),  # out of the motors
+        ("engine_loss", "f8"),  # into an engine in overrun
         ("lifted", "f8"),  # against gravity
         ("road_work", "f8"),  # of the road's heights on the tyres
         # follows from these

@@ -10,6 +10,7 @@ import numpy as np
 from brakelab.plant.body import advance_attitude, advance_planar, hub_velocity, set_wheel_loads
 from brakelab.plant.chassis import advance_chassis, settle
 from brakelab.plant.emission import advance_emission
+from brakelab.plant.engine import advance_engine
 from brakelab.plant.friction.law import START
 from brakelab.plant.hydraulics import advance_pressure
 from brakelab.plant.jit import Record, kernel
@@ -32,6 +33,7 @@ def advance(params: Record, state: Record, commands: Record, dt: float) -> None:
         state.motor_history[state.place, wheel] = commands.motor_demand[wheel]
     advance_pressure(params, state, dt)
     advance_motors(params, state, dt)
+    advance_engine(params, state, dt)
     advance_lining(params, state, dt)
     if params.suspended:
         advance_chassis(params, state, commands, dt)

@@ -1,7 +1,7 @@
 """One wheel between brake, motor and road: spin, slip and tyre force.
 
-Model. I omega' = -T_motor - r F_L - (T_b + f_r r F_z) sign(omega) (A.3; slip and F_L negative in braking),
-tau F_L' + F_L = F_L(slip) (A.13), slip = (r omega - v_L) / max(r omega, v_L) (A.6).
+Model. I omega' = -T_motor - T_engine - r F_L - (T_b + f_r r F_z) sign(omega) (A.3; slip and F_L negative in
+braking), tau F_L' + F_L = F_L(slip) (A.13), slip = (r omega - v_L) / max(r omega, v_L) (A.6).
 
 Discretisation. Both equations are stiff (r^2 C / (I v) is some 300 1/s at 30 m/s, and at standstill the
 carcass is a spring against the wheel), so they are solved together by the trapezoidal rule, linearised in
@@ -46,7 +46,8 @@ def advance_wheel(
     grown_per_spin = 0.5 * gain_x * stiffness * radius / reference
     mean_force = state.force_x[wheel] + 0.5 * grown
     inertia = params.wheel_inertia[wheel] + 0.5 * dt * radius * grown_per_spin
-    free = omega - dt * (state.motor_torque[wheel] + radius * mean_force) / inertia
+    drive = state.motor_torque[wheel] + state.engine_torque[wheel]
+    free = omega - dt * (drive + radius * mean_force) / inertia
     braking, rolling = state.brake_torque[wheel], params.rolling_resistance * load * radius
     stopping = dt * (braking + rolling) / inertia
     turning = max(abs(free) - stopping, 0.0)
@@ -58,6 +59,7 @@ def advance_wheel(
     rubbed = math.copysign(held_back, free) * turned
     state.brake_work[wheel] = braking * rubbed
     state.rolling_loss += rolling * rubbed
+    state.engine_loss += state.engine_torque[wheel] * turned
     regenerated = state.motor_torque[wheel] * turned
     if regenerated > 0.0:
         state.regenerated += regenerated

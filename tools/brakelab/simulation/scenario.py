@@ -59,6 +59,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, Field, ValidationError, model_validator
 
 from brakelab.plant.cycle import CYCLE
+from brakelab.plant.description import Engine
 from brakelab.plant.driver import PEDAL_TRAVEL, Script
 from brakelab.plant.records import BRAKE, COAST, CRUISE, FOLLOW, PHASE
 from brakelab.plant.sensor_errors import Sensors
@@ -104,6 +105,8 @@ class Scenario(BaseModel):
     """How far the car of a seed is from its file; see `brakelab.plant.draw`."""
     payload: Payload | None = None
     """What the car carries beside the driver."""
+    engine: Engine | None = None
+    """Combustion engine of the car instead of that of its file; in overrun it drags."""
     initial_speed: Annotated[NotNegative, Unit("m/s")]
     """At t = 0."""
     initial_disc_temperature: Annotated[tuple[float, float], Unit("degC")] = (100.0, 100.0)

@@ -1,6 +1,8 @@
-"""Car of a scenario: its file, its payload, and the width of its draw."""
+"""Car of a scenario: its file, its payload, its engine, and the width of its draw."""
 
 from typing import get_args
+
+from pydantic import BaseModel
 
 from brakelab.plant.description import Plant, PlantFileError, load_plant
 from brakelab.plant.draw import Widths, load_widths
@@ -19,10 +21,12 @@ def scenario_plant(scenario: Scenario) -> Plant:
         plant = load_plant(named(scenario.plant, "config/plant"))
     except PlantFileError as error:
         raise UserError(error.where, error.place, error.remedy) from None
-    if scenario.payload is None:
-        return plant
-    laden = plant.vehicle.model_copy(update={"body": scenario.payload.body(plant.vehicle.body)})
-    return plant.model_copy(update={"vehicle": laden})
+    changed: dict[str, BaseModel] = {}
+    if scenario.payload is not None:
+        changed["body"] = scenario.payload.body(plant.vehicle.body)
+    if scenario.engine is not None:
+        changed["engine"] = scenario.engine
+    return plant.model_copy(update={"vehicle": plant.vehicle.model_copy(update=changed)})
 
 
 def with_draw(scenario: Scenario, draw: str) -> Scenario:
