@@ -31,10 +31,7 @@ TEXT: Final = (
     "*everyday* and begin cold. Counted while the brakes of both axles have been on for 0.8 s, above "
     "15 km/h. The ECU's observers run as a shadow: they do not know the demand, only pressure. "
     "Observer 1 alone hears the forces of measuring wheels; the simulated loggers and the real car have "
-    "none. No engine drags in the simulated cars: Observer 2 takes that for granted, the joint observer does "
-    "not. In an experiment with the same ten cars, 50 Hz, and an engine in front that drags 0.1 to 0.4 m/s², "
-    "by its gear and unreported, Observer 2 was off by 9.3 % (worst car 25), the joint observer by 4.8 % "
-    "(15); with 0.3 to 0.8 m/s² by 10.8 (33) and 5.4 % (11)."
+    "none. Recorded cars have an engine, whose drag nothing reports ([plant.md](../plant.md))."
 )
 
 

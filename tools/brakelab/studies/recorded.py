@@ -13,6 +13,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.plant.description import Engine
 from brakelab.replay.drive import replay_drive
 from brakelab.replay.quality import Findings
 from brakelab.replay.source import load_source
@@ -35,6 +36,14 @@ Vector = NDArray[np.float64]
 CARS: Final = 20
 SHARE: Final = 0.68  # of the brake force in front
 FIRST: Final = 2  # the third application: counted from here on
+ENGINE: Final = Engine(
+    drag_torque=25.0,
+    drag_growth=0.06,
+    lowest_speed=126.0,
+    ratios=(14.8, 9.86, 6.60, 5.26, 4.06, 3.15, 2.65, 2.11),
+    share_front=1.0,
+)
+"""Some three litres, eight gears: 0.1 m/s^2 at 30 m/s, 0.4 at 5. Assumption."""
 DECELS: Final = (2.0, 5.0, 3.0, 6.5, 1.5, 4.0, 7.0, 2.5, 5.5, 3.5)  # m/s^2
 PRESSURE_EVERY: Final = 5  # cycles: 20 Hz
 
@@ -75,7 +84,7 @@ def uncorrected() -> Config:
 
 
 def recorded_scenario() -> Scenario:
-    """Return ten brakings by the driver, without a speed reference."""
+    """Return ten brakings by the driver of a car with an engine, without a speed reference."""
     base = shipped("sensitivity")
     phases = []
     for decel in DECELS:
@@ -85,7 +94,7 @@ def recorded_scenario() -> Scenario:
             Phase(kind="brake", decel=decel, until_speed=6.0),
             Phase(kind="coast", seconds=0.7),
         ]
-    return base.model_copy(update={"phase": phases, "vehicle_speed": "none"})
+    return base.model_copy(update={"phase": phases, "vehicle_speed": "none", "engine": ENGINE})
 
 
 def logger_columns(drive: Drive, logger: Logger) -> dict[str, Vector]:
