@@ -1,6 +1,7 @@
 """`brake-ecu simulate`: a scenario in closed loop; frames, decoded inputs and true values as files."""
 
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 import pyarrow as pa
@@ -10,24 +11,33 @@ from numpy.typing import NDArray
 from brakelab.logs.candump_text import candump_text
 from brakelab.results.outputs import check_outputs
 from brakelab.results.progress import progress_bar
-from brakelab.simulation.closed_loop import START_NS, VEHICLE_BUS, new_loop, run
+from brakelab.simulation.closed_loop import START_NS, VEHICLE_BUS, new_loop, run_blocks
 from brakelab.simulation.scenario import load_scenario
 from brakelab.simulation.scenario_car import with_draw
+from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS
+from ecu.contract.signals import CYCLE_NS, INPUT_SIGNALS
 from ecu.errors import UserError
 from ecu.output import give, wrote
 from ecu.settings.config import load_config
 from ecu.settings.resources import command_name
+
+ROWS: Final = 100_000
+"""Of a row group: minutes of a drive, so that one of hours needs no second copy of itself."""
+SIGNALS: Final = tuple(signal.name for signal in INPUT_SIGNALS)
 
 
 def write_columns(
     path: Path, t: NDArray[np.float64], columns: dict[str, NDArray[np.float64]], metadata: dict[str, str]
 ) -> None:
     """Write columns as Parquet (zstd) with `t` [s]; NaN becomes null, an empty column is left out."""
-    arrays = {"t": pa.array(t)}
-    for name, column in columns.items():
-        if not np.all(np.isnan(column)):
-            arrays[name] = pa.array(column, from_pandas=True)
-    pq.write_table(pa.table(arrays).replace_schema_metadata(metadata), path, compression="zstd")
+    given = {"t": t} | {name: column for name, column in columns.items() if not np.all(np.isnan(column))}
+    types = [(name, pa.from_numpy_dtype(column.dtype)) for name, column in given.items()]
+    schema = pa.schema(types).with_metadata(metadata)
+    with pq.ParquetWriter(path, schema, compression="zstd") as writer:
+        for first in range(0, len(t), ROWS):
+            rows = slice(first, first + ROWS)
+            arrays = [pa.array(column[rows], from_pandas=True) for column in given.values()]
+            writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
 
 
 def simulate(scenario: Path, config: Path, out: Path, seed: int = 0, draw: str | None = None) -> int:
@@ -49,17 +59,26 @@ def simulate(scenario: Path, config: Path, out: Path, seed: int = 0, draw: str |
         "seed": str(seed),
         "draw": driven.draw,
     }
+    decoded: list[NDArray[np.float64]] = []
+    true: list[NDArray[np.float64]] = []
+    frames = 0
     with progress_bar("simulate", None):
-        result = run(new_loop(driven, load_config(config), seed))
+        loop = new_loop(driven, load_config(config), seed)
         try:
             out.parent.mkdir(parents=True, exist_ok=True)
-            log.write_bytes(candump_text(result.frames, VEHICLE_BUS))
-            write_columns(inputs, result.t, result.inputs, metadata)
-            write_columns(truth, result.t, result.truth, metadata)
+            with log.open("wb") as text:
+                for block in run_blocks(loop):
+                    text.write(candump_text(block.frames, VEHICLE_BUS))
+                    decoded.append(block.decoded.copy())
+                    true.append(block.truth.copy())
+                    frames += len(block.frames)
+            t = np.arange(sum(map(len, true)), dtype=np.float64) * (1e-9 * CYCLE_NS)
+            for path, names, blocks in ((inputs, SIGNALS, decoded), (truth, TRUTH_COLUMNS, true)):
+                write_columns(path, t, dict(zip(names, np.concatenate(blocks).T, strict=True)), metadata)
         except OSError as error:
             remedy = f"cannot be written ({error.strerror}); choose another --out"
             raise UserError(str(out), "", remedy) from None
-    give(seconds=float(result.t[-1]), frames=len(result.frames))
+    give(seconds=float(t[-1]), frames=frames)
     again = f"brake-ecu replay {log} --config {command_name(config)} --out {out}.result.parquet"
     wrote(log, inputs, truth, next=again)
     return 0

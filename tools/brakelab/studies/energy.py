@@ -3,9 +3,10 @@
 from pathlib import Path
 from typing import Final
 
+from brakelab.plant.cycle import CYCLE
 from brakelab.plant.energy import Energy, energy
 from brakelab.results.text_table import Table
-from brakelab.simulation.closed_loop import new_loop, run
+from brakelab.simulation.closed_loop import new_loop, run_blocks
 from brakelab.simulation.scenario import load_scenario
 from ecu.settings.config import Config
 
@@ -25,8 +26,8 @@ def scenario_energy(path: Path, config: Config, car: str | None = None) -> tuple
     loop = new_loop(scenario.model_copy(update={"plant": car or scenario.plant}), config, 0)
     vehicle = loop.sides.vehicle
     start = vehicle.state.copy()
-    seconds = float(run(loop).t[-1])
-    return seconds, energy(vehicle.params, start, vehicle.state)
+    cycles = sum(len(block.truth) for block in run_blocks(loop))
+    return (cycles - 1) * CYCLE, energy(vehicle.params, start, vehicle.state)
 
 
 def energy_tables(scenarios: Path, config: Config) -> list[Table]:
