@@ -128,6 +128,16 @@ def test_a_mistake_is_one_line_that_names_file_and_key(tmp_path: Path, text: str
     assert "\n" not in str(caught.value)
 
 
+def test_a_scenario_gives_its_car_an_engine_and_a_payload(tmp_path: Path) -> None:
+    path = tmp_path / "s.toml"
+    engine = "[engine]\ndrag_torque = 25.0\nlowest_speed = 126.0\nratios = [14.8, 6.6]\nshare_front = 1.0\n"
+    path.write_text(f"{GOOD}{engine}[payload]\nmass = 100.0\nbehind = 0.5\nheight = 0.6\n")
+    vehicle = scenario_plant(load_scenario(path)).vehicle
+    assert vehicle.engine is not None
+    assert vehicle.engine.ratios == (14.8, 6.6)
+    assert vehicle.body.mass == 2205.0
+
+
 def test_the_phases_are_driven_as_often_as_repeat_says(tmp_path: Path) -> None:
     path = tmp_path / "s.toml"
     path.write_text("repeat = 3\n" + GOOD.replace("until_speed = 0.0", "seconds = 1.0\npedal_speed = 45.0"))

@@ -43,6 +43,12 @@ mass = 495.0                     # kg
 behind = 0.65                    # m, of the empty car's centre of gravity
 height = 0.80                    # m
 
+[engine]                         # combustion, in overrun, see `brakelab.plant.engine`
+drag_torque = 25.0               # N m
+lowest_speed = 126.0             # rad/s: there the gearbox shifts down
+ratios = [14.8, 6.60, 3.15]      # crankshaft over wheels
+share_front = 1.0
+
 [steering]
 angle = [[0.0, 0.0], [2.0, 0.03]]          # s, rad at the road wheel, left positive
 path = [[0.0, 0.0], [30.0, 3.5]]           # or m, m: path that the driver follows
