@@ -24,7 +24,7 @@ from ecu.algorithm.control.blending import (
     update_motors,
 )
 from ecu.algorithm.control.cleaner_share import CALM_ACROSS, CLEANER_STATE, lean
-from ecu.algorithm.control.demand import DEMAND_STATE, hold_pedal, update_demand
+from ecu.algorithm.control.demand import DEMAND_STATE, hold_automated, hold_pedal, update_demand
 from ecu.algorithm.control.distribution import (
     DISTRIBUTION_STATE,
     cap_trailing,
@@ -203,6 +203,7 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
     mask_implausible(p, s, u)
     u = s.trusted
     hold_pedal(p, s.demand, u)
+    faults |= hold_automated(s.demand, u, dt)
     _estimate(p, s, u, contradicted, dt)
     update_discs(p, s.discs, s.learned, u, s.estimate, s.application, dt)
     update_wear(p, s.wear, s.learned, u, s.estimate, s.discs, s.application, dt)

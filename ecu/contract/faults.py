@@ -45,6 +45,7 @@ LEARNING_GIVEN_UP: Final = 1 << 26
 NOT_KEPT: Final = 1 << 27
 E2E_REJECTIONS: Final = 1 << 28
 BRAKE_FAILED: Final = 1 << 29
+DEMAND_LOST: Final = 1 << 30
 
 FAULTS: Final = (
     Fault(WHEEL_SPEED_LOST, "wheel speed lost", "a wheel speed is stale or invalid", "check the sender of WheelSpeed*"),
@@ -77,6 +78,7 @@ FAULTS: Final = (
     Fault(NOT_KEPT, "nothing is kept", "the side process is away or hangs, or the state folder cannot be written: what is learned now ends with this run", "it is started again by itself; look at the disk and at the log lines before"),
     Fault(E2E_REJECTIONS, "E2E rejections", "of a protected message more frames come than its sender makes, or many are rejected: nothing is learned, and a request in doubt is not lowered", "look for a second sender of that message and for disturbances of the bus: `brake-ecu doctor -i -c` counts them"),
     Fault(BRAKE_FAILED, "brake gives nothing", "a calliper has far less pressure than demanded, and the car brakes less by its share: the other wheels and the motors brake in its place", "stop; look for a leak, a valve that does not open, or a line that is shut"),
+    Fault(DEMAND_LOST, "automated demand lost", "an automated demand that was followed is stale or invalid without having been withdrawn: it is kept for 0.1 s while its frames come, then the pedal alone brakes", "check the sender of decel_demand: range, decel_demand_valid, cycle"),
 )  # fmt: skip
 
 DEGRADING: Final = (

@@ -9,6 +9,10 @@ no brake demand.
 
 A pedal whose position is lost while its switch still works keeps its last position until the switch opens;
 one pressed only afterwards demands `SECONDARY_DECEL`.
+
+An automated demand ends at once where `decel_demand_valid` is 0. One that is not available or out of range,
+or whose flag is, stays as it was for `DEMAND_GAP` while frames arrive, as one whose frames stay away; then it
+is lost.
 """
 
 import math
@@ -18,15 +22,20 @@ import numpy as np
 from ecu.algorithm.inputs import (
     LEAST_REQUEST,
     MAX_DECEL,
+    automated_demand_valid,
     mean_wheel_speed,
     pedal_known,
     pedal_to_decel,
     requested_decel,
     usable,
 )
+from ecu.contract.faults import DEMAND_LOST
 from ecu.contract.params import PEDAL_POINTS
 from ecu.contract.signals import (
     ACCELERATOR_POSITION,
+    ALIVE,
+    DECEL_DEMAND,
+    DECEL_DEMAND_VALID,
     PEDAL_POSITION,
     PEDAL_PRESSED,
     USABLE,
@@ -40,6 +49,8 @@ DEMAND_STATE = np.dtype(
         ("held", "u1"),
         ("hold", "f8"),  # holding demand [m/s^2], fades in and out
         ("pedal", "f8"),  # last known or assumed position [%]
+        ("automated", "f8"),  # last automated demand followed [m/s^2], 0: none, or withdrawn
+        ("gap_s", "f8"),  # time since then, without a usable one [s]
     ],
     align=True,
 )
@@ -48,6 +59,7 @@ STANDSTILL = 0.3  # m/s
 STANDING_TIME = 0.5  # s
 ACCELERATOR_PRESSED = 3.0  # %
 SECONDARY_DECEL = 2.44  # m/s^2, of a secondary braking system (ECE R13-H, Annex 3, 2.2)
+DEMAND_GAP = 0.1  # s, time-out of decel_demand
 HOLD_RATE = 5.0  # m/s^3: released within 0.7 s, as fast as a foot changes the pedal
 
 
@@ -80,6 +92,31 @@ def hold_pedal(params: Record, state: Record, inputs: Record) -> None:
     elif pedal_to_decel(params, state.pedal) < LEAST_REQUEST:
         state.pedal = _position_for(params, SECONDARY_DECEL)
     inputs.value[PEDAL_POSITION], inputs.verdict[PEDAL_POSITION] = state.pedal, USABLE
+
+
+@kernel
+def hold_automated(state: Record, inputs: Record, dt: float) -> int:
+    """Substitute an automated demand that is lost but not withdrawn by the last one; return the fault bit.
+
+    Args:
+        state: `DEMAND_STATE`; `automated` and `gap_s` are overwritten.
+        inputs: the trusted `INPUTS`.
+        dt: time since the last cycle [s].
+    """
+    withdrawn = usable(inputs, DECEL_DEMAND_VALID) and inputs.value[DECEL_DEMAND_VALID] < 0.5
+    if withdrawn or automated_demand_valid(inputs):
+        state.automated = 0.0 if withdrawn else inputs.value[DECEL_DEMAND]
+        state.gap_s = 0.0
+        return 0
+    if state.automated < LEAST_REQUEST:
+        return 0
+    state.gap_s += dt
+    arrive = inputs.verdict[DECEL_DEMAND] & inputs.verdict[DECEL_DEMAND_VALID] & ALIVE
+    if arrive and state.gap_s < DEMAND_GAP:
+        inputs.value[DECEL_DEMAND], inputs.verdict[DECEL_DEMAND] = state.automated, USABLE
+        inputs.value[DECEL_DEMAND_VALID], inputs.verdict[DECEL_DEMAND_VALID] = 1.0, USABLE
+        return 0
+    return DEMAND_LOST
 
 
 @kernel

@@ -5,11 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from ecu.algorithm.control.demand import DEMAND_STATE, hold_pedal, update_demand
+from ecu.algorithm.control.demand import DEMAND_STATE, hold_automated, hold_pedal, update_demand
+from ecu.contract.faults import DEMAND_LOST
 from ecu.contract.signals import (
     ACCELERATOR_POSITION,
     ALIVE,
     DECEL_DEMAND,
+    DECEL_DEMAND_VALID,
     PEDAL_POSITION,
     PEDAL_PRESSED,
     USABLE,
@@ -156,3 +158,42 @@ def test_a_map_that_asks_for_less_than_a_secondary_brake_gives_all_it_has(params
     inputs[0]["verdict"][PEDAL_POSITION] = ALIVE
     hold_pedal(params[0], state, inputs[0])
     assert inputs[0]["value"][PEDAL_POSITION] == 100.0
+
+
+GAPS = [
+    # case, flag, verdicts of demand and flag, demand after 0.01, 0.09 and 0.2 s [m/s^2], told after 0.2 s
+    ("followed", 1.0, USABLE, USABLE, (4.0, 4.0, 4.0), False),
+    ("withdrawn", 0.0, USABLE, USABLE, (0.0, 0.0, 0.0), False),
+    ("withdrawn, and no value any more", 0.0, ALIVE, USABLE, (0.0, 0.0, 0.0), False),
+    ("out of range or not available", 1.0, ALIVE, USABLE, (4.0, 4.0, 0.0), True),
+    ("its flag says error", 1.0, USABLE, ALIVE, (4.0, 4.0, 0.0), True),
+    ("both are not available", 1.0, ALIVE, ALIVE, (4.0, 4.0, 0.0), True),
+    ("no frame for its time-out", 1.0, 0, 0, (0.0, 0.0, 0.0), True),
+]
+
+
+@pytest.mark.parametrize(
+    ("case", "flag", "value", "flagged", "asked", "told"), GAPS, ids=[row[0] for row in GAPS]
+)
+def test_an_automated_demand_ends_at_once_only_where_it_is_withdrawn(
+    params, feed, case, flag, value, flagged, asked, told
+) -> None:
+    state = np.zeros(1, DEMAND_STATE)[0]
+    assert hold_automated(state, feed(decel_demand=4.0, decel_demand_valid=1.0)[0], DT) == 0
+    got = []
+    for _ in range(20):
+        inputs = feed(pedal_position=0.0, decel_demand=4.0, decel_demand_valid=flag)[0]
+        inputs["verdict"][DECEL_DEMAND], inputs["verdict"][DECEL_DEMAND_VALID] = value, flagged
+        bits = hold_automated(state, inputs, DT)
+        got.append(update_demand(params[0], state, inputs, 20.0, DT))
+    assert (got[0], got[8], got[19]) == asked, case
+    assert bits == (DEMAND_LOST if told else 0)
+    if told:
+        assert hold_automated(state, feed(decel_demand=2.0, decel_demand_valid=1.0)[0], DT) == 0, "it is back"
+
+
+def test_a_demand_that_asked_for_nothing_is_not_missed(feed) -> None:
+    state, inputs = np.zeros(1, DEMAND_STATE)[0], feed(decel_demand=0.0, decel_demand_valid=1.0)[0]
+    hold_automated(state, inputs, DT)
+    inputs["verdict"][DECEL_DEMAND] = ALIVE
+    assert hold_automated(state, inputs, DT) == 0
