@@ -129,7 +129,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file; a mistake is one line."""
     detail(f"reading {path}")
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))  # Windows editors mark it
     except FileNotFoundError:
         raise UserError(str(path), "", "no such file") from None
     except IsADirectoryError:

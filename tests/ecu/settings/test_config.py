@@ -173,6 +173,12 @@ WRONG = [
 ]
 
 
+def test_the_mark_of_a_windows_editor_is_no_mistake(tmp_path: Path) -> None:
+    path = tmp_path / "car.toml"
+    path.write_text(SUV, encoding="utf-8-sig")
+    assert load_config(path).vehicle.mass == 2105.0
+
+
 @pytest.mark.parametrize(("case", "text", "names"), WRONG, ids=[row[0] for row in WRONG])
 def test_a_wrong_file_is_one_line_that_names_file_and_key(tmp_path: Path, case, text, names) -> None:
     path = tmp_path / "car.toml"

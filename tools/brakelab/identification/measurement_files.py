@@ -97,7 +97,7 @@ def refuse_nested(config: Path) -> None:
     Raises:
         UserError: it does.
     """
-    inner = tomllib.loads(config.read_text("utf-8")).get("include")
+    inner = tomllib.loads(config.read_text("utf-8-sig")).get("include")
     if inner is not None:
         remedy = f"the file written would include {config}, which may include none: give --config {inner}"
         raise UserError(str(config), "include", f"{remedy}, and copy the sections into one file")

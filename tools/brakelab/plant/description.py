@@ -210,7 +210,7 @@ Model = TypeVar("Model", bound=BaseModel)
 def read_file(path: Path, model: type[Model]) -> Model:
     """Return the TOML file `path` as a `model`. Raises `PlantFileError`, one line."""
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
         return model.model_validate(content, context={"folder": path.parent})
     except OSError as error:
         raise PlantFileError(str(path), "", error.strerror or "cannot be read") from error
