@@ -77,7 +77,7 @@ def measure(wear: Any, pad: Pad, i: int, thickness: float) -> None:
     """Store a thickness [mm] measured at corner i.
 
     Raises:
-        UserError: the pad would be thicker than new, than at the last measurement, or none at all.
+        UserError: the pad would be thicker than new, than at the last measurement, or next to none.
     """
     name = f"{CORNERS[i]}={thickness:g}"
     n = int(wear["measurements"][i])
@@ -88,7 +88,7 @@ def measure(wear: Any, pad: Pad, i: int, thickness: float) -> None:
         raise UserError(
             "--measured", name, f"thicker than {before}: measure again, or give --new-pads {axle} first"
         )
-    if not thickness > 0.0:
+    if not thickness > GAUGE:  # as metres would be
         raise UserError("--measured", name, "give the thickness of the lining in mm, without the backplate")
     add_measurement(wear, i, pad.thickness_new - thickness, GAUGE)
 

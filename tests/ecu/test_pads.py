@@ -104,6 +104,7 @@ def test_wear_survives_a_configuration_that_changes(tmp_path, capsys):
 REFUSED = {
     "a thickness that grew": ("fl=12.9", "fl=12.9: thicker than the 12 mm of a new pad"),
     "no thickness": ("fl=-1", "without the backplate"),
+    "metres": ("fl=0.0098", "in mm, without the backplate"),
     "no corner": ("front=9", "corners fl, fr, rl, rr"),
     "no number": ("fl=nine", "give corner=mm"),
     "nothing": ("fl=nan", "give corner=mm"),
