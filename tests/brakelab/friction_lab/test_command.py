@@ -176,3 +176,11 @@ def test_held_out_are_the_hottest(stops: Stops) -> None:
     assert len(seen) == 19
     assert len(unseen) == 5
     assert seen.start_temperature.max() <= unseen.start_temperature.min()
+
+
+def test_a_wrong_ending_is_told_before_the_programme_is_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(command, "new_bench", lambda *_, **__: pytest.fail("the rig was started"))
+    with pytest.raises(UserError, match=r"ends in \.csv or \.parquet"):
+        command.run("ams", "A", 0, tmp_path / "data.xls")

@@ -17,7 +17,7 @@ from brakelab.friction_lab.identification import identify
 from brakelab.friction_lab.lining_file import write_lining
 from brakelab.friction_lab.plausibility import refuse_nonsense
 from brakelab.friction_lab.reader import read_recording
-from brakelab.friction_lab.recording import Recording, joined, write_recording
+from brakelab.friction_lab.recording import Recording, check_name, joined, write_recording
 from brakelab.friction_lab.report_page import write_report
 from brakelab.friction_lab.sections import has_sections, load_sequence, means_table, run_sequence
 from brakelab.friction_lab.stops import Stops, find_stops
@@ -56,6 +56,7 @@ def run(
     Raises:
         UserError: a programme, brake or law of that name does not exist, or `out` ends in something else.
     """
+    check_name(out)
     known = _linings(linings)
     if brake not in known:
         raise UserError("--brake", brake, f"no such brake; choose one of {', '.join(known)}")

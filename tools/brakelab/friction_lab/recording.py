@@ -33,6 +33,12 @@ def joined(parts: list[Recording]) -> Recording:
     return Recording(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
+def check_name(path: Path) -> None:
+    """Refuse a `path` that `write_recording` cannot write. Raises UserError."""
+    if path.suffix not in (".csv", ".parquet"):
+        raise UserError(str(path), "", "give a name that ends in .csv or .parquet")
+
+
 def write_recording(path: Path, recording: Recording, lining: Lining, inertia: float) -> Path:
     """Write `path` (.csv or .parquet), and beside it PATH.toml, which names columns, units and the brake.
 
@@ -41,6 +47,7 @@ def write_recording(path: Path, recording: Recording, lining: Lining, inertia: f
     Raises:
         UserError: the ending of `path` is neither.
     """
+    check_name(path)
     factors = (1.0, 1e-5, 1.0, 3.6 * lining.brake.tyre_radius, 1.0)
     digits = (3, 3, 1, 3, 2)
     columns = [
@@ -52,13 +59,11 @@ def write_recording(path: Path, recording: Recording, lining: Lining, inertia: f
         formats = ",".join(f"%.{places}f" for places in digits)
         text = "\n".join(formats % row for row in zip(*(c.tolist() for c in columns), strict=True))
         path.write_text(f"{','.join(HEADER)}\n{text}\n", encoding="utf-8")
-    elif path.suffix == ".parquet":
+    else:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
         pq.write_table(pa.table(dict(zip(HEADER, columns, strict=True))), path, compression="zstd")
-    else:
-        raise UserError(str(path), "", "give a name that ends in .csv or .parquet")
     beside = path.with_suffix(".toml")
     beside.write_text(columns_text(Columns.own(lining, inertia)), encoding="utf-8")
     return beside
