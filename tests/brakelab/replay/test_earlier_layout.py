@@ -21,6 +21,10 @@ def earlier(without: str = "") -> np.dtype:
             part = np.dtype([(field, part[field]) for field in part.names if field != "gain_variance"])
         if name == "application":
             part = np.dtype([(field, part[field]) for field in part.names if field != "shown"])
+        if name == "demand":
+            part = np.dtype(
+                [(field, part[field]) for field in part.names if field not in ("automated", "gap_s")]
+            )
         parts.append(("friction_torque" if name == "hydraulics" else name, part))
     return np.dtype([part for part in parts if part[0] != without], align=True)
 

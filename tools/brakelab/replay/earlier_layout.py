@@ -9,7 +9,7 @@ from ecu.algorithm.step import INITIAL
 from ecu.contract.records import RecordArray
 
 RENAMED = {"hydraulics": "friction_torque"}  # present name: earlier one
-ADDED = {"follows", "gain_variance", "shown"}  # begin at 0
+ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s"}  # begin at 0
 
 
 def convert_initial(initial: RecordArray) -> RecordArray | None:
