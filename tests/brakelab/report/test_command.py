@@ -195,6 +195,11 @@ def test_place_that_cannot_be_written(drive_files: Files) -> None:
         report(drive_files["result"], None, drive_files["result"] / "report.html")
 
 
+def test_a_page_has_the_name_of_one(drive_files: Files, tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"^--out: .*r\.pdf: the report is a web page; .* end in \.html"):
+        report(drive_files["result"], None, tmp_path / "r.pdf")
+
+
 def test_dark_colours_can_be_taken_back() -> None:
     assert len(set(DARK.values())) == len(DARK)
     assert not set(DARK) & set(DARK.values())

@@ -62,6 +62,8 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
     """
     recorded = [] if timing is None else [timing, timing / "cycles.bin"]
     check_outputs(out, [out], [result, *([truth] if truth else []), *recorded])
+    if out.suffix.lower() not in (".html", ".htm"):
+        raise UserError("--out", str(out), "the report is a web page; let the name end in .html")
     drive = read_drive(
         result, ("vehicle_speed", *_FRICTION), "give a RESULT.parquet that `brake-ecu replay` or `demo` wrote"
     )
