@@ -1,6 +1,7 @@
 import http.client
 import json
 import re
+import socket
 import threading
 
 import numpy as np
@@ -84,6 +85,25 @@ def test_only_the_page_itself_keeps_a_recording(watched, tmp_path):
     answer = ask(port, "POST", "/keep", **{"X-Brake-Ecu": "keep"})
     assert answer.read().decode().startswith("1 s kept in ")
     assert len(read_recording(tmp_path / "kept").cycles) == 80
+
+
+def test_what_a_page_elsewhere_sends_is_no_second_request(watched, tmp_path):
+    """A browser lets any page post text to 127.0.0.1: it must not be read as a request of our own."""
+    inner = b"POST /keep HTTP/1.1\r\nHost: localhost\r\nX-Brake-Ecu: keep\r\n\r\n"
+    outer = b"POST /keep HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: %d\r\n\r\n" % len(inner)
+    with socket.create_connection(("127.0.0.1", watched[2]), timeout=60) as client:
+        client.sendall(outer + inner)
+        said = b"".join(iter(lambda: _received(client), b""))
+    assert said.count(b"HTTP/1.1") == 1
+    assert said.startswith(b"HTTP/1.1 403")
+    assert not (tmp_path / "kept").exists()
+
+
+def _received(client):
+    try:
+        return client.recv(4096)
+    except ConnectionResetError:  # closed before all was read
+        return b""
 
 
 @pytest.mark.parametrize(
