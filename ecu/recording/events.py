@@ -23,12 +23,14 @@ class EventLog:
         self._mode, self._faults, self._overruns, self._dropped, self._lost = 0, 0, 0, 0, 0
         self._speaks: bool | None = None
 
-    def begin_after(self, record: RecordArray) -> None:
-        """Continue after an earlier log that ended with `record` (`RECORDED`, shape (1,))."""
+    def begin_after(self, record: RecordArray, lost: int = 0) -> None:
+        """Continue after an earlier log that ended with `record` (`RECORDED`, shape (1,)); `lost`: cycles and
+        frames that the reader had missed by then."""
         cycle, outputs = record["cycle"][0], record["outputs"][0]
         self._mode, self._faults = (int(np.nan_to_num(outputs[name])) for name in ("mode", "active_faults"))
         self._overruns, self._dropped = int(cycle["overruns"]), int(cycle["dropped"])
         self._speaks = bool(cycle["speaks"])
+        self._lost = lost
 
     def look(self, records: RecordArray, lost_cycles: int, lost_frames: int) -> None:
         """Log the changes within `records` (`RECORDED`, shape (n,)); `lost_*`: missed by the reader."""

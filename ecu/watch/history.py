@@ -11,9 +11,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ecu.contract.records import RecordArray
+from ecu.contract.records import CYCLE, RecordArray
 from ecu.contract.signals import CORNERS
 from ecu.recording.events import EventLog
+from ecu.recording.log import Throttle
 from ecu.recording.ring import Batch, RingReader
 
 EVERY: Final = 4  # cycles: 25 rows a second
@@ -61,16 +62,16 @@ class Event(NamedTuple):
 
 
 class _Teller:
-    """The log to which `EventLog` writes."""
+    """The log to which `EventLog` writes; `tell` takes a text, whether it is serious, its cycle if known."""
 
-    def __init__(self, tell: Callable[[str, bool], None]) -> None:
+    def __init__(self, tell: Callable[[str, bool, int | None], None]) -> None:
         self._tell = tell
 
     def info(self, event: str, **content: Any) -> None:
-        self._tell(_sentence(event, content), False)
+        self._tell(_sentence(event, content), False, content.get("cycle"))
 
     def warning(self, event: str, **content: Any) -> None:
-        self._tell(_sentence(event, content), True)
+        self._tell(_sentence(event, content), True, content.get("cycle"))
 
 
 def _sentence(event: str, content: dict[str, Any]) -> str:
@@ -86,7 +87,8 @@ def _sentence(event: str, content: dict[str, Any]) -> str:
         case "frames_dropped":
             return f"{content['dropped']} frames dropped by the kernel"
         case "ring_overtaken":
-            return f"this watcher was too slow: {content['lost_cycles']} cycles not seen"
+            lost = f"{content['lost_cycles']} cycles and {content['lost_frames']} frames"
+            return f"this watcher was too slow: {lost} not seen in all"
         case _:
             return event.replace("_", " ")
 
@@ -107,6 +109,7 @@ class History:
         self._log: EventLog | None = None
         self._worst_us = 0.0
         self._clock = time.time()
+        self._looked = np.empty(0, CYCLE)
 
     def begin_run(self) -> None:
         """Forget the cycles to keep: a recording is of one run."""
@@ -120,9 +123,13 @@ class History:
         """Return how many seconds could be kept as a recording."""
         return self._held / 100
 
-    def tell(self, text: str, serious: bool = False) -> None:
-        """Note an event now."""
-        self.events.append(Event(self._clock, text, serious))
+    def tell(self, text: str, serious: bool = False, cycle: int | None = None) -> None:
+        """Note an event now, or in a cycle of those that are looked at."""
+        clock = self._clock
+        if cycle is not None:
+            place = int(np.searchsorted(self._looked["number"], cycle))
+            clock = 1e-9 * float(self._looked["t_ns"][place])
+        self.events.append(Event(clock, text, serious))
 
     def take(self, batch: Batch, reader: RingReader) -> None:
         """Add the cycles of `batch`, just read by `reader`."""
@@ -132,9 +139,11 @@ class History:
         self._clock = 1e-9 * float(records["cycle"]["t_ns"][-1])
         self.cycles = int(records["cycle"]["number"][-1]) + 1
         self.missed = int(records["cycle"]["overruns"][-1])
+        self._looked = records["cycle"]
         if self._log is None:
-            self._log = EventLog(log=_Teller(self.tell))
-            self._log.begin_after(records[:1])
+            throttle = Throttle(lambda: 1e-9 * float(self._looked["t_mono_ns"][-1]))
+            self._log = EventLog(throttle, _Teller(self.tell))
+            self._log.begin_after(records[:1], reader.lost_cycles + reader.lost_frames)
         self._log.look(records, reader.lost_cycles, reader.lost_frames)
         late_us = records["cycle"]["lateness_ns"] * 1e-3
         places = np.searchsorted(LATENESS_US, late_us)

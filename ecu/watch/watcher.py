@@ -14,6 +14,8 @@ from ecu.watch.history import History
 
 PERIOD_S: Final = 0.04
 LOOK_S: Final = 0.5
+BATCH: Final = 100
+"""Cycles that are looked at at once when it catches up: events are throttled by the second."""
 STALLED_S: Final = 0.5
 """Without a new cycle for that long, the writer's lock is looked at."""
 NONE_RUNS: Final = "no daemon of this user runs; start one with brake-ecu run, it is attached to by itself"
@@ -45,6 +47,10 @@ class Watcher:
                 return 0
             self._looked_s = self._now_s()
             self._attach()
+            if self.reader is not None and self.daemon is not None:
+                count = self._follow(self.reader)  # what the ring holds is older than this
+                self.history.tell(f"attached to {self.daemon.label}")
+                return count
         return self._follow(self.reader) if self.reader else 0
 
     def _attach(self) -> None:
@@ -65,12 +71,11 @@ class Watcher:
             return
         self.daemon, self.reader, self.source = found, reader, reader
         self.history.begin_run()
-        self.history.tell(f"attached to {found.label}")
         self.trouble, self._seen_s = "", self._now_s()
 
     def _follow(self, reader: RingReader) -> int:
         count = 0
-        while len((batch := reader.read()).records):
+        while len((batch := reader.read(BATCH)).records):
             self.history.take(batch, reader)
             count += len(batch.records)
         if count:

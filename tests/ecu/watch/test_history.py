@@ -66,6 +66,31 @@ def test_events_are_those_of_the_daemon_s_log(loop):
     assert history.events[0].clock == pytest.approx(1_800_000_000.07)
 
 
+def test_events_of_the_past_have_the_time_of_their_cycles(loop):
+    """A ring holds 24 s: what changed in them is read in an instant, a second at a time."""
+    one, history = loop(), History()
+    for mode in (1, 2, 1, 2, 1):
+        one.publish(150, mode=mode)
+    reader = RingReader(one.ring.path)
+    while len((batch := reader.read(100)).records):
+        history.take(batch, reader)
+    clocks = [event.clock - 1_800_000_000.0 for event in history.events]
+    assert clocks == pytest.approx([1.5, 3.0, 4.5, 6.0])
+
+
+def test_what_was_lost_before_it_was_attached_is_no_event(loop):
+    one, history = loop(), History()
+    reader = RingReader(one.ring.path)
+    one.publish(2401)  # one more than the ring holds
+    read(one, history, reader)
+    assert not history.events
+    one.publish(2403, frames=1)
+    read(one, history, reader)
+    assert [event.text for event in history.events] == [
+        "this watcher was too slow: 4 cycles and 0 frames not seen in all"
+    ]
+
+
 def test_old_cycles_are_forgotten_whole_batches_at_a_time(loop):
     one, history = loop(), History()
     reader = RingReader(one.ring.path)

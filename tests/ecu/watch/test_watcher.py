@@ -75,6 +75,15 @@ def test_a_name_that_no_daemon_answers_to(loop, clock):
     assert one
 
 
+def test_what_happened_before_it_was_attached_is_told_before(loop, clock):
+    one, watcher = loop(), Watcher(None, clock)
+    one.publish(300)
+    one.publish(300, mode=2)
+    turn(watcher, clock)
+    assert [event.text[:8] for event in watcher.history.events] == ["ready → ", "attached"]
+    assert watcher.history.events[0].clock < watcher.history.events[1].clock
+
+
 def test_two_daemons_and_no_name(loop, clock):
     kept = [loop(1), loop(2)]
     with pytest.raises(UserError, match="name one by its process"):
