@@ -29,9 +29,11 @@ def corner_values(row: Row, name: str) -> list[float]:
     return [float(value) for value in row[first : first + len(CORNERS)]]
 
 
-def whole(value: float) -> str:
-    """Return a number without decimals, a dash for one that is not available."""
-    return f"{round(value)}" if math.isfinite(value) else "–"
+def number(value: float, digits: int = 0) -> str:
+    """Return a number with so many decimals, a dash for one that is not available; nothing is minus zero."""
+    if not math.isfinite(value):
+        return "–"
+    return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 def _clock(seconds: float) -> str:
@@ -44,16 +46,17 @@ def text_line(watcher: Watcher) -> str:
         return f"{_clock(time.time())} {watcher.trouble or 'attached, no cycle yet'}"
     row = watcher.history.rows[-1]
     friction = " ".join(
-        f"{mu:.3f}±{sigma:.3f}"
+        f"{number(mu, 3)}±{number(sigma, 3)}"
         for mu, sigma in zip(corner_values(row, "mu_b"), corner_values(row, "sigma_mu_b"), strict=True)
     )
-    pressures = "/".join(whole(value) for value in corner_values(row, "calliper_pressure"))
-    discs = "/".join(whole(value) for value in corner_values(row, "disc_temperature"))
+    pressures = "/".join(map(number, corner_values(row, "calliper_pressure")))
+    discs = "/".join(map(number, corner_values(row, "disc_temperature")))
     faults = ", ".join(faults_of(row)) or "no fault"
+    demanded, measured = row[COLUMN["decel_demand_total"]], -row[COLUMN["accel_x_road"]]
     return (
-        f"{_clock(row[COLUMN['clock']])} {mode_of(row)}"
-        f" {row[COLUMN['vehicle_speed']]:.1f} m/s"
-        f" decel {row[COLUMN['decel_demand_total']]:.2f}→{-row[COLUMN['accel_x_road']]:.2f} m/s²"
+        f"{_clock(row[COLUMN['clock']])} {mode_of(row)}{'' if row[COLUMN['speaks']] else ' (silent standby)'}"
+        f" {number(row[COLUMN['vehicle_speed']], 1)} m/s"
+        f" decel {number(demanded, 2)}→{number(measured, 2)} m/s²"
         f" mu {friction} {pressures} bar {discs} °C"
         f" late {row[COLUMN['lateness']]:.0f} µs missed {watcher.history.missed}; {faults}"
     )
@@ -65,7 +68,7 @@ def json_line(watcher: Watcher) -> str:
         return json.dumps({"clock": round(time.time(), 3), "trouble": watcher.trouble or None})
     row = watcher.history.rows[-1]
     plain = {
-        name: _number(row[COLUMN[name]])
+        name: _number(float(row[COLUMN[name]]))
         for name in COLUMNS
         if name[-3:] not in {f"_{corner}" for corner in CORNERS}
     }
@@ -86,5 +89,7 @@ def json_line(watcher: Watcher) -> str:
     )
 
 
-def _number(value: float) -> float | None:
-    return float(f"{value:.6g}") if math.isfinite(value) else None
+def _number(value: float) -> float | int | None:
+    if not math.isfinite(value):
+        return None
+    return int(value) if value.is_integer() else float(f"{value:.6g}")

@@ -6,14 +6,15 @@ from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from typing import Final
 
-from rich.console import Group, RenderableType
+import numpy as np
+from rich.console import Console, Group, RenderableType
 from rich.rule import Rule
 from rich.table import Table
 from rich.text import Text
 
 from ecu.contract.signals import CORNERS
 from ecu.watch.history import COLUMN, LATENESS_US, SHOWN_S, Row
-from ecu.watch.line import corner_values, faults_of, mode_of, whole
+from ecu.watch.line import corner_values, faults_of, mode_of, number
 from ecu.watch.watcher import Watcher
 
 BLOCKS: Final = "▁▂▃▄▅▆▇█"
@@ -23,10 +24,10 @@ KEYS: Final = "q quit  k keep  space pause  ← → 1 s  ↑ ↓ 10 s  end now"
 WIDE, MEDIUM = 100, 64
 
 
-def sparkline(values: Sequence[float], width: int, least: float) -> str:
+def sparkline(values: Sequence[float], width: int, least: float, peers: Sequence[float] = ()) -> str:
     """Return values as a line of blocks; `least` is the least range, NaN is left blank.
 
-    The end of the line is the end of `values`, each block the mean of its part.
+    The end of the line is the end of `values`, each block the mean of its part. The scale holds `peers` too.
     """
     if not values or width < 1:
         return ""
@@ -36,7 +37,8 @@ def sparkline(values: Sequence[float], width: int, least: float) -> str:
     known = [mean for mean in means if math.isfinite(mean)]
     if not known:
         return " " * width
-    low, high = min(known), max(known)
+    beside = [value for value in peers if math.isfinite(value)]
+    low, high = min([*known, *beside]), max([*known, *beside])
     low, high = (low, high) if high - low >= least else ((low + high - least) / 2, (low + high + least) / 2)
     scale = (len(BLOCKS) - 1) / (high - low)
     return "".join(BLOCKS[int(scale * (m - low) + 0.499)] if math.isfinite(m) else " " for m in means)
@@ -65,16 +67,19 @@ def picture(
     if watcher.history.lateness.any():
         parts += [Rule(style="dim"), *_lateness(watcher, width, height)]
     parts.append(Rule(style="dim"))
-    used = 4 + sum(_height(part) for part in parts)
-    parts += _events(watcher, max(2, height - used))
     kept = f"{watcher.history.kept_s:.0f} s can be kept"
-    parts.append(Text(note or kept, "cyan", overflow="ellipsis", no_wrap=not note))
-    parts.append(Text(KEYS, "dim", no_wrap=True, overflow="ellipsis"))
-    return Group(*parts)
+    last = [Text(note or kept, "cyan", overflow="ellipsis", no_wrap=not note)]
+    last.append(Text(KEYS, "dim", no_wrap=True, overflow="ellipsis"))
+    room = height - 1 - sum(_height(part, width) for part in [*parts, *last])
+    return Group(*parts, *_events(watcher, room), *last)
 
 
-def _height(part: RenderableType) -> int:
-    return part.row_count + 1 if isinstance(part, Table) else 1
+def _height(part: RenderableType, width: int) -> int:
+    if isinstance(part, Table):
+        return part.row_count + 1
+    if isinstance(part, Text) and not part.no_wrap:
+        return len(part.wrap(Console(), width))
+    return 1
 
 
 def _state(row: Row, back_s: float, paused: bool) -> Text:
@@ -82,7 +87,7 @@ def _state(row: Row, back_s: float, paused: bool) -> Text:
     when = time.strftime("%H:%M:%S", time.localtime(row[COLUMN["clock"]]))
     line = Text(no_wrap=True, overflow="ellipsis")
     line.append(mode.upper(), STYLES.get(mode, ""))
-    line.append(f"  {row[COLUMN['vehicle_speed']]:.1f} m/s  {when}")
+    line.append(f"  {number(row[COLUMN['vehicle_speed']], 1)} m/s  {when}")
     if not row[COLUMN["speaks"]]:
         line.append("  silent standby", "yellow")
     if back_s > 0.0:
@@ -111,34 +116,31 @@ def _corners(rows: Sequence[Row], width: int) -> Table:
 
         cells = [
             corner,
-            f"{value('mu_b'):.3f}±{value('sigma_mu_b'):.3f}",
-            f"{whole(value('pressure_demand'))}→{whole(value('calliper_pressure'))}",
-            whole(value("disc_temperature")),
+            f"{number(value('mu_b'), 3)}±{number(value('sigma_mu_b'), 3)}",
+            f"{number(value('pressure_demand'))}→{number(value('calliper_pressure'))}",
+            number(value("disc_temperature")),
         ]
         if width >= MEDIUM:
             mode = value("mode_mu_b")
-            cells += [f"{value('pad_wear'):.3f}", whole(value("pad_remaining"))]
+            cells += [number(value("pad_wear"), 3), number(value("pad_remaining"))]
             cells.append(ESTIMATES[int(mode)] if math.isfinite(mode) and 0 <= mode < 4 else "?")
         if spark:
             place_of = COLUMN[f"mu_b_{corner}"]
             cells.append(sparkline([float(one[place_of]) for one in rows], spark, 0.05))
-        table.add_row(*(cell.replace("nan", "–") for cell in cells))
+        table.add_row(*cells)
     return table
 
 
 def _decelerations(rows: Sequence[Row], width: int) -> Iterable[Text]:
     row = rows[-1]
-    demanded, measured = row[COLUMN["decel_demand_total"]], -row[COLUMN["accel_x_road"]]
-    text = f"deceleration {demanded:.2f} demanded, {measured:.2f} measured m/s²"
-    yield Text(text if width >= MEDIUM else f"{demanded:.2f}→{measured:.2f} m/s²")
+    demanded, measured = number(row[COLUMN["decel_demand_total"]], 2), number(-row[COLUMN["accel_x_road"]], 2)
+    text = f"deceleration {demanded} demanded, {measured} measured m/s²"
+    yield Text(text if width >= MEDIUM else f"decel {demanded}→{measured} m/s²")
     room = width - 10
-    if room >= 20:
-        for name, sign, label in (
-            ("decel_demand_total", 1.0, "demanded"),
-            ("accel_x_road", -1.0, "measured"),
-        ):
-            line = sparkline([sign * float(one[COLUMN[name]]) for one in rows], room, 1.0)
-            yield Text(f"{label:9} {line}", no_wrap=True, overflow="crop")
+    demands = [float(one[COLUMN["decel_demand_total"]]) for one in rows]
+    measurements = [-float(one[COLUMN["accel_x_road"]]) for one in rows]
+    yield Text(f"demanded  {sparkline(demands, room, 1.0, measurements)}", no_wrap=True, overflow="crop")
+    yield Text(f"measured  {sparkline(measurements, room, 1.0, demands)}", no_wrap=True, overflow="crop")
 
 
 def _faults(row: Row) -> Text:
@@ -149,14 +151,15 @@ def _faults(row: Row) -> Text:
 def _lateness(watcher: Watcher, width: int, height: int) -> Iterable[Text]:
     counts = watcher.history.lateness
     total = int(counts.sum())
-    yield Text(
-        f"{watcher.history.cycles} cycles, periods missed: {watcher.history.missed}; late, of {total} seen:",
-        no_wrap=True,
-        overflow="ellipsis",
-    )
-    if height < 30:
-        return
     labels = [f"≤ {edge} µs" for edge in LATENESS_US] + ["later"]
+    cycles = f"{watcher.history.cycles} cycles, periods missed: {watcher.history.missed}"
+    yield Text(cycles, no_wrap=True, overflow="ellipsis")
+    if height < 30:
+        most = labels[int(np.searchsorted(np.cumsum(counts), 0.99 * total))]
+        worst = labels[int(np.flatnonzero(counts)[-1])]
+        yield Text(f"late: 99 % {most}, worst {worst}", no_wrap=True, overflow="ellipsis")
+        return
+    yield Text(f"late, of {total} seen:")
     room = max(5, min(60, width - 26))
     for label, count in zip(labels, counts.tolist(), strict=True):
         if count:
@@ -165,7 +168,7 @@ def _lateness(watcher: Watcher, width: int, height: int) -> Iterable[Text]:
 
 
 def _events(watcher: Watcher, room: int) -> Iterable[Text]:
-    for event in list(watcher.history.events)[-room:]:
+    for event in list(watcher.history.events)[-room:] if room > 0 else ():
         when = time.strftime("%H:%M:%S", time.localtime(event.clock))
         style = "yellow" if event.serious else ""
         yield Text(f"{when} {event.text}", style, no_wrap=True, overflow="ellipsis")

@@ -45,6 +45,20 @@ def test_the_line_of_json(watched):
     assert said["clock"] == 1_800_000_000.03
 
 
+def test_what_is_not_available_and_who_is_silent(loop):
+    one = loop()
+    one.cycle["speaks"] = 0
+    one.publish(4, mode=2, vehicle_speed=np.nan, accel_x_road=0.001, decel_demand_total=-0.0, mu_b=np.nan)
+    watcher = Watcher(None)
+    watcher.turn()
+    line = text_line(watcher)
+    assert "active (silent standby) – m/s decel 0.00→0.00 m/s² mu –±" in line
+    assert "nan" not in line
+    said = json_line(watcher)
+    assert '"speaks": 0, ' in said
+    assert '"vehicle_speed": null' in said
+
+
 def test_without_a_daemon(rings):
     watcher = Watcher(None)
     watcher.turn()

@@ -54,6 +54,31 @@ def test_it_fits_any_terminal(watched, width, height):
     assert ("93" in page) == (width >= 64)
 
 
+@pytest.mark.parametrize("width", [40, 80])
+def test_a_long_note_leaves_the_keys_in_sight(watched, width):
+    note = "24 s kept in out/watch/2026-11-22T20-07-29Z; next: brake-ecu replay " + "out/" * 20
+    for number in range(30):
+        watched.history.tell(f"event {number}")
+    lines = draw(watched, width, 24, note=note)
+    assert len(lines) <= 24
+    assert lines[-1].startswith("q quit")
+    assert "event 29" in "\n".join(lines)
+
+
+def test_both_decelerations_have_one_scale(watched):
+    """3 m/s² were demanded, none was reached."""
+    demanded, measured = (line[-1] for line in draw(watched, 80, 40) if line[:8] in ("demanded", "measured"))
+    assert (demanded, measured) == ("█", "▁")
+
+
+def test_what_is_not_available_is_a_dash(loop):
+    one = loop()
+    one.publish(4, vehicle_speed=math.nan, accel_x_road=math.nan, mu_b=math.nan, pad_wear=math.nan)
+    watcher = Watcher(None)
+    watcher.turn()
+    assert "nan" not in "\n".join(draw(watcher, 120, 40))
+
+
 def test_it_scrolls_back(watched):
     page = "\n".join(draw(watched, 80, 40, back_s=5.0, paused=True))
     assert "READY  20.0 m/s" in page
