@@ -39,6 +39,7 @@ def test_replay_gives_what_the_command_writes(drive: Simulation, result: Result,
 
 
 def test_nothing_is_printed(drive: Simulation, capfd: pytest.CaptureFixture[str]) -> None:
+    simulate(Path(__file__).parents[2] / "config/scenarios/stop-1.toml", config="suv")
     notes = replay(drive.log, config="suv").notes
     assert "never received: WheelForceFront" in notes[0]
     said = capfd.readouterr()

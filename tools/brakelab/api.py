@@ -196,7 +196,7 @@ def simulate(
     folder = TemporaryDirectory(prefix="brake-ecu-") if out is None else None
     written = Path(folder.name, path.stem) if folder else Path(out or "")
     with _changed(config, changes) as car:
-        run_scenario(path, car, written, seed, draw)
+        run_scenario(path, car, written, seed, draw, told=False)
     return Simulation(written, folder)
 
 

@@ -40,10 +40,13 @@ def write_columns(
             writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
 
 
-def simulate(scenario: Path, config: Path, out: Path, seed: int = 0, draw: str | None = None) -> int:
+def simulate(
+    scenario: Path, config: Path, out: Path, seed: int = 0, draw: str | None = None, told: bool = True
+) -> int:
     """Run a scenario with the ECU of `config`, armed; write OUT.log, OUT.parquet, OUT.truth.parquet.
 
-    `draw`: width of the car's draw, see `Scenario.draw`; None: that of the scenario.
+    `draw`: width of the car's draw, see `Scenario.draw`; None: that of the scenario. `told`: False for use
+    from Python, where nothing is printed.
 
     Raises:
         UserError: a file cannot be read, is wrong, or cannot be written.
@@ -62,7 +65,7 @@ def simulate(scenario: Path, config: Path, out: Path, seed: int = 0, draw: str |
     decoded: list[NDArray[np.float64]] = []
     true: list[NDArray[np.float64]] = []
     frames = 0
-    with progress_bar("simulate", None):
+    with progress_bar("simulate", None, told):
         loop = new_loop(driven, load_config(config), seed)
         try:
             out.parent.mkdir(parents=True, exist_ok=True)
@@ -78,7 +81,8 @@ def simulate(scenario: Path, config: Path, out: Path, seed: int = 0, draw: str |
         except OSError as error:
             remedy = f"cannot be written ({error.strerror}); choose another --out"
             raise UserError(str(out), "", remedy) from None
-    give(seconds=float(t[-1]), frames=frames)
-    again = f"brake-ecu replay {log} --config {command_name(config)} --out {out}.result.parquet"
-    wrote(log, inputs, truth, next=again)
+    if told:
+        give(seconds=float(t[-1]), frames=frames)
+        again = f"brake-ecu replay {log} --config {command_name(config)} --out {out}.result.parquet"
+        wrote(log, inputs, truth, next=again)
     return 0
