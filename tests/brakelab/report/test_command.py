@@ -211,3 +211,12 @@ def test_an_input_is_never_overwritten(drive_files: Files, name: str) -> None:
     with pytest.raises(UserError, match=f"^--out: .*would overwrite {drive_files[name]}"):
         report(drive_files["result"], drive_files["truth"], drive_files[name])
     assert drive_files[name].read_bytes() == before
+
+
+def test_friction_that_nobody_knows_is_one_dash(drive_files: Files) -> None:
+    for corner in ("fl", "fr"):
+        unknown = np.full(pq.read_table(drive_files["result"]).num_rows, np.nan)
+        change(drive_files["result"], column(f"mu_b_{corner}", unknown))
+    shown = visible(written(drive_files, truth=False, timing=False))
+    assert "Friction front, ±2σ – nothing is known" in shown
+    assert "Friction rear, ±2σ 0." in shown

@@ -108,13 +108,16 @@ def _friction(drive: Drive, accuracy: dict[str, Accuracy] | None) -> list[Tile]:
     shown = []
     for axle, wheels in AXLES.items():
         last, band = _last(mu[:, wheels]), 2.0 * _last(sigma[:, wheels])
-        note = "at the end of the drive" if np.isfinite(last) else "no calliper pressure, nothing to tell"
+        told = bool(np.isfinite(last))
+        note = "at the end of the drive" if told else "nothing is known"
         warns = False
-        if accuracy is not None:
+        if accuracy is not None and told:
             row = accuracy[axle]
             note = f"nRMSE {percent(row.nrmse, 1)} %, truth inside ±2σ {percent(row.inside, 0)} %"
             warns = row.inside < _HONEST_SHARE
-        shown.append(Tile(f"Friction {axle}, ±2σ", fixed(last, 3), f"± {fixed(band, 3)}", note, warns))
+        shown.append(
+            Tile(f"Friction {axle}, ±2σ", fixed(last, 3), f"± {fixed(band, 3)}" if told else "", note, warns)
+        )
     return shown
 
 
