@@ -56,7 +56,7 @@ def test_the_means_are_those_of_the_recording(lining: Lining, columns: Columns) 
             ],
         }
     )
-    recording, means = run_sequence(new_bench(lining, "A", 2), sequence, columns, lambda done, of: None)
+    recording, means = run_sequence(new_bench(lining, "A", 2), sequence, columns, lambda share: None)
     whole = find_stops(recording, columns, "short")
     assert [len(each.mu) for each in means] == [4, 2]
     assert np.concatenate([each.mu for each in means]) == pytest.approx(whole.mean)

@@ -33,7 +33,7 @@ def ams() -> Stops:
     lining = linings().lining["A"]
     bench = new_bench(lining, "A", 1)
     programme = load_programme(resource("config/rig/ams.toml"))
-    recording = run_programme(bench, programme, lambda done, of: None)
+    recording = run_programme(bench, programme, lambda share: None)
     rig = bench.rig[0]
     return find_stops(recording, Columns.own(lining, float(rig["mass"] * rig["tyre_radius"] ** 2)), "ams")
 

@@ -1,6 +1,5 @@
 """`brake-ecu lab` and `brake-ecu identify friction`."""
 
-import time
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -33,6 +32,7 @@ from brakelab.friction_lab.tables import (
 from brakelab.plant.description import PlantFileError, read_file
 from brakelab.plant.dynamometer_programme import load_programme
 from brakelab.plant.linings import Lining, Linings
+from brakelab.results.progress import progress_bar
 from brakelab.results.text_table import show
 from ecu.errors import UserError
 from ecu.output import give, say
@@ -66,23 +66,17 @@ def run(
     if law is not None and law not in lining.friction:
         raise UserError("--law", law, f"no such law; choose one of {', '.join(lining.friction)}")
     bench = new_bench(lining, brake, seed, law=law or "")
-    last = time.monotonic()
-
-    def progress(done: int, of: int) -> None:
-        nonlocal last
-        if time.monotonic() - last > 1.0 or done == of:
-            last = time.monotonic()
-            say(f"{done} of {of} stops")
-
     path = named(programme, "config/rig")
     rig = bench.rig[0]
     inertia = float(rig["mass"] * rig["tyre_radius"] ** 2)
     if has_sections(path):
         sequence = load_sequence(path)
-        recording, means = run_sequence(bench, sequence, Columns.own(lining, inertia), progress)
+        with progress_bar("lab run", 1.0) as advance:
+            recording, means = run_sequence(bench, sequence, Columns.own(lining, inertia), advance)
         show(Console(), means_table(f"{sequence.title}, {brake}", means))
     else:
-        recording = run_programme(bench, load_programme(path), progress)
+        with progress_bar("lab run", 1.0) as advance:
+            recording = run_programme(bench, load_programme(path), advance)
     beside = write_recording(out, recording, lining, inertia)
     hours, minutes = bench.time / 3600.0, recording.time.size / 200.0 / 60.0
     say(f"{hours:.1f} h on the rig, {minutes:.0f} min recorded: {out}, {beside}")

@@ -142,11 +142,11 @@ def lagged(values: np.ndarray, dt: float, constant: float) -> np.ndarray:
     return out
 
 
-def run_programme(bench: Bench, programme: Programme, progress: Callable[[int, int], None]) -> Recording:
-    """Return the recording of a programme, temperatures outermost; `progress(done, of)` after each stop."""
+def run_programme(bench: Bench, programme: Programme, advance: Callable[[float], None]) -> Recording:
+    """Return the recording of a programme, temperatures outermost; `advance` hears the share of each stop."""
     parts = []
     stops = list(product(programme.temperature, programme.speed, programme.level))
-    for done, (wanted, speed, level) in enumerate(stops, 1):
+    for wanted, speed, level in stops:
         bench.bring_to(programme.gate, wanted)
         start, end = KMH * speed, KMH * programme.end_speed
         if programme.control == "pressure":
@@ -154,7 +154,7 @@ def run_programme(bench: Bench, programme: Programme, progress: Callable[[int, i
         else:
             stop = new_stop(DECELERATION, start, end, bench.temperature, deceleration=level)
         parts.append(bench.measure(stop))
-        progress(done, len(stops))
+        advance(1.0 / len(stops))
     return joined(parts)
 
 

@@ -72,9 +72,9 @@ def load_sequence(path: Path) -> Sequence:
 
 
 def run_sequence(
-    bench: Bench, sequence: Sequence, columns: Columns, progress: Callable[[int, int], None]
+    bench: Bench, sequence: Sequence, columns: Columns, advance: Callable[[float], None]
 ) -> tuple[Recording, list[Means]]:
-    """Return the recording of a programme and its means; `progress(done, of)` after each application."""
+    """Return the recording of a programme and its means; `advance` hears the share of each stop."""
     parts: list[Recording] = []
     means = []
     total = sum(len(section.each()) for section in sequence.section)
@@ -88,7 +88,7 @@ def run_sequence(
             else:
                 stop = new_stop(DECELERATION, start, end, bench.temperature, deceleration=level)
             parts.append(bench.measure(stop))
-            progress(len(parts), total)
+            advance(1.0 / total)
         means.append(_means(section, parts[begin:], columns))
     return joined(parts), means
 

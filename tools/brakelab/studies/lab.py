@@ -89,7 +89,7 @@ def columns_of(lining: Lining, law: str = "SIM") -> Columns:
 def run(bench: Bench, programme: str, columns: Columns) -> Stops:
     """Return the stops of a shipped programme on a bench."""
     found = load_programme(resource(f"config/rig/{programme}.toml"))
-    return find_stops(run_programme(bench, found, lambda done, of: None), columns, programme)
+    return find_stops(run_programme(bench, found, lambda share: None), columns, programme)
 
 
 def measure(brake: str, progress: Callable[[str], None], seed: int = SEED) -> Brake:

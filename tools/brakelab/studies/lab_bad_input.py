@@ -110,7 +110,7 @@ def answers() -> list[Answer]:
     inertia = columns_of(lining).rig.inertia
     assert inertia is not None
     programme = load_programme(resource("config/rig/ams.toml"))
-    recording = run_programme(new_bench(lining, "A", SEED), programme, lambda done, of: None)
+    recording = run_programme(new_bench(lining, "A", SEED), programme, lambda share: None)
     found = []
     for what, spoil in CASES.items():
         with TemporaryDirectory() as name:

@@ -55,7 +55,7 @@ def pad_terms(brake: str) -> PadTerms:
     """Return the terms found in CPC of a drawn pad."""
     lining = linings().lining[brake]
     programme = load_programme(resource("config/rig/cpc.toml"))
-    recording = run_programme(new_bench(lining, brake, SEED), programme, lambda done, of: None)
+    recording = run_programme(new_bench(lining, brake, SEED), programme, lambda share: None)
     found = sparse(library(find_stops(recording, columns_of(lining), "cpc")))
     return PadTerms(brake, found.terms, found.error)
 
