@@ -17,7 +17,7 @@ from typing import Final, NamedTuple, TypeGuard
 
 import numpy as np
 
-from brakelab.log_physics.line import RATE, Fit, Vector, fit
+from brakelab.log_physics.line import MOVING, RATE, Fit, Vector, fit
 from brakelab.log_physics.pressures import pressure_lines
 from brakelab.log_physics.samples import SAMPLED, Car, Drive, Rows
 from ecu.bus.units import CONVERSIONS
@@ -25,7 +25,6 @@ from ecu.contract.params import GRAVITY
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CORNERS, INPUT_SIGNALS
 
-MOVING: Final = 3.0  # m/s
 LEAST_ROWS: Final = int(8 * RATE)
 CLEAN: Final = 0.93  # correlation from which a slope is a scale
 SIGNED: Final = 0.6  # from which it has a sign

@@ -10,6 +10,8 @@ Vector = NDArray[np.float64]
 RATE: Final = 50.0  # Hz, of the common grid
 SMOOTH_S: Final = 0.4
 LAGS: Final = range(-10, 11)  # grid steps
+MOVING: Final = 3.0  # m/s, from which a car drives
+BRAKING: Final = 0.7  # m/s^2, from which it is its brakes that slow it
 
 
 class Fit(NamedTuple):

@@ -10,11 +10,10 @@ from typing import Final
 
 import numpy as np
 
-from brakelab.log_physics.line import RATE, Vector, fit
+from brakelab.log_physics.line import BRAKING, RATE, Vector, fit
 from brakelab.log_physics.samples import Car, Drive, Rows
 from ecu.bus.units import CONVERSIONS
 
-BRAKING: Final = 0.7  # m/s^2
 LEAST_ROWS: Final = int(2 * RATE)
 FRICTION: Final = 2.5  # by which friction and mass together may be off
 SIDES: Final = 0.2  # by which the sides of an axle may differ

@@ -5,16 +5,14 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from brakelab.log_physics.line import RATE, Vector, smooth
+from brakelab.log_physics.line import MOVING, RATE, Vector, smooth
 from brakelab.log_physics.samples import ANY_CAR, Car, Rows
 from brakelab.mapping.names import converts, corner_of, score
 from brakelab.mapping.series import Series
 from ecu.bus.units import CONVERSIONS, spelled
 from ecu.contract.signals import CORNERS, INPUT, INPUT_SIGNALS
 
-MOVING: Final = 3.0  # m/s
 STANDING: Final = 0.1  # m/s
-BRAKING: Final = 0.7  # m/s^2
 BRIDGED: Final = 0.5  # s without a sample that a straight line may fill
 PERIODS: Final = 3.0  # likewise, of a sender that is slow
 MARGIN: Final = 0.5  # s beside a gap, that smoothing and delay reach

@@ -16,11 +16,12 @@ left). Once a yaw rate is found it replaces that of the wheels, which their slip
 from collections.abc import Iterable
 from typing import Final
 
+from brakelab.log_physics.line import MOVING
 from brakelab.log_physics.samples import ANY_CAR, Car
 from brakelab.mapping.brakes import brakes, flags
 from brakelab.mapping.candidates import best_of, by_name, unit_of
 from brakelab.mapping.curves import curves
-from brakelab.mapping.motion import MOVING, Found, Motion, contract_unit, motion_of, wheel_speeds
+from brakelab.mapping.motion import Found, Motion, contract_unit, motion_of, wheel_speeds
 from brakelab.mapping.scale import scale_of
 from brakelab.mapping.series import Series
 from ecu.bus.units import CONVERSIONS, spelled
