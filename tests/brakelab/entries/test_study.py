@@ -1,6 +1,7 @@
 """Scoring by entries whose error is known: one that knows nothing, cheats, fails; and by real stops."""
 
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -111,10 +112,15 @@ def _raise(inputs: Inputs) -> None:
     raise ValueError("no idea\nsecond line")
 
 
+def _exit(inputs: Inputs) -> None:
+    sys.exit("enough")
+
+
 @pytest.mark.parametrize(
     ("answer", "line"),
     [
         (_raise, "step raised ValueError: no idea, ordinary, t = 1.00 s"),
+        (_exit, "step raised SystemExit: enough, ordinary, t = 1.00 s"),
         (lambda inputs: None, "no pair of friction and sigma"),
         (lambda inputs: (0.4, 0.01), r"friction of shape \(\), not \(4,\)"),
         (lambda inputs: (TRUE[:2], TRUE), r"friction of shape \(2,\)"),

@@ -62,7 +62,7 @@ def load_class(name: str) -> type[Observer]:
         loaded = _module(module)
     except UserError:
         raise
-    except Exception as error:  # what a stranger's module does while it is imported is its own
+    except (Exception, SystemExit) as error:  # what a stranger's module does while it is imported is its own
         raise UserError(OPTION, name, f"cannot be imported ({type(error).__name__}: {error})") from None
     found = getattr(loaded, wanted, None)
     if not isinstance(found, type):

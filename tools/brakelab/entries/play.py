@@ -35,7 +35,11 @@ class Heard(NamedTuple):
     """After the rows asked for."""
 
 
-def _failed(what: str, error: Exception, where: str) -> EntryError:
+FAILURES = (Exception, SystemExit)
+"""Of an entry, whose failure is its result: it may not end the bench either."""
+
+
+def _failed(what: str, error: BaseException, where: str) -> EntryError:
     return EntryError(f"{what} raised {type(error).__name__}: {str(error).partition(chr(10))[0]}{where}")
 
 
@@ -44,7 +48,7 @@ def new_entry(kind: type[Observer]) -> Observer:
     try:
         with redirect_stdout(sys.stderr):
             return kind()
-    except Exception as error:  # an entry's failure is its result
+    except FAILURES as error:
         raise _failed(kind.__name__, error, "") from None
 
 
@@ -53,7 +57,7 @@ def reset(entry: Observer, config: Config) -> None:
     try:
         with redirect_stdout(sys.stderr):
             entry.reset(config)
-    except Exception as error:  # as above
+    except FAILURES as error:
         raise _failed("reset", error, "") from None
 
 
@@ -107,7 +111,7 @@ def play(entry: Observer, track: Track, asked: Collection[int] = ()) -> Heard:
             began = thread_time_ns()
             try:
                 answer = entry.step(inputs)
-            except Exception as error:  # as above
+            except FAILURES as error:
                 raise _failed("step", error, f", {track.name}, t = {k * PERIOD:.2f} s") from None
             took += thread_time_ns() - began
             mu[k], sigma[k] = _four(answer, f", {track.name}, t = {k * PERIOD:.2f} s")
@@ -116,6 +120,6 @@ def play(entry: Observer, track: Track, asked: Collection[int] = ()) -> Heard:
                     known[k] = _known(entry)
                 except EntryError:
                     raise
-                except Exception as error:  # as above
+                except FAILURES as error:
                     raise _failed("mass, overrun or pressure_zero", error, "") from None
     return Heard(mu, sigma, 1e-3 * took / n, known)
