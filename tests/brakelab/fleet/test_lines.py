@@ -21,6 +21,11 @@ def test_a_line_each_in_percent_without_the_drives_that_do_not_tell() -> None:
     np.testing.assert_allclose(found[1]["x"], [2])
 
 
+def test_there_is_no_half_a_drive() -> None:
+    assert lines_of_vehicles([drive("a", 0.01)], QUANTITIES[2]).xaxis[0].ticker.interval == 1
+    assert lines_of_vehicles([drive("a", 0.01)] * 90, QUANTITIES[2]).xaxis[0].ticker.interval == 6
+
+
 def test_lines_of_all_vehicles_differ() -> None:
     done = [drive(f"{k}", 0.01) for k in range(FEW)]
     plot = lines_of_vehicles(done, QUANTITIES[2])

@@ -1,9 +1,11 @@
 """Fleet page, few vehicles: each quantity over the drives, a line per vehicle."""
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
+from bokeh.models import SingleIntervalTicker
 
 from brakelab.fleet.statistics import Quantity, Summary, values_of
 from brakelab.report.look import INK, STAGE_COLOURS, new_figure
@@ -28,4 +30,6 @@ def lines_of_vehicles(done: Sequence[Summary], quantity: Quantity) -> Any:
         colour, dash = _COLOURS[place % len(_COLOURS)], _DASHES[place // len(_COLOURS)]
         plot.line(number, mine[known], line_color=colour, line_dash=dash, legend_label=vehicle)
         plot.scatter(number, mine[known], size=5, line_color=colour, fill_color=colour, legend_label=vehicle)
+    longest = max(Counter(owners).values(), default=1)
+    plot.xaxis.ticker = SingleIntervalTicker(interval=max(1, -(-longest // 15)), num_minor_ticks=0)
     return plot

@@ -77,13 +77,14 @@ def _tiles(done: Sequence[Summary], good: Sequence[Summary], vehicles: Vehicles)
     brakings = sum(row["brakings"] for row in good)
     taught = sum(row["learned"] for row in good)
     faults = len(done) - len(good)
+    counted = "1 vehicle" if len(vehicles.names) == 1 else f"{len(vehicles.names)} vehicles"
     tiles = [
         Tile("Drives done", f"{len(good)}", f"of {len(done)}", f"{faults} failed", faults > 0),
         Tile(
             "Driven",
             f"{metres / 1000.0:.0f}",
             "km",
-            f"{hours / 3600.0:.1f} h, {len(vehicles.names)} vehicles",
+            f"{hours / 3600.0:.1f} h, {counted}",
         ),
         Tile("Brakings", f"{brakings}", "", f"{taught} of them taught friction", brakings > 0 == taught),
     ]
