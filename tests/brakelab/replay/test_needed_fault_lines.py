@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from brakelab.logs.signal_file import freshness_at_any_rate
-from brakelab.replay.needed import fault_lines, needed_lines, request_line
+from brakelab.replay.needed import fault_lines, needed_lines, request_line, transducer_line
 from brakelab.replay.quality import Findings
 from ecu.contract.faults import PEDAL_LOST, PRESSURE_LOST, WHEEL_SPEED_LOST
 from ecu.contract.signals import CORNERS, INPUT
@@ -58,3 +58,13 @@ def test_a_car_without_a_demand_is_told_so(names: list[str], told: int) -> None:
     lines = request_line(came(*names))
     assert len(lines) == told
     assert all("not mapped; nothing is demanded" in line for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("observer", "names", "told"),
+    [("observer1", ["accel_x"], 1), ("observer1", ["wheel_force_x_fl"], 0), ("observer2", ["accel_x"], 0)],
+)
+def test_observer_1_without_wheel_transducers_is_told_to_be_observer_2(observer, names, told) -> None:
+    lines = transducer_line(came(*names), observer)
+    assert len(lines) == told
+    assert all(line.startswith("d.log: wheel_force_x_*: no sample for observer1") for line in lines)

@@ -19,7 +19,7 @@ from brakelab.fleet.summary import DriveBook
 from brakelab.fleet.wear import register_pads, wear_summary
 from brakelab.replay.drive import replay_drive
 from brakelab.replay.log import log_hash
-from brakelab.replay.needed import NEEDED, fault_lines, needed_lines, nothing_usable
+from brakelab.replay.needed import NEEDED, fault_lines, needed_lines, nothing_usable, transducer_line
 from brakelab.replay.quality import Findings, quality_lines
 from brakelab.results.car import KEY as CAR
 from brakelab.results.car import car_of
@@ -97,7 +97,10 @@ def _replay(job: Job, paths: Sequence[Path]) -> tuple[Outcome, pa.Table]:
     notes = [
         line
         for found in findings
-        for line in (*quality_lines(found, job.source.plan), *needed_lines(found), *fault_lines(found))
+        for line in (
+            *(*quality_lines(found, job.source.plan), *needed_lines(found)),
+            *(*transducer_line(found, job.config.observer.kind), *fault_lines(found)),
+        )
     ]
     summary = provenance(job) | book.summary(findings)
     summary |= wear_summary(params, after, job.config, book.last, book.brakes.rows)

@@ -21,6 +21,7 @@ from brakelab.replay.needed import (
     needed_lines,
     nothing_usable,
     request_line,
+    transducer_line,
 )
 from brakelab.replay.quality import Findings, quality_counts, quality_lines
 from brakelab.replay.source import check_map, load_source, radius_line
@@ -149,7 +150,7 @@ def replay_into(
     if state and learned is not None and learned.tobytes() != before:
         with closing(open_store(state)) as store:
             save(store, store_key(vehicle), learned)
-    notes += _notes(findings, source.plan)
+    notes += _notes(findings, source.plan, vehicle.observer.kind)
     return Replayed(writer, findings, notes, params[0]["mu_nominal"])
 
 
@@ -176,12 +177,12 @@ def _restore(state: Path | None, vehicle: Config, params: RecordArray) -> Record
     return found[1] if found else None
 
 
-def _notes(findings: Sequence[Findings], plan: ReceivePlan) -> list[str]:
+def _notes(findings: Sequence[Findings], plan: ReceivePlan, observer: str) -> list[str]:
     lines: list[str] = []
     for found in findings:
         about = (
             *(quality_lines(found, plan), needed_lines(found), request_line(found)),
-            *(lacking_line(found), fault_lines(found)),
+            *(transducer_line(found, observer), lacking_line(found), fault_lines(found)),
         )
         judged = (f"{found.path}: {line}" for line in found.physics.lines)
         lines += chain(*about, judged)

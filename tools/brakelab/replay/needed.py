@@ -22,6 +22,7 @@ from ecu.contract.signals import (
     PEDAL_POSITION,
     STEERING_ANGLE,
     VEHICLE_SPEED,
+    WHEEL_FORCE_X,
     WHEEL_SPEED,
     YAW_RATE,
 )
@@ -110,6 +111,15 @@ def lacking_line(found: Findings) -> list[str]:
         if not found.freshness["taken"][list(group.places)].any()
     ]
     return [f"{found.path}: without {'; '.join(lacking)}"] if lacking else []
+
+
+def transducer_line(found: Findings, observer: str) -> list[str]:
+    """Return the line for `observer` 1 on a log without wheel transducers: it works as Observer 2."""
+    places = slice(WHEEL_FORCE_X, WHEEL_FORCE_X + len(CORNERS))
+    if observer != "observer1" or found.freshness is None or found.freshness["taken"][places].any():
+        return []
+    remedy = "the forces are virtual, as of observer2; give the wheel transducers, or take observer2"
+    return [f"{found.path}: wheel_force_x_*: no sample for observer1; {remedy}"]
 
 
 def nothing_usable(logs: Sequence[Findings]) -> bool:
