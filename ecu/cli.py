@@ -41,7 +41,7 @@ from ecu.arguments import (
 from ecu.cli_config import app as config_app
 from ecu.cli_watch import app as watch_app
 from ecu.completion import known
-from ecu.errors import RunFault, UserError
+from ecu.errors import Mistakes, RunFault, UserError
 from ecu.output import LOG_FORMATS, Level, fault, give, log_as, new_policy, policy, print_given
 
 LABORATORY = ("bokeh", "jinja2", "pyarrow", "pymoo", "scipy")
@@ -250,7 +250,10 @@ def main(arguments: list[str] | None = None) -> int:
             line, code = _describe(error)
             line = " ".join(line.split())
             give(error=line)
-            fault(f"brake-ecu: {line}")
+            if isinstance(error, Mistakes):
+                give(mistakes=error.lines)
+            for each in error.lines if isinstance(error, Mistakes) else [line]:
+                fault(f"brake-ecu: {each}")
         if asked.json and asked.given:
             print_given()
         return code

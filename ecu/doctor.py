@@ -64,7 +64,7 @@ def doctor(config: Path | None, map: Path | None, interface: str | None, channel
     """
     if (interface is None) != (channel is None):
         raise UserError("doctor", "-i, -c", "give both or none")
-    plan = receive_plan(map)
+    plan = receive_plan(map, say)
     with compiling_told():
         checks = [*machine(), kernels(config, plan)]
     if interface is not None and channel is not None:

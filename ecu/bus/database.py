@@ -2,14 +2,15 @@
 
 import re
 import xml.etree.ElementTree as ET
+from collections.abc import Collection
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
-import cantools
 from cantools.database import Database, Message
 
 from ecu.bus.bits import first_bit
-from ecu.errors import UserError, closest
+from ecu.bus.database_mistakes import Mistake, near, parse
+from ecu.errors import Mistakes, UserError, closest
 
 LONGEST_PAYLOAD: Final = 64  # bytes, CAN FD
 SHOWN: Final = 6  # suggested names
@@ -17,8 +18,6 @@ KINDS: Final = ".dbc, .arxml, .kcd, .sym"
 BEGINNING: Final = {"0", "7"}  # start position of a PDU that begins with its frame, little- and big-endian
 
 _SYNTAX = re.compile(r'Invalid syntax at line (\d+), column (\d+): "(.*?)"{1,2}$', re.DOTALL)
-_OVERLAP = re.compile(r"The signals (\S+) and (\S+) are overlapping in message (\S+?)\.?\"?$")
-_OUTSIDE = re.compile(r"The signal (\S+) does not fit in message (\S+?)\.?\"?$")
 _XML = re.compile(r"([a-z (),-]+): line (\d+), column (\d+)\W*$")
 
 
@@ -26,18 +25,8 @@ def _refusal(path: Path, error: Exception) -> UserError:
     text = str(error)
     if found := _SYNTAX.search(text):
         line, column, source = found.groups()
-        around = source.partition(">>!<<")
-        near = f"{around[0][-20:]}»{around[2][:30]}".strip()
-        remedy = f"syntax not understood at » in: {near}; mend that line"
+        remedy = f"syntax not understood at » in: {near(source)}; mend that line"
         return UserError(str(path), f"line {line}, column {column}", remedy)
-    if found := _OVERLAP.search(text):
-        first, second, message = found.groups()
-        remedy = f"overlaps {second}; if that is meant, set strict = false in the map"
-        return UserError(str(path), f"{message}.{first}", remedy)
-    if found := _OUTSIDE.search(text):
-        signal, message = found.groups()
-        remedy = "does not fit its message; if it is not used, set strict = false in the map"
-        return UserError(str(path), f"{message}.{signal}", remedy)
     if found := _XML.search(text):
         what, line, column = found.groups()
         remedy = f"no XML from there on ({what.strip()}); the file is cut off or damaged, export it again"
@@ -52,19 +41,62 @@ def _refusal(path: Path, error: Exception) -> UserError:
     return UserError(str(path), "", f"not a database that can be read ({reason})")
 
 
+class Readable(NamedTuple):
+    """A database, as far as it can be read."""
+
+    database: Database
+    mistakes: list[Mistake]
+
+    def refuse(self, path: Path, strict: bool, used: Collection[str] | None = None) -> None:
+        """Raise every mistake that spoils one of the messages `used`, None: any of the database.
+
+        `strict` refuses overlapping and misplaced signals too.
+        """
+        findings = [
+            (mistake.place, mistake.remedy)
+            for mistake in self.mistakes
+            if (strict or not mistake.tolerable)
+            and (used is None or mistake.message in used)
+            and mistake.message
+        ]
+        if findings:
+            raise Mistakes(str(path), findings)
+
+    def left_out(self, path: Path, used: Collection[str]) -> str:
+        """Return a line on the mistakes elsewhere than in the messages `used`, empty: there are none."""
+        others = [mistake for mistake in self.mistakes if mistake.message not in used]
+        if not others:
+            return ""
+        first = f"{others[0].place}: {others[0].remedy.partition(';')[0]}"
+        spoilt = dict.fromkeys(mistake.message for mistake in others if mistake.message)
+        told = f"{len(spoilt)} message{'s' if len(spoilt) > 1 else ''} left out, which the map does not use"
+        more = f" (and {len(others) - 1} more)" if len(others) > 1 else ""
+        return f"{path}: {first}{more}; {told if spoilt else 'only a comment is lost'}"
+
+
 def load_database(path: Path, strict: bool = True) -> Database:
     """Return the database at `path`; `strict` refuses overlapping and misplaced signals.
 
-    Raises UserError naming line and column, or message and signal.
+    Raises UserError naming line and column, or message and signal, of every mistake at once.
     """
+    readable = read_database(path)
+    readable.refuse(path, strict)
+    return readable.database
+
+
+def read_database(path: Path) -> Readable:
+    """Return the database at `path` and its mistakes. Raises UserError for a file that cannot be read."""
     if not path.is_file():
         raise UserError(str(path), "", f"no such file; give the path of a database ({KINDS})")
     if path.stat().st_size == 0:
         raise UserError(str(path), "", f"the file is empty; give a database ({KINDS})")
+    mistakes: list[Mistake] = []
     try:
-        database = cantools.database.load_file(path, strict=strict)
+        database = parse(path, mistakes)
     except Exception as error:  # cantools' parsers raise errors of many kinds
-        raise _refusal(path, error) from None
+        last = _refusal(path, error)
+        before = [(mistake.place, mistake.remedy) for mistake in mistakes]
+        raise Mistakes(str(path), [*before, (last.place, last.remedy)]) from None
     if not isinstance(database, Database):
         raise UserError(str(path), "", "a diagnostics database; give one that describes CAN messages")
     if not database.messages:
@@ -72,7 +104,7 @@ def load_database(path: Path, strict: bool = True) -> Database:
         raise UserError(str(path), "", f"{where} in it; give the database of a CAN bus")
     if path.suffix.lower() == ".arxml":
         _check_pdus(path)
-    return database
+    return Readable(database, mistakes)
 
 
 def _check_pdus(path: Path) -> None:

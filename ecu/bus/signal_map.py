@@ -4,6 +4,7 @@ A map is a TOML file; `docs/signal-maps.md` explains it with an example. A value
 ((raw as the database scales it) · factor + offset) in `unit`, and that is converted to the contract's unit.
 """
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -11,7 +12,7 @@ from cantools.database import Database, Message
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ecu.bus import e2e
-from ecu.bus.database import find_message, find_signal, load_database
+from ecu.bus.database import find_message, find_signal, read_database
 from ecu.bus.freshness import input_freshness
 from ecu.bus.plan import SignalUse
 from ecu.bus.receive import MessageUse, ReceivePlan, compile_receive, contract_receive_plan
@@ -97,7 +98,7 @@ class SignalMap(_Table):
     database: str
     """Path, relative to the map file."""
     strict: bool = True
-    """Refuse a database whose signals overlap."""
+    """Refuse used messages whose signals overlap."""
     bus: str | None = None
     """Interface name in logs that hold several buses; without it every bus."""
     rolling_radius: Annotated[float, Field(gt=0.1, lt=2.0), Unit("m")] | None = None
@@ -116,6 +117,8 @@ class MappedBus(NamedTuple):
     plan: ReceivePlan
     bus: str | None
     """Interface that the frames are taken from; None: every one."""
+    left_out: str
+    """A line on mistakes in messages of the database that the map does not use; empty: there are none."""
 
 
 def read_signal_map(path: Path) -> SignalMap:
@@ -134,27 +137,34 @@ def load_signal_map(path: Path) -> MappedBus:
     """Return the plan that a map file describes; raises UserError that names file, key and remedy."""
     signal_map = read_signal_map(path)
     database_path = path.parent / signal_map.database
-    database = load_database(database_path, signal_map.strict)
+    readable = read_database(database_path)
     _check_names(path, signal_map)
     names = list(dict.fromkeys(mapped.message for mapped in signal_map.inputs.values()))
-    uses = [_message_use(path, database_path, signal_map, database, name) for name in names]
+    readable.refuse(database_path, signal_map.strict, names)
+    uses = [_message_use(path, database_path, signal_map, readable.database, name) for name in names]
     periods = {signal.place: (use.period_s, use.slowest_s) for use in uses for signal in use.signals}
     timeouts = {
         INPUT[name]: mapped.timeout
         for name, mapped in signal_map.inputs.items()
         if mapped.timeout is not None
     }
-    return MappedBus(compile_receive(uses, input_freshness(periods, timeouts)), signal_map.bus)
+    plan = compile_receive(uses, input_freshness(periods, timeouts))
+    return MappedBus(plan, signal_map.bus, readable.left_out(database_path, names))
 
 
-def receive_plan(map_file: Path | None) -> ReceivePlan:
+def receive_plan(map_file: Path | None, tell: Callable[[str], None] = lambda line: None) -> ReceivePlan:
     """Return the receive plan of the bus: the contract's frames, or those of a signal map.
+
+    `tell` is given a line on what is wrong elsewhere in the map's database.
 
     Raises UserError for a map or a database that is not usable.
     """
     if map_file is None:
         return contract_receive_plan(resource("dbc/brake_ecu.dbc"))
-    return load_signal_map(map_file).plan
+    mapped = load_signal_map(map_file)
+    if mapped.left_out:
+        tell(mapped.left_out)
+    return mapped.plan
 
 
 def _check_names(path: Path, signal_map: SignalMap) -> None:

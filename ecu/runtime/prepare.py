@@ -114,11 +114,12 @@ def prepare(options: RunOptions) -> Session:
     config = load_config(options.config)
     if options.armed:
         config = config.model_copy(update={"transmit": True})
-    receiving = receive_plan(options.map)
+    log = structlog.get_logger("ecu")
+    receiving = receive_plan(options.map, lambda line: log.warning("database", left_out=line))
     sending = contract_transmit_plan(resource("dbc/brake_ecu.dbc"), "BrakeEcu")
     params = new_params(config)
     description = _describe(options, config)
-    structlog.get_logger("ecu").debug(
+    log.debug(
         "read",
         **{key: description[key] for key in ("name", "config", "config_hash", "map", "versions")},
         observer=config.observer.kind,

@@ -26,7 +26,7 @@ from brakelab.replay.log import log_size
 from brakelab.replay.quality import Findings, damage_lines
 from brakelab.results.console import WIDTH
 from brakelab.results.progress import progress_bar
-from ecu.bus.database import load_database
+from ecu.bus.database import read_database
 from ecu.bus.signal_map import load_signal_map
 from ecu.contract.signals import INPUT, INPUT_SIGNALS, without_corner
 from ecu.errors import UserError
@@ -61,7 +61,7 @@ def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) 
         return _suggest_columns(log, out, car)
     if dbc is None:
         raise UserError("--dbc", "", f"missing; {log} holds frames: give the database of this car")
-    database, strict = _load(dbc)
+    database, overlapping = _load(dbc)
     findings = Findings(log)
     interfaces = findings.interfaces
     with progress_bar("map suggest", log_size(log)) as advance:
@@ -86,6 +86,7 @@ def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) 
             hints = [f"{name} follows the deceleration: {remedy}"]
     if not any(one.target.startswith("motor_torque") for one in found):
         found += motors(here, wheel_speeds(series), motion)
+    strict = not any(one.series.message in overlapping for one in found)
     text = map_text(found, here, (out or Path("map.toml")), dbc, strict, interfaces, bus, hints, car)
     _show(found, drives)
     for line in hints + _warnings(found):
@@ -158,13 +159,18 @@ def _written(text: str, out: Path | None) -> Path | None:
     return out
 
 
-def _load(dbc: Path) -> tuple[Database, bool]:
-    try:
-        return load_database(dbc), True
-    except UserError as error:
-        if "strict = false" not in str(error):
-            raise
-        return load_database(dbc, strict=False), False
+def _load(dbc: Path) -> tuple[Database, list[str]]:
+    """Return the messages of a database that can be used, and the names of those that want strict = false."""
+    database, mistakes = read_database(dbc)
+    for mistake in mistakes[:SHOWN]:
+        told = mistake.remedy.partition(";")[0] if mistake.tolerable else f"{mistake.remedy}; left out"
+        say(f"{dbc}: {mistake.place}: {told}")
+    if len(mistakes) > SHOWN:
+        say(f"{dbc}: {len(mistakes) - SHOWN} more mistakes")
+    spoilt = {mistake.message for mistake in mistakes if not mistake.tolerable}
+    usable = [message for message in database.messages if message.name not in spoilt]
+    overlapping = [mistake.message for mistake in mistakes if mistake.tolerable]
+    return Database(usable, strict=False), overlapping
 
 
 def _show(found: list[Found], drives: bool) -> None:

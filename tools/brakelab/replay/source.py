@@ -12,6 +12,7 @@ from ecu.bus.receive import ReceivePlan, contract_receive_plan
 from ecu.bus.signal_map import load_signal_map, read_signal_map
 from ecu.contract.records import RecordArray
 from ecu.errors import UserError
+from ecu.output import say
 from ecu.settings.resources import resource
 
 NEAR: Final = 0.02  # of a radius, that tyres and loads differ by
@@ -41,6 +42,8 @@ def load_source(map: Path | None) -> Source:
         columns = read_column_map(map)
         return Source(plan, "", _hash(map), columns, columns.content.rolling_radius)
     mapped = load_signal_map(map)
+    if mapped.left_out:
+        say(mapped.left_out)
     content = read_signal_map(map)
     database = map.parent / content.database
     return Source(mapped.plan, mapped.bus or "", _hash(map, database), None, content.rolling_radius)
