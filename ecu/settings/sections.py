@@ -127,15 +127,15 @@ class Axle(Section):
 class Sensors(Section):
     """Standard deviations of the sensors (Table 4.1), the accelerometer's range, the reference's delay."""
 
-    wheel_speed: Annotated[Positive, Unit("rad/s")] = 0.1
+    wheel_speed: Annotated[float, Field(gt=0, lt=10), Unit("rad/s")] = 0.1
     """Standard deviation."""
-    accel: Annotated[Positive, Unit("m/s^2")] = 0.01
+    accel: Annotated[float, Field(gt=0, lt=5), Unit("m/s^2")] = 0.01
     """Standard deviation."""
     accel_range: Annotated[float, Field(ge=5.0, le=40.0), Unit("m/s^2")] = 20.0
     """A reading beyond it is none, m/s^2: more than car and tyres can do."""
-    pressure: Annotated[Positive, Unit("bar")] = 1.8
+    pressure: Annotated[float, Field(gt=0, lt=20), Unit("bar")] = 1.8
     """Standard deviation."""
-    vehicle_speed: Annotated[Positive, Unit("m/s")] = 0.027
+    vehicle_speed: Annotated[float, Field(gt=0, lt=10), Unit("m/s")] = 0.027
     """Standard deviation."""
     vehicle_speed_delay: Annotated[float, Field(ge=0, lt=1), Unit("s")] = 0.0
     """Of the reference behind the other signals."""

@@ -167,6 +167,7 @@ WRONG = [
     ("no section", lambda: SUV.replace("[rear]", "[back]"), ["back: unknown key", "1 more)"]),
     ("a section that is a number", lambda: "vehicle = 3\n" + SUV.split("[vehicle]")[0], ["vehicle"]),
     ("not TOML", lambda: SUV + "\n[[[", ["TOML"]),
+    ("sensor noise in Pa", change("sensors.pressure", "180000.0"), ["sensors.pressure", "bar"]),
     ("YAML", lambda: "name: suv\nvehicle:\n  mass: 2105\n", ["TOML", "line 1"]),
     ("a key twice", lambda: SUV + "\npedal_position = [0.0, 1.0]\n", ["TOML"]),
     ("empty", lambda: "", ["name"]),
