@@ -56,6 +56,24 @@ def exchange(a: list[int], b: list[int]) -> Callable[[Samples], None]:
     return change
 
 
+def clip(columns: list[int], share: float) -> Callable[[Samples], None]:
+    """Clip at a share of the greatest size, as a sensor of too small a range does."""
+
+    def change(samples: Samples) -> None:
+        end = share * np.nanpercentile(np.abs(samples[:, columns]), 99.9)
+        samples[:, columns] = np.clip(samples[:, columns], -end, end)
+
+    return change
+
+
+def freeze(column: int, begin: float, seconds: float) -> Callable[[Samples], None]:
+    def change(samples: Samples) -> None:
+        part = samples[int(100 * begin) : int(100 * (begin + seconds)), column]
+        part[np.isfinite(part)] = part[np.isfinite(part)][0]
+
+    return change
+
+
 ACCEL_X, ACCEL_Y, YAW, STEERING = (
     [PLACE[name]] for name in ("accel_x", "accel_y", "yaw_rate", "steering_angle")
 )
@@ -85,6 +103,11 @@ WRONG = [
     ("one pressure 25 % less", times(PRESSURES[:1], 0.75), "calliper_pressure_*: front left", "25 % less"),
     ("pressures turned", times(PRESSURES, -0.1), "calliper_pressure_*: turned", "factor = -1"),
     ("pressures off by 8", times(PRESSURES, 1.0, 8.0), "calliper_pressure_*: reads +8 bar", "offset"),
+    ("accel_x clipped", clip(ACCEL_X, 0.5), "accel_x: stands at -", "its range ends there"),
+    ("accel_y clipped", clip(ACCEL_Y, 0.5), "accel_y: stands at ", "its range ends there"),
+    ("a wheel's range too small", clip(WHEELS[1:2], 0.7), "wheel_speed_fr: stands at ", "its range ends"),
+    ("a wheel frozen", freeze(WHEELS[2], 60.0, 40.0), "wheel_speed_rl: stands at ", "frozen"),
+    ("pressures clipped", clip(PRESSURES, 0.4), "calliper_pressure_*: fl fr rl rr stand", "more range"),
 ]  # fmt: skip
 
 

@@ -20,6 +20,7 @@ import numpy as np
 from brakelab.log_physics.line import MOVING, RATE, Fit, Vector, fit
 from brakelab.log_physics.pressures import pressure_lines
 from brakelab.log_physics.samples import SAMPLED, Car, Drive, Rows
+from brakelab.log_physics.stuck import clipped_accels, stuck_wheels
 from ecu.bus.units import CONVERSIONS
 from ecu.contract.params import GRAVITY
 from ecu.contract.records import RecordArray
@@ -68,8 +69,12 @@ def judge(drive: Drive, car: Car) -> Judged:
     rows = drive.known & (np.median(np.abs(wheels), axis=1) > MOVING)
     if rows.sum() < LEAST_ROWS:
         return Judged([], [])
+    stuck, wheels = stuck_wheels(drive, wheels, rows)
     lines, wheels = _wheels(wheels, rows, car)
     speed = wheels.mean(axis=1)
+    clipped, unclipped = clipped_accels(drive, speed, rows)
+    rows = unclipped if unclipped.sum() >= LEAST_ROWS else rows
+    lines = stuck + lines + clipped
     checked = ["wheel_speed"]
     relations = _relate(drive, car, wheels, rows)
     factor, told = _speed_scale(drive, relations, speed, rows, car)

@@ -12,6 +12,7 @@ import numpy as np
 
 from brakelab.log_physics.line import BRAKING, RATE, Vector, fit
 from brakelab.log_physics.samples import Car, Drive, Rows
+from brakelab.log_physics.stuck import clipped_pressures
 from ecu.bus.units import CONVERSIONS
 
 LEAST_ROWS: Final = int(2 * RATE)
@@ -33,7 +34,7 @@ def pressure_lines(drive: Drive, car: Car, speed: Vector, rows: Rows) -> tuple[l
     if pressures is None:
         return [], []
     change = np.gradient(speed, 1.0 / RATE)
-    lines = []
+    lines: list[str] = []
     idle = rows & (change > 0.2)
     if idle.sum() > LEAST_ROWS:
         at_rest = np.median(pressures[idle], axis=0)
@@ -59,7 +60,9 @@ def pressure_lines(drive: Drive, car: Car, speed: Vector, rows: Rows) -> tuple[l
     if line.correlation < 0.2:
         told = f"calliper_pressure_*: does not follow the deceleration (correlation {line.correlation:.2f})"
         return [f"{told}; is it another signal?"], ["calliper_pressure"]
-    return _sides(pressures[pressed]) + _unit(drive, car, pressures, change, pressed), ["calliper_pressure"]
+    clipped = clipped_pressures(drive, change, rows)
+    lines = [clipped] if clipped else _sides(pressures[pressed])
+    return lines + _unit(drive, car, pressures, change, pressed), ["calliper_pressure"]
 
 
 def _sides(pressures: Vector) -> list[str]:

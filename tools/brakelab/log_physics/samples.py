@@ -108,6 +108,7 @@ class Drive:
     def __init__(self, samples: Vector) -> None:
         """Take rows of the grid, shape (n, len(SAMPLED))."""
         self._values: dict[str, Vector] = {}
+        self._raw: dict[str, Vector] = {}
         self.known = np.ones(len(samples), np.bool_)
         """Rows where every input that there is has samples near, shape (n,)."""
         places = np.arange(len(samples))
@@ -116,7 +117,8 @@ class Drive:
             if len(there) < FEWEST:
                 continue
             name = INPUT_SIGNALS[place].name
-            self._values[name] = smooth(np.interp(places, there, samples[there, column]))
+            self._raw[name] = np.interp(places, there, samples[there, column])
+            self._values[name] = smooth(self._raw[name])
             after = np.minimum(np.searchsorted(there, places), len(there) - 1)
             before = np.maximum(after - 1, 0)
             near = np.minimum(np.abs(there[after] - places), np.abs(places - there[before]))
@@ -127,6 +129,10 @@ class Drive:
 
     def __getitem__(self, name: str) -> Vector:
         return self._values[name]
+
+    def raw(self, name: str) -> Vector:
+        """Return an input on the grid as it came, not smoothed, shape (n,)."""
+        return self._raw[name]
 
     def corners(self, stem: str) -> Vector | None:
         """Return the four of a wheel's quantity, shape (n, 4); None: not all are there."""
