@@ -97,7 +97,12 @@ def test_a_package_that_is_missing_is_one_line(result: Result, monkeypatch: pyte
 
 
 def test_changes_are_keys_of_the_configuration(drive: Simulation, result: Result) -> None:
-    changed = replay(drive.log, config="suv", changes={"front.mu_nominal": 0.35, "observer.mu_drift": 0.03})
+    changes = {
+        "front.mu_nominal": np.float32(0.35),
+        "vehicle.mass": np.int64(2200),
+        "observer.mu_drift": 0.03,
+    }
+    changed = replay(drive.log, config="suv", changes=changes)  # type: ignore[arg-type]
     assert (result["mu_b_fl"][100], changed["mu_b_fl"][100]) == pytest.approx((0.45, 0.35))
     assert changed.metadata["config_hash"] != result.metadata["config_hash"]
 
@@ -121,11 +126,18 @@ def test_a_map_is_taken_by_name(tmp_path: Path) -> None:
         (lambda: load("no.log"), "no.log: no such file"),
         (lambda: replay(MUSTANG, config="nosuch"), "nosuch: no such file, and none that is shipped"),
         (lambda: replay(MUSTANG, config="suv"), "give the signal map of this car"),
-        (lambda: replay(MUSTANG, config="suv", changes={"front.mu": 0.4}), "front.mu: unknown key"),
+        (lambda: replay([], config="suv"), "logs: the list is empty"),
+        (lambda: replay(MUSTANG, config="suv", changes={"front.mu": 0.4}), "changes: front.mu: unknown key"),
+        (lambda: replay(MUSTANG, config="suv", changes={"front mu": 0.4}), "changes: front mu: no key"),
+        (lambda: replay(MUSTANG, config="suv", changes={"front.mu_nominal": np.nan}), "nan is no value"),
+        (lambda: replay(MUSTANG, config="suv", changes={"front.mu_nominal": None}), "None is no value"),  # type: ignore[dict-item]
+        (lambda: replay(MUSTANG, config="suv", changes={"vehicle.mass": object()}), "is no value"),  # type: ignore[dict-item]
         (lambda: replay(MUSTANG, config="suv", changes={"vehicle.mass": 1.0}), "give a value above 200 kg"),
         (lambda: replay(MUSTANG, config="suv", out="x.mf4"), "is Parquet here"),
         (lambda: replay(MUSTANG, config="mustang", map="mustang", observer="best"), "take joint, observer1"),
         (lambda: simulate("nosuch", config="suv"), "nosuch: no such file"),
+        (lambda: simulate("stop-1", config="suv", seed=-1), "seed: -1: give a whole number"),
+        (lambda: simulate("stop-1", config="suv", seed=1.5), "seed: 1.5: give a whole number"),  # type: ignore[arg-type]
     ],
 )
 def test_a_mistake_is_a_user_error(call: object, says: str) -> None:
@@ -135,7 +147,7 @@ def test_a_mistake_is_a_user_error(call: object, says: str) -> None:
 
 
 def test_an_unknown_column_names_the_others(result: Result) -> None:
-    with pytest.raises(UserError, match="mu_b: no such column; there are t, "):
+    with pytest.raises(UserError, match=r"mu_b: no such column; did you mean mu_b_..\?; `.columns` has all"):
         result["mu_b"]
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from brakelab.table import Table
+from ecu.errors import UserError
 
 COLUMNS = {
     "t": np.array([0.0, 0.01, 0.02]),
@@ -49,6 +50,12 @@ def test_units_are_with_pandas_and_arrow_and_the_table(polars: Any) -> None:
         b"",
     ]
     assert TABLE.to_polars().to_arrow().schema.field("t").metadata is None
+
+
+@pytest.mark.parametrize("mask", [np.ones(2, bool), np.ones(3), [0, 1, 2], True])
+def test_what_is_no_mask_is_told(mask: Any) -> None:
+    with pytest.raises(UserError, match=r"give a mask of bool of shape \(3,\)"):
+        TABLE.where(mask)
 
 
 def test_a_table_without_rows_has_its_columns(polars: Any) -> None:

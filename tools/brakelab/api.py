@@ -8,6 +8,7 @@ command line. Nothing is printed; what is wrong is an `ecu.errors.UserError`. do
 
 import json
 import os
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -45,6 +46,7 @@ TRUTH_UNITS = {
     "particles": "-",
 }
 """Of true values that are neither input nor output."""
+_KEY = re.compile(r"\w+(\.\w+)*", re.ASCII)
 INPUT_UNITS = {signal.name: signal.unit for signal in INPUT_SIGNALS}
 
 
@@ -153,6 +155,8 @@ def replay(
     if out is not None and Path(out).suffix in EXPORTS:
         raise UserError("out", str(out), "is Parquet here; `brake-ecu replay` writes MDF4 and MCAP")
     paths = [Path(logs)] if isinstance(logs, str | os.PathLike) else [Path(log) for log in logs]
+    if not paths:
+        raise UserError("logs", "", "the list is empty; give the logs of one drive")
     folder = TemporaryDirectory(prefix="brake-ecu-") if out is None else None
     written = Path(folder.name, f"{paths[0].stem}.parquet") if folder else Path(out or "")
     with _changed(config, changes) as car:
@@ -193,10 +197,12 @@ def simulate(
         UserError: a file is not right or cannot be written.
     """
     path = scenario_file(os.fspath(scenario))
+    if not isinstance(seed, int | np.integer) or seed < 0:
+        raise UserError("seed", str(seed), "give a whole number from 0 on")
     folder = TemporaryDirectory(prefix="brake-ecu-") if out is None else None
     written = Path(folder.name, path.stem) if folder else Path(out or "")
     with _changed(config, changes) as car:
-        run_scenario(path, car, written, seed, draw, told=False)
+        run_scenario(path, car, written, int(seed), draw, told=False)
     return Simulation(written, folder)
 
 
@@ -209,13 +215,28 @@ def _changed(config: AnyPath, changes: Mapping[str, Change] | None) -> Iterator[
         return
     with TemporaryDirectory(prefix="brake-ecu-") as folder:
         changed = Path(folder, f"{path.stem}-changed.toml")
-        keys = [f"{key} = {_toml(value)}" for key, value in changes.items()]
-        changed.write_text("\n".join([f"include = {_toml(str(path.resolve()))}", *keys]) + "\n", "utf-8")
-        yield changed
+        keys = [f"{key} = {_toml(key, value)}" for key, value in changes.items()]
+        changed.write_text("\n".join([f"include = {json.dumps(str(path.resolve()))}", *keys]) + "\n", "utf-8")
+        try:
+            yield changed
+        except UserError as error:
+            if error.where != str(changed):
+                raise
+            raise UserError("changes", error.place, error.remedy) from None
 
 
-def _toml(value: Change) -> str:
-    return json.dumps(list(value) if isinstance(value, tuple | np.ndarray) else value)
+def _toml(key: str, value: Change) -> str:
+    """Return a value as TOML. Raises UserError if it has no place in a configuration."""
+    if not _KEY.fullmatch(key):
+        raise UserError("changes", key, 'no key of a configuration; give one like "front.mu_nominal"')
+    plain = value.tolist() if isinstance(value, np.generic | np.ndarray) else value
+    try:
+        text = json.dumps(plain, allow_nan=False)
+    except (TypeError, ValueError):
+        text = "null"
+    if text == "null":
+        raise UserError("changes", key, f"{value!r} is no value of a configuration")
+    return text
 
 
 def _truth_unit(name: str) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ecu.errors import UserError
+from ecu.errors import UserError, closest
 
 
 class Table:
@@ -24,7 +24,9 @@ class Table:
         try:
             return self.columns[name]
         except KeyError:
-            raise UserError("column", name, f"no such column; there are {', '.join(self.columns)}") from None
+            hint = closest(name, self.columns)
+            remedy = f"no such column{hint}; `.columns` has all {len(self.columns)}"
+            raise UserError("column", str(name), remedy) from None
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -57,8 +59,12 @@ class Table:
         return pa.Table.from_arrays([*arrays.values()], schema=pa.schema(fields))
 
     def where(self, rows: NDArray[np.bool_]) -> "Table":
-        """Return some rows, by a mask of shape (rows,)."""
-        return Table({name: column[rows] for name, column in self.columns.items()}, self.units)
+        """Return some rows, by a mask of shape (rows,). Raises UserError for anything else."""
+        mask = np.asarray(rows)
+        if mask.shape != (len(self),) or mask.dtype != np.bool_:
+            found = f"{mask.dtype} of shape {mask.shape}"
+            raise UserError("where", found, f"give a mask of bool of shape ({len(self)},)")
+        return Table({name: column[mask] for name, column in self.columns.items()}, self.units)
 
 
 def _module(name: str) -> Any:
