@@ -71,7 +71,7 @@ def bench_entries(json: bool, seeds: int, entered: Entered) -> int:
     names = tuple(dict.fromkeys((*OURS, *entered.observers)))
     car, log = _drive(entered.drive)
     real = None if log is None else real_drive(car, log)
-    say(f"{cars} cars are driven and heard by {len(names)} entries: minutes")
+    say(f"cars to drive: {cars}, heard by {len(names)} entries; minutes")
     results = each_car(ENTRIES, partial(judge_car, names), cars)
     predictions = {} if real is None else predict_all(names, real)
     found = standings(results, predictions)
@@ -105,9 +105,9 @@ def _drive(named: str | None) -> tuple[str, Path | None]:
 
 def _export(folder: Path, cars: int) -> int:
     new_folder(folder)
-    say(f"{cars} cars are driven: minutes")
+    say(f"cars to drive: {cars}; minutes")
     for seed in tracked(range(cars), ENTRIES, cars):
         export_car(folder, seed, car_tracks(seed))
-    say(f"written: {folder}, inputs and truth of {cars} cars; next: docs/benchmark.md")
+    say(f"written: {folder}, inputs and truth (cars: {cars}); next: docs/benchmark.md")
     give(written=[folder])
     return 0

@@ -96,12 +96,13 @@ def entry_tables(found: Sequence[Standing], cars: int, drive: str) -> list[Table
     failed = [f"{one.name}: {one.failure}." for one in found if one.failure]
     counted = next((one.prediction.counted for one in found if one.prediction), 0)
     recorded = f"{drive}: {counted} braking{'' if counted == 1 else 's'}" if drive else "No recorded drive"
+    noun = "car" if cars == 1 else "cars"
     return [
         Table(
             "Friction: nRMSE [%]",
             ("entry", "rank", *GROUPS, "worst"),
             friction,
-            f"Front/rear, median over {cars} cars and their drives; worst: of all of these. Rank: by the "
+            f"Front/rear, median over {cars} {noun} and their drives; worst: of all of these. Rank: by the "
             "mean of the medians." + "".join(f" {line}" for line in failed),
         ),
         Table(
@@ -116,8 +117,8 @@ def entry_tables(found: Sequence[Standing], cars: int, drive: str) -> list[Table
             "Recorded cars: error of what was known before a braking [%]",
             ("entry", *SETS, "recorded drive, median", "recorded drive, worst"),
             others,
-            f"First the brake force of all wheels, median (worst) over {cars} simulated cars of their median "
-            "from the third application on, with the signals of a logger alone. Then the specific force of "
-            f"brakings of a real car. {recorded}.",
+            f"First the brake force of all wheels, median (worst) over {cars} simulated {noun} of "
+            "their median from the third application on, with the signals of a logger alone. Then the "
+            f"specific force of brakings of a real car. {recorded}.",
         ),
     ]
