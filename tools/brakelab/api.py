@@ -116,7 +116,8 @@ def load(log: AnyPath, *, map: AnyPath | None = None) -> Drive:
     if not path.exists():
         raise UserError(str(path), "", "no such file; give an existing log")
     found, source = Findings(path), load_source(map_file(os.fspath(map)) if map is not None else None)
-    notes = [line] if map is not None and (line := check_map(Path(map), source, path)) else []
+    unused = check_map(Path(map), source, path) if map is not None else ""
+    notes = [line for line in (source.left_out, unused) if line]
     samples = list(decoded(path, source, found))
     t_ns = np.array([stamp for stamp, _ in samples], np.int64)
     values = np.array([row for _, row in samples]).reshape(len(samples), len(INPUT_SIGNALS))

@@ -4,11 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from brakelab.replay.source import load_source, radius_line
+from brakelab.api import load
+from brakelab.replay.source import announced, load_source, radius_line
 from ecu.settings.config import load_config, new_params
 from ecu.settings.resources import resource
 
 PARAMS = new_params(load_config(resource("config/suv.toml")))[0]
+MUSTANG = resource("config").parent / "tests/data/mustang.log"
 ROLLS = float(PARAMS["wheel_radius"].mean())
 
 
@@ -27,3 +29,24 @@ def test_wheels_in_rad_per_s_need_no_radius() -> None:
     map = resource("config/maps/mustang.toml")
     assert not radius_line(map, load_source(map), PARAMS)
     assert not radius_line(None, load_source(None), PARAMS)
+
+
+def test_mistakes_that_the_map_does_not_meet_are_told_once_and_by_who_reads_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = resource("dbc/cars/mustang.dbc").read_text("utf-8")
+    overlapping = (
+        'BO_ 2000 Radio: 8 X\n SG_ Volume : 0|8@1+ (1,0) [0|0] "" X\n SG_ Band : 4|8@1+ (1,0) [0|0] "" X\n'
+    )
+    database = tmp_path / "car.dbc"
+    database.write_text(f"{text}\n{overlapping}", "utf-8")
+    map = tmp_path / "map.toml"
+    shipped = resource("config/maps/mustang.toml").read_text("utf-8")
+    map.write_text(shipped.replace("../../dbc/cars/mustang.dbc", "car.dbc"), "utf-8")
+    source = load_source(map)
+    assert capsys.readouterr() == ("", "")  # of Python nothing is printed
+    assert announced(source) is source
+    said = capsys.readouterr().err
+    assert said == f"{source.left_out}\n"
+    assert said.endswith("1 message left out, which the map does not use\n")
+    assert load(MUSTANG, map=map).notes[0] == source.left_out

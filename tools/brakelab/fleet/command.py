@@ -17,7 +17,7 @@ from brakelab.fleet.run import Chain, Planned, run_fleet
 from brakelab.fleet.statistics import notes
 from brakelab.fleet.summary import summary_table, when
 from brakelab.fleet.wear import pads_table
-from brakelab.replay.source import load_source
+from brakelab.replay.source import announced, load_source
 from brakelab.results.progress import progress_bar
 from brakelab.simulation.observer import with_observer
 from ecu.errors import UserError
@@ -79,7 +79,7 @@ def fleet(
 def plan(drives: Sequence[Drive], observer: str | None) -> list[Chain]:
     """Return the drives vehicle by vehicle, with their configurations, maps and the state of their logs."""
     config_of = cache(lambda path: with_observer(load_config(path), observer))
-    source_of = cache(load_source)
+    source_of = cache(lambda path: announced(load_source(path)))
     chains: dict[str, Chain] = {}
     for drive in drives:
         size, marks, fault = 0, "", ""

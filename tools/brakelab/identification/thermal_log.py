@@ -16,7 +16,7 @@ from brakelab.log_physics.samples import DISC_TEMPERATURE_MEASURED, KEPT
 from brakelab.replay.engine import new_ecu
 from brakelab.replay.log import log_size, replay_log
 from brakelab.replay.quality import Findings
-from brakelab.replay.source import load_source
+from brakelab.replay.source import announced, load_source
 from brakelab.results.progress import progress_bar
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import AMBIENT_TEMPERATURE, CALLIPER_PRESSURE, CYCLE_NS, OUTPUT, RAIN, WHEEL_SPEED
@@ -124,7 +124,7 @@ def read_drives(logs: Sequence[Path], config: Config, map: Path | None) -> list[
     Raises:
         UserError: a log or the map is not right.
     """
-    source, params = load_source(map), new_params(config)
+    source, params = announced(load_source(map)), new_params(config)
     learned: RecordArray | None = None
     drives: list[Drive] = []
     with progress_bar("identify thermal", 2 * sum(log_size(path) for path in logs)) as advance:

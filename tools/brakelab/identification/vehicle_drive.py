@@ -18,7 +18,7 @@ from brakelab.replay.engine import new_ecu
 from brakelab.replay.log import log_size, replay_log
 from brakelab.replay.needed import nothing_usable
 from brakelab.replay.quality import Findings
-from brakelab.replay.source import check_map, load_source
+from brakelab.replay.source import announced, check_map, load_source
 from brakelab.results.progress import progress_bar
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CORNERS, INPUT_SIGNALS
@@ -91,7 +91,7 @@ def read_drives(paths: Sequence[Path], params: RecordArray, map: Path | None) ->
         UserError: a log or `map` is not right, or a drive cannot tell anything: wheels missing, standing,
             too short, or an input that physics says is another one.
     """
-    source, drives = load_source(map), []
+    source, drives = announced(load_source(map)), []
     with progress_bar("identify vehicle", sum(log_size(path) for path in paths)) as advance:
         for path in paths:
             if map and (line := check_map(map, source, path)):

@@ -12,7 +12,7 @@ from brakelab.replay.engine import new_ecu
 from brakelab.replay.log import log_size, replay_log
 from brakelab.replay.needed import needed_lines
 from brakelab.replay.quality import Findings, quality_counts, quality_lines
-from brakelab.replay.source import Source, check_map, load_source, radius_line
+from brakelab.replay.source import Source, announced, check_map, load_source, radius_line
 from brakelab.results.console import new_console
 from brakelab.results.progress import progress_bar
 from ecu.bus.signal_map import read_signal_map
@@ -34,7 +34,7 @@ def check(log: Path, map: Path, config: Path | None) -> int:
     Raises:
         UserError: the map, its database, `config` or the log is not right.
     """
-    source, findings = load_source(map), Findings(log)
+    source, findings = announced(load_source(map)), Findings(log)
     if unused := check_map(map, source, log):
         raise UserError(unused, "", "map suggest proposes one")
     inputs = _feeds(map, source)

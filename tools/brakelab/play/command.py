@@ -15,7 +15,7 @@ from typing import Final
 from brakelab.play.play_log import timed_frames
 from brakelab.play.read_ahead import ReadAhead
 from brakelab.replay.quality import Findings, damage_lines
-from brakelab.replay.source import check_map, load_source
+from brakelab.replay.source import announced, check_map, load_source
 from brakelab.simulation.priority import PRIORITY, ask_for_priority
 from ecu.bus.channel import open_channel
 from ecu.bus.protocol import Channel
@@ -92,7 +92,7 @@ def play(log: Path, interface: str, channel: str, map: Path | None, speed: float
         raise UserError("--speed", f"{speed:g}", f"give a factor from {least:g} to {most:g}; 1 is real time")
     if not log.exists():
         raise UserError(str(log), "", "no such file; give an existing log")
-    if map and (line := check_map(map, load_source(map), log)):
+    if map and (line := check_map(map, announced(load_source(map)), log)):
         say(line)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)  # a shell's background jobs ignore SIGINT

@@ -115,7 +115,8 @@ def replay_into(
     check_outputs(out, (out, brakes_path(out)), [*logs, config, *([map] if map else [])])
     source = load_source(map)
     detail(f"{vehicle.name}, {vehicle.observer.kind}, {map or 'the database of the ECU'}")
-    notes = [line for log in logs if map and (line := check_map(map, source, log))]
+    notes = [source.left_out] if source.left_out else []
+    notes += [line for log in logs if map and (line := check_map(map, source, log))]
     recording = read_recording(cycles) if cycles else None
     params = new_params(vehicle)
     notes += [line] if (line := radius_line(map, source, params[0])) else []

@@ -30,6 +30,8 @@ class Source(NamedTuple):
     """Columns of a signal file, None: the contract's names and units."""
     rolling_radius: float | None = None
     """m, with which the map makes rotation of the wheels' speeds; None: they need none."""
+    left_out: str = ""
+    """Line on the mistakes in messages of the database that the map does not use."""
 
 
 def load_source(map: Path | None) -> Source:
@@ -42,11 +44,17 @@ def load_source(map: Path | None) -> Source:
         columns = read_column_map(map)
         return Source(plan, "", _hash(map), columns, columns.content.rolling_radius)
     mapped = load_signal_map(map)
-    if mapped.left_out:
-        say(mapped.left_out)
     content = read_signal_map(map)
     database = map.parent / content.database
-    return Source(mapped.plan, mapped.bus or "", _hash(map, database), None, content.rolling_radius)
+    radius = content.rolling_radius
+    return Source(mapped.plan, mapped.bus or "", _hash(map, database), None, radius, mapped.left_out)
+
+
+def announced(source: Source) -> Source:
+    """Say what of the source's database is left out; return the source."""
+    if source.left_out:
+        say(source.left_out)
+    return source
 
 
 def check_map(map: Path, source: Source, log: Path) -> str:
