@@ -98,7 +98,6 @@ class Recorder:
         try:
             self.store = state_store.open_store(state)
             self._kept_open.enter_context(state_store.in_use(state))
-            self._refused = ""
         except (UserError, OSError) as error:
             self._refuse(str(error))
 

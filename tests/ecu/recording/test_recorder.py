@@ -2,6 +2,7 @@ import io
 import json
 import os
 import re
+import sqlite3
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from brakelab.logs.log_quality import LogQuality
 from ecu.contract.records import CYCLE, FRAME, FRAME_EXTENDED, FRAME_FD, LEARNED, OUTPUTS, new_record
 from ecu.errors import UserError
 from ecu.recording import side_process
+from ecu.recording import store as state_store
 from ecu.recording.recorder import (
     CYCLES_FILE,
     FRAMES_FILE,
@@ -224,6 +226,27 @@ def test_a_store_that_cannot_be_written_is_tried_again(tmp_path):
     run.cycles(1, brakings=3)
     assert run.recorder.kept
     assert saved_brakings(tmp_path / "state") == 3
+
+
+def test_a_disk_that_is_full_is_told_once(tmp_path, monkeypatch):
+    """The store opens, and every value that is written to it fails."""
+    run = Run(tmp_path, state=tmp_path / "state")
+    run.cycles(2)
+    save = state_store.save
+
+    def full(*_):
+        raise sqlite3.OperationalError("database or disk is full")
+
+    monkeypatch.setattr(state_store, "save", full)
+    with capture_logs() as lines:
+        for brakings in range(1, 5):
+            run.cycles(1, brakings=brakings)
+            assert not run.recorder.kept
+    assert [line["event"] for line in lines] == ["not_kept"]
+    monkeypatch.setattr(state_store, "save", save)
+    run.cycles(1, brakings=5)
+    assert run.recorder.kept
+    assert saved_brakings(tmp_path / "state") == 5
 
 
 def test_a_limit_removes_the_oldest_recordings_and_stops_one_that_is_larger_alone(tmp_path):
