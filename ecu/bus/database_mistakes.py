@@ -89,8 +89,6 @@ def _blank_out(lines: list[str], text: str) -> Mistake | None:
     if not (found := _AT.search(text)):
         return None
     row, column = int(found[1]) - 1, int(found[2])
-    if row >= len(lines):
-        return None
     place, remedy = f"line {row + 1}, column {column}", f"syntax not understood at » in: {near(found[3])}"
     if _SIGNAL.match(lines[row]):
         owner = next((m for line in reversed(lines[:row]) if (m := _MESSAGE.match(line))), None)

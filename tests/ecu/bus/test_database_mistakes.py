@@ -108,6 +108,22 @@ def test_all_mistakes_are_told_at_once(tmp_path: Path, capsys: pytest.CaptureFix
     ]
 
 
+@pytest.mark.parametrize(
+    ("before", "after", "told"),
+    [
+        ("8 A\n SG_ v_fl : 0|16", "8 A SG_ v_fl : 0|0", "v_fl length 0 is not greater than 0"),
+        ("BO_ 1 W", "BO_ 9999 W", "id 0x270f is more than 11 bits in message Wheels"),
+    ],
+    ids=["no line of its own", "no identifier"],
+)
+def test_what_spoils_no_signal_s_line_refuses_the_database(
+    tmp_path: Path, before: str, after: str, told: str
+) -> None:
+    path = written(tmp_path, GOOD.replace(before, after))
+    with pytest.raises(Mistakes, match=rf"^{path}: .*{told}"):
+        read_database(path)
+
+
 def test_comments_that_are_no_syntax_are_lost_alone(tmp_path: Path) -> None:
     path = written(tmp_path, GOOD + 'CM_ SG_ 7 "signal\nmissing";\nCM_ 9 "no kind";\nCM_ BO_ 1 "wheels";\n')
     readable = read_database(path)
