@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple
 from cantools.database import Database, Message
 
 from ecu.bus.bits import first_bit
-from ecu.bus.database_mistakes import Mistake, near, parse
+from ecu.bus.database_mistakes import Mistake, parse, syntax_fault
 from ecu.errors import Mistakes, UserError, closest
 
 LONGEST_PAYLOAD: Final = 64  # bytes, CAN FD
@@ -17,16 +17,13 @@ SHOWN: Final = 6  # suggested names
 KINDS: Final = ".dbc, .arxml, .kcd, .sym"
 BEGINNING: Final = {"0", "7"}  # start position of a PDU that begins with its frame, little- and big-endian
 
-_SYNTAX = re.compile(r'Invalid syntax at line (\d+), column (\d+): "(.*?)"{1,2}$', re.DOTALL)
 _XML = re.compile(r"([a-z (),-]+): line (\d+), column (\d+)\W*$")
 
 
 def _refusal(path: Path, error: Exception) -> UserError:
     text = str(error)
-    if found := _SYNTAX.search(text):
-        line, column, source = found.groups()
-        remedy = f"syntax not understood at » in: {near(source)}; mend that line"
-        return UserError(str(path), f"line {line}, column {column}", remedy)
+    if fault := syntax_fault(text):
+        return UserError(str(path), fault.place, f"{fault.remedy}; mend that line")
     if found := _XML.search(text):
         what, line, column = found.groups()
         remedy = f"no XML from there on ({what.strip()}); the file is cut off or damaged, export it again"

@@ -16,7 +16,7 @@ from ecu.bus.bits import first_bit
 
 MOST: Final = 40  # pieces that are blanked out before the file is given up
 
-_AT: Final = re.compile(r'Invalid syntax at line (\d+), column (\d+): "(.*?)"{1,2}$', re.DOTALL)
+_SYNTAX: Final = re.compile(r'Invalid syntax at line (\d+), column (\d+): "(.*?)"{1,2}$', re.DOTALL)
 _EMPTY: Final = re.compile(r"The signal (\S+) length (-?\d+) is not greater than 0 in message (\S+?)\.?\"?$")
 _MESSAGE: Final = re.compile(r"\s*BO_\s+\d+\s+(\w+)\s*:")
 _SIGNAL: Final = re.compile(r"\s*SG_\s+(\w+)\b")
@@ -34,10 +34,23 @@ class Mistake(NamedTuple):
     """Whether `strict = false` takes the message all the same."""
 
 
-def near(source: str) -> str:
-    """Return what stands around the place » that a parser did not understand."""
-    before, _, after = source.partition(">>!<<")
-    return f"{before[-20:]}»{after[:30]}".strip()
+class SyntaxFault(NamedTuple):
+    """Where a parser of cantools stopped."""
+
+    line: int
+    place: str
+    remedy: str
+
+
+def syntax_fault(text: str) -> SyntaxFault | None:
+    """Return where the parser stopped whose error says `text`; None: it is about something else."""
+    if not (found := _SYNTAX.search(text)):
+        return None
+    before, _, after = found[3].partition(">>!<<")
+    near = f"{before[-20:]}»{after[:30]}".strip()
+    return SyntaxFault(
+        int(found[1]), f"line {found[1]}, column {found[2]}", f"syntax not understood at » in: {near}"
+    )
 
 
 def parse(path: Path, mistakes: list[Mistake]) -> Any:
@@ -86,19 +99,18 @@ def _blank_out(lines: list[str], text: str) -> Mistake | None:
         lines[row] = ""
         remedy = f"has {length} bits; give its length, or remove it"
         return Mistake(message, f"line {row + 1}, {message}.{signal}", remedy)
-    if not (found := _AT.search(text)):
+    if not (fault := syntax_fault(text)):
         return None
-    row, column = int(found[1]) - 1, int(found[2])
-    place, remedy = f"line {row + 1}, column {column}", f"syntax not understood at » in: {near(found[3])}"
+    row = fault.line - 1
     if _SIGNAL.match(lines[row]):
         owner = next((m for line in reversed(lines[:row]) if (m := _MESSAGE.match(line))), None)
         lines[row] = ""
-        return Mistake(owner[1], place, f"{remedy}; mend that line") if owner else None
+        return Mistake(owner[1], fault.place, f"{fault.remedy}; mend that line") if owner else None
     whole = _COMMENT.match("\n".join(lines[row:]))
     if whole or (lines[row].lstrip().startswith("CM_") and lines[row].rstrip().endswith(";")):
         count = 1 + (whole[0].count("\n") if whole else 0)
         lines[row : row + count] = [""] * count
-        return Mistake("", place, f"{remedy}; mend that comment")
+        return Mistake("", fault.place, f"{fault.remedy}; mend that comment")
     return None
 
 
