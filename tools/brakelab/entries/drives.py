@@ -17,6 +17,7 @@ from brakelab.simulation.closed_loop import START_NS, Drive, new_loop, run
 from brakelab.simulation.ecu_inputs import ecu_inputs
 from brakelab.simulation.scenario import Scenario
 from brakelab.simulation.scenario_car import with_draw
+from brakelab.stretches import stretches
 from brakelab.studies.observers import ORDINARY, counted
 from brakelab.studies.observers_cases import configured, shipped
 from brakelab.studies.recorded import LOGGERS, logger_columns, recorded_scenario, uncorrected
@@ -92,9 +93,8 @@ def car_tracks(seed: int) -> CarTracks:
 
 def applications(track: Track) -> Iterator[slice]:
     """Yield the counted rows of each brake application."""
-    edges = np.flatnonzero(np.diff(track.rows, prepend=False, append=False))
-    for first, last in zip(edges[0::2], edges[1::2], strict=True):
-        yield slice(int(first), int(last))
+    for first, last in stretches(track.rows).tolist():
+        yield slice(first, last)
 
 
 class RealDrive(NamedTuple):

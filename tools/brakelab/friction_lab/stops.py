@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from brakelab.friction_lab.columns import Columns
 from brakelab.friction_lab.recording import Recording
 from brakelab.plant.jit import Record, kernel
+from brakelab.stretches import stretches
 from ecu.errors import UserError
 
 Vector = NDArray[np.float64]
@@ -154,9 +155,8 @@ def some(stops: Stops, wanted: Places) -> Stops:
 def _applications(time: Vector, pressed: Vector) -> list[tuple[int, int]]:
     on = pressed > APPLIED
     # Noise about the threshold is no release: fill what is shorter than five samples.
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], on.astype(int), [0]])))
     runs: list[tuple[int, int]] = []
-    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+    for begin, end in stretches(on):
         if runs and begin - runs[-1][1] <= 5 and time[begin] - time[runs[-1][1] - 1] <= GAP:
             runs[-1] = (runs[-1][0], int(end))
         else:

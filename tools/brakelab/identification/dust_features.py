@@ -16,6 +16,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.stretches import stretches
+
 Array = NDArray[np.float64]
 
 PERIOD: Final = 0.1  # s, grid of a trip
@@ -103,9 +105,8 @@ def find_applications(trip: Recorded) -> list[tuple[int, int]]:
     """Return first row and row after the last of each application."""
     kernel = np.full(SMOOTH, 1.0 / SMOOTH)
     pressed = (np.convolve(trip.pressure, kernel, "same") > PRESSED) & (trip.speed > MOVING)
-    edges = np.flatnonzero(np.diff(pressed, prepend=False, append=False))
     found = []
-    for first, last in zip(edges[::2], edges[1::2], strict=True):
+    for first, last in stretches(pressed):
         above = first + np.flatnonzero(trip.pressure[first:last] > PRESSED)  # smoothing widens
         if not len(above):
             continue

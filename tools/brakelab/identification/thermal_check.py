@@ -3,11 +3,13 @@
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from brakelab.identification.measurement_files import WARMEST_COLD
 from brakelab.identification.thermal_fit import Disc, Fit, fit_axle
 from brakelab.identification.thermal_log import Drive
-from brakelab.identification.thermal_model import ROW, Array, Cooling, Course
+from brakelab.identification.thermal_model import ROW, Cooling, Course
+from brakelab.stretches import stretches
 from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
 
@@ -24,9 +26,9 @@ LIKELY: Final = (0.4, 2.5)  # of xi over the configuration's
 BETTER: Final = 0.8  # of the residual, if read in degF
 
 
-def _longest_run(there: Array) -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], there.astype(np.int8), [0]])))
-    return int(np.max(edges[1::2] - edges[::2], initial=0))
+def _longest_run(there: NDArray[np.bool_]) -> int:
+    begin, end = stretches(there).T
+    return int(np.max(end - begin, initial=0))
 
 
 def check_drive(drive: Drive) -> list[int]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from brakelab.identification.measurement_files import check_celsius, read_columns, read_manifest
 from brakelab.results.wear import regressors_of
+from brakelab.stretches import stretches
 from ecu.errors import UserError
 from ecu.settings.pad import Pad
 
@@ -119,10 +120,8 @@ def read_stops(path: Path) -> list[dict[str, Array]]:
     """
     columns = read_columns(path, COLUMNS, "block")
     pressed = columns["calliper_pressure"] > PRESSED
-    edges = np.flatnonzero(np.diff(pressed, prepend=False, append=False))
     stops = [
-        {name: column[start:end] for name, column in columns.items()}
-        for start, end in zip(edges[::2], edges[1::2], strict=True)
+        {name: column[start:end] for name, column in columns.items()} for start, end in stretches(pressed)
     ]
     return [stop for stop in stops if stop["t"][-1] - stop["t"][0] >= SHORTEST]
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from brakelab.log_physics.line import RATE, Vector, smooth
 from brakelab.log_physics.samples import Drive, Rows
+from brakelab.stretches import stretches
 from ecu.contract.signals import CORNERS
 
 CLIPPED: Final = int(0.3 * RATE)  # rows at the extreme
@@ -25,12 +26,7 @@ HARDER: Final = 1.2  # between decelerations at the same greatest pressure
 
 def runs(at: Rows, least: int) -> list[slice]:
     """Return the stretches of at least `least` rows in which `at` holds, shape (n,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], at, [False])).astype(np.int8)))
-    return [
-        slice(int(begin), int(end))
-        for begin, end in zip(edges[::2], edges[1::2], strict=True)
-        if end - begin >= least
-    ]
+    return [slice(begin, end) for begin, end in stretches(at).tolist() if end - begin >= least]
 
 
 def clipped_accels(drive: Drive, speed: Vector, rows: Rows) -> tuple[list[str], Rows]:

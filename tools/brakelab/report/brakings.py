@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from brakelab.report.drive import Drive, Vector, numbers, read_parquet
 from brakelab.results.files import brakes_path
 from brakelab.results.prediction import SHORT, left_out
+from brakelab.stretches import stretches
 from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
 
@@ -140,12 +141,11 @@ def _from_file(drive: Drive, path: Path) -> list[Braking]:
 def _from_result(drive: Drive) -> list[Braking]:
     name = "braking" if drive.has("braking") else "decel_demand_total"
     busy = np.nan_to_num(drive.column(name)) > 0.5
-    edges = np.flatnonzero(np.diff(busy.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
     friction, sigma = drive.corners("mu_b"), drive.corners("sigma_mu_b")
     temperature = drive.corners("disc_temperature")
     speed = drive.column("vehicle_speed")
     found = []
-    for first, end in edges:
+    for first, end in stretches(busy):
         last = end - 1
         duration = max(float(drive.t[last] - drive.t[first]), PERIOD)
         found.append(

@@ -14,6 +14,7 @@ from brakelab.report.drive import Drive, Vector
 from brakelab.report.look import DEGRADED, DEMAND, ESTIMATE, GRID, INK, QUIET, new_figure
 from brakelab.report.torque import binned
 from brakelab.results.car import RATES, Car
+from brakelab.stretches import stretches
 from ecu.contract.params import GRAVITY
 from ecu.settings.annex5_picture import forbidden
 
@@ -84,8 +85,7 @@ def forbidden_stretches(car: Car, end: float) -> dict[str, list[float]]:
     half = 0.5 * (_SHARES[1] - _SHARES[0])
     for z in np.arange(0.5 * _STEP, end, _STEP):
         wrong = np.any([forbidden(sizes, float(z), load, _SHARES) for load in car.loads], axis=0)
-        edges = np.flatnonzero(np.diff(wrong.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
-        for first, after in edges:
+        for first, after in stretches(wrong):
             found["left"].append(round(float(z) - 0.5 * _STEP, 3))
             found["right"].append(round(min(float(z) + 0.5 * _STEP, end), 3))
             found["bottom"].append(round(100.0 * float(_SHARES[first] - half), 2))

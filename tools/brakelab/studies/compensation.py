@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK
 from brakelab.simulation.closed_loop import Drive, FrictionOverride, new_loop, run
 from brakelab.simulation.scenario import Scenario, load_scenario
+from brakelab.stretches import stretches
 from brakelab.studies.stops import LOWEST_SPEED, Vector, achieved_decel, columns
 from ecu.settings.config import Config
 from ecu.settings.resources import resource
@@ -101,8 +102,7 @@ def drive_as(kind: str, scenario: Scenario, config: Config, seed: int) -> Run:
 def asked_rows(drive: Drive) -> list[NDArray[np.int_]]:
     """Return the rows of each brake application, from the first demand to the last."""
     asked = drive.outputs["decel_demand_total"]
-    ends = np.flatnonzero(np.diff(np.r_[0, (asked > ASKED).astype(int), 0]))
-    return [np.arange(start, end) for start, end in zip(ends[::2], ends[1::2], strict=True)]
+    return [np.arange(start, end) for start, end in stretches(asked > ASKED)]
 
 
 def applications(drive: Drive) -> list[NDArray[np.int_]]:

@@ -13,6 +13,7 @@ from brakelab.plant.emission import RUN_IN
 from brakelab.plant.wear import RUN_IN as WEAR_RUN_IN
 from brakelab.simulation.closed_loop import new_loop, run_blocks
 from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS
+from brakelab.stretches import stretches
 from brakelab.studies.wear_drives import trip_scenario
 from ecu.algorithm.monitoring.wear import WEAR_STATE, restore_wear
 from ecu.contract.dust import MODELS
@@ -164,8 +165,7 @@ def mass_after_measurement(params: RecordArray, learned: RecordArray, worn: Arra
 
 def _told_error(rows: Array) -> float:
     """Return the error of the reported applications; rows of braking, last reported, emitted so far."""
-    edges = np.flatnonzero(np.diff(rows[:, 0], prepend=0.0, append=0.0))
-    starts, ends = edges[::2], edges[1::2]
+    starts, ends = stretches(rows[:, 0] > 0.0).T
     emitted = rows[np.minimum(ends, len(rows) - 1), 2] - rows[np.maximum(starts - LATER, 0), 2]
     said = rows[np.minimum(ends + 1, len(rows) - 1), 1]
     known = np.isfinite(said)

@@ -10,7 +10,6 @@ Its limits are measured by cars with one thing as configured, all else as drawn.
 
 import re
 import shutil
-from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final, NamedTuple
@@ -22,6 +21,7 @@ from brakelab.friction_lab.trips import GENTLE, HIGH, LOW, MILD
 from brakelab.simulation.closed_loop import Drive
 from brakelab.simulation.scenario import Phase, Scenario
 from brakelab.simulation.scenario_car import with_draw
+from brakelab.stretches import stretches
 from brakelab.studies.observers import JOINT, ORDINARY, WIDE, counted, drive_car
 from brakelab.studies.observers_cases import Setup, configured, shipped
 from brakelab.studies.stops import friction_errors
@@ -82,11 +82,9 @@ def trip_of_kinds(seed: int) -> tuple[Scenario, str]:
 def brakings(drive: Drive) -> list[NDArray[np.bool_]]:
     """Return the counted rows of each brake application, in order; shape (n,) each."""
     asked = drive.truth["decel_demand"] > 0.05
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], asked, [False]]).astype(int)))
     rows = counted(drive)
     place = np.arange(len(drive.t))
-    spans = list(pairwise(edges))[::2]
-    return [rows & (place >= begin) & (place < end) for begin, end in spans]
+    return [rows & (place >= begin) & (place < end) for begin, end in stretches(asked)]
 
 
 def plant_files(folder: Path, changes: dict[str, str]) -> str:

@@ -10,6 +10,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.stretches import stretches
+
 Array = NDArray[np.float64]
 
 KMH: Final = 1.0 / 3.6  # m/s
@@ -114,8 +116,7 @@ def brakings(t: Array, speed: Array, decel: Array) -> Brakings:
     deceleration is that of ECE R13-H, (v_b^2 - v_e^2)/(2 (s_e - s_b)), with v_b and v_e where 80 % and 10 %
     of the loss are still to come; for a stop these are the regulation's 0.8 and 0.1 of the initial speed.
     """
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], decel > BRAKING_FROM, [False]])))
-    starts, ends = edges[::2], edges[1::2]  # an end is the first sample after
+    starts, ends = stretches(decel > BRAKING_FROM).T  # an end is the first sample after
     if len(starts):
         apart = t[starts[1:]] - t[ends[:-1] - 1] >= SHORTEST_GAP
         starts, ends = starts[np.append(True, apart)], ends[np.append(apart, True)]
