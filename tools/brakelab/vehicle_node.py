@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from brakelab.plant.driver import drive
 from brakelab.simulation.closed_loop import Plans, plans
-from brakelab.simulation.faults import Link, deliver, new_link
+from brakelab.simulation.fault_kernels import Link, deliver, new_link
 from brakelab.simulation.priority import ask_for_priority
 from brakelab.simulation.scenario import Scenario, load_scenario
 from brakelab.simulation.simulate import write_columns

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from brakelab.simulation.closed_loop import Drive, Loop, new_loop, run
-from brakelab.simulation.faults import HELD, KINDS, Fault, deliver, fault_records, new_link
+from brakelab.simulation.fault_kernels import HELD, deliver, new_link
+from brakelab.simulation.faults import KINDS, Fault, fault_records
 from brakelab.simulation.outages import START_UP
 from brakelab.simulation.scenario import load_scenario
 from ecu.contract import faults as bits
@@ -182,6 +183,38 @@ def test_a_signal_is_spoilt_as_asked(
     assert error.std() == pytest.approx(spread, rel=0.25)
 
 
+WHEEL = "wheel_speed_fl"
+
+
+def _later(truth: Any, seconds: float) -> Any:
+    return np.roll(truth[WHEEL], round(100 * seconds))
+
+
+@pytest.mark.parametrize(
+    ("fault", "expected"),
+    [
+        ('kind = "set"\namount = 12.5', lambda t, truth: np.full(len(t), 12.5)),
+        # The bus carries no less than -20 rad/s.
+        ('kind = "scaled"\namount = -1.0', lambda t, truth: np.maximum(-truth[WHEEL], -20.0)),
+        ('kind = "drifting"\nrate = -4.0\nlimit = 3.0', lambda t, truth: truth[WHEEL] - np.minimum(4 * t, 3)),
+        (
+            'kind = "scale_drifting"\nrate = 0.1\nlimit = 0.05',
+            lambda t, truth: truth[WHEEL] * (1 + np.minimum(0.1 * t, 0.05)),
+        ),
+        ('kind = "delayed"\ndelay = 0.05', lambda t, truth: _later(truth, 0.05)),
+        ('kind = "delayed"\ndelay = 0.2', lambda t, truth: _later(truth, 0.2)),
+        ('kind = "swapped"', lambda t, truth: truth["wheel_speed_rl"]),
+    ],
+)  # fmt: skip
+def test_a_wheel_speed_lies_as_asked_and_no_longer(tmp_path: Path, fault: str, expected: Any) -> None:
+    signals = [WHEEL, "wheel_speed_rl"] if "swapped" in fault else [WHEEL]
+    _, drive = driven(tmp_path, f"{fault}\nsignal = {signals}")
+    lies, honest = rows(drive, 2.0, 3.0), rows(drive, 3.0, 3.9)
+    error = drive.inputs[WHEEL] - expected(drive.t - 2.0, drive.truth)
+    assert np.abs(error[lies]).max() < 0.5
+    assert np.abs(drive.inputs[WHEEL] - drive.truth[WHEEL])[honest].max() < 0.5
+
+
 @pytest.mark.parametrize(
     ("signal", "amount", "keys", "bit", "after"),
     [
@@ -262,6 +295,9 @@ def test_a_killed_daemon_is_silent_and_knows_its_friction_afterwards(
         ('kind = "lost"\nsignal = ["accel_x"]', "signal does not belong to the kind 'lost'"),
         ('kind = "lost"\nmessage = ["Imo"]', "no 'Imo' in the database"),
         ('kind = "biased"\nsignal = ["accel_w"]\namount = 1.0', "'accel_w' is none of the ECU's inputs"),
+        ('kind = "swapped"\nsignal = ["accel_x"]', "swapped are two signals"),
+        ('kind = "swapped"\nsignal = ["wheel_speed", "accel_x"]', "swapped are two signals"),
+        ('kind = "drifting"\nsignal = ["accel_x"]\nrate = 1.0', "'drifting' needs limit"),
     ],
 )
 def test_a_mistake_is_one_line(tmp_path: Path, fault: str, line: str) -> None:

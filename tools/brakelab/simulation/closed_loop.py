@@ -16,7 +16,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from brakelab.plant.driver import drive
-from brakelab.simulation.faults import Link, deliver, new_link
+from brakelab.simulation.fault_kernels import Link, deliver, new_link
 from brakelab.simulation.outages import find_outages
 from brakelab.simulation.scenario import LONGEST, Scenario
 from brakelab.simulation.vehicle_bus import (

@@ -1,4 +1,4 @@
-"""Fault injection: `[[fault]]` tables of a scenario, and the kernels that apply them.
+"""Fault injection: `[[fault]]` tables of a scenario. `fault_kernels.py` applies them.
 
 ```
 [[fault]]
@@ -13,8 +13,14 @@ share = 0.5                  # of these frames
 | lost, doubled, corrupted | message, share | frames are lost, arrive twice, arrive with one bit flipped |
 | late | message, share, delay [s] | frames arrive `delay` later |
 | stuck | signal | a signal on the bus keeps its value, its frames continue |
+| set | signal, amount | a signal has the value `amount` |
 | invalid | signal | a signal is sent as not available |
 | biased, noisy | signal, amount | `amount` is added; white noise of that standard deviation is added |
+| scaled | signal, amount | a signal is multiplied by `amount` |
+| drifting | signal, rate, limit | `rate` times the seconds since `t` is added, `limit` at most |
+| scale_drifting | signal, rate, limit | a signal is multiplied by one plus the same |
+| delayed | signal, delay [s] | a signal has the value of `delay` before |
+| swapped | signal | two signals have each other's value |
 | bus_off | | the ECU's controller is off the bus: neither side receives the other |
 | daemon_killed | standby | SIGKILL at `t`, restart after `duration`; `standby`: a second daemon stands by |
 | motor_lost | corner | motors give no torque and report none available |
@@ -28,18 +34,14 @@ frame is intact.
 import math
 from collections.abc import Sequence
 from functools import cache
-from typing import Annotated, Any, Final, Literal, NamedTuple, get_args
+from typing import Annotated, Final, Literal, get_args
 
 import numpy as np
-from numpy.random import Generator
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from ecu.bus.transmit import contract_transmit_plan
-from ecu.contract import signals
-from ecu.contract.records import FRAME, RecordArray, new_record
+from ecu.contract.records import RecordArray, new_record
 from ecu.contract.signals import CORNERS, INPUT, N_INPUTS
-from ecu.jit import Record, kernel
 from ecu.settings.resources import resource
 from ecu.settings.toml_file import Unit
 
@@ -48,37 +50,51 @@ Kind = Literal[
     "lost",
     "doubled",
     "corrupted",
+    "bus_off",
+    "daemon_killed",
     "stuck",
+    "set",
     "invalid",
     "biased",
     "noisy",
-    "bus_off",
-    "daemon_killed",
+    "scaled",
+    "drifting",
+    "scale_drifting",
+    "delayed",
+    "swapped",
     "motor_lost",
     "calliper_dead",
     "accumulator_low",
 ]
 KINDS: Final[tuple[str, ...]] = get_args(Kind)
-LATE, LOST, DOUBLED, CORRUPTED, STUCK, INVALID, BIASED, NOISY, BUS_OFF, DAEMON_KILLED = range(10)
-MOTOR_LOST, CALLIPER_DEAD, ACCUMULATOR_LOW = range(10, len(KINDS))
+LATE, LOST, DOUBLED, CORRUPTED, BUS_OFF, DAEMON_KILLED = range(6)
+STUCK, SET, INVALID, BIASED, NOISY, SCALED, DRIFTING, SCALE_DRIFTING, DELAYED, SWAPPED = range(6, 16)
+MOTOR_LOST, CALLIPER_DEAD, ACCUMULATOR_LOW = range(16, len(KINDS))
 _FRAMES: Final = {"message", "share"}
 _BELONGS: Final[dict[str, set[str]]] = {
     "late": {*_FRAMES, "delay"},
     "lost": _FRAMES,
     "doubled": _FRAMES,
     "corrupted": _FRAMES,
+    "bus_off": set(),
     "stuck": {"signal"},
+    "set": {"signal", "amount"},
     "invalid": {"signal"},
     "biased": {"signal", "amount"},
     "noisy": {"signal", "amount"},
-    "bus_off": set(),
+    "scaled": {"signal", "amount"},
+    "drifting": {"signal", "rate", "limit"},
+    "scale_drifting": {"signal", "rate", "limit"},
+    "delayed": {"signal", "delay"},
+    "swapped": {"signal"},
     "daemon_killed": {"standby"},
     "motor_lost": {"corner"},
     "calliper_dead": {"corner"},
     "accumulator_low": {"amount"},
 }
-_NEEDED: Final = {"delay", "signal", "amount"}
+_NEEDED: Final = {"delay", "signal", "amount", "rate", "limit"}
 
+LONGEST_DELAY: Final = 21  # cycles
 FAULT: Final = np.dtype(
     [
         ("kind", "i4"),
@@ -91,14 +107,15 @@ FAULT: Final = np.dtype(
         ("n_ids", "i4"),
         ("place", "u1", (N_INPUTS,)),  # 1: this input is disturbed
         ("held", "f8", (N_INPUTS,)),  # NaN: no value held
+        ("rate", "f8"),
+        ("limit", "f8"),
+        ("past", "f8", (LONGEST_DELAY, N_INPUTS)),  # values of the last cycles, a ring
+        ("newest", "i8"),  # its row
         ("corner", "u1", (4,)),
         ("standby", "u1"),
     ],
     align=True,
 )
-SLACK: Final = 1e-4  # s by which the sum of all steps may fall short of a cycle's time
-HELD: Final = 256  # delayed frames at a time
-ROOM: Final = 512  # frames that arrive in one cycle
 
 
 @cache
@@ -128,11 +145,15 @@ class Fault(BaseModel):
     share: Annotated[float, Field(gt=0.0, le=1.0), Unit("-")] = 1.0
     """Of these frames, drawn."""
     delay: Annotated[float, Field(gt=0.0, le=0.2), Unit("s")] = 0.0
-    """Of late frames."""
+    """Of late frames, of a delayed signal."""
     signal: list[str] = []
     """Inputs that are disturbed."""
     amount: float = 0.0
-    """Added, or standard deviation of the noise, in the signal's unit; the accumulator's pressure, bar."""
+    """Value, addition or standard deviation in the signal's unit; factor; the accumulator's pressure, bar."""
+    rate: float = 0.0
+    """Of a drift, in the signal's unit per second, or relative per second."""
+    limit: Annotated[float, Field(gt=0.0)] = math.inf
+    """Greatest size of a drift."""
     corner: list[Literal["fl", "fr", "rl", "rr"]] = ["fl", "fr", "rl", "rr"]
     """Wheels whose motor or calliper fails."""
     standby: bool = False
@@ -153,6 +174,8 @@ class Fault(BaseModel):
         for name in self.signal:
             if not _places(name):
                 raise ValueError(f"signal: {name!r} is none of the ECU's inputs")
+        if self.kind == "swapped" and [len(_places(name)) for name in self.signal] != [1, 1]:
+            raise ValueError("signal: swapped are two signals of one wheel each; name both")
         return self
 
     @property
@@ -186,136 +209,8 @@ def fault_records(faults: Sequence[Fault]) -> RecordArray:
         row["ids"][: len(ids)], row["n_ids"] = ids, len(ids)
         for name in fault.signal:
             row["place"][_places(name)] = 1
-        row["held"] = np.nan
+        row["rate"], row["limit"] = fault.rate, fault.limit
+        row["held"] = row["past"] = np.nan
         row["corner"] = [corner in fault.corner for corner in CORNERS]
         row["standby"] = fault.standby
     return rows
-
-
-class Link(NamedTuple):
-    """One direction of the bus."""
-
-    held: RecordArray
-    """`FRAME`s that come later, and when:"""
-    release: NDArray[np.float64]
-    """s, inf where nothing is held."""
-    arrived: RecordArray
-    """Room for what `deliver` hands over."""
-
-
-def new_link() -> Link:
-    """Return a link without delayed frames."""
-    return Link(new_record(FRAME, HELD), np.full(HELD, np.inf), new_record(FRAME, ROOM))
-
-
-@kernel
-def is_on(fault: Record, t: float) -> bool:
-    """Return whether the fault acts at `t` [s]."""
-    return bool(fault.begin <= t + SLACK < fault.end)
-
-
-@kernel
-def _hits(fault: Record, can_id: int, t: float, noise: Generator) -> bool:
-    if not is_on(fault, t):
-        return False
-    for i in range(fault.n_ids):
-        if fault.ids[i] == can_id:
-            return bool(fault.share >= 1.0 or noise.random() < fault.share)
-    return False
-
-
-@kernel
-def _hold_up(link: Link, frame: Record, release: float, delay: float) -> None:
-    for place in range(len(link.release)):
-        if math.isinf(link.release[place]):
-            link.held[place] = frame
-            link.held[place].stamp_ns += np.int64(1e9 * delay)
-            link.release[place] = release
-            return
-
-
-@kernel
-def deliver(faults: Any, link: Link, t: float, noise: Generator, frames: Any, count: int) -> int:
-    """Write the frames that arrive into `link.arrived`: of `frames[:count]`, sent at `t` [s], and of delayed
-    ones; return their number."""
-    arrived = 0
-    for place in range(len(link.release)):
-        if link.release[place] <= t + SLACK:
-            link.arrived[arrived] = link.held[place]
-            link.release[place] = np.inf
-            arrived += 1
-    for i in range(count):
-        kept, copies = True, 1
-        link.arrived[arrived] = frames[i]
-        for j in range(len(faults)):
-            fault = faults[j]
-            kind = fault.kind
-            if kind != LOST and kind != BUS_OFF and kind != LATE and kind != DOUBLED and kind != CORRUPTED:
-                continue
-            if not _hits(fault, frames[i].can_id, t, noise):
-                continue
-            if kind == CORRUPTED:
-                bit = int(noise.random() * 8 * frames[i].length)
-                link.arrived[arrived].data[bit // 8] ^= 1 << (bit % 8)
-            elif kind == DOUBLED:
-                copies = 2
-            else:
-                kept = False
-                if kind == LATE:
-                    _hold_up(link, frames[i], t + fault.delay, fault.delay)
-        if kept:
-            arrived += 1
-            if copies == 2:
-                link.arrived[arrived] = link.arrived[arrived - 1]
-                arrived += 1
-    return arrived
-
-
-@kernel
-def _spoil_signals(fault: Record, on: bool, noise: Generator, values: NDArray[np.float64]) -> None:
-    for place in range(len(fault.place)):
-        if not fault.place[place]:
-            continue
-        if not on:
-            fault.held[place] = np.nan
-        elif fault.kind == INVALID:
-            values[place] = np.nan
-        elif fault.kind == BIASED:
-            values[place] += fault.amount
-        elif fault.kind == NOISY:
-            values[place] += fault.amount * noise.standard_normal()
-        elif math.isnan(fault.held[place]):
-            fault.held[place] = values[place]
-        elif not math.isnan(values[place]):
-            values[place] = fault.held[place]
-
-
-@kernel
-def spoil_car(
-    faults: Any, t: float, noise: Generator, sound: Record, params: Record, values: NDArray[np.float64]
-) -> None:
-    """Apply faults of sensors and actuators to the values to send, shape (N_INPUTS,), and to the car.
-
-    `sound` are the car's parameters without a fault.
-    """
-    for i in range(4):
-        params.motor_share[i] = sound.motor_share[i]
-        params.pressure_limit[i] = sound.pressure_limit[i]
-    for j in range(len(faults)):
-        fault = faults[j]
-        on = is_on(fault, t)
-        if fault.kind == STUCK or fault.kind == INVALID or fault.kind == BIASED or fault.kind == NOISY:
-            _spoil_signals(fault, on, noise, values)
-        elif on and fault.kind == MOTOR_LOST:
-            for i in range(4):
-                if fault.corner[i]:
-                    params.motor_share[i] = 0.0
-        elif on and fault.kind == CALLIPER_DEAD:
-            for i in range(4):
-                if fault.corner[i]:
-                    params.pressure_limit[i] = 0.0
-        elif on and fault.kind == ACCUMULATOR_LOW:
-            for i in range(4):
-                params.pressure_limit[i] = min(params.pressure_limit[i], 1e5 * fault.amount)
-            values[signals.ACCUMULATOR_PRESSURE] = fault.amount
-            values[signals.HYDRAULIC_READY] = 0.0

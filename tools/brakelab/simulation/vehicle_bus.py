@@ -27,7 +27,8 @@ from brakelab.plant.sensor_errors import (
 from brakelab.plant.sensors import body_accelerations, true_readings
 from brakelab.plant.vehicle import new_state
 from brakelab.plant.wear import pad_wear
-from brakelab.simulation.faults import fault_records, spoil_car
+from brakelab.simulation.fault_kernels import spoil_car
+from brakelab.simulation.faults import fault_records
 from brakelab.simulation.scenario import Scenario
 from brakelab.simulation.scenario_car import scenario_plant, scenario_widths
 from ecu.contract import signals
