@@ -12,7 +12,7 @@ ROOT = Path(__file__).parent.parent
 OF_THE_SIGNAL = {"noise", "resolution", "scale", "bias", "drift", "floor", "offset", "sentinels", "amount"}
 """In the unit of a signal that the file names."""
 SAID = {"delay", "drift_time", "dropout", "dropout_length", "period", "stuck_from", "lost_from"} | {
-    *("drag_torque", "drag_growth", "lowest_speed", "ratios", "share_front")
+    *("drag_torque", "drag_growth", "lowest_speed", "ratios", "share_front", "rate", "limit")
 }
 """The simulated vehicle knows no units of the ECU; they stand in the meaning."""
 MIXED = {"coefficients", "numbers", "low", "high", "factor", "below", "above"}

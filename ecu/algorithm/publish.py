@@ -4,6 +4,7 @@ import math
 
 from ecu.algorithm.control.blending import blends
 from ecu.algorithm.estimate import STANDING
+from ecu.contract.faults import WORD
 from ecu.contract.signals import CALLIPER_PRESSURE, FAILED
 from ecu.jit import Record, kernel
 
@@ -18,7 +19,7 @@ def publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: in
         u: `INPUTS` with implausible ones masked out.
         y: `OUTPUTS`, already holding the demanded pressures and motor torques.
         decel: demanded [m/s^2], may be NaN.
-        faults: the bits of `active_faults`.
+        faults: mask of both words.
         mode: of the ECU.
     """
     e = s.estimate
@@ -27,7 +28,7 @@ def publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: in
     y.vehicle_speed = e.speed if started else math.nan
     y.k_f = e.k_f
     y.mode = mode
-    y.active_faults = faults
+    y.active_faults, y.active_faults_2 = faults & (1 << WORD) - 1, faults >> WORD
     y.overruns = u.overruns
     y.worst_lateness_us = u.worst_lateness_us
     y.pressure_demand_valid = 1.0 if s.plausibility.sent else 0.0

@@ -1,9 +1,20 @@
-"""Fault bits of `active_faults`, each with its meaning and remedy.
+"""Fault bits of `active_faults` and `active_faults_2`, each with its meaning and remedy.
 
-The table is the single source: events, reports and docs/faults.md repeat it.
+The table is the single source: events, reports and docs/faults.md repeat it. A mask here holds both words: bits
+0 to 31 are those of `active_faults`, bits 32 to 62 those of `active_faults_2` from its bit 0 on.
 """
 
-from typing import Final, NamedTuple
+from collections.abc import Mapping
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ecu.contract.signals import CORNERS
+
+WORDS: Final = ("active_faults", "active_faults_2")
+WORD: Final = 32
+"""Bits of a word."""
 
 
 class Fault(NamedTuple):
@@ -47,6 +58,31 @@ E2E_REJECTIONS: Final = 1 << 28
 BRAKE_FAILED: Final = 1 << 29
 DEMAND_LOST: Final = 1 << 30
 
+
+def _corners(stem: str, meaning: str, remedy: str) -> list[tuple[str, str, str]]:
+    return [(f"{stem}_{corner}", meaning, remedy) for corner in CORNERS]
+
+
+# An input that the others contradict is left out, or corrected where the text says so: in the order of the bits.
+_CONTRADICTED: Final = (
+    *_corners("wheel_speed", "turns as the other wheels and the car's motion do not allow, or is far noisier than configured: it is left out", "check that wheel's sensor, its wires and the tyre's size"),
+    ("accel_x", "zero or scale have drifted from what wheels and torques show: it is corrected by what is known of them, or left out", "check mounting, supply and calibration of the IMU"),
+    ("accel_y", "contradicts yaw rate, steering and wheels: it is left out", "check mounting, supply and calibration of the IMU"),
+    ("yaw_rate", "contradicts lateral acceleration, steering and wheels: it is left out", "check mounting, supply and calibration of the IMU"),
+    ("steering_angle", "contradicts yaw rate, lateral acceleration and wheels: it is left out", "check the zero and the ratio of the steering sensor"),
+    *_corners("calliper_pressure", "differs from the pressure demanded while the car brakes as demanded: the pressure that follows from the demand stands for it", "check that wheel's pressure sensor and valve, and the receiver of PressureDemand*"),
+    *_corners("motor_torque", "differs from what was demanded of that motor, or from what the car does: it is left out", "check the inverter and the sender of Motor*"),
+    ("vehicle_speed", "contradicts the wheels and the acceleration: it is left out", "check the receiver or the sensor of the speed over ground"),
+    ("accumulator_pressure", "less than a calliper's pressure: it limits nothing", "check the sender of HydraulicStatus"),
+    ("reverse", "the car drives forwards: too fast for a reverse gear, engaged while moving, or decelerating as only forwards; it is taken for 0", "check the sender of reverse"),
+    ("abs_active", "stands for longer than an ABS acts, or without a braking: it is taken for 0", "check the sender of abs_active"),
+    ("esp_active", "stands for longer than an ESP acts: it is taken for 0", "check the sender of esp_active"),
+    ("accelerator_position", "does not return through several brakings: what it returned to last counts as its rest", "check the pedal sensor and the factor and offset of the map"),
+)  # fmt: skip
+IMPLAUSIBLE: Final = {row[0]: 1 << (WORD + place) for place, row in enumerate(_CONTRADICTED)}
+"""Bit of each input that is watched, by its name."""
+REAR_HELD: Final = 1 << (WORD + 30)
+
 FAULTS: Final = (
     Fault(WHEEL_SPEED_LOST, "wheel speed lost", "a wheel speed is stale or invalid", "check the sender of WheelSpeed*"),
     Fault(IMU_LOST, "IMU lost", "longitudinal acceleration is stale or invalid", "check the sender of Imu"),
@@ -79,6 +115,8 @@ FAULTS: Final = (
     Fault(E2E_REJECTIONS, "E2E rejections", "of a protected message more frames come than its sender makes, or many are rejected: nothing is learned, and a request in doubt is not lowered", "look for a second sender of that message and for disturbances of the bus: `brake-ecu doctor -i -c` counts them"),
     Fault(BRAKE_FAILED, "brake gives nothing", "a calliper has far less pressure than demanded, and the car brakes less by its share: the other wheels and the motors brake in its place", "stop; look for a leak, a valve that does not open, or a line that is shut"),
     Fault(DEMAND_LOST, "automated demand lost", "an automated demand that was followed is stale or invalid without having been withdrawn: it is kept for 0.1 s while its frames come, then the pedal alone brakes", "check the sender of decel_demand: range, decel_demand_valid, cycle"),
+    *(Fault(IMPLAUSIBLE[name], f"{name} implausible", meaning, remedy) for name, meaning, remedy in _CONTRADICTED),
+    Fault(REAR_HELD, "trailing axle held back", "its wheels slip more than those of the leading axle: torque has moved to the leading axle", "compare slip and friction of both axles in the report"),
 )  # fmt: skip
 
 DEGRADING: Final = (
@@ -93,6 +131,19 @@ DEGRADING: Final = (
     | E2E_REJECTIONS
     | BRAKE_FAILED
 )
+
+
+def fault_mask(outputs: Mapping[str, Any] | NDArray[np.void] | np.void) -> NDArray[np.int64]:
+    """Return the mask of both words, of any shape, from `active_faults` and, where there, `active_faults_2`.
+
+    Args:
+        outputs: columns by name, or a record or records with these fields; NaN counts as no fault.
+    """
+    names = outputs.dtype.names if isinstance(outputs, np.ndarray | np.void) else outputs
+    mask = np.nan_to_num(np.asarray(outputs["active_faults"])).astype(np.int64)
+    if names is not None and "active_faults_2" in names:
+        mask = mask | np.nan_to_num(np.asarray(outputs["active_faults_2"])).astype(np.int64) << WORD
+    return np.asarray(mask, np.int64)
 
 
 def fault_names(mask: int) -> list[str]:

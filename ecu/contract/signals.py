@@ -137,6 +137,7 @@ OUTPUT_SIGNALS: Final[tuple[OutputSignal, ...]] = (
     OutputSignal("particles_last_brake", "-", False, "ParticleEmissions"),
     OutputSignal("particles_per_km", "1/km", False, "ParticleEmissions"),
     OutputSignal("active_faults", "-", False, "EcuStatus"),
+    OutputSignal("active_faults_2", "-", False, "EcuFaults"),
     OutputSignal("overruns", "-", False, "EcuStatus"),
     OutputSignal("worst_lateness_us", "us", False, "EcuStatus"),
     # Beyond the contract: quantities for the interpretation of results.

@@ -5,7 +5,7 @@ from typing import Any, Final
 import numpy as np
 import structlog
 
-from ecu.contract.faults import FAULTS, fault_names
+from ecu.contract.faults import FAULTS, fault_mask, fault_names
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import STARTING
 from ecu.recording.log import Throttle
@@ -27,7 +27,7 @@ class EventLog:
         """Continue after an earlier log that ended with `record` (`RECORDED`, shape (1,)); `lost`: cycles and
         frames that the reader had missed by then."""
         cycle, outputs = record["cycle"][0], record["outputs"][0]
-        self._mode, self._faults = (int(np.nan_to_num(outputs[name])) for name in ("mode", "active_faults"))
+        self._mode, self._faults = int(np.nan_to_num(outputs["mode"])), int(fault_mask(outputs))
         self._overruns, self._dropped = int(cycle["overruns"]), int(cycle["dropped"])
         self._speaks = bool(cycle["speaks"])
         self._lost = lost
@@ -36,7 +36,7 @@ class EventLog:
         """Log the changes within `records` (`RECORDED`, shape (n,)); `lost_*`: missed by the reader."""
         cycles, outputs = records["cycle"], records["outputs"]
         mode = np.nan_to_num(outputs["mode"]).astype(np.int64)
-        faults = np.nan_to_num(outputs["active_faults"]).astype(np.int64)
+        faults = fault_mask(outputs)
         faults[mode == STARTING] &= ~_INPUT_FAULTS
         changed = (mode != np.r_[self._mode, mode[:-1]]) | (faults != np.r_[self._faults, faults[:-1]])
         for row in np.flatnonzero(changed):

@@ -11,6 +11,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ecu.contract.faults import WORDS
 from ecu.contract.records import CYCLE, RecordArray
 from ecu.contract.signals import CORNERS
 from ecu.recording.events import EventLog
@@ -27,7 +28,7 @@ EVENTS: Final = 200
 LATENESS_US: Final = (20, 50, 100, 200, 500, 1000, 2000, 5000, 10000)
 """Upper edges of the histogram of lateness; later ones are counted behind the last."""
 
-PLAIN: Final = ("mode", "active_faults", "vehicle_speed", "decel_demand_total", "accel_x_road")
+PLAIN: Final = ("mode", *WORDS, "vehicle_speed", "decel_demand_total", "accel_x_road")
 OF_CORNERS: Final = (
     "mu_b",
     "sigma_mu_b",

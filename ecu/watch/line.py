@@ -4,7 +4,7 @@ import json
 import math
 import time
 
-from ecu.contract.faults import fault_names
+from ecu.contract.faults import WORDS, fault_mask, fault_names
 from ecu.contract.signals import CORNERS
 from ecu.recording.events import MODES
 from ecu.watch.history import COLUMN, COLUMNS, LATENESS_US, OF_CORNERS, Row
@@ -13,8 +13,7 @@ from ecu.watch.watcher import Watcher
 
 def faults_of(row: Row) -> list[str]:
     """Return the names of the faults that are active in a row."""
-    mask = row[COLUMN["active_faults"]]
-    return fault_names(int(mask)) if math.isfinite(mask) else []
+    return fault_names(int(fault_mask({name: row[COLUMN[name]] for name in WORDS})))
 
 
 def mode_of(row: Row) -> str:

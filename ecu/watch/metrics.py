@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from ecu.contract.faults import FAULTS
+from ecu.contract.faults import FAULTS, fault_mask
 from ecu.contract.records import STAGES
 from ecu.contract.signals import CORNERS
 from ecu.recording.events import MODES
@@ -128,7 +128,7 @@ def _state(outputs: np.void) -> Iterator["Metric"]:
         modes = [(name, float(place == int(mode))) for place, name in enumerate(MODES)]
         yield _labelled(GaugeMetricFamily, "mode", "mode", "1 for the mode that the ECU is in", modes)
     if math.isfinite(outputs["active_faults"]):
-        mask = int(outputs["active_faults"])
+        mask = int(fault_mask(outputs))
         faults = [(fault.name, float(bool(mask & fault.bit))) for fault in FAULTS]
         yield _labelled(GaugeMetricFamily, "fault", "fault", "1 for a fault that is active", faults)
     for name, column, text in (

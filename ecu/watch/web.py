@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ecu.contract.faults import FAULTS
+from ecu.contract.faults import FAULTS, WORD
 from ecu.contract.signals import CORNERS
 from ecu.recording.events import MODES
 from ecu.watch.history import COLUMNS, LATENESS_US, REMEMBERED_S, SHOWN_S, Row
@@ -69,9 +69,14 @@ class Shared:
 
 
 def _numbers(row: Row) -> Iterable[float | None]:
-    """Return a row for JSON: times to the millisecond, the rest to five digits, null for NaN."""
-    rest = [float(f"{value:.5g}") if math.isfinite(value) else None for value in row[2:].tolist()]
-    return [*np.round(row[:2], 3).tolist(), *rest]
+    """Return a row for JSON: times to the millisecond, whole numbers as they are, the rest to five digits."""
+    return [*np.round(row[:2], 3).tolist(), *map(_short, row[2:].tolist())]
+
+
+def _short(value: float) -> float | None:
+    if not math.isfinite(value):
+        return None
+    return value if value.is_integer() else float(f"{value:.5g}")
 
 
 @cache
@@ -81,7 +86,7 @@ def page() -> bytes:
         "columns": COLUMNS,
         "corners": CORNERS,
         "modes": MODES,
-        "faults": [[fault.bit, fault.name, fault.remedy] for fault in FAULTS],
+        "faults": [[*divmod(fault.bit.bit_length() - 1, WORD), fault.name] for fault in FAULTS],
         "edges": LATENESS_US,
         "shown": SHOWN_S,
         "remembered": REMEMBERED_S,

@@ -45,6 +45,7 @@ def test_a_second_of_the_ecu() -> None:
         "BlcfFront": 50,
         "BlcfRear": 50,
         "EcuStatus": 10,
+        "EcuFaults": 10,
         "DiscTemperature": 10,
         "PadWear": 1,
         "ParticleEmissions": 1,

@@ -48,6 +48,15 @@ def test_the_page_asks_for_nothing_elsewhere(watched):
     assert tuple(about["columns"]) == COLUMNS
 
 
+def test_a_word_of_faults_keeps_every_bit(watched):
+    one, shared, port = watched
+    words = {"active_faults": 0x8001_0001, "active_faults_2": 0x4000_0011}
+    one.publish(4, **words)
+    shared.turn()
+    row = dict(zip(COLUMNS, news(ask(port, "GET", "/stream"))["rows"][-1], strict=True))
+    assert {name: row[name] for name in words} == words
+
+
 def test_every_viewer_gets_all_rows_and_then_the_new_ones(watched):
     one, shared, port = watched
     viewers = [ask(port, "GET", "/stream") for _ in range(3)]

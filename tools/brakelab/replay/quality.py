@@ -12,7 +12,7 @@ from brakelab.log_physics.judge import Judged
 from brakelab.logs.log_quality import Damage, LogQuality, SignalQuality
 from ecu.bus.freshness import RATE_TOLERANCE
 from ecu.bus.receive import ReceivePlan, Reception
-from ecu.contract.faults import FAULTS
+from ecu.contract.faults import FAULTS, WORDS, fault_mask
 from ecu.contract.records import EXTENDED_ID, RecordArray
 from ecu.contract.signals import DEGRADED, INPUT_SIGNALS, N_INPUTS, OUTPUT
 
@@ -77,7 +77,7 @@ class Findings:
 def note_faults(findings: Findings, values: NDArray[np.float64]) -> None:
     """Count the faults in rows of results, shape (n, N_ROW)."""
     faulty = values[:, OUTPUT["mode"]] >= DEGRADED
-    masks = values[faulty, OUTPUT["active_faults"]].astype(np.int64)
+    masks = fault_mask({name: values[faulty, OUTPUT[name]] for name in WORDS})
     findings.faulty_rows += len(masks)
     for fault in FAULTS:
         findings.fault_rows[fault.bit] += int(np.count_nonzero(masks & fault.bit))

@@ -9,7 +9,7 @@ from bokeh.models.annotations import Legend
 from brakelab.report.downsample import Buckets, worst
 from brakelab.report.drive import Drive, Vector
 from brakelab.report.look import DEGRADED, ESTIMATE, FAILED, HOLDING, IDLE, new_figure
-from ecu.contract.faults import FAULTS
+from ecu.contract.faults import FAULTS, WORD, WORDS, fault_mask
 from ecu.contract.signals import CORNERS, STARTING
 
 # Appearance of each state: (label of the legend, colour)
@@ -36,19 +36,21 @@ class Bar(NamedTuple):
 
 
 def fault_masks(drive: Drive) -> np.ndarray[Any, np.dtype[np.int64]]:
-    """Return `active_faults` per row, 0 where it is not available, shape (n,).
+    """Return the mask of active faults per row, 0 where it is not available, shape (n,).
 
     While the ECU starts, inputs not yet received count as lost, which is no fault.
     """
-    masks = np.where(drive.column("mode") == STARTING, 0.0, drive.column("active_faults"))
-    return np.asarray(np.nan_to_num(masks).astype(np.int64))
+    words = {name: drive.column(name) for name in WORDS}
+    return np.where(drive.column("mode") == STARTING, 0, fault_mask(words))
 
 
 def faults_seen(drive: Drive) -> dict[int, str]:
     """Return bit mask and name of every fault that was active at some time."""
     seen = int(np.bitwise_or.reduce(fault_masks(drive)))
     names = {fault.bit: fault.name for fault in FAULTS}
-    return {1 << bit: names.get(1 << bit, f"fault bit {bit}") for bit in range(32) if seen >> bit & 1}
+    return {
+        1 << bit: names.get(1 << bit, f"fault bit {bit}") for bit in range(2 * WORD - 1) if seen >> bit & 1
+    }
 
 
 def _bars(row: str, t: Vector, end: float, levels: Vector, states: tuple[tuple[str, str], ...]) -> list[Bar]:

@@ -37,7 +37,15 @@ MATTERS: Final = {
 }
 """Least difference that matters, by unit."""
 OF_RMS: Final = 0.01
-EXACT: Final = ("mode", "active_faults", "braking", "overruns", "pressure_demand_valid", "motor_demand_valid")
+EXACT: Final = (
+    "mode",
+    "active_faults",
+    "active_faults_2",
+    "braking",
+    "overruns",
+    "pressure_demand_valid",
+    "motor_demand_valid",
+)
 BRAKES: Final = "brake applications"
 PROVENANCE: Final = ("version", "vehicle", "observer", "config_hash", "database_hash", "inputs")
 

@@ -31,7 +31,7 @@ ROW_COLUMNS: Final = OUTPUT_COLUMNS + tuple(signal.name for signal in MEASURED)
 N_ROW: Final = len(ROW_COLUMNS)
 
 _SMALL: Final = {"mode", "mode_mu_b", "pressure_demand_valid", "motor_demand_valid", "braking"}
-_COUNTS: Final = {"active_faults", "overruns"}
+_COUNTS: Final = {"active_faults", "active_faults_2", "overruns"}
 
 
 def _row_schema() -> pa.Schema:

@@ -23,7 +23,7 @@ from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.scenario import Scenario, load_scenario
 from brakelab.vehicle_node import warm_up
 from ecu.compiling import compiling_told
-from ecu.contract.faults import fault_names
+from ecu.contract.faults import fault_mask, fault_names
 from ecu.errors import RunFault, UserError
 from ecu.output import give, say
 from ecu.settings.config import Config, load_config
@@ -108,7 +108,7 @@ def _undisturbed(scenario: Scenario, vehicle: Config, seed: int) -> Undisturbed:
     if not scenario.fault:
         return Undisturbed(math.nan, frozenset())
     sound = run(new_loop(scenario.model_copy(update={"fault": []}), vehicle, seed))
-    mask = int(np.bitwise_or.reduce(np.nan_to_num(sound.outputs["active_faults"]).astype(np.int64)))
+    mask = int(np.bitwise_or.reduce(fault_mask(sound.outputs)))
     return Undisturbed(stopping_distance(Drive(sound.t, sound.truth, {})), frozenset(fault_names(mask)))
 
 
