@@ -35,7 +35,7 @@ from ecu.algorithm.control.distribution import (
 from ecu.algorithm.control.failed_brakes import FAILED_BRAKES_STATE, replace_failed
 from ecu.algorithm.control.friction_torque import lagging_torque
 from ecu.algorithm.control.limiter import LIMITER_STATE, available_pressure, limit_axle, reads_empty
-from ecu.algorithm.control.mode import MODE_STATE, decide_mode, input_faults, speaks
+from ecu.algorithm.control.mode import MODE_STATE, decide_mode, input_faults, request_lost, speaks
 from ecu.algorithm.control.pressure_law import (
     PRESSURE_LAW_STATE,
     compensated_pressure,
@@ -204,6 +204,7 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
     u = s.trusted
     hold_pedal(p, s.demand, u)
     faults |= hold_automated(s.demand, u, dt)
+    faults |= request_lost(p, u)
     _estimate(p, s, u, contradicted, dt)
     update_discs(p, s.discs, s.learned, u, s.estimate, s.application, dt)
     update_wear(p, s.wear, s.learned, u, s.estimate, s.discs, s.application, dt)

@@ -62,7 +62,7 @@ def _asked_by_nobody(params: Record) -> bool:
 
 @kernel
 def input_faults(params: Record, inputs: Record) -> int:
-    """Return the fault bits that the inputs show."""
+    """Return the fault bits that the inputs as received show."""
     faults = 0
     for i in range(4):
         if not usable(inputs, WHEEL_SPEED + i):
@@ -73,9 +73,6 @@ def input_faults(params: Record, inputs: Record) -> int:
             faults |= MOTOR_TORQUE_LOST
     if not usable(inputs, ACCEL_X):
         faults |= IMU_LOST
-    known = pedal_known(params, inputs) or automated_demand_valid(inputs) or _asked_by_nobody(params)
-    if not known:
-        faults |= REQUEST_LOST
     if _lost(params, inputs, PEDAL_POSITION):
         faults |= PEDAL_LOST
     for place in (STEERING_ANGLE, YAW_RATE, ACCEL_Y):
@@ -91,6 +88,13 @@ def input_faults(params: Record, inputs: Record) -> int:
     if usable(inputs, HYDRAULIC_READY) and inputs.value[HYDRAULIC_READY] < 0.5:
         faults |= HYDRAULICS_NOT_READY
     return faults
+
+
+@kernel
+def request_lost(params: Record, trusted: Record) -> int:
+    """Return the fault bit of a request that is unknown, by the inputs with held demands substituted."""
+    known = pedal_known(params, trusted) or automated_demand_valid(trusted) or _asked_by_nobody(params)
+    return 0 if known else REQUEST_LOST
 
 
 @kernel

@@ -14,6 +14,7 @@ from ecu.contract.params import OFF
 from ecu.contract.records import OUTPUTS, output_vector
 from ecu.contract.signals import (
     ACTIVE,
+    ALIVE,
     CORNERS,
     DEGRADED,
     FAILED,
@@ -23,6 +24,7 @@ from ecu.contract.signals import (
     OBSERVING,
     OUTPUT_COLUMNS,
     READY,
+    USABLE,
 )
 
 G, DT = 9.81, 0.01
@@ -201,6 +203,32 @@ def test_no_pedal_and_no_demand_is_failed_and_flagged_invalid(params, feed) -> N
     assert int(column(row, "active_faults")[0]) & REQUEST_LOST
     assert column(row, "pressure_demand_valid")[0] == 0
     assert [column(row, f"pressure_demand_{c}")[0] for c in CORNERS] == [0.0] * 4
+
+
+@pytest.mark.parametrize("lost", ["decel_demand", "decel_demand_valid"])
+@pytest.mark.parametrize("pedal", [True, False], ids=["pedal received", "no pedal on the bus"])
+@pytest.mark.parametrize(("cycles", "without"), [(1, 0), (5, 0), (10, 0), (12, 2)])
+def test_an_automated_demand_that_is_lost_is_kept_for_a_tenth_of_a_second(
+    params, feed, cycles: int, without: int, pedal: bool, lost: str
+) -> None:
+    """Its frames go on, but say "not available"."""
+    params[0]["transmit"] = 1
+    car = Car(params, feed)
+    if not pedal:
+        for name in ("pedal_position", "pedal_pressed"):
+            car.inputs[0]["verdict"][INPUT[name]] = 0
+    car.overwrite = {"decel_demand": 4.0, "decel_demand_valid": 1.0}
+    asked = car.drive((0.0, 1.0))[-1:]
+    car.inputs[0]["verdict"][INPUT[lost]] = ALIVE
+    during = car.drive((0.0, cycles * DT))
+    car.inputs[0]["verdict"][INPUT[lost]] = USABLE
+    after = car.drive((0.0, 0.02))
+    kept = column(during, "decel_demand_total") == column(asked, "decel_demand_total")
+    assert kept.tolist() == [True] * (cycles - without) + [False] * without
+    assert column(after, "decel_demand_total").tolist() == [4.0, 4.0]
+    failed = np.zeros(cycles, bool) if pedal else ~kept
+    assert (column(during, "mode") == FAILED).tolist() == failed.tolist()
+    assert (column(during, "pressure_demand_valid") == 0).tolist() == failed.tolist()
 
 
 def test_a_lost_wheel_speed_degrades_and_braking_goes_on(params, feed) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ecu.algorithm.control.mode import MODE_STATE, decide_mode, input_faults, speaks
+from ecu.algorithm.control.mode import MODE_STATE, decide_mode, input_faults, request_lost, speaks
 from ecu.contract.faults import (
     BUS_OFF,
     DEMAND_LIMITED,
@@ -80,7 +80,7 @@ def test_what_a_lost_input_means(params, feed, case, lost, valid, bits, mode, ve
     inputs = feed(**ALL_GOOD | {"decel_demand_valid": float(valid)})
     for name in lost:
         inputs[0]["verdict"][INPUT[name]] = verdict
-    faults = input_faults(params[0], inputs[0])
+    faults = input_faults(params[0], inputs[0]) | request_lost(params[0], inputs[0])
     assert faults == bits
     assert decide_mode(running(), faults, False, 0.01) == mode
     expected = mode if mode in (DEGRADED, FAILED) else ACTIVE
@@ -167,7 +167,7 @@ def test_a_shadow_without_any_source_of_a_demand_misses_none(params, feed, mappe
         inputs[0]["verdict"][INPUT[name]] = 0
     for name in ("pedal_position", "decel_demand"):
         params[0]["mapped"][INPUT[name]] = name in mapped
-    assert input_faults(params[0], inputs[0]) == bits
+    assert input_faults(params[0], inputs[0]) | request_lost(params[0], inputs[0]) == bits
 
 
 @pytest.mark.parametrize(
