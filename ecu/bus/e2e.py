@@ -1,4 +1,4 @@
-"""End-to-end protection: checks that a frame is intact and the next one of its sender.
+"""End-to-end protection: checks that a frame is intact. Whether it is its sender's next: `sequence.py`.
 
 Checksum rules, by the names that signal maps use:
 
@@ -13,23 +13,14 @@ hyundai_sum      last byte = sum of all other bytes (0x153)
 hyundai_xor      high nibble of the last byte = XOR of all other nibbles (0x2B0)
 
 Each maker's rule holds for every frame of the recorded drives that the tests read.
-
-Counter: a sender keeps a grid, one count a period. While it lives (an accepted frame not older than `LIVING`
-periods) a frame fits if it arrives at the grid position given by its counter: within half a period, or a
-quarter while another stream claims the sequence. So a stream replayed beside its sender does not fit,
-regardless of lost frames, unless it is in phase with the sender: then two frames claim one position, which is
-reported (CROSSED), and the nearer one keeps the grid. Undisputed frames later than the grid belong to a
-delayed sender: it gets a new grid, unless a frame of the former one still arrives. A lost sender is accepted
-again as by AUTOSAR's P01 check, with any counter step that the elapsed time allows, or after three consistent
-frames: so after a restart it is back within `LIVING` periods and two. `link.py` judges the stream.
 """
 
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ecu.jit import Record, kernel
+from ecu.jit import kernel
 
 NO_CHECKSUM, AUTOSAR_P01, FORD_BRAKE_SN_4, FORD_ACCEL_DATA, TOYOTA, HYUNDAI_SUM, HYUNDAI_XOR = range(7)
 RULES: Final = {
@@ -45,15 +36,6 @@ SHORTEST: Final = {"autosar_p01": 2, "ford_brake_sn_4": 4, "ford_accel_data": 8}
 
 P01_MODULO: Final = 15  # counter 0–14
 P01_COUNTER_START, P01_COUNTER_LENGTH = 8, 4
-
-# Results of the counter check
-IN_SEQUENCE, SOME_LOST, RESYNCHRONISED, REPEATED, WRONG_SEQUENCE, CROSSED = range(6)
-LIVING: Final = 6.5
-"""Periods without a frame that a sender may lose, five frames and their jitter, before it is gone."""
-_FRAMES_TO_RESYNCHRONISE: Final = 3  # first frame out of sequence and two consistent with it
-_GRID_GAIN: Final = 0.25  # of a frame's lateness in the grid: slower than jitter, faster than drift
-_DOUBTED_GAIN: Final = 0.0625  # five frames of another sender do not shift it
-DOUBT_NS: Final = 1_000_000_000  # duration of the doubt after one frame out of place
 
 
 def _crc8_table() -> NDArray[np.uint8]:
@@ -110,142 +92,3 @@ def checksum_holds(rule: int, data: NDArray[np.uint8], length: int, can_id: int,
             total ^= int(data[i]) ^ (int(data[i]) >> 4)
         return int(data[last]) >> 4 == (total ^ int(data[last])) & 0xF
     return True
-
-
-# Stored state of a sender's counter between frames; wide types, since kernels compute with them
-SEQUENCE: Final = [
-    ("accepted_ns", "i8"),  # stamp of the last frame accepted
-    ("expected_ns", "i8"),  # its position on the grid
-    ("grid_ns", "i8"),  # the same, with the grid's own correction
-    ("disputed_ns", "i8"),  # stamp of the last frame that claimed the sequence without fitting
-    ("doubted_ns", "i8"),  # stamp of the last reason to doubt the sender of accepted frames
-    ("candidate_ns", "i8"),
-    ("former_ns", "i8"),  # grid of a sender that seemed delayed, while it may be alive
-    ("former_until_ns", "i8"),
-    ("former", "i8"),  # its counter
-    ("counter", "i8"),
-    ("candidate", "i8"),
-    ("consistent", "i8"),
-    ("started", "u1"),
-]
-
-
-@kernel
-def _lasts(told_ns: int, stamp_ns: int) -> bool:
-    """Return whether a report is still in force; 0: never made."""
-    return told_ns > 0 and stamp_ns - told_ns < DOUBT_NS
-
-
-@kernel
-def in_doubt(state: Record, stamp_ns: int) -> bool:
-    """Return whether accepted frames may have more than one sender: reported within the last second."""
-    return _lasts(state.doubted_ns, stamp_ns)
-
-
-@kernel
-def _accept(state: Record, counter: int, stamp_ns: int, expected_ns: int) -> None:
-    gain = _DOUBTED_GAIN if in_doubt(state, stamp_ns) else _GRID_GAIN
-    state.counter = counter
-    state.accepted_ns = stamp_ns
-    state.expected_ns = expected_ns
-    state.grid_ns = expected_ns + int(gain * (stamp_ns - expected_ns))
-    state.consistent = 0
-    state.started = 1
-
-
-@kernel
-def _dispute(state: Record, stamp_ns: int) -> None:
-    state.disputed_ns = state.doubted_ns = stamp_ns
-
-
-@kernel
-def _takes_back(state: Record, counter: int, modulo: int, stamp_ns: int, period_ns: int) -> bool:
-    """Accept a frame that fits the former grid: its sender was not delayed, another one had sent."""
-    expected_ns = state.former_ns + (counter - state.former) % modulo * period_ns
-    fits: bool = stamp_ns <= state.former_until_ns and abs(stamp_ns - expected_ns) <= period_ns // 2
-    if fits:
-        _dispute(state, stamp_ns)
-        _accept(state, counter, stamp_ns, expected_ns)
-        state.former_until_ns = 0
-    return fits
-
-
-@kernel
-def _resynchronise(
-    state: Record, counter: int, modulo: int, stamp_ns: int, period_ns: int, gone: bool
-) -> Any:
-    """Take a frame that does not fit as a candidate; accept the third one of a lost sender."""
-    cycles = (stamp_ns - state.candidate_ns + period_ns // 2) // period_ns
-    consistent = 1 <= (counter - state.candidate) % modulo <= cycles
-    state.consistent = min(state.consistent + 1, _FRAMES_TO_RESYNCHRONISE) if consistent else 1
-    state.candidate = counter
-    state.candidate_ns = stamp_ns
-    if gone and state.consistent >= _FRAMES_TO_RESYNCHRONISE:
-        _accept(state, counter, stamp_ns, stamp_ns)
-        return RESYNCHRONISED
-    _dispute(state, stamp_ns)
-    return WRONG_SEQUENCE
-
-
-@kernel
-def check_counter(
-    state: Record, counter: int, modulo: int, stamp_ns: int, period_ns: int, slowest_ns: int
-) -> Any:
-    """Judge a frame's counter and store it in `state` (fields of `SEQUENCE`); the first frame is accepted.
-
-    Args:
-        state: fields of `SEQUENCE`, overwritten.
-        counter: of the frame.
-        modulo: of the counter.
-        stamp_ns: of the frame.
-        period_ns: between two frames.
-        slowest_ns: the longest period of a sender with a variable one; with it there is no grid.
-
-    Returns IN_SEQUENCE, SOME_LOST or RESYNCHRONISED (accepted), REPEATED, WRONG_SEQUENCE or CROSSED: a second
-    frame at the sequence position of the last accepted one (rejected).
-    """
-    if counter >= modulo:
-        return WRONG_SEQUENCE
-    since_accepted = stamp_ns - state.accepted_ns
-    if not state.started or since_accepted < -period_ns:  # the clock was set back
-        _accept(state, counter, stamp_ns, stamp_ns)
-        return IN_SEQUENCE
-    elapsed = stamp_ns - state.grid_ns
-    step = (counter - state.counter) % modulo
-    if step == 0:
-        _dispute(state, stamp_ns)
-        if since_accepted > period_ns // 2:
-            return REPEATED
-        nearer = abs(stamp_ns - state.expected_ns) < abs(state.accepted_ns - state.expected_ns)
-        if nearer:
-            _accept(state, counter, stamp_ns, state.expected_ns)
-        return CROSSED
-    found = IN_SEQUENCE if step == 1 else SOME_LOST
-    gone = since_accepted > LIVING * slowest_ns
-    if gone:
-        if step <= 1 + (elapsed + period_ns // 2) // period_ns:
-            _accept(state, counter, stamp_ns, stamp_ns)
-            return found
-        return _resynchronise(state, counter, modulo, stamp_ns, period_ns, gone)
-    disputed = _lasts(state.disputed_ns, stamp_ns)
-    tolerance = period_ns // 4 if disputed else period_ns // 2
-    if slowest_ns > period_ns:
-        tolerance = period_ns  # without a grid the frame before may have been the late one
-    early = step * period_ns - elapsed
-    if early > tolerance or (disputed and elapsed - step * slowest_ns > tolerance):
-        if _takes_back(state, counter, modulo, stamp_ns, period_ns):
-            return SOME_LOST
-        return _resynchronise(state, counter, modulo, stamp_ns, period_ns, gone)
-    if elapsed - step * slowest_ns > tolerance:
-        state.former_ns, state.former = state.grid_ns, state.counter
-        state.former_until_ns = state.accepted_ns + int(LIVING * period_ns)
-        state.doubted_ns = stamp_ns
-        _accept(state, counter, stamp_ns, stamp_ns)
-        return found
-    if abs(early) > period_ns // 4 and slowest_ns == period_ns:
-        state.doubted_ns = stamp_ns
-    if slowest_ns > period_ns:
-        _accept(state, counter, stamp_ns, stamp_ns)
-    else:
-        _accept(state, counter, stamp_ns, stamp_ns + early)
-    return found

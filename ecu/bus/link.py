@@ -13,7 +13,7 @@ out of sequence is neither, as in AUTOSAR. One window serves all states, so MIN_
 
 A stream is loud, and reported as a fault for `TOLD_NS`, if `MANY_REJECTED` frames of the window were rejected
 for any reason, or if it carries more frames than one sender makes: those beyond `FASTER` times its rate fill
-a bucket, whose limit is `CROWD` periods.
+a bucket, whose limit is `CROWD` periods; as many periods without a frame may be caught up.
 """
 
 from typing import Any, Final
@@ -28,7 +28,7 @@ MIN_OK, MAX_ERROR = 9, 5
 MIN_OK_AGAIN, MAX_ERROR_AGAIN = 12, 2
 MANY_REJECTED: Final = 8
 FASTER: Final = 1.25  # times its rate, limit of one sender: clock error, and late frames caught up
-CROWD: Final = 16.0  # periods: frames held up for 0.16 s and then sent at once are no excess
+CROWD: Final = 16.0  # periods
 TOLD_NS: Final = 1_000_000_000
 _MASK: Final = (1 << WINDOW) - 1
 
@@ -92,12 +92,14 @@ def judge_link(state: Record, status: int, stamp_ns: int, period_ns: int, slowes
         slowest_ns: longest period, where the sender's is variable.
     """
     elapsed = max(stamp_ns - state.checked_ns, 0)
-    if state.link != NODATA:
+    periods, missed = elapsed / period_ns, max(-state.crowd, 0.0)
+    if state.link != NODATA and elapsed >= slowest_ns + slowest_ns // 2:
+        missed = min(max(periods - 1.0, missed), CROWD)
         for _ in range(min((elapsed + slowest_ns // 2) // slowest_ns - 1, WINDOW)):
             add_check(state, P_NONEWDATA)
     state.checked_ns = stamp_ns
     add_check(state, status)
-    state.crowd = max(state.crowd - FASTER * elapsed / period_ns, 0.0) + 1.0
+    state.crowd = max(state.crowd - FASTER * periods, -missed) + 1.0
     loud = state.crowd > CROWD or state.rejected_count >= MANY_REJECTED
     state.crowd = min(state.crowd, CROWD + 1.0)
     if loud:

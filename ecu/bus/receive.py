@@ -12,11 +12,20 @@ import numpy as np
 from cantools.database import Message
 from numpy.typing import NDArray
 
-from ecu.bus import bits, e2e, link
+from ecu.bus import bits, e2e, link, sequence
 from ecu.bus.database import attribute, load_database
 from ecu.bus.freshness import NEVER, accept, input_freshness, new_freshness
 from ecu.bus.plan import SIGNAL, SignalUse, compile_signals, is_present, is_valid, raw_code, signed_value
-from ecu.bus.request import FIRST, LAST, REQUEST, begin_request, hold_request, note_request
+from ecu.bus.request import (
+    FIRST,
+    LAST,
+    REQUEST,
+    begin_request,
+    hold_request,
+    note_request,
+    note_rival,
+    settle_request,
+)
 from ecu.contract.faults import E2E_REJECTIONS
 from ecu.contract.records import EXTENDED_ID, FRAME_ERROR, FRAME_EXTENDED, FRAME_REMOTE, RecordArray
 from ecu.contract.signals import INPUT, INPUT_SIGNALS, N_INPUTS, N_OUTPUTS, OUTPUT
@@ -55,7 +64,7 @@ MESSAGE_COUNTERS: Final = np.dtype(
         ("lost", "u4"),  # accepted frames after a counter step above one
         ("resynchronised", "u4"),
         ("stamp_ns", "i8"),  # of the last frame received
-        *e2e.SEQUENCE,
+        *sequence.SEQUENCE,
         *link.LINK,
     ],
     align=True,
@@ -189,18 +198,18 @@ def check_frame(message: Record, counters: Record, frame: Record) -> Any:
     if message.modulo > 0:
         start, length, big_endian = message.counter_start, message.counter_length, message.counter_big_endian
         counter: Any = np.int64(bits.extract(frame.data, start, length, big_endian))
-        found = e2e.check_counter(
+        found = sequence.check_counter(
             counters, counter, message.modulo, frame.stamp_ns, message.period_ns, message.slowest_ns
         )
-        if found == e2e.REPEATED or found == e2e.CROSSED:
+        if found == sequence.REPEATED or found == sequence.CROSSED:
             counters.repeated += 1
             return link.P_REPEATED
-        if found == e2e.WRONG_SEQUENCE:
+        if found == sequence.WRONG_SEQUENCE:
             counters.sequence_errors += 1
             return link.P_WRONG_SEQUENCE
-        if found == e2e.SOME_LOST:
+        if found == sequence.SOME_LOST:
             counters.lost += 1
-        elif found == e2e.RESYNCHRONISED:
+        elif found == sequence.RESYNCHRONISED:
             counters.resynchronised += 1
     counters.accepted += 1
     return link.P_OK
@@ -252,13 +261,21 @@ def receive(
             counters, status, frame.stamp_ns, message.period_ns, message.slowest_ns
         ):
             totals.loud_ns = frame.stamp_ns
-        doubt = message.request != 0 and e2e.in_doubt(counters, frame.stamp_ns)
-        claims = status == link.P_REPEATED and counters.disputed_ns == frame.stamp_ns
-        if status != link.P_OK:
+        accepted = counts = status == link.P_OK
+        asks = message.request != 0
+        doubt = asks and sequence.in_doubt(counters, frame.stamp_ns)
+        rival, standing = False, sequence.ESTABLISHED
+        if not accepted:
             totals.rejected += 1
-            if not (doubt and claims):
+            if not asks or status == link.P_ERROR:
                 continue
-        if message.request:
+            crossed = counters.disputed_ns == frame.stamp_ns
+            rival = not crossed and sequence.rival_spoke(counters, frame.stamp_ns)
+            standing = sequence.standing(counters, frame.stamp_ns)
+            counts = crossed or (rival and standing == sequence.EQUAL)
+            if not (counts or rival):
+                continue
+        if asks:
             begin_request(request)
         for row in range(message.first, message.first + message.count):
             if is_present(signals, codes, row, frame.data):
@@ -266,16 +283,20 @@ def receive(
                 code = raw_code(signal, frame.data)
                 valid = is_valid(signals, codes, row, code, frame.data)
                 value = signed_value(signals, codes, row, code, frame.data)
-                asked = message.request != 0 and FIRST <= signal.place <= LAST
-                if (doubt and asked and not valid) or (status != link.P_OK and not asked):
-                    continue
+                asked = asks and FIRST <= signal.place <= LAST
                 if asked and valid:
                     request.sample[signal.place - FIRST] = value
+                if (doubt and asked and not valid) or not (accepted or (asked and counts)):
+                    continue
                 accept(inputs, freshness, signal.place, value, frame.stamp_ns, valid)
-        if message.request:
+        if rival:
+            note_rival(request, frame.stamp_ns, standing)
+        if asks and counts:
             note_request(request, frame.stamp_ns)
             if doubt:
                 hold_request(request, inputs)
+    if len(inputs.new) == N_INPUTS:
+        settle_request(request, freshness, inputs.t_ns)
     _tell_links(totals, inputs)
     return index
 

@@ -1,21 +1,32 @@
-"""Driver's request while its sender is in doubt: a doubtful stream cannot lower it.
+"""Driver's request while its sender is in doubt: who brakes wins over who does not.
 
-While the request may have more than one sender (`e2e.in_doubt`), pedal position, pedal switch and automated
-demand are the largest of the last 60 to 120 ms, longer than five lost frames of the true sender. Every frame
-at the sender's sequence position counts; one out of sequence does not. The pedal has priority: an automated
-demand counts only if its own frame flags it valid, and can only add to the pedal's.
+*In the sender's place.* While the request may have more than one sender (`sequence.in_doubt`), pedal
+position, pedal switch and automated demand are the largest of the last 60 to 120 ms, longer than five lost
+frames of the true sender. Every frame at the sender's sequence position counts. The pedal has priority: an
+automated demand counts only if its own frame flags it valid, and can only add to the pedal's.
+
+*A rival stream*, intact but at another count, counts by the standing of the sender (`sequence.standing`):
+
+    ESTABLISHED   not at all; where it brakes and the sender does not, the request is in doubt
+    EQUAL         like the sender, for a second
+    UNKNOWN       after that; where either brakes, the request is in doubt
+
+A request in doubt is not valid: the ECU flags its demand invalid, and the hydraulics follow the pedal itself.
 """
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
+from ecu.bus.sequence import EQUAL, ESTABLISHED
 from ecu.contract.signals import DECEL_DEMAND, DECEL_DEMAND_VALID, PEDAL_POSITION, PEDAL_PRESSED
 from ecu.jit import Record, kernel
 
 FIRST, LAST = PEDAL_POSITION, DECEL_DEMAND_VALID
 """The places of the request lie side by side."""
 HALF_NS: Final = 60_000_000
+PEDAL_REST: Final = 5.0  # %
+LEAST_DECEL: Final = 0.05  # m/s^2
 
 REQUEST: Final = np.dtype(
     [
@@ -23,6 +34,9 @@ REQUEST: Final = np.dtype(
         ("sample", "f8", (4,)),  # of this frame, from FIRST on; 0: none, or not valid
         ("newer", "f8", (4,)),  # largest since then
         ("older", "f8", (4,)),  # largest of the preceding `HALF_NS`
+        ("rival_ns", "i8"),  # stamp of the rival's last frame, 0: there was none
+        ("rival_brakes", "u1"),
+        ("standing", "u1"),  # of the sender, then
     ],
     align=True,
 )
@@ -36,6 +50,13 @@ def begin_request(state: Record) -> None:
 
 
 @kernel
+def _vouched(state: Record) -> None:
+    """Drop a deceleration that its own frame does not flag valid."""
+    if state.sample[DECEL_DEMAND_VALID - FIRST] < 0.5:
+        state.sample[DECEL_DEMAND - FIRST] = 0.0
+
+
+@kernel
 def note_request(state: Record, stamp_ns: int) -> None:
     """Update the largest values by a frame's samples."""
     age = stamp_ns - state.since_ns
@@ -44,17 +65,48 @@ def note_request(state: Record, stamp_ns: int) -> None:
         for i in range(4):
             state.older[i], state.newer[i] = kept * state.newer[i], 0.0
         state.since_ns = stamp_ns
-    if state.sample[DECEL_DEMAND_VALID - FIRST] < 0.5:
-        state.sample[DECEL_DEMAND - FIRST] = 0.0
+    _vouched(state)
     for i in range(4):
         state.newer[i] = max(state.newer[i], state.sample[i])
+
+
+@kernel
+def _held(state: Record, place: int) -> float:
+    """Return the largest value of the last frames."""
+    return max(state.newer[place - FIRST], state.older[place - FIRST])
 
 
 @kernel
 def hold_request(state: Record, inputs: Record) -> None:
     """Overwrite the request in `inputs` by the largest of the last frames."""
     for place in (PEDAL_POSITION, PEDAL_PRESSED):
-        inputs.value[place] = max(state.newer[place - FIRST], state.older[place - FIRST])
-    decel = max(state.newer[DECEL_DEMAND - FIRST], state.older[DECEL_DEMAND - FIRST])
+        inputs.value[place] = _held(state, place)
+    decel = _held(state, DECEL_DEMAND)
     if decel > 0.0:
         inputs.value[DECEL_DEMAND], inputs.value[DECEL_DEMAND_VALID] = decel, 1.0
+
+
+@kernel
+def _brakes(position: float, pressed: float, decel: float) -> bool:
+    return position > PEDAL_REST or pressed > 0.5 or decel > LEAST_DECEL
+
+
+@kernel
+def note_rival(state: Record, stamp_ns: int, standing: int) -> None:
+    """Note a frame of the rival by its samples, and the sender's standing."""
+    _vouched(state)
+    position, pressed, decel, _ = state.sample
+    state.rival_brakes = 1 if _brakes(position, pressed, decel) else 0
+    state.rival_ns = stamp_ns
+    state.standing = standing
+
+
+@kernel
+def settle_request(state: Record, freshness: Any, t_ns: int) -> None:
+    """Mark the request invalid in `freshness` while it is in doubt whether anybody brakes."""
+    if state.rival_ns == 0 or t_ns - state.rival_ns > 2 * HALF_NS or state.standing == EQUAL:
+        return
+    sender = _brakes(_held(state, PEDAL_POSITION), _held(state, PEDAL_PRESSED), _held(state, DECEL_DEMAND))
+    if state.rival_brakes and not sender if state.standing == ESTABLISHED else state.rival_brakes or sender:
+        for place in range(FIRST, LAST + 1):
+            freshness[place].valid = 0

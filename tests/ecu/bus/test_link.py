@@ -146,6 +146,8 @@ def loud_after(intervals_ms: list[float], statuses: list[int], period_ms: float 
         ("one frame in twenty spoilt", [10.0], [E] + [G] * 19, None, None),
         ("a restart: six frames not taken", [10.0], [W] * 6 + [G] * 50, None, None),
         ("150 ms held up, then all at once", [150.0] + [0.2] * 15 + [10.0] * 50, [G], None, None),
+        ("300 ms held up, then all at once", [300.0] + [0.2] * 30 + [10.0] * 50, [G], None, None),
+        ("300 ms held up, then more than that", [300.0] + [0.2] * 40 + [10.0] * 50, [G], 300.0, 320.0),
         ("a second stream of the same rate", [5.0, 5.0], [G, W], 50.0, 160.0),
         ("a second stream of half the rate", [5.0, 5.0, 10.0], [G, W, G], 200.0, 700.0),
         ("frames of another identity all the time", [1.0], [E], 5.0, 20.0),
@@ -182,13 +184,51 @@ def test_a_sender_that_may_choose_is_silent_only_behind_its_slowest_rate() -> No
     assert (NAMES[int(state["link"])], state["ok_count"]) == ("VALID", 16)
 
 
-@pytest.mark.parametrize(("periods", "silent"), [(1.4, 0), (1.45, 0), (1.55, 1), (2.4, 1), (2.6, 2)])
+@pytest.mark.parametrize(
+    ("periods", "silent"), [(1.4, 0), (1.45, 0), (1.5, 1), (1.55, 1), (2.4, 1), (2.6, 2)]
+)
 def test_silence_is_counted_in_whole_periods(periods: float, silent: int) -> None:
     state = new_link()
     for k in range(30):
         judge_link(state, P_OK, (1000 + 10 * k) * MS, PERIOD, PERIOD)
     judge_link(state, P_OK, 1290 * MS + int(periods * PERIOD), PERIOD, PERIOD)
     assert state["ok_count"] == 16 - silent
+
+
+@pytest.mark.parametrize(
+    ("silent_ms", "frames"), [(10, 16), (14.9, 16), (15.1, 16), (25, 17), (100, 25), (170, 32), (10_000, 32)]
+)
+def test_as_many_periods_as_were_missed_may_be_caught_up(silent_ms: float, frames: int) -> None:
+    """Sixteen at most, beside the sixteen of a crowd."""
+    state, t = new_link(), 1000.0
+    for k in range(50):
+        judge_link(state, P_OK, int((t + 10 * k) * MS), PERIOD, PERIOD)
+    t += 490 + silent_ms
+    loud = [bool(judge_link(state, P_OK, int(t * MS), PERIOD, PERIOD)) for _ in range(50)]
+    assert loud.index(True) == frames
+
+
+@pytest.mark.parametrize(("periods", "crowd"), [(1.0, 1.0), (1.25, 1.0), (1.45, 1.0), (1.5, 0.5), (2.0, 0.0)])
+def test_a_period_counts_as_missed_from_its_half_on(periods: float, crowd: float) -> None:
+    state = new_link()
+    for k in range(50):
+        judge_link(state, P_OK, (1000 + 10 * k) * MS, PERIOD, PERIOD)
+    judge_link(state, P_OK, 1490 * MS + int(periods * PERIOD), PERIOD, PERIOD)
+    assert state["crowd"] == pytest.approx(crowd)
+
+
+def test_a_pause_that_is_not_caught_up_is_forgotten_frame_by_frame() -> None:
+    state = new_link()
+    for k in range(50):
+        judge_link(state, P_OK, (1000 + 10 * k) * MS, PERIOD, PERIOD)
+    for k in range(20):
+        judge_link(state, P_OK, (1600 + 10 * k) * MS, PERIOD, PERIOD)
+    assert state["crowd"] == 1.0
+
+
+def test_errors_alone_are_no_crowd_at_the_senders_rate() -> None:
+    state = new_link()
+    assert not any(judge_link(state, P_ERROR, (1000 + 10 * k) * MS, PERIOD, PERIOD) for k in range(100))
 
 
 def test_the_seventeenth_frame_of_a_crowd_is_told_and_four_more_at_its_rate() -> None:

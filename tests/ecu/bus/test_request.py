@@ -2,7 +2,7 @@
 
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -10,7 +10,18 @@ import pytest
 from ecu.bus.e2e import p01_protect
 from ecu.bus.freshness import begin_cycle, end_cycle
 from ecu.bus.receive import contract_receive_plan, new_reception, receive
-from ecu.bus.request import FIRST, HALF_NS, LAST, REQUEST, begin_request, hold_request, note_request
+from ecu.bus.request import (
+    FIRST,
+    HALF_NS,
+    LAST,
+    REQUEST,
+    begin_request,
+    hold_request,
+    note_request,
+    note_rival,
+    settle_request,
+)
+from ecu.bus.sequence import EQUAL, ESTABLISHED, UNKNOWN
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
 from ecu.contract.faults import E2E_REJECTIONS
 from ecu.contract.records import FRAME, INPUTS, RecordArray, new_record
@@ -21,6 +32,7 @@ from ecu.contract.signals import (
     PEDAL_POSITION,
     PEDAL_PRESSED,
     USABLE,
+    VALID,
 )
 from ecu.jit import kernel
 
@@ -201,6 +213,160 @@ def test_the_largest_of_the_last_60_to_120_ms(case: str, frames: Any, held: Any)
         note_request(state, T0 + int(ms * MS))
     hold_request(state, inputs)
     assert inputs["value"][FIRST : LAST + 1].tolist() == list(held), case
+
+
+# Rival beside the sender: standing, who brakes by pedal (P) or automated (A), is the request valid?
+IN_DOUBT = [
+    (ESTABLISHED, FREE, FREE, True),
+    (ESTABLISHED, PRESSED, FREE, True),
+    (ESTABLISHED, PRESSED, PRESSED, True),
+    (ESTABLISHED, FIRM, FREE, True),
+    (ESTABLISHED, FREE, PRESSED, False),
+    (ESTABLISHED, FREE, FIRM, False),
+    (ESTABLISHED, FREE, (5.1, 0.0, 0.0, 0.0), False),
+    (ESTABLISHED, FREE, (5.0, 0.0, 0.0, 0.0), True),
+    (ESTABLISHED, FREE, (0.0, 1.0, 0.0, 0.0), False),
+    (ESTABLISHED, FREE, (0.0, 0.5, 0.0, 0.0), True),
+    (ESTABLISHED, FREE, (0.0, 0.0, 0.06, 1.0), False),
+    (ESTABLISHED, FREE, (0.0, 0.0, 0.05, 1.0), True),
+    (ESTABLISHED, FREE, (0.0, 0.0, 12.0, 0.0), True),
+    (EQUAL, FREE, PRESSED, True),
+    (EQUAL, PRESSED, FREE, True),
+    (UNKNOWN, FREE, FREE, True),
+    (UNKNOWN, PRESSED, FREE, False),
+    (UNKNOWN, FREE, PRESSED, False),
+    (UNKNOWN, FIRM, FIRM, False),
+]
+
+
+@pytest.mark.parametrize(("age_ms", "heard"), [(0, True), (120, True), (120.1, False)])
+@pytest.mark.parametrize(("standing", "sender", "rival", "valid"), IN_DOUBT)
+def test_where_nobody_knows_whether_somebody_brakes_the_request_is_not_valid(
+    standing: int, sender: Any, rival: Any, valid: bool, age_ms: float, heard: bool
+) -> None:
+    state = np.zeros(1, REQUEST)[0]
+    reception = new_reception(PLAN)
+    reception.freshness["valid"] = 1
+    state["sample"] = sender
+    note_request(state, T0)
+    state["sample"] = rival
+    note_rival(state, T0, standing)
+    settle_request(state, reception.freshness, T0 + int(age_ms * MS))
+    asked = reception.freshness["valid"][FIRST : LAST + 1]
+    assert asked.tolist() == [int(valid or not heard)] * 4
+    assert np.delete(reception.freshness["valid"], range(FIRST, LAST + 1)).all()
+
+
+def test_without_a_rival_the_request_is_valid() -> None:
+    state, reception = np.zeros(1, REQUEST)[0], new_reception(PLAN)
+    reception.freshness["valid"] = 1
+    state["standing"] = UNKNOWN
+    state["sample"] = PRESSED
+    note_request(state, 5 * MS)
+    settle_request(state, reception.freshness, 10 * MS)
+    assert reception.freshness["valid"].all()
+
+
+def pedal(inputs: RecordArray) -> Any:
+    """Pedal position [%] in each cycle, NaN where it is not usable."""
+    usable = inputs["verdict"][:, PEDAL_POSITION] & USABLE == USABLE
+    return np.where(usable, inputs["value"][:, PEDAL_POSITION], np.nan)
+
+
+class Gap(NamedTuple):
+    """A sender that is silent from 2 s on, and a stream that is replayed beside it."""
+
+    silent: int = 0
+    """Frames that the sender loses."""
+    ahead: int = 0
+    """What its counter has jumped by behind them."""
+    lead: int = 100
+    """Frames that were replayed before; negative: it begins in the gap."""
+    jitter: float = 1.0
+    """Of the sender [ms]."""
+
+    def drive(self, behind: RecordArray, replayed: RecordArray, phase: int, offset: float) -> Any:
+        """Return the pedal in 500 cycles; it is free before the gap."""
+        wire, k = Wire(), np.arange(500)
+        random = np.random.default_rng(phase)
+        living = np.maximum.accumulate(10 * k + random.uniform(-self.jitter, self.jitter, len(k)))
+        later = k >= 200 + self.silent
+        wire.send(PEDAL_FREE, k[:200], living[:200])
+        wire.send(behind, k[later] + self.ahead, living[later])
+        later = k >= 200 - self.lead
+        second = 10 * k + offset + random.uniform(-1.0, 1.0, len(k))
+        wire.send(replayed, k[later] + phase, second[later])
+        return pedal(wire.run(500, 9.7))
+
+    def phases(self) -> Any:
+        """Yield the phases and offsets of streams that lie on no grid of the sender."""
+        for phase in range(15):
+            for offset in (0.5, 3.5, 6.5, 9.5):
+                away = [(offset - 10 * (phase - ahead)) % 150.0 for ahead in (0, self.ahead)]
+                if min(min(a, 150.0 - a) for a in away) > 5.0 + 2.0 * self.jitter:
+                    yield phase, offset
+
+
+SILENT = (0, 5, 7, 10, 20, 50)
+LEADS = (150, 50, 0, -2, -5)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("jitter", [1.0, 5.0])
+@pytest.mark.parametrize("ahead", [0, 3, 8])
+@pytest.mark.parametrize("lead", LEADS)
+@pytest.mark.parametrize("silent", SILENT)
+def test_a_replayed_release_locks_no_pedal_out(silent: int, lead: int, ahead: int, jitter: float) -> None:
+    """Behind the gap the driver brakes: within 0.2 s he is followed, or the request is not valid."""
+    gap = Gap(silent, ahead, lead, jitter)
+    for phase, offset in gap.phases():
+        position = gap.drive(PEDAL, PEDAL_FREE, phase, offset)[200 + silent + 20 :]
+        assert np.nanmin(position, initial=40.0) == pytest.approx(40.0, abs=0.5), (phase, offset)
+        if ahead == 0 or lead > 0:  # back on its grid, or beside a stream that is known
+            assert np.isfinite(position).all(), (phase, offset)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("jitter", [1.0, 5.0])
+@pytest.mark.parametrize("ahead", [0, 3, 8])
+@pytest.mark.parametrize("lead", LEADS)
+@pytest.mark.parametrize("silent", SILENT)
+def test_a_replayed_braking_is_followed_while_it_is_alone_and_a_second_longer(
+    silent: int, lead: int, ahead: int, jitter: float
+) -> None:
+    """Known beside the sender before the gap, it is not followed at all."""
+    gap = Gap(silent, ahead, lead, jitter)
+    for phase, offset in gap.phases():
+        braked = np.sum(gap.drive(PEDAL_FREE, PEDAL, phase, offset) > 1.0)
+        if lead > 0:
+            assert braked <= (16 if jitter > 1.0 else 0), (phase, offset)
+        elif ahead == 0:
+            assert braked <= silent + 17, (phase, offset)
+        else:
+            assert braked <= silent + 117, (phase, offset)
+
+
+@pytest.mark.parametrize("phase", [2, 7, 13])
+@pytest.mark.parametrize("first", [100, 150, 400])
+def test_who_was_there_first_is_the_sender_and_doubt_is_not_valid(first: int, phase: int) -> None:
+    """At ignition a replayed release may come first: then the pedal is followed by the hydraulics alone."""
+    wire, k = Wire(), np.arange(first + 100)
+    wire.send(PEDAL_FREE, k, 10 * k)
+    later = k >= first
+    wire.send(PEDAL, k[later] + phase, 10 * k[later] + 4.0)
+    inputs = wire.run(first + 100, 9.0)
+    assert (pedal(inputs)[1 : first + 2] == 0.0).all()
+    assert np.isnan(pedal(inputs)[first + 2 :]).all()
+    assert (inputs["verdict"][first + 2 :, FIRST : LAST + 1] & VALID == 0).all()
+
+
+def test_doubt_ends_with_the_rival() -> None:
+    wire, k = Wire(), np.arange(200)
+    wire.send(PEDAL_FREE, k, 10 * k)
+    beside = (k >= 50) & (k < 100)
+    wire.send(PEDAL, k[beside] + 7, 10 * k[beside] + 4.0)
+    valid = np.isfinite(pedal(wire.run(200, 9.0)))
+    assert valid.tolist() == [True] * 52 + [False] * 59 + [True] * 89
 
 
 def test_places_lie_side_by_side() -> None:

@@ -47,6 +47,7 @@ LOST = [
         PEDAL_LOST | REQUEST_LOST,
         FAILED,
     ),
+    ("pedal, demand valid", ["pedal_position", "pedal_pressed"], 1, PEDAL_LOST, DEGRADED),
     ("pedal, demand not valid", ["pedal_position", "pedal_pressed"], 0, PEDAL_LOST | REQUEST_LOST, FAILED),
     (
         "pedal, validity of the demand lost",
