@@ -1,15 +1,22 @@
 """Reading TOML that a person wrote: a mistake is one line that names the file, the key and the remedy."""
 
+import os
+import stat
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple, get_args, get_origin
+from typing import Any, Final, NamedTuple, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
 
 from ecu.errors import UserError, closest
 from ecu.output import detail
+
+LONGEST: Final = 16 << 20
+"""Characters of a file: a fleet's manifest of 100,000 drives has 5 million."""
+SHOWN: Final = 60
+"""Characters that are shown of a value."""
 
 
 class Unit(NamedTuple):
@@ -93,7 +100,15 @@ def _remedy(finding: Any, model: type[BaseModel]) -> str:
     if not keys or isinstance(finding["input"], dict):
         return wanted
     unit = _unit(table, keys) if finding["type"].startswith(("greater_than", "less_than")) else ""
-    return f"{wanted}{unit} (found {finding['input']!r})"
+    return f"{wanted}{unit} (found {_shown(finding['input'])})"
+
+
+def _shown(value: object) -> str:
+    try:
+        text = repr(value)
+    except ValueError:  # Python writes no number of more than 4300 digits
+        return "a number of thousands of digits"
+    return text if len(text) <= SHOWN else f"{text[:SHOWN]}…"
 
 
 def _table(model: type[BaseModel], keys: list[str]) -> type[BaseModel] | None:
@@ -126,15 +141,35 @@ def unit_of(field: FieldInfo) -> str | None:
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """Read a TOML file; a mistake is one line."""
+    """Read a TOML file; a mistake is one line. Whatever is no regular file is not read: it may never end."""
     detail(f"reading {path}")
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))  # Windows editors mark it
+        return tomllib.loads(_text(path))
+    except tomllib.TOMLDecodeError as error:
+        raise UserError(str(path), "", f"not valid TOML: {error}") from None
+    except RecursionError:
+        raise UserError(str(path), "", "nested too deep; no key needs more than three levels") from None
+    except ValueError:
+        raise UserError(str(path), "", "a number of thousands of digits; correct it") from None
+
+
+def _text(path: Path) -> str:
+    try:
+        with open(path, encoding="utf-8-sig", opener=_without_waiting) as file:  # Windows editors mark it
+            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                raise UserError(str(path), "", "is no regular file; give a TOML file")
+            text = file.read(LONGEST + 1)
     except FileNotFoundError:
         raise UserError(str(path), "", "no such file") from None
     except IsADirectoryError:
         raise UserError(str(path), "", "is a folder; give a TOML file") from None
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, ValueError) as error:
         raise UserError(str(path), "", f"cannot be read as text: {error}") from None
-    except tomllib.TOMLDecodeError as error:
-        raise UserError(str(path), "", f"not valid TOML: {error}") from None
+    if len(text) > LONGEST:
+        raise UserError(str(path), "", f"is larger than {LONGEST >> 20} MB; give a TOML file")
+    return text
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    """Open a file; a fifo that nobody writes to would wait for ever."""
+    return os.open(path, flags | os.O_NONBLOCK)

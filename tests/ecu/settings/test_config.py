@@ -1,6 +1,7 @@
 """CONFIG files: the shipped ones against the thesis's tables; every kind of wrong file is one line."""
 
 import math
+import os
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -169,6 +170,8 @@ WRONG = [
     ("not TOML", lambda: SUV + "\n[[[", ["TOML"]),
     ("sensor noise in Pa", change("sensors.pressure", "180000.0"), ["sensors.pressure", "bar"]),
     ("YAML", lambda: "name: suv\nvehicle:\n  mass: 2105\n", ["TOML", "line 1"]),
+    ("5,000 hex digits", change("vehicle.mass", "0x" + 5_000 * "f"), ["vehicle.mass", "thousands of digits"]),
+    ("a text of 100 kB", change("vehicle.mass", '"' + 100_000 * "x" + '"'), ["vehicle.mass", "xxx…"]),
     ("a key twice", lambda: SUV + "\npedal_position = [0.0, 1.0]\n", ["TOML"]),
     ("empty", lambda: "", ["name"]),
 ]
@@ -207,8 +210,16 @@ def test_the_untouched_file_is_right(tmp_path: Path) -> None:
         lambda path: path.write_bytes(bytes(range(256)) * 8),
         lambda path: path.write_bytes(SUV.encode("utf-16")),
         lambda path: path.symlink_to(path),
+        lambda path: path.symlink_to("/dev/zero"),
+        os.mkfifo,
+        lambda path: path.write_text(f"a = {'[' * 20_000}{']' * 20_000}"),
+        lambda path: path.write_text(f"mass = {'9' * 5_000}"),
+        lambda path: path.write_text("#" * (17 << 20)),
     ],
-    ids=["missing", "directory", "binary", "UTF-16", "endless link"],
+    ids=[
+        *("missing", "directory", "binary", "UTF-16", "endless link"),
+        *("endless file", "fifo", "nested 20,000 deep", "5,000 digits", "17 MB"),
+    ],
 )
 def test_what_is_no_readable_file_is_one_line(tmp_path: Path, make) -> None:
     path = tmp_path / "car.toml"
@@ -322,6 +333,8 @@ WRONG_INCLUDES = [
     # include, content of the included file, the line
     ('"nosuch.toml"', "", "nosuch.toml: no such file"),
     ('"."', "", "is a folder"),
+    ('"/dev/zero"', "", "/dev/zero: is no regular file; give a TOML file"),
+    ('"a\\u0000b"', "", "cannot be read as text: embedded null"),
     ('""', "", 'car.toml: include: give the name of a TOML file in "quotes"'),
     ("3", "", 'car.toml: include: give the name of a TOML file in "quotes"'),
     ('"tuned.toml"', "[[[", "tuned.toml: not valid TOML"),
