@@ -1,7 +1,8 @@
 """`brake-ecu config check`: every mistake of a CONFIG file, or the figures of its car.
 
 The figures are for reading: torque per pressure, pressures of a braking, the distribution beside the ideal
-one and how far it is from what Annex 5 of ECE R13-H forbids. Swapped numbers that are possible show there.
+one, how hard the whole pedal brakes, how far the car is from what ECE R13-H forbids. Swapped numbers that are
+possible show there.
 """
 
 from pathlib import Path
@@ -12,9 +13,10 @@ import numpy as np
 from ecu.algorithm.control.distribution import front_share
 from ecu.contract.params import BAR, GRAVITY
 from ecu.output import fault, give
-from ecu.settings.annex5 import K_RULED, Z_ORDERED, Load, annex_5_violation, shares, utilisation
+from ecu.settings.annex3 import LEAST_DECEL, full_braking
+from ecu.settings.annex5 import K_RULED, Z_ORDERED, Load, shares, utilisation
 from ecu.settings.annex5_picture import picture
-from ecu.settings.config import Config, new_params, torque_per_bar, validate_config
+from ecu.settings.config import Config, new_params, torque_per_bar, validate_config, violations
 
 RATES: Final = (0.2, 0.4, 0.6, 0.8)  # braking rates z
 
@@ -33,14 +35,15 @@ def check(path: Path, pictured: bool = False) -> int:
         give(config=path, mistakes=[str(finding) for finding in config])
         return 2
     params = new_params(config)[0]
-    violation = annex_5_violation(params, config.vehicle.loads())
+    found = violations(path, config, params)
     for line in figures(config, params):
         print(line)
-    give(config=path, mistakes=[violation] if violation else [], figures=figures_of(config, params))
+    give(config=path, mistakes=[str(one) for one in found], figures=figures_of(config, params))
     if pictured:
         print("\n".join(picture(params, config.vehicle.loads())))
-    if violation:
-        fault(f"brake-ecu: {path}: control.distribution: {violation}")
+    for finding in found:
+        fault(f"brake-ecu: {finding}")
+    if found:
         return 2
     print(f"{path}: nothing wrong")
     return 0
@@ -81,7 +84,12 @@ def figures(config: Config, params: Any) -> list[str]:
             f"z = {z:.1f}       front share {100 * share:4.1f} %, ideal {100 * ideal:4.1f} %; "
             f"{braking['pressure_front']:5.1f} bar in front, {braking['pressure_rear']:5.1f} bar in the rear"
         )
-    return lines + [line for load in config.vehicle.loads() for line in margins(params, load)]
+    loads = config.vehicle.loads()
+    lines.append(
+        f"Annex 3       {loads[-1].name}: at the end of the pedal, {params['pedal_decel'][-1]:.2f} m/s^2, "
+        f"the linings alone brake by {full_braking(params, loads[-1]):.2f} m/s^2 ({LEAST_DECEL} in 2.1.1)"
+    )
+    return lines + [line for load in loads for line in margins(params, load)]
 
 
 def axle_torque_per_bar(params: Any) -> tuple[float, float]:

@@ -28,6 +28,7 @@ from ecu.contract.params import (
 )
 from ecu.contract.records import RecordArray
 from ecu.errors import UserError
+from ecu.settings.annex3 import annex_3_violation
 from ecu.settings.annex5 import annex_5_violation
 from ecu.settings.dust import set_dust, set_dust_version
 from ecu.settings.lining_share import set_lining_share
@@ -45,6 +46,7 @@ __all__ = [
     "store_key",
     "torque_per_bar",
     "validate_config",
+    "violations",
 ]
 
 AIR_DENSITY = 1.2  # kg/m^3, 20 degC at sea level
@@ -54,16 +56,26 @@ def load_config(path: Path) -> Config:
     """Read and check a CONFIG file.
 
     Raises:
-        UserError: a file cannot be read, a key is missing, unknown or out of range, or the distribution of
-            the brake force violates Annex 5 of ECE R13-H.
+        UserError: a file cannot be read, a key is missing, unknown or out of range, or the car violates
+            ECE R13-H, see `violations`.
     """
     config = validate_config(path)
     if not isinstance(config, Config):
         raise summarised(config)
-    finding = annex_5_violation(new_params(config)[0], config.vehicle.loads())
-    if finding:
-        raise UserError(str(path), "control.distribution", finding)
+    found = violations(path, config, new_params(config)[0])
+    if found:
+        raise summarised(found)
     return config
+
+
+def violations(path: Path, config: Config, params: Any) -> list[UserError]:
+    """Return what of the car in `path` violates Annexes 3 and 5 of ECE R13-H; `params` is its `PARAMS`."""
+    loads = config.vehicle.loads()
+    braking, distribution = annex_3_violation(params, loads), annex_5_violation(params, loads)
+    return [
+        *([UserError(str(path), *braking)] if braking else []),
+        *([UserError(str(path), "control.distribution", distribution)] if distribution else []),
+    ]
 
 
 def validate_config(path: Path) -> Config | list[UserError]:

@@ -3,11 +3,12 @@
 import zlib
 from typing import Annotated, Any, Literal
 
-import numpy as np
 from pydantic import Field, model_validator
 
 from ecu.contract.dust import FEATURES, MODELS, NONE, NUMBERS
 from ecu.settings.toml_file import Section
+
+Feature = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
 class Dust(Section):
@@ -15,11 +16,11 @@ class Dust(Section):
 
     model: Literal["network", "table", "law"]
     """Kind of the model that `identify dust` found."""
-    numbers: list[float]
+    numbers: list[Annotated[float, Field(ge=-1e4, le=1e4)]]
     """Of the model, in the order that its kernel takes them."""
-    low: list[float] = Field(min_length=len(FEATURES), max_length=len(FEATURES))
+    low: list[Feature] = Field(min_length=len(FEATURES), max_length=len(FEATURES))
     """Of each feature, the least that it was trained on: outside nothing is told."""
-    high: list[float] = Field(min_length=len(FEATURES), max_length=len(FEATURES))
+    high: list[Feature] = Field(min_length=len(FEATURES), max_length=len(FEATURES))
     """Of each feature, the greatest."""
     factor: Annotated[float, Field(gt=0.1, lt=10.0)] = 1.0
     """Mean of the particles over ten to the emission factor: a logarithm's mean is that of its median."""
@@ -31,7 +32,7 @@ class Dust(Section):
     @model_validator(mode="after")
     def _whole(self) -> "Dust":
         expected = NUMBERS[MODELS.index(self.model)]
-        if len(self.numbers) != expected or not np.isfinite(self.numbers).all():
+        if len(self.numbers) != expected:
             raise ValueError(f"a {self.model} has {expected} finite numbers (found {len(self.numbers)})")
         if any(low > high for low, high in zip(self.low, self.high, strict=True)):
             raise ValueError("low must not exceed high")

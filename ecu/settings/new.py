@@ -18,9 +18,8 @@ from pydantic import ValidationError
 from ecu.errors import UserError
 from ecu.output import fault, give
 from ecu.settings import data_sheet as sheet
-from ecu.settings.annex5 import annex_5_violation
 from ecu.settings.check import figures
-from ecu.settings.config import Config, load_config, new_params
+from ecu.settings.config import Config, load_config, new_params, violations
 from ecu.settings.resources import resource
 from ecu.settings.sections import Axle, Control, Sensors, Vehicle
 from ecu.settings.toml_file import Section, describe, unit_of
@@ -44,7 +43,7 @@ class Value(NamedTuple):
 def new(given: list[str], out: Path | None) -> int:
     """Ask for the data sheet, or take it from `given` ("key=value" each), and write a CONFIG file.
 
-    Returns 0; 1 where the distribution that results is forbidden, which is told. Nothing is written over.
+    Returns 0; 1 where ECE R13-H forbids the car that results, which is told. Nothing is written over.
 
     Raises:
         UserError: an answer is wrong or missing, or the file exists.
@@ -287,13 +286,13 @@ def _toml(value: Any) -> str:
 
 def _tell(out: Path, config: Config) -> int:
     params = new_params(config)[0]
-    violation = annex_5_violation(params, config.vehicle.loads())
+    found = violations(out, config, params)
     for line in figures(config, params):
         print(line)
     print(f'{out}: written; lines that end in "{ASSUMED}" are another car\'s')
     print(f"next: brake-ecu config check {out}")
     give(written=[out], next=f"brake-ecu config check {out}")
     print(f"      brake-ecu identify vehicle DRIVE… --config {out} --out {out.stem}-identified.toml")
-    if violation:
-        fault(f"brake-ecu: {out}: control.distribution: {violation}")
-    return 1 if violation else 0
+    for finding in found:
+        fault(f"brake-ecu: {finding}")
+    return 1 if found else 0

@@ -25,13 +25,13 @@ class Pad(Section):
     """Of the area, missing at the new surface; falls linearly to nothing at the depth."""
     law: Literal["extended", "quasi-static"] = "extended"
     """(7.13), or (7.14): its first three coefficients alone."""
-    coefficients: list[Annotated[float, Field(ge=0)]] = Field(
+    coefficients: list[Annotated[float, Field(ge=0, le=100)]] = Field(
         default=[0.1016, 0.0, 0.3984e-6, 0.4887, 0.0, 0.0, 0.66e-2], min_length=7, max_length=7
     )
     """gamma_10 to gamma_31 of Table 7.1, of both pads of a calliper; the disc's temperature in degC."""
     road_scale: Annotated[float, Field(gt=0.1, lt=10), Unit("-")] = 1.0
     """Wear on the road over that on the dynamometer (section 7.6)."""
-    sigma: Annotated[float, Field(gt=0, lt=1), Unit("-")] = 0.15
+    sigma: Annotated[float, Field(gt=1e-3, lt=1), Unit("-")] = 0.15
     """Of the law, relative, for linings that were never measured."""
     walk: Annotated[float, Field(ge=0, lt=0.2), Unit("1/sqrt(g)")] = 0.01
     """Random walk of the law's scale as the lining wears, per square root of a gram."""

@@ -57,6 +57,7 @@ _WANTED = {
     "less_than": "give a value below {lt:g}",
     "less_than_equal": "give a value of at most {le:g}",
     "string_too_short": "give a text, not an empty one",
+    "string_too_long": "give a text of at most {max_length} characters",
     "too_short": "give at least {min_length} values",
     "too_long": "give at most {max_length} values",
     "value_error": "{error}",

@@ -34,6 +34,22 @@ def test_a_key_is_described_and_a_number_has_a_unit(name: str, key: dict[str, An
         assert any("unit" in kind for kind in kinds), name
 
 
+def bounded(kind: dict[str, Any]) -> bool:
+    return bool(
+        {"minimum", "exclusiveMinimum"} & kind.keys() and {"maximum", "exclusiveMaximum"} & kind.keys()
+    )
+
+
+def test_every_number_has_a_least_and_a_greatest_value() -> None:
+    open_ended = {
+        name
+        for name, key in keys()
+        for kind in (key, *key.get("anyOf", []), key.get("items", {}))
+        if kind.get("type") in ("number", "integer") and not bounded(kind)
+    }
+    assert open_ended == set()
+
+
 def test_the_command_prints_it(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["config", "schema"]) == 0
     printed = json.loads(capsys.readouterr().out)
