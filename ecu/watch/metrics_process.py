@@ -83,6 +83,9 @@ def new_handler(shared: Shared) -> type[Handler]:
 
         def do_GET(self) -> None:  # noqa: N802
             """Answer `/metrics` (OpenMetrics, or what the client takes) and `/health`."""
+            if not self.is_local():
+                self.answer(403, "text/plain", b"ask for 127.0.0.1 or localhost\n")
+                return
             match self.path.partition("?")[0]:
                 case "/metrics":
                     encode, kind = choose_encoder(

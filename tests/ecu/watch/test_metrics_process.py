@@ -62,6 +62,11 @@ def test_metrics_in_the_form_that_is_asked_for(served, loop):
     assert ask(port, "/")[::2] == (404, "/metrics or /health\n")
 
 
+@pytest.mark.parametrize("path", ["/metrics", "/health"])
+def test_a_page_whose_name_was_bent_to_this_machine_reads_nothing(served, path):
+    assert ask(served[1], path, Host="evil.example:9476")[::2] == (403, "ask for 127.0.0.1 or localhost\n")
+
+
 def test_a_port_that_is_taken_is_tried_again(monkeypatch, capsys):
     blocking = socket.create_server(("127.0.0.1", 0))
     port = blocking.getsockname()[1]
