@@ -4,13 +4,17 @@ numba's disk cache checks a function's own file only: after an edit in a callee 
 the old code. Kernels are therefore cached in a folder named after the text of every module with kernels or
 constants of their package (and of `ecu`, whose kernels the laboratory calls).
 
-`NUMBA_CACHE_DIR` chooses the place, default `~/.cache/brake-ecu`. With `NUMBA_DISABLE_JIT=1` kernels run as
-plain Python (`ecu/interpreted.py`).
+`NUMBA_CACHE_DIR` chooses the place, default `~/.cache/brake-ecu`. What lies there is run (numba's cache is
+pickle and machine code), so a place in which anybody else may put or exchange files is refused. With
+`NUMBA_DISABLE_JIT=1` kernels run as plain Python (`ecu/interpreted.py`).
 """
 
+import grp
 import hashlib
 import os
+import pwd
 import re
+import stat
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from importlib.util import find_spec
@@ -73,14 +77,46 @@ def _folder(cache_name: str, packages: frozenset[str]) -> str:
         digest.update(text)
     folder = _CACHE_ROOT / f"{cache_name}-{digest.hexdigest()[:16]}"
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     except OSError:
         writable = False
     else:
         writable = os.access(folder, os.W_OK)
     if not writable:
         raise UserError(str(folder), "", "cannot be written; set NUMBA_CACHE_DIR to a folder of yours")
+    folder = folder.resolve()
+    if found := open_to_others(folder):
+        remedy = "chmod go-w it, or set NUMBA_CACHE_DIR to a folder of yours alone"
+        raise UserError(str(found), "", f"others may put compiled kernels here, which are run; {remedy}")
     return str(folder)
+
+
+def open_to_others(folder: Path) -> Path | None:
+    """Return which of `folder` and those above it lets others put or exchange files, None: none does.
+
+    Root, and whoever owns `/`, is trusted above it. In a sticky folder (`/tmp`) only owners exchange files.
+    `folder` contains no links.
+    """
+    own, above = {os.geteuid()}, {os.geteuid(), 0, os.stat("/").st_uid}  # `/` in a user namespace: nobody's
+    for path in (folder, *folder.parents):
+        found = path.stat()
+        writers = found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+        if writers == stat.S_IWGRP and _of_one_user(found.st_gid):
+            writers = 0
+        if path != folder and found.st_mode & stat.S_ISVTX:
+            writers = 0
+        if writers or found.st_uid not in (own if path == folder else above):
+            return path
+    return None
+
+
+def _of_one_user(group: int) -> bool:
+    """Return whether a group is the user's own: many systems give each one, and let it write by default."""
+    try:
+        found, user = grp.getgrgid(group), pwd.getpwuid(os.geteuid()).pw_name
+    except KeyError:
+        return False
+    return found.gr_name == user and set(found.gr_mem) <= {user}
 
 
 def compile_kernel(
