@@ -51,6 +51,7 @@ _HEADER: Final = np.dtype(
 )
 _MAGIC: Final = int.from_bytes(b"ecuring3", "little")
 _PAGE: Final = 4096
+_NO_OBJECT: Final = (ValueError, TypeError, RecursionError)  # of JSON
 
 
 class Ring(NamedTuple):
@@ -262,7 +263,7 @@ class RingReader:
         end = at + int(row["description_bytes"])
         try:
             self.description: dict[str, Any] = dict(json.loads(memory[at:end]))
-        except (ValueError, TypeError):
+        except _NO_OBJECT:
             raise UserError(str(path), "", "not a ring: its description cannot be read") from None
         self.initial: bytes = memory[end : end + int(row["initial_bytes"])]
         self.lost_cycles = self.lost_frames = 0
@@ -280,9 +281,11 @@ class RingReader:
 
     @property
     def last_words(self) -> dict[str, Any]:
-        """Last message of the writer, from when it closed the ring."""
-        words: dict[str, Any] = json.loads(bytes(self.ring.header[0]["last_words"]) or b"{}")
-        return words
+        """Last message of the writer, from when it closed the ring; empty: none that can be read."""
+        try:
+            return dict(json.loads(bytes(self.ring.header[0]["last_words"])))
+        except _NO_OBJECT:
+            return {}
 
     def go_on_after(self, number: int) -> RecordArray | None:
         """Continue after cycle `number`; return that cycle (`RECORDED`, shape (1,)) if it is present."""

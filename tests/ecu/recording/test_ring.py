@@ -192,6 +192,10 @@ FORGED = {
     "its description is a list": lambda path: path.write_bytes(
         path.read_bytes().replace(b'{"channel": "can0"}', b'["channel", "can0"]')
     ),
+    "its description is 3000 deep": lambda path: (
+        path.write_bytes(path.read_bytes().replace(b'{"channel": "can0"}initial' + bytes(2974), b"[" * 3000)),
+        _header(path, description_bytes=3000),
+    ),
     "no slots": lambda path: _header(path, slots=0),
     "more slots than it has": lambda path: _header(path, slots=10**12),
     "negative": lambda path: _header(path, frames=-5),
@@ -227,6 +231,13 @@ def test_rings_of_the_living_are_known_by_their_lock(tmp_path, monkeypatch):
     (tmp_path / "brake-ecu.0.3.ring.abcd.new").write_text("left by one that died while it made it")
     assert living_rings() == [kept.ring.path]
     assert [file.name for file in tmp_path.iterdir()] == [kept.ring.path.name]
+
+
+@pytest.mark.parametrize("words", [b"", b"[" * 3000, b"3", b'"by"', b"{", b"\xff", b"9" * 3000 + b"]"])
+def test_last_words_that_cannot_be_read_are_none(path, words):
+    ring = Writer(path, slots=8, frames=16).ring
+    ring.header["last_words"], ring.header["closed"] = words, 1
+    assert (RingReader(path).closed, RingReader(path).last_words) == (True, {})
 
 
 def test_last_words_and_where_to_go_on(path):
