@@ -6,7 +6,7 @@ A map is a TOML file; `docs/signal-maps.md` explains it with an example. A value
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, Final, NamedTuple
 
 from cantools.database import Database, Message
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -21,6 +21,10 @@ from ecu.contract.signals import INPUT, INPUT_SIGNALS
 from ecu.errors import UserError, closest
 from ecu.settings.resources import resource
 from ecu.settings.toml_file import Unit, describe, read_toml
+
+SLOWEST_S: Final = 60.0
+"""Greatest period and time-out, s: the slowest input, the ambient temperature, comes once a minute."""
+Seconds = Annotated[float, Field(gt=0.0, le=SLOWEST_S), Unit("s")]
 
 
 class _Table(BaseModel):
@@ -64,7 +68,7 @@ class MappedInput(_Table):
     """A signal that says whether the value counts."""
     sign: Sign | None = None
     """A signal that says on which side of zero it is, where it is sent as a magnitude."""
-    timeout: Annotated[float, Field(gt=0.0), Unit("s")] | None = None
+    timeout: Seconds | None = None
     """After it the input is stale, if not after the contract's."""
 
 
@@ -80,9 +84,9 @@ class Counter(_Table):
 class MappedMessage(_Table):
     """Rate and protection of a message."""
 
-    period: Annotated[float, Field(gt=0.0), Unit("s")] | None = None
+    period: Seconds | None = None
     """Between frames; the database's cycle time (DBC: GenMsgCycleTime) if it is not given."""
-    slowest_period: Annotated[float, Field(gt=0.0), Unit("s")] | None = None
+    slowest_period: Seconds | None = None
     """Of a sender that varies its rate, or a logger that loses frames."""
     checksum: str | None = None
     """Name of a rule (docs/signal-maps.md)."""

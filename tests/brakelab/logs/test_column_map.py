@@ -146,6 +146,10 @@ WRONG = [
     ),
     ("[inputs]\naccel_x = { column = 'InlineAcc', factor = nan }", "give a finite number"),
     (
+        "[inputs]\naccel_x = { column = 'InlineAcc', timeout = 1e18 }",
+        "inputs.accel_x.timeout: give a value of at most 60 s (found 1e+18)",
+    ),
+    (
         "time_unit = 'min'\n[inputs]\naccel_x = { column = 'InlineAcc' }",
         "t is in seconds, but the rows are 1.2 s apart",
     ),

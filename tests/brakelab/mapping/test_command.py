@@ -224,6 +224,12 @@ def test_a_timeout_spans_the_longest_gap(target: str, gap: float, expected: floa
     assert timeout(series_of(target, 0.02, gap)) == expected
 
 
+def test_a_timeout_is_one_that_a_map_takes() -> None:
+    t = np.arange(0.0, 600.0, 50.0)
+    ambient = Series("M", "ambient_temperature", "", 0, 50.0, False, t, np.sin(t))
+    assert timeout(Found("ambient_temperature", ambient, 1.0, 0.0, "", "", True)) == 60.0
+
+
 def test_the_faster_of_two_that_follow_equally_well_is_taken(drive) -> None:
     series = read_series([drive], cantools.database.load_string(contract(), "dbc"))
     (own,) = (one for one in series if one.signal == "accel_x")

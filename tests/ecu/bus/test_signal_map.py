@@ -328,6 +328,21 @@ MISTAKES: dict[str, tuple[str, str, str]] = {
         ', signal = "p", timeout = inf }',
         f"{PRESSURE}.timeout: give a finite number (found inf)",
     ),
+    "time-out of an hour": (
+        ', signal = "p" }',
+        ', signal = "p", timeout = 3600 }',
+        f"{PRESSURE}.timeout: give a value of at most 60 s (found 3600)",
+    ),
+    "time-out of ages": (
+        ', signal = "p" }',
+        ', signal = "p", timeout = 1e308 }',
+        f"{PRESSURE}.timeout: give a value of at most 60 s (found 1e+308)",
+    ),
+    "period of ages": (
+        "period = 0.01",
+        "period = 1e18",
+        "messages.Wheels.period: give a value of at most 60 s (found 1e+18)",
+    ),
     "unused message": (
         "[messages.Wheels]",
         "[messages.W]\nperiod = 1\n[messages.Wheels]",

@@ -14,6 +14,7 @@ from typing import Annotated, Final, Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from ecu.bus.signal_map import Seconds
 from ecu.bus.units import conversion
 from ecu.contract.signals import INPUT, INPUT_SIGNALS
 from ecu.errors import UserError, closest
@@ -40,7 +41,7 @@ class MappedColumn(_Table):
     """Of the value in the file; -1 turns its sign."""
     offset: float = 0.0
     """Added after the factor, in `unit`."""
-    timeout: Annotated[float, Field(gt=0.0), Unit("s")] | None = None
+    timeout: Seconds | None = None
     """After it the input is stale, if not by the rate of its samples."""
 
 

@@ -27,7 +27,7 @@ from brakelab.replay.quality import Findings, damage_lines
 from brakelab.results.console import WIDTH
 from brakelab.results.progress import progress_bar
 from ecu.bus.database import read_database
-from ecu.bus.signal_map import load_signal_map
+from ecu.bus.signal_map import SLOWEST_S, load_signal_map
 from ecu.contract.signals import INPUT, INPUT_SIGNALS, without_corner
 from ecu.errors import UserError
 from ecu.output import give, say
@@ -222,7 +222,7 @@ def timeout(found: Found) -> float | None:
     """Return the time-out [s] that spans the gaps of a signal, None: the contract's does."""
     usual = INPUT_SIGNALS[INPUT[found.target]].timeout_s
     silent = max(LONGEST, PERIODS * found.series.period)
-    wanted = SPARE * min(found.series.longest_gap, silent)
+    wanted = min(SPARE * min(found.series.longest_gap, silent), SLOWEST_S)
     return round(STEP * math.ceil(wanted / STEP - 1e-9), 3) if wanted > usual else None
 
 
