@@ -207,7 +207,7 @@ def _describe(error: Exception) -> tuple[str, int]:
         case ModuleNotFoundError(name=str(name)) if name.partition(".")[0] in LABORATORY:
             return f"{name} is missing: this command needs the laboratory, pip install 'brake-ecu[lab]'", 2
         case ModuleNotFoundError(name=str(name)) if name.partition(".")[0] in (*FLEET, "dask"):
-            return f"{name} is missing: fleets need Dask, pip install distributed fsspec", 2
+            return f"{name} is missing: fleets need it, pip install distributed fsspec", 2
         case ModuleNotFoundError(name=str(name)) if name.partition(".")[0] in LEARN:
             return (
                 f"{name} is missing: emission models need scikit-learn, pip install scikit-learn",

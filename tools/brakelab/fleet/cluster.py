@@ -1,86 +1,102 @@
-"""Workers that replay the drives: processes of this machine, or those of a Dask scheduler."""
+"""Workers that replay the drives: processes of this machine, or those of a Dask scheduler.
 
-import logging
+Whoever reaches a Dask scheduler or its workers without TLS has code run as their user, and so does whoever
+sits between them and the client. A scheduler elsewhere has to be one of TLS therefore, unless Dask's
+configuration says `distributed.comm.require-encryption: false`.
+"""
+
 import os
-import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
 from contextlib import contextmanager
-from typing import Any, Final
+from ipaddress import ip_address
+from typing import Any, Final, NamedTuple
+from urllib.parse import urlsplit
 
-import dask
-from distributed import Client, LocalCluster
-
+from brakelab.fleet.local import LocalWorkers, WorkerDied
 from ecu import __version__
 from ecu.errors import UserError
 
 TIMEOUT_S: Final = 10.0
-ONE_THREAD: Final = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
-"""Environment of a worker, without the MALLOC_TRIM_THRESHOLD_ that Dask would set: with it every block of a
-log is new memory from the kernel, which took a third more processor time."""
+QUEUED: Final = 2
+"""Drives on a cluster for each of its threads: one runs, one waits for it to end."""
+ENCRYPTED: Final = ("tls", "wss")
 
-LOCAL: Final = {
-    # A drive whose worker died returns to the client, which counts and reports it.
-    "distributed.scheduler.allowed-failures": 0,
-    "distributed.nanny.pre-spawn-environ": ONE_THREAD,
-    # Dask monitors itself up to a hundred times a second, for pages unused here; on two cores that took 6 %.
-    "distributed.worker.profile.enabled": False,
-    "distributed.admin.tick.interval": "1s",
-    "distributed.admin.system-monitor.interval": "5s",
-    "distributed.worker.memory.monitor-interval": "500ms",
-    "distributed.scheduler.active-memory-manager.start": False,
-}
+
+class Workers(NamedTuple):
+    """What replays the drives."""
+
+    executor: Executor
+    room: Callable[[], int]
+    """Return how many drives they take at a time."""
+    died: type[Exception]
+    """Raised by the drive of a worker that died."""
 
 
 @contextmanager
-def connect(scheduler: str | None, workers: int | None) -> Iterator[Client]:
-    """Return a client of the scheduler at an address; None: of `workers` local processes (None: one a core).
+def connect(scheduler: str | None, workers: int | None) -> Iterator[Workers]:
+    """Yield the workers of the scheduler at an address; None: `workers` local processes (None: one a core).
 
     Raises:
-        UserError: no answer from the address, or its workers have another version of this program.
+        UserError: no answer from the address, it is neither encrypted nor on this machine, or its workers
+            have another version of this program.
     """
     if scheduler is None:
-        yield from _local(workers or _cores())
+        count = workers or _cores()
+        with LocalWorkers(count) as local:
+            yield Workers(local, lambda: count, WorkerDied)
         return
+    from distributed import Client, KilledWorker
+
+    _refuse_open(scheduler)
     try:
         client = Client(scheduler, timeout=TIMEOUT_S)
+    except TypeError:
+        remedy = "without a certificate of yours; name it to Dask (docs/fleet.md)"
+        raise UserError("--scheduler", scheduler, remedy) from None
     except (OSError, ValueError) as error:
         remedy = f"no Dask scheduler answers ({error}); start one with `dask scheduler`, or leave this out"
         raise UserError("--scheduler", scheduler, remedy) from None
     with client:
         _check_versions(client, scheduler)
-        yield client
+        yield Workers(
+            client.get_executor(pure=False),
+            lambda: QUEUED * max(sum(client.nthreads().values()), 1),
+            KilledWorker,
+        )
 
 
 def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _local(workers: int) -> Iterator[Client]:
-    with (
-        dask.config.set(LOCAL),
-        LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            dashboard_address="127.0.0.1:0",
-            scheduler_kwargs={"dashboard": False},
-            silence_logs=logging.CRITICAL,
-            preload=[__name__],
-        ) as cluster,
-        Client(cluster) as client,
-    ):
-        yield client
+def _refuse_open(scheduler: str) -> None:
+    import dask
+
+    if scheduler.partition("://")[0] in ENCRYPTED or _is_loopback(scheduler):
+        return
+    if dask.config.get("distributed.comm.require-encryption", None) is False:
+        return
+    remedy = (
+        "is not encrypted: whoever reaches it or listens has code run by its workers; give tls://…, or say"
+        " that nobody can by DASK_DISTRIBUTED__COMM__REQUIRE_ENCRYPTION=false (docs/fleet.md)"
+    )
+    raise UserError("--scheduler", scheduler, remedy)
 
 
-def dask_setup(worker: Any) -> None:
-    """Prepare a local worker, called by Dask: Ctrl-C is for the client alone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _is_loopback(scheduler: str) -> bool:
+    try:
+        host = urlsplit(scheduler if "://" in scheduler else f"tcp://{scheduler}").hostname
+        return host == "localhost" or ip_address(host or "").is_loopback
+    except ValueError:  # a name, or no address
+        return False
 
 
 def _version() -> str:
     return __version__
 
 
-def _check_versions(client: Client, scheduler: str) -> None:
+def _check_versions(client: Any, scheduler: str) -> None:
     for worker, found in client.run(_version, on_error="return").items():
         if found != __version__:
             says = f"version {found}" if isinstance(found, str) else f"{found}"

@@ -56,9 +56,9 @@ def fleet(
     total = sum(chain.left for chain in chains)
     done: list[dict[str, Any]] = []
     replayed, interrupted = 0, False
-    with progress_bar("fleet", total) as advance, connect(scheduler, workers) as client:
+    with progress_bar("fleet", total) as advance, connect(scheduler, workers) as crew:
         try:
-            for planned, summary, new in run_fleet(client, chains, out, rows):
+            for planned, summary, new in run_fleet(crew, chains, out, rows):
                 done.append(summary)
                 replayed += new
                 advance(planned.size)

@@ -5,8 +5,8 @@ python -m brakelab.fleet.measure scaling MANIFEST [--rounds 3] [--drives 100]
 python -m brakelab.fleet.measure distance [--kilometres 30000] [--minutes 5] [--workers 2]
 python -m brakelab.fleet.measure length [--gigabytes 10]
 ```
-`scaling` replays the same drives without Dask, by one worker and by two, in turn. `distance` simulates drives
-of ten minutes, replays and discards them one by one, and keeps their brake applications until its end;
+`scaling` replays the same drives in its own process, by one worker and by two, in turn. `distance` simulates
+drives of ten minutes, replays and discards them one by one, and keeps their brake applications until its end;
 distance not reached in time, or before Ctrl-C, is extrapolated. `length` replays one log that long: a drive
 of ten minutes again and again, with a jump of speed and counters at each seam.
 """
@@ -17,17 +17,16 @@ import re
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, wait
 from contextlib import contextmanager, redirect_stdout, suppress
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 import numpy as np
-from distributed import Client
 
-from brakelab.fleet.cluster import connect
+from brakelab.fleet.cluster import Workers, connect
 from brakelab.fleet.command import plan
 from brakelab.fleet.generate import plant_of, simulate_and_replay, write_drive
 from brakelab.fleet.manifest import Drive, find_drives
@@ -51,42 +50,48 @@ TELL_S: Final = 30.0
 
 
 @contextmanager
-def _warm(workers: int, chains: Sequence[Chain], task: Task = replay_job) -> Iterator[Client]:
-    """Yield a client whose workers have all the code loaded."""
-    with connect(None, workers) as client:
+def _warm(count: int, chains: Sequence[Chain], task: Task = replay_job) -> Iterator[Workers]:
+    """Yield workers that have all the code loaded."""
+    with connect(None, count) as workers:
         job = chains[0].job(Path(), rows=False)
-        for worker in client.nthreads():
-            client.submit(task, job, workers=[worker], pure=False).result()
-        yield client
+        wait([workers.executor.submit(task, job) for _ in range(count)])
+        yield workers
 
 
-def _peak_megabytes() -> float:
-    """Return the peak memory of this process, without that of its parent."""
-    held = re.search(r"VmHWM:\s*(\d+) kB", Path("/proc/self/status").read_text("ascii"))
+def _peak_megabytes(process: int | str = "self") -> float:
+    """Return the peak memory of a process, without that of its parent."""
+    held = re.search(r"VmHWM:\s*(\d+) kB", Path(f"/proc/{process}/status").read_text("ascii"))
     return int(held[1]) / 1024.0 if held else float("nan")
 
 
+def _of_workers() -> tuple[float, float]:
+    """Return the processor time [s] that the workers have used up to now, and the greatest peak [MB]."""
+    pids = [child.pid for child in active_children() if child.pid]
+    times = [Path(f"/proc/{pid}/stat").read_text("ascii").rpartition(")")[2].split() for pid in pids]
+    ticks = sum(int(user) + int(system) for *_, user, system in (row[:13] for row in times))
+    return ticks / os.sysconf("SC_CLK_TCK"), max(map(_peak_megabytes, pids))
+
+
 def _by_workers(workers: int, drives: Sequence[Drive]) -> dict[str, float]:
-    with TemporaryDirectory() as folder, _warm(workers, plan(drives, None)) as client:
+    with TemporaryDirectory() as folder, _warm(workers, plan(drives, None)) as crew:
         chains = plan(drives, None)
-        work = sum(client.run(time.process_time).values())
+        before, _ = _of_workers()
         began, parent = time.perf_counter(), time.process_time()
-        done = [summary for _, summary, _ in run_fleet(client, chains, Path(folder))]
+        done = [summary for _, summary, _ in run_fleet(crew, chains, Path(folder))]
         wall, parent = time.perf_counter() - began, time.process_time() - parent
-        work = sum(client.run(time.process_time).values()) - work
+        work, peak = _of_workers()
         busy = sum(summary["replay_seconds"] for summary in done)
-        peaks = client.run(_peak_megabytes).values()
     return {
         "wall": wall,
         "busy": busy / (workers * wall),
         "parent": 1e3 * parent / len(drives),
-        "work": 1e3 * work / len(drives),
-        "peak": max(peaks),
+        "work": 1e3 * (work - before) / len(drives),
+        "peak": peak,
     }
 
 
 def _alone(drives: Sequence[Drive]) -> tuple[float, float]:
-    """Replay without Dask; return wall time and total processor time."""
+    """Replay without workers; return wall time and total processor time."""
     began, work = time.perf_counter(), time.process_time()
     for chain in plan(drives, None):
         while chain.place < len(chain.drives):
@@ -95,7 +100,7 @@ def _alone(drives: Sequence[Drive]) -> tuple[float, float]:
 
 
 def scaling(manifest: Path, rounds: int, count: int) -> None:
-    """Print times of the same drives without Dask, by one worker and by two.
+    """Print times of the same drives in this process, by one worker and by two.
 
     Wall times are valid on an idle machine. Processor time is not affected by others: the replays' share in
     its total is the efficiency of an idle machine.
@@ -114,7 +119,7 @@ def scaling(manifest: Path, rounds: int, count: int) -> None:
         for workers, took in ((1, one), (2, two)):
             print(
                 f"  {workers} workers {took['wall']:.1f} s, {100 * took['busy']:.1f} % of it in replays; "
-                f"CPU each {took['work']:.0f} ms workers, {took['parent']:.0f} ms client and scheduler; "
+                f"CPU each {took['work']:.0f} ms workers, {took['parent']:.0f} ms client; "
                 f"peak {took['peak']:.0f} MB a worker",
                 flush=True,
             )
@@ -137,21 +142,16 @@ def _simulated(kilometres: float) -> list[Chain]:
     return chains
 
 
-def _work(client: Client) -> float:
-    """Return the processor time [s] that client, scheduler and workers have used up to now."""
-    return time.process_time() + float(sum(client.run(time.process_time).values()))
-
-
 def distance(kilometres: float, minutes: float, workers: int) -> None:
     """Print the distance simulated in `minutes` or until Ctrl-C, and the time needed for `kilometres`."""
     done: list[dict[str, Any]] = []
     driven = wall = told = 0.0
     chains = _simulated(kilometres)
-    with TemporaryDirectory() as folder, _warm(workers, chains, simulate_and_replay) as client:
-        work = _work(client)
+    with TemporaryDirectory() as folder, _warm(workers, chains, simulate_and_replay) as crew:
+        work = time.process_time() + _of_workers()[0]
         began = time.perf_counter()
         with suppress(KeyboardInterrupt):
-            for _, summary, _ in run_fleet(client, chains, Path(folder), task=simulate_and_replay):
+            for _, summary, _ in run_fleet(crew, chains, Path(folder), task=simulate_and_replay):
                 done.append(summary)
                 driven += 1e-3 * summary.get("distance", 0.0)
                 wall = time.perf_counter() - began
@@ -160,8 +160,8 @@ def distance(kilometres: float, minutes: float, workers: int) -> None:
                     print(f"{wall:.0f} s: {len(done)} drives, {driven:.0f} km", file=sys.stderr, flush=True)
                 if wall > 60.0 * minutes or driven >= kilometres:
                     break
-        work = _work(client) - work
-        peaks = client.run(_peak_megabytes).values()
+        used, peak = _of_workers()
+        work = time.process_time() + used - work
         kept = sum(file.stat().st_size for file in Path(folder).rglob("*.parquet"))
     good = [row for row in done if not row["fault"]]
     if not good:
@@ -177,9 +177,9 @@ def distance(kilometres: float, minutes: float, workers: int) -> None:
         f"{wall:.0f} s with {workers} workers, load {os.getloadavg()[0]:.1f}: {3600.0 * hours / wall:.0f} "
         f"times as fast as driven; {100.0 * (replayed + simulated) / (workers * wall):.1f} % of it in tasks, "
         f"of which {100.0 * replayed / (replayed + simulated):.0f} % in replays\n"
-        f"CPU {work / len(done):.2f} s a drive, {work / 3600.0:.2f} h in all, for simulation, replay, client "
-        f"and scheduler\n"
-        f"prediction off by {100.0 * float(np.median(errors)):.1f} % (median); peak {max(peaks):.0f} MB a "
+        f"CPU {work / len(done):.2f} s a drive, {work / 3600.0:.2f} h in all, for simulation, replay and "
+        f"client\n"
+        f"prediction off by {100.0 * float(np.median(errors)):.1f} % (median); peak {peak:.0f} MB a "
         f"worker, {1e-3 * kept / len(done):.0f} kB kept a drive\n"
         f"{kilometres:.0f} km: {share * wall / 3600.0:.2f} h at this rate, {share * work / 3600.0:.2f} h of "
         f"processor time"

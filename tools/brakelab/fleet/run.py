@@ -1,20 +1,20 @@
 """The drives of every vehicle in order, different vehicles side by side.
 
-A vehicle has one drive on the cluster at a time: the learned values of one go into the next. A failed drive
-teaches nothing, and the next starts with the values before it. So the scheduler holds a few drives per worker
-at most, independent of their number; vehicles with the longest remaining distance come first.
+A vehicle has one drive with the workers at a time: the learned values of one go into the next. A failed drive
+teaches nothing, and the next starts with the values before it. So the workers hold a few drives each at most,
+independent of their number; vehicles with the longest remaining distance come first.
 """
 
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, field
 from heapq import heapify, heappop, heappush
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from distributed import Client, Future, KilledWorker, as_completed
-
+from brakelab.fleet.cluster import Workers
 from brakelab.fleet.job import Job, Outcome, failed
 from brakelab.fleet.manifest import Drive
 from brakelab.fleet.output import keep, rows_file, standing
@@ -27,8 +27,6 @@ TRIES: Final = 3
 """After so many lost workers the drive is held to be the cause."""
 COUNT_S: Final = 2.0
 """Between looks at how many workers there are."""
-QUEUED: Final = 2
-"""Drives on the cluster for each of its threads: one runs, one waits for it to end."""
 
 
 Task = Callable[[Job], Outcome]
@@ -82,7 +80,7 @@ class Chain:
 
 
 def run_fleet(
-    client: Client,
+    workers: Workers,
     chains: Sequence[Chain],
     out: Path,
     rows: bool = False,
@@ -95,12 +93,11 @@ def run_fleet(
     """
     ready = [(-chain.left, number, chain) for number, chain in enumerate(chains)]
     heapify(ready)
-    running: dict[Future, tuple[int, Chain, Job]] = {}
-    finished = as_completed()
+    running: dict[Future[Outcome], tuple[int, Chain, Job]] = {}
     room, counted = 1, -math.inf
     while ready or running:
         if time.monotonic() > counted + COUNT_S:
-            room, counted = QUEUED * max(sum(client.nthreads().values()), 1), time.monotonic()
+            room, counted = workers.room(), time.monotonic()
         while ready and len(running) < room:
             _, number, chain = heappop(ready)
             for planned, summary in _skip(chain, out, rows):
@@ -108,23 +105,19 @@ def run_fleet(
             if chain.place == len(chain.drives):
                 continue
             job = chain.job(out, rows)
-            future = client.submit(task, job, pure=False, priority=chain.left)
-            running[future] = number, chain, job
-            finished.add(future)
-        if not running:
-            continue
-        future = next(finished)
-        number, chain, job = running.pop(future)
-        outcome = _outcome(future, job)
-        if outcome is None and chain.tries < TRIES:
-            chain.tries += 1
-        else:
-            planned = chain.drives[chain.place]
-            outcome = outcome or failed(job, f"{job.logs[0]}: killed {TRIES} workers; is it too large?")
-            outcome.summary["tries"] = chain.tries
-            keep(out, outcome)
-            yield planned, chain.finish(outcome), True
-        heappush(ready, (-chain.left, number, chain))
+            running[workers.executor.submit(task, job)] = number, chain, job
+        for future in wait(running, return_when=FIRST_COMPLETED).done:
+            number, chain, job = running.pop(future)
+            outcome = _outcome(future, job, workers.died)
+            if outcome is None and chain.tries < TRIES:
+                chain.tries += 1
+            else:
+                planned = chain.drives[chain.place]
+                outcome = outcome or failed(job, f"{job.logs[0]}: killed {TRIES} workers; is it too large?")
+                outcome.summary["tries"] = chain.tries
+                keep(out, outcome)
+                yield planned, chain.finish(outcome), True
+            heappush(ready, (-chain.left, number, chain))
 
 
 def _skip(chain: Chain, out: Path, rows: bool) -> Iterator[tuple[Planned, dict[str, Any]]]:
@@ -143,16 +136,15 @@ def _skip(chain: Chain, out: Path, rows: bool) -> Iterator[tuple[Planned, dict[s
         yield planned, chain.finish(outcome)
 
 
-def _outcome(future: Future, job: Job) -> Outcome | None:
+def _outcome(future: Future[Outcome], job: Job, died: type[Exception]) -> Outcome | None:
     """Return the outcome of a job, None: its worker died."""
-    if future.status in ("cancelled", "lost"):
+    if future.cancelled():
         raise RunFault(
             "the Dask scheduler was lost; what is done stays, the same command goes on with the rest"
         )
     error = future.exception()
-    if isinstance(error, KilledWorker):
+    if isinstance(error, died):
         return None
     if error is not None:
         return failed(job, f"{job.logs[0]}: {type(error).__name__}: {error}")
-    outcome: Outcome = future.result()
-    return outcome
+    return future.result()
