@@ -10,6 +10,7 @@ import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 import pytest
 
+from brakelab.fleet import command
 from brakelab.fleet.command import disorder, fleet
 from brakelab.fleet.generate import write_drive
 from brakelab.fleet.job import Job
@@ -133,3 +134,16 @@ def test_a_log_that_starts_before_the_one_before_it_is_told() -> None:
 
     assert disorder(starts(500_000, None, 500_001, 500_002)) == []
     assert "2.log (2027-01-15 07:00:00 UTC) comes after 0.log" in disorder(starts(500_000, None, 499_999))[0]
+
+
+def test_ctrl_c_before_the_first_drive_is_done_is_one_line(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command, "run_fleet", interrupted)
+    assert fleet([f"{data}/*/*.log"], SUV, None, None, None, 1, tmp_path / "out") == 130
+    told = capsys.readouterr()
+    assert "interrupted: the same command goes on with the rest" in told.out + told.err
+    assert list((tmp_path / "out").iterdir()) == []

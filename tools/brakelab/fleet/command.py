@@ -24,6 +24,7 @@ from ecu.errors import UserError
 from ecu.output import fault, give, say, wrote
 from ecu.settings.config import load_config
 
+GOES_ON: Final = "interrupted: the same command goes on with the rest"
 SHOWN: Final = 20
 """Failures that are printed; all of them are in the report."""
 
@@ -64,6 +65,9 @@ def fleet(
                 advance(planned.size)
         except KeyboardInterrupt:
             interrupted = True
+    if not done:
+        say(GOES_ON)
+        return 130
     place = {(p.drive.vehicle, p.drive.name): k for k, p in enumerate(p for c in chains for p in c.drives)}
     done.sort(key=lambda summary: place[summary["vehicle"], summary["drive"]])
     pq.write_table(summary_table(done), out / "drives.parquet", compression="zstd")
@@ -71,7 +75,7 @@ def fleet(
     write_page(done, out / "report.html")
     _tell(done, replayed, sum(len(chain.drives) for chain in chains), out)
     if interrupted:
-        say("interrupted: the same command goes on with the rest")
+        say(GOES_ON)
         return 130
     return 1 if any(summary["fault"] for summary in done) else 0
 
