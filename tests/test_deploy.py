@@ -1,7 +1,9 @@
 """The files for a machine: systemd itself is asked about its own."""
 
+import re
 import shutil
 import subprocess
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -35,3 +37,13 @@ def test_nothing_in_the_unit_forbids_what_the_daemon_does():
     assert "MemoryDenyWriteExecute" not in text  # kernels are compiled
     assert "AF_CAN" in text
     assert "AF_UNIX" in text
+
+
+def test_the_image_belongs_to_root_but_for_the_kernels_and_says_whether_it_is_well():
+    text = (DEPLOY.parents[1] / "Dockerfile").read_text()
+    before, user, after = text.partition("USER brake")
+    assert user
+    assert re.findall(r"install-onboard.sh (\S+)", before) == ["/opt/brake-ecu"]
+    assert re.findall(r"chown -R brake: (\S+)", text) == ["/opt/brake-ecu/cache"]
+    assert not re.search(r"install .*-o brake", text)
+    assert find_spec(re.search(r"HEALTHCHECK (?:.|\n)*? -m (\S+)", after)[1])

@@ -1,8 +1,8 @@
 #!/bin/sh
 # tools/install-onboard.sh PREFIX
 # Install what runs in the vehicle into PREFIX, an absent or empty folder, and compile its kernels there,
-# so that a start compiles nothing. Run it as the user that will run the daemon: the folder of compiled
-# kernels, PREFIX/cache, has to stay writable for that user. Needs no root and leaves nothing elsewhere.
+# so that a start compiles nothing. Run it as the user that will run the daemon, or as root and give that user
+# the folder of compiled kernels, PREFIX/cache, which has to be his own. Needs no root and leaves nothing elsewhere.
 set -eu
 die() { echo "install-onboard: $*" >&2; exit 2; }
 

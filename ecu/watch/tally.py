@@ -18,10 +18,10 @@ from ecu.contract.records import INPUTS, STAGES, RecordArray, new_record
 from ecu.contract.signals import CYCLE_NS
 from ecu.errors import UserError
 from ecu.recording.ring import Batch, RingReader
+from ecu.watch.health import ailment
 
 EDGES_S: Final = (20e-6, 50e-6, 100e-6, 200e-6, 500e-6, 1e-3, 2e-3, 5e-3, 10e-3, 100e-3)
 """Upper edges of the histogram of lateness; the last bin has none."""
-STALLED_S: Final = 0.5
 
 
 class Tally:
@@ -73,8 +73,4 @@ class Tally:
 
     def ailment(self) -> str:
         """Return why the loop is not healthy, empty while its cycles advance."""
-        if self.reader.closed:
-            return f"the run has ended: {self.reader.last_words.get('by', 'no reason given')}"
-        if self.last is None:
-            return "no cycle yet"
-        return f"no cycle for {self.age_s:.1f} s" if self.age_s > STALLED_S else ""
+        return ailment(self.reader, self.age_s)

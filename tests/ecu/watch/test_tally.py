@@ -4,7 +4,8 @@ import pytest
 from ecu.contract.records import FRAME, new_record
 from ecu.contract.signals import CYCLE_NS
 from ecu.errors import UserError
-from ecu.watch.tally import EDGES_S, STALLED_S, Tally
+from ecu.watch.health import STALLED_S
+from ecu.watch.tally import EDGES_S, Tally
 
 from .conftest import MONO_NS
 
