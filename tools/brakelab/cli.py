@@ -252,7 +252,9 @@ def fleet(
     scheduler: Annotated[
         str | None,
         typer.Option(
-            "--scheduler", metavar="ADDRESS", help="Use this Dask cluster; default: local processes"
+            "--scheduler",
+            metavar="ADDRESS",
+            help="Use this Dask cluster, tls://HOST:PORT; default: local processes",
         ),
     ] = None,
     workers: Annotated[
