@@ -9,10 +9,8 @@ pickle and machine code), so a place in which anybody else may put or exchange f
 `NUMBA_DISABLE_JIT=1` kernels run as plain Python (`ecu/interpreted.py`).
 """
 
-import grp
 import hashlib
 import os
-import pwd
 import re
 import stat
 from collections.abc import Callable, Iterable, Iterator
@@ -97,6 +95,8 @@ def open_to_others(folder: Path) -> Path | None:
     Root, and whoever owns `/`, is trusted above it. In a sticky folder (`/tmp`) only owners exchange files.
     `folder` contains no links.
     """
+    if not hasattr(os, "geteuid"):  # a system whose folders have no such owners
+        return None
     own, above = {os.geteuid()}, {os.geteuid(), 0, os.stat("/").st_uid}  # `/` in a user namespace: nobody's
     for path in (folder, *folder.parents):
         found = path.stat()
@@ -113,8 +113,11 @@ def open_to_others(folder: Path) -> Path | None:
 def _of_one_user(group: int) -> bool:
     """Return whether a group is the user's own: many systems give each one, and let it write by default."""
     try:
+        import grp
+        import pwd
+
         found, user = grp.getgrgid(group), pwd.getpwuid(os.geteuid()).pw_name
-    except KeyError:
+    except (ImportError, KeyError):
         return False
     return found.gr_name == user and set(found.gr_mem) <= {user}
 

@@ -173,4 +173,4 @@ def _text(path: Path) -> str:
 
 def _without_waiting(path: str, flags: int) -> int:
     """Open a file; a fifo that nobody writes to would wait for ever."""
-    return os.open(path, flags | os.O_NONBLOCK)
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))

@@ -1,7 +1,9 @@
 """The cache of compiled kernels is named after everything that a kernel is made of."""
 
 import ast
+import grp
 import os
+import pwd
 import subprocess
 import sys
 from pathlib import Path
@@ -100,8 +102,8 @@ def test_a_group_is_a_user_s_own_by_its_name_and_members(monkeypatch: pytest.Mon
     class Entry:
         pw_name, gr_name, gr_mem = "ann", "ann", ["ann"]
 
-    monkeypatch.setattr(jit.pwd, "getpwuid", lambda uid: Entry)
-    monkeypatch.setattr(jit.grp, "getgrgid", lambda gid: Entry)
+    monkeypatch.setattr(pwd, "getpwuid", lambda uid: Entry)
+    monkeypatch.setattr(grp, "getgrgid", lambda gid: Entry)
     assert jit._of_one_user(1000)
     monkeypatch.setattr(Entry, "gr_mem", ["ann", "bob"])
     assert not jit._of_one_user(1000)
