@@ -201,7 +201,7 @@ def test_a_module_is_one_idea(path: Path) -> None:
 
 
 TESTS = [path.relative_to(ROOT / "tests") for path in sorted((ROOT / "tests").rglob("test_*.py"))]
-ACROSS = {"closed_loop", "golden", "system"}
+ACROSS = {"closed_loop", "golden", "system", "wide_world"}
 
 
 @pytest.mark.parametrize(
