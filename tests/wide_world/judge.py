@@ -2,8 +2,8 @@
 
     python -m tests.wide_world.judge [--cars 0-29] [--seed 1] [--workers 2] [--json FILE] [--keep DIR]
 
-Judged is the mean deceleration of each braking beyond 1.5 m/s^2, over its rows above 5 m/s and below 0.4 g
-across: predicted from its pressures and from what was known before it, against what the accelerometer
+Judged is the mean deceleration of each braking beyond 1.5 m/s^2, over the rows that a force balance can judge
+(`brakings`): predicted from its pressures and from what was known before it, against what the accelerometer
 measured.
 
     product, published   friction, zeros, mass, unreported drag of the row before, in the force balance here
@@ -190,7 +190,7 @@ def report(judged: list[Judged]) -> str:
         for name in dict.fromkeys(t for o in each for t in o.traits)
     }
     spoilt = {"accelerator rests at 2.5 %", "engine's torque at 2.5 times"}
-    plain = {"neither of the first two": lambda one: not spoilt & set(one.traits)}
+    sound = {"both signals sound": lambda one: not spoilt & set(one.traits)}
     numbers = {str(n): lambda one, n=n: one.number == n for n in range(1, 9)} | {
         "9 on": lambda one: one.number > 8
     }
@@ -199,7 +199,7 @@ def report(judged: list[Judged]) -> str:
             f"Brakings beyond {LEAST} m/s^2. Mean/p90 error [%], share inside 2 sigma [%]. By set:",
             table(judged, columns({"pooled": lambda one: True} | sets), _cell),
             "By what the cars have:",
-            table(judged, columns(plain | traits), _cell),
+            table(judged, columns(sound | traits), _cell),
             "By the number of the braking, mean error (bias) [%]:",
             table(judged, columns(numbers), _bias),
         )
