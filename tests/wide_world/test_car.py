@@ -13,6 +13,9 @@ from .lining import CONSTANT, Brake
 from .state import ROW, STATE
 from .tyre import BRUSH, Tyre, greatest
 
+pytestmark = pytest.mark.compiled
+
+
 BODY = Body(
     mass=1200.0, fuel=0.0, wheelbase=2.6, front_axle=1.3, cog_height=0.5, track=1.6, drag=0.0, lift=0.0,
     lift_front=0.4, rolling=0.0, cornering=20.0, roll_front=0.5, inertia_front=1.2, inertia_rear=1.2,

@@ -12,6 +12,9 @@ from .brakings import find, read
 from .draw import CARS, SETS, draw
 from .logger import record
 
+pytestmark = pytest.mark.compiled
+
+
 ALL = draw(1)
 
 

@@ -7,6 +7,9 @@ from .car import NO_ABS
 from .draw import draw
 from .driver import Engine, change_gear
 
+pytestmark = pytest.mark.compiled
+
+
 ENGINE = Engine(
     2e5, 400.0, (12.0, 9.6, 7.7, 6.1, 4.9, 3.9), 700.0, 400.0, 20.0, 0.05, 0.1, 0.0, 0.2, 0.0, 0.0, 0.0
 )
