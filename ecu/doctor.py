@@ -19,7 +19,8 @@ from ecu import jit
 from ecu.bus.channel import open_channel
 from ecu.bus.freshness import NEVER, begin_cycle
 from ecu.bus.protocol import Channel
-from ecu.bus.receive import ReceivePlan, Reception, new_reception, receive
+from ecu.bus.receive import Reception, new_reception, receive
+from ecu.bus.receive_plan import ReceivePlan
 from ecu.bus.signal_map import receive_plan
 from ecu.bus.transmit import contract_transmit_plan
 from ecu.compiling import compiling_told

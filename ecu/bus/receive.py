@@ -1,21 +1,17 @@
 """Reception of frames into inputs: identifier, length, checksum, counter, bits, validity, freshness.
 
-A `ReceivePlan` is compiled from a database (and a signal map), a `Reception` holds the state of reception. A
-rejected frame changes the counters alone, none of its signals.
+A `Reception` holds its state. A rejected frame changes the counters alone, none of its signals.
 """
 
-from collections.abc import Sequence
-from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from cantools.database import Message
 from numpy.typing import NDArray
 
 from ecu.bus import bits, e2e, link, sequence
-from ecu.bus.database import attribute, load_database
-from ecu.bus.freshness import NEVER, accept, input_freshness, new_freshness
-from ecu.bus.plan import SIGNAL, SignalUse, compile_signals, is_present, is_valid, raw_code, signed_value
+from ecu.bus.freshness import NEVER, accept
+from ecu.bus.plan import is_present, is_valid, raw_code, signed_value
+from ecu.bus.receive_plan import ReceivePlan
 from ecu.bus.request import (
     FIRST,
     LAST,
@@ -28,29 +24,8 @@ from ecu.bus.request import (
 )
 from ecu.contract.faults import E2E_REJECTIONS
 from ecu.contract.records import EXTENDED_ID, FRAME_ERROR, FRAME_EXTENDED, FRAME_REMOTE, RecordArray
-from ecu.contract.signals import INPUT, INPUT_SIGNALS, N_INPUTS, N_OUTPUTS, OUTPUT
+from ecu.contract.signals import N_INPUTS
 from ecu.jit import Record, kernel
-
-MESSAGE: Final = np.dtype(
-    [
-        ("name", "U48"),
-        ("id", "u4"),  # with EXTENDED_ID
-        ("data_id", "u4"),
-        ("period_ns", "i8"),
-        ("slowest_ns", "i8"),
-        ("first", "i4"),  # rows of `signals`
-        ("count", "i4"),
-        ("rule", "u1"),
-        ("length", "u1"),
-        ("foreign", "u1"),  # own identifier, never expected from another sender
-        ("request", "u1"),  # carries the driver's request
-        ("modulo", "i2"),  # of the counter, 0: none
-        ("counter_start", "i2"),
-        ("counter_length", "u1"),
-        ("counter_big_endian", "u1"),
-    ],
-    align=True,
-)
 
 # Per message of the plan
 MESSAGE_COUNTERS: Final = np.dtype(
@@ -81,20 +56,6 @@ TOTALS: Final = np.dtype(
 )
 
 
-class ReceivePlan(NamedTuple):
-    """Signals to take from frames; `messages` in ascending order of identifiers. Read only."""
-
-    ids: NDArray[np.uint32]
-    """Identifiers, those of 29 bits with EXTENDED_ID: what kernel filters must let through."""
-    messages: RecordArray
-    signals: RecordArray
-    codes: NDArray[np.int64]
-    expected: RecordArray
-    """`FRESHNESS` before the first sample, one per target place."""
-    mapped: NDArray[np.bool_]
-    """Per target place: whether any message feeds it."""
-
-
 class Reception(NamedTuple):
     """State of reception. Kernels write to it."""
 
@@ -106,61 +67,6 @@ class Reception(NamedTuple):
     """`FRESHNESS` per target place."""
     request: RecordArray
     """`REQUEST`, length 1."""
-
-
-class MessageUse(NamedTuple):
-    """Use of one message; `period_s` to `slowest_s` is the range of its admissible intervals."""
-
-    message: Message
-    signals: Sequence[SignalUse]
-    period_s: float
-    slowest_s: float
-    rule: int = e2e.NO_CHECKSUM
-    data_id: int = 0
-    counter: Any = None
-    """The cantools signal that counts frames, None: there is none."""
-    modulo: int = 0
-    foreign: bool = False
-
-
-def compile_receive(uses: Sequence[MessageUse], expected: RecordArray) -> ReceivePlan:
-    """Return the plan that receives `uses` into as many target places as `expected` has."""
-    uses = sorted(uses, key=_identifier)
-    messages = np.zeros(len(uses), MESSAGE)
-    rows: list[RecordArray] = [np.zeros(0, SIGNAL)]
-    codes: list[int] = []
-    mapped = np.zeros(len(expected), np.bool_)
-    for message, use in zip(messages, uses, strict=True):
-        first = sum(map(len, rows))
-        compiled = compile_signals(use.message, use.signals, first, len(codes))
-        rows.append(compiled.rows)
-        codes += compiled.codes
-        mapped[[signal.place for signal in use.signals]] = True
-        message["name"], message["id"] = use.message.name, _identifier(use)
-        message["length"] = use.message.length
-        message["period_ns"] = round(use.period_s * 1e9)
-        message["slowest_ns"] = round(use.slowest_s * 1e9)
-        message["first"], message["count"] = first, compiled.wanted
-        message["rule"], message["data_id"], message["foreign"] = use.rule, use.data_id, use.foreign
-        asks = [FIRST <= signal.place <= LAST for signal in use.signals]
-        message["request"] = len(expected) == N_INPUTS and any(asks)
-        if use.counter is not None:
-            big_endian = use.counter.byte_order == "big_endian"
-            message["modulo"] = use.modulo
-            message["counter_start"] = bits.first_bit(use.counter.start, big_endian)
-            message["counter_length"], message["counter_big_endian"] = use.counter.length, big_endian
-    return ReceivePlan(
-        np.ascontiguousarray(messages["id"]),
-        messages,
-        np.concatenate(rows),
-        np.array([*codes, 0], np.int64),
-        expected,
-        mapped,
-    )
-
-
-def _identifier(use: MessageUse) -> int:
-    return int(use.message.frame_id) | (EXTENDED_ID if use.message.is_extended_frame else 0)
 
 
 def new_reception(plan: ReceivePlan) -> Reception:
@@ -299,53 +205,3 @@ def receive(
         settle_request(request, freshness, inputs.t_ns)
     _tell_links(totals, inputs)
     return index
-
-
-def _protected(message: Message, places: dict[str, int]) -> MessageUse:
-    """Return the wanted signals of a contract message: every signal that has a place."""
-    names = [signal.name for signal in message.signals]
-    period_s = attribute(message, "GenMsgCycleTime") * 1e-3
-    slowest_s = attribute(message, "CycleTimeSlowest") * 1e-3 or period_s
-    protected = attribute(message, "E2EDataId") != 0
-    return MessageUse(
-        message,
-        [SignalUse(name, places[name]) for name in names if name in places],
-        period_s,
-        slowest_s,
-        e2e.AUTOSAR_P01 if protected else e2e.NO_CHECKSUM,
-        attribute(message, "E2EDataId"),
-        message.get_signal_by_name("alive_counter") if protected else None,
-        e2e.P01_MODULO,
-    )
-
-
-def contract_receive_plan(dbc_path: Path) -> ReceivePlan:
-    """Return the ECU's own plan: input frames into `INPUTS`; frames like the ECU's own are foreign."""
-    messages = load_database(dbc_path).messages
-    uses = [_protected(message, INPUT) for message in messages if "BrakeEcu" not in message.senders]
-    watched = [MessageUse(m, [], 0.0, 0.0, foreign=True) for m in messages if "BrakeEcu" in m.senders]
-    periods = {signal.place: (use.period_s, use.slowest_s) for use in uses for signal in use.signals}
-    return compile_receive(uses + watched, input_freshness(periods, {}))
-
-
-def contract_listen_plan(dbc_path: Path) -> ReceivePlan:
-    """Return the plan of a listener to the ECU: its output frames into a vector of `OUTPUT_COLUMNS`.
-
-    The target is a `target_dtype(N_OUTPUTS)` record. A value sent in two messages (`pressure_demand_valid`)
-    arrives at twice the rate.
-    """
-    messages = load_database(dbc_path).messages
-    uses = [_protected(message, OUTPUT) for message in messages if "BrakeEcu" in message.senders]
-    rate = np.zeros(N_OUTPUTS)
-    for use in uses:
-        for signal in use.signals:
-            rate[signal.place] += 1.0 / use.period_s
-    period_s = np.divide(1.0, rate, out=np.zeros(N_OUTPUTS), where=rate > 0.0)
-    everything = np.full(N_OUTPUTS, np.inf)
-    timeout_s = np.maximum(0.1, 3.0 * period_s)
-    return compile_receive(uses, new_freshness(timeout_s, period_s, period_s, -everything, everything))
-
-
-def input_names(plan: ReceivePlan) -> tuple[str, ...]:
-    """Return the names of the inputs that the plan feeds."""
-    return tuple(signal.name for signal, mapped in zip(INPUT_SIGNALS, plan.mapped, strict=True) if mapped)

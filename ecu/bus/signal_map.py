@@ -15,7 +15,7 @@ from ecu.bus import e2e
 from ecu.bus.database import find_message, find_signal, read_database
 from ecu.bus.freshness import input_freshness
 from ecu.bus.plan import SignalUse
-from ecu.bus.receive import MessageUse, ReceivePlan, compile_receive, contract_receive_plan
+from ecu.bus.receive_plan import MessageUse, ReceivePlan, compile_receive, contract_receive_plan
 from ecu.bus.units import conversion
 from ecu.contract.signals import INPUT, INPUT_SIGNALS
 from ecu.errors import UserError, closest

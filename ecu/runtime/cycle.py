@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from ecu.algorithm.step import new_state, step
 from ecu.bus.freshness import begin_cycle, end_cycle
 from ecu.bus.protocol import BusStatus, Channel
-from ecu.bus.receive import ReceivePlan, Reception, new_reception, receive
+from ecu.bus.receive import Reception, new_reception, receive
+from ecu.bus.receive_plan import ReceivePlan
 from ecu.bus.transmit import Transmission, TransmitPlan, frame_buffer, new_transmission, transmit
 from ecu.contract import faults
 from ecu.contract.records import (

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ecu.bus.freshness import begin_cycle
-from ecu.bus.receive import ReceivePlan, Reception, new_reception, receive
+from ecu.bus.receive import Reception, new_reception, receive
+from ecu.bus.receive_plan import ReceivePlan
 from ecu.bus.signal_map import receive_plan
 from ecu.contract.records import INPUTS, STAGES, RecordArray, new_record
 from ecu.contract.signals import CYCLE_NS

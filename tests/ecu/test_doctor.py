@@ -2,7 +2,8 @@ from pathlib import Path
 
 import pytest
 
-from ecu.bus.receive import contract_receive_plan, new_reception
+from ecu.bus.receive import new_reception
+from ecu.bus.receive_plan import contract_receive_plan
 from ecu.doctor import doctor, machine, messages, unit
 from ecu.errors import UserError
 from ecu.settings.resources import resource

@@ -19,7 +19,8 @@ from brakelab.studies import output
 from brakelab.studies.braking import MESSAGES_IN, simulated_stop
 from brakelab.studies.measure import Figure, Row
 from ecu import cli
-from ecu.bus.receive import contract_receive_plan, new_reception, receive
+from ecu.bus.receive import new_reception, receive
+from ecu.bus.receive_plan import contract_receive_plan
 from ecu.contract.records import FRAME, INPUTS, STAGES, new_record
 from ecu.contract.signals import INPUT
 from ecu.errors import UserError

@@ -14,7 +14,8 @@ from brakelab.replay.quality import Findings
 from brakelab.replay.source import load_source
 from ecu.bus.freshness import begin_cycle, end_cycle
 from ecu.bus.protocol import BusStatus
-from ecu.bus.receive import contract_receive_plan, new_reception, receive
+from ecu.bus.receive import new_reception, receive
+from ecu.bus.receive_plan import contract_receive_plan
 from ecu.contract.records import FRAME, INPUTS, RecordArray, new_record
 from ecu.contract.signals import ACCEL_X, CYCLE_NS, STEERING_ANGLE, USABLE, WHEEL_SPEED
 from ecu.errors import UserError

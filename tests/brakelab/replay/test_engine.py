@@ -16,7 +16,8 @@ from brakelab.replay.quality import Findings
 from brakelab.replay.source import load_source
 from ecu.algorithm.step import step
 from ecu.bus.freshness import accept, begin_cycle, end_cycle
-from ecu.bus.receive import contract_receive_plan, new_reception, receive
+from ecu.bus.receive import new_reception, receive
+from ecu.bus.receive_plan import contract_receive_plan
 from ecu.contract.records import CYCLE, FRAME, RecordArray
 from ecu.contract.signals import ACCEL_X, CALLIPER_PRESSURE, CYCLE_NS, MOTOR_TORQUE, N_OUTPUTS, WHEEL_SPEED
 from ecu.recording.recorder import candump_lines

@@ -13,7 +13,8 @@ from brakelab.replay.source import load_source
 from brakelab.results.files import read_result
 from ecu.algorithm.step import INITIAL, initial_part, step
 from ecu.bus.freshness import begin_cycle, end_cycle
-from ecu.bus.receive import contract_receive_plan, new_reception, receive
+from ecu.bus.receive import new_reception, receive
+from ecu.bus.receive_plan import contract_receive_plan
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CYCLE_NS, OUTPUT_COLUMNS
 from ecu.errors import UserError

@@ -14,7 +14,7 @@ from brakelab.replay.quality import Findings
 from brakelab.replay.seen import new_seen, set_raw_ends
 from brakelab.replay.source import load_source
 from brakelab.results.files import read_result
-from ecu.bus.receive import contract_receive_plan
+from ecu.bus.receive_plan import contract_receive_plan
 from ecu.contract.signals import INPUT
 from ecu.recording.recorder import candump_lines
 from ecu.settings.resources import resource

@@ -12,15 +12,8 @@ from ecu.bus.database import load_database
 from ecu.bus.e2e import p01_protect
 from ecu.bus.freshness import begin_cycle, end_cycle, new_freshness, target_dtype
 from ecu.bus.plan import SignalUse
-from ecu.bus.receive import (
-    EXTENDED_ID,
-    MessageUse,
-    compile_receive,
-    contract_receive_plan,
-    input_names,
-    new_reception,
-    receive,
-)
+from ecu.bus.receive import EXTENDED_ID, new_reception, receive
+from ecu.bus.receive_plan import MessageUse, compile_receive, contract_receive_plan, input_names
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
 from ecu.contract.records import (
     FRAME,

@@ -9,7 +9,8 @@ import pytest
 
 from ecu.bus.e2e import p01_protect
 from ecu.bus.freshness import begin_cycle, end_cycle
-from ecu.bus.receive import contract_receive_plan, new_reception, receive
+from ecu.bus.receive import new_reception, receive
+from ecu.bus.receive_plan import contract_receive_plan
 from ecu.bus.request import (
     FIRST,
     HALF_NS,

@@ -13,7 +13,8 @@ import pytest
 from numpy.typing import NDArray
 
 from ecu.bus.freshness import begin_cycle, end_cycle
-from ecu.bus.receive import Reception, input_names, new_reception, receive
+from ecu.bus.receive import Reception, new_reception, receive
+from ecu.bus.receive_plan import input_names
 from ecu.bus.signal_map import MappedBus, load_signal_map, receive_plan
 from ecu.bus.units import CONVERSIONS, conversion
 from ecu.contract.records import INPUTS, RecordArray, new_record

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from ecu.bus.database import attribute, load_database
 from ecu.bus.freshness import begin_cycle, target_dtype
-from ecu.bus.receive import contract_listen_plan, contract_receive_plan, new_reception, receive
+from ecu.bus.receive import new_reception, receive
+from ecu.bus.receive_plan import contract_listen_plan, contract_receive_plan
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
 from ecu.contract.records import INPUTS, new_record
 from ecu.contract.signals import INPUT, INPUT_SIGNALS, N_INPUTS, N_OUTPUTS, OUTPUT, OUTPUT_COLUMNS

@@ -9,7 +9,7 @@ import pytest
 from numba.core.runtime import _nrt_python, rtsys
 
 from ecu.bus.protocol import BusStatus
-from ecu.bus.receive import contract_receive_plan
+from ecu.bus.receive_plan import contract_receive_plan
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
 from ecu.contract import faults
 from ecu.contract.records import LEARNED

@@ -9,7 +9,7 @@ import pytest
 
 from ecu.bus.e2e import P01_MODULO
 from ecu.bus.protocol import BusStatus
-from ecu.bus.receive import contract_receive_plan
+from ecu.bus.receive_plan import contract_receive_plan
 from ecu.bus.transmit import contract_transmit_plan, new_transmission
 from ecu.contract.faults import FOREIGN_SENDER
 from ecu.contract.records import CYCLE, FRAME, LEARNED, OUTPUTS, new_record

@@ -7,7 +7,8 @@ import numpy as np
 
 from brakelab.studies.braking import ALL_DUE, MESSAGES_IN, Stop, simulated_stop
 from brakelab.studies.measure import Row, alternate, installed, timed
-from ecu.bus.receive import ReceivePlan, contract_receive_plan, new_reception, receive
+from ecu.bus.receive import new_reception, receive
+from ecu.bus.receive_plan import ReceivePlan, contract_receive_plan
 from ecu.bus.transmit import (
     Transmission,
     TransmitPlan,

@@ -19,7 +19,7 @@ from brakelab.bench.socket_pair import PythonCanBus, daemon_channel, put, socket
 from brakelab.studies.braking import ALL_DUE, MESSAGES_IN, Stop, simulated_stop
 from brakelab.studies.measure import Figure, Row, figure, installed
 from ecu.bus.e2e import P01_MODULO
-from ecu.bus.receive import ReceivePlan, contract_receive_plan
+from ecu.bus.receive_plan import ReceivePlan, contract_receive_plan
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
 from ecu.contract.records import STAGES
 from ecu.jit import CompileCounter

@@ -31,7 +31,8 @@ from brakelab.studies.measure import Figure, Row, Task, alternate, installed
 from brakelab.studies.table import time_table
 from ecu.algorithm.step import new_state
 from ecu.bus.freshness import begin_cycle, end_cycle
-from ecu.bus.receive import ReceivePlan, contract_receive_plan, new_reception, receive
+from ecu.bus.receive import new_reception, receive
+from ecu.bus.receive_plan import ReceivePlan, contract_receive_plan
 from ecu.contract.records import INPUTS, OUTPUTS, RecordArray, new_record
 from ecu.contract.signals import CYCLE_NS
 from ecu.settings.config import load_config, new_params

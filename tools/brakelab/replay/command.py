@@ -37,7 +37,7 @@ from brakelab.results.progress import progress_bar
 from brakelab.simulation.observer import with_observer
 from ecu import __version__
 from ecu.algorithm.step import new_state
-from ecu.bus.receive import ReceivePlan
+from ecu.bus.receive_plan import ReceivePlan
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CORNERS
 from ecu.errors import RunFault, UserError

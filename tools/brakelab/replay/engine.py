@@ -18,7 +18,8 @@ from brakelab.replay.seen import look_at, new_seen
 from brakelab.results.row import MEASURED_INPUTS, N_ROW
 from ecu.algorithm.step import new_state, step
 from ecu.bus.freshness import accept, begin_cycle, end_cycle
-from ecu.bus.receive import ReceivePlan, Reception, receive
+from ecu.bus.receive import Reception, receive
+from ecu.bus.receive_plan import ReceivePlan
 from ecu.contract.records import CYCLE, FRAME, INPUTS, OUTPUTS, RecordArray, new_record, output_vector
 from ecu.contract.signals import (
     CYCLE_NS,

@@ -18,7 +18,8 @@ from brakelab.replay.quality import Findings, identifier, note_faults
 from brakelab.replay.seen import set_raw_ends
 from brakelab.replay.source import Source, only_interface
 from ecu.algorithm.step import INITIAL, resume
-from ecu.bus.receive import ReceivePlan, new_reception
+from ecu.bus.receive import new_reception
+from ecu.bus.receive_plan import ReceivePlan
 from ecu.contract.faults import FOREIGN_SENDER
 from ecu.contract.records import CYCLE, EXTENDED_ID, FRAME_ERROR, FRAME_EXTENDED, RecordArray
 from ecu.errors import UserError

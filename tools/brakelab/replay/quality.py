@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from brakelab.log_physics.judge import Judged
 from brakelab.logs.log_quality import Damage, LogQuality, SignalQuality
 from ecu.bus.freshness import RATE_TOLERANCE
-from ecu.bus.receive import ReceivePlan, Reception
+from ecu.bus.receive import Reception
+from ecu.bus.receive_plan import ReceivePlan
 from ecu.contract.faults import FAULTS, WORDS, fault_mask
 from ecu.contract.records import EXTENDED_ID, RecordArray
 from ecu.contract.signals import DEGRADED, INPUT_SIGNALS, N_INPUTS, OUTPUT

@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 from brakelab.logs.column_map import MappedFile, maps_columns, read_column_map
 from brakelab.logs.formats import interface_name, kind_of
 from brakelab.replay.quality import Findings
-from ecu.bus.receive import ReceivePlan, contract_receive_plan
+from ecu.bus.receive_plan import ReceivePlan, contract_receive_plan
 from ecu.bus.signal_map import load_signal_map, read_signal_map
 from ecu.contract.records import RecordArray
 from ecu.errors import UserError

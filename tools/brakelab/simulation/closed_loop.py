@@ -33,14 +33,8 @@ from brakelab.simulation.vehicle_bus import (
 )
 from ecu.algorithm.step import new_state, step
 from ecu.bus.freshness import begin_cycle, end_cycle, target_dtype
-from ecu.bus.receive import (
-    ReceivePlan,
-    Reception,
-    contract_listen_plan,
-    contract_receive_plan,
-    new_reception,
-    receive,
-)
+from ecu.bus.receive import Reception, new_reception, receive
+from ecu.bus.receive_plan import ReceivePlan, contract_listen_plan, contract_receive_plan
 from ecu.bus.transmit import (
     Transmission,
     TransmitPlan,

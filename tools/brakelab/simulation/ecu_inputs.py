@@ -6,7 +6,8 @@ import numpy as np
 
 from brakelab.simulation.closed_loop import START_NS, plans
 from ecu.bus.freshness import begin_cycle, end_cycle
-from ecu.bus.receive import ReceivePlan, Reception, new_reception, receive
+from ecu.bus.receive import Reception, new_reception, receive
+from ecu.bus.receive_plan import ReceivePlan
 from ecu.contract.records import INPUTS, RecordArray, new_record
 from ecu.contract.signals import CYCLE_NS
 from ecu.jit import kernel
