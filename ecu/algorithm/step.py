@@ -27,6 +27,7 @@ from ecu.algorithm.control.cleaner_share import CALM_ACROSS, CLEANER_STATE, lean
 from ecu.algorithm.control.demand import DEMAND_STATE, hold_automated, hold_pedal, update_demand
 from ecu.algorithm.control.distribution import (
     DISTRIBUTION_STATE,
+    KEPT,
     cap_trailing,
     distribute,
     front_share,
@@ -87,6 +88,7 @@ from ecu.contract.faults import (
     LEARNED_AT_BOUND,
     LEARNING_GIVEN_UP,
     MOTOR_SHORT,
+    REAR_HELD,
     WHEEL_SLIPS,
 )
 from ecu.contract.params import BAR
@@ -149,7 +151,8 @@ def new_state(params: RecordArray, learned: RecordArray | None = None) -> Record
     row["control"]["mu_override"], row["control"]["start"] = math.nan, 1.0
     row["failed_brakes"]["scale"] = 1.0
     row["force"]["k_f"] = row["force"]["stiffness"] = 1.0
-    row["distribution"]["trailing"] = 1.0
+    row["distribution"]["trailing"] = row["distribution"]["rolled"] = 1.0
+    row["guard"]["rolled"] = math.nan
     _begin(params, state)
     return state
 
@@ -218,6 +221,8 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
         faults |= ACCUMULATOR_LOW
     if s.guard.acting:
         faults |= WHEEL_SLIPS
+    if s.distribution.trailing < KEPT:
+        faults |= REAR_HELD
     if s.control.at_limit:
         faults |= BRAKE_FADE
     if s.estimate.at_bound:
@@ -257,7 +262,7 @@ def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
     backwards = e.backwards != 0
     failed = s.failed_brakes.failed
     watch_trailing(p, s.distribution, u, e, failed, decel, speed, dt)
-    distribute(p, s.distribution, e.mass, decel, backwards)
+    distribute(p, s.distribution, e.mass, decel, backwards, dt)
     if p.minimised:
         _lean(p, s, u, decel, backwards, dt)
     follow_friction(p, s.control, e, dt)

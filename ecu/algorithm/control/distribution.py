@@ -9,8 +9,9 @@ Lining friction is uncertain, so none of the three alone guarantees the order in
 functions do (ECE R13-H, Annex 5: the rear uses no more grip than the front):
 
 - `watch_trailing`: where a rear wheel slips more than the front one of its side by more than
-  `rear_slip_margin`, the torque of the rear axle is reduced until it no longer does. This needs no friction
-  estimate. Beside a front wheel whose brake has failed it may slip `LONE_SLIP`.
+  `rear_slip_margin`, torque of the rear axle moves to the front one until it no longer does. This needs no
+  friction estimate. Beside a front wheel whose brake has failed it may slip `LONE_SLIP`. The front takes all
+  of it up to `GRIP` of its load, beyond that slowly; none from when it slips more than `GRIP_SLIP`.
 - `cap_trailing`: compensation raises the rear's pressure relative to the front's only as far as the estimate
   is certain, with the rear at mu + 2 sigma and the front at mu - 2 sigma.
 
@@ -33,6 +34,8 @@ DISTRIBUTION_STATE = np.dtype(
     [
         ("torque", "f8", (4,)),  # demanded of each wheel [N m], >= 0; NaN without a request
         ("trailing", "f8"),  # share of its torque that the trailing axle keeps, LEAST_TRAILING to 1
+        ("grip", "f8"),  # force over load to which the leading axle takes the rest; 0: none of it
+        ("rolled", "f8", (2,)),  # by a leading wheel over the way of the ground below it, low-passed
         ("beyond", "f8", (2,)),  # slip of a trailing wheel less that of the leading one, low-passed
         ("offset", "f8", (2,)),  # the same of a rear wheel while rolling freely: error of the radii
         ("free_s", "f8", (2,)),  # learning time of that, at most LEARNING_TIME
@@ -42,6 +45,7 @@ DISTRIBUTION_STATE = np.dtype(
 
 IDEAL, FIXED, ELECTRONIC = range(len(DISTRIBUTIONS))
 LEAST_TRAILING = 0.3  # share that the trailing axle always keeps
+KEPT = 0.95  # of it, below which the axle counts as held back
 TAKE_BACK = 600.0  # 1/s per slip: 1 % excess reduces the torque at 6 1/s
 GIVE_BACK = 0.3  # 1/s
 SMOOTHING = 0.2  # per sample: 50 ms; leaves a fifth of the wheel speeds' noise
@@ -50,6 +54,8 @@ RADIUS_DOUBT = 0.008  # before learning: radii within 0.3 % and other difference
 FREE_ACCEL, FREE_YAW_RATE = 0.5, 0.03  # m/s^2, rad/s
 RULED_FROM = 0.15  # z above which Annex 5 orders the axles
 FASTEST = 1.02  # of the ground below it
+GRIP, GRIP_RATE = 0.6, 0.5  # force over load taken over at once, 1/s beyond it
+GRIP_SLIP = 0.05  # of a leading wheel, beyond which it takes nothing until the braking ends
 LONE_SLIP = 0.04  # of a trailing wheel beside one that rolls freely: tyres peak at 0.1 on a dry road
 ROUNDING = 1e-9
 
@@ -77,22 +83,17 @@ def front_share(params: Record, decel: float) -> float:
 
 
 @kernel
-def _rear_beyond_front(params: Record, inputs: Record, estimate: Record, speed: float, side: int) -> float:
-    """Return the slip of a rear wheel less that of the front wheel on its side.
+def _rolled(params: Record, inputs: Record, estimate: Record, speed: float, i: int) -> float:
+    """Return how far a wheel rolls over the way of the ground below it: 1 plus its slip.
 
-    NaN without new samples, or where a wheel turns faster than a braked one can: its sensor is stuck.
+    NaN without a new sample, or where the wheel turns faster than a braked one can: its sensor is stuck.
     """
-    slips, forwards = 0.0, 1.0 if speed > 0.0 else -1.0
-    for i in (side, side + 2):
-        ground = forwards * corner_speed(params, estimate, speed, i)
-        if not (fresh(inputs, WHEEL_SPEED + i) and ground > 0.0):
-            return math.nan
-        radius = rolling_radius(estimate.load[i], params.unloaded_radius[i], params.vertical_stiffness[i])
-        rolled = abs(inputs.value[WHEEL_SPEED + i]) * radius / ground
-        if rolled > FASTEST:
-            return math.nan
-        slips += rolled if i == side else -rolled
-    return slips
+    ground = math.copysign(1.0, speed) * corner_speed(params, estimate, speed, i)
+    if not (fresh(inputs, WHEEL_SPEED + i) and ground > 0.0):
+        return math.nan
+    radius = rolling_radius(estimate.load[i], params.unloaded_radius[i], params.vertical_stiffness[i])
+    rolled: float = abs(inputs.value[WHEEL_SPEED + i]) * radius / ground
+    return rolled if rolled <= FASTEST else math.nan
 
 
 @kernel
@@ -126,12 +127,15 @@ def watch_trailing(
     free = not brakes and abs(estimate.accel_x) < FREE_ACCEL and abs(estimate.yaw_rate) < FREE_YAW_RATE
     worst, trailing = 0.0, 1.0 if speed > 0.0 else -1.0
     for side in range(2):
-        beyond = math.nan
+        front = rear = math.nan
         if abs(speed) > params.min_speed:
-            beyond = _rear_beyond_front(params, inputs, estimate, speed, side)
+            front = _rolled(params, inputs, estimate, speed, side)
+            rear = _rolled(params, inputs, estimate, speed, side + 2)
+        beyond = front - rear
         if math.isnan(beyond):
             state.beyond[side] = 0.0
             continue
+        state.rolled[side] += SMOOTHING * ((front if trailing > 0.0 else rear) - state.rolled[side])
         if free:
             state.free_s[side] = min(state.free_s[side] + dt, LEARNING_TIME)
             state.offset[side] += dt / state.free_s[side] * (beyond - state.offset[side])
@@ -147,16 +151,27 @@ def watch_trailing(
 
 
 @kernel
-def distribute(params: Record, state: Record, mass: float, decel: float, backwards: bool) -> None:
+def distribute(params: Record, state: Record, mass: float, decel: float, backwards: bool, dt: float) -> None:
     """Overwrite the torque demanded of each wheel [N m]; NaN for an unknown deceleration [m/s^2].
 
     `mass` [kg] is the current estimate; `backwards`: the car is in reverse.
     """
-    front = front_share(params, -decel if backwards else decel)
+    signed = -decel if backwards else decel
+    front = front_share(params, signed)
+    lead = 1.0 - front if backwards else front
+    trail = (1.0 - lead) * state.trailing
+    if not decel > 0.0:
+        state.grip = GRIP
+    elif min(state.rolled[0], state.rolled[1]) < 1.0 - GRIP_SLIP:
+        state.grip = 0.0
+    elif state.grip > 0.0 and state.trailing < 1.0:
+        state.grip += GRIP_RATE * dt
+    if decel > 0.0:
+        load = ideal_front_share(params, signed)
+        most = state.grip * (1.0 - load if backwards else load) * GRAVITY / decel
+        lead = max(lead, min(1.0 - trail, most))
     for i in range(4):
-        axle = front if i < 2 else 1.0 - front
-        if (i < 2) == backwards:
-            axle *= state.trailing
+        axle = trail if (i < 2) == backwards else lead
         state.torque[i] = 0.5 * axle * mass * decel * params.wheel_radius[i]
 
 

@@ -1,16 +1,20 @@
 """Slip guard: holds the pressure at a wheel beyond its tyre's range, returns it once the wheel recovers.
 
     lag    = |v_i| - |omega| r                       speed deficit of a wheel [m/s]; slip = -lag / |v_i|
-    growth = d lag / dt, low-passed                  rate of that deficit [m/s^2]
+    growth = -d(|omega| r)/dt - braking of the car   rate of that deficit [m/s^2], low-passed
 
 begins   slip beyond `RANGE` while the lag grows: the cap is the pressure demanded last
 cut      slip beyond `RANGE` and the wheel is not coming back: the cap falls
 hold     slip beyond `RANGE`, the wheel comes back: the cap stays
 return   slip within `RANGE`, or the car slower than `LEAST_SPEED`: the cap rises until it no longer acts
 
-The deficit must grow, so a vehicle speed wrong by a tenth caps nothing. While ABS or ESP report activity the
-cap never falls: two controllers would cut the same wheel. This is no ABS: it seeks no optimal slip, has no
-yaw control and treats each wheel alone.
+The rate is the wheel's own against the accelerometer, not against the vehicle speed: a speed that errs, jumps
+or stands still caps nothing. `GROWING` rises with the noise of the wheel's speed, `NOISE` sigma, by its
+second differences. A wheel that brakes no more spins up within `SPIN_UP_S` on ice too; one that does not has
+a sensor that lies, and its pressure returns: it is capped again only where its deficit grows anew.
+
+While ABS or ESP report activity the cap never falls: two controllers would cut the same wheel. This is no
+ABS: it seeks no optimal slip, has no yaw control and treats each wheel alone.
 
 Assumption: all constants; found with the simulated vehicle on friction of 0.2 to 1.2.
 """
@@ -22,7 +26,7 @@ import numpy as np
 from ecu.algorithm.inputs import fresh, usable
 from ecu.algorithm.vehicle import corner_speed
 from ecu.contract.params import BAR
-from ecu.contract.signals import ABS_ACTIVE, ESP_ACTIVE, WHEEL_SPEED
+from ecu.contract.signals import ABS_ACTIVE, CYCLE_NS, ESP_ACTIVE, WHEEL_SPEED
 from ecu.jit import Record, kernel
 
 SLIP_GUARD_STATE = np.dtype(
@@ -30,8 +34,13 @@ SLIP_GUARD_STATE = np.dtype(
         ("capped", "u1", (4,)),
         ("cap", "f8", (4,)),  # Pa, where capped
         ("lag", "f8", (4,)),  # last known [m/s]
+        ("rolled", "f8", (4,)),  # |omega| r of the last sample [m/s], NaN before the first
+        ("fall", "f8", (4,)),  # of that speed since the sample before [m/s]
+        ("noise", "f8", (4,)),  # of that speed [m/s]
         ("growth", "f8", (4,)),  # m/s^2
         ("age", "f8", (4,)),  # of the lag [s]
+        ("freed_s", "f8", (4,)),  # time at push-out pressure without spinning up
+        ("denied", "u1", (4,)),  # the wheel did not spin up: its lag is not believed
         ("acting", "u1"),  # on any wheel
     ],
     align=True,
@@ -41,9 +50,15 @@ RANGE = 0.10  # slip; braking at 9.5 m/s^2 on a dry road stays below 0.07
 GROWING = 10.0  # m/s^2; noise of the wheel speeds and braking as in RANGE stay below 8
 RETURNING = -5.0  # m/s^2
 GROWTH_LAG = 0.02  # s
+NOISE = 4.0  # sigma
+SECOND_DIFFERENCE = 1.95  # mean modulus of a second difference of white noise, over sigma: sqrt(12 / pi)
+OF_GROWTH = 0.45  # sigma of the low-passed first difference of white noise over its sigma
+QUIET = 20.0  # m/s^2 of noise that the cycle of slipping and spinning up itself shows
+NOISE_S = 0.5
+SPIN_UP_S = 0.3  # lag of the hydraulics, and 15 m/s^2 at an adhesion of 0.05
 LEAST_SPEED = 3.0  # m/s
 CUT = 400.0 * BAR  # Pa/s
-RETURN = 200.0 * BAR  # Pa/s
+RETURN = 150.0 * BAR  # Pa/s
 
 
 @kernel
@@ -52,16 +67,46 @@ def _flag(inputs: Record, place: int) -> bool:
 
 
 @kernel
-def _follow_lag(params: Record, state: Record, inputs: Record, ground: float, i: int, dt: float) -> None:
-    """Update the lag by a new wheel speed; a wheel whose speed is lost has no lag."""
+def _follow_lag(
+    params: Record, state: Record, inputs: Record, ground: float, braking: float, i: int, dt: float
+) -> None:
+    """Update the lag by a new wheel speed; a wheel whose speed is lost has no lag.
+
+    `braking` [m/s^2]: deceleration of the car.
+    """
     state.age[i] += dt
     if fresh(inputs, WHEEL_SPEED + i) and state.age[i] > 0.0:
-        lag = ground - abs(inputs.value[WHEEL_SPEED + i]) * params.wheel_radius[i]
-        gain = 1.0 - math.exp(-state.age[i] / GROWTH_LAG)
-        state.growth[i] += gain * ((lag - state.lag[i]) / state.age[i] - state.growth[i])
-        state.lag[i], state.age[i] = lag, 0.0
-    if not (usable(inputs, WHEEL_SPEED + i) and math.isfinite(state.growth[i])):
-        state.lag[i] = state.growth[i] = 0.0
+        rolled = abs(inputs.value[WHEEL_SPEED + i]) * params.wheel_radius[i]
+        fall, age = state.rolled[i] - rolled, state.age[i]
+        if math.isfinite(fall):
+            gain = 1.0 - math.exp(-age / GROWTH_LAG)
+            state.growth[i] += gain * (fall / age - braking - state.growth[i])
+            jerk = abs(fall - state.fall[i]) / SECOND_DIFFERENCE
+            state.noise[i] += (1.0 - math.exp(-age / NOISE_S)) * (jerk - state.noise[i])
+            state.fall[i] = fall
+        state.lag[i], state.rolled[i], state.age[i] = ground - rolled, rolled, 0.0
+    if not (usable(inputs, WHEEL_SPEED + i) and math.isfinite(state.lag[i] + state.growth[i])):
+        state.lag[i] = state.growth[i] = state.noise[i] = state.fall[i] = 0.0
+        state.rolled[i] = math.nan
+
+
+@kernel
+def _grows(state: Record, i: int) -> bool:
+    """Return whether a wheel falls behind the car by more than its noise."""
+    noise = NOISE * OF_GROWTH * state.noise[i] / (1e-9 * CYCLE_NS)
+    grows: bool = state.growth[i] > GROWING + max(noise - QUIET, 0.0)
+    return grows
+
+
+@kernel
+def _doubt(params: Record, state: Record, i: int, slipping: bool, dt: float) -> None:
+    """Overwrite `denied`: a wheel without brake torque that does not spin up, until its lag is gone."""
+    freed = state.capped[i] != 0 and slipping and state.cap[i] <= params.push_out_pressure[i]
+    state.freed_s[i] = state.freed_s[i] + dt if freed and state.growth[i] > RETURNING else 0.0
+    if state.freed_s[i] > SPIN_UP_S:
+        state.denied[i] = 1
+    elif not slipping or _grows(state, i):
+        state.denied[i] = 0
 
 
 @kernel
@@ -92,11 +137,14 @@ def guard_slip(
     watching = abs(speed) > LEAST_SPEED
     other = _flag(inputs, ABS_ACTIVE) or _flag(inputs, ESP_ACTIVE)
     state.acting = 0
+    braking = -math.copysign(1.0, speed) * estimate.accel_x if watching else 0.0
     for i in range(4):
         ground = abs(corner_speed(params, estimate, speed, i)) if watching else 0.0
-        _follow_lag(params, state, inputs, ground, i, dt)
+        _follow_lag(params, state, inputs, ground, braking, i, dt)
         slipping = watching and state.lag[i] > RANGE * max(ground, LEAST_SPEED)
-        if slipping and not state.capped[i] and state.growth[i] > GROWING:
+        _doubt(params, state, i, slipping, dt)
+        slipping = slipping and state.denied[i] == 0
+        if slipping and not state.capped[i] and _grows(state, i):
             state.capped[i], state.cap[i] = 1, sent[i]
         if slipping and state.growth[i] > RETURNING and not other:
             state.cap[i] = max(state.cap[i] - CUT * dt, params.push_out_pressure[i])

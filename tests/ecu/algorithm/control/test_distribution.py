@@ -10,6 +10,7 @@ from ecu.algorithm.control.distribution import (
     DISTRIBUTION_STATE,
     ELECTRONIC,
     FIXED,
+    GRIP,
     IDEAL,
     LEAST_TRAILING,
     cap_trailing,
@@ -29,7 +30,8 @@ CONFIGS = Path(__file__).parents[4] / "config"
 @pytest.fixture
 def state():
     state = np.zeros(1, DISTRIBUTION_STATE)
-    state["trailing"] = 1.0
+    state["trailing"] = state["rolled"] = 1.0
+    state["grip"] = GRIP
     return state
 
 
@@ -80,7 +82,7 @@ def test_torques_add_up_to_the_force_that_is_asked_for(params, state, kind: int,
     """(5.1): sum T_b / r = m a; nothing on either side of the car is larger than the other."""
     params["distribution"], params["front_share"] = kind, 0.65
     p = params[0]
-    distribute(p, state[0], p["mass"], decel, False)
+    distribute(p, state[0], p["mass"], decel, False, DT)
     torques = state[0]["torque"]
     assert np.sum(torques / p["wheel_radius"]) == pytest.approx(p["mass"] * decel)
     assert torques[0] == torques[1] > torques[2] == torques[3] >= 0
@@ -91,7 +93,7 @@ def test_torques_add_up_to_the_force_that_is_asked_for(params, state, kind: int,
 def test_the_force_is_that_of_the_mass_as_it_is_known_now(
     params, state, mass: float, backwards: bool
 ) -> None:
-    distribute(params[0], state[0], mass, 3.0, backwards)
+    distribute(params[0], state[0], mass, 3.0, backwards, DT)
     assert np.sum(state[0]["torque"] / params[0]["wheel_radius"]) == pytest.approx(mass * 3.0)
 
 
@@ -99,38 +101,63 @@ def test_the_force_is_that_of_the_mass_as_it_is_known_now(
 def test_backwards_every_wheel_uses_the_grip_that_its_axle_has(params, state, decel: float) -> None:
     """The front axle trails and is relieved by m a h / L: torque over radius and axle load is z at both."""
     p = params[0]
-    distribute(p, state[0], p["mass"], decel, True)
+    distribute(p, state[0], p["mass"], decel, True, DT)
     force = state[0]["torque"] / p["wheel_radius"]
     shift = p["mass"] * decel * p["cog_height"] / p["wheelbase"]
     at_rest = p["mass"] * G * np.array([p["rear_axle"], p["front_axle"]]) / p["wheelbase"]
     used = [force[:2].sum() / (at_rest[0] - shift), force[2:].sum() / (at_rest[1] + shift)]
     assert used == pytest.approx([decel / G, decel / G])
-    distribute(p, state[0], p["mass"], decel, False)
+    distribute(p, state[0], p["mass"], decel, False, DT)
     assert force[0] < state[0]["torque"][0] / p["wheel_radius"][0]
 
 
 def test_no_request_is_no_torque_and_an_unknown_one_is_unknown(params, state) -> None:
     mass = params[0]["mass"]
-    distribute(params[0], state[0], mass, 0.0, False)
+    distribute(params[0], state[0], mass, 0.0, False, DT)
     assert state["torque"].tolist() == [[0.0] * 4]
-    distribute(params[0], state[0], mass, math.nan, False)
+    distribute(params[0], state[0], mass, math.nan, False, DT)
     assert np.isnan(state["torque"]).all()
 
 
 @pytest.mark.parametrize(
-    ("backwards", "left"),
+    ("backwards", "trailing", "leading"),
     [
-        pytest.param(False, (1, 1, 0.6, 0.6), id="forwards the rear trails"),
-        pytest.param(True, (0.6, 0.6, 1, 1), id="backwards the front trails"),
+        pytest.param(False, slice(2, 4), slice(0, 2), id="forwards the rear trails"),
+        pytest.param(True, slice(0, 2), slice(2, 4), id="backwards the front trails"),
     ],
 )
-def test_what_the_trailing_axle_is_not_left_is_not_given_to_the_other(params, state, backwards, left) -> None:
-    mass = params[0]["mass"]
-    distribute(params[0], state[0], mass, 5.0, backwards)
+def test_what_the_trailing_axle_is_not_left_the_leading_one_takes(
+    params, state, backwards, trailing, leading
+) -> None:
+    """The sum of the forces stays; the leading axle's force over its load stays below `GRIP`."""
+    p = params[0]
+    distribute(p, state[0], p["mass"], 3.0, backwards, DT)
     before = state[0]["torque"].copy()
     state["trailing"] = 0.6
-    distribute(params[0], state[0], mass, 5.0, backwards)
-    assert state[0]["torque"] == pytest.approx(before * left)
+    distribute(p, state[0], p["mass"], 3.0, backwards, DT)
+    after = state[0]["torque"]
+    assert after[trailing] == pytest.approx(0.6 * before[trailing])
+    assert np.sum(after / p["wheel_radius"]) == pytest.approx(p["mass"] * 3.0)
+    shift = p["mass"] * 3.0 * p["cog_height"] / p["wheelbase"]
+    at_rest = p["mass"] * G * (p["front_axle"] if backwards else p["rear_axle"]) / p["wheelbase"]
+    assert np.sum(after[leading] / p["wheel_radius"][leading]) < GRIP * (at_rest + shift)
+
+
+def test_beyond_the_grip_of_most_roads_the_leading_axle_takes_it_slowly(params, state) -> None:
+    """At 7 m/s^2 the front at once takes what is 0.6 of its load, then 0.5 of it a second more."""
+    p = params[0]
+    load = p["mass"] * (G * p["rear_axle"] + 7.0 * p["cog_height"]) / p["wheelbase"]
+    distribute(p, state[0], p["mass"], 7.0, False, DT)
+    alone = np.sum(state[0]["torque"][:2] / p["wheel_radius"][:2])
+    assert alone / load == pytest.approx(7.0 / G)
+    state["trailing"] = 0.6
+    used = []
+    for _ in range(60):
+        distribute(p, state[0], p["mass"], 7.0, False, DT)
+        used.append(np.sum(state[0]["torque"][:2] / p["wheel_radius"][:2]) / load)
+    assert used[0] == pytest.approx(7.0 / G), "never less than its own share"
+    assert used[40] == pytest.approx(GRIP + 41 * DT * 0.5)
+    assert np.sum(state[0]["torque"] / p["wheel_radius"]) <= p["mass"] * 7.0 * (1 + 1e-12)
 
 
 class Watch:
@@ -273,7 +300,7 @@ def capped(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return pressures before and after the cap; `wanted`: friction that front and rear count on."""
     p, decel = params[0], z * G
-    distribute(p, state[0], p["mass"], decel, backwards)
+    distribute(p, state[0], p["mass"], decel, backwards, DT)
     lining = state[0]["torque"] * (1 - np.repeat(motor, 2))
     lever = 2 * p["piston_area"] * p["effective_radius"]
     before = lining / (lever * np.repeat(wanted, 2)) + p["push_out_pressure"]

@@ -142,7 +142,7 @@ class Replaced:
         distribution["trailing"] = trailing
         cycles = round(seconds / DT)
         for k in range(cycles + 1):
-            distribute(p, distribution, p["mass"], decel, backwards)
+            distribute(p, distribution, p["mass"], decel, backwards, DT)
             self.before = distribution["torque"] / p["wheel_radius"]
             if k:
                 state["failed"][list(failed)], state["any"] = 1, len(failed) > 0
