@@ -66,11 +66,13 @@ def motor_torque_known(inputs: Record, corner: int) -> bool:
 
 @kernel
 def mean_wheel_speed(params: Record, inputs: Record) -> float:
-    """Return the mean speed of the wheels [m/s] by their last samples, unsigned."""
-    total = 0.0
+    """Return the mean speed of the wheels [m/s] whose samples are usable, unsigned; NaN: fewer than two."""
+    total, wheels = 0.0, 0
     for i in range(4):
-        total += abs(inputs.value[WHEEL_SPEED + i]) * params.wheel_radius[i]
-    return 0.25 * total
+        if usable(inputs, WHEEL_SPEED + i):
+            total += abs(inputs.value[WHEEL_SPEED + i]) * params.wheel_radius[i]
+            wheels += 1
+    return total / wheels if wheels > 1 else math.nan
 
 
 @kernel

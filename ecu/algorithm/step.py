@@ -78,7 +78,10 @@ from ecu.algorithm.monitoring.disc_temperature import (
 from ecu.algorithm.monitoring.dust import DUST_STATE, restore_dust, update_dust
 from ecu.algorithm.monitoring.plausibility import PLAUSIBILITY_STATE
 from ecu.algorithm.monitoring.sensors import mask_implausible, watch_sensors
+from ecu.algorithm.monitoring.speeds import SPEEDS_STATE
+from ecu.algorithm.monitoring.turning import TURNING_STATE
 from ecu.algorithm.monitoring.wear import WEAR_STATE, restore_wear, update_wear
+from ecu.algorithm.monitoring.witness import WITNESS_STATE
 from ecu.algorithm.publish import publish
 from ecu.contract.faults import (
     ACCUMULATOR_LOW,
@@ -119,6 +122,9 @@ INITIAL = np.dtype(
         ("guard", SLIP_GUARD_STATE),
         ("limiter", LIMITER_STATE),
         ("plausibility", PLAUSIBILITY_STATE),
+        ("witness", WITNESS_STATE),
+        ("turning", TURNING_STATE),
+        ("speeds", SPEEDS_STATE),
         ("acceleration", ACCELERATION_STATE),
         ("prediction", PREDICTION_STATE),
         ("trusted", INPUTS),  # inputs with implausible ones masked out

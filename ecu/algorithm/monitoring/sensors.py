@@ -7,13 +7,16 @@ estimation, by the estimate of the last cycle.
 from ecu.algorithm.control.failed_brakes import watch_brakes
 from ecu.algorithm.monitoring.acceleration import watch_acceleration
 from ecu.algorithm.monitoring.plausibility import watch_pressures, watch_wheels, wheel_speed_implausible
+from ecu.algorithm.monitoring.speeds import watch_speeds
+from ecu.algorithm.monitoring.turning import watch_turning
+from ecu.algorithm.monitoring.witness import rejected_faults
 from ecu.contract.faults import (
     ACCEL_IMPLAUSIBLE,
     BRAKE_FAILED,
     PRESSURE_NOT_FOLLOWING,
     WHEEL_SPEED_IMPLAUSIBLE,
 )
-from ecu.contract.signals import ACCEL_X, CALLIPER_PRESSURE, WHEEL_SPEED
+from ecu.contract.signals import ACCEL_X, CALLIPER_PRESSURE, N_INPUTS, WHEEL_SPEED
 from ecu.jit import Record, kernel
 
 LEFT_OUT_S = 0.03  # duration of a pressure's deviation from its demand
@@ -35,6 +38,9 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
     if estimate.started:
         watch_acceleration(p, s.acceleration, u, estimate, s.control.base, s.application.braking != 0, dt)
         watch_wheels(p, s.plausibility, u, estimate, dt)
+        watch_turning(p, s.turning, s.witness, u, estimate.speed, dt)
+        watch_speeds(p, s.speeds, s.witness, u, estimate, dt)
+        faults |= rejected_faults(s.witness)
         if wheel_speed_implausible(p, s.plausibility, u, estimate, dt):
             faults |= WHEEL_SPEED_IMPLAUSIBLE
     if s.acceleration.implausible:
@@ -58,6 +64,9 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
 def mask_implausible(p: Record, s: Record, u: Record) -> None:
     """Overwrite the trusted inputs: `u` with implausible inputs masked out."""
     s.trusted = u
+    for place in range(N_INPUTS):
+        if s.witness.rejected[place]:
+            _distrust(s.trusted, place)
     if s.acceleration.implausible or abs(u.value[ACCEL_X]) > p.accel_range:
         _distrust(s.trusted, ACCEL_X)
     for i in range(4):

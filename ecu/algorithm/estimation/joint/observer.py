@@ -100,10 +100,10 @@ def start_joint(state: Record) -> None:
 
 @kernel
 def _start_speed(params: Record, state: Record, inputs: Record) -> None:
-    for i in range(4):
-        if not usable(inputs, WHEEL_SPEED + i):
-            return
-    state.x[V] = mean_wheel_speed(params, inputs)
+    speed = mean_wheel_speed(params, inputs)
+    if math.isnan(speed):
+        return
+    state.x[V] = speed
     state.started, state.hold_s = 1, HOLD_S
 
 
@@ -197,7 +197,9 @@ def update_joint(
         state.reversing = 1
         return
     if state.reversing:
-        state.x[V], state.p[V, V], state.reversing = mean_wheel_speed(params, inputs), 0.25, 0
+        speed = mean_wheel_speed(params, inputs)
+        state.x[V] = speed if math.isfinite(speed) else abs(state.x[V])
+        state.p[V, V], state.reversing = 0.25, 0
         open_window(state)
     state.released = 1 if not braking and _released(params, state, inputs) else 0
     gather(params, state, inputs, motion, load, hydraulics, state.released != 0, dt)
@@ -232,6 +234,8 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     time = w.time
     motors = 0.0
     for i in range(4):
+        if not usable(inputs, WHEEL_SPEED + i):
+            state.slides[i] = 0
         if state.released:
             settle_zero(state.zero, i)
         if not usable(inputs, CALLIPER_PRESSURE + i):

@@ -1,0 +1,166 @@
+"""Plausibility of wheel speeds and vehicle speed against each other and the accelerometer.
+
+Each wheel gives the car's speed at its radius, turning removed. With the vehicle speed and dead reckoning by
+the accelerometer, whose zero and slope are followed slowly, they form a median that two inputs of one frame
+cannot move. A wheel is judged by its low-passed difference from it, less what its radius has been found to
+differ by while rolling:
+
+    slower than it    while nothing brakes that wheel: it rolls or is driven
+    faster than it    while nothing drives that wheel
+
+so a wheel that slides or spins is never judged. The vehicle speed is judged where it is slower than the
+wheels and nothing drives them, and where it is faster while they roll freely, or while dead reckoning agrees
+with them. A constant error of less than `FARTHEST_BASE` is another radius.
+"""
+
+import math
+
+import numpy as np
+
+from ecu.algorithm.inputs import driver_accelerates, motor_torque, usable
+from ecu.algorithm.monitoring.witness import judge
+from ecu.algorithm.vehicle import corner_speed
+from ecu.contract.signals import ACCEL_X, VEHICLE_SPEED, VEHICLE_SPEED_VALID, WHEEL_SPEED
+from ecu.jit import Record, kernel
+
+SPEED, RECKONED = 4, 5
+WITNESSES = 6
+SPEEDS_STATE = np.dtype(
+    [
+        ("told", "f8", (WITNESSES,)),  # car's speed by wheels, vehicle speed, reckoning [m/s]; NaN: silent
+        ("sorted", "f8", (WITNESSES,)),
+        ("apart", "f8", (5,)),  # excess of an input over the median, relative, low-passed
+        ("base", "f8", (5,)),  # the same while rolling: error of the radius
+        ("rolled_s", "f8"),  # learning time of that, at most `BASE_S`
+        ("reckoned", "f8"),  # m/s
+        ("slope", "f8"),  # of the road and the accelerometer's zero [m/s^2]
+        ("started", "u1"),
+    ],
+    align=True,
+)
+
+LEAST_SPEED = 5.0  # m/s
+SMOOTHING_S = 0.1
+TOLERANCE, UNFOUND = 0.035, 0.03  # of the speed, added before the radii are found
+ABSOLUTE = 0.15  # m/s
+SLIPPING = 0.06  # added for a vehicle speed above wheels that are braked
+DOUBT_S = 0.3
+BASE_S, FOUND_S = 20.0, 2.0
+FARTHEST_BASE = 0.03
+FREE_ACCEL, DRIVEN_ACCEL = 1.0, 0.5  # m/s^2
+DRAGGED_ACCEL = -0.7  # m/s^2, an engine that holds wheels on ice
+TORQUE = 60.0  # N m, above which a wheel is braked or driven
+RECKON, SLOPE_RECKON = 0.8, 0.16  # 1/s, 1/s^2: critically damped at 0.4 rad/s
+RECKON_REACH = 0.04  # of the speed, greatest innovation
+
+
+@kernel
+def _place(i: int) -> int:
+    return WHEEL_SPEED + i if i < SPEED else VEHICLE_SPEED
+
+
+@kernel
+def _gather(params: Record, state: Record, inputs: Record, estimate: Record) -> None:
+    """Overwrite the car's speed by each input, `told`."""
+    for i in range(4):
+        turning = corner_speed(params, estimate, estimate.speed, i) - estimate.speed
+        rolled = abs(inputs.value[WHEEL_SPEED + i]) * params.wheel_radius[i]
+        state.told[i] = (rolled - turning) * (1.0 - state.base[i])
+    delay = params.vehicle_speed_delay + 1e-9 * inputs.age_ns[VEHICLE_SPEED]
+    over_ground = inputs.value[VEHICLE_SPEED] + delay * estimate.accel_x
+    state.told[SPEED] = over_ground * (1.0 - state.base[SPEED])
+    invalid = params.mapped[VEHICLE_SPEED_VALID] != 0 and inputs.value[VEHICLE_SPEED_VALID] < 0.5
+    for i in range(5):
+        if not usable(inputs, _place(i)) or (i == SPEED and invalid):
+            state.told[i] = math.nan
+    state.told[RECKONED] = state.reckoned if state.started else math.nan
+
+
+@kernel
+def _median(state: Record, witness: Record) -> float:
+    """Return the median of the witnesses that speak and are not rejected; NaN: fewer than three do."""
+    count = 0
+    for i in range(WITNESSES):
+        value = state.told[i]
+        if math.isfinite(value) and (i == RECKONED or not witness.rejected[_place(i)]):
+            k = count
+            while k > 0 and state.sorted[k - 1] > value:
+                state.sorted[k] = state.sorted[k - 1]
+                k -= 1
+            state.sorted[k] = value
+            count += 1
+    middle: float = 0.5 * (state.sorted[(count - 1) // 2] + state.sorted[count // 2])
+    return middle if count > 2 else math.nan
+
+
+@kernel
+def _reckon(state: Record, inputs: Record, accel: float, median: float, dt: float) -> None:
+    """Advance dead reckoning; without an accelerometer it is the median."""
+    if not (state.started and usable(inputs, ACCEL_X)):
+        state.reckoned, state.slope, state.started = median, 0.0, 1
+        return
+    reach = RECKON_REACH * max(median, LEAST_SPEED)
+    innovation = min(max(median - state.reckoned, -reach), reach)
+    state.slope -= SLOPE_RECKON * dt * innovation
+    state.reckoned += (accel - state.slope + RECKON * innovation) * dt
+
+
+@kernel
+def _judged(state: Record, i: int, median: float, free: bool, braked: bool, driven: bool) -> float:
+    """Return by how much input `i` contradicts the others, over the speed; 0: within what it may."""
+    apart: float = state.apart[i] - state.base[i]
+    if free:
+        return apart
+    if i < SPEED:
+        judged = (apart > 0.0 and not driven) or (apart < 0.0 and not braked)
+    elif apart < 0.0:
+        judged = not driven
+    else:
+        away = abs(state.told[SPEED] - state.reckoned)
+        judged = away > 2.0 * abs(median - state.reckoned) + SLIPPING * median
+        apart = max(apart - SLIPPING, 0.0)
+    return apart if judged else math.nan
+
+
+@kernel
+def watch_speeds(
+    params: Record, state: Record, witness: Record, inputs: Record, estimate: Record, dt: float
+) -> None:
+    """Judge wheel speeds and vehicle speed.
+
+    Args:
+        params: `PARAMS`.
+        state: `SPEEDS_STATE`, overwritten.
+        witness: `WITNESS_STATE`; the five inputs' fields are overwritten.
+        inputs: `INPUTS` as received.
+        estimate: `ESTIMATE` of the last cycle; backwards, or slower than `LEAST_SPEED`, nothing is judged.
+        dt: time since the last cycle [s].
+    """
+    _gather(params, state, inputs, estimate)
+    median = _median(state, witness)
+    if estimate.backwards or not median > LEAST_SPEED:
+        state.started = 0
+        return
+    _reckon(state, inputs, estimate.accel_x, median, dt)
+    accel = estimate.accel_x
+    accelerates = driver_accelerates(inputs) or accel > DRIVEN_ACCEL
+    free = not accelerates and accel > DRAGGED_ACCEL
+    for i in range(4):
+        torque = estimate.brake_torque[i] + motor_torque(inputs, i)
+        free = free and abs(torque) < TORQUE
+    state.rolled_s = min(state.rolled_s + dt, BASE_S) if free else state.rolled_s
+    tolerance = TOLERANCE + ABSOLUTE / median + (UNFOUND if state.rolled_s < FOUND_S else 0.0)
+    for i in range(5):
+        if math.isnan(state.told[i]):
+            continue
+        told = state.told[i] / (1.0 - state.base[i])
+        state.apart[i] += (told / median - 1.0 - state.apart[i]) * min(dt / SMOOTHING_S, 1.0)
+        braking, motor = estimate.brake_torque[i % 4], motor_torque(inputs, i % 4)
+        braked = braking + motor > TORQUE or accel < DRAGGED_ACCEL
+        apart = _judged(state, i, median, free, braked, accelerates or motor < -TORQUE)
+        place = _place(i)
+        unit = median / params.wheel_radius[i] if i < SPEED else median
+        judge(witness, place, apart * unit, tolerance * unit, DOUBT_S, dt)
+        if free and not witness.rejected[place] and abs(apart) < tolerance:
+            base = state.base[i] + (state.apart[i] - state.base[i]) * dt / max(state.rolled_s, dt)
+            state.base[i] = min(max(base, -FARTHEST_BASE), FARTHEST_BASE)

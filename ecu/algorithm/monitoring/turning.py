@@ -1,0 +1,104 @@
+"""Plausibility of yaw rate, lateral acceleration and steering angle: five witnesses of the car's turning.
+
+    yaw rate    psi_dot
+    across      a_y / v                                                  steady cornering, bank
+    steering    v delta / L (1 ... 0.4)                                  understeer, any vehicle
+    wheels      (v_right - v_left) / track, of either axle               slip, radii
+
+Two witnesses support each other where they differ by less than both their tolerances. One that has less
+support than the best supported one is judged by its distance from the mean of those: it takes two witnesses
+to contradict one, and no wheel is judged here.
+"""
+
+import math
+
+import numpy as np
+
+from ecu.algorithm.inputs import usable
+from ecu.algorithm.monitoring.witness import judge
+from ecu.contract.signals import ACCEL_Y, STEERING_ANGLE, WHEEL_SPEED, YAW_RATE
+from ecu.jit import Record, kernel
+
+YAW, ACROSS, STEERING, FRONT, REAR = range(5)
+WITNESSES = 5
+TURNING_STATE = np.dtype(
+    [
+        ("rate", "f8", (WITNESSES,)),  # yaw rate by each witness [rad/s], NaN: silent
+        ("tolerance", "f8", (WITNESSES,)),  # of it [rad/s]
+    ],
+    align=True,
+)
+
+LEAST_SPEED = 5.0  # m/s
+YAW_ZERO, YAW_SCALE = 0.03, 0.05  # rad/s, of the value
+BANK = 1.0  # m/s^2: a road banked by 6 %, roll, zero
+STEERING_ZERO, UNDERSTEER = 0.03, 0.6  # rad/s, of the value
+TURNS = 0.02  # of the wheel speeds: radii and slip of the two sides
+DOUBT_S = 0.2
+
+
+@kernel
+def _set(state: Record, of: int, known: bool, rate: float, tolerance: float) -> None:
+    state.rate[of], state.tolerance[of] = rate if known else math.nan, tolerance
+
+
+@kernel
+def _difference(params: Record, inputs: Record, left: int) -> float:
+    """Return the yaw rate [rad/s] by the wheels of an axle, whose left one is `left`."""
+    r, value = params.wheel_radius, inputs.value
+    turns: float = abs(value[WHEEL_SPEED + left + 1]) * r[left + 1] - abs(value[WHEEL_SPEED + left]) * r[left]
+    return turns / params.track
+
+
+@kernel
+def _support(state: Record, i: int) -> int:
+    """Return how many witnesses, itself included, are within their tolerances of one; 0: silent."""
+    count = 0
+    for j in range(WITNESSES):
+        if abs(state.rate[i] - state.rate[j]) < state.tolerance[i] + state.tolerance[j]:
+            count += 1
+    return count
+
+
+@kernel
+def watch_turning(
+    params: Record, state: Record, witness: Record, inputs: Record, speed: float, dt: float
+) -> None:
+    """Judge yaw rate, lateral acceleration and steering angle.
+
+    Args:
+        params: `PARAMS`.
+        state: `TURNING_STATE`, overwritten.
+        witness: `WITNESS_STATE`; the three inputs' fields are overwritten.
+        inputs: `INPUTS` as received.
+        speed: of the vehicle [m/s]; below `LEAST_SPEED`, or backwards, nothing is judged.
+        dt: time since the last cycle [s].
+    """
+    if not speed > LEAST_SPEED:
+        return
+    value = inputs.value
+    yaw, across = value[YAW_RATE], value[ACCEL_Y] / speed
+    steering = value[STEERING_ANGLE] * speed / params.wheelbase
+    turns = TURNS * speed / params.track + YAW_ZERO
+    _set(state, YAW, usable(inputs, YAW_RATE), yaw, YAW_ZERO + YAW_SCALE * abs(yaw))
+    _set(state, ACROSS, usable(inputs, ACCEL_Y), across, BANK / speed + YAW_SCALE * abs(across))
+    reach = STEERING_ZERO + UNDERSTEER * abs(steering)
+    _set(state, STEERING, usable(inputs, STEERING_ANGLE), steering, reach)
+    for axle in range(2):
+        known = usable(inputs, WHEEL_SPEED + 2 * axle) and usable(inputs, WHEEL_SPEED + 2 * axle + 1)
+        _set(state, FRONT + axle, known, _difference(params, inputs, 2 * axle), turns)
+    best = 0
+    for i in range(WITNESSES):
+        best = max(best, _support(state, i))
+    mean, width, count = 0.0, 0.0, 0
+    for i in range(WITNESSES):
+        if _support(state, i) == best:
+            mean, count = mean + state.rate[i], count + 1
+            width = state.tolerance[i] if count == 1 else min(width, state.tolerance[i])
+    for i in range(FRONT):
+        if count < 2 or math.isnan(state.rate[i]):
+            continue
+        apart = 0.0 if _support(state, i) == best else state.rate[i] - mean / count
+        place = YAW_RATE if i == YAW else ACCEL_Y if i == ACROSS else STEERING_ANGLE
+        unit = 1.0 if i == YAW else speed if i == ACROSS else params.wheelbase / speed
+        judge(witness, place, apart * unit, (state.tolerance[i] + width) * unit, DOUBT_S, dt)
