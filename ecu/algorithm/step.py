@@ -66,6 +66,7 @@ from ecu.algorithm.estimation.thesis.speed import SPEED_STATE
 from ecu.algorithm.estimation.wheel_load import WHEEL_LOAD_STATE
 from ecu.algorithm.hydraulics import HYDRAULICS_STATE, advance_pressures, correct_pressures
 from ecu.algorithm.inputs import others_brake
+from ecu.algorithm.monitoring.accel_error import ACCEL_ERROR_STATE
 from ecu.algorithm.monitoring.acceleration import ACCELERATION_STATE
 from ecu.algorithm.monitoring.application import APPLICATION_STATE, update_application
 from ecu.algorithm.monitoring.disc_temperature import (
@@ -122,6 +123,7 @@ INITIAL = np.dtype(
         ("guard", SLIP_GUARD_STATE),
         ("limiter", LIMITER_STATE),
         ("plausibility", PLAUSIBILITY_STATE),
+        ("accel_error", ACCEL_ERROR_STATE),
         ("witness", WITNESS_STATE),
         ("turning", TURNING_STATE),
         ("speeds", SPEEDS_STATE),

@@ -5,6 +5,7 @@ estimation, by the estimate of the last cycle.
 """
 
 from ecu.algorithm.control.failed_brakes import watch_brakes
+from ecu.algorithm.monitoring.accel_error import correct_accel, follow_accel_error, watch_frozen
 from ecu.algorithm.monitoring.acceleration import watch_acceleration
 from ecu.algorithm.monitoring.plausibility import watch_pressures, watch_wheels, wheel_speed_implausible
 from ecu.algorithm.monitoring.speeds import watch_speeds
@@ -13,12 +14,14 @@ from ecu.algorithm.monitoring.witness import rejected_faults
 from ecu.contract.faults import (
     ACCEL_IMPLAUSIBLE,
     BRAKE_FAILED,
+    IMPLAUSIBLE,
     PRESSURE_NOT_FOLLOWING,
     WHEEL_SPEED_IMPLAUSIBLE,
 )
 from ecu.contract.signals import ACCEL_X, CALLIPER_PRESSURE, N_INPUTS, WHEEL_SPEED
 from ecu.jit import Record, kernel
 
+ACCEL_X_DRIFTED = IMPLAUSIBLE["accel_x"]
 LEFT_OUT_S = 0.03  # duration of a pressure's deviation from its demand
 
 
@@ -38,6 +41,11 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
     if estimate.started:
         watch_acceleration(p, s.acceleration, u, estimate, s.control.base, s.application.braking != 0, dt)
         watch_wheels(p, s.plausibility, u, estimate, dt)
+        watch_frozen(s.accel_error, s.acceleration, s.witness, u, dt)
+        if s.acceleration.time == 0.0 and not s.witness.rejected[ACCEL_X]:
+            follow_accel_error(p, s.accel_error, s.acceleration, estimate.accel_y, s.application.braking != 0)
+        if s.accel_error.zero_off != 0.0 or s.accel_error.scale_off != 0.0:
+            faults |= ACCEL_X_DRIFTED
         watch_turning(p, s.turning, s.witness, u, estimate.speed, dt)
         watch_speeds(p, s.speeds, s.witness, u, estimate, dt)
         faults |= rejected_faults(s.witness)
@@ -64,6 +72,7 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
 def mask_implausible(p: Record, s: Record, u: Record) -> None:
     """Overwrite the trusted inputs: `u` with implausible inputs masked out."""
     s.trusted = u
+    s.trusted.value[ACCEL_X] = correct_accel(s.accel_error, u.value[ACCEL_X])
     for place in range(N_INPUTS):
         if s.witness.rejected[place]:
             _distrust(s.trusted, place)
