@@ -35,7 +35,13 @@ from ecu.algorithm.control.distribution import (
 )
 from ecu.algorithm.control.failed_brakes import FAILED_BRAKES_STATE, replace_failed
 from ecu.algorithm.control.friction_torque import lagging_torque
-from ecu.algorithm.control.limiter import LIMITER_STATE, available_pressure, limit_axle, reads_empty
+from ecu.algorithm.control.limiter import (
+    LIMITER_STATE,
+    available_pressure,
+    limit_axle,
+    reads_empty,
+    watch_accumulator,
+)
 from ecu.algorithm.control.mode import MODE_STATE, decide_mode, input_faults, request_lost, speaks
 from ecu.algorithm.control.pressure_law import (
     PRESSURE_LAW_STATE,
@@ -77,6 +83,7 @@ from ecu.algorithm.monitoring.disc_temperature import (
     update_discs,
 )
 from ecu.algorithm.monitoring.dust import DUST_STATE, restore_dust, update_dust
+from ecu.algorithm.monitoring.flags import FLAGS_STATE, correct_flags
 from ecu.algorithm.monitoring.plausibility import PLAUSIBILITY_STATE
 from ecu.algorithm.monitoring.sensors import mask_implausible, watch_sensors
 from ecu.algorithm.monitoring.speeds import SPEEDS_STATE
@@ -89,6 +96,7 @@ from ecu.contract.faults import (
     BRAKE_FADE,
     DEMAND_LIMITED,
     FILTER_RESET,
+    IMPLAUSIBLE,
     LEARNED_AT_BOUND,
     LEARNING_GIVEN_UP,
     MOTOR_SHORT,
@@ -98,6 +106,8 @@ from ecu.contract.faults import (
 from ecu.contract.params import BAR
 from ecu.contract.records import INPUTS, LEARNED, RecordArray
 from ecu.jit import Record, kernel
+
+ACCUMULATOR_IMPLAUSIBLE = IMPLAUSIBLE["accumulator_pressure"]
 
 INITIAL = np.dtype(
     [
@@ -123,6 +133,7 @@ INITIAL = np.dtype(
         ("guard", SLIP_GUARD_STATE),
         ("limiter", LIMITER_STATE),
         ("plausibility", PLAUSIBILITY_STATE),
+        ("flags", FLAGS_STATE),
         ("accel_error", ACCEL_ERROR_STATE),
         ("witness", WITNESS_STATE),
         ("turning", TURNING_STATE),
@@ -160,7 +171,7 @@ def new_state(params: RecordArray, learned: RecordArray | None = None) -> Record
     row["failed_brakes"]["scale"] = 1.0
     row["force"]["k_f"] = row["force"]["stiffness"] = 1.0
     row["distribution"]["trailing"] = row["distribution"]["rolled"] = 1.0
-    row["guard"]["rolled"] = math.nan
+    row["guard"]["rolled"] = row["flags"]["last"] = math.nan
     _begin(params, state)
     return state
 
@@ -208,11 +219,13 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
     """
     p, s, u, y = params[0], state[0], inputs[0], outputs[0]
     dt = 1e-9 * u.dt_ns
+    s.trusted = u
+    told = correct_flags(p, s.flags, s.trusted, s.estimate, s.application.braking != 0, dt)
+    u = s.trusted
     faults, contradicted = watch_sensors(p, s, u, dt)
     contradicted = contradicted or u.e2e_faults != 0
-    faults |= u.bus_faults | u.e2e_faults | input_faults(p, u)
+    faults |= told | u.bus_faults | u.e2e_faults | input_faults(p, u)
     mask_implausible(p, s, u)
-    u = s.trusted
     hold_pedal(p, s.demand, u)
     faults |= hold_automated(s.demand, u, dt)
     faults |= request_lost(p, u)
@@ -227,6 +240,8 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
         faults |= DEMAND_LIMITED
     if s.limiter.starved or reads_empty(u):
         faults |= ACCUMULATOR_LOW
+    if s.limiter.denied:
+        faults |= ACCUMULATOR_IMPLAUSIBLE
     if s.guard.acting:
         faults |= WHEEL_SLIPS
     if s.distribution.trailing < KEPT:
@@ -285,7 +300,8 @@ def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
     cap_trailing(p, s.distribution, decel, s.blending.lining, e, y.pressure_demand, failed, backwards)
     if p.slip_guard:
         guard_slip(p, s.guard, u, e, speed, s.limiter.pressure, y.pressure_demand, s.distribution.torque, dt)
-    _limit(p, s, y, available_pressure(p, u), decel, dt)
+    watch_accumulator(s.limiter, u, dt)
+    _limit(p, s, y, available_pressure(p, s.limiter, u), decel, dt)
     return decel
 
 

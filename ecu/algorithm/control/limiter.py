@@ -8,7 +8,7 @@ For each corner, given the demand of the uncompensated law and the compensated o
 3. left and right differ by no more than `LEFT_RIGHT_SHARE` of the torque demanded, T(p, nominal friction)
    over it: learned friction, compensation and fallbacks of one side together. Torque taken from one side is
    added to the other, so that the axle torque is unchanged;
-4. 0–180 bar, and no more than the accumulator holds or the slip guard lets through;
+4. 0–180 bar, and no more than the accumulator holds, as callipers confirm, or the slip guard lets through;
 5. rise at most `max_pressure_rate` (at least 1500 bar/s: an emergency stop is not delayed); a fall is
    unlimited while the demand falls or to stay below 2 and 4, and as slow as a rise while it does not.
 
@@ -25,7 +25,7 @@ import numpy as np
 from ecu.algorithm.brake import brake_gain
 from ecu.algorithm.inputs import usable
 from ecu.contract.params import BAR
-from ecu.contract.signals import ACCUMULATOR_PRESSURE
+from ecu.contract.signals import ACCUMULATOR_PRESSURE, CALLIPER_PRESSURE
 from ecu.jit import Record, kernel
 
 LIMITER_STATE = np.dtype(
@@ -39,6 +39,10 @@ LIMITER_STATE = np.dtype(
         ("falls", "u1", (4,)),  # the demand of the corner falls
         ("limited", "u1"),
         ("starved", "u1"),  # the accumulator holds less than is demanded
+        ("short_s", "f8"),  # time for which callipers have confirmed that
+        ("above_s", "f8"),  # time for which a calliper has held more than the accumulator reads
+        ("confirmed", "u1"),  # the accumulator's reading limits
+        ("denied", "u1"),  # it does not: a calliper holds more
     ],
     align=True,
 )
@@ -49,6 +53,8 @@ BEYOND_ANY = 1e12  # Pa; two infinite pressures have no ratio
 # A demand that rises while its compensated twin falls by more than this in one cycle is a fault [Pa].
 AGAINST_DEMAND = 5e5
 EMPTY = 10.0 * BAR  # far below the gas pressure of any accumulator
+MARGIN = 8.0  # bar, of a calliper's pressure above the accumulator's
+CONFIRMED_S, DENIED_S = 0.4, 0.1
 
 
 @kernel
@@ -59,14 +65,47 @@ def reads_empty(inputs: Record) -> bool:
 
 
 @kernel
-def available_pressure(params: Record, inputs: Record) -> float:
-    """Return the highest pressure [Pa] available from the hydraulics: the accumulator's, where it is known.
+def watch_accumulator(state: Record, inputs: Record, dt: float) -> None:
+    """Overwrite whether the accumulator's reading limits.
+
+    It does once more is demanded and no calliper has more, both for `CONFIRMED_S`: it takes two witnesses to
+    take pressure away. A calliper that holds more denies it.
+
+    Args:
+        state: `LIMITER_STATE`.
+        inputs: `INPUTS`.
+        dt: time since the last cycle [s].
+    """
+    if not usable(inputs, ACCUMULATOR_PRESSURE):
+        state.short_s, state.above_s, state.confirmed, state.denied = 0.0, 0.0, 0, 0
+        return
+    reading, highest, asked = inputs.value[ACCUMULATOR_PRESSURE], 0.0, 0.0
+    for i in range(4):
+        if usable(inputs, CALLIPER_PRESSURE + i):
+            highest = max(highest, inputs.value[CALLIPER_PRESSURE + i])
+        asked = max(asked, state.asked[i] / BAR)
+    state.above_s = state.above_s + dt if highest > reading + MARGIN else 0.0
+    if state.above_s > DENIED_S:
+        state.denied = 1
+    elif (asked > MARGIN and highest < reading < asked) or (highest > MARGIN and reading > asked + MARGIN):
+        state.denied = 0
+    short = asked > reading + MARGIN and highest < reading + MARGIN and state.denied == 0
+    state.short_s = state.short_s + dt if short else 0.0
+    if state.short_s > CONFIRMED_S:
+        state.confirmed = 1
+    elif not short and (asked < reading or state.denied):
+        state.confirmed = 0
+
+
+@kernel
+def available_pressure(params: Record, state: Record, inputs: Record) -> float:
+    """Return the highest pressure [Pa] available from the hydraulics: the accumulator's, where confirmed.
 
     A reading of an empty accumulator does not limit: if true, no pressure is lost; if the sensor errs, all
     would be.
     """
     available: float = params.max_pressure
-    if usable(inputs, ACCUMULATOR_PRESSURE) and not reads_empty(inputs):
+    if state.confirmed and usable(inputs, ACCUMULATOR_PRESSURE) and not reads_empty(inputs):
         available = min(BAR * inputs.value[ACCUMULATOR_PRESSURE], available)
     return available
 

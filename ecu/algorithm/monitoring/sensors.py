@@ -70,19 +70,18 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
 
 @kernel
 def mask_implausible(p: Record, s: Record, u: Record) -> None:
-    """Overwrite the trusted inputs: `u` with implausible inputs masked out."""
-    s.trusted = u
-    s.trusted.value[ACCEL_X] = correct_accel(s.accel_error, u.value[ACCEL_X])
+    """Mask out the implausible of the inputs `u`, and correct the accelerometer's reading."""
+    u.value[ACCEL_X] = correct_accel(s.accel_error, u.value[ACCEL_X])
     for place in range(N_INPUTS):
         if s.witness.rejected[place]:
-            _distrust(s.trusted, place)
+            _distrust(u, place)
     if s.acceleration.implausible or abs(u.value[ACCEL_X]) > p.accel_range:
-        _distrust(s.trusted, ACCEL_X)
+        _distrust(u, ACCEL_X)
     for i in range(4):
         if s.plausibility.fell[i]:
-            _distrust(s.trusted, WHEEL_SPEED + i)
+            _distrust(u, WHEEL_SPEED + i)
         if s.plausibility.apart_s[i] > LEFT_OUT_S and not s.failed_brakes.failed[i]:
-            _distrust(s.trusted, CALLIPER_PRESSURE + i)
+            _distrust(u, CALLIPER_PRESSURE + i)
 
 
 @kernel

@@ -1,0 +1,177 @@
+"""Flags that stand for longer, or at another time, than they can: they are taken for 0.
+
+reverse        believed if it is set below `ENGAGED` and while the car is slower than `FASTEST_BACK`, as long
+               as the wheels do not gain speed where the accelerometer reads forwards: backwards they lose it.
+ABS, ESP       stand for `LONGEST_S` without a wheel beyond `SLIPS` of slip; an ESP in a bend for three times
+               as long.
+accelerator    that does not move through two brakings is at its rest, which is taken off.
+"""
+
+import math
+
+import numpy as np
+
+from ecu.algorithm.inputs import fresh, mean_wheel_speed, usable
+from ecu.algorithm.vehicle import corner_speed
+from ecu.contract.faults import IMPLAUSIBLE
+from ecu.contract.signals import (
+    ABS_ACTIVE,
+    ACCEL_X,
+    ACCELERATOR_POSITION,
+    ESP_ACTIVE,
+    REVERSE,
+    WHEEL_SPEED,
+)
+from ecu.jit import Record, kernel
+
+FLAGS_STATE = np.dtype(
+    [
+        ("reverse", "u1"),  # the flag is believed
+        ("reverse_was", "u1"),  # it was set in the last cycle
+        ("rolled", "f8"),  # mean speed of the wheels, low-passed [m/s]
+        ("gain", "f8", (2,)),  # its rate and the acceleration, low-passed [m/s^2]
+        ("usual", "f8", (2,)),  # both, low-passed slowly
+        ("agreed", "f8"),  # product of their changes, fading [m^2/s^3]
+        ("moved", "f8"),  # square of the accelerometer's, fading
+        ("abs_s", "f8"),  # time for which it has stood without slip
+        ("esp_s", "f8"),
+        ("rest", "f8"),  # of the accelerator [%]
+        ("brake_s", "f8"),  # duration of this braking
+        ("low", "f8"),  # least and greatest position in it [%]
+        ("high", "f8"),
+        ("last", "f8"),  # position through the last braking, NaN: it moved [%]
+    ],
+    align=True,
+)
+
+REVERSE_BIT, ABS_BIT = IMPLAUSIBLE["reverse"], IMPLAUSIBLE["abs_active"]
+ESP_BIT, ACCELERATOR_BIT = IMPLAUSIBLE["esp_active"], IMPLAUSIBLE["accelerator_position"]
+ENGAGED, FASTEST_BACK = 2.0, 12.0  # m/s
+RATE_S, USUAL_S, FADING_S = 0.15, 2.0, 3.0
+MOVED = 0.5  # m^2/s^3, from which the sign of the motion is known
+FORWARDS = 0.4  # of the square, share that the product has
+LONGEST_S, SLIPS = 5.0, 0.05
+BENDING, IN_A_BEND = 2.0, 3.0  # m/s^2, times as long
+LEAST_SPEED = 3.0  # m/s, for slip
+STEADY, THROUGH_S = 0.5, 1.0  # %, s
+RESTS_BELOW = 5.0  # %
+
+
+@kernel
+def _set(inputs: Record, place: int) -> bool:
+    return usable(inputs, place) and inputs.value[place] > 0.5
+
+
+@kernel
+def _follow_direction(params: Record, state: Record, inputs: Record, rolled: float, dt: float) -> None:
+    """Update the correlation of the wheels' rate with the acceleration; both without what is constant."""
+    if not (math.isfinite(rolled) and usable(inputs, ACCEL_X)):
+        return
+    before = state.rolled
+    state.rolled += (rolled - state.rolled) * min(dt / RATE_S, 1.0)
+    rate = (state.rolled - before) / dt if dt > 0.0 else 0.0
+    product, square = 0.0, 0.0
+    for k in range(2):
+        value = rate if k == 0 else inputs.value[ACCEL_X]
+        lag = 0.5 * RATE_S if k == 0 else 1.5 * RATE_S  # the rate lags already
+        state.gain[k] += (value - state.gain[k]) * min(dt / lag, 1.0)
+        state.usual[k] += (state.gain[k] - state.usual[k]) * min(dt / USUAL_S, 1.0)
+    rate, accel = state.gain[0] - state.usual[0], state.gain[1] - state.usual[1]
+    product, square = rate * accel, accel * accel
+    keep = 1.0 - min(dt / FADING_S, 1.0)
+    state.agreed, state.moved = keep * state.agreed + dt * product, keep * state.moved + dt * square
+
+
+@kernel
+def _watch_reverse(params: Record, state: Record, inputs: Record, dt: float) -> None:
+    rolled = mean_wheel_speed(params, inputs)
+    _follow_direction(params, state, inputs, rolled, dt)
+    told = _set(inputs, REVERSE)
+    if told and not state.reverse_was:
+        state.reverse = 0 if rolled > ENGAGED else 1
+    forwards = state.moved > MOVED and state.agreed > FORWARDS * state.moved
+    if rolled > FASTEST_BACK or forwards:
+        state.reverse = 0
+    state.reverse_was = 1 if told else 0
+
+
+@kernel
+def _some_wheel_slips(params: Record, inputs: Record, estimate: Record) -> bool:
+    speed = estimate.speed
+    if not abs(speed) > LEAST_SPEED:
+        return False
+    slips = False
+    for i in range(4):
+        if usable(inputs, WHEEL_SPEED + i):
+            ground = abs(corner_speed(params, estimate, speed, i))
+            rolled = abs(inputs.value[WHEEL_SPEED + i]) * params.wheel_radius[i]
+            slips = slips or abs(ground - rolled) > SLIPS * ground
+    return slips
+
+
+@kernel
+def _stands(stood_s: float, told: bool, slips: bool, dt: float) -> float:
+    """Return for how long a controller's flag has stood without reason [s]; once too long, until it falls."""
+    if not told:
+        return 0.0
+    if slips and stood_s < LONGEST_S:
+        return max(stood_s - dt, 0.0)
+    return stood_s + dt
+
+
+@kernel
+def _watch_accelerator(state: Record, inputs: Record, braking: bool, dt: float) -> None:
+    position = inputs.value[ACCELERATOR_POSITION]
+    if not fresh(inputs, ACCELERATOR_POSITION):
+        return
+    state.rest = min(state.rest, max(position, 0.0))
+    if braking:
+        if state.brake_s == 0.0:
+            state.low = state.high = position
+        state.low, state.high = min(state.low, position), max(state.high, position)
+        state.brake_s += dt
+    elif state.brake_s > 0.0:
+        steady = state.brake_s > THROUGH_S and state.high - state.low < STEADY
+        middle = 0.5 * (state.low + state.high)
+        if steady and abs(middle - state.last) < STEADY:
+            state.rest = state.high
+        if state.brake_s > THROUGH_S:
+            state.last = middle if steady else math.nan
+        state.brake_s = 0.0
+
+
+@kernel
+def correct_flags(
+    params: Record, state: Record, inputs: Record, estimate: Record, braking: bool, dt: float
+) -> int:
+    """Overwrite flags that cannot be in `inputs`; return the fault bits.
+
+    Args:
+        params: `PARAMS`.
+        state: `FLAGS_STATE`, overwritten.
+        inputs: `INPUTS`, whose four values are overwritten.
+        estimate: `ESTIMATE` of the last cycle.
+        braking: a brake application lasts.
+        dt: time since the last cycle [s].
+    """
+    faults, value = 0, inputs.value
+    _watch_reverse(params, state, inputs, dt)
+    if _set(inputs, REVERSE) and not state.reverse:
+        faults |= REVERSE_BIT
+        value[REVERSE] = 0.0
+    slips = _some_wheel_slips(params, inputs, estimate)
+    bending = abs(estimate.accel_y) > BENDING
+    state.abs_s = _stands(state.abs_s, _set(inputs, ABS_ACTIVE), slips, dt)
+    state.esp_s = _stands(state.esp_s, _set(inputs, ESP_ACTIVE), slips, dt / IN_A_BEND if bending else dt)
+    if state.abs_s > LONGEST_S:
+        faults |= ABS_BIT
+        value[ABS_ACTIVE] = 0.0
+    if state.esp_s > LONGEST_S:
+        faults |= ESP_BIT
+        value[ESP_ACTIVE] = 0.0
+    _watch_accelerator(state, inputs, braking, dt)
+    if state.rest > 0.0:
+        if state.rest > RESTS_BELOW:
+            faults |= ACCELERATOR_BIT
+        value[ACCELERATOR_POSITION] = max(value[ACCELERATOR_POSITION] - state.rest, 0.0)
+    return faults
