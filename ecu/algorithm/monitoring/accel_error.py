@@ -1,7 +1,7 @@
 """Zero and scale of the accelerometer that have drifted, by the wheels' deceleration and by coasting.
 
     a - dw/dt = c + s dw/dt      c: zero and slope of the road, walks by `SLOPE_WALK`; s: scale error
-    a - f     = b                b: zero, while no brake is applied and the motors' torques are reported
+    a - f     = b                b: zero, while no brake is applied and the motors alone drive the car
 
 of the blocks of 0.1 s that `acceleration.py` gathers. The first is a Kalman filter of two states: a slope
 does not come and go with the brakes. An error beyond its doubt is taken off the reading; one within is left
@@ -26,6 +26,7 @@ ACCEL_ERROR_STATE = np.dtype(
         ("p", "f8", (3,)),  # variances of both, covariance
         ("zero", "f8"),  # b [m/s^2]
         ("coasted_s", "f8"),  # learning time of that, at most `ZERO_S`
+        ("proven_s", "f8"),  # time for which the motors' torques alone have driven the car
         ("zero_off", "f8"),  # taken off the reading [m/s^2]
         ("scale_off", "f8"),  # of it
         ("reading", "f8"),  # last sample [m/s^2]
@@ -48,8 +49,9 @@ FORCE = 0.1  # relative error of mass and motors
 WEIGHT = 0.15  # m/s^2, error of drag and rolling resistance
 SCALE_DOUBT, SIGMAS = 0.03, 1.0
 ZERO_DOUBT = 0.25  # m/s^2
+PROVING, ENGINE, PROVEN_S = 1.0, 0.2, 0.5  # m/s^2; of it, what an unreported engine exceeds; s
 KEPT = 0.4
-SAME_S = 0.3  # time after which a reading that never changes is judged
+SAME_S = 0.6  # the blocks whose deceleration is compared
 CHANGED = 1.0  # m/s^2, of the wheels' deceleration meanwhile
 
 
@@ -95,7 +97,10 @@ def _follow_zero(params: Record, state: Record, mean: Record) -> None:
     speed = mean[0, W]
     resistance = params.drag_area * speed * speed / params.mass + params.rolling_resistance * GRAVITY
     innovation = mean[0, A] - mean[0, F] + resistance - state.zero
-    if abs(innovation) > GROSS:
+    if mean[0, F] > PROVING:
+        proves = abs(innovation) < ENGINE * mean[0, F] + ZERO_DOUBT
+        state.proven_s = min(state.proven_s + BLOCK_S, PROVEN_S) if proves else 0.0
+    if abs(innovation) > GROSS or state.proven_s < PROVEN_S:
         return
     certainty = (WEIGHT / (WEIGHT + FORCE * abs(mean[0, F]))) ** 2
     state.coasted_s = min(state.coasted_s + certainty * BLOCK_S, ZERO_S)

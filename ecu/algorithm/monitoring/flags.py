@@ -28,6 +28,7 @@ FLAGS_STATE = np.dtype(
     [
         ("reverse", "u1"),  # the flag is believed
         ("reverse_was", "u1"),  # it was set in the last cycle
+        ("age_s", "f8"),  # since the first cycle
         ("rolled", "f8"),  # mean speed of the wheels, low-passed [m/s]
         ("gain", "f8", (2,)),  # its rate and the acceleration, low-passed [m/s^2]
         ("usual", "f8", (2,)),  # both, low-passed slowly
@@ -47,6 +48,7 @@ FLAGS_STATE = np.dtype(
 REVERSE_BIT, ABS_BIT = IMPLAUSIBLE["reverse"], IMPLAUSIBLE["abs_active"]
 ESP_BIT, ACCELERATOR_BIT = IMPLAUSIBLE["esp_active"], IMPLAUSIBLE["accelerator_position"]
 ENGAGED, FASTEST_BACK = 2.0, 12.0  # m/s
+START_S = 1.0  # in which an ECU that starts on the way believes the flag
 RATE_S, USUAL_S, FADING_S = 0.15, 2.0, 3.0
 MOVED = 0.5  # m^2/s^3, from which the sign of the motion is known
 FORWARDS = 0.4  # of the square, share that the product has
@@ -88,7 +90,8 @@ def _watch_reverse(params: Record, state: Record, inputs: Record, dt: float) -> 
     _follow_direction(params, state, inputs, rolled, dt)
     told = _set(inputs, REVERSE)
     if told and not state.reverse_was:
-        state.reverse = 0 if rolled > ENGAGED else 1
+        state.reverse = 0 if rolled > ENGAGED and state.age_s > START_S else 1
+    state.age_s += dt
     forwards = state.moved > MOVED and state.agreed > FORWARDS * state.moved
     if rolled > FASTEST_BACK or forwards:
         state.reverse = 0

@@ -14,7 +14,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ecu.algorithm.control.limiter import LIMITER_STATE, available_pressure, limit_axle, reads_empty
+from ecu.algorithm.control.limiter import (
+    LIMITER_STATE,
+    available_pressure,
+    limit_axle,
+    reads_empty,
+    watch_accumulator,
+)
 from ecu.contract.signals import ALIVE, INPUT, USABLE, VALID
 from ecu.jit import kernel
 from ecu.settings.config import load_config, new_params
@@ -185,10 +191,53 @@ def test_from_below_a_ceiling_that_is_lifted_pressure_rises_from_where_it_was() 
     ],
 )
 def test_what_the_accumulator_can_give(feed, case, verdict, accumulator, available) -> None:
-    inputs = feed(accumulator_pressure=accumulator)
+    """Once callipers have confirmed its reading, nothing before."""
+    inputs, state = feed(accumulator_pressure=accumulator), np.zeros(1, LIMITER_STATE)[0]
     inputs[0]["verdict"][INPUT["accumulator_pressure"]] = verdict
-    assert available_pressure(PARAMS[0], inputs[0]) == pytest.approx(available * BAR), case
+    assert available_pressure(PARAMS[0], state, inputs[0]) == pytest.approx(180.0 * BAR), case
+    state["confirmed"] = 1
+    assert available_pressure(PARAMS[0], state, inputs[0]) == pytest.approx(available * BAR), case
     assert bool(reads_empty(inputs[0])) == (verdict == USABLE and accumulator <= 10.0)
+
+
+ACCUMULATORS = [
+    # case, accumulator reads, calliper, demand [bar], seconds, limits, denied
+    ("holds enough", 180.0, 60.0, 60.0, 1.0, 0, 0),
+    ("low, a calliper agrees", 40.0, 39.0, 60.0, 0.45, 1, 0),
+    ("not yet", 40.0, 39.0, 60.0, 0.35, 0, 0),
+    ("low, nothing more demanded", 40.0, 39.0, 45.0, 1.0, 0, 0),
+    ("a calliper holds more", 11.0, 60.0, 60.0, 0.15, 0, 1),
+    ("for a moment", 11.0, 60.0, 60.0, 0.05, 0, 0),
+    ("not by more than both sensors err", 40.0, 47.0, 60.0, 0.45, 1, 0),
+    ("lost", math.nan, 60.0, 60.0, 1.0, 0, 0),
+]
+
+
+@pytest.mark.parametrize(
+    ("case", "reads", "calliper", "asked", "seconds", "limits", "denied"),
+    ACCUMULATORS,
+    ids=[row[0] for row in ACCUMULATORS],
+)
+def test_an_accumulator_limits_once_callipers_confirm_it(
+    feed, case, reads, calliper, asked, seconds, limits, denied
+) -> None:
+    inputs, state = feed(accumulator_pressure=reads), np.zeros(1, LIMITER_STATE)[0]
+    feed(inputs, calliper_pressure=np.array([calliper, 0.0, 0.0, 0.0]))
+    state["asked"] = asked * BAR
+    for _ in range(round(seconds / DT)):
+        watch_accumulator(state, inputs[0], DT)
+    assert (state["confirmed"], state["denied"]) == (limits, denied), case
+
+
+def test_an_accumulator_that_agrees_again_is_believed_again(feed) -> None:
+    inputs, state = feed(accumulator_pressure=11.0), np.zeros(1, LIMITER_STATE)[0]
+    feed(inputs, calliper_pressure=np.full(4, 60.0))
+    state["asked"] = 60.0 * BAR
+    for reads, denied in ((11.0, 1), (150.0, 0)):
+        feed(inputs, accumulator_pressure=reads)
+        for _ in range(30):
+            watch_accumulator(state, inputs[0], DT)
+        assert state["denied"] == denied
 
 
 # ---------------------------------------------------------------- 0–180 bar
