@@ -1,6 +1,6 @@
 # make demo | test | studies | check | coverage | mutants | fuzz | soak | screenshot | clean. Sets up .venv itself; PYTHON=... chooses the interpreter.
 PIP := .venv/bin/python -m pip --disable-pip-version-check install --quiet
-PINNED := $(PIP) --require-hashes --requirement requirements/build.txt
+PINNED := $(PIP) --no-deps --require-hashes --requirement requirements/build.txt
 
 .PHONY: help demo test studies check coverage mutants fuzz soak screenshot clean
 

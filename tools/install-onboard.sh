@@ -19,12 +19,12 @@ pip="-m pip --disable-pip-version-check --no-cache-dir --quiet"
 
 echo "Building the package"
 "$python" -m venv "$build/venv"
-"$build/venv/bin/python" $pip install --require-hashes --requirement "$source/requirements/build.txt"
+"$build/venv/bin/python" $pip install --no-deps --require-hashes --requirement "$source/requirements/build.txt"
 "$build/venv/bin/python" $pip wheel --no-deps --no-build-isolation --wheel-dir "$build" "$source"
 
 echo "Installing into $prefix"
 "$python" -m venv "$prefix"
-"$prefix/bin/python" $pip install --require-hashes --requirement "$source/requirements/onboard.txt"
+"$prefix/bin/python" $pip install --no-deps --require-hashes --requirement "$source/requirements/onboard.txt"
 "$prefix/bin/python" $pip install --no-deps "$build"/brake_ecu-*.whl
 
 # Compiled for any processor of this architecture: the image may run on another machine than built it.
