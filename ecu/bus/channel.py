@@ -22,8 +22,6 @@ from ecu.errors import UserError, closest
 
 # Frames of one identifier that may be echoed back: 0.3 s of a 10 ms frame.
 _ECHOES: Final = 32
-# A driver's stamp that far from the real-time clock has another origin (e.g. the adapter's start).
-_FOREIGN_ORIGIN_NS: Final = 5_000_000_000
 _IP_MULTICAST_ALL: Final = 49  # linux/in.h
 _MALFORMED_AT_ONCE: Final = 200  # unreadable messages per cycle; the rest waits
 _KNOWN: Final = sorted(can.VALID_INTERFACES)
@@ -187,9 +185,10 @@ class GenericChannel:
 
 
 def _store(message: can.Message, frame: Any) -> None:
+    # A driver counts from 1970, or from a start of its own that is never half as long ago.
     now = time.time_ns()
     stamp = round(message.timestamp * 1e6) * 1000
-    frame["stamp_ns"] = stamp if abs(now - stamp) < _FOREIGN_ORIGIN_NS else now // 1000 * 1000
+    frame["stamp_ns"] = stamp if stamp > now // 2 else now // 1000 * 1000
     frame["can_id"] = message.arbitration_id
     frame["flags"] = FRAME_EXTENDED * message.is_extended_id | FRAME_FD * message.is_fd
     length = len(message.data)

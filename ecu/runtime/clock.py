@@ -1,8 +1,9 @@
 """Time grid of 10 ms: absolute deadlines on the monotonic clock, missed periods, lateness statistics.
 
-An overrun is not caught up in a burst: missed periods are counted, and the next deadline is the next one on
-the grid. T_k exists on two clocks: the monotonic one schedules, the real-time one is compared with the
-frames' stamps.
+Missed periods are not caught up in a burst but counted, whether the cycle before lasted too long or the sleep
+did (a stopped process, a paused virtual machine): a cycle's deadline T_k is the last one on the grid when it
+wakes, never one from before the sleep. T_k exists on two clocks: the monotonic one schedules, the real-time
+one is compared with the frames' stamps.
 """
 
 import ctypes
@@ -63,7 +64,7 @@ class Tick(NamedTuple):
     missed: int
     """Periods that passed unserved since the cycle before."""
     lateness_ns: int
-    """How long after its deadline the cycle woke."""
+    """How long after its deadline the cycle woke; if periods were missed, after the first of theirs."""
 
 
 class Grid:
@@ -77,15 +78,16 @@ class Grid:
     def wait(self) -> Tick:
         """Sleep until the next deadline; a signal may interrupt the sleep, which then continues."""
         period = self.period_ns
+        due_ns = self.deadline_ns + period
         now = self.source.monotonic_ns()
-        missed = max(0, (now - self.deadline_ns) // period)
-        self.deadline_ns += (missed + 1) * period
+        self.deadline_ns = due_ns + max(0, now - self.deadline_ns) // period * period
         while now < self.deadline_ns:
             self.source.sleep_until(self.deadline_ns)
             now = self.source.monotonic_ns()
+        self.deadline_ns += (now - self.deadline_ns) // period * period
         self._follow_realtime()
         t_ns = (self.deadline_ns + self.offset_ns) // MICROSECOND_NS * MICROSECOND_NS
-        return Tick(t_ns, self.deadline_ns, missed, now - self.deadline_ns)
+        return Tick(t_ns, self.deadline_ns, (self.deadline_ns - due_ns) // period, now - due_ns)
 
     def _sample_offset(self) -> tuple[int, int]:
         before = self.source.monotonic_ns()

@@ -36,7 +36,9 @@ from ecu.recording.ring import Ring, publish
 from ecu.runtime.clock import MICROSECOND_NS, Grid, Histogram, Tick
 from ecu.runtime.standby import Claim, Standby
 
-WAITING_FRAMES: Final = 4096  # buffer of received frames: a second of a saturated bus
+WAITING_FRAMES: Final = 16384  # more than a socket holds: what waited while the process stood still
+GIVEN_UP_NS: Final = 3 * CYCLE_NS
+"""Age of a demand that receivers have given up; it is not sent any more."""
 HOLD_CYCLES: Final = 100  # a transient fault of the service shows for a second
 FAREWELLS: Final = 3  # one may be lost
 _COUNTED: Final = (faults.SEND_FAILED, faults.FRAMES_DROPPED, faults.FOREIGN_SENDER, faults.LATE)
@@ -152,7 +154,7 @@ def cycle_once(ecu: Ecu, channel: Channel, ring: Ring, grid: Grid, run: Progress
     woken = clock()
     run.waiting += channel.drain(ecu.waiting, run.waiting)
     drained = clock()
-    consumed, late, foreign = _gather(
+    consumed, late, foreign, beside = _gather(
         ecu.receive_plan,
         ecu.transmit_plan.ids,
         ecu.reception,
@@ -166,7 +168,7 @@ def cycle_once(ecu: Ecu, channel: Channel, ring: Ring, grid: Grid, run: Progress
     )
     if run.standby is None:
         run.foreign += foreign
-        if run.claim.is_lost(foreign, tick.missed):
+        if run.claim.is_lost(beside, tick.missed):
             run.standby = Standby(yielded=True)
     if run.standby is not None:
         run.standby.listen(ecu.transmit_plan, ecu.transmission, ecu.waiting, run.waiting, tick.t_mono_ns)
@@ -179,7 +181,8 @@ def cycle_once(ecu: Ecu, channel: Channel, ring: Ring, grid: Grid, run: Progress
     if run.speaks:
         due = transmit(ecu.transmit_plan, ecu.transmission, ecu.vector, run.number, ecu.sending)
     encoded = clock()
-    channel.send(ecu.sending, due)
+    if encoded - tick.t_mono_ns < GIVEN_UP_NS:  # else the process stood still since it woke
+        channel.send(ecu.sending, due)
     sent = clock()
 
     stages = (drained - woken, received - drained, stepped - received, encoded - stepped, sent - encoded)
@@ -194,7 +197,7 @@ def cycle_once(ecu: Ecu, channel: Channel, ring: Ring, grid: Grid, run: Progress
 def _note_service(ecu: Ecu, run: Progress, tick: Tick, status: BusStatus) -> None:
     """Pass the service's own findings to `step`."""
     run.overruns += tick.missed
-    run.worst_lateness_ns = max(run.worst_lateness_ns, tick.lateness_ns + tick.missed * CYCLE_NS)
+    run.worst_lateness_ns = max(run.worst_lateness_ns, tick.lateness_ns)
     inputs = ecu.inputs
     inputs["bus_faults"] = run.watch.look(run.number, status, run.foreign, run.overruns)
     inputs["overruns"] = run.overruns
@@ -225,11 +228,11 @@ def _gather(
     dt_ns: int,
     previous_t_ns: int,
     now_ns: int,
-) -> tuple[int, int, int]:
+) -> tuple[int, int, int, int]:
     """Fill `inputs` from the frames stamped up to `t_ns`.
 
-    Returns their number, and how many of them were late and how many have one of our own identifiers. A stamp
-    in the future means that the clock was set back: it becomes now.
+    Returns their number, how many of them were late, how many have one of our own identifiers, and in how
+    many periods such ones came. A stamp in the future means that the clock was set back: it becomes now.
     """
     now_us = now_ns // MICROSECOND_NS * MICROSECOND_NS
     for i in range(count):
@@ -238,7 +241,8 @@ def _gather(
     begin_cycle(inputs[0], t_ns, dt_ns)
     consumed = receive(plan, reception, frames, 0, count, inputs[0])
     end_cycle(inputs[0], reception.freshness)
-    late = foreign = 0
+    late = foreign = beside = 0
+    heard_in = -1
     for i in range(consumed):
         if frames[i].stamp_ns <= previous_t_ns:
             late += 1
@@ -246,7 +250,11 @@ def _gather(
         for own in own_ids:
             if own == identifier:
                 foreign += 1
-    return consumed, late, foreign
+                period = (t_ns - frames[i].stamp_ns) // CYCLE_NS
+                if period != heard_in:
+                    heard_in = period
+                    beside += 1
+    return consumed, late, foreign, beside
 
 
 @kernel

@@ -7,7 +7,8 @@ must have heard a first daemon, so two started together do not race; without one
 per bus: two of them would take over together.
 
 When a sending daemon hears another sender of its frames, precedence decides (`Claim`): a newcomer yields and
-continues as a standby, an established one stays. Reasons: docs/safety.md.
+continues as a standby, an established one stays. One that stood still while another spoke yields before it
+sends. Reasons: docs/safety.md.
 
 The alive counters continue from those of the first one, so that receivers see one sequence. Learned values
 are read from the first one's ring at the start, if it runs on this machine; afterwards the own estimate
@@ -38,7 +39,8 @@ SPREAD_CYCLES: Final = 16
 NEWCOMER_CYCLES: Final = 200
 """After two seconds of sending a daemon is established: a new one has heard it, and refused."""
 BESIDE_CYCLES: Final = 10
-"""Least duration of another sender: a standby falls silent after one cycle, delayed frames come in one."""
+"""Least duration of another sender, missed periods among them: a standby falls silent after one cycle, delayed
+frames come in one."""
 
 
 class Claim:
@@ -47,13 +49,15 @@ class Claim:
     def __init__(self) -> None:
         self._spoken = self._beside = 0
 
-    def is_lost(self, foreign: int, missed: int) -> bool:
-        """Add a cycle with `foreign` frames of our identifiers, after `missed` periods."""
+    def is_lost(self, beside: int, missed: int) -> bool:
+        """Add a cycle after `missed` periods; in `beside` of all these frames of our identifiers came."""
         if missed * CYCLE_NS >= SILENCE_NS:  # receivers missed us: a take-over was legitimate
             self._spoken = 0
         self._spoken += 1
-        self._beside = self._beside + 1 if foreign else max(0, self._beside - 1)
-        return self._beside == BESIDE_CYCLES and self._spoken <= NEWCOMER_CYCLES + BESIDE_CYCLES
+        before = self._beside
+        self._beside = before + min(beside, missed + 1) if beside else max(0, before - 1)
+        newcomer = self._spoken <= NEWCOMER_CYCLES + BESIDE_CYCLES
+        return newcomer and before < BESIDE_CYCLES <= self._beside
 
 
 class Standby:

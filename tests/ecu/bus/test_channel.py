@@ -96,6 +96,15 @@ def test_stamps_are_whole_microseconds_and_one_of_another_origin_is_replaced():
     assert frames["stamp_ns"][1] > (now - 1) * 1e9
 
 
+@pytest.mark.parametrize("age_s", [0.0, 4.0, 6.0, 3600.0, -3600.0])
+def test_a_frame_that_waited_keeps_its_stamp(age_s):
+    bus, frames = ScriptedBus(), new_record(FRAME, 8)
+    stamp = time.time() - age_s
+    bus.heard = [message(0x10, timestamp=stamp)]
+    channel(bus, [0x10]).drain(frames, 0)
+    assert abs(frames["stamp_ns"][0] - stamp * 1e9) < 2000
+
+
 def test_what_does_not_fit_waits():
     bus, frames = ScriptedBus(), new_record(FRAME, 4)
     bus.heard = [message(0x10, bytes([i])) for i in range(6)]

@@ -46,6 +46,27 @@ def test_missed_periods_are_counted_and_not_made_up_for(work_ms, expected):
     assert [(tick.t_mono_ns / MS, tick.missed) for tick in ticks] == expected
 
 
+# how long [ms] each sleep lasts beyond its deadline -> (deadline [ms], missed, lateness [ms]) of these cycles
+OVERSLEPT = {
+    "in time": ([0, 0.07], [(10, 0, 0), (20, 0, 0.07)]),
+    "not a period": ([9.9, 0], [(10, 0, 9.9), (20, 0, 0)]),
+    "just one period": ([10, 0], [(20, 1, 10), (30, 0, 0)]),
+    "stopped for half a second": ([503, 0, 0], [(510, 50, 503), (520, 0, 0), (530, 0, 0)]),
+    "twice in a row": ([25, 14, 0], [(30, 2, 25), (50, 1, 14), (60, 0, 0)]),
+}
+
+
+@pytest.mark.parametrize(("late_ms", "expected"), OVERSLEPT.values(), ids=OVERSLEPT)
+def test_a_sleep_that_lasted_too_long_ends_at_the_deadline_before_the_waking(late_ms, expected):
+    time = FakeTime()
+    grid = Grid(time.source())
+    ticks = []
+    for late in late_ms:
+        time.late_ns = round(late * MS)
+        ticks.append(grid.wait())
+    assert [(tick.t_mono_ns / MS, tick.missed, tick.lateness_ns / MS) for tick in ticks] == expected
+
+
 def test_lateness_is_from_the_deadline():
     grid = Grid(FakeTime(late_ns=70_000).source())
     assert [grid.wait().lateness_ns for _ in range(3)] == [70_000] * 3

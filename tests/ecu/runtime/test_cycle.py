@@ -1,6 +1,7 @@
 """The cycle on a bus and a clock of the test's own."""
 
 import gc
+import random
 import sys
 from pathlib import Path
 
@@ -29,16 +30,19 @@ FINE = BusStatus(False, False, 0, 0)
 
 
 class Bench:
-    """An ECU, a vehicle that sends all its frames each period, and a clock that only sleeping moves."""
+    """An ECU, a vehicle that sends all its frames 1 ms before each deadline, and a clock of its own."""
 
     def __init__(self, folder: Path) -> None:
         self.now_ns, self.offset_ns = 0, EPOCH_NS
+        self.next_ns = CYCLE_NS - MS
+        self.oversleeps_ns = self.stopped_ns = 0
         self.name, self.line, self.sent, self.pending = "bench", FINE, [], []
         self.plan = contract_transmit_plan(DBC, "Vehicle")
         self.counters, self.buffer = new_transmission(self.plan), frame_buffer(self.plan)
         self.values = np.zeros(N_INPUTS)
         self.values[INPUT["hydraulic_ready"]] = self.values[INPUT["decel_demand_valid"]] = 1
         self.values[INPUT["accumulator_pressure"]] = 160
+        self.then = {}
         self.periods = 0
         self.grid = Grid(TimeSource(lambda: self.now_ns, lambda: self.now_ns + self.offset_ns, self.sleep))
         params = new_params(load_config(ROOT / "config" / "suv.toml"))
@@ -51,18 +55,32 @@ class Bench:
         self.speaks = True
 
     def sleep(self, until_ns: int) -> None:
+        self.pass_time(until_ns)
+        self.values[list(self.then)] = list(self.then.values())
+        self.pass_time(until_ns + self.oversleeps_ns)
+        self.oversleeps_ns = 0
+
+    def oversleep(self, ms: float, **then: float) -> None:
+        """Let the next sleep last longer; behind its deadline the vehicle sends the inputs `then`."""
+        self.oversleeps_ns, self.then = round(ms * MS), {INPUT[name]: then[name] for name in then}
+
+    def pass_time(self, until_ns: int) -> None:
+        while self.speaks and self.next_ns <= until_ns:
+            self.vehicle(self.next_ns)
+            self.next_ns += CYCLE_NS
         self.now_ns = until_ns
 
-    def vehicle(self) -> None:
-        """Put this period's frames on the wire, the last of them 1 ms before now."""
+    def vehicle(self, at_ns: int | None = None) -> None:
+        """Put a period's frames on the wire; without an instant 1 ms before now."""
         count = transmit(self.plan, self.counters, self.values, self.periods, self.buffer)
         self.periods += 1
-        self.buffer["stamp_ns"] = self.now_ns + self.offset_ns - MS
-        self.pending.append((self.buffer, count))
+        self.buffer["stamp_ns"] = (self.now_ns - MS if at_ns is None else at_ns) + self.offset_ns
+        self.pending.append((self.buffer.copy(), count))
 
     def drain(self, frames, start):
-        if self.speaks:
-            self.vehicle()
+        self.sent = []
+        self.pass_time(self.now_ns + self.stopped_ns)
+        self.stopped_ns = 0
         count = 0
         for buffer, length in self.pending:
             frames[start + count : start + count + length] = buffer[:length]
@@ -144,6 +162,77 @@ def test_after_missed_periods_one_step_covers_them_all(bench):
     assert bench.ecu.inputs["dt_ns"][0] == 4 * CYCLE_NS
     assert bench.faults() == faults.LATE
     assert bench.run()["missed"] == 0
+
+
+@pytest.fixture
+def braking(bench):
+    """A bench whose armed ECU follows 3 m/s2 of a car that drives."""
+    bench.ecu.params["transmit"] = 1
+    bench.values[INPUT["decel_demand"]] = 3.0
+    bench.values[INPUT["wheel_speed_fl"] : INPUT["wheel_speed_fl"] + 4] = 60.0
+    bench.run(150)
+    assert bench.ecu.outputs["pressure_demand_valid"][0] == 1
+    assert (bench.ecu.outputs["pressure_demand"] > 5).all()
+    return bench
+
+
+STILL_MS = [10, 50, 503, 5000, 10_000]
+
+
+@pytest.mark.parametrize("still_ms", STILL_MS)
+def test_the_first_demand_after_standing_still_is_what_is_asked_then(braking, still_ms):
+    braking.oversleep(still_ms, decel_demand=0.0)
+    cycle = braking.run()
+    assert braking.sent[0] == braking.ecu.transmit_plan.ids[0]
+    assert (braking.ecu.outputs["pressure_demand"] == 0).all()
+    assert cycle["missed"] == still_ms // 10
+    assert braking.ecu.inputs["dt_ns"][0] == (still_ms // 10 + 1) * CYCLE_NS
+
+
+@pytest.mark.parametrize("still_ms", [30, 503, 5000, 10_000])
+def test_what_was_computed_before_the_process_stood_still_is_not_sent(braking, still_ms):
+    braking.stopped_ns = still_ms * MS  # behind its waking
+    braking.run()
+    assert braking.sent == []
+    braking.values[INPUT["decel_demand"]] = 0.0
+    braking.run()
+    assert braking.sent[0] == braking.ecu.transmit_plan.ids[0]
+    assert (braking.ecu.outputs["pressure_demand"] == 0).all()
+
+
+def test_a_cycle_that_only_lasts_long_is_sent(braking):
+    for _ in range(10):
+        braking.stopped_ns = 25 * MS
+        braking.run()
+        assert braking.sent[0] == braking.ecu.transmit_plan.ids[0]
+
+
+def test_a_silent_sender_s_last_demand_is_not_used_after_standing_still(braking):
+    braking.speaks = False
+    braking.oversleep(503)
+    braking.run()
+    assert (braking.ecu.outputs["pressure_demand"] == 0).all()
+    assert braking.ecu.outputs["pressure_demand_valid"][0] == 0
+
+
+def test_a_cycle_consumes_the_frames_up_to_its_deadline_however_often_the_process_stands_still(bench):
+    draw = random.Random(4)
+    stamps, ends, t_ns = [], [], EPOCH_NS
+    for _ in range(300):
+        if draw.random() < 0.2:
+            bench.oversleep(draw.uniform(0, 80))
+        if draw.random() < 0.2:
+            bench.stopped_ns = round(draw.uniform(0, 80) * MS)
+        cycle = bench.run()
+        t_ns += (int(cycle["missed"]) + 1) * CYCLE_NS
+        assert cycle["t_ns"] == t_ns
+        assert bench.ecu.inputs["dt_ns"][0] == (cycle["missed"] + 1) * CYCLE_NS
+        stamps += bench.reader.read().frames["stamp_ns"].tolist()
+        ends.append((t_ns, len(stamps)))
+        assert cycle["late_frames"] == 0
+    assert [np.searchsorted(stamps, t_ns, "right") for t_ns, _ in ends] == [count for _, count in ends]
+    assert stamps[-1] > ends[-1][0] - CYCLE_NS
+    assert bench.progress.overruns > 100
 
 
 def test_a_clock_set_back_holds_no_frame_back(bench):

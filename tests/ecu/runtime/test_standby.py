@@ -124,8 +124,39 @@ def test_one_goes_on_counting_where_the_other_stopped(tmp_path):
     assert len(second[1].sent) == before
 
 
+@pytest.mark.parametrize("still_cycles", [20, 500])
+def test_one_that_stood_still_while_the_standby_spoke_says_nothing_any_more(tmp_path, still_cycles):
+    now = [0]
+    clock = TimeSource(lambda: now[0], lambda: now[0], lambda until_ns: now.__setitem__(0, until_ns))
+    first, second = unit(tmp_path / "1", clock), unit(tmp_path / "2", clock, Standby())
+    first[1].other, second[1].other = second[1], first[1]
+
+    def cycle(number, *units):
+        for ecu, wire, ring, grid, progress in units:
+            now[0] = number * CYCLE_NS - MS
+            cycle_once(ecu, wire, ring, grid, progress)
+            for frame in wire.other.waiting:
+                frame["stamp_ns"] = frame["stamp_ns"] or now[0]
+
+    for number in range(1, 300):
+        cycle(number, first, second)
+    said = len(first[1].sent)
+    for number in range(300, 300 + still_cycles):
+        cycle(number, second)
+    assert second[4].speaks
+    for number in range(300 + still_cycles, 320 + still_cycles):
+        before = len(second[1].sent)
+        cycle(number, first, second)
+        assert len(second[1].sent) > before
+    assert len(first[1].sent) == said
+    assert not first[4].speaks
+
+
 def yields_after(foreign, missed=(), cycles=2000):
-    """Return in which cycle a daemon yields that hears another one in the cycles `foreign`; None: never."""
+    """Return in which cycle a daemon yields that hears another one in the cycles `foreign`; None: never.
+
+    Each cycle of `missed` comes after a gap of 0.3 s.
+    """
     claim = Claim()
     for cycle in range(cycles):
         if claim.is_lost(int(cycle in foreign), 30 if cycle in missed else 0):
@@ -150,6 +181,24 @@ CLAIMS = {
 @pytest.mark.parametrize(("foreign", "missed", "cycle"), CLAIMS.values(), ids=CLAIMS)
 def test_who_spoke_first_goes_on_and_a_newcomer_yields(foreign, missed, cycle):
     assert yields_after(foreign, missed) == cycle
+
+
+# (periods in which another sender was heard, periods missed) in a cycle after 1000 -> whether it yields in it
+HELD_UP = {
+    "nobody spoke": ((0, 499), False),
+    "a standby took over": ((494, 499), True),
+    "a standby took over just now": ((9, 14), False),  # it falls silent at our first frame
+    "a standby has spoken for 0.1 s": ((10, 14), True),
+    "frames of long ago came in at once": ((20, 0), False),
+    "no gap that receivers notice": ((4, 4), False),
+}
+
+
+@pytest.mark.parametrize(("cycle", "yields"), HELD_UP.values(), ids=HELD_UP)
+def test_one_that_stood_still_while_another_spoke_yields_at_once(cycle, yields):
+    claim = Claim()
+    assert not any(claim.is_lost(0, 0) for _ in range(1000))
+    assert claim.is_lost(*cycle) is yields
 
 
 @pytest.mark.parametrize("apart", [0, 1, 7, 50])
