@@ -39,8 +39,8 @@ SPREAD_CYCLES: Final = 16
 NEWCOMER_CYCLES: Final = 200
 """After two seconds of sending a daemon is established: a new one has heard it, and refused."""
 BESIDE_CYCLES: Final = 10
-"""Least duration of another sender, missed periods among them: a standby falls silent after one cycle, delayed
-frames come in one."""
+"""Least duration of another sender, missed periods among them: a standby falls silent after one cycle,
+delayed frames come in one."""
 
 
 class Claim:

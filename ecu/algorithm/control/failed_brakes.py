@@ -62,7 +62,7 @@ longitudinal grip, and some 20 degrees at the steering wheel."""
 
 
 @kernel
-def _owed_force(params: Record, law: Record, pressure: float, i: int) -> float:
+def lining_force(params: Record, law: Record, pressure: float, i: int) -> float:
     """Return the force [N] of a wheel's lining at a pressure [bar]."""
     lever: float = brake_gain(params, i) / params.wheel_radius[i]
     return lever * law.base[i] * max(BAR * pressure - params.push_out_pressure[i], 0.0)
@@ -89,7 +89,7 @@ def watch_brakes(
         estimate: `ESTIMATE` of the last cycle.
         law: `PRESSURE_LAW_STATE`, for the friction.
         expected: pressures that follow from the demands sent, shape (4,) [bar].
-        zero: pressure zeros, shape (4,) [bar].
+        zero: pressure zeros, shape (4,) [bar]; NaN: the reading shows no failure.
         sent: the demands were valid; otherwise, and while another controller brakes, nothing is judged.
         dt: time since the last cycle [s].
     """
@@ -98,7 +98,7 @@ def watch_brakes(
     given = -estimate.tyre_force - params.rolling_resistance * weight
     due, total, suspected, braked = 0.0, 0.0, 0.0, False
     for i in range(4):
-        force = _owed_force(params, law, expected[i], i)
+        force = lining_force(params, law, expected[i], i)
         state.owed[i] += gain * (force - state.owed[i])
         given -= motor_torque(inputs, i) / params.wheel_radius[i]
         due += force
@@ -131,7 +131,8 @@ def watch_brakes(
 @kernel
 def _lacks(inputs: Record, expected: float, zero: float, i: int) -> bool:
     reading = inputs.value[CALLIPER_PRESSURE + i] - zero
-    return expected > LEAST and usable(inputs, CALLIPER_PRESSURE + i) and reading < FOLLOWING * expected
+    below = -LEAST < reading < FOLLOWING * expected  # a brake that gives nothing reads no suction
+    return expected > LEAST and usable(inputs, CALLIPER_PRESSURE + i) and below
 
 
 @kernel

@@ -1,0 +1,158 @@
+"""Calliper pressures beside those that follow from the demands sent (`ecu.algorithm.hydraulics`).
+
+While the ECU's demands are executed, each pressure is known twice. Of the two the demand is what counts for
+the force: friction learned as force over demanded pressure gives the demanded force whatever the pressure
+really is. So a difference that lasts is taken out of the reading,
+
+    reading = zero + (1 + ratio) model + offset        offset: at released brakes, ratio: at applied ones
+
+but for a tolerance within which a sound reading is better than the model; quick changes remain the sensor's.
+Beyond `OFFSET` or `RATIO`, and at once where the reading is far off, the modelled pressure stands for it.
+
+A pressure may really be another: a circuit leaks, someone else brakes, nobody follows the demand. Where the
+readings make a clear difference to the force, the car's deceleration (4.16) decides: if it agrees with the
+readings, they are believed. A brake that gives nothing is `failed_brakes`' to find.
+"""
+
+import math
+
+import numpy as np
+
+from ecu.algorithm.control.failed_brakes import LAG, lining_force
+from ecu.algorithm.inputs import fresh, others_brake, usable
+from ecu.contract.params import GRAVITY
+from ecu.contract.signals import CALLIPER_PRESSURE
+from ecu.jit import Record, kernel
+
+PRESSURES_STATE = np.dtype(
+    [
+        ("offset", "f8", (4,)),  # lasting difference from the model at released brakes [bar]
+        ("ratio", "f8", (4,)),  # further one at applied brakes, over the model
+        ("rest", "f8", (4,)),  # zero; NaN: no reading of a released brake [bar]
+        ("read", "f8"),  # force of the linings by the readings [N], low-passed
+        ("honest", "u1"),  # the deceleration agrees with the readings, not with the model
+        ("doubt_s", "f8", (4,)),  # excess time for which a reading was too far off
+        ("wrong", "u1", (4,)),  # the model stands for this reading
+    ],
+    align=True,
+)
+
+APPLIED, RELEASED = 5.0, 0.5  # bar by the model
+STEADY = 20.0  # bar/s: at quicker changes lag differs more than sensors do
+LEARN_S, WEAK = 0.5, 15.0  # s, bar: at this pressure a ratio is learned half as fast
+OFFSET, RATIO = 3.0, 0.1  # bar, 1: no hydraulics and sensor that are sound differ more
+LARGEST_OFFSET, LARGEST_RATIO = 4.5, 0.15  # learned: a sensor that recovers is soon believed again
+FAR, FAR_SHARE = 8.0, 0.2  # bar, of the pressure: too far off for noise and lag
+KEPT = 0.6  # bar: averaged noise and lag; as much stays in a reading
+LEAST_FORCE, LEAST_SHARE = 0.05, 0.4  # of the weight, of the modelled force: a clear difference
+LEAST_SPEED = 1.0  # m/s: a car at standstill does not show its brakes' force
+SURE_S, DOUBT_S = 0.1, 0.3  # decided by the deceleration, and by nothing but the difference
+
+
+@kernel
+def _learn(state: Record, i: int, gap: float, model: float, dt: float) -> None:
+    """Follow the lasting difference `gap` [bar] of a wheel at a steady pressure `model` [bar]."""
+    gain = dt / LEARN_S
+    if model < RELEASED:
+        offset = state.offset[i] + gain * (gap - state.offset[i])
+        state.offset[i] = min(max(offset, -LARGEST_OFFSET), LARGEST_OFFSET)
+    elif model > APPLIED:
+        error = gap - state.offset[i] - state.ratio[i] * model
+        ratio = state.ratio[i] + gain * error * model / (model * model + WEAK * WEAK)
+        state.ratio[i] = min(max(ratio, -LARGEST_RATIO), LARGEST_RATIO)
+
+
+@kernel
+def _compare_forces(
+    params: Record,
+    state: Record,
+    inputs: Record,
+    law: Record,
+    brakes: Record,
+    model: Record,
+    zero: Record,
+    dt: float,
+) -> bool:
+    """Overwrite `state.honest`; return whether the forces by readings and by the model differ clearly."""
+    read, owed = 0.0, 0.0
+    for i in range(4):
+        place = CALLIPER_PRESSURE + i
+        pressure = inputs.value[place] - zero[i] if usable(inputs, place) else model[i]
+        read += lining_force(params, law, pressure, i)
+        owed += brakes.owed[i]
+    state.read += dt / (LAG + dt) * (read - state.read)
+    apart = abs(state.read - owed)
+    decides: bool = apart > max(LEAST_FORCE * params.mass * GRAVITY, LEAST_SHARE * owed)
+    given = brakes.given / brakes.scale
+    state.honest = 1 if decides and abs(given - state.read) < abs(given - owed) else 0
+    return decides
+
+
+@kernel
+def compare_pressures(
+    params: Record,
+    state: Record,
+    inputs: Record,
+    estimate: Record,
+    law: Record,
+    brakes: Record,
+    hydraulics: Record,
+    zero: Record,
+    sent: bool,
+    dt: float,
+) -> bool:
+    """Overwrite which readings are wrong, and what lasts of all differences; return whether one is new.
+
+    Args:
+        params: `PARAMS`.
+        state: `PRESSURES_STATE`.
+        inputs: `INPUTS` as received.
+        estimate: `ESTIMATE` of the last cycle.
+        law: `PRESSURE_LAW_STATE`, for the friction.
+        brakes: `FAILED_BRAKES_STATE` of this cycle.
+        hydraulics: `HYDRAULICS_STATE`: modelled response to the demands sent.
+        zero: pressure zeros, shape (4,) [bar].
+        sent: the demands were valid; otherwise all readings are believed.
+        dt: time since the last cycle [s].
+    """
+    model, begins = hydraulics.model, False
+    if not sent:
+        state.honest = 0
+        for i in range(4):
+            state.doubt_s[i], state.wrong[i] = 0.0, 0
+        return False
+    if others_brake(inputs):
+        return False
+    decides = _compare_forces(params, state, inputs, law, brakes, model, zero, dt)
+    shown = estimate.measured and not estimate.backwards and estimate.speed > LEAST_SPEED
+    if decides and not shown:
+        return False
+    for i in range(4):
+        place = CALLIPER_PRESSURE + i
+        if not usable(inputs, place) or brakes.failed[i]:
+            state.doubt_s[i], state.wrong[i] = 0.0, 0
+            continue
+        gap = inputs.value[place] - zero[i] - model[i]
+        if fresh(inputs, place) and not state.honest and abs(hydraulics.rate[i]) < STEADY:
+            _learn(state, i, gap, model[i], dt)
+        state.rest[i] = zero[i] if abs(state.offset[i]) < OFFSET else math.nan
+        far = abs(gap) > FAR + FAR_SHARE * model[i]
+        doubted = far or abs(state.offset[i]) > OFFSET or abs(state.ratio[i]) > RATIO
+        if doubted and not state.honest:
+            state.doubt_s[i] = min(state.doubt_s[i] + dt, 2.0 * DOUBT_S)
+        else:
+            state.doubt_s[i] = max(state.doubt_s[i] - dt, 0.0)
+        if state.doubt_s[i] > (SURE_S if decides else DOUBT_S):
+            begins = begins or not state.wrong[i]
+            state.wrong[i] = 1
+        elif state.doubt_s[i] == 0.0:
+            state.wrong[i] = 0
+    return begins
+
+
+@kernel
+def lasting_difference(state: Record, i: int, model: float, variance: float) -> float:
+    """Return what is taken out of a reading at a modelled pressure [bar]; `variance` of its zero [bar^2]."""
+    lasting: float = state.offset[i] + state.ratio[i] * model
+    kept = KEPT * KEPT + 9.0 * variance
+    return lasting - kept / lasting if lasting * lasting > kept else 0.0
