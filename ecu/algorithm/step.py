@@ -84,7 +84,9 @@ from ecu.algorithm.monitoring.disc_temperature import (
 )
 from ecu.algorithm.monitoring.dust import DUST_STATE, restore_dust, update_dust
 from ecu.algorithm.monitoring.flags import FLAGS_STATE, correct_flags
+from ecu.algorithm.monitoring.motors import MOTORS_WATCH_STATE
 from ecu.algorithm.monitoring.plausibility import PLAUSIBILITY_STATE
+from ecu.algorithm.monitoring.pressures import PRESSURES_STATE
 from ecu.algorithm.monitoring.sensors import mask_implausible, watch_sensors
 from ecu.algorithm.monitoring.speeds import SPEEDS_STATE
 from ecu.algorithm.monitoring.turning import TURNING_STATE
@@ -133,9 +135,11 @@ INITIAL = np.dtype(
         ("guard", SLIP_GUARD_STATE),
         ("limiter", LIMITER_STATE),
         ("plausibility", PLAUSIBILITY_STATE),
+        ("pressures", PRESSURES_STATE),
         ("flags", FLAGS_STATE),
         ("accel_error", ACCEL_ERROR_STATE),
         ("witness", WITNESS_STATE),
+        ("motors", MOTORS_WATCH_STATE),
         ("turning", TURNING_STATE),
         ("speeds", SPEEDS_STATE),
         ("acceleration", ACCELERATION_STATE),

@@ -5,8 +5,8 @@
 
 of the blocks of 0.1 s that `acceleration.py` gathers. The first is a Kalman filter of two states: a slope
 does not come and go with the brakes. An error beyond its doubt is taken off the reading; one within is left
-to the observer. A reading that is off by more than `GROSS`
-is not followed: it is implausible as a whole.
+to the observer. A zero b that c does not show is no zero of the accelerometer (`motors.py`). A reading that
+is off by more than `GROSS` is not followed: it is implausible as a whole.
 """
 
 import math
@@ -26,7 +26,7 @@ ACCEL_ERROR_STATE = np.dtype(
         ("p", "f8", (3,)),  # variances of both, covariance
         ("zero", "f8"),  # b [m/s^2]
         ("coasted_s", "f8"),  # learning time of that, at most `ZERO_S`
-        ("proven_s", "f8"),  # time for which the motors' torques alone have driven the car
+        ("proven_s", "f8"),  # time for which the motors' torques alone have driven the car, at most `SURE_S`
         ("zero_off", "f8"),  # taken off the reading [m/s^2]
         ("scale_off", "f8"),  # of it
         ("reading", "f8"),  # last sample [m/s^2]
@@ -49,7 +49,9 @@ FORCE = 0.1  # relative error of mass and motors
 WEIGHT = 0.15  # m/s^2, error of drag and rolling resistance
 SCALE_DOUBT, SIGMAS = 0.03, 1.0
 ZERO_DOUBT = 0.25  # m/s^2
-PROVING, ENGINE, PROVEN_S = 1.0, 0.2, 0.5  # m/s^2; of it, what an unreported engine exceeds; s
+PROVING, ENGINE = 1.0, 0.2  # m/s^2; of it, what an unreported engine exceeds
+PROVEN_S, SURE_S, REFUTES = 0.5, 3.0, 5.0  # s, s; times as fast as it is proven
+CONFIRMED = 0.5  # of the zero, what the wheels must show of it too
 KEPT = 0.4
 SAME_S = 0.6  # the blocks whose deceleration is compared
 CHANGED = 1.0  # m/s^2, of the wheels' deceleration meanwhile
@@ -98,8 +100,11 @@ def _follow_zero(params: Record, state: Record, mean: Record) -> None:
     resistance = params.drag_area * speed * speed / params.mass + params.rolling_resistance * GRAVITY
     innovation = mean[0, A] - mean[0, F] + resistance - state.zero
     if mean[0, F] > PROVING:
-        proves = abs(innovation) < ENGINE * mean[0, F] + ZERO_DOUBT
-        state.proven_s = min(state.proven_s + BLOCK_S, PROVEN_S) if proves else 0.0
+        engine = ENGINE * mean[0, F] + ZERO_DOUBT
+        if abs(innovation) < engine:
+            state.proven_s = min(state.proven_s + BLOCK_S, SURE_S)
+        elif innovation > engine:
+            state.proven_s = max(state.proven_s - REFUTES * BLOCK_S, 0.0)
     if abs(innovation) > GROSS or state.proven_s < PROVEN_S:
         return
     certainty = (WEIGHT / (WEIGHT + FORCE * abs(mean[0, F]))) ** 2
@@ -127,7 +132,8 @@ def follow_accel_error(params: Record, state: Record, blocks: Record, across: fl
         _follow_zero(params, state, blocks.mean)
     state.scale_off = _off(state.scale, SCALE_DOUBT + SIGMAS * math.sqrt(state.p[1]), state.scale_off)
     if state.coasted_s > FEWEST_S:
-        state.zero_off = _off(state.zero, ZERO_DOUBT, state.zero_off)
+        confirmed = state.offset / state.zero > CONFIRMED if state.zero != 0.0 else False
+        state.zero_off = _off(state.zero, ZERO_DOUBT, state.zero_off) if confirmed else 0.0
 
 
 @kernel

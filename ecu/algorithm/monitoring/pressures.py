@@ -43,7 +43,7 @@ LEARN_S, WEAK = 0.5, 15.0  # s, bar: at this pressure a ratio is learned half as
 OFFSET, RATIO = 3.0, 0.1  # bar, 1: no hydraulics and sensor that are sound differ more
 LARGEST_OFFSET, LARGEST_RATIO = 4.5, 0.15  # learned: a sensor that recovers is soon believed again
 FAR, FAR_SHARE = 8.0, 0.2  # bar, of the pressure: too far off for noise and lag
-KEPT = 0.6  # bar: averaged noise and lag; as much stays in a reading
+KEPT, KEPT_SHARE = 0.6, 0.025  # bar, of the model: so much stays in a reading, of which it is the better one
 LEAST_FORCE, LEAST_SHARE = 0.05, 0.4  # of the weight, of the modelled force: a clear difference
 LEAST_SPEED = 1.0  # m/s: a car at standstill does not show its brakes' force
 SURE_S, DOUBT_S = 0.1, 0.3  # decided by the deceleration, and by nothing but the difference
@@ -151,8 +151,8 @@ def compare_pressures(
 
 
 @kernel
-def lasting_difference(state: Record, i: int, model: float, variance: float) -> float:
-    """Return what is taken out of a reading at a modelled pressure [bar]; `variance` of its zero [bar^2]."""
+def lasting_difference(state: Record, i: int, model: float) -> float:
+    """Return what is taken out of a reading at a modelled pressure [bar]."""
     lasting: float = state.offset[i] + state.ratio[i] * model
-    kept = KEPT * KEPT + 9.0 * variance
+    kept = KEPT**2 + (KEPT_SHARE * model) ** 2
     return lasting - kept / lasting if lasting * lasting > kept else 0.0

@@ -5,9 +5,17 @@ estimation, by the estimate of the last cycle.
 """
 
 from ecu.algorithm.control.failed_brakes import watch_brakes
-from ecu.algorithm.monitoring.accel_error import correct_accel, follow_accel_error, watch_frozen
+from ecu.algorithm.inputs import driver_accelerates, others_brake, usable
+from ecu.algorithm.monitoring.accel_error import (
+    PROVEN_S,
+    correct_accel,
+    follow_accel_error,
+    watch_frozen,
+)
 from ecu.algorithm.monitoring.acceleration import watch_acceleration
+from ecu.algorithm.monitoring.motors import compare_motors, watch_motors
 from ecu.algorithm.monitoring.plausibility import watch_pressures, watch_wheels, wheel_speed_implausible
+from ecu.algorithm.monitoring.pressures import DOUBT_S, compare_pressures, lasting_difference
 from ecu.algorithm.monitoring.speeds import watch_speeds
 from ecu.algorithm.monitoring.turning import watch_turning
 from ecu.algorithm.monitoring.witness import rejected_faults
@@ -18,10 +26,11 @@ from ecu.contract.faults import (
     PRESSURE_NOT_FOLLOWING,
     WHEEL_SPEED_IMPLAUSIBLE,
 )
-from ecu.contract.signals import ACCEL_X, CALLIPER_PRESSURE, N_INPUTS, WHEEL_SPEED
+from ecu.contract.signals import ACCEL_X, CALLIPER_PRESSURE, MOTOR_TORQUE, N_INPUTS, WHEEL_SPEED
 from ecu.jit import Record, kernel
 
 ACCEL_X_DRIFTED = IMPLAUSIBLE["accel_x"]
+PRESSURE_IMPLAUSIBLE = IMPLAUSIBLE["calliper_pressure_fl"]
 LEFT_OUT_S = 0.03  # duration of a pressure's deviation from its demand
 
 
@@ -46,6 +55,11 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
             follow_accel_error(p, s.accel_error, s.acceleration, estimate.accel_y, s.application.braking != 0)
         if s.accel_error.zero_off != 0.0 or s.accel_error.scale_off != 0.0:
             faults |= ACCEL_X_DRIFTED
+        if s.accel_error.proven_s > PROVEN_S:
+            base, offset = s.control.base, s.accel_error.offset
+            watch_motors(p, s.motors, s.witness, u, estimate, base, offset, dt)
+        if s.application.braking and s.plausibility.sent and not (driver_accelerates(u) or others_brake(u)):
+            compare_motors(p, s.motors, s.witness, u, s.blending, dt)
         watch_turning(p, s.turning, s.witness, u, estimate.speed, dt)
         watch_speeds(p, s.speeds, s.witness, u, estimate, dt)
         faults |= rejected_faults(s.witness)
@@ -59,13 +73,20 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
         faults |= PRESSURE_NOT_FOLLOWING
     failed = s.failed_brakes.any != 0
     watch_brakes(
-        p, s.failed_brakes, u, estimate, s.control, s.hydraulics.model, estimate.pressure_zero,
+        p, s.failed_brakes, u, estimate, s.control, s.hydraulics.model, s.pressures.rest,
         s.plausibility.sent != 0, dt,
     )  # fmt: skip
     fails = s.failed_brakes.any != 0 and not failed
     if s.failed_brakes.any:
         faults |= BRAKE_FAILED
-    return faults, begins or fails
+    contradicted = compare_pressures(
+        p, s.pressures, u, estimate, s.control, s.failed_brakes, s.hydraulics, estimate.pressure_zero,
+        s.plausibility.sent != 0, dt,
+    )  # fmt: skip
+    for i in range(4):
+        if s.pressures.doubt_s[i] > DOUBT_S:
+            faults |= PRESSURE_IMPLAUSIBLE << i
+    return faults, begins or fails or contradicted
 
 
 @kernel
@@ -75,13 +96,30 @@ def mask_implausible(p: Record, s: Record, u: Record) -> None:
     for place in range(N_INPUTS):
         if s.witness.rejected[place]:
             _distrust(u, place)
+    for i in range(4):
+        if s.witness.rejected[MOTOR_TORQUE + i] and s.application.braking:
+            u.value[MOTOR_TORQUE + i] = s.blending.asked[0, i]
     if s.acceleration.implausible or abs(u.value[ACCEL_X]) > p.accel_range:
         _distrust(u, ACCEL_X)
     for i in range(4):
         if s.plausibility.fell[i]:
             _distrust(u, WHEEL_SPEED + i)
-        if s.plausibility.apart_s[i] > LEFT_OUT_S and not s.failed_brakes.failed[i]:
-            _distrust(u, CALLIPER_PRESSURE + i)
+        _mask_pressure(s, u, i, others_brake(u))
+
+
+@kernel
+def _mask_pressure(s: Record, u: Record, i: int, others: bool) -> None:
+    """Overwrite a pressure by the model's where it is wrong, less what lasts where it is not."""
+    place, model = CALLIPER_PRESSURE + i, s.hydraulics.model[i]
+    if not s.plausibility.sent or s.failed_brakes.failed[i] or not usable(u, place):
+        return
+    if others:
+        if s.pressures.wrong[i]:
+            _distrust(u, place)
+    elif s.pressures.wrong[i] or s.plausibility.apart_s[i] > LEFT_OUT_S:
+        u.value[place] = model + s.estimate.pressure_zero[i]
+    elif not s.pressures.honest:
+        u.value[place] -= lasting_difference(s.pressures, i, model)
 
 
 @kernel

@@ -5,9 +5,9 @@
     steering    v delta / L (1 ... 0.4)                                  understeer, any vehicle
     wheels      (v_right - v_left) / track, of either axle               slip, radii
 
-Two witnesses support each other where they differ by less than both their tolerances. One that has less
-support than the best supported one is judged by its distance from the mean of those: it takes two witnesses
-to contradict one, and no wheel is judged here.
+Each is an interval, its tolerance to both sides. The turning is the interval that most of them contain
+(K. Marzullo, Maintaining the Time in a Distributed System, 1984); one of the three inputs that lies outside
+contradicts the others, if they are two or more. No wheel is judged here.
 """
 
 import math
@@ -51,13 +51,23 @@ def _difference(params: Record, inputs: Record, left: int) -> float:
 
 
 @kernel
-def _support(state: Record, i: int) -> int:
-    """Return how many witnesses, itself included, are within their tolerances of one; 0: silent."""
-    count = 0
-    for j in range(WITNESSES):
-        if abs(state.rate[i] - state.rate[j]) < state.tolerance[i] + state.tolerance[j]:
-            count += 1
-    return count
+def _agreement(state: Record) -> tuple[int, float, float]:
+    """Return how many witnesses agree at most, and the ends of the interval in which they do [rad/s].
+
+    Between two such intervals nobody is contradicted: they are taken for one.
+    """
+    best, low, high = 0, math.inf, -math.inf
+    for i in range(WITNESSES):
+        begins, ends, count = state.rate[i] - state.tolerance[i], math.inf, 0
+        for j in range(WITNESSES):
+            if abs(state.rate[j] - begins) <= state.tolerance[j] * (1.0 + 1e-12):
+                count += 1
+                ends = min(ends, state.rate[j] + state.tolerance[j])
+        if count > best:
+            best, low, high = count, begins, ends
+        elif count == best and count > 0:
+            low, high = min(low, begins), max(high, ends)
+    return best, low, high
 
 
 @kernel
@@ -87,18 +97,11 @@ def watch_turning(
     for axle in range(2):
         known = usable(inputs, WHEEL_SPEED + 2 * axle) and usable(inputs, WHEEL_SPEED + 2 * axle + 1)
         _set(state, FRONT + axle, known, _difference(params, inputs, 2 * axle), turns)
-    best = 0
-    for i in range(WITNESSES):
-        best = max(best, _support(state, i))
-    mean, width, count = 0.0, 0.0, 0
-    for i in range(WITNESSES):
-        if _support(state, i) == best:
-            mean, count = mean + state.rate[i], count + 1
-            width = state.tolerance[i] if count == 1 else min(width, state.tolerance[i])
+    agreed, low, high = _agreement(state)
+    if agreed < 2:
+        return
     for i in range(FRONT):
-        if count < 2 or math.isnan(state.rate[i]):
-            continue
-        apart = 0.0 if _support(state, i) == best else state.rate[i] - mean / count
+        apart = state.rate[i] - 0.5 * (low + high)
         place = YAW_RATE if i == YAW else ACCEL_Y if i == ACROSS else STEERING_ANGLE
         unit = 1.0 if i == YAW else speed if i == ACROSS else params.wheelbase / speed
-        judge(witness, place, apart * unit, (state.tolerance[i] + width) * unit, DOUBT_S, dt)
+        judge(witness, place, apart * unit, (state.tolerance[i] + 0.5 * (high - low)) * unit, DOUBT_S, dt)

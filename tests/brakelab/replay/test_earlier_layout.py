@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 from brakelab.replay.earlier_layout import convert_initial
-from ecu.algorithm.step import INITIAL
+from ecu.algorithm.step import INITIAL, initial_part, new_state
+from ecu.contract.records import RecordArray
+from ecu.settings.config import load_config, new_params
+from ecu.settings.resources import resource
 
 PRESSURES = np.dtype([("model", "f8", (4,)), ("value", "f8", (4,))])  # of the observer alone
 
@@ -25,8 +28,16 @@ def earlier(without: str = "") -> np.dtype:
             part = np.dtype(
                 [(field, part[field]) for field in part.names if field not in ("automated", "gap_s")]
             )
+        if name == "distribution":
+            part = np.dtype([(field, part[field]) for field in part.names if field not in ("grip", "rolled")])
+        if name in ("flags", "witness"):
+            continue
         parts.append(("friction_torque" if name == "hydraulics" else name, part))
     return np.dtype([part for part in parts if part[0] != without], align=True)
+
+
+def started() -> RecordArray:
+    return initial_part(new_state(new_params(load_config(resource("config/suv.toml")))))
 
 
 def test_every_state_goes_on_under_its_present_name() -> None:
@@ -34,17 +45,19 @@ def test_every_state_goes_on_under_its_present_name() -> None:
     old["friction_torque"]["value"], old["friction_torque"]["agreed_s"] = [1.0, 2.0, 3.0, 4.0], 0.5
     old["joint"]["x"], old["joint"]["zero"]["value"] = np.arange(old["joint"]["x"].shape[1]), 0.7
     old["learned"] = np.frombuffer(bytes(range(1, 256)) * 40, old["learned"].dtype, 1)
-    new = convert_initial(old)
+    new = convert_initial(old, started())
     assert new.dtype == INITIAL
     assert new["hydraulics"]["value"].tolist() == [[1.0, 2.0, 3.0, 4.0]]
     assert new["hydraulics"]["agreed_s"].tolist() == [[0.5] * 4]
     assert new["joint"]["zero"]["value"].tolist() == [[0.7] * 4]
     np.testing.assert_array_equal(new["joint"]["x"], old["joint"]["x"])
     assert new["learned"].tobytes() == old["learned"].tobytes()
+    assert (new["distribution"]["rolled"] == 1.0).all()
+    assert np.isnan(new["flags"]["last"])
     assert not new["joint"]["follows"].any()
     assert not new["application"]["shown"].any()
 
 
 @pytest.mark.parametrize("part", ["friction_torque", "joint", "limiter"])
 def test_a_state_that_lacks_a_part_is_not_converted(part: str) -> None:
-    assert convert_initial(np.zeros(1, earlier(without=part))) is None
+    assert convert_initial(np.zeros(1, earlier(without=part)), started()) is None

@@ -13,13 +13,14 @@ from brakelab.simulation.outages import START_UP
 from brakelab.simulation.scenario import load_scenario
 from ecu.contract import faults as bits
 from ecu.contract.records import FRAME, new_record
-from ecu.contract.signals import CORNERS, DEGRADED, FAULT, OBSERVING
+from ecu.contract.signals import CORNERS, DEGRADED, OBSERVING
 from ecu.errors import UserError
 from ecu.settings.config import load_config
 from ecu.settings.resources import resource
 
 ROOT = Path(__file__).parents[3]
 CONFIG = load_config(ROOT / "config" / "suv.toml")
+PRESSURE_FL = bits.PRESSURE_NOT_FOLLOWING | bits.IMPLAUSIBLE["calliper_pressure_fl"]
 
 
 def identifier(name: str) -> int:
@@ -118,8 +119,7 @@ def decel_of(drive: Drive, within: Any) -> float:
 
 
 def raised(drive: Drive, begin: float, end: float) -> int:
-    masks = np.nan_to_num(drive.outputs["active_faults"][rows(drive, begin, end)]).astype(int)
-    return int(np.bitwise_or.reduce(masks))
+    return int(np.bitwise_or.reduce(bits.fault_mask(drive.outputs)[rows(drive, begin, end)]))
 
 
 @pytest.mark.parametrize(
@@ -222,7 +222,7 @@ def test_a_wheel_speed_lies_as_asked_and_no_longer(tmp_path: Path, fault: str, e
         ("accel_x", -0.7, "", bits.ACCEL_IMPLAUSIBLE, 0.4),
         ("accel_x", 0.7, "motor_share = 0.5", bits.ACCEL_IMPLAUSIBLE, 0.4),
         ("accel_x", 0.15, "", 0, 0.0),
-        ("calliper_pressure_fl", 20.0, "", OFF, 0.45),
+        ("calliper_pressure_fl", 20.0, "", PRESSURE_FL, 0.45),
         ("calliper_pressure_fl", 3.0, "", 0, 0.0),
     ],
 )

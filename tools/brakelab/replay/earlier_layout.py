@@ -3,19 +3,24 @@
 Version 0.1 before November 2026 kept two models of the hydraulics, one of which is now the only one.
 """
 
-import numpy as np
-
-from ecu.algorithm.step import INITIAL
 from ecu.contract.records import RecordArray
 
 RENAMED = {"hydraulics": "friction_torque"}  # present name: earlier one
-ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s"}  # begin at 0
+# Begin as in a new state.
+ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s"} | {
+    *("pressures", "flags", "accel_error", "witness", "motors", "turning", "speeds"),
+    *("grip", "rolled", "fall", "noise", "freed_s", "denied", "short_s", "above_s", "confirmed"),
+}
 
 
-def convert_initial(initial: RecordArray) -> RecordArray | None:
-    """Return `INITIAL`, shape (1,), of an earlier one; None if it lacks a part or is of another shape."""
-    converted = np.zeros(1, INITIAL)
-    return converted if _copy(initial, converted) else None
+def convert_initial(initial: RecordArray, new: RecordArray) -> RecordArray | None:
+    """Return `new` with what an earlier `initial` holds; None if that lacks a part or is of another shape.
+
+    Args:
+        initial: of a recording, shape (1,).
+        new: `INITIAL` of a new state, shape (1,), overwritten.
+    """
+    return new if _copy(initial, new) else None
 
 
 def _copy(source: RecordArray, target: RecordArray) -> bool:

@@ -17,7 +17,7 @@ from brakelab.replay.engine import Ecu, Rows, run_frames, run_samples
 from brakelab.replay.quality import Findings, identifier, note_faults
 from brakelab.replay.seen import set_raw_ends
 from brakelab.replay.source import Source, only_interface
-from ecu.algorithm.step import INITIAL, resume
+from ecu.algorithm.step import INITIAL, initial_part, resume
 from ecu.bus.receive import new_reception
 from ecu.bus.receive_plan import ReceivePlan
 from ecu.contract.faults import FOREIGN_SENDER
@@ -62,7 +62,8 @@ def start_as_recorded(ecu: Ecu, recording: Recording) -> None:
             "recording.json",
             "begins within a run: its cycles cannot be repeated; leave --cycles out",
         )
-    initial = recording.initial if recording.initial.dtype == INITIAL else convert_initial(recording.initial)
+    known = recording.initial.dtype == INITIAL
+    initial = recording.initial if known else convert_initial(recording.initial, initial_part(ecu.state))
     if initial is None:
         raise _other_version(recording)
     resume(ecu.state, initial)

@@ -1,0 +1,118 @@
+"""Wheel speeds and vehicle speed: which of them contradicts the others, and when nothing is said."""
+
+import numpy as np
+import pytest
+
+from ecu.algorithm.estimate import ESTIMATE
+from ecu.algorithm.monitoring.speeds import SPEEDS_STATE, watch_speeds
+from ecu.algorithm.monitoring.witness import WITNESS_STATE
+from ecu.contract.signals import INPUT
+
+DT = 0.01
+NAMES = ("wheel_speed_fl", "wheel_speed_fr", "wheel_speed_rl", "wheel_speed_rr", "vehicle_speed")
+
+
+class Road:
+    """A car on a straight road; `turns` of its wheels and of the vehicle speed over its own speed."""
+
+    def __init__(self, params, feed, reference: bool = True) -> None:
+        self.params, self.feed, self.inputs = params[0], feed, feed()
+        self.state, self.witness = np.zeros(1, SPEEDS_STATE)[0], np.zeros(1, WITNESS_STATE)[0]
+        self.estimate = np.zeros(1, ESTIMATE)[0]
+        self.speed, self.reference = 25.0, reference
+        self.random = np.random.default_rng(0)
+
+    def drive(
+        self, seconds: float, turns=(1, 1, 1, 1, 1), accel: float = 0.0, gas: float = 0.0
+    ) -> tuple[str, ...]:
+        """Return the names that are rejected at the end; `accel` < 0 brakes all wheels, `gas` [%]."""
+        turns = np.array(turns, float)
+        for _ in range(round(seconds / DT)):
+            self.speed += accel * DT
+            self.estimate["speed"], self.estimate["accel_x"] = self.speed, accel
+            self.estimate["brake_torque"] = 800.0 if accel < -1.0 else 0.0
+            wheels = self.speed * turns[:4] / self.params["wheel_radius"]
+            self.feed(
+                self.inputs,
+                wheel_speed=wheels + 0.1 * self.random.standard_normal(4),
+                vehicle_speed=self.speed * turns[4] - self.params["vehicle_speed_delay"] * accel,
+                vehicle_speed_valid=1.0,
+                accelerator_position=gas,
+                accel_x=accel,
+                motor_torque=0.0,
+            )
+            if not self.reference:
+                self.inputs[0]["verdict"][INPUT["vehicle_speed"]] = 0
+            watch_speeds(self.params, self.state, self.witness, self.inputs[0], self.estimate, DT)
+        return tuple(name for name in NAMES if self.witness["rejected"][INPUT[name]])
+
+
+@pytest.fixture
+def road(params, feed) -> Road:
+    road = Road(params, feed)
+    assert road.drive(5.0) == ()
+    return road
+
+
+FRONT, REAR = NAMES[:2], NAMES[2:4]
+CASES = [
+    # case, wheels and vehicle speed over the car's, acceleration, accelerator, seconds, rejected
+    ("rolls", (1, 1, 1, 1, 1), 0.0, 0.0, 10.0, ()),
+    ("brakes with 3 % of slip", (0.97, 0.97, 0.97, 0.97, 1), -4.0, 0.0, 3.0, ()),
+    ("a wheel locks", (1, 1, 0.0, 1, 1), -4.0, 0.0, 3.0, ()),
+    ("all slide", (0.6, 0.6, 0.6, 0.6, 1), -4.0, 0.0, 1.5, ()),
+    ("an axle spins", (1, 1, 1.3, 1.3, 1), 2.0, 50.0, 3.0, ()),
+    ("an engine drags an axle on ice", (0.9, 0.9, 1, 1, 1), -0.8, 0.0, 2.0, ()),
+    ("stuck while the car slows", (1.1, 0.98, 0.98, 0.98, 1), -4.0, 0.0, 0.5, NAMES[:1]),
+    ("a wheel that rolls reads zero", (1, 1, 1, 0, 1), 0.0, 0.0, 0.3, NAMES[3:4]),
+    ("an axle that rolls reads 6 % less", (1, 1, 0.94, 0.94, 1), 0.0, 0.0, 1.0, REAR),
+    ("an axle that brakes reads 20 % more", (1.2, 1.2, 0.98, 0.98, 1), -4.0, 0.0, 0.5, FRONT),
+    ("the speed reads zero", (1, 1, 1, 1, 0), 0.0, 0.0, 0.3, NAMES[4:]),
+    ("the speed stands still above", (0.97, 0.97, 0.97, 0.97, 1.4), -4.0, 0.0, 0.5, NAMES[4:]),
+    ("the speed stands below braked wheels", (0.97, 0.97, 0.97, 0.97, 0.7), -4.0, 0.0, 0.5, NAMES[4:]),
+]
+
+
+@pytest.mark.parametrize(
+    ("case", "turns", "accel", "gas", "seconds", "rejected"), CASES, ids=[c[0] for c in CASES]
+)
+def test_who_contradicts_the_others(road, case, turns, accel, gas, seconds, rejected) -> None:
+    assert road.drive(seconds, turns, accel, gas) == rejected
+
+
+def test_without_a_speed_over_ground_the_accelerometer_sees_which_axle_lies(params, feed) -> None:
+    road = Road(params, feed, reference=False)
+    road.drive(5.0)
+    assert road.drive(1.0, (1.2, 1.2, 0.98, 0.98, 1), -4.0) == FRONT
+
+
+def test_another_tyre_is_learned_while_rolling(params, feed) -> None:
+    """A spare wheel 2.5 % smaller is no lie, braked or not; what it then changes by is."""
+    road = Road(params, feed)
+    assert road.drive(20.0, (1.025, 1, 1, 1, 1)) == ()
+    assert road.state["base"][0] == pytest.approx(0.025, abs=0.004)
+    assert road.drive(3.0, (1.0, 0.975, 0.975, 0.975, 1), -4.0) == ()
+    road.speed = 25.0
+    assert road.drive(1.0, (1.08, 1, 1, 1, 1)) == NAMES[:1]
+
+
+def test_a_sensor_that_is_well_again_is_believed_again(road) -> None:
+    assert road.drive(1.0, (1.1, 1, 1, 1, 1)) == NAMES[:1]
+    assert road.drive(0.8) == NAMES[:1]
+    assert road.drive(1.0) == ()
+
+
+@pytest.mark.parametrize("backwards", [0, 1])
+def test_slow_or_backwards_nothing_is_judged(params, feed, backwards) -> None:
+    road = Road(params, feed)
+    road.speed = 25.0 if backwards else 4.0
+    road.estimate["backwards"] = backwards
+    assert road.drive(3.0, (0.5, 1, 1, 1, 1)) == ()
+
+
+def test_two_witnesses_that_differ_judge_nobody(params, feed) -> None:
+    """One wheel, and dead reckoning; without more the third is the median of the two."""
+    road = Road(params, feed, reference=False)
+    road.inputs[0]["verdict"][INPUT["wheel_speed_fl"] : INPUT["wheel_speed_fl"] + 3] = 0
+    assert road.drive(2.0, (1, 1, 1, 1, 1)) == ()
+    assert road.drive(2.0, (1, 1, 1, 0.5, 1)) == ()
