@@ -16,7 +16,7 @@ import numpy as np
 
 from ecu.algorithm.inputs import usable
 from ecu.algorithm.monitoring.witness import judge
-from ecu.contract.signals import ACCEL_Y, STEERING_ANGLE, WHEEL_SPEED, YAW_RATE
+from ecu.contract.signals import ACCEL_X, ACCEL_Y, STEERING_ANGLE, WHEEL_SPEED, YAW_RATE
 from ecu.jit import Record, kernel
 
 YAW, ACROSS, STEERING, FRONT, REAR = range(5)
@@ -33,8 +33,8 @@ LEAST_SPEED = 5.0  # m/s
 YAW_ZERO, YAW_SCALE = 0.03, 0.05  # rad/s, of the value
 BANK = 1.0  # m/s^2: a road banked by 6 %, roll, zero
 STEERING_ZERO, UNDERSTEER = 0.03, 0.6  # rad/s, of the value
-TURNS = 0.02  # of the wheel speeds: radii and slip of the two sides
-DOUBT_S = 0.2
+TURNS, SLIP = 0.02, 0.012  # of the wheel speeds: radii; per m/s^2: slip of the two sides
+DOUBT_S, COUNTERSTEER_S = 0.2, 1.0
 
 
 @kernel
@@ -89,7 +89,7 @@ def watch_turning(
     value = inputs.value
     yaw, across = value[YAW_RATE], value[ACCEL_Y] / speed
     steering = value[STEERING_ANGLE] * speed / params.wheelbase
-    turns = TURNS * speed / params.track + YAW_ZERO
+    turns = (TURNS + SLIP * abs(value[ACCEL_X])) * speed / params.track + YAW_ZERO
     _set(state, YAW, usable(inputs, YAW_RATE), yaw, YAW_ZERO + YAW_SCALE * abs(yaw))
     _set(state, ACROSS, usable(inputs, ACCEL_Y), across, BANK / speed + YAW_SCALE * abs(across))
     reach = STEERING_ZERO + UNDERSTEER * abs(steering)
@@ -104,4 +104,6 @@ def watch_turning(
         apart = state.rate[i] - 0.5 * (low + high)
         place = YAW_RATE if i == YAW else ACCEL_Y if i == ACROSS else STEERING_ANGLE
         unit = 1.0 if i == YAW else speed if i == ACROSS else params.wheelbase / speed
-        judge(witness, place, apart * unit, (state.tolerance[i] + 0.5 * (high - low)) * unit, DOUBT_S, dt)
+        tolerance = state.tolerance[i] + 0.5 * (high - low)
+        doubt_s = COUNTERSTEER_S if i == STEERING else DOUBT_S
+        judge(witness, place, apart * unit, tolerance * unit, doubt_s, dt)

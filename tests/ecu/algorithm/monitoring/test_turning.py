@@ -15,14 +15,15 @@ CASES = [
     ("straight", 0.0, {}, 20.0, ()),
     ("a bend", 0.3, {}, 20.0, ()),
     ("a banked road", 0.0, {"accel_y": 0.8}, 20.0, ()),
+    ("an axle that slips in a bend", 0.2, {"accel_x": -4.0, "slip": 0.06}, 20.0, ()),
     ("a car that understeers", 0.2, {"steering_angle": 0.055}, 20.0, ()),
     ("yaw rate at its end", 0.0, {"yaw_rate": 5.9}, 0.1, ("yaw_rate",)),
     ("yaw rate stuck from the bend before", 0.0, {"yaw_rate": 0.3}, 0.3, ("yaw_rate",)),
     ("yaw rate turned round", 0.3, {"yaw_rate": -0.3}, 0.3, ("yaw_rate",)),
     ("lateral acceleration at its end", 0.0, {"accel_y": 39.0}, 0.1, ("accel_y",)),
     ("lateral acceleration of zero in a bend", 0.3, {"accel_y": 0.0}, 0.3, ("accel_y",)),
-    ("steering at its end", 0.0, {"steering_angle": 1.5}, 0.2, ("steering_angle",)),
-    ("steering of the wrong sign", 0.3, {"steering_angle": -0.04}, 0.5, ("steering_angle",)),
+    ("steering at its end", 0.0, {"steering_angle": 1.5}, 0.8, ("steering_angle",)),
+    ("steering of the wrong sign", 0.3, {"steering_angle": -0.04}, 0.9, ("steering_angle",)),
 ]
 
 
@@ -31,7 +32,9 @@ def drive(params, feed, yaw: float, reads: dict[str, float], seconds: float, spe
     p = params[0]
     sides = 0.5 * p["track"] * np.array([-1, 1, -1, 1])
     true = {"yaw_rate": yaw, "accel_y": yaw * speed, "steering_angle": yaw * p["wheelbase"] / speed}
-    inputs = feed(wheel_speed=(speed + yaw * sides) / p["wheel_radius"], **true | reads)
+    turns = (speed + yaw * sides) * (1.0 - np.array([reads.get("slip", 0.0), 0, 0, 0]))
+    told = {name: value for name, value in (true | reads).items() if name != "slip"}
+    inputs = feed(wheel_speed=turns / p["wheel_radius"], **told)
     for _ in range(round(seconds / DT)):
         watch_turning(p, state, witness, inputs[0], speed, DT)
     return witness
