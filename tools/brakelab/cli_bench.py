@@ -11,7 +11,7 @@ from ecu.output import policy
 NAMES: Final = {
     "times": "step, codec, plant, cycle, lateness, replay, play",
     "accuracy": "stops, observers, entries, ablation, bound, recorded, vehicle",
-    "control": "compensation, margins, blending, failures",
+    "control": "compensation, margins, blending, failures, lies",
     "physics": "friction, lab, energy, wear, dust, thermal, blocks, cycles",
 }
 """Benches by what they measure."""

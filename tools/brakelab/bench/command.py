@@ -27,6 +27,8 @@ from brakelab.studies.cars import each_car
 from brakelab.studies.energy import energy_tables
 from brakelab.studies.failures import failure_tables
 from brakelab.studies.friction import friction_tables
+from brakelab.studies.lies import all_cells
+from brakelab.studies.lies_table import lie_tables
 from brakelab.studies.measure import NOT_INSTALLED, machine
 from brakelab.studies.observers import WIDE, Sample, Task, observer_rows, tasks
 from brakelab.studies.observers_cases import configured
@@ -46,6 +48,7 @@ from brakelab.studies.texts import (
     FAILURES_TEXT,
     FRICTION_TEXT,
     LATENESS_TEXT,
+    LIES_TEXT,
     MARGINS_TEXT,
     OBSERVERS_TEXT,
     PLAY_TEXT,
@@ -71,9 +74,12 @@ LAB: Final = "lab"
 ENERGY: Final = "energy"
 BLENDING: Final = "blending"
 FAILURES: Final = "failures"
+LIES: Final = "lies"
 COMPENSATION: Final = "compensation"
 MARGINS: Final = "margins"
 LATENESS, RECORDED, VEHICLE, WEAR, DUST = "lateness", "recorded", "vehicle", "wear", "dust"
+SOUND: Final = 6
+"""Sound cars that `lies` drives for false alarms."""
 THERMAL, BLOCKS, CYCLES, REPLAY, PLAY = "thermal", "blocks", "cycles", "replay", "play"
 
 
@@ -109,6 +115,7 @@ def bench(
         MARGINS: _margins,
         BLENDING: _blending,
         FAILURES: _failures,
+        LIES: partial(_lies, seeds=seeds),
         RECORDED: partial(_recorded, seeds=seeds),
         VEHICLE: partial(_vehicle, seeds=seeds),
         WEAR: partial(_wear, seeds=seeds),
@@ -303,6 +310,11 @@ def _blending(json: bool) -> int:
 
 def _failures(json: bool) -> int:
     return results_page(FAILURES, "Brakes that fail", FAILURES_TEXT, failure_tables(), json)
+
+
+def _lies(json: bool, seeds: int) -> int:
+    tables = lie_tables(all_cells(), min(seeds, SOUND))
+    return results_page(LIES, "Inputs that lie", LIES_TEXT, tables, json)
 
 
 def _lateness(json: bool, seconds: float) -> int:

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from brakelab.studies import failures
+from brakelab.studies import failures, lies
 from brakelab.studies.blending import CARS
 
 STOPS_TEXT: Final = (
@@ -70,6 +70,16 @@ FAILURES_TEXT: Final = (
     "give at once; what one front calliper takes at 6 m/s² the limit of the yaw moment does not. "
     f"{failures.CARS} cars of the wide draw, median (least–greatest). "
     "[control.md](../control.md#brakes-that-fail) says how."
+)
+
+LIES_TEXT: Final = (
+    f"{lies.BRAKINGS} brakings of {lies.DECEL:g} m/s² from 28 m/s, armed; from t = {lies.BEGIN:g} s on one "
+    "input, or those of one frame, lie. Force is that of linings and motors over that of the same car "
+    f"without the lie, at the same time in the same braking, above {lies.LOWEST_SPEED:g} m/s. What it falls "
+    f"below for {lies.SHORT_S:g} s is the most that the lie takes; a lie costs where it is off by more than "
+    f"{100 * lies.COSTS:g} % for {lies.LONG_S:g} s, and is told in time where the bit of its own input comes "
+    "no later than 2 s after the begin of that. Cars of the wide draw, seed 1. "
+    "[faults.md](../faults.md) says what is left out, and by which witnesses."
 )
 
 RECORDED_TEXT: Final = (
