@@ -36,7 +36,7 @@ ACCEL_ERROR_STATE = np.dtype(
 )
 
 OFFSET_START, SCALE_START, SCALE_MOST = 0.5, 0.03, 0.05  # m/s^2, -, -
-LEAST_SHOWN = 1.5  # m/s^2, below which a scale does not show
+LEAST_SHOWN = 2.0  # m/s^2, below which a scale does not show
 ACROSS = 1.0  # m/s^2, above which tyres drag
 SLOPE_WALK, SCALE_WALK = 0.1, 0.01  # m/s^2 and - per root second
 NOISE = 0.15  # m/s^2, of a block's difference
@@ -47,7 +47,7 @@ GROSS = 1.5  # m/s^2
 ZERO_S, FEWEST_S = 1.0, 0.3
 FORCE = 0.1  # relative error of mass and motors
 WEIGHT = 0.15  # m/s^2, error of drag and rolling resistance
-SCALE_DOUBT, SIGMAS = 0.03, 1.0
+SCALE_DOUBT, SIGMAS = 0.03, 2.0
 ZERO_DOUBT = 0.25  # m/s^2
 PROVING, ENGINE = 1.0, 0.2  # m/s^2; of it, what an unreported engine exceeds
 PROVEN_S, SURE_S, REFUTES = 0.5, 3.0, 5.0  # s, s; times as fast as it is proven

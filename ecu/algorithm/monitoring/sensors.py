@@ -5,7 +5,7 @@ estimation, by the estimate of the last cycle.
 """
 
 from ecu.algorithm.control.failed_brakes import watch_brakes
-from ecu.algorithm.inputs import driver_accelerates, others_brake, usable
+from ecu.algorithm.inputs import LEAST_REQUEST, driver_accelerates, others_brake, requested_decel, usable
 from ecu.algorithm.monitoring.accel_error import (
     PROVEN_S,
     correct_accel,
@@ -58,7 +58,8 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
         if s.accel_error.proven_s > PROVEN_S:
             base, offset = s.control.base, s.accel_error.offset
             watch_motors(p, s.motors, s.witness, u, estimate, base, offset, dt)
-        if s.application.braking and s.plausibility.sent and not (driver_accelerates(u) or others_brake(u)):
+        asked = s.application.braking != 0 and requested_decel(p, u) > LEAST_REQUEST
+        if asked and s.plausibility.sent and not (driver_accelerates(u) or others_brake(u)):
             compare_motors(p, s.motors, s.witness, u, s.blending, dt)
         watch_turning(p, s.turning, s.witness, u, estimate.speed, dt)
         watch_speeds(p, s.speeds, s.witness, u, estimate, dt)

@@ -42,7 +42,8 @@ SPEEDS_STATE = np.dtype(
 LEAST_SPEED = 5.0  # m/s
 SMOOTHING_S = 0.1
 TOLERANCE, UNFOUND = 0.035, 0.03  # of the speed, added before the radii are found
-ABSOLUTE = 0.15  # m/s
+ROLLING, ROLLING_ACROSS = 0.012, 0.002  # of the speed while rolling freely, by lateral acceleration [s^2/m]
+ABSOLUTE, LAG_S = 0.15, 0.3  # m/s; of a vehicle speed, while the car slows
 SLIPPING = 0.06  # added for a vehicle speed above wheels that are braked
 DOUBT_S = 0.3
 BASE_S, FOUND_S = 20.0, 2.0
@@ -107,19 +108,27 @@ def _reckon(state: Record, inputs: Record, accel: float, median: float, dt: floa
 
 @kernel
 def _judged(state: Record, i: int, median: float, free: bool, braked: bool, driven: bool) -> float:
-    """Return by how much input `i` contradicts the others, over the speed; 0: within what it may."""
+    """Return by how much input `i` contradicts the others, over the speed; NaN: nothing is said of it.
+
+    Where wheels slip together the median slips with them: then dead reckoning and vehicle speed count.
+    """
     apart: float = state.apart[i] - state.base[i]
     if free:
         return apart
     if i < SPEED:
-        judged = (apart > 0.0 and not driven) or (apart < 0.0 and not braked)
-    elif apart < 0.0:
-        judged = not driven
-    else:
-        away = abs(state.told[SPEED] - state.reckoned)
-        judged = away > 2.0 * abs(median - state.reckoned) + SLIPPING * median
-        apart = max(apart - SLIPPING, 0.0)
-    return apart if judged else math.nan
+        reckoned, speed = state.reckoned / median, state.told[SPEED] / median
+        if not math.isfinite(speed):
+            speed = 1.0
+        faster = apart + 1.0 - max(reckoned, speed, 1.0)
+        slower = apart + 1.0 - min(reckoned, speed, 1.0)
+        if faster > 0.0 and not driven:
+            return faster
+        return slower if slower < 0.0 and not braked else math.nan
+    if apart < 0.0:
+        return math.nan if driven else apart
+    away = abs(state.told[SPEED] - state.reckoned)
+    judged = away > 2.0 * abs(median - state.reckoned) + SLIPPING * median
+    return max(apart - SLIPPING, 0.0) if judged else math.nan
 
 
 @kernel
@@ -140,6 +149,8 @@ def watch_speeds(
     median = _median(state, witness)
     if estimate.backwards or not median > LEAST_SPEED:
         state.started = 0
+        for i in range(5):
+            state.apart[i] = state.base[i]
         return
     _reckon(state, inputs, estimate.accel_x, median, dt)
     accel = estimate.accel_x
@@ -149,7 +160,11 @@ def watch_speeds(
         torque = estimate.brake_torque[i] + motor_torque(inputs, i)
         free = free and abs(torque) < TORQUE
     state.rolled_s = min(state.rolled_s + dt, BASE_S) if free else state.rolled_s
-    tolerance = TOLERANCE + ABSOLUTE / median + (UNFOUND if state.rolled_s < FOUND_S else 0.0)
+    found = state.rolled_s >= FOUND_S
+    tolerance = TOLERANCE + ABSOLUTE / median + (0.0 if found else UNFOUND)
+    if free and found:
+        tolerance = ROLLING + ROLLING_ACROSS * abs(estimate.accel_y)
+        tolerance += (ABSOLUTE + LAG_S * abs(accel)) / median
     for i in range(5):
         if math.isnan(state.told[i]):
             continue

@@ -88,6 +88,7 @@ LEVEL_WALK = 0.01  # common to all levels while the pads rub
 # Bounds of learned states: beyond them a fault was learned, not a car. Of friction: `friction.py`.
 LOWEST, HIGHEST = np.full(N, -np.inf), np.full(N, np.inf)
 LOWEST[LEVEL : LEVEL + 4], HIGHEST[LEVEL : LEVEL + 4] = math.log(LEAST_RATIO), math.log(GREATEST_RATIO)
+LEFT_RIGHT = 0.2  # of an axle's two levels: linings of one axle are of one batch, and one that is oiled is found
 LOWEST[STIFFNESS], HIGHEST[STIFFNESS] = math.log(0.4), math.log(2.5)
 LOWEST[RADIUS : RADIUS + 4], HIGHEST[RADIUS : RADIUS + 4] = -0.02, 0.02
 LOWEST[BIAS], HIGHEST[BIAS] = -0.6, 0.6
@@ -115,6 +116,21 @@ def limit_variance(state: Record, i: int, most: float) -> None:
 
 
 @kernel
+def _keep_alike(state: Record, left: int) -> bool:
+    """Return the levels of an axle to within `LEFT_RIGHT` of each other; return whether they had parted."""
+    x, p, free, right = state.x, state.p, state.free, left + 1
+    apart = x[left] - x[right]
+    variance = p[left, left] + p[right, right] - 2.0 * p[left, right]
+    if abs(apart) <= LEFT_RIGHT * (1.0 + 1e-9) or not variance > 0.0:
+        return False
+    back = (math.copysign(LEFT_RIGHT, apart) - apart) / variance
+    for j in range(N):
+        if free[j] or left <= j <= right:
+            x[j] += (p[j, left] - p[j, right]) * back
+    return True
+
+
+@kernel
 def keep_within_bounds(state: Record) -> bool:
     """Return learned states to their bounds; return whether any had left them.
 
@@ -130,6 +146,8 @@ def keep_within_bounds(state: Record) -> bool:
                     x[j] += p[j, i] / p[i, i] * back
             x[i] += back
             found = found or (i != PEAK and i != SLOPE)
+    for left in (LEVEL, LEVEL + 2):
+        found = _keep_alike(state, left) or found
     return found
 
 

@@ -62,6 +62,11 @@ CASES = [
     ("a wheel locks", (1, 1, 0.0, 1, 1), -4.0, 0.0, 3.0, ()),
     ("all slide", (0.6, 0.6, 0.6, 0.6, 1), -4.0, 0.0, 1.5, ()),
     ("an axle spins", (1, 1, 1.3, 1.3, 1), 2.0, 50.0, 3.0, ()),
+    ("three wheels spin", (1.4, 1, 1.4, 1.4, 1), 3.0, 50.0, 2.0, ()),
+    ("three wheels lock", (0.3, 1, 0.3, 0.3, 1), -3.0, 0.0, 2.0, ()),
+    ("radii that differ by 1 %", (1.01, 1, 1, 0.99, 1), 0.0, 0.0, 3.0, ()),
+    ("an axle that rolls reads 2.5 % more", (1.025, 1.025, 1, 1, 1), 0.0, 0.0, 1.0, FRONT),
+    ("the speed reads 2.5 % more", (1, 1, 1, 1, 1.025), 0.0, 0.0, 1.0, NAMES[4:]),
     ("an engine drags an axle on ice", (0.9, 0.9, 1, 1, 1), -0.8, 0.0, 2.0, ()),
     ("stuck while the car slows", (1.1, 0.98, 0.98, 0.98, 1), -4.0, 0.0, 0.5, NAMES[:1]),
     ("a wheel that rolls reads zero", (1, 1, 1, 0, 1), 0.0, 0.0, 0.3, NAMES[3:4]),
@@ -94,6 +99,13 @@ def test_another_tyre_is_learned_while_rolling(params, feed) -> None:
     assert road.drive(3.0, (1.0, 0.975, 0.975, 0.975, 1), -4.0) == ()
     road.speed = 25.0
     assert road.drive(1.0, (1.08, 1, 1, 1, 1)) == NAMES[:1]
+
+
+def test_wheels_that_spun_as_the_car_drove_off_say_nothing_later(params, feed) -> None:
+    road = Road(params, feed)
+    road.speed = 3.0
+    assert road.drive(0.3, (2.5, 1, 2.5, 2.5, 1), 2.0, 50.0) == ()
+    assert road.drive(3.0, (1, 1, 1, 1, 1), 2.0, 50.0) == ()
 
 
 def test_a_sensor_that_is_well_again_is_believed_again(road) -> None:

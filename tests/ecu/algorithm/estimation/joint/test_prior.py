@@ -24,6 +24,7 @@ from ecu.algorithm.estimation.joint.prior import (
     CHANGE_AXLE,
     CHANGE_COMMON,
     HIGHEST,
+    LEFT_RIGHT,
     LEVEL_AXLE,
     LEVEL_COMMON,
     LEVEL_WHEEL,
@@ -254,6 +255,8 @@ def test_a_state_beyond_its_bound_is_put_on_it_and_what_it_is_tied_to_follows(i:
     state = tied(7)
     bound = (LOWEST if side == "lowest" else HIGHEST)[i]
     state["x"] = 0.0
+    if LEVEL <= i < LEVEL + 4:
+        state["x"][LEVEL : LEVEL + 4] = 0.9 * bound  # linings that are alike
     state["x"][i] = bound + math.copysign(0.001, bound)
     state["free"] = 1
     x, P = state["x"].copy(), state["p"].copy()
@@ -261,6 +264,22 @@ def test_a_state_beyond_its_bound_is_put_on_it_and_what_it_is_tied_to_follows(i:
     np.testing.assert_allclose(state["x"], x + P[:, i] / P[i, i] * (bound - x[i]), rtol=1e-9, atol=1e-15)
     assert state["x"][i] == pytest.approx(bound)
     np.testing.assert_array_equal(state["p"], P)
+
+
+@pytest.mark.parametrize("apart", [0.3, -0.3])
+@pytest.mark.parametrize("axle", [0, 1])
+def test_levels_of_an_axle_stay_alike_as_if_their_difference_was_measured(axle: int, apart: float) -> None:
+    state = tied(10)
+    state["x"], state["free"] = 0.0, 1
+    left = LEVEL + 2 * axle
+    state["x"][left], state["x"][left + 1] = 0.5 * apart, -0.5 * apart
+    x, P = state["x"].copy(), state["p"].copy()
+    assert keep_within_bounds(state)
+    h = np.zeros(N)
+    h[left], h[left + 1] = 1.0, -1.0
+    kept = math.copysign(LEFT_RIGHT, apart)
+    np.testing.assert_allclose(state["x"], x + P @ h / (h @ P @ h) * (kept - apart), rtol=1e-9, atol=1e-15)
+    assert not keep_within_bounds(state)
 
 
 @pytest.mark.parametrize("free", [[], [STIFFNESS], [STIFFNESS, MASS]])
