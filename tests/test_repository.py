@@ -184,10 +184,12 @@ def test_estimating_and_using_know_each_other_by_the_estimate_alone(part: str, o
             assert not name.startswith(f"ecu.algorithm.{other.replace('/', '.')}"), f"{path}: {name}"
 
 
-OF_OBSERVERS = re.compile(r"\bs\.(motion|wheel_load|speed|joint|wheels|force|observer|friction|prediction)\b")
+OF_OBSERVERS = re.compile(
+    r'\b(s\.|row\[")(motion|wheel_load|speed|joint|wheels|force|observer|friction|prediction)\b'
+)
 
 
-@pytest.mark.parametrize("part", ["control", "monitoring", "publish"])
+@pytest.mark.parametrize("part", ["control", "monitoring", "publish", "step"])
 def test_what_uses_estimates_reads_no_record_of_an_observer(part: str) -> None:
     """Where all of the state is handed over, as `s`."""
     algorithm = ROOT / "ecu/algorithm"

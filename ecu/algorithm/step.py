@@ -173,7 +173,6 @@ def new_state(params: RecordArray, learned: RecordArray | None = None) -> Record
         row["learned"] = learned[0]
     row["control"]["mu_override"], row["control"]["start"] = math.nan, 1.0
     row["failed_brakes"]["scale"] = 1.0
-    row["force"]["k_f"] = row["force"]["stiffness"] = 1.0
     row["distribution"]["trailing"] = row["distribution"]["rolled"] = 1.0
     row["guard"]["rolled"] = row["flags"]["last"] = math.nan
     _begin(params, state)
@@ -272,13 +271,13 @@ def _estimate(p: Record, s: Record, u: Record, contradicted: bool, dt: float) ->
         keep_application(p, s)
         learn_start(s.control, s.estimate, s.learned)
         hand_over_application(p, s)
-    if s.application.started:
-        for i in range(4):
-            s.joint.heat[i] = heat_widening(s.discs, i)
     if s.application.braking == 0:
         set_base(p, s.control, s.learned)
-    correct_pressures(p, s.hydraulics, u, s.limiter.pressure, s.joint.zero.value, s.failed_brakes.failed, dt)
-    observe(p, s, u, s.joint.heat, s.guard.acting != 0, contradicted, dt)
+    zero, failed = s.estimate.pressure_zero, s.failed_brakes.failed
+    correct_pressures(p, s.hydraulics, u, s.limiter.pressure, zero, failed, dt)
+    d = s.discs
+    heat = (heat_widening(d, 0), heat_widening(d, 1), heat_widening(d, 2), heat_widening(d, 3))
+    observe(p, s, u, heat, s.guard.acting != 0, contradicted, dt)
 
 
 @kernel

@@ -29,12 +29,15 @@ from ecu.contract.params import BAR, JOINT, OBSERVER1
 from ecu.contract.signals import ACCEL_X, CALLIPER_PRESSURE
 from ecu.jit import Record, kernel
 
+Corners = tuple[float, float, float, float]
+
 KEEP_S = 1.0  # between stores of the joint observer's states, while no application ends
 
 
 @kernel
 def start_estimation(p: Record, s: Record) -> None:
     """Start with the learned values, at standstill."""
+    s.force.k_f = s.force.stiffness = 1.0
     restore_friction(p, s.friction, s.learned)
     restore_joint(p, s.joint, s.learned)
     update_wheel_load(p, s.wheel_load, 0.0, 0.0, 0.0, 1.0)
@@ -46,6 +49,8 @@ def start_estimation(p: Record, s: Record) -> None:
 def start_estimate(s: Record) -> None:
     """Initialise the estimate before the first cycle: friction is the learned one."""
     tell_friction(s.friction, s.estimate)
+    for i in range(4):
+        s.estimate.pressure_zero[i] = s.joint.zero.value[i]
 
 
 @kernel
@@ -71,7 +76,7 @@ def hand_over_application(p: Record, s: Record) -> None:
 
 @kernel
 def observe(
-    p: Record, s: Record, u: Record, heat: Record, guarded: bool, contradicted: bool, dt: float
+    p: Record, s: Record, u: Record, heat: Corners, guarded: bool, contradicted: bool, dt: float
 ) -> None:
     """Overwrite the estimate of the last cycle.
 
@@ -79,7 +84,7 @@ def observe(
         p: `PARAMS`.
         s: `STATE` of `ecu.algorithm.step`.
         u: `INPUTS` with implausible ones masked out.
-        heat: relative standard deviation that each friction has gained by its disc's temperature, shape (4,).
+        heat: relative standard deviation that each friction has gained by its disc's temperature.
         guarded: the slip guard holds a wheel: the last snapshot is restored.
         contradicted: a sensor or a stream has just become implausible: likewise.
         dt: time since the last cycle [s].
@@ -103,7 +108,7 @@ def observe(
 
 @kernel
 def _observe_jointly(
-    p: Record, s: Record, u: Record, heat: Record, doubted: bool, braking: bool, dt: float
+    p: Record, s: Record, u: Record, heat: Corners, doubted: bool, braking: bool, dt: float
 ) -> None:
     joint = s.joint
     if s.application.started:

@@ -131,7 +131,6 @@ JOINT_STATE: Final = np.dtype(
         ("follows", "u1", (4,)),  # the pressure followed the demand throughout the last window
         ("observed", "u1", (4,)),  # friction was corrected in the last window
         ("sigma_force", "f8"),  # of the force of all linings at equal pressures, relative
-        ("heat", "f8", (4,)),  # relative standard deviation of friction by its disc's temperature
         ("ratio", "f8", (RATIOS,)),  # squared innovations over their variances
         (
             "signed_ratio",
