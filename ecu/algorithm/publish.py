@@ -1,23 +1,39 @@
-"""Outputs of a cycle: estimates and state, NaN where nothing is known."""
+"""Outputs of a cycle: demands, estimates and state, NaN where nothing is known.
+
+A failed ECU demands no pressure: in mode `FAILED` the pressures sent are 0.
+"""
 
 import math
+
+import numpy as np
 
 from ecu.algorithm.control.blending import blends
 from ecu.algorithm.estimate import STANDING
 from ecu.contract.faults import WORD
+from ecu.contract.params import BAR
 from ecu.contract.signals import CALLIPER_PRESSURE, FAILED
 from ecu.jit import Record, kernel
+
+DEMANDS = np.dtype(
+    [
+        ("pressure", "f8", (4,)),  # compensated, before the limiter [Pa]
+        ("uncompensated", "f8", (4,)),  # with the base friction [Pa]
+        ("motor", "f8", (4,)),  # torque [N m], NaN where no motors blend
+    ],
+    align=True,
+)
+"""What control demands in a cycle, overwritten by each; the limiter holds the pressures to send."""
 
 
 @kernel
 def publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: int, mode: int) -> None:
-    """Overwrite the outputs not yet written.
+    """Overwrite the outputs, in their units.
 
     Args:
         p: `PARAMS`.
         s: `STATE`.
         u: `INPUTS` with implausible ones masked out.
-        y: `OUTPUTS`, already holding the demanded pressures and motor torques.
+        y: `OUTPUTS`.
         decel: demanded [m/s^2], may be NaN.
         faults: mask of both words.
         mode: of the ECU.
@@ -44,6 +60,9 @@ def publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: in
     y.particles_last_brake_low, y.particles_last_brake_high = s.dust.low, s.dust.high
     y.particle_mass_per_km = s.dust.mass_per_km
     for i in range(4):
+        y.pressure_demand[i] = s.limiter.pressure[i] / BAR if mode != FAILED else 0.0
+        y.pressure_uncompensated[i] = s.demands.uncompensated[i] / BAR
+        y.motor_demand[i] = s.demands.motor[i]
         y.slip[i] = e.slip[i] if rolls else math.nan
         y.wheel_force_x[i] = e.force[i] if rolls else math.nan
         y.wheel_force_z[i] = e.load[i]
@@ -61,5 +80,3 @@ def publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: in
         y.sigma_pad_wear[i] = s.wear.sigma[i] if mapped else math.nan
         y.pad_remaining[i] = 100.0 * max(1.0 - s.wear.wear[i] / p.pad_life[i], 0.0) if mapped else math.nan
         y.pad_wear_mass[i] = s.wear.mass[i] if mapped else math.nan
-        if mode == FAILED:
-            y.pressure_demand[i] = 0.0

@@ -92,7 +92,7 @@ from ecu.algorithm.monitoring.speeds import SPEEDS_STATE
 from ecu.algorithm.monitoring.turning import TURNING_STATE
 from ecu.algorithm.monitoring.wear import WEAR_STATE, restore_wear, update_wear
 from ecu.algorithm.monitoring.witness import WITNESS_STATE
-from ecu.algorithm.publish import publish
+from ecu.algorithm.publish import DEMANDS, publish
 from ecu.contract.faults import (
     ACCUMULATOR_LOW,
     BRAKE_FADE,
@@ -105,7 +105,6 @@ from ecu.contract.faults import (
     REAR_HELD,
     WHEEL_SLIPS,
 )
-from ecu.contract.params import BAR
 from ecu.contract.records import INPUTS, LEARNED, RecordArray
 from ecu.jit import Record, kernel
 
@@ -153,7 +152,8 @@ INITIAL = np.dtype(
 """State before the first cycle as a recording stores it: without the estimate, which follows from it."""
 
 STATE = np.dtype(
-    [*((name, INITIAL[name]) for name in INITIAL.names or ()), ("estimate", ESTIMATE)], align=True
+    [*((name, INITIAL[name]) for name in INITIAL.names or ()), ("estimate", ESTIMATE), ("demands", DEMANDS)],
+    align=True,
 )
 
 
@@ -236,7 +236,7 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
     update_discs(p, s.discs, s.learned, u, s.estimate, s.application, dt)
     update_wear(p, s.wear, s.learned, u, s.estimate, s.discs, s.application, dt)
     update_dust(p, s.dust, s.learned, u, s.estimate, s.discs, s.wear, s.application, dt)
-    decel = _control(p, s, u, y, dt)
+    decel = _control(p, s, u, dt)
     if s.estimate.reset:
         faults |= FILTER_RESET
     if s.limiter.limited:
@@ -281,8 +281,8 @@ def _estimate(p: Record, s: Record, u: Record, contradicted: bool, dt: float) ->
 
 
 @kernel
-def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
-    e = s.estimate
+def _control(p: Record, s: Record, u: Record, dt: float) -> float:
+    e, demands = s.estimate, s.demands
     speed = e.speed if e.started else math.nan
     decel = update_demand(p, s.demand, u, speed, dt)
     backwards = e.backwards != 0
@@ -298,13 +298,13 @@ def _control(p: Record, s: Record, u: Record, y: Record, dt: float) -> float:
     share_torque(p, s.blending, s.distribution.torque, dt)
     for i in range(4):
         torque = s.blending.lining[i]
-        y.pressure_uncompensated[i] = pressure_for_torque(p, torque, s.control.base[i], i)
-        y.pressure_demand[i] = compensated_pressure(p, s.control, y.pressure_uncompensated[i], i)
-    cap_trailing(p, s.distribution, decel, s.blending.lining, e, y.pressure_demand, failed, backwards)
+        demands.uncompensated[i] = pressure_for_torque(p, torque, s.control.base[i], i)
+        demands.pressure[i] = compensated_pressure(p, s.control, demands.uncompensated[i], i)
+    cap_trailing(p, s.distribution, decel, s.blending.lining, e, demands.pressure, failed, backwards)
     if p.slip_guard:
-        guard_slip(p, s.guard, u, e, speed, s.limiter.pressure, y.pressure_demand, s.distribution.torque, dt)
+        guard_slip(p, s.guard, u, e, speed, s.limiter.pressure, demands.pressure, s.distribution.torque, dt)
     watch_accumulator(s.limiter, u, dt)
-    _limit(p, s, y, available_pressure(p, s.limiter, u), decel, dt)
+    _limit(p, s, available_pressure(p, s.limiter, u), decel, dt)
     return decel
 
 
@@ -319,21 +319,20 @@ def _lean(p: Record, s: Record, u: Record, decel: float, backwards: bool, dt: fl
 
 
 @kernel
-def _limit(p: Record, s: Record, y: Record, available: float, decel: float, dt: float) -> None:
-    limiter = s.limiter
+def _limit(p: Record, s: Record, available: float, decel: float, dt: float) -> None:
+    limiter, demands = s.limiter, s.demands
     limiter.limited = limiter.starved = 0
     for i in range(4):
         limiter.ceiling[i] = min(available, s.guard.cap[i]) if s.guard.capped[i] else available
-        if available < min(y.pressure_demand[i], p.max_pressure):
+        if available < min(demands.pressure[i], p.max_pressure):
             limiter.starved = 1
     for left in (0, 2):
-        limit_axle(p, limiter, left, y.pressure_demand, y.pressure_uncompensated, s.blending.lining, dt)
+        limit_axle(p, limiter, left, demands.pressure, demands.uncompensated, s.blending.lining, dt)
     for i in range(4):
         asked, pressure = limiter.asked[i], limiter.pressure[i]
         s.control.cut[i] = 1 if pressure < asked - 1.0 else 0
-        y.pressure_demand[i], y.pressure_uncompensated[i] = pressure / BAR, y.pressure_uncompensated[i] / BAR
         motor = motor_torque_demand(
             p, s.blending, lagging_torque(p, s.hydraulics.value, s.control, asked, i), i
         )
-        y.motor_demand[i] = motor if blends(p) else math.nan
+        demands.motor[i] = motor if blends(p) else math.nan
     watch_limit(p, s.control, s.estimate.mu, s.guard.capped, decel > 0.0, dt)
