@@ -12,7 +12,6 @@ import time
 from pathlib import Path
 from typing import Final, NamedTuple
 
-import numba
 import numpy as np
 
 from ecu import jit
@@ -139,7 +138,7 @@ def _wake_up() -> Check:
 
 
 def _cache() -> Check:
-    folder = Path(numba.config.CACHE_DIR)
+    folder = jit.CACHE_ROOT
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):

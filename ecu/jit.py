@@ -1,8 +1,10 @@
 """Compilation of kernels, and a cache that cannot go stale.
 
-numba's disk cache checks a function's own file only: after an edit in a callee it would silently run
-the old code. Kernels are therefore cached in a folder named after the text of every module with kernels or
-constants of their package (and of `ecu`, whose kernels the laboratory calls).
+numba's disk cache checks a function's own file only: after an edit of a callee or of a constant elsewhere it
+would silently run the old code. The kernels of a module are therefore cached in a folder named after the
+texts of the module and of all that it imports, directly or not, of its own package and of `ecu`, whose
+kernels the laboratory calls. A module imported by a name in a string does not count, nor does a file that is
+read.
 
 `NUMBA_CACHE_DIR` chooses the place, default `~/.cache/brake-ecu`. What lies there is run (numba's cache is
 pickle and machine code), so a place in which anybody else may put or exchange files is refused. With
@@ -13,11 +15,11 @@ import hashlib
 import os
 import re
 import stat
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numba
 import numba.core.event as numba_event
@@ -33,47 +35,81 @@ Record = Any
 # Kernels raise nothing and follow IEEE 754: x/0 is inf or NaN and is caught by the module's own checks.
 OPTIONS = {"cache": True, "error_model": "numpy", "fastmath": False}
 
-_CACHE_ROOT = Path(
+CACHE_ROOT = Path(
     os.environ.get("NUMBA_CACHE_DIR")
     or Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "brake-ecu"
 )
 
 
-_IMPORTED = re.compile(rb"^from ([\w.]+) import (\([^)]*\)|.*)$", re.MULTILINE)
-_CONSTANT = re.compile(rb"\b[A-Z][A-Z0-9_]+\b")
+_COMMENT = re.compile(rb"#[^\n]*|\\\n")
+_FROM = re.compile(
+    rb"(?:^|[;:])[ \t]*from\b[ \t]*([.\w]+)[ \t]+import\b[ \t]*(\([^)]*\)|[^\n;]*)", re.MULTILINE
+)
+_IMPORT = re.compile(rb"(?:^|[;:])[ \t]*import\b([^\n;]*)", re.MULTILINE)
 
 
-def sources_of_kernels(packages: Iterable[str]) -> dict[str, bytes]:
-    """Return the text of every module with kernels, or with constants used in kernels, by name.
-
-    A constant is upper case and imported by name.
-    """
-    texts = dict(_texts(packages))
-    found = [name for name, text in texts.items() if b"@kernel" in text]
-    for name in found:  # grows
-        for module, names in _IMPORTED.findall(texts[name]):
-            if (source := module.decode()) in texts and source not in found and _CONSTANT.search(names):
-                found.append(source)
-    return {name: texts[name] for name in sorted(found)}
-
-
-def _texts(packages: Iterable[str]) -> Iterator[tuple[str, bytes]]:
-    for package in packages:
-        spec = find_spec(package)
-        for root in (spec.submodule_search_locations or []) if spec else []:
-            for path in Path(root).rglob("*.py"):
-                parts = path.relative_to(root).with_suffix("").parts
-                yield ".".join((package, *parts)).removesuffix(".__init__"), path.read_bytes()
+class _Source(NamedTuple):
+    digest: bytes
+    imports: frozenset[str]  # modules that it may import, and names in them
 
 
 @cache
-def _folder(cache_name: str, packages: frozenset[str]) -> str:
-    """Return the folder of compiled kernels; numba would fall back to one that can go stale."""
+def _modules(package: str) -> dict[str, Path]:
+    """Return the files of a package, or of a single module, by the names of the modules."""
+    spec = find_spec(package)
+    found = {package: Path(spec.origin)} if spec and spec.has_location and spec.origin else {}
+    for root in (spec.submodule_search_locations or []) if spec else []:
+        for path in Path(root).rglob("*.py"):
+            parts = path.relative_to(root).with_suffix("").parts
+            found[".".join((package, *parts)).removesuffix(".__init__")] = path
+    return found
+
+
+@cache
+def _source(module: str, path: Path) -> _Source:
+    text = path.read_bytes()
+    package = module if path.stem == "__init__" else module.rpartition(".")[0]
+    return _Source(hashlib.sha256(text).digest(), frozenset(_imports(package, _COMMENT.sub(b"", text))))
+
+
+def _imports(package: str, text: bytes) -> Iterator[str]:
+    """Yield every module that a module of `package` may import: a text that looks like an import counts."""
+    for start, names in _FROM.findall(text):
+        source = start.decode()
+        if dots := len(source) - len(source.lstrip(".")):
+            above = package.split(".")[: 1 - dots or None]
+            source = ".".join([*above, *filter(None, [source[dots:]])])
+        yield source
+        yield from (f"{source}.{name.decode()}" for name in re.findall(rb"\w+", names))
+    for names in _IMPORT.findall(text):
+        for name in re.findall(rb"[\w.]+", names):
+            parts = name.decode().split(".")
+            yield from (".".join(parts[:count]) for count in range(1, len(parts) + 1))
+
+
+def sources_of_kernels(module: str) -> dict[str, bytes]:
+    """Return digests of the texts that the kernels of a module may depend on, by module.
+
+    They are the module and what it imports, directly or not, of its own package and of `ecu`.
+    """
+    known = _modules("ecu") | _modules(module.partition(".")[0])
+    ahead, found = [module], dict[str, bytes]()
+    while ahead:
+        name = ahead.pop()
+        if name in known and name not in found:
+            source = _source(name, known[name])
+            found[name] = source.digest
+            ahead += source.imports
+    return dict(sorted(found.items()))
+
+
+@cache
+def _folder(module: str) -> str:
+    """Return the folder of a module's compiled kernels; numba would fall back to one that can go stale."""
     digest = hashlib.sha256(numba.__version__.encode())
-    for name, text in sources_of_kernels(packages).items():
-        digest.update(name.encode())
-        digest.update(text)
-    folder = _CACHE_ROOT / f"{cache_name}-{digest.hexdigest()[:16]}"
+    for name, text in sources_of_kernels(module).items():
+        digest.update(name.encode() + b"\0" + text)
+    folder = CACHE_ROOT / f"{module}-{digest.hexdigest()[:16]}"
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     except OSError:
@@ -122,26 +158,17 @@ def _of_one_user(group: int) -> bool:
     return found.gr_name == user and set(found.gr_mem) <= {user}
 
 
-def compile_kernel(
-    function: Function, cache_name: str, packages: frozenset[str], parallel: bool = False
-) -> Function:
+def kernel(function: Function, parallel: bool = False) -> Function:
     """Compile `function` with numba (no Python objects, no fastmath) and cache it on disk.
-
-    `cache_name` is the prefix of the cache's folder, `packages` hold the sources it depends on.
 
     Raises:
         UserError: there is no place for the cache.
     """
     if numba.config.DISABLE_JIT:
         return interpreted(function)
-    numba.config.CACHE_DIR = _folder(cache_name, packages)
+    spec = find_spec(function.__module__)  # of `python -m package.module`: not `__main__`
+    numba.config.CACHE_DIR = _folder(spec.name if spec else function.__module__)
     return cast(Function, numba.njit(**OPTIONS, parallel=parallel)(function))
-
-
-def kernel(function: Function) -> Function:
-    """Compile a function of the ECU or of the laboratory. Raises UserError: see `compile_kernel`."""
-    package = function.__module__.partition(".")[0]
-    return compile_kernel(function, package, frozenset({"ecu", package}))
 
 
 class CompileCounter(numba_event.Listener):  # type: ignore[misc]

@@ -1,7 +1,8 @@
 """The cache of compiled kernels is named after everything that a kernel is made of."""
 
-import ast
 import grp
+import importlib
+import json
 import os
 import pwd
 import subprocess
@@ -14,44 +15,109 @@ import pytest
 from ecu import jit
 
 ROOT = Path(__file__).parents[2]
-FOLDERS = {"ecu": ROOT / "ecu", "brakelab": ROOT / "tools" / "brakelab"}
+WAYS = {
+    # of taking the constant: the text of a module with a kernel that returns `{}`
+    "by name": ("from {package}.limits import GREATEST", "GREATEST"),
+    "by another name": ("from {package}.limits import GREATEST as g", "g"),
+    "of a module": ("from {package} import limits", "limits.GREATEST"),
+    "of a module by another name": ("import {package}.limits as at", "at.GREATEST"),
+    "by its whole name": ("import {package}.limits", "{package}.limits.GREATEST"),
+    "in lower case": ("from {package}.limits import greatest", "greatest"),
+    "by a relative import": ("from .limits import GREATEST", "GREATEST"),
+    "of a relative module": ("from . import limits", "limits.GREATEST"),
+    "from a folder below": ("from .below.further import GREATEST", "GREATEST"),
+    "among others": ("from .limits import (  # (which)\n    OTHER,  # a)\n    GREATEST,\n)", "GREATEST"),
+    "over two lines": ("from .limits import OTHER, \\\n    GREATEST", "GREATEST"),
+    "all that there is": ("from .limits import *", "GREATEST"),
+    "after another statement": ("OTHER = 1.0; from .limits import GREATEST", "GREATEST"),
+    "inside a function": (
+        "def made():\n    from .limits import GREATEST\n\n    return GREATEST\n\n\nMADE = made()", "MADE"
+    ),
+    "computed here": ("from .limits import GREATEST\n\nTWICE = 2.0 * GREATEST", "TWICE / 2.0"),
+    "computed elsewhere": ("from .derived import TWICE", "TWICE / 2.0"),
+    "handed on by the package": ("from {package} import handed_on", "handed_on"),
+    "of another kernel": ("from .by_name import value as other", "other()"),
+}  # fmt: skip
 
 
-def names_in_kernels(module: ast.Module) -> set[str]:
-    functions = (node for node in module.body if isinstance(node, ast.FunctionDef))
-    kernels = (function for function in functions if "kernel" in map(ast.unparse, function.decorator_list))
-    bodies = (ast.Module(kernel.body, []) for kernel in kernels)
-    return {node.id for body in bodies for node in ast.walk(body) if isinstance(node, ast.Name)}
+class Package:
+    """A package with a module for each way, and `page`, which no kernel reaches."""
+
+    def __init__(self, folder: Path) -> None:
+        self.name, self.folder, self.cache = "thrown_away", folder / "thrown_away", folder / "cache"
+        (self.folder / "below").mkdir(parents=True)
+        self.cache.mkdir()
+        self.write("__init__", "from .limits import GREATEST as handed_on")
+        self.write("below/__init__", "")
+        self.write("below/further", "from ..limits import GREATEST")
+        self.write("derived", "from . import limits\n\nTWICE = 2.0 * limits.GREATEST")
+        self.write("alone", self.kernel("NUMBER = 7.0", "NUMBER"))
+        self.write("page", f"import {self.name}.alone")
+        for way, (imports, value) in WAYS.items():
+            self.write(way.replace(" ", "_"), self.kernel(imports, value))
+
+    def kernel(self, imports: str, value: str) -> str:
+        head, value = (text.replace("{package}", self.name) for text in (imports, value))
+        return f"from ecu.jit import kernel\n{head}\n\n\n@kernel\ndef value():\n    return {value}"
+
+    def write(self, module: str, text: str) -> None:
+        (self.folder / f"{module}.py").write_text(text + "\n")
+
+    def limit(self, value: float) -> None:
+        self.write("limits", f"OTHER = 0.0\nGREATEST = greatest = {value}")
+
+    def run(self) -> dict[str, tuple[float, bool]]:
+        """Return what each kernel gives, in a process of its own, and whether it was compiled."""
+        program = (
+            "import importlib, json, sys\n"
+            "package, *names = sys.argv[1:]\n"
+            "kernels = [importlib.import_module(f'{package}.{name}').value for name in names]\n"
+            "print(json.dumps([(k(), bool(k.stats.cache_misses)) for k in kernels]))"
+        )
+        names = ["alone", *(way.replace(" ", "_") for way in WAYS)]
+        environment = {
+            **os.environ, "PYTHONPATH": f"{ROOT}:{self.folder.parent}", "NUMBA_CACHE_DIR": str(self.cache),
+            "PYTHONDONTWRITEBYTECODE": "1",
+        }  # fmt: skip
+        command = [sys.executable, "-c", program, self.name, *names]
+        done = subprocess.run(command, capture_output=True, text=True, env=environment, check=True)
+        return dict(zip(names, map(tuple, json.loads(done.stdout)), strict=True))
 
 
-def constants_of_kernels(package: str) -> set[str]:
-    """Modules of which a kernel takes a constant: numba compiles its value in."""
-    found = set()
-    for path in FOLDERS[package].rglob("*.py"):
-        module = ast.parse(path.read_text("utf-8"))
-        used = names_in_kernels(module)
-        for node in ast.walk(module):
-            if not isinstance(node, ast.ImportFrom):
-                continue
-            root, _, rest = (node.module or "").partition(".")
-            taken = {name.name for name in node.names} & used
-            if root in FOLDERS and taken:
-                place = FOLDERS[root].joinpath(*filter(None, rest.split(".")))
-                found |= (
-                    {f"{node.module}.{name}" for name in taken} if place.is_dir() else {node.module or ""}
-                )
-    return found
+def test_a_changed_constant_is_compiled_in_whichever_way_it_is_imported(tmp_path: Path) -> None:
+    package = Package(tmp_path)
+    package.limit(2.0)
+    assert set(package.run().values()) == {(7.0, True), (2.0, True)}
+    package.limit(3.0)
+    package.write("page", "WORDS = 'new'")
+    changed = package.run()
+    assert changed.pop("alone") == (7.0, False)
+    assert {way: found for way, found in changed.items() if found != (3.0, True)} == {}
+    assert {compiled for _, compiled in package.run().values()} == {False}
 
 
-@pytest.mark.parametrize("package", FOLDERS)
-def test_whatever_a_kernel_takes_a_constant_from_counts(package: str) -> None:
-    modules = constants_of_kernels(package)
-    assert len(modules) > 5
-    assert modules <= jit.sources_of_kernels({"ecu", package}).keys()
+def modules_with_kernels(package: str) -> list[str]:
+    root = Path(importlib.import_module(package).__file__ or "").parent
+    paths = [path for path in root.rglob("*.py") if "@kernel" in path.read_text("utf-8")]
+    return [".".join((package, *path.relative_to(root).with_suffix("").parts)) for path in paths]
 
 
-def test_a_module_of_neither_kind_does_not_count() -> None:
-    assert "ecu.cli" not in jit.sources_of_kernels({"ecu"})
+@pytest.mark.parametrize("package", ["ecu", "brakelab"])
+def test_pages_and_commands_count_for_no_kernel(package: str) -> None:
+    modules = modules_with_kernels(package)
+    assert len(modules) > 20
+    for module in modules:
+        counted = jit.sources_of_kernels(module)
+        assert not {"ecu.cli", "brakelab.cli", "brakelab.report.page", "ecu.watch.web"} & counted.keys(), (
+            module
+        )
+
+
+def test_the_cycle_s_kernel_counts_on_all_that_it_calls() -> None:
+    counted = jit.sources_of_kernels("ecu.algorithm.step").keys()
+    called = set(modules_with_kernels("ecu")) - {"ecu.algorithm.step"}
+    assert {name for name in called if name.startswith("ecu.algorithm.")} <= counted
+    assert {"ecu.contract.signals", "ecu.contract.params"} <= counted
 
 
 def test_without_a_place_for_the_cache_nothing_is_compiled_and_one_line_says_so(tmp_path: Path) -> None:
