@@ -16,11 +16,11 @@ before them; the tolerance grows with the noise of the sensors and with the rang
 with least = max(LEAST, NOISE sigma), sigma of a - w by the configured noise of the sensors.
 
 A reading beyond any road (`SLOPE`) that the torques contradict for a second is wrong as well, regardless of
-its history. From then on it is not used until it agrees with the wheels or with the torques as before, or the
-car is at standstill, on an unknown slope. Where the drive torque is unreported or uncertain, the torques
-neither contradict nor confirm: a reading beyond any road by the wheels alone is doubted until it no longer
-is. No verdict is given while wheels slide or ABS or ESP act. A constant or slowly growing bias is not
-detected.
+its history. From then on it is not used until it agrees with the wheels or with the torques as before, the
+longer the more often it has been wrong, or the car is at standstill, on an unknown slope. Where the drive
+torque is unreported or uncertain, the torques neither contradict nor confirm: a reading beyond any road by
+the wheels alone is doubted until it no longer is. No verdict is given while wheels slide or ABS or ESP act. A
+constant or slowly growing bias is not detected.
 
 Assumption: all constants; found with the simulated vehicle, whose sound sensor stays below a third of `LEAST`
 in all shipped scenarios.
@@ -59,6 +59,7 @@ ACCELERATION_STATE = np.dtype(
         ("sigma", "f8"),  # of a - w by the sensors' noise [m/s^2]
         ("beyond", "i8"),  # consecutive blocks beyond any road
         ("agreed", "i8"),  # consecutive blocks that agree again
+        ("times", "i8"),  # that it has become implausible, at most `OFTEN`
         ("usual", "f8"),  # a - w before the jump [m/s^2]
         ("usual_force", "f8"),  # a - f before the jump [m/s^2]
         ("implausible", "u1"),
@@ -75,10 +76,11 @@ LEAST, NOISE = 0.25, 6.0  # m/s^2, times sigma
 SLIP, SLIP_BY_SPEED = 0.1, 0.01  # -, s/m
 FORCE = 0.3  # possible error of friction
 KNOWN_MOTORS = 0.1  # greatest relative error of a motor torque that still yields a force
-SLOPE = 2.0  # m/s^2, of a slope of 20 %
+SLOPE, STEEP = 2.0, 1.5  # m/s^2, of a slope of 20 %, of 15 %
 DENIED = 1.0  # m/s^2
 SECOND = 10  # blocks
-AGAIN, AGREED = 0.5, 2  # of LEAST, blocks
+AGAIN, AGREED = 0.5, 2  # of LEAST; blocks after the first time, twice as many after each further
+OFTEN = 6
 STANDSTILL = 0.1  # m/s
 
 
@@ -164,6 +166,12 @@ def _beside_wheels(mean: Record, j: int) -> float:
 
 
 @kernel
+def wheels_deny(state: Record) -> bool:
+    """Return whether the wheels' deceleration confirms the reading on no usual road, or says nothing."""
+    return state.good_blocks < 3 or abs(_beside_wheels(state.mean, W)) > STEEP
+
+
+@kernel
 def _usually_beside_wheels(mean: Record, j: int) -> float:
     """Return a - dv/dt before, of a straight line through four blocks [m/s^2]."""
     change = (3.0 * (mean[4, j] - mean[7, j]) + mean[5, j] - mean[6, j]) / (10.0 * BLOCK_S)
@@ -231,7 +239,7 @@ def _judge(state: Record) -> None:
     if state.implausible:
         agrees = state.good_blocks >= 3 and _agrees(state)
         state.agreed = state.agreed + 1 if agrees else 0
-        if state.agreed >= AGREED:
+        if state.agreed >= AGREED << (state.times - 1):
             state.implausible, state.good_blocks, state.known_blocks = 0, 0, 0
         return
     if state.good_blocks < 8:
@@ -240,7 +248,7 @@ def _judge(state: Record) -> None:
     state.beyond = state.beyond + 1 if _beyond_any_road(state) else 0
     jumped = state.known_blocks >= 8 and _jumped(state)
     if jumped or state.beyond >= SECOND:
-        state.implausible, state.agreed = 1, 0
+        state.implausible, state.agreed, state.times = 1, 0, min(state.times + 1, OFTEN)
         state.usual = _usually_beside_wheels(mean, W) if jumped else 0.0
         state.usual_force = _before(mean, A) - _before(mean, F) if jumped else 0.0
 

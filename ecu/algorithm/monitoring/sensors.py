@@ -12,7 +12,7 @@ from ecu.algorithm.monitoring.accel_error import (
     follow_accel_error,
     watch_frozen,
 )
-from ecu.algorithm.monitoring.acceleration import watch_acceleration
+from ecu.algorithm.monitoring.acceleration import watch_acceleration, wheels_deny
 from ecu.algorithm.monitoring.motors import compare_motors, watch_motors
 from ecu.algorithm.monitoring.plausibility import watch_pressures, watch_wheels, wheel_speed_implausible
 from ecu.algorithm.monitoring.pressures import DOUBT_S, compare_pressures, lasting_difference
@@ -55,7 +55,7 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
             follow_accel_error(p, s.accel_error, s.acceleration, estimate.accel_y, s.application.braking != 0)
         if s.accel_error.zero_off != 0.0 or s.accel_error.scale_off != 0.0:
             faults |= ACCEL_X_DRIFTED
-        if s.accel_error.proven_s > PROVEN_S:
+        if s.accel_error.proven_s > PROVEN_S and not wheels_deny(s.acceleration):
             base, offset = s.control.base, s.accel_error.offset
             watch_motors(p, s.motors, s.witness, u, estimate, base, offset, dt)
         asked = s.application.braking != 0 and requested_decel(p, u) > LEAST_REQUEST

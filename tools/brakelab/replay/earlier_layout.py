@@ -9,7 +9,19 @@ RENAMED = {"hydraulics": "friction_torque"}  # present name: earlier one
 # Begin as in a new state.
 ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s"} | {
     *("pressures", "flags", "accel_error", "witness", "motors", "turning", "speeds"),
-    *("grip", "rolled", "fall", "noise", "freed_s", "denied", "short_s", "above_s", "confirmed"),
+    *(
+        "grip",
+        "rolled",
+        "fall",
+        "noise",
+        "freed_s",
+        "denied",
+        "short_s",
+        "above_s",
+        "confirmed",
+        "times",
+        "modelled",
+    ),
 }
 
 

@@ -9,7 +9,7 @@ enter the variance.
 import math
 
 from ecu.algorithm.brake import brake_gain_per_bar
-from ecu.algorithm.estimation.joint.kalman import clear_derivatives, correct
+from ecu.algorithm.estimation.joint.kalman import REJECT, clear_derivatives, correct
 from ecu.algorithm.estimation.joint.layout import (
     BALANCE_RATIO,
     BIAS,
@@ -97,4 +97,5 @@ def correct_by_balance(params: Record, state: Record, braking: bool) -> None:
             variance += (SLIDING_FORCE * per_bar * w.pressure[i]) ** 2
     wild *= max(params.sigma_motor_torque - SCALE_ONLY, 0.0)
     variance += wild * wild * (1.0 if braking else COLOURED)
-    state.ratio[BALANCE_RATIO] = correct(state, -left, variance)
+    reject = math.inf if braking else REJECT
+    state.ratio[BALANCE_RATIO] = correct(state, -left, variance, reject)

@@ -49,13 +49,35 @@ def drift_speed(state: Record, time: float) -> None:
 
 
 @kernel
+def drift_by_derivatives(state: Record, time: float) -> None:
+    """Propagate into the covariance of speed what `state.h`, derivatives of dv/dt [m/s^2], says of others."""
+    p, h, ph = state.p, state.h, state.ph
+    own = 0.0
+    for j in range(N):
+        ph[j] = 0.0
+        for i in range(N):
+            if h[i] != 0.0:
+                ph[j] += h[i] * p[i, j]
+    for j in range(N):
+        own += h[j] * ph[j]
+    for j in range(N):
+        if j != V:
+            p[V, j] += time * ph[j]
+            p[j, V] = p[V, j]
+    p[V, V] += time * (2.0 * ph[V] + time * own)
+
+
+@kernel
 def _corrects(free: Record, i: int, only_speed: bool) -> bool:
     return free[i] != 0 and (not only_speed or i in (V, SLOPE))
 
 
 @kernel
-def correct(state: Record, innovation: float, variance: float) -> float:
-    """Fuse a measurement with derivatives `state.h` and noise `variance`; return its test ratio."""
+def correct(state: Record, innovation: float, variance: float, reject: float = REJECT) -> float:
+    """Fuse a measurement with derivatives `state.h` and noise `variance`; return its test ratio.
+
+    `reject`: standard deviations of the innovation beyond which nothing is corrected.
+    """
     p, h, ph, x, free = state.p, state.h, state.ph, state.x, state.free
     total = variance
     for i in range(N):
@@ -67,7 +89,7 @@ def correct(state: Record, innovation: float, variance: float) -> float:
     for i in range(N):
         total += ph[i] * h[i]
     ratio = innovation * innovation / total
-    if not math.isfinite(ratio) or ratio > REJECT * REJECT:
+    if not math.isfinite(ratio) or ratio > reject * reject:
         return ratio
     outlier = ratio > GATE * GATE
     if outlier:

@@ -18,7 +18,12 @@ from ecu.algorithm.estimate import STANDING
 from ecu.algorithm.estimation.friction import drives_against
 from ecu.algorithm.estimation.joint.balance import correct_by_balance, predict_balance
 from ecu.algorithm.estimation.joint.drive import KNOWN, measure_drive
-from ecu.algorithm.estimation.joint.kalman import forget
+from ecu.algorithm.estimation.joint.kalman import (
+    clear_derivatives,
+    clear_state,
+    drift_by_derivatives,
+    forget,
+)
 from ecu.algorithm.estimation.joint.layout import (
     BIAS,
     CHANGE,
@@ -42,6 +47,7 @@ from ecu.algorithm.estimation.joint.layout import (
     V,
 )
 from ecu.algorithm.estimation.joint.prior import (
+    PRIOR,
     forget_rate,
     keep_within_bounds,
     note_change,
@@ -209,6 +215,7 @@ def update_joint(
     if state.window.time < WINDOW_S - 0.001:
         return
     close_window(params, state, hydraulics)
+    _note_modelled(state, motion.measured == 0)
     _fuse(params, state, inputs, braking)
     if not braking and usable(inputs, ACCEL_X):
         measure_drive(params, state)
@@ -226,6 +233,28 @@ def _released(params: Record, state: Record, inputs: Record) -> bool:
     for i in range(4):
         total += state.smooth_pressure[i]
     return total < 4.0 * FREE
+
+
+@kernel
+def _note_modelled(state: Record, modelled: bool) -> None:
+    """Forget the slope where the accelerometer has just been lost: it may have been the sensor's error."""
+    if modelled and not state.modelled:
+        clear_state(state, SLOPE, PRIOR[SLOPE] ** 2)
+    state.modelled = 1 if modelled else 0
+
+
+@kernel
+def _drift_by_linings(params: Record, state: Record, time: float) -> None:
+    """Tie the speed to friction while the torques stand for the accelerometer: dv/dt = -sum T_i / (r_i m)."""
+    h = state.h
+    clear_derivatives(state)
+    for i in range(4):
+        decel = brake_torque(params, state, i, state.window.pressure[i]) / (
+            params.wheel_radius[i] * params.mass
+        )
+        h[LEVEL + i] -= decel
+        h[CHANGE + i // 2] -= decel
+    drift_by_derivatives(state, time)
 
 
 @kernel
@@ -248,6 +277,8 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     moving = x[V] > LEAST_SPEED
     state.drive_known = 1.0 - unknown_share(params, state)
     walk(state, braking and moving, time)
+    if state.modelled and braking and moving:
+        _drift_by_linings(params, state, time)
     _watch_release(state, braking)
     learning = moving and state.hold_s <= 0.0 and w.motor_known != 0
     learning = learning and not _learning_forbidden(params, state, inputs, braking)

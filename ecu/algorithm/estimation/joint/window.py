@@ -96,7 +96,8 @@ def gather(
     state.mean_accel += (1.0 - math.exp(-dt / STEADY)) * (motion.accel_x - state.mean_accel)
     follow_motors(state.motors, inputs, dt)
     front_lateral = params.mass * motion.accel_y * params.rear_axle / params.wheelbase
-    w.across += motion.accel_y / GRAVITY
+    turning = motion.yaw_rate * x[V]  # a bend shows in both, a bank or a zero in one alone
+    w.across += (motion.accel_y if abs(motion.accel_y) < abs(turning) else turning) / GRAVITY
     w.lateral += front_lateral * math.sin(motion.steering)
     for i in range(4):
         w.load[i] += load[i]

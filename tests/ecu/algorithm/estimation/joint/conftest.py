@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from ecu.algorithm.estimation.joint.layout import JOINT_STATE
+from ecu.algorithm.estimation.joint.layout import CHANGE, JOINT_STATE, LEVEL
 from ecu.algorithm.estimation.joint.observer import start_joint, update_joint
 from ecu.algorithm.estimation.joint.prior import begin_application, end_application, set_prior
 from ecu.algorithm.estimation.motion import MOTION_STATE
@@ -54,6 +54,7 @@ class Car:
         set_prior(self.params, self.state)
         start_joint(self.state)
         self.motion = np.zeros(1, MOTION_STATE)[0]
+        self.motion["measured"] = 1
         self.load = self.params["static_load"].copy()
         self.hydraulics = np.zeros(1, HYDRAULICS_STATE)[0]
         self.time = 0.0
@@ -71,6 +72,13 @@ class Car:
         # m (v' + g_slope) = -sum((T + I v'/r) / r) - drag
         change = -(drag + self.mass * slope + (torque / r).sum()) / (self.mass + (inertia / r).sum())
         return -(torque + inertia * change) / r, float(change)
+
+    def modelled(self, bar: np.ndarray, motor: np.ndarray) -> float:
+        """Return the acceleration [m/s^2] by the observer's own friction and the configured car."""
+        p, x = self.params, self.state["x"]
+        mu = p["mu_nominal"] * np.exp(x[LEVEL : LEVEL + 4] + np.repeat(x[CHANGE : CHANGE + 2], 2))
+        torque = 2 * BAR * p["piston_area"] * p["effective_radius"] * mu * bar + motor
+        return -float(p["drag_area"] * self.speed**2 + (torque / p["wheel_radius"]).sum()) / p["mass"]
 
     def cycles(
         self,
@@ -107,6 +115,8 @@ class Car:
             value[CALLIPER_PRESSURE : CALLIPER_PRESSURE + 4] = reading
             value[MOTOR_TORQUE : MOTOR_TORQUE + 4] = motor + sigma["motor"] * normal(4)
             self.motion["accel_x"] = change + slope + sigma["accel"] * normal()
+            if not self.motion["measured"]:
+                self.motion["accel_x"] = self.modelled(bar, motor)
             new[VEHICLE_SPEED] = reference and k % 2 == 0
             value[VEHICLE_SPEED] = self.speed + sigma["vehicle_speed"] * normal()
             self.observe(bool(bar.any()) if braking is None else braking)

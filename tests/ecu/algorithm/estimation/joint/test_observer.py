@@ -106,6 +106,38 @@ def test_it_finds_friction_as_well_as_it_says(new_car, front, rear, mass, stiffn
     assert front < 0.05
 
 
+LOST = [  # true friction over nominal, slope [m/s^2], error of the first application, of the fifth
+    ("as configured", 1.0, 0.0, 0.03, 0.03),
+    ("it fades", 0.8, 0.0, 0.10, 0.08),
+    ("it rises", 1.2, 0.0, 0.10, 0.04),
+    ("a slope of 3 %", 1.0, 0.3, 0.05, 0.04),
+]
+
+
+@pytest.mark.parametrize(("case", "true", "slope", "first", "last"), LOST, ids=[row[0] for row in LOST])
+def test_without_an_accelerometer_the_loss_of_speed_shows_friction(
+    new_car, case: str, true: float, slope: float, first: float, last: float
+) -> None:
+    """Rolling shows the slope, and the speed lost beyond it the brakes."""
+    errors = []
+    for seed in range(4):
+        car = new_car(seed=seed, speed=38.0)
+        car.drive(1.0)
+        car.drive(3.0, **BRAKING)
+        car.mu *= true
+        car.motion["measured"] = 0
+        own = []
+        for _ in range(5):
+            car.speed = car.state["x"][V] = 38.0
+            car.drive(3.0, slope=slope)
+            own.append((friction(car.drive(3.0, slope=slope, **BRAKING)) / true - 1).mean())
+        errors.append(own)
+    mean = np.abs(errors).mean(axis=0)
+    print(f"{case}: mean error of the sum by application {np.round(100 * mean, 1)} %")
+    assert mean[0] < first
+    assert mean[-1] < last
+
+
 @pytest.mark.parametrize("noisy", ["wheel_speed", "accel", "vehicle_speed", "pressure", "motor"])
 def test_noise_does_not_bias_friction(new_car, noisy: str) -> None:
     """The car is as configured, one kind of sensor has noise; mean over seeds."""
