@@ -4,14 +4,17 @@
     growth = -d(|omega| r)/dt - braking of the car   rate of that deficit [m/s^2], low-passed
 
 begins   slip beyond `RANGE` while the lag grows: the cap is the pressure demanded last
-cut      slip beyond `RANGE` and the wheel is not coming back: the cap falls
-hold     slip beyond `RANGE`, the wheel comes back: the cap stays
-return   slip within `RANGE`, or the car slower than `LEAST_SPEED`: the cap rises until it no longer acts
+cut      slip beyond `RANGE` that grows, or beyond `HALF` and the wheel is not coming back: the cap falls
+hold     slip beyond `RANGE` that stays, or the wheel comes back: the cap stays
+return   slip within `RANGE` or steady, or the car slower than `LEAST_SPEED`: the cap rises until it no longer
+         acts
 
 The rate is the wheel's own against the accelerometer, not against the vehicle speed: a speed that errs, jumps
 or stands still caps nothing. `GROWING` rises with the noise of the wheel's speed, `NOISE` sigma, by its
 second differences. A wheel that brakes no more spins up within `SPIN_UP_S` on ice too; one that does not has
-a sensor that lies, and its pressure returns: it is capped again only where its deficit grows anew.
+a sensor that lies. One that slips by less than `HALF` and neither falls behind nor comes back for `STEADY_S`
+is in the stable range of its tyre, or its sensor is scaled. The pressure of both returns, and is capped again
+only where the deficit grows anew.
 
 While ABS or ESP report activity the cap never falls: two controllers would cut the same wheel. This is no
 ABS: it seeks no optimal slip, has no yaw control and treats each wheel alone.
@@ -38,9 +41,11 @@ SLIP_GUARD_STATE = np.dtype(
         ("fall", "f8", (4,)),  # of that speed since the sample before [m/s]
         ("noise", "f8", (4,)),  # of that speed [m/s]
         ("growth", "f8", (4,)),  # m/s^2
+        ("latest", "f8", (4,)),  # of the last sample alone [m/s^2]
         ("age", "f8", (4,)),  # of the lag [s]
         ("freed_s", "f8", (4,)),  # time at push-out pressure without spinning up
-        ("denied", "u1", (4,)),  # the wheel did not spin up: its lag is not believed
+        ("steady_s", "f8", (4,)),  # time for which it has slipped less than `HALF` and steadily
+        ("denied", "u1", (4,)),  # it did not spin up, or slips steadily: that is no wheel that locks
         ("acting", "u1"),  # on any wheel
     ],
     align=True,
@@ -49,6 +54,7 @@ SLIP_GUARD_STATE = np.dtype(
 RANGE = 0.10  # slip; braking at 9.5 m/s^2 on a dry road stays below 0.07
 GROWING = 10.0  # m/s^2; noise of the wheel speeds and braking as in RANGE stay below 8
 RETURNING = -5.0  # m/s^2
+STAYS, HALF, STEADY_S = 2.0, 0.5, 0.1  # m/s^2, slip, s
 GROWTH_LAG = 0.02  # s
 NOISE = 4.0  # sigma
 SECOND_DIFFERENCE = 1.95  # mean modulus of a second difference of white noise, over sigma: sqrt(12 / pi)
@@ -80,13 +86,14 @@ def _follow_lag(
         fall, age = state.rolled[i] - rolled, state.age[i]
         if math.isfinite(fall):
             gain = 1.0 - math.exp(-age / GROWTH_LAG)
-            state.growth[i] += gain * (fall / age - braking - state.growth[i])
+            state.latest[i] = fall / age - braking
+            state.growth[i] += gain * (state.latest[i] - state.growth[i])
             jerk = abs(fall - state.fall[i]) / SECOND_DIFFERENCE
             state.noise[i] += (1.0 - math.exp(-age / NOISE_S)) * (jerk - state.noise[i])
             state.fall[i] = fall
         state.lag[i], state.rolled[i], state.age[i] = ground - rolled, rolled, 0.0
     if not (usable(inputs, WHEEL_SPEED + i) and math.isfinite(state.lag[i] + state.growth[i])):
-        state.lag[i] = state.growth[i] = state.noise[i] = state.fall[i] = 0.0
+        state.lag[i] = state.growth[i] = state.latest[i] = state.noise[i] = state.fall[i] = 0.0
         state.rolled[i] = math.nan
 
 
@@ -99,11 +106,14 @@ def _grows(state: Record, i: int) -> bool:
 
 
 @kernel
-def _doubt(params: Record, state: Record, i: int, slipping: bool, dt: float) -> None:
-    """Overwrite `denied`: a wheel without brake torque that does not spin up, until its lag is gone."""
-    freed = state.capped[i] != 0 and slipping and state.cap[i] <= params.push_out_pressure[i]
-    state.freed_s[i] = state.freed_s[i] + dt if freed and state.growth[i] > RETURNING else 0.0
-    if state.freed_s[i] > SPIN_UP_S:
+def _doubt(params: Record, state: Record, i: int, ground: float, slipping: bool, dt: float) -> None:
+    """Overwrite `denied`: a wheel that does not behave as one that locks, until its lag is gone or grows."""
+    capped = state.capped[i] != 0 and slipping
+    freed = capped and state.cap[i] <= params.push_out_pressure[i] and state.growth[i] > RETURNING
+    steady = capped and state.lag[i] < HALF * ground and abs(state.growth[i]) < STAYS
+    state.freed_s[i] = state.freed_s[i] + dt if freed else 0.0
+    state.steady_s[i] = state.steady_s[i] + dt if steady else 0.0
+    if state.freed_s[i] > SPIN_UP_S or state.steady_s[i] > STEADY_S:
         state.denied[i] = 1
     elif not slipping or _grows(state, i):
         state.denied[i] = 0
@@ -142,14 +152,17 @@ def guard_slip(
         ground = abs(corner_speed(params, estimate, speed, i)) if watching else 0.0
         _follow_lag(params, state, inputs, ground, braking, i, dt)
         slipping = watching and state.lag[i] > RANGE * max(ground, LEAST_SPEED)
-        _doubt(params, state, i, slipping, dt)
+        _doubt(params, state, i, ground, slipping, dt)
         slipping = slipping and state.denied[i] == 0
         if slipping and not state.capped[i] and _grows(state, i):
             state.capped[i], state.cap[i] = 1, sent[i]
-        if slipping and state.growth[i] > RETURNING and not other:
+        falls = min(state.growth[i], state.latest[i]) > STAYS
+        if state.lag[i] > HALF * ground:
+            falls = state.growth[i] > RETURNING
+        if slipping and falls and not other:
             state.cap[i] = max(state.cap[i] - CUT * dt, params.push_out_pressure[i])
         if not slipping:
-            state.cap[i] += RETURN * dt
+            state.cap[i] += (CUT if state.denied[i] else RETURN) * dt
             if not state.cap[i] < wanted[i]:
                 state.capped[i] = 0
         if not torque[i] > 0.0:

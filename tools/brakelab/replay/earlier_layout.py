@@ -21,6 +21,8 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s"} | {
         "confirmed",
         "times",
         "modelled",
+        "latest",
+        "steady_s",
     ),
 }
 
