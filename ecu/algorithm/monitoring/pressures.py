@@ -37,11 +37,11 @@ PRESSURES_STATE = np.dtype(
     align=True,
 )
 
-APPLIED, RELEASED = 12.0, 0.5  # bar by the model
+APPLIED, RELEASED = 5.0, 0.5  # bar by the model
 STEADY = 20.0  # bar/s: at quicker changes lag differs more than sensors do
 LEARN_S, WEAK = 0.5, 15.0  # s, bar: at this pressure a ratio is learned half as fast
 OFFSET, RATIO = 3.0, 0.1  # bar, 1: no hydraulics and sensor that are sound differ more
-LEAST_SCALED = 2.0  # bar, of a ratio's effect: at low pressures noise and zero are a ratio
+LEAST_SCALED = 3.0  # bar, of a ratio's effect: at low pressures noise and zero are a ratio
 LARGEST_OFFSET, LARGEST_RATIO = 4.5, 0.15  # learned: a sensor that recovers is soon believed again
 FAR, FAR_SHARE = 8.0, 0.2  # bar, of the pressure: too far off for noise and lag
 KEPT, KEPT_SHARE = 0.6, 0.025  # bar, of the model: so much stays in a reading, of which it is the better one

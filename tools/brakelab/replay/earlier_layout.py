@@ -20,9 +20,10 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s"} | {
         "above_s",
         "confirmed",
         "times",
-        "modelled",
+        "unmeasured_s",
         "latest",
         "steady_s",
+        "rejected_s",
     ),
 }
 

@@ -34,6 +34,7 @@ SLIDING_FORCE = 0.3  # relative error of the brake force taken for the force of 
 BALANCE_FLOOR = 0.01  # m/s^2, unmodelled in the balance
 BALANCE_SHARE = 0.004  # of the deceleration
 ACROSS = 0.4  # of the lateral acceleration: stands for a smaller error that lasts a second
+PERSISTS_S = 0.3  # of a rejected balance while braking: then friction is wrong, not the measurement
 SKEW_ACCEL = 0.5  # windows between acceleration and torques
 
 
@@ -97,5 +98,7 @@ def correct_by_balance(params: Record, state: Record, braking: bool) -> None:
             variance += (SLIDING_FORCE * per_bar * w.pressure[i]) ** 2
     wild *= max(params.sigma_motor_torque - SCALE_ONLY, 0.0)
     variance += wild * wild * (1.0 if braking else COLOURED)
-    reject = math.inf if braking else REJECT
-    state.ratio[BALANCE_RATIO] = correct(state, -left, variance, reject)
+    reject = REJECT if state.rejected_s < PERSISTS_S else math.inf
+    ratio = correct(state, -left, variance, reject)
+    state.rejected_s = state.rejected_s + w.time if braking and ratio > REJECT * REJECT else 0.0
+    state.ratio[BALANCE_RATIO] = ratio

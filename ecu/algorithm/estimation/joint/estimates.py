@@ -87,8 +87,11 @@ def _tell_friction(
             sigma = math.sqrt(sigma * sigma + hydraulics.variance[i] / (above * above))
         estimate.mu[i], estimate.sigma[i] = mu, mu * sigma
         good = usable(inputs, WHEEL_SPEED + i) and usable(inputs, CALLIPER_PRESSURE + i)
-        if braking and state.observed[i] and good:
+        by_wheel = good and state.observed[i] != 0
+        by_balance = usable(inputs, CALLIPER_PRESSURE + i) and math.isfinite(state.ratio[BALANCE_RATIO])
+        if braking and (by_wheel or by_balance):
             estimate.observed_s[i] += dt
+        if braking and by_wheel:
             estimate.mode[i] = OBSERVING
         else:
             estimate.mode[i] = resting_mode(params, estimate, learned, good, i)

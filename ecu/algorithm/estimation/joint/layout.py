@@ -113,7 +113,8 @@ JOINT_STATE: Final = np.dtype(
         ),  # 1: beyond the linear range of its tyre, its torque does not indicate its force
         ("releasing", "u1"),
         ("released", "u1"),  # no friction brake is applied
-        ("modelled", "u1"),  # without an accelerometer: the acceleration is that of the torques
+        ("unmeasured_s", "f8"),  # time without an accelerometer: the acceleration is that of the torques [s]
+        ("rejected_s", "f8"),  # time for which the balance has been rejected while braking [s]
         ("untrusted_s", "f8"),  # time since a wheel was last trusted [s]
         ("hold_s", "f8"),  # time for which learning stays suspended after a wheel left its tyre's range
         ("reference_s", "f8"),  # time since the last speed reference [s]

@@ -83,6 +83,7 @@ from ecu.contract.signals import (
 from ecu.jit import Record, kernel
 
 WINDOW_S = 0.05
+LOST_S = 0.3  # without an accelerometer: longer than between two frames of a slow one
 LEAST_SPEED = 3.4  # m/s
 STRAIGHT = 0.05  # lateral acceleration over gravity: above it wheels roll at unequal loads and angles
 VARIES_FROM, VARIES = 0.3, 0.2  # m/s^2: acceleration at which mass is observable, and its change
@@ -207,6 +208,7 @@ def update_joint(
         state.x[V] = speed if math.isfinite(speed) else abs(state.x[V])
         state.p[V, V], state.reversing = 0.25, 0
         open_window(state)
+    _note_measured(state, motion.measured != 0, dt)
     state.released = 1 if not braking and _released(params, state, inputs) else 0
     gather(params, state, inputs, motion, load, hydraulics, state.released != 0, dt)
     if braking and usable(inputs, ACCEL_X):
@@ -215,7 +217,6 @@ def update_joint(
     if state.window.time < WINDOW_S - 0.001:
         return
     close_window(params, state, hydraulics)
-    _note_modelled(state, motion.measured == 0)
     _fuse(params, state, inputs, braking)
     if not braking and usable(inputs, ACCEL_X):
         measure_drive(params, state)
@@ -236,11 +237,12 @@ def _released(params: Record, state: Record, inputs: Record) -> bool:
 
 
 @kernel
-def _note_modelled(state: Record, modelled: bool) -> None:
-    """Forget the slope where the accelerometer has just been lost: it may have been the sensor's error."""
-    if modelled and not state.modelled:
+def _note_measured(state: Record, measured: bool, dt: float) -> None:
+    """Forget the slope once the accelerometer is lost for good: it may have been the sensor's error."""
+    lost = state.unmeasured_s >= LOST_S
+    state.unmeasured_s = 0.0 if measured else state.unmeasured_s + dt
+    if state.unmeasured_s >= LOST_S and not lost:
         clear_state(state, SLOPE, PRIOR[SLOPE] ** 2)
-    state.modelled = 1 if modelled else 0
 
 
 @kernel
@@ -277,7 +279,7 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     moving = x[V] > LEAST_SPEED
     state.drive_known = 1.0 - unknown_share(params, state)
     walk(state, braking and moving, time)
-    if state.modelled and braking and moving:
+    if state.unmeasured_s >= LOST_S and braking and moving:
         _drift_by_linings(params, state, time)
     _watch_release(state, braking)
     learning = moving and state.hold_s <= 0.0 and w.motor_known != 0

@@ -51,6 +51,8 @@ TRANSIENT = 1.0  # of a slip's change since the last window
 CURVED = 1.0  # of the part of a slip beyond that of a linear tyre: uncertainty of the peak
 CORNERING = 1.0  # of slip, per squared lateral adhesion: load and slip angle are then uncertain
 LOW_SPEED_NOISE = 0.15  # m/s
+CHANGED = 4.0  # times the squared gate, of a rolling wheel whose radius is another one
+ROLLS = 60.0  # N m, of a motor, below which a wheel that is not braked rolls freely
 
 
 @kernel
@@ -160,6 +162,9 @@ def correct_by_wheel(
     state.free[MASS] = state.free[MOTOR] = 0
     state.ratio[WHEEL_RATIO + i] = correct(state, innovation, variance)
     state.free[MASS], state.free[MOTOR] = mass, motor
+    rolls = state.free[RADIUS + i] != 0 and not observing and abs(w.motor[i]) < ROLLS
+    if rolls and state.ratio[WHEEL_RATIO + i] > CHANGED * GATE * GATE:
+        state.p[RADIUS + i, RADIUS + i] += (innovation / omega) ** 2  # it has changed: it is learned anew
     state.signed_ratio[i] = math.copysign(min(state.ratio[WHEEL_RATIO + i], GATE * GATE), innovation)
     state.observed[i] = 1 if observing and state.smooth_pressure[i] > 2.0 * APPLIED else 0
 

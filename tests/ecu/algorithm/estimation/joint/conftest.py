@@ -56,6 +56,7 @@ class Car:
         self.motion = np.zeros(1, MOTION_STATE)[0]
         self.motion["measured"] = 1
         self.load = self.params["static_load"].copy()
+        self.radius = np.ones(4)  # of the wheels, over the configured one
         self.hydraulics = np.zeros(1, HYDRAULICS_STATE)[0]
         self.time = 0.0
         self.braked = False
@@ -108,7 +109,7 @@ class Car:
             for i, own in (slide or {}).items():
                 slip[i] = own
             rolled = np.where(slip < 0, 1 + slip, 1 / (1 - slip)) * self.speed
-            omega = rolled / p["wheel_radius"] + sigma["wheel_speed"] * normal(4)
+            omega = rolled / (self.radius * p["wheel_radius"]) + sigma["wheel_speed"] * normal(4)
             value[WHEEL_SPEED : WHEEL_SPEED + 4] = omega
             reading = np.where(bar > 0, bar + p["push_out_pressure"] / BAR, 0.0)
             reading = reading + max(sigma["pressure"] / BAR, NEARLY_QUIET) * normal(4)

@@ -10,6 +10,7 @@ from ecu.algorithm.estimate import ESTIMATE
 from ecu.algorithm.estimation.joint.estimates import tell_joint
 from ecu.algorithm.estimation.joint.kalman import GATE
 from ecu.algorithm.estimation.joint.layout import (
+    BALANCE_RATIO,
     BIAS,
     CHANGE,
     JOINT_STATE,
@@ -91,28 +92,30 @@ def test_an_observed_friction_is_as_unsure_as_the_pressure_it_is_set_against(fee
 
 
 MODES = [
-    # braking, observed, pressure usable; friction is being observed
-    (True, True, True, True),
-    (True, False, True, False),
-    (True, True, False, False),
-    (False, True, True, False),
+    # braking, wheel and balance observed, pressure usable; friction is being observed, its time counts
+    (True, True, True, True, True, True),
+    (True, True, False, True, True, True),
+    (True, False, True, True, False, True),
+    (True, False, False, True, False, False),
+    (True, True, True, False, False, False),
+    (False, True, True, True, False, False),
 ]
 
 
-@pytest.mark.parametrize(("braking", "observed", "usable", "observing"), MODES)
+@pytest.mark.parametrize(("braking", "wheel", "balance", "usable", "observing", "counts"), MODES)
 def test_a_corner_is_observed_while_its_signals_show_friction(
-    feed, braking: bool, observed: bool, usable: bool, observing: bool
+    feed, braking: bool, wheel: bool, balance: bool, usable: bool, observing: bool, counts: bool
 ) -> None:
     state, estimate = driven(6), np.zeros(1, ESTIMATE)[0]
     inputs, learned = feed()[0], np.zeros(1, LEARNED)[0]
     hydraulics = np.zeros(1, HYDRAULICS_STATE)[0]
-    state["observed"] = observed
+    state["observed"], state["ratio"][BALANCE_RATIO] = wheel, 0.5 if balance else math.nan
     inputs["verdict"][CALLIPER_PRESSURE + 1] *= usable
     for _ in range(5):
         tell_joint(SUV, state, hydraulics, estimate, learned, inputs, braking, 0.01)
     assert (estimate["mode"][1] == OBSERVING) == observing
-    assert estimate["observed_s"][1] == pytest.approx(0.05 * observing)
-    assert (estimate["mode"][0] == OBSERVING) == (braking and observed)
+    assert estimate["observed_s"][1] == pytest.approx(0.05 * counts)
+    assert (estimate["mode"][0] == OBSERVING) == (braking and wheel)
 
 
 def test_the_sigma_of_all_linings_force_is_that_of_its_logarithms_gradient(feed) -> None:

@@ -106,6 +106,22 @@ def test_it_finds_friction_as_well_as_it_says(new_car, front, rear, mass, stiffn
     assert front < 0.05
 
 
+@pytest.mark.parametrize("change", [0.01, -0.01])
+def test_a_radius_that_changes_is_learned_anew_while_rolling(new_car, change: float) -> None:
+    """Both front wheels: their friction would be off by a third, their slip being some 2 %."""
+    errors = []
+    for seed in range(4):
+        car = new_car(seed=seed, speed=38.0)
+        car.drive(10.0)
+        car.drive(3.0, **BRAKING)
+        car.radius[:2] = 1.0 + change
+        car.speed = car.state["x"][V] = 38.0
+        car.drive(1.5)
+        errors.append(friction(car.drive(3.0, **BRAKING))[:2] - 1)
+    print(f"{change}: {np.round(100 * np.mean(errors, axis=0), 1)} %")
+    assert np.abs(np.mean(errors)) < 0.05
+
+
 LOST = [  # true friction over nominal, slope [m/s^2], error of the first application, of the fifth
     ("as configured", 1.0, 0.0, 0.03, 0.03),
     ("it fades", 0.8, 0.0, 0.10, 0.08),
