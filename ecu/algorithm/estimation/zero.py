@@ -76,12 +76,19 @@ def note_rest(state: Record, i: int, reading: float) -> None:
 
 
 @kernel
+def is_floored(state: Record, i: int) -> bool:
+    """Return whether a sensor reports no pressure below zero."""
+    at_floor: bool = state.at_floor[i] > LEAST_SHARE
+    return at_floor and not state.below[i]
+
+
+@kernel
 def settle_zero(state: Record, i: int) -> None:
     """Overwrite a sensor's zero and its variance from the readings added."""
     n = state.samples[i]
     zero, sigma = state.mean[i], math.sqrt(max(state.square[i] - state.mean[i] ** 2, 0.0))
     known = n / (n + START)
-    if not state.below[i] and state.at_floor[i] > LEAST_SHARE:
+    if is_floored(state, i):
         if state.at_floor[i] > NEARLY_ALL or not state.mean[i] > 0.0:
             state.value[i], state.variance[i] = -UNKNOWN, UNKNOWN * UNKNOWN
             return

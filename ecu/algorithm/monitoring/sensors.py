@@ -5,6 +5,7 @@ estimation, by the estimate of the last cycle.
 """
 
 from ecu.algorithm.control.failed_brakes import watch_brakes
+from ecu.algorithm.estimation.zero import is_floored
 from ecu.algorithm.inputs import LEAST_REQUEST, driver_accelerates, others_brake, requested_decel, usable
 from ecu.algorithm.monitoring.accel_error import (
     PROVEN_S,
@@ -81,7 +82,7 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
     if s.failed_brakes.any:
         faults |= BRAKE_FAILED
     contradicted = compare_pressures(
-        p, s.pressures, u, estimate, s.control, s.failed_brakes, s.hydraulics, estimate.pressure_zero,
+        p, s.pressures, u, estimate, s.control, s.failed_brakes, s.hydraulics, s.joint.zero,
         s.plausibility.sent != 0, dt,
     )  # fmt: skip
     for i in range(4):
@@ -120,7 +121,8 @@ def _mask_pressure(s: Record, u: Record, i: int, others: bool) -> None:
     elif s.pressures.wrong[i] or s.plausibility.apart_s[i] > LEFT_OUT_S:
         u.value[place] = model + s.estimate.pressure_zero[i]
     elif not s.pressures.honest:
-        u.value[place] -= lasting_difference(s.pressures, i, model)
+        reading = u.value[place] - lasting_difference(s.pressures, i, model)
+        u.value[place] = max(reading, 0.0) if is_floored(s.joint.zero, i) else reading
 
 
 @kernel

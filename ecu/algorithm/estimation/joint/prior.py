@@ -88,9 +88,7 @@ LEVEL_WALK = 0.01  # common to all levels while the pads rub
 # Bounds of learned states: beyond them a fault was learned, not a car. Of friction: `friction.py`.
 LOWEST, HIGHEST = np.full(N, -np.inf), np.full(N, np.inf)
 LOWEST[LEVEL : LEVEL + 4], HIGHEST[LEVEL : LEVEL + 4] = math.log(LEAST_RATIO), math.log(GREATEST_RATIO)
-LEFT_RIGHT = (
-    0.2  # of an axle's two levels: linings of one axle are of one batch, and one that is oiled is found
-)
+LEFT_RIGHT = 0.2  # of an axle's two levels: its linings are of one batch, and one that is oiled is found
 LOWEST[STIFFNESS], HIGHEST[STIFFNESS] = math.log(0.4), math.log(2.5)
 LOWEST[RADIUS : RADIUS + 4], HIGHEST[RADIUS : RADIUS + 4] = -0.02, 0.02
 LOWEST[BIAS], HIGHEST[BIAS] = -0.6, 0.6
