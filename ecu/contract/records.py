@@ -14,7 +14,8 @@ from ecu.contract.signals import N_INPUTS, N_OUTPUTS, OUTPUT_SIGNALS
 RecordArray = NDArray[np.void]
 
 # One CAN frame as received. `stamp_ns` is the kernel's receive time on the real-time clock, cut to whole
-# microseconds as in candump logs, so that a log replays to the same bits.
+# microseconds as in candump logs, so that a log replays to the same bits; in a run less what that clock was
+# set by since the start.
 FRAME: Final = np.dtype(
     [
         ("stamp_ns", "i8"),
@@ -60,8 +61,9 @@ assert OUTPUTS.itemsize == 8 * N_OUTPUTS
 CYCLE: Final = np.dtype(
     [
         ("number", "i8"),
-        ("t_ns", "i8"),  # T_k on the real-time clock, the clock of the frames' stamps
+        ("t_ns", "i8"),  # T_k on the run's time line, that of the frames' stamps: see ecu/runtime/clock.py
         ("t_mono_ns", "i8"),  # T_k on the monotonic clock
+        ("clock_set_ns", "i8"),  # by how much the real-time clock was set since the start
         ("missed", "i4"),  # periods missed before this cycle
         ("bus_faults", "u4"),
         ("overruns", "u4"),

@@ -22,6 +22,7 @@ class EventLog:
         self._throttle = throttle or Throttle()
         self._mode, self._faults, self._overruns, self._dropped, self._lost = 0, 0, 0, 0, 0
         self._speaks: bool | None = None
+        self._clock_set_ns = 0
 
     def begin_after(self, record: RecordArray, lost: int = 0) -> None:
         """Continue after an earlier log that ended with `record` (`RECORDED`, shape (1,)); `lost`: cycles and
@@ -30,6 +31,7 @@ class EventLog:
         self._mode, self._faults = int(np.nan_to_num(outputs["mode"])), int(fault_mask(outputs))
         self._overruns, self._dropped = int(cycle["overruns"]), int(cycle["dropped"])
         self._speaks = bool(cycle["speaks"])
+        self._clock_set_ns = int(cycle["clock_set_ns"])
         self._lost = lost
 
     def look(self, records: RecordArray, lost_cycles: int, lost_frames: int) -> None:
@@ -49,6 +51,9 @@ class EventLog:
         self._speaks = bool(speaks[-1])
         last = cycles[-1]
         overruns, dropped = int(last["overruns"]), int(last["dropped"])
+        if (set_ns := int(last["clock_set_ns"])) != self._clock_set_ns:
+            self._say("clock_set", by_s=1e-9 * (set_ns - self._clock_set_ns), since_start_s=1e-9 * set_ns)
+            self._clock_set_ns = set_ns
         if overruns > self._overruns:
             self._say("missed", missed=overruns - self._overruns, total=overruns)
             self._overruns = overruns

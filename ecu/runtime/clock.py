@@ -1,9 +1,12 @@
 """Time grid of 10 ms: absolute deadlines on the monotonic clock, missed periods, lateness statistics.
 
 Missed periods are not caught up in a burst but counted, whether the cycle before lasted too long or the sleep
-did (a stopped process, a paused virtual machine): a cycle's deadline T_k is the last one on the grid when it
-wakes, never one from before the sleep. T_k exists on two clocks: the monotonic one schedules, the real-time
-one is compared with the frames' stamps.
+did (a stopped process, a paused virtual machine, a suspended machine, whose time the monotonic clock here
+counts): a cycle's deadline T_k is the last one on the grid when it wakes, never one from before the sleep.
+
+The frames' stamps are of the real-time clock, which can be set at any time. A run keeps the time line on which
+it began, real time at its start plus monotonic time since; `Grid.follow_realtime` tells by how much the
+real-time clock has been set, and the cycle takes that off the stamps.
 """
 
 import ctypes
@@ -11,6 +14,7 @@ import math
 import os
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -19,6 +23,18 @@ from numpy.typing import NDArray
 from ecu.contract.signals import CYCLE_NS
 
 MICROSECOND_NS: Final = 1000
+
+
+_SUSPENDED_TOO: Final[int | None] = getattr(time, "CLOCK_BOOTTIME", None)
+monotonic_ns: Final[Callable[[], int]] = (
+    time.monotonic_ns if _SUSPENDED_TOO is None else partial(time.clock_gettime_ns, _SUSPENDED_TOO)
+)
+"""The monotonic clock of the cycle [ns]: with the time for which the machine was suspended, where that is known."""
+
+
+def monotonic_s() -> float:
+    """Return the cycle's monotonic clock [s]."""
+    return 1e-9 * monotonic_ns()
 
 
 class TimeSource(NamedTuple):
@@ -34,10 +50,11 @@ class _Timespec(ctypes.Structure):
 
 
 def _absolute_sleep() -> Callable[[int], None]:
-    """Return clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME), or time.sleep where libc has none."""
+    """Return clock_nanosleep(TIMER_ABSTIME) on the monotonic clock, or time.sleep where libc has none."""
     nanosleep = getattr(ctypes.CDLL(None), "clock_nanosleep", None) if os.name == "posix" else None
     if nanosleep is None:
-        return lambda deadline_ns: time.sleep(max(0, deadline_ns - time.monotonic_ns()) / 1e9)
+        return lambda deadline_ns: time.sleep(max(0, deadline_ns - monotonic_ns()) / 1e9)
+    clock = time.CLOCK_MONOTONIC if _SUSPENDED_TOO is None else _SUSPENDED_TOO
     nanosleep.argtypes = (ctypes.c_int, ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)
     until = _Timespec()
     address = ctypes.addressof(until)
@@ -45,21 +62,21 @@ def _absolute_sleep() -> Callable[[int], None]:
 
     def sleep_until(deadline_ns: int) -> None:
         until.seconds, until.nanoseconds = divmod(deadline_ns, 1_000_000_000)
-        nanosleep(time.CLOCK_MONOTONIC, absolute, address, None)
+        nanosleep(clock, absolute, address, None)
 
     return sleep_until
 
 
 def system_time() -> TimeSource:
     """Return the machine's clocks."""
-    return TimeSource(time.monotonic_ns, time.time_ns, _absolute_sleep())
+    return TimeSource(monotonic_ns, time.time_ns, _absolute_sleep())
 
 
 class Tick(NamedTuple):
     """One deadline after its wait."""
 
     t_ns: int
-    """T_k on the real-time clock, whole microseconds."""
+    """T_k on the run's time line, whole microseconds."""
     t_mono_ns: int
     missed: int
     """Periods that passed unserved since the cycle before."""
@@ -74,6 +91,9 @@ class Grid:
         self.source, self.period_ns = source, period_ns
         self.deadline_ns = source.monotonic_ns()
         self.offset_ns, self._spread_ns = self._sample_offset()
+        """Real time at the start less monotonic time: the time line, for the whole run."""
+        self.set_ns = 0
+        """By how much the real-time clock has been set since the start, whole microseconds."""
 
     def wait(self) -> Tick:
         """Sleep until the next deadline; a signal may interrupt the sleep, which then continues."""
@@ -85,7 +105,6 @@ class Grid:
             self.source.sleep_until(self.deadline_ns)
             now = self.source.monotonic_ns()
         self.deadline_ns += (now - self.deadline_ns) // period * period
-        self._follow_realtime()
         t_ns = (self.deadline_ns + self.offset_ns) // MICROSECOND_NS * MICROSECOND_NS
         return Tick(t_ns, self.deadline_ns, (self.deadline_ns - due_ns) // period, now - due_ns)
 
@@ -95,11 +114,14 @@ class Grid:
         after = self.source.monotonic_ns()
         return real - (before + after) // 2, after - before
 
-    def _follow_realtime(self) -> None:
-        """Take a new offset only if the real-time clock was set: a sleep between readings falsifies it."""
+    def follow_realtime(self) -> int:
+        """Return `set_ns` as it is now. It changes only if the real-time clock was set: a sleep between the
+        two readings falsifies them."""
         offset, spread = self._sample_offset()
-        if abs(offset - self.offset_ns) > spread + self._spread_ns:
-            self.offset_ns, self._spread_ns = offset, spread
+        if abs(offset - self.offset_ns - self.set_ns) > spread + self._spread_ns + MICROSECOND_NS:
+            self.set_ns = (offset - self.offset_ns) // MICROSECOND_NS * MICROSECOND_NS
+            self._spread_ns = spread
+        return self.set_ns
 
 
 class Welford:

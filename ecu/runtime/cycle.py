@@ -139,7 +139,7 @@ class Progress:
     def __init__(self, watch: Watch, standby: Standby | None = None) -> None:
         self.watch, self.standby, self.claim, self.timing = watch, standby, Claim(), Timing()
         self.number = self.overruns = self.waiting = self.foreign = 0
-        self.worst_lateness_ns = self.previous_t_ns = 0
+        self.worst_lateness_ns = self.previous_t_ns = self.emptied_ns = 0
 
     @property
     def speaks(self) -> bool:
@@ -152,8 +152,12 @@ def cycle_once(ecu: Ecu, channel: Channel, ring: Ring, grid: Grid, run: Progress
     clock = grid.source.monotonic_ns
     tick = grid.wait()
     woken = clock()
-    run.waiting += channel.drain(ecu.waiting, run.waiting)
+    first, set_before_ns, emptied_ns = run.waiting, grid.set_ns, run.emptied_ns
+    run.waiting += channel.drain(ecu.waiting, first)
+    set_ns = grid.follow_realtime()
     drained = clock()
+    run.emptied_ns = drained + grid.offset_ns
+    _stamp(ecu.waiting, first, run.waiting, set_ns, set_before_ns, emptied_ns, run.emptied_ns)
     consumed, late, foreign, beside = _gather(
         ecu.receive_plan,
         ecu.transmit_plan.ids,
@@ -164,7 +168,6 @@ def cycle_once(ecu: Ecu, channel: Channel, ring: Ring, grid: Grid, run: Progress
         tick.t_ns,
         (tick.missed + 1) * CYCLE_NS,
         run.previous_t_ns,
-        grid.source.realtime_ns(),
     )
     if run.standby is None:
         run.foreign += foreign
@@ -187,6 +190,7 @@ def cycle_once(ecu: Ecu, channel: Channel, ring: Ring, grid: Grid, run: Progress
 
     stages = (drained - woken, received - drained, stepped - received, encoded - stepped, sent - encoded)
     _note_cycle(ecu, run, tick, consumed, late, status.dropped, stages)
+    ecu.cycle["clock_set_ns"] = set_ns
     publish(ring, ecu.cycle, ecu.outputs, ecu.learned, ecu.waiting)
     run.waiting = _keep_rest(ecu.waiting, consumed, run.waiting)
     run.timing.add(tick.lateness_ns, stages)
@@ -217,6 +221,24 @@ def _note_cycle(
 
 
 @kernel
+def _stamp(
+    frames: Any, first: int, count: int, set_ns: int, set_before_ns: int, emptied_ns: int, now_ns: int
+) -> None:
+    """Turn the stamps of `frames[first:count]` from the real-time clock to the run's time line.
+
+    They came after `emptied_ns`. Where the clock was set since, from `set_before_ns` to `set_ns`, those that
+    this contradicts were stamped before. A stamp in the future, of a driver with a clock of its own, becomes
+    now.
+    """
+    now_us = now_ns // MICROSECOND_NS * MICROSECOND_NS
+    for i in range(first, count):
+        stamp_ns = frames[i].stamp_ns - set_ns
+        if set_before_ns != set_ns and not emptied_ns < stamp_ns <= now_ns:
+            stamp_ns = frames[i].stamp_ns - set_before_ns
+        frames[i].stamp_ns = min(stamp_ns, now_us)
+
+
+@kernel
 def _gather(
     plan: ReceivePlan,
     own_ids: NDArray[np.uint32],
@@ -227,17 +249,12 @@ def _gather(
     t_ns: int,
     dt_ns: int,
     previous_t_ns: int,
-    now_ns: int,
 ) -> tuple[int, int, int, int]:
     """Fill `inputs` from the frames stamped up to `t_ns`.
 
     Returns their number, how many of them were late, how many have one of our own identifiers, and in how
-    many periods such ones came. A stamp in the future means that the clock was set back: it becomes now.
+    many periods such ones came.
     """
-    now_us = now_ns // MICROSECOND_NS * MICROSECOND_NS
-    for i in range(count):
-        if frames[i].stamp_ns > now_us:
-            frames[i].stamp_ns = now_us
     begin_cycle(inputs[0], t_ns, dt_ns)
     consumed = receive(plan, reception, frames, 0, count, inputs[0])
     end_cycle(inputs[0], reception.freshness)

@@ -5,11 +5,11 @@ HEALTHCHECK of a container. `/health` of the metrics answers the same.
 """
 
 import math
-import time
 from typing import Final
 
 from ecu.errors import UserError
 from ecu.recording.ring import RingReader
+from ecu.runtime.clock import monotonic_s
 from ecu.watch.daemons import running
 
 STALLED_S: Final = 0.5
@@ -25,7 +25,7 @@ def ailment(reader: RingReader, age_s: float) -> str:
 
 
 def ailments(now_s: float) -> list[str]:
-    """Return a line for each daemon that is not well at `now_s` of the monotonic clock, one if none runs."""
+    """Return a line for each daemon that is not well at `now_s` of the loop's monotonic clock, one if none runs."""
     found = running()
     lines = [] if found else ["no daemon runs"]
     for daemon in found:
@@ -43,7 +43,7 @@ def ailments(now_s: float) -> list[str]:
 
 def main() -> int:
     """Print what is not well."""
-    lines = ailments(time.monotonic())
+    lines = ailments(monotonic_s())
     for line in lines:
         print(line)
     return 1 if lines else 0

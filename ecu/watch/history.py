@@ -85,6 +85,8 @@ def _sentence(event: str, content: dict[str, Any]) -> str:
             return f"{content['fault']}: gone"
         case "missed":
             return f"periods missed: {content['missed']}, in all {content['total']}"
+        case "clock_set":
+            return f"the machine's clock was set by {content['by_s']:+g} s"
         case "frames_dropped":
             return f"{content['dropped']} frames dropped by the kernel"
         case "ring_overtaken":
@@ -129,7 +131,7 @@ class History:
         clock = self._clock
         if cycle is not None:
             place = int(np.searchsorted(self._looked["number"], cycle))
-            clock = 1e-9 * float(self._looked["t_ns"][place])
+            clock = float(_clock_s(self._looked)[place])
         self.events.append(Event(clock, text, serious))
 
     def take(self, batch: Batch, reader: RingReader) -> None:
@@ -137,7 +139,7 @@ class History:
         records = batch.records
         if not len(records):
             return
-        self._clock = 1e-9 * float(records["cycle"]["t_ns"][-1])
+        self._clock = float(_clock_s(records["cycle"])[-1])
         self.cycles = int(records["cycle"]["number"][-1]) + 1
         self.missed = int(records["cycle"]["overruns"][-1])
         self._looked = records["cycle"]
@@ -166,12 +168,17 @@ class History:
             self._worst_us = max(self._worst_us, float(late_us[begin:].max()))
 
 
+def _clock_s(cycles: RecordArray) -> Row:
+    """Return the machine's clock [s since 1970] at T_k."""
+    return 1e-9 * (cycles["t_ns"] + cycles["clock_set_ns"])
+
+
 def _row(record: RecordArray, worst_us: float) -> Row:
     cycle, outputs = record["cycle"], record["outputs"]
     return np.concatenate(
         [
             cycle["t_mono_ns"] * 1e-9,
-            cycle["t_ns"] * 1e-9,
+            _clock_s(cycle),
             [worst_us],
             cycle["speaks"],
             *(outputs[name] for name in PLAIN),

@@ -3,7 +3,6 @@
 Frames are checked once more by the daemon's own code (`receive`), so what it rejected is known by reason.
 """
 
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final
@@ -19,6 +18,7 @@ from ecu.contract.records import INPUTS, STAGES, RecordArray, new_record
 from ecu.contract.signals import CYCLE_NS
 from ecu.errors import UserError
 from ecu.recording.ring import Batch, RingReader
+from ecu.runtime.clock import monotonic_s
 from ecu.watch.health import ailment
 
 EDGES_S: Final = (20e-6, 50e-6, 100e-6, 200e-6, 500e-6, 1e-3, 2e-3, 5e-3, 10e-3, 100e-3)
@@ -28,7 +28,7 @@ EDGES_S: Final = (20e-6, 50e-6, 100e-6, 200e-6, 500e-6, 1e-3, 2e-3, 5e-3, 10e-3,
 class Tally:
     """Counts of one run, from the oldest cycle that the ring holds."""
 
-    def __init__(self, ring: Path, now_s: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, ring: Path, now_s: Callable[[], float] = monotonic_s) -> None:
         """Raises UserError: there is no ring (yet)."""
         self.reader = RingReader(ring)
         self._now_s = now_s

@@ -1,5 +1,6 @@
 import math
 import statistics
+import time as wall
 from itertools import pairwise
 
 import pytest
@@ -88,26 +89,37 @@ def test_real_time_deadlines_are_whole_microseconds_on_the_same_grid():
     assert 0 <= EPOCH_NS + 1_234 + 10 * MS - stamps[0] < 1000
 
 
-@pytest.mark.parametrize("step_s", [3600, -3600, 0.05])
-def test_a_clock_that_was_set_moves_the_real_time_deadline_and_no_other(step_s):
+@pytest.mark.parametrize("step_s", [0.05, -0.05, 3600, -3600, 31_536_000, -31_536_000])
+def test_a_clock_that_was_set_is_told_and_moves_no_deadline(step_s):
     time = FakeTime()
     grid = Grid(time.source())
     before = grid.wait()
     time.offset_ns += round(step_s * 1e9)
     after = grid.wait()
-    assert after.t_mono_ns - before.t_mono_ns == 10 * MS
-    assert after.t_ns - before.t_ns == 10 * MS + round(step_s * 1e9)
+    assert after.t_mono_ns - before.t_mono_ns == after.t_ns - before.t_ns == 10 * MS
+    assert grid.follow_realtime() == round(step_s * 1e9)
+    time.offset_ns = EPOCH_NS
+    assert grid.follow_realtime() == 0
 
 
-def test_a_reading_that_was_interrupted_does_not_move_the_deadline():
+def test_a_reading_that_was_interrupted_is_no_clock_that_was_set():
     time = FakeTime()
     grid = Grid(time.source())
-    before = grid.wait()
-    reads = iter([10 * MS, 20 * MS, 20 * MS, 24 * MS])  # asleep, awake, then 4 ms between the two readings
+    reads = iter([20 * MS, 24 * MS])
     grid.source = time.source()._replace(
-        monotonic_ns=lambda: next(reads), realtime_ns=lambda: EPOCH_NS + 20 * MS, sleep_until=lambda _: None
+        monotonic_ns=lambda: next(reads), realtime_ns=lambda: EPOCH_NS + 20 * MS
     )
-    assert grid.wait().t_ns - before.t_ns == 10 * MS
+    assert grid.follow_realtime() == 0
+
+
+@pytest.mark.skipif(not hasattr(wall, "CLOCK_BOOTTIME"), reason="no clock here counts a suspension")
+def test_a_suspended_machine_s_time_counts():
+    """So a cycle after it is one that overslept, and asks for what is asked then."""
+    source = system_time()
+    before = wall.clock_gettime_ns(wall.CLOCK_BOOTTIME)
+    assert before <= source.monotonic_ns() <= wall.clock_gettime_ns(wall.CLOCK_BOOTTIME)
+    source.sleep_until(before + MS)
+    assert wall.clock_gettime_ns(wall.CLOCK_BOOTTIME) >= before + MS
 
 
 def test_the_machines_own_clocks_keep_the_grid():

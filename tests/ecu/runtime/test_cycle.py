@@ -42,7 +42,7 @@ class Bench:
         self.values = np.zeros(N_INPUTS)
         self.values[INPUT["hydraulic_ready"]] = self.values[INPUT["decel_demand_valid"]] = 1
         self.values[INPUT["accumulator_pressure"]] = 160
-        self.then = {}
+        self.then, self.then_do = {}, lambda: None
         self.periods = 0
         self.grid = Grid(TimeSource(lambda: self.now_ns, lambda: self.now_ns + self.offset_ns, self.sleep))
         params = new_params(load_config(ROOT / "config" / "suv.toml"))
@@ -57,6 +57,7 @@ class Bench:
     def sleep(self, until_ns: int) -> None:
         self.pass_time(until_ns)
         self.values[list(self.then)] = list(self.then.values())
+        self.then_do()
         self.pass_time(until_ns + self.oversleeps_ns)
         self.oversleeps_ns = 0
 
@@ -235,15 +236,31 @@ def test_a_cycle_consumes_the_frames_up_to_its_deadline_however_often_the_proces
     assert bench.progress.overruns > 100
 
 
-def test_a_clock_set_back_holds_no_frame_back(bench):
-    bench.run(5)
-    bench.vehicle()
-    bench.offset_ns -= 3600 * 1_000_000_000
-    bench.speaks = False
-    assert bench.run()["frames"] > 0
-    bench.speaks = True
-    assert bench.run(3)["frames"] > 0
-    assert bench.progress.waiting == 0
+YEAR_S = 31_536_000
+
+
+@pytest.mark.parametrize("when", ["before the frames came", "after they came"])
+@pytest.mark.parametrize("step_s", [0.02, -0.02, 0.2, -0.2, 3600, -3600, YEAR_S, -YEAR_S])
+def test_a_clock_that_is_set_changes_nothing_but_its_own_record(braking, step_s, when):
+    def set_clock():
+        braking.offset_ns = EPOCH_NS + round(step_s * 1e9)
+
+    if when == "after they came":
+        braking.oversleep(0.5)
+        braking.then_do = set_clock
+    else:
+        set_clock()
+    stamps, modes = [], []
+    for _ in range(150):
+        cycle = braking.run()
+        modes.append(int(braking.ecu.outputs["mode"][0]))
+        assert braking.ecu.outputs["pressure_demand_valid"][0] == 1
+        assert int(braking.ecu.outputs["active_faults"][0]) & ~faults.BRAKE_FAILED == 0
+        assert (cycle["late_frames"], cycle["missed"], cycle["clock_set_ns"]) == (0, 0, step_s * 1e9)
+        stamps += np.unique(braking.reader.read().frames["stamp_ns"]).tolist()
+    assert len(set(modes)) == 1
+    assert (np.diff(stamps) == CYCLE_NS).all()
+    assert braking.progress.waiting == 0
 
 
 def rose(**change):

@@ -23,6 +23,7 @@ from brakelab.simulation.faults import Fault
 from ecu.bus.channel import open_channel
 from ecu.errors import RunFault, UserError
 from ecu.recording.ring import RingReader, ring_path
+from ecu.runtime.clock import monotonic_s
 from ecu.runtime.start import raise_priority
 
 MULTICAST: Final = f"239.74.163.{os.getpid() % 250 + 2}"  # a group of its own: two rigs do not interfere
@@ -143,7 +144,7 @@ class Processes:
         return None
 
     def departure(self) -> float:
-        """Wait until the vehicle sets off; return T_0 on the monotonic clock [s]."""
+        """Wait until the vehicle sets off; return T_0 on the cycle's monotonic clock [s]."""
         return 1e-9 * int(self._line("driving").split()[1])
 
     def _line(self, begin: str) -> str:
@@ -243,7 +244,7 @@ def _act(
     t_0 = processes.departure()
     victim, may_end = processes.daemons[-1], bool(actions)
     while processes.driving() and (may_end or victim.poll() is None):
-        if actions and time.monotonic() >= t_0 + actions[0][0]:
+        if actions and monotonic_s() >= t_0 + actions[0][0]:
             match actions.pop(0)[1]:
                 case "kill":
                     victim.kill()
@@ -257,7 +258,7 @@ def _act(
                     wire.ends[0].restart()
             continue
         look(ring)
-        due = t_0 + actions[0][0] - time.monotonic() if actions else TURN_S
+        due = t_0 + actions[0][0] - monotonic_s() if actions else TURN_S
         time.sleep(min(max(due, 0.0), TURN_S))
     return ring
 
