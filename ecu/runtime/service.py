@@ -17,7 +17,7 @@ from ecu.recording.ring import close_ring, remove_ring
 from ecu.runtime.clock import Grid, system_time
 from ecu.runtime.cycle import Progress, Watch, cycle_once, send_farewell
 from ecu.runtime.prepare import RunOptions, Session, prepare
-from ecu.runtime.start import ENDING, left_at_once
+from ecu.runtime.start import ENDING, IGNORED, left_at_once, signal_name
 
 LOOK_AT_SIDE_CYCLES: Final = 10
 SIDE_PATIENCE_S: Final = 30.0  # to write out the ring
@@ -40,6 +40,8 @@ def run(options: RunOptions) -> int:
     for number in ENDING:
         if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:  # nohup
             signal.signal(number, stop)
+    for number in IGNORED:
+        signal.signal(number, signal.SIG_IGN)
     with left_at_once():
         session = prepare(options)
     progress = Progress(Watch(session.channel.status(), session.compiled), session.standby)
@@ -48,7 +50,7 @@ def run(options: RunOptions) -> int:
     try:
         _cycle_until(session, progress, stopping)
         off = session.channel.status().bus_off
-        words["by"] = signal.Signals(stopping[0]).name
+        words["by"] = signal_name(stopping[0])
     except BaseException as error:
         words["by"] = f"{type(error).__name__}: {error}"
         if isinstance(error, OSError):  # of the machine, not of an argument: a restart may help

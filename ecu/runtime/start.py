@@ -12,17 +12,29 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Final
 
-ENDING: Final = (
-    signal.SIGTERM,
-    signal.SIGINT,
-    signal.SIGHUP,
-    signal.SIGQUIT,
-    signal.SIGABRT,
-    signal.SIGUSR1,
-    signal.SIGUSR2,
-)
-"""End a run in order; a group's are left to the loop by its side processes."""
+
+def _signals(*names: str) -> set[int]:
+    """Return those of the signals that this system has."""
+    return {int(getattr(signal, name)) for name in names if hasattr(signal, name)}
+
+
+IGNORED: Final = _signals("SIGTSTP", "SIGTTIN", "SIGTTOU")
+"""Signals by which a terminal would stop the loop in the middle of a demand."""
+HARMLESS: Final = _signals("SIGCHLD", "SIGCONT", "SIGURG", "SIGWINCH", "SIGPIPE", "SIGXFSZ")
+"""Signals that end no process, the last two because Python ignores them."""
+OUT_OF_REACH: Final = _signals("SIGKILL", "SIGSTOP", "SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL", "SIGSYS")
+"""Signals that cannot be caught, or that tell of an instruction that would be tried again for ever."""
+ENDING: Final = tuple(sorted({int(one) for one in signal.valid_signals()} - IGNORED - HARMLESS - OUT_OF_REACH))
+"""All other signals. They end a run in order; a group's are left to the loop by its side processes."""
 PRIORITY: Final = 1  # of SCHED_FIFO: above every ordinary process, below every real-time one
+
+
+def signal_name(number: int) -> str:
+    """Return a signal's name, for a real-time one its distance from the first."""
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"SIGRTMIN+{number - signal.SIGRTMIN}"
 
 
 def is_run(arguments: list[str]) -> bool:

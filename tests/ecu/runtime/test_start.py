@@ -11,7 +11,16 @@ import numba
 import pytest
 
 from ecu.jit import CompileCounter
-from ecu.runtime.start import left_at_once, lower_priority, raise_priority, without_modules
+from ecu.runtime.start import (
+    ENDING,
+    IGNORED,
+    OUT_OF_REACH,
+    left_at_once,
+    lower_priority,
+    raise_priority,
+    signal_name,
+    without_modules,
+)
 
 
 def test_what_is_kept_out_is_not_found_and_comes_back_afterwards(monkeypatch, tmp_path):
@@ -51,6 +60,22 @@ def test_a_signal_ends_what_compiles_at_once_and_nobody_s_business_else():
     with left_at_once():
         assert threading.active_count() == before + 1
     assert threading.active_count() == before  # the loop has no thread beside it
+
+
+def test_every_signal_that_would_end_the_loop_is_caught_or_out_of_reach():
+    """The kernel itself says which signals end a process that does nothing about them."""
+    script = "import os, signal, sys; signal.signal(2, signal.SIG_DFL); os.kill(os.getpid(), int(sys.argv[1]))"
+    command = [sys.executable, "-I", "-S", "-c", script]
+    numbers = [int(one) for one in signal.valid_signals() - OUT_OF_REACH - IGNORED]
+    fatal = {n for n in numbers if subprocess.run([*command, str(n)], check=False).returncode == -n}
+    assert fatal <= set(ENDING)
+    assert {"SIGALRM", "SIGXCPU", "SIGVTALRM", "SIGPROF", "SIGRTMIN", "SIGIO", "SIGPWR", "SIGTERM"} <= {
+        signal_name(number) for number in fatal
+    }
+
+
+def test_signals_have_names():
+    assert [signal_name(number) for number in (signal.SIGHUP, signal.SIGRTMIN + 3)] == ["SIGHUP", "SIGRTMIN+3"]
 
 
 def test_precedence_is_real_time_below_every_cycle_and_goes_back():
