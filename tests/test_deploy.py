@@ -1,6 +1,7 @@
 """The files for a machine: systemd itself is asked about its own."""
 
 import re
+import shlex
 import shutil
 import subprocess
 from importlib.util import find_spec
@@ -30,6 +31,20 @@ def test_the_watchdog_waits_for_four_signs_of_life():
     text = (DEPLOY / "brake-ecu.service").read_text()
     assert "\nWatchdogSec=1\n" in text
     assert Manager({"NOTIFY_SOCKET": "x", "WATCHDOG_USEC": "1000000"}).watchdog_cycles == 25
+
+
+@pytest.mark.parametrize(("status", "waits"), [("2", True), ("1", False), ("0", False), ("KILL", False)])
+def test_no_exit_code_ends_the_service_for_good_and_one_alone_makes_it_wait(status, waits, tmp_path):
+    text = (DEPLOY / "brake-ecu.service").read_text()
+    assert re.findall(r"^Restart\w*=.*", text, re.M) == ["Restart=always", "RestartSec=0"]
+    assert "\nStartLimitIntervalSec=0\n" in text
+    command = re.search(r"^ExecStopPost=(.*)", text, re.M)[1].replace("$$", "$")
+    pause = tmp_path / "sleep"
+    pause.write_text("#!/bin/sh\necho paused for $1\n")
+    pause.chmod(0o755)
+    environment = {"PATH": str(tmp_path), "EXIT_STATUS": status}
+    said = subprocess.run(shlex.split(command), env=environment, capture_output=True, text=True, check=True)
+    assert said.stdout == ("paused for 5\n" if waits else "")
 
 
 def test_nothing_in_the_unit_forbids_what_the_daemon_does():
