@@ -1,15 +1,60 @@
-"""Detection of a foreign sender of our frames, before the first frame is sent."""
+"""Other senders of our frames: one that sends before we do, and frames by which another ECU is known.
+
+A stray frame is no sender. Before the first frame is sent, one counts who sends an identifier of ours again
+and again, whatever it holds: two such senders destroy each other's frames. Later, when braking depends on it,
+only another ECU does: intact frames of two of our messages at a time, which garbage is not even by chance.
+"""
 
 import time
-from typing import Final
+from typing import Any, Final
 
+import numpy as np
+
+from ecu.bus.e2e import p01_crc
 from ecu.bus.protocol import Channel
 from ecu.bus.transmit import TransmitPlan
 from ecu.contract.records import EXTENDED_ID, FRAME, FRAME_EXTENDED, new_record
 from ecu.errors import UserError
+from ecu.jit import Record, kernel
 
 _AT_ONCE: Final = 1024
 _DISCARD_S: Final = 0.5  # a bus too busy to be emptied in that time is listened to at once
+_LOOK_S: Final = 0.01
+SENDS: Final = 5
+"""Looks in which one identifier was heard that make a sender; one look hears all that came at once."""
+
+
+@kernel
+def place_of_ours(plan: TransmitPlan, frame: Record) -> int:
+    """Return the message of `plan` that has the frame's identifier, -1: none."""
+    identifier = np.int64(frame.can_id) | (EXTENDED_ID if frame.flags & FRAME_EXTENDED else 0)
+    for place in range(len(plan.ids)):
+        if plan.ids[place] == identifier:
+            return place
+    return -1
+
+
+@kernel
+def is_intact(plan: TransmitPlan, place: int, frame: Record) -> bool:
+    """Return whether a frame of our message at `place` is protected as ours is; False for unprotected ones."""
+    message = plan.messages[place]
+    if message.data_id == 0 or frame.length != message.length:
+        return False
+    return int(frame.data[0]) == p01_crc(frame.data, frame.length, message.data_id)
+
+
+@kernel
+def another_ecu_speaks(plan: TransmitPlan, frames: Any, count: int) -> bool:
+    """Return whether intact frames of two of our messages are among `frames[:count]`."""
+    first = -1
+    for i in range(count):
+        place = place_of_ours(plan, frames[i])
+        if place < 0 or place == first or not is_intact(plan, place, frames[i]):
+            continue
+        if first >= 0:
+            return True
+        first = place
+    return False
 
 
 def discard(channel: Channel) -> None:
@@ -20,25 +65,30 @@ def discard(channel: Channel) -> None:
         pass
 
 
-def listen_before_send(channel: Channel, where: str, plan: TransmitPlan, seconds: float) -> None:
+def listen_before_send(channel: Channel, where: str, plan: TransmitPlan, seconds: float) -> int:
     """Listen for a while and refuse to start if another node already sends one of our frames.
+
+    Returns the number of stray frames with an identifier of ours.
 
     Raises:
         UserError: a foreign sender was heard.
     """
-    names = dict(zip(plan.ids.tolist(), plan.messages["name"].tolist(), strict=True))
     frames = new_record(FRAME, _AT_ONCE)
-    end = time.monotonic() + seconds
+    looks = np.zeros(len(plan.ids), np.int64)
+    end, stray = time.monotonic() + seconds, 0
     while True:
         count = channel.drain(frames, 0)
-        for frame in frames[:count]:
-            number = int(frame["can_id"]) | (EXTENDED_ID if frame["flags"] & FRAME_EXTENDED else 0)
-            if number in names:
-                raise UserError(
-                    where,
-                    f"frame {int(frame['can_id']):03X} ({names[number]})",
-                    "someone else already sends it; stop the other sender first",
-                )
+        heard = frames["can_id"][:count] | np.where(frames["flags"][:count] & FRAME_EXTENDED, EXTENDED_ID, 0)
+        ours = np.isin(heard, plan.ids)
+        stray += int(ours.sum())
+        looks += np.isin(plan.ids, heard[ours])
+        if looks.max() >= SENDS:
+            sent = plan.messages[int(looks.argmax())]
+            raise UserError(
+                where,
+                f"frame {int(sent['id']):03X} ({sent['name']})",
+                "someone else already sends it; stop the other sender first",
+            )
         if time.monotonic() >= end and count < len(frames):
-            return
-        time.sleep(0.01)
+            return stray
+        time.sleep(_LOOK_S)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ecu.algorithm.step import new_state, step
+from ecu.bus.foreign import another_ecu_speaks, place_of_ours
 from ecu.bus.freshness import begin_cycle, end_cycle
 from ecu.bus.protocol import BusStatus, Channel
 from ecu.bus.receive import Reception, new_reception, receive
@@ -20,9 +21,7 @@ from ecu.bus.transmit import Transmission, TransmitPlan, frame_buffer, new_trans
 from ecu.contract import faults
 from ecu.contract.records import (
     CYCLE,
-    EXTENDED_ID,
     FRAME,
-    FRAME_EXTENDED,
     INPUTS,
     OUTPUTS,
     STAGES,
@@ -160,7 +159,7 @@ def cycle_once(ecu: Ecu, channel: Channel, ring: Ring, grid: Grid, run: Progress
     _stamp(ecu.waiting, first, run.waiting, set_ns, set_before_ns, emptied_ns, run.emptied_ns)
     consumed, late, foreign, beside = _gather(
         ecu.receive_plan,
-        ecu.transmit_plan.ids,
+        ecu.transmit_plan,
         ecu.reception,
         ecu.waiting,
         run.waiting,
@@ -241,7 +240,7 @@ def _stamp(
 @kernel
 def _gather(
     plan: ReceivePlan,
-    own_ids: NDArray[np.uint32],
+    own: TransmitPlan,
     reception: Reception,
     frames: Any,
     count: int,
@@ -253,24 +252,24 @@ def _gather(
     """Fill `inputs` from the frames stamped up to `t_ns`.
 
     Returns their number, how many of them were late, how many have one of our own identifiers, and in how
-    many periods such ones came.
+    many periods another ECU's came (`ecu/bus/foreign.py`).
     """
     begin_cycle(inputs[0], t_ns, dt_ns)
     consumed = receive(plan, reception, frames, 0, count, inputs[0])
     end_cycle(inputs[0], reception.freshness)
-    late = foreign = beside = 0
-    heard_in = -1
+    late = foreign = beside = begin = 0
     for i in range(consumed):
         if frames[i].stamp_ns <= previous_t_ns:
             late += 1
-        identifier = np.int64(frames[i].can_id) | (EXTENDED_ID if frames[i].flags & FRAME_EXTENDED else 0)
-        for own in own_ids:
-            if own == identifier:
-                foreign += 1
-                period = (t_ns - frames[i].stamp_ns) // CYCLE_NS
-                if period != heard_in:
-                    heard_in = period
-                    beside += 1
+        if place_of_ours(own, frames[i]) >= 0:
+            foreign += 1
+    while begin < consumed and foreign > 1:
+        period, end = (t_ns - frames[begin].stamp_ns) // CYCLE_NS, begin + 1
+        while end < consumed and (t_ns - frames[end].stamp_ns) // CYCLE_NS == period:
+            end += 1
+        if another_ecu_speaks(own, frames[begin:end], end - begin):
+            beside += 1
+        begin = end
     return consumed, late, foreign, beside
 
 

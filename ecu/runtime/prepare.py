@@ -147,7 +147,9 @@ def prepare(options: RunOptions) -> Session:
         warm_s = time.monotonic() - began
         discard(channel)
         if not options.standby:
-            listen_before_send(channel, f"{options.interface} {options.channel}", sending, LISTEN_S)
+            stray = listen_before_send(channel, f"{options.interface} {options.channel}", sending, LISTEN_S)
+            if stray:
+                log.warning("stray_frames", count=stray, remedy="someone sent identifiers of ours; look for it")
         ring = create_ring(path, description, initial_part(ecu.state).tobytes())
         side.await_ready()
     except BaseException:

@@ -1,7 +1,7 @@
 """Standby: a second daemon that follows the bus in silence and takes over when the first one falls silent.
 
 It runs the whole cycle on the same frames, so its estimates, limiter and mode are warm at any time; only
-sending is left out. It takes over when none of the ECU's identifiers was heard for `SILENCE_NS` on the
+sending is left out. It takes over when no other ECU (`ecu/bus/foreign.py`) was heard for `SILENCE_NS` on the
 monotonic clock, and falls silent again in the cycle in which it hears one: two never send side by side. It
 must have heard a first daemon, so two started together do not race; without one it stays silent. One standby
 per bus: two of them would take over together.
@@ -24,8 +24,9 @@ import structlog
 from numpy.typing import NDArray
 
 from ecu.bus.e2e import P01_MODULO
+from ecu.bus.foreign import another_ecu_speaks, is_intact, place_of_ours
 from ecu.bus.transmit import Transmission, TransmitPlan
-from ecu.contract.records import EXTENDED_ID, FRAME_EXTENDED, RecordArray
+from ecu.contract.records import RecordArray
 from ecu.contract.signals import CYCLE_NS
 from ecu.errors import UserError
 from ecu.jit import kernel
@@ -50,7 +51,7 @@ class Claim:
         self._spoken = self._beside = 0
 
     def is_lost(self, beside: int, missed: int) -> bool:
-        """Add a cycle after `missed` periods; in `beside` of all these frames of our identifiers came."""
+        """Add a cycle after `missed` periods; in `beside` of all these another ECU was heard."""
         if missed * CYCLE_NS >= SILENCE_NS:  # receivers missed us: a take-over was legitimate
             self._spoken = 0
         self._spoken += 1
@@ -84,17 +85,15 @@ class Standby:
 
 
 @kernel
-def _adopt_counters(plan: TransmitPlan, sent: Transmission, frames: Any, count: int) -> int:
-    """Return the number of frames with one of our identifiers; continue their counters."""
-    heard = 0
+def _adopt_counters(plan: TransmitPlan, sent: Transmission, frames: Any, count: int) -> bool:
+    """Return whether another ECU's frames are among `frames[:count]`; continue their counters."""
+    if not another_ecu_speaks(plan, frames, count):
+        return False
     for i in range(count):
-        identifier = np.int64(frames[i].can_id) | (EXTENDED_ID if frames[i].flags & FRAME_EXTENDED else 0)
-        for place in range(len(plan.ids)):
-            if plan.ids[place] == identifier:
-                heard += 1
-                if plan.messages[place].data_id != 0:
-                    sent.counter[place] = ((frames[i].data[1] & 0xF) + 1) % P01_MODULO
-    return heard
+        place = place_of_ours(plan, frames[i])
+        if place >= 0 and is_intact(plan, place, frames[i]):
+            sent.counter[place] = ((frames[i].data[1] & 0xF) + 1) % P01_MODULO
+    return True
 
 
 def learned_by_first(description: dict[str, Any], mu_nominal: NDArray[np.float64]) -> RecordArray | None:

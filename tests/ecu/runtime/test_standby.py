@@ -10,10 +10,10 @@ import pytest
 from ecu.bus.e2e import P01_MODULO
 from ecu.bus.protocol import BusStatus
 from ecu.bus.receive_plan import contract_receive_plan
-from ecu.bus.transmit import contract_transmit_plan, new_transmission
+from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
 from ecu.contract.faults import FOREIGN_SENDER
 from ecu.contract.records import CYCLE, FRAME, LEARNED, OUTPUTS, new_record
-from ecu.contract.signals import CYCLE_NS
+from ecu.contract.signals import CYCLE_NS, N_OUTPUTS
 from ecu.jit import CompileCounter
 from ecu.recording import ring as ring_module
 from ecu.recording.ring import RingReader, create_ring, publish
@@ -32,11 +32,11 @@ MS = 1_000_000
 def listened(*heard_ms: int) -> list[int]:
     """Return in which of 40 cycles a standby speaks that hears a frame in the cycles at `heard_ms`."""
     plan = contract_transmit_plan(DBC, "BrakeEcu")
-    standby, sent, frames = Standby(), new_transmission(plan), new_record(FRAME)
-    frames["can_id"] = plan.ids[0]
-    spoken = []
+    standby, sent, first = Standby(), new_transmission(plan), new_transmission(plan)
+    frames, spoken = frame_buffer(plan), []
     for t_ms in range(0, 400, 10):
-        standby.listen(plan, sent, frames, int(t_ms in heard_ms), t_ms * MS)
+        count = transmit(plan, first, np.zeros(N_OUTPUTS), 0, frames) if t_ms in heard_ms else 0
+        standby.listen(plan, sent, frames, count, t_ms * MS)
         if standby.speaks:
             spoken.append(t_ms)
     return spoken
@@ -150,6 +150,41 @@ def test_one_that_stood_still_while_the_standby_spoke_says_nothing_any_more(tmp_
         assert len(second[1].sent) > before
     assert len(first[1].sent) == said
     assert not first[4].speaks
+
+
+def garbage(draw, count):
+    """Frames with identifiers of the ECU and random content."""
+    frames, ids = new_record(FRAME, count), contract_transmit_plan(DBC, "BrakeEcu").ids
+    for frame in frames:
+        frame["can_id"], frame["length"] = draw.choice(ids.tolist()), 8
+        frame["data"][:8] = list(draw.randbytes(8))
+    return list(frames)
+
+
+def test_garbage_with_our_identifiers_silences_neither_a_newcomer_nor_a_standby(tmp_path):
+    now, draw = [0], random.Random(6)
+    clock = TimeSource(lambda: now[0], lambda: now[0], lambda until_ns: now.__setitem__(0, until_ns))
+    first, second = unit(tmp_path / "1", clock), unit(tmp_path / "2", clock, Standby())
+    first[1].other, second[1].other = second[1], first[1]
+
+    def cycle(number, *units):
+        for ecu, wire, ring, grid, progress in units:
+            now[0] = number * CYCLE_NS - MS
+            wire.waiting += garbage(draw, 2)
+            for frame in wire.waiting:
+                frame["stamp_ns"] = now[0]
+            cycle_once(ecu, wire, ring, grid, progress)
+
+    for number in range(1, 300):
+        before = len(first[1].sent)
+        cycle(number, first, second)
+        assert len(first[1].sent) > before
+    assert second[1].sent == []
+    assert int(first[0].cycle["bus_faults"][0]) & FOREIGN_SENDER
+    for number in range(300, 400):
+        before = len(second[1].sent)
+        cycle(number, second)
+        assert (len(second[1].sent) > before) == (number >= 304)  # 50 ms after the first one's last frame
 
 
 def yields_after(foreign, missed=(), cycles=2000):
