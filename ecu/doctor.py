@@ -44,7 +44,7 @@ OPTIONAL: Final = frozenset(
 UNIT_FOLDERS: Final = tuple(
     map(Path, ("/etc/systemd/system", "/run/systemd/system", "/usr/lib/systemd/system"))
 )
-UNIT_NEEDS: Final = ("Type=notify", "WatchdogSec=", "Restart=", "RestartPreventExitStatus=2")
+UNIT_NEEDS: Final = ("Type=notify", "WatchdogSec=", "Restart=always", "ExecStopPost=")
 
 
 class Check(NamedTuple):

@@ -58,7 +58,7 @@ UNITS = {
     "none": (None, True, "not installed"),
     "ours": (resource("tools/deploy/brake-ecu.service").read_text(), True, "brake-ecu.service"),
     "no watchdog": (
-        "[Service]\nType=notify\nRestart=always\nRestartPreventExitStatus=2\n",
+        "[Service]\nType=notify\nRestart=always\nExecStopPost=x\n",
         False,
         "WatchdogSec=",
     ),
