@@ -86,6 +86,7 @@ class SocketcanChannel:
         self.name = name
         self._bus: can.BusABC = bus
         self._socket: socket.socket = bus.socket
+        self._wanted = receive_ids
         _configure(self._socket, receive_ids)
         self._handle = self._socket.fileno()
         libc = ctypes.CDLL(None, use_errno=True)
@@ -95,7 +96,7 @@ class SocketcanChannel:
         self._sendmmsg.argtypes = (number, pointer, count, number)
         self._incoming, self._outgoing = _Burst(_CONTROL_BYTES), _Burst(0)
         self._line: NDArray[np.int64] = np.zeros(4, np.int64)
-        self._failures, self._down = 0, False
+        self._failures, self._down, self._gone = 0, False, False
         self._discard()
         self._warm_up()
 
@@ -106,6 +107,8 @@ class SocketcanChannel:
 
     def drain(self, frames: RecordArray, start: int) -> int:
         """See `Channel`. Error frames change the status and are not returned."""
+        if self._gone:
+            self._bind_again()
         incoming, count = self._incoming, 0
         while (room := len(frames) - start - count) > 0:
             got = self._recvmmsg(self._handle, incoming.address, min(BURST, room), socket.MSG_DONTWAIT, None)
@@ -140,6 +143,19 @@ class SocketcanChannel:
     def _note_error(self, number: int) -> None:
         if number in (errno.ENETDOWN, errno.ENODEV, errno.ENXIO):
             self._down = True
+            self._gone = self._gone or number != errno.ENETDOWN
+
+    def _bind_again(self) -> None:
+        """Bind to the interface of this name, which was removed (a USB adapter, say) and may be back.
+
+        The socket's filters went with it.
+        """
+        try:
+            _configure(self._socket, self._wanted)
+            self._socket.bind((self.name,))
+        except OSError:
+            return
+        self._gone = False
 
     def status(self) -> BusStatus:
         """See `Channel`. An interface that is down counts as bus off."""

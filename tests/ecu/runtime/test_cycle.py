@@ -208,12 +208,20 @@ def test_a_cycle_that_only_lasts_long_is_sent(braking):
         assert braking.sent[0] == braking.ecu.transmit_plan.ids[0]
 
 
-def test_a_silent_sender_s_last_demand_is_not_used_after_standing_still(braking):
+@pytest.mark.parametrize("still_ms", [503, 30_000, 8 * 3_600_000])
+def test_a_silent_sender_s_last_demand_is_not_used_after_standing_still_or_a_night_s_suspension(
+    braking, still_ms
+):
     braking.speaks = False
-    braking.oversleep(503)
+    braking.oversleep(still_ms)
     braking.run()
     assert (braking.ecu.outputs["pressure_demand"] == 0).all()
     assert braking.ecu.outputs["pressure_demand_valid"][0] == 0
+    braking.speaks, braking.next_ns = True, braking.now_ns + CYCLE_NS - MS
+    braking.run(100)
+    assert braking.ecu.outputs["pressure_demand_valid"][0] == 1
+    assert (braking.ecu.outputs["pressure_demand"] > 5).all()
+    assert np.isfinite(braking.ecu.outputs["disc_temperature"]).all()
 
 
 def test_a_cycle_consumes_the_frames_up_to_its_deadline_however_often_the_process_stands_still(bench):
