@@ -28,9 +28,10 @@ from ecu.algorithm.step import INITIAL, new_state
 from ecu.bus.database import load_database
 from ecu.bus.signal_map import receive_plan
 from ecu.errors import RunFault, UserError
+from ecu.recording.learned_range import out_of_range
 from ecu.recording.recorder import layout, read_recording
 from ecu.recording.ring import RECORDED, RingReader, create_ring
-from ecu.recording.store import FILE, open_store, out_of_range, restore, save
+from ecu.recording.store import FILE, open_store, restore, save
 from ecu.settings.config import load_config, new_params
 
 ROOT = Path(__file__).parent.parent

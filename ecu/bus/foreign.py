@@ -36,7 +36,7 @@ def place_of_ours(plan: TransmitPlan, frame: Record) -> int:
 
 @kernel
 def is_intact(plan: TransmitPlan, place: int, frame: Record) -> bool:
-    """Return whether a frame of our message at `place` is protected as ours is; False for unprotected ones."""
+    """Return whether a frame of our message at `place` is protected as ours are."""
     message = plan.messages[place]
     if message.data_id == 0 or frame.length != message.length:
         return False

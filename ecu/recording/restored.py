@@ -1,12 +1,11 @@
 """Restored state of a run: learned values of this car and its brakes, and wear of its linings."""
 
-from contextlib import closing
 from pathlib import Path
 
 from ecu.algorithm.step import new_state
 from ecu.contract.records import RecordArray
 from ecu.recording.rest import cool_discs, rest_of
-from ecu.recording.store import PARTS, open_store, restore, restore_part, saved_at
+from ecu.recording.store import PARTS, open_to_read, restore, restore_part, saved_at
 from ecu.settings.config import Config, store_key
 
 
@@ -19,10 +18,10 @@ def restored(
     the discs have cooled since the store was written; None: nobody knows how long ago that was.
 
     Raises:
-        UserError: the folder cannot be written.
+        UserError: the store can be neither opened nor read.
     """
     key = store_key(config)
-    with closing(open_store(folder)) as store:
+    with open_to_read(folder) as store:
         found = restore(store, key, params["mu_nominal"][0])
         kept = {} if found else {part: restore_part(store, key, part) for part in PARTS}
         if found and now is not None:

@@ -74,6 +74,7 @@ class Recorder:
         self.store: sqlite3.Connection | None = None
         self._kept_open = ExitStack()
         self.state, self._refused = state, ""
+        self._file: tuple[int, int] | None = None
         if state:
             self._open_store(state)
 
@@ -97,6 +98,7 @@ class Recorder:
     def _open_store(self, state: Path) -> None:
         try:
             self.store = state_store.open_store(state)
+            self._file = state_store.identity(state)
             self._kept_open.enter_context(state_store.in_use(state))
         except (UserError, OSError) as error:
             self._refuse(str(error))
@@ -142,8 +144,19 @@ class Recorder:
     def _keep(self) -> None:
         """Save after a brake application, or a minute after another change."""
         now_s, learned = time.monotonic(), self.reader.learned()
-        if learned is not None and state_store.is_due(self.keeper, learned, now_s):
+        if learned is not None and (self._is_removed() or state_store.is_due(self.keeper, learned, now_s)):
             self._save(learned, now_s)
+
+    def _is_removed(self) -> bool:
+        """Close and report a store whose file was removed or replaced: what is saved to it is lost."""
+        if self.store is None or self.state is None or state_store.identity(self.state) == self._file:
+            return False
+        self.log.error(
+            "store_removed", folder=str(self.state), remedy="it is made anew by what this run has learned"
+        )
+        self.store.close()
+        self.store = None
+        return True
 
     def _save(self, learned: RecordArray, now_s: float) -> None:
         if self.state and self.store is None:
@@ -164,7 +177,7 @@ class Recorder:
         while self.turn():
             pass
         learned = self.reader.learned()
-        if learned is not None and learned.tobytes() != self.keeper.saved:
+        if learned is not None and (self._is_removed() or learned.tobytes() != self.keeper.saved):
             self._save(learned, time.monotonic())
         if self.files:
             for file in (self.files.frames, self.files.cycles):

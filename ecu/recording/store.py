@@ -2,29 +2,33 @@
 
 Only the side process writes. A row that fails its CRC or its ranges is skipped for the previous revision; a
 file that sqlite cannot read, or that holds another table, another schema or values of another kind, is set
-aside and a new one made. Values learned by another version of the algorithm stay in the file unused.
-The folder is its owner's alone.
+aside and a new one made. Not for what is around it, such as a full disk, nor for what a later version adds:
+columns and indices more are left alone, and a file of a later version that cannot be used is not touched.
+Values learned by another version of the algorithm stay in the file unused. The folder is its owner's alone.
 
 Wear of the linings and emission of the brakes are also stored in rows of their own, in the same transaction,
 by the vehicle's name alone: they outlive a new version and a changed configuration.
 """
 
-import math
+import shutil
 import sqlite3
 import time
 import zlib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 import structlog
 from numpy.typing import NDArray
 
-from ecu.contract.records import DUST, LEARNED, N_MEASURED, WEAR, RecordArray
+from ecu.contract.records import DUST, LEARNED, WEAR, RecordArray
 from ecu.errors import UserError
+from ecu.recording.learned_range import dust_out_of_range, out_of_range, wear_out_of_range
 from ecu.recording.lock import lock
+from ecu.recording.ring import ring_folder
 
 FILE: Final = "learned.sqlite"
 DAMAGED: Final = (sqlite3.Error, ValueError, OverflowError, TypeError)
@@ -32,20 +36,29 @@ DAMAGED: Final = (sqlite3.Error, ValueError, OverflowError, TypeError)
 LOCK: Final = "in-use"
 REVISIONS_KEPT: Final = 20
 SAVE_INTERVAL_S: Final = 60.0
-MU_RANGE: Final = (0.5, 1.5)  # of nominal
-RADIUS_ERROR_LIMIT: Final = 0.03
-DISC_EXCESS_LIMIT: Final = 2000.0  # K above the air, with its error
-JOINT_LIMIT: Final = 1.5
-"""Of any state of the joint observer: logarithms, and the rest is smaller still."""
-FARTHEST: Final = 1e10  # m, of an odometer
-THICKEST: Final = 50.0  # mm
-LEAST_EIGENVALUE: Final = 1e-6  # of a correlation matrix, below zero: rounding
 
 _TABLE: Final = """CREATE TABLE learned (
     key TEXT NOT NULL, revision INTEGER NOT NULL, saved_at TEXT NOT NULL,
     record BLOB NOT NULL, crc INTEGER NOT NULL,
     PRIMARY KEY (key, revision)
 )"""
+_SCHEMA: Final = 1
+"""Version of the table, in the file's `user_version`."""
+_COLUMNS: Final = {
+    "key": ("TEXT", 1),  # type, place in the primary key
+    "revision": ("INTEGER", 2),
+    "saved_at": ("TEXT", 0),
+    "record": ("BLOB", 0),
+    "crc": ("INTEGER", 0),
+}
+_NAMES: Final = ", ".join(_COLUMNS)
+_DAMAGE: Final = (
+    sqlite3.SQLITE_ERROR,
+    sqlite3.SQLITE_IOERR_SHORT_READ,
+    sqlite3.SQLITE_IOERR_DATA,
+    sqlite3.SQLITE_IOERR_CORRUPTFS,
+)
+"""Errors of operation that tell of the file itself; all others of rights, a full disk, a lock."""
 _FILE_FORMATS: Final = (b"\x01\x01", b"\x02\x02")  # bytes 18 and 19: rollback journal, WAL
 _LARGEST_REVISION: Final = 1 << 53
 _OF_ANOTHER_KIND: Final = f"""SELECT count(*) FROM learned WHERE typeof(key) != 'text'
@@ -57,7 +70,7 @@ def open_store(folder: Path) -> sqlite3.Connection:
     """Open the store in `folder`, created if missing; a file that is no valid sqlite database is set aside.
 
     Raises:
-        UserError: the folder cannot be written.
+        UserError: the folder cannot be written, or a later version's store cannot be used.
     """
     path = folder / FILE
     try:
@@ -73,6 +86,39 @@ def open_store(folder: Path) -> sqlite3.Connection:
         raise UserError(
             str(path), "", f"cannot be opened: {error}; give a folder that can be written"
         ) from None
+
+
+@contextmanager
+def open_to_read(folder: Path) -> Iterator[sqlite3.Connection]:
+    """Open the store in `folder`, or a copy in memory where the folder cannot be written, as on a full disk.
+
+    Raises:
+        UserError: neither is possible.
+    """
+    try:
+        store = open_store(folder)
+    except UserError as error:
+        with TemporaryDirectory(dir=ring_folder()) as copy:
+            try:
+                for part in (folder / FILE, *folder.glob(f"{FILE}-wal")):
+                    shutil.copy(part, copy)
+                store = open_store(Path(copy))
+            except (OSError, UserError):
+                raise error from None
+            with closing(store):
+                yield store
+        return
+    with closing(store):
+        yield store
+
+
+def identity(folder: Path) -> tuple[int, int] | None:
+    """Return device and number of the store's file in `folder`, None without one."""
+    try:
+        found = (folder / FILE).stat()
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino
 
 
 @contextmanager
@@ -103,9 +149,9 @@ def alone(folder: Path) -> Iterator[None]:
 
 
 def _is_damaged(error: sqlite3.OperationalError) -> bool:
-    """Return whether the file itself is damaged, not its surroundings (rights, a full disk, a lock)."""
-    code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR)  # Python's own, over text, has none
-    return code & 0xFF in (sqlite3.SQLITE_IOERR, sqlite3.SQLITE_ERROR)
+    """Return whether the file itself is damaged, not its surroundings."""
+    # Python's own, over text, has no code.
+    return getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) in _DAMAGE
 
 
 def _connect(path: Path) -> sqlite3.Connection:
@@ -117,13 +163,17 @@ def _connect(path: Path) -> sqlite3.Connection:
         store.execute("PRAGMA journal_mode=WAL")
         store.execute("PRAGMA synchronous=FULL")
         with _transaction(store):
-            schema = store.execute(
-                "SELECT type, name, sql FROM sqlite_schema WHERE sql IS NOT NULL"
-            ).fetchall()
-            if not schema:
+            kinds = [row[0] for row in store.execute("SELECT type FROM sqlite_schema WHERE sql IS NOT NULL")]
+            if not kinds:
                 store.execute(_TABLE)
-            store.execute("PRAGMA user_version = 1")  # an unwritable one shows now
-        if schema and schema != [("table", "learned", _TABLE)]:
+            version = max(store.execute("PRAGMA user_version").fetchone()[0], _SCHEMA)
+            usable = "trigger" not in kinds and _has_our_table(store)
+            if not usable and version > _SCHEMA:
+                raise UserError(
+                    str(path), "", f"a later version wrote it (schema {version}); use that version"
+                )
+            store.execute(f"PRAGMA user_version = {version}")  # an unwritable one shows now
+        if not usable:
             raise sqlite3.DatabaseError("it holds another schema")
         verdict = store.execute("PRAGMA integrity_check(1)").fetchone()[0]
         if verdict != "ok":
@@ -134,6 +184,16 @@ def _connect(path: Path) -> sqlite3.Connection:
         store.close()
         raise
     return store
+
+
+def _has_our_table(store: sqlite3.Connection) -> bool:
+    """Return whether `learned` has our columns, and beside them none that we would have to fill."""
+    if store.execute("SELECT type FROM sqlite_schema WHERE name = 'learned'").fetchone() != ("table",):
+        return False
+    found = {name: row for _, name, *row in store.execute("PRAGMA table_info(learned)")}
+    ours = {name: (kind, place) for name, (kind, _, _, place) in found.items() if name in _COLUMNS}
+    others = [row for name, row in found.items() if name not in _COLUMNS]
+    return ours == _COLUMNS and all(not needed or default is not None for _, needed, default, _ in others)
 
 
 def _set_aside(path: Path, reason: str) -> None:
@@ -168,7 +228,7 @@ def _add(store: sqlite3.Connection, key: str, record: bytes) -> int:
     revision = int(last or 0) + 1
     now = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
     crc = _crc(key, revision, record)
-    store.execute("INSERT INTO learned VALUES (?, ?, ?, ?, ?)", (key, revision, now, record, crc))
+    store.execute(f"INSERT INTO learned ({_NAMES}) VALUES (?, ?, ?, ?, ?)", (key, revision, now, record, crc))
     store.execute("DELETE FROM learned WHERE key = ? AND revision <= ?", (key, revision - REVISIONS_KEPT))
     return revision
 
@@ -253,74 +313,11 @@ def _tell_of_other_versions(store: sqlite3.Connection, key: str) -> None:
         )
 
 
-def out_of_range(learned: RecordArray, mu_nominal: NDArray[np.float64]) -> str:
-    """Return the name of the first implausible value of `learned` (shape (1,)), empty if there is none."""
-    row = learned[0]
-    known = row["observed_s"] > 0  # of a corner never observed, the friction is not checked
-    share = row["mu_b"] / mu_nominal
-    sigma = row["sigma_mu_b"]
-    p = covariance_of(row["joint_covariance"])
-    checks = {
-        "observed_s": np.isfinite(row["observed_s"]) & (row["observed_s"] >= 0),
-        "mu_b": ~known | ((share >= MU_RANGE[0]) & (share <= MU_RANGE[1])),
-        "sigma_mu_b": ~known | (np.isfinite(sigma) & (sigma > 0)),
-        "radius_error": np.abs(row["radius_error"]) <= RADIUS_ERROR_LIMIT,
-        "radius_sigma": np.isfinite(row["radius_sigma"]) & (row["radius_sigma"] > 0),
-        "joint": np.abs(row["joint"]) <= JOINT_LIMIT,
-        "joint_covariance": np.asarray(not row["joint_known"] or is_covariance(p)),
-        "disc_excess": (row["disc_excess"] >= 0) & (row["disc_excess"] <= DISC_EXCESS_LIMIT),
-        "brakings": np.asarray(row["brakings"] >= 0),
-    }
-    first = next((name for name, good in checks.items() if not good.all()), "")
-    return first or wear_out_of_range(learned["wear"]) or dust_out_of_range(learned["dust"])
-
-
-def wear_out_of_range(wear: RecordArray) -> str:
-    """Return the name of the first implausible value of `wear` (shape (1,)), empty if there is none."""
-    row = wear[0]
-    sums = ("regressors", "friction_error", "temperature_error", "leg_ends", "measured_at")
-    checks = {name: np.isfinite(row[name]) & (row[name] >= 0) for name in sums}
-    checks["odometer"] = np.asarray(0 <= row["odometer"] <= FARTHEST)
-    checks["fitted_at"] = (row["fitted_at"] >= 0) & (row["fitted_at"] <= row["odometer"])
-    checks["told"] = np.isin(row["told"], (0, 1))
-    checks["measurements"] = (row["measurements"] >= 0) & (row["measurements"] <= N_MEASURED)
-    used = np.arange(N_MEASURED)[:, None] < row["measurements"]
-    checks["measured_wear"] = ~used | (np.abs(row["measured_wear"]) <= THICKEST)
-    checks["measured_sigma"] = ~used | ((row["measured_sigma"] > 0) & (row["measured_sigma"] <= THICKEST))
-    checks["legs"] = np.asarray(0 <= row["legs"] <= FARTHEST)
-    return next((name for name, good in checks.items() if not good.all()), "")
-
-
-def dust_out_of_range(dust: RecordArray) -> str:
-    """Return the name of the first implausible value of `dust` (shape (1,)), empty if there is none."""
-    row = dust[0]
-    checks = {name: np.isfinite(row[name]) and row[name] >= 0 for name in ("particles", "work", "told_work")}
-    checks["way"] = 0 <= row["way"] <= FARTHEST
-    checks["applications"] = row["applications"] >= 0
-    return next((name for name, good in checks.items() if not good), "")
-
-
 PARTS: Final = {
     "wear": (WEAR, wear_out_of_range, "odometer"),
     "dust": (DUST, dust_out_of_range, "way"),
 }
 """Record of the vehicle and its pads: layout, check, and the distance [m] by which it went on."""
-
-
-def covariance_of(triangle: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the symmetric matrix whose lower triangle, by rows, is `triangle`."""
-    n = int(math.sqrt(2 * len(triangle)))
-    matrix = np.zeros((n, n))
-    matrix[np.tril_indices(n)] = triangle
-    return matrix + np.tril(matrix, -1).T
-
-
-def is_covariance(matrix: NDArray[np.float64]) -> bool:
-    """Return whether a symmetric matrix, shape (n, n), is a covariance: finite, no eigenvalue below 0."""
-    if not np.isfinite(matrix).all() or (np.diag(matrix) < 0).any():
-        return False
-    sigma = np.sqrt(np.maximum(np.diag(matrix), 1e-30))
-    return bool(np.linalg.eigvalsh(matrix / np.outer(sigma, sigma)).min() > -LEAST_EIGENVALUE)
 
 
 class Keeper(NamedTuple):

@@ -4,8 +4,8 @@ Missed periods are not caught up in a burst but counted, whether the cycle befor
 did (a stopped process, a paused virtual machine, a suspended machine, whose time the monotonic clock here
 counts): a cycle's deadline T_k is the last one on the grid when it wakes, never one from before the sleep.
 
-The frames' stamps are of the real-time clock, which can be set at any time. A run keeps the time line on which
-it began, real time at its start plus monotonic time since; `Grid.follow_realtime` tells by how much the
+The frames' stamps are of the real-time clock, which can be set at any time. A run keeps the time line on
+which it began, real time at its start plus monotonic time since; `Grid.follow_realtime` tells by how much the
 real-time clock has been set, and the cycle takes that off the stamps.
 """
 
@@ -29,7 +29,7 @@ _SUSPENDED_TOO: Final[int | None] = getattr(time, "CLOCK_BOOTTIME", None)
 monotonic_ns: Final[Callable[[], int]] = (
     time.monotonic_ns if _SUSPENDED_TOO is None else partial(time.clock_gettime_ns, _SUSPENDED_TOO)
 )
-"""The monotonic clock of the cycle [ns]: with the time for which the machine was suspended, where that is known."""
+"""The monotonic clock of the cycle [ns], with the time for which the machine was suspended, if known."""
 
 
 def monotonic_s() -> float:

@@ -149,7 +149,9 @@ def prepare(options: RunOptions) -> Session:
         if not options.standby:
             stray = listen_before_send(channel, f"{options.interface} {options.channel}", sending, LISTEN_S)
             if stray:
-                log.warning("stray_frames", count=stray, remedy="someone sent identifiers of ours; look for it")
+                log.warning(
+                    "stray_frames", count=stray, remedy="someone sent identifiers of ours; look for it"
+                )
         ring = create_ring(path, description, initial_part(ecu.state).tobytes())
         side.await_ready()
     except BaseException:

@@ -30,8 +30,8 @@ from ecu.contract.records import RecordArray
 from ecu.contract.signals import CYCLE_NS
 from ecu.errors import UserError
 from ecu.jit import kernel
+from ecu.recording.learned_range import out_of_range
 from ecu.recording.ring import RingReader, living_rings
-from ecu.recording.store import out_of_range
 
 SILENCE_NS: Final = 50_000_000
 """Five cycles without a frame of the first one."""

@@ -24,7 +24,9 @@ HARMLESS: Final = _signals("SIGCHLD", "SIGCONT", "SIGURG", "SIGWINCH", "SIGPIPE"
 """Signals that end no process, the last two because Python ignores them."""
 OUT_OF_REACH: Final = _signals("SIGKILL", "SIGSTOP", "SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL", "SIGSYS")
 """Signals that cannot be caught, or that tell of an instruction that would be tried again for ever."""
-ENDING: Final = tuple(sorted({int(one) for one in signal.valid_signals()} - IGNORED - HARMLESS - OUT_OF_REACH))
+ENDING: Final = tuple(
+    sorted({int(one) for one in signal.valid_signals()} - IGNORED - HARMLESS - OUT_OF_REACH)
+)
 """All other signals. They end a run in order; a group's are left to the loop by its side processes."""
 PRIORITY: Final = 1  # of SCHED_FIFO: above every ordinary process, below every real-time one
 

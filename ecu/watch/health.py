@@ -25,7 +25,7 @@ def ailment(reader: RingReader, age_s: float) -> str:
 
 
 def ailments(now_s: float) -> list[str]:
-    """Return a line for each daemon that is not well at `now_s` of the loop's monotonic clock, one if none runs."""
+    """Return a line for each daemon that is not well at `now_s` of its own clock, one if none runs."""
     found = running()
     lines = [] if found else ["no daemon runs"]
     for daemon in found:

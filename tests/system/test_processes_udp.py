@@ -126,7 +126,8 @@ def last_flags(car, count=3):
 
 
 @pytest.mark.parametrize(
-    "number", [signal.SIGHUP, signal.SIGTERM, signal.SIGQUIT, signal.SIGALRM, signal.SIGIO, signal.SIGRTMIN + 3]
+    "number",
+    [signal.SIGHUP, signal.SIGTERM, signal.SIGQUIT, signal.SIGALRM, signal.SIGIO, signal.SIGRTMIN + 3],
 )
 def test_a_signal_ends_it_with_three_demands_flagged_invalid(number, daemon, car, bus):
     unit = daemon(*bus)

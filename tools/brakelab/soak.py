@@ -31,11 +31,11 @@ from ecu.bus.signal_map import receive_plan
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CYCLE_NS
 from ecu.jit import CompileCounter
+from ecu.recording.learned_range import out_of_range
 from ecu.recording.recorder import layout, read_recording
 from ecu.recording.restored import restored
 from ecu.recording.ring import RingReader, close_ring, create_ring, remove_ring
 from ecu.recording.side_process import Recorder
-from ecu.recording.store import out_of_range
 from ecu.runtime.clock import Grid, TimeSource
 from ecu.runtime.cycle import Progress, Watch, cycle_once, new_ecu
 from ecu.settings.config import load_config, new_params, store_key

@@ -2,6 +2,7 @@ import io
 import json
 import os
 import re
+import shutil
 import sqlite3
 
 import numpy as np
@@ -247,6 +248,25 @@ def test_a_disk_that_is_full_is_told_once(tmp_path, monkeypatch):
     run.cycles(1, brakings=5)
     assert run.recorder.kept
     assert saved_brakings(tmp_path / "state") == 5
+
+
+@pytest.mark.parametrize("what", ["the folder", "the file", "the file, and another was put there"])
+def test_a_store_that_is_removed_is_told_and_made_anew(tmp_path, what):
+    run = Run(tmp_path, state=tmp_path / "state")
+    run.cycles(1, brakings=1)
+    if what == "the folder":
+        shutil.rmtree(tmp_path / "state")
+    else:
+        for file in (tmp_path / "state").glob("learned*"):
+            file.unlink()
+    if what == "the file, and another was put there":
+        open_store(tmp_path / "state").close()
+    with capture_logs() as lines:
+        run.cycles(1, brakings=1)  # nothing learned since
+        run.cycles(1, brakings=1)
+    assert [line["event"] for line in lines] == ["store_removed"]
+    assert run.recorder.kept
+    assert saved_brakings(tmp_path / "state") == 1
 
 
 def test_a_limit_removes_the_oldest_recordings_and_stops_one_that_is_larger_alone(tmp_path):

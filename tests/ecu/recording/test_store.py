@@ -2,8 +2,9 @@ import itertools
 import math
 import multiprocessing
 import random
+import resource
 import sqlite3
-from contextlib import closing, suppress
+from contextlib import closing, contextmanager, suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from structlog.testing import capture_logs
 
 from ecu.contract.records import DUST, LEARNED, N_KEPT, N_MEASURED, WEAR, new_record
 from ecu.errors import UserError
+from ecu.recording import store as store_module
 from ecu.recording.store import (
     FILE,
     REVISIONS_KEPT,
@@ -21,6 +23,7 @@ from ecu.recording.store import (
     in_use,
     is_due,
     open_store,
+    open_to_read,
     restore,
     restore_part,
     save,
@@ -71,6 +74,105 @@ def test_another_vehicle_or_version_knows_nothing_of_it(tmp_path, key, told):
         assert restore(store, key, NOMINAL) is None
     assert [line["event"] for line in lines] == told
     assert restore(store, KEY, NOMINAL) is not None
+
+
+# what a later version may have done to the file -> whether its values are used
+LATER = {
+    "a column more": (["ALTER TABLE learned ADD COLUMN extra"], True),
+    "one with a default": (["ALTER TABLE learned ADD COLUMN extra INTEGER NOT NULL DEFAULT 3"], True),
+    "an index": (["CREATE INDEX i ON learned (saved_at)"], True),
+    "another table": (["CREATE TABLE more (a)"], True),
+    "a view": (["CREATE VIEW latest AS SELECT * FROM learned"], True),
+    "its number alone": (["PRAGMA user_version = 2"], True),
+    "all of it": (
+        [
+            "PRAGMA user_version = 7",
+            "ALTER TABLE learned ADD COLUMN extra",
+            "CREATE INDEX i ON learned (saved_at)",
+        ],
+        True,
+    ),
+    "a trigger": (
+        [
+            "PRAGMA user_version = 2",
+            "CREATE TRIGGER t AFTER INSERT ON learned BEGIN DELETE FROM learned; END",
+        ],
+        False,
+    ),
+    "another name": (["PRAGMA user_version = 2", "ALTER TABLE learned RENAME TO taught"], False),
+    "a column without which no row is": (
+        ["PRAGMA user_version = 2", "ALTER TABLE learned RENAME COLUMN crc TO sum"],
+        False,
+    ),
+}
+
+
+@pytest.mark.parametrize(("changes", "used"), LATER.values(), ids=LATER)
+def test_a_store_of_a_later_version_is_used_or_left_alone_and_never_set_aside(tmp_path, changes, used):
+    with closing(open_store(tmp_path)) as store:
+        save(store, KEY, learned(7))
+    with closing(sqlite3.connect(tmp_path / FILE)) as later:
+        for change in changes:
+            later.execute(change)
+        version = later.execute("PRAGMA user_version").fetchone()
+    content = (tmp_path / FILE).read_bytes()
+    with capture_logs() as lines:
+        if used:
+            with closing(open_store(tmp_path)) as store:
+                assert restore(store, KEY, NOMINAL)[1]["brakings"][0] == 7
+                assert save(store, KEY, learned(8)) == 2
+                assert store.execute("PRAGMA user_version").fetchone() == version
+        else:
+            with pytest.raises(UserError, match="a later version wrote it"):
+                open_store(tmp_path)
+            assert (tmp_path / FILE).read_bytes() == content
+    assert lines == []
+    assert not list(tmp_path.glob("*.damaged-*"))
+
+
+@contextmanager
+def files_of_at_most(size: int):
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@pytest.mark.parametrize("size", [0, 4096, 24_576])
+def test_a_good_store_that_cannot_be_written_is_not_set_aside(tmp_path, size):
+    """The limit stands for a full disk: sqlite's shared memory of 32 kB is the first that has no room."""
+    with closing(open_store(tmp_path)) as store:
+        save(store, KEY, learned(7))
+    with files_of_at_most(size), capture_logs() as lines, pytest.raises(UserError, match="cannot be opened"):
+        open_store(tmp_path)
+    assert lines == []
+    assert [file.name for file in tmp_path.glob("*.damaged-*")] == []
+    with closing(open_store(tmp_path)) as store:
+        assert restore(store, KEY, NOMINAL)[1]["brakings"][0] == 7
+
+
+def test_what_was_saved_is_read_where_nothing_can_be_written(tmp_path, monkeypatch):
+    """With its write-ahead log: the last daemon was killed."""
+    store = open_store(tmp_path)
+    save(store, KEY, learned(7))
+    assert (tmp_path / f"{FILE}-wal").stat().st_size > 0
+    connect = store_module._connect
+
+    def no_room(path):
+        if path.parent == tmp_path:
+            error = sqlite3.OperationalError("disk I/O error")
+            error.sqlite_errorcode = sqlite3.SQLITE_IOERR_SHMSIZE
+            raise error
+        return connect(path)
+
+    monkeypatch.setattr(store_module, "_connect", no_room)
+    with open_to_read(tmp_path) as copy:
+        assert restore(copy, KEY, NOMINAL)[1]["brakings"][0] == 7
+    (tmp_path / FILE).unlink()
+    with pytest.raises(UserError, match="disk I/O error"), open_to_read(tmp_path):
+        pass
 
 
 @pytest.mark.parametrize("columns", ["key TEXT, value BLOB", "revision INTEGER"])

@@ -64,7 +64,9 @@ def test_a_signal_ends_what_compiles_at_once_and_nobody_s_business_else():
 
 def test_every_signal_that_would_end_the_loop_is_caught_or_out_of_reach():
     """The kernel itself says which signals end a process that does nothing about them."""
-    script = "import os, signal, sys; signal.signal(2, signal.SIG_DFL); os.kill(os.getpid(), int(sys.argv[1]))"
+    script = (
+        "import os, signal, sys; signal.signal(2, signal.SIG_DFL); os.kill(os.getpid(), int(sys.argv[1]))"
+    )
     command = [sys.executable, "-I", "-S", "-c", script]
     numbers = [int(one) for one in signal.valid_signals() - OUT_OF_REACH - IGNORED]
     fatal = {n for n in numbers if subprocess.run([*command, str(n)], check=False).returncode == -n}
@@ -75,7 +77,10 @@ def test_every_signal_that_would_end_the_loop_is_caught_or_out_of_reach():
 
 
 def test_signals_have_names():
-    assert [signal_name(number) for number in (signal.SIGHUP, signal.SIGRTMIN + 3)] == ["SIGHUP", "SIGRTMIN+3"]
+    assert [signal_name(number) for number in (signal.SIGHUP, signal.SIGRTMIN + 3)] == [
+        "SIGHUP",
+        "SIGRTMIN+3",
+    ]
 
 
 def test_precedence_is_real_time_below_every_cycle_and_goes_back():

@@ -15,7 +15,7 @@ from ecu.contract.params import BAR, GRAVITY
 from ecu.contract.records import INPUTS, OUTPUTS, new_record
 from ecu.contract.signals import INPUT_SIGNALS
 from ecu.jit import kernel
-from ecu.recording.store import out_of_range
+from ecu.recording.learned_range import out_of_range
 from ecu.settings.config import Config, new_params
 
 

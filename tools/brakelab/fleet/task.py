@@ -28,7 +28,7 @@ from brakelab.results.pads import pads_of
 from ecu.algorithm.step import new_state
 from ecu.contract.records import LEARNED
 from ecu.errors import RunFault, UserError
-from ecu.recording.store import out_of_range
+from ecu.recording.learned_range import out_of_range
 from ecu.settings.config import new_params
 
 

@@ -25,7 +25,7 @@ from brakelab.stretches import stretches
 from brakelab.studies.observers import JOINT, ORDINARY, WIDE, counted, drive_car
 from brakelab.studies.observers_cases import Setup, configured, shipped
 from brakelab.studies.stops import friction_errors
-from ecu.recording.store import out_of_range
+from ecu.recording.learned_range import out_of_range
 from ecu.settings.config import new_params
 from ecu.settings.resources import resource
 

@@ -34,7 +34,7 @@ from ecu.algorithm.step import new_state
 from ecu.contract.params import OBSERVERS
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CORNERS
-from ecu.recording.store import out_of_range
+from ecu.recording.learned_range import out_of_range
 from ecu.settings.config import new_params
 
 SEEDS: Final = 20

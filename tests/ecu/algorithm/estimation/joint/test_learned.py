@@ -30,7 +30,7 @@ from ecu.algorithm.estimation.joint.learned import (
 )
 from ecu.algorithm.estimation.joint.prior import set_prior
 from ecu.contract.records import LEARNED, N_KEPT
-from ecu.recording.store import JOINT_LIMIT, out_of_range
+from ecu.recording.learned_range import JOINT_LIMIT, out_of_range
 from ecu.settings.config import load_config, new_params
 
 SUV = new_params(load_config(Path(__file__).parents[5] / "config" / "suv.toml"))[0]
