@@ -13,7 +13,7 @@ pressures follow: friction learned with a wheel believed failed would confirm th
 
 Torque of failed brakes goes to their own motors up to these motors' greatest demand, the rest to the other
 wheels, so that each uses the same share of its load: no rear wheel more grip than a front one that brakes
-(ECE R13-H, Annex 5). Beyond `GRIP` torque is added slowly, limited by the resulting yaw moment, `YAW_LIMIT`.
+(ECE R13-H, Annex 5). A brake that is sound again relieves the others as fast as its pressure can rise. Beyond `GRIP` torque is added slowly, limited by the resulting yaw moment, `YAW_LIMIT`.
 The demand to a failed brake continues, so that a wrong verdict or a recovery shows.
 """
 
@@ -41,6 +41,7 @@ FAILED_BRAKES_STATE = np.dtype(
         ("grip", "f8"),  # force over load that the other wheels may be demanded
         ("force", "f8", (4,)),  # force demanded of each wheel [N]
         ("share", "f8", (4,)),  # of the load, of the wheels that brake
+        ("taken", "f8", (4,)),  # of that share, 0 to 1: a brake that is sound again takes it by degrees
     ],
     align=True,
 )
@@ -140,7 +141,7 @@ def _shares(params: Record, state: Record, trailing: float, decel: float, backwa
     """Overwrite the shares of the load of the wheels that brake; return their sum."""
     front, total = ideal_front_share(params, -decel if backwards else decel), 0.0
     for i in range(4):
-        state.share[i] = 0.0 if state.failed[i] else 0.5 * (front if i < 2 else 1.0 - front)
+        state.share[i] = 0.5 * state.taken[i] * (front if i < 2 else 1.0 - front)
         if (i < 2) == backwards:
             state.share[i] *= trailing
         total += state.share[i]
@@ -169,6 +170,8 @@ def replace_failed(
         dt: time since the last cycle [s].
     """
     step = dt / MOVE_S
+    for i in range(4):
+        state.taken[i] = 0.0 if state.failed[i] else min(state.taken[i] + step, 1.0)
     state.moved = min(state.moved + step, 1.0) if state.any else max(state.moved - step, 0.0)
     if state.moved == 0.0 or not decel > 0.0:
         state.grip = max(decel / GRAVITY, GRIP)
@@ -190,7 +193,8 @@ def replace_failed(
     wanted = min(wanted, state.grip * shares * params.mass * GRAVITY)
     for i in range(4):
         if not state.failed[i]:
-            state.force[i] += state.moved * (wanted * state.share[i] / shares - state.force[i])
+            kept = (1.0 - state.taken[i]) * state.force[i]
+            state.force[i] += state.moved * (kept + wanted * state.share[i] / shares - state.force[i])
     _limit_yaw(params, state, distribution)
     for i in range(4):
         if not state.failed[i]:

@@ -147,6 +147,7 @@ class Replaced:
             if k:
                 state["failed"][list(failed)], state["any"] = 1, len(failed) > 0
             replace_failed(p, state, distribution, np.full(4, allowed), decel, backwards, DT)
+        self.state, self.distribution = state, distribution
         self.force = distribution["torque"] / p["wheel_radius"]
         z = decel / G * (-1.0 if backwards else 1.0)
         front = (p["rear_axle"] + z * p["cog_height"]) / p["wheelbase"]
@@ -230,6 +231,30 @@ def test_the_axle_that_slips_is_relieved_here_too(params) -> None:
     free, held = Replaced(params, (FL,), 3.0), Replaced(params, (FL,), 3.0, trailing=0.5)
     assert held.force[RL] / held.load[RL] == pytest.approx(0.5 * held.force[FR] / held.load[FR])
     assert held.force[FR] > free.force[FR]
+
+
+@pytest.mark.parametrize(
+    ("failed", "again"), [((FL, FR), FL), ((FL, RR), RR), ((RL, RR), RL), ((FL, FR, RL), FL)]
+)
+def test_one_of_several_failed_brakes_that_is_sound_again_relieves_the_others_by_degrees(
+    params, failed, again
+) -> None:
+    """Not before its own pressure has risen: they would give less for that time."""
+    decel = 1.5
+    car = Replaced(params, failed, decel)
+    p, state, distribution = car.params, car.state, car.distribution
+    state["failed"][again] = 0
+    force = car.force.copy()
+    for _ in range(10):
+        last = force
+        distribute(p, distribution, p["mass"], decel, False, DT)
+        replace_failed(p, state, distribution, np.zeros(4), decel, False, DT)
+        force = distribution["torque"] / p["wheel_radius"]
+        brakes = [i for i in range(4) if i not in failed or i == again]
+        assert force[brakes].sum() >= car.before.sum() * (1 - 1e-9)
+        assert (force[car.alive] >= 0.7 * last[car.alive]).all()
+    left = [i for i in failed if i != again]
+    assert force == pytest.approx(Replaced(params, left, decel).force)
 
 
 def test_with_no_brake_left_nothing_is_moved(params) -> None:
