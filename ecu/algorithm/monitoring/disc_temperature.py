@@ -51,6 +51,7 @@ DISC_STATE = np.dtype(
     align=True,
 )
 
+GREATEST_EXCESS = 1200.0  # K above the air: cast iron melts
 UNKNOWN_EXCESS = 200.0  # K above the air at most, where nothing was ever saved
 RAIN_UNKNOWN_ERROR = 0.40  # of delta where rain is not reported
 AMBIENT_ERROR = 3.0  # K: difference between the air at the wheel and at the sensor
@@ -116,7 +117,7 @@ def update_discs(
         if estimate.mode[i] == OBSERVING:
             state.observed_at[i] = state.temperature[i]
         if application.ended:
-            learned.disc_excess[i] = state.excess[i] + UNIFORM * state.sigma[i]
+            learned.disc_excess[i] = min(state.excess[i] + UNIFORM * state.sigma[i], GREATEST_EXCESS)
 
 
 @kernel

@@ -19,6 +19,7 @@ from ecu.algorithm.step import new_state, step
 from ecu.contract.records import OUTPUTS
 from ecu.contract.signals import CALLIPER_PRESSURE, CORNERS, HOLDING, INPUT, OBSERVING, OUTPUT
 from ecu.jit import kernel
+from ecu.recording.learned_range import DISC_EXCESS_LIMIT
 
 AIR = 20.0  # degC
 RADIUS = 0.36  # m
@@ -204,6 +205,17 @@ def test_restarts_alone_make_the_disc_no_hotter(discs: Discs) -> None:
         discs.d["excess"], discs.d["sigma_start"] = before / 2, before / math.sqrt(12)
         discs.go(0.01)
         assert (discs.s["learned"]["disc_excess"] < before + 2.0).all()
+
+
+def test_what_is_stored_is_never_hotter_than_a_disc_can_be(discs: Discs) -> None:
+    """A store refuses the whole record otherwise, friction and wear with it."""
+    discs.s["application"]["ended"] = 1
+    discs.d["excess"], discs.d["sigma_heating"] = 900.0, [100.0, 300.0, 1e4, 1e12]
+    discs.go(0.01)
+    stored = discs.s["learned"]["disc_excess"]
+    assert stored[0] == pytest.approx(900 + math.sqrt(3) * discs.d["sigma"][0], abs=0.1)
+    assert (stored[1:] == 1200.0).all()
+    assert stored.max() <= DISC_EXCESS_LIMIT
 
 
 # Lost signals, air, noise
