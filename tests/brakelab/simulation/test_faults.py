@@ -11,6 +11,7 @@ from brakelab.simulation.fault_kernels import HELD, deliver, new_link
 from brakelab.simulation.faults import KINDS, Fault, fault_records
 from brakelab.simulation.outages import START_UP
 from brakelab.simulation.scenario import load_scenario
+from brakelab.simulation.vehicle_bus import new_noise
 from ecu.contract import faults as bits
 from ecu.contract.records import FRAME, new_record
 from ecu.contract.signals import CORNERS, DEGRADED, OBSERVING
@@ -44,6 +45,11 @@ WAYS = {
     "lost": ({"kind": "lost", "t": 0.02, "duration": 0.02}, [[0], [1], [], [], [4], [5]]),
     "doubled": ({"kind": "doubled", "t": 0.02, "duration": 0.02}, [[0], [1], [2, 2], [3, 3], [4], [5]]),
     "late": ({"kind": "late", "t": 0.01, "duration": 0.02, "delay": 0.02}, [[0], [], [], [1, 3], [2, 4]]),
+    "a gateway": (
+        {"kind": "batched", "t": 0.015, "duration": 0.06, "delay": 0.03},
+        [[0], [1], [], [2], [], [], [3, 4, 5], [], [8], [6, 7, 9]],
+    ),
+    "held up": ({"kind": "held_up", "t": 0.02, "duration": 0.03}, [[0], [1], [], [], [], [2, 3, 4, 5], [6]]),
     "bus off": ({"kind": "bus_off", "t": 0.03}, [[0], [1], [2], [], [], []]),
     "another message": ({"kind": "lost", "t": 0.0, "message": ["Steering"]}, [[k] for k in range(6)]),
     "not the ECU's": ({"kind": "lost", "t": 0.0}, [[k] for k in range(6)]),
@@ -55,6 +61,29 @@ def test_what_arrives(case: str) -> None:
     fault, expected = WAYS[case]
     name = "PressureDemandFront" if case == "not the ECU's" else "Imu"
     assert way(fault, len(expected), name) == expected
+
+
+def test_jitter_is_a_normal_draw_that_keeps_the_order() -> None:
+    records, link, noise = (
+        fault_records([Fault(kind="jittered", t=0.0, delay=0.005)]),
+        new_link(),
+        new_noise(3),
+    )
+    frames, late, last = new_record(FRAME), [], -1
+    frames["can_id"], frames["length"] = identifier("Imu"), 8
+    for cycle in range(2000):
+        frames["stamp_ns"] = frames["data"][0, :8].view("i8")[0] = cycle * 10_000_000
+        count = deliver(records, link, 0.01 * cycle, noise, frames, 1)
+        for frame in link.arrived[:count]:
+            sent, came = int(frame["data"][:8].view("i8")[0]), int(frame["stamp_ns"])
+            assert last < sent <= came <= cycle * 10_000_000 + 100_000
+            late.append(1e-9 * (came - sent))
+            last = sent
+    free = [value for value in late if value > 0.0]  # the others would have been early
+    print(f"late by {np.mean(late):.4f} s, deviation {np.std(late):.4f} s, {len(free)} of {len(late)} at all")
+    assert len(late) > 1995
+    assert np.mean(late) == pytest.approx(0.0054, abs=4 * 0.005 / len(late) ** 0.5)  # by the draw's own form
+    assert len(free) / len(late) == pytest.approx(0.84, abs=0.03)
 
 
 def test_a_share_of_the_frames_is_hit() -> None:

@@ -179,10 +179,21 @@ def new_loop(scenario: Scenario, config: Config, seed: int, armed: bool = True) 
 
 
 @kernel
-def _hand_over(frames: Any, count: int, first_ns: int, spacing_ns: int, kept: Any, place: int) -> int:
-    """Stamp `count` frames and copy them from index `place` on; return the index behind them."""
+def _stamp(frames: Any, count: int, sent_ns: int) -> None:
     for i in range(count):
-        frames[i].stamp_ns = first_ns + i * spacing_ns
+        frames[i].stamp_ns = sent_ns
+
+
+@kernel
+def _hand_over(frames: Any, count: int, first_ns: int, spacing_ns: int, kept: Any, place: int) -> int:
+    """Stamp `count` frames and copy them from index `place` on; return the index behind them.
+
+    One that was delayed keeps its stamp if that is earlier.
+    """
+    last_ns = kept[place - 1].stamp_ns if place > 0 else 0
+    for i in range(count):
+        last_ns = max(last_ns, min(first_ns + i * spacing_ns, frames[i].stamp_ns))
+        frames[i].stamp_ns = last_ns
         kept[place + i] = frames[i]
     return place + count
 
@@ -227,6 +238,7 @@ def _run(
         write_truth(vehicle, truth[row])
         sent = transmit(plan.vehicle_sends, loop.vehicle_sent, loop.values, cycle, loop.vehicle_frames)
         t = 1e-9 * (cycle * CYCLE_NS)
+        _stamp(loop.vehicle_frames, sent, t_ns)
         sent = deliver(vehicle.faults, loop.to_ecu, t, noise, loop.vehicle_frames, sent)
         arrived = loop.to_ecu.arrived
         # A log's time grid starts at its first frame: the first burst is stamped T_0.
@@ -247,6 +259,7 @@ def _run(
         outputs[row] = loop.output_vector
 
         sent = transmit(plan.ecu_sends, loop.ecu_sent, loop.output_vector, cycle, loop.ecu_frames)
+        _stamp(loop.ecu_frames, sent, t_ns + CYCLE_NS // 2)
         sent = deliver(vehicle.faults, loop.to_vehicle, t, noise, loop.ecu_frames, sent)
         arrived = loop.to_vehicle.arrived
         place = _hand_over(arrived, sent, t_ns + 10 * SPACING_NS, SPACING_NS, kept, place)

@@ -9,17 +9,18 @@ from numpy.typing import NDArray
 
 from brakelab.simulation.faults import (
     ACCUMULATOR_LOW,
+    BATCHED,
     BIASED,
-    BUS_OFF,
     CALLIPER_DEAD,
     CORRUPTED,
+    DAEMON_KILLED,
     DELAYED,
     DOUBLED,
     DRIFTING,
+    HELD_UP,
     INVALID,
     LATE,
     LONGEST_DELAY,
-    LOST,
     MOTOR_LOST,
     NOISY,
     SCALE_DRIFTING,
@@ -35,6 +36,7 @@ from ecu.jit import Record, kernel
 
 SLACK: Final = 1e-4  # s by which the sum of all steps may fall short of a cycle's time
 HELD: Final = 256  # delayed frames at a time
+BEHIND: Final = 1e-6  # s
 ROOM: Final = 512  # frames that arrive in one cycle
 
 
@@ -71,32 +73,57 @@ def _hits(fault: Record, can_id: int, t: float, noise: Generator) -> bool:
 
 
 @kernel
-def _hold_up(link: Link, frame: Record, release: float, delay: float) -> None:
+def _hold_up(link: Link, frame: Record, t: float, release: float) -> None:
     for place in range(len(link.release)):
         if math.isinf(link.release[place]):
             link.held[place] = frame
-            link.held[place].stamp_ns += np.int64(1e9 * delay)
+            link.held[place].stamp_ns += np.int64(1e9 * (release - t))
             link.release[place] = release
             return
 
 
 @kernel
-def deliver(faults: Any, link: Link, t: float, noise: Generator, frames: Any, count: int) -> int:
-    """Write the frames that arrive into `link.arrived`: of `frames[:count]`, sent at `t` [s], and of delayed
-    ones; return their number."""
-    arrived = 0
+def _release(fault: Record, link: Link, frame: Record, t: float, noise: Generator) -> float:
+    """Return when a frame sent at `t` arrives [s]."""
+    if fault.kind == HELD_UP:
+        return float(fault.end)
+    if fault.kind == BATCHED:
+        return float(fault.delay * (math.floor((t + SLACK) / fault.delay) + 1.0))
+    if fault.kind == LATE:
+        return float(t + fault.delay)
+    release = t + fault.delay * max(1.0 + noise.standard_normal(), 0.0)
     for place in range(len(link.release)):
-        if link.release[place] <= t + SLACK:
-            link.arrived[arrived] = link.held[place]
-            link.release[place] = np.inf
-            arrived += 1
+        if not math.isinf(link.release[place]) and link.held[place].can_id == frame.can_id:
+            release = max(release, link.release[place] + BEHIND)
+    return release
+
+
+@kernel
+def _next(link: Link, t: float) -> int:
+    """Return the place of the held frame that arrives first, by `t` at the latest; -1: none."""
+    found, first = -1, t + SLACK
+    for place in range(len(link.release)):
+        if link.release[place] < first or (found < 0 and link.release[place] <= first):
+            found, first = place, link.release[place]
+    return found
+
+
+@kernel
+def deliver(faults: Any, link: Link, t: float, noise: Generator, frames: Any, count: int) -> int:
+    """Write the frames that arrive into `link.arrived`: delayed ones, in the order of their arrival, then
+    those of `frames[:count]`, sent at `t` [s]; return their number."""
+    arrived = 0
+    while (place := _next(link, t)) >= 0:
+        link.arrived[arrived] = link.held[place]
+        link.release[place] = np.inf
+        arrived += 1
     for i in range(count):
         kept, copies = True, 1
         link.arrived[arrived] = frames[i]
         for j in range(len(faults)):
             fault = faults[j]
             kind = fault.kind
-            if kind != LOST and kind != BUS_OFF and kind != LATE and kind != DOUBLED and kind != CORRUPTED:
+            if kind >= DAEMON_KILLED:
                 continue
             if not _hits(fault, frames[i].can_id, t, noise):
                 continue
@@ -107,8 +134,8 @@ def deliver(faults: Any, link: Link, t: float, noise: Generator, frames: Any, co
                 copies = 2
             else:
                 kept = False
-                if kind == LATE:
-                    _hold_up(link, frames[i], t + fault.delay, fault.delay)
+                if kind <= HELD_UP:
+                    _hold_up(link, frames[i], t, _release(fault, link, frames[i], t, noise))
         if kept:
             arrived += 1
             if copies == 2:

@@ -12,6 +12,9 @@ share = 0.5                  # of these frames
 | --- | --- | --- |
 | lost, doubled, corrupted | message, share | frames are lost, arrive twice, arrive with one bit flipped |
 | late | message, share, delay [s] | frames arrive `delay` later |
+| jittered | message, share, delay [s] | frames are late by a normal draw, mean and deviation `delay` |
+| batched | message, share, delay [s] | a gateway passes frames on at whole multiples of `delay` |
+| held_up | message, share | frames arrive at the end of the fault, all at once |
 | stuck | signal | a signal on the bus keeps its value, its frames continue |
 | set | signal, amount | a signal has the value `amount` |
 | invalid | signal | a signal is sent as not available |
@@ -47,6 +50,9 @@ from ecu.settings.toml_file import Unit
 
 Kind = Literal[
     "late",
+    "jittered",
+    "batched",
+    "held_up",
     "lost",
     "doubled",
     "corrupted",
@@ -67,12 +73,15 @@ Kind = Literal[
     "accumulator_low",
 ]
 KINDS: Final[tuple[str, ...]] = get_args(Kind)
-LATE, LOST, DOUBLED, CORRUPTED, BUS_OFF, DAEMON_KILLED = range(6)
-STUCK, SET, INVALID, BIASED, NOISY, SCALED, DRIFTING, SCALE_DRIFTING, DELAYED, SWAPPED = range(6, 16)
-MOTOR_LOST, CALLIPER_DEAD, ACCUMULATOR_LOW = range(16, len(KINDS))
+LATE, JITTERED, BATCHED, HELD_UP, LOST, DOUBLED, CORRUPTED, BUS_OFF, DAEMON_KILLED = range(9)
+STUCK, SET, INVALID, BIASED, NOISY, SCALED, DRIFTING, SCALE_DRIFTING, DELAYED, SWAPPED = range(9, 19)
+MOTOR_LOST, CALLIPER_DEAD, ACCUMULATOR_LOW = range(19, len(KINDS))
 _FRAMES: Final = {"message", "share"}
 _BELONGS: Final[dict[str, set[str]]] = {
     "late": {*_FRAMES, "delay"},
+    "jittered": {*_FRAMES, "delay"},
+    "batched": {*_FRAMES, "delay"},
+    "held_up": _FRAMES,
     "lost": _FRAMES,
     "doubled": _FRAMES,
     "corrupted": _FRAMES,
@@ -145,7 +154,7 @@ class Fault(BaseModel):
     share: Annotated[float, Field(gt=0.0, le=1.0), Unit("-")] = 1.0
     """Of these frames, drawn."""
     delay: Annotated[float, Field(gt=0.0, le=0.2), Unit("s")] = 0.0
-    """Of late frames, of a delayed signal."""
+    """Of late frames, of a delayed signal; between the batches of a gateway."""
     signal: list[str] = []
     """Inputs that are disturbed."""
     amount: float = 0.0
