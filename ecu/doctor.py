@@ -226,9 +226,12 @@ def _message(plan: ReceivePlan, expected: np.void, counters: np.void, seconds: f
     rate = f"{received / seconds:.0f}/s"
     wrong = {
         "checksum": int(counters["checksum_errors"]),
-        "counter": int(counters["sequence_errors"]) + int(counters["repeated"]),
         "length": int(counters["length_errors"]),
+        "sequence": int(counters["sequence_errors"]),
+        "repeated": int(counters["repeated"]),
     }
+    taken = {"late": int(counters["late"]), "gaps": int(counters["lost"])}
+    rate += "".join(f", {count} {kind}" for kind, count in taken.items() if count)
     if accepted < received:
         kinds = ", ".join(f"{count} {kind}" for kind, count in wrong.items() if count)
         return Check(

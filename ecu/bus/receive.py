@@ -23,7 +23,14 @@ from ecu.bus.request import (
     settle_request,
 )
 from ecu.contract.faults import E2E_REJECTIONS
-from ecu.contract.records import EXTENDED_ID, FRAME_ERROR, FRAME_EXTENDED, FRAME_REMOTE, RecordArray
+from ecu.contract.records import (
+    E2E_COUNTS,
+    EXTENDED_ID,
+    FRAME_ERROR,
+    FRAME_EXTENDED,
+    FRAME_REMOTE,
+    RecordArray,
+)
 from ecu.contract.signals import N_INPUTS
 from ecu.jit import Record, kernel
 
@@ -44,6 +51,7 @@ MESSAGE_COUNTERS: Final = np.dtype(
     ],
     align=True,
 )
+LATE, LOST, REPEATED, WRONG = range(len(E2E_COUNTS))
 TOTALS: Final = np.dtype(
     [
         ("frames", "u8"),
@@ -51,6 +59,7 @@ TOTALS: Final = np.dtype(
         ("foreign", "u8"),
         ("bus_errors", "u8"),
         ("rejected", "u8"),
+        ("e2e", "u8", (len(E2E_COUNTS),)),
         ("loud_ns", "i8"),  # stamp of the last frame that made its stream loud
     ]
 )
@@ -162,7 +171,10 @@ def receive(
         if message.foreign:
             totals.foreign += 1
             continue
+        late, lost = counters.late, counters.lost
         status = check_frame(message, counters, frame)
+        totals.e2e[LATE] += counters.late - late
+        totals.e2e[LOST] += counters.lost - lost
         if message.modulo > 0 and link.judge_link(
             counters, status, frame.stamp_ns, message.period_ns, message.slowest_ns
         ):
@@ -173,6 +185,7 @@ def receive(
         rival, standing = False, sequence.ESTABLISHED
         if not accepted:
             totals.rejected += 1
+            totals.e2e[REPEATED if status == link.P_REPEATED else WRONG] += 1
             if not asks or status == link.P_ERROR:
                 continue
             crossed = counters.disputed_ns == frame.stamp_ns

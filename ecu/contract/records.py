@@ -32,6 +32,10 @@ FRAME_EXTENDED, FRAME_REMOTE, FRAME_ERROR, FRAME_FD = 1, 2, 4, 8
 EXTENDED_ID: Final = 1 << 31
 """Marks a 29-bit identifier wherever one number stands for an identifier."""
 
+E2E_COUNTS: Final = ("late", "lost", "repeated", "wrong")
+"""Troubles of protected frames: later than their sender's grid, gaps of lost ones, a count that came again,
+checksum, length or sequence wrong. Only the last two are rejected."""
+
 # Inputs of step in cycle k. `value` keeps a signal's last valid sample (never NaN).
 INPUTS: Final = np.dtype(
     [
@@ -70,6 +74,7 @@ CYCLE: Final = np.dtype(
         ("frames", "u4"),  # frames consumed in this cycle
         ("late_frames", "u4"),  # of these: stamped before the previous deadline
         ("dropped", "u4"),  # frames the kernel dropped so far (SO_RXQ_OVFL)
+        ("e2e", "u4", (len(E2E_COUNTS),)),  # troubles of protected frames so far
         ("worst_lateness_us", "f8"),
         ("lateness_ns", "i8"),
         ("stage_ns", "i8", (5,)),  # drain, receive, step, transmit, send
@@ -132,6 +137,11 @@ LEARNED: Final = np.dtype(
     align=True,
 )
 STAGES: Final = ("drain", "receive", "step", "transmit", "send")
+
+
+def e2e_counts(cycle: RecordArray) -> dict[str, int]:
+    """Return the troubles of protected frames so far by `E2E_COUNTS`; `cycle` is `CYCLE`, shape (1,)."""
+    return dict(zip(E2E_COUNTS, cycle["e2e"][0].tolist(), strict=True))
 
 
 def new_record(dtype: np.dtype[Any], length: int = 1) -> RecordArray:

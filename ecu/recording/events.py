@@ -5,8 +5,8 @@ from typing import Any, Final
 import numpy as np
 import structlog
 
-from ecu.contract.faults import FAULTS, fault_mask, fault_names
-from ecu.contract.records import RecordArray
+from ecu.contract.faults import E2E_REJECTIONS, FAULTS, fault_mask
+from ecu.contract.records import RecordArray, e2e_counts
 from ecu.contract.signals import STARTING
 from ecu.recording.log import Throttle
 
@@ -42,7 +42,7 @@ class EventLog:
         faults[mode == STARTING] &= ~_INPUT_FAULTS
         changed = (mode != np.r_[self._mode, mode[:-1]]) | (faults != np.r_[self._faults, faults[:-1]])
         for row in np.flatnonzero(changed):
-            self._look_at(int(cycles["number"][row]), int(mode[row]), int(faults[row]))
+            self._look_at(cycles[row : row + 1], int(mode[row]), int(faults[row]))
         speaks = cycles["speaks"] != 0
         if self._speaks is None:
             self._speaks = bool(speaks[0])
@@ -52,7 +52,7 @@ class EventLog:
         last = cycles[-1]
         overruns, dropped = int(last["overruns"]), int(last["dropped"])
         if (set_ns := int(last["clock_set_ns"])) != self._clock_set_ns:
-            self._say("clock_set", by_s=1e-9 * (set_ns - self._clock_set_ns), since_start_s=1e-9 * set_ns)
+            self._say("clock_set", by_s=(set_ns - self._clock_set_ns) / 1e9, since_start_s=set_ns / 1e9)
             self._clock_set_ns = set_ns
         if overruns > self._overruns:
             self._say("missed", missed=overruns - self._overruns, total=overruns)
@@ -64,14 +64,18 @@ class EventLog:
             self._say("ring_overtaken", lost_cycles=lost_cycles, lost_frames=lost_frames)
             self._lost = lost_cycles + lost_frames
 
-    def _look_at(self, cycle: int, mode: int, faults: int) -> None:
+    def _look_at(self, record: RecordArray, mode: int, faults: int) -> None:
+        cycle, frames = int(record["number"][0]), e2e_counts(record)
         if mode != self._mode:
             self._say("mode", MODES[mode], cycle=cycle, was=MODES[self._mode], now=MODES[mode])
         for fault in FAULTS:
             if fault.bit & faults & ~self._faults:
-                self._say("fault", fault.name, cycle=cycle, fault=fault.name, remedy=fault.remedy)
-        for name in fault_names(self._faults & ~faults):
-            self._say("fault_gone", name, cycle=cycle, fault=name)
+                counted = {"frames": frames} if fault.bit == E2E_REJECTIONS else {}
+                self._say("fault", fault.name, cycle=cycle, fault=fault.name, remedy=fault.remedy, **counted)
+        for fault in FAULTS:
+            if fault.bit & self._faults & ~faults:
+                counted = {"frames": frames} if fault.bit == E2E_REJECTIONS else {}
+                self._say("fault_gone", fault.name, cycle=cycle, fault=fault.name, **counted)
         self._mode, self._faults = mode, faults
 
     def _say(self, event: str, cause: str = "", **content: Any) -> None:

@@ -216,6 +216,7 @@ def _note_cycle(
     for name in ("bus_faults", "overruns", "worst_lateness_us"):
         cycle[name] = ecu.inputs[name]
     cycle["frames"], cycle["late_frames"], cycle["dropped"] = consumed, late, dropped
+    cycle["e2e"] = ecu.reception.totals["e2e"]
     cycle["stage_ns"], cycle["speaks"] = stages_ns, run.speaks
 
 

@@ -10,7 +10,7 @@ from contextlib import suppress
 from types import FrameType
 from typing import Any, Final
 
-from ecu.contract.records import STAGES
+from ecu.contract.records import STAGES, e2e_counts
 from ecu.errors import RunFault
 from ecu.recording.log import configure_logging
 from ecu.recording.ring import close_ring, remove_ring
@@ -60,7 +60,7 @@ def run(options: RunOptions) -> int:
         if progress.speaks:
             with suppress(Exception):  # even after an error the rest is still to be done
                 send_farewell(session.ecu, session.channel, progress.number)
-        _leave(session, {**words, **_summary(progress)})
+        _leave(session, {**words, **_summary(progress), "frames": e2e_counts(session.ecu.cycle)})
     where = f"{options.interface} {options.channel}"
     if not progress.number:  # stopped before the first cycle
         return 0

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ecu.contract.faults import WORDS
-from ecu.contract.records import CYCLE, RecordArray
+from ecu.contract.records import CYCLE, E2E_COUNTS, RecordArray, e2e_counts
 from ecu.contract.signals import CORNERS
 from ecu.recording.events import EventLog
 from ecu.recording.log import Throttle
@@ -75,14 +75,23 @@ class _Teller:
         self._tell(_sentence(event, content), True, content.get("cycle"))
 
 
+def frames_text(frames: dict[str, int]) -> str:
+    """Return the troubles of protected frames as text."""
+    return ", ".join(f"{count} {name}" for name, count in frames.items())
+
+
+def _counted(content: dict[str, Any]) -> str:
+    return f" ({frames_text(content['frames'])})" if "frames" in content else ""
+
+
 def _sentence(event: str, content: dict[str, Any]) -> str:
     match event:
         case "mode":
             return f"{content['was']} → {content['now']}"
         case "fault":
-            return f"{content['fault']}: {content['remedy']}"
+            return f"{content['fault']}{_counted(content)}: {content['remedy']}"
         case "fault_gone":
-            return f"{content['fault']}: gone"
+            return f"{content['fault']}{_counted(content)}: gone"
         case "missed":
             return f"periods missed: {content['missed']}, in all {content['total']}"
         case "clock_set":
@@ -106,6 +115,7 @@ class History:
         self.added = 0
         """Rows so far, also those forgotten."""
         self.cycles = self.missed = 0
+        self.frames = dict.fromkeys(E2E_COUNTS, 0)
         """Of the run, as its last cycle has them."""
         self.batches: deque[Batch] = deque()
         self._held = 0
@@ -142,6 +152,7 @@ class History:
         self._clock = float(_clock_s(records["cycle"])[-1])
         self.cycles = int(records["cycle"]["number"][-1]) + 1
         self.missed = int(records["cycle"]["overruns"][-1])
+        self.frames = e2e_counts(records["cycle"][-1:])
         self._looked = records["cycle"]
         if self._log is None:
             throttle = Throttle(lambda: 1e-9 * float(self._looked["t_mono_ns"][-1]))

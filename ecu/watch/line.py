@@ -7,7 +7,7 @@ import time
 from ecu.contract.faults import WORDS, fault_mask, fault_names
 from ecu.contract.signals import CORNERS
 from ecu.recording.events import MODES
-from ecu.watch.history import COLUMN, COLUMNS, LATENESS_US, OF_CORNERS, Row
+from ecu.watch.history import COLUMN, COLUMNS, LATENESS_US, OF_CORNERS, Row, frames_text
 from ecu.watch.watcher import Watcher
 
 
@@ -57,7 +57,8 @@ def text_line(watcher: Watcher) -> str:
         f" {number(row[COLUMN['vehicle_speed']], 1)} m/s"
         f" decel {number(demanded, 2)}→{number(measured, 2)} m/s²"
         f" mu {friction} {pressures} bar {discs} °C"
-        f" late {row[COLUMN['lateness']]:.0f} µs missed {watcher.history.missed}; {faults}"
+        f" late {row[COLUMN['lateness']]:.0f} µs missed {watcher.history.missed}"
+        f" frames {frames_text(watcher.history.frames)}; {faults}"
     )
 
 
@@ -82,6 +83,7 @@ def json_line(watcher: Watcher) -> str:
             "faults": faults_of(row),
             "cycles": watcher.history.cycles,
             "missed": watcher.history.missed,
+            "frames": watcher.history.frames,
             "lateness_us": lateness,
             "daemon": watcher.daemon.label if watcher.daemon else None,
         }

@@ -106,6 +106,7 @@ def _frames(tally: Tally) -> Iterator["Metric"]:
     for metric, column, text in (
         ("frames_received", "received", "Frames received"),
         ("frames_accepted", "accepted", "Frames that passed every check"),
+        ("frames_behind", "late", "Frames accepted later than their sender's grid has them"),
         ("frame_gaps", "lost", "Gaps in a message's counter: frames were lost before an accepted one"),
     ):
         yield _labelled(

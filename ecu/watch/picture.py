@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ecu.contract.signals import CORNERS
-from ecu.watch.history import COLUMN, LATENESS_US, SHOWN_S, Row
+from ecu.watch.history import COLUMN, LATENESS_US, SHOWN_S, Row, frames_text
 from ecu.watch.line import corner_values, faults_of, mode_of, number
 from ecu.watch.watcher import Watcher
 
@@ -154,6 +154,7 @@ def _lateness(watcher: Watcher, width: int, height: int) -> Iterable[Text]:
     labels = [f"≤ {edge} µs" for edge in LATENESS_US] + ["later"]
     cycles = f"{watcher.history.cycles} cycles, periods missed: {watcher.history.missed}"
     yield Text(cycles, no_wrap=True, overflow="ellipsis")
+    yield Text(f"protected frames: {frames_text(watcher.history.frames)}", no_wrap=True, overflow="ellipsis")
     if height < 30:
         most = labels[int(np.searchsorted(np.cumsum(counts), 0.99 * total))]
         worst = labels[int(np.flatnonzero(counts)[-1])]

@@ -19,7 +19,7 @@ import numpy as np
 from ecu.contract.faults import FAULTS, WORD
 from ecu.contract.signals import CORNERS
 from ecu.recording.events import MODES
-from ecu.watch.history import COLUMNS, LATENESS_US, REMEMBERED_S, SHOWN_S, Row
+from ecu.watch.history import COLUMNS, LATENESS_US, REMEMBERED_S, SHOWN_S, Row, frames_text
 from ecu.watch.keep import keep_now
 from ecu.watch.serve import Handler, Server
 from ecu.watch.watcher import PERIOD_S, Watcher
@@ -55,6 +55,7 @@ class Shared:
                 "trouble": self.watcher.trouble,
                 "cycles": history.cycles,
                 "missed": history.missed,
+                "frames": frames_text(history.frames),
                 "lateness": history.lateness.tolist(),
                 "kept": round(history.kept_s),
                 "events": [[e.clock, e.text, e.serious] for e in list(history.events)[-40:]],

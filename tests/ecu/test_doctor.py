@@ -17,7 +17,10 @@ FOUND = {
     "never, but optional": ("WheelForceFront", {}, True, "optional"),
     "too rare": ("Imu", {"received": 50, "accepted": 50}, False, "least"),
     "checksum": ("Imu", {"received": 200, "accepted": 190, "checksum_errors": 10}, False, "10 checksum"),
-    "counter stuck": ("Imu", {"received": 200, "accepted": 1, "repeated": 199}, False, "199 counter"),
+    "counter stuck": ("Imu", {"received": 200, "accepted": 1, "repeated": 199}, False, "199 repeated"),
+    "another's counts": ("Imu", {"received": 9, "accepted": 1, "sequence_errors": 8}, False, "8 sequence"),
+    "late ones": ("Imu", {"received": 200, "accepted": 200, "late": 7}, True, "100/s, 7 late, all accepted"),
+    "lost ones": ("Imu", {"received": 190, "accepted": 190, "lost": 3}, True, "95/s, 3 gaps, all accepted"),
     "slow by right": ("Ambient", {"received": 2, "accepted": 2}, True, "1/s"),
 }
 

@@ -13,7 +13,8 @@ pressures follow: friction learned with a wheel believed failed would confirm th
 
 Torque of failed brakes goes to their own motors up to these motors' greatest demand, the rest to the other
 wheels, so that each uses the same share of its load: no rear wheel more grip than a front one that brakes
-(ECE R13-H, Annex 5). A brake that is sound again relieves the others as fast as its pressure can rise. Beyond `GRIP` torque is added slowly, limited by the resulting yaw moment, `YAW_LIMIT`.
+(ECE R13-H, Annex 5). Beyond `GRIP` torque is added slowly, limited by the resulting yaw moment, `YAW_LIMIT`.
+A brake that is sound again relieves the others as its pressure rises.
 The demand to a failed brake continues, so that a wrong verdict or a recovery shows.
 """
 

@@ -158,6 +158,45 @@ def test_a_stuck_counter_is_never_taken_twice() -> None:
     assert bus.verdict(INPUT["wheel_speed_rl"]) & USABLE == USABLE
 
 
+# what happens to one frame of a stream -> what is counted: late, gaps, repeated, wrong
+TROUBLES = {
+    "nothing": (None, (0, 0, 0, 0)),
+    "lost": ("lost", (0, 1, 0, 0)),
+    "late": ("late", (1, 0, 0, 0)),
+    "sent twice": ("twice", (0, 0, 1, 0)),
+    "a bit spoilt": ("payload bit", (0, 1, 0, 1)),
+    "a byte short": ("shortened", (0, 1, 0, 1)),
+    "another's count": ("another", (0, 0, 0, 1)),
+}
+
+
+@pytest.mark.parametrize(("what", "counted"), TROUBLES.values(), ids=TROUBLES)
+def test_late_lost_repeated_and_wrong_are_counted_apart(what: str | None, counted: tuple[int, ...]) -> None:
+    bus = Bus()
+    bus.run(30)
+    frames = bus.sent()
+    ours = frames["can_id"] == 0x70
+    if what == "lost":
+        frames = frames[~ours]
+    elif what == "late":
+        held, frames = frames[ours].copy(), frames[~ours]
+        bus.take(frames)
+        frames = np.concatenate([held, bus.sent()])
+        frames["stamp_ns"][0] = frames["stamp_ns"][1]
+    elif what == "twice":
+        frames = np.concatenate([frames, frames[ours]])
+    elif what == "another":
+        other = frames[ours].copy()
+        p01_protect(other["data"][0], 8, 0x7C01, (int(other["data"][0, 1] & 0xF) + 7) % 15)
+        other["stamp_ns"] -= 4_000_000
+        frames = np.concatenate([other, frames])
+    elif what is not None:
+        frames = broken(frames, what)
+    bus.take(frames)
+    bus.run(20)
+    assert tuple(bus.reception.totals["e2e"][0].tolist()) == counted
+
+
 @pytest.mark.compiled
 def test_five_percent_corrupted() -> None:
     bus, random = Bus(), np.random.default_rng(1)

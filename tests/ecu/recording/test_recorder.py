@@ -11,6 +11,7 @@ from structlog.testing import capture_logs
 
 from brakelab.logs.formats import read_frames
 from brakelab.logs.log_quality import LogQuality
+from ecu.contract.faults import E2E_REJECTIONS
 from ecu.contract.records import CYCLE, FRAME, FRAME_EXTENDED, FRAME_FD, LEARNED, OUTPUTS, new_record
 from ecu.errors import UserError
 from ecu.recording import side_process
@@ -326,6 +327,30 @@ def test_events_are_lines_on_change_only(tmp_path):
         ("fault", "bus off"),
         ("fault_gone", "bus off"),
     ]
+
+
+def test_rejections_are_told_with_what_was_late_lost_repeated_and_wrong_so_far(tmp_path):
+    run = Run(tmp_path)
+    with capture_logs() as lines:
+        run.cycle["e2e"] = 4, 3, 9, 0
+        run.cycles(5, mode=3, active_faults=E2E_REJECTIONS)
+        run.cycle["e2e"] = 4, 3, 20, 1
+        run.cycles(5, mode=3, active_faults=0)
+    assert [line["frames"] for line in lines if "fault" in line] == [
+        {"late": 4, "lost": 3, "repeated": 9, "wrong": 0},
+        {"late": 4, "lost": 3, "repeated": 20, "wrong": 1},
+    ]
+
+
+def test_a_clock_that_was_set_is_told(tmp_path):
+    run = Run(tmp_path)
+    with capture_logs() as lines:
+        for set_s in (0, 60, 60, -3600):
+            run.cycle["clock_set_ns"] = set_s * 1_000_000_000
+            run.cycles(1)
+    assert [(line["by_s"], line["since_start_s"]) for line in lines if line["event"] == "clock_set"] == [
+        (60.0, 60.0)
+    ]  # the second one within a second
 
 
 def test_stamps_of_a_recording_are_what_candump_keeps(tmp_path):

@@ -11,6 +11,7 @@ from ecu.watch.watcher import Watcher
 @pytest.fixture
 def watched(loop):
     one = loop()
+    one.cycle["e2e"] = 7, 3, 2, 1
     one.publish(
         4,
         mode=3,
@@ -32,7 +33,8 @@ def watched(loop):
 def test_the_line_of_text(watched):
     assert text_line(watched)[9:] == (
         "degraded 20.0 m/s decel 3.00→2.90 m/s² mu 0.400±0.020 0.410±0.020 0.420±0.020 0.430±0.020"
-        " 30/31/12/0 bar 100/101/102/– °C late 50 µs missed 0; IMU lost"
+        " 30/31/12/0 bar 100/101/102/– °C late 50 µs missed 0"
+        " frames 7 late, 3 lost, 2 repeated, 1 wrong; IMU lost"
     )
 
 
@@ -42,6 +44,7 @@ def test_the_line_of_json(watched):
     assert said["disc_temperature"] == [100, 101, 102, None]
     assert (said["mode"], said["faults"], said["missed"], said["cycles"]) == ("degraded", ["IMU lost"], 0, 4)
     assert said["lateness_us"]["50"] == 4
+    assert said["frames"] == {"late": 7, "lost": 3, "repeated": 2, "wrong": 1}
     assert said["clock"] == 1_800_000_000.03
 
 

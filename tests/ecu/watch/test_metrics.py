@@ -86,11 +86,13 @@ def test_every_quantity_with_its_unit(one):
 def test_frames_by_message(one, contract_frames):
     frames = contract_frames("Imu", 8)
     frames["data"][3, 2] ^= 1
+    frames["stamp_ns"][6:] += 22_000_000
     one.publish_frames(frames)
     samples = read(one)
     assert samples["brake_ecu_frames_received_total"][("Imu",)] == 8
     assert samples["brake_ecu_frames_accepted_total"][("Imu",)] == 7
     assert samples["brake_ecu_frames_rejected_total"][("Imu", "checksum")] == 1
+    assert samples["brake_ecu_frames_behind_total"][("Imu",)] == 2
     assert samples["brake_ecu_frame_gaps_total"][("Imu",)] == 1
     assert ("BlcfFront",) not in samples["brake_ecu_frames_received_total"]  # our own
 

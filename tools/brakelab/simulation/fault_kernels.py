@@ -113,10 +113,12 @@ def deliver(faults: Any, link: Link, t: float, noise: Generator, frames: Any, co
     """Write the frames that arrive into `link.arrived`: delayed ones, in the order of their arrival, then
     those of `frames[:count]`, sent at `t` [s]; return their number."""
     arrived = 0
-    while (place := _next(link, t)) >= 0:
+    place = _next(link, t)
+    while place >= 0:
         link.arrived[arrived] = link.held[place]
         link.release[place] = np.inf
         arrived += 1
+        place = _next(link, t)
     for i in range(count):
         kept, copies = True, 1
         link.arrived[arrived] = frames[i]
