@@ -226,7 +226,7 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
     told = correct_flags(p, s.flags, s.trusted, s.estimate, s.application.braking != 0, dt)
     u = s.trusted
     faults, contradicted = watch_sensors(p, s, u, dt)
-    contradicted = contradicted or u.e2e_faults != 0
+    contradicted = contradicted or u.e2e_unsure != 0
     faults |= told | u.bus_faults | u.e2e_faults | input_faults(p, u)
     mask_implausible(p, s, u)
     hold_pedal(p, s.demand, u)

@@ -86,6 +86,7 @@ def target_dtype(places: int) -> np.dtype[Any]:
             ("new", "u1", (places,)),
             ("verdict", "u1", (places,)),
             ("e2e_faults", "u4"),
+            ("e2e_unsure", "u4"),
         ],
         align=True,
     )

@@ -46,6 +46,7 @@ MESSAGE_COUNTERS: Final = np.dtype(
         ("lost", "u4"),  # accepted frames after a counter step above one
         ("resynchronised", "u4"),
         ("stamp_ns", "i8"),  # of the last frame received
+        ("content", "u1", (8,)),  # of the last frame accepted
         *sequence.SEQUENCE,
         *link.LINK,
     ],
@@ -61,6 +62,7 @@ TOTALS: Final = np.dtype(
         ("rejected", "u8"),
         ("e2e", "u8", (len(E2E_COUNTS),)),
         ("loud_ns", "i8"),  # stamp of the last frame that made its stream loud
+        ("unsure_ns", "i8"),  # stamp of the last frame by which a stream's content is unsure
     ]
 )
 
@@ -98,6 +100,20 @@ def _find(ids: NDArray[np.uint32], identifier: int) -> int:
 
 
 @kernel
+def _is_copy(counters: Record, counter: int, frame: Record, period_ns: int) -> bool:
+    """Return whether a frame is the last accepted one once more, as a gateway or a bridge doubles it."""
+    if (
+        counter != counters.sender.counter
+        or not 0 <= frame.stamp_ns - counters.sender.heard_ns <= period_ns // 2
+    ):
+        return False
+    same = True
+    for i in range(len(counters.content)):
+        same = same and frame.data[i] == counters.content[i]
+    return same
+
+
+@kernel
 def check_frame(message: Record, counters: Record, frame: Record) -> Any:
     """Return a frame's check result, P_OK if it is complete, intact and the next of its sender.
 
@@ -113,6 +129,9 @@ def check_frame(message: Record, counters: Record, frame: Record) -> Any:
     if message.modulo > 0:
         start, length, big_endian = message.counter_start, message.counter_length, message.counter_big_endian
         counter: Any = np.int64(bits.extract(frame.data, start, length, big_endian))
+        if counters.started and _is_copy(counters, counter, frame, message.period_ns):
+            counters.repeated += 1
+            return link.P_REPEATED
         found = sequence.check_counter(
             counters, counter, message.modulo, frame.stamp_ns, message.period_ns, message.slowest_ns
         )
@@ -126,15 +145,31 @@ def check_frame(message: Record, counters: Record, frame: Record) -> Any:
             counters.lost += 1
         elif found == sequence.RESYNCHRONISED:
             counters.resynchronised += 1
+        for i in range(len(counters.content)):
+            counters.content[i] = frame.data[i]
     counters.accepted += 1
     return link.P_OK
 
 
 @kernel
+def _is_unsure(counters: Record, status: int, stamp_ns: int) -> bool:
+    """Return whether the frames that a stream has accepted may be another sender's.
+
+    Two frames with one count and different contents, a sender that is not established beside a rival, or so
+    many wrong checksums that some are right by chance. A stream that is only loud is its sender's.
+    """
+    crossed = status == link.P_REPEATED and counters.disputed_ns == stamp_ns
+    contested = counters.established == 0 and counters.contested_ns > 0
+    return crossed or contested or counters.error_count >= link.MANY_REJECTED
+
+
+@kernel
 def _tell_links(totals: Record, inputs: Record) -> None:
-    """Write the fault bit of streams that are loud."""
+    """Write the fault bit of streams that are loud, and whether a stream's content is unsure."""
     loud = totals.loud_ns > 0 and inputs.t_ns - totals.loud_ns < link.TOLD_NS
     inputs.e2e_faults = E2E_REJECTIONS if loud else 0
+    unsure = totals.unsure_ns > 0 and inputs.t_ns - totals.unsure_ns < link.TOLD_NS
+    inputs.e2e_unsure = 1 if unsure else 0
 
 
 @kernel
@@ -181,6 +216,8 @@ def receive(
             totals.loud_ns = frame.stamp_ns
         accepted = counts = status == link.P_OK
         asks = message.request != 0
+        if not asks and message.modulo > 0 and _is_unsure(counters, status, frame.stamp_ns):
+            totals.unsure_ns = frame.stamp_ns
         doubt = asks and sequence.in_doubt(counters, frame.stamp_ns)
         rival, standing = False, sequence.ESTABLISHED
         if not accepted:

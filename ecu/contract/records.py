@@ -46,9 +46,9 @@ INPUTS: Final = np.dtype(
         ("new", "u1", (N_INPUTS,)),  # a valid sample arrived in this cycle
         ("verdict", "u1", (N_INPUTS,)),  # ALIVE | RATE_OK | VALID
         ("bus_faults", "u4"),  # fault bits known to the service alone (bus off, foreign sender, …)
-        ("e2e_faults", "u4"),  # fault bits known to the receiver alone: streams that cannot be trusted
+        ("e2e_faults", "u4"),  # fault bits known to the receiver alone: streams that are loud
         ("overruns", "u4"),
-        ("spare", "u4"),  # a gap would be left undefined by copies
+        ("e2e_unsure", "u4"),  # 1: content of a stream may be another sender's: nothing is learned
         ("worst_lateness_us", "f8"),
     ],
     align=True,

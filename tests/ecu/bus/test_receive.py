@@ -68,7 +68,7 @@ class Bus:
     def counts(self, message: str = "WheelSpeedFront") -> dict[str, int]:
         record = self.reception.messages[NAMES.index(message)]
         return {
-            name: int(record[name]) for name in record.dtype.names if record[name] and "errors" in name
+            name: int(record[name]) for name in record.dtype.names if "errors" in name and record[name]
         } | {name: int(record[name]) for name in ("received", "accepted")}
 
     def verdict(self, place: int = SPEED) -> int:
@@ -195,6 +195,60 @@ def test_late_lost_repeated_and_wrong_are_counted_apart(what: str | None, counte
     bus.take(frames)
     bus.run(20)
     assert tuple(bus.reception.totals["e2e"][0].tolist()) == counted
+
+
+def beside(frames: RecordArray, can_id: int, ms: float, counts: int = 0, other: bool = True) -> RecordArray:
+    """Return the frames and a second one of a message `ms` later: another content, `counts` counts on."""
+    second = frames[frames["can_id"] == can_id].copy()
+    if other:
+        second["data"][0, 4] ^= 0x20
+    data_id = int(VEHICLE.messages["data_id"][VEHICLE.ids == can_id][0])
+    p01_protect(second["data"][0], 8, data_id, (int(second["data"][0, 1] & 0xF) + counts) % 15)
+    second["stamp_ns"] += int(ms * 1_000_000)
+    together = np.concatenate([frames, second])
+    return together[np.argsort(together["stamp_ns"], kind="stable")]
+
+
+def garbage(frames: RecordArray, can_id: int) -> RecordArray:
+    """Return the frames and nine times as many of one message with a wrong checksum."""
+    ours = frames[frames["can_id"] == can_id]
+    spoilt = np.repeat(ours, 9)
+    spoilt["data"][:, 0] ^= 1
+    return np.concatenate([frames, spoilt])
+
+
+# what comes in each cycle of a second -> whether nothing is learned for it
+UNSURE = {
+    "the sender alone": (lambda frames: frames, False),
+    "each frame twice": (lambda frames: beside(frames, 0x70, 0.0, other=False), False),
+    "each frame again after 4 ms": (lambda frames: beside(frames, 0x70, 4.0, other=False), False),
+    "another content with its count": (lambda frames: beside(frames, 0x70, 2.0), True),
+    "another content beside it": (lambda frames: beside(frames, 0x70, 2.0, counts=7), False),
+    "every frame spoilt": (lambda frames: broken(frames, "checksum"), True),
+    "nine of ten spoilt": (lambda frames: garbage(frames, 0x70), True),
+    "another request with its count": (lambda frames: beside(frames, 0x60, 2.0), False),
+    "another one beside it, which is the request's own affair": (
+        lambda frames: beside(frames, 0x60, 2.0, counts=7),
+        False,
+    ),
+}
+
+
+@pytest.mark.parametrize(("what", "unsure"), UNSURE.values(), ids=UNSURE)
+def test_what_is_surely_its_sender_s_is_learned_from(what: Any, unsure: bool) -> None:
+    bus = Bus()
+
+    def run(cycles: int, what: Any = lambda frames: frames) -> bool:
+        for _ in range(cycles):
+            frames = what(bus.sent())
+            frames["stamp_ns"] -= 5_000_000
+            bus.take(frames)
+        return bool(bus.inputs["e2e_unsure"][0])
+
+    assert not run(30)
+    assert run(100, what) is unsure
+    assert run(99) is unsure, "told for a second"
+    assert not run(20)
 
 
 @pytest.mark.compiled

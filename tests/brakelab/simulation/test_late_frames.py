@@ -1,0 +1,149 @@
+"""An honest sender that pauses, stalls or jitters, frames that come twice: what braking and learning lose.
+
+The table of docs/safety.md is of the same drive with twelve brakings and three cars.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from brakelab.simulation.closed_loop import Drive, new_loop, run
+from brakelab.simulation.faults import Fault
+from brakelab.simulation.scenario import Phase, Scenario
+from brakelab.stretches import stretches
+from ecu.contract.signals import CORNERS, DEGRADED, FAILED, OBSERVING
+from ecu.settings.config import load_config
+from ecu.settings.resources import resource
+
+pytestmark = pytest.mark.compiled
+
+CONFIG = load_config(resource("config/suv.toml"))
+BEGIN, EVERY = 20.0, 10.0  # s
+BRAKINGS = 6
+
+
+def now_and_then(kind: str, duration: float) -> list[Fault]:
+    """Return the fault once in every ten seconds."""
+    return [
+        Fault.model_validate({"kind": kind, "t": BEGIN + EVERY * k, "duration": duration}) for k in range(12)
+    ]
+
+
+def always(kind: str, delay: float) -> list[Fault]:
+    return [Fault.model_validate({"kind": kind, "t": BEGIN, "delay": delay})]
+
+
+class Lost(NamedTuple):
+    """Shares of the time in per cent after the fault began, errors in per cent."""
+
+    degraded: float
+    """Mode degraded or failed."""
+    unobserved: float
+    """Of braking, from half a second on: a lining's friction is not observed."""
+    friction: float
+    """Root mean square error of friction."""
+    force: tuple[float, float]
+    """Deceleration over demand, its first and last hundredth."""
+
+
+def drive(fault: list[Fault], seed: int = 1, brakings: int = BRAKINGS) -> Drive:
+    """Brake again and again by 4 m/s^2 from 28 m/s."""
+    once = [
+        Phase(kind="brake", decel=4.0, until_speed=3.0),
+        Phase(kind="cruise", speed=30.0, accel=5.0, until_speed=28.0),
+        Phase(kind="coast", seconds=0.6),
+    ]
+    phases = [Phase(kind="coast", seconds=1.0)] + brakings * once
+    found: dict[str, Any] = {"plant": "suv", "initial_speed": 28.0, "road_friction": [(0.0, 1.2)]}
+    return run(new_loop(Scenario.model_validate({**found, "phase": phases, "fault": fault}), CONFIG, seed))
+
+
+def judge(driven: Drive) -> Lost:
+    out, truth = driven.outputs, driven.truth
+    after = driven.t > BEGIN + 0.5
+    full = after & (truth["decel_demand"] > 3.8) & (truth["vehicle_speed"] > 5.0)
+    rows = np.concatenate([np.arange(begin + 50, end) for begin, end in stretches(full).tolist()])
+    error = [out[f"mu_b_{c}"][rows] / truth[f"mu_b_{c}"][rows] - 1.0 for c in CORNERS]
+    observing = np.all([out[f"mode_{c}"][rows] == OBSERVING for c in CORNERS], axis=0)
+    share = np.percentile(-truth["accel_x_road"][rows] / 4.0, (1, 99))
+    return Lost(
+        100 * float(np.mean(out["mode"][after] >= DEGRADED)),
+        100 * float(np.mean(~observing)),
+        100 * float(np.sqrt(np.mean(np.square(error)))),
+        (100 * float(share[0]), 100 * float(share[1])),
+    )
+
+
+@pytest.fixture(scope="module")
+def regular() -> Lost:
+    return judge(drive([]))
+
+
+# what the sender does -> time that is degraded, time without learning [% of all, of braking]: at most
+LATE = {
+    "pauses of 70 ms": (now_and_then("lost", 0.07), 0.0, 100 * (0.07 + 0.2) / EVERY),
+    "pauses of 150 ms": (now_and_then("lost", 0.15), 100 * (0.15 - 0.08) / EVERY, 100 * (0.15 + 0.2) / EVERY),
+    "stalls of 70 ms, caught up in a burst": (now_and_then("held_up", 0.07), 0.0, 100 * (0.07 + 0.2) / EVERY),
+    "stalls of 150 ms": (
+        now_and_then("held_up", 0.15),
+        100 * (0.15 - 0.08) / EVERY,
+        100 * (0.15 + 0.2) / EVERY,
+    ),
+    "jitters by half a period": (always("jittered", 0.005), 0.0, 0.0),
+    "sends through a gateway of 20 ms": (always("batched", 0.02), 0.0, 0.0),
+    "sends through a gateway of 50 ms": (always("batched", 0.05), 0.0, 0.0),
+}
+
+
+@pytest.mark.parametrize(("fault", "degraded", "unobserved"), LATE.values(), ids=LATE)
+def test_who_is_late_is_heard(regular: Lost, fault: list[Fault], degraded: float, unobserved: float) -> None:
+    found = judge(drive(fault))
+    print(found)
+    # A drive of a minute has more of them in its brakings, or fewer, than their share.
+    assert found.degraded <= 1.5 * degraded + 0.01
+    assert found.unobserved <= 2.0 * unobserved + 0.01
+    assert found.friction <= regular.friction + 2.0
+    assert found.force[0] > regular.force[0] - 5.0  # the car's own fallback, where it lasts beyond 0.1 s
+    assert found.force[1] < regular.force[1] + 7.0  # friction is off for half a second after that
+
+
+@pytest.mark.parametrize("seed", [1, 3, 6])
+def test_twelve_seconds_of_frames_that_come_twice_cost_no_learning(seed: int) -> None:
+    """Of this car's linings friction changes by -13 to +28 % meanwhile, in one braking from 198 km/h."""
+
+    def stop(fault: list[Fault]) -> tuple[Drive, np.ndarray[Any, Any]]:
+        phases = [Phase(kind="coast", seconds=1.0)]
+        for _ in range(3):
+            phases += [
+                Phase(kind="brake", decel=3.5, seconds=3.0),
+                Phase(kind="cruise", speed=56.0, accel=6.0, until_speed=55.0),
+                Phase(kind="coast", seconds=0.6),
+            ]
+        phases.append(Phase(kind="brake", decel=3.5, until_speed=2.0))
+        found: dict[str, Any] = {"plant": "suv", "initial_speed": 55.0, "road_friction": [(0.0, 1.2)]}
+        scenario = Scenario.model_validate({**found, "phase": phases, "fault": fault})
+        driven = run(new_loop(scenario, CONFIG, seed))
+        begin, end = stretches(driven.truth["decel_demand"] > 3.0)[-1]
+        return driven, np.arange(begin, end)
+
+    sound, rows = stop([])
+    begin = float(sound.t[rows[0]]) + 1.5
+    doubled, same = stop([Fault(kind="doubled", t=begin)])
+    late = slice(200, min(len(rows), len(same)) - 40)
+    share = force(doubled, same)[late] / force(sound, rows)[late]
+    mu = sound.truth["mu_b_fl"][rows]
+    print(
+        f"friction {mu[-40] / mu[150] - 1:+.0%} in {len(rows) / 100:.1f} s, force over the sound car's",
+        end=" ",
+    )
+    print(f"{share.min():.3f} to {share.max():.3f}")
+    assert np.all(doubled.outputs["mode"][same[late]] == DEGRADED), "it is told"
+    assert not np.any(doubled.outputs["mode"][same] == FAILED)
+    assert np.abs(share - 1.0).max() < 0.03
+
+
+def force(driven: Drive, rows: np.ndarray[Any, Any]) -> Any:
+    """Return the force of the linings [N] in these rows."""
+    truth = driven.truth
+    return sum(truth[f"brake_torque_{c}"][rows] / truth[f"rolling_radius_{c}"][rows] for c in CORNERS)
