@@ -44,10 +44,10 @@ def way(fault: dict[str, Any], cycles: int, name: str = "Imu") -> list[list[int]
 WAYS = {
     "lost": ({"kind": "lost", "t": 0.02, "duration": 0.02}, [[0], [1], [], [], [4], [5]]),
     "doubled": ({"kind": "doubled", "t": 0.02, "duration": 0.02}, [[0], [1], [2, 2], [3, 3], [4], [5]]),
-    "late": ({"kind": "late", "t": 0.01, "duration": 0.02, "delay": 0.02}, [[0], [], [], [1, 3], [2, 4]]),
+    "late": ({"kind": "late", "t": 0.01, "duration": 0.02, "delay": 0.02}, [[0], [], [], [1], [2, 3, 4]]),
     "a gateway": (
         {"kind": "batched", "t": 0.015, "duration": 0.06, "delay": 0.03},
-        [[0], [1], [], [2], [], [], [3, 4, 5], [], [8], [6, 7, 9]],
+        [[0], [1], [], [2], [], [], [3, 4, 5], [], [], [6, 7, 8, 9]],
     ),
     "held up": ({"kind": "held_up", "t": 0.02, "duration": 0.03}, [[0], [1], [], [], [], [2, 3, 4, 5], [6]]),
     "bus off": ({"kind": "bus_off", "t": 0.03}, [[0], [1], [2], [], [], []]),

@@ -73,7 +73,18 @@ def _hits(fault: Record, can_id: int, t: float, noise: Generator) -> bool:
 
 
 @kernel
+def _behind(link: Link, can_id: int) -> float:
+    """Return when a frame can arrive at the soonest [s]: a bus hands over those of one identifier in order."""
+    soonest = -math.inf
+    for place in range(len(link.release)):
+        if not math.isinf(link.release[place]) and link.held[place].can_id == can_id:
+            soonest = max(soonest, link.release[place] + BEHIND)
+    return soonest
+
+
+@kernel
 def _hold_up(link: Link, frame: Record, t: float, release: float) -> None:
+    release = max(release, _behind(link, frame.can_id))
     for place in range(len(link.release)):
         if math.isinf(link.release[place]):
             link.held[place] = frame
@@ -83,7 +94,7 @@ def _hold_up(link: Link, frame: Record, t: float, release: float) -> None:
 
 
 @kernel
-def _release(fault: Record, link: Link, frame: Record, t: float, noise: Generator) -> float:
+def _release(fault: Record, t: float, noise: Generator) -> float:
     """Return when a frame sent at `t` arrives [s]."""
     if fault.kind == HELD_UP:
         return float(fault.end)
@@ -91,11 +102,7 @@ def _release(fault: Record, link: Link, frame: Record, t: float, noise: Generato
         return float(fault.delay * (math.floor((t + SLACK) / fault.delay) + 1.0))
     if fault.kind == LATE:
         return float(t + fault.delay)
-    release = t + fault.delay * max(1.0 + noise.standard_normal(), 0.0)
-    for place in range(len(link.release)):
-        if not math.isinf(link.release[place]) and link.held[place].can_id == frame.can_id:
-            release = max(release, link.release[place] + BEHIND)
-    return release
+    return float(t + fault.delay * max(1.0 + noise.standard_normal(), 0.0))
 
 
 @kernel
@@ -137,8 +144,10 @@ def deliver(faults: Any, link: Link, t: float, noise: Generator, frames: Any, co
             else:
                 kept = False
                 if kind <= HELD_UP:
-                    _hold_up(link, frames[i], t, _release(fault, link, frames[i], t, noise))
-        if kept:
+                    _hold_up(link, frames[i], t, _release(fault, t, noise))
+        if kept and _behind(link, frames[i].can_id) > t:
+            _hold_up(link, link.arrived[arrived], t, t)
+        elif kept:
             arrived += 1
             if copies == 2:
                 link.arrived[arrived] = link.arrived[arrived - 1]
