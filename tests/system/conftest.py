@@ -160,6 +160,10 @@ class Vehicle:
         self._periods = 0
         self._frames = new_record(FRAME, 4096)
         self.values = np.zeros(N_INPUTS)
+        self.each_period: Callable[[], None] = lambda: None
+        """What else is sent in each period."""
+        self.longest_gap_s = self._sent_s = 0.0
+        """Longest time between two periods of frames [s]: the machine may hold it up."""
         self.set(hydraulic_ready=1, decel_demand_valid=1, accumulator_pressure=160, vehicle_speed=0)
 
     def set(self, **values: float) -> None:
@@ -172,8 +176,11 @@ class Vehicle:
         grid, heard, demands = Grid(system_time()), [self.hear()], 0
         for _ in patience():
             grid.wait()
+            self.each_period()
             count = transmit(self._plan, self._counters, self.values, self._periods, self._buffer)
             self.channel.send(self._buffer, count)
+            gap_s, self._sent_s = time.monotonic() - self._sent_s, time.monotonic()
+            self.longest_gap_s = max(self.longest_gap_s, gap_s)
             self._periods += 1
             heard.append(self.hear())
             demands += int((heard[-1]["can_id"] == demand_ids()[0]).sum())
