@@ -218,7 +218,8 @@ def receive(
         asks = message.request != 0
         if not asks and message.modulo > 0 and _is_unsure(counters, status, frame.stamp_ns):
             totals.unsure_ns = frame.stamp_ns
-        doubt = asks and sequence.in_doubt(counters, frame.stamp_ns)
+        garbage = counters.error_count > link.MAX_ERROR_AGAIN
+        doubt = asks and (garbage or sequence.in_doubt(counters, frame.stamp_ns))
         rival, standing = False, sequence.ESTABLISHED
         if not accepted:
             totals.rejected += 1
@@ -248,7 +249,7 @@ def receive(
         if rival:
             note_rival(request, frame.stamp_ns, standing)
         if asks and counts:
-            note_request(request, frame.stamp_ns)
+            note_request(request, frame.stamp_ns, garbage)
             if doubt:
                 hold_request(request, inputs)
     if len(inputs.new) == N_INPUTS:

@@ -11,6 +11,9 @@ automated demand counts only if its own frame flags it valid, and can only add t
     EQUAL         like the sender, for a second
     UNKNOWN       after that; where either brakes, the request is in doubt
 
+*Garbage* beside the sender, every 256th of which has the right checksum by chance: a demand counts once two
+accepted frames in a row have it.
+
 A request in doubt is not valid: the ECU flags its demand invalid, and the hydraulics follow the pedal itself.
 """
 
@@ -32,6 +35,7 @@ REQUEST: Final = np.dtype(
     [
         ("since_ns", "i8"),  # start of `newer`
         ("sample", "f8", (4,)),  # of this frame, from FIRST on; 0: none, or not valid
+        ("before", "f8", (4,)),  # of the frame before
         ("newer", "f8", (4,)),  # largest since then
         ("older", "f8", (4,)),  # largest of the preceding `HALF_NS`
         ("rival_ns", "i8"),  # stamp of the rival's last frame, 0: there was none
@@ -57,8 +61,8 @@ def _vouched(state: Record) -> None:
 
 
 @kernel
-def note_request(state: Record, stamp_ns: int) -> None:
-    """Update the largest values by a frame's samples."""
+def note_request(state: Record, stamp_ns: int, garbage: bool) -> None:
+    """Update the largest values by a frame's samples; by what the frame before has too beside `garbage`."""
     age = stamp_ns - state.since_ns
     if not 0 <= age < HALF_NS:
         kept = 1.0 if HALF_NS <= age < 2 * HALF_NS else 0.0
@@ -67,7 +71,9 @@ def note_request(state: Record, stamp_ns: int) -> None:
         state.since_ns = stamp_ns
     _vouched(state)
     for i in range(4):
-        state.newer[i] = max(state.newer[i], state.sample[i])
+        sample = state.sample[i]
+        state.newer[i] = max(state.newer[i], min(sample, state.before[i]) if garbage else sample)
+        state.before[i] = sample
 
 
 @kernel
@@ -79,11 +85,8 @@ def _held(state: Record, place: int) -> float:
 @kernel
 def hold_request(state: Record, inputs: Record) -> None:
     """Overwrite the request in `inputs` by the largest of the last frames."""
-    for place in (PEDAL_POSITION, PEDAL_PRESSED):
+    for place in range(FIRST, LAST + 1):
         inputs.value[place] = _held(state, place)
-    decel = _held(state, DECEL_DEMAND)
-    if decel > 0.0:
-        inputs.value[DECEL_DEMAND], inputs.value[DECEL_DEMAND_VALID] = decel, 1.0
 
 
 @kernel

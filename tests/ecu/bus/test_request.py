@@ -109,6 +109,12 @@ def asked(inputs: RecordArray) -> Any:
     return np.where(usable, value[:, DECEL_DEMAND], 0.0)
 
 
+def pressed(inputs: RecordArray) -> Any:
+    """Pedal position in each cycle [%], 0 where it is not usable."""
+    usable = inputs["verdict"][:, PEDAL_POSITION] & USABLE == USABLE
+    return np.where(usable, inputs["value"][:, PEDAL_POSITION], 0.0)
+
+
 def duel(phase: int, lost: int, offset: float, deadline: float, seed: int, begin: int) -> RecordArray:
     """The sender asks for 3 m/s², beside it a stream of `RELEASED`; 1 ms of jitter each. 400 cycles."""
     wire, k = Wire(), np.arange(400)
@@ -211,9 +217,31 @@ def test_the_largest_of_the_last_60_to_120_ms(case: str, frames: Any, held: Any)
         begin_request(state)
         valid = np.isfinite(samples)
         state["sample"][valid] = np.array(samples)[valid]
-        note_request(state, T0 + int(ms * MS))
+        note_request(state, T0 + int(ms * MS), False)
     hold_request(state, inputs)
     assert inputs["value"][FIRST : LAST + 1].tolist() == list(held), case
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("rate_hz", [100, 1000])
+@pytest.mark.parametrize(
+    "sent", [RELEASED, LIVING, PEDAL_FREE, PEDAL], ids=["free", "asked", "pedal free", "pedal"]
+)
+def test_garbage_that_passes_by_chance_asks_for_nothing(sent: RecordArray, rate_hz: int) -> None:
+    """One in 256 has the right checksum, one in 15 of these the next count: the sender alone is heard."""
+    seconds, draw = 60, np.random.default_rng(rate_hz)
+    wire, k = Wire(), np.arange(100 * seconds)
+    wire.send(sent, k, 10 * k)
+    garbage = np.zeros(rate_hz * seconds, FRAME)
+    garbage["can_id"], garbage["length"] = BRAKE_REQUEST, 8
+    garbage["data"][:, :8] = draw.integers(0, 256, (len(garbage), 8))
+    garbage["stamp_ns"] = T0 + (1e9 * draw.uniform(1.0, seconds, len(garbage))).astype(np.int64)
+    wire.frames.append(garbage)
+    beside = wire.run(len(k), 3.0)
+    wire.frames.pop()
+    alone = wire.run(len(k), 3.0)
+    assert np.array_equal(asked(beside), asked(alone))
+    assert np.array_equal(pressed(beside), pressed(alone))
 
 
 # Rival beside the sender: standing, who brakes by pedal (P) or automated (A), is the request valid?
@@ -249,7 +277,7 @@ def test_where_nobody_knows_whether_somebody_brakes_the_request_is_not_valid(
     reception = new_reception(PLAN)
     reception.freshness["valid"] = 1
     state["sample"] = sender
-    note_request(state, T0)
+    note_request(state, T0, False)
     state["sample"] = rival
     note_rival(state, T0, standing)
     settle_request(state, reception.freshness, T0 + int(age_ms * MS))
@@ -263,7 +291,7 @@ def test_without_a_rival_the_request_is_valid() -> None:
     reception.freshness["valid"] = 1
     state["standing"] = UNKNOWN
     state["sample"] = PRESSED
-    note_request(state, 5 * MS)
+    note_request(state, 5 * MS, False)
     settle_request(state, reception.freshness, 10 * MS)
     assert reception.freshness["valid"].all()
 
