@@ -44,7 +44,7 @@ from ecu.completion import known
 from ecu.errors import Mistakes, RunFault, UserError
 from ecu.output import LOG_FORMATS, Level, fault, give, log_as, new_policy, policy, print_given
 
-LABORATORY = ("bokeh", "jinja2", "pyarrow", "pymoo", "scipy")
+LABORATORY = ("bokeh", "jinja2", "pyarrow", "pymoo", "scipy", "tomlkit")
 """Packages of the extra `lab`, by the names that are imported."""
 FLEET = ("distributed", "fsspec")
 """Packages of the extra `fleet`."""

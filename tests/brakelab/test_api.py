@@ -96,13 +96,14 @@ def test_a_package_that_is_missing_is_one_line(result: Result, monkeypatch: pyte
         result.to_polars()
 
 
-def test_changes_are_keys_of_the_configuration(drive: Simulation, result: Result) -> None:
+@pytest.mark.parametrize("config", ["suv", "suv-blended"])
+def test_changes_are_keys_of_the_configuration(config: str, drive: Simulation, result: Result) -> None:
     changes = {
         "front.mu_nominal": np.float32(0.35),
         "vehicle.mass": np.int64(2200),
         "observer.mu_drift": 0.03,
     }
-    changed = replay(drive.log, config="suv", changes=changes)  # type: ignore[arg-type]
+    changed = replay(drive.log, config=config, changes=changes)  # type: ignore[arg-type]
     assert (result["mu_b_fl"][100], changed["mu_b_fl"][100]) == pytest.approx((0.45, 0.35))
     assert changed.metadata["config_hash"] != result.metadata["config_hash"]
 

@@ -16,6 +16,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from brakelab.identification.car_file import Section, write_car
 from brakelab.play.play_log import decoded
 from brakelab.replay.command import replay_into
 from brakelab.replay.needed import NEEDED, nothing_usable
@@ -216,8 +217,11 @@ def _changed(config: AnyPath, changes: Mapping[str, Change] | None) -> Iterator[
         return
     with TemporaryDirectory(prefix="brake-ecu-") as folder:
         changed = Path(folder, f"{path.stem}-changed.toml")
-        keys = [f"{key} = {_toml(key, value)}" for key, value in changes.items()]
-        changed.write_text("\n".join([f"include = {json.dumps(str(path.resolve()))}", *keys]) + "\n", "utf-8")
+        sections: dict[str, Section] = {}
+        for key, value in changes.items():
+            table, _, name = key.rpartition(".")
+            sections.setdefault(table, {})[name] = _toml(key, value), ""
+        write_car(path, changed, "# Changed.", sections)
         try:
             yield changed
         except UserError as error:

@@ -49,6 +49,14 @@ def test_trips_become_a_configuration_and_a_page(trips, capsys):
     assert "from 3 trips" in capsys.readouterr().out
 
 
+def test_trips_of_a_car_whose_configuration_includes_another(trips):
+    start, out = CONFIG.with_name("suv-blended.toml"), trips / "car.toml"
+    identify_dust(trips / "manifest.csv", start, "rear", out)
+    config, before = load_config(out), load_config(start)
+    assert config.rear.dust is not None
+    assert (config.front, config.blending) == (before.front, before.blending)
+
+
 def rewrite(path: Path, change) -> None:
     with path.open(newline="") as file:
         rows = list(csv.DictReader(file))

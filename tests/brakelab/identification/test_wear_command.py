@@ -69,10 +69,13 @@ def test_blocks_in_mdf4_give_the_same_law(blocks):
         identify_wear(blocks / "manifest.csv", CONFIG, "front", blocks / "mdf.toml")
 
 
-def test_a_configuration_that_includes_another_is_refused_before_it_is_included(blocks):
-    nested = CONFIG.with_name("suv-blended.toml")
-    with pytest.raises(UserError, match=r"suv-blended.toml: include: .* give --config suv.toml"):
-        identify_wear(blocks / "manifest.csv", nested, "front", blocks / "car.toml")
+def test_linings_of_both_axles_of_a_configuration_that_includes_another(blocks):
+    start, one, both = CONFIG.with_name("suv-blended.toml"), blocks / "one.toml", blocks / "both.toml"
+    identify_wear(blocks / "manifest.csv", start, "front", one)
+    identify_wear(blocks / "manifest.csv", one, "rear", both)
+    config = load_config(both)
+    assert config.front.pad.coefficients == config.rear.pad.coefficients
+    assert config.blending == load_config(start).blending
 
 
 def test_a_block_has_at_least_250_applications_of_its_road():

@@ -1,53 +1,56 @@
-"""CONFIG files that take all but some keys from another one."""
+"""CONFIG files that take all but some keys from another one; what that one says in comments stays."""
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import tomlkit
+from tomlkit.items import InlineTable
+
+from ecu.errors import UserError
 from ecu.settings.toml_file import read_toml
 
 Section = dict[str, tuple[str, str]]
-"""Keys of a section, each with its value as TOML and a comment."""
+"""Keys of a table, each with its value as TOML and a comment."""
 
 
-def toml_value(value: Any) -> str:
-    """Return a value as TOML writes it."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
-    if isinstance(value, list):
-        return f"[{', '.join(toml_value(each) for each in value)}]"
-    return repr(value)
+def included_file(config: Path) -> list[Path]:
+    """Return the file that `config` includes, if any."""
+    name = read_toml(config).get("include")
+    return [config.parent / str(name)] if name else []
 
 
-def _lines(path: str, own: dict[str, Any], sections: dict[str, Section]) -> list[str]:
-    """Return the keys of table `path` that `own` has, then those fitted, then the tables within."""
-    new = sections.get(path, {})
-    plain = [
-        f"{key} = {toml_value(v)}" for key, v in own.items() if not isinstance(v, dict) and key not in new
-    ]
-    plain += [f"{key} = {value}  # {comment}" for key, (value, comment) in new.items()]
-    lines = ["", f"[{path}]", *plain] if plain and path else plain
-    for key, value in own.items():
-        if isinstance(value, dict):
-            lines += _lines(f"{path}.{key}" if path else key, value, sections)
-    return lines
+def car_toml(config: Path, out: Path, head: str, sections: Mapping[str, Section]) -> str:
+    """Return a configuration that takes all but `sections` from `config`; comments `head` stand first.
 
-
-def split_include(config: Path) -> tuple[Path, dict[str, Any]]:
-    """Return the file that a new CONFIG includes in place of `config`, and the keys that it must repeat.
-
-    An included file includes no other: `config` itself, or the one that it includes and its own keys.
+    `sections` by the names of tables, as front.pad, "": the keys at the top. A file that is included includes
+    no other: what `config` itself includes is included in its place, and its own keys are repeated.
     """
-    own = read_toml(config)
-    return (config.parent / str(own.pop("include")), own) if "include" in own else (config, {})
+    [source] = included_file(config) or [config]
+    document: Any = tomlkit.parse(config.read_text("utf-8-sig") if source != config else "")
+    document["include"] = Path(os.path.relpath(source.resolve(), out.resolve().parent)).as_posix()
+    for name, keys in sections.items():
+        table = document
+        for part in filter(None, name.split(".")):
+            if not isinstance(table.get(part), Mapping):
+                table[part] = tomlkit.table()
+            table = table[part]
+        for key, (value, comment) in keys.items():
+            item = tomlkit.value(value)
+            table[key] = item.comment(comment) if comment and not isinstance(table, InlineTable) else item
+    return f"{head}\n{document.as_string().rstrip()}\n"
 
 
-def car_toml(config: Path, out: Path, head: str, sections: dict[str, Section]) -> str:
-    """Return a configuration that takes all but `sections` from `config`; `head` are its first lines."""
-    source, own = split_include(config)
-    include = Path(os.path.relpath(source, out.parent)).as_posix()
-    for name in sections:
-        own.setdefault(name, {})
-    return "\n".join([head, f'include = "{include}"', *_lines("", own, sections), ""])
+def write_car(config: Path, out: Path, head: str, sections: Mapping[str, Section]) -> None:
+    """Write `car_toml` to `out`.
+
+    Raises:
+        UserError: it cannot be written.
+    """
+    text = car_toml(config, out, head, sections)
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        out.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise UserError(str(out), "", f"cannot be written ({error.strerror}); choose another --out") from None

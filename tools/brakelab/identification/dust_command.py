@@ -1,17 +1,16 @@
 """Identification of dust (`brake-ecu identify dust`): emission models from trips with a particle counter."""
 
-import os
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
+from brakelab.identification.car_file import Section, write_car
 from brakelab.identification.dust_features import Applications, Array
 from brakelab.identification.dust_fit import Judged, choose, judge_all, ranges
 from brakelab.identification.dust_models import LEAST
 from brakelab.identification.dust_reader import read_trips
 from brakelab.identification.dust_tables import model_table, spearman_table, trip_table
-from brakelab.identification.measurement_files import refuse_nested
 from brakelab.results.chart import BLUE, GREY, ORANGE, PINK, Line, Panel, write_chart
 from brakelab.results.outputs import check_outputs
 from brakelab.results.text_table import markdown
@@ -27,24 +26,22 @@ def _numbers(values: Array) -> str:
     return "[" + ", ".join(f"{value:.6g}" for value in values) + "]"
 
 
-def dust_toml(axle: str, chosen: Judged, trained: tuple[Array, Array]) -> str:
-    """Return the section `[front.dust]` or `[rear.dust]` of a configuration."""
+def dust_section(chosen: Judged, trained: tuple[Array, Array]) -> Section:
+    """Return the keys of [front.dust] or [rear.dust], of one brake; see ecu/settings/dust.py."""
     model = chosen.model
     assert model.on_board is not None
-    return (
-        f"[{axle}.dust]\n# of one brake; what the numbers are: ecu/algorithm/monitoring/emission_factor.py\n"
-        f'model = "{MODELS[model.on_board]}"\nnumbers = {_numbers(model.numbers)}\n'
-        "# v_in, v_end [m/s], torque [N m], disc [degC], duration [s], pressure [bar]: trained on this\n"
-        f"low = {_numbers(trained[0])}\nhigh = {_numbers(trained[1])}\n"
-        f"factor = {chosen.factor:.4f} # mean of the particles over ten to the emission factor\n"
-        f"below = {chosen.below:.4f} # 95 % of the emission factor, conformal\nabove = {chosen.above:.4f}\n"
-    )
-
-
-def car_toml(config: Path, out: Path, section: str) -> str:
-    """Return a configuration that takes all other values from `config`."""
-    include = os.path.relpath(config, out.parent).replace("\\", "/")
-    return f'include = "{include}"\n\n{section}'
+    return {
+        "model": (f'"{MODELS[model.on_board]}"', "of one brake"),
+        "numbers": (_numbers(model.numbers), ""),
+        "low": (
+            _numbers(trained[0]),
+            "trained from here: v_in, v_end [m/s], torque [N m], disc [degC], duration [s], pressure [bar]",
+        ),
+        "high": (_numbers(trained[1]), "to here"),
+        "factor": (f"{chosen.factor:.4f}", "mean of the particles over ten to the emission factor"),
+        "below": (f"{chosen.below:.4f}", "95 % of the emission factor, conformal"),
+        "above": (f"{chosen.above:.4f}", ""),
+    }
 
 
 def _pairs(judged: Judged, trips: list[Applications]) -> tuple[Array, Array]:
@@ -105,7 +102,6 @@ def identify_dust(manifest: Path, config: Path, axle: str, out: Path) -> int:
     if axle not in ("front", "rear"):
         raise UserError("--axle", axle, "choose front or rear")
     vehicle = load_config(config)
-    refuse_nested(config)
     page = out.with_suffix(".md")
     check_outputs(out, (out, page, out.with_suffix(".svg")), [manifest, config])
     brake: Axle = getattr(vehicle, axle)
@@ -114,9 +110,8 @@ def identify_dust(manifest: Path, config: Path, axle: str, out: Path) -> int:
     trained, test = [trip for trip in trips if not trip.test], [trip for trip in trips if trip.test]
     judged = judge_all(trained, test)
     chosen = choose(judged)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    section = dust_toml(axle, chosen, ranges(trained))
-    out.write_text(car_toml(config, out, section), encoding="utf-8")
+    head = "# Emission of particles by `brake-ecu identify dust`."
+    write_car(config, out, head, {f"{axle}.dust": dust_section(chosen, ranges(trained))})
     write_page(page, trips, judged, chosen)
     said = f", test trips {100 * chosen.test.sum_error:+.1f} %" if chosen.test else ""
     print(

@@ -1,7 +1,6 @@
 """Manifests and tables of measurements: read, and refused with one line if invalid."""
 
 import csv
-import tomllib
 from pathlib import Path
 from typing import Final
 
@@ -89,18 +88,6 @@ def _channels(path: Path, names: tuple[str, ...], what: str) -> dict[str, Array]
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise UserError(str(path), "", f"cannot be read as MDF4: {reason}") from None
     return dict(zip(names, [t, *values], strict=True))
-
-
-def refuse_nested(config: Path) -> None:
-    """Refuse a CONFIG that includes another: the written file would include it, and may not.
-
-    Raises:
-        UserError: it does.
-    """
-    inner = tomllib.loads(config.read_text("utf-8-sig")).get("include")
-    if inner is not None:
-        remedy = f"the file written would include {config}, which may include none: give --config {inner}"
-        raise UserError(str(config), "include", f"{remedy}, and copy the sections into one file")
 
 
 def check_celsius(path: Path, name: str, values: Array, hottest: float) -> None:

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from brakelab.identification.car_file import Section, car_toml
+from brakelab.identification.car_file import Section, write_car
 from brakelab.identification.thermal_check import check_drive, check_fit
 from brakelab.identification.thermal_fit import Disc, Fit, fit_axle, fit_nothing
 from brakelab.identification.thermal_log import Drive, read_drives
@@ -87,9 +87,8 @@ def identify_thermal(logs: Sequence[Path], config: Path, map: Path | None, out: 
     sections: dict[str, Section] = {
         axle.name: section_of(axle.fit, axle.brake, axle.errors, _about(axle)) for axle in axles
     }
-    out.parent.mkdir(parents=True, exist_ok=True)
-    head = "# Disc temperature by `brake-ecu identify thermal`; the rest as in the file included."
-    out.write_text(car_toml(config, out, head, sections), encoding="utf-8")
+    head = "# Disc temperature by `brake-ecu identify thermal`."
+    write_car(config, out, head, sections)
     load_config(out)
     write_page(page, axles)
     for drive in drives:

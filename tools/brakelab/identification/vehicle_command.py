@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from brakelab.identification.vehicle_drive import read_drives
-from brakelab.identification.vehicle_file import map_toml, offsets, write_car
+from brakelab.identification.vehicle_file import map_toml, offsets, write_vehicle
 from brakelab.identification.vehicle_identify import identify
 from brakelab.identification.vehicle_page import write_page
 from brakelab.identification.vehicle_parameters import parameters_of
@@ -32,7 +32,7 @@ def identify_vehicle(drives: Sequence[Path], config: Path, map: Path | None, clo
     params = new_params(start)
     found = identify(read_drives(drives, params, map), params, closed)
     names = [drive.name for drive in drives]
-    parameters = write_car(config, out, parameters_of(found, start), start, names)
+    parameters = write_vehicle(config, out, parameters_of(found, start), start, names)
     try:
         load_config(out)
     except UserError as error:

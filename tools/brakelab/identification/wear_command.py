@@ -1,12 +1,11 @@
 """Identification of wear (`brake-ecu identify wear`): wear law from dynamometer blocks, as a CONFIG; page."""
 
-import os
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from brakelab.identification.measurement_files import refuse_nested
+from brakelab.identification.car_file import Section, write_car
 from brakelab.identification.wear_blocks import Array, Block, Heat, read_blocks
 from brakelab.identification.wear_curves import SHARE
 from brakelab.identification.wear_fit import QUASI_STATIC, TERMS, UNITS, Fit, fit_law
@@ -99,16 +98,14 @@ def write_page(page: Path, blocks: list[Block], fused: Fused, fit: Fit, static: 
     page.write_text(head + "\n".join(parts).rstrip() + "\n", encoding="utf-8")
 
 
-def car_toml(config: Path, out: Path, axle: str, fit: Fit, error: float) -> str:
-    """Return a configuration that takes everything but the wear law from `config`."""
-    include = os.path.relpath(config, out.parent).replace("\\", "/")
+def law_section(fit: Fit, error: float) -> Section:
+    """Return the keys of a pad: its law and the law's `error`, relative."""
     numbers = ", ".join(f"{value:.6g}" for value in fit.coefficients)
-    return (
-        f'include = "{include}"\n\n[{axle}.pad]\n'
-        "# from dynamometer blocks, disc in degC: g/MJ, g/MJ/K, g/MJ/K^2, g/MW, g/MW/K, g s/MJ^2, …/K\n"
-        f'law = "extended"\ncoefficients = [{numbers}]\n'
-        f"sigma = {min(max(error, 0.02), 0.9):.4f} # relative, blocks left out and the way to the road\n"
-    )
+    return {
+        "law": ('"extended"', "from dynamometer blocks, disc in degC"),
+        "coefficients": (f"[{numbers}]", "g/MJ, g/MJ/K, g/MJ/K^2, g/MW, g/MW/K, g s/MJ^2, …/K"),
+        "sigma": (f"{min(max(error, 0.02), 0.9):.4f}", "relative, blocks left out and the way to the road"),
+    }
 
 
 def identify_wear(manifest: Path, config: Path, axle: str, out: Path) -> int:
@@ -120,7 +117,6 @@ def identify_wear(manifest: Path, config: Path, axle: str, out: Path) -> int:
     if axle not in ("front", "rear"):
         raise UserError("--axle", axle, "choose front or rear")
     vehicle = load_config(config)
-    refuse_nested(config)
     page = out.with_suffix(".md")
     check_outputs(out, (out, page), [manifest, config])
     brake: Axle = getattr(vehicle, axle)
@@ -135,8 +131,8 @@ def identify_wear(manifest: Path, config: Path, axle: str, out: Path) -> int:
     except UserError as error:
         raise UserError(str(manifest), f"{error.where}: {error.place}", error.remedy) from None
     sigma = float(np.hypot(leave_one_out(fit, fused.mass), ROAD))
-    out.parent.mkdir(parents=True, exist_ok=True)
-    out.write_text(car_toml(config, out, axle, fit, sigma), encoding="utf-8")
+    head = "# Wear law by `brake-ecu identify wear`."
+    write_car(config, out, head, {f"{axle}.pad": law_section(fit, sigma)})
     write_page(page, blocks, fused, fit, static, SHARE[axle] * vehicle.vehicle.mass)
     named = zip(TERMS, fit.coefficients, UNITS, strict=True)
     kept = ", ".join(f"{name} = {value:.4g} {unit}" for name, value, unit in named if value)
