@@ -100,8 +100,10 @@ def test_what_identify_writes(
     words = campaign()
     capsys.readouterr()
     assert cli.main(["identify", *words, "--config", "start.toml", "--out", "car.toml"]) == 0
-    parts = {"printed": capsys.readouterr().out}
-    for path in sorted(Path().glob("car*")):
+    printed = capsys.readouterr()
+    parts, written = {"printed": printed.out}, sorted(Path().glob("car*"))
+    assert all(path.name in printed.err.splitlines()[-1] for path in written)
+    for path in written:
         head, *sections = path.read_text("utf-8").split("\n## ")
         parts[path.name] = head
         parts |= {f"{path.name}, {section.splitlines()[0]}": section for section in sections}

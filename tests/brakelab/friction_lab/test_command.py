@@ -125,7 +125,7 @@ def test_a_law_of_one_s_own_must_have_a_name_of_its_own(tmp_path: Path) -> None:
         ),
         (lambda f: command.run("ams", "A", 0, f, "R9"), "--law: R9: no such law; choose one of SIM, R1"),
         (lambda f: command.run("ams", "A", 0, f.with_suffix(".xls")), "ends in .csv or .parquet"),
-        (lambda f: command.friction([f], None, None, f), "6 stops; needs 10"),
+        (lambda f: command.friction([f], None, None, f.with_name("law.toml")), "6 stops; needs 10"),
     ],
 )
 def test_one_line_says_what_to_do(tmp_path: Path, call, line: str) -> None:

@@ -72,10 +72,10 @@ def test_the_documented_commands_make_a_configuration_a_page_and_a_result(
     assert config.front.disc_heating != before.front.disc_heating
     assert config.front.sigma_disc_heating < before.front.sigma_disc_heating
     assert config.vehicle == before.vehicle
-    written = capsys.readouterr().out
-    assert "front δ0 in rain: not told by these logs" in written
-    assert written.splitlines()[-1].endswith(
-        "next: brake-ecu replay LOG --config " + f"{out} --out drive.parquet"
+    said = capsys.readouterr()
+    assert "front δ0 in rain: not told by these logs" in said.out
+    assert said.err.splitlines()[-1].endswith(
+        f"next: brake-ecu replay LOG --config {out} --out drive.parquet"
     )
     page = out.with_suffix(".md").read_text()
     assert "| dry.parquet | rl |" in page

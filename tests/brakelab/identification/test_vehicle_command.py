@@ -89,9 +89,9 @@ def test_a_configuration_a_page_and_a_picture_are_written(car, tmp_path, capsys)
     page = (tmp_path / "car.md").read_text("utf-8")
     assert all(word in page for word in ("## Told", "## Not told", "## Zeros of sensors", "vehicle.mass"))
     assert (tmp_path / "car.svg").read_text("utf-8").count("<rect") >= 4
-    said = capsys.readouterr().out
-    assert "next: brake-ecu replay" in said.splitlines()[-1]
-    assert "offset =" in said
+    said = capsys.readouterr()
+    assert "next: brake-ecu replay" in said.err.splitlines()[-1]
+    assert "offset =" in said.out
 
 
 def reduced(car, tmp_path, *without: str, rows: slice = slice(None)):

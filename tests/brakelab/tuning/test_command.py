@@ -85,7 +85,7 @@ def test_an_interrupted_file_says_how_far_it_came(
 @pytest.mark.parametrize(
     ("out", "line"),
     [
-        ("tuned.txt", "a tuning is written as TOML"),
+        ("tuned.txt", "is written as TOML"),
         ("stop.toml", "which this command reads"),
         ("folder.toml", "is a folder"),
     ],

@@ -18,6 +18,7 @@ from brakelab.fleet.statistics import notes
 from brakelab.fleet.summary import summary_table, when
 from brakelab.fleet.wear import pads_table
 from brakelab.replay.source import announced, load_source
+from brakelab.results.outputs import check_outputs
 from brakelab.results.progress import progress_bar
 from brakelab.simulation.observer import with_observer
 from ecu.errors import UserError
@@ -48,7 +49,12 @@ def fleet(
         UserError: an argument, a manifest, a configuration or a map is invalid.
         RunFault: the scheduler was lost.
     """
-    chains = plan(find_drives(given, config, map, out), observer)
+    drives = find_drives(given, config, map, out)
+    tables = [out / name for name in ("drives.parquet", "pads.parquet", "report.html")]
+    names = {table.name for table in tables}
+    logs = (Path(log) for drive in drives for log in drive.logs)
+    check_outputs(out, tables, [log for log in logs if log.name in names])
+    chains = plan(drives, observer)
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -70,10 +76,11 @@ def fleet(
         return 130
     place = {(p.drive.vehicle, p.drive.name): k for k, p in enumerate(p for c in chains for p in c.drives)}
     done.sort(key=lambda summary: place[summary["vehicle"], summary["drive"]])
-    pq.write_table(summary_table(done), out / "drives.parquet", compression="zstd")
-    pq.write_table(pads_table(done), out / "pads.parquet", compression="zstd")
-    write_page(done, out / "report.html")
+    pq.write_table(summary_table(done), tables[0], compression="zstd")
+    pq.write_table(pads_table(done), tables[1], compression="zstd")
+    write_page(done, tables[2])
     _tell(done, replayed, sum(len(chain.drives) for chain in chains), out)
+    wrote(*tables)
     if interrupted:
         say(GOES_ON)
         return 130
@@ -127,7 +134,6 @@ def _tell(done: Sequence[dict[str, Any]], replayed: int, total: int, out: Path) 
     )
     give(drives=total, done=len(done) - len(faults), replayed=replayed, with_notes=noted)
     give(vehicles=vehicles, hours=hours, kilometres=kilometres, failed=[one["fault"] for one in faults])
-    wrote(out / "drives.parquet", out / "pads.parquet", out / "report.html")
 
 
 def disorder(done: Sequence[dict[str, Any]]) -> list[str]:

@@ -32,10 +32,11 @@ from brakelab.friction_lab.tables import (
 from brakelab.plant.description import PlantFileError, read_file
 from brakelab.plant.dynamometer_programme import load_programme
 from brakelab.plant.linings import Lining, Linings
+from brakelab.results.outputs import check_outputs
 from brakelab.results.progress import progress_bar
 from brakelab.results.text_table import show
 from ecu.errors import UserError
-from ecu.output import give, say
+from ecu.output import give, say, wrote
 from ecu.settings.resources import named, resource
 
 FEWEST: Final = 10
@@ -57,6 +58,8 @@ def run(
         UserError: a programme, brake or law of that name does not exist, or `out` ends in something else.
     """
     check_name(out)
+    path, beside = named(programme, "config/rig"), out.with_suffix(".toml")
+    check_outputs(out, (out, beside), [path, *([linings] if linings else [])])
     known = _linings(linings)
     if brake not in known:
         raise UserError("--brake", brake, f"no such brake; choose one of {', '.join(known)}")
@@ -66,7 +69,6 @@ def run(
     if law is not None and law not in lining.friction:
         raise UserError("--law", law, f"no such law; choose one of {', '.join(lining.friction)}")
     bench = new_bench(lining, brake, seed, law=law or "")
-    path = named(programme, "config/rig")
     rig = bench.rig[0]
     inertia = float(rig["mass"] * rig["tyre_radius"] ** 2)
     if has_sections(path):
@@ -77,11 +79,14 @@ def run(
     else:
         with progress_bar("lab run", 1.0) as advance:
             recording = run_programme(bench, load_programme(path), advance)
-    beside = write_recording(out, recording, lining, inertia)
+    write_recording(out, recording, lining, inertia)
     hours, minutes = bench.time / 3600.0, recording.time.size / 200.0 / 60.0
-    say(f"{hours:.1f} h on the rig, {minutes:.0f} min recorded: {out}, {beside}")
-    give(written=[out, beside], hours=hours, minutes_recorded=minutes)
-    say(f"next: brake-ecu lab look {out}; brake-ecu identify friction {out} --out brake.toml")
+    say(f"{hours:.1f} h on the rig, {minutes:.0f} min recorded")
+    give(hours=hours, minutes_recorded=minutes)
+    lining_file = out.with_name(f"{out.stem}-lining.toml")
+    wrote(
+        out, beside, next=f"brake-ecu lab look {out}; brake-ecu identify friction {out} --out {lining_file}"
+    )
     return 0
 
 
@@ -116,6 +121,10 @@ def friction(
     Raises:
         UserError: a file cannot be read or makes no physical sense, or holds too few stops; one line.
     """
+    page = out.with_suffix(".html")
+    recordings = [*data, *([held_out] if held_out else [])]
+    described_by = [columns or path.with_suffix(".toml") for path in recordings]
+    check_outputs(out, (out, page), [*recordings, *described_by, *map(Path, own)], toml=True)
     measured = _read(data, columns)
     _need(measured.stops, data[0])
     own = tuple(str(Path(code).resolve()) if code.endswith(".py") else code for code in own)
@@ -140,10 +149,10 @@ def friction(
     for table in tables:
         show(Console(), table)
     write_lining(out, measured.columns, measured.heating, identified)
-    page = out.with_suffix(".html")
     write_report(page, measured.columns, measured.stops, identified, tables)
-    give(written=[out, page], chosen=identified.chosen.name, stops=identified.stops)
-    say(f"written: {out}, the law chosen under the name SIM; {page}, how well and how far it holds")
+    give(chosen=identified.chosen.name, stops=identified.stops)
+    wrote(out, page)
+    say(f"{out}: the law chosen under the name SIM; {page}: how well and how far it holds")
     return 0
 
 

@@ -8,17 +8,11 @@ from typing import Any
 import tomlkit
 from tomlkit.items import InlineTable
 
+from brakelab.results.outputs import config_files
 from ecu.errors import UserError
-from ecu.settings.toml_file import read_toml
 
 Section = dict[str, tuple[str, str]]
 """Keys of a table, each with its value as TOML and a comment."""
-
-
-def included_file(config: Path) -> list[Path]:
-    """Return the file that `config` includes, if any."""
-    name = read_toml(config).get("include")
-    return [config.parent / str(name)] if name else []
 
 
 def car_toml(config: Path, out: Path, head: str, sections: Mapping[str, Section]) -> str:
@@ -27,7 +21,7 @@ def car_toml(config: Path, out: Path, head: str, sections: Mapping[str, Section]
     `sections` by the names of tables, as front.pad, "": the keys at the top. A file that is included includes
     no other: what `config` itself includes is included in its place, and its own keys are repeated.
     """
-    [source] = included_file(config) or [config]
+    source = config_files(config)[-1]
     document: Any = tomlkit.parse(config.read_text("utf-8-sig") if source != config else "")
     document["include"] = Path(os.path.relpath(source.resolve(), out.resolve().parent)).as_posix()
     for name, keys in sections.items():

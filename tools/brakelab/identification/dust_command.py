@@ -12,11 +12,11 @@ from brakelab.identification.dust_models import LEAST
 from brakelab.identification.dust_reader import read_trips
 from brakelab.identification.dust_tables import model_table, spearman_table, trip_table
 from brakelab.results.chart import BLUE, GREY, ORANGE, PINK, Line, Panel, write_chart
-from brakelab.results.outputs import check_outputs
+from brakelab.results.outputs import check_outputs, config_files
 from brakelab.results.text_table import markdown
 from ecu.contract.dust import MODELS
 from ecu.errors import UserError
-from ecu.output import give, say
+from ecu.output import give, wrote
 from ecu.settings.config import Axle, load_config, new_params
 
 LEGEND: Final = (("chosen", BLUE), ("others", ORANGE), ("95 %, and the background's line", PINK))
@@ -102,8 +102,8 @@ def identify_dust(manifest: Path, config: Path, axle: str, out: Path) -> int:
     if axle not in ("front", "rear"):
         raise UserError("--axle", axle, "choose front or rear")
     vehicle = load_config(config)
-    page = out.with_suffix(".md")
-    check_outputs(out, (out, page, out.with_suffix(".svg")), [manifest, config])
+    written = out, page, _ = out, out.with_suffix(".md"), out.with_suffix(".svg")
+    check_outputs(out, written, [manifest, *config_files(config)], toml=True)
     brake: Axle = getattr(vehicle, axle)
     radius = float(new_params(vehicle)[0]["wheel_radius"][0 if axle == "front" else 2])
     trips = read_trips(manifest, brake.push_out_pressure, radius)
@@ -119,6 +119,6 @@ def identify_dust(manifest: Path, config: Path, axle: str, out: Path) -> int:
         f"left out within {100 * chosen.left_out_sum:.0f} % RMS{said}"
     )
     print(f"{page}: models beside each other, background, correlations")
-    give(written=[out, page], model=chosen.name, left_out=chosen.left_out_sum, trips=len(trained))
-    say(f"next: brake-ecu replay LOG --config {out} --out drive.parquet")
+    give(model=chosen.name, left_out=chosen.left_out_sum, trips=len(trained))
+    wrote(*written, next=f"brake-ecu replay LOG --config {out} --out drive.parquet")
     return 0

@@ -12,9 +12,9 @@ from brakelab.identification.thermal_fit import Disc, Fit, fit_axle, fit_nothing
 from brakelab.identification.thermal_log import Drive, read_drives
 from brakelab.identification.thermal_page import Judged, untold, write_page
 from brakelab.identification.thermal_result import errors_of, judge, section_of, start_of
-from brakelab.results.outputs import check_outputs
+from brakelab.results.outputs import check_outputs, config_files
 from ecu.errors import UserError
-from ecu.output import give
+from ecu.output import give, wrote
 from ecu.settings.config import Axle, Config, load_config
 
 AXLES: Final = {"front": (0, 1), "rear": (2, 3)}
@@ -62,10 +62,8 @@ def identify_thermal(logs: Sequence[Path], config: Path, map: Path | None, out: 
         UserError: an argument or a log is invalid, or the logs tell nothing.
     """
     vehicle = load_config(config)
-    if out.suffix != ".toml":
-        raise UserError("--out", str(out), "a CONFIG is TOML; let the name end in .toml")
-    page = out.with_suffix(".md")
-    check_outputs(out, (out, page, out.with_suffix(".svg")), [*logs, config, *([map] if map else [])])
+    written = out, page, _ = out, out.with_suffix(".md"), out.with_suffix(".svg")
+    check_outputs(out, written, [*logs, *config_files(config), *([map] if map else [])], toml=True)
     for log in logs:
         if not log.exists():
             raise UserError(str(log), "", "no such file; give an existing log")
@@ -97,12 +95,12 @@ def identify_thermal(logs: Sequence[Path], config: Path, map: Path | None, out: 
     for axle in axles:
         for line in untold(axle):
             print(line)
-    give(written=[out, page], axles=sections)
+    give(axles=sections)
     for axle in axles:
         fit, inside = axle.fit, 100.0 * float(np.mean([told.inside for told in axle.told]))
         print(
             f"{axle.name}: ξ {fit.heating:.3g} K/J, δ {fit.cooling.still:.3g} + {fit.cooling.by_speed:.3g} v "
             f"1/s; {_about(axle)}, inside 2σ {inside:.0f} %"
         )
-    print(f"{out}, {page}: written; next: brake-ecu replay LOG --config {out} --out drive.parquet")
+    wrote(*written, next=f"brake-ecu replay LOG --config {out} --out drive.parquet")
     return 0

@@ -8,9 +8,9 @@ from brakelab.identification.vehicle_file import map_toml, offsets, write_vehicl
 from brakelab.identification.vehicle_identify import identify
 from brakelab.identification.vehicle_page import write_page
 from brakelab.identification.vehicle_parameters import parameters_of
-from brakelab.results.outputs import check_outputs
+from brakelab.results.outputs import check_outputs, config_files
 from ecu.errors import UserError
-from ecu.output import give, say
+from ecu.output import give, say, wrote
 from ecu.settings.config import load_config, new_params
 
 
@@ -20,12 +20,10 @@ def identify_vehicle(drives: Sequence[Path], config: Path, map: Path | None, clo
     Raises:
         UserError: an argument or a file is not right, or the drives tell nothing.
     """
-    if out.suffix != ".toml":
-        raise UserError("--out", str(out), "a CONFIG is written; let the name end in .toml")
     start = load_config(config)
     page, own_map = out.with_suffix(".md"), out.with_name(f"{out.stem}-map.toml")
     written = [out, page, page.with_suffix(".svg"), *([own_map] if map else [])]
-    check_outputs(out, written, [*drives, config, *([map] if map else [])])
+    check_outputs(out, written, [*drives, *config_files(config), *([map] if map else [])], toml=True)
     for drive in drives:
         if not drive.exists():
             raise UserError(str(drive), "", "no such file; give a log or a file of signals")
@@ -41,7 +39,7 @@ def identify_vehicle(drives: Sequence[Path], config: Path, map: Path | None, clo
     zeros = offsets(found.zeros)
     if map and zeros:
         own_map.write_text(map_toml(map, own_map, zeros), encoding="utf-8")
-    give(parameters=parameters, zeros=zeros, written=[path for path in written if path.exists()])
+    give(parameters=parameters, zeros=zeros)
     for one in parameters:
         unit = "" if one.unit == "-" else f" {one.unit}"
         if one.remedy:
@@ -53,9 +51,7 @@ def identify_vehicle(drives: Sequence[Path], config: Path, map: Path | None, clo
             f"{name}: reads {zero:+.4g} at 0"
             + ("" if map else f"; a map would take it off: offset = {-zero:.4g}")
         )
-    also = f", {own_map} (zeros taken off)" if map and zeros else ""
     with_map = f" --map {own_map if zeros else map}" if map else ""
-    print(
-        f"{out}: written, fits in {page}{also}; next: brake-ecu replay {drives[0]} --config {out}{with_map}"
-    )
+    replay = f"brake-ecu replay {drives[0]} --config {out}{with_map} --out drive.parquet"
+    wrote(*(written if map and zeros else written[:3]), next=replay)
     return 0

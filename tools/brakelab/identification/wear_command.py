@@ -12,10 +12,10 @@ from brakelab.identification.wear_fit import QUASI_STATIC, TERMS, UNITS, Fit, fi
 from brakelab.identification.wear_fusion import Fused, fuse
 from brakelab.identification.wear_pictures import LEGEND, law_panels
 from brakelab.results.chart import write_chart
-from brakelab.results.outputs import check_outputs
+from brakelab.results.outputs import check_outputs, config_files
 from brakelab.results.text_table import Table, markdown
 from ecu.errors import UserError
-from ecu.output import give, say
+from ecu.output import give, wrote
 from ecu.settings.config import Axle, load_config
 
 COOLING_SPEED: Final = 15.0  # m/s, speed of cooling between stops, assumed
@@ -117,8 +117,8 @@ def identify_wear(manifest: Path, config: Path, axle: str, out: Path) -> int:
     if axle not in ("front", "rear"):
         raise UserError("--axle", axle, "choose front or rear")
     vehicle = load_config(config)
-    page = out.with_suffix(".md")
-    check_outputs(out, (out, page), [manifest, config])
+    written = out, page, _ = out, out.with_suffix(".md"), out.with_suffix(".svg")
+    check_outputs(out, written, [manifest, *config_files(config)], toml=True)
     brake: Axle = getattr(vehicle, axle)
     cooling = brake.disc_cooling + COOLING_SPEED * brake.disc_cooling_by_speed
     blocks = read_blocks(manifest, brake.pad, Heat(brake.disc_heating, cooling))
@@ -136,12 +136,12 @@ def identify_wear(manifest: Path, config: Path, axle: str, out: Path) -> int:
     write_page(page, blocks, fused, fit, static, SHARE[axle] * vehicle.vehicle.mass)
     named = zip(TERMS, fit.coefficients, UNITS, strict=True)
     kept = ", ".join(f"{name} = {value:.4g} {unit}" for name, value, unit in named if value)
-    give(written=[out, page], coefficients=dict(zip(TERMS, fit.coefficients, strict=True)), r2=fit.r2)
+    give(coefficients=dict(zip(TERMS, fit.coefficients, strict=True)), r2=fit.r2)
     give(left_out=leave_one_out(fit, fused.mass), tables=tables(blocks, fused, fit, static))
     print(f"{out}: {kept}")
     print(
         f"{page}: {len(blocks)} blocks, R² {fit.r2:.4f} (quasi-static {static.r2:.4f}), blocks left out "
         f"{100 * leave_one_out(fit, fused.mass):.1f} % RMS, rank {fit.rank} of 7"
     )
-    say(f"next: brake-ecu replay LOG --config {out} --out drive.parquet")
+    wrote(*written, next=f"brake-ecu replay LOG --config {out} --out drive.parquet")
     return 0

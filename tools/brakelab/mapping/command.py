@@ -25,6 +25,7 @@ from brakelab.mapping.torque import FORMULA, brake_torque, stand_in
 from brakelab.replay.log import log_size
 from brakelab.replay.quality import Findings, damage_lines
 from brakelab.results.console import WIDTH
+from brakelab.results.outputs import check_outputs, config_files
 from brakelab.results.progress import progress_bar
 from ecu.bus.database import read_database
 from ecu.bus.signal_map import SLOWEST_S, load_signal_map
@@ -55,6 +56,9 @@ def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) 
         UserError: the log, the database, `config` or `out` is not right, or no wheel speeds were found,
             against which everything else is judged.
     """
+    if out is not None:
+        given = [log, *([dbc] if dbc else []), *(config_files(config) if config else [])]
+        check_outputs(out, (out,), given, toml=True)
     params = new_params(load_config(config))[0] if config else None
     car = ANY_CAR if params is None else car_of(params)
     if kind_of(log) == "signals":

@@ -1,17 +1,27 @@
-"""Output files of a command: none may be a folder, or one of its inputs."""
+"""Output files of a command: none may be a folder, or one of its inputs; TOML has its ending."""
 
 import os
 from collections.abc import Sequence
 from pathlib import Path
 
 from ecu.errors import UserError
+from ecu.settings.toml_file import read_toml
 
 
-def check_outputs(out: Path, written: Sequence[Path], read: Sequence[Path]) -> None:
+def config_files(config: Path) -> list[Path]:
+    """Return `config` and the file that it includes, if any."""
+    name = read_toml(config).get("include")
+    return [config, config.parent / str(name)] if name else [config]
+
+
+def check_outputs(out: Path, written: Sequence[Path], read: Sequence[Path], toml: bool = False) -> None:
     """Refuse an `--out` by which a file of `written` would be a folder or replace one of `read`.
 
-    Raises UserError. Links are followed; files that do not exist yet are compared by their path.
+    `toml`: `out` must end in .toml. Raises UserError. Links are followed; files that do not exist yet are
+    compared by their path.
     """
+    if toml and out.suffix != ".toml":
+        raise UserError("--out", str(out), "is written as TOML; let the name end in .toml")
     for path in written:
         if path.is_dir():
             what = "is a folder" if path == out else f"writes {path}, which is a folder"

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from brakelab.results.console import new_console
-from brakelab.results.outputs import check_outputs
+from brakelab.results.outputs import check_outputs, config_files
 from brakelab.results.progress import progress_bar
 from brakelab.results.text_table import Table, show
 from brakelab.simulation.observer import with_observer
@@ -60,9 +60,7 @@ def tune(
     Raises:
         UserError: a file cannot be read, is wrong, or cannot be written; a scenario never brakes.
     """
-    if out.suffix != ".toml":
-        raise UserError("--out", str(out), "a tuning is written as TOML; let the name end in .toml")
-    check_outputs(out, (out,), [config, *trained, *validated])
+    check_outputs(out, (out,), [*config_files(config), *trained, *validated], toml=True)
     manual = with_observer(load_config(config), kind="observer2")
     scenarios = {path: load_scenario(path) for path in (*trained, *validated)}
     recordings = _record(manual, {path: scenarios[path] for path in trained}, range(seeds))

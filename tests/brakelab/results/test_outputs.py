@@ -1,0 +1,75 @@
+"""No command writes over what it reads, by whatever name; TOML is written to names that end in .toml."""
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from ecu import cli
+from ecu.settings.resources import resource
+
+OVERWRITING = {
+    # command line: file that it would replace
+    "identify vehicle drive.csv --config car.toml --out car.toml": "car.toml",
+    "identify vehicle drive.csv --config car.toml --out base.toml": "base.toml",
+    "identify vehicle drive.csv --config base.toml --map car-map.toml --out car.toml": "car-map.toml",
+    "identify thermal drive.csv --config car.toml --out base.toml": "base.toml",
+    "identify wear blocks.svg --config base.toml --out blocks.toml": "blocks.svg",
+    "identify wear blocks.csv --config car.toml --out base.toml": "base.toml",
+    "identify dust trips.md --config base.toml --out trips.toml": "trips.md",
+    "identify dust trips.csv --config linked.toml --out base.toml": "linked.toml",
+    "identify friction brake.csv --out brake.toml": "brake.toml",
+    "identify friction brake.csv --columns mine.toml --out mine.toml": "mine.toml",
+    "lab run mine.toml --brake A --out mine.csv": "mine.toml",
+    "lab run cpc --brake A --linings brake.toml --law SIM --out brake.csv": "brake.toml",
+    "tune --config car.toml --out base.toml": "base.toml",
+    "map suggest drive.csv --config car.toml --out base.toml": "base.toml",
+    "replay drive.brakes.parquet --config base.toml --out drive.parquet": "drive.brakes.parquet",
+    "fleet fleet.csv --config base.toml --out .": "drives.parquet",
+}
+NO_TOML = (
+    "identify vehicle drive.csv --config base.toml --out car.txt",
+    "identify thermal drive.csv --config base.toml --out car.txt",
+    "identify wear blocks.csv --config base.toml --out car.txt",
+    "identify dust trips.csv --config base.toml --out car.txt",
+    "identify friction brake.csv --out car.txt",
+    "tune --config base.toml --out car.txt",
+    "map suggest drive.csv --out car.txt",
+)
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    names = " ".join([*OVERWRITING, *NO_TOML]).split()
+    for name in {name for name in names if "." in name[1:]} - {"car.txt"} | {"drives.parquet"}:
+        (tmp_path / name).write_text(name)
+    shutil.copy(resource("config/suv.toml"), tmp_path / "base.toml")
+    (tmp_path / "car.toml").write_text('include = "base.toml"\n')
+    (tmp_path / "linked.toml").unlink()
+    (tmp_path / "linked.toml").symlink_to("base.toml")
+    (tmp_path / "fleet.csv").write_text("vehicle,log\none,drives.parquet\n")
+    return tmp_path
+
+
+@pytest.mark.parametrize("line", OVERWRITING)
+def test_an_output_or_its_neighbour_is_no_input(
+    line: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    assert cli.main(line.split()) == 2
+    said = capsys.readouterr().err
+    assert re.search(
+        rf"--out: .*: would overwrite (/.*/)?{OVERWRITING[line]}, which this command reads", said
+    )
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+@pytest.mark.parametrize("line", NO_TOML)
+def test_toml_is_written_to_a_name_that_says_so(
+    line: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(line.split()) == 2
+    assert "--out: car.txt: is written as TOML; let the name end in .toml" in capsys.readouterr().err
+    assert not (folder / "car.txt").exists()
