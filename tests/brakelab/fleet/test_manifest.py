@@ -28,7 +28,7 @@ def test_by_pattern_the_folder_is_the_vehicle_and_numbers_count_as_numbers(tmp_p
 
 
 def test_csv_orders_by_time(tmp_path: Path) -> None:
-    manifest = tmp_path / "fleet.csv"
+    manifest = tmp_path / "FLEET.CSV"
     manifest.write_text(
         "vehicle,log,time,config,map\n"
         "b,late.log,2026-05-02T08:00:00+02:00,sedan,kona\n"
@@ -42,7 +42,7 @@ def test_csv_orders_by_time(tmp_path: Path) -> None:
 
 
 def test_toml_is_in_the_order_of_driving(tmp_path: Path) -> None:
-    manifest = tmp_path / "fleet.toml"
+    manifest = tmp_path / "Fleet.TOML"
     manifest.write_text(
         '[[vehicle]]\nname = "a"\nconfig = "sedan"\ndrives = ["2.log", ["1a.log", "1b.log"], "s3://d/3.log"]\n'
         '[[vehicle]]\nname = "b"\ndrives = ["1.log"]\n'

@@ -73,9 +73,9 @@ def find_drives(given: Sequence[str], config: Path | None, map: Path | None, out
     Raises:
         UserError: a manifest is invalid, nothing is found, or a drive has no configuration.
     """
-    if len(given) == 1 and Path(given[0]).suffix == ".toml":
+    if len(given) == 1 and Path(given[0]).suffix.lower() == ".toml":
         drives = _from_toml(Path(given[0]), config, map)
-    elif len(given) == 1 and Path(given[0]).suffix == ".csv" and not re.search(r"[*?\[]", given[0]):
+    elif len(given) == 1 and Path(given[0]).suffix.lower() == ".csv" and not re.search(r"[*?\[]", given[0]):
         drives = _from_csv(Path(given[0]), config, map)
     else:
         drives = _from_patterns(given, config, map, out)

@@ -53,7 +53,7 @@ def read_columns(path: Path, names: tuple[str, ...], what: str) -> dict[str, Arr
         _check_time(path, columns["t"])
         return columns
     try:
-        table = pq.read_table(path) if path.suffix == ".parquet" else pa_csv.read_csv(path)
+        table = pq.read_table(path) if path.suffix.lower() == ".parquet" else pa_csv.read_csv(path)
     except (OSError, pa.ArrowInvalid) as error:
         reason = str(error).splitlines()[0]
         raise UserError(str(path), "", f"cannot be read as CSV or Parquet: {reason}") from None
