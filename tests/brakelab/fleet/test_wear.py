@@ -39,7 +39,7 @@ FLEET = [
     drive("slow", "1", (9e4, 9e4, 8e4, 9e4)),
     drive("hasty", "1", (5e4, 5e4, 9e4, 9e4)),
     drive("new", "1", (NAN,) * 4, particle_mass_per_km=None),
-    drive("hasty", "2", (2.1e4, 2e4, 9e4, 9e4), particle_mass_per_km=11.0, particles_per_km=4e9),
+    drive("hasty", "2", (2.1e4, 2e4, 9e4, 9e4), particle_mass_per_km=11.2, particles_per_km=4e9),
     drive("silent", "1", (1e3,) * 4, pads=[]),
 ]
 
@@ -68,7 +68,7 @@ def test_the_page_has_the_order_and_the_next_one(tmp_path: Path):
     section = page[page.index("Who needs pads when") :].partition("</section>")[0]
     assert section.index(">hasty<") < section.index(">slow<") < section.index(">new<")
     assert "16000 to 24000" in section
-    assert '<td class="warns">11.0</td>' in section
+    assert '<td class="warns">11.2</td>' in section
     assert "nan" not in section
     assert "Next pads in" in page
 

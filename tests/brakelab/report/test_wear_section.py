@@ -118,7 +118,7 @@ TOWN_MG = 9 * 2 * 500 * 0.02 / TOWN_KM
         "fl 10.50 ± 0.39 54.0 20000 80000 60000 to 101000 measured 2 times, 1.10 of the law",
         f"town up to 60 km/h 9.4 9 383 {TOWN_WEAR:.3f} 0.000 {TOWN_MG:.1f}",
         f"motorway above 90 km/h 30.6 11 144 {MOTORWAY_WEAR:.3f}",
-        "[mg/km] 17.5 ± 3.4 6.5 7, battery electric 3",
+        "[mg/km] 17.5 ± 3.4 6.5 7, battery electric 3; heavier vans 11, battery electric 5",
         "Particles [10⁹/km] 5.25 (2.10 to 10.50) 3.00 none yet",
         "brakes did 75 % of the work of brakes and motors or engine",
         "The 10 dirtiest brakings, by particles",

@@ -26,6 +26,7 @@ from brakelab.fleet.statistics import (
 from brakelab.fleet.wear import Due, pads_due
 from brakelab.report.look import ESTIMATE, SHADE, new_figure
 from brakelab.report.page import Tile, fill, fixed
+from brakelab.results import euro7
 from ecu import __version__
 from ecu.errors import UserError
 
@@ -54,6 +55,7 @@ def write_page(done: Sequence[Summary], out: Path) -> None:
             "facts": [("Drives", f"{len(done)}"), ("brake-ecu", __version__)],
             "tiles": [*_tiles(done, good, vehicles), *_next_pads(due)],
             "due": due[:ROWS],
+            "euro_7": euro7.WORDS,
             "due_left": max(len(due) - ROWS, 0),
             "outliers": outliers(vehicles)[:ROWS],
             "failed": [

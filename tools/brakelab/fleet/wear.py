@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from brakelab.fleet.manifest import FITTED
 from brakelab.fleet.statistics import Summary
 from brakelab.fleet.summary import known
+from brakelab.results import euro7
 from brakelab.results.brakes import BrakeRow
 from brakelab.results.pads import PadState, filled, packed, pads_of
 from brakelab.results.prediction import corners
@@ -21,8 +22,6 @@ from ecu.pads import fit_new, measure, parse_measured
 from ecu.pads import pads as linings_of
 from ecu.settings.config import Config
 
-LIMIT: Final = 7.0
-"""mg/km, Euro 7 over the WLTP-Brake cycle; battery electric cars 3."""
 _TEXT, _NUMBER = pa.string(), pa.float64()
 _COLUMNS: Final[tuple[tuple[str, pa.DataType, str], ...]] = (
     ("vehicle", _TEXT, "-"),
@@ -124,7 +123,7 @@ def pads_due(done: Sequence[Summary]) -> list[Due]:
             math.nan if row[name] is None else float(row[name])
             for name in ("particle_mass_per_km", "particles_per_km")
         )
-        found.append(Due(vehicle, pad, rate, mass, mass > LIMIT, particles))
+        found.append(Due(vehicle, pad, rate, mass, euro7.above_all(mass), particles))
     return sorted(found, key=lambda due: (_order(due.pad), due.vehicle))
 
 

@@ -13,12 +13,11 @@ from brakelab.report.wear_applications import Application, dirtiest, read_applic
 from brakelab.report.wear_plots import BAND, plots_of_emission, plots_of_wear
 from brakelab.report.wear_roads import KINDS, roads, way
 from brakelab.report.wear_untold import OUTSIDE, told_share, untold
+from brakelab.results import euro7
 from brakelab.results.pads import KEY, PadState, unpacked
 from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
 
-LIMITS: Final = (7.0, 3.0)
-"""mg/km over the WLTP-Brake cycle, Regulation (EU) 2024/1257: cars and light vans, battery electric ones."""
 LEAST_WAY: Final = 1.0  # km, below which nothing is said per distance
 
 
@@ -30,7 +29,7 @@ class Amount(NamedTuple):
     life: str
     limit: str
     above: bool
-    """The drive is above the limit of all cars but battery electric ones."""
+    """The drive is above every limit."""
 
 
 class Section(NamedTuple):
@@ -107,14 +106,13 @@ def _amounts(drive: Drive, pads: list[PadState], applications: list[Application]
     found = []
     life = float(drive.column("particle_mass_per_km")[-1])
     if math.isfinite(per_km) or math.isfinite(life):
-        limit = f"{LIMITS[0]:.0f}, battery electric {LIMITS[1]:.0f}"
-        above = max(v for v in (per_km, life) if math.isfinite(v)) > LIMITS[0]
+        above = any(map(euro7.above_all, (per_km, life)))
         found.append(
             Amount(
                 "Particles of the linings up to 10 µm [mg/km]",
                 fixed(per_km, 1) + band,
                 fixed(life, 1),
-                limit,
+                euro7.WORDS,
                 above,
             )
         )

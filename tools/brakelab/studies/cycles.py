@@ -6,6 +6,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from brakelab.results import euro7
 from brakelab.results.text_table import Table
 from brakelab.studies.cycle_cars import (
     SHIPPED,
@@ -24,7 +25,7 @@ CAR: Final = 1
 FIRST_DRAW: Final = 10
 """Seeds 0 to 7 of the sport utility vehicle served to choose the constants of `lining_share.py`."""
 DRAWS: Final = 4
-LIMITS: Final = {"suv": 7.0, "sedan": 7.0, "lcv": 11.0, "suv-blended": 3.0}
+LIMITS: Final = {"suv": euro7.CAR, "sedan": euro7.CAR, "lcv": euro7.VAN, "suv-blended": euro7.ELECTRIC_CAR}
 """mg/km of Euro 7 for each type: car, car, N1 of class III, battery electric car."""
 GOAL: Final = 15.0  # % of dust
 POLICIES: Final = ("off", "dust")

@@ -9,6 +9,7 @@ import numpy as np
 
 from brakelab.identification.dust_command import LEGEND, dust_panels
 from brakelab.identification.dust_tables import THESIS, spearman_table, trip_table
+from brakelab.results import euro7
 from brakelab.results.chart import write_chart
 from brakelab.results.text_table import Table
 from brakelab.studies.dust_study import Draw, OnBoard, draw_trips, drive_on_board, pictured
@@ -126,9 +127,9 @@ def dust_tables(draws: list[Draw], quiet: list[Draw], cars: list[OnBoard]) -> li
             "from 90 % of the work on. Mass: half of what the linings lose, without the discs: by the law "
             "of Table 7.1, which these linings do not obey; once their thickness was measured (± 0.1 mm) "
             "after 10,000 km like this trip; and of what they lost. The half itself is not tested: 0.02 to "
-            "0.7 were measured, by weighing filters. Euro 7 allows 7 mg/km "
-            "(battery electric cars 3) of particles up to 10 µm over the WLTP brake cycle, discs included; "
-            "it limits no number yet.",
+            "0.7 were measured, by weighing filters. Euro 7 allows cars "
+            f"{euro7.WORDS} mg/km of particles up to 10 µm over the WLTP-Brake cycle, discs included; it "
+            "limits no number yet.",
         ),
     ]  # fmt: skip
 

@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from brakelab.results import euro7
 from brakelab.studies import failures, lies
 from brakelab.studies.blending import CARS
 
@@ -192,10 +193,10 @@ CYCLES_TEXT: Final = (
     "with bedded brakes; dust and wear are those of the plant's own laws (tools/brakelab/plant/emission.py, "
     "wear.py), which nothing on board knows. The ECU's emission models of both axles are identified from "
     "eight trips with a counter, as `identify dust` finds them; its law of wear is that of Table 7.1.\n\n"
-    "Limits: Regulation (EU) 2024/1257 (Euro 7) allows 3 mg/km of particles up to 10 µm to battery electric "
-    "cars and 7 to others, 5 and 11 to heavier vans, for new types from 29 November 2026; there is none on "
-    "their number. (The Commission's proposal had 3 for all from 2035. Read in summaries by S&P Global "
-    "Mobility, 2026, and Freshfields, 2022; the text of the regulation was not at hand.) Electrified cars "
+    f"Limits: Regulation (EU) 2024/1257 (Euro 7) allows to cars {euro7.WORDS} mg/km of particles up to "
+    "10 µm, for new types from 29 November 2026; there is none on their number. (The Commission's proposal had 3 "
+    "for all from 2035. Read in summaries by S&P Global Mobility, 2026, and Freshfields, 2022; the text of "
+    "the regulation was not at hand.) Electrified cars "
     "are tested with linings alone and multiply by the friction braking share coefficient c of UN GTR 24: "
     "1 for linings alone, 0.17 for battery electric cars, 0.34 for plug-in hybrids, about 0.5 to 0.6 for "
     "others. Of these only 1 and, in the proposal of 2022, 0.15 for battery electric cars were found in a "
