@@ -74,7 +74,7 @@ def _hits(fault: Record, can_id: int, t: float, noise: Generator) -> bool:
 
 @kernel
 def _behind(link: Link, can_id: int) -> float:
-    """Return when a frame can arrive at the soonest [s]: a bus hands over those of one identifier in order."""
+    """Return when a frame can arrive at the soonest [s]: a bus keeps the order of one identifier."""
     soonest = -math.inf
     for place in range(len(link.release)):
         if not math.isinf(link.release[place]) and link.held[place].can_id == can_id:
