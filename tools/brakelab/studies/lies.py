@@ -26,7 +26,7 @@ from brakelab.simulation.closed_loop import Drive, new_loop, run
 from brakelab.simulation.faults import Fault
 from brakelab.simulation.scenario import Phase, Scenario
 from brakelab.stretches import stretches
-from ecu.contract.faults import IMPLAUSIBLE, fault_mask
+from ecu.contract.faults import ACCEL_IMPLAUSIBLE, IMPLAUSIBLE, fault_mask
 from ecu.contract.signals import CORNERS, INPUT_SIGNALS
 from ecu.settings.config import Config, load_config
 from ecu.settings.resources import resource
@@ -247,6 +247,7 @@ def judge(
     after = drive.t >= BEGIN
     masks, usual = _masks(drive)[after], int(np.bitwise_or.reduce(_masks(sound)))
     own = sum(IMPLAUSIBLE.get(signal, 0) for signal in signals)
+    own |= ACCEL_IMPLAUSIBLE if "accel_x" in signals else 0
     named = np.flatnonzero(masks & own)
     begin = float(drive.t[after][named[0]]) if len(named) else np.nan
     mode = drive.outputs["mode"][after]
