@@ -36,6 +36,8 @@ ESTIMATE = np.dtype(
         ("mode", "i8", (4,)),  # of friction: nominal, observing, holding, fault
         ("brake_torque", "f8", (4,)),  # of the linings [N m], >= 0
         ("pressure_zero", "f8", (4,)),  # pressure zero [bar]
+        ("pressure_at_rest", "f8", (4,)),  # mean of the readings of a released brake [bar]
+        ("floored", "u1", (4,)),  # the sensor reads no pressure below zero
         # Fit of the measurements: test ratios, NaN where nothing was fused in the last window.
         ("test_ratio", "f8", (4,)),  # of the wheels
         ("test_ratio_balance", "f8"),  # of the forces along the car

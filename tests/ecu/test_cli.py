@@ -47,7 +47,7 @@ COMMANDS = (
         ("rig stop-1 stop-1 --config suv", "stop-1: named twice"),
         ("rig stop-1 --config suv -i socketcan", "-i, -c: give both or none"),
         ("simulate stop-1 --config suv --out x --seed -1", "Invalid value for '--seed'"),
-        ("tune --config suv --out tuned.txt", "--out: tuned.txt: a tuning is written as TOML"),
+        ("tune --config suv --out tuned.txt", "--out: tuned.txt: is written as TOML"),
         ("tune --config suv --population 3", "Invalid value for '--population'"),
     ],
 )

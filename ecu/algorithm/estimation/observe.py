@@ -22,7 +22,7 @@ from ecu.algorithm.estimation.thesis.friction import hand_over, restore_friction
 from ecu.algorithm.estimation.thesis.slip import expect_slip, learn_radius, update_radius, update_slip
 from ecu.algorithm.estimation.thesis.speed import update_speed
 from ecu.algorithm.estimation.wheel_load import update_wheel_load
-from ecu.algorithm.estimation.zero import FREE, note_rest, settle_zero
+from ecu.algorithm.estimation.zero import FREE, note_rest, settle_zero, tell_zeros
 from ecu.algorithm.inputs import LEAST_REQUEST, fresh, requested_decel, usable
 from ecu.algorithm.vehicle import total_tyre_force
 from ecu.contract.params import BAR, JOINT, OBSERVER1
@@ -49,8 +49,7 @@ def start_estimation(p: Record, s: Record) -> None:
 def start_estimate(s: Record) -> None:
     """Initialise the estimate before the first cycle: friction is the learned one."""
     tell_friction(s.friction, s.estimate)
-    for i in range(4):
-        s.estimate.pressure_zero[i] = s.joint.zero.value[i]
+    tell_zeros(s.joint.zero, s.estimate)
 
 
 @kernel
@@ -170,5 +169,4 @@ def _observe_by_wheel(p: Record, s: Record, u: Record, braking: bool, dt: float)
         s.application, dt,
     )  # fmt: skip
     tell_wheels(p, s.friction, s.estimate, s.speed, s.wheels, s.force)
-    for i in range(4):
-        s.estimate.pressure_zero[i] = s.joint.zero.value[i]
+    tell_zeros(s.joint.zero, s.estimate)

@@ -76,8 +76,7 @@ def note_rest(state: Record, i: int, reading: float) -> None:
 
 
 @kernel
-def is_floored(state: Record, i: int) -> bool:
-    """Return whether a sensor reports no pressure below zero."""
+def _is_floored(state: Record, i: int) -> bool:
     at_floor: bool = state.at_floor[i] > LEAST_SHARE
     return at_floor and not state.below[i]
 
@@ -88,7 +87,7 @@ def settle_zero(state: Record, i: int) -> None:
     n = state.samples[i]
     zero, sigma = state.mean[i], math.sqrt(max(state.square[i] - state.mean[i] ** 2, 0.0))
     known = n / (n + START)
-    if is_floored(state, i):
+    if _is_floored(state, i):
         if state.at_floor[i] > NEARLY_ALL or not state.mean[i] > 0.0:
             state.value[i], state.variance[i] = -UNKNOWN, UNKNOWN * UNKNOWN
             return
@@ -98,3 +97,12 @@ def settle_zero(state: Record, i: int) -> None:
         zero = max(zero, -2.0 * UNKNOWN)
     state.value[i] = min(max(known * zero, -LARGEST), LARGEST)
     state.variance[i] = sigma * sigma / max(n, 1) + ((1.0 - known) * UNKNOWN) ** 2 + LEAST_SIGMA**2
+
+
+@kernel
+def tell_zeros(state: Record, estimate: Record) -> None:
+    """Overwrite in `ESTIMATE` the zeros, what released brakes read, and which sensors are floored."""
+    for i in range(4):
+        estimate.pressure_zero[i] = state.value[i]
+        estimate.floored[i] = _is_floored(state, i)
+        estimate.pressure_at_rest[i] = state.mean[i] if estimate.floored[i] else state.value[i]

@@ -19,7 +19,6 @@ import math
 import numpy as np
 
 from ecu.algorithm.control.failed_brakes import LAG, lining_force
-from ecu.algorithm.estimation.zero import is_floored
 from ecu.algorithm.inputs import fresh, others_brake, usable
 from ecu.contract.params import GRAVITY
 from ecu.contract.signals import CALLIPER_PRESSURE
@@ -79,7 +78,7 @@ def _compare_forces(
     read, owed = 0.0, 0.0
     for i in range(4):
         place = CALLIPER_PRESSURE + i
-        pressure = inputs.value[place] - zero.value[i] if usable(inputs, place) else model[i]
+        pressure = inputs.value[place] - zero[i] if usable(inputs, place) else model[i]
         read += lining_force(params, law, pressure, i)
         owed += brakes.owed[i]
     state.read += dt / (LAG + dt) * (read - state.read)
@@ -99,7 +98,6 @@ def compare_pressures(
     law: Record,
     brakes: Record,
     hydraulics: Record,
-    zero: Record,
     sent: bool,
     dt: float,
 ) -> bool:
@@ -113,11 +111,10 @@ def compare_pressures(
         law: `PRESSURE_LAW_STATE`, for the friction.
         brakes: `FAILED_BRAKES_STATE` of this cycle.
         hydraulics: `HYDRAULICS_STATE`: modelled response to the demands sent.
-        zero: `ZERO_STATE`: pressure zeros; a released brake of a floored sensor reads their mean.
         sent: the demands were valid; otherwise all readings are believed.
         dt: time since the last cycle [s].
     """
-    model, begins = hydraulics.model, False
+    model, zero, begins = hydraulics.model, estimate.pressure_zero, False
     if not sent:
         state.honest = 0
         for i in range(4):
@@ -134,11 +131,11 @@ def compare_pressures(
         if not usable(inputs, place) or brakes.failed[i]:
             state.doubt_s[i], state.wrong[i] = 0.0, 0
             continue
-        at_rest = zero.mean[i] if model[i] < RELEASED and is_floored(zero, i) else zero.value[i]
-        gap = inputs.value[place] - at_rest - model[i]
+        unapplied = estimate.pressure_at_rest[i] if model[i] < RELEASED else zero[i]
+        gap = inputs.value[place] - unapplied - model[i]
         if fresh(inputs, place) and not state.honest and abs(hydraulics.rate[i]) < STEADY:
             _learn(state, i, gap, model[i], dt)
-        state.rest[i] = zero.value[i] if abs(state.offset[i]) < OFFSET else math.nan
+        state.rest[i] = zero[i] if abs(state.offset[i]) < OFFSET else math.nan
         far = abs(gap) > FAR + FAR_SHARE * model[i]
         scaled = abs(state.ratio[i]) > RATIO and abs(state.ratio[i]) * model[i] > LEAST_SCALED
         doubted = far or abs(state.offset[i]) > OFFSET or scaled

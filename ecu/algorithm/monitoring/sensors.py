@@ -5,7 +5,6 @@ estimation, by the estimate of the last cycle.
 """
 
 from ecu.algorithm.control.failed_brakes import watch_brakes
-from ecu.algorithm.estimation.zero import is_floored
 from ecu.algorithm.inputs import LEAST_REQUEST, driver_accelerates, others_brake, requested_decel, usable
 from ecu.algorithm.monitoring.accel_error import (
     PROVEN_S,
@@ -82,9 +81,8 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
     if s.failed_brakes.any:
         faults |= BRAKE_FAILED
     contradicted = compare_pressures(
-        p, s.pressures, u, estimate, s.control, s.failed_brakes, s.hydraulics, s.joint.zero,
-        s.plausibility.sent != 0, dt,
-    )  # fmt: skip
+        p, s.pressures, u, estimate, s.control, s.failed_brakes, s.hydraulics, s.plausibility.sent != 0, dt
+    )
     for i in range(4):
         if s.pressures.doubt_s[i] > DOUBT_S:
             faults |= PRESSURE_IMPLAUSIBLE << i
@@ -122,7 +120,7 @@ def _mask_pressure(s: Record, u: Record, i: int, others: bool) -> None:
         u.value[place] = model + s.estimate.pressure_zero[i]
     elif not s.pressures.honest:
         reading = u.value[place] - lasting_difference(s.pressures, i, model)
-        u.value[place] = max(reading, 0.0) if is_floored(s.joint.zero, i) else reading
+        u.value[place] = max(reading, 0.0) if s.estimate.floored[i] else reading
 
 
 @kernel

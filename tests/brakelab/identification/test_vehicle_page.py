@@ -22,7 +22,7 @@ def test_the_commands_without_a_car_run(tmp_path, monkeypatch, capsys):
     car = load_config(tmp_path / "out/car.toml")
     assert car.vehicle.drag_coefficient != load_config(SUV).vehicle.drag_coefficient
     assert (tmp_path / "out/car.md").is_file()
-    assert "next: brake-ecu replay out/identify.parquet --config out/car.toml" in capsys.readouterr().out
+    assert "next: brake-ecu replay out/identify.parquet --config out/car.toml" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("key", re.findall(r"^\| `(\w+)`(?:, `\w+`)? \|", PAGE, re.MULTILINE))

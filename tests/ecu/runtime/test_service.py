@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from ecu.algorithm import step
+from ecu.contract.records import CYCLE, new_record
 from ecu.errors import RunFault
 from ecu.runtime import clock, cycle, notify, service, side
 from ecu.runtime.prepare import RunOptions
@@ -65,7 +66,10 @@ def test_whatever_ends_the_loop_first_the_farewell_then_the_last_words(
             raise OSError
 
     session = SimpleNamespace(
-        ecu=SimpleNamespace(reception=SimpleNamespace(messages={"received": SimpleNamespace(sum=lambda: 1)})),
+        ecu=SimpleNamespace(
+            reception=SimpleNamespace(messages={"received": SimpleNamespace(sum=lambda: 1)}),
+            cycle=new_record(CYCLE),
+        ),
         channel=bus,
         ring=SimpleNamespace(path=None),
         side=SimpleNamespace(await_end=lambda patience_s: done.append("side ended")),

@@ -27,6 +27,7 @@ from ecu.recording.ring import create_ring, remove_ring
 from ecu.runtime.clock import Grid, system_time
 from ecu.runtime.cycle import Progress, Watch, cycle_once, new_ecu
 from ecu.settings.resources import resource
+from ecu.warm import warm_up
 
 ROUNDS: Final = 10
 CYCLES: Final = 210  # a round
@@ -85,7 +86,9 @@ def our_side(stop: Stop, folder: Path) -> Side:
     pair = socket_pair()
     channel = daemon_channel(pair.ecu, receiving.ids)
     ring = create_ring(folder / "ring", {}, b"", slots=256, frames=64 * 256)
-    progress = Progress(Watch(channel.status(), CompileCounter()))
+    compiled = CompileCounter()
+    warm_up(ecu, compiled)
+    progress = Progress(Watch(channel.status(), compiled))
     grid = Grid(system_time())
 
     def cycle() -> tuple[int, ...]:

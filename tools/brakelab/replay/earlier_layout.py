@@ -24,6 +24,8 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s"} | {
         "latest",
         "steady_s",
         "rejected_s",
+        "pressure_at_rest",
+        "floored",
     ),
 }
 

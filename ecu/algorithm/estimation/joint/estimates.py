@@ -21,6 +21,7 @@ from ecu.algorithm.estimation.joint.layout import (
 )
 from ecu.algorithm.estimation.joint.observer import WINDOW_S
 from ecu.algorithm.estimation.joint.wheel import friction
+from ecu.algorithm.estimation.zero import tell_zeros
 from ecu.algorithm.inputs import usable
 from ecu.contract.signals import CALLIPER_PRESSURE, OBSERVING, WHEEL_SPEED
 from ecu.jit import Record, kernel
@@ -134,7 +135,7 @@ def tell_joint(
     _tell_friction(params, state, hydraulics, estimate, learned, inputs, braking, dt)
     estimate.test_ratio_balance = _test_ratio(state, BALANCE_RATIO)
     estimate.test_ratio_speed = _test_ratio(state, REFERENCE_RATIO)
+    tell_zeros(state.zero, estimate)
     for i in range(4):
         estimate.slip[i], estimate.force[i] = state.slip[i], state.force[i]
         estimate.test_ratio[i] = _test_ratio(state, WHEEL_RATIO + i)
-        estimate.pressure_zero[i] = state.zero.value[i]

@@ -6,7 +6,7 @@ import pytest
 from ecu.algorithm.control.failed_brakes import FAILED_BRAKES_STATE
 from ecu.algorithm.control.pressure_law import PRESSURE_LAW_STATE
 from ecu.algorithm.estimate import ESTIMATE
-from ecu.algorithm.estimation.zero import ZERO_STATE, note_rest, settle_zero
+from ecu.algorithm.estimation.zero import ZERO_STATE, note_rest, settle_zero, tell_zeros
 from ecu.algorithm.hydraulics import HYDRAULICS_STATE
 from ecu.algorithm.monitoring.pressures import (
     KEPT,
@@ -51,9 +51,10 @@ class Brakes:
                 for i in range(4):
                     note_rest(self.zero, i, self.inputs[0]["value"][CALLIPER_PRESSURE + i])
                     settle_zero(self.zero, i)
+                tell_zeros(self.zero, self.estimate)
             compare_pressures(
                 self.params, self.state, self.inputs[0], self.estimate, self.law, self.brakes,
-                self.hydraulics, self.zero, True, DT,
+                self.hydraulics, True, DT,
             )  # fmt: skip
 
     def taken_out(self, bar: float) -> np.ndarray:
