@@ -14,7 +14,7 @@ hydraulics follow. Where the plan drops, the last part of the linings' share com
 overshoots a step by 6 %, and a motor that is no longer available cannot compensate for that.
 
 A motor whose limit or torque is unknown, or whose torque falls short of its demand, leaves the plan; its
-demand fades while the linings take over. It is tried again in the next brake application. Under ABS or ESP,
+demand fades within the limit that it reports while the linings take over. It is tried again in the next brake application. Under ABS or ESP,
 in reverse and at a wheel that the slip guard holds, the motor demand drops to zero at once.
 """
 
@@ -22,7 +22,7 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.inputs import current, fresh, others_brake
+from ecu.algorithm.inputs import current, fresh, others_brake, usable
 from ecu.contract.signals import MOTOR_LIMIT, MOTOR_TORQUE, REVERSE
 from ecu.jit import Record, kernel
 
@@ -123,6 +123,8 @@ def update_motors(
         elif known and not state.lost[i]:
             _follow_limit(state, inputs, fading, i, dt)
         else:
+            if usable(inputs, MOTOR_LIMIT + i):
+                state.ceiling[i] = min(state.ceiling[i], value[MOTOR_LIMIT + i])
             state.ceiling[i] = max(state.ceiling[i] - FADE * dt, 0.0)
             state.allowed[i] = 0.0
 

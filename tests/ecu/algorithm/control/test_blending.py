@@ -156,6 +156,15 @@ def test_an_unknown_motor_fades_while_its_lining_takes_over(params, feed, name, 
     assert motors.state["lining"][1] == pytest.approx(270.0)  # the other wheel's is known
 
 
+def test_a_motor_whose_torque_is_unknown_is_asked_for_no_more_than_its_limit(params, feed) -> None:
+    motors = Motors(params, feed, 0.7, 1350.0)
+    motors.settle(40.0)
+    motors.inputs["verdict"][0, INPUT["motor_torque_fl"]] = 0
+    assert motors.cycle(1900.0, lag=1900.0, motor_limit=200.0) <= 200.0
+    assert motors.cycle(1900.0, lag=1900.0, motor_limit=0.0) == 0.0
+    assert motors.asked[1] == 0.0
+
+
 @pytest.mark.parametrize(("gives", "lost"), [(1.0, False), (0.9, False), (0.5, True), (0.0, True)])
 def test_a_motor_that_gives_too_little_is_planned_for_no_longer(params, feed, gives, lost) -> None:
     motors = Motors(params, feed, 0.7, 1350.0)
