@@ -28,7 +28,8 @@ from ecu.algorithm.estimation.joint.learned import (
     keep_joint,
     restore_joint,
 )
-from ecu.algorithm.estimation.joint.prior import set_prior
+from ecu.algorithm.estimation.joint.observer import _choose_free
+from ecu.algorithm.estimation.joint.prior import HIGHEST, LOWEST, set_prior
 from ecu.contract.records import LEARNED, N_KEPT
 from ecu.recording.learned_range import JOINT_LIMIT, out_of_range
 from ecu.settings.config import load_config, new_params
@@ -214,3 +215,17 @@ def test_what_pressures_cannot_tell_apart_stays_together() -> None:
     P = restored(keep(before))["p"]
     np.testing.assert_allclose(P[LEVELS, MASS], 0.01**2)
     np.testing.assert_allclose(P[MASS, MASS], 0.01**2 + PAUSE[MASS] ** 2)
+
+
+@pytest.mark.parametrize("motors", [False, True])
+@pytest.mark.parametrize("braking", [False, True])
+def test_what_may_be_learned_and_is_stored_has_bounds_that_a_store_takes(braking: bool, motors: bool) -> None:
+    """One value out of range costs the whole revision: friction, wear and all."""
+    state = new_state()
+    state["x"][V], state["drive_known"], state["last_accel"] = 20.0, 1.0, 2.0
+    state["window"]["reference_samples"] = state["window"]["motor_reported"] = 1
+    _choose_free(state, braking, motors, True)
+    learned = [i for i in KEPT if state["free"][i]]
+    assert len(learned) >= 8
+    assert np.all(LOWEST[learned] >= -JOINT_LIMIT)
+    assert np.all(HIGHEST[learned] <= JOINT_LIMIT)
