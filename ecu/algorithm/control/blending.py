@@ -14,8 +14,9 @@ hydraulics follow. Where the plan drops, the last part of the linings' share com
 overshoots a step by 6 %, and a motor that is no longer available cannot compensate for that.
 
 A motor whose limit or torque is unknown, or whose torque falls short of its demand, leaves the plan; its
-demand fades within the limit that it reports while the linings take over. It is tried again in the next brake application. Under ABS or ESP,
-in reverse and at a wheel that the slip guard holds, the motor demand drops to zero at once.
+demand fades, within the limit that it reports, while the linings take over. It is tried again in the next
+brake application. Under ABS or ESP, in reverse and at a wheel that the slip guard holds, the motor demand
+drops to zero at once.
 """
 
 import math
