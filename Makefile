@@ -43,7 +43,7 @@ mutants: .venv/dev
 	.venv/bin/python tools/mutate.py $(ARGS)
 
 fuzz: .venv/dev
-	FUZZ_CASES=3000 .venv/bin/python -m pytest -n auto --maxprocesses 4 tests/test_fuzz.py $(ARGS)
+	FUZZ_CASES=3000 .venv/bin/python -m pytest -n auto --maxprocesses 4 tests/test_fuzz.py tests/ecu/algorithm/test_step_extremes.py $(ARGS)
 
 soak: .venv/dev
 	.venv/bin/python -m brakelab.soak $(or $(ARGS),virtual --hours 24)
