@@ -206,7 +206,8 @@ def update_joint(
     if state.reversing:
         speed = mean_wheel_speed(params, inputs)
         state.x[V] = speed if math.isfinite(speed) else abs(state.x[V])
-        state.p[V, V], state.reversing = 0.25, 0
+        state.reversing = 0
+        forget(state, V, 0.25)
         open_window(state)
     _note_measured(state, motion.measured != 0, dt)
     state.released = 1 if not braking and _released(params, state, inputs) else 0

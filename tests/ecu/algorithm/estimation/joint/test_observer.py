@@ -18,6 +18,7 @@ from ecu.contract.signals import (
     VEHICLE_SPEED,
     WHEEL_SPEED,
 )
+from ecu.recording.learned_range import is_covariance
 
 LEVELS = slice(LEVEL, LEVEL + 4)
 OF_AXLE = np.zeros((4, N))  # friction of each wheel by the states: its level and its axle's change
@@ -427,6 +428,9 @@ def test_in_reverse_the_speed_is_negative_and_nothing_is_learned(new_car) -> Non
     assert car.state["x"][V] == pytest.approx(-5.0 * car.params["wheel_radius"].max())
     car.motion["backwards"] = 0
     car.speed = 2.0
+    car.state["p"][V, V], car.state["p"][SLOPE, SLOPE] = 9.0, 0.09
+    car.state["p"][V, SLOPE] = car.state["p"][SLOPE, V] = -0.8  # speed by integration alone
+    assert is_covariance(car.drive(0.01)["p"])
     state = car.drive(0.5)
     assert state["x"][V] == pytest.approx(2.0, abs=0.1)
     assert not state["reversing"]
