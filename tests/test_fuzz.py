@@ -120,7 +120,7 @@ def read_ring(path: Path) -> None:
     reader = RingReader(path)
     batch = reader.read()
     assert len(batch.records) <= 256
-    reader.learned()
+    reader.latest("learned")
 
 
 @pytest.fixture(scope="module")

@@ -91,7 +91,7 @@ from ecu.algorithm.monitoring.sensors import mask_implausible, watch_sensors
 from ecu.algorithm.monitoring.speeds import SPEEDS_STATE
 from ecu.algorithm.monitoring.turning import TURNING_STATE
 from ecu.algorithm.monitoring.wear import WEAR_STATE, restore_wear, update_wear
-from ecu.algorithm.monitoring.witness import WITNESS_STATE
+from ecu.algorithm.monitoring.witness import WITNESS_STATE, begin_watch, end_watch
 from ecu.algorithm.publish import DEMANDS, publish
 from ecu.contract.faults import (
     ACCUMULATOR_LOW,
@@ -175,6 +175,9 @@ def new_state(params: RecordArray, learned: RecordArray | None = None) -> Record
     row["failed_brakes"]["scale"] = 1.0
     row["distribution"]["trailing"] = row["distribution"]["rolled"] = 1.0
     row["guard"]["rolled"] = row["flags"]["last"] = math.nan
+    watched = row["witness"]["published"]
+    watched["innovation"] = watched["sigma"] = watched["ratio"] = math.nan
+    watched["unused_s"] = math.inf
     _begin(params, state)
     return state
 
@@ -223,7 +226,8 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
     p, s, u, y = params[0], state[0], inputs[0], outputs[0]
     dt = 1e-9 * u.dt_ns
     s.trusted = u
-    told = correct_flags(p, s.flags, s.trusted, s.estimate, s.application.braking != 0, dt)
+    begin_watch(s.witness, dt)
+    told = correct_flags(p, s.flags, s.witness, s.trusted, s.estimate, s.application.braking != 0, dt)
     u = s.trusted
     faults, contradicted = watch_sensors(p, s, u, dt)
     contradicted = contradicted or u.e2e_unsure != 0
@@ -261,6 +265,7 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
     asked = math.isfinite(decel) and decel > 0.05
     mode = decide_mode(s.mode, faults, asked or s.application.braking != 0, dt)
     s.plausibility.sent = 1 if speaks(p, mode) else 0
+    end_watch(s.witness, inputs[0], u, dt)
     publish(p, s, u, y, decel, faults, mode)
 
 
@@ -303,7 +308,7 @@ def _control(p: Record, s: Record, u: Record, dt: float) -> float:
     cap_trailing(p, s.distribution, decel, s.blending.lining, e, demands.pressure, failed, backwards)
     if p.slip_guard:
         guard_slip(p, s.guard, u, e, speed, s.limiter.pressure, demands.pressure, s.distribution.torque, dt)
-    watch_accumulator(s.limiter, u, dt)
+    watch_accumulator(s.limiter, s.witness, u, dt)
     _limit(p, s, available_pressure(p, s.limiter, u), decel, dt)
     return decel
 

@@ -9,7 +9,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ecu.contract.signals import N_INPUTS, N_OUTPUTS, OUTPUT_SIGNALS
+from ecu.contract.faults import IMPLAUSIBLE
+from ecu.contract.signals import INPUT, N_INPUTS, N_OUTPUTS, OUTPUT_SIGNALS
 
 RecordArray = NDArray[np.void]
 
@@ -60,6 +61,22 @@ OUTPUTS: Final = np.dtype(
     align=True,
 )
 assert OUTPUTS.itemsize == 8 * N_OUTPUTS
+
+WATCHED: Final = tuple(INPUT[name] for name in IMPLAUSIBLE)
+"""Places of the inputs that are compared with others."""
+# What the others say of each input, in its unit; see monitoring/witness.py.
+INPUT_WATCH: Final = np.dtype(
+    [
+        ("value", "f8", (N_INPUTS,)),  # as received, NaN: not usable
+        ("innovation", "f8", (N_INPUTS,)),  # what it differs from the others by, in the last comparison
+        ("sigma", "f8", (N_INPUTS,)),  # standard deviation of that
+        ("ratio", "f8", (N_INPUTS,)),  # test ratio, 1 at the gate
+        ("judged_s", "f8", (N_INPUTS,)),  # age of that comparison
+        ("unused_s", "f8", (N_INPUTS,)),  # since a cycle in which it was used, inf: never
+        ("rejected", "u1", (N_INPUTS,)),  # left out, or replaced, in this cycle
+    ],
+    align=True,
+)
 
 # Cycle record of the service beside the outputs; with it and the frames a replay repeats the run.
 CYCLE: Final = np.dtype(

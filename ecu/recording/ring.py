@@ -1,9 +1,9 @@
 """Ring in shared memory: written by the cycle without waiting, read by any process.
 
 The file holds a header, a description (JSON), the state before the first cycle, a slot per cycle, the learned
-values (of the last two cycles, in turn) and a ring of frames. A slot carries its number before and after its
-content is written (-1 between), so an overtaken reader notices and counts its losses. Frames are claimed
-before they are overwritten.
+values and what was found of the inputs (of the last two cycles, in turn) and a ring of frames. A slot carries
+its number before and after its content is written (-1 between), so an overtaken reader notices and counts its
+losses. Frames are claimed before they are overwritten.
 
 The file is its owner's alone: made anew (O_EXCL, O_NOFOLLOW), mode 0600, and read only if it belongs to the
 reader's user. Its writer holds a lock on it for its lifetime, across namespaces.
@@ -22,7 +22,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ecu.contract.records import CYCLE, FRAME, LEARNED, OUTPUTS, RecordArray
+from ecu.contract.records import CYCLE, FRAME, INPUT_WATCH, LEARNED, OUTPUTS, RecordArray
 from ecu.errors import UserError
 from ecu.jit import kernel
 from ecu.recording.lock import lock
@@ -33,6 +33,7 @@ FRAMES: Final = 131072  # 29 s of a classical bus at 45 frames per cycle
 # One cycle as stored in the ring's slots and in a recording's cycles.bin.
 RECORDED: Final = np.dtype([("cycle", CYCLE), ("outputs", OUTPUTS)], align=True)
 _SLOT: Final = np.dtype([("number", "i8"), ("first_frame", "i8"), ("recorded", RECORDED)], align=True)
+_LATEST: Final = np.dtype([("learned", LEARNED), ("watched", INPUT_WATCH)], align=True)
 _LAST_WORDS_BYTES: Final = 3072
 _HEADER: Final = np.dtype(
     [
@@ -49,7 +50,7 @@ _HEADER: Final = np.dtype(
         ("last_words", f"S{_LAST_WORDS_BYTES}"),  # JSON
     ]
 )
-_MAGIC: Final = int.from_bytes(b"ecuring3", "little")
+_MAGIC: Final = int.from_bytes(b"ecuring4", "little")
 _PAGE: Final = 4096
 _NO_OBJECT: Final = (ValueError, TypeError, RecursionError)  # of JSON
 
@@ -61,8 +62,8 @@ class Ring(NamedTuple):
     memory: mmap.mmap
     header: RecordArray
     slots: RecordArray
-    learned: RecordArray
-    """LEARNED, shape (2,): after cycle k in row k % 2."""
+    latest: RecordArray
+    """Shape (2,): after cycle k in row k % 2."""
     frames: RecordArray
 
 
@@ -123,7 +124,7 @@ def _is_ring(memory: mmap.mmap) -> bool:
     sizes = [int(row[name]) for name in ("slots", "frames", "description_bytes", "initial_bytes")]
     if int(row["magic"]) != _MAGIC or min(sizes[:2]) < 1 or min(sizes[2:]) < 0:
         return False
-    parts = (_HEADER.itemsize, sum(sizes[2:]), sizes[0] * _SLOT.itemsize, 2 * LEARNED.itemsize)
+    parts = (_HEADER.itemsize, sum(sizes[2:]), sizes[0] * _SLOT.itemsize, 2 * _LATEST.itemsize)
     return sum(map(_round_up, (*parts, sizes[1] * FRAME.itemsize))) == len(memory)
 
 
@@ -133,9 +134,9 @@ def _map(path: Path, memory: mmap.mmap) -> Ring:
     at = _round_up(_HEADER.itemsize) + _round_up(int(row["description_bytes"]) + int(row["initial_bytes"]))
     slots = np.frombuffer(memory, _SLOT, int(row["slots"]), at)
     at += _round_up(slots.nbytes)
-    learned = np.frombuffer(memory, LEARNED, 2, at)
-    frames = np.frombuffer(memory, FRAME, int(row["frames"]), at + _round_up(learned.nbytes))
-    return Ring(path, memory, header, slots, learned, frames)
+    latest = np.frombuffer(memory, _LATEST, 2, at)
+    frames = np.frombuffer(memory, FRAME, int(row["frames"]), at + _round_up(latest.nbytes))
+    return Ring(path, memory, header, slots, latest, frames)
 
 
 def create_ring(
@@ -150,7 +151,7 @@ def create_ring(
     """
     text = json.dumps(description).encode()
     head = _round_up(_HEADER.itemsize) + _round_up(len(text) + len(initial))
-    parts = (slots * _SLOT.itemsize, 2 * LEARNED.itemsize, frames * FRAME.itemsize)
+    parts = (slots * _SLOT.itemsize, 2 * _LATEST.itemsize, frames * FRAME.itemsize)
     size = head + sum(map(_round_up, parts))
     unfinished = path.with_name(f"{path.name}.{secrets.token_hex(4)}.new")
     try:
@@ -188,6 +189,7 @@ def publish(
     cycle: RecordArray,
     outputs: RecordArray,
     learned: RecordArray,
+    watched: RecordArray,
     frames: RecordArray,
 ) -> None:
     """Write one cycle with its `cycle["frames"]` frames, the first of `frames`; never waits.
@@ -202,7 +204,8 @@ def publish(
     numbers[place] = -1
     header["frames_claimed"] = end
     _fill(ring.slots, place, ring.frames, begin, end, cycle, outputs, frames)
-    ring.learned[number % 2] = learned[0]
+    latest = ring.latest[number % 2]
+    latest["learned"], latest["watched"] = learned[0], watched[0]
     header["frames_written"] = end
     numbers[place] = number
     header["written"] = number + 1
@@ -303,12 +306,12 @@ class RingReader:
         total = int(header["frames_written"])
         return total if header["written"] == number else None
 
-    def learned(self) -> RecordArray | None:
-        """Return the learned values of the last cycle (`LEARNED`, shape (1,)), None while there are none."""
+    def latest(self, name: str) -> RecordArray | None:
+        """Return `learned` (LEARNED) or `watched` (INPUT_WATCH) of the last cycle, shape (1,), or None."""
         for _ in range(10):  # the writer may overtake us
             written = int(self.ring.header[0]["written"])
             row = (written - 1) % 2
-            copied = self.ring.learned[row : row + 1].copy()
+            copied = self.ring.latest[name][row : row + 1].copy()
             if written and written == int(self.ring.header[0]["written"]):
                 return copied
         return None

@@ -143,7 +143,7 @@ class Recorder:
 
     def _keep(self) -> None:
         """Save after a brake application, or a minute after another change."""
-        now_s, learned = time.monotonic(), self.reader.learned()
+        now_s, learned = time.monotonic(), self.reader.latest("learned")
         if learned is not None and (self._is_removed() or state_store.is_due(self.keeper, learned, now_s)):
             self._save(learned, now_s)
 
@@ -176,7 +176,7 @@ class Recorder:
         """Write the rest: the ring, then the values learned since the last save."""
         while self.turn():
             pass
-        learned = self.reader.learned()
+        learned = self.reader.latest("learned")
         if learned is not None and (self._is_removed() or learned.tobytes() != self.keeper.saved):
             self._save(learned, time.monotonic())
         if self.files:

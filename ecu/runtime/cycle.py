@@ -54,6 +54,8 @@ class Ecu(NamedTuple):
     """The outputs as `transmit` reads them."""
     learned: RecordArray
     """A view into the state."""
+    watched: RecordArray
+    """Likewise."""
     cycle: RecordArray
     receive_plan: ReceivePlan
     reception: Reception
@@ -79,6 +81,7 @@ def new_ecu(
         outputs,
         output_vector(outputs),
         state["learned"],
+        state["witness"]["published"],
         new_record(CYCLE),
         receive_plan,
         new_reception(receive_plan),
@@ -190,7 +193,7 @@ def cycle_once(ecu: Ecu, channel: Channel, ring: Ring, grid: Grid, run: Progress
     stages = (drained - woken, received - drained, stepped - received, encoded - stepped, sent - encoded)
     _note_cycle(ecu, run, tick, consumed, late, status.dropped, stages)
     ecu.cycle["clock_set_ns"] = set_ns
-    publish(ring, ecu.cycle, ecu.outputs, ecu.learned, ecu.waiting)
+    publish(ring, ecu.cycle, ecu.outputs, ecu.learned, ecu.watched, ecu.waiting)
     run.waiting = _keep_rest(ecu.waiting, consumed, run.waiting)
     run.timing.add(tick.lateness_ns, stages)
     run.previous_t_ns = tick.t_ns

@@ -110,7 +110,7 @@ def learned_by_first(description: dict[str, Any], mu_nominal: NDArray[np.float64
             continue
         if any(reader.description.get(name) != description[name] for name in same):
             continue
-        learned = reader.learned()
+        learned = reader.latest("learned")
         if learned is None:
             continue
         wrong = out_of_range(learned, mu_nominal)

@@ -17,6 +17,7 @@ from ecu.contract.signals import CORNERS
 from ecu.recording.events import EventLog
 from ecu.recording.log import Throttle
 from ecu.recording.ring import Batch, RingReader
+from ecu.watch.inputs import InputRow, input_rows
 
 EVERY: Final = 4  # cycles: 25 rows a second
 SHOWN_S: Final = 60.0
@@ -117,6 +118,8 @@ class History:
         self.cycles = self.missed = 0
         self.frames = dict.fromkeys(E2E_COUNTS, 0)
         """Of the run, as its last cycle has them."""
+        self.inputs: list[InputRow] = []
+        """Likewise."""
         self.batches: deque[Batch] = deque()
         self._held = 0
         self._log: EventLog | None = None
@@ -153,6 +156,7 @@ class History:
         self.cycles = int(records["cycle"]["number"][-1]) + 1
         self.missed = int(records["cycle"]["overruns"][-1])
         self.frames = e2e_counts(records["cycle"][-1:])
+        self.inputs = input_rows(reader.latest("watched"))
         self._looked = records["cycle"]
         if self._log is None:
             throttle = Throttle(lambda: 1e-9 * float(self._looked["t_mono_ns"][-1]))

@@ -8,6 +8,7 @@ from ecu.contract.faults import WORDS, fault_mask, fault_names
 from ecu.contract.signals import CORNERS
 from ecu.recording.events import MODES
 from ecu.watch.history import COLUMN, COLUMNS, LATENESS_US, OF_CORNERS, Row, frames_text
+from ecu.watch.inputs import InputRow
 from ecu.watch.watcher import Watcher
 
 
@@ -84,10 +85,18 @@ def json_line(watcher: Watcher) -> str:
             "cycles": watcher.history.cycles,
             "missed": watcher.history.missed,
             "frames": watcher.history.frames,
+            "inputs": {row.name: _values(row) for row in watcher.history.inputs},
             "lateness_us": lateness,
             "daemon": watcher.daemon.label if watcher.daemon else None,
         }
     )
+
+
+def _values(row: InputRow) -> dict[str, float | int | bool | str | None]:
+    """Return what an input's row holds beside its name; null: never, or not available."""
+    values = row._asdict()
+    del values["name"]
+    return {name: _number(value) if isinstance(value, float) else value for name, value in values.items()}
 
 
 def _number(value: float) -> float | int | None:

@@ -11,6 +11,7 @@ from ecu.contract.faults import FAULTS, fault_mask
 from ecu.contract.records import STAGES
 from ecu.contract.signals import CORNERS
 from ecu.recording.events import MODES
+from ecu.watch.inputs import input_rows
 from ecu.watch.tally import EDGES_S, Tally
 
 if TYPE_CHECKING:
@@ -72,6 +73,7 @@ def families(tally: Tally) -> Iterator["Metric"]:
     )
     yield from _frames(tally)
     yield from _state(outputs)
+    yield from _inputs(tally)
 
 
 def _labelled(kind: Any, name: str, label: str, text: str, values: Any) -> Any:
@@ -119,6 +121,19 @@ def _frames(tally: Tally) -> Iterator["Metric"]:
         for name, count in zip(names, counted[column].tolist(), strict=True):
             rejected.add_metric([name, reason], count)
     yield rejected
+
+
+def _inputs(tally: Tally) -> Iterator["Metric"]:
+    from prometheus_client.core import GaugeMetricFamily
+
+    rows = input_rows(tally.reader.latest("watched"))
+    for name, text, values in (
+        ("test_ratio", "What it differs from the others by, 1 at the gate", [row.ratio for row in rows]),
+        ("rejected", "1 for an input that is left out", [float(row.rejected) for row in rows]),
+        ("unused_seconds", "Since it was used", [row.unused_s for row in rows]),
+    ):
+        names = [row.name for row in rows]
+        yield _labelled(GaugeMetricFamily, f"input_{name}", "input", text, zip(names, values, strict=True))
 
 
 def _state(outputs: np.void) -> Iterator["Metric"]:

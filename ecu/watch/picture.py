@@ -14,6 +14,7 @@ from rich.text import Text
 
 from ecu.contract.signals import CORNERS
 from ecu.watch.history import COLUMN, LATENESS_US, SHOWN_S, Row, frames_text
+from ecu.watch.inputs import InputRow
 from ecu.watch.line import corner_values, faults_of, mode_of, number
 from ecu.watch.watcher import Watcher
 
@@ -22,6 +23,9 @@ ESTIMATES: Final = ("nominal", "observing", "holding", "fault")
 STYLES: Final = {"active": "bold green", "ready": "green", "degraded": "bold yellow", "failed": "bold red"}
 KEYS: Final = "q quit  k keep  space pause  ← → 1 s  ↑ ↓ 10 s  end now"
 WIDE, MEDIUM = 100, 64
+TALL: Final = 30
+RECENT_S: Final = 1.0
+"""Age up to which a comparison of an input says something of now."""
 
 
 def sparkline(values: Sequence[float], width: int, least: float, peers: Sequence[float] = ()) -> str:
@@ -64,6 +68,7 @@ def picture(
     if rows:
         parts += [_state(rows[-1], back_s, paused), _corners(rows, width), *_decelerations(rows, width)]
         parts += [Rule(style="dim"), _faults(rows[-1])]
+        parts += [_inputs(watcher.history.inputs)] if height >= TALL else []
     if watcher.history.lateness.any():
         parts += [Rule(style="dim"), *_lateness(watcher, width, height)]
     parts.append(Rule(style="dim"))
@@ -148,6 +153,16 @@ def _faults(row: Row) -> Text:
     return Text(", ".join(names), "bold red") if names else Text("no fault", "green")
 
 
+def _inputs(inputs: Sequence[InputRow]) -> Text:
+    """Return which inputs are left out, and which of the others is nearest to its gate."""
+    rejected = ", ".join(row.name for row in inputs if row.rejected)
+    judged = [row for row in inputs if not row.rejected and row.judged_s < RECENT_S]
+    worst = max(judged, key=lambda row: row.ratio, default=None)
+    told = f"test ratio at most {number(worst.ratio, 2)} ({worst.name})" if worst else "no input compared"
+    line = Text(f"left out: {rejected}; " if rejected else "", "bold red", no_wrap=True, overflow="ellipsis")
+    return line.append(told, "none")
+
+
 def _lateness(watcher: Watcher, width: int, height: int) -> Iterable[Text]:
     counts = watcher.history.lateness
     total = int(counts.sum())
@@ -155,7 +170,7 @@ def _lateness(watcher: Watcher, width: int, height: int) -> Iterable[Text]:
     cycles = f"{watcher.history.cycles} cycles, periods missed: {watcher.history.missed}"
     yield Text(cycles, no_wrap=True, overflow="ellipsis")
     yield Text(f"protected frames: {frames_text(watcher.history.frames)}", no_wrap=True, overflow="ellipsis")
-    if height < 30:
+    if height < TALL:
         most = labels[int(np.searchsorted(np.cumsum(counts), 0.99 * total))]
         worst = labels[int(np.flatnonzero(counts)[-1])]
         yield Text(f"late: 99 % {most}, worst {worst}", no_wrap=True, overflow="ellipsis")

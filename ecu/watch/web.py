@@ -57,6 +57,7 @@ class Shared:
                 "missed": history.missed,
                 "frames": frames_text(history.frames),
                 "lateness": history.lateness.tolist(),
+                "inputs": [[_short(v) if isinstance(v, float) else v for v in row] for row in history.inputs],
                 "kept": round(history.kept_s),
                 "events": [[e.clock, e.text, e.serious] for e in list(history.events)[-40:]],
             }

@@ -24,6 +24,7 @@ import numpy as np
 
 from ecu.algorithm.brake import brake_gain
 from ecu.algorithm.inputs import usable
+from ecu.algorithm.monitoring.witness import compare, leave_out
 from ecu.contract.params import BAR
 from ecu.contract.signals import ACCUMULATOR_PRESSURE, CALLIPER_PRESSURE
 from ecu.jit import Record, kernel
@@ -65,7 +66,7 @@ def reads_empty(inputs: Record) -> bool:
 
 
 @kernel
-def watch_accumulator(state: Record, inputs: Record, dt: float) -> None:
+def watch_accumulator(state: Record, witness: Record, inputs: Record, dt: float) -> None:
     """Overwrite whether the accumulator's reading limits.
 
     It does once more is demanded and no calliper has more, both for `CONFIRMED_S`: it takes two witnesses to
@@ -73,6 +74,7 @@ def watch_accumulator(state: Record, inputs: Record, dt: float) -> None:
 
     Args:
         state: `LIMITER_STATE`.
+        witness: `WITNESS_STATE`; what is published of the accumulator is overwritten.
         inputs: `INPUTS`.
         dt: time since the last cycle [s].
     """
@@ -95,6 +97,9 @@ def watch_accumulator(state: Record, inputs: Record, dt: float) -> None:
         state.confirmed = 1
     elif not short and (asked < reading or state.denied):
         state.confirmed = 0
+    compare(witness, ACCUMULATOR_PRESSURE, min(reading - highest, 0.0), MARGIN)
+    if state.denied or reads_empty(inputs):
+        leave_out(witness, ACCUMULATOR_PRESSURE)
 
 
 @kernel

@@ -15,6 +15,7 @@ import numpy as np
 
 from ecu.algorithm.inputs import fresh
 from ecu.algorithm.monitoring.acceleration import BLOCK_S, ROLLED, A, F, W
+from ecu.algorithm.monitoring.witness import compare
 from ecu.contract.params import GRAVITY
 from ecu.contract.signals import ACCEL_X
 from ecu.jit import Record, kernel
@@ -114,12 +115,15 @@ def _follow_zero(params: Record, state: Record, mean: Record) -> None:
 
 
 @kernel
-def follow_accel_error(params: Record, state: Record, blocks: Record, across: float, braking: bool) -> None:
+def follow_accel_error(
+    params: Record, state: Record, witness: Record, blocks: Record, across: float, braking: bool
+) -> None:
     """Overwrite what is to be taken off the accelerometer's reading.
 
     Args:
         params: `PARAMS`.
         state: `ACCEL_ERROR_STATE`, overwritten.
+        witness: `WITNESS_STATE`; what is published of the accelerometer is overwritten.
         blocks: `ACCELERATION_STATE`, whose last block was closed in this cycle.
         across: lateral acceleration [m/s^2].
         braking: a brake application lasts.
@@ -130,10 +134,14 @@ def follow_accel_error(params: Record, state: Record, blocks: Record, across: fl
         _follow_scale(state, blocks.mean)
     if blocks.known_blocks > 1 and not braking and abs(across) < ACROSS:
         _follow_zero(params, state, blocks.mean)
-    state.scale_off = _off(state.scale, SCALE_DOUBT + SIGMAS * math.sqrt(state.p[1]), state.scale_off)
+    doubt = SCALE_DOUBT + SIGMAS * math.sqrt(state.p[1])
+    compare(witness, ACCEL_X, state.scale * LEAST_SHOWN, doubt * LEAST_SHOWN)
+    state.scale_off = _off(state.scale, doubt, state.scale_off)
     if state.coasted_s > FEWEST_S:
         confirmed = state.offset / state.zero > CONFIRMED if state.zero != 0.0 else False
         state.zero_off = _off(state.zero, ZERO_DOUBT, state.zero_off) if confirmed else 0.0
+        if confirmed:
+            compare(witness, ACCEL_X, state.zero, ZERO_DOUBT)
 
 
 @kernel
@@ -143,7 +151,7 @@ def watch_frozen(state: Record, blocks: Record, witness: Record, inputs: Record,
     Args:
         state: `ACCEL_ERROR_STATE`, overwritten.
         blocks: `ACCELERATION_STATE`.
-        witness: `WITNESS_STATE`; whether the accelerometer is rejected is overwritten.
+        witness: `WITNESS_STATE`; the accelerometer's fields are overwritten.
         inputs: `INPUTS` as received.
         dt: time since the last cycle [s].
     """
@@ -154,8 +162,10 @@ def watch_frozen(state: Record, blocks: Record, witness: Record, inputs: Record,
         witness.rejected[ACCEL_X] = 0
     mean = blocks.mean
     change = (mean[0, ROLLED] - mean[1, ROLLED] - mean[3, ROLLED] + mean[4, ROLLED]) / BLOCK_S
-    if state.same_s > SAME_S and abs(change) > CHANGED:
-        witness.rejected[ACCEL_X] = 1
+    if state.same_s > SAME_S:
+        compare(witness, ACCEL_X, -change, CHANGED)
+        if abs(change) > CHANGED:
+            witness.rejected[ACCEL_X] = 1
 
 
 @kernel

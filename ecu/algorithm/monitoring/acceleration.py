@@ -31,6 +31,7 @@ import math
 import numpy as np
 
 from ecu.algorithm.inputs import fresh, motor_torque, others_brake, usable
+from ecu.algorithm.monitoring.witness import compare, compare_both
 from ecu.contract.params import GRAVITY
 from ecu.contract.signals import (
     ACCEL_X,
@@ -189,22 +190,24 @@ def _moved_against_wheels(mean: Record) -> float:
 
 
 @kernel
-def _agrees(state: Record) -> bool:
+def _agrees(state: Record, witness: Record) -> bool:
     """Return whether a doubted reading agrees as before."""
     mean = state.mean
     least = AGAIN * max(LEAST, NOISE * state.sigma)
     against_wheels = _beside_wheels(mean, W)
     if state.known_blocks < 3:
+        compare(witness, ACCEL_X, against_wheels, SLOPE)
         on_a_road: bool = abs(against_wheels) < SLOPE
         return on_a_road and state.good_blocks >= SECOND
     against_force = _now(mean, A) - _now(mean, F)
     by_force = state.known_blocks >= SECOND and abs(against_force - state.usual_force) < least
     by_wheels: bool = abs(against_wheels - state.usual) < least
+    compare(witness, ACCEL_X, against_wheels - state.usual, least)
     return by_force or by_wheels
 
 
 @kernel
-def _jumped(state: Record) -> bool:
+def _jumped(state: Record, witness: Record) -> bool:
     """Return whether the reading has moved against wheels and torques."""
     mean = state.mean
     least, greatest = mean[0, F], mean[0, F]
@@ -216,28 +219,31 @@ def _jumped(state: Record) -> bool:
     noise = max(LEAST, NOISE * state.sigma)
     wheels_err = noise + (SLIP + SLIP_BY_SPEED * _now(mean, W)) * moved
     force_err = noise + FORCE * moved
+    compare_both(witness, ACCEL_X, wheels, wheels_err, force, force_err)
     up: bool = wheels > wheels_err and force > force_err
     return up or (wheels < -wheels_err and force < -force_err)
 
 
 @kernel
-def _beyond_any_road(state: Record) -> bool:
+def _beyond_any_road(state: Record, witness: Record) -> bool:
     mean = state.mean
     against_wheels = _beside_wheels(mean, W)
     if state.known_blocks < 8:
+        compare(witness, ACCEL_X, against_wheels, SLOPE + NOISE * state.sigma)
         return abs(against_wheels) > SLOPE + NOISE * state.sigma
     against_force = _now(mean, A) - _now(mean, F)
     denied = DENIED + FORCE * abs(_now(mean, F))
+    compare_both(witness, ACCEL_X, against_wheels, SLOPE, against_force, denied)
     up: bool = against_wheels > SLOPE and against_force > denied
     return up or (against_wheels < -SLOPE and against_force < -denied)
 
 
 @kernel
-def _judge(state: Record) -> None:
+def _judge(state: Record, witness: Record) -> None:
     """Compare the last blocks with those before, or with the values before the sensor jumped."""
     mean = state.mean
     if state.implausible:
-        agrees = state.good_blocks >= 3 and _agrees(state)
+        agrees = state.good_blocks >= 3 and _agrees(state, witness)
         state.agreed = state.agreed + 1 if agrees else 0
         if state.agreed >= AGREED << (state.times - 1):
             state.implausible, state.good_blocks, state.known_blocks = 0, 0, 0
@@ -245,8 +251,8 @@ def _judge(state: Record) -> None:
     if state.good_blocks < 8:
         state.beyond = 0
         return
-    state.beyond = state.beyond + 1 if _beyond_any_road(state) else 0
-    jumped = state.known_blocks >= 8 and _jumped(state)
+    state.beyond = state.beyond + 1 if _beyond_any_road(state, witness) else 0
+    jumped = state.known_blocks >= 8 and _jumped(state, witness)
     if jumped or state.beyond >= SECOND:
         state.implausible, state.agreed, state.times = 1, 0, min(state.times + 1, OFTEN)
         state.usual = _usually_beside_wheels(mean, W) if jumped else 0.0
@@ -257,6 +263,7 @@ def _judge(state: Record) -> None:
 def watch_acceleration(
     params: Record,
     state: Record,
+    witness: Record,
     inputs: Record,
     estimate: Record,
     base: Record,
@@ -268,6 +275,7 @@ def watch_acceleration(
     Args:
         params: `PARAMS`.
         state: `ACCELERATION_STATE`, overwritten.
+        witness: `WITNESS_STATE`; what is published of the accelerometer is overwritten.
         inputs: `INPUTS`.
         estimate: `ESTIMATE` of the last cycle.
         base: friction at the start of this application, shape (4,).
@@ -284,4 +292,4 @@ def watch_acceleration(
     state.time += dt
     if state.time > BLOCK_S - 0.001:
         _close_block(params, state)
-        _judge(state)
+        _judge(state, witness)

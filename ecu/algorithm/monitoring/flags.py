@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from ecu.algorithm.inputs import fresh, mean_wheel_speed, usable
+from ecu.algorithm.monitoring.witness import compare, leave_out
 from ecu.algorithm.vehicle import corner_speed
 from ecu.contract.faults import IMPLAUSIBLE
 from ecu.contract.signals import (
@@ -85,7 +86,13 @@ def _follow_direction(params: Record, state: Record, inputs: Record, rolled: flo
 
 
 @kernel
-def _watch_reverse(params: Record, state: Record, inputs: Record, dt: float) -> None:
+def _contradict(witness: Record, place: int, evidence: float) -> None:
+    """Publish what speaks against a flag that is set, over what denies it."""
+    compare(witness, place, max(evidence, 0.0), 1.0)
+
+
+@kernel
+def _watch_reverse(params: Record, state: Record, witness: Record, inputs: Record, dt: float) -> None:
     rolled = mean_wheel_speed(params, inputs)
     _follow_direction(params, state, inputs, rolled, dt)
     told = _set(inputs, REVERSE)
@@ -95,6 +102,10 @@ def _watch_reverse(params: Record, state: Record, inputs: Record, dt: float) -> 
     forwards = state.moved > MOVED and state.agreed > FORWARDS * state.moved
     if rolled > FASTEST_BACK or forwards:
         state.reverse = 0
+    if told:
+        _contradict(witness, REVERSE, rolled / FASTEST_BACK)
+        if state.moved > MOVED:
+            _contradict(witness, REVERSE, state.agreed / (FORWARDS * state.moved))
     state.reverse_was = 1 if told else 0
 
 
@@ -145,34 +156,49 @@ def _watch_accelerator(state: Record, inputs: Record, braking: bool, dt: float) 
 
 @kernel
 def correct_flags(
-    params: Record, state: Record, inputs: Record, estimate: Record, braking: bool, dt: float
+    params: Record,
+    state: Record,
+    witness: Record,
+    inputs: Record,
+    estimate: Record,
+    braking: bool,
+    dt: float,
 ) -> int:
     """Overwrite flags that cannot be in `inputs`; return the fault bits.
 
     Args:
         params: `PARAMS`.
         state: `FLAGS_STATE`, overwritten.
+        witness: `WITNESS_STATE`; what is published of the four is overwritten.
         inputs: `INPUTS`, whose four values are overwritten.
         estimate: `ESTIMATE` of the last cycle.
         braking: a brake application lasts.
         dt: time since the last cycle [s].
     """
     faults, value = 0, inputs.value
-    _watch_reverse(params, state, inputs, dt)
+    _watch_reverse(params, state, witness, inputs, dt)
     if _set(inputs, REVERSE) and not state.reverse:
         faults |= REVERSE_BIT
         value[REVERSE] = 0.0
+        leave_out(witness, REVERSE)
     slips = _some_wheel_slips(params, inputs, estimate)
     bending = abs(estimate.accel_y) > BENDING
     state.abs_s = _stands(state.abs_s, _set(inputs, ABS_ACTIVE), slips, dt)
     state.esp_s = _stands(state.esp_s, _set(inputs, ESP_ACTIVE), slips, dt / IN_A_BEND if bending else dt)
+    if _set(inputs, ABS_ACTIVE):
+        _contradict(witness, ABS_ACTIVE, state.abs_s / LONGEST_S)
+    if _set(inputs, ESP_ACTIVE):
+        _contradict(witness, ESP_ACTIVE, state.esp_s / LONGEST_S)
     if state.abs_s > LONGEST_S:
         faults |= ABS_BIT
         value[ABS_ACTIVE] = 0.0
+        leave_out(witness, ABS_ACTIVE)
     if state.esp_s > LONGEST_S:
         faults |= ESP_BIT
         value[ESP_ACTIVE] = 0.0
+        leave_out(witness, ESP_ACTIVE)
     _watch_accelerator(state, inputs, braking, dt)
+    compare(witness, ACCELERATOR_POSITION, state.rest, RESTS_BELOW)
     if state.rest > 0.0:
         if state.rest > RESTS_BELOW:
             faults |= ACCELERATOR_BIT

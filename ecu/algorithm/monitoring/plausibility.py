@@ -17,6 +17,7 @@ import math
 import numpy as np
 
 from ecu.algorithm.inputs import fresh, motor_torque, others_brake, usable
+from ecu.algorithm.monitoring.witness import compare
 from ecu.algorithm.vehicle import corner_speed
 from ecu.contract.signals import CALLIPER_PRESSURE, WHEEL_SPEED
 from ecu.jit import Record, kernel
@@ -55,13 +56,14 @@ def _over_ground(params: Record, inputs: Record, estimate: Record, i: int) -> fl
 
 @kernel
 def wheel_speed_implausible(
-    params: Record, state: Record, inputs: Record, estimate: Record, dt: float
+    params: Record, state: Record, witness: Record, inputs: Record, estimate: Record, dt: float
 ) -> bool:
     """Return whether a wheel has been too fast for `DOUBT_S`, or has fallen too fast.
 
     Args:
         params: `PARAMS`.
         state: `PLAUSIBILITY_STATE`, overwritten.
+        witness: `WITNESS_STATE`; what is published of the wheel speeds is overwritten.
         inputs: `INPUTS` as received.
         estimate: `ESTIMATE` of the last cycle.
         dt: time since the last cycle [s].
@@ -79,12 +81,19 @@ def wheel_speed_implausible(
         fast = usable(inputs, WHEEL_SPEED + i) and estimate.speed > LEAST_SPEED and over > FASTER
         alone = over * (wheels - 1) > FASTER * (total - over)  # than the mean of the others; no other: 0 > 0
         state.for_s[i] = state.for_s[i] + dt if fast and alone and braked else 0.0
+        if braked and wheels > 1 and over > 1.0 and usable(inputs, WHEEL_SPEED + i):
+            beside = max((total - over) / (wheels - 1), 1.0)
+            free = inputs.value[WHEEL_SPEED + i] / over
+            if estimate.speed > LEAST_SPEED and over > beside:
+                compare(witness, WHEEL_SPEED + i, (over / beside - 1.0) * free, (FASTER - 1.0) * free)
         found = found or state.for_s[i] > DOUBT_S
     return found
 
 
 @kernel
-def watch_wheels(params: Record, state: Record, inputs: Record, estimate: Record, dt: float) -> None:
+def watch_wheels(
+    params: Record, state: Record, witness: Record, inputs: Record, estimate: Record, dt: float
+) -> None:
     """Overwrite `state.fell`: wheels whose speed has fallen faster than a wheel's can.
 
     Arguments as for `wheel_speed_implausible`.
@@ -97,6 +106,8 @@ def watch_wheels(params: Record, state: Record, inputs: Record, estimate: Record
             possible = FALL + FALL_SHARE * braked / params.wheel_inertia[i] * state.age_s[i]
             ground = corner_speed(params, estimate, estimate.speed, i)
             known = state.age_s[i] < OLDEST_S and usable(inputs, CALLIPER_PRESSURE + i)
+            if known and omega < state.omega[i]:
+                compare(witness, WHEEL_SPEED + i, omega - state.omega[i], possible)
             if known and state.omega[i] - omega > possible:
                 state.fell[i] = 1
             elif abs(omega * params.wheel_radius[i] - ground) < ROLLING * ground:

@@ -20,6 +20,7 @@ import numpy as np
 
 from ecu.algorithm.control.failed_brakes import LAG, lining_force
 from ecu.algorithm.inputs import fresh, others_brake, usable
+from ecu.algorithm.monitoring.witness import compare
 from ecu.contract.params import GRAVITY
 from ecu.contract.signals import CALLIPER_PRESSURE
 from ecu.jit import Record, kernel
@@ -93,6 +94,7 @@ def _compare_forces(
 def compare_pressures(
     params: Record,
     state: Record,
+    witness: Record,
     inputs: Record,
     estimate: Record,
     law: Record,
@@ -106,6 +108,7 @@ def compare_pressures(
     Args:
         params: `PARAMS`.
         state: `PRESSURES_STATE`.
+        witness: `WITNESS_STATE`; what is published of the pressures is overwritten.
         inputs: `INPUTS` as received.
         estimate: `ESTIMATE` of the last cycle.
         law: `PRESSURE_LAW_STATE`, for the friction.
@@ -136,6 +139,11 @@ def compare_pressures(
         if fresh(inputs, place) and not state.honest and abs(hydraulics.rate[i]) < STEADY:
             _learn(state, i, gap, model[i], dt)
         state.rest[i] = zero[i] if abs(state.offset[i]) < OFFSET else math.nan
+        if not state.honest:
+            compare(witness, place, gap, FAR + FAR_SHARE * model[i])
+            compare(witness, place, state.offset[i], OFFSET)
+            if abs(state.ratio[i]) * model[i] > LEAST_SCALED:
+                compare(witness, place, state.ratio[i] * model[i], RATIO * model[i])
         far = abs(gap) > FAR + FAR_SHARE * model[i]
         scaled = abs(state.ratio[i]) > RATIO and abs(state.ratio[i]) * model[i] > LEAST_SCALED
         doubted = far or abs(state.offset[i]) > OFFSET or scaled

@@ -18,7 +18,7 @@ from ecu.algorithm.monitoring.plausibility import watch_pressures, watch_wheels,
 from ecu.algorithm.monitoring.pressures import DOUBT_S, compare_pressures, lasting_difference
 from ecu.algorithm.monitoring.speeds import watch_speeds
 from ecu.algorithm.monitoring.turning import watch_turning
-from ecu.algorithm.monitoring.witness import rejected_faults
+from ecu.algorithm.monitoring.witness import leave_out, rejected_faults
 from ecu.contract.faults import (
     ACCEL_IMPLAUSIBLE,
     BRAKE_FAILED,
@@ -48,23 +48,24 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
     doubted = s.acceleration.implausible != 0
     estimate = s.estimate
     if estimate.started:
-        watch_acceleration(p, s.acceleration, u, estimate, s.control.base, s.application.braking != 0, dt)
-        watch_wheels(p, s.plausibility, u, estimate, dt)
+        braking = s.application.braking != 0
+        watch_acceleration(p, s.acceleration, s.witness, u, estimate, s.control.base, braking, dt)
+        watch_wheels(p, s.plausibility, s.witness, u, estimate, dt)
         watch_frozen(s.accel_error, s.acceleration, s.witness, u, dt)
         if s.acceleration.time == 0.0 and not s.witness.rejected[ACCEL_X]:
-            follow_accel_error(p, s.accel_error, s.acceleration, estimate.accel_y, s.application.braking != 0)
+            follow_accel_error(p, s.accel_error, s.witness, s.acceleration, estimate.accel_y, braking)
         if s.accel_error.zero_off != 0.0 or s.accel_error.scale_off != 0.0:
             faults |= ACCEL_X_DRIFTED
         if s.accel_error.proven_s > PROVEN_S and not wheels_deny(s.acceleration):
             base, offset = s.control.base, s.accel_error.offset
             watch_motors(p, s.motors, s.witness, u, estimate, base, offset, dt)
-        asked = s.application.braking != 0 and requested_decel(p, u) > LEAST_REQUEST
+        asked = braking and requested_decel(p, u) > LEAST_REQUEST
         if asked and s.plausibility.sent and not (driver_accelerates(u) or others_brake(u)):
             compare_motors(p, s.motors, s.witness, u, s.blending, dt)
         watch_turning(p, s.turning, s.witness, u, estimate.speed, dt)
         watch_speeds(p, s.speeds, s.witness, u, estimate, dt)
         faults |= rejected_faults(s.witness)
-        if wheel_speed_implausible(p, s.plausibility, u, estimate, dt):
+        if wheel_speed_implausible(p, s.plausibility, s.witness, u, estimate, dt):
             faults |= WHEEL_SPEED_IMPLAUSIBLE
     if s.acceleration.implausible:
         faults |= ACCEL_IMPLAUSIBLE
@@ -81,8 +82,9 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
     if s.failed_brakes.any:
         faults |= BRAKE_FAILED
     contradicted = compare_pressures(
-        p, s.pressures, u, estimate, s.control, s.failed_brakes, s.hydraulics, s.plausibility.sent != 0, dt
-    )
+        p, s.pressures, s.witness, u, estimate, s.control, s.failed_brakes, s.hydraulics,
+        s.plausibility.sent != 0, dt,
+    )  # fmt: skip
     for i in range(4):
         if s.pressures.doubt_s[i] > DOUBT_S:
             faults |= PRESSURE_IMPLAUSIBLE << i
@@ -95,15 +97,15 @@ def mask_implausible(p: Record, s: Record, u: Record) -> None:
     u.value[ACCEL_X] = correct_accel(s.accel_error, u.value[ACCEL_X])
     for place in range(N_INPUTS):
         if s.witness.rejected[place]:
-            _distrust(u, place)
+            _distrust(s, u, place)
     for i in range(4):
         if s.witness.rejected[MOTOR_TORQUE + i] and s.application.braking:
             u.value[MOTOR_TORQUE + i] = s.blending.asked[0, i]
     if s.acceleration.implausible or abs(u.value[ACCEL_X]) > p.accel_range:
-        _distrust(u, ACCEL_X)
+        _distrust(s, u, ACCEL_X)
     for i in range(4):
         if s.plausibility.fell[i]:
-            _distrust(u, WHEEL_SPEED + i)
+            _distrust(s, u, WHEEL_SPEED + i)
         _mask_pressure(s, u, i, others_brake(u))
 
 
@@ -115,14 +117,16 @@ def _mask_pressure(s: Record, u: Record, i: int, others: bool) -> None:
         return
     if others:
         if s.pressures.wrong[i]:
-            _distrust(u, place)
+            _distrust(s, u, place)
     elif s.pressures.wrong[i] or s.plausibility.apart_s[i] > LEFT_OUT_S:
         u.value[place] = model + s.estimate.pressure_zero[i]
+        leave_out(s.witness, place)
     elif not s.pressures.honest:
         reading = u.value[place] - lasting_difference(s.pressures, i, model)
         u.value[place] = max(reading, 0.0) if s.estimate.floored[i] else reading
 
 
 @kernel
-def _distrust(inputs: Record, place: int) -> None:
-    inputs.verdict[place] = inputs.new[place] = 0
+def _distrust(s: Record, u: Record, place: int) -> None:
+    u.verdict[place] = u.new[place] = 0
+    leave_out(s.witness, place)

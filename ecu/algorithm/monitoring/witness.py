@@ -1,24 +1,26 @@
 """Verdict on an input by its innovation against other inputs: the test that every watched input passes.
 
-    ratio = (innovation / tolerance)^2
+    ratio = (innovation / tolerance)^2        tolerance = `GATE` sigma
 
 Beyond 1 the doubt grows with time, the faster the further the input is off; an input doubted for longer than
 its limit is rejected, and accepted again after it agreed within half of its tolerance for `AGAIN_S`.
+
+What every comparison found is published, also of those that decide elsewhere (`INPUT_WATCH`).
 """
 
 import math
 
 import numpy as np
 
+from ecu.algorithm.inputs import usable
 from ecu.contract.faults import IMPLAUSIBLE
+from ecu.contract.records import INPUT_WATCH
 from ecu.contract.signals import INPUT_SIGNALS, N_INPUTS
 from ecu.jit import Record, kernel
 
 WITNESS_STATE = np.dtype(
     [
-        ("innovation", "f8", (N_INPUTS,)),  # of the last judgement, in the input's unit
-        ("tolerance", "f8", (N_INPUTS,)),  # of it
-        ("ratio", "f8", (N_INPUTS,)),
+        ("published", INPUT_WATCH),
         ("doubted_s", "f8", (N_INPUTS,)),
         ("agreed_s", "f8", (N_INPUTS,)),
         ("rejected", "u1", (N_INPUTS,)),
@@ -27,9 +29,68 @@ WITNESS_STATE = np.dtype(
 )
 
 BITS = np.array([IMPLAUSIBLE.get(signal.name, 0) for signal in INPUT_SIGNALS], dtype=np.int64)
+GATE = 3.0  # standard deviations
 FASTEST_DOUBT = 5.0  # times as fast as at the tolerance
 AGREES = 0.25  # test ratio
 AGAIN_S = 1.0
+
+
+@kernel
+def begin_watch(state: Record, dt: float) -> None:
+    """Begin a cycle, `dt` [s] after the last: nothing is compared in it yet, nothing left out."""
+    published = state.published
+    for place in range(N_INPUTS):
+        published.judged_s[place] += dt
+        published.rejected[place] = 0
+
+
+@kernel
+def compare(state: Record, place: int, innovation: float, tolerance: float) -> float:
+    """Publish what an input differs from others by; return its test ratio.
+
+    Of several comparisons in a cycle the one with the greatest ratio is published.
+    """
+    published, ratio = state.published, (innovation / tolerance) ** 2
+    if math.isfinite(ratio) and (published.judged_s[place] > 0.0 or ratio > published.ratio[place]):
+        published.innovation[place], published.sigma[place] = innovation, tolerance / GATE
+        published.ratio[place], published.judged_s[place] = ratio, 0.0
+    return ratio
+
+
+@kernel
+def compare_both(
+    state: Record, place: int, first: float, tolerance: float, second: float, other_tolerance: float
+) -> None:
+    """Publish of two innovations that count together the lesser one; none if their signs differ."""
+    if first * second <= 0.0:
+        compare(state, place, 0.0, tolerance)
+    elif abs(first / tolerance) < abs(second / other_tolerance):
+        compare(state, place, first, tolerance)
+    else:
+        compare(state, place, second, other_tolerance)
+
+
+@kernel
+def leave_out(state: Record, place: int) -> None:
+    """Note that an input is left out, or replaced, in this cycle."""
+    state.published.rejected[place] = 1
+
+
+@kernel
+def end_watch(state: Record, received: Record, trusted: Record, dt: float) -> None:
+    """End a cycle: publish the inputs as `received`, and which of them were used.
+
+    Args:
+        state: `WITNESS_STATE`, overwritten.
+        received: `INPUTS`.
+        trusted: `INPUTS` with implausible ones masked out.
+        dt: time since the last cycle [s].
+    """
+    published = state.published
+    for place in range(N_INPUTS):
+        published.value[place] = received.value[place] if usable(received, place) else math.nan
+        used = usable(trusted, place) and published.rejected[place] == 0
+        published.unused_s[place] = 0.0 if used else published.unused_s[place] + dt
 
 
 @kernel
@@ -46,8 +107,7 @@ def judge(state: Record, place: int, innovation: float, tolerance: float, doubt_
     """
     if not math.isfinite(innovation):
         return
-    ratio = (innovation / tolerance) ** 2
-    state.innovation[place], state.tolerance[place], state.ratio[place] = innovation, tolerance, ratio
+    ratio = compare(state, place, innovation, tolerance)
     if ratio > 1.0:
         state.doubted_s[place] += dt * min(math.sqrt(ratio), FASTEST_DOUBT)
     else:

@@ -12,7 +12,16 @@ from structlog.testing import capture_logs
 from brakelab.logs.formats import read_frames
 from brakelab.logs.log_quality import LogQuality
 from ecu.contract.faults import E2E_REJECTIONS
-from ecu.contract.records import CYCLE, FRAME, FRAME_EXTENDED, FRAME_FD, LEARNED, OUTPUTS, new_record
+from ecu.contract.records import (
+    CYCLE,
+    FRAME,
+    FRAME_EXTENDED,
+    FRAME_FD,
+    INPUT_WATCH,
+    LEARNED,
+    OUTPUTS,
+    new_record,
+)
 from ecu.errors import UserError
 from ecu.recording import side_process
 from ecu.recording import store as state_store
@@ -60,7 +69,7 @@ class Run:
             self.cycle["frames"], self.learned["brakings"] = frames, brakings
             for name, value in outputs.items():
                 self.outputs[name] = value
-            publish(self.ring, self.cycle, self.outputs, self.learned, self.frames)
+            publish(self.ring, self.cycle, self.outputs, self.learned, new_record(INPUT_WATCH), self.frames)
         self.recorder.turn()
 
 

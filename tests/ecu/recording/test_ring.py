@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ecu.contract.records import CYCLE, FRAME, LEARNED, OUTPUTS, new_record
+from ecu.contract.records import CYCLE, FRAME, INPUT_WATCH, LEARNED, OUTPUTS, new_record
 from ecu.contract.signals import CYCLE_NS
 from ecu.errors import UserError
 from ecu.recording import ring as ring_module
@@ -30,7 +30,7 @@ class Writer:
     def __init__(self, path: Path, slots: int, frames: int) -> None:
         self.ring = create_ring(path, {"channel": "can0"}, b"initial", slots=slots, frames=frames)
         self.cycle, self.outputs, self.learned = new_record(CYCLE), new_record(OUTPUTS), new_record(LEARNED)
-        self.frames = new_record(FRAME, 100)
+        self.watched, self.frames = new_record(INPUT_WATCH), new_record(FRAME, 100)
         self.sent = 0
 
     def publish(self, *frames_per_cycle: int) -> None:
@@ -38,8 +38,9 @@ class Writer:
             number = int(self.ring.header["written"][0])
             self.cycle["number"], self.cycle["frames"] = number, count
             self.outputs["k_f"], self.learned["mu_b"] = number + 0.5, number
+            self.watched["ratio"] = number + 0.25
             self.frames["can_id"] = (self.sent + np.arange(100)) % 2048
-            publish(self.ring, self.cycle, self.outputs, self.learned, self.frames)
+            publish(self.ring, self.cycle, self.outputs, self.learned, self.watched, self.frames)
             self.sent += count
 
 
@@ -55,7 +56,8 @@ def test_a_reader_gets_what_was_written_in_order(path):
     batch = reader.read()
     assert batch.records["cycle"]["number"].tolist() == [0, 1, 2]
     assert batch.records["outputs"]["k_f"].tolist() == [0.5, 1.5, 2.5]
-    assert reader.learned()["mu_b"].tolist() == [[2.0] * 4]
+    assert reader.latest("learned")["mu_b"].tolist() == [[2.0] * 4]
+    assert set(reader.latest("watched")["ratio"].flat) == {2.25}
     assert batch.frames["can_id"].tolist() == list(range(10))
     assert len(reader.read().records) == 0
     assert (reader.description, reader.initial) == ({"channel": "can0"}, b"initial")
@@ -143,7 +145,7 @@ def test_a_reader_beside_a_racing_writer_sees_whole_cycles_only(path):
         batch = reader.read()
         numbers = batch.records["cycle"]["number"]
         assert (batch.records["outputs"]["k_f"] == numbers + 0.5).all()
-        learned = reader.learned()
+        learned = reader.latest("learned")
         assert learned is None or len(set(learned["mu_b"][0])) == 1
         assert np.isin(batch.frames["can_id"], np.arange(2048)).all()
         read += len(numbers)

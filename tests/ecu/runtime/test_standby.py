@@ -12,7 +12,7 @@ from ecu.bus.protocol import BusStatus
 from ecu.bus.receive_plan import contract_receive_plan
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
 from ecu.contract.faults import FOREIGN_SENDER
-from ecu.contract.records import CYCLE, FRAME, LEARNED, OUTPUTS, new_record
+from ecu.contract.records import CYCLE, FRAME, INPUT_WATCH, LEARNED, OUTPUTS, new_record
 from ecu.contract.signals import CYCLE_NS, N_OUTPUTS
 from ecu.jit import CompileCounter
 from ecu.recording import ring as ring_module
@@ -277,7 +277,7 @@ def first_ring(tmp_path, monkeypatch):
         for number in range(cycles):
             cycle = new_record(CYCLE)
             cycle["number"] = number
-            publish(ring, cycle, new_record(OUTPUTS), record, new_record(FRAME))
+            publish(ring, cycle, new_record(OUTPUTS), record, new_record(INPUT_WATCH), new_record(FRAME))
         return ring
 
     return learned
@@ -304,5 +304,5 @@ def test_what_the_first_one_learned_comes_out_of_its_ring(first_ring, mu_b, desc
 
 def test_before_its_first_cycle_a_ring_tells_nothing(first_ring):
     ring = first_ring(0.4, cycles=0)
-    assert RingReader(ring.path).learned() is None
+    assert RingReader(ring.path).latest("learned") is None
     assert learned_by_first(DESCRIPTION, NOMINAL) is None

@@ -7,8 +7,8 @@ import pytest
 
 from ecu.algorithm.step import INITIAL
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
-from ecu.contract.records import CYCLE, FRAME, LEARNED, OUTPUTS, new_record
-from ecu.contract.signals import CYCLE_NS, N_INPUTS
+from ecu.contract.records import CYCLE, FRAME, INPUT_WATCH, LEARNED, OUTPUTS, new_record
+from ecu.contract.signals import CYCLE_NS, INPUT, N_INPUTS
 from ecu.recording import ring as ring_module
 from ecu.recording.recorder import layout
 from ecu.recording.ring import close_ring, create_ring, publish
@@ -33,10 +33,18 @@ class Loop:
         }
         self.ring = create_ring(path, self.about, new_record(INITIAL).tobytes(), slots=2400, frames=4096)
         self.cycle, self.outputs, self.learned = new_record(CYCLE), new_record(OUTPUTS), new_record(LEARNED)
+        self.watched = new_record(INPUT_WATCH)
+        self.watched["value"] = self.watched["sigma"] = self.watched["ratio"] = np.nan
+        self.watched["unused_s"] = np.inf
         self.cycle["speaks"] = 1
         self.outputs["mode"] = 1
         self.frames = new_record(FRAME, 100)
         self.number = 0
+
+    def find(self, name: str, **found) -> None:
+        """Set what the next cycles find of an input, by the fields of `INPUT_WATCH`."""
+        for field, value in found.items():
+            self.watched[field][0, INPUT[name]] = value
 
     def publish(self, cycles: int, *, frames: int = 0, lateness_us=50.0, **outputs) -> None:
         for name, value in outputs.items():
@@ -48,13 +56,13 @@ class Loop:
             self.cycle["lateness_ns"] = round(1e3 * lateness_us)
             self.frames["stamp_ns"], self.frames["can_id"] = stamp_ns, 0x123
             self.frames["length"], self.frames["data"] = 8, np.arange(64)
-            publish(self.ring, self.cycle, self.outputs, self.learned, self.frames)
+            publish(self.ring, self.cycle, self.outputs, self.learned, self.watched, self.frames)
             self.number += 1
 
     def publish_frames(self, frames) -> None:
         """Publish a cycle that consumed `frames`."""
         self.cycle["number"], self.cycle["frames"] = self.number, len(frames)
-        publish(self.ring, self.cycle, self.outputs, self.learned, frames)
+        publish(self.ring, self.cycle, self.outputs, self.learned, self.watched, frames)
         self.number += 1
 
     def close(self, **words) -> None:

@@ -12,6 +12,9 @@ from ecu.watch.watcher import Watcher
 def watched(loop):
     one = loop()
     one.cycle["e2e"] = 7, 3, 2, 1
+    one.find("yaw_rate", value=3.0, innovation=2.9, sigma=0.02, ratio=2336.1, rejected=1, unused_s=12.3)
+    one.find("reverse", value=0.0, unused_s=0.0)
+    one.find("vehicle_speed", rejected=0, unused_s=4.0)  # it came once
     one.publish(
         4,
         mode=3,
@@ -45,6 +48,19 @@ def test_the_line_of_json(watched):
     assert (said["mode"], said["faults"], said["missed"], said["cycles"]) == ("degraded", ["IMU lost"], 0, 4)
     assert said["lateness_us"]["50"] == 4
     assert said["frames"] == {"late": 7, "lost": 3, "repeated": 2, "wrong": 1}
+    assert list(said["inputs"]) == ["yaw_rate", "vehicle_speed", "reverse"]
+    assert said["inputs"]["yaw_rate"] == {
+        "unit": "rad/s",
+        "value": 3,
+        "innovation": 2.9,
+        "sigma": 0.02,
+        "ratio": 2336.1,
+        "judged_s": 0,
+        "rejected": True,
+        "unused_s": 12.3,
+    }
+    found = [said["inputs"]["vehicle_speed"][name] for name in ("value", "ratio", "rejected", "unused_s")]
+    assert found == [None, None, False, 4]
     assert said["clock"] == 1_800_000_000.03
 
 

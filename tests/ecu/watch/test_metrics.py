@@ -58,20 +58,26 @@ def test_every_quantity_with_its_unit(one):
         pad_wear=0.5,
         pad_remaining=95.0,
     )
+    one.find("yaw_rate", ratio=2.5, rejected=1, unused_s=12.0)
+    one.find("accel_x", value=-3.0, unused_s=0.0)
+    one.publish(1)
     samples = read(one)
+    assert samples["brake_ecu_input_test_ratio"] == {("yaw_rate",): 2.5}
+    assert samples["brake_ecu_input_rejected"] == {("accel_x",): 0, ("yaw_rate",): 1}
+    assert samples["brake_ecu_input_unused_seconds"] == {("accel_x",): 0, ("yaw_rate",): 12}
     for name, expected in {
         "up": 1,
-        "cycles_total": 50,
+        "cycles_total": 51,
         "missed_periods_total": 2,
         "frames_dropped_total": 7,
         "vehicle_speed_metres_per_second": 20,
         "speaks": 1,
-        "lateness_seconds_count": 50,
+        "lateness_seconds_count": 51,
     }.items():
         assert samples[f"brake_ecu_{name}"] == {(): expected}, name
     assert samples["brake_ecu_last_cycle_age_seconds"][()] == pytest.approx(0.01)
-    assert samples["brake_ecu_lateness_seconds_sum"][()] == pytest.approx(50 * 50e-6)
-    assert samples["brake_ecu_lateness_seconds_bucket"][("5e-05",)] == 50
+    assert samples["brake_ecu_lateness_seconds_sum"][()] == pytest.approx(51 * 50e-6)
+    assert samples["brake_ecu_lateness_seconds_bucket"][("5e-05",)] == 51
     assert samples["brake_ecu_friction"] == {("fl",): 0.41, ("fr",): 0.42, ("rl",): 0.43}
     assert samples["brake_ecu_friction_sigma"][("rr",)] == 0.02
     assert samples["brake_ecu_disc_temperature_celsius"][("rl",)] == 103
@@ -98,6 +104,7 @@ def test_frames_by_message(one, contract_frames):
 
 
 def test_the_dashboard_and_the_page_name_metrics_that_exist(one):
+    one.find("accel_x", value=0.0, ratio=0.1, unused_s=0.0)
     one.publish(4)
     exist = {name.removeprefix("brake_ecu_") for name in read(one)}
     root = Path(__file__).parents[3]

@@ -79,6 +79,19 @@ def test_what_is_not_available_is_a_dash(loop):
     assert "nan" not in "\n".join(draw(watcher, 120, 40))
 
 
+def test_the_inputs_in_a_line(loop):
+    one = loop()
+    one.find("yaw_rate", value=3.0, ratio=2e3, rejected=1)
+    one.find("accel_x", value=-3.0, ratio=0.31)
+    one.find("vehicle_speed", value=20.0, ratio=9.0, judged_s=60.0)  # what was said long ago counts no more
+    one.publish(4)
+    watcher = Watcher(None)
+    watcher.turn()
+    line = "left out: yaw_rate; test ratio at most 0.31 (accel_x)"
+    assert line in "\n".join(draw(watcher, 80, 40))
+    assert "accel_x" not in "\n".join(draw(watcher, 80, 24))
+
+
 def test_it_scrolls_back(watched):
     page = "\n".join(draw(watched, 80, 40, back_s=5.0, paused=True))
     assert "READY  20.0 m/s" in page

@@ -7,7 +7,7 @@ from ecu.contract.records import RecordArray
 
 RENAMED = {"hydraulics": "friction_torque"}  # present name: earlier one
 # Begin as in a new state.
-ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s"} | {
+ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"} | {
     *("pressures", "flags", "accel_error", "witness", "motors", "turning", "speeds"),
     *(
         "grip",

@@ -21,6 +21,7 @@ from ecu.algorithm.control.limiter import (
     reads_empty,
     watch_accumulator,
 )
+from ecu.algorithm.monitoring.witness import WITNESS_STATE
 from ecu.contract.signals import ALIVE, INPUT, USABLE, VALID
 from ecu.jit import kernel
 from ecu.settings.config import load_config, new_params
@@ -29,6 +30,7 @@ BAR = 1e5
 DT = 0.01
 RATE = 3000.0 * BAR  # Pa/s, the default of the configuration
 STEP = RATE * DT
+WITNESS = np.zeros(1, WITNESS_STATE)[0]  # what is published does not matter here
 NAN, INF = math.nan, math.inf
 
 CONFIGS = Path(__file__).parents[4] / "config"
@@ -225,7 +227,7 @@ def test_an_accumulator_limits_once_callipers_confirm_it(
     feed(inputs, calliper_pressure=np.array([calliper, 0.0, 0.0, 0.0]))
     state["asked"] = asked * BAR
     for _ in range(round(seconds / DT)):
-        watch_accumulator(state, inputs[0], DT)
+        watch_accumulator(state, WITNESS, inputs[0], DT)
     assert (state["confirmed"], state["denied"]) == (limits, denied), case
 
 
@@ -236,7 +238,7 @@ def test_an_accumulator_that_agrees_again_is_believed_again(feed) -> None:
     for reads, denied in ((11.0, 1), (150.0, 0)):
         feed(inputs, accumulator_pressure=reads)
         for _ in range(30):
-            watch_accumulator(state, inputs[0], DT)
+            watch_accumulator(state, WITNESS, inputs[0], DT)
         assert state["denied"] == denied
 
 

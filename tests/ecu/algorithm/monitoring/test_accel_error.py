@@ -60,10 +60,10 @@ class Car:
             self.estimate["speed"] = speed
             self.estimate["brake_torque"] = np.maximum(-wheel_torque, 0.0)
             braking = force < 0.0
-            watch_acceleration(p, self.blocks, self.inputs[0], self.estimate, base, braking, DT)
+            watch_acceleration(p, self.blocks, self.witness, self.inputs[0], self.estimate, base, braking, DT)
             watch_frozen(self.state, self.blocks, self.witness, self.inputs[0], DT)
             if self.blocks["time"] == 0.0:
-                follow_accel_error(p, self.state, self.blocks, 0.0, braking)
+                follow_accel_error(p, self.state, self.witness, self.blocks, 0.0, braking)
 
 
 # reading, seconds; taken off a reading of 0 and of -4 m/s2

@@ -12,6 +12,7 @@ import pytest
 
 from ecu.algorithm.estimate import ESTIMATE
 from ecu.algorithm.monitoring.acceleration import ACCELERATION_STATE, watch_acceleration
+from ecu.algorithm.monitoring.witness import WITNESS_STATE
 from ecu.contract.params import GRAVITY
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import MOTOR_TORQUE
@@ -86,7 +87,7 @@ def drive(
     p = params[0]
     state, estimate = np.zeros(1, ACCELERATION_STATE)[0], np.zeros(1, ESTIMATE)[0]
     estimate["mu"] = p["mu_nominal"]
-    base = p["mu_nominal"].copy()
+    base, witness = p["mu_nominal"].copy(), np.zeros(1, WITNESS_STATE)[0]
     inputs, speed, said = feed(), 30.0, []
     for k in range(round(100 * seconds)):
         t = 0.01 * k
@@ -101,7 +102,7 @@ def drive(
         if not motors:
             inputs[0]["verdict"][MOTOR_TORQUE : MOTOR_TORQUE + 4] = 0
         estimate["speed"] = speed
-        watch_acceleration(p, state, inputs[0], estimate, base, False, 0.01)
+        watch_acceleration(p, state, witness, inputs[0], estimate, base, False, 0.01)
         said.append(bool(state["implausible"]))
     return said
 

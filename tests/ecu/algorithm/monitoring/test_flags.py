@@ -5,6 +5,7 @@ import pytest
 
 from ecu.algorithm.estimate import ESTIMATE
 from ecu.algorithm.monitoring.flags import FLAGS_STATE, LONGEST_S, correct_flags
+from ecu.algorithm.monitoring.witness import WITNESS_STATE
 from ecu.contract.faults import IMPLAUSIBLE
 from ecu.contract.signals import INPUT
 
@@ -18,6 +19,7 @@ class Car:
         self.params, self.feed, self.inputs = params[0], feed, feed()
         self.state, self.estimate = np.zeros(1, FLAGS_STATE)[0], np.zeros(1, ESTIMATE)[0]
         self.state["last"] = np.nan
+        self.witness = np.zeros(1, WITNESS_STATE)[0]
         self.speed, self.across, self.clock = speed, 0.0, 0.0
         self.random = np.random.default_rng(1)
         self.said: list[int] = []
@@ -42,7 +44,9 @@ class Car:
             wheels = abs(self.speed) / self.params["wheel_radius"] * np.array([1, 1, 1, turns])
             noise = 0.05 * self.random.standard_normal(5)
             self.feed(self.inputs, wheel_speed=wheels + noise[:4], accel_x=accel + noise[4], **reads)
-            said = correct_flags(self.params, self.state, self.inputs[0], self.estimate, braking, DT)
+            said = correct_flags(
+                self.params, self.state, self.witness, self.inputs[0], self.estimate, braking, DT
+            )
             self.said.append(said)
             lost += DT * (self.inputs[0]["value"][INPUT[name]] != value)
         return lost

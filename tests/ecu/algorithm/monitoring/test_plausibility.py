@@ -12,7 +12,10 @@ from ecu.algorithm.monitoring.plausibility import (
     watch_wheels,
     wheel_speed_implausible,
 )
+from ecu.algorithm.monitoring.witness import WITNESS_STATE
 from ecu.contract.signals import CALLIPER_PRESSURE, MOTOR_TORQUE, WHEEL_SPEED
+
+WITNESS = np.zeros(1, WITNESS_STATE)[0]  # what is published does not matter here
 
 CASES = [
     # what, turns over ground, brake torque [N m], motor torque [N m], car's speed [m/s], implausible
@@ -58,7 +61,7 @@ def test_a_wheel_that_brakes_is_not_faster_than_the_car(
     inputs[0]["value"][WHEEL_SPEED + wheel] = turns * speed / params[0]["wheel_radius"][wheel]
     inputs[0]["value"][MOTOR_TORQUE : MOTOR_TORQUE + 4] = motor
     said = [
-        wheel_speed_implausible(params[0], state, inputs[0], estimated(speed, torque), 0.01)
+        wheel_speed_implausible(params[0], state, WITNESS, inputs[0], estimated(speed, torque), 0.01)
         for _ in range(50)
     ]
     assert any(said) == implausible
@@ -72,7 +75,7 @@ def fallen(speeds: list[float], torque: float, params, feed, period: float = 0.0
     ground, said = speeds[0] * params[0]["wheel_radius"][0], []
     for speed in speeds:
         inputs = feed(wheel_speed=[speed, *[speeds[0]] * 3])
-        watch_wheels(params[0], state, inputs[0], estimated(ground, torque), period)
+        watch_wheels(params[0], state, WITNESS, inputs[0], estimated(ground, torque), period)
         said.append(bool(state["fell"][0]))
         assert not state["fell"][1:].any()
     return said
@@ -106,7 +109,7 @@ def test_wheels_are_held_against_each_other_too(params, feed, stuck: int, car: f
     for speeds, expected in ((sound, False), (turns, True)):
         said = [
             wheel_speed_implausible(
-                params[0], state, feed(wheel_speed=speeds)[0], estimated(car * 20.0, 800.0), 0.01
+                params[0], state, WITNESS, feed(wheel_speed=speeds)[0], estimated(car * 20.0, 800.0), 0.01
             )
             for _ in range(50)
         ]
@@ -179,7 +182,7 @@ def test_a_lost_wheel_does_not_count_among_the_others(params, feed) -> None:
     inputs = feed(wheel_speed=np.array([1.08, 1.08, 1.08, 0.0]) * 20.0 / params[0]["wheel_radius"])
     inputs[0]["verdict"][WHEEL_SPEED + 3] = 0
     for _ in range(60):
-        assert not wheel_speed_implausible(params[0], state, inputs[0], estimated(20.0, 800.0), 0.01)
+        assert not wheel_speed_implausible(params[0], state, WITNESS, inputs[0], estimated(20.0, 800.0), 0.01)
 
 
 @pytest.mark.parametrize(
@@ -189,7 +192,7 @@ def test_a_lost_wheel_does_not_count_among_the_others(params, feed) -> None:
 def test_a_sample_is_compared_with_one_that_is_younger_than_0_1_s(params, feed, age, left_out) -> None:
     state = np.zeros(1, PLAUSIBILITY_STATE)[0]
     state["omega"], ground = 60.0, 60.0 * float(params[0]["wheel_radius"][0])
-    watch_wheels(params[0], state, feed(wheel_speed=0.0)[0], estimated(ground, 0.0), age)
+    watch_wheels(params[0], state, WITNESS, feed(wheel_speed=0.0)[0], estimated(ground, 0.0), age)
     assert bool(state["fell"][0]) == left_out
 
 
@@ -206,7 +209,7 @@ def sample(params, feed, corner: int, omega: float, state=None, torque=0.0, age=
     if beside.get("pressure_lost"):
         inputs[0]["verdict"][CALLIPER_PRESSURE + corner] = 0
     speed = 60.0 * float(params[0]["wheel_radius"][0]) if ground is None else ground
-    watch_wheels(params[0], state, inputs[0], estimated(speed, torque), age)
+    watch_wheels(params[0], state, WITNESS, inputs[0], estimated(speed, torque), age)
     return state
 
 
@@ -272,7 +275,7 @@ def test_a_fast_wheel_beside_the_others(params, feed, fast, case, lost, speed, i
         inputs[0]["verdict"][WHEEL_SPEED + (fast + other) % 4] = 0
     said = False
     for _ in range(40):
-        said = wheel_speed_implausible(params[0], state, inputs[0], estimated(speed, 800.0), 0.01)
+        said = wheel_speed_implausible(params[0], state, WITNESS, inputs[0], estimated(speed, 800.0), 0.01)
     assert bool(said) == implausible, case
 
 
@@ -310,7 +313,9 @@ def test_what_lasts_0_3_s_is_not_said_yet(params, feed) -> None:
     inputs = feed(wheel_speed=turns, calliper_pressure=[30.0, 0.0, 0.0, 0.0])
     wheels, pressures = [], []
     for _ in range(3):
-        wheels.append(wheel_speed_implausible(params[0], state, inputs[0], estimated(20.0, 800.0), 0.15))
+        wheels.append(
+            wheel_speed_implausible(params[0], state, WITNESS, inputs[0], estimated(20.0, 800.0), 0.15)
+        )
         watch_pressures(state, inputs[0], np.zeros(4), np.zeros(4), 0.15)
         pressures.append(bool(state["pressure"]))
     assert wheels == pressures == [False, False, True]

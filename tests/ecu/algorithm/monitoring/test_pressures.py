@@ -15,6 +15,7 @@ from ecu.algorithm.monitoring.pressures import (
     compare_pressures,
     lasting_difference,
 )
+from ecu.algorithm.monitoring.witness import WITNESS_STATE
 from ecu.contract.params import BAR
 from ecu.contract.signals import CALLIPER_PRESSURE
 
@@ -33,6 +34,7 @@ class Brakes:
         self.brakes["scale"], self.law["base"] = 1.0, MU
         self.hydraulics, self.estimate = np.zeros(1, HYDRAULICS_STATE)[0], np.zeros(1, ESTIMATE)[0]
         self.estimate["measured"], self.estimate["speed"] = 1, 20.0
+        self.witness = np.zeros(1, WITNESS_STATE)[0]
         self.random = np.random.default_rng(0)
 
     def force(self, bar: float) -> float:
@@ -53,7 +55,7 @@ class Brakes:
                     settle_zero(self.zero, i)
                 tell_zeros(self.zero, self.estimate)
             compare_pressures(
-                self.params, self.state, self.inputs[0], self.estimate, self.law, self.brakes,
+                self.params, self.state, self.witness, self.inputs[0], self.estimate, self.law, self.brakes,
                 self.hydraulics, True, DT,
             )  # fmt: skip
 

@@ -5,7 +5,16 @@ import math
 import numpy as np
 import pytest
 
-from ecu.algorithm.monitoring.witness import WITNESS_STATE, judge, rejected_faults
+from ecu.algorithm.monitoring.witness import (
+    WITNESS_STATE,
+    begin_watch,
+    compare,
+    compare_both,
+    end_watch,
+    judge,
+    leave_out,
+    rejected_faults,
+)
 from ecu.contract.faults import IMPLAUSIBLE
 from ecu.contract.signals import INPUT
 
@@ -59,8 +68,52 @@ def test_a_rejected_input_agrees_for_a_second_within_half_of_its_tolerance(
     assert judged(state, agrees, seconds) == (not accepted)
 
 
-def test_what_a_verdict_was_made_of_is_kept(state) -> None:
+def published(state, *names: str) -> list[float]:
+    return [float(state["published"][name][PLACE]) for name in names]
+
+
+def test_what_a_verdict_was_made_of_is_published(state) -> None:
+    """A tolerance is three standard deviations."""
+    begin_watch(state, DT)
     judged(state, 3.0, DT)
-    assert state["innovation"][PLACE] == pytest.approx(0.6)
-    assert state["tolerance"][PLACE] == pytest.approx(0.2)
-    assert state["ratio"][PLACE] == pytest.approx(9.0)
+    found = published(state, "innovation", "sigma", "ratio", "judged_s")
+    assert found == pytest.approx([0.6, 0.2 / 3.0, 9.0, 0.0])
+    begin_watch(state, DT)
+    judged(state, math.nan, DT)
+    assert published(state, "ratio", "judged_s") == pytest.approx([9.0, DT])
+
+
+COMPARED = [
+    # innovation over tolerance of two comparisons; published, one by one and where both count together
+    ((0.5, 0.2), 0.5, 0.2),
+    ((0.2, -0.5), -0.5, 0.0),
+    ((-2.0, -3.0), -3.0, -2.0),
+    ((2.0, 0.0), 2.0, 0.0),
+]
+
+
+@pytest.mark.parametrize(("apart", "greatest", "together"), COMPARED)
+def test_of_several_comparisons_in_a_cycle_one_is_published(state, apart, greatest, together) -> None:
+    begin_watch(state, DT)
+    for one in apart:
+        compare(state, PLACE, 0.2 * one, 0.2)
+    assert published(state, "innovation", "ratio") == pytest.approx([0.2 * greatest, greatest**2])
+    begin_watch(state, DT)
+    compare_both(state, PLACE, 0.2 * apart[0], 0.2, 4.0 * apart[1], 4.0)
+    assert published(state, "ratio")[0] == pytest.approx(together**2)
+
+
+def test_who_is_left_out_is_not_used(state, feed) -> None:
+    received, trusted = feed(yaw_rate=0.3), feed(yaw_rate=0.3)
+    for k in range(5):
+        begin_watch(state, DT)
+        if k >= 3:
+            leave_out(state, PLACE)
+        end_watch(state, received[0], trusted[0], DT)
+    assert published(state, "value", "rejected", "unused_s") == pytest.approx([0.3, 1, 2 * DT])
+    received["verdict"] = trusted["verdict"] = 0
+    begin_watch(state, DT)
+    end_watch(state, received[0], trusted[0], DT)
+    assert published(state, "value", "rejected", "unused_s") == pytest.approx(
+        [math.nan, 0, 3 * DT], nan_ok=True
+    )
