@@ -1,4 +1,4 @@
-"""Motor torques that contradict the car's motion, or what was demanded of them: which, and when nothing is said."""
+"""Motor torques that contradict the car's motion or what was demanded of them: which, and when none is named."""
 
 import numpy as np
 import pytest
@@ -86,14 +86,14 @@ CASES = [
     ("no time for it yet", {"decel": 0.5, "reads": ONE}, 0.3, ()),
     ("5 % too much", {"decel": 0.5, "reads": 1.05}, 20.0, ()),
     ("one reads twice, walking pace", {"decel": 0.5, "reads": ONE, "speed": LEAST_SPEED}, 20.0, ()),
-    ("one reads twice, a little faster", {"decel": 0.5, "reads": ONE, "speed": LEAST_SPEED + 0.01}, 3.0, ("rl",)),
-    ("one reads twice, the driver accelerates", {"decel": 0.5, "reads": ONE, "accelerator_position": 20.0}, 9.0, ()),
+    ("one reads twice, just faster", {"decel": 0.5, "reads": ONE, "speed": LEAST_SPEED + 0.01}, 3.0, ("rl",)),
+    ("one reads twice, accelerating", {"decel": 0.5, "reads": ONE, "accelerator_position": 20.0}, 9.0, ()),
     ("one reads twice, ABS", {"decel": 0.5, "reads": ONE, "abs_active": 1.0}, 9.0, ()),
     ("the linings' doubt", {"decel": 0.1, "lining": 1.0, "off": 1.5}, 9.0, ()),
     ("more than it", {"decel": 0.1, "lining": 0.25, "off": 1.5}, 9.0, ALL),
     ("the accelerometer's zero", {"decel": 0.5, "off": 1.0, "accel_offset": -0.9}, 9.0, ()),
     ("a zero of the other sign", {"decel": 0.5, "off": 1.0, "accel_offset": 0.9}, 9.0, ALL),
-    ("a greater zero takes no more than the error", {"decel": 0.5, "off": 1.0, "accel_offset": -9.0}, 9.0, ()),
+    ("a greater zero takes just the error", {"decel": 0.5, "off": 1.0, "accel_offset": -9.0}, 9.0, ()),
 ]  # fmt: skip
 
 
