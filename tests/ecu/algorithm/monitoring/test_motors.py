@@ -1,4 +1,4 @@
-"""Motor torques that contradict the car's motion or what was demanded of them: which, and when none is named."""
+"""Motor torques that contradict the motion or what was demanded of them: which, and when none is named."""
 
 import numpy as np
 import pytest
