@@ -35,6 +35,7 @@ from ecu.contract.signals import (
     RATE_OK,
     USABLE,
     VALID,
+    WHEEL_SPEED,
 )
 from ecu.settings.config import load_config, new_params
 
@@ -175,6 +176,13 @@ def test_the_mean_of_the_wheels_has_no_sign(params, feed) -> None:
     assert mean_wheel_speed(params[0], feed(wheel_speed=-8.0 / radius)[0]) == pytest.approx(8.0)
     four = np.array([8.0, 8.0, 4.0, 0.0])
     assert mean_wheel_speed(params[0], feed(wheel_speed=four / radius)[0]) == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize(("lost", "mean"), [(1, 4.0), (2, 2.0), (3, math.nan), (4, math.nan)])
+def test_the_mean_is_of_two_wheels_at_least(params, feed, lost: int, mean: float) -> None:
+    inputs = feed(wheel_speed=np.array([8.0, 8.0, 4.0, 0.0]) / params[0]["wheel_radius"])[0]
+    inputs["verdict"][WHEEL_SPEED : WHEEL_SPEED + lost] = 0
+    assert mean_wheel_speed(params[0], inputs) == pytest.approx(mean, nan_ok=True)
 
 
 @pytest.mark.parametrize(

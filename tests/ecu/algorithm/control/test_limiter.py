@@ -231,6 +231,16 @@ def test_an_accumulator_limits_once_callipers_confirm_it(
     assert (state["confirmed"], state["denied"]) == (limits, denied), case
 
 
+def test_a_lost_calliper_pressure_denies_no_accumulator(feed) -> None:
+    inputs, state = feed(accumulator_pressure=11.0), np.zeros(1, LIMITER_STATE)[0]
+    feed(inputs, calliper_pressure=np.array([60.0, 0.0, 0.0, 0.0]))
+    inputs[0]["verdict"][INPUT["calliper_pressure_fl"]] = 0
+    state["asked"] = 60.0 * BAR
+    for _ in range(100):
+        watch_accumulator(state, WITNESS, inputs[0], DT)
+    assert (state["confirmed"], state["denied"]) == (1, 0)
+
+
 def test_an_accumulator_that_agrees_again_is_believed_again(feed) -> None:
     inputs, state = feed(accumulator_pressure=11.0), np.zeros(1, LIMITER_STATE)[0]
     feed(inputs, calliper_pressure=np.full(4, 60.0))
