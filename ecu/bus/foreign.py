@@ -5,6 +5,7 @@ and again, whatever it holds: two such senders destroy each other's frames. Late
 only another ECU does: intact frames of two of our messages at a time, which garbage is not even by chance.
 """
 
+import math
 import time
 from typing import Any, Final
 
@@ -21,7 +22,8 @@ _AT_ONCE: Final = 1024
 _DISCARD_S: Final = 0.5  # a bus too busy to be emptied in that time is listened to at once
 _LOOK_S: Final = 0.01
 SENDS: Final = 5
-"""Looks in which one identifier was heard that make a sender; one look hears all that came at once."""
+"""Frames of one identifier that make a sender; those stamped within `_APART_NS` are one."""
+_APART_NS: Final = 5_000_000
 
 
 @kernel
@@ -74,16 +76,19 @@ def listen_before_send(channel: Channel, where: str, plan: TransmitPlan, seconds
         UserError: a foreign sender was heard.
     """
     frames = new_record(FRAME, _AT_ONCE)
-    looks = np.zeros(len(plan.ids), np.int64)
+    sends, last_ns = np.zeros(len(plan.ids), np.int64), np.full(len(plan.ids), -math.inf)
     end, stray = time.monotonic() + seconds, 0
     while True:
         count = channel.drain(frames, 0)
         heard = frames["can_id"][:count] | np.where(frames["flags"][:count] & FRAME_EXTENDED, EXTENDED_ID, 0)
         ours = np.isin(heard, plan.ids)
         stray += int(ours.sum())
-        looks += np.isin(plan.ids, heard[ours])
-        if looks.max() >= SENDS:
-            sent = plan.messages[int(looks.argmax())]
+        for i in np.flatnonzero(ours):
+            place = int(np.flatnonzero(plan.ids == heard[i])[0])
+            if frames["stamp_ns"][i] - last_ns[place] >= _APART_NS:
+                sends[place], last_ns[place] = sends[place] + 1, frames["stamp_ns"][i]
+        if sends.max() >= SENDS:
+            sent = plan.messages[int(sends.argmax())]
             raise UserError(
                 where,
                 f"frame {int(sent['id']):03X} ({sent['name']})",

@@ -19,20 +19,21 @@ STATUS = int(PLAN.ids[UNPROTECTED[0]])
 
 
 class Bus:
-    """Frames (identifier, flags) by the time [s] at which they can be read; time passes in sleep."""
+    """Frames (identifier, flags) by the time [s] at which they come; a sleep lasts `late_s` at least."""
 
-    def __init__(self, monkeypatch, frames):
-        self.now_s, self.frames = 0.0, sorted(frames)
+    def __init__(self, monkeypatch, frames, late_s=0.0):
+        self.now_s, self.frames, self.late_s = 0.0, sorted(frames), late_s
         monkeypatch.setattr(foreign.time, "monotonic", lambda: self.now_s)
         monkeypatch.setattr(foreign.time, "sleep", self.sleep)
 
     def sleep(self, seconds):
-        self.now_s += seconds
+        self.now_s += max(seconds, self.late_s)
 
     def drain(self, frames, start):
         count = 0
         while self.frames and self.frames[0][0] <= self.now_s and start + count < len(frames):
-            _, frames["can_id"][start + count], frames["flags"][start + count] = self.frames.pop(0)
+            frame, (at_s, identifier, flags) = frames[start + count], self.frames.pop(0)
+            frame["stamp_ns"], frame["can_id"], frame["flags"] = round(1e9 * at_s), identifier, flags
             count += 1
         return count
 
@@ -67,6 +68,11 @@ def test_only_who_sends_again_and_again_while_we_listen_keeps_us_away(monkeypatc
     with pytest.raises(UserError, match="someone else already sends it") if stray is None else nullcontext():
         assert listen_before_send(bus, "x", PLAN, 1.0) == stray
     assert stray is None or bus.now_s >= 1.0
+
+
+def test_a_machine_that_sleeps_for_a_second_hears_as_much(monkeypatch):
+    with pytest.raises(UserError, match="someone else already sends it"):
+        listen_before_send(Bus(monkeypatch, each(0.05), late_s=2.0), "x", PLAN, 1.0)
 
 
 def burst(*places, counter=0, spoil=None):
