@@ -83,10 +83,10 @@ def listen_before_send(channel: Channel, where: str, plan: TransmitPlan, seconds
         heard = frames["can_id"][:count] | np.where(frames["flags"][:count] & FRAME_EXTENDED, EXTENDED_ID, 0)
         ours = np.isin(heard, plan.ids)
         stray += int(ours.sum())
-        for i in np.flatnonzero(ours):
-            place = int(np.flatnonzero(plan.ids == heard[i])[0])
-            if frames["stamp_ns"][i] - last_ns[place] >= _APART_NS:
-                sends[place], last_ns[place] = sends[place] + 1, frames["stamp_ns"][i]
+        for frame in frames[:count][ours]:
+            place = place_of_ours(plan, frame)
+            if frame["stamp_ns"] - last_ns[place] >= _APART_NS:
+                sends[place], last_ns[place] = sends[place] + 1, frame["stamp_ns"]
         if sends.max() >= SENDS:
             sent = plan.messages[int(sends.argmax())]
             raise UserError(

@@ -162,10 +162,8 @@ def watch_frozen(state: Record, blocks: Record, witness: Record, inputs: Record,
         witness.rejected[ACCEL_X] = 0
     mean = blocks.mean
     change = (mean[0, ROLLED] - mean[1, ROLLED] - mean[3, ROLLED] + mean[4, ROLLED]) / BLOCK_S
-    if state.same_s > SAME_S:
-        compare(witness, ACCEL_X, -change, CHANGED)
-        if abs(change) > CHANGED:
-            witness.rejected[ACCEL_X] = 1
+    if state.same_s > SAME_S and compare(witness, ACCEL_X, -change, CHANGED) > 1.0:
+        witness.rejected[ACCEL_X] = 1
 
 
 @kernel

@@ -196,13 +196,11 @@ def _agrees(state: Record, witness: Record) -> bool:
     least = AGAIN * max(LEAST, NOISE * state.sigma)
     against_wheels = _beside_wheels(mean, W)
     if state.known_blocks < 3:
-        compare(witness, ACCEL_X, against_wheels, SLOPE)
-        on_a_road: bool = abs(against_wheels) < SLOPE
+        on_a_road: bool = compare(witness, ACCEL_X, against_wheels, SLOPE) < 1.0
         return on_a_road and state.good_blocks >= SECOND
     against_force = _now(mean, A) - _now(mean, F)
     by_force = state.known_blocks >= SECOND and abs(against_force - state.usual_force) < least
-    by_wheels: bool = abs(against_wheels - state.usual) < least
-    compare(witness, ACCEL_X, against_wheels - state.usual, least)
+    by_wheels: bool = compare(witness, ACCEL_X, against_wheels - state.usual, least) < 1.0
     return by_force or by_wheels
 
 
@@ -229,8 +227,8 @@ def _beyond_any_road(state: Record, witness: Record) -> bool:
     mean = state.mean
     against_wheels = _beside_wheels(mean, W)
     if state.known_blocks < 8:
-        compare(witness, ACCEL_X, against_wheels, SLOPE + NOISE * state.sigma)
-        return abs(against_wheels) > SLOPE + NOISE * state.sigma
+        beyond: bool = compare(witness, ACCEL_X, against_wheels, SLOPE + NOISE * state.sigma) > 1.0
+        return beyond
     against_force = _now(mean, A) - _now(mean, F)
     denied = DENIED + FORCE * abs(_now(mean, F))
     compare_both(witness, ACCEL_X, against_wheels, SLOPE, against_force, denied)

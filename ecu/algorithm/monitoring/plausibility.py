@@ -106,9 +106,8 @@ def watch_wheels(
             possible = FALL + FALL_SHARE * braked / params.wheel_inertia[i] * state.age_s[i]
             ground = corner_speed(params, estimate, estimate.speed, i)
             known = state.age_s[i] < OLDEST_S and usable(inputs, CALLIPER_PRESSURE + i)
-            if known and omega < state.omega[i]:
-                compare(witness, WHEEL_SPEED + i, omega - state.omega[i], possible)
-            if known and state.omega[i] - omega > possible:
+            falls = known and omega < state.omega[i]
+            if falls and compare(witness, WHEEL_SPEED + i, omega - state.omega[i], possible) > 1.0:
                 state.fell[i] = 1
             elif abs(omega * params.wheel_radius[i] - ground) < ROLLING * ground:
                 state.fell[i] = 0

@@ -139,15 +139,13 @@ def compare_pressures(
         if fresh(inputs, place) and not state.honest and abs(hydraulics.rate[i]) < STEADY:
             _learn(state, i, gap, model[i], dt)
         state.rest[i] = zero[i] if abs(state.offset[i]) < OFFSET else math.nan
+        far = offset = scaled = 0.0  # test ratios
         if not state.honest:
-            compare(witness, place, gap, FAR + FAR_SHARE * model[i])
-            compare(witness, place, state.offset[i], OFFSET)
+            far = compare(witness, place, gap, FAR + FAR_SHARE * model[i])
+            offset = compare(witness, place, state.offset[i], OFFSET)
             if abs(state.ratio[i]) * model[i] > LEAST_SCALED:
-                compare(witness, place, state.ratio[i] * model[i], RATIO * model[i])
-        far = abs(gap) > FAR + FAR_SHARE * model[i]
-        scaled = abs(state.ratio[i]) > RATIO and abs(state.ratio[i]) * model[i] > LEAST_SCALED
-        doubted = far or abs(state.offset[i]) > OFFSET or scaled
-        if doubted and not state.honest:
+                scaled = compare(witness, place, state.ratio[i] * model[i], RATIO * model[i])
+        if max(far, offset, scaled) > 1.0:
             state.doubt_s[i] = min(state.doubt_s[i] + dt, 2.0 * DOUBT_S)
         else:
             state.doubt_s[i] = max(state.doubt_s[i] - dt, 0.0)
