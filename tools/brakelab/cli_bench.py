@@ -6,7 +6,6 @@ from typing import Annotated, Final
 import typer
 
 from ecu.completion import fitting
-from ecu.output import policy
 
 NAMES: Final = {
     "times": "step, codec, plant, cycle, lateness, replay, play",
@@ -54,6 +53,9 @@ def bench(
     export: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write the drives of entries there, run nothing")
     ] = None,
+    write: Annotated[
+        bool, typer.Option("--write", help="Renew the page in docs/results of this checkout")
+    ] = False,
 ) -> int:
     """Run one bench, see `HELP`."""
     from brakelab.bench import command
@@ -61,4 +63,4 @@ def bench(
 
     entered = Entered(tuple(observer or ()), drive, export)
     refuse(entered, name)
-    return command.bench(name, policy().json, seeds, seconds, draw, entered)
+    return command.bench(name, command.Asked(seeds, seconds, draw, entered), write)

@@ -70,7 +70,7 @@ def test_the_page_keeps_the_tables_of_other_buses(monkeypatch: pytest.MonkeyPatc
     for title, value in [("one bus", "1"), ("another", "2"), ("one bus", "3")]:
         table = Table(title, ("what", "us"), [("a", value)], "Below.")
         monkeypatch.setattr("brakelab.bench.play.play_tables", lambda seconds, table=table: [table])
-        assert command.bench("play", json=False) == 0
+        assert command.bench("play", write=True) == 0
     text = (tmp_path / "docs" / "results" / "play.md").read_text(encoding="utf-8")
     assert text.count("Below.") == text.count("## ") == 2
     assert (

@@ -15,6 +15,7 @@ from brakelab.bench.filters import FilterpyFilters, NumpyFilters, constants, fil
 from brakelab.bench.plant import cars, plant_rows
 from brakelab.bench.socket_pair import put
 from brakelab.bench.step import filter_table, step_rows
+from brakelab.entries.command import Entered
 from brakelab.studies import output
 from brakelab.studies.braking import MESSAGES_IN, simulated_stop
 from brakelab.studies.measure import Figure, Row
@@ -156,22 +157,40 @@ def test_json_holds_machine_figures_and_ratio(one_bench: Path, capsys: pytest.Ca
     assert not one_bench.exists()
 
 
-def test_only_a_run_of_all_renews_the_documentation(
+def test_the_documentation_is_renewed_where_that_is_asked(
     one_bench: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert command.bench("step", json=False) == 0
-    assert not one_bench.exists()
-    assert command.bench(None, json=False) == 0
+    for arguments in ([], ["step"], ["--json"]):
+        assert cli.main(["bench", *arguments]) == 0
+        assert not one_bench.exists()
+    assert cli.main(["bench", "--write"]) == 0
     assert "| a | 2 (1–4) | 6 (6–6) | 3 | µs | peer |" in one_bench.read_text(encoding="utf-8")
     assert "| b | 2 (1–4) | – | – | µs | none |" in one_bench.read_text(encoding="utf-8")
     assert "Below." in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("name", "asked", "remedy"),
+    [
+        ("step", command.Asked(), "no page of its own"),
+        ("stops", command.Asked(draw="nominal"), "leave out --draw"),
+        ("entries", command.Asked(entered=Entered(drive="mustang:a.log")), "leave out --observer, --drive"),
+        ("friction", command.Asked(), "run it in a checkout"),
+    ],
+)
+def test_what_has_no_page_is_refused_before_it_runs(
+    name: str, asked: command.Asked, remedy: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(command, "resource", lambda name: tmp_path / name)
+    with pytest.raises(UserError, match=remedy):
+        command.bench(name, asked, write=True)
 
 
 def test_unknown_bench_names_those_there_are() -> None:
     with pytest.raises(
         UserError, match="steps: no such bench; choose one of step, codec, plant, cycle, stops"
     ):
-        command.bench("steps", json=False)
+        command.bench("steps")
 
 
 def test_replay_tables() -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from brakelab.entries.command import NOBODY, Entered, bench_entries, refuse
+from brakelab.entries.command import NOBODY, Entered, measure_entries, refuse
 from brakelab.entries.ours import OURS
 from ecu.cli import main
 from ecu.errors import UserError
@@ -26,7 +26,7 @@ ROOT = Path(__file__).parents[3]
 )
 def test_a_mistake_is_told_before_anything_is_driven(entered: Entered, remedy: str) -> None:
     with pytest.raises(UserError, match=remedy):
-        bench_entries(False, 1, entered)
+        measure_entries(1, entered)
 
 
 def test_other_benches_have_no_entries() -> None:

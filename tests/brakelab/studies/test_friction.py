@@ -57,7 +57,7 @@ def test_every_column_of_table_3_4_is_complete() -> None:
 def test_the_bench_writes_its_page(monkeypatch: pytest.MonkeyPatch) -> None:
     written = []
     monkeypatch.setattr(output, "write_page", lambda name, *rest: written.append((name, len(rest[2]))))
-    assert command.bench("friction", json=False) == 0
+    assert command.bench("friction", write=True) == 0
     assert written == [("friction.md", len(friction_tables()))]
 
 

@@ -208,7 +208,7 @@ def test_page_and_picture(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> No
     monkeypatch.setattr(command, "ProcessPoolExecutor", lambda mp_context: ThreadPoolExecutor())
     monkeypatch.setattr(command, "consistency_of", lambda seed: car)
     monkeypatch.setattr(command, "step_times", lambda: {JOINT: Figure(2.0, 1.0, 3.0)})
-    assert command.bench("observers", json=False, seeds=1) == 0
+    assert command.bench("observers", command.Asked(seeds=1), write=True) == 0
     page = (tmp_path / "docs" / "results" / "observers.md").read_text(encoding="utf-8")
     assert "seeds 0–0" in page
     for table in observer_tables(found, {JOINT: Figure(2.0, 1.0, 3.0)}, [car], "wide"):

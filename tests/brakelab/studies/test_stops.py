@@ -82,7 +82,7 @@ def test_page_names_config_seeds_and_every_figure(
     monkeypatch.setattr(command, "resource", lambda name: tmp_path / name)
     monkeypatch.setattr(output, "resource", lambda name: tmp_path / name)
     monkeypatch.setattr(command.stops_bench, "stops", lambda config, seeds, spread, draw: result)
-    assert command.bench("stops", json=False, seeds=20) == 0
+    assert command.bench("stops", write=True) == 0
     page = (tmp_path / "docs" / "results" / "observer-accuracy.md").read_text(encoding="utf-8")
     assert "config/suv.toml" in page
     assert "seeds 0–19" in page

@@ -5,10 +5,8 @@ from typing import Final, NamedTuple
 
 from brakelab.bench import codec, cycle, plant, step
 from brakelab.studies.measure import Row, machine
-from brakelab.studies.output import plain_row, print_tables, write_page
+from brakelab.studies.output import Measured, plain_row
 from brakelab.studies.table import time_table
-from ecu import __version__
-from ecu.output import give
 
 
 class Bench(NamedTuple):
@@ -49,16 +47,11 @@ BENCHES: Final = {
 }
 
 
-def run_times(name: str | None, json: bool) -> int:
-    """Run one of `BENCHES`, or all; print tables, or JSON; of all renew the page. Returns 0."""
+def run_times(name: str | None) -> Measured:
+    """Run one of `BENCHES`, or all."""
     line = machine()
     chosen = {key: value for key, value in BENCHES.items() if name in (None, key)}
     rows = {key: value.rows() for key, value in chosen.items()}
-    if json:
-        give(machine=line, **{key: [plain_row(row) for row in value] for key, value in rows.items()})
-        return 0
+    plain = {"machine": line} | {key: [plain_row(row) for row in value] for key, value in rows.items()}
     tables = [time_table(chosen[key].title, rows[key], chosen[key].below) for key in rows]
-    print_tables(line, tables)
-    if name is None:
-        write_page("benchmarks.md", "Times", f"`brake-ecu bench`, version {__version__}. {line}.", tables)
-    return 0
+    return Measured(tables, f". {line}", plain)

@@ -14,8 +14,7 @@ from brakelab.results.progress import tracked
 from brakelab.studies.cars import each_car
 from brakelab.studies.measure import machine
 from brakelab.studies.observers_table import finite
-from brakelab.studies.output import print_tables, write_page
-from ecu import __version__
+from brakelab.studies.output import Measured
 from ecu.errors import UserError
 from ecu.output import give, say
 from ecu.settings.resources import resource
@@ -55,19 +54,15 @@ def refuse(entered: Entered, name: str | None) -> None:
         raise UserError("bench", name or "", f"has no --observer, --drive, --export; `bench {ENTRIES}` has")
 
 
-def bench_entries(json: bool, seeds: int, entered: Entered) -> int:
-    """Play the drives of cars 0 to `seeds` - 1 (at most `CARS`) to ours and the entered observers; returns 0.
-
-    Without observers, drive or export the page docs/results/entries.md is renewed.
+def measure_entries(seeds: int, entered: Entered) -> Measured:
+    """Play the drives of cars 0 to `seeds` - 1 (at most `CARS`) to ours and the entered observers.
 
     Raises:
-        UserError: an observer cannot be loaded, a log not read, or the folder not written.
+        UserError: an observer cannot be loaded, or a log not read.
     """
     cars = min(seeds, CARS)
     for name in entered.observers:
         class_of(name)
-    if entered.export is not None:
-        return _export(entered.export, cars)
     names = tuple(dict.fromkeys((*OURS, *entered.observers)))
     car, log = _drive(entered.drive)
     real = None if log is None else real_drive(car, log)
@@ -75,16 +70,9 @@ def bench_entries(json: bool, seeds: int, entered: Entered) -> int:
     results = each_car(ENTRIES, partial(judge_car, names), cars)
     predictions = {} if real is None else predict_all(names, real)
     found = standings(results, predictions)
-    of = f"`brake-ecu bench {ENTRIES}`, version {__version__}, wide draw, seeds 0–{cars - 1}. {machine()}"
-    if json:
-        rows = [{"rank_error": one.rank_error, **_plain(one)} for one in found]
-        give(**finite({"of": of, "entries": rows}))
-        return 0
+    rows = [{"rank_error": one.rank_error, **_plain(one)} for one in found]
     tables = entry_tables(found, cars, "" if log is None else f"{car}, {log.name}")
-    print_tables(of, tables)
-    if entered == NOBODY:
-        write_page("entries.md", "Friction observers, side by side", f"{of}. {TEXT}", tables)
-    return 0
+    return Measured(tables, f", wide draw, seeds 0–{cars - 1}. {machine()}", finite({"entries": rows}))
 
 
 def _plain(one: NamedTuple) -> dict[str, object]:
@@ -103,7 +91,13 @@ def _drive(named: str | None) -> tuple[str, Path | None]:
     return car, Path(log)
 
 
-def _export(folder: Path, cars: int) -> int:
+def export_entries(folder: Path, seeds: int) -> int:
+    """Write the drives of cars 0 to `seeds` - 1 (at most `CARS`) into a new folder; returns 0.
+
+    Raises:
+        UserError: the folder cannot be written.
+    """
+    cars = min(seeds, CARS)
     new_folder(folder)
     say(f"cars to drive: {cars}; minutes")
     for seed in tracked(range(cars), ENTRIES, cars):

@@ -2,15 +2,14 @@
 
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from brakelab.identification.dust_command import LEGEND, dust_panels
+from brakelab.identification.dust_command import dust_panels
 from brakelab.identification.dust_tables import THESIS, spearman_table, trip_table
 from brakelab.results import euro7
-from brakelab.results.chart import write_chart
+from brakelab.results.chart import Panel
 from brakelab.results.text_table import Table
 from brakelab.studies.dust_study import Draw, OnBoard, draw_trips, drive_on_board, pictured
 
@@ -134,13 +133,11 @@ def dust_tables(draws: list[Draw], quiet: list[Draw], cars: list[OnBoard]) -> li
     ]  # fmt: skip
 
 
-def dust_page(each: Callable[..., list[Any]], draws: int, picture: Path | None) -> list[Table]:
-    """Return the tables of the page and draw its figures; `each(function, count)` calls a function for 0 to
-    count - 1."""
+def dust_page(each: Callable[..., list[Any]], draws: int) -> tuple[list[Table], list[Panel]]:
+    """Return tables and panels of the page; `each(function, count)` calls a function for 0 to count - 1."""
     many = each(draw_trips, draws)
     quiet = each(partial(draw_trips, quiet=True), min(draws, QUIET_DRAWS))
     cars = each(drive_on_board, min(draws, CARS))
     trips, judged, chosen = pictured()
-    if picture is not None:
-        write_chart(picture, dust_panels(trips, judged, chosen), LEGEND)
-    return [*dust_tables(many, quiet, cars), trip_table(trips), spearman_table(trips)]
+    tables = [*dust_tables(many, quiet, cars), trip_table(trips), spearman_table(trips)]
+    return tables, dust_panels(trips, judged, chosen)

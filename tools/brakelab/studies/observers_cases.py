@@ -15,7 +15,6 @@ from brakelab.simulation.scenario import Phase, RoadByPlace, Scenario, SteeringF
 from ecu.settings.config import Config, load_config
 from ecu.settings.resources import resource
 
-KMH_100: Final = 27.778  # m/s
 EVERY_SENSOR: Final = (
     *("accel_x", "accel_y", "yaw_rate", "vehicle_speed"),
     *("wheel_speed", "calliper_pressure", "motor_torque", "steering_angle"),

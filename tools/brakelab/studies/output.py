@@ -1,6 +1,8 @@
 """Output of a bench: tables on the terminal, JSON, and pages of the documentation."""
 
-from typing import Any, Final
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Final, NamedTuple
 
 from rich.console import Console
 
@@ -8,7 +10,7 @@ from brakelab.results.text_table import Table, markdown, show
 from brakelab.studies.measure import Figure, Row
 from brakelab.studies.provenance import measured_on
 from ecu import __version__
-from ecu.output import give, say
+from ecu.output import give, policy, say
 from ecu.settings.resources import resource
 
 RESULTS: Final = "docs/results"
@@ -33,32 +35,49 @@ def print_tables(line: str, tables: list[Table]) -> None:
 
 def write_page(name: str, title: str, text: str, tables: list[Table], keep: bool = False) -> None:
     """Renew a page; with `keep` sections with other titles stay: of other buses, measured elsewhere."""
-    folder = resource(RESULTS)
-    if folder.is_dir():
-        sections = {table.title: markdown(table) for table in tables}
-        if keep and (folder / name).exists():
-            _, *before = (folder / name).read_text(encoding="utf-8").split("\n## ")
-            kept = {section.partition("\n")[0]: f"## {section.rstrip()}\n" for section in before}
-            sections = kept | sections
-        content = "\n".join([f"# {title}", "", measured_on(), "", text, "", *sections.values()])
-        (folder / name).write_text(content.rstrip() + "\n", encoding="utf-8")
-        say(f"written: {RESULTS}/{name}")
+    path = resource(RESULTS) / name
+    sections = {table.title: markdown(table) for table in tables}
+    if keep and path.exists():
+        _, *before = path.read_text(encoding="utf-8").split("\n## ")
+        kept = {section.partition("\n")[0]: f"## {section.rstrip()}\n" for section in before}
+        sections = kept | sections
+    content = "\n".join([f"# {title}", "", measured_on(), "", text, "", *sections.values()])
+    path.write_text(content.rstrip() + "\n", encoding="utf-8")
+    say(f"written: {RESULTS}/{name}")
 
 
-def results_page(
-    name: str,
-    title: str,
-    text: str,
-    tables: list[Table],
-    json: bool,
-    file: str | None = None,
-    keep: bool = False,
-) -> int:
-    """Print the tables of bench `name`, or give JSON; renew its page, `file` or its name. Returns 0."""
-    of = f"`brake-ecu bench {name}`, version {__version__}"
-    if json:
-        give(of=of, tables=tables)
-        return 0
-    print_tables(of, tables)
-    write_page(f"{file or name}.md", title, f"{of}. {text}", tables, keep)
-    return 0
+class Measured(NamedTuple):
+    """What a bench measured."""
+
+    tables: list[Table]
+    of: str = ""
+    """What it was measured on, after the version: configuration, draw, machine."""
+    plain: Mapping[str, Any] | None = None
+    """For JSON; None: the tables."""
+    draw: Callable[[Path], None] | None = None
+    """Writes the pictures of the page into a folder."""
+
+
+class Page(NamedTuple):
+    """Page of a bench."""
+
+    title: str
+    text: str = ""
+    file: str = ""
+    """Its name; "": the bench's."""
+    keep: bool = False
+    """See `write_page`."""
+
+
+def show_measured(command: str, page: Page, measured: Measured, write: bool) -> None:
+    """Print tables, or give JSON; with `write` renew the page and its pictures. `command`: bench NAME."""
+    of = f"`brake-ecu {command}`, version {__version__}{measured.of}"
+    if policy().json:
+        give(of=of, **({"tables": measured.tables} if measured.plain is None else measured.plain))
+    else:
+        print_tables(of, measured.tables)
+    if write:
+        file = page.file or command.rpartition(" ")[2]
+        write_page(f"{file}.md", page.title, f"{of}. {page.text}".rstrip(), measured.tables, page.keep)
+        if measured.draw is not None:
+            measured.draw(resource(PICTURES))
