@@ -15,9 +15,12 @@ from brakelab.report.prediction import (
     prediction_errors,
     prediction_rows,
 )
+from brakelab.results.prediction import LEAST_ROWS, PRESSED, SHORT, WEAK
+from ecu.algorithm.estimation.friction import DRIVEN
 
 from .conftest import braking_between
 
+ROOT = Path(__file__).parents[3]
 NAN = float("nan")
 BEFORE, BEFORE_SIGMA = np.array([0.38, 0.40, 0.45, 0.45]), np.array([0.01, 0.02, 0.05, 0.05])
 
@@ -110,3 +113,12 @@ def test_a_table_of_brakings_of_the_contract_alone_tells_of_no_prediction(
     assert [row.friction.tolist() for row in found] == [[0.38, 0.38, 0.49, 0.5]] * 3
     assert prediction_rows(found) == []
     assert plots_of_prediction(found) == {}
+
+
+def test_the_documentation_says_which_predictions_count() -> None:
+    text = (ROOT / "docs/report.md").read_text("utf-8")
+    section = " ".join(text.partition("## Prediction\n")[2].partition("\n## ")[0].split())
+    assert DRIVEN == 1 / 5
+    assert "more than a fifth of the brakes' force" in section
+    limits = (f"{LEAST_ROWS} rows", f"({PRESSED:g} %)", f"below {WEAK:g} m/s²", f"shorter than {SHORT:g} s")
+    assert [limit for limit in limits if limit not in section] == []
