@@ -20,10 +20,15 @@ def rig_of(linings: Linings, brake: str, law: str, delta_1: float = 1.0) -> Reco
     return rig
 
 
+def _span(values: list[float]) -> str:
+    return f"{min(values):.0f} to {max(values):.0f}"
+
+
 def heat_tables(linings: Linings) -> list[Table]:
     """Return the tables of cooling, of heating in a stop and of the Biot number."""
     speeds = (0.0, 30.0, 60.0, 100.0, 130.0)
     cooling, heating, biot = [], [], []
+    at_100, less = dict[str, list[float]](), dict[float, list[float]]()
     for brake in BRAKES:
         disc = linings.lining[brake].disc
         for name, factor, wetness in (
@@ -33,17 +38,20 @@ def heat_tables(linings: Linings) -> list[Table]:
         ):
             rig = rig_of(linings, brake, "R1", factor)
             rig["wetness"] = wetness
-            seconds = (f"{cool(rig, speed * KMH, 400.0, 100.0):.0f}" for speed in speeds)
-            cooling.append((brake, name, *seconds))
+            seconds = [cool(rig, speed * KMH, 400.0, 100.0) for speed in speeds]
+            at_100.setdefault(name, []).append(seconds[speeds.index(100.0)])
+            cooling.append((brake, name, *(f"{value:.0f}" for value in seconds)))
         for start in (50.0, 100.0, 130.0):
-            rises = []
+            rises = list[float]()
             for factor in (0.0, PRINTED, 1.0):
                 rig = rig_of(linings, brake, "SIM", factor)
                 trace = run_stop(rig, new_stop(PRESSURE, start * KMH, 5.0 * KMH, 220.0, pressure=30e5))
-                rises.append(f"{trace['temperature'][-1] - 220.0:.1f}")
+                rises.append(float(trace["temperature"][-1]) - 220.0)
+                less.setdefault(factor, []).append(1.0 - rises[-1] / rises[0])
             rig = rig_of(linings, brake, "SIM")
             adiabatic = 0.5 * float(rig[0]["mass"]) * (start * KMH) ** 2 * disc.heating
-            heating.append((f"{brake} {start:.0f} km/h", f"{trace['t'][-1]:.1f}", f"{adiabatic:.1f}", *rises))
+            figures = (f"{value:.1f}" for value in (trace["t"][-1], adiabatic, *rises))
+            heating.append((f"{brake} {start:.0f} km/h", *figures))
         cells = []
         for speed in (0.0, 30.0):
             for factor in (PRINTED, 1.0):
@@ -57,9 +65,9 @@ def heat_tables(linings: Linings) -> list[Table]:
             cooling,
             "Figure 3.7 has no table. It shows cooling from 400 °C at a low and a high cruising speed, "
             "beside the conventional model (delta_1 = 0: the time at 0 km/h, whatever the speed); with both "
-            "sets the models part the more the faster the car. As printed, delta_1 cools a disc within a "
-            "minute at 100 km/h, which no car's disc does. With a tenth it takes five to seven minutes. "
-            "The plant uses the tenth. Wet: rain multiplies delta_1 by "
+            "sets the models part the more the faster the car. At 100 km/h a disc needs "
+            f"{_span(at_100['printed'])} s with delta_1 as printed, {_span(at_100['a tenth'])} s with a "
+            "tenth of it, which the plant uses. Wet: rain multiplies delta_1 by "
             f"{WET:.0f}, an assumption; Figure 7.15 shows only that rain adds cooling at high speed.",
         ),
         Table(
@@ -74,9 +82,9 @@ def heat_tables(linings: Linings) -> list[Table]:
             ),
             heating,
             "SIM friction. Figure 3.8 compares the conventional with the corrected model and says that the "
-            "correction matters for stops from high speed. It does so here with delta_1 as printed (a third "
-            "to two thirds of the rise); with a tenth the two differ by 3 to 8 %, which an error of the heat "
-            "share would hide: cooling alone tells the sets apart.",
+            "correction matters for stops from high speed. Here delta_1 as printed takes "
+            f"{_span([100.0 * share for share in less[PRINTED]])} % off the rise, a tenth of it "
+            f"{_span([100.0 * share for share in less[1.0]])} %.",
         ),
         Table(
             "Disc: Biot number",

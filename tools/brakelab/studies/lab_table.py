@@ -105,10 +105,8 @@ def _components(lab: Lab) -> Table:
     columns = ("variable", "PC1, thesis [%]", "PC1 [%]", "share, thesis [%]", "share [%]", "any form [%]")
     below = (
         "Table 3.2 prints loadings of the first component and reads them as shares of variance. The shares "
-        "are r², for the thesis from its own loadings (R = 4 V - 3, r = PC1 R √2): temperature explains "
-        "36, 25 and 25 % of the variance of mean friction, not 60. On our pads it explains more: their "
-        "chance is smaller than that of the measured brakes. Any form: the means at each level, which a "
-        "curve can follow."
+        "are r², for the thesis from its own loadings (R = 4 V - 3, r = PC1 R √2). Any form: the means at "
+        "each level, which a curve can follow."
     )
     return Table("Table 3.2: what moves mean friction in CPC", columns, rows, below)
 

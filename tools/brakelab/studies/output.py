@@ -16,6 +16,9 @@ from ecu.settings.resources import resource
 RESULTS: Final = "docs/results"
 """Folder of the pages that benches write."""
 PICTURES: Final = f"{RESULTS}/images"
+CAUSES: Final = "Causes"
+"""Title of the section of a page that a person writes."""
+MOVED: Final = "**The figures changed since this was written: read it again, then take this line away.**"
 
 
 def plain_row(row: Any) -> dict[str, Any]:
@@ -34,13 +37,22 @@ def print_tables(line: str, tables: list[Table]) -> None:
 
 
 def write_page(name: str, title: str, text: str, tables: list[Table], keep: bool = False) -> None:
-    """Renew a page; with `keep` sections with other titles stay: of other buses, measured elsewhere."""
+    """Renew a page; with `keep` sections with other titles stay: of other buses, measured elsewhere.
+
+    The section `CAUSES` stays always, marked where figures are no longer those that it was written for.
+    """
     path = resource(RESULTS) / name
     sections = {table.title: markdown(table) for table in tables}
-    if keep and path.exists():
-        _, *before = path.read_text(encoding="utf-8").split("\n## ")
-        kept = {section.partition("\n")[0]: f"## {section.rstrip()}\n" for section in before}
-        sections = kept | sections
+    if path.exists():
+        _, *found = path.read_text(encoding="utf-8").split("\n## ")
+        before = {section.partition("\n")[0]: f"## {section.rstrip()}\n" for section in found}
+        same = all(before.get(head, "").rstrip() == one.rstrip() for head, one in sections.items())
+        if keep:
+            sections = before | sections
+        elif CAUSES in before:
+            sections[CAUSES] = before[CAUSES]
+            if not same and MOVED not in before[CAUSES]:
+                sections[CAUSES] = before[CAUSES].replace("\n", f"\n\n{MOVED}\n", 1)
     content = "\n".join([f"# {title}", "", measured_on(), "", text, "", *sections.values()])
     path.write_text(content.rstrip() + "\n", encoding="utf-8")
     say(f"written: {RESULTS}/{name}")

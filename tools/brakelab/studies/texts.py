@@ -41,8 +41,7 @@ BOUND_TEXT: Final = (
     "a rate of each axle, random, but as fast and for as long as in that very stop. *Course known*: as "
     "ten minutes, but how friction changes is known, as if a law of friction told it. Assumed: friction "
     "at the beginning of an application is known from the one before to 5 % in common and 3 % an axle; "
-    "pressure follows the demand to 5 % of its change; motor torque is exact, as it is in these cars. "
-    "With 20 % or 15 % instead, stop #1 of the first car changes by 0.04 (ten minutes)."
+    "pressure follows the demand to 5 % of its change; motor torque is exact, as it is in these cars."
 )
 
 FRICTION_TEXT: Final = (
