@@ -22,7 +22,7 @@ for name in ("BRAKE_ECU_DEBUG", "NOTIFY_SOCKET", "COLUMNS", "FORCE_COLOR", "GITH
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
-LONG = re.compile(r"tests/(system/|test_|brakelab/(identification|fleet|report)/)")
+LONG = re.compile(r"tests/(system/|test_|brakelab/(identify|fleet|report)/)")
 """Files whose tests run processes, trainings or browsers."""
 
 CHECKOUT = Path(__file__).parent.parent

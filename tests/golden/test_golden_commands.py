@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brakelab.identification.dust_trips import campaign, write_campaign
-from brakelab.identification.wear_programme import drawn_car, programme, write_programme
 from brakelab.results.files import brakes_path, read_result
+from brakelab.simulation.campaigns.dust_trips import campaign, write_campaign
+from brakelab.simulation.campaigns.wear_blocks import drawn_car, programme, write_programme
 from brakelab.simulation.closed_loop import Drive, new_loop, run
 from brakelab.simulation.scenario import load_scenario
 from brakelab.simulation.simulate import write_columns

@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from brakelab.identification.car_file import Section, write_car
+from brakelab.identify.config_file import Section, write_car
 from brakelab.play.play_log import decoded
 from brakelab.replay.command import replay_into
 from brakelab.replay.needed import NEEDED, nothing_usable

@@ -327,7 +327,7 @@ def tune(
     ] = Path("tuned.toml"),
 ) -> int:
     """Tune Observer 2 on simulated drives by a genetic algorithm. Ctrl-C writes the best so far."""
-    from brakelab.tuning import command
+    from brakelab.identify.tuning import command
 
     trained = scenario or [scenario_file(name) for name in command.FIRST_SESSION]
     validated = validate or [scenario_file(name) for name in command.LATER_SESSIONS]

@@ -45,7 +45,7 @@ def friction(
     ] = None,
 ) -> int:
     """Identify a friction law from dynamometer recordings. Fit all laws, choose one, state its limits."""
-    from brakelab.friction_lab import command
+    from brakelab.identify.friction import command
     from ecu.compiling import compiling_told
 
     with compiling_told():
@@ -67,9 +67,9 @@ def wear(
     ] = "front",
 ) -> int:
     """Identify the wear law of brake linings from dynamometer blocks. Write a CONFIG."""
-    from brakelab.identification import wear_command
+    from brakelab.identify.wear import command
 
-    return wear_command.identify_wear(manifest, config, axle, out)
+    return command.identify_wear(manifest, config, axle, out)
 
 
 @app.command()
@@ -84,9 +84,9 @@ def dust(
     ] = "front",
 ) -> int:
     """Identify particle emission from trips with a counter. Write a CONFIG."""
-    from brakelab.identification import dust_command
+    from brakelab.identify.dust import command
 
-    return dust_command.identify_dust(manifest, config, axle, out)
+    return command.identify_dust(manifest, config, axle, out)
 
 
 @app.command()
@@ -102,9 +102,9 @@ def thermal(
     map: Map = None,
 ) -> int:
     """Identify the disc temperature model, dry and wet. Write a CONFIG."""
-    from brakelab.identification import thermal_command
+    from brakelab.identify.thermal import command
 
-    return thermal_command.identify_thermal(logs, config, map, out)
+    return command.identify_thermal(logs, config, map, out)
 
 
 @app.command()
@@ -122,6 +122,6 @@ def vehicle(
     ] = False,
 ) -> int:
     """Identify radii, mass, drag, tyres and brakes of a car. Write a CONFIG."""
-    from brakelab.identification import vehicle_command
+    from brakelab.identify.vehicle import command
 
-    return vehicle_command.identify_vehicle(drives, config, map, closed, out)
+    return command.identify_vehicle(drives, config, map, closed, out)

@@ -69,7 +69,7 @@ def run(
     ] = None,
 ) -> int:
     """Run a programme on the dynamometer. Record at 200 Hz; the pad follows none of the friction laws."""
-    from brakelab.friction_lab import command
+    from brakelab.identify.friction import command
     from ecu.compiling import compiling_told
 
     with compiling_told():
@@ -87,6 +87,6 @@ def look(
     ] = None,
 ) -> int:
     """Analyse a recording. Show principal components, shares of variance, effect of the previous stop."""
-    from brakelab.friction_lab import command
+    from brakelab.identify.friction import command
 
     return command.look(data, columns)

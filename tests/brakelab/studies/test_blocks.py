@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from brakelab.identification.wear_programme import drawn_car
 from brakelab.plant.wear_rig import AIR, TORQUE, T, wear_block
+from brakelab.simulation.campaigns.wear_blocks import drawn_car
 from brakelab.studies.blocks import DRIVERS, blocks_page, pair_of, repeated
 from brakelab.studies.blocks_rig import CHECK_OFF, corner_of, energy_error, run_stops
 

@@ -5,7 +5,7 @@ import pytest
 
 pytest.importorskip("sklearn", reason="needs scikit-learn (extra learn)")
 
-from brakelab.identification.dust_models import FITS
+from brakelab.identify.dust.model import FITS
 from brakelab.studies.dust import dust_tables, model_rows
 from brakelab.studies.dust_study import (
     Draw,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from brakelab.identification.vehicle_parameters import Parameter
+from brakelab.identify.vehicle.parameters import Parameter
 from brakelab.studies.identified import (
     KEYS,
     OFF,

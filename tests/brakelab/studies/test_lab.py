@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from brakelab.friction_lab.columns import Columns
-from brakelab.friction_lab.dynamometer import new_bench, run_programme
-from brakelab.friction_lab.identification import Judged
-from brakelab.friction_lab.stops import Stops, find_stops
+from brakelab.identify.friction.choice import Judged
+from brakelab.identify.friction.columns import Columns
+from brakelab.identify.friction.dynamometer import new_bench, run_programme
+from brakelab.identify.friction.stops import Stops, find_stops
 from brakelab.plant.dynamometer_programme import load_programme
 from brakelab.plant.friction.constant import Constant
 from brakelab.studies.friction import LOADINGS, TABLE_3_4, TEMPERATURES

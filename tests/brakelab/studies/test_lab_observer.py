@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from brakelab.friction_lab.trips import GENTLE, HIGH, LOW, MILD
+from brakelab.identify.friction.trips import GENTLE, HIGH, LOW, MILD
 from brakelab.plant.description import load_plant
 from brakelab.plant.draw import draw, load_widths
 from brakelab.studies.lab_observer import AS_DRAWN, BRAKINGS, CAUSES, KINDS, plant_files, trip_of_kinds

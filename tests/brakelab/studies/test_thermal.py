@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brakelab.identification.thermal_fit import Fit
-from brakelab.identification.thermal_model import Cooling
-from brakelab.identification.thermal_page import Judged
-from brakelab.identification.thermal_result import Errors
+from brakelab.identify.thermal.fit import Fit
+from brakelab.identify.thermal.model import Cooling
+from brakelab.identify.thermal.page import Judged
+from brakelab.identify.thermal.result import Errors
 from brakelab.results.chart import chart_svg
 from brakelab.results.text_table import markdown
 from brakelab.studies.thermal import LEGEND, thermal_panels, thermal_tables

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from brakelab.identification.wear_fit import fit_law
+from brakelab.identify.wear.fit import fit_law
 from brakelab.studies.wear import determination, inside, wear_tables
 from brakelab.studies.wear_drives import CarDrives, Part, trip_scenario
 from brakelab.studies.wear_study import LAWS, LIFE_KM, MODES, Law, Life, live

@@ -5,9 +5,11 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.identification.wear_curves import TABLE_7_1, sensitivity
-from brakelab.identification.wear_pictures import sensitivity_panels, surface_panel
-from brakelab.identification.wear_programme import (
+from brakelab.identify.wear.curves import TABLE_7_1, sensitivity
+from brakelab.identify.wear.page import sensitivity_panels, surface_panel
+from brakelab.results.chart import BLUE, GREY, ORANGE, PINK, Cells, Line, Panel
+from brakelab.results.text_table import Table
+from brakelab.simulation.campaigns.wear_blocks import (
     DRIVERS,
     LABORATORY,
     ROADS,
@@ -16,8 +18,6 @@ from brakelab.identification.wear_programme import (
     programme,
     road_stops,
 )
-from brakelab.results.chart import BLUE, GREY, ORANGE, PINK, Cells, Line, Panel
-from brakelab.results.text_table import Table
 from brakelab.studies.blocks_rig import Corner, Done, corner_of, energy_error, run_stops
 from brakelab.studies.wear_bad_input import bad_input_table
 from brakelab.studies.wear_study import CLIMATE, measured_block

@@ -9,14 +9,14 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from brakelab.identification.dust_features import extract
-from brakelab.identification.dust_fit import judge
-from brakelab.identification.dust_trips import TRIPS, campaign
+from brakelab.identify.dust.features import extract
+from brakelab.identify.dust.fit import judge
 from brakelab.plant.description import load_plant
 from brakelab.plant.draw import draw, load_widths
 from brakelab.plant.emission import RUN_IN
 from brakelab.plant.records import RecordArray
 from brakelab.plant.wear import RUN_IN as WEAR_RUN_IN
+from brakelab.simulation.campaigns.dust_trips import TRIPS, campaign
 from brakelab.studies.dust_study import as_recorded, section
 from ecu.settings.config import Config, load_config, new_params
 from ecu.settings.dust import Dust

@@ -6,11 +6,11 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.identification.dust_features import Applications, Recorded, extract
-from brakelab.identification.dust_fit import Judged, choose, judge_all, ranges
-from brakelab.identification.dust_trips import COLUMNS, CORNER, Trip, campaign, drawn_brake
+from brakelab.identify.dust.features import Applications, Recorded, extract
+from brakelab.identify.dust.fit import Judged, choose, judge_all, ranges
 from brakelab.plant.emission import RUN_IN
 from brakelab.plant.wear import RUN_IN as WEAR_RUN_IN
+from brakelab.simulation.campaigns.dust_trips import COLUMNS, CORNER, Trip, campaign, drawn_brake
 from brakelab.simulation.closed_loop import new_loop, run_blocks
 from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS
 from brakelab.stretches import stretches

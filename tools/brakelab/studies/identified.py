@@ -14,10 +14,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.identification.vehicle_drive import read_drives
-from brakelab.identification.vehicle_identify import identify
-from brakelab.identification.vehicle_model import Place
-from brakelab.identification.vehicle_parameters import Parameter, parameters_of, values_of
+from brakelab.identify.vehicle.model import Place
+from brakelab.identify.vehicle.parameters import Parameter, parameters_of, values_of
+from brakelab.identify.vehicle.reader import read_drives
+from brakelab.identify.vehicle.solve import identify
 from brakelab.plant.records import GRAVITY
 from brakelab.plant.tyre import rolling_radius, stiffnesses
 from brakelab.replay.drive import replay_drive

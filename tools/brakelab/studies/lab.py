@@ -8,21 +8,21 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.friction_lab.analysis import (
+from brakelab.identify.friction.analysis import (
     Components,
     History,
     history_effect,
     inputs_of,
     principal_components,
 )
-from brakelab.friction_lab.candidates import ilvo
-from brakelab.friction_lab.columns import Columns
-from brakelab.friction_lab.dynamometer import Bench, new_bench, run_programme
-from brakelab.friction_lab.fitting import fit, replayed
-from brakelab.friction_lab.heat_capacity import HeatCapacity, heat_capacity
-from brakelab.friction_lab.identification import Identified, Judged, identify
-from brakelab.friction_lab.recording import THRESHOLD, Recording, joined
-from brakelab.friction_lab.stops import Stops, find_stops
+from brakelab.identify.friction.candidates import ilvo
+from brakelab.identify.friction.choice import Identified, Judged, identify
+from brakelab.identify.friction.columns import Columns
+from brakelab.identify.friction.dynamometer import Bench, new_bench, run_programme
+from brakelab.identify.friction.fit import fit, replayed
+from brakelab.identify.friction.heat_capacity import HeatCapacity, heat_capacity
+from brakelab.identify.friction.recording import THRESHOLD, Recording, joined
+from brakelab.identify.friction.stops import Stops, find_stops
 from brakelab.plant.description import read_file
 from brakelab.plant.dynamometer import DECELERATION, PRESSURE, REPLAY, mean_friction, new_stop, run_stop
 from brakelab.plant.dynamometer_programme import load_programme

@@ -5,10 +5,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final, NamedTuple
 
-from brakelab.friction_lab.dynamometer import new_bench, run_programme
-from brakelab.friction_lab.plausibility import refuse_nonsense
-from brakelab.friction_lab.reader import read_recording
-from brakelab.friction_lab.recording import write_recording
+from brakelab.identify.friction.check import refuse_nonsense
+from brakelab.identify.friction.dynamometer import new_bench, run_programme
+from brakelab.identify.friction.reader import read_recording
+from brakelab.identify.friction.recording import write_recording
 from brakelab.plant.dynamometer_programme import load_programme
 from brakelab.results.text_table import Table
 from brakelab.studies.lab import SEED, columns_of, linings

@@ -5,9 +5,9 @@ from collections.abc import Iterable
 from itertools import product
 from typing import Final, NamedTuple
 
-from brakelab.friction_lab.discovery import ILVO, NAMES, Support, greedy, library, sparse
-from brakelab.friction_lab.dynamometer import new_bench, run_programme
-from brakelab.friction_lab.stops import find_stops
+from brakelab.identify.friction.discovery import ILVO, NAMES, Support, greedy, library, sparse
+from brakelab.identify.friction.dynamometer import new_bench, run_programme
+from brakelab.identify.friction.stops import find_stops
 from brakelab.plant.dynamometer_programme import load_programme
 from brakelab.results.text_table import Table
 from brakelab.studies.heat import BRAKES

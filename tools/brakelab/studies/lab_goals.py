@@ -4,8 +4,8 @@ from typing import Final
 
 import numpy as np
 
-from brakelab.friction_lab.discovery import ILVO
-from brakelab.friction_lab.estimators import NETWORK, OSTERMEYER, SURFACE
+from brakelab.identify.friction.discovery import ILVO
+from brakelab.identify.friction.estimators import NETWORK, OSTERMEYER, SURFACE
 from brakelab.results.text_table import Table
 from brakelab.studies.heat import BRAKES
 from brakelab.studies.lab import SEED, recovery, table_errors

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from brakelab.friction_lab.identification import Judged
+from brakelab.identify.friction.choice import Judged
 from brakelab.plant.disc import DISC_SHARE
 from brakelab.results.text_table import Table
 from brakelab.studies.heat import BRAKES

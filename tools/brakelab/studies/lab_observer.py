@@ -1,6 +1,6 @@
 """The joint observer in the four manoeuvres of Table 2.1: in a car, without a dynamometer.
 
-A trip of brakings of the kinds of `friction_lab.trips` in closed loop, cars of the wide draw. The observer
+A trip of brakings of the kinds of `friction/trips.py` in closed loop, cars of the wide draw. The observer
 has the car's configuration and the learned values of ten minutes of ordinary driving; the front linings are
 of brake A under one of three laws, at a level other than the configured one. Counted as in `bench observers`:
 from 0.8 s after the brakes of both axles are applied, above 15 km/h.
@@ -17,7 +17,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.friction_lab.trips import GENTLE, HIGH, LOW, MILD
+from brakelab.identify.friction.trips import GENTLE, HIGH, LOW, MILD
 from brakelab.simulation.closed_loop import Drive
 from brakelab.simulation.scenario import Phase, Scenario
 from brakelab.simulation.scenario_car import with_draw

@@ -7,10 +7,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.friction_lab.analysis import Components, levels
-from brakelab.friction_lab.cost import Cost
-from brakelab.friction_lab.estimators import NETWORK, OSTERMEYER, SURFACE
-from brakelab.friction_lab.heat_capacity import AT, HeatCapacity
+from brakelab.identify.friction.analysis import Components, levels
+from brakelab.identify.friction.cost import Cost
+from brakelab.identify.friction.estimators import NETWORK, OSTERMEYER, SURFACE
+from brakelab.identify.friction.heat_capacity import AT, HeatCapacity
 from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Cells, Line, Panel, write_chart
 from brakelab.studies.heat import BRAKES
 from brakelab.studies.lab import Brake

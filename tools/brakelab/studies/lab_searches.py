@@ -2,11 +2,11 @@
 
 from typing import Final, NamedTuple
 
-from brakelab.friction_lab.candidates import candidates
-from brakelab.friction_lab.cost import Cost, cost_over
-from brakelab.friction_lab.dynamometer import new_bench
-from brakelab.friction_lab.fitting import fit
-from brakelab.friction_lab.profile import Profile, profile_over
+from brakelab.identify.friction.candidates import candidates
+from brakelab.identify.friction.cost import Cost, cost_over
+from brakelab.identify.friction.dynamometer import new_bench
+from brakelab.identify.friction.fit import fit
+from brakelab.identify.friction.profile import Profile, profile_over
 from brakelab.results.text_table import Table
 from brakelab.studies.lab import SEED, columns_of, linings, run
 

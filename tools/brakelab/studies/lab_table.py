@@ -4,8 +4,8 @@ from typing import Final
 
 import numpy as np
 
-from brakelab.friction_lab.dynamometer import Noise
-from brakelab.friction_lab.patches import CAPACITY_RISE
+from brakelab.identify.friction.dynamometer import Noise
+from brakelab.identify.friction.patches import CAPACITY_RISE
 from brakelab.plant.disc import DISC_SHARE
 from brakelab.results.text_table import Table
 from brakelab.studies.friction import LOADINGS, TABLE_3_4, TEMPERATURES

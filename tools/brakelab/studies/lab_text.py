@@ -5,7 +5,7 @@ from typing import Final
 LAB_TEXT: Final = """\
 From the recording of a dynamometer to a friction law, with the methods of chapters 2 and 3, beside what
 the thesis prints. The dynamometer is simulated; on it are three drawn pads that follow none of the laws
-(tools/brakelab/friction_lab/patches.py): contact patches that temperature builds and wear destroys, a
+(tools/brakelab/identify/friction/patches.py): contact patches that temperature builds and wear destroys, a
 film, chance, and memory of the stop before. Its numbers and the thesis's are of different pads: what can
 be compared is order, size and cause.
 

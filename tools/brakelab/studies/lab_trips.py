@@ -5,8 +5,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.friction_lab.dynamometer import new_bench
-from brakelab.friction_lab.estimators import (
+from brakelab.identify.friction.dynamometer import new_bench
+from brakelab.identify.friction.estimators import (
     NETWORK,
     SURFACE,
     Estimator,
@@ -15,8 +15,8 @@ from brakelab.friction_lab.estimators import (
     errors_by_manoeuvre,
     estimators,
 )
-from brakelab.friction_lab.stops import Stops
-from brakelab.friction_lab.trips import Trip, drive, manoeuvres
+from brakelab.identify.friction.stops import Stops
+from brakelab.identify.friction.trips import Trip, drive, manoeuvres
 from brakelab.studies.lab import SEED, columns_of, linings
 
 Vector = NDArray[np.float64]

@@ -156,8 +156,8 @@ DUST_TEXT: Final = (
     "config/plant/lcv.toml with linings whose emission follows the plant's own law "
     "(tools/brakelab/plant/emission.py: effects (i) to (v) of section 8.1), which nothing on board and no "
     "model knows. Their front right brake runs in an enclosure with a counter, read once a second, over "
-    "eight generated trips (tools/brakelab/identification/dust_trips.py); trips 1 to 7 train, trip 8 is "
-    "held out. Trips and correlations below are those of the first draw.\n\n"
+    "eight generated trips (tools/brakelab/simulation/campaigns/dust_trips.py); trips 1 to 7 train, trip 8 "
+    "is held out. Trips and correlations below are those of the first draw.\n\n"
     "![Background by speed, predicted over counted emission factor](images/dust.svg)"
 )
 

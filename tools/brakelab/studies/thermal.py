@@ -5,9 +5,9 @@ from typing import Final
 
 import numpy as np
 
-from brakelab.identification.thermal_model import ROW, Array
-from brakelab.identification.thermal_page import cooling_panel
-from brakelab.identification.thermal_result import SYMBOLS, values_of
+from brakelab.identify.thermal.model import ROW, Array
+from brakelab.identify.thermal.page import cooling_panel
+from brakelab.identify.thermal.result import SYMBOLS, values_of
 from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Line, Panel
 from brakelab.results.text_table import Table
 from brakelab.studies.thermal_study import JUDGED, Appraised, Car, Course

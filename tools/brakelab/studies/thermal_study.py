@@ -9,12 +9,12 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.identification.thermal_command import AXLES, judge_axle, with_fits
-from brakelab.identification.thermal_fit import Disc
-from brakelab.identification.thermal_log import Drive
-from brakelab.identification.thermal_model import Array, Cooling, respond
-from brakelab.identification.thermal_page import Judged
-from brakelab.identification.thermal_result import start_of
+from brakelab.identify.thermal.command import AXLES, judge_axle, with_fits
+from brakelab.identify.thermal.fit import Disc
+from brakelab.identify.thermal.model import Array, Cooling, respond
+from brakelab.identify.thermal.page import Judged
+from brakelab.identify.thermal.reader import Drive
+from brakelab.identify.thermal.result import start_of
 from brakelab.simulation.closed_loop import new_loop
 from brakelab.studies.thermal_drives import BEYOND_TOWN, Measured, drive_measured, measured_trip
 from ecu.algorithm.step import new_state

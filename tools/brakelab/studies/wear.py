@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.identification.wear_fit import TERMS
+from brakelab.identify.wear.fit import TERMS
 from brakelab.results.chart import BLUE, GREY, ORANGE, PINK, Line, Panel
 from brakelab.results.text_table import Table
 from brakelab.studies.wear_drives import CarDrives

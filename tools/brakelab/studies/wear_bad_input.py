@@ -9,11 +9,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final
 
-from brakelab.identification.dust_command import identify_dust
-from brakelab.identification.dust_trips import campaign, write_campaign
-from brakelab.identification.wear_command import identify_wear
-from brakelab.identification.wear_programme import drawn_car, programme, write_programme
+from brakelab.identify.dust.command import identify_dust
+from brakelab.identify.wear.command import identify_wear
 from brakelab.results.text_table import Table
+from brakelab.simulation.campaigns.dust_trips import campaign, write_campaign
+from brakelab.simulation.campaigns.wear_blocks import drawn_car, programme, write_programme
 from brakelab.studies.lab_bad_input import Answer
 from ecu.errors import UserError
 from ecu.settings.resources import resource

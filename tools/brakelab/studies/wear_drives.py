@@ -9,9 +9,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.identification.wear_programme import drawn_car
 from brakelab.plant.wear import RUN_IN, RUN_IN_MASS
 from brakelab.results.wear import HALF_WIDTH, PERIOD, regressors_of
+from brakelab.simulation.campaigns.wear_blocks import drawn_car
 from brakelab.simulation.closed_loop import Loop, new_loop, run_blocks
 from brakelab.simulation.scenario import Scenario, Trace, load_scenario
 from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from brakelab.identification.wear_blocks import stop_regressors
-from brakelab.identification.wear_command import ROAD, leave_one_out
-from brakelab.identification.wear_fit import QUASI_STATIC, Fit, fit_law
-from brakelab.identification.wear_fusion import fuse
-from brakelab.identification.wear_programme import (
+from brakelab.identify.wear.command import ROAD, leave_one_out
+from brakelab.identify.wear.fit import QUASI_STATIC, Fit, fit_law
+from brakelab.identify.wear.fusion import fuse
+from brakelab.identify.wear.reader import stop_regressors
+from brakelab.simulation.campaigns.wear_blocks import (
     BALANCE,
     COLUMNS,
     POINT,

@@ -1,0 +1,127 @@
+"""`brake-ecu identify dust`: from simulated trips to a configuration; what bad trips give."""
+
+import csv
+import shutil
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("sklearn", reason="needs scikit-learn (extra learn)")
+
+from brakelab.identify.dust import reader
+from brakelab.identify.dust.command import identify_dust
+from brakelab.simulation.campaigns.dust_trips import COLUMNS, campaign, write_campaign
+from ecu.errors import UserError
+from ecu.settings.config import load_config, new_params, store_key
+
+CONFIG = Path(__file__).parents[4] / "config" / "lcv.toml"
+
+
+@pytest.fixture(scope="session")
+def made(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("dust")
+    write_campaign(campaign(3, trips=4), folder)
+    return folder
+
+
+@pytest.fixture
+def trips(made, tmp_path) -> Path:
+    shutil.copytree(made, tmp_path / "trips")
+    return tmp_path / "trips"
+
+
+def test_trips_become_a_configuration_and_a_page(trips, capsys):
+    out = trips / "car.toml"
+    assert identify_dust(trips / "manifest.csv", CONFIG, "front", out) == 0
+    config, before = load_config(out), load_config(CONFIG)
+    dust = config.front.dust
+    assert dust is not None
+    assert config.rear.dust is None
+    assert dust.below < 0.0 < dust.above
+    assert dust.high[0] > 25.0  # m/s
+    assert store_key(config) == store_key(before)  # what was learned of friction goes on
+    params = new_params(config)[0]
+    assert list(params["dust_model"] >= 0) == [True, True, False, False]
+    assert params["dust_version"] != new_params(before)[0]["dust_version"]
+    page = (trips / "car.md").read_text()
+    assert all(name in page for name in ("LUT", "dynamic ANN", "monotone law", "trip 4 (test)", "Δt_b"))
+    assert (trips / "car.svg").is_file()
+    assert "from 3 trips" in capsys.readouterr().out
+
+
+def test_trips_of_a_car_whose_configuration_includes_another(trips):
+    start, out = CONFIG.with_name("suv-blended.toml"), trips / "car.toml"
+    identify_dust(trips / "manifest.csv", start, "rear", out)
+    config, before = load_config(out), load_config(start)
+    assert config.rear.dust is not None
+    assert (config.front, config.blending) == (before.front, before.blending)
+
+
+def rewrite(path: Path, change) -> None:
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    change(rows)
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def column(name: str, value):
+    def spoil(folder: Path) -> None:
+        def change(rows):
+            for row in rows:
+                if row[name] not in ("", "nan"):
+                    row[name] = value(float(row[name]))
+
+        rewrite(folder / "trip-1.csv", change)
+
+    return spoil
+
+
+def without_test(folder: Path) -> None:
+    rewrite(folder / "manifest.csv", lambda rows: [row.update(test="yes") for row in rows])
+
+
+def all_held_out(folder: Path) -> None:
+    rewrite(folder / "manifest.csv", lambda rows: [row.update(test="1") for row in rows])
+
+
+def without_column(folder: Path) -> None:
+    path = folder / "trip-1.csv"
+    path.write_text(path.read_text().replace("tunnel_flow", "flow", 1))
+
+
+def backwards(folder: Path) -> None:
+    path = folder / "trip-1.csv"
+    lines = path.read_text().splitlines(keepends=True)
+    lines[5], lines[6] = lines[6], lines[5]
+    path.write_text("".join(lines))
+
+
+BAD = {
+    "a trip without braking": (column("calliper_pressure_fr", lambda x: 0.4), "0 brake applications"),
+    "a temperature in °F or K": (column("disc_temperature_fr", lambda x: x + 273.15), "cannot be degC"),
+    "a speed in km/h": (column("vehicle_speed", lambda x: 3.6 * x), "km/h"),
+    "a flow in m^3/h": (column("tunnel_flow", lambda x: 3600 * x), "of a tunnel"),
+    "a counter that is off": (column("particle_concentration", lambda x: ""), "no sample"),
+    "a count below zero": (column("particle_concentration", lambda x: x - 1e5), "below zero"),
+    "a manifest without test": (without_test, "needs trip, file and test"),
+    "nothing to train on": (all_held_out, "3 or more trips with test 0"),
+    "a column that is missing": (without_column, "no such column"),
+    "a time that falls": (backwards, "must rise"),
+}
+
+
+@pytest.mark.parametrize(("spoil", "said"), BAD.values(), ids=BAD)
+def test_what_is_wrong_is_one_line_that_names_file_and_place(trips, spoil, said):
+    spoil(trips)
+    with pytest.raises(UserError, match=said) as caught:
+        identify_dust(trips / "manifest.csv", CONFIG, "front", trips / "car.toml")
+    assert "\n" not in str(caught.value)
+    assert ".csv" in str(caught.value)
+    assert not (trips / "car.toml").exists()
+
+
+def test_columns_are_those_of_the_contract():
+    assert reader.COLUMNS == COLUMNS

@@ -1,0 +1,72 @@
+"""Every usual mistake in a recording is named, with its remedy; a sound one is not doubted."""
+
+import pytest
+
+from brakelab.identify.friction.check import refuse_nonsense
+from brakelab.identify.friction.columns import Columns, DiscGiven, Rig
+from brakelab.identify.friction.recording import Recording
+from ecu.errors import UserError
+
+
+def test_a_sound_recording_passes(recording: Recording, columns: Columns) -> None:
+    numbers = refuse_nonsense(recording, columns, "cpc.csv")
+    assert numbers.friction == pytest.approx(0.44, abs=0.05)
+    assert numbers.inertia == pytest.approx(129.1, rel=0.02)
+    # The thermocouple lags, the air cools, and the heat capacity rises: all three heat the disc less.
+    assert numbers.heating == pytest.approx(2.111e-4, rel=0.18)
+
+
+@pytest.mark.parametrize(
+    ("column", "factor", "known", "place", "remedy"),
+    [
+        ("pressure", 14.504, True, "pressure", 'give the unit "psi"'),
+        ("pressure", 14.504, False, "pressure", 'give the unit "psi"'),
+        ("pressure", 0.1, True, "pressure", 'give the unit "MPa"'),
+        ("pressure", 0.1, False, "pressure", 'give the unit "MPa"'),
+        ("torque", 0.5, True, "torque", "one pad: set pads = 1"),
+        ("torque", 1e-3, False, "torque", 'give the unit "kN m"'),
+        ("speed", 1.0 / 3.6, True, "speed", 'give the unit "m/s"'),
+        ("speed", 1.0 / 1.609, True, "speed", 'give the unit "mph"'),
+    ],
+)
+def test_a_mistake_is_named(
+    recording: Recording, columns: Columns, column: str, factor: float, known: bool, place: str, remedy: str
+) -> None:
+    """`known`: the flywheel's inertia and the disc's heating are given."""
+    if not known:
+        columns = columns.model_copy(update={"rig": Rig(), "disc": DiscGiven()})
+    spoilt = recording._replace(**{column: getattr(recording, column) * factor})
+    with pytest.raises(UserError) as error:
+        refuse_nonsense(spoilt, columns, "cpc.csv")
+    assert str(error.value).startswith(f"cpc.csv: {place} (friction ")
+    assert remedy in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("factor", "remedy"), [(1.8, 'give the unit "°F"'), (0.2, "take the column of the disc")]
+)
+def test_a_temperature_is_doubted_by_what_the_energy_heats(
+    recording: Recording, columns: Columns, factor: float, remedy: str
+) -> None:
+    spoilt = recording._replace(temperature=recording.temperature * factor + (32.0 if factor > 1 else 40.0))
+    with pytest.raises(UserError, match="temperature") as error:
+        refuse_nonsense(spoilt, columns, "cpc.csv")
+    assert remedy in str(error.value)
+
+
+def test_kelvin_is_no_disc(recording: Recording, columns: Columns) -> None:
+    with pytest.raises(UserError, match="no brake disc is that"):
+        refuse_nonsense(recording._replace(temperature=recording.temperature + 800.0), columns, "cpc.csv")
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e-3])
+def test_milliseconds_are_no_seconds(recording: Recording, columns: Columns, factor: float) -> None:
+    with pytest.raises(UserError, match=r"time, .* s between samples: check its unit"):
+        refuse_nonsense(recording._replace(time=recording.time * factor), columns, "cpc.csv")
+
+
+def test_kelvin_that_a_disc_could_have_is_known_by_its_coldest(
+    recording: Recording, columns: Columns
+) -> None:
+    with pytest.raises(UserError, match='reads like K: give the unit "K"'):
+        refuse_nonsense(recording._replace(temperature=recording.temperature + 273.15), columns, "cpc.csv")

@@ -1,0 +1,186 @@
+"""`brake-ecu lab` and `brake-ecu identify friction` from a recording to a law that the rig runs."""
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from brakelab.cli import app
+from brakelab.identify.friction import choice, command
+from brakelab.identify.friction.choice import Judged, choose, hottest
+from brakelab.identify.friction.columns import Columns, load_columns
+from brakelab.identify.friction.reader import read_recording
+from brakelab.identify.friction.recording import Recording, write_recording
+from brakelab.identify.friction.stops import Stops, find_stops
+from brakelab.plant.description import read_file
+from brakelab.plant.dynamometer import nominal_friction
+from brakelab.plant.friction.constant import Constant
+from brakelab.plant.friction.own import Own
+from brakelab.plant.linings import Lining, Linings, rig_with
+from ecu.errors import UserError
+
+FEW = ("constant", "ilvo")
+"""Laws that are quickly identified."""
+
+
+class InThisProcess(ThreadPoolExecutor):
+    """A pool that sees what a test has replaced."""
+
+    def __init__(self, workers: int, mp_context: object) -> None:
+        super().__init__(1)
+
+
+def test_ams_of_brake_b_is_written_and_read(tmp_path: Path) -> None:
+    out = tmp_path / "ams.csv"
+    done = CliRunner().invoke(app, ["lab", "run", "ams", "--brake", "B", "--seed", "3", "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    read = read_recording(out)
+    stops = find_stops(read.recording, read.columns, "ams.csv")
+    assert len(stops) == 6
+    assert stops.start_temperature == pytest.approx([50, 100, 150, 200, 250, 300], abs=3.0)
+    assert load_columns(out.with_suffix(".toml")).rig.inertia == pytest.approx(stops.inertia)
+
+
+def test_a_law_is_identified_and_runs_on_the_rig(
+    tmp_path: Path,
+    recording: Recording,
+    lining: Lining,
+    columns: Columns,
+    stops: Stops,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The lining file has the chosen law as SIM; its nominal friction is what the recording shows."""
+    few = [c for c in choice.candidates(stops, lining.brake) if c.name in FEW]
+    monkeypatch.setattr(choice, "candidates", lambda stops, brake, own: few)
+    monkeypatch.setattr(choice, "ProcessPoolExecutor", InThisProcess)
+    monkeypatch.setattr(choice, "as_completed", list)
+    data, out = tmp_path / "own.parquet", tmp_path / "brake.toml"
+    assert columns.rig.inertia is not None
+    write_recording(data, recording, lining, columns.rig.inertia)
+    assert command.friction([data], None, None, out) == 0
+    page = out.with_suffix(".html").read_text("utf-8")
+    assert "Friction law of mine: ilvo" in page
+    assert "Do not extrapolate.</b> Seen: 8" in page
+    found = read_file(out, Linings).lining["mine"]
+    assert found.brake == lining.brake
+    assert set(found.friction) == {"SIM", *FEW}
+    assert found.friction["SIM"] == found.friction["ilvo"]
+    nominal = nominal_friction(rig_with(found, "SIM"))
+    near = np.abs(stops.held_pressure - 30e5) < 5e5
+    seen = np.interp(100.0, stops.start_temperature[near], stops.mean[near])
+    assert nominal == pytest.approx(seen, rel=0.1)
+
+
+def test_a_law_of_one_s_own_is_identified_with_the_others(
+    tmp_path: Path, recording: Recording, lining: Lining, columns: Columns, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is written names the file, from where it lies, and reads as what was fitted."""
+    every = choice.candidates
+    monkeypatch.setattr(
+        choice,
+        "candidates",
+        lambda stops, brake, own: [c for c in every(stops, brake, own) if c.name in ("constant", "line")],
+    )
+    monkeypatch.setattr(choice, "ProcessPoolExecutor", InThisProcess)
+    monkeypatch.setattr(choice, "as_completed", list)
+    (tmp_path / "laws").mkdir()
+    own, data, out = tmp_path / "laws" / "line.py", tmp_path / "own.parquet", tmp_path / "brake.toml"
+    own.write_text(
+        'NUMBERS = {"mu": ("–", 0.1, 0.8), "heat": ("1/K", -2e-3, 2e-3)}\n\n\n'
+        "def step(numbers, memory, pressure, speed, slowing, temperature, dt):\n"
+        "    return memory, numbers[0] * (1.0 + numbers[1] * (temperature - 100.0))\n"
+    )
+    assert columns.rig.inertia is not None
+    write_recording(data, recording, lining, columns.rig.inertia)
+    assert command.friction([data], None, None, out, own=(str(own),)) == 0
+    assert 'code = "laws/line.py"' in out.read_text()
+    found = read_file(out, Linings).lining["mine"].friction["line"]
+    assert isinstance(found, Own)
+    stops = find_stops(recording, columns, "x")
+    heat = stops.temperature[stops.block_first[:, None] + np.arange(stops.per_block)].mean(axis=1)
+    slope, level = np.polyfit(heat - 100.0, stops.mu, 1)
+    assert found.numbers["mu"] == pytest.approx(level, rel=1e-3)
+    assert found.numbers["heat"] * found.numbers["mu"] == pytest.approx(slope, rel=1e-2)
+
+
+def test_a_law_of_one_s_own_must_have_a_name_of_its_own(tmp_path: Path) -> None:
+    own, data = tmp_path / "ilvo.py", tmp_path / "cpc.csv"
+    own.write_text(
+        'NUMBERS = {"mu": ("–", 0.1, 0.8)}\n\n\ndef step(numbers, memory, *u):\n    return memory, 0.4\n'
+    )
+    command.run("ams", "A", 0, data)
+    with pytest.raises(UserError, match="ilvo: two laws of this name"):
+        command.friction([data, data], None, None, tmp_path / "out.toml", own=(str(own),))
+
+
+@pytest.mark.parametrize(
+    ("call", "line"),
+    [
+        (lambda f: command.run("cpc", "D", 0, f), "--brake: D: no such brake; choose one of A, B, C"),
+        (
+            lambda f: command.run("cpd", "A", 0, f),
+            "cpd: no such file, and none that is shipped (ak-master, ams, cpc)",
+        ),
+        (lambda f: command.run("ams", "A", 0, f, "R9"), "--law: R9: no such law; choose one of SIM, R1"),
+        (lambda f: command.run("ams", "A", 0, f.with_suffix(".xls")), "ends in .csv or .parquet"),
+        (lambda f: command.friction([f], None, None, f.with_name("law.toml")), "6 stops; needs 10"),
+    ],
+)
+def test_one_line_says_what_to_do(tmp_path: Path, call, line: str) -> None:
+    out = tmp_path / "data.csv"
+    command.run("ams", "A", 0, out)
+    with pytest.raises(UserError) as error:
+        call(out)
+    assert line in str(error.value)
+
+
+def test_recordings_of_two_brakes_are_not_one(tmp_path: Path) -> None:
+    for brake in "AB":
+        command.run("ams", brake, 0, tmp_path / f"{brake}.csv")
+    with pytest.raises(UserError, match="identify one brake at a time"):
+        command.look([tmp_path / "A.csv", tmp_path / "B.csv"], None)
+
+
+def judged(name: str, held_out: float, criterion: float) -> Judged:
+    law = Constant(law="constant", rig_mass=1.0, mu=0.4)
+    return Judged(name, law, False, 1, 1.0, held_out, "stays" in name, criterion, (), (), "4 of 4", "")
+
+
+@pytest.mark.parametrize(
+    ("laws", "expected"),
+    [
+        ([("a", 4.0, -10.0), ("b", 6.0, -90.0)], "a"),
+        ([("a", 4.00, -10.0), ("b", 4.15, -90.0)], "b"),
+        ([("a", 4.00, -10.0), ("b", 4.25, -90.0)], "a"),
+        ([("a", 4.00, -90.0), ("stays", 4.95, -10.0)], "stays"),
+        ([("a", 4.00, -90.0), ("stays", 5.05, -10.0)], "a"),
+        ([("a", 4.00, -90.0), ("stays", 4.30, -10.0), ("stays too", 4.90, -20.0)], "stays too"),
+    ],
+    ids=[
+        "least error unseen",
+        "a tie goes to the criterion",
+        "more than 5 % is no tie",
+        "what stays beyond the data comes first",
+        "unless it is worse by a quarter",
+        "of two that stay the one of less criterion",
+    ],
+)
+def test_the_choice(laws: list[tuple[str, float, float]], expected: str) -> None:
+    assert choose(tuple(judged(*law) for law in laws)).name == expected
+
+
+def test_held_out_are_the_hottest(stops: Stops) -> None:
+    seen, unseen = hottest(stops)
+    assert len(seen) == 19
+    assert len(unseen) == 5
+    assert seen.start_temperature.max() <= unseen.start_temperature.min()
+
+
+def test_a_wrong_ending_is_told_before_the_programme_is_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(command, "new_bench", lambda *_, **__: pytest.fail("the rig was started"))
+    with pytest.raises(UserError, match=r"ends in \.csv or \.parquet"):
+        command.run("ams", "A", 0, tmp_path / "data.xls")

@@ -1,0 +1,30 @@
+"""The disc's heat capacity over temperature, found from what a lagging thermocouple shows."""
+
+import pytest
+
+from brakelab.identify.friction.columns import Columns
+from brakelab.identify.friction.dynamometer import Noise
+from brakelab.identify.friction.heat_capacity import heat_capacity
+from brakelab.identify.friction.patches import CAPACITY_RISE
+from brakelab.identify.friction.recording import Recording
+from brakelab.identify.friction.stops import Stops, find_stops
+from brakelab.plant.disc import DISC_SHARE
+from brakelab.plant.linings import Lining
+from brakelab.studies.lab import r1_recording
+
+
+def test_the_disc_of_the_pads_is_found(stops: Stops, columns: Columns, lining: Lining) -> None:
+    found = heat_capacity(stops, columns)
+    assert found.at_100 == pytest.approx(DISC_SHARE / lining.disc.heating, rel=0.03)
+    assert found.rise == pytest.approx(CAPACITY_RISE, abs=found.rise_half)
+    assert found.rise_half < 0.5 * CAPACITY_RISE
+    assert found.lag == pytest.approx(Noise().thermocouple, abs=0.15)
+
+
+def test_a_constant_capacity_is_constant(lining: Lining, columns: Columns) -> None:
+    """The plant's own disc, whose xi is constant and whose temperature is shown as it is."""
+    recording: Recording = r1_recording(lining, 0.0, 0)
+    found = heat_capacity(find_stops(recording, columns, "R1"), columns)
+    assert found.at_100 == pytest.approx(DISC_SHARE / lining.disc.heating, rel=0.01)
+    assert abs(found.rise) < 2e-5
+    assert abs(found.lag) < 0.1

@@ -1,0 +1,31 @@
+"""The page of an identified law: its charts hold what they say, and it is one file of its own."""
+
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+from brakelab.identify.friction.choice import Identified, Judged
+from brakelab.identify.friction.columns import Columns
+from brakelab.identify.friction.page import write_report
+from brakelab.identify.friction.stops import Stops
+from brakelab.plant.friction.constant import Constant
+from brakelab.results.text_table import Table
+
+
+def test_the_page_of_a_constant(tmp_path: Path, columns: Columns, stops: Stops) -> None:
+    law = Constant(law="constant", rig_mass=1.0, mu=float(stops.mu.mean()))
+    judged = Judged("constant", law, False, 1, 5.0, 6.0, True, 0.0, (), ("<mu>",), "4 of 4", "knows no fade")
+    span = (1.0, 9.0)
+    identified = Identified((judged,), judged, len(stops), span, (1e6, 7e6), (80.0, 250.0))
+    path = tmp_path / "brake.html"
+    write_report(path, columns, stops, identified, [Table("All & every", ("a",), [("1 < 2",)], "")])
+    page = path.read_text("utf-8")
+    assert "Seen: 80 to 250 °C, 10 to 70 bar, sliding at 1.0 to 9.0 m/s. Beyond: knows no fade." in page
+    assert "Not told by the data: &lt;mu&gt;." in page
+    assert "1 &lt; 2" in page
+    assert not re.search(r"<script|src=|href=|url\(", page)
+    charts = re.findall(r"<svg.*?</svg>", page, re.DOTALL)
+    assert [chart.count("<rect x=") for chart in charts] == [2, 3]
+    for each in charts:
+        ElementTree.fromstring(each)
+    assert charts[0].count("h0") == 3 * len(stops)

@@ -1,0 +1,134 @@
+"""A stranger's recording: other columns, units and separators, damaged rows; and each line that he gets."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from brakelab.identify.friction.columns import Columns, columns_text
+from brakelab.identify.friction.reader import read_recording
+from brakelab.identify.friction.recording import Recording, write_recording
+from brakelab.plant.linings import Lining
+from ecu.errors import UserError
+
+Write = Callable[..., Path]
+
+
+@pytest.mark.parametrize("ending", [".csv", ".parquet"])
+def test_what_we_write_is_what_we_read(
+    tmp_path: Path, recording: Recording, lining: Lining, ending: str
+) -> None:
+    path = tmp_path / f"own{ending}"
+    write_recording(path, recording, lining, 129.0)
+    read = read_recording(path)
+    assert read.damaged == ""
+    assert read.columns.brake == lining.brake
+    assert read.columns.rig.inertia == 129.0
+    for found, written, digits in zip(read.recording, recording, (1e-3, 100.0, 0.1, 1e-3, 0.01), strict=True):
+        np.testing.assert_allclose(found, written, atol=digits)
+
+
+def test_a_stranger_s_units_become_si(tmp_path: Path, recording: Recording, strange: Write) -> None:
+    read = read_recording(strange(tmp_path, recording))
+    for found, written in zip(read.recording, recording, strict=True):
+        np.testing.assert_allclose(found, written, rtol=1e-4, atol=2e-3)
+
+
+def test_damaged_rows_are_left_out_and_counted(tmp_path: Path, recording: Recording, strange: Write) -> None:
+    path = strange(tmp_path, recording, damaged=True)
+    read = read_recording(path)
+    assert read.damaged == f"{path}: 3 rows left out, first: line 52 (2 cells instead of 5)"
+    assert len(read.recording.time) == len(recording.time) - 3
+
+
+@pytest.mark.parametrize(
+    ("row", "spoilt", "place"),
+    [
+        (10, "1;2", "line 12 (2 cells instead of 5)"),
+        (20, ";1;1;1;1", "line 22 (Zeit is no number)"),
+        (30, "1;1;off;1;1", "line 32 (M_B is no number)"),
+        (40, "0;1;1;1;1", "line 42 (time does not rise)"),
+    ],
+)
+def test_a_damaged_row_is_named_as_an_editor_counts(
+    tmp_path: Path, recording: Recording, strange: Write, row: int, spoilt: str, place: str
+) -> None:
+    """The address holds behind an empty line too."""
+    path = strange(tmp_path, recording)
+    lines = path.read_text("utf-8").splitlines()
+    lines[row + 1] = spoilt
+    path.write_text("\n".join(lines) + "\n", "utf-8")
+    assert read_recording(path).damaged == f"{path}: 1 row left out, first: {place}"
+    path.write_text("\n".join([lines[0], "", *lines[1:]]) + "\n", "utf-8")
+    assert read_recording(path).damaged.endswith(place.replace(str(row + 2), str(row + 3)))
+
+
+def test_a_column_of_words_in_parquet_is_named(tmp_path: Path, columns: Columns) -> None:
+    path = tmp_path / "own.parquet"
+    names = [name for name, _ in columns.columns.model_dump().values()]
+    pq.write_table(pa.table({name: ["a", "b"] for name in names}), path)
+    path.with_suffix(".toml").write_text(columns_text(columns), "utf-8")
+    with pytest.raises(UserError, match="time_s: is string, not numbers"):
+        read_recording(path)
+
+
+def test_a_row_of_parquet_is_named(tmp_path: Path, recording: Recording, lining: Lining) -> None:
+    path = tmp_path / "own.parquet"
+    write_recording(path, recording, lining, 129.0)
+    table = pq.read_table(path).to_pydict()
+    table["torque_Nm"][7] = float("nan")
+    pq.write_table(pa.table(table), path)
+    assert read_recording(path).damaged.endswith("1 row left out, first: row 8 (torque_Nm is no number)")
+
+
+def test_channels_of_mdf4(tmp_path: Path, recording: Recording, columns: Columns) -> None:
+    asammdf = pytest.importorskip("asammdf")
+    file = asammdf.MDF(version="4.10")
+    units = {
+        "pressure": ("pressure_bar", 1e-5),
+        "torque": ("torque_Nm", 1.0),
+        "temperature": ("disc_temperature_C", 1.0),
+    }
+    units["speed"] = ("speed_km_h", 3.6 * columns.brake.tyre_radius)
+    file.append(
+        [
+            asammdf.Signal(getattr(recording, q) * factor, recording.time, name=name)
+            for q, (name, factor) in units.items()
+        ]
+    )
+    path = tmp_path / "own.mf4"
+    file.save(path)
+    path.with_suffix(".toml").write_text(columns_text(columns), "utf-8")
+    for found, written in zip(read_recording(path).recording, recording, strict=True):
+        np.testing.assert_allclose(found, written, rtol=1e-9, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "line"),
+    [
+        (lambda f: f.unlink(), "no such file"),
+        (lambda f: f.with_suffix(".toml").unlink(), "no file of columns; give --columns"),
+        (lambda f: f.write_text(f.read_text().replace("P_Line", "P")), "P_Line: no such column; the file"),
+        (lambda f: _in_columns(f, '"psi"', '"pound"'), "unit 'pound' of pressure unknown; one of bar, kPa"),
+        (lambda f: _in_columns(f, "piston_area", "piston"), "brake.piston: unknown key; did you mean"),
+        (lambda f: f.write_text("\n".join(f.read_text().splitlines()[:40]) + "\n"), "only 39 whole rows"),
+    ],
+    ids=["no file", "no columns", "column", "unit", "brake", "short"],
+)  # fmt: skip
+def test_one_line_says_what_to_do(
+    tmp_path: Path, recording: Recording, strange: Write, spoil, line: str
+) -> None:
+    path = strange(tmp_path, recording)
+    spoil(path)
+    with pytest.raises(UserError) as error:
+        read_recording(path)
+    assert line in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def _in_columns(path: Path, old: str, new: str) -> None:
+    beside = path.with_suffix(".toml")
+    beside.write_text(beside.read_text("utf-8").replace(old, new), "utf-8")

@@ -1,0 +1,173 @@
+"""`brake-ecu identify wear`: from the simulated dynamometer to a configuration; what bad blocks give."""
+
+import csv
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from brakelab.identify.wear.command import identify_wear
+from brakelab.identify.wear.curves import specific_wear
+from brakelab.simulation.campaigns.wear_blocks import (
+    COLUMNS,
+    drawn_car,
+    programme,
+    road_stops,
+    write_programme,
+)
+from ecu.errors import UserError
+from ecu.settings.config import load_config
+
+CONFIG = Path(__file__).parents[4] / "config" / "suv.toml"
+
+
+@pytest.fixture(scope="session")
+def made(tmp_path_factory) -> Path:
+    """Folder of a small programme: four blocks, two roads by two drivers."""
+    folder = tmp_path_factory.mktemp("dynamometer")
+    car = drawn_car(1)
+    write_programme(car, 0, 1, folder, programme(car, 0, 1, ("town", "motorway")))
+    return folder
+
+
+@pytest.fixture
+def blocks(made, tmp_path) -> Path:
+    shutil.copytree(made, tmp_path / "blocks")
+    return tmp_path / "blocks"
+
+
+def test_a_programme_becomes_a_configuration_and_a_page(blocks, capsys):
+    out = blocks / "car.toml"
+    assert identify_wear(blocks / "manifest.csv", CONFIG, "front", out) == 0
+    pad = load_config(out).front.pad
+    assert pad.thickness_new == load_config(CONFIG).front.pad.thickness_new
+    middle = specific_wear(np.array(pad.coefficients), np.array([80.0]), 0.02, 0.15)[0]
+    assert 0.05 < middle < 0.3  # g/MJ, as Table 7.1
+    page = (blocks / "car.md").read_text()
+    assert all(name in page for name in ("town-calm", "motorway-lively", "γ10", "quasi-static"))
+    assert (blocks / "car.svg").is_file()
+    assert "4 blocks" in capsys.readouterr().out
+
+
+def test_blocks_in_mdf4_give_the_same_law(blocks):
+    mdf = pytest.importorskip("asammdf")
+    identify_wear(blocks / "manifest.csv", CONFIG, "front", blocks / "csv.toml")
+    with (blocks / "manifest.csv").open(newline="") as file:
+        names = [row["file"] for row in csv.DictReader(file)]
+    for name in names:
+        columns = np.loadtxt(blocks / name, delimiter=",", skiprows=1).T
+        signals = [
+            mdf.Signal(samples, columns[0], name=channel)
+            for channel, samples in zip(COLUMNS[1:], columns[1:], strict=True)
+        ]
+        with mdf.MDF() as file:
+            file.append(signals)
+            file.save(blocks / Path(name).with_suffix(".mf4"), overwrite=True)
+    rewrite(blocks / "manifest.csv", lambda rows: [
+        row.update(file=row["file"].replace(".csv", ".mf4")) for row in rows
+    ])  # fmt: skip
+    identify_wear(blocks / "manifest.csv", CONFIG, "front", blocks / "mdf.toml")
+    laws = [load_config(blocks / f"{name}.toml").front.pad.coefficients for name in ("csv", "mdf")]
+    assert laws[0] == pytest.approx(laws[1], rel=1e-6)
+    (blocks / Path(names[0]).with_suffix(".mf4")).write_bytes(b"no MDF4")
+    with pytest.raises(UserError, match=r"calm.mf4: cannot be read as MDF4"):
+        identify_wear(blocks / "manifest.csv", CONFIG, "front", blocks / "mdf.toml")
+
+
+def test_linings_of_both_axles_of_a_configuration_that_includes_another(blocks):
+    start, one, both = CONFIG.with_name("suv-blended.toml"), blocks / "one.toml", blocks / "both.toml"
+    identify_wear(blocks / "manifest.csv", start, "front", one)
+    identify_wear(blocks / "manifest.csv", one, "rear", both)
+    config = load_config(both)
+    assert config.front.pad.coefficients == config.rear.pad.coefficients
+    assert config.blending == load_config(start).blending
+
+
+def test_a_block_has_at_least_250_applications_of_its_road():
+    stops = road_stops("motorway", "lively", 2)
+    assert len(stops) >= 250
+    assert stops[:, 0].min() > 90 / 3.6
+    assert (stops[:, 0] > stops[:, 1]).all()
+
+
+def rewrite(path: Path, change) -> None:
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    change(rows)
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def few(folder: Path) -> None:
+    path = folder / "town-calm.csv"
+    path.write_text("".join(path.read_text().splitlines(keepends=True)[:2000]))
+
+
+def grown(folder: Path) -> None:
+    def change(rows):
+        for k in range(1, 7):
+            rows[1][f"thickness_after_{k}"] = "12.4"
+
+    rewrite(folder / "manifest.csv", change)
+
+
+def heavier(folder: Path) -> None:
+    rewrite(folder / "manifest.csv", lambda rows: rows[0].update(mass_after="500"))
+
+
+def fahrenheit(folder: Path) -> None:
+    rewrite(folder / "town-calm.csv", lambda rows: [
+        row.update(disc_temperature=f"{32 + 1.8 * float(row['disc_temperature']):.2f}") for row in rows
+    ])  # fmt: skip
+
+
+def kelvin(folder: Path) -> None:
+    rewrite(folder / "town-calm.csv", lambda rows: [
+        row.update(disc_temperature=f"{273.15 + float(row['disc_temperature']):.2f}") for row in rows
+    ])  # fmt: skip
+
+
+def alike(folder: Path) -> None:
+    def change(rows):
+        for row in rows:
+            row["file"] = "town-calm.csv"
+
+    rewrite(folder / "manifest.csv", change)
+
+
+def without_column(folder: Path) -> None:
+    path = folder / "town-calm.csv"
+    path.write_text(path.read_text().replace("omega", "speed", 1))
+
+
+def text(folder: Path) -> None:
+    rewrite(folder / "manifest.csv", lambda rows: rows[0].update(mass_before="heavy"))
+
+
+BAD = {
+    "a block with too few applications": (few, "applications; a block needs"),
+    "a thickness that grows": (grown, "the pads grew by"),
+    "a mass that grows": (heavier, "pads gained mass"),
+    "a temperature in °F": (fahrenheit, "°F"),
+    "a temperature in K": (kelvin, "cannot be degC"),
+    "collinear regressors": (alike, "collinear"),
+    "a column that is missing": (without_column, "no such column"),
+    "a mass that is no number": (text, "give a number"),
+}
+
+
+@pytest.mark.parametrize(("spoil", "said"), BAD.values(), ids=BAD)
+def test_what_is_wrong_is_one_line_that_names_file_and_place(blocks, spoil, said):
+    spoil(blocks)
+    with pytest.raises(UserError, match=said) as caught:
+        identify_wear(blocks / "manifest.csv", CONFIG, "front", blocks / "car.toml")
+    assert "\n" not in str(caught.value)
+    assert ".csv" in str(caught.value)
+    assert not (blocks / "car.toml").exists()
+
+
+def test_columns_are_those_of_the_contract():
+    assert COLUMNS == ("t", "omega", "calliper_pressure", "brake_torque", "disc_temperature")

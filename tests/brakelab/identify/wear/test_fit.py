@@ -1,0 +1,109 @@
+"""Identification of a wear law: a known law is found within its confidence, terms are pruned."""
+
+import numpy as np
+import pytest
+
+from brakelab.identify.wear.fit import QUASI_STATIC, fit_law, rank_of
+from brakelab.identify.wear.fusion import BALANCE, POINT, POINTS, fuse
+from ecu.errors import UserError
+
+LAW = np.array([0.1016, 0.0, 0.0, 0.4887, 0.0, 0.0, 0.66e-2])  # Table 7.1 without its smallest term
+SEEDS = 40
+
+
+def regressors(seed: int, blocks: int = 10) -> np.ndarray:
+    """Draw what blocks have: work, heat, slowing and power that vary by road and driver."""
+    random = np.random.default_rng([seed, 1])
+    energy, heat = random.uniform(10, 40, blocks), random.uniform(60, 250, blocks)
+    rate, power = random.uniform(0.05, 0.4, blocks), random.uniform(0.01, 0.06, blocks)
+    parts = (1.0, heat, 1.1 * heat**2, rate, rate * heat, power, power * heat)
+    return energy[:, None] * np.column_stack([np.broadcast_to(part, blocks) for part in parts])
+
+
+def measured(x: np.ndarray, seed: int, scatter: float = 0.02) -> tuple[np.ndarray, np.ndarray]:
+    true = x @ LAW
+    noise = np.random.default_rng([seed, 2]).standard_normal((2, len(x)))
+    variance = np.full(len(x), 2 * BALANCE**2)
+    return true * (1 + scatter * noise[0]) + np.sqrt(variance) * noise[1], variance
+
+
+def test_a_law_without_scatter_is_found_exactly():
+    x = regressors(0, 20)
+    fit = fit_law(x, x @ LAW, np.full(20, 1e-12))
+    np.testing.assert_allclose(x @ fit.coefficients, x @ LAW, rtol=5e-3)
+    assert fit.r2 > 0.9999
+
+
+@pytest.mark.study
+def test_the_true_mass_is_predicted_within_its_scatter_and_confidence_holds_over_seeds():
+    """New blocks by the identified law; and gamma_10 + ... where the three true terms were chosen."""
+    held, counted, errors = 0, 0, []
+    for seed in range(SEEDS):
+        x = regressors(seed, 12)
+        fit = fit_law(x, *measured(x, seed))
+        new = regressors(1000 + seed, 6)
+        errors.append(np.sqrt(np.mean((new @ fit.coefficients / (new @ LAW) - 1.0) ** 2)))
+        if set(np.flatnonzero(fit.coefficients)) == set(np.flatnonzero(LAW)):
+            places = np.flatnonzero(LAW)
+            counted += len(places)
+            held += np.sum((fit.low[places] <= LAW[places]) & (LAW[places] <= fit.high[places]))
+    assert np.median(errors) < 0.03
+    assert counted >= 3 * SEEDS // 4, "the true terms are seldom chosen"
+    assert 0.85 <= held / counted <= 1.0, f"{held} of {counted} coefficients in their 95 %"
+
+
+def test_the_extended_law_is_chosen_over_the_quasi_static_one_by_its_criterion():
+    x = regressors(3, 12)
+    mass, variance = measured(x, 3)
+    assert fit_law(x, mass, variance).criterion < fit_law(x, mass, variance, QUASI_STATIC).criterion - 4.0
+
+
+def test_no_coefficient_is_negative_and_no_more_terms_than_the_rank_allows():
+    for seed in range(10):
+        x = regressors(seed, 6)
+        fit = fit_law(x, *measured(x, seed, 0.1))
+        assert (fit.coefficients >= 0.0).all()
+        assert np.count_nonzero(fit.coefficients) <= min(fit.rank, 4)
+
+
+def test_blocks_that_are_multiples_of_one_another_have_rank_one():
+    x = np.outer([1.0, 2.0, 3.0, 5.0], regressors(0, 1)[0])
+    assert rank_of(x)[0] == 1
+    with pytest.raises(UserError, match="collinear: add other roads"):
+        fit_law(x, x @ LAW, np.full(4, 1e-4))
+
+
+def test_too_few_blocks():
+    x = regressors(0, 2)
+    with pytest.raises(UserError, match="give 3 or more"):
+        fit_law(x, x @ LAW, np.full(2, 1e-4))
+
+
+def test_fusion_is_most_likely_point_on_the_line_with_its_variance_over_seeds():
+    """Truth y = K x; balance and gauge as stated: errors of the blend beside its covariance."""
+    random = np.random.default_rng(5)
+    true = random.uniform(0.02, 0.3, 8)
+    chi, blend, balance = [], [], []
+    for _ in range(300):
+        wear = true + random.normal(0, POINT * np.sqrt(2 / POINTS), 8)
+        mass = 35.0 * true + random.normal(0, np.sqrt(2) * BALANCE, 8)
+        fused = fuse(wear, mass)
+        error = fused.mass - 35.0 * true
+        chi.append(error @ np.linalg.solve(fused.covariance, error))
+        blend.append(error), balance.append(mass - 35.0 * true)
+    assert np.mean(chi) == pytest.approx(8.0, rel=0.15)
+    assert np.std(blend) < np.std(balance)
+
+
+def test_fusion_is_the_projection_of_7_11():
+    wear, mass = np.array([0.1, 0.2, 0.3]), np.array([3.2, 7.4, 10.2])
+    fused = fuse(wear, mass)
+    k, a = fused.slope, fused.alpha
+    assert k == pytest.approx((wear @ mass) / (wear @ wear))
+    np.testing.assert_allclose(fused.mass, (k * mass + a * wear) / (k + a / k), rtol=1e-12)
+
+
+def test_without_thickness_the_balance_stands_alone():
+    fused = fuse(np.full(3, np.nan), np.array([1.0, 2.0, 3.0]))
+    assert fused.mass.tolist() == [1.0, 2.0, 3.0]
+    assert np.isnan(fused.slope)

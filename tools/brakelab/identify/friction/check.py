@@ -1,0 +1,145 @@
+"""Doubts a recording: units and sensors that would make no physical sense, one line each with the remedy.
+
+Three numbers of a recording have to fit known physics, and every usual mistake moves them in its own way:
+
+    friction  median of T / (2 A_k r_eff p)                    0.42, give or take a third
+    inertia   torque impulse over the loss of speed            of the flywheel, or 60 kg m^2 within a factor 4
+    heating   rise of the disc over the friction energy, K/J   of the disc, or 0.96 / (8 kg 500 J/(kg K))
+"""
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from brakelab.identify.friction.columns import UNITS, Columns
+from brakelab.identify.friction.recording import Recording
+from brakelab.identify.friction.stops import Stops, find_stops
+from ecu.errors import UserError
+
+USUAL: Final = (0.42, 60.0, 2.4e-4)  # friction, inertia [kg m^2], heating [K/J]
+TOLERANCE: Final = (0.33, 1.4, 0.55)  # standard deviations of the logarithms, where nothing is given
+GIVEN: Final = 0.15  # likewise where the file of columns gives the number
+DOUBTFUL: Final = 2.0  # standard deviations
+CLEARER: Final = 4.0  # a mistake must explain the numbers better by this much, in squares
+HOTTEST: Final = 900.0  # degC
+COLDEST: Final = -40.0  # degC
+WARM: Final = 250.0  # degC; no programme keeps a disc above this all the time
+SAMPLES: Final = (1e-4, 0.05)  # s between them, least and greatest
+
+
+class Mistake(NamedTuple):
+    """A mistake of units: its factors on the three numbers, and its remedy."""
+
+    friction: float
+    inertia: float
+    heating: float
+    place: str
+    remedy: str
+
+
+def mistakes(columns: Columns) -> list[Mistake]:
+    """Return the mistakes that a recording so described can hold: other units, pads, another thermocouple."""
+    found: list[Mistake] = []
+    for quantity, units in UNITS.items():
+        given = columns.columns.model_dump()[quantity][1]
+        for unit, factor in units.items():
+            ratio = _factor(factor, columns) / _factor(units[given], columns)
+            effect = _effect(quantity, ratio)
+            if abs(ratio - 1.0) > 1e-6 and effect not in [mistake[:3] for mistake in found]:
+                found.append(Mistake(*effect, quantity, f'reads like {unit}: give the unit "{unit}"'))
+    if columns.rig.pads == 2:
+        found.append(Mistake(0.5, 0.5, 2.0, "torque", "reads like that of one pad: set pads = 1 in [rig]"))
+    else:
+        found.append(Mistake(2.0, 2.0, 0.5, "torque", "reads like that of both pads: set pads = 2 in [rig]"))
+    plate = "rises like a backing plate's: take the column of the disc"
+    return [*found, Mistake(1.0, 1.0, 0.2, "temperature", plate)]
+
+
+def _factor(factor: float, columns: Columns) -> float:
+    return factor if factor > 0.0 else -factor / columns.brake.tyre_radius
+
+
+def _effect(quantity: str, ratio: float) -> tuple[float, float, float]:
+    """Return the factors on friction, inertia and heating; `ratio`: of the true unit to the given."""
+    return {
+        "pressure": (ratio, 1.0, 1.0),
+        "torque": (1.0 / ratio, 1.0 / ratio, ratio),
+        "speed": (1.0, ratio, ratio),
+        "temperature": (1.0, 1.0, 1.0 / ratio),
+    }.get(quantity, (1.0, 1.0, 1.0))
+
+
+class Numbers(NamedTuple):
+    """The three numbers."""
+
+    friction: float
+    inertia: float
+    heating: float
+
+
+def measure(recording: Recording, columns: Columns, where: str) -> tuple[Numbers, Stops]:
+    """Return the three numbers of a recording, and its stops. Raises `UserError`, one line."""
+    free = columns.model_copy(update={"rig": columns.rig.model_copy(update={"inertia": None})})
+    stops = find_stops(recording, free, where)
+    radius = columns.brake.effective_radius
+    energy, rise = [], []
+    for begin, end in zip(stops.first[:-1], stops.first[1:], strict=True):
+        few = stops.per_block
+        energy.append(float((stops.torque[begin:end] * stops.speed[begin:end]).sum()) / radius * stops.dt)
+        temperature = stops.temperature
+        rise.append(temperature[end - few : end].mean() - temperature[begin : begin + few].mean())
+    hard = np.array(energy) >= np.median(energy)
+    heating = float(np.sum(np.array(rise)[hard]) / np.sum(np.array(energy)[hard]))
+    return Numbers(float(np.median(stops.mu)), stops.inertia, heating), stops
+
+
+def refuse_nonsense(recording: Recording, columns: Columns, where: str) -> Numbers:
+    """Return the three numbers of a recording that makes sense.
+
+    Raises:
+        UserError: it does not; names the column, the finding and the remedy.
+    """
+    hottest, coldest = float(recording.temperature.max()), float(recording.temperature.min())
+    if hottest > HOTTEST or coldest < COLDEST:
+        place = f"temperature {coldest:.0f} to {hottest:.0f} °C"
+        raise UserError(where, place, "no brake disc is that; check its unit, and the thermocouple")
+    if coldest > WARM:
+        raise UserError(where, f"temperature {coldest:.0f} °C and more", 'reads like K: give the unit "K"')
+    between = float(np.median(np.diff(recording.time)))
+    if not SAMPLES[0] <= between <= SAMPLES[1]:
+        raise UserError(where, f"time, {between:.3g} s between samples", "check its unit; 50 Hz are needed")
+    if np.ptp(recording.speed) < 1e-3:
+        raise UserError(where, "speed", "does not change; give the column of the disc's speed")
+    numbers, _ = measure(recording, columns, where)
+    mistake = likeliest(numbers, columns)
+    if mistake is not None:
+        raise UserError(where, f"{mistake.place} ({_found(numbers)})", mistake.remedy)
+    return numbers
+
+
+def likeliest(numbers: Numbers, columns: Columns) -> Mistake | None:
+    """Return the mistake that the three numbers tell, None if they make sense."""
+    known = (None, columns.rig.inertia, columns.disc.heating)
+    expected = np.array([given or usual for given, usual in zip(known, USUAL, strict=True)])
+    spread = [usual if given is None else GIVEN for given, usual in zip(known, TOLERANCE, strict=True)]
+    off = np.log(np.maximum(numbers, 1e-9)) - np.log(expected)
+    # The thermocouple lags and the air cools: a disc seems to heat less than it does.
+    off[2] += 0.15
+
+    def badness(mistake: Mistake) -> float:
+        return float(np.sum(((off - np.log(mistake[:3])) / spread) ** 2))
+
+    fine = Mistake(1.0, 1.0, 1.0, "", "")
+    if np.max(np.abs(off / spread)) < DOUBTFUL:
+        return None
+    best = min(mistakes(columns), key=badness)
+    if badness(best) + CLEARER < badness(fine):
+        return best
+    return fine._replace(place="brake", remedy="fits no known mistake: check areas, radii, inertia and disc")
+
+
+def _found(numbers: Numbers) -> str:
+    return (
+        f"friction {numbers.friction:.3g}, inertia {numbers.inertia:.3g} kg m², "
+        f"disc heated by {numbers.heating:.3g} K/J"
+    )

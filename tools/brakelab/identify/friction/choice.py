@@ -1,0 +1,154 @@
+"""`brake-ecu identify friction`: all laws on one recording, and the choice among them.
+
+Choice. Every law is identified twice: on all stops, and without those held out. Held out is the programme
+that was given for it, else the fifth of the stops that begin hottest: a law that only copies what it saw
+shows itself there. Least error on what is held out wins; of laws within 5 % of it, the least information
+criterion (Schwarz's, with stops as observations, since the residuals of one stop hang together). But what is
+held out lies 25 K beyond the rest, and a car brakes 100 K hotter than a programme: a law that goes on beyond
+the data must be better by a quarter than every one that stays what it is at their edge; of those within the
+quarter, the least criterion.
+"""
+
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from brakelab.identify.friction.candidates import candidates
+from brakelab.identify.friction.columns import Columns
+from brakelab.identify.friction.fit import Fitted, error_of, fit, refit
+from brakelab.identify.friction.stops import Stops, some
+from brakelab.plant.friction.law import Law, RigBrake
+
+HELD_OUT: Final = 0.2
+TIE: Final = 1.05
+STAYS: Final = 1.25  # of the least error, up to which a law that is bounded comes first
+PROCESSES: Final = 2
+
+
+class Judged(NamedTuple):
+    """A law that was identified."""
+
+    name: str
+    law: Law
+    starts_at_measured: bool
+    free: int
+    error: float  # nRMSE [%] on what it was identified with
+    held_out: float  # nRMSE [%] on what it had not seen
+    bounded: bool  # beyond the data stays what it is at their edge
+    criterion: float  # less is better
+    numbers: tuple[tuple[str, str, float, float], ...]  # name, unit, value, half of the interval of 95 %
+    unidentified: tuple[str, ...]
+    starts: str  # that agreed, of those tried
+    extrapolates: str
+
+
+class Identified(NamedTuple):
+    """All laws, in the order of `candidates`, and which was chosen."""
+
+    laws: tuple[Judged, ...]
+    chosen: Judged
+    stops: int
+    speed: tuple[float, float]  # m/s, sliding, least and greatest seen
+    pressure: tuple[float, float]  # Pa
+    temperature: tuple[float, float]  # degC
+
+
+class _Job(NamedTuple):
+    name: str
+    brake: RigBrake
+    stops: Stops
+    unseen: Stops | None
+    own: tuple[str, ...]
+
+
+def hottest(stops: Stops) -> tuple[Stops, Stops]:
+    """Return the stops without the fifth that begins hottest, and that fifth."""
+    order = np.argsort(stops.start_temperature, kind="stable")
+    cut = round((1.0 - HELD_OUT) * len(stops))
+    return some(stops, np.sort(order[:cut])), some(stops, np.sort(order[cut:]))
+
+
+def identify(
+    columns: Columns,
+    stops: Stops,
+    unseen: Stops | None,
+    progress: Callable[[str], None],
+    own: tuple[str, ...] = (),
+) -> Identified:
+    """Return all laws identified on `stops` and judged on `unseen`, by default the hottest of `stops`.
+
+    `progress` is told a line for each law; `own`: files and entry points of laws of one's own. Two processes.
+    """
+    names = [candidate.name for candidate in candidates(stops, columns.brake, own)]
+    jobs = [_Job(name, columns.brake, stops, unseen, own) for name in names]
+    done: dict[str, Judged] = {}
+    with ProcessPoolExecutor(PROCESSES, mp_context=get_context("spawn")) as pool:
+        running = [pool.submit(judge, job) for job in reversed(jobs)]  # the slowest first
+        for future in as_completed(running):
+            judged = future.result()
+            done[judged.name] = judged
+            progress(
+                f"{len(done)} of {len(jobs)}: {judged.name}, nRMSE {judged.error:.2f} %, "
+                f"unseen {judged.held_out:.2f} %, {judged.starts} starts agree"
+            )
+    laws = tuple(done[name] for name in names)
+    return Identified(
+        laws,
+        choose(laws),
+        len(stops),
+        _span(stops.speed),
+        _span(stops.held_pressure),
+        _span(stops.temperature),
+    )
+
+
+def judge(job: _Job) -> Judged:
+    """Return one law identified and judged."""
+    candidate = next(c for c in candidates(job.stops, job.brake, job.own) if c.name == job.name)
+    fitted = fit(candidate, job.brake, job.stops)
+    if job.unseen is None:
+        seen, unseen = hottest(job.stops)
+        law = refit(fitted, job.brake, seen)
+    else:
+        law, unseen = fitted.law, job.unseen
+    held_out = error_of(law, job.brake, unseen, candidate.starts_at_measured)
+    return Judged(
+        candidate.name,
+        fitted.law,
+        candidate.starts_at_measured,
+        len(candidate.free),
+        100.0 * float(np.sqrt(np.mean(fitted.residuals**2)) / np.mean(job.stops.mu)),
+        held_out,
+        candidate.bounded,
+        criterion(fitted, job.stops),
+        tuple(
+            (free.name, free.unit, value, float(half))
+            for free, value, half in zip(candidate.free, fitted.values, fitted.half, strict=True)
+        ),
+        tuple(fitted.unidentified()),
+        f"{fitted.agreed} of {fitted.tried}",
+        candidate.extrapolates,
+    )
+
+
+def criterion(fitted: Fitted, stops: Stops) -> float:
+    """Return n ln(mean square) + k ln n, n the number of stops."""
+    count = len(stops)
+    mean_square = max(float(np.mean(fitted.residuals**2)), 1e-300)
+    return count * float(np.log(mean_square)) + len(fitted.candidate.free) * float(np.log(count))
+
+
+def choose(laws: tuple[Judged, ...]) -> Judged:
+    """Return the law of least error on held-out data; see above for ties."""
+    least = min(judged.held_out for judged in laws)
+    staying = [judged for judged in laws if judged.bounded and judged.held_out <= STAYS * least]
+    tied = [judged for judged in laws if judged.held_out <= TIE * least]
+    return min(staying or tied, key=lambda judged: judged.criterion)
+
+
+def _span(values: np.ndarray) -> tuple[float, float]:
+    low, high = np.percentile(values, [0.5, 99.5])
+    return float(low), float(high)

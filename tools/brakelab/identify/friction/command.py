@@ -1,0 +1,200 @@
+"""`brake-ecu lab` and `brake-ecu identify friction`."""
+
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+from rich.console import Console
+
+from brakelab.identify.friction.ak_master import has_sections, load_sequence, means_table, run_sequence
+from brakelab.identify.friction.analysis import history_effect, principal_components
+from brakelab.identify.friction.candidates import candidates
+from brakelab.identify.friction.check import refuse_nonsense
+from brakelab.identify.friction.choice import identify
+from brakelab.identify.friction.columns import Columns
+from brakelab.identify.friction.dynamometer import new_bench, run_programme
+from brakelab.identify.friction.fit import fit
+from brakelab.identify.friction.heat_capacity import heat_capacity
+from brakelab.identify.friction.lining_file import write_lining
+from brakelab.identify.friction.page import write_report
+from brakelab.identify.friction.reader import read_recording
+from brakelab.identify.friction.recording import Recording, check_name, joined, write_recording
+from brakelab.identify.friction.stops import Stops, find_stops
+from brakelab.identify.friction.tables import (
+    component_table,
+    heat_line,
+    history_line,
+    law_tables,
+    number_table,
+    profile_table,
+    residual_table,
+)
+from brakelab.plant.description import PlantFileError, read_file
+from brakelab.plant.dynamometer_programme import load_programme
+from brakelab.plant.linings import Lining, Linings
+from brakelab.results.outputs import check_outputs
+from brakelab.results.progress import progress_bar
+from brakelab.results.text_table import show
+from ecu.errors import UserError
+from ecu.output import give, say, wrote
+from ecu.settings.resources import named, resource
+
+FEWEST: Final = 10
+"""Stops that identification needs."""
+HELD_OUT: Final = "the fifth of the stops that begins hottest"
+BETWEEN: Final = 600.0
+"""s between recordings."""
+
+
+def run(
+    programme: str, brake: str, seed: int, out: Path, law: str | None = None, linings: Path | None = None
+) -> int:
+    """Run a programme on the simulated dynamometer and write its recording. Returns 0.
+
+    `programme`: a file, or cpc, ams, ak-master, whose table of means is printed; `brake`: A, B or C, of which
+    `seed` draws a pad and the sensors, or a lining of the file `linings`; `law`: of the lining, not a pad.
+
+    Raises:
+        UserError: a programme, brake or law of that name does not exist, or `out` ends in something else.
+    """
+    check_name(out)
+    path, beside = named(programme, "config/rig"), out.with_suffix(".toml")
+    check_outputs(out, (out, beside), [path, *([linings] if linings else [])])
+    known = _linings(linings)
+    if brake not in known:
+        raise UserError("--brake", brake, f"no such brake; choose one of {', '.join(known)}")
+    lining = known[brake]
+    if linings is not None and law is None:
+        raise UserError("--law", "", f"missing; --linings has laws, no pads: {', '.join(lining.friction)}")
+    if law is not None and law not in lining.friction:
+        raise UserError("--law", law, f"no such law; choose one of {', '.join(lining.friction)}")
+    bench = new_bench(lining, brake, seed, law=law or "")
+    rig = bench.rig[0]
+    inertia = float(rig["mass"] * rig["tyre_radius"] ** 2)
+    if has_sections(path):
+        sequence = load_sequence(path)
+        with progress_bar("lab run", 1.0) as advance:
+            recording, means = run_sequence(bench, sequence, Columns.own(lining, inertia), advance)
+        show(Console(), means_table(f"{sequence.title}, {brake}", means))
+    else:
+        with progress_bar("lab run", 1.0) as advance:
+            recording = run_programme(bench, load_programme(path), advance)
+    write_recording(out, recording, lining, inertia)
+    hours, minutes = bench.time / 3600.0, recording.time.size / 200.0 / 60.0
+    say(f"{hours:.1f} h on the rig, {minutes:.0f} min recorded")
+    give(hours=hours, minutes_recorded=minutes)
+    lining_file = out.with_name(f"{out.stem}-lining.toml")
+    wrote(
+        out, beside, next=f"brake-ecu lab look {out}; brake-ecu identify friction {out} --out {lining_file}"
+    )
+    return 0
+
+
+def look(data: list[Path], columns: Path | None) -> int:
+    """Print principal components, the effect of the previous stop and the disc's heat. Returns 0."""
+    measured = _read(data, columns)
+    stops = measured.stops
+    _need(stops, data[0])
+    console = Console()
+    show(console, component_table(principal_components(stops)))
+    give(stops=len(stops))
+    console.print(history_line(history_effect(stops)), highlight=False)
+    console.print(heat_line(heat_capacity(stops, measured.columns)), highlight=False)
+    return 0
+
+
+def friction(
+    data: list[Path],
+    columns: Path | None,
+    held_out: Path | None,
+    out: Path,
+    profile: str | None = None,
+    own: tuple[str, ...] = (),
+) -> int:
+    """Identify all laws, print them, and write them with the chosen one as a lining file. Returns 0.
+
+    A page with the law's fit is written beside it, with the ending .html.
+
+    `data` are recordings of one brake; `columns` describes them all, default: the file beside each;
+    `held_out` is a recording that the choice is made by; `own` are laws of one's own.
+
+    Raises:
+        UserError: a file cannot be read or makes no physical sense, or holds too few stops; one line.
+    """
+    page = out.with_suffix(".html")
+    recordings = [*data, *([held_out] if held_out else [])]
+    described_by = [columns or path.with_suffix(".toml") for path in recordings]
+    check_outputs(out, (out, page), [*recordings, *described_by, *map(Path, own)], toml=True)
+    measured = _read(data, columns)
+    _need(measured.stops, data[0])
+    own = tuple(str(Path(code).resolve()) if code.endswith(".py") else code for code in own)
+    try:
+        known = candidates(measured.stops, measured.columns.brake, own)
+    except ValueError as error:
+        raise UserError("--own", "", str(error)) from None
+    laws = {candidate.name: candidate for candidate in known}
+    if profile is not None and profile not in laws:
+        raise UserError("--profile", profile, f"no such law; choose one of {', '.join(laws)}")
+    unseen = None if held_out is None else _read([held_out], columns).stops
+    described = HELD_OUT if held_out is None else str(held_out)
+    identified = identify(measured.columns, measured.stops, unseen, say, own)
+    tables = [
+        *law_tables(identified, described),
+        number_table(identified.chosen),
+        residual_table(identified.chosen, measured.columns, measured.stops),
+    ]
+    if profile is not None:
+        fitted = fit(laws[profile], measured.columns.brake, measured.stops)
+        tables.append(profile_table(fitted, measured.columns.brake, measured.stops, say))
+    for table in tables:
+        show(Console(), table)
+    write_lining(out, measured.columns, measured.heating, identified)
+    write_report(page, measured.columns, measured.stops, identified, tables)
+    give(chosen=identified.chosen.name, stops=identified.stops)
+    wrote(out, page)
+    say(f"{out}: the law chosen under the name SIM; {page}: how well and how far it holds")
+    return 0
+
+
+def _linings(path: Path | None) -> dict[str, Lining]:
+    """Return the linings of a file, or those that are shipped."""
+    if path is None:
+        return read_file(resource("config/plant/linings.toml"), Linings).lining
+    try:
+        return read_file(path, Linings).lining
+    except PlantFileError as error:
+        raise UserError(str(path), error.place, error.remedy) from None
+
+
+class _Measured(NamedTuple):
+    columns: Columns
+    stops: Stops
+    heating: float  # K/J
+
+
+def _read(data: list[Path], columns: Path | None) -> _Measured:
+    """Return the stops of recordings of one brake, one after the other."""
+    parts: list[Recording] = []
+    first: Columns | None = None
+    heating = []
+    for path in data:
+        read = read_recording(path, columns)
+        if read.damaged:
+            say(read.damaged)
+        if first is None:
+            first = read.columns
+        elif (read.columns.brake, read.columns.rig) != (first.brake, first.rig):
+            raise UserError(
+                str(path), "brake, rig", f"differ from those of {data[0]}; identify one brake at a time"
+            )
+        heating.append(refuse_nonsense(read.recording, read.columns, str(path)).heating)
+        begin = parts[-1].time[-1] + BETWEEN if parts else 0.0
+        parts.append(read.recording._replace(time=read.recording.time - read.recording.time[0] + begin))
+    assert first is not None
+    stops = find_stops(joined(parts), first, str(data[0]))
+    return _Measured(first, stops, float(np.median(heating)))
+
+
+def _need(stops: Stops, path: Path) -> None:
+    if len(stops) < FEWEST:
+        raise UserError(str(path), "", f"{len(stops)} stops; needs {FEWEST}")

@@ -1,0 +1,160 @@
+"""Reads the recording of a dynamometer, ours or a stranger's: CSV, Parquet or MDF4, by a file of columns.
+
+Rows whose numbers cannot be read, or whose time does not rise, are left out and counted. Torque and speed are
+turned to be positive; torque of one pad is doubled where the file of columns says so.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakelab.identify.friction.columns import UNITS, ZEROS, Columns, load_columns
+from brakelab.identify.friction.recording import NAMES, Recording
+from brakelab.logs.csv_rows import csv_columns, csv_rows
+from brakelab.logs.log_quality import Damage
+from ecu.errors import UserError
+
+Vector = NDArray[np.float64]
+Places = NDArray[np.int64]
+
+LEAST_SAMPLES = 100
+PLACES = {".csv": ("line", 2), ".txt": ("line", 2), ".parquet": ("row", 1), ".mf4": ("sample", 1)}
+"""Name of a row for each file ending, and the number of the first."""
+
+
+class Read(NamedTuple):
+    """Recording with its description."""
+
+    recording: Recording
+    columns: Columns
+    damaged: str
+    """Rows that were left out, one line; empty if none."""
+
+
+def read_recording(path: Path, columns: Path | None = None) -> Read:
+    """Return the recording `path`; `columns` defaults to the file of the same name that ends in .toml.
+
+    Raises:
+        UserError: a file, a column or a unit is missing or wrong, or too few rows are whole; one line.
+    """
+    if not path.is_file():
+        raise UserError(str(path), "", "no such file")
+    if path.suffix.lower() not in PLACES:
+        raise UserError(str(path), "", f"ends in none of {' '.join(PLACES)}; export it as CSV")
+    beside = columns or path.with_suffix(".toml")
+    if not beside.is_file():
+        raise UserError(
+            str(path), "", "no file of columns; give --columns (docs/results/friction-lab.md has one)"
+        )
+    described = load_columns(beside)
+    names = [getattr(described.columns, quantity)[0] for quantity in NAMES]
+    damage = Damage()
+    word, first = PLACES[path.suffix.lower()]
+    lines, raw = _joined(list(_rows(path, names, damage, first)))
+    whole = np.isfinite(raw)
+    missing = ~whole.all(axis=0)
+    if missing.any():
+        row = int(np.argmax(missing))
+        name = names[int(np.argmin(whole[:, row]))]
+        damage.note_damage(int(missing.sum()), f"{word} {lines[row]} ({name} is no number)")
+    lines, raw = lines[~missing], raw[:, ~missing]
+    back = np.concatenate([[False], raw[0, 1:] <= np.maximum.accumulate(raw[0])[:-1]])[: raw.shape[1]]
+    if back.any():
+        damage.note_damage(int(back.sum()), f"{word} {lines[int(np.argmax(back))]} (time does not rise)")
+    raw = raw[:, ~back]
+    if raw.shape[1] < LEAST_SAMPLES:
+        because = f"; first left out: {damage.first_damaged}" if damage.damaged else ""
+        raise UserError(str(path), "", f"only {raw.shape[1]} whole rows; needs {LEAST_SAMPLES}{because}")
+    rows = "row" if damage.damaged == 1 else "rows"
+    note = (
+        f"{path}: {damage.damaged} {rows} left out, first: {damage.first_damaged}" if damage.damaged else ""
+    )
+    cut = f"{path}: {damage.cut}" if damage.cut else ""
+    return Read(_in_si(raw, described), described, "; ".join(part for part in (note, cut) if part))
+
+
+def _joined(blocks: list[tuple[Places, Vector]]) -> tuple[Places, Vector]:
+    lines = [lines for lines, _ in blocks]
+    rows = [rows for _, rows in blocks]
+    return np.concatenate([np.empty(0, np.int64), *lines]), np.concatenate([np.empty((5, 0)), *rows], axis=1)
+
+
+def _rows(path: Path, names: list[str], damage: Damage, first: int) -> Iterator[tuple[Places, Vector]]:
+    """Yield where rows stand in the file, and their columns as numbers in its units, shape (5, rows)."""
+    if path.suffix.lower() == ".mf4":
+        channels = _mdf(path, names)
+        yield first + np.arange(channels.shape[1]), channels
+        return
+    if path.suffix.lower() == ".parquet":
+        import pyarrow.parquet as pq
+
+        _refuse_missing(path, names, pq.read_schema(path).names)
+        table = pq.read_table(path, columns=names)
+        columns = np.array([_column(path, name, table[name]) for name in names])
+        yield first + np.arange(columns.shape[1]), columns
+        return
+    found, delimiter = csv_columns(path)
+    _refuse_missing(path, names, found)
+    for lines, batch in csv_rows(path, found, delimiter, list(dict.fromkeys(names)), damage):
+        cells = {name: _numbers(batch.column(name).to_pylist()) for name in dict.fromkeys(names)}
+        yield lines, np.array([cells[name] for name in names])
+
+
+def _refuse_missing(path: Path, names: list[str], found: list[str]) -> None:
+    for name in names:
+        if name not in found:
+            raise UserError(str(path), name, f"no such column; the file has {', '.join(found[:20])}")
+
+
+def _column(path: Path, name: str, column: Any) -> Vector:
+    try:
+        return np.asarray(column.to_numpy().astype(float))
+    except (TypeError, ValueError):
+        raise UserError(str(path), name, f"is {column.type}, not numbers; write it as float") from None
+
+
+def _numbers(cells: list[str | None]) -> Vector:
+    def number(cell: str | None) -> float:
+        try:
+            return float(cell) if cell else np.nan
+        except ValueError:
+            return np.nan
+
+    return np.array([number(cell) for cell in cells])
+
+
+def _mdf(path: Path, names: list[str]) -> Vector:
+    """Return channels of an MDF4 file on the time of the pressure, shape (5, rows)."""
+    try:
+        from asammdf import MDF
+    except ImportError:
+        raise UserError(str(path), "", "MDF4 needs asammdf: pip install asammdf") from None
+    with MDF(path) as file:
+        _refuse_missing(path, names[1:], list(file.channels_db))
+        pressure = file.get(names[1])
+        time = np.asarray(pressure.timestamps, dtype=float)
+        others = [file.get(name) for name in names[2:]]
+        values = [np.interp(time, other.timestamps, np.asarray(other.samples, float)) for other in others]
+        return np.array([time, np.asarray(pressure.samples, float), *values])
+
+
+def _in_si(raw: Vector, described: Columns) -> Recording:
+    """Return the numbers of a file in the units of a recording."""
+    si = {}
+    for quantity, values in zip(NAMES, raw, strict=True):
+        unit = getattr(described.columns, quantity)[1]
+        factor = UNITS[quantity][unit]
+        if factor < 0.0:
+            factor = -factor / described.brake.tyre_radius
+        si[quantity] = (values - ZEROS.get(unit, 0.0)) * factor
+    si["torque"] = _positive(si["torque"]) * (2.0 / described.rig.pads)
+    si["speed"] = _positive(si["speed"])
+    return Recording(**si)
+
+
+def _positive(values: Vector) -> Vector:
+    """Return `values` with the sign that makes their sum positive: noise about zero keeps its own."""
+    return -values if values.sum() < 0.0 else values

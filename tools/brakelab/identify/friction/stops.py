@@ -1,0 +1,191 @@
+"""Finds the stops in a recording and makes friction of torque and pressure (3.1, 3.2).
+
+A stop is an application of the brake above 1.5 bar without a gap in time, of 0.5 s and more, in which the
+speed falls by a tenth and more; drags are no stops. Friction follows from T = 2 mu_b (p - p_0) A_k r_eff
+(A.19, corrected: A_k sums the pistons of a side) by least squares: recursively with forgetting for a curve
+over time, in blocks of 50 ms (the same without forgetting, begun anew) for identification, whose errors are
+then independent.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakelab.identify.friction.columns import Columns
+from brakelab.identify.friction.recording import Recording
+from brakelab.plant.jit import Record, kernel
+from brakelab.stretches import stretches
+from ecu.errors import UserError
+
+Vector = NDArray[np.float64]
+Places = NDArray[np.int64]
+
+APPLIED: Final = 1.5e5  # Pa
+SHORTEST: Final = 0.5  # s
+GAP: Final = 0.1  # s
+BLOCK: Final = 0.05  # s
+MEMORY: Final = 0.1  # s, of the recursive least squares
+RISEN: Final = 0.9  # of the pressure that a stop holds: from here friction counts (SAE J2522)
+
+
+@dataclass(frozen=True)
+class Stops:
+    """All stops of a recording, one after the other; samples of stop k: first[k] to first[k + 1].
+
+    Blocks are those samples that count, in groups of `per_block`; block j of stop k has the samples from
+    block_first[j] on.
+    """
+
+    first: Places  # (stops + 1,)
+    dt: float  # s
+    pressure: Vector  # (samples,) Pa, on the pads
+    speed: Vector  # m/s, sliding
+    temperature: Vector  # degC
+    slowing: Vector  # rad/s^2, by the brake torque
+    torque: Vector  # N m
+    per_block: int
+    block_first: Places  # (blocks,)
+    block_stop: Places  # (blocks,), the stop of each
+    mu: Vector  # (blocks,), measured
+    mean: Vector  # (stops,), over distance, of the recursive curve (SAE J2522)
+    start_speed: Vector  # (stops,), m/s, sliding
+    start_temperature: Vector  # (stops,), degC
+    held_pressure: Vector  # (stops,), Pa, mean where friction counts
+    inertia: float  # kg m^2
+
+    def __len__(self) -> int:
+        return len(self.mean)
+
+
+@kernel
+def recursive_friction(torque: Record, pressed: Record, forget: float, out: Record) -> None:
+    """Write friction over time by recursive least squares of `torque` over `pressed`, its lever [N m]."""
+    mu, information = 0.0, 1e-3
+    for k in range(len(torque)):
+        information = forget * information + pressed[k] * pressed[k]
+        mu += pressed[k] / information * (torque[k] - pressed[k] * mu)
+        out[k] = mu
+
+
+def friction_over_time(torque: Vector, pressure: Vector, lever: float, dt: float) -> Vector:
+    """Return mu_b, shape as `torque` [N m]; `pressure` [Pa] on the pads, `lever` 2 A_k r_eff [m^3]."""
+    out = np.empty_like(torque)
+    recursive_friction(torque, lever * pressure, float(np.exp(-dt / MEMORY)), out)
+    return out
+
+
+def find_stops(recording: Recording, columns: Columns, where: str) -> Stops:
+    """Return the stops of a recording. Raises `UserError` naming `where` if there is none."""
+    time = recording.time
+    dt = float(np.median(np.diff(time)))
+    pressed = np.maximum(recording.pressure - 1e5 * columns.rig.push_out_pressure, 0.0)
+    runs = [run for run in _applications(time, pressed) if _is_stop(recording, run, dt)]
+    if not runs:
+        raise UserError(where, "", "no stop found: pressure above 1.5 bar for 0.5 s while the speed falls")
+    lever = 2.0 * columns.brake.piston_area * columns.brake.effective_radius
+    inertia = columns.rig.inertia or _inertia(recording, runs)
+    picked = np.concatenate([np.arange(*run) for run in runs])
+    first = np.concatenate([[0], np.cumsum([end - begin for begin, end in runs])])
+    radius = columns.brake.effective_radius
+    torque, pressure = recording.torque[picked], pressed[picked]
+    speed = radius * recording.speed[picked]
+    per_block = max(round(BLOCK / dt), 1)
+    starts, owners, mu, mean, held = [], [], [], [], []
+    for stop, (begin, end) in enumerate(pairwise(first)):
+        on = pressure[begin:end]
+        risen = begin + int(np.argmax(on >= RISEN * np.median(on[on > APPLIED])))
+        count = (end - risen) // per_block
+        blocks = risen + per_block * np.arange(count)
+        use = blocks[:, None] + np.arange(per_block)
+        lever_arm = lever * pressure[use]
+        found = (torque[use] * lever_arm).sum(axis=1) / (lever_arm**2).sum(axis=1)
+        starts.append(blocks)
+        owners.append(np.full(count, stop))
+        mu.append(found)
+        curve = friction_over_time(torque[begin:end], on, lever, dt)
+        mean.append(np.average(curve[risen - begin :], weights=speed[risen:end]))
+        held.append(pressure[risen:end].mean())
+    return Stops(
+        first.astype(np.int64),
+        dt,
+        pressure,
+        speed,
+        recording.temperature[picked],
+        torque / inertia,
+        torque,
+        per_block,
+        np.concatenate(starts).astype(np.int64),
+        np.concatenate(owners).astype(np.int64),
+        np.concatenate(mu),
+        np.array(mean),
+        np.array([speed[begin : begin + per_block].mean() for begin in first[:-1]]),
+        np.array([recording.temperature[run[0] : run[0] + per_block].mean() for run in runs]),
+        np.array(held),
+        inertia,
+    )
+
+
+def some(stops: Stops, wanted: Places) -> Stops:
+    """Return the stops of the numbers `wanted`, in this order."""
+    spans = [np.arange(stops.first[k], stops.first[k + 1]) for k in wanted]
+    picked = np.concatenate(spans)
+    first = np.concatenate([[0], np.cumsum([len(span) for span in spans])])
+    blocks = [np.flatnonzero(stops.block_stop == k) for k in wanted]
+    moved = [
+        stops.block_first[block] - stops.first[k] + begin
+        for block, k, begin in zip(blocks, wanted, first, strict=False)
+    ]
+    owners = [np.full(len(block), place) for place, block in enumerate(blocks)]
+    sampled = ("pressure", "speed", "temperature", "slowing", "torque")
+    each = ("mean", "start_speed", "start_temperature", "held_pressure")
+    return replace(
+        stops,
+        first=first.astype(np.int64),
+        block_first=np.concatenate(moved).astype(np.int64),
+        block_stop=np.concatenate(owners).astype(np.int64),
+        mu=stops.mu[np.concatenate(blocks)],
+        **{name: getattr(stops, name)[picked] for name in sampled},
+        **{name: getattr(stops, name)[wanted] for name in each},
+    )
+
+
+def _applications(time: Vector, pressed: Vector) -> list[tuple[int, int]]:
+    on = pressed > APPLIED
+    # Noise about the threshold is no release: fill what is shorter than five samples.
+    runs: list[tuple[int, int]] = []
+    for begin, end in stretches(on):
+        if runs and begin - runs[-1][1] <= 5 and time[begin] - time[runs[-1][1] - 1] <= GAP:
+            runs[-1] = (runs[-1][0], int(end))
+        else:
+            runs.append((int(begin), int(end)))
+    whole = []
+    for begin, end in runs:
+        cuts = begin + 1 + np.flatnonzero(np.diff(time[begin:end]) > GAP)
+        bounds = [begin, *(int(cut) for cut in cuts), end]
+        whole += list(pairwise(bounds))
+    return whole
+
+
+def _is_stop(recording: Recording, run: tuple[int, int], dt: float) -> bool:
+    begin, end = run
+    few = max(round(BLOCK / dt), 1)
+    if (end - begin) * dt < SHORTEST:
+        return False
+    before = recording.speed[begin : begin + few].mean()
+    return bool(recording.speed[end - few : end].mean() < 0.9 * before)
+
+
+def _inertia(recording: Recording, runs: list[tuple[int, int]]) -> float:
+    """Return the inertia [kg m^2] that the torque impulse over the loss of speed tells, the stops' median."""
+    found = []
+    few = 5
+    for begin, end in runs:
+        first, last = slice(begin, begin + few), slice(end - few, end)
+        middle = slice(begin + few // 2, end - few // 2)
+        impulse = float(np.trapezoid(recording.torque[middle], recording.time[middle]))
+        loss = float(recording.speed[first].mean() - recording.speed[last].mean())
+        found.append(impulse / loss)
+    return float(np.median(found))

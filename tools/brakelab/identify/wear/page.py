@@ -1,0 +1,103 @@
+"""Panels of a wear law: specific wear (Figure 7.9), sensitivity (Figure 7.10), residuals."""
+
+from typing import Final
+
+import numpy as np
+
+from brakelab.identify.wear.curves import Array, sensitivity, specific_wear, wear_surface
+from brakelab.identify.wear.fit import Fit
+from brakelab.identify.wear.reader import Block
+from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Cells, Line, Panel
+
+MOTION: Final = ((5.0, BLUE), (20.0, GREEN), (50.0, ORANGE))  # kW of friction
+DECEL: Final = 2.0  # m/s^2 of the surface
+SPEED: Final = np.linspace(20.0, 140.0, 25)  # km/h
+HEAT: Final = np.linspace(20.0, 400.0, 39)  # degC
+FRICTION_ERRORS: Final = np.linspace(-0.3, 0.3, 31)
+HEAT_ERRORS: Final = np.linspace(-50.0, 50.0, 41)  # K
+LEGEND: Final = (
+    ("5 kW, or coolest block", BLUE),
+    ("20 kW", GREEN),
+    ("50 kW, or hottest block", ORANGE),
+    ("quasi-static", PINK),
+)
+
+
+def curve_panel(extended: Array, static: Array) -> Panel:
+    """Return specific wear over disc temperature for a few powers."""
+    lines = [
+        Line(HEAT, specific_wear(extended, HEAT, 1e-3 * power, 0.15), colour) for power, colour in MOTION
+    ]
+    lines.append(Line(HEAT, specific_wear(static, HEAT, 0.0, 0.0), PINK, True))
+    top = 1.1 * max(float(line.y.max()) for line in lines)
+    return Panel("specific wear [g/MJ]", "disc [degC]", (20.0, 400.0), (0.0, top), lines)
+
+
+def surface_panel(coefficients: Array, mass: float, name: str) -> Panel:
+    """Return specific wear over speed and disc temperature as coloured cells."""
+    speed, heat = (0.5 * (edges[1:] + edges[:-1]) for edges in (SPEED, HEAT))
+    value = wear_surface(coefficients, speed / 3.6, heat, DECEL, mass)
+    low, high = 0.0, float(value.max())
+    title = f"{name}, {value.min():.2f} to {high:.2f} (dark) g/MJ; disc [degC]"
+    cells = Cells(SPEED, HEAT, value, low, high)
+    ends = ((float(SPEED[0]), float(SPEED[-1])), (float(HEAT[0]), float(HEAT[-1])))
+    return Panel(title, f"speed [km/h], at {DECEL:.0f} m/s²", *ends, [], cells=cells)
+
+
+def sensitivity_panels(extended: Array, static: Array, cool: Array, hot: Array) -> list[Panel]:
+    """Return the error of wear over errors of friction and of temperature, for two blocks' regressors."""
+    panels = []
+    for of, errors, scale, name in (
+        ("friction", FRICTION_ERRORS, 100.0, "error of friction [%]"),
+        ("temperature", HEAT_ERRORS, 1.0, "error of disc temperature [K]"),
+    ):
+        lines = [
+            Line(scale * errors, 100.0 * sensitivity(extended, x, errors, of), colour)
+            for x, colour in ((cool, BLUE), (hot, ORANGE))
+        ]
+        lines.append(Line(scale * errors, 100.0 * sensitivity(static, hot, errors, of), PINK, True))
+        wide = max(1.1 * max(float(np.abs(line.y).max()) for line in lines), 1.0)
+        ends = (scale * float(errors[0]), scale * float(errors[-1]))
+        panels.append(Panel("error of wear [%]", name, ends, (-wide, wide), lines))
+    return panels
+
+
+def residual_panels(blocks: list[Block], mass: Array, fit: Fit) -> list[Panel]:
+    """Return law over measured, and residuals over temperature, energy and order of the blocks."""
+    most = 1.05 * float(max(mass.max(), fit.predicted.max()))
+    residual = 100.0 * (fit.predicted / mass - 1.0)
+    left_out = 100.0 * (fit.left_out / mass - 1.0)
+    wide = max(1.2 * float(np.abs(np.concatenate([residual, left_out])).max()), 1.0)
+    diagonal = np.array([0.0, most])
+    panels = [
+        Panel("by the law over measured [g]", "measured [g]", (0.0, most), (0.0, most), [
+            Line(diagonal, diagonal, GREY, True), Line(mass, fit.predicted, BLUE, marks=True),
+        ])
+    ]  # fmt: skip
+    for name, x in (
+        ("mean disc temperature [degC]", np.array([block.temperature for block in blocks])),
+        ("energy [MJ]", np.array([block.regressors[0] for block in blocks])),
+        ("block, in the order measured", np.arange(1.0, len(blocks) + 1.0)),
+    ):
+        margin = 0.06 * max(float(np.ptp(x)), 1e-6)
+        ends = (float(x.min()) - margin, float(x.max()) + margin)
+        lines = [
+            Line(np.array(ends), np.zeros(2), GREY, True),
+            Line(x, left_out, ORANGE, marks=True),
+            Line(x, residual, BLUE, marks=True),
+        ]
+        panels.append(Panel("residual [%], block left out orange", name, ends, (-wide, wide), lines))
+    return panels
+
+
+def law_panels(blocks: list[Block], mass: Array, fit: Fit, static: Fit, of_brake: float) -> list[Panel]:
+    """Return all panels of an identified law; `of_brake`: mass that one brake slows [kg]."""
+    heat = [block.temperature for block in blocks]
+    cool, hot = blocks[int(np.argmin(heat))].regressors, blocks[int(np.argmax(heat))].regressors
+    extended, quasi_static = fit.coefficients, static.coefficients
+    return [
+        curve_panel(extended, quasi_static),
+        surface_panel(extended, of_brake, "extended"),
+        *sensitivity_panels(extended, quasi_static, cool, hot),
+        *residual_panels(blocks, mass, fit),
+    ]
