@@ -196,7 +196,7 @@ def _wear(asked: Asked) -> Measured:
 
 
 def _dust(asked: Asked) -> Measured:
-    from brakelab.identify.dust.command import LEGEND
+    from brakelab.identify.dust.page import LEGEND
     from brakelab.studies import dust
 
     tables, panels = dust.dust_page(partial(each_car, "dust"), min(asked.seeds, dust.DRAWS))

@@ -6,8 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from brakelab.identify.dust.command import dust_panels
-from brakelab.identify.dust.page import THESIS, spearman_table, trip_table
+from brakelab.identify.dust.page import THESIS, dust_panels, spearman_table, trip_table
 from brakelab.results import euro7
 from brakelab.results.chart import Panel
 from brakelab.results.text_table import Table

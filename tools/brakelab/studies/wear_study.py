@@ -7,8 +7,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from brakelab.identify.wear.command import ROAD, leave_one_out
-from brakelab.identify.wear.fit import QUASI_STATIC, Fit, fit_law
+from brakelab.identify.wear.command import ROAD
+from brakelab.identify.wear.fit import QUASI_STATIC, Fit, fit_law, leave_one_out
 from brakelab.identify.wear.fusion import fuse
 from brakelab.identify.wear.reader import stop_regressors
 from brakelab.simulation.campaigns.wear_blocks import (

@@ -1,25 +1,17 @@
 """Identification of dust (`brake-ecu identify dust`): emission models from trips with a particle counter."""
 
 from pathlib import Path
-from typing import Final
-
-import numpy as np
 
 from brakelab.identify.config_file import Section, write_car
-from brakelab.identify.dust.features import Applications, Array
+from brakelab.identify.dust.features import Array
 from brakelab.identify.dust.fit import Judged, choose, judge_all, ranges
-from brakelab.identify.dust.model import LEAST
-from brakelab.identify.dust.page import model_table, spearman_table, trip_table
+from brakelab.identify.dust.page import write_page
 from brakelab.identify.dust.reader import read_trips
-from brakelab.results.chart import BLUE, GREY, ORANGE, PINK, Line, Panel, write_chart
 from brakelab.results.outputs import check_outputs, config_files
-from brakelab.results.text_table import markdown
 from ecu.contract.dust import MODELS
 from ecu.errors import UserError
 from ecu.output import give, wrote
 from ecu.settings.config import Axle, load_config, new_params
-
-LEGEND: Final = (("chosen", BLUE), ("others", ORANGE), ("95 %, and the background's line", PINK))
 
 
 def _numbers(values: Array) -> str:
@@ -42,55 +34,6 @@ def dust_section(chosen: Judged, trained: tuple[Array, Array]) -> Section:
         "below": (f"{chosen.below:.4f}", "95 % of the emission factor, conformal"),
         "above": (f"{chosen.above:.4f}", ""),
     }
-
-
-def _pairs(judged: Judged, trips: list[Applications]) -> tuple[Array, Array]:
-    """Return counted and predicted EF in the order of the counted one."""
-    features, sequences, counted = (
-        np.concatenate([getattr(trip, name) for trip in trips])
-        for name in ("features", "sequences", "particles")
-    )
-    known = counted > LEAST
-    measured = np.log10(counted[known])
-    order = np.argsort(measured)
-    return measured[order], judged.model.predict(features, sequences)[known][order]
-
-
-def dust_panels(trips: list[Applications], judged: list[Judged], chosen: Judged) -> list[Panel]:
-    """Return Figures 8.2 and 8.8: background by speed, and predicted over counted EF of the tests."""
-    shown = [trip for trip in trips if trip.test] or trips
-    first = shown[0].background
-    top = 1.3 * float(max(first.levels.max(initial=1.0), first.still))
-    speed = np.linspace(0.0, 35.0, 50)
-    line = first.still + first.by_speed * speed
-    panels = [
-        Panel("background [1/cm³]", "speed [m/s]", (0.0, 35.0), (0.0, max(top, float(line[-1]))), [
-            Line(first.speeds, first.levels, BLUE), Line(speed, line, PINK, True),
-        ])
-    ]  # fmt: skip
-    for one in judged:
-        if one is not chosen and one.name not in ("LUT", "static ANN"):
-            continue
-        counted, said = _pairs(one, shown)
-        ends = float(np.floor(min(counted.min(), said.min()))), float(np.ceil(max(counted.max(), said.max())))
-        diagonal = np.array(ends)
-        lines = [
-            Line(counted, said, BLUE if one is chosen else ORANGE),
-            Line(diagonal, diagonal, GREY),
-            Line(diagonal, diagonal - one.below, PINK, True),
-            Line(diagonal, diagonal - one.above, PINK, True),
-        ]
-        panels.append(Panel(f"EF by {one.name}", "EF counted", ends, ends, lines))
-    return panels
-
-
-def write_page(page: Path, trips: list[Applications], judged: list[Judged], chosen: Judged) -> None:
-    """Write the tables with Figures 8.2 and 8.8 above them."""
-    picture = page.with_suffix(".svg")
-    write_chart(picture, dust_panels(trips, judged, chosen), LEGEND)
-    tables = [model_table(judged, chosen), trip_table(trips), spearman_table(trips)]
-    head = f"# Emission of one brake by {len(trips)} trips\n\n![Figures 8.2 and 8.8]({picture.name})\n\n"
-    page.write_text(head + "\n".join(map(markdown, tables)).rstrip() + "\n", encoding="utf-8")
 
 
 def identify_dust(manifest: Path, config: Path, axle: str, out: Path) -> int:

@@ -1,13 +1,17 @@
-"""Tables of an identification of dust: trips as Table 8.1, models by the KPIs of Table 8.3, Figure 8.6."""
+"""Page of an identification of dust: trips (Table 8.1), models by Table 8.3, Figures 8.2, 8.6 and 8.8."""
 
+from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from brakelab.identify.dust.features import Applications
+from brakelab.identify.dust.features import Applications, Array
 from brakelab.identify.dust.fit import Judged, spearman
-from brakelab.results.text_table import Table
+from brakelab.identify.dust.model import LEAST
+from brakelab.results.chart import BLUE, GREY, ORANGE, PINK, Line, Panel, write_chart
+from brakelab.results.text_table import Table, markdown
 
+LEGEND: Final = (("chosen", BLUE), ("others", ORANGE), ("95 %, and the background's line", PINK))
 THESIS: Final = {"LUT": -32.68, "static ANN": -9.07, "dynamic ANN": -3.95}
 """%, sum of particles of Trip 8, Table 8.2."""
 
@@ -85,3 +89,52 @@ def spearman_table(trips: list[Applications]) -> Table:
         (name, *(f"{value:+.2f}" for value in row)) for name, row in zip(names, np.array(matrix), strict=True)
     ]
     return Table("Spearman", ("", *names), rows, "Rank correlations of all trips, as Figure 8.6.")
+
+
+def _pairs(judged: Judged, trips: list[Applications]) -> tuple[Array, Array]:
+    """Return counted and predicted EF in the order of the counted one."""
+    features, sequences, counted = (
+        np.concatenate([getattr(trip, name) for trip in trips])
+        for name in ("features", "sequences", "particles")
+    )
+    known = counted > LEAST
+    measured = np.log10(counted[known])
+    order = np.argsort(measured)
+    return measured[order], judged.model.predict(features, sequences)[known][order]
+
+
+def dust_panels(trips: list[Applications], judged: list[Judged], chosen: Judged) -> list[Panel]:
+    """Return Figures 8.2 and 8.8: background by speed, and predicted over counted EF of the tests."""
+    shown = [trip for trip in trips if trip.test] or trips
+    first = shown[0].background
+    top = 1.3 * float(max(first.levels.max(initial=1.0), first.still))
+    speed = np.linspace(0.0, 35.0, 50)
+    line = first.still + first.by_speed * speed
+    panels = [
+        Panel("background [1/cm³]", "speed [m/s]", (0.0, 35.0), (0.0, max(top, float(line[-1]))), [
+            Line(first.speeds, first.levels, BLUE), Line(speed, line, PINK, True),
+        ])
+    ]  # fmt: skip
+    for one in judged:
+        if one is not chosen and one.name not in ("LUT", "static ANN"):
+            continue
+        counted, said = _pairs(one, shown)
+        ends = float(np.floor(min(counted.min(), said.min()))), float(np.ceil(max(counted.max(), said.max())))
+        diagonal = np.array(ends)
+        lines = [
+            Line(counted, said, BLUE if one is chosen else ORANGE),
+            Line(diagonal, diagonal, GREY),
+            Line(diagonal, diagonal - one.below, PINK, True),
+            Line(diagonal, diagonal - one.above, PINK, True),
+        ]
+        panels.append(Panel(f"EF by {one.name}", "EF counted", ends, ends, lines))
+    return panels
+
+
+def write_page(page: Path, trips: list[Applications], judged: list[Judged], chosen: Judged) -> None:
+    """Write the tables with Figures 8.2 and 8.8 above them."""
+    picture = page.with_suffix(".svg")
+    write_chart(picture, dust_panels(trips, judged, chosen), LEGEND)
+    tables = [model_table(judged, chosen), trip_table(trips), spearman_table(trips)]
+    head = f"# Emission of one brake by {len(trips)} trips\n\n![Figures 8.2 and 8.8]({picture.name})\n\n"
+    page.write_text(head + "\n".join(map(markdown, tables)).rstrip() + "\n", encoding="utf-8")

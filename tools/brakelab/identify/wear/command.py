@@ -1,4 +1,4 @@
-"""Identification of wear (`brake-ecu identify wear`): wear law from dynamometer blocks, as a CONFIG; page."""
+"""Identification of wear (`brake-ecu identify wear`): wear law from dynamometer blocks, as a CONFIG."""
 
 from pathlib import Path
 from typing import Final
@@ -7,95 +7,17 @@ import numpy as np
 
 from brakelab.identify.config_file import Section, write_car
 from brakelab.identify.wear.curves import SHARE
-from brakelab.identify.wear.fit import QUASI_STATIC, TERMS, UNITS, Fit, fit_law
-from brakelab.identify.wear.fusion import Fused, fuse
-from brakelab.identify.wear.page import LEGEND, law_panels
-from brakelab.identify.wear.reader import Array, Block, Heat, read_blocks
-from brakelab.results.chart import write_chart
+from brakelab.identify.wear.fit import QUASI_STATIC, TERMS, UNITS, Fit, fit_law, leave_one_out
+from brakelab.identify.wear.fusion import fuse
+from brakelab.identify.wear.page import tables, write_page
+from brakelab.identify.wear.reader import Heat, read_blocks
 from brakelab.results.outputs import check_outputs, config_files
-from brakelab.results.text_table import Table, markdown
 from ecu.errors import UserError
 from ecu.output import give, wrote
 from ecu.settings.config import Axle, load_config
 
 COOLING_SPEED: Final = 15.0  # m/s, speed of cooling between stops, assumed
 ROAD: Final = 0.10  # relative: difference of the road from a laboratory (section 7.6)
-
-
-def leave_one_out(fit: Fit, mass: Array) -> float:
-    """Return the RMS relative error of blocks by the law identified from the others."""
-    return float(np.sqrt(np.mean((fit.left_out / mass - 1.0) ** 2)))
-
-
-def tables(blocks: list[Block], fused: Fused, fit: Fit, static: Fit) -> list[Table]:
-    """Return coefficients, blocks and the comparison of the two laws as tables."""
-    coefficients = [
-        (name, unit, f"{value:.4g}", f"{low:.4g}–{high:.4g}" if value else "pruned")
-        for name, unit, value, low, high in zip(
-            TERMS, UNITS, fit.coefficients, fit.low, fit.high, strict=True
-        )
-    ]
-    rows = [
-        (
-            block.name,
-            f"{block.applications}",
-            f"{block.regressors[0]:.1f}",
-            f"{block.temperature:.0f}",
-            f"{mass:.3f}",
-            f"{predicted:.3f}",
-            f"{100 * (predicted / mass - 1):+.1f}",
-            f"{100 * (left_out / mass - 1):+.1f}",
-        )
-        for block, mass, predicted, left_out in zip(
-            blocks, fused.mass, fit.predicted, fit.left_out, strict=True
-        )
-    ]
-    laws = [
-        (
-            name,
-            f"{each.r2:.4f}",
-            f"{100 * leave_one_out(each, fused.mass):.1f}",
-            f"{100 * each.scatter:.1f}",
-            f"{each.criterion:.1f}",
-            f"{each.rank}",
-        )
-        for name, each in (("extended (7.13)", fit), ("quasi-static (7.14)", static))
-    ]
-    slope = f"{fused.slope:.2f} g/mm" if np.isfinite(fused.slope) else "not measured"
-    return [
-        Table(
-            "Law",
-            ("term", "unit", "value", "95 % confidence"),
-            coefficients,
-            "Of both pads of a calliper, disc in degC; terms that do not lower AICc are pruned.",
-        ),
-        Table(
-            "Blocks",
-            ("block", "applications", "energy [MJ]", "disc [degC]", "mass [g]", "law [g]", "error [%]",
-             "left out [%]"),
-            rows,
-            f"Mass: balance and thickness blended (7.11); mass over linear wear K: {slope}. Left out: by the "
-            "law of the other blocks.",
-        ),
-        Table(
-            "The two laws",
-            ("law", "R²", "left out, RMS [%]", "scatter [%]", "AICc", "rank"),
-            laws,
-            "Rank: of the scaled regressors; no law has more terms.",
-        ),
-    ]  # fmt: skip
-
-
-def write_page(page: Path, blocks: list[Block], fused: Fused, fit: Fit, static: Fit, of_brake: float) -> None:
-    """Write the tables and the panels of the law; `of_brake`: mass that one brake slows [kg]."""
-    picture = page.with_suffix(".svg")
-    write_chart(picture, law_panels(blocks, fused.mass, fit, static, of_brake), LEGEND)
-    parts = [markdown(table) for table in tables(blocks, fused, fit, static)]
-    head = (
-        f"# Wear law of {len(blocks)} blocks\n\n![Specific wear (Figure 7.9), sensitivity (Figure 7.10), "
-        f"residuals]({picture.name})\n\n"
-    )
-    page.write_text(head + "\n".join(parts).rstrip() + "\n", encoding="utf-8")
 
 
 def law_section(fit: Fit, error: float) -> Section:

@@ -140,3 +140,8 @@ def fit_law(
     spread = float(np.sum((mass - mass.mean()) ** 2))
     r2 = 1.0 - float(np.sum((mass - predicted) ** 2)) / spread
     return Fit(coefficients, low, high, predicted, left_out, scatter, r2, criterion, rank, condition)
+
+
+def leave_one_out(fit: Fit, mass: Array) -> float:
+    """Return the RMS relative error of blocks by the law identified from the others."""
+    return float(np.sqrt(np.mean((fit.left_out / mass - 1.0) ** 2)))

@@ -1,13 +1,16 @@
-"""Panels of a wear law: specific wear (Figure 7.9), sensitivity (Figure 7.10), residuals."""
+"""Page of a wear law: tables, specific wear (Figure 7.9), sensitivity (Figure 7.10), residuals."""
 
+from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from brakelab.identify.wear.curves import Array, sensitivity, specific_wear, wear_surface
-from brakelab.identify.wear.fit import Fit
+from brakelab.identify.wear.fit import TERMS, UNITS, Fit, leave_one_out
+from brakelab.identify.wear.fusion import Fused
 from brakelab.identify.wear.reader import Block
-from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Cells, Line, Panel
+from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Cells, Line, Panel, write_chart
+from brakelab.results.text_table import Table, markdown
 
 MOTION: Final = ((5.0, BLUE), (20.0, GREEN), (50.0, ORANGE))  # kW of friction
 DECEL: Final = 2.0  # m/s^2 of the surface
@@ -101,3 +104,74 @@ def law_panels(blocks: list[Block], mass: Array, fit: Fit, static: Fit, of_brake
         *sensitivity_panels(extended, quasi_static, cool, hot),
         *residual_panels(blocks, mass, fit),
     ]
+
+
+def tables(blocks: list[Block], fused: Fused, fit: Fit, static: Fit) -> list[Table]:
+    """Return coefficients, blocks and the comparison of the two laws as tables."""
+    coefficients = [
+        (name, unit, f"{value:.4g}", f"{low:.4g}–{high:.4g}" if value else "pruned")
+        for name, unit, value, low, high in zip(
+            TERMS, UNITS, fit.coefficients, fit.low, fit.high, strict=True
+        )
+    ]
+    rows = [
+        (
+            block.name,
+            f"{block.applications}",
+            f"{block.regressors[0]:.1f}",
+            f"{block.temperature:.0f}",
+            f"{mass:.3f}",
+            f"{predicted:.3f}",
+            f"{100 * (predicted / mass - 1):+.1f}",
+            f"{100 * (left_out / mass - 1):+.1f}",
+        )
+        for block, mass, predicted, left_out in zip(
+            blocks, fused.mass, fit.predicted, fit.left_out, strict=True
+        )
+    ]
+    laws = [
+        (
+            name,
+            f"{each.r2:.4f}",
+            f"{100 * leave_one_out(each, fused.mass):.1f}",
+            f"{100 * each.scatter:.1f}",
+            f"{each.criterion:.1f}",
+            f"{each.rank}",
+        )
+        for name, each in (("extended (7.13)", fit), ("quasi-static (7.14)", static))
+    ]
+    slope = f"{fused.slope:.2f} g/mm" if np.isfinite(fused.slope) else "not measured"
+    return [
+        Table(
+            "Law",
+            ("term", "unit", "value", "95 % confidence"),
+            coefficients,
+            "Of both pads of a calliper, disc in degC; terms that do not lower AICc are pruned.",
+        ),
+        Table(
+            "Blocks",
+            ("block", "applications", "energy [MJ]", "disc [degC]", "mass [g]", "law [g]", "error [%]",
+             "left out [%]"),
+            rows,
+            f"Mass: balance and thickness blended (7.11); mass over linear wear K: {slope}. Left out: by the "
+            "law of the other blocks.",
+        ),
+        Table(
+            "The two laws",
+            ("law", "R²", "left out, RMS [%]", "scatter [%]", "AICc", "rank"),
+            laws,
+            "Rank: of the scaled regressors; no law has more terms.",
+        ),
+    ]  # fmt: skip
+
+
+def write_page(page: Path, blocks: list[Block], fused: Fused, fit: Fit, static: Fit, of_brake: float) -> None:
+    """Write the tables and the panels of the law; `of_brake`: mass that one brake slows [kg]."""
+    picture = page.with_suffix(".svg")
+    write_chart(picture, law_panels(blocks, fused.mass, fit, static, of_brake), LEGEND)
+    parts = [markdown(table) for table in tables(blocks, fused, fit, static)]
+    head = (
+        f"# Wear law of {len(blocks)} blocks\n\n![Specific wear (Figure 7.9), sensitivity (Figure 7.10), "
+        f"residuals]({picture.name})\n\n"
+    )
+    page.write_text(head + "\n".join(parts).rstrip() + "\n", encoding="utf-8")
