@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from stale_pages import judge
+from stale_pages import HEADER, code_of, judge
 
+ROOT = Path(__file__).parents[1]
 PAGE = "docs/results/brake.md"
 BENCH = "from ecu import brake\n\nCONFIG = 'config/car.toml'\n"
 BRAKE = '"""A brake."""\n\nGAIN = 2.0\n'
@@ -98,3 +99,10 @@ def test_dirty_measurement_counts_from_the_commit_that_brought_it(checkout: Path
 def test_page_that_cannot_be_judged(checkout: Path, text: str, said: str) -> None:
     _write(checkout, {PAGE: text})
     assert judge(checkout, checkout / PAGE) == said
+
+
+@pytest.mark.parametrize("page", sorted((ROOT / "docs/results").glob("*.md")), ids=lambda page: page.stem)
+def test_every_page_has_code_of_its_bench(page: Path) -> None:
+    header = HEADER.search(page.read_text("utf-8"))
+    assert header is not None
+    assert any(path.suffix == ".py" for path in code_of(ROOT, header["bench"]))

@@ -24,7 +24,7 @@ BENCHES = ("bench", "studies")
 TIMES = ("step", "codec", "plant", "cycle")
 """Benches of the page that `brake-ecu bench` without a name writes."""
 PRESENTATION = ("command", "output", "table", "texts")
-"""Modules of `BENCHES` that write the page down; none of the figures is theirs."""
+"""Modules below `BENCHES` that write the page down; none of the figures is theirs."""
 HEADER = re.compile(r"`brake-ecu bench ?(?P<bench>\w*)`")
 MEASURED = re.compile(r"^Measured on commit (?P<commit>\w+)(?P<dirty>-dirty)?,.*$", re.MULTILINE)
 
@@ -54,6 +54,8 @@ def _modules(checkout: Path) -> dict[str, Path]:
     found = {}
     for package, folder in PACKAGES.items():
         for path in (checkout / folder).rglob("*.py"):
+            if path.stem == "__init__" and not path.stat().st_size:
+                continue
             parts = (package, *path.relative_to(checkout / folder).with_suffix("").parts)
             found[".".join(parts).removesuffix(".__init__")] = path
     return found
@@ -73,18 +75,18 @@ def _named(path: Path) -> set[str]:
     return names
 
 
+def _modules_of(bench: str, benches: list[str]) -> list[str]:
+    """Return the module of a bench and those whose names begin with its own, else all of its folder."""
+    own = [name for name in benches if re.search(rf"\.{bench}(_\w+)?$", name)]
+    return own or [name for name in benches if f".{bench}." in name]
+
+
 def code_of(checkout: Path, bench: str) -> set[Path]:
     """Return the modules and configuration files that a bench depends on."""
     modules = _modules(checkout)
-    folders = [f"brakelab.{folder}." for folder in BENCHES]
-    todo = [
-        name
-        for name in modules
-        for folder in folders
-        for start in ([bench] if bench else TIMES)
-        if name == folder + start or name.startswith(f"{folder}{start}_")
-    ]
-    seen = {folder + name for folder in folders for name in PRESENTATION}
+    benches = [name for name in modules if name.startswith(tuple(f"brakelab.{one}." for one in BENCHES))]
+    todo = [name for start in ([bench] if bench else TIMES) for name in _modules_of(start, benches)]
+    seen = {name for name in benches if name.rpartition(".")[2] in PRESENTATION}
     files: set[Path] = set()
     while todo:
         name = todo.pop()

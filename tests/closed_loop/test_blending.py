@@ -8,8 +8,8 @@ from brakelab.simulation.closed_loop import Drive, new_loop, run
 from brakelab.simulation.faults import Fault
 from brakelab.simulation.scenario import Phase, Scenario
 from brakelab.simulation.scenario_car import with_draw
-from brakelab.studies import blending
-from brakelab.studies.blending import (
+from brakelab.studies.control import blending
+from brakelab.studies.control.blending import (
     LOSS,
     blended,
     changing,

@@ -59,7 +59,7 @@ def bench(
 ) -> int:
     """Run one bench, see `HELP`."""
     from brakelab.bench import command
-    from brakelab.entries.command import Entered, refuse
+    from brakelab.studies.entries.command import Entered, refuse
 
     entered = Entered(tuple(observer or ()), drive, export)
     refuse(entered, name)

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from brakelab.bench import command, times
+from brakelab.bench.braking import MESSAGES_IN, simulated_stop
 from brakelab.bench.codec import codec_rows, plan_of_the_bench, protected_frames
 from brakelab.bench.cycle import bursts, cycle_rows, our_side, python_side, run_cycles, thrice
 from brakelab.bench.filters import FilterpyFilters, NumpyFilters, constants, filter_cycles, new_observer
 from brakelab.bench.plant import cars, plant_rows
 from brakelab.bench.socket_pair import put
 from brakelab.bench.step import filter_table, step_rows
-from brakelab.entries.command import Entered
 from brakelab.studies import output
-from brakelab.studies.braking import MESSAGES_IN, simulated_stop
+from brakelab.studies.entries.command import Entered
 from brakelab.studies.measure import Figure, Row
 from ecu import cli
 from ecu.bus.receive import new_reception, receive

@@ -10,7 +10,7 @@ from brakelab.log_physics.samples import ANY_CAR, SAMPLED, Car, Collector, car_o
 from brakelab.logs.signal_file import freshness_at_any_rate
 from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.ecu_inputs import ecu_inputs, vehicle_frames
-from brakelab.studies.observers_cases import shipped
+from brakelab.studies.accuracy.observers_cases import shipped
 from ecu.contract.signals import INPUT, INPUT_SIGNALS
 from ecu.settings.config import load_config, new_params
 from ecu.settings.resources import resource

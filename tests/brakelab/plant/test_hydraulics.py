@@ -11,7 +11,7 @@ from scipy import signal
 
 from brakelab.plant.hydraulics import BUILD_UP, RELEASE, advance_pressure, command_for, settled_pressure
 from brakelab.plant.records import HISTORY, PARAMS, STATE, new_record
-from brakelab.studies.staircase import STEPS, measure_step
+from brakelab.studies.physics.staircase import STEPS, measure_step
 
 DT = 1e-3
 BAR = 1e5

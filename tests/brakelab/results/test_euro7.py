@@ -3,7 +3,7 @@
 import pytest
 
 from brakelab.results import euro7
-from brakelab.studies.cycles import LIMITS
+from brakelab.studies.dust.cycles import LIMITS
 from brakelab.studies.texts import CYCLES_TEXT
 
 LIMITS_TEXT = "7, battery electric 3; heavier vans 11, battery electric 5"

@@ -5,7 +5,7 @@ from typing import Any, Final
 import cantools
 import numpy as np
 
-from brakelab.studies.braking import ALL_DUE, MESSAGES_IN, Stop, simulated_stop
+from brakelab.bench.braking import ALL_DUE, MESSAGES_IN, Stop, simulated_stop
 from brakelab.studies.measure import Row, alternate, installed, timed
 from ecu.bus.receive import new_reception, receive
 from ecu.bus.receive_plan import ReceivePlan, contract_receive_plan

@@ -9,35 +9,27 @@ from typing import Final, NamedTuple
 
 from brakelab.bench.observer_times import step_times
 from brakelab.bench.times import BENCHES, run_times
-from brakelab.entries.command import ENTRIES, NOBODY, TEXT, Entered, export_entries, measure_entries
 from brakelab.results.chart import Panel, write_chart
 from brakelab.results.progress import tracked
-from brakelab.studies import (
-    ablation,
-    bound,
-    compensation,
-    compensation_picture,
-    compensation_table,
-    identified,
-    margins,
-    recorded,
-)
-from brakelab.studies import stops as stops_bench
-from brakelab.studies.blending import blending_tables
+from brakelab.studies.accuracy import ablation, bound, recorded, vehicle
+from brakelab.studies.accuracy import stops as stops_bench
+from brakelab.studies.accuracy.observers import WIDE, Sample, Task, observer_rows, tasks
+from brakelab.studies.accuracy.observers_cases import configured
+from brakelab.studies.accuracy.observers_picture import PICTURED, consistency_of, write_picture
+from brakelab.studies.accuracy.observers_table import finite, observer_tables
+from brakelab.studies.accuracy.table import stop_tables
 from brakelab.studies.cars import each_car
-from brakelab.studies.energy import energy_tables
-from brakelab.studies.failures import failure_tables
-from brakelab.studies.friction import friction_tables
-from brakelab.studies.lab_text import LAB_TEXT
+from brakelab.studies.control import compensation, compensation_picture, compensation_table, margins
+from brakelab.studies.control.blending import blending_tables
+from brakelab.studies.control.failures import failure_tables
+from brakelab.studies.entries.command import ENTRIES, NOBODY, TEXT, Entered, export_entries, measure_entries
+from brakelab.studies.lab.text import LAB_TEXT
 from brakelab.studies.lies import all_cells
 from brakelab.studies.lies_table import lie_tables
 from brakelab.studies.measure import NOT_INSTALLED, machine
-from brakelab.studies.observers import WIDE, Sample, Task, observer_rows, tasks
-from brakelab.studies.observers_cases import configured
-from brakelab.studies.observers_picture import PICTURED, consistency_of, write_picture
-from brakelab.studies.observers_table import finite, observer_tables
 from brakelab.studies.output import RESULTS, Measured, Page, plain_row, show_measured
-from brakelab.studies.table import stop_tables
+from brakelab.studies.physics.energy import energy_tables
+from brakelab.studies.physics.friction import friction_tables
 from brakelab.studies.texts import (
     ABLATION_TEXT,
     BLENDING_TEXT,
@@ -181,15 +173,15 @@ def _recorded(asked: Asked) -> Measured:
 
 
 def _vehicle(asked: Asked) -> Measured:
-    cars = each_car("vehicle", identified.identified_of, min(asked.seeds, identified.CARS))
-    return Measured(identified.identified_tables(cars))
+    cars = each_car("vehicle", vehicle.identified_of, min(asked.seeds, vehicle.CARS))
+    return Measured(vehicle.identified_tables(cars))
 
 
 def _wear(asked: Asked) -> Measured:
-    from brakelab.studies import wear, wear_drives, wear_study
+    from brakelab.studies.wear import drives, study, wear
 
-    cars = each_car("wear", wear_drives.drive_car, min(asked.seeds, wear.CARS))
-    laws = wear_study.dynamometer_laws()
+    cars = each_car("wear", drives.drive_car, min(asked.seeds, wear.CARS))
+    laws = study.dynamometer_laws()
     lives = wear.wear_lives(cars, laws)
     picture = _picture("wear.svg", wear.wear_panels(lives, len(cars)), wear.LEGEND)
     return Measured(wear.wear_tables(cars, laws, lives), draw=picture)
@@ -197,29 +189,29 @@ def _wear(asked: Asked) -> Measured:
 
 def _dust(asked: Asked) -> Measured:
     from brakelab.identify.dust.page import LEGEND
-    from brakelab.studies import dust
+    from brakelab.studies.dust import dust
 
     tables, panels = dust.dust_page(partial(each_car, "dust"), min(asked.seeds, dust.DRAWS))
     return Measured(tables, draw=_picture("dust.svg", panels, LEGEND))
 
 
 def _thermal(asked: Asked) -> Measured:
-    from brakelab.studies import thermal, thermal_study
+    from brakelab.studies.thermal import study, thermal
 
-    cars = each_car("thermal", thermal_study.drive_car, min(asked.seeds, thermal.CARS))
+    cars = each_car("thermal", study.drive_car, min(asked.seeds, thermal.CARS))
     picture = _picture("disc-temperature.svg", thermal.thermal_panels(cars), thermal.LEGEND)
     return Measured(thermal.thermal_tables(cars), draw=picture)
 
 
 def _blocks(asked: Asked) -> Measured:
-    from brakelab.studies import blocks
+    from brakelab.studies.wear import blocks
 
     tables, panels = blocks.blocks_page(min(asked.seeds, blocks.CARS))
     return Measured(tables, draw=_picture("blocks.svg", panels, blocks.LEGEND))
 
 
 def _cycles(asked: Asked) -> Measured:
-    from brakelab.studies.cycles import cycles_page
+    from brakelab.studies.dust.cycles import cycles_page
 
     return Measured(cycles_page(partial(each_car, "cycles")))
 
@@ -229,9 +221,9 @@ def _friction(asked: Asked) -> Measured:
 
 
 def _lab(asked: Asked) -> Measured:
-    from brakelab.studies.lab_pictures import write_pictures
-    from brakelab.studies.lab_run import run_lab
-    from brakelab.studies.lab_table import lab_tables
+    from brakelab.studies.lab.pictures import write_pictures
+    from brakelab.studies.lab.run import run_lab
+    from brakelab.studies.lab.tables import lab_tables
 
     lab = run_lab(say)
     return Measured(lab_tables(lab), draw=lambda folder: write_pictures(folder, lab))

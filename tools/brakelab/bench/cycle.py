@@ -14,9 +14,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.bench.braking import ALL_DUE, MESSAGES_IN, Stop, simulated_stop
 from brakelab.bench.python_ecu import PythonEcu
 from brakelab.bench.socket_pair import PythonCanBus, daemon_channel, put, socket_pair, take, wire_format
-from brakelab.studies.braking import ALL_DUE, MESSAGES_IN, Stop, simulated_stop
 from brakelab.studies.measure import Figure, Row, figure, installed
 from ecu.bus.e2e import P01_MODULO
 from ecu.bus.receive_plan import ReceivePlan, contract_receive_plan

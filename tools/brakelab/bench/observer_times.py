@@ -2,11 +2,11 @@
 
 from collections.abc import Callable
 
+from brakelab.bench.braking import simulated_stop
 from brakelab.bench.step import CYCLES, ROUNDS, run_steps
 from brakelab.simulation.observer import with_observer
-from brakelab.studies.braking import simulated_stop
+from brakelab.studies.accuracy.observers_cases import configured
 from brakelab.studies.measure import Figure, alternate, timed
-from brakelab.studies.observers_cases import configured
 from ecu.algorithm.step import new_state
 from ecu.contract.params import OBSERVERS
 from ecu.contract.records import OUTPUTS, RecordArray, new_record

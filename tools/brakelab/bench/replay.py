@@ -27,8 +27,8 @@ from brakelab.replay.command import replay
 from brakelab.results.text_table import Table
 from brakelab.simulation.closed_loop import VEHICLE_BUS, new_loop, run
 from brakelab.simulation.scenario import load_scenario
+from brakelab.studies.accuracy.table import time_table
 from brakelab.studies.measure import Figure, Row, Task, alternate, installed
-from brakelab.studies.table import time_table
 from ecu.algorithm.step import new_state
 from ecu.bus.freshness import begin_cycle, end_cycle
 from ecu.bus.receive import new_reception, receive

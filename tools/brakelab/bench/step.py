@@ -4,6 +4,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from brakelab.bench.braking import simulated_stop
 from brakelab.bench.filters import (
     FILTER_INPUT,
     FilterpyFilters,
@@ -14,7 +15,6 @@ from brakelab.bench.filters import (
     new_observer,
     note_inputs,
 )
-from brakelab.studies.braking import simulated_stop
 from brakelab.studies.measure import NOT_INSTALLED, Figure, Row, alternate, installed, timed
 from ecu.algorithm.step import new_state, step
 from ecu.contract.records import OUTPUTS, RecordArray, new_record

@@ -4,9 +4,9 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 from brakelab.bench import codec, cycle, plant, step
+from brakelab.studies.accuracy.table import time_table
 from brakelab.studies.measure import Row, machine
 from brakelab.studies.output import Measured, plain_row
-from brakelab.studies.table import time_table
 
 
 class Bench(NamedTuple):

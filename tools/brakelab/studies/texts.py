@@ -3,8 +3,9 @@
 from typing import Final
 
 from brakelab.results import euro7
-from brakelab.studies import failures, lies
-from brakelab.studies.blending import CARS
+from brakelab.studies import lies
+from brakelab.studies.control import failures
+from brakelab.studies.control.blending import CARS
 
 STOPS_TEXT: Final = (
     "Stops from 120 km/h to standstill, Table 4.2 of the thesis: #1 4, #2 7 m/s² on a dry road (1.2), #3 4, "
@@ -112,9 +113,9 @@ COMPENSATION_TEXT: Final = (
 
 MARGINS_TEXT: Final = (
     "How far the loop through pressure law, hydraulics, car and observer is from instability, measured "
-    "with the loop cut at the friction in use (tools/brakelab/studies/margins.py). The loop gain is far "
-    "below 1 at every frequency: an estimate of friction is torque over pressure, and more pressure gives "
-    "more torque, so to first order the estimate does not see what the law does. What comes back is lag "
+    "with the loop cut at the friction in use (tools/brakelab/studies/control/margins.py). The loop gain is "
+    "far below 1 at every frequency: an estimate of friction is torque over pressure, and more pressure "
+    "gives more torque, so to first order the estimate does not see what the law does. What comes back is lag "
     "between the signals and what friction really owes to pressure.\n\n![Loop gain and distance from "
     "+1](images/control-margins.svg)"
 )
@@ -177,8 +178,8 @@ THERMAL_TEXT: Final = (
 BLOCKS_TEXT: Final = (
     "How well a dynamometer reproduces the wear of real driving (sections 7.3 to 7.5). Blocks of 300 "
     "applications from generated trips run twice with the plant's friction and wear "
-    "(tools/brakelab/studies/blocks_rig.py): on the road with drag and rolling resistance, and under the "
-    "rule-based controller of Figure 7.5, which waits for the disc, runs up and holds the road's "
+    "(tools/brakelab/studies/wear/blocks_rig.py): on the road with drag and rolling resistance, and under "
+    "the rule-based controller of Figure 7.5, which waits for the disc, runs up and holds the road's "
     "deceleration with the brake alone.\n\n"
     "![Specific wear by Table 7.1, its sensitivity, energy error, a block repeated](images/blocks.svg)\n\n"
     "In the picture: Figure 7.9 (both laws of Table 7.1), Figure 7.10 (a and b), Figure 7.11, Figure 7.12 "

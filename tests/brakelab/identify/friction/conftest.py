@@ -15,7 +15,7 @@ from brakelab.identify.friction.stops import Stops, find_stops
 from brakelab.plant.description import read_file
 from brakelab.plant.dynamometer import PRESSURE, new_stop
 from brakelab.plant.linings import Lining, Linings, rig_with
-from brakelab.studies.lab import r1_recording
+from brakelab.studies.lab.brakes import r1_recording
 from ecu.settings.resources import resource
 
 KMH = 1.0 / 3.6

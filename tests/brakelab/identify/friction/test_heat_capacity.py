@@ -10,7 +10,7 @@ from brakelab.identify.friction.recording import Recording
 from brakelab.identify.friction.stops import Stops, find_stops
 from brakelab.plant.disc import DISC_SHARE
 from brakelab.plant.linings import Lining
-from brakelab.studies.lab import r1_recording
+from brakelab.studies.lab.brakes import r1_recording
 
 
 def test_the_disc_of_the_pads_is_found(stops: Stops, columns: Columns, lining: Lining) -> None:

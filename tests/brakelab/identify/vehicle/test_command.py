@@ -11,8 +11,8 @@ from brakelab.identify.vehicle.reader import read_drives
 from brakelab.identify.vehicle.solve import identify
 from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.simulate import write_columns
-from brakelab.studies.identified import start_of, true_theta, with_parameters
-from brakelab.studies.observers_cases import shipped
+from brakelab.studies.accuracy.observers_cases import shipped
+from brakelab.studies.accuracy.vehicle import start_of, true_theta, with_parameters
 from ecu.algorithm.vehicle import rolling_radius
 from ecu.errors import UserError
 from ecu.settings.config import load_config, new_params

@@ -1,0 +1,263 @@
+"""Cars identified from a drive, beside the truth: values, sigma, and predictions of a stranger's drive.
+
+A car of the wide draw drives `config/scenarios/identify.toml`; START is config/suv.toml with every key of
+masses, tyres and brakes 20 % off, up or down by the seed, but for what a data sheet says (wheelbase,
+frontal area, pistons). Then another trip of the same car, real driving of another seed, is replayed with
+START and with the identified CONFIG, and each predicts the brakings.
+"""
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakelab.identify.vehicle.model import Place
+from brakelab.identify.vehicle.parameters import Parameter, parameters_of, values_of
+from brakelab.identify.vehicle.reader import read_drives
+from brakelab.identify.vehicle.solve import identify
+from brakelab.plant.records import GRAVITY
+from brakelab.plant.tyre import rolling_radius, stiffnesses
+from brakelab.replay.drive import replay_drive
+from brakelab.replay.quality import Findings
+from brakelab.replay.source import load_source
+from brakelab.results.brakes import BrakeBook
+from brakelab.results.prediction import errors
+from brakelab.results.text_table import Table
+from brakelab.simulation.closed_loop import Drive, new_loop, run
+from brakelab.simulation.scenario import Scenario, Trace
+from brakelab.simulation.simulate import write_columns
+from brakelab.studies.accuracy.observers_cases import shipped
+from ecu.contract.signals import CORNERS
+from ecu.settings.config import Config, load_config, new_params
+from ecu.settings.resources import resource
+
+CARS: Final = 10
+OFF: Final = 0.20
+DRIVEN: Final = 12700.0  # m, by the scenario, roughly: a car's brakes make it up to 250 m more or less
+OVER_MASS: Final = ("vehicle.drag_coefficient", "front.mu_nominal", "rear.mu_nominal")
+PERIOD: Final = 4800.0  # m, of the scenario's hills at most
+STRANGER: Final = 900.0  # s of the other trip
+KEYS: Final = {
+    "vehicle": ("mass", "front_axle", "cog_height", "track", "drag_coefficient", "rolling_resistance",
+                "pitch_gradient"),
+    "front": ("unloaded_radius", "vertical_stiffness", "wheel_inertia", "slip_stiffness",
+              "stiffness_degression", "effective_radius", "mu_nominal", "push_out_pressure"),
+}  # fmt: skip
+"""Errors of START; the rear axle as the front one."""
+
+Vector = NDArray[np.float64]
+
+
+class Beside(NamedTuple):
+    """A key of a car."""
+
+    parameter: Parameter
+    truth: float
+
+
+class Car(NamedTuple):
+    """One car."""
+
+    keys: list[Beside]
+    before: tuple[float, float]
+    """Mean error of the stranger's predicted brakings with START [%]: learning, and with its friction."""
+    after: tuple[float, float]
+    """With the identified CONFIG."""
+    brakings: int
+
+
+def start_of(seed: int) -> Config:
+    """Return config/suv.toml with its keys 20 % off."""
+    config = load_config(resource("config/suv.toml"))
+    random = np.random.default_rng([seed, 16])
+    update: dict[str, Any] = {}
+    for section in ("vehicle", "front", "rear"):
+        own: Any = getattr(config, section)
+        keys = KEYS.get(section, KEYS["front"])
+        wrong = {name: getattr(own, name) * (1.0 + OFF * random.choice([-1.0, 1.0])) for name in keys}
+        if section == "vehicle":
+            wrong |= {"laden_mass": None, "laden_front_axle": None, "laden_cog_height": None}
+        update[section] = own.model_copy(update=wrong)
+    return config.model_copy(update=update)
+
+
+def with_parameters(config: Config, parameters: Sequence[Parameter]) -> Config:
+    """Return `config` with the keys that were told."""
+    update: dict[str, Any] = {}
+    for section in ("vehicle", "front", "rear", "sensors"):
+        own: Any = getattr(config, section)
+        values = {
+            one.key.partition(".")[2]: one.value
+            for one in parameters
+            if not one.remedy and one.key.startswith(f"{section}.")
+        }
+        update[section] = own.model_copy(update=values)
+    return config.model_copy(update=update)
+
+
+def true_theta(car: Any, drive: Drive, sensors: Any, push_out: Sequence[float]) -> Vector:
+    """Return the model's parameters of a simulated car; brakes by least squares beyond `push_out`."""
+    theta = np.zeros(len(Place))
+    base = car["front_length"] + car["rear_length"]
+    share = np.repeat([car["rear_length"], car["front_length"]], 2) / base
+    load = 0.5 * car["mass"] * GRAVITY * share
+    free, vertical = car["free_radius"], car["vertical_stiffness"]
+    radius = [rolling_radius(float(free[i]), float(vertical[i]), float(load[i])) for i in range(4)]
+    stiffness = np.array([stiffnesses(car, i, load[i])[0] for i in range(4)]).reshape(2, 2).sum(axis=1)
+    brakes = np.zeros(2)
+    moves = drive.truth["vehicle_speed"] > 3.0
+    for axle, pair in enumerate((CORNERS[:2], CORNERS[2:])):
+        pressure = np.mean([drive.truth[f"calliper_pressure_{c}"] for c in pair], axis=0)
+        rubs = moves & (pressure > 3.0)
+        torque = np.sum([drive.truth[f"brake_torque_{c}"][rubs] for c in pair], axis=0)
+        acts = pressure[rubs] - push_out[axle]
+        brakes[axle] = float(acts @ torque) / float(acts @ acts)
+    mean_radius = float(np.mean(radius))
+    sink = car["mass"] * car["cog_height"] / (6.0 * base * float(np.mean(car["vertical_stiffness"])))
+    known = {
+        Place.MASS: np.log(car["mass"]), Place.DRAG: np.log(car["drag_factor"]),
+        Place.ROLLING: car["rolling_resistance"], Place.PITCH: car["pitch_gradient"],
+        Place.RADIUS_F: np.log(np.mean(radius[:2])), Place.RADIUS_R: np.log(np.mean(radius[2:])),
+        Place.STIFFNESS: 0.5 * np.log(stiffness.prod()),
+        Place.STIFFNESS_RATIO: np.log(stiffness[1] / stiffness[0]),
+        Place.DEFLECTION: np.log(sink / mean_radius),
+        Place.BRAKES: np.log(brakes.sum()), Place.BRAKE_RATIO: np.log(brakes[1] / brakes[0]),
+        Place.PUSH_OUT_F: car["push_out_pressure"][0] * 1e-5,
+        Place.PUSH_OUT_R: car["push_out_pressure"][2] * 1e-5,
+        Place.DELAY: float(sensors[3]["delay"]) * 0.01,
+    }  # fmt: skip
+    for place, value in known.items():
+        theta[place] = value
+    return theta
+
+
+def _on_own_road(scenario: Scenario, seed: int, driven: float) -> Scenario:
+    """Return the scenario on hills that begin elsewhere: a road in common would be an error in common.
+
+    They end as high as they began, after the `driven` metres of this car.
+    """
+    begin = float(np.random.default_rng([seed, 17]).uniform(0.0, PERIOD))
+    rows = scenario.road.grade
+    shifted = [(place - begin, grade) for place, grade in rows if place > begin]
+    first = float(np.interp(begin, *np.transpose(rows)))
+    place, grade = np.transpose([(0.0, first), *shifted])
+    grade -= np.interp(np.linspace(0.0, driven, 4000), place, grade).mean()
+    level = list(zip(place.tolist(), grade.tolist(), strict=True))
+    road = scenario.road.model_copy(update={"grade": level})
+    return scenario.model_copy(update={"road": road})
+
+
+def beside_truth(seed: int) -> tuple[list[Beside], Config]:
+    """Drive one car and identify it; return its keys and the CONFIG that results."""
+    start = start_of(seed)
+    suv, driven = load_config(resource("config/suv.toml")), DRIVEN
+    for _ in range(2):  # the first drive tells how far it is
+        loop = new_loop(_on_own_road(shipped("identify"), seed, driven), suv, seed)
+        car, sensors = loop.sides.vehicle.params[0].copy(), loop.sides.vehicle.sensors.copy()
+        drive = run(loop)
+        driven = float(np.ptp(drive.truth["distance"]))
+    with TemporaryDirectory(prefix="brake-ecu-identified-") as folder:
+        path = Path(folder, "drive.parquet")
+        write_columns(path, drive.t, drive.inputs, {})
+        found = identify(read_drives([path], new_params(start), None), new_params(start), closed=True)
+    parameters = parameters_of(found, start)
+    used = {one.key: one.value for one in parameters}
+    push_out = [used[f"{axle}.push_out_pressure"] for axle in ("front", "rear")]
+    true = values_of(found, start, true_theta(car, drive, sensors, push_out))
+    true["vehicle.track"] = float(car["track"])
+    return [Beside(one, true[one.key]) for one in parameters], with_parameters(start, parameters)
+
+
+def identified_of(seed: int) -> Car:
+    """Drive one car, identify it, and let it drive a stranger's trip."""
+    keys, config = beside_truth(seed)
+    trace = Trace(generate="real-driving", seed=seed + 100)
+    trip = shipped("real-driving").model_copy(update={"trace": trace})
+    other = run(new_loop(trip, load_config(resource("config/suv.toml")), seed), seconds=STRANGER)
+    before, count = _predicted(other, start_of(seed))
+    after, _ = _predicted(other, config)
+    return Car(keys, before, after, count)
+
+
+def _predicted(drive: Drive, config: Config) -> tuple[tuple[float, float], int]:
+    """Return the mean error of predicted brakings [%], learning and with the configured friction; count."""
+    params = new_params(config)
+    book = BrakeBook(params)
+    with TemporaryDirectory(prefix="brake-ecu-identified-") as folder:
+        path = Path(folder, "drive.parquet")
+        write_columns(path, drive.t, drive.inputs, {})
+        replay_drive(
+            [Findings(path)], params, None, load_source(None), book.add, book.end_log, lambda _: None
+        )
+    rows = [row for row in book.rows[:: len(CORNERS)] if not row.left_out]
+    measured = [row.specific_force_mean for row in rows]
+    learned = errors(measured, [row.specific_force_predicted for row in rows])
+    configured = errors(measured, [row.specific_force_configured for row in rows])
+    return (100.0 * learned.mean, 100.0 * configured.mean), len(rows)
+
+
+def _over_mass(cars: Sequence[Car], key: str) -> tuple[str, ...]:
+    """Return the line of a key over mass, in which the scale of motor torque cancels."""
+    relative = []
+    for car in cars:
+        by_key = {each.parameter.key: each for each in car.keys}
+        one, mass = by_key[key], by_key["vehicle.mass"]
+        relative.append(one.parameter.value / one.truth / (mass.parameter.value / mass.truth) - 1.0)
+    off = 100.0 * np.abs(relative)
+    within = f"{np.sum(off <= 3.0)} of {len(cars)}"
+    return f"{key} / mass", "–", f"{np.median(off):.2f}", f"{off.max():.2f}", "–", "–", within
+
+
+def identified_tables(cars: Iterable[Car]) -> list[Table]:
+    """Return errors by key, each car's worst, and the stranger's brakings."""
+    every = list(cars)
+    rows = []
+    for place, one in enumerate(every[0].keys):
+        told = [car.keys[place] for car in every if not car.keys[place].parameter.remedy]
+        if not told:
+            rows.append((one.parameter.key, f"0 of {len(every)}", *["–"] * 5))
+            continue
+        error = np.array([each.parameter.value - each.truth for each in told])
+        relative = 100.0 * np.abs(error) / np.maximum(np.abs([each.truth for each in told]), 1e-9)
+        z = error / np.array([each.parameter.sigma for each in told])
+        sigma = np.median([each.parameter.sigma / max(abs(each.truth), 1e-9) for each in told])
+        if one.parameter.key.endswith("delay"):
+            spread = f"{1e3 * np.median(np.abs(error)):.1f} ms", f"{1e3 * np.abs(error).max():.1f} ms"
+            inside = f"{np.sum(np.abs(z) <= 2.0)} of {len(told)}"
+            rows.append((one.parameter.key, f"{len(told)} of {len(every)}", *spread, "–", inside, "–"))
+            continue
+        rows.append((
+            one.parameter.key, f"{len(told)} of {len(every)}", f"{np.median(relative):.2f}",
+            f"{relative.max():.2f}", f"{100 * sigma:.2f}", f"{np.sum(np.abs(z) <= 2.0)} of {len(told)}",
+            f"{np.sum(relative <= 3.0)} of {len(told)}",
+        ))  # fmt: skip
+    known = {each.parameter.key for each in every[0].keys}
+    rows += [_over_mass(every, key) for key in OVER_MASS if key in known]
+    strange = [
+        (f"{number}", f"{car.brakings}", *(f"{each:.1f}" for each in (*car.before, *car.after)))
+        for number, car in enumerate(every, 1)
+    ]  # fmt: skip
+    misses = [
+        (f"{number}", each.parameter.key, f"{each.truth:.4g}", f"{each.parameter.value:.4g}",
+         f"{each.parameter.sigma:.2g}", f"{(each.parameter.value - each.truth) / each.parameter.sigma:+.1f}",
+         f"{100 * (each.parameter.value / each.truth - 1):+.1f}")
+        for number, car in enumerate(every, 1) for each in car.keys
+        if not each.parameter.remedy and not each.parameter.key.endswith("delay")
+        and (abs(each.parameter.value - each.truth) > 2.0 * each.parameter.sigma
+             or abs(each.parameter.value / each.truth - 1.0) > 0.03)
+    ]  # fmt: skip
+    return [
+        Table("Keys beside the truth",
+              ("key", "told", "error, median [%]", "worst [%]", "σ [%]", "inside 2σ", "within 3 %"), rows,
+              f"{len(every)} cars of the wide draw, START 20 % off. Truth in terms of START's other keys: "
+              "torque per bar, stiffness per axle load, deflection for its height of the centre of gravity."),
+        Table("Beyond 2σ or 3 %", ("car", "key", "truth", "value", "σ", "error/σ", "error [%]"), misses,
+              "Every one of them."),
+        Table("Brakings of a stranger's drive: mean error of the prediction [%]",
+              ("car", "brakings", "START, learning", "START, configured", "CAR, learning", "CAR, configured"),
+              strange, "Fifteen minutes of real driving by the same car. Learning: with the friction learned "
+              "before each braking; configured: with that of the CONFIG."),
+    ]  # fmt: skip

@@ -1,0 +1,51 @@
+"""All that `brake-ecu bench lab` measures."""
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from itertools import product
+from multiprocessing import get_context
+from typing import NamedTuple
+
+from brakelab.studies.lab.brakes import DRAWS, R2_DRAWS, Brake, Recovered, measure, recovered
+from brakelab.studies.lab.choice import Choice, choices
+from brakelab.studies.lab.discovery import Draw, PadTerms, discovered, jobs, pad_terms
+from brakelab.studies.lab.observer import CARS, CAUSES, OnTrip, on_trip
+from brakelab.studies.lab.searches import Searches, searches
+from brakelab.studies.lab.trips import OnTrips, trips
+from brakelab.studies.physics.heat import BRAKES
+
+
+class Lab(NamedTuple):
+    """All that the bench measures."""
+
+    brakes: dict[str, Brake]
+    recovered: list[Recovered]
+    on_trips: OnTrips
+    in_cars: list[OnTrip]  # the joint observer
+    draws: list[Draw]  # of discovery
+    pads: list[PadTerms]
+    searches: Searches
+    choices: list[Choice]  # on further pads
+
+
+def run_lab(progress: Callable[[str], None]) -> Lab:
+    """Return all results; `progress` is told a line at a time. Minutes, on two cores."""
+    # Small matrices: threads of their own in every process cost more than they give.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    brakes = {}
+    for brake in BRAKES:
+        brakes[brake] = measure(brake, progress)
+        progress(f"{brake}: CPC simulated and all laws identified in {brakes[brake].seconds:.0f} s")
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        on_road, searched = pool.submit(trips), pool.submit(searches)
+        sets = [*product(("R1",), BRAKES, range(DRAWS)), *product(("R2",), BRAKES, range(R2_DRAWS))]
+        found = list(pool.map(recovered, sets))
+        progress(f"recovery: {len(found)} draws")
+        in_cars = list(pool.map(on_trip, product(CAUSES, range(CARS))))
+        progress(f"joint observer: {len(in_cars)} cars")
+        draws = list(pool.map(discovered, jobs()))
+        progress(f"discovery: {len(draws)} draws")
+        pads = list(pool.map(pad_terms, BRAKES))
+        on_trips, costs = on_road.result(), searched.result()
+    return Lab(brakes, found, on_trips, in_cars, draws, pads, costs, choices(progress))

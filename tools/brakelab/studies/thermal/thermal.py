@@ -1,0 +1,148 @@
+"""`brake-ecu bench thermal`: disc temperature after identification beside its goals, Figures 7.13 to 7.15."""
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from brakelab.identify.thermal.model import ROW, Array
+from brakelab.identify.thermal.page import cooling_panel
+from brakelab.identify.thermal.result import SYMBOLS, values_of
+from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Line, Panel
+from brakelab.results.text_table import Table
+from brakelab.studies.thermal.study import JUDGED, Appraised, Car, Course
+
+CARS: Final = 8
+GOAL: Final = 10.0  # K
+AXLES: Final = {"front": slice(0, 2), "rear": slice(2, 4)}
+FIGURES: Final = {"dry": "7.13", "rain": "7.14"}
+LEGEND: Final = (
+    ("measured disc", GREY),
+    ("ECU", BLUE),
+    ("two sigma", PINK),
+    ("as configured before; dry", ORANGE),
+    ("rain", GREEN),
+)
+
+
+def _over(appraised: Sequence[Appraised], name: str, part: slice) -> Array:
+    return np.concatenate([getattr(one, name)[part] for one in appraised])
+
+
+def _both(values: Array) -> str:
+    return f"{np.median(values):.1f} ({np.max(values):.1f})"
+
+
+def _judged_rows(cars: Sequence[Car]) -> list[tuple[str, ...]]:
+    rows: list[tuple[str, ...]] = []
+    for number, trip in enumerate(JUDGED):
+        for axle, part in AXLES.items():
+            each = [car.trips[number] for car in cars]
+            after = _over(each, "after", part)
+            rows.append(
+                (
+                    f"{trip.name} ({FIGURES[trip.name]})",
+                    axle,
+                    f"{_over(each, 'hottest', part).min():.0f}–{_over(each, 'hottest', part).max():.0f}",
+                    _both(_over(each, "before", part)),
+                    _both(after),
+                    f"{np.count_nonzero(after <= GOAL)} of {len(after)}",
+                    f"{np.median(_over(each, 'bias', part)):+.1f}",
+                    f"{np.median(_over(each, 'sigma', part)):.1f}",
+                    f"{100 * _over(each, 'inside', part).mean():.1f}",
+                    f"{np.sqrt(np.mean(_over(each, 'normalised', part) ** 2)):.2f}",
+                )
+            )
+    return rows
+
+
+def _car_rows(cars: Sequence[Car]) -> list[tuple[str, ...]]:
+    rows: list[tuple[str, ...]] = []
+    for car in cars:
+        for axle, part in zip(car.axles, AXLES.values(), strict=True):
+            new, old = (values_of(fit.heating, fit.cooling) for fit in (axle.fit, axle.before))
+            changes = [f"{100 * (a / b - 1):+.0f}" for a, b in zip(new, old, strict=True)]
+            told = [SYMBOLS[k] for k in range(5) if not axle.fit.told[k]]
+            rows.append(
+                (
+                    f"{car.seed} {axle.name}",
+                    *changes,
+                    ", ".join(told) or "–",
+                    f"{100 * axle.errors.heating:.1f} / {100 * axle.errors.cooling:.1f} / "
+                    f"{100 * axle.errors.wet:.0f}",
+                    *(f"{np.max(trip.after[part]):.1f}" for trip in car.trips),
+                    *(f"{100 * trip.inside[part].mean():.0f}" for trip in car.trips),
+                )
+            )
+    return rows
+
+
+def _rest_row(cars: Sequence[Car], part: slice) -> tuple[str, str]:
+    known = np.concatenate([car.trips[0].after[part] for car in cars])
+    unknown = np.concatenate([car.unknown_rest[part] for car in cars])
+    return _both(known), _both(unknown)
+
+
+def thermal_tables(cars: Sequence[Car]) -> list[Table]:
+    """Return the tables of the page."""
+    every = [trip for car in cars for trip in car.trips]
+    inside = 100.0 * float(np.mean([trip.inside.mean() for trip in every]))
+    within = np.concatenate([trip.after for trip in every]) <= GOAL
+    rest = [(axle, *_rest_row(cars, part)) for axle, part in AXLES.items()]
+    return [
+        Table(
+            "Trips that were not identified on",
+            ("trip (figure)", "axle", "hottest [°C]", "RMSE before [K]", "RMSE now [K]", "within 10 K",
+             "mean error [K]", "mean σ [K]", "inside 2σ [%]", "error over σ, RMS"),
+            _judged_rows(cars),
+            f"{len(cars)} cars, two discs an axle; RMSE over the whole trip, median (worst). Before: the "
+            "shipped configuration, from a cold start by the same power; now: the ECU itself. Goals: 10 K, "
+            f"inside 2σ at 93–99 %. All together: {np.count_nonzero(within)} of {len(within)} discs within "
+            f"10 K, inside 2σ at {inside:.1f} %.",
+        ),
+        Table(
+            "Cars",
+            ("car", "ξ [%]", "δ0 [%]", "δ1 [%]", "δ0 rain [%]", "δ1 rain [%]", "not told",
+             "σ of ξ / dry / rain [%]", "RMSE dry [K]", "RMSE rain [K]", "inside dry [%]", "inside rain [%]"),
+            _car_rows(cars),
+            "Parameters: change against the configuration. RMSE: the worse disc of the axle.",
+        ),
+        Table(
+            "A rest that is known",
+            ("axle", "RMSE, night known [K]", "unknown [K]"),
+            rest,
+            "Dry trips, whole, median (worst). Unknown: the discs begin half as hot as the last trip left "
+            "them at most, which is how the ECU starts when no clock tells how long it rested (a replay, or "
+            "a daemon whose clock was not set).",
+        ),
+    ]  # fmt: skip
+
+
+def _disc(title: str, course: Course, corner: int) -> Panel:
+    minutes = np.arange(1, len(course.said) + 1, dtype=np.float64) * ROW / 60.0
+    said, sigma = course.said[:, corner], course.sigma[:, corner]
+    lines = [
+        Line(minutes, said - 2.0 * sigma, PINK, True),
+        Line(minutes, said + 2.0 * sigma, PINK, True),
+        Line(minutes, course.before[:, corner], ORANGE, True),
+        Line(minutes, course.true[:, corner], GREY),
+        Line(minutes, said, BLUE),
+    ]
+    low, high = min(float(line.y.min()) for line in lines), max(float(line.y.max()) for line in lines)
+    return Panel(title, "min", (0.0, float(minutes[-1])), (low, high), lines)
+
+
+def thermal_panels(cars: Sequence[Car]) -> list[Panel]:
+    """Return Figures 7.13 (dry) and 7.14 (rain): speed, front and rear disc; 7.15: cooling by speed."""
+    car, panels = cars[0], []
+    for trip, course in zip(JUDGED, car.courses, strict=True):
+        minutes = np.arange(1, len(course.speed) + 1, dtype=np.float64) * ROW / 60.0
+        figure, span = FIGURES[trip.name], (0.0, float(minutes[-1]))
+        speed = Line(minutes, course.speed, GREY)
+        panels.append(Panel(f"{figure} a): {trip.name}, speed [m/s]", "min", span, (0.0, 45.0), [speed]))
+        panels.append(_disc(f"{figure} b): front left [°C]", course, 0))
+        panels.append(_disc(f"{figure} c): rear left [°C]", course, 2))
+        axle = car.axles[len(panels) // 4]
+        title = f"7.15: {axle.name}, δ [1/1000 s], before dashed"
+        panels.append(cooling_panel(title, axle.fit.cooling, axle.before.cooling))
+    return panels
