@@ -46,7 +46,7 @@ fuzz: .venv/dev
 	FUZZ_CASES=3000 .venv/bin/python -m pytest -n auto --maxprocesses 4 tests/test_fuzz.py tests/ecu/algorithm/test_step_extremes.py $(ARGS)
 
 soak: .venv/dev
-	.venv/bin/python -m brakelab.soak $(or $(ARGS),virtual --hours 24)
+	.venv/bin/python -m brakelab.rig.soak $(or $(ARGS),virtual --hours 24)
 
 screenshot: .venv/lab
 	.venv/bin/brake-ecu demo --out out/screenshot

@@ -17,13 +17,13 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from brakelab.identify.config_file import Section, write_car
-from brakelab.play.play_log import decoded
 from brakelab.replay.command import replay_into
 from brakelab.replay.needed import NEEDED, nothing_usable
 from brakelab.replay.quality import Findings, damage_lines
 from brakelab.replay.source import check_map, load_source
 from brakelab.report.command import report as write_report
 from brakelab.results.files import EXPORTS, brakes_path, read_result
+from brakelab.rig.play.play_log import decoded
 from brakelab.simulation.simulate import simulate as run_scenario
 from brakelab.table import Table
 from ecu.arguments import config_file, map_file, scenario_file

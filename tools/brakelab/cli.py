@@ -164,7 +164,7 @@ def play(
     ] = 1.0,
 ) -> int:
     """Play a recorded drive onto a CAN bus. With MAP, send frames of the ECU with fresh E2E."""
-    from brakelab.play import command as play
+    from brakelab.rig.play import command as play
 
     return play.play(log, interface, channel, map, speed)
 

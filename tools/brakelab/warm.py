@@ -21,10 +21,10 @@ from brakelab.plant.records import COMMANDS
 from brakelab.plant.vehicle import STEP, advance, new_state
 from brakelab.replay.command import replay_into
 from brakelab.replay.quality import Findings
+from brakelab.rig.vehicle_node import warm_up
 from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.scenario import load_scenario
 from brakelab.simulation.simulate import simulate
-from brakelab.vehicle_node import warm_up
 from ecu.jit import CompileCounter
 from ecu.output import Level, asked, new_policy
 from ecu.settings.config import load_config

@@ -10,9 +10,9 @@ import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 import pytest
 
+from brakelab.bench.fleet_drives import write_drive
 from brakelab.fleet import command
 from brakelab.fleet.command import disorder, fleet
-from brakelab.fleet.generate import write_drive
 from brakelab.fleet.job import Job
 from brakelab.fleet.output import brakes_file
 from brakelab.fleet.task import replay_job

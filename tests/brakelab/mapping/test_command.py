@@ -7,9 +7,9 @@ import cantools
 import numpy as np
 import pytest
 
-from brakelab.log_physics.line import fit
 from brakelab.logs.formats import read_frames
 from brakelab.logs.log_quality import LogQuality
+from brakelab.logs.physics.line import fit
 from brakelab.mapping.command import map_text, timeout
 from brakelab.mapping.motion import Found, motion_of, wheel_speeds
 from brakelab.mapping.names import corner_of, score, words

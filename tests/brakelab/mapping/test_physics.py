@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brakelab.log_physics.samples import ANY_CAR, car_of
+from brakelab.logs.physics.samples import ANY_CAR, car_of
 from brakelab.mapping.brakes import brakes, flags
 from brakelab.mapping.curves import at_rest, curves
 from brakelab.mapping.motion import motion_of, wheel_speeds

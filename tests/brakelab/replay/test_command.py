@@ -10,11 +10,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from brakelab.play.play_log import contract_frames
 from brakelab.replay.command import replay
 from brakelab.replay.quality import Findings
 from brakelab.replay.source import load_source
 from brakelab.results.files import read_result
+from brakelab.rig.play.play_log import contract_frames
 from ecu.contract.signals import CORNERS
 from ecu.errors import RunFault, UserError
 from ecu.recording.recorder import candump_lines

@@ -9,11 +9,11 @@ import pytest
 from brakelab.logs.formats import read_frames
 from brakelab.logs.log_quality import LogQuality
 from brakelab.logs.signal_file import SampleBlock, freshness_at_any_rate
-from brakelab.play.play_log import contract_frames
 from brakelab.replay import engine
 from brakelab.replay.engine import Rows, new_ecu, run_frames, run_samples
 from brakelab.replay.quality import Findings
 from brakelab.replay.source import load_source
+from brakelab.rig.play.play_log import contract_frames
 from ecu.algorithm.step import step
 from ecu.bus.freshness import accept, begin_cycle, end_cycle
 from ecu.bus.receive import new_reception, receive

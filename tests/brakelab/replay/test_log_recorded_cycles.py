@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brakelab.play.play_log import contract_frames
 from brakelab.replay.command import replay
 from brakelab.replay.engine import new_ecu
 from brakelab.replay.quality import Findings
 from brakelab.replay.source import load_source
 from brakelab.results.files import read_result
+from brakelab.rig.play.play_log import contract_frames
 from ecu.algorithm.step import INITIAL, initial_part, step
 from ecu.bus.freshness import begin_cycle, end_cycle
 from ecu.bus.receive import new_reception, receive

@@ -8,12 +8,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from brakelab.play.play_log import contract_frames
 from brakelab.replay.command import replay
 from brakelab.replay.quality import Findings
 from brakelab.replay.seen import new_seen, set_raw_ends
 from brakelab.replay.source import load_source
 from brakelab.results.files import read_result
+from brakelab.rig.play.play_log import contract_frames
 from ecu.bus.receive_plan import contract_receive_plan
 from ecu.contract.signals import INPUT
 from ecu.recording.recorder import candump_lines

@@ -23,11 +23,11 @@ import numpy as np
 from can.interfaces.udp_multicast.utils import unpack_message
 from numpy.typing import NDArray
 
-from brakelab.play.command import Sent, send_on_schedule
-from brakelab.play.play_log import timed_frames
 from brakelab.replay.quality import Findings
 from brakelab.results.text_table import Table
 from brakelab.rig.live import Bus, choose_bus
+from brakelab.rig.play.command import Sent, send_on_schedule
+from brakelab.rig.play.play_log import timed_frames
 from brakelab.simulation.priority import PRIORITY, ask_for_priority
 from brakelab.studies.measure import installed, machine
 from ecu.runtime.clock import system_time

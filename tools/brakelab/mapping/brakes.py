@@ -4,9 +4,9 @@ from typing import Final
 
 import numpy as np
 
-from brakelab.log_physics.line import BRAKING, MOVING, Fit, smooth
-from brakelab.log_physics.pressures import OVERRUN, scale_by_brakes
-from brakelab.log_physics.samples import Car
+from brakelab.logs.physics.line import BRAKING, MOVING, Fit, smooth
+from brakelab.logs.physics.pressures import OVERRUN, scale_by_brakes
+from brakelab.logs.physics.samples import Car
 from brakelab.mapping.candidates import best_of, by_name, unit_of
 from brakelab.mapping.motion import Found, Motion, is_near, on_grid
 from brakelab.mapping.names import converts, corner_of, score, tells_brake, tells_pressure

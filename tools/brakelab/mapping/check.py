@@ -6,8 +6,8 @@ from typing import Any, Final, NamedTuple
 from rich.box import SIMPLE
 from rich.table import Table
 
-from brakelab.log_physics.judge import judge, range_lines
-from brakelab.log_physics.samples import ANY_CAR, Collector, car_of
+from brakelab.logs.physics.judge import judge, range_lines
+from brakelab.logs.physics.samples import ANY_CAR, Collector, car_of
 from brakelab.replay.engine import new_ecu
 from brakelab.replay.log import log_size, replay_log
 from brakelab.replay.needed import needed_lines

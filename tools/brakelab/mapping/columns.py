@@ -7,9 +7,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from brakelab.log_physics.samples import Car
 from brakelab.logs.column_map import SECONDS, TIMES
 from brakelab.logs.log_quality import SignalQuality
+from brakelab.logs.physics.samples import Car
 from brakelab.logs.signal_batches import Columns, columns_of, rows_of, time_of
 from brakelab.mapping.map_text import input_lines, radius_line
 from brakelab.mapping.motion import Found

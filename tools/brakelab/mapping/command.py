@@ -10,10 +10,10 @@ from cantools.database import Database
 from rich.console import Console
 from rich.table import Table
 
-from brakelab.log_physics.samples import ANY_CAR, Car, car_of
 from brakelab.logs.column_map import read_column_map
 from brakelab.logs.formats import kind_of, read_frames
 from brakelab.logs.log_quality import SignalQuality
+from brakelab.logs.physics.samples import ANY_CAR, Car, car_of
 from brakelab.mapping.columns import column_map_text, read_column_series
 from brakelab.mapping.drive_torque import motors
 from brakelab.mapping.map_text import input_lines, radius_line

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from brakelab.log_physics.line import BRAKING, MOVING, Fit, fit, smooth
+from brakelab.logs.physics.line import BRAKING, MOVING, Fit, fit, smooth
 from brakelab.mapping.motion import Found, Motion, is_near, on_grid
 from brakelab.mapping.names import converts, words
 from brakelab.mapping.series import Series

@@ -1,6 +1,6 @@
 """Text of an input in a proposed map, for frames and columns alike: evidence, scale, unit, time-out."""
 
-from brakelab.log_physics.samples import Car
+from brakelab.logs.physics.samples import Car
 from brakelab.mapping.motion import Found
 from ecu.bus.units import spelled
 

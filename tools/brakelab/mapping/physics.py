@@ -16,8 +16,8 @@ left). Once a yaw rate is found it replaces that of the wheels, which their slip
 from collections.abc import Iterable
 from typing import Final
 
-from brakelab.log_physics.line import MOVING
-from brakelab.log_physics.samples import ANY_CAR, Car
+from brakelab.logs.physics.line import MOVING
+from brakelab.logs.physics.samples import ANY_CAR, Car
 from brakelab.mapping.brakes import brakes, flags
 from brakelab.mapping.candidates import best_of, by_name, unit_of
 from brakelab.mapping.curves import curves

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from brakelab.log_physics.line import BRAKING, Fit, Vector, fit, smooth
+from brakelab.logs.physics.line import BRAKING, Fit, Vector, fit, smooth
 from brakelab.mapping.motion import Found, Motion, is_near, on_grid
 from brakelab.mapping.names import converts, words
 from brakelab.mapping.series import Series

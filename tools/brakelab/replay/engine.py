@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.log_physics.samples import KEPT
+from brakelab.logs.physics.samples import KEPT
 from brakelab.logs.signal_file import SampleBlock
 from brakelab.replay.seen import look_at, new_seen
 from brakelab.results.row import MEASURED_INPUTS, N_ROW

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from brakelab.log_physics.judge import judge
-from brakelab.log_physics.samples import Collector, car_of
 from brakelab.logs.column_map import MappedFile
 from brakelab.logs.formats import Advance, kind_of, read_frames
 from brakelab.logs.log_quality import LogQuality
+from brakelab.logs.physics.judge import judge
+from brakelab.logs.physics.samples import Collector, car_of
 from brakelab.logs.signal_file import SampleBlock, freshness_at_any_rate, read_signals
 from brakelab.replay.earlier_layout import convert_initial
 from brakelab.replay.engine import Ecu, Rows, run_frames, run_samples

@@ -8,8 +8,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.log_physics.judge import Judged
 from brakelab.logs.log_quality import Damage, LogQuality, SignalQuality
+from brakelab.logs.physics.judge import Judged
 from ecu.bus.freshness import RATE_TOLERANCE
 from ecu.bus.receive import Reception
 from ecu.bus.receive_plan import ReceivePlan

@@ -19,9 +19,9 @@ from brakelab.rig.live import Bus, choose_bus, drive, make_folder, named_bus
 from brakelab.rig.outcome import Outcome, Undisturbed, outcome, stopping_distance
 from brakelab.rig.page import summary, write_page, write_tables
 from brakelab.rig.results import write_recorded, write_simulated
+from brakelab.rig.vehicle_node import warm_up
 from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.scenario import Scenario, load_scenario
-from brakelab.vehicle_node import warm_up
 from ecu.compiling import compiling_told
 from ecu.contract.faults import fault_mask, fault_names
 from ecu.errors import RunFault, UserError

@@ -17,9 +17,9 @@ from rich.console import Console
 from brakelab.report.command import report
 from brakelab.rig.live import Bus, choose_bus, drive, make_folder
 from brakelab.rig.results import write_recorded
+from brakelab.rig.vehicle_node import drive_in_real_time, new_node, wait_for_ecu, warm_up, write_truth_file
 from brakelab.simulation.closed_loop import plans
 from brakelab.simulation.scenario import load_scenario
-from brakelab.vehicle_node import drive_in_real_time, new_node, wait_for_ecu, warm_up, write_truth_file
 from ecu.bus.channel import open_channel
 from ecu.contract.records import RecordArray
 from ecu.output import Level, give, policy

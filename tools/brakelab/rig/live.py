@@ -1,7 +1,7 @@
 """One scenario in real time: daemon and vehicle as processes of their own on a common bus.
 
-The vehicle (`brakelab.vehicle_node`) sets off when it hears the ECU. The vehicle applies a scenario's faults
-of frames, sensors and actuators; faults of the daemon are applied here, with the same T_0.
+The vehicle (`vehicle_node.py`) sets off when it hears the ECU. It applies a scenario's faults of frames,
+sensors and actuators; faults of the daemon are applied here, with the same T_0.
 """
 
 import ctypes
@@ -121,7 +121,8 @@ class Processes:
             RunFault: it did not start.
         """
         wire = self._bus.wire
-        command = [sys.executable, "-m", "brakelab.vehicle_node", str(scenario), "-i", self._bus.interface]
+        command = [sys.executable, "-m", "brakelab.rig.vehicle_node", str(scenario)]
+        command += ["-i", self._bus.interface]
         command += ["-c", self._bus.channel] if wire is None else ["-c", wire.ends[1].name, "--bus-goes-off"]
         command += ["--with-ecu", "--seed", str(seed), "--truth", str(self.truth)]
         self.vehicle = subprocess.Popen(

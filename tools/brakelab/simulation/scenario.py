@@ -21,9 +21,9 @@ A phase ends after `seconds` or when the speed passes `until_speed`, whichever c
 ```
 [trace]
 file = "town.csv"                # beside the scenario; or `speed = [[0.0, 0.0], [9.0, 14.0]]`
-generate = "real-driving"        # or that of brakelab.trip.generate, with its grade
+generate = "real-driving"        # or that of brakelab.simulation.trip.generate, with its grade
 seed = 1
-generate = "wltp-brake"          # or that of brakelab.trip.wltp_brake, on a level road
+generate = "wltp-brake"          # or that of brakelab.simulation.trip.wltp_brake, on a level road
 trip = 3                         # one of its ten; all of them without
 ```
 The road can be described by place instead of time, with friction and height of each side, and the steering:

@@ -84,7 +84,7 @@ class Trace(ScenarioTable):
     file: str | None = None
     """CSV file of time and speed, beside the scenario."""
     generate: Literal["real-driving", "wltp-brake"] | None = None
-    """A trip of `brakelab.trip.generate`, with its grade, or the cycle of `brakelab.trip.wltp_brake`."""
+    """A trip of `simulation/trip/generate.py`, with its grade, or the cycle of `wltp_brake.py` there."""
     seed: Annotated[int, Field(ge=0), Unit("-")] = 0
     """Of the trip of real driving."""
     trip: Annotated[int, Field(ge=1, le=N_TRIPS), Unit("-")] | None = None

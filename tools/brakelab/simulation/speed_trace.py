@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.trip.generate import real_driving
-from brakelab.trip.wltp_brake import TRIPS, wltp_brake
+from brakelab.simulation.trip.generate import real_driving
+from brakelab.simulation.trip.wltp_brake import TRIPS, wltp_brake
 from ecu.errors import UserError
 
 HEADER = ["t", "speed"]

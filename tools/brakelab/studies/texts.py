@@ -115,8 +115,8 @@ MARGINS_TEXT: Final = (
     "How far the loop through pressure law, hydraulics, car and observer is from instability, measured "
     "with the loop cut at the friction in use (tools/brakelab/studies/control/margins.py). The loop gain is "
     "far below 1 at every frequency: an estimate of friction is torque over pressure, and more pressure "
-    "gives more torque, so to first order the estimate does not see what the law does. What comes back is lag "
-    "between the signals and what friction really owes to pressure.\n\n![Loop gain and distance from "
+    "gives more torque, so to first order the estimate does not see what the law does. What comes back is "
+    "lag between the signals and what friction really owes to pressure.\n\n![Loop gain and distance from "
     "+1](images/control-margins.svg)"
 )
 

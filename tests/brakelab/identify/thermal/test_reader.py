@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from brakelab.identify.thermal.reader import USED, as_drive, read_drives
-from brakelab.log_physics.samples import DISC_TEMPERATURE_MEASURED, KEPT
+from brakelab.logs.physics.samples import DISC_TEMPERATURE_MEASURED, KEPT
 from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.scenario import load_scenario
 from brakelab.simulation.simulate import write_columns

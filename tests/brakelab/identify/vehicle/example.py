@@ -3,7 +3,7 @@
 import numpy as np
 
 from brakelab.identify.vehicle.reader import PRESENT, Drive, drive_of
-from brakelab.log_physics.samples import SAMPLED
+from brakelab.logs.physics.samples import SAMPLED
 from ecu.settings.config import load_config, new_params
 from ecu.settings.resources import resource
 

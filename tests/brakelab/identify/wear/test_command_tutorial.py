@@ -8,7 +8,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from brakelab.fleet import generate
+from brakelab.bench import fleet_drives as generate
 from ecu.cli import main
 from ecu.settings.resources import resource
 
@@ -22,7 +22,7 @@ def _run(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
             assert main(arguments) == 0, line
         case ["python", "-c", code]:
             exec(compile(code, "tutorial", "exec"), {})
-        case ["python", "-m", "brakelab.fleet.generate", *arguments]:
+        case ["python", "-m", "brakelab.bench.fleet_drives", *arguments]:
             monkeypatch.setattr(sys, "argv", ["generate", *arguments])
             generate.main()
         case ["mkdir", "-p", folder]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.identify.thermal.model import ROW, Array, Course
-from brakelab.log_physics.samples import DISC_TEMPERATURE_MEASURED, KEPT
+from brakelab.logs.physics.samples import DISC_TEMPERATURE_MEASURED, KEPT
 from brakelab.replay.engine import new_ecu
 from brakelab.replay.log import log_size, replay_log
 from brakelab.replay.quality import Findings

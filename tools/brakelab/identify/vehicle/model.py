@@ -19,7 +19,7 @@ import numpy as np
 
 from brakelab.identify.vehicle.fit import Places, Prior, Residuals
 from brakelab.identify.vehicle.windows import Windows
-from brakelab.log_physics.line import Vector
+from brakelab.logs.physics.line import Vector
 from ecu.contract.params import BAR, GRAVITY
 from ecu.settings.config import torque_per_bar
 

@@ -29,7 +29,7 @@ from brakelab.identify.vehicle.sensors import (
 )
 from brakelab.identify.vehicle.wheels import Pairs, pairs_of
 from brakelab.identify.vehicle.windows import SECONDS, Windows, cut, pressure_zeros
-from brakelab.log_physics.line import Vector
+from brakelab.logs.physics.line import Vector
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CORNERS
 from ecu.errors import UserError

@@ -16,7 +16,7 @@ import numpy as np
 from brakelab.identify.vehicle.fit import Fit, Prior, Residuals, fit
 from brakelab.identify.vehicle.model import select
 from brakelab.identify.vehicle.windows import Windows
-from brakelab.log_physics.line import Vector
+from brakelab.logs.physics.line import Vector
 from ecu.contract.params import GRAVITY
 
 CURVES: Final = 0.02  # rad/s, standard deviation of a yaw rate that tells anything

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from brakelab.identify.vehicle.reader import MOVING, RATE, Drive, Rows
-from brakelab.log_physics.line import Vector
+from brakelab.logs.physics.line import Vector
 from ecu.contract.signals import CORNERS
 
 SECONDS: Final = 0.5

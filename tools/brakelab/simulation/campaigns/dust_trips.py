@@ -28,8 +28,8 @@ from brakelab.plant.emission_rig import (
     run_trip,
 )
 from brakelab.plant.records import RecordArray
-from brakelab.trip.generate import real_driving
-from brakelab.trip.table import distance_driven
+from brakelab.simulation.trip.generate import real_driving
+from brakelab.simulation.trip.table import distance_driven
 from ecu.settings.resources import resource
 
 Array = NDArray[np.float64]

@@ -19,8 +19,8 @@ from brakelab.plant.wear import pad_wear
 from brakelab.plant.wear_rig import SAMPLE, STEP, wear_block
 from brakelab.simulation.scenario import load_scenario
 from brakelab.simulation.scenario_car import scenario_plant, scenario_widths
-from brakelab.trip.generate import real_driving
-from brakelab.trip.table import KMH, brakings
+from brakelab.simulation.trip.generate import real_driving
+from brakelab.simulation.trip.table import KMH, brakings
 from ecu.settings.resources import resource
 
 Array = NDArray[np.float64]

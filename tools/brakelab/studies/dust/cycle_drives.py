@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from brakelab.plant.cycle import CYCLE
 from brakelab.simulation.closed_loop import Loop, new_loop, run_blocks
 from brakelab.simulation.scenario import Scenario, Trace, load_scenario
+from brakelab.simulation.trip.wltp_brake import DISC_AT_START, TRIPS
 from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS
 from brakelab.studies.dust.cycle_cars import Shipped, bedded, configured
-from brakelab.trip.wltp_brake import DISC_AT_START, TRIPS
 from ecu.algorithm.step import new_state
 from ecu.contract.faults import WHEEL_SLIPS
 from ecu.contract.signals import OUTPUT

@@ -16,8 +16,8 @@ from brakelab.plant.emission import conditioning, emission_rate, treat
 from brakelab.plant.jit import Record, kernel
 from brakelab.plant.records import GRAVITY, RecordArray
 from brakelab.plant.wear import wear_rate
-from brakelab.trip.generate import real_driving
-from brakelab.trip.wltp_brake import DISC_AT_START, TRIPS, wltp_brake
+from brakelab.simulation.trip.generate import real_driving
+from brakelab.simulation.trip.wltp_brake import DISC_AT_START, TRIPS, wltp_brake
 from ecu.algorithm.control.cleaner_share import CLEANER_STATE, lean
 from ecu.algorithm.control.distribution import front_share
 from ecu.contract.records import RecordArray as Params

@@ -13,7 +13,7 @@ from numpy.random import Generator
 
 from brakelab.identify.thermal.model import ROW, Array
 from brakelab.identify.thermal.reader import USED, Drive, as_drive
-from brakelab.log_physics.samples import DISC_TEMPERATURE_MEASURED, KEPT
+from brakelab.logs.physics.samples import DISC_TEMPERATURE_MEASURED, KEPT
 from brakelab.plant.disc_nodes import heat_discs, nodes_like, wind
 from brakelab.simulation.closed_loop import Loop, new_loop, run_blocks
 from brakelab.simulation.scenario import Scenario, Trace

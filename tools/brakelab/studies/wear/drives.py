@@ -14,8 +14,8 @@ from brakelab.results.wear import HALF_WIDTH, PERIOD, regressors_of
 from brakelab.simulation.campaigns.wear_blocks import drawn_car
 from brakelab.simulation.closed_loop import Loop, new_loop, run_blocks
 from brakelab.simulation.scenario import Scenario, Trace, load_scenario
+from brakelab.simulation.trip.generate import real_driving
 from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS
-from brakelab.trip.generate import real_driving
 from ecu.algorithm.step import new_state
 from ecu.contract.signals import OUTPUT
 from ecu.settings.config import load_config, new_params

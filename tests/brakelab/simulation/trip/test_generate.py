@@ -8,9 +8,16 @@ import pyarrow.parquet as pq
 import pytest
 
 from brakelab.report.drive import read_drive
-from brakelab.trip.generate import BRAKE_JERK, DRIVE_JERK, DT, STRONGEST_BRAKING, main, real_driving
-from brakelab.trip.report import DRIVE_COLUMNS, brake_lines, part_lines
-from brakelab.trip.table import KMH, Brakings, Row, brakings, distance_driven, trip_rows
+from brakelab.simulation.trip.generate import (
+    BRAKE_JERK,
+    DRIVE_JERK,
+    DT,
+    STRONGEST_BRAKING,
+    main,
+    real_driving,
+)
+from brakelab.simulation.trip.report import DRIVE_COLUMNS, brake_lines, part_lines
+from brakelab.simulation.trip.table import KMH, Brakings, Row, brakings, distance_driven, trip_rows
 
 SEEDS = (1, 2, 3, 4, 11)  # the first draw of 11 stands too short a time and is discarded
 TABLE_1_1 = [  # name, low, high
@@ -276,5 +283,5 @@ def test_a_file_that_is_no_drive_is_one_line(tmp_path: Path, capsys: pytest.Capt
 def test_the_documented_table_is_what_the_command_prints(capsys: pytest.CaptureFixture[str]) -> None:
     main(["--seed", "1"])
     said = capsys.readouterr().out.split("start [s]")[0].rstrip()
-    text = (Path(__file__).parents[3] / "docs" / "driving-cycle.md").read_text()
+    text = (Path(__file__).parents[4] / "docs" / "driving-cycle.md").read_text()
     assert said in text

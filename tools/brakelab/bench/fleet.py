@@ -1,9 +1,9 @@
 """Cost of a fleet: time beyond its replays, time for 30,000 km, memory for a long log.
 
 ```
-python -m brakelab.fleet.measure scaling MANIFEST [--rounds 3] [--drives 100]
-python -m brakelab.fleet.measure distance [--kilometres 30000] [--minutes 5] [--workers 2]
-python -m brakelab.fleet.measure length [--gigabytes 10]
+python -m brakelab.bench.fleet scaling MANIFEST [--rounds 3] [--drives 100]
+python -m brakelab.bench.fleet distance [--kilometres 30000] [--minutes 5] [--workers 2]
+python -m brakelab.bench.fleet length [--gigabytes 10]
 ```
 `scaling` replays the same drives in its own process, by one worker and by two, in turn. `distance` simulates
 drives of ten minutes, replays and discards them one by one, and keeps their brake applications until its end;
@@ -26,9 +26,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from brakelab.bench.fleet_drives import plant_of, simulate_and_replay, write_drive
 from brakelab.fleet.cluster import Workers, connect
 from brakelab.fleet.command import plan
-from brakelab.fleet.generate import plant_of, simulate_and_replay, write_drive
 from brakelab.fleet.manifest import Drive, find_drives
 from brakelab.fleet.run import Chain, Planned, Task, run_fleet
 from brakelab.fleet.task import replay_job
@@ -227,7 +227,7 @@ def length(gigabytes: float) -> None:
 
 def main() -> None:
     """Run the measurement requested on the command line."""
-    parser = argparse.ArgumentParser(prog="python -m brakelab.fleet.measure")
+    parser = argparse.ArgumentParser(prog="python -m brakelab.bench.fleet")
     what = parser.add_subparsers(dest="what", required=True)
     one = what.add_parser("scaling")
     one.add_argument("manifest", type=Path)

@@ -1,10 +1,10 @@
 """Simulated vehicle as a process of its own on a real bus, in real time.
 
-`python -m brakelab.vehicle_node SCENARIO -i INTERFACE -c CHANNEL` sends the vehicle's frames every 10 ms on
-absolute deadlines, takes the ECU's demands, and leaves when the scenario has ended or on SIGTERM. It prints
-`ready` when it is compiled and on the bus, and `driving NS` when it sets off: T_0 on the monotonic clock.
-Without valid demands for 30 ms its own hydraulics brake. The scenario's faults act on its sensors, on its
-actuators and on the frames of both directions.
+`python -m brakelab.rig.vehicle_node SCENARIO -i INTERFACE -c CHANNEL` sends the vehicle's frames every 10 ms
+on absolute deadlines, takes the ECU's demands, and leaves when the scenario has ended or on SIGTERM. It
+prints `ready` when it is compiled and on the bus, and `driving NS` when it sets off: T_0 on the monotonic
+clock. Without valid demands for 30 ms its own hydraulics brake. The scenario's faults act on its sensors, on
+its actuators and on the frames of both directions.
 """
 
 import argparse
@@ -224,7 +224,8 @@ def _ends(stop: list[int], written: Future[None] | None) -> bool:
 
 def _arguments(argv: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
-        prog="python -m brakelab.vehicle_node", description="The simulated vehicle on a bus, in real time."
+        prog="python -m brakelab.rig.vehicle_node",
+        description="The simulated vehicle on a bus, in real time.",
     )
     parser.add_argument("scenario", help="a scenario file, or a shipped one by name")
     parser.add_argument("-i", "--interface", required=True, help="as python-can calls it")

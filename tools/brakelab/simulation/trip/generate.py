@@ -6,7 +6,7 @@ for the end of the leg (a light, a junction, a bend, a queue). Accelerations are
 Every trip meets Table 1.1: as on the road, one that violates a row is discarded and repeated.
 
 ```
-python -m brakelab.trip.generate [--seed N] [--svg PICTURE.svg] [DRIVE.truth.parquet]
+python -m brakelab.simulation.trip.generate [--seed N] [--svg PICTURE.svg] [DRIVE.truth.parquet]
 ```
 prints the trip of a seed, or a drive of the simulated car that followed it, beside Tables 1.1 and 1.2.
 """
@@ -24,9 +24,9 @@ import numpy as np
 from numpy.random import Generator
 
 from brakelab.report.drive import read_drive
-from brakelab.trip import report as trip_report
-from brakelab.trip.picture import write_picture
-from brakelab.trip.table import KMH, Array, brakings, distance_driven, trip_rows
+from brakelab.simulation.trip import report as trip_report
+from brakelab.simulation.trip.picture import write_picture
+from brakelab.simulation.trip.table import KMH, Array, brakings, distance_driven, trip_rows
 from ecu.errors import UserError
 
 DT: Final = 0.1  # s, of the samples
@@ -259,7 +259,8 @@ def real_driving(seed: int) -> Cycle:
 def main(argv: list[str] | None = None) -> int:
     """Print, and draw, a trip or a drive; returns the exit code."""
     parser = argparse.ArgumentParser(
-        prog="python -m brakelab.trip.generate", description="A trip beside the thesis' Tables 1.1 and 1.2."
+        prog="python -m brakelab.simulation.trip.generate",
+        description="A trip beside the thesis' Tables 1.1 and 1.2.",
     )
     parser.add_argument("drive", nargs="?", type=Path, help="NAME.truth.parquet of a car that followed it")
     parser.add_argument("--seed", type=int, default=1, help="of the trip, from 0 on")

@@ -10,9 +10,9 @@ from typing import Final
 
 import numpy as np
 
-from brakelab.log_physics.line import BRAKING, RATE, Vector, fit
-from brakelab.log_physics.samples import Car, Drive, Rows
-from brakelab.log_physics.stuck import clipped_pressures
+from brakelab.logs.physics.line import BRAKING, RATE, Vector, fit
+from brakelab.logs.physics.samples import Car, Drive, Rows
+from brakelab.logs.physics.stuck import clipped_pressures
 from ecu.bus.units import CONVERSIONS
 
 LEAST_ROWS: Final = int(2 * RATE)

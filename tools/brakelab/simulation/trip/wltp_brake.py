@@ -22,7 +22,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.trip.table import KMH
+from brakelab.simulation.trip.table import KMH
 
 Array = NDArray[np.float64]
 

@@ -5,8 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from brakelab.trip.table import KMH, brakings
-from brakelab.trip.wltp_brake import DISC_AT_START, TRIPS, Division, wltp_brake
+from brakelab.simulation.trip.table import KMH, brakings
+from brakelab.simulation.trip.wltp_brake import DISC_AT_START, TRIPS, Division, wltp_brake
 
 NUMBERS = [None, *range(1, 11)]
 

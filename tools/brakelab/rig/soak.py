@@ -1,7 +1,7 @@
 """A long run of the ECU beside the simulated car, with checks of its invariants.
 
-    python -m brakelab.soak virtual --hours 24        the loop on a clock of its own, as fast as it goes
-    python -m brakelab.soak live --hours 1            `brake-ecu run` with recording and store, in real time
+    python -m brakelab.rig.soak virtual --hours 24    the loop on a clock of its own, as fast as it goes
+    python -m brakelab.rig.soak live --hours 1        `brake-ecu run` with recording and store, in real time
 
 `virtual` runs `cycle_once` with ring, recorder and state store in one process: the loop closed over
 real frames. Cycle numbers and counters of frames begin half a run below 2^32; every hour the clock
@@ -21,10 +21,10 @@ import numpy as np
 import structlog
 
 from brakelab.rig.live import choose_bus, drive
+from brakelab.rig.vehicle_node import live_through, new_node
 from brakelab.simulation.closed_loop import START_NS, plans
 from brakelab.simulation.scenario import load_scenario
 from brakelab.simulation.vehicle_bus import N_TRUTH
-from brakelab.vehicle_node import live_through, new_node
 from ecu.algorithm.step import INITIAL, initial_part
 from ecu.bus.protocol import BusStatus
 from ecu.bus.signal_map import receive_plan
@@ -309,7 +309,7 @@ def _blocks(path: Path) -> Any:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run and print the table."""
-    parser = argparse.ArgumentParser(prog="python -m brakelab.soak", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="python -m brakelab.rig.soak", description=__doc__.splitlines()[0])
     parser.add_argument("kind", choices=["virtual", "live"])
     parser.add_argument("--hours", type=float, default=1.0)
     parser.add_argument("--seed", type=int, default=1, help="of the drawn car and its noise")

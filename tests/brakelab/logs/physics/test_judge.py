@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from brakelab.log_physics.judge import judge, range_lines
-from brakelab.log_physics.samples import ANY_CAR, SAMPLED, Car, Collector, car_of
+from brakelab.logs.physics.judge import judge, range_lines
+from brakelab.logs.physics.samples import ANY_CAR, SAMPLED, Car, Collector, car_of
 from brakelab.logs.signal_file import freshness_at_any_rate
 from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.ecu_inputs import ecu_inputs, vehicle_frames

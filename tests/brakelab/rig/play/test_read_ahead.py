@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brakelab.play.read_ahead import SLOT_FRAMES, SLOTS, ReadAhead
 from brakelab.replay.quality import Findings
+from brakelab.rig.play.read_ahead import SLOT_FRAMES, SLOTS, ReadAhead
 from ecu.contract.records import FRAME, RecordArray
 from ecu.errors import RunFault, UserError
 

@@ -7,18 +7,18 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from brakelab.rig.vehicle_node import drive_in_real_time, main, new_node, write_truth_file
 from brakelab.simulation.closed_loop import plans
 from brakelab.simulation.faults import Fault
 from brakelab.simulation.scenario import Scenario, load_scenario
 from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS
-from brakelab.vehicle_node import drive_in_real_time, main, new_node, write_truth_file
 from ecu.bus.protocol import BusStatus
 from ecu.bus.transmit import frame_buffer, new_transmission, transmit
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import N_OUTPUTS, OUTPUT
 from ecu.runtime.clock import TimeSource
 
-CONFIG = Path(__file__).parents[2] / "config"
+CONFIG = Path(__file__).parents[3] / "config"
 EPOCH_NS = 1_700_000_000_000_000_000
 
 

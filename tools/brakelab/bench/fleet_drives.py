@@ -1,7 +1,7 @@
 """Fleet of simulated cars, as test data for `brake-ecu fleet`.
 
 ```
-python -m brakelab.fleet.generate --vehicles 20 --drives 10 --seconds 60 --out FOLDER [--damage]
+python -m brakelab.bench.fleet_drives --vehicles 20 --drives 10 --seconds 60 --out FOLDER [--damage]
 ```
 writes `FOLDER/<vehicle>/<drive>.log` (of every fourth vehicle `.parquet`, decoded) and a `manifest.toml`.
 A car is drawn once; its drives, half a week apart, differ in route, weather and noise.
@@ -121,7 +121,7 @@ def _task(task: tuple[int, int, float, Path]) -> None:
 
 def main() -> None:
     """Write the fleet requested on the command line."""
-    parser = argparse.ArgumentParser(prog="python -m brakelab.fleet.generate")
+    parser = argparse.ArgumentParser(prog="python -m brakelab.bench.fleet_drives")
     for name, default in (("vehicles", 20), ("drives", 10), ("workers", 2)):
         parser.add_argument(f"--{name}", type=int, default=default)
     parser.add_argument("--seconds", type=float, default=60.0)

@@ -12,10 +12,10 @@ from itertools import chain
 from pathlib import Path
 from typing import Final
 
-from brakelab.play.play_log import timed_frames
-from brakelab.play.read_ahead import ReadAhead
 from brakelab.replay.quality import Findings, damage_lines
 from brakelab.replay.source import announced, check_map, load_source
+from brakelab.rig.play.play_log import timed_frames
+from brakelab.rig.play.read_ahead import ReadAhead
 from brakelab.simulation.priority import PRIORITY, ask_for_priority
 from ecu.bus.channel import open_channel
 from ecu.bus.protocol import Channel

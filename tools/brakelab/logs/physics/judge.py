@@ -17,10 +17,10 @@ from typing import Final, NamedTuple, TypeGuard
 
 import numpy as np
 
-from brakelab.log_physics.line import MOVING, RATE, Fit, Vector, fit
-from brakelab.log_physics.pressures import pressure_lines
-from brakelab.log_physics.samples import SAMPLED, Car, Drive, Rows
-from brakelab.log_physics.stuck import clipped_accels, stuck_wheels
+from brakelab.logs.physics.line import MOVING, RATE, Fit, Vector, fit
+from brakelab.logs.physics.pressures import pressure_lines
+from brakelab.logs.physics.samples import SAMPLED, Car, Drive, Rows
+from brakelab.logs.physics.stuck import clipped_accels, stuck_wheels
 from ecu.bus.units import CONVERSIONS
 from ecu.contract.params import GRAVITY
 from ecu.contract.records import RecordArray

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from brakelab import soak
-from brakelab.soak import Check, soak_virtual
+from brakelab.rig import soak
+from brakelab.rig.soak import Check, soak_virtual
 
 
 def short(monkeypatch: pytest.MonkeyPatch, folder: Path) -> dict[str, Check]:

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from brakelab.log_physics.samples import SAMPLED, Drive
-from brakelab.log_physics.stuck import clipped_accels, clipped_pressures, runs, stuck_wheels
+from brakelab.logs.physics.samples import SAMPLED, Drive
+from brakelab.logs.physics.stuck import clipped_accels, clipped_pressures, runs, stuck_wheels
 from ecu.contract.signals import INPUT_SIGNALS
 
 PLACE = {INPUT_SIGNALS[place].name: column for column, place in enumerate(SAMPLED)}

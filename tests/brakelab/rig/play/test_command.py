@@ -7,11 +7,11 @@ import can
 import numpy as np
 import pytest
 
-from brakelab.play import command as player
-from brakelab.play.command import INTERRUPTED, Sent, Waker, play, send_on_schedule
-from brakelab.play.play_log import contract_frames, raw_frames, timed, timed_frames
 from brakelab.replay.quality import Findings
 from brakelab.replay.source import load_source
+from brakelab.rig.play import command as player
+from brakelab.rig.play.command import INTERRUPTED, Sent, Waker, play, send_on_schedule
+from brakelab.rig.play.play_log import contract_frames, raw_frames, timed, timed_frames
 from ecu.bus.freshness import begin_cycle, end_cycle
 from ecu.bus.protocol import BusStatus
 from ecu.bus.receive import new_reception, receive

@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from brakelab.report.drive import Drive
-from brakelab.trip.table import KMH, RURAL, URBAN, Array, Brakings, Row, distance_driven, trip_rows
+from brakelab.simulation.trip.table import KMH, RURAL, URBAN, Array, Brakings, Row, distance_driven, trip_rows
 from ecu.contract.signals import CORNERS
 
 DRIVE_COLUMNS: Final = (

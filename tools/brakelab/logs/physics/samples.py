@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.log_physics.line import RATE, Vector, smooth
+from brakelab.logs.physics.line import RATE, Vector, smooth
 from ecu.contract.signals import (
     ACCEL_X,
     ACCEL_Y,
