@@ -6,10 +6,10 @@ from typing import Annotated
 
 import typer
 
-from brakelab.cli_bench import HELP as BENCH_HELP
-from brakelab.cli_bench import bench
-from brakelab.cli_identify import app as identify_app
-from brakelab.cli_lab import app as lab_app
+from brakelab.cli.bench import HELP as BENCH_HELP
+from brakelab.cli.bench import bench
+from brakelab.cli.dynamometer import app as lab_app
+from brakelab.cli.identify import app as identify_app
 from ecu.arguments import (
     CHANNEL_OPTION,
     CONFIG_OPTION,
