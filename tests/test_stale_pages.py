@@ -57,6 +57,7 @@ def checkout(tmp_path: Path) -> Path:
         ({"ecu/brake.py": BRAKE.replace("2.0", "2.1")}, "ecu/brake.py"),
         ({"ecu/brake.py": BRAKE.replace("A brake", "One brake")}, ""),
         ({"ecu/brake.py": "# Torque per pressure.\n" + BRAKE}, ""),
+        ({"ecu/brake.py": BRAKE + 'TEXT: Final = "What is measured."\n'}, ""),
         ({"ecu/other.py": "X = 2\n"}, ""),
         ({"config/car.toml": "mass = 1600\n"}, "config/car.toml"),
         (
@@ -67,7 +68,16 @@ def checkout(tmp_path: Path) -> Path:
             "",
         ),
     ],
-    ids=["nothing", "constant", "docstring", "comment", "module not loaded", "configuration", "moved"],
+    ids=[
+        "nothing",
+        "constant",
+        "docstring",
+        "comment",
+        "text",
+        "module not loaded",
+        "configuration",
+        "moved",
+    ],
 )
 def test_page_is_older_where_what_the_bench_loads_changed(
     checkout: Path, change: dict[str, str], older: str

@@ -23,15 +23,21 @@ BENCHES = ("bench", "studies")
 """Folders of brakelab that hold the benches."""
 TIMES = ("step", "codec", "plant", "cycle")
 """Benches of the page that `brake-ecu bench` without a name writes."""
-PRESENTATION = ("command", "output", "table", "texts")
-"""Modules below `BENCHES` that write the page down; none of the figures is theirs."""
+PRESENTATION = (
+    "bench.command",
+    "bench.registry",
+    "studies.output",
+    "studies.study",
+    "studies.accuracy.table",
+)
+"""Modules that write the page down; none of the figures is theirs."""
 HEADER = re.compile(r"`brake-ecu bench ?(?P<bench>\w*)`")
 MEASURED = re.compile(r"^Measured on commit (?P<commit>\w+)(?P<dirty>-dirty)?,.*$", re.MULTILINE)
 
 
 @cache
 def fingerprint(content: bytes) -> str:
-    """Return a hash of the source's syntax tree without docstrings and imports."""
+    """Return a hash of the source's syntax tree without docstrings, imports and texts of pages."""
     tree = ast.parse(content)
     for node in ast.walk(tree):
         body = getattr(node, "body", None)
@@ -42,7 +48,8 @@ def fingerprint(content: bytes) -> str:
 
 def _says_nothing(line: ast.stmt) -> bool:
     text = isinstance(line, ast.Expr) and isinstance(line.value, ast.Constant)
-    return text or isinstance(line, ast.Import | ast.ImportFrom)
+    page = isinstance(line, ast.AnnAssign) and getattr(line.target, "id", "") in ("TEXT", "STUDY")
+    return text or page or isinstance(line, ast.Import | ast.ImportFrom)
 
 
 def _git(checkout: Path, *words: str) -> bytes:
@@ -86,7 +93,7 @@ def code_of(checkout: Path, bench: str) -> set[Path]:
     modules = _modules(checkout)
     benches = [name for name in modules if name.startswith(tuple(f"brakelab.{one}." for one in BENCHES))]
     todo = [name for start in ([bench] if bench else TIMES) for name in _modules_of(start, benches)]
-    seen = {name for name in benches if name.rpartition(".")[2] in PRESENTATION}
+    seen = {f"brakelab.{name}" for name in PRESENTATION}
     files: set[Path] = set()
     while todo:
         name = todo.pop()

@@ -17,8 +17,8 @@ from brakelab.bench.plant import cars, plant_rows
 from brakelab.bench.socket_pair import put
 from brakelab.bench.step import filter_table, step_rows
 from brakelab.studies import output
-from brakelab.studies.entries.command import Entered
 from brakelab.studies.measure import Figure, Row
+from brakelab.studies.study import Asked, Entered
 from ecu import cli
 from ecu.bus.receive import new_reception, receive
 from ecu.bus.receive_plan import contract_receive_plan
@@ -172,14 +172,14 @@ def test_the_documentation_is_renewed_where_that_is_asked(
 @pytest.mark.parametrize(
     ("name", "asked", "remedy"),
     [
-        ("step", command.Asked(), "no page of its own"),
-        ("stops", command.Asked(draw="nominal"), "leave out --draw"),
-        ("entries", command.Asked(entered=Entered(drive="mustang:a.log")), "leave out --observer, --drive"),
-        ("friction", command.Asked(), "run it in a checkout"),
+        ("step", Asked(), "no page of its own"),
+        ("stops", Asked(draw="nominal"), "leave out --draw"),
+        ("entries", Asked(entered=Entered(drive="mustang:a.log")), "leave out --observer, --drive"),
+        ("friction", Asked(), "run it in a checkout"),
     ],
 )
 def test_what_has_no_page_is_refused_before_it_runs(
-    name: str, asked: command.Asked, remedy: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    name: str, asked: Asked, remedy: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(command, "resource", lambda name: tmp_path / name)
     with pytest.raises(UserError, match=remedy):
@@ -188,7 +188,7 @@ def test_what_has_no_page_is_refused_before_it_runs(
 
 def test_unknown_bench_names_those_there_are() -> None:
     with pytest.raises(
-        UserError, match="steps: no such bench; choose one of step, codec, plant, cycle, stops"
+        UserError, match="steps: no such bench; choose one of step, codec, plant, cycle, lateness"
     ):
         command.bench("steps")
 

@@ -20,6 +20,8 @@ from numpy.typing import NDArray
 from brakelab.bench.watchers import BLOCK_S, PORTS, VIEWERS, Block, Watchers, alternate, inside
 from brakelab.results.text_table import Table
 from brakelab.rig.live import Processes, choose_bus
+from brakelab.studies.measure import machine
+from brakelab.studies.study import Asked, Measured, Study
 from ecu.contract.signals import CYCLE_NS
 from ecu.recording.recorder import read_recording
 from ecu.runtime.clock import Grid, system_time
@@ -147,3 +149,17 @@ def lateness_tables(seconds: float) -> list[Table]:
         "else these and the process of the metrics stand still."
     )
     return [Table("lateness", ("what", "p50", "p99", "p99.9", "worst", "goal"), rows, below)]
+
+
+TEXT: Final = (
+    "Daemon and simulated vehicle as processes in real time, with a busy process on every core. The bare "
+    "loop wakes every 10 ms on the daemon's core, above its priority, and does nothing: what the machine "
+    "allows."
+)
+
+
+def _run(asked: Asked) -> Measured:
+    return Measured(lateness_tables(asked.seconds), f". {machine()}")
+
+
+STUDY: Final = Study("Lateness under load", TEXT, _run)

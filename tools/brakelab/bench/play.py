@@ -30,6 +30,7 @@ from brakelab.rig.play.command import Sent, send_on_schedule
 from brakelab.rig.play.play_log import timed_frames
 from brakelab.simulation.priority import PRIORITY, ask_for_priority
 from brakelab.studies.measure import installed, machine
+from brakelab.studies.study import Asked, Measured, Study
 from ecu.runtime.clock import system_time
 from ecu.warm import Silence
 
@@ -263,3 +264,20 @@ def play_tables(seconds: float) -> list[Table]:
     )
     columns = ("speed", "player", "frames", "p50", "p99", "p99.9", "worst", "note")
     return [Table(f"play on {bus.interface}", columns, rows, below)]
+
+
+TEXT: Final = (
+    "Traffic of a bus of 500 kbit/s with 40 % load: 40 identifiers every 10 to 100 ms with jitter, one frame "
+    "after another, 1620 a second. Only ours has an option for the speed; the others get the log with its "
+    "stamps divided by it. How late a frame was is the kernel's stamp of its arrival at a socket of the "
+    "bench's own against its stamp in the log over the speed; 0 is the frame of the run that came earliest "
+    "against the log, for every player alike. Nothing sent: ours on a bus that takes every frame and does "
+    "nothing, against the schedule itself."
+)
+
+
+def _run(asked: Asked) -> Measured:
+    return Measured(play_tables(asked.seconds))
+
+
+STUDY: Final = Study("How late frames are played", TEXT, _run, keep=True)

@@ -28,7 +28,8 @@ from brakelab.results.text_table import Table
 from brakelab.simulation.closed_loop import VEHICLE_BUS, new_loop, run
 from brakelab.simulation.scenario import load_scenario
 from brakelab.studies.accuracy.table import time_table
-from brakelab.studies.measure import Figure, Row, Task, alternate, installed
+from brakelab.studies.measure import Figure, Row, Task, alternate, installed, machine
+from brakelab.studies.study import Asked, Measured, Study
 from ecu.algorithm.step import new_state
 from ecu.bus.freshness import begin_cycle, end_cycle
 from ecu.bus.receive import new_reception, receive
@@ -226,3 +227,16 @@ def _below_replays(rows: list[Row]) -> str:
         "replay of candump. The peer reads the first "
         f"{PART_S:.0f} s: no CRC, no counter, no time-out, four filters, no results."
     )
+
+
+TEXT: Final = (
+    "One drive of ten minutes in closed loop (config/scenarios/ordinary.toml) as a log of every format, "
+    "written by python-can and asammdf."
+)
+
+
+def _run(asked: Asked) -> Measured:
+    return Measured(replay_tables(), f". {machine()}")
+
+
+STUDY: Final = Study("Speed of replay", TEXT, _run, "replay-speed")

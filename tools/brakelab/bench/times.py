@@ -5,8 +5,8 @@ from typing import Final, NamedTuple
 
 from brakelab.bench import codec, cycle, plant, step
 from brakelab.studies.accuracy.table import time_table
-from brakelab.studies.measure import Row, machine
-from brakelab.studies.output import Measured, plain_row
+from brakelab.studies.measure import Row, machine, plain_row
+from brakelab.studies.study import Measured
 
 
 class Bench(NamedTuple):

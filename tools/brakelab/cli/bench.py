@@ -5,26 +5,20 @@ from typing import Annotated, Final
 
 import typer
 
+from brakelab.bench.registry import MODULES, NAMES, TIMES
 from ecu.completion import fitting
 
-NAMES: Final = {
-    "times": "step, codec, plant, cycle, lateness, replay, play",
-    "accuracy": "stops, observers, entries, ablation, bound, recorded, vehicle",
-    "control": "compensation, margins, blending, failures, lies",
-    "physics": "friction, lab, energy, wear, dust, thermal, blocks, cycles",
-}
-"""Benches by what they measure."""
 HELP: Final = "\n".join(
     [
         "Measure times, accuracy, control and physics. Print tables.\n\n\b",
-        *(f"{what:8}  {these}" for what, these in NAMES.items()),
+        *(f"{what:8}  {', '.join(these)}" for what, these in NAMES.items()),
     ]
 )
 
 
 def names(incomplete: str) -> list[str]:
     """Return the benches that begin like that."""
-    return fitting(", ".join(NAMES.values()).split(", "), incomplete)
+    return fitting([*TIMES, *MODULES], incomplete)
 
 
 def bench(
@@ -59,8 +53,7 @@ def bench(
 ) -> int:
     """Run one bench, see `HELP`."""
     from brakelab.bench import command
-    from brakelab.studies.entries.command import Entered, refuse
+    from brakelab.studies.study import Asked, Entered
 
     entered = Entered(tuple(observer or ()), drive, export)
-    refuse(entered, name)
-    return command.bench(name, command.Asked(seeds, seconds, draw, entered), write)
+    return command.bench(name, Asked(seeds, seconds, draw, entered), write)

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numba
 import numpy as np
@@ -37,6 +37,13 @@ class Row(NamedTuple):
     def ratio(self) -> float | None:
         """Ratio of the peer's median to ours; None without a peer."""
         return None if self.peer is None else self.peer.median / self.ours.median
+
+
+def plain_row(row: Any) -> dict[str, Any]:
+    """Return a row for JSON: figures become objects, times get their ratio."""
+    values = row._asdict().items()
+    plain = {key: value._asdict() if isinstance(value, Figure) else value for key, value in values}
+    return plain | {"ratio": row.ratio} if isinstance(row, Row) else plain
 
 
 Task = Callable[[], float]

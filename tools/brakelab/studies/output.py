@@ -1,14 +1,12 @@
 """Output of a bench: tables on the terminal, JSON, and pages of the documentation."""
 
-from collections.abc import Callable, Mapping
-from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final
 
 from rich.console import Console
 
 from brakelab.results.text_table import Table, markdown, show
-from brakelab.studies.measure import Figure, Row
 from brakelab.studies.provenance import measured_on
+from brakelab.studies.study import Measured, Study
 from ecu import __version__
 from ecu.output import give, policy, say
 from ecu.settings.resources import resource
@@ -19,13 +17,6 @@ PICTURES: Final = f"{RESULTS}/images"
 CAUSES: Final = "Causes"
 """Title of the section of a page that a person writes."""
 MOVED: Final = "**The figures changed since this was written: read it again, then take this line away.**"
-
-
-def plain_row(row: Any) -> dict[str, Any]:
-    """Return a row for JSON: figures become objects, times get their ratio."""
-    values = row._asdict().items()
-    plain = {key: value._asdict() if isinstance(value, Figure) else value for key, value in values}
-    return plain | {"ratio": row.ratio} if isinstance(row, Row) else plain
 
 
 def print_tables(line: str, tables: list[Table]) -> None:
@@ -58,30 +49,7 @@ def write_page(name: str, title: str, text: str, tables: list[Table], keep: bool
     say(f"written: {RESULTS}/{name}")
 
 
-class Measured(NamedTuple):
-    """What a bench measured."""
-
-    tables: list[Table]
-    of: str = ""
-    """What it was measured on, after the version: configuration, draw, machine."""
-    plain: Mapping[str, Any] | None = None
-    """For JSON; None: the tables."""
-    draw: Callable[[Path], None] | None = None
-    """Writes the pictures of the page into a folder."""
-
-
-class Page(NamedTuple):
-    """Page of a bench."""
-
-    title: str
-    text: str = ""
-    file: str = ""
-    """Its name; "": the bench's."""
-    keep: bool = False
-    """See `write_page`."""
-
-
-def show_measured(command: str, page: Page, measured: Measured, write: bool) -> None:
+def show_measured(command: str, page: Study, measured: Measured, write: bool) -> None:
     """Print tables, or give JSON; with `write` renew the page and its pictures. `command`: bench NAME."""
     of = f"`brake-ecu {command}`, version {__version__}{measured.of}"
     if policy().json:

@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from brakelab.bench import command
+from brakelab.bench import observers as bench
 from brakelab.results.text_table import markdown
 from brakelab.simulation.closed_loop import Drive
 from brakelab.studies import output
@@ -38,6 +39,7 @@ from brakelab.studies.accuracy.observers_cases import (
 from brakelab.studies.accuracy.observers_picture import HEIGHT, LEFT, TOP, Consistency, write_picture
 from brakelab.studies.accuracy.observers_table import finite, observer_tables
 from brakelab.studies.measure import Figure
+from brakelab.studies.study import Asked
 from ecu.contract.params import OBSERVERS
 from ecu.contract.records import FRAME, new_record
 from ecu.contract.signals import CORNERS
@@ -200,15 +202,14 @@ def test_page_and_picture(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> No
     (tmp_path / "docs" / "results" / "images").mkdir(parents=True)
     t = np.linspace(0.0, 6.0, 100)
     car = Consistency((t, t), (np.full((2, 100), 0.5),) * 2, (np.ones((5, 20)),) * 2)
-    monkeypatch.setattr(command, "resource", lambda name: tmp_path / name)
     monkeypatch.setattr(output, "resource", lambda name: tmp_path / name)
-    monkeypatch.setattr(command, "tasks", lambda seeds, draw: [])
+    monkeypatch.setattr(bench, "tasks", lambda seeds, draw: [])
     found = observer_rows([Task(JOINT, 0, ())], lambda drive, todo: [_samples(1.0)])
-    monkeypatch.setattr(command, "observer_rows", lambda todo, spread: found)
-    monkeypatch.setattr(command, "ProcessPoolExecutor", lambda mp_context: ThreadPoolExecutor())
-    monkeypatch.setattr(command, "consistency_of", lambda seed: car)
-    monkeypatch.setattr(command, "step_times", lambda: {JOINT: Figure(2.0, 1.0, 3.0)})
-    assert command.bench("observers", command.Asked(seeds=1), write=True) == 0
+    monkeypatch.setattr(bench, "observer_rows", lambda todo, spread: found)
+    monkeypatch.setattr(bench, "ProcessPoolExecutor", lambda mp_context: ThreadPoolExecutor())
+    monkeypatch.setattr(bench, "consistency_of", lambda seed: car)
+    monkeypatch.setattr(bench, "step_times", lambda: {JOINT: Figure(2.0, 1.0, 3.0)})
+    assert command.bench("observers", Asked(seeds=1), write=True) == 0
     page = (tmp_path / "docs" / "results" / "observers.md").read_text(encoding="utf-8")
     assert "seeds 0–0" in page
     for table in observer_tables(found, {JOINT: Figure(2.0, 1.0, 3.0)}, [car], "wide"):

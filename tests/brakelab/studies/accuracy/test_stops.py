@@ -9,8 +9,8 @@ from brakelab.bench import command
 from brakelab.results.text_table import markdown
 from brakelab.simulation.closed_loop import Drive
 from brakelab.studies import output
-from brakelab.studies.accuracy.stops import TABLE_4_3, Stops, nrmse, stops, window
-from brakelab.studies.accuracy.table import stop_tables
+from brakelab.studies.accuracy import stops as study
+from brakelab.studies.accuracy.stops import TABLE_4_3, Stops, nrmse, stop_tables, stops, window
 from ecu import cli
 from ecu.contract.records import FRAME, new_record
 from ecu.settings.config import load_config
@@ -80,8 +80,9 @@ def test_page_names_config_seeds_and_every_figure(
     (tmp_path / "config").mkdir()
     (tmp_path / "config" / "suv.toml").write_bytes(resource("config/suv.toml").read_bytes())
     monkeypatch.setattr(command, "resource", lambda name: tmp_path / name)
+    monkeypatch.setattr(study, "resource", lambda name: tmp_path / name)
     monkeypatch.setattr(output, "resource", lambda name: tmp_path / name)
-    monkeypatch.setattr(command.stops_bench, "stops", lambda config, seeds, spread, draw: result)
+    monkeypatch.setattr(study, "stops", lambda config, seeds, spread, draw: result)
     assert command.bench("stops", write=True) == 0
     page = (tmp_path / "docs" / "results" / "observer-accuracy.md").read_text(encoding="utf-8")
     assert "config/suv.toml" in page

@@ -5,8 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from brakelab.studies.entries.command import NOBODY, Entered, measure_entries, refuse
+from brakelab.bench.command import bench
+from brakelab.studies.entries.command import measure_entries
 from brakelab.studies.entries.ours import OURS
+from brakelab.studies.study import Asked, Entered
 from ecu.cli import main
 from ecu.errors import UserError
 
@@ -26,14 +28,13 @@ ROOT = Path(__file__).parents[4]
 )
 def test_a_mistake_is_told_before_anything_is_driven(entered: Entered, remedy: str) -> None:
     with pytest.raises(UserError, match=remedy):
-        measure_entries(1, entered)
+        measure_entries(Asked(1, entered=entered))
 
 
-def test_other_benches_have_no_entries() -> None:
-    refuse(NOBODY, "stops")
-    refuse(Entered(("a:B",)), "entries")
+@pytest.mark.parametrize("name", ["stops", "step", None])
+def test_other_benches_have_no_entries(name: str | None) -> None:
     with pytest.raises(UserError, match="bench entries"):
-        refuse(Entered(("a:B",)), "stops")
+        bench(name, Asked(entered=Entered(("a:B",))))
 
 
 @pytest.mark.study

@@ -20,6 +20,8 @@ from brakelab.simulation.scenario import Scenario
 from brakelab.studies.accuracy.observers import ORDINARY, counted
 from brakelab.studies.accuracy.observers_cases import ACCURACY, configured, shipped
 from brakelab.studies.accuracy.stops import AXLES, Vector, estimate_errors
+from brakelab.studies.cars import each_car
+from brakelab.studies.study import Asked, Measured, Study
 from ecu.algorithm.estimation.joint.layout import (
     BIAS,
     DEFLECTION_GAIN,
@@ -194,3 +196,21 @@ def ablation_table(cars: Iterable[list[Sample]]) -> Table:
         [(name, *(cell((name, *state)) for state in states)) for name in ABLATIONS],
         f"Front/rear, medians over {len(every)} cars. –: as with nothing taken away.",
     )
+
+
+TEXT: Final = (
+    "Each line takes one thing away from the joint observer; the rest is as in "
+    "[observers.md](observers.md). What is withheld or worthless is so in the ten minutes before too, "
+    "what was learned is forgotten after them. Balance of forces: the accelerometer still drives the "
+    "speed. Pressure by the demand: the same drives seen by a shadow, which has the samples alone. Motor "
+    "torque: it is there in the case itself. Friction's rate, the zeros of the pressure sensors and the "
+    "changing share of front and rear cannot be taken away from outside."
+)
+
+
+def _run(asked: Asked) -> Measured:
+    cars = each_car("ablation", samples_of, min(asked.seeds, CARS))
+    return Measured([ablation_table(cars)])
+
+
+STUDY: Final = Study("What carries the joint observer", TEXT, _run)

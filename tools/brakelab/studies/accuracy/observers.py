@@ -30,6 +30,7 @@ from brakelab.studies.accuracy.observers_cases import (
 )
 from brakelab.studies.accuracy.stops import AXLES, LOWEST_SPEED, Vector, columns, friction_errors, nrmse
 from brakelab.studies.measure import Figure, figure
+from brakelab.studies.study import WIDE
 from ecu.algorithm.step import new_state
 from ecu.contract.params import OBSERVERS
 from ecu.contract.records import RecordArray
@@ -41,7 +42,6 @@ SEEDS: Final = 20
 ROBUST_SHARE: Final = 4
 """Robustness is judged with one car out of so many: each disturbance has ten minutes of its own."""
 JOINT: Final = OBSERVERS[0]
-WIDE: Final = "wide"
 ORDINARY: Final = "ordinary"
 FILLED: Final = 2.0  # bar: the brakes are on
 ON_FOR: Final = 80  # cycles

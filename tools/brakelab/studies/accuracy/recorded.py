@@ -26,7 +26,9 @@ from brakelab.simulation.scenario import Phase, Scenario
 from brakelab.simulation.simulate import write_columns
 from brakelab.studies.accuracy.observers_cases import shipped
 from brakelab.studies.accuracy.table import spread
+from brakelab.studies.cars import each_car
 from brakelab.studies.measure import figure
+from brakelab.studies.study import Asked, Measured, Study
 from ecu.contract.signals import CORNERS
 from ecu.settings.config import Config, load_config, new_params
 from ecu.settings.resources import resource
@@ -198,3 +200,20 @@ def recorded_table(cars: Iterable[list[Recorded]]) -> Table:
         "afterwards. Goals: brake force and prediction within 4 %. Inside 2σ: friction of each corner, of "
         "which proportional pressures hardly tell more than the sum.",
     )
+
+
+TEXT: Final = (
+    "Ten brakings of 1.5 to 7 m/s² from 30 m/s by cars whose front and rear pressures are proportional, "
+    "braked by an ECU that corrects nothing. Replayed is what a logger has: wheel speeds at 100 Hz, one "
+    "pressure per axle at 20 Hz, the accelerometer at 50 or 10 Hz; no speed reference, no motor torque. The "
+    "cars have an engine in front, whose drag nothing reports: 0.1 m/s² at 30 m/s to 0.4 at 5, by its "
+    "gear, drawn within ±40 %."
+)
+
+
+def _run(asked: Asked) -> Measured:
+    cars = each_car("recorded", recorded_of, min(asked.seeds, CARS))
+    return Measured([recorded_table(cars)])
+
+
+STUDY: Final = Study("Cars as loggers record them", TEXT, _run, "recorded-cars")

@@ -30,6 +30,8 @@ from brakelab.simulation.closed_loop import Drive, new_loop, run
 from brakelab.simulation.scenario import Scenario, Trace
 from brakelab.simulation.simulate import write_columns
 from brakelab.studies.accuracy.observers_cases import shipped
+from brakelab.studies.cars import each_car
+from brakelab.studies.study import Asked, Measured, Study
 from ecu.contract.signals import CORNERS
 from ecu.settings.config import Config, load_config, new_params
 from ecu.settings.resources import resource
@@ -261,3 +263,22 @@ def identified_tables(cars: Iterable[Car]) -> list[Table]:
               strange, "Fifteen minutes of real driving by the same car. Learning: with the friction learned "
               "before each braking; configured: with that of the CONFIG."),
     ]  # fmt: skip
+
+
+TEXT: Final = (
+    "`brake-ecu identify vehicle --closed` on config/scenarios/identify.toml (689 s, hills shifted by the "
+    "seed), driven by cars of the wide draw with an ECU of config/suv.toml; START is that configuration with "
+    "masses, tyres and brakes 20 % off, up or down by the seed, rear apart from front. The scale of the "
+    "motors' torque, drawn within ±3 %, cannot be seen: it is that of mass, resistance and brakes alike, is "
+    "in their σ, and cancels in what is divided by mass, as in every prediction of a deceleration. Friction "
+    "is that of this drive, which begins with discs of 100 °C; the stranger's begins at 20 °C, so where a "
+    "car's linings depend much on temperature the configured friction is wrong there: only learning helps."
+)
+
+
+def _run(asked: Asked) -> Measured:
+    cars = each_car("vehicle", identified_of, min(asked.seeds, CARS))
+    return Measured(identified_tables(cars))
+
+
+STUDY: Final = Study("Cars identified from a drive", TEXT, _run, "identified-cars")

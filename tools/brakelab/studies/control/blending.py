@@ -25,6 +25,7 @@ from brakelab.studies.accuracy.observers_cases import Setup, shipped
 from brakelab.studies.accuracy.stops import FULL, window
 from brakelab.studies.accuracy.table import spread
 from brakelab.studies.measure import figure
+from brakelab.studies.study import Asked, Measured, Study
 from ecu.contract.signals import CORNERS
 from ecu.settings.config import Config, load_config, new_params
 from ecu.settings.resources import resource
@@ -293,3 +294,19 @@ def _wrong_friction_table(cars: int) -> Table:
 def blending_tables(cars: int = CARS) -> list[Table]:
     """Return the tables, each figure as median (least–greatest) over the cars 0 to `cars` - 1."""
     return [_changing_table(cars), _loss_table(cars), _wrong_friction_table(cars)]
+
+
+TEXT: Final = (
+    "Brakings from 75 km/h in closed loop with the ECU of config/suv.toml, whose motors take the share f on "
+    f"both axles. {CARS} cars, drawn from config/plant/suv.toml; figures are median (least–greatest) over "
+    "them. Torque is that of linings and motors, true; the demand is m a r with mass and radius of the "
+    "configuration (5.1). Cars of the wide draw: their hydraulics, motors and frictions are not those that "
+    "the ECU knows. Where it is told the true friction, what is left is the error of blending."
+)
+
+
+def _run(asked: Asked) -> Measured:
+    return Measured(blending_tables())
+
+
+STUDY: Final = Study("Motors and linings brake together", TEXT, _run)

@@ -15,6 +15,7 @@ from brakelab.simulation.scenario import Phase, Scenario
 from brakelab.studies.accuracy.observers_cases import shipped
 from brakelab.studies.accuracy.table import spread
 from brakelab.studies.measure import figure
+from brakelab.studies.study import Asked, Measured, Study
 from ecu.contract.faults import BRAKE_FAILED
 from ecu.contract.signals import CORNERS
 from ecu.settings.config import Config, load_config
@@ -113,3 +114,21 @@ def _table(title: str, decel: float, config: Config, motors: bool, cars: int) ->
         *("beside the line [m]", "largest slip [%]"),
     )
     return Table(title, columns, rows, "")
+
+
+TEXT: Final = (
+    "In the second of two brakings from 28 m/s, by a driver who keeps the lane, a brake gives nothing "
+    f"any more from t = {FAILS:g} s on. Deceleration is that of the second that begins "
+    f"{1e3 * AFTER:g} ms after it, against the same car without the fault. What the front axle's "
+    "circuit takes at 4 m/s² and more, and the diagonal one at 6 m/s², the grip of the other wheels does not "
+    "give at once; what one front calliper takes at 6 m/s² the limit of the yaw moment does not. "
+    f"{CARS} cars of the wide draw, median (least–greatest). "
+    "[control.md](../control.md#brakes-that-fail) says how."
+)
+
+
+def _run(asked: Asked) -> Measured:
+    return Measured(failure_tables())
+
+
+STUDY: Final = Study("Brakes that fail", TEXT, _run)

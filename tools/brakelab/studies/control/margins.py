@@ -14,7 +14,9 @@ on the friction in use is neglected: it makes the loop slower still.
 """
 
 from collections.abc import Callable, Iterable
+from concurrent.futures import ProcessPoolExecutor
 from functools import partial
+from multiprocessing import get_context
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -25,7 +27,8 @@ from brakelab.results.text_table import Table
 from brakelab.simulation.closed_loop import FrictionOverride, new_loop, run
 from brakelab.simulation.scenario import Phase, Scenario, load_scenario
 from brakelab.studies.accuracy.stops import AXLES, columns
-from ecu.settings.config import Config
+from brakelab.studies.study import Asked, Measured, Study, picture
+from ecu.settings.config import Config, load_config
 from ecu.settings.resources import resource
 
 CARS: Final = 5
@@ -199,3 +202,24 @@ def margin_panels(cars: list[Margins]) -> list[Panel]:
 
 
 LEGEND: Final = [(f"car {number}", colour) for number, colour in enumerate(COLOURS)]
+
+
+TEXT: Final = (
+    "How far the loop through pressure law, hydraulics, car and observer is from instability, measured "
+    "with the loop cut at the friction in use (tools/brakelab/studies/control/margins.py). The loop gain is "
+    "far below 1 at every frequency: an estimate of friction is torque over pressure, and more pressure "
+    "gives more torque, so to first order the estimate does not see what the law does. What comes back is "
+    "lag between the signals and what friction really owes to pressure.\n\n![Loop gain and distance from "
+    "+1](images/control-margins.svg)"
+)
+
+
+def _run(asked: Asked) -> Measured:
+    config = load_config(resource("config/suv.toml"))
+    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+        cars = measure_cars(config, spread=pool.map)
+    drawn = picture("control-margins.svg", margin_panels(cars), LEGEND)
+    return Measured(margin_tables(cars), draw=drawn)
+
+
+STUDY: Final = Study("Margins of the control loop", TEXT, _run, "control-margins")

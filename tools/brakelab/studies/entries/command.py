@@ -1,6 +1,5 @@
 """`brake-ecu bench entries`: friction observers of anybody, side by side."""
 
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -14,7 +13,7 @@ from brakelab.studies.entries.ours import OURS
 from brakelab.studies.entries.study import class_of, judge_car, predict_all
 from brakelab.studies.entries.table import entry_tables, standings
 from brakelab.studies.measure import machine
-from brakelab.studies.output import Measured
+from brakelab.studies.study import Asked, Measured, Study
 from ecu.errors import UserError
 from ecu.output import give, say
 from ecu.settings.resources import resource
@@ -34,33 +33,13 @@ TEXT: Final = (
 )
 
 
-class Entered(NamedTuple):
-    """Options of the command line about entries."""
-
-    observers: Sequence[str] = ()
-    """As `load_class` takes them."""
-    drive: str | None = None
-    """CAR:LOG; None: the shipped one, where the tests are."""
-    export: Path | None = None
-    """Write the drives there instead."""
-
-
-NOBODY: Final = Entered()
-
-
-def refuse(entered: Entered, name: str | None) -> None:
-    """Raise UserError where options of this bench are given to another one."""
-    if entered != NOBODY and name != ENTRIES:
-        raise UserError("bench", name or "", f"has no --observer, --drive, --export; `bench {ENTRIES}` has")
-
-
-def measure_entries(seeds: int, entered: Entered) -> Measured:
-    """Play the drives of cars 0 to `seeds` - 1 (at most `CARS`) to ours and the entered observers.
+def measure_entries(asked: Asked) -> Measured:
+    """Play the drives of the cars (at most `CARS`) to ours and the entered observers.
 
     Raises:
         UserError: an observer cannot be loaded, or a log not read.
     """
-    cars = min(seeds, CARS)
+    cars, entered = min(asked.seeds, CARS), asked.entered
     for name in entered.observers:
         class_of(name)
     names = tuple(dict.fromkeys((*OURS, *entered.observers)))
@@ -105,3 +84,6 @@ def export_entries(folder: Path, seeds: int) -> int:
     say(f"written: {folder}, inputs and truth (cars: {cars}); next: docs/benchmark.md")
     give(written=[folder])
     return 0
+
+
+STUDY: Final = Study("Friction observers, side by side", TEXT, measure_entries)

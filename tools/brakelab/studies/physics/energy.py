@@ -8,7 +8,9 @@ from brakelab.plant.energy import Energy, energy
 from brakelab.results.text_table import Table
 from brakelab.simulation.closed_loop import new_loop, run_blocks
 from brakelab.simulation.scenario import load_scenario
-from ecu.settings.config import Config
+from brakelab.studies.study import Asked, Measured, Study
+from ecu.settings.config import Config, load_config
+from ecu.settings.resources import resource
 
 SUSPENDED: Final = "suv14"
 SOURCES: Final = ("motion", "gravity", "driven")
@@ -68,3 +70,17 @@ def energy_tables(scenarios: Path, config: Config) -> list[Table]:
         "gained instead of given. Springs store less than 0.05 %. Own car: the one that the scenario names."
     )
     return [Table("Energy of the scenarios [%]", columns, rows, below)]
+
+
+TEXT: Final = (
+    "Every scenario of config/scenarios in closed loop with the ECU of config/suv.toml. The simulated "
+    "vehicle sums what leaves and enters in its own steps (tools/brakelab/plant/energy.py)."
+)
+
+
+def _run(asked: Asked) -> Measured:
+    config = load_config(resource("config/suv.toml"))
+    return Measured(energy_tables(resource("config/scenarios"), config))
+
+
+STUDY: Final = Study("Where the energy goes", TEXT, _run)

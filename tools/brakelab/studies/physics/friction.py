@@ -26,6 +26,7 @@ from brakelab.plant.records import RecordArray
 from brakelab.results.text_table import Table
 from brakelab.studies.physics.heat import BRAKES, KMH, PRINTED, heat_tables, rig_of
 from brakelab.studies.physics.staircase import staircase_table
+from brakelab.studies.study import Asked, Measured, Study
 from ecu.settings.resources import resource
 
 Vector = NDArray[np.float64]
@@ -277,3 +278,16 @@ def friction_tables() -> list[Table]:
         *heat_tables(linings),
         staircase_table(),
     ]
+
+
+TEXT: Final = (
+    "What the friction laws of tools/brakelab/plant/friction, the disc and the brake unit of the simulated "
+    "vehicle reproduce of the thesis, on the simulated dynamometer. Numbers: config/plant/linings.toml."
+)
+
+
+def _run(asked: Asked) -> Measured:
+    return Measured(friction_tables())
+
+
+STUDY: Final = Study("Friction laws, disc and brake unit", TEXT, _run)

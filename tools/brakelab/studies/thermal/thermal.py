@@ -10,7 +10,9 @@ from brakelab.identify.thermal.page import cooling_panel
 from brakelab.identify.thermal.result import SYMBOLS, values_of
 from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Line, Panel
 from brakelab.results.text_table import Table
-from brakelab.studies.thermal.study import JUDGED, Appraised, Car, Course
+from brakelab.studies.cars import each_car
+from brakelab.studies.study import Asked, Measured, Study, picture
+from brakelab.studies.thermal.study import JUDGED, Appraised, Car, Course, drive_car
 
 CARS: Final = 8
 GOAL: Final = 10.0  # K
@@ -146,3 +148,26 @@ def thermal_panels(cars: Sequence[Car]) -> list[Panel]:
         title = f"7.15: {axle.name}, δ [1/1000 s], before dashed"
         panels.append(cooling_panel(title, axle.fit.cooling, axle.before.cooling))
     return panels
+
+
+TEXT: Final = (
+    "How disc temperature is computed and identified: [disc-temperature.md](../disc-temperature.md). "
+    "Cars are drawn (wide) from config/plant/suv.toml. Their discs are measured and judged by a model "
+    "that is no lump (tools/brakelab/plant/disc_nodes.py: ring and hat, heat capacity by temperature, "
+    "radiation, convection by the 0.8th power of the air's speed, a film of water), about the drawn "
+    "numbers, with wind, air at the wheel and rain of the day; thermocouples lag by 1 to 4 s, scatter, "
+    "and are off by a constant and a factor. Each car is identified on one dry trip of real driving and "
+    "on a rainy one beyond the town, by the ECU's own torque, and judged on another of each by another "
+    "driver in other weather, the ECU with what it learned of friction, after a night of rest. "
+    "`HEAT_CAPACITY`, `AIR_FLOW` and `RAIN`, which widen the σ of a fit, were chosen on cars 0 and 2.\n\n"
+    "![Figures 7.13 to 7.15](images/disc-temperature.svg)"
+)
+
+
+def _run(asked: Asked) -> Measured:
+    cars = each_car("thermal", drive_car, min(asked.seeds, CARS))
+    drawn = picture("disc-temperature.svg", thermal_panels(cars), LEGEND)
+    return Measured(thermal_tables(cars), draw=drawn)
+
+
+STUDY: Final = Study("Disc temperature", TEXT, _run, "disc-temperature")

@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 from brakelab.identify.wear.fit import TERMS
 from brakelab.results.chart import BLUE, GREY, ORANGE, PINK, Line, Panel
 from brakelab.results.text_table import Table
-from brakelab.studies.wear.drives import CarDrives
-from brakelab.studies.wear.study import LAWS, MODES, Law, Life, live
+from brakelab.studies.cars import each_car
+from brakelab.studies.study import Asked, Measured, Study, picture
+from brakelab.studies.wear.drives import CarDrives, drive_car
+from brakelab.studies.wear.study import LAWS, MODES, Law, Life, dynamometer_laws, live
 from ecu.contract.signals import CORNERS
 
 CARS: Final = 5
@@ -169,3 +171,27 @@ def wear_panels(lives: list[Life], cars: int) -> list[Panel]:
         title = f"car {life.seed}, {CORNERS[0]}, {life.law}: wear [mm]"
         panels.append(Panel(title, "km", (0.0, 30e3), (0.0, top), lines))
     return panels
+
+
+TEXT: Final = (
+    "How wear is kept, measured and identified: [pad-wear.md](../pad-wear.md). Cars are drawn (wide) from "
+    "config/plant/suv.toml; each is driven in closed loop, without a speed reference, through one trip of "
+    "real driving by a calm, a usual and a lively driver in winter, spring and summer, its ECU going on with "
+    "what it has learned. Parts of these trips (town, country, motorway) are drawn into 30,000 km, one mix "
+    "of them between two measurements. True wear follows the plant's own law (tools/brakelab/plant/wear.py: "
+    "Archard with a regime of heat, running in, a lot of each axle, a climate that changes over 1,000 km), "
+    "which nothing on board knows. The ECU's law comes from the dynamometer with linings of another lot on "
+    "another car's brake. A thickness is measured to ± 0.1 mm (standard deviation). `scatter` and `walk` of "
+    "the linings were chosen on cars 0 and 1.\n\n![True and predicted wear](images/wear.svg)"
+)
+
+
+def _run(asked: Asked) -> Measured:
+    cars = each_car("wear", drive_car, min(asked.seeds, CARS))
+    laws = dynamometer_laws()
+    lives = wear_lives(cars, laws)
+    drawn = picture("wear.svg", wear_panels(lives, len(cars)), LEGEND)
+    return Measured(wear_tables(cars, laws, lives), draw=drawn)
+
+
+STUDY: Final = Study("Wear", TEXT, _run)

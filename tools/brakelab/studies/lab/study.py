@@ -2,7 +2,13 @@
 
 from typing import Final
 
-LAB_TEXT: Final = """\
+from brakelab.studies.lab.pictures import write_pictures
+from brakelab.studies.lab.run import run_lab
+from brakelab.studies.lab.tables import lab_tables
+from brakelab.studies.study import Asked, Measured, Study
+from ecu.output import say
+
+TEXT: Final = """\
 From the recording of a dynamometer to a friction law, with the methods of chapters 2 and 3, beside what
 the thesis prints. The dynamometer is simulated; on it are three drawn pads that follow none of the laws
 (tools/brakelab/identify/friction/patches.py): contact patches that temperature builds and wear destroys, a
@@ -105,3 +111,11 @@ no longer does; C and D scatter by the torque sensor, which has little to measur
 network ahead in all four and Ostermeyer's law worst in A, as here. The lumped temperature (pink) runs off by
 30 K: nominal friction, constants 5 % off, and a heat capacity that does not rise. 2.9 is discussed below.
 """
+
+
+def _run(asked: Asked) -> Measured:
+    lab = run_lab(say)
+    return Measured(lab_tables(lab), draw=lambda folder: write_pictures(folder, lab))
+
+
+STUDY: Final = Study("The friction laboratory", TEXT, _run, "friction-lab")

@@ -1,0 +1,35 @@
+"""The table of benches: each has its study, and its page where there is one says so."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from brakelab.bench.command import study_of
+from brakelab.bench.registry import MODULES
+from ecu.errors import UserError
+
+RESULTS = Path(__file__).parents[3] / "docs/results"
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_a_study_is_where_the_table_says_and_its_page_has_its_title(name: str) -> None:
+    study = study_of(name)
+    page = RESULTS / f"{study.file or name}.md"
+    assert study.text.rstrip().endswith((".", ")", "**"))
+    if page.exists():
+        text = page.read_text("utf-8")
+        assert text.startswith(f"# {study.title}\n")
+        assert f"`brake-ecu bench {name}`" in text
+
+
+def test_a_missing_package_is_named_with_its_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "asammdf", None)
+    monkeypatch.delitem(sys.modules, "brakelab.bench.replay", raising=False)
+    with pytest.raises(UserError, match=r"replay: asammdf not installed: pip install 'brake-ecu\[dev\]'"):
+        study_of("replay")
+
+
+def test_every_page_is_of_a_bench() -> None:
+    files = {study_of(name).file or name for name in MODULES} | {"benchmarks"}
+    assert {page.stem for page in RESULTS.glob("*.md")} <= files

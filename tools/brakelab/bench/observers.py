@@ -1,0 +1,47 @@
+"""`brake-ecu bench observers`: the observers beside their goals, and the time of a step with each."""
+
+from collections.abc import Callable, Iterable
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from typing import Final
+
+from brakelab.bench.observer_times import step_times
+from brakelab.results.progress import tracked
+from brakelab.studies.accuracy.observers import Sample, Task, observer_rows, tasks
+from brakelab.studies.accuracy.observers_cases import configured
+from brakelab.studies.accuracy.observers_picture import PICTURED, consistency_of, write_picture
+from brakelab.studies.accuracy.observers_table import finite, observer_tables
+from brakelab.studies.accuracy.stops import drawn_of
+from brakelab.studies.measure import machine, plain_row
+from brakelab.studies.study import Asked, Measured, Study
+
+TEXT: Final = (
+    "Cars and their sensors are drawn per seed about config/plant/suv.toml and Table 4.1. Cold: the "
+    "configuration as it is, nothing learned. Adapted: after ten minutes of "
+    "config/scenarios/ordinary.toml in the same car, with what the state store keeps of them. Every "
+    "observer closes the loop itself; figures stand for front/rear. Counted while the brakes of both axles "
+    "have been on for 0.8 s, above 15 km/h.\n\n"
+    "![Error of the friction over 2σ, and the squared innovations](images/observers.svg)"
+)
+
+
+def _run(asked: Asked) -> Measured:
+    seeds, todo = asked.seeds, tasks(asked.seeds, asked.draw)
+    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+
+        def all_cores(drive: Callable[[Task], list[Sample]], cars: list[Task]) -> Iterable[list[Sample]]:
+            return tracked(pool.map(drive, cars), "observers", len(cars))
+
+        rows = observer_rows(todo, all_cores)
+        consistency = list(pool.map(consistency_of, range(min(seeds, PICTURED))))
+    times = step_times()
+    step_us = {name: value._asdict() for name, value in times.items()}
+    return Measured(
+        observer_tables(rows, times, consistency, asked.draw),
+        f"{drawn_of('suv.toml', configured(), asked)}. {machine()}",
+        finite({"rows": [plain_row(row) for row in rows], "step_us": step_us}),
+        lambda folder: write_picture(folder / "observers.svg", consistency),
+    )
+
+
+STUDY: Final = Study("The observers beside their goals", TEXT, _run)
