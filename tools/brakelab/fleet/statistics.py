@@ -12,7 +12,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Vector = NDArray[np.float64]
+from brakelab.arrays import Vector
+
 Summary = Mapping[str, Any]
 
 WEEK_NS: Final = 7 * 86_400 * 10**9

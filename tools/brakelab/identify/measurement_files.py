@@ -8,12 +8,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pa_csv
 import pyarrow.parquet as pq
-from numpy.typing import NDArray
 
+from brakelab.arrays import Array
 from brakelab.results.mdf import load_asammdf
 from ecu.errors import UserError
-
-Array = NDArray[np.float64]
 
 WARMEST_COLD: Final = 250.0
 """degC: a disc that is never cooler is given in K."""

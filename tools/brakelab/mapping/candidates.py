@@ -6,7 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from brakelab.logs.physics.line import Fit, Vector, fit, smooth
+from brakelab.arrays import Vector
+from brakelab.logs.physics.line import Fit, fit, smooth
 from brakelab.logs.physics.samples import Rows
 from brakelab.mapping.motion import Motion, contract_unit, is_near, on_grid
 from brakelab.mapping.names import converts, names_itself, score, tells_direction, tells_pressure

@@ -7,6 +7,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from brakelab.arrays import Vector
 from brakelab.logs.column_map import SECONDS, TIMES
 from brakelab.logs.log_quality import SignalQuality
 from brakelab.logs.physics.samples import Car
@@ -14,7 +15,7 @@ from brakelab.logs.signal_batches import Columns, columns_of, rows_of, time_of
 from brakelab.mapping.map_text import input_lines, radius_line
 from brakelab.mapping.motion import Found
 from brakelab.mapping.names import converts
-from brakelab.mapping.series import FEWEST, Series, Vector
+from brakelab.mapping.series import FEWEST, Series
 from ecu.errors import UserError
 
 FLAG: Final = {0.0, 1.0}

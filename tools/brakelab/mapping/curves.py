@@ -13,7 +13,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from brakelab.logs.physics.line import LAGS, MOVING, RATE, Vector, smooth
+from brakelab.arrays import Vector
+from brakelab.logs.physics.line import LAGS, MOVING, RATE, smooth
 from brakelab.logs.physics.samples import Car, Rows
 from brakelab.mapping.candidates import best_of, unit_of
 from brakelab.mapping.motion import STANDING, Found, Motion, contract_unit, is_near, on_grid

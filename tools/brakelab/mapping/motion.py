@@ -5,7 +5,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from brakelab.logs.physics.line import MOVING, RATE, Vector, smooth
+from brakelab.arrays import Vector
+from brakelab.logs.physics.line import MOVING, RATE, smooth
 from brakelab.logs.physics.samples import ANY_CAR, Car, Rows
 from brakelab.mapping.names import converts, corner_of, score
 from brakelab.mapping.series import Series

@@ -8,13 +8,13 @@ import numpy as np
 from cantools.database import Database, Message
 from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from ecu.bus.database import fits
 from ecu.bus.plan import compile_message, decode
 from ecu.bus.units import spelled
 from ecu.contract.records import EXTENDED_ID, FRAME_ERROR, FRAME_EXTENDED, FRAME_REMOTE, RecordArray
 from ecu.jit import kernel
 
-Vector = NDArray[np.float64]
 FEWEST = 20  # frames of a message
 MAGNITUDES = {"deg", "rad", "deg/s", "rad/s", "m/s^2", "g", "N m"}  # units of what has two sides
 TURNS = 4  # of a sign, in a drive

@@ -11,7 +11,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from brakelab.logs.physics.line import BRAKING, Fit, Vector, fit, smooth
+from brakelab.arrays import Vector
+from brakelab.logs.physics.line import BRAKING, Fit, fit, smooth
 from brakelab.mapping.motion import Found, Motion, is_near, on_grid
 from brakelab.mapping.names import converts, words
 from brakelab.mapping.series import Series

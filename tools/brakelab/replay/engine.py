@@ -12,6 +12,7 @@ from typing import Any, Final, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from brakelab.logs.physics.samples import KEPT
 from brakelab.logs.signal_file import SampleBlock
 from brakelab.replay.seen import look_at, new_seen
@@ -28,7 +29,6 @@ from ecu.contract.signals import (
 )
 from ecu.jit import Record, kernel
 
-Vector = NDArray[np.float64]
 Block = TypeVar("Block")
 
 BLOCK_CYCLES: Final = 16384

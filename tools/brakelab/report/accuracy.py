@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from brakelab.report.brakings import Braking, inside
-from brakelab.report.drive import Drive, Vector
+from brakelab.report.drive import Drive
 
 AXLES = {"front": slice(0, 2), "rear": slice(2, 4)}
 

@@ -8,9 +8,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from brakelab.arrays import Vector
 from brakelab.report.accuracy import AXLES
 from brakelab.report.brakings import Braking, inside
-from brakelab.report.drive import Drive, Vector
+from brakelab.report.drive import Drive
 from brakelab.report.torque import axle_pressure
 from ecu.contract.signals import CORNERS, OBSERVING
 

@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.report.drive import Drive, Vector, numbers, read_parquet
+from brakelab.arrays import Vector
+from brakelab.report.drive import Drive, numbers, read_parquet
 from brakelab.results.files import brakes_path
 from brakelab.results.prediction import SHORT, left_out
 from brakelab.stretches import stretches

@@ -9,8 +9,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from bokeh.models import ColumnDataSource, Range1d
 
+from brakelab.arrays import Vector
 from brakelab.report.brakings import Braking, inside
-from brakelab.report.drive import Drive, Vector
+from brakelab.report.drive import Drive
 from brakelab.report.look import DEGRADED, DEMAND, ESTIMATE, GRID, INK, QUIET, new_figure
 from brakelab.report.torque import binned
 from brakelab.results.car import RATES, Car

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.report.drive import Vector
+from brakelab.arrays import Vector
 
 # A brake application is a small part of a drive and the part that readers zoom into.
 BUSY_WEIGHT = 5.0

@@ -7,13 +7,11 @@ from typing import NamedTuple
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from brakelab.results.files import refuse_export
 from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
-
-Vector = NDArray[np.float64]
 
 
 class Drive(NamedTuple):

@@ -4,8 +4,9 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from brakelab.arrays import Vector
 from brakelab.report.brakings import Braking, inside
-from brakelab.report.drive import Drive, Vector
+from brakelab.report.drive import Drive
 from brakelab.report.per_braking import CORNER_MARKS, Series, points_by_braking
 from brakelab.results.car import Car
 from ecu.contract.signals import CORNERS

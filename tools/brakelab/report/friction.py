@@ -5,9 +5,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from brakelab.report.accuracy import AXLES
 from brakelab.report.brakings import Braking, inside
-from brakelab.report.drive import Drive, Vector
+from brakelab.report.drive import Drive
 from brakelab.report.look import INK, LEFT, RIGHT, new_figure
 from ecu.contract.signals import CORNERS, OBSERVING
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from brakelab.report.drive import Vector
+from brakelab.arrays import Vector
 from brakelab.report.look import ESTIMATE, STAGE_COLOURS, new_figure
 from brakelab.report.timing import Timing
 

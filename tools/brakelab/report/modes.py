@@ -6,8 +6,9 @@ import numpy as np
 from bokeh.models import ColumnDataSource, FactorRange, HoverTool, Range1d
 from bokeh.models.annotations import Legend
 
+from brakelab.arrays import Vector
 from brakelab.report.downsample import Buckets, worst
-from brakelab.report.drive import Drive, Vector
+from brakelab.report.drive import Drive
 from brakelab.report.look import DEGRADED, ESTIMATE, FAILED, HOLDING, IDLE, new_figure
 from ecu.contract.faults import FAULTS, WORD, WORDS, fault_mask
 from ecu.contract.signals import CORNERS, STARTING

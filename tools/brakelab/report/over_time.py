@@ -6,9 +6,10 @@ import numpy as np
 from bokeh.models import ColumnDataSource, HoverTool, Range1d
 from bokeh.models.annotations import BoxAnnotation
 
+from brakelab.arrays import Vector
 from brakelab.report.brakings import Braking, inside
 from brakelab.report.downsample import Buckets, buckets, extremes, times
-from brakelab.report.drive import Drive, Vector
+from brakelab.report.drive import Drive
 from brakelab.report.look import DEMAND, ESTIMATE, INK, LEFT, RIGHT, SHADE, link_crosshair, new_figure
 from brakelab.report.modes import modes_plot
 from brakelab.report.wheels import plots_of_wheels

@@ -7,8 +7,8 @@ import numpy as np
 from bokeh.models import ColumnDataSource, HoverTool, Range1d, SingleIntervalTicker
 from bokeh.models.annotations import Span
 
+from brakelab.arrays import Vector
 from brakelab.report.brakings import Braking
-from brakelab.report.drive import Vector
 from brakelab.report.look import DEMAND, ESTIMATE, LEFT, RIGHT, new_figure
 from ecu.contract.signals import CORNERS
 

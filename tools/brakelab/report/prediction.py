@@ -9,8 +9,8 @@ import numpy as np
 from bokeh.models import ColumnDataSource, HoverTool, Range1d, SingleIntervalTicker
 from bokeh.models.annotations import BoxAnnotation, Span
 
+from brakelab.arrays import Vector
 from brakelab.report.brakings import Braking, Force
-from brakelab.report.drive import Vector
 from brakelab.report.look import DEMAND, ESTIMATE, INK, QUIET, new_figure
 from brakelab.results.prediction import Errors, errors, one_scale, running_average
 

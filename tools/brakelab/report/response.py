@@ -8,9 +8,10 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from brakelab.arrays import Vector
 from brakelab.report.accuracy import AXLES
 from brakelab.report.brakings import Braking, inside
-from brakelab.report.drive import Drive, Vector
+from brakelab.report.drive import Drive
 from brakelab.report.look import DEMAND, LEFT, QUIET, RIGHT, STAGE_COLOURS
 from brakelab.report.per_braking import Series, points_by_braking
 from brakelab.report.torque import axle_pressure

@@ -3,8 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from brakelab.report.brakings import Braking, inside
-from brakelab.report.drive import Drive, Vector
+from brakelab.report.drive import Drive
 
 Rows = NDArray[np.bool_]
 Curve = tuple[Vector, Vector]

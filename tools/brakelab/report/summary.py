@@ -6,9 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from brakelab.arrays import Vector
 from brakelab.report.accuracy import AXLES, Accuracy
 from brakelab.report.brakings import Braking
-from brakelab.report.drive import Drive, Vector, start_ns
+from brakelab.report.drive import Drive, start_ns
 from brakelab.report.modes import fault_masks, faults_seen
 from brakelab.report.page import Tile, fixed, percent, signed_percent
 from brakelab.report.timing import Timing, spread

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from brakelab.report.drive import Vector
+from brakelab.arrays import Vector
 from ecu.contract.records import STAGES
 from ecu.errors import UserError
 from ecu.recording.recorder import read_recording

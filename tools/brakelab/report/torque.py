@@ -10,9 +10,10 @@ import numpy as np
 from bokeh.models import LinearAxis, Range1d
 from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from brakelab.report.accuracy import AXLES
 from brakelab.report.brakings import Braking, inside
-from brakelab.report.drive import Drive, Vector
+from brakelab.report.drive import Drive
 from brakelab.report.look import INK, QUIET, STAGE_COLOURS, new_figure
 from brakelab.results.car import Car
 from ecu.contract.signals import CORNERS, OBSERVING

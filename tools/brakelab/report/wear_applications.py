@@ -6,7 +6,8 @@ from typing import Final, NamedTuple
 import numpy as np
 import pyarrow as pa
 
-from brakelab.report.drive import Drive, Vector, numbers, read_parquet
+from brakelab.arrays import Vector
+from brakelab.report.drive import Drive, numbers, read_parquet
 from brakelab.results.files import brakes_path
 from ecu.contract.signals import CORNERS
 

@@ -6,8 +6,9 @@ import numpy as np
 from bokeh.models import ColumnDataSource, HoverTool
 from bokeh.models.annotations import Span
 
+from brakelab.arrays import Vector
 from brakelab.report.accuracy import AXLES
-from brakelab.report.drive import Drive, Vector
+from brakelab.report.drive import Drive
 from brakelab.report.look import FAILED, LEFT, RIGHT, new_figure
 from brakelab.report.wear_applications import Application
 from brakelab.report.wear_roads import way

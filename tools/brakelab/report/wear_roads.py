@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
+from brakelab.arrays import Vector
 from brakelab.report.accuracy import AXLES
-from brakelab.report.drive import Drive, Vector
+from brakelab.report.drive import Drive
 from brakelab.report.wear_applications import Application
 
 KINDS: Final = (("town", 60.0), ("country", 90.0), ("motorway", float("inf")))

@@ -5,8 +5,9 @@ from typing import Any, Final
 import numpy as np
 from bokeh.models import ColumnDataSource, Range1d
 
+from brakelab.arrays import Vector
 from brakelab.report.downsample import Buckets, extremes, times
-from brakelab.report.drive import Drive, Vector
+from brakelab.report.drive import Drive
 from brakelab.report.look import DEMAND, ESTIMATE, INK, LEFT, QUIET, RIGHT, STAGE_COLOURS, new_figure
 from ecu.contract.signals import CORNERS
 

@@ -9,7 +9,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.report.drive import Drive, Vector
+from brakelab.arrays import Vector
+from brakelab.report.drive import Drive
 from ecu.algorithm.control.limiter import LEAST_TORQUE
 from ecu.algorithm.control.pressure_law import GREATEST_CHANGE
 from ecu.contract.faults import BRAKE_FADE, DEMAND_LIMITED

@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from brakelab.report.accuracy import accuracy_per_axle, achieved_deceleration, evaluated
 from brakelab.report.brakings import brakings
-from brakelab.report.drive import Drive, Vector, onto, read_drive, start_ns
+from brakelab.report.drive import Drive, onto, read_drive, start_ns
 from brakelab.report.sparkline import drive_sparkline
 from brakelab.report.timing import Spread, read_timing, spread
 from brakelab.rig.linings import OF_LININGS, beyond_compensation, tell_linings

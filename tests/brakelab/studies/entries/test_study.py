@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from brakelab.arrays import Vector
 from brakelab.studies.accuracy.observers_cases import configured, shipped
 from brakelab.studies.entries.drives import NAMES, SETS, CarTracks, Track, applications, drive_track
-from brakelab.studies.entries.inputs import Inputs, Vector
+from brakelab.studies.entries.inputs import Inputs
 from brakelab.studies.entries.observer import EntryError, load_class
 from brakelab.studies.entries.ours import OURS, Configured, EcuObserver
 from brakelab.studies.entries.player import new_entry, play, reset

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from brakelab.arrays import Array
 from brakelab.identify.config_file import Section, write_car
-from brakelab.identify.dust.features import Array
 from brakelab.identify.dust.fit import Judged, choose, judge_all, ranges
 from brakelab.identify.dust.page import write_page
 from brakelab.identify.dust.reader import read_trips

@@ -14,11 +14,9 @@ with the transport delay of best correlation between counter and friction power,
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from brakelab.arrays import Array
 from brakelab.stretches import stretches
-
-Array = NDArray[np.float64]
 
 PERIOD: Final = 0.1  # s, grid of a trip
 PRESSED: Final = 1.5  # bar, of the mean over SMOOTH

@@ -19,7 +19,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.identify.dust.features import Applications, Array
+from brakelab.arrays import Array
+from brakelab.identify.dust.features import Applications
 from brakelab.identify.dust.model import FITS, LEAST, Model, samples_of
 
 COVERAGE: Final = 0.95

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from brakelab.arrays import Array
 from brakelab.identify.dust.features import Applications
 from ecu.algorithm.monitoring.emission_factor import (
     PRESSURE,
@@ -25,7 +26,6 @@ from ecu.algorithm.monitoring.emission_factor import (
 )
 from ecu.contract.dust import HIDDEN, INPUTS, KNOTS, LAW, LAW_TERMS, NETWORK, NODES, TABLE
 
-Array = NDArray[np.float64]
 Predictor = Callable[[Array, Array], Array]
 """EF, shape (n,), of features, shape (n, 6), and sequences, shape (n, ·)."""
 

@@ -5,7 +5,8 @@ from typing import Final
 
 import numpy as np
 
-from brakelab.identify.dust.features import Applications, Array
+from brakelab.arrays import Array
+from brakelab.identify.dust.features import Applications
 from brakelab.identify.dust.fit import Judged, spearman
 from brakelab.identify.dust.model import LEAST
 from brakelab.results.chart import BLUE, GREY, ORANGE, PINK, Line, Panel, write_chart

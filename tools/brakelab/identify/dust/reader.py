@@ -11,13 +11,8 @@ from typing import Final
 
 import numpy as np
 
-from brakelab.identify.dust.features import (
-    PERIOD,
-    Applications,
-    Array,
-    Recorded,
-    extract,
-)
+from brakelab.arrays import Array
+from brakelab.identify.dust.features import PERIOD, Applications, Recorded, extract
 from brakelab.identify.measurement_files import check_celsius, read_columns, read_manifest
 from ecu.errors import UserError
 

@@ -10,11 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.arrays import Matrix, Vector
 from brakelab.identify.friction.fit import quantile
 from brakelab.identify.friction.stops import Stops
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 LEVEL_GAPS = (0.4, 2.5e5, 6.0)
 """Initial speeds (sliding, m/s), pressures (Pa), initial temperatures (K) this far apart are two levels."""

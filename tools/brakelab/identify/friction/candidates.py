@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from brakelab.identify.friction.stops import Stops
 from brakelab.plant.friction.constant import Constant
 from brakelab.plant.friction.ilvo import Ilvo
@@ -22,8 +22,6 @@ from brakelab.plant.friction.ostermeyer_revised import OstermeyerRevised
 from brakelab.plant.friction.own import Own, read_code
 from brakelab.plant.friction.surface import Surface
 from brakelab.plant.friction.table import Table
-
-Vector = NDArray[np.float64]
 
 EVEN_STEP: Final = 40.0  # K, least distance of knots over temperature
 TEMPERATURES: Final = 6  # knots of a table

@@ -10,15 +10,13 @@ from itertools import product
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares, minimize
 
+from brakelab.arrays import Matrix, Vector
 from brakelab.identify.friction.fit import PART, STEP, Fitted, residual_function
 from brakelab.identify.friction.stops import Stops, some
 from brakelab.plant.friction.law import RigBrake
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 Scalar = Callable[[Vector], float]
 
 POINTS: Final = 25

@@ -24,12 +24,11 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.arrays import Matrix, Vector
 from brakelab.identify.friction.stops import Stops
 from brakelab.plant.friction.law import KELVIN
 from brakelab.plant.jit import Record, kernel
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 Support = tuple[int, ...]
 
 PLAIN, BY_MU, BY_ALPHA = range(3)

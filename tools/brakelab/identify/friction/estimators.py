@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from brakelab.arrays import Vector
 from brakelab.identify.friction.candidates import candidates
 from brakelab.identify.friction.fit import fit, replayed
 from brakelab.identify.friction.network import train
@@ -15,7 +16,6 @@ from brakelab.identify.friction.stops import Stops
 from brakelab.identify.friction.trips import Trip, manoeuvres
 from brakelab.plant.friction.law import RigBrake
 
-Vector = NDArray[np.float64]
 Estimator = Callable[[Stops], Vector]
 """Friction of every block, shape (blocks,), from pressure, speed and temperature."""
 

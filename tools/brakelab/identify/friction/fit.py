@@ -18,14 +18,12 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares, minimize
 from scipy.stats import qmc, t
 
+from brakelab.arrays import Matrix, Vector
 from brakelab.identify.friction.candidates import Candidate
 from brakelab.identify.friction.stops import Stops, some
 from brakelab.plant.friction.law import START, Law, RigBrake
 from brakelab.plant.friction.laws import friction, law_row
 from brakelab.plant.jit import Record, kernel
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 STARTS: Final = 8
 WALKS: Final = 40  # evaluations of a walk per free number

@@ -11,15 +11,13 @@ not shown yet. C_100, rise and lag are found by least squares over all stops; co
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from brakelab.arrays import Vector
 from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.fit import quantile
 from brakelab.identify.friction.stops import Stops
 from brakelab.plant.disc import DISC_SHARE
-
-Vector = NDArray[np.float64]
 
 AT: Final = 100.0  # degC
 AMBIENT: Final = 20.0  # degC

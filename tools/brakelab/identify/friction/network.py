@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
+from brakelab.arrays import Matrix, Vector
 
 HIDDEN: Final = (8, 6)
 PATIENCE: Final = 20  # iterations

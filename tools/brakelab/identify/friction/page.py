@@ -10,16 +10,14 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from brakelab.identify.friction.choice import Identified
 from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.fit import replayed
 from brakelab.identify.friction.stops import Stops
 from brakelab.results.chart import BLUE, GREY, ORANGE, Line, Panel, chart_svg
 from brakelab.results.text_table import Table
-
-Vector = NDArray[np.float64]
 
 WORD: Final = re.compile("[a-z]{3}")
 """Mark of a column of words, which is set from the left."""

@@ -8,14 +8,12 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq, least_squares
 
+from brakelab.arrays import Vector
 from brakelab.identify.friction.fit import STEP, Fitted, residual_function, slopes_at
 from brakelab.identify.friction.stops import Stops
 from brakelab.plant.friction.law import RigBrake
-
-Vector = NDArray[np.float64]
 
 REACH: Final = 4.0  # half intervals in which a profile's end is sought
 EVALUATIONS: Final = 12

@@ -11,13 +11,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from brakelab.identify.friction.columns import UNITS, ZEROS, Columns, load_columns
 from brakelab.identify.friction.recording import NAMES, Recording
 from brakelab.logs.csv_rows import csv_columns, csv_rows
 from brakelab.logs.log_quality import Damage
 from ecu.errors import UserError
 
-Vector = NDArray[np.float64]
 Places = NDArray[np.int64]
 
 LEAST_SAMPLES = 100

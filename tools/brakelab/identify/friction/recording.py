@@ -4,13 +4,11 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from brakelab.identify.friction.columns import Columns, columns_text
 from brakelab.plant.linings import Lining
 from ecu.errors import UserError
-
-Vector = NDArray[np.float64]
 
 RATE: Final = 200.0  # Hz (3.2)
 THRESHOLD: Final = 0.5e5  # Pa: pressure below which the pads do not touch. SAE J2522, as 3.5 has it

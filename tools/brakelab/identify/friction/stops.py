@@ -14,13 +14,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.recording import Recording
 from brakelab.plant.jit import Record, kernel
 from brakelab.stretches import stretches
 from ecu.errors import UserError
 
-Vector = NDArray[np.float64]
 Places = NDArray[np.int64]
 
 APPLIED: Final = 1.5e5  # Pa

@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from brakelab.identify.thermal.model import ROW, Array, Cooling, Course, lagged, respond
+from brakelab.arrays import Array
+from brakelab.identify.thermal.model import ROW, Cooling, Course, lagged, respond
 
 HEATING, STILL, BY_SPEED, STILL_WET, BY_SPEED_WET, LAG = range(6)
 NAMES: Final = ("xi", "delta_0", "delta_1", "delta_0 in rain", "delta_1 in rain", "lag of the sensor")

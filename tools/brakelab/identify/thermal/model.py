@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-Array = NDArray[np.float64]
+from brakelab.arrays import Array
 
 ROW: Final = 1.0  # s, of one row
 STEEPEST: Final = 600.0  # of D within one piece: exp stays finite

@@ -6,8 +6,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from brakelab.arrays import Array
 from brakelab.identify.thermal.fit import Disc, Fit
-from brakelab.identify.thermal.model import ROW, Array, Cooling
+from brakelab.identify.thermal.model import ROW, Cooling
 from brakelab.identify.thermal.result import KEYS, REMEDIES, SYMBOLS, Errors, Told, values_of
 from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Line, Panel, write_chart
 from brakelab.results.text_table import Table, markdown

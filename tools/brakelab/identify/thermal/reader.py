@@ -11,7 +11,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.identify.thermal.model import ROW, Array, Course
+from brakelab.arrays import Array
+from brakelab.identify.thermal.model import ROW, Course
 from brakelab.logs.physics.samples import DISC_TEMPERATURE_MEASURED, KEPT
 from brakelab.replay.engine import new_ecu
 from brakelab.replay.log import log_size, replay_log

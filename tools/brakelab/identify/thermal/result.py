@@ -4,6 +4,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from brakelab.arrays import Array
 from brakelab.identify.config_file import Section
 from brakelab.identify.thermal.fit import (
     BY_SPEED,
@@ -16,7 +17,7 @@ from brakelab.identify.thermal.fit import (
     Disc,
     Fit,
 )
-from brakelab.identify.thermal.model import Array, Cooling, lagged, respond
+from brakelab.identify.thermal.model import Cooling, lagged, respond
 from ecu.settings.config import Axle
 
 HEAT_CAPACITY: Final = 0.02

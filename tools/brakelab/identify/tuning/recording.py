@@ -14,6 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.arrays import Array
 from brakelab.simulation.closed_loop import Drive, new_loop, run
 from brakelab.simulation.ecu_inputs import ecu_inputs, vehicle_frames
 from brakelab.simulation.scenario import Scenario
@@ -21,8 +22,6 @@ from brakelab.studies.accuracy.stops import AXLES, LOWEST_SPEED, SETTLING_S, est
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CORNERS, CYCLE_NS
 from ecu.settings.config import Config
-
-Array = NDArray[np.float64]
 
 PER_SECOND: Final = 1_000_000_000 // CYCLE_NS
 AROUND_S: Final = 20.0

@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.arrays import Array
 from brakelab.identify.tuning.recording import Errors, Recording, mean_errors
 from ecu.algorithm.step import new_state, step
 from ecu.contract.records import OUTPUTS, RecordArray, new_record
 from ecu.jit import kernel
 from ecu.settings.config import Config, new_params
-
-Array = NDArray[np.float64]
 
 
 @kernel

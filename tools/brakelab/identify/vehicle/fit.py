@@ -23,7 +23,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Vector = NDArray[np.float64]
+from brakelab.arrays import Vector
+
 Places = NDArray[np.int64]
 
 HUBER: Final = 3.0  # robust standard deviations

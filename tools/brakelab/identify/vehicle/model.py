@@ -17,9 +17,9 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from brakelab.arrays import Vector
 from brakelab.identify.vehicle.fit import Places, Prior, Residuals
 from brakelab.identify.vehicle.windows import Windows
-from brakelab.logs.physics.line import Vector
 from ecu.contract.params import BAR, GRAVITY
 from ecu.settings.config import torque_per_bar
 

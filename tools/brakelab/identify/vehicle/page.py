@@ -7,10 +7,10 @@ from typing import Any, Final
 
 import numpy as np
 
+from brakelab.arrays import Vector
 from brakelab.identify.vehicle.model import Place, motion, stiffness_of
 from brakelab.identify.vehicle.parameters import ROUGH, Parameter
 from brakelab.identify.vehicle.solve import Identified
-from brakelab.logs.physics.line import Vector
 from brakelab.results.chart import BLUE, ORANGE, PINK, Line, Panel, write_chart
 from brakelab.results.text_table import Table, markdown
 from ecu.contract.params import GRAVITY

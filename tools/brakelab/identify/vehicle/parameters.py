@@ -12,9 +12,9 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from brakelab.arrays import Vector
 from brakelab.identify.vehicle.model import Place, brakes_of, stiffness_of
 from brakelab.identify.vehicle.solve import Identified
-from brakelab.logs.physics.line import Vector
 from ecu.algorithm.vehicle import rolling_radius
 from ecu.contract.params import BAR, GRAVITY
 from ecu.settings.config import AIR_DENSITY, Config

@@ -11,8 +11,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from brakelab.logs.physics.judge import judge
-from brakelab.logs.physics.line import Vector
 from brakelab.logs.physics.samples import ANY_CAR, SAMPLED, Collector
 from brakelab.replay.engine import new_ecu
 from brakelab.replay.log import log_size, replay_log

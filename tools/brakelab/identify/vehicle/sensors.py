@@ -16,10 +16,10 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from brakelab.arrays import Vector
 from brakelab.identify.vehicle.fit import Places, Prior, Residuals, fit
 from brakelab.identify.vehicle.reader import Rows
 from brakelab.identify.vehicle.windows import SECONDS, Windows
-from brakelab.logs.physics.line import Vector
 from ecu.contract.params import GRAVITY
 
 MANOEUVRE: Final = 12.0  # s, in which the grade is a parabola of the place

@@ -9,6 +9,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from brakelab.arrays import Vector
 from brakelab.identify.vehicle.fit import Fit, Prior, Residuals, fit
 from brakelab.identify.vehicle.model import (
     Place,
@@ -29,7 +30,6 @@ from brakelab.identify.vehicle.sensors import (
 )
 from brakelab.identify.vehicle.wheels import Pairs, pairs_of
 from brakelab.identify.vehicle.windows import SECONDS, Windows, cut, pressure_zeros
-from brakelab.logs.physics.line import Vector
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CORNERS
 from ecu.errors import UserError

@@ -13,10 +13,10 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from brakelab.arrays import Vector
 from brakelab.identify.vehicle.fit import Fit, Prior, Residuals, fit
 from brakelab.identify.vehicle.model import select
 from brakelab.identify.vehicle.windows import Windows
-from brakelab.logs.physics.line import Vector
 from ecu.contract.params import GRAVITY
 
 CURVES: Final = 0.02  # rad/s, standard deviation of a yaw rate that tells anything

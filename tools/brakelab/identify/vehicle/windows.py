@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
+from brakelab.arrays import Vector
 from brakelab.identify.vehicle.reader import MOVING, RATE, Drive, Rows
-from brakelab.logs.physics.line import Vector
 from ecu.contract.signals import CORNERS
 
 SECONDS: Final = 0.5

@@ -3,11 +3,9 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from brakelab.arrays import Array
 from ecu.algorithm.monitoring.wear import ENERGY, ENERGY_T, ENERGY_T2, POWER2, POWER2_T, RATE, RATE_T
-
-Array = NDArray[np.float64]
 
 TABLE_7_1: Final = {
     "extended": np.array([0.1016, 0.0, 0.3984e-6, 0.4887, 0.0, 0.0, 0.66e-2]),

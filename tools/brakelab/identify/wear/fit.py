@@ -10,12 +10,10 @@ from itertools import combinations
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from brakelab.arrays import Array
 from ecu.errors import UserError
-
-Array = NDArray[np.float64]
 
 TERMS: Final = ("γ10", "γ11", "γ12", "γ20", "γ21", "γ30", "γ31")
 UNITS: Final = ("g/MJ", "g/MJ/K", "g/MJ/K^2", "g/MW", "g/MW/K", "g s/MJ^2", "g s/(MJ^2 K)")

@@ -5,7 +5,8 @@ from typing import Final
 
 import numpy as np
 
-from brakelab.identify.wear.curves import Array, sensitivity, specific_wear, wear_surface
+from brakelab.arrays import Array
+from brakelab.identify.wear.curves import sensitivity, specific_wear, wear_surface
 from brakelab.identify.wear.fit import TERMS, UNITS, Fit, leave_one_out
 from brakelab.identify.wear.fusion import Fused
 from brakelab.identify.wear.reader import Block

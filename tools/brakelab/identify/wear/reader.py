@@ -11,15 +11,13 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from brakelab.arrays import Array
 from brakelab.identify.measurement_files import check_celsius, read_columns, read_manifest
 from brakelab.results.wear import regressors_of
 from brakelab.stretches import stretches
 from ecu.errors import UserError
 from ecu.settings.pad import Pad
-
-Array = NDArray[np.float64]
 
 COLUMNS: Final = ("t", "omega", "calliper_pressure", "brake_torque", "disc_temperature")
 POINTS: Final = 6

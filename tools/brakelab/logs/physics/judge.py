@@ -17,7 +17,8 @@ from typing import Final, NamedTuple, TypeGuard
 
 import numpy as np
 
-from brakelab.logs.physics.line import MOVING, RATE, Fit, Vector, fit
+from brakelab.arrays import Vector
+from brakelab.logs.physics.line import MOVING, RATE, Fit, fit
 from brakelab.logs.physics.pressures import pressure_lines
 from brakelab.logs.physics.samples import SAMPLED, Car, Drive, Rows
 from brakelab.logs.physics.stuck import clipped_accels, stuck_wheels

@@ -5,7 +5,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Vector = NDArray[np.float64]
+from brakelab.arrays import Vector
 
 RATE: Final = 50.0  # Hz, of the common grid
 SMOOTH_S: Final = 0.4

@@ -10,7 +10,8 @@ from typing import Final
 
 import numpy as np
 
-from brakelab.logs.physics.line import BRAKING, RATE, Vector, fit
+from brakelab.arrays import Vector
+from brakelab.logs.physics.line import BRAKING, RATE, fit
 from brakelab.logs.physics.samples import Car, Drive, Rows
 from brakelab.logs.physics.stuck import clipped_pressures
 from ecu.bus.units import CONVERSIONS

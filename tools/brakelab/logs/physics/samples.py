@@ -8,7 +8,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.logs.physics.line import RATE, Vector, smooth
+from brakelab.arrays import Vector
+from brakelab.logs.physics.line import RATE, smooth
 from ecu.contract.signals import (
     ACCEL_X,
     ACCEL_Y,

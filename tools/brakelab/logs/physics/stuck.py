@@ -8,7 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from brakelab.logs.physics.line import RATE, Vector, smooth
+from brakelab.arrays import Vector
+from brakelab.logs.physics.line import RATE, smooth
 from brakelab.logs.physics.samples import Drive, Rows
 from brakelab.stretches import stretches
 from ecu.contract.signals import CORNERS

@@ -10,8 +10,8 @@ from itertools import chain
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from brakelab.logs.column_map import MappedFile
 from brakelab.logs.formats import kind_of, read_frames
 from brakelab.logs.signal_file import SampleBlock, freshness_at_any_rate, read_signals
@@ -25,8 +25,6 @@ from ecu.contract.signals import CYCLE_NS, USABLE
 from ecu.errors import UserError
 from ecu.recording.recorder import read_recording
 from ecu.settings.resources import resource
-
-Vector = NDArray[np.float64]
 
 
 def timed_frames(

@@ -11,8 +11,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
+from brakelab.arrays import Array
 from brakelab.plant.description import load_plant
 from brakelab.plant.draw import draw, load_widths
 from brakelab.plant.emission_rig import (
@@ -31,8 +31,6 @@ from brakelab.plant.records import RecordArray
 from brakelab.simulation.trip.generate import real_driving
 from brakelab.simulation.trip.table import distance_driven
 from ecu.settings.resources import resource
-
-Array = NDArray[np.float64]
 
 TRIPS: Final = 8
 CORNER: Final = 1  # front right

@@ -11,8 +11,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
+from brakelab.arrays import Array
 from brakelab.plant.draw import draw
 from brakelab.plant.records import RecordArray
 from brakelab.plant.wear import pad_wear
@@ -22,8 +22,6 @@ from brakelab.simulation.scenario_car import scenario_plant, scenario_widths
 from brakelab.simulation.trip.generate import real_driving
 from brakelab.simulation.trip.table import KMH, brakings
 from ecu.settings.resources import resource
-
-Array = NDArray[np.float64]
 
 APPLICATIONS: Final = 300
 ROADS: Final = {"trip": (0.0, 999.0), "town": (0.0, 60.0), "country": (60.0, 90.0), "motorway": (90.0, 999.0)}

@@ -23,10 +23,11 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.random import Generator
 
+from brakelab.arrays import Array
 from brakelab.report.drive import read_drive
 from brakelab.simulation.trip import report as trip_report
 from brakelab.simulation.trip.picture import write_picture
-from brakelab.simulation.trip.table import KMH, Array, brakings, distance_driven, trip_rows
+from brakelab.simulation.trip.table import KMH, brakings, distance_driven, trip_rows
 from ecu.errors import UserError
 
 DT: Final = 0.1  # s, of the samples

@@ -6,8 +6,9 @@ from typing import Final
 
 import numpy as np
 
+from brakelab.arrays import Array
 from brakelab.report.downsample import buckets, extremes, times
-from brakelab.simulation.trip.table import KMH, RURAL, URBAN, Array, height_gained
+from brakelab.simulation.trip.table import KMH, RURAL, URBAN, height_gained
 from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
 

@@ -4,8 +4,9 @@ from typing import Final
 
 import numpy as np
 
+from brakelab.arrays import Array
 from brakelab.report.drive import Drive
-from brakelab.simulation.trip.table import KMH, RURAL, URBAN, Array, Brakings, Row, distance_driven, trip_rows
+from brakelab.simulation.trip.table import KMH, RURAL, URBAN, Brakings, Row, distance_driven, trip_rows
 from ecu.contract.signals import CORNERS
 
 DRIVE_COLUMNS: Final = (

@@ -8,11 +8,9 @@ needed.
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from brakelab.arrays import Array
 from brakelab.stretches import stretches
-
-Array = NDArray[np.float64]
 
 KMH: Final = 1.0 / 3.6  # m/s
 STOPPED: Final = 1.0 * KMH

@@ -20,11 +20,9 @@ from functools import cache
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from brakelab.arrays import Array
 from brakelab.simulation.trip.table import KMH
-
-Array = NDArray[np.float64]
 
 
 class Totals(NamedTuple):

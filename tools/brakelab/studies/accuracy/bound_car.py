@@ -17,8 +17,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from brakelab.simulation.closed_loop import Drive
-from brakelab.studies.accuracy.stops import Vector
 from ecu.contract.signals import CORNERS
 
 CYCLES: Final = 5

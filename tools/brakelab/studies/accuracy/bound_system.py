@@ -5,6 +5,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from brakelab.studies.accuracy.bound_car import (
     BIAS,
     DEFLECTION_GAIN,
@@ -35,7 +36,6 @@ from brakelab.studies.accuracy.bound_car import (
     V,
 )
 from brakelab.studies.accuracy.linear_bound import System
-from brakelab.studies.accuracy.stops import Vector
 
 LAG: Final = 10  # windows
 

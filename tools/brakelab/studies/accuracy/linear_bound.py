@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from brakelab.studies.accuracy.stops import Vector
+from brakelab.arrays import Vector
 
 
 class System(NamedTuple):

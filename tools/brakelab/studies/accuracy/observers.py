@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from brakelab.logs.signal_file import freshness_at_any_rate
 from brakelab.simulation.closed_loop import Drive, new_loop, run
 from brakelab.simulation.observer import with_observer
@@ -28,7 +29,7 @@ from brakelab.studies.accuracy.observers_cases import (
     configured,
     shipped,
 )
-from brakelab.studies.accuracy.stops import AXLES, LOWEST_SPEED, Vector, columns, friction_errors, nrmse
+from brakelab.studies.accuracy.stops import AXLES, LOWEST_SPEED, columns, friction_errors, nrmse
 from brakelab.studies.measure import Figure, figure
 from brakelab.studies.study import WIDE
 from ecu.algorithm.step import new_state

@@ -11,8 +11,8 @@ from tempfile import TemporaryDirectory
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from brakelab.plant.description import Engine
 from brakelab.replay.drive import replay_drive
 from brakelab.replay.quality import Findings
@@ -32,8 +32,6 @@ from brakelab.studies.study import Asked, Measured, Study
 from ecu.contract.signals import CORNERS
 from ecu.settings.config import Config, load_config, new_params
 from ecu.settings.resources import resource
-
-Vector = NDArray[np.float64]
 
 CARS: Final = 20
 SHARE: Final = 0.68  # of the brake force in front

@@ -19,6 +19,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from brakelab.results.progress import tracked
 from brakelab.results.text_table import Table
 from brakelab.simulation.closed_loop import Drive, Loop, new_loop, run
@@ -29,8 +30,6 @@ from brakelab.studies.study import Asked, Measured, Study
 from ecu.contract.signals import CORNERS
 from ecu.settings.config import Config, config_hash, load_config
 from ecu.settings.resources import resource
-
-Vector = NDArray[np.float64]
 
 TESTS: Final = (1, 2, 3, 4)
 SEEDS: Final = 20

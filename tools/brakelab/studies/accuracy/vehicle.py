@@ -12,8 +12,8 @@ from tempfile import TemporaryDirectory
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from brakelab.identify.vehicle.model import Place
 from brakelab.identify.vehicle.parameters import Parameter, parameters_of, values_of
 from brakelab.identify.vehicle.reader import read_drives
@@ -49,8 +49,6 @@ KEYS: Final = {
               "stiffness_degression", "effective_radius", "mu_nominal", "push_out_pressure"),
 }  # fmt: skip
 """Errors of START; the rear axle as the front one."""
-
-Vector = NDArray[np.float64]
 
 
 class Beside(NamedTuple):

@@ -13,6 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from brakelab.plant.friction.constant import Constant
 from brakelab.plant.friction.laws import LAWS
 from brakelab.plant.sensor_errors import SensorErrors
@@ -29,8 +30,6 @@ from brakelab.studies.study import Asked, Measured, Study
 from ecu.contract.signals import CORNERS
 from ecu.settings.config import Config, load_config, new_params
 from ecu.settings.resources import resource
-
-Vector = NDArray[np.float64]
 
 CARS: Final = 5
 TOLERANCE: Final = 2.0  # %

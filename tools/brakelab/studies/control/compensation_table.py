@@ -4,8 +4,8 @@ from typing import Final
 
 import numpy as np
 
+from brakelab.arrays import Vector
 from brakelab.results.text_table import Table
-from brakelab.studies.accuracy.stops import Vector
 from brakelab.studies.control.compensation import (
     CURVES,
     FADE_RUNS,

@@ -7,8 +7,8 @@ surfaces and ECU have become is handed on. The ECU has no speed reference.
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from brakelab.arrays import Array
 from brakelab.plant.cycle import CYCLE
 from brakelab.simulation.closed_loop import Loop, new_loop, run_blocks
 from brakelab.simulation.scenario import Scenario, Trace, load_scenario
@@ -21,8 +21,6 @@ from ecu.contract.signals import OUTPUT
 from ecu.settings.annex5 import Z_ORDERED
 from ecu.settings.dust import Dust
 from ecu.settings.resources import resource
-
-Array = NDArray[np.float64]
 
 REAL_DRIVING, WLTP_BRAKE = "real-driving", "wltp-brake"
 CYCLES: Final = (REAL_DRIVING, WLTP_BRAKE)

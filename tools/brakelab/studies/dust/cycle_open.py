@@ -8,8 +8,8 @@ by the ECU's own tables (`control.minimise`); heat, emission and wear are those 
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from brakelab.arrays import Array
 from brakelab.plant.disc import cooling_rate, disc_step
 from brakelab.plant.driver import LIFT_OFF_DECEL
 from brakelab.plant.emission import conditioning, emission_rate, treat
@@ -21,8 +21,6 @@ from brakelab.simulation.trip.wltp_brake import DISC_AT_START, TRIPS, wltp_brake
 from ecu.algorithm.control.cleaner_share import CLEANER_STATE, lean
 from ecu.algorithm.control.distribution import front_share
 from ecu.contract.records import RecordArray as Params
-
-Array = NDArray[np.float64]
 
 STEP: Final = 0.1  # s
 REFERENCE_FRICTION: Final = 0.4  # pressure and normal force for wear

@@ -4,8 +4,8 @@ error, and the on-board result of the ECU in a simulated car with the same linin
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from brakelab.arrays import Array
 from brakelab.identify.dust.features import Applications, Recorded, extract
 from brakelab.identify.dust.fit import Judged, choose, judge_all, ranges
 from brakelab.plant.emission import RUN_IN
@@ -23,8 +23,6 @@ from ecu.pads import GAUGE, add_measurement
 from ecu.settings.config import load_config, new_params
 from ecu.settings.dust import Dust
 from ecu.settings.resources import resource
-
-Array = NDArray[np.float64]
 
 PARTICLES: Final = TRUTH_COLUMNS.index("particles_fl")
 BRAKING, LAST = OUTPUT["braking"], OUTPUT["particles_last_brake"]

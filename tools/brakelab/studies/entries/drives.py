@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from brakelab.logs.formats import kind_of, read_frames
 from brakelab.logs.log_quality import LogQuality
 from brakelab.replay.engine import new_ecu, run_frames
@@ -21,7 +22,7 @@ from brakelab.studies.accuracy.observers import ORDINARY, counted
 from brakelab.studies.accuracy.observers_cases import configured, shipped
 from brakelab.studies.accuracy.recorded import LOGGERS, logger_columns, recorded_scenario, uncorrected
 from brakelab.studies.accuracy.stops import TESTS
-from brakelab.studies.entries.inputs import TRANSDUCERS, Vector
+from brakelab.studies.entries.inputs import TRANSDUCERS
 from ecu.bus.receive import new_reception
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CORNERS, CYCLE_NS, INPUT_SIGNALS, without_corner

@@ -2,13 +2,9 @@
 
 from typing import Any, Final
 
-import numpy as np
-from numpy.typing import NDArray
-
+from brakelab.arrays import Vector
 from ecu.contract.signals import INPUT_SIGNALS, without_corner
 from ecu.errors import closest
-
-Vector = NDArray[np.float64]
 
 TRANSDUCERS: Final = ("wheel_force_x", "wheel_torque_y")
 """Of measuring wheels: heard by entries with the attribute `wheel_transducers` alone."""

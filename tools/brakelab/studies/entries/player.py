@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from brakelab.arrays import Vector
 from brakelab.studies.entries.drives import NAMES, PERIOD, WITHHELD, Track
-from brakelab.studies.entries.inputs import Inputs, Vector
+from brakelab.studies.entries.inputs import Inputs
 from brakelab.studies.entries.observer import EntryError, Observer
 from ecu.settings.config import Config
 

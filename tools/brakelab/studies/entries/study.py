@@ -5,6 +5,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from brakelab.arrays import Vector
 from brakelab.results.prediction import Errors, errors, predict
 from brakelab.studies.accuracy.stops import nrmse
 from brakelab.studies.entries.drives import (
@@ -15,7 +16,6 @@ from brakelab.studies.entries.drives import (
     applications,
     car_tracks,
 )
-from brakelab.studies.entries.inputs import Vector
 from brakelab.studies.entries.observer import EntryError, Observer, load_class
 from brakelab.studies.entries.ours import OURS
 from brakelab.studies.entries.player import Heard, new_entry, play, reset

@@ -6,8 +6,8 @@ from time import monotonic
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from brakelab.identify.friction.analysis import (
     Components,
     History,
@@ -31,8 +31,6 @@ from brakelab.plant.linings import Lining, Linings, rig_with
 from brakelab.studies.physics.friction import TABLE_3_4, TEMPERATURES, stop_means
 from brakelab.studies.physics.heat import BRAKES, KMH, PRINTED
 from ecu.settings.resources import resource
-
-Vector = NDArray[np.float64]
 
 SEED: Final = 1
 DRAWS: Final = 20

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from brakelab.identify.friction.analysis import Components, levels
 from brakelab.identify.friction.cost import Cost
 from brakelab.identify.friction.estimators import NETWORK, OSTERMEYER, SURFACE
@@ -17,8 +18,6 @@ from brakelab.studies.lab.run import Lab
 from brakelab.studies.lab.searches import Searches
 from brakelab.studies.lab.trips import FACTORS, OnTrips
 from brakelab.studies.physics.heat import BRAKES
-
-Vector = NDArray[np.float64]
 
 NAMES: Final = ("speed", "pressure", "temperature", "friction")
 COLOURS: Final = (PINK, BLUE, ORANGE, GREEN)

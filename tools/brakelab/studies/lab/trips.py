@@ -3,8 +3,8 @@
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from brakelab.arrays import Matrix, Vector
 from brakelab.identify.friction.dynamometer import new_bench
 from brakelab.identify.friction.estimators import (
     NETWORK,
@@ -18,9 +18,6 @@ from brakelab.identify.friction.estimators import (
 from brakelab.identify.friction.stops import Stops
 from brakelab.identify.friction.trips import Trip, drive, manoeuvres
 from brakelab.studies.lab.brakes import SEED, columns_of, linings
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 FACTORS: Final = (0.6, 0.8, 1.0, 1.2, 1.4)  # of a wrong temperature
 CELLS: Final = 20  # of a map, along each axis

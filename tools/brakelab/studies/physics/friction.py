@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from brakelab.arrays import Vector
 from brakelab.plant.description import load_plant
 from brakelab.plant.dynamometer import (
     DECELERATION,
@@ -28,8 +28,6 @@ from brakelab.studies.physics.heat import BRAKES, KMH, PRINTED, heat_tables, rig
 from brakelab.studies.physics.staircase import staircase_table
 from brakelab.studies.study import Asked, Measured, Study
 from ecu.settings.resources import resource
-
-Vector = NDArray[np.float64]
 
 GRAVITY: Final = 9.81  # m/s^2
 TEMPERATURES: Final = (50.0, 100.0, 150.0, 200.0, 250.0, 300.0)  # degC

@@ -11,7 +11,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.random import Generator
 
-from brakelab.identify.thermal.model import ROW, Array
+from brakelab.arrays import Array
+from brakelab.identify.thermal.model import ROW
 from brakelab.identify.thermal.reader import USED, Drive, as_drive
 from brakelab.logs.physics.samples import DISC_TEMPERATURE_MEASURED, KEPT
 from brakelab.plant.disc_nodes import heat_discs, nodes_like, wind

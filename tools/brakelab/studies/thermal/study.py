@@ -9,9 +9,10 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.arrays import Array
 from brakelab.identify.thermal.command import AXLES, judge_axle, with_fits
 from brakelab.identify.thermal.fit import Disc
-from brakelab.identify.thermal.model import Array, Cooling, respond
+from brakelab.identify.thermal.model import Cooling, respond
 from brakelab.identify.thermal.page import Judged
 from brakelab.identify.thermal.reader import Drive
 from brakelab.identify.thermal.result import start_of

@@ -5,7 +5,8 @@ from typing import Final
 
 import numpy as np
 
-from brakelab.identify.thermal.model import ROW, Array
+from brakelab.arrays import Array
+from brakelab.identify.thermal.model import ROW
 from brakelab.identify.thermal.page import cooling_panel
 from brakelab.identify.thermal.result import SYMBOLS, values_of
 from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Line, Panel

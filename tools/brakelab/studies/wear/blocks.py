@@ -3,8 +3,8 @@
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from brakelab.arrays import Array
 from brakelab.identify.wear.curves import TABLE_7_1, sensitivity
 from brakelab.identify.wear.page import sensitivity_panels, surface_panel
 from brakelab.results.chart import BLUE, GREY, ORANGE, PINK, Cells, Line, Panel
@@ -22,8 +22,6 @@ from brakelab.studies.study import Asked, Measured, Study, picture
 from brakelab.studies.wear.bad_input import bad_input_table
 from brakelab.studies.wear.blocks_rig import Corner, Done, corner_of, energy_error, run_stops
 from brakelab.studies.wear.study import CLIMATE, measured_block
-
-Array = NDArray[np.float64]
 
 CARS: Final = 5
 SEED: Final = 1  # of the trips, and of the car of the tables by road

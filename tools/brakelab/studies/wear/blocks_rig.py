@@ -14,16 +14,14 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from brakelab.arrays import Array
 from brakelab.plant.disc import cooling_rate, disc_step
 from brakelab.plant.friction.law import START
 from brakelab.plant.friction.laws import friction
 from brakelab.plant.records import RecordArray
 from brakelab.plant.wear import running_in, wear_rate
 from brakelab.plant.wear_rig import AIR, FAN, RAMP, SLOWEST
-
-Array = NDArray[np.float64]
 
 STEP: Final = 5e-3  # s
 COARSE: Final = 0.5  # s, while nothing brakes

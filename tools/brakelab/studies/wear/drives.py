@@ -7,8 +7,8 @@ the increments of the ECU's regressors and the true wear of run-in pads on a mea
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from brakelab.arrays import Array
 from brakelab.plant.wear import RUN_IN, RUN_IN_MASS
 from brakelab.results.wear import HALF_WIDTH, PERIOD, regressors_of
 from brakelab.simulation.campaigns.wear_blocks import drawn_car
@@ -20,8 +20,6 @@ from ecu.algorithm.step import new_state
 from ecu.contract.signals import OUTPUT
 from ecu.settings.config import load_config, new_params
 from ecu.settings.resources import resource
-
-Array = NDArray[np.float64]
 
 DRIVERS: Final = {"calm": (0.95, 1.10, 5.0), "usual": (1.0, 1.0, 18.0), "lively": (1.08, 0.82, 30.0)}
 """Factors on speed and on time; ambient temperature [degC]."""

@@ -5,8 +5,8 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
+from brakelab.arrays import Array
 from brakelab.identify.wear.command import ROAD
 from brakelab.identify.wear.fit import QUASI_STATIC, Fit, fit_law, leave_one_out
 from brakelab.identify.wear.fusion import fuse
@@ -25,8 +25,6 @@ from ecu.contract.records import LEARNED, RecordArray, new_record
 from ecu.pads import GAUGE, add_measurement
 from ecu.settings.config import load_config, new_params
 from ecu.settings.resources import resource
-
-Array = NDArray[np.float64]
 
 LIFE_KM: Final = 30_000.0
 EVERY_KM: Final = 2_500.0

@@ -3,7 +3,6 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brakelab.identify.wear.fit import TERMS
 from brakelab.results.chart import BLUE, GREY, ORANGE, PINK, Line, Panel
@@ -25,8 +24,6 @@ LEGEND: Final = (
 COLOURS: Final = dict(LEGEND)
 AXLES: Final = {"front": slice(0, 2), "rear": slice(2, 4)}
 THESIS_R2: Final = {"extended": "0.993", "quasi-static": "0.988"}
-
-Array = NDArray[np.float64]
 
 
 def _last(life: Life, mode: str, corner: int) -> float:
