@@ -35,7 +35,6 @@ SHORTEST: Final = {"autosar_p01": 2, "ford_brake_sn_4": 4, "ford_accel_data": 8}
 """The payload that a rule needs at least [bytes], 2 where not listed."""
 
 P01_MODULO: Final = 15  # counter 0–14
-P01_COUNTER_START, P01_COUNTER_LENGTH = 8, 4
 
 
 def _crc8_table() -> NDArray[np.uint8]:

@@ -17,7 +17,7 @@ from ecu.bus.freshness import input_freshness, new_freshness
 from ecu.bus.plan import SIGNAL, SignalUse, compile_signals
 from ecu.bus.request import FIRST, LAST
 from ecu.contract.records import EXTENDED_ID, RecordArray
-from ecu.contract.signals import INPUT, INPUT_SIGNALS, N_INPUTS, N_OUTPUTS, OUTPUT
+from ecu.contract.signals import INPUT, N_INPUTS, N_OUTPUTS, OUTPUT
 
 MESSAGE: Final = np.dtype(
     [
@@ -153,8 +153,3 @@ def contract_listen_plan(dbc_path: Path) -> ReceivePlan:
     everything = np.full(N_OUTPUTS, np.inf)
     timeout_s = np.maximum(0.1, 3.0 * period_s)
     return compile_receive(uses, new_freshness(timeout_s, period_s, period_s, -everything, everything))
-
-
-def input_names(plan: ReceivePlan) -> tuple[str, ...]:
-    """Return the names of the inputs that the plan feeds."""
-    return tuple(signal.name for signal, mapped in zip(INPUT_SIGNALS, plan.mapped, strict=True) if mapped)

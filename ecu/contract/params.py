@@ -76,7 +76,7 @@ PARAMS: Final = np.dtype(
         ("chamfer_depth", "f8", (4,)),  # mm
         ("chamfer_share", "f8", (4,)),  # of the area, removed by chamfers on new pads
         # dust, see monitoring/dust.py
-        ("dust_model", "i8", (4,)),  # MODELS of ecu/dust.py, NONE without
+        ("dust_model", "i8", (4,)),  # MODELS of contract/dust.py, NONE without
         ("dust_numbers", "f8", (4, MOST)),
         ("dust_low", "f8", (4, 6)),  # training range of a model's FEATURES
         ("dust_high", "f8", (4, 6)),

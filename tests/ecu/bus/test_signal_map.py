@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from ecu.bus.freshness import begin_cycle, end_cycle
 from ecu.bus.receive import Reception, new_reception, receive
-from ecu.bus.receive_plan import input_names
 from ecu.bus.signal_map import MappedBus, load_signal_map, receive_plan
 from ecu.bus.units import CONVERSIONS, conversion
 from ecu.contract.records import INPUTS, RecordArray, new_record
@@ -208,7 +207,8 @@ def test_units_factor_offset_and_one_signal_for_two_inputs(
     assert found["calliper_pressure_fl"][0] == pytest.approx(40.0)
     assert found["calliper_pressure_fr"][0] == pytest.approx(19.0)  # 0.5 · 4000 kPa − 100 kPa
     assert mapped.plan.expected["timeout_ns"][INPUT["calliper_pressure_fr"]] == 500_000_000
-    assert input_names(mapped.plan) == ("wheel_speed_fl", "calliper_pressure_fl", "calliper_pressure_fr")
+    fed = [INPUT_SIGNALS[place].name for place in np.flatnonzero(mapped.plan.mapped)]
+    assert fed == ["wheel_speed_fl", "calliper_pressure_fl", "calliper_pressure_fr"]
     assert mapped.bus is None
 
 
