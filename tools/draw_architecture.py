@@ -2,8 +2,9 @@
 
     python tools/draw_architecture.py
 
-An arrow is an import. Arrows that a chain of others implies are left out, except within a circle of packages.
-A package of three packages or more is drawn module by module.
+A picture shows what is directly in a package, each folder as one box; a package of three packages or more has
+a picture of its own. An arrow is an import. Arrows that a chain of others implies are left out, except within
+a circle.
 """
 
 import ast
@@ -17,38 +18,40 @@ SOURCES = {"ecu": CHECKOUT / "ecu", "brakelab": CHECKOUT / "tools" / "brakelab"}
 Graph = dict[str, set[str]]
 
 
-def package_of(module: str) -> str:
-    """Return the box of a module: its package, or itself in a package of packages."""
-    top, *rest = module.split(".")
-    folder = SOURCES[top]
-    for depth, name in enumerate(rest):
-        if not (folder / name).is_dir():
-            return module if len(list(folder.glob("*/__init__.py"))) >= 3 else ".".join([top, *rest[:depth]])
-        folder = folder / name
-    return module
+def folder_of(package: str) -> Path:
+    """Return the folder of a package."""
+    return SOURCES[package.partition(".")[0]].joinpath(*package.split(".")[1:])
 
 
-def imports(source: str) -> Graph:
-    """Return the packages of a source, each with those that it imports; the other source is one package."""
+def packages() -> list[str]:
+    """Return the packages that have a picture: the sources, and those of three packages or more."""
+    found = []
+    for source, top in SOURCES.items():
+        for folder in (top, *sorted(path.parent for path in top.rglob("*/__init__.py"))):
+            if folder == top or len(list(folder.glob("*/__init__.py"))) >= 3:
+                found.append(".".join((source, *folder.relative_to(top).parts)))
+    return found
+
+
+def imports(package: str) -> Graph:
+    """Return what is in a package, each with what it imports of it; another source is one box."""
     graph: Graph = {}
-    for path in sorted(SOURCES[source].rglob("*.py")):
-        parts = path.relative_to(SOURCES[source].parent).with_suffix("").parts
-        here = package_of(".".join(parts).removesuffix(".__init__"))
-        if here == source:
+    depth = package.count(".") + 2
+    for path in sorted(folder_of(package).rglob("*.py")):
+        parts = [package, *path.relative_to(folder_of(package)).with_suffix("").parts]
+        here = ".".join(parts[:2])
+        if parts[1:] == ["__init__"]:
             continue
         wanted = graph.setdefault(here, set())
         for node in ast.walk(ast.parse(path.read_bytes())):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
-            if isinstance(node, ast.ImportFrom) and node.module in SOURCES:
+            if isinstance(node, ast.ImportFrom) and node.module:
                 names = [f"{node.module}.{alias.name}" for alias in node.names]
-            elif isinstance(node, ast.ImportFrom) and node.module:
-                names = [node.module]
             for name in names:
                 top = name.partition(".")[0]
-                if top in SOURCES and name != top:
-                    wanted.add(package_of(name) if top == source else top)
+                wanted.add(".".join(name.split(".")[:depth]) if name.startswith(f"{package}.") else top)
         wanted.discard(here)
-    known = graph.keys() | SOURCES.keys() - {source}
+    known = graph.keys() | (SOURCES.keys() - {package} if package in SOURCES else set())
     return {name: found & known for name, found in graph.items()}
 
 
@@ -75,23 +78,23 @@ def without_implied(graph: Graph) -> Graph:
     return {name: {to for to in found if not implied(name, to)} for name, found in graph.items()}
 
 
-def drawn(source: str) -> str:
-    """Return the picture of a source as Mermaid text."""
-    graph = without_implied(imports(source))
+def drawn(package: str) -> str:
+    """Return the picture of a package as Mermaid text."""
+    graph = without_implied(imports(package))
     names = sorted(graph.keys() | {to for found in graph.values() for to in found})
-    boxes = [f'    {name.replace(".", "_")}["{name.removeprefix(f"{source}.")}"]' for name in names]
+    boxes = [f'    {name.replace(".", "_")}["{name.removeprefix(f"{package}.")}"]' for name in names]
     arrows = [
         f"    {name.replace('.', '_')} --> {to.replace('.', '_')}"
         for name, found in sorted(graph.items())
         for to in sorted(found)
     ]
-    return "\n".join(["```mermaid", "flowchart TD", *boxes, *arrows, "```", ""])
+    return "\n".join([f"`{package}`", "", "```mermaid", "flowchart TD", *boxes, *arrows, "```", ""])
 
 
 def drawn_anew(page: str) -> str:
     """Return the page with its pictures drawn from the code as it is."""
     before, _, rest = page.partition(BEGIN)
-    return before + BEGIN + "\n".join(drawn(source) for source in SOURCES) + END + rest.partition(END)[2]
+    return before + BEGIN + "\n".join(map(drawn, packages())) + END + rest.partition(END)[2]
 
 
 if __name__ == "__main__":
