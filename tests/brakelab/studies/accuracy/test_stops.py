@@ -2,17 +2,14 @@
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from brakelab.bench import command
 from brakelab.results.text_table import markdown
-from brakelab.simulation.closed_loop import Drive
 from brakelab.studies import output
 from brakelab.studies.accuracy import stops as study
-from brakelab.studies.accuracy.stops import TABLE_4_3, Stops, nrmse, stop_tables, stops, window
+from brakelab.studies.accuracy.stops import TABLE_4_3, Stops, stop_tables, stops
 from ecu import cli
-from ecu.contract.records import FRAME, new_record
 from ecu.settings.config import load_config
 from ecu.settings.resources import resource
 
@@ -48,29 +45,6 @@ def test_without_compensation_vehicle_speed_changes_next_to_nothing(result: Stop
     """The watch over the rear's slip knows it, and the rear's friction is 29 % ahead of the front's."""
     with_speed, without = result.compensation
     assert with_speed.to_demand_uncompensated == pytest.approx(without.to_demand_uncompensated, rel=1e-4)
-
-
-@pytest.mark.parametrize(
-    ("estimate", "true", "percent"),
-    [
-        ([0.5, 0.5], [0.5, 0.5], 0.0),
-        ([0.55, 0.45], [0.5, 0.5], 10.0),
-        ([0.6, 0.5], [0.5, 0.5], 100.0 * np.sqrt(0.005) / 0.5),
-        ([0.4, 0.4], [0.3, 0.5], 25.0),
-    ],
-)
-def test_nrmse(estimate: list[float], true: list[float], percent: float) -> None:
-    assert nrmse(np.array(estimate), np.array(true)) == pytest.approx(percent)
-
-
-def test_window_begins_half_a_second_after_the_full_demand_and_ends_at_15_kmh() -> None:
-    t = 0.01 * np.arange(1000)
-    demand = np.clip(4.0 * (t - 1.0), 0.0, 4.0)  # full at 2 s
-    speed = 30.0 - 4.0 * np.clip(t - 1.5, 0.0, 7.0)
-    drive = Drive(t, {}, {}, {"decel_demand": demand, "vehicle_speed": speed}, new_record(FRAME, 0))
-    counted = t[window(drive)]
-    assert counted[0] == pytest.approx(2.5, abs=0.015)
-    assert counted[-1] == pytest.approx(1.5 + (30.0 - 15.0 / 3.6) / 4.0, abs=0.015)
 
 
 def test_page_names_config_seeds_and_every_figure(

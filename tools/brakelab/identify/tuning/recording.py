@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.arrays import Array
+from brakelab.simulation.accuracy import AXLES, LOWEST_SPEED, SETTLING_S, estimate_errors
 from brakelab.simulation.closed_loop import Drive, new_loop, run
 from brakelab.simulation.ecu_inputs import ecu_inputs, vehicle_frames
 from brakelab.simulation.scenario import Scenario
-from brakelab.studies.accuracy.stops import AXLES, LOWEST_SPEED, SETTLING_S, estimate_errors
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CORNERS, CYCLE_NS
 from ecu.settings.config import Config

@@ -19,6 +19,7 @@ import numpy as np
 
 from brakelab.arrays import Vector
 from brakelab.results.text_table import Table
+from brakelab.simulation.accuracy import AXLES, estimate_errors
 from brakelab.simulation.scenario_car import with_draw
 from brakelab.simulation.vehicle_bus import new_vehicle
 from brakelab.studies.accuracy.bound_car import (
@@ -49,7 +50,6 @@ from brakelab.studies.accuracy.linear_bound import filtered, sampled
 from brakelab.studies.accuracy.observers import JOINT, ORDINARY, counted, drive_car
 from brakelab.studies.accuracy.observers_cases import ACCURACY, Setup, configured, goals, shipped
 from brakelab.studies.accuracy.observers_table import ROUNDING
-from brakelab.studies.accuracy.stops import AXLES, estimate_errors
 from brakelab.studies.cars import each_car
 from brakelab.studies.study import Asked, Measured, Study
 from ecu.algorithm.estimation.joint import layout

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from brakelab.arrays import Vector
 from brakelab.logs.signal_file import freshness_at_any_rate
+from brakelab.simulation.accuracy import AXLES, LOWEST_SPEED, columns, friction_errors, nrmse
 from brakelab.simulation.closed_loop import Drive, new_loop, run
 from brakelab.simulation.observer import with_observer
 from brakelab.simulation.scenario_car import with_draw
@@ -29,7 +30,6 @@ from brakelab.studies.accuracy.observers_cases import (
     configured,
     shipped,
 )
-from brakelab.studies.accuracy.stops import AXLES, LOWEST_SPEED, columns, friction_errors, nrmse
 from brakelab.studies.measure import Figure, figure
 from brakelab.studies.study import WIDE
 from ecu.algorithm.step import new_state

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from brakelab.arrays import Vector
 from brakelab.results.chart import write_svg
+from brakelab.simulation.accuracy import AXLES, columns
 from brakelab.simulation.closed_loop import Drive
 from brakelab.studies.accuracy.observers import JOINT, ORDINARY, counted, drive_car
 from brakelab.studies.accuracy.observers_cases import Setup, configured, shipped
-from brakelab.studies.accuracy.stops import AXLES, columns
 from ecu.algorithm.estimation.joint.kalman import GATE
 from ecu.contract.signals import CORNERS
 

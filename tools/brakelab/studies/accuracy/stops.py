@@ -1,10 +1,8 @@
 """Accuracy in the stops of the thesis's Table 4.2, with cars drawn per seed.
 
-Counted from 0.5 s after the deceleration demand has its full value, down to 15 km/h:
+Errors and rows that count: `simulation/accuracy.py`. Friction stands beside Observer 2 of Table 4.3 and the
+configured friction taken as the estimate.
 
-friction      nRMSE = sqrt(mean((estimate - truth)^2)) / mean(truth) over both wheels of an axle, beside
-              Observer 2 of Table 4.3 and beside the configured nominal friction taken as the estimate
-deceleration  sum over the wheels of (brake torque + motor torque) / rolling radius, over the mass, all true
 compensation  mean of |achieved - wanted| / wanted; wanted is the demand, or the deceleration
               achieved by the same controller in the same car with the true friction
 """
@@ -17,23 +15,21 @@ from multiprocessing import get_context
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brakelab.arrays import Vector
 from brakelab.results.progress import tracked
 from brakelab.results.text_table import Table
-from brakelab.simulation.closed_loop import Drive, Loop, new_loop, run
+from brakelab.simulation.accuracy import AXLES, achieved_decel, friction_errors, window
+from brakelab.simulation.closed_loop import Drive, new_loop, run
 from brakelab.simulation.scenario import Scenario, load_scenario
 from brakelab.simulation.scenario_car import with_draw
 from brakelab.studies.measure import Figure, figure, plain_row
 from brakelab.studies.study import Asked, Measured, Study
-from ecu.contract.signals import CORNERS
 from ecu.settings.config import Config, config_hash, load_config
 from ecu.settings.resources import resource
 
 TESTS: Final = (1, 2, 3, 4)
 SEEDS: Final = 20
-AXLES: Final = {"front": CORNERS[:2], "rear": CORNERS[2:]}
 TABLE_4_3: Final = {
     1: {"front": 4.74, "rear": 7.23},
     2: {"front": 3.34, "rear": 6.96},
@@ -41,9 +37,6 @@ TABLE_4_3: Final = {
     4: {"front": 3.13, "rear": 7.87},
 }
 """nRMSE of Observer 2 in %."""
-SETTLING_S: Final = 0.5
-LOWEST_SPEED: Final = 15.0 / 3.6  # m/s
-FULL: Final = 0.999  # of the demand
 
 
 class Friction(NamedTuple):
@@ -87,50 +80,6 @@ def _brake(scenario: Scenario, config: Config, seed: int, ideal: bool = False) -
     loop = new_loop(scenario, config, seed)
     drive = run(loop, ideal)
     return _Stop(drive, achieved_decel(loop, drive))
-
-
-def achieved_decel(loop: Loop, drive: Drive) -> Vector:
-    """Return the deceleration [m/s^2] by the torques of a drive and the mass of its car, shape (n,)."""
-    truth = drive.truth
-    force = sum(
-        (truth[f"brake_torque_{c}"] + truth[f"motor_torque_{c}"]) / truth[f"rolling_radius_{c}"]
-        for c in CORNERS
-    )
-    return np.asarray(force) / float(loop.sides.vehicle.params["mass"][0])
-
-
-def window(drive: Drive) -> NDArray[np.bool_]:
-    """Return the counted rows, shape (n,)."""
-    demand, speed = drive.truth["decel_demand"], drive.truth["vehicle_speed"]
-    reached = drive.t[np.argmax(demand >= FULL * demand.max())]
-    rows: NDArray[np.bool_] = (drive.t >= reached + SETTLING_S) & (speed > LOWEST_SPEED)
-    return rows
-
-
-def nrmse(estimate: Vector, true: Vector) -> float:
-    """Return the root mean square error over the mean of the truth [%]."""
-    return float(100.0 * np.sqrt(np.mean((estimate - true) ** 2)) / np.mean(true))
-
-
-def columns(table: dict[str, Vector], stem: str, axle: str, rows: NDArray[np.bool_]) -> Vector:
-    """Return both wheels of an axle, shape (2, rows)."""
-    return np.stack([table[f"{stem}_{corner}"][rows] for corner in AXLES[axle]])
-
-
-def estimate_errors(drive: Drive, rows: NDArray[np.bool_], axle: str) -> tuple[float, float]:
-    """Return nRMSE [%] and share inside 2σ of an axle's friction over `rows`."""
-    true = columns(drive.truth, "mu_b", axle, rows)
-    estimate = columns(drive.outputs, "mu_b", axle, rows)
-    sigma = columns(drive.outputs, "sigma_mu_b", axle, rows)
-    return nrmse(estimate, true), float(np.mean(np.abs(estimate - true) <= 2.0 * sigma))
-
-
-def friction_errors(
-    drive: Drive, rows: NDArray[np.bool_], axle: str, nominal: float
-) -> tuple[float, float, float]:
-    """Return nRMSE [%], share inside 2σ and nRMSE of the nominal friction [%] over `rows`."""
-    true = columns(drive.truth, "mu_b", axle, rows)
-    return *estimate_errors(drive, rows, axle), nrmse(np.full_like(true, nominal), true)
 
 
 def _relative_error(stop: _Stop, wanted: Vector) -> float:

@@ -18,12 +18,12 @@ from brakelab.plant.friction.constant import Constant
 from brakelab.plant.friction.laws import LAWS
 from brakelab.plant.sensor_errors import SensorErrors
 from brakelab.results.text_table import Table
+from brakelab.simulation.accuracy import FULL, window
 from brakelab.simulation.closed_loop import Drive, Loop, new_loop, run
 from brakelab.simulation.faults import Fault
 from brakelab.simulation.scenario import Phase, Scenario
 from brakelab.studies.accuracy.observers import JOINT, ORDINARY, drive_car
 from brakelab.studies.accuracy.observers_cases import Setup, shipped
-from brakelab.studies.accuracy.stops import FULL, window
 from brakelab.studies.accuracy.table import spread
 from brakelab.studies.measure import figure
 from brakelab.studies.study import Asked, Measured, Study

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from brakelab.arrays import Vector
 from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK
+from brakelab.simulation.accuracy import LOWEST_SPEED, achieved_decel, columns
 from brakelab.simulation.closed_loop import Drive, FrictionOverride, new_loop, run
 from brakelab.simulation.scenario import Scenario, load_scenario
 from brakelab.stretches import stretches
-from brakelab.studies.accuracy.stops import LOWEST_SPEED, achieved_decel, columns
 from ecu.settings.config import Config
 from ecu.settings.resources import resource
 

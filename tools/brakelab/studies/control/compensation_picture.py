@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Line, Panel
-from brakelab.studies.accuracy.stops import AXLES, columns
+from brakelab.simulation.accuracy import AXLES, columns
 from brakelab.studies.control.blending import SHARES, WRONG, wrong_friction
 from brakelab.studies.control.compensation import CURVES, RUNS, Run, applications, drive_all
 from ecu.settings.config import Config

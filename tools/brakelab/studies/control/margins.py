@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 
 from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Line, Panel
 from brakelab.results.text_table import Table
+from brakelab.simulation.accuracy import AXLES, columns
 from brakelab.simulation.closed_loop import FrictionOverride, new_loop, run
 from brakelab.simulation.scenario import Phase, Scenario, load_scenario
-from brakelab.studies.accuracy.stops import AXLES, columns
 from brakelab.studies.study import Asked, Measured, Study, picture
 from ecu.settings.config import Config, load_config
 from ecu.settings.resources import resource

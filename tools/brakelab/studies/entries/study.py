@@ -7,7 +7,7 @@ import numpy as np
 
 from brakelab.arrays import Vector
 from brakelab.results.prediction import Errors, errors, predict
-from brakelab.studies.accuracy.stops import nrmse
+from brakelab.simulation.accuracy import nrmse
 from brakelab.studies.entries.drives import (
     PERIOD,
     CarTracks,

@@ -18,13 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.identify.friction.trips import GENTLE, HIGH, LOW, MILD
+from brakelab.simulation.accuracy import friction_errors
 from brakelab.simulation.closed_loop import Drive
 from brakelab.simulation.scenario import Phase, Scenario
 from brakelab.simulation.scenario_car import with_draw
 from brakelab.stretches import stretches
 from brakelab.studies.accuracy.observers import JOINT, ORDINARY, counted, drive_car
 from brakelab.studies.accuracy.observers_cases import Setup, configured, shipped
-from brakelab.studies.accuracy.stops import friction_errors
 from brakelab.studies.study import WIDE
 from ecu.recording.learned_range import out_of_range
 from ecu.settings.config import new_params
