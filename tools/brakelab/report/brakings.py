@@ -11,11 +11,11 @@ from brakelab.report.drive import Drive, numbers, read_parquet
 from brakelab.results.files import brakes_path
 from brakelab.results.prediction import SHORT, left_out
 from brakelab.stretches import stretches
+from ecu.algorithm.estimate import STANDING
 from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
 
 PERIOD = 0.01  # s, one row
-STANDING = 0.3  # m/s, below: standstill, without further deceleration
 
 _PER_BRAKE = ("t_start", "duration", "v_in", "v_end", "decel_mean", "decel_predicted")
 _REMEDY = "write it again with `brake-ecu replay`, or remove it: the report then uses the result alone"

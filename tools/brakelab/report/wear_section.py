@@ -2,7 +2,7 @@
 
 import math
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,14 +11,13 @@ from brakelab.report.page import fixed
 from brakelab.report.quality import Quality
 from brakelab.report.wear_applications import Application, dirtiest, read_applications
 from brakelab.report.wear_plots import BAND, plots_of_emission, plots_of_wear
-from brakelab.report.wear_roads import KINDS, roads, way
-from brakelab.report.wear_untold import OUTSIDE, told_share, untold
+from brakelab.report.wear_roads import KINDS, LEAST_WAY, roads, way
+from brakelab.report.wear_untold import told_share, untold
 from brakelab.results import euro7
 from brakelab.results.pads import KEY, PadState, unpacked
+from ecu.algorithm.monitoring.dust import UNTOLD
 from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
-
-LEAST_WAY: Final = 1.0  # km, below which nothing is said per distance
 
 
 class Amount(NamedTuple):
@@ -119,7 +118,7 @@ def _amounts(drive: Drive, pads: list[PadState], applications: list[Application]
     life = float(drive.column("particles_per_km")[-1])
     told = [each for each in applications if math.isfinite(each.particles)]
     text = fixed(math.nan, 0)
-    if told and km >= LEAST_WAY and told_share(pads, applications) >= 1.0 - OUTSIDE:
+    if told and km >= LEAST_WAY and told_share(pads, applications) >= 1.0 - UNTOLD:
         low, middle, high = (
             1e-9 * sum(getattr(each, name) for each in told) / km
             for name in ("particles_low", "particles", "particles_high")

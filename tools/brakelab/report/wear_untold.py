@@ -8,6 +8,7 @@ from brakelab.report.drive import Drive
 from brakelab.report.quality import Quality
 from brakelab.report.wear_applications import Application
 from brakelab.results.pads import PadState
+from ecu.algorithm.monitoring.dust import UNTOLD
 from ecu.contract.signals import CORNERS
 from ecu.pads import LEAST_DISTANCE
 
@@ -109,16 +110,12 @@ def _of_particles(pads: list[PadState], applications: list[Application]) -> list
     else:
         found = []
     share = told_share(pads, applications)
-    if share < 1.0 - OUTSIDE:
+    if share < 1.0 - UNTOLD:
         reason = (
             f"{100.0 * (1.0 - share):.0f} % of the work was outside what the emission model was trained on."
         )
         found.append(Untold("Particles per km in this drive", reason))
     return found
-
-
-OUTSIDE = 0.10
-"""Share of the work up to which particles per km are told, as the ECU has it."""
 
 
 def told_share(pads: list[PadState], applications: list[Application]) -> float:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from brakelab.arrays import Vector
 from brakelab.logs.physics.judge import judge
+from brakelab.logs.physics.line import MOVING
 from brakelab.logs.physics.samples import ANY_CAR, SAMPLED, Collector
 from brakelab.replay.engine import new_ecu
 from brakelab.replay.log import log_size, replay_log
@@ -30,7 +31,6 @@ GAP: Final = 0.15  # s to the nearest sample, beyond which a signal is not known
 SLOW_GAP: Final = 0.3  # s, of the speed reference, which may come ten times a second
 FEWEST: Final = 500  # samples of a signal that counts as there
 SHORTEST: Final = 15.0  # s of driving
-MOVING: Final = 3.0  # m/s
 PRESENT: Final = {INPUT_SIGNALS[place].name: column for column, place in enumerate(SAMPLED)}
 
 Rows = NDArray[np.bool_]

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from brakelab.arrays import Vector
-from brakelab.identify.vehicle.reader import MOVING, RATE, Drive, Rows
+from brakelab.identify.vehicle.reader import RATE, Drive, Rows
+from brakelab.logs.physics.line import MOVING
 from ecu.contract.signals import CORNERS
 
 SECONDS: Final = 0.5
