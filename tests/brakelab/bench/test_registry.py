@@ -13,7 +13,7 @@ RESULTS = Path(__file__).parents[3] / "docs/results"
 
 
 @pytest.mark.parametrize("name", MODULES)
-def test_a_study_is_where_the_table_says_and_its_page_has_its_title(name: str) -> None:
+def test_a_study_is_where_the_table_says_and_its_page_has_its_title_and_text(name: str) -> None:
     study = study_of(name)
     page = RESULTS / f"{study.file or name}.md"
     assert study.text.rstrip().endswith((".", ")", "**"))
@@ -21,6 +21,7 @@ def test_a_study_is_where_the_table_says_and_its_page_has_its_title(name: str) -
         text = page.read_text("utf-8")
         assert text.startswith(f"# {study.title}\n")
         assert f"`brake-ecu bench {name}`" in text
+        assert study.text.rstrip() in text
 
 
 def test_a_missing_package_is_named_with_its_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
