@@ -26,7 +26,8 @@ from ecu.contract.faults import (
     PRESSURE_NOT_FOLLOWING,
     WHEEL_SPEED_IMPLAUSIBLE,
 )
-from ecu.contract.signals import ACCEL_X, CALLIPER_PRESSURE, MOTOR_TORQUE, N_INPUTS, WHEEL_SPEED
+from ecu.contract.records import WATCHED
+from ecu.contract.signals import ACCEL_X, CALLIPER_PRESSURE, MOTOR_TORQUE, WHEEL_SPEED
 from ecu.jit import Record, kernel
 
 ACCEL_X_DRIFTED = IMPLAUSIBLE["accel_x"]
@@ -95,7 +96,7 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
 def mask_implausible(p: Record, s: Record, u: Record) -> None:
     """Mask out the implausible of the inputs `u`, and correct the accelerometer's reading."""
     u.value[ACCEL_X] = correct_accel(s.accel_error, u.value[ACCEL_X])
-    for place in range(N_INPUTS):
+    for place in WATCHED:
         if s.witness.rejected[place]:
             _distrust(s, u, place)
     for i in range(4):

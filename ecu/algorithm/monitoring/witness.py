@@ -14,7 +14,7 @@ import numpy as np
 
 from ecu.algorithm.inputs import usable
 from ecu.contract.faults import IMPLAUSIBLE
-from ecu.contract.records import INPUT_WATCH
+from ecu.contract.records import INPUT_WATCH, WATCHED
 from ecu.contract.signals import INPUT_SIGNALS, N_INPUTS
 from ecu.jit import Record, kernel
 
@@ -39,7 +39,7 @@ AGAIN_S = 1.0
 def begin_watch(state: Record, dt: float) -> None:
     """Begin a cycle, `dt` [s] after the last: nothing is compared in it yet, nothing left out."""
     published = state.published
-    for place in range(N_INPUTS):
+    for place in WATCHED:
         published.judged_s[place] += dt
         published.rejected[place] = 0
 
@@ -78,7 +78,7 @@ def leave_out(state: Record, place: int) -> None:
 
 @kernel
 def end_watch(state: Record, received: Record, trusted: Record, dt: float) -> None:
-    """End a cycle: publish the inputs as `received`, and which of them were used.
+    """End a cycle: publish the watched inputs as `received`, and which of them were used.
 
     Args:
         state: `WITNESS_STATE`, overwritten.
@@ -87,7 +87,7 @@ def end_watch(state: Record, received: Record, trusted: Record, dt: float) -> No
         dt: time since the last cycle [s].
     """
     published = state.published
-    for place in range(N_INPUTS):
+    for place in WATCHED:
         published.value[place] = received.value[place] if usable(received, place) else math.nan
         used = usable(trusted, place) and published.rejected[place] == 0
         published.unused_s[place] = 0.0 if used else published.unused_s[place] + dt
@@ -123,7 +123,7 @@ def judge(state: Record, place: int, innovation: float, tolerance: float, doubt_
 def rejected_faults(state: Record) -> int:
     """Return the fault bits of the inputs that are rejected."""
     faults = 0
-    for place in range(N_INPUTS):
+    for place in WATCHED:
         if state.rejected[place]:
             faults |= BITS[place]
     return faults
