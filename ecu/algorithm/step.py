@@ -24,6 +24,7 @@ from ecu.algorithm.control.blending import (
     update_motors,
 )
 from ecu.algorithm.control.cleaner_share import CALM_ACROSS, CLEANER_STATE, lean
+from ecu.algorithm.control.confirmed_friction import confirm_friction
 from ecu.algorithm.control.demand import DEMAND_STATE, hold_automated, hold_pedal, update_demand
 from ecu.algorithm.control.distribution import (
     DISTRIBUTION_STATE,
@@ -296,6 +297,9 @@ def _control(p: Record, s: Record, u: Record, dt: float) -> float:
     distribute(p, s.distribution, e.mass, decel, backwards, dt)
     if p.minimised:
         _lean(p, s, u, decel, backwards, dt)
+    held = s.guard.acting != 0 or s.distribution.trailing < 1.0 or s.failed_brakes.any != 0
+    calm = not (held or backwards or others_brake(u))
+    confirm_friction(p, s.control.confirmed, e, s.control.used, s.accel_error.offset, decel, calm, dt)
     follow_friction(p, s.control, e, dt)
     advance_pressures(s.hydraulics, s.limiter.pressure)
     update_motors(p, s.blending, u, s.guard.capped, e.speed, decel, dt)

@@ -23,6 +23,7 @@ import math
 import numpy as np
 
 from ecu.algorithm.brake import brake_gain
+from ecu.algorithm.control.confirmed_friction import CONFIRMED_STATE, confirmed_friction
 from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO, well_observed
 from ecu.contract.params import INVERSE, OFF
 from ecu.jit import Record, kernel
@@ -34,6 +35,7 @@ PRESSURE_LAW_STATE = np.dtype(
         ("mu_override", "f8", (4,)),  # true friction, for the laboratory's ideal controller alone; NaN: off
         ("early", "f8", (4,)),  # friction soon after this application began, 0: not observed yet
         ("start", "f8", (4,)),  # initial over final friction of the last application
+        ("confirmed", CONFIRMED_STATE),
         ("cut", "u1", (4,)),  # the last pressure was cut by limiter or slip guard
         ("limit_s", "f8"),  # time for which the deceleration has not been reached
         ("at_limit", "u1"),  # it was too long in this application
@@ -63,8 +65,8 @@ def follow_friction(params: Record, state: Record, estimate: Record, dt: float) 
     """Move the friction in use towards the estimate, within its admissible range.
 
     An estimate above the base counts only as far as it is certain: too much torque is preferred to too
-    little. While it still is the final friction of the last application, whose initial friction differed, it
-    waits.
+    little, and as far as the deceleration confirms it. While it still is the final friction of the last
+    application, whose initial friction differed, it waits.
     """
     if params.compensation == OFF:
         return
@@ -79,6 +81,7 @@ def follow_friction(params: Record, state: Record, estimate: Record, dt: float) 
         doubt = max(estimate.sigma[i] / max(mu[i], 0.1) - SURE, 0.0)
         if target > base:
             target = max(target * math.exp(-2.0 * doubt), base)
+        target = confirmed_friction(state.confirmed, target, i)
         target = min(max(target, LEAST_RATIO * params.mu_nominal[i]), GREATEST_RATIO * params.mu_nominal[i])
         least = 0.0 if state.cut[i] else -step
         state.used[i] += min(max(target - state.used[i], least), step)
@@ -86,9 +89,9 @@ def follow_friction(params: Record, state: Record, estimate: Record, dt: float) 
 
 @kernel
 def set_base(params: Record, state: Record, learned: Record) -> None:
-    """Take the learned friction as the base; only between applications."""
+    """Take the learned friction, as far as it is confirmed, as the base; only between applications."""
     for i in range(4):
-        base = learned.mu_b[i] * state.start[i]
+        base = confirmed_friction(state.confirmed, learned.mu_b[i], i) * state.start[i]
         state.base[i] = params.mu_nominal[i] if params.compensation == OFF else base
         state.used[i] = state.base[i]
 

@@ -1,0 +1,103 @@
+"""Friction of the pressure law as far as the car's deceleration confirms it.
+
+An estimate that is too high lowers the pressure. It may have risen by what one input says, a wheel speed or
+the speed over ground; the force of all brakes is known otherwise:
+
+    r = (-a + d - drag / m - f_roll g) / a_dem                         while the demand is steady
+
+While r is at least `CONFIRMS`, the friction in use counts as confirmed. Below `LEAST` what it has risen by
+since is taken back, until r is `AGREES`; where that is not enough, up to `LOWER` of the confirmed friction
+too: the linings have changed since. All is given again slowly. A friction that falls raises the pressure: it
+is followed.
+
+d is what the accelerometer has moved by against the wheels of late (c of `accel_error.py`): a drift, or the
+road. It counts where it speaks against what is done: as far as it is negative against a friction that has
+risen, as far as it is positive against one that is lowered beyond what was confirmed.
+"""
+
+import math
+
+import numpy as np
+
+from ecu.contract.params import GRAVITY
+from ecu.jit import Record, kernel
+
+CONFIRMED_STATE = np.dtype(
+    [
+        ("friction", "f8", (4,)),  # last that was confirmed, 0: none yet
+        ("asked", "f8"),  # deceleration demanded and given, low-passed [m/s^2]
+        ("given", "f8"),
+        ("usual", "f8"),  # c, low-passed [m/s^2]
+        ("steady_s", "f8"),
+        ("back", "f8"),  # share of an unconfirmed rise that is taken back; above 1, of `LOWER` too
+    ],
+    align=True,
+)
+
+LEAST_DECEL = 2.0  # m/s^2: at less the accelerometer's zero counts for too much
+LAG, STEADY, SETTLED_S = 0.15, 0.05, 0.3  # s, of the demand, s: hydraulics and tyres have followed
+LEAST, AGREES, CONFIRMS = 0.92, 0.95, 0.93
+TAKE, WIDTH = 10.0, 0.04  # 1/s at an error of `WIDTH`
+GIVE, GIVE_FAST, OVER = 0.05, 0.5, 1.04  # 1/s, 1/s where more than that is given
+LOWER, LOWERING = 0.3, 0.25  # of the friction, 1/s at an error of `WIDTH`: slow against the lag
+FOLLOW_S, USUAL_S = 0.5, 30.0
+
+
+@kernel
+def confirm_friction(
+    params: Record,
+    state: Record,
+    estimate: Record,
+    used: Record,
+    accel_offset: float,
+    decel: float,
+    calm: bool,
+    dt: float,
+) -> None:
+    """Confirm the friction in use by the car's deceleration, or contradict it.
+
+    Args:
+        params: `PARAMS`.
+        state: `CONFIRMED_STATE`, overwritten.
+        estimate: `ESTIMATE` of this cycle.
+        used: friction in use, shape (4,).
+        accel_offset: c, the accelerometer's difference from the wheels [m/s^2].
+        decel: demanded [m/s^2], NaN: unknown.
+        calm: the ECU alone brakes, forwards, no wheel or axle is held back and no brake has failed.
+        dt: time since the last cycle [s].
+    """
+    state.usual += (accel_offset - state.usual) * min(dt / USUAL_S, 1.0)
+    if not decel > LEAST_DECEL:
+        state.asked = state.given = state.steady_s = 0.0
+        return
+    resistance = params.drag_area * estimate.speed**2 / params.mass + params.rolling_resistance * GRAVITY
+    gain = 1.0 - math.exp(-dt / LAG)
+    state.asked += gain * (decel - state.asked)
+    state.given += gain * (-estimate.accel_x - resistance - state.given)
+    steady = calm and estimate.measured != 0 and abs(decel - state.asked) < STEADY * decel
+    state.steady_s = state.steady_s + dt if steady else 0.0
+    if state.steady_s < SETTLED_S:
+        return
+    drifted = accel_offset - state.usual
+    share = (state.given + (max(drifted, 0.0) if state.back >= 1.0 else min(drifted, 0.0))) / state.asked
+    missing = min(max(((AGREES if state.back > 0.0 else LEAST) - share) / WIDTH, -1.0), 1.0)
+    if state.back > 1.0 or (state.back == 1.0 and missing > 0.0):
+        state.back = min(max(state.back + LOWERING * missing * dt, 1.0), 2.0)
+    elif missing > 0.0:
+        state.back = min(state.back + TAKE * missing * dt, 1.0)
+    else:
+        state.back = max(state.back - (GIVE_FAST if share > OVER else GIVE) * dt, 0.0)
+    if state.back == 0.0 and share > CONFIRMS:
+        for i in range(4):
+            known = state.friction[i] > 0.0
+            state.friction[i] += (used[i] - state.friction[i]) * (dt / FOLLOW_S if known else 1.0)
+
+
+@kernel
+def confirmed_friction(state: Record, mu: float, corner: int) -> float:
+    """Return the friction `mu` without what is taken back of it."""
+    confirmed: float = state.friction[corner]
+    if confirmed == 0.0:
+        return mu
+    most: float = mu - min(state.back, 1.0) * max(mu - confirmed, 0.0)
+    return min(most, confirmed * (1.0 - LOWER * (state.back - 1.0))) if state.back > 1.0 else most

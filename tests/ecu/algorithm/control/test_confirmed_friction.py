@@ -1,0 +1,117 @@
+"""A friction that the deceleration does not confirm does not take the brakes."""
+
+import math
+
+import numpy as np
+import pytest
+
+from ecu.algorithm.control.confirmed_friction import confirm_friction
+from ecu.algorithm.control.pressure_law import PRESSURE_LAW_STATE, follow_friction, set_base
+from ecu.algorithm.estimate import ESTIMATE
+from ecu.contract.params import GRAVITY
+from ecu.contract.records import LEARNED
+
+DT, MU, DECEL = 0.01, 0.45, 4.0
+
+
+class Car:
+    """Brakes with 4 m/s^2; friction in use decides how hard, by linings whose true friction may change."""
+
+    def __init__(self, params) -> None:
+        self.p, self.law = params[0], np.zeros(1, PRESSURE_LAW_STATE)[0]
+        self.law["base"] = self.law["used"] = MU
+        self.law["mu_override"], self.law["start"] = math.nan, 1.0
+        self.estimate = np.zeros(1, ESTIMATE)[0]
+        self.estimate["sigma"], self.estimate["observed_s"], self.estimate["measured"] = 0.01, 2.0, 1
+        self.force = 0.0
+
+    @property
+    def state(self):
+        return self.law["confirmed"]
+
+    def brake(self, seconds, believed=MU, true=MU, reads=0.0, offset=0.0, decel=DECEL, calm=True) -> float:
+        """Return the least force over demand; `reads`: error of the accelerometer, `offset`: c [m/s^2]."""
+        least = math.inf
+        self.estimate["mu"], self.estimate["speed"] = believed, 20.0
+        resistance = self.p["drag_area"] * 400.0 / self.p["mass"] + self.p["rolling_resistance"] * GRAVITY
+        for _ in range(round(seconds / DT)):
+            given = decel * true / float(np.mean(self.law["used"]))
+            self.force += (given - self.force) * DT / 0.1
+            self.estimate["accel_x"] = -self.force - resistance + reads
+            confirm_friction(self.p, self.state, self.estimate, self.law["used"], offset, decel, calm, DT)
+            follow_friction(self.p, self.law, self.estimate, DT)
+            least = min(least, self.force / decel)
+        return least
+
+
+@pytest.fixture
+def car(params) -> Car:
+    car = Car(params)
+    car.brake(3.0)
+    assert list(car.state["friction"]) == pytest.approx([MU] * 4)
+    assert car.state["back"] == 0.0
+    return car
+
+
+CASES = [
+    # case, what differs, friction in use after 6 s, over the one before
+    ("nothing", {}, 1.0, 1.0),
+    ("the linings rub harder, and the estimate says so", {"believed": 1.3 * MU, "true": 1.3 * MU}, 1.3, 1.3),
+    ("the estimate alone rises", {"believed": 1.4 * MU}, 1.0, 1.06),
+    ("it rises by less than shows", {"believed": 1.06 * MU}, 1.06, 1.06),
+    ("it falls", {"believed": 0.7 * MU}, 0.7, 0.7),
+    ("it rises while the linings rub less", {"believed": 1.4 * MU, "true": 0.85 * MU}, 0.85, 0.91),
+    ("linings that have gone are not made up for", {"true": 0.5 * MU}, 0.69, 0.71),
+    ("a wheel slips", {"believed": 1.4 * MU, "calm": False}, 1.4, 1.4),
+    ("the accelerometer drifts", {"believed": 1.2 * MU, "reads": -0.67, "offset": -0.67}, 1.0, 1.07),
+    (
+        "it reads less: no less friction than confirmed",
+        {"believed": MU, "reads": 0.6, "offset": 0.6},
+        1.0,
+        1.0,
+    ),
+]
+
+
+@pytest.mark.parametrize(("case", "wrong", "least", "most"), CASES, ids=[case[0] for case in CASES])
+def test_what_is_used_of_an_estimate(car, case, wrong, least, most) -> None:
+    car.brake(6.0, **wrong)
+    used = car.law["used"] / MU
+    print(used, car.state)
+    assert (used >= least - 0.01).all()
+    assert (used <= most + 0.01).all()
+
+
+def test_a_rise_that_is_a_lie_takes_more_than_a_tenth_for_less_than_a_second(car) -> None:
+    """The friction in use moves by half a unit a second at most, there and back."""
+    assert car.brake(0.9, believed=1.5 * MU) == pytest.approx(0.79, abs=0.02)
+    assert car.brake(5.0, believed=1.5 * MU) > 0.9
+
+
+def test_the_next_braking_begins_with_what_was_confirmed(car) -> None:
+    learned = np.zeros(1, LEARNED)[0]
+    learned["mu_b"] = 1.5 * MU
+    car.brake(5.0, believed=1.5 * MU)
+    set_base(car.p, car.law, learned)
+    assert car.law["base"] == pytest.approx([MU] * 4, rel=0.08)
+
+
+def test_an_estimate_that_is_right_again_is_used_again(car) -> None:
+    car.brake(3.0, believed=1.5 * MU)
+    car.brake(25.0, believed=1.2 * MU, true=1.2 * MU)
+    assert car.state["back"] == 0.0
+    assert car.law["used"] == pytest.approx([1.2 * MU] * 4, rel=0.01)
+
+
+@pytest.mark.parametrize(("decel", "judged"), [(1.9, False), (2.1, True), (math.nan, False)])
+def test_a_weak_braking_says_nothing(params, decel, judged) -> None:
+    car = Car(params)
+    car.brake(3.0, decel=decel)
+    assert (car.state["friction"] > 0.0).all() == judged
+
+
+def test_an_accelerometer_that_is_lost_says_nothing(params) -> None:
+    car = Car(params)
+    car.estimate["measured"] = 0
+    car.brake(3.0)
+    assert not car.state["friction"].any()
