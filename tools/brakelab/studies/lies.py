@@ -1,47 +1,24 @@
 """One input lies in closed loop, armed: how far the brakes stray, and when the ECU says which input it is.
 
 Twelve brakings of 4 m/s^2 from 28 m/s by an automated demand; from `BEGIN` on one input, or those of one
-frame, lie. Brake force is that of linings and motors,
-
-    F = sum (T_b + max(T_m, 0)) / r_w / m                  true values, m: of the configuration
-
-over that of the same car without the lie, in the braking of the same number and at the same time in it, from
-`SETTLED_S` on and above `LOWEST_SPEED`. A loss lasts for `w` where F stays below a share that long:
-
-    least over w = min over windows of w of the greatest F in the window
+frame, lie. `lies_cell.py` says what is measured of a drive.
 """
 
-from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from itertools import product
 from multiprocessing import get_context
 from typing import Final, NamedTuple
 
-import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
-
 from brakelab.results.progress import tracked
-from brakelab.simulation.closed_loop import Drive, new_loop, run
+from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.faults import Fault
 from brakelab.simulation.scenario import Phase, Scenario
-from brakelab.stretches import stretches
-from ecu.contract.faults import ACCEL_IMPLAUSIBLE, IMPLAUSIBLE, fault_mask
+from brakelab.studies.lies_cell import BEGIN, DECEL, Cell, judge
 from ecu.contract.signals import CORNERS, INPUT_SIGNALS
 from ecu.settings.config import Config, load_config
 from ecu.settings.resources import resource
 
-Vector = NDArray[np.float64]
-
-BEGIN: Final = 20.0  # s
 BRAKINGS: Final = 12
-DECEL: Final = 4.0  # m/s^2
-SETTLED_S: Final = 0.5
-LOWEST_SPEED: Final = 5.0  # m/s
-SHORT_S, LONG_S = 0.3, 2.0
-"""A loss of more than 10 % may last for the one, of more than 3 % for the other."""
-COSTS: Final = 0.03  # of the force
-
 CARS: Final = {"suv": False, "suv-blended": True, "sedan": False}
 """Configurations, and whether their motors brake."""
 ROADS: Final[dict[str, dict[str, object]]] = {
@@ -53,6 +30,8 @@ ROADS: Final[dict[str, dict[str, object]]] = {
     },
     "downhill": {"road": {"grade": [(0.0, 0.0), (50.0, -0.06), (20000.0, -0.06)]}},
 }
+LONGER: Final = 1.5  # than the sound car's drive, at most: a car that has spun gets nowhere
+ACCEL, SPLIT_ACCEL = 5.0, 2.0  # m/s^2, between the brakings; on the split one driven axle has less grip
 
 
 class Input(NamedTuple):
@@ -142,40 +121,14 @@ def lies(name: str) -> dict[str, Fault]:
 INPUTS: Final = (*ANALOGUE, *FLAGS, "accelerator_position")
 
 
-class Cell(NamedTuple):
-    """One car on one road, one of whose inputs lies."""
-
-    car: str
-    road: str
-    input: str
-    lie: str
-    least_short: float
-    """Brake force over that of the sound car: what it falls below for `SHORT_S`."""
-    least_long: float
-    """For `LONG_S`."""
-    most_long: float
-    """What it stays above for `LONG_S`."""
-    mean: float
-    named_s: float
-    """From the beginning of the lie until its fault bit; NaN: never."""
-    late_s: float
-    """From the beginning of the first 2 s that cost more than `COSTS`; NaN: nothing costs, or never named."""
-    costs: bool
-    degraded: float
-    """Share of the time in mode degraded or failed."""
-    locked_s: float
-    """A wheel slips by more than 0.3 above 5 m/s, beyond what it does in the sound car."""
-    others: int
-    """Mask of the faults that neither name the input nor are there in the sound car."""
-
-
 def scenario(car: str, road: str, fault: list[Fault]) -> Scenario:
     """Return the drive of a car of `CARS` on a road of `ROADS`."""
     phases = [Phase(kind="coast", seconds=1.0)]
+    accel = SPLIT_ACCEL if road == "split" else ACCEL
     for _ in range(BRAKINGS):
         phases += [
             Phase(kind="brake", decel=DECEL, until_speed=3.0),
-            Phase(kind="cruise", speed=30.0, accel=5.0, until_speed=28.0),
+            Phase(kind="cruise", speed=30.0, accel=accel, until_speed=28.0),
             Phase(kind="coast", seconds=0.6),
         ]
     plant, blending = car.partition("-")[0], CARS[car]
@@ -183,92 +136,6 @@ def scenario(car: str, road: str, fault: list[Fault]) -> Scenario:
         {"plant": plant, "initial_speed": 28.0, "blending": blending, "phase": phases, "fault": fault}
         | ROADS[road]
     )
-
-
-def brake_force(drive: Drive, mass: float) -> Vector:
-    """Return the true force of all brakes and motors over the mass [m/s^2], shape (n,)."""
-    truth = drive.truth
-    wheels = [
-        (truth[f"brake_torque_{c}"] + np.maximum(truth[f"motor_torque_{c}"], 0.0))
-        / truth[f"rolling_radius_{c}"]
-        for c in CORNERS
-    ]
-    force: Vector = np.sum(wheels, axis=0) / mass
-    return force
-
-
-def brakings(drive: Drive) -> list[slice]:
-    """Return the rows of each braking, from the demand's full value to `LOWEST_SPEED`."""
-    full = (drive.truth["decel_demand"] > 0.95 * DECEL) & (drive.truth["vehicle_speed"] > LOWEST_SPEED)
-    return [slice(begin, end) for begin, end in stretches(full).tolist() if end - begin > 100]
-
-
-def _shares(drive: Drive, sound: Drive, mass: float) -> Iterator[tuple[Vector, Vector]]:
-    """Yield time [s] and force over the sound car's of each braking after the lie began."""
-    ours, theirs = brake_force(drive, mass), brake_force(sound, mass)
-    for rows, reference in zip(brakings(drive), brakings(sound), strict=False):
-        settled = round(100 * SETTLED_S)
-        place = np.arange(rows.start + settled, rows.stop)
-        place = place[drive.t[place] > BEGIN]
-        if not len(place):
-            continue
-        beside = np.minimum(reference.start + place - rows.start, reference.stop - 1)
-        yield drive.t[place], ours[place] / theirs[beside]
-
-
-def _lasting(shares: Vector, seconds: float, least: bool) -> Vector:
-    """Return, per window of `seconds`, the bound that all its shares keep to; empty where none is as long."""
-    length = round(100 * seconds)
-    if len(shares) < length:
-        return np.empty(0)
-    windows = sliding_window_view(shares, length)
-    bound: Vector = windows.max(axis=1) if least else windows.min(axis=1)
-    return bound
-
-
-def _masks(drive: Drive) -> NDArray[np.int64]:
-    return np.asarray(fault_mask(drive.outputs), np.int64)
-
-
-def judge(
-    name: tuple[str, str, str, str], drive: Drive, sound: Drive, mass: float, signals: tuple[str, ...]
-) -> Cell:
-    """Return the cell `name` (car, road, input, lie) of a drive beside that of the sound car."""
-    short, long, most, everything, first = [1.0], [1.0], [1.0], [1.0], np.inf
-    for t, shares in _shares(drive, sound, mass):
-        short.extend(_lasting(shares, SHORT_S, True))
-        low, high = _lasting(shares, LONG_S, True), _lasting(shares, LONG_S, False)
-        long.extend(low)
-        most.extend(high)
-        everything.extend(shares)
-        beyond = np.flatnonzero((low < 1.0 - COSTS) | (high > 1.0 + COSTS))
-        if len(beyond):
-            first = min(first, float(t[beyond[0]]))
-    after = drive.t >= BEGIN
-    masks, usual = _masks(drive)[after], int(np.bitwise_or.reduce(_masks(sound)))
-    own = sum(IMPLAUSIBLE.get(signal, 0) for signal in signals)
-    own |= ACCEL_IMPLAUSIBLE if "accel_x" in signals else 0
-    named = np.flatnonzero(masks & own)
-    begin = float(drive.t[after][named[0]]) if len(named) else np.nan
-    mode = drive.outputs["mode"][after]
-    return Cell(
-        *name,
-        float(min(short)),
-        float(min(long)),
-        float(max(most)),
-        float(np.mean(everything)),
-        begin - BEGIN,
-        max(begin - first, 0.0) if np.isfinite(first) else np.nan,
-        bool(np.isfinite(first)),
-        float(np.mean(mode >= 3.0)),
-        max(_locked(drive) - _locked(sound), 0.0),
-        int(np.bitwise_or.reduce(masks)) & ~own & ~usual,
-    )
-
-
-def _locked(drive: Drive) -> float:
-    fast = drive.truth["vehicle_speed"] > LOWEST_SPEED
-    return 0.01 * max(float(np.sum(fast & (drive.truth[f"slip_{c}"] < -0.3))) for c in CORNERS)
 
 
 def cells(car: str, road: str, name: str, seed: int, wanted: tuple[str, ...] = ()) -> list[Cell]:
@@ -279,7 +146,7 @@ def cells(car: str, road: str, name: str, seed: int, wanted: tuple[str, ...] = (
     for lie, fault in lies(name).items():
         if wanted and lie not in wanted:
             continue
-        drive = run(new_loop(scenario(car, road, [fault]), config, seed))
+        drive = run(new_loop(scenario(car, road, [fault]), config, seed), seconds=LONGER * sound.t[-1])
         found.append(judge((car, road, name, lie), drive, sound, config.vehicle.mass, tuple(fault.signal)))
     return found
 
