@@ -2,7 +2,7 @@
 
     yaw rate    psi_dot
     across      a_y / v                                                  steady cornering, bank
-    steering    v delta / L (1 ... 0.4)                                  understeer, any vehicle
+    steering    v delta / L (1 ... 0.4)                                  understeer, brakes that pull
     wheels      (v_right - v_left) / track, of either axle               slip, radii
 
 Each is an interval, its tolerance to both sides. The turning is the interval that most of them contain
@@ -33,6 +33,7 @@ LEAST_SPEED = 5.0  # m/s
 YAW_ZERO, YAW_SCALE = 0.03, 0.05  # rad/s, of the value
 BANK = 1.0  # m/s^2: a road banked by 6 %, roll, zero
 STEERING_ZERO, UNDERSTEER = 0.03, 0.6  # rad/s, of the value
+PULLS = 0.002  # s^2/m^2, of deceleration and speed: linings of left and right that differ by half
 TURNS, SLIP = 0.02, 0.012  # of the wheel speeds: radii; per m/s^2: slip of the two sides
 DOUBT_S, COUNTERSTEER_S = 0.2, 1.0
 
@@ -92,7 +93,7 @@ def watch_turning(
     turns = (TURNS + SLIP * abs(value[ACCEL_X])) * speed / params.track + YAW_ZERO
     _set(state, YAW, usable(inputs, YAW_RATE), yaw, YAW_ZERO + YAW_SCALE * abs(yaw))
     _set(state, ACROSS, usable(inputs, ACCEL_Y), across, BANK / speed + YAW_SCALE * abs(across))
-    reach = STEERING_ZERO + UNDERSTEER * abs(steering)
+    reach = STEERING_ZERO + UNDERSTEER * abs(steering) + PULLS * max(-value[ACCEL_X], 0.0) * speed
     _set(state, STEERING, usable(inputs, STEERING_ANGLE), steering, reach)
     for axle in range(2):
         known = usable(inputs, WHEEL_SPEED + 2 * axle) and usable(inputs, WHEEL_SPEED + 2 * axle + 1)

@@ -46,6 +46,14 @@ def test_who_contradicts_the_others(params, feed, case, yaw, reads, seconds, rej
     assert tuple(name for name in WATCHED if witness["rejected"][INPUT[name]]) == rejected
 
 
+@pytest.mark.parametrize(("accel", "rejected"), [(-4.4, ()), (0.0, ("steering_angle",))])
+def test_brakes_that_pull_turn_a_fast_car_against_its_steering(params, feed, accel, rejected) -> None:
+    """As measured: linings whose friction has come to differ between left and right, 120 km/h."""
+    reads = {"accel_x": accel, "steering_angle": 0.0013}
+    witness = drive(params, feed, -0.2, reads, 5.0, 33.0)
+    assert tuple(name for name in WATCHED if witness["rejected"][INPUT[name]]) == rejected
+
+
 @pytest.mark.parametrize("speed", [4.9, -8.0, np.nan])
 def test_slow_or_backwards_nobody_is_judged(params, feed, speed: float) -> None:
     assert not drive(params, feed, 0.0, {"yaw_rate": 5.9}, 1.0, speed)["rejected"].any()
