@@ -34,6 +34,7 @@ CONFIRMED_STATE = np.dtype(
     align=True,
 )
 
+LEAST_SPEED = 3.0  # m/s: a car that stands does not decelerate
 LEAST_DECEL = 2.0  # m/s^2: at less the accelerometer's zero counts for too much
 LAG, STEADY, SETTLED_S = 0.15, 0.05, 0.3  # s, of the demand, s: hydraulics and tyres have followed
 LEAST, AGREES, CONFIRMS = 0.92, 0.95, 0.93
@@ -74,7 +75,8 @@ def confirm_friction(
     gain = 1.0 - math.exp(-dt / LAG)
     state.asked += gain * (decel - state.asked)
     state.given += gain * (-estimate.accel_x - resistance - state.given)
-    steady = calm and estimate.measured != 0 and abs(decel - state.asked) < STEADY * decel
+    moves = estimate.speed > LEAST_SPEED and estimate.measured != 0
+    steady = calm and moves and abs(decel - state.asked) < STEADY * decel
     state.steady_s = state.steady_s + dt if steady else 0.0
     if state.steady_s < SETTLED_S:
         return

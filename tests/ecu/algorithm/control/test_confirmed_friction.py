@@ -29,11 +29,11 @@ class Car:
     def state(self):
         return self.law["confirmed"]
 
-    def brake(self, seconds, believed=MU, true=MU, reads=0.0, offset=0.0, decel=DECEL, calm=True) -> float:
+    def brake(self, seconds, believed=MU, true=MU, reads=0.0, offset=0.0, decel=DECEL, calm=True, speed=20.0):
         """Return the least force over demand; `reads`: error of the accelerometer, `offset`: c [m/s^2]."""
         least = math.inf
-        self.estimate["mu"], self.estimate["speed"] = believed, 20.0
-        resistance = self.p["drag_area"] * 400.0 / self.p["mass"] + self.p["rolling_resistance"] * GRAVITY
+        self.estimate["mu"], self.estimate["speed"] = believed, speed
+        resistance = self.p["drag_area"] * speed**2 / self.p["mass"] + self.p["rolling_resistance"] * GRAVITY
         for _ in range(round(seconds / DT)):
             given = decel * true / float(np.mean(self.law["used"]))
             self.force += (given - self.force) * DT / 0.1
@@ -62,6 +62,7 @@ CASES = [
     ("it falls", {"believed": 0.7 * MU}, 0.7, 0.7),
     ("it rises while the linings rub less", {"believed": 1.4 * MU, "true": 0.85 * MU}, 0.85, 0.91),
     ("linings that have gone are not made up for", {"true": 0.5 * MU}, 0.69, 0.71),
+    ("the car stands", {"reads": DECEL, "speed": 0.0}, 1.0, 1.0),
     ("a wheel slips", {"believed": 1.4 * MU, "calm": False}, 1.4, 1.4),
     ("the accelerometer drifts", {"believed": 1.2 * MU, "reads": -0.67, "offset": -0.67}, 1.0, 1.07),
     (
