@@ -10,9 +10,8 @@ since is taken back, until r is `AGREES`; where that is not enough, up to `LOWER
 too: the linings have changed since. All is given again slowly. A friction that falls raises the pressure: it
 is followed.
 
-d is what the accelerometer has moved by against the wheels of late (c of `accel_error.py`): a drift, or the
-road. It counts where it speaks against what is done: as far as it is negative against a friction that has
-risen, as far as it is positive against one that is lowered beyond what was confirmed.
+d is what the accelerometer has moved by against the wheels of late (c of `accel_error.py`), as far as it is
+positive: a drift, or the road. It counts where friction is lowered beyond what was confirmed.
 """
 
 import math
@@ -80,8 +79,8 @@ def confirm_friction(
     state.steady_s = state.steady_s + dt if steady else 0.0
     if state.steady_s < SETTLED_S:
         return
-    drifted = accel_offset - state.usual
-    share = (state.given + (max(drifted, 0.0) if state.back >= 1.0 else min(drifted, 0.0))) / state.asked
+    drifted = max(accel_offset - state.usual, 0.0) if state.back >= 1.0 else 0.0
+    share = (state.given + drifted) / state.asked
     missing = min(max(((AGREES if state.back > 0.0 else LEAST) - share) / WIDTH, -1.0), 1.0)
     if state.back > 1.0 or (state.back == 1.0 and missing > 0.0):
         state.back = min(max(state.back + LOWERING * missing * dt, 1.0), 2.0)
