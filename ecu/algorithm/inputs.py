@@ -65,6 +65,15 @@ def motor_torque_known(inputs: Record, corner: int) -> bool:
 
 
 @kernel
+def wheels_mapped(params: Record) -> bool:
+    """Return whether any wheel speed is received at all."""
+    mapped = 0
+    for i in range(4):
+        mapped += params.mapped[WHEEL_SPEED + i]
+    return mapped > 0
+
+
+@kernel
 def mean_wheel_speed(params: Record, inputs: Record) -> float:
     """Return the mean speed of the wheels [m/s] whose samples are usable, unsigned; NaN: fewer than two."""
     total, wheels = 0.0, 0

@@ -54,6 +54,8 @@ def publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: in
     y.accel_x_model = e.accel_x_model
     y.overrun, y.accel_x_zero, y.vehicle_mass = e.overrun, e.accel_bias, e.mass
     y.sigma_brake_force = e.sigma_force
+    y.grip_limit, y.sigma_grip_limit, y.grip_knee = e.grip_limit, e.sigma_grip_limit, e.grip_knee
+    y.motor_torque_share = e.torque_share
     y.braking = s.application.braking
     y.test_ratio_balance, y.test_ratio_speed = e.test_ratio_balance, e.test_ratio_speed
     y.particles_last_brake, y.particles_per_km = s.dust.particles, s.dust.per_km

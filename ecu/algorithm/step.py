@@ -57,6 +57,7 @@ from ecu.algorithm.control.slip_guard import SLIP_GUARD_STATE, guard_slip
 from ecu.algorithm.estimate import ESTIMATE
 from ecu.algorithm.estimation.joint.layout import JOINT_STATE
 from ecu.algorithm.estimation.joint.prediction import PREDICTION_STATE
+from ecu.algorithm.estimation.joint.whole_application import WHOLE_STATE
 from ecu.algorithm.estimation.motion import MOTION_STATE
 from ecu.algorithm.estimation.observe import (
     hand_over_application,
@@ -118,6 +119,7 @@ INITIAL = np.dtype(
         ("wheel_load", WHEEL_LOAD_STATE),
         ("speed", SPEED_STATE),
         ("joint", JOINT_STATE),
+        ("whole", WHOLE_STATE),
         ("wheels", WHEELS_STATE),
         ("force", FORCE_STATE),
         ("observer", OBSERVER_STATE),

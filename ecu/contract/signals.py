@@ -161,6 +161,10 @@ OUTPUT_SIGNALS: Final[tuple[OutputSignal, ...]] = (
     OutputSignal("test_ratio", "-", True, ""),  # of wheel speed
     OutputSignal("test_ratio_balance", "-", False, ""),  # of the forces along the car
     OutputSignal("test_ratio_speed", "-", False, ""),  # of the speed reference
+    OutputSignal("grip_limit", "m/s^2", False, ""),  # ceiling of the brakes' deceleration by road and tyres
+    OutputSignal("sigma_grip_limit", "m/s^2", False, ""),
+    OutputSignal("grip_knee", "-", False, ""),  # exponent of the bend towards it; NaN: the ECU brakes
+    OutputSignal("motor_torque_share", "-", False, ""),  # of reported torques that counts, by the motion
 )
 
 

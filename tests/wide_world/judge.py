@@ -6,13 +6,14 @@ Judged is the mean deceleration of each braking beyond 1.5 m/s^2, over the rows 
 (`brakings`): predicted from its pressures and from what was known before it, against what the accelerometer
 measured.
 
-    product, published   friction, zeros, mass, unreported drag of the row before, in the force balance here
+    product, published   friction, zeros, mass, drag and ceiling of the row before, in the force balance here
     product, table       `specific_force_predicted` of its own table of brakings, against its own measurement
     product, table v     `decel_predicted` of the same table, against the loss of speed
 """
 
 import argparse
 import json
+import math
 import sys
 import tempfile
 import time
@@ -34,6 +35,7 @@ from .logger import CORNERS, record, truth, write
 from .references import REFERENCES, Prediction
 
 LEAST = 1.5  # m/s^2, of a braking that is judged
+SIGMAS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
 MOST = 40  # brakings of a car, lest one outweigh the others
 
 
@@ -71,10 +73,15 @@ def published(result: Result, signals: Signals, brakings: list[Braking], nominal
             for name in ("vehicle_mass", "accel_x_zero", "overrun", "sigma_brake_force")
         )
         mass = mass if mass > 0.0 else nominal.mass
+        knee = result["grip_knee"][row]
         offset = signals.zero - np.nan_to_num(four("pressure_zero", row))
         here = signals._replace(pressure=signals.pressure + offset)
-        lining = float(np.mean(lining_decel(here, braking.rows, nominal, mu, mass)))
-        rest = rest_decel(signals, braking.rows, nominal, mass)
+        each = lining_decel(here, braking.rows, nominal, mu, mass)
+        if np.isfinite(knee):
+            each = each * (1.0 + (each / result["grip_limit"][row]) ** knee) ** (-1.0 / knee)
+        lining = float(np.mean(each))
+        known = signals._replace(motor=signals.motor * result["motor_torque_share"][row])
+        rest = rest_decel(known, braking.rows, nominal, mass)
         decel.append(lining + rest + overrun - zero / (1.0 + G * nominal.pitch_gradient))
         if relative == 0.0:
             relative = float(np.mean(four("sigma_mu_b", row) / mu))
@@ -176,6 +183,22 @@ def table(
     return "\n".join(lines)
 
 
+def calibration(judged: list[Judged]) -> str:
+    """Return a Markdown table of the share inside k sigma [%] of every predictor that states sigma."""
+    lines = [
+        "| k | " + " | ".join(f"{k:g}" for k in SIGMAS) + " | median sigma [%] |",
+        "| --- |" + " --- |" * (len(SIGMAS) + 1),
+        "| normal distribution | " + " | ".join(f"{100 * math.erf(k / 2**0.5):.0f}" for k in SIGMAS) + " | |",
+    ]
+    for predictor in dict.fromkeys(one.predictor for one in judged if not np.isnan(one.sigma)):
+        mine = [one for one in judged if one.predictor == predictor and not np.isnan(one.sigma)]
+        off = np.array([abs(one.predicted - one.measured) / one.sigma for one in mine])
+        share = " | ".join(f"{100 * np.mean(off <= k):.0f}" for k in SIGMAS)
+        median = np.median([100.0 * one.sigma / one.measured for one in mine])
+        lines.append(f"| {predictor} | {share} | {median:.1f} |")
+    return "\n".join(lines)
+
+
 def report(judged: list[Judged]) -> str:
     """Return all tables."""
     each = [one for one in judged if one.predictor == "never learning"]
@@ -202,6 +225,8 @@ def report(judged: list[Judged]) -> str:
             table(judged, columns(sound | traits), _cell),
             "By the number of the braking, mean error (bias) [%]:",
             table(judged, columns(numbers), _bias),
+            "Share inside k sigma [%]:",
+            calibration(judged),
         )
     )
 

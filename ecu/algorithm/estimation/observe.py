@@ -3,6 +3,8 @@
 It changes its own records of `STATE`, the learned values, and `estimate`, which the rest of the ECU reads.
 """
 
+import math
+
 from ecu.algorithm.estimation.friction import update_pressure
 from ecu.algorithm.estimation.joint.estimates import tell_joint
 from ecu.algorithm.estimation.joint.learned import hand_over_level, keep_joint, restore_joint
@@ -15,6 +17,18 @@ from ecu.algorithm.estimation.joint.prediction import (
 )
 from ecu.algorithm.estimation.joint.prior import begin_application, end_application, forget_levels
 from ecu.algorithm.estimation.joint.sliding import suspend_learning
+from ecu.algorithm.estimation.joint.whole_application import (
+    add_to_whole,
+    apply_scale,
+    begin_whole,
+    compare_drive,
+    end_whole,
+    forget_whole,
+    keep_whole,
+    restore_whole,
+    tell_whole,
+    torques_measured,
+)
 from ecu.algorithm.estimation.motion import tell_motion, update_motion
 from ecu.algorithm.estimation.thesis.estimates import tell_friction, tell_wheels
 from ecu.algorithm.estimation.thesis.force import reset_force, take_measured_force, update_force
@@ -26,7 +40,7 @@ from ecu.algorithm.estimation.zero import FREE, note_rest, settle_zero, tell_zer
 from ecu.algorithm.inputs import LEAST_REQUEST, fresh, requested_decel, usable
 from ecu.algorithm.vehicle import total_tyre_force
 from ecu.contract.params import BAR, JOINT, OBSERVER1
-from ecu.contract.signals import ACCEL_X, CALLIPER_PRESSURE
+from ecu.contract.signals import ACCEL_X, CALLIPER_PRESSURE, OBSERVING
 from ecu.jit import Record, kernel
 
 Corners = tuple[float, float, float, float]
@@ -40,6 +54,7 @@ def start_estimation(p: Record, s: Record) -> None:
     s.force.k_f = s.force.stiffness = 1.0
     restore_friction(p, s.friction, s.learned)
     restore_joint(p, s.joint, s.learned)
+    restore_whole(s.whole, s.learned)
     update_wheel_load(p, s.wheel_load, 0.0, 0.0, 0.0, 1.0)
     update_radius(p, s.wheels, s.learned, s.wheel_load.load)
     start_estimate(s)
@@ -53,14 +68,33 @@ def start_estimate(s: Record) -> None:
 
 
 @kernel
+def _windows_teach(p: Record, s: Record) -> bool:
+    taught: bool = p.transmit != 0 or s.whole.alone == 0
+    return taught
+
+
+@kernel
 def keep_application(p: Record, s: Record) -> None:
     """At the end of a brake application: store the joint observer's learned states."""
-    if p.observer == JOINT:
+    if p.observer != JOINT:
+        return
+    if not p.transmit:
+        end_whole(s.whole)
+    if _windows_teach(p, s):
         end_application(s.joint)
         if end_prediction(s.prediction):
             forget_levels(s.joint)
             close_book(s.prediction)
-        keep_joint(p, s.joint, s.learned)
+            forget_whole(s.whole)
+    _keep(p, s)
+
+
+@kernel
+def _keep(p: Record, s: Record) -> None:
+    keep_joint(p, s.joint, s.learned)
+    if not p.transmit:
+        keep_whole(s.whole, s.learned)
+        apply_scale(p, s.whole, s.learned)
 
 
 @kernel
@@ -95,6 +129,8 @@ def observe(
     tell_motion(s.motion, e)
     for i in range(4):
         e.load[i], e.brake_torque[i] = s.wheel_load.load[i], s.friction.torque[i]
+    e.grip_limit = e.sigma_grip_limit = e.grip_knee = math.nan
+    e.torque_share, e.torques_known = 1.0, 1
     if p.observer == JOINT:
         _observe_jointly(p, s, u, heat, guarded or contradicted, braking, dt)
     else:
@@ -111,19 +147,34 @@ def _observe_jointly(
 ) -> None:
     joint = s.joint
     if s.application.started:
-        begin_prediction(p, s.prediction, joint)
-        begin_application(joint, heat)
+        begin_whole(p, s.whole, joint)
+        if _windows_teach(p, s):
+            begin_prediction(p, s.prediction, joint)
+            begin_application(joint, heat)
+    joint.held = 1 if not p.transmit and (s.whole.alone or s.whole.bent) else 0
     if doubted:
         suspend_learning(joint)
     update_joint(p, joint, u, s.motion, s.wheel_load.load, s.hydraulics, braking, dt)
+    if joint.closed and joint.released:
+        compare_drive(p, s.whole, joint)
     if braking and joint.closed:
-        add_window(p, s.prediction, joint, u)
+        if not p.transmit:
+            add_to_whole(p, s.whole, joint)
+        if _windows_teach(p, s):
+            add_window(p, s.prediction, joint, u)
     s.prediction.told_s = max(s.prediction.told_s - dt, 0.0)
     tell_joint(p, joint, s.hydraulics, s.estimate, s.learned, u, braking, dt)
     s.estimate.given_up = 1 if s.prediction.told_s > 0.0 else 0
+    s.estimate.torques_known = 1 if p.transmit or torques_measured(p, joint) else 0
+    if not p.transmit:
+        tell_whole(s.whole, s.estimate, p.mass)
+        if braking and s.whole.alone and s.whole.time > 0.0:
+            for i in range(4):
+                s.estimate.mode[i] = OBSERVING
+                s.estimate.observed_s[i] += dt
     joint.unkept_s += dt
     if joint.unkept_s > KEEP_S:
-        keep_joint(p, joint, s.learned)
+        _keep(p, s)
 
 
 @kernel

@@ -36,6 +36,27 @@ LEFT_OUT_S = 0.03  # duration of a pressure's deviation from its demand
 
 
 @kernel
+def _watch_motion(p: Record, s: Record, u: Record, dt: float) -> int:
+    """Return the fault bits of accelerometer, motors and speeds by the torques, where these are known."""
+    faults, estimate = 0, s.estimate
+    braking = s.application.braking != 0
+    watch_acceleration(p, s.acceleration, s.witness, u, estimate, s.control.base, braking, dt)
+    watch_frozen(s.accel_error, s.acceleration, s.witness, u, dt)
+    if s.acceleration.time == 0.0 and not s.witness.rejected[ACCEL_X]:
+        follow_accel_error(p, s.accel_error, s.witness, s.acceleration, estimate.accel_y, braking)
+    if s.accel_error.zero_off != 0.0 or s.accel_error.scale_off != 0.0:
+        faults |= ACCEL_X_DRIFTED
+    if s.accel_error.proven_s > PROVEN_S and not wheels_deny(s.acceleration):
+        base, offset = s.control.base, s.accel_error.offset
+        watch_motors(p, s.motors, s.witness, u, estimate, base, offset, dt)
+    asked = braking and requested_decel(p, u) > LEAST_REQUEST
+    if asked and s.plausibility.sent and not (driver_accelerates(u) or others_brake(u)):
+        compare_motors(p, s.motors, s.witness, u, s.blending, dt)
+    watch_speeds(p, s.speeds, s.witness, u, estimate, dt)
+    return faults
+
+
+@kernel
 def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool]:
     """Return the fault bits of sensors whose readings contradict the others, and whether one is new.
 
@@ -49,22 +70,10 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
     doubted = s.acceleration.implausible != 0
     estimate = s.estimate
     if estimate.started:
-        braking = s.application.braking != 0
-        watch_acceleration(p, s.acceleration, s.witness, u, estimate, s.control.base, braking, dt)
+        if estimate.torques_known:
+            faults |= _watch_motion(p, s, u, dt)
         watch_wheels(p, s.plausibility, s.witness, u, estimate, dt)
-        watch_frozen(s.accel_error, s.acceleration, s.witness, u, dt)
-        if s.acceleration.time == 0.0 and not s.witness.rejected[ACCEL_X]:
-            follow_accel_error(p, s.accel_error, s.witness, s.acceleration, estimate.accel_y, braking)
-        if s.accel_error.zero_off != 0.0 or s.accel_error.scale_off != 0.0:
-            faults |= ACCEL_X_DRIFTED
-        if s.accel_error.proven_s > PROVEN_S and not wheels_deny(s.acceleration):
-            base, offset = s.control.base, s.accel_error.offset
-            watch_motors(p, s.motors, s.witness, u, estimate, base, offset, dt)
-        asked = braking and requested_decel(p, u) > LEAST_REQUEST
-        if asked and s.plausibility.sent and not (driver_accelerates(u) or others_brake(u)):
-            compare_motors(p, s.motors, s.witness, u, s.blending, dt)
         watch_turning(p, s.turning, s.witness, u, estimate.speed, dt)
-        watch_speeds(p, s.speeds, s.witness, u, estimate, dt)
         faults |= rejected_faults(s.witness)
         if wheel_speed_implausible(p, s.plausibility, s.witness, u, estimate, dt):
             faults |= WHEEL_SPEED_IMPLAUSIBLE
@@ -94,7 +103,22 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
 
 @kernel
 def mask_implausible(p: Record, s: Record, u: Record) -> None:
-    """Mask out the implausible of the inputs `u`, and correct the accelerometer's reading."""
+    """Mask out the implausible of the inputs `u`, and correct the accelerometer's reading.
+
+    What contradicts torques is masked where this ECU brakes: those of a car that others brake prove nothing.
+    """
+    if p.transmit:
+        _mask_contradicted(s, u)
+    if abs(u.value[ACCEL_X]) > p.accel_range:
+        _distrust(s, u, ACCEL_X)
+    for i in range(4):
+        if s.plausibility.fell[i]:
+            _distrust(s, u, WHEEL_SPEED + i)
+        _mask_pressure(s, u, i, others_brake(u))
+
+
+@kernel
+def _mask_contradicted(s: Record, u: Record) -> None:
     u.value[ACCEL_X] = correct_accel(s.accel_error, u.value[ACCEL_X])
     for place in WATCHED:
         if s.witness.rejected[place]:
@@ -102,12 +126,8 @@ def mask_implausible(p: Record, s: Record, u: Record) -> None:
     for i in range(4):
         if s.witness.rejected[MOTOR_TORQUE + i] and s.application.braking:
             u.value[MOTOR_TORQUE + i] = s.blending.asked[0, i]
-    if s.acceleration.implausible or abs(u.value[ACCEL_X]) > p.accel_range:
+    if s.acceleration.implausible:
         _distrust(s, u, ACCEL_X)
-    for i in range(4):
-        if s.plausibility.fell[i]:
-            _distrust(s, u, WHEEL_SPEED + i)
-        _mask_pressure(s, u, i, others_brake(u))
 
 
 @kernel

@@ -26,6 +26,12 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "rejected_s",
         "pressure_at_rest",
         "floored",
+        "whole",
+        "whole_covariance",
+        "differs",
+        "wheel_ratio",
+        "speed_copies",
+        "held",
     ),
 }
 

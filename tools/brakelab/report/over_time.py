@@ -91,6 +91,7 @@ def _lines(drive: Drive, truth: Drive | None) -> dict[str, Vector]:
         "demanded": drive.column("decel_demand_total"),
         "achieved": -drive.column("accel_x_road"),
         "k_f": drive.column("k_f"),
+        "grip_limit": drive.column("grip_limit"),
     }
     for corner in ("fl", "fr", "rl", "rr"):
         for name in (_FRICTION.column, _DISC.column):
@@ -140,8 +141,10 @@ def _deceleration(source: ColumnDataSource, span: Range1d) -> Any:
     plot.y_range.min_interval = _LEAST_DECELERATION
     _line(plot, source, "achieved", "achieved (measured)", ESTIMATE, line_width=1.0)
     _line(plot, source, "achieved_true", "achieved (true)", INK, line_dash="dashed", line_width=1.2)
+    _line(plot, source, "grip_limit", "ceiling of grip", INK, line_dash="dotted", line_width=1.2)
     _line(plot, source, "demanded", "demanded", DEMAND, line_width=2.0)
     rows = [("demanded", "demanded"), ("achieved", "achieved"), ("true", "achieved_true")]
+    rows.append(("ceiling", "grip_limit"))
     _hover(plot, source, [(label, name, "0.00") for label, name in rows])
     return plot
 

@@ -33,6 +33,7 @@ from ecu.contract.signals import N_OUTPUTS, OUTPUT
 Vector = NDArray[np.float64]
 
 STANDING: Final = 0.3  # m/s, below: standstill
+ROLLING: Final = 5.0  # m/s, from which the balance of a car that others brake is judged
 SHORT: Final = 0.5  # s, shorter: a tap on the pedal
 WEAK: Final = 0.5  # m/s^2, below: its relative error is meaningless
 PRESSED: Final = 2.0  # %, of the accelerator; the ECU learns nothing above it either
@@ -92,6 +93,9 @@ def that_count(rows: Vector, before: Vector, params: RecordArray) -> NDArray[np.
     moves = rows[:, OUTPUT["vehicle_speed"]] > STANDING
     accelerates = rows[:, N_OUTPUTS + 4] > PRESSED
     felt = np.isfinite(rows[:, OUTPUT["accel_x_road"]])
+    if np.isfinite(before[OUTPUT["grip_knee"]]):  # what a car that others brake is learned from
+        accelerates, motors = np.zeros_like(accelerates), motors * before[OUTPUT["motor_torque_share"]]
+        moves = rows[:, OUTPUT["vehicle_speed"]] > ROLLING
     return np.asarray(moves & ~accelerates & ~(-motors > DRIVEN * brakes) & (felt | ~felt.any()))
 
 
@@ -110,16 +114,21 @@ class _Car(NamedTuple):
     mu_b: Vector
     mass: float
     overrun: float
+    ceiling: float = float("inf")  # m/s^2, towards which the linings' deceleration bends
+    knee: float = 1.0  # exponent of that bend
+    motors: float = 1.0  # share of the reported torques that counts
 
 
 def _forces(rows: Vector, before: Vector, car: _Car, params: RecordArray) -> tuple[Vector, Vector]:
     """Return the specific force of the linings and the rest of it [m/s^2], shape (n,)."""
     p = params[0]
     inert = car.mass + (p["wheel_inertia"] / p["wheel_radius"] ** 2).sum()
-    motors = (_motor_torques(rows) / p["wheel_radius"]).sum(axis=1)
+    motors = car.motors * (_motor_torques(rows) / p["wheel_radius"]).sum(axis=1)
     resistance = p["drag_area"] * rows[:, OUTPUT["vehicle_speed"]] ** 2
     resistance += p["rolling_resistance"] * GRAVITY * car.mass
-    return _linings(rows, before, params) @ car.mu_b / inert, (motors + resistance) / inert + car.overrun
+    linings = _linings(rows, before, params) @ car.mu_b / inert
+    linings = linings * (1.0 + (linings / car.ceiling) ** car.knee) ** (-1.0 / car.knee)
+    return linings, (motors + resistance) / inert + car.overrun
 
 
 def predict(rows: Vector, before: Vector, params: RecordArray) -> Prediction:
@@ -134,13 +143,16 @@ def predict(rows: Vector, before: Vector, params: RecordArray) -> Prediction:
     mass, overrun = float(before[OUTPUT["vehicle_mass"]]), float(np.nan_to_num(before[OUTPUT["overrun"]]))
     mass = mass if np.isfinite(mass) else float(p["mass"])
     learned = _Car(corners(before, "mu_b"), mass, overrun)
+    if np.isfinite(before[OUTPUT["grip_knee"]]):
+        ceiling, knee = float(before[OUTPUT["grip_limit"]]), float(before[OUTPUT["grip_knee"]])
+        learned = learned._replace(ceiling=ceiling, knee=knee, motors=before[OUTPUT["motor_torque_share"]])
     configured = _Car(p["mu_nominal"], float(p["mass"]), 0.0)
     speed = rows[:, OUTPUT["vehicle_speed"]]
     decel = mean(np.where(speed > STANDING, sum(_forces(rows, before, learned, params)), 0.0))
     rows = rows[that_count(rows, before, params)]
     brakes, rest = map(mean, _forces(rows, before, learned, params))
     configured_brakes, configured_rest = map(mean, _forces(rows, before, configured, params))
-    motors = mean((_motor_torques(rows) / p["wheel_radius"]).sum(axis=1)) / mass
+    motors = learned.motors * mean((_motor_torques(rows) / p["wheel_radius"]).sum(axis=1)) / mass
     relative = before[OUTPUT["sigma_brake_force"]]
     if np.isnan(relative):  # of one wheel's observers: taken as one error common to all
         relative = float(np.mean(corners(before, "sigma_mu_b") / corners(before, "mu_b")))

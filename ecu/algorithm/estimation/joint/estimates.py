@@ -13,6 +13,7 @@ from ecu.algorithm.estimation.joint.layout import (
     LEVEL,
     MASS,
     OVERRUN,
+    PEAK,
     RATE,
     REFERENCE_RATIO,
     STIFFNESS,
@@ -20,9 +21,11 @@ from ecu.algorithm.estimation.joint.layout import (
     V,
 )
 from ecu.algorithm.estimation.joint.observer import WINDOW_S
-from ecu.algorithm.estimation.joint.wheel import friction
+from ecu.algorithm.estimation.joint.prior import PRIOR
+from ecu.algorithm.estimation.joint.wheel import LEAST_OF_PEAK, friction, peak_adhesion
 from ecu.algorithm.estimation.zero import tell_zeros
 from ecu.algorithm.inputs import usable
+from ecu.contract.params import GRAVITY
 from ecu.contract.signals import CALLIPER_PRESSURE, OBSERVING, WHEEL_SPEED
 from ecu.jit import Record, kernel
 
@@ -136,6 +139,11 @@ def tell_joint(
     estimate.test_ratio_balance = _test_ratio(state, BALANCE_RATIO)
     estimate.test_ratio_speed = _test_ratio(state, REFERENCE_RATIO)
     tell_zeros(state.zero, estimate)
+    limit = GRAVITY * peak_adhesion(state, 1.0)
+    seen = state.p[PEAK, PEAK] < (0.5 * PRIOR[PEAK]) ** 2
+    estimate.grip_limit = limit if seen else math.nan
+    sigma = math.sqrt(state.p[PEAK, PEAK]) / max(1.0 - 4.0 * x[PEAK], LEAST_OF_PEAK)
+    estimate.sigma_grip_limit = limit * sigma if seen else math.nan
     for i in range(4):
         estimate.slip[i], estimate.force[i] = state.slip[i], state.force[i]
         estimate.test_ratio[i] = _test_ratio(state, WHEEL_RATIO + i)

@@ -64,7 +64,7 @@ from ecu.algorithm.estimation.joint.sliding import (
 from ecu.algorithm.estimation.joint.snapshot import restore_snapshot, save_newer_snapshot, save_snapshot
 from ecu.algorithm.estimation.joint.wheel import APPLIED, brake_torque, unknown_share
 from ecu.algorithm.estimation.joint.wheel_speed import correct_by_wheels
-from ecu.algorithm.estimation.joint.window import close_window, gather, open_window
+from ecu.algorithm.estimation.joint.window import close_window, compare_wheels, gather, open_window
 from ecu.algorithm.estimation.motion import speed_backwards
 from ecu.algorithm.estimation.zero import FREE, settle_zero
 from ecu.algorithm.inputs import (
@@ -74,10 +74,12 @@ from ecu.algorithm.inputs import (
     others_brake,
     requested_decel,
     usable,
+    wheels_mapped,
 )
 from ecu.contract.signals import (
     ACCEL_X,
     CALLIPER_PRESSURE,
+    VEHICLE_SPEED,
     WHEEL_SPEED,
 )
 from ecu.jit import Record, kernel
@@ -108,6 +110,8 @@ def start_joint(state: Record) -> None:
 @kernel
 def _start_speed(params: Record, state: Record, inputs: Record) -> None:
     speed = mean_wheel_speed(params, inputs)
+    if not wheels_mapped(params) and usable(inputs, VEHICLE_SPEED):
+        speed = inputs.value[VEHICLE_SPEED]
     if math.isnan(speed):
         return
     state.x[V] = speed
@@ -130,7 +134,7 @@ def _learning_forbidden(params: Record, state: Record, inputs: Record, braking: 
         brakes += brake_torque(params, state, i, w.pressure[i])
     against = braking and (driver_accelerates(inputs) or drives_against(motors, brakes))
     unknown = braking and (_axle_unknown(inputs, 0) or _axle_unknown(inputs, 2))
-    return against or unknown or others_brake(inputs)
+    return against or unknown or (braking and state.held != 0) or others_brake(inputs)
 
 
 @kernel
@@ -218,6 +222,7 @@ def update_joint(
     if state.window.time < WINDOW_S - 0.001:
         return
     close_window(params, state, hydraulics)
+    compare_wheels(state)
     _fuse(params, state, inputs, braking)
     if not braking and usable(inputs, ACCEL_X):
         measure_drive(params, state)
@@ -297,6 +302,8 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     if w.reference_samples > 0:
         state.reference_s = 0.0
         correct_by_reference(params, state)
+        if not wheels_mapped(params):
+            state.untrusted_s = 0.0
     state.untrusted_s += time
     seen = correct_by_wheels(params, state, before, moving, learning and braking)
     if state.free[LEVEL]:

@@ -33,6 +33,7 @@ from ecu.jit import Record, kernel
 
 OLDEST_S = 0.06  # of an acceleration or torque that is compared
 COPIES, LEAST_COMPARED = 20, 2.0  # equal samples in a row, bar: the reading is then a copy
+LEAST_ROLLED, COPIED = 10.0, 1e-4  # rad/s; change of a ratio of speeds that are one and the same
 NEW_SHARE = 0.2  # share of the model's variance that is independent in the next window
 SMOOTHING = 0.2  # s, low-pass of pressure and acceleration in derivatives
 STEADY = 5.0  # s, time constant separating varying from lasting acceleration
@@ -66,6 +67,27 @@ def _compare_pressures(state: Record, inputs: Record) -> None:
         pressure = inputs.value[left]
         if fresh(inputs, left) and fresh(inputs, left + 1) and pressure > LEAST_COMPARED:
             state.copies[axle] = state.copies[axle] + 1 if pressure == inputs.value[left + 1] else 0
+            if state.copies[axle] == 0:
+                state.differs[axle] = 1
+
+
+@kernel
+def compare_wheels(state: Record) -> None:
+    """Count the windows in which all wheels had one speed: a logger's only one may stand for all four."""
+    w = state.window
+    if state.speed_copies < 0 or w.omega[0] < LEAST_ROLLED:
+        return
+    for i in range(4):
+        if w.omega_samples[i] == 0:
+            return
+    for i in range(3):
+        ratio = w.omega[i + 1] / w.omega[0]
+        if state.speed_copies == 0:
+            state.wheel_ratio[i] = ratio
+        elif abs(ratio - state.wheel_ratio[i]) > COPIED:
+            state.speed_copies = -1
+            return
+    state.speed_copies += 1
 
 
 @kernel

@@ -11,10 +11,11 @@ from ecu.contract.records import OUTPUTS
 OBSERVERS = [JOINT, OBSERVER1, OBSERVER2]
 SPEED = 20.0  # m/s
 RATIOS = {"test_ratio", "test_ratio_balance", "test_ratio_speed"}
+GRIP = ("grip_limit", "sigma_grip_limit", "grip_knee")
 NOT_TOLD = {
     JOINT: {"test_ratio_balance", "test_ratio_speed"},  # nothing brakes or drives, and there is no reference
-    OBSERVER1: {"sigma_force", *RATIOS},  # only a filter of the whole car knows these
-    OBSERVER2: {"sigma_force", *RATIOS},
+    OBSERVER1: {"sigma_force", *GRIP, *RATIOS},  # only a filter of the whole car knows these
+    OBSERVER2: {"sigma_force", *GRIP, *RATIOS},
 }
 
 

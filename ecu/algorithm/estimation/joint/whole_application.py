@@ -1,0 +1,295 @@
+"""Friction and ceiling of grip of a car that others brake, from whole brake applications.
+
+What linings ask for and what road and tyres give are two things. In a car that this ECU does not brake, drive
+and pressure of each wheel are seldom known, and within an application pedal, engine and grip change together:
+its windows alone do not tell them apart. The means of applications do:
+
+    f = L' (1 + (L' / c)^n)^(-1/n) + o        L' = s sum 2 A_i r_i mu_i p_i / (R_i m)
+
+L' is the deceleration that the linings would give, mu_i their friction as learned window by window where
+wheels are measured one by one, else the configured one; f is the specific force less drag, rolling and
+reported torques. The bend is wide (n = 2.5, close to a tanh) where it stands for wheels that nobody sees lock
+one by one, and sharp where their slip is seen. States are the logarithm of s, that of the ceiling c over
+`CEILING`, and the unreported drag o, which includes the accelerometer's zero where no window teaches it: an
+extended Kalman filter, corrected once an application. An innovation beyond `GATE` standard deviations counts
+with a variance that puts it there; an application that was not measured widens nothing.
+
+Reported torques count as long as they explain how the car is driven: what an engine's controller reports is
+often that of the crankshaft, or a guess. Of those that do not counts the share that arrives.
+"""
+
+import math
+
+import numpy as np
+
+from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
+from ecu.algorithm.estimation.friction import drives_against
+from ecu.algorithm.estimation.joint.layout import BIAS, MASS, V
+from ecu.algorithm.estimation.joint.wheel import brake_torque, radius, unknown_share
+from ecu.algorithm.inputs import wheels_mapped
+from ecu.jit import Record, kernel
+
+SCALE, GRIP, OVERRUN = range(3)
+CEILING = 14.0  # m/s^2: a first braking at 12 must be possible before any was seen
+PRIOR_MEAN = np.array([0.0, 0.0, 0.2])  # the drag in m/s^2
+PRIOR = np.array([0.25, 0.4, 0.3])  # standard deviations
+STEP = np.array([0.05, 0.03, 0.03])  # between applications
+BESIDE, BESIDE_STEP = 0.1, 0.02  # of the scale beside what windows teach: its prior and step
+PAUSE = np.array([0.03, 0.15, 0.1])  # of unknown length: rain, another road, another day
+LOWEST = np.array([-0.7, math.log(3.0 / CEILING), -1.0])
+HIGHEST = np.array([0.6, math.log(30.0 / CEILING), 1.4])
+NOISE = 0.35  # m/s^2, of the mean of an application
+GATE = 2.5
+LEAST_SPEED, ACROSS = 5.0, 0.4  # m/s, lateral acceleration over gravity: limits of the force balance
+ONSET_S = 0.25  # callipers and accelerometer lag behind the pressure
+LEAST_S = 0.3  # of an application that is learned from
+LEAST_DECEL = 0.8  # m/s^2
+LONGEST_STEP_S = 0.5  # between samples that are compared
+ALONE_KNEE, BESIDE_KNEE = 2.5, 6.0  # n; windows see the slip of a tyre that bends
+BENDS = 0.7  # of the ceiling, beyond which windows no longer teach friction
+COPIES = 20  # windows after which equal speeds of the wheels are one
+USUAL = 6.0  # m/s^2, of the linings, before any application
+DRIVES = 0.5  # m/s^2, by reported torques, from which they are compared with the motion
+DRIVE_MEMORY_S = 60.0
+LEAST_DRIVEN = 10.0  # m^2/s^3, the integral of their square from which they are judged
+LEAST_SHARE, GREATEST_SHARE, MOST_SHARE = 0.75, 1.33, 1.5  # of them that arrives: explained, at most
+
+WHOLE_STATE = np.dtype(
+    [
+        ("x", "f8", (3,)),  # ln scale, ln ceiling over `CEILING`, unreported drag [m/s^2]
+        ("p", "f8", (3, 3)),
+        ("alone", "u1"),  # nothing but whole applications teaches
+        ("bent", "u1"),  # the linings ask for more than road and tyres give freely
+        ("knee", "f8"),  # exponent n of the bend
+        ("age_s", "f8"),  # of the application
+        ("common", "f8"),  # time of the last comparison [s]
+        ("time", "f8"),  # for which it could be measured [s]
+        ("measured", "f8"),  # integrals over that: f [m/s^2 s]
+        ("expected", "f8"),  # c tanh(s L / c)
+        ("linings", "f8"),  # s L
+        ("by_scale", "f8"),  # derivatives of `expected`
+        ("by_grip", "f8"),
+        ("usual", "f8"),  # s L of the last application that was measured [m/s^2]
+        ("driven", "f8"),  # fading integral of the squared deceleration by reported torques [m^2/s^3]
+        ("arrived", "f8"),  # likewise of it times that of the car
+    ],
+    align=True,
+)
+
+
+@kernel
+def restore_whole(state: Record, learned: Record) -> None:
+    """Restore learned states, less certain by a pause; use the prior where nothing was learned."""
+    state.usual, state.knee = USUAL, ALONE_KNEE
+    forget_whole(state)
+    if learned.whole_covariance[0] == 0.0:
+        return
+    place = 0
+    for i in range(3):
+        state.x[i] = learned.whole[i]
+        for j in range(i + 1):
+            state.p[i, j] = state.p[j, i] = learned.whole_covariance[place]
+            place += 1
+        state.p[i, i] = min(state.p[i, i] + PAUSE[i] ** 2, PRIOR[i] ** 2)
+
+
+@kernel
+def forget_whole(state: Record) -> None:
+    """Reset to the prior."""
+    for i in range(3):
+        state.x[i] = PRIOR_MEAN[i]
+        for j in range(3):
+            state.p[i, j] = PRIOR[i] ** 2 if i == j else 0.0
+
+
+@kernel
+def keep_whole(state: Record, learned: Record) -> None:
+    """Write the present states into `learned`."""
+    place = 0
+    for i in range(3):
+        learned.whole[i] = state.x[i]
+        for j in range(i + 1):
+            learned.whole_covariance[place] = state.p[i, j]
+            place += 1
+
+
+@kernel
+def apply_scale(params: Record, state: Record, learned: Record) -> None:
+    """Scale the stored friction by that of whole applications, within its bounds.
+
+    Its standard deviation is that of the windows where these teach: they know the lining, `SCALE` the car.
+    """
+    scale = math.exp(state.x[SCALE])
+    variance = state.p[SCALE, SCALE] if state.alone else 0.0
+    for i in range(4):
+        ratio = scale * learned.mu_b[i] / params.mu_nominal[i]
+        relative = learned.sigma_mu_b[i] / learned.mu_b[i]
+        learned.mu_b[i] = params.mu_nominal[i] * min(max(ratio, LEAST_RATIO), GREATEST_RATIO)
+        learned.sigma_mu_b[i] = learned.mu_b[i] * math.sqrt(relative * relative + variance)
+
+
+@kernel
+def torques_measured(params: Record, joint: Record) -> bool:
+    """Return whether the drive is known, and the pressure of each wheel by a sensor of its own."""
+    apart: bool = joint.differs[0] != 0 and joint.differs[1] != 0
+    return apart and unknown_share(params, joint) == 0.0
+
+
+@kernel
+def begin_whole(params: Record, state: Record, joint: Record) -> None:
+    """Begin an application."""
+    copied = joint.speed_copies > COPIES
+    state.alone = 1 if copied or not wheels_mapped(params) else 0
+    most, variance = BESIDE * BESIDE, state.p[SCALE, SCALE]
+    if joint.speed_copies < 0 and variance > most:
+        for i in range(3):
+            state.p[SCALE, i] *= math.sqrt(most / variance)
+            state.p[i, SCALE] = state.p[SCALE, i]
+        state.p[SCALE, SCALE] = most
+    state.knee = ALONE_KNEE if state.alone else BESIDE_KNEE
+    state.bent = 0
+    state.common = joint.sampling.common
+    state.age_s = state.time = state.measured = state.expected = state.linings = 0.0
+    state.by_scale = state.by_grip = 0.0
+
+
+@kernel
+def _mass(params: Record, state: Record, joint: Record) -> float:
+    mass: float = params.mass
+    return mass if state.alone else mass * math.exp(joint.x[MASS])
+
+
+@kernel
+def _lining_decel(params: Record, joint: Record, mass: float) -> float:
+    total = 0.0
+    for i in range(4):
+        r, _ = radius(params, joint, i, joint.window.load[i])
+        total += max(brake_torque(params, joint, i, joint.window.common_pressure[i]), 0.0) / (r * mass)
+    return total
+
+
+@kernel
+def _other_decel(params: Record, joint: Record, mass: float, share: float) -> float:
+    """Return drag, rolling and a share of the torques over the mass, plus the specific force [m/s^2]."""
+    w, speed = joint.window, joint.x[V]
+    total = w.common_accel + (w.lateral + params.drag_area * speed * abs(speed)) / mass
+    for i in range(4):
+        r, _ = radius(params, joint, i, w.load[i])
+        own = params.rolling_resistance * w.load[i] * r + params.wheel_inertia[i] * w.common_accel / r
+        total += (w.motor[i] * share + own) / (r * mass)
+    return total
+
+
+@kernel
+def compare_drive(params: Record, state: Record, joint: Record) -> None:
+    """Compare reported torques with the motion in the last window, in which no brake was applied."""
+    w, reported = joint.window, 0.0
+    for i in range(4):
+        reported += w.motor[i] / (params.wheel_radius[i] * params.mass)
+    if abs(reported) < DRIVES or joint.x[V] < LEAST_SPEED or joint.unmeasured_s > 0.0:
+        return
+    keeps = math.exp(-w.time / DRIVE_MEMORY_S)
+    state.driven = keeps * state.driven + w.time * reported * reported
+    state.arrived = keeps * state.arrived - w.time * reported * _other_decel(params, joint, params.mass, 0.0)
+
+
+@kernel
+def torque_share(state: Record) -> float:
+    """Return the share of the reported torques that counts: all while they explain how the car is driven."""
+    if state.driven < LEAST_DRIVEN:
+        return 1.0
+    share: float = state.arrived / state.driven
+    return 1.0 if LEAST_SHARE < share < GREATEST_SHARE else min(max(share, 0.0), MOST_SHARE)
+
+
+@kernel
+def _driven(params: Record, joint: Record, share: float) -> bool:
+    """Return whether that share of the torques drives against the brakes."""
+    motors, brakes = 0.0, 0.0
+    for i in range(4):
+        motors += share * joint.window.motor[i]
+        brakes += brake_torque(params, joint, i, joint.window.pressure[i])
+    return drives_against(motors, brakes)
+
+
+@kernel
+def bend(linings: float, ceiling: float, knee: float) -> tuple[float, float, float]:
+    """Return the deceleration f of linings below a ceiling, and its derivatives by ln L and ln c."""
+    base = 1.0 + (linings / ceiling) ** knee
+    decel = linings * base ** (-1.0 / knee)
+    steep = decel / base
+    return decel, steep, decel - steep
+
+
+@kernel
+def add_to_whole(params: Record, state: Record, joint: Record) -> None:
+    """Add the last window of an application."""
+    w = joint.window
+    state.age_s += w.time
+    step = min(joint.sampling.common - state.common, LONGEST_STEP_S)
+    state.common = joint.sampling.common
+    held = joint.x[V] > LEAST_SPEED and abs(w.across) < ACROSS and state.age_s > ONSET_S
+    share = torque_share(state)
+    if not (w.balanced and held) or joint.unmeasured_s > LONGEST_STEP_S or _driven(params, joint, share):
+        return
+    mass = _mass(params, state, joint)
+    linings = math.exp(state.x[SCALE]) * _lining_decel(params, joint, mass)
+    expected, by_scale, by_grip = bend(linings, CEILING * math.exp(state.x[GRIP]), state.knee)
+    state.bent = 1 if linings > BENDS * CEILING * math.exp(state.x[GRIP]) else 0
+    state.time += step
+    state.measured -= step * _other_decel(params, joint, mass, share)
+    if not state.alone:
+        state.measured += step * joint.x[BIAS]
+    state.linings += step * linings
+    state.expected += step * expected
+    state.by_scale += step * by_scale
+    state.by_grip += step * by_grip
+
+
+@kernel
+def _variance(state: Record, by_scale: float, by_grip: float) -> float:
+    p = state.p
+    own = by_scale * by_scale * p[SCALE, SCALE] + by_grip * by_grip * p[GRIP, GRIP] + p[OVERRUN, OVERRUN]
+    shared = by_scale * by_grip * p[SCALE, GRIP] + by_scale * p[SCALE, OVERRUN] + by_grip * p[GRIP, OVERRUN]
+    variance: float = own + 2.0 * shared + NOISE**2
+    return variance
+
+
+@kernel
+def end_whole(state: Record) -> None:
+    """Correct the states by the mean of this application, if it was measured."""
+    if state.time < LEAST_S or state.linings < LEAST_DECEL * state.time:
+        return
+    x, p = state.x, state.p
+    h_scale, h_grip = state.by_scale / state.time, state.by_grip / state.time
+    innovation = (state.measured - state.expected) / state.time - x[OVERRUN]
+    total = max(_variance(state, h_scale, h_grip), (innovation / GATE) ** 2)
+    gain_scale = (p[SCALE, SCALE] * h_scale + p[SCALE, GRIP] * h_grip + p[SCALE, OVERRUN]) / total
+    gain_grip = (p[GRIP, SCALE] * h_scale + p[GRIP, GRIP] * h_grip + p[GRIP, OVERRUN]) / total
+    gain_overrun = (p[OVERRUN, SCALE] * h_scale + p[OVERRUN, GRIP] * h_grip + p[OVERRUN, OVERRUN]) / total
+    gain = (gain_scale, gain_grip, gain_overrun)
+    for i in range(3):
+        x[i] = min(max(x[i] + gain[i] * innovation, LOWEST[i]), HIGHEST[i])
+        for j in range(3):
+            p[i, j] -= gain[i] * gain[j] * total
+        p[i, i] += (STEP[i] if state.alone or i != SCALE else BESIDE_STEP) ** 2
+    state.usual = state.linings / state.time
+
+
+@kernel
+def tell_whole(state: Record, estimate: Record, mass: float) -> None:
+    """Overwrite friction, drag and ceiling of the estimate, and how well the next braking is known."""
+    ceiling = CEILING * math.exp(state.x[GRIP])
+    scale, variance = math.exp(state.x[SCALE]), state.p[SCALE, SCALE]
+    for i in range(4):
+        relative = 0.0 if state.alone else estimate.sigma[i] / estimate.mu[i]
+        estimate.mu[i] *= scale
+        estimate.sigma[i] = estimate.mu[i] * math.sqrt(relative * relative + variance)
+    expected, by_scale, by_grip = bend(state.usual, ceiling, state.knee)
+    estimate.sigma_force = math.sqrt(_variance(state, by_scale, by_grip)) / expected
+    estimate.overrun = state.x[OVERRUN]
+    if state.alone:
+        estimate.accel_bias, estimate.mass = 0.0, mass
+    estimate.torque_share = torque_share(state)
+    estimate.grip_limit, estimate.grip_knee = ceiling, state.knee
+    estimate.sigma_grip_limit = ceiling * math.sqrt(state.p[GRIP, GRIP])
