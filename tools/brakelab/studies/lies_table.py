@@ -9,9 +9,9 @@ import numpy as np
 
 from brakelab.results.text_table import Table
 from brakelab.simulation.closed_loop import new_loop, run
+from brakelab.studies.accuracy.observers_cases import shipped
 from brakelab.studies.lies import CARS, INPUTS, ROADS
 from brakelab.studies.lies_cell import COSTS, LONG_S, SHORT_S, TAKES, Cell
-from brakelab.studies.accuracy.observers_cases import shipped
 from ecu.contract.faults import IMPLAUSIBLE, fault_mask, fault_names
 from ecu.settings.config import load_config
 from ecu.settings.resources import resource
