@@ -34,7 +34,8 @@ CEILING = 14.0  # m/s^2: a first braking at 12 must be possible before any was s
 PRIOR_MEAN = np.array([0.0, 0.0, 0.2])  # the drag in m/s^2
 PRIOR = np.array([0.25, 0.4, 0.3])  # standard deviations
 STEP = np.array([0.05, 0.03, 0.03])  # between applications
-BESIDE, BESIDE_STEP = 0.1, 0.02  # of the scale beside what windows teach: its prior and step
+# Prior of the scale beside windows, which teach nearly all where all torques are known; its step over that.
+BESIDE, BESIDE_KNOWN, BESIDE_STEP = 0.1, 0.03, 0.2
 PAUSE = np.array([0.03, 0.15, 0.1])  # of unknown length: rain, another road, another day
 LOWEST = np.array([-0.7, math.log(3.0 / CEILING), -1.0])
 HIGHEST = np.array([0.6, math.log(30.0 / CEILING), 1.4])
@@ -59,6 +60,7 @@ WHOLE_STATE = np.dtype(
         ("x", "f8", (3,)),  # ln scale, ln ceiling over `CEILING`, unreported drag [m/s^2]
         ("p", "f8", (3, 3)),
         ("alone", "u1"),  # nothing but whole applications teaches
+        ("most", "f8"),  # standard deviation of the scale beside windows
         ("bent", "u1"),  # the linings ask for more than road and tyres give freely
         ("knee", "f8"),  # exponent n of the bend
         ("age_s", "f8"),  # of the application
@@ -80,7 +82,7 @@ WHOLE_STATE = np.dtype(
 @kernel
 def restore_whole(state: Record, learned: Record) -> None:
     """Restore learned states, less certain by a pause; use the prior where nothing was learned."""
-    state.usual, state.knee = USUAL, ALONE_KNEE
+    state.usual, state.knee, state.most = USUAL, ALONE_KNEE, BESIDE
     forget_whole(state)
     if learned.whole_covariance[0] == 0.0:
         return
@@ -140,7 +142,8 @@ def begin_whole(params: Record, state: Record, joint: Record) -> None:
     """Begin an application."""
     copied = joint.speed_copies > COPIES
     state.alone = 1 if copied or not wheels_mapped(params) else 0
-    most, variance = BESIDE * BESIDE, state.p[SCALE, SCALE]
+    state.most = BESIDE_KNOWN if torques_measured(params, joint) else BESIDE
+    most, variance = state.most**2, state.p[SCALE, SCALE]
     if joint.speed_copies < 0 and variance > most:
         for i in range(3):
             state.p[SCALE, i] *= math.sqrt(most / variance)
@@ -272,7 +275,7 @@ def end_whole(state: Record) -> None:
         x[i] = min(max(x[i] + gain[i] * innovation, LOWEST[i]), HIGHEST[i])
         for j in range(3):
             p[i, j] -= gain[i] * gain[j] * total
-        p[i, i] += (STEP[i] if state.alone or i != SCALE else BESIDE_STEP) ** 2
+        p[i, i] += (STEP[i] if state.alone or i != SCALE else BESIDE_STEP * state.most) ** 2
     state.usual = state.linings / state.time
 
 
@@ -281,6 +284,8 @@ def tell_whole(state: Record, estimate: Record, mass: float) -> None:
     """Overwrite friction, drag and ceiling of the estimate, and how well the next braking is known."""
     ceiling = CEILING * math.exp(state.x[GRIP])
     scale, variance = math.exp(state.x[SCALE]), state.p[SCALE, SCALE]
+    if not state.alone:
+        variance = min(variance, state.most**2)
     for i in range(4):
         relative = 0.0 if state.alone else estimate.sigma[i] / estimate.mu[i]
         estimate.mu[i] *= scale
