@@ -77,6 +77,8 @@ def confirm_friction(
     moves = estimate.speed > LEAST_SPEED and estimate.measured != 0
     steady = calm and moves and abs(decel - state.asked) < STEADY * decel
     state.steady_s = state.steady_s + dt if steady else 0.0
+    if estimate.measured == 0:  # left out: what was taken on its word is given again
+        state.back = max(state.back - TAKE * dt, 0.0)
     if state.steady_s < SETTLED_S:
         return
     drifted = max(accel_offset - state.usual, 0.0) if state.back >= 1.0 else 0.0

@@ -115,3 +115,13 @@ def test_an_accelerometer_that_is_lost_says_nothing(params) -> None:
     car.estimate["measured"] = 0
     car.brake(3.0)
     assert not car.state["friction"].any()
+
+
+def test_what_an_accelerometer_took_is_given_again_once_it_is_left_out(car) -> None:
+    """It reads 1 m/s^2 less, until the other sensors deny it."""
+    car.brake(1.0, reads=1.0)
+    assert car.state["back"] > 0.5
+    car.estimate["measured"] = 0
+    car.brake(0.3, reads=0.0)
+    assert car.state["back"] == 0.0
+    assert car.law["used"] == pytest.approx(np.full(4, MU), rel=0.02)
