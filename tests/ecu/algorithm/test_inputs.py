@@ -20,6 +20,7 @@ from ecu.algorithm.inputs import (
     pedal_to_decel,
     requested_decel,
     usable,
+    wheels_mapped,
 )
 from ecu.contract.signals import (
     ABS_ACTIVE,
@@ -183,6 +184,14 @@ def test_the_mean_is_of_two_wheels_at_least(params, feed, lost: int, mean: float
     inputs = feed(wheel_speed=np.array([8.0, 8.0, 4.0, 0.0]) / params[0]["wheel_radius"])[0]
     inputs["verdict"][WHEEL_SPEED : WHEEL_SPEED + lost] = 0
     assert mean_wheel_speed(params[0], inputs) == pytest.approx(mean, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("mapped", "any_of_them"), [([0, 0, 0, 0], False), ([0, 0, 0, 1], True), ([1, 1, 1, 1], True)]
+)
+def test_a_car_has_wheel_speeds_if_one_is_mapped(params, mapped: list[int], any_of_them: bool) -> None:
+    params[0]["mapped"][WHEEL_SPEED : WHEEL_SPEED + 4] = mapped
+    assert wheels_mapped(params[0]) == any_of_them
 
 
 @pytest.mark.parametrize(
