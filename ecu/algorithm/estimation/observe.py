@@ -68,19 +68,13 @@ def start_estimate(s: Record) -> None:
 
 
 @kernel
-def _windows_teach(p: Record, s: Record) -> bool:
-    taught: bool = p.transmit != 0 or s.whole.alone == 0
-    return taught
-
-
-@kernel
 def keep_application(p: Record, s: Record) -> None:
     """At the end of a brake application: store the joint observer's learned states."""
     if p.observer != JOINT:
         return
     if not p.transmit:
         end_whole(s.whole)
-    if _windows_teach(p, s):
+    if not s.whole.alone:
         end_application(s.joint)
         if end_prediction(s.prediction):
             forget_levels(s.joint)
@@ -147,20 +141,21 @@ def _observe_jointly(
 ) -> None:
     joint = s.joint
     if s.application.started:
-        begin_whole(p, s.whole, joint)
-        if _windows_teach(p, s):
+        if not p.transmit:
+            begin_whole(p, s.whole, joint)
+        if not s.whole.alone:
             begin_prediction(p, s.prediction, joint)
             begin_application(joint, heat)
-    joint.held = 1 if not p.transmit and (s.whole.alone or s.whole.bent) else 0
+    joint.held = 1 if s.whole.alone or s.whole.bent else 0
     if doubted:
         suspend_learning(joint)
     update_joint(p, joint, u, s.motion, s.wheel_load.load, s.hydraulics, braking, dt)
-    if joint.closed and joint.released:
+    if joint.closed and joint.released and not p.transmit:
         compare_drive(p, s.whole, joint)
     if braking and joint.closed:
         if not p.transmit:
             add_to_whole(p, s.whole, joint)
-        if _windows_teach(p, s):
+        if not s.whole.alone:
             add_window(p, s.prediction, joint, u)
     s.prediction.told_s = max(s.prediction.told_s - dt, 0.0)
     tell_joint(p, joint, s.hydraulics, s.estimate, s.learned, u, braking, dt)

@@ -139,11 +139,10 @@ def tell_joint(
     estimate.test_ratio_balance = _test_ratio(state, BALANCE_RATIO)
     estimate.test_ratio_speed = _test_ratio(state, REFERENCE_RATIO)
     tell_zeros(state.zero, estimate)
-    limit = GRAVITY * peak_adhesion(state, 1.0)
-    seen = state.p[PEAK, PEAK] < (0.5 * PRIOR[PEAK]) ** 2
-    estimate.grip_limit = limit if seen else math.nan
-    sigma = math.sqrt(state.p[PEAK, PEAK]) / max(1.0 - 4.0 * x[PEAK], LEAST_OF_PEAK)
-    estimate.sigma_grip_limit = limit * sigma if seen else math.nan
+    if state.p[PEAK, PEAK] < (0.5 * PRIOR[PEAK]) ** 2:
+        estimate.grip_limit = GRAVITY * peak_adhesion(state, 1.0)
+        sigma = math.sqrt(state.p[PEAK, PEAK]) / max(1.0 - 4.0 * x[PEAK], LEAST_OF_PEAK)
+        estimate.sigma_grip_limit = estimate.grip_limit * sigma
     for i in range(4):
         estimate.slip[i], estimate.force[i] = state.slip[i], state.force[i]
         estimate.test_ratio[i] = _test_ratio(state, WHEEL_RATIO + i)

@@ -102,10 +102,7 @@ JOINT_STATE: Final = np.dtype(
         ("copies", "i8", (2,)),  # samples in which both pressures of an axle were equal
         ("differs", "u1", (2,)),  # 1: they have ever differed
         ("wheel_ratio", "f8", (3,)),  # of the other wheels' speeds over the first, as first seen
-        (
-            "speed_copies",
-            "i8",
-        ),  # windows in which these stayed the same; -1: they differ
+        ("speed_copies", "i8"),  # windows in which these stayed the same; -1: they differ
         ("held", "u1"),  # windows of this application do not teach
         ("zero", ZERO_STATE),
         ("pressed", "f8"),  # relative change of a pressure in the last window, greater of both axles

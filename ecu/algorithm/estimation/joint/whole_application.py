@@ -26,6 +26,7 @@ from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
 from ecu.algorithm.estimation.friction import drives_against
 from ecu.algorithm.estimation.joint.layout import BIAS, MASS, V
 from ecu.algorithm.estimation.joint.wheel import brake_torque, radius, unknown_share
+from ecu.algorithm.estimation.joint.window import COPIES
 from ecu.algorithm.inputs import wheels_mapped
 from ecu.jit import Record, kernel
 
@@ -48,7 +49,6 @@ LEAST_DECEL = 0.8  # m/s^2
 LONGEST_STEP_S = 0.5  # between samples that are compared
 ALONE_KNEE, BESIDE_KNEE = 2.5, 6.0  # n; windows see the slip of a tyre that bends
 BENDS = 0.7  # of the ceiling, beyond which windows no longer teach friction
-COPIES = 20  # windows after which equal speeds of the wheels are one
 USUAL = 6.0  # m/s^2, of the linings, before any application
 DRIVES = 0.5  # m/s^2, by reported torques, from which they are compared with the motion
 DRIVE_MEMORY_S = 60.0
@@ -67,7 +67,7 @@ WHOLE_STATE = np.dtype(
         ("common", "f8"),  # time of the last comparison [s]
         ("time", "f8"),  # for which it could be measured [s]
         ("measured", "f8"),  # integrals over that: f [m/s^2 s]
-        ("expected", "f8"),  # c tanh(s L / c)
+        ("expected", "f8"),  # s L below the ceiling
         ("linings", "f8"),  # s L
         ("by_scale", "f8"),  # derivatives of `expected`
         ("by_grip", "f8"),
@@ -237,8 +237,9 @@ def add_to_whole(params: Record, state: Record, joint: Record) -> None:
         return
     mass = _mass(params, state, joint)
     linings = math.exp(state.x[SCALE]) * _lining_decel(params, joint, mass)
-    expected, by_scale, by_grip = bend(linings, CEILING * math.exp(state.x[GRIP]), state.knee)
-    state.bent = 1 if linings > BENDS * CEILING * math.exp(state.x[GRIP]) else 0
+    ceiling = CEILING * math.exp(state.x[GRIP])
+    expected, by_scale, by_grip = bend(linings, ceiling, state.knee)
+    state.bent = 1 if linings > BENDS * ceiling else 0
     state.time += step
     state.measured -= step * _other_decel(params, joint, mass, share)
     if not state.alone:
@@ -259,6 +260,13 @@ def _variance(state: Record, by_scale: float, by_grip: float) -> float:
 
 
 @kernel
+def _gain(state: Record, i: int, by_scale: float, by_grip: float, total: float) -> float:
+    p = state.p
+    gain: float = (p[i, SCALE] * by_scale + p[i, GRIP] * by_grip + p[i, OVERRUN]) / total
+    return gain
+
+
+@kernel
 def end_whole(state: Record) -> None:
     """Correct the states by the mean of this application, if it was measured."""
     if state.time < LEAST_S or state.linings < LEAST_DECEL * state.time:
@@ -267,10 +275,11 @@ def end_whole(state: Record) -> None:
     h_scale, h_grip = state.by_scale / state.time, state.by_grip / state.time
     innovation = (state.measured - state.expected) / state.time - x[OVERRUN]
     total = max(_variance(state, h_scale, h_grip), (innovation / GATE) ** 2)
-    gain_scale = (p[SCALE, SCALE] * h_scale + p[SCALE, GRIP] * h_grip + p[SCALE, OVERRUN]) / total
-    gain_grip = (p[GRIP, SCALE] * h_scale + p[GRIP, GRIP] * h_grip + p[GRIP, OVERRUN]) / total
-    gain_overrun = (p[OVERRUN, SCALE] * h_scale + p[OVERRUN, GRIP] * h_grip + p[OVERRUN, OVERRUN]) / total
-    gain = (gain_scale, gain_grip, gain_overrun)
+    gain = (
+        _gain(state, SCALE, h_scale, h_grip, total),
+        _gain(state, GRIP, h_scale, h_grip, total),
+        _gain(state, OVERRUN, h_scale, h_grip, total),
+    )
     for i in range(3):
         x[i] = min(max(x[i] + gain[i] * innovation, LOWEST[i]), HIGHEST[i])
         for j in range(3):

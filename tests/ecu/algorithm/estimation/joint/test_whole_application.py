@@ -12,7 +12,6 @@ from ecu.algorithm.estimation.joint.whole_application import (
     ALONE_KNEE,
     BESIDE_KNEE,
     CEILING,
-    COPIES,
     GATE,
     GRIP,
     LEAST_S,
@@ -36,6 +35,7 @@ from ecu.algorithm.estimation.joint.whole_application import (
     tell_whole,
     torque_share,
 )
+from ecu.algorithm.estimation.joint.window import COPIES
 from ecu.contract.records import LEARNED
 
 BAR, GRAVITY, WINDOW_S = 1e5, 9.81, 0.05
