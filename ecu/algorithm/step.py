@@ -295,7 +295,8 @@ def _control(p: Record, s: Record, u: Record, dt: float) -> float:
     decel = update_demand(p, s.demand, u, speed, dt)
     backwards = e.backwards != 0
     failed = s.failed_brakes.failed
-    watch_trailing(p, s.distribution, u, e, failed, decel, speed, dt)
+    reckoned = s.speeds.reckoned if s.speeds.started else 0.0
+    watch_trailing(p, s.distribution, u, e, failed, decel, speed, reckoned, dt)
     distribute(p, s.distribution, e.mass, decel, backwards, dt)
     if p.minimised:
         _lean(p, s, u, decel, backwards, dt)

@@ -9,9 +9,10 @@ Lining friction is uncertain, so none of the three alone guarantees the order in
 functions do (ECE R13-H, Annex 5: the rear uses no more grip than the front):
 
 - `watch_trailing`: where a rear wheel slips more than the front one of its side by more than
-  `rear_slip_margin`, torque of the rear axle moves to the front one until it no longer does. This needs no
-  friction estimate. Beside a front wheel whose brake has failed it may slip `LONE_SLIP`. The front takes all
-  of it up to `GRIP` of its load, beyond that slowly; none from when it slips more than `GRIP_SLIP`.
+  `rear_slip_margin`, and the more than `LEAST_SLIP` by the car's speed, torque of the rear axle moves to the
+  front one until it no longer does: a front wheel whose speed is late or scaled alone takes nothing. This
+  needs no friction estimate. Beside a front wheel whose brake has failed it may slip `LONE_SLIP`. The front
+  takes all of it up to `GRIP` of its load, beyond that slowly; none from when it slips more than `GRIP_SLIP`.
 - `cap_trailing`: compensation raises the rear's pressure relative to the front's only as far as the estimate
   is certain, with the rear at mu + 2 sigma and the front at mu - 2 sigma.
 
@@ -37,6 +38,7 @@ DISTRIBUTION_STATE = np.dtype(
         ("grip", "f8"),  # force over load to which the leading axle takes the rest; 0: none of it
         ("rolled", "f8", (2,)),  # by a leading wheel over the way of the ground below it, low-passed
         ("beyond", "f8", (2,)),  # slip of a trailing wheel less that of the leading one, low-passed
+        ("slip", "f8", (2,)),  # of a trailing wheel by the car's speed, low-passed
         ("offset", "f8", (2,)),  # the same of a rear wheel while rolling freely: error of the radii
         ("free_s", "f8", (2,)),  # learning time of that, at most LEARNING_TIME
     ],
@@ -52,6 +54,7 @@ SMOOTHING = 0.2  # per sample: 50 ms; leaves a fifth of the wheel speeds' noise
 LEARNING_TIME = 2.0  # s
 RADIUS_DOUBT = 0.008  # before learning: radii within 0.3 % and other differences, two standard deviations
 FREE_ACCEL, FREE_YAW_RATE = 0.5, 0.03  # m/s^2, rad/s
+LEAST_SLIP = 0.012  # of a trailing wheel that may lock: tyres peak at 0.03 on ice
 RULED_FROM = 0.15  # z above which Annex 5 orders the axles
 FASTEST = 1.02  # of the ground below it
 GRIP, GRIP_RATE = 0.6, 0.5  # force over load taken over at once, 1/s beyond it
@@ -105,6 +108,7 @@ def watch_trailing(
     failed: Record,
     decel: float,
     speed: float,
+    reckoned: float,
     dt: float,
 ) -> None:
     """Adjust the torque share of the trailing axle by the slip of its wheels relative to the leading ones.
@@ -121,6 +125,7 @@ def watch_trailing(
         failed: wheels whose brake has failed, shape (4,).
         decel: demanded [m/s^2]; the axle regains its full torque once no brake is demanded.
         speed: of the vehicle [m/s], NaN: unknown. Below `min_speed` slip is not evaluated.
+        reckoned: the same by dead reckoning [m/s], 0: unknown; the greater of the two shows a slip.
         dt: time since the last cycle [s].
     """
     brakes = decel > 0.0
@@ -135,6 +140,8 @@ def watch_trailing(
         if math.isnan(beyond):
             state.beyond[side] = 0.0
             continue
+        rolled = (rear if trailing > 0.0 else front) * min(abs(speed) / max(reckoned, 1e-9), 1.0)
+        state.slip[side] += SMOOTHING * (1.0 - rolled - state.slip[side])
         state.rolled[side] += SMOOTHING * ((front if trailing > 0.0 else rear) - state.rolled[side])
         if free:
             state.free_s[side] = min(state.free_s[side] + dt, LEARNING_TIME)
@@ -145,7 +152,8 @@ def watch_trailing(
             doubt += RADIUS_DOUBT
         leading = side if trailing > 0.0 else side + 2
         margin = LONE_SLIP if failed[leading] else params.rear_slip_margin
-        worst = max(worst, state.beyond[side] - margin - doubt)
+        if state.slip[side] > LEAST_SLIP:
+            worst = max(worst, state.beyond[side] - margin - doubt)
     change = -TAKE_BACK * worst if worst > 0.0 else GIVE_BACK
     state.trailing = min(max(state.trailing + change * dt, LEAST_TRAILING), 1.0) if brakes else 1.0
 

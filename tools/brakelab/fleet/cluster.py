@@ -54,7 +54,7 @@ def connect(scheduler: str | None, workers: int | None) -> Iterator[Workers]:
     except TypeError:
         remedy = "without a certificate of yours; name it to Dask (docs/fleet.md)"
         raise UserError("--scheduler", scheduler, remedy) from None
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, AssertionError) as error:  # AssertionError: its thread does not start
         remedy = f"no Dask scheduler answers ({error}); start one with `dask scheduler`, or leave this out"
         raise UserError("--scheduler", scheduler, remedy) from None
     with client:

@@ -186,7 +186,7 @@ class Watch:
             inputs = self.feed(wheel_speed=omega + noise * random.standard_normal(4))
             if lost is not None:
                 inputs[0]["new"][WHEEL_SPEED + lost] = 0
-            watch_trailing(p, self.state, inputs[0], self.estimate, self.failed, decel, speed, DT)
+            watch_trailing(p, self.state, inputs[0], self.estimate, self.failed, decel, speed, 0.0, DT)
         return float(self.state["trailing"])
 
 
