@@ -32,6 +32,7 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "wheel_ratio",
         "speed_copies",
         "held",
+        "slip",
     ),
 }
 

@@ -171,7 +171,7 @@ class Watch:
         params["rear_slip_margin"] = 0.005
         self.state["free_s"] = learned
 
-    def run(self, slip, seconds=0.1, decel=5.0, speed=20.0, noise=0.0, lost=None) -> float:
+    def run(self, slip, seconds=0.1, decel=5.0, speed=20.0, noise=0.0, lost=None, reckoned=0.0) -> float:
         """Return what the trailing axle is left after some time with a constant slip [%] of fl, fr, rl, rr.
 
         Wheel speeds carry no sign, as most sensors of them."""
@@ -186,7 +186,7 @@ class Watch:
             inputs = self.feed(wheel_speed=omega + noise * random.standard_normal(4))
             if lost is not None:
                 inputs[0]["new"][WHEEL_SPEED + lost] = 0
-            watch_trailing(p, self.state, inputs[0], self.estimate, self.failed, decel, speed, 0.0, DT)
+            watch_trailing(p, self.state, inputs[0], self.estimate, self.failed, decel, speed, reckoned, DT)
         return float(self.state["trailing"])
 
 
@@ -208,6 +208,9 @@ WATCHED = [
     ("one side is enough: the bend's inner wheels", (-3, -2, -4.5, -2), {"seconds": 0.15}, (0.4, 0.65)),
     ("front beyond the rear", (-5, -5, -3, -3), {}, (1.0, 1.0)),
     ("rear locked", (-3, -3, -100, -100), {"seconds": 0.05}, LEAST),
+    ("the front reads 3 % fast, it is late: the rear hardly slips", (2, 2, -1, -1), {}, (1.0, 1.0)),
+    ("the same, a speed by which the rear slips", (0, 0, -1, -1), {"reckoned": 20.4}, LEAST),
+    ("a reckoning that is too slow hides nothing", BEYOND, {"reckoned": 15.0}, LEAST),
     ("both locked", (-100, -100, -100, -100), {}, (1.0, 1.0)),
     ("the front drives", (0.3, 0.3, 0.1, 0.1), {}, (1.0, 1.0)),
     ("noise of the wheel speeds at 20 m/s", (-3, -3, -3.4, -3.4), {"noise": 0.1}, (0.99, 1.0)),
