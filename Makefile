@@ -37,7 +37,8 @@ check: .venv/dev
 
 coverage: .venv/dev
 	NUMBA_DISABLE_JIT=1 .venv/bin/python -m pytest -n auto --maxprocesses 4 \
-		tests/ecu/algorithm/control tests/ecu/algorithm/test_inputs.py tests/ecu/bus $(ARGS) --cov
+		tests/ecu/algorithm/control tests/ecu/algorithm/monitoring/test_failed_brakes.py \
+		tests/ecu/algorithm/test_inputs.py tests/ecu/bus $(ARGS) --cov
 
 mutants: .venv/dev
 	.venv/bin/python tools/mutate.py $(ARGS)

@@ -7,8 +7,9 @@ Exit code 0 on success, 1 when the run found a fault, 2 for bad arguments, confi
 
 import sys
 
+from ecu.imports import without_modules
 from ecu.recording.sink import free_output
-from ecu.runtime.start import is_run, raise_priority, without_modules
+from ecu.runtime.start import is_run, raise_priority
 
 if is_run(sys.argv[1:]):  # under load, importing the command line alone would take a second
     raise_priority()

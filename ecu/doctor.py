@@ -28,9 +28,9 @@ from ecu.contract.signals import CYCLE_NS, INPUT, INPUT_SIGNALS
 from ecu.errors import UserError
 from ecu.output import give, say
 from ecu.runtime.cycle import new_ecu
+from ecu.runtime.warm_up import warm_up
 from ecu.settings.config import load_config, new_params
 from ecu.settings.resources import resource
-from ecu.warm import warm_up
 
 LISTEN_S: Final = 2.0
 SLEEPS: Final = 50

@@ -5,56 +5,14 @@ exits 1 if there was any: an installation whose cache is complete compiles nothi
 """
 
 import argparse
-import itertools
-import tempfile
-from pathlib import Path
 
-from ecu.bus.protocol import BusStatus
 from ecu.bus.signal_map import receive_plan
 from ecu.bus.transmit import contract_transmit_plan
-from ecu.contract.records import RecordArray
-from ecu.contract.signals import CYCLE_NS
 from ecu.jit import CompileCounter
-from ecu.recording.ring import create_ring
-from ecu.runtime.clock import Grid, TimeSource
-from ecu.runtime.cycle import Ecu, Progress, Watch, cycle_once, new_ecu
-from ecu.runtime.standby import Standby
+from ecu.runtime.cycle import new_ecu
+from ecu.runtime.warm_up import warm_up
 from ecu.settings.config import load_config, new_params
 from ecu.settings.resources import resource
-
-
-class Silence:
-    """A bus without traffic, see `ecu.bus.channel.Channel`."""
-
-    name = ""
-
-    def drain(self, frames: RecordArray, start: int) -> int:
-        """Receive nothing."""
-        return 0
-
-    def send(self, frames: RecordArray, count: int) -> int:
-        """Take `count` frames."""
-        return count
-
-    def status(self) -> BusStatus:
-        """Return an error-free status."""
-        return BusStatus(False, False, 0, 0)
-
-    def close(self) -> None:
-        """Nothing is open."""
-
-
-def warm_up(ecu: Ecu, compiled: CompileCounter) -> None:
-    """Run a few cycles of an identical ECU on a bus of its own, so that every kernel is compiled."""
-    twin = new_ecu(ecu.params, None, ecu.receive_plan, ecu.transmit_plan)
-    with tempfile.TemporaryDirectory(prefix="brake-ecu-") as folder:
-        ring = create_ring(Path(folder) / "ring", {}, b"", slots=2, frames=1)
-        instants = itertools.count(0, CYCLE_NS // 100)
-        grid = Grid(TimeSource(instants.__next__, instants.__next__, lambda _: None))
-        for standby in (None, Standby()):
-            progress = Progress(Watch(Silence().status(), compiled), standby)
-            for _ in range(3):
-                cycle_once(twin, Silence(), ring, grid, progress)
 
 
 def warm() -> int:

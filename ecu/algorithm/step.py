@@ -34,7 +34,6 @@ from ecu.algorithm.control.distribution import (
     front_share,
     watch_trailing,
 )
-from ecu.algorithm.control.failed_brakes import FAILED_BRAKES_STATE, replace_failed
 from ecu.algorithm.control.friction_torque import lagging_torque
 from ecu.algorithm.control.limiter import (
     LIMITER_STATE,
@@ -53,6 +52,7 @@ from ecu.algorithm.control.pressure_law import (
     set_base,
     watch_limit,
 )
+from ecu.algorithm.control.replacement import REPLACEMENT_STATE, replace_failed
 from ecu.algorithm.control.slip_guard import SLIP_GUARD_STATE, guard_slip
 from ecu.algorithm.estimate import ESTIMATE
 from ecu.algorithm.estimation.joint.layout import JOINT_STATE
@@ -85,6 +85,7 @@ from ecu.algorithm.monitoring.disc_temperature import (
     update_discs,
 )
 from ecu.algorithm.monitoring.dust import DUST_STATE, restore_dust, update_dust
+from ecu.algorithm.monitoring.failed_brakes import FAILED_BRAKES_STATE
 from ecu.algorithm.monitoring.flags import FLAGS_STATE, correct_flags
 from ecu.algorithm.monitoring.motors import MOTORS_WATCH_STATE
 from ecu.algorithm.monitoring.plausibility import PLAUSIBILITY_STATE
@@ -132,6 +133,7 @@ INITIAL = np.dtype(
         ("distribution", DISTRIBUTION_STATE),
         ("cleaner", CLEANER_STATE),
         ("failed_brakes", FAILED_BRAKES_STATE),
+        ("replacement", REPLACEMENT_STATE),
         ("blending", BLENDING_STATE),
         ("control", PRESSURE_LAW_STATE),
         ("guard", SLIP_GUARD_STATE),
@@ -298,36 +300,27 @@ def _control(p: Record, s: Record, u: Record, dt: float) -> float:
     reckoned = s.speeds.reckoned if s.speeds.started else 0.0
     watch_trailing(p, s.distribution, u, e, failed, decel, speed, reckoned, dt)
     distribute(p, s.distribution, e.mass, decel, backwards, dt)
-    if p.minimised:
-        _lean(p, s, u, decel, backwards, dt)
     held = s.guard.acting != 0 or s.distribution.trailing < 1.0 or s.failed_brakes.any != 0
     calm = not (held or backwards or others_brake(u))
+    torque, allowed = s.distribution.torque, s.blending.allowed
+    if p.minimised:
+        straight, share = calm and abs(e.accel_y) <= CALM_ACROSS, front_share(p, decel)
+        lean(p, s.cleaner, torque, allowed, s.discs.temperature, share, e.mass, decel, straight, dt)
     confirm_friction(p, s.control.confirmed, e, s.control.used, s.accel_error.offset, decel, calm, dt)
     follow_friction(p, s.control, e, dt)
     advance_pressures(s.hydraulics, s.limiter.pressure)
     update_motors(p, s.blending, u, s.guard.capped, e.speed, decel, dt)
-    replace_failed(p, s.failed_brakes, s.distribution, s.blending.allowed, decel, backwards, dt)
-    share_torque(p, s.blending, s.distribution.torque, dt)
+    replace_failed(p, s.replacement, s.failed_brakes, s.distribution, allowed, decel, backwards, dt)
+    share_torque(p, s.blending, torque, dt)
     for i in range(4):
-        torque = s.blending.lining[i]
-        demands.uncompensated[i] = pressure_for_torque(p, torque, s.control.base[i], i)
+        demands.uncompensated[i] = pressure_for_torque(p, s.blending.lining[i], s.control.base[i], i)
         demands.pressure[i] = compensated_pressure(p, s.control, demands.uncompensated[i], i)
     cap_trailing(p, s.distribution, decel, s.blending.lining, e, demands.pressure, failed, backwards)
     if p.slip_guard:
-        guard_slip(p, s.guard, u, e, speed, s.limiter.pressure, demands.pressure, s.distribution.torque, dt)
+        guard_slip(p, s.guard, u, e, speed, s.limiter.pressure, demands.pressure, torque, dt)
     watch_accumulator(s.limiter, s.witness, u, dt)
     _limit(p, s, available_pressure(p, s.limiter, u), decel, dt)
     return decel
-
-
-@kernel
-def _lean(p: Record, s: Record, u: Record, decel: float, backwards: bool, dt: float) -> None:
-    calm = not backwards and s.distribution.trailing == 1.0 and s.guard.acting == 0 and not others_brake(u)
-    calm = calm and abs(s.estimate.accel_y) <= CALM_ACROSS
-    for i in range(4):
-        calm = calm and s.failed_brakes.failed[i] == 0
-    front, torque, motors = front_share(p, decel), s.distribution.torque, s.blending.allowed
-    lean(p, s.cleaner, torque, motors, s.discs.temperature, front, s.estimate.mass, decel, calm, dt)
 
 
 @kernel

@@ -4,7 +4,7 @@ Where asammdf is installed, python-can loads it for log files that the bus never
 0.9 s of processor time instead of 0.17 s. It is hidden from python-can alone; the laboratory may import it.
 """
 
-from ecu.runtime.start import without_modules
+from ecu.imports import without_modules
 
 with without_modules("asammdf"):
     import can  # noqa: F401

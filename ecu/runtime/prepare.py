@@ -38,9 +38,9 @@ from ecu.runtime.realtime import freeze_memory, make_realtime
 from ecu.runtime.side import Side
 from ecu.runtime.standby import Standby, learned_by_first
 from ecu.runtime.start import lower_priority
+from ecu.runtime.warm_up import warm_up
 from ecu.settings.config import Config, config_hash, load_config, new_params, store_key
 from ecu.settings.resources import resource
-from ecu.warm import warm_up
 
 LISTEN_S: Final = 1.0
 TELL_PROGRESS_S: Final = 5.0

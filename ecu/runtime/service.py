@@ -2,7 +2,7 @@
 
 From READY on the loop logs nothing and waits for its deadline alone. However it ends, except by SIGKILL or a
 crash of the interpreter, the last frames flag every demand invalid (`send_farewell`). Events reach the log
-through the ring and the side process (`ecu/recording/side_process.py`).
+through the ring and the side process (`ecu/runtime/side_process.py`).
 """
 
 import signal

@@ -6,7 +6,6 @@ No slow import here.
 import gc
 import os
 import signal
-import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -59,22 +58,6 @@ def lower_priority() -> None:
 def _schedule(policy: str, priority: int) -> None:
     with suppress(OSError, AttributeError):
         os.sched_setscheduler(0, getattr(os, policy), os.sched_param(priority))
-
-
-@contextmanager
-def without_modules(*names: str) -> Iterator[None]:
-    """Hide optional modules `names` from libraries that would load them needlessly.
-
-    Modules loaded already stay; afterwards all can be imported again.
-    """
-    absent = [name for name in names if name not in sys.modules]
-    for name in absent:
-        sys.modules[name] = None  # type: ignore[assignment]
-    try:
-        yield
-    finally:
-        for name in absent:
-            del sys.modules[name]
 
 
 @contextmanager

@@ -41,7 +41,7 @@ def main(arguments: Sequence[str]) -> int:
     command = [
         sys.executable,
         "-m",
-        "ecu.recording.side_process",
+        "ecu.runtime.side_process",
         "--leash",
         arguments[0],
         "--parent",

@@ -18,8 +18,8 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.control.failed_brakes import LAG, lining_force
 from ecu.algorithm.inputs import fresh, others_brake, usable
+from ecu.algorithm.monitoring.failed_brakes import LAG, lining_force
 from ecu.algorithm.monitoring.witness import compare
 from ecu.contract.params import GRAVITY
 from ecu.contract.signals import CALLIPER_PRESSURE

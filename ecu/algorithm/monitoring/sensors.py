@@ -4,7 +4,6 @@ Accelerometer, wheel speeds and calliper pressures are compared with each other 
 estimation, by the estimate of the last cycle.
 """
 
-from ecu.algorithm.control.failed_brakes import watch_brakes
 from ecu.algorithm.inputs import LEAST_REQUEST, driver_accelerates, others_brake, requested_decel, usable
 from ecu.algorithm.monitoring.accel_error import (
     PROVEN_S,
@@ -13,6 +12,7 @@ from ecu.algorithm.monitoring.accel_error import (
     watch_frozen,
 )
 from ecu.algorithm.monitoring.acceleration import watch_acceleration, wheels_deny
+from ecu.algorithm.monitoring.failed_brakes import watch_brakes
 from ecu.algorithm.monitoring.motors import compare_motors, watch_motors
 from ecu.algorithm.monitoring.plausibility import watch_pressures, watch_wheels, wheel_speed_implausible
 from ecu.algorithm.monitoring.pressures import DOUBT_S, compare_pressures, lasting_difference

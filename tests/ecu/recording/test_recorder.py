@@ -23,7 +23,6 @@ from ecu.contract.records import (
     new_record,
 )
 from ecu.errors import UserError
-from ecu.recording import side_process
 from ecu.recording import store as state_store
 from ecu.recording.recorder import (
     CYCLES_FILE,
@@ -36,8 +35,9 @@ from ecu.recording.recorder import (
     read_recording,
 )
 from ecu.recording.ring import RECORDED, RingReader, create_ring, publish
-from ecu.recording.side_process import Recorder
 from ecu.recording.store import open_store, restore
+from ecu.runtime import side_process
+from ecu.runtime.side_process import Recorder
 
 STATE = np.dtype([("speed", "f8"), ("learned", LEARNED), ("flag", "u1")], align=True)
 ABOUT = {

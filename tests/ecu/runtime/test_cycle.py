@@ -19,8 +19,8 @@ from ecu.jit import CompileCounter
 from ecu.recording.ring import RingReader, create_ring
 from ecu.runtime.clock import Grid, TimeSource
 from ecu.runtime.cycle import HOLD_CYCLES, Progress, Watch, cycle_once, new_ecu, send_farewell
+from ecu.runtime.warm_up import warm_up
 from ecu.settings.config import load_config, new_params
-from ecu.warm import warm_up
 
 ROOT = Path(__file__).parents[3]
 DBC = ROOT / "dbc" / "brake_ecu.dbc"

@@ -1,6 +1,5 @@
-"""What a start may do to be soon: precedence until something has to be compiled, and less to load."""
+"""What a start may do to be soon: precedence until something has to be compiled and what ends it."""
 
-import importlib
 import os
 import signal
 import subprocess
@@ -19,19 +18,7 @@ from ecu.runtime.start import (
     lower_priority,
     raise_priority,
     signal_name,
-    without_modules,
 )
-
-
-def test_what_is_kept_out_is_not_found_and_comes_back_afterwards(monkeypatch, tmp_path):
-    (tmp_path / "library_of_nobody.py").write_text("", "utf-8")
-    monkeypatch.syspath_prepend(tmp_path)
-    with without_modules("library_of_nobody", "os"), pytest.raises(ImportError):
-        importlib.import_module("library_of_nobody")
-    assert importlib.import_module("library_of_nobody")
-    assert sys.modules["os"] is os  # was loaded before
-    with without_modules("library_of_nobody"):
-        assert importlib.import_module("library_of_nobody")
 
 
 def test_each_compilation_is_told_before_it_begins():

@@ -26,8 +26,8 @@ from ecu.jit import CompileCounter
 from ecu.recording.ring import create_ring, remove_ring
 from ecu.runtime.clock import Grid, system_time
 from ecu.runtime.cycle import Progress, Watch, cycle_once, new_ecu
+from ecu.runtime.warm_up import warm_up
 from ecu.settings.resources import resource
-from ecu.warm import warm_up
 
 ROUNDS: Final = 10
 CYCLES: Final = 210  # a round

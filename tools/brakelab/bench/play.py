@@ -32,7 +32,7 @@ from brakelab.simulation.priority import PRIORITY, ask_for_priority
 from brakelab.studies.measure import installed, machine
 from brakelab.studies.study import Asked, Measured, Study
 from ecu.runtime.clock import system_time
-from ecu.warm import Silence
+from ecu.runtime.warm_up import Silence
 
 SPEEDS: Final = (0.1, 1.0, 5.0, 20.0)
 GOAL_US: Final = 100

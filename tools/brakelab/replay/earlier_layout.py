@@ -33,6 +33,7 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "speed_copies",
         "held",
         "slip",
+        "replacement",
     ),
 }
 

@@ -35,12 +35,12 @@ from ecu.recording.learned_range import out_of_range
 from ecu.recording.recorder import layout, read_recording
 from ecu.recording.restored import restored
 from ecu.recording.ring import RingReader, close_ring, create_ring, remove_ring
-from ecu.recording.side_process import Recorder
 from ecu.runtime.clock import Grid, TimeSource
 from ecu.runtime.cycle import Progress, Watch, cycle_once, new_ecu
+from ecu.runtime.side_process import Recorder
+from ecu.runtime.warm_up import warm_up
 from ecu.settings.config import load_config, new_params, store_key
 from ecu.settings.resources import resource
-from ecu.warm import warm_up
 
 HOUR: Final = 360_000  # cycles
 RESTART: Final = 6 * HOUR + 7  # no multiple of 15: its E2E counters start at another value

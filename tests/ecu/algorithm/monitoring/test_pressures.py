@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from ecu.algorithm.control.failed_brakes import FAILED_BRAKES_STATE
 from ecu.algorithm.control.pressure_law import PRESSURE_LAW_STATE
 from ecu.algorithm.estimate import ESTIMATE
 from ecu.algorithm.estimation.zero import ZERO_STATE, note_rest, settle_zero, tell_zeros
 from ecu.algorithm.hydraulics import HYDRAULICS_STATE
+from ecu.algorithm.monitoring.failed_brakes import FAILED_BRAKES_STATE
 from ecu.algorithm.monitoring.pressures import (
     KEPT,
     KEPT_SHARE,

@@ -1,6 +1,6 @@
 """Side process of `run`: reads the ring, writes the recording, keeps the state store and logs events.
 
-`python -m ecu.recording.side_process --ring RING --leash SOCKET --parent PID [--record DIR [--record-limit
+`python -m ecu.runtime.side_process --ring RING --leash SOCKET --parent PID [--record DIR [--record-limit
 GB]] [--state DIR] [--metrics ADDRESS:PORT] [--again]`, started by `ecu/runtime/supervisor.py`. It ends when
 the ring is closed or the loop has died, after everything in the ring is written; signals to the group are
 left to the loop. A full disk ends the recording, nothing else; an unwritable store is tried again at the next
@@ -221,7 +221,7 @@ def _follow(recorder: Recorder, leash: socket.socket, parent: int) -> bool:
 def main() -> int:
     """Follow the ring until its writer has ended or died."""
     parser = argparse.ArgumentParser(
-        prog="python -m ecu.recording.side_process", description="The side process of run."
+        prog="python -m ecu.runtime.side_process", description="The side process of run."
     )
     parser.add_argument("--ring", type=Path, required=True)
     parser.add_argument("--leash", type=int, required=True)
