@@ -29,7 +29,8 @@ EVENTS: Final = 200
 LATENESS_US: Final = (20, 50, 100, 200, 500, 1000, 2000, 5000, 10000)
 """Upper edges of the histogram of lateness; later ones are counted behind the last."""
 
-PLAIN: Final = ("mode", *WORDS, "vehicle_speed", "decel_demand_total", "accel_x_road")
+GRIP: Final = ("grip_limit", "sigma_grip_limit")
+PLAIN: Final = ("mode", *WORDS, "vehicle_speed", "decel_demand_total", "accel_x_road", *GRIP)
 OF_CORNERS: Final = (
     "mu_b",
     "sigma_mu_b",

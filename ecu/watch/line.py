@@ -7,7 +7,7 @@ import time
 from ecu.contract.faults import WORDS, fault_mask, fault_names
 from ecu.contract.signals import CORNERS
 from ecu.recording.events import MODES
-from ecu.watch.history import COLUMN, COLUMNS, LATENESS_US, OF_CORNERS, Row, frames_text
+from ecu.watch.history import COLUMN, COLUMNS, GRIP, LATENESS_US, OF_CORNERS, Row, frames_text
 from ecu.watch.inputs import InputRow
 from ecu.watch.watcher import Watcher
 
@@ -36,6 +36,12 @@ def number(value: float, digits: int = 0) -> str:
     return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
+def ceiling(row: Row) -> str:
+    """Return the ceiling of grip as text, empty where none is estimated."""
+    limit, sigma = (float(row[COLUMN[name]]) for name in GRIP)
+    return f", ceiling of grip {number(limit, 1)}±{number(sigma, 1)}" if math.isfinite(limit) else ""
+
+
 def _clock(seconds: float) -> str:
     return time.strftime("%H:%M:%S", time.localtime(seconds))
 
@@ -56,7 +62,7 @@ def text_line(watcher: Watcher) -> str:
     return (
         f"{_clock(row[COLUMN['clock']])} {mode_of(row)}{'' if row[COLUMN['speaks']] else ' (silent standby)'}"
         f" {number(row[COLUMN['vehicle_speed']], 1)} m/s"
-        f" decel {number(demanded, 2)}→{number(measured, 2)} m/s²"
+        f" decel {number(demanded, 2)}→{number(measured, 2)} m/s²{ceiling(row)}"
         f" mu {friction} {pressures} bar {discs} °C"
         f" late {row[COLUMN['lateness']]:.0f} µs missed {watcher.history.missed}"
         f" frames {frames_text(watcher.history.frames)}; {faults}"

@@ -15,7 +15,7 @@ from rich.text import Text
 from ecu.contract.signals import CORNERS
 from ecu.watch.history import COLUMN, LATENESS_US, SHOWN_S, Row, frames_text
 from ecu.watch.inputs import InputRow
-from ecu.watch.line import corner_values, faults_of, mode_of, number
+from ecu.watch.line import ceiling, corner_values, faults_of, mode_of, number
 from ecu.watch.watcher import Watcher
 
 BLOCKS: Final = "▁▂▃▄▅▆▇█"
@@ -139,7 +139,7 @@ def _corners(rows: Sequence[Row], width: int) -> Table:
 def _decelerations(rows: Sequence[Row], width: int) -> Iterable[Text]:
     row = rows[-1]
     demanded, measured = number(row[COLUMN["decel_demand_total"]], 2), number(-row[COLUMN["accel_x_road"]], 2)
-    text = f"deceleration {demanded} demanded, {measured} measured m/s²"
+    text = f"deceleration {demanded} demanded, {measured} measured m/s²{ceiling(row)}"
     yield Text(text if width >= MEDIUM else f"decel {demanded}→{measured} m/s²")
     room = width - 10
     demands = [float(one[COLUMN["decel_demand_total"]]) for one in rows]

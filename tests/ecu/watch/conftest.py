@@ -37,7 +37,7 @@ class Loop:
         self.watched["value"] = self.watched["sigma"] = self.watched["ratio"] = np.nan
         self.watched["unused_s"] = np.inf
         self.cycle["speaks"] = 1
-        self.outputs["mode"] = 1
+        self.outputs["mode"], self.outputs["grip_limit"] = 1, np.nan
         self.frames = new_record(FRAME, 100)
         self.number = 0
 

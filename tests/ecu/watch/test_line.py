@@ -78,6 +78,15 @@ def test_what_is_not_available_and_who_is_silent(loop):
     assert '"vehicle_speed": null' in said
 
 
+def test_the_ceiling_of_grip_where_one_is_estimated(loop):
+    one = loop()
+    one.publish(4, decel_demand_total=3.0, accel_x_road=-2.9, grip_limit=9.14, sigma_grip_limit=0.82)
+    watcher = Watcher(None)
+    watcher.turn()
+    assert "decel 3.00→2.90 m/s², ceiling of grip 9.1±0.8 mu" in text_line(watcher)
+    assert '"grip_limit": 9.14, "sigma_grip_limit": 0.82' in json_line(watcher)
+
+
 def test_without_a_daemon(rings):
     watcher = Watcher(None)
     watcher.turn()
