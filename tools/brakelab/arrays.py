@@ -1,4 +1,6 @@
-"""Arrays of numbers, by what they hold."""
+"""Arrays of numbers, by what they hold, and as columns of Arrow."""
+
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,3 +9,34 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Array = NDArray[np.float64]
 """Of any shape."""
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+
+def arrow_array(values: Any, kind: Any) -> "pa.Array[Any]":
+    """Return a column of Arrow: null where a number is NaN, or not finite where `kind` is an integer.
+
+    Made of its memory: `pa.array` imports pandas. `kind`: a `pyarrow.DataType`.
+    """
+    import pyarrow as pa
+
+    if len(values) == 0:
+        return pa.nulls(0, kind)
+    if pa.types.is_string(kind):
+        texts = [b"" if text is None else text.encode() for text in values]
+        ends: Any = np.cumsum([0, *map(len, texts)], dtype=np.int32)
+        valid: Any = np.packbits([text is not None for text in values], bitorder="little")
+        data: Any = b"".join(texts)
+        return pa.Array.from_buffers(kind, len(texts), [pa.py_buffer(one) for one in (valid, ends, data)])
+    if pa.types.is_boolean(kind):
+        bits: Any = np.packbits(values, bitorder="little")
+        return pa.Array.from_buffers(kind, len(values), [None, pa.py_buffer(bits)])
+    numbers = np.ascontiguousarray(values, np.float64)
+    known = ~np.isnan(numbers)
+    if pa.types.is_integer(kind):
+        known &= np.isfinite(numbers)
+        numbers = np.where(known, numbers, 0.0)
+    data = numbers.astype(kind.to_pandas_dtype(), copy=False)
+    valid = np.packbits(known, bitorder="little")
+    return pa.Array.from_buffers(kind, len(numbers), [pa.py_buffer(valid), pa.py_buffer(data)])

@@ -13,6 +13,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from brakelab.arrays import arrow_array
 from brakelab.logs.column_map import ColumnUse, FileUse, MappedFile
 from brakelab.logs.log_quality import MAX_JUMP_NS, SignalQuality
 from brakelab.logs.signal_batches import Batch, is_csv, mapped_batches, plain_batches
@@ -97,7 +98,7 @@ def read_signals(
                 raise UserError(str(path), f"{_place(path, places[0])}, t", remedy)
             missing = np.flatnonzero(~known)
             quality.note_damage(len(missing), f"{_place(path, places[missing[0]])}, t (missing)")
-            batch, places, t = batch.filter(pa.array(known)), places[known], t[known]
+            batch, places, t = batch.filter(arrow_array(known, pa.bool_())), places[known], t[known]
         if not len(t):
             continue
         _check_unit(path, t, "" if mapped is None else f"; or state time_unit in {mapped.path}")

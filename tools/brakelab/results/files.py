@@ -16,6 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from brakelab.arrays import arrow_array
 from brakelab.results import mcap_file, mdf
 from brakelab.results.brakes import BRAKE_UNITS, BrakeBook, BrakeRow
 from brakelab.results.pads import KEY, PadState, packed
@@ -75,16 +76,8 @@ def brakes_path(result: Path) -> Path:
 
 
 def _table(schema: pa.Schema, columns: Sequence[NDArray[Any] | list[Any]]) -> pa.Table:
-    arrays = []
-    for field, column in zip(schema, columns, strict=True):
-        if pa.types.is_integer(field.type):
-            values = np.asarray(column, np.float64)
-            known = np.isfinite(values)
-            whole = np.where(known, values, 0.0).astype(field.type.to_pandas_dtype())
-            arrays.append(pa.array(whole, field.type, mask=~known))
-        else:
-            arrays.append(pa.array(column, field.type, from_pandas=True))
-    return pa.Table.from_arrays(arrays, schema=schema)
+    pairs = zip(schema, columns, strict=True)
+    return pa.Table.from_arrays([arrow_array(column, field.type) for field, column in pairs], schema=schema)
 
 
 def brakes_table(rows: Sequence[BrakeRow]) -> pa.Table:

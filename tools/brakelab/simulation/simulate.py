@@ -8,6 +8,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from brakelab.arrays import arrow_array
 from brakelab.logs.candump_text import candump_text
 from brakelab.results.outputs import check_outputs
 from brakelab.results.progress import progress_bar
@@ -36,7 +37,7 @@ def write_columns(
     with pq.ParquetWriter(path, schema, compression="zstd") as writer:
         for first in range(0, len(t), ROWS):
             rows = slice(first, first + ROWS)
-            arrays = [pa.array(column[rows], from_pandas=True) for column in given.values()]
+            arrays = [arrow_array(given[field.name][rows], field.type) for field in schema]
             writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
 
 
