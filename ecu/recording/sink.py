@@ -24,10 +24,11 @@ class Sink(io.TextIOBase):
         self._socket: socket.socket | None = None
         self._free = False
         try:
-            if stat.S_ISSOCK(os.fstat(handle).st_mode):
+            kind = os.fstat(handle).st_mode
+            if stat.S_ISSOCK(kind):
                 self._socket = socket.socket(fileno=os.dup(handle))
-            else:
-                self._free = _set_free(handle)
+            else:  # a regular file never blocks, and its offset is shared with who gave it
+                self._free = stat.S_ISREG(kind) or _set_free(handle)
         except OSError:  # closed, and soon perhaps another file's: every line is dropped
             self._handle = -1
 
@@ -77,7 +78,7 @@ def _set_free(handle: int) -> bool:
     It is opened anew: O_NONBLOCK on the old description would hold for the shell that gave it, too.
     """
     try:
-        own = os.open(f"/proc/self/fd/{handle}", os.O_WRONLY | os.O_APPEND | os.O_NONBLOCK | os.O_NOCTTY)
+        own = os.open(f"/proc/self/fd/{handle}", os.O_WRONLY | os.O_NONBLOCK | os.O_NOCTTY)
     except OSError:
         return False
     os.dup2(own, handle)

@@ -106,9 +106,11 @@ def test_the_shell_keeps_its_stream_as_it_was(pipe):
     os.close(own)
 
 
-def test_lines_are_appended_to_a_file(tmp_path):
-    path = tmp_path / "log"
-    path.write_text("before\n")
-    with path.open("r+") as file:
-        Sink(file.fileno()).write("after\n")
-    assert path.read_text() == "before\nafter\n"
+@pytest.mark.parametrize("redirection", [">", ">>"])
+def test_lines_of_a_shared_file_follow_each_other(redirection, tmp_path):
+    ours = "from ecu.recording.sink import free_output; free_output(); print('ours')"
+    script = f'{{ echo before; "$0" -c "$1"; echo after; }} {redirection} log'
+    (tmp_path / "log").write_text("earlier\n")
+    subprocess.run(["sh", "-c", script, sys.executable, ours], cwd=tmp_path, check=True)
+    kept = ["earlier"] if redirection == ">>" else []
+    assert (tmp_path / "log").read_text().split() == [*kept, "before", "ours", "after"]
