@@ -22,7 +22,7 @@ def test_the_ring_is_read_once_more_when_the_daemon_has_ended(
             self.daemons = [SimpleNamespace(poll=lambda: None)]
             self._turns = iter([True, False])
 
-        def start_vehicle(self, scenario: Path, seed: int) -> None: ...
+        def start_vehicle(self, scenario: Path, seed: int, plant: str | None) -> None: ...
 
         def start_daemon(self, *options: str) -> Any:
             return object()

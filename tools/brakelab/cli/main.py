@@ -25,10 +25,20 @@ from ecu.arguments import (
     State,
     scenario_file,
 )
-from ecu.completion import fitting, shipped
+from ecu.completion import fitting, known, shipped
 from ecu.errors import UserError
 from ecu.output import wrote
 from ecu.settings.resources import SCENARIOS, resource
+
+Plant = Annotated[
+    str | None,
+    typer.Option(
+        "--plant",
+        autocompletion=known("suv", "suv14", "sedan", "lcv"),
+        metavar="PLANT",
+        help="Simulated car: file or name (sedan, …); default: SCENARIO's",
+    ),
+]
 
 app = Commands()
 app.add_typer(lab_app, name="lab")
@@ -72,11 +82,12 @@ def simulate(
         int, typer.Option("--seed", metavar="N", min=0, help="Seed of the drawn vehicle and its noise")
     ] = 0,
     draw: Draw = None,
+    plant: Plant = None,
 ) -> int:
     """Simulate a scenario in closed loop. Write frames, decoded inputs and true values."""
     from brakelab.simulation import simulate
 
-    return simulate.simulate(scenario, config, out, seed, draw)
+    return simulate.simulate(scenario, config, out, seed, draw, plant)
 
 
 @app.command()
@@ -101,6 +112,7 @@ def rig(
     seed: Annotated[
         int, typer.Option("--seed", metavar="N", min=0, help="Seed of the drawn vehicle and its noise")
     ] = 0,
+    plant: Plant = None,
 ) -> int:
     """Test the ECU in scenarios with faults. Write one report."""
     from brakelab.rig import command
@@ -108,7 +120,7 @@ def rig(
     if (interface is None) != (channel is None):
         raise UserError("-i, -c", "", "give both or none; none: a bus of its own on this machine")
     bus = None if interface is None or channel is None else (interface, channel)
-    return command.rig(scenario, config, bus, out, lock_step, seed)
+    return command.rig(scenario, config, bus, out, lock_step, seed, plant)
 
 
 @app.command()

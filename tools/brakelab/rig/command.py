@@ -22,10 +22,11 @@ from brakelab.rig.results import write_recorded, write_simulated
 from brakelab.rig.vehicle_node import warm_up
 from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.scenario import Scenario, load_scenario
+from brakelab.simulation.scenario_car import other_car, with_plant
 from ecu.compiling import compiling_told
 from ecu.contract.faults import fault_mask, fault_names
 from ecu.errors import RunFault, UserError
-from ecu.output import give, say
+from ecu.output import fault, give, say
 from ecu.settings.config import Config, load_config
 from ecu.settings.resources import SCENARIOS, named, resource
 from ecu.warm import warm
@@ -58,18 +59,21 @@ def rig(
     out: Path,
     lock_step: bool,
     seed: int,
+    plant: str | None = None,
 ) -> int:
     """Run every scenario; return 0, or 1 if one showed a fault bit that nothing of it accounts for.
 
-    `bus`: interface and channel, None: the best available.
+    `bus`: interface and channel, None: the best available. `plant`: the car's file, None: each scenario's.
+    1 also if that is another car than `config` describes.
 
     Raises:
         UserError: a scenario, the configuration or the bus is invalid, or `out` cannot be written.
         RunFault: a daemon or the vehicle ended early.
     """
-    scenarios = [(path, load_scenario(path)) for path in found(names)]
-    make_folder(out)
+    scenarios = [(path, with_plant(load_scenario(path), plant)) for path in found(names)]
     vehicle = load_config(config)
+    others = sorted({other_car(scenario, vehicle) for _, scenario in scenarios} - {""})
+    make_folder(out)
     meeting = None
     if not lock_step:
         meeting = choose_bus() if bus is None else named_bus(*bus)
@@ -88,19 +92,24 @@ def rig(
                 if meeting is None:
                     outcomes.append(_in_memory(path.stem, scenario, vehicle, folder, seed))
                 else:
-                    outcomes.append(_in_real_time(path, scenario, meeting, config, vehicle, folder, seed))
+                    driven = _in_real_time(path, scenario, meeting, config, vehicle, folder, seed, plant)
+                    outcomes.append(driven)
     finally:
         if meeting is not None:
             meeting.close()
     console = new_console(WIDTH)
     console.print(summary(outcomes))
     give(scenarios=[{k: v for k, v in one._asdict().items() if k != "curve"} for one in outcomes])
+    for line in others:
+        fault(f"brake-ecu: {line}")
+    give(other_cars=others)
     write_tables(outcomes, out)
     page = out / "rig.html"
-    page.write_text(write_page(outcomes, meeting, vehicle, seed), "utf-8")
+    cars = ", ".join(sorted({Path(scenario.plant).stem for _, scenario in scenarios}))
+    page.write_text(write_page(outcomes, meeting, vehicle, cars, seed), "utf-8")
     say(f"report: {page.resolve()}")
     give(written=[page, out / "scenarios.parquet", out / "faults.parquet"])
-    return int(any(result.unexplained or result.differing for result in outcomes))
+    return int(bool(others) or any(result.unexplained or result.differing for result in outcomes))
 
 
 def _undisturbed(scenario: Scenario, vehicle: Config, seed: int) -> Undisturbed:
@@ -121,9 +130,16 @@ def _in_memory(name: str, scenario: Scenario, vehicle: Config, folder: Path, see
 
 
 def _in_real_time(
-    path: Path, scenario: Scenario, bus: Bus, config: Path, vehicle: Config, folder: Path, seed: int
+    path: Path,
+    scenario: Scenario,
+    bus: Bus,
+    config: Path,
+    vehicle: Config,
+    folder: Path,
+    seed: int,
+    plant: str | None,
 ) -> Outcome:
-    recorded = drive(bus, path, config, scenario.fault, folder, seed)
+    recorded = drive(bus, path, config, scenario.fault, folder, seed, plant=plant)
     written = write_recorded(recorded.recordings, vehicle, folder)
     report(written.result, recorded.truth, folder / "report.html", recorded.recordings[0])
     undisturbed = _undisturbed(scenario, vehicle, seed)

@@ -114,7 +114,7 @@ class Processes:
         self._bus, self._config, self._log = bus, config, log
         self.vehicle: subprocess.Popen[str] | None = None
 
-    def start_vehicle(self, scenario: Path, seed: int) -> None:
+    def start_vehicle(self, scenario: Path, seed: int, plant: str | None = None) -> None:
         """Start the vehicle and wait until it is on the bus.
 
         Raises:
@@ -124,6 +124,7 @@ class Processes:
         command = [sys.executable, "-m", "brakelab.rig.vehicle_node", str(scenario)]
         command += ["-i", self._bus.interface]
         command += ["-c", self._bus.channel] if wire is None else ["-c", wire.ends[1].name, "--bus-goes-off"]
+        command += [] if plant is None else ["--plant", plant]
         command += ["--with-ecu", "--seed", str(seed), "--truth", str(self.truth)]
         self.vehicle = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=self._log, text=True, preexec_fn=end_with_parent
@@ -181,8 +182,11 @@ def drive(
     out: Path,
     seed: int,
     look: Callable[[RingReader], Any] = lambda ring: None,
+    plant: str | None = None,
 ) -> Recorded:
     """Drive a scenario with the ECU of `config`, armed; `look` sees its ring every 50 ms and at the end.
+
+    `plant`: the car's file, None: the scenario's.
 
     Raises:
         RunFault: a daemon or the vehicle ended early.
@@ -195,7 +199,7 @@ def drive(
         processes = Processes(bus, config, out, file)
         processes.truth.unlink(missing_ok=True)
         try:
-            processes.start_vehicle(scenario, seed)
+            processes.start_vehicle(scenario, seed, plant)
             if any(fault.standby for fault in kills):
                 processes.start_daemon("standby", "--standby")
             ring = processes.start_daemon("drive")

@@ -106,8 +106,8 @@ def _tiles(outcomes: list[Outcome], live: bool) -> list[Tile]:
     return tiles
 
 
-def write_page(outcomes: list[Outcome], bus: Bus | None, config: Config, seed: int) -> str:
-    """Return the page; it needs no other file but links to the reports beside it."""
+def write_page(outcomes: list[Outcome], bus: Bus | None, config: Config, cars: str, seed: int) -> str:
+    """Return the page, of the simulated `cars`; it needs no other file but links to reports beside it."""
     page = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     page.filters.update(fixed=fixed, percent=percent, signed_percent=signed_percent)
     source = (files("brakelab.rig") / "page.html.j2").read_text("utf-8")
@@ -121,6 +121,7 @@ def write_page(outcomes: list[Outcome], bus: Bus | None, config: Config, seed: i
         controller=bus is not None and bus.wire is not None,
         facts=[
             ("Vehicle", config.name),
+            ("Simulated car", cars),
             ("Configuration", config_hash(config)[:12]),
             ("Observer", config.observer.kind),
             ("Seed", str(seed)),

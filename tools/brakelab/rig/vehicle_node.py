@@ -26,6 +26,7 @@ from brakelab.simulation.closed_loop import Plans, plans
 from brakelab.simulation.fault_kernels import Link, deliver, new_link
 from brakelab.simulation.priority import ask_for_priority
 from brakelab.simulation.scenario import Scenario, load_scenario
+from brakelab.simulation.scenario_car import with_plant
 from brakelab.simulation.simulate import write_columns
 from brakelab.simulation.vehicle_bus import (
     N_TRUTH,
@@ -231,6 +232,7 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument("-i", "--interface", required=True, help="as python-can calls it")
     parser.add_argument("-c", "--channel", required=True, help="as python-can calls it")
     parser.add_argument("--seed", type=int, default=0, help="of the drawn car and its noise")
+    parser.add_argument("--plant", help="the car, a file or a shipped one by name; default: the scenario's")
     parser.add_argument(
         "--with-ecu", action="store_true", help="drive off when the ECU is heard, stay until it is silent"
     )
@@ -253,7 +255,7 @@ def main(argv: list[str] | None = None) -> int:
     signal.signal(signal.SIGINT, ask_to_stop)
     try:
         path = named(arguments.scenario, *SCENARIOS)
-        scenario = load_scenario(path)
+        scenario = with_plant(load_scenario(path), arguments.plant)
         if arguments.bus_goes_off:
             rest = [fault for fault in scenario.fault if fault.kind != "bus_off"]
             scenario = scenario.model_copy(update={"fault": rest})

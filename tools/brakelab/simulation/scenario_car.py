@@ -1,6 +1,7 @@
-"""Car of a scenario: its file, its payload, its engine, and the width of its draw."""
+"""Car of a scenario: its file, payload and engine, the width of its draw, and whether CONFIG means it."""
 
-from typing import get_args
+from pathlib import Path
+from typing import Final, get_args
 
 from pydantic import BaseModel
 
@@ -8,7 +9,11 @@ from brakelab.plant.description import Plant, PlantFileError, load_plant
 from brakelab.plant.draw import Widths, load_widths
 from brakelab.simulation.scenario import Scenario
 from ecu.errors import UserError
+from ecu.settings.config import Config
 from ecu.settings.resources import named, resource
+
+ANOTHER: Final = 0.10
+"""Relative difference from which on a car is not the configured one."""
 
 
 def scenario_plant(scenario: Scenario) -> Plant:
@@ -27,6 +32,34 @@ def scenario_plant(scenario: Scenario) -> Plant:
     if scenario.engine is not None:
         changed["engine"] = scenario.engine
     return plant.model_copy(update={"vehicle": plant.vehicle.model_copy(update=changed)})
+
+
+def with_plant(scenario: Scenario, plant: str | None) -> Scenario:
+    """Return a scenario with the car `plant`, a file or a name of `config/plant`; None: its own."""
+    return scenario if plant is None else scenario.model_copy(update={"plant": plant})
+
+
+def other_car(scenario: Scenario, config: Config) -> str:
+    """Return in what a scenario's empty car is not that of `config`, one line; "": in nothing.
+
+    Compared are mass, radius of the wheels, and piston area times effective radius of the brakes.
+
+    Raises:
+        UserError: the plant's file cannot be read or is wrong.
+    """
+    vehicle = scenario_plant(scenario.model_copy(update={"payload": None})).vehicle
+    ratios = {"mass": vehicle.body.mass / config.vehicle.mass}
+    for axle in ("front", "rear"):
+        told, brake = getattr(config, axle), getattr(vehicle, f"brake_{axle}")
+        area = (brake.piston_diameter / told.piston_diameter) ** 2 / told.pistons
+        ratios[f"{axle} wheels"] = vehicle.tyre.free_radius / told.unloaded_radius
+        ratios[f"{axle} brakes"] = area * brake.effective_radius / told.effective_radius
+    more = {name: ratio - 1.0 for name, ratio in ratios.items() if abs(ratio - 1.0) > ANOTHER}
+    found = ", ".join(f"{name} {100.0 * by:+.0f} %" for name, by in more.items())
+    if not found:
+        return ""
+    plant = Path(scenario.plant).stem
+    return f"plant {plant} is another car than {config.name} ({found}); give yours: --plant NAME or FILE"
 
 
 def with_draw(scenario: Scenario, draw: str) -> Scenario:

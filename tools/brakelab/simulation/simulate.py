@@ -14,11 +14,11 @@ from brakelab.results.outputs import check_outputs
 from brakelab.results.progress import progress_bar
 from brakelab.simulation.closed_loop import START_NS, VEHICLE_BUS, new_loop, run_blocks
 from brakelab.simulation.scenario import load_scenario
-from brakelab.simulation.scenario_car import with_draw
+from brakelab.simulation.scenario_car import other_car, with_draw, with_plant
 from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS
 from ecu.contract.signals import CYCLE_NS, INPUT_SIGNALS
 from ecu.errors import UserError
-from ecu.output import give, wrote
+from ecu.output import give, say, wrote
 from ecu.settings.config import load_config
 from ecu.settings.resources import command_name
 
@@ -42,19 +42,27 @@ def write_columns(
 
 
 def simulate(
-    scenario: Path, config: Path, out: Path, seed: int = 0, draw: str | None = None, told: bool = True
+    scenario: Path,
+    config: Path,
+    out: Path,
+    seed: int = 0,
+    draw: str | None = None,
+    plant: str | None = None,
+    told: bool = True,
 ) -> int:
     """Run a scenario with the ECU of `config`, armed; write OUT.log, OUT.parquet, OUT.truth.parquet.
 
-    `draw`: width of the car's draw, see `Scenario.draw`; None: that of the scenario. `told`: False for use
-    from Python, where nothing is printed.
+    `draw`: width of the car's draw, see `Scenario.draw`; `plant`: the car's file; None: the scenario's.
+    `told`: False for use from Python, where nothing is printed.
 
     Raises:
         UserError: a file cannot be read, is wrong, or cannot be written.
     """
     log, inputs, truth = (out.with_name(out.name + end) for end in (".log", ".parquet", ".truth.parquet"))
     check_outputs(out, (log, inputs, truth), (scenario, config))
-    driven = load_scenario(scenario)
+    driven, vehicle = with_plant(load_scenario(scenario), plant), load_config(config)
+    if told and (differs := other_car(driven, vehicle)):
+        say(f"brake-ecu: {differs}")
     if draw is not None:
         driven = with_draw(driven, draw)
     metadata = {
@@ -67,7 +75,7 @@ def simulate(
     true: list[NDArray[np.float64]] = []
     frames = 0
     with progress_bar("simulate", None, told):
-        loop = new_loop(driven, load_config(config), seed)
+        loop = new_loop(driven, vehicle, seed)
         try:
             out.parent.mkdir(parents=True, exist_ok=True)
             with log.open("wb") as text:
