@@ -7,7 +7,6 @@ import os
 import platform
 import subprocess
 import sys
-import tempfile
 import time
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -138,16 +137,10 @@ def _wake_up() -> Check:
 
 
 def _cache() -> Check:
+    """Name the cache; whether it may be read-only, because it is complete, `kernels` finds."""
     folder = jit.CACHE_ROOT
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        return Check(
-            "kernel cache", False, f"{folder}: {error.strerror}", "set NUMBA_CACHE_DIR to a folder of yours"
-        )
-    return Check("kernel cache", True, f"{folder} can be written")
+    written = "can be written" if os.access(folder, os.W_OK) else "is read-only: nothing can be compiled"
+    return Check("kernel cache", True, f"{folder} {written}")
 
 
 def unit(folders: tuple[Path, ...] = UNIT_FOLDERS) -> Check:
@@ -170,10 +163,11 @@ def kernels(config: Path | None, plan: ReceivePlan) -> Check:
     compiled = jit.CompileCounter()
     began = time.monotonic()
     params = new_params(load_config(config or resource("config/suv.toml")))
-    warm_up(
-        new_ecu(params, None, plan, contract_transmit_plan(resource("dbc/brake_ecu.dbc"), "BrakeEcu")),
-        compiled,
-    )
+    sending = contract_transmit_plan(resource("dbc/brake_ecu.dbc"), "BrakeEcu")
+    try:
+        warm_up(new_ecu(params, None, plan, sending), compiled)
+    except UserError as error:
+        return Check("kernels", False, error.where, error.remedy)
     found = f"{compiled.count} compiled, ready after {time.monotonic() - began:.1f} s"
     return Check("kernels", compiled.count == 0, found, "they are cached now; a second look will find none")
 

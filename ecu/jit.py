@@ -6,16 +6,19 @@ texts of the module and of all that it imports, directly or not, of its own pack
 kernels the laboratory calls. A module imported by a name in a string does not count, nor does a file that is
 read.
 
-`NUMBA_CACHE_DIR` chooses the place, default `~/.cache/brake-ecu`. What lies there is run (numba's cache is
-pickle and machine code), so a place in which anybody else may put or exchange files is refused. With
+`NUMBA_CACHE_DIR` chooses the place, default `~/.cache/brake-ecu`; it may be read-only where nothing has to be
+compiled. What lies there is run (numba's cache is pickle and machine code), so a place in which anybody else
+may put or exchange files is refused. With
 `NUMBA_DISABLE_JIT=1` kernels run as plain Python (`ecu/interpreted.py`).
 """
 
+import errno
 import hashlib
 import os
 import re
 import stat
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -23,6 +26,7 @@ from typing import Any, NamedTuple, TypeVar, cast
 
 import numba
 import numba.core.event as numba_event
+from numba.core import caching
 
 from ecu.errors import UserError
 from ecu.interpreted import interpreted
@@ -39,7 +43,8 @@ CACHE_ROOT = Path(
     os.environ.get("NUMBA_CACHE_DIR")
     or Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "brake-ecu"
 )
-
+_UNWRITABLE = {errno.EACCES, errno.EPERM, errno.EROFS}
+_REMEDY = "set NUMBA_CACHE_DIR to a folder of yours"
 
 _COMMENT = re.compile(rb"#[^\n]*|\\\n")
 _FROM = re.compile(
@@ -105,19 +110,16 @@ def sources_of_kernels(module: str) -> dict[str, bytes]:
 
 @cache
 def _folder(module: str) -> str:
-    """Return the folder of a module's compiled kernels; numba would fall back to one that can go stale."""
+    """Return the folder of a module's compiled kernels, made if that is possible."""
     digest = hashlib.sha256(numba.__version__.encode())
     for name, text in sources_of_kernels(module).items():
         digest.update(name.encode() + b"\0" + text)
     folder = CACHE_ROOT / f"{module}-{digest.hexdigest()[:16]}"
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    except OSError:
-        writable = False
-    else:
-        writable = os.access(folder, os.W_OK)
-    if not writable:
-        raise UserError(str(folder), "", "cannot be written; set NUMBA_CACHE_DIR to a folder of yours")
+    except OSError as error:
+        if error.errno not in _UNWRITABLE:
+            raise UserError(str(folder), "", f"cannot be made ({error.strerror}); {_REMEDY}") from None
     folder = folder.resolve()
     if found := open_to_others(folder):
         remedy = "chmod go-w it, or set NUMBA_CACHE_DIR to a folder of yours alone"
@@ -128,20 +130,20 @@ def _folder(module: str) -> str:
 def open_to_others(folder: Path) -> Path | None:
     """Return which of `folder` and those above it lets others put or exchange files, None: none does.
 
-    Root, and whoever owns `/`, is trusted above it. In a sticky folder (`/tmp`) only owners exchange files.
-    `folder` contains no links.
+    Root, and whoever owns `/`, is trusted. In a sticky folder (`/tmp`) only owners exchange files. `folder`
+    contains no links.
     """
     if not hasattr(os, "geteuid"):  # a system whose folders have no such owners
         return None
-    own, above = {os.geteuid()}, {os.geteuid(), 0, os.stat("/").st_uid}  # `/` in a user namespace: nobody's
-    for path in (folder, *folder.parents):
+    trusted = {os.geteuid(), 0, os.stat("/").st_uid}  # `/` in a user namespace: nobody's
+    for path in filter(Path.exists, (folder, *folder.parents)):
         found = path.stat()
         writers = found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
         if writers == stat.S_IWGRP and _of_one_user(found.st_gid):
             writers = 0
         if path != folder and found.st_mode & stat.S_ISVTX:
             writers = 0
-        if writers or found.st_uid not in (own if path == folder else above):
+        if writers or found.st_uid not in trusted:
             return path
     return None
 
@@ -162,13 +164,39 @@ def kernel(function: Function, parallel: bool = False) -> Function:
     """Compile `function` with numba (no Python objects, no fastmath) and cache it on disk.
 
     Raises:
-        UserError: there is no place for the cache.
+        UserError: there is no place for the cache, or others can write to it; when it is called: it has to be
+            compiled, and its place is read-only.
     """
     if numba.config.DISABLE_JIT:
         return interpreted(function)
     spec = find_spec(function.__module__)  # of `python -m package.module`: not `__main__`
     numba.config.CACHE_DIR = _folder(spec.name if spec else function.__module__)
     return cast(Function, numba.njit(**OPTIONS, parallel=parallel)(function))
+
+
+def _make_folder(locator: Any) -> None:
+    with suppress(OSError):  # numba would ask for a folder that can be written, or take one that can go stale
+        os.makedirs(locator.get_cache_path(), exist_ok=True)
+
+
+caching._CacheLocator.ensure_cache_path = _make_folder
+
+
+class _RefuseUnwritable(numba_event.Listener):  # type: ignore[misc]
+    """Say before a kernel is compiled, not minutes later, that it cannot be kept."""
+
+    def on_start(self, event: numba_event.Event) -> None:
+        function = event.data["dispatcher"]
+        folder = function.stats.cache_path
+        if folder is not None and not os.access(folder, os.W_OK):
+            name = f"{function.py_func.__module__}.{function.py_func.__qualname__}"
+            raise UserError(str(CACHE_ROOT), "", f"lacks {name} and cannot be written; {_REMEDY}")
+
+    def on_end(self, event: numba_event.Event) -> None:
+        pass
+
+
+numba_event.register("numba:compile", _RefuseUnwritable())
 
 
 class CompileCounter(numba_event.Listener):  # type: ignore[misc]

@@ -54,6 +54,21 @@ def test_nothing_in_the_unit_forbids_what_the_daemon_does():
     assert "AF_UNIX" in text
 
 
+@pytest.mark.parametrize(
+    ("given", "taken"), [(None, "/opt/p/cache"), ("", "/opt/p/cache"), ("/run/k", "/run/k")]
+)
+def test_the_launcher_keeps_to_a_cache_that_is_given(given, taken):
+    text = (DEPLOY.parent / "install-onboard.sh").read_text()
+    here_document = re.search(r"^cat .*(<<LAUNCHER\n(?:.|\n)*?\nLAUNCHER\n)", text, re.M)[1]
+    launcher = subprocess.run(
+        ["sh", "-c", f"prefix=/opt/p; cat {here_document}"], capture_output=True, text=True, check=True
+    )
+    lines = launcher.stdout.replace("exec ", "echo $NUMBA_CACHE_DIR # ")
+    environment = {} if given is None else {"NUMBA_CACHE_DIR": given}
+    said = subprocess.run(["/bin/sh", "-euc", lines], env=environment, capture_output=True, text=True)
+    assert said.stdout == f"{taken}\n"
+
+
 def test_the_image_belongs_to_root_but_for_the_kernels_and_says_whether_it_is_well():
     text = (DEPLOY.parents[1] / "Dockerfile").read_text()
     before, user, after = text.partition("USER brake")

@@ -1,8 +1,8 @@
 #!/bin/sh
 # tools/install-onboard.sh PREFIX
 # Install what runs in the vehicle into PREFIX, an absent or empty folder, and compile its kernels there,
-# so that a start compiles nothing. Run it as the user that will run the daemon, or as root and give that user
-# the folder of compiled kernels, PREFIX/cache, which has to be his own. Needs no root and leaves nothing elsewhere.
+# so that a start compiles nothing, and PREFIX may be read-only. Run it as the user that will run the daemon, or as
+# root; the folder of compiled kernels, PREFIX/cache, has to be theirs. Needs no root and leaves nothing elsewhere.
 set -eu
 die() { echo "install-onboard: $*" >&2; exit 2; }
 
@@ -30,7 +30,8 @@ echo "Installing into $prefix"
 # Compiled for any processor of this architecture: the image may run on another machine than built it.
 cat > "$prefix/bin/brake-ecu" <<LAUNCHER
 #!/bin/sh
-export NUMBA_CPU_NAME=generic NUMBA_CACHE_DIR='$prefix/cache'
+[ -n "\${NUMBA_CACHE_DIR:-}" ] || NUMBA_CACHE_DIR='$prefix/cache'
+export NUMBA_CPU_NAME=generic NUMBA_CACHE_DIR
 exec '$prefix/bin/python' -P -m ecu.cli "\$@"
 LAUNCHER
 

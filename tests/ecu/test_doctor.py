@@ -4,7 +4,7 @@ import pytest
 
 from ecu.bus.receive import new_reception
 from ecu.bus.receive_plan import contract_receive_plan
-from ecu.doctor import doctor, machine, messages, unit
+from ecu.doctor import doctor, kernels, machine, messages, unit
 from ecu.errors import UserError
 from ecu.settings.resources import resource
 
@@ -48,6 +48,16 @@ def test_the_machine_is_looked_at_and_every_refusal_has_a_remedy():
     checks = {check.name: check for check in machine()}
     assert {"Python", "SCHED_FIFO", "mlockall", "clock", "wake-up", "kernel cache"} <= set(checks)
     assert all(check.good or check.remedy for check in checks.values())
+
+
+def test_a_kernel_that_cannot_be_compiled_is_a_row(monkeypatch):
+    def refuse(ecu, compiled):
+        raise UserError("/opt/cache", "", "lacks ecu.step and cannot be written; set NUMBA_CACHE_DIR")
+
+    monkeypatch.setattr("ecu.doctor.warm_up", refuse)
+    row = kernels(None, contract_receive_plan(resource("dbc/brake_ecu.dbc")))
+    assert (row.good, row.found) == (False, "/opt/cache")
+    assert row.remedy.startswith("lacks ecu.step")
 
 
 @pytest.mark.parametrize("arguments", [("virtual", None), (None, "x")])

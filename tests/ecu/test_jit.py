@@ -66,9 +66,9 @@ class Package:
     def limit(self, value: float) -> None:
         self.write("limits", f"OTHER = 0.0\nGREATEST = greatest = {value}")
 
-    def run(self) -> dict[str, tuple[float, bool]]:
+    def run(self, first: str = "") -> dict[str, tuple[float, bool]]:
         """Return what each kernel gives, in a process of its own, and whether it was compiled."""
-        program = (
+        program = first + (
             "import importlib, json, sys\n"
             "package, *names = sys.argv[1:]\n"
             "kernels = [importlib.import_module(f'{package}.{name}').value for name in names]\n"
@@ -80,7 +80,9 @@ class Package:
             "PYTHONDONTWRITEBYTECODE": "1",
         }  # fmt: skip
         command = [sys.executable, "-c", program, self.name, *names]
-        done = subprocess.run(command, capture_output=True, text=True, env=environment, check=True)
+        done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+        if done.returncode:
+            raise RuntimeError(done.stderr)
         return dict(zip(names, map(tuple, json.loads(done.stdout)), strict=True))
 
 
@@ -94,6 +96,29 @@ def test_a_changed_constant_is_compiled_in_whichever_way_it_is_imported(tmp_path
     assert changed.pop("alone") == (7.0, False)
     assert {way: found for way, found in changed.items() if found != (3.0, True)} == {}
     assert {compiled for _, compiled in package.run().values()} == {False}
+
+
+READ_ONLY = """
+import errno, os, tempfile
+
+def refuse(path=None, *args, **kwargs):
+    raise OSError(errno.EEXIST if path and os.path.exists(path) else errno.EROFS, "read-only", path)
+
+os.mkdir = tempfile.TemporaryFile = refuse
+os.access = lambda path, mode: not mode & os.W_OK
+"""
+
+
+def test_a_complete_cache_on_a_read_only_system_is_enough(tmp_path: Path) -> None:
+    package = Package(tmp_path)
+    package.limit(2.0)
+    package.run()
+    assert {compiled for _, compiled in package.run(READ_ONLY).values()} == {False}
+    package.limit(3.0)
+    with pytest.raises(RuntimeError) as refused:
+        package.run(READ_ONLY)
+    line = str(refused.value).splitlines()[-1]
+    assert f"{package.cache}: lacks thrown_away.by_name.value and cannot be written; set NUMBA" in line
 
 
 def modules_with_kernels(package: str) -> list[str]:
@@ -158,10 +183,18 @@ def test_a_cache_that_others_can_write_to_is_found(
     assert (found and found.name) == fault
 
 
-def test_a_cache_of_another_user_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cache_of_another_user_than_root_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert jit.open_to_others(tmp_path) is None
+    if os.geteuid() == 0:
+        os.chown(tmp_path, 4712, -1)
     monkeypatch.setattr(os, "geteuid", lambda: 4711)
     assert jit.open_to_others(tmp_path) == tmp_path
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root gives a folder to root")
+def test_a_cache_of_root_is_run_by_its_users(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "geteuid", lambda: 4711)
+    assert jit.open_to_others(tmp_path) is None
 
 
 def test_a_group_is_a_user_s_own_by_its_name_and_members(monkeypatch: pytest.MonkeyPatch) -> None:
