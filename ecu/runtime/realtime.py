@@ -1,6 +1,7 @@
 """Real-time rights of a process; each refused one is a warning with its remedy."""
 
 import ctypes
+import errno
 import gc
 import os
 from collections.abc import Callable
@@ -8,6 +9,8 @@ from contextlib import suppress
 from typing import Final, NamedTuple
 
 import structlog
+
+from ecu.recording.ring import living_rings, ring_path
 
 PRIORITY: Final = 50  # of SCHED_FIFO: the priority that Linux gives its interrupt threads
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
@@ -33,9 +36,37 @@ def _lock_memory(which: int = _MCL_CURRENT | _MCL_FUTURE) -> None:
         raise OSError(number, os.strerror(number))
 
 
-def _last_cpu() -> None:
-    """Pin to the last CPU allowed: interrupts are served by the first ones."""
-    os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+def pin() -> None:
+    """Pin to the last CPU that no other daemon is pinned to: interrupts are served by the first ones.
+
+    Of two that pin at once the later process moves on. Raises OSError if no CPU is left.
+    """
+    allowed, own = os.sched_getaffinity(0), os.getpid()
+    rival = True
+    while rival:
+        free = allowed - _pinned().keys()
+        if not free:
+            os.sched_setaffinity(0, allowed)
+            raise OSError(errno.EBUSY, "other daemons are pinned to all CPUs")
+        os.sched_setaffinity(0, {max(free)})
+        rival = _pinned().get(max(free), own) < own
+
+
+def other_daemons() -> list[int]:
+    """Return the processes of our user that write rings, but for this one."""
+    own = ring_path(os.getpid()).name.split(".")
+    names = [path.name.split(".") for path in living_rings()]
+    return [int(name[2]) for name in names if name[1] == own[1] and name[2] != own[2]]
+
+
+def _pinned() -> dict[int, int]:
+    """Return the CPUs to which other daemons are pinned, with the first process of each."""
+    found: dict[int, int] = {}
+    for process in sorted(other_daemons(), reverse=True):
+        with suppress(ProcessLookupError):
+            cpus = os.sched_getaffinity(process)
+            found |= {cpu: process for cpu in cpus if len(cpus) == 1}
+    return found
 
 
 REQUESTS: Final[tuple[tuple[str, Callable[[], None], str], ...]] = (
@@ -52,7 +83,7 @@ REQUESTS: Final[tuple[tuple[str, Callable[[], None], str], ...]] = (
         "or LimitMEMLOCK=infinity in the unit",
     ),
 )
-AFFINITY: Final = ("affinity", _last_cpu, "let the cpuset of this process hold a CPU of its own")
+AFFINITY: Final = ("affinity", pin, "let the cpuset of this process hold a CPU of its own")
 
 
 def freeze_memory() -> None:

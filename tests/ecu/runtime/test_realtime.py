@@ -1,8 +1,11 @@
 import gc
+import os
 
 import pytest
 from structlog.testing import capture_logs
 
+from ecu.recording import ring as ring_module
+from ecu.recording.ring import ring_path
 from ecu.runtime import realtime
 
 
@@ -36,3 +39,52 @@ def test_each_refusal_is_one_line_with_its_remedy(monkeypatch, granted, verdicts
     assert [(verdict.name, verdict.granted) for verdict in found] == verdicts
     assert [line["what"] for line in logged] == lines
     assert all("limits.conf" in line["remedy"] for line in logged)
+
+
+def test_a_daemon_sees_the_others_of_its_user(monkeypatch, tmp_path):
+    monkeypatch.setattr(ring_module, "ring_folder", lambda: tmp_path)
+    rings = [ring_module.create_ring(ring_path(n), {}, b"", slots=2, frames=1) for n in (7, os.getpid())]
+    (tmp_path / "brake-ecu.1.8.ring").touch()
+    assert len(rings) == 2
+    assert realtime.other_daemons() == [7]
+
+
+# CPUs allowed, process -> its CPUs -> the CPU of process 50
+PINNED = {
+    "alone": ({0, 1, 2, 3}, {}, {3}),
+    "beside a standby": ({0, 1, 2, 3}, {7: {3}}, {2}),
+    "beside two": ({0, 1, 2, 3}, {7: {3}, 60: {2}}, {1}),
+    "beside one without rights": ({0, 1, 2, 3}, {7: {0, 1, 2, 3}}, {3}),
+    "beside one elsewhere": ({0, 1}, {7: {3}}, {1}),
+    "none left": ({0, 1}, {7: {0}, 8: {1}}, {0, 1}),
+}
+
+
+@pytest.mark.parametrize(("allowed", "others", "taken"), PINNED.values(), ids=PINNED)
+def test_a_daemon_takes_the_last_cpu_that_no_other_one_has(monkeypatch, allowed, others, taken):
+    cpus = {50: allowed} | others
+    monkeypatch.setattr(realtime, "other_daemons", lambda: list(others))
+    monkeypatch.setattr(os, "getpid", lambda: 50)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: cpus[process or 50])
+    monkeypatch.setattr(os, "sched_setaffinity", lambda process, given: cpus.update({50: given}))
+    if taken == allowed:
+        with pytest.raises(OSError, match="other daemons"):
+            realtime.pin()
+    else:
+        realtime.pin()
+    assert cpus[50] == taken
+
+
+@pytest.mark.parametrize(("rival", "taken"), [(49, {2}), (51, {3})])
+def test_of_two_that_pin_at_once_the_later_process_moves_on(monkeypatch, rival, taken):
+    cpus = {50: {0, 1, 2, 3}, rival: {0, 1, 2, 3}}
+
+    def pin(process, given):
+        cpus.update({50: given, rival: {3}})
+
+    monkeypatch.setattr(realtime, "other_daemons", lambda: [rival])
+    monkeypatch.setattr(os, "getpid", lambda: 50)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: cpus[process or 50])
+    monkeypatch.setattr(os, "sched_setaffinity", pin)
+    realtime.pin()
+    assert cpus[50] == taken
