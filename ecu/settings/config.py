@@ -1,8 +1,8 @@
 """CONFIG files: one vehicle, its brakes, sensors and tuning, in TOML; checked here, turned into `PARAMS`.
 
 Pressures stand in bar, everything else in SI units. `include = "tuned.toml"` takes from another file, named
-relative to this one, the keys that this one does not give itself. A key that is missing, unknown or out of
-range is one line: the file, the key and what would be right.
+relative to this one, or from a shipped one ("suv") the keys that this one does not give itself. A key that is
+missing, unknown or out of range is one line: the file, the key and what would be right.
 """
 
 import hashlib
@@ -33,6 +33,7 @@ from ecu.settings.annex5 import annex_5_violation
 from ecu.settings.dust import set_dust, set_dust_version
 from ecu.settings.lining_share import set_lining_share
 from ecu.settings.pad import set_pad
+from ecu.settings.resources import shipped_in
 from ecu.settings.sections import Axle, Config, Observer
 from ecu.settings.toml_file import findings, read_toml, summarised
 
@@ -41,6 +42,7 @@ __all__ = [
     "Config",
     "Observer",
     "config_hash",
+    "included_file",
     "load_config",
     "new_params",
     "store_key",
@@ -95,11 +97,17 @@ def validate_config(path: Path) -> Config | list[UserError]:
 def _included(path: Path, name: object) -> tuple[Path, dict[str, Any]]:
     if not isinstance(name, str) or not name:
         raise UserError(str(path), "include", 'give the name of a TOML file in "quotes"')
-    source = path.parent / name
+    source = included_file(path, name)
     included = read_toml(source)
     if "include" in included:
         raise UserError(str(source), "include", f"an included file includes no other; name it in {path}")
     return source, included
+
+
+def included_file(path: Path, name: str) -> Path:
+    """Return the file that `path` includes as `name`: one relative to it, or a shipped configuration."""
+    beside = path.parent / name
+    return beside if beside.exists() else shipped_in("config").get(name, beside)
 
 
 def _merged(own: dict[str, Any], included: dict[str, Any]) -> dict[str, Any]:

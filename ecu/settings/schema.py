@@ -21,7 +21,7 @@ def config_schema() -> dict[str, Any]:
     described(found)
     found["properties"]["include"] = {
         "type": "string",
-        "description": "A file beside this one that gives the keys which this one does not.",
+        "description": "File beside this one, or shipped one (suv, …), with what this one does not give.",
     }
     return found
 

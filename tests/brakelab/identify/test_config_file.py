@@ -58,6 +58,15 @@ def test_programs_go_on_with_what_others_wrote_in_any_order(tmp_path, start) -> 
     assert first.blending == load_config(CONFIG / f"{start}.toml").blending
 
 
+@pytest.mark.parametrize("start", ["suv", "suv-blended"])
+def test_what_was_identified_of_a_shipped_car_can_be_moved(tmp_path, start) -> None:
+    out, moved = tmp_path / "out" / "car.toml", tmp_path / "vehicle" / "etc" / "car.toml"
+    write_car(CONFIG / f"{start}.toml", out, "# head", FITTED)
+    moved.parent.mkdir(parents=True)
+    out.rename(moved)
+    assert load_config(moved).front.disc_heating == 3e-4
+
+
 def test_what_a_person_wrote_stays_with_its_comments(tmp_path) -> None:
     first, second = tmp_path / "a.toml", tmp_path / "sub" / "b.toml"
     first.write_text(

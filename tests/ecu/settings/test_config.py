@@ -356,6 +356,14 @@ def test_the_hash_is_that_of_the_merged_content(tmp_path: Path) -> None:
     assert config_hash(merged) == config_hash(whole) != config_hash(load_config(CONFIGS / "suv.toml"))
 
 
+def test_a_shipped_car_is_included_by_its_name_but_for_a_file_of_that_name(tmp_path: Path) -> None:
+    car = tmp_path / "car.toml"
+    car.write_text('include = "suv"\nname = "mine"\n', encoding="utf-8")
+    assert load_config(car).vehicle == load_config(CONFIGS / "suv.toml").vehicle
+    (tmp_path / "suv").write_text((CONFIGS / "lcv.toml").read_text("utf-8"), encoding="utf-8")
+    assert load_config(car).vehicle == load_config(CONFIGS / "lcv.toml").vehicle
+
+
 WRONG_INCLUDES = [
     # include, content of the included file, the line
     ('"nosuch.toml"', "", "nosuch.toml: no such file"),

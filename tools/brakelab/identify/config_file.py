@@ -10,6 +10,7 @@ from tomlkit.items import InlineTable
 
 from brakelab.results.outputs import config_files
 from ecu.errors import UserError
+from ecu.settings.resources import shipped_in
 
 Section = dict[str, tuple[str, str]]
 """Keys of a table, each with its value as TOML and a comment."""
@@ -19,11 +20,13 @@ def car_toml(config: Path, out: Path, head: str, sections: Mapping[str, Section]
     """Return a configuration that takes all but `sections` from `config`; comments `head` stand first.
 
     `sections` by the names of tables, as front.pad, "": the keys at the top. A file that is included includes
-    no other: what `config` itself includes is included in its place, and its own keys are repeated.
+    no other: what `config` itself includes is included in its place, and its own keys are repeated. A shipped
+    one is included by its name, so that the file can be moved to another machine.
     """
     source = config_files(config)[-1]
     document: Any = tomlkit.parse(config.read_text("utf-8-sig") if source != config else "")
-    document["include"] = Path(os.path.relpath(source.resolve(), out.resolve().parent)).as_posix()
+    beside = Path(os.path.relpath(source.resolve(), out.resolve().parent)).as_posix()
+    document["include"] = source.stem if is_shipped(source) else beside
     for name, keys in sections.items():
         table = document
         for part in filter(None, name.split(".")):
@@ -34,6 +37,12 @@ def car_toml(config: Path, out: Path, head: str, sections: Mapping[str, Section]
             item = tomlkit.value(value)
             table[key] = item.comment(comment) if comment and not isinstance(table, InlineTable) else item
     return f"{head}\n{document.as_string().rstrip()}\n"
+
+
+def is_shipped(config: Path) -> bool:
+    """Return whether `config` is one of the shipped configurations."""
+    shipped = shipped_in("config").get(config.stem)
+    return shipped is not None and shipped.resolve() == config.resolve()
 
 
 def write_car(config: Path, out: Path, head: str, sections: Mapping[str, Section]) -> None:

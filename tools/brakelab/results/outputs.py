@@ -5,13 +5,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ecu.errors import UserError
+from ecu.settings.config import included_file
 from ecu.settings.toml_file import read_toml
 
 
 def config_files(config: Path) -> list[Path]:
     """Return `config` and the file that it includes, if any."""
     name = read_toml(config).get("include")
-    return [config, config.parent / str(name)] if name else [config]
+    return [config, included_file(config, str(name))] if name else [config]
 
 
 def check_outputs(out: Path, written: Sequence[Path], read: Sequence[Path], toml: bool = False) -> None:
