@@ -8,6 +8,7 @@ import pytest
 
 from brakelab.identify.friction.analysis import history_effect, levels, principal_components
 from brakelab.identify.friction.stops import Stops
+from brakelab.identify.friction.tables import component_table
 
 
 def factorial(stops: Stops, slopes: tuple[float, float, float], noise: float, before: float = 0.0) -> Stops:
@@ -56,6 +57,16 @@ def test_levels_explain_what_a_line_does_not(stops: Stops) -> None:
     found = principal_components(replace(made, mean=made.mean - 0.05 * scaled**2))
     assert found.correlation[2] ** 2 < 0.01
     assert found.any_form[2] > 0.95
+
+
+@pytest.mark.parametrize("hotter", [0.0, 25.0], ids=["full factorial", "hotter at higher pressure"])
+def test_shares_of_inputs_that_go_together_are_not_added(stops: Stops, hotter: float) -> None:
+    made = factorial(stops, (-0.1, 0.4, 0.6), 0.7)
+    heated = made.start_temperature + hotter * (made.held_pressure / 1e6 - 1.0)
+    found = principal_components(replace(made, start_temperature=heated))
+    table = component_table(found)
+    assert (table.rows[-1][-1] == "–") == (hotter > 0.0)
+    assert ("their shares overlap" in table.below) == (hotter > 0.0)
 
 
 def test_levels_are_told_apart_wherever_they_lie() -> None:

@@ -27,6 +27,7 @@ class Components(NamedTuple):
     correlation: Vector  # (3,), with mean friction
     linear: float  # share of friction's variance that straight lines explain
     any_form: Vector  # (3,), share that the mean at each level explains (eta squared)
+    overlap: float  # largest correlation between two inputs: 0 in a full factorial
     together: float  # share that the mean of each combination of levels would explain, without interactions
 
 
@@ -74,6 +75,7 @@ def principal_components(stops: Stops) -> Components:
         with_friction,
         float(with_friction @ inverse @ with_friction),
         any_form,
+        float(np.abs(correlations[:3, :3] - np.eye(3)).max()),
         float(any_form.sum()),
     )
 

@@ -15,6 +15,8 @@ from brakelab.plant.friction.law import RigBrake
 from brakelab.results.text_table import Table
 
 PARTS = 5
+OVERLAP = 0.1
+"""Correlation of two inputs from which on their shares of variance overlap by more than their digits."""
 
 
 def law_tables(identified: Identified, unseen: str) -> list[Table]:
@@ -97,7 +99,11 @@ def residual_table(judged: Judged, columns: Columns, stops: Stops) -> Table:
 
 
 def component_table(found: Components) -> Table:
-    """Return the principal components of stops beside the true shares of variance."""
+    """Return the principal components of stops beside the true shares of variance.
+
+    Shares of inputs that go together are not added: they overlap.
+    """
+    added = found.overlap <= OVERLAP
     rows = [
         (name, *(f"{100 * value:+.1f}" for value in found.loadings[place]), *cells)
         for place, (name, cells) in enumerate(
@@ -108,7 +114,7 @@ def component_table(found: Components) -> Table:
                         (f"{r:+.2f}", f"{100 * r * r:.1f}", f"{100 * any_form:.1f}")
                         for r, any_form in zip(found.correlation, found.any_form, strict=True)
                     ),
-                    ("", f"{100 * found.linear:.1f}", f"{100 * found.together:.1f}"),
+                    ("", f"{100 * found.linear:.1f}", f"{100 * found.together:.1f}" if added else "–"),
                 ],
                 strict=True,
             )
@@ -118,6 +124,11 @@ def component_table(found: Components) -> Table:
         f"First three components: {100 * found.first_three:.1f} % of the variance of the four variables, "
         "which is not of friction. Loadings as in Table B.1; shares of the variance of mean friction."
     )
+    if not added:
+        below += (
+            f" Inputs vary together here (correlation up to {found.overlap:.2f}): their shares overlap, "
+            "each is that of all it goes with, and their sum says nothing."
+        )
     columns = ("variable", "PC1 [%]", "PC2 [%]", "PC3 [%]", "r", "share, linear [%]", "share, any form [%]")
     return Table("Principal components", columns, rows, below)
 
