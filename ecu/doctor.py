@@ -23,7 +23,7 @@ from ecu.bus.signal_map import receive_plan
 from ecu.bus.transmit import contract_transmit_plan
 from ecu.compiling import compiling_told
 from ecu.contract.records import FRAME, INPUTS, new_record
-from ecu.contract.signals import CYCLE_NS, INPUT, INPUT_SIGNALS
+from ecu.contract.signals import CYCLE_NS, INPUT_SIGNALS
 from ecu.errors import UserError
 from ecu.output import give, say
 from ecu.runtime.cycle import new_ecu
@@ -33,11 +33,14 @@ from ecu.settings.resources import resource
 
 LISTEN_S: Final = 2.0
 SLEEPS: Final = 50
-OPTIONAL: Final = frozenset(
-    place
-    for place in INPUT.values()
-    if INPUT_SIGNALS[place].message.startswith(("VehicleSpeed", "WheelForce"))
-)
+OPTIONAL: Final = {
+    "VehicleSpeed": "the speed is that of the wheels",
+    "WheelForce": "friction is estimated without measured forces",
+    "Motor": "no motor brakes or drives, and nothing is learned of the mass",
+    "HydraulicStatus": "the hydraulic unit counts as ready, its accumulator as full",
+    "Ambient": "the ambient temperature is that of CONFIG, and it does not rain",
+}
+"""What holds without the frames of these inputs."""
 
 
 UNIT_FOLDERS: Final = tuple(
@@ -214,8 +217,9 @@ def _message(plan: ReceivePlan, expected: np.void, counters: np.void, seconds: f
     places = plan.signals["place"][first : first + int(expected["count"])]
     received, accepted = int(counters["received"]), int(counters["accepted"])
     if counters["stamp_ns"] == NEVER:
-        if OPTIONAL.issuperset(places.tolist()):
-            return Check(name, True, "not seen, optional")
+        without = {_without(place) for place in places.tolist()}
+        if "" not in without:
+            return Check(name, True, f"not seen, optional: {'; '.join(sorted(without))}")
         return Check(name, False, "not seen", "check its sender, the channel, --map")
     rate = f"{received / seconds:.0f}/s"
     wrong = {
@@ -235,6 +239,12 @@ def _message(plan: ReceivePlan, expected: np.void, counters: np.void, seconds: f
     if longest_ns and received < int(seconds * 1e9 / longest_ns):
         return Check(name, False, f"{rate}, {1e9 / longest_ns:.1f}/s is the least", "is the bus overloaded?")
     return Check(name, True, f"{rate}, all accepted")
+
+
+def _without(place: int) -> str:
+    """Return what holds without an input, "": it is needed."""
+    message = INPUT_SIGNALS[place].message
+    return next((held for begin, held in OPTIONAL.items() if message.startswith(begin)), "")
 
 
 def _show(checks: list[Check]) -> None:

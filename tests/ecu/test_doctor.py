@@ -14,7 +14,12 @@ DBC = Path(__file__).parents[2] / "dbc" / "brake_ecu.dbc"
 FOUND = {
     "in time": ("Imu", {"received": 200, "accepted": 200}, True, "100/s"),
     "never": ("Imu", {}, False, "not seen"),
-    "never, but optional": ("WheelForceFront", {}, True, "optional"),
+    "never, but optional": ("WheelForceFront", {}, True, "optional: friction is estimated without"),
+    "a car without motors": ("MotorRear", {}, True, "nothing is learned of the mass"),
+    "a unit that says nothing": ("HydraulicStatus", {}, True, "counts as ready"),
+    "no thermometer": ("Ambient", {}, True, "that of CONFIG"),
+    "no steering angle": ("Steering", {}, False, "not seen"),
+    "no pressures": ("CalliperPressureFront", {}, False, "not seen"),
     "too rare": ("Imu", {"received": 50, "accepted": 50}, False, "least"),
     "checksum": ("Imu", {"received": 200, "accepted": 190, "checksum_errors": 10}, False, "10 checksum"),
     "counter stuck": ("Imu", {"received": 200, "accepted": 1, "repeated": 199}, False, "199 repeated"),
