@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from brakelab.fleet.manifest import FITTED
 from brakelab.fleet.statistics import Summary
 from brakelab.fleet.summary import known
-from brakelab.results import euro7
 from brakelab.results.brakes import BrakeRow
 from brakelab.results.pads import PadState, filled, packed, pads_of
 from brakelab.results.prediction import corners
@@ -54,8 +53,6 @@ class Due(NamedTuple):
     """Wear, mm per 1,000 km."""
     mass: float
     """Of particles, mg/km, all linings since they were fitted."""
-    above: bool
-    """Above the limit of a cycle that is not this driving."""
     particles: float
     """Per km since the emission models count."""
 
@@ -123,7 +120,7 @@ def pads_due(done: Sequence[Summary]) -> list[Due]:
             math.nan if row[name] is None else float(row[name])
             for name in ("particle_mass_per_km", "particles_per_km")
         )
-        found.append(Due(vehicle, pad, rate, mass, euro7.above_all(mass), particles))
+        found.append(Due(vehicle, pad, rate, mass, particles))
     return sorted(found, key=lambda due: (_order(due.pad), due.vehicle))
 
 

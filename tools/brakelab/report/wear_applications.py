@@ -13,8 +13,8 @@ from ecu.contract.signals import CORNERS
 
 _REMEDY: Final = "write it again with `brake-ecu replay`"
 _PER_CORNER: Final = (
-    "brake_energy", "disc_temperature_mean", "pad_wear_mass", "sigma_pad_wear_mass", "particle_mass",
-    "emission_factor", "emission_factor_low", "emission_factor_high",
+    "brake_energy", "disc_temperature_mean", "pad_wear_mass", "particle_mass", "particle_mass_low",
+    "particle_mass_high", "emission_factor", "emission_factor_low", "emission_factor_high",
 )  # fmt: skip
 AFTER: Final = 0.005  # s after an application: the ECU has counted its particles
 DIRTIEST: Final = 10
@@ -32,9 +32,10 @@ class Application(NamedTuple):
     """Of the four brakes, J."""
     worn: Vector
     """Mass of both pads of a calliper, g."""
-    worn_sigma: Vector
     mass: float
     """Of particles, all brakes, mg."""
+    mass_low: float
+    mass_high: float
     particles: float
     """All brakes that have a model."""
     particles_low: float
@@ -68,7 +69,7 @@ def read_applications(drive: Drive, result: Path) -> list[Application]:
     t, duration, v_in, v_end = (
         numbers(table, name, path)[first] for name in ("t_start", "duration", "v_in", "v_end")
     )
-    energy, heat, worn, sigma, mass, factor, low, high = (
+    energy, heat, worn, mass, mass_low, mass_high, factor, low, high = (
         _optional(table, name, path)[order] for name in _PER_CORNER
     )
     after = np.searchsorted(drive.t, t + duration + AFTER)
@@ -80,7 +81,8 @@ def read_applications(drive: Drive, result: Path) -> list[Application]:
     return [
         Application(
             float(t[k]), float(t[k] + duration[k]), float(v_in[k]), float(v_end[k]),
-            _total(energy[:, k]), worn[:, k], sigma[:, k], _total(mass[:, k]),
+            _total(energy[:, k]), worn[:, k], _total(mass[:, k]),
+            _total(mass_low[:, k]), _total(mass_high[:, k]),
             float(count[k]), float(count_low[k]), float(count_high[k]),
             heat[:, k], energy[:, k], factor[:, k], low[:, k], high[:, k],
         )

@@ -95,24 +95,22 @@ def _known_by(pad: PadState) -> str:
 
 def _amounts(drive: Drive, pads: list[PadState], applications: list[Application]) -> list[Amount]:
     km = 1e-3 * float(way(drive)[-1])
-    mass = sum(each.mass for each in applications if math.isfinite(each.mass))
-    weighed = any(math.isfinite(each.mass) for each in applications)
-    per_km = mass / km if weighed and km >= LEAST_WAY else math.nan
-    worn, sigma = (
-        np.nansum([getattr(each, name) for each in applications]) for name in ("worn", "worn_sigma")
+    weighed = [each for each in applications if math.isfinite(each.mass)]
+    per_km, low, high = (
+        sum(getattr(each, name) for each in weighed) / km if weighed and km >= LEAST_WAY else math.nan
+        for name in ("mass", "mass_low", "mass_high")
     )
-    band = f" ± {BAND * sigma / worn * per_km:.1f}" if worn > 0.0 and math.isfinite(per_km) else ""
+    band = f" ({low:.1f} to {high:.1f})" if math.isfinite(low + high) else ""
     found = []
     life = float(drive.column("particle_mass_per_km")[-1])
     if math.isfinite(per_km) or math.isfinite(life):
-        above = any(map(euro7.above_all, (per_km, life)))
         found.append(
             Amount(
                 "Particles of the linings up to 10 µm [mg/km]",
                 fixed(per_km, 1) + band,
                 fixed(life, 1),
                 euro7.WORDS,
-                above,
+                euro7.above_all(low),
             )
         )
     life = float(drive.column("particles_per_km")[-1])
