@@ -17,7 +17,7 @@ from brakelab.report.drive import Drive
 from brakelab.results.console import new_console
 from brakelab.rig.live import Bus, choose_bus, drive, make_folder, named_bus
 from brakelab.rig.outcome import Outcome, Undisturbed, outcome, stopping_distance
-from brakelab.rig.page import summary, write_page, write_tables
+from brakelab.rig.page import by_the_car, summary, write_page, write_tables
 from brakelab.rig.results import write_recorded, write_simulated
 from brakelab.rig.vehicle_node import warm_up
 from brakelab.simulation.closed_loop import new_loop, run
@@ -98,6 +98,8 @@ def rig(
         if meeting is not None:
             meeting.close()
     console = new_console(WIDTH)
+    for line in by_the_car(outcomes):
+        print(line)
     console.print(summary(outcomes))
     give(scenarios=[{k: v for k, v in one._asdict().items() if k != "curve"} for one in outcomes])
     for line in others:

@@ -3,7 +3,7 @@
 import math
 from importlib.resources import files
 from pathlib import Path
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -17,6 +17,9 @@ from brakelab.rig.outcome import Outcome
 from brakelab.rig.reaction import Reaction
 from ecu import __version__
 from ecu.settings.config import Config, config_hash
+
+NAMED: Final = 3
+"""Scenarios whose names are listed; more are counted."""
 
 
 def more_distance(outcome: Outcome) -> float:
@@ -47,9 +50,22 @@ def summary(outcomes: list[Outcome]) -> Table:
             signed_percent(more_distance(one), 1),
             str(one.missed),
             str(one.frames.lost),
-            "; ".join([*seen, *(f"unexplained: {name}" for name in one.unexplained), *one.of_linings]),
+            "; ".join([*seen, *(f"unexplained: {name}" for name in one.unexplained)]),
         )
     return table
+
+
+def by_the_car(outcomes: list[Outcome]) -> list[str]:
+    """Return the fault bits that the car's linings account for, each once with its scenarios."""
+    told: dict[str, list[str]] = {}
+    for one in outcomes:
+        for line in one.of_linings:
+            told.setdefault(line, []).append(one.scenario)
+    where = {
+        line: ", ".join(names) if len(names) <= NAMED else f"{len(names)} of {len(outcomes)}"
+        for line, names in told.items()
+    }
+    return [f"by the car, in {scenarios}: {line}" for line, scenarios in where.items()]
 
 
 def write_tables(outcomes: list[Outcome], out: Path) -> None:
@@ -117,6 +133,7 @@ def write_page(outcomes: list[Outcome], bus: Bus | None, config: Config, cars: s
         tiles=_tiles(outcomes, bus is not None),
         more_distance=more_distance,
         bits_text=bits_text,
+        by_the_car=by_the_car(outcomes),
         live=bus is not None,
         controller=bus is not None and bus.wire is not None,
         facts=[
