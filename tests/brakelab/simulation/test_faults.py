@@ -1,5 +1,6 @@
 """Every kind of fault: what it does to frames, signals and the car, and what the ECU makes of it."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,7 @@ import pytest
 
 from brakelab.simulation.closed_loop import Drive, Loop, new_loop, run
 from brakelab.simulation.fault_kernels import HELD, deliver, new_link
-from brakelab.simulation.faults import KINDS, Fault, fault_records
+from brakelab.simulation.faults import KEYS, KINDS, Fault, fault_records
 from brakelab.simulation.outages import START_UP
 from brakelab.simulation.scenario import load_scenario
 from brakelab.simulation.vehicle_bus import new_noise
@@ -22,6 +23,19 @@ from ecu.settings.resources import resource
 ROOT = Path(__file__).parents[3]
 CONFIG = load_config(ROOT / "config" / "suv.toml")
 PRESSURE_FL = bits.PRESSURE_NOT_FOLLOWING | bits.IMPLAUSIBLE["calliper_pressure_fl"]
+
+
+def test_the_page_has_the_keys_of_every_kind() -> None:
+    page = (ROOT / "docs" / "rig.md").read_text("utf-8")
+    rows = re.findall(
+        r"^\| (`.*?) \| (.*?) ?\| .* \|$", page.partition("| kind | keys")[2].partition("**Bus-off")[0], re.M
+    )
+    listed = {
+        kind: set(re.findall(r"`(\w+)`", keys))
+        for kinds, keys in rows
+        for kind in re.findall(r"`(\w+)`", kinds)
+    }
+    assert listed == KEYS
 
 
 def identifier(name: str) -> int:

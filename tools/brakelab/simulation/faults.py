@@ -1,34 +1,4 @@
-"""Fault injection: `[[fault]]` tables of a scenario. `fault_kernels.py` applies them.
-
-```
-[[fault]]
-kind = "lost"                # see `KINDS`
-t = 4.0                      # s since the car set off
-duration = 1.0               # s; without it to the end of the drive
-message = ["Imu"]            # of the database, either way; without it all frames of the vehicle
-share = 0.5                  # of these frames
-```
-| kind | keys beside t and duration | effect |
-| --- | --- | --- |
-| lost, doubled, corrupted | message, share | frames are lost, arrive twice, arrive with one bit flipped |
-| late | message, share, delay [s] | frames arrive `delay` later |
-| jittered | message, share, delay [s] | frames are late by a normal draw, mean and deviation `delay` |
-| batched | message, share, delay [s] | a gateway passes frames on at whole multiples of `delay` |
-| held_up | message, share | frames arrive at the end of the fault, all at once |
-| stuck | signal | a signal on the bus keeps its value, its frames continue |
-| set | signal, amount | a signal has the value `amount` |
-| invalid | signal | a signal is sent as not available |
-| biased, noisy | signal, amount | `amount` is added; white noise of that standard deviation is added |
-| scaled | signal, amount | a signal is multiplied by `amount` |
-| drifting | signal, rate, limit | `rate` times the seconds since `t` is added, `limit` at most |
-| scale_drifting | signal, rate, limit | a signal is multiplied by one plus the same |
-| delayed | signal, delay [s] | a signal has the value of `delay` before |
-| swapped | signal | two signals have each other's value |
-| bus_off | | the ECU's controller is off the bus: neither side receives the other |
-| daemon_killed | standby | SIGKILL at `t`, restart after `duration`; `standby`: a second daemon stands by |
-| motor_lost | corner | motors give no torque and report none available |
-| calliper_dead | corner | callipers get no pressure: one, or those of a circuit |
-| accumulator_low | amount [bar] | the hydraulics reach this pressure at most and report "not ready" |
+"""Fault injection: `[[fault]]` tables of a scenario. `fault_kernels.py` applies them; docs/rig.md lists them.
 
 Frames are disturbed in transit, after end-to-end protection; a signal is disturbed before it, so that its
 frame is intact.
@@ -77,7 +47,7 @@ LATE, JITTERED, BATCHED, HELD_UP, LOST, DOUBLED, CORRUPTED, BUS_OFF, DAEMON_KILL
 STUCK, SET, INVALID, BIASED, NOISY, SCALED, DRIFTING, SCALE_DRIFTING, DELAYED, SWAPPED = range(9, 19)
 MOTOR_LOST, CALLIPER_DEAD, ACCUMULATOR_LOW = range(19, len(KINDS))
 _FRAMES: Final = {"message", "share"}
-_BELONGS: Final[dict[str, set[str]]] = {
+KEYS: Final[dict[str, set[str]]] = {
     "late": {*_FRAMES, "delay"},
     "jittered": {*_FRAMES, "delay"},
     "batched": {*_FRAMES, "delay"},
@@ -101,6 +71,7 @@ _BELONGS: Final[dict[str, set[str]]] = {
     "calliper_dead": {"corner"},
     "accumulator_low": {"amount"},
 }
+"""Of each kind, beside `t` and `duration`."""
 _NEEDED: Final = {"delay", "signal", "amount", "rate", "limit"}
 
 LONGEST_DELAY: Final = 21  # cycles
@@ -139,12 +110,12 @@ def _messages() -> dict[str, dict[str, int]]:
 
 
 class Fault(BaseModel):
-    """One `[[fault]]` table."""
+    """A fault; docs/rig.md has the keys and the effect of each kind."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True)
 
     kind: Kind
-    """What fails; docs/rig.md has the effect of each."""
+    """What fails."""
     t: Annotated[float, Field(ge=0.0), Unit("s")]
     """Since the car set off."""
     duration: Annotated[float, Field(gt=0.0), Unit("s")] | None = None
@@ -170,7 +141,7 @@ class Fault(BaseModel):
 
     @model_validator(mode="after")
     def _complete(self) -> "Fault":
-        belongs = _BELONGS[self.kind]
+        belongs = KEYS[self.kind]
         given = self.model_fields_set - {"kind", "t", "duration"}
         for name in sorted(given - belongs):
             raise ValueError(f"{name} does not belong to the kind {self.kind!r}; remove it")

@@ -53,7 +53,7 @@ share_front = 1.0
 angle = [[0.0, 0.0], [2.0, 0.03]]          # s, rad at the road wheel, left positive
 path = [[0.0, 0.0], [30.0, 3.5]]           # or m, m: path that the driver follows
 ```
-Faults of the bus, a sensor or an actuator are described by `[[fault]]` tables: `faults.py`.
+Faults of the bus, a sensor or an actuator are described by `[[fault]]` tables: docs/rig.md.
 """
 
 import math
@@ -148,7 +148,7 @@ class Scenario(BaseModel):
     repeat: Annotated[int, Field(ge=1), Unit("-")] = 1
     """How often the phases are driven."""
     fault: list[Fault] = []
-    """Faults on the way; see `brakelab.simulation.faults`."""
+    """Faults on the way."""
     phase: Annotated[list[Phase], Field(min_length=1)]
     """The driver's actions, one after the other."""
 
