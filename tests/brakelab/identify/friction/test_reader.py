@@ -66,6 +66,29 @@ def test_a_damaged_row_is_named_as_an_editor_counts(
     assert read_recording(path).damaged.endswith(place.replace(str(row + 2), str(row + 3)))
 
 
+ABOVE = {
+    # of a test rig's programme; the names and what stands below them are changed by the last two
+    "a session": ("Prüfstand;LINK 3900\nBelag;A 17\n\n", ";", ""),
+    "a session of another width": ("Prüfstand;LINK 3900;;;;;;;\nPrüfer;Weiß\n", ";", ""),
+    "units below the names": ("Prüfstand;LINK 3900\n\n", ";", "s;psi;Nm;rpm;°F\n"),
+    "units in the names": ("Prüfstand;LINK 3900\n\n", " [raw];", ""),
+}
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
+@pytest.mark.parametrize(("above", "joint", "below"), ABOVE.values(), ids=ABOVE)
+def test_lines_above_the_names_are_passed_over(
+    tmp_path: Path, recording: Recording, strange: Write, above: str, joint: str, below: str, encoding: str
+) -> None:
+    path = strange(tmp_path, recording)
+    first, rows = path.read_text("utf-8").split("\n", 1)
+    names = first.replace(";", joint) + joint.removesuffix(";")
+    path.write_text(f"{above}{names}\n{below}{rows}", encoding)
+    read = read_recording(path)
+    assert read.damaged == ""
+    np.testing.assert_allclose(read.recording.time, recording.time, rtol=1e-4, atol=2e-3)
+
+
 def test_a_column_of_words_in_parquet_is_named(tmp_path: Path, columns: Columns) -> None:
     path = tmp_path / "own.parquet"
     names = [name for name, _ in columns.columns.model_dump().values()]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from brakelab.arrays import Vector
 from brakelab.identify.friction.columns import UNITS, ZEROS, Columns, load_columns
 from brakelab.identify.friction.recording import NAMES, Recording
+from brakelab.logs.csv_header import find_header
 from brakelab.logs.csv_rows import csv_columns, csv_rows
 from brakelab.logs.log_quality import Damage
 from ecu.errors import UserError
@@ -96,11 +97,21 @@ def _rows(path: Path, names: list[str], damage: Damage, first: int) -> Iterator[
         columns = np.array([_column(path, name, table[name]) for name in names])
         yield first + np.arange(columns.shape[1]), columns
         return
-    found, delimiter = csv_columns(path)
+    found, delimiter, above = _header(path, names)
     _refuse_missing(path, names, found)
-    for lines, batch in csv_rows(path, found, delimiter, list(dict.fromkeys(names)), damage):
+    for lines, batch in csv_rows(path, found, delimiter, list(dict.fromkeys(names)), damage, above):
         cells = {name: _numbers(batch.column(name).to_pylist()) for name in dict.fromkeys(names)}
         yield lines, np.array([cells[name] for name in names])
+
+
+def _header(path: Path, names: list[str]) -> tuple[list[str], str, int]:
+    """Return columns, separator and number of lines above the rows; lines may stand above the names."""
+    found, delimiter = csv_columns(path)
+    if set(names) <= set(found):
+        return found, delimiter, 1
+    header = find_header(path)
+    titled = set(names) <= set(header.titles)
+    return header.titles if titled else header.names, header.delimiter, header.lines
 
 
 def _refuse_missing(path: Path, names: list[str], found: list[str]) -> None:
