@@ -47,6 +47,8 @@ from ecu.output import LOG_FORMATS, Level, fault, give, log_as, new_policy, poli
 
 LABORATORY = ("bokeh", "jinja2", "pyarrow", "pymoo", "scipy", "tomlkit")
 """Packages of the extra `lab`, by the names that are imported."""
+OF_REPOSITORY = "from the repository: pip install '.[lab]' ./tools"
+"""No package index has this project: a package of its name there would be somebody else's."""
 FLEET = ("distributed", "fsspec")
 """Packages of the extra `fleet`."""
 LEARN = ("sklearn",)
@@ -203,10 +205,10 @@ def _describe(error: Exception) -> tuple[str, int]:
         case typer.TyperException():
             context = getattr(error, "ctx", None)
             command = context.command_path if context else "brake-ecu"
-            hint = "" if _add_commands() else "; the laboratory's commands need pip install brake-ecu-lab"
+            hint = "" if _add_commands() else f"; the laboratory's commands need {OF_REPOSITORY}"
             return f"{error.format_message().rstrip('.')}; see {command} --help{hint}", error.exit_code
         case ModuleNotFoundError(name=str(name)) if name.partition(".")[0] in LABORATORY:
-            return f"{name} is missing: this command needs the laboratory, pip install 'brake-ecu[lab]'", 2
+            return f"{name} is missing: this command needs the laboratory, {OF_REPOSITORY}", 2
         case ModuleNotFoundError(name=str(name)) if name.partition(".")[0] in (*FLEET, "dask"):
             return f"{name} is missing: fleets need it, pip install distributed fsspec", 2
         case ModuleNotFoundError(name=str(name)) if name.partition(".")[0] in LEARN:

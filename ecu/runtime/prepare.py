@@ -180,7 +180,8 @@ def prepare(options: RunOptions) -> Session:
 def _check_metrics(place: str) -> None:
     """Raise UserError for metrics that can never be served at `place`, ADDRESS:PORT."""
     if find_spec("prometheus_client") is None:
-        raise UserError("--metrics-port", "", "needs prometheus-client: pip install prometheus-client")
+        install = f"{sys.executable} -m pip install prometheus-client"
+        raise UserError("--metrics-port", "", f"needs prometheus-client: {install}")
     address = place.rpartition(":")[0]
     try:
         IPv4Address(address)

@@ -85,7 +85,7 @@ def test_a_mistake_is_one_line_and_exit_code_2(
         (
             ModuleNotFoundError("No module named 'bokeh'", name="bokeh.plotting"),
             2,
-            "pip install 'brake-ecu[lab]'",
+            "from the repository: pip install '.[lab]' ./tools",
         ),
         (ModuleNotFoundError("No module named 'ecu.x'", name="ecu.x"), 1, "unexpected ModuleNotFoundError"),
         (

@@ -77,8 +77,8 @@ def test_step_without_filterpy_says_how_to_get_it(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setitem(__import__("sys").modules, "filterpy.kalman", None)
     rows = step_rows(rounds=1, cycles=5)
     assert [row.note for row in rows if row.peer is None] == [
-        "filterpy not installed: pip install 'brake-ecu[dev]', four filters only"
-    ] * 2 + ["filterpy not installed: pip install 'brake-ecu[dev]'"] * 2
+        "filterpy not installed: in the repository pip install '.[dev]', four filters only"
+    ] * 2 + ["filterpy not installed: in the repository pip install '.[dev]'"] * 2
 
 
 def test_all_frames_of_the_codec_bench_are_accepted_and_read_as_cantools_reads_them() -> None:

@@ -13,7 +13,7 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike
 
-NOT_INSTALLED: Final = "{} not installed: pip install 'brake-ecu[dev]'"
+NOT_INSTALLED: Final = "{} not installed: in the repository pip install '.[dev]'"
 
 
 class Figure(NamedTuple):
