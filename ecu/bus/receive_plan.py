@@ -3,6 +3,7 @@
 A signal map compiles the messages of a foreign database to the same plan.
 """
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -17,7 +18,7 @@ from ecu.bus.freshness import input_freshness, new_freshness
 from ecu.bus.plan import SIGNAL, SignalUse, compile_signals
 from ecu.bus.request import FIRST, LAST
 from ecu.contract.records import EXTENDED_ID, RecordArray
-from ecu.contract.signals import INPUT, N_INPUTS, N_OUTPUTS, OUTPUT
+from ecu.contract.signals import INPUT, INPUT_SIGNALS, N_INPUTS, N_OUTPUTS, OUTPUT
 
 MESSAGE: Final = np.dtype(
     [
@@ -104,6 +105,18 @@ def compile_receive(uses: Sequence[MessageUse], expected: RecordArray) -> Receiv
         expected,
         mapped,
     )
+
+
+def messages_by_contract(plan: ReceivePlan) -> dict[str, list[str]]:
+    """Return the messages of `plan` by those of the contract whose inputs they feed, without the axle."""
+    found: dict[str, list[str]] = {}
+    for message in plan.messages:
+        rows = plan.signals["place"][int(message["first"]) :][: int(message["count"])]
+        for place in () if message["foreign"] else rows.tolist():
+            names = found.setdefault(re.sub("(Front|Rear)$", "", INPUT_SIGNALS[place].message), [])
+            if str(message["name"]) not in names:
+                names.append(str(message["name"]))
+    return found
 
 
 def _identifier(use: MessageUse) -> int:

@@ -1,5 +1,7 @@
 """Events from the cycles' records: one line per change of mode, fault or counter."""
 
+import re
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -14,10 +16,28 @@ _INPUT_FAULTS: Final = 0xFFFF  # while starting nothing was received yet, which 
 MODES: Final = ("starting", "ready", "active", "degraded", "failed")
 
 
-class EventLog:
-    """Event log of one run, written batch by batch to `log`, with structlog's methods (None: structlog)."""
+def in_names_of(messages: Mapping[str, Sequence[str]], remedy: str) -> str:
+    """Return a remedy with the bus's own names in place of the contract's: `check CalliperPressure*`."""
 
-    def __init__(self, throttle: Throttle | None = None, log: Any = None) -> None:
+    def named(word: re.Match[str]) -> str:
+        return ", ".join(messages.get(word[1], [word[0]]))
+
+    return re.sub(r"\b(\w+)\b\*?", named, remedy)
+
+
+class EventLog:
+    """Event log of one run, written batch by batch to `log`, with structlog's methods (None: structlog).
+
+    `messages`: those of the bus by those of the contract, where a map names others.
+    """
+
+    def __init__(
+        self,
+        throttle: Throttle | None = None,
+        log: Any = None,
+        messages: Mapping[str, Sequence[str]] | None = None,
+    ) -> None:
+        self._messages = messages or {}
         self._log = log or structlog.get_logger("ecu")
         self._throttle = throttle or Throttle()
         self._mode, self._faults, self._overruns, self._dropped, self._lost = 0, 0, 0, 0, 0
@@ -71,7 +91,8 @@ class EventLog:
         for fault in FAULTS:
             if fault.bit & faults & ~self._faults:
                 counted = {"frames": frames} if fault.bit == E2E_REJECTIONS else {}
-                self._say("fault", fault.name, cycle=cycle, fault=fault.name, remedy=fault.remedy, **counted)
+                remedy = in_names_of(self._messages, fault.remedy)
+                self._say("fault", fault.name, cycle=cycle, fault=fault.name, remedy=remedy, **counted)
         for fault in FAULTS:
             if fault.bit & self._faults & ~faults:
                 counted = {"frames": frames} if fault.bit == E2E_REJECTIONS else {}

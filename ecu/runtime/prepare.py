@@ -22,6 +22,7 @@ from ecu.algorithm.step import INITIAL, initial_part
 from ecu.bus.channel import open_channel
 from ecu.bus.foreign import discard, listen_before_send
 from ecu.bus.protocol import Channel
+from ecu.bus.receive_plan import messages_by_contract
 from ecu.bus.signal_map import receive_plan
 from ecu.bus.transmit import contract_transmit_plan
 from ecu.contract.records import RecordArray
@@ -119,6 +120,8 @@ def prepare(options: RunOptions) -> Session:
     sending = contract_transmit_plan(resource("dbc/brake_ecu.dbc"), "BrakeEcu")
     params = new_params(config)
     description = _describe(options, config)
+    if options.map is not None:
+        description["messages"] = messages_by_contract(receiving)
     log.debug(
         "read",
         **{key: description[key] for key in ("name", "config", "config_hash", "map", "versions")},

@@ -61,7 +61,7 @@ class Recorder:
     ) -> None:
         about = reader.description
         self.reader, self.log = reader, structlog.get_logger("recorder")
-        self.events = EventLog()
+        self.events = EventLog(messages=about.get("messages"))
         self.channel, self.key = str(about["channel"]), str(about["store_key"])
         self.files: RecordingFiles | None = None
         self._limit_bytes, self._looked_s = limit_bytes, -math.inf

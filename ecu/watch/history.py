@@ -161,7 +161,7 @@ class History:
         self._looked = records["cycle"]
         if self._log is None:
             throttle = Throttle(lambda: 1e-9 * float(self._looked["t_mono_ns"][-1]))
-            self._log = EventLog(throttle, _Teller(self.tell))
+            self._log = EventLog(throttle, _Teller(self.tell), reader.description.get("messages"))
             self._log.begin_after(records[:1], reader.lost_cycles + reader.lost_frames)
         self._log.look(records, reader.lost_cycles, reader.lost_frames)
         late_us = records["cycle"]["lateness_ns"] * 1e-3
