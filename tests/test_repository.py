@@ -237,6 +237,15 @@ def test_every_relative_link_leads_somewhere(document: Path) -> None:
         assert not fragment or fragment in _anchors(linked), target
 
 
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_every_row_of_a_table_has_the_cells_of_its_heading(document: Path) -> None:
+    text = re.sub(r"```.*?```", "", document.read_text("utf-8"), flags=re.S)
+    for table in re.findall(r"(?:^\|.*\n)+", text, re.M):
+        rows = [re.sub(r"`[^`]*`", "", row) for row in table.splitlines()]
+        cells = [len(re.findall(r"(?<!\\)\|", row)) for row in rows]
+        assert set(cells) == {cells[0]}, rows[[each == cells[0] for each in cells].index(False)]
+
+
 @pytest.mark.parametrize("page", sorted((ROOT / "docs/results").glob("*.md")), ids=lambda path: path.name)
 def test_every_page_of_results_says_what_it_was_measured_on(page: Path) -> None:
     """By what command, on what commit, with what configuration: `tools/stale_pages.py` reads it."""
