@@ -29,7 +29,7 @@ def watch(
         Path, typer.Option("--out", metavar="DIR", help="Folder for recordings that you keep")
     ] = Path("out/watch"),
 ) -> int:
-    """Look into a running daemon. Its loop does not notice; q quits."""
+    """Look into a running daemon, which waits for no reader; q quits."""
     from ecu.watch import command
 
     return command.watch(daemon, web, port, as_json, out)
