@@ -3,7 +3,7 @@
 import pytest
 from rich.console import Console
 
-from brakelab.replay.summary import brakings_table, prediction_lines
+from brakelab.replay.summary import WIDTH, brakings_table, listed, prediction_lines
 from brakelab.results.brakes import LEARNED, BrakeRow
 from ecu.contract.signals import CORNERS
 
@@ -60,6 +60,26 @@ def test_a_line_has_what_was_measured_predicted_and_configured() -> None:
     with console.capture() as capture:
         console.print(brakings_table([row(0, corner, **force) for corner in CORNERS], NOMINAL))
     assert "108 → 36 4.00 4.20 ± 0.10 4.60" in " ".join(capture.get().split())
+
+
+@pytest.mark.parametrize(
+    ("brakings", "every", "shown", "before"),
+    [(0, False, 0, 0), (3, False, 3, 0), (40, False, 40, 0), (1024, False, 40, 984), (1024, True, 1024, 0)],
+)
+def test_a_long_drive_lists_its_last_brakings(brakings: int, every: bool, shown: int, before: int) -> None:
+    taps = [row(-1, corner, duration=0.4) for corner in CORNERS]
+    rows = [row(number, corner) for number in range(brakings) for corner in CORNERS]
+    found, left = listed([*taps, *rows, *taps], every)
+    assert (len(found), left) == (4 * shown, before)
+    assert [one.brake for one in found[-4:]] == [brakings - 1] * min(4 * shown, 4)
+
+
+def test_a_braking_is_one_line_off_a_terminal() -> None:
+    friction = {"mu_b_end": 0.4, "sigma_mu_b_end": 0.02, "learning": "held: ABS, ESP, accelerator or reverse"}
+    console = Console(width=WIDTH)
+    with console.capture() as capture:
+        console.print(brakings_table([row(0, corner, **friction) for corner in CORNERS], NOMINAL))
+    assert len([line for line in capture.get().splitlines() if "0.400" in line or "reverse" in line]) == 1
 
 
 def told(*brakings: tuple[float, float, float, str]) -> list[str]:

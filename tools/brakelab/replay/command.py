@@ -25,7 +25,7 @@ from brakelab.replay.needed import (
 )
 from brakelab.replay.quality import Findings, quality_counts, quality_lines
 from brakelab.replay.source import check_map, load_source, radius_line
-from brakelab.replay.summary import brakings_table, prediction_errors, prediction_lines, taps
+from brakelab.replay.summary import WIDTH, brakings_table, listed, prediction_errors, prediction_lines, taps
 from brakelab.results.car import KEY as CAR
 from brakelab.results.car import car_of
 from brakelab.results.console import new_console
@@ -39,9 +39,8 @@ from ecu import __version__
 from ecu.algorithm.step import new_state
 from ecu.bus.receive_plan import ReceivePlan
 from ecu.contract.records import RecordArray
-from ecu.contract.signals import CORNERS
 from ecu.errors import RunFault, UserError
-from ecu.output import detail, give, say, wrote
+from ecu.output import Level, detail, give, policy, say, wrote
 from ecu.recording.recorder import read_recording
 from ecu.recording.restored import restored
 from ecu.recording.store import open_store, save
@@ -192,7 +191,7 @@ def _notes(findings: Sequence[Findings], plan: ReceivePlan, observer: str) -> li
 
 def _tell(done: Replayed) -> None:
     writer, findings, _, nominal = done
-    console = new_console()
+    console = new_console(WIDTH)
     frames = sum(found.log.frames for found in findings)
     samples = sum(found.signals.samples for found in findings)
     give(result=writer.path, rows=writer.rows, frames=frames, samples=samples, brakes=writer.brakes.rows)
@@ -203,10 +202,13 @@ def _tell(done: Replayed) -> None:
         return
     brakings = writer.brakes.rows
     short = taps(brakings)
-    if len(brakings) > short * len(CORNERS):
-        console.print(brakings_table(brakings, nominal))
+    last, before = listed(brakings, policy().level == Level.VERBOSE)
+    if last:
+        console.print(brakings_table(last, nominal))
     else:
         print("no braking in this drive")
+    if before:
+        print(f"{before} brakings before these are in {brakes_path(writer.path).name}; -v lists them too")
     if short:
         print(f"{short} applications shorter than {SHORT} s are in {brakes_path(writer.path).name} only")
     for line in prediction_lines(brakings):

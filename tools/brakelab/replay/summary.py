@@ -3,6 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 from rich.box import SIMPLE
@@ -13,9 +14,14 @@ from brakelab.results.prediction import SHORT, Errors, Vector, errors, one_scale
 from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
 from ecu.contract.signals import CORNERS
 
+WIDTH: Final = 150
+"""Columns of the table where no terminal says how wide it is."""
+LISTED: Final = 40
+"""Brakings of a table that a person reads."""
+
 
 def brakings_table(rows: Sequence[BrakeRow], nominal: Sequence[float]) -> Table:
-    """Return a table of the applications in `rows`, four rows each, without taps shorter than `SHORT`.
+    """Return a table of the applications in `rows`, four rows each.
 
     `nominal`: nominal friction of each corner, to tell an estimate that stands at its bound.
     """
@@ -27,8 +33,6 @@ def brakings_table(rows: Sequence[BrakeRow], nominal: Sequence[float]) -> Table:
     for first in range(0, len(rows), len(CORNERS)):
         corners = rows[first : first + len(CORNERS)]
         one = corners[0]
-        if one.duration < SHORT:
-            continue
         table.add_row(
             f"{one.t_start:.2f}",
             f"{one.duration:.2f}",
@@ -41,6 +45,16 @@ def brakings_table(rows: Sequence[BrakeRow], nominal: Sequence[float]) -> Table:
             _verdict(corners),
         )
     return table
+
+
+def listed(rows: Sequence[BrakeRow], every: bool) -> tuple[Sequence[BrakeRow], int]:
+    """Return the applications for the table, and how many before them it leaves out.
+
+    They last at least `SHORT`, and are the last `LISTED` of these unless `every` one is asked for.
+    """
+    long = [row for row in rows if row.duration >= SHORT]
+    last = long if every else long[-LISTED * len(CORNERS) :]
+    return last, (len(long) - len(last)) // len(CORNERS)
 
 
 def taps(rows: Sequence[BrakeRow]) -> int:
