@@ -28,4 +28,7 @@ def test_the_page_of_a_constant(tmp_path: Path, columns: Columns, stops: Stops) 
     assert [chart.count("<rect x=") for chart in charts] == [2, 3]
     for each in charts:
         ElementTree.fromstring(each)
+    assert page.count('<div class="scroll" tabindex="0"><svg') == 2  # legible on a phone
+    assert '<meta name="viewport" content="width=device-width' in page
+    assert "prefers-color-scheme:dark" in page
     assert charts[0].count("h0") == 3 * len(stops)

@@ -28,8 +28,10 @@ STYLE: Final = (
     "h1{font-size:1.5em}h2{font-size:1.15em;margin-top:2em}"
     "table{border-collapse:collapse;font-size:13px}td,th{padding:3px 10px;border-bottom:1px solid #dde2e7;"
     "text-align:right}td:first-child,th:first-child,.words{text-align:left}"
-    "svg{width:100%}.limit{background:#fff4e5;"
+    ".scroll{overflow-x:auto}svg{width:100%;min-width:640px}.limit{background:#fff4e5;"
     "border-left:4px solid #d55e00;padding:.6em 1em}"
+    "@media screen and (prefers-color-scheme:dark){body{background:#14181d;color:#e8ebef}"
+    "td,th{border-color:#323941}.limit{background:#33291a}}"
 )
 
 
@@ -88,15 +90,17 @@ def write_report(
         f'<p class="limit"><b>Do not extrapolate.</b> Seen: {ends}. Beyond: {escape(chosen.extrapolates)}.'
         + (f" Not told by the data: {escape(unsure)}." if unsure else "")
         + "</p>",
-        chart_svg(fit, [("measured", GREY), ("law", BLUE)]),
+        _scrolling(chart_svg(fit, [("measured", GREY), ("law", BLUE)])),
         "<h2>What the law leaves</h2><p>A mark is a block of 50 ms, the line their mean. A line off zero is "
         "what the law has no term for.</p>",
-        chart_svg(left, [("blocks", BLUE), ("their mean", ORANGE)]),
+        _scrolling(chart_svg(left, [("blocks", BLUE), ("their mean", ORANGE)])),
         *(_html(table) for table in tables),
     ]
     title = f"Friction law of {escape(columns.name)}"
     path.write_text(
-        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title><style>{STYLE}</style>'
+        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title>'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f'<meta name="color-scheme" content="light dark"><style>{STYLE}</style>'
         f"<body>{''.join(body)}</body></html>\n",
         encoding="utf-8",
     )
@@ -125,6 +129,10 @@ def _ends(*values: Vector) -> tuple[float, float]:
     return low - edge, high + edge
 
 
+def _scrolling(wide: str) -> str:
+    return f'<div class="scroll" tabindex="0">{wide}</div>'
+
+
 def _html(table: Table) -> str:
     wordy = [any(WORD.search(row[k]) for row in table.rows) for k in range(len(table.columns))]
     kinds = [' class="words"' if words else "" for words in wordy]
@@ -134,4 +142,5 @@ def _html(table: Table) -> str:
 
     rows = "".join(f"<tr>{cells('td', row)}</tr>" for row in table.rows)
     below = f"<p>{escape(table.below)}</p>" if table.below else ""
-    return f"<h2>{escape(table.title)}</h2><table><tr>{cells('th', table.columns)}</tr>{rows}</table>{below}"
+    lines = f"<table><tr>{cells('th', table.columns)}</tr>{rows}</table>"
+    return f"<h2>{escape(table.title)}</h2>{_scrolling(lines)}{below}"
