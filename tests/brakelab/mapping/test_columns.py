@@ -67,6 +67,23 @@ def test_suggest_check_and_replay(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert front == pytest.approx([14.0, 34.0, 54.0, 74.0], abs=0.2)
 
 
+@pytest.mark.parametrize(("per_second", "unit"), [(1e3, "ms"), (1e6, "us")])
+def test_a_time_that_is_not_in_seconds_is_refused_or_read_by_its_unit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], per_second: float, unit: str
+) -> None:
+    log = write_drive(tmp_path / "aim.csv", seconds=30.0)
+    head, units, *rows = log.read_text().splitlines()
+    cells = [row.split(",", 1) for row in rows if row]
+    rows = [f"{1.5e9 * per_second + float(t) * per_second:.0f},{rest}" for t, rest in cells]
+    log.write_text("\n".join([head, units.replace("s,", ",", 1), *rows]) + "\n")
+    assert cli.main(["map", "suggest", str(log)]) == 2
+    line = capsys.readouterr().err.splitlines()[-1]
+    assert "aim.csv: Time: Time is in seconds, but " in line
+    assert 'write its unit behind the name, "Time [us]"' in line
+    log.write_text("\n".join([head.replace("Time", f"Time [{unit}]"), *rows]) + "\n")
+    assert cli.main(["map", "suggest", str(log)]) == 0
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [

@@ -101,7 +101,7 @@ def read_signals(
             batch, places, t = batch.filter(arrow_array(known, pa.bool_())), places[known], t[known]
         if not len(t):
             continue
-        _check_unit(path, t, "" if mapped is None else f"; or state time_unit in {mapped.path}")
+        check_seconds(path, "t", t, "" if mapped is None else f"; or state time_unit in {mapped.path}")
         if origin_ns is None:
             origin = float(t[0])
             origin_ns = last_ns = round(origin * 1e6) * 1000
@@ -140,14 +140,19 @@ def read_signals(
         raise UserError(str(path), quality.first_damaged or _place(path, 2 * is_csv(path)), remedy)
 
 
-def _check_unit(path: Path, t: NDArray[np.float64], or_else: str) -> None:
+def check_seconds(path: Path, name: str, t: NDArray[np.float64], or_else: str) -> None:
+    """Refuse times that cannot be in seconds, with the column's `name` and what else would do.
+
+    Raises:
+        UserError: they cannot.
+    """
     step = float(np.median(np.diff(t))) if len(t) > FEW_ROWS else 0.0
     found = f"the rows are {step:g} s apart" if step > SLOWEST_STEP else ""
     if np.abs(t).max() > LATEST:
         found = f"a value is {t[np.abs(t).argmax()]:g} s"
     if found:
-        remedy = f"t is in seconds, but {found}; convert it from ms, us or ns, or give every sample{or_else}"
-        raise UserError(str(path), "t", remedy)
+        remedy = f"convert it from ms, us or ns, or give every sample{or_else}"
+        raise UserError(str(path), name, f"{name} is in seconds, but {found}; {remedy}")
 
 
 def _check_span(

@@ -12,6 +12,7 @@ from brakelab.logs.column_map import SECONDS, TIMES
 from brakelab.logs.log_quality import SignalQuality
 from brakelab.logs.physics.samples import Car
 from brakelab.logs.signal_batches import Columns, columns_of, rows_of, time_of
+from brakelab.logs.signal_file import check_seconds
 from brakelab.mapping.map_text import input_lines, radius_line
 from brakelab.mapping.motion import Found
 from brakelab.mapping.names import converts
@@ -38,7 +39,9 @@ def read_column_series(log: Path, quality: SignalQuality) -> tuple[Columns, list
     t = read[time] * seconds
     if not np.isfinite(t).any():
         raise UserError(str(log), time, "holds no time; give a file with rows")
-    t = t - t[np.isfinite(t)][0]
+    known = t[np.isfinite(t)]
+    check_seconds(log, time, known, f'; or write its unit behind the name, "{time} [us]"')
+    t = t - known[0]
     series = [_series(name, columns.units.get(name, ""), t, read[name]) for name in names]
     return columns, [one for one in series if len(one.t) >= FEWEST]
 
