@@ -80,8 +80,19 @@ def test_a_time_that_is_not_in_seconds_is_refused_or_read_by_its_unit(
     line = capsys.readouterr().err.splitlines()[-1]
     assert "aim.csv: Time: Time is in seconds, but " in line
     assert 'write its unit behind the name, "Time [us]"' in line
-    log.write_text("\n".join([head.replace("Time", f"Time [{unit}]"), *rows]) + "\n")
+    log.write_text("\n".join([head, units.replace("s,", f"{unit},", 1), *rows]) + "\n")
     assert cli.main(["map", "suggest", str(log)]) == 0
+
+
+def test_wheel_speeds_without_a_unit_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """28 m/s at most: 102 km/h; all else is judged by the wheels."""
+    log = write_drive(tmp_path / "aim.csv", seconds=40.0)
+    log.write_text(log.read_text().replace("km/h", ""))
+    assert cli.main(["map", "suggest", str(log)]) == 2
+    line = capsys.readouterr().err.splitlines()[-1]
+    assert "aim.csv: WheelSpd_FL: no unit is stated" in line
+    assert 'write it behind the names: "WheelSpd_FL [km/h]"' in line
+    assert "m/s if it is rpm" in line
 
 
 @pytest.mark.parametrize(

@@ -76,6 +76,7 @@ def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) 
     if not found:
         remedy = _speed_alone(series) or "give the database of this car"
         raise UserError(str(dbc), "", f"names no four wheel speeds in {log}; {remedy}")
+    _refuse_unitless(dbc, found[0].series, "give it there", car)
     bus = found[0].series.bus
     here = [one for one in series if one.bus == bus]
     hints: list[str] = []
@@ -131,6 +132,8 @@ def _suggest_columns(log: Path, out: Path | None, car: Car) -> int:
         among = f"no four wheel speeds by their names among {', '.join(columns.names[:SHOWN])}"
         remedy = _speed_alone(series) or "write the map by hand (docs/signal-maps.md)"
         raise UserError(str(log), "", f"{among}; {remedy}")
+    wheel = found[0].series
+    _refuse_unitless(log, wheel, f'write it behind the names: "{wheel.signal} [km/h]"', car)
     _show(found, drives)
     for line in _warnings(found):
         say(line)
@@ -139,6 +142,17 @@ def _suggest_columns(log: Path, out: Path | None, car: Car) -> int:
         read_column_map(written)
         _say_next(log, written)
     return 0
+
+
+def _refuse_unitless(where: Path, wheel: Series, remedy: str, car: Car) -> None:
+    """Refuse a wheel speed of no unit: all else is judged by it, and would be bent to fit a wrong one."""
+    if converts(wheel.unit, "rad/s") or converts(wheel.unit, "m/s"):
+        return
+    fastest = float(np.nanmax(np.abs(wheel.value)))
+    turning = fastest * float(car.radius.mean())
+    speeds = {"rad/s": turning, "rpm": turning * math.tau / 60.0, "km/h": fastest / 3.6}
+    known = ", ".join(f"{speed:.0f} m/s if it is {unit}" for unit, speed in speeds.items())
+    raise UserError(str(where), wheel.signal, f"no unit is stated for this wheel speed; {remedy} ({known})")
 
 
 def _say_next(log: Path, out: Path) -> None:
