@@ -167,6 +167,25 @@ def test_without_a_curve_names_propose_what_curves_would_tell():
     assert not {one.target for one in propose(curved)[0]} & {"yaw_rate", "accel_y"}
 
 
+@pytest.mark.parametrize(
+    ("wheel", "taken"), [("wheel_speed_{}", True), ("Wheel_{}", False)], ids=["the ECU's", "a car's"]
+)
+def test_names_of_the_ecu_s_inputs_count_where_the_wheels_have_them_too(wheel: str, taken: bool) -> None:
+    """The angle at the road wheels is not taken for a hand wheel's, what stands still is mapped too."""
+    wheels = [ROAD.wheels[corner]._replace(signal=wheel.format(corner)) for corner in CORNERS]
+    straight = [one._replace(value=ROAD.speed / 0.33, unit="rad/s") for one in wheels]
+    others = [
+        series("steering_angle", np.zeros(len(ROAD.t)), "rad"),
+        series("motor_torque_fl", -30.0 * ROAD.change, "N m", "Motor"),
+        series("accelerator_position", np.maximum(ROAD.change, 0.0), "%", "Pedals"),
+        series("pedal_position", np.zeros(len(ROAD.t)), "%", "Pedals"),
+    ]
+    found = {one.target: one for one in propose([*straight, *others])[0]}
+    assert ({"motor_torque_fl", "pedal_position"} <= found.keys()) == taken
+    if taken:
+        assert (found["steering_angle"].factor, found["steering_angle"].warning) == (1.0, "")
+
+
 def paused(one: Series, pause: float, at: float = 120.0) -> Series:
     """Return a series whose recorder, or clock, jumps ahead by `pause` [s]."""
     return one._replace(t=np.where(one.t > at, one.t + pause, one.t))

@@ -25,6 +25,7 @@ from brakelab.mapping.motion import Found, Motion, contract_unit, motion_of, whe
 from brakelab.mapping.scale import scale_of
 from brakelab.mapping.series import Series
 from ecu.bus.units import CONVERSIONS, spelled
+from ecu.contract.signals import CORNERS, INPUT
 
 STEERING_RATIO: Final = 16.0  # of a car that is not known. Assumption
 CURVES: Final = ("yaw_rate", "accel_y", "steering_angle")
@@ -63,6 +64,18 @@ def named_only(series: list[Series], targets: Iterable[str], because: str) -> li
     return found
 
 
+def _named_as_inputs(series: list[Series]) -> list[Found]:
+    """Return what has an input's own name and unit, where the wheel speeds have theirs too."""
+    own = {one.signal: one for one in series if one.signal in INPUT and not one.sign}
+    if not all(f"wheel_speed_{corner}" in own for corner in CORNERS):
+        return []
+    return [
+        Found(name, one, 1.0, 0.0, contract_unit(name), "named as the ECU's input", True)
+        for name, one in own.items()
+        if spelled(one.unit) in (contract_unit(name), "")
+    ]
+
+
 def _curved(motion: Motion) -> bool:
     """Return whether the drive has curves enough to tell what follows them."""
     fast = motion.faster(MOVING)
@@ -91,4 +104,8 @@ def propose(series: list[Series], car: Car = ANY_CAR) -> tuple[list[Found], bool
             found += named_only(here, open_, "the drive has hardly a curve")
     else:
         found += named_only(here, ("accel_x", *CURVES), "the car stands")
-    return found + brakes(here, motion, car) + flags(here, motion), motion.drives
+    found += brakes(here, motion, car) + flags(here, motion)
+    own = {one.target: one for one in _named_as_inputs(here)}
+    told = {one.target for one in found if one.sure}
+    kept = [one for one in found if one.sure or one.target not in own]
+    return kept + [one for target, one in own.items() if target not in told], motion.drives
