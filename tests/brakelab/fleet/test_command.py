@@ -51,6 +51,19 @@ def brakings(out: Path, vehicle: str, drive: int) -> pa.Table:
     return table.drop_columns(["drive"]).replace_schema_metadata(None)
 
 
+def test_of_a_fleet_without_one_good_drive_each_reason_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for vehicle in CARS:
+        (tmp_path / "data" / vehicle).mkdir(parents=True)
+        (tmp_path / "data" / vehicle / "1.log").write_bytes(b"\x00garbage" * 1000)
+    assert fleet([f"{tmp_path}/data/*/*.log"], SUV, None, None, None, 1, tmp_path / "out") == 1
+    told = capsys.readouterr()
+    assert told.err.count("failed: ") == 2
+    assert "0 of 2 drives of 2 vehicles" in told.out
+    assert "Drives that failed" in (tmp_path / "out" / "report.html").read_text("utf-8")
+
+
 def test_a_fleet_is_its_drives_in_order(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -52,6 +52,8 @@ def kmh(speed: float) -> str:
 
 def embed(figures: Mapping[str, Any]) -> tuple[str, dict[str, str]]:
     """Return the script that draws the figures, and the place of each, by name."""
+    if not figures:
+        return "", {}
     document = Document()
     with document.models.freeze():  # else every figure added walks through all of them once more
         for figure in figures.values():
