@@ -9,6 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from brakelab.api import Result, Simulation, UserError, load, replay, simulate
+from brakelab.table import Table
 from ecu import cli
 from ecu.contract.signals import INPUT_SIGNALS
 from ecu.errors import UserError as EcuUserError
@@ -127,6 +128,8 @@ def test_a_map_is_taken_by_name(tmp_path: Path) -> None:
         (lambda: load("no.log"), "no.log: no such file"),
         (lambda: replay(MUSTANG, config="nosuch"), "nosuch: no such file, and none that is shipped"),
         (lambda: replay(MUSTANG, config="suv"), "give the signal map of this car"),
+        (lambda: load(Table({}, {})), "log: Table: is no file: write it first"),  # type: ignore[arg-type]
+        (lambda: replay(Table({}, {}), config="suv"), "log: Table: is no file"),  # type: ignore[arg-type]
         (lambda: replay([], config="suv"), "logs: the list is empty"),
         (lambda: replay(MUSTANG, config="suv", changes={"front.mu": 0.4}), "changes: front.mu: unknown key"),
         (lambda: replay(MUSTANG, config="suv", changes={"front mu": 0.4}), "changes: front mu: no key"),

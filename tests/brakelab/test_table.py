@@ -19,6 +19,19 @@ TABLE = Table(COLUMNS, {"t": "s", "pressure": "bar"})
 EMPTY = Table({name: column[:0] for name, column in COLUMNS.items()}, TABLE.units)
 
 
+@pytest.mark.parametrize(
+    ("columns", "said"),
+    [
+        (5, "Table of 3 rows, 5 columns: t [s], pressure [bar], number, valid, law"),
+        (2, "Table of 3 rows, 2 columns: t [s], pressure [bar]"),
+        (0, "Table of 0 rows, 0 columns: "),
+    ],
+)
+def test_a_table_says_what_is_in_it(columns: int, said: str) -> None:
+    names = [*COLUMNS][:columns]
+    assert repr(Table({name: COLUMNS[name] for name in names}, TABLE.units)) == said
+
+
 @pytest.fixture
 def polars() -> Any:
     return pytest.importorskip("polars", reason="Polars is not installed")

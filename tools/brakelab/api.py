@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
@@ -113,7 +114,7 @@ def load(log: AnyPath, *, map: AnyPath | None = None) -> Drive:
     Raises:
         UserError: the log or the map is not right.
     """
-    path = Path(log)
+    path = _file(log)
     if not path.exists():
         raise UserError(str(path), "", "no such file; give an existing log")
     found, source = Findings(path), load_source(map_file(os.fspath(map)) if map is not None else None)
@@ -127,6 +128,13 @@ def load(log: AnyPath, *, map: AnyPath | None = None) -> Drive:
     columns |= {signal.name: values[:, place] for place, signal in enumerate(INPUT_SIGNALS) if known[place]}
     units = {"t": "s"} | {name: INPUT_UNITS[name] for name in columns if name != "t"}
     return Drive(Table(columns, units), [*notes, *damage_lines(found)])
+
+
+def _file(log: Any) -> Path:
+    if not isinstance(log, str | os.PathLike):
+        remedy = 'is no file: write it first, table.to_parquet("drive.parquet")'
+        raise UserError("log", type(log).__name__, remedy)
+    return Path(log)
 
 
 def replay(
@@ -156,7 +164,8 @@ def replay(
     """
     if out is not None and Path(out).suffix in EXPORTS:
         raise UserError("out", str(out), "is Parquet here; `brake-ecu replay` writes MDF4 and MCAP")
-    paths = [Path(logs)] if isinstance(logs, str | os.PathLike) else [Path(log) for log in logs]
+    given = logs if isinstance(logs, Sequence) and not isinstance(logs, str) else [logs]
+    paths = [_file(log) for log in given]
     if not paths:
         raise UserError("logs", "", "the list is empty; give the logs of one drive")
     folder = TemporaryDirectory(prefix="brake-ecu-") if out is None else None

@@ -2,12 +2,15 @@
 
 from collections.abc import Iterator, Mapping
 from importlib import import_module
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ecu.errors import UserError, closest
+
+SHOWN: Final = 8
+"""Columns that a table names of itself."""
 
 
 class Table:
@@ -27,6 +30,15 @@ class Table:
             hint = closest(name, self.columns)
             remedy = f"no such column{hint}; `.columns` has all {len(self.columns)}"
             raise UserError("column", str(name), remedy) from None
+
+    def __repr__(self) -> str:
+        units = {name: f" [{unit}]" if unit else "" for name, unit in self.units.items()}
+        named = [name + units.get(name, "") for name in self.columns]
+        shown = ", ".join(named if len(named) <= SHOWN else [*named[:SHOWN], "…"])
+        return f"{type(self).__name__} of {len(self)} rows, {len(named)} columns: {shown}"
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return [*self.columns]
 
     def __len__(self) -> int:
         """Return the number of rows."""
