@@ -21,6 +21,7 @@ from ecu.jit import Record, kernel
 BLOCK_FRAMES: Final = 1 << 14  # 1.3 MB: they stay in the processor's cache until they are decoded
 # A step of the clock beyond this is no gap in the drive but a wrong stamp or two logs in one file.
 MAX_JUMP_NS: Final = 3_600_000_000_000
+FEW: Final = 50  # frames that step back, by which no log counts as running backwards
 # Assumption: no adapter holds a frame back for longer; an older stamp comes from a clock that was set.
 STEP_NS: Final = 1_000_000_000
 _FARTHEST_NS: Final = 1 << 61  # the year 2043: sums of two such stamps are still numbers
@@ -181,7 +182,7 @@ def checked(
     `mended` is False for what the daemon recorded: it met the stamps as they are.
 
     Raises:
-        UserError: the clock jumps by more than an hour and stays there.
+        UserError: the clock jumps by more than an hour and stays there, or the log runs backwards.
     """
     state = new_record(_STAMPS)
     stamps = state[0]
@@ -214,6 +215,9 @@ def checked(
         quality.stamps_repeated = int(stamps["repeated"])
         quality.clock_set_back, quality.gaps = int(stamps["set_back"]), int(stamps["gaps"])
         quality.frames += len(frames)
+        if quality.stamps_backwards > max(0.5 * quality.frames, FEW):
+            remedy = "it runs backwards; sort its frames by time"
+            raise UserError(str(path), f"time falls at {quality.stamps_backwards} frames", remedy)
         if len(frames):
             yield frames
 
