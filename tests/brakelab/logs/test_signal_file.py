@@ -51,6 +51,16 @@ def test_csv_and_parquet_read_alike(tmp_path: Path) -> None:
     np.testing.assert_array_equal(a.t_ns, b.t_ns)
 
 
+@pytest.mark.parametrize("unit", ["ms", "us", "ns"])
+@pytest.mark.parametrize(("kind", "start"), [(pa.timestamp, 1_600_000_000_000), (pa.duration, 0)])
+def test_dates_and_durations_of_pandas_are_times(tmp_path: Path, kind: Any, start: int, unit: str) -> None:
+    ticks = {"ms": 1, "us": 1_000, "ns": 1_000_000}[unit]
+    t = pa.array([(start + 10 * k) * ticks for k in range(100)], kind(unit))
+    path = write(tmp_path / "drive.parquet", {"t": t, "accel_x": [0.5] * 100})
+    (block,) = read_signals(path, SignalQuality())
+    assert block.t_ns.tolist() == [(start + 10 * k) * 1_000_000 for k in range(100)]
+
+
 @pytest.mark.parametrize("start", [0.0, -3.7, 1.6e9 + 0.123])
 def test_a_10_ms_input_lies_on_the_grid_wherever_it_starts(tmp_path: Path, start: float) -> None:
     t = start + np.arange(20_000) * 0.01

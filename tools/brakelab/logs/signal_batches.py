@@ -6,6 +6,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
@@ -151,13 +152,24 @@ def _parquet_rows(path: Path, wanted: list[str] | None, quality: SignalQuality) 
                 yield _names_only(names)
                 _note_start(source, quality)
                 wanted = [name for name in names if name == "t" or name in INPUT]
-            yield from _numbered(source.iter_batches(BLOCK_ROWS, columns=wanted))
+            yield from _numbered(map(_in_seconds, source.iter_batches(BLOCK_ROWS, columns=wanted)))
     except (pa.ArrowInvalid, OSError, UnicodeDecodeError) as error:
         reason = str(error).splitlines()[0].rstrip(".")
         if not quality.rows:
             remedy = f"no readable Parquet file ({reason}); write it again"
             raise UserError(str(path), "", remedy) from None
         quality.cut = f"row {quality.rows}: cannot be read ({reason}), the rest is missing"
+
+
+def _in_seconds(batch: pa.RecordBatch) -> pa.RecordBatch:
+    """Return a batch whose dates and durations are numbers [s], dates since 1970."""
+    columns = [
+        pc.multiply(column.cast(pa.int64()).cast(pa.float64(), safe=False), SECONDS[column.type.unit])
+        if pa.types.is_timestamp(column.type) or pa.types.is_duration(column.type)
+        else column
+        for column in batch.columns
+    ]
+    return pa.RecordBatch.from_arrays(columns, names=batch.schema.names)
 
 
 def _note_start(source: pq.ParquetFile, quality: SignalQuality) -> None:
