@@ -9,7 +9,7 @@ Derived by statics and geometry:
 """
 
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -49,14 +49,14 @@ def new(given: list[str], out: Path | None) -> int:
         UserError: an answer is wrong or missing, or the file exists.
     """
     _refuse_existing(out)
-    answers = parse_given(given) if given else _ask()
+    answers, taken = (parse_given(given), set[str]()) if given else _ask()
     missing = sheet.needed(answers)
     if missing:
         raise UserError("config new", "", f"missing: {', '.join(map(_named, missing))}; give --set KEY=VALUE")
     like = nearest(answers)
     out = out or Path(f"{answers.get('name', 'car')}.toml")
     _refuse_existing(out)
-    text = config_text(answers, like)
+    text = config_text(answers, like, taken)
     try:
         config = Config.model_validate(tomllib.loads(text))
     except ValidationError as error:
@@ -91,21 +91,25 @@ def parse_given(given: list[str]) -> Given:
     return answers
 
 
-def _ask() -> Given:
-    """Ask every question until standard input ends; Enter takes what stands in brackets."""
+def _ask() -> tuple[Given, set[str]]:
+    """Ask every question until standard input ends; Enter takes what stands in brackets.
+
+    Returns the answers, and the keys of those that Enter took.
+    """
     print("Enter takes what stands in [brackets]; a length is in mm unless it brings its unit: 2.72 m.")
     answers: Given = {}
     passed: set[str] = set()
+    taken: set[str] = set()
     try:
         for question in sheet.QUESTIONS:
             while question.key not in answers and question.key not in passed:
-                _ask_one(question, answers, passed)
+                _ask_one(question, answers, passed, taken)
     except EOFError:
         print()
-    return answers
+    return answers, taken
 
 
-def _ask_one(question: sheet.Question, answers: Given, passed: set[str]) -> None:
+def _ask_one(question: sheet.Question, answers: Given, passed: set[str], taken: set[str]) -> None:
     stands_in = next((one.key for one in sheet.QUESTIONS if one.instead == question.key), None)
     if stands_in in answers:
         passed.add(question.key)
@@ -121,6 +125,7 @@ def _ask_one(question: sheet.Question, answers: Given, passed: set[str]) -> None
         passed.add(question.key)
         if not question.assumed and not question.instead and usual is not None:
             answers[question.key] = usual
+            taken.add(question.key)
         return
     try:
         answers[question.key] = sheet.parse_answer(question, text, "answer")
@@ -139,14 +144,16 @@ def nearest(answers: Given) -> Config:
     return min(cars, key=distance)
 
 
-def config_text(answers: Given, like: Config) -> str:
+def config_text(answers: Given, like: Config, taken: Collection[str] = ()) -> str:
     """Return a CONFIG file of the answers and, where they are silent, of the car `like`.
+
+    `taken`: keys of answers that are that car's too.
 
     Raises:
         UserError: the answers contradict each other.
     """
-    vehicle = _vehicle(answers, like)
-    axles = {axle: _axle(axle, answers, like) for axle in ("front", "rear")}
+    vehicle = _vehicle(answers, like, taken)
+    axles = {axle: _axle(axle, answers, like, taken) for axle in ("front", "rear")}
     name = answers.get("name", "car")
     lines = [
         f'# {name}, by `brake-ecu config new`. "data sheet": as given; "{ASSUMED}": measure it, or',
@@ -176,14 +183,14 @@ def config_text(answers: Given, like: Config) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _vehicle(answers: Given, like: Config) -> dict[str, Value]:
+def _vehicle(answers: Given, like: Config, taken: Collection[str]) -> dict[str, Value]:
     car = like.vehicle
     values = {key: Value(value, f"as {like.name}, {ASSUMED}") for key, value in car if value is not None}
     for key, value in answers.items():
         section, _, name = key.rpartition(".")
         if section == "vehicle" and name in values:
             metres = sheet.BY_KEY[key].unit == "mm"
-            values[name] = Value(float(value) / 1000.0 if metres else value, "data sheet")
+            values[name] = Value(float(value) / 1000.0 if metres else value, _origin(key, like, taken))
     mass, length = float(values["mass"].value), float(values["wheelbase"].value)
     if "vehicle.front_load" in answers:
         values["front_axle"] = _from_load(answers, "vehicle.front_load", mass, length)
@@ -204,6 +211,10 @@ def _vehicle(answers: Given, like: Config) -> dict[str, Value]:
     return values
 
 
+def _origin(key: str, like: Config, taken: Collection[str]) -> str:
+    return f"as {like.name}, {ASSUMED}" if key in taken else "data sheet"
+
+
 def _from_load(answers: Given, key: str, mass: float, wheelbase: float) -> Value:
     load = float(answers[key])
     if not 0.2 * mass <= load <= 0.8 * mass:
@@ -212,7 +223,7 @@ def _from_load(answers: Given, key: str, mass: float, wheelbase: float) -> Value
     return Value(round(wheelbase * (1.0 - load / mass), 3), f"from {load:g} kg of {mass:g} kg in front")
 
 
-def _axle(axle: str, answers: Given, like: Config) -> dict[str, Value]:
+def _axle(axle: str, answers: Given, like: Config, taken: Collection[str]) -> dict[str, Value]:
     usual = like.front if axle == "front" else like.rear
     values = {
         key: Value(value, f"as {like.name}, {ASSUMED}")
@@ -232,9 +243,10 @@ def _axle(axle: str, answers: Given, like: Config) -> dict[str, Value]:
             remedy = f"a fixed calliper has as many pistons on both sides (found {pistons}); give their sum"
             raise UserError("config new", f"{axle}.pistons", remedy)
         pistons //= 2
-    values["pistons"] = Value(pistons, f"{given('calliper')} calliper, data sheet")
+    told = _origin(f"{axle}.pistons", like, taken)
+    values["pistons"] = Value(pistons, f"{given('calliper')} calliper, {told}")
     piston = float(given("piston_diameter")) / 1000.0
-    values["piston_diameter"] = Value(round(piston, 5), "data sheet")
+    values["piston_diameter"] = Value(round(piston, 5), _origin(f"{axle}.piston_diameter", like, taken))
     if given("effective_radius") is not None:
         values["effective_radius"] = Value(float(given("effective_radius")) / 1000.0, "data sheet")
     else:

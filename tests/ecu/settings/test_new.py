@@ -150,6 +150,22 @@ def test_questions_are_asked_until_they_are_answered(
     assert load_config(out).vehicle.wheelbase == pytest.approx(2.62)
 
 
+def test_what_enter_takes_is_another_car_s(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    brake = ["235/55 R19", "", "", "", "", "305", ""]
+    said = ["", "", "2665", "1120", *[""] * 6, *brake, *brake, "", ""]
+    monkeypatch.setattr("sys.stdin", io.StringIO("\n".join(said) + "\n"))
+    out = tmp_path / "car.toml"
+    run(out)
+    origin = {
+        line.split(" = ")[0]: line.rpartition("; ")[2]
+        for line in out.read_text("utf-8").splitlines()
+        if " = " in line
+    }
+    assert origin["wheelbase"] == "data sheet"
+    assert origin["mass"] == origin["piston_diameter"] == "as suv, assumed"
+    assert origin["pistons"] == "floating calliper, as suv, assumed"
+
+
 def test_an_end_of_input_says_what_is_missing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -102,7 +102,7 @@ WRONG = [
     ("pressures in MPa", times(PRESSURES, 0.1), "calliper_pressure_*: the car brakes", 'unit = "MPa"'),
     ("one pressure 25 % less", times(PRESSURES[:1], 0.75), "calliper_pressure_*: front left", "25 % less"),
     ("pressures turned", times(PRESSURES, -0.1), "calliper_pressure_*: turned", "factor = -1"),
-    ("pressures off by 8", times(PRESSURES, 1.0, 8.0), "calliper_pressure_*: reads +8 bar", "offset"),
+    ("pressures off by 8", times(PRESSURES, 1.0, 8.0), "calliper_pressure_*: reads +8.", "add -8."),
     ("accel_x clipped", clip(ACCEL_X, 0.5), "accel_x: stands at -", "its range ends there"),
     ("accel_y clipped", clip(ACCEL_Y, 0.5), "accel_y: stands at ", "its range ends there"),
     ("a wheel's range too small", clip(WHEELS[1:2], 0.7), "wheel_speed_fr: stands at ", "its range ends"),

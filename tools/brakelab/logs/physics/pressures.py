@@ -42,7 +42,8 @@ def pressure_lines(drive: Drive, car: Car, speed: Vector, rows: Rows) -> tuple[l
         if np.abs(at_rest).max() > REST:
             worst = float(at_rest[np.argmax(np.abs(at_rest))])
             lines.append(
-                f"calliper_pressure_*: reads {worst:+.0f} bar while the car speeds up; check the offset"
+                f"calliper_pressure_*: reads {worst:+.1f} bar while the car speeds up;"
+                f" add {-worst:+.1f} bar to its offset"
             )
             return lines, ["calliper_pressure"]
     total = pressures.sum(axis=1)
