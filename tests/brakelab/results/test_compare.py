@@ -1,5 +1,6 @@
 """Two results side by side: what differs comes first, what does not matters not."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -72,6 +73,9 @@ def test_another_observer_is_told_and_shown(results, capsys) -> None:
     said = capsys.readouterr().out
     print(said)
     assert "observer: joint -> observer2" in said
+    lines = dict(line.split(": ", 1) for line in said.splitlines() if ": " in line)
+    assert re.fullmatch(r"[\d.]+ % on the mean, bias .* -> .* % on the mean, .*", lines["prediction off by"])
+    assert re.fullmatch(r"0\.\d+ front, 0\.\d+ rear -> 0.*", lines["friction at the end"])
     assert "mu_b" in said
     assert "braking 1" in said
 

@@ -17,6 +17,7 @@ from rich.table import Table
 
 from brakelab.results.console import new_console
 from brakelab.results.files import Result, brakes_path, read_result
+from brakelab.results.prediction import errors
 from ecu.contract.signals import CORNERS, without_corner
 from ecu.errors import UserError
 from ecu.output import give
@@ -147,6 +148,27 @@ def _provenance(a: Result, b: Result) -> list[str]:
     return lines
 
 
+def _judged(brakes: Columns) -> tuple[str, str]:
+    """Return how far the predictions of a result were off, and its friction at the end."""
+    counts = (brakes["corner"] == CORNERS[0]) & (brakes["left_out"] == "")
+    off = "no braking to judge it by"
+    if counts.any():
+        measured, predicted = (brakes[f"specific_force_{name}"][counts] for name in ("mean", "predicted"))
+        found = errors(measured.tolist(), predicted.tolist())
+        off = f"{100.0 * found.mean:.1f} % on the mean, bias {100.0 * found.bias:+.1f} %"
+    last = [brakes["mu_b_end"][brakes["corner"] == corner][-1] for corner in CORNERS]
+    return off, f"{0.5 * (last[0] + last[1]):.3f} front, {0.5 * (last[2] + last[3]):.3f} rear"
+
+
+def _verdicts(a: Columns, b: Columns) -> list[str]:
+    """Return what a user compares first: errors of prediction and friction of both."""
+    if not all(len(one["corner"]) and "left_out" in one for one in (a, b)):  # an earlier version's
+        return []
+    names = ("prediction off by", "friction at the end")
+    pairs = zip(names, _judged(a), _judged(b), strict=True)
+    return [f"{name}: {before} -> {after}" for name, before, after in pairs]
+
+
 def compare(a: Path, b: Path) -> int:
     """Print the differences of result `b` from `a`; return 1 if one matters, else 0.
 
@@ -163,7 +185,11 @@ def compare(a: Path, b: Path) -> int:
         console.print(line, highlight=False)
     pairs = [("rows", first, second, _row_keys)]
     if brakes_path(a).exists() and brakes_path(b).exists():
-        pairs += [(BRAKES, read_result(brakes_path(a)), read_result(brakes_path(b)), _brake_keys)]
+        brakes = read_result(brakes_path(a)), read_result(brakes_path(b))
+        pairs += [(BRAKES, *brakes, _brake_keys)]
+        for line in (verdicts := _verdicts(*(one.columns for one in brakes))):
+            console.print(line, highlight=False)
+        give(verdicts=verdicts)
     for title, one, other, keys in pairs:
         own, others = keys(one.columns), keys(other.columns)
         both, rows_a, rows_b = np.intersect1d(own, others, return_indices=True)
