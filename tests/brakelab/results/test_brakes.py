@@ -8,6 +8,7 @@ import pytest
 
 from brakelab.replay.engine import N_ROW
 from brakelab.results.brakes import LEARNED, BrakeBook
+from ecu.contract.faults import E2E_REJECTIONS, PRESSURE_LOST, WHEEL_SPEED_LOST
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CORNERS, FAULT, HOLDING, N_OUTPUTS, NOMINAL, OBSERVING, OUTPUT
 from ecu.settings.config import load_config, new_params
@@ -173,6 +174,15 @@ def lost_for_a_moment(rows: np.ndarray) -> None:
     rows[100:200, OUTPUT["mode_fl"] : OUTPUT["mode_fl"] + 4] = FAULT
 
 
+def faulty(bit: int, speed: float = SPEED, until: int = 700) -> Callable[[np.ndarray], None]:
+    def change(rows: np.ndarray) -> None:
+        no_observation(rows)
+        rows[:until, OUTPUT["active_faults"]] = bit
+        rows[:, OUTPUT["vehicle_speed"]] = speed
+
+    return change
+
+
 HELD = "held: ABS, ESP, accelerator or reverse, or a wheel that slides"
 
 
@@ -184,6 +194,10 @@ HELD = "held: ABS, ESP, accelerator or reverse, or a wheel that slides"
         (no_observation, HELD),
         (lost, "inputs lost"),
         (lost_for_a_moment, HELD),
+        (faulty(E2E_REJECTIONS), "E2E rejections"),
+        (faulty(PRESSURE_LOST), "pressure lost"),
+        (faulty(WHEEL_SPEED_LOST, np.nan), "wheel speed lost"),
+        (faulty(E2E_REJECTIONS, until=200), HELD),
         (brief, LEARNED),
     ],
 )

@@ -17,6 +17,7 @@ from brakelab.results.dust import airborne_mass, dust_of
 from brakelab.results.prediction import STANDING, Vector, corners, left_out, mean, predict
 from brakelab.results.wear import wear_of
 from ecu.algorithm.monitoring.wear import REGRESSORS
+from ecu.contract.faults import E2E_REJECTIONS, FAULTS, PRESSURE_LOST, WHEEL_SPEED_LOST
 from ecu.contract.params import BAR
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CORNERS, FAULT, HOLDING, OBSERVING, OUTPUT
@@ -25,6 +26,8 @@ RELEASE_BAR: Final = 1.0  # an application lasts while a pressure is this much a
 SLOWEST: Final = 5.0 / 3.6  # m/s, end of the friction mean (contract)
 PERIOD: Final = 0.01  # s, one row
 LEARNED: Final = "learned"
+HOLDS: Final = WHEEL_SPEED_LOST | PRESSURE_LOST | E2E_REJECTIONS
+"""Fault bits that explain why nothing was learned."""
 
 BRAKE_UNITS: Final = {
     "brake": "-",
@@ -161,6 +164,10 @@ def learning(rows: Vector, i: int, params: RecordArray) -> str:
         return LEARNED
     if np.mean(_modes(rows, i) == FAULT) > 0.5:
         return "inputs lost"
+    shown = np.nan_to_num(rows[:, OUTPUT["active_faults"]]).astype(np.int64)
+    for fault in FAULTS:
+        if fault.bit & HOLDS and np.mean(shown & fault.bit != 0) > 0.5:
+            return fault.name
     fastest = np.nanmax(rows[:, OUTPUT["vehicle_speed"]], initial=0.0)
     if fastest <= p["min_speed"]:
         return "stands" if fastest < STANDING else f"slower than {3.6 * p['min_speed']:.0f} km/h"
