@@ -54,12 +54,15 @@ def _name(judged: Judged, identified: Identified) -> str:
 
 
 def number_table(judged: Judged) -> Table:
-    """Return the numbers of a law with their intervals of 95 %."""
+    """Return the numbers of a law with their intervals of 95 % by the scatter of the stops alone."""
     rows = [
         (name, f"{value:.4g}", f"{half:.2g}", unit, "no" if name in judged.unidentified else "yes")
         for name, unit, value, half in judged.numbers
     ]
-    below = "Intervals of 95 %, residuals of one stop taken together. Told: by these stops."
+    below = (
+        "±: 95 % by the scatter of these stops, residuals of one stop taken together; lag, filters and scale "
+        "of the sensors, which shift numbers by several times that, are not in it. Told: by these stops."
+    )
     return Table(f"Numbers of {judged.name}", ("number", "value", "±", "unit", "told"), rows, below)
 
 
