@@ -23,6 +23,7 @@ until_speed = 0.0
         ("suv", (), 0, ""),
         ("lcv", (), 1, "brake-ecu: plant suv is another car than lcv (mass +11 %"),
         ("lcv", ("--plant", "lcv"), 0, ""),
+        ("lcv", ("--plant", "as-config"), 0, ""),
     ],
 )
 def test_a_rig_with_another_car_than_the_configured_one_has_failed(

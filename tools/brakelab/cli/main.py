@@ -34,9 +34,9 @@ Plant = Annotated[
     str | None,
     typer.Option(
         "--plant",
-        autocompletion=known("suv", "suv14", "sedan", "lcv"),
+        autocompletion=known("as-config", "suv", "suv14", "sedan", "lcv"),
         metavar="PLANT",
-        help="Simulated car: file or name (sedan, …); default: SCENARIO's",
+        help="Simulated car: as-config, file or name (sedan, …); default: SCENARIO's",
     ),
 ]
 

@@ -22,7 +22,7 @@ from brakelab.rig.results import write_recorded, write_simulated
 from brakelab.rig.vehicle_node import warm_up
 from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.scenario import Scenario, load_scenario
-from brakelab.simulation.scenario_car import other_car, with_plant
+from brakelab.simulation.scenario_car import other_car, with_plant_for
 from ecu.compiling import compiling_told
 from ecu.contract.faults import fault_mask, fault_names
 from ecu.errors import RunFault, UserError
@@ -63,17 +63,18 @@ def rig(
 ) -> int:
     """Run every scenario; return 0, or 1 if one showed a fault bit that nothing of it accounts for.
 
-    `bus`: interface and channel, None: the best available. `plant`: the car's file, None: each scenario's.
-    1 also if that is another car than `config` describes.
+    `bus`: interface and channel, None: the best available. `plant`: the car's file or name, "as-config",
+    None: each scenario's. 1 also if that is another car than `config` describes.
 
     Raises:
         UserError: a scenario, the configuration or the bus is invalid, or `out` cannot be written.
         RunFault: a daemon or the vehicle ended early.
     """
-    scenarios = [(path, with_plant(load_scenario(path), plant)) for path in found(names)]
+    shipped = [(path, load_scenario(path)) for path in found(names)]
     vehicle = load_config(config)
-    others = sorted({other_car(scenario, vehicle) for _, scenario in scenarios} - {""})
     make_folder(out)
+    scenarios = [(path, with_plant_for(one, plant, vehicle, out / "plant")) for path, one in shipped]
+    others = sorted({other_car(scenario, vehicle) for _, scenario in scenarios} - {""})
     meeting = None
     if not lock_step:
         meeting = choose_bus() if bus is None else named_bus(*bus)
@@ -92,7 +93,7 @@ def rig(
                 if meeting is None:
                     outcomes.append(_in_memory(path.stem, scenario, vehicle, folder, seed))
                 else:
-                    driven = _in_real_time(path, scenario, meeting, config, vehicle, folder, seed, plant)
+                    driven = _in_real_time(path, scenario, meeting, config, vehicle, folder, seed)
                     outcomes.append(driven)
     finally:
         if meeting is not None:
@@ -139,9 +140,8 @@ def _in_real_time(
     vehicle: Config,
     folder: Path,
     seed: int,
-    plant: str | None,
 ) -> Outcome:
-    recorded = drive(bus, path, config, scenario.fault, folder, seed, plant=plant)
+    recorded = drive(bus, path, config, scenario.fault, folder, seed, plant=scenario.plant)
     written = write_recorded(recorded.recordings, vehicle, folder)
     report(written.result, recorded.truth, folder / "report.html", recorded.recordings[0])
     undisturbed = _undisturbed(scenario, vehicle, seed)

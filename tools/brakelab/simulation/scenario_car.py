@@ -7,6 +7,7 @@ from pydantic import BaseModel
 
 from brakelab.plant.description import Plant, PlantFileError, load_plant
 from brakelab.plant.draw import Widths, load_widths
+from brakelab.simulation.plant_of_config import AS_CONFIG, write_plant
 from brakelab.simulation.scenario import Scenario
 from ecu.errors import UserError
 from ecu.settings.config import Config
@@ -39,6 +40,17 @@ def with_plant(scenario: Scenario, plant: str | None) -> Scenario:
     return scenario if plant is None else scenario.model_copy(update={"plant": plant})
 
 
+def with_plant_for(scenario: Scenario, plant: str | None, config: Config, folder: Path) -> Scenario:
+    """Return a scenario as `with_plant` does; for "as-config" its car becomes that of `config`, in `folder`.
+
+    Raises:
+        UserError: the plant's file cannot be read, or `folder` not be written.
+    """
+    if plant == AS_CONFIG:
+        plant = str(write_plant(config, named(scenario.plant, "config/plant"), folder))
+    return with_plant(scenario, plant)
+
+
 def other_car(scenario: Scenario, config: Config) -> str:
     """Return in what a scenario's empty car is not that of `config`, one line; "": in nothing.
 
@@ -58,8 +70,8 @@ def other_car(scenario: Scenario, config: Config) -> str:
     found = ", ".join(f"{name} {100.0 * by:+.0f} %" for name, by in more.items())
     if not found:
         return ""
-    plant = Path(scenario.plant).stem
-    return f"plant {plant} is another car than {config.name} ({found}); give yours: --plant NAME or FILE"
+    name = Path(scenario.plant).stem
+    return f"plant {name} is another car than {config.name} ({found}); give --plant as-config, or its file"
 
 
 def with_draw(scenario: Scenario, draw: str) -> Scenario:

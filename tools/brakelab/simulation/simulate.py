@@ -14,7 +14,7 @@ from brakelab.results.outputs import check_outputs
 from brakelab.results.progress import progress_bar
 from brakelab.simulation.closed_loop import START_NS, VEHICLE_BUS, new_loop, run_blocks
 from brakelab.simulation.scenario import load_scenario
-from brakelab.simulation.scenario_car import other_car, with_draw, with_plant
+from brakelab.simulation.scenario_car import other_car, with_draw, with_plant_for
 from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS
 from ecu.contract.signals import CYCLE_NS, INPUT_SIGNALS
 from ecu.errors import UserError
@@ -52,15 +52,17 @@ def simulate(
 ) -> int:
     """Run a scenario with the ECU of `config`, armed; write OUT.log, OUT.parquet, OUT.truth.parquet.
 
-    `draw`: width of the car's draw, see `Scenario.draw`; `plant`: the car's file; None: the scenario's.
-    `told`: False for use from Python, where nothing is printed.
+    `draw`: width of the car's draw, see `Scenario.draw`; `plant`: the car's file or name, or "as-config",
+    which is made in OUT.plant/; None: the scenario's. `told`: False for use from Python, where nothing is
+    printed.
 
     Raises:
         UserError: a file cannot be read, is wrong, or cannot be written.
     """
     log, inputs, truth = (out.with_name(out.name + end) for end in (".log", ".parquet", ".truth.parquet"))
     check_outputs(out, (log, inputs, truth), (scenario, config))
-    driven, vehicle = with_plant(load_scenario(scenario), plant), load_config(config)
+    vehicle = load_config(config)
+    driven = with_plant_for(load_scenario(scenario), plant, vehicle, out.with_name(out.name + ".plant"))
     if told and (differs := other_car(driven, vehicle)):
         say(f"brake-ecu: {differs}")
     if draw is not None:
