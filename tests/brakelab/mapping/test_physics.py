@@ -234,7 +234,7 @@ def test_a_lateral_acceleration_is_not_blamed_for_flat_tyres():
 
 DECEL = np.maximum(-ROAD.change, 0.0)
 SUV = car_of(new_params(load_config(resource("config/suv.toml")))[0])
-PER_BAR = float(SUV.decel_per_bar.sum())  # m/s² per bar in all callipers
+PER_BAR = float(SUV.brakes.decel_per_bar.sum())  # m/s² per bar in all callipers
 BAR = np.maximum(DECEL - 0.3, 0.0) / PER_BAR
 
 

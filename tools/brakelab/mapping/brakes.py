@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from brakelab.logs.physics.line import BRAKING, MOVING, Fit, smooth
-from brakelab.logs.physics.pressures import OVERRUN, scale_by_brakes
+from brakelab.logs.physics.pressures import OVERRUN
 from brakelab.logs.physics.samples import Car
 from brakelab.mapping.candidates import best_of, by_name, unit_of
 from brakelab.mapping.motion import Found, Motion, is_near, on_grid
@@ -79,7 +79,7 @@ def _pressures(best: Series, line: Fit | None, series: list[Series], motion: Mot
 def _without_unit(each: list[Series], motion: Motion, car: Car) -> tuple[float, str]:
     """Return factor and warning of pressures without a unit: what the brakes of CONFIG need."""
     told = "the database states no unit"
-    if car.decel_per_bar is None:
+    if car.brakes is None:
         return 1.0, f"{told}, taken for bar: friction is off by its scale; --config CONFIG tells more"
     pressures = np.stack([smooth(on_grid(one, motion.t)) for one in each], axis=1)
     braking = motion.faster(MOVING) & (motion.change < -BRAKING)
@@ -88,7 +88,9 @@ def _without_unit(each: list[Series], motion: Motion, car: Car) -> tuple[float, 
     pressures = pressures - zero
     applied = pressures.sum(axis=1)  # not by motors alone
     braking &= applied > APPLIED * np.percentile(applied[motion.faster(MOVING)], 99)
-    factor = scale_by_brakes(pressures[braking], -motion.change[braking] - OVERRUN, car.decel_per_bar)
+    expected = float((pressures[braking] @ car.brakes.decel_per_bar).sum())
+    decel = float((-motion.change[braking] - OVERRUN).sum())
+    factor = decel / expected if expected > 0.0 else 1.0
     if 1.0 / READS_AS_BAR < factor < READS_AS_BAR:
         return 1.0, f"{told}, taken for bar, as which it fits CONFIG's brakes"
     factor = float(f"{factor:.3g}")

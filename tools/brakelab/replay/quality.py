@@ -57,7 +57,7 @@ class Findings:
     """Statistics of its samples, shape (N_INPUTS,)."""
     mapped: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(N_INPUTS, np.bool_))
     """Where the log can hold an input, shape (N_INPUTS,)."""
-    physics: Judged = field(default_factory=lambda: Judged([], []))
+    physics: Judged = field(default_factory=lambda: Judged([], [], []))
     """Findings of the physics check about the inputs."""
     dropped: int = 0
     """Frames that the kernel dropped in a recorded run."""

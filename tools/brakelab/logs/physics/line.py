@@ -10,6 +10,7 @@ from brakelab.arrays import Vector
 RATE: Final = 50.0  # Hz, of the common grid
 SMOOTH_S: Final = 0.4
 LAGS: Final = range(-10, 11)  # grid steps
+STRIDE: Final = 5  # rows from one compared to the next: a quarter of `SMOOTH_S`, nothing is lost
 MOVING: Final = 3.0  # m/s, from which a car drives
 BRAKING: Final = 0.7  # m/s^2, from which it is its brakes that slow it
 
@@ -22,6 +23,16 @@ class Fit(NamedTuple):
     """Signal per reference."""
     intercept: float
 
+    @property
+    def span(self) -> tuple[float, float]:
+        """Least and greatest size of the slope: all noise is the signal's, or all is the reference's."""
+        return abs(self.slope), abs(self.slope) / max(self.correlation**2, 1e-9)
+
+    def is_beyond(self, tolerated: float) -> bool:
+        """Return whether the size of the slope is not 1 within a factor, whosever the noise is."""
+        least, most = self.span
+        return most < 1.0 / tolerated or least > tolerated
+
 
 def smooth(values: Vector) -> Vector:
     """Return the moving mean over `SMOOTH_S` of values on the grid."""
@@ -32,11 +43,14 @@ def smooth(values: Vector) -> Vector:
 
 def fit(signal: Vector, reference: Vector, rows: NDArray[np.bool_]) -> Fit:
     """Return the line of the best of a few lags between a signal and its expected value."""
-    best = Fit(0.0, 0.0, 0.0)
+    best, places = Fit(0.0, 0.0, 0.0), np.flatnonzero(rows)
+    if len(places) < 2 * RATE:
+        return best
+    places = places[::STRIDE]
+    r = reference[places]
     for lag in LAGS:
-        shifted = np.roll(signal, lag)
-        s, r = shifted[rows], reference[rows]
-        if len(s) < 2 * RATE or s.std() == 0.0 or r.std() == 0.0:
+        s = signal[(places - lag) % len(signal)]
+        if s.std() == 0.0 or r.std() == 0.0:
             continue
         correlation = float(np.corrcoef(s, r)[0, 1])
         if abs(correlation) > abs(best.correlation):

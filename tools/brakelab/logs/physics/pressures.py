@@ -1,12 +1,13 @@
 """Calliper pressures of a drive against its deceleration.
 
-    -dv/dt  ~  sum of the callipers of  2 A_k r_eff mu_nominal (p - p_0) / (m r)
+    -a  ~  sum of the callipers of  2 A_k r_eff mu_nominal (p - p_0) / (m r)  +  motors
 
-Friction may be half or twice the nominal one, so that only a wrong unit shows, not a wrong scale; a wrong
-scale of one calliper shows against the other side of its axle.
+Friction may be half or nearly twice the nominal one, so that only a scale beyond shows; a wrong scale of one
+calliper shows against the other side of its axle. Front and rear are exchanged if the rear wheels would have
+to bear more than the front ones for their load, and would not the other way round: no car is built so.
 """
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -17,54 +18,63 @@ from brakelab.logs.physics.stuck import clipped_pressures
 from ecu.bus.units import CONVERSIONS
 
 LEAST_ROWS: Final = int(2 * RATE)
-FRICTION: Final = 2.5  # by which friction and mass together may be off
+FRICTION: Final = 1.9  # by which friction and mass together may be off
 SIDES: Final = 0.2  # by which the sides of an axle may differ
 LEAST_BAR: Final = 3.0  # on the mean, from which sides are compared
 REST: Final = 5.0  # bar, that a released brake may read
 TURNED: Final = 0.6  # correlation with the deceleration
 NOISE: Final = 4.0  # standard deviations of released brakes, that braking stands out by
 OVERRUN: Final = 0.3  # m/s^2, drag and engine
+APPLIED: Final = 0.1  # of the greatest pressure, from which a brake is applied
+HARD: Final = 2.5  # m/s^2, from which loads tell the axles apart
+OVERBRAKED: Final = 1.1  # of the front wheels' use of their load, that rear ones never reach
 
 
-def pressure_lines(drive: Drive, car: Car, speed: Vector, rows: Rows) -> tuple[list[str], list[str]]:
-    """Return a line for each thing that the pressures cannot be, and which inputs were judged.
+class Pressures(NamedTuple):
+    """Findings about pressures, as `brakelab.logs.physics.judge.Judged` has them."""
 
-    `speed` [m/s] and the `rows` in which the car moves are of shape (n,).
+    contradictions: list[str]
+    flaws: list[str]
+    checked: list[str]
+
+
+def judge_pressures(drive: Drive, car: Car, change: Vector, rows: Rows) -> Pressures:
+    """Return what the pressures cannot be.
+
+    `change` [m/s^2] of speed and the `rows` in which the car moves are of shape (n,).
     """
     pressures = drive.corners("calliper_pressure")
     if pressures is None:
-        return [], []
-    change = np.gradient(speed, 1.0 / RATE)
-    lines: list[str] = []
+        return Pressures([], [], [])
+    checked = ["calliper_pressure"]
     idle = rows & (change > 0.2)
-    if idle.sum() > LEAST_ROWS:
-        at_rest = np.median(pressures[idle], axis=0)
-        if np.abs(at_rest).max() > REST:
-            worst = float(at_rest[np.argmax(np.abs(at_rest))])
-            lines.append(
-                f"calliper_pressure_*: reads {worst:+.1f} bar while the car speeds up;"
-                f" add {-worst:+.1f} bar to its offset"
-            )
-            return lines, ["calliper_pressure"]
+    rest = np.median(pressures[idle], axis=0) if idle.sum() > LEAST_ROWS else np.zeros(4)
+    if np.abs(rest).max() > REST:
+        worst = float(rest[np.argmax(np.abs(rest))])
+        told = (
+            f"calliper_pressure_*: reads {worst:+.1f} bar while the car speeds up;"
+            f" add {-worst:+.1f} bar to its offset"
+        )
+        return Pressures([], [told], checked)
     total = pressures.sum(axis=1)
     greatest = np.percentile(np.abs(total[rows]), 99)
     if idle.sum() > LEAST_ROWS:
         released = total[idle]
         if np.percentile(np.abs(total[rows] - np.median(released)), 99) < NOISE * released.std():
-            return [], []
-    brakes = rows & (change < -BRAKING)
-    pressed = brakes & (np.abs(total) > 0.3 * greatest)
+            return Pressures([], [], [])
+    pressed = rows & (change < -BRAKING) & (np.abs(total) > 0.3 * greatest)
     if pressed.sum() < LEAST_ROWS:
-        return [], []
+        return Pressures([], [], [])
     line = fit(total, np.maximum(-change, 0.0), rows)
     if line.correlation < -TURNED:
-        return ["calliper_pressure_*: turned: falls as the car brakes; factor = -1"], ["calliper_pressure"]
+        return Pressures(["calliper_pressure_*: turned: falls as the car brakes; factor = -1"], [], checked)
     if line.correlation < 0.2:
         told = f"calliper_pressure_*: does not follow the deceleration (correlation {line.correlation:.2f})"
-        return [f"{told}; is it another signal?"], ["calliper_pressure"]
+        return Pressures([f"{told}; is it another signal?"], [], checked)
     clipped = clipped_pressures(drive, change, rows)
-    lines = [clipped] if clipped else _sides(pressures[pressed])
-    return lines + _unit(drive, car, pressures, change, pressed), ["calliper_pressure"]
+    lines = [] if clipped else _sides(pressures[pressed])
+    lines += _axles(pressures - rest, change, rows, car) + _unit(drive, car, pressures - rest, change, rows)
+    return Pressures(lines, [clipped] if clipped else [], checked)
 
 
 def _sides(pressures: Vector) -> list[str]:
@@ -80,23 +90,40 @@ def _sides(pressures: Vector) -> list[str]:
     return lines
 
 
-def scale_by_brakes(pressures: Vector, decel: Vector, per_bar: Vector) -> float:
-    """Return the factor with which pressures make the brakes' deceleration; 1 if they make none.
+def _axles(pressures: Vector, change: Vector, rows: Rows, car: Car) -> list[str]:
+    """Compare what the axles would bear with their loads, as mapped and the other way round."""
+    if car.brakes is None:
+        return []
+    hard = rows & (change < -HARD)
+    if hard.sum() < LEAST_ROWS:
+        return []
+    mean, decel = pressures[hard].mean(axis=0), -float(change[hard].mean())
+    front_load = car.brakes.front_load + car.brakes.transfer * decel
 
-    `pressures` [bar], shape (n, 4); `decel` by the brakes alone [m/s^2], shape (n,); `per_bar`: see `Car`.
-    """
-    expected = float((pressures @ per_bar).sum())
-    return float(decel.sum()) / expected if expected > 0.0 else 1.0
+    def rear_use(each: Vector) -> float:
+        front, rear = each[:2].sum() / front_load, each[2:].sum() / (1.0 - front_load)
+        return float(rear / front)
+
+    mapped = rear_use(mean * car.brakes.decel_per_bar)
+    exchanged = rear_use(mean[[2, 3, 0, 1]] * car.brakes.decel_per_bar)
+    if not (mapped > OVERBRAKED and exchanged < 1.0 / OVERBRAKED):
+        return []
+    told = f"the rear wheels would bear {mapped:.1f} times what the front ones do for their load"
+    return [f"calliper_pressure_*: front and rear are exchanged: {told}; exchange them"]
 
 
-def _unit(drive: Drive, car: Car, pressures: Vector, change: Vector, pressed: Rows) -> list[str]:
-    if car.decel_per_bar is None or car.decel_per_torque is None:
+def _unit(drive: Drive, car: Car, pressures: Vector, change: Vector, rows: Rows) -> list[str]:
+    if car.brakes is None:
         return []
     motors = drive.corners("motor_torque")
-    others = OVERRUN if motors is None else OVERRUN + motors[pressed] @ car.decel_per_torque
-    wanted = scale_by_brakes(pressures[pressed], -change[pressed] - others, car.decel_per_bar)
-    if 1.0 / FRICTION <= wanted <= FRICTION:
+    others = OVERRUN if motors is None else OVERRUN + motors @ car.brakes.decel_per_torque
+    total = pressures.sum(axis=1)
+    applied = rows & (total > APPLIED * np.percentile(total[rows], 99))
+    line = fit(pressures @ car.brakes.decel_per_bar, -change - others, applied)
+    if line.correlation < TURNED or not line.is_beyond(FRICTION):
         return []
+    least, most = line.span
+    wanted = 1.0 / np.sqrt(least * most)
     fitting = [
         unit
         for unit, (scale, _) in CONVERSIONS["bar"].items()

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from brakelab.arrays import Vector
 from brakelab.logs.physics.line import RATE, smooth
+from ecu.contract.params import GRAVITY
 from ecu.contract.signals import (
     ACCEL_X,
     ACCEL_Y,
@@ -49,8 +50,21 @@ FEWEST: Final = 100  # samples
 Rows = NDArray[np.bool_]
 
 
+class Brakes(NamedTuple):
+    """Brakes of a car that is known."""
+
+    decel_per_bar: Vector
+    """Of each calliper [m/s^2/bar], shape (4,)."""
+    decel_per_torque: Vector
+    """Of each wheel [m/s^2/(N m)], shape (4,)."""
+    front_load: float
+    """Share of the load that the front axle bears at rest."""
+    transfer: float
+    """Share that moves to it per deceleration [1/(m/s^2)]."""
+
+
 class Car(NamedTuple):
-    """Lengths of a car, and torque per pressure of its brakes."""
+    """Lengths of a car, and its brakes."""
 
     radius: Vector
     """m, shape (4,)."""
@@ -58,15 +72,16 @@ class Car(NamedTuple):
     """m"""
     wheelbase: float
     """m"""
-    decel_per_bar: Vector | None
-    """Of each calliper [m/s^2/bar], shape (4,); None: not known."""
-    decel_per_torque: Vector | None
-    """Of each wheel [m/s^2/(N m)], shape (4,)."""
-    known: bool
-    """By a configuration; else of any passenger car."""
+    brakes: Brakes | None
+    """None: of any passenger car."""
+
+    @property
+    def known(self) -> bool:
+        """Whether a configuration tells it."""
+        return self.brakes is not None
 
 
-ANY_CAR: Final = Car(np.full(4, 0.33), 1.55, 2.7, None, None, known=False)
+ANY_CAR: Final = Car(np.full(4, 0.33), 1.55, 2.7, None)
 
 
 def car_of(params: Any) -> Car:
@@ -74,8 +89,11 @@ def car_of(params: Any) -> Car:
     torque = torque_per_bar(params)
     radius = np.array(params["wheel_radius"])
     per_torque = 1.0 / radius / float(params["mass"])
-    lengths = float(params["track"]), float(params["wheelbase"])
-    return Car(radius, *lengths, torque * per_torque, per_torque, known=True)
+    wheelbase = float(params["wheelbase"])
+    front_load = float(params["rear_axle"]) / wheelbase
+    transfer = float(params["cog_height"]) / wheelbase / GRAVITY
+    brakes = Brakes(torque * per_torque, per_torque, front_load, transfer)
+    return Car(radius, float(params["track"]), wheelbase, brakes)
 
 
 class Collector:
