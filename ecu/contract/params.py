@@ -29,6 +29,7 @@ SECOND_ORDER, INVERSE, OFF = range(3)
 PARAMS: Final = np.dtype(
     [
         ("transmit", "u1"),  # armed: demands are flagged valid
+        ("fixed", "u1"),  # friction stays as it was restored: nothing is learned
         ("mapped", "u1", (N_INPUTS,)),  # inputs fed by a frame or column
         # vehicle
         ("mass", "f8"),  # kg

@@ -146,6 +146,7 @@ def replay(
     state: AnyPath | None = None,
     changes: Mapping[str, Change] | None = None,
     out: AnyPath | None = None,
+    force: bool = False,
 ) -> Result:
     """Replay a drive of one log or several through the ECU.
 
@@ -157,6 +158,7 @@ def replay(
         state: folder of what was learned before, read and written; None: nothing is known.
         changes: keys of `config` with other values, {"observer.mu_drift": 0.05}.
         out: file of the result, Parquet; None: a temporary one.
+        force: learn friction although physics contradicts a log; else `notes` say so, and nothing is learned.
 
     Raises:
         UserError: an argument, the configuration, the map or a log is not right, or no sample of an input
@@ -178,6 +180,7 @@ def replay(
             observer,
             Path(state) if state is not None else None,
             written,
+            force=force,
         )
     if nothing_usable(done.findings):
         names = ", ".join(group.name for group in NEEDED)

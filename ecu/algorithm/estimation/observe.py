@@ -70,7 +70,7 @@ def start_estimate(s: Record) -> None:
 @kernel
 def keep_application(p: Record, s: Record) -> None:
     """At the end of a brake application: store the joint observer's learned states."""
-    if p.observer != JOINT:
+    if p.observer != JOINT or p.fixed:
         return
     if not p.transmit:
         end_whole(s.whole)
@@ -96,7 +96,7 @@ def hand_over_application(p: Record, s: Record) -> None:
     """After `keep_application`: prepare the observed values for the next application."""
     if p.observer == JOINT:
         hand_over_level(s.estimate, s.learned)
-    else:
+    elif not p.fixed:
         hand_over(s.friction, s.learned)
         tell_friction(s.friction, s.estimate)
 
@@ -128,7 +128,7 @@ def observe(
     if p.observer == JOINT:
         _observe_jointly(p, s, u, heat, guarded or contradicted, braking, dt)
     else:
-        s.friction.held = 1 if contradicted else 0
+        s.friction.held = 1 if contradicted or p.fixed else 0
         if _at_rest(p, s, u):
             _learn_zeros(s.joint.zero, u)
         _observe_by_wheel(p, s, u, braking, dt)
@@ -158,17 +158,18 @@ def _observe_jointly(
         if not s.whole.alone:
             add_window(p, s.prediction, joint, u)
     s.prediction.told_s = max(s.prediction.told_s - dt, 0.0)
-    tell_joint(p, joint, s.hydraulics, s.estimate, s.learned, u, braking, dt)
+    learns = braking and not p.fixed
+    tell_joint(p, joint, s.hydraulics, s.estimate, s.learned, u, learns, dt)
     s.estimate.given_up = 1 if s.prediction.told_s > 0.0 else 0
     s.estimate.torques_known = 1 if p.transmit or torques_measured(p, joint) else 0
     if not p.transmit:
         tell_whole(s.whole, s.estimate, p.mass)
-        if braking and s.whole.alone and s.whole.time > 0.0:
+        if learns and s.whole.alone and s.whole.time > 0.0:
             for i in range(4):
                 s.estimate.mode[i] = OBSERVING
                 s.estimate.observed_s[i] += dt
     joint.unkept_s += dt
-    if joint.unkept_s > KEEP_S:
+    if joint.unkept_s > KEEP_S and not p.fixed:
         _keep(p, s)
 
 

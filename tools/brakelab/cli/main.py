@@ -153,11 +153,14 @@ def replay(
             help="Repeat the cycles of this recording of `run --record` to the bit",
         ),
     ] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Learn friction although physics contradicts the log")
+    ] = False,
 ) -> int:
     """Replay a recorded drive through the ECU. Write results."""
     from brakelab.replay import command
 
-    return command.replay(logs, config, map, observer, state, out, cycles)
+    return command.replay(logs, config, map, observer, state, out, cycles, force)
 
 
 @app.command()

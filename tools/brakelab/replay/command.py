@@ -4,12 +4,13 @@ from collections.abc import Sequence
 from contextlib import closing
 from itertools import chain
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.logs.formats import kind_of
+from brakelab.logs.formats import Advance, kind_of
+from brakelab.replay.contradictions import HELD, contradiction_lines
 from brakelab.replay.drive import drive_frames, replay_drive
 from brakelab.replay.log import log_hash, log_size
 from brakelab.replay.needed import (
@@ -24,7 +25,7 @@ from brakelab.replay.needed import (
     transducer_line,
 )
 from brakelab.replay.quality import Findings, quality_counts, quality_lines
-from brakelab.replay.source import check_map, load_source, radius_line
+from brakelab.replay.source import Source, check_map, load_source, radius_line
 from brakelab.replay.summary import WIDTH, brakings_table, listed, prediction_errors, prediction_lines, taps
 from brakelab.results.car import KEY as CAR
 from brakelab.results.car import car_of
@@ -41,7 +42,7 @@ from ecu.bus.receive_plan import ReceivePlan
 from ecu.contract.records import RecordArray
 from ecu.errors import RunFault, UserError
 from ecu.output import Level, detail, give, policy, say, wrote
-from ecu.recording.recorder import read_recording
+from ecu.recording.recorder import Recording, read_recording
 from ecu.recording.restored import restored
 from ecu.recording.store import open_store, save
 from ecu.settings.config import Config, config_hash, load_config, new_params, store_key
@@ -55,6 +56,7 @@ def replay(
     state: Path | None,
     out: Path,
     cycles: Path | None = None,
+    force: bool = False,
 ) -> int:
     """Replay `logs` as one drive into `out`, print the findings and return 0; arguments as `replay_into`.
 
@@ -62,7 +64,7 @@ def replay(
         UserError: an argument, the configuration, the map or a log is not right.
         RunFault: the results are written, but no needed input was ever usable.
     """
-    done = replay_into(logs, config, map, observer, state, out, cycles, progress=True)
+    done = replay_into(logs, config, map, observer, state, out, cycles, force, progress=True)
     for line in done.notes:
         say(line)
     _tell(done)
@@ -96,9 +98,13 @@ def replay_into(
     state: Path | None,
     out: Path,
     cycles: Path | None = None,
+    force: bool = False,
     progress: bool = False,
 ) -> Replayed:
     """Replay `logs` as one drive into `out` (its folder is made) and `<name>.brakes.parquet`.
+
+    Where physics contradicts a log, the drive is replayed once more with friction as it was before it, and
+    nothing is stored; not with `force`, nor from recordings, which repeat what the ECU did.
 
     An `out` that ends in .mf4 or .mcap holds both, the latter the frames of the logs, too.
 
@@ -122,11 +128,10 @@ def replay_into(
     learned = _restore(state, vehicle, params)
     before = new_state(params, learned)["learned"].tobytes()
     findings = [Findings(path) for path in logs]
-    with (
-        ResultWriter(out, params) as writer,
-        progress_bar("replay", sum(log_size(path) for path in logs), progress) as advance,
-    ):
-        writer.provenance = {
+    recorded = recording is not None or any(kind_of(log) == "recording" for log in logs)
+    size = sum(log_size(path) for path in logs)
+    with ResultWriter(out, params) as writer, progress_bar("replay", size, progress) as advance:
+        provenance = {
             "version": __version__,
             "vehicle": vehicle.name,
             "observer": vehicle.observer.kind,
@@ -135,23 +140,44 @@ def replay_into(
             "database_hash": source.database_hash,
             "inputs": [{"name": path.name, "sha256": log_hash(path)} for path in logs],
         }
-
-        def write(t: NDArray[np.float64], rows: NDArray[np.float64]) -> None:
-            if (began_ns := findings[0].began_ns) is not None:
-                writer.provenance.setdefault("start_time_ns", str(began_ns))
-            writer.write(t, rows)
-
-        learned = replay_drive(
-            findings, params, learned, source, write, writer.brakes.end_log, advance, recording
-        )
+        after = _run(writer, findings, params, learned, source, provenance, advance, recording)
+        wrong = contradiction_lines(findings)
+        held = bool(wrong) and not (force or recorded)
+        if held:
+            params["fixed"] = 1
+            writer.restart()
+            findings = [Findings(path) for path in logs]
+            after = _run(writer, findings, params, learned, source, provenance, lambda size: None, recording)
         writer.quality = [quality_counts(found, source.plan) for found in findings]
         writer.frames = drive_frames(findings)
-        writer.pads = [] if learned is None else pads_of(params, learned, vehicle)
-    if state and learned is not None and learned.tobytes() != before:
+        writer.pads = [] if after is None else pads_of(params, after, vehicle)
+    if state and not held and after is not None and after.tobytes() != before:
         with closing(open_store(state)) as store:
-            save(store, store_key(vehicle), learned)
+            save(store, store_key(vehicle), after)
+    notes = [*wrong, *([HELD] if held else []), *notes]
     notes += _notes(findings, source.plan, vehicle.observer.kind)
     return Replayed(writer, findings, notes, params[0]["mu_nominal"])
+
+
+def _run(
+    writer: ResultWriter,
+    findings: Sequence[Findings],
+    params: RecordArray,
+    learned: RecordArray | None,
+    source: Source,
+    provenance: dict[str, Any],
+    advance: Advance,
+    recording: Recording | None,
+) -> RecordArray | None:
+    """Write the rows of a drive and return what is learned after it."""
+    writer.provenance = dict(provenance)
+
+    def write(t: NDArray[np.float64], rows: NDArray[np.float64]) -> None:
+        if (began_ns := findings[0].began_ns) is not None:
+            writer.provenance.setdefault("start_time_ns", str(began_ns))
+        writer.write(t, rows)
+
+    return replay_drive(findings, params, learned, source, write, writer.brakes.end_log, advance, recording)
 
 
 def _check(logs: Sequence[Path], out: Path, cycles: Path | None) -> None:
@@ -184,8 +210,8 @@ def _notes(findings: Sequence[Findings], plan: ReceivePlan, observer: str) -> li
             *(quality_lines(found, plan), needed_lines(found), request_line(found)),
             *(transducer_line(found, observer), lacking_line(found), fault_lines(found)),
         )
-        judged = (f"{found.path}: {line}" for line in found.physics.lines)
-        lines += chain(*about, judged)
+        flaws = (f"{found.path}: {line}" for line in found.physics.flaws)
+        lines += chain(*about, flaws)
     return lines
 
 

@@ -160,6 +160,8 @@ def _modes(rows: Vector, i: int) -> Vector:
 def learning(rows: Vector, i: int, params: RecordArray) -> str:
     """Return `LEARNED` if corner i was observed in `rows`, shape (n, N_ROW), else the reason why not."""
     p = params[0]
+    if p["fixed"]:
+        return "physics contradicts"
     if np.any(_modes(rows, i) == OBSERVING):
         return LEARNED
     if np.mean(_modes(rows, i) == FAULT) > 0.5:

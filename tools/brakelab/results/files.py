@@ -122,6 +122,14 @@ class ResultWriter:
         self.brakes.add(t, rows)
         self.rows += len(t)
 
+    def restart(self) -> None:
+        """Forget what was written: the rows come once more."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+        self.brakes.rows.clear()
+        self.rows = 0
+
     def _open(self) -> pq.ParquetWriter:
         if self._file is None:
             schema = ROW_SCHEMA.with_metadata(_encoded(self.provenance))

@@ -127,7 +127,7 @@ def tell_joint(
         estimate: `ESTIMATE`, already holding inertial signals and pressures.
         learned: `LEARNED`.
         inputs: `INPUTS`.
-        braking: a brake application lasts.
+        braking: a brake application lasts that may teach friction.
         dt: time since the last cycle [s].
     """
     x = state.x

@@ -134,7 +134,7 @@ def _learning_forbidden(params: Record, state: Record, inputs: Record, braking: 
         brakes += brake_torque(params, state, i, w.pressure[i])
     against = braking and (driver_accelerates(inputs) or drives_against(motors, brakes))
     unknown = braking and (_axle_unknown(inputs, 0) or _axle_unknown(inputs, 2))
-    return against or unknown or (braking and state.held != 0) or others_brake(inputs)
+    return against or unknown or (braking and state.held != 0) or others_brake(inputs) or params.fixed != 0
 
 
 @kernel
