@@ -52,8 +52,8 @@ def params(config: Path) -> np.void:
     return new_params(load_config(config))[0]
 
 
-def contradictions(columns: Columns, car: Car) -> list[str]:
-    """Judge a log as `replay` does: the last sample of 10 ms, if it is within the range of its input."""
+def grid(columns: Columns) -> Values:
+    """Return the samples of `SAMPLED` as `replay` takes them: the last of 10 ms, within its input's range."""
     cycle = np.rint((columns["t"] - columns["t"][0]) * 100.0).astype(int)
     samples = np.full((cycle[-1] + 1, len(SAMPLED)), np.nan)
     for column, place in enumerate(SAMPLED):
@@ -61,8 +61,12 @@ def contradictions(columns: Columns, car: Car) -> list[str]:
         values = columns.get(signal.name, np.array([np.nan]))
         here = np.flatnonzero((values >= signal.low) & (values <= signal.high))
         samples[cycle[here], column] = values[here]
+    return samples
+
+
+def contradictions(columns: Columns, car: Car) -> list[str]:
     collector = Collector()
-    collector.add(samples)
+    collector.add(grid(columns))
     return judge(collector.drive(), car).contradictions
 
 

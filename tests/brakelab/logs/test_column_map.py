@@ -13,7 +13,8 @@ import pytest
 
 from brakelab.logs.column_map import maps_columns, read_column_map
 from brakelab.logs.log_quality import SignalQuality
-from brakelab.logs.signal_file import SampleBlock, freshness_at_any_rate, read_signals
+from brakelab.logs.sample_block import SampleBlock
+from brakelab.logs.signal_file import freshness_at_any_rate, read_signals
 from ecu.contract.signals import ACCEL_X, INPUT
 from ecu.errors import UserError
 

@@ -8,7 +8,8 @@ import pytest
 
 from brakelab.logs.formats import read_frames
 from brakelab.logs.log_quality import LogQuality
-from brakelab.logs.signal_file import SampleBlock, freshness_at_any_rate
+from brakelab.logs.sample_block import SampleBlock
+from brakelab.logs.signal_file import freshness_at_any_rate
 from brakelab.replay import engine
 from brakelab.replay.engine import Rows, new_ecu, run_frames, run_samples
 from brakelab.replay.quality import Findings

@@ -239,11 +239,15 @@ def check(
     log: Annotated[Path, typer.Argument(metavar="LOG", help="Recorded drive")],
     map: Annotated[Path, MAP_OPTION],
     config: Annotated[Path | None, CONFIG_OPTION] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="MAP.toml", help="Map of columns to write, with the lags of the drive"),
+    ] = None,
 ) -> int:
     """Check a map on a drive: what feeds each input, and the physics. Exit code 1: it is wrong."""
     from brakelab.mapping import check
 
-    return check.check(log, map, config)
+    return check.check(log, map, config, out)
 
 
 @app.command()

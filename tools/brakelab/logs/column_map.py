@@ -22,6 +22,8 @@ from ecu.settings.toml_file import Unit, describe, read_toml
 
 TIMES: Final = ("t", "time", "timestamp", "timestamps", "interval", "zeit", "elapsed time", "offset")
 """Names of the column of time, in lower case."""
+LONGEST_LAG_S: Final = 0.5
+"""Of an input, either way [s]."""
 SECONDS: Final = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3, "us": 1e-6, "µs": 1e-6,
                   "μs": 1e-6, "ns": 1e-9, "min": 60.0}  # fmt: skip
 
@@ -43,6 +45,8 @@ class MappedColumn(_Table):
     """Added after the factor, in `unit`."""
     timeout: Seconds | None = None
     """After it the input is stale, if not by the rate of its samples."""
+    lag: Annotated[float, Field(ge=-LONGEST_LAG_S, le=LONGEST_LAG_S), Unit("s")] = 0.0
+    """By which its samples come later than what they tell; they count as taken so much earlier."""
 
 
 class ColumnMap(_Table):
@@ -69,6 +73,11 @@ class MappedFile(NamedTuple):
         """Time-outs that the map states [s], by place of the input."""
         inputs = self.content.inputs
         return {INPUT[name]: one.timeout for name, one in inputs.items() if one.timeout is not None}
+
+    @property
+    def lags(self) -> dict[int, float]:
+        """Lags that the map states [s], by place of the input."""
+        return {INPUT[name]: one.lag for name, one in self.content.inputs.items() if one.lag}
 
 
 class ColumnUse(NamedTuple):

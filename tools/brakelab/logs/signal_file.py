@@ -7,7 +7,7 @@ input at one instant the last counts.
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 import pyarrow as pa
@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 
 from brakelab.arrays import arrow_array
 from brakelab.logs.column_map import ColumnUse, FileUse, MappedFile
+from brakelab.logs.lag import without_lags
 from brakelab.logs.log_quality import MAX_JUMP_NS, SignalQuality
+from brakelab.logs.sample_block import SampleBlock
 from brakelab.logs.signal_batches import Batch, is_csv, mapped_batches, plain_batches
 from ecu.bus.freshness import input_freshness
 from ecu.contract.records import RecordArray
@@ -31,18 +33,6 @@ _SHOWN: Final = 20  # names in a line
 _REMEDY: Final = f"give t [s] and columns such as {', '.join(list(INPUT)[:3])} (contract input names)"
 
 _OR_MAP: Final = ", or the map of columns that `map suggest` proposes: --map MAP"
-
-
-class SampleBlock(NamedTuple):
-    """Rows of a signal file, in the order of time."""
-
-    t: NDArray[np.float64]
-    """As it stands in the file [s], shape (rows,)."""
-    t_ns: NDArray[np.int64]
-    places: NDArray[np.int64]
-    """Place of each column in `inputs.value`, shape (columns,)."""
-    values: NDArray[np.float64]
-    """NaN: no sample, shape (rows, columns), units of the contract."""
 
 
 def freshness_at_any_rate(timeouts: Mapping[int, float] | None = None) -> RecordArray:
@@ -76,6 +66,12 @@ def read_signals(
     and column for a `t` that falls, jumps or is not in seconds, an infinite value, a column without any
     number, and a file without any known column or row.
     """
+    blocks = _read(path, quality, mapped)
+    lags = {} if mapped is None else mapped.lags
+    yield from without_lags(blocks, lags) if lags else blocks
+
+
+def _read(path: Path, quality: SignalQuality, mapped: MappedFile | None) -> Iterator[SampleBlock]:
     use: FileUse | None = None
     batches: Iterator[Batch]
     if mapped is None:

@@ -7,13 +7,16 @@ from rich.box import SIMPLE
 from rich.table import Table
 
 from brakelab.logs.physics.judge import judge, range_lines
+from brakelab.logs.physics.lags import lags
 from brakelab.logs.physics.samples import ANY_CAR, Collector, car_of
+from brakelab.mapping.lag import lag_line, write_lags
 from brakelab.replay.engine import new_ecu
 from brakelab.replay.log import log_size, replay_log
 from brakelab.replay.needed import needed_lines
 from brakelab.replay.quality import Findings, quality_counts, quality_lines
 from brakelab.replay.source import Source, announced, check_map, load_source, radius_line
 from brakelab.results.console import new_console
+from brakelab.results.outputs import check_outputs, config_files
 from brakelab.results.progress import progress_bar
 from ecu.bus.signal_map import read_signal_map
 from ecu.contract.signals import without_corner
@@ -26,14 +29,17 @@ WIDTH: Final = 140  # columns where no terminal says how wide it is
 JUDGED: Final = ("wheel_speed", "accel_x", "yaw_rate", "accel_y", "steering_angle", "calliper_pressure")
 
 
-def check(log: Path, map: Path, config: Path | None) -> int:
+def check(log: Path, map: Path, config: Path | None, out: Path | None = None) -> int:
     """Print the signal of each input and the drive's findings; return 1 if one is wrong.
 
-    `config` is of the car: with its tyres and brakes scales and pressures are judged closer.
+    `config` is of the car: with its tyres and brakes scales and pressures are judged closer. `out` is the map
+    to write with the lags that the drive shows.
 
     Raises:
-        UserError: the map, its database, `config` or the log is not right.
+        UserError: the map, its database, `config`, the log or `out` is not right.
     """
+    if out is not None:
+        check_outputs(out, (out,), [log, map, *(config_files(config) if config else [])], toml=True)
     source, findings = announced(load_source(map)), Findings(log)
     if unused := check_map(map, source, log):
         raise UserError(unused, "", "map suggest proposes one")
@@ -44,7 +50,9 @@ def check(log: Path, map: Path, config: Path | None) -> int:
         for rows in replay_log(log, new_ecu(params, None), source, None, findings, advance):
             collector.add(rows.samples)
     assert findings.freshness is not None
-    judged = judge(collector.drive(), car_of(params[0]) if config else ANY_CAR)
+    drive = collector.drive()
+    judged = judge(drive, car_of(params[0]) if config else ANY_CAR)
+    late = lags(drive) if not judged.contradictions else []
     counts = quality_counts(findings, source.plan)
     new_console(WIDTH).print(_table(inputs, counts))
     wrong = [*range_lines(findings.freshness), *judged.lines]
@@ -52,7 +60,10 @@ def check(log: Path, map: Path, config: Path | None) -> int:
         print(line)
     for line in (*quality_lines(findings, source.plan), *needed_lines(findings), *wrong):
         print(line)
-    give(inputs=counts["inputs"], wrong=wrong, checked=judged.checked)
+    stated = source.columns.content if source.columns else None
+    for line in (lag_line(lag, stated) for lag in late):
+        print(line)
+    give(inputs=counts["inputs"], wrong=wrong, checked=judged.checked, lags=[lag._asdict() for lag in late])
     give(notes=[*quality_lines(findings, source.plan), *needed_lines(findings)])
     open_ = [name for name in JUDGED if name not in judged.checked]
     if not wrong:
@@ -63,6 +74,8 @@ def check(log: Path, map: Path, config: Path | None) -> int:
         )
     if judged.checked and open_:
         print(f"not judged, for it is not mapped or the drive shows too little: {', '.join(open_)}")
+    if out is not None:
+        write_lags(map, stated, late, out)
     return 1 if wrong else 0
 
 

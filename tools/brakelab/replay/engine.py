@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from brakelab.arrays import Vector
 from brakelab.logs.physics.samples import KEPT
-from brakelab.logs.signal_file import SampleBlock
+from brakelab.logs.sample_block import SampleBlock
 from brakelab.replay.seen import look_at, new_seen
 from brakelab.results.row import MEASURED_INPUTS, N_ROW
 from ecu.algorithm.step import new_state, step

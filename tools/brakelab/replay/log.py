@@ -11,7 +11,8 @@ from brakelab.logs.formats import Advance, kind_of, read_frames
 from brakelab.logs.log_quality import LogQuality
 from brakelab.logs.physics.judge import judge
 from brakelab.logs.physics.samples import Collector, car_of
-from brakelab.logs.signal_file import SampleBlock, freshness_at_any_rate, read_signals
+from brakelab.logs.sample_block import SampleBlock
+from brakelab.logs.signal_file import freshness_at_any_rate, read_signals
 from brakelab.replay.earlier_layout import convert_initial
 from brakelab.replay.engine import Ecu, Rows, run_frames, run_samples
 from brakelab.replay.quality import Findings, identifier, note_faults

@@ -14,7 +14,8 @@ import numpy as np
 from brakelab.arrays import Vector
 from brakelab.logs.column_map import MappedFile
 from brakelab.logs.formats import kind_of, read_frames
-from brakelab.logs.signal_file import SampleBlock, freshness_at_any_rate, read_signals
+from brakelab.logs.sample_block import SampleBlock
+from brakelab.logs.signal_file import freshness_at_any_rate, read_signals
 from brakelab.replay.quality import Findings
 from brakelab.replay.source import Source, load_source, only_interface
 from ecu.bus.freshness import accept, begin_cycle, end_cycle
