@@ -10,11 +10,11 @@ from brakelab.cli.bench import HELP as BENCH_HELP
 from brakelab.cli.bench import bench
 from brakelab.cli.dynamometer import app as lab_app
 from brakelab.cli.identify import app as identify_app
+from brakelab.cli.maps import app as map_app
 from ecu.arguments import (
     CHANNEL_OPTION,
     CONFIG_OPTION,
     INTERFACE_OPTION,
-    MAP_OPTION,
     Channel,
     Commands,
     Config,
@@ -43,6 +43,7 @@ Plant = Annotated[
 app = Commands()
 app.add_typer(lab_app, name="lab")
 app.add_typer(identify_app, name="identify")
+app.add_typer(map_app, name="map")
 
 
 def scenarios_and_folders(incomplete: str) -> list[str]:
@@ -206,48 +207,6 @@ def report(
         command.report(result, truth, out, timing)
     wrote(out)
     return 0
-
-
-map_app = Commands(help="Make signal maps for other CAN databases and signal files.", no_args_is_help=True)
-app.add_typer(map_app, name="map")
-
-
-@map_app.command()
-def suggest(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="Recorded drive")],
-    dbc: Annotated[
-        Path | None,
-        typer.Option(
-            "--dbc",
-            metavar="DB",
-            help="CAN database of the car: DBC, KCD, SYM, ARXML; none for a signal file",
-        ),
-    ] = None,
-    config: Annotated[Path | None, CONFIG_OPTION] = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="MAP.toml", help="Map to write; default: print it")
-    ] = None,
-) -> int:
-    """Propose a map by names, units and physics, for you to edit."""
-    from brakelab.mapping import command
-
-    return command.suggest(log, dbc, config, out)
-
-
-@map_app.command()
-def check(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="Recorded drive")],
-    map: Annotated[Path, MAP_OPTION],
-    config: Annotated[Path | None, CONFIG_OPTION] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="MAP.toml", help="Map of columns to write, with the lags of the drive"),
-    ] = None,
-) -> int:
-    """Check a map on a drive: what feeds each input, and the physics. Exit code 1: it is wrong."""
-    from brakelab.mapping import check
-
-    return check.check(log, map, config, out)
 
 
 @app.command()
