@@ -5,7 +5,7 @@ the accelerometer, whose zero and slope are followed slowly, they form a median 
 cannot move. A wheel is judged by its low-passed difference from it, less what its radius has been found to
 differ by while rolling:
 
-    slower than it    while nothing brakes that wheel: it rolls or is driven
+    slower than it    after nothing has braked that wheel for `SPIN_UP_S`: it rolls or is driven
     faster than it    while nothing drives that wheel
 
 so a wheel that slides or spins is never judged. The vehicle speed is judged where it is slower than the
@@ -31,6 +31,7 @@ SPEEDS_STATE = np.dtype(
         ("sorted", "f8", (WITNESSES,)),
         ("apart", "f8", (5,)),  # excess of an input over the median, relative, low-passed
         ("base", "f8", (5,)),  # the same while rolling: error of the radius
+        ("freed_s", "f8", (4,)),  # time since the wheel was braked
         ("rolled_s", "f8"),  # learning time of that, at most `BASE_S`
         ("reckoned", "f8"),  # m/s
         ("slope", "f8"),  # of the road and the accelerometer's zero [m/s^2]
@@ -46,6 +47,7 @@ ROLLING, ROLLING_ACROSS = 0.012, 0.002  # of the speed while rolling freely, by 
 ABSOLUTE, LAG_S = 0.15, 0.3  # m/s; of a vehicle speed, while the car slows
 SLIPPING = 0.06  # added for a vehicle speed above wheels that are braked
 DOUBT_S = 0.3
+SPIN_UP_S = 0.5  # of a wheel that locked on ice: lag of the hydraulics, and 15 m/s^2 at an adhesion of 0.05
 BASE_S, FOUND_S = 20.0, 0.5
 FARTHEST_BASE = 0.03
 FREE_ACCEL, DRIVEN_ACCEL = 1.0, 0.5  # m/s^2
@@ -114,7 +116,7 @@ def _judged(state: Record, i: int, median: float, free: bool, braked: bool, driv
     """
     apart: float = state.apart[i] - state.base[i]
     if free:
-        return apart
+        return math.nan if braked and apart < 0.0 else apart
     if i < SPEED:
         reckoned, speed = state.reckoned / median, state.told[SPEED] / median
         if not math.isfinite(speed):
@@ -171,7 +173,11 @@ def watch_speeds(
         told = state.told[i] / (1.0 - state.base[i])
         state.apart[i] += (told / median - 1.0 - state.apart[i]) * min(dt / SMOOTHING_S, 1.0)
         braking, motor = estimate.brake_torque[i % 4], motor_torque(inputs, i % 4)
-        braked = braking + motor > TORQUE or accel < DRAGGED_ACCEL
+        braked = False
+        if i < SPEED:
+            brakes = braking + motor > TORQUE or accel < DRAGGED_ACCEL
+            state.freed_s[i] = 0.0 if brakes else state.freed_s[i] + dt
+            braked = state.freed_s[i] < SPIN_UP_S
         apart = _judged(state, i, median, free, braked, accelerates or motor < -TORQUE)
         place = _place(i)
         unit = median / params.wheel_radius[i] if i < SPEED else median

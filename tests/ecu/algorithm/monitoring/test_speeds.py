@@ -85,6 +85,14 @@ def test_who_contradicts_the_others(road, case, turns, accel, gas, seconds, reje
     assert road.drive(seconds, turns, accel, gas) == rejected
 
 
+def test_a_wheel_that_locked_on_ice_has_time_to_spin_up(road) -> None:
+    """The guard takes its pressure away; a sensor that stays behind for longer is one that lies."""
+    assert road.drive(0.5, (1, 0.5, 1, 1, 1), -1.5) == ()
+    assert road.drive(0.3, (1, 0.7, 1, 1, 1), -0.5) == ()
+    assert road.drive(0.5, (1, 0.5, 1, 1, 1), -1.5) == ()
+    assert road.drive(1.0, (1, 0.7, 1, 1, 1), -0.5) == NAMES[1:2]
+
+
 def test_without_a_speed_over_ground_the_accelerometer_sees_which_axle_lies(params, feed) -> None:
     road = Road(params, feed, reference=False)
     road.drive(5.0)
