@@ -6,7 +6,7 @@ cannot move. A wheel is judged by its low-passed difference from it, less what i
 differ by while rolling:
 
     slower than it    after nothing has braked that wheel for `SPIN_UP_S`: it rolls or is driven
-    faster than it    while nothing drives that wheel
+    faster than it    after nothing has driven that wheel for as long
 
 so a wheel that slides or spins is never judged. The vehicle speed is judged where it is slower than the
 wheels and nothing drives them, and where it is faster while they roll freely, or while dead reckoning agrees
@@ -31,7 +31,7 @@ SPEEDS_STATE = np.dtype(
         ("sorted", "f8", (WITNESSES,)),
         ("apart", "f8", (5,)),  # excess of an input over the median, relative, low-passed
         ("base", "f8", (5,)),  # the same while rolling: error of the radius
-        ("freed_s", "f8", (4,)),  # time since the wheel was braked
+        ("spins_s", "f8", (4, 2)),  # time for which a wheel that was braked, or driven, may still slip
         ("rolled_s", "f8"),  # learning time of that, at most `BASE_S`
         ("reckoned", "f8"),  # m/s
         ("slope", "f8"),  # of the road and the accelerometer's zero [m/s^2]
@@ -47,7 +47,7 @@ ROLLING, ROLLING_ACROSS = 0.012, 0.002  # of the speed while rolling freely, by 
 ABSOLUTE, LAG_S = 0.15, 0.3  # m/s; of a vehicle speed, while the car slows
 SLIPPING = 0.06  # added for a vehicle speed above wheels that are braked
 DOUBT_S = 0.3
-SPIN_UP_S = 0.5  # of a wheel that locked on ice: lag of the hydraulics, and 15 m/s^2 at an adhesion of 0.05
+SPIN_UP_S = 0.5  # of a wheel that slid on ice: lag of the hydraulics, and 15 m/s^2 at an adhesion of 0.05
 BASE_S, FOUND_S = 20.0, 0.5
 FARTHEST_BASE = 0.03
 FREE_ACCEL, DRIVEN_ACCEL = 1.0, 0.5  # m/s^2
@@ -116,7 +116,8 @@ def _judged(state: Record, i: int, median: float, free: bool, braked: bool, driv
     """
     apart: float = state.apart[i] - state.base[i]
     if free:
-        return math.nan if braked and apart < 0.0 else apart
+        slid = braked if apart < 0.0 else driven and i < SPEED
+        return math.nan if slid else apart
     if i < SPEED:
         reckoned, speed = state.reckoned / median, state.told[SPEED] / median
         if not math.isfinite(speed):
@@ -173,12 +174,13 @@ def watch_speeds(
         told = state.told[i] / (1.0 - state.base[i])
         state.apart[i] += (told / median - 1.0 - state.apart[i]) * min(dt / SMOOTHING_S, 1.0)
         braking, motor = estimate.brake_torque[i % 4], motor_torque(inputs, i % 4)
-        braked = False
+        braked, driven = False, accelerates or motor < -TORQUE
         if i < SPEED:
-            brakes = braking + motor > TORQUE or accel < DRAGGED_ACCEL
-            state.freed_s[i] = 0.0 if brakes else state.freed_s[i] + dt
-            braked = state.freed_s[i] < SPIN_UP_S
-        apart = _judged(state, i, median, free, braked, accelerates or motor < -TORQUE)
+            left_s, braked = state.spins_s[i], braking + motor > TORQUE or accel < DRAGGED_ACCEL
+            left_s[0] = SPIN_UP_S if braked else max(left_s[0] - dt, 0.0)
+            left_s[1] = SPIN_UP_S if driven else max(left_s[1] - dt, 0.0)
+            braked, driven = left_s[0] > 0.0, left_s[1] > 0.0
+        apart = _judged(state, i, median, free, braked, driven)
         place = _place(i)
         unit = median / params.wheel_radius[i] if i < SPEED else median
         judge(witness, place, apart * unit, tolerance * unit, DOUBT_S, dt)

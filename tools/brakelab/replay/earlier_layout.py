@@ -34,6 +34,7 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "held",
         "slip",
         "replacement",
+        "spins_s",
     ),
 }
 

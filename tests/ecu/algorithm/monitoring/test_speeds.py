@@ -93,6 +93,12 @@ def test_a_wheel_that_locked_on_ice_has_time_to_spin_up(road) -> None:
     assert road.drive(1.0, (1, 0.7, 1, 1, 1), -0.5) == NAMES[1:2]
 
 
+def test_a_wheel_that_spun_has_time_to_spin_down(road) -> None:
+    assert road.drive(1.0, (1.6, 1.6, 1, 1, 1), 1.0, 50.0) == ()
+    assert road.drive(0.4, (1.1, 1.1, 1, 1, 1), -0.5) == ()
+    assert road.drive(0.5, (1.1, 1.1, 1, 1, 1), -0.5) == FRONT
+
+
 def test_without_a_speed_over_ground_the_accelerometer_sees_which_axle_lies(params, feed) -> None:
     road = Road(params, feed, reference=False)
     road.drive(5.0)
