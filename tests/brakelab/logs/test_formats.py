@@ -378,13 +378,6 @@ def test_clocks_that_jump_are_mended_and_told(
     assert np.abs(frames["stamp_ns"] - expected).max() <= 40_000_000 * ("clock_set_back" in told)
 
 
-def test_a_log_that_runs_backwards_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "drive.log"
-    path.write_text("".join(f"({1e9 - k / 100:.6f}) can{k % 2} 123#{k % 256:02X}\n" for k in range(400)))
-    with pytest.raises(UserError, match=r"time falls at \d+ frames: it runs backwards; sort its frames"):
-        read(path)
-
-
 @pytest.mark.parametrize("compression", [0, 2])
 def test_mdf_groups_are_merged_by_time(tmp_path: Path, compression: int) -> None:
     interfaces: list[str] = []

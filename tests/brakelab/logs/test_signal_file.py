@@ -81,6 +81,22 @@ def test_blocks_join_without_a_seam(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert quality.rows == 100
 
 
+@pytest.mark.parametrize("ending", ["parquet", "csv"])
+def test_rows_stored_from_the_end_are_read_from_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str
+) -> None:
+    t = np.round(np.arange(100)[::-1] * 0.01, 2)
+    content = {"t": list(t), "accel_x": list(t)}
+    text = "t,accel_x\n" + "".join(f"{x},{x}\n" for x in t)
+    path = write(tmp_path / f"drive.{ending}", content if ending == "parquet" else text)
+    monkeypatch.setattr(signal_batches, "BLOCK_ROWS", 30)
+    quality = SignalQuality()
+    blocks = list(read_signals(path, quality))
+    np.testing.assert_array_equal(np.concatenate([block.t for block in blocks]), t[::-1])
+    np.testing.assert_array_equal(np.concatenate([block.values[:, 0] for block in blocks]), t[::-1])
+    assert quality.backwards
+
+
 DAMAGED = {
     "infinite value, Parquet": (
         {"t": [0.0, 0.01], "accel_x": [1.0, math.inf]},

@@ -21,10 +21,10 @@ from ecu.jit import Record, kernel
 BLOCK_FRAMES: Final = 1 << 14  # 1.3 MB: they stay in the processor's cache until they are decoded
 # A step of the clock beyond this is no gap in the drive but a wrong stamp or two logs in one file.
 MAX_JUMP_NS: Final = 3_600_000_000_000
-FEW: Final = 50  # frames that step back, by which no log counts as running backwards
 # Assumption: no adapter holds a frame back for longer; an older stamp comes from a clock that was set.
 STEP_NS: Final = 1_000_000_000
 _FARTHEST_NS: Final = 1 << 61  # the year 2043: sums of two such stamps are still numbers
+_FEW: Final = 10  # frames, too few to judge their order
 _AHEAD: Final = 4096  # frames among which the next of the same interface is looked for
 
 _STAMPS: Final = np.dtype(
@@ -81,6 +81,8 @@ class SignalQuality(Damage):
     unknown_columns: list[str] = field(default_factory=list)
     zero_ns: int | None = None
     """Date of t = 0 as Unix time, if the file says so."""
+    backwards: bool = False
+    """Whether its rows are stored from the end, and were read from there."""
 
 
 @dataclass
@@ -182,7 +184,7 @@ def checked(
     `mended` is False for what the daemon recorded: it met the stamps as they are.
 
     Raises:
-        UserError: the clock jumps by more than an hour and stays there, or the log runs backwards.
+        UserError: the clock jumps by more than an hour and stays there, or runs backwards.
     """
     state = new_record(_STAMPS)
     stamps = state[0]
@@ -215,11 +217,16 @@ def checked(
         quality.stamps_repeated = int(stamps["repeated"])
         quality.clock_set_back, quality.gaps = int(stamps["set_back"]), int(stamps["gaps"])
         quality.frames += len(frames)
-        if quality.stamps_backwards > max(0.5 * quality.frames, FEW):
-            remedy = "it runs backwards; sort its frames by time"
-            raise UserError(str(path), f"time falls at {quality.stamps_backwards} frames", remedy)
         if len(frames):
+            _refuse_backwards(path, block, frames, quality)
             yield frames
+
+
+def _refuse_backwards(path: Path, block: FrameBlock, frames: RecordArray, quality: LogQuality) -> None:
+    falls = 2 * quality.stamps_backwards > quality.frames and frames["stamp_ns"][-1] < frames["stamp_ns"][0]
+    if falls and quality.frames == len(frames) > _FEW:
+        remedy = "time falls from frame to frame: the log is stored from its end; reverse its order"
+        raise UserError(str(path), _place(block, 0), remedy)
 
 
 def _joined(rest: FrameBlock | None, following: FrameBlock | None) -> FrameBlock | None:

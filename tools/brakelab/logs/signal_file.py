@@ -25,7 +25,7 @@ from ecu.contract.signals import INPUT, INPUT_SIGNALS
 from ecu.errors import UserError
 
 FEW_ROWS: Final = 10  # too few to judge their distance
-SLOWEST_STEP: Final = 0.9  # s, above: no input would stay alive, so t is probably not in seconds
+SLOWEST_STEP: Final = 1.1  # s, above: no input would stay alive, so t is probably not in seconds
 SLOWEST_S: Final = 0.3
 """Between samples of a signal that still counts as one."""
 LATEST: Final = 9e9  # s, the year 2255 as Unix time
@@ -80,7 +80,7 @@ def _read(path: Path, quality: SignalQuality, mapped: MappedFile | None) -> Iter
         use, batches = mapped_batches(path, quality, mapped)
     origin_ns: int | None = None
     last_ns = 0
-    for batch, places in batches:
+    for batch, places in _forwards(batches, "t" if use is None else use.time, quality):
         if use is None:
             known_columns = _known_columns(path, batch.schema.names, quality)
             use = FileUse("t", 1.0, [ColumnUse(name, INPUT[name]) for name in known_columns])
@@ -134,6 +134,31 @@ def _read(path: Path, quality: SignalQuality, mapped: MappedFile | None) -> Iter
     if quality.rows == 0:
         remedy = quality.cut or f"no row that can be read; {_REMEDY}"
         raise UserError(str(path), quality.first_damaged or _place(path, 2 * is_csv(path)), remedy)
+
+
+def _forwards(batches: Iterator[Batch], time: str, quality: SignalQuality) -> Iterator[Batch]:
+    """Yield the rows of a file in the order of time, also of one that is stored from its end."""
+    for batch in batches:
+        if not batch.rows.num_rows:
+            yield batch
+            continue
+        if not _falls(batch, time):
+            yield batch
+            break
+        quality.backwards = True
+        for rows, places in reversed([batch, *batches]):
+            yield Batch(rows.take(pa.array(np.arange(rows.num_rows)[::-1])), places[::-1])
+    yield from batches
+
+
+def _falls(batch: Batch, time: str) -> bool:
+    """Return whether time falls from row to row."""
+    try:
+        t = batch.rows.column(time).cast(pa.float64()).to_numpy(zero_copy_only=False)
+    except (KeyError, pa.ArrowInvalid, pa.ArrowNotImplementedError):
+        return False
+    steps = np.diff(t[np.isfinite(t)])
+    return len(steps) >= FEW_ROWS and bool((steps <= 0.0).all() and (steps < 0.0).any())
 
 
 def check_seconds(path: Path, name: str, t: NDArray[np.float64], or_else: str) -> None:

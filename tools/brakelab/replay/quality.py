@@ -113,6 +113,8 @@ def damage_lines(findings: Findings) -> list[str]:
     if log.gaps:
         first = f"the longest of {log.gaps} gaps" if log.gaps > 1 else "the only gap"
         lines.append(f"{name}: {log.longest_gap}: no frame for {log.longest_gap_s:.1f} s before, {first}")
+    if signals.backwards:
+        lines.append(f"{name}: stored from its end, and read from there")
     if signals.unknown_columns:
         unknown = signals.unknown_columns
         more = f", … ({len(unknown)} in all)" if len(unknown) > SHOWN else ""
