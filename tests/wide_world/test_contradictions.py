@@ -2,15 +2,20 @@
 
 from collections.abc import Callable
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
+from brakelab.fleet.job import Job
+from brakelab.fleet.task import replay_job
 from brakelab.logs.physics.judge import judge
 from brakelab.logs.physics.samples import SAMPLED, Car, Collector, car_of
 from brakelab.replay.command import Replayed, replay_into
+from brakelab.replay.source import load_source
 from brakelab.results.files import read_result
 from ecu.contract.signals import CORNERS, INPUT_SIGNALS
 from ecu.recording.store import open_store, restore
@@ -189,3 +194,27 @@ def test_a_sound_log_teaches_and_force_does(logged: dict[tuple[int, int], Logged
     assert notes[0].endswith("accel_x: turned against dv/dt; factor = -1")
     assert not any("--force" in line for line in notes)
     assert learned(forced)
+
+
+@pytest.mark.parametrize("rows", [False, True])
+def test_a_fleet_learns_nothing_of_a_contradicted_drive(
+    logged: dict[tuple[int, int], Logged], tmp_path: Path, rows: bool
+) -> None:
+    columns = dict(logged[1, 7].columns)
+    log, config, out = tmp_path / "log.parquet", tmp_path / "car.toml", tmp_path / "rows.parquet"
+    config.write_text(logged[1, 7].config, "utf-8")
+    job = Job(
+        "a", "1", (str(log),), load_config(config), load_source(None), b"", "", str(out) if rows else ""
+    )
+    write(columns, log)
+    sound = replay_job(job)
+    assert sound.summary["learned"] > 0
+    times("accel_x", -1.0)(columns)
+    write(columns, log)
+    told = replay_job(replace(job, learned=sound.learned))
+    assert told.summary["notes"].splitlines()[0].endswith("accel_x: turned against dv/dt; factor = -1")
+    assert told.summary["learned"] == 0
+    assert told.summary["brakings"] > 10
+    assert told.learned == sound.learned
+    if rows:
+        assert np.ptp(pq.read_table(out)["mu_b_fl"].to_numpy()) == 0.0

@@ -17,6 +17,7 @@ from brakelab.fleet.files import local_copies
 from brakelab.fleet.job import Job, Outcome, failed, metadata_of, provenance
 from brakelab.fleet.summary import DriveBook
 from brakelab.fleet.wear import register_pads, wear_summary
+from brakelab.replay.contradictions import contradiction_lines
 from brakelab.replay.drive import replay_drive
 from brakelab.replay.log import log_hash
 from brakelab.replay.needed import NEEDED, fault_lines, needed_lines, nothing_usable, transducer_line
@@ -26,7 +27,7 @@ from brakelab.results.car import car_of
 from brakelab.results.files import ResultWriter, brakes_table
 from brakelab.results.pads import pads_of
 from ecu.algorithm.step import new_state
-from ecu.contract.records import LEARNED
+from ecu.contract.records import LEARNED, RecordArray
 from ecu.errors import RunFault, UserError
 from ecu.recording.learned_range import out_of_range
 from ecu.settings.config import new_params
@@ -82,9 +83,18 @@ def _replay(job: Job, paths: Sequence[Path]) -> tuple[Outcome, pa.Table]:
                     }
                     writer.write(t, rows)
 
-            after = replay_drive(
-                findings, params, learned, job.source, write, book.brakes.end_log, lambda _: None
-            )
+            def run() -> RecordArray | None:
+                ended = book.brakes.end_log
+                return replay_drive(findings, params, learned, job.source, write, ended, lambda _: None)
+
+            after = run()
+            wrong = contradiction_lines(findings)
+            if wrong:
+                params["fixed"] = 1
+                findings, book = [Findings(path) for path in paths], DriveBook(params)
+                if writer is not None:
+                    writer.restart()
+                after = run()
             if writer is not None and after is not None:
                 writer.pads = pads_of(params, after, job.config)
         if nothing_usable(findings):
@@ -94,7 +104,10 @@ def _replay(job: Job, paths: Sequence[Path]) -> tuple[Outcome, pa.Table]:
             _put(file, Path(job.rows))
     assert after is not None
     kept = job.learned if out_of_range(after, params[0]["mu_nominal"]) else after.tobytes()
-    notes = [
+    if wrong:
+        kept = b"" if learned is None else learned.tobytes()
+        wrong = [*wrong, "friction stays as it was before this drive, until the map is mended"]
+    notes = wrong + [
         line
         for found in findings
         for line in (
