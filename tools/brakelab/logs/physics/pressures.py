@@ -3,8 +3,9 @@
     -a  ~  sum of the callipers of  2 A_k r_eff mu_nominal (p - p_0) / (m r)  +  motors
 
 Friction may be half or nearly twice the nominal one, so that only a scale beyond shows; a wrong scale of one
-calliper shows against the other side of its axle. Front and rear are exchanged if the rear wheels would have
-to bear more than the front ones for their load, and would not the other way round: no car is built so.
+calliper shows against the other side of its axle (`sides`). Front and rear are exchanged if the rear wheels
+would have to bear more than the front ones for their load, and would not the other way round: no car is built
+so.
 """
 
 from typing import Final, NamedTuple
@@ -14,19 +15,19 @@ import numpy as np
 from brakelab.arrays import Vector
 from brakelab.logs.physics.line import BRAKING, RATE, fit
 from brakelab.logs.physics.samples import Car, Drive, Rows
+from brakelab.logs.physics.sides import Sides, judge_sides
 from brakelab.logs.physics.stuck import clipped_pressures
 from ecu.bus.units import CONVERSIONS
 
 LEAST_ROWS: Final = int(2 * RATE)
 FRICTION: Final = 1.9  # by which friction and mass together may be off
-SIDES: Final = 0.2  # by which the sides of an axle may differ
-LEAST_BAR: Final = 3.0  # on the mean, from which sides are compared
 REST: Final = 5.0  # bar, that a released brake may read
 TURNED: Final = 0.6  # correlation with the deceleration
 NOISE: Final = 4.0  # standard deviations of released brakes, that braking stands out by
 OVERRUN: Final = 0.3  # m/s^2, drag and engine
 APPLIED: Final = 0.1  # of the greatest pressure, from which a brake is applied
 HARD: Final = 2.5  # m/s^2, from which loads tell the axles apart
+ALIVE: Final = 0.4  # of the other axle's pressure: below, one has failed
 OVERBRAKED: Final = 1.1  # of the front wheels' use of their load, that rear ones never reach
 
 
@@ -72,22 +73,11 @@ def judge_pressures(drive: Drive, car: Car, change: Vector, rows: Rows) -> Press
         told = f"calliper_pressure_*: does not follow the deceleration (correlation {line.correlation:.2f})"
         return Pressures([f"{told}; is it another signal?"], [], checked)
     clipped = clipped_pressures(drive, change, rows)
-    lines = [] if clipped else _sides(pressures[pressed])
-    lines += _axles(pressures - rest, change, rows, car) + _unit(drive, car, pressures - rest, change, rows)
-    return Pressures(lines, [clipped] if clipped else [], checked)
-
-
-def _sides(pressures: Vector) -> list[str]:
-    lines = []
-    for axle, left, right in (("front", 0, 1), ("rear", 2, 3)):
-        means = pressures.mean(axis=0)
-        if min(means[left], means[right]) < LEAST_BAR:
-            continue
-        more = float(means[left] / means[right])
-        if max(more, 1.0 / more) > 1.0 + SIDES:
-            told = f"{100.0 * abs(more - 1.0):.0f} % {'more' if more > 1.0 else 'less'} than the right"
-            lines.append(f"calliper_pressure_*: {axle} left reads {told}; check factor and signal of both")
-    return lines
+    sides = Sides([], []) if clipped else judge_sides(drive, car, pressures, pressed)
+    lines = sides.contradictions + _unit(drive, car, pressures - rest, change, rows)
+    if not sides.differ:
+        lines += _axles(pressures - rest, change, rows, car)
+    return Pressures(lines, sides.flaws + ([clipped] if clipped else []), checked)
 
 
 def _axles(pressures: Vector, change: Vector, rows: Rows, car: Car) -> list[str]:
@@ -106,7 +96,8 @@ def _axles(pressures: Vector, change: Vector, rows: Rows, car: Car) -> list[str]
 
     mapped = rear_use(mean * car.brakes.decel_per_bar)
     exchanged = rear_use(mean[[2, 3, 0, 1]] * car.brakes.decel_per_bar)
-    if not (mapped > OVERBRAKED and exchanged < 1.0 / OVERBRAKED):
+    alive = mean[:2].sum() > ALIVE * mean[2:].sum()
+    if not (alive and mapped > OVERBRAKED and exchanged < 1.0 / OVERBRAKED):
         return []
     told = f"the rear wheels would bear {mapped:.1f} times what the front ones do for their load"
     return [f"calliper_pressure_*: front and rear are exchanged: {told}; exchange them"]

@@ -18,6 +18,7 @@ from brakelab.logs.physics.samples import Car, Drive, Rows
 from brakelab.logs.physics.scales import CLEAN, SIGNED
 
 LEAST_ROWS: Final = int(8 * RATE)
+LEAST_CURVED: Final = int(20 * RATE)  # of a lateral acceleration: a car also drifts sideways for a while
 LEAST_CHANGE: Final = 0.3  # m/s^2, standard deviation of dv/dt and of v times yaw rate
 LEAST_TURN: Final = 0.008  # rad/s, standard deviation
 
@@ -66,7 +67,8 @@ def relate(drive: Drive, car: Car, wheels: Vector, rows: Rows) -> Relations:
         yaw_rate is not None and abs(yaw_rate.slope) > 57.3 * 0.3 and abs(yaw_rate.correlation) > SIGNED
     )
     scale = np.pi / 180.0 if in_degrees else 1.0
-    accel_y = line("accel_y", scale * speed * yaw, LEAST_CHANGE)
+    curved = rows if rows.sum() >= LEAST_CURVED else np.zeros_like(rows)
+    accel_y = line("accel_y", scale * speed * yaw, LEAST_CHANGE, curved)
     curve = np.arctan(car.wheelbase * scale * yaw / np.maximum(np.abs(speed), MOVING))
     steering = line("steering_angle", curve, 0.004)
     return Relations(accel_x, swapped, yaw_rate, None if swapped else accel_y, steering)
