@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from brakelab.api import load
-from brakelab.replay.source import announced, load_source, radius_line
+from brakelab.replay.source import announced, delay_line, load_source, radius_line
 from ecu.settings.config import load_config, new_params
 from ecu.settings.resources import resource
 
@@ -50,3 +50,14 @@ def test_mistakes_that_the_map_does_not_meet_are_told_once_and_by_who_reads_it(
     assert said == f"{source.left_out}\n"
     assert said.endswith("1 message left out, which the map does not use\n")
     assert load(MUSTANG, map=map).notes[0] == source.left_out
+
+
+@pytest.mark.parametrize(("lag", "delay", "told"), [(0.2, 0.1, True), (0.2, 0.0, False), (0.0, 0.1, False)])
+def test_a_lag_beside_that_of_the_car_is_told(tmp_path: Path, lag: float, delay: float, told: bool) -> None:
+    map = tmp_path / "map.toml"
+    map.write_text(f'[inputs]\nvehicle_speed = {{ column = "v", lag = {lag} }}\n')
+    params = new_params(load_config(resource("config/suv.toml")))
+    params["vehicle_speed_delay"] = delay
+    line = delay_line(load_source(map), params[0])
+    assert ("inputs.vehicle_speed.lag: 0.2 s beside 0.1 s" in line) == told
+    assert bool(line) == told

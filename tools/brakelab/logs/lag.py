@@ -39,7 +39,7 @@ def _moved(block: SampleBlock, lags: Mapping[int, float]) -> SampleBlock:
     parts = []
     for lag in np.unique([0, *late]):
         values = np.where(late == lag, block.values, np.nan)
-        part = SampleBlock(block.t - 1e-9 * lag, block.t_ns - lag, block.places, values)
+        part = SampleBlock(np.round(block.t - 1e-9 * lag, 9), block.t_ns - lag, block.places, values)
         parts.append(part.rows(np.flatnonzero(np.isfinite(values).any(axis=1))) if lag else part)
     return _joined(parts)
 

@@ -14,7 +14,7 @@ from brakelab.replay.engine import new_ecu
 from brakelab.replay.log import log_size, replay_log
 from brakelab.replay.needed import needed_lines
 from brakelab.replay.quality import Findings, quality_counts, quality_lines
-from brakelab.replay.source import Source, announced, check_map, load_source, radius_line
+from brakelab.replay.source import Source, announced, check_map, delay_line, load_source, radius_line
 from brakelab.results.console import new_console
 from brakelab.results.outputs import check_outputs, config_files
 from brakelab.results.progress import progress_bar
@@ -56,8 +56,9 @@ def check(log: Path, map: Path, config: Path | None, out: Path | None = None) ->
     counts = quality_counts(findings, source.plan)
     new_console(WIDTH).print(_table(inputs, counts))
     wrong = [*range_lines(findings.freshness), *judged.lines]
-    if config and (line := radius_line(map, source, params[0])):
-        print(line)
+    if config:
+        for line in filter(None, (radius_line(map, source, params[0]), delay_line(source, params[0]))):
+            print(line)
     for line in (*quality_lines(findings, source.plan), *needed_lines(findings), *wrong):
         print(line)
     stated = source.columns.content if source.columns else None

@@ -25,7 +25,7 @@ from brakelab.replay.needed import (
     transducer_line,
 )
 from brakelab.replay.quality import Findings, quality_counts, quality_lines
-from brakelab.replay.source import Source, check_map, load_source, radius_line
+from brakelab.replay.source import Source, check_map, delay_line, load_source, radius_line
 from brakelab.replay.summary import WIDTH, brakings_table, listed, prediction_errors, prediction_lines, taps
 from brakelab.results.car import KEY as CAR
 from brakelab.results.car import car_of
@@ -124,7 +124,7 @@ def replay_into(
     notes += [line for log in logs if map and (line := check_map(map, source, log))]
     recording = read_recording(cycles) if cycles else None
     params = new_params(vehicle)
-    notes += [line] if (line := radius_line(map, source, params[0])) else []
+    notes += [line for line in (radius_line(map, source, params[0]), delay_line(source, params[0])) if line]
     learned = _restore(state, vehicle, params)
     before = new_state(params, learned)["learned"].tobytes()
     findings = [Findings(path) for path in logs]

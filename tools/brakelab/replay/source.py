@@ -11,6 +11,7 @@ from brakelab.replay.quality import Findings
 from ecu.bus.receive_plan import ReceivePlan, contract_receive_plan
 from ecu.bus.signal_map import load_signal_map, read_signal_map
 from ecu.contract.records import RecordArray
+from ecu.contract.signals import VEHICLE_SPEED
 from ecu.errors import UserError
 from ecu.output import say
 from ecu.settings.resources import resource
@@ -83,6 +84,16 @@ def radius_line(map: Path | None, source: Source, params: Any) -> str:
         f"the wheels of CONFIG roll on {radius:.4g} m, so that speeds are read {off:+.0f} % beside the log's"
     )
     return f"{map}: rolling_radius: {told}; give {radius:.4g}, unless the log's speeds are wrong by as much"
+
+
+def delay_line(source: Source, params: Any) -> str:
+    """Return a line where both the map and the car of `params` (one `PARAMS`) have a lag of the speed."""
+    delay = float(params["vehicle_speed_delay"])
+    lag = source.columns.lags.get(VEHICLE_SPEED, 0.0) if source.columns else 0.0
+    if not (lag and delay and source.columns):
+        return ""
+    told = f"{lag:g} s beside {delay:g} s of CONFIG's sensors.vehicle_speed_delay; keep one of them"
+    return f"{source.columns.path}: inputs.vehicle_speed.lag: {told}"
 
 
 def _hash(*paths: Path) -> str:
