@@ -29,9 +29,13 @@ class Fit(NamedTuple):
         return abs(self.slope), abs(self.slope) / max(self.correlation**2, 1e-9)
 
     def is_beyond(self, tolerated: float) -> bool:
-        """Return whether the size of the slope is not 1 within a factor, whosever the noise is."""
+        """Return whether the size of the slope is not 1 within a factor, whosever the noise is.
+
+        As much again is left for a reference that is no noise but too large: wheels that lock, a coarse speed.
+        """
         least, most = self.span
-        return most < 1.0 / tolerated or least > tolerated
+        slack = tolerated / max(self.correlation**2, 1e-9)
+        return most < 1.0 / slack or least > slack
 
 
 def smooth(values: Vector) -> Vector:

@@ -111,9 +111,9 @@ def _unit(drive: Drive, car: Car, pressures: Vector, change: Vector, rows: Rows)
     total = pressures.sum(axis=1)
     applied = rows & (total > APPLIED * np.percentile(total[rows], 99))
     line = fit(pressures @ car.brakes.decel_per_bar, -change - others, applied)
-    if line.correlation < TURNED or not line.is_beyond(FRICTION):
-        return []
     least, most = line.span
+    if line.correlation < TURNED or (least <= FRICTION and most >= 1.0 / FRICTION):
+        return []
     wanted = 1.0 / np.sqrt(least * most)
     fitting = [
         unit
