@@ -311,6 +311,25 @@ def test_a_flag_that_is_on_for_most_of_the_drive_is_not_esp_at_work(share, taken
     assert ("esp_active" in found(flag)) == taken
 
 
+@pytest.mark.parametrize(
+    ("name", "on", "taken"),
+    [
+        ("REVERSE", lambda t: (t > 5.0) & (t < 9.0), True),
+        ("REVERSE", lambda t: (t > 25.0) & (t < 35.0), False),  # at 30 m/s
+        ("REVERSE", lambda t: t < -1.0, True),
+        ("ReverseLampFault", lambda t: (t > 5.0) & (t < 9.0), False),
+        ("GearRvs", lambda t: (t > 5.0) & (t < 9.0), True),
+        ("Forward", lambda t: (t > 5.0) & (t < 9.0), False),
+    ],
+)
+def test_a_reverse_gear_is_known_by_its_name_where_the_car_is_slow(name, on, taken):
+    """Wheel speeds without a sign: a car that backs out would else be driving forwards."""
+    slow = drive(slowest=1.0)
+    flag = series(name, on(slow.t).astype(float))._replace(flag=True)
+    told = {one.target: one for one in flags([flag], motion_of(slow.wheels))}
+    assert ("reverse" in told) == taken
+
+
 CASES = [
     # unit, slope, correlation, in curves -> factor, said
     ("m/s2", 1.04, 0.99, False, 1.0, ""),

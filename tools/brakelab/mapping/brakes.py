@@ -15,6 +15,7 @@ from ecu.contract.signals import CORNERS
 
 READS_AS_BAR: Final = 1.25  # and its inverse: of a scale that friction explains
 APPLIED: Final = 0.3  # of the greatest pressure
+BACKWARDS: Final = 8.0  # m/s; nobody reverses faster. Assumption
 SELDOM: Final = 0.1  # of a drive, that ABS or ESP may act
 FULL: Final = 100.0  # %
 
@@ -118,4 +119,16 @@ def flags(series: list[Series], motion: Motion) -> list[Found]:
         if named:
             evidence = "by its name, and it is seldom on"
             found.append(Found(target, named, 1.0, 0.0, "-", evidence, False))
+    backwards = [one for one in seldom if score(one.signal, "reverse") >= 1 and _is_slow(one, motion)]
+    if backwards:
+        named = max(backwards, key=lambda one: score(one.signal, "reverse"))
+        evidence = f"by its name, seldom on and never above {3.6 * BACKWARDS:.0f} km/h"
+        warning = "its name alone speaks for it: check that it is on while the car backs"
+        found.append(Found("reverse", named, 1.0, 0.0, "-", evidence, False, warning))
     return found
+
+
+def _is_slow(flag: Series, motion: Motion) -> bool:
+    """Return whether the car is never faster than it reverses while the flag is on."""
+    on = (on_grid(flag, motion.t) > 0.5) & motion.known & is_near(flag, motion.t)
+    return bool(motion.speed[on].max(initial=0.0) < BACKWARDS)

@@ -56,6 +56,7 @@ WORDS: Final = {
     "motor_torque": ("tq", "trq", "torque", "mot", "motor", "whl", "wheel", "prpl", "axle"),
     "abs_active": ("abs", "active", "act", "actv", "brk"),
     "esp_active": ("esp", "esc", "vdc", "vsc", "stab", "active", "act", "actv", "ctl"),
+    "reverse": ("reverse", "rvs", "rueckwaerts", "rückwärts", "backwards"),
 }
 """Words that speak for an input."""
 _ASKED: Final = (
@@ -75,6 +76,7 @@ AGAINST: Final = {
     ),
     "accelerator_position": ("brake", "brk", "accel_x", "long", "lat", "inverted"),
     "pedal_position": ("accelerator", "gas", "throttle", "clutch", "aped", "pressure", "torque"),
+    "reverse": ("light", "lamp", "camera", "cam", "warn", "fault", "fail", "inhibit", "torque", *_ASKED),
     "abs_active": ("fail", "fault", "warn", "lamp", "def", "pas", "off", "diag"),
     "esp_active": ("fail", "fault", "warn", "lamp", "def", "pas", "off", "diag"),
 }
