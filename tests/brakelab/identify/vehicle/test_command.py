@@ -92,6 +92,11 @@ def test_a_configuration_a_page_and_a_picture_are_written(car, tmp_path, capsys)
     said = capsys.readouterr()
     assert "next: brake-ecu replay" in said.err.splitlines()[-1]
     assert "offset =" in said.out
+    printed = [line for line in said.out.splitlines() if " ± " in line]
+    rough = [line.split(" = ")[0].rpartition(".")[2] for line in printed if ", rough" in line]
+    marked = [line for line in out.read_text("utf-8").splitlines() if ", rough" in line]
+    assert 0 < len(rough) == len(marked) < len(printed)
+    assert all(any(line.startswith(f"{name} = ") for line in marked) for name in rough)
 
 
 def reduced(car, tmp_path, *without: str, rows: slice = slice(None)):

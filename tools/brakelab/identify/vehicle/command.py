@@ -45,7 +45,8 @@ def identify_vehicle(drives: Sequence[Path], config: Path, map: Path | None, clo
         if one.remedy:
             print(f"{one.key}: not told; {one.remedy} would tell it")
         else:
-            print(f"{one.key} = {one.value:.5g} ± {one.sigma:.2g}{unit} ({one.source}; was {one.start:.5g})")
+            value = f"{one.value:.5g} ± {one.sigma:.2g}{unit}{one.doubt}"
+            print(f"{one.key} = {value} ({one.source}; was {one.start:.5g})")
     for name, zero in zeros.items():
         print(
             f"{name}: reads {zero:+.4g} at 0"

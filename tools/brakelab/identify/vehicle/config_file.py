@@ -8,7 +8,7 @@ from typing import Any, Final
 import tomlkit
 
 from brakelab.identify.config_file import Section, write_car
-from brakelab.identify.vehicle.parameters import ROUGH, Parameter
+from brakelab.identify.vehicle.parameters import Parameter
 from brakelab.identify.vehicle.solve import Zeros
 from ecu.settings.config import Config, validate_config
 
@@ -42,9 +42,8 @@ def head_of(parameters: Sequence[Parameter], start: str, drives: Sequence[str]) 
 
 def _fitted(one: Parameter) -> tuple[str, str]:
     unit = "" if one.unit == "-" else f"{one.unit}, "
-    rough = ", rough" if one.sigma > ROUGH * abs(one.value) else ""
     origin = f"{one.source}; {one.windows} half seconds"
-    return f"{one.value:.6g}", f"{unit}± {one.sigma:.2g}{rough}; {origin}; was {one.start:.6g}"
+    return f"{one.value:.6g}", f"{unit}± {one.sigma:.2g}{one.doubt}; {origin}; was {one.start:.6g}"
 
 
 def write_vehicle(

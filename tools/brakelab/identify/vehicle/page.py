@@ -9,7 +9,7 @@ import numpy as np
 
 from brakelab.arrays import Vector
 from brakelab.identify.vehicle.model import Place, motion, stiffness_of
-from brakelab.identify.vehicle.parameters import ROUGH, Parameter
+from brakelab.identify.vehicle.parameters import Parameter
 from brakelab.identify.vehicle.solve import Identified
 from brakelab.results.chart import BLUE, ORANGE, PINK, Line, Panel, write_chart
 from brakelab.results.text_table import Table, markdown
@@ -23,7 +23,7 @@ def fitted_table(parameters: Sequence[Parameter]) -> Table:
     """Return the keys that were told."""
     rows = [
         (one.key, one.unit, f"{one.start:.4g}", f"{one.value:.4g}", f"{one.sigma:.2g}",
-         f"{one.windows}", one.source + ("; rough" if one.sigma > ROUGH * abs(one.value) else ""))
+         f"{one.windows}", one.source + one.doubt)
         for one in parameters if not one.remedy
     ]  # fmt: skip
     return Table(

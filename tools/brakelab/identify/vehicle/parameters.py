@@ -50,6 +50,11 @@ class Parameter(NamedTuple):
     remedy: str
     """What would tell it, where the drive does not; else empty."""
 
+    @property
+    def doubt(self) -> str:
+        """Return the word to put behind a value whose deviation is large, else nothing."""
+        return ", rough" if self.sigma > ROUGH * abs(self.value) else ""
+
 
 class _Kind(NamedTuple):
     key: str
