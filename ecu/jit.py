@@ -120,6 +120,12 @@ def _folder(module: str) -> str:
     except OSError as error:
         if error.errno not in _UNWRITABLE:
             raise UserError(str(folder), "", f"cannot be made ({error.strerror}); {_REMEDY}") from None
+    try:
+        os.scandir(folder).close()
+    except FileNotFoundError:
+        pass  # whoever compiles a kernel hears of it
+    except OSError as error:
+        raise UserError(str(folder), "", f"cannot be read ({error.strerror}); {_REMEDY}") from None
     folder = folder.resolve()
     if found := open_to_others(folder):
         remedy = "chmod go-w it, or set NUMBA_CACHE_DIR to a folder of yours alone"

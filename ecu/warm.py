@@ -5,6 +5,8 @@ exits 1 if there was any: an installation whose cache is complete compiles nothi
 """
 
 import argparse
+from collections.abc import Callable
+from typing import Final
 
 from ecu.bus.signal_map import receive_plan
 from ecu.bus.transmit import contract_transmit_plan
@@ -14,14 +16,25 @@ from ecu.runtime.warm_up import warm_up
 from ecu.settings.config import load_config, new_params
 from ecu.settings.resources import resource
 
+EVERY: Final = 50
+"""Kernels between two lines of progress."""
 
-def warm() -> int:
-    """Prepare every kernel of the cycle; return how many had to be compiled."""
-    compiled = CompileCounter()
+
+def warm(begins: Callable[[int], None] = lambda count: None) -> int:
+    """Prepare every kernel of the cycle; return how many had to be compiled.
+
+    `begins` is called before each, with the number of those before it.
+    """
+    compiled = CompileCounter(begins)
     params = new_params(load_config(resource("config/suv.toml")))
     sending = contract_transmit_plan(resource("dbc/brake_ecu.dbc"), "BrakeEcu")
     warm_up(new_ecu(params, None, receive_plan(None), sending), compiled)
     return compiled.count
+
+
+def _tell_progress(count: int) -> None:
+    if count % EVERY == 0:
+        print(f"{count} kernels compiled, some 500 in all", flush=True)
 
 
 def main() -> int:
@@ -30,7 +43,7 @@ def main() -> int:
     )
     parser.add_argument("--check", action="store_true", help="exit 1 if anything had to be compiled")
     check = parser.parse_args().check
-    compiled = warm()
+    compiled = warm(_tell_progress)
     print(f"{compiled} kernels compiled")
     return int(check and compiled > 0)
 

@@ -69,6 +69,12 @@ def test_the_launcher_keeps_to_a_cache_that_is_given(given, taken):
     assert said.stdout == f"{taken}\n"
 
 
+def test_kernels_that_root_compiled_are_read_by_all_and_written_by_nobody_else():
+    lines = (DEPLOY.parent / "install-onboard.sh").read_text().splitlines()
+    compiling = next(place for place, line in enumerate(lines) if line.endswith("-m ecu.warm"))
+    assert lines[compiling + 1] == 'chmod -R a+rX,go-w "$NUMBA_CACHE_DIR"'
+
+
 def test_the_image_belongs_to_root_but_for_the_kernels_and_says_whether_it_is_well():
     text = (DEPLOY.parents[1] / "Dockerfile").read_text()
     before, user, after = text.partition("USER brake")

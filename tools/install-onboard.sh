@@ -2,7 +2,7 @@
 # tools/install-onboard.sh PREFIX
 # Install what runs in the vehicle into PREFIX, an absent or empty folder, and compile its kernels there,
 # so that a start compiles nothing, and PREFIX may be read-only. Run it as the user that will run the daemon, or as
-# root; the folder of compiled kernels, PREFIX/cache, has to be theirs. Needs no root and leaves nothing elsewhere.
+# root; the compiled kernels in PREFIX/cache are read by all. Needs no root and leaves nothing elsewhere.
 set -eu
 die() { echo "install-onboard: $*" >&2; exit 2; }
 
@@ -39,4 +39,5 @@ echo "Compiling the kernels"
 export NUMBA_CPU_NAME=generic NUMBA_CACHE_DIR="$prefix/cache"
 mkdir "$NUMBA_CACHE_DIR"
 "$prefix/bin/python" -P -m ecu.warm
+chmod -R a+rX,go-w "$NUMBA_CACHE_DIR"
 echo "Done: $prefix/bin/brake-ecu; next: $prefix/bin/brake-ecu doctor --config suv -i socketcan -c can0"

@@ -121,6 +121,28 @@ def test_a_complete_cache_on_a_read_only_system_is_enough(tmp_path: Path) -> Non
     assert f"{package.cache}: lacks thrown_away.by_name.value and cannot be written; set NUMBA" in line
 
 
+UNREADABLE = """
+import os
+
+real = os.scandir
+
+def scandir(path="."):
+    if str(path).startswith(os.environ["NUMBA_CACHE_DIR"]):
+        raise PermissionError(13, "Permission denied", str(path))
+    return real(path)
+
+os.scandir = scandir
+"""
+
+
+def test_a_cache_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
+    package = Package(tmp_path)
+    package.limit(2.0)
+    with pytest.raises(RuntimeError) as refused:
+        package.run(UNREADABLE)
+    assert "cannot be read (Permission denied); set NUMBA_CACHE_DIR" in str(refused.value).splitlines()[-1]
+
+
 def modules_with_kernels(package: str) -> list[str]:
     root = Path(importlib.import_module(package).__file__ or "").parent
     paths = [path for path in root.rglob("*.py") if "@kernel" in path.read_text("utf-8")]
