@@ -4,6 +4,7 @@ import http.client
 import os
 import signal
 import socket
+import sys
 from contextlib import suppress
 from pathlib import Path
 
@@ -75,7 +76,8 @@ def test_without_prometheus_client_it_is_one_line(daemon):
     program = hide + "from ecu.cli import main; raise SystemExit(main())"
     one = daemon("--config", "suv", "-i", "virtual", "-c", "x", "--metrics-port", "9476", program=program)
     assert one.end(None) == 2
-    assert one.other == ["brake-ecu: --metrics-port: needs prometheus-client: pip install prometheus-client"]
+    install = f"{sys.executable} -m pip install prometheus-client"
+    assert one.other == [f"brake-ecu: --metrics-port: needs prometheus-client: {install}"]
 
 
 def test_an_address_that_is_none(daemon):

@@ -27,7 +27,9 @@ def test_a_study_is_where_the_table_says_and_its_page_has_its_title_and_text(nam
 def test_a_missing_package_is_named_with_its_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "asammdf", None)
     monkeypatch.delitem(sys.modules, "brakelab.bench.replay", raising=False)
-    with pytest.raises(UserError, match=r"replay: asammdf not installed: pip install 'brake-ecu\[dev\]'"):
+    with pytest.raises(
+        UserError, match=r"replay: asammdf not installed: in the repository pip install '\.\[dev\]'"
+    ):
         study_of("replay")
 
 
