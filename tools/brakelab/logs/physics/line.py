@@ -31,7 +31,7 @@ class Fit(NamedTuple):
     def is_beyond(self, tolerated: float) -> bool:
         """Return whether the size of the slope is not 1 within a factor, whosever the noise is.
 
-        As much again is left for a reference that is no noise but too large: wheels that lock, a coarse speed.
+        As much again is left for a reference that is too large: wheels that lock, a coarse speed.
         """
         least, most = self.span
         slack = tolerated / max(self.correlation**2, 1e-9)
