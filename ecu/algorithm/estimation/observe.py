@@ -126,7 +126,7 @@ def observe(
     e.grip_limit = e.sigma_grip_limit = e.grip_knee = math.nan
     e.torque_share, e.torques_known = 1.0, 1
     if p.observer == JOINT:
-        _observe_jointly(p, s, u, heat, guarded or contradicted, braking, dt)
+        _observe_jointly(p, s, u, heat, guarded, contradicted, braking, dt)
     else:
         s.friction.held = 1 if contradicted or p.fixed else 0
         if _at_rest(p, s, u):
@@ -137,17 +137,23 @@ def observe(
 
 @kernel
 def _observe_jointly(
-    p: Record, s: Record, u: Record, heat: Corners, doubted: bool, braking: bool, dt: float
+    p: Record,
+    s: Record,
+    u: Record,
+    heat: Corners,
+    guarded: bool,
+    contradicted: bool,
+    braking: bool,
+    dt: float,
 ) -> None:
     joint = s.joint
-    if s.application.started:
-        if not p.transmit:
-            begin_whole(p, s.whole, joint)
-        if not s.whole.alone:
-            begin_prediction(p, s.prediction, joint)
-            begin_application(joint, heat)
+    if not p.transmit and (s.application.started or contradicted):
+        begin_whole(p, s.whole, joint)
+    if s.application.started and not s.whole.alone:
+        begin_prediction(p, s.prediction, joint)
+        begin_application(joint, heat)
     joint.held = 1 if s.whole.alone or s.whole.bent else 0
-    if doubted:
+    if guarded or contradicted:
         suspend_learning(joint)
     update_joint(p, joint, u, s.motion, s.wheel_load.load, s.hydraulics, braking, dt)
     if joint.closed and joint.released and not p.transmit:

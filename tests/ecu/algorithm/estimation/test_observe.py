@@ -78,3 +78,26 @@ def test_nothing_is_learned_while_a_deceleration_is_asked_for(params, feed, obse
 def test_nothing_is_learned_of_a_brake_that_is_applied_a_little(params, feed, observer: int) -> None:
     """0.9 bar above push-out: no application yet, and nobody says why. The first 50 ms tell nothing of it."""
     assert np.abs(roll(params, feed, observer, 3.0, (1.4, 1.4, 1.4, 1.4))["pressure_zero"]).max() < 0.1
+
+
+@pytest.mark.parametrize(("doubted_s", "measured_s"), [(0.0, 2.7), (3.0, 0.0), (1.5, 1.2)])
+def test_a_stream_in_doubt_teaches_no_whole_application(
+    params, feed, doubted_s: float, measured_s: float
+) -> None:
+    """A shadow sees a braking of 3 s at 4 m/s^2 by wheels that roll; the doubt lasts that long."""
+    car, state, outputs = params[0], new_state(params), np.zeros(1, OUTPUTS)
+    car["transmit"] = 0
+    inputs, speed = feed(), 30.0
+    for k in range(400):
+        brakes = k >= 100
+        speed -= 0.04 * brakes
+        feed(
+            inputs,
+            wheel_speed=speed / car["wheel_radius"],
+            calliper_pressure=40.0 * brakes,
+            accel_x=-4.0 * brakes,
+            yaw_rate=0.0,
+        )
+        inputs["e2e_unsure"] = brakes and k < 100 + 100 * doubted_s
+        step(params, state, inputs, outputs)
+    assert state["whole"]["time"][0] == pytest.approx(measured_s, abs=0.1)
