@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ecu.bus.freshness import begin_cycle, end_cycle
 from ecu.bus.receive import Reception, new_reception, receive
+from ecu.bus.receive_plan import messages_by_contract
 from ecu.bus.signal_map import MappedBus, load_signal_map, receive_plan
 from ecu.bus.units import CONVERSIONS, conversion
 from ecu.contract.records import INPUTS, RecordArray, new_record
@@ -421,3 +422,39 @@ def test_a_database_of_another_kind_gives_the_same_inputs(tmp_path: Path, kind: 
         np.testing.assert_allclose(other.signals[name], plan.signals[name])
     assert other.ids.tolist() == plan.ids.tolist()
     assert other.mapped.tolist() == plan.mapped.tolist()
+
+
+MESSAGES = [
+    # car, messages of its bus by those of the contract that they stand for
+    (
+        "rav4",
+        {
+            "Imu": ["KINEMATICS"],
+            "Steering": ["STEER_ANGLE_SENSOR"],
+            "WheelSpeed": ["WHEEL_SPEEDS"],
+            "BrakeRequest": ["BRAKE_MODULE", "GAS_PEDAL"],
+        },
+    ),
+    (
+        "mustang",
+        {
+            "Imu": ["BrakeSnData_3"],
+            "CalliperPressure": ["BrakeSnData_4"],
+            "Steering": ["SteeringPinion_Data_Alt"],
+            "BrakeRequest": ["EngBrakeData", "EngVehicleSpThrottle", "DesiredTorqBrk"],
+            "Motor": ["VehicleOperatingModes"],
+            "WheelSpeed": ["WheelSpeed"],
+        },
+    ),
+]
+
+
+@pytest.mark.parametrize(("car", "messages"), MESSAGES, ids=[row[0] for row in MESSAGES])
+def test_messages_stand_for_those_of_the_contract(maps, car: str, messages: dict[str, list[str]]) -> None:
+    assert messages_by_contract(maps[car].plan) == messages
+
+
+def test_without_a_map_axles_share_a_name_and_our_own_frames_have_none() -> None:
+    messages = messages_by_contract(receive_plan(None))
+    assert messages["WheelSpeed"] == ["WheelSpeedFront", "WheelSpeedRear"]
+    assert not any("Blcf" in name for names in messages.values() for name in names)

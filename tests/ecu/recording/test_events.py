@@ -31,7 +31,6 @@ def test_a_remedy_names_the_messages_of_the_bus(
 def test_a_map_s_messages_stand_for_those_of_the_contract() -> None:
     mapped = load_signal_map(MUSTANG)
     messages = messages_by_contract(mapped.plan)
-    print(messages)
     assert set().union(*messages.values()) == set(mapped.plan.messages["name"].tolist())
     said = [in_names_of(messages, fault.remedy) for fault in FAULTS]
     assert not any(f" {name}*" in line for name in messages for line in said)
