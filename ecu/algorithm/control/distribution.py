@@ -38,9 +38,9 @@ DISTRIBUTION_STATE = np.dtype(
         ("grip", "f8"),  # force over load to which the leading axle takes the rest; 0: none of it
         ("rolled", "f8", (2,)),  # by a leading wheel over the way of the ground below it, low-passed
         ("beyond", "f8", (2,)),  # slip of a trailing wheel less that of the leading one, low-passed
-        ("slip", "f8", (2,)),  # of a trailing wheel by the car's speed, low-passed
         ("offset", "f8", (2,)),  # the same of a rear wheel while rolling freely: error of the radii
         ("free_s", "f8", (2,)),  # learning time of that, at most LEARNING_TIME
+        ("slip", "f8", (2,)),  # of a trailing wheel by the car's speed, low-passed
     ],
     align=True,
 )
@@ -140,7 +140,7 @@ def watch_trailing(
         if math.isnan(beyond):
             state.beyond[side] = 0.0
             continue
-        rolled = (rear if trailing > 0.0 else front) * min(abs(speed) / max(reckoned, 1e-9), 1.0)
+        rolled = (rear if trailing > 0.0 else front) * (abs(speed) / max(reckoned, abs(speed)))
         state.slip[side] += SMOOTHING * (1.0 - rolled - state.slip[side])
         state.rolled[side] += SMOOTHING * ((front if trailing > 0.0 else rear) - state.rolled[side])
         if free:

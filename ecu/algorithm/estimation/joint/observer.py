@@ -15,7 +15,6 @@ restored from a snapshot 0.2 to 0.4 s old.
 import math
 
 from ecu.algorithm.estimate import STANDING
-from ecu.algorithm.estimation.friction import drives_against
 from ecu.algorithm.estimation.joint.balance import correct_by_balance, predict_balance
 from ecu.algorithm.estimation.joint.drive import KNOWN, measure_drive
 from ecu.algorithm.estimation.joint.kalman import (
@@ -62,7 +61,7 @@ from ecu.algorithm.estimation.joint.sliding import (
     watch_tyres,
 )
 from ecu.algorithm.estimation.joint.snapshot import restore_snapshot, save_newer_snapshot, save_snapshot
-from ecu.algorithm.estimation.joint.wheel import APPLIED, brake_torque, unknown_share
+from ecu.algorithm.estimation.joint.wheel import APPLIED, brake_torque, drive_opposes, unknown_share
 from ecu.algorithm.estimation.joint.wheel_speed import correct_by_wheels
 from ecu.algorithm.estimation.joint.window import close_window, compare_wheels, gather, open_window
 from ecu.algorithm.estimation.motion import speed_backwards
@@ -127,12 +126,7 @@ def _axle_unknown(inputs: Record, left: int) -> bool:
 
 @kernel
 def _learning_forbidden(params: Record, state: Record, inputs: Record, braking: bool) -> bool:
-    w = state.window
-    motors, brakes = 0.0, 0.0
-    for i in range(4):
-        motors += w.motor[i]
-        brakes += brake_torque(params, state, i, w.pressure[i])
-    against = braking and (driver_accelerates(inputs) or drives_against(motors, brakes))
+    against = braking and (driver_accelerates(inputs) or drive_opposes(params, state, 1.0))
     unknown = braking and (_axle_unknown(inputs, 0) or _axle_unknown(inputs, 2))
     return against or unknown or (braking and state.held != 0) or others_brake(inputs) or params.fixed != 0
 

@@ -9,6 +9,7 @@ Slip by the adhesion used n (force over load), and its derivatives; stiffness C 
 import math
 
 from ecu.algorithm.brake import brake_gain_per_bar
+from ecu.algorithm.estimation.friction import drives_against
 from ecu.algorithm.estimation.joint.layout import (
     BIAS,
     CHANGE,
@@ -93,6 +94,16 @@ def brake_torque(params: Record, state: Record, i: int, pressure: float) -> floa
         return 0.0
     acts = pressure - state.x[OFFSET + i // 2]
     return brake_gain_per_bar(params, i) * friction(params, state, i) * acts
+
+
+@kernel
+def drive_opposes(params: Record, state: Record, share: float) -> bool:
+    """Return whether that share of the window's motor torques drives against the brakes."""
+    motors, brakes = 0.0, 0.0
+    for i in range(4):
+        motors += share * state.window.motor[i]
+        brakes += brake_torque(params, state, i, state.window.pressure[i])
+    return drives_against(motors, brakes)
 
 
 @kernel

@@ -23,9 +23,8 @@ import math
 import numpy as np
 
 from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
-from ecu.algorithm.estimation.friction import drives_against
 from ecu.algorithm.estimation.joint.layout import BIAS, MASS, V
-from ecu.algorithm.estimation.joint.wheel import brake_torque, radius, unknown_share
+from ecu.algorithm.estimation.joint.wheel import brake_torque, drive_opposes, radius, unknown_share
 from ecu.algorithm.estimation.joint.window import COPIES
 from ecu.algorithm.inputs import wheels_mapped
 from ecu.jit import Record, kernel
@@ -206,16 +205,6 @@ def torque_share(state: Record) -> float:
 
 
 @kernel
-def _driven(params: Record, joint: Record, share: float) -> bool:
-    """Return whether that share of the torques drives against the brakes."""
-    motors, brakes = 0.0, 0.0
-    for i in range(4):
-        motors += share * joint.window.motor[i]
-        brakes += brake_torque(params, joint, i, joint.window.pressure[i])
-    return drives_against(motors, brakes)
-
-
-@kernel
 def bend(linings: float, ceiling: float, knee: float) -> tuple[float, float, float]:
     """Return the deceleration f of linings below a ceiling, and its derivatives by ln L and ln c."""
     base = 1.0 + (linings / ceiling) ** knee
@@ -233,7 +222,11 @@ def add_to_whole(params: Record, state: Record, joint: Record) -> None:
     state.common = joint.sampling.common
     held = joint.x[V] > LEAST_SPEED and abs(w.across) < ACROSS and state.age_s > ONSET_S
     share = torque_share(state)
-    if not (w.balanced and held) or joint.unmeasured_s > LONGEST_STEP_S or _driven(params, joint, share):
+    if (
+        not (w.balanced and held)
+        or joint.unmeasured_s > LONGEST_STEP_S
+        or drive_opposes(params, joint, share)
+    ):
         return
     mass = _mass(params, state, joint)
     linings = math.exp(state.x[SCALE]) * _lining_decel(params, joint, mass)
