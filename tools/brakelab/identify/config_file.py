@@ -8,8 +8,7 @@ from typing import Any
 import tomlkit
 from tomlkit.items import InlineTable
 
-from brakelab.results.outputs import config_files
-from ecu.errors import UserError
+from brakelab.results.outputs import config_files, write_text
 from ecu.settings.resources import shipped_in
 
 Section = dict[str, tuple[str, str]]
@@ -52,8 +51,4 @@ def write_car(config: Path, out: Path, head: str, sections: Mapping[str, Section
         UserError: it cannot be written.
     """
     text = car_toml(config, out, head, sections)
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        out.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise UserError(str(out), "", f"cannot be written ({error.strerror}); choose another --out") from None
+    write_text(out, text)

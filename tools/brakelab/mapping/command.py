@@ -25,7 +25,7 @@ from brakelab.mapping.torque import FORMULA, brake_torque, stand_in
 from brakelab.replay.log import log_size
 from brakelab.replay.quality import Findings, damage_lines
 from brakelab.results.console import WIDTH
-from brakelab.results.outputs import check_outputs, config_files
+from brakelab.results.outputs import check_outputs, config_files, write_text
 from brakelab.results.progress import progress_bar
 from ecu.bus.database import read_database
 from ecu.bus.signal_map import SLOWEST_S, load_signal_map
@@ -167,11 +167,7 @@ def _written(text: str, out: Path | None) -> Path | None:
     if out is None:
         print(text)
         return None
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        out.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise UserError(str(out), "", f"cannot be written ({error.strerror}); choose another --out") from None
+    write_text(out, text)
     say(f"written: {out}; check and edit it")
     give(written=[out])
     return out

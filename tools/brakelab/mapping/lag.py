@@ -5,6 +5,7 @@ from pathlib import Path
 
 from brakelab.logs.column_map import LONGEST_LAG_S, ColumnMap, read_column_map
 from brakelab.logs.physics.lags import Lag
+from brakelab.results.outputs import write_text
 from ecu.errors import UserError
 from ecu.output import say, wrote
 
@@ -34,11 +35,7 @@ def write_lags(map: Path, stated: ColumnMap | None, lags: list[Lag], out: Path) 
         for name in _inputs(lag, stated):
             if abs(total) <= LONGEST_LAG_S:
                 text = _with_lag(text, name, total, map)
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        out.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise UserError(str(out), "", f"cannot be written ({error.strerror}); choose another --out") from None
+    write_text(out, text)
     read_column_map(out)
     if not lags:
         say("the drive shows no lag")

@@ -33,6 +33,15 @@ def check_outputs(out: Path, written: Sequence[Path], read: Sequence[Path], toml
                 raise UserError("--out", str(out), remedy)
 
 
+def write_text(out: Path, text: str) -> None:
+    """Write the text of an `--out`, and its folder. Raises UserError if it cannot be written."""
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        out.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise UserError(str(out), "", f"cannot be written ({error.strerror}); choose another --out") from None
+
+
 def _same(one: Path, other: Path) -> bool:
     if one.exists() and other.exists():
         return one.samefile(other)

@@ -15,7 +15,7 @@ from brakelab.identify.tuning.recording import (
 from brakelab.identify.tuning.replay import replay_errors
 from brakelab.identify.tuning.search import RANGES, Best, search
 from brakelab.results.console import new_console
-from brakelab.results.outputs import check_outputs, config_files
+from brakelab.results.outputs import check_outputs, config_files, write_text
 from brakelab.results.progress import progress_bar
 from brakelab.results.text_table import Table, show
 from brakelab.simulation.observer import with_observer
@@ -143,11 +143,7 @@ def _write(out: Path, of: str, rows: Sequence[Row], config: Config) -> None:
         f'kind = "{config.observer.kind}"',
         *(f"{key} = {getattr(config.observer, key)!r}" for key in RANGES),
     ]
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        out.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise UserError(str(out), "", f"cannot be written ({error.strerror}); choose another --out") from None
+    write_text(out, "\n".join(lines) + "\n")
 
 
 def _tell(out: Path, of: str, rows: Sequence[Row], seeds: int) -> None:

@@ -14,6 +14,7 @@ from brakelab.logs.physics.scales import (
     UNIT,
     is_apart,
     is_clean,
+    is_in_degrees,
     sign_and_scale,
     times,
 )
@@ -51,7 +52,7 @@ def lateral_lines(relations: Relations, car: Car) -> list[str]:
     if relations.swapped:
         return lines
     wheels = relations.yaw_rate
-    if wheels and abs(wheels.correlation) > SIGNED and abs(wheels.slope) > 57.3 * 0.3:
+    if is_in_degrees(wheels):
         return [*lines, 'yaw_rate: reads some 57 times what the wheels turn; unit = "deg/s"']
     if wheels and abs(wheels.correlation) > CLEAN - 0.1 and abs(wheels.slope) < 2.0 / 57.3:
         return [*lines, 'yaw_rate: reads a 57th of what the wheels turn; unit = "rad/s"']

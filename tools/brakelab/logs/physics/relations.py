@@ -15,7 +15,7 @@ import numpy as np
 from brakelab.arrays import Vector
 from brakelab.logs.physics.line import MOVING, RATE, Fit, fit
 from brakelab.logs.physics.samples import Car, Drive, Rows
-from brakelab.logs.physics.scales import CLEAN, SIGNED
+from brakelab.logs.physics.scales import CLEAN, is_in_degrees
 
 LEAST_ROWS: Final = int(8 * RATE)
 LEAST_CURVED: Final = int(20 * RATE)  # of a lateral acceleration: a car also drifts sideways for a while
@@ -63,10 +63,7 @@ def relate(drive: Drive, car: Car, wheels: Vector, rows: Rows) -> Relations:
     if "yaw_rate" not in drive:
         return Relations(accel_x, swapped, None, None, None)
     yaw = drive["yaw_rate"]
-    in_degrees = (
-        yaw_rate is not None and abs(yaw_rate.slope) > 57.3 * 0.3 and abs(yaw_rate.correlation) > SIGNED
-    )
-    scale = np.pi / 180.0 if in_degrees else 1.0
+    scale = np.pi / 180.0 if is_in_degrees(yaw_rate) else 1.0
     curved = rows if rows.sum() >= LEAST_CURVED else np.zeros_like(rows)
     accel_y = line("accel_y", scale * speed * yaw, LEAST_CHANGE, curved)
     curve = np.arctan(car.wheelbase * scale * yaw / np.maximum(np.abs(speed), MOVING))

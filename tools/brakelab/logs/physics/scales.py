@@ -37,6 +37,11 @@ def is_clean(line: Fit | None) -> TypeGuard[Fit]:
     return line is not None and abs(line.correlation) > CLEAN
 
 
+def is_in_degrees(line: Fit | None) -> bool:
+    """Return whether an angular rate is some 57 times what it should be."""
+    return line is not None and abs(line.correlation) > SIGNED and abs(line.slope) > 57.3 * 0.3
+
+
 def is_apart(ratio: float, tolerated: float) -> bool:
     """Return whether a ratio is not 1 within a factor."""
     return not 1.0 / tolerated <= ratio <= tolerated
