@@ -9,7 +9,7 @@ help:
 	@echo "make test    every test but the studies"
 	@echo "make studies   tests that draw many cars, brakes or trips: minutes"
 	@echo "make check   ruff, format and types"
-	@echo "make coverage  lines and branches of ecu/algorithm/control, inputs.py and ecu/bus, kernels as plain Python: all of them"
+	@echo "make coverage  lines and branches of ecu/algorithm/control, failed_brakes.py, inputs.py and ecu/bus, kernels as plain Python: all of them"
 	@echo "make mutants   one change at a time in what brakes: which one do the tests not notice? a few minutes"
 	@echo "make fuzz      damaged files by the thousand"
 	@echo "make soak      24 h in virtual time; ARGS='live --hours 1': in real time"
