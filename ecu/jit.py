@@ -1,4 +1,4 @@
-"""Compilation of kernels, and a cache that cannot go stale.
+"""Kernels: from the compiled library of their package where it fits (`ecu/library.py`), from numba otherwise.
 
 numba's disk cache checks a function's own file only: after an edit of a callee or of a constant elsewhere it
 would silently run the old code. The kernels of a module are therefore cached in a folder named after the
@@ -17,19 +17,19 @@ import hashlib
 import os
 import re
 import stat
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from functools import cache
+from functools import cache, cached_property, update_wrapper
 from importlib.util import find_spec
+from inspect import signature
 from pathlib import Path
+from types import ModuleType
 from typing import Any, NamedTuple, TypeVar, cast
-
-import numba
-import numba.core.event as numba_event
-from numba.core import caching
 
 from ecu.errors import UserError
 from ecu.interpreted import interpreted
+from ecu.library import FOLDER, Entry, Library
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -50,6 +50,7 @@ _COMMENT = re.compile(rb"#[^\n]*|\\\n")
 _FROM = re.compile(
     rb"(?:^|[;:])[ \t]*from\b[ \t]*([.\w]+)[ \t]+import\b[ \t]*(\([^)]*\)|[^\n;]*)", re.MULTILINE
 )
+_KERNEL = re.compile(rb"^@(?:parallel_)?kernel\b", re.MULTILINE)
 _IMPORT = re.compile(rb"(?:^|[;:])[ \t]*import\b([^\n;]*)", re.MULTILINE)
 
 
@@ -108,10 +109,16 @@ def sources_of_kernels(module: str) -> dict[str, bytes]:
     return dict(sorted(found.items()))
 
 
+def modules_with_kernels(package: str) -> list[str]:
+    """Return the modules of a package that have kernels."""
+    found = _modules(package).items()
+    return [name for name, path in found if _KERNEL.search(path.read_bytes())]
+
+
 @cache
 def _folder(module: str) -> str:
     """Return the folder of a module's compiled kernels, made if that is possible."""
-    digest = hashlib.sha256(numba.__version__.encode())
+    digest = hashlib.sha256(compiler().__version__.encode())
     for name, text in sources_of_kernels(module).items():
         digest.update(name.encode() + b"\0" + text)
     folder = CACHE_ROOT / f"{module}-{digest.hexdigest()[:16]}"
@@ -166,18 +173,32 @@ def _of_one_user(group: int) -> bool:
     return found.gr_name == user and set(found.gr_mem) <= {user}
 
 
-def kernel(function: Function, parallel: bool = False) -> Function:
-    """Compile `function` with numba (no Python objects, no fastmath) and cache it on disk.
+_BEGINS: list[Callable[[Any], None]] = []
+"""Called with the dispatcher before anything is compiled."""
 
-    Raises:
-        UserError: there is no place for the cache, or others can write to it; when it is called: it has to be
-            compiled, and its place is read-only.
-    """
-    if numba.config.DISABLE_JIT:
-        return interpreted(function)
-    spec = find_spec(function.__module__)  # of `python -m package.module`: not `__main__`
-    numba.config.CACHE_DIR = _folder(spec.name if spec else function.__module__)
-    return cast(Function, numba.njit(**OPTIONS, parallel=parallel)(function))
+
+@cache
+def compiler() -> ModuleType:
+    """Return numba, which is loaded where something has to be compiled, and tells what it compiles."""
+    try:
+        import numba
+        import numba.core.event as event
+        from numba.core import caching
+    except ImportError:
+        remedy = f"{sys.executable} -m pip install numba"
+        raise UserError("numba", "", f"is not installed, and has to compile a kernel: {remedy}") from None
+
+    class Begins(event.Listener):  # type: ignore[misc]
+        def on_start(self, event: Any) -> None:
+            for begins in tuple(_BEGINS):
+                begins(event.data["dispatcher"])
+
+        def on_end(self, event: Any) -> None:
+            pass
+
+    event.register("numba:compile", Begins())
+    caching._CacheLocator.ensure_cache_path = _make_folder
+    return numba
 
 
 def _make_folder(locator: Any) -> None:
@@ -185,37 +206,141 @@ def _make_folder(locator: Any) -> None:
         os.makedirs(locator.get_cache_path(), exist_ok=True)
 
 
-caching._CacheLocator.ensure_cache_path = _make_folder
-
-
-class _RefuseUnwritable(numba_event.Listener):  # type: ignore[misc]
+def _refuse_unwritable(dispatcher: Any) -> None:
     """Say before a kernel is compiled, not minutes later, that it cannot be kept."""
-
-    def on_start(self, event: numba_event.Event) -> None:
-        function = event.data["dispatcher"]
-        folder = function.stats.cache_path
-        if folder is not None and not os.access(folder, os.W_OK):
-            name = f"{function.py_func.__module__}.{function.py_func.__qualname__}"
-            raise UserError(str(CACHE_ROOT), "", f"lacks {name} and cannot be written; {_REMEDY}")
-
-    def on_end(self, event: numba_event.Event) -> None:
-        pass
+    folder = dispatcher.stats.cache_path
+    if folder is not None and not os.access(folder, os.W_OK):
+        name = f"{dispatcher.py_func.__module__}.{dispatcher.py_func.__qualname__}"
+        raise UserError(str(CACHE_ROOT), "", f"lacks {name} and cannot be written; {_REMEDY}")
 
 
-numba_event.register("numba:compile", _RefuseUnwritable())
+_BEGINS.append(_refuse_unwritable)
 
 
-class CompileCounter(numba_event.Listener):  # type: ignore[misc]
+def before_compiling(begins: Callable[[Any], None]) -> None:
+    """Have `begins` called with numba's dispatcher before anything is compiled."""
+    if "numba" in sys.modules:
+        compiler()
+    _BEGINS.append(begins)
+
+
+def after_all(begins: Callable[[Any], None]) -> None:
+    """End what `before_compiling` began."""
+    _BEGINS.remove(begins)
+
+
+def interprets() -> bool:
+    """Return whether kernels run as plain Python."""
+    return os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+
+
+@cache
+def text_digest(module: str) -> str | None:
+    """Return what stands for the text of a module, None without one."""
+    path = _modules(module.partition(".")[0]).get(module)
+    return None if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+@cache
+def library(package: str) -> Library | None:
+    """Return the compiled library of a package, None without one for this processor.
+
+    `BRAKE_ECU_LIBRARY=0` leaves it aside.
+    """
+    if os.environ.get("BRAKE_ECU_LIBRARY") == "0":
+        return None
+    spec = find_spec(package)
+    for root in (spec.submodule_search_locations or []) if spec else []:
+        with suppress(OSError, ValueError, KeyError):
+            return Library(package, Path(root) / FOLDER)
+    return None
+
+
+@cache
+def _fitting(module: str) -> Library | None:
+    """Return the library in which the kernels of a module stand as they are now."""
+    found = library(module.partition(".")[0])
+    return found if found is not None and found.fits(module, text_digest) else None
+
+
+def compiler_version() -> str:
+    """Return the version of numba that made the kernels."""
+    found = library("ecu")
+    return compiler().__version__ if found is None else str(found.manifest["numba"])
+
+
+def kernel(function: Function, parallel: bool = False) -> Function:
+    """Compile `function` with numba (no Python objects, no fastmath), unless a library has it.
+
+    What numba compiles is cached on disk.
+
+    Raises:
+        UserError: there is no place for the cache, or others can write to it; when it is called: it has to be
+            compiled, and its place is read-only.
+    """
+    if interprets():
+        return interpreted(function)
+    if not parallel and (found := _fitting(module_of(function))) is not None:
+        return cast(Function, Kernel(function, found))
+    return cast(Function, dispatcher(function, parallel))
+
+
+def module_of(function: Callable[..., Any]) -> str:
+    """Return the name by which the module of a function is imported."""
+    spec = find_spec(function.__module__)  # of `python -m package.module`: not `__main__`
+    return spec.name if spec else function.__module__
+
+
+def dispatcher(function: Callable[..., Any], parallel: bool = False) -> Any:
+    """Return numba's dispatcher of a kernel, with its cache."""
+    numba = compiler()
+    numba.config.CACHE_DIR = _folder(module_of(function))
+    return numba.njit(**OPTIONS, parallel=parallel)(function)
+
+
+class Kernel:
+    """A kernel of a library. What was not compiled in there, numba compiles when it is called."""
+
+    def __init__(self, function: Callable[..., Any], found: Library) -> None:
+        update_wrapper(self, function)
+        self.py_func = function
+        self._name, self._library = f"{module_of(function)}.{function.__qualname__}", found
+
+    @cached_property
+    def _entries(self) -> list[Entry]:
+        return self._library.entries(self._name)
+
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        if named:
+            bound = signature(self.py_func).bind(*arguments, **named)
+            arguments = bound.args
+        for entry in self._entries:
+            if entry.count == len(arguments) and (block := entry.take(arguments)) is not None:
+                return entry.call(block)
+        return self.dispatcher(*arguments)
+
+    def __reduce__(self) -> str:
+        return cast(str, self.__qualname__)
+
+    @cached_property
+    def dispatcher(self) -> Any:
+        """Return the kernel as numba has it, for what numba compiles and for other arguments."""
+        return dispatcher(self.py_func)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """Return the kernel's type where numba finds it in a function: that of its dispatcher."""
+        return compiler().typeof(self.dispatcher)
+
+
+class CompileCounter:
     """Counter of compilations, none of which may follow the warm-up; `begins` is called before each."""
 
     def __init__(self, begins: Callable[[int], None] = lambda count: None) -> None:
         self.count = 0
         self._begins = begins
-        numba_event.register("numba:compile", self)
+        before_compiling(self._count)
 
-    def on_start(self, event: numba_event.Event) -> None:
+    def _count(self, dispatcher: Any) -> None:
         self._begins(self.count)
         self.count += 1
-
-    def on_end(self, event: numba_event.Event) -> None:
-        pass

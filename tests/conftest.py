@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
+from ecu import jit
+
 # A property is tried on the same values each time, and as slowly as the machine likes.
 settings.register_profile(
     "here", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
@@ -21,6 +23,13 @@ for name in ("BRAKE_ECU_DEBUG", "NOTIFY_SOCKET", "COLUMNS", "FORCE_COLOR", "GITH
 # Small matrices: threads of their own in every worker cost more than they give.
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(name, "1")
+
+# Tests call kernels that no library holds: here numba has them all, processes that tests start take the library.
+if os.environ.get("BRAKE_ECU_TEST_LIBRARY") != "1":
+    os.environ["BRAKE_ECU_LIBRARY"] = "0"
+    for package in ("ecu", "brakelab"):
+        jit.library(package)
+    del os.environ["BRAKE_ECU_LIBRARY"]
 
 LONG = re.compile(r"tests/(system/|test_|brakelab/(identify|fleet|report)/)")
 """Files whose tests run processes, trainings or browsers."""

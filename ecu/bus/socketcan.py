@@ -77,6 +77,13 @@ class _Burst:
         self.address = self.messages.ctypes.data
 
 
+def prepare_kernels() -> None:
+    """Load or compile the kernels of a channel, which afterwards compiles nothing."""
+    incoming, outgoing, frames = _Burst(_CONTROL_BYTES), _Burst(0), new_record(FRAME)
+    _parse(incoming.messages, incoming.wire, incoming.control, 0, frames, 0, np.zeros(4, np.int64))
+    _format(frames, 0, 0, outgoing.wire, outgoing.vectors)
+
+
 class SocketcanChannel:
     """A CAN_RAW socket, see `ecu.bus.channel.Channel`."""
 
@@ -98,12 +105,7 @@ class SocketcanChannel:
         self._line: NDArray[np.int64] = np.zeros(4, np.int64)
         self._failures, self._down, self._gone = 0, False, False
         self._discard()
-        self._warm_up()
-
-    def _warm_up(self) -> None:
-        frames = new_record(FRAME)
-        _parse(self._incoming.messages, self._incoming.wire, self._incoming.control, 0, frames, 0, self._line)
-        _format(frames, 0, 0, self._outgoing.wire, self._outgoing.vectors)
+        prepare_kernels()
 
     def drain(self, frames: RecordArray, start: int) -> int:
         """See `Channel`. Error frames change the status and are not returned."""

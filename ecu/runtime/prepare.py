@@ -13,7 +13,6 @@ from ipaddress import IPv4Address
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-import numba
 import numpy as np
 import structlog
 
@@ -28,7 +27,7 @@ from ecu.bus.transmit import contract_transmit_plan
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CYCLE_NS, INPUT_SIGNALS, OUTPUT_SIGNALS
 from ecu.errors import UserError
-from ecu.jit import CompileCounter
+from ecu.jit import CompileCounter, compiler_version
 from ecu.recording import store as state_store
 from ecu.recording.recorder import interface_name, layout
 from ecu.recording.restored import restored
@@ -226,7 +225,7 @@ def _describe(options: RunOptions, config: Config) -> dict[str, Any]:
             "brake-ecu": __version__,
             "python": ".".join(map(str, sys.version_info[:3])),
             "numpy": np.__version__,
-            "numba": numba.__version__,
+            "numba": compiler_version(),
         },
         "units": {signal.name: signal.unit for signal in OUTPUT_SIGNALS},
         "input_units": {signal.name: signal.unit for signal in INPUT_SIGNALS},

@@ -32,6 +32,11 @@ from ecu.settings.resources import resource
 
 FRAMES: Final = 50
 """Of a log in each format."""
+SHORT: Final = """
+plant = "suv"
+initial_speed = 20.0
+phase = [{ kind = "cruise", speed = 20.0, seconds = 0.1 }, { kind = "brake", decel = 4.0, seconds = 0.2 }]
+"""
 
 
 def compile_vehicle() -> None:
@@ -50,10 +55,11 @@ def compile_closed_loop() -> None:
 
 def compile_commands() -> None:
     """Compile what `simulate` and `replay` do around that: frames to text and back, the rows of a result."""
-    scenario, config = resource("config/scenarios/stop-1.toml"), resource("config/suv.toml")
+    config = resource("config/suv.toml")
     with tempfile.TemporaryDirectory(prefix="brake-ecu-") as folder, new_policy() as policy:
         policy.level = Level.QUIET
-        drive = Path(folder) / "drive"
+        drive, scenario = Path(folder) / "drive", Path(folder) / "scenario.toml"
+        scenario.write_text(SHORT)
         with asked():
             simulate(scenario, config, drive)
             for log in (Path(f"{drive}.log"), Path(f"{drive}.parquet")):
@@ -72,14 +78,20 @@ def _read_as(log: Path, frames: Path) -> None:
         pass
 
 
+def compile_all() -> None:
+    """Compile all of the laboratory's kernels that stand above."""
+    compile_vehicle()
+    compile_closed_loop()
+    warm_up(load_scenario(resource("config/scenarios/demo.toml")))
+    compile_commands()
+
+
 def main() -> int:
     compiled = CompileCounter()
     daemon = subprocess.Popen([sys.executable, "-m", "ecu.warm"])
     compile_vehicle()
     failed = daemon.wait()
-    compile_closed_loop()
-    warm_up(load_scenario(resource("config/scenarios/demo.toml")))
-    compile_commands()
+    compile_all()
     print(f"{compiled.count} kernels of the laboratory compiled")
     return failed
 

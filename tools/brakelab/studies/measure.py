@@ -9,9 +9,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike
+
+from ecu.jit import compiler_version
 
 NOT_INSTALLED: Final = "{} not installed: in the repository pip install '.[dev]'"
 
@@ -94,7 +95,7 @@ def machine() -> str:
     load = f", load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
     return (
         f"{_processor()}, {cores} cores{load}; {platform.system()} {platform.release()}; "
-        f"Python {platform.python_version()}, numba {numba.__version__}, numpy {np.__version__}"
+        f"Python {platform.python_version()}, numba {compiler_version()}, numpy {np.__version__}"
     )
 
 

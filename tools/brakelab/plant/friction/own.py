@@ -21,15 +21,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Final, Literal, NamedTuple, Self
 
-import numba
 import numpy as np
-from llvmlite import ir  # type: ignore[import-untyped]
-from numba.core import cgutils, errors
-from numba.extending import intrinsic
 from pydantic import ValidationInfo, field_validator, model_validator
 
 from brakelab.plant.friction.law import ROW, Law, RigBrake
 from brakelab.plant.jit import Record, kernel
+from ecu.jit import interprets
 
 GROUP: Final = "brakelab.friction_laws"
 ADDRESS: Final = 1
@@ -37,9 +34,6 @@ NUMBERS: Final = 2  # index of the first number in the row
 MOST: Final = ROW - NUMBERS
 TRIED: Final = (1.0, 30e5, 5.0, 30.0, 100.0, 1e-3)
 """Inputs after the numbers at which a law must give a friction: 30 bar, 5 m/s, 30 rad/s^2, 100 degC, 1 ms."""
-
-DOUBLE: Final = numba.types.float64
-POINTER: Final = numba.types.CPointer(DOUBLE)
 
 Step = Callable[..., tuple[float, float]]
 
@@ -132,7 +126,7 @@ def _checked(code: str, module: ModuleType) -> Code:
         raise ValueError(f"{code}: has no function step")
     try:
         address, keeps = _compiled(law, len(numbers))
-    except errors.NumbaError as error:
+    except Exception as error:
         raise ValueError(f"{code}: numba cannot compile step: {_one_line(error)}") from error
     compiled = Code(numbers, float(getattr(module, "START", 1.0)), address, keeps)
     middle = [0.5 * (low + high) for _, low, high in numbers.values()]
@@ -159,50 +153,12 @@ def _one_line(error: Exception) -> str:
 def _compiled(step: Any, count: int) -> tuple[int, Any]:
     """Return the address of `step` as a C function (numbers, out, six inputs), and its owner."""
     plain = getattr(step, "py_func", step)
-    if numba.config.DISABLE_JIT:
+    if interprets():
         _PLAIN[len(_PLAIN) + 1] = plain
         return len(_PLAIN), plain
-    law = numba.njit(error_model="numpy")(plain)
+    from brakelab.plant.friction.own_compiled import as_c_function
 
-    def call(
-        numbers: Any, out: Any, memory: float, p: float, v: float, slowing: float, heat: float, dt: float
-    ) -> None:
-        remembered, mu = law(numba.carray(numbers, count), memory, p, v, slowing, heat, dt)
-        out[0], out[1] = remembered, mu
-
-    made = numba.cfunc(numba.types.void(POINTER, POINTER, *[DOUBLE] * 6))(call)
-    return int(made.address), made
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def _call(
-    context: Any,
-    address: Any,
-    row: Any,
-    memory: Any,
-    pressure: Any,
-    speed: Any,
-    slowing: Any,
-    temperature: Any,
-    dt: Any,
-) -> Any:
-    """Call the C function at `address` with the numbers of `row`."""
-    returned = numba.types.UniTuple(DOUBLE, 2)
-    signature = returned(numba.types.int64, row, *[DOUBLE] * 6)
-
-    def generate(target: Any, builder: Any, sig: Any, given: Any) -> Any:
-        double = ir.DoubleType()
-        numbers = target.make_array(sig.args[1])(target, builder, given[1]).data
-        numbers = builder.gep(numbers, [ir.Constant(ir.IntType(64), NUMBERS)])
-        out = cgutils.alloca_once(builder, double, size=2)
-        places = [builder.gep(out, [ir.Constant(ir.IntType(64), k)]) for k in range(2)]
-        builder.store(given[2], places[0])
-        builder.store(ir.Constant(double, float("nan")), places[1])
-        kind = ir.FunctionType(ir.VoidType(), [double.as_pointer()] * 2 + [double] * 6)
-        builder.call(builder.inttoptr(given[0], kind.as_pointer()), [numbers, out, *given[2:]])
-        return target.make_tuple(builder, sig.return_type, [builder.load(place) for place in places])
-
-    return signature, generate
+    return as_c_function(plain, count)
 
 
 def _call_plain(address: int, row: Any, *inputs: float) -> tuple[float, float]:
@@ -210,7 +166,17 @@ def _call_plain(address: int, row: Any, *inputs: float) -> tuple[float, float]:
     return float(memory), float(mu)
 
 
-call_law: Any = _call_plain if numba.config.DISABLE_JIT else _call
+class _CompiledCall:
+    """`own_compiled.call` by its type: numba asks for it, nobody else needs numba."""
+
+    @property
+    def _numba_type_(self) -> Any:
+        from brakelab.plant.friction.own_compiled import type_of_call
+
+        return type_of_call()
+
+
+call_law: Any = _call_plain if interprets() else _CompiledCall()
 
 
 @kernel
