@@ -19,12 +19,12 @@ help:
 	@echo "ARGS=... goes to the command: make test ARGS=tests/ecu, make demo ARGS='--out out/first'."
 
 demo: .venv/lab
-	@echo "Compiling what is not in the cache yet: minutes the first time, seconds later"
-	@.venv/bin/python -m brakelab.warm
+	@.venv/bin/python -m brakelab.build
 	.venv/bin/brake-ecu demo $(ARGS)
 
 test: .venv/dev
-	.venv/bin/python -m brakelab.warm
+	.venv/bin/python -m brakelab.build
+	BRAKE_ECU_LIBRARY=0 .venv/bin/python -m brakelab.warm
 	.venv/bin/python -m pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder -m "not study" $(ARGS)
 
 studies: .venv/dev
@@ -57,7 +57,7 @@ screenshot: .venv/lab
 	.venv/bin/python tools/first_steps.py
 
 clean:
-	rm -rf .venv out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf .venv out build dist ecu/compiled tools/brakelab/compiled .mypy_cache .ruff_cache .pytest_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 .venv/bin/pip:

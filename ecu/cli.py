@@ -144,7 +144,10 @@ def run(
 ) -> int:
     """Run the daemon on a CAN bus. Its demands are flagged invalid unless it is armed."""
     with without_modules("rich", "scipy"):  # of structlog's tracebacks, and BLAS that the cycle never calls
-        import numba.np.arraymath  # noqa: F401
+        from ecu.jit import library_of
+
+        if library_of("ecu.algorithm.step") is None:
+            import numba.np.arraymath  # noqa: F401
 
         from ecu.runtime import prepare, service
     metrics = f"{metrics_address}:{metrics_port}" if metrics_port else None

@@ -140,7 +140,7 @@ def _wake_up() -> Check:
 
 
 def _cache() -> Check:
-    """Name the cache; whether it may be read-only, because it is complete, `kernels` finds."""
+    """Name numba's cache; whether it may be read-only, because it is complete, `kernels` finds."""
     folder = jit.CACHE_ROOT
     written = "can be written" if os.access(folder, os.W_OK) else "is read-only: nothing can be compiled"
     return Check("kernel cache", True, f"{folder} {written}")
@@ -171,7 +171,9 @@ def kernels(config: Path | None, plan: ReceivePlan) -> Check:
         warm_up(new_ecu(params, None, plan, sending), compiled)
     except UserError as error:
         return Check("kernels", False, error.where, error.remedy)
-    found = f"{compiled.count} compiled, ready after {time.monotonic() - began:.1f} s"
+    taken = jit.library_of("ecu.algorithm.step")
+    source = "numba's cache" if taken is None else f"{taken.folder}, for {taken.processor}"
+    found = f"from {source}; {compiled.count} compiled, ready after {time.monotonic() - began:.1f} s"
     return Check("kernels", compiled.count == 0, found, "they are cached now; a second look will find none")
 
 

@@ -257,7 +257,7 @@ def library(package: str) -> Library | None:
 
 
 @cache
-def _fitting(module: str) -> Library | None:
+def library_of(module: str) -> Library | None:
     """Return the library in which the kernels of a module stand as they are now."""
     found = library(module.partition(".")[0])
     return found if found is not None and found.fits(module, text_digest) else None
@@ -280,7 +280,7 @@ def kernel(function: Function, parallel: bool = False) -> Function:
     """
     if interprets():
         return interpreted(function)
-    if not parallel and (found := _fitting(module_of(function))) is not None:
+    if not parallel and (found := library_of(module_of(function))) is not None:
         return cast(Function, Kernel(function, found))
     return cast(Function, dispatcher(function, parallel))
 

@@ -101,7 +101,8 @@ def spec_of(value: Any) -> Spec | None:
     return None
 
 
-def _fits(wanted: Spec, found: Spec) -> bool:
+def fits(wanted: Spec, found: Spec) -> bool:
+    """Return whether a kernel compiled for `wanted` takes `found`."""
     kind = wanted[0]
     if kind != found[0]:
         return False
@@ -117,7 +118,7 @@ def _fits(wanted: Spec, found: Spec) -> bool:
         return bool(wanted[1] == found[1] or (wanted[1] == "<f8" and found[1] == "<i8"))
     if kind == "tuple":
         parts = zip(wanted[2:], found[2:], strict=False)
-        return wanted[1] == found[1] and len(wanted) == len(found) and all(_fits(w, f) for w, f in parts)
+        return wanted[1] == found[1] and len(wanted) == len(found) and all(fits(w, f) for w, f in parts)
     return bool(wanted[1:] == found[1:])
 
 
@@ -224,7 +225,7 @@ class Entry:
         for index, value in enumerate(arguments):
             if value is not last[index]:
                 spec, found = self._arguments[index], spec_of(value)
-                if found is None or not _fits(spec, found):
+                if found is None or not fits(spec, found):
                     self._free.append(block)
                     return None
                 last[index] = _Block  # half written

@@ -4,7 +4,7 @@ import re
 import shlex
 import shutil
 import subprocess
-from importlib.util import find_spec
+from importlib.util import find_spec, module_from_spec, spec_from_file_location
 from pathlib import Path
 
 import pytest
@@ -54,32 +54,29 @@ def test_nothing_in_the_unit_forbids_what_the_daemon_does():
     assert "AF_UNIX" in text
 
 
-@pytest.mark.parametrize(
-    ("given", "taken"), [(None, "/opt/p/cache"), ("", "/opt/p/cache"), ("/run/k", "/run/k")]
-)
-def test_the_launcher_keeps_to_a_cache_that_is_given(given, taken):
-    text = (DEPLOY.parent / "install-onboard.sh").read_text()
-    here_document = re.search(r"^cat .*(<<LAUNCHER\n(?:.|\n)*?\nLAUNCHER\n)", text, re.M)[1]
-    launcher = subprocess.run(
-        ["sh", "-c", f"prefix=/opt/p; cat {here_document}"], capture_output=True, text=True, check=True
-    )
-    lines = launcher.stdout.replace("exec ", "echo $NUMBA_CACHE_DIR # ")
-    environment = {} if given is None else {"NUMBA_CACHE_DIR": given}
-    said = subprocess.run(["/bin/sh", "-euc", lines], env=environment, capture_output=True, text=True)
-    assert said.stdout == f"{taken}\n"
-
-
-def test_kernels_that_root_compiled_are_read_by_all_and_written_by_nobody_else():
-    lines = (DEPLOY.parent / "install-onboard.sh").read_text().splitlines()
-    compiling = next(place for place, line in enumerate(lines) if line.endswith("-m ecu.warm"))
-    assert lines[compiling + 1] == 'chmod -R a+rX,go-w "$NUMBA_CACHE_DIR"'
-
-
-def test_the_image_belongs_to_root_but_for_the_kernels_and_says_whether_it_is_well():
+def test_the_image_is_root_s_without_a_compiler_and_says_whether_it_is_well():
     text = (DEPLOY.parents[1] / "Dockerfile").read_text()
-    before, user, after = text.partition("USER brake")
+    made, _, image = text.rpartition("\nFROM ")
+    before, user, after = image.partition("USER brake")
     assert user
-    assert re.findall(r"install-onboard.sh (\S+)", before) == ["/opt/brake-ecu"]
-    assert re.findall(r"chown -R brake: (\S+)", text) == ["/opt/brake-ecu/cache"]
-    assert not re.search(r"install .*-o brake", text)
+    assert re.findall(r"install-onboard.sh (\S+)", made) == ["/opt/brake-ecu"]
+    assert re.findall(r"COPY --from=build (\S+) (\S+)", before) == [("/opt/brake-ecu", "/opt/brake-ecu")]
+    assert "apt-get" not in image
+    assert "chown" not in text
     assert find_spec(re.search(r"HEALTHCHECK (?:.|\n)*? -m (\S+)", after)[1])
+
+
+@pytest.mark.parametrize("made", [True, False])
+def test_a_wheel_is_of_one_platform_where_it_holds_a_library(made, tmp_path):
+    pytest.importorskip("hatchling")
+    spec = spec_from_file_location("wheel_tag", DEPLOY.parent / "wheel_tag.py")
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    if made:
+        (tmp_path / "ecu" / "compiled").mkdir(parents=True)
+        (tmp_path / "ecu" / "compiled" / "manifest.json").write_text("{}")
+    hook = module.WheelTag(str(tmp_path), {}, None, None, str(tmp_path), "wheel")
+    for version in ("standard", "editable"):
+        changed = {}
+        hook.initialize(version, changed)
+        assert ("tag" in changed) is (made and version == "standard")

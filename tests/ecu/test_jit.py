@@ -170,7 +170,12 @@ def test_the_cycle_s_kernel_counts_on_all_that_it_calls() -> None:
 def test_without_a_place_for_the_cache_nothing_is_compiled_and_one_line_says_so(tmp_path: Path) -> None:
     place = tmp_path / "file"
     place.write_text("")
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(place)}
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(ROOT),
+        "NUMBA_CACHE_DIR": str(place),
+        "BRAKE_ECU_LIBRARY": "0",
+    }
     command = [sys.executable, "-m", "ecu.cli", "doctor"]
     done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
     assert (done.returncode, done.stdout) == (2, "")
@@ -235,7 +240,12 @@ def test_a_group_is_a_user_s_own_by_its_name_and_members(monkeypatch: pytest.Mon
 
 def test_kernels_in_a_folder_that_is_open_to_all_are_not_run(tmp_path: Path) -> None:
     tmp_path.chmod(0o777)
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path)}
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(ROOT),
+        "NUMBA_CACHE_DIR": str(tmp_path),
+        "BRAKE_ECU_LIBRARY": "0",
+    }
     command = [sys.executable, "-m", "ecu.cli", "doctor"]
     done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
     assert (done.returncode, done.stdout) == (2, "")
