@@ -24,7 +24,7 @@ from typing import Any, Final, NamedTuple, NoReturn
 
 import numba
 from llvmlite import binding, ir  # type: ignore[import-untyped]
-from numba.core import codegen, cpu, types
+from numba.core import codegen, cpu
 from numba.core.registry import cpu_target
 
 from ecu import jit
@@ -82,6 +82,9 @@ void PyErr_SetString(void *kind, const char *text) { (void)kind, (void)text; }
 """
 
 
+types: Any = numba.core.types  # whose names numba's own annotations hide in part
+
+
 class Call(NamedTuple):
     """A kernel that Python called, and with what."""
 
@@ -135,9 +138,8 @@ class _Part(codegen.JITCodeLibrary):  # type: ignore[misc]
 def watch() -> None:
     """Note from now on how kernels of modules that are loaded later are called; they are plain Python."""
     os.environ["NUMBA_DISABLE_JIT"] = "0"
-    jit.kernel = lambda function, parallel=False: (  # type: ignore[assignment]
-        interpreted(function) if parallel else Seen(function)
-    )
+    noted: Any = lambda function, parallel=False: interpreted(function) if parallel else Seen(function)  # noqa: E731
+    jit.kernel = noted
 
 
 def _signature(call: Call) -> tuple[Any, ...]:

@@ -320,7 +320,7 @@ class Kernel:
         return self.dispatcher(*arguments)
 
     def __reduce__(self) -> str:
-        return cast(str, self.__qualname__)
+        return self.py_func.__qualname__
 
     @cached_property
     def dispatcher(self) -> Any:

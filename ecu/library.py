@@ -17,7 +17,7 @@ import hashlib
 import importlib
 import json
 import platform
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, Final
@@ -71,7 +71,7 @@ def _described(dtype: np.dtype[Any]) -> str:
         return f"{_described(base)}{shape}"
     if dtype.names is None:
         return dtype.str
-    fields = dtype.fields or {}
+    fields: Mapping[str, Any] = dtype.fields or {}
     inside = ",".join(f"{name}@{fields[name][1]}:{_described(fields[name][0])}" for name in dtype.names)
     return f"{{{inside}}}{dtype.itemsize}"
 
@@ -136,8 +136,8 @@ class _Block:
 
     def __init__(self, count: int, places: int) -> None:
         self.values = np.zeros(max(places, 1), np.int64)
-        self.whole = memoryview(self.values)
-        self.real = memoryview(self.values.view(np.float64))
+        self.whole: memoryview[int] = memoryview(self.values)  # type: ignore[arg-type]
+        self.real: memoryview[float] = memoryview(self.values.view(np.float64))  # type: ignore[arg-type]
         self.address = self.values.ctypes.data
         self.last: list[Any] = [_Block] * count  # of no argument
 

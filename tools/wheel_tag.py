@@ -1,4 +1,4 @@
-"""Tag of the wheel: hatchling's build hook of pyproject.toml. With a library of kernels it is of one platform."""
+"""Tag of the wheel, hatchling's build hook: with a library of kernels it is of one platform."""
 
 import sysconfig
 from pathlib import Path

@@ -167,6 +167,12 @@ def test_the_cycle_s_kernel_counts_on_all_that_it_calls() -> None:
     assert {"ecu.contract.signals", "ecu.contract.params"} <= counted
 
 
+def numba_alone(cache: Path) -> dict[str, str]:
+    """Return an environment without the library of kernels."""
+    given = {"PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(cache), "BRAKE_ECU_LIBRARY": "0"}
+    return {**os.environ, **given}
+
+
 def test_without_a_place_for_the_cache_nothing_is_compiled_and_one_line_says_so(tmp_path: Path) -> None:
     place = tmp_path / "file"
     place.write_text("")

@@ -1,4 +1,4 @@
-"""Kernels of a compiled library give what numba's give, and are taken only where they were made from this text."""
+"""Kernels of a library give what numba's give, and are taken only where they were made from this text."""
 
 import ast
 import importlib.util
@@ -315,7 +315,8 @@ from brakelab.simulation.scenario import load_scenario
 from ecu.settings.config import load_config
 from ecu.settings.resources import resource
 
-loop = new_loop(load_scenario(resource("config/scenarios/stop-1.toml")), load_config(resource("config/suv.toml")), 3)
+scenario, config = resource("config/scenarios/stop-1.toml"), resource("config/suv.toml")
+loop = new_loop(load_scenario(scenario), load_config(config), 3)
 drive = run(loop)
 digest = hashlib.sha256()
 for part in (*drive.outputs.values(), *drive.truth.values(), drive.frames):
