@@ -5,6 +5,7 @@ group `brake_ecu.commands`, as the laboratory does (`tools/pyproject.toml`); the
 Exit code 0 on success, 1 when the run found a fault, 2 for bad arguments, configuration or input.
 """
 
+import os
 import sys
 
 from ecu.imports import without_modules
@@ -14,9 +15,9 @@ from ecu.runtime.start import is_run, raise_priority
 if is_run(sys.argv[1:]):  # under load, importing the command line alone would take a second
     raise_priority()
     free_output()
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # numpy's: 40 MB of locked memory a thread
 
 import errno
-import os
 import traceback
 from functools import cache
 from importlib.metadata import entry_points

@@ -12,7 +12,6 @@ from typing import Final, Literal
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 import pyarrow.csv as pa_csv
 from numpy.typing import NDArray
 
@@ -121,5 +120,7 @@ def _parsed(
         lines = np.delete(lines, [row for row, _ in wrong])
     columns = [table.column(name).combine_chunks() for name in wanted]
     if pointed:
+        import pyarrow.compute as pc  # see `signal_batches`
+
         columns = [pc.replace_substring(column, ",", ".") for column in columns]
     return lines, pa.RecordBatch.from_arrays(columns, names=wanted)

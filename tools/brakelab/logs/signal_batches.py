@@ -6,7 +6,6 @@ from typing import Final, NamedTuple
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
@@ -163,6 +162,8 @@ def _parquet_rows(path: Path, wanted: list[str] | None, quality: SignalQuality) 
 
 def _in_seconds(batch: pa.RecordBatch) -> pa.RecordBatch:
     """Return a batch whose dates and durations are numbers [s], dates since 1970."""
+    import pyarrow.compute as pc  # as long as much else of a short replay
+
     columns = [
         pc.multiply(column.cast(pa.int64()).cast(pa.float64(), safe=False), SECONDS[column.type.unit])
         if pa.types.is_timestamp(column.type) or pa.types.is_duration(column.type)
