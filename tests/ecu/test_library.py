@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ecu import build, jit, library
+from ecu import jit, library
+from ecu.building.machine_code import compiler
 
 ROOT = Path(__file__).parents[2]
 pytestmark = [
     pytest.mark.compiled,
-    pytest.mark.skipif(build.compiler() is None, reason="no C compiler"),
+    pytest.mark.skipif(compiler() is None, reason="no C compiler"),
 ]
 
 LAWS = '''
@@ -298,9 +299,9 @@ def _kernels_that_python_calls(package: str) -> set[str]:
 
 def test_a_library_holds_every_kernel_of_the_ecu_that_python_calls() -> None:
     program = (
-        "from ecu import build\nbuild.watch()\n"
+        "from ecu.building.calls import Seen, watch\nwatch()\n"
         "from ecu.entries import call_every_entry\ncall_every_entry()\n"
-        "print(*{call.kernel.name for call in build.Seen.calls.values()})"
+        "print(*{call.kernel.name for call in Seen.calls.values()})"
     )
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT

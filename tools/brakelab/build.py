@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import NoReturn
 
 from ecu import build
+from ecu.building.machine_code import compiler
 
 
 def _load_workload() -> Callable[[], None]:
@@ -18,7 +19,7 @@ def _load_workload() -> Callable[[], None]:
 
 
 def main() -> NoReturn:
-    if build.compiler() is None:
+    if compiler() is None:
         print("no C compiler (cc): numba compiles each kernel by itself instead, which takes minutes")
         raise SystemExit(subprocess.call([sys.executable, "-m", "brakelab.warm"]))
     daemon = subprocess.Popen([sys.executable, "-m", "ecu.build"])

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from ecu.jit import Record, kernel
+from ecu.jit import Record, interprets, kernel
 
-__all__ = ["Record", "kernel", "parallel_kernel"]
+__all__ = ["Record", "interprets", "kernel", "parallel_kernel"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

@@ -25,8 +25,7 @@ import numpy as np
 from pydantic import ValidationInfo, field_validator, model_validator
 
 from brakelab.plant.friction.law import ROW, Law, RigBrake
-from brakelab.plant.jit import Record, kernel
-from ecu.jit import interprets
+from brakelab.plant.jit import Record, interprets, kernel
 
 GROUP: Final = "brakelab.friction_laws"
 ADDRESS: Final = 1

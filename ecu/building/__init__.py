@@ -1,0 +1,1 @@
+"""What `ecu/build.py` is made of: which kernels Python calls, and their machine code."""
