@@ -46,8 +46,9 @@ from ecu.completion import known
 from ecu.errors import Mistakes, RunFault, UserError
 from ecu.output import LOG_FORMATS, Level, fault, give, log_as, new_policy, policy, print_given
 
-LABORATORY = ("bokeh", "jinja2", "numba", "pyarrow", "pymoo", "scipy", "tomlkit")
-"""Packages of the extra `lab`, by the names that are imported."""
+LABORATORY = ("bokeh", "jinja2", "pyarrow", "pymoo", "scipy", "tomlkit")
+"""Packages of the extra `lab`, by the names that are imported, beside those of `compiler`."""
+COMPILER = ("numba",)
 OF_REPOSITORY = "from the repository: pip install '.[lab]' ./tools"
 """No package index has this project: a package of its name there would be somebody else's."""
 FLEET = ("distributed", "fsspec")

@@ -1,6 +1,7 @@
 """What holds for the repository as a whole."""
 
 import ast
+import os
 import re
 import subprocess
 import sys
@@ -11,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from ecu import __version__
-from ecu.cli import FLEET, LABORATORY, LEARN
+from ecu.cli import COMPILER, FLEET, LABORATORY, LEARN
 
 ROOT = Path(__file__).parent.parent
 LOCKS = sorted((ROOT / "requirements").glob("*.txt"))
@@ -94,7 +95,9 @@ def test_the_locks_hold_what_the_project_asks_for() -> None:
     project, extras = PROJECT["project"], PROJECT["project"]["optional-dependencies"]
     onboard = names(project["dependencies"])
     laboratory = names(extras["lab"])
-    assert laboratory == set(LABORATORY)
+    assert laboratory == {*LABORATORY, *COMPILER}
+    assert names(extras["compiler"]) == set(COMPILER)
+    assert names(extras["compiler"]) <= _requirements(ROOT / "requirements/compiler.txt").keys()
     assert names(extras["fleet"]) == set(FLEET)
     assert names(extras["learn"]) == {"scikit-learn"}, "installs sklearn"
     assert not names(extras["metrics"]) & _requirements(ROOT / "requirements/onboard.txt").keys()
@@ -127,19 +130,24 @@ def test_the_supported_pythons_are_the_same_everywhere() -> None:
 
 
 def test_onboard_code_loads_no_laboratory() -> None:
-    """Every module of `ecu` is imported in a process of its own; then none of these may be loaded."""
+    """Every module of `ecu` but the builder's is imported in a process; then none of these may be loaded."""
     script = (
         "import importlib, pkgutil, sys, ecu\n"
         "for module in pkgutil.walk_packages(ecu.__path__, 'ecu.'):\n"
-        "    importlib.import_module(module.name)\n"
+        "    if not module.name.startswith('ecu.build'):\n"
+        "        importlib.import_module(module.name)\n"
         "print(*{name.partition('.')[0] for name in sys.modules})\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True
+        [sys.executable, "-c", script],
+        cwd=ROOT,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},  # as with the library: nothing is compiled
+        capture_output=True,
+        text=True,
+        check=True,
     )
     laboratory = {"brakelab", "matplotlib", "asammdf", "prometheus_client", "tornado", *LABORATORY, *LEARN}
-    # numba loads scipy wherever it finds it.
-    assert not (laboratory - {"scipy"}) & set(done.stdout.split())
+    assert not {*laboratory, *COMPILER} & set(done.stdout.split())
 
 
 def test_ecu_never_imports_the_laboratory() -> None:
