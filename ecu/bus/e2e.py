@@ -1,4 +1,6 @@
-"""End-to-end protection: checks that a frame is intact. Whether it is its sender's next: `sequence.py`.
+"""End-to-end protection: writes and checks what says that a frame is intact.
+
+Whether a frame is its sender's next: `sequence.py`.
 
 Checksum rules, by the names that signal maps use:
 
@@ -59,35 +61,52 @@ def p01_crc(data: NDArray[np.uint8], length: int, data_id: int) -> int:
 
 
 @kernel
-def p01_protect(data: NDArray[np.uint8], length: int, data_id: int, counter: int) -> None:
-    """Write counter and CRC into the payload."""
-    data[1] = np.uint8((data[1] & 0xF0) | counter)
-    data[0] = np.uint8(p01_crc(data, length, data_id))
+def checksum_place(rule: int, length: int) -> int:
+    """Return the byte of a payload of `length` bytes that holds the rule's checksum, 0 without a rule."""
+    if rule == FORD_BRAKE_SN_4:
+        return 2
+    if rule == FORD_ACCEL_DATA:
+        return 6
+    if rule in (TOYOTA, HYUNDAI_SUM, HYUNDAI_XOR):
+        return length - 1
+    return 0
+
+
+@kernel
+def _checked_byte(rule: int, data: NDArray[np.uint8], length: int, can_id: int, data_id: int) -> int:
+    """Return the byte at `checksum_place` as the rest of the payload wants it."""
+    place = checksum_place(rule, length)
+    total = 0
+    if rule == AUTOSAR_P01:
+        return p01_crc(data, length, data_id)
+    if rule == FORD_BRAKE_SN_4:
+        return (0xFF - (int(data[0]) + int(data[1]) + (int(data[3]) >> 4))) & 0xFF
+    if rule == FORD_ACCEL_DATA:
+        total = 0x16 - int(data[7])
+        for i in range(place):
+            total -= int(data[i])
+        return total & 0xFF
+    if rule == TOYOTA:
+        total = (can_id >> 8) + (can_id & 0xFF) + length
+    if rule in (TOYOTA, HYUNDAI_SUM):
+        for i in range(place):
+            total += int(data[i])
+        return total & 0xFF
+    if rule == HYUNDAI_XOR:
+        low = int(data[place]) & 0xF
+        for i in range(place):
+            total ^= int(data[i]) ^ (int(data[i]) >> 4)
+        return (((total ^ low) & 0xF) << 4) | low
+    return int(data[place])
 
 
 @kernel
 def checksum_holds(rule: int, data: NDArray[np.uint8], length: int, can_id: int, data_id: int) -> bool:
     """Return whether the payload of `length` bytes obeys the rule."""
-    last = length - 1
-    total = 0
-    if rule == AUTOSAR_P01:
-        return int(data[0]) == p01_crc(data, length, data_id)
-    if rule == FORD_BRAKE_SN_4:
-        total = 0xFF - (int(data[0]) + int(data[1]) + (int(data[3]) >> 4))
-        return int(data[2]) == total & 0xFF
-    if rule == FORD_ACCEL_DATA:
-        total = 0x16 - int(data[7])
-        for i in range(6):
-            total -= int(data[i])
-        return int(data[6]) == total & 0xFF
-    if rule == TOYOTA:
-        total = (can_id >> 8) + (can_id & 0xFF) + length
-    if rule in (TOYOTA, HYUNDAI_SUM):
-        for i in range(last):
-            total += int(data[i])
-        return int(data[last]) == total & 0xFF
-    if rule == HYUNDAI_XOR:
-        for i in range(last):
-            total ^= int(data[i]) ^ (int(data[i]) >> 4)
-        return int(data[last]) >> 4 == (total ^ int(data[last])) & 0xF
-    return True
+    return int(data[checksum_place(rule, length)]) == _checked_byte(rule, data, length, can_id, data_id)
+
+
+@kernel
+def protect(rule: int, data: NDArray[np.uint8], length: int, can_id: int, data_id: int) -> None:
+    """Write the rule's checksum into the payload of `length` bytes, whose other bits are final."""
+    data[checksum_place(rule, length)] = np.uint8(_checked_byte(rule, data, length, can_id, data_id))

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ecu.bus.e2e import p01_crc
+from ecu.bus.e2e import NO_CHECKSUM, checksum_holds
 from ecu.bus.protocol import Channel
 from ecu.bus.transmit import TransmitPlan
 from ecu.contract.records import EXTENDED_ID, FRAME, FRAME_EXTENDED, new_record
@@ -40,9 +40,10 @@ def place_of_ours(plan: TransmitPlan, frame: Record) -> int:
 def is_intact(plan: TransmitPlan, place: int, frame: Record) -> bool:
     """Return whether a frame of our message at `place` is protected as ours are."""
     message = plan.messages[place]
-    if message.data_id == 0 or frame.length != message.length:
+    if message.rule == NO_CHECKSUM or frame.length != message.length:
         return False
-    return int(frame.data[0]) == p01_crc(frame.data, frame.length, message.data_id)
+    can_id: Any = np.int64(frame.can_id)
+    return checksum_holds(message.rule, frame.data, frame.length, can_id, message.data_id)
 
 
 @kernel

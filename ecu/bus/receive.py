@@ -8,9 +8,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ecu.bus import bits, e2e, link, sequence
+from ecu.bus import e2e, link, sequence
 from ecu.bus.freshness import NEVER, accept
-from ecu.bus.plan import is_present, is_valid, raw_code, signed_value
+from ecu.bus.plan import frame_count, is_present, is_valid, raw_code, signed_value
 from ecu.bus.receive_plan import ReceivePlan
 from ecu.bus.request import (
     FIRST,
@@ -127,8 +127,7 @@ def check_frame(message: Record, counters: Record, frame: Record) -> Any:
         counters.checksum_errors += 1
         return link.P_ERROR
     if message.modulo > 0:
-        start, length, big_endian = message.counter_start, message.counter_length, message.counter_big_endian
-        counter: Any = np.int64(bits.extract(frame.data, start, length, big_endian))
+        counter: Any = frame_count(message, frame.data)
         if counters.started and _is_copy(counters, counter, frame, message.period_ns):
             counters.repeated += 1
             return link.P_REPEATED

@@ -6,37 +6,42 @@ A signal map compiles the messages of a foreign database to the same plan.
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from cantools.database import Message
 from numpy.typing import NDArray
 
-from ecu.bus import bits, e2e
 from ecu.bus.database import attribute, load_database
 from ecu.bus.freshness import input_freshness, new_freshness
-from ecu.bus.plan import SIGNAL, SignalUse, compile_signals
+from ecu.bus.plan import (
+    PROTECTION,
+    SIGNAL,
+    UNPROTECTED,
+    Protection,
+    SignalUse,
+    compile_signals,
+    contract_protection,
+    identifier,
+    set_protection,
+    uses_in,
+)
 from ecu.bus.request import FIRST, LAST
-from ecu.contract.records import EXTENDED_ID, RecordArray
+from ecu.contract.records import RecordArray
 from ecu.contract.signals import INPUT, INPUT_SIGNALS, N_INPUTS, N_OUTPUTS, OUTPUT
 
 MESSAGE: Final = np.dtype(
     [
         ("name", "U48"),
         ("id", "u4"),  # with EXTENDED_ID
-        ("data_id", "u4"),
         ("period_ns", "i8"),
         ("slowest_ns", "i8"),
         ("first", "i4"),  # rows of `signals`
         ("count", "i4"),
-        ("rule", "u1"),
         ("length", "u1"),
         ("foreign", "u1"),  # own identifier, never expected from another sender
         ("request", "u1"),  # carries the driver's request
-        ("modulo", "i2"),  # of the counter, 0: none
-        ("counter_start", "i2"),
-        ("counter_length", "u1"),
-        ("counter_big_endian", "u1"),
+        *PROTECTION,
     ],
     align=True,
 )
@@ -63,17 +68,13 @@ class MessageUse(NamedTuple):
     signals: Sequence[SignalUse]
     period_s: float
     slowest_s: float
-    rule: int = e2e.NO_CHECKSUM
-    data_id: int = 0
-    counter: Any = None
-    """The cantools signal that counts frames, None: there is none."""
-    modulo: int = 0
+    protection: Protection = UNPROTECTED
     foreign: bool = False
 
 
 def compile_receive(uses: Sequence[MessageUse], expected: RecordArray) -> ReceivePlan:
     """Return the plan that receives `uses` into as many target places as `expected` has."""
-    uses = sorted(uses, key=_identifier)
+    uses = sorted(uses, key=lambda use: identifier(use.message))
     messages = np.zeros(len(uses), MESSAGE)
     rows: list[RecordArray] = [np.zeros(0, SIGNAL)]
     codes: list[int] = []
@@ -84,19 +85,15 @@ def compile_receive(uses: Sequence[MessageUse], expected: RecordArray) -> Receiv
         rows.append(compiled.rows)
         codes += compiled.codes
         mapped[[signal.place for signal in use.signals]] = True
-        message["name"], message["id"] = use.message.name, _identifier(use)
+        message["name"], message["id"] = use.message.name, identifier(use.message)
         message["length"] = use.message.length
         message["period_ns"] = round(use.period_s * 1e9)
         message["slowest_ns"] = round(use.slowest_s * 1e9)
         message["first"], message["count"] = first, compiled.wanted
-        message["rule"], message["data_id"], message["foreign"] = use.rule, use.data_id, use.foreign
+        message["foreign"] = use.foreign
+        set_protection(message, use.protection)
         asks = [FIRST <= signal.place <= LAST for signal in use.signals]
         message["request"] = len(expected) == N_INPUTS and any(asks)
-        if use.counter is not None:
-            big_endian = use.counter.byte_order == "big_endian"
-            message["modulo"] = use.modulo
-            message["counter_start"] = bits.first_bit(use.counter.start, big_endian)
-            message["counter_length"], message["counter_big_endian"] = use.counter.length, big_endian
     return ReceivePlan(
         np.ascontiguousarray(messages["id"]),
         messages,
@@ -119,25 +116,16 @@ def messages_by_contract(plan: ReceivePlan) -> dict[str, list[str]]:
     return found
 
 
-def _identifier(use: MessageUse) -> int:
-    return int(use.message.frame_id) | (EXTENDED_ID if use.message.is_extended_frame else 0)
-
-
 def _protected(message: Message, places: dict[str, int]) -> MessageUse:
     """Return the wanted signals of a contract message: every signal that has a place."""
-    names = [signal.name for signal in message.signals]
     period_s = attribute(message, "GenMsgCycleTime") * 1e-3
     slowest_s = attribute(message, "CycleTimeSlowest") * 1e-3 or period_s
-    protected = attribute(message, "E2EDataId") != 0
     return MessageUse(
         message,
-        [SignalUse(name, places[name]) for name in names if name in places],
+        uses_in(message, places),
         period_s,
         slowest_s,
-        e2e.AUTOSAR_P01 if protected else e2e.NO_CHECKSUM,
-        attribute(message, "E2EDataId"),
-        message.get_signal_by_name("alive_counter") if protected else None,
-        e2e.P01_MODULO,
+        contract_protection(message),
     )
 
 

@@ -6,7 +6,7 @@ A map is a TOML file; `docs/signal-maps.md` explains it with an example. A value
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, Final, NamedTuple
+from typing import Annotated, Final, NamedTuple
 
 from cantools.database import Database, Message
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ecu.bus import e2e
 from ecu.bus.database import find_message, find_signal, read_database
 from ecu.bus.freshness import input_freshness
-from ecu.bus.plan import SignalUse
+from ecu.bus.plan import Protection, SignalUse
 from ecu.bus.receive_plan import MessageUse, ReceivePlan, compile_receive, contract_receive_plan
 from ecu.bus.units import conversion
 from ecu.contract.signals import INPUT, INPUT_SIGNALS
@@ -78,7 +78,7 @@ class Counter(_Table):
     signal: str
     """Of the same message."""
     modulo: Annotated[int, Field(ge=2), Unit("-")] | None = None
-    """Values that it counts through; all of its bits if it is not given."""
+    """Values that it counts through; if it is not given, all of its bits, with autosar_p01 15."""
 
 
 class MappedMessage(_Table):
@@ -208,13 +208,14 @@ def _message_use(
     use = MessageUse(message, signals, period_s, settings.slowest_period or period_s)
     if name in signal_map.ignore_checksum:
         return use
-    return use._replace(**_protection(path, database_path, message, settings, key))
+    return use._replace(protection=protection_of(path, database_path, message, settings, key))
 
 
-def _protection(
+def protection_of(
     path: Path, database_path: Path, message: Message, settings: MappedMessage, key: str
-) -> dict[str, Any]:
-    protection: dict[str, Any] = {"data_id": settings.data_id}
+) -> Protection:
+    """Return what `key` of the map at `path` says of a message; raises UserError that names the key."""
+    rule, counter, modulo = e2e.NO_CHECKSUM, None, 0
     if settings.checksum is not None:
         if settings.checksum not in e2e.RULES:
             known = ", ".join(e2e.RULES)
@@ -223,16 +224,16 @@ def _protection(
             )
         if message.length < e2e.SHORTEST.get(settings.checksum, 2):
             raise UserError(str(path), f"{key}.checksum", f"{message.name} is too short for this rule")
-        protection["rule"] = e2e.RULES[settings.checksum]
+        rule = e2e.RULES[settings.checksum]
     if settings.counter is not None:
         counter = find_signal(message, settings.counter.signal, database_path, path, f"{key}.counter.signal")
-        modulo = settings.counter.modulo or 1 << min(counter.length, 15)
+        every = e2e.P01_MODULO if rule == e2e.AUTOSAR_P01 else 1 << min(counter.length, 15)
+        modulo = settings.counter.modulo or every
         if counter.length > 15 or modulo > 1 << counter.length:
             raise UserError(
                 str(path), f"{key}.counter", f"{counter.name} has {counter.length} bits; at most 15 count"
             )
-        protection["counter"], protection["modulo"] = counter, modulo
-    return protection
+    return Protection(rule, settings.data_id, counter, modulo)
 
 
 def _signal_use(

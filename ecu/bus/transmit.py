@@ -1,29 +1,48 @@
 """Transmission: values due in this cycle are scaled, packed, counted and protected."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
+from cantools.database import Message
 from numpy.typing import NDArray
 
-from ecu.bus.database import attribute, load_database
-from ecu.bus.e2e import P01_MODULO, p01_protect
-from ecu.bus.plan import SIGNAL, SignalUse, compile_signals, encode_signal
-from ecu.contract.records import FRAME, RecordArray
+from ecu.bus import bits
+from ecu.bus.database import LONGEST_PAYLOAD, attribute, load_database
+from ecu.bus.e2e import NO_CHECKSUM, protect
+from ecu.bus.plan import (
+    PROTECTION,
+    SIGNAL,
+    UNPROTECTED,
+    Protection,
+    compile_signals,
+    contract_protection,
+    encode_signal,
+    identifier,
+    set_protection,
+    uses_in,
+)
+from ecu.contract.records import EXTENDED_ID, FRAME, FRAME_EXTENDED, FRAME_FD, RecordArray
 from ecu.contract.signals import CYCLE_NS, INPUT, OUTPUT
 from ecu.jit import Record, kernel
+
+LONGEST_CLASSICAL: Final = 8
+"""Payload of a classical frame [bytes]; a longer one makes it a CAN FD frame."""
 
 SENT_MESSAGE: Final = np.dtype(
     [
         ("name", "U48"),
-        ("id", "u4"),
-        ("data_id", "u4"),  # 0: not protected
+        ("id", "u4"),  # with EXTENDED_ID
         ("first", "i4"),  # rows of `signals`
         ("count", "i4"),
         ("period", "i4"),  # cycles
         ("phase", "i4"),
         ("length", "u1"),
+        ("flags", "u1"),  # of its frames
         ("optional", "u1"),  # not sent while all its values are NaN
+        *PROTECTION,
+        ("payload", "u1", (LONGEST_PAYLOAD,)),  # before its values are written
     ],
     align=True,
 )
@@ -33,6 +52,7 @@ class TransmitPlan(NamedTuple):
     """Schedule of frames to send, in ascending order of identifiers. Read only."""
 
     ids: NDArray[np.uint32]
+    """Identifiers, those of 29 bits with EXTENDED_ID."""
     messages: RecordArray
     signals: RecordArray
 
@@ -40,10 +60,63 @@ class TransmitPlan(NamedTuple):
 class Transmission(NamedTuple):
     """State of transmission. Kernels write to it."""
 
-    counter: NDArray[np.uint8]
+    counter: NDArray[np.uint16]
     """Of the next frame, per message."""
     sent: NDArray[np.int64]
     """Frames so far, per message."""
+
+
+class SentMessage(NamedTuple):
+    """A message to send; `period` and `phase` in cycles."""
+
+    message: Message
+    rows: RecordArray
+    """`SIGNAL` of its values."""
+    period: int
+    phase: int
+    protection: Protection = UNPROTECTED
+    optional: bool = False
+    payload: bytes = bytes(LONGEST_PAYLOAD)
+    """Before its values are written."""
+    moved: int = 0
+    """Added to its identifier."""
+
+
+def compile_transmit(sent: Sequence[SentMessage]) -> TransmitPlan:
+    """Return the plan that sends these messages."""
+    sent = sorted(sent, key=lambda one: identifier(one.message) + one.moved)
+    messages = np.zeros(len(sent), SENT_MESSAGE)
+    for row, one in zip(messages, sent, strict=True):
+        message = one.message
+        row["name"], row["id"], row["length"] = message.name, identifier(message) + one.moved, message.length
+        fd = message.is_fd or message.length > LONGEST_CLASSICAL
+        row["flags"] = FRAME_EXTENDED * message.is_extended_frame | FRAME_FD * fd
+        row["count"], row["period"], row["phase"] = len(one.rows), one.period, one.phase
+        row["optional"], row["payload"] = one.optional, np.frombuffer(one.payload, np.uint8)
+        set_protection(row, one.protection)
+    messages["first"] = np.cumsum(messages["count"]) - messages["count"]
+    rows = np.concatenate([np.zeros(0, SIGNAL), *(one.rows for one in sent)])
+    return TransmitPlan(np.ascontiguousarray(messages["id"]), messages, rows)
+
+
+def contract_messages(
+    dbc_path: Path, sender: Literal["BrakeEcu", "Vehicle"], moved: int = 0
+) -> list[SentMessage]:
+    """Return the contract's messages of `sender`, `moved` added to their identifiers."""
+    places = OUTPUT if sender == "BrakeEcu" else INPUT
+    return [
+        SentMessage(
+            message,
+            compile_signals(message, uses_in(message, places)).rows,
+            attribute(message, "GenMsgCycleTime") * 1_000_000 // CYCLE_NS,
+            attribute(message, "CyclePhase") * 1_000_000 // CYCLE_NS,
+            contract_protection(message),
+            bool(attribute(message, "Optional")),
+            moved=moved,
+        )
+        for message in load_database(dbc_path).messages
+        if sender in message.senders
+    ]
 
 
 def contract_transmit_plan(dbc_path: Path, sender: Literal["BrakeEcu", "Vehicle"]) -> TransmitPlan:
@@ -51,26 +124,12 @@ def contract_transmit_plan(dbc_path: Path, sender: Literal["BrakeEcu", "Vehicle"
 
     NaN is sent as "not available"; an out-of-range value as the nearest that can be sent.
     """
-    places = OUTPUT if sender == "BrakeEcu" else INPUT
-    chosen = [message for message in load_database(dbc_path).messages if sender in message.senders]
-    chosen.sort(key=lambda message: int(message.frame_id))
-    messages = np.zeros(len(chosen), SENT_MESSAGE)
-    rows: list[RecordArray] = [np.zeros(0, SIGNAL)]
-    for message, source in zip(messages, chosen, strict=True):
-        names = [signal.name for signal in source.signals if signal.name in places]
-        message["name"], message["id"], message["length"] = source.name, source.frame_id, source.length
-        message["data_id"] = attribute(source, "E2EDataId")
-        message["first"], message["count"] = sum(map(len, rows)), len(names)
-        message["period"] = attribute(source, "GenMsgCycleTime") * 1_000_000 // CYCLE_NS
-        message["phase"] = attribute(source, "CyclePhase") * 1_000_000 // CYCLE_NS
-        message["optional"] = attribute(source, "Optional")
-        rows.append(compile_signals(source, [SignalUse(name, places[name]) for name in names]).rows)
-    return TransmitPlan(np.ascontiguousarray(messages["id"]), messages, np.concatenate(rows))
+    return compile_transmit(contract_messages(dbc_path, sender))
 
 
 def new_transmission(plan: TransmitPlan) -> Transmission:
     """Return the state before the first cycle."""
-    return Transmission(np.zeros(len(plan.messages), np.uint8), np.zeros(len(plan.messages), np.int64))
+    return Transmission(np.zeros(len(plan.messages), np.uint16), np.zeros(len(plan.messages), np.int64))
 
 
 def frame_buffer(plan: TransmitPlan) -> RecordArray:
@@ -100,19 +159,30 @@ def transmit(
             continue
         frame = frames[count]
         frame.stamp_ns = 0
-        frame.can_id = message.id
-        frame.flags = 0
+        frame.can_id = message.id & ~np.uint32(EXTENDED_ID)
+        frame.flags = message.flags
         frame.bus = 0
         frame.length = message.length
         for i in range(len(frame.data)):
-            frame.data[i] = 0
+            frame.data[i] = message.payload[i]
         for row in range(message.first, message.first + message.count):
             signal = plan.signals[row]
-            encode_signal(signal, frame.data, values[signal.place])
-        if message.data_id != 0:
-            counter = transmission.counter[place]
-            p01_protect(frame.data, message.length, message.data_id, counter)
-            transmission.counter[place] = (counter + 1) % P01_MODULO
+            valid = signal.validity < 0 or values[signal.validity] == 1.0
+            encode_signal(signal, frame.data, values[signal.place] if valid else np.nan)
+        _protect(message, transmission, place, frame)
         transmission.sent[place] += 1
         count += 1
     return count
+
+
+@kernel
+def _protect(message: Record, transmission: Transmission, place: int, frame: Record) -> None:
+    """Write counter and checksum of a frame of the message at `place`."""
+    if message.modulo > 0:
+        start, length, big_endian = message.counter_start, message.counter_length, message.counter_big_endian
+        counter = transmission.counter[place]
+        bits.insert(frame.data, start, length, big_endian, np.uint64(counter))
+        transmission.counter[place] = (counter + 1) % message.modulo
+    if message.rule != NO_CHECKSUM:
+        can_id: Any = np.int64(frame.can_id)
+        protect(message.rule, frame.data, frame.length, can_id, message.data_id)

@@ -23,8 +23,8 @@ import numpy as np
 import structlog
 from numpy.typing import NDArray
 
-from ecu.bus.e2e import P01_MODULO
 from ecu.bus.foreign import another_ecu_speaks, is_intact, place_of_ours
+from ecu.bus.plan import frame_count
 from ecu.bus.transmit import Transmission, TransmitPlan
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CYCLE_NS
@@ -91,8 +91,9 @@ def _adopt_counters(plan: TransmitPlan, sent: Transmission, frames: Any, count: 
         return False
     for i in range(count):
         place = place_of_ours(plan, frames[i])
-        if place >= 0 and is_intact(plan, place, frames[i]):
-            sent.counter[place] = ((frames[i].data[1] & 0xF) + 1) % P01_MODULO
+        if place >= 0 and is_intact(plan, place, frames[i]) and plan.messages[place].modulo > 0:
+            message = plan.messages[place]
+            sent.counter[place] = (frame_count(message, frames[i].data) + 1) % message.modulo
     return True
 
 

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from ecu.bus.e2e import AUTOSAR_P01, protect
 from ecu.contract.records import FRAME, RecordArray
 
 ROOT = Path(__file__).parents[3]
@@ -61,3 +63,9 @@ def read_log() -> Callable[[Path, str], RecordArray]:
         )
 
     return read
+
+
+def p01_protect(data: NDArray[np.uint8], length: int, data_id: int, counter: int) -> None:
+    """Write counter and CRC of Profile 1 into a payload."""
+    data[1] = data[1] & 0xF0 | counter
+    protect(AUTOSAR_P01, data, length, 0, data_id)

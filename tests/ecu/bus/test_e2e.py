@@ -18,10 +18,13 @@ from ecu.bus.e2e import (
     HYUNDAI_XOR,
     TOYOTA,
     checksum_holds,
+    checksum_place,
     p01_crc,
-    p01_protect,
+    protect,
 )
 from ecu.contract.records import RecordArray
+
+from .conftest import p01_protect
 
 
 @pytest.mark.parametrize(
@@ -158,3 +161,39 @@ def test_makers_rules_on_whole_drives(
     frames = read_log(drives / log, bus)
     frames = frames[frames["can_id"] == can_id]
     assert sum(checksum_holds(rule, one["data"], one["length"], can_id, 0) for one in frames) == count
+
+
+@pytest.mark.parametrize(
+    ("car", "can_id", "rule", "byte", "bits"),
+    [
+        ("mustang", 0x07D, FORD_BRAKE_SN_4, 2, 0xFF),
+        ("mustang", 0x092, FORD_ACCEL_DATA, 6, 0xFF),
+        ("rav4", 0x024, TOYOTA, 7, 0xFF),
+        ("rav4", 0x025, TOYOTA, 7, 0xFF),
+        ("kona", 0x153, HYUNDAI_SUM, 7, 0xFF),
+        ("kona", 0x2B0, HYUNDAI_XOR, 4, 0xF0),
+    ],
+)
+def test_what_is_protected_is_the_recorded_frame(
+    root: Path,
+    read_log: Callable[[Path, str], RecordArray],
+    car: str,
+    can_id: int,
+    rule: int,
+    byte: int,
+    bits: int,
+) -> None:
+    log = read_log(root / "tests" / "data" / f"{car}.log", "can0")
+    for one in log[log["can_id"] == can_id]:
+        assert checksum_place(rule, int(one["length"])) == byte
+        recorded = one["data"].copy()
+        one["data"][byte] ^= bits
+        protect(rule, one["data"], one["length"], can_id, 0)
+        assert one["data"].tolist() == recorded.tolist()
+
+
+@given(data=st.binary(min_size=8, max_size=8))
+def test_without_a_rule_nothing_is_protected(data: bytes) -> None:
+    payload = np.frombuffer(data, np.uint8).copy()
+    protect(protection.NO_CHECKSUM, payload, 8, 0x50, 0)
+    assert payload.tobytes() == data

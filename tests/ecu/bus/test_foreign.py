@@ -5,12 +5,13 @@ from contextlib import nullcontext
 import pytest
 
 from ecu.bus import foreign
-from ecu.bus.e2e import p01_protect
 from ecu.bus.foreign import another_ecu_speaks, discard, listen_before_send
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer
 from ecu.contract.records import FRAME_EXTENDED
 from ecu.errors import UserError
 from ecu.settings.resources import resource
+
+from .conftest import p01_protect
 
 PLAN = contract_transmit_plan(resource("dbc/brake_ecu.dbc"), "BrakeEcu")
 DEMAND = int(PLAN.ids[0])

@@ -9,7 +9,6 @@ import pytest
 from numba.core.runtime import _nrt_python, rtsys
 
 from ecu.bus.database import load_database
-from ecu.bus.e2e import p01_protect
 from ecu.bus.freshness import begin_cycle, end_cycle, new_freshness, target_dtype
 from ecu.bus.plan import SignalUse
 from ecu.bus.receive import EXTENDED_ID, new_reception, receive
@@ -25,6 +24,8 @@ from ecu.contract.records import (
     new_record,
 )
 from ecu.contract.signals import ALIVE, INPUT, INPUT_SIGNALS, N_INPUTS, RATE_OK, USABLE, VALID
+
+from .conftest import p01_protect
 
 ROOT = Path(__file__).parents[3]
 CONTRACT = ROOT / "dbc" / "brake_ecu.dbc"

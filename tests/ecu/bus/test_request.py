@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from ecu.bus.e2e import p01_protect
 from ecu.bus.freshness import begin_cycle, end_cycle
 from ecu.bus.receive import new_reception, receive
 from ecu.bus.receive_plan import contract_receive_plan
@@ -36,6 +35,8 @@ from ecu.contract.signals import (
     VALID,
 )
 from ecu.jit import kernel
+
+from .conftest import p01_protect
 
 CONTRACT = Path(__file__).parents[3] / "dbc" / "brake_ecu.dbc"
 PLAN = contract_receive_plan(CONTRACT)
