@@ -1,6 +1,6 @@
 """Outputs of a cycle: demands, estimates and state, NaN where nothing is known.
 
-A failed ECU demands no pressure: in mode `FAILED` the pressures sent are 0.
+A failed ECU demands no pressure: in mode `FAILED` the pressures and torques sent are 0.
 """
 
 import math
@@ -8,6 +8,7 @@ import math
 import numpy as np
 
 from ecu.algorithm.control.blending import blends
+from ecu.algorithm.control.friction_torque import lining_torque
 from ecu.algorithm.estimate import STANDING
 from ecu.contract.faults import WORD
 from ecu.contract.params import BAR
@@ -63,6 +64,7 @@ def publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: in
     y.particle_mass_per_km = s.dust.mass_per_km
     for i in range(4):
         y.pressure_demand[i] = s.limiter.pressure[i] / BAR if mode != FAILED else 0.0
+        y.torque_demand[i] = lining_torque(p, BAR * y.pressure_demand[i], s.control, i)
         y.pressure_uncompensated[i] = s.demands.uncompensated[i] / BAR
         y.motor_demand[i] = s.demands.motor[i]
         y.slip[i] = e.slip[i] if rolls else math.nan

@@ -165,6 +165,7 @@ OUTPUT_SIGNALS: Final[tuple[OutputSignal, ...]] = (
     OutputSignal("sigma_grip_limit", "m/s^2", False, ""),
     OutputSignal("grip_knee", "-", False, ""),  # exponent of the bend towards it; NaN: the ECU brakes
     OutputSignal("motor_torque_share", "-", False, ""),  # of reported torques that counts, by the motion
+    OutputSignal("torque_demand", "N m", True, ""),  # of the linings: that of the pressure demand
 )
 
 

@@ -1,4 +1,4 @@
-"""Lag of the lining torque behind its demand, which motors can compensate.
+"""Torque of the lining at a pressure, and its lag behind its demand, which motors can compensate.
 
 Torque is 2 A_k r_eff mu (p - p_0) (A.19) with the friction of the pressure law: only the lag of the pressure
 is modelled (`ecu.algorithm.hydraulics`), neither errors of the law nor its limits.
@@ -8,6 +8,13 @@ from ecu.algorithm.brake import brake_gain
 from ecu.algorithm.control.pressure_law import friction_in_use
 from ecu.contract.params import BAR
 from ecu.jit import Record, kernel
+
+
+@kernel
+def lining_torque(params: Record, pressure: float, law: Record, i: int) -> float:
+    """Return the torque [N m] of a wheel's lining at a pressure [Pa], by the friction of `PRESSURE_LAW_STATE`."""
+    pushing = max(pressure - params.push_out_pressure[i], 0.0)
+    return brake_gain(params, i) * friction_in_use(law, i) * pushing
 
 
 @kernel

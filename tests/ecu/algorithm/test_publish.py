@@ -11,6 +11,12 @@ from ecu.settings.resources import resource
 PRESSURES = [30e5, 31e5, 0.0, 12e5]  # Pa
 
 
+def torques(params, bar, mu):
+    """(A.19), N m."""
+    pressing = np.maximum(np.array(bar) * 1e5 - params["push_out_pressure"], 0.0)
+    return 2 * params["piston_area"] * params["effective_radius"] * mu * pressing
+
+
 @pytest.mark.parametrize(
     ("mode", "bar"),
     [(ACTIVE, [30.0, 31.0, 0.0, 12.0]), (DEGRADED, [30.0, 31.0, 0.0, 12.0]), (FAILED, [0.0, 0.0, 0.0, 0.0])],
@@ -22,6 +28,7 @@ def test_demands_are_sent_in_bar_and_a_failed_ecu_demands_no_pressure(mode: int,
     state["demands"]["uncompensated"], state["demands"]["motor"] = 28e5, 400.0
     publish(params[0], state[0], np.zeros(1, INPUTS)[0], outputs[0], 3.0, 0, mode)
     assert outputs["pressure_demand"][0] == pytest.approx(bar)
+    assert outputs["torque_demand"][0] == pytest.approx(torques(params[0], bar, state[0]["control"]["used"]))
     assert outputs["pressure_uncompensated"][0] == pytest.approx([28.0] * 4)
     assert outputs["motor_demand"][0] == pytest.approx([400.0] * 4)
     assert state["limiter"]["pressure"][0] == pytest.approx(PRESSURES)

@@ -1,11 +1,11 @@
-"""Torque that a lining lacks of its demand, by (A.19)."""
+"""Torque of a lining, and what it lacks of its demand, by (A.19)."""
 
 import math
 
 import numpy as np
 import pytest
 
-from ecu.algorithm.control.friction_torque import lagging_torque
+from ecu.algorithm.control.friction_torque import lagging_torque, lining_torque
 from ecu.algorithm.control.pressure_law import PRESSURE_LAW_STATE
 
 BAR = 1e5
@@ -25,5 +25,6 @@ def test_the_lag_is_a_torque(params, corner, override, mu, there, wanted) -> Non
         """(A.19), one piston a side, 0.5 bar of push-out pressure."""
         return 2 * mu * math.pi * diameter**2 / 4 * max(bar - 0.5, 0.0) * BAR * radius
 
+    assert lining_torque(params[0], wanted * BAR, law, corner) == pytest.approx(torque(wanted))
     found = lagging_torque(params[0], np.full(4, there), law, wanted * BAR, corner)
     assert found == pytest.approx(torque(wanted) - torque(there))
