@@ -117,6 +117,9 @@ def run(
         bool,
         typer.Option("--armed", help="Flag the demands valid, as `transmit = true` in CONFIG does"),
     ] = False,
+    silent: Annotated[
+        bool, typer.Option("--silent", help="Receive and estimate only: send nothing, whatever CONFIG says")
+    ] = False,
     metrics_port: Annotated[
         int | None,
         typer.Option(
@@ -157,7 +160,7 @@ def run(
     log_as(log_format, level)
     return service.run(
         prepare.RunOptions(
-            config, interface, channel, map, record, record_limit, state, standby, armed, metrics
+            config, interface, channel, map, record, record_limit, state, standby, armed, silent, metrics
         )
     )
 

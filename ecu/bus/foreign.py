@@ -24,6 +24,8 @@ _LOOK_S: Final = 0.01
 SENDS: Final = 5
 """Frames of one identifier that make a sender; those stamped within `_APART_NS` are one."""
 _APART_NS: Final = 5_000_000
+KNOWN_BY: Final = 2
+"""Messages of ours by which another ECU is known."""
 
 
 @kernel

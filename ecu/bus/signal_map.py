@@ -2,6 +2,7 @@
 
 A map is a TOML file; `docs/signal-maps.md` explains it with an example. A value becomes
 ((raw as the database scales it) · factor + offset) in `unit`, and that is converted to the contract's unit.
+What such a map says of outputs: `output_map.py`.
 """
 
 from collections.abc import Callable
@@ -72,6 +73,36 @@ class MappedInput(_Table):
     """After it the input is stale, if not after the contract's."""
 
 
+class SentValidity(_Table):
+    """A signal of the same message that says whether a sent value counts."""
+
+    signal: str
+    """Of the same message."""
+    valid: Annotated[int, Unit("-")]
+    """Its raw code while the output is valid."""
+    invalid: Annotated[int, Unit("-")]
+    """Its raw code while the output is invalid or unknown."""
+
+
+class MappedOutput(_Table):
+    """Destination of one output; needs `validity`, `invalid`, or a code "not_available" of the database."""
+
+    message: str
+    """Its name in the database."""
+    signal: str
+    """Its name in the database."""
+    unit: str | None = None
+    """Of the value before factor and offset; the database's own if it is not given."""
+    factor: Annotated[float, Unit("-")] = 1.0
+    """Of the output in `unit`: what is sent, as the database scales it; -1 turns its sign."""
+    offset: float = 0.0
+    """Added after the factor, as the database scales it."""
+    validity: SentValidity | None = None
+    """A signal that says whether the value counts."""
+    invalid: float | None = None
+    """Sent instead of an invalid or unknown value, as the database scales it."""
+
+
 class Counter(_Table):
     """Frame counter of a message: 0 … `modulo` − 1."""
 
@@ -94,6 +125,8 @@ class MappedMessage(_Table):
     """Of the rule autosar_p01."""
     counter: Counter | None = None
     """Its frame counter."""
+    constants: Annotated[dict[str, int], Unit("-")] = {}
+    """Raw codes of other signals, by name, in a message that is sent."""
 
 
 class SignalMap(_Table):
@@ -113,6 +146,14 @@ class SignalMap(_Table):
     """Rate and protection, by name of the message."""
     inputs: Annotated[dict[str, MappedInput], Field(min_length=1)]
     """Sources, by name of the input."""
+    output_database: str | None = None
+    """Path of the database of the messages that are sent, if it is not `database`."""
+    own_frames: bool | None = None
+    """Send the ECU's own frames; if it is not given, only without `outputs`."""
+    own_offset: Annotated[int, Field(ge=0, le=0x7FF), Unit("-")] = 0
+    """Added to the identifiers of the ECU's own frames."""
+    outputs: dict[str, MappedOutput] = {}
+    """Destinations, by name of the output."""
 
 
 class MappedBus(NamedTuple):
@@ -179,9 +220,11 @@ def _check_names(path: Path, signal_map: SignalMap) -> None:
             )
             raise UserError(str(path), f"inputs.{name}", f"no such input{hint}")
     used = {mapped.message for mapped in signal_map.inputs.values()}
+    sent = {mapped.message for mapped in signal_map.outputs.values()}
     for name in signal_map.messages:
-        if name not in used:
-            raise UserError(str(path), f"messages.{name}", "no input uses it; remove it or mend its name")
+        if name not in used | sent:
+            remedy = "no input and no output uses it; remove it or mend its name"
+            raise UserError(str(path), f"messages.{name}", remedy)
     for name in signal_map.ignore_checksum:
         message = signal_map.messages.get(name)
         if message is None or (message.checksum is None and message.counter is None):
@@ -197,18 +240,26 @@ def _message_use(
     message = find_message(database, name, path, f"inputs.{first}.message")
     settings = signal_map.messages.get(name, MappedMessage())
     key = f"messages.{name}"
-    period_s = settings.period or float(message.cycle_time or 0) * 1e-3
-    if not period_s:
-        raise UserError(str(path), f"{key}.period", "missing, and the database has none; give it in seconds")
+    period_s = period_of(path, message, settings, key)
     signals = [
         _signal_use(path, database_path, signal_map, message, f"inputs.{target}", target, mapped)
         for target, mapped in signal_map.inputs.items()
         if mapped.message == name
     ]
+    if settings.constants:
+        raise UserError(str(path), f"{key}.constants", "belong to a message that is sent; remove them")
     use = MessageUse(message, signals, period_s, settings.slowest_period or period_s)
     if name in signal_map.ignore_checksum:
         return use
     return use._replace(protection=protection_of(path, database_path, message, settings, key))
+
+
+def period_of(path: Path, message: Message, settings: MappedMessage, key: str) -> float:
+    """Return the period [s] of a message, of `key` of the map at `path` or its database; else UserError."""
+    period_s = settings.period or float(message.cycle_time or 0) * 1e-3
+    if not period_s:
+        raise UserError(str(path), f"{key}.period", "missing, and the database has none; give it in seconds")
+    return period_s
 
 
 def protection_of(

@@ -127,6 +127,12 @@ def contract_transmit_plan(dbc_path: Path, sender: Literal["BrakeEcu", "Vehicle"
     return compile_transmit(contract_messages(dbc_path, sender))
 
 
+def slowest_demand(plan: TransmitPlan) -> int:
+    """Return the longest period [cycles] of messages of a map with a demand, 0 without one."""
+    of_message = np.repeat(plan.messages["period"], plan.messages["count"])
+    return int(of_message[plan.signals["validity"] >= 0].max(initial=0))
+
+
 def new_transmission(plan: TransmitPlan) -> Transmission:
     """Return the state before the first cycle."""
     return Transmission(np.zeros(len(plan.messages), np.uint16), np.zeros(len(plan.messages), np.int64))

@@ -59,7 +59,7 @@ def conversion(
     A speed is converted into a wheel speed by the rolling radius [m]. Raises UserError for other units.
     """
     name = spelled(unit)
-    known = CONVERSIONS[target]
+    known = CONVERSIONS.get(target, {target: (1.0, 0.0)})
     if name in known:
         return known[name]
     if target == "rad/s" and name in CONVERSIONS["m/s"] and key.startswith("inputs.wheel_speed"):

@@ -95,7 +95,7 @@ CYCLE: Final = np.dtype(
         ("worst_lateness_us", "f8"),
         ("lateness_ns", "i8"),
         ("stage_ns", "i8", (5,)),  # drain, receive, step, transmit, send
-        ("speaks", "i8"),  # 0: a silent standby, or one that yielded; nothing was sent
+        ("speaks", "i8"),  # 0: a standby, one that yielded, or a silent run; nothing was sent
     ],
     align=True,
 )

@@ -168,6 +168,15 @@ OUTPUT_SIGNALS: Final[tuple[OutputSignal, ...]] = (
     OutputSignal("torque_demand", "N m", True, ""),  # of the linings: that of the pressure demand
 )
 
+DEMANDS: Final = {
+    "pressure_demand": "pressure_demand_valid",
+    "pressure_uncompensated": "pressure_demand_valid",
+    "torque_demand": "pressure_demand_valid",
+    "decel_demand_total": "pressure_demand_valid",
+    "motor_demand": "motor_demand_valid",
+}
+"""Outputs that ask for torque, and the output that declares each valid."""
+
 
 def column_names(signal: OutputSignal) -> tuple[str, ...]:
     """Return the names of an output in results and on the bus, one per corner where it has four."""

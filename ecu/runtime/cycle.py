@@ -17,7 +17,14 @@ from ecu.bus.freshness import begin_cycle, end_cycle
 from ecu.bus.protocol import BusStatus, Channel
 from ecu.bus.receive import Reception, new_reception, receive
 from ecu.bus.receive_plan import ReceivePlan
-from ecu.bus.transmit import Transmission, TransmitPlan, frame_buffer, new_transmission, transmit
+from ecu.bus.transmit import (
+    Transmission,
+    TransmitPlan,
+    frame_buffer,
+    new_transmission,
+    slowest_demand,
+    transmit,
+)
 from ecu.contract import faults
 from ecu.contract.records import (
     CYCLE,
@@ -29,7 +36,7 @@ from ecu.contract.records import (
     new_record,
     output_vector,
 )
-from ecu.contract.signals import CYCLE_NS
+from ecu.contract.signals import CYCLE_NS, DEMANDS
 from ecu.jit import CompileCounter, kernel
 from ecu.recording.ring import Ring, publish
 from ecu.runtime.clock import MICROSECOND_NS, Grid, Histogram, Tick
@@ -290,12 +297,15 @@ def send_farewell(
 ) -> None:
     """Send all frames due with demand 0 flagged invalid, in three cycles from `number` on.
 
-    The hydraulic fallback takes over at once. It works at any point of an interrupted cycle.
+    In as many more as the slowest message of a map with a demand needs. The hydraulic fallback takes over at
+    once. It works at any point of an interrupted cycle.
     """
     outputs = ecu.outputs
-    outputs["pressure_demand"] = outputs["pressure_demand_valid"] = outputs["motor_demand_valid"] = 0.0
+    for name in DEMANDS:
+        outputs[name] = 0.0
+    outputs["pressure_demand_valid"] = outputs["motor_demand_valid"] = 0.0
     outputs["motor_demand"] = np.nan
-    for cycle in range(number, number + FAREWELLS):
+    for cycle in range(number, number + max(FAREWELLS, slowest_demand(ecu.transmit_plan))):
         if cycle > number:
             sleep(CYCLE_NS * 1e-9)
         due = transmit(ecu.transmit_plan, ecu.transmission, ecu.vector, cycle, ecu.sending)

@@ -19,12 +19,14 @@ import structlog
 from ecu import __version__
 from ecu.algorithm.step import INITIAL, initial_part
 from ecu.bus.channel import open_channel
-from ecu.bus.foreign import discard, listen_before_send
+from ecu.bus.e2e import NO_CHECKSUM
+from ecu.bus.foreign import KNOWN_BY, discard, listen_before_send
+from ecu.bus.output_map import transmit_plan
 from ecu.bus.protocol import Channel
 from ecu.bus.receive_plan import messages_by_contract
 from ecu.bus.signal_map import receive_plan
-from ecu.bus.transmit import contract_transmit_plan
-from ecu.contract.records import RecordArray
+from ecu.bus.transmit import TransmitPlan, compile_transmit
+from ecu.contract.records import FRAME_FD, RecordArray
 from ecu.contract.signals import CYCLE_NS, INPUT_SIGNALS, OUTPUT_SIGNALS
 from ecu.errors import UserError
 from ecu.jit import CompileCounter, compiler_version
@@ -40,10 +42,11 @@ from ecu.runtime.standby import Standby, learned_by_first
 from ecu.runtime.start import lower_priority
 from ecu.runtime.warm_up import warm_up
 from ecu.settings.config import Config, config_hash, load_config, new_params, store_key
-from ecu.settings.resources import resource
 
 LISTEN_S: Final = 1.0
 TELL_PROGRESS_S: Final = 5.0
+SILENCE: Final = compile_transmit([])
+"""What a silent run sends."""
 
 
 class RunOptions(NamedTuple):
@@ -60,6 +63,8 @@ class RunOptions(NamedTuple):
     standby: bool = False
     armed: bool = False
     """Whatever the configuration says."""
+    silent: bool = False
+    """A shadow that sends nothing."""
     metrics: str | None = None
     """ADDRESS:PORT on which metrics are served."""
 
@@ -108,15 +113,18 @@ def prepare(options: RunOptions) -> Session:
     """
     if options.metrics is not None:
         _check_metrics(options.metrics)
+    if options.silent and (options.armed or options.standby):
+        raise UserError("--silent", "", "sends nothing, so it is neither armed nor a standby; leave one out")
     manager = Manager()
     progress = CompileProgress(manager)
     compiled = CompileCounter(progress)
     config = load_config(options.config)
-    if options.armed:
-        config = config.model_copy(update={"transmit": True})
+    if options.armed or options.silent:
+        config = config.model_copy(update={"transmit": options.armed})
     log = structlog.get_logger("ecu")
     receiving = receive_plan(options.map, lambda line: log.warning("database", left_out=line))
-    sending = contract_transmit_plan(resource("dbc/brake_ecu.dbc"), "BrakeEcu")
+    sending = SILENCE if options.silent else transmit_plan(options.map, receiving)
+    _check_sending(options, config, sending)
     params = new_params(config)
     description = _describe(options, config)
     if options.map is not None:
@@ -148,7 +156,7 @@ def prepare(options: RunOptions) -> Session:
         freeze_memory()
         warm_s = time.monotonic() - began
         discard(channel)
-        if not options.standby:
+        if not (options.standby or options.silent):
             stray = listen_before_send(channel, f"{options.interface} {options.channel}", sending, LISTEN_S)
             if stray:
                 log.warning(
@@ -167,6 +175,7 @@ def prepare(options: RunOptions) -> Session:
         channel=options.channel,
         armed=config.transmit,
         standby=options.standby,
+        silent=options.silent,
         warm_up_s=round(warm_s, 2),
         compiled=compiled.count,
         realtime={verdict.name: verdict.granted for verdict in verdicts},
@@ -176,7 +185,22 @@ def prepare(options: RunOptions) -> Session:
         structlog.get_logger("ecu").warning(
             "not_notified", remedy=f"NOTIFY_SOCKET is {os.environ['NOTIFY_SOCKET']}: unset it or mend it"
         )
-    return Session(ecu, channel, ring, side, compiled, Standby() if options.standby else None, manager)
+    waits = options.standby or options.silent  # a silent one hears no first one, as it has no frames
+    return Session(ecu, channel, ring, side, compiled, Standby() if waits else None, manager)
+
+
+def _check_sending(options: RunOptions, config: Config, sending: TransmitPlan) -> None:
+    """Raise UserError for a map's messages that this run cannot send."""
+    fd = sending.messages["name"][sending.messages["flags"] & FRAME_FD != 0]
+    if len(fd) and not config.can_fd:
+        raise UserError(
+            str(options.config), "can_fd", f"{fd[0]} of the map is a CAN FD frame; set it to true"
+        )
+    if options.standby and np.count_nonzero(sending.messages["rule"] != NO_CHECKSUM) < KNOWN_BY:
+        remedy = (
+            f"knows the first one by {KNOWN_BY} messages with a checksum; set own_frames = true in the map"
+        )
+        raise UserError("--standby", "", remedy)
 
 
 def _check_metrics(place: str) -> None:

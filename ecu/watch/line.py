@@ -60,7 +60,7 @@ def text_line(watcher: Watcher) -> str:
     faults = ", ".join(faults_of(row)) or "no fault"
     demanded, measured = row[COLUMN["decel_demand_total"]], -row[COLUMN["accel_x_road"]]
     return (
-        f"{_clock(row[COLUMN['clock']])} {mode_of(row)}{'' if row[COLUMN['speaks']] else ' (silent standby)'}"
+        f"{_clock(row[COLUMN['clock']])} {mode_of(row)}{'' if row[COLUMN['speaks']] else ' (silent)'}"
         f" {number(row[COLUMN['vehicle_speed']], 1)} m/s"
         f" decel {number(demanded, 2)}→{number(measured, 2)} m/s²{ceiling(row)}"
         f" mu {friction} {pressures} bar {discs} °C"

@@ -61,7 +61,7 @@ def families(tally: Tally) -> Iterator["Metric"]:
         yield CounterMetricFamily(f"brake_ecu_{name}", text, value=value)
     yield GaugeMetricFamily("brake_ecu_last_cycle_age_seconds", "Since the last cycle", value=tally.age_s)
     yield GaugeMetricFamily(
-        "brake_ecu_speaks", "1 while it sends, 0: standby", value=float(cycle["speaks"] != 0)
+        "brake_ecu_speaks", "1 while it sends, 0: silent", value=float(cycle["speaks"] != 0)
     )
     yield _lateness(tally)
     yield _labelled(

@@ -94,7 +94,7 @@ def _state(row: Row, back_s: float, paused: bool) -> Text:
     line.append(mode.upper(), STYLES.get(mode, ""))
     line.append(f"  {number(row[COLUMN['vehicle_speed']], 1)} m/s  {when}")
     if not row[COLUMN["speaks"]]:
-        line.append("  silent standby", "yellow")
+        line.append("  silent", "yellow")
     if back_s > 0.0:
         line.append(f"  {back_s:.0f} s back", "cyan")
     if paused:

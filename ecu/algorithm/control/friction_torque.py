@@ -12,7 +12,7 @@ from ecu.jit import Record, kernel
 
 @kernel
 def lining_torque(params: Record, pressure: float, law: Record, i: int) -> float:
-    """Return the torque [N m] of a wheel's lining at a pressure [Pa], by the friction of `PRESSURE_LAW_STATE`."""
+    """Return the torque [N m] of a wheel's lining at a pressure [Pa]; `law`: `PRESSURE_LAW_STATE`."""
     pushing = max(pressure - params.push_out_pressure[i], 0.0)
     return brake_gain(params, i) * friction_in_use(law, i) * pushing
 

@@ -348,7 +348,7 @@ MISTAKES: dict[str, tuple[str, str, str]] = {
     "unused message": (
         "[messages.Wheels]",
         "[messages.W]\nperiod = 1\n[messages.Wheels]",
-        "messages.W: no input uses it",
+        "messages.W: no input and no output uses it",
     ),
     "counter too wide": ('"count" }', '"count", modulo = 17 }', "messages.Wheels.counter: count has 4 bits"),
     "nothing to ignore": (

@@ -9,6 +9,9 @@ from structlog.testing import capture_logs
 from ecu.errors import UserError
 from ecu.runtime import prepare
 from ecu.runtime.notify import Manager
+from ecu.settings.resources import resource
+
+CONFIG = resource("config/suv.toml")
 
 
 def test_compiling_is_a_line_at_once_then_every_five_seconds_and_none_in_operation(monkeypatch):
@@ -34,3 +37,44 @@ def test_a_package_that_is_missing_is_installed_for_the_python_that_runs(monkeyp
     with pytest.raises(UserError) as refused:
         prepare.prepare(options)
     assert str(refused.value).endswith(f"{sys.executable} -m pip install prometheus-client")
+
+
+DBC = """VERSION ""
+BU_: Car Unit
+BO_ 10 Wheels: 8 Car
+ SG_ v_fl : 0|16@1+ (0.01,0) [0|655] "km/h" Unit
+BO_ 20 Brake: 8 Unit
+ SG_ p : 0|16@1+ (1,0) [0|0] "kPa" Car
+BO_ 21 Long: 12 Unit
+ SG_ t : 0|16@1+ (1,0) [0|0] "N m" Car
+"""
+MAP = """database = "car.dbc"
+rolling_radius = 0.3
+[messages]
+Wheels = { period = 0.01 }
+MESSAGE = { period = 0.01 }
+[inputs]
+wheel_speed_fl = { message = "Wheels", signal = "v_fl" }
+[outputs]
+OUTPUT
+"""
+PRESSURE = 'pressure_demand_fl = { message = "Brake", signal = "p", invalid = 0 }'
+TORQUE = 'torque_demand_fl = { message = "Long", signal = "t", invalid = 0 }'
+
+
+@pytest.mark.parametrize(
+    ("message", "output", "more", "line"),
+    [
+        ("Long", TORQUE, {}, "can_fd: Long of the map is a CAN FD frame; set it to true"),
+        ("Brake", PRESSURE, {"standby": True}, "--standby: knows the first one by 2 messages with a checksum"),
+        ("Brake", PRESSURE, {"silent": True, "armed": True}, "--silent: sends nothing, so it is neither armed"),
+        ("Brake", PRESSURE, {"silent": True, "standby": True}, "--silent: sends nothing, so it is neither"),
+    ],
+    ids=["FD", "standby", "silent and armed", "silent and standby"],
+)
+def test_what_a_run_cannot_send_is_refused(tmp_path, message, output, more, line):
+    (tmp_path / "car.dbc").write_text(DBC)
+    (tmp_path / "car.toml").write_text(MAP.replace("MESSAGE", message).replace("OUTPUT", output))
+    options = prepare.RunOptions(CONFIG, "virtual", "x", tmp_path / "car.toml", **more)
+    with pytest.raises(UserError, match=line):
+        prepare.prepare(options)

@@ -71,7 +71,7 @@ def test_what_is_not_available_and_who_is_silent(loop):
     watcher = Watcher(None)
     watcher.turn()
     line = text_line(watcher)
-    assert "active (silent standby) – m/s decel 0.00→0.00 m/s² mu –±" in line
+    assert "active (silent) – m/s decel 0.00→0.00 m/s² mu –±" in line
     assert "nan" not in line
     said = json_line(watcher)
     assert '"speaks": 0, ' in said
