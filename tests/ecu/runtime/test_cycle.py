@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from numba.core.runtime import _nrt_python, rtsys
 
+from ecu.bus.output_map import transmit_plan
 from ecu.bus.protocol import BusStatus
 from ecu.bus.receive_plan import contract_receive_plan
+from ecu.bus.signal_map import receive_plan
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
 from ecu.contract import faults
 from ecu.contract.records import LEARNED
@@ -323,6 +325,27 @@ def test_the_last_frames_flag_every_demand_invalid(bench):
     assert bench.ecu.outputs["pressure_demand_valid"][0] == 0
     assert (bench.ecu.outputs["pressure_demand"] == 0).all()
     assert set(bench.ecu.transmit_plan.ids[:2].tolist()) <= set(bench.sent)
+
+
+def test_a_farewell_lasts_until_the_slowest_demand_of_a_map_has_left(bench, tmp_path):
+    (tmp_path / "car.dbc").write_text(
+        'VERSION ""\nBU_: A\nBO_ 10 Wheels: 8 A\n SG_ v : 0|16@1+ (1,0) [0|0] "rad/s" A\n'
+        'BO_ 20 Brake: 8 A\n SG_ p : 0|16@1+ (1,0) [0|0] "bar" A\n'
+    )
+    (tmp_path / "car.toml").write_text(
+        'database = "car.dbc"\nmessages = { Wheels = { period = 0.01 }, Brake = { period = 0.05 } }\n'
+        'inputs = { wheel_speed_fl = { message = "Wheels", signal = "v" } }\n'
+        'outputs = { pressure_demand_fl = { message = "Brake", signal = "p", invalid = 0 } }\n'
+    )
+    plan = transmit_plan(tmp_path / "car.toml", receive_plan(tmp_path / "car.toml"))
+    ecu = bench.ecu._replace(
+        transmit_plan=plan, transmission=new_transmission(plan), sending=frame_buffer(plan)
+    )
+    for number in range(5):
+        sent: list[int] = []
+        bench.send = lambda frames, count, sent=sent: sent.append(count)
+        send_farewell(ecu, bench, number, lambda s: None)
+        assert sum(sent) == 1
 
 
 def test_learned_values_are_taken_over(tmp_path):

@@ -66,8 +66,18 @@ TORQUE = 'torque_demand_fl = { message = "Long", signal = "t", invalid = 0 }'
     ("message", "output", "more", "line"),
     [
         ("Long", TORQUE, {}, "can_fd: Long of the map is a CAN FD frame; set it to true"),
-        ("Brake", PRESSURE, {"standby": True}, "--standby: knows the first one by 2 messages with a checksum"),
-        ("Brake", PRESSURE, {"silent": True, "armed": True}, "--silent: sends nothing, so it is neither armed"),
+        (
+            "Brake",
+            PRESSURE,
+            {"standby": True},
+            "--standby: knows the first one by 2 messages with a checksum",
+        ),
+        (
+            "Brake",
+            PRESSURE,
+            {"silent": True, "armed": True},
+            "--silent: sends nothing, so it is neither armed",
+        ),
         ("Brake", PRESSURE, {"silent": True, "standby": True}, "--silent: sends nothing, so it is neither"),
     ],
     ids=["FD", "standby", "silent and armed", "silent and standby"],
