@@ -3,6 +3,7 @@
 The rights are requested in a separate process, so that the check changes nothing.
 """
 
+import json
 import os
 import platform
 import subprocess
@@ -16,11 +17,13 @@ import numpy as np
 from ecu import jit
 from ecu.bus.channel import open_channel
 from ecu.bus.freshness import NEVER, begin_cycle
+from ecu.bus.load import received_load, sent_load
+from ecu.bus.output_map import transmit_plan
 from ecu.bus.protocol import Channel
 from ecu.bus.receive import Reception, new_reception, receive
 from ecu.bus.receive_plan import ReceivePlan
 from ecu.bus.signal_map import receive_plan
-from ecu.bus.transmit import contract_transmit_plan
+from ecu.bus.transmit import TransmitPlan
 from ecu.compiling import compiling_told
 from ecu.contract.records import FRAME, INPUTS, new_record
 from ecu.contract.signals import CYCLE_NS, INPUT_SIGNALS
@@ -33,6 +36,9 @@ from ecu.settings.resources import resource
 
 LISTEN_S: Final = 2.0
 SLEEPS: Final = 50
+USUAL_BIT_RATE: Final = 500_000
+FULL_BUS: Final = 0.5
+"""Share of a bus that is left to these frames: the slowest of them still arrive in time, and others do."""
 OPTIONAL: Final = {
     "VehicleSpeed": "the speed is that of the wheels",
     "WheelForce": "friction is estimated without measured forces",
@@ -67,8 +73,9 @@ def doctor(config: Path | None, map: Path | None, interface: str | None, channel
     if (interface is None) != (channel is None):
         raise UserError("doctor", "-i, -c", "give both or none")
     plan = receive_plan(map, say)
+    sending = transmit_plan(map, plan)
     with compiling_told():
-        checks = [*machine(), kernels(config, plan)]
+        checks = [*machine(), kernels(config, plan, sending), bus_load(interface, channel, plan, sending)]
     if interface is not None and channel is not None:
         say(f"listening to {channel} for {LISTEN_S:.0f} s")
         checks += bus(interface, channel, plan, config)
@@ -161,12 +168,11 @@ def unit(folders: tuple[Path, ...] = UNIT_FOLDERS) -> Check:
     return Check("systemd unit", True, ", ".join(map(str, installed)))
 
 
-def kernels(config: Path | None, plan: ReceivePlan) -> Check:
+def kernels(config: Path | None, plan: ReceivePlan, sending: TransmitPlan) -> Check:
     """Prepare every kernel; good if none had to be compiled."""
     compiled = jit.CompileCounter()
     began = time.monotonic()
     params = new_params(load_config(config or resource("config/suv.toml")))
-    sending = contract_transmit_plan(resource("dbc/brake_ecu.dbc"), "BrakeEcu")
     try:
         warm_up(new_ecu(params, None, plan, sending), compiled)
     except UserError as error:
@@ -175,6 +181,29 @@ def kernels(config: Path | None, plan: ReceivePlan) -> Check:
     source = "numba's cache" if taken is None else f"{taken.folder}, for {taken.processor}"
     found = f"from {source}; {compiled.count} compiled, ready after {time.monotonic() - began:.1f} s"
     return Check("kernels", compiled.count == 0, found, "they are cached now; a second look will find none")
+
+
+def bus_load(interface: str | None, channel: str | None, plan: ReceivePlan, sending: TransmitPlan) -> Check:
+    """Reckon what the frames sent and expected take of the bus at worst stuffing."""
+    known = bit_rate(channel) if interface == "socketcan" and channel is not None else None
+    rate = known or USUAL_BIT_RATE
+    sends, receives = sent_load(sending), received_load(plan)
+    share = (sends + receives) / rate
+    found = f"{share:.0%} of {rate / 1e3:.0f} kbit/s{'' if known else ' (assumed)'} at worst"
+    found += f": sends {sends / 1e3:.0f}, receives {receives / 1e3:.0f} kbit/s"
+    remedy = "take a faster bus, longer periods in the map, or own_frames = false"
+    return Check("bus load", share <= FULL_BUS, found, remedy)
+
+
+def bit_rate(channel: str) -> int | None:
+    """Return the nominal bit rate of a SocketCAN interface [bit/s], None where `ip` does not tell it."""
+    try:
+        told = subprocess.run(
+            ["ip", "-details", "-json", "link", "show", channel], capture_output=True, check=True
+        )
+        return int(json.loads(told.stdout)[0]["linkinfo"]["info_data"]["bittiming"]["bitrate"])
+    except (OSError, subprocess.CalledProcessError, LookupError, ValueError):
+        return None
 
 
 def bus(interface: str, channel: str, plan: ReceivePlan, config: Path | None) -> list[Check]:

@@ -1,10 +1,13 @@
+import json
+import subprocess
 from pathlib import Path
 
 import pytest
 
 from ecu.bus.receive import new_reception
 from ecu.bus.receive_plan import contract_receive_plan
-from ecu.doctor import doctor, kernels, machine, messages, unit
+from ecu.bus.transmit import contract_transmit_plan
+from ecu.doctor import bit_rate, bus_load, doctor, kernels, machine, messages, unit
 from ecu.errors import UserError
 from ecu.settings.resources import resource
 
@@ -60,9 +63,45 @@ def test_a_kernel_that_cannot_be_compiled_is_a_row(monkeypatch):
         raise UserError("/opt/cache", "", "lacks ecu.step and cannot be written; set NUMBA_CACHE_DIR")
 
     monkeypatch.setattr("ecu.doctor.warm_up", refuse)
-    row = kernels(None, contract_receive_plan(resource("dbc/brake_ecu.dbc")))
+    row = kernels(None, contract_receive_plan(DBC), contract_transmit_plan(DBC, "BrakeEcu"))
     assert (row.good, row.found) == (False, "/opt/cache")
     assert row.remedy.startswith("lacks ecu.step")
+
+
+@pytest.mark.parametrize(
+    ("rate", "good", "found"),
+    [
+        (None, True, "48% of 500 kbit/s (assumed) at worst: sends 72, receives 169 kbit/s"),
+        (1_000_000, True, "24% of 1000 kbit/s at worst"),
+        (250_000, False, "96% of 250 kbit/s at worst"),
+    ],
+)
+def test_what_the_frames_take_of_the_bus_is_told_beforehand(monkeypatch, rate, good, found):
+    monkeypatch.setattr("ecu.doctor.bit_rate", lambda channel: rate)
+    plans = contract_receive_plan(DBC), contract_transmit_plan(DBC, "BrakeEcu")
+    row = bus_load("socketcan", "can0", *plans)
+    assert (row.good, found in row.found) == (good, True), row.found
+    assert bus_load(None, None, *plans).found == bus_load("virtual", "x", *plans).found
+
+
+LINK = {"linkinfo": {"info_kind": "can", "info_data": {"bittiming": {"bitrate": 250000}}}}
+
+
+@pytest.mark.parametrize(
+    ("told", "rate"),
+    [(json.dumps([LINK]), 250_000), (json.dumps([{"linkinfo": {"info_kind": "vcan"}}]), None), ("", None)],
+    ids=["can", "vcan", "nothing"],
+)
+def test_the_bit_rate_is_what_ip_says(monkeypatch, told, rate):
+    monkeypatch.setattr(
+        subprocess, "run", lambda *given, **more: subprocess.CompletedProcess(given, 0, told.encode())
+    )
+    assert bit_rate("can0") == rate
+
+
+def test_without_ip_the_bit_rate_is_unknown(monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    assert bit_rate("can0") is None
 
 
 @pytest.mark.parametrize("arguments", [("virtual", None), (None, "x")])

@@ -122,17 +122,6 @@ def test_demands_win_the_arbitration(messages: dict[str, Message]) -> None:
     ]
 
 
-def test_bus_load_stays_below_half_of_500_kbit(messages: dict[str, Message]) -> None:
-    """Worst stuffing: 8 n data bits and 34 more can be stuffed, one bit in four; 13 more bits cannot."""
-
-    def worst_bits(message: Message) -> int:
-        stuffed = 34 + 8 * message.length
-        return stuffed + 13 + (stuffed - 1) // 4
-
-    per_second = sum(worst_bits(m) * 1000 / attribute(m, "GenMsgCycleTime") for m in messages.values())
-    assert per_second / 500_000 < 0.5
-
-
 def test_slow_frames_are_spread_over_the_cycles(messages: dict[str, Message]) -> None:
     """No cycle carries more than one slow frame of a sender (beside those of 10 and 20 ms)."""
     for sender in ("BrakeEcu", "Vehicle"):
