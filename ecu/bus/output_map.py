@@ -15,7 +15,8 @@ from cantools.database.errors import Error as DatabaseError
 from ecu.bus import e2e
 from ecu.bus.bits import FLOAT32, first_bit
 from ecu.bus.database import LONGEST_PAYLOAD, find_message, find_signal, read_database
-from ecu.bus.plan import Protection, not_available_code, signal_row
+from ecu.bus.plan import not_available_code, signal_row
+from ecu.bus.protection import Protection
 from ecu.bus.receive_plan import ReceivePlan
 from ecu.bus.signal_map import (
     MappedMessage,

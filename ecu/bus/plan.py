@@ -7,8 +7,8 @@ import numpy as np
 from cantools.database import Message
 from numpy.typing import NDArray
 
-from ecu.bus import bits, e2e
-from ecu.bus.database import attribute, fits
+from ecu.bus import bits
+from ecu.bus.database import fits
 from ecu.contract.records import EXTENDED_ID, RecordArray
 from ecu.jit import Record, kernel
 
@@ -35,48 +35,6 @@ SIGNAL: Final = np.dtype(
     ],
     align=True,
 )
-
-# Checksum and frame counter of a message.
-PROTECTION: Final = [
-    ("data_id", "u4"),
-    ("rule", "u1"),
-    ("modulo", "i2"),  # of the counter, 0: none
-    ("counter_start", "i2"),
-    ("counter_length", "u1"),
-    ("counter_big_endian", "u1"),
-]
-
-
-class Protection(NamedTuple):
-    """How a message is protected."""
-
-    rule: int = e2e.NO_CHECKSUM
-    data_id: int = 0
-    counter: Any = None
-    """The cantools signal that counts frames, None: there is none."""
-    modulo: int = 0
-
-
-UNPROTECTED: Final = Protection()
-
-
-def contract_protection(message: Message) -> Protection:
-    """Return the protection of a message of the contract."""
-    data_id = attribute(message, "E2EDataId")
-    if not data_id:
-        return UNPROTECTED
-    counter = message.get_signal_by_name("alive_counter")
-    return Protection(e2e.AUTOSAR_P01, data_id, counter, e2e.P01_MODULO)
-
-
-def set_protection(row: np.void, protection: Protection) -> None:
-    """Write the fields of `PROTECTION` of a message's row."""
-    row["rule"], row["data_id"], row["modulo"] = protection.rule, protection.data_id, protection.modulo
-    counter = protection.counter
-    if counter is not None:
-        row["counter_big_endian"] = counter.byte_order == "big_endian"
-        row["counter_start"] = bits.first_bit(counter.start, counter.byte_order == "big_endian")
-        row["counter_length"] = counter.length
 
 
 def identifier(message: Message) -> int:
@@ -239,13 +197,6 @@ def compile_message(message: Message) -> MessagePlan:
         if selector is not None:
             signals[place]["selector"] = names.index(selector)
     return MessagePlan(signals, np.array(rows.codes, np.int64), names, message.length)
-
-
-@kernel
-def frame_count(message: Record, data: NDArray[np.uint8]) -> Any:
-    """Return the frame counter of a payload as int64; `message` has the fields of `PROTECTION`."""
-    start, length, big_endian = message.counter_start, message.counter_length, message.counter_big_endian
-    return np.int64(bits.extract(data, start, length, big_endian))
 
 
 @kernel

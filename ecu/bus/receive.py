@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from ecu.bus import e2e, link, sequence
 from ecu.bus.freshness import NEVER, accept
-from ecu.bus.plan import frame_count, is_present, is_valid, raw_code, signed_value
+from ecu.bus.plan import is_present, is_valid, raw_code, signed_value
+from ecu.bus.protection import frame_count
 from ecu.bus.receive_plan import ReceivePlan
 from ecu.bus.request import (
     FIRST,

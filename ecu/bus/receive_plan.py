@@ -14,18 +14,8 @@ from numpy.typing import NDArray
 
 from ecu.bus.database import attribute, load_database
 from ecu.bus.freshness import input_freshness, new_freshness
-from ecu.bus.plan import (
-    PROTECTION,
-    SIGNAL,
-    UNPROTECTED,
-    Protection,
-    SignalUse,
-    compile_signals,
-    contract_protection,
-    identifier,
-    set_protection,
-    uses_in,
-)
+from ecu.bus.plan import SIGNAL, SignalUse, compile_signals, identifier, uses_in
+from ecu.bus.protection import PROTECTION, UNPROTECTED, Protection, contract_protection, set_protection
 from ecu.bus.request import FIRST, LAST
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import INPUT, INPUT_SIGNALS, N_INPUTS, N_OUTPUTS, OUTPUT

@@ -15,7 +15,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ecu.bus import e2e
 from ecu.bus.database import find_message, find_signal, read_database
 from ecu.bus.freshness import input_freshness
-from ecu.bus.plan import Protection, SignalUse
+from ecu.bus.plan import SignalUse
+from ecu.bus.protection import Protection
 from ecu.bus.receive_plan import MessageUse, ReceivePlan, compile_receive, contract_receive_plan
 from ecu.bus.units import conversion
 from ecu.contract.signals import INPUT, INPUT_SIGNALS

@@ -8,20 +8,16 @@ import numpy as np
 from cantools.database import Message
 from numpy.typing import NDArray
 
-from ecu.bus import bits
 from ecu.bus.database import LONGEST_PAYLOAD, attribute, load_database
 from ecu.bus.e2e import NO_CHECKSUM, protect
-from ecu.bus.plan import (
+from ecu.bus.plan import SIGNAL, compile_signals, encode_signal, identifier, uses_in
+from ecu.bus.protection import (
     PROTECTION,
-    SIGNAL,
     UNPROTECTED,
     Protection,
-    compile_signals,
     contract_protection,
-    encode_signal,
-    identifier,
     set_protection,
-    uses_in,
+    write_count,
 )
 from ecu.contract.records import EXTENDED_ID, FRAME, FRAME_EXTENDED, FRAME_FD, RecordArray
 from ecu.contract.signals import CYCLE_NS, INPUT, OUTPUT
@@ -175,20 +171,12 @@ def transmit(
             signal = plan.signals[row]
             valid = signal.validity < 0 or values[signal.validity] == 1.0
             encode_signal(signal, frame.data, values[signal.place] if valid else np.nan)
-        _protect(message, transmission, place, frame)
+        if message.modulo > 0:
+            write_count(message, frame.data, transmission.counter[place])
+            transmission.counter[place] = (transmission.counter[place] + 1) % message.modulo
+        if message.rule != NO_CHECKSUM:
+            can_id: Any = np.int64(frame.can_id)
+            protect(message.rule, frame.data, frame.length, can_id, message.data_id)
         transmission.sent[place] += 1
         count += 1
     return count
-
-
-@kernel
-def _protect(message: Record, transmission: Transmission, place: int, frame: Record) -> None:
-    """Write counter and checksum of a frame of the message at `place`."""
-    if message.modulo > 0:
-        start, length, big_endian = message.counter_start, message.counter_length, message.counter_big_endian
-        counter = transmission.counter[place]
-        bits.insert(frame.data, start, length, big_endian, np.uint64(counter))
-        transmission.counter[place] = (counter + 1) % message.modulo
-    if message.rule != NO_CHECKSUM:
-        can_id: Any = np.int64(frame.can_id)
-        protect(message.rule, frame.data, frame.length, can_id, message.data_id)

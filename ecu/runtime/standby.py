@@ -24,7 +24,7 @@ import structlog
 from numpy.typing import NDArray
 
 from ecu.bus.foreign import another_ecu_speaks, is_intact, place_of_ours
-from ecu.bus.plan import frame_count
+from ecu.bus.protection import frame_count
 from ecu.bus.transmit import Transmission, TransmitPlan
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CYCLE_NS
