@@ -1,15 +1,28 @@
-"""The reference of configurations, maps and scenarios is that of the models; every key is described."""
+"""The reference of configurations, maps, scenarios and frames is that of the code; every key is described."""
 
 import re
+import runpy
 import tomllib
 from pathlib import Path
 
 import pytest
 
 import write_reference as reference
+from contract_page import EXAMPLE, contract_text
 
 ROOT = Path(__file__).parent.parent
-OF_THE_SIGNAL = {"noise", "resolution", "scale", "bias", "drift", "floor", "offset", "sentinels", "amount"}
+OF_THE_SIGNAL = {
+    "noise",
+    "resolution",
+    "scale",
+    "bias",
+    "drift",
+    "floor",
+    "offset",
+    "sentinels",
+    "amount",
+    "invalid",
+}
 """In the unit of a signal that the file names."""
 SAID = {"delay", "drift_time", "dropout", "dropout_length", "period", "stuck_from", "lost_from"} | {
     *("drag_torque", "drag_growth", "lowest_speed", "ratios", "share_front", "rate", "limit")
@@ -65,3 +78,19 @@ def test_a_row_of_the_reference_says_what_the_model_does() -> None:
     assert "## `[front]`, `[rear]`" in page
     scenarios = reference.page_text("reference-scenarios.md")
     assert "| `until_speed` | m/s | ≥ 0 |  | The phase ends when the speed passes it. |" in scenarios
+
+
+def test_the_contract_is_that_of_database_and_code() -> None:
+    page = (reference.DOCS / "contract.md").read_text("utf-8")
+    assert page == contract_text(), "run python tools/write_reference.py"
+
+
+def test_the_worked_example_of_the_checksum_is_right() -> None:
+    page = contract_text()
+    found = re.search(r"`(crc\(.+?\))` gives byte 0\s+as (0x\w\w)\.", page)
+    assert found
+    example = runpy.run_path(str(EXAMPLE))
+    assert eval(found[1], example) == int(found[2], 16) == 0xCC
+    code = re.search(r"```python\n(.+?)```", page, re.S)
+    assert code
+    assert code[1].strip() in EXAMPLE.read_text("utf-8")

@@ -2,7 +2,7 @@
 
     python tools/write_reference.py
 
-writes docs/reference-*.md: for each table its keys with unit, range, default and meaning.
+writes docs/reference-*.md, with unit, range, default and meaning of each key, and docs/contract.md.
 """
 
 import math
@@ -13,6 +13,7 @@ from pydantic import BaseModel
 
 from brakelab.logs.column_map import ColumnMap
 from brakelab.simulation.scenario import Scenario
+from contract_page import contract_text
 from ecu.bus.signal_map import SignalMap
 from ecu.contract.signals import INPUT_SIGNALS, without_corner
 from ecu.settings.schema import config_schema
@@ -203,3 +204,5 @@ if __name__ == "__main__":
     for name in PAGES:
         (DOCS / name).write_text(page_text(name), "utf-8")
         print(DOCS / name)
+    (DOCS / "contract.md").write_text(contract_text(), "utf-8")
+    print(DOCS / "contract.md")
