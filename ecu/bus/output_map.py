@@ -45,6 +45,8 @@ SLOWEST_DEMAND_S: Final = 0.1
 FD_LENGTHS: Final = (12, 16, 20, 24, 32, 48, 64)
 LAST_STANDARD: Final = 0x7FF
 
+_BEYOND: Final = 2.0**64
+"""Greater than any raw code."""
 _UNITS: Final = {column: one.unit for one in OUTPUT_SIGNALS for column in column_names(one)}
 _ALWAYS_KNOWN: Final = {
     *("mode", "active_faults", "active_faults_2", "overruns", "worst_lateness_us", "braking"),
@@ -186,11 +188,16 @@ def _rows(
     return [value, row]
 
 
+def _codes(signal: Any) -> tuple[int, int]:
+    """Return the least and the greatest raw code of an integer signal."""
+    if signal.is_signed:
+        return -(1 << (signal.length - 1)), (1 << (signal.length - 1)) - 1
+    return 0, (1 << signal.length) - 1
+
+
 def _raw(path: Path, key: str, signal: Any, code: int) -> int:
     """Return the bits of a raw code; raises UserError for one that the signal cannot hold."""
-    low, high = 0, (1 << signal.length) - 1
-    if signal.is_signed:
-        low, high = -(1 << (signal.length - 1)), high >> 1
+    low, high = _codes(signal)
     if signal.is_float or not low <= code <= high:
         kind = "a float, it has no codes" if signal.is_float else f"{low} to {high}"
         raise UserError(str(path), key, f"{signal.name} cannot be {code}; its codes: {kind}")
@@ -202,9 +209,13 @@ def _set_invalid(path: Path, key: str, signal: Any, row: RecordArray, value: flo
     scaled = (value - signal.offset) / signal.scale
     if signal.is_float:
         kind: Any = np.float32 if int(row["kind"][0]) == FLOAT32 else np.float64
+        if abs(scaled) > np.finfo(kind).max:
+            raise UserError(
+                str(path), f"{key}.invalid", f"{signal.name} cannot be {value:g}; give another value"
+            )
         row["not_available"] = kind(scaled).view(f"u{signal.length // 8}")
         return
-    code = round(scaled)
+    code = round(min(max(scaled, -_BEYOND), _BEYOND))
     if abs(scaled - code) > 1e-6 * max(1.0, abs(scaled)):
         remedy = f"{signal.name} has steps of {signal.scale:g}; give {code * signal.scale + signal.offset:g}"
         raise UserError(str(path), f"{key}.invalid", remedy)
@@ -291,5 +302,6 @@ def _payload(
 
 def _unused(signal: Any) -> float:
     """Return the raw code of a signal that the map does not name."""
+    low, high = _codes(signal)
     codes = (signal.raw_initial, not_available_code(signal))
-    return next((code for code in codes if code is not None), 0)
+    return next((code for code in codes if code is not None and (signal.is_float or low <= code <= high)), 0)

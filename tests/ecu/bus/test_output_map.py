@@ -299,6 +299,12 @@ def test_a_multiplexed_signal_leaves_where_a_constant_selects_it(tmp_path: Path)
     assert decoded(plan, pressure_demand_fl=12.3, **EVERY) == {"kind": 2, "two": pytest.approx(12.3)}
 
 
+def test_an_initial_value_that_cannot_be_is_none(tmp_path: Path) -> None:
+    database = DATABASE.replace("SG_ 273 spare 9", "SG_ 273 spare 16")
+    found = decoded(planned(write(tmp_path, database=database)), database)
+    assert found["spare"] == 0
+
+
 def test_messages_of_one_period_leave_in_turn_and_the_slowest_demand_is_known(tmp_path: Path) -> None:
     plan = mapped(
         tmp_path,
@@ -370,6 +376,16 @@ MISTAKES = {
         RIGHT,
         'signal = "p_r", invalid = -110',
         "fr.invalid: p_r cannot be -1; its codes: 0 to",
+    ),
+    "invalid beyond any bits": (
+        RIGHT,
+        'signal = "p_r", invalid = 1e308',
+        "fr.invalid: p_r has steps of 10; give",
+    ),
+    "invalid beyond any float": (
+        f'"Brake", {RIGHT}',
+        '"Torque", signal = "t_fl", unit = "bar", invalid = 1e308',
+        "fr.invalid: t_fl cannot be 1e+308; give another value",
     ),
     "code beyond its bits": (
         "valid = 1,",
