@@ -26,6 +26,7 @@ from brakelab.logs.log_quality import LogQuality, SignalQuality
 from brakelab.logs.signal_file import read_signals
 from ecu.algorithm.step import INITIAL, new_state
 from ecu.bus.database import load_database
+from ecu.bus.output_map import transmit_plan
 from ecu.bus.signal_map import receive_plan
 from ecu.errors import RunFault, UserError
 from ecu.recording.learned_range import out_of_range
@@ -158,6 +159,11 @@ def _make(kind: str, folder: Path, head: Path) -> Path:
     if kind == ".parquet":
         pq.write_table(table, folder / "drive.parquet", compression="zstd", row_group_size=100)
         return folder / "drive.parquet"
+    if kind == "outputs":
+        path = folder / "outputs.toml"
+        shipped_map = (ROOT / "config" / "maps" / "mustang.toml").read_text()
+        path.write_text(f'output_database = "../../dbc/brake_ecu.dbc"\n{shipped_map}{OUTPUTS}')
+        return path
     shipped = {"config": "config/suv.toml", "map": "config/maps/mustang.toml", "dbc": "dbc/brake_ecu.dbc"}
     if kind in shipped:
         return ROOT / shipped[kind]
@@ -184,6 +190,24 @@ def _ring(folder: Path, head: Path) -> Path:
     return folder / "ring"
 
 
+OUTPUTS = """
+[messages.PressureDemandFront]
+period = 0.02
+checksum = "autosar_p01"
+data_id = 0x5A01
+counter = { signal = "alive_counter" }
+constants = { pressure_demand_fr = 7 }
+[outputs.pressure_demand_fl]
+message = "PressureDemandFront"
+signal = "pressure_demand_fl"
+unit = "bar"
+factor = 0.5
+offset = 0.1
+invalid = 65.535
+validity = { signal = "pressure_demand_valid", valid = 1, invalid = 0 }
+"""
+
+
 READERS: dict[str, Callable[[Path], Any]] = {
     ".log": read_log,
     ".asc": read_log,
@@ -196,12 +220,13 @@ READERS: dict[str, Callable[[Path], Any]] = {
     ".parquet": read_signal_file,
     "config": read_config,
     "map": receive_plan,
+    "outputs": lambda path: transmit_plan(path, receive_plan(path)),
     "dbc": load_database,
     "store": read_store,
     "recording": read_folder,
     "ring": read_ring,
 }
-SLOW = {".mf4": 4, "dbc": 4, "map": 4}
+SLOW = {".mf4": 4, "dbc": 4, "map": 4, "outputs": 4}
 """By how much fewer cases."""
 
 
@@ -212,7 +237,7 @@ def test_a_damaged_file_gives_a_result_or_one_line(
     kind: str, whole: Callable[[str], tuple[str, bytes]], tmp_path: Path
 ) -> None:
     name, content = whole(kind)
-    if kind == "map":
+    if kind in ("map", "outputs"):
         shutil.copytree(ROOT / "dbc", tmp_path / "dbc")
     path = tmp_path / "of" / "kind" / name
     path.parent.mkdir(parents=True)

@@ -163,7 +163,9 @@ def _rows(
     value["offset"] = (signal.offset - mapped.offset) * inverse + offset
     gate = DEMANDS.get(without_corner(name), "")
     unknown = gate or (
-        name not in _ALWAYS_KNOWN and not_available_code(signal) is None and not signal.is_float
+        without_corner(name) not in _ALWAYS_KNOWN
+        and not_available_code(signal) is None
+        and not signal.is_float
     )
     if unknown and mapped.validity is None and mapped.invalid is None:
         remedy = (
@@ -209,7 +211,7 @@ def _set_invalid(path: Path, key: str, signal: Any, row: RecordArray, value: flo
     scaled = (value - signal.offset) / signal.scale
     if signal.is_float:
         kind: Any = np.float32 if int(row["kind"][0]) == FLOAT32 else np.float64
-        if abs(scaled) > np.finfo(kind).max:
+        if abs(scaled) > float(np.finfo(kind).max):
             raise UserError(
                 str(path), f"{key}.invalid", f"{signal.name} cannot be {value:g}; give another value"
             )

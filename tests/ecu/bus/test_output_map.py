@@ -507,3 +507,9 @@ def test_a_mistake_gives_one_line_with_the_key(tmp_path: Path, mistake: str) -> 
     with pytest.raises(UserError, match=re.escape(line)) as refusal:
         planned(write(tmp_path, text))
     assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("car", ["mustang", "rav4", "kona"])
+def test_own_frames_fit_beside_the_shipped_cars(root: Path, car: str, contract: Path) -> None:
+    plan = planned(root / "config" / "maps" / f"{car}.toml")
+    assert plan.ids.tolist() == contract_transmit_plan(contract, "BrakeEcu").ids.tolist()
