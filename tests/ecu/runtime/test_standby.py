@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from ecu.bus.e2e import P01_MODULO
+from ecu.bus.output_map import transmit_plan
 from ecu.bus.protocol import BusStatus
 from ecu.bus.receive_plan import contract_receive_plan
+from ecu.bus.signal_map import receive_plan
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
 from ecu.contract.faults import FOREIGN_SENDER
 from ecu.contract.records import CYCLE, FRAME, INPUT_WATCH, LEARNED, OUTPUTS, new_record
@@ -306,3 +308,28 @@ def test_before_its_first_cycle_a_ring_tells_nothing(first_ring):
     ring = first_ring(0.4, cycles=0)
     assert RingReader(ring.path).latest("learned") is None
     assert learned_by_first(DESCRIPTION, NOMINAL) is None
+
+
+def test_a_standby_counts_on_in_the_messages_of_a_map(tmp_path):
+    (tmp_path / "car.dbc").write_text(
+        'VERSION ""\nBU_: A\nBO_ 10 Wheels: 8 A\n SG_ v : 0|16@1+ (1,0) [0|0] "rad/s" A\n'
+        'BO_ 20 Front: 8 A\n SG_ p : 0|16@1+ (1,0) [0|0] "bar" A\n SG_ n : 23|3@0+ (1,0) [0|0] "" A\n'
+        'BO_ 21 Rear: 8 A\n SG_ p : 0|16@1+ (1,0) [0|0] "bar" A\n'
+    )
+    (tmp_path / "car.toml").write_text(
+        'database = "car.dbc"\n[messages]\nWheels = { period = 0.01 }\n'
+        'Front = { period = 0.01, checksum = "toyota", counter = { signal = "n", modulo = 7 } }\n'
+        'Rear = { period = 0.01, checksum = "hyundai_sum" }\n'
+        '[inputs]\nwheel_speed_fl = { message = "Wheels", signal = "v" }\n'
+        '[outputs]\npressure_demand_fl = { message = "Front", signal = "p", invalid = 0 }\n'
+        'pressure_demand_rl = { message = "Rear", signal = "p", invalid = 0 }\n'
+    )
+    plan = transmit_plan(tmp_path / "car.toml", receive_plan(tmp_path / "car.toml"))
+    first, second, standby = new_transmission(plan), new_transmission(plan), Standby()
+    frames = frame_buffer(plan)
+    for cycle in range(20):
+        count = transmit(plan, first, np.zeros(N_OUTPUTS), cycle, frames)
+        standby.listen(plan, second, frames, count, cycle * CYCLE_NS)
+        assert second.counter.tolist() == first.counter.tolist() == [(cycle + 1) % 7, 0]
+    standby.listen(plan, second, frames, 0, 20 * CYCLE_NS + SILENCE_NS)
+    assert standby.speaks
