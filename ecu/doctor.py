@@ -18,7 +18,7 @@ from ecu import jit
 from ecu.bus.channel import open_channel
 from ecu.bus.freshness import NEVER, begin_cycle
 from ecu.bus.load import received_load, sent_load
-from ecu.bus.output_map import transmit_plan
+from ecu.bus.output_map import refuse_fd, transmit_plan
 from ecu.bus.protocol import Channel
 from ecu.bus.receive import Reception, new_reception, receive
 from ecu.bus.receive_plan import ReceivePlan
@@ -74,6 +74,8 @@ def doctor(config: Path | None, map: Path | None, interface: str | None, channel
         raise UserError("doctor", "-i, -c", "give both or none")
     plan = receive_plan(map, say)
     sending = transmit_plan(map, plan)
+    if config is not None:
+        refuse_fd(sending, load_config(config).can_fd, config)
     with compiling_told():
         checks = [*machine(), kernels(config, plan, sending), bus_load(interface, channel, plan, sending)]
     if interface is not None and channel is not None:

@@ -34,7 +34,7 @@ from ecu.bus.transmit import (
     contract_messages,
 )
 from ecu.bus.units import conversion
-from ecu.contract.records import EXTENDED_ID, RecordArray
+from ecu.contract.records import EXTENDED_ID, FRAME_FD, RecordArray
 from ecu.contract.signals import CYCLE_NS, DEMANDS, OUTPUT, OUTPUT_SIGNALS, column_names, without_corner
 from ecu.errors import UserError, closest
 from ecu.settings.resources import resource
@@ -71,6 +71,13 @@ def transmit_plan(map_file: Path | None, receiving: ReceivePlan) -> TransmitPlan
     plan = compile_transmit(sent)
     _refuse_shared(map_file, plan, receiving)
     return plan
+
+
+def refuse_fd(plan: TransmitPlan, can_fd: bool, config: Path) -> None:
+    """Raise UserError for CAN FD frames on a bus that `config` opens as a classical one."""
+    names = plan.messages["name"][plan.messages["flags"] & FRAME_FD != 0]
+    if len(names) and not can_fd:
+        raise UserError(str(config), "can_fd", f"{names[0]} of the map is a CAN FD frame; set it to true")
 
 
 def _refuse_shared(path: Path, plan: TransmitPlan, receiving: ReceivePlan) -> None:

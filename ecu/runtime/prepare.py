@@ -21,12 +21,12 @@ from ecu.algorithm.step import INITIAL, initial_part
 from ecu.bus.channel import open_channel
 from ecu.bus.e2e import NO_CHECKSUM
 from ecu.bus.foreign import KNOWN_BY, discard, listen_before_send
-from ecu.bus.output_map import transmit_plan
+from ecu.bus.output_map import refuse_fd, transmit_plan
 from ecu.bus.protocol import Channel
 from ecu.bus.receive_plan import messages_by_contract
 from ecu.bus.signal_map import receive_plan
 from ecu.bus.transmit import TransmitPlan, compile_transmit
-from ecu.contract.records import FRAME_FD, RecordArray
+from ecu.contract.records import RecordArray
 from ecu.contract.signals import CYCLE_NS, INPUT_SIGNALS, OUTPUT_SIGNALS
 from ecu.errors import UserError
 from ecu.jit import CompileCounter, compiler_version
@@ -191,11 +191,7 @@ def prepare(options: RunOptions) -> Session:
 
 def _check_sending(options: RunOptions, config: Config, sending: TransmitPlan) -> None:
     """Raise UserError for a map's messages that this run cannot send."""
-    fd = sending.messages["name"][sending.messages["flags"] & FRAME_FD != 0]
-    if len(fd) and not config.can_fd:
-        raise UserError(
-            str(options.config), "can_fd", f"{fd[0]} of the map is a CAN FD frame; set it to true"
-        )
+    refuse_fd(sending, config.can_fd, options.config)
     if options.standby and np.count_nonzero(sending.messages["rule"] != NO_CHECKSUM) < KNOWN_BY:
         remedy = (
             f"knows the first one by {KNOWN_BY} messages with a checksum; set own_frames = true in the map"

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from ecu.bus.output_map import transmit_plan
+from ecu.bus.output_map import refuse_fd, transmit_plan
 from ecu.bus.signal_map import receive_plan
 from ecu.bus.transmit import (
     TransmitPlan,
@@ -236,6 +236,9 @@ motor_demand_fr = { message = "Torque", signal = "t_fr", invalid = -5.5 }
 decel_demand_total = { message = "Torque", signal = "decel", factor = -1, invalid = 0 }""",
     )
     assert plan.ids.tolist() == [EXTENDED_ID | 0x18FEF1FE]
+    refuse_fd(plan, True, Path("car.toml"))
+    with pytest.raises(UserError, match=r"car.toml: can_fd: Torque of the map is a CAN FD frame; set it"):
+        refuse_fd(plan, False, Path("car.toml"))
     given = {"torque_demand_fl": 1234.5, "motor_demand_fr": -800.25, "decel_demand_total": 3.214, **EVERY}
     [(can_id, flags, payload)] = sent(plan, **given)
     assert (can_id, flags, len(payload)) == (0x18FEF1FE, FRAME_EXTENDED | FRAME_FD, 16)
