@@ -8,6 +8,7 @@ text, and llvmlite.
 """
 
 import argparse
+import hashlib
 import importlib
 import json
 import os
@@ -25,7 +26,7 @@ from ecu import jit
 from ecu.building.calls import Seen, watch
 from ecu.building.machine_code import link, link_shared, machine_code, returned_spec, translate
 from ecu.errors import UserError
-from ecu.library import BASELINE, FOLDER, MANIFEST, V3, file_name, has_v3
+from ecu.library import BASELINE, FOLDER, MANIFEST, V3, has_v3
 
 MACHINERY: Final = {"ecu.errors", "ecu.interpreted", "ecu.jit", "ecu.library"}
 """Modules whose texts are in no kernel: they call them."""
@@ -78,34 +79,41 @@ def build(package: str, load_workload: Callable[[], Callable[[], None]], wanted:
     for symbol, (call, _, returned) in zip(symbols, kept, strict=True):
         row = {"symbol": symbol, "arguments": call.specs, "returns": returned}
         kernels.setdefault(call.kernel.name, []).append(row)
-    root = Path(importlib.import_module(package).__file__ or "").parent
-    folder = root / FOLDER
+    codes = {processor: machine_code(whole, processor) for processor in wanted}
+    folder = Path(importlib.import_module(package).__file__ or "").parent / FOLDER
     folder.mkdir(exist_ok=True)
-    (folder / MANIFEST).unlink(missing_ok=True)
-    for processor in wanted:
-        link_shared(machine_code(whole, processor), folder / file_name(processor))
-    _write_manifest(package, folder, kernels, wanted)
+    _write(package, folder, kernels, codes)
     print(f"{folder}: {', '.join(wanted)}, after {time.monotonic() - began:.0f} s", flush=True)
 
 
-def _write_manifest(
-    package: str, folder: Path, kernels: dict[str, list[dict[str, Any]]], wanted: list[str]
+def _write(
+    package: str, folder: Path, kernels: dict[str, list[dict[str, Any]]], codes: dict[str, bytes]
 ) -> None:
+    """Write the files of a library and put its manifest in place of the last; who runs that one keeps it."""
     needs = {
         module: [name for name in jit.sources_of_kernels(module) if name not in MACHINERY]
         for module in sorted(Seen.modules)
         if module.partition(".")[0] == package
     }
-    sources = {name: jit.text_digest(name) for name in sorted(set().union(*needs.values()))}
+    files = {
+        processor: f"{processor}-{hashlib.sha256(code).hexdigest()[:16]}.so"
+        for processor, code in codes.items()
+    }
+    for processor, name in files.items():
+        link_shared(codes[processor], folder / name)
     manifest = {
         "numba": numba.__version__,
-        "processors": wanted,
-        "sources": sources,
+        "processors": files,
+        "sources": {name: jit.text_digest(name) for name in sorted(set().union(*needs.values()))},
         "modules": needs,
         "kernels": kernels,
     }
-    text = json.dumps(manifest, separators=(",", ":"))
-    (folder / MANIFEST).write_text(text, "utf-8")
+    part = folder / f"{MANIFEST}.part"
+    part.write_text(json.dumps(manifest, separators=(",", ":")), "utf-8")
+    part.replace(folder / MANIFEST)
+    for path in folder.glob("*.so"):
+        if path.name not in files.values():
+            path.unlink()
 
 
 def make(package: str, load_workload: Callable[[], Callable[[], None]], everything: bool) -> int:

@@ -4,8 +4,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from ecu.jit import after_all, before_compiling
+from ecu.jit import after_all, before_compiling, library, library_of
 from ecu.output import detail, say
+
+
+def _reason() -> str:
+    if library("ecu") is not None and library_of("ecu.algorithm.step") is None:
+        return "compiling kernels, whose library is of another text (python -m brakelab.build makes it anew)"
+    return "compiling kernels that are not in the cache yet"
 
 
 @contextmanager
@@ -16,7 +22,7 @@ def compiling_told() -> Iterator[None]:
     def begins(dispatcher: Any) -> None:
         nonlocal told
         if not told:
-            say("compiling kernels that are not in the cache yet: once per version, minutes at most")
+            say(f"{_reason()}: once per version, minutes at most")
         told = True
         function = dispatcher.py_func
         if not function.__module__.startswith("numba."):

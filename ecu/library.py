@@ -1,6 +1,6 @@
 """Kernels of a compiled library, called without numba: `ecu/build.py` makes it, `ecu/jit.py` asks for it.
 
-A library stands beside its package in `compiled/`, one file for each kind of processor, with a manifest: the
+A library stands beside its package in `compiled/`, a file for each kind of processor, with a manifest: the
 texts that its kernels were made from, and for each kernel the arguments that it was compiled for. A kernel is
 taken from it where every one of those texts is unchanged. An entry reads its arguments from a block of
 8-byte places and writes what it returns behind them:
@@ -45,11 +45,6 @@ def has_v3() -> bool:
         return False
     flags = set(next((line for line in text.splitlines() if line.startswith("flags")), "").split())
     return {"avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe"} <= flags
-
-
-def file_name(processor: str) -> str:
-    """Return the file of a library for a processor."""
-    return f"kernels-{processor}.so"
 
 
 _LAYOUTS: dict[int, tuple[np.dtype[Any], str]] = {}
@@ -255,7 +250,7 @@ class Library:
         self.processor = next((name for name in wanted if name in known), "")
         if not self.processor:
             raise ValueError(f"{folder}: nothing for {platform.machine()}")
-        self._file = ctypes.PyDLL(str(folder / file_name(self.processor)))
+        self._file = ctypes.PyDLL(str(folder / known[self.processor]))
         self._kernels: dict[str, list[dict[str, Any]]] = self.manifest["kernels"]
         self._sources: dict[str, str] = self.manifest["sources"]
         self._needs: dict[str, list[str]] = self.manifest["modules"]

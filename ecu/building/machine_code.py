@@ -208,4 +208,6 @@ def link_shared(code: bytes, file: Path) -> None:
         except (OSError, subprocess.CalledProcessError) as error:
             words = (getattr(error, "stderr", "") or str(error)).splitlines()[-1][:300]
             raise UserError(command[0], "", f"{words}; install a C compiler, or set CC to one") from None
-        file.write_bytes(shared.read_bytes())
+        part = file.with_suffix(".part")
+        part.write_bytes(shared.read_bytes())
+        part.replace(file)
