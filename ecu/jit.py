@@ -251,7 +251,7 @@ def library(package: str) -> Library | None:
         return None
     spec = find_spec(package)
     for root in (spec.submodule_search_locations or []) if spec else []:
-        with suppress(OSError, ValueError, KeyError):
+        with suppress(OSError, ValueError, KeyError, TypeError):  # none, of an earlier form, or damaged
             return Library(package, Path(root) / FOLDER)
     return None
 
