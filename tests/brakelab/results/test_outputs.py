@@ -17,6 +17,8 @@ OVERWRITING = {
     "identify thermal drive.csv --config car.toml --out base.toml": "base.toml",
     "identify wear blocks.svg --config base.toml --out blocks.toml": "blocks.svg",
     "identify wear blocks.csv --config car.toml --out base.toml": "base.toml",
+    "identify wear rig.csv --config base.toml --out block.toml": "block.svg",
+    "identify dust rig.csv --config base.toml --out trip.toml": "trip.md",
     "identify dust trips.md --config base.toml --out trips.toml": "trips.md",
     "identify dust trips.csv --config linked.toml --out base.toml": "linked.toml",
     "identify friction brake.csv --out brake.toml": "brake.toml",
@@ -27,6 +29,16 @@ OVERWRITING = {
     "map suggest drive.csv --config car.toml --out base.toml": "base.toml",
     "replay drive.brakes.parquet --config base.toml --out drive.parquet": "drive.brakes.parquet",
     "fleet fleet.csv --config base.toml --out .": "drives.parquet",
+}
+NOT_ITS_OWN = {
+    # command line: file of somebody that stands where a new output would have its neighbour
+    "lab run ams --brake A --out own.csv": "own.toml",
+    "identify wear rig.csv --config base.toml --out own.toml": "own.svg",
+    "identify dust rig.csv --config base.toml --out own.toml": "own.md",
+    "identify thermal drive.csv --config base.toml --out own.toml": "own.svg",
+    "identify friction brake.csv --out own.toml": "own.html",
+    "simulate stop-4 --config base.toml --out own": "own.truth.parquet",
+    "replay drive.csv --config base.toml --out own.parquet": "own.brakes.parquet",
 }
 NO_TOML = (
     "identify vehicle drive.csv --config base.toml --out car.txt",
@@ -42,13 +54,18 @@ NO_TOML = (
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
-    names = " ".join([*OVERWRITING, *NO_TOML]).split()
+    names = " ".join([*OVERWRITING, *NOT_ITS_OWN, *NO_TOML]).split()
     for name in {name for name in names if "." in name[1:]} - {"car.txt"} | {"drives.parquet"}:
         (tmp_path / name).write_text(name)
     shutil.copy(resource("config/suv.toml"), tmp_path / "base.toml")
     (tmp_path / "car.toml").write_text('include = "base.toml"\n')
     (tmp_path / "linked.toml").unlink()
     (tmp_path / "linked.toml").symlink_to("base.toml")
+    (tmp_path / "rig.csv").write_text("block,trip,file\n1,1,block.svg\n2,2,trip.md\n")
+    for name in ("block.svg", "trip.md"):
+        (tmp_path / name).write_text(name)
+    for name in ("block.toml", "trip.toml", "own.csv", "own.toml", "own.parquet"):
+        (tmp_path / name).unlink()
     (tmp_path / "fleet.csv").write_text("vehicle,log\none,drives.parquet\n")
     return tmp_path
 
@@ -64,6 +81,17 @@ def test_an_output_or_its_neighbour_is_no_input(
         rf"--out: .*: would overwrite (/.*/)?{OVERWRITING[line]}, which this command reads", said
     )
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+@pytest.mark.parametrize("line", NOT_ITS_OWN)
+def test_a_new_output_takes_the_place_of_nobodys_file(
+    line: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    theirs = folder / NOT_ITS_OWN[line]
+    theirs.write_text("theirs")
+    assert cli.main(line.split()) == 2
+    assert f"would overwrite {theirs.name}, which was not written with it" in capsys.readouterr().err
+    assert theirs.read_text() == "theirs"
 
 
 @pytest.mark.parametrize("line", NO_TOML)

@@ -31,6 +31,15 @@ def read_manifest(path: Path) -> list[dict[str, str]]:
         raise UserError(str(path), "", f"cannot be read: {error}; give a CSV manifest") from None
 
 
+def measured_files(manifest: Path) -> list[Path]:
+    """Return the manifest and the files that its rows name, which exist or not.
+
+    Raises:
+        UserError: it cannot be read.
+    """
+    return [manifest, *(manifest.parent / row["file"] for row in read_manifest(manifest) if row.get("file"))]
+
+
 def read_columns(path: Path, names: tuple[str, ...], what: str) -> dict[str, Array]:
     """Return columns of a CSV, Parquet or MDF4 file, each of shape (n,); NaN where a row has no value.
 

@@ -31,7 +31,7 @@ from brakelab.results.car import KEY as CAR
 from brakelab.results.car import car_of
 from brakelab.results.console import new_console
 from brakelab.results.files import EXPORTS, ResultWriter, brakes_path
-from brakelab.results.outputs import check_outputs
+from brakelab.results.outputs import check_outputs, config_files
 from brakelab.results.pads import pads_of
 from brakelab.results.prediction import SHORT
 from brakelab.results.progress import progress_bar
@@ -117,7 +117,11 @@ def replay_into(
     """
     vehicle = with_observer(load_config(config), observer)
     _check(logs, out, cycles)
-    check_outputs(out, (out, brakes_path(out)), [*logs, config, *([map] if map else [])])
+    check_outputs(
+        out,
+        (out, brakes_path(out)),
+        [*logs, *config_files(config), *([map] if map else []), *([cycles] if cycles else [])],
+    )
     source = load_source(map)
     detail(f"{vehicle.name}, {vehicle.observer.kind}, {map or 'the database of the ECU'}")
     notes = [source.left_out] if source.left_out else []

@@ -1,4 +1,7 @@
-"""Output files of a command: none may be a folder, or one of its inputs; TOML has its ending."""
+"""Output files of a command: none may be a folder, one of its inputs, or somebody else's; TOML has its ending.
+
+A command may renew what it wrote. What stands beside its first output is its own only if that one is there.
+"""
 
 import os
 from collections.abc import Sequence
@@ -16,10 +19,11 @@ def config_files(config: Path) -> list[Path]:
 
 
 def check_outputs(out: Path, written: Sequence[Path], read: Sequence[Path], toml: bool = False) -> None:
-    """Refuse an `--out` by which a file of `written` would be a folder or replace one of `read`.
+    """Refuse an `--out` by which a file of `written` would be a folder or replace one that is not its own.
 
-    `toml`: `out` must end in .toml. Raises UserError. Links are followed; files that do not exist yet are
-    compared by their path.
+    Not its own are those of `read`, and whatever stands in the place of a neighbour while `written[0]` is not
+    there yet. `toml`: `out` must end in .toml. Raises UserError. Links are followed; files that do not exist
+    yet are compared by their path.
     """
     if toml and out.suffix != ".toml":
         raise UserError("--out", str(out), "is written as TOML; let the name end in .toml")
@@ -31,6 +35,9 @@ def check_outputs(out: Path, written: Sequence[Path], read: Sequence[Path], toml
             if _same(path, source):
                 remedy = f"would overwrite {source}, which this command reads; choose another name"
                 raise UserError("--out", str(out), remedy)
+    if not written[0].exists() and (strange := [path for path in written if path.exists()]):
+        remedy = f"would overwrite {strange[0]}, which was not written with it; choose another name"
+        raise UserError("--out", str(out), remedy)
 
 
 def write_text(out: Path, text: str) -> None:

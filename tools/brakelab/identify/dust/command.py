@@ -7,6 +7,7 @@ from brakelab.identify.config_file import Section, write_car
 from brakelab.identify.dust.fit import Judged, choose, judge_all, ranges
 from brakelab.identify.dust.page import write_page
 from brakelab.identify.dust.reader import read_trips
+from brakelab.identify.measurement_files import measured_files
 from brakelab.results.outputs import check_outputs, config_files
 from ecu.contract.dust import MODELS
 from ecu.errors import UserError
@@ -46,7 +47,7 @@ def identify_dust(manifest: Path, config: Path, axle: str, out: Path) -> int:
         raise UserError("--axle", axle, "choose front or rear")
     vehicle = load_config(config)
     written = out, page, _ = out, out.with_suffix(".md"), out.with_suffix(".svg")
-    check_outputs(out, written, [manifest, *config_files(config)], toml=True)
+    check_outputs(out, written, [*measured_files(manifest), *config_files(config)], toml=True)
     brake: Axle = getattr(vehicle, axle)
     radius = float(new_params(vehicle)[0]["wheel_radius"][0 if axle == "front" else 2])
     trips = read_trips(manifest, brake.push_out_pressure, radius)

@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 
 from brakelab.identify.config_file import Section, write_car
+from brakelab.identify.measurement_files import measured_files
 from brakelab.identify.wear.curves import SHARE
 from brakelab.identify.wear.fit import QUASI_STATIC, TERMS, UNITS, Fit, fit_law, leave_one_out
 from brakelab.identify.wear.fusion import fuse
@@ -40,7 +41,7 @@ def identify_wear(manifest: Path, config: Path, axle: str, out: Path) -> int:
         raise UserError("--axle", axle, "choose front or rear")
     vehicle = load_config(config)
     written = out, page, _ = out, out.with_suffix(".md"), out.with_suffix(".svg")
-    check_outputs(out, written, [manifest, *config_files(config)], toml=True)
+    check_outputs(out, written, [*measured_files(manifest), *config_files(config)], toml=True)
     brake: Axle = getattr(vehicle, axle)
     cooling = brake.disc_cooling + COOLING_SPEED * brake.disc_cooling_by_speed
     blocks = read_blocks(manifest, brake.pad, Heat(brake.disc_heating, cooling))
