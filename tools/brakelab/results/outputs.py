@@ -1,4 +1,4 @@
-"""Output files of a command: none may be a folder, one of its inputs, or somebody else's; TOML has its ending.
+"""Output files of a command: none may be a folder, an input or somebody else's; TOML has its ending.
 
 A command may renew what it wrote. What stands beside its first output is its own only if that one is there.
 """

@@ -10,9 +10,10 @@ from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.fit import clustered, error_of, fit, replayed
 from brakelab.identify.friction.profile import profile_interval
 from brakelab.identify.friction.recording import Recording
-from brakelab.identify.friction.stops import Stops, find_stops
+from brakelab.identify.friction.stops import Stops, find_stops, some
 from brakelab.plant.friction.constant import Constant
 from brakelab.plant.friction.ostermeyer import Ostermeyer
+from brakelab.plant.friction.table import Table
 from brakelab.plant.linings import Lining, rig_with
 
 TRUTH = {"kappa_0": 0.2687, "kappa_1": 0.3075e-3, "a": 24.1e-9, "b": 2.302e-2, "c": 1.226e-10}
@@ -96,3 +97,44 @@ def test_errors_that_hang_together_widen_the_interval() -> None:
 def test_a_law_that_leaves_the_numbers_costs_but_does_not_stop(stops: Stops, columns: Columns) -> None:
     law = Constant(law="constant", rig_mass=1.0, mu=1e6)
     assert np.isfinite(replayed(law, columns.brake, stops, False)).all()
+
+
+@pytest.mark.parametrize("name", ["ilvo", "ostermeyer", "surface", "table"])
+def test_no_law_is_told_the_measured_torque(
+    name: str, recording: Recording, stops: Stops, columns: Columns
+) -> None:
+    """Slowing follows from the law's own friction (3.22a); the measured one is the measured friction."""
+    candidate = named(name, stops, columns)
+    law = candidate.law([free.value(0.4) for free in candidate.free])
+    other = find_stops(recording._replace(torque=1.2 * recording.torque), columns, "x")
+    assert replayed(law, columns.brake, other, False) == pytest.approx(
+        replayed(law, columns.brake, stops, False)
+    )
+
+
+def test_closed_loop_demands_the_measured_torque(stops: Stops, columns: Columns) -> None:
+    """Friction that falls with pressure as mu = 0.5 - 0.2 p / 200 bar: T = lever mu p is a square of p."""
+    law = Table(
+        law="table", rig_mass=1.0, temperature=(0.0, 500.0), pressure=(0.0, 200.0),
+        mu=((0.5, 0.5), (0.3, 0.3)),
+    )  # fmt: skip
+    last = stops.block_first + stops.per_block - 1
+    torque = np.array([stops.torque[k - stops.per_block + 1 : k + 1].mean() for k in last])
+    per_bar = torque / (1e5 * stops.lever)
+    bars = (0.5 - np.sqrt(0.25 - 4.0 * 0.001 * per_bar)) / 0.002
+    found = replayed(law, columns.brake, stops, False, closed=True)
+    assert found == pytest.approx(0.5 - 0.001 * bars, rel=0.02)
+
+
+def test_where_no_stop_was_a_table_is_the_mean_with_a_wide_band(stops: Stops, columns: Columns) -> None:
+    """No hot stop at high pressure: it used to end at 0.05, the least of the search."""
+    cold = stops.start_temperature < 150.0
+    seen = some(stops, np.flatnonzero(cold | (stops.held_pressure < 20e5)))
+    fitted = fit(named("table", seen, columns), columns.brake, seen)
+    assert isinstance(fitted.law, Table)
+    mean, hot = float(seen.mu.mean()), fitted.law.mu[-1][-1]
+    assert hot == pytest.approx(mean, rel=0.25)
+    name = fitted.candidate.free[-1].name
+    assert fitted.half[-1] > 0.5 * mean
+    assert name in fitted.unidentified()
+    assert fitted.half[0] < 0.2 * mean

@@ -68,3 +68,44 @@ def test_a_part_is_the_same_stops(stops: Stops) -> None:
         )
     block = part.block_first[part.block_stop == 1][0] - part.first[1]
     assert block == stops.block_first[stops.block_stop == 2][0] - stops.first[2]
+
+
+def test_a_stop_ends_where_the_disc_stands(recording: Recording, columns: Columns) -> None:
+    """Pressure held at rest for a second, the torque what holds the disc: friction is that of the stop."""
+    one = slice(0, int(np.flatnonzero(np.diff(recording.time) > 1.0)[0]))
+    braked = Recording(*(column[one] for column in recording))
+    rest = np.ones(200)
+    held = Recording(
+        braked.time[-1] + 0.005 * np.cumsum(rest),
+        braked.pressure[-1] * rest,
+        50.0 * rest,
+        0.0 * rest,
+        braked.temperature[-1] * rest,
+    )
+    assert find_stops(joined([braked, held]), columns, "x").mu == pytest.approx(
+        find_stops(braked, columns, "x").mu
+    )
+
+
+def test_the_release_is_no_friction(recording: Recording, columns: Columns) -> None:
+    """Torque that goes at once while the pressure takes 0.4 s to fall."""
+    one = slice(0, int(np.flatnonzero(np.diff(recording.time) > 1.0)[0]))
+    braked = Recording(*(column[one] for column in recording))
+    falls = np.linspace(0.5, 0.0, 80)
+    let_go = Recording(
+        braked.time[-1] + 0.005 * np.arange(1, 81),
+        braked.pressure[-1] * falls,
+        0.0 * falls,
+        braked.speed[-1] + 0.0 * falls,
+        braked.temperature[-1] + 0.0 * falls,
+    )
+    assert find_stops(joined([braked, let_go]), columns, "x").mu.min() > 0.2
+
+
+def test_stops_without_torque_are_left_out_and_named(recording: Recording, columns: Columns) -> None:
+    begins = np.flatnonzero(np.diff(recording.time, prepend=-100.0) > 1.0)
+    dead = (recording.time >= recording.time[begins[3]]) & (recording.time < recording.time[begins[4]])
+    found = find_stops(recording._replace(torque=np.where(dead, 0.0, recording.torque)), columns, "x")
+    assert len(found) == 23
+    assert found.mu.min() > 0.2
+    assert found.dead == pytest.approx([recording.time[begins[3]]], abs=0.5)

@@ -139,9 +139,8 @@ def _table(stops: Stops, mass: float) -> Candidate:
         rows = tuple(map(tuple, np.reshape(values, (PRESSURES, TEMPERATURES)).tolist()))
         return Table(law="table", rig_mass=mass, temperature=temperatures, pressure=pressures, mu=rows)
 
-    return Candidate(
-        "table", free, law, extrapolates="constant beyond its knots; knows no speed", bounded=True
-    )
+    limit = "constant beyond its knots, the mean of all stops where it saw none; knows no speed"
+    return Candidate("table", free, law, extrapolates=limit, bounded=True)
 
 
 def _surface(mass: float) -> Candidate:

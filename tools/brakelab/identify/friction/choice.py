@@ -2,11 +2,12 @@
 
 Choice. Every law is identified twice: on all stops, and without those held out. Held out is the programme
 that was given for it, else the fifth of the stops that begin hottest: a law that only copies what it saw
-shows itself there. Least error on what is held out wins; of laws within 5 % of it, the least information
-criterion (Schwarz's, with stops as observations, since the residuals of one stop hang together). But what is
-held out lies 25 K beyond the rest, and a car brakes 100 K hotter than a programme: a law that goes on beyond
-the data must be better by a quarter than every one that stays what it is at their edge; of those within the
-quarter, the least criterion.
+shows itself there. It is judged in closed loop, where it is used: with the measured pressure a law that loses
+the brake costs nothing, for the answer is given. Least error on what is held out wins; of laws within 5 % of
+it, the least information criterion (Schwarz's, with stops as observations, since the residuals of one stop
+hang together). But what is held out lies 25 K beyond the rest, and a car brakes 100 K hotter than a
+programme: a law that goes on beyond the data must be better by a quarter than every one that stays what it is
+at their edge; of those within the quarter, the least criterion.
 """
 
 from collections.abc import Callable
@@ -36,7 +37,7 @@ class Judged(NamedTuple):
     starts_at_measured: bool
     free: int
     error: float  # nRMSE [%] on what it was identified with
-    held_out: float  # nRMSE [%] on what it had not seen
+    held_out: float  # nRMSE [%] on what it had not seen, in closed loop
     bounded: bool  # beyond the data stays what it is at their edge
     criterion: float  # less is better
     numbers: tuple[tuple[str, str, float, float], ...]  # name, unit, value, half of the interval of 95 %
@@ -114,7 +115,7 @@ def judge(job: _Job) -> Judged:
         law = refit(fitted, job.brake, seen)
     else:
         law, unseen = fitted.law, job.unseen
-    held_out = error_of(law, job.brake, unseen, candidate.starts_at_measured)
+    held_out = error_of(law, job.brake, unseen, candidate.starts_at_measured, closed=True)
     return Judged(
         candidate.name,
         fitted.law,

@@ -192,6 +192,11 @@ def _read(data: list[Path], columns: Path | None) -> _Measured:
         parts.append(read.recording._replace(time=read.recording.time - read.recording.time[0] + begin))
     assert first is not None
     stops = find_stops(joined(parts), first, str(data[0]))
+    if len(stops.dead):
+        say(
+            f"{data[0]}: {len(stops.dead)} of {len(stops.dead) + len(stops)} stops left out, the first at "
+            f"{stops.dead[0]:.1f} s: their torque does not explain the loss of speed; check its sensor there"
+        )
     return _Measured(first, stops, float(np.median(heating)))
 
 

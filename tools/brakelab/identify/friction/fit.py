@@ -1,13 +1,20 @@
 """Identifies a law from stops: multi-start, simplex search, least squares, confidence (3.6, Appendix C).
 
 The law is integrated over each stop with the measured pressure, speed and temperature as inputs, one step a
-sample, and compared with the friction of every block. Numbers are searched as shares between their bounds,
-so they are standardised (C.1). Starts of a Latin hypercube are walked down by Nelder–Mead on a part of the
-stops; the best are finished by least squares on all. What several starts do not agree on is said.
+sample, and compared with the friction of every block; slowing is what the law's own friction does to the
+flywheel (3.22a), since the measured one over the measured pressure is the measured friction. In closed loop
+the measured torque is demanded, and the pressure follows from the law's friction, as in a car. Numbers are
+searched as shares between their bounds, so they are standardised (C.1). Starts of a Latin hypercube are
+walked down by Nelder–Mead on a part of the stops; the best are finished by least squares on all. What several
+starts do not agree on is said.
 
 Confidence. Residuals of one stop hang together, those of two stops do not: the covariance is that of sums
 over stops (Liang and Zeger's), with Student's t for as many degrees of freedom as stops less one. It holds
 for noise and for a law that is wrong in its own way at every stop, not for one that is wrong everywhere.
+
+Where no stop was. A number that is a friction at a place, as a table's, is held to the mean friction of all
+stops by `BAND`, with the weight of a stop that is `CHANCE` off: beyond the data it is the constant, with that
+band for its interval; where there are stops, they outweigh it.
 """
 
 from collections.abc import Callable
@@ -21,6 +28,7 @@ from scipy.stats import qmc, t
 from brakelab.arrays import Matrix, Vector
 from brakelab.identify.friction.candidates import Candidate
 from brakelab.identify.friction.stops import Stops, some
+from brakelab.plant.dynamometer import HIGHEST_PRESSURE, SMALLEST_LEVER
 from brakelab.plant.friction.law import START, Law, RigBrake
 from brakelab.plant.friction.laws import friction, law_row
 from brakelab.plant.jit import Record, kernel
@@ -36,6 +44,8 @@ LOST: Final = 10.0  # friction of a law that left the numbers
 LEVEL: Final = 0.95
 LOOSE: Final = 0.5  # half an interval over the value, or over the bounds: from here not identified
 EDGE: Final = 1e-3  # a share this near to a bound lies on it
+BAND: Final = 0.3  # of the mean: standard deviation of friction about it, over all that a brake does
+CHANCE: Final = 0.1  # of the mean: what the mean of a stop is off a law
 
 
 class Fitted(NamedTuple):
@@ -74,29 +84,35 @@ def replay(
     first: Record,
     pressure: Record,
     speed: Record,
-    slowing: Record,
+    torque: Record,
     temperature: Record,
+    brake: tuple[float, float],
+    closed: bool,
     dt: float,
     out: Record,
 ) -> None:
-    """Write the law's friction at every sample; `starts`: its memory at the start of each stop."""
+    """Write the law's friction at every sample.
+
+    `starts`: its memory at the start of each stop; `brake`: torque over friction and pressure [m^3], inertia
+    [kg m^2]; `closed`: pressure follows from `torque` and the law's friction.
+    """
+    lever, inertia = brake
     for stop in range(len(first) - 1):
         begin, end = first[stop], first[stop + 1]
         memory = starts[stop]
-        memory, out[begin] = friction(
-            number, row, memory, pressure[begin], speed[begin], slowing[begin], temperature[begin], dt
-        )
-        for k in range(begin + 1, end):
-            memory, out[k] = friction(
-                number,
-                row,
-                memory,
-                0.5 * (pressure[k - 1] + pressure[k]),
-                0.5 * (speed[k - 1] + speed[k]),
-                0.5 * (slowing[k - 1] + slowing[k]),
-                temperature[k],
-                dt,
-            )
+        memory, mu = friction(number, row, memory, 0.0, speed[begin], 0.0, temperature[begin], 0.0)
+        for k in range(begin, end):
+            before = max(k - 1, begin)
+            pressed = 0.5 * (pressure[before] + pressure[k])
+            if closed:
+                pressed = min(
+                    max(0.5 * (torque[before] + torque[k]), 0.0) / max(lever * mu, SMALLEST_LEVER),
+                    HIGHEST_PRESSURE,
+                )
+            sliding = 0.5 * (speed[before] + speed[k])
+            slowing = lever * mu * pressed / inertia
+            memory, mu = friction(number, row, memory, pressed, sliding, slowing, temperature[k], dt)
+            out[k] = mu
 
 
 @kernel
@@ -108,34 +124,52 @@ def block_means(values: Record, first: Record, per_block: int, out: Record) -> N
         out[block] = total / per_block
 
 
-def replayed(law: Law, brake: RigBrake, stops: Stops, starts_at_measured: bool) -> Vector:
-    """Return the law's friction in every block, shape (blocks,), with the measured inputs."""
+def replayed(
+    law: Law, brake: RigBrake, stops: Stops, starts_at_measured: bool, closed: bool = False
+) -> Vector:
+    """Return the law's friction in every block, shape (blocks,), with measured pressure or in closed loop."""
     number, row = law_row(law, brake)
     starts = np.full(len(stops), row[START])
     if starts_at_measured:
         places = np.searchsorted(stops.block_stop, np.arange(len(stops)))
         starts = stops.mu[places]
     mu, means = np.empty_like(stops.pressure), np.empty_like(stops.mu)
-    inputs = (stops.pressure, stops.speed, stops.slowing, stops.temperature)
-    replay(number, np.array(row), starts, stops.first, *inputs, stops.dt, mu)
+    inputs = (stops.pressure, stops.speed, stops.torque, stops.temperature)
+    rig = (stops.lever, stops.inertia)
+    replay(number, np.array(row), starts, stops.first, *inputs, rig, closed, stops.dt, mu)
     block_means(mu, stops.block_first, stops.per_block, means)
     return np.nan_to_num(np.clip(means, -LOST, LOST), nan=LOST)
 
 
-def error_of(law: Law, brake: RigBrake, stops: Stops, starts_at_measured: bool) -> float:
-    """Return the nRMSE [%]: RMS of all blocks over their mean friction."""
-    off = replayed(law, brake, stops, starts_at_measured) - stops.mu
+def error_of(
+    law: Law, brake: RigBrake, stops: Stops, starts_at_measured: bool, closed: bool = False
+) -> float:
+    """Return the nRMSE [%]: RMS of all blocks over their mean friction; see `replayed`."""
+    off = replayed(law, brake, stops, starts_at_measured, closed) - stops.mu
     return 100.0 * float(np.sqrt(np.mean(off**2)) / np.mean(stops.mu))
 
 
 def residual_function(candidate: Candidate, brake: RigBrake, stops: Stops) -> Callable[[Vector], Vector]:
-    """Return the function of shares that least squares make small, shape (blocks,)."""
+    """Return the function of shares that least squares make small.
+
+    Shape (blocks + frictions,): what the law leaves, and how far each friction is off the mean of all stops,
+    in the weight that the module states.
+    """
+    mean = float(stops.mu.mean())
+    frictions = [place for place, free in enumerate(candidate.free) if free.friction]
+    weight = held_by(stops)
 
     def residuals(shares: Vector) -> Vector:
-        law = candidate.law(candidate.values(np.clip(shares, 0.0, 1.0)))
-        return replayed(law, brake, stops, candidate.starts_at_measured) - stops.mu
+        values = candidate.values(np.clip(shares, 0.0, 1.0))
+        off = replayed(candidate.law(values), brake, stops, candidate.starts_at_measured) - stops.mu
+        return np.concatenate([off, [weight * (values[place] - mean) for place in frictions]])
 
     return residuals
+
+
+def held_by(stops: Stops) -> float:
+    """Return the factor of a friction's distance to the mean of all stops among the residuals."""
+    return float(np.sqrt(len(stops.mu) / len(stops))) * CHANCE / BAND
 
 
 def fit(candidate: Candidate, brake: RigBrake, stops: Stops, seed: int = 0) -> Fitted:
@@ -202,8 +236,15 @@ def _judged(
 ) -> Fitted:
     residuals = residual_function(candidate, brake, stops)
     slopes = slopes_at(residuals, shares)
-    left = residuals(shares)
-    covariance = clustered(slopes, left, stops.block_stop, len(stops))
+    left, held = np.split(residuals(shares), [len(stops.mu)])
+    expected = np.full(len(held), held_by(stops) * BAND * float(stops.mu.mean()))
+    alone = len(stops) + np.arange(len(held))
+    covariance = clustered(
+        slopes,
+        np.concatenate([left, expected]),
+        np.concatenate([stops.block_stop, alone]),
+        len(stops) + len(held),
+    )
     steps = np.array([free.slope(share) for free, share in zip(candidate.free, shares, strict=True)])
     half = np.sqrt(np.maximum(np.diag(covariance), 0.0)) * np.abs(steps) * quantile(len(stops))
     bound = tuple(bool(share < EDGE or share > 1.0 - EDGE) for share in shares)
@@ -217,7 +258,7 @@ def quantile(stops: int) -> float:
 
 
 def slopes_at(residuals: Callable[[Vector], Vector], shares: Vector) -> Matrix:
-    """Return central differences, shape (blocks, free), one-sided at a bound."""
+    """Return central differences, shape (residuals, free), one-sided at a bound."""
     columns = []
     for place in range(len(shares)):
         low, high = shares.copy(), shares.copy()

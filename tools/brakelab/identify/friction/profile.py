@@ -75,7 +75,7 @@ def _rise_of(
     free = fitted.candidate.free[place]
     best = fitted.shares
     residuals = residual_function(fitted.candidate, brake, stops)
-    least = float(np.sum(fitted.residuals**2))
+    least = float(np.sum(residuals(best) ** 2))
     half = max(float(fitted.half[place]) / max(abs(free.slope(best[place])), 1e-300), 1e-6)
     slopes = slopes_at(residuals, best)
     bread = np.linalg.pinv(slopes.T @ slopes, rcond=1e-12, hermitian=True)

@@ -1,10 +1,11 @@
 """Finds the stops in a recording and makes friction of torque and pressure (3.1, 3.2).
 
 A stop is an application of the brake above 1.5 bar without a gap in time, of 0.5 s and more, in which the
-speed falls by a tenth and more; drags are no stops. Friction follows from T = 2 mu_b (p - p_0) A_k r_eff
-(A.19, corrected: A_k sums the pistons of a side) by least squares: recursively with forgetting for a curve
-over time, in blocks of 50 ms (the same without forgetting, begun anew) for identification, whose errors are
-then independent.
+speed falls by a tenth and more; drags are no stops. It ends where the disc stands: there the torque is what
+holds it, not friction. A stop whose torque does not explain its loss of speed is left out. Friction follows
+from T = 2 mu_b (p - p_0) A_k r_eff (A.19, corrected: A_k sums the pistons of a side) by least squares:
+recursively with forgetting for a curve over time, in blocks of 50 ms (the same without forgetting, begun
+anew) for identification, whose errors are then independent.
 """
 
 from dataclasses import dataclass, replace
@@ -29,6 +30,9 @@ GAP: Final = 0.1  # s
 BLOCK: Final = 0.05  # s
 MEMORY: Final = 0.1  # s, of the recursive least squares
 RISEN: Final = 0.9  # of the pressure that a stop holds: from here friction counts (SAE J2522)
+RELEASED: Final = 0.5  # likewise: below it at the end the brake is let go
+STANDS: Final = 0.2  # m/s of sliding
+DEAD: Final = 2.0  # factor between the inertia of a stop and that of most, from which on its torque is wrong
 
 
 @dataclass(frozen=True)
@@ -44,7 +48,6 @@ class Stops:
     pressure: Vector  # (samples,) Pa, on the pads
     speed: Vector  # m/s, sliding
     temperature: Vector  # degC
-    slowing: Vector  # rad/s^2, by the brake torque
     torque: Vector  # N m
     per_block: int
     block_first: Places  # (blocks,)
@@ -55,6 +58,8 @@ class Stops:
     start_temperature: Vector  # (stops,), degC
     held_pressure: Vector  # (stops,), Pa, mean where friction counts
     inertia: float  # kg m^2
+    lever: float  # m^3, torque over friction and pressure: 2 A_k r_eff
+    dead: Vector  # s, beginnings of stops that are left out: torque and loss of speed disagree
 
     def __len__(self) -> int:
         return len(self.mean)
@@ -81,23 +86,31 @@ def find_stops(recording: Recording, columns: Columns, where: str) -> Stops:
     """Return the stops of a recording. Raises `UserError` naming `where` if there is none."""
     time = recording.time
     dt = float(np.median(np.diff(time)))
+    radius = columns.brake.effective_radius
     pressed = np.maximum(recording.pressure - 1e5 * columns.rig.push_out_pressure, 0.0)
-    runs = [run for run in _applications(time, pressed) if _is_stop(recording, run, dt)]
-    if not runs:
+    on = (pressed > APPLIED) & (radius * recording.speed > STANDS)
+    applied = [run for run in _applications(time, on) if _is_stop(recording, run, dt)]
+    if not applied:
         raise UserError(where, "", "no stop found: pressure above 1.5 bar for 0.5 s while the speed falls")
-    lever = 2.0 * columns.brake.piston_area * columns.brake.effective_radius
-    inertia = columns.rig.inertia or _inertia(recording, runs)
+    inertias = np.array([_inertia(recording, run) for run in applied])
+    most = float(np.median(inertias))
+    sound = np.abs(np.log(np.maximum(inertias, 1e-9) / max(most, 1e-9))) < np.log(DEAD)
+    runs = [run for run, kept in zip(applied, sound, strict=True) if kept]
+    dead = np.array([time[run[0]] for run, kept in zip(applied, sound, strict=True) if not kept])
+    lever = 2.0 * columns.brake.piston_area * radius
+    inertia = columns.rig.inertia or most
     picked = np.concatenate([np.arange(*run) for run in runs])
     first = np.concatenate([[0], np.cumsum([end - begin for begin, end in runs])])
-    radius = columns.brake.effective_radius
     torque, pressure = recording.torque[picked], pressed[picked]
     speed = radius * recording.speed[picked]
     per_block = max(round(BLOCK / dt), 1)
     starts, owners, mu, mean, held = [], [], [], [], []
     for stop, (begin, end) in enumerate(pairwise(first)):
         on = pressure[begin:end]
-        risen = begin + int(np.argmax(on >= RISEN * np.median(on[on > APPLIED])))
-        count = (end - risen) // per_block
+        held_at = np.median(on[on > APPLIED])
+        risen = begin + int(np.argmax(on >= RISEN * held_at))
+        let_go = end - int(np.argmax(on[::-1] >= RELEASED * held_at))
+        count = (let_go - risen) // per_block
         blocks = risen + per_block * np.arange(count)
         use = blocks[:, None] + np.arange(per_block)
         lever_arm = lever * pressure[use]
@@ -106,15 +119,14 @@ def find_stops(recording: Recording, columns: Columns, where: str) -> Stops:
         owners.append(np.full(count, stop))
         mu.append(found)
         curve = friction_over_time(torque[begin:end], on, lever, dt)
-        mean.append(np.average(curve[risen - begin :], weights=speed[risen:end]))
-        held.append(pressure[risen:end].mean())
+        mean.append(np.average(curve[risen - begin : let_go - begin], weights=speed[risen:let_go]))
+        held.append(pressure[risen:let_go].mean())
     return Stops(
         first.astype(np.int64),
         dt,
         pressure,
         speed,
         recording.temperature[picked],
-        torque / inertia,
         torque,
         per_block,
         np.concatenate(starts).astype(np.int64),
@@ -125,6 +137,8 @@ def find_stops(recording: Recording, columns: Columns, where: str) -> Stops:
         np.array([recording.temperature[run[0] : run[0] + per_block].mean() for run in runs]),
         np.array(held),
         inertia,
+        lever,
+        dead,
     )
 
 
@@ -139,7 +153,7 @@ def some(stops: Stops, wanted: Places) -> Stops:
         for block, k, begin in zip(blocks, wanted, first, strict=False)
     ]
     owners = [np.full(len(block), place) for place, block in enumerate(blocks)]
-    sampled = ("pressure", "speed", "temperature", "slowing", "torque")
+    sampled = ("pressure", "speed", "temperature", "torque")
     each = ("mean", "start_speed", "start_temperature", "held_pressure")
     return replace(
         stops,
@@ -152,8 +166,7 @@ def some(stops: Stops, wanted: Places) -> Stops:
     )
 
 
-def _applications(time: Vector, pressed: Vector) -> list[tuple[int, int]]:
-    on = pressed > APPLIED
+def _applications(time: Vector, on: NDArray[np.bool_]) -> list[tuple[int, int]]:
     # Noise about the threshold is no release: fill what is shorter than five samples.
     runs: list[tuple[int, int]] = []
     for begin, end in stretches(on):
@@ -178,14 +191,11 @@ def _is_stop(recording: Recording, run: tuple[int, int], dt: float) -> bool:
     return bool(recording.speed[end - few : end].mean() < 0.9 * before)
 
 
-def _inertia(recording: Recording, runs: list[tuple[int, int]]) -> float:
-    """Return the inertia [kg m^2] that the torque impulse over the loss of speed tells, the stops' median."""
-    found = []
+def _inertia(recording: Recording, run: tuple[int, int]) -> float:
+    """Return the inertia [kg m^2] that the torque impulse over the loss of speed tells."""
     few = 5
-    for begin, end in runs:
-        first, last = slice(begin, begin + few), slice(end - few, end)
-        middle = slice(begin + few // 2, end - few // 2)
-        impulse = float(np.trapezoid(recording.torque[middle], recording.time[middle]))
-        loss = float(recording.speed[first].mean() - recording.speed[last].mean())
-        found.append(impulse / loss)
-    return float(np.median(found))
+    begin, end = run
+    first, last = slice(begin, begin + few), slice(end - few, end)
+    middle = slice(begin + few // 2, end - few // 2)
+    impulse = float(np.trapezoid(recording.torque[middle], recording.time[middle]))
+    return impulse / float(recording.speed[first].mean() - recording.speed[last].mean())

@@ -42,7 +42,10 @@ def law_tables(identified: Identified, unseen: str) -> list[Table]:
         f"{1e-5 * identified.pressure[1]:.0f} bar, sliding at {identified.speed[0]:.1f} to "
         f"{identified.speed[1]:.1f} m/s. Beyond these no law is tested."
     )
-    chosen = f"Unseen: {unseen}. Chosen: {identified.chosen.name}."
+    chosen = (
+        f"Unseen: {unseen}, in closed loop: the measured torque is demanded, the pressure follows from the "
+        f"law. Chosen: {identified.chosen.name}."
+    )
     return [
         Table("Laws", ("law", "numbers", "nRMSE [%]", "unseen [%]", "criterion", "agree"), errors, chosen),
         Table("Where laws end", ("law", "numbers not told by these stops", "note"), limits, seen),
