@@ -93,7 +93,7 @@ def test_a_choice_is_judged_by_ams_alone() -> None:
     """The chosen law is no rival of its own; the best in hindsight may be none of the thesis's."""
     found = {"table": 4.0, "constant": 9.0, "ilvo": 5.0, "ostermeyer": 6.0, "ostermeyer_revised": 7.0}
     zero = np.zeros(6)
-    ams = {name: OnAms(zero, zero, zero, whole) for name, whole in found.items()}
+    ams = {name: OnAms(zero, zero, np.full(6, off)) for name, off in found.items()}
     law = Constant(law="constant", rig_mass=996.0, mu=0.40)
     seen = [
         choice_of(

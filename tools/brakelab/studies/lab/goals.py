@@ -120,8 +120,8 @@ def _choice(lab: Lab) -> tuple[str, ...]:
     is_met = first[0] >= 2 and not first[1]
     holds = others[0] >= 2 * count / 3 and not others[1]
     return (
-        "chosen law on AMS of the pads: better than every single law of the thesis on 2 of 3, never worse "
-        "than the constant",
+        "chosen law on AMS of the pads in closed loop: better than every single law of the thesis on 2 of 3, "
+        "never worse than the constant",
         "–",
         f"better on {first[0]} of 3, worse than the constant on {first[1]}; other pads: {others[0]} and "
         f"{others[1]} of {count}",

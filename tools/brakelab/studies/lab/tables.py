@@ -194,15 +194,20 @@ def _fit(lab: Lab) -> Table:
     columns = ("law", *(f"{b}{what}" for b in BRAKES for what in (", thesis", "", ", unseen")))
     below = (
         "nRMSE [%] of all blocks of 50 ms of CPC; unseen: the fifth that begins hottest, which the law was "
-        "not identified on; *: chosen, without a look at AMS. On A and C the order is the thesis's, ILVO "
-        "before both of Ostermeyer; on B, whose friction only rises with temperature, as theirs do, the "
-        "revised one is as good. Levels are lower: a simulated pad has less chance in it. The revised law "
-        "holds the original as a special case and can only fit better; that the print has it worse on B "
-        "and C tells of a search that had not ended. A table and a surface of powers, which the thesis "
-        "does not try, come near ILVO.\n\nILVO's bounded form fits worse: contact between 0.85 and 1.2 is "
-        "too narrow for what these pads do in a stop."
+        "not identified on, in closed loop; *: chosen, without a look at AMS. All laws have the same inputs: "
+        "slowing is what their own friction does (3.22a). ILVO before both of Ostermeyer, the thesis's "
+        f"order: on {_in_order(lab)}. Levels are lower: a simulated pad has less chance in it. The revised "
+        "law holds the original as a special case and can only fit better; that the print has it worse on B "
+        "and C tells of a search that had not ended. The table and the surface are not in the thesis."
     )
     return Table("Table 3.3: CPC", columns, rows, below)
+
+
+def _in_order(lab: Lab) -> str:
+    """Return the brakes on which ILVO fits better than both of Ostermeyer's laws."""
+    errors = {b: {law.name: law.error for law in lab.brakes[b].identified.laws} for b in BRAKES}
+    better = [b for b, e in errors.items() if e["ilvo"] < min(e["ostermeyer"], e["ostermeyer_revised"])]
+    return ", ".join(better) or "none"
 
 
 def _ams(lab: Lab) -> Table:
@@ -214,18 +219,16 @@ def _ams(lab: Lab) -> Table:
             law = found.ams[judged.name]
             printed = TABLE_3_4_NRMSE.get(judged.name)
             mark = " *" if judged.name == found.identified.chosen.name else ""
-            closed = np.sqrt(np.mean(law.closed**2))
             thesis = f"{np.mean(printed[brake]):.1f}" if printed else "–"
-            cells += [thesis, f"{law.nrmse.mean():.1f}{mark}", f"{closed:.1f}"]
+            cells += [thesis, f"{law.nrmse.mean():.1f}{mark}", f"{law.in_closed_loop:.1f}"]
         rows.append((judged.name, *cells))
     columns = ("law", *(f"{b}{what}" for b in BRAKES for what in (", thesis", "", ", closed loop")))
     below = (
         "Mean nRMSE [%] of the six stops with the measured pressure replayed, of laws identified on CPC "
         "alone; closed loop: RMS error [%] of the six means when the law's own friction sets the pressure. "
         "*: chosen. A and C fade above what CPC shows them, so all laws extrapolate, and those that rise "
-        "with temperature miss most, as in the thesis. ILVO is good in replay and not in closed loop, as "
-        "friction.md found of the thesis's own numbers: the measured pressure holds the "
-        f"answer.\n\n{_verdict(lab)}"
+        "with temperature miss most, as in the thesis. Replayed, a law that loses the brake costs little, "
+        f"for the measured pressure holds the answer; it is used in closed loop.\n\n{_verdict(lab)}"
     )
     return Table("Table 3.4: AMS, which no law has seen", columns, rows, below)
 
@@ -242,7 +245,7 @@ def _verdict(lab: Lab) -> str:
     best, worse = met([choice_of(brake, SEED, lab.brakes[brake]) for brake in BRAKES])
     return (
         "Goal: the chosen law is better than constant, both of Ostermeyer and ILVO on two of three brakes, "
-        f"and never worse than the constant. Over all blocks: {'; '.join(words)}. Better on {best} of 3, "
+        f"and never worse than the constant. In closed loop: {'; '.join(words)}. Better on {best} of 3, "
         f"worse than the constant on {worse}. "
         + ("Met. " if best >= 2 and not worse else "Missed. ")
         + "How a pad fades hotter than CPC is not in CPC: a law that goes on must be better by a quarter "
