@@ -100,6 +100,17 @@ def backwards(folder: Path) -> None:
 
 
 BAD = {
+    "a count in 1/m^3": (column("particle_concentration", lambda x: 1e6 * x), "1/m.3. convert it"),
+    "a counter at its end": (column("particle_concentration", lambda x: min(x, 900.0)), "counts no more"),
+    "a pressure in Pa": (
+        column("calliper_pressure_fr", lambda x: 1e5 * x),
+        "reads like Pa: convert it to bar",
+    ),
+    "a torque in kN m": (column("brake_torque_fr", lambda x: 1e-3 * x), "reads like kN m: convert it to N m"),
+    "a temperature in °F": (
+        column("disc_temperature_fr", lambda x: 32.0 + 1.8 * x),
+        "reads like °F: convert",
+    ),
     "a trip without braking": (column("calliper_pressure_fr", lambda x: 0.4), "0 brake applications"),
     "a temperature in °F or K": (column("disc_temperature_fr", lambda x: x + 273.15), "cannot be degC"),
     "a speed in km/h": (column("vehicle_speed", lambda x: 3.6 * x), "km/h"),

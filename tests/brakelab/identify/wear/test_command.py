@@ -50,6 +50,15 @@ def test_a_programme_becomes_a_configuration_and_a_page(blocks, capsys):
     assert "4 blocks" in capsys.readouterr().out
 
 
+def test_what_a_gram_is_worth_is_taken_from_the_blocks(blocks):
+    """Pads lose K g/mm: measured, it is the density of the lining on board, whose area is CONFIG's."""
+    identify_wear(blocks / "manifest.csv", CONFIG, "front", blocks / "car.toml")
+    page = (blocks / "car.md").read_text()
+    slope = float(page.partition("linear wear K: ")[2].partition(" g/mm")[0])
+    pad = load_config(blocks / "car.toml").front.pad
+    assert 2.0 * pad.density * pad.area == pytest.approx(slope, rel=1e-3)
+
+
 def test_blocks_in_mdf4_give_the_same_law(blocks):
     mdf = pytest.importorskip("asammdf")
     identify_wear(blocks / "manifest.csv", CONFIG, "front", blocks / "csv.toml")
@@ -147,7 +156,58 @@ def text(folder: Path) -> None:
     rewrite(folder / "manifest.csv", lambda rows: rows[0].update(mass_before="heavy"))
 
 
+def scaled(column: str, factor: float):
+    """Return what writes a column of one block in another unit."""
+
+    def spoil(folder: Path) -> None:
+        rewrite(folder / "town-calm.csv", lambda rows: [
+            row.update({column: f"{factor * float(row[column]):.9g}"}) for row in rows
+        ])  # fmt: skip
+
+    return spoil
+
+
+def weighed(factor: float):
+    def spoil(folder: Path) -> None:
+        rewrite(folder / "manifest.csv", lambda rows: [
+            row.update({name: f"{factor * float(row[name]):.9g}" for name in ("mass_before", "mass_after")})
+            for row in rows
+        ])  # fmt: skip
+
+    return spoil
+
+
+def mistyped_thickness(folder: Path) -> None:
+    rewrite(folder / "manifest.csv", lambda rows: rows[2].update(thickness_after_3="1.1"))
+
+
+def mistyped_mass(folder: Path) -> None:
+    def change(rows):
+        rows[1]["mass_before"] = f"{float(rows[1]['mass_before']) + 30.0:.3f}"
+
+    rewrite(folder / "manifest.csv", change)
+
+
+def without_torque(folder: Path) -> None:
+    rewrite(folder / "town-calm.csv", lambda rows: [row.update(brake_torque="nan") for row in rows[::50]])
+
+
 BAD = {
+    "a thickness with a digit too few": (
+        mistyped_thickness,
+        "line 4, thickness_before_3 .* correct the read",
+    ),
+    "a mass that its thickness contradicts": (mistyped_mass, r"block town-lively: lost 3\d.* by the balance"),
+    "masses in kg": (weighed(1e-3), "give masses in g"),
+    "masses in mg": (weighed(1e3), "give masses in g"),
+    "torque in kN m": (scaled("brake_torque", 1e-3), "brake_torque .* reads like kN m: convert it to N m"),
+    "torque of one pad": (scaled("brake_torque", 0.5), "brake_torque .* one pad: give that of both"),
+    "torque with gaps": (without_torque, "brake_torque: has gaps"),
+    "time in ms": (scaled("t", 1e3), "t .* reads like ms: convert it to s"),
+    "time in min": (scaled("t", 1.0 / 60.0), "t .* reads like min: convert it to s"),
+    "speed in rpm": (scaled("omega", 9.5493), "omega .* reads like rpm: convert it to rad/s"),
+    "pressure in Pa": (scaled("calliper_pressure", 1e5), "calliper_pressure .* like Pa: convert it to bar"),
+    "pressure in MPa": (scaled("calliper_pressure", 0.1), "calliper_pressure .* MPa: convert it to bar"),
     "a block with too few applications": (few, "applications; a block needs"),
     "a thickness that grows": (grown, "the pads grew by"),
     "a mass that grows": (heavier, "pads gained mass"),

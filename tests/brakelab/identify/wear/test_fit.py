@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from brakelab.identify.wear.fit import QUASI_STATIC, fit_law, rank_of
-from brakelab.identify.wear.fusion import BALANCE, POINT, POINTS, fuse
+from brakelab.identify.wear.fit import QUASI_STATIC, explains, fit_law, rank_of, strangers
+from brakelab.identify.wear.fusion import BALANCE, POINT, POINTS, disagreeing, fuse
 from ecu.errors import UserError
 
 LAW = np.array([0.1016, 0.0, 0.0, 0.4887, 0.0, 0.0, 0.66e-2])  # Table 7.1 without its smallest term
@@ -32,6 +32,35 @@ def test_a_law_without_scatter_is_found_exactly():
     fit = fit_law(x, x @ LAW, np.full(20, 1e-12))
     np.testing.assert_allclose(x @ fit.coefficients, x @ LAW, rtol=5e-3)
     assert fit.r2 > 0.9999
+
+
+def test_a_block_that_was_weighed_wrongly_is_found_and_no_other():
+    """30 g too many in one of ten, no thickness beside it; sound blocks with 5 % scatter are all kept."""
+    for seed in range(10):
+        x = regressors(seed)
+        mass, variance = measured(x, seed, 0.05)
+        assert strangers(x, mass, variance) == []
+        wrong = int(np.argsort(x[:, 1] / x[:, 0])[4])
+        mass[wrong] += 30.0
+        assert strangers(x, mass, variance) == [wrong]
+
+
+def test_a_law_that_tells_no_block_explains_nothing():
+    x = regressors(2)
+    mass, variance = measured(x, 2)
+    assert explains(fit_law(x, mass, variance), mass)
+    other = mass[::-1] * np.geomspace(0.2, 5.0, len(mass))
+    assert not explains(fit_law(x, other, variance), other)
+
+
+@pytest.mark.parametrize(("grams", "found"), [(0.0, []), (2.0, [3]), (-1.5, [3])])
+def test_balance_and_thickness_that_disagree(grams: float, found: list[int]):
+    """Blocks of 2 g and more, 27 g/mm; a block without thickness is not judged."""
+    mass = np.array([2.0, 3.0, 2.5, 4.0, 3.5])
+    wear = mass / 27.0
+    wear[1] = np.nan
+    mass[3] += grams
+    assert [place for place, _ in disagreeing(wear, mass)] == found
 
 
 @pytest.mark.study

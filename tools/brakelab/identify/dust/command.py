@@ -12,7 +12,7 @@ from brakelab.results.outputs import check_outputs, config_files
 from ecu.contract.dust import MODELS
 from ecu.errors import UserError
 from ecu.output import give, wrote
-from ecu.settings.config import Axle, load_config, new_params
+from ecu.settings.config import load_config
 
 
 def _numbers(values: Array) -> str:
@@ -48,9 +48,7 @@ def identify_dust(manifest: Path, config: Path, axle: str, out: Path) -> int:
     vehicle = load_config(config)
     written = out, page, _ = out, out.with_suffix(".md"), out.with_suffix(".svg")
     check_outputs(out, written, [*measured_files(manifest), *config_files(config)], toml=True)
-    brake: Axle = getattr(vehicle, axle)
-    radius = float(new_params(vehicle)[0]["wheel_radius"][0 if axle == "front" else 2])
-    trips = read_trips(manifest, brake.push_out_pressure, radius)
+    trips = read_trips(manifest, vehicle, axle)
     trained, test = [trip for trip in trips if not trip.test], [trip for trip in trips if trip.test]
     judged = judge_all(trained, test)
     chosen = choose(judged)

@@ -12,9 +12,22 @@ from typing import Final
 import numpy as np
 
 from brakelab.arrays import Array
-from brakelab.identify.dust.features import PERIOD, Applications, Recorded, extract
+from brakelab.identify.dust.features import (
+    MOVING,
+    PERIOD,
+    PRESSED,
+    SHORTEST,
+    Applications,
+    Recorded,
+    extract,
+)
+from brakelab.identify.friction.check import refuse_units
+from brakelab.identify.friction.columns import Columns
+from brakelab.identify.friction.recording import Recording
 from brakelab.identify.measurement_files import check_celsius, read_columns, read_manifest
+from brakelab.stretches import stretches
 from ecu.errors import UserError
+from ecu.settings.config import Config
 
 CORNER: Final = "fr"
 COLUMNS: Final = (
@@ -26,31 +39,33 @@ COLUMNS: Final = (
     "particle_concentration",
     "tunnel_flow",
 )
+IN_ORDER: Final = (COLUMNS[0], COLUMNS[2], COLUMNS[3], COLUMNS[1], COLUMNS[4])
+"""As `Columns.contract` has them."""
 LONGEST_GAP: Final = 5.0  # s between two samples
 FEWEST_TRIPS: Final = 3  # for identification: each is left out once
 FEWEST: Final = 20  # applications of a trip
 FASTEST: Final = 90.0  # m/s
 HOTTEST: Final = 900.0  # degC
+MOST_COUNT: Final = 1e6  # 1/cm^3; a street has 1e3 to 1e5
+LONGEST_TOP: Final = 10.0  # s at the greatest value, to the digit
 MOST_FLOW: Final = 5.0  # m^3/s
 
 
-def read_trips(manifest: Path, push_out: float, radius: float) -> list[Applications]:
-    """Return the applications of every trip of a manifest.
-
-    Args:
-        manifest: CSV.
-        push_out: push-out pressure [bar].
-        radius: of the tyre [m].
+def read_trips(manifest: Path, config: Config, axle: str) -> list[Applications]:
+    """Return the applications of every trip of a CSV manifest, measured on a brake of an `axle` of `config`.
 
     Raises:
         UserError: a file, a row or a value of it is invalid.
     """
     trips = []
+    columns = Columns.contract(IN_ORDER, "m/s", config, axle)
     for line, row in enumerate(read_manifest(manifest), 2):
         if not row.get("trip") or not row.get("file") or row.get("test") not in ("0", "1"):
             raise UserError(str(manifest), f"line {line}", "needs trip, file and test (1: held out, else 0)")
         path = manifest.parent / row["file"]
-        found = extract(_read_trip(path, row["trip"], row["test"] == "1", push_out), radius)
+        trip = _read_trip(path, row["trip"], row["test"] == "1", columns.rig.push_out_pressure)
+        _check_units(path, trip, columns)
+        found = extract(trip, columns.brake.tyre_radius)
         if len(found.particles) < FEWEST:
             remedy = f"{len(found.particles)} brake applications; a trip needs {FEWEST} or more"
             raise UserError(str(path), f"trip {row['trip']}", remedy)
@@ -78,6 +93,24 @@ def _read_trip(path: Path, name: str, test: bool, push_out: float) -> Recorded:
     )  # fmt: skip
 
 
+def _check_units(path: Path, trip: Recorded, columns: Columns) -> None:
+    """Refuse a brake's columns in other units than they should have."""
+    pressed = stretches((trip.pressure > PRESSED) & (trip.speed > MOVING))
+    applications = [
+        Recording(
+            trip.t[begin:end],
+            1e5 * (trip.pressure[begin:end] + columns.rig.push_out_pressure),
+            trip.torque[begin:end],
+            trip.speed[begin:end] / columns.brake.tyre_radius,
+            trip.temperature[begin:end],
+        )
+        for begin, end in pressed
+        if (end - begin) * PERIOD >= SHORTEST
+    ]
+    if applications:
+        refuse_units(applications, columns, str(path))
+
+
 def _on_grid(path: Path, name: str, t: Array, values: Array, grid: Array) -> Array:
     known = np.isfinite(values)
     gaps = np.diff(t[known], prepend=t[0], append=t[-1])
@@ -96,5 +129,15 @@ def _check_ranges(path: Path, even: dict[str, Array]) -> None:
     if not 0.0 < flow.min() <= flow.max() < MOST_FLOW:
         remedy = f"{flow.min():.3g} to {flow.max():.3g} cannot be m^3/s of a tunnel; convert it"
         raise UserError(str(path), "tunnel_flow", remedy)
+    if np.median(count) > MOST_COUNT:
+        remedy = f"{np.median(count):.1g} most of the time cannot be 1/cm^3 of air: 1/m^3? convert it"
+        raise UserError(str(path), "particle_concentration", remedy)
+    top = count == count.max()
+    if np.count_nonzero(top) * PERIOD > LONGEST_TOP:
+        remedy = (
+            f"stands at {count.max():.3g} for {np.count_nonzero(top) * PERIOD:.0f} s: the counter counts no "
+            "more than that; dilute the sample, and leave this trip out"
+        )
+        raise UserError(str(path), "particle_concentration", remedy)
     if count.min() < 0.0:
         raise UserError(str(path), "particle_concentration", "below zero; leave out what is not counted")

@@ -5,8 +5,12 @@ Three numbers of a recording have to fit known physics, and every usual mistake 
     friction  median of T / (2 A_k r_eff p)                    0.42, give or take a third
     inertia   torque impulse over the loss of speed            of the flywheel, or 60 kg m^2 within a factor 4
     heating   rise of the disc over the friction energy, K/J   of the disc, or 0.96 / (8 kg 500 J/(kg K))
+
+Recordings of friction have a file of columns, in which a unit is mended; blocks of wear and trips of dust
+have fixed units, to which a column is converted (`refuse_units`).
 """
 
+from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -19,6 +23,7 @@ from ecu.errors import UserError
 USUAL: Final = (0.42, 60.0, 2.4e-4)  # friction, inertia [kg m^2], heating [K/J]
 TOLERANCE: Final = (0.33, 1.4, 0.55)  # standard deviations of the logarithms, where nothing is given
 GIVEN: Final = 0.15  # likewise where the file of columns gives the number
+CONFIGURED: Final = 0.3  # likewise where CONFIG does, of any disc of this car
 DOUBTFUL: Final = 2.0  # standard deviations
 CLEARER: Final = 4.0  # a mistake must explain the numbers better by this much, in squares
 HOTTEST: Final = 900.0  # degC
@@ -66,7 +71,8 @@ def _effect(quantity: str, ratio: float) -> tuple[float, float, float]:
         "torque": (1.0 / ratio, 1.0 / ratio, ratio),
         "speed": (1.0, ratio, ratio),
         "temperature": (1.0, 1.0, 1.0 / ratio),
-    }.get(quantity, (1.0, 1.0, 1.0))
+        "time": (1.0, 1.0 / ratio, ratio),
+    }[quantity]
 
 
 class Numbers(NamedTuple):
@@ -75,6 +81,42 @@ class Numbers(NamedTuple):
     friction: float
     inertia: float
     heating: float
+
+
+def numbers_of(applications: Sequence[Recording], columns: Columns) -> Numbers:
+    """Return the three numbers of brake applications, by those in which the car slows, if any does."""
+    slowing = [one for one in applications if one.speed[-1] < 0.9 * one.speed[0]]
+    disc, brake = columns.disc, columns.brake
+    push_out, lever = 1e5 * columns.rig.push_out_pressure, 2.0 * brake.piston_area * brake.effective_radius
+    friction, inertia, work, rise = [], [], [], []
+    for one in slowing or applications:
+        pressed = float(np.sum(np.maximum(one.pressure - push_out, 0.0)))
+        friction.append(float(np.sum(one.torque)) / max(lever * pressed, 1e-9))
+        lost = float(one.speed[0] - one.speed[-1])
+        inertia.append(float(np.trapezoid(one.torque, one.time)) / lost if lost > 0.0 else USUAL[1])
+        rate = disc.cooling + disc.cooling_by_speed * brake.tyre_radius * float(one.speed.mean())
+        kept = max(1.0 - 0.5 * rate * float(one.time[-1] - one.time[0]), 0.3)
+        work.append(kept * float(np.trapezoid(one.torque * one.speed, one.time)))
+        rise.append(float(one.temperature[-1] - one.temperature[0]))
+    hard = np.array(work) >= np.median(work)
+    heating = float(np.sum(np.array(rise)[hard]) / max(np.sum(np.array(work)[hard]), 1e-9))
+    return Numbers(float(np.median(friction)), float(np.median(inertia)), heating)
+
+
+def refuse_units(applications: Sequence[Recording], columns: Columns, where: str) -> None:
+    """Refuse applications, in the units of a recording, whose columns are in other units than theirs.
+
+    Raises:
+        UserError: names the column, the finding and the remedy.
+    """
+    numbers = numbers_of(applications, columns)
+    mistake = likeliest(numbers, columns, CONFIGURED)
+    if mistake is None or mistake.place not in UNITS:  # areas and radii count for nothing here
+        return
+    name, unit = getattr(columns.columns, mistake.place)
+    remedy = mistake.remedy.partition(":")[0]
+    convert = "give that of both" if "pad" in remedy else f"convert it to {unit}"
+    raise UserError(where, f"{name} ({_found(numbers)})", f"{remedy}: {convert}")
 
 
 def measure(recording: Recording, columns: Columns, where: str) -> tuple[Numbers, Stops]:
@@ -117,11 +159,14 @@ def refuse_nonsense(recording: Recording, columns: Columns, where: str) -> Numbe
     return numbers
 
 
-def likeliest(numbers: Numbers, columns: Columns) -> Mistake | None:
-    """Return the mistake that the three numbers tell, None if they make sense."""
+def likeliest(numbers: Numbers, columns: Columns, given: float = GIVEN) -> Mistake | None:
+    """Return the mistake that the three numbers tell, None if they make sense.
+
+    `given`: standard deviation of the logarithm of a number that `columns` gives.
+    """
     known = (None, columns.rig.inertia, columns.disc.heating)
-    expected = np.array([given or usual for given, usual in zip(known, USUAL, strict=True)])
-    spread = [usual if given is None else GIVEN for given, usual in zip(known, TOLERANCE, strict=True)]
+    expected = np.array([one or usual for one, usual in zip(known, USUAL, strict=True)])
+    spread = [usual if one is None else given for one, usual in zip(known, TOLERANCE, strict=True)]
     off = np.log(np.maximum(numbers, 1e-9)) - np.log(expected)
     # The thermocouple lags and the air cools: a disc seems to heat less than it does.
     off[2] += 0.15

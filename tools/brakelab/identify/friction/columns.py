@@ -12,6 +12,7 @@ temperature = ["T_disc", "°F"]
 [disc]                             # optional; without, heating is found from the stops
 """
 
+import math
 from pathlib import Path
 from typing import Annotated, Final, Literal, Self
 
@@ -19,6 +20,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from brakelab.plant.friction.law import NotNegative, Positive, RigBrake, Section
 from brakelab.plant.linings import Lining
+from ecu.settings.config import Axle, Config, new_params
 from ecu.settings.toml_file import describe, read_toml
 
 UNITS: Final[dict[str, dict[str, float]]] = {
@@ -85,6 +87,31 @@ class Columns(Section):
         )
         disc = DiscGiven(**lining.disc.model_dump())
         return cls(columns=names, brake=lining.brake, rig=Rig(inertia=inertia), disc=disc)
+
+    @classmethod
+    def contract(cls, names: tuple[str, str, str, str, str], speed: str, config: Config, axle: str) -> Self:
+        """Return the description of a file of fixed names and units, of a brake of an axle of CONFIG.
+
+        `names`: of time [s], calliper pressure [bar], torque of both pads [N m], speed [`speed`: "rad/s" of
+        the disc or "m/s" of the car] and disc temperature [degC].
+        """
+        brake: Axle = getattr(config, axle)
+        radius = float(new_params(config)[0]["wheel_radius"][0 if axle == "front" else 2])
+        units = ("s", "bar", "N m", speed, "°C")
+        pad = RigBrake(
+            piston_area=brake.pistons * math.pi / 4.0 * brake.piston_diameter**2,
+            pad_area=brake.pad.area,
+            effective_radius=brake.effective_radius,
+            tyre_radius=radius,
+        )
+        disc = DiscGiven(
+            heating=brake.disc_heating,
+            cooling=brake.disc_cooling,
+            cooling_by_speed=brake.disc_cooling_by_speed,
+        )
+        rig = Rig(push_out_pressure=brake.push_out_pressure)
+        return cls(columns=Names(**dict(zip(UNITS, zip(names, units, strict=True), strict=True))), brake=pad,
+                   rig=rig, disc=disc)  # fmt: skip
 
 
 def load_columns(path: Path) -> Columns:

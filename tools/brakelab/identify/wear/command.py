@@ -5,30 +5,89 @@ from typing import Final
 
 import numpy as np
 
+from brakelab.arrays import Array
 from brakelab.identify.config_file import Section, write_car
 from brakelab.identify.measurement_files import measured_files
 from brakelab.identify.wear.curves import SHARE
-from brakelab.identify.wear.fit import QUASI_STATIC, TERMS, UNITS, Fit, fit_law, leave_one_out
-from brakelab.identify.wear.fusion import fuse
+from brakelab.identify.wear.fit import (
+    QUASI_STATIC,
+    TERMS,
+    UNITS,
+    Fit,
+    explains,
+    fit_law,
+    leave_one_out,
+    strangers,
+)
+from brakelab.identify.wear.fusion import Fused, disagreeing, fuse
 from brakelab.identify.wear.page import tables, write_page
-from brakelab.identify.wear.reader import Heat, read_blocks
+from brakelab.identify.wear.reader import Block, read_blocks
 from brakelab.results.outputs import check_outputs, config_files
-from ecu.errors import UserError
-from ecu.output import give, wrote
+from ecu.errors import RunFault, UserError
+from ecu.output import give, say, wrote
 from ecu.settings.config import Axle, load_config
+from ecu.settings.pad import Pad
 
-COOLING_SPEED: Final = 15.0  # m/s, speed of cooling between stops, assumed
+DENSITIES: Final = (800.0, 6000.0)  # kg/m^3: organic linings 1500 to 2800, sintered ones up to 5500
 ROAD: Final = 0.10  # relative: difference of the road from a laboratory (section 7.6)
 
 
-def law_section(fit: Fit, error: float) -> Section:
-    """Return the keys of a pad: its law and the law's `error`, relative."""
+def law_section(fit: Fit, error: float, pad: Pad, slope: float) -> Section:
+    """Return the keys of a pad: its law, the law's `error`, relative, and the density by `slope` [g/mm].
+
+    Raises:
+        UserError: the slope cannot be that of a lining of this area.
+    """
     numbers = ", ".join(f"{value:.6g}" for value in fit.coefficients)
-    return {
+    measured: Section = {}
+    if np.isfinite(slope):
+        density = 0.5 * slope / pad.area  # kg/m is g/mm
+        if not DENSITIES[0] < density < DENSITIES[1]:
+            remedy = (
+                f"pads lose {slope:.3g} g/mm, {density:.3g} kg/m^3 by an area of {pad.area:g} m^2: "
+                "give masses in g, thickness in mm, and the pad's area in CONFIG"
+            )
+            raise UserError("mass, thickness", "", remedy)
+        measured = {"density": (f"{density:.0f}", f"kg/m^3, by {slope:.2f} g/mm of the blocks and the area")}
+    return measured | {
         "law": ('"extended"', "from dynamometer blocks, disc in degC"),
         "coefficients": (f"[{numbers}]", "g/MJ, g/MJ/K, g/MJ/K^2, g/MW, g/MW/K, g s/MJ^2, …/K"),
         "sigma": (f"{min(max(error, 0.02), 0.9):.4f}", "relative, blocks left out and the way to the road"),
     }
+
+
+def _measured(blocks: list[Block]) -> tuple[Fused, Array]:
+    """Return the wear of blocks by balance and thickness, and their regressors, shape (n, 7)."""
+    fused = fuse(np.array([b.wear for b in blocks]), np.array([b.mass for b in blocks]))
+    return fused, np.array([block.regressors for block in blocks])
+
+
+def _agreeing(blocks: list[Block]) -> list[Block]:
+    """Return the blocks without those that the law of the others does not come near, which are said.
+
+    Raises:
+        UserError: balance and thickness of a block cannot both be right.
+    """
+    masses = np.array([b.mass for b in blocks])
+    for place, grams in disagreeing(np.array([b.wear for b in blocks]), masses):
+        remedy = (
+            f"lost {masses[place]:.2f} g by the balance, {grams:.2f} g by its thickness and what the other "
+            "blocks lose per mm; correct one of them, or leave the thicknesses of all blocks out"
+        )
+        raise UserError(f"block {blocks[place].name}", "", remedy)
+    fused, regressors = _measured(blocks)
+    strange = strangers(regressors, fused.mass, np.diag(fused.covariance))
+    rest = [block for place, block in enumerate(blocks) if place not in strange]
+    if strange:
+        fused, others = _measured(rest)
+        law = fit_law(others, fused.mass, np.diag(fused.covariance))
+        for place in strange:
+            say(
+                f"block {blocks[place].name}: left out, it lost {masses[place]:.2f} g, "
+                f"{regressors[place] @ law.coefficients:.2f} g by the law of the others; check its weighing "
+                "and its file"
+            )
+    return rest
 
 
 def identify_wear(manifest: Path, config: Path, axle: str, out: Path) -> int:
@@ -36,6 +95,7 @@ def identify_wear(manifest: Path, config: Path, axle: str, out: Path) -> int:
 
     Raises:
         UserError: an argument or a file is invalid.
+        RunFault: no law explains the blocks.
     """
     if axle not in ("front", "rear"):
         raise UserError("--axle", axle, "choose front or rear")
@@ -43,19 +103,27 @@ def identify_wear(manifest: Path, config: Path, axle: str, out: Path) -> int:
     written = out, page, _ = out, out.with_suffix(".md"), out.with_suffix(".svg")
     check_outputs(out, written, [*measured_files(manifest), *config_files(config)], toml=True)
     brake: Axle = getattr(vehicle, axle)
-    cooling = brake.disc_cooling + COOLING_SPEED * brake.disc_cooling_by_speed
-    blocks = read_blocks(manifest, brake.pad, Heat(brake.disc_heating, cooling))
-    fused = fuse(np.array([b.wear for b in blocks]), np.array([b.mass for b in blocks]))
-    regressors = np.array([block.regressors for block in blocks])
-    variance = np.diag(fused.covariance)
+    blocks = read_blocks(manifest, vehicle, axle)
     try:
+        blocks = _agreeing(blocks)
+        fused, regressors = _measured(blocks)
+        variance = np.diag(fused.covariance)
         fit = fit_law(regressors, fused.mass, variance)
         static = fit_law(regressors, fused.mass, variance, QUASI_STATIC)
+        if not explains(fit, fused.mass):
+            raise RunFault(
+                f"{manifest}: no law explains these blocks better than their mean (R² {fit.r2:.2f}, left out "
+                f"{100 * leave_one_out(fit, fused.mass):.0f} % RMS); check masses and the units of all files"
+            )
+        section = law_section(
+            fit, float(np.hypot(leave_one_out(fit, fused.mass), ROAD)), brake.pad, fused.slope
+        )
     except UserError as error:
-        raise UserError(str(manifest), f"{error.where}: {error.place}", error.remedy) from None
-    sigma = float(np.hypot(leave_one_out(fit, fused.mass), ROAD))
+        raise UserError(
+            str(manifest), ": ".join(filter(None, (error.where, error.place))), error.remedy
+        ) from None
     head = "# Wear law by `brake-ecu identify wear`."
-    write_car(config, out, head, {f"{axle}.pad": law_section(fit, sigma)})
+    write_car(config, out, head, {f"{axle}.pad": section})
     write_page(page, blocks, fused, fit, static, SHARE[axle] * vehicle.vehicle.mass)
     named = zip(TERMS, fit.coefficients, UNITS, strict=True)
     kept = ", ".join(f"{name} = {value:.4g} {unit}" for name, value, unit in named if value)

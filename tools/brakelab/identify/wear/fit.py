@@ -10,6 +10,7 @@ from itertools import combinations
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from brakelab.arrays import Array
@@ -22,6 +23,10 @@ LEAST_SINGULAR: Final = 1e-3  # of the greatest, of regressors scaled by row and
 LEAST_SCATTER: Final = 0.005  # relative
 ROUNDS: Final = 400
 CONFIDENCE: Final = (2.5, 97.5)  # %
+STRANGE: Final = np.log(1.8)
+"""Logarithm of a block's mass over its law's; pressure and running-in, in no law, make half of that."""
+FAR: Final = 4.0  # standard deviations of the others, likewise
+FEWEST: Final = 4  # blocks that must agree
 
 
 class Fit(NamedTuple):
@@ -138,6 +143,42 @@ def fit_law(
     spread = float(np.sum((mass - mass.mean()) ** 2))
     r2 = 1.0 - float(np.sum((mass - predicted) ** 2)) / spread
     return Fit(coefficients, low, high, predicted, left_out, scatter, r2, criterion, rank, condition)
+
+
+def strangers(regressors: Array, mass: Array, variance: Array) -> list[int]:
+    """Return the blocks whose mass the law of the others does not come near, worst first.
+
+    Arguments as of `fit_law`. At most one block of four is left out, and four must agree.
+    """
+    kept = np.arange(len(mass))
+    found: list[int] = []
+    while len(kept) > FEWEST and len(found) < len(mass) // FEWEST:
+        law = fit_law(regressors[kept], mass[kept], variance[kept])
+        worst = int(np.argmax(_off(mass[kept], law.left_out)))
+        one, others = kept[worst], np.delete(kept, worst)
+        rest = fit_law(regressors[others], mass[others], variance[others])
+        usual = float(np.median(_off(mass[others], rest.left_out))) / 0.6745
+        off = float(_off(mass[one], regressors[one] @ rest.coefficients))
+        if off < max(STRANGE, FAR * usual) or not _amid(regressors, one, others):
+            break
+        found.append(int(one))
+        kept = others
+    return found
+
+
+def _off(mass: Array, predicted: Array) -> Array:
+    return np.abs(np.log(mass / np.maximum(predicted, 1e-9)))
+
+
+def _amid(regressors: Array, one: int, others: NDArray[np.int64]) -> bool:
+    """Return whether the mean temperature of a block lies among those of the others, so that they tell it."""
+    heat = regressors[:, 1] / regressors[:, 0]
+    return bool(heat[others].min() <= heat[one] <= heat[others].max())
+
+
+def explains(fit: Fit, mass: Array) -> bool:
+    """Return whether the law tells blocks left out within 30 %, or any better than their mean does."""
+    return fit.r2 > 0.0 or leave_one_out(fit, mass) < 0.3
 
 
 def leave_one_out(fit: Fit, mass: Array) -> float:

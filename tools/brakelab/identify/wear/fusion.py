@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 BALANCE: Final = 0.03  # g, two weighings of two pads: balance and moisture
 POINT: Final = 0.010  # mm, of one thickness at one point
 POINTS: Final = 6
+UNEVEN: Final = 0.25  # of the mass: by it six points may miss what wears unevenly
+SURE: Final = 5.0  # standard deviations
 
 
 class Fused(NamedTuple):
@@ -26,6 +28,21 @@ class Fused(NamedTuple):
     slope: float
     """K, g/mm; NaN: no thickness was measured."""
     alpha: float
+
+
+def disagreeing(wear: NDArray[np.float64], mass: NDArray[np.float64]) -> list[tuple[int, float]]:
+    """Return the blocks of which balance and thickness cannot both be right, and the mass by thickness [g].
+
+    `wear` [mm], NaN where not measured, and `mass` [g], shape (n,); three or more tell what is usual.
+    """
+    known = np.flatnonzero(np.isfinite(wear))
+    if len(known) < 3:
+        return []
+    usual = float(np.median(mass[known] / wear[known]))
+    by_thickness = usual * wear
+    noise = np.hypot(np.sqrt(2.0) * BALANCE, usual * POINT * np.sqrt(2.0 / POINTS))
+    allowed = SURE * noise + UNEVEN * np.minimum(mass, by_thickness)
+    return [(int(k), float(by_thickness[k])) for k in known if abs(mass[k] - by_thickness[k]) > allowed[k]]
 
 
 def fuse(wear: NDArray[np.float64], mass: NDArray[np.float64]) -> Fused:

@@ -13,20 +13,27 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from brakelab.arrays import Array
+from brakelab.identify.friction.check import refuse_units
+from brakelab.identify.friction.columns import Columns
+from brakelab.identify.friction.recording import Recording
 from brakelab.identify.measurement_files import check_celsius, read_columns, read_manifest
 from brakelab.results.wear import regressors_of
 from brakelab.stretches import stretches
 from ecu.errors import UserError
+from ecu.settings.config import Config
 from ecu.settings.pad import Pad
 
 COLUMNS: Final = ("t", "omega", "calliper_pressure", "brake_torque", "disc_temperature")
+IN_ORDER: Final = ("t", "calliper_pressure", "brake_torque", "omega", "disc_temperature")
+"""As `Columns.contract` has them."""
 POINTS: Final = 6
 FEWEST: Final = 100  # applications of a block; the thesis has 250 and more
 PRESSED: Final = 1.0  # bar
 SHORTEST: Final = 0.1  # s of an application
 SLOPE_S: Final = 0.2  # s to either side, for the slope of the speed
-FAHRENHEIT: Final = 1.8
+UNEVEN: Final = 0.3  # mm by which a point may lose more or less than the others, beside what all lose
 HOTTEST: Final = 1100.0  # degC
+SPECIFIC: Final = (2e-3, 20.0)  # g/MJ: linings 0.05 to 1, some tens of times less or more where cold or hot
 
 
 class Block(NamedTuple):
@@ -44,15 +51,8 @@ class Block(NamedTuple):
     """Mean of the disc while braking, by energy [degC]."""
 
 
-class Heat(NamedTuple):
-    """Configured heating and cooling of the disc (3.7)."""
-
-    heating: float
-    cooling: float
-
-
-def read_blocks(manifest: Path, pad: Pad, heat: Heat) -> list[Block]:
-    """Return the blocks of a manifest.
+def read_blocks(manifest: Path, config: Config, axle: str) -> list[Block]:
+    """Return the blocks of a manifest, measured on a brake of an `axle` of `config`.
 
     Raises:
         UserError: a file, a row or a value of it is not right.
@@ -60,10 +60,10 @@ def read_blocks(manifest: Path, pad: Pad, heat: Heat) -> list[Block]:
     rows = read_manifest(manifest)
     if not rows:
         raise UserError(str(manifest), "", "no blocks; give a row with block, file, mass_before, mass_after")
-    return [_block(manifest, number, row, pad, heat) for number, row in enumerate(rows, 2)]
+    return [_block(manifest, number, row, config, axle) for number, row in enumerate(rows, 2)]
 
 
-def _block(manifest: Path, line: int, row: dict[str, str], pad: Pad, heat: Heat) -> Block:
+def _block(manifest: Path, line: int, row: dict[str, str], config: Config, axle: str) -> Block:
     where = f"line {line}"
     if not row.get("block") or not row.get("file"):
         raise UserError(str(manifest), where, "needs block, file, mass_before and mass_after")
@@ -72,13 +72,22 @@ def _block(manifest: Path, line: int, row: dict[str, str], pad: Pad, heat: Heat)
         raise UserError(
             str(manifest), f"{where}, block {row['block']}", f"pads gained mass ({before:g} to {after:g} g)"
         )
-    wear = _thickness(manifest, where, row, pad)
-    stops = read_stops(manifest.parent / row["file"])
+    wear = _thickness(manifest, where, row, getattr(config, axle).pad)
+    path = manifest.parent / row["file"]
+    stops = read_stops(path)
+    if stops:
+        _check_physics(path, stops, Columns.contract(IN_ORDER, "rad/s", config, axle))
     if len(stops) < FEWEST:
         remedy = f"{len(stops)} applications; a block needs {FEWEST} or more to wear what can be measured"
-        raise UserError(str(manifest.parent / row["file"]), f"block {row['block']}", remedy)
-    _check_temperature(manifest.parent / row["file"], stops, heat)
+        raise UserError(str(path), f"block {row['block']}", remedy)
     regressors = np.sum([stop_regressors(stop) for stop in stops], axis=0)
+    specific = (before - after) / float(regressors[0])
+    if not SPECIFIC[0] < specific < SPECIFIC[1]:
+        remedy = (
+            f"{before - after:.3g} over {regressors[0]:.3g} MJ make {specific:.2g} g/MJ, which no lining "
+            "wears; give masses in g"
+        )
+        raise UserError(str(manifest), f"{where}, block {row['block']}", remedy)
     mean = regressors[1] / regressors[0]
     return Block(row["block"], len(stops), regressors, before - after, wear, float(mean))
 
@@ -96,7 +105,7 @@ def _number(manifest: Path, where: str, row: dict[str, str], name: str) -> float
 def _thickness(manifest: Path, where: str, row: dict[str, str], pad: Pad) -> float:
     if not row.get("thickness_before_1"):
         return math.nan
-    lost = []
+    lost: list[float] = []
     for point in range(1, POINTS + 1):
         names = f"thickness_before_{point}", f"thickness_after_{point}"
         before, after = (_number(manifest, where, row, name) for name in names)
@@ -104,6 +113,12 @@ def _thickness(manifest: Path, where: str, row: dict[str, str], pad: Pad) -> flo
             remedy = f"{before:g} mm cannot be of a pad that is {pad.thickness_new:g} mm thick when new"
             raise UserError(str(manifest), f"{where}, {names[0]}", remedy)
         lost.append(before - after)
+    off = np.abs(lost - np.median(lost))
+    if off.max() > UNEVEN + np.abs(np.median(lost)):
+        names = (f"thickness_{when}_{int(np.argmax(off)) + 1}" for when in ("before", "after"))
+        said = " and ".join(f"{name} {row[name]}" for name in names)
+        remedy = f"{off.max():.1f} mm off what the other points lost; correct the reading"
+        raise UserError(str(manifest), f"{where}, {said} mm", remedy)
     if np.mean(lost) <= 0.0:
         remedy = f"the pads grew by {-1e3 * float(np.mean(lost)):.0f} µm; measure them cold, same points"
         raise UserError(str(manifest), f"{where}, thickness_after_1…{POINTS}", remedy)
@@ -131,24 +146,22 @@ def stop_regressors(stop: dict[str, Array]) -> Array:
     return regressors_of(torque, omega, stop["disc_temperature"], period, max(round(SLOPE_S / period), 1))
 
 
-def _check_temperature(path: Path, stops: list[dict[str, Array]], heat: Heat) -> None:
-    """Refuse temperatures that cannot be degC: by their range, and by the heating per work."""
-    everything = np.concatenate([stop["disc_temperature"] for stop in stops])
-    if not np.isfinite(everything).all():
-        raise UserError(str(path), "disc_temperature", "has gaps while the brake is applied; fill them")
-    check_celsius(path, "disc_temperature", everything, HOTTEST)
-    ratios = []
-    for stop in stops:
-        seconds = stop["t"][-1] - stop["t"][0]
-        work = float(np.trapezoid(np.abs(stop["brake_torque"] * stop["omega"]), stop["t"]))
-        if heat.heating * work > 5.0:  # K
-            loss = 1.0 - 0.5 * heat.cooling * seconds
-            rise = stop["disc_temperature"][-1] - stop["disc_temperature"][0]
-            ratios.append(rise / (heat.heating * work * max(loss, 0.3)))
-    middle = float(np.median(ratios)) if ratios else 1.0
-    if 0.8 * FAHRENHEIT < middle < 1.3 * FAHRENHEIT:
-        remedy = (
-            f"rises {middle:.1f} times what the work warms the disc: °F? convert it to degC "
-            "(or correct disc_heating in CONFIG)"
+def _check_physics(path: Path, stops: list[dict[str, Array]], columns: Columns) -> None:
+    """Refuse columns that have gaps or cannot be in the units that they should have."""
+    for name in COLUMNS[1:]:
+        everything = np.concatenate([stop[name] for stop in stops])
+        if not np.isfinite(everything).all():
+            raise UserError(str(path), name, "has gaps while the brake is applied; fill them")
+    heat = np.concatenate([stop["disc_temperature"] for stop in stops])
+    check_celsius(path, "disc_temperature", heat, HOTTEST)
+    applications = [
+        Recording(
+            stop["t"],
+            1e5 * stop["calliper_pressure"],
+            np.abs(stop["brake_torque"]),
+            np.abs(stop["omega"]),
+            stop["disc_temperature"],
         )
-        raise UserError(str(path), "disc_temperature", remedy)
+        for stop in stops
+    ]
+    refuse_units(applications, columns, str(path))
