@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from ecu.algorithm.monitoring.wear import WEAR_STATE, restore_wear
+from ecu.algorithm.monitoring.wear import LEG, WEAR_STATE, restore_wear
 from ecu.algorithm.monitoring.wear_belief import mass_by_law
 from ecu.algorithm.step import new_state
 from ecu.contract.records import N_LEGS, N_MEASURED, RecordArray
@@ -102,8 +102,9 @@ def rate_per_metre(params: Any, wear: Any, i: int) -> tuple[float, float]:
     if driven < LEAST_DISTANCE:
         return math.nan, math.nan
     rate = mass_by_law(params, wear["regressors"], i) / driven
-    legs = min(int(wear["legs"]), N_LEGS)
-    order = [(int(wear["legs"]) - legs + k) % N_LEGS for k in range(legs)]
+    legs = int(wear["legs"])
+    whole = max(legs - N_LEGS, math.ceil(float(wear["fitted_at"][i]) / LEG) - 1, 0)
+    order = [leg % N_LEGS for leg in range(whole, legs)]  # that of the fitting is a part: it only begins them
     masses = np.diff([mass_by_law(params, wear["leg_ends"][k], i) for k in order])
     masses = masses[masses > 0.0]
     if len(masses) < 3:
@@ -160,7 +161,7 @@ def lines(corners: list[Corner]) -> list[str]:
     if unknown := [c.corner for c in corners if not c.told and not c.measurements]:
         names = ", ".join(unknown)
         table.append(
-            f"{names}: counted from a full lining; give --measured or --new-pads to say what is there"
+            f"{names}: taken as half worn, give or take half; --measured or --new-pads says what is there"
         )
     if measured := [f"{c.corner} {c.scale:.2f}" for c in corners if c.measurements]:
         table.append("wear over what the law gives, as measured: " + ", ".join(measured))

@@ -10,6 +10,7 @@ import numpy as np
 from ecu.algorithm.control.blending import blends
 from ecu.algorithm.control.friction_torque import lining_torque
 from ecu.algorithm.estimate import STANDING
+from ecu.algorithm.monitoring.wear_belief import is_known
 from ecu.contract.faults import WORD
 from ecu.contract.params import BAR
 from ecu.contract.signals import CALLIPER_PRESSURE, FAILED
@@ -82,5 +83,6 @@ def publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: in
         y.test_ratio[i] = e.test_ratio[i]
         y.pad_wear[i] = s.wear.wear[i] if mapped else math.nan
         y.sigma_pad_wear[i] = s.wear.sigma[i] if mapped else math.nan
-        y.pad_remaining[i] = 100.0 * max(1.0 - s.wear.wear[i] / p.pad_life[i], 0.0) if mapped else math.nan
+        left = 100.0 * max(1.0 - s.wear.wear[i] / p.pad_life[i], 0.0)
+        y.pad_remaining[i] = left if mapped and is_known(s.learned.wear, i) else math.nan
         y.pad_wear_mass[i] = s.wear.mass[i] if mapped else math.nan

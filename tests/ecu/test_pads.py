@@ -10,7 +10,7 @@ from ecu.algorithm.monitoring.wear import LEG
 from ecu.algorithm.step import new_state
 from ecu.contract.records import N_LEGS
 from ecu.errors import UserError
-from ecu.pads import appraise, wear_command
+from ecu.pads import appraise, pads, rate_per_metre, wear_command
 from ecu.recording.store import in_use, open_store, restore, save
 from ecu.settings.config import load_config, new_params, store_key
 
@@ -63,6 +63,27 @@ def test_uneven_driving_widens_the_band_of_the_distance():
         for legs in (even, uneven)
     ]
     assert widths[1] > 1.1 * widths[0]
+
+
+def test_the_leg_in_which_pads_were_fitted_is_no_leg_of_theirs():
+    """Fitted after 3.9 legs, then 2 g a leg: a tenth of a leg used to count as one that wears a tenth."""
+    learned = driven(2e3, 8.2)
+    wear = learned[0]["wear"]
+    wear["fitted_at"], wear["legs"] = 3.9 * LEG, 8
+    masses = np.array([0.0, 0.0, 0.0, 0.2, 2.2, 4.2, 6.2, 8.2])
+    wear["leg_ends"][:, 0] = masses[:, None] / PARAMS["wear_law"][0, 0]
+    rate, spread = rate_per_metre(PARAMS[0], wear, 0)
+    assert rate == pytest.approx(8.2 / (2e6 - 3.9 * LEG))
+    assert spread == pytest.approx(0.0, abs=1e-9)
+
+
+def test_linings_of_which_nobody_said_anything_are_half_worn_give_or_take_half():
+    """Their band holds 95 % of any pads: of a uniform distribution the mean is in the middle."""
+    learned = new_state(PARAMS)["learned"].copy()
+    for corner, pad in zip(appraise(PARAMS, learned, VEHICLE), pads(VEHICLE), strict=True):
+        life = pad.thickness_new - pad.thickness_worn
+        assert corner.wear == pytest.approx(0.5 * life)
+        assert corner.sigma == pytest.approx(life / np.sqrt(12.0), rel=0.02)
 
 
 def test_a_measured_thickness_corrects_and_narrows(tmp_path, capsys):

@@ -34,6 +34,7 @@ from ecu.algorithm.monitoring.emission_factor import (
     emission_factor,
     inside,
 )
+from ecu.algorithm.monitoring.wear_belief import mass_by_law
 from ecu.contract.dust import NONE
 from ecu.contract.params import BAR
 from ecu.contract.signals import CALLIPER_PRESSURE
@@ -150,5 +151,6 @@ def _renew(params: Record, state: Record, learned: Record, wear: Record) -> None
         state.per_km = 1e3 * dust.particles / dust.way
     for i in range(4):
         way = learned.wear.odometer - learned.wear.fitted_at[i]
-        grams = params.airborne_share[i] * wear.mass[i]
+        worn = wear.belief.scale[i] * mass_by_law(params, learned.wear.regressors, i)
+        grams = params.airborne_share[i] * worn
         state.mass_per_km += 1e6 * grams / way if way >= LEAST_WEAR_WAY else math.nan

@@ -9,7 +9,9 @@ which the thesis scales its dynamometer law to the road (7.6, from one measureme
 s starts at 1 with the law's spread and, relative to the mass so far, the errors of friction and temperature.
 A measured thickness is a measured M (`pad_geometry.py`); both states are corrected by Kalman's rule. All of
 it is computed anew from the stored values, so that another law reinterprets the same regressors and
-measurements. Linings not registered as new when counting began may have any wear.
+measurements. Linings not registered as new when counting began may have any wear: the belief begins at half
+a life, with the deviation of a uniform distribution, and what is left of them is not told before they are
+measured.
 """
 
 import math
@@ -69,11 +71,24 @@ def _ahead(params: Record, state: Record, i: int, law: float) -> tuple[float, fl
 
 
 @kernel
+def unregistered(params: Record, i: int) -> tuple[float, float]:
+    """Return mean and deviation of the thickness lost [mm] by linings of which nobody said anything."""
+    return 0.5 * params.pad_life[i], params.pad_life[i] / UNIFORM
+
+
+@kernel
+def is_known(wear: Record, i: int) -> bool:
+    """Return whether the linings of corner i were registered as new, or measured."""
+    return bool(wear.told[i] != 0 or wear.measurements[i] > 0)
+
+
+@kernel
 def believe(params: Record, state: Record, wear: Record, i: int) -> None:
     """Compute the belief of corner i from all values stored in `wear`."""
-    start = NEW_SIGMA if wear.told[i] else params.pad_life[i] / UNIFORM
-    sigma = start * params.pad_mass[i] * area_share(params, i, 0.0)
-    state.mass[i] = state.law[i] = state.covariance[i] = 0.0
+    lost, deviation = (0.0, NEW_SIGMA) if wear.told[i] else unregistered(params, i)
+    sigma = deviation * params.pad_mass[i] * area_share(params, i, lost)
+    state.mass[i] = mass_of(params, i, lost)
+    state.law[i] = state.covariance[i] = 0.0
     state.scale[i], state.mass_variance[i] = 1.0, sigma * sigma
     own = params.wear_sigma[i] * params.wear_sigma[i]
     state.scale_variance[i] = own

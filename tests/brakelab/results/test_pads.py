@@ -15,11 +15,12 @@ from ecu.settings.resources import resource
 SUV = load_config(resource("config/suv.toml"))
 
 
-def test_a_new_ecu_knows_a_full_lining_and_no_distance():
+def test_a_new_ecu_takes_linings_as_half_worn_and_knows_no_distance():
     params = new_params(SUV)
     pads = pads_of(params, new_state(params)["learned"], SUV)
     assert [pad.corner for pad in pads] == list(CORNERS)
-    assert all(pad.thickness == SUV.front.pad.thickness_new and not pad.told for pad in pads)
+    middle = 0.5 * (SUV.front.pad.thickness_new + SUV.front.pad.thickness_worn)
+    assert all(pad.thickness == pytest.approx(middle) and not pad.told for pad in pads)
     assert all(math.isnan(pad.remaining) for pad in pads)
     assert all(pad.configured and not pad.emission_model for pad in pads)
 

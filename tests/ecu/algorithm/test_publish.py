@@ -32,3 +32,14 @@ def test_demands_are_sent_in_bar_and_a_failed_ecu_demands_no_pressure(mode: int,
     assert outputs["pressure_uncompensated"][0] == pytest.approx([28.0] * 4)
     assert outputs["motor_demand"][0] == pytest.approx([400.0] * 4)
     assert state["limiter"]["pressure"][0] == pytest.approx(PRESSURES)
+
+
+def test_what_remains_of_linings_is_unknown_until_somebody_says_what_is_fitted() -> None:
+    params = new_params(load_config(resource("config/suv.toml")))
+    params["mapped"] = 1
+    state, outputs = new_state(params), np.full(1, np.nan, OUTPUTS)
+    wear = state["learned"]["wear"][0]
+    wear["told"], wear["measurements"] = [1, 0, 0, 0], [0, 1, 0, 0]
+    publish(params[0], state[0], np.zeros(1, INPUTS)[0], outputs[0], 3.0, 0, ACTIVE)
+    assert np.isfinite(outputs["pad_remaining"][0]).tolist() == [True, True, False, False]
+    assert np.isfinite(outputs["sigma_pad_wear"][0]).all()

@@ -90,7 +90,7 @@ def _known_by(pad: PadState) -> str:
     if pad.measurements:
         times = "once" if pad.measurements == 1 else f"{pad.measurements} times"
         return f"measured {times}, {pad.scale:.2f} of the law"
-    return "fitted as new, by the law" if pad.told else "by the law, from a full lining"
+    return "fitted as new, by the law" if pad.told else "by the law, from half a life"
 
 
 def _amounts(drive: Drive, pads: list[PadState], applications: list[Application]) -> list[Amount]:

@@ -56,7 +56,7 @@ def _of_pads(pads: list[PadState]) -> list[Untold]:
     found = []
     if names := [pad.corner for pad in pads if not pad.told and not pad.measurements]:
         reason = (
-            "nobody said what is fitted, so a full lining is counted from, with a band as wide as its life: "
+            "nobody said what is fitted, so half a life is counted from, give or take half: "
             "brake-ecu wear --new-pads or --measured says it."
         )
         found.append(Untold(f"Thickness of {', '.join(names)} to better than their life", reason))

@@ -10,6 +10,7 @@ from brakelab.identify.dust.fit import (
     Judged,
     choose,
     conformal,
+    inside_of,
     judge,
     kpis,
     ranges,
@@ -37,6 +38,16 @@ def trips(seed: int, count: int = 8, n: int = 100, scatter: float = SCATTER) -> 
             )
         )  # fmt: skip
     return made
+
+
+def test_a_winter_trip_is_within_what_it_was_trained_on():
+    """Discs below 0 °C are in the range of a model that has seen them; other features are never below 0."""
+    made = trips(3)[:2]
+    made[0].features[:, 3] -= 25.0
+    low, high = ranges(made)
+    assert low[3] < made[0].features[:, 3].min() < 0.0
+    assert (low[[0, 1, 2, 4, 5]] > 0.0).all()
+    assert inside_of(made[0].features, (low, high)).all()
 
 
 def test_conformal_intervals_hold_95_percent():

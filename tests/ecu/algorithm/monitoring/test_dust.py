@@ -207,7 +207,7 @@ def test_other_models_count_anew(car):
 
 def test_mass_is_what_stays_in_the_air_of_what_was_worn_off(car):
     wear = car.s["learned"]["wear"]
-    wear["odometer"], car.s["wear"]["mass"] = 1000e3, [10.0, 10.0, 4.0, 4.0]
+    wear["odometer"], wear["regressors"][0] = 1000e3, [10.0, 10.0, 4.0, 4.0] / car.p["wear_law"][0]
     wear["fitted_at"] = [0.0, 0.0, 500e3, 500e3]
     assert list(car.p["airborne_share"]) == [0.5] * 4
     assert again(car)["mass_per_km"] == pytest.approx(2 * 5.0 + 2 * 4.0)

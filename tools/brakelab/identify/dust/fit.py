@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.arrays import Array
-from brakelab.identify.dust.features import Applications
+from brakelab.identify.dust.features import FEATURES, Applications
 from brakelab.identify.dust.model import FITS, LEAST, Model, samples_of
 
 COVERAGE: Final = 0.95
@@ -63,7 +63,8 @@ def ranges(trips: list[Applications]) -> tuple[Array, Array]:
     features = np.concatenate([trip.features for trip in trips])
     low, high = features.min(axis=0), features.max(axis=0)
     margin = MARGIN * (high - low)
-    return np.maximum(low - margin, 1e-3), high + margin
+    least = np.where(np.array(FEATURES) == "temperature", -np.inf, 1e-3)  # of the others nothing is below 0
+    return np.maximum(low - margin, least), high + margin
 
 
 def inside_of(features: Array, trained: tuple[Array, Array]) -> NDArray[np.bool_]:
