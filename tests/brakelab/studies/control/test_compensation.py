@@ -70,3 +70,18 @@ def test_told_too_much_friction_the_car_brakes_too_little() -> None:
     (under,), (over,) = (application_errors(runs[kind], runs["ideal"]) for kind in ("under", "over"))
     assert under == pytest.approx(100 * (1 - 1 / 1.15), abs=0.5)
     assert over == pytest.approx(100 * (1 / 0.85 - 1), abs=0.5)
+
+
+def test_a_car_that_did_not_get_there_is_left_out_of_what_mass_leaves() -> None:
+    """Its cell is a dash, and no mean of the others is nan."""
+    shape = (2, len(LEVELS))
+    whole, short = np.full(shape, 3.0), np.full(shape, 3.0)
+    short[:, -1] = np.nan
+    cars = [
+        Car({}, {(name, "compensated"): (curve, curve) for name in CURVES}, {}, 1.0)
+        for curve in (whole, whole, short)
+    ]
+    table = mass_table(cars)
+    assert table.rows[2][4] == "–"
+    assert table.rows[-1][4] == "+2.0 (0.0)"
+    assert "nan" not in str(table)

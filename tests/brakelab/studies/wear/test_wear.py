@@ -6,7 +6,7 @@ import pytest
 from brakelab.identify.wear.fit import fit_law
 from brakelab.studies.wear.drives import CarDrives, Part, trip_scenario
 from brakelab.studies.wear.study import LAWS, LIFE_KM, MODES, Law, Life, live
-from brakelab.studies.wear.wear import determination, inside, wear_tables
+from brakelab.studies.wear.wear import determination, inside, wear_tables, wins
 
 TRUE_LAW = np.array([0.08, 0.0, 0.0, 0.0, 0.0, 3.0, 0.0])
 
@@ -81,3 +81,8 @@ def test_drivers_differ_in_speed_time_and_season():
     assert ends[0] / ends[1] == pytest.approx(1.10 / 0.82)
     assert calm.ambient_temperature < lively.ambient_temperature
     assert calm.vehicle_speed == "none"
+
+
+def test_a_tie_is_nobodys_win() -> None:
+    """The rear's two laws are the same one: its pads say nothing about which is better."""
+    assert wins(np.array([[0.9, 0.8], [0.7, 0.7]]), np.array([[0.8, 0.9], [0.7, 0.7]])) == (1, 2)

@@ -164,6 +164,7 @@ def campaign(
     car = drawn_brake(seed) if car is None else car
     random = np.random.default_rng([seed, 82])
     work, found = random.uniform(*DRIVEN), []
+    radius = float(car[0]["free_radius"][corner])
     for number in range(trips):
         drive, _ = _trace(random, 1000 * seed + number)
         conditions = _conditions(random, day)
@@ -172,7 +173,7 @@ def campaign(
         wander = _wander(random, len(drive))
         out, mean = (np.zeros((len(drive) // 10 + 1, EMITTED + 1)) for _ in range(2))
         rows, _ = run_trip(car[0], corner, conditions[0], drive, wander, scatter, out)
-        work += float(np.trapezoid(out[:rows, TORQUE] * out[:rows, SPEED], out[:rows, T])) / 0.33
+        work += float(np.trapezoid(out[:rows, TORQUE] * out[:rows, SPEED], out[:rows, T])) / radius
         plain = conditions.copy()
         plain["day"] = 1.0
         run_trip(car[0], corner, plain[0], drive, wander, np.ones(1), mean)
