@@ -2,12 +2,14 @@
 
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pa_csv
 import pyarrow.parquet as pq
 import pytest
 
-from brakelab.identify.measurement_files import read_columns
+from brakelab.identify.measurement_files import read_columns, read_manifest
+from ecu.errors import UserError
 
 TABLE = pa.table({"t": [0.0, 0.1], "omega": [80.0, 79.0]})
 
@@ -24,3 +26,63 @@ TABLE = pa.table({"t": [0.0, 0.1], "omega": [80.0, 79.0]})
 def test_the_ending_of_a_block_may_be_in_capitals(tmp_path: Path, name: str, write) -> None:
     write(TABLE, tmp_path / name)
     assert read_columns(tmp_path / name, ("t", "omega"), "block")["omega"].tolist() == [80.0, 79.0]
+
+
+MANIFEST = "block,file,mass_before\nkühl,b1.csv,905.123\n"
+EXPORTS = {
+    "Excel, CSV UTF-8": MANIFEST.encode("utf-8-sig"),
+    "Excel, German": MANIFEST.replace(",", ";").replace(".123", ",123").encode("cp1252"),
+    "Excel, Unicode text": MANIFEST.replace(",", "\t").encode("utf-16"),
+    "LibreOffice": MANIFEST.encode(),
+}
+
+
+@pytest.mark.parametrize("text", EXPORTS.values(), ids=EXPORTS)
+def test_a_manifest_is_what_a_spreadsheet_writes(tmp_path: Path, text: bytes) -> None:
+    (tmp_path / "manifest.csv").write_bytes(text)
+    row = {"block": "kühl", "file": "b1.csv", "mass_before": "905.123"}
+    assert read_manifest(tmp_path / "manifest.csv") == [row]
+
+
+BLOCKS = {
+    "as the contract has it": "t,omega,brake_torque,disc_temperature\n0,80,1200,20\n0.1,79,1210,\n",
+    "decimal commas, units below": (
+        "t;omega;brake_torque;disc_temperature\ns;1/min;kN m;°F\n0;763,9437;1,2;68\n0,1;754,3944;1,21;\n"
+        "0,2;744,8451;1,22;70\n0,3;735,2958;1,23;71\n"
+    ),
+    "a head, units in brackets": (
+        "Prüfstand 4\nBelag X\nt [s];omega [rad/s];brake_torque [N m];disc_temperature [°C]\n"
+        "0;80;1.200,0;20\n0,1;79;1.210,0;\n0,2;78;1.220,0;21\n0,3;77;1.230,0;22\n"
+    ),
+    "times of day": (
+        "t,omega,brake_torque,disc_temperature\n10:59:59.9,80,1200,20\n11:00:00.0,79,1210,nan\n"
+    ),
+}
+
+
+@pytest.mark.parametrize("text", BLOCKS.values(), ids=BLOCKS)
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
+def test_a_block_is_what_a_rig_writes(tmp_path: Path, text: str, encoding: str) -> None:
+    path = tmp_path / "block.csv"
+    path.write_text(text, encoding)
+    columns = read_columns(path, ("t", "omega", "brake_torque", "disc_temperature"), "block")
+    assert np.diff(columns["t"][:2]) == pytest.approx([0.1])
+    assert columns["omega"][:2] == pytest.approx([80.0, 79.0], rel=1e-5)
+    assert columns["brake_torque"][:2] == pytest.approx([1200.0, 1210.0])
+    assert columns["disc_temperature"][0] == pytest.approx(20.0)
+    assert np.isnan(columns["disc_temperature"][1])
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("t,omega\n0,80\n0.1,fast\n", "line 3, omega: fast is no number"),
+        ("t,omega\n0,80\n0.1\n", "line 3 (1 cell instead of 2): is damaged"),
+        ("t;omega\ns;furlong\n0;80\n1;79\n2;78\n", "omega: unit 'furlong' unknown; one of rad/s, rpm"),
+    ],
+)
+def test_what_is_no_number_is_named(tmp_path: Path, text: str, line: str) -> None:
+    (tmp_path / "block.csv").write_text(text)
+    with pytest.raises(UserError) as error:
+        read_columns(tmp_path / "block.csv", ("t", "omega"), "block")
+    assert line in str(error.value)

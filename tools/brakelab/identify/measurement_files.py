@@ -1,34 +1,74 @@
 """Manifests and tables of measurements: read, and refused with one line if invalid."""
 
+import codecs
 import csv
+import datetime
+import io
+import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.csv as pa_csv
 import pyarrow.parquet as pq
 
 from brakelab.arrays import Array
+from brakelab.identify.friction.columns import UNITS, ZEROS
+from brakelab.logs.csv_header import find_header
+from brakelab.logs.csv_rows import csv_columns, csv_rows
+from brakelab.logs.log_quality import Damage
 from brakelab.results.mdf import load_asammdf
 from ecu.errors import UserError
 
 WARMEST_COLD: Final = 250.0
 """degC: a disc that is never cooler is given in K."""
 COLDEST: Final = -60.0  # degC
+CONTRACT: Final = {
+    "t": ("time", "s"),
+    "omega": ("speed", "rad/s"),
+    "vehicle_speed": ("speed", "m/s"),
+    "calliper_pressure": ("pressure", "bar"),
+    "brake_torque": ("torque", "N m"),
+    "disc_temperature": ("temperature", "degC"),
+}
+"""Quantity and unit of the columns of blocks and trips."""
+_DECIMAL: Final = re.compile(r"^([-+]?\d+),(\d+)$")
+_DATE: Final = re.compile(
+    r"(?:(\d{1,4})[-./](\d{1,2})[-./](\d{1,4})[T ]+)?(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d*)?)"
+)
+_EPOCH: Final = datetime.date(2000, 1, 1).toordinal()
+"""Seconds are counted from here: of today's dates a microsecond is left."""
 
 
 def read_manifest(path: Path) -> list[dict[str, str]]:
-    """Return the rows of a CSV manifest.
+    """Return the rows of a CSV manifest, as spreadsheets write them; decimal commas are points.
 
     Raises:
         UserError: it cannot be read.
     """
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            return list(csv.DictReader(file))
-    except (OSError, UnicodeDecodeError) as error:
-        raise UserError(str(path), "", f"cannot be read: {error}; give a CSV manifest") from None
+        given = path.read_bytes()
+    except OSError as error:
+        raise UserError(str(path), "", f"cannot be read ({error.strerror}); give a CSV manifest") from None
+    text = _decoded(given)
+    names = text.partition("\n")[0]
+    delimiter = max(",;\t", key=names.count)
+    rows = csv.DictReader(io.StringIO(text), delimiter=delimiter)
+    return [
+        {name.strip(): _DECIMAL.sub(r"\1.\2", (cell or "").strip()) for name, cell in row.items() if name}
+        for row in rows
+    ]
+
+
+def _decoded(given: bytes) -> str:
+    """Return text of whatever a spreadsheet writes: UTF-8 with or without a mark, UTF-16, Windows-1252."""
+    if given[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
+        return given.decode("utf-16", "replace")
+    try:
+        return given.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return given.decode("cp1252", "replace")
 
 
 def measured_files(manifest: Path) -> list[Path]:
@@ -43,7 +83,9 @@ def measured_files(manifest: Path) -> list[Path]:
 def read_columns(path: Path, names: tuple[str, ...], what: str) -> dict[str, Array]:
     """Return columns of a CSV, Parquet or MDF4 file, each of shape (n,); NaN where a row has no value.
 
-    In MDF4 `t` is the time of the second of `names`; other channels are interpolated to it.
+    A CSV file may be any that `header_of` reads; where it states units, columns are converted to those of
+    `CONTRACT`, and a time that is a date or a time of day becomes seconds. In MDF4 `t` is the time of the
+    second of `names`; other channels are interpolated to it.
 
     Args:
         path: of the file.
@@ -59,11 +101,15 @@ def read_columns(path: Path, names: tuple[str, ...], what: str) -> dict[str, Arr
         columns = _channels(path, names, what)
         _check_time(path, columns["t"])
         return columns
+    if path.suffix.lower() != ".parquet":
+        columns = _csv(path, names, what)
+        _check_time(path, columns["t"])
+        return columns
     try:
-        table = pq.read_table(path) if path.suffix.lower() == ".parquet" else pa_csv.read_csv(path)
+        table = pq.read_table(path)
     except (OSError, pa.ArrowInvalid) as error:
         reason = str(error).splitlines()[0]
-        raise UserError(str(path), "", f"cannot be read as CSV or Parquet: {reason}") from None
+        raise UserError(str(path), "", f"cannot be read as Parquet: {reason}") from None
     if missing := [name for name in names if name not in table.column_names]:
         raise UserError(str(path), missing[0], f"no such column; a {what} has {', '.join(names)}")
     try:
@@ -72,6 +118,100 @@ def read_columns(path: Path, names: tuple[str, ...], what: str) -> dict[str, Arr
         raise UserError(str(path), "", f"{', '.join(names)} must be numbers") from None
     _check_time(path, columns["t"])
     return columns
+
+
+def _csv(path: Path, names: tuple[str, ...], what: str) -> dict[str, Array]:
+    found, delimiter, above, units = header_of(path, list(names))
+    if missing := [name for name in names if name not in found]:
+        raise UserError(str(path), missing[0], f"no such column; a {what} has {', '.join(names)}")
+    parts: dict[str, list[Array]] = {name: [] for name in names}
+    damage = Damage()
+    for lines, batch in csv_rows(path, found, delimiter, list(names), damage, above):
+        for name in names:
+            cells = batch.column(name)
+            values = numbers_of(cells.to_pylist())
+            wrong = np.isnan(values) & np.asarray(cells.is_valid())
+            wrong[wrong] = [str(cells[int(k)]).strip().lower() != "nan" for k in np.flatnonzero(wrong)]
+            if wrong.any():
+                place = int(np.argmax(wrong))
+                raise UserError(str(path), f"line {lines[place]}, {name}", f"{cells[place]} is no number")
+            parts[name].append(values)
+    if damage.damaged:
+        raise UserError(str(path), damage.first_damaged, "is damaged; mend or remove the line")
+    return {
+        name: _converted(path, name, np.concatenate(values or [np.empty(0)]), units.get(name, ""))
+        for name, values in parts.items()
+    }
+
+
+def _converted(path: Path, name: str, values: Array, unit: str) -> Array:
+    """Return values in the unit of `CONTRACT` from the `unit` that the file states, if it does."""
+    quantity, own = CONTRACT.get(name.removesuffix("_fr"), ("", ""))
+    if not unit or not quantity or unit == own:
+        return values
+    known = {one: factor for one, factor in UNITS[quantity].items() if factor * UNITS[quantity][own] > 0.0}
+    if unit not in known:
+        raise UserError(str(path), name, f"unit {unit!r} unknown; one of {', '.join(known)}")
+    return np.asarray((values - ZEROS.get(unit, 0.0)) * (known[unit] / known[own]))
+
+
+def header_of(path: Path, names: list[str]) -> tuple[list[str], str, int, dict[str, str]]:
+    """Return columns of a CSV file, separator, number of lines above the rows, and units where it states
+    them.
+
+    Lines may stand above the names and units below them or in brackets behind; `names` are those looked for.
+
+    Raises:
+        UserError: it is UTF-16, or has no names above rows of numbers.
+    """
+    found, delimiter = csv_columns(path)
+    if set(names) <= set(found) and _numbers_follow(path, delimiter):
+        return found, delimiter, 1, {}
+    try:
+        header = find_header(path)
+    except UserError:
+        if set(names) <= set(found):
+            return found, delimiter, 1, {}
+        raise
+    titled = set(names) <= set(header.titles)
+    columns = header.titles if titled else header.names
+    return columns, header.delimiter, header.lines, dict(zip(columns, header.units, strict=False))
+
+
+def _numbers_follow(path: Path, delimiter: str) -> bool:
+    """Return whether the second line has a number, so that it states no units."""
+    with path.open("rb") as stream:
+        stream.readline()
+        cells = stream.readline().decode("latin-1").replace(",", "." if delimiter != "," else ",")
+    return bool(np.isfinite(numbers_of(cells.strip().split(delimiter))).any())
+
+
+def numbers_of(cells: Sequence[str | None]) -> Array:
+    """Return cells of text as numbers, shape (n,): of a date or a time of day its seconds, of another NaN."""
+
+    def number(cell: str | None) -> float:
+        try:
+            return float(cell) if cell else np.nan
+        except ValueError:
+            return _seconds(cell or "")
+
+    return np.array([number(cell) for cell in cells])
+
+
+def _seconds(cell: str) -> float:
+    """Return the time of a cell such as 12.03.2024 10:23:45.120 [s]."""
+    found = _DATE.fullmatch(cell.strip().strip('"'))
+    if not found:
+        return np.nan
+    *date, hours, minutes, seconds = found.groups()
+    days = 0
+    if date[0]:
+        year, month, day = date if len(date[0]) == 4 else reversed(date)
+        try:
+            days = datetime.date(int(year), int(month), int(day)).toordinal() - _EPOCH
+        except ValueError:  # the month first
+            days = datetime.date(int(year), int(day), int(month)).toordinal() - _EPOCH
+    return 86400.0 * days + 3600.0 * int(hours) + 60.0 * int(minutes) + float(seconds)
 
 
 def _check_time(path: Path, t: Array) -> None:

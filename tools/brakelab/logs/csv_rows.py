@@ -1,8 +1,8 @@
 """Reads CSV text into columns of text, a block of whole lines at a time, so that every row knows its line.
 
 Cells stand between commas, semicolons or tabs, whichever the line of names has; with semicolons or tabs a
-decimal comma is a point. A line that is damaged is skipped and counted; a last line that is not whole is
-not used.
+decimal comma is a point, and what separates thousands is left out. A line that is damaged is skipped and
+counted; a last line that is not whole is not used.
 """
 
 import io
@@ -77,6 +77,17 @@ def csv_rows(
             damage.cut = f"line {line}: the last line is cut off and was not used"
 
 
+def _pointed(column: pa.StringArray) -> pa.StringArray:
+    """Return cells with a decimal point; `1.234,5` and `1,234.5` are numbers with thousands."""
+    import pyarrow.compute as pc  # see `signal_batches`
+
+    for thousands, point in ((".", ","), (",", ".")):
+        grouped = rf"^\s*[-+]?\d{{1,3}}(\{thousands}\d{{3}})+\{point}\d*\s*$"
+        if pc.any(pc.match_substring_regex(column, grouped)).as_py():
+            column = pc.replace_substring(column, thousands, "")
+    return pc.replace_substring(column, ",", ".")
+
+
 def _parsed(
     text: bytes,
     line: int,
@@ -120,7 +131,5 @@ def _parsed(
         lines = np.delete(lines, [row for row, _ in wrong])
     columns = [table.column(name).combine_chunks() for name in wanted]
     if pointed:
-        import pyarrow.compute as pc  # see `signal_batches`
-
-        columns = [pc.replace_substring(column, ",", ".") for column in columns]
+        columns = [_pointed(column) for column in columns]
     return lines, pa.RecordBatch.from_arrays(columns, names=wanted)

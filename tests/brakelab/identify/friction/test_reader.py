@@ -1,5 +1,6 @@
 """A stranger's recording: other columns, units and separators, damaged rows; and each line that he gets."""
 
+import datetime
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 from brakelab.identify.friction.columns import Columns, columns_text
 from brakelab.identify.friction.reader import read_recording
 from brakelab.identify.friction.recording import Recording, write_recording
+from brakelab.identify.friction.stops import find_stops
 from brakelab.plant.linings import Lining
 from ecu.errors import UserError
 
@@ -87,6 +89,54 @@ def test_lines_above_the_names_are_passed_over(
     read = read_recording(path)
     assert read.damaged == ""
     np.testing.assert_allclose(read.recording.time, recording.time, rtol=1e-4, atol=2e-3)
+
+
+def _export(strange: Path, cells) -> Path:
+    """Rewrite a stranger's file; `cells`: of the number of a row and its cells, the new ones."""
+    head, *rows = strange.read_text("utf-8").splitlines()
+    new = [";".join(cells(number, row.split(";"))) for number, row in enumerate(rows)]
+    strange.write_text("\n".join([head, *new, ""]), "utf-8")
+    return strange
+
+
+def _grouped(cell: str) -> str:
+    return f"{float(cell.replace(',', '.')):,.6f}".replace(",", "|").replace(".", ",").replace("|", ".")
+
+
+def test_thousands_are_numbers(tmp_path: Path, recording: Recording, strange: Write) -> None:
+    """1.234,5 rpm: what turns fastest was left out."""
+    path = _export(strange(tmp_path, recording), lambda _, cells: list(map(_grouped, cells)))
+    read = read_recording(path)
+    assert read.damaged == ""
+    assert read.recording.speed == pytest.approx(recording.speed, abs=1e-4)
+
+
+@pytest.mark.parametrize("form", ["%d.%m.%Y %H:%M:%S", "%Y-%m-%dT%H:%M:%S", "%m/%d/%Y %H:%M:%S"])
+def test_dates_are_times(tmp_path: Path, recording: Recording, strange: Write, form: str) -> None:
+    """From before midnight on."""
+    begin = datetime.datetime(2024, 3, 28, 23, 59, 58)
+
+    def dated(_: int, cells: list[str]) -> list[str]:
+        now = begin + datetime.timedelta(milliseconds=float(cells[0].replace(",", ".")))
+        return [f"{now.strftime(form)},{now.microsecond:06d}", *cells[1:]]
+
+    path = _export(strange(tmp_path, recording), dated)
+    columns = path.with_suffix(".toml")
+    columns.write_text(columns.read_text("utf-8").replace('"ms"', '"s"'), "utf-8")
+    read = read_recording(path)
+    assert read.damaged == ""
+    assert np.diff(read.recording.time) == pytest.approx(np.diff(recording.time), abs=1e-5)
+
+
+def test_a_time_that_begins_anew_with_every_stop_goes_on(
+    tmp_path: Path, recording: Recording, columns: Columns, strange: Write
+) -> None:
+    begins = np.flatnonzero(np.diff(recording.time, prepend=-100.0) > 1.0)
+    stop = np.searchsorted(begins, np.arange(len(recording.time)), "right") - 1
+    anew = recording.time - recording.time[begins][stop]
+    read = read_recording(strange(tmp_path, recording._replace(time=anew)))
+    assert read.damaged == ""
+    assert len(find_stops(read.recording, columns, "x")) == len(begins) == 24
 
 
 def test_a_column_of_words_in_parquet_is_named(tmp_path: Path, columns: Columns) -> None:

@@ -14,14 +14,16 @@ from numpy.typing import NDArray
 from brakelab.arrays import Vector
 from brakelab.identify.friction.columns import UNITS, ZEROS, Columns, load_columns
 from brakelab.identify.friction.recording import NAMES, Recording
-from brakelab.logs.csv_header import find_header
-from brakelab.logs.csv_rows import csv_columns, csv_rows
+from brakelab.identify.measurement_files import header_of, numbers_of
+from brakelab.logs.csv_rows import csv_rows
 from brakelab.logs.log_quality import Damage
 from ecu.errors import UserError
 
 Places = NDArray[np.int64]
 
 LEAST_SAMPLES = 100
+ANEW = 1.0  # of a file's time, by which a stop may begin later than the first
+APART = 100.0  # likewise, between stops whose time begins anew
 PLACES = {".csv": ("line", 2), ".txt": ("line", 2), ".parquet": ("row", 1), ".mf4": ("sample", 1)}
 """Name of a row for each file ending, and the number of the first."""
 
@@ -62,6 +64,7 @@ def read_recording(path: Path, columns: Path | None = None) -> Read:
         name = names[int(np.argmin(whole[:, row]))]
         damage.note_damage(int(missing.sum()), f"{word} {lines[row]} ({name} is no number)")
     lines, raw = lines[~missing], raw[:, ~missing]
+    raw[0] = _continued(raw[0])
     back = np.concatenate([[False], raw[0, 1:] <= np.maximum.accumulate(raw[0])[:-1]])[: raw.shape[1]]
     if back.any():
         damage.note_damage(int(back.sum()), f"{word} {lines[int(np.argmax(back))]} (time does not rise)")
@@ -97,21 +100,22 @@ def _rows(path: Path, names: list[str], damage: Damage, first: int) -> Iterator[
         columns = np.array([_column(path, name, table[name]) for name in names])
         yield first + np.arange(columns.shape[1]), columns
         return
-    found, delimiter, above = _header(path, names)
+    found, delimiter, above, _ = header_of(path, names)
     _refuse_missing(path, names, found)
     for lines, batch in csv_rows(path, found, delimiter, list(dict.fromkeys(names)), damage, above):
-        cells = {name: _numbers(batch.column(name).to_pylist()) for name in dict.fromkeys(names)}
+        cells = {name: numbers_of(batch.column(name).to_pylist()) for name in dict.fromkeys(names)}
         yield lines, np.array([cells[name] for name in names])
 
 
-def _header(path: Path, names: list[str]) -> tuple[list[str], str, int]:
-    """Return columns, separator and number of lines above the rows; lines may stand above the names."""
-    found, delimiter = csv_columns(path)
-    if set(names) <= set(found):
-        return found, delimiter, 1
-    header = find_header(path)
-    titled = set(names) <= set(header.titles)
-    return header.titles if titled else header.names, header.delimiter, header.lines
+def _continued(time: Vector) -> Vector:
+    """Return a time that begins anew with every stop as one that goes on, stops `APART` apart."""
+    if len(time) < 3:
+        return time
+    before, here, after = time[:-2], time[1:-1], time[2:]
+    anew = 1 + np.flatnonzero((here < before) & (after > here) & (after < before) & (here - time[0] < ANEW))
+    steps = np.zeros(len(time))
+    steps[anew] = time[anew - 1] - time[anew] + APART
+    return np.asarray(time + np.cumsum(steps))
 
 
 def _refuse_missing(path: Path, names: list[str], found: list[str]) -> None:
@@ -125,16 +129,6 @@ def _column(path: Path, name: str, column: Any) -> Vector:
         return np.asarray(column.to_numpy().astype(float))
     except (TypeError, ValueError):
         raise UserError(str(path), name, f"is {column.type}, not numbers; write it as float") from None
-
-
-def _numbers(cells: list[str | None]) -> Vector:
-    def number(cell: str | None) -> float:
-        try:
-            return float(cell) if cell else np.nan
-        except ValueError:
-            return np.nan
-
-    return np.array([number(cell) for cell in cells])
 
 
 def _mdf(path: Path, names: list[str]) -> Vector:
