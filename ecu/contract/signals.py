@@ -72,6 +72,7 @@ N_INPUTS: Final = len(INPUT_SIGNALS)
 WHEEL_SPEED: Final = INPUT["wheel_speed_fl"]
 ACCEL_X: Final = INPUT["accel_x"]
 ACCEL_Y: Final = INPUT["accel_y"]
+DISC_TEMPERATURE_MEASURED: Final = INPUT["disc_temperature_measured_fl"]
 YAW_RATE: Final = INPUT["yaw_rate"]
 CALLIPER_PRESSURE: Final = INPUT["calliper_pressure_fl"]
 PEDAL_POSITION: Final = INPUT["pedal_position"]

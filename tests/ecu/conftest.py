@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ecu.contract.records import INPUTS, RecordArray
-from ecu.contract.signals import CORNERS, INPUT, RATE_OK, USABLE
+from ecu.contract.signals import CORNERS, DISC_TEMPERATURE_MEASURED, INPUT, RATE_OK, USABLE
 from ecu.settings.config import load_config, new_params
 
 CONFIGS = Path(__file__).parents[2] / "config"
@@ -29,6 +29,9 @@ def feed() -> Callable[..., RecordArray]:
             inputs = np.zeros(1, INPUTS)
             inputs["dt_ns"] = 10_000_000
             inputs["new"], inputs["verdict"] = 1, USABLE | RATE_OK
+            inputs["verdict"][:, DISC_TEMPERATURE_MEASURED : DISC_TEMPERATURE_MEASURED + 4] = (
+                0  # no thermocouple
+            )
         for name, value in values.items():
             if name in INPUT:
                 inputs[0]["value"][INPUT[name]] = value

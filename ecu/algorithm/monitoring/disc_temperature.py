@@ -20,7 +20,8 @@ causes add as squares:
 So the standard deviation grows with the heat put in and falls towards that of the air at rest.
 
 Start. The disc temperature is uniformly distributed between that of the air and the highest that the last
-application can have left (`learned.disc_excess`; the daemon lowers it by a rest that its clock tells).
+application can have left (`learned.disc_excess`; the daemon lowers it by a rest that its clock tells). A
+thermocouple in a recording tells more, at its first sample; afterwards it is a reference, and no input.
 
 Where a pressure is lost, the wheel's share by load of the total tyre force counts as heat, and as its error.
 
@@ -32,7 +33,14 @@ import math
 import numpy as np
 
 from ecu.algorithm.inputs import usable
-from ecu.contract.signals import AMBIENT_TEMPERATURE, CALLIPER_PRESSURE, OBSERVING, RAIN, WHEEL_SPEED
+from ecu.contract.signals import (
+    AMBIENT_TEMPERATURE,
+    CALLIPER_PRESSURE,
+    DISC_TEMPERATURE_MEASURED,
+    OBSERVING,
+    RAIN,
+    WHEEL_SPEED,
+)
 from ecu.jit import Record, kernel
 
 DISC_STATE = np.dtype(
@@ -54,6 +62,7 @@ DISC_STATE = np.dtype(
 GREATEST_EXCESS = 1200.0  # K above the air: cast iron melts
 UNKNOWN_EXCESS = 200.0  # K above the air at most, where nothing was ever saved
 RAIN_UNKNOWN_ERROR = 0.40  # of delta where rain is not reported
+THERMOCOUPLE_ERROR = 5.0  # K: of a disc at rest, by where it touches
 AMBIENT_ERROR = 3.0  # K: difference between the air at the wheel and at the sensor
 AMBIENT_UNKNOWN = 15.0  # K: no sensor, or none received
 FRICTION_PER_KELVIN = 0.04 / 100.0  # relative change of friction, its sign unknown
@@ -94,6 +103,10 @@ def update_discs(
     wet = rain_known and inputs.value[RAIN] > 0.5
     load_sum = load[0] + load[1] + load[2] + load[3]
     for i in range(4):
+        if state.sigma_start[i] > THERMOCOUPLE_ERROR and usable(inputs, DISC_TEMPERATURE_MEASURED + i):
+            state.excess[i] = max(inputs.value[DISC_TEMPERATURE_MEASURED + i] - state.ambient, 0.0)
+            state.sigma_start[i] = THERMOCOUPLE_ERROR
+            state.observed_at[i] = state.ambient + state.excess[i]
         seen = usable(inputs, WHEEL_SPEED + i)
         omega = abs(inputs.value[WHEEL_SPEED + i]) if seen else abs(speed) / params.wheel_radius[i]
         if usable(inputs, CALLIPER_PRESSURE + i):

@@ -11,6 +11,7 @@ from brakelab.identify.dust.features import (
     find_background,
     way_of_air,
 )
+from ecu.errors import UserError
 
 RADIUS, FLOW = 0.33, 0.07
 STILL, BY_SPEED = 300.0, 20.0
@@ -34,7 +35,8 @@ def trip(way: float = 2.0, stops: int = 10, noise: float = 0.0, holds: bool = Fa
     for start in np.flatnonzero(np.diff(on, prepend=0.0) == 1.0)[:stops]:
         plume = start + round((way - 0.7) / PERIOD) + np.arange(40)
         rate[plume[plume < len(v)]] = PER_STOP / 40 / PERIOD
-    shown = rate / (1e6 * FLOW) + STILL + BY_SPEED * v
+    sampled = np.concatenate([np.full(round(way / PERIOD), v[0]), v])[: len(v)]
+    shown = rate / (1e6 * FLOW) + STILL + BY_SPEED * sampled
     shown *= 1.0 + noise * random.normal(size=len(v))
     return Recorded(
         "a", False, t, v, 15.0 * on + 0.3 * random.normal(size=len(v)), 400.0 * on * (v > 0.0),
@@ -73,7 +75,7 @@ def test_particles_are_what_was_above_the_background(noise):
 
 
 def test_background_is_a_line_over_speed():
-    recorded = trip(noise=0.05)
+    recorded = trip(way=0.7, noise=0.05)
     found = find_background(recorded, find_applications(recorded))
     assert found.still == pytest.approx(STILL, rel=0.05)
     assert found.by_speed == pytest.approx(BY_SPEED, rel=0.05)
@@ -82,7 +84,7 @@ def test_background_is_a_line_over_speed():
 
 
 def test_a_background_that_wanders_is_followed():
-    recorded = trip()
+    recorded = trip(way=0.7)
     wander = np.exp(0.3 * np.sin(2 * np.pi * recorded.t / 600.0))
     recorded = recorded._replace(concentration=recorded.concentration * wander)
     found = find_background(recorded, find_applications(recorded))
@@ -90,9 +92,27 @@ def test_a_background_that_wanders_is_followed():
     assert np.std(np.log(ratio)) < 0.3 * np.std(np.log(wander))
 
 
-@pytest.mark.parametrize("way", [1.0, 3.0])
+@pytest.mark.parametrize("way", [1.0, 3.0, 12.0, 25.0])
 def test_the_way_of_the_air(way):
     """The plume's middle lies `way` + 1.3 s behind the start, that of the application 1.25 s."""
-    recorded = trip(way=way)
-    excess = recorded.concentration - STILL - BY_SPEED * recorded.speed
-    assert way_of_air(recorded, excess) == pytest.approx(way, abs=0.8)
+    assert way_of_air(trip(way=way)) == pytest.approx(way, abs=0.8)
+
+
+@pytest.mark.parametrize("way", [6.0, 12.0, 20.0])
+def test_a_long_way_of_the_air_costs_no_particles(way):
+    """The background of the sampled air is that of the speed it was sampled at, too."""
+    found = extract(trip(way=way), RADIUS)
+    assert found.particles[:9] / PER_STOP == pytest.approx(np.ones(9), abs=0.05)
+
+
+def test_a_trip_without_cruising_tells_no_background():
+    """Its particles came out three times too many, without a word."""
+    recorded = trip(way=0.7)
+    uneven = recorded.speed + 8.0 * np.sin(1.5 * recorded.t)
+    with pytest.raises(UserError, match="trip a: vehicle_speed: no steady driving 25 s after a braking"):
+        find_background(recorded._replace(speed=uneven), find_applications(recorded))
+
+
+def test_a_counter_that_follows_no_braking_is_refused():
+    with pytest.raises(UserError, match="trip a: particle_concentration: follows the braking by none"):
+        way_of_air(trip(way=44.0))

@@ -322,3 +322,17 @@ def test_friction_gets_less_certain_by_4_percent_per_100_kelvin_either_way(discs
     discs.d["excess"] = excess
     discs.go(0.001, dt=0.001)
     assert heat_widening(discs.d, 0) == pytest.approx(expected, abs=1e-5)
+
+
+def test_a_recorded_thermocouple_tells_the_start_and_nothing_after_it(discs) -> None:
+    """Cold after a night: within a few kelvin at once, where half of 200 K was assumed for a quarter hour."""
+    discs.d["excess"], discs.d["sigma_start"] = 0.5 * UNKNOWN_EXCESS, 0.5 * UNKNOWN_EXCESS / math.sqrt(3.0)
+    place = INPUT["disc_temperature_measured_fl"]
+    discs.inputs[0]["verdict"][place : place + 4] = discs.inputs[0]["verdict"][0]
+    discs.feed(discs.inputs, disc_temperature_measured=AIR + 4.0)
+    discs.step()
+    assert discs.d["temperature"] == pytest.approx(AIR + 4.0, abs=0.1)
+    assert (discs.d["sigma"] < 7.0).all()
+    discs.feed(discs.inputs, disc_temperature_measured=300.0)
+    discs.step()
+    assert discs.d["temperature"] == pytest.approx(AIR + 4.0, abs=0.1)

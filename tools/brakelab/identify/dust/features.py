@@ -1,14 +1,15 @@
 """Features of each brake application on a trip with a particle counter (section 8.4, Figures 8.2 to 8.4).
 
+The air takes a while from the disc to the counter: the delay is that of best correlation between counter and
+friction power, and the counter's readings are moved back by it before anything else is made of them.
+
 Background: the counter's reading when cruising, long after a brake application, against speed (Figure 8.2): a
 line through the medians by speed, times a slow factor by the readings within two minutes.
 
 Applications are found by pressure and end at standstill, where a disc emits nothing. Their
 conditions are those of (8.2) and the mean pressure; their emission is (8.1)
 
-    EF = log10 of the integral of Q (c - background) over the application, delayed by the air's transport
-
-with the transport delay of best correlation between counter and friction power, and a tail for mixing.
+    EF = log10 of the integral of Q (c - background) over the application, and a tail for mixing
 """
 
 from typing import Final, NamedTuple
@@ -17,6 +18,7 @@ import numpy as np
 
 from brakelab.arrays import Array
 from brakelab.stretches import stretches
+from ecu.errors import UserError
 
 PERIOD: Final = 0.1  # s, grid of a trip
 PRESSED: Final = 1.5  # bar, of the mean over SMOOTH
@@ -29,7 +31,8 @@ STEADY: Final = 0.4  # m/s^2
 SPEED_BIN: Final = 4.0  # m/s
 NEAR_S: Final = 60.0  # standard deviation of the window of the slow factor
 NEAR_COUNT: Final = 10.0  # prior weight of the line in samples
-LONGEST_WAY_S: Final = 8.0
+LONGEST_WAY_S: Final = 40.0
+LEAST_CORRELATION: Final = 0.05  # of counter and power, at the delay of best correlation
 BEFORE_S: Final = 2.0  # the plume begins this much before its middle
 TAIL_S: Final = 5.0
 SEQUENCE: Final = 12  # points of a sequence (8.3)
@@ -117,7 +120,11 @@ def find_applications(trip: Recorded) -> list[tuple[int, int]]:
 
 
 def find_background(trip: Recorded, applications: list[tuple[int, int]]) -> Background:
-    """Return the background of a trip (Figure 8.2)."""
+    """Return the background of a trip (Figure 8.2).
+
+    Raises:
+        UserError: the trip has no steady driving that shows it.
+    """
     since = np.full(len(trip.t), np.inf)
     for start, end in applications:
         since[start:] = 0.0
@@ -135,9 +142,14 @@ def find_background(trip: Recorded, applications: list[tuple[int, int]]) -> Back
             speeds.append(float(np.median(v[inside])))
             levels.append(float(np.median(c[inside])))
             counts.append(np.count_nonzero(inside))
-    if len(speeds) < 2:
-        level = float(np.percentile(trip.concentration, 10))
-        return Background(level, 0.0, np.array(speeds), np.array(levels), np.ones(len(trip.t)))
+    if not speeds:
+        remedy = (
+            f"no steady driving {CLEAR_S:.0f} s after a braking, so nothing tells the background; "
+            "give trips that have some"
+        )
+        raise UserError(f"trip {trip.name}", "vehicle_speed", remedy)
+    if len(speeds) == 1:
+        return Background(levels[0], 0.0, np.array(speeds), np.array(levels), np.ones(len(trip.t)))
     slope, still = np.polyfit(speeds, levels, 1, w=np.sqrt(counts))
     slope, still = max(float(slope), 0.0), max(float(still), 1.0)
     ratio = np.log(np.maximum(c, 1.0) / (still + slope * v))
@@ -149,14 +161,32 @@ def find_background(trip: Recorded, applications: list[tuple[int, int]]) -> Back
     return Background(still, slope, np.array(speeds), np.array(levels), factor)
 
 
-def way_of_air(trip: Recorded, excess: Array) -> float:
-    """Return the transport delay [s] with which the counter follows the friction power best."""
-    power = trip.torque * trip.speed
-    power = power - power.mean()
-    shown = excess - excess.mean()
-    lags = range(round(LONGEST_WAY_S / PERIOD))
-    sums = [float(power[: len(power) - lag] @ shown[lag:]) for lag in lags]
-    return PERIOD * int(np.argmax(sums))
+def way_of_air(trip: Recorded) -> float:
+    """Return the transport delay [s] with which the counter follows the friction power best.
+
+    Of the power counts what the speed does not tell: the background grows with that.
+
+    Raises:
+        UserError: it follows it at no delay that is sought.
+    """
+    power, known = trip.torque * trip.speed, np.column_stack([np.ones(len(trip.t)), trip.speed])
+    power = power - known @ np.linalg.lstsq(known, power, rcond=None)[0]
+    shown = trip.concentration - trip.concentration.mean()
+    lags = range(min(round(LONGEST_WAY_S / PERIOD), len(power) - 1))
+    means = [float(power[: len(power) - lag] @ shown[lag:]) / (len(power) - lag) for lag in lags]
+    best = int(np.argmax(means))
+    if means[best] < LEAST_CORRELATION * power.std() * shown.std():
+        remedy = f"follows the braking by none of 0 to {LONGEST_WAY_S:.0f} s; align its clock or mend it"
+        raise UserError(f"trip {trip.name}", "particle_concentration", remedy)
+    return PERIOD * best
+
+
+def aligned(trip: Recorded, way: float) -> Recorded:
+    """Return a trip whose counter shows at once what the disc emits; its last `way` [s] are cut off."""
+    late = round(way / PERIOD)
+    whole = len(trip.t) - late
+    columns = (column[:whole] for column in trip[2:7])
+    return Recorded(trip.name, trip.test, *columns, trip.concentration[late:], trip.flow[:whole])
 
 
 def _conditions(trip: Recorded, start: int, end: int) -> tuple[float, ...]:
@@ -181,17 +211,19 @@ def _sequence(trip: Recorded, start: int, end: int) -> Array:
 
 def extract(trip: Recorded, radius: float) -> Applications:
     """Return the applications of a trip; `radius` of the tyre [m]."""
+    way = way_of_air(trip)
+    trip = aligned(trip, way)
     places = find_applications(trip)
     background = find_background(trip, places)
     excess = trip.concentration - background.at(trip.speed)
-    way = way_of_air(trip, excess)
     emitted = np.cumsum(1e6 * trip.flow * excess) * PERIOD
+    before = round(min(way, BEFORE_S) / PERIOD)
     particles, energy = [], []
     for k, (start, end) in enumerate(places):
-        first = start + round(max(way - BEFORE_S, 0.0) / PERIOD)
-        last = end + round((way + TAIL_S) / PERIOD)
+        first = max(start - before, 0)
+        last = end + round(TAIL_S / PERIOD)
         if k + 1 < len(places):
-            last = min(last, places[k + 1][0] + round(max(way - BEFORE_S, 0.0) / PERIOD))
+            last = min(last, places[k + 1][0] - before)
         last = min(max(last, first + 1), len(emitted) - 1)
         particles.append(float(emitted[last] - emitted[min(first, last)]))
         part = slice(start, end)

@@ -17,7 +17,7 @@ from ecu.contract.signals import (
     AMBIENT_TEMPERATURE,
     CALLIPER_PRESSURE,
     CORNERS,
-    INPUT,
+    DISC_TEMPERATURE_MEASURED,
     INPUT_SIGNALS,
     MOTOR_TORQUE,
     RAIN,
@@ -35,7 +35,6 @@ SAMPLED: Final = (
     *range(MOTOR_TORQUE, MOTOR_TORQUE + 4),
 )
 """Inputs whose samples are judged by the physics of the drive."""
-DISC_TEMPERATURE_MEASURED: Final = INPUT["disc_temperature_measured_fl"]
 KEPT: Final = (
     *SAMPLED,
     *(AMBIENT_TEMPERATURE, RAIN),
