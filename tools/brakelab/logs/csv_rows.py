@@ -8,7 +8,7 @@ counted; a last line that is not whole is not used.
 import io
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 import pyarrow as pa
@@ -77,7 +77,7 @@ def csv_rows(
             damage.cut = f"line {line}: the last line is cut off and was not used"
 
 
-def _pointed(column: pa.StringArray) -> pa.StringArray:
+def _pointed(column: "pa.Array[Any]") -> "pa.Array[Any]":
     """Return cells with a decimal point; `1.234,5` and `1,234.5` are numbers with thousands."""
     import pyarrow.compute as pc  # see `signal_batches`
 

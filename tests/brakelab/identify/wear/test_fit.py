@@ -1,4 +1,4 @@
-"""Identification of a wear law: a known law is found within its confidence, terms are pruned."""
+"""Identification of a wear law: a known law is found within its confidence, by few blocks too."""
 
 import numpy as np
 import pytest
@@ -64,21 +64,33 @@ def test_balance_and_thickness_that_disagree(grams: float, found: list[int]):
 
 
 @pytest.mark.study
-def test_the_true_mass_is_predicted_within_its_scatter_and_confidence_holds_over_seeds():
-    """New blocks by the identified law; and gamma_10 + ... where the three true terms were chosen."""
-    held, counted, errors = 0, 0, []
+@pytest.mark.parametrize(("blocks", "error", "holds"), [(4, 0.16, 0.5), (8, 0.02, 0.85), (12, 0.015, 0.85)])
+def test_the_true_mass_is_predicted_and_confidence_holds_over_seeds(blocks, error, holds):
+    """New blocks by the identified law, and the true terms in their 95 %, whichever sets were chosen.
+
+    A set chosen by AICc missed new blocks by 31 % where there were four, and held 2 % of the terms.
+    """
+    held, errors, places = 0, [], np.flatnonzero(LAW)
     for seed in range(SEEDS):
-        x = regressors(seed, 12)
+        x = regressors(seed, blocks)
         fit = fit_law(x, *measured(x, seed))
         new = regressors(1000 + seed, 6)
         errors.append(np.sqrt(np.mean((new @ fit.coefficients / (new @ LAW) - 1.0) ** 2)))
-        if set(np.flatnonzero(fit.coefficients)) == set(np.flatnonzero(LAW)):
-            places = np.flatnonzero(LAW)
-            counted += len(places)
-            held += np.sum((fit.low[places] <= LAW[places]) & (LAW[places] <= fit.high[places]))
-    assert np.median(errors) < 0.03
-    assert counted >= 3 * SEEDS // 4, "the true terms are seldom chosen"
-    assert 0.85 <= held / counted <= 1.0, f"{held} of {counted} coefficients in their 95 %"
+        held += np.sum((fit.low[places] <= LAW[places]) & (LAW[places] <= fit.high[places]))
+    print(blocks, np.median(errors), held / (SEEDS * len(places)))
+    assert np.median(errors) < error
+    assert held / (SEEDS * len(places)) > holds
+
+
+def test_blocks_of_one_temperature_say_little_of_another():
+    """Their law was 51 % wrong on ordinary blocks, and said 10 %."""
+    x = regressors(5, 8)
+    alike = x.copy()
+    alike[:, [1, 4, 6]] = 150.0 * x[:, [0, 3, 5]]
+    alike[:, 2] = 1.02 * 150.0**2 * x[:, 0]
+    fits = [fit_law(one, *measured(one, 5)) for one in (x, alike)]
+    assert fits[0].elsewhere < 0.1
+    assert fits[1].elsewhere > 0.15
 
 
 def test_the_extended_law_is_chosen_over_the_quasi_static_one_by_its_criterion():
@@ -87,12 +99,11 @@ def test_the_extended_law_is_chosen_over_the_quasi_static_one_by_its_criterion()
     assert fit_law(x, mass, variance).criterion < fit_law(x, mass, variance, QUASI_STATIC).criterion - 4.0
 
 
-def test_no_coefficient_is_negative_and_no_more_terms_than_the_rank_allows():
+def test_no_coefficient_is_negative():
     for seed in range(10):
         x = regressors(seed, 6)
         fit = fit_law(x, *measured(x, seed, 0.1))
         assert (fit.coefficients >= 0.0).all()
-        assert np.count_nonzero(fit.coefficients) <= min(fit.rank, 4)
 
 
 def test_blocks_that_are_multiples_of_one_another_have_rank_one():

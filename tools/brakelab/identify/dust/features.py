@@ -185,8 +185,9 @@ def aligned(trip: Recorded, way: float) -> Recorded:
     """Return a trip whose counter shows at once what the disc emits; its last `way` [s] are cut off."""
     late = round(way / PERIOD)
     whole = len(trip.t) - late
-    columns = (column[:whole] for column in trip[2:7])
-    return Recorded(trip.name, trip.test, *columns, trip.concentration[late:], trip.flow[:whole])
+    t, speed, pressure, torque, temperature = (column[:whole] for column in trip[2:7])
+    counted, flow = trip.concentration[late:], trip.flow[:whole]
+    return Recorded(trip.name, trip.test, t, speed, pressure, torque, temperature, counted, flow)
 
 
 def _conditions(trip: Recorded, start: int, end: int) -> tuple[float, ...]:

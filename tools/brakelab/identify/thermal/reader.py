@@ -13,14 +13,22 @@ from numpy.typing import NDArray
 
 from brakelab.arrays import Array
 from brakelab.identify.thermal.model import ROW, Course
-from brakelab.logs.physics.samples import DISC_TEMPERATURE_MEASURED, KEPT
+from brakelab.logs.physics.samples import KEPT
 from brakelab.replay.engine import new_ecu
 from brakelab.replay.log import log_size, replay_log
 from brakelab.replay.quality import Findings
 from brakelab.replay.source import announced, load_source
 from brakelab.results.progress import progress_bar
 from ecu.contract.records import RecordArray
-from ecu.contract.signals import AMBIENT_TEMPERATURE, CALLIPER_PRESSURE, CYCLE_NS, OUTPUT, RAIN, WHEEL_SPEED
+from ecu.contract.signals import (
+    AMBIENT_TEMPERATURE,
+    CALLIPER_PRESSURE,
+    CYCLE_NS,
+    DISC_TEMPERATURE_MEASURED,
+    OUTPUT,
+    RAIN,
+    WHEEL_SPEED,
+)
 from ecu.settings.config import Config, new_params
 
 CYCLES: Final = round(1e9 * ROW / CYCLE_NS)

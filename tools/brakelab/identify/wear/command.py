@@ -32,6 +32,11 @@ DENSITIES: Final = (800.0, 6000.0)  # kg/m^3: organic linings 1500 to 2800, sint
 ROAD: Final = 0.20  # relative: what a brake wears on the road beside a dynamometer (7.20, 7.21; +20 %)
 
 
+def law_error(fit: Fit, mass: Array) -> float:
+    """Return the relative standard deviation of a law on the road, of blocks that lost `mass` [g], (n,)."""
+    return float(np.linalg.norm([leave_one_out(fit, mass), fit.elsewhere, ROAD]))
+
+
 def law_section(fit: Fit, error: float, pad: Pad, slope: float) -> Section:
     """Return the keys of a pad: its law, the law's `error`, relative, and the density by `slope` [g/mm].
 
@@ -52,7 +57,10 @@ def law_section(fit: Fit, error: float, pad: Pad, slope: float) -> Section:
     return measured | {
         "law": ('"extended"', "from dynamometer blocks, disc in degC"),
         "coefficients": (f"[{numbers}]", "g/MJ, g/MJ/K, g/MJ/K^2, g/MW, g/MW/K, g s/MJ^2, …/K"),
-        "sigma": (f"{min(max(error, 0.02), 0.9):.4f}", "relative, blocks left out and the way to the road"),
+        "sigma": (
+            f"{min(max(error, 0.02), 0.9):.4f}",
+            "relative: blocks left out, discs 50 K off theirs, the road",
+        ),
     }
 
 
@@ -115,9 +123,7 @@ def identify_wear(manifest: Path, config: Path, axle: str, out: Path) -> int:
                 f"{manifest}: no law explains these blocks better than their mean (R² {fit.r2:.2f}, left out "
                 f"{100 * leave_one_out(fit, fused.mass):.0f} % RMS); check masses and the units of all files"
             )
-        section = law_section(
-            fit, float(np.hypot(leave_one_out(fit, fused.mass), ROAD)), brake.pad, fused.slope
-        )
+        section = law_section(fit, law_error(fit, fused.mass), brake.pad, fused.slope)
     except UserError as error:
         raise UserError(
             str(manifest), ": ".join(filter(None, (error.where, error.place))), error.remedy

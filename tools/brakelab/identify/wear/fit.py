@@ -2,8 +2,10 @@
 
 Every column is scaled to 1, every block weighted by its standard deviation: that of the measurement and a
 share of its mass, the scatter unexplained by any law, estimated with it. All sets of terms admitted by the
-rank of the scaled regressors are tried; the least information criterion (AICc) wins. Confidence: parametric
-bootstrap.
+rank of the scaled regressors are tried, and each is judged by the blocks that it did not see. The law is the
+mean of all sets, each by its likelihood of the blocks left out, (error)^-n: few blocks do not tell one set,
+and a law chosen as if they did is wrong by what was left out of it. Confidence: parametric bootstrap, the set
+drawn anew every time.
 """
 
 from itertools import combinations
@@ -23,6 +25,9 @@ LEAST_SINGULAR: Final = 1e-3  # of the greatest, of regressors scaled by row and
 LEAST_SCATTER: Final = 0.005  # relative
 ROUNDS: Final = 400
 CONFIDENCE: Final = (2.5, 97.5)  # %
+ELSEWHERE: Final = 50.0  # K by which roads differ from a programme
+LEAST_ERROR: Final = 0.02  # of blocks left out: weighings are no better
+LEAST_WEIGHT: Final = 0.02  # of the best set's, below which a set is left out
 STRANGE: Final = np.log(1.8)
 """Logarithm of a block's mass over its law's; pressure and running-in, in no law, make half of that."""
 FAR: Final = 4.0  # standard deviations of the others, likewise
@@ -33,17 +38,21 @@ class Fit(NamedTuple):
     """A law with its confidence."""
 
     coefficients: Array
-    """Shape (7,), terms that were pruned are 0."""
+    """Shape (7,), 0: in no set that counts."""
     low: Array
     high: Array
     predicted: Array
     """g, shape (n,)."""
     left_out: Array
     """g, each block by the law of the others; shape (n,)."""
+    elsewhere: float
+    """Relative standard deviation of the wear at discs `ELSEWHERE` hotter or cooler than the blocks', by the
+    sets that tell the blocks as well as each other."""
     scatter: float
     """Relative standard deviation that is not the measurement's."""
     r2: float
     criterion: float
+    """Least AICc of the sets."""
     rank: int
     condition: float
 
@@ -118,31 +127,46 @@ def fit_law(
             "all alike, their regressors are collinear: add other roads, drivers or temperatures",
         )
     most = min(rank, len(mass) - 2, len(allowed))
-    tried = {
-        terms: _fit_terms(regressors, mass, variance, terms)
-        for size in range(1, most + 1)
-        for terms in combinations(allowed, size)
-    }
-    criteria = {terms: found[2] for terms, found in tried.items()}
-    terms = min(criteria, key=criteria.__getitem__)
-    coefficients, scatter, criterion = tried[terms]
-    predicted = regressors @ coefficients
-    sigma = _sigma(mass, variance, scatter)
+    sets = [terms for size in range(1, most + 1) for terms in combinations(allowed, size)]
+    tried = [_fit_terms(regressors, mass, variance, terms) for terms in sets]
+    sigmas = [_sigma(mass, variance, scatter) for _, scatter, _ in tried]
+    unseen = np.array([_left_out(regressors, mass, *one) for one in zip(sigmas, sets, strict=True)])
+    error = np.maximum(np.sqrt(np.mean((unseen / mass - 1.0) ** 2, axis=1)), LEAST_ERROR)
+    weight = (error / error.min()) ** -len(mass)
+    weight = np.where(weight < LEAST_WEIGHT, 0.0, weight) / np.sum(weight[weight >= LEAST_WEIGHT])
+    coefficients = weight @ np.array([found for found, _, _ in tried])
+    scatter = float(weight @ np.array([one for _, one, _ in tried]))
+    criterion = min(one for _, _, one in tried)
+    predicted, left_out = regressors @ coefficients, weight @ unseen
     random = np.random.default_rng(seed)
-    drawn = np.array(
-        [
-            _solve(regressors, np.maximum(predicted + sigma * z, 1e-9), sigma, terms)
-            for z in random.standard_normal((ROUNDS, len(mass)))
-        ]
-    )
+    drawn = np.empty((ROUNDS, regressors.shape[1]))
+    for k, place in enumerate(random.choice(len(sets), ROUNDS, p=weight)):
+        noisy = predicted + sigmas[place] * random.standard_normal(len(mass))
+        drawn[k] = _solve(regressors, np.maximum(noisy, 1e-9), sigmas[place], sets[place])
     low, high = np.percentile(drawn, CONFIDENCE, axis=0)
-    left_out = np.empty(len(mass))
-    for i in range(len(mass)):
-        others = np.arange(len(mass)) != i
-        left_out[i] = regressors[i] @ _solve(regressors[others], mass[others], sigma[others], terms)
+    roads = np.array([_warmer(regressors, kelvin).sum(axis=0) for kelvin in (-ELSEWHERE, ELSEWHERE)])
+    elsewhere = float(np.max(np.std(drawn @ roads.T, axis=0) / (roads @ coefficients)))
     spread = float(np.sum((mass - mass.mean()) ** 2))
     r2 = 1.0 - float(np.sum((mass - predicted) ** 2)) / spread
-    return Fit(coefficients, low, high, predicted, left_out, scatter, r2, criterion, rank, condition)
+    return Fit(
+        coefficients, low, high, predicted, left_out, elsewhere, scatter, r2, criterion, rank, condition
+    )
+
+
+def _warmer(regressors: Array, kelvin: float) -> Array:
+    """Return the regressors (7.16) of the same brakings with discs `kelvin` hotter, not below 0 degC."""
+    e, et, ett, r, rt, p, pt = regressors.T
+    k = np.maximum(kelvin, -et / e)
+    return np.column_stack([e, et + k * e, ett + 2.0 * k * et + k * k * e, r, rt + k * r, p, pt + k * p])
+
+
+def _left_out(regressors: Array, mass: Array, sigma: Array, terms: tuple[int, ...]) -> Array:
+    """Return the mass [g] of each block by the law of the others, shape (n,)."""
+    found = np.empty(len(mass))
+    for i in range(len(mass)):
+        others = np.arange(len(mass)) != i
+        found[i] = regressors[i] @ _solve(regressors[others], mass[others], sigma[others], terms)
+    return found
 
 
 def strangers(regressors: Array, mass: Array, variance: Array) -> list[int]:

@@ -113,10 +113,12 @@ def _thickness(manifest: Path, where: str, row: dict[str, str], pad: Pad) -> flo
             remedy = f"{before:g} mm cannot be of a pad that is {pad.thickness_new:g} mm thick when new"
             raise UserError(str(manifest), f"{where}, {names[0]}", remedy)
         lost.append(before - after)
-    off = np.abs(lost - np.median(lost))
+    off = np.abs(np.array(lost) - np.median(lost))
     if off.max() > UNEVEN + np.abs(np.median(lost)):
-        names = (f"thickness_{when}_{int(np.argmax(off)) + 1}" for when in ("before", "after"))
-        said = " and ".join(f"{name} {row[name]}" for name in names)
+        point = int(np.argmax(off)) + 1
+        said = " and ".join(
+            f"{name} {row[name]}" for name in (f"thickness_before_{point}", f"thickness_after_{point}")
+        )
         remedy = f"{off.max():.1f} mm off what the other points lost; correct the reading"
         raise UserError(str(manifest), f"{where}, {said} mm", remedy)
     if np.mean(lost) <= 0.0:

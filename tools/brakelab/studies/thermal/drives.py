@@ -14,14 +14,14 @@ from numpy.random import Generator
 from brakelab.arrays import Array
 from brakelab.identify.thermal.model import ROW
 from brakelab.identify.thermal.reader import USED, Drive, as_drive
-from brakelab.logs.physics.samples import DISC_TEMPERATURE_MEASURED, KEPT
+from brakelab.logs.physics.samples import KEPT
 from brakelab.plant.disc_nodes import heat_discs, nodes_like, wind
 from brakelab.simulation.closed_loop import Loop, new_loop, run_blocks
 from brakelab.simulation.scenario import Scenario, Trace
 from brakelab.simulation.simulate import write_columns
 from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS
 from brakelab.studies.wear.drives import trip_scenario
-from ecu.contract.signals import CORNERS, INPUT_SIGNALS, OUTPUT
+from ecu.contract.signals import CORNERS, DISC_TEMPERATURE_MEASURED, INPUT_SIGNALS, OUTPUT
 from ecu.settings.config import load_config
 from ecu.settings.resources import resource
 

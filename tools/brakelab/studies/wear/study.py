@@ -7,8 +7,8 @@ import numpy as np
 from numpy.random import Generator
 
 from brakelab.arrays import Array
-from brakelab.identify.wear.command import ROAD
-from brakelab.identify.wear.fit import QUASI_STATIC, Fit, fit_law, leave_one_out
+from brakelab.identify.wear.command import law_error
+from brakelab.identify.wear.fit import QUASI_STATIC, Fit, fit_law
 from brakelab.identify.wear.fusion import fuse
 from brakelab.identify.wear.reader import stop_regressors
 from brakelab.simulation.campaigns.wear_blocks import (
@@ -92,7 +92,7 @@ def dynamometer_laws() -> dict[str, Law]:
         fused = fuse(wear, mass)
         for law, allowed in zip(LAWS, (tuple(range(7)), QUASI_STATIC), strict=True):
             fits[law].append(fit_law(x, fused.mass, np.diag(fused.covariance), allowed))
-            sigma[law].append(float(np.hypot(leave_one_out(fits[law][-1], fused.mass), ROAD)))
+            sigma[law].append(law_error(fits[law][-1], fused.mass))
     return {
         law: Law(
             np.repeat(np.column_stack([fit.coefficients for fit in fits[law]]), 2, axis=1),
