@@ -14,7 +14,7 @@ from brakelab.identify.friction.choice import identify
 from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.dynamometer import new_bench, run_programme
 from brakelab.identify.friction.fit import fit
-from brakelab.identify.friction.heat_capacity import heat_capacity
+from brakelab.identify.friction.heat_capacity import SLOW, heat_capacity, undelayed
 from brakelab.identify.friction.lining_file import write_lining
 from brakelab.identify.friction.page import write_report
 from brakelab.identify.friction.reader import read_recording
@@ -127,6 +127,10 @@ def friction(
     check_outputs(out, (out, page), [*recordings, *described_by, *map(Path, own)], toml=True)
     measured = _read(data, columns)
     _need(measured.stops, data[0])
+    heat = heat_capacity(measured.stops, measured.columns)
+    if heat.lag > SLOW:
+        say(f"{data[0]}: the thermocouple lags {heat.lag:.1f} s: what it has not shown is added by the work")
+    measured = measured._replace(stops=undelayed(measured.stops, heat, measured.columns))
     own = tuple(str(Path(code).resolve()) if code.endswith(".py") else code for code in own)
     try:
         known = candidates(measured.stops, measured.columns.brake, own)
@@ -135,7 +139,9 @@ def friction(
     laws = {candidate.name: candidate for candidate in known}
     if profile is not None and profile not in laws:
         raise UserError("--profile", profile, f"no such law; choose one of {', '.join(laws)}")
-    unseen = None if held_out is None else _read([held_out], columns).stops
+    unseen = None
+    if held_out is not None:
+        unseen = undelayed(_read([held_out], columns).stops, heat, measured.columns)
     described = HELD_OUT if held_out is None else str(held_out)
     identified = identify(measured.columns, measured.stops, unseen, say, own)
     tables = [

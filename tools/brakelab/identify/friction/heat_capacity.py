@@ -6,8 +6,12 @@ Model. A stop with friction energy E raises the disc of heat capacity C(tau) = C
 
 cooled: what the air takes at the rate of 3.7; P_end the power at the end, which a thermocouple that lags has
 not shown yet. C_100, rise and lag are found by least squares over all stops; cooling is taken as given.
+
+A thermocouple that lags by more than `SLOW` shows a law another disc than it had: friction that falls with
+heat seems to fall with time. What the last seconds have heated is then added to what is shown.
 """
 
+from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -22,6 +26,7 @@ from brakelab.plant.disc import DISC_SHARE
 AT: Final = 100.0  # degC
 AMBIENT: Final = 20.0  # degC
 LAST: Final = 0.8  # s of power that a thermocouple of about half that lag has not shown
+SLOW: Final = 1.0  # s; in a disc one lags by 0.2 to 0.6 s
 FEW: Final = 5  # samples of the shown temperature at either end
 
 
@@ -73,3 +78,17 @@ def heat_capacity(stops: Stops, columns: Columns) -> HeatCapacity:
         tau,
         DISC_SHARE * (e - lag * p) / rise,
     )
+
+
+def undelayed(stops: Stops, found: HeatCapacity, columns: Columns) -> Stops:
+    """Return the stops with the temperature that the disc had when a lagging thermocouple showed less."""
+    if found.lag < SLOW:
+        return stops
+    late = round(found.lag / stops.dt)
+    temperature = stops.temperature.copy()
+    for begin, end in zip(stops.first[:-1], stops.first[1:], strict=True):
+        power = stops.torque[begin:end] * stops.speed[begin:end] / columns.brake.effective_radius
+        energy = np.cumsum(power) * stops.dt
+        hidden = energy - np.concatenate([np.zeros(late), energy])[: len(energy)]
+        temperature[begin:end] += DISC_SHARE / found.at_100 * hidden
+    return replace(stops, temperature=temperature)
