@@ -11,7 +11,7 @@ pytest.importorskip("sklearn", reason="needs scikit-learn (extra learn)")
 from brakelab.identify.dust import reader
 from brakelab.identify.dust.command import identify_dust
 from brakelab.simulation.campaigns.dust_trips import COLUMNS, campaign, write_campaign
-from ecu.errors import UserError
+from ecu.errors import RunFault, UserError
 from ecu.settings.config import load_config, new_params, store_key
 
 CONFIG = Path(__file__).parents[4] / "config" / "lcv.toml"
@@ -131,6 +131,14 @@ def test_what_is_wrong_is_one_line_that_names_file_and_place(trips, spoil, said)
         identify_dust(trips / "manifest.csv", CONFIG, "front", trips / "car.toml")
     assert "\n" not in str(caught.value)
     assert ".csv" in str(caught.value)
+    assert not (trips / "car.toml").exists()
+
+
+def test_trips_that_do_not_count_alike_are_no_model(trips):
+    """One of four counted three hundredfold: exit 1, and what each counted per work."""
+    column("particle_concentration", lambda x: 300.0 * x)(trips)
+    with pytest.raises(RunFault, match=r"no model tells these trips: .* trip 1 \S+ 1/MJ, trip 2 "):
+        identify_dust(trips / "manifest.csv", CONFIG, "front", trips / "car.toml")
     assert not (trips / "car.toml").exists()
 
 

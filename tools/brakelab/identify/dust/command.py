@@ -1,18 +1,23 @@
 """Identification of dust (`brake-ecu identify dust`): emission models from trips with a particle counter."""
 
 from pathlib import Path
+from typing import Final
 
 from brakelab.arrays import Array
 from brakelab.identify.config_file import Section, write_car
+from brakelab.identify.dust.features import Applications
 from brakelab.identify.dust.fit import Judged, choose, judge_all, ranges
 from brakelab.identify.dust.page import write_page
 from brakelab.identify.dust.reader import read_trips
 from brakelab.identify.measurement_files import measured_files
 from brakelab.results.outputs import check_outputs, config_files
 from ecu.contract.dust import MODELS
-from ecu.errors import UserError
+from ecu.errors import RunFault, UserError
 from ecu.output import give, wrote
 from ecu.settings.config import load_config
+
+LOST: Final = 1.0
+"""Relative error of the particles of trips left out, from which on a model tells nothing."""
 
 
 def _numbers(values: Array) -> str:
@@ -37,11 +42,18 @@ def dust_section(chosen: Judged, trained: tuple[Array, Array]) -> Section:
     }
 
 
+def _per_megajoule(trips: list[Applications]) -> str:
+    """Return the particles that each trip counted per work of friction."""
+    rates = {one.trip: 1e6 * one.particles.sum() / one.energy.sum() for one in trips}
+    return ", ".join(f"{trip} {rate:.1e} 1/MJ" for trip, rate in rates.items())
+
+
 def identify_dust(manifest: Path, config: Path, axle: str, out: Path) -> int:
     """Identify the emission of an axle's brakes; write `out` and `out`.md, return 0.
 
     Raises:
         UserError: an argument or a file is invalid.
+        RunFault: no model explains the trips.
     """
     if axle not in ("front", "rear"):
         raise UserError("--axle", axle, "choose front or rear")
@@ -52,6 +64,11 @@ def identify_dust(manifest: Path, config: Path, axle: str, out: Path) -> int:
     trained, test = [trip for trip in trips if not trip.test], [trip for trip in trips if trip.test]
     judged = judge_all(trained, test)
     chosen = choose(judged)
+    if chosen.left_out_sum > LOST:
+        raise RunFault(
+            f"{manifest}: no model tells these trips: left out, missed by "
+            f"{100 * chosen.left_out_sum:.0f} % RMS; check that all count in the same unit and dilution: {_per_megajoule(trained)}"
+        )
     head = "# Emission of particles by `brake-ecu identify dust`."
     write_car(config, out, head, {f"{axle}.dust": dust_section(chosen, ranges(trained))})
     write_page(page, trips, judged, chosen)
