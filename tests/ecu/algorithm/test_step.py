@@ -60,6 +60,7 @@ class Car:
         self.params, self.feed, self.mu, self.reference = params, feed, mu, reference
         self.p, self.inputs, self.outputs = params[0], feed(), np.zeros(1, OUTPUTS)
         self.random, self.state = np.random.default_rng(seed), new_state(params)
+        self.state["learned"]["wear"]["told"] = 1  # what is left of other pads nobody knows
         self.speed, self.decel, self.t = 25.0, 0.0, 0
         self.overwrite: dict[str, float] = {}
 

@@ -67,7 +67,8 @@ def identify_dust(manifest: Path, config: Path, axle: str, out: Path) -> int:
     if chosen.left_out_sum > LOST:
         raise RunFault(
             f"{manifest}: no model tells these trips: left out, missed by "
-            f"{100 * chosen.left_out_sum:.0f} % RMS; check that all count in the same unit and dilution: {_per_megajoule(trained)}"
+            f"{100 * chosen.left_out_sum:.0f} % RMS; check that all count in the same unit and "
+            f"dilution: {_per_megajoule(trained)}"
         )
     head = "# Emission of particles by `brake-ecu identify dust`."
     write_car(config, out, head, {f"{axle}.dust": dust_section(chosen, ranges(trained))})
