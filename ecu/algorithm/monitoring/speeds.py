@@ -5,10 +5,10 @@ the accelerometer, whose zero and slope are followed slowly, they form a median 
 cannot move. A wheel is judged by its low-passed difference from it, less what its radius has been found to
 differ by while rolling:
 
-    slower than it    after nothing has braked that wheel for `SPIN_UP_S`: it rolls or is driven
-    faster than it    after nothing has driven that wheel for as long
+    slower than it    while nothing brakes that wheel: it rolls or is driven
+    faster than it    while nothing drives it
 
-so a wheel that slides or spins is never judged. The vehicle speed is judged where it is slower than the
+and where it is off by more than `SLID`, `SPIN_UP_S` later, so a wheel that slides or spins is never judged. The vehicle speed is judged where it is slower than the
 wheels and nothing drives them, and where it is faster while they roll freely, or while dead reckoning agrees
 with them. A constant error of less than `FARTHEST_BASE` is another radius.
 """
@@ -31,7 +31,7 @@ SPEEDS_STATE = np.dtype(
         ("sorted", "f8", (WITNESSES,)),
         ("apart", "f8", (5,)),  # excess of an input over the median, relative, low-passed
         ("base", "f8", (5,)),  # the same while rolling: error of the radius
-        ("spins_s", "f8", (4, 2)),  # time for which a wheel that was braked, or driven, may still slip
+        ("spins_s", "f8", (4, 2)),  # time for which a wheel that was braked, or driven, may still slide
         ("rolled_s", "f8"),  # learning time of that, at most `BASE_S`
         ("reckoned", "f8"),  # m/s
         ("slope", "f8"),  # of the road and the accelerometer's zero [m/s^2]
@@ -48,6 +48,7 @@ ABSOLUTE, LAG_S = 0.15, 0.3  # m/s; of a vehicle speed, while the car slows
 SLIPPING = 0.06  # added for a vehicle speed above wheels that are braked
 DOUBT_S = 0.3
 SPIN_UP_S = 0.5  # of a wheel that slid on ice: lag of the hydraulics, and 15 m/s^2 at an adhesion of 0.05
+SLID = 0.08  # beyond the slip at which a tyre on a dry road gives most
 BASE_S, FOUND_S = 20.0, 0.5
 FARTHEST_BASE = 0.03
 FREE_ACCEL, DRIVEN_ACCEL = 1.0, 0.5  # m/s^2
@@ -116,8 +117,7 @@ def _judged(state: Record, i: int, median: float, free: bool, braked: bool, driv
     """
     apart: float = state.apart[i] - state.base[i]
     if free:
-        slid = braked if apart < 0.0 else driven and i < SPEED
-        return math.nan if slid else apart
+        return apart
     if i < SPEED:
         reckoned, speed = state.reckoned / median, state.told[SPEED] / median
         if not math.isfinite(speed):
@@ -132,6 +132,16 @@ def _judged(state: Record, i: int, median: float, free: bool, braked: bool, driv
     away = abs(state.told[SPEED] - state.reckoned)
     judged = away > 2.0 * abs(median - state.reckoned) + SLIPPING * median
     return max(apart - SLIPPING, 0.0) if judged else math.nan
+
+
+@kernel
+def _slides(state: Record, i: int, apart: float, braked: bool, driven: bool, dt: float) -> bool:
+    """Return whether wheel `i`, off by `apart`, may still slide or spin from what braked or drove it."""
+    left_s = state.spins_s[i]
+    left_s[0] = SPIN_UP_S if braked else max(left_s[0] - dt, 0.0)
+    left_s[1] = SPIN_UP_S if driven else max(left_s[1] - dt, 0.0)
+    slides: bool = (left_s[0] > 0.0 and apart < -SLID) or (left_s[1] > 0.0 and apart > SLID)
+    return slides
 
 
 @kernel
@@ -176,11 +186,10 @@ def watch_speeds(
         braking, motor = estimate.brake_torque[i % 4], motor_torque(inputs, i % 4)
         braked, driven = False, accelerates or motor < -TORQUE
         if i < SPEED:
-            left_s, braked = state.spins_s[i], braking + motor > TORQUE or accel < DRAGGED_ACCEL
-            left_s[0] = SPIN_UP_S if braked else max(left_s[0] - dt, 0.0)
-            left_s[1] = SPIN_UP_S if driven else max(left_s[1] - dt, 0.0)
-            braked, driven = left_s[0] > 0.0, left_s[1] > 0.0
+            braked = braking + motor > TORQUE or accel < DRAGGED_ACCEL
         apart = _judged(state, i, median, free, braked, driven)
+        if i < SPEED and _slides(state, i, apart, braked, driven, dt):
+            apart = math.nan
         place = _place(i)
         unit = median / params.wheel_radius[i] if i < SPEED else median
         judge(witness, place, apart * unit, tolerance * unit, DOUBT_S, dt)

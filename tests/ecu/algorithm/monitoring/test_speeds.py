@@ -93,6 +93,12 @@ def test_a_wheel_that_locked_on_ice_has_time_to_spin_up(road) -> None:
     assert road.drive(1.0, (1, 0.7, 1, 1, 1), -0.5) == NAMES[1:2]
 
 
+def test_a_wheel_that_reads_too_little_is_found_in_a_coast_that_is_short(road) -> None:
+    """A slip of 2 % while braked is not the lie, and it did not slide."""
+    assert road.drive(1.0, (0.93, 0.98, 0.98, 0.98, 1), -4.0) == ()
+    assert road.drive(0.6, (0.95, 1, 1, 1, 1), -0.3) == NAMES[:1]
+
+
 def test_a_wheel_that_spun_has_time_to_spin_down(road) -> None:
     assert road.drive(1.0, (1.6, 1.6, 1, 1, 1), 1.0, 50.0) == ()
     assert road.drive(0.4, (1.1, 1.1, 1, 1, 1), -0.5) == ()
