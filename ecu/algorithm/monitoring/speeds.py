@@ -10,8 +10,8 @@ differ by while rolling:
 
 and where it is off by more than `SLID`, `SPIN_UP_S` later, so a wheel that slides or spins is never judged.
 The vehicle speed is judged where it is slower than the wheels and nothing drives them, and where it is faster
-while they roll freely, or while dead reckoning agrees with them. A constant error of less than `FARTHEST_BASE`
-is another radius.
+while they roll freely, or while dead reckoning agrees with them. A constant error of less than
+`FARTHEST_BASE` is another radius.
 """
 
 import math
