@@ -28,7 +28,7 @@ SAID = {"delay", "drift_time", "dropout", "dropout_length", "period", "stuck_fro
     *("drag_torque", "drag_growth", "lowest_speed", "ratios", "share_front", "rate", "limit")
 }
 """The simulated vehicle knows no units of the ECU; they stand in the meaning."""
-MIXED = {"coefficients", "numbers", "low", "high", "factor", "below", "above"}
+MIXED = {"coefficients", "numbers", "low", "high", "factor", "below", "above"} | {"at_most", "at_least"}
 
 
 @pytest.mark.parametrize("name", reference.PAGES)

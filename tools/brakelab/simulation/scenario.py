@@ -53,7 +53,20 @@ share_front = 1.0
 angle = [[0.0, 0.0], [2.0, 0.03]]          # s, rad at the road wheel, left positive
 path = [[0.0, 0.0], [30.0, 3.5]]           # or m, m: path that the driver follows
 ```
-Faults of the bus, a sensor or an actuator are described by `[[fault]]` tables: docs/rig.md.
+`[[fault]]` tables are faults of the bus, a sensor or an actuator; `[[expect]]` tables say what the run has to
+show: by them `rig` and `simulate` pass or fail it. docs/rig.md has the keys of both.
+```
+[[fault]]
+kind = "lost"
+message = ["Imu"]
+t = 4.0                          # s
+duration = 1.0
+
+[[expect]]
+what = "bit"
+bit = "IMU lost"
+within = 0.1                     # s of the fault
+```
 """
 
 import math
@@ -70,6 +83,7 @@ from brakelab.plant.driver import PEDAL_TRAVEL, Script
 from brakelab.plant.records import BRAKE, COAST, CRUISE, FOLLOW, PHASE
 from brakelab.plant.sensor_errors import Sensors
 from brakelab.plant.steering import Steering
+from brakelab.simulation.expectations import Expectation
 from brakelab.simulation.faults import Fault
 from brakelab.simulation.scenario_tables import (
     BRAKE_BY,
@@ -149,6 +163,8 @@ class Scenario(BaseModel):
     """How often the phases are driven."""
     fault: list[Fault] = []
     """Faults on the way."""
+    expect: list[Expectation] = []
+    """What the run has to show."""
     phase: Annotated[list[Phase], Field(min_length=1)]
     """The driver's actions, one after the other."""
 
@@ -175,6 +191,9 @@ class Scenario(BaseModel):
             raise ValueError("grade: a generated trace has its own; remove this key")
         if self.motor_share > 0.0 and self.blending:
             raise ValueError("give either blending (by the ECU) or motor_share (without it)")
+        missing = max((one.fault for one in self.expect if one.after_fault), default=0)
+        if missing > len(self.fault):
+            raise ValueError(f"expect: there is no [[fault]] number {missing}; add it, or give t")
         return self
 
     def script(self) -> Script:
