@@ -18,35 +18,38 @@ def config_files(config: Path) -> list[Path]:
     return [config, included_file(config, str(name))] if name else [config]
 
 
-def check_outputs(out: Path, written: Sequence[Path], read: Sequence[Path], toml: bool = False) -> None:
-    """Refuse an `--out` by which a file of `written` would be a folder or replace one that is not its own.
+def check_outputs(
+    out: Path, written: Sequence[Path], read: Sequence[Path], toml: bool = False, option: str = "--out"
+) -> None:
+    """Refuse an output by which a file of `written` would be a folder or replace one that is not its own.
 
     Not its own are those of `read`, and whatever stands in the place of a neighbour while `written[0]` is not
-    there yet. `toml`: `out` must end in .toml. Raises UserError. Links are followed; files that do not exist
-    yet are compared by their path.
+    there yet. `option`: by which it was given. `toml`: `out` must end in .toml. Raises UserError. Links are
+    followed; files that do not exist yet are compared by their path.
     """
     if toml and out.suffix != ".toml":
-        raise UserError("--out", str(out), "is written as TOML; let the name end in .toml")
+        raise UserError(option, str(out), "is written as TOML; let the name end in .toml")
     for path in written:
         if path.is_dir():
             what = "is a folder" if path == out else f"writes {path}, which is a folder"
-            raise UserError("--out", str(out), f"{what}; give the name of a file, or remove the folder")
+            raise UserError(option, str(out), f"{what}; give the name of a file, or remove the folder")
         for source in read:
             if _same(path, source):
                 remedy = f"would overwrite {source}, which this command reads; choose another name"
-                raise UserError("--out", str(out), remedy)
+                raise UserError(option, str(out), remedy)
     if not written[0].exists() and (strange := [path for path in written if path.exists()]):
         remedy = f"would overwrite {strange[0]}, which was not written with it; choose another name"
-        raise UserError("--out", str(out), remedy)
+        raise UserError(option, str(out), remedy)
 
 
-def write_text(out: Path, text: str) -> None:
-    """Write the text of an `--out`, and its folder. Raises UserError if it cannot be written."""
+def write_text(out: Path, text: str, option: str = "--out") -> None:
+    """Write the text of an output, and its folder. Raises UserError if it cannot be written."""
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         out.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise UserError(str(out), "", f"cannot be written ({error.strerror}); choose another --out") from None
+        remedy = f"cannot be written ({error.strerror}); choose another {option}"
+        raise UserError(str(out), "", remedy) from None
 
 
 def _same(one: Path, other: Path) -> bool:
