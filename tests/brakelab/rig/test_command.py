@@ -1,10 +1,13 @@
-"""The rig's exit code and words, in memory."""
+"""The rig's exit code, words and files, in memory."""
 
+import json
 from pathlib import Path
 
+import pyarrow.parquet as pq
 import pytest
 
 from ecu import cli
+from ecu.settings.resources import resource
 
 STOP = """
 plant = "suv"
@@ -40,3 +43,59 @@ def test_a_rig_with_another_car_than_the_configured_one_has_failed(
     lines = [line for line in capsys.readouterr().err.splitlines() if line.startswith("brake-ecu:")]
     assert len(lines) == bool(told)
     assert all(line.startswith(told) for line in lines)
+
+
+EXPECTED = """
+[[expect]]
+what = "stopping_distance"
+at_most = 10.0
+[[expect]]
+what = "no_bit"
+bit = "wheel slips"
+"""
+LONG, KEPT = "stopping distance at most 10 m", "never wheel slips"
+
+
+@pytest.mark.parametrize(("limit", "code"), [("10.0", 0), ("1.0", 1)])
+def test_a_rig_fails_by_a_limit_that_is_not_kept(
+    limit: str, code: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    (tmp_path / "stop.toml").write_text(STOP + EXPECTED.replace("10.0", limit))
+    arguments = ["rig", str(tmp_path / "stop.toml"), "--config", "suv", "--lock-step", "--out", str(out)]
+    assert cli.main([*arguments, "--json"]) == code
+    given = json.loads(capsys.readouterr().out)
+    found = {one["expected"]: one["passed"] for one in given["scenarios"][0]["verdicts"]}
+    assert found == {LONG.replace("10", limit.removesuffix(".0")): not code, KEPT: True}
+
+    (row,) = pq.read_table(out / "scenarios.parquet", columns=["expected", "failed"]).to_pylist()
+    assert row["expected"] == 2
+    assert ("FAILED: stopping distance at most 1 m (found: " in row["failed"]) == bool(code)
+    page = (out / "rig.html").read_text("utf-8")
+    assert page.count("<b>failed</b>") == code
+    assert ("1 of 2 failed" in page) == bool(code)
+
+
+@pytest.mark.parametrize(("limit", "verdict", "code"), [("10.0", "passed", 0), ("1.0", "FAILED", 1)])
+def test_simulate_fails_by_a_limit_that_is_not_kept(
+    limit: str, verdict: str, code: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "stop.toml").write_text(STOP + EXPECTED.replace("10.0", limit))
+    arguments = ["simulate", str(tmp_path / "stop.toml"), "--config", "suv", "--out", str(tmp_path / "drive")]
+    assert cli.main(arguments) == code
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith(f"{verdict}: stopping distance at most {limit[:-2]} m (found: ")
+    assert lines[1] == f"passed: {KEPT} (found: never)"
+
+
+def test_a_shipped_scenario_passes_and_fails_by_a_time_out_that_is_shorter_than_the_ecu_has(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = resource("config/scenarios/faults/lost.toml").read_text("utf-8")
+    (tmp_path / "strict.toml").write_text(text.replace("within = 0.15 ", "within = 0.05 "))
+    arguments = ["rig", "--config", "suv", "--lock-step", "--seed", "1", "--out", str(tmp_path / "out")]
+    assert cli.main([*arguments, "lost", "calliper-dead", "killed-standby"]) == 0
+    assert "FAILED" not in capsys.readouterr().out
+    assert cli.main([*arguments, str(tmp_path / "strict.toml")]) == 1
+    failed = [line for line in capsys.readouterr().out.splitlines() if "FAILED" in line]
+    assert failed == ["strict: FAILED: IMU lost within 0.05 s of fault 1 (found: after 0.09 s)"]

@@ -1,11 +1,12 @@
-"""What the rig's page and terminal say of the car itself, once over all scenarios."""
+"""What the rig's page and terminal say of the car itself, once over all scenarios, and of expectations."""
 
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from brakelab.rig.page import by_the_car
+from brakelab.rig.page import by_the_car, passed_text
+from brakelab.rig.verdicts import Verdict
 
 WEAK = "compensation at its limit: front linings 36 % below the configured friction"
 STRONG = "demand limited: rear linings 39 % above the configured friction"
@@ -26,3 +27,12 @@ def test_a_thing_of_the_car_is_said_once(of_linings: dict[str, list[str]], lines
         SimpleNamespace(scenario=name, of_linings=told) for name, told in of_linings.items()
     ]
     assert by_the_car(outcomes) == lines
+
+
+@pytest.mark.parametrize(
+    ("passed", "text"),
+    [([], "none"), ([True], "passed"), ([True, True], "passed"), ([True, False, False], "2 of 3 failed")],
+)
+def test_a_scenario_passed_if_all_that_it_expects_did(passed: list[bool], text: str) -> None:
+    outcome: Any = SimpleNamespace(verdicts=[Verdict("", "", one) for one in passed])
+    assert passed_text(outcome) == text

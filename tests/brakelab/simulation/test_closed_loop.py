@@ -133,7 +133,7 @@ def test_the_ideal_controller_brakes_with_the_true_friction(config: Config) -> N
 
 def test_simulate_writes_log_inputs_and_truth(tmp_path: Path, stop: Drive) -> None:
     out = tmp_path / "new" / "run.1"
-    assert simulate(CONFIG / "scenarios" / "stop-1.toml", CONFIG / "suv.toml", out, 3) == 0
+    simulate(CONFIG / "scenarios" / "stop-1.toml", CONFIG / "suv.toml", out, 3)
     lines = (tmp_path / "new" / "run.1.log").read_text().splitlines()
     assert len(lines) == len(stop.frames)
     assert lines[0].startswith(f"({START_NS // 10**9}.000000) can0 ")

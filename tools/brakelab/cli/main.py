@@ -85,10 +85,15 @@ def simulate(
     draw: Draw = None,
     plant: Plant = None,
 ) -> int:
-    """Simulate a scenario in closed loop. Write frames, decoded inputs and true values."""
+    """Simulate a scenario in closed loop. Write frames, inputs, true values. Exit code 1: it failed."""
     from brakelab.simulation import simulate
 
-    return simulate.simulate(scenario, config, out, seed, draw, plant)
+    driven = simulate.simulate(scenario, config, out, seed, draw, plant)
+    if not driven.scenario.expect:
+        return 0
+    from brakelab.rig.simulated import judge_simulated
+
+    return judge_simulated(driven, seed)
 
 
 @app.command()
@@ -115,7 +120,7 @@ def rig(
     ] = 0,
     plant: Plant = None,
 ) -> int:
-    """Test the ECU in scenarios with faults. Write one report."""
+    """Test the ECU in scenarios with faults. Write one report. Exit code 1: a scenario failed."""
     from brakelab.rig import command
 
     if (interface is None) != (channel is None):

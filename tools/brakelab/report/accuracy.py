@@ -99,3 +99,15 @@ def accuracy_per_axle(drive: Drive, truth: Drive, found: list[Braking]) -> dict[
         axle: accuracy(estimate[rows, wheels], sigma[rows, wheels], true[rows, wheels], dt)
         for axle, wheels in AXLES.items()
     }
+
+
+def error_at_end(drive: Drive, truth: Drive, found: list[Braking]) -> dict[str, float]:
+    """Return by axle |estimate - truth| of friction over the truth in the last row evaluated; NaN: none."""
+    rows = np.flatnonzero(evaluated(drive, truth, found))[-1:]
+    if not len(rows):
+        return dict.fromkeys(AXLES, float("nan"))
+    estimate, true = drive.corners("mu_b")[rows], truth.corners("mu_b")[rows]
+    return {
+        axle: float(abs(estimate[:, wheels].mean() / true[:, wheels].mean() - 1.0))
+        for axle, wheels in AXLES.items()
+    }

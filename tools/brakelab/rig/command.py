@@ -5,18 +5,14 @@ memory as fast as it goes. Per scenario a folder with results, truth, frames and
 `rig.html`, `scenarios.parquet` and `faults.parquet`.
 """
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from brakelab.report.command import report
-from brakelab.report.drive import Drive
 from brakelab.results.console import new_console
 from brakelab.rig.live import Bus, choose_bus, drive, make_folder, named_bus
-from brakelab.rig.outcome import Outcome, Undisturbed, outcome, stopping_distance
+from brakelab.rig.outcome import Outcome, of_the_rig, outcome, undisturbed
 from brakelab.rig.page import by_the_car, summary, write_page, write_tables
 from brakelab.rig.results import write_recorded, write_simulated
 from brakelab.rig.vehicle_node import warm_up
@@ -24,7 +20,6 @@ from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.scenario import Scenario, load_scenario
 from brakelab.simulation.scenario_car import other_car, with_plant_for
 from ecu.compiling import compiling_told
-from ecu.contract.faults import fault_mask, fault_names
 from ecu.errors import RunFault, UserError
 from ecu.output import fault, give, say
 from ecu.settings.config import Config, load_config
@@ -61,10 +56,11 @@ def rig(
     seed: int,
     plant: str | None = None,
 ) -> int:
-    """Run every scenario; return 0, or 1 if one showed a fault bit that nothing of it accounts for.
+    """Run every scenario; return 0, or 1 if one failed.
 
-    `bus`: interface and channel, None: the best available. `plant`: the car's file or name, "as-config",
-    None: each scenario's. 1 also if that is another car than `config` describes.
+    It did if an expectation is not met, if it showed a fault bit that nothing of it accounts for, if replay
+    differs, or if its car is another one than `config` describes. `bus`: interface and channel, None: the
+    best available. `plant`: the car's file or name, "as-config", None: each scenario's.
 
     Raises:
         UserError: a scenario, the configuration or the bus is invalid, or `out` cannot be written.
@@ -74,7 +70,8 @@ def rig(
     vehicle = load_config(config)
     make_folder(out)
     scenarios = [(path, with_plant_for(one, plant, vehicle, out / "plant")) for path, one in shipped]
-    others = sorted({other_car(scenario, vehicle) for _, scenario in scenarios} - {""})
+    cars = {path.stem: other_car(scenario, vehicle) for path, scenario in scenarios}
+    others = sorted(set(cars.values()) - {""})
     meeting = None
     if not lock_step:
         meeting = choose_bus() if bus is None else named_bus(*bus)
@@ -106,22 +103,17 @@ def rig(
     for line in others:
         fault(f"brake-ecu: {line}")
     give(other_cars=others)
+    judged = {one.scenario: [of_the_rig(one, cars[one.scenario]), *one.verdicts] for one in outcomes}
+    for one in outcomes:
+        for verdict in one.verdicts:
+            print(f"{one.scenario}: {verdict.line}")
     write_tables(outcomes, out)
     page = out / "rig.html"
-    cars = ", ".join(sorted({Path(scenario.plant).stem for _, scenario in scenarios}))
-    page.write_text(write_page(outcomes, meeting, vehicle, cars, seed), "utf-8")
+    plants = ", ".join(sorted({Path(scenario.plant).stem for _, scenario in scenarios}))
+    page.write_text(write_page(outcomes, meeting, vehicle, plants, seed), "utf-8")
     say(f"report: {page.resolve()}")
     give(written=[page, out / "scenarios.parquet", out / "faults.parquet"])
-    return int(bool(others) or any(result.unexplained or result.differing for result in outcomes))
-
-
-def _undisturbed(scenario: Scenario, vehicle: Config, seed: int) -> Undisturbed:
-    """Return the same drive without the scenario's faults."""
-    if not scenario.fault:
-        return Undisturbed(math.nan, frozenset())
-    sound = run(new_loop(scenario.model_copy(update={"fault": []}), vehicle, seed))
-    mask = int(np.bitwise_or.reduce(fault_mask(sound.outputs)))
-    return Undisturbed(stopping_distance(Drive(sound.t, sound.truth, {})), frozenset(fault_names(mask)))
+    return int(not all(verdict.passed for verdicts in judged.values() for verdict in verdicts))
 
 
 def _in_memory(name: str, scenario: Scenario, vehicle: Config, folder: Path, seed: int) -> Outcome:
@@ -129,7 +121,7 @@ def _in_memory(name: str, scenario: Scenario, vehicle: Config, folder: Path, see
     written = write_simulated(loop, run(loop), vehicle, folder)
     truth = folder / "truth.parquet"
     report(written.result, truth, folder / "report.html")
-    return outcome(name, written, truth, scenario.fault, vehicle, _undisturbed(scenario, vehicle, seed), [])
+    return outcome(name, written, truth, scenario, vehicle, undisturbed(scenario, vehicle, seed), [])
 
 
 def _in_real_time(
@@ -144,7 +136,5 @@ def _in_real_time(
     recorded = drive(bus, path, config, scenario.fault, folder, seed, plant=scenario.plant)
     written = write_recorded(recorded.recordings, vehicle, folder)
     report(written.result, recorded.truth, folder / "report.html", recorded.recordings[0])
-    undisturbed = _undisturbed(scenario, vehicle, seed)
-    return outcome(
-        path.stem, written, recorded.truth, scenario.fault, vehicle, undisturbed, recorded.recordings
-    )
+    sound = undisturbed(scenario, vehicle, seed)
+    return outcome(path.stem, written, recorded.truth, scenario, vehicle, sound, recorded.recordings)

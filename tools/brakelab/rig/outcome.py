@@ -5,23 +5,22 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from brakelab.arrays import Vector
-from brakelab.report.accuracy import accuracy_per_axle, achieved_deceleration, evaluated
 from brakelab.report.brakings import brakings
-from brakelab.report.drive import Drive, onto, read_drive, start_ns
+from brakelab.report.drive import Drive, read_drive
 from brakelab.report.sparkline import drive_sparkline
 from brakelab.report.timing import Spread, read_timing, spread
+from brakelab.rig.figures import figures, last_stop
 from brakelab.rig.linings import OF_LININGS, beyond_compensation, tell_linings
-from brakelab.rig.reaction import Reaction, raised_alone, reactions
+from brakelab.rig.reaction import Reaction, raised_alone
 from brakelab.rig.results import Frames, Written
+from brakelab.rig.verdicts import Verdict, judge
+from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.faults import Fault
-from ecu.contract.faults import FAULTS
+from brakelab.simulation.scenario import Scenario
+from ecu.contract.faults import FAULTS, fault_mask, fault_names
 from ecu.settings.config import Config
 
-STANDSTILL = 0.2  # m/s
-SETTLED_ROWS = 50  # 0.5 s
 _REMEDY = "run the rig again"
 
 
@@ -32,8 +31,7 @@ class Outcome(NamedTuple):
     seconds: float
     brakings: int
     decel_error: float
-    """Largest |achieved - demanded| [m/s^2] in the rows of `brakelab.report.accuracy.evaluated` whose demand
-    has not moved for 0.5 s."""
+    """As in `Figures` [m/s^2]."""
     nrmse_front: float
     """Of friction, as a share."""
     nrmse_rear: float
@@ -41,11 +39,15 @@ class Outcome(NamedTuple):
     """From the demand of the last braking that ends at rest to rest [m]."""
     undisturbed: float
     """The same without the scenario's faults [m]."""
+    longer: float
+    """Relative increase of the stopping distance by the faults."""
     unexplained: list[str]
     """Fault bits that neither an injected fault nor the car's linings account for."""
     of_linings: list[str]
     """Fault bits that the car's linings account for, with what is told by them."""
     reactions: list[Reaction]
+    verdicts: list[Verdict]
+    """On the scenario's expectations."""
     frames: Frames
     differing: int
     """Values that replay did not give again."""
@@ -58,27 +60,6 @@ class Outcome(NamedTuple):
     folder: Path
 
 
-def _steady(demand: Vector) -> NDArray[np.bool_]:
-    """Return the rows in whose last 0.5 s the demand [m/s^2] moved less than 0.05, shape (n,)."""
-    padded = np.concatenate([np.full(SETTLED_ROWS, np.nan), demand])
-    spread = np.ptp(np.lib.stride_tricks.sliding_window_view(padded, SETTLED_ROWS + 1), axis=1)
-    return np.asarray(spread < 0.05)
-
-
-def stopping_distance(truth: Drive) -> float:
-    """Return the distance [m] from the demand to rest of the last braking that ends at rest, else NaN."""
-    speed = truth.column("vehicle_speed")
-    asked = (truth.column("decel_demand") > 0.0) | (truth.column("pedal_position") > 0.0)
-    rests = np.flatnonzero((speed[1:] < STANDSTILL) & (speed[:-1] >= STANDSTILL) & asked[1:])
-    if not len(rests):
-        return math.nan
-    end = int(rests[-1]) + 1
-    free = np.flatnonzero(~asked[:end])
-    begin = int(free[-1]) + 1 if len(free) else 0
-    distance = truth.column("distance")
-    return float(distance[end] - distance[begin])
-
-
 class Undisturbed(NamedTuple):
     """The same drive without the faults of its scenario."""
 
@@ -86,6 +67,19 @@ class Undisturbed(NamedTuple):
     """m; NaN: no such drive."""
     faults: frozenset[str]
     """Names of the fault bits that it shows: of a car beyond what compensation may do, for one."""
+
+    def longer(self, distance: float) -> float:
+        """Return by how much of the undisturbed one a stopping distance [m] is longer."""
+        return distance / self.stopping_distance - 1.0
+
+
+def undisturbed(scenario: Scenario, vehicle: Config, seed: int) -> Undisturbed:
+    """Return the same drive without the scenario's faults."""
+    if not scenario.fault:
+        return Undisturbed(math.nan, frozenset())
+    sound = run(new_loop(scenario.model_copy(update={"fault": []}), vehicle, seed))
+    mask = int(np.bitwise_or.reduce(fault_mask(sound.outputs)))
+    return Undisturbed(last_stop(Drive(sound.t, sound.truth, {})).distance, frozenset(fault_names(mask)))
 
 
 def account_for(
@@ -110,37 +104,34 @@ def outcome(
     name: str,
     written: Written,
     truth_path: Path,
-    faults: list[Fault],
+    scenario: Scenario,
     vehicle: Config,
-    undisturbed: Undisturbed,
+    sound: Undisturbed,
     recordings: list[Path],
 ) -> Outcome:
     """Return the outcome by the files of one drive; fault bits shown without the faults too do not count."""
     drive = read_drive(written.result, ("vehicle_speed",), _REMEDY)
     own = read_drive(truth_path, ("vehicle_speed",), _REMEDY)
-    truth = onto(drive, own, truth_path)
     found = brakings(drive, written.result)
-    rows = evaluated(drive, truth, found)
-    demand = drive.column("decel_demand_total")
-    rows &= _steady(demand)
-    error = np.abs(achieved_deceleration(drive, truth) - demand)[rows]
-    accuracy = accuracy_per_axle(drive, truth, found)
+    seen = figures(drive, own, truth_path, found, scenario.fault)
+    longer = sound.longer(seen.stop.distance)
     timings = [read_timing(folder) for folder in recordings]
     lateness = np.concatenate([timing.lateness for timing in timings]) if timings else np.array([np.nan])
-    from_start = drive._replace(t=drive.t + 1e-9 * ((start_ns(drive) or 0) - (start_ns(own) or 0)))
-    alone, of_linings = account_for(from_start, own, faults, vehicle, undisturbed.faults)
+    alone, of_linings = account_for(seen.drive, own, scenario.fault, vehicle, sound.faults)
     return Outcome(
         scenario=name,
         seconds=float(own.t[-1]),
         brakings=len(found),
-        decel_error=float(error.max()) if len(error) else math.nan,
-        nrmse_front=accuracy["front"].nrmse,
-        nrmse_rear=accuracy["rear"].nrmse,
-        stopping_distance=stopping_distance(own),
-        undisturbed=undisturbed.stopping_distance,
+        decel_error=seen.decel_error,
+        nrmse_front=seen.accuracy["front"].nrmse,
+        nrmse_rear=seen.accuracy["rear"].nrmse,
+        stopping_distance=seen.stop.distance,
+        undisturbed=sound.stopping_distance,
+        longer=longer,
         unexplained=alone,
         of_linings=of_linings,
-        reactions=reactions(from_start, own, faults),
+        reactions=seen.reactions,
+        verdicts=judge(scenario.expect, seen, longer, scenario.fault),
         frames=written.frames,
         differing=written.differing,
         cycles=len(drive.t),
@@ -149,3 +140,12 @@ def outcome(
         curve=drive_sparkline(drive),
         folder=written.result.parent,
     )
+
+
+def of_the_rig(one: Outcome, other_car: str) -> Verdict:
+    """Return the verdict on what no scenario has to ask for; `other_car`: as of `scenario_car.other_car`."""
+    wrong = [f"unexplained: {name}" for name in one.unexplained]
+    wrong += [f"replay differs in {one.differing} values"] if one.differing else []
+    wrong += [other_car] if other_car else []
+    expected = "every fault bit accounted for, replay to the bit, the configured car"
+    return Verdict(expected, "; ".join(wrong) or "nothing else", not wrong)

@@ -22,14 +22,17 @@ NAMED: Final = 3
 """Scenarios whose names are listed; more are counted."""
 
 
-def more_distance(outcome: Outcome) -> float:
-    """Return the relative increase of the stopping distance by the faults."""
-    return outcome.stopping_distance / outcome.undisturbed - 1.0
-
-
 def bits_text(reaction: Reaction) -> str:
     """Return the fault bits raised, with their delays in ms."""
     return ", ".join(f"{name} {after:.0f}" for name, after in reaction.bits) or "none"
+
+
+def passed_text(outcome: Outcome) -> str:
+    """Return whether the scenario's expectations were met."""
+    failed = sum(not verdict.passed for verdict in outcome.verdicts)
+    if not outcome.verdicts:
+        return "none"
+    return f"{failed} of {len(outcome.verdicts)} failed" if failed else "passed"
 
 
 def summary(outcomes: list[Outcome]) -> Table:
@@ -47,7 +50,7 @@ def summary(outcomes: list[Outcome]) -> Table:
             fixed(one.decel_error, 2),
             f"{percent(one.nrmse_front, 1)} / {percent(one.nrmse_rear, 1)} %",
             fixed(one.stopping_distance, 1),
-            signed_percent(more_distance(one), 1),
+            signed_percent(one.longer, 1),
             str(one.missed),
             str(one.frames.lost),
             "; ".join([*seen, *(f"unexplained: {name}" for name in one.unexplained)]),
@@ -72,13 +75,14 @@ def write_tables(outcomes: list[Outcome], out: Path) -> None:
     """Write `scenarios.parquet` and `faults.parquet`: one row per scenario, one per injected fault."""
     flat = (
         "scenario", "seconds", "brakings", "decel_error", "nrmse_front", "nrmse_rear", "stopping_distance",
-        "undisturbed", "differing", "cycles", "missed",
+        "undisturbed", "longer", "differing", "cycles", "missed",
     )  # fmt: skip
     rows = [
         {name: getattr(one, name) for name in flat}
         | {f"frames_{name}": value for name, value in one.frames._asdict().items()}
         | {f"lateness_{name}_us": value for name, value in one.lateness._asdict().items()}
         | {"unexplained": ", ".join(one.unexplained), "of_linings": "; ".join(one.of_linings)}
+        | {"expected": len(one.verdicts), "failed": "; ".join(v.line for v in one.verdicts if not v.passed)}
         for one in outcomes
     ]
     pq.write_table(pa.Table.from_pylist(rows), out / "scenarios.parquet")
@@ -108,13 +112,18 @@ def _tiles(outcomes: list[Outcome], live: bool) -> list[Tile]:
     if not math.isnan(worst.decel_error):
         note = f"largest in settled braking: {worst.scenario}"
         tiles.append(Tile("Deceleration error", fixed(worst.decel_error, 2), "m/s²", note, False))
-    longest = max(outcomes, key=lambda one: np.nan_to_num(more_distance(one), nan=-1.0))
-    if not math.isnan(more_distance(longest)):
-        more = signed_percent(more_distance(longest), 1)
+    longest = max(outcomes, key=lambda one: np.nan_to_num(one.longer, nan=-1.0))
+    if not math.isnan(longest.longer):
+        more = signed_percent(longest.longer, 1)
         tiles.append(Tile("Stopping distance", more, "%", f"longest by faults: {longest.scenario}", False))
     count = sum(len(one.unexplained) for one in outcomes)
     note = "by no injected fault"
     tiles.append(Tile("Unexplained faults", str(count), "", note, count > 0))
+    verdicts = [verdict for one in outcomes for verdict in one.verdicts]
+    if verdicts:
+        failed = sum(not verdict.passed for verdict in verdicts)
+        note = f"of {len(verdicts)}"
+        tiles.append(Tile("Failed expectations", str(failed), "", note, failed > 0))
     if live:
         missed = sum(one.missed for one in outcomes)
         note = f"of {sum(one.cycles for one in outcomes)}"
@@ -131,8 +140,8 @@ def write_page(outcomes: list[Outcome], bus: Bus | None, config: Config, cars: s
         css=(files("brakelab.report") / "page.css").read_text("utf-8"),
         outcomes=outcomes,
         tiles=_tiles(outcomes, bus is not None),
-        more_distance=more_distance,
         bits_text=bits_text,
+        passed_text=passed_text,
         by_the_car=by_the_car(outcomes),
         live=bus is not None,
         controller=bus is not None and bus.wire is not None,

@@ -85,24 +85,33 @@ def _end(fault: Fault) -> float:
     return fault.t if fault.kind == "daemon_killed" and fault.standby else fault.end
 
 
-def _first(t: NDArray[np.float64], rows: NDArray[np.bool_], since: float) -> float:
+def first_after(t: NDArray[np.float64], rows: NDArray[np.bool_], since: float) -> float:
     """Return the time of the first of `rows`, in ms after `since`; NaN: none."""
     places = np.flatnonzero(rows)
     return 1e3 * (float(t[places[0]]) - since) if len(places) else math.nan
 
 
+def _usual(drive: Drive, since: float) -> int:
+    """Return the mask of the last row before `since`."""
+    before = np.flatnonzero(drive.t < since)
+    return int(fault_masks(drive)[before[-1]]) if len(before) else 0
+
+
+def raised(drive: Drive, since: float, until: float = math.inf) -> list[tuple[str, float]]:
+    """Return the fault bits raised from `since` to `until` [s], with when in ms after `since`, in order.
+
+    A bit that stood before does not count.
+    """
+    masks = fault_masks(drive) & ~_usual(drive, since)
+    masks[(drive.t < since) | (drive.t >= until)] = 0
+    found = [(one.name, first_after(drive.t, (masks & one.bit) != 0, since)) for one in FAULTS]
+    return sorted((bit for bit in found if math.isfinite(bit[1])), key=lambda bit: bit[1])
+
+
 def _reaction(drive: Drive, truth: Drive, fault: Fault) -> Reaction:
-    masks, mode = fault_masks(drive), drive.column("mode")
+    mode = drive.column("mode")
     end = _end(fault)
     within = (drive.t >= fault.t) & (drive.t < end + AFTER_S)
-    before = np.flatnonzero(drive.t < fault.t)
-    usual = int(masks[before[-1]]) if len(before) else 0
-    raised = within & ((masks & ~usual) != 0)
-    bits = []
-    for one in FAULTS:
-        after = _first(drive.t, raised & ((masks & ~usual & one.bit) != 0), fault.t)
-        if math.isfinite(after):
-            bits.append((one.name, after))
     worst = int(np.nanmax(mode[within])) if within.any() else 0
     deaf = truth.column("demand_heard") == 0.0
     concerned = deaf & (truth.t >= max(fault.t, FIRST_HEARD_S)) & (truth.t < end + AFTER_S)
@@ -112,21 +121,22 @@ def _reaction(drive: Drive, truth: Drive, fault: Fault) -> Reaction:
         what=", ".join([*fault.message, *fault.signal]),
         t=fault.t,
         duration=end - fault.t,
-        bits=sorted(bits, key=lambda bit: bit[1]),
+        bits=raised(drive, fault.t, end + AFTER_S),
         mode=MODES[worst],
-        mode_after=_first(drive.t, within & (mode == worst) & (mode >= DEGRADED), fault.t),
+        mode_after=first_after(drive.t, within & (mode == worst) & (mode >= DEGRADED), fault.t),
         fallback=1e3 * period * float(np.count_nonzero(concerned)),
-        fallback_after=_first(truth.t, concerned, fault.t),
-        recovered=_recovered(drive, truth, fault, usual),
+        fallback_after=first_after(truth.t, concerned, fault.t),
+        recovered=_recovered(drive, truth, fault),
     )
 
 
-def _recovered(drive: Drive, truth: Drive, fault: Fault, usual: int) -> float:
-    """Return when the last effect of the fault disappeared, in ms after its end."""
+def _recovered(drive: Drive, truth: Drive, fault: Fault) -> float:
+    """Return when the last effect of the fault disappeared, in ms after its end; "late" is the machine's."""
     since = fault.t if fault.kind == "daemon_killed" else _end(fault)
     if math.isinf(since):
         return math.nan
-    wrong = ((fault_masks(drive) & ~usual) != 0) | (drive.column("mode") >= DEGRADED)
+    masks = fault_masks(drive) & ~_usual(drive, fault.t) & ~LATE
+    wrong = (masks != 0) | (drive.column("mode") >= DEGRADED)
     wrong &= (drive.t >= since) & (drive.t < since + AFTER_S + SHOWN_S)
     deaf = (truth.column("demand_heard") == 0.0) & (truth.t >= since) & (truth.t < since + AFTER_S + SHOWN_S)
     lasts = [float(t[rows][-1]) for t, rows in ((drive.t, wrong), (truth.t, deaf)) if rows.any()]

@@ -1,7 +1,7 @@
 """`brake-ecu simulate`: a scenario in closed loop; frames, decoded inputs and true values as files."""
 
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -13,13 +13,13 @@ from brakelab.logs.candump_text import candump_text
 from brakelab.results.outputs import check_outputs
 from brakelab.results.progress import progress_bar
 from brakelab.simulation.closed_loop import START_NS, VEHICLE_BUS, new_loop, run_blocks
-from brakelab.simulation.scenario import load_scenario
+from brakelab.simulation.scenario import Scenario, load_scenario
 from brakelab.simulation.scenario_car import other_car, with_draw, with_plant_for
 from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS
-from ecu.contract.signals import CYCLE_NS, INPUT_SIGNALS
+from ecu.contract.signals import CYCLE_NS, INPUT_SIGNALS, N_OUTPUTS
 from ecu.errors import UserError
 from ecu.output import give, say, wrote
-from ecu.settings.config import load_config
+from ecu.settings.config import Config, load_config
 from ecu.settings.resources import command_name
 
 ROWS: Final = 100_000
@@ -41,6 +41,21 @@ def write_columns(
             writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
 
 
+class Simulated(NamedTuple):
+    """A simulated drive whose files are written."""
+
+    scenario: Scenario
+    """With the car and the draw that were asked for."""
+    vehicle: Config
+    t: NDArray[np.float64]
+    outputs: NDArray[np.float64]
+    """By `OUTPUT_COLUMNS`, shape (n, N_OUTPUTS); without a row where the scenario expects nothing."""
+    truth: NDArray[np.float64]
+    """By `TRUTH_COLUMNS`, shape (n, N_TRUTH)."""
+    path: Path
+    """File of the truth."""
+
+
 def simulate(
     scenario: Path,
     config: Path,
@@ -49,7 +64,7 @@ def simulate(
     draw: str | None = None,
     plant: str | None = None,
     told: bool = True,
-) -> int:
+) -> Simulated:
     """Run a scenario with the ECU of `config`, armed; write OUT.log, OUT.parquet, OUT.truth.parquet.
 
     `draw`: width of the car's draw, see `Scenario.draw`; `plant`: the car's file or name, or "as-config",
@@ -75,6 +90,7 @@ def simulate(
     }
     decoded: list[NDArray[np.float64]] = []
     true: list[NDArray[np.float64]] = []
+    outputs = [np.empty((0, N_OUTPUTS))]
     frames = 0
     with progress_bar("simulate", None, told):
         loop = new_loop(driven, vehicle, seed)
@@ -85,6 +101,8 @@ def simulate(
                     text.write(candump_text(block.frames, VEHICLE_BUS))
                     decoded.append(block.decoded.copy())
                     true.append(block.truth.copy())
+                    if driven.expect:
+                        outputs.append(block.outputs.copy())
                     frames += len(block.frames)
             t = np.arange(sum(map(len, true)), dtype=np.float64) * (1e-9 * CYCLE_NS)
             for path, names, blocks in ((inputs, SIGNALS, decoded), (truth, TRUTH_COLUMNS, true)):
@@ -96,4 +114,4 @@ def simulate(
         give(seconds=float(t[-1]), frames=frames)
         again = f"brake-ecu replay {log} --config {command_name(config)} --out {out}.result.parquet"
         wrote(log, inputs, truth, next=again)
-    return 0
+    return Simulated(driven, vehicle, t, np.concatenate(outputs), np.concatenate(true), truth)
