@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pyarrow.parquet as pq
 import pytest
@@ -54,19 +55,26 @@ what = "no_bit"
 bit = "wheel slips"
 """
 LONG, KEPT = "stopping distance at most 10 m", "never wheel slips"
+OWN = "every fault bit accounted for, replay to the bit, the configured car"
 
 
 @pytest.mark.parametrize(("limit", "code"), [("10.0", 0), ("1.0", 1)])
 def test_a_rig_fails_by_a_limit_that_is_not_kept(
     limit: str, code: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    out = tmp_path / "out"
+    out, junit = tmp_path / "out", tmp_path / "new" / "verdicts.xml"
     (tmp_path / "stop.toml").write_text(STOP + EXPECTED.replace("10.0", limit))
     arguments = ["rig", str(tmp_path / "stop.toml"), "--config", "suv", "--lock-step", "--out", str(out)]
-    assert cli.main([*arguments, "--json"]) == code
+    assert cli.main([*arguments, "--junit", str(junit), "--json"]) == code
     given = json.loads(capsys.readouterr().out)
     found = {one["expected"]: one["passed"] for one in given["scenarios"][0]["verdicts"]}
     assert found == {LONG.replace("10", limit.removesuffix(".0")): not code, KEPT: True}
+    assert str(junit) in given["written"]
+
+    (suite,) = ElementTree.parse(junit).getroot()
+    assert suite.attrib == {"name": "stop", "tests": "3", "failures": str(code), "errors": "0"}
+    cases = {case.get("name"): [one.tag for one in case] for case in suite}
+    assert cases == {OWN: []} | {name: [] if passed else ["failure"] for name, passed in found.items()}
 
     (row,) = pq.read_table(out / "scenarios.parquet", columns=["expected", "failed"]).to_pylist()
     assert row["expected"] == 2
@@ -99,3 +107,12 @@ def test_a_shipped_scenario_passes_and_fails_by_a_time_out_that_is_shorter_than_
     assert cli.main([*arguments, str(tmp_path / "strict.toml")]) == 1
     failed = [line for line in capsys.readouterr().out.splitlines() if "FAILED" in line]
     assert failed == ["strict: FAILED: IMU lost within 0.05 s of fault 1 (found: after 0.09 s)"]
+
+
+def test_the_verdicts_never_replace_what_is_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "stop.toml"
+    path.write_text(STOP)
+    arguments = ["rig", str(path), "--config", "suv", "--lock-step", "--out", str(tmp_path / "out")]
+    assert cli.main([*arguments, "--junit", str(path)]) == 2
+    assert f"--junit: {path}: would overwrite {path}" in capsys.readouterr().err
+    assert path.read_text() == STOP

@@ -119,6 +119,9 @@ def rig(
         int, typer.Option("--seed", metavar="N", min=0, help="Seed of the drawn vehicle and its noise")
     ] = 0,
     plant: Plant = None,
+    junit: Annotated[
+        Path | None, typer.Option("--junit", metavar="FILE.xml", help="Write the verdicts as JUnit XML")
+    ] = None,
 ) -> int:
     """Test the ECU in scenarios with faults. Write one report. Exit code 1: a scenario failed."""
     from brakelab.rig import command
@@ -126,7 +129,7 @@ def rig(
     if (interface is None) != (channel is None):
         raise UserError("-i, -c", "", "give both or none; none: a bus of its own on this machine")
     bus = None if interface is None or channel is None else (interface, channel)
-    return command.rig(scenario, config, bus, out, lock_step, seed, plant)
+    return command.rig(scenario, config, bus, out, lock_step, seed, plant, junit)
 
 
 @app.command()

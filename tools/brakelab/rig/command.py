@@ -2,7 +2,7 @@
 
 In real time the daemon and the vehicle are processes on a bus; with `--lock-step` both run in one loop in
 memory as fast as it goes. Per scenario a folder with results, truth, frames and report; over all of them
-`rig.html`, `scenarios.parquet` and `faults.parquet`.
+`rig.html`, `scenarios.parquet` and `faults.parquet`; with `--junit` the verdicts for a test server.
 """
 
 from collections.abc import Sequence
@@ -11,6 +11,8 @@ from typing import Final
 
 from brakelab.report.command import report
 from brakelab.results.console import new_console
+from brakelab.results.outputs import check_outputs, config_files, write_text
+from brakelab.rig.junit import junit_text
 from brakelab.rig.live import Bus, choose_bus, drive, make_folder, named_bus
 from brakelab.rig.outcome import Outcome, of_the_rig, outcome, undisturbed
 from brakelab.rig.page import by_the_car, summary, write_page, write_tables
@@ -55,19 +57,24 @@ def rig(
     lock_step: bool,
     seed: int,
     plant: str | None = None,
+    junit: Path | None = None,
 ) -> int:
     """Run every scenario; return 0, or 1 if one failed.
 
     It did if an expectation is not met, if it showed a fault bit that nothing of it accounts for, if replay
     differs, or if its car is another one than `config` describes. `bus`: interface and channel, None: the
-    best available. `plant`: the car's file or name, "as-config", None: each scenario's.
+    best available. `plant`: the car's file or name, "as-config", None: each scenario's. `junit`: file of the
+    verdicts as JUnit XML.
 
     Raises:
-        UserError: a scenario, the configuration or the bus is invalid, or `out` cannot be written.
+        UserError: a scenario, the configuration or the bus is invalid, or `out` or `junit` cannot be written.
         RunFault: a daemon or the vehicle ended early.
     """
     shipped = [(path, load_scenario(path)) for path in found(names)]
     vehicle = load_config(config)
+    if junit is not None:
+        read = [path for path, _ in shipped]
+        check_outputs(junit, (junit,), [*config_files(config), *read], option="--junit")
     make_folder(out)
     scenarios = [(path, with_plant_for(one, plant, vehicle, out / "plant")) for path, one in shipped]
     cars = {path.stem: other_car(scenario, vehicle) for path, scenario in scenarios}
@@ -112,7 +119,11 @@ def rig(
     plants = ", ".join(sorted({Path(scenario.plant).stem for _, scenario in scenarios}))
     page.write_text(write_page(outcomes, meeting, vehicle, plants, seed), "utf-8")
     say(f"report: {page.resolve()}")
-    give(written=[page, out / "scenarios.parquet", out / "faults.parquet"])
+    written = [page, out / "scenarios.parquet", out / "faults.parquet"]
+    if junit is not None:
+        write_text(junit, junit_text(judged), option="--junit")
+        written.append(junit)
+    give(written=written)
     return int(not all(verdict.passed for verdicts in judged.values() for verdict in verdicts))
 
 
