@@ -24,8 +24,8 @@ for name in ("BRAKE_ECU_DEBUG", "NOTIFY_SOCKET", "COLUMNS", "FORCE_COLOR", "GITH
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
-# Tests call kernels that no library holds: numba has them all; processes that tests start take the library.
-if os.environ.get("BRAKE_ECU_TEST_LIBRARY") != "1":
+# Kernels come from the library where it holds them; `BRAKE_ECU_TEST_LIBRARY=0`: in tests all from numba.
+if os.environ.get("BRAKE_ECU_TEST_LIBRARY") == "0":
     os.environ["BRAKE_ECU_LIBRARY"] = "0"
     for package in ("ecu", "brakelab"):
         jit.library(package)

@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ecu.algorithm.monitoring.wear import ENERGY, ENERGY_T, POWER2, POWER2_T, RATE, RATE_T
 from ecu.contract.records import N_MEASURED, RecordArray
 
 MU_RANGE: Final = (0.5, 1.5)  # of nominal
@@ -15,6 +16,7 @@ JOINT_LIMIT: Final = 1.5
 """Of any state of the joint observer: logarithms, and the rest is smaller still."""
 FARTHEST: Final = 1e10  # m, of an odometer
 THICKEST: Final = 50.0  # mm
+COLDEST: Final = -100.0  # degC, of a disc
 LEAST_EIGENVALUE: Final = 1e-6  # of a correlation matrix, below zero: rounding
 
 
@@ -45,8 +47,10 @@ def out_of_range(learned: RecordArray, mu_nominal: NDArray[np.float64]) -> str:
 def wear_out_of_range(wear: RecordArray) -> str:
     """Return the name of the first implausible value of `wear` (shape (1,)), empty if there is none."""
     row = wear[0]
-    sums = ("regressors", "friction_error", "temperature_error", "leg_ends", "measured_at")
-    checks = {name: np.isfinite(row[name]) & (row[name] >= 0) for name in sums}
+    checks = {
+        name: np.isfinite(row[name]) & (row[name] >= 0) for name in ("friction_error", "temperature_error")
+    }
+    checks |= {name: _are_sums(row[name]) for name in ("regressors", "leg_ends", "measured_at")}
     checks["odometer"] = np.asarray(0 <= row["odometer"] <= FARTHEST)
     checks["fitted_at"] = (row["fitted_at"] >= 0) & (row["fitted_at"] <= row["odometer"])
     checks["told"] = np.isin(row["told"], (0, 1))
@@ -56,6 +60,14 @@ def wear_out_of_range(wear: RecordArray) -> str:
     checks["measured_sigma"] = ~used | ((row["measured_sigma"] > 0) & (row["measured_sigma"] <= THICKEST))
     checks["legs"] = np.asarray(0 <= row["legs"] <= FARTHEST)
     return next((name for name, good in checks.items() if not good.all()), "")
+
+
+def _are_sums(values: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which regressors of wear, shape (..., N_REGRESSORS, 4), a disc above `COLDEST` gives."""
+    least = np.zeros_like(values)
+    for with_temperature, without in ((ENERGY_T, ENERGY), (RATE_T, RATE), (POWER2_T, POWER2)):
+        least[..., with_temperature, :] = COLDEST * np.abs(values[..., without, :])
+    return np.isfinite(values) & (values >= least)
 
 
 def dust_out_of_range(dust: RecordArray) -> str:

@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from .conftest import PATIENCE_S, ROOT
@@ -26,5 +27,7 @@ def test_the_example_is_braked_as_it_asks(daemon):
     assert speed == 0.0
     assert bar > 5.0
     braking = [decel for t, _, decel, _ in rows if t >= 3.0]
-    assert min(braking) > 3.0, said  # asks for 4 m/s², less and more while the machine holds either up
+    assert np.median(braking) == pytest.approx(4.4, abs=0.8), (
+        said
+    )  # asks for 4 m/s²; a busy machine holds it up
     assert max(braking) < 6.0, said

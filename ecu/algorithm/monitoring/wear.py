@@ -134,12 +134,12 @@ def _count_errors(state: Record, wear: Record, inputs: Record, estimate: Record,
         share = estimate.sigma[i] / estimate.mu[i] if known else LOST
         sigma, error = discs.sigma[i], wear.temperature_error
         error[ENERGY_T, i] += sigma * (x[ENERGY, i] - counted[ENERGY, i])
-        error[ENERGY_T2, i] += 2.0 * sigma * (x[ENERGY_T, i] - counted[ENERGY_T, i])
+        error[ENERGY_T2, i] += 2.0 * sigma * abs(x[ENERGY_T, i] - counted[ENERGY_T, i])
         error[RATE_T, i] += sigma * (x[RATE, i] - counted[RATE, i])
         error[POWER2_T, i] += sigma * (x[POWER2, i] - counted[POWER2, i])
         for j in range(7):
             power = 2.0 if j >= POWER2 else 1.0
-            wear.friction_error[j, i] += power * share * (x[j, i] - counted[j, i])
+            wear.friction_error[j, i] += power * share * abs(x[j, i] - counted[j, i])
             counted[j, i] = x[j, i]
 
 

@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from brakelab.arrays import Array
-from brakelab.identify.friction.columns import UNITS, ZEROS
+from brakelab.identify.units import UNITS, ZEROS
 from brakelab.logs.csv_header import find_header
 from brakelab.logs.csv_rows import csv_columns, csv_rows
 from brakelab.logs.log_quality import Damage

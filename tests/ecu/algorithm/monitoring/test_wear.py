@@ -12,6 +12,7 @@ from ecu.algorithm.monitoring.wear_belief import NEW_SIGMA, mass_by_law
 from ecu.algorithm.step import new_state
 from ecu.contract.records import N_LEGS, N_MEASURED
 from ecu.pads import add_measurement, fit_new
+from ecu.recording.learned_range import wear_out_of_range
 
 DT = 0.01  # s
 TORQUE = 1500.0  # N m
@@ -106,6 +107,16 @@ def test_nothing_wears_without_both_pressure_and_sliding(brakes, case):
     for _ in range(100):
         brakes.cycle(case["omega"])
     assert not brakes.kept["regressors"].any()
+
+
+def test_a_winter_s_braking_is_kept_and_what_no_disc_can_have_is_not(brakes):
+    brakes.s["estimate"]["sigma"], brakes.s["discs"]["sigma"] = 0.04, 10.0
+    brakes.stop(3.0, 60.0, -10.0, heat=-20.0)
+    brakes.end()
+    assert brakes.kept["regressors"][1, 0] < 0.0  # energy by a temperature below zero
+    assert wear_out_of_range(np.array([brakes.kept])) == ""
+    brakes.kept["regressors"][1, 0] *= 6.0
+    assert wear_out_of_range(np.array([brakes.kept])) == "regressors"
 
 
 def test_wear_recomputed_by_another_law_is_what_that_law_would_have_counted(params, feed):

@@ -15,9 +15,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from brakelab.identify.friction.columns import UNITS, Columns
+from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.recording import Recording
 from brakelab.identify.friction.stops import Stops, find_stops
+from brakelab.identify.units import UNITS
 from ecu.errors import UserError
 
 USUAL: Final = (0.42, 60.0, 2.4e-4)  # friction, inertia [kg m^2], heating [K/J]

@@ -14,33 +14,15 @@ temperature = ["T_disc", "°F"]
 
 import math
 from pathlib import Path
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
+from brakelab.identify.units import UNITS
 from brakelab.plant.friction.law import NotNegative, Positive, RigBrake, Section
 from brakelab.plant.linings import Lining
 from ecu.settings.config import Axle, Config, new_params
 from ecu.settings.toml_file import describe, read_toml
-
-UNITS: Final[dict[str, dict[str, float]]] = {
-    "time": {"s": 1.0, "ms": 1e-3, "min": 60.0},
-    "pressure": {"bar": 1e5, "kPa": 1e3, "MPa": 1e6, "Pa": 1.0, "psi": 6894.757},
-    "torque": {"N m": 1.0, "Nm": 1.0, "kN m": 1e3, "lbf ft": 1.355818},
-    "speed": {
-        "rad/s": 1.0,
-        "rpm": 0.10471976,
-        "1/min": 0.10471976,
-        "U/min": 0.10471976,
-        "m/s": -1.0,
-        "km/h": -1.0 / 3.6,
-        "mph": -0.44704,
-    },
-    "temperature": {"°C": 1.0, "C": 1.0, "degC": 1.0, "K": 1.0, "°F": 1.0 / 1.8, "F": 1.0 / 1.8},
-}
-"""To s, Pa, N m, rad/s and K of difference; below zero: of the car's speed, to m/s."""
-ZEROS: Final = {"K": 273.15, "°F": 32.0, "F": 32.0}
-"""Reading at 0 degC."""
 
 Column = tuple[str, str]
 

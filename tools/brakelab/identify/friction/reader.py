@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.arrays import Vector
-from brakelab.identify.friction.columns import UNITS, ZEROS, Columns, load_columns
+from brakelab.identify.friction.columns import Columns, load_columns
 from brakelab.identify.friction.recording import NAMES, Recording
 from brakelab.identify.measurement_files import header_of, numbers_of
+from brakelab.identify.units import UNITS, ZEROS
 from brakelab.logs.csv_rows import csv_rows
 from brakelab.logs.log_quality import Damage
 from ecu.errors import UserError
