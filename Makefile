@@ -23,8 +23,9 @@ demo: .venv/lab
 	.venv/bin/brake-ecu demo $(ARGS)
 
 test: .venv/dev
-	.venv/bin/python -m brakelab.build
-	BRAKE_ECU_LIBRARY=0 .venv/bin/python -m brakelab.warm
+	@echo "Making the library of kernels, and compiling one by one those that only tests call (minutes, once)"
+	@.venv/bin/python -m brakelab.build & build=$$!; \
+		BRAKE_ECU_LIBRARY=0 .venv/bin/python -m brakelab.warm && wait $$build
 	.venv/bin/python -m pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder -m "not study" $(ARGS)
 
 studies: .venv/dev
