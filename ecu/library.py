@@ -17,6 +17,7 @@ import hashlib
 import importlib
 import json
 import platform
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -89,11 +90,17 @@ def spec_of(value: Any) -> Spec | None:
         return ("number", value.dtype.str)
     if isinstance(value, tuple):
         inside = [spec_of(part) for part in value]
-        name = f"{type(value).__module__}:{type(value).__qualname__}"
-        return None if None in inside else ("tuple", name, *inside)
+        return None if None in inside else ("tuple", _name_of(type(value)), *inside)
     if isinstance(value, np.random.Generator):
         return ("generator",)
     return None
+
+
+@cache
+def _name_of(kind: type) -> str:
+    spec = sys.modules["__main__"].__spec__ if kind.__module__ == "__main__" else None
+    module = kind.__module__ if spec is None else spec.name  # of `python -m package.module`
+    return f"{module}:{kind.__qualname__}"
 
 
 def fits(wanted: Spec, found: Spec) -> bool:

@@ -49,10 +49,13 @@ def braking_line(number: int, duration: float, rows: RecordArray) -> str:
         f"{axle} friction {last['mu_b'][i]:.3f} ± {2 * last['sigma_mu_b'][i]:.3f} (2σ)"
         for axle, i in (("front", 0), ("rear", 2))
     )
+    reached = ""
+    if len(held):
+        asked, achieved = np.mean(held["decel_demand_total"]), -np.mean(held["accel_x_road"])
+        reached = f", asked {asked:.2f}, achieved {achieved:.2f} m/s²"
     return (
         f"braking {number}: {rows[0]['vehicle_speed'] * 3.6:5.1f} to {last['vehicle_speed'] * 3.6:5.1f} km/h "
-        f"in {duration:4.1f} s, asked {np.mean(held['decel_demand_total']):.2f}, "
-        f"achieved {-np.mean(held['accel_x_road']):.2f} m/s²; {friction}"
+        f"in {duration:4.1f} s{reached}; {friction}"
     )
 
 
