@@ -90,11 +90,12 @@ def _write(
     package: str, folder: Path, kernels: dict[str, list[dict[str, Any]]], codes: dict[str, bytes]
 ) -> None:
     """Write the files of a library and put its manifest in place of the last; who runs that one keeps it."""
-    needs = {
-        module: [name for name in jit.sources_of_kernels(module) if name not in MACHINERY]
-        for module in sorted(Seen.modules)
-        if module.partition(".")[0] == package
-    }
+    needs, sources = dict[str, list[str]](), dict[str, str]()
+    for module in sorted(Seen.modules):
+        if module.partition(".")[0] == package:
+            texts = jit.sources_of_kernels(module)
+            needs[module] = [name for name in texts if name not in MACHINERY]
+            sources |= {name: texts[name].hex() for name in needs[module]}
     files = {
         processor: f"{processor}-{hashlib.sha256(code).hexdigest()[:16]}.so"
         for processor, code in codes.items()
@@ -104,7 +105,7 @@ def _write(
     manifest = {
         "numba": numba.__version__,
         "processors": files,
-        "sources": {name: jit.text_digest(name) for name in sorted(set().union(*needs.values()))},
+        "sources": sources,
         "modules": needs,
         "kernels": kernels,
     }

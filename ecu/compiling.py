@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from ecu.jit import after_all, before_compiling, library, library_of
+from ecu.jit import before_compiling, library, library_of, stop_listening
 from ecu.output import detail, say
 
 
@@ -32,4 +32,4 @@ def compiling_told() -> Iterator[None]:
     try:
         yield
     finally:
-        after_all(begins)
+        stop_listening(begins)

@@ -224,8 +224,8 @@ def before_compiling(begins: Callable[[Any], None]) -> None:
     _BEGINS.append(begins)
 
 
-def after_all(begins: Callable[[Any], None]) -> None:
-    """End what `before_compiling` began."""
+def stop_listening(begins: Callable[[Any], None]) -> None:
+    """Call `begins` of `before_compiling` no more."""
     _BEGINS.remove(begins)
 
 
@@ -252,7 +252,7 @@ def library(package: str) -> Library | None:
     spec = find_spec(package)
     for root in (spec.submodule_search_locations or []) if spec else []:
         with suppress(OSError, ValueError, KeyError, TypeError):  # none, of an earlier form, or damaged
-            return Library(package, Path(root) / FOLDER)
+            return Library(Path(root) / FOLDER)
     return None
 
 

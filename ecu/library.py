@@ -247,9 +247,9 @@ class Entry:
 class Library:
     """Kernels of a package that are compiled."""
 
-    def __init__(self, package: str, folder: Path) -> None:
+    def __init__(self, folder: Path) -> None:
         """Open the library in `folder`. Raises OSError, ValueError: there is none for this processor."""
-        self.package, self.folder = package, folder
+        self.folder = folder
         self.manifest = json.loads((folder / MANIFEST).read_bytes())
         known = self.manifest["processors"]
         wanted = [V3] if has_v3() else []

@@ -11,8 +11,8 @@ from ecu.interpreted import interpreted
 from ecu.library import Spec, spec_of
 
 OPTIONS: Final = {
-    "error_model": "numpy",
-    "fastmath": False,
+    **jit.OPTIONS,
+    "cache": False,
     "no_cpython_wrapper": True,
     "no_cfunc_wrapper": True,
 }
