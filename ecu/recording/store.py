@@ -1,10 +1,7 @@
-"""Store of learned values: sqlite, WAL, synchronous FULL, a CRC and a revision per row.
+"""Store of learned values: revisions (`revisions.py`), written by the side process alone.
 
-Only the side process writes. A row that fails its CRC or its ranges is skipped for the previous revision; a
-file that sqlite cannot read, or that holds another table, another schema or values of another kind, is set
-aside and a new one made. Not for what is around it, such as a full disk, nor for what a later version adds:
-columns and indices more are left alone, and a file of a later version that cannot be used is not touched.
-Values learned by another version of the algorithm stay in the file unused. The folder is its owner's alone.
+A revision out of range is skipped for the one before it. Values learned by another version of the algorithm
+stay in the file unused.
 
 Wear of the linings and emission of the brakes are also stored in rows of their own, in the same transaction,
 by the vehicle's name alone: they outlive a new version and a changed configuration.
@@ -12,10 +9,8 @@ by the vehicle's name alone: they outlive a new version and a changed configurat
 
 import shutil
 import sqlite3
-import time
-import zlib
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final, NamedTuple
@@ -28,42 +23,12 @@ from ecu.contract.records import DUST, LEARNED, WEAR, RecordArray
 from ecu.errors import UserError
 from ecu.recording.learned_range import dust_out_of_range, out_of_range, wear_out_of_range
 from ecu.recording.lock import lock
+from ecu.recording.revisions import add, newest_good, open_file, transaction
 from ecu.recording.ring import ring_folder
 
 FILE: Final = "learned.sqlite"
-DAMAGED: Final = (sqlite3.Error, ValueError, OverflowError, TypeError)
-"""Errors of sqlite3 over a damaged file: text that is no UTF-8 and impossible numbers among them."""
 LOCK: Final = "in-use"
-REVISIONS_KEPT: Final = 20
 SAVE_INTERVAL_S: Final = 60.0
-
-_TABLE: Final = """CREATE TABLE learned (
-    key TEXT NOT NULL, revision INTEGER NOT NULL, saved_at TEXT NOT NULL,
-    record BLOB NOT NULL, crc INTEGER NOT NULL,
-    PRIMARY KEY (key, revision)
-)"""
-_SCHEMA: Final = 1
-"""Version of the table, in the file's `user_version`."""
-_COLUMNS: Final = {
-    "key": ("TEXT", 1),  # type, place in the primary key
-    "revision": ("INTEGER", 2),
-    "saved_at": ("TEXT", 0),
-    "record": ("BLOB", 0),
-    "crc": ("INTEGER", 0),
-}
-_NAMES: Final = ", ".join(_COLUMNS)
-_DAMAGE: Final = (
-    sqlite3.SQLITE_ERROR,
-    sqlite3.SQLITE_IOERR_SHORT_READ,
-    sqlite3.SQLITE_IOERR_DATA,
-    sqlite3.SQLITE_IOERR_CORRUPTFS,
-)
-"""Errors of operation that tell of the file itself; all others of rights, a full disk, a lock."""
-_FILE_FORMATS: Final = (b"\x01\x01", b"\x02\x02")  # bytes 18 and 19: rollback journal, WAL
-_LARGEST_REVISION: Final = 1 << 53
-_OF_ANOTHER_KIND: Final = f"""SELECT count(*) FROM learned WHERE typeof(key) != 'text'
-    OR typeof(saved_at) != 'text' OR typeof(record) != 'blob' OR typeof(crc) != 'integer'
-    OR typeof(revision) != 'integer' OR revision NOT BETWEEN 1 AND {_LARGEST_REVISION}"""
 
 
 def open_store(folder: Path) -> sqlite3.Connection:
@@ -72,20 +37,7 @@ def open_store(folder: Path) -> sqlite3.Connection:
     Raises:
         UserError: the folder cannot be written, or a later version's store cannot be used.
     """
-    path = folder / FILE
-    try:
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        try:
-            return _connect(path)
-        except DAMAGED as error:
-            if isinstance(error, sqlite3.OperationalError) and not _is_damaged(error):
-                raise
-            _set_aside(path, str(error))
-            return _connect(path)
-    except (OSError, *DAMAGED) as error:
-        raise UserError(
-            str(path), "", f"cannot be opened: {error}; give a folder that can be written"
-        ) from None
+    return open_file(folder / FILE)
 
 
 @contextmanager
@@ -148,105 +100,17 @@ def alone(folder: Path) -> Iterator[None]:
         raise UserError(str(folder), "", f"cannot be written: {error.strerror}") from None
 
 
-def _is_damaged(error: sqlite3.OperationalError) -> bool:
-    """Return whether the file itself is damaged, not its surroundings."""
-    # Python's own, over text, has no code.
-    return getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) in _DAMAGE
-
-
-def _connect(path: Path) -> sqlite3.Connection:
-    with suppress(FileNotFoundError), path.open("rb") as file:
-        if file.read(20)[18:] not in (b"", *_FILE_FORMATS):  # sqlite would take it as read-only
-            raise sqlite3.DatabaseError("its format is another's")
-    store = sqlite3.connect(path, isolation_level=None, timeout=0.5)
-    try:
-        store.execute("PRAGMA journal_mode=WAL")
-        store.execute("PRAGMA synchronous=FULL")
-        with _transaction(store):
-            kinds = [row[0] for row in store.execute("SELECT type FROM sqlite_schema WHERE sql IS NOT NULL")]
-            if not kinds:
-                store.execute(_TABLE)
-            version = max(store.execute("PRAGMA user_version").fetchone()[0], _SCHEMA)
-            usable = "trigger" not in kinds and _has_our_table(store)
-            if not usable and version > _SCHEMA:
-                raise UserError(
-                    str(path), "", f"a later version wrote it (schema {version}); use that version"
-                )
-            store.execute(f"PRAGMA user_version = {version}")  # an unwritable one shows now
-        if not usable:
-            raise sqlite3.DatabaseError("it holds another schema")
-        verdict = store.execute("PRAGMA integrity_check(1)").fetchone()[0]
-        if verdict != "ok":
-            raise sqlite3.DatabaseError(verdict)
-        if store.execute(_OF_ANOTHER_KIND).fetchone()[0]:
-            raise sqlite3.DatabaseError("it holds values of another kind")
-    except BaseException:
-        store.close()
-        raise
-    return store
-
-
-def _has_our_table(store: sqlite3.Connection) -> bool:
-    """Return whether `learned` has our columns, and beside them none that we would have to fill."""
-    if store.execute("SELECT type FROM sqlite_schema WHERE name = 'learned'").fetchone() != ("table",):
-        return False
-    found = {name: row for _, name, *row in store.execute("PRAGMA table_info(learned)")}
-    ours = {name: (kind, place) for name, (kind, _, _, place) in found.items() if name in _COLUMNS}
-    others = [row for name, row in found.items() if name not in _COLUMNS]
-    return ours == _COLUMNS and all(not needed or default is not None for _, needed, default, _ in others)
-
-
-def _set_aside(path: Path, reason: str) -> None:
-    aside = path.with_name(f"{path.name}.damaged-{time.time_ns()}")
-    for suffix in ("", "-wal", "-shm"):
-        part = path.with_name(path.name + suffix)
-        if part.exists():
-            part.rename(aside.with_name(aside.name + suffix))
-    structlog.get_logger("store").error(
-        "store_damaged",
-        file=str(path),
-        reason=reason,
-        set_aside=str(aside),
-        remedy="learned values start anew",
-    )
-
-
-def _crc(key: str, revision: int, record: bytes) -> int:
-    return zlib.crc32(f"{key}\0{revision}\0".encode() + record)
-
-
 def save(store: sqlite3.Connection, key: str, learned: RecordArray) -> int:
     """Save `learned` (`LEARNED`, shape (1,)), durably, as the next revision of `key`; return that."""
-    with _transaction(store):
+    with transaction(store):
         for part in PARTS:
-            _add(store, part_key(key, part), learned[part].tobytes())
-        return _add(store, key, learned.tobytes())
-
-
-def _add(store: sqlite3.Connection, key: str, record: bytes) -> int:
-    last = store.execute("SELECT max(revision) FROM learned WHERE key = ?", (key,)).fetchone()[0]
-    revision = int(last or 0) + 1
-    now = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
-    crc = _crc(key, revision, record)
-    store.execute(f"INSERT INTO learned ({_NAMES}) VALUES (?, ?, ?, ?, ?)", (key, revision, now, record, crc))
-    store.execute("DELETE FROM learned WHERE key = ? AND revision <= ?", (key, revision - REVISIONS_KEPT))
-    return revision
+            add(store, part_key(key, part), learned[part].tobytes())
+        return add(store, key, learned.tobytes())
 
 
 def part_key(key: str, part: str) -> str:
     """Return the key of one of `PARTS`: the vehicle of `key` and the version of its layout."""
     return f"{key.rsplit('/', 2)[0]}/{part}/1"
-
-
-@contextmanager
-def _transaction(store: sqlite3.Connection) -> Iterator[None]:
-    store.execute("BEGIN IMMEDIATE")
-    try:
-        yield
-    except BaseException:
-        store.execute("ROLLBACK")
-        raise
-    store.execute("COMMIT")
 
 
 def restore(
@@ -257,7 +121,7 @@ def restore(
     `mu_nominal` has shape (4,). Good: the CRC holds and every value lies in its range. Wear and dust are the
     vehicle's where these are newer.
     """
-    found = _newest_good(store, key, LEARNED, lambda learned: out_of_range(learned, mu_nominal))
+    found = newest_good(store, key, _reading(LEARNED, lambda learned: out_of_range(learned, mu_nominal)))
     if not found:
         _tell_of_other_versions(store, key)
         return None
@@ -278,29 +142,20 @@ def saved_at(store: sqlite3.Connection, key: str, revision: int) -> str:
 def restore_part(store: sqlite3.Connection, key: str, part: str) -> RecordArray | None:
     """Return the vehicle's wear or dust (`PARTS`, shape (1,)) by its newest good row, None without one."""
     dtype, wrong, _ = PARTS[part]
-    found = _newest_good(store, part_key(key, part), dtype, wrong)
+    found = newest_good(store, part_key(key, part), _reading(dtype, wrong))
     return found[1] if found else None
 
 
-def _newest_good(
-    store: sqlite3.Connection, key: str, dtype: np.dtype[Any], wrong: Callable[[RecordArray], str]
-) -> tuple[int, RecordArray] | None:
-    rows = store.execute(
-        "SELECT revision, record, crc FROM learned WHERE key = ? ORDER BY revision DESC", (key,)
-    )
-    for revision, record, crc in rows.fetchall():
-        if not isinstance(record, bytes) or len(record) != dtype.itemsize:
-            reason = "another layout"
-        elif crc != _crc(key, revision, record):
-            reason = "CRC"
-        else:
-            reason = wrong(np.frombuffer(record, dtype))
-        if not reason:
-            return revision, np.frombuffer(record, dtype).copy()
-        structlog.get_logger("store").warning(
-            "revision_refused", revision=revision, reason=reason, remedy="the one before it is tried"
-        )
-    return None
+def _reading(dtype: np.dtype[Any], wrong: Callable[[RecordArray], str]) -> Callable[[bytes], RecordArray]:
+    def read(record: bytes) -> RecordArray:
+        if len(record) != dtype.itemsize:
+            raise ValueError("another layout")
+        values = np.frombuffer(record, dtype).copy()
+        if reason := wrong(values):
+            raise ValueError(reason)
+        return values
+
+    return read
 
 
 def _tell_of_other_versions(store: sqlite3.Connection, key: str) -> None:

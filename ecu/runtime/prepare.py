@@ -30,9 +30,9 @@ from ecu.contract.records import RecordArray
 from ecu.contract.signals import CYCLE_NS, INPUT_SIGNALS, OUTPUT_SIGNALS
 from ecu.errors import UserError
 from ecu.jit import CompileCounter, compiler_version
-from ecu.recording import store as state_store
 from ecu.recording.recorder import interface_name, layout
 from ecu.recording.restored import restored
+from ecu.recording.revisions import DAMAGED
 from ecu.recording.ring import Ring, create_ring, remove_ring, ring_path
 from ecu.runtime.cycle import Ecu, new_ecu
 from ecu.runtime.notify import Manager
@@ -217,7 +217,7 @@ def _restored(folder: Path | None, config: Config, params: RecordArray) -> Recor
         return None
     try:
         found = restored(folder, config, params, time.time())
-    except (UserError, *state_store.DAMAGED):
+    except (UserError, *DAMAGED):
         return None
     if found is None:
         return None

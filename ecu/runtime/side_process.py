@@ -36,6 +36,7 @@ from ecu.recording.recorder import (
     start_recording,
     write_batch,
 )
+from ecu.recording.revisions import DAMAGED
 from ecu.recording.ring import Batch, RingReader, remove_ring
 from ecu.recording.sink import free_output
 from ecu.runtime.side import KEPT, NOT_KEPT, READY, REFUSED, word
@@ -167,7 +168,7 @@ class Recorder:
             state_store.save(self.store, self.key, learned)
             self._refused = ""
             self.keeper = state_store.first_keeper(learned, now_s)
-        except state_store.DAMAGED as error:
+        except DAMAGED as error:
             self._refuse(str(error))
             self.store.close()
             self.store = None  # reopened, and set aside if damaged, at the next change

@@ -14,10 +14,10 @@ from structlog.testing import capture_logs
 
 from ecu.contract.records import DUST, LEARNED, N_KEPT, N_MEASURED, WEAR, new_record
 from ecu.errors import UserError
-from ecu.recording import store as store_module
+from ecu.recording import revisions
+from ecu.recording.revisions import REVISIONS_KEPT
 from ecu.recording.store import (
     FILE,
-    REVISIONS_KEPT,
     alone,
     first_keeper,
     in_use,
@@ -158,7 +158,7 @@ def test_what_was_saved_is_read_where_nothing_can_be_written(tmp_path, monkeypat
     store = open_store(tmp_path)
     save(store, KEY, learned(7))
     assert (tmp_path / f"{FILE}-wal").stat().st_size > 0
-    connect = store_module._connect
+    connect = revisions._connect
 
     def no_room(path):
         if path.parent == tmp_path:
@@ -167,7 +167,7 @@ def test_what_was_saved_is_read_where_nothing_can_be_written(tmp_path, monkeypat
             raise error
         return connect(path)
 
-    monkeypatch.setattr(store_module, "_connect", no_room)
+    monkeypatch.setattr(revisions, "_connect", no_room)
     with open_to_read(tmp_path) as copy:
         assert restore(copy, KEY, NOMINAL)[1]["brakings"][0] == 7
     (tmp_path / FILE).unlink()
