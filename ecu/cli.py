@@ -41,6 +41,7 @@ from ecu.arguments import (
     TopLevel,
 )
 from ecu.cli_config import app as config_app
+from ecu.cli_diagnostics import app as diagnostics_app
 from ecu.cli_watch import app as watch_app
 from ecu.completion import known
 from ecu.errors import Mistakes, RunFault, UserError
@@ -69,6 +70,7 @@ app = Commands(
 
 app.add_typer(config_app, name="config")
 app.add_typer(watch_app)
+app.add_typer(diagnostics_app)
 
 
 def _show_version(wanted: bool) -> None:
@@ -133,6 +135,20 @@ def run(
     metrics_address: Annotated[
         str, typer.Option("--metrics-address", metavar="IP", help="Address to serve metrics on")
     ] = "127.0.0.1",
+    diagnostics: Annotated[
+        str | None,
+        typer.Option(
+            "--diagnostics",
+            metavar="REQUEST:RESPONSE",
+            help="Answer a tester (UDS) on these identifiers of the bus, such as 0x7E0:0x7E8",
+        ),
+    ] = None,
+    diagnostics_key: Annotated[
+        Path | None,
+        typer.Option(
+            "--diagnostics-key", metavar="FILE", help="Secret of the tester's access; without it none gets it"
+        ),
+    ] = None,
     log_format: Annotated[
         str | None,
         typer.Option(
@@ -160,7 +176,19 @@ def run(
     log_as(log_format, level)
     return service.run(
         prepare.RunOptions(
-            config, interface, channel, map, record, record_limit, state, standby, armed, silent, metrics
+            config,
+            interface,
+            channel,
+            map,
+            record,
+            record_limit,
+            state,
+            standby,
+            armed,
+            silent,
+            metrics,
+            diagnostics,
+            diagnostics_key,
         )
     )
 

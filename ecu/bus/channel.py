@@ -39,7 +39,20 @@ def open_channel(interface: str, channel: str, *, receive_ids: Iterable[int], fd
         UserError: the bus cannot be opened.
     """
     wanted = frozenset(receive_ids)
-    special: dict[str, Any] = {}
+    bus = open_bus(interface, channel, fd=fd)
+    if interface == "socketcan" and sys.platform == "linux":
+        from ecu.bus.socketcan import SocketcanChannel
+
+        return SocketcanChannel(bus, channel, wanted)
+    return GenericChannel(bus, channel, wanted, fd=fd, hears_itself=interface == "udp_multicast")
+
+
+def open_bus(interface: str, channel: str, *, fd: bool = False, **special: Any) -> can.BusABC:
+    """Open python-can's bus; `special` are arguments of its interface.
+
+    Raises:
+        UserError: it cannot be opened.
+    """
     if interface == "udp_multicast":
         special["hop_limit"] = 0  # stay on this machine
     # python-can's udp_multicast ends a burst at the first FD frame if FD is off.
@@ -61,11 +74,7 @@ def open_channel(interface: str, channel: str, *, receive_ids: Iterable[int], fd
         )
     if interface == "udp_multicast":
         _hear_own_group_only(bus)
-    if interface == "socketcan" and sys.platform == "linux":
-        from ecu.bus.socketcan import SocketcanChannel
-
-        return SocketcanChannel(bus, channel, wanted)
-    return GenericChannel(bus, channel, wanted, fd=fd, hears_itself=interface == "udp_multicast")
+    return bus
 
 
 def _open(interface: str, channel: str, special: dict[str, Any]) -> can.BusABC | str:
@@ -95,7 +104,7 @@ def _hear_own_group_only(bus: can.BusABC) -> None:
                     own.recv(1, socket.MSG_DONTWAIT)
 
 
-def _is_malformed(error: Exception) -> bool:
+def is_malformed(error: Exception) -> bool:
     """Return whether the driver could not read one message, which says nothing about the line.
 
     python-can has no error class for it; line failures carry a reason of the operating system.
@@ -122,7 +131,7 @@ class GenericChannel:
             try:
                 message = self._bus.recv(timeout=0)
             except (can.CanError, OSError) as error:
-                if not _is_malformed(error):
+                if not is_malformed(error):
                     self._off = True
                     break
                 malformed += 1

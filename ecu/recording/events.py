@@ -12,7 +12,8 @@ from ecu.contract.records import RecordArray, e2e_counts
 from ecu.contract.signals import STARTING
 from ecu.recording.log import Throttle
 
-_INPUT_FAULTS: Final = 0xFFFF  # while starting nothing was received yet, which is no event
+INPUT_FAULTS: Final = 0xFFFF
+"""Of what is received: while starting nothing was yet, which is no event."""
 MODES: Final = ("starting", "ready", "active", "degraded", "failed")
 
 
@@ -59,7 +60,7 @@ class EventLog:
         cycles, outputs = records["cycle"], records["outputs"]
         mode = np.nan_to_num(outputs["mode"]).astype(np.int64)
         faults = fault_mask(outputs)
-        faults[mode == STARTING] &= ~_INPUT_FAULTS
+        faults[mode == STARTING] &= ~INPUT_FAULTS
         changed = (mode != np.r_[self._mode, mode[:-1]]) | (faults != np.r_[self._faults, faults[:-1]])
         for row in np.flatnonzero(changed):
             self._look_at(cycles[row : row + 1], int(mode[row]), int(faults[row]))

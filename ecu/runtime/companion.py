@@ -1,6 +1,6 @@
-"""A process beside the recorder that nothing depends on, such as that of `--metrics-port`.
+"""Processes beside the recorder that nothing depends on: those of `--metrics-port` and `--diagnostics`.
 
-The supervisor starts it again when it ends, ever later while it ends soon.
+The supervisor starts one again when it ends, ever later while it ends soon; with exit code 0 it is done.
 """
 
 import os
@@ -19,7 +19,9 @@ CALM_S: Final = 60.0
 class Companion:
     """`python -m MODULE ARGUMENTS --parent PID [--pause S]`, from now until `end`."""
 
-    def __init__(self, module: str, arguments: Sequence[str]) -> None:
+    def __init__(self, module: str, arguments: Sequence[str], patience_s: float = 0.0) -> None:
+        """Start it; `patience_s`: what it may take to end by itself, once the run has ended."""
+        self._patience_s = patience_s
         self._command = [sys.executable, "-m", module, *arguments, "--parent", str(os.getpid())]
         self._pause_s = 0.0
         self._start()
@@ -29,21 +31,33 @@ class Companion:
         pause = ["--pause", str(self._pause_s)] if self._pause_s else []
         self._process = subprocess.Popen([*self._command, *pause], stdin=subprocess.DEVNULL)
 
-    def await_end_of(self, other: "subprocess.Popen[bytes]") -> int:
-        """Wait until `other` ends and return its exit code, as `other.wait()` does."""
-        while True:
-            pid, status = os.wait()
-            if pid == other.pid:
-                other.returncode = os.waitstatus_to_exitcode(status)
-                return other.returncode
-            if pid == self._process.pid:
-                self._process.returncode = os.waitstatus_to_exitcode(status)
-                calm = time.monotonic() - self._began_s > CALM_S + self._pause_s
-                self._pause_s = PAUSE_S if calm else min(LONGEST_PAUSE_S, max(PAUSE_S, 2 * self._pause_s))
-                self._start()
+    def look(self, pid: int, status: int) -> None:
+        """Start it again if it is the process `pid` that ended with `status` (`os.wait`)."""
+        if pid != self._process.pid:
+            return
+        self._process.returncode = os.waitstatus_to_exitcode(status)
+        if self._process.returncode == 0:
+            return
+        calm = time.monotonic() - self._began_s > CALM_S + self._pause_s
+        self._pause_s = PAUSE_S if calm else min(LONGEST_PAUSE_S, max(PAUSE_S, 2 * self._pause_s))
+        self._start()
 
     def end(self) -> None:
-        """Kill it: it has nothing to write."""
+        """Wait for its end as long as it may take, then kill it."""
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(self._patience_s)
         with suppress(OSError):
             self._process.kill()
         self._process.wait()
+
+
+def await_end_of(other: "subprocess.Popen[bytes]", companions: Sequence[Companion]) -> int:
+    """Wait until `other` ends and return its exit code; meanwhile keep the companions running."""
+    while companions:
+        pid, status = os.wait()
+        if pid == other.pid:
+            other.returncode = os.waitstatus_to_exitcode(status)
+            return other.returncode
+        for companion in companions:
+            companion.look(pid, status)
+    return other.wait()

@@ -28,6 +28,7 @@ from ecu.bus.signal_map import receive_plan
 from ecu.bus.transmit import TransmitPlan, compile_transmit
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CYCLE_NS, INPUT_SIGNALS, OUTPUT_SIGNALS
+from ecu.diagnostics.settings import checked_settings
 from ecu.errors import UserError
 from ecu.jit import CompileCounter, compiler_version
 from ecu.recording.recorder import interface_name, layout
@@ -67,6 +68,10 @@ class RunOptions(NamedTuple):
     """A shadow that sends nothing."""
     metrics: str | None = None
     """ADDRESS:PORT on which metrics are served."""
+    diagnostics: str | None = None
+    """Identifiers REQUEST:RESPONSE[:ALL] on which a tester is answered."""
+    diagnostics_key: Path | None = None
+    """File of the secret by which a tester gets access."""
 
 
 class Session(NamedTuple):
@@ -125,6 +130,14 @@ def prepare(options: RunOptions) -> Session:
     receiving = receive_plan(options.map, lambda line: log.warning("database", left_out=line))
     sending = SILENCE if options.silent else transmit_plan(options.map, receiving)
     _check_sending(options, config, sending)
+    diagnostics = checked_settings(
+        options.interface,
+        options.channel,
+        options.diagnostics,
+        options.diagnostics_key,
+        {*receiving.ids.tolist(), *sending.ids.tolist()},
+        options.silent,
+    )
     params = new_params(config)
     description = _describe(options, config)
     if options.map is not None:
@@ -144,7 +157,7 @@ def prepare(options: RunOptions) -> Session:
         fd=config.can_fd,
     )
     began = time.monotonic()
-    side = Side(path, _side_arguments(options))
+    side = Side(path, _side_arguments(options, diagnostics))
     try:
         learned = _restored(options.state, config, params)
         if options.standby:
@@ -253,11 +266,12 @@ def _describe(options: RunOptions, config: Config) -> dict[str, Any]:
     }
 
 
-def _side_arguments(options: RunOptions) -> list[str]:
+def _side_arguments(options: RunOptions, diagnostics: str | None) -> list[str]:
     given = {
         "--record": options.record,
         "--record-limit": options.record_limit,
         "--state": options.state,
         "--metrics": options.metrics,
+        "--diagnostics": diagnostics,
     }
     return [word for name, value in given.items() if value is not None for word in (name, str(value))]

@@ -2,8 +2,8 @@
 
 The loop starts no process once it is READY, so this small one does. It imports next to nothing and waits. It
 ends with the recorder when the loop has ended (exit code 0) or on a user error (2). A recorder whose
-supervisor died becomes one itself (`become`). With `--metrics
-ADDRESS:PORT` it also starts the process that serves them.
+supervisor died becomes one itself (`become`). With `--metrics ADDRESS:PORT` or `--diagnostics SETTINGS` it
+also starts the processes that serve these.
 """
 
 import json
@@ -19,7 +19,7 @@ from contextlib import suppress
 from typing import Final, NoReturn
 
 from ecu.recording.sink import free_output
-from ecu.runtime.companion import Companion
+from ecu.runtime.companion import Companion, await_end_of
 from ecu.runtime.side import AWAY
 from ecu.runtime.start import ENDING, lower_priority
 
@@ -27,6 +27,7 @@ PAUSE_S: Final = 0.1
 LONGEST_PAUSE_S: Final = 10.0  # less than the ring holds
 CALM_S: Final = 60.0  # a recorder that lived that long restarts after the short pause again
 FINAL_EXITS: Final = (0, 2)
+DIAGNOSTICS_PATIENCE_S: Final = 5.0  # it stores the fault memory
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -48,15 +49,15 @@ def main(arguments: Sequence[str]) -> int:
         str(os.getpid()),
         *rest,
     ]
-    metrics = _metrics(rest)
+    companions = _companions(rest)
     pause_s, loop_is_gone = PAUSE_S, False
     while True:
         began = time.monotonic()
         recorder = subprocess.Popen(command + ["--again"] * again, pass_fds=[leash.fileno()])
-        code = metrics.await_end_of(recorder) if metrics else recorder.wait()
+        code = await_end_of(recorder, companions)
         if code in FINAL_EXITS or loop_is_gone:
-            if metrics:
-                metrics.end()
+            for companion in companions:
+                companion.end()
             return code
         _say_away(leash, code)
         lower_priority()
@@ -67,12 +68,21 @@ def main(arguments: Sequence[str]) -> int:
         pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
 
 
-def _metrics(arguments: Sequence[str]) -> Companion | None:
-    """Start the process that serves metrics, if `arguments` ask for it."""
-    if "--metrics" not in arguments:
-        return None
-    ring, place = (arguments[arguments.index(name) + 1] for name in ("--ring", "--metrics"))
-    return Companion("ecu.watch.metrics_process", ["--ring", ring, "--metrics", place])
+def _companions(arguments: Sequence[str]) -> list[Companion]:
+    """Start the processes that `arguments` ask for."""
+    companions = []
+    if "--metrics" in arguments:
+        companions.append(Companion("ecu.watch.metrics_process", _picked(arguments, "--ring", "--metrics")))
+    if "--diagnostics" in arguments:
+        picked = _picked(arguments, "--ring", "--state", "--diagnostics")
+        companions.append(Companion("ecu.diagnostics.process", picked, DIAGNOSTICS_PATIENCE_S))
+    return companions
+
+
+def _picked(arguments: Sequence[str], *names: str) -> list[str]:
+    """Return those of the options `names` that are there, each with its value."""
+    at = [arguments.index(name) for name in names if name in arguments]
+    return [word for place in at for word in arguments[place : place + 2]]
 
 
 def _say_away(leash: socket.socket, code: int) -> None:

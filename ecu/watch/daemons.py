@@ -40,6 +40,11 @@ class Daemon(NamedTuple):
         return (self.name, self.interface, self.channel) == (other.name, other.interface, other.channel)
 
 
+def pid_of(path: Path) -> int:
+    """Return the process that writes a ring, by its name."""
+    return int(path.name.split(".")[2])
+
+
 def is_held(path: Path) -> bool:
     """Return whether the writer of a ring lives: it holds a lock on it."""
     try:
@@ -74,7 +79,7 @@ def _daemon(path: Path, reader: RingReader) -> Daemon:
     about = reader.description
     return Daemon(
         path,
-        int(path.name.split(".")[2]),
+        pid_of(path),
         str(about.get("name", "?")),
         str(about.get("interface", "?")),
         str(about.get("channel", "?")),

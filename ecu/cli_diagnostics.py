@@ -1,0 +1,44 @@
+"""`brake-ecu diag`: options of the command."""
+
+from typing import Annotated
+
+import typer
+
+from ecu.arguments import Channel, Commands, Interface
+from ecu.completion import known
+
+app = Commands()
+
+
+@app.command()
+def diag(
+    action: Annotated[
+        str,
+        typer.Argument(
+            metavar="ACTION",
+            autocompletion=known("faults", "clear", "read", "info"),
+            help="faults, clear, read or info",
+        ),
+    ],
+    interface: Interface,
+    channel: Channel,
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[NAME]...",
+            help="What to read, as mu_b or 0x0110; what to clear, as C1003-08; default: all",
+        ),
+    ] = None,
+    ids: Annotated[
+        str,
+        typer.Option(
+            "--ids",
+            metavar="REQUEST:RESPONSE",
+            help="Identifiers of the ECU's diagnostics (`run --diagnostics`)",
+        ),
+    ] = "0x7E0:0x7E8",
+) -> int:
+    """Ask an ECU on a bus for its faults and values (UDS). Exit code 1: it has confirmed faults."""
+    from ecu.diagnostics import tester
+
+    return tester.diag(action, names or [], interface, channel, ids)

@@ -1,0 +1,55 @@
+"""Diagnostic server of `run --diagnostics`: a process of its own, started by the supervisor.
+
+`python -m ecu.diagnostics.process --ring RING --diagnostics SETTINGS [--state DIR] --parent PID [--pause
+S]`. It follows the ring as any reader does, and loads what it needs once that is there: a starting daemon
+goes first. It ends with exit code 0 when the run has ended and the fault memory is stored.
+"""
+
+import argparse
+import os
+import signal
+import time
+from pathlib import Path
+from typing import Final
+
+from ecu.recording.sink import free_output
+from ecu.runtime.start import ENDING, lower_priority
+
+LOOK_FOR_RING_S: Final = 0.05
+
+
+def main() -> int:
+    """Serve until the run has ended or the parent has gone."""
+    parser = argparse.ArgumentParser(
+        prog="python -m ecu.diagnostics.process", description="Diagnostics of run."
+    )
+    parser.add_argument("--ring", type=Path, required=True)
+    parser.add_argument("--diagnostics", required=True)
+    parser.add_argument("--state", type=Path)
+    parser.add_argument("--parent", type=int, required=True)
+    parser.add_argument("--pause", type=float, default=0.0)
+    options = parser.parse_args()
+    free_output()
+    for number in ENDING:
+        signal.signal(number, signal.SIG_IGN)
+    lower_priority()
+
+    def goes_on() -> bool:
+        return os.getppid() == options.parent
+
+    time.sleep(options.pause)
+    while not options.ring.exists():
+        if not goes_on():
+            return 0
+        time.sleep(LOOK_FOR_RING_S)
+    from ecu.diagnostics.serve import serve
+    from ecu.diagnostics.settings import read_settings
+    from ecu.recording.log import configure_logging
+
+    configure_logging()
+    serve(options.ring, options.state, read_settings(options.diagnostics), goes_on)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
