@@ -46,28 +46,37 @@ def test_it_is_started_again_with_pauses_that_grow(codes, gone_after, starts, pa
     assert all(ours.recv(9) == b"x" for _ in pauses)
 
 
-def test_metrics_are_served_by_a_process_beside_the_recorder(monkeypatch):
-    """The recorder knows of them, too: it may become the supervisor."""
+@pytest.mark.parametrize(
+    ("asked", "module", "given"),
+    [
+        (["--metrics", "127.0.0.1:9476"], "ecu.watch.metrics_process", ["--metrics", "127.0.0.1:9476"]),
+        (["--diagnostics", "x"], "ecu.diagnostics.process", ["--diagnostics", "x"]),
+        (
+            ["--state", "DIR", "--diagnostics", "x"],
+            "ecu.diagnostics.process",
+            ["--state", "DIR", "--diagnostics", "x"],
+        ),
+    ],
+)
+def test_what_is_asked_for_is_served_by_a_process_beside_the_recorder(asked, module, given, monkeypatch):
+    """The recorder knows of it, too: it may become the supervisor."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     said = []
 
     class Beside:
-        def __init__(self, module, arguments):
+        def __init__(self, module, arguments, patience_s=0.0):
             said.append((module, arguments))
-
-        def await_end_of(self, recorder):
-            return 0
 
         def end(self):
             said.append("ended")
 
     monkeypatch.setattr(supervisor, "Companion", Beside)
+    monkeypatch.setattr(supervisor, "await_end_of", lambda recorder, companions: 0)
     monkeypatch.setattr(supervisor.subprocess, "Popen", lambda command, pass_fds: said.append(command))
     monkeypatch.setattr(supervisor, "free_output", lambda: None)
     monkeypatch.setattr(supervisor.signal, "signal", lambda *_: None)
-    metrics = ["--metrics", "127.0.0.1:9476"]
-    assert supervisor.main([str(theirs.detach()), "--ring", "x", *metrics]) == 0
-    assert said[0] == ("ecu.watch.metrics_process", ["--ring", "x", *metrics])
-    assert said[1][-2:] == metrics
+    assert supervisor.main([str(theirs.detach()), "--ring", "x", *asked]) == 0
+    assert said[0] == (module, ["--ring", "x", *given])
+    assert said[1][-len(asked) :] == asked
     assert said[2] == "ended"
     ours.close()
