@@ -8,6 +8,10 @@ from ecu.diagnostics.fault_memory import FaultMemory
 from ecu.diagnostics.services import respond
 from ecu.diagnostics.session import Ecu, Session
 
+from ..watch.conftest import loop, rings
+
+__all__ = ["loop", "rings"]
+
 SECRET = bytes(range(16))
 
 
