@@ -9,6 +9,8 @@ import pytest
 
 import write_reference as reference
 from contract_page import EXAMPLE, contract_text
+from diagnostics_tables import PAGE as DIAGNOSTICS
+from diagnostics_tables import with_tables
 
 ROOT = Path(__file__).parent.parent
 OF_THE_SIGNAL = {
@@ -83,6 +85,11 @@ def test_a_row_of_the_reference_says_what_the_model_does() -> None:
 def test_the_contract_is_that_of_database_and_code() -> None:
     page = (reference.DOCS / "contract.md").read_text("utf-8")
     assert page == contract_text(), "run python tools/write_reference.py"
+
+
+def test_the_tables_of_diagnostics_are_those_of_the_code() -> None:
+    page = DIAGNOSTICS.read_text("utf-8")
+    assert page == with_tables(page), "run python tools/write_reference.py"
 
 
 def test_the_worked_example_of_the_checksum_is_right() -> None:

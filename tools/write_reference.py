@@ -2,7 +2,8 @@
 
     python tools/write_reference.py
 
-writes docs/reference-*.md, with unit, range, default and meaning of each key, and docs/contract.md.
+writes docs/reference-*.md, with unit, range, default and meaning of each key, docs/contract.md and the tables
+of docs/diagnostics.md.
 """
 
 import math
@@ -14,6 +15,8 @@ from pydantic import BaseModel
 from brakelab.logs.column_map import ColumnMap
 from brakelab.simulation.scenario import Scenario
 from contract_page import contract_text
+from diagnostics_tables import PAGE as DIAGNOSTICS
+from diagnostics_tables import with_tables
 from ecu.bus.signal_map import SignalMap
 from ecu.contract.signals import INPUT_SIGNALS, without_corner
 from ecu.settings.schema import config_schema
@@ -206,3 +209,5 @@ if __name__ == "__main__":
         print(DOCS / name)
     (DOCS / "contract.md").write_text(contract_text(), "utf-8")
     print(DOCS / "contract.md")
+    DIAGNOSTICS.write_text(with_tables(DIAGNOSTICS.read_text("utf-8")), "utf-8")
+    print(DIAGNOSTICS)

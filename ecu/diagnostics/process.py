@@ -43,8 +43,8 @@ def main() -> int:
             return 0
         time.sleep(LOOK_FOR_RING_S)
     from ecu.diagnostics.serve import serve
-    from ecu.diagnostics.settings import read_settings
     from ecu.recording.log import configure_logging
+    from ecu.runtime.diagnostics import read_settings
 
     configure_logging()
     serve(options.ring, options.state, read_settings(options.diagnostics), goes_on)

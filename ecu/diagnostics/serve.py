@@ -8,10 +8,11 @@ from typing import Final
 import can
 import structlog
 
+from ecu.bus.addresses import Addresses, parse_addresses
 from ecu.diagnostics.server import Server
-from ecu.diagnostics.settings import OPTION, Settings, read_secret
-from ecu.diagnostics.transport import Addresses, Link, parse_addresses
+from ecu.diagnostics.transport import Link
 from ecu.errors import UserError
+from ecu.runtime.diagnostics import OPTION, Settings, read_secret
 
 PERIOD_S: Final = 0.1
 BUSY_S: Final = 0.002

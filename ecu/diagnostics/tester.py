@@ -6,12 +6,13 @@ from typing import Final
 
 import can
 
+from ecu.bus.addresses import Addresses, parse_addresses
 from ecu.diagnostics import read_faults
 from ecu.diagnostics.fault_memory import CONFIRMED, STATUS_NAMES
 from ecu.diagnostics.identifiers import BY_NAME, BY_NUMBER, TEXTS, UNITS, snapshot_values, to_values
 from ecu.diagnostics.services import ALL_GROUPS, CLEAR, NEGATIVE, POSITIVE, READ_DATA, READ_FAULTS
 from ecu.diagnostics.session import PENDING, REASONS
-from ecu.diagnostics.transport import Addresses, Link, parse_addresses
+from ecu.diagnostics.transport import Link
 from ecu.diagnostics.trouble_codes import BY_NUMBER as CODES
 from ecu.diagnostics.trouble_codes import TROUBLE_CODES, code_text
 from ecu.errors import RunFault, UserError, closest

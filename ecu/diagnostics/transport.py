@@ -6,20 +6,15 @@ time: one that comes while a response is under way waits for its end, at most th
 """
 
 import logging
-import re
 from collections import deque
 from typing import Any, Final, NamedTuple
 
 import can
 
+from ecu.bus.addresses import NEEDS, STANDARD
 from ecu.bus.channel import is_malformed, open_bus
-from ecu.contract.records import EXTENDED_ID
 from ecu.errors import UserError
 
-STANDARD: Final = 0x7FF
-FUNCTIONAL: Final = 0x7DF
-FUNCTIONAL_29: Final = 0x18DB33F1
-"""To all ECUs: ISO 15765-4, with 11 and with 29 bits."""
 PADDING: Final = 0xCC
 WAITING: Final = 8
 """Requests that wait; of more the newest are lost."""
@@ -33,51 +28,6 @@ _SINGLE_FRAME: Final = 7
 _ISOTP_LOG: Final = logging.getLogger("isotp")
 _ISOTP_LOG.addHandler(logging.NullHandler())  # a tester's slips are not the daemon's lines
 _ISOTP_LOG.propagate = False
-
-
-class Addresses(NamedTuple):
-    """Identifiers of the diagnostic connection; beyond 11 bits they have 29."""
-
-    request: int
-    response: int
-    functional: int
-    """Of requests to all ECUs."""
-
-    def __str__(self) -> str:
-        """Return them as they are given."""
-        return ":".join(f"0x{one:X}" for one in self)
-
-
-def parse_addresses(option: str, text: str) -> Addresses:
-    """Return the identifiers of `0x7E0:0x7E8`, or with a third one for requests to all ECUs.
-
-    Raises:
-        UserError: it names the option, and what is wrong.
-    """
-    words = text.split(":")
-    if len(words) not in (2, 3) or not all(re.fullmatch(r"(0[xX])?[0-9A-Fa-f]{1,8}", word) for word in words):
-        raise UserError(option, text, "give the identifiers of request and response: 0x7E0:0x7E8")
-    numbers = [int(word, 16) for word in words]
-    if len(words) == 2:
-        numbers.append(FUNCTIONAL if numbers[0] <= STANDARD else FUNCTIONAL_29)
-    if any(number >= 1 << 29 for number in numbers):
-        raise UserError(option, text, "an identifier has 29 bits at most")
-    if len(set(numbers)) < 3:
-        raise UserError(option, text, "request, response and requests to all ECUs need an identifier each")
-    return Addresses(*numbers)
-
-
-def refuse_taken(option: str, addresses: Addresses, taken: set[int]) -> None:
-    """Raise UserError for an identifier of a message that the ECU sends or receives.
-
-    Args:
-        option: named in the error.
-        addresses: of the diagnostic connection.
-        taken: identifiers, those of 29 bits with `EXTENDED_ID`.
-    """
-    for number in addresses:
-        if (number | EXTENDED_ID if number > STANDARD else number) in taken:
-            raise UserError(option, f"0x{number:X}", "another message has it; choose one that is free")
 
 
 class Request(NamedTuple):
@@ -198,8 +148,5 @@ def load_isotp() -> Any:
     try:
         import isotp
     except ModuleNotFoundError:
-        import sys
-
-        install = f"{sys.executable} -m pip install can-isotp"
-        raise UserError("diagnostics", "", f"need can-isotp: {install}") from None
+        raise UserError("diagnostics", "", NEEDS) from None
     return isotp

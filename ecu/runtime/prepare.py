@@ -28,7 +28,6 @@ from ecu.bus.signal_map import receive_plan
 from ecu.bus.transmit import TransmitPlan, compile_transmit
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CYCLE_NS, INPUT_SIGNALS, OUTPUT_SIGNALS
-from ecu.diagnostics.settings import checked_settings
 from ecu.errors import UserError
 from ecu.jit import CompileCounter, compiler_version
 from ecu.recording.recorder import interface_name, layout
@@ -36,6 +35,7 @@ from ecu.recording.restored import restored
 from ecu.recording.revisions import DAMAGED
 from ecu.recording.ring import Ring, create_ring, remove_ring, ring_path
 from ecu.runtime.cycle import Ecu, new_ecu
+from ecu.runtime.diagnostics import checked_settings
 from ecu.runtime.notify import Manager
 from ecu.runtime.realtime import freeze_memory, make_realtime
 from ecu.runtime.side import Side

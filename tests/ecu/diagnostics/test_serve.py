@@ -8,9 +8,9 @@ import structlog
 
 from ecu.diagnostics import serve as serve_module
 from ecu.diagnostics.serve import AGAIN_S, Place, serve
-from ecu.diagnostics.settings import Settings
 from ecu.diagnostics.transport import Request
 from ecu.errors import UserError
+from ecu.runtime.diagnostics import Settings
 
 from .test_server import ABOUT
 

@@ -1,4 +1,4 @@
-"""Identifiers as they are given, and ISO-TP between two ends and against frames of anybody."""
+"""ISO-TP between two ends, and against frames of anybody."""
 
 import itertools
 import sys
@@ -8,65 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ecu.contract.records import EXTENDED_ID
 from ecu.diagnostics import transport
-from ecu.diagnostics.transport import Addresses, Link, Request, parse_addresses, refuse_taken
+from ecu.diagnostics.transport import Link, Request
 from ecu.errors import UserError
 
 CHANNELS = (f"uds-{number}" for number in itertools.count())
 
 
-@pytest.mark.parametrize(
-    ("text", "addresses"),
-    [
-        ("0x7E0:0x7E8", Addresses(0x7E0, 0x7E8, 0x7DF)),
-        ("7e0:7E8", Addresses(0x7E0, 0x7E8, 0x7DF)),
-        ("0x7E0:0x7E8:0x700", Addresses(0x7E0, 0x7E8, 0x700)),
-        ("0x18DA28F1:0x18DAF128", Addresses(0x18DA28F1, 0x18DAF128, 0x18DB33F1)),
-    ],
-)
-def test_identifiers_are_read(text, addresses):
-    assert parse_addresses("--diagnostics", text) == addresses
-    assert parse_addresses("--diagnostics", str(addresses)) == addresses
-
-
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        ("0x7E0", "give the identifiers of request and response: 0x7E0:0x7E8"),
-        ("0x7E0:", "give the identifiers"),
-        ("a:b:c:d", "give the identifiers"),
-        ("-1:2", "give the identifiers"),
-        ("0x7E0:0x7E0", "request, response and requests to all ECUs need an identifier each"),
-        ("0x7DF:0x7E8", "need an identifier each"),
-        ("0x20000000:0x7E8", "an identifier has 29 bits at most"),
-    ],
-)
-def test_identifiers_that_are_none_are_one_line(text, says):
-    with pytest.raises(UserError) as refused:
-        parse_addresses("--diagnostics", text)
-    assert str(refused.value).startswith(f"--diagnostics: {text}: ")
-    assert says in str(refused.value)
-
-
-@pytest.mark.parametrize(
-    ("text", "taken", "named"),
-    [
-        ("0x50:0x7E8", {0x50}, "0x50"),
-        ("0x7E0:0x60", {0x60}, "0x60"),
-        ("0x7E0:0x7E8", {0x7DF}, "0x7DF"),
-        ("0x18DA28F1:0x18DAF128", {0x18DA28F1 | EXTENDED_ID}, "0x18DA28F1"),
-    ],
-)
-def test_an_identifier_of_another_message_is_refused(text, taken, named):
-    with pytest.raises(UserError, match=f"--diagnostics: {named}: another message has it"):
-        refuse_taken("--diagnostics", parse_addresses("--diagnostics", text), taken)
-    refuse_taken("--diagnostics", parse_addresses("--diagnostics", text), {0x18DA28F1, 0x51})
-
-
 def test_without_can_isotp_it_is_one_line(monkeypatch):
     monkeypatch.setitem(sys.modules, "isotp", None)
-    with pytest.raises(UserError, match=r"need can-isotp: .* -m pip install can-isotp"):
+    with pytest.raises(UserError, match=r"needs can-isotp: .* -m pip install can-isotp"):
         transport.load_isotp()
 
 

@@ -1,11 +1,13 @@
 """What `run --diagnostics` is refused for before it starts, and what its process is told."""
 
+import sys
 from pathlib import Path
 
 import pytest
 
-from ecu.diagnostics.settings import Settings, checked_settings, read_secret, read_settings
 from ecu.errors import UserError
+from ecu.runtime import diagnostics
+from ecu.runtime.diagnostics import Settings, checked_settings, read_secret, read_settings
 
 
 def key_file(folder, text="00112233445566778899aabbccddeeff\n", mode=0o600):
@@ -20,6 +22,13 @@ def test_what_is_checked_reaches_the_process(tmp_path):
     word = checked_settings("socketcan", "can 0", "7E0:7E8", key, {0x50}, silent=False)
     assert read_settings(word) == Settings("socketcan", "can 0", "7E0:7E8", str(key))
     assert read_secret(key) == bytes.fromhex("00112233445566778899aabbccddeeff")
+
+
+def test_without_can_isotp_it_is_one_line(monkeypatch):
+    monkeypatch.setattr(diagnostics, "find_spec", lambda name: None)
+    with pytest.raises(UserError) as refused:
+        checked_settings("socketcan", "can0", "7E0:7E8", None, set(), silent=False)
+    assert str(refused.value) == f"--diagnostics: needs can-isotp: {sys.executable} -m pip install can-isotp"
 
 
 def test_without_diagnostics_there_is_nothing_to_tell():

@@ -1,11 +1,12 @@
-"""Settings of the diagnostic server: checked by `run` before READY, handed to its process as one word."""
+"""Settings of `run --diagnostics`: checked before READY, handed to its process (`ecu/diagnostics`) as a word."""
 
 import json
 import stat
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from ecu.diagnostics.transport import load_isotp, parse_addresses, refuse_taken
+from ecu.bus.addresses import NEEDS, parse_addresses, refuse_taken
 from ecu.errors import UserError
 
 OPTION: Final = "--diagnostics"
@@ -55,7 +56,8 @@ def checked_settings(
         raise UserError(
             OPTION, addresses, "answers on the bus, where a --silent run sends nothing; leave one out"
         )
-    load_isotp()
+    if find_spec("isotp") is None:
+        raise UserError(OPTION, "", NEEDS)
     refuse_taken(OPTION, parse_addresses(OPTION, addresses), taken)
     if key is not None:
         read_secret(key)
