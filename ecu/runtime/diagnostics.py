@@ -1,4 +1,4 @@
-"""Settings of `run --diagnostics`: checked before READY, handed to its process (`ecu/diagnostics`) as a word."""
+"""Settings of `run --diagnostics`: checked before READY, handed to its process as a word."""
 
 import json
 import stat
