@@ -38,17 +38,18 @@ EXCHANGES = {
     "clear another's group": ((), "14 00 00 00", "7F 14 31", {}),
     "clear too short": ((), "14 FF FF", "7F 14 13", {}),
     "clear too long": ((), "14 FF FF FF 00", "7F 14 13", {}),
-    # 0x19 ReadDTCInformation: wheel speed lost is confirmed, passed are all others
+    # 0x19 ReadDTCInformation: wheel speed lost is confirmed, was there twice; passed are all others
     "number by status": ((), "19 01 08", "59 01 7F 00 00 01", {}),
     "number by status of none": ((), "19 01 80", "59 01 7F 00 00 00", {}),
     "by status": ((), "19 02 FF", "59 02 7F 50 00 08 2F", {}),
     "by status, quietly": ((), "19 82 FF", "", {}),
-    "occurrences and ageing": ((), "19 06 50 00 08 FF", "59 06 50 00 08 2F 01 01 02 00", {}),
-    "occurrences": ((), "19 06 50 00 08 01", "59 06 50 00 08 2F 01 01", {}),
+    "occurrences and ageing": ((), "19 06 50 00 08 FF", "59 06 50 00 08 2F 01 02 02 00", {}),
+    "occurrences": ((), "19 06 50 00 08 01", "59 06 50 00 08 2F 01 02", {}),
     "ageing": ((), "19 06 50 00 08 02", "59 06 50 00 08 2F 02 00", {}),
     "no such extended data": ((), "19 06 50 00 08 03", "7F 19 31", {}),
     "snapshot of the first": ((), "19 04 50 00 08 01", "59 04 50 00 08 2F 01 06 AA BB", {}),
-    "snapshots": ((), "19 04 50 00 08 FF", "59 04 50 00 08 2F 01 06 AA BB 02 06 AA BB", {}),
+    "snapshot of the last": ((), "19 04 50 00 08 02", "59 04 50 00 08 2F 02 06 CC DD", {}),
+    "snapshots": ((), "19 04 50 00 08 FF", "59 04 50 00 08 2F 01 06 AA BB 02 06 CC DD", {}),
     "snapshot of a code without": ((), "19 04 50 10 88 FF", "59 04 50 10 88 00", {}),
     "no such snapshot": ((), "19 04 50 00 08 03", "7F 19 31", {}),
     "no such code": ((), "19 04 50 00 09 FF", "7F 19 31", {}),
@@ -79,6 +80,9 @@ EXCHANGES = {
     "second key for one seed": ((*LOCKED, "27 01", "27 02" + " 00" * 16), "key", "7F 27 24", {}),
     # 0x28 CommunicationControl
     "silence the ECU": (LOCKED, "28 03 01", "7F 28 22", {}),
+    "let the ECU speak": (LOCKED, "28 00 01", "7F 28 22", {}),
+    "silence, what it hears": (LOCKED, "28 01 01", "7F 28 22", {}),
+    "silence, what it sends": (LOCKED, "28 02 01", "7F 28 22", {}),
     "silence a shadow": (LOCKED, "28 03 01", "7F 28 22", ON_SHADOW),
     "silence in the default session": ((), "28 03 01", "7F 28 7F", {}),
     "silence, too short": (LOCKED, "28 03", "7F 28 13", {}),
@@ -122,9 +126,10 @@ def ask(tester, request):
 @pytest.mark.parametrize(("before", "request_", "response", "ecu"), EXCHANGES.values(), ids=EXCHANGES)
 def test_what_is_asked_and_what_is_answered(before, request_, response, ecu, tester, world):
     codes = sum(code.fault.bit for code in TROUBLE_CODES)
-    for failed in (0, WHEEL_SPEED_LOST):
+    snapshots = iter([b"\xaa\xbb", b"\xcc\xdd"])
+    for failed in (0, WHEEL_SPEED_LOST, 0, WHEEL_SPEED_LOST):
         for _ in range(120):
-            world.memory.add(failed, codes, lambda: b"\xaa\xbb")
+            world.memory.add(failed, codes, lambda: next(snapshots))
     one = tester(**ecu)
     for earlier in before:
         assert not ask(one, earlier).startswith("7F 10")
@@ -185,10 +190,11 @@ def test_with_the_session_ends_all_that_came_with_it(ends, tester):
     assert ask(one, "31 03 02 00") == "7F 31 24"
 
 
-def test_a_new_extended_session_is_locked_and_keeps_the_setting(tester):
+def test_a_new_extended_session_is_locked_and_keeps_setting_and_result(tester):
     one = tester()
-    for request in (*UNLOCKED, "85 02", EXTENDED):
+    for request in (*UNLOCKED, "85 02", "31 01 02 00", EXTENDED):
         ask(one, request)
+    assert ask(one, "31 03 02 00") == "71 03 02 00 00 00 00 00"
     assert not one.session.dtc_setting
     assert ask(one, "31 01 02 01") == "7F 31 33"
 
@@ -207,8 +213,12 @@ def test_three_wrong_keys_cost_ten_seconds(tester):
         ask(one, "10 01")  # a new session does not shorten it
         ask(one, EXTENDED)
     one.now_s += 0.3
-    assert ask(one, "27 01").startswith("67 01")
-    assert ask(one, "key") == "67 02"
+    for _ in range(2):  # a right key, or the delay, forgives the wrong ones
+        answers = []
+        for request in ("27 01", wrong, "27 01", wrong, "27 01", "key"):
+            answers.append(ask(one, request)[:8])
+        assert answers == ["67 01 " + answers[0][6:], "7F 27 35", answers[2], "7F 27 35", answers[4], "67 02"]
+        ask(one, EXTENDED)
 
 
 def test_a_reset_is_only_for_who_is_started_again(tester, world):
@@ -233,6 +243,7 @@ def test_a_clear_that_cannot_be_stored_is_no_success(tester, world):
         ("14 00 00 00", True, ""),
         ("14", True, ""),
         ("19 02 FF", True, ""),
+        ("22 50 00 08", True, ""),
         ("", True, ""),
     ],
 )
@@ -296,9 +307,10 @@ def is_valid(request, response):
 def test_a_confirmed_code_is_gone_once_cleared(tester, world):
     bits = sum(code.fault.bit for code in TROUBLE_CODES)
     for _ in range(20):
-        world.memory.add(BUS_OFF, bits, lambda: b"")
+        world.memory.add(BUS_OFF | WHEEL_SPEED_LOST, bits, lambda: b"")
     one = tester()
-    assert ask(one, "19 02 08") == "59 02 7F 50 10 88 2F"
+    assert ask(one, "19 02 08") == "59 02 7F 50 00 08 2F 50 10 88 2F"
     assert ask(one, "14 50 10 88") == "54"
-    assert ask(one, "19 02 08") == "59 02 7F"
+    assert ask(one, "19 02 08") == "59 02 7F 50 00 08 2F"
+    assert ask(one, "14 FF FF FF") == "54"
     assert not any(entry.status & CONFIRMED for entry in world.memory.entries.values())
