@@ -8,6 +8,7 @@ tried again with the next change.
 import json
 import os
 import threading
+import time
 from collections.abc import Mapping
 from contextlib import ExitStack, closing
 from pathlib import Path
@@ -18,9 +19,18 @@ import structlog
 from ecu.diagnostics.fault_memory import AVAILABLE, MOST_OCCURRENCES, Entry, FaultMemory
 from ecu.errors import UserError
 from ecu.recording.lock import lock
-from ecu.recording.revisions import DAMAGED, add, newest_good, open_file, transaction
+from ecu.recording.revisions import (
+    DAMAGED,
+    add,
+    newest_good,
+    open_file,
+    open_file_to_read,
+    transaction,
+)
 from ecu.recording.store import part_key
 
+PATIENCE_S: Final = 5.0
+LOOK_AGAIN_S: Final = 0.1
 FILE: Final = "faults.sqlite"
 LOCK: Final = "faults-in-use"
 _FIELDS: Final = ("status", "occurrences", "ageing", "first", "last")
@@ -88,33 +98,39 @@ class MemoryFile:
         self._turn = threading.Condition()
         self._wanted: bytes | None = None
         self._asked = self._done = 0
-        self._good = True
-        self._thread: threading.Thread | None = None
+        self._good = False
 
-    def load(self) -> Kept | None:
-        """Return what was kept before, None: nothing, or it cannot be read."""
+    def load(self, patience_s: float = PATIENCE_S) -> Kept | None:
+        """Return what was kept before, None: nothing, or it cannot be read; then nothing is saved over it.
+
+        It waits for an owner that is about to end: this process's forerunner.
+        """
         try:
-            self._own()
-            with closing(open_file(self._folder / FILE)) as store:
+            self._own(time.monotonic() + patience_s)
+            with open_file_to_read(self._folder / FILE) as store:
                 found = newest_good(store, self._key, from_record)
         except (OSError, UserError, *DAMAGED) as error:
             self._refuse(error)
             return None
+        threading.Thread(target=self._save_what_comes, daemon=True).start()
+        self._good = True
         return found[1] if found else None
 
-    def _own(self) -> None:
-        """Take the lock, once. Raises OSError or UserError."""
-        if self._thread is not None:
-            return
+    def _own(self, until_s: float) -> None:
+        """Take the lock. Raises OSError or UserError."""
         self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         file = self._held.enter_context((self._folder / LOCK).open("a"))
-        try:
-            lock(file.fileno())
-        except BlockingIOError:
-            self._held.close()
-            raise UserError(str(self._folder), "", "another daemon keeps its fault memory there") from None
-        self._thread = threading.Thread(target=self._save_what_comes, daemon=True)
-        self._thread.start()
+        while True:
+            try:
+                lock(file.fileno())
+            except BlockingIOError:
+                if time.monotonic() >= until_s:
+                    raise UserError(
+                        str(self._folder), "", "another daemon keeps its fault memory there"
+                    ) from None
+                time.sleep(LOOK_AGAIN_S)
+            else:
+                return
 
     def _refuse(self, error: Exception) -> None:
         if not self._refused:
@@ -126,14 +142,8 @@ class MemoryFile:
         self._refused = str(error)
 
     def save(self, record: bytes) -> None:
-        """Have it saved; a record that waits is replaced."""
+        """Have it saved, once it is loaded; a record that waits is replaced."""
         with self._turn:
-            try:
-                self._own()
-            except (OSError, UserError) as error:
-                self._refuse(error)
-                self._good = False
-                return
             self._wanted = record
             self._asked += 1
             self._turn.notify_all()

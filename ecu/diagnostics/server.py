@@ -4,6 +4,7 @@ import os
 import secrets
 import signal
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -29,6 +30,8 @@ from ecu.watch.health import ailment
 
 _ALL: Final = sum(fault.bit for fault in FAULTS)
 STORED_WITHIN_S: Final = 0.8e-3 * P2_STAR_MS
+LAST_STORED_WITHIN_S: Final = 0.8  # the end of the run waits for it
+SELF_TEST_CYCLES: Final = 2400
 PASSED, FAILED, NOT_TESTED = range(3)
 SELF_TESTS: Final = (
     "cycles advance",
@@ -61,6 +64,8 @@ class Server:
         self.session = Session()
         self.last: RecordArray | None = None
         """RECORDED, shape (1,): the last cycle."""
+        self._overruns: deque[tuple[int, int]] = deque()
+        """Periods missed so far, by cycle, as it was followed."""
         self._file = MemoryFile(state, str(about["store_key"])) if state else None
         self._place = Place(int(about["start_ns"]), -1)
         self._texts = {
@@ -110,6 +115,11 @@ class Server:
             self.memory.add(failed, tested, lambda record=record: snapshot(record))  # type: ignore[misc]
         self.last = batch.records[-1:]
         self._place = self._place._replace(cycle=int(self.last["cycle"]["number"][0]))
+        for row in (0, -1):
+            cycle = batch.records["cycle"][row]
+            self._overruns.append((int(cycle["number"]), int(cycle["overruns"])))
+        while self._overruns[0][0] < self._place.cycle - SELF_TEST_CYCLES:
+            self._overruns.popleft()
 
     def _save(self) -> None:
         if self._file and self.memory.changes != self._saved_changes:
@@ -152,7 +162,7 @@ class Server:
         """Add the last cycles and store the fault memory."""
         self.follow()
         if self._file:
-            self._file.close(STORED_WITHIN_S)
+            self._file.close(LAST_STORED_WITHIN_S)
 
     def _read(self, number: int) -> bytes | None:
         if number in TEXTS:
@@ -172,7 +182,7 @@ class Server:
     def _self_test(self) -> bytes:
         assert self.last is not None
         age_s = monotonic_s() - 1e-9 * float(self.last["cycle"]["t_mono_ns"][0])
-        missed = int(self.last["cycle"]["overruns"][0]) - self._overruns_before()
+        missed = self._overruns[-1][1] > self._overruns[0][1]
         kept = not int(fault_mask(self.last["outputs"])[0]) & NOT_KEPT
         stored = PASSED if self._file and self._file.is_saved(STORED_WITHIN_S) else FAILED
         results = (
@@ -182,8 +192,3 @@ class Server:
             stored if self._file else NOT_TESTED,
         )
         return bytes(results)
-
-    def _overruns_before(self) -> int:
-        """Return the periods that were missed before the oldest cycle in the ring."""
-        oldest = RingReader(self._ring).read(1).records
-        return int(oldest["cycle"]["overruns"][0]) if len(oldest) else 0

@@ -7,17 +7,20 @@ version adds: columns and indices more are left alone, and a file of a later ver
 not touched. The folder is its owner's alone.
 """
 
+import shutil
 import sqlite3
 import time
 import zlib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Final, TypeVar
 
 import structlog
 
 from ecu.errors import UserError
+from ecu.recording.ring import ring_folder
 
 Content = TypeVar("Content")
 
@@ -73,6 +76,30 @@ def open_file(path: Path) -> sqlite3.Connection:
         raise UserError(
             str(path), "", f"cannot be opened: {error}; give a folder that can be written"
         ) from None
+
+
+@contextmanager
+def open_file_to_read(path: Path) -> Iterator[sqlite3.Connection]:
+    """Open the file at `path`, or a copy in memory where its folder cannot be written, as on a full disk.
+
+    Raises:
+        UserError: neither is possible.
+    """
+    try:
+        store = open_file(path)
+    except UserError as error:
+        with TemporaryDirectory(dir=ring_folder()) as copy:
+            try:
+                for part in (path, *path.parent.glob(f"{path.name}-wal")):
+                    shutil.copy(part, copy)
+                store = open_file(Path(copy) / path.name)
+            except (OSError, UserError):
+                raise error from None
+            with closing(store):
+                yield store
+        return
+    with closing(store):
+        yield store
 
 
 def _is_damaged(error: sqlite3.OperationalError) -> bool:

@@ -7,12 +7,10 @@ Wear of the linings and emission of the brakes are also stored in rows of their 
 by the vehicle's name alone: they outlive a new version and a changed configuration.
 """
 
-import shutil
 import sqlite3
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -23,8 +21,7 @@ from ecu.contract.records import DUST, LEARNED, WEAR, RecordArray
 from ecu.errors import UserError
 from ecu.recording.learned_range import dust_out_of_range, out_of_range, wear_out_of_range
 from ecu.recording.lock import lock
-from ecu.recording.revisions import add, newest_good, open_file, transaction
-from ecu.recording.ring import ring_folder
+from ecu.recording.revisions import add, newest_good, open_file, open_file_to_read, transaction
 
 FILE: Final = "learned.sqlite"
 LOCK: Final = "in-use"
@@ -47,20 +44,7 @@ def open_to_read(folder: Path) -> Iterator[sqlite3.Connection]:
     Raises:
         UserError: neither is possible.
     """
-    try:
-        store = open_store(folder)
-    except UserError as error:
-        with TemporaryDirectory(dir=ring_folder()) as copy:
-            try:
-                for part in (folder / FILE, *folder.glob(f"{FILE}-wal")):
-                    shutil.copy(part, copy)
-                store = open_store(Path(copy))
-            except (OSError, UserError):
-                raise error from None
-            with closing(store):
-                yield store
-        return
-    with closing(store):
+    with open_file_to_read(folder / FILE) as store:
         yield store
 
 

@@ -27,7 +27,7 @@ PAUSE_S: Final = 0.1
 LONGEST_PAUSE_S: Final = 10.0  # less than the ring holds
 CALM_S: Final = 60.0  # a recorder that lived that long restarts after the short pause again
 FINAL_EXITS: Final = (0, 2)
-DIAGNOSTICS_PATIENCE_S: Final = 5.0  # it stores the fault memory
+DIAGNOSTICS_PATIENCE_S: Final = 1.0  # it stores the fault memory
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -5,6 +5,7 @@ import signal
 import sqlite3
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -30,7 +31,9 @@ def failed():
 
 @pytest.fixture
 def file(tmp_path):
+    """The file of a vehicle, loaded."""
     one = MemoryFile(tmp_path, KEY)
+    assert one.load() is None
     yield one
     one.close(10)
 
@@ -48,10 +51,6 @@ def test_what_is_saved_is_loaded_by_the_next(tmp_path, file):
     take_over(memory, kept.entries)
     assert memory.entries == failed().entries
     assert kept.place == PLACE
-
-
-def test_an_empty_folder_holds_nothing(file):
-    assert file.load() is None
 
 
 def test_another_vehicles_memory_is_its_own(tmp_path, file):
@@ -96,12 +95,14 @@ def test_a_revision_that_makes_no_sense_is_skipped_for_the_one_before(record, tm
     assert [line["event"] for line in lines] == ["revision_refused"]
 
 
-def test_a_damaged_file_is_one_line_and_it_goes_on(tmp_path, file):
+def test_a_damaged_file_is_one_line_and_it_goes_on(tmp_path):
     (tmp_path / FILE).write_bytes(b"no database" * 1000)
+    file = MemoryFile(tmp_path, KEY)
     with structlog.testing.capture_logs() as lines:
         assert file.load() is None
         assert saved(file)
     assert [line["event"] for line in lines] == ["store_damaged"]
+    file.close(10)
 
 
 def test_a_full_disk_is_one_line_until_there_is_room(tmp_path, file, monkeypatch):
@@ -110,16 +111,21 @@ def test_a_full_disk_is_one_line_until_there_is_room(tmp_path, file, monkeypatch
         error.sqlite_errorcode = sqlite3.SQLITE_FULL
         raise error
 
-    with structlog.testing.capture_logs() as lines:
-        assert file.load() is None
-        with monkeypatch.context() as disk:
-            disk.setattr(revisions, "_connect", full)
-            assert not saved(file)
-            assert not saved(file)
-        assert saved(file)
-    assert [line["event"] for line in lines] == ["faults_not_kept"]
+    assert saved(file)
     file.close(10)
-    assert MemoryFile(tmp_path, KEY).load().place == PLACE
+    second, connect = MemoryFile(tmp_path, KEY), revisions._connect
+    with structlog.testing.capture_logs() as lines:
+        with monkeypatch.context() as disk:
+            disk.setattr(
+                revisions, "_connect", lambda path: (full if path.parent == tmp_path else connect)(path)
+            )
+            assert second.load().place == PLACE  # it can be read all the same
+            assert not saved(second, FaultMemory())
+            assert not saved(second, FaultMemory())
+        assert saved(second, FaultMemory())
+    assert [line["event"] for line in lines] == ["faults_not_kept"]
+    second.close(10)
+    assert MemoryFile(tmp_path, KEY).load() == Kept(PLACE, {})
 
 
 def test_a_folder_that_cannot_be_made_is_one_line(tmp_path):
@@ -127,21 +133,31 @@ def test_a_folder_that_cannot_be_made_is_one_line(tmp_path):
     one = MemoryFile(tmp_path / "file", KEY)
     with structlog.testing.capture_logs() as lines:
         assert one.load() is None
-        assert not saved(one)
+        one.save(b"")
+        assert not one.is_saved(0.1)
     assert [line["event"] for line in lines] == ["faults_not_kept"]
 
 
-def test_it_has_one_owner_and_the_next_when_that_is_gone(tmp_path, file):
-    assert file.load() is None
+def test_it_has_one_owner_and_nobody_else_writes_over_it(tmp_path, file):
+    assert saved(file)
     second = MemoryFile(tmp_path, KEY)
     with structlog.testing.capture_logs() as lines:
-        assert second.load() is None
-        assert not saved(second)
+        assert second.load(patience_s=0.0) is None
     assert "another daemon keeps its fault memory there" in lines[0]["reason"]
     assert len(lines) == 1
     file.close(10)
-    assert saved(second)
-    second.close(10)
+    second.save(to_record(FaultMemory(), Place(2, 2)))
+    assert not second.is_saved(0.2)
+    assert MemoryFile(tmp_path, KEY).load().place == PLACE
+
+
+def test_an_owner_that_is_about_to_end_is_waited_for(tmp_path, file):
+    """A server that is started while the one before it stores its last cycles."""
+    assert saved(file)
+    ends = threading.Timer(0.3, lambda: file.close(10))
+    ends.start()
+    assert MemoryFile(tmp_path, KEY).load().place == PLACE
+    ends.join()
 
 
 def test_a_process_that_is_killed_has_lost_nothing_that_was_saved(tmp_path):
@@ -150,6 +166,7 @@ def test_a_process_that_is_killed_has_lost_nothing_that_was_saved(tmp_path):
         "from ecu.diagnostics.fault_memory import FaultMemory\n"
         "from ecu.diagnostics.memory_file import MemoryFile, Place, to_record\n"
         f"file = MemoryFile(Path(sys.argv[1]), {KEY!r})\n"
+        "file.load()\n"
         "for cycle in range(1000):\n"
         "    file.save(to_record(FaultMemory(), Place(1, cycle)))\n"
         "    if file.is_saved(10): print(cycle, flush=True)\n"
