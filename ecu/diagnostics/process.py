@@ -52,4 +52,5 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    code = main()
+    os._exit(code)  # the end of the run waits for this process, not for the modules it takes down

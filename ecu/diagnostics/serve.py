@@ -50,6 +50,10 @@ class Place:
                 "no_diagnostics", reason=str(error), remedy="it is tried again every 5 s"
             )
         self._told, self._again_s = True, self._now_s() + AGAIN_S
+        self.close()
+
+    def close(self) -> None:
+        """Close the end, if it is open."""
         if self._link is not None:
             self._link.close()
             self._link = None
@@ -70,6 +74,7 @@ def serve(ring: Path, state: Path | None, settings: Settings, goes_on: Callable[
             server.follow()
             due_s = time.monotonic() + PERIOD_S
     server.finish()
+    place.close()
 
 
 def _turn(server: Server, place: Place) -> None:

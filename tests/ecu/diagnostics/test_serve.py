@@ -103,6 +103,7 @@ def test_it_answers_over_a_lost_bus_until_the_run_ends(wires, loop, tmp_path, mo
         serve(run.ring.path, tmp_path, SETTINGS, goes_on)
     assert first.sent == [b"\x7e\x00"]
     assert second.sent == [b"\x7f\x14\x78", b"\x54"]
+    assert second.closed
     assert (tmp_path / "faults.sqlite").exists()
 
 
