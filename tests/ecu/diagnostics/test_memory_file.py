@@ -1,5 +1,6 @@
 """The stored fault memory: durable, of one owner, and none the worse for a damaged file or a full disk."""
 
+import json
 import os
 import signal
 import sqlite3
@@ -10,6 +11,8 @@ from pathlib import Path
 
 import pytest
 import structlog
+from hypothesis import given
+from hypothesis import strategies as st
 
 from ecu.contract.faults import WHEEL_SPEED_LOST
 from ecu.diagnostics.fault_memory import CONFIRMED, Entry, FaultMemory
@@ -93,6 +96,37 @@ def test_a_revision_that_makes_no_sense_is_skipped_for_the_one_before(record, tm
         PLACE, {number: entry for number, entry in failed().entries.items() if entry != Entry()}
     )
     assert [line["event"] for line in lines] == ["revision_refused"]
+
+
+VALUE = st.recursive(
+    st.one_of(st.none(), st.integers(-300, 300), st.floats(), st.text(max_size=4), st.just("00ff")),
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=6), st.dictionaries(st.text(max_size=4), inner, max_size=3)
+    ),
+    max_leaves=8,
+)
+RECORD = st.one_of(
+    VALUE,
+    st.fixed_dictionaries(
+        {
+            "start_ns": st.one_of(st.just(1), VALUE),
+            "cycle": st.one_of(st.just(2), VALUE),
+            "entries": st.one_of(
+                VALUE, st.dictionaries(st.just("500008"), st.lists(VALUE, min_size=5, max_size=5))
+            ),
+        }
+    ),
+)
+
+
+@given(st.one_of(st.binary(max_size=40), RECORD.map(lambda value: json.dumps(value).encode())))
+def test_any_record_is_a_memory_or_refused(record):
+    try:
+        kept = from_record(record)
+    except ValueError:
+        return
+    take_over(FaultMemory(), kept.entries)
+    assert all(0 <= entry.status < 128 and isinstance(entry.first, bytes) for entry in kept.entries.values())
 
 
 def test_a_damaged_file_is_one_line_and_it_goes_on(tmp_path):
