@@ -167,7 +167,8 @@ class Server:
     def _read(self, number: int) -> bytes | None:
         if number in TEXTS:
             return self._texts[TEXTS[number]].encode()
-        if number in BY_NUMBER and self.last is not None:
+        if number in BY_NUMBER:
+            assert self.last is not None
             return to_bytes(BY_NUMBER[number], measured(self.last))
         return None
 

@@ -9,7 +9,7 @@ import udsoncan
 from udsoncan import configs
 from udsoncan.client import Client
 from udsoncan.connections import PythonIsoTpConnection
-from udsoncan.exceptions import TimeoutException
+from udsoncan.exceptions import TimeoutException, UnexpectedResponseException
 
 from ecu import __version__
 from ecu.bus.channel import open_bus
@@ -96,7 +96,7 @@ def asked(client, ask):
     def answered():
         try:
             found.append(ask(client))
-        except TimeoutException:
+        except (TimeoutException, UnexpectedResponseException):  # none yet, or a late one to the last request
             return False
         return True
 

@@ -98,6 +98,13 @@ def test_a_clear_is_told_to_be_pending_and_is_stored(begin):
     assert confirmed(after) == []
 
 
+def test_a_clear_that_a_full_disk_does_not_keep_is_refused(begin, monkeypatch):
+    run, server = begin()
+    run.publish(20, active_faults=LATE)
+    monkeypatch.setattr(server._file, "_save", lambda record: False)
+    assert ask(server, "14 FF FF FF") == ["7F 14 78", "7F 14 72"]
+
+
 def test_without_a_state_folder_a_clear_is_done_at_once(begin):
     run, server = begin(state=False)
     run.publish(20, active_faults=LATE)
