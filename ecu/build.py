@@ -73,7 +73,7 @@ def build(package: str, load_workload: Callable[[], Callable[[], None]], wanted:
         if (returned := returned_spec(result.fndesc.restype)) is not None
     ]
     symbols = [f"kernel_{number}" for number in range(len(kept))]
-    whole = link([result for _, result, _ in kept], symbols)
+    whole = link([result for _, result, _ in kept], symbols, [call.specs for call, _, _ in kept])
     print(f"{package}: translated after {time.monotonic() - began:.0f} s; optimising", flush=True)
     kernels = dict[str, list[dict[str, Any]]]()
     for symbol, (call, _, returned) in zip(symbols, kept, strict=True):

@@ -145,7 +145,8 @@ class _Block:
 
 
 def _address(value: Any) -> int:
-    return int(value.__array_interface__["data"][0])
+    """Return where an array or a record lies; its `__array_interface__` would describe every field first."""
+    return int((value if isinstance(value, np.ndarray) else np.frombuffer(value, np.uint8)).ctypes.data)
 
 
 def _write(block: _Block, at: int, spec: Spec, value: Any) -> int:

@@ -4,7 +4,7 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,7 +15,7 @@ from numba.core.registry import cpu_target
 
 from ecu.building.calls import Call
 from ecu.errors import UserError
-from ecu.library import Spec
+from ecu.library import Spec, places_of
 
 RUNTIME: Final = r"""
 #include <stddef.h>
@@ -56,6 +56,9 @@ void *PyExc_RuntimeError;
 void PyErr_SetString(void *kind, const char *text) { (void)kind, (void)text; }
 """
 
+
+COUNTED: Final = {"NRT_incref": 1, "NRT_decref": -1}
+"""What numba's code calls to count references to the owner of an array."""
 
 types: Any = numba.core.types  # whose names numba's own annotations hide in part
 
@@ -110,7 +113,41 @@ def returned_spec(kind: Any) -> Spec | None:
     return None
 
 
-def _entry(module: Any, symbol: str, result: Any) -> None:
+def _empty_places(spec: Spec) -> list[bool]:
+    """Return which places of an argument hold nothing: those where numba keeps the owner of an array."""
+    if spec[0] == "tuple":
+        return [empty for part in spec[2:] for empty in _empty_places(part)]
+    empty = [False] * places_of(spec)
+    if spec[0] == "array":
+        empty[:2] = True, True
+    return empty
+
+
+def _count_references(module: Any) -> None:
+    """Add how references to an array's owner are counted.
+
+    In place of numba's functions, which are not inlined: an argument has no owner, and once that is seen
+    nothing remains of them. Not atomic: what a kernel makes, no other thread knows.
+    """
+    count = ir.IntType(64)
+    kind = ir.FunctionType(ir.VoidType(), [ir.IntType(8).as_pointer()])
+    destroy = ir.Function(module, kind, "NRT_MemInfo_call_dtor")
+    for name, change in COUNTED.items():
+        function = ir.Function(module, kind, name)
+        function.attributes.add("alwaysinline")
+        builder = ir.IRBuilder(function.append_basic_block())
+        owner = function.args[0]
+        with builder.if_then(builder.icmp_unsigned("!=", owner, ir.Constant(owner.type, None))):
+            place = builder.bitcast(owner, count.as_pointer())
+            left = builder.add(builder.load(place), count(change))
+            builder.store(left, place)
+            if change < 0:
+                with builder.if_then(builder.icmp_unsigned("==", left, count(0))):
+                    builder.call(destroy, [owner])
+        builder.ret_void()
+
+
+def _entry(module: Any, symbol: str, result: Any, specs: Sequence[Spec]) -> None:
     """Add a function that takes a block of places, see `ecu/library.py`, and calls the kernel."""
     context, described = cpu_target.target_context, result.fndesc
     whole, block = ir.IntType(64), ir.IntType(64).as_pointer()
@@ -127,9 +164,12 @@ def _entry(module: Any, symbol: str, result: Any) -> None:
         return builder.gep(entry.args[0], [ir.IntType(32)(at - 1)])
 
     arguments = []
-    for wanted in kind.args[2:]:
+    empty = [one for spec in specs for one in _empty_places(spec)]
+    for wanted, nothing in zip(kind.args[2:], empty, strict=True):
         value = builder.load(place())
-        if isinstance(wanted, ir.PointerType):
+        if nothing:
+            value = ir.Constant(wanted, None)
+        elif isinstance(wanted, ir.PointerType):
             value = builder.inttoptr(value, wanted)
         elif isinstance(wanted, ir.IntType):
             value = value if wanted.width == 64 else builder.trunc(value, wanted)
@@ -155,14 +195,18 @@ def _entry(module: Any, symbol: str, result: Any) -> None:
     builder.ret(status)
 
 
-def link(results: list[Any], symbols: list[str]) -> Any:
+def link(results: list[Any], symbols: list[str], specs: list[Sequence[Spec]]) -> Any:
     """Return LLVM's module of all results with an entry for each, nothing else visible."""
     entries = ir.Module("entries")
     entries.triple = binding.get_process_triple()
-    for symbol, result in zip(symbols, results, strict=True):
-        _entry(entries, symbol, result)
+    _count_references(entries)
+    for symbol, result, arguments in zip(symbols, results, specs, strict=True):
+        _entry(entries, symbol, result, arguments)
     whole = binding.parse_assembly(str(entries))
     for part in _parts(results):
+        for function in part._final_module.functions:
+            if function.name in COUNTED and not function.is_declaration:
+                function.linkage = binding.Linkage.linkonce_any  # numba's own give way
         whole.link_in(part._final_module, preserve=True)
     for function in whole.functions:
         if not function.is_declaration and function.name not in symbols:
