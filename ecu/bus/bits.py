@@ -27,6 +27,8 @@ def extract(data: NDArray[np.uint8], start: int, length: int, big_endian: int) -
     """Return the field as uint64."""
     byte = start >> 3
     skipped = start & 7
+    if skipped + length <= 64 and byte + 8 <= len(data):
+        return _extract_at_once(data, np.uint64(byte), np.uint64(skipped), np.uint64(64 - length), big_endian)
     got = 8 - skipped
     if big_endian:
         value = np.uint64(data[byte] & (0xFF >> skipped))
@@ -42,6 +44,19 @@ def extract(data: NDArray[np.uint8], start: int, length: int, big_endian: int) -
         value |= np.uint64(data[byte]) << np.uint64(got)
         got += 8
     return value & (np.uint64(0xFFFFFFFFFFFFFFFF) >> np.uint64(64 - length))
+
+
+@kernel
+def _extract_at_once(data: NDArray[np.uint8], byte: Any, skipped: Any, unused: Any, big_endian: int) -> Any:
+    """Return a field within eight bytes of `data`: as one load, so written that no index may be negative."""
+    word = np.uint64(0)
+    if big_endian:
+        for i in range(8):
+            word |= np.uint64(data[byte + np.uint64(i)]) << np.uint64(56 - 8 * i)
+        return (word << skipped) >> unused
+    for i in range(8):
+        word |= np.uint64(data[byte + np.uint64(i)]) << np.uint64(8 * i)
+    return (word >> skipped) & (np.uint64(0xFFFFFFFFFFFFFFFF) >> unused)
 
 
 @kernel

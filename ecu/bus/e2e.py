@@ -39,24 +39,31 @@ SHORTEST: Final = {"autosar_p01": 2, "ford_brake_sn_4": 4, "ford_accel_data": 8}
 P01_MODULO: Final = 15  # counter 0–14
 
 
-def _crc8_table() -> NDArray[np.uint8]:
+def _crc8_tables() -> NDArray[np.uint8]:
+    """Return what a byte adds to the CRC, by how many bytes of payload and Data ID it is from the end.
+
+    The CRC starts at 0 and is linear: it is the XOR of what its bytes add, none of which waits for another.
+    """
     polynomial = 0x1D  # SAE J1850
     table = np.arange(256)
     for _ in range(8):
         table = np.where(table & 0x80, (table << 1) ^ polynomial, table << 1) & 0xFF
-    return table.astype(np.uint8)
+    tables = [np.arange(256)]
+    for _ in range(_LONGEST + 1):
+        tables.append(table[tables[-1]])
+    return np.array(tables, np.uint8)
 
 
-_CRC8: Final = _crc8_table()
+_LONGEST: Final = 64  # bytes of a CAN FD payload
+_CRC8: Final = _crc8_tables()
 
 
 @kernel
 def p01_crc(data: NDArray[np.uint8], length: int, data_id: int) -> int:
-    """Return the Profile 1 CRC of bytes 1 to `length` − 1 of `data`."""
-    crc = _CRC8[data_id & 0xFF]
-    crc = _CRC8[crc ^ np.uint8((data_id >> 8) & 0xFF)]
+    """Return the Profile 1 CRC of bytes 1 to `length` − 1 of `data`, at most 63 bytes."""
+    crc = _CRC8[length + 1, data_id & 0xFF] ^ _CRC8[length, (data_id >> 8) & 0xFF]
     for i in range(1, length):
-        crc = _CRC8[crc ^ data[i]]
+        crc ^= _CRC8[length - i, data[i]]
     return int(crc)
 
 

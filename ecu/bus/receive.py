@@ -181,7 +181,7 @@ def receive(
     Returns the index of the first frame left. `inputs` is `INPUTS` or a `target_dtype` record.
     """
     # Tuple fields are taken out once: in the loop each would cost an atomic reference count.
-    ids, messages, signals, codes = plan.ids, plan.messages, plan.signals, plan.codes
+    ids, places, messages, signals, codes = plan.ids, plan.places, plan.messages, plan.signals, plan.codes
     counted, freshness, totals = reception.messages, reception.freshness, reception.totals[0]
     request = reception.request[0]
     index = first
@@ -195,7 +195,7 @@ def receive(
         identifier: Any = np.int64(frame.can_id)
         if frame.flags & FRAME_EXTENDED:
             identifier |= EXTENDED_ID
-        place = _find(ids, identifier)
+        place = np.int64(places[identifier]) if identifier < len(places) else _find(ids, identifier)
         if place < 0:
             totals.unknown += 1
             continue

@@ -36,12 +36,16 @@ MESSAGE: Final = np.dtype(
     align=True,
 )
 
+STANDARD_IDS: Final = 1 << 11
+
 
 class ReceivePlan(NamedTuple):
     """Signals to take from frames; `messages` in ascending order of identifiers. Read only."""
 
     ids: NDArray[np.uint32]
     """Identifiers, those of 29 bits with EXTENDED_ID: what kernel filters must let through."""
+    places: NDArray[np.int16]
+    """Message of each identifier of 11 bits, −1: none, shape (2048,)."""
     messages: RecordArray
     signals: RecordArray
     codes: NDArray[np.int64]
@@ -84,8 +88,12 @@ def compile_receive(uses: Sequence[MessageUse], expected: RecordArray) -> Receiv
         set_protection(message, use.protection)
         asks = [FIRST <= signal.place <= LAST for signal in use.signals]
         message["request"] = len(expected) == N_INPUTS and any(asks)
+    places = np.full(STANDARD_IDS, -1, np.int16)
+    standard = np.flatnonzero(messages["id"] < STANDARD_IDS)
+    places[messages["id"][standard]] = standard
     return ReceivePlan(
         np.ascontiguousarray(messages["id"]),
+        places,
         messages,
         np.concatenate(rows),
         np.array([*codes, 0], np.int64),
