@@ -39,4 +39,5 @@ def arrow_array(values: Any, kind: Any) -> "pa.Array[Any]":
         numbers = np.where(known, numbers, 0.0)
     data = numbers.astype(kind.to_pandas_dtype(), copy=False)
     valid = np.packbits(known, bitorder="little")
-    return pa.Array.from_buffers(kind, len(numbers), [pa.py_buffer(valid), pa.py_buffer(data)])
+    nulls = None if known.all() else pa.py_buffer(valid)
+    return pa.Array.from_buffers(kind, len(numbers), [nulls, pa.py_buffer(data)])

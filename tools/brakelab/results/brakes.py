@@ -257,8 +257,15 @@ class BrakeBook:
 
     def add(self, t: Vector, rows: Vector) -> None:
         """Add rows that follow the last: `t` [s], shape (n,), and `rows`, shape (n, N_ROW)."""
-        if len(self._t):
-            t, rows = np.concatenate((self._t, t)), np.concatenate((self._rows, rows))
+        first = 0
+        if len(self._t):  # only the application that goes on, or begins here, needs the rows before
+            first = int(np.argmin(np.append(rows[:, OUTPUT["braking"]] == 1.0, False)))
+            joined = slice(first + 1)
+            self._take(np.concatenate((self._t, t[joined])), np.concatenate((self._rows, rows[joined])))
+        if first < len(t):
+            self._take(t[first:], rows[first:])
+
+    def _take(self, t: Vector, rows: Vector) -> None:
         braking = rows[:, OUTPUT["braking"]] == 1.0
         edges = np.flatnonzero(np.diff(braking, prepend=False))
         for start, end in zip(edges[0::2], edges[1::2], strict=False):
@@ -277,4 +284,5 @@ class BrakeBook:
     def _close(self, t: Vector, rows: Vector, start: int, end: int) -> None:
         number = len(self.rows) // len(CORNERS)
         before, after = rows[max(start - 1, 0)], rows[min(end, len(rows) - 1)]
-        self.rows += application(number, t[start:end], rows[start:end], before, after, self._params)
+        own = np.ascontiguousarray(rows[start:end])  # sums have the same bits however rows are stored
+        self.rows += application(number, t[start:end], own, before, after, self._params)

@@ -118,7 +118,7 @@ class ResultWriter:
 
     def write(self, t: NDArray[np.float64], rows: NDArray[np.float64]) -> None:
         """Append rows: `t` [s], shape (n,), `rows` in the order of `ROW_COLUMNS`, shape (n, N_ROW)."""
-        self._open().write_table(_table(ROW_SCHEMA, [t, *np.ascontiguousarray(rows.T)]))
+        self._open().write_table(_table(ROW_SCHEMA, [t, *rows.T]))
         self.brakes.add(t, rows)
         self.rows += len(t)
 
