@@ -52,12 +52,19 @@ def fit(signal: Vector, reference: Vector, rows: NDArray[np.bool_]) -> Fit:
         return best
     places = places[::STRIDE]
     r = reference[places]
+    mean = float(r.mean())
+    r -= mean
+    size = float(np.dot(r, r))
+    padded = np.pad(signal, LAGS[-1], mode="wrap")
     for lag in LAGS:
-        s = signal[(places - lag) % len(signal)]
-        if s.std() == 0.0 or r.std() == 0.0:
+        s = padded[places + (LAGS[-1] - lag)]
+        level = float(s.mean())
+        s -= level
+        both, own = float(np.dot(s, r)), float(np.dot(s, s))
+        if own == 0.0 or size == 0.0:
             continue
-        correlation = float(np.corrcoef(s, r)[0, 1])
+        correlation = both / float(np.sqrt(own * size))
         if abs(correlation) > abs(best.correlation):
-            slope = float(np.cov(s, r)[0, 1] / r.var(ddof=1))
-            best = Fit(correlation, slope, float(s.mean() - slope * r.mean()))
+            slope = both / size
+            best = Fit(correlation, slope, level - slope * mean)
     return best

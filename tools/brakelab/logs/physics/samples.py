@@ -108,9 +108,11 @@ class Collector:
             return
         judged = samples[: len(samples) // CYCLES * CYCLES, : len(SAMPLED)]
         pairs = judged.reshape(-1, CYCLES, len(SAMPLED))
-        there = np.isfinite(pairs)
-        with np.errstate(invalid="ignore"):
-            mean = np.where(there, pairs, 0.0).sum(axis=1) / there.sum(axis=1)
+        first, second = pairs[:, 0], pairs[:, 1]
+        mean = 0.5 * (first + second)
+        for alone, other in ((first, second), (second, first)):
+            np.copyto(mean, alone, where=~np.isfinite(other))
+        np.copyto(mean, np.nan, where=~np.isfinite(mean))
         self._rows.append(mean.astype(np.float32))
         self._count += len(mean)
 
@@ -135,6 +137,10 @@ class Drive:
             if len(there) < FEWEST:
                 continue
             name = INPUT_SIGNALS[place].name
+            if len(there) == len(samples):
+                self._raw[name] = samples[:, column].copy()
+                self._values[name] = smooth(self._raw[name])
+                continue
             self._raw[name] = np.interp(places, there, samples[there, column])
             self._values[name] = smooth(self._raw[name])
             after = np.minimum(np.searchsorted(there, places), len(there) - 1)
