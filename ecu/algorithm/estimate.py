@@ -5,9 +5,13 @@ estimation. Checks that run before estimation read that of the last cycle. It fo
 states, so neither store nor recording keeps it.
 """
 
+import math
+
 import numpy as np
 
 from ecu.jit import Record, kernel
+
+REMEMBERED = 10
 
 ESTIMATE = np.dtype(
     [
@@ -17,7 +21,9 @@ ESTIMATE = np.dtype(
         ("accel_x_model", "f8"),  # the same by the torques of brakes and motors and by drag [m/s^2]
         ("accel_y", "f8"),  # m/s^2
         ("yaw_rate", "f8"),  # rad/s
-        ("steering", "f8"),  # rad at the road wheel
+        ("steering", "f8"),  # rad at the road wheel, and its cosine and sine
+        ("cos_steering", "f8"),
+        ("sin_steering", "f8"),
         ("lateral_speed", "f8"),  # m/s
         ("tyre_force", "f8"),  # of all tyres along the car (4.16) [N]
         ("mass", "f8"),  # kg
@@ -53,6 +59,9 @@ ESTIMATE = np.dtype(
         ("reset", "u1"),  # a filter met a non-finite value
         ("at_bound", "u1"),  # a learned state is at its bound
         ("given_up", "u1"),  # learned values recently predicted worse than the configuration
+        # Exponentials of what changes less than once a cycle: see `remembered_exp`.
+        ("exponent", "f8", (REMEMBERED,)),
+        ("power", "f8", (REMEMBERED,)),
     ],
     align=True,
 )
@@ -61,6 +70,15 @@ STANDING = 0.3  # m/s, below: the brakes hold the car at standstill
 LEAST_RATIO, GREATEST_RATIO = 0.5, 1.5  # of friction over nominal
 SIGMA_FOR_LEARNING = 0.10
 SECONDS_FOR_LEARNING = 1.0
+
+
+@kernel
+def remembered_exp(estimate: Record, place: int, exponent: float) -> float:
+    """Return e to the `exponent`, computed anew only where that is not the last one of this `place`."""
+    if exponent != estimate.exponent[place] or estimate.power[place] == 0.0:
+        estimate.exponent[place], estimate.power[place] = exponent, math.exp(exponent)
+    power: float = estimate.power[place]
+    return power
 
 
 @kernel

@@ -18,6 +18,7 @@ import math
 import numpy as np
 
 from ecu.algorithm.inputs import fresh
+from ecu.algorithm.lag import lag_gain
 from ecu.contract.params import BAR
 from ecu.contract.signals import CALLIPER_PRESSURE, CYCLE_NS
 from ecu.jit import Record, kernel
@@ -82,7 +83,7 @@ def advance_pressures(state: Record, sent: Record) -> None:
 def _correct(state: Record, i: int, measured: float, sigma: float, dt: float) -> None:
     """Fuse a sample less the sensor's zero [bar]; judge whether the pressure follows the demand."""
     innovation = measured - state.value[i]
-    gain = 1.0 - math.exp(-dt / DISAGREEMENT_LAG)
+    gain = lag_gain(dt, DISAGREEMENT_LAG)
     state.disagreement[i] += gain * (innovation - state.disagreement[i])
     averaged = sigma * math.sqrt(0.5 * gain) + math.sqrt(state.variance[i])
     if abs(state.disagreement[i]) > TOLERANCE * averaged:

@@ -13,7 +13,8 @@ Ground speed of a wheel in its rolling direction (A.5), of a rigid body (x forwa
 
 Sum of the tyres' forces along the car (corrected 4.16), see `estimation/thesis/force.py`.
 
-`motion` is any record with the fields that a function reads: `MOTION_STATE` or `ESTIMATE`.
+`motion` is any record with the fields that a function reads: `MOTION_STATE` or `ESTIMATE`. Cosine and sine of
+the steering angle, which a dozen places of a cycle need, are computed once (`set_steering`).
 """
 
 import math
@@ -32,6 +33,26 @@ def rolling_radius(load: float, unloaded_radius: float, vertical_stiffness: floa
 
 
 @kernel
+def set_steering(motion: Record, angle: float) -> None:
+    """Overwrite the steering angle [rad at the road wheel], its cosine and its sine."""
+    motion.steering, motion.cos_steering, motion.sin_steering = angle, math.cos(angle), math.sin(angle)
+
+
+@kernel
+def cos_steering(motion: Record) -> float:
+    """Return the cosine of the steering angle; where nobody has set it, it is 0."""
+    cosine: float = motion.cos_steering
+    return cosine if cosine != 0.0 else math.cos(motion.steering)
+
+
+@kernel
+def sin_steering(motion: Record) -> float:
+    """Return the sine of the steering angle, likewise."""
+    sine: float = motion.sin_steering
+    return sine if motion.cos_steering != 0.0 else math.sin(motion.steering)
+
+
+@kernel
 def corner_speed(params: Record, motion: Record, speed: float, corner: int) -> float:
     """Return the ground speed [m/s] of a wheel in its rolling direction (A.5) at vehicle speed `speed`."""
     half_track = 0.5 * params.track * (1.0 if corner % 2 == 1 else -1.0)
@@ -39,7 +60,7 @@ def corner_speed(params: Record, motion: Record, speed: float, corner: int) -> f
     if corner >= 2:
         return along
     across: float = motion.lateral_speed + motion.yaw_rate * params.front_axle
-    return along * math.cos(motion.steering) + across * math.sin(motion.steering)
+    return along * cos_steering(motion) + across * sin_steering(motion)
 
 
 @kernel
@@ -48,4 +69,4 @@ def total_tyre_force(params: Record, motion: Record, speed: float) -> float:
     inertial: float = params.mass * motion.accel_x
     drag: float = params.drag_area * speed * abs(speed)
     front_lateral: float = params.mass * motion.accel_y * params.rear_axle / params.wheelbase
-    return inertial + drag + front_lateral * math.sin(motion.steering)
+    return inertial + drag + front_lateral * sin_steering(motion)

@@ -24,6 +24,7 @@ import math
 import numpy as np
 
 from ecu.algorithm.inputs import current, fresh, others_brake, usable
+from ecu.algorithm.lag import lag_gain
 from ecu.contract.signals import MOTOR_LIMIT, MOTOR_TORQUE, REVERSE
 from ecu.jit import Record, kernel
 
@@ -148,7 +149,7 @@ def share_torque(params: Record, state: Record, torque: Record, dt: float) -> No
         allowed = max(state.allowed[i] - AHEAD * state.rise[i], 0.0)
         plan = min(params.blending[i] * demand, allowed)
         later = LATER * max(state.slow[i] - plan, 0.0)
-        state.slow[i] += (1.0 - math.exp(-dt / LATER_S)) * (plan - state.slow[i])
+        state.slow[i] += lag_gain(dt, LATER_S) * (plan - state.slow[i])
         state.plan[i] = min(plan + later, demand)
         state.lining[i] = torque[i] - state.plan[i]
         if demand == 0.0:

@@ -14,10 +14,9 @@ d is what the accelerometer has moved by against the wheels of late (c of `accel
 positive: a drift, or the road. It counts where friction is lowered beyond what was confirmed.
 """
 
-import math
-
 import numpy as np
 
+from ecu.algorithm.lag import lag_gain
 from ecu.contract.params import GRAVITY
 from ecu.jit import Record, kernel
 
@@ -71,7 +70,7 @@ def confirm_friction(
         state.asked = state.given = state.steady_s = 0.0
         return
     resistance = params.drag_area * estimate.speed**2 / params.mass + params.rolling_resistance * GRAVITY
-    gain = 1.0 - math.exp(-dt / LAG)
+    gain = lag_gain(dt, LAG)
     state.asked += gain * (decel - state.asked)
     state.given += gain * (-estimate.accel_x - resistance - state.given)
     moves = estimate.speed > LEAST_SPEED and estimate.measured != 0

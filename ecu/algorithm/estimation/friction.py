@@ -3,11 +3,13 @@
 import math
 
 from ecu.algorithm.brake import brake_gain
+from ecu.algorithm.lag import PERIOD
 from ecu.contract.params import BAR
 from ecu.contract.signals import CALLIPER_PRESSURE, FAULT, HOLDING, NOMINAL, WHEEL_SPEED
 from ecu.jit import Record, kernel
 
 CUT_OFF = 16.0  # Hz, of pressure and slip (4.3.3): all signals lag alike
+RATE = -2.0 * math.pi * CUT_OFF  # 1/s
 DRIVEN = 0.2  # of the brakes' torque: above it the drive acts against the brakes
 
 
@@ -25,7 +27,7 @@ def update_pressure(
         inputs: `INPUTS`.
         dt: time since the last cycle [s].
     """
-    gain = 1.0 - math.exp(-2.0 * math.pi * CUT_OFF * dt)
+    gain = 1.0 - math.exp(RATE * PERIOD) if dt == PERIOD else 1.0 - math.exp(RATE * dt)
     for i in range(4):
         above = BAR * (inputs.value[CALLIPER_PRESSURE + i] - zero[i]) - params.push_out_pressure[i]
         if math.isfinite(above):

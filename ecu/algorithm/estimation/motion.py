@@ -18,6 +18,7 @@ import numpy as np
 
 from ecu.algorithm.estimate import STANDING
 from ecu.algorithm.inputs import motor_torque, usable
+from ecu.algorithm.vehicle import set_steering
 from ecu.contract.params import GRAVITY
 from ecu.contract.signals import (
     ACCEL_X,
@@ -40,7 +41,9 @@ MOTION_STATE = np.dtype(
         ("backwards", "u1"),  # in reverse
         ("accel_y", "f8"),
         ("yaw_rate", "f8"),  # rad/s
-        ("steering", "f8"),  # rad at the road wheel
+        ("steering", "f8"),  # rad at the road wheel, and its cosine and sine
+        ("cos_steering", "f8"),
+        ("sin_steering", "f8"),
         ("lateral_speed", "f8"),  # m/s
         ("ground_speed", "f8", (4,)),  # of each wheel in its rolling direction per (A.5) [m/s]
     ],
@@ -81,7 +84,7 @@ def update_motion(params: Record, state: Record, inputs: Record, speed: float, b
     Longitudinal acceleration is modelled while its sensor is lost; brake torques [N m] oppose travel.
     """
     value = inputs.value
-    state.steering = value[STEERING_ANGLE] if usable(inputs, STEERING_ANGLE) else 0.0
+    set_steering(state, value[STEERING_ANGLE] if usable(inputs, STEERING_ANGLE) else 0.0)
     yaw, across = usable(inputs, YAW_RATE), usable(inputs, ACCEL_Y)
     state.yaw_rate = value[YAW_RATE] if yaw else 0.0
     state.accel_y = value[ACCEL_Y] if across else state.yaw_rate * speed
@@ -108,3 +111,4 @@ def tell_motion(state: Record, estimate: Record) -> None:
     estimate.measured, estimate.backwards = state.measured, state.backwards
     estimate.accel_y, estimate.yaw_rate = state.accel_y, state.yaw_rate
     estimate.steering, estimate.lateral_speed = state.steering, state.lateral_speed
+    estimate.cos_steering, estimate.sin_steering = state.cos_steering, state.sin_steering

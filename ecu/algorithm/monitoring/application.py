@@ -48,11 +48,12 @@ def update_application(params: Record, state: Record, inputs: Record, dt: float)
         elif fresh(inputs, place):
             state.shown[i] += above
         state.recent[i, state.place] = above
-        mean = 0.0
-        for j in range(WINDOW):
-            mean += state.recent[i, j] / WINDOW
         long_enough = long_enough or (state.above[i] >= WINDOW and state.shown[i] >= WINDOW * MARGIN)
-        applied = applied or mean > MARGIN
+        if state.braking and not applied:
+            mean = 0.0
+            for j in range(WINDOW):
+                mean += state.recent[i, j] / WINDOW
+            applied = mean > MARGIN
     state.started, state.ended = 0, 0
     if state.braking:
         state.duration_s += dt

@@ -101,6 +101,7 @@ def update_discs(
     speed, load = estimate.speed, estimate.load
     rain_known = usable(inputs, RAIN)
     wet = rain_known and inputs.value[RAIN] > 0.5
+    last, stays = -1.0, 1.0
     load_sum = load[0] + load[1] + load[2] + load[3]
     for i in range(4):
         if state.sigma_start[i] > THERMOCOUPLE_ERROR and usable(inputs, DISC_TEMPERATURE_MEASURED + i):
@@ -123,7 +124,9 @@ def update_discs(
         else:
             rate = params.disc_cooling[i] + params.disc_cooling_by_speed[i] * abs(speed)
             cooling_error = params.sigma_disc_cooling[i] if rain_known else RAIN_UNKNOWN_ERROR
-        _advance(state, i, params.disc_heating[i] * power, heating_error, rate, cooling_error, dt)
+        if rate != last:  # discs of an axle cool alike
+            last, stays = rate, math.exp(-rate * dt)
+        _advance(state, i, params.disc_heating[i] * power, heating_error, rate, cooling_error, stays)
         parts = state.sigma_heating[i] ** 2 + state.sigma_cooling[i] ** 2 + state.sigma_start[i] ** 2
         state.sigma[i] = math.sqrt(parts + sigma_ambient**2)
         state.temperature[i] = state.ambient + state.excess[i]
@@ -141,10 +144,12 @@ def _advance(
     heating_error: float,
     rate: float,
     cooling_error: float,
-    dt: float,
+    stays: float,
 ) -> None:
-    """Advance the excess and its errors of one disc by `warming` [K/s] and cooling at `rate` [1/s]."""
-    stays = math.exp(-rate * dt)
+    """Advance the excess and its errors of one disc by `warming` [K/s] and cooling at `rate` [1/s].
+
+    `stays`: share of the excess that is left after the cycle.
+    """
     gain = (1.0 - stays) / rate
     state.sigma_heating[i] = stays * state.sigma_heating[i] + heating_error * gain * warming
     state.sigma_cooling[i] = stays * state.sigma_cooling[i] + cooling_error * rate * gain * state.excess[i]

@@ -12,12 +12,11 @@ The expected force uses the friction at the start of the application, corrected 
 pressures follow: friction learned with a wheel believed failed would confirm that belief.
 """
 
-import math
-
 import numpy as np
 
 from ecu.algorithm.brake import brake_gain
 from ecu.algorithm.inputs import motor_torque, others_brake, usable
+from ecu.algorithm.lag import lag_gain
 from ecu.contract.params import BAR, GRAVITY
 from ecu.contract.signals import CALLIPER_PRESSURE
 from ecu.jit import Record, kernel
@@ -77,7 +76,7 @@ def watch_brakes(
         sent: the demands were valid; otherwise, and while another controller brakes, nothing is judged.
         dt: time since the last cycle [s].
     """
-    gain = 1.0 - math.exp(-dt / LAG)
+    gain = lag_gain(dt, LAG)
     weight = params.mass * GRAVITY
     given = -estimate.tyre_force - params.rolling_resistance * weight
     due, total, suspected, braked = 0.0, 0.0, 0.0, False

@@ -15,6 +15,7 @@ import math
 import numpy as np
 
 from ecu.algorithm.inputs import driver_accelerates, motor_torque, others_brake, usable
+from ecu.algorithm.lag import lag_gain
 from ecu.algorithm.monitoring.witness import AGAIN_S, judge
 from ecu.contract.params import GRAVITY
 from ecu.contract.signals import ACCEL_X, MOTOR_TORQUE
@@ -63,7 +64,7 @@ def watch_motors(
         accel_offset: zero of the accelerometer and slope, by the wheels [m/s^2].
         dt: time since the last cycle [s].
     """
-    speed, gain = estimate.speed, 1.0 - math.exp(-dt / LAG)
+    speed, gain = estimate.speed, lag_gain(dt, LAG)
     resistance = params.drag_area * speed * speed / params.mass + params.rolling_resistance * GRAVITY
     reading = inputs.value[ACCEL_X] / (1.0 + GRAVITY * params.pitch_gradient)
     error, doubt = reading + resistance, ACCEL
@@ -130,7 +131,7 @@ def compare_motors(
         blending: `BLENDING_STATE` of the last cycle.
         dt: time since the last cycle [s].
     """
-    gain = 1.0 - math.exp(-dt / GAP_LAG)
+    gain = lag_gain(dt, GAP_LAG)
     for i in range(4):
         place, asked = MOTOR_TORQUE + i, blending.asked
         if params.blending[i] == 0.0 or witness.rejected[place] or not usable(inputs, place):

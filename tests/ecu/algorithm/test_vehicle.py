@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ecu.algorithm.estimation.motion import MOTION_STATE, update_motion
-from ecu.algorithm.vehicle import corner_speed, rolling_radius, total_tyre_force
+from ecu.algorithm.vehicle import corner_speed, rolling_radius, set_steering, total_tyre_force
 
 G = 9.81
 RADIUS, STIFFNESS = 0.3705, 250e3
@@ -77,6 +77,9 @@ def test_corner_speeds_are_those_of_a_rigid_body(
     state = np.zeros(1, MOTION_STATE)
     state["lateral_speed"], state["yaw_rate"], state["steering"] = lateral, yaw_rate, steering
     expected = rigid_body_speed(params, speed, lateral, yaw_rate, steering, corner)
+    assert corner_speed(params[0], state[0], speed, corner) == pytest.approx(expected, abs=1e-12), manoeuvre
+    set_steering(state[0], 0.3)
+    set_steering(state[0], steering)  # cosine and sine are those of the last angle
     assert corner_speed(params[0], state[0], speed, corner) == pytest.approx(expected, abs=1e-12), manoeuvre
 
 

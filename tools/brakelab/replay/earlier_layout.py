@@ -35,6 +35,8 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "slip",
         "replacement",
         "spins_s",
+        "cos_steering",
+        "sin_steering",
     ),
 }
 

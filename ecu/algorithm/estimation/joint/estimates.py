@@ -3,7 +3,7 @@
 import math
 
 from ecu.algorithm.brake import brake_gain_per_bar
-from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
+from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO, remembered_exp
 from ecu.algorithm.estimation.friction import resting_mode
 from ecu.algorithm.estimation.joint.kalman import GATE
 from ecu.algorithm.estimation.joint.layout import (
@@ -29,6 +29,9 @@ from ecu.contract.params import GRAVITY
 from ecu.contract.signals import CALLIPER_PRESSURE, OBSERVING, WHEEL_SPEED
 from ecu.jit import Record, kernel
 
+_NOW, _LEVEL, _STIFFNESS, _MASS = 0, 4, 8, 9
+"""Places of `remembered_exp`."""
+
 
 @kernel
 def friction_now(state: Record, i: int) -> float:
@@ -43,13 +46,16 @@ def _at_bound(ratio: float) -> bool:
 
 
 @kernel
-def sigma_friction(params: Record, state: Record, i: int, now: bool) -> float:
-    """Return the standard deviation of ln friction: of the level, or, with `now`, of its present value."""
+def sigma_friction(params: Record, state: Record, i: int, ratio: float, now: bool) -> float:
+    """Return the standard deviation of ln friction: of the level, or, with `now`, of its present value.
+
+    `ratio`: of the level to the nominal friction.
+    """
     p, level, change = state.p, LEVEL + i, CHANGE + i // 2
     variance = p[level, level]
     if now:
         variance += 2.0 * p[level, change] + p[change, change]
-    if _at_bound(math.exp(state.x[level])):
+    if _at_bound(ratio):
         variance = max(variance, params.sigma_mu_initial**2)
     return math.sqrt(max(variance, 0.0))
 
@@ -84,8 +90,9 @@ def _tell_friction(
         state.sigma_force = _sigma_force(params, state)
     estimate.sigma_force = state.sigma_force
     for i in range(4):
-        mu = params.mu_nominal[i] * math.exp(friction_now(state, i))
-        sigma = sigma_friction(params, state, i, True)
+        mu = params.mu_nominal[i] * remembered_exp(estimate, _NOW + i, friction_now(state, i))
+        ratio = remembered_exp(estimate, _LEVEL + i, state.x[LEVEL + i])
+        sigma = sigma_friction(params, state, i, ratio, True)
         if state.observed[i] and state.follows[i]:
             above = max(state.smooth_pressure[i], 1.0)
             sigma = math.sqrt(sigma * sigma + hydraulics.variance[i] / (above * above))
@@ -132,8 +139,8 @@ def tell_joint(
     """
     x = state.x
     estimate.started, estimate.reset, estimate.at_bound = state.started, state.reset, state.at_bound
-    estimate.speed, estimate.k_f = x[V], math.exp(x[STIFFNESS])
-    estimate.mass = params.mass * math.exp(x[MASS])
+    estimate.speed, estimate.k_f = x[V], remembered_exp(estimate, _STIFFNESS, x[STIFFNESS])
+    estimate.mass = params.mass * remembered_exp(estimate, _MASS, x[MASS])
     estimate.accel_bias, estimate.overrun = x[BIAS], x[OVERRUN]
     _tell_friction(params, state, hydraulics, estimate, learned, inputs, braking, dt)
     estimate.test_ratio_balance = _test_ratio(state, BALANCE_RATIO)

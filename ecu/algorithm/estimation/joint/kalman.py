@@ -105,9 +105,9 @@ def correct(state: Record, innovation: float, variance: float, reject: float = R
             gain = ph[i] * inverse
             for j in range(N):
                 p[i, j] -= gain * ph[j]
-    for i in range(N):
-        if not _corrects(free, i, only_speed):
-            for j in range(N):
-                if _corrects(free, j, only_speed):
+    for j in range(N):  # few are free
+        if _corrects(free, j, only_speed):
+            for i in range(N):
+                if not _corrects(free, i, only_speed):
                     p[i, j] = p[j, i]
     return ratio

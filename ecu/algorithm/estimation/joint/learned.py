@@ -79,7 +79,8 @@ def keep_joint(params: Record, state: Record, learned: Record) -> None:
             place += 1
     for i in range(4):
         mu = params.mu_nominal[i] * math.exp(learned.joint[LEVEL + i])
-        learned.mu_b[i], learned.sigma_mu_b[i] = mu, mu * sigma_friction(params, state, i, False)
+        sigma = sigma_friction(params, state, i, math.exp(state.x[LEVEL + i]), False)
+        learned.mu_b[i], learned.sigma_mu_b[i] = mu, mu * sigma
 
 
 @kernel

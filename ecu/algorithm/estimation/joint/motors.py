@@ -6,11 +6,10 @@ low-passed up to the end of the last window, independent of this window's noise,
 measurement includes the noise of the readings, estimated from their second differences.
 """
 
-import math
-
 import numpy as np
 
 from ecu.algorithm.inputs import fresh, motor_torque
+from ecu.algorithm.lag import lag_gain
 from ecu.contract.signals import MOTOR_TORQUE
 from ecu.jit import Record, kernel
 
@@ -33,7 +32,7 @@ LARGEST_STEP = 200.0  # N m between samples: beyond it the demand has stepped, w
 @kernel
 def follow_motors(state: Record, inputs: Record, dt: float) -> None:
     """Update the filters by this cycle's readings."""
-    gain = 1.0 - math.exp(-dt / SMOOTHING)
+    gain = lag_gain(dt, SMOOTHING)
     for i in range(4):
         torque = motor_torque(inputs, i)
         state.smooth[i] += gain * (torque - state.smooth[i])

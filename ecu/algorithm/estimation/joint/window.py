@@ -19,7 +19,8 @@ from ecu.algorithm.estimation.joint.sampling import (
 from ecu.algorithm.estimation.zero import note_rest
 from ecu.algorithm.hydraulics import follows_demand
 from ecu.algorithm.inputs import current, fresh, motor_torque, motor_torque_known, usable
-from ecu.algorithm.vehicle import corner_speed
+from ecu.algorithm.lag import lag_gain
+from ecu.algorithm.vehicle import corner_speed, sin_steering
 from ecu.contract.params import BAR, GRAVITY
 from ecu.contract.signals import (
     ACCEL_X,
@@ -113,14 +114,14 @@ def gather(
     if fresh(inputs, ACCEL_X):
         add_sample(state.sampling, ACCEL, motion.accel_x, 1e-9 * inputs.age_ns[ACCEL_X])
     w.change += change
-    gain = 1.0 - math.exp(-dt / SMOOTHING)
+    gain = lag_gain(dt, SMOOTHING)
     state.smooth_accel += gain * (motion.accel_x - state.smooth_accel)
-    state.mean_accel += (1.0 - math.exp(-dt / STEADY)) * (motion.accel_x - state.mean_accel)
+    state.mean_accel += lag_gain(dt, STEADY) * (motion.accel_x - state.mean_accel)
     follow_motors(state.motors, inputs, dt)
     front_lateral = params.mass * motion.accel_y * params.rear_axle / params.wheelbase
     turning = motion.yaw_rate * x[V]  # a bend shows in both, a bank or a zero in one alone
     w.across += (motion.accel_y if abs(motion.accel_y) < abs(turning) else turning) / GRAVITY
-    w.lateral += front_lateral * math.sin(motion.steering)
+    w.lateral += front_lateral * sin_steering(motion)
     for i in range(4):
         w.load[i] += load[i]
         w.motor[i] += motor_torque(inputs, i)

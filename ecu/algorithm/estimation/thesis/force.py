@@ -24,6 +24,7 @@ import numpy as np
 
 from ecu.algorithm.estimation.thesis.tyre import initial_stiffness, linear_force, tyre_force
 from ecu.algorithm.inputs import usable
+from ecu.algorithm.vehicle import cos_steering
 from ecu.contract.signals import WHEEL_FORCE_X
 from ecu.jit import Record, kernel
 
@@ -95,7 +96,7 @@ def update_force(
     for i in range(4):
         stiffness = state.stiffness * initial_stiffness(params, i, load[i])
         state.model[i] = tyre_force(stiffness, load[i], wheels.slip[i], motion.accel_y)
-        model_total += state.model[i] / math.cos(motion.steering) if i < 2 else state.model[i]
+        model_total += state.model[i] / cos_steering(motion) if i < 2 else state.model[i]
         fresh = fresh or wheels.fresh[i] != 0
     if regress and fresh and abs(model_total) > MIN_MODEL_FORCE:
         x, y, p = model_total, state.total, state.covariance

@@ -1,0 +1,21 @@
+"""First-order lags, of which every cycle has a dozen with a constant time.
+
+Where the time since the last cycle is the nominal one, the compiler knows the result.
+"""
+
+import math
+from typing import Final
+
+from ecu.contract.signals import CYCLE_NS
+from ecu.jit import kernel
+
+PERIOD: Final = 1e-9 * CYCLE_NS
+"""Nominal time between two cycles [s], as `step` computes it."""
+
+
+@kernel
+def lag_gain(dt: float, lag: float) -> float:
+    """Return which share of its way to a constant value a lag of time `lag` [s] covers in `dt` [s]."""
+    if dt == PERIOD:
+        return 1.0 - math.exp(-PERIOD / lag)
+    return 1.0 - math.exp(-dt / lag)
