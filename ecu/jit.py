@@ -50,7 +50,7 @@ _COMMENT = re.compile(rb"#[^\n]*|\\\n")
 _FROM = re.compile(
     rb"(?:^|[;:])[ \t]*from\b[ \t]*([.\w]+)[ \t]+import\b[ \t]*(\([^)]*\)|[^\n;]*)", re.MULTILINE
 )
-_KERNEL = re.compile(rb"^@(?:parallel_)?kernel\b", re.MULTILINE)
+_KERNEL = re.compile(rb"^@(?:parallel_|batch_)?kernel\b", re.MULTILINE)
 _IMPORT = re.compile(rb"(?:^|[;:])[ \t]*import\b([^\n;]*)", re.MULTILINE)
 
 
@@ -243,10 +243,7 @@ def text_digest(module: str) -> str | None:
 
 @cache
 def library(package: str) -> Library | None:
-    """Return the compiled library of a package, None without one for this processor.
-
-    `BRAKE_ECU_LIBRARY=0` leaves it aside.
-    """
+    """Return the compiled library of a package, None: none is for this processor or BRAKE_ECU_LIBRARY=0."""
     if os.environ.get("BRAKE_ECU_LIBRARY") == "0":
         return None
     spec = find_spec(package)
@@ -269,10 +266,10 @@ def compiler_version() -> str:
     return compiler().__version__ if found is None else str(found.manifest["numba"])
 
 
-def kernel(function: Function, parallel: bool = False) -> Function:
+def kernel(function: Function, parallel: bool = False, nogil: bool = False) -> Function:
     """Compile `function` with numba (no Python objects, no fastmath), unless a library has it.
 
-    What numba compiles is cached on disk.
+    What numba compiles is cached on disk. `nogil`: other threads run meanwhile.
 
     Raises:
         UserError: there is no place for the cache, or others can write to it; when it is called: it has to be
@@ -281,8 +278,13 @@ def kernel(function: Function, parallel: bool = False) -> Function:
     if interprets():
         return interpreted(function)
     if not parallel and (found := library_of(module_of(function))) is not None:
-        return cast(Function, Kernel(function, found))
-    return cast(Function, dispatcher(function, parallel))
+        return cast(Function, Kernel(function, found, nogil))
+    return cast(Function, dispatcher(function, parallel, nogil))
+
+
+def batch_kernel(function: Function) -> Function:
+    """Compile a function of long calls, beside which other threads run; the daemon's cycle calls none."""
+    return kernel(function, nogil=True)
 
 
 def module_of(function: Callable[..., Any]) -> str:
@@ -291,24 +293,25 @@ def module_of(function: Callable[..., Any]) -> str:
     return spec.name if spec else function.__module__
 
 
-def dispatcher(function: Callable[..., Any], parallel: bool = False) -> Any:
+def dispatcher(function: Callable[..., Any], parallel: bool = False, nogil: bool = False) -> Any:
     """Return numba's dispatcher of a kernel, with its cache."""
     numba = compiler()
     numba.config.CACHE_DIR = _folder(module_of(function))
-    return numba.njit(**OPTIONS, parallel=parallel)(function)
+    return numba.njit(**OPTIONS, parallel=parallel, nogil=nogil)(function)
 
 
 class Kernel:
     """A kernel of a library. What was not compiled in there, numba compiles when it is called."""
 
-    def __init__(self, function: Callable[..., Any], found: Library) -> None:
+    def __init__(self, function: Callable[..., Any], found: Library, nogil: bool) -> None:
         update_wrapper(self, function)
         self.py_func = function
-        self._name, self._library = f"{module_of(function)}.{function.__qualname__}", found
+        self._name = f"{module_of(function)}.{function.__qualname__}"
+        self._library, self._nogil = found, nogil
 
     @cached_property
     def _entries(self) -> list[Entry]:
-        return self._library.entries(self._name)
+        return self._library.entries(self._name, self._nogil)
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
         if named:
@@ -325,7 +328,7 @@ class Kernel:
     @cached_property
     def dispatcher(self) -> Any:
         """Return the kernel as numba has it, for what numba compiles and for other arguments."""
-        return dispatcher(self.py_func)
+        return dispatcher(self.py_func, nogil=self._nogil)
 
     @property
     def _numba_type_(self) -> Any:

@@ -258,7 +258,8 @@ class Library:
         self.processor = next((name for name in wanted if name in known), "")
         if not self.processor:
             raise ValueError(f"{folder}: nothing for {platform.machine()}")
-        self._file = ctypes.PyDLL(str(folder / known[self.processor]))
+        self._file = str(folder / known[self.processor])
+        self._held = ctypes.PyDLL(self._file)
         self._kernels: dict[str, list[dict[str, Any]]] = self.manifest["kernels"]
         self._sources: dict[str, str] = self.manifest["sources"]
         self._needs: dict[str, list[str]] = self.manifest["modules"]
@@ -268,11 +269,14 @@ class Library:
         needs = self._needs.get(module)
         return needs is not None and all(digest(name) == self._sources[name] for name in needs)
 
-    def entries(self, kernel: str) -> list[Entry]:
-        """Return a kernel, by its full name, for each list of arguments."""
-        found = []
+    def entries(self, kernel: str, nogil: bool = False) -> list[Entry]:
+        """Return a kernel, by its full name, for each list of arguments.
+
+        `nogil`: other threads of Python run while it is called.
+        """
+        found, file = [], ctypes.CDLL(self._file) if nogil else self._held
         for row in self._kernels.get(kernel, ()):
-            function = self._file[row["symbol"]]
+            function = file[row["symbol"]]
             function.argtypes, function.restype = [ctypes.c_void_p], ctypes.c_int
             found.append(Entry(kernel, function, _as_tuples(row["arguments"]), _as_tuples(row["returns"])))
         return found

@@ -64,5 +64,8 @@ class Seen:
 def watch() -> None:
     """Note from now on how kernels of modules that are loaded later are called; they are plain Python."""
     os.environ["NUMBA_DISABLE_JIT"] = "0"
-    noted: Any = lambda function, parallel=False: interpreted(function) if parallel else Seen(function)  # noqa: E731
+
+    def noted(function: Any, parallel: bool = False, nogil: bool = False) -> Any:
+        return interpreted(function) if parallel else Seen(function)
+
     jit.kernel = noted

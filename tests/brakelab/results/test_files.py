@@ -109,6 +109,30 @@ def test_a_run_that_fails_leaves_the_old_result_alone(tmp_path: Path, params: Re
     assert path.read_text() == "the result of yesterday"
 
 
+@pytest.mark.parametrize("blocks", [1, 2])
+def test_rows_that_cannot_be_written_leave_the_old_result_alone(
+    tmp_path: Path, params: RecordArray, monkeypatch: pytest.MonkeyPatch, blocks: int
+) -> None:
+    """Rows are encoded beside the run: it hears of a full disk with the next ones, or at its end."""
+    path = tmp_path / "drive.parquet"
+    path.write_text("the result of yesterday")
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(pq.ParquetWriter, "write_table", full)
+
+    def fail() -> None:
+        with ResultWriter(path, params) as writer:
+            for _ in range(blocks):
+                writer.write(np.arange(5) * 0.01, rows(5))
+
+    with pytest.raises(OSError, match="No space left"):
+        fail()
+    assert [file.name for file in tmp_path.iterdir()] == ["drive.parquet"]
+    assert path.read_text() == "the result of yesterday"
+
+
 @pytest.mark.parametrize("content", [None, "no Parquet"])
 def test_a_result_that_cannot_be_read_gives_one_line(tmp_path: Path, content: str | None) -> None:
     path = tmp_path / "drive.parquet"

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from brakelab.logs.log_quality import FrameBlock, LogQuality
 from brakelab.logs.text_log import DAMAGED, DATA, HEX, IS_FD_LENGTH, SKIPPED, note_line, read_text
 from ecu.contract.records import FRAME_ERROR, FRAME_EXTENDED, FRAME_FD, FRAME_REMOTE, RecordArray
-from ecu.jit import Record, kernel
+from ecu.jit import Record, batch_kernel, kernel
 
 EXAMPLE: Final = "(1600000820.298000) can0 085#7C33800047E07C7F"
 MAX_INTERFACES: Final = 16
@@ -214,7 +214,7 @@ def _parse_usual(
     return at, own
 
 
-@kernel
+@batch_kernel
 def _parse_candump(
     text: NDArray[np.uint8],
     names: NDArray[np.uint8],

@@ -276,5 +276,6 @@ def _fill(frames: RecordArray, columns: dict[str, NDArray[Any]], kind: int) -> N
         length = np.full(len(frames), width)
     frames["length"] = np.clip(length, 0, 64 if kind else min(width, 64))
     frames["data"][:, : min(width, 64)] = data[:, :64]
-    beyond = np.arange(64)[:width] >= frames["length"][:, np.newaxis]
-    frames["data"][:, : min(width, 64)][beyond] = 0
+    if len(frames) and frames["length"].min() < min(width, 64):
+        beyond = np.arange(64)[:width] >= frames["length"][:, np.newaxis]
+        frames["data"][:, : min(width, 64)][beyond] = 0

@@ -1,6 +1,7 @@
 """`brake-ecu replay`: recorded logs, one drive in the order given, through the code of the ECU."""
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from itertools import chain
 from pathlib import Path
@@ -134,7 +135,12 @@ def replay_into(
     findings = [Findings(path) for path in logs]
     recorded = recording is not None or any(kind_of(log) == "recording" for log in logs)
     size = sum(log_size(path) for path in logs)
-    with ResultWriter(out, params) as writer, progress_bar("replay", size, progress) as advance:
+    with (
+        ResultWriter(out, params) as writer,
+        progress_bar("replay", size, progress) as advance,
+        ThreadPoolExecutor(1, "brake-ecu hashes logs") as side,
+    ):
+        inputs = side.submit(lambda: [{"name": path.name, "sha256": log_hash(path)} for path in logs])
         provenance = {
             "version": __version__,
             "vehicle": vehicle.name,
@@ -142,7 +148,7 @@ def replay_into(
             "config_hash": config_hash(vehicle),
             CAR: car_of(vehicle),
             "database_hash": source.database_hash,
-            "inputs": [{"name": path.name, "sha256": log_hash(path)} for path in logs],
+            "inputs": inputs.result,
         }
         after = _run(writer, findings, params, learned, source, provenance, advance, recording)
         wrong = contradiction_lines(findings)
@@ -173,15 +179,21 @@ def _run(
     advance: Advance,
     recording: Recording | None,
 ) -> RecordArray | None:
-    """Write the rows of a drive and return what is learned after it."""
-    writer.provenance = dict(provenance)
+    """Write the rows of a drive and return what is learned after it.
+
+    `provenance`: for the writer, but a function that returns the logs' hashes, which are computed meanwhile.
+    """
+    writer.provenance = provenance.copy()
 
     def write(t: NDArray[np.float64], rows: NDArray[np.float64]) -> None:
+        writer.provenance["inputs"] = provenance["inputs"]()
         if (began_ns := findings[0].began_ns) is not None:
             writer.provenance.setdefault("start_time_ns", str(began_ns))
         writer.write(t, rows)
 
-    return replay_drive(findings, params, learned, source, write, writer.brakes.end_log, advance, recording)
+    after = replay_drive(findings, params, learned, source, write, writer.brakes.end_log, advance, recording)
+    writer.provenance["inputs"] = provenance["inputs"]()
+    return after
 
 
 def _check(logs: Sequence[Path], out: Path, cycles: Path | None) -> None:

@@ -27,7 +27,7 @@ from ecu.contract.signals import (
     N_OUTPUTS,
     USABLE,
 )
-from ecu.jit import Record, kernel
+from ecu.jit import Record, batch_kernel, kernel
 
 Block = TypeVar("Block")
 
@@ -102,7 +102,7 @@ def _close_cycle(
         samples[i] = inputs[0].value[place] if inputs[0].new[place] else np.nan
 
 
-@kernel
+@batch_kernel
 def _run_frames(
     params: Any,
     state: Any,
@@ -152,7 +152,7 @@ def _run_frames(
         run.open = 0
 
 
-@kernel
+@batch_kernel
 def _run_samples(
     params: Any,
     state: Any,

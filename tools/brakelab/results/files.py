@@ -7,6 +7,7 @@ unit, the schema's metadata the provenance (version, hashes, start, quality of t
 
 import json
 from collections.abc import Iterable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, NamedTuple
@@ -115,15 +116,29 @@ class ResultWriter:
         self.rows = 0
         self._unfinished = path.with_name(f".{path.name}.unfinished")
         self._file: pq.ParquetWriter | None = None
+        self._side = ThreadPoolExecutor(1, "brake-ecu writes rows")
+        self._writing: Future[None] | None = None
 
     def write(self, t: NDArray[np.float64], rows: NDArray[np.float64]) -> None:
-        """Append rows: `t` [s], shape (n,), `rows` in the order of `ROW_COLUMNS`, shape (n, N_ROW)."""
-        self._open().write_table(_table(ROW_SCHEMA, [t, *rows.T]))
+        """Append rows: `t` [s], shape (n,), `rows` in the order of `ROW_COLUMNS`, shape (n, N_ROW).
+
+        Another thread encodes them: both are to stay as they are.
+        """
+        self._wait()
+        file = self._open()
+        self._writing = self._side.submit(lambda: file.write_table(_table(ROW_SCHEMA, [t, *rows.T])))
         self.brakes.add(t, rows)
         self.rows += len(t)
 
+    def _wait(self) -> None:
+        """Wait for the rows that are being written; raise what that raised."""
+        writing, self._writing = self._writing, None
+        if writing is not None:
+            writing.result()
+
     def restart(self) -> None:
         """Forget what was written: the rows come once more."""
+        self._wait()
         if self._file is not None:
             self._file.close()
             self._file = None
@@ -147,10 +162,14 @@ class ResultWriter:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: object, trace: TracebackType | None) -> None:
-        if kind is not None:
+        self._side.shutdown()
+        failed = self._writing.exception() if self._writing is not None else None
+        if kind is not None or failed is not None:
             if self._file is not None:
                 self._file.close()
             self._unfinished.unlink(missing_ok=True)
+            if kind is None and failed is not None:
+                raise failed
             return
         file = self._open()
         file.add_key_value_metadata({"quality": json.dumps(self.quality), KEY: json.dumps(packed(self.pads))})
