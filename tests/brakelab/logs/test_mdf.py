@@ -42,13 +42,18 @@ def frames_of_all_kinds(count: int = 500) -> RecordArray:
 
 @pytest.mark.parametrize("window", [1 << 18, 7])
 @pytest.mark.parametrize("compression", [0, 1, 2])
+@pytest.mark.parametrize("groups", ["one", "several"])
 def test_bus_logging_gives_the_frames_back(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, window: int, compression: int
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, window: int, compression: int, groups: str
 ) -> None:
-    monkeypatch.setattr(mdf_reader, "WINDOW", window)
+    for name in ("WINDOW", "AT_ONCE", "_FEW"):
+        monkeypatch.setattr(mdf_reader, name, window)
     frames = frames_of_all_kinds()
-    frames["flags"][::50] = FRAME_ERROR
-    frames["length"][::50], frames["data"][::50], frames["can_id"][::50] = 0, 0, 0
+    if groups == "one":
+        frames["bus"] = 0
+    else:
+        frames["flags"][::50] = FRAME_ERROR
+        frames["length"][::50], frames["data"][::50], frames["can_id"][::50] = 0, 0, 0
     path = write_mdf(tmp_path / "drive.mf4", frames, ["can0", "can1", "can2"], compression)
     interfaces = ["can0", "can1", "can2"]
     found = np.concatenate(list(read_frames(path, interfaces, quality := LogQuality())))
