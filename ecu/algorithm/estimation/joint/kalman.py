@@ -82,10 +82,11 @@ def correct(state: Record, innovation: float, variance: float, reject: float = R
     total = variance
     for i in range(N):
         ph[i] = 0.0
-    for j in range(N):  # most derivatives are zero
-        if h[j] != 0.0:
+    for j in range(N):
+        derivative = h[j]  # read once: the compiler cannot know that it is not in `ph`
+        if derivative != 0.0:  # most are
             for i in range(N):
-                ph[i] += p[j, i] * h[j]
+                ph[i] += p[j, i] * derivative
     for i in range(N):
         total += ph[i] * h[i]
     ratio = innovation * innovation / total
