@@ -45,6 +45,11 @@ def smooth(values: Vector) -> Vector:
     return np.convolve(padded, np.full(width, 1.0 / width), mode="valid")
 
 
+def _product(one: Vector, other: Vector) -> float:
+    """Return the scalar product; BLAS would have threads wait for each, busily."""
+    return float(np.einsum("i,i", one, other))
+
+
 def fit(signal: Vector, reference: Vector, rows: NDArray[np.bool_]) -> Fit:
     """Return the line of the best of a few lags between a signal and its expected value."""
     best, places = Fit(0.0, 0.0, 0.0), np.flatnonzero(rows)
@@ -54,13 +59,13 @@ def fit(signal: Vector, reference: Vector, rows: NDArray[np.bool_]) -> Fit:
     r = reference[places]
     mean = float(r.mean())
     r -= mean
-    size = float(np.dot(r, r))
+    size = _product(r, r)
     padded = np.pad(signal, LAGS[-1], mode="wrap")
     for lag in LAGS:
         s = padded[places + (LAGS[-1] - lag)]
         level = float(s.mean())
         s -= level
-        both, own = float(np.dot(s, r)), float(np.dot(s, s))
+        both, own = _product(s, r), _product(s, s)
         if own == 0.0 or size == 0.0:
             continue
         correlation = both / float(np.sqrt(own * size))
