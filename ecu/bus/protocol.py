@@ -1,6 +1,8 @@
 """Bus interface of the cycle: drain received frames, send without blocking, report the line's status."""
 
-from typing import NamedTuple, Protocol
+from typing import Final, NamedTuple, Protocol
+
+import numpy as np
 
 from ecu.contract.records import RecordArray
 
@@ -14,6 +16,10 @@ class BusStatus(NamedTuple):
     """Frames that were not taken, or not acknowledged, so far."""
     dropped: int
     """Received frames that the kernel dropped so far."""
+
+
+STATUS: Final = np.dtype([(name, "i8") for name in BusStatus._fields])
+"""The same as kernels have it."""
 
 
 class Channel(Protocol):

@@ -1,26 +1,25 @@
-"""SocketCAN drained in one burst: `recvmmsg` into preallocated memory, parsed by a kernel into frames.
+"""SocketCAN drained in one burst: kernels call `recvmmsg` and `sendmmsg` on preallocated memory.
 
-The socket is the one that python-can opened. The kernel filters by identifier, stamps every frame (cut to
+The socket is the one that python-can opened. Linux filters by identifier, stamps every frame (cut to
 whole microseconds, as in candump logs), counts the frames it dropped (SO_RXQ_OVFL) and reports the
 controller's state in error frames: during bus-off it accepts frames to send without an error, so only error
 frames reveal it.
 """
 
-import ctypes
 import errno
 import select
 import socket
 import struct
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
-import can
 import numpy as np
 from numpy.typing import NDArray
 
-from ecu.bus.protocol import BusStatus
+from ecu.bus.protocol import STATUS, BusStatus
 from ecu.contract.records import EXTENDED_ID, FRAME, FRAME_EXTENDED, FRAME_FD, RecordArray, new_record
 from ecu.errors import UserError
 from ecu.jit import kernel
+from ecu.system_calls import errno_location, memcpy, recvmmsg, sendmmsg
 
 BURST: Final = 128  # frames per system call: a 500 kbit/s bus carries 45 in a cycle
 RECEIVE_BUFFER: Final = 4 << 20  # bytes: about 5000 frames, a second of a saturated bus
@@ -33,6 +32,9 @@ _CRTL_WARNING, _CRTL_PASSIVE, _CRTL_ACTIVE = 0x0C, 0x30, 0x40
 _CAN_RAW_ERR_FILTER = 2
 _SO_RCVBUFFORCE, _SO_TIMESTAMPNS, _SO_RXQ_OVFL = 33, 35, 40
 _CAN_MTU, _CANFD_MTU = 16, 72
+_MSG_DONTWAIT = 0x40  # linux/socket.h
+_DOWN_ERRORS: Final = (errno.ENETDOWN, errno.ENODEV, errno.ENXIO)
+_ENETDOWN: Final = errno.ENETDOWN
 
 # struct msghdr and mmsghdr, struct iovec, struct canfd_frame (a can_frame is its first 16 bytes)
 _MESSAGE: Final = np.dtype(
@@ -53,35 +55,60 @@ _WIRE: Final = np.dtype(
     [("can_id", "u4"), ("length", "u1"), ("flags", "u1"), ("spare", "u2"), ("data", "u1", (64,))]
 )
 _CONTROL_BYTES: Final = 64  # a timespec (32 with its header) and a counter (24)
-# State of the line as found by a kernel; indices in an array.
-_BUS_OFF, _PASSIVE, _NOT_ACKNOWLEDGED, _DROPPED = range(4)
+# State of the line as found by kernels; indices in an array. Gone: the interface was removed.
+_BUS_OFF, _PASSIVE, _NOT_ACKNOWLEDGED, _DROPPED, _DOWN, _GONE, _FAILURES, _ERRNO = range(8)
 
 
-class _Burst:
+class Burst(NamedTuple):
     """Preallocated memory of one `recvmmsg` or `sendmmsg`."""
 
-    def __init__(self, control_bytes: int) -> None:
-        self.messages = np.zeros(BURST, _MMESSAGE)
-        self.vectors = np.zeros(BURST, _IOVEC)
-        self.wire = np.zeros(BURST, _WIRE)
-        self.control: NDArray[np.int64] = np.zeros((BURST, control_bytes // 8), np.int64)
-        every = np.arange(BURST, dtype=np.uintp)
-        self.vectors["base"] = self.wire.ctypes.data + every * _WIRE.itemsize
-        self.vectors["length"] = _CANFD_MTU
-        header = self.messages["header"]
-        header["iov"] = self.vectors.ctypes.data + every * _IOVEC.itemsize
-        header["iov_length"] = 1
-        if control_bytes:
-            header["control"] = self.control.ctypes.data + every * control_bytes
-            header["control_length"] = control_bytes
-        self.address = self.messages.ctypes.data
+    messages: RecordArray
+    vectors: RecordArray
+    wire: RecordArray
+    control: NDArray[np.int64]
+
+
+class Socket(NamedTuple):
+    """A socket as kernels have it."""
+
+    handle: int
+    """-1: none; nothing comes in, nothing is taken."""
+    incoming: Burst
+    outgoing: Burst
+    line: NDArray[np.int64]
+    """State of the line."""
+
+
+def _new_burst(control_bytes: int) -> Burst:
+    burst = Burst(
+        np.zeros(BURST, _MMESSAGE),
+        np.zeros(BURST, _IOVEC),
+        np.zeros(BURST, _WIRE),
+        np.zeros((BURST, control_bytes // 8), np.int64),
+    )
+    every = np.arange(BURST, dtype=np.uintp)
+    burst.vectors["base"] = burst.wire.ctypes.data + every * _WIRE.itemsize
+    burst.vectors["length"] = _CANFD_MTU
+    header = burst.messages["header"]
+    header["iov"] = burst.vectors.ctypes.data + every * _IOVEC.itemsize
+    header["iov_length"] = 1
+    if control_bytes:
+        header["control"] = burst.control.ctypes.data + every * control_bytes
+        header["control_length"] = control_bytes
+    return burst
+
+
+def new_socket(handle: int = -1) -> Socket:
+    """Return the memory for a socket."""
+    return Socket(handle, _new_burst(_CONTROL_BYTES), _new_burst(0), np.zeros(8, np.int64))
 
 
 def prepare_kernels() -> None:
     """Load or compile the kernels of a channel, which afterwards compiles nothing."""
-    incoming, outgoing, frames = _Burst(_CONTROL_BYTES), _Burst(0), new_record(FRAME)
-    _parse(incoming.messages, incoming.wire, incoming.control, 0, frames, 0, np.zeros(4, np.int64))
-    _format(frames, 0, 0, outgoing.wire, outgoing.vectors)
+    none, frames = new_socket(), new_record(FRAME)
+    receive_frames(none, frames, 0)
+    send_frames(none, frames, 1)
+    read_status(none, new_record(STATUS))
 
 
 class SocketcanChannel:
@@ -91,78 +118,43 @@ class SocketcanChannel:
         if np.dtype(np.uintp).itemsize != 8:
             raise UserError(name, "", "SocketCAN needs a 64-bit system")
         self.name = name
-        self._bus: can.BusABC = bus
+        self._bus = bus
         self._socket: socket.socket = bus.socket
         self._wanted = receive_ids
         _configure(self._socket, receive_ids)
-        self._handle = self._socket.fileno()
-        libc = ctypes.CDLL(None, use_errno=True)
-        pointer, count, number = ctypes.c_void_p, ctypes.c_uint, ctypes.c_int
-        self._recvmmsg, self._sendmmsg = libc.recvmmsg, libc.sendmmsg
-        self._recvmmsg.argtypes = (number, pointer, count, number, pointer)
-        self._sendmmsg.argtypes = (number, pointer, count, number)
-        self._incoming, self._outgoing = _Burst(_CONTROL_BYTES), _Burst(0)
-        self._line: NDArray[np.int64] = np.zeros(4, np.int64)
-        self._failures, self._down, self._gone = 0, False, False
+        self.memory = new_socket(self._socket.fileno())
+        self._status = new_record(STATUS)
         self._discard()
         prepare_kernels()
 
     def drain(self, frames: RecordArray, start: int) -> int:
         """See `Channel`. Error frames change the status and are not returned."""
-        if self._gone:
-            self._bind_again()
-        incoming, count = self._incoming, 0
-        while (room := len(frames) - start - count) > 0:
-            got = self._recvmmsg(self._handle, incoming.address, min(BURST, room), socket.MSG_DONTWAIT, None)
-            if got <= 0:
-                self._note_error(ctypes.get_errno())
-                break
-            self._down = False
-            count += _parse(
-                incoming.messages, incoming.wire, incoming.control, got, frames, start + count, self._line
-            )
-            if got < BURST:
-                break
-        return count
+        self.bind_again()
+        return receive_frames(self.memory, frames, start)
 
     def send(self, frames: RecordArray, count: int) -> int:
         """See `Channel`. Frames that the kernel does not take at once are counted as failed and dropped."""
-        outgoing, taken = self._outgoing, 0
-        while taken < count:
-            part = min(BURST, count - taken)
-            _format(frames, taken, part, outgoing.wire, outgoing.vectors)
-            sent = self._sendmmsg(self._handle, outgoing.address, part, socket.MSG_DONTWAIT)
-            if sent < 0:
-                self._note_error(ctypes.get_errno())
-            else:
-                self._down = False
-                taken += sent
-            if sent < part:
-                self._failures += count - taken
-                break
-        return taken
+        return send_frames(self.memory, frames, count)
 
-    def _note_error(self, number: int) -> None:
-        if number in (errno.ENETDOWN, errno.ENODEV, errno.ENXIO):
-            self._down = True
-            self._gone = self._gone or number != errno.ENETDOWN
-
-    def _bind_again(self) -> None:
-        """Bind to the interface of this name, which was removed (a USB adapter, say) and may be back.
+    def bind_again(self) -> None:
+        """Bind to the interface of this name if it was removed (a USB adapter, say) and may be back.
 
         The socket's filters went with it.
         """
+        if not self.memory.line[_GONE]:
+            return
         try:
             _configure(self._socket, self._wanted)
             self._socket.bind((self.name,))
         except OSError:
             return
-        self._gone = False
+        self.memory.line[_GONE] = 0
 
     def status(self) -> BusStatus:
         """See `Channel`. An interface that is down counts as bus off."""
-        off, passive, unacknowledged, dropped = self._line.tolist()
-        return BusStatus(bool(off) or self._down, bool(passive), self._failures + unacknowledged, dropped)
+        read_status(self.memory, self._status)
+        off, passive, failures, dropped = self._status[0].tolist()
+        return BusStatus(bool(off), bool(passive), failures, dropped)
 
     def close(self) -> None:
         """See `Channel`."""
@@ -194,6 +186,68 @@ def _configure(handle: socket.socket, receive_ids: frozenset[int]) -> None:
         handle.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, RECEIVE_BUFFER)
     except PermissionError:
         handle.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+
+
+@kernel
+def receive_frames(line_socket: Socket, frames: RecordArray, start: int) -> int:
+    """Write all frames that wait in the socket from `frames[start]` on; return their number."""
+    handle, line = line_socket.handle, line_socket.line
+    messages, _, wire, control = line_socket.incoming
+    count = 0
+    while start + count < len(frames):
+        room = min(BURST, len(frames) - start - count)
+        got = recvmmsg(handle, messages.ctypes.data, room, _MSG_DONTWAIT, 0)
+        if got <= 0:
+            _note_error(line)
+            break
+        line[_DOWN] = 0
+        count += _parse(messages, wire, control, got, frames, start + count, line)
+        if got < BURST:
+            break
+    return count
+
+
+@kernel
+def send_frames(line_socket: Socket, frames: RecordArray, count: int) -> int:
+    """Hand over the first `count` frames; return how many were taken, the others count as failed."""
+    handle, line = line_socket.handle, line_socket.line
+    messages, vectors, wire, _ = line_socket.outgoing
+    taken = 0
+    while taken < count:
+        part = min(BURST, count - taken)
+        _format(frames, taken, part, wire, vectors)
+        sent = sendmmsg(handle, messages.ctypes.data, part, _MSG_DONTWAIT)
+        if sent < 0:
+            _note_error(line)
+        else:
+            line[_DOWN] = 0
+            taken += sent
+        if sent < part:
+            line[_FAILURES] += count - taken
+            break
+    return taken
+
+
+@kernel
+def _note_error(line: NDArray[np.int64]) -> None:
+    """Update the line's state by the number of the system call's error."""
+    line[_ERRNO] = 0
+    memcpy(line.ctypes.data + 8 * _ERRNO, errno_location(), 4)
+    number = line[_ERRNO]
+    if number in _DOWN_ERRORS:
+        line[_DOWN] = 1
+        if number != _ENETDOWN:
+            line[_GONE] = 1
+
+
+@kernel
+def read_status(line_socket: Socket, status: RecordArray) -> None:
+    """Write the line's status to `STATUS`, shape (1,)."""
+    line, now = line_socket.line, status[0]
+    now.bus_off = 1 if line[_BUS_OFF] or line[_DOWN] else 0
+    now.error_passive = line[_PASSIVE]
+    now.send_failures = line[_FAILURES] + line[_NOT_ACKNOWLEDGED]
+    now.dropped = line[_DROPPED]
 
 
 @kernel

@@ -214,7 +214,7 @@ CONTROL = {
 
 @pytest.mark.parametrize(("words", "expected"), CONTROL.values(), ids=CONTROL)
 def test_stamp_and_drop_counter_are_read_from_any_order(words, expected):
-    burst, frames, line = socketcan._Burst(64), new_record(FRAME), np.zeros(4, np.int64)
+    burst, frames, line = socketcan.new_socket().incoming, new_record(FRAME), np.zeros(4, np.int64)
     burst.messages["header"]["control_length"][0] = 8 * len(words)
     burst.messages["length"][0] = 16
     burst.wire["can_id"][0], burst.wire["length"][0], burst.wire["data"][0] = 0x123, 8, 0xAA
