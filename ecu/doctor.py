@@ -29,7 +29,7 @@ from ecu.contract.records import FRAME, INPUTS, new_record
 from ecu.contract.signals import CYCLE_NS, INPUT_SIGNALS
 from ecu.errors import UserError
 from ecu.output import give, say
-from ecu.runtime.cycle import new_ecu
+from ecu.runtime.memory import new_ecu
 from ecu.runtime.warm_up import warm_up
 from ecu.settings.config import load_config, new_params
 from ecu.settings.resources import resource

@@ -25,7 +25,7 @@ from ecu.bus.socketcan import prepare_kernels
 from ecu.bus.transmit import contract_transmit_plan
 from ecu.contract.records import FRAME, INPUTS, LEARNED, new_record
 from ecu.contract.signals import CYCLE_NS
-from ecu.runtime.cycle import new_ecu
+from ecu.runtime.memory import new_ecu
 from ecu.settings.config import load_config, new_params
 from ecu.settings.resources import resource
 from ecu.warm import warm

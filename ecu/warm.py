@@ -11,7 +11,7 @@ from typing import Final
 from ecu.bus.signal_map import receive_plan
 from ecu.bus.transmit import contract_transmit_plan
 from ecu.jit import CompileCounter
-from ecu.runtime.cycle import new_ecu
+from ecu.runtime.memory import new_ecu
 from ecu.runtime.warm_up import warm_up
 from ecu.settings.config import load_config, new_params
 from ecu.settings.resources import resource

@@ -22,7 +22,8 @@ from ecu.bus.transmit import contract_transmit_plan
 from ecu.contract import faults
 from ecu.contract.signals import CYCLE_NS, INPUT, INPUT_SIGNALS
 from ecu.doctor import OPTIONAL
-from ecu.runtime.cycle import FAREWELLS, GIVEN_UP_NS
+from ecu.runtime.cycle import FAREWELLS
+from ecu.runtime.loop import GIVEN_UP_NS
 from ecu.runtime.prepare import LISTEN_S
 from ecu.runtime.standby import SILENCE_NS
 

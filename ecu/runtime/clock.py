@@ -5,7 +5,7 @@ did (a stopped process, a paused virtual machine, a suspended machine, whose tim
 counts): a cycle's deadline T_k is the last one on the grid when it wakes, never one from before the sleep.
 
 The frames' stamps are of the real-time clock, which can be set at any time. A run keeps the time line on
-which it began, real time at its start plus monotonic time since; `Grid.follow_realtime` tells by how much the
+which it began, real time at its start plus monotonic time since; `follow_realtime` tells by how much the
 real-time clock has been set, and the cycle takes that off the stamps.
 """
 
@@ -20,7 +20,9 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ecu.contract.records import RecordArray, new_record
 from ecu.contract.signals import CYCLE_NS
+from ecu.jit import kernel
 
 MICROSECOND_NS: Final = 1000
 
@@ -84,16 +86,39 @@ class Tick(NamedTuple):
     """How long after its deadline the cycle woke; if periods were missed, after the first of theirs."""
 
 
+TIME_LINE: Final = np.dtype(
+    [
+        ("offset_ns", "i8"),  # real time at the start less monotonic time: the time line, for the whole run
+        ("spread_ns", "i8"),  # time that the reading took
+        ("set_ns", "i8"),  # by how much the real-time clock has been set since the start, whole microseconds
+    ]
+)
+
+
+@kernel
+def follow_realtime(line: RecordArray, before_ns: int, real_ns: int, after_ns: int) -> None:
+    """Update the set time of a `TIME_LINE`, shape (1,), by a reading of real time between two of monotonic
+    time.
+
+    It changes only if the real-time clock was set: a sleep between the readings falsifies them.
+    """
+    known = line[0]
+    offset_ns, spread_ns = real_ns - (before_ns + after_ns) // 2, after_ns - before_ns
+    if abs(offset_ns - known.offset_ns - known.set_ns) > spread_ns + known.spread_ns + MICROSECOND_NS:
+        known.set_ns = (offset_ns - known.offset_ns) // MICROSECOND_NS * MICROSECOND_NS
+        known.spread_ns = spread_ns
+
+
 class Grid:
     """Deadlines every `period_ns`, the first one a period after the start."""
 
     def __init__(self, source: TimeSource, period_ns: int = CYCLE_NS) -> None:
         self.source, self.period_ns = source, period_ns
         self.deadline_ns = source.monotonic_ns()
-        self.offset_ns, self._spread_ns = self._sample_offset()
-        """Real time at the start less monotonic time: the time line, for the whole run."""
-        self.set_ns = 0
-        """By how much the real-time clock has been set since the start, whole microseconds."""
+        before_ns, real_ns, after_ns = self._read()
+        self.offset_ns = real_ns - (before_ns + after_ns) // 2
+        self.line = new_record(TIME_LINE)
+        self.line["offset_ns"], self.line["spread_ns"] = self.offset_ns, after_ns - before_ns
 
     def wait(self) -> Tick:
         """Sleep until the next deadline; a signal may interrupt the sleep, which then continues."""
@@ -108,20 +133,14 @@ class Grid:
         t_ns = (self.deadline_ns + self.offset_ns) // MICROSECOND_NS * MICROSECOND_NS
         return Tick(t_ns, self.deadline_ns, (self.deadline_ns - due_ns) // period, now - due_ns)
 
-    def _sample_offset(self) -> tuple[int, int]:
-        before = self.source.monotonic_ns()
-        real = self.source.realtime_ns()
-        after = self.source.monotonic_ns()
-        return real - (before + after) // 2, after - before
+    def _read(self) -> tuple[int, int, int]:
+        """Return monotonic, real and again monotonic time [ns]."""
+        return self.source.monotonic_ns(), self.source.realtime_ns(), self.source.monotonic_ns()
 
     def follow_realtime(self) -> int:
-        """Return `set_ns` as it is now. It changes only if the real-time clock was set: a sleep between the
-        two readings falsifies them."""
-        offset, spread = self._sample_offset()
-        if abs(offset - self.offset_ns - self.set_ns) > spread + self._spread_ns + MICROSECOND_NS:
-            self.set_ns = (offset - self.offset_ns) // MICROSECOND_NS * MICROSECOND_NS
-            self._spread_ns = spread
-        return self.set_ns
+        """Return by how much the real-time clock has been set since the start [ns]."""
+        follow_realtime(self.line, *self._read())
+        return int(self.line["set_ns"][0])
 
 
 class Welford:

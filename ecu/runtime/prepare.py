@@ -34,12 +34,12 @@ from ecu.recording.recorder import interface_name, layout
 from ecu.recording.restored import restored
 from ecu.recording.revisions import DAMAGED
 from ecu.recording.ring import Ring, create_ring, remove_ring, ring_path
-from ecu.runtime.cycle import Ecu, new_ecu
 from ecu.runtime.diagnostics import checked_settings
+from ecu.runtime.memory import Ecu, new_ecu
 from ecu.runtime.notify import Manager
 from ecu.runtime.realtime import freeze_memory, make_realtime
 from ecu.runtime.side import Side
-from ecu.runtime.standby import Standby, learned_by_first
+from ecu.runtime.standby import learned_by_first
 from ecu.runtime.start import lower_priority
 from ecu.runtime.warm_up import warm_up
 from ecu.settings.config import Config, config_hash, load_config, new_params, store_key
@@ -82,7 +82,8 @@ class Session(NamedTuple):
     ring: Ring
     side: Side
     compiled: CompileCounter
-    standby: Standby | None
+    waits: bool
+    """A standby, or a silent run: it hears no first one, as it has no frames."""
     manager: Manager
 
 
@@ -198,8 +199,7 @@ def prepare(options: RunOptions) -> Session:
         structlog.get_logger("ecu").warning(
             "not_notified", remedy=f"NOTIFY_SOCKET is {os.environ['NOTIFY_SOCKET']}: unset it or mend it"
         )
-    waits = options.standby or options.silent  # a silent one hears no first one, as it has no frames
-    return Session(ecu, channel, ring, side, compiled, Standby() if waits else None, manager)
+    return Session(ecu, channel, ring, side, compiled, options.standby or options.silent, manager)
 
 
 def _check_sending(options: RunOptions, config: Config, sending: TransmitPlan) -> None:

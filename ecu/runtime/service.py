@@ -15,7 +15,7 @@ from ecu.errors import RunFault
 from ecu.recording.log import configure_logging
 from ecu.recording.ring import close_ring, remove_ring
 from ecu.runtime.clock import Grid, system_time
-from ecu.runtime.cycle import Progress, Watch, cycle_once, send_farewell
+from ecu.runtime.cycle import Progress, cycle_once, send_farewell
 from ecu.runtime.prepare import RunOptions, Session, prepare
 from ecu.runtime.start import ENDING, IGNORED, left_at_once, signal_name
 
@@ -44,7 +44,7 @@ def run(options: RunOptions) -> int:
         signal.signal(number, signal.SIG_IGN)
     with left_at_once():
         session = prepare(options)
-    progress = Progress(Watch(session.channel.status(), session.compiled), session.standby)
+    progress = Progress(session.channel.status(), session.compiled, waits=session.waits)
     words: dict[str, Any] = {}
     off = False
     try:
@@ -77,7 +77,7 @@ def _cycle_until(session: Session, progress: Progress, stopping: list[int]) -> N
     while not stopping:
         cycle_once(session.ecu, session.channel, session.ring, grid, progress)
         if progress.number % LOOK_AT_SIDE_CYCLES == 0:
-            progress.watch.kept = session.side.look(grid.deadline_ns)
+            progress.loop["kept"] = session.side.look(grid.deadline_ns)
             session.ring.header["followed"] = session.side.followed
         if watchdog and progress.number % watchdog == 0:
             session.manager.tell("WATCHDOG=1")

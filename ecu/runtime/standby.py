@@ -6,7 +6,7 @@ monotonic clock, and falls silent again in the cycle in which it hears one: two 
 must have heard a first daemon, so two started together do not race; without one it stays silent. One standby
 per bus: two of them would take over together.
 
-When a sending daemon hears another sender of its frames, precedence decides (`Claim`): a newcomer yields and
+When a sending daemon hears another sender of its frames, precedence decides (`CLAIM`): a newcomer yields and
 continues as a standby, an established one stays. One that stood still while another spoke yields before it
 sends. Reasons: docs/safety.md.
 
@@ -26,10 +26,10 @@ from numpy.typing import NDArray
 from ecu.bus.foreign import another_ecu_speaks, is_intact, place_of_ours
 from ecu.bus.protection import frame_count
 from ecu.bus.transmit import Transmission, TransmitPlan
-from ecu.contract.records import RecordArray
+from ecu.contract.records import RecordArray, new_record
 from ecu.contract.signals import CYCLE_NS
 from ecu.errors import UserError
-from ecu.jit import kernel
+from ecu.jit import Record, kernel
 from ecu.recording.learned_range import out_of_range
 from ecu.recording.ring import RingReader, living_rings
 
@@ -37,6 +37,8 @@ SILENCE_NS: Final = 50_000_000
 """Five cycles without a frame of the first one."""
 SPREAD_CYCLES: Final = 16
 """Upper bound of the random extra cycles of two that yielded to each other: one becomes first."""
+DRAWS: Final = 64
+"""Drawn at the start: a kernel of the cycle has no source of chance."""
 NEWCOMER_CYCLES: Final = 200
 """After two seconds of sending a daemon is established: a new one has heard it, and refused."""
 BESIDE_CYCLES: Final = 10
@@ -44,44 +46,77 @@ BESIDE_CYCLES: Final = 10
 delayed frames come in one."""
 
 
-class Claim:
-    """Rule by which a sending daemon yields to another sender of its frames."""
+CLAIM: Final = np.dtype(
+    [
+        ("spoken", "i8"),  # cycles since the start, or since receivers missed us
+        ("beside", "i8"),  # of these with another sender, those without taken off
+    ]
+)
+STANDBY: Final = np.dtype(
+    [
+        ("waits", "i8"),  # 1: a standby, or one that yielded
+        ("speaks", "i8"),
+        ("heard", "i8"),  # 1: a first daemon, at `heard_ns`
+        ("heard_ns", "i8"),  # T_k on the monotonic clock
+        ("silence_ns", "i8"),  # after which it speaks
+        ("yielded", "i8"),  # 1: to another that may do the same
+        ("drawn", "i8"),  # how many `extra` were used
+        ("extra", "i8", (DRAWS,)),  # random cycles beyond `SILENCE_NS`, in turn
+    ],
+    align=True,
+)
 
-    def __init__(self) -> None:
-        self._spoken = self._beside = 0
 
-    def is_lost(self, beside: int, missed: int) -> bool:
-        """Add a cycle after `missed` periods; in `beside` of all these another ECU was heard."""
-        if missed * CYCLE_NS >= SILENCE_NS:  # receivers missed us: a take-over was legitimate
-            self._spoken = 0
-        self._spoken += 1
-        before = self._beside
-        self._beside = before + min(beside, missed + 1) if beside else max(0, before - 1)
-        newcomer = self._spoken <= NEWCOMER_CYCLES + BESIDE_CYCLES
-        return newcomer and before < BESIDE_CYCLES <= self._beside
+def new_standby(*, waits: bool) -> RecordArray:
+    """Return the state of a daemon that is a standby, or sends."""
+    standby = new_record(STANDBY)
+    standby["waits"], standby["speaks"], standby["silence_ns"] = waits, not waits, SILENCE_NS
+    standby["extra"] = random.choices(range(SPREAD_CYCLES), k=DRAWS)
+    return standby
 
 
-class Standby:
-    """State of the second daemon. `yielded`: to another that may do the same."""
+@kernel
+def claim_is_lost(claim: Record, beside: int, missed: int) -> bool:
+    """Add a cycle after `missed` periods; return whether a sending daemon yields.
 
-    def __init__(self, *, yielded: bool = False) -> None:
-        self.speaks = False
-        self._heard_ns: int | None = None
-        self._yielded = yielded
-        self._silence_ns = self._draw()
+    In `beside` of all these periods another ECU was heard.
+    """
+    if missed * CYCLE_NS >= SILENCE_NS:  # receivers missed us: a take-over was legitimate
+        claim.spoken = 0
+    claim.spoken += 1
+    before = claim.beside
+    claim.beside = before + min(beside, missed + 1) if beside else max(0, before - 1)
+    newcomer = claim.spoken <= NEWCOMER_CYCLES + BESIDE_CYCLES
+    return newcomer and before < BESIDE_CYCLES <= claim.beside
 
-    def _draw(self) -> int:
-        return SILENCE_NS + (random.randrange(SPREAD_CYCLES) * CYCLE_NS if self._yielded else 0)
 
-    def listen(
-        self, plan: TransmitPlan, sent: Transmission, frames: RecordArray, count: int, now_ns: int
-    ) -> None:
-        """Check the first `count` waiting frames; `now_ns` is T_k on the monotonic clock."""
-        if _adopt_counters(plan, sent, frames, count):
-            self._heard_ns = now_ns
-            if self.speaks:
-                self._silence_ns = self._draw()
-        self.speaks = self._heard_ns is not None and now_ns - self._heard_ns >= self._silence_ns
+@kernel
+def yield_to_other(standby: Record) -> None:
+    """Become the standby of another that may do the same."""
+    standby.waits = standby.yielded = 1
+    standby.speaks = 0
+    _draw(standby)
+
+
+@kernel
+def _draw(standby: Record) -> None:
+    standby.silence_ns = SILENCE_NS
+    if standby.yielded:
+        standby.silence_ns += standby.extra[standby.drawn % DRAWS] * CYCLE_NS
+        standby.drawn += 1
+
+
+@kernel
+def listen(
+    standby: Record, plan: TransmitPlan, sent: Transmission, frames: RecordArray, count: int, now_ns: int
+) -> None:
+    """Check the first `count` waiting frames; `now_ns` is T_k on the monotonic clock."""
+    if _adopt_counters(plan, sent, frames, count):
+        standby.heard, standby.heard_ns = 1, now_ns
+        if standby.speaks:
+            _draw(standby)
+    silent = standby.heard != 0 and now_ns - standby.heard_ns >= standby.silence_ns
+    standby.speaks = 1 if silent else 0
 
 
 @kernel

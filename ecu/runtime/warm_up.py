@@ -10,8 +10,8 @@ from ecu.contract.signals import CYCLE_NS
 from ecu.jit import CompileCounter
 from ecu.recording.ring import create_ring
 from ecu.runtime.clock import Grid, TimeSource
-from ecu.runtime.cycle import Ecu, Progress, Watch, cycle_once, new_ecu
-from ecu.runtime.standby import Standby
+from ecu.runtime.cycle import Progress, cycle_once
+from ecu.runtime.memory import Ecu, new_ecu
 
 
 class Silence:
@@ -42,7 +42,7 @@ def warm_up(ecu: Ecu, compiled: CompileCounter) -> None:
         ring = create_ring(Path(folder) / "ring", {}, b"", slots=2, frames=1)
         instants = itertools.count(0, CYCLE_NS // 100)
         grid = Grid(TimeSource(instants.__next__, instants.__next__, lambda _: None))
-        for standby in (None, Standby()):
-            progress = Progress(Watch(Silence().status(), compiled), standby)
+        for waits in (False, True):
+            progress = Progress(Silence().status(), compiled, waits=waits)
             for _ in range(3):
                 cycle_once(twin, Silence(), ring, grid, progress)

@@ -20,7 +20,9 @@ from ecu.contract.signals import CYCLE_NS, INPUT, N_INPUTS
 from ecu.jit import CompileCounter
 from ecu.recording.ring import RingReader, create_ring
 from ecu.runtime.clock import Grid, TimeSource
-from ecu.runtime.cycle import HOLD_CYCLES, Progress, Watch, cycle_once, new_ecu, send_farewell
+from ecu.runtime.cycle import Progress, cycle_once, send_farewell
+from ecu.runtime.loop import HOLD_CYCLES
+from ecu.runtime.memory import new_ecu
 from ecu.runtime.warm_up import warm_up
 from ecu.settings.config import load_config, new_params
 
@@ -53,7 +55,7 @@ class Bench:
         self.reader = RingReader(self.ring.path)
         compiled = CompileCounter()
         warm_up(self.ecu, compiled)
-        self.progress = Progress(Watch(FINE, compiled))
+        self.progress = Progress(FINE, compiled)
         self.speaks = True
 
     def sleep(self, until_ns: int) -> None:
@@ -144,9 +146,9 @@ def test_a_frame_stamped_after_the_deadline_waits_for_the_next_cycle(bench):
     bench.sleep = lambda until_ns: setattr(bench, "now_ns", until_ns + MS)
     bench.grid.source = bench.grid.source._replace(sleep_until=bench.sleep)
     assert bench.run()["frames"] == 3
-    assert bench.progress.waiting == count - 3
+    assert bench.progress.loop["waiting"][0] == count - 3
     cycle = bench.run()
-    assert (cycle["frames"], cycle["late_frames"], bench.progress.waiting) == (count - 3, 0, 0)
+    assert (cycle["frames"], cycle["late_frames"], bench.progress.loop["waiting"][0]) == (count - 3, 0, 0)
 
 
 def test_a_frame_that_came_late_is_taken_and_counted(bench):
@@ -270,7 +272,7 @@ def test_a_clock_that_is_set_changes_nothing_but_its_own_record(braking, step_s,
         stamps += np.unique(braking.reader.read().frames["stamp_ns"]).tolist()
     assert len(set(modes)) == 1
     assert (np.diff(stamps) == CYCLE_NS).all()
-    assert braking.progress.waiting == 0
+    assert braking.progress.loop["waiting"][0] == 0
 
 
 def rose(**change):
@@ -311,7 +313,7 @@ def test_a_second_sender_of_our_frames_is_a_fault(bench):
 
 def test_a_compilation_in_operation_is_a_fault(bench):
     bench.run(3)
-    bench.progress.watch._compiled.count += 1
+    bench.progress._compiled.count += 1
     bench.run()
     assert bench.faults() == faults.COMPILED
 

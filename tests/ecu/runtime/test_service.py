@@ -74,7 +74,7 @@ def test_whatever_ends_the_loop_first_the_farewell_then_the_last_words(
         ring=SimpleNamespace(path=None),
         side=SimpleNamespace(await_end=lambda patience_s: done.append("side ended")),
         compiled=SimpleNamespace(count=0),
-        standby=None,
+        waits=False,
         manager=SimpleNamespace(tell=done.append),
     )
     monkeypatch.setattr(service, "prepare", lambda options: session)

@@ -20,8 +20,16 @@ from ecu.jit import CompileCounter
 from ecu.recording import ring as ring_module
 from ecu.recording.ring import RingReader, create_ring, publish
 from ecu.runtime.clock import Grid, TimeSource
-from ecu.runtime.cycle import Progress, Watch, cycle_once, new_ecu
-from ecu.runtime.standby import SILENCE_NS, Claim, Standby, learned_by_first
+from ecu.runtime.cycle import Progress, cycle_once
+from ecu.runtime.memory import new_ecu
+from ecu.runtime.standby import (
+    CLAIM,
+    SILENCE_NS,
+    claim_is_lost,
+    learned_by_first,
+    listen,
+    new_standby,
+)
 from ecu.settings.config import load_config, new_params
 
 ROOT = Path(__file__).parents[3]
@@ -34,12 +42,12 @@ MS = 1_000_000
 def listened(*heard_ms: int) -> list[int]:
     """Return in which of 40 cycles a standby speaks that hears a frame in the cycles at `heard_ms`."""
     plan = contract_transmit_plan(DBC, "BrakeEcu")
-    standby, sent, first = Standby(), new_transmission(plan), new_transmission(plan)
+    standby, sent, first = new_standby(waits=True)[0], new_transmission(plan), new_transmission(plan)
     frames, spoken = frame_buffer(plan), []
     for t_ms in range(0, 400, 10):
         count = transmit(plan, first, np.zeros(N_OUTPUTS), 0, frames) if t_ms in heard_ms else 0
-        standby.listen(plan, sent, frames, count, t_ms * MS)
-        if standby.speaks:
+        listen(standby, plan, sent, frames, count, t_ms * MS)
+        if standby["speaks"]:
             spoken.append(t_ms)
     return spoken
 
@@ -87,18 +95,18 @@ class Wire:
         pass
 
 
-def unit(folder, clock, standby=None):
+def unit(folder, clock, waits=False):
     """Return what one daemon needs for `cycle_once`."""
     params = new_params(load_config(ROOT / "config" / "suv.toml"))
     ecu = new_ecu(params, None, contract_receive_plan(DBC), contract_transmit_plan(DBC, "BrakeEcu"))
-    progress = Progress(Watch(FINE, CompileCounter()), standby)
+    progress = Progress(FINE, CompileCounter(), waits=waits)
     return ecu, Wire(), create_ring(folder, {}, b"", slots=64, frames=512), Grid(clock), progress
 
 
 def test_one_goes_on_counting_where_the_other_stopped(tmp_path):
     now = [0]
     clock = TimeSource(lambda: now[0], lambda: now[0], lambda until_ns: now.__setitem__(0, until_ns))
-    first, second = unit(tmp_path / "1", clock), unit(tmp_path / "2", clock, Standby())
+    first, second = unit(tmp_path / "1", clock), unit(tmp_path / "2", clock, waits=True)
     first[1].other, second[1].other = second[1], first[1]
 
     def cycle(*units):
@@ -118,7 +126,7 @@ def test_one_goes_on_counting_where_the_other_stopped(tmp_path):
     counters += [counter for can_id, counter in second[1].sent if can_id == demand]
     assert counters == [k % P01_MODULO for k in range(len(counters))]
     assert len(counters) == 33 + 20 - (SILENCE_NS // CYCLE_NS - 1)  # it speaks 50 ms after the last frame
-    assert int(second[4].foreign) == 0
+    assert int(second[4].loop["foreign"][0]) == 0
     assert not int(second[0].cycle["bus_faults"][0]) & FOREIGN_SENDER
     before = len(second[1].sent)
     for _ in range(10):
@@ -130,7 +138,7 @@ def test_one_goes_on_counting_where_the_other_stopped(tmp_path):
 def test_one_that_stood_still_while_the_standby_spoke_says_nothing_any_more(tmp_path, still_cycles):
     now = [0]
     clock = TimeSource(lambda: now[0], lambda: now[0], lambda until_ns: now.__setitem__(0, until_ns))
-    first, second = unit(tmp_path / "1", clock), unit(tmp_path / "2", clock, Standby())
+    first, second = unit(tmp_path / "1", clock), unit(tmp_path / "2", clock, waits=True)
     first[1].other, second[1].other = second[1], first[1]
 
     def cycle(number, *units):
@@ -166,7 +174,7 @@ def garbage(draw, count):
 def test_garbage_with_our_identifiers_silences_neither_a_newcomer_nor_a_standby(tmp_path):
     now, draw = [0], random.Random(6)
     clock = TimeSource(lambda: now[0], lambda: now[0], lambda until_ns: now.__setitem__(0, until_ns))
-    first, second = unit(tmp_path / "1", clock), unit(tmp_path / "2", clock, Standby())
+    first, second = unit(tmp_path / "1", clock), unit(tmp_path / "2", clock, waits=True)
     first[1].other, second[1].other = second[1], first[1]
 
     def cycle(number, *units):
@@ -194,9 +202,9 @@ def yields_after(foreign, missed=(), cycles=2000):
 
     Each cycle of `missed` comes after a gap of 0.3 s.
     """
-    claim = Claim()
+    claim = new_record(CLAIM)[0]
     for cycle in range(cycles):
-        if claim.is_lost(int(cycle in foreign), 30 if cycle in missed else 0):
+        if claim_is_lost(claim, int(cycle in foreign), 30 if cycle in missed else 0):
             return cycle
     return None
 
@@ -233,9 +241,9 @@ HELD_UP = {
 
 @pytest.mark.parametrize(("cycle", "yields"), HELD_UP.values(), ids=HELD_UP)
 def test_one_that_stood_still_while_another_spoke_yields_at_once(cycle, yields):
-    claim = Claim()
-    assert not any(claim.is_lost(0, 0) for _ in range(1000))
-    assert claim.is_lost(*cycle) is yields
+    claim = new_record(CLAIM)[0]
+    assert not any(claim_is_lost(claim, 0, 0) for _ in range(1000))
+    assert claim_is_lost(claim, *cycle) == yields
 
 
 @pytest.mark.parametrize("apart", [0, 1, 7, 50])
@@ -325,11 +333,11 @@ def test_a_standby_counts_on_in_the_messages_of_a_map(tmp_path):
         'pressure_demand_rl = { message = "Rear", signal = "p", invalid = 0 }\n'
     )
     plan = transmit_plan(tmp_path / "car.toml", receive_plan(tmp_path / "car.toml"))
-    first, second, standby = new_transmission(plan), new_transmission(plan), Standby()
+    first, second, standby = new_transmission(plan), new_transmission(plan), new_standby(waits=True)[0]
     frames = frame_buffer(plan)
     for cycle in range(20):
         count = transmit(plan, first, np.zeros(N_OUTPUTS), cycle, frames)
-        standby.listen(plan, second, frames, count, cycle * CYCLE_NS)
+        listen(standby, plan, second, frames, count, cycle * CYCLE_NS)
         assert second.counter.tolist() == first.counter.tolist() == [(cycle + 1) % 7, 0]
-    standby.listen(plan, second, frames, 0, 20 * CYCLE_NS + SILENCE_NS)
-    assert standby.speaks
+    listen(standby, plan, second, frames, 0, 20 * CYCLE_NS + SILENCE_NS)
+    assert standby["speaks"]

@@ -25,7 +25,8 @@ from ecu.contract.records import STAGES
 from ecu.jit import CompileCounter
 from ecu.recording.ring import create_ring, remove_ring
 from ecu.runtime.clock import Grid, system_time
-from ecu.runtime.cycle import Progress, Watch, cycle_once, new_ecu
+from ecu.runtime.cycle import Progress, cycle_once
+from ecu.runtime.memory import new_ecu
 from ecu.runtime.warm_up import warm_up
 from ecu.settings.resources import resource
 
@@ -88,7 +89,7 @@ def our_side(stop: Stop, folder: Path) -> Side:
     ring = create_ring(folder / "ring", {}, b"", slots=256, frames=64 * 256)
     compiled = CompileCounter()
     warm_up(ecu, compiled)
-    progress = Progress(Watch(channel.status(), compiled))
+    progress = Progress(channel.status(), compiled)
     grid = Grid(system_time())
 
     def cycle() -> tuple[int, ...]:

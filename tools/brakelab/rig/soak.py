@@ -36,7 +36,8 @@ from ecu.recording.recorder import layout, read_recording
 from ecu.recording.restored import restored
 from ecu.recording.ring import RingReader, close_ring, create_ring, remove_ring
 from ecu.runtime.clock import Grid, TimeSource
-from ecu.runtime.cycle import Progress, Watch, cycle_once, new_ecu
+from ecu.runtime.cycle import Progress, cycle_once
+from ecu.runtime.memory import new_ecu
 from ecu.runtime.side_process import Recorder
 from ecu.runtime.warm_up import warm_up
 from ecu.settings.config import load_config, new_params, store_key
@@ -152,7 +153,7 @@ def run_one(rig: Rig, folder: Path, first: int, cycles: int, memory: list[float]
     about = {"channel": "soak", "store_key": store_key(config), "state": layout(INITIAL)}
     ring = create_ring(folder / "ring", about, initial_part(ecu.state).tobytes())
     recorder = Recorder(RingReader(ring.path), None, folder)
-    progress, grid = Progress(Watch(FINE, compiled)), Grid(rig.source())
+    progress, grid = Progress(FINE, compiled), Grid(rig.source())
     progress.number = first
     counters = ecu.reception.messages
     for name in ("received", "accepted"):
