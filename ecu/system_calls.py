@@ -40,3 +40,4 @@ sendmmsg: Final = CFunction("sendmmsg", "int32", "int32", "int64", "uint32", "in
 clock_gettime: Final = CFunction("clock_gettime", "int32", "int32", "int64")
 errno_location: Final = CFunction("__errno_location", "int64")
 memcpy: Final = CFunction("memcpy", "int64", "int64", "int64", "int64")
+clock_nanosleep: Final = CFunction("clock_nanosleep", "int32", "int32", "int32", "int64", "int64")

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ecu.bus.protocol import STATUS, BusStatus
 from ecu.contract.records import EXTENDED_ID, FRAME, FRAME_EXTENDED, FRAME_FD, RecordArray, new_record
 from ecu.errors import UserError
-from ecu.jit import kernel
+from ecu.jit import Record, kernel
 from ecu.system_calls import errno_location, memcpy, recvmmsg, sendmmsg
 
 BURST: Final = 128  # frames per system call: a 500 kbit/s bus carries 45 in a cycle
@@ -108,7 +108,7 @@ def prepare_kernels() -> None:
     none, frames = new_socket(), new_record(FRAME)
     receive_frames(none, frames, 0)
     send_frames(none, frames, 1)
-    read_status(none, new_record(STATUS))
+    read_status(none, new_record(STATUS)[0])
 
 
 class SocketcanChannel:
@@ -152,7 +152,7 @@ class SocketcanChannel:
 
     def status(self) -> BusStatus:
         """See `Channel`. An interface that is down counts as bus off."""
-        read_status(self.memory, self._status)
+        read_status(self.memory, self._status[0])
         off, passive, failures, dropped = self._status[0].tolist()
         return BusStatus(bool(off), bool(passive), failures, dropped)
 
@@ -241,13 +241,13 @@ def _note_error(line: NDArray[np.int64]) -> None:
 
 
 @kernel
-def read_status(line_socket: Socket, status: RecordArray) -> None:
-    """Write the line's status to `STATUS`, shape (1,)."""
-    line, now = line_socket.line, status[0]
-    now.bus_off = 1 if line[_BUS_OFF] or line[_DOWN] else 0
-    now.error_passive = line[_PASSIVE]
-    now.send_failures = line[_FAILURES] + line[_NOT_ACKNOWLEDGED]
-    now.dropped = line[_DROPPED]
+def read_status(line_socket: Socket, status: Record) -> None:
+    """Write the line's status to a record `STATUS`."""
+    line = line_socket.line
+    status.bus_off = 1 if line[_BUS_OFF] or line[_DOWN] else 0
+    status.error_passive = line[_PASSIVE]
+    status.send_failures = line[_FAILURES] + line[_NOT_ACKNOWLEDGED]
+    status.dropped = line[_DROPPED]
 
 
 @kernel

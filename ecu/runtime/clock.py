@@ -86,8 +86,11 @@ class Tick(NamedTuple):
     """How long after its deadline the cycle woke; if periods were missed, after the first of theirs."""
 
 
-TIME_LINE: Final = np.dtype(
+GRID: Final = np.dtype(
     [
+        ("deadline_ns", "i8"),  # of the cycle before
+        ("wakes_ns", "i8"),  # deadline up to which this one sleeps
+        ("period_ns", "i8"),
         ("offset_ns", "i8"),  # real time at the start less monotonic time: the time line, for the whole run
         ("spread_ns", "i8"),  # time that the reading took
         ("set_ns", "i8"),  # by how much the real-time clock has been set since the start, whole microseconds
@@ -95,18 +98,30 @@ TIME_LINE: Final = np.dtype(
 )
 
 
+def _arrival(
+    deadline_ns: int, wakes_ns: int, period_ns: int, offset_ns: int, now_ns: int
+) -> tuple[int, int, int, int]:
+    """Return the `Tick` of a cycle that woke at `now_ns`; the arguments are those of `GRID`."""
+    due_ns = deadline_ns + period_ns
+    deadline_ns = wakes_ns + (now_ns - wakes_ns) // period_ns * period_ns
+    t_ns = (deadline_ns + offset_ns) // MICROSECOND_NS * MICROSECOND_NS
+    return t_ns, deadline_ns, (deadline_ns - due_ns) // period_ns, now_ns - due_ns
+
+
+arrival = kernel(_arrival)
+
+
 @kernel
-def follow_realtime(line: RecordArray, before_ns: int, real_ns: int, after_ns: int) -> None:
-    """Update the set time of a `TIME_LINE`, shape (1,), by a reading of real time between two of monotonic
-    time.
+def follow_realtime(grid: RecordArray, before_ns: int, real_ns: int, after_ns: int) -> None:
+    """Update the set time of a `GRID`, shape (1,), by a reading of real time between two of monotonic time.
 
     It changes only if the real-time clock was set: a sleep between the readings falsifies them.
     """
-    known = line[0]
+    line = grid[0]
     offset_ns, spread_ns = real_ns - (before_ns + after_ns) // 2, after_ns - before_ns
-    if abs(offset_ns - known.offset_ns - known.set_ns) > spread_ns + known.spread_ns + MICROSECOND_NS:
-        known.set_ns = (offset_ns - known.offset_ns) // MICROSECOND_NS * MICROSECOND_NS
-        known.spread_ns = spread_ns
+    if abs(offset_ns - line.offset_ns - line.set_ns) > spread_ns + line.spread_ns + MICROSECOND_NS:
+        line.set_ns = (offset_ns - line.offset_ns) // MICROSECOND_NS * MICROSECOND_NS
+        line.spread_ns = spread_ns
 
 
 class Grid:
@@ -117,21 +132,31 @@ class Grid:
         self.deadline_ns = source.monotonic_ns()
         before_ns, real_ns, after_ns = self._read()
         self.offset_ns = real_ns - (before_ns + after_ns) // 2
-        self.line = new_record(TIME_LINE)
-        self.line["offset_ns"], self.line["spread_ns"] = self.offset_ns, after_ns - before_ns
+        self.memory = new_record(GRID)
+        self.memory["period_ns"], self.memory["offset_ns"] = period_ns, self.offset_ns
+        self.memory["spread_ns"] = after_ns - before_ns
 
     def wait(self) -> Tick:
         """Sleep until the next deadline; a signal may interrupt the sleep, which then continues."""
-        period = self.period_ns
-        due_ns = self.deadline_ns + period
-        now = self.source.monotonic_ns()
-        self.deadline_ns = due_ns + max(0, now - self.deadline_ns) // period * period
-        while now < self.deadline_ns:
-            self.source.sleep_until(self.deadline_ns)
-            now = self.source.monotonic_ns()
-        self.deadline_ns += (now - self.deadline_ns) // period * period
-        t_ns = (self.deadline_ns + self.offset_ns) // MICROSECOND_NS * MICROSECOND_NS
-        return Tick(t_ns, self.deadline_ns, (self.deadline_ns - due_ns) // period, now - due_ns)
+        wakes_ns, now_ns = self._sleep(0)
+        tick = Tick(*_arrival(self.deadline_ns, wakes_ns, self.period_ns, self.offset_ns, now_ns))
+        self.deadline_ns = tick.t_mono_ns
+        return tick
+
+    def approach(self, lead_ns: int) -> None:
+        """Sleep until `lead_ns` before the next deadline; a kernel has the rest of the wait, by `memory`."""
+        wakes_ns, _ = self._sleep(lead_ns)
+        self.memory["deadline_ns"], self.memory["wakes_ns"] = self.deadline_ns, wakes_ns
+
+    def _sleep(self, lead_ns: int) -> tuple[int, int]:
+        """Sleep until `lead_ns` before the next deadline; return that deadline, and now."""
+        now_ns = self.source.monotonic_ns()
+        late_ns = max(0, now_ns - self.deadline_ns)
+        wakes_ns = self.deadline_ns + self.period_ns + late_ns // self.period_ns * self.period_ns
+        while now_ns < wakes_ns - lead_ns:
+            self.source.sleep_until(wakes_ns - lead_ns)
+            now_ns = self.source.monotonic_ns()
+        return wakes_ns, now_ns
 
     def _read(self) -> tuple[int, int, int]:
         """Return monotonic, real and again monotonic time [ns]."""
@@ -139,8 +164,8 @@ class Grid:
 
     def follow_realtime(self) -> int:
         """Return by how much the real-time clock has been set since the start [ns]."""
-        follow_realtime(self.line, *self._read())
-        return int(self.line["set_ns"][0])
+        follow_realtime(self.memory, *self._read())
+        return int(self.memory["set_ns"][0])
 
 
 class Welford:

@@ -13,14 +13,16 @@ import numpy as np
 
 from ecu.algorithm.step import step
 from ecu.bus.protocol import BusStatus, Channel
+from ecu.bus.socketcan import SocketcanChannel
 from ecu.bus.transmit import slowest_demand, transmit
 from ecu.contract.records import STAGES
 from ecu.contract.signals import CYCLE_NS, DEMANDS
 from ecu.jit import CompileCounter
 from ecu.recording.ring import Ring, publish
 from ecu.runtime.clock import Grid, Histogram
+from ecu.runtime.exchange import LEAD_NS, exchange
 from ecu.runtime.loop import GIVEN_UP_NS, begin, keep_rest, take_frames
-from ecu.runtime.memory import Ecu, new_loop
+from ecu.runtime.memory import Ecu, new_loop, new_twin
 
 FAREWELLS: Final = 3  # one may be lost
 
@@ -42,8 +44,9 @@ class Timing:
 class Progress:
     """State of the loop beside the ECU's own records. `waits`: as a standby."""
 
-    def __init__(self, start: BusStatus, compiled: CompileCounter, *, waits: bool = False) -> None:
+    def __init__(self, ecu: Ecu, start: BusStatus, compiled: CompileCounter, *, waits: bool = False) -> None:
         self.loop, self.timing, self.number = new_loop(waits=waits), Timing(), 0
+        self.twin, self.twin_loop = new_twin(ecu), self.loop.copy()
         self.loop["seen"][0, :2] = start.send_failures, start.dropped
         self._compiled, self._compiled_at_start = compiled, compiled.count
 
@@ -65,25 +68,33 @@ class Progress:
 
 def cycle_once(ecu: Ecu, channel: Channel, ring: Ring, grid: Grid, run: Progress) -> None:
     """Run one cycle: the ECU, from the socket to the socket."""
-    cycle, tick = ecu.cycle, grid.wait()
-    cycle["number"], cycle["t_ns"], cycle["t_mono_ns"] = run.number, tick.t_ns, tick.t_mono_ns
-    cycle["missed"], cycle["lateness_ns"] = tick.missed, tick.lateness_ns
+    cycle = ecu.cycle
+    cycle["number"] = run.number
     run.look_at_compiler()
-    _exchange(ecu, channel, grid, run)
+    if isinstance(channel, SocketcanChannel):
+        grid.approach(LEAD_NS)
+        channel.bind_again()
+        exchange(ecu, run.twin, run.loop, run.twin_loop, grid.memory, channel.memory)
+        grid.deadline_ns = int(cycle["t_mono_ns"][0])
+    else:
+        _exchange(ecu, channel, grid, run)
     publish(ring, cycle, ecu.outputs, ecu.learned, ecu.watched, ecu.waiting)
     keep_rest(ecu, run.loop)
-    run.timing.add(tick.lateness_ns, cycle["stage_ns"][0].tolist())
+    run.timing.add(int(cycle["lateness_ns"][0]), cycle["stage_ns"][0].tolist())
     run.number += 1
 
 
 def _exchange(ecu: Ecu, channel: Channel, grid: Grid, run: Progress) -> None:
-    """Drain, receive, step, transmit and send."""
+    """Wait, drain, receive, step, transmit and send, as `exchange` does on SocketCAN."""
     cycle, loop, clock = ecu.cycle, run.loop, grid.source.monotonic_ns
+    tick = grid.wait()
     woken = clock()
+    cycle["t_ns"], cycle["t_mono_ns"] = tick.t_ns, tick.t_mono_ns
+    cycle["missed"], cycle["lateness_ns"] = tick.missed, tick.lateness_ns
     count = channel.drain(ecu.waiting, int(loop["waiting"][0]))
     grid.follow_realtime()
     drained = clock()
-    take_frames(ecu.waiting, loop, grid.line, count, drained)
+    take_frames(ecu.waiting, loop, grid.memory, count, drained)
     loop["status"] = tuple(channel.status())
     begin(ecu, loop)
     received = clock()
@@ -93,10 +104,9 @@ def _exchange(ecu: Ecu, channel: Channel, grid: Grid, run: Progress) -> None:
     if run.speaks:
         due = transmit(ecu.transmit_plan, ecu.transmission, ecu.vector, run.number, ecu.sending)
     encoded = clock()
-    if encoded - int(cycle["t_mono_ns"][0]) < GIVEN_UP_NS:  # else the process stood still since it woke
+    if encoded - tick.t_mono_ns < GIVEN_UP_NS:  # else the process stood still since it woke
         channel.send(ecu.sending, due)
-    sent = clock()
-    instants = (woken, drained, received, stepped, encoded, sent)
+    instants = (woken, drained, received, stepped, encoded, clock())
     cycle["stage_ns"] = tuple(after - before for before, after in pairwise(instants))
 
 

@@ -31,18 +31,18 @@ _N_E2E: Final = len(E2E_COUNTS)
 
 @kernel
 def take_frames(
-    frames: RecordArray, loop: RecordArray, line: RecordArray, count: int, drained_ns: int
+    frames: RecordArray, loop: RecordArray, grid: RecordArray, count: int, drained_ns: int
 ) -> None:
     """Add `count` frames behind those that wait, and turn their stamps to the run's time line.
 
-    They were drained at `drained_ns` of the monotonic clock, just before `line` (`TIME_LINE`, shape (1,)) was
-    followed.
+    They were drained at `drained_ns` of the monotonic clock, just before `grid` (`GRID`, shape (1,)) followed
+    real time.
     """
     state, first = loop[0], loop[0].waiting
-    now_ns = drained_ns + line[0].offset_ns
+    now_ns = drained_ns + grid[0].offset_ns
     state.waiting += count
-    _stamp(frames, first, state.waiting, line[0].set_ns, state.set_ns, state.emptied_ns, now_ns)
-    state.set_ns, state.emptied_ns = line[0].set_ns, now_ns
+    _stamp(frames, first, state.waiting, grid[0].set_ns, state.set_ns, state.emptied_ns, now_ns)
+    state.set_ns, state.emptied_ns = grid[0].set_ns, now_ns
 
 
 @kernel

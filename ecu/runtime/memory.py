@@ -33,6 +33,8 @@ LOOP: Final = np.dtype(
         ("until", "i8", (N_COUNTED,)),  # cycle to which the fault is shown
         ("claim", CLAIM),
         ("standby", STANDBY),
+        ("rehearsal_ns", "i8"),  # how long a rehearsal lasts, a mean
+        ("instant", "i8", (2,)),  # struct timespec, of a reading of a clock
     ],
     align=True,
 )
@@ -84,6 +86,23 @@ def new_ecu(
         new_transmission(transmit_plan),
         new_record(FRAME, WAITING_FRAMES),
         frame_buffer(transmit_plan),
+    )
+
+
+def new_twin(ecu: Ecu) -> Ecu:
+    """Return an ECU with memory of its own for all that the cycle overwrites, but the frames that wait."""
+    state, outputs = ecu.state.copy(), ecu.outputs.copy()
+    return ecu._replace(
+        state=state,
+        inputs=ecu.inputs.copy(),
+        outputs=outputs,
+        vector=output_vector(outputs),
+        learned=state["learned"],
+        watched=state["witness"]["published"],
+        cycle=ecu.cycle.copy(),
+        reception=new_reception(ecu.receive_plan),
+        transmission=new_transmission(ecu.transmit_plan),
+        sending=frame_buffer(ecu.transmit_plan),
     )
 
 

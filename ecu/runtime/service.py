@@ -44,7 +44,7 @@ def run(options: RunOptions) -> int:
         signal.signal(number, signal.SIG_IGN)
     with left_at_once():
         session = prepare(options)
-    progress = Progress(session.channel.status(), session.compiled, waits=session.waits)
+    progress = Progress(session.ecu, session.channel.status(), session.compiled, waits=session.waits)
     words: dict[str, Any] = {}
     off = False
     try:

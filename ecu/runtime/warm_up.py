@@ -1,16 +1,19 @@
 """A few cycles on a bus without traffic, so that every kernel of the cycle is compiled or loaded."""
 
 import itertools
+import sys
 import tempfile
 from pathlib import Path
 
 from ecu.bus.protocol import BusStatus
+from ecu.bus.socketcan import new_socket
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CYCLE_NS
 from ecu.jit import CompileCounter
 from ecu.recording.ring import create_ring
-from ecu.runtime.clock import Grid, TimeSource
+from ecu.runtime.clock import Grid, TimeSource, system_time
 from ecu.runtime.cycle import Progress, cycle_once
+from ecu.runtime.exchange import LEAD_NS, exchange
 from ecu.runtime.memory import Ecu, new_ecu
 
 
@@ -43,6 +46,10 @@ def warm_up(ecu: Ecu, compiled: CompileCounter) -> None:
         instants = itertools.count(0, CYCLE_NS // 100)
         grid = Grid(TimeSource(instants.__next__, instants.__next__, lambda _: None))
         for waits in (False, True):
-            progress = Progress(Silence().status(), compiled, waits=waits)
+            progress = Progress(twin, Silence().status(), compiled, waits=waits)
             for _ in range(3):
                 cycle_once(twin, Silence(), ring, grid, progress)
+            if sys.platform == "linux":
+                on_can = Grid(system_time())
+                on_can.approach(LEAD_NS)
+                exchange(twin, progress.twin, progress.loop, progress.twin_loop, on_can.memory, new_socket())

@@ -104,7 +104,7 @@ def test_an_error_tells_whether_the_interface_is_down_or_gone(number, expected):
     memory.line[:] = 0
     memcpy(errno_location(), told.ctypes.data, 4)
     socketcan._note_error(memory.line)
-    socketcan.read_status(memory, status)
+    socketcan.read_status(memory, status[0])
     assert (bool(status["bus_off"][0]), bool(memory.line[socketcan._GONE])) == expected
 
 

@@ -55,7 +55,7 @@ class Bench:
         self.reader = RingReader(self.ring.path)
         compiled = CompileCounter()
         warm_up(self.ecu, compiled)
-        self.progress = Progress(FINE, compiled)
+        self.progress = Progress(self.ecu, FINE, compiled)
         self.speaks = True
 
     def sleep(self, until_ns: int) -> None:

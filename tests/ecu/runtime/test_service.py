@@ -77,6 +77,7 @@ def test_whatever_ends_the_loop_first_the_farewell_then_the_last_words(
         waits=False,
         manager=SimpleNamespace(tell=done.append),
     )
+    monkeypatch.setattr(cycle, "new_twin", lambda ecu: ecu)
     monkeypatch.setattr(service, "prepare", lambda options: session)
     monkeypatch.setattr(service, "configure_logging", lambda: None)
     monkeypatch.setattr(service.signal, "signal", handlers.__setitem__)

@@ -99,7 +99,7 @@ def unit(folder, clock, waits=False):
     """Return what one daemon needs for `cycle_once`."""
     params = new_params(load_config(ROOT / "config" / "suv.toml"))
     ecu = new_ecu(params, None, contract_receive_plan(DBC), contract_transmit_plan(DBC, "BrakeEcu"))
-    progress = Progress(FINE, CompileCounter(), waits=waits)
+    progress = Progress(ecu, FINE, CompileCounter(), waits=waits)
     return ecu, Wire(), create_ring(folder, {}, b"", slots=64, frames=512), Grid(clock), progress
 
 

@@ -89,7 +89,7 @@ def our_side(stop: Stop, folder: Path) -> Side:
     ring = create_ring(folder / "ring", {}, b"", slots=256, frames=64 * 256)
     compiled = CompileCounter()
     warm_up(ecu, compiled)
-    progress = Progress(channel.status(), compiled)
+    progress = Progress(ecu, channel.status(), compiled)
     grid = Grid(system_time())
 
     def cycle() -> tuple[int, ...]:

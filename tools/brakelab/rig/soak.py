@@ -153,7 +153,7 @@ def run_one(rig: Rig, folder: Path, first: int, cycles: int, memory: list[float]
     about = {"channel": "soak", "store_key": store_key(config), "state": layout(INITIAL)}
     ring = create_ring(folder / "ring", about, initial_part(ecu.state).tobytes())
     recorder = Recorder(RingReader(ring.path), None, folder)
-    progress, grid = Progress(FINE, compiled), Grid(rig.source())
+    progress, grid = Progress(ecu, FINE, compiled), Grid(rig.source())
     progress.number = first
     counters = ecu.reception.messages
     for name in ("received", "accepted"):
