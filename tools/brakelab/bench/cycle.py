@@ -1,7 +1,8 @@
 """Stage times of a whole 100 Hz cycle, 39 frames in and 6 out over a socket pair, in real time.
 
 Ours is the daemon's own `cycle_once`, with SocketCAN channel, ring and grid; beside it `PythonEcu`. Both wake
-every 10 ms, with caches as cold as the sleep left them; times are those of the clock, not of the processor.
+every 10 ms, with caches as cold as the sleep left them; times are those of the clock, not of the processor,
+from the waking at the deadline on. What ours does before it (`ecu/runtime/exchange.py`) is in no stage.
 """
 
 import gc
