@@ -6,13 +6,15 @@ its windows alone do not tell them apart. The means of applications do:
 
     f = L' (1 + (L' / c)^n)^(-1/n) + o        L' = s sum 2 A_i r_i mu_i p_i / (R_i m)
 
-L' is the deceleration that the linings would give, mu_i their friction as learned window by window where
-wheels are measured one by one, else the configured one; f is the specific force less drag, rolling and
-reported torques. The bend is wide (n = 2.5, close to a tanh) where it stands for wheels that nobody sees lock
-one by one, and sharp where their slip is seen. States are the logarithm of s, that of the ceiling c over
-`CEILING`, and the unreported drag o, which includes the accelerometer's zero where no window teaches it: an
-extended Kalman filter, corrected once an application. An innovation beyond `GATE` standard deviations counts
-with a variance that puts it there; an application that was not measured widens nothing.
+L' is the deceleration that the linings would give; f is the specific force less drag, rolling and reported
+torques. Where the torques of the drive and of each brake are known and wheels are measured one by one, mu_i
+is the friction as learned window by window, s next to 1. Elsewhere windows teach nothing: mu_i is the
+configured friction, or what was learned where they did. The bend stands for wheels that reach their limit one
+after the other: wide (n = 2.5, close to a tanh) where they have one speed, else sharper (n = 4). States are
+the logarithm of s, that of the ceiling c over `CEILING`, and the unreported drag o, which includes the
+accelerometer's zero where no window teaches it: an extended Kalman filter, corrected once an application. An
+innovation beyond `GATE` standard deviations counts with a variance that puts it there; an application that
+was not measured widens nothing.
 
 Reported torques count as long as they explain how the car is driven: what an engine's controller reports is
 often that of the crankshaft, or a guess. Of those that do not counts the share that arrives.
@@ -23,7 +25,7 @@ import math
 import numpy as np
 
 from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
-from ecu.algorithm.estimation.joint.layout import BIAS, MASS, V
+from ecu.algorithm.estimation.joint.layout import BIAS, LEVEL, MASS, V
 from ecu.algorithm.estimation.joint.wheel import brake_torque, drive_opposes, radius, unknown_share
 from ecu.algorithm.estimation.joint.window import COPIES
 from ecu.algorithm.inputs import wheels_mapped
@@ -34,8 +36,7 @@ CEILING = 14.0  # m/s^2: a first braking at 12 must be possible before any was s
 PRIOR_MEAN = np.array([0.0, 0.0, 0.2])  # the drag in m/s^2
 PRIOR = np.array([0.25, 0.4, 0.3])  # standard deviations
 STEP = np.array([0.05, 0.03, 0.03])  # between applications
-# Prior of the scale beside windows, which teach nearly all where all torques are known; its step over that.
-BESIDE, BESIDE_KNOWN, BESIDE_STEP = 0.1, 0.03, 0.2
+BESIDE, BESIDE_STEP = 0.03, 0.006  # prior of the scale beside windows, which teach nearly all; its step
 PAUSE = np.array([0.03, 0.15, 0.1])  # of unknown length: rain, another road, another day
 LOWEST = np.array([-0.7, math.log(3.0 / CEILING), -1.0])
 HIGHEST = np.array([0.6, math.log(30.0 / CEILING), 1.4])
@@ -44,9 +45,9 @@ GATE = 2.5
 LEAST_SPEED, ACROSS = 5.0, 0.4  # m/s, lateral acceleration over gravity: limits of the force balance
 ONSET_S = 0.25  # callipers and accelerometer lag behind the pressure
 LEAST_S = 0.3  # of an application that is learned from
-LEAST_DECEL = 0.8  # m/s^2
+LEAST_DECEL, LEAST_TOTAL = 0.8, 1.5  # m/s^2, of linings, or of the car: a light braking tells the drag
 LONGEST_STEP_S = 0.5  # between samples that are compared
-ALONE_KNEE, BESIDE_KNEE = 2.5, 6.0  # n; windows see the slip of a tyre that bends
+ONE_SPEED_KNEE, WHEELS_KNEE = 2.5, 4.0  # n
 BENDS = 0.7  # of the ceiling, beyond which windows no longer teach friction
 USUAL = 6.0  # m/s^2, of the linings, before any application
 DRIVES = 0.5  # m/s^2, by reported torques, from which they are compared with the motion
@@ -59,7 +60,6 @@ WHOLE_STATE = np.dtype(
         ("x", "f8", (3,)),  # ln scale, ln ceiling over `CEILING`, unreported drag [m/s^2]
         ("p", "f8", (3, 3)),
         ("alone", "u1"),  # nothing but whole applications teaches
-        ("most", "f8"),  # standard deviation of the scale beside windows
         ("bent", "u1"),  # the linings ask for more than road and tyres give freely
         ("knee", "f8"),  # exponent n of the bend
         ("age_s", "f8"),  # of the application
@@ -68,9 +68,10 @@ WHOLE_STATE = np.dtype(
         ("measured", "f8"),  # integrals over that: f [m/s^2 s]
         ("expected", "f8"),  # s L below the ceiling
         ("linings", "f8"),  # s L
+        ("total", "f8"),  # deceleration of the car
         ("by_scale", "f8"),  # derivatives of `expected`
         ("by_grip", "f8"),
-        ("usual", "f8"),  # s L of the last application that was measured [m/s^2]
+        ("usual", "f8"),  # s L of the last application whose linings taught [m/s^2]
         ("driven", "f8"),  # fading integral of the squared deceleration by reported torques [m^2/s^3]
         ("arrived", "f8"),  # likewise of it times that of the car
     ],
@@ -81,7 +82,7 @@ WHOLE_STATE = np.dtype(
 @kernel
 def restore_whole(state: Record, learned: Record) -> None:
     """Restore learned states, less certain by a pause; use the prior where nothing was learned."""
-    state.usual, state.knee, state.most = USUAL, ALONE_KNEE, BESIDE
+    state.usual, state.knee = USUAL, ONE_SPEED_KNEE
     forget_whole(state)
     if learned.whole_covariance[0] == 0.0:
         return
@@ -137,21 +138,33 @@ def torques_measured(params: Record, joint: Record) -> bool:
 
 
 @kernel
+def _hand_over_scale(state: Record, joint: Record) -> None:
+    """Turn the scale into friction of the linings, from which windows go on."""
+    for i in range(LEVEL, LEVEL + 4):
+        joint.x[i] += state.x[SCALE]
+        for snapshot in range(2):
+            joint.kept_x[snapshot, i] += state.x[SCALE]
+    state.x[SCALE] = 0.0
+
+
+@kernel
 def begin_whole(params: Record, state: Record, joint: Record) -> None:
     """Begin an application."""
-    copied = joint.speed_copies > COPIES
-    state.alone = 1 if copied or not wheels_mapped(params) else 0
-    state.most = BESIDE_KNOWN if torques_measured(params, joint) else BESIDE
-    most, variance = state.most**2, state.p[SCALE, SCALE]
-    if joint.speed_copies < 0 and variance > most:
+    apart = wheels_mapped(params) and joint.speed_copies <= COPIES
+    alone = not (apart and torques_measured(params, joint))
+    if state.alone and not alone:
+        _hand_over_scale(state, joint)
+    state.alone = 1 if alone else 0
+    most, variance = BESIDE**2, state.p[SCALE, SCALE]
+    if not alone and variance > most:
         for i in range(3):
             state.p[SCALE, i] *= math.sqrt(most / variance)
             state.p[i, SCALE] = state.p[SCALE, i]
         state.p[SCALE, SCALE] = most
-    state.knee = ALONE_KNEE if state.alone else BESIDE_KNEE
+    state.knee = WHEELS_KNEE if apart else ONE_SPEED_KNEE
     state.bent = 0
     state.common = joint.sampling.common
-    state.age_s = state.time = state.measured = state.expected = state.linings = 0.0
+    state.age_s = state.time = state.measured = state.expected = state.linings = state.total = 0.0
     state.by_scale = state.by_grip = 0.0
 
 
@@ -238,6 +251,7 @@ def add_to_whole(params: Record, state: Record, joint: Record) -> None:
     if not state.alone:
         state.measured += step * joint.x[BIAS]
     state.linings += step * linings
+    state.total -= step * w.common_accel
     state.expected += step * expected
     state.by_scale += step * by_scale
     state.by_grip += step * by_grip
@@ -262,7 +276,8 @@ def _gain(state: Record, i: int, by_scale: float, by_grip: float, total: float) 
 @kernel
 def end_whole(state: Record) -> None:
     """Correct the states by the mean of this application, if it was measured."""
-    if state.time < LEAST_S or state.linings < LEAST_DECEL * state.time:
+    linings = state.linings >= LEAST_DECEL * state.time
+    if state.time < LEAST_S or not (linings or state.total >= LEAST_TOTAL * state.time):
         return
     x, p = state.x, state.p
     h_scale, h_grip = state.by_scale / state.time, state.by_grip / state.time
@@ -277,8 +292,9 @@ def end_whole(state: Record) -> None:
         x[i] = min(max(x[i] + gain[i] * innovation, LOWEST[i]), HIGHEST[i])
         for j in range(3):
             p[i, j] -= gain[i] * gain[j] * total
-        p[i, i] += (STEP[i] if state.alone or i != SCALE else BESIDE_STEP * state.most) ** 2
-    state.usual = state.linings / state.time
+        p[i, i] += (STEP[i] if state.alone or i != SCALE else BESIDE_STEP) ** 2
+    if linings:
+        state.usual = state.linings / state.time
 
 
 @kernel
@@ -287,7 +303,7 @@ def tell_whole(state: Record, estimate: Record, mass: float) -> None:
     ceiling = CEILING * math.exp(state.x[GRIP])
     scale, variance = math.exp(state.x[SCALE]), state.p[SCALE, SCALE]
     if not state.alone:
-        variance = min(variance, state.most**2)
+        variance = min(variance, BESIDE**2)
     for i in range(4):
         relative = 0.0 if state.alone else estimate.sigma[i] / estimate.mu[i]
         estimate.mu[i] *= scale

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from ecu.algorithm.estimate import ESTIMATE
-from ecu.algorithm.estimation.joint.layout import JOINT_STATE, V
+from ecu.algorithm.estimation.joint.layout import JOINT_STATE, LEVEL, V
 from ecu.algorithm.estimation.joint.whole_application import (
-    ALONE_KNEE,
-    BESIDE_KNEE,
+    BESIDE,
     CEILING,
     GATE,
     GRIP,
     LEAST_S,
     NOISE,
+    ONE_SPEED_KNEE,
     ONSET_S,
     OVERRUN,
     PAUSE,
@@ -23,6 +23,8 @@ from ecu.algorithm.estimation.joint.whole_application import (
     PRIOR_MEAN,
     SCALE,
     STEP,
+    USUAL,
+    WHEELS_KNEE,
     WHOLE_STATE,
     add_to_whole,
     apply_scale,
@@ -97,7 +99,7 @@ def bystander(params: Any) -> Bystander:
     return Bystander(params)
 
 
-@pytest.mark.parametrize("knee", [ALONE_KNEE, BESIDE_KNEE])
+@pytest.mark.parametrize("knee", [ONE_SPEED_KNEE, WHEELS_KNEE])
 @pytest.mark.parametrize("linings", [0.1, 3.0, 9.0, 14.0, 40.0])
 def test_derivatives_of_the_bend_are_those_of_differences(linings: float, knee: float) -> None:
     step, ceiling = 1e-6, 11.0
@@ -112,12 +114,12 @@ def test_derivatives_of_the_bend_are_those_of_differences(linings: float, knee: 
 @pytest.mark.parametrize(
     ("case", "knee", "share", "expected", "within"),
     [
-        ("gentle: the linings'", ALONE_KNEE, 0.05, 0.05, 0.001),
-        ("wide: a tanh", ALONE_KNEE, 0.5, math.tanh(0.5), 0.03),
-        ("wide: a tanh", ALONE_KNEE, 1.0, math.tanh(1.0), 0.01),
-        ("wide: a tanh", ALONE_KNEE, 2.0, math.tanh(2.0), 0.03),
-        ("sharp: the linings' to 0.6 of the ceiling", BESIDE_KNEE, 0.6, 0.6, 0.008),
-        ("asked for far too much: the ceiling", BESIDE_KNEE, 3.0, 1.0, 0.001),
+        ("gentle: the linings'", ONE_SPEED_KNEE, 0.05, 0.05, 0.001),
+        ("wide: a tanh", ONE_SPEED_KNEE, 0.5, math.tanh(0.5), 0.03),
+        ("wide: a tanh", ONE_SPEED_KNEE, 1.0, math.tanh(1.0), 0.01),
+        ("wide: a tanh", ONE_SPEED_KNEE, 2.0, math.tanh(2.0), 0.03),
+        ("sharper: nearly the linings' to 0.5 of the ceiling", WHEELS_KNEE, 0.5, 0.5, 0.016),
+        ("asked for far too much: the ceiling", WHEELS_KNEE, 3.0, 1.0, 0.004),
     ],
 )
 def test_brakes_give_what_linings_ask_up_to_the_ceiling(
@@ -134,7 +136,7 @@ def test_the_filter_is_that_of_the_matrices(bystander: Bystander) -> None:
         bars = list(rng.uniform(5.0, 80.0, 30))
         decels = [0.9 * bystander.linings(bar) + 0.3 + rng.normal(0.0, 0.5) for bar in bars]
         asked = np.exp(x[SCALE]) * np.array([bystander.linings(bar) for bar in bars])
-        bent = np.array([bend(one, CEILING * np.exp(x[GRIP]), ALONE_KNEE) for one in asked])
+        bent = np.array([bend(one, CEILING * np.exp(x[GRIP]), ONE_SPEED_KNEE) for one in asked])
         h = np.array([bent[:, 1].mean(), bent[:, 2].mean(), 1.0])
         measured = np.mean([decel - bystander.rest(decel) for decel in decels])
         innovation = measured - bent[:, 0].mean() - x[OVERRUN]
@@ -146,17 +148,30 @@ def test_the_filter_is_that_of_the_matrices(bystander: Bystander) -> None:
         assert bystander.state["p"] == pytest.approx(p, rel=1e-3, abs=1e-6)
 
 
-def test_friction_is_learned_below_the_ceiling_and_the_ceiling_above(bystander: Bystander) -> None:
-    """Linings of 1.3 on a road that gives 9 m/s^2, cut off hard: another law than the filter's."""
+@pytest.mark.parametrize(
+    ("case", "copies", "force", "friction", "limit"),
+    [  # the greatest errors: the wider the bend, the more of the knee is taken for friction
+        ("a speed for each wheel", -1, 0.15, 0.25, 0.12),
+        ("one speed", COPIES + 1, 0.20, 0.40, 0.25),
+    ],
+)
+def test_a_road_that_cuts_off_hard_is_learned_as_a_ceiling(
+    bystander: Bystander, case: str, copies: int, force: float, friction: float, limit: float
+) -> None:
+    """Linings of 1.3 on a road that gives 9 m/s^2 and no more: another law than the filter's."""
     rng = np.random.default_rng(1)
-    bystander.joint["speed_copies"] = -1
+    bystander.joint["speed_copies"] = copies
     per_bar = bystander.linings(1.0)
     for _ in range(40):
         bars = list(rng.uniform(1.0, 15.0) / per_bar * np.linspace(1.0, 0.6, 30))
         bystander.brake(bars, [min(1.3 * per_bar * bar, 9.0) + bystander.rest(0.0) for bar in bars])
-    x = bystander.state["x"]
-    assert math.exp(x[SCALE]) == pytest.approx(1.3, rel=0.12)
-    assert CEILING * math.exp(x[GRIP]) == pytest.approx(9.0, rel=0.12)
+    x, knee = bystander.state["x"], bystander.state["knee"]
+    ceiling = CEILING * math.exp(x[GRIP])
+    assert math.exp(x[SCALE]) == pytest.approx(1.3, rel=friction)
+    assert ceiling == pytest.approx(9.0, rel=limit)
+    for asked in (4.0, 6.0, 8.0, 10.0, 14.0):
+        said = bend(math.exp(x[SCALE]) * asked, ceiling, knee)[0] + x[OVERRUN]
+        assert said == pytest.approx(min(1.3 * asked, 9.0), rel=force), asked
 
 
 @pytest.mark.parametrize(
@@ -212,22 +227,59 @@ def test_what_was_learned_comes_back_less_certain(bystander: Bystander) -> None:
 
 
 @pytest.mark.parametrize(
-    ("case", "copies", "mapped", "alone"),
+    ("case", "copies", "mapped", "motors", "own", "alone", "knee"),
     [
-        ("wheels of their own", -1, 1, False),
-        ("not yet compared", COPIES, 1, False),
-        ("one speed stands for all", COPIES + 1, 1, True),
-        ("no wheel speeds", 0, 0, True),
+        ("torques of all motors and brakes", -1, 1, 1, 1, False, WHEELS_KNEE),
+        ("not yet compared", COPIES, 1, 1, 1, False, WHEELS_KNEE),
+        ("no motor reports", -1, 1, 0, 1, True, WHEELS_KNEE),
+        ("a pressure for each axle", -1, 1, 1, 0, True, WHEELS_KNEE),
+        ("one speed stands for all", COPIES + 1, 1, 1, 1, True, ONE_SPEED_KNEE),
+        ("no wheel speeds", 0, 0, 1, 1, True, ONE_SPEED_KNEE),
     ],
 )
-def test_windows_teach_where_each_wheel_is_measured(
-    bystander: Bystander, case: str, copies: int, mapped: int, alone: bool
+def test_windows_teach_where_all_torques_and_each_wheel_are_measured(
+    bystander: Bystander, case: str, copies: int, mapped: int, motors: int, own: int, alone: bool, knee: float
 ) -> None:
-    bystander.params["mapped"] = mapped
-    bystander.joint["speed_copies"] = copies
+    bystander.params["mapped"], bystander.params["sigma_motor_torque"] = mapped, 0.0
+    bystander.joint["speed_copies"], bystander.joint["differs"] = copies, own
+    bystander.joint["motors"]["samples"] = motors
     begin_whole(bystander.params, bystander.state, bystander.joint)
     assert bool(bystander.state["alone"]) == alone
-    assert bystander.state["knee"] == (ALONE_KNEE if alone else BESIDE_KNEE)
+    assert bystander.state["knee"] == knee
+
+
+def test_windows_go_on_from_what_whole_applications_have_learned(bystander: Bystander) -> None:
+    """The pressures of an axle are told apart at last: the linings' force stays, the scale is 1."""
+    joint, state, params = bystander.joint, bystander.state, bystander.params
+    params["sigma_motor_torque"], joint["speed_copies"], joint["motors"]["samples"] = 0.0, -1, 1
+    begin_whole(params, state, joint)
+    state["x"][SCALE] = -0.3
+    joint["differs"] = 1
+    begin_whole(params, state, joint)
+    assert not state["alone"]
+    assert state["x"][SCALE] == 0.0
+    assert state["p"][SCALE, SCALE] == pytest.approx(BESIDE**2)
+    assert joint["x"][LEVEL : LEVEL + 4] == pytest.approx(-0.3)
+    assert joint["kept_x"][:, LEVEL : LEVEL + 4] == pytest.approx(-0.3)
+    begin_whole(params, state, joint)
+    assert joint["x"][LEVEL : LEVEL + 4] == pytest.approx(-0.3)
+
+
+@pytest.mark.parametrize(
+    ("case", "bar", "decel", "teaches"),
+    [
+        ("linings that brake", 15.0, 1.0, True),
+        ("hardly any linings, but the motors brake: it tells the drag", 2.0, 2.0, True),
+        ("hardly any of both", 2.0, 0.5, False),
+    ],
+)
+def test_a_light_braking_teaches_where_the_car_slows(
+    bystander: Bystander, case: str, bar: float, decel: float, teaches: bool
+) -> None:
+    before = bystander.state["x"].copy()
+    bystander.brake([bar] * 30, [decel] * 30)
+    assert bool((bystander.state["x"] != before).any()) == teaches
+    assert bystander.state["usual"] == (USUAL if bar < 10.0 else pytest.approx(bystander.linings(bar)))
 
 
 def test_estimate_and_store_have_the_scale(bystander: Bystander) -> None:
