@@ -2,7 +2,8 @@
 
     -a  ~  sum of the callipers of  2 A_k r_eff mu_nominal (p - p_0) / (m r)  +  motors
 
-Friction may be half or nearly twice the nominal one, so that only a scale beyond shows; a wrong scale of one
+Friction may be half or nearly twice the nominal one, so that only a scale beyond shows, also in the brakings
+that road and tyres do not limit; a wrong scale of one
 calliper shows against the other side of its axle (`sides`). Front and rear are exchanged if the rear wheels
 would have to bear more than the front ones for their load, and would not the other way round: no car is built
 so.
@@ -28,6 +29,8 @@ OVERRUN: Final = 0.3  # m/s^2, drag and engine
 APPLIED: Final = 0.1  # of the greatest pressure, from which a brake is applied
 HARD: Final = 2.5  # m/s^2, from which loads tell the axles apart
 ALIVE: Final = 0.4  # of the other axle's pressure: below, one has failed
+FREE: Final = 0.85  # of the greatest decelerations: below, tyres give most of what the linings ask for
+LIKELY: Final = 1.65  # scale by these alone that explains the rest by grip
 OVERBRAKED: Final = 1.1  # of the front wheels' use of their load, that rear ones never reach
 
 
@@ -109,10 +112,15 @@ def _unit(drive: Drive, car: Car, pressures: Vector, change: Vector, rows: Rows)
     motors = drive.corners("motor_torque")
     others = OVERRUN if motors is None else OVERRUN + motors @ car.brakes.decel_per_torque
     total = pressures.sum(axis=1)
+    decel = -change - others
     applied = rows & (total > APPLIED * np.percentile(total[rows], 99))
-    line = fit(pressures @ car.brakes.decel_per_bar, -change - others, applied)
+    linings = pressures @ car.brakes.decel_per_bar
+    line = fit(linings, decel, applied)
     least, most = line.span
     if line.correlation < TURNED or (least <= FRICTION and most >= 1.0 / FRICTION):
+        return []
+    free = fit(linings, decel, applied & (decel < FREE * np.percentile(decel[applied], 95))).span
+    if 1.0 / LIKELY <= np.sqrt(free[0] * free[1]) <= LIKELY:
         return []
     wanted = 1.0 / np.sqrt(least * most)
     fitting = [
