@@ -66,6 +66,14 @@ class MessageUse(NamedTuple):
     foreign: bool = False
 
 
+def places_of(ids: NDArray[np.uint32]) -> NDArray[np.int16]:
+    """Return `ReceivePlan.places` of messages with these identifiers."""
+    places = np.full(STANDARD_IDS, -1, np.int16)
+    standard = np.flatnonzero(ids < STANDARD_IDS)
+    places[ids[standard]] = standard
+    return places
+
+
 def compile_receive(uses: Sequence[MessageUse], expected: RecordArray) -> ReceivePlan:
     """Return the plan that receives `uses` into as many target places as `expected` has."""
     uses = sorted(uses, key=lambda use: identifier(use.message))
@@ -88,12 +96,9 @@ def compile_receive(uses: Sequence[MessageUse], expected: RecordArray) -> Receiv
         set_protection(message, use.protection)
         asks = [FIRST <= signal.place <= LAST for signal in use.signals]
         message["request"] = len(expected) == N_INPUTS and any(asks)
-    places = np.full(STANDARD_IDS, -1, np.int16)
-    standard = np.flatnonzero(messages["id"] < STANDARD_IDS)
-    places[messages["id"][standard]] = standard
     return ReceivePlan(
         np.ascontiguousarray(messages["id"]),
-        places,
+        places_of(messages["id"]),
         messages,
         np.concatenate(rows),
         np.array([*codes, 0], np.int64),

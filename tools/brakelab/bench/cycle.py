@@ -20,7 +20,7 @@ from brakelab.bench.python_ecu import PythonEcu
 from brakelab.bench.socket_pair import PythonCanBus, daemon_channel, put, socket_pair, take, wire_format
 from brakelab.studies.measure import Figure, Row, figure, installed
 from ecu.bus.e2e import P01_MODULO
-from ecu.bus.receive_plan import ReceivePlan, contract_receive_plan
+from ecu.bus.receive_plan import ReceivePlan, contract_receive_plan, places_of
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
 from ecu.contract.records import STAGES
 from ecu.jit import CompileCounter
@@ -61,7 +61,8 @@ def thrice(plan: ReceivePlan) -> ReceivePlan:
     messages["id"] += np.repeat(np.array(OFFSETS, np.uint32), len(inputs))
     messages["period_ns"] = PERIOD_NS
     messages = np.sort(messages, order="id")
-    return plan._replace(ids=np.ascontiguousarray(messages["id"]), messages=messages)
+    ids = np.ascontiguousarray(messages["id"])
+    return plan._replace(ids=ids, places=places_of(ids), messages=messages)
 
 
 def bursts(stop: Stop, cycles: int) -> list[list[bytes]]:
