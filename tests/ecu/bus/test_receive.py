@@ -12,7 +12,7 @@ from ecu.bus.database import load_database
 from ecu.bus.freshness import begin_cycle, end_cycle, new_freshness, target_dtype
 from ecu.bus.plan import SignalUse
 from ecu.bus.receive import EXTENDED_ID, new_reception, receive
-from ecu.bus.receive_plan import MessageUse, compile_receive, contract_receive_plan
+from ecu.bus.receive_plan import MessageUse, compile_receive, contract_receive_plan, places_of
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
 from ecu.contract.records import (
     FRAME,
@@ -96,6 +96,21 @@ def test_frames_after_the_deadline_wait() -> None:
     frames["stamp_ns"][3:] = T0 + 1
     assert bus.take(frames) == 3
     assert bus.take(frames[3:]) == len(frames) - 3
+
+
+def test_identifiers_of_29_bits_are_found_wherever_they_stand() -> None:
+    """The same bus with all identifiers of 29 bits: each message is found, and no other taken for it."""
+    bus = Bus()
+    ids = PLAN.ids | np.uint32(EXTENDED_ID)
+    plan, frames = PLAN._replace(ids=ids, places=places_of(ids)), bus.sent()
+    frames["flags"] |= FRAME_EXTENDED
+    strangers = frames.copy()
+    strangers["can_id"] += 0x10000
+    begin_cycle(bus.inputs[0], T0, CYCLE_NS)
+    receive(plan, bus.reception, np.concatenate([frames, strangers]), 0, 2 * len(frames), bus.inputs[0])
+    accepted = bus.reception.messages["accepted"]
+    assert set(PLAN.ids[accepted > 0]) == set(frames["can_id"])
+    assert bus.reception.totals["unknown"][0] == len(frames)
 
 
 def test_filters_let_through_what_the_plan_knows() -> None:
