@@ -7,13 +7,11 @@ goes first. It ends with exit code 0 when the run has ended and the fault memory
 
 import argparse
 import os
-import signal
 import time
 from pathlib import Path
 from typing import Final
 
-from ecu.recording.sink import free_output
-from ecu.runtime.start import ENDING, lower_priority
+from ecu.runtime.companion import begin_companion
 
 LOOK_FOR_RING_S: Final = 0.05
 
@@ -23,21 +21,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         prog="python -m ecu.diagnostics.process", description="Diagnostics of run."
     )
-    parser.add_argument("--ring", type=Path, required=True)
     parser.add_argument("--diagnostics", required=True)
     parser.add_argument("--state", type=Path)
-    parser.add_argument("--parent", type=int, required=True)
-    parser.add_argument("--pause", type=float, default=0.0)
-    options = parser.parse_args()
-    free_output()
-    for number in ENDING:
-        signal.signal(number, signal.SIG_IGN)
-    lower_priority()
-
-    def goes_on() -> bool:
-        return os.getppid() == options.parent
-
-    time.sleep(options.pause)
+    options, goes_on = begin_companion(parser)
     while not options.ring.exists():
         if not goes_on():
             return 0

@@ -4,12 +4,20 @@ The supervisor starts one again when it ends, ever later while it ends soon; wit
 """
 
 import os
+import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Final
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from ecu.recording.sink import free_output
+from ecu.runtime.start import ENDING, lower_priority
+
+if TYPE_CHECKING:  # the supervisor imports next to nothing
+    import argparse
 
 PAUSE_S: Final = 1.0
 LONGEST_PAUSE_S: Final = 60.0
@@ -49,6 +57,25 @@ class Companion:
         with suppress(OSError):
             self._process.kill()
         self._process.wait()
+
+
+def begin_companion(
+    parser: "argparse.ArgumentParser",
+) -> "tuple[argparse.Namespace, Callable[[], bool]]":
+    """In the process of a `Companion`: take its options, leave priority and signals to the loop, and pause.
+
+    `parser` has the options of its own. Returns all of them, and what tells whether the supervisor is there.
+    """
+    parser.add_argument("--ring", type=Path, required=True)
+    parser.add_argument("--parent", type=int, required=True)
+    parser.add_argument("--pause", type=float, default=0.0)
+    options = parser.parse_args()
+    free_output()
+    for number in ENDING:
+        signal.signal(number, signal.SIG_IGN)
+    lower_priority()
+    time.sleep(options.pause)
+    return options, lambda: os.getppid() == options.parent
 
 
 def await_end_of(other: "subprocess.Popen[bytes]", companions: Sequence[Companion]) -> int:

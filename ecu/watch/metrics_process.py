@@ -7,14 +7,13 @@ tried again.
 
 import os
 
-from ecu.runtime.start import ENDING, lower_priority
+from ecu.runtime.start import lower_priority
 
 if __name__ == "__main__":  # the daemon is starting: it goes first
     lower_priority()
     os.nice(10)
 
 import argparse
-import signal
 import threading
 import time
 from collections.abc import Callable
@@ -25,7 +24,7 @@ import structlog
 
 from ecu.errors import UserError
 from ecu.recording.log import configure_logging
-from ecu.recording.sink import free_output
+from ecu.runtime.companion import begin_companion
 from ecu.watch.metrics import families
 from ecu.watch.serve import Handler, Server
 from ecu.watch.tally import Tally
@@ -123,21 +122,10 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         prog="python -m ecu.watch.metrics_process", description="Metrics of run."
     )
-    parser.add_argument("--ring", type=Path, required=True)
     parser.add_argument("--metrics", required=True)
-    parser.add_argument("--parent", type=int, required=True)
-    parser.add_argument("--pause", type=float, default=0.0)
-    options = parser.parse_args()
-    free_output()
-    for number in ENDING:
-        signal.signal(number, signal.SIG_IGN)
+    options, goes_on = begin_companion(parser)
     configure_logging()
-    time.sleep(options.pause)
     shared = Shared(options.ring)
-
-    def goes_on() -> bool:
-        return os.getppid() == options.parent
-
     server = open_server(options.metrics, new_handler(shared), goes_on)
     if server is None:
         return 0
