@@ -45,11 +45,11 @@ def warm_up(ecu: Ecu, compiled: CompileCounter) -> None:
         ring = create_ring(Path(folder) / "ring", {}, b"", slots=2, frames=1)
         instants = itertools.count(0, CYCLE_NS // 100)
         grid = Grid(TimeSource(instants.__next__, instants.__next__, lambda _: None))
-        for waits in (False, True):
+        for waits in (True, False):
             progress = Progress(twin, Silence().status(), compiled, waits=waits)
             for _ in range(3):
                 cycle_once(twin, Silence(), ring, grid, progress)
-            if sys.platform == "linux":
-                on_can = Grid(system_time())
-                on_can.approach(LEAD_NS)
-                exchange(twin, progress.twin, progress.loop, progress.twin_loop, on_can.memory, new_socket())
+        if sys.platform == "linux":
+            on_can = Grid(system_time())
+            on_can.approach(LEAD_NS)
+            exchange(twin, progress.twin, progress.loop, progress.twin_loop, on_can.memory, new_socket())
