@@ -101,7 +101,7 @@ class FaultMemory:
 
         Args:
             failed: mask of the fault bits that are set.
-            tested: mask of those that were tested in this cycle.
+            tested: mask of those that were tested in this cycle; bits without a code are left out.
             snapshot: returns what is stored with a code that fails now.
         """
         if not self.enabled:

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 import structlog
 
-from ecu.contract.faults import FAULTS, NOT_KEPT, fault_mask
+from ecu.contract.faults import NOT_KEPT, fault_mask
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import STARTING
 from ecu.diagnostics.fault_memory import FaultMemory
@@ -28,7 +28,6 @@ from ecu.runtime.clock import monotonic_s
 from ecu.watch.daemons import is_held, pid_of
 from ecu.watch.health import ailment
 
-_ALL: Final = sum(fault.bit for fault in FAULTS)
 STORED_WITHIN_S: Final = 0.8e-3 * P2_STAR_MS
 LAST_STORED_WITHIN_S: Final = 0.8  # the end of the run waits for it
 SELF_TEST_CYCLES: Final = 2400
@@ -110,7 +109,7 @@ class Server:
         outputs = batch.records["outputs"]
         starting = np.nan_to_num(outputs["mode"]) == STARTING
         for row, failed in enumerate(fault_mask(outputs).tolist()):
-            tested = _ALL & ~INPUT_FAULTS if starting[row] else _ALL
+            tested = ~INPUT_FAULTS if starting[row] else ~0
             record = batch.records[row : row + 1]
             self.memory.add(failed, tested, lambda record=record: snapshot(record))  # type: ignore[misc]
         self.last = batch.records[-1:]

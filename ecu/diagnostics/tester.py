@@ -8,10 +8,10 @@ import can
 
 from ecu.bus.addresses import Addresses, parse_addresses
 from ecu.diagnostics import read_faults
-from ecu.diagnostics.fault_memory import CONFIRMED, STATUS_NAMES
+from ecu.diagnostics.fault_memory import AGEING_CYCLES, CONFIRMED, STATUS_NAMES, TEST_FAILED
 from ecu.diagnostics.identifiers import BY_NAME, BY_NUMBER, TEXTS, UNITS, snapshot_values, to_values
 from ecu.diagnostics.services import ALL_GROUPS, CLEAR, NEGATIVE, POSITIVE, READ_DATA, READ_FAULTS
-from ecu.diagnostics.session import PENDING, REASONS
+from ecu.diagnostics.session import P2_STAR_MS, PENDING, REASONS
 from ecu.diagnostics.transport import Link
 from ecu.diagnostics.trouble_codes import BY_NUMBER as CODES
 from ecu.diagnostics.trouble_codes import TROUBLE_CODES, code_text
@@ -20,7 +20,7 @@ from ecu.output import give
 
 PATIENCE_S: Final = 1.0
 """For the first byte of a response; P2 is 50 ms, and the way there and back."""
-PATIENCE_PENDING_S: Final = 5.0  # P2*
+PATIENCE_PENDING_S: Final = 1e-3 * P2_STAR_MS
 TURN_S: Final = 0.01
 ACTIONS: Final = ("faults", "clear", "read", "info")
 
@@ -123,7 +123,8 @@ def _faults(ask: Ask) -> int:
         found.append(_details(ask, number, status))
     for fault in found:
         print(f"{fault['code']}  {fault['name']}: {'active' if fault['active'] else 'not active now'}")
-        print(f"  {fault['occurrences']} times, ageing {fault['ageing']} of 40 starts; {fault['remedy']}")
+        ageing = f"ageing {fault['ageing']} of {AGEING_CYCLES} starts"
+        print(f"  {fault['occurrences']} times, {ageing}; {fault['remedy']}")
         for label in ("first",) if fault["first"] == fault["last"] else ("first", "last"):
             if text := _snapshot_text(fault[label]):
                 print(f"  {label}: {text}")
@@ -141,7 +142,7 @@ def _details(ask: Ask, number: int, status: int) -> dict[str, object]:
         "code": code_text(number),
         "name": known.fault.name if known else "not known to this program",
         "remedy": known.fault.remedy if known else "",
-        "active": bool(status & 1),
+        "active": bool(status & TEST_FAILED),
         "status": [name for place, name in enumerate(STATUS_NAMES) if status >> place & 1],
         "occurrences": records.get(read_faults.OCCURRENCES, 0),
         "ageing": records.get(read_faults.AGEING, 0),

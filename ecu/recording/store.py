@@ -9,7 +9,7 @@ by the vehicle's name alone: they outlive a new version and a changed configurat
 
 import sqlite3
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -37,15 +37,13 @@ def open_store(folder: Path) -> sqlite3.Connection:
     return open_file(folder / FILE)
 
 
-@contextmanager
-def open_to_read(folder: Path) -> Iterator[sqlite3.Connection]:
+def open_to_read(folder: Path) -> AbstractContextManager[sqlite3.Connection]:
     """Open the store in `folder`, or a copy in memory where the folder cannot be written, as on a full disk.
 
     Raises:
         UserError: neither is possible.
     """
-    with open_file_to_read(folder / FILE) as store:
-        yield store
+    return open_file_to_read(folder / FILE)
 
 
 def identity(folder: Path) -> tuple[int, int] | None:

@@ -3,10 +3,9 @@
     -a  ~  sum of the callipers of  2 A_k r_eff mu_nominal (p - p_0) / (m r)  +  motors
 
 Friction may be half or nearly twice the nominal one, so that only a scale beyond shows, also in the brakings
-that road and tyres do not limit; a wrong scale of one
-calliper shows against the other side of its axle (`sides`). Front and rear are exchanged if the rear wheels
-would have to bear more than the front ones for their load, and would not the other way round: no car is built
-so.
+that road and tyres do not limit; a wrong scale of one calliper shows against the other side of its axle
+(`sides`). Front and rear are exchanged if the rear wheels would have to bear more than the front ones for
+their load, and would not the other way round: no car is built so.
 """
 
 from typing import Final, NamedTuple
