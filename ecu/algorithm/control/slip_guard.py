@@ -1,7 +1,8 @@
 """Slip guard: holds the pressure at a wheel beyond its tyre's range, returns it once the wheel recovers.
 
     lag    = |v_i| - |omega| r                       speed deficit of a wheel [m/s]; slip = -lag / |v_i|
-    growth = -d(|omega| r)/dt - braking of the car   rate of that deficit [m/s^2], low-passed
+    growth = -d(|omega| r)/dt - braking of the car   rate of that deficit [m/s^2], median of three samples,
+                                                     low-passed
 
 begins   slip beyond `RANGE` while the lag grows: the cap is the pressure demanded last
 cut      slip beyond `RANGE` that grows, or beyond `HALF` and the wheel is not coming back: the cap falls
@@ -10,11 +11,12 @@ return   slip within `RANGE` or steady, or the car slower than `LEAST_SPEED`: th
          acts
 
 The rate is the wheel's own against the accelerometer, not against the vehicle speed: a speed that errs, jumps
-or stands still caps nothing. `GROWING` rises with the noise of the wheel's speed, `NOISE` sigma, by its
-second differences. A wheel that brakes no more spins up within `SPIN_UP_S` on ice too; one that does not has
-a sensor that lies. One that slips by less than `HALF` and neither falls behind nor comes back for `STEADY_S`
-is in the stable range of its tyre, or its sensor is scaled. The pressure of both returns, and is capped again
-only where the deficit grows anew.
+or stands still caps nothing. A wheel that locks falls behind from sample to sample; a wheel speed that jumps
+once, and is scaled or shifted from then on, does not: hence the median. `GROWING` rises with the noise of the
+wheel's speed, `NOISE` sigma, by its second differences. A wheel that brakes no more spins up within
+`SPIN_UP_S` on ice too; one that does not has a sensor that lies. One that slips by less than `HALF` and
+neither falls behind nor comes back for `STEADY_S` is in the stable range of its tyre, or its sensor is
+scaled. The pressure of both returns, and is capped again only where the deficit grows anew.
 
 While ABS or ESP report activity the cap never falls: two controllers would cut the same wheel. This is no
 ABS: it seeks no optimal slip, has no yaw control and treats each wheel alone.
@@ -42,6 +44,7 @@ SLIP_GUARD_STATE = np.dtype(
         ("noise", "f8", (4,)),  # of that speed [m/s]
         ("growth", "f8", (4,)),  # m/s^2
         ("latest", "f8", (4,)),  # of the last sample alone [m/s^2]
+        ("before", "f8", (4,)),  # of the sample before that
         ("age", "f8", (4,)),  # of the lag [s]
         ("freed_s", "f8", (4,)),  # time at push-out pressure without spinning up
         ("steady_s", "f8", (4,)),  # time for which it has slipped less than `HALF` and steadily
@@ -86,14 +89,17 @@ def _follow_lag(
         fall, age = state.rolled[i] - rolled, state.age[i]
         if math.isfinite(fall):
             gain = 1.0 - math.exp(-age / GROWTH_LAG)
-            state.latest[i] = fall / age - braking
-            state.growth[i] += gain * (state.latest[i] - state.growth[i])
+            before, last, latest = state.before[i], state.latest[i], fall / age - braking
+            state.before[i], state.latest[i] = last, latest
+            middle = max(min(before, last), min(max(before, last), latest))
+            state.growth[i] += gain * (middle - state.growth[i])
             jerk = abs(fall - state.fall[i]) / SECOND_DIFFERENCE
             state.noise[i] += (1.0 - math.exp(-age / NOISE_S)) * (jerk - state.noise[i])
             state.fall[i] = fall
         state.lag[i], state.rolled[i], state.age[i] = ground - rolled, rolled, 0.0
     if not (usable(inputs, WHEEL_SPEED + i) and math.isfinite(state.lag[i] + state.growth[i])):
-        state.lag[i] = state.growth[i] = state.latest[i] = state.noise[i] = state.fall[i] = 0.0
+        state.lag[i] = state.growth[i] = state.latest[i] = state.before[i] = 0.0
+        state.noise[i] = state.fall[i] = 0.0
         state.rolled[i] = math.nan
 
 

@@ -229,7 +229,17 @@ def test_growth_is_low_passed_with_20_ms(wheels: Wheels) -> None:
     for _ in range(20):
         wheels.cycle(0.0)
     wheels.cycle(-0.05)  # 1 m/s in 10 ms
+    assert wheels.state["growth"][0] == 0.0  # once: that may be a jump of the signal
+    wheels.cycle(-0.10)
     assert wheels.state["growth"][0] == pytest.approx(100.0 * (1.0 - math.exp(-0.5)))
+
+
+@pytest.mark.parametrize("jump", [-0.2, -0.5, 0.2])
+def test_a_wheel_speed_that_jumps_once_caps_nothing(wheels: Wheels, jump) -> None:
+    wheels.cycle(0.0)
+    for _ in range(50):
+        wheels.cycle(jump)
+    assert not wheels.state["capped"].any()
 
 
 def test_an_abs_that_is_half_said_to_work_does_not(params, feed) -> None:
