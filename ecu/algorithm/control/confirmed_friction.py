@@ -10,8 +10,10 @@ since is taken back, until r is `AGREES`; where that is not enough, up to `LOWER
 too: the linings have changed since. All is given again slowly. A friction that falls raises the pressure: it
 is followed.
 
-d is what the accelerometer has moved by against the wheels of late (c of `accel_error.py`), as far as it is
-positive: a drift, or the road. It counts where friction is lowered beyond what was confirmed.
+d is what the accelerometer has moved by against the wheels of late (c of `accel_error.py`): a drift, or the
+road. A negative d counts against a rise: two witnesses, accelerometer and wheels, must confirm what lowers
+the pressure. A positive one counts where friction is lowered beyond what was confirmed. On a road that falls
+away a true rise waits until d is usual, and the car brakes the harder for it.
 """
 
 import numpy as np
@@ -76,11 +78,15 @@ def confirm_friction(
     moves = estimate.speed > LEAST_SPEED and estimate.measured != 0
     steady = calm and moves and abs(decel - state.asked) < STEADY * decel
     state.steady_s = state.steady_s + dt if steady else 0.0
-    if estimate.measured == 0:  # left out: what was taken on its word is given again
-        state.back = max(state.back - TAKE * dt, 0.0)
+    if estimate.measured == 0:  # left out: nobody confirms a rise, and nothing is taken on its word
+        state.back += min(max(1.0 - state.back, -TAKE * dt), TAKE * dt)
     if state.steady_s < SETTLED_S:
         return
-    drifted = max(accel_offset - state.usual, 0.0) if state.back >= 1.0 else 0.0
+    drifted = accel_offset - state.usual
+    if state.back >= 1.0:
+        drifted = max(drifted, 0.0)
+    else:
+        drifted = min(drifted, 0.0) if state.friction[0] > 0.0 else 0.0
     share = (state.given + drifted) / state.asked
     missing = min(max(((AGREES if state.back > 0.0 else LEAST) - share) / WIDTH, -1.0), 1.0)
     if state.back > 1.0 or (state.back == 1.0 and missing > 0.0):

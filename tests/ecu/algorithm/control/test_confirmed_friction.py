@@ -63,6 +63,18 @@ CASES = [
     ("it rises while the linings rub less", {"believed": 1.4 * MU, "true": 0.85 * MU}, 0.85, 0.91),
     ("linings that have gone are not made up for", {"true": 0.5 * MU}, 0.69, 0.71),
     ("the car stands", {"reads": DECEL, "speed": 0.0}, 1.0, 1.0),
+    (
+        "it rises by an accelerometer that the wheels deny",
+        {"believed": 1.15 * MU, "reads": -0.6, "offset": -0.6},
+        1.0,
+        1.06,
+    ),
+    (
+        "the linings rub less on a road that falls away",
+        {"true": 0.9 * MU, "believed": 0.9 * MU, "offset": -0.6},
+        0.9,
+        0.9,
+    ),
     ("a wheel slips", {"believed": 1.4 * MU, "calm": False}, 1.4, 1.4),
     (
         "it reads less: no less friction than confirmed",
@@ -117,11 +129,17 @@ def test_an_accelerometer_that_is_lost_says_nothing(params) -> None:
     assert not car.state["friction"].any()
 
 
+def test_a_rise_is_not_followed_while_the_accelerometer_is_left_out(car) -> None:
+    car.estimate["measured"] = 0
+    car.brake(3.0, believed=1.4 * MU)
+    assert car.law["used"] == pytest.approx([MU] * 4)
+
+
 def test_what_an_accelerometer_took_is_given_again_once_it_is_left_out(car) -> None:
     """It reads 1 m/s^2 less, until the other sensors deny it."""
     car.brake(1.0, reads=1.0)
     assert car.state["back"] > 0.5
     car.estimate["measured"] = 0
     car.brake(0.3, reads=0.0)
-    assert car.state["back"] == 0.0
+    assert car.state["back"] == 1.0  # nothing below what was confirmed
     assert car.law["used"] == pytest.approx(np.full(4, MU), rel=0.02)
