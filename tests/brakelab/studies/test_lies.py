@@ -160,3 +160,23 @@ def test_a_car_is_driven() -> None:
     (same,) = cells("suv", "straight", "rain", 1, ("stuck at 0",))
     assert (same.least_short, same.most_long, same.alarms) == (1.0, 1.0, 0)
     assert same.cause.friction == pytest.approx((1.0, 1.0))
+
+
+HELD = [
+    # car, road, input, lie: force over demand for 0.3 s at least, for 2 s at most
+    ("suv-blended", "downhill", "wheel speeds front", "-20 %", 0.97, 1.03),  # 0.41 while one jump was a slip
+    ("suv-blended", "downhill", "wheel speeds front", "zero -5 %", 0.97, 1.03),  # 0.43
+    ("suv", "downhill", "vehicle_speed", "zero -0.1 %/s", 0.97, 1.08),  # 1.51 by the wheels' word alone
+    ("sedan", "straight", "vehicle_speed", "zero -0.1 %/s", 0.97, 1.10),  # 1.48
+    ("suv", "split", "accel_x", "ramp -1 %/s", 0.95, 1.10),  # 0.80 once it was left out
+    ("sedan", "curve", "accel_x", "zero -1 %/s", 0.85, 1.05),  # 0.70
+]
+
+
+@pytest.mark.study
+@pytest.mark.parametrize(("car", "road", "name", "lie", "least", "most"), HELD)
+def test_a_lie_that_once_took_the_brakes_takes_them_no_longer(car, road, name, lie, least, most) -> None:
+    [found] = cells(car, road, name, 1, (lie,))
+    print(f"{found.least_short:.2f} to {found.most_long:.2f}")
+    assert found.least_short > least
+    assert found.most_long < most

@@ -9,7 +9,7 @@ enter the variance.
 import math
 
 from ecu.algorithm.brake import brake_gain_per_bar
-from ecu.algorithm.estimation.joint.kalman import REJECT, clear_derivatives, correct
+from ecu.algorithm.estimation.joint.kalman import GATE, REJECT, clear_derivatives, correct
 from ecu.algorithm.estimation.joint.layout import (
     BALANCE_RATIO,
     BIAS,
@@ -34,7 +34,7 @@ SLIDING_FORCE = 0.3  # relative error of the brake force taken for the force of 
 BALANCE_FLOOR = 0.01  # m/s^2, unmodelled in the balance
 BALANCE_SHARE = 0.004  # of the deceleration
 ACROSS = 0.4  # of the lateral acceleration: stands for a smaller error that lasts a second
-PERSISTS_S = 0.3  # of a rejected balance while braking: then friction is wrong, not the measurement
+PERSISTS_S = 0.3  # beyond the gate on one side while braking: then the state is wrong, not the measurement
 SKEW_ACCEL = 0.5  # windows between acceleration and torques
 
 
@@ -73,6 +73,17 @@ def predict_balance(params: Record, state: Record, braking: bool) -> float:
 
 
 @kernel
+def _left_before(params: Record, state: Record, left: float) -> float:
+    """Return the residual [m/s^2] that the friction before this application would leave, of `left` now."""
+    x = state.x
+    for i in range(4):
+        moved = x[LEVEL + i] + x[CHANGE + i // 2] - state.before[i]
+        torque = brake_torque(params, state, i, state.window.common_pressure[i])
+        left -= torque * (1.0 - math.exp(-moved)) / (params.wheel_radius[i] * params.mass)
+    return left
+
+
+@kernel
 def correct_by_balance(params: Record, state: Record, braking: bool) -> None:
     """Correct the state by the force balance along the car, unless a wheel's force is limited by the road."""
     w, wild = state.window, 0.0
@@ -98,7 +109,11 @@ def correct_by_balance(params: Record, state: Record, braking: bool) -> None:
             variance += (SLIDING_FORCE * per_bar * w.pressure[i]) ** 2
     wild *= max(params.sigma_motor_torque - SCALE_ONLY, 0.0)
     variance += wild * wild * (1.0 if braking else COLOURED)
-    reject = REJECT if state.rejected_s < PERSISTS_S else math.inf
-    ratio = correct(state, -left, variance, reject)
-    state.rejected_s = state.rejected_s + w.time if braking and ratio > REJECT * REJECT else 0.0
+    since = state.left_s if state.left_s * left > 0.0 else 0.0
+    persists = abs(since) >= PERSISTS_S
+    wheels_err = persists and abs(_left_before(params, state, left)) < abs(left)
+    gate, reject = math.inf if wheels_err else GATE, math.inf if persists else REJECT
+    ratio = correct(state, -left, variance, gate, reject)
+    beyond = braking and ratio > GATE * GATE
+    state.left_s = since + math.copysign(w.time, left) if beyond else 0.0
     state.ratio[BALANCE_RATIO] = ratio

@@ -73,10 +73,13 @@ def _corrects(free: Record, i: int, only_speed: bool) -> bool:
 
 
 @kernel
-def correct(state: Record, innovation: float, variance: float, reject: float = REJECT) -> float:
+def correct(
+    state: Record, innovation: float, variance: float, gate: float = GATE, reject: float = REJECT
+) -> float:
     """Fuse a measurement with derivatives `state.h` and noise `variance`; return its test ratio.
 
-    `reject`: standard deviations of the innovation beyond which nothing is corrected.
+    `gate`, `reject`: standard deviations of the innovation beyond which it counts as if on the gate, and
+    beyond which nothing is corrected.
     """
     p, h, ph, x, free = state.p, state.h, state.ph, state.x, state.free
     total = variance
@@ -92,9 +95,9 @@ def correct(state: Record, innovation: float, variance: float, reject: float = R
     ratio = innovation * innovation / total
     if not math.isfinite(ratio) or ratio > reject * reject:
         return ratio
-    outlier = ratio > GATE * GATE
+    outlier = ratio > gate * gate
     if outlier:
-        total = innovation * innovation / (GATE * GATE)
+        total = innovation * innovation / (gate * gate)
     only_speed = outlier and not free[LEVEL]
     scale = innovation / total
     for i in range(N):

@@ -118,7 +118,8 @@ JOINT_STATE: Final = np.dtype(
         ("releasing", "u1"),
         ("released", "u1"),  # no friction brake is applied
         ("unmeasured_s", "f8"),  # time without an accelerometer: the acceleration is that of the torques [s]
-        ("rejected_s", "f8"),  # time for which the balance has been rejected while braking [s]
+        ("before", "f8", (4,)),  # LEVEL before this brake application
+        ("left_s", "f8"),  # time for which the balance is beyond its gate while braking, signed as it is [s]
         ("untrusted_s", "f8"),  # time since a wheel was last trusted [s]
         ("hold_s", "f8"),  # time for which learning stays suspended after a wheel left its tyre's range
         ("reference_s", "f8"),  # time since the last speed reference [s]

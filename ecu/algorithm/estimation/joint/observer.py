@@ -286,6 +286,8 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     learning = learning and not _learning_forbidden(params, state, inputs, braking)
     if not braking:
         learning = learning and abs(w.across) < STRAIGHT and state.released != 0
+        for i in range(4):
+            state.before[i] = x[LEVEL + i]
     if learning and not braking and motors <= MOTORS:
         learning = w.balanced and abs(predict_balance(params, state, False)) < UNEXPLAINED
     _choose_free(state, braking, motors > MOTORS, learning)

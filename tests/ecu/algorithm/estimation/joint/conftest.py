@@ -58,6 +58,7 @@ class Car:
         self.load = self.params["static_load"].copy()
         self.radius = np.ones(4)  # of the wheels, over the configured one
         self.hydraulics = np.zeros(1, HYDRAULICS_STATE)[0]
+        self.reference_zero = 0.0  # m/s, of the speed reference
         self.time = 0.0
         self.braked = False
 
@@ -119,7 +120,7 @@ class Car:
             if not self.motion["measured"]:
                 self.motion["accel_x"] = self.modelled(bar, motor)
             new[VEHICLE_SPEED] = reference and k % 2 == 0
-            value[VEHICLE_SPEED] = self.speed + sigma["vehicle_speed"] * normal()
+            value[VEHICLE_SPEED] = self.speed + self.reference_zero + sigma["vehicle_speed"] * normal()
             self.observe(bool(bar.any()) if braking is None else braking)
             yield self.state
 

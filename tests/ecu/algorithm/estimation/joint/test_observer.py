@@ -51,6 +51,22 @@ STAYS = [
 ]
 
 
+@pytest.mark.parametrize("rate", [-0.1, -0.06, 0.06, 0.1])
+def test_a_speed_reference_that_drifts_does_not_outvote_the_accelerometer(new_car, rate: float) -> None:
+    """As it falls behind, all wheels seem to slip less, as if linings gave less; the balance denies it."""
+    car = new_car(speed=28.0)
+    lever = car.params["piston_area"] * car.params["effective_radius"] * np.repeat([38.0, 30.0], 2)
+    off = []
+    for _ in range(4):
+        for seconds, how in [(1.0, {})] + [(1.0, BRAKING)] * 4 + [(1.0, {"motor": -900.0})] * 4:
+            car.reference_zero += rate * seconds  # m/s
+            state = car.drive(seconds, **how)
+            if how is BRAKING:
+                off.append(lever @ friction(state) / lever.sum() - 1.0)
+    print(f"{rate:+.2f} m/s^2: force believed {100 * min(off):+.0f} to {100 * max(off):+.0f} %")
+    assert max(map(abs, off)) < 0.1
+
+
 @pytest.mark.parametrize("reference", [True, False])
 @pytest.mark.parametrize(("name", "how"), STAYS, ids=[row[0] for row in STAYS])
 def test_what_is_right_stays_right(new_car, name: str, how, reference: bool) -> None:
