@@ -12,6 +12,10 @@ and where it is off by more than `SLID`, `SPIN_UP_S` later, so a wheel that slid
 The vehicle speed is judged where it is slower than the wheels and nothing drives them, and where it is faster
 while they roll freely, or while dead reckoning agrees with them. A constant error of less than
 `FARTHEST_BASE` is another radius.
+
+Braked wheels that slip together leave the car. Dead reckoning does not follow a median that is more than
+`LEAVES` below it, but the vehicle speed where the two agree, and stands for the median. For `SPIN_UP_S` more
+no wheel is judged as one that rolls freely, or as too slow.
 """
 
 import math
@@ -30,9 +34,10 @@ SPEEDS_STATE = np.dtype(
     [
         ("told", "f8", (WITNESSES,)),  # car's speed by wheels, vehicle speed, reckoning [m/s]; NaN: silent
         ("sorted", "f8", (WITNESSES,)),
-        ("apart", "f8", (5,)),  # excess of an input over the median, relative, low-passed
+        ("apart", "f8", (5,)),  # excess of an input over the median or reckoning, relative, low-passed
         ("base", "f8", (5,)),  # the same while rolling: error of the radius
         ("spins_s", "f8", (4, 2)),  # time for which a wheel that was braked, or driven, may still slide
+        ("left_s", "f8"),  # the same of all that slid together
         ("rolled_s", "f8"),  # learning time of that, at most `BASE_S`
         ("reckoned", "f8"),  # m/s
         ("slope", "f8"),  # of the road and the accelerometer's zero [m/s^2]
@@ -57,6 +62,7 @@ DRAGGED_ACCEL = -0.7  # m/s^2, an engine that holds wheels on ice
 TORQUE = 60.0  # N m, above which a wheel is braked or driven
 RECKON, SLOPE_RECKON = 0.8, 0.16  # 1/s, 1/s^2: critically damped at 0.4 rad/s
 RECKON_REACH = 0.04  # of the speed, greatest innovation
+LEAVES = 0.5 * SLID  # of the speed: reckoning and wheels that slip by `SLID` have this median
 
 
 @kernel
@@ -99,28 +105,43 @@ def _median(state: Record, witness: Record) -> float:
 
 
 @kernel
-def _reckon(state: Record, inputs: Record, accel: float, median: float, dt: float) -> None:
-    """Advance dead reckoning; without an accelerometer it is the median."""
+def _wheels_left(state: Record, median: float) -> bool:
+    """Return whether braked wheels' median is below the car's speed, and no vehicle speed agrees with it."""
+    speed = state.told[SPEED]
+    below = median < (1.0 - LEAVES) * state.reckoned
+    left: bool = state.started != 0 and below and not speed < 0.5 * (median + state.reckoned)
+    return left
+
+
+@kernel
+def _reckon(
+    state: Record, witness: Record, inputs: Record, accel: float, median: float, left: bool, dt: float
+) -> None:
+    """Advance dead reckoning; without an accelerometer it is the median. `left`: see `_wheels_left`."""
     if not (state.started and usable(inputs, ACCEL_X)):
         state.reckoned, state.slope, state.started = median, 0.0, 1
         return
     reach = RECKON_REACH * max(median, LEAST_SPEED)
     innovation = min(max(median - state.reckoned, -reach), reach)
+    if left:
+        innovation = state.told[SPEED] - state.reckoned
+        if not (abs(innovation) < LEAVES * state.reckoned) or witness.rejected[VEHICLE_SPEED]:
+            innovation = 0.0
     state.slope -= SLOPE_RECKON * dt * innovation
     state.reckoned += (accel - state.slope + RECKON * innovation) * dt
 
 
 @kernel
-def _judged(state: Record, i: int, median: float, free: bool, braked: bool, driven: bool) -> float:
+def _judged(state: Record, i: int, ground: float, free: bool, braked: bool, driven: bool) -> float:
     """Return by how much input `i` contradicts the others, over the speed; NaN: nothing is said of it.
 
-    Where wheels slip together the median slips with them: then dead reckoning and vehicle speed count.
+    Where wheels slip together the median, `ground`, slips with them: dead reckoning and vehicle speed count.
     """
     apart: float = state.apart[i] - state.base[i]
     if free:
         return apart
     if i < SPEED:
-        reckoned, speed = state.reckoned / median, state.told[SPEED] / median
+        reckoned, speed = state.reckoned / ground, state.told[SPEED] / ground
         if not math.isfinite(speed):
             speed = 1.0
         faster = apart + 1.0 - max(reckoned, speed, 1.0)
@@ -131,7 +152,7 @@ def _judged(state: Record, i: int, median: float, free: bool, braked: bool, driv
     if apart < 0.0:
         return math.nan if driven else apart
     away = abs(state.told[SPEED] - state.reckoned)
-    judged = away > 2.0 * abs(median - state.reckoned) + SLIPPING * median
+    judged = away > 2.0 * abs(ground - state.reckoned) + SLIPPING * ground
     return max(apart - SLIPPING, 0.0) if judged else math.nan
 
 
@@ -160,39 +181,45 @@ def watch_speeds(
         dt: time since the last cycle [s].
     """
     _gather(params, state, inputs, estimate)
-    median = _median(state, witness)
-    if estimate.backwards or not median > LEAST_SPEED:
+    median, accel = _median(state, witness), estimate.accel_x
+    braked = accel < DRAGGED_ACCEL
+    for i in range(4):
+        braked = braked or estimate.brake_torque[i] > TORQUE
+    left = braked and _wheels_left(state, median)
+    ground = state.reckoned if left else median
+    if estimate.backwards or not ground > LEAST_SPEED:
         state.started = 0
         for i in range(5):
             state.apart[i] = state.base[i]
         return
-    _reckon(state, inputs, estimate.accel_x, median, dt)
-    accel = estimate.accel_x
+    _reckon(state, witness, inputs, accel, median, left, dt)
     accelerates = driver_accelerates(inputs) or accel > DRIVEN_ACCEL
     free = not accelerates and accel > DRAGGED_ACCEL
+    state.left_s = SPIN_UP_S if left else max(state.left_s - dt, 0.0)
+    free = free and state.left_s == 0.0
     for i in range(4):
         torque = estimate.brake_torque[i] + motor_torque(inputs, i)
         free = free and abs(torque) < TORQUE
     state.rolled_s = min(state.rolled_s + dt, BASE_S) if free else state.rolled_s
     found = state.rolled_s >= FOUND_S
-    tolerance = TOLERANCE + ABSOLUTE / median + (0.0 if found else UNFOUND)
+    tolerance = TOLERANCE + ABSOLUTE / ground + (0.0 if found else UNFOUND)
     if free and found:
         tolerance = ROLLING + ROLLING_ACROSS * abs(estimate.accel_y)
-        tolerance += (ABSOLUTE + LAG_S * abs(accel)) / median
+        tolerance += (ABSOLUTE + LAG_S * abs(accel)) / ground
     for i in range(5):
         if math.isnan(state.told[i]):
             continue
         told = state.told[i] / (1.0 - state.base[i])
-        state.apart[i] += (told / median - 1.0 - state.apart[i]) * min(dt / SMOOTHING_S, 1.0)
+        state.apart[i] += (told / ground - 1.0 - state.apart[i]) * min(dt / SMOOTHING_S, 1.0)
         braking, motor = estimate.brake_torque[i % 4], motor_torque(inputs, i % 4)
         braked, driven = False, accelerates or motor < -TORQUE
         if i < SPEED:
-            braked = braking + motor > TORQUE or accel < DRAGGED_ACCEL
-        apart = _judged(state, i, median, free, braked, driven)
+            braked = braking + motor > TORQUE or accel < DRAGGED_ACCEL or state.left_s > 0.0
+        apart = _judged(state, i, ground, free, braked, driven)
         if i < SPEED and _slides(state, i, apart, braked, driven, dt):
             apart = math.nan
         place = _place(i)
-        unit = median / params.wheel_radius[i] if i < SPEED else median
+        unit = ground / params.wheel_radius[i] if i < SPEED else ground
         judge(witness, place, apart * unit, tolerance * unit, DOUBT_S, dt)
         if free and not witness.rejected[place] and abs(apart) < tolerance:
             base = state.base[i] + (state.apart[i] - state.base[i]) * dt / max(state.rolled_s, dt)

@@ -61,6 +61,8 @@ CASES = [
     ("brakes with 3 % of slip", (0.97, 0.97, 0.97, 0.97, 1), -4.0, 0.0, 3.0, ()),
     ("a wheel locks", (1, 1, 0.0, 1, 1), -4.0, 0.0, 3.0, ()),
     ("all slide", (0.6, 0.6, 0.6, 0.6, 1), -4.0, 0.0, 1.5, ()),
+    ("all slide, and the speed reads 40 % more", (0.6, 0.6, 0.6, 0.6, 1.4), -4.0, 0.0, 0.5, NAMES[4:]),
+    ("all lock on ice", (0.1, 0.1, 0.1, 0.1, 1), -1.5, 0.0, 12.0, ()),
     ("an axle spins", (1, 1, 1.3, 1.3, 1), 2.0, 50.0, 3.0, ()),
     ("three wheels spin", (1.4, 1, 1.4, 1.4, 1), 3.0, 50.0, 2.0, ()),
     ("three wheels lock", (0.3, 1, 0.3, 0.3, 1), -3.0, 0.0, 2.0, ()),
@@ -91,6 +93,18 @@ def test_a_wheel_that_locked_on_ice_has_time_to_spin_up(road) -> None:
     assert road.drive(0.3, (1, 0.7, 1, 1, 1), -0.5) == ()
     assert road.drive(0.5, (1, 0.5, 1, 1, 1), -1.5) == ()
     assert road.drive(1.0, (1, 0.7, 1, 1, 1), -0.5) == NAMES[1:2]
+
+
+@pytest.mark.parametrize("reference", [True, False])
+@pytest.mark.parametrize("rest", [(1, 1, 1, 1, 1), (0.95, 0.95, 0.98, 0.95, 1)])
+def test_wheels_that_slip_together_again_and_again_contradict_nobody(params, feed, reference, rest) -> None:
+    """A guard releases all brakes and applies them again, twice a second, until the car is slow."""
+    road = Road(params, feed, reference)
+    road.drive(5.0)
+    for _ in range(24):
+        assert road.drive(0.3, (0.5, 0.6, 0.7, 0.6, 1), -2.0) == ()
+        assert road.drive(0.15, rest, -0.3) == ()
+    assert road.drive(1.0) == ()
 
 
 def test_a_wheel_that_reads_too_little_is_found_in_a_coast_that_is_short(road) -> None:
