@@ -40,6 +40,8 @@ def figures(stop: Stop) -> Figures:
         ({"what": "bit", "bit": "E2E rejections", "within": 9.0}, "never", False),  # it stood before
         ({"what": "no_bit", "bit": "wheel slips"}, "never", True),
         ({"what": "no_bit", "bit": "IMU lost"}, "at t = 2.10 s", False),
+        ({"what": "no_bit", "bit": "IMU lost", "t": 2.0}, "at t = 2.10 s", False),
+        ({"what": "no_bit", "bit": "IMU lost", "t": 9.0}, "never", True),
         ({"what": "mode", "mode": "degraded", "within": 0.1}, "after 0.1 s", True),
         ({"what": "mode", "mode": "failed", "within": 1.0}, "never", False),
         ({"what": "mode", "mode": "active", "within": 0.6, "t": 2.5}, "after 0.56 s", True),

@@ -46,6 +46,7 @@ def test_a_mode_is_any_of_the_ecu() -> None:
             "wheel_speed_fr implausible within 0.1 s of t = 9 s",
         ),
         ({"what": "no_bit", "bit": "late"}, "never late"),
+        ({"what": "no_bit", "bit": "late", "t": 2.5}, "never late from t = 2.5 s on"),
         ({"what": "mode", "mode": "degraded", "within": 0.2}, "degraded within 0.2 s of fault 1"),
         ({"what": "mode", "mode": "active", "t": 9.5}, "active at t = 9.5 s"),
         ({"what": "recovered", "within": 0.5}, "recovered within 0.5 s after fault 1"),

@@ -88,7 +88,7 @@ def account_for(
     """Return the fault bits that nothing accounts for, and those that the car's linings account for.
 
     `drive` are the ECU's results, `truth` the vehicle's on its own axis; `usual`: bits shown without the
-    scenario's faults too.
+    scenario's faults too, or expected by it.
     """
     rises = raised_alone(drive, truth, faults)
     beyond = beyond_compensation(truth, vehicle)
@@ -117,7 +117,9 @@ def outcome(
     longer = sound.longer(seen.stop.distance)
     timings = [read_timing(folder) for folder in recordings]
     lateness = np.concatenate([timing.lateness for timing in timings]) if timings else np.array([np.nan])
-    alone, of_linings = account_for(seen.drive, own, scenario.fault, vehicle, sound.faults)
+    expected = {one.fault_bit.name for one in scenario.expect if one.what == "bit"}
+    usual = sound.faults | expected
+    alone, of_linings = account_for(seen.drive, own, scenario.fault, vehicle, usual)
     return Outcome(
         scenario=name,
         seconds=float(own.t[-1]),

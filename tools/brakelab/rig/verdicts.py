@@ -44,7 +44,7 @@ def _verdict(one: Expectation, seen: Figures, longer: float, faults: Sequence[Fa
             bits = seen.reactions[one.fault - 1].bits if one.t is None else raised(drive, one.t)
             return _in_time(one, dict(bits).get(one.fault_bit.name, math.nan))
         case "no_bit":
-            rows = (drive.t >= 0.0) & (drive.t <= seen.truth.t[-1])
+            rows = (drive.t >= (one.t or 0.0)) & (drive.t <= seen.truth.t[-1])
             rows &= (fault_masks(drive) & one.fault_bit.bit) != 0
             at = 1e-3 * first_after(drive.t, rows, 0.0)
             return Verdict(one.text, "never" if math.isnan(at) else f"at t = {at:.2f} s", math.isnan(at))

@@ -27,7 +27,7 @@ _SINCE: Final = {"t", "fault"}
 _LIMITS: Final = {"at_most", "at_least"}
 KEYS: Final[dict[str, set[str]]] = {
     "bit": {"bit", "within", *_SINCE},
-    "no_bit": {"bit"},
+    "no_bit": {"bit", "t"},
     "mode": {"mode", "within", *_SINCE},
     "recovered": {"within", "fault"},
     "stopping_distance": _LIMITS,
@@ -111,7 +111,8 @@ class Expectation(ScenarioTable):
             case "bit":
                 return f"{self.fault_bit.name} within {self.within:g} s {since}"
             case "no_bit":
-                return f"never {self.fault_bit.name}"
+                since = "" if self.t is None else f" from t = {self.t:g} s on"
+                return f"never {self.fault_bit.name}{since}"
             case "mode" if self.within is None:
                 return f"{self.mode} at t = {self.t:g} s"
             case "mode":
