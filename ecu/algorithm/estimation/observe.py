@@ -6,6 +6,7 @@ It changes its own records of `STATE`, the learned values, and `estimate`, which
 import math
 
 from ecu.algorithm.estimation.friction import update_pressure
+from ecu.algorithm.estimation.joint.ceiling import follow_ceiling
 from ecu.algorithm.estimation.joint.estimates import tell_joint
 from ecu.algorithm.estimation.joint.learned import hand_over_level, keep_joint, restore_joint
 from ecu.algorithm.estimation.joint.observer import update_joint
@@ -156,6 +157,8 @@ def _observe_jointly(
     if guarded or contradicted:
         suspend_learning(joint)
     update_joint(p, joint, u, s.motion, s.wheel_load.load, s.hydraulics, braking, dt)
+    if joint.closed and p.transmit:
+        follow_ceiling(p, joint, braking)
     if joint.closed and joint.released and not p.transmit:
         compare_drive(p, s.whole, joint)
     if braking and joint.closed:

@@ -5,6 +5,7 @@ import math
 from ecu.algorithm.brake import brake_gain_per_bar
 from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO, remembered_exp
 from ecu.algorithm.estimation.friction import resting_mode
+from ecu.algorithm.estimation.joint.ceiling import KNOWN
 from ecu.algorithm.estimation.joint.kalman import GATE
 from ecu.algorithm.estimation.joint.layout import (
     BALANCE_RATIO,
@@ -13,7 +14,6 @@ from ecu.algorithm.estimation.joint.layout import (
     LEVEL,
     MASS,
     OVERRUN,
-    PEAK,
     RATE,
     REFERENCE_RATIO,
     STIFFNESS,
@@ -21,8 +21,7 @@ from ecu.algorithm.estimation.joint.layout import (
     V,
 )
 from ecu.algorithm.estimation.joint.observer import WINDOW_S
-from ecu.algorithm.estimation.joint.prior import PRIOR
-from ecu.algorithm.estimation.joint.wheel import LEAST_OF_PEAK, friction, peak_adhesion
+from ecu.algorithm.estimation.joint.wheel import friction
 from ecu.algorithm.estimation.zero import tell_zeros
 from ecu.algorithm.inputs import usable
 from ecu.contract.params import GRAVITY
@@ -146,10 +145,9 @@ def tell_joint(
     estimate.test_ratio_balance = _test_ratio(state, BALANCE_RATIO)
     estimate.test_ratio_speed = _test_ratio(state, REFERENCE_RATIO)
     tell_zeros(state.zero, estimate)
-    if state.p[PEAK, PEAK] < (0.5 * PRIOR[PEAK]) ** 2:
-        estimate.grip_limit = GRAVITY * peak_adhesion(state, 1.0)
-        sigma = math.sqrt(state.p[PEAK, PEAK]) / max(1.0 - 4.0 * x[PEAK], LEAST_OF_PEAK)
-        estimate.sigma_grip_limit = estimate.grip_limit * sigma
+    if 0.0 < state.ceiling_variance < KNOWN**2:
+        estimate.grip_limit = GRAVITY * state.ceiling
+        estimate.sigma_grip_limit = estimate.grip_limit * math.sqrt(state.ceiling_variance)
     for i in range(4):
         estimate.slip[i], estimate.force[i] = state.slip[i], state.force[i]
         estimate.test_ratio[i] = _test_ratio(state, WHEEL_RATIO + i)

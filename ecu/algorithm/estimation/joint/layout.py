@@ -115,6 +115,10 @@ JOINT_STATE: Final = np.dtype(
             "u1",
             (4,),
         ),  # 1: beyond the linear range of its tyre, its torque does not indicate its force
+        ("ceiling", "f8"),  # peak adhesion of the road by wheels that slip
+        ("ceiling_variance", "f8"),  # of its logarithm; 0: unknown
+        ("measured_slip", "f8", (4,)),  # by speed and wheel speed, positive while braking
+        ("slipping", "u1", (4,)),  # past the linear range of the tyre, by that
         ("releasing", "u1"),
         ("released", "u1"),  # no friction brake is applied
         ("unmeasured_s", "f8"),  # time without an accelerometer: the acceleration is that of the torques [s]
