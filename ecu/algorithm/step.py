@@ -101,6 +101,7 @@ from ecu.contract.faults import (
     BRAKE_FADE,
     DEMAND_LIMITED,
     FILTER_RESET,
+    GRIP_EXCEEDED,
     IMPLAUSIBLE,
     LEARNED_AT_BOUND,
     LEARNING_GIVEN_UP,
@@ -260,6 +261,8 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
         faults |= REAR_HELD
     if s.control.at_limit:
         faults |= BRAKE_FADE
+    if s.control.beyond_grip:
+        faults |= GRIP_EXCEEDED
     if s.estimate.at_bound:
         faults |= LEARNED_AT_BOUND
     if s.estimate.given_up:
@@ -301,7 +304,7 @@ def _control(p: Record, s: Record, u: Record, dt: float) -> float:
     watch_trailing(p, s.distribution, u, e, failed, decel, speed, reckoned, dt)
     distribute(p, s.distribution, e.mass, decel, backwards, dt)
     held = s.guard.acting != 0 or s.distribution.trailing < 1.0 or s.failed_brakes.any != 0
-    calm = not (held or backwards or others_brake(u))
+    calm = not (held or backwards or s.control.beyond_grip or others_brake(u))
     torque, allowed = s.distribution.torque, s.blending.allowed
     if p.minimised:
         straight, share = calm and abs(e.accel_y) <= CALM_ACROSS, front_share(p, decel)
@@ -340,4 +343,5 @@ def _limit(p: Record, s: Record, available: float, decel: float, dt: float) -> N
             p, s.blending, lagging_torque(p, s.hydraulics.value, s.control, asked, i), i
         )
         demands.motor[i] = motor if blends(p) else math.nan
-    watch_limit(p, s.control, s.estimate.mu, s.guard.capped, decel > 0.0, dt)
+    slips = s.guard.acting != 0 or s.distribution.trailing < KEPT
+    watch_limit(p, s.control, s.estimate, s.guard.capped, slips, decel, dt)

@@ -81,6 +81,7 @@ _CONTRADICTED: Final = (
 )  # fmt: skip
 IMPLAUSIBLE: Final = {row[0]: 1 << (WORD + place) for place, row in enumerate(_CONTRADICTED)}
 """Bit of each input that is watched, by its name."""
+GRIP_EXCEEDED: Final = 1 << (WORD + 29)
 REAR_HELD: Final = 1 << (WORD + 30)
 
 FAULTS: Final = (
@@ -116,6 +117,7 @@ FAULTS: Final = (
     Fault(BRAKE_FAILED, "brake gives nothing", "a calliper has far less pressure than demanded, and the car brakes less by its share: the other wheels and the motors brake in its place", "stop; look for a leak, a valve that does not open, or a line that is shut"),
     Fault(DEMAND_LOST, "automated demand lost", "an automated demand that was followed is stale or invalid without having been withdrawn: it is kept for 0.1 s while its frames come, then the pedal alone brakes", "check the sender of decel_demand: range, decel_demand_valid, cycle"),
     *(Fault(IMPLAUSIBLE[name], f"{name} implausible", meaning, remedy) for name, meaning, remedy in _CONTRADICTED),
+    Fault(GRIP_EXCEEDED, "demand beyond grip", "more deceleration is demanded than road and tyres give, as wheels that slip show: pressure is not raised for what is missing", "brake earlier; compare decel_demand_total and grip_limit in the report"),
     Fault(REAR_HELD, "trailing axle held back", "its wheels slip more than those of the leading axle: torque has moved to the leading axle", "compare slip and friction of both axles in the report"),
 )  # fmt: skip
 

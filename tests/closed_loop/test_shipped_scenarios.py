@@ -17,8 +17,8 @@ from ecu.settings.config import load_config
 
 CONFIG = Path(__file__).parents[2] / "config"
 CUT = 60.0
-"""s; of a scenario that lasts longer only this is driven, but for two whose end is of interest."""
-WHOLE = ("fade", "downhill")
+"""s; of a scenario that lasts longer only this is driven, but for three whose end is of interest."""
+WHOLE = ("fade", "downhill", "snow")
 ROWS = NDArray[np.float64]
 
 
@@ -55,6 +55,7 @@ FACTS = {
     "demo": Fact((50, 58), 0.0, 27.8, (5.0, 6.5)),
     "downhill": Fact((177, 179), 0.0, 14.0, (0.5, 0.9), disc=(200, 300)),
     "fade": Fact((140, 170), 5.6, 27.8, (3.3, 3.6), disc=(350, 500)),
+    "fade-descent": Fact((26, 28), 0.0, 40.0, (2.9, 3.5), disc=(300, 400)),
     "fixed-decel": Fact(LONG, CUT_OFF, 13.9, (1.2, 1.4)),
     "fixed-pedal": Fact(LONG, CUT_OFF, 27.8, (0.9, 1.1)),  # Table 6.1: about 1
     "hand-over": Fact((7, 8), 0.0, 20.8, (3.9, 4.4)),
@@ -70,6 +71,7 @@ FACTS = {
     "repeated-slow": Fact((15, 18), 0.0, 36.1, (4.0, 4.5)),
     "sensitivity": Fact(LONG, CUT_OFF, 27.8, (0.7, 1.0)),
     "single": Fact((6, 8), 0.0, 20.8, (3.9, 4.5)),
+    "snow": Fact((70, 76), 0.0, 25.0, (3.9, 4.4), disc=(100, 200)),
     "split": Fact((6.4, 6.6), 19.1, 22.3, (1.5, 2.3), (0.5, 4.0)),
     "staircase": Fact((30, 60), 27.0, 27.8, (4.0, 5.3)),
     "stop-1": Fact((13, 16), 0.0, 33.4, (3.8, 4.4)),

@@ -10,7 +10,8 @@ is the torque of the lining alone (5.4). The second order leaves a torque error 
 and reverses beyond it; the inverse has no such limit. "off" takes nominal friction always. The base changes
 between applications only, so that a noisy estimate never is a divisor. The friction used moves at most
 `FRICTION_RATE` a second: the loop through estimator and hydraulics (26 ms dead time) stays slow against both.
-Where a pressure is unavailable it falls no further, which would gain nothing.
+Where a pressure is unavailable, or more is demanded than road and tyres give, it falls no further: that would
+gain nothing.
 
 Many linings rub harder as speed falls and start the next application lower again (assumption; the simulated
 car's rear linings by a sixth). So the base is the learned friction times the ratio of initial to final
@@ -39,6 +40,8 @@ PRESSURE_LAW_STATE = np.dtype(
         ("cut", "u1", (4,)),  # the last pressure was cut by limiter or slip guard
         ("limit_s", "f8"),  # time for which the deceleration has not been reached
         ("at_limit", "u1"),  # it was too long in this application
+        ("beyond_s", "f8"),  # time for which more than the ceiling of grip has been demanded [s]
+        ("beyond_grip", "u1"),  # it is too long: pressure is not raised any further
     ],
     align=True,
 )
@@ -83,7 +86,7 @@ def follow_friction(params: Record, state: Record, estimate: Record, dt: float) 
             target = max(target * math.exp(-2.0 * doubt), base)
         target = confirmed_friction(state.confirmed, target, i)
         target = min(max(target, LEAST_RATIO * params.mu_nominal[i]), GREATEST_RATIO * params.mu_nominal[i])
-        least = 0.0 if state.cut[i] else -step
+        least = 0.0 if state.cut[i] or state.beyond_grip else -step
         state.used[i] += min(max(target - state.used[i], least), step)
 
 
@@ -130,23 +133,33 @@ def compensated_pressure(params: Record, state: Record, pressure: float, corner:
 
 
 @kernel
-def watch_limit(params: Record, state: Record, mu: Record, guarded: Record, asked: bool, dt: float) -> None:
-    """Report, until the application ends, that the demanded deceleration was not reached for `LIMIT_S`.
+def watch_limit(
+    params: Record, state: Record, estimate: Record, guarded: Record, slips: bool, decel: float, dt: float
+) -> None:
+    """Report what has kept the car from the demanded deceleration for `LIMIT_S`.
+
+    More than road and tyres give (`beyond_grip`) explains what is missing; otherwise linings or hydraulics do
+    (`at_limit`, until the application ends).
 
     Args:
         params: `PARAMS`.
-        state: `PRESSURE_LAW_STATE`; `at_limit` and `limit_s` are overwritten.
-        mu: friction as estimated, shape (4,).
+        state: `PRESSURE_LAW_STATE`; the last four fields are overwritten.
+        estimate: `ESTIMATE`, for friction and the ceiling of grip.
         guarded: wheels held by the slip guard, shape (4,): not a limit of compensation.
-        asked: a deceleration is demanded.
+        slips: a wheel or an axle is held back by its slip; otherwise the ceiling counts with one sigma more.
+        decel: demanded [m/s^2], NaN: unknown.
         dt: time since the last cycle [s].
     """
+    asked, mu = decel > 0.0, estimate.mu
+    beyond = decel > estimate.grip_limit + (0.0 if slips else estimate.sigma_grip_limit)
+    state.beyond_s = state.beyond_s + dt if beyond else 0.0
+    state.beyond_grip = 1 if state.beyond_s > LIMIT_S else 0
     short = False
     for i in range(4):
         e = (mu[i] - state.base[i]) / state.base[i]
         faded = params.compensation != OFF and e < -GREATEST_CHANGE
         short = short or faded or (state.cut[i] != 0 and guarded[i] == 0)
-    state.limit_s = state.limit_s + dt if short and asked else 0.0
+    state.limit_s = state.limit_s + dt if short and asked and not beyond else 0.0
     if not asked:
         state.at_limit = 0
     elif state.limit_s > LIMIT_S:

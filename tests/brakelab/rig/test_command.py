@@ -102,7 +102,7 @@ def test_a_shipped_scenario_passes_and_fails_by_a_time_out_that_is_shorter_than_
     text = resource("config/scenarios/faults/lost.toml").read_text("utf-8")
     (tmp_path / "strict.toml").write_text(text.replace("within = 0.15 ", "within = 0.05 "))
     arguments = ["rig", "--config", "suv", "--lock-step", "--seed", "1", "--out", str(tmp_path / "out")]
-    assert cli.main([*arguments, "lost", "calliper-dead", "killed-standby"]) == 0
+    assert cli.main([*arguments, "lost", "calliper-dead", "killed-standby", "snow", "fade-descent"]) == 0
     assert "FAILED" not in capsys.readouterr().out
     assert cli.main([*arguments, str(tmp_path / "strict.toml")]) == 1
     failed = [line for line in capsys.readouterr().out.splitlines() if "FAILED" in line]

@@ -38,9 +38,10 @@ def law(base: float = 0.45, used: float = 0.45):
     return state[0]
 
 
-def estimated(mu: object, sigma: float = 0.02, observed_s: float = 2.0):
-    """Return what the observer says."""
+def estimated(mu: object, sigma: float = 0.02, observed_s: float = 2.0, grip=(math.nan, math.nan)):
+    """Return what the observer says; `grip`: ceiling and its sigma [m/s^2]."""
     estimate = np.zeros(1, ESTIMATE)
+    estimate["grip_limit"], estimate["sigma_grip_limit"] = grip
     estimate["mu"], estimate["sigma"], estimate["observed_s"] = mu, sigma, observed_s
     return estimate[0]
 
@@ -240,23 +241,60 @@ def test_when_the_driver_is_told_that_the_brakes_fade(
     params["compensation"] = compensation
     state = law()
     state["cut"][2] = cut
-    mu, guard = np.array([0.45, estimate, 0.45, 0.45]), np.array([0, 0, guarded, 0])
+    guard, known = np.array([0, 0, guarded, 0]), estimated([0.45, estimate, 0.45, 0.45])
     after = []
     for _ in range(40):
-        watch_limit(params[0], state, mu, guard, asked, 0.01)
+        watch_limit(params[0], state, known, guard, False, 4.0 * asked, 0.01)
         after.append(int(state["at_limit"]))
     assert after[28] == 0, case  # 0.29 s
     assert after[-1] == told, case
 
 
 def test_what_the_driver_is_told_lasts_until_the_brakes_are_released() -> None:
-    state, faded, well = law(), np.full(4, 0.3), np.full(4, 0.45)
+    state, faded, well = law(), estimated(0.3), estimated(0.45)
     seen = []
-    for mu, asked, cycles in ((faded, True, 40), (well, True, 100), (well, False, 1), (well, True, 40)):
+    for known, decel, cycles in ((faded, 4.0, 40), (well, 4.0, 100), (well, 0.0, 1), (well, 4.0, 40)):
         for _ in range(cycles):
-            watch_limit(PARAMS, state, mu, np.zeros(4), asked, 0.01)
+            watch_limit(PARAMS, state, known, np.zeros(4), False, decel, 0.01)
         seen.append(int(state["at_limit"]))
     assert seen == [1, 1, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("case", "limit", "sigma", "slips", "mu", "decel", "beyond", "faded"),
+    [
+        ("nothing is known of the road", math.nan, math.nan, False, 0.3, 5.0, 0, 1),
+        ("a dry road, linings fade", 9.0, 0.5, False, 0.3, 5.0, 0, 1),
+        ("a dry road, all is well", 9.0, 0.5, False, 0.45, 5.0, 0, 0),
+        ("the road explains what is missing", 2.5, 0.2, True, 0.45, 5.0, 1, 0),
+        ("the road explains it, whatever the linings do", 2.5, 0.2, True, 0.3, 5.0, 1, 0),
+        ("within the ceiling's sigma, no wheel slips", 4.9, 0.2, False, 0.45, 5.0, 0, 0),
+        ("within its sigma, wheels slip", 4.9, 0.2, True, 0.45, 5.0, 1, 0),
+        ("below it wheels slip for another cause", 5.2, 0.2, True, 0.45, 5.0, 0, 0),
+        ("nobody asks for anything", 2.5, 0.2, True, 0.3, 0.0, 0, 0),
+        ("the request is unknown", 2.5, 0.2, True, 0.3, math.nan, 0, 0),
+    ],
+)
+def test_either_the_ceiling_of_grip_or_the_brakes_are_told(
+    case, limit, sigma, slips, mu, decel, beyond, faded
+) -> None:
+    state, after = law(), []
+    for _ in range(40):
+        watch_limit(PARAMS, state, estimated(mu, grip=(limit, sigma)), np.zeros(4), slips, decel, 0.01)
+        after.append((int(state["beyond_grip"]), int(state["at_limit"])))
+    assert after[28] == (0, 0), case  # 0.29 s
+    assert after[-1] == (beyond, faded), case
+
+
+def test_more_than_the_road_gives_raises_no_pressure() -> None:
+    """The friction in use falls no further while the demand is beyond grip; it may rise."""
+    state, estimate = law(), estimated(0.3)
+    state["beyond_grip"] = 1
+    follow_friction(PARAMS, state, estimate, 0.1)
+    assert state["used"] == pytest.approx([0.45] * 4)
+    state["beyond_grip"] = 0
+    follow_friction(PARAMS, state, estimate, 0.1)
+    assert (state["used"] < 0.45).all()
 
 
 def test_the_ideal_controller_of_the_laboratory_is_exact(params) -> None:
