@@ -1,8 +1,8 @@
 """`brake-ecu config check`: every mistake of a CONFIG file, or the figures of its car.
 
 The figures are for reading: torque per pressure, pressures of a braking, the distribution beside the ideal
-one, how hard the whole pedal brakes, how far the car is from what ECE R13-H forbids. Swapped numbers that are
-possible show there.
+one, how hard the whole pedal brakes, how much of it a road holds, how far the car is from what ECE R13-H
+forbids. Swapped numbers that are possible show there.
 """
 
 from pathlib import Path
@@ -14,11 +14,13 @@ from ecu.algorithm.control.distribution import front_share
 from ecu.contract.params import BAR, GRAVITY
 from ecu.output import fault, give
 from ecu.settings.annex3 import LEAST_DECEL, full_braking
-from ecu.settings.annex5 import K_RULED, Z_ORDERED, Load, shares, utilisation
+from ecu.settings.annex5 import DEMANDED, K_RULED, Z_ORDERED, Load, shares, utilisation
 from ecu.settings.annex5_picture import picture
 from ecu.settings.config import Config, new_params, torque_per_bar, validate_config, violations
 
 RATES: Final = (0.2, 0.4, 0.6, 0.8)  # braking rates z
+ROADS: Final = (0.2, 0.4, 0.6, 0.8)
+"""Adhesion from snow to a dry road."""
 
 
 def check(path: Path, pictured: bool = False) -> int:
@@ -89,7 +91,31 @@ def figures(config: Config, params: Any) -> list[str]:
         f"Annex 3       {loads[-1].name}: at the end of the pedal, {params['pedal_decel'][-1]:.2f} m/s^2, "
         f"the linings alone brake by {full_braking(params, loads[-1]):.2f} m/s^2 ({LEAST_DECEL} in 2.1.1)"
     )
+    lines += [grip(params, load) for load in loads]
     return lines + [line for load in loads for line in margins(params, load)]
+
+
+def held_demand(params: Any, load: Load, road: float) -> float:
+    """Return the demand [m/s^2] at which the first axle uses all of a road's adhesion, nominal friction."""
+    curve = utilisation(params, shares(params), load)
+    return float(np.interp(road, np.maximum(curve.front, curve.rear), DEMANDED)) * GRAVITY
+
+
+def grip(params: Any, load: Load) -> str:
+    """Return what the brakes can be asked for on `ROADS`, and the adhesion that the whole pedal takes."""
+    held = [held_demand(params, load, road) for road in ROADS]
+    pedal = [float(np.interp(one, params["pedal_decel"], params["pedal_position"])) for one in held]
+    most = float(params["pedal_decel"][-1])
+    curve = utilisation(params, shares(params), load)
+    needs = float(np.interp(most / GRAVITY, DEMANDED, np.maximum(curve.front, curve.rear)))
+    roads, demands, travels = (
+        ", ".join(format(one, form) for one in row)
+        for row, form in ((ROADS, ".1f"), (held, ".1f"), (pedal, ".0f"))
+    )
+    return (
+        f"grip          {load.name}: roads of {roads} hold a demand of {demands} m/s^2, {travels} % of the "
+        f"pedal; all of it, {most:.1f} m/s^2, needs {needs:.2f}"
+    )
 
 
 def axle_torque_per_bar(params: Any) -> tuple[float, float]:

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from ecu import cli
-from ecu.settings.check import axle_torque_per_bar, figures, pressures
+from ecu.algorithm.control.distribution import front_share
+from ecu.settings.check import axle_torque_per_bar, figures, grip, held_demand, pressures
 from ecu.settings.config import load_config, new_params
 
 CONFIGS = Path(__file__).parents[3] / "config"
@@ -80,6 +81,37 @@ def test_pressures_brake_the_car_at_the_rate_and_use_both_axles_alike(path: Path
     behind = car.wheelbase - car.front_axle
     on_front = car.mass * 9.81 * (behind + z * car.cog_height) / car.wheelbase
     assert forces[0] / on_front == pytest.approx(forces[1] / (car.mass * 9.81 - on_front))
+
+
+@pytest.mark.parametrize("path", CARS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("laden", [False, True])
+@pytest.mark.parametrize("road", [0.2, 0.6])
+def test_a_road_holds_the_demand_at_which_the_first_axle_uses_all_of_it(
+    path: Path, laden: bool, road: float
+) -> None:
+    """By the forces of both axles and moments about the contact of the rear tyres; z of the loaded car."""
+    config = load_config(path)
+    params, load = new_params(config)[0], config.vehicle.loads()[-1 if laden else 0]
+    demand = held_demand(params, load, road)
+    force = demand * config.vehicle.mass
+    front = force * front_share(params, demand)
+    behind, rate = config.vehicle.wheelbase - load.front_axle, force / (load.mass * 9.81)
+    on_front = load.mass * 9.81 * (behind + rate * load.cog_height) / config.vehicle.wheelbase
+    used = front / on_front, (force - front) / (load.mass * 9.81 - on_front)
+    assert max(used) == pytest.approx(road, rel=1e-3)
+    held = [
+        float(one)
+        for one in re.findall(r"demand of (.*) m/s\^2, .* pedal;", grip(params, load))[0].split(",")
+    ]
+    assert held[0 if road == 0.2 else 2] == pytest.approx(demand, abs=0.06)
+
+
+def test_the_whole_pedal_is_told_with_the_adhesion_that_it_needs() -> None:
+    """10 m/s^2 at the ideal distribution: both axles use 10 / 9.81."""
+    config = load_config(CONFIGS / "suv.toml")
+    said = grip(new_params(config)[0], config.vehicle.loads()[0])
+    assert said.endswith("all of it, 10.0 m/s^2, needs 1.02")
+    assert "unladen: roads of 0.2, 0.4, 0.6, 0.8 hold a demand of 2.0, 3.9, 5.9, 7.8 m/s^2" in said
 
 
 def test_pistons_counted_on_both_sides_show_as_twice_the_torque(tmp_path: Path) -> None:
