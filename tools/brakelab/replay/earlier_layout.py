@@ -39,6 +39,7 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "ceiling",
         "ceiling_variance",
         "measured_slip",
+        "rolling_slip",
         "slipping",
         "beyond_s",
         "beyond_grip",

@@ -17,7 +17,6 @@ where it is contradicted: the road is another one.
 import math
 
 from ecu.algorithm.estimation.joint.layout import LEVEL, PEAK, STIFFNESS, V
-from ecu.algorithm.estimation.joint.sliding import YIELDING
 from ecu.algorithm.estimation.joint.wheel import LEAST_OF_PEAK, SHAPE, car_force, peak_adhesion
 from ecu.jit import Record, kernel
 
@@ -29,14 +28,16 @@ OF_SHAPE = 0.5  # of what the curve has fallen from its peak, or has yet to rise
 LEAST_SHARE = 0.3  # of the peak
 OF_CHANGE = 0.5  # of the change of slip in a window: error of a wheel's force, and of the share of the peak
 NEAR = 0.8  # of the learned peak that the car uses: there slip shows where the bend is
+ROLLING_S, CALM = 1.0, 1.0  # s, m/s^2: what a wheel slips by while it rolls is an error of its radius
 LASTS_S = 0.5  # for which an error of the curve's shape is the same
+SLIPS = 0.1  # slip that no error of the speed explains; a wheel on a dry road has its peak there
 GATE = 3.0
 LEAST_ADHESION, LEAST_SPEED = 0.03, 4.0  # -, m/s
 ITERATIONS = 4
 
 
 @kernel
-def _correct(state: Record, measured: float, lasting: float, passing: float) -> None:
+def _correct(state: Record, measured: float, lasting: float, passing: float, windows: float) -> None:
     """Correct the ceiling by a measured peak adhesion.
 
     Args:
@@ -44,13 +45,14 @@ def _correct(state: Record, measured: float, lasting: float, passing: float) -> 
         measured: peak adhesion.
         lasting: relative variance of what is the same in every window: it is never averaged away.
         passing: that of the rest.
+        windows: in which that is the same.
     """
     before, innovation = state.ceiling_variance, 0.0
     if before > 0.0:
         innovation = math.log(measured / state.ceiling)
     if before == 0.0 or innovation * innovation > GATE * GATE * (before + lasting + passing):
         state.ceiling, before, innovation = measured, PRIOR**2, 0.0
-    gain = before / (before + lasting + passing)
+    gain = before / (before + lasting + passing * windows)
     state.ceiling *= math.exp(gain * innovation)
     state.ceiling_variance = max(before * (1.0 - gain), min(before, lasting))
 
@@ -89,7 +91,9 @@ def follow_ceiling(params: Record, state: Record, braking: bool) -> None:
         state.ceiling_variance += FORGETS**2 * w.time
         if state.ceiling_variance > PRIOR**2:
             state.ceiling_variance = 0.0
-    speed = state.x[V]
+    speed, calm = state.x[V], False
+    if state.released and state.hold_s <= 0.0:
+        calm = abs(w.accel) < CALM and state.x[V] > LEAST_SPEED
     known = braking and state.unmeasured_s == 0.0 and speed > LEAST_SPEED
     rest, load, slips, doubt, changed = 0.0, 0.0, 0.0, 0.0, 0.0
     left = right = False
@@ -97,9 +101,12 @@ def follow_ceiling(params: Record, state: Record, braking: bool) -> None:
         r, load = params.wheel_radius[i], load + w.load[i]
         slip = 1.0 - w.omega[i] * r / max(w.ground[i], LEAST_SPEED)
         if w.omega_samples[i] == 0:
-            slip = 0.0
+            slip = state.rolling_slip[i]
+        elif calm:
+            state.rolling_slip[i] += (slip - state.rolling_slip[i]) * min(w.time / ROLLING_S, 1.0)
+        slip -= state.rolling_slip[i]
         change, state.measured_slip[i] = slip - state.measured_slip[i], slip
-        state.slipping[i] = 1 if slip > YIELDING else 0
+        state.slipping[i] = 1 if slip > SLIPS else 0
         if state.slipping[i]:
             slips += w.load[i]
             left, right = left or i % 2 == 0, right or i % 2 == 1
@@ -116,7 +123,7 @@ def follow_ceiling(params: Record, state: Record, braking: bool) -> None:
     learned = peak_adhesion(state, 1.0)
     if total > NEAR * learned * load:
         relative = math.sqrt(state.p[PEAK, PEAK]) / max(1.0 - 4.0 * state.x[PEAK], LEAST_OF_PEAK)
-        _correct(state, learned, FLOOR**2 + relative * relative, 0.0)
+        _correct(state, learned, FLOOR**2 + relative * relative, 0.0, 1.0)
     if not (left and right and total - rest > LEAST_ADHESION * slips):
         return
     used = math.hypot((total - rest) / slips, w.across)
@@ -126,5 +133,5 @@ def follow_ceiling(params: Record, state: Record, braking: bool) -> None:
         peak = used / share
     lasting = FLOOR**2 + (doubt / (total - rest)) ** 2
     shape = OF_SHAPE * (1.0 / share - 1.0)
-    passing = shape * shape * max(LASTS_S / w.time, 1.0) + (OF_CHANGE * changed / slips) ** 2
-    _correct(state, peak, lasting, passing)
+    passing = shape * shape + (OF_CHANGE * changed / slips) ** 2
+    _correct(state, peak, lasting, passing, max(LASTS_S / w.time, 1.0))

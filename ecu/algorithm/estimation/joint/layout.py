@@ -117,7 +117,8 @@ JOINT_STATE: Final = np.dtype(
         ),  # 1: beyond the linear range of its tyre, its torque does not indicate its force
         ("ceiling", "f8"),  # peak adhesion of the road by wheels that slip
         ("ceiling_variance", "f8"),  # of its logarithm; 0: unknown
-        ("measured_slip", "f8", (4,)),  # by speed and wheel speed, positive while braking
+        ("measured_slip", "f8", (4,)),  # by speed and wheel speed, positive while braking, less the next one
+        ("rolling_slip", "f8", (4,)),  # while it rolls freely: error of the radius
         ("slipping", "u1", (4,)),  # past the linear range of the tyre, by that
         ("releasing", "u1"),
         ("released", "u1"),  # no friction brake is applied
