@@ -1,9 +1,10 @@
-"""Ring in shared memory: written by the cycle without waiting, read by any process.
+"""Ring in shared memory: written by the cycle without waiting (`publish.py`), read by any process.
 
 The file holds a header, a description (JSON), the state before the first cycle, a slot per cycle, the learned
-values and what was found of the inputs (of the last two cycles, in turn) and a ring of frames. A slot carries
-its number before and after its content is written (-1 between), so an overtaken reader notices and counts its
-losses. Frames are claimed before they are overwritten.
+values and what was found of the inputs (of the last two cycles, in turn) and a ring of frames. A slot holds
+what a recording keeps of a cycle, and its inputs and estimate. It carries its number before and after its
+content is written (-1 between), so an overtaken reader notices and counts its losses. Frames are claimed
+before they are overwritten.
 
 The file is its owner's alone: made anew (O_EXCL, O_NOFOLLOW), mode 0600, and read only if it belongs to the
 reader's user. Its writer holds a lock on it for its lifetime, across namespaces.
@@ -22,9 +23,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ecu.contract.records import CYCLE, FRAME, INPUT_WATCH, LEARNED, OUTPUTS, RecordArray
+from ecu.algorithm.estimate import ESTIMATE
+from ecu.contract.records import CYCLE, FRAME, INPUT_WATCH, INPUTS, LEARNED, OUTPUTS, RecordArray
 from ecu.errors import UserError
-from ecu.jit import kernel
 from ecu.recording.lock import lock
 
 SLOTS: Final = 2400  # 24 s of cycles
@@ -32,7 +33,11 @@ FRAMES: Final = 131072  # 29 s of a classical bus at 45 frames per cycle
 
 # One cycle as stored in the ring's slots and in a recording's cycles.bin.
 RECORDED: Final = np.dtype([("cycle", CYCLE), ("outputs", OUTPUTS)], align=True)
-_SLOT: Final = np.dtype([("number", "i8"), ("first_frame", "i8"), ("recorded", RECORDED)], align=True)
+# What is measured of a cycle beside it: what step read, and what it estimated.
+BESIDE: Final = np.dtype([("inputs", INPUTS), ("estimate", ESTIMATE)], align=True)
+_SLOT: Final = np.dtype(
+    [("number", "i8"), ("first_frame", "i8"), ("recorded", RECORDED), ("beside", BESIDE)], align=True
+)
 _LATEST: Final = np.dtype([("learned", LEARNED), ("watched", INPUT_WATCH)], align=True)
 _LAST_WORDS_BYTES: Final = 3072
 _HEADER: Final = np.dtype(
@@ -50,7 +55,7 @@ _HEADER: Final = np.dtype(
         ("last_words", f"S{_LAST_WORDS_BYTES}"),  # JSON
     ]
 )
-_MAGIC: Final = int.from_bytes(b"ecuring4", "little")
+_MAGIC: Final = int.from_bytes(b"ecuring5", "little")
 _PAGE: Final = 4096
 _NO_OBJECT: Final = (ValueError, TypeError, RecursionError)  # of JSON
 
@@ -184,53 +189,6 @@ def create_ring(
     return ring
 
 
-def publish(
-    ring: Ring,
-    cycle: RecordArray,
-    outputs: RecordArray,
-    learned: RecordArray,
-    watched: RecordArray,
-    frames: RecordArray,
-) -> None:
-    """Write one cycle with its `cycle["frames"]` frames, the first of `frames`; never waits.
-
-    The claims are outside the kernel that fills, where a compiler could move or drop them.
-    """
-    header = ring.header[0]
-    number, begin = int(header["written"]), int(header["frames_written"])
-    end = begin + int(cycle["frames"][0])
-    place = number % len(ring.slots)
-    numbers = ring.slots["number"]
-    numbers[place] = -1
-    header["frames_claimed"] = end
-    _fill(ring.slots, place, ring.frames, begin, end, cycle, outputs, frames)
-    latest = ring.latest[number % 2]
-    latest["learned"], latest["watched"] = learned[0], watched[0]
-    header["frames_written"] = end
-    numbers[place] = number
-    header["written"] = number + 1
-
-
-# Arrays, not records: handing a numpy record to a kernel costs 10 us, an array 0.6 us.
-@kernel
-def _fill(
-    slots: RecordArray,
-    place: int,
-    ring_frames: RecordArray,
-    begin: int,
-    end: int,
-    cycle: RecordArray,
-    outputs: RecordArray,
-    frames: RecordArray,
-) -> None:
-    for i in range(begin, end):
-        ring_frames[i % len(ring_frames)] = frames[i - begin]
-    slot = slots[place]
-    slot.first_frame = begin
-    slot.recorded.cycle = cycle[0]
-    slot.recorded.outputs = outputs[0]
-
-
 def close_ring(ring: Ring, last_words: dict[str, Any] | None = None) -> None:
     """Tell readers that the stream has ended; the file is freed when the last of them closes it."""
     ring.header[0]["last_words"] = json.dumps(last_words or {}).encode()
@@ -244,6 +202,8 @@ class Batch(NamedTuple):
     """RECORDED, shape (n,)."""
     frames: RecordArray
     """FRAME, the frames of these cycles in the order they were consumed."""
+    beside: RecordArray
+    """BESIDE, shape (n,)."""
 
 
 class RingReader:
@@ -330,7 +290,7 @@ class RingReader:
         self.lost_cycles += int(len(wanted) - intact.sum())
         self._next += len(wanted)
         copied = copied[intact]
-        return Batch(copied["recorded"], self._frames(copied))
+        return Batch(copied["recorded"], self._frames(copied), copied["beside"])
 
     def _frames(self, slots: RecordArray) -> RecordArray:
         ring = self.ring.frames

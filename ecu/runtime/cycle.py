@@ -18,7 +18,8 @@ from ecu.bus.transmit import slowest_demand, transmit
 from ecu.contract.records import STAGES
 from ecu.contract.signals import CYCLE_NS, DEMANDS
 from ecu.jit import CompileCounter
-from ecu.recording.ring import Ring, publish
+from ecu.recording.publish import publish
+from ecu.recording.ring import Ring
 from ecu.runtime.clock import Grid, Histogram
 from ecu.runtime.exchange import LEAD_NS, exchange
 from ecu.runtime.loop import GIVEN_UP_NS, begin, keep_rest, take_frames
@@ -78,7 +79,7 @@ def cycle_once(ecu: Ecu, channel: Channel, ring: Ring, grid: Grid, run: Progress
         grid.deadline_ns = int(cycle["t_mono_ns"][0])
     else:
         _exchange(ecu, channel, grid, run)
-    publish(ring, cycle, ecu.outputs, ecu.learned, ecu.watched, ecu.waiting)
+    publish(ring, cycle, ecu.outputs, ecu.inputs, ecu.estimate, ecu.learned, ecu.watched, ecu.waiting)
     keep_rest(ecu, run.loop)
     run.timing.add(int(cycle["lateness_ns"][0]), cycle["stage_ns"][0].tolist())
     run.number += 1

@@ -51,6 +51,8 @@ class Ecu(NamedTuple):
     """The outputs as `transmit` reads them."""
     learned: RecordArray
     """A view into the state."""
+    estimate: RecordArray
+    """Likewise."""
     watched: RecordArray
     """Likewise."""
     cycle: RecordArray
@@ -78,6 +80,7 @@ def new_ecu(
         outputs,
         output_vector(outputs),
         state["learned"],
+        state["estimate"],
         state["witness"]["published"],
         new_record(CYCLE),
         receive_plan,
@@ -98,6 +101,7 @@ def new_twin(ecu: Ecu) -> Ecu:
         outputs=outputs,
         vector=output_vector(outputs),
         learned=state["learned"],
+        estimate=state["estimate"],
         watched=state["witness"]["published"],
         cycle=ecu.cycle.copy(),
         reception=new_reception(ecu.receive_plan),

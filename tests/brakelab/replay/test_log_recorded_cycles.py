@@ -26,7 +26,7 @@ from ecu.recording.recorder import (
     start_recording,
     write_batch,
 )
-from ecu.recording.ring import RECORDED, Batch
+from ecu.recording.ring import BESIDE, RECORDED, Batch
 from ecu.settings.config import load_config, new_params
 from ecu.settings.resources import resource
 
@@ -78,7 +78,7 @@ def record(tmp_path: Path, frames: RecordArray) -> tuple[Path, RecordArray]:
         records["outputs"][k] = ecu.outputs[0]
     about = {"start_ns": START_NS, "state": layout(INITIAL)}
     files = start_recording(tmp_path / "record", about, initial)
-    write_batch(files, Batch(records, frames[begin:first]), "can0")
+    write_batch(files, Batch(records, frames[begin:first], np.zeros(CYCLES, BESIDE)), "can0")
     return files.folder, records
 
 

@@ -11,6 +11,7 @@ from structlog.testing import capture_logs
 
 from brakelab.logs.formats import read_frames
 from brakelab.logs.log_quality import LogQuality
+from ecu.algorithm.estimate import ESTIMATE
 from ecu.contract.faults import E2E_REJECTIONS
 from ecu.contract.records import (
     CYCLE,
@@ -18,12 +19,14 @@ from ecu.contract.records import (
     FRAME_EXTENDED,
     FRAME_FD,
     INPUT_WATCH,
+    INPUTS,
     LEARNED,
     OUTPUTS,
     new_record,
 )
 from ecu.errors import UserError
 from ecu.recording import store as state_store
+from ecu.recording.publish import publish
 from ecu.recording.recorder import (
     CYCLES_FILE,
     FRAMES_FILE,
@@ -34,7 +37,7 @@ from ecu.recording.recorder import (
     make_room,
     read_recording,
 )
-from ecu.recording.ring import RECORDED, RingReader, create_ring, publish
+from ecu.recording.ring import RECORDED, RingReader, create_ring
 from ecu.recording.store import open_store, restore
 from ecu.runtime import side_process
 from ecu.runtime.side_process import Recorder
@@ -69,7 +72,8 @@ class Run:
             self.cycle["frames"], self.learned["brakings"] = frames, brakings
             for name, value in outputs.items():
                 self.outputs[name] = value
-            publish(self.ring, self.cycle, self.outputs, self.learned, new_record(INPUT_WATCH), self.frames)
+            measured = (self.outputs, new_record(INPUTS), new_record(ESTIMATE))
+            publish(self.ring, self.cycle, *measured, self.learned, new_record(INPUT_WATCH), self.frames)
         self.recorder.turn()
 
 

@@ -8,10 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ecu.contract.records import CYCLE, FRAME, INPUT_WATCH, LEARNED, OUTPUTS, new_record
+from ecu.algorithm.estimate import ESTIMATE
+from ecu.contract.records import CYCLE, FRAME, INPUT_WATCH, INPUTS, LEARNED, OUTPUTS, new_record
 from ecu.contract.signals import CYCLE_NS
 from ecu.errors import UserError
 from ecu.recording import ring as ring_module
+from ecu.recording.publish import publish
 from ecu.recording.ring import (
     FRAMES,
     SLOTS,
@@ -19,7 +21,6 @@ from ecu.recording.ring import (
     close_ring,
     create_ring,
     living_rings,
-    publish,
     ring_path,
 )
 
@@ -30,6 +31,7 @@ class Writer:
     def __init__(self, path: Path, slots: int, frames: int) -> None:
         self.ring = create_ring(path, {"channel": "can0"}, b"initial", slots=slots, frames=frames)
         self.cycle, self.outputs, self.learned = new_record(CYCLE), new_record(OUTPUTS), new_record(LEARNED)
+        self.inputs, self.estimate = new_record(INPUTS), new_record(ESTIMATE)
         self.watched, self.frames = new_record(INPUT_WATCH), new_record(FRAME, 100)
         self.sent = 0
 
@@ -38,9 +40,11 @@ class Writer:
             number = int(self.ring.header["written"][0])
             self.cycle["number"], self.cycle["frames"] = number, count
             self.outputs["k_f"], self.learned["mu_b"] = number + 0.5, number
+            self.inputs["value"], self.estimate["speed"] = number + 0.125, number + 0.75
             self.watched["ratio"] = number + 0.25
             self.frames["can_id"] = (self.sent + np.arange(100)) % 2048
-            publish(self.ring, self.cycle, self.outputs, self.learned, self.watched, self.frames)
+            measured = (self.outputs, self.inputs, self.estimate)
+            publish(self.ring, self.cycle, *measured, self.learned, self.watched, self.frames)
             self.sent += count
 
 
@@ -56,6 +60,8 @@ def test_a_reader_gets_what_was_written_in_order(path):
     batch = reader.read()
     assert batch.records["cycle"]["number"].tolist() == [0, 1, 2]
     assert batch.records["outputs"]["k_f"].tolist() == [0.5, 1.5, 2.5]
+    assert set(batch.beside["inputs"]["value"][1]) == {1.125}
+    assert batch.beside["estimate"]["speed"].tolist() == [0.75, 1.75, 2.75]
     assert reader.latest("learned")["mu_b"].tolist() == [[2.0] * 4]
     assert set(reader.latest("watched")["ratio"].flat) == {2.25}
     assert batch.frames["can_id"].tolist() == list(range(10))

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ecu.algorithm.estimate import ESTIMATE
 from ecu.bus.e2e import P01_MODULO
 from ecu.bus.output_map import transmit_plan
 from ecu.bus.protocol import BusStatus
@@ -14,11 +15,12 @@ from ecu.bus.receive_plan import contract_receive_plan
 from ecu.bus.signal_map import receive_plan
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
 from ecu.contract.faults import FOREIGN_SENDER
-from ecu.contract.records import CYCLE, FRAME, INPUT_WATCH, LEARNED, OUTPUTS, new_record
+from ecu.contract.records import CYCLE, FRAME, INPUT_WATCH, INPUTS, LEARNED, OUTPUTS, new_record
 from ecu.contract.signals import CYCLE_NS, N_OUTPUTS
 from ecu.jit import CompileCounter
 from ecu.recording import ring as ring_module
-from ecu.recording.ring import RingReader, create_ring, publish
+from ecu.recording.publish import publish
+from ecu.recording.ring import RingReader, create_ring
 from ecu.runtime.clock import Grid, TimeSource
 from ecu.runtime.cycle import Progress, cycle_once
 from ecu.runtime.memory import new_ecu
@@ -287,7 +289,8 @@ def first_ring(tmp_path, monkeypatch):
         for number in range(cycles):
             cycle = new_record(CYCLE)
             cycle["number"] = number
-            publish(ring, cycle, new_record(OUTPUTS), record, new_record(INPUT_WATCH), new_record(FRAME))
+            measured = (new_record(kind) for kind in (OUTPUTS, INPUTS, ESTIMATE))
+            publish(ring, cycle, *measured, record, new_record(INPUT_WATCH), new_record(FRAME))
         return ring
 
     return learned

@@ -5,13 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ecu.algorithm.estimate import ESTIMATE
 from ecu.algorithm.step import INITIAL
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
-from ecu.contract.records import CYCLE, FRAME, INPUT_WATCH, LEARNED, OUTPUTS, new_record
+from ecu.contract.records import CYCLE, FRAME, INPUT_WATCH, INPUTS, LEARNED, OUTPUTS, new_record
 from ecu.contract.signals import CYCLE_NS, INPUT, N_INPUTS
 from ecu.recording import ring as ring_module
+from ecu.recording.publish import publish
 from ecu.recording.recorder import layout
-from ecu.recording.ring import close_ring, create_ring, publish
+from ecu.recording.ring import close_ring, create_ring
 from ecu.settings.resources import resource
 
 START_NS = 1_800_000_000_000_000_000
@@ -33,6 +35,7 @@ class Loop:
         }
         self.ring = create_ring(path, self.about, new_record(INITIAL).tobytes(), slots=2400, frames=4096)
         self.cycle, self.outputs, self.learned = new_record(CYCLE), new_record(OUTPUTS), new_record(LEARNED)
+        self.inputs, self.estimate = new_record(INPUTS), new_record(ESTIMATE)
         self.watched = new_record(INPUT_WATCH)
         self.watched["value"] = self.watched["sigma"] = self.watched["ratio"] = np.nan
         self.watched["unused_s"] = np.inf
@@ -56,14 +59,18 @@ class Loop:
             self.cycle["lateness_ns"] = round(1e3 * lateness_us)
             self.frames["stamp_ns"], self.frames["can_id"] = stamp_ns, 0x123
             self.frames["length"], self.frames["data"] = 8, np.arange(64)
-            publish(self.ring, self.cycle, self.outputs, self.learned, self.watched, self.frames)
+            self._publish(self.frames)
             self.number += 1
 
     def publish_frames(self, frames) -> None:
         """Publish a cycle that consumed `frames`."""
         self.cycle["number"], self.cycle["frames"] = self.number, len(frames)
-        publish(self.ring, self.cycle, self.outputs, self.learned, self.watched, frames)
+        self._publish(frames)
         self.number += 1
+
+    def _publish(self, frames) -> None:
+        measured = (self.outputs, self.inputs, self.estimate)
+        publish(self.ring, self.cycle, *measured, self.learned, self.watched, frames)
 
     def close(self, **words) -> None:
         close_ring(self.ring, words)
