@@ -2,7 +2,8 @@
 
 import re
 import sys
-from typing import Final, NamedTuple
+from collections.abc import Iterable
+from typing import Any, Final, NamedTuple
 
 from ecu.contract.records import EXTENDED_ID
 from ecu.errors import UserError
@@ -46,14 +47,27 @@ def parse_addresses(option: str, text: str) -> Addresses:
     return Addresses(*numbers)
 
 
-def refuse_taken(option: str, addresses: Addresses, taken: set[int]) -> None:
+def refuse_taken(option: str, numbers: Iterable[int], taken: set[int]) -> None:
     """Raise UserError for an identifier of a message that the ECU sends or receives.
 
     Args:
         option: named in the error.
-        addresses: of the diagnostic connection.
+        numbers: identifiers of a connection.
         taken: identifiers, those of 29 bits with `EXTENDED_ID`.
     """
-    for number in addresses:
-        if (number | EXTENDED_ID if number > STANDARD else number) in taken:
+    for number in numbers:
+        if in_table(number) in taken:
             raise UserError(option, f"0x{number:X}", "another message has it; choose one that is free")
+
+
+def in_table(number: int) -> int:
+    """Return an identifier with `EXTENDED_ID` where it has 29 bits."""
+    return number | EXTENDED_ID if number > STANDARD else number
+
+
+def can_filters(numbers: Iterable[int]) -> list[dict[str, Any]]:
+    """Return python-can's filters for these identifiers alone."""
+    return [
+        {"can_id": one, "can_mask": 0x1FFFFFFF if one > STANDARD else STANDARD, "extended": one > STANDARD}
+        for one in numbers
+    ]

@@ -7,13 +7,9 @@ goes first. It ends with exit code 0 when the run has ended and the fault memory
 
 import argparse
 import os
-import time
 from pathlib import Path
-from typing import Final
 
-from ecu.runtime.companion import begin_companion
-
-LOOK_FOR_RING_S: Final = 0.05
+from ecu.runtime.companion import await_ring, begin_companion
 
 
 def main() -> int:
@@ -24,10 +20,8 @@ def main() -> int:
     parser.add_argument("--diagnostics", required=True)
     parser.add_argument("--state", type=Path)
     options, goes_on = begin_companion(parser)
-    while not options.ring.exists():
-        if not goes_on():
-            return 0
-        time.sleep(LOOK_FOR_RING_S)
+    if not await_ring(options.ring, goes_on):
+        return 0
     from ecu.diagnostics.serve import serve
     from ecu.recording.log import configure_logging
     from ecu.runtime.diagnostics import read_settings

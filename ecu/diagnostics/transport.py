@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 
 import can
 
-from ecu.bus.addresses import NEEDS, STANDARD
+from ecu.bus.addresses import NEEDS, STANDARD, can_filters
 from ecu.bus.channel import is_malformed, open_bus
 from ecu.errors import UserError
 
@@ -46,15 +46,7 @@ class Link:
         """Open the bus. Raises UserError: it cannot be opened, or can-isotp is missing."""
         isotp = load_isotp()
         wanted = [hears] if hears_all is None else [hears, hears_all]
-        filters = [
-            {
-                "can_id": one,
-                "can_mask": 0x1FFFFFFF if one > STANDARD else STANDARD,
-                "extended": one > STANDARD,
-            }
-            for one in wanted
-        ]
-        self._bus = open_bus(interface, channel, can_filters=filters)
+        self._bus = open_bus(interface, channel, can_filters=can_filters(wanted))
         self._hears, self._hears_all = hears, hears_all
         self._frames: deque[Any] = deque()
         self._requests: deque[Request] = deque()

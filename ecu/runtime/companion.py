@@ -1,4 +1,4 @@
-"""Processes beside the recorder that nothing depends on: those of `--metrics-port` and `--diagnostics`.
+"""Processes beside the recorder that nothing depends on: of `--metrics-port`, `--diagnostics` and `--xcp`.
 
 The supervisor starts one again when it ends, ever later while it ends soon; with exit code 0 it is done.
 """
@@ -22,6 +22,7 @@ if TYPE_CHECKING:  # the supervisor imports next to nothing
 PAUSE_S: Final = 1.0
 LONGEST_PAUSE_S: Final = 60.0
 CALM_S: Final = 60.0
+LOOK_FOR_RING_S: Final = 0.05
 
 
 class Companion:
@@ -76,6 +77,15 @@ def begin_companion(
     lower_priority()
     time.sleep(options.pause)
     return options, lambda: os.getppid() == options.parent
+
+
+def await_ring(ring: Path, goes_on: Callable[[], bool]) -> bool:
+    """Wait until the ring is there, for a starting daemon goes first; return False: `goes_on` says no."""
+    while not ring.exists():
+        if not goes_on():
+            return False
+        time.sleep(LOOK_FOR_RING_S)
+    return True
 
 
 def await_end_of(other: "subprocess.Popen[bytes]", companions: Sequence[Companion]) -> int:

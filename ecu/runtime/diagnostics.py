@@ -6,7 +6,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from ecu.bus.addresses import NEEDS, parse_addresses, refuse_taken
+from ecu.bus.addresses import NEEDS, in_table, parse_addresses, refuse_taken
 from ecu.errors import UserError
 
 OPTION: Final = "--diagnostics"
@@ -62,6 +62,11 @@ def checked_settings(
     if key is not None:
         read_secret(key)
     return Settings(interface, channel, addresses, "" if key is None else str(key.absolute())).word()
+
+
+def identifiers(addresses: str | None) -> set[int]:
+    """Return the identifiers that diagnostics on `addresses` take, those of 29 bits with `EXTENDED_ID`."""
+    return set() if addresses is None else {in_table(one) for one in parse_addresses(OPTION, addresses)}
 
 
 def read_secret(path: Path) -> bytes:

@@ -7,9 +7,10 @@ import pytest
 import structlog
 
 from ecu.diagnostics import serve as serve_module
-from ecu.diagnostics.serve import AGAIN_S, Place, serve
+from ecu.diagnostics.serve import serve
 from ecu.diagnostics.transport import Request
 from ecu.errors import UserError
+from ecu.runtime import place as place_module
 from ecu.runtime.diagnostics import Settings
 
 from .test_server import ABOUT
@@ -55,43 +56,12 @@ def wires(monkeypatch):
     return opened
 
 
-def test_a_bus_that_is_not_there_is_one_line_and_tried_again(wires):
-    clock = [100.0]
-    place = Place(SETTINGS, now_s=lambda: clock[0])
-    wire = Wire()
-    wires += [UserError("virtual x", "", "is down"), UserError("virtual x", "", "is down"), wire]
-    with structlog.testing.capture_logs() as lines:
-        for _ in range(3):
-            assert place.link() is None
-        clock[0] += AGAIN_S
-        assert place.link() is None
-        clock[0] += AGAIN_S
-        assert place.link() is wire
-    assert [line["event"] for line in lines] == ["no_diagnostics"]
-    assert "is down" in lines[0]["reason"]
-
-
-def test_a_bus_that_goes_is_told_each_time(wires):
-    clock = [100.0]
-    place = Place(SETTINGS, now_s=lambda: clock[0])
-    first, second = Wire(), Wire()
-    wires += [first, second]
-    with structlog.testing.capture_logs() as lines:
-        for wire in (first, second):
-            assert place.link() is wire
-            place.lose(can.CanOperationError("gone"))
-            assert wire.closed
-            assert place.link() is None
-            clock[0] += AGAIN_S
-    assert len(lines) == 2
-
-
 def test_it_answers_over_a_lost_bus_until_the_run_ends(wires, loop, tmp_path, monkeypatch):
     run = loop(**ABOUT)
     run.publish(5, mode=1)
     first, second = Wire(b"\x3e\x00", can.CanOperationError("gone")), Wire(b"\x14\xff\xff\xff", b"\x3e\x80")
     wires += [first, second]
-    monkeypatch.setattr(serve_module, "AGAIN_S", 0.0)
+    monkeypatch.setattr(place_module, "AGAIN_S", 0.0)
     turns = itertools.count()
 
     def goes_on():
