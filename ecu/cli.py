@@ -43,6 +43,7 @@ from ecu.arguments import (
 from ecu.cli_config import app as config_app
 from ecu.cli_diagnostics import app as diagnostics_app
 from ecu.cli_watch import app as watch_app
+from ecu.cli_xcp import app as xcp_app
 from ecu.completion import known
 from ecu.errors import Mistakes, RunFault, UserError
 from ecu.output import LOG_FORMATS, Level, fault, give, log_as, new_policy, policy, print_given
@@ -71,6 +72,7 @@ app = Commands(
 app.add_typer(config_app, name="config")
 app.add_typer(watch_app)
 app.add_typer(diagnostics_app)
+app.add_typer(xcp_app)
 
 
 def _show_version(wanted: bool) -> None:
@@ -149,6 +151,15 @@ def run(
             "--diagnostics-key", metavar="FILE", help="Secret of the tester's access; without it none gets it"
         ),
     ] = None,
+    xcp: Annotated[
+        str | None,
+        typer.Option(
+            "--xcp",
+            metavar="TRANSPORT",
+            autocompletion=known("udp:127.0.0.1:5555", "tcp:127.0.0.1:5555"),
+            help="Answer a master of XCP: udp:[ADDRESS:]PORT, tcp:[ADDRESS:]PORT or can:REQUEST:RESPONSE",
+        ),
+    ] = None,
     log_format: Annotated[
         str | None,
         typer.Option(
@@ -189,6 +200,7 @@ def run(
             metrics,
             diagnostics,
             diagnostics_key,
+            xcp,
         )
     )
 

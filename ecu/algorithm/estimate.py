@@ -66,6 +66,20 @@ ESTIMATE = np.dtype(
     align=True,
 )
 
+UNITS = {
+    **dict.fromkeys(("speed", "lateral_speed"), "m/s"),
+    **dict.fromkeys(("accel_x", "accel_x_model", "accel_y", "accel_bias", "overrun"), "m/s^2"),
+    **dict.fromkeys(("grip_limit", "sigma_grip_limit"), "m/s^2"),
+    "yaw_rate": "rad/s",
+    "steering": "rad",
+    "mass": "kg",
+    **dict.fromkeys(("tyre_force", "load", "force"), "N"),
+    "observed_s": "s",
+    "brake_torque": "N m",
+    **dict.fromkeys(("pressure_zero", "pressure_at_rest"), "bar"),
+}
+"""Of the fields of `ESTIMATE` that are no pure number."""
+
 STANDING = 0.3  # m/s, below: the brakes hold the car at standstill
 LEAST_RATIO, GREATEST_RATIO = 0.5, 1.5  # of friction over nominal
 SIGMA_FOR_LEARNING = 0.10

@@ -34,7 +34,7 @@ from ecu.recording.recorder import interface_name, layout
 from ecu.recording.restored import restored
 from ecu.recording.revisions import DAMAGED
 from ecu.recording.ring import Ring, create_ring, remove_ring, ring_path
-from ecu.runtime.diagnostics import checked_settings
+from ecu.runtime import diagnostics, xcp
 from ecu.runtime.memory import Ecu, new_ecu
 from ecu.runtime.notify import Manager
 from ecu.runtime.realtime import freeze_memory, make_realtime
@@ -72,6 +72,8 @@ class RunOptions(NamedTuple):
     """Identifiers REQUEST:RESPONSE[:ALL] on which a tester is answered."""
     diagnostics_key: Path | None = None
     """File of the secret by which a tester gets access."""
+    xcp: str | None = None
+    """Transport on which a master of XCP is answered."""
 
 
 class Session(NamedTuple):
@@ -131,14 +133,7 @@ def prepare(options: RunOptions) -> Session:
     receiving = receive_plan(options.map, lambda line: log.warning("database", left_out=line))
     sending = SILENCE if options.silent else transmit_plan(options.map, receiving)
     _check_sending(options, config, sending)
-    diagnostics = checked_settings(
-        options.interface,
-        options.channel,
-        options.diagnostics,
-        options.diagnostics_key,
-        {*receiving.ids.tolist(), *sending.ids.tolist()},
-        options.silent,
-    )
+    side_arguments = _side_arguments(options, {*receiving.ids.tolist(), *sending.ids.tolist()})
     params = new_params(config)
     description = _describe(options, config)
     if options.map is not None:
@@ -158,7 +153,7 @@ def prepare(options: RunOptions) -> Session:
         fd=config.can_fd,
     )
     began = time.monotonic()
-    side = Side(path, _side_arguments(options, diagnostics))
+    side = Side(path, side_arguments)
     try:
         learned = _restored(options.state, config, params)
         if options.standby:
@@ -252,6 +247,7 @@ def _describe(options: RunOptions, config: Config) -> dict[str, Any]:
         "config": str(options.config),
         "map": None if options.map is None else str(options.map),
         "config_hash": config_hash(config),
+        "configuration": config.model_dump(),
         "armed": config.transmit,
         "store_key": store_key(config),
         "versions": {
@@ -266,12 +262,19 @@ def _describe(options: RunOptions, config: Config) -> dict[str, Any]:
     }
 
 
-def _side_arguments(options: RunOptions, diagnostics: str | None) -> list[str]:
+def _side_arguments(options: RunOptions, taken: set[int]) -> list[str]:
+    """Return the arguments of the side processes; `taken`: identifiers of messages. Raises UserError."""
+    bus = options.interface, options.channel
     given = {
         "--record": options.record,
         "--record-limit": options.record_limit,
         "--state": options.state,
         "--metrics": options.metrics,
-        "--diagnostics": diagnostics,
+        "--diagnostics": diagnostics.checked_settings(
+            *bus, options.diagnostics, options.diagnostics_key, taken, options.silent
+        ),
+        "--xcp": xcp.checked_settings(
+            options.xcp, *bus, taken | diagnostics.identifiers(options.diagnostics), options.silent
+        ),
     }
     return [word for name, value in given.items() if value is not None for word in (name, str(value))]

@@ -2,8 +2,8 @@
 
 The loop starts no process once it is READY, so this small one does. It imports next to nothing and waits. It
 ends with the recorder when the loop has ended (exit code 0) or on a user error (2). A recorder whose
-supervisor died becomes one itself (`become`). With `--metrics ADDRESS:PORT` or `--diagnostics SETTINGS` it
-also starts the processes that serve these.
+supervisor died becomes one itself (`become`). With `--metrics ADDRESS:PORT`, `--diagnostics SETTINGS` or
+`--xcp SETTINGS` it also starts the processes that serve these.
 """
 
 import json
@@ -28,6 +28,7 @@ LONGEST_PAUSE_S: Final = 10.0  # less than the ring holds
 CALM_S: Final = 60.0  # a recorder that lived that long restarts after the short pause again
 FINAL_EXITS: Final = (0, 2)
 DIAGNOSTICS_PATIENCE_S: Final = 1.0  # it stores the fault memory
+XCP_PATIENCE_S: Final = 0.5  # it sends the last cycles
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -76,6 +77,8 @@ def _companions(arguments: Sequence[str]) -> list[Companion]:
     if "--diagnostics" in arguments:
         picked = _picked(arguments, "--ring", "--state", "--diagnostics")
         companions.append(Companion("ecu.diagnostics.process", picked, DIAGNOSTICS_PATIENCE_S))
+    if "--xcp" in arguments:
+        companions.append(Companion("ecu.xcp.process", _picked(arguments, "--ring", "--xcp"), XCP_PATIENCE_S))
     return companions
 
 

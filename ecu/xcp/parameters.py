@@ -1,0 +1,97 @@
+"""The keys of a CONFIG as one record: what a master reads of the configuration that a run goes by.
+
+Its fields are those of the schema (`ecu/settings/schema.py`): numbers as float64, whole ones too, true and
+false as 0 and 1, a word as its place among those allowed. A key that is not given, and what of a list is not,
+is NaN; a word that is not given is 255. Names are left out.
+"""
+
+from collections.abc import Iterator, Mapping
+from functools import cache
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from ecu.contract.records import RecordArray, new_record
+from ecu.settings.schema import config_schema
+
+NO_WORD: Final = 255
+
+
+class Parameter(NamedTuple):
+    """One key with a value."""
+
+    key: str
+    """With its tables: front.pad.area."""
+    length: int
+    """Of a list at most, 0: one value."""
+    unit: str
+    low: float | None
+    high: float | None
+    """Limits, None: none; of a list those of each value."""
+    meaning: str
+    texts: tuple[str, ...]
+    """Words that are allowed, empty: a number."""
+
+
+@cache
+def parameters() -> tuple[Parameter, ...]:
+    """Return every key of a CONFIG that is no name."""
+    schema = config_schema()
+    return tuple(_of_table(schema, schema, ""))
+
+
+def _of_table(schema: dict[str, Any], table: dict[str, Any], path: str) -> Iterator[Parameter]:
+    for name, key in table["properties"].items():
+        for one in (key, *key.get("anyOf", [])):
+            if "$ref" in one:
+                inner = schema["$defs"][one["$ref"].rpartition("/")[2]]
+                yield from _of_table(schema, inner, f"{path}{name}.")
+            elif "type" in one and one["type"] != "null" and ("enum" in one or one["type"] != "string"):
+                yield _of_key(f"{path}{name}", one, key)
+
+
+def _of_key(key: str, one: dict[str, Any], described: dict[str, Any]) -> Parameter:
+    value = one["items"] if one["type"] == "array" else one
+    texts = ("false", "true") if one["type"] == "boolean" else tuple(one.get("enum", ()))
+    unit = described.get("unit", one.get("unit", "-"))
+    meaning = " ".join(described.get("description", "").split())
+    if texts:
+        return Parameter(key, 0, unit, 0.0, len(texts) - 1.0, meaning, texts)
+    low = value.get("minimum", value.get("exclusiveMinimum"))
+    high = value.get("maximum", value.get("exclusiveMaximum"))
+    return Parameter(key, one.get("maxItems", 0), unit, low, high, meaning, ())
+
+
+PARAMETERS: Final = np.dtype(
+    [
+        (one.key, "u1") if one.texts else (one.key, "f8", (one.length,)) if one.length else (one.key, "f8")
+        for one in parameters()
+    ],
+    align=True,
+)
+
+
+def to_record(given: Mapping[str, Any]) -> RecordArray:
+    """Return a configuration, as `Config.model_dump` gives it, as `PARAMETERS`, shape (1,)."""
+    record = new_record(PARAMETERS)
+    for one in parameters():
+        value = _value(given, one.key)
+        if one.texts:
+            record[one.key] = NO_WORD if value is None else one.texts.index(_word(value))
+        elif one.length:
+            values = value or []
+            record[one.key] = [*values, *[np.nan] * (one.length - len(values))]
+        else:
+            record[one.key] = np.nan if value is None else value
+    return record
+
+
+def _value(given: Mapping[str, Any], key: str) -> Any:
+    found: Any = given
+    for name in key.split("."):
+        found = None if found is None else found[name]
+    return found
+
+
+def _word(value: object) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
