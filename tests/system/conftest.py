@@ -24,6 +24,7 @@ from ecu.bus.protocol import Channel
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
 from ecu.contract.records import FRAME, new_record
 from ecu.contract.signals import INPUT, N_INPUTS
+from ecu.recording.recorder import read_recording
 from ecu.runtime.clock import Grid, system_time
 
 ROOT = Path(__file__).parents[2]
@@ -221,6 +222,38 @@ def car(vehicle: Callable[..., Vehicle], request: pytest.FixtureRequest) -> Vehi
     car.set(decel_demand=3, vehicle_speed=20, vehicle_speed_valid=1)
     car.set(**{f"wheel_speed_{corner}": 55.0 for corner in ("fl", "fr", "rl", "rr")})
     return car
+
+
+@contextmanager
+def driven(car: Vehicle) -> Iterator[None]:
+    """Let the car drive meanwhile."""
+    ends = threading.Event()
+    thread = threading.Thread(target=lambda: car.drive(0, until=ends.is_set))
+    thread.start()
+    try:
+        yield
+    finally:
+        ends.set()
+        thread.join()
+
+
+def process_of(daemon: Daemon, module: str) -> int | None:
+    """Process beside the loop that runs a module, None: it is away."""
+    for pid in daemon.family():
+        try:
+            if module.encode() in Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0"):
+                return pid
+        except OSError:
+            pass
+    return None
+
+
+def unharmed(daemon: Daemon, recordings: Path) -> None:
+    """End the daemon; the loop and the recorder know nothing of what befell a process beside them."""
+    assert daemon.end() == 0
+    assert not daemon.said("recorder_gone")
+    numbers = read_recording(recordings).cycles["number"]
+    assert numbers.tolist() == list(range(len(numbers)))
 
 
 class Witness:

@@ -4,8 +4,8 @@ import pytest
 
 from ecu.diagnostics.trouble_codes import TROUBLE_CODES
 
-from .conftest import ROOT
-from .uds_tester import asked, driven, foreign_tester
+from .conftest import ROOT, driven
+from .uds_tester import asked, foreign_tester
 
 pytestmark = pytest.mark.socketcan
 

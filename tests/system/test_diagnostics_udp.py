@@ -27,11 +27,10 @@ from ecu.contract.faults import WHEEL_SPEED_LOST
 from ecu.diagnostics.identifiers import MEASURED, OF_SNAPSHOT, has_corners
 from ecu.diagnostics.services import SELF_TEST
 from ecu.diagnostics.trouble_codes import TROUBLE_CODES
-from ecu.recording.recorder import read_recording
 
 from . import uds_tester
-from .conftest import ROOT, wait_for
-from .uds_tester import SECRET, asked, driven
+from .conftest import ROOT, driven, process_of, unharmed, wait_for
+from .uds_tester import SECRET, asked
 
 pytestmark = pytest.mark.multicast
 
@@ -65,21 +64,7 @@ def unit(daemon, car, key_file, tmp_path):
 
 def server_of(unit):
     """Process of the diagnostic server, None: it is away."""
-    for pid in unit.family():
-        try:
-            if b"diagnostics.process" in Path(f"/proc/{pid}/cmdline").read_bytes():
-                return pid
-        except OSError:
-            pass
-    return None
-
-
-def unharmed(unit, tmp_path):
-    """End the daemon; the loop and the recorder know nothing of what befell the server."""
-    assert unit.end() == 0
-    assert not unit.said("recorder_gone")
-    numbers = read_recording(tmp_path / "record").cycles["number"]
-    assert numbers.tolist() == list(range(len(numbers)))
+    return process_of(unit, "ecu.diagnostics.process")
 
 
 def test_a_foreign_tester_reads_clears_tests_and_gets_access(unit, tmp_path):
@@ -108,7 +93,7 @@ def test_a_foreign_tester_reads_clears_tests_and_gets_access(unit, tmp_path):
         client.control_dtc_setting(2)
         client.clear_dtc()
         assert client.get_number_of_dtc_by_status_mask(0x08).service_data.dtc_count == 0
-    unharmed(unit, tmp_path)
+    unharmed(unit, tmp_path / "record")
 
 
 def test_a_fault_is_confirmed_kept_and_read_with_its_snapshot(daemon, car, tmp_path):
@@ -170,7 +155,7 @@ def test_two_testers_at_once(unit, tmp_path):
     for thread in threads:
         thread.join(120)
     assert min(counts.values()) >= 20, counts
-    unharmed(unit, tmp_path)
+    unharmed(unit, tmp_path / "record")
 
 
 def test_a_tester_that_dies_in_the_middle_of_a_message(unit, tmp_path):
@@ -180,7 +165,7 @@ def test_a_tester_that_dies_in_the_middle_of_a_message(unit, tmp_path):
         for data in (b"\x10\x20\x22\x01\x03\x01\x03\x01", b"\x02\x19\x0a\xcc\xcc\xcc\xcc\xcc"):
             client.bus.send(can.Message(arbitration_id=0x7E0, is_extended_id=False, data=data))
         assert client.get_supported_dtc().service_data.dtc_count == len(TROUBLE_CODES)
-    unharmed(unit, tmp_path)
+    unharmed(unit, tmp_path / "record")
 
 
 def test_fuzzed_frames_and_requests(unit, tmp_path):
@@ -201,7 +186,7 @@ def test_fuzzed_frames_and_requests(unit, tmp_path):
         asked(client, lambda one: one.change_session(1))
         assert asked(client, lambda one: one.read_data_by_identifier_first([0xF189])) == __version__
         assert server_of(unit) == before
-    unharmed(unit, tmp_path)
+    unharmed(unit, tmp_path / "record")
 
 
 def test_loop_and_recorder_do_not_care_for_the_server(unit, tmp_path):
@@ -215,7 +200,7 @@ def test_loop_and_recorder_do_not_care_for_the_server(unit, tmp_path):
         assert asked(client, lambda one: one.tester_present())
         last = server_of(unit)
         assert last not in (None, first)
-    unharmed(unit, tmp_path)
+    unharmed(unit, tmp_path / "record")
     wait_for(lambda: not Path(f"/proc/{last}").exists())
 
 
@@ -286,7 +271,7 @@ def test_the_small_tester(unit, tmp_path):
     code, _, error = diag("info", "--ids", "0x7E1:0x7E9")
     assert code == 1
     assert error.startswith("brake-ecu: no answer within 1 s on 0x7E9 to a request on 0x7E1")
-    unharmed(unit, tmp_path)
+    unharmed(unit, tmp_path / "record")
 
 
 def test_a_reset_restarts_a_shadow_by_its_service_manager(daemon, car, tmp_path):
@@ -314,4 +299,4 @@ def test_garbage_on_the_multicast_port_does_not_end_it(unit, tmp_path):
     with foreign_tester() as client:
         assert asked(client, lambda one: one.tester_present())
         assert server_of(unit) == before
-    unharmed(unit, tmp_path)
+    unharmed(unit, tmp_path / "record")

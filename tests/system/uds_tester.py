@@ -1,6 +1,5 @@
 """A foreign tester, udsoncan over can-isotp, for a daemon with diagnostics beside a car that drives."""
 
-import threading
 from contextlib import contextmanager
 
 import can
@@ -74,19 +73,6 @@ def foreign_tester(addresses=(0x7E0, 0x7E8), *, interface, channel, **config):
     finally:
         notifier.stop()
         bus.shutdown()
-
-
-@contextmanager
-def driven(car):
-    """Let the car drive meanwhile."""
-    ends = threading.Event()
-    thread = threading.Thread(target=lambda: car.drive(0, until=ends.is_set))
-    thread.start()
-    try:
-        yield
-    finally:
-        ends.set()
-        thread.join()
 
 
 def asked(client, ask):

@@ -1,0 +1,109 @@
+"""`run --xcp` with a foreign master, pyxcp: what it reads, what it may not, what it measures."""
+
+import time
+
+import numpy as np
+import pytest
+
+from ecu.xcp.memory import EPK
+
+from .conftest import ROOT, driven, wait_for
+from .test_xcp_udp import GROUP, SIGNALS, free_port
+from .xcp_master import VARIABLES
+
+pyxcp = pytest.importorskip("pyxcp", reason="pyxcp is not installed: pip install pyxcp")
+
+pytestmark = pytest.mark.multicast
+
+SECONDS = 3.0
+
+
+@pytest.fixture(params=["UDP", "TCP"])
+def settings(request, daemon, car):
+    """An application of pyxcp for the slave of a daemon whose car drives."""
+    from pyxcp.config import create_application_from_config, set_application
+
+    port = free_port()
+    one = daemon(
+        *("--config", ROOT / "config" / "suv.toml", "-i", "udp_multicast", "-c", GROUP),
+        *("--xcp", f"{request.param.lower()}:{port}"),
+    )
+    one.wait_for("ready")
+    place = {"host": "127.0.0.1", "port": port, "protocol": request.param, "ipv6": False}
+    application = create_application_from_config({"Transport": {"Eth": place}})
+    set_application(application)
+    with driven(car):
+        yield application
+        assert one.end() == 0
+
+
+def opened(settings, **policy):
+    """Return a master of pyxcp as soon as there is somebody at the port."""
+    found = []
+
+    def opens():
+        try:
+            found.append(pyxcp.Master("eth", config=settings, **policy))
+            found[-1].__enter__()
+            found[-1].connect()
+        except Exception:  # pyxcp's are of many kinds
+            return False
+        return True
+
+    wait_for(opens)
+    return found[-1]
+
+
+def test_a_foreign_master_reads_what_it_may(settings):
+    from pyxcp.master.errorhandler import SystemExit  # not Python's
+
+    master = opened(settings)
+    try:
+        assert master.identifier(1) == "brake_ecu"
+        assert master.identifier(5) == EPK
+        mass, _ = VARIABLES["parameters.vehicle.mass"]
+        assert np.frombuffer(master.shortUpload(8, mass)).tolist() == [2105.0]
+        (event,) = master.getDaqInfo()["channels"]
+        assert (event["name"], event["cycle"]) == ("cycle", 10)
+        with pytest.raises(SystemExit) as refused:
+            master.shortUpload(8, 0)
+        assert refused.value.error_code.name == "ERR_ACCESS_DENIED"
+        master.setMta(mass)
+        with pytest.raises(SystemExit) as refused:
+            master.download(bytes(8))
+        assert refused.value.error_code.name == "ERR_WRITE_PROTECTED"
+        master.disconnect()
+    finally:
+        master.close()
+
+
+def test_a_foreign_master_measures_200_signals_and_none_is_lost(settings):
+    from pyxcp.daq_stim import DaqList, DaqOnlinePolicy
+
+    class Kept(DaqOnlinePolicy):
+        """Keeps what comes."""
+
+        def initialize(self):
+            self.rows = []
+
+        def finalize(self):
+            pass
+
+        def on_daq_list(self, daq_list, timestamp0, timestamp1, payload):
+            self.rows.append((timestamp1, list(payload)))
+
+    wanted = [(name.replace(".", "_"), VARIABLES[name][0], 0, "F64") for name in SIGNALS]
+    policy = Kept([DaqList("cycle", 0, False, True, wanted, 0, 1)])
+    master = opened(settings, policy=policy)
+    try:
+        policy.setup()
+        policy.start()
+        time.sleep(SECONDS)
+        policy.stop()
+        master.disconnect()
+    finally:
+        master.close()
+    stamps = np.array([stamp for stamp, _ in policy.rows])
+    assert len(stamps) > 50 * SECONDS
+    assert set(np.diff(stamps)) <= {10_000_000 * periods for periods in range(1, 100)}
+    assert len(policy.rows[0][1]) == len(SIGNALS)

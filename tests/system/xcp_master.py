@@ -1,0 +1,176 @@
+"""A small XCP master of the tests' own, by the standard alone: UDP, TCP or CAN; what it measures it keeps."""
+
+import socket
+import struct
+import time
+
+import can
+
+from ecu.xcp.variables import RECORDS
+
+from .conftest import wait_for
+
+HEADER = struct.Struct("<HH")
+VARIABLES = {
+    f"{record.name}.{one.name}": (record.base + one.offset, one)
+    for record in RECORDS
+    for one in record.variables
+}
+
+
+class Refused(Exception):
+    """A negative response, by its code."""
+
+
+class Wire:
+    """UDP or TCP; checks the counter of what comes."""
+
+    def __init__(self, kind, port):
+        self.stream, self.port = kind == "tcp", port
+        self.open()
+
+    def open(self):
+        """Open it, as soon as there is somebody."""
+        self.data, self.counter, self.lost = b"", None, 0
+        wait_for(self._opens)
+
+    def _opens(self):
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM if self.stream else socket.SOCK_DGRAM)
+        self.socket.settimeout(2.0)
+        if not self.stream:
+            self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 22)
+        try:
+            self.socket.connect(("127.0.0.1", self.port))
+        except ConnectionRefusedError:
+            self.socket.close()
+            return False
+        return True
+
+    def send(self, packet):
+        self.socket.send(HEADER.pack(len(packet), 0) + packet)
+
+    def receive(self):
+        while True:
+            if len(self.data) >= HEADER.size:
+                length, counter = HEADER.unpack_from(self.data)
+                end = HEADER.size + length
+                if len(self.data) >= end:
+                    packet, self.data = self.data[HEADER.size : end], self.data[end:]
+                    if self.counter is not None:
+                        self.lost += (counter - self.counter - 1) & 0xFFFF
+                    self.counter = counter
+                    return packet
+            found = self.socket.recv(1 << 16)
+            if not found:
+                raise ConnectionResetError("the slave hung up")
+            self.data = self.data + found if self.stream else found
+
+    def close(self):
+        self.socket.close()
+
+
+class CanWire:
+    """A pair of identifiers on a bus."""
+
+    lost = 0
+
+    def __init__(self, bus, request, response):
+        self.bus, self.request, self.response = bus, request, response
+
+    def send(self, packet):
+        self.bus.send(can.Message(arbitration_id=self.request, is_extended_id=False, data=packet))
+
+    def receive(self):
+        end = time.monotonic() + 2.0
+        while time.monotonic() < end:
+            frame = self.bus.recv(0.1)
+            if frame is not None and frame.arbitration_id == self.response:
+                return bytes(frame.data)
+        raise TimeoutError("no answer")
+
+    def close(self):
+        self.bus.shutdown()
+
+
+class Master:
+    """Asks one question at a time; packets of lists that come meanwhile are kept in `packets`."""
+
+    def __init__(self, wire):
+        self.wire, self.packets, self.events = wire, [], []
+
+    def ask(self, layout, *values):
+        """Send a command, packed; return what follows the first byte of the response."""
+        self.wire.send(struct.pack(f"<{layout}", *values))
+        while (packet := self.take())[0] < 0xFE:
+            pass
+        if packet[0] == 0xFE:
+            raise Refused(packet[1])
+        return packet[1:]
+
+    def take(self):
+        """Return the next packet, kept where it is no response."""
+        packet = self.wire.receive()
+        if packet[0] == 0xFD:
+            self.events.append(packet)
+        elif packet[0] < 0xFC:
+            self.packets.append(packet)
+        return packet
+
+    def connect(self):
+        """Connect as soon as there is an answer: the slave begins after the loop."""
+
+        def answered():
+            try:
+                return bool(self.ask("BB", 0xFF, 0))
+            except TimeoutError:
+                return False
+            except ConnectionError:  # one that has died, or a port of UDP that nobody has yet
+                self.wire.close()
+                self.wire.open()
+                return False
+
+        wait_for(answered)
+        return self
+
+    def upload(self, address, length):
+        return self.ask("BBBBL", 0xF4, length, 0, 0, address)
+
+    def value(self, name):
+        """Return a variable as it is now."""
+        address, one = VARIABLES[name]
+        return struct.unpack(f"<{one.kind.char}", self.upload(address, one.kind.itemsize))[0]
+
+    def begin(self, odts, stamp=True):
+        """Set up list 0 with entries (address, length) of each packet, and start it."""
+        self.ask("B", 0xD6)
+        self.ask("BBH", 0xD5, 0, 1)
+        self.ask("BBHB", 0xD4, 0, 0, len(odts))
+        for number, entries in enumerate(odts):
+            self.ask("BBHBB", 0xD3, 0, 0, number, len(entries))
+        for number, entries in enumerate(odts):
+            self.ask("BBHBB", 0xE2, 0, 0, number, 0)
+            for address, length in entries:
+                self.ask("BBBBL", 0xE1, 0xFF, length, 0, address)
+        self.ask("BBHHBB", 0xE0, 0x10 if stamp else 0, 0, 0, 1, 0)
+        self.ask("BBH", 0xDE, 2, 0)
+        self.ask("BB", 0xDD, 1)
+
+    def measure(self, names, packets):
+        """Measure variables of eight bytes until so many packets have come; stop; return stamps and rows."""
+        odts = [names[at : at + 150] for at in range(0, len(names), 150)]
+        self.begin([[(VARIABLES[name][0], 8) for name in odt] for odt in odts])
+        while len(self.packets) < packets * len(odts):
+            self.take()
+        self.ask("BB", 0xDD, 0)
+        rows, stamps = [], []
+        for packet in self.packets:
+            if packet[0] == 0:
+                stamps.append(struct.unpack_from("<L", packet, 1)[0])
+                rows.append(packet[5:])
+            else:
+                assert len(stamps) == len(rows)
+                rows[-1] += packet[1:]
+        return stamps, rows
+
+    def close(self):
+        self.wire.close()
