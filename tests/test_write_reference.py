@@ -11,6 +11,8 @@ import write_reference as reference
 from contract_page import EXAMPLE, contract_text
 from diagnostics_tables import PAGE as DIAGNOSTICS
 from diagnostics_tables import with_tables
+from xcp_tables import PAGE as XCP
+from xcp_tables import with_xcp_tables
 
 ROOT = Path(__file__).parent.parent
 OF_THE_SIGNAL = {
@@ -90,6 +92,11 @@ def test_the_contract_is_that_of_database_and_code() -> None:
 def test_the_tables_of_diagnostics_are_those_of_the_code() -> None:
     page = DIAGNOSTICS.read_text("utf-8")
     assert page == with_tables(page), "run python tools/write_reference.py"
+
+
+def test_the_tables_of_xcp_are_those_of_the_code() -> None:
+    page = XCP.read_text("utf-8")
+    assert page == with_xcp_tables(page), "run python tools/write_reference.py"
 
 
 def test_the_worked_example_of_the_checksum_is_right() -> None:

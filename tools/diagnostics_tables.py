@@ -8,10 +8,9 @@ from ecu.diagnostics import read_faults, services, session
 from ecu.diagnostics.identifiers import MEASURED, SESSION, TEXTS, UNITS, has_corners, scaling_of
 from ecu.diagnostics.server import SELF_TESTS
 from ecu.diagnostics.trouble_codes import FAILURE_TYPES, TROUBLE_CODES
+from page_tables import filled
 
 PAGE: Final = Path(__file__).parent.parent / "docs/diagnostics.md"
-BEGIN: Final = "<!-- tables: python tools/write_reference.py -->\n"
-END: Final = "<!-- end of the tables -->\n"
 
 _SERVICES: Final = {
     services.SESSION_CONTROL: ("DiagnosticSessionControl", "01 default, 03 extended"),
@@ -29,11 +28,7 @@ _SERVICES: Final = {
 
 def with_tables(page: str) -> str:
     """Return the page with its tables as the code has them."""
-    before, _, rest = page.partition(BEGIN)
-    parts = (_services(), _identifiers(), _codes())
-    return (
-        before + BEGIN + "\n\n".join("\n".join(part) for part in parts) + "\n" + END + rest.partition(END)[2]
-    )
+    return filled(page, (_services(), _identifiers(), _codes()))
 
 
 def _services() -> list[str]:

@@ -3,7 +3,7 @@
     python tools/write_reference.py
 
 writes docs/reference-*.md, with unit, range, default and meaning of each key, docs/contract.md and the tables
-of docs/diagnostics.md.
+of docs/diagnostics.md and docs/xcp.md.
 """
 
 import math
@@ -21,6 +21,8 @@ from ecu.bus.signal_map import SignalMap
 from ecu.contract.signals import INPUT_SIGNALS, without_corner
 from ecu.settings.schema import config_schema
 from ecu.settings.sections import Config
+from xcp_tables import PAGE as XCP
+from xcp_tables import with_xcp_tables
 
 DOCS: Final = Path(__file__).parent.parent / "docs"
 REPEATED: Final = {"rear": "front"}
@@ -209,5 +211,6 @@ if __name__ == "__main__":
         print(DOCS / name)
     (DOCS / "contract.md").write_text(contract_text(), "utf-8")
     print(DOCS / "contract.md")
-    DIAGNOSTICS.write_text(with_tables(DIAGNOSTICS.read_text("utf-8")), "utf-8")
-    print(DIAGNOSTICS)
+    for page, with_its_tables in ((DIAGNOSTICS, with_tables), (XCP, with_xcp_tables)):
+        page.write_text(with_its_tables(page.read_text("utf-8")), "utf-8")
+        print(page)

@@ -55,8 +55,12 @@ def _is_readable(timeout_s: float, *sockets: socket.socket) -> bool:
 
 
 def _open(kind: socket.SocketKind, address: str, port: int) -> socket.socket:
-    """Return a socket at a port. Raises UserError: it is taken."""
-    opened = socket.socket(socket.AF_INET, kind)
+    """Return a socket at a port. Raises UserError: it is taken, or the machine does not let us."""
+    try:
+        opened = socket.socket(socket.AF_INET, kind)
+    except OSError as error:
+        remedy = "in a unit of systemd add AF_INET to RestrictAddressFamilies"
+        raise UserError(f"{address}:{port}", "", f"{error.strerror}; {remedy}") from None
     try:
         if kind == socket.SOCK_STREAM:
             opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -64,7 +68,9 @@ def _open(kind: socket.SocketKind, address: str, port: int) -> socket.socket:
         opened.setblocking(False)
     except OSError as error:
         opened.close()
-        raise UserError(f"{address}:{port}", "", f"{error.strerror}; choose another port") from None
+        raise UserError(
+            f"{address}:{port}", "", f"{error.strerror}; choose another address or port"
+        ) from None
     return opened
 
 

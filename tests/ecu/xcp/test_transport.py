@@ -138,8 +138,19 @@ def test_a_master_of_udp_that_has_died_does_not_end_it(udp, masters):
 
 def test_a_port_that_is_taken_is_one_line(udp, tcp):
     for kind, end in ((Udp, udp), (Tcp, tcp)):
-        with pytest.raises(UserError, match=f"127.0.0.1:{end.port}: Address already in use; choose another"):
+        with pytest.raises(
+            UserError, match=f"127.0.0.1:{end.port}: Address already in use; choose another address or port"
+        ):
             kind("127.0.0.1", end.port, lambda: False, lambda: None)
+
+
+def test_a_unit_that_forbids_the_network_is_one_line(monkeypatch):
+    def refused(*_):
+        raise OSError(97, "Address family not supported by protocol")
+
+    monkeypatch.setattr(socket, "socket", refused)
+    with pytest.raises(UserError, match="add AF_INET to RestrictAddressFamilies"):
+        Tcp("127.0.0.1", 5555, lambda: False, lambda: None)
 
 
 def test_tcp_joins_what_comes_in_pieces(tcp, masters):

@@ -1,0 +1,75 @@
+"""The tables of docs/xcp.md, from those of the code; `write_reference.py` writes them into it."""
+
+from pathlib import Path
+from typing import Final
+
+from ecu.xcp.a2l import MEANINGS
+from ecu.xcp.protocol import Command
+from ecu.xcp.transport import CAN, ETHERNET
+from ecu.xcp.variables import RECORDS
+from page_tables import filled
+
+PAGE: Final = Path(__file__).parent.parent / "docs/xcp.md"
+
+_WHAT: Final = {
+    Command.CONNECT: "mode 00; any session before it ends",
+    Command.DISCONNECT: "",
+    Command.GET_STATUS: "",
+    Command.SYNCH: "",
+    Command.GET_COMM_MODE_INFO: "no block modes, no interleaving",
+    Command.GET_ID: "0 and 1: names; 4: the A2L file itself; 5: EPK. All by UPLOAD",
+    Command.GET_SEED: "a seed of no length: nothing is locked",
+    Command.UNLOCK: "refused: SEQUENCE",
+    Command.SET_MTA: "address extension 0",
+    Command.UPLOAD: "of the last cycle",
+    Command.SHORT_UPLOAD: "of the last cycle",
+    Command.DOWNLOAD: "refused: WRITE_PROTECTED",
+    Command.CLEAR_DAQ_LIST: "",
+    Command.SET_DAQ_PTR: "",
+    Command.WRITE_DAQ: "bit offset FF; over neighbouring variables too",
+    Command.SET_DAQ_LIST_MODE: "time stamp or none; event 0; prescaler 1 to 255",
+    Command.START_STOP_DAQ_LIST: "",
+    Command.START_STOP_SYNCH: "stop all, start, stop and prepare selected ones",
+    Command.GET_DAQ_CLOCK: "",
+    Command.GET_DAQ_PROCESSOR_INFO: "dynamic lists, prescaler, time stamps, overload as an event",
+    Command.GET_DAQ_RESOLUTION_INFO: "stamps of four bytes, 1 µs",
+    Command.GET_DAQ_EVENT_INFO: "event 0: `cycle`, 10 ms",
+    Command.FREE_DAQ: "",
+    Command.ALLOC_DAQ: "",
+    Command.ALLOC_ODT: "252 of all lists",
+    Command.ALLOC_ODT_ENTRY: "4096 of all lists",
+    Command.WRITE_DAQ_MULTIPLE: "",
+}
+
+
+def with_xcp_tables(page: str) -> str:
+    """Return the page with its tables as the code has them."""
+    return filled(page, (_records(), _commands()))
+
+
+def _records() -> list[str]:
+    lines = [
+        "## Addresses",
+        "",
+        "| group | addresses | variables | |",
+        "| --- | --- | --- | --- |",
+    ]
+    for record in RECORDS:
+        last, count = record.base + record.dtype.itemsize - 1, len(record.variables)
+        lines.append(
+            f"| `{record.name}` | {record.base:05X}–{last:05X} | {count} | {MEANINGS[record.name]} |"
+        )
+    return lines
+
+
+def _commands() -> list[str]:
+    lines = [
+        "## Commands",
+        "",
+        f"MAX_CTO and MAX_DTO: {ETHERNET.command} and {ETHERNET.data} on UDP and TCP,"
+        f" {CAN.command} and {CAN.data} on CAN.",
+        "",
+        "| | command | |",
+        "| --- | --- | --- |",
+    ]
+    return [*lines, *(f"| {one:02X} | {one.name} | {_WHAT[one]} |" for one in Command)]
