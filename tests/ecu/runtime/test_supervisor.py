@@ -56,6 +56,7 @@ def test_it_is_started_again_with_pauses_that_grow(codes, gone_after, starts, pa
             "ecu.diagnostics.process",
             ["--state", "DIR", "--diagnostics", "x"],
         ),
+        (["--xcp", "x"], "ecu.xcp.process", ["--xcp", "x"]),
     ],
 )
 def test_what_is_asked_for_is_served_by_a_process_beside_the_recorder(asked, module, given, monkeypatch):

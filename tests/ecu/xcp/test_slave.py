@@ -1,8 +1,11 @@
 """Commands of XCP and the slave's responses, byte for byte."""
 
+import random
+
 import pytest
 
 from ecu.xcp.memory import EPK
+from ecu.xcp.protocol import Command
 from ecu.xcp.transport import CAN
 
 from .conftest import Master
@@ -135,3 +138,39 @@ def test_events_tell_of_lost_cycles_and_of_the_end(master):
     assert master.slave.overload().hex(" ") == "fd 06 00 00"
     assert master.slave.end().hex(" ") == "fd 07"
     assert not master.slave.connected
+
+
+def set_up(draw):
+    """Yield the commands that set up and start a list, of odd sizes and addresses."""
+    odts, entries = draw.randint(1, 3), draw.randint(1, 5)
+    yield from ("D6", "D5 00 01 00", f"D4 00 00 00 {odts:02X}")
+    yield from (f"D3 00 00 00 {odt:02X} {entries:02X}" for odt in range(odts))
+    for odt in range(odts):
+        yield f"E2 00 00 00 {odt:02X} 00"
+        for _ in range(entries):
+            address = 0x10000 * draw.randint(1, 3) + 8 * draw.randint(0, 80)
+            length = draw.choice((8, 8, 16, 248))
+            yield f"E1 FF {length:02X} 00 {address.to_bytes(4, 'little').hex()}"
+    yield f"E0 {draw.choice((0, 16)):02X} 00 00 00 00 01 00"
+    yield f"DE {draw.randint(1, 2):02X} 00 00"
+    yield "DD 01"
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_any_bytes_are_answered_within_a_packet(seed):
+    """Lists are set up and started again and again, with other bytes among these commands and instead."""
+    draw, master, measured = random.Random(seed), Master(), 0
+    for _ in range(100):
+        for text in set_up(draw):
+            command = bytes.fromhex(text)
+            if draw.random() < 0.03:
+                command = draw.choice((draw.randbytes(draw.randint(0, 12)), command[:-1], b""))
+            if command[:1] == bytes([Command.DISCONNECT]):
+                continue
+            response = master.slave.answer(command)
+            assert response is None or (response[0] in (0xFF, 0xFE) and len(response) <= 248)
+        packets = list(master.slave.daq.packets(0, 1, master.image))
+        assert all(1 < len(packet) <= 1400 and packet[0] < 0xFC for packet in packets)
+        measured += bool(packets)
+    assert measured > 5
+    assert master.ask("FF 00") is not None
