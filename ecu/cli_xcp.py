@@ -26,7 +26,7 @@ def a2l(
         typer.Option("--out", "-o", metavar="FILE", help="File to write; default: standard output"),
     ] = None,
 ) -> int:
-    """Write the A2L file (ASAM MCD-2 MC) of `run --xcp` for tools that measure."""
+    """Write the A2L file of `run --xcp` (ASAM MCD-2 MC)."""
     from ecu.xcp import a2l
 
     return a2l.a2l(config, xcp, out)
