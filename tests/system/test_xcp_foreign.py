@@ -67,11 +67,11 @@ def test_a_foreign_master_reads_what_it_may(settings):
         assert (event["name"], event["cycle"]) == ("cycle", 10)
         with pytest.raises(SystemExit) as refused:
             master.shortUpload(8, 0)
-        assert refused.value.error_code.name == "ERR_ACCESS_DENIED"
+        assert "ERR_ACCESS_DENIED" in repr(refused.value)
         master.setMta(mass)
         with pytest.raises(SystemExit) as refused:
             master.download(bytes(8))
-        assert refused.value.error_code.name == "ERR_WRITE_PROTECTED"
+        assert "ERR_WRITE_PROTECTED" in repr(refused.value)
         master.disconnect()
     finally:
         master.close()
