@@ -1,7 +1,5 @@
-"""The README: its commands and its Python example run as they stand, its accuracy is that of the page."""
+"""The README: it is short, its commands run as they stand, its accuracy is that of the page."""
 
-import contextlib
-import io
 import re
 from pathlib import Path
 
@@ -36,17 +34,8 @@ def test_replay_report_and_compare(checkout: Path) -> None:
     assert (checkout / "out/drive.html").stat().st_size > 100_000
 
 
-def test_python_example_prints_what_the_readme_shows(checkout: Path) -> None:
-    (example,) = [block for kind, block in BLOCKS if kind == "python"]
-    (shown,) = [block for kind, block in BLOCKS if kind == "text"]
-    printed = io.StringIO()
-    with contextlib.redirect_stdout(printed):
-        exec(compile(example, "README.md", "exec"), {})
-
-    def numbers(text: str) -> list[float]:
-        return [float(number) for number in re.findall(r"\d+\.\d+", text)]
-
-    assert numbers(printed.getvalue()) == pytest.approx(numbers(shown), abs=0.0021)
+def test_it_is_read_in_one_sitting() -> None:
+    assert len(README.splitlines()) <= 150
 
 
 def test_accuracy_is_that_of_the_page() -> None:
