@@ -1,13 +1,14 @@
-"""tools/stale_pages.py on a small checkout: one bench, the module that it measures, one configuration."""
+"""tools/stale_pages.py on a small checkout: a bench, the module that it measures, golden figures."""
 
 import subprocess
 from pathlib import Path
 
 import pytest
 
-from stale_pages import HEADER, code_of, judge
+from stale_pages import ALSO, HEADER, LOOPS, OUTPUTS, TIMES, UNSEEN, code_of, judge, main
 
 ROOT = Path(__file__).parents[1]
+PAGES = sorted((ROOT / "docs/results").glob("*.md"))
 PAGE = "docs/results/brake.md"
 BENCH = "from ecu import brake\n\nCONFIG = 'config/car.toml'\n"
 BRAKE = '"""A brake."""\n\nGAIN = 2.0\n'
@@ -111,8 +112,80 @@ def test_page_that_cannot_be_judged(checkout: Path, text: str, said: str) -> Non
     assert judge(checkout, checkout / PAGE) == said
 
 
-@pytest.mark.parametrize("page", sorted((ROOT / "docs/results").glob("*.md")), ids=lambda page: page.stem)
+GOLDEN = "single,mu_b_fl,abc,0.4\nbench brake,Torque,def 123,7\n"
+RUNS = "from ecu import brake\n"
+
+
+@pytest.mark.parametrize(
+    ("golden", "change", "older"),
+    [
+        ("single,mu_b_fl,abc,0.4\n", {}, ""),
+        ("single,mu_b_fl,abc,0.4\n", {OUTPUTS: "single,mu_b_fl,abd,0.5\n"}, "golden single"),
+        ("single,mu_b_fl,abc,0.4\n", {OUTPUTS: "single,mu_b_fl,abc,0.4\nsingle,mu_b_fr,a,1\n"}, ""),
+        ("single,mu_b_fl,abc,0.4\n", {OUTPUTS: "single,mu_b_fr,abc,0.4\n"}, "golden single"),
+        (
+            "split,mu_b_fl,abc,0.4\n",
+            {OUTPUTS: "split,mu_b_fl,abc,0.4\nsingle,mu_b_fl,a,1\n"},
+            "golden single",
+        ),
+        ("kona,mu_b_fl,abc,0.4\n", {OUTPUTS: "kona,mu_b_fl,abd,0.5\n"}, ""),
+        ("single,mu_b_fl,abc,0.4\n", {"ecu/brake.py": BRAKE.replace("2.0", "2.1")}, ""),
+        ("single,mu_b_fl,abc,0.4\n", {"config/car.toml": "mass = 1600\n"}, "config/car.toml"),
+        (GOLDEN, {OUTPUTS: GOLDEN.replace("abc", "abd")}, ""),
+        (GOLDEN, {OUTPUTS: GOLDEN.replace("def 123,7", "def 124,8")}, "golden bench brake"),
+        (GOLDEN, {"tools/brakelab/bench/brake.py": BENCH + "CARS = 3\n"}, ""),
+    ],
+    ids=[
+        "nothing",
+        "loop",
+        "another output of the loop",
+        "output gone",
+        "loop that was not there",
+        "recorded drive",
+        "module that the golden run loads",
+        "configuration of the bench",
+        "loop, for a bench with tables",
+        "table of the bench",
+        "bench with tables: its module",
+    ],
+)
+def test_page_is_stale_where_the_golden_figures_that_it_rests_on_changed(
+    checkout: Path, golden: str, change: dict[str, str], older: str
+) -> None:
+    _write(checkout, {OUTPUTS: golden, "tests/golden/test_golden.py": RUNS})
+    _git(checkout, "add", "-A")
+    _git(checkout, "commit", "-qm", "golden")
+    commit = _git(checkout, "rev-parse", "--short=7", "HEAD")
+    _write(checkout, {PAGE: _page(commit), **change})
+    assert judge(checkout, checkout / PAGE) == (OLDER.format(commit, older) if older else "")
+
+
+def test_times_are_measured_for_each_version(checkout: Path) -> None:
+    page = _page("abcdef0").replace("bench brake", "bench play")
+    _write(checkout, {PAGE: page, "pyproject.toml": '[project]\nversion = "1"\n'})
+    assert judge(checkout, checkout / PAGE) == ""
+    _write(checkout, {"pyproject.toml": '[project]\nversion = "1.1"\n'})
+    assert judge(checkout, checkout / PAGE) == "brake.md: of version 1, this is 1.1"
+
+
+def test_a_check_fails_where_a_page_is_stale(checkout: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--check", str(checkout)]) == 0
+    assert capsys.readouterr().out == "0 of 1 pages of docs/results are stale\n"
+    _write(checkout, {"ecu/brake.py": "GAIN = 2.2\n"})
+    assert main([str(checkout)]) == 0
+    assert main(["--check", str(checkout)]) == 1
+
+
+def test_the_runs_and_modules_that_it_names_are_there() -> None:
+    runs = {line.partition(",")[0].strip('"') for line in (ROOT / OUTPUTS).read_text("utf-8").splitlines()}
+    assert {*LOOPS, *(run for others in ALSO.values() for run in others)} <= runs
+    assert {*ALSO, *TIMES} <= {HEADER.search(page.read_text("utf-8"))["bench"] for page in PAGES}
+    for name in UNSEEN:
+        assert (ROOT / f"tools/{name.replace('.', '/')}.py").exists()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_every_page_has_code_of_its_bench(page: Path) -> None:
     header = HEADER.search(page.read_text("utf-8"))
     assert header is not None
-    assert any(path.suffix == ".py" for path in code_of(ROOT, header["bench"]))
+    assert any(path.suffix == ".py" for path in code_of(ROOT, header["bench"])) or header["bench"] in TIMES

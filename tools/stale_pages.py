@@ -1,19 +1,26 @@
-"""Check for pages of docs/results that are older than the code they describe.
+"""Check for pages of docs/results whose figures may have moved since they were measured.
 
-    python tools/stale_pages.py [CHECKOUT]
+    python tools/stale_pages.py [--check] [CHECKOUT]
 
-A page names the bench that wrote it and the commit it was measured on. It is older than its code where a
-module that the bench loads (imports, and `-m` names of processes), or a file of config/ that one of them
-names, has changed since. Modules are compared by their syntax trees: docstrings, comments, imports and a move
-to another folder change no figure. The exit code is always 0: the decision to measure again, which takes
-hours, is left to people.
+A page names the bench that wrote it and the commit it was measured on. It is stale where one of these
+changed since:
+
+- tables of that bench in tests/golden/outputs.csv, where it has some: they are its figures for two cars;
+- else outputs of the closed loops there, and of the runs of `ALSO`; and modules that the bench loads and the
+  golden runs do not, or a file of config/ that one of them names. Modules are compared by their syntax trees:
+  docstrings, comments, imports and a move to another folder change no figure.
+
+What golden runs give is the code's because `make test` and `make studies` hold it.
+A page of times is measured for each version. With `--check` the exit code is 1 where a page is stale.
 """
 
 import ast
+import csv
 import hashlib
 import re
 import subprocess
 import sys
+import tomllib
 from functools import cache
 from pathlib import Path
 
@@ -21,17 +28,35 @@ PACKAGES = {"ecu": "ecu", "brakelab": "tools/brakelab"}
 """Where the sources of each package are."""
 BENCHES = ("bench", "studies")
 """Folders of brakelab that hold the benches."""
-TIMES = ("step", "codec", "plant", "cycle")
-"""Benches of the page that `brake-ecu bench` without a name writes."""
+TIMES = ("", "lateness", "replay", "play")
+"""Benches whose figures are times; "": the one without a name."""
+GOLDEN = "tests/golden"
+OUTPUTS = f"{GOLDEN}/outputs.csv"
+LOOPS = ("single", "hand-over", "stop-3", "low-grip", "split", "faults/circuit-dead-diagonal")
+"""Runs of `OUTPUTS` in which ECU and simulated vehicle move each other."""
+ALSO = {
+    "entries": ("mustang",),
+    "vehicle": ("identify vehicle",),
+    "thermal": ("identify thermal",),
+    "wear": ("identify wear",),
+    "dust": ("identify dust",),
+    "cycles": ("identify wear", "identify dust"),
+    "lab": ("bench friction", "identify wear"),
+}
+"""Runs of `OUTPUTS` that a bench rests on besides."""
+UNSEEN = ("brakelab.plant.energy",)
+"""Modules that golden runs load, but of which they show nothing."""
 PRESENTATION = (
     "bench.command",
     "bench.registry",
+    "results.chart",
+    "results.text_table",
     "studies.output",
     "studies.study",
     "studies.accuracy.table",
 )
 """Modules that write the page down; none of the figures is theirs."""
-HEADER = re.compile(r"`brake-ecu bench ?(?P<bench>\w*)`")
+HEADER = re.compile(r"`brake-ecu bench ?(?P<bench>\w*)`, version (?P<version>\w+(\.\w+)*)")
 MEASURED = re.compile(r"^Measured on commit (?P<commit>\w+)(?P<dirty>-dirty)?,.*$", re.MULTILINE)
 
 
@@ -88,25 +113,53 @@ def _modules_of(bench: str, benches: list[str]) -> list[str]:
     return own or [name for name in benches if f".{bench}." in name]
 
 
+def _loaded(modules: dict[str, Path], start: list[str]) -> dict[str, set[str]]:
+    """Return the modules that those of `start` load, each with the names that it has."""
+    seen: dict[str, set[str]] = {}
+    while start:
+        name = start.pop()
+        if name not in seen:
+            seen[name] = _named(modules[name])
+            start.extend(seen[name] & modules.keys() - seen.keys())
+    return seen
+
+
 def code_of(checkout: Path, bench: str) -> set[Path]:
-    """Return the modules and configuration files that a bench depends on."""
+    """Return the modules and configuration files that a bench depends on and no golden run shows."""
     modules = _modules(checkout)
     benches = [name for name in modules if name.startswith(tuple(f"brakelab.{one}." for one in BENCHES))]
-    todo = [name for start in ([bench] if bench else TIMES) for name in _modules_of(start, benches)]
-    seen = {f"brakelab.{name}" for name in PRESENTATION}
-    files: set[Path] = set()
-    while todo:
-        name = todo.pop()
-        if name in seen:
-            continue
-        seen.add(name)
-        files.add(modules[name])
-        named = _named(modules[name])
-        todo.extend(named & modules.keys())
-        for text in named:
-            if re.fullmatch(r"config/[\w/-]+\.toml", text) and (checkout / text).exists():
-                files.add(checkout / text)
-    return files
+    golden = {name for path in (checkout / GOLDEN).glob("test_*.py") for name in _named(path)}
+    shown = _loaded(modules, sorted(golden & modules.keys())).keys() - set(UNSEEN)
+    for name in (*shown, *(f"brakelab.{name}" for name in PRESENTATION)):
+        modules.pop(name, None)
+    own = [name for name in _modules_of(bench, benches) if name in modules]
+    loaded = _loaded(modules, own)
+    texts = {
+        text for named in loaded.values() for text in named if re.fullmatch(r"config/[\w/-]+\.toml", text)
+    }
+    files = {checkout / text for text in texts}
+    return {modules[name] for name in loaded} | {path for path in files if path.exists()}
+
+
+def _golden(text: str) -> dict[str, dict[str, list[str]]]:
+    """Return hashes and values of outputs.csv by run and part."""
+    runs: dict[str, dict[str, list[str]]] = {}
+    for run, part, *cells in csv.reader(text.splitlines()):
+        runs.setdefault(run, {})[part] = cells
+    return runs
+
+
+def changed_golden(
+    checkout: Path, commit: str, runs: tuple[str, ...], now: dict[str, dict[str, list[str]]]
+) -> list[str]:
+    """Return those of `runs` whose golden figures are not those of `commit`; new parts change no figure."""
+    there = _git(checkout, "ls-tree", "--name-only", commit, "--", OUTPUTS).strip()
+    before = _golden(_git(checkout, "show", f"{commit}:{OUTPUTS}").decode()) if there else {}
+    return [
+        f"golden {run}"
+        for run in runs
+        if run not in before or any(now[run].get(part) != cells for part, cells in before[run].items())
+    ]
 
 
 def _fingerprint_of(path: str, content: bytes) -> str:
@@ -152,14 +205,20 @@ def _commit_of(checkout: Path, page: Path, measured: re.Match[str]) -> str:
 
 
 def judge(checkout: Path, page: Path) -> str:
-    """Return one line on a page that is older than its code or cannot be judged, "" where it is current."""
+    """Return one line on a page that is stale or cannot be judged, "" where its figures stand."""
     text = page.read_text("utf-8")
     header, measured = HEADER.search(text), MEASURED.search(text)
     if header is None or measured is None:
         return f"{page.name}: does not say what bench and commit it is of"
+    bench = header["bench"]
+    if bench in TIMES:
+        now = version(checkout)
+        return (
+            "" if header["version"] == now else f"{page.name}: of version {header['version']}, this is {now}"
+        )
     try:
         commit = _commit_of(checkout, page, measured)
-        changed = changed_since(checkout, commit, code_of(checkout, header["bench"])) if commit else []
+        changed = _changed(checkout, commit, bench) if commit else []
     except subprocess.CalledProcessError:
         return f"{page.name}: commit {measured['commit']} is not in this clone"
     if not changed:
@@ -168,12 +227,31 @@ def judge(checkout: Path, page: Path) -> str:
     return f"{page.name}: of {commit}; changed since: {', '.join(changed[:3])}{more}"
 
 
-def main(checkout: Path) -> None:
-    """Print a line for each page that is older than its code."""
+def _changed(checkout: Path, commit: str, bench: str) -> list[str]:
+    path = checkout / OUTPUTS
+    golden = _golden(path.read_text("utf-8")) if path.exists() else {}
+    own = f"bench {bench}"
+    if own in golden:
+        return changed_golden(checkout, commit, (own,), golden)
+    runs = tuple(run for run in (*LOOPS, *ALSO.get(bench, ())) if run in golden)
+    code = changed_since(checkout, commit, code_of(checkout, bench))
+    return changed_golden(checkout, commit, runs, golden) + code
+
+
+def version(checkout: Path) -> str:
+    """Return the version of the project."""
+    return str(tomllib.loads((checkout / "pyproject.toml").read_text("utf-8"))["project"]["version"])
+
+
+def main(arguments: list[str]) -> int:
+    """Print a line for each page that is stale. Returns 1 where there is one and `--check` is asked for."""
+    folders = [argument for argument in arguments if argument != "--check"]
+    checkout = Path(folders[0] if folders else Path(__file__).parent.parent).resolve()
     pages = sorted((checkout / "docs/results").glob("*.md"))
     lines = [line for line in (judge(checkout, page) for page in pages) if line]
-    print(f"{len(lines)} of {len(pages)} pages of docs/results are older than their code", *lines, sep="\n  ")
+    print(f"{len(lines)} of {len(pages)} pages of docs/results are stale", *lines, sep="\n  ")
+    return int(bool(lines) and "--check" in arguments)
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else Path(__file__).parent.parent).resolve())
+    sys.exit(main(sys.argv[1:]))
