@@ -1,8 +1,8 @@
-# make demo | test | studies | check | coverage | mutants | fuzz | soak | screenshot | clean. Sets up .venv itself; PYTHON=... chooses the interpreter.
+# make demo | test | studies | check | coverage | mutants | fuzz | soak | results | screenshot | clean. Sets up .venv itself; PYTHON=... chooses the interpreter.
 PIP := .venv/bin/python -m pip --disable-pip-version-check install --quiet
 PINNED := $(PIP) --no-deps --require-hashes --requirement requirements/build.txt
 
-.PHONY: help demo test studies check coverage mutants fuzz soak screenshot clean
+.PHONY: help demo test studies check coverage mutants fuzz soak results screenshot clean
 
 help:
 	@echo "make demo    the ECU brakes a simulated car on a bus, in real time; a report at the end"
@@ -13,6 +13,7 @@ help:
 	@echo "make mutants   one change at a time in what brakes: which one do the tests not notice? a few minutes"
 	@echo "make fuzz      damaged files by the thousand"
 	@echo "make soak      24 h in virtual time; ARGS='live --hours 1': in real time"
+	@echo "make results  every page of docs/results measured anew: a night; goes on where it was, ARGS='stops bound': some"
 	@echo "make screenshot  the pictures of the README and of the first steps, with chromium"
 	@echo "make clean   remove .venv, results and caches"
 	@echo "The first call installs what it needs into .venv. PYTHON=/path/to/python3.12 chooses a Python;"
@@ -49,6 +50,10 @@ fuzz: .venv/dev
 
 soak: .venv/dev
 	.venv/bin/python -m brakelab.rig.soak $(or $(ARGS),virtual --hours 24)
+
+results: .venv/dev
+	@.venv/bin/python -m brakelab.build
+	.venv/bin/python tools/measure_results.py $(ARGS)
 
 screenshot: .venv/lab
 	.venv/bin/brake-ecu demo --out out/screenshot
