@@ -1,5 +1,6 @@
 """The table of benches: each has its study, and its page where there is one says so."""
 
+import re
 import sys
 from pathlib import Path
 
@@ -9,7 +10,8 @@ from brakelab.bench.command import study_of
 from brakelab.bench.registry import MODULES
 from ecu.errors import UserError
 
-RESULTS = Path(__file__).parents[3] / "docs/results"
+ROOT = Path(__file__).parents[3]
+RESULTS = ROOT / "docs/results"
 
 
 @pytest.mark.parametrize("name", MODULES)
@@ -36,3 +38,10 @@ def test_a_missing_package_is_named_with_its_remedy(monkeypatch: pytest.MonkeyPa
 def test_every_page_is_of_a_bench() -> None:
     files = {study_of(name).file or name for name in MODULES} | {"benchmarks"}
     assert {page.stem for page in RESULTS.glob("*.md")} <= files
+
+
+@pytest.mark.parametrize("folder", ["bench", "studies"])
+def test_no_cause_is_typed_into_a_study(folder: str) -> None:
+    """Nobody knows one before it is measured; causes stand on the page, by a person, under "Causes"."""
+    for path in (ROOT / "tools/brakelab" / folder).rglob("*.py"):
+        assert not re.search(r"\bbecause\b|\bby chance\b", path.read_text("utf-8")), path

@@ -31,6 +31,7 @@ from brakelab.rig.play.play_log import timed_frames
 from brakelab.simulation.priority import PRIORITY, ask_for_priority
 from brakelab.studies.measure import installed, machine
 from brakelab.studies.study import Asked, Measured, Study
+from brakelab.studies.verdict import Goal, verdict
 from ecu.runtime.clock import system_time
 from ecu.runtime.warm_up import Silence
 
@@ -233,9 +234,11 @@ def _row(player: Player, bus: Bus, speed: float, seconds: float, folder: Path) -
     if not len(numbers):
         return (*begin, "0", *["–"] * 4, said[-1] if said else "nothing came")
     late = errors_us(times, speed, numbers, stamps)
-    order = "" if (np.diff(numbers) > 0).all() else "not in order"
+    notes = [] if (np.diff(numbers) > 0).all() else ["not in order"]
+    if player is PLAYERS[0]:
+        notes.append(verdict(Goal("p99", float(np.quantile(late, 0.99)), GOAL_US)))
     figures = [f"{np.quantile(late, share):.0f}" for share in SHARES]
-    return (*begin, f"{len(numbers)} of {len(times)}", *figures, order)
+    return (*begin, f"{len(numbers)} of {len(times)}", *figures, ", ".join(notes))
 
 
 def _floor(bus: Bus, speed: float, seconds: float, folder: Path) -> tuple[str, ...]:

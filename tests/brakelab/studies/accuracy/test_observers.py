@@ -174,21 +174,21 @@ def test_verdicts() -> None:
     accuracy = pages["Joint observer"]
     assert accuracy["stop #2"][5:] == ("met", "1.00/1.00 (1.0/1.0)", "1.2/1.2", "met")
     assert accuracy["stop #1"][5] == "met"
-    assert accuracy["stop #1"][8] == "missed: front, rear"  # 0.8 and 0.9
-    assert accuracy["stop #3"][8] == "missed: front"  # 0.9, 1.0
-    assert pages["Truth inside 2σ [%]"]["all"][3] == "missed: rear large"
+    assert accuracy["stop #1"][8] == "missed: front by 0.2, rear by 0.1"  # 0.8 and 0.9
+    assert accuracy["stop #3"][8] == "missed: front by 0.1"  # 0.9, 1.0
+    assert pages["Truth inside 2σ [%]"]["all"][3] == "missed: rear large by 1"
     robust = pages["Joint observer, disturbed"]
     assert {line[-1] for line in robust.values()} == {"met"}
     events = pages["How long it takes"]
     longest = {name: events[f"{name}, joint, cold"][5] for name in LONGEST}
     assert longest == {
-        "tyre stiffness × 0.67": "missed: time, force",  # 0.2 s, and no better than Observer 2
-        "low-grip patch": "missed: force",
+        "tyre stiffness × 0.67": "missed: time by 0.1, force by 2.5",  # 0.2 s, no better than Observer 2
+        "low-grip patch": "missed: force by 2.5",
     }
     worse = _pages(_samples(11.0))
-    missed = "missed: cold front, cold rear, adapted front, adapted rear"
+    missed = "missed: cold front by 1, cold rear by 1, adapted front by 9.4, adapted rear by 9.2"
     assert worse["Joint observer, disturbed"]["mass ±10 %"][-1] == missed
-    assert worse["Joint observer"]["0.7 m/s²"][4:6] == ("constant", "missed: front, rear")
+    assert worse["Joint observer"]["0.7 m/s²"][4:6] == ("constant", "missed: front by 1, rear by 1")
 
 
 def test_json_has_null_for_what_is_not_finite() -> None:

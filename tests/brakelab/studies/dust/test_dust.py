@@ -32,7 +32,8 @@ def test_a_row_holds_median_and_worst_over_the_draws():
     assert (law["median"], law["size"], law["worst"], law["plain"]) == ("+2.0", "4.0", "-30.0", "-8.0")
     assert rows[4][11] == "3"
     assert rows[-1][1:4] == ("+0.0", "10.0", "-20.0")
-    assert [row[-1] for row in rows[:4]] == ["-32.7", "-9.1", "-4.0", "–"]  # Table 8.2
+    assert [row[-2] for row in rows[:4]] == ["-32.7", "-9.1", "-4.0", "–"]  # Table 8.2
+    assert rows[4][-1] == "missed: worst by 20"
 
 
 def test_what_is_not_told_per_kilometre_says_so():

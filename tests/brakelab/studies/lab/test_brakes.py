@@ -22,7 +22,7 @@ from brakelab.studies.lab.brakes import (
     recovery,
     table_errors,
 )
-from brakelab.studies.lab.choice import choice_of, met
+from brakelab.studies.lab.choice import choice_of, compared
 from brakelab.studies.lab.tables import PRINTED, TABLE_3_4_NRMSE
 from brakelab.studies.physics.friction import LOADINGS, TABLE_3_4, TEMPERATURES
 from ecu.settings.resources import resource
@@ -112,7 +112,7 @@ def test_a_choice_is_judged_by_ams_alone() -> None:
         ("ostermeyer", "table"),
         ("ilvo", "table"),
     ]
-    assert met(seen) == (2, 0)
+    assert compared(seen) == (2, 0)
 
 
 def test_the_noise_of_a_recovery_is_one_percent() -> None:

@@ -57,10 +57,10 @@ def _verdict(missed: list[str]) -> str:
 
 
 def _above(row: Row, goal: Goal | None) -> list[str]:
-    """Return the axles whose median exceeds the goal, or, without one, is not below the constant."""
+    """Return the axles whose median exceeds the goal, or the constant without one, and by how much."""
     limits = goal or tuple(figure.median for figure in row.nominal)
     return [
-        axle
+        f"{axle} by {reached.median - limit:.2g}"
         for axle, reached, limit in zip(AXLES, row.nrmse, limits, strict=True)
         if reached.median > limit + ROUNDING
     ]
@@ -121,12 +121,16 @@ def _others(rows: Rows) -> Table:
 
 
 def _honesty(shares: tuple[float, float]) -> list[str]:
-    """Return the axles whose ±2σ contains too little or too much."""
+    """Return the axles whose ±2σ contains too little or too much, and by how much."""
     return [
-        f"{axle} {'small' if share < HONEST[0] else 'large'}"
+        f"{axle} {'small' if share < HONEST[0] else 'large'} by {_beyond(share)}"
         for axle, share in zip(AXLES, shares, strict=True)
         if not HONEST[0] <= round(share) <= HONEST[1]
     ]
+
+
+def _beyond(share: float) -> int:
+    return round(max(HONEST[0] - round(share), round(share) - HONEST[1]))
 
 
 def _uncertainty(rows: Rows) -> Table:
@@ -157,7 +161,7 @@ def _robust_line(name: str, rows: Rows, draw: str) -> tuple[str, ...]:
     missed = [f"cold {axle}" for axle in _above(cold, None)]
     missed += [f"adapted {axle}" for axle in _above(adapted, goal)]
     missed += [
-        f"σ {word} {axle}"
+        f"σ {word} {axle} by {_beyond(share)}"
         for word, row in (("cold", cold), ("adapted", adapted))
         for axle, share in zip(AXLES, row.inside_2_sigma, strict=True)
         if round(share) < HONEST[0]
@@ -229,8 +233,9 @@ def _event_verdict(row: Row, rows: Rows) -> str:
     if longest is None or row.observer != JOINT:
         return "–"
     half = 0.5 * rows[row.case, "observer2", row.adapted].force.median
-    missed = ["time"] if row.seconds.median > longest + ROUNDING_S else []
-    return _verdict(missed + (["force"] if row.force.median > half else []))
+    late, force = row.seconds.median - longest, row.force.median - half
+    missed = [f"time by {late:.2g}"] if late > ROUNDING_S else []
+    return _verdict(missed + ([f"force by {force:.2g}"] if force > 0.0 else []))
 
 
 def _events(rows: Rows) -> Table:

@@ -29,11 +29,13 @@ from brakelab.studies.accuracy.table import spread
 from brakelab.studies.cars import each_car
 from brakelab.studies.measure import figure
 from brakelab.studies.study import Asked, Measured, Study
+from brakelab.studies.verdict import Goal, verdict
 from ecu.contract.signals import CORNERS
 from ecu.settings.config import Config, load_config, new_params
 from ecu.settings.resources import resource
 
 CARS: Final = 20
+GOAL: Final = 4.0  # %
 SHARE: Final = 0.68  # of the brake force in front
 FIRST: Final = 2  # the third application: counted from here on
 ENGINE: Final = Engine(
@@ -173,10 +175,11 @@ def recorded_table(cars: Iterable[list[Recorded]]) -> Table:
         lines.append(
             (
                 name,
-                spread(figure([car.sum_error for car in found])),
-                spread(figure([car.predicted for car in found])),
+                spread(force := figure([car.sum_error for car in found])),
+                spread(predicted := figure([car.predicted for car in found])),
                 *(f"{value:.2f}" for value in others),
                 f"{np.mean([car.inside for car in found]):.0f}",
+                verdict(Goal("force", force.median, GOAL), Goal("prediction", predicted.median, GOAL)),
             )
         )
     return Table(
@@ -189,13 +192,14 @@ def recorded_table(cars: Iterable[list[Recorded]]) -> Table:
             "running average",
             "hindsight",
             "inside 2σ",
+            f"goal {GOAL:g} %",
         ),
         lines,
         f"Median over each car's applications, then median (least–greatest) over {len(every)} cars of the "
         "wide draw. Brake force of all wheels: by the friction known before the application, beside its mean "
         "true friction at its true pressures. Prediction: of the specific force, beside the same with the "
         "configured friction, a running average of the ratio that starts there, and one scale chosen "
-        "afterwards. Goals: brake force and prediction within 4 %. Inside 2σ: friction of each corner, of "
+        "afterwards. Goals: medians of brake force and prediction. Inside 2σ: friction of each corner, of "
         "which proportional pressures hardly tell more than the sum.",
     )
 

@@ -19,6 +19,7 @@ from brakelab.studies.dust.cycle_cars import (
 from brakelab.studies.dust.cycle_drives import CYCLES, REAL_DRIVING, WLTP_BRAKE, CycleDrive, drive_cycle
 from brakelab.studies.dust.cycle_open import OpenDrive, drive_open, real_driving_profile, wltp_brake_profile
 from brakelab.studies.study import Asked, Measured, Study
+from brakelab.studies.verdict import Goal, verdict
 from ecu.settings.config import Config, new_params
 
 CAR: Final = 1
@@ -147,9 +148,15 @@ def saving_rows(cars: list[Driven]) -> list[tuple[str, ...]]:
                         f"{drive.rear_ahead:+.3f}",
                         f"{drive.guarded:.2f}",
                         f"{drive.speed_error:.3f}",
+                        _verdict(driven, cycle, policy, 100.0 * (1.0 - particles)),
                     )
                 )
     return rows
+
+
+def _verdict(driven: Driven, cycle: str, policy: str, saved: float) -> str:
+    judged = driven.car.coefficient == 1.0 and cycle == REAL_DRIVING and policy == "dust"
+    return verdict(Goal("", saved, least=GOAL)) if judged else "–"
 
 
 def _percent(share: float) -> str:
@@ -239,7 +246,7 @@ def _run(asked: Asked) -> Measured:
             "What braking against dust saves and costs",
             ("car", "cycle", "minimise", "particles saved [%]", "mass saved [%]", "front's share of the work",
              "hottest front, rear [degC]", "brakes [MJ]", "regenerated [MJ]", "slip front, rear [%]",
-             "rear ahead", "slip guard [s]", "speed error [m/s]"),
+             "rear ahead", "slip guard [s]", "speed error [m/s]", "goal"),
             saving_rows(cars),
             f"Closed loop, drawn car {CAR}. Goal: {GOAL:.0f} % of particles in real driving without "
             "motors. Rear ahead: grip used by the rear less that of the front, at most, by true forces "

@@ -52,7 +52,7 @@ def choices(progress: Callable[[str], None]) -> list[Choice]:
     return [choice_of(brake, seed, measure(brake, progress, seed)) for seed in SEEDS for brake in BRAKES]
 
 
-def met(found: list[Choice]) -> tuple[int, int]:
+def compared(found: list[Choice]) -> tuple[int, int]:
     """Return on how many pads the choice beat every law of the thesis, and was worse than a constant."""
     return (
         sum(each.error < each.rival_error for each in found),
@@ -72,10 +72,10 @@ def choice_table(found: list[Choice]) -> Table:
         )
         for each in found
     ]
-    better, worse = met(found)
+    better, worse = compared(found)
     whole = sum(
-        met([each for each in found if each.seed == seed])[0] >= 2
-        and not met([each for each in found if each.seed == seed])[1]
+        compared([each for each in found if each.seed == seed])[0] >= 2
+        and not compared([each for each in found if each.seed == seed])[1]
         for seed in SEEDS
     )
     below = (

@@ -64,9 +64,9 @@ def search_table(found: Searches) -> Table:
         "starts that agree",
     )
     below = (
-        "Brake A, CPC, the other numbers at their best. The thesis calls the problem convex because the cost "
-        "is quadratic: it is so in the residuals, not in the numbers of a differential equation. Both "
-        "searches end at the same cost, least squares sooner, as printed. More than one end: a number "
-        "that leaves no trace, or a search that got stuck. Agree: starts of the search over all numbers."
+        "Brake A, CPC, the other numbers at their best. The thesis calls the problem convex for its "
+        "quadratic cost: it is so in the residuals, not in the numbers of a differential equation. More than "
+        "one end: a number that leaves no trace, or a search that got stuck. Agree: starts of the search of "
+        "all numbers."
     )
     return Table("Figure C.1: the cost of two numbers", columns, rows, below)

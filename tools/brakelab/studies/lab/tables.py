@@ -10,7 +10,7 @@ from brakelab.plant.disc import DISC_SHARE
 from brakelab.results.text_table import Table
 from brakelab.studies.lab.bad_input import bad_input_table
 from brakelab.studies.lab.brakes import DRAWS, SEED, linings, recovery, table_errors
-from brakelab.studies.lab.choice import choice_of, choice_table, met
+from brakelab.studies.lab.choice import choice_of, choice_table, compared
 from brakelab.studies.lab.discovery import discovery_tables
 from brakelab.studies.lab.estimators import estimator_tables
 from brakelab.studies.lab.goals import goal_table
@@ -19,6 +19,7 @@ from brakelab.studies.lab.run import Lab
 from brakelab.studies.lab.searches import search_table
 from brakelab.studies.physics.friction import LOADINGS, TABLE_3_4, TEMPERATURES
 from brakelab.studies.physics.heat import BRAKES
+from brakelab.studies.verdict import Goal, verdict
 
 TABLE_B_1: Final = {
     "initial speed": (-0.0961, 0.9907, 0.0),
@@ -242,13 +243,13 @@ def _verdict(lab: Lab) -> str:
             f"{brake}: {own.chosen} {own.error:.1f} %, the best of the others {own.rival} "
             f"{own.rival_error:.1f} %"
         )
-    best, worse = met([choice_of(brake, SEED, lab.brakes[brake]) for brake in BRAKES])
+    better, worse = compared([choice_of(brake, SEED, lab.brakes[brake]) for brake in BRAKES])
+    goals = verdict(Goal("better", better, least=2), Goal("worse", worse, most=0))
     return (
         "Goal: the chosen law is better than constant, both of Ostermeyer and ILVO on two of three brakes, "
-        f"and never worse than the constant. In closed loop: {'; '.join(words)}. Better on {best} of 3, "
-        f"worse than the constant on {worse}. "
-        + ("Met. " if best >= 2 and not worse else "Missed. ")
-        + "How a pad fades hotter than CPC is not in CPC: a law that goes on must be better by a quarter "
+        f"and never worse than the constant. In closed loop: {'; '.join(words)}. Better on {better} of 3, "
+        f"worse than the constant on {worse}: {goals}. "
+        "How a pad fades hotter than CPC is not in CPC: a law that goes on must be better by a quarter "
         "there than one that stays. `--held-out ams.csv` chooses by what fades."
     )
 
@@ -272,8 +273,8 @@ def _stops(lab: Lab) -> Table:
         *(f"{name}{what}" for name in laws for what in (", thesis [%]", " [%]")),
     )
     below = (
-        "Mean friction and its relative error, measured pressure replayed. The measured columns differ "
-        "because these are other pads: drawn, to be none of the laws."
+        "Mean friction and its relative error, measured pressure replayed. Measured: on the thesis's pads, "
+        "and on the drawn pads, which are none of the laws."
     )
     return Table("Table 3.4: stop by stop", columns, rows, below)
 

@@ -14,9 +14,11 @@ from brakelab.results.text_table import Table
 from brakelab.studies.cars import each_car
 from brakelab.studies.study import Asked, Measured, Study, picture
 from brakelab.studies.thermal.study import JUDGED, Appraised, Car, Course, drive_car
+from brakelab.studies.verdict import Goal, verdict
 
 CARS: Final = 8
 GOAL: Final = 10.0  # K
+INSIDE: Final = (93.0, 99.0)  # %
 AXLES: Final = {"front": slice(0, 2), "rear": slice(2, 4)}
 FIGURES: Final = {"dry": "7.13", "rain": "7.14"}
 LEGEND: Final = (
@@ -42,6 +44,7 @@ def _judged_rows(cars: Sequence[Car]) -> list[tuple[str, ...]]:
         for axle, part in AXLES.items():
             each = [car.trips[number] for car in cars]
             after = _over(each, "after", part)
+            inside = 100.0 * float(_over(each, "inside", part).mean())
             rows.append(
                 (
                     f"{trip.name} ({FIGURES[trip.name]})",
@@ -52,8 +55,9 @@ def _judged_rows(cars: Sequence[Car]) -> list[tuple[str, ...]]:
                     f"{np.count_nonzero(after <= GOAL)} of {len(after)}",
                     f"{np.median(_over(each, 'bias', part)):+.1f}",
                     f"{np.median(_over(each, 'sigma', part)):.1f}",
-                    f"{100 * _over(each, 'inside', part).mean():.1f}",
+                    f"{inside:.1f}",
                     f"{np.sqrt(np.mean(_over(each, 'normalised', part) ** 2)):.2f}",
+                    verdict(Goal("worst", after.max(), GOAL), Goal("inside", inside, INSIDE[1], INSIDE[0])),
                 )
             )
     return rows
@@ -96,12 +100,12 @@ def thermal_tables(cars: Sequence[Car]) -> list[Table]:
         Table(
             "Trips that were not identified on",
             ("trip (figure)", "axle", "hottest [°C]", "RMSE before [K]", "RMSE now [K]", "within 10 K",
-             "mean error [K]", "mean σ [K]", "inside 2σ [%]", "error over σ, RMS"),
+             "mean error [K]", "mean σ [K]", "inside 2σ [%]", "error over σ, RMS", "goals"),
             _judged_rows(cars),
             f"{len(cars)} cars, two discs an axle; RMSE over the whole trip, median (worst). Before: the "
-            "shipped configuration, from a cold start by the same power; now: the ECU itself. Goals: 10 K, "
-            f"inside 2σ at 93–99 %. All together: {np.count_nonzero(within)} of {len(within)} discs within "
-            f"10 K, inside 2σ at {inside:.1f} %.",
+            "shipped configuration, from a cold start by the same power; now: the ECU itself. Goals: "
+            f"{GOAL:g} K of every disc, inside 2σ at {INSIDE[0]:g}–{INSIDE[1]:g} %. All together: "
+            f"{np.count_nonzero(within)} of {len(within)} discs within 10 K, inside 2σ at {inside:.1f} %.",
         ),
         Table(
             "Cars",

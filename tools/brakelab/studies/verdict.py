@@ -1,0 +1,31 @@
+"""Goals of a study: whether what it measured meets them, and by how much it does not."""
+
+import math
+from collections.abc import Iterable
+from typing import NamedTuple
+
+
+class Goal(NamedTuple):
+    """A measured value beside its limits, which are within the goal."""
+
+    name: str
+    """Of what is limited; "" where a verdict has one goal alone."""
+    value: float
+    most: float = math.inf
+    least: float = -math.inf
+
+
+def verdict(*goals: Goal) -> str:
+    """Return "met", or each goal that was missed and by how much, in its own unit."""
+    missed = [
+        f"{goal.name} by {max(goal.value - goal.most, goal.least - goal.value):.2g}".strip()
+        for goal in goals
+        if not goal.least <= goal.value <= goal.most
+    ]
+    return f"missed: {', '.join(missed)}" if missed else "met"
+
+
+def met(verdicts: Iterable[str]) -> str:
+    """Return "2 of 3", those that are met."""
+    every = list(verdicts)
+    return f"{every.count('met')} of {len(every)}"
