@@ -31,6 +31,7 @@ from brakelab.logs.text_log import (
     SKIPPED,
     decimal,
     is_word,
+    line_end,
     note_line,
     number,
     read_text,
@@ -280,13 +281,10 @@ def _parse_asc(
     lines: NDArray[np.int64],
     counts: Record,
 ) -> tuple[int, int, bool]:
-    size, room = len(text), len(frames)
     used = count = 0
-    while count < room:
-        end = used
-        while end < size and text[end] != 0x0A:
-            end += 1
-        if end == size:
+    while count < len(frames):
+        end = line_end(text, used)
+        if end < 0:
             break
         found = _parse_line(text, used, end, state, frames[count], payloads[count])
         if found == HEADER:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.logs.log_quality import FrameBlock, LogQuality
-from brakelab.logs.text_log import DAMAGED, DATA, HEX, IS_FD_LENGTH, SKIPPED, note_line, read_text
+from brakelab.logs.text_log import DAMAGED, DATA, HEX, IS_FD_LENGTH, SKIPPED, line_end, note_line, read_text
 from ecu.contract.records import FRAME_ERROR, FRAME_EXTENDED, FRAME_FD, FRAME_REMOTE, RecordArray
 from ecu.jit import Record, batch_kernel, kernel
 
@@ -238,10 +238,8 @@ def _parse_candump(
                 used = end + 1
                 continue
             payloads[count] = 0
-        end = used
-        while end < size and text[end] != 0x0A:
-            end += 1
-        if end == size:
+        end = line_end(text, used)
+        if end < 0:
             break
         counts.line += 1
         if end == used or (end == used + 1 and text[used] == 0x0D):

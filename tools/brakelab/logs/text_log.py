@@ -55,6 +55,14 @@ def note_line(
 
 
 @kernel
+def line_end(text: NDArray[np.uint8], at: int) -> int:
+    """Return the place of the end of the line that begins at `at`; -1: it is not whole."""
+    while at < len(text) and text[at] != 0x0A:
+        at += 1
+    return at if at < len(text) else -1
+
+
+@kernel
 def skip_blanks(text: NDArray[np.uint8], at: int, end: int) -> int:
     """Return the place of the next word in `text[at:end]`, `end` if there is none."""
     while at < end and (text[at] == 0x20 or text[at] == 0x09 or text[at] == 0x0D):
