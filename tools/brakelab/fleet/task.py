@@ -17,17 +17,17 @@ from brakelab.fleet.files import local_copies
 from brakelab.fleet.job import Job, Outcome, failed, metadata_of, provenance
 from brakelab.fleet.summary import DriveBook
 from brakelab.fleet.wear import register_pads, wear_summary
-from brakelab.replay.contradictions import contradiction_lines
+from brakelab.replay.contradictions import contradiction_lines, runs
 from brakelab.replay.drive import replay_drive
 from brakelab.replay.log import log_hash
 from brakelab.replay.needed import NEEDED, fault_lines, needed_lines, nothing_usable, transducer_line
-from brakelab.replay.quality import Findings, quality_lines
+from brakelab.replay.quality import quality_lines
 from brakelab.results.car import KEY as CAR
 from brakelab.results.car import car_of
 from brakelab.results.files import ResultWriter, brakes_table
 from brakelab.results.pads import pads_of
 from ecu.algorithm.step import new_state
-from ecu.contract.records import LEARNED, RecordArray
+from ecu.contract.records import LEARNED
 from ecu.errors import RunFault, UserError
 from ecu.recording.learned_range import out_of_range
 from ecu.settings.config import new_params
@@ -64,11 +64,9 @@ def _replay(job: Job, paths: Sequence[Path]) -> tuple[Outcome, pa.Table]:
     if job.pads:
         learned = new_state(params)["learned"].copy() if learned is None else learned
         register_pads(learned, job.config, job.pads, f"vehicle {job.vehicle}, {job.drive}")
-    findings = [Findings(path) for path in paths]
     for path in paths:
         if not path.exists():
             raise UserError(str(path), "", "no such file; give an existing log")
-    book = DriveBook(params)
     with TemporaryDirectory(prefix="brake-ecu-fleet-") as folder:
         file = Path(folder, "rows.parquet")
         with ResultWriter(file, params) if job.rows else nullcontext() as writer:
@@ -83,18 +81,13 @@ def _replay(job: Job, paths: Sequence[Path]) -> tuple[Outcome, pa.Table]:
                     }
                     writer.write(t, rows)
 
-            def run() -> RecordArray | None:
-                ended = book.brakes.end_log
-                return replay_drive(findings, params, learned, job.source, write, ended, lambda _: None)
-
-            after = run()
-            wrong = contradiction_lines(findings)
-            if wrong:
-                params["fixed"] = 1
-                findings, book = [Findings(path) for path in paths], DriveBook(params)
+            for findings in runs(paths, params, learns=False):
+                book = DriveBook(params)
                 if writer is not None:
                     writer.restart()
-                after = run()
+                ended = book.brakes.end_log
+                after = replay_drive(findings, params, learned, job.source, write, ended, lambda _: None)
+            wrong = contradiction_lines(findings)
             if writer is not None and after is not None:
                 writer.pads = pads_of(params, after, job.config)
         if nothing_usable(findings):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.logs.formats import Advance, kind_of
-from brakelab.replay.contradictions import HELD, contradiction_lines
+from brakelab.replay.contradictions import HELD, contradiction_lines, runs
 from brakelab.replay.drive import drive_frames, replay_drive
 from brakelab.replay.log import log_hash, log_size
 from brakelab.replay.needed import (
@@ -132,8 +132,7 @@ def replay_into(
     notes += [line for line in (radius_line(map, source, params[0]), delay_line(source, params[0])) if line]
     learned = _restore(state, vehicle, params)
     before = new_state(params, learned)["learned"].tobytes()
-    findings = [Findings(path) for path in logs]
-    recorded = recording is not None or any(kind_of(log) == "recording" for log in logs)
+    learns = force or recording is not None or any(kind_of(log) == "recording" for log in logs)
     size = sum(log_size(path) for path in logs)
     with (
         ResultWriter(out, params) as writer,
@@ -150,14 +149,12 @@ def replay_into(
             "database_hash": source.database_hash,
             "inputs": inputs.result,
         }
-        after = _run(writer, findings, params, learned, source, provenance, advance, recording)
-        wrong = contradiction_lines(findings)
-        held = bool(wrong) and not (force or recorded)
-        if held:
-            params["fixed"] = 1
+        for again, findings in enumerate(runs(logs, params, learns)):
             writer.restart()
-            findings = [Findings(path) for path in logs]
-            after = _run(writer, findings, params, learned, source, provenance, lambda size: None, recording)
+            heard = (lambda size: None) if again else advance
+            after = _run(writer, findings, params, learned, source, provenance, heard, recording)
+        wrong = contradiction_lines(findings)
+        held = bool(wrong) and not learns
         writer.quality = [quality_counts(found, source.plan) for found in findings]
         writer.frames = drive_frames(findings)
         writer.pads = [] if after is None else pads_of(params, after, vehicle)
