@@ -19,7 +19,9 @@ from brakelab.logs.csv_header import find_header
 from brakelab.logs.csv_rows import csv_columns, csv_rows
 from brakelab.logs.log_quality import Damage
 from brakelab.results.mdf import load_asammdf
+from brakelab.results.outputs import check_outputs, config_files
 from ecu.errors import UserError
+from ecu.settings.config import Config, load_config
 
 WARMEST_COLD: Final = 250.0
 """degC: a disc that is never cooler is given in K."""
@@ -71,13 +73,21 @@ def _decoded(given: bytes) -> str:
         return given.decode("cp1252", "replace")
 
 
-def measured_files(manifest: Path) -> list[Path]:
-    """Return the manifest and the files that its rows name, which exist or not.
+def open_campaign(
+    manifest: Path, config: Path, axle: str, out: Path
+) -> tuple[Config, tuple[Path, Path, Path]]:
+    """Return the configuration, and what measurements of an `axle` will write: `out`, its page and picture.
 
     Raises:
-        UserError: it cannot be read.
+        UserError: an argument is invalid, or one of them would replace what is read or somebody else's.
     """
-    return [manifest, *(manifest.parent / row["file"] for row in read_manifest(manifest) if row.get("file"))]
+    if axle not in ("front", "rear"):
+        raise UserError("--axle", axle, "choose front or rear")
+    vehicle = load_config(config)
+    written = out, out.with_suffix(".md"), out.with_suffix(".svg")
+    files = [manifest.parent / row["file"] for row in read_manifest(manifest) if row.get("file")]
+    check_outputs(out, written, [manifest, *files, *config_files(config)], toml=True)
+    return vehicle, written
 
 
 def read_columns(path: Path, names: tuple[str, ...], what: str) -> dict[str, Array]:

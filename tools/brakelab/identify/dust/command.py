@@ -9,12 +9,10 @@ from brakelab.identify.dust.features import Applications
 from brakelab.identify.dust.fit import Judged, choose, judge_all, ranges
 from brakelab.identify.dust.page import write_page
 from brakelab.identify.dust.reader import read_trips
-from brakelab.identify.measurement_files import measured_files
-from brakelab.results.outputs import check_outputs, config_files
+from brakelab.identify.measurement_files import open_campaign
 from ecu.contract.dust import MODELS
-from ecu.errors import RunFault, UserError
+from ecu.errors import RunFault
 from ecu.output import give, wrote
-from ecu.settings.config import load_config
 
 LOST: Final = 1.0
 """Relative error of the particles of trips left out, from which on a model tells nothing."""
@@ -55,11 +53,8 @@ def identify_dust(manifest: Path, config: Path, axle: str, out: Path) -> int:
         UserError: an argument or a file is invalid.
         RunFault: no model explains the trips.
     """
-    if axle not in ("front", "rear"):
-        raise UserError("--axle", axle, "choose front or rear")
-    vehicle = load_config(config)
-    written = out, page, _ = out, out.with_suffix(".md"), out.with_suffix(".svg")
-    check_outputs(out, written, [*measured_files(manifest), *config_files(config)], toml=True)
+    vehicle, written = open_campaign(manifest, config, axle, out)
+    page = written[1]
     trips = read_trips(manifest, vehicle, axle)
     trained, test = [trip for trip in trips if not trip.test], [trip for trip in trips if trip.test]
     judged = judge_all(trained, test)

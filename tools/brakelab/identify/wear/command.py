@@ -7,7 +7,7 @@ import numpy as np
 
 from brakelab.arrays import Array
 from brakelab.identify.config_file import Section, write_car
-from brakelab.identify.measurement_files import measured_files
+from brakelab.identify.measurement_files import open_campaign
 from brakelab.identify.wear.curves import SHARE
 from brakelab.identify.wear.fit import (
     QUASI_STATIC,
@@ -22,10 +22,9 @@ from brakelab.identify.wear.fit import (
 from brakelab.identify.wear.fusion import Fused, disagreeing, fuse
 from brakelab.identify.wear.page import tables, write_page
 from brakelab.identify.wear.reader import Block, read_blocks
-from brakelab.results.outputs import check_outputs, config_files
 from ecu.errors import RunFault, UserError
 from ecu.output import give, say, wrote
-from ecu.settings.config import Axle, load_config
+from ecu.settings.config import Axle
 from ecu.settings.pad import Pad
 
 DENSITIES: Final = (800.0, 6000.0)  # kg/m^3: organic linings 1500 to 2800, sintered ones up to 5500
@@ -105,11 +104,8 @@ def identify_wear(manifest: Path, config: Path, axle: str, out: Path) -> int:
         UserError: an argument or a file is invalid.
         RunFault: no law explains the blocks.
     """
-    if axle not in ("front", "rear"):
-        raise UserError("--axle", axle, "choose front or rear")
-    vehicle = load_config(config)
-    written = out, page, _ = out, out.with_suffix(".md"), out.with_suffix(".svg")
-    check_outputs(out, written, [*measured_files(manifest), *config_files(config)], toml=True)
+    vehicle, written = open_campaign(manifest, config, axle, out)
+    page = written[1]
     brake: Axle = getattr(vehicle, axle)
     blocks = read_blocks(manifest, vehicle, axle)
     try:
