@@ -38,6 +38,14 @@ def test_it_is_read_in_one_sitting() -> None:
     assert len(README.splitlines()) <= 150
 
 
+def test_every_command_is_in_the_table(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["--help"])
+    listed = re.findall(r"^  (\w+)  +[A-Z]", capsys.readouterr().out.partition("Commands:")[2], re.MULTILINE)
+    rows = "\n".join(re.findall(r"^\| (`.*?) \| ", README, re.MULTILINE))
+    assert len(listed) > 15
+    assert [name for name in listed if not re.search(rf"`{name}\b", rows)] == []
+
+
 def test_accuracy_is_that_of_the_page() -> None:
     """Figures front/rear of each row of the README's table are in the rows of that case."""
     page = (ROOT / "docs/results/observers.md").read_text("utf-8")

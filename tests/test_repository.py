@@ -272,6 +272,13 @@ def test_the_index_of_the_documents_names_every_page() -> None:
     assert {*(ROOT / "docs").rglob("*.md")} - {index} <= linked
 
 
+def test_what_is_said_to_be_touched_is_there() -> None:
+    tables = "\n".join(re.findall(r"^\|.*", (ROOT / "docs/extending.md").read_text("utf-8"), re.M))
+    files = re.findall(r"`((?:ecu|tools|tests|dbc|docs)/[\w./]+)`", tables.replace("/NAME/", "/"))
+    assert len(files) > 30
+    assert [name for name in files if not (ROOT / name).exists()] == []
+
+
 def test_the_glossary_names_what_the_code_has() -> None:
     glossary = (ROOT / "docs/glossary.md").read_text("utf-8")
     cells = [row.rsplit("|", 2)[1] for row in re.findall(r"^\|.*\|$", glossary, re.MULTILINE)]
