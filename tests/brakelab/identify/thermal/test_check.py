@@ -11,7 +11,7 @@ from brakelab.identify.thermal.model import Cooling
 from brakelab.identify.thermal.reader import Drive
 from ecu.errors import UserError
 
-from .courses import DRY, XI, course, discs
+from .series import DRY, XI, discs, series
 
 ONES = np.ones(4)
 START = Cooling(*DRY, DRY[0], 1.5 * DRY[1])
@@ -19,7 +19,7 @@ START = Cooling(*DRY, DRY[0], 1.5 * DRY[1])
 
 @pytest.fixture(scope="module")
 def good():
-    return course(1500)
+    return series(1500)
 
 
 def drive(one, **changed) -> Drive:

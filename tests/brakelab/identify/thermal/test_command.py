@@ -16,7 +16,7 @@ from ecu import cli
 from ecu.contract.signals import CORNERS
 from ecu.settings.config import load_config, new_params, store_key
 
-from .courses import TRUE, XI, course, discs
+from .series import TRUE, XI, discs, series
 
 ROOT = Path(__file__).parents[4]
 CONFIG = ROOT / "config" / "suv.toml"
@@ -144,7 +144,7 @@ def test_the_configuration_in_memory_is_that_of_the_file() -> None:
     from brakelab.identify.thermal.result import start_of
 
     config = load_config(CONFIG)
-    fit = fit_axle(discs(course(1500, rain=True)), config.front.disc_heating, start_of(config.front))
+    fit = fit_axle(discs(series(1500, rain=True)), config.front.disc_heating, start_of(config.front))
     row = new_params(with_fits(config, {"front": fit}))[0]
     assert row["disc_heating"][0] == pytest.approx(XI, rel=0.03)
     assert row["disc_cooling_by_speed_wet"][0] == pytest.approx(TRUE.by_speed_wet, rel=0.1)

@@ -15,7 +15,7 @@ from brakelab.identify.thermal.fit import (
 )
 from brakelab.identify.thermal.model import Cooling
 
-from .courses import TRUE, XI, course, discs
+from .series import TRUE, XI, discs, series
 
 START_XI = 1.7e-4
 START = Cooling(1.3e-3, 1.4e-4, 1.3e-3, 2.1e-4)
@@ -27,7 +27,7 @@ def in_sigmas(fit) -> np.ndarray:
 
 
 def test_a_dry_and_a_wet_drive_give_all_five_numbers() -> None:
-    fit = fit_axle(discs(course(), course(seed=2, rain=True)), START_XI, START)
+    fit = fit_axle(discs(series(), series(seed=2, rain=True)), START_XI, START)
     assert fit.told.all()
     assert fit.rank == 6
     assert fit.heating == pytest.approx(XI, rel=0.01)
@@ -48,7 +48,7 @@ def test_a_dry_and_a_wet_drive_give_all_five_numbers() -> None:
     ids=["dry", "rain", "one speed", "at rest"],
 )
 def test_what_a_drive_cannot_tell_stays_as_configured(drive, told, not_told) -> None:
-    fit = fit_axle(discs(course(**drive)), START_XI, START)
+    fit = fit_axle(discs(series(**drive)), START_XI, START)
     assert fit.told[told].all()
     assert not fit.told[not_told].any()
     if STILL_WET in not_told:  # follows the dry one
@@ -56,7 +56,7 @@ def test_what_a_drive_cannot_tell_stays_as_configured(drive, told, not_told) -> 
 
 
 def test_a_rate_is_known_better_than_its_parts() -> None:
-    fit = fit_axle(discs(course(speed=30.0)), START_XI, START)
+    fit = fit_axle(discs(series(speed=30.0)), START_XI, START)
     assert fit.sigma[STILL] > 0.3
     assert fit.stated[1] < 0.05
     assert np.isnan(fit.stated[2])
@@ -64,8 +64,8 @@ def test_a_rate_is_known_better_than_its_parts() -> None:
 
 
 def test_readings_that_jump_are_left_aside() -> None:
-    clean = course()
-    dirty = course()
+    clean = series()
+    dirty = series()
     random = np.random.default_rng(5)
     dirty.measured[random.random(len(dirty.speed)) < 0.05, :2] = 900.0
     good, found = (fit_axle(discs(one), START_XI, START) for one in (clean, dirty))
@@ -74,7 +74,7 @@ def test_readings_that_jump_are_left_aside() -> None:
 
 
 def test_a_sensor_that_is_off_moves_xi_by_no_more_than_its_sigma() -> None:
-    off = course()
+    off = series()
     off.measured[:, :2] += 3.0
     fit = fit_axle(discs(off), START_XI, START)
     assert np.abs(in_sigmas(fit)[[HEATING, STILL, BY_SPEED]]).max() < 2.5
@@ -84,7 +84,7 @@ def test_a_sensor_that_is_off_moves_xi_by_no_more_than_its_sigma() -> None:
 def test_what_the_lump_leaves_over_is_not_taken_for_noise() -> None:
     """Errors that last 200 s and are common to both discs: 12 drives, two sigma of each number."""
     off = np.array(
-        [in_sigmas(fit_axle(discs(course(2400, seed, drift=3.0)), START_XI, START))[:3] for seed in range(12)]
+        [in_sigmas(fit_axle(discs(series(2400, seed, drift=3.0)), START_XI, START))[:3] for seed in range(12)]
     )
     rms, inside = np.sqrt(np.mean(off**2, axis=0)), np.mean(np.abs(off) < 2.0)
     print(f"error over sigma: {np.round(rms, 2)}, inside 2 sigma {100 * inside:.0f} %")
@@ -102,7 +102,7 @@ def test_autocorrelation_time_of_a_known_process() -> None:
 
 
 def test_the_configuration_as_a_fit_keeps_its_numbers() -> None:
-    both = discs(course())
+    both = discs(series())
     fit = fit_axle(both, START_XI, START)
     before = fit_nothing(both, START_XI, START, fit)
     assert (before.heating, before.cooling) == (START_XI, START)

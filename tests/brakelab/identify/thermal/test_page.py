@@ -10,14 +10,14 @@ from brakelab.identify.thermal.page import Judged, cooling_panel, untold, write_
 from brakelab.identify.thermal.result import errors_of, judge, start_of
 from ecu.settings.config import load_config
 
-from .courses import DRY, course, discs
+from .series import DRY, discs, series
 
 FRONT = load_config(Path(__file__).parents[4] / "config" / "suv.toml").front
 
 
 @pytest.fixture(scope="module")
 def axle() -> Judged:
-    both, start = discs(course(1500)), start_of(FRONT)
+    both, start = discs(series(1500)), start_of(FRONT)
     fit = fit_axle(both, FRONT.disc_heating, start)
     before, errors = fit_nothing(both, FRONT.disc_heating, start, fit), errors_of(fit, FRONT)
     told = [judge(disc, np.zeros(1500), fit, k, errors, before) for k, disc in enumerate(both)]

@@ -39,15 +39,15 @@ def cycles(n: int = 500) -> tuple[np.ndarray, np.ndarray]:
 
 def test_a_second_is_the_mean_of_its_cycles() -> None:
     drive = as_drive(Path("a.csv"), *cycles(), 15.0)
-    course = drive.course
-    assert course.power[1] == pytest.approx(50.0 * np.array([100.0, 200.0, 300.0, 400.0]))
-    assert not course.power[[0, 2, 3, 4]].any()  # nobody brakes: torque is noise
-    assert course.speed == pytest.approx(18.0)
-    assert course.air == pytest.approx(7.0)
-    assert course.wet.tolist() == [True, True, True, True, True]  # the first word on rain holds before it
-    assert course.measured[:, 1] == pytest.approx(80.0)
-    assert np.isnan(course.measured[:, [0, 2, 3]]).all()
-    assert (drive.applications, course.air_known, drive.rain_known) == (1, True, True)
+    series = drive.series
+    assert series.power[1] == pytest.approx(50.0 * np.array([100.0, 200.0, 300.0, 400.0]))
+    assert not series.power[[0, 2, 3, 4]].any()  # nobody brakes: torque is noise
+    assert series.speed == pytest.approx(18.0)
+    assert series.air == pytest.approx(7.0)
+    assert series.wet.tolist() == [True, True, True, True, True]  # the first word on rain holds before it
+    assert series.measured[:, 1] == pytest.approx(80.0)
+    assert np.isnan(series.measured[:, [0, 2, 3]]).all()
+    assert (drive.applications, series.air_known, drive.rain_known) == (1, True, True)
     assert drive.friction_error == pytest.approx(0.05)
 
 
@@ -56,9 +56,9 @@ def test_what_no_sensor_says_is_the_configuration_s_or_missing() -> None:
     samples[:, [KEPT.index(AMBIENT_TEMPERATURE), KEPT.index(RAIN)]] = np.nan
     samples[:, KEPT.index(WHEEL_SPEED) + 2] = np.nan
     drive = as_drive(Path("a.csv"), outputs, samples, 15.0)
-    assert drive.course.air == pytest.approx(15.0)
-    assert not drive.course.wet.any()
-    assert (drive.course.air_known, drive.rain_known) == (False, False)
+    assert drive.series.air == pytest.approx(15.0)
+    assert not drive.series.wet.any()
+    assert (drive.series.air_known, drive.rain_known) == (False, False)
     assert drive.wheels_seen == pytest.approx([1.0, 1.0, 0.0, 1.0])
 
 
@@ -72,8 +72,8 @@ def test_the_power_of_a_log_is_that_of_the_closed_loop(tmp_path) -> None:
         float(np.sum(0.01 * loop.truth[f"brake_torque_{c}"] * loop.truth[f"wheel_speed_{c}"]))
         for c in CORNERS
     ]
-    assert drive.course.power.sum(axis=0) == pytest.approx(true, rel=0.15)  # by its own friction
-    assert drive.course.measured[-1] == pytest.approx([m[-50] for m in measured.values()], abs=5.0)
+    assert drive.series.power.sum(axis=0) == pytest.approx(true, rel=0.15)  # by its own friction
+    assert drive.series.measured[-1] == pytest.approx([m[-50] for m in measured.values()], abs=5.0)
     assert drive.applications >= 1
 
 

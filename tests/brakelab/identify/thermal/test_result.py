@@ -19,14 +19,14 @@ from brakelab.identify.thermal.result import (
 )
 from ecu.settings.config import load_config
 
-from .courses import TRUE, XI, course, discs
+from .series import TRUE, XI, discs, series
 
 FRONT = load_config(Path(__file__).parents[4] / "config" / "suv.toml").front
 
 
 @pytest.fixture(scope="module")
 def dry():
-    return discs(course())
+    return discs(series())
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +39,7 @@ def fit(dry):
     [(Errors(0.1, 1e-9, 1e-9), 1.001, 1.0), (Errors(1e-9, 0.1, 0.1), 1.0, 1.001)],
 )
 def test_the_band_is_what_a_wrong_parameter_does(dry, errors, heating, cooling) -> None:
-    disc, none = dry[0], np.zeros(len(dry[0].course.speed))
+    disc, none = dry[0], np.zeros(len(dry[0].series.speed))
     plain, sigma = predict(disc, XI, TRUE, errors, none, 0.01, 20.0)
     other = Cooling(*(cooling * value for value in TRUE))
     moved, _ = predict(disc, heating * XI, other, errors, none, 0.01, 20.0)
@@ -49,7 +49,7 @@ def test_the_band_is_what_a_wrong_parameter_does(dry, errors, heating, cooling) 
 
 def test_unsure_friction_widens_the_band(dry) -> None:
     disc = dry[0]
-    none = np.zeros(len(disc.course.speed))
+    none = np.zeros(len(disc.series.speed))
     _, sure = predict(disc, XI, TRUE, Errors(0.04, 0.08, 0.2), none, 2.0, 0.0)
     _, unsure = predict(disc, XI, TRUE, Errors(0.04, 0.08, 0.2), none + 0.1, 2.0, 0.0)
     assert (unsure[100:] > 1.1 * sure[100:]).all()
@@ -58,7 +58,7 @@ def test_unsure_friction_widens_the_band(dry) -> None:
 def test_the_fit_is_nearer_than_the_configuration(dry, fit) -> None:
     start = start_of(FRONT)
     before = fit_nothing(dry, FRONT.disc_heating, start, fit)
-    friction = np.zeros(len(dry[0].course.speed))
+    friction = np.zeros(len(dry[0].series.speed))
     told = judge(dry[0], friction, fit, 0, errors_of(fit, FRONT), before)
     assert told.after < 0.6 < 0.8 < told.before
     assert told.inside > 0.95

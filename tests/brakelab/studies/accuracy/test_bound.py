@@ -15,13 +15,13 @@ from brakelab.studies.accuracy.bound_car import (
     RADIUS,
     SLOPE,
     WINDOW_S,
-    Course,
     N,
+    Trajectory,
     V,
-    course_of,
     derivatives,
     shown,
     slip_of,
+    trajectory_of,
 )
 from brakelab.studies.accuracy.bound_system import wander_of
 from brakelab.studies.accuracy.linear_bound import System, filtered, sampled
@@ -97,60 +97,60 @@ def test_slip_is_the_inverse_of_the_plants_magic_formula(c: float, e: float) -> 
     np.testing.assert_allclose(back, used, atol=1e-9)
 
 
-def _drive(name: str) -> tuple[Drive, RecordArray, Course]:
+def _drive(name: str) -> tuple[Drive, RecordArray, Trajectory]:
     loop = new_loop(shipped(name), configured(), seed=1)
     drive = run(loop)
     car = loop.sides.vehicle.params[0]
-    return drive, car, course_of(drive, car, counted(drive))
+    return drive, car, trajectory_of(drive, car, counted(drive))
 
 
 @pytest.mark.parametrize("name", ["stop-1", "stop-2", "blending-40"])
 def test_the_linearised_car_is_the_simulated_one(name: str) -> None:
-    drive, car, course = _drive(name)
-    rows = course.counted
-    found = shown(car, course, np.zeros(N))[rows]
+    drive, car, trajectory = _drive(name)
+    rows = trajectory.counted
+    found = shown(car, trajectory, np.zeros(N))[rows]
     # Within a tenth of the sensor's noise; a slip of 2 % has to be known to a hundredth of it.
-    np.testing.assert_allclose(found[:, :4], course.omega[rows], rtol=3e-4, atol=0.01)
-    np.testing.assert_allclose(found[:, 4], course.force[rows], atol=0.002)
-    by = derivatives(car, course)[rows]
+    np.testing.assert_allclose(found[:, :4], trajectory.omega[rows], rtol=3e-4, atol=0.01)
+    np.testing.assert_allclose(found[:, 4], trajectory.force[rows], atol=0.002)
+    by = derivatives(car, trajectory)[rows]
     brakes = np.zeros(len(drive.t))
     for corner in CORNERS:
         brakes += drive.truth[f"brake_torque_{corner}"] / drive.truth[f"rolling_radius_{corner}"]
-    n = len(course.speed)
+    n = len(trajectory.speed)
     per_mass = brakes[: 5 * n].reshape(n, 5).mean(axis=1)[rows] / car["mass"]
     np.testing.assert_allclose(by[:, 4, MU : MU + 4].sum(axis=1), -per_mass, rtol=0.002)
     # Speed and radius scale a wheel's speed; more mass at the same torque: less deceleration.
-    np.testing.assert_allclose(by[:, :4, V] * course.speed[rows, None], course.omega[rows], rtol=1e-3)
+    np.testing.assert_allclose(by[:, :4, V] * trajectory.speed[rows, None], trajectory.omega[rows], rtol=1e-3)
     own = by[:, range(4), range(RADIUS, RADIUS + 4)]
-    np.testing.assert_allclose(own, -course.omega[rows], rtol=0.06)
+    np.testing.assert_allclose(own, -trajectory.omega[rows], rtol=0.06)
     rolling = GRAVITY * car["rolling_resistance"]  # grows with the mass
-    np.testing.assert_allclose(by[:, 4, MASS], -course.force[rows] - rolling, atol=0.003)
+    np.testing.assert_allclose(by[:, 4, MASS], -trajectory.force[rows] - rolling, atol=0.003)
     assert np.all(by[:, :, SLOPE] == 0.0)
 
 
-def _course(mu: np.ndarray) -> Course:
+def _trajectory(mu: np.ndarray) -> Trajectory:
     n = len(mu)
     zero, wheels = np.zeros(n), np.zeros((n, 4))
     counts = np.ones(n, np.bool_)
-    return Course(zero, wheels, zero, wheels, wheels, wheels, mu, wheels, wheels, zero, counts)
+    return Trajectory(zero, wheels, zero, wheels, wheels, wheels, mu, wheels, wheels, zero, counts)
 
 
 def test_how_friction_wanders() -> None:
     t = WINDOW_S * np.arange(4001)
     front = np.exp(0.05 / 0.7 * np.sin(0.7 * t))  # its rate is 0.05 cos(0.7 t)
     rear = np.exp(-0.10 / 0.7 * np.sin(0.7 * t))
-    wander = wander_of(_course(np.stack([front, front, rear, rear], axis=1)))
+    wander = wander_of(_trajectory(np.stack([front, front, rear, rear], axis=1)))
     expected = 0.5 * np.array([[0.05**2, -0.05 * 0.10], [-0.05 * 0.10, 0.10**2]])
     np.testing.assert_allclose(wander.covariance, expected, rtol=0.02)
     assert np.exp(-0.5 / wander.time) == pytest.approx(np.cos(0.7 * 0.5), rel=0.02)
 
 
 def test_errors_count_as_in_observers() -> None:
-    course = _course(np.tile([0.4, 0.4, 0.5, 0.5], (10, 1)))
+    trajectory = _trajectory(np.tile([0.4, 0.4, 0.5, 0.5], (10, 1)))
     errors = np.zeros((10, N, 1))
     errors[:, MU] = 0.02  # of one front wheel
     errors[:, MU + 2 : MU + 4] = 0.03
-    np.testing.assert_allclose(axle_errors(course, errors)[:, 0], [2.0 / np.sqrt(2.0), 3.0])
+    np.testing.assert_allclose(axle_errors(trajectory, errors)[:, 0], [2.0 / np.sqrt(2.0), 3.0])
 
 
 @pytest.fixture(scope="module")
@@ -168,9 +168,9 @@ def test_whoever_knows_more_errs_less(stop: Bound) -> None:
     filters = {level: np.median(stop.limits[level].filter, axis=1) for level in LEVELS}
     smoothers = {level: np.median(stop.limits[level].smoother, axis=1) for level in LEVELS}
     for axle in (0, 1):
-        learned, minutes, car, course = (filters[level][axle] for level in LEVELS)
+        learned, minutes, car, trajectory = (filters[level][axle] for level in LEVELS)
         assert 0.1 < car < minutes < learned < 5.0
-        assert 0.1 < course < minutes
+        assert 0.1 < trajectory < minutes
         for level in LEVELS:
             assert smoothers[level][axle] < 1.02 * filters[level][axle]
     for axle in (0, 1):  # the observer is a filter too, and not a bad one
@@ -181,8 +181,8 @@ def test_the_table_tells_what_a_goal_would_take(monkeypatch: pytest.MonkeyPatch)
     case = "stop #1"
     monkeypatch.setattr(bound, "ACCURACY", {case: ACCURACY[case]._replace(adapted=(0.8, 0.9))})
 
-    def verdicts(joint: float, minutes: float, car: float, course: float) -> tuple[str, str]:
-        of = dict(zip(LEVELS, (9.0, minutes, car, course), strict=True))
+    def verdicts(joint: float, minutes: float, car: float, trajectory: float) -> tuple[str, str]:
+        of = dict(zip(LEVELS, (9.0, minutes, car, trajectory), strict=True))
         limits = {level: Limit(*np.full((2, 2, 3), value)) for level, value in of.items()}
         (line,) = bound_table([[Bound(case, (joint, joint), limits)]]).rows
         return line[-2], line[-1]
@@ -190,5 +190,5 @@ def test_the_table_tells_what_a_goal_would_take(monkeypatch: pytest.MonkeyPatch)
     assert verdicts(0.84, 2.0, 2.0, 2.0) == ("met", "met")
     assert verdicts(0.86, 0.7, 2.0, 2.0) == ("yes", "met")
     assert verdicts(2.0, 0.9, 0.8, 2.0) == ("with the car known", "yes")
-    assert verdicts(2.0, 1.0, 1.0, 0.7) == ("with the course known", "with the course known")
-    assert verdicts(2.0, 1.0, 1.0, 0.9) == ("no", "with the course known")
+    assert verdicts(2.0, 1.0, 1.0, 0.7) == ("with the change known", "with the change known")
+    assert verdicts(2.0, 1.0, 1.0, 0.9) == ("no", "with the change known")

@@ -11,7 +11,7 @@ from brakelab.identify.thermal.page import Judged
 from brakelab.identify.thermal.result import Errors
 from brakelab.results.chart import chart_svg
 from brakelab.results.text_table import markdown
-from brakelab.studies.thermal.study import Appraised, Car, Course
+from brakelab.studies.thermal.study import Appraised, Car, Series
 from brakelab.studies.thermal.thermal import LEGEND, thermal_panels, thermal_tables
 from ecu.settings.config import load_config
 
@@ -37,9 +37,9 @@ def car(seed: int, rmse: float) -> Car:
         )
 
     warm = np.linspace(20.0, 120.0, 600)[:, None] * np.ones(4)
-    course = Course(np.full(600, 20.0), warm, 0.1 * warm, warm + 3.0, warm + 20.0)
+    series = Series(np.full(600, 20.0), warm, 0.1 * warm, warm + 3.0, warm + 20.0)
     axles = [judged("front"), judged("rear")]
-    return Car(seed, axles, [appraised("dry"), appraised("rain")], [course, course], 12.0 * np.ones(4))
+    return Car(seed, axles, [appraised("dry"), appraised("rain")], [series, series], 12.0 * np.ones(4))
 
 
 @pytest.fixture(scope="module")

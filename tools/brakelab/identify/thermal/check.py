@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from brakelab.identify.measurement_files import WARMEST_COLD
 from brakelab.identify.thermal.fit import Disc, Fit, fit_axle
-from brakelab.identify.thermal.model import ROW, Cooling, Course
+from brakelab.identify.thermal.model import ROW, Cooling, Series
 from brakelab.identify.thermal.reader import Drive
 from brakelab.stretches import stretches
 from ecu.contract.signals import CORNERS
@@ -37,13 +37,13 @@ def check_drive(drive: Drive) -> list[int]:
     Raises:
         UserError: nothing can be identified from this log.
     """
-    path, course = str(drive.path), drive.course
-    found = np.isfinite(course.measured)
+    path, series = str(drive.path), drive.series
+    found = np.isfinite(series.measured)
     corners = [i for i in range(4) if found[:, i].any()]
     if not corners:
         remedy = "not in this log; give the disc's thermocouples in degC under these names (or in the map)"
         raise UserError(path, "disc_temperature_measured_*", remedy)
-    length = ROW * len(course.speed)
+    length = ROW * len(series.speed)
     if length < SHORTEST:
         raise UserError(
             path, "t", f"lasts {length:.0f} s; a disc heats and cools over {SHORTEST:.0f} s and more"
@@ -60,14 +60,14 @@ def check_drive(drive: Drive) -> list[int]:
         remedy = f"{drive.applications} brake applications; give {FEWEST} or more that warm the discs"
         raise UserError(path, "calliper_pressure_*", remedy)
     for i in corners:
-        _check_sensor(path, course, i)
+        _check_sensor(path, series, i)
     return corners
 
 
-def _check_sensor(path: str, course: Course, corner: int) -> None:
+def _check_sensor(path: str, series: Series, corner: int) -> None:
     name = f"disc_temperature_measured_{CORNERS[corner]}"
-    seen = np.isfinite(course.measured[:, corner])
-    values, air = course.measured[seen, corner], course.air[seen]
+    seen = np.isfinite(series.measured[:, corner])
+    values, air = series.measured[seen, corner], series.air[seen]
     if len(values) < LEAST_ROWS:
         remedy = f"{len(values)} s with a sample; log it once a second or faster, all the way"
         raise UserError(path, name, remedy)
@@ -76,7 +76,7 @@ def _check_sensor(path: str, course: Course, corner: int) -> None:
         raise UserError(path, name, f"stays at {low:.1f} for the whole log; is its sensor connected?")
     if low > WARMEST_COLD:
         raise UserError(path, name, f"{low:.0f} to {high:.0f}, never below: K? convert it to degC")
-    under = float(np.percentile(air - values, 99.0)) if course.air_known else 0.0
+    under = float(np.percentile(air - values, 99.0)) if series.air_known else 0.0
     if under > BELOW_AIR:
         remedy = f"{under:.0f} K below the air, which no disc is; both must be in degC"
         raise UserError(path, name, remedy)
@@ -103,7 +103,7 @@ def check_fit(path: str, discs: list[Disc], fit: Fit, heating: float, start: Coo
     ratio = fit.heating / heating
     name = f"disc_temperature_measured_{CORNERS[discs[0].corner]}"
     if all(_warm_enough(disc) for disc in discs):
-        turned = [Disc(_in_celsius(disc.course), disc.corner) for disc in discs]
+        turned = [Disc(_in_celsius(disc.series), disc.corner) for disc in discs]
         again = fit_axle(turned, heating, start)
         nearer = abs(np.log(again.heating / heating)) < abs(np.log(ratio))
         if nearer and 1.8 * again.noise < BETTER * fit.noise:
@@ -119,10 +119,10 @@ def check_fit(path: str, discs: list[Disc], fit: Fit, heating: float, start: Coo
 
 def _warm_enough(disc: Disc) -> bool:
     """Return whether every reading could be one in degF of a disc that is no colder than the air."""
-    course, seen = disc.course, disc.seen
-    coldest = course.measured[seen, disc.corner] - (1.8 * course.air[seen] + 32.0)
+    series, seen = disc.series, disc.seen
+    coldest = series.measured[seen, disc.corner] - (1.8 * series.air[seen] + 32.0)
     return float(coldest.min()) > -BELOW_AIR
 
 
-def _in_celsius(course: Course) -> Course:
-    return course._replace(measured=(course.measured - 32.0) / 1.8)
+def _in_celsius(series: Series) -> Series:
+    return series._replace(measured=(series.measured - 32.0) / 1.8)

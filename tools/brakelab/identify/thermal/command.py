@@ -24,12 +24,12 @@ def judge_axle(name: str, drives: Sequence[Drive], discs: list[Disc], axle: Axle
     """Return the fit of one axle beside the configuration's own. Raises `UserError`: see `check_fit`."""
     start = start_of(axle)
     fit = fit_axle(discs, axle.disc_heating, start)
-    of_course = {id(drive.course): drive for drive in drives}
-    check_fit(str(of_course[id(discs[0].course)].path), discs, fit, axle.disc_heating, start)
+    drive_of = {id(drive.series): drive for drive in drives}
+    check_fit(str(drive_of[id(discs[0].series)].path), discs, fit, axle.disc_heating, start)
     before = fit_nothing(discs, axle.disc_heating, start, fit)
     errors = errors_of(fit, axle)
     told = [
-        judge(disc, of_course[id(disc.course)].friction_error[:, disc.corner], fit, number, errors, before)
+        judge(disc, drive_of[id(disc.series)].friction_error[:, disc.corner], fit, number, errors, before)
         for number, disc in enumerate(discs)
     ]
     return Judged(name, axle, discs, fit, before, errors, told)
@@ -40,7 +40,7 @@ def _mean(values: Sequence[float]) -> float:
 
 
 def _about(axle: Judged) -> str:
-    names = ", ".join(dict.fromkeys(disc.course.name for disc in axle.discs))
+    names = ", ".join(dict.fromkeys(disc.series.name for disc in axle.discs))
     before, after = (_mean([getattr(told, when) for told in axle.told]) for when in ("before", "after"))
     return f"{names}; RMSE {before:.1f} to {after:.1f} K"
 
@@ -72,7 +72,7 @@ def identify_thermal(logs: Sequence[Path], config: Path, map: Path | None, out: 
     axles: list[Judged] = []
     for name, corners in AXLES.items():
         discs = [
-            Disc(drive.course, corner)
+            Disc(drive.series, corner)
             for drive, found in zip(drives, measured, strict=True)
             for corner in corners
             if corner in found

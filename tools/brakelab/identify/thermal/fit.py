@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from brakelab.arrays import Array
-from brakelab.identify.thermal.model import ROW, Cooling, Course, lagged, respond
+from brakelab.identify.thermal.model import ROW, Cooling, Series, lagged, respond
 
 HEATING, STILL, BY_SPEED, STILL_WET, BY_SPEED_WET, LAG = range(6)
 NAMES: Final = ("xi", "delta_0", "delta_1", "delta_0 in rain", "delta_1 in rain", "lag of the sensor")
@@ -46,13 +46,13 @@ Rows = NDArray[np.bool_]
 class Disc(NamedTuple):
     """One disc in one log."""
 
-    course: Course
+    series: Series
     corner: int
 
     @property
     def seen(self) -> Rows:
         """Rows with a measured temperature."""
-        return np.isfinite(self.course.measured[:, self.corner])
+        return np.isfinite(self.series.measured[:, self.corner])
 
 
 class Fit(NamedTuple):
@@ -102,9 +102,9 @@ class _Weights(NamedTuple):
 
 def _shown(disc: Disc, cooling: Cooling, lag: float) -> tuple[Array, Array, Array]:
     """Return the sensor's response to the air, per xi and per starting excess, shapes (n,)."""
-    course = disc.course
-    heat, decay = respond(cooling.rate(course.speed, course.wet), course.power[:, disc.corner])
-    return lagged(course.air, lag), lagged(heat, lag), lagged(decay, lag)
+    series = disc.series
+    heat, decay = respond(cooling.rate(series.speed, series.wet), series.power[:, disc.corner])
+    return lagged(series.air, lag), lagged(heat, lag), lagged(decay, lag)
 
 
 def _eliminate(
@@ -113,8 +113,8 @@ def _eliminate(
     """Return residual [K] of the seen rows with the best starting excess and offset, and these two."""
     air, heat, decay = _shown(disc, cooling, lag)
     seen = disc.seen
-    left = disc.course.measured[seen, disc.corner] - air[seen] - heating * heat[seen]
-    width = OFFSET if disc.course.air_known else OFFSET_NO_AIR
+    left = disc.series.measured[seen, disc.corner] - air[seen] - heating * heat[seen]
+    width = OFFSET if disc.series.air_known else OFFSET_NO_AIR
     columns = np.column_stack([decay[seen], np.ones(int(seen.sum()))])
     normal = columns.T @ (weight[:, None] * columns) / noise**2
     normal[0, 0] += 1e-6
@@ -128,7 +128,7 @@ def _residuals(x: Array, discs: Sequence[Disc], heating: float, start: Cooling, 
     parts = []
     for disc, weight in zip(discs, weights.rows, strict=True):
         left, _, offset = _eliminate(disc, heating * np.exp(x[HEATING]), cooling, lag, weight, weights.noise)
-        width = OFFSET if disc.course.air_known else OFFSET_NO_AIR
+        width = OFFSET if disc.series.air_known else OFFSET_NO_AIR
         parts += [np.sqrt(weight) * left / weights.noise, [offset / width]]
     return np.concatenate([*parts, x / PRIOR])
 
@@ -182,14 +182,14 @@ def _fit(
 
 def _parts(disc: Disc, heating: float, cooling: Cooling) -> Array:
     """Return the slopes of the excess [K] over the five logarithms, shape (n, 5), dry and wet ones apart."""
-    course, speed = disc.course, np.abs(disc.course.speed)
-    rate = cooling.rate(course.speed, course.wet)
-    excess = heating * respond(rate, course.power[:, disc.corner])[0]
+    series, speed = disc.series, np.abs(disc.series.speed)
+    rate = cooling.rate(series.speed, series.wet)
+    excess = heating * respond(rate, series.power[:, disc.corner])[0]
     terms = [
-        np.where(course.wet, 0.0, cooling.still),
-        np.where(course.wet, 0.0, cooling.by_speed * speed),
-        np.where(course.wet, cooling.still_wet, 0.0),
-        np.where(course.wet, cooling.by_speed_wet * speed, 0.0),
+        np.where(series.wet, 0.0, cooling.still),
+        np.where(series.wet, 0.0, cooling.by_speed * speed),
+        np.where(series.wet, cooling.still_wet, 0.0),
+        np.where(series.wet, cooling.by_speed_wet * speed, 0.0),
     ]
     return np.column_stack([excess, *(-respond(rate, term * excess)[0] for term in terms)])
 
@@ -226,8 +226,8 @@ def _stated(discs: Sequence[Disc], heating: float, cooling: Cooling, covariance:
 
 def fit_axle(discs: Sequence[Disc], heating: float, start: Cooling) -> Fit:
     """Fit discs of one axle, each in one log, beginning at xi [K/J] and the cooling of a configuration."""
-    raining = sum(float((disc.course.wet & disc.seen).sum()) for disc in discs) * ROW
-    dry = sum(float((~disc.course.wet & disc.seen).sum()) for disc in discs) * ROW
+    raining = sum(float((disc.series.wet & disc.seen).sum()) for disc in discs) * ROW
+    dry = sum(float((~disc.series.wet & disc.seen).sum()) for disc in discs) * ROW
     possible = np.ones(len(NAMES), np.bool_)
     possible[[STILL_WET, BY_SPEED_WET]] = raining >= LEAST_WET
     count = len({disc.corner for disc in discs})

@@ -20,7 +20,7 @@ ROW: Final = 1.0  # s, of one row
 STEEPEST: Final = 600.0  # of D within one piece: exp stays finite
 
 
-class Course(NamedTuple):
+class Series(NamedTuple):
     """One drive on rows of `ROW` seconds."""
 
     name: str

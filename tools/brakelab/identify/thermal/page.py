@@ -69,14 +69,14 @@ def tables(axles: Sequence[Judged]) -> list[Table]:
             )
             parameters.append((*row, "yes" if told else REMEDIES[place]))
         for number, (disc, told_disc) in enumerate(zip(axle.discs, axle.told, strict=True)):
-            course, seen = disc.course, disc.seen
-            measured = course.measured[seen, disc.corner]
+            series, seen = disc.series, disc.seen
+            measured = series.measured[seen, disc.corner]
             logs.append(
                 (
-                    course.name,
+                    series.name,
                     CORNERS[disc.corner],
-                    f"{ROW * len(course.speed) / 60:.0f}",
-                    f"{100 * course.wet.mean():.0f}",
+                    f"{ROW * len(series.speed) / 60:.0f}",
+                    f"{100 * series.wet.mean():.0f}",
                     f"{measured.min():.0f}–{measured.max():.0f}",
                     f"{axle.fit.starts[number]:+.0f}",
                     f"{axle.fit.offsets[number]:+.1f}",
@@ -145,13 +145,13 @@ def write_page(page: Path, axles: Sequence[Judged]) -> None:
     ]
     discs = [pair for axle in axles for pair in zip(axle.discs, axle.told, strict=True)]
     for disc, told in discs[:MOST]:
-        course = disc.course
-        minutes = np.arange(1, len(course.speed) + 1, dtype=np.float64) * ROW / 60.0
-        title = f"{course.name}, {CORNERS[disc.corner]} [°C]"
-        panels.append(disc_panel(title, minutes, course.measured[:, disc.corner], told.predicted, told.sigma))
+        series = disc.series
+        minutes = np.arange(1, len(series.speed) + 1, dtype=np.float64) * ROW / 60.0
+        title = f"{series.name}, {CORNERS[disc.corner]} [°C]"
+        panels.append(disc_panel(title, minutes, series.measured[:, disc.corner], told.predicted, told.sigma))
     picture = page.with_suffix(".svg")
     write_chart(picture, panels, LEGEND)
-    head = f"# Disc temperature by {len({id(disc.course) for disc, _ in discs})} logs\n\n"
+    head = f"# Disc temperature by {len({id(disc.series) for disc, _ in discs})} logs\n\n"
     head += f"![Cooling by speed, measured over predicted temperature]({picture.name})\n\n"
     parts = "\n".join(markdown(table) for table in tables(axles)).rstrip()
     page.write_text(f"{head}{parts}\n", encoding="utf-8")

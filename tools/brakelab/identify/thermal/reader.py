@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.arrays import Array
-from brakelab.identify.thermal.model import ROW, Course
+from brakelab.identify.thermal.model import ROW, Series
 from brakelab.logs.physics.samples import KEPT
 from brakelab.replay.engine import new_ecu
 from brakelab.replay.log import log_size, replay_log
@@ -48,7 +48,7 @@ class Drive(NamedTuple):
     """One log."""
 
     path: Path
-    course: Course
+    series: Series
     friction_error: Array
     """Relative standard deviation of the ECU's friction, shape (n, 4)."""
     applications: int
@@ -107,7 +107,7 @@ def as_drive(path: Path, outputs: Array, samples: Array, air: float) -> Drive:
     known = np.isfinite(around)
     first = [around[known[:, k], k][0] if known[:, k].any() else (air, 0.0)[k] for k in range(2)]
     around = _held(around, np.array(first))
-    course = Course(
+    series = Series(
         path.name,
         _means(np.nan_to_num(power)),
         _means(np.abs(np.nan_to_num(outputs[:, _SPEED]))),
@@ -118,7 +118,7 @@ def as_drive(path: Path, outputs: Array, samples: Array, air: float) -> Drive:
     )
     return Drive(
         path,
-        course,
+        series,
         np.nan_to_num(_means(four(outputs, _SIGMA) / four(outputs, _MU))),
         int(np.count_nonzero(np.diff(braking.astype(np.int8)) > 0)),
         _fresh(wheels).mean(axis=0),

@@ -102,20 +102,20 @@ def predict(
 
     `friction`: relative standard deviation of the friction, shape (n,); `start` [K] above the air, known.
     """
-    course = disc.course
-    rate, power = cooling.rate(course.speed, course.wet), course.power[:, disc.corner]
+    series = disc.series
+    rate, power = cooling.rate(series.speed, series.wet), series.power[:, disc.corner]
     heat, decay = respond(rate, power)
     excess = heating * heat + start * decay
     by_heating = respond(rate, heating * power * np.hypot(errors.heating, friction))[0]
-    by_cooling = respond(rate, rate * excess * np.where(course.wet, errors.wet, errors.cooling))[0]
-    air = OFFSET if course.air_known else OFFSET_NO_AIR
-    return lagged(course.air + excess, lag), np.sqrt(by_heating**2 + by_cooling**2 + air**2)
+    by_cooling = respond(rate, rate * excess * np.where(series.wet, errors.wet, errors.cooling))[0]
+    air = OFFSET if series.air_known else OFFSET_NO_AIR
+    return lagged(series.air + excess, lag), np.sqrt(by_heating**2 + by_cooling**2 + air**2)
 
 
 def judge(disc: Disc, friction: Array, fit: Fit, number: int, errors: Errors, before: Fit) -> Told:
     """Return the fit of disc `number` beside the measurement; `before` is that of the configuration."""
     seen = disc.seen
-    measured = disc.course.measured[seen, disc.corner]
+    measured = disc.series.measured[seen, disc.corner]
 
     def rmse(predicted: Array) -> float:
         return float(np.sqrt(np.mean((predicted[seen] - measured) ** 2)))

@@ -6,7 +6,7 @@ The drives of `observers` as a linear system about the true drive (`bound_car.py
 learned          that of the joint observer, by its own standard deviations
 ten minutes      the best of a filter of this structure after config/scenarios/ordinary.toml
 car known        car and sensors exactly; only friction is left
-course known     as ten minutes, with the change of friction known, so that its level alone is left
+change known     as ten minutes, with the change of friction known, so that its level alone is left
 
 But for the last, friction changes by a rate per axle, a Gauss-Markov process whose covariance and correlation
 time are those of the very drive. Draws of the errors are judged as `observers` judges its drives.
@@ -39,11 +39,11 @@ from brakelab.studies.accuracy.bound_car import (
     SLOPE,
     STIFFNESS,
     TRANSFER,
-    Course,
     N,
+    Trajectory,
     V,
-    course_of,
     derivatives,
+    trajectory_of,
 )
 from brakelab.studies.accuracy.bound_system import PRIOR, Wander, before_stop, prior, system_of, wander_of
 from brakelab.studies.accuracy.linear_bound import filtered, sampled
@@ -59,18 +59,18 @@ from ecu.settings.config import new_params
 
 CARS: Final = 10
 DRAWS: Final = 64
-LEVELS: Final = ("learned", "ten minutes", "car known", "course known")
+LEVELS: Final = ("learned", "ten minutes", "car known", "change known")
 REMEDY: Final = {
     "ten minutes": "yes",
     "car known": "with the car known",
-    "course known": "with the course known",
+    "change known": "with the change known",
 }
 BELOW: Final = (
     "Front/rear, medians over {} cars of the nominal draw, whose spread the bounds know; of the bounds over "
     f"{DRAWS} draws each of noise and of what is not "
     "known. A smoother knows the rest of the stop as well, which no ECU does. Front, rear: can a filter meet "
     "the goal that the joint observer misses? Yes: with what ten minutes show; with the car known: only with "
-    "car and sensors known exactly; with the course known: only if it is known beforehand how friction is "
+    "car and sensors known exactly; with the change known: only if it is known beforehand how friction is "
     "going to change; no: not even then. The joint observer can be better than *learned*, which allows for "
     "wrong motor torque; these cars report it exactly."
 )
@@ -121,12 +121,12 @@ def as_learned(params: RecordArray, learned: RecordArray, wander: Wander) -> Vec
     return np.asarray(p)
 
 
-def axle_errors(course: Course, errors: Vector) -> Vector:
+def axle_errors(trajectory: Trajectory, errors: Vector) -> Vector:
     """Return nRMSE [%] of errors of ln friction, shape (n, N, draws), as shape (2, draws)."""
-    rows = course.counted
+    rows = trajectory.counted
     found = []
     for axle in range(2):
-        mu = course.mu[rows, 2 * axle : 2 * axle + 2]
+        mu = trajectory.mu[rows, 2 * axle : 2 * axle + 2]
         off = errors[rows, MU + 2 * axle : MU + 2 * axle + 2] * mu[:, :, None]
         found.append(100.0 * np.sqrt((off**2).mean(axis=(0, 1))) / mu.mean())
     return np.stack(found)
@@ -137,7 +137,7 @@ def bounds_of(seed: int, names: Sequence[str] = tuple(ACCURACY)) -> list[Bound]:
     config, before = configured(), with_draw(shipped(ORDINARY), "nominal")
     ordinary, learned = drive_car(Setup(before, config), JOINT, seed)
     car = new_vehicle(before, seed).params[0]
-    taught = course_of(ordinary, car, counted(ordinary))
+    taught = trajectory_of(ordinary, car, counted(ordinary))
     shown, usual = derivatives(car, taught), wander_of(taught)
     known_after = {
         car_known: filtered(system_of(taught, shown, usual, car_known), prior(car_known, usual)).p[-1]
@@ -148,8 +148,8 @@ def bounds_of(seed: int, names: Sequence[str] = tuple(ACCURACY)) -> list[Bound]:
         scenario = with_draw(ACCURACY[name].scenario, "nominal")
         drive, _ = drive_car(Setup(scenario, config), JOINT, seed, learned)
         rows = counted(drive)
-        course = course_of(drive, car, rows)
-        shown, wander = derivatives(car, course), wander_of(course)
+        trajectory = trajectory_of(drive, car, rows)
+        shown, wander = derivatives(car, trajectory), wander_of(trajectory)
         still = wander._replace(covariance=np.zeros((2, 2)))
         limits = {}
         for level, process, car_known in zip(
@@ -158,10 +158,10 @@ def bounds_of(seed: int, names: Sequence[str] = tuple(ACCURACY)) -> list[Bound]:
             start = before_stop(known_after[car_known], process, car_known)
             if level == "learned":
                 start = as_learned(new_params(config), learned, process)
-            system = system_of(course, shown, process, car_known)
+            system = system_of(trajectory, shown, process, car_known)
             random = np.random.default_rng(seed)
             errors = sampled(system, filtered(system, start), start, DRAWS, random)
-            limits[level] = Limit(*(axle_errors(course, error) for error in errors))
+            limits[level] = Limit(*(axle_errors(trajectory, error) for error in errors))
         front, rear = (estimate_errors(drive, rows, axle)[0] for axle in AXLES)
         bounds.append(Bound(name, (front, rear), limits))
     return bounds
@@ -216,7 +216,7 @@ TEXT: Final = (
     "filter of it is the best there is. *Learned*: it starts with the standard deviations that the joint "
     "observer kept of the ten minutes. *Ten minutes*: with what they show at best, to one who knew the "
     "spread of the drawn cars. *Car known*: friction alone is unknown. In these three friction changes by "
-    "a rate of each axle, random, but as fast and for as long as in that very stop. *Course known*: as "
+    "a rate of each axle, random, but as fast and for as long as in that very stop. *Change known*: as "
     "ten minutes, but how friction changes is known, as if a law of friction told it. Assumed: friction "
     "at the beginning of an application is known from the one before to 5 % in common and 3 % an axle; "
     "pressure follows the demand to 5 % of its change; motor torque is exact, as it is in these cars."

@@ -56,7 +56,7 @@ STEP: Final = 1e-4
 NEAR_PEAK: Final = 0.98
 
 
-class Course(NamedTuple):
+class Trajectory(NamedTuple):
     """A true drive in windows of `WINDOW_S`; four wheels where there is a second axis."""
 
     speed: Vector
@@ -80,7 +80,7 @@ class Course(NamedTuple):
     counted: NDArray[np.bool_]
 
 
-def course_of(drive: Drive, car: Any, counted: NDArray[np.bool_]) -> Course:
+def trajectory_of(drive: Drive, car: Any, counted: NDArray[np.bool_]) -> Trajectory:
     """Return the windows of a drive of `car` (a row of the plant's PARAMS); `counted`: rows, shape (n,)."""
     n = len(drive.t) // CYCLES
     truth = drive.truth
@@ -97,7 +97,7 @@ def course_of(drive: Drive, car: Any, counted: NDArray[np.bool_]) -> Course:
     ground = np.where(slip < 0.0, rolled / np.maximum(1.0 + slip, 0.1), rolled * (1.0 - slip))
     speed = truth["vehicle_speed"]
     push_out = 1e-5 * np.asarray(car["push_out_pressure"])
-    return Course(
+    return Trajectory(
         mean(speed)[:, 0],
         mean(ground / np.maximum(speed, 1.0)[:, None]),
         mean(truth["road_friction"])[:, 0],
@@ -124,44 +124,44 @@ def slip_of(used: Vector, stiffness: Vector, peak: Vector, c: float, e: float) -
     return np.asarray(c * peak * x / stiffness)
 
 
-def shown(car: Any, course: Course, error: Vector) -> Vector:
+def shown(car: Any, trajectory: Trajectory, error: Vector) -> Vector:
     """Return wheel speeds [rad/s] and specific force [m/s^2] of all windows, shape (n, 5).
 
     `error`: deviation of car and drive from the truth, shape (N,).
     """
     d = error
     at_rest = np.asarray(car["nominal_load"])
-    load = at_rest + np.exp(d[TRANSFER]) * (course.load - at_rest)
-    deflection = course.load / (3.0 * np.asarray(car["vertical_stiffness"]))
+    load = at_rest + np.exp(d[TRANSFER]) * (trajectory.load - at_rest)
+    deflection = trajectory.load / (3.0 * np.asarray(car["vertical_stiffness"]))
     rest = at_rest / (3.0 * np.asarray(car["vertical_stiffness"]))
     radius = np.asarray(car["free_radius"]) - rest - np.exp(d[DEFLECTION_GAIN]) * (deflection - rest)
     radius = radius * np.exp(d[RADIUS : RADIUS + 4])
     axle = np.repeat(d[PUSH_OUT : PUSH_OUT + 2] - d[FOLLOWING : FOLLOWING + 2], 2)
-    pressure = np.where(course.pressure > RUBBING, course.pressure - axle, course.pressure)
+    pressure = np.where(trajectory.pressure > RUBBING, trajectory.pressure - axle, trajectory.pressure)
     lever = 2e5 * np.asarray(car["piston_area"]) * np.asarray(car["effective_radius"])
     heavier = np.exp(d[MASS])
-    torque = lever * course.mu * np.exp(d[MU : MU + 4]) * pressure
-    torque = torque + np.exp(d[MOTOR]) * course.motor
+    torque = lever * trajectory.mu * np.exp(d[MU : MU + 4]) * pressure
+    torque = torque + np.exp(d[MOTOR]) * trajectory.motor
     torque = torque + np.exp(d[ROLLING]) * car["rolling_resistance"] * heavier * load * radius
-    force = -(torque + np.asarray(car["wheel_inertia"]) * course.spin_change) / radius
-    speed = course.speed + d[V]
+    force = -(torque + np.asarray(car["wheel_inertia"]) * trajectory.spin_change) / radius
+    speed = trajectory.speed + d[V]
     drag = car["drag_factor"] * np.exp(d[DRAG]) * speed * speed
     specific = (force.sum(axis=1) - drag) / (car["mass"] * heavier)
     relative = load / np.asarray(car["nominal_load"]) - 1.0
     stiffness = np.asarray(car["slip_stiffness"]) * np.exp(d[STIFFNESS] + d[RATIO] * np.array([0, 0, 1, 1]))
     stiffness = stiffness * (1.0 - (car["stiffness_degression"] + d[DEGRESSION]) * relative)
-    peak = course.adhesion[:, None] * np.exp(d[PEAK]) * (1.0 - car["friction_degression"] * relative)
+    peak = trajectory.adhesion[:, None] * np.exp(d[PEAK]) * (1.0 - car["friction_degression"] * relative)
     slip = slip_of(force / (heavier * load), stiffness, peak, car["magic_c"], car["magic_e"])
-    ground = speed[:, None] * course.over_ground
+    ground = speed[:, None] * trajectory.over_ground
     rolled = np.where(slip < 0.0, ground * (1.0 + slip), ground / (1.0 - slip))
     return np.column_stack([rolled / radius, specific])
 
 
-def derivatives(car: Any, course: Course) -> Vector:
+def derivatives(car: Any, trajectory: Trajectory) -> Vector:
     """Return those of `shown` by all states, shape (n, 5, N)."""
     parts = []
     for state in range(N):
         error = np.zeros(N)
         error[state] = STEP
-        parts.append((shown(car, course, error) - shown(car, course, -error)) / (2.0 * STEP))
+        parts.append((shown(car, trajectory, error) - shown(car, trajectory, -error)) / (2.0 * STEP))
     return np.stack(parts, axis=2)

@@ -30,9 +30,9 @@ from brakelab.studies.accuracy.bound_car import (
     STIFFNESS,
     TRANSFER,
     WINDOW_S,
-    Course,
     M,
     N,
+    Trajectory,
     V,
 )
 from brakelab.studies.accuracy.linear_bound import System
@@ -75,11 +75,11 @@ class Wander(NamedTuple):
     """s until it is another"""
 
 
-def wander_of(course: Course) -> Wander:
+def wander_of(trajectory: Trajectory) -> Wander:
     """Return the change of friction in the counted windows."""
-    logarithm = np.log(course.mu.reshape(-1, 2, 2).mean(axis=2))
+    logarithm = np.log(trajectory.mu.reshape(-1, 2, 2).mean(axis=2))
     rate = np.diff(logarithm, axis=0) / WINDOW_S
-    rate = rate[course.counted[1:] & course.counted[:-1]]
+    rate = rate[trajectory.counted[1:] & trajectory.counted[:-1]]
     later = (rate[LAG:] * rate[:-LAG]).sum(axis=1).mean() / (rate**2).sum(axis=1).mean()
     return Wander(rate.T @ rate / len(rate), -LAG * WINDOW_S / float(np.log(np.clip(later, 0.05, 0.99))))
 
@@ -88,13 +88,13 @@ def _before(rubbing: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return np.vstack([rubbing[:1], rubbing[:-1]])
 
 
-def system_of(course: Course, shown: Vector, wander: Wander, car_known: bool) -> System:
+def system_of(trajectory: Trajectory, shown: Vector, wander: Wander, car_known: bool) -> System:
     """Return a drive with the derivatives `shown`, shape (n, 5, N), as a linear system."""
-    n = len(course.speed)
-    rubbing = course.pressure.reshape(n, 2, 2).mean(axis=2) > RUBBING
+    n = len(trajectory.speed)
+    rubbing = trajectory.pressure.reshape(n, 2, 2).mean(axis=2) > RUBBING
     begins = rubbing & ~_before(rubbing)
     first = begins.any(axis=1) & ~_before(rubbing).any(axis=1)
-    change = np.diff(course.pressure.reshape(n, 2, 2).mean(axis=2), axis=0, prepend=0.0)
+    change = np.diff(trajectory.pressure.reshape(n, 2, 2).mean(axis=2), axis=0, prepend=0.0)
 
     move = np.tile(np.eye(N), (n, 1, 1))
     move[:, V] += WINDOW_S * shown[:, 4]
@@ -122,7 +122,7 @@ def system_of(course: Course, shown: Vector, wander: Wander, car_known: bool) ->
     see[:, SPEED_REFERENCE, V] = 1.0
     for axle in range(2):
         see[:, PRESSURE + axle, FOLLOWING + axle] = rubbing[:, axle]
-    see[course.speed < SLOWEST] = 0.0
+    see[trajectory.speed < SLOWEST] = 0.0
     return System(move, walk, see / NOISE[:, None])
 
 

@@ -72,7 +72,7 @@ class Appraised(NamedTuple):
     """degC"""
 
 
-class Course(NamedTuple):
+class Series(NamedTuple):
     """One trip for the figures."""
 
     speed: Array
@@ -88,7 +88,7 @@ class Car(NamedTuple):
     seed: int
     axles: list[Judged]
     trips: list[Appraised]
-    courses: list[Course]
+    plotted: list[Series]
     unknown_rest: Array
     """RMSE [K] of the ECU with the keys of the dry trip, had the rest been unknown; shape (4,)."""
 
@@ -105,14 +105,14 @@ def _go(
     return driven, loop.sides.state["learned"].copy()
 
 
-def _cold(course_of: Drive, config: Config) -> Array:
+def _cold(drive: Drive, config: Config) -> Array:
     """Return temperatures [degC] of a configuration from a cold start by the ECU's power, shape (n, 4)."""
-    course = course_of.course
+    series = drive.series
     found = []
     for i in range(4):
         axle: Axle = config.front if i < 2 else config.rear
-        heat, _ = respond(start_of(axle).rate(course.speed, course.wet), course.power[:, i])
-        found.append(course.air + axle.disc_heating * heat)
+        heat, _ = respond(start_of(axle).rate(series.speed, series.wet), series.power[:, i])
+        found.append(series.air + axle.disc_heating * heat)
     return np.column_stack(found)
 
 
@@ -131,12 +131,12 @@ def drive_car(seed: int) -> Car:
         drives.append(driven.drive(trip.name, air))
     axles = [
         judge_axle(
-            name, drives, [Disc(drive.course, c) for drive in drives for c in corners], getattr(config, name)
+            name, drives, [Disc(drive.series, c) for drive in drives for c in corners], getattr(config, name)
         )
         for name, corners in AXLES.items()
     ]
     fitted = with_fits(config, {axle.name: axle.fit for axle in axles})
-    trips, courses = [], []
+    trips, plotted = [], []
     unknown = np.full(4, np.nan)
     for number, trip in enumerate(JUDGED, len(IDENTIFIED)):
         kept = learned.copy()
@@ -156,18 +156,18 @@ def drive_car(seed: int) -> Car:
                 driven.true.max(axis=0),
             )
         )
-        courses.append(Course(drive.course.speed, driven.said, driven.sigma, driven.true, cold))
+        plotted.append(Series(drive.series.speed, driven.said, driven.sigma, driven.true, cold))
         if number == len(IDENTIFIED):
             rates = [start_of(fitted.front if i < 2 else fitted.rear) for i in range(4)]
             left = 0.5 * kept[0]["disc_excess"]
             unknown = _rms(
                 error + np.column_stack([_decay(rate, drive, left[i]) for i, rate in enumerate(rates)])
             )
-    return Car(seed, axles, trips, courses, unknown)
+    return Car(seed, axles, trips, plotted, unknown)
 
 
 def _decay(rate: Cooling, drive: Drive, excess: float) -> NDArray[np.float64]:
     """Return the remainder of a wrong start of `excess` [K], shape (n,)."""
-    course = drive.course
-    _, decay = respond(rate.rate(course.speed, course.wet), course.power[:, 0])
+    series = drive.series
+    _, decay = respond(rate.rate(series.speed, series.wet), series.power[:, 0])
     return np.asarray(excess * decay)

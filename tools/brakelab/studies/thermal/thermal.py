@@ -13,7 +13,7 @@ from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Line, Panel
 from brakelab.results.text_table import Table
 from brakelab.studies.cars import each_car
 from brakelab.studies.study import Asked, Measured, Study, picture
-from brakelab.studies.thermal.study import JUDGED, Appraised, Car, Course, drive_car
+from brakelab.studies.thermal.study import JUDGED, Appraised, Car, Series, drive_car
 from brakelab.studies.verdict import Goal, verdict
 
 CARS: Final = 8
@@ -125,14 +125,14 @@ def thermal_tables(cars: Sequence[Car]) -> list[Table]:
     ]  # fmt: skip
 
 
-def _disc(title: str, course: Course, corner: int) -> Panel:
-    minutes = np.arange(1, len(course.said) + 1, dtype=np.float64) * ROW / 60.0
-    said, sigma = course.said[:, corner], course.sigma[:, corner]
+def _disc(title: str, series: Series, corner: int) -> Panel:
+    minutes = np.arange(1, len(series.said) + 1, dtype=np.float64) * ROW / 60.0
+    said, sigma = series.said[:, corner], series.sigma[:, corner]
     lines = [
         Line(minutes, said - 2.0 * sigma, PINK, True),
         Line(minutes, said + 2.0 * sigma, PINK, True),
-        Line(minutes, course.before[:, corner], ORANGE, True),
-        Line(minutes, course.true[:, corner], GREY),
+        Line(minutes, series.before[:, corner], ORANGE, True),
+        Line(minutes, series.true[:, corner], GREY),
         Line(minutes, said, BLUE),
     ]
     low, high = min(float(line.y.min()) for line in lines), max(float(line.y.max()) for line in lines)
@@ -142,13 +142,13 @@ def _disc(title: str, course: Course, corner: int) -> Panel:
 def thermal_panels(cars: Sequence[Car]) -> list[Panel]:
     """Return Figures 7.13 (dry) and 7.14 (rain): speed, front and rear disc; 7.15: cooling by speed."""
     car, panels = cars[0], []
-    for trip, course in zip(JUDGED, car.courses, strict=True):
-        minutes = np.arange(1, len(course.speed) + 1, dtype=np.float64) * ROW / 60.0
+    for trip, series in zip(JUDGED, car.plotted, strict=True):
+        minutes = np.arange(1, len(series.speed) + 1, dtype=np.float64) * ROW / 60.0
         figure, span = FIGURES[trip.name], (0.0, float(minutes[-1]))
-        speed = Line(minutes, course.speed, GREY)
+        speed = Line(minutes, series.speed, GREY)
         panels.append(Panel(f"{figure} a): {trip.name}, speed [m/s]", "min", span, (0.0, 45.0), [speed]))
-        panels.append(_disc(f"{figure} b): front left [°C]", course, 0))
-        panels.append(_disc(f"{figure} c): rear left [°C]", course, 2))
+        panels.append(_disc(f"{figure} b): front left [°C]", series, 0))
+        panels.append(_disc(f"{figure} c): rear left [°C]", series, 2))
         axle = car.axles[len(panels) // 4]
         title = f"7.15: {axle.name}, δ [1/1000 s], before dashed"
         panels.append(cooling_panel(title, axle.fit.cooling, axle.before.cooling))

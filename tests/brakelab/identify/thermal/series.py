@@ -3,7 +3,7 @@
 import numpy as np
 
 from brakelab.identify.thermal.fit import Disc
-from brakelab.identify.thermal.model import Cooling, Course
+from brakelab.identify.thermal.model import Cooling, Series
 
 XI = 2.2e-4
 DRY = (1.8e-3, 1.0e-4)
@@ -41,7 +41,7 @@ def temperature(pace, power, wet, start: float, xi: float = XI, cooling: Cooling
     return found
 
 
-def course(
+def series(
     seconds: int = 2400,
     seed: int = 1,
     rain: bool = False,
@@ -50,7 +50,7 @@ def course(
     start: float = 30.0,
     lag: float = 2.0,
     **kind,
-) -> Course:
+) -> Series:
     """Return a drive with two measured front discs; `drift` [K]: a slow error that both share."""
     random = np.random.default_rng([seed, 2])
     pace, power = driven(seconds, seed, **kind)
@@ -68,9 +68,9 @@ def course(
             shown[k] = now
         measured[:, i] = shown + wander + noise * random.standard_normal(seconds)
     powers = np.column_stack([power, power, 0.0 * power, 0.0 * power])
-    return Course("drive", powers, pace, wet, np.full(seconds, AIR), True, measured)
+    return Series("drive", powers, pace, wet, np.full(seconds, AIR), True, measured)
 
 
-def discs(*courses: Course) -> list[Disc]:
+def discs(*drives: Series) -> list[Disc]:
     """Return both front discs of the drives."""
-    return [Disc(one, corner) for one in courses for corner in (0, 1)]
+    return [Disc(one, corner) for one in drives for corner in (0, 1)]
