@@ -119,9 +119,7 @@ def _table(title: str, decel: float, config: Config, motors: bool, cars: int) ->
 TEXT: Final = (
     "In the second of two brakings from 28 m/s, by a driver who keeps the lane, a brake gives nothing "
     f"any more from t = {FAILS:g} s on. Deceleration is that of the second that begins "
-    f"{1e3 * AFTER:g} ms after it, against the same car without the fault. What the front axle's "
-    "circuit takes at 4 m/s² and more, and the diagonal one at 6 m/s², the grip of the other wheels does not "
-    "give at once; what one front calliper takes at 6 m/s² the limit of the yaw moment does not. "
+    f"{1e3 * AFTER:g} ms after it, against the same car without the fault. "
     f"{CARS} cars of the wide draw, median (least–greatest). "
     "[control.md](../control.md#brakes-that-fail) says how."
 )

@@ -197,9 +197,8 @@ def _fit(lab: Lab) -> Table:
         "nRMSE [%] of all blocks of 50 ms of CPC; unseen: the fifth that begins hottest, which the law was "
         "not identified on, in closed loop; *: chosen, without a look at AMS. All laws have the same inputs: "
         "slowing is what their own friction does (3.22a). ILVO before both of Ostermeyer, the thesis's "
-        f"order: on {_in_order(lab)}. Levels are lower: a simulated pad has less chance in it. The revised "
-        "law holds the original as a special case and can only fit better; that the print has it worse on B "
-        "and C tells of a search that had not ended. The table and the surface are not in the thesis."
+        f"order: on {_in_order(lab)}. The revised law holds the original as a "
+        "special case. The table and the surface are not in the thesis."
     )
     return Table("Table 3.3: CPC", columns, rows, below)
 

