@@ -172,7 +172,7 @@ def _observe_jointly(
     s.estimate.given_up = 1 if s.prediction.told_s > 0.0 else 0
     s.estimate.torques_known = 1 if p.transmit or torques_measured(p, joint) else 0
     if not p.transmit:
-        tell_whole(s.whole, s.estimate, p.mass)
+        tell_whole(p, s.whole, joint, s.estimate)
         if learns and s.whole.alone and s.whole.time > 0.0:
             for i in range(4):
                 s.estimate.mode[i] = OBSERVING

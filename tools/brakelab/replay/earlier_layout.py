@@ -36,6 +36,7 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "replacement",
         "spins_s",
         "before",
+        "unshown",
         "ceiling",
         "ceiling_variance",
         "measured_slip",

@@ -24,9 +24,16 @@ import math
 
 import numpy as np
 
+from ecu.algorithm.brake import brake_gain_per_bar
 from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
 from ecu.algorithm.estimation.joint.layout import BIAS, LEVEL, MASS, V
-from ecu.algorithm.estimation.joint.wheel import brake_torque, drive_opposes, radius, unknown_share
+from ecu.algorithm.estimation.joint.wheel import (
+    brake_torque,
+    drive_opposes,
+    friction,
+    radius,
+    unknown_share,
+)
 from ecu.algorithm.estimation.joint.window import COPIES
 from ecu.algorithm.inputs import wheels_mapped
 from ecu.jit import Record, kernel
@@ -62,6 +69,7 @@ WHOLE_STATE = np.dtype(
         ("alone", "u1"),  # nothing but whole applications teaches
         ("bent", "u1"),  # the linings ask for more than road and tyres give freely
         ("knee", "f8"),  # exponent n of the bend
+        ("unshown", "f8", (4,)),  # variance of ln friction of a lining against that of all together
         ("age_s", "f8"),  # of the application
         ("common", "f8"),  # time of the last comparison [s]
         ("time", "f8"),  # for which it could be measured [s]
@@ -298,21 +306,44 @@ def end_whole(state: Record) -> None:
 
 
 @kernel
-def tell_whole(state: Record, estimate: Record, mass: float) -> None:
-    """Overwrite friction, drag and ceiling of the estimate, and how well the next braking is known."""
+def _compare_linings(params: Record, state: Record, joint: Record) -> None:
+    """Overwrite `unshown`: the force of all linings together says nothing of how they share it."""
+    p, share, total = joint.p, joint.h, 0.0
+    for i in range(LEVEL, LEVEL + 4):
+        corner = i - LEVEL
+        share[i] = brake_gain_per_bar(params, corner) * friction(params, joint, corner)
+        share[i] /= params.wheel_radius[corner]
+        total += share[i]
+    for i in range(LEVEL, LEVEL + 4):
+        variance = p[i, i]
+        for j in range(LEVEL, LEVEL + 4):
+            variance -= 2.0 * share[j] / total * p[i, j]
+            for k in range(LEVEL, LEVEL + 4):
+                variance += share[j] * share[k] / (total * total) * p[j, k]
+        state.unshown[i - LEVEL] = max(variance, 0.0)
+
+
+@kernel
+def tell_whole(params: Record, state: Record, joint: Record, estimate: Record) -> None:
+    """Overwrite friction, drag and ceiling of the estimate, and how well the next braking is known.
+
+    A lining's standard deviation contains what whole applications alone do not show: front against rear.
+    """
+    if state.alone and joint.closed:
+        _compare_linings(params, state, joint)
     ceiling = CEILING * math.exp(state.x[GRIP])
     scale, variance = math.exp(state.x[SCALE]), state.p[SCALE, SCALE]
     if not state.alone:
         variance = min(variance, BESIDE**2)
     for i in range(4):
-        relative = 0.0 if state.alone else estimate.sigma[i] / estimate.mu[i]
+        own = state.unshown[i] if state.alone else (estimate.sigma[i] / estimate.mu[i]) ** 2
         estimate.mu[i] *= scale
-        estimate.sigma[i] = estimate.mu[i] * math.sqrt(relative * relative + variance)
+        estimate.sigma[i] = estimate.mu[i] * math.sqrt(own + variance)
     expected, by_scale, by_grip = bend(state.usual, ceiling, state.knee)
     estimate.sigma_force = math.sqrt(_variance(state, by_scale, by_grip)) / expected
     estimate.overrun = state.x[OVERRUN]
     if state.alone:
-        estimate.accel_bias, estimate.mass = 0.0, mass
+        estimate.accel_bias, estimate.mass = 0.0, params.mass
     estimate.torque_share = torque_share(state)
     estimate.grip_limit, estimate.grip_knee = ceiling, state.knee
     estimate.sigma_grip_limit = ceiling * math.sqrt(state.p[GRIP, GRIP])

@@ -282,6 +282,22 @@ def test_a_light_braking_teaches_where_the_car_slows(
     assert bystander.state["usual"] == (USUAL if bar < 10.0 else pytest.approx(bystander.linings(bar)))
 
 
+def test_how_the_linings_share_the_force_is_not_shown_by_their_sum(bystander: Bystander) -> None:
+    """Beside 20,000 draws of four frictions whose sum at equal pressures is known."""
+    p, joint, state = bystander.params, bystander.joint, bystander.state
+    common, axle = np.full((4, 4), 0.13**2), np.kron(np.eye(2), np.full((2, 2), 0.17**2))
+    levels = common + axle + np.diag(np.full(4, 0.04**2))
+    joint["p"][LEVEL : LEVEL + 4, LEVEL : LEVEL + 4], joint["closed"] = levels, 1
+    state["alone"], state["p"] = 1, np.zeros((3, 3))
+    estimate = np.zeros(1, ESTIMATE)[0]
+    estimate["mu"], estimate["sigma"] = p["mu_nominal"], 0.5 * p["mu_nominal"]
+    tell_whole(p, state, joint, estimate)
+    lever = p["mu_nominal"] * p["piston_area"] * p["effective_radius"] / p["wheel_radius"]
+    drawn = np.random.default_rng(1).multivariate_normal(np.zeros(4), levels, 20_000)
+    apart = drawn - (drawn @ lever / lever.sum())[:, None]
+    assert estimate["sigma"] / estimate["mu"] == pytest.approx(apart.std(axis=0), rel=0.03)
+
+
 def test_estimate_and_store_have_the_scale(bystander: Bystander) -> None:
     """Its sigma adds to that of the windows; what the store takes stays within its bounds."""
     p, state = bystander.params, bystander.state
@@ -289,7 +305,7 @@ def test_estimate_and_store_have_the_scale(bystander: Bystander) -> None:
     estimate = np.zeros(1, ESTIMATE)[0]
     estimate["mu"], estimate["sigma"] = p["mu_nominal"], 0.04 * p["mu_nominal"]
     state["alone"] = 0
-    tell_whole(state, estimate, 1000.0)
+    tell_whole(p, state, bystander.joint, estimate)
     assert estimate["mu"] == pytest.approx(1.2 * p["mu_nominal"])
     assert estimate["sigma"] == pytest.approx(1.2 * p["mu_nominal"] * math.hypot(0.03, 0.04))
     assert estimate["grip_limit"] == pytest.approx(7.0)
