@@ -96,6 +96,8 @@ def confirm_friction(
     else:
         state.back = max(state.back - (GIVE_FAST if share > OVER else GIVE) * dt, 0.0)
     if state.back == 0.0 and share > CONFIRMS:
+        if state.friction[0] == 0.0:
+            state.usual = accel_offset  # of the road that the first braking was on
         for i in range(4):
             known = state.friction[i] > 0.0
             state.friction[i] += (used[i] - state.friction[i]) * (dt / FOLLOW_S if known else 1.0)
