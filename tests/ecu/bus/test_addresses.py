@@ -1,8 +1,9 @@
 """Identifiers of the diagnostic connection, as they are given and refused."""
 
+import can
 import pytest
 
-from ecu.bus.addresses import Addresses, parse_addresses, refuse_taken
+from ecu.bus.addresses import Addresses, can_filters, parse_addresses, refuse_taken
 from ecu.contract.records import EXTENDED_ID
 from ecu.errors import UserError
 
@@ -53,3 +54,17 @@ def test_an_identifier_of_another_message_is_refused(text, taken, named):
     with pytest.raises(UserError, match=f"--diagnostics: {named}: another message has it"):
         refuse_taken("--diagnostics", parse_addresses("--diagnostics", text), taken)
     refuse_taken("--diagnostics", parse_addresses("--diagnostics", text), {0x18DA28F1, 0x51})
+
+
+def test_filters_let_these_identifiers_pass_alone():
+    sent = [(0x123, False), (0x123, True), (0x124, False), (0x18DA28F1, True), (0x18DA28F2, True)]
+    filters = can_filters([0x123, 0x18DA28F1])
+    with (
+        can.Bus("filters", interface="virtual") as sender,
+        can.Bus("filters", interface="virtual", can_filters=filters) as receiver,
+    ):
+        for number, extended in sent:
+            sender.send(can.Message(arbitration_id=number, is_extended_id=extended))
+        heard = [receiver.recv(timeout=0.1) for _ in range(3)]
+    assert heard[2] is None
+    assert [(one.arbitration_id, one.is_extended_id) for one in heard[:2]] == [sent[0], sent[3]]
