@@ -11,6 +11,7 @@ from brakelab.studies.verdict import Goal, met, verdict
         ([Goal("", 3.9, 4.0)], "met"),
         ([Goal("", 4.0, 4.0)], "met"),
         ([Goal("", 4.25, 4.0)], "missed: by 0.25"),
+        ([Goal("p99.9", 689.0, 500.0)], "missed: p99.9 by 189"),
         ([Goal("R²", 0.985, least=0.993)], "missed: R² by 0.008"),
         ([Goal("inside", 91.0, 99.0, 93.0), Goal("error", 5.0, 5.0)], "missed: inside by 2"),
         ([Goal("inside", 100.0, 99.0, 93.0), Goal("error", 6.5, 5.0)], "missed: inside by 1, error by 1.5"),

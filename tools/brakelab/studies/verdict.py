@@ -17,11 +17,11 @@ class Goal(NamedTuple):
 
 def verdict(*goals: Goal) -> str:
     """Return "met", or each goal that was missed and by how much, in its own unit."""
-    missed = [
-        f"{goal.name} by {max(goal.value - goal.most, goal.least - goal.value):.2g}".strip()
-        for goal in goals
-        if not goal.least <= goal.value <= goal.most
-    ]
+    missed = []
+    for goal in goals:
+        if not goal.least <= goal.value <= goal.most:
+            by = max(goal.value - goal.most, goal.least - goal.value)
+            missed.append(f"{goal.name} by {by:{'.0f' if by >= 100.0 else '.2g'}}".strip())
     return f"missed: {', '.join(missed)}" if missed else "met"
 
 
