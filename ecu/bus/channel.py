@@ -10,7 +10,7 @@ import socket
 import sys
 import time
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from typing import Any, Final
 
@@ -111,6 +111,25 @@ def is_malformed(error: Exception) -> bool:
     """
     reason = error.__cause__
     return isinstance(error, can.CanOperationError) and reason is not None and not isinstance(reason, OSError)
+
+
+def read_frames(bus: can.BusABC, timeout_s: float, most: int) -> Iterator[can.Message]:
+    """Yield the classical data frames among the next messages, at most `most`, waiting for the first alone.
+
+    Raises:
+        can.CanError, OSError: the bus is gone.
+    """
+    for number in range(most):
+        try:
+            frame = bus.recv(0.0 if number else timeout_s)
+        except can.CanError as error:
+            if not is_malformed(error):
+                raise
+            continue
+        if frame is None:
+            return
+        if not (frame.is_error_frame or frame.is_remote_frame or frame.is_fd):
+            yield frame
 
 
 class GenericChannel:

@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple
 import can
 
 from ecu.bus.addresses import NEEDS, STANDARD, can_filters
-from ecu.bus.channel import is_malformed, open_bus
+from ecu.bus.channel import open_bus, read_frames
 from ecu.errors import UserError
 
 PADDING: Final = 0xCC
@@ -76,15 +76,7 @@ class Link:
         Raises:
             can.CanError, OSError: the bus is gone.
         """
-        for number in range(MOST_AT_ONCE):
-            try:
-                frame = self._bus.recv(0.0 if number else timeout_s)
-            except can.CanError as error:
-                if not is_malformed(error):
-                    raise
-                continue
-            if frame is None:
-                break
+        for frame in read_frames(self._bus, timeout_s, MOST_AT_ONCE):
             self._sort(frame)
         self._layer.process()
         while (data := self._layer.recv()) is not None:
@@ -92,8 +84,6 @@ class Link:
 
     def _sort(self, frame: can.Message) -> None:
         """Take a frame to this end; only whole requests are taken from those to all."""
-        if frame.is_error_frame or frame.is_remote_frame or frame.is_fd:
-            return
         if frame.is_extended_id != (self._hears > STANDARD):
             return
         if frame.arbitration_id == self._hears:

@@ -16,7 +16,7 @@ from typing import Final, Protocol
 import can
 
 from ecu.bus.addresses import STANDARD, can_filters
-from ecu.bus.channel import is_malformed, open_bus
+from ecu.bus.channel import open_bus, read_frames
 from ecu.errors import UserError
 from ecu.xcp.protocol import Command
 from ecu.xcp.slave import Size
@@ -265,17 +265,7 @@ class Can:
 
     def commands(self, timeout_s: float) -> Iterator[bytes]:
         """See `End`."""
-        for number in range(MOST_AT_ONCE):
-            try:
-                frame = self._bus.recv(0.0 if number else timeout_s)
-            except can.CanError as error:
-                if not is_malformed(error):
-                    raise
-                continue
-            if frame is None:
-                return
-            if frame.is_error_frame or frame.is_remote_frame or frame.is_fd:
-                continue
+        for frame in read_frames(self._bus, timeout_s, MOST_AT_ONCE):
             if (frame.arbitration_id, frame.is_extended_id) == (self._hears, self._hears > STANDARD):
                 yield bytes(frame.data)
 

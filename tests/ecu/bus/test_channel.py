@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ecu.bus import socketcan
-from ecu.bus.channel import GenericChannel, open_channel
+from ecu.bus.channel import GenericChannel, open_channel, read_frames
 from ecu.contract.records import EXTENDED_ID, FRAME, FRAME_EXTENDED, FRAME_FD, new_record
 from ecu.errors import UserError
 
@@ -321,3 +321,20 @@ def test_only_socketcan_on_linux_is_drained_past_python_can(monkeypatch, interfa
     found = open_channel(interface, "can7", receive_ids=[0x10])
     assert opened == (["can7"] if drains_itself else [])
     assert isinstance(found, GenericChannel) is not drains_itself
+
+
+def test_classical_data_frames_are_read_until_none_comes_and_a_bus_that_is_gone_is_told():
+    bus = ScriptedBus()
+    other = [{"is_error_frame": True}, {"is_remote_frame": True, "data": None}, {"is_fd": True}]
+    bus.heard = [
+        message(0x10),
+        ValueError("no frame"),
+        *(message(0x11, **one) for one in other),
+        message(0x12),
+    ]
+    assert [one.arbitration_id for one in read_frames(bus, 0.1, 64)] == [0x10, 0x12]
+    bus.heard = [message(number) for number in range(5)]
+    assert [one.arbitration_id for one in read_frames(bus, 0.1, 3)] == [0, 1, 2]
+    bus.gone = True
+    with pytest.raises(can.CanOperationError):
+        list(read_frames(bus, 0.1, 64))
