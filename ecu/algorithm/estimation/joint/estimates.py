@@ -2,7 +2,6 @@
 
 import math
 
-from ecu.algorithm.brake import brake_gain_per_bar
 from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO, remembered_exp
 from ecu.algorithm.estimation.friction import resting_mode
 from ecu.algorithm.estimation.joint.ceiling import KNOWN
@@ -21,7 +20,7 @@ from ecu.algorithm.estimation.joint.layout import (
     V,
 )
 from ecu.algorithm.estimation.joint.observer import WINDOW_S
-from ecu.algorithm.estimation.joint.wheel import friction
+from ecu.algorithm.estimation.joint.wheel import weigh_linings
 from ecu.algorithm.estimation.zero import tell_zeros
 from ecu.algorithm.inputs import usable
 from ecu.contract.params import GRAVITY
@@ -62,11 +61,7 @@ def sigma_friction(params: Record, state: Record, i: int, ratio: float, now: boo
 @kernel
 def _sigma_force(params: Record, state: Record) -> float:
     """Return the relative standard deviation of the force of all linings together, at equal pressures."""
-    h, total, variance = state.h, 0.0, 0.0
-    for i in range(LEVEL, LEVEL + 4):
-        h[i] = brake_gain_per_bar(params, i - LEVEL) * friction(params, state, i - LEVEL)
-        h[i] /= params.wheel_radius[i - LEVEL]
-        total += h[i]
+    h, total, variance = state.h, weigh_linings(params, state), 0.0
     for i in range(LEVEL, LEVEL + 4):
         for j in range(LEVEL, LEVEL + 4):
             variance += h[i] * h[j] * state.p[i, j]

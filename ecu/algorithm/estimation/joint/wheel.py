@@ -97,6 +97,17 @@ def brake_torque(params: Record, state: Record, i: int, pressure: float) -> floa
 
 
 @kernel
+def weigh_linings(params: Record, state: Record) -> float:
+    """Set `state.h` of each lining's level to its force per bar [N]; return their sum."""
+    h, total = state.h, 0.0
+    for i in range(LEVEL, LEVEL + 4):
+        h[i] = brake_gain_per_bar(params, i - LEVEL) * friction(params, state, i - LEVEL)
+        h[i] /= params.wheel_radius[i - LEVEL]
+        total += h[i]
+    return total
+
+
+@kernel
 def drive_opposes(params: Record, state: Record, share: float) -> bool:
     """Return whether that share of the window's motor torques drives against the brakes."""
     motors, brakes = 0.0, 0.0

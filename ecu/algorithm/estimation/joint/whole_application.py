@@ -24,15 +24,14 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.brake import brake_gain_per_bar
 from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
 from ecu.algorithm.estimation.joint.layout import BIAS, LEVEL, MASS, V
 from ecu.algorithm.estimation.joint.wheel import (
     brake_torque,
     drive_opposes,
-    friction,
     radius,
     unknown_share,
+    weigh_linings,
 )
 from ecu.algorithm.estimation.joint.window import COPIES
 from ecu.algorithm.inputs import wheels_mapped
@@ -308,12 +307,7 @@ def end_whole(state: Record) -> None:
 @kernel
 def _compare_linings(params: Record, state: Record, joint: Record) -> None:
     """Overwrite `unshown`: the force of all linings together says nothing of how they share it."""
-    p, share, total = joint.p, joint.h, 0.0
-    for i in range(LEVEL, LEVEL + 4):
-        corner = i - LEVEL
-        share[i] = brake_gain_per_bar(params, corner) * friction(params, joint, corner)
-        share[i] /= params.wheel_radius[corner]
-        total += share[i]
+    p, share, total = joint.p, joint.h, weigh_linings(params, joint)
     for i in range(LEVEL, LEVEL + 4):
         variance = p[i, i]
         for j in range(LEVEL, LEVEL + 4):
