@@ -21,6 +21,7 @@ from ecu.contract.signals import (
 from ecu.jit import Record, kernel
 
 MAX_DECEL = 12.0  # m/s^2: beyond the adhesion of any road car
+OVERSLEPT_S = 0.1  # longer cycle: what happened in it is unknown
 LEAST_REQUEST = 0.05  # m/s^2, below it no brake is demanded
 ACCELERATES = 2.0  # % of the accelerator's travel
 

@@ -22,7 +22,7 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.inputs import driver_accelerates, motor_torque, usable
+from ecu.algorithm.inputs import OVERSLEPT_S, driver_accelerates, motor_torque, usable
 from ecu.algorithm.monitoring.witness import judge
 from ecu.algorithm.vehicle import corner_speed
 from ecu.contract.signals import ACCEL_X, VEHICLE_SPEED, VEHICLE_SPEED_VALID, WHEEL_SPEED
@@ -180,6 +180,8 @@ def watch_speeds(
         estimate: `ESTIMATE` of the last cycle; backwards, or slower than `LEAST_SPEED`, nothing is judged.
         dt: time since the last cycle [s].
     """
+    if dt > OVERSLEPT_S:
+        state.started = 0
     _gather(params, state, inputs, estimate)
     median, accel = _median(state, witness), estimate.accel_x
     braked = accel < DRAGGED_ACCEL

@@ -21,6 +21,7 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "confirmed",
         "times",
         "unmeasured_s",
+        "unseen_s",
         "latest",
         "steady_s",
         "left_s",

@@ -94,7 +94,7 @@ def follow_ceiling(params: Record, state: Record, braking: bool) -> None:
     speed, calm = state.x[V], False
     if state.released and state.hold_s <= 0.0:
         calm = abs(w.accel) < CALM and state.x[V] > LEAST_SPEED
-    known = braking and state.unmeasured_s == 0.0 and speed > LEAST_SPEED
+    known = braking and max(state.unmeasured_s, state.unseen_s) == 0.0 and speed > LEAST_SPEED
     rest, load, slips, doubt, changed = 0.0, 0.0, 0.0, 0.0, 0.0
     left = right = False
     for i in range(4):

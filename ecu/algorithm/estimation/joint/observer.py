@@ -61,15 +61,14 @@ from ecu.algorithm.estimation.joint.sliding import (
     watch_tyres,
 )
 from ecu.algorithm.estimation.joint.snapshot import restore_snapshot, save_newer_snapshot, save_snapshot
+from ecu.algorithm.estimation.joint.speed import LOST_S, bridge_gap, reverses, start_speed
 from ecu.algorithm.estimation.joint.wheel import APPLIED, brake_torque, drive_opposes, unknown_share
 from ecu.algorithm.estimation.joint.wheel_speed import correct_by_wheels
 from ecu.algorithm.estimation.joint.window import close_window, compare_wheels, gather, open_window
-from ecu.algorithm.estimation.motion import speed_backwards
 from ecu.algorithm.estimation.zero import FREE, settle_zero
 from ecu.algorithm.inputs import (
     LEAST_REQUEST,
     driver_accelerates,
-    mean_wheel_speed,
     others_brake,
     requested_decel,
     usable,
@@ -78,13 +77,11 @@ from ecu.algorithm.inputs import (
 from ecu.contract.signals import (
     ACCEL_X,
     CALLIPER_PRESSURE,
-    VEHICLE_SPEED,
     WHEEL_SPEED,
 )
 from ecu.jit import Record, kernel
 
 WINDOW_S = 0.05
-LOST_S = 0.3  # without an accelerometer: longer than between two frames of a slow one
 LEAST_SPEED = 3.4  # m/s
 STRAIGHT = 0.05  # lateral acceleration over gravity: above it wheels roll at unequal loads and angles
 VARIES_FROM, VARIES = 0.3, 0.2  # m/s^2: acceleration at which mass is observable, and its change
@@ -104,17 +101,6 @@ def start_joint(state: Record) -> None:
     open_window(state)
     save_snapshot(state, 0)
     save_snapshot(state, 1)
-
-
-@kernel
-def _start_speed(params: Record, state: Record, inputs: Record) -> None:
-    speed = mean_wheel_speed(params, inputs)
-    if not wheels_mapped(params) and usable(inputs, VEHICLE_SPEED):
-        speed = inputs.value[VEHICLE_SPEED]
-    if math.isnan(speed):
-        return
-    state.x[V] = speed
-    state.started, state.hold_s = 1, HOLD_S
 
 
 @kernel
@@ -194,20 +180,14 @@ def update_joint(
         open_window(state)
     state.reset = state.closed = 0
     if not state.started:
-        _start_speed(params, state, inputs)
+        start_speed(params, state, inputs)
         if not state.started:
             return
-    if motion.backwards:
-        state.x[V] = speed_backwards(params, inputs, motion, state.x[V], dt)
-        state.reversing = 1
+    if reverses(params, state, inputs, motion, dt):
         return
-    if state.reversing:
-        speed = mean_wheel_speed(params, inputs)
-        state.x[V] = speed if math.isfinite(speed) else abs(state.x[V])
-        state.reversing = 0
-        forget(state, V, 0.25)
-        open_window(state)
     _note_measured(state, motion.measured != 0, dt)
+    if bridge_gap(params, state, inputs, motion, dt):
+        return
     state.released = 1 if not braking and _released(params, state, inputs) else 0
     gather(params, state, inputs, motion, load, hydraulics, state.released != 0, dt)
     if braking and usable(inputs, ACCEL_X):
@@ -296,12 +276,14 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
         state.ratio[place] = math.nan
     state.reference_s += time
     if w.reference_samples > 0:
-        state.reference_s = 0.0
+        state.reference_s = state.unseen_s = 0.0
         correct_by_reference(params, state)
         if not wheels_mapped(params):
             state.untrusted_s = 0.0
     state.untrusted_s += time
     seen = correct_by_wheels(params, state, before, moving, learning and braking)
+    if state.untrusted_s == 0.0:
+        state.unseen_s = 0.0
     if state.free[LEVEL]:
         weight = 0.0
         for i in range(4):

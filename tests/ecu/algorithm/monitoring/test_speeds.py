@@ -23,9 +23,17 @@ class Road:
         self.random = np.random.default_rng(0)
 
     def drive(
-        self, seconds: float, turns=(1, 1, 1, 1, 1), accel: float = 0.0, gas: float = 0.0
+        self,
+        seconds: float,
+        turns=(1, 1, 1, 1, 1),
+        accel: float = 0.0,
+        gas: float = 0.0,
+        overslept: float = 0.0,
     ) -> tuple[str, ...]:
-        """Return the names that are rejected at the end; `accel` < 0 brakes all wheels, `gas` [%]."""
+        """Return the names that are rejected at the end.
+
+        `accel` < 0 brakes all wheels, `gas` [%]; the first cycle comes `overslept` seconds late.
+        """
         turns = np.array(turns, float)
         for _ in range(round(seconds / DT)):
             self.speed += accel * DT
@@ -43,7 +51,8 @@ class Road:
             )
             if not self.reference:
                 self.inputs[0]["verdict"][INPUT["vehicle_speed"]] = 0
-            watch_speeds(self.params, self.state, self.witness, self.inputs[0], self.estimate, DT)
+            watch_speeds(self.params, self.state, self.witness, self.inputs[0], self.estimate, DT + overslept)
+            overslept = 0.0
         return tuple(name for name in NAMES if self.witness["rejected"][INPUT[name]])
 
 
@@ -85,6 +94,18 @@ CASES = [
 )
 def test_who_contradicts_the_others(road, case, turns, accel, gas, seconds, rejected) -> None:
     assert road.drive(seconds, turns, accel, gas) == rejected
+
+
+@pytest.mark.parametrize("overslept", [0.2, 0.5])
+def test_what_an_ecu_overslept_contradicts_no_wheel(params, feed, overslept) -> None:
+    """The brakes were released meanwhile: dead reckoning by the deceleration of before is wrong."""
+    road = Road(params, feed, False)
+    road.drive(5.0)
+    road.drive(1.0, accel=-6.0)
+    road.estimate["accel_x"] = -6.0
+    assert road.drive(0.02, accel=-6.0, overslept=overslept) == ()
+    road.drive(1.5, accel=-6.0)
+    assert road.state["reckoned"] == pytest.approx(road.speed, rel=0.01)
 
 
 def test_a_wheel_that_locked_on_ice_has_time_to_spin_up(road) -> None:

@@ -1,0 +1,70 @@
+"""The car's speed where no filter step tells it: at the start, in reverse, after nobody saw the car move."""
+
+import math
+
+from ecu.algorithm.estimation.joint.kalman import forget
+from ecu.algorithm.estimation.joint.layout import V
+from ecu.algorithm.estimation.joint.sliding import HOLD_S
+from ecu.algorithm.estimation.joint.window import open_window
+from ecu.algorithm.estimation.motion import speed_backwards
+from ecu.algorithm.inputs import OVERSLEPT_S, mean_wheel_speed, usable, wheels_mapped
+from ecu.contract.signals import ACCEL_X, VEHICLE_SPEED
+from ecu.jit import Record, kernel
+
+LOST_S = 0.3  # without an accelerometer: longer than between two frames of a slow one
+UNSEEN_ACCEL = 12.0  # m/s^2, greatest that nobody saw
+VARIANCE = 0.25  # m^2/s^2
+
+
+@kernel
+def start_speed(params: Record, state: Record, inputs: Record) -> None:
+    """Start with the wheels' speed, or the speed over ground where no wheel is mapped."""
+    speed = mean_wheel_speed(params, inputs)
+    if not wheels_mapped(params) and usable(inputs, VEHICLE_SPEED):
+        speed = inputs.value[VEHICLE_SPEED]
+    if math.isnan(speed):
+        return
+    state.x[V] = speed
+    state.started, state.hold_s = 1, HOLD_S
+
+
+@kernel
+def reverses(params: Record, state: Record, inputs: Record, motion: Record, dt: float) -> bool:
+    """Take the speed from the wheels in reverse; return whether the car moves backwards."""
+    if motion.backwards:
+        state.x[V] = speed_backwards(params, inputs, motion, state.x[V], dt)
+        state.reversing = 1
+        return True
+    if state.reversing:
+        speed = mean_wheel_speed(params, inputs)
+        state.x[V] = speed if math.isfinite(speed) else abs(state.x[V])
+        state.reversing = 0
+        forget(state, V, VARIANCE)
+        open_window(state)
+    return False
+
+
+@kernel
+def bridge_gap(params: Record, state: Record, inputs: Record, motion: Record, dt: float) -> bool:
+    """Carry the speed over a time in which nobody tells how the car moves, and take it from the wheels then.
+
+    Dead reckoning over such a gap proves no slip: wheels that differ from it by less than the car may have
+    been braked by meanwhile tell its speed, and learning is held for a while. Returns whether this cycle
+    belongs to the gap.
+    """
+    speed = mean_wheel_speed(params, inputs)
+    told = motion.measured != 0 or math.isfinite(speed) or usable(inputs, VEHICLE_SPEED)
+    if not told and state.unseen_s == 0.0:
+        state.unseen_s = min(1e-9 * inputs.age_ns[ACCEL_X], LOST_S)
+    if not told or dt > OVERSLEPT_S:
+        state.unseen_s += dt
+    reach = UNSEEN_ACCEL * state.unseen_s
+    seen = reach > 0.0 and abs(speed - state.x[V]) < reach
+    if told and not seen:
+        return False
+    state.x[V] = speed if seen else max(state.x[V] + dt * motion.accel_x, 0.0)
+    state.unseen_s, state.hold_s = 0.0 if seen else state.unseen_s, HOLD_S
+    state.sampling.now += dt
+    forget(state, V, VARIANCE)
+    open_window(state)
+    return True
