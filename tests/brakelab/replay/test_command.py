@@ -45,6 +45,23 @@ def stop(path: Path, t0: float = 0.0, brakes: float = 4.0) -> Path:
     return path
 
 
+@pytest.mark.parametrize(
+    ("stood", "excess", "sigma"),
+    [(None, 100.0, 58.0), (0.0, 100.0, 58.0), (1.0, 35.0, 20.0), (12.0, 0.0, 0.5)],
+)
+def test_discs_have_cooled_while_the_car_stood(tmp_path: Path, stood, excess, sigma) -> None:
+    """Unknown: 0 to 200 K above the air; by half of δ0 less in an hour, nothing after a night."""
+    out = tmp_path / "result.parquet"
+    assert replay([stop(tmp_path / "drive.parquet")], SUV, None, None, None, out, stood=stood) == 0
+    params, drive = new_params(load_config(SUV))[0], read_result(out).columns
+    if stood == 1.0:
+        left = np.exp(-0.5 * 3600.0 * params["disc_cooling"][0])
+        excess, sigma = 100.0 * left, 58.0 * left
+    air = 15.0  # K, σ of an air that no sensor measures
+    assert drive["disc_temperature_fl"][5] - params["ambient_temperature"] == pytest.approx(excess, abs=2.0)
+    assert drive["sigma_disc_temperature_fl"][5] == pytest.approx(np.hypot(sigma, air), abs=1.0)
+
+
 def frames_of(path: Path, log: Path) -> Path:
     """The signal file as candump text of contract frames."""
     text = b""

@@ -165,11 +165,20 @@ def replay(
     force: Annotated[
         bool, typer.Option("--force", help="Learn friction although physics contradicts the log")
     ] = False,
+    stood: Annotated[
+        float | None,
+        typer.Option(
+            "--stood",
+            metavar="HOURS",
+            min=0.0,
+            help="Time for which the car stood before: the discs have cooled. Default: unknown",
+        ),
+    ] = None,
 ) -> int:
     """Replay a recorded drive through the ECU. Write results."""
     from brakelab.replay import command
 
-    return command.replay(logs, config, map, observer, state, out, cycles, force)
+    return command.replay(logs, config, map, observer, state, out, cycles, force, stood)
 
 
 @app.command()

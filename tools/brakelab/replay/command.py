@@ -44,6 +44,7 @@ from ecu.contract.records import RecordArray
 from ecu.errors import RunFault, UserError
 from ecu.output import Level, detail, give, policy, say, wrote
 from ecu.recording.recorder import Recording, read_recording
+from ecu.recording.rest import cool_discs
 from ecu.recording.restored import restored
 from ecu.recording.store import open_store, save
 from ecu.settings.config import Config, config_hash, load_config, new_params, store_key
@@ -58,6 +59,7 @@ def replay(
     out: Path,
     cycles: Path | None = None,
     force: bool = False,
+    stood: float | None = None,
 ) -> int:
     """Replay `logs` as one drive into `out`, print the findings and return 0; arguments as `replay_into`.
 
@@ -65,7 +67,7 @@ def replay(
         UserError: an argument, the configuration, the map or a log is not right.
         RunFault: the results are written, but no needed input was ever usable.
     """
-    done = replay_into(logs, config, map, observer, state, out, cycles, force, progress=True)
+    done = replay_into(logs, config, map, observer, state, out, cycles, force, stood, progress=True)
     for line in done.notes:
         say(line)
     _tell(done)
@@ -100,6 +102,7 @@ def replay_into(
     out: Path,
     cycles: Path | None = None,
     force: bool = False,
+    stood: float | None = None,
     progress: bool = False,
 ) -> Replayed:
     """Replay `logs` as one drive into `out` (its folder is made) and `<name>.brakes.parquet`.
@@ -111,6 +114,7 @@ def replay_into(
 
     `map` is a signal map (None: the ECU's own database), `state` the folder of the state store, `cycles` a
     recording that gives initial state, T_k and missed periods to an independent log of the same drive.
+    `stood`: hours for which the car stood before, in which its discs cooled; None: nobody knows.
     `progress` shows a bar.
 
     Raises:
@@ -130,7 +134,7 @@ def replay_into(
     recording = read_recording(cycles) if cycles else None
     params = new_params(vehicle)
     notes += [line for line in (radius_line(map, source, params[0]), delay_line(source, params[0])) if line]
-    learned = _restore(state, vehicle, params)
+    learned = _restore(state, vehicle, params, stood)
     before = new_state(params, learned)["learned"].tobytes()
     learns = force or recording is not None or any(kind_of(log) == "recording" for log in logs)
     size = sum(log_size(path) for path in logs)
@@ -209,11 +213,15 @@ def _check(logs: Sequence[Path], out: Path, cycles: Path | None) -> None:
         raise UserError("--cycles", str(cycles), "belongs to one log; replay the logs one by one")
 
 
-def _restore(state: Path | None, vehicle: Config, params: RecordArray) -> RecordArray | None:
-    if state is None:
-        return None
-    found = restored(state, vehicle, params)
-    return found[1] if found else None
+def _restore(
+    state: Path | None, vehicle: Config, params: RecordArray, stood: float | None
+) -> RecordArray | None:
+    found = restored(state, vehicle, params) if state else None
+    learned = found[1] if found else None
+    if stood is not None:
+        learned = new_state(params, learned)["learned"].copy()
+        cool_discs(learned, params, 3600.0 * stood)
+    return learned
 
 
 def _notes(findings: Sequence[Findings], plan: ReceivePlan, observer: str) -> list[str]:
