@@ -8,8 +8,9 @@ import pyarrow.csv as pa_csv
 import pyarrow.parquet as pq
 import pytest
 
-from brakelab.identify.measurement_files import read_columns, read_manifest
+from brakelab.identify.measurement_files import open_campaign, read_columns, read_manifest
 from ecu.errors import UserError
+from ecu.settings.resources import resource
 
 TABLE = pa.table({"t": [0.0, 0.1], "omega": [80.0, 79.0]})
 
@@ -86,3 +87,27 @@ def test_what_is_no_number_is_named(tmp_path: Path, text: str, line: str) -> Non
     with pytest.raises(UserError) as error:
         read_columns(tmp_path / "block.csv", ("t", "omega"), "block")
     assert line in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("rows", "line"),
+    [
+        (
+            ("a.csv,1,12.1", "b.csv,2,12.3", "c.csv,3,12.1"),
+            None,
+        ),  # run once more: another mass
+        (("a.csv,1,12.1", "b.csv,2,12.1", "c.csv,3,12.3"), "line 3"),
+        (("a.csv,1,12.1", "c.csv,2,12.3", "a.csv,3,12.1"), "line 4"),
+    ],
+)
+def test_a_measurement_counts_once(tmp_path: Path, rows: tuple[str, ...], line: str | None) -> None:
+    """a.csv and b.csv are the same block under two names."""
+    for name, text in {"a": "t\n0\n1\n", "b": "t\n0\n1\n", "c": "t\n0\n2\n"}.items():
+        (tmp_path / f"{name}.csv").write_text(text)
+    manifest = tmp_path / "manifest.csv"
+    manifest.write_text("\n".join(("file,block,mass_g", *rows)))
+    if line is None:
+        open_campaign(manifest, resource("config/suv.toml"), "front", tmp_path / "out.toml")
+        return
+    with pytest.raises(UserError, match=f"manifest.csv: {line}.*once more; leave one of them out"):
+        open_campaign(manifest, resource("config/suv.toml"), "front", tmp_path / "out.toml")

@@ -3,6 +3,7 @@
 import codecs
 import csv
 import datetime
+import hashlib
 import io
 import re
 from collections.abc import Sequence
@@ -35,6 +36,8 @@ CONTRACT: Final = {
     "disc_temperature": ("temperature", "degC"),
 }
 """Quantity and unit of the columns of blocks and trips."""
+NAMES: Final = ("file", "block", "trip", "test")
+"""Columns of a manifest that measure nothing."""
 _DECIMAL: Final = re.compile(r"^([-+]?\d+),(\d+)$")
 _DATE: Final = re.compile(
     r"(?:(\d{1,4})[-./](\d{1,2})[-./](\d{1,4})[T ]+)?(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d*)?)"
@@ -85,9 +88,26 @@ def open_campaign(
         raise UserError("--axle", axle, "choose front or rear")
     vehicle = load_config(config)
     written = out, out.with_suffix(".md"), out.with_suffix(".svg")
-    files = [manifest.parent / row["file"] for row in read_manifest(manifest) if row.get("file")]
+    rows = read_manifest(manifest)
+    files = [manifest.parent / row["file"] for row in rows if row.get("file")]
+    _refuse_repeated(manifest, rows)
     check_outputs(out, written, [manifest, *files, *config_files(config)], toml=True)
     return vehicle, written
+
+
+def _refuse_repeated(manifest: Path, rows: Sequence[dict[str, str]]) -> None:
+    """Refuse a measurement that counts twice: a file of the same bytes with the same masses or counts."""
+    first: dict[tuple[str, ...], int] = {}
+    for line, row in enumerate(rows, start=2):
+        path = manifest.parent / row.get("file", "")
+        if path.is_file():
+            with path.open("rb") as file:
+                content = hashlib.file_digest(file, "sha256").hexdigest()
+            measured = (content, *(cell for name, cell in row.items() if name not in NAMES))
+            if (before := first.setdefault(measured, line)) != line:
+                raise UserError(
+                    str(manifest), f"line {line}", f"line {before} once more; leave one of them out"
+                )
 
 
 def read_columns(path: Path, names: tuple[str, ...], what: str) -> dict[str, Array]:
