@@ -104,10 +104,10 @@ def confirm_friction(
 
 
 @kernel
-def confirmed_friction(state: Record, mu: float, corner: int) -> float:
-    """Return the friction `mu` without what is taken back of it."""
+def confirmed_friction(state: Record, mu: float, corner: int, base: float) -> float:
+    """Return the friction `mu` without what is taken back of it; `base` until one was confirmed."""
     confirmed: float = state.friction[corner]
     if confirmed == 0.0:
-        return mu
+        return mu - min(state.back, 1.0) * max(mu - base, 0.0)
     most: float = mu - min(state.back, 1.0) * max(mu - confirmed, 0.0)
     return min(most, confirmed * (1.0 - LOWER * (state.back - 1.0))) if state.back > 1.0 else most

@@ -84,7 +84,7 @@ def follow_friction(params: Record, state: Record, estimate: Record, dt: float) 
         doubt = max(estimate.sigma[i] / max(mu[i], 0.1) - SURE, 0.0)
         if target > base:
             target = max(target * math.exp(-2.0 * doubt), base)
-        target = confirmed_friction(state.confirmed, target, i)
+        target = confirmed_friction(state.confirmed, target, i, base)
         target = min(max(target, LEAST_RATIO * params.mu_nominal[i]), GREATEST_RATIO * params.mu_nominal[i])
         least = 0.0 if state.cut[i] or state.beyond_grip else -step
         state.used[i] += min(max(target - state.used[i], least), step)
@@ -94,7 +94,7 @@ def follow_friction(params: Record, state: Record, estimate: Record, dt: float) 
 def set_base(params: Record, state: Record, learned: Record) -> None:
     """Take the learned friction, as far as it is confirmed, as the base; only between applications."""
     for i in range(4):
-        base = confirmed_friction(state.confirmed, learned.mu_b[i], i) * state.start[i]
+        base = confirmed_friction(state.confirmed, learned.mu_b[i], i, learned.mu_b[i]) * state.start[i]
         state.base[i] = params.mu_nominal[i] if params.compensation == OFF else base
         state.used[i] = state.base[i]
 

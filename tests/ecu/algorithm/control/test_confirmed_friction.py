@@ -94,6 +94,25 @@ def test_what_is_used_of_an_estimate(car, case, wrong, least, most) -> None:
     assert (used <= most + 0.01).all()
 
 
+@pytest.mark.parametrize(
+    ("case", "measured", "believed", "true", "used"),
+    [
+        ("the linings rub harder than the base", 1, 1.3, 1.3, 1.3),
+        ("the estimate alone rises", 1, 1.4, 1.0, 1.05),
+        ("nobody measures the deceleration", 0, 1.3, 1.3, 1.0),
+        ("they rub less", 1, 0.8, 0.8, 0.8),
+        ("the car is too slow for all, and nothing is confirmed", 1, 1.0, 0.7, 1.0),
+    ],
+)
+def test_a_rise_in_the_first_braking_is_one_over_the_base(
+    params, case, measured, believed, true, used
+) -> None:
+    car = Car(params)
+    car.estimate["measured"] = measured
+    car.brake(6.0, believed=believed * MU, true=true * MU)
+    assert car.law["used"] == pytest.approx([used * MU] * 4, rel=0.015)
+
+
 def test_a_rise_that_is_a_lie_takes_more_than_a_tenth_for_less_than_a_second(car) -> None:
     """The friction in use moves by half a unit a second at most, there and back."""
     assert car.brake(0.9, believed=1.5 * MU) == pytest.approx(0.79, abs=0.02)
