@@ -130,7 +130,7 @@ def test_a_road_that_gives_less_is_told_as_that_and_friction_is_held(road, decel
         ("suv", 1, 300.0, 4.0, 0.38, True),
         ("suv", 2, 300.0, 4.0, 0.0, False),
         ("sedan", 1, 300.0, 4.0, 0.41, True),
-        ("sedan", 4, 300.0, 4.0, 0.1, False),
+        ("sedan", 4, 300.0, 4.0, 0.06, False),
     ],
 )
 def test_linings_that_fade_on_a_road_with_grip_are_followed_and_told_where_it_is_true(
