@@ -69,18 +69,17 @@ def follow_friction(params: Record, state: Record, estimate: Record, dt: float) 
 
     An estimate above the base counts only as far as it is certain: too much torque is preferred to too
     little, and as far as the deceleration confirms it. While it still is the final friction of the last
-    application, whose initial friction differed, it waits.
+    application, whose initial friction differed, the base serves.
     """
     if params.compensation == OFF:
         return
     step, mu = FRICTION_RATE * dt, estimate.mu
     for i in range(4):
-        if estimate.observed_s[i] < EARLY_S and state.start[i] != 1.0:
-            continue
         if state.early[i] == 0.0 and estimate.observed_s[i] >= EARLY_S:
             state.early[i] = mu[i]
         base: float = state.base[i]
-        target = mu[i] if math.isfinite(mu[i]) else base
+        waits = estimate.observed_s[i] < EARLY_S and state.start[i] != 1.0
+        target = mu[i] if math.isfinite(mu[i]) and not waits else base
         doubt = max(estimate.sigma[i] / max(mu[i], 0.1) - SURE, 0.0)
         if target > base:
             target = max(target * math.exp(-2.0 * doubt), base)

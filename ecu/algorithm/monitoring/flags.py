@@ -39,8 +39,8 @@ FLAGS_STATE = np.dtype(
         ("esp_s", "f8"),
         ("rest", "f8"),  # of the accelerator [%]
         ("brake_s", "f8"),  # duration of this braking
-        ("low", "f8"),  # least and greatest position in it [%]
-        ("high", "f8"),
+        ("low", "f8"),  # least position in it [%]
+        ("still_s", "f8"),  # time for which it was within `STEADY` above that
         ("last", "f8"),  # position through the last braking, NaN: it moved [%]
     ],
     align=True,
@@ -57,6 +57,7 @@ LONGEST_S, SLIPS = 5.0, 0.05
 BENDING, IN_A_BEND = 2.0, 3.0  # m/s^2, times as long
 LEAST_SPEED = 3.0  # m/s, for slip
 STEADY, THROUGH_S = 0.5, 1.0  # %, s
+THROUGH = 0.7  # of a braking: a foot moves on before the brakes are released
 RESTS_BELOW = 5.0  # %
 
 
@@ -140,17 +141,17 @@ def _watch_accelerator(state: Record, inputs: Record, braking: bool, dt: float) 
         return
     state.rest = min(state.rest, max(position, 0.0))
     if braking:
-        if state.brake_s == 0.0:
-            state.low = state.high = position
-        state.low, state.high = min(state.low, position), max(state.high, position)
+        if state.brake_s == 0.0 or position < state.low - STEADY:
+            state.still_s = 0.0
+        state.low = position if state.brake_s == 0.0 else min(state.low, position)
+        state.still_s += dt if position < state.low + STEADY else 0.0
         state.brake_s += dt
     elif state.brake_s > 0.0:
-        steady = state.brake_s > THROUGH_S and state.high - state.low < STEADY
-        middle = 0.5 * (state.low + state.high)
-        if steady and abs(middle - state.last) < STEADY:
-            state.rest = state.high
+        steady = state.still_s > max(THROUGH_S, THROUGH * state.brake_s)
+        if steady and abs(state.low - state.last) < STEADY:
+            state.rest = state.low
         if state.brake_s > THROUGH_S:
-            state.last = middle if steady else math.nan
+            state.last = state.low if steady else math.nan
         state.brake_s = 0.0
 
 

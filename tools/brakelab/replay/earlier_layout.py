@@ -22,6 +22,7 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "times",
         "unmeasured_s",
         "unseen_s",
+        "still_s",
         "latest",
         "steady_s",
         "left_s",

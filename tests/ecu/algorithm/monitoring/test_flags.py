@@ -117,6 +117,20 @@ def test_a_driver_who_presses_both_pedals_is_no_rest(params, feed) -> None:
         assert car.drive(1.0, accelerator_position=position) == 0.0
 
 
+@pytest.mark.parametrize(("last_s", "read"), [(0.4, 0.0), (1.5, 50.0)])
+def test_a_foot_that_moves_on_before_the_brakes_are_released_hides_no_rest(
+    params, feed, last_s, read
+) -> None:
+    """A sensor that reads 50 % more; for most of the braking nobody accelerates."""
+    car = Car(params, feed, 20.0)
+    for _ in range(2):
+        car.drive(2.0, braking=True, accelerator_position=50.0)
+        car.drive(last_s, braking=True, accelerator_position=100.0)
+        car.drive(1.0, accelerator_position=100.0)
+    car.drive(0.1, accelerator_position=50.0)
+    assert car.inputs[0]["value"][INPUT["accelerator_position"]] == read
+
+
 def test_an_accelerator_far_from_zero_at_rest_is_told(params, feed) -> None:
     car = Car(params, feed, 20.0)
     for _ in range(2):
