@@ -10,6 +10,9 @@ from hypothesis import HealthCheck, settings
 
 from ecu import jit
 
+pytest_plugins = ["brakelab.testing.plugin"]
+"""Of this checkout, be it installed or not; the entry point in tools/pyproject.toml has the same name."""
+
 # A property is tried on the same values each time, and as slowly as the machine likes.
 settings.register_profile(
     "here", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]

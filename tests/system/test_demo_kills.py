@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 
 from brakelab.plant.cycle import DEMAND_TIMEOUT
+from brakelab.testing.daemon import patience, wait_for
 from ecu.bus.channel import open_channel
 from ecu.contract.records import FRAME, new_record
 from ecu.contract.signals import CYCLE_NS
 from ecu.recording.store import open_store
 
-from .conftest import ROOT, demand_ids, patience, priority, wait_for
+from .conftest import ROOT, demand_ids, priority
 
 pytestmark = pytest.mark.multicast
 

@@ -22,6 +22,7 @@ from udsoncan.exceptions import (
     UnexpectedResponseException,
 )
 
+from brakelab.testing.daemon import wait_for
 from ecu import __version__
 from ecu.contract.faults import WHEEL_SPEED_LOST
 from ecu.diagnostics.identifiers import MEASURED, OF_SNAPSHOT, has_corners
@@ -29,7 +30,7 @@ from ecu.diagnostics.services import SELF_TEST
 from ecu.diagnostics.trouble_codes import TROUBLE_CODES
 
 from . import uds_tester
-from .conftest import ROOT, driven, process_of, unharmed, wait_for
+from .conftest import ROOT, driven, process_of, unharmed
 from .uds_tester import SECRET, asked
 
 pytestmark = pytest.mark.multicast

@@ -8,7 +8,9 @@ import sys
 import numpy as np
 import pytest
 
-from .conftest import PATIENCE_S, ROOT
+from brakelab.testing.daemon import PATIENCE_S
+
+from .conftest import ROOT
 
 pytestmark = pytest.mark.multicast
 

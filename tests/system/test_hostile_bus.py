@@ -17,9 +17,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from brakelab.testing.daemon import Daemon, patience
 from ecu.bus.channel import open_channel
 
-from .conftest import ROOT, Daemon, Vehicle, demand_ids, patience, priority
+from .conftest import ROOT, Vehicle, demand_ids, priority
 
 pytestmark = pytest.mark.socketcan
 

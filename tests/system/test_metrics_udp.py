@@ -10,9 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from brakelab.testing.daemon import wait_for
 from ecu.recording.recorder import read_recording
 
-from .conftest import ROOT, wait_for
+from .conftest import ROOT
 
 pytestmark = pytest.mark.multicast
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from brakelab.plant.cycle import DEMAND_TIMEOUT
+from brakelab.testing.daemon import wait_for
 from ecu.bus.e2e import P01_MODULO
 from ecu.contract.faults import FOREIGN_SENDER, NOT_KEPT
 from ecu.contract.signals import CYCLE_NS
@@ -18,7 +19,7 @@ from ecu.recording.recorder import read_recording
 from ecu.recording.store import open_store
 from ecu.runtime.start import signal_name
 
-from .conftest import ROOT, demand_ids, wait_for
+from .conftest import ROOT, demand_ids
 
 pytestmark = pytest.mark.multicast
 

@@ -8,9 +8,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from brakelab.rig.wire import lay_wire
+from brakelab.testing.daemon import PATIENCE_S
 from ecu.errors import UserError
 
-from .conftest import PATIENCE_S, ROOT
+from .conftest import ROOT
 
 GROUP = f"239.76.{os.getpid() >> 8 & 0xFF}.{os.getpid() & 0xFF}"
 # Imu frames are lost after the kill, which the standby has to notice.

@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 from brakelab.rig.wire import ACTIVE, BUS_OFF, PASSIVE, STATE_NAMES, WARNING, Wire
+from brakelab.testing.daemon import patience, wait_for
 from ecu.bus.channel import open_channel
 from ecu.contract.records import EXTENDED_ID, FRAME, FRAME_EXTENDED, FRAME_FD, new_record
 from ecu.recording.recorder import read_recording
 
-from .conftest import ROOT, demand_ids, patience, wait_for
+from .conftest import ROOT, demand_ids
 
 pytestmark = pytest.mark.socketcan
 

@@ -10,10 +10,11 @@ import time
 
 import pytest
 
+from brakelab.testing.daemon import wait_for
 from draw_watch import Browser, chromium
 from ecu.recording.recorder import read_recording
 
-from .conftest import ROOT, wait_for
+from .conftest import ROOT
 
 pytestmark = pytest.mark.multicast
 

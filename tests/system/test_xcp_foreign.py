@@ -5,9 +5,10 @@ import time
 import numpy as np
 import pytest
 
+from brakelab.testing.daemon import wait_for
 from ecu.xcp.memory import EPK
 
-from .conftest import ROOT, driven, wait_for
+from .conftest import ROOT, driven
 from .test_xcp_udp import GROUP, SIGNALS, free_port
 from .xcp_master import VARIABLES
 

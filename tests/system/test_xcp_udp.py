@@ -10,6 +10,7 @@ import time
 import numpy as np
 import pytest
 
+from brakelab.testing.daemon import wait_for
 from ecu.bus.channel import open_bus
 from ecu.contract.records import output_vector
 from ecu.contract.signals import OUTPUT_COLUMNS
@@ -17,7 +18,7 @@ from ecu.recording.recorder import read_recording
 from ecu.xcp.a2l import a2l_text
 from ecu.xcp.memory import EPK
 
-from .conftest import ROOT, driven, process_of, unharmed, wait_for
+from .conftest import ROOT, driven, process_of, unharmed
 from .xcp_master import VARIABLES, CanWire, Master, Refused, Wire
 
 pytestmark = pytest.mark.multicast

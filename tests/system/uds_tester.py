@@ -10,13 +10,12 @@ from udsoncan.client import Client
 from udsoncan.connections import PythonIsoTpConnection
 from udsoncan.exceptions import TimeoutException, UnexpectedResponseException
 
+from brakelab.testing.daemon import wait_for
 from ecu import __version__
 from ecu.bus.channel import open_bus
 from ecu.diagnostics.identifiers import MEASURED, length_of, scaling_of
 from ecu.diagnostics.session import key_of
 from ecu.diagnostics.trouble_codes import TROUBLE_CODES
-
-from .conftest import wait_for
 
 SECRET = "00112233445566778899aabbccddeeff"
 

@@ -6,9 +6,8 @@ import time
 
 import can
 
+from brakelab.testing.daemon import wait_for
 from ecu.xcp.variables import RECORDS
-
-from .conftest import wait_for
 
 HEADER = struct.Struct("<HH")
 VARIABLES = {

@@ -100,7 +100,7 @@ class Simulation:
         inputs, truth = (read_result(path).columns for path in (self.inputs_path, self.truth_path))
         self.inputs = Table(inputs, {name: units.get(name, "") for name in inputs})
         """Sensor signals, every 10 ms; NaN: no new sample."""
-        self.truth = Table(truth, {name: _truth_unit(name) for name in truth})
+        self.truth = Table(truth, {name: truth_unit(name) for name in truth})
         """True values, every 10 ms."""
 
 
@@ -172,7 +172,7 @@ def replay(
         raise UserError("logs", "", "the list is empty; give the logs of one drive")
     folder = TemporaryDirectory(prefix="brake-ecu-") if out is None else None
     written = Path(folder.name, f"{paths[0].stem}.parquet") if folder else Path(out or "")
-    with _changed(config, changes) as car:
+    with changed(config, changes) as car:
         done = replay_into(
             paths,
             car,
@@ -215,13 +215,13 @@ def simulate(
         raise UserError("seed", str(seed), "give a whole number from 0 on")
     folder = TemporaryDirectory(prefix="brake-ecu-") if out is None else None
     written = Path(folder.name, path.stem) if folder else Path(out or "")
-    with _changed(config, changes) as car:
+    with changed(config, changes) as car:
         run_scenario(path, car, written, int(seed), draw, told=False)
     return Simulation(written, folder)
 
 
 @contextmanager
-def _changed(config: AnyPath, changes: Mapping[str, Change] | None) -> Iterator[Path]:
+def changed(config: AnyPath, changes: Mapping[str, Change] | None) -> Iterator[Path]:
     """Yield the configuration, with some keys changed as a file that is there while the context lasts."""
     path = config_file(os.fspath(config))
     if not changes:
@@ -256,7 +256,8 @@ def _toml(key: str, value: Change) -> str:
     return text
 
 
-def _truth_unit(name: str) -> str:
+def truth_unit(name: str) -> str:
+    """Return the unit of a true value, empty: none."""
     stem = name[:-3] if name[-3:] in ("_fl", "_fr", "_rl", "_rr") else name
     outputs = {signal.name: signal.unit for signal in OUTPUT_SIGNALS}
     return (TRUTH_UNITS | outputs).get(stem, INPUT_UNITS.get(name, ""))
