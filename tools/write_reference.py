@@ -148,7 +148,7 @@ def _value(key: dict[str, Any]) -> str:
         count = f", {least}" if least == most else f", {least} to {most}" if most < math.inf else ""
         return f"list of {items[0]}{count} of them" if count else f"list of {items[0]}"
     if kind == "object":
-        return "tables"
+        return "tables" if "$ref" in key["additionalProperties"] else "table"
     if kind in ("number", "integer"):
         bounds = (
             ("> ", "exclusiveMinimum"),

@@ -64,6 +64,25 @@ def test_a_verdict_says_what_was_found(keys: dict[str, Any], found: str, passed:
     (verdict,) = judge([Expectation(**keys)], figures(Stop(42.0, 4.5)), 0.05, FAULTS)
     assert (verdict.found, verdict.passed) == (found, passed)
     assert verdict.line.startswith("passed: " if passed else "FAILED: ")
+    assert (verdict.margin >= 0.0) == passed
+
+
+@pytest.mark.parametrize(
+    ("keys", "margin"),
+    [
+        ({"what": "bit", "bit": "IMU lost", "within": 0.15}, 0.05),
+        ({"what": "bit", "bit": "IMU lost", "within": 0.09}, -0.01),
+        ({"what": "bit", "bit": "wheel slips", "within": 9.0}, -math.inf),
+        ({"what": "no_bit", "bit": "wheel slips"}, math.inf),
+        ({"what": "mode", "mode": "active", "t": 2.5}, -math.inf),
+        ({"what": "stopping_distance", "at_least": 40.0, "at_most": 45.0}, 2.0),
+        ({"what": "stopping_distance", "at_most": 40.0}, -2.0),
+        ({"what": "friction_error", "axle": "rear", "at_most": 2.0}, -math.inf),
+    ],
+)
+def test_the_margin_tells_which_run_is_the_worst(keys: dict[str, Any], margin: float) -> None:
+    (verdict,) = judge([Expectation(**keys)], figures(Stop(42.0, 4.5)), 0.05, FAULTS)
+    assert verdict.margin == pytest.approx(margin)
 
 
 def test_a_drive_without_a_stop_keeps_no_distance() -> None:

@@ -122,6 +122,17 @@ def rig(
     junit: Annotated[
         Path | None, typer.Option("--junit", metavar="FILE.xml", help="Write the verdicts as JUnit XML")
     ] = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--vary",
+            metavar="NAME=LOW..HIGH|A,B,C",
+            help="Drive many cars: a parameter drawn from a range, or from a list; several: repeat",
+        ),
+    ] = None,
+    runs: Annotated[
+        int | None, typer.Option("--runs", metavar="N", min=1, help="With --vary: draws from the ranges (50)")
+    ] = None,
 ) -> int:
     """Test the ECU in scenarios with faults. Write one report. Exit code 1: a scenario failed."""
     from brakelab.rig import command
@@ -129,6 +140,15 @@ def rig(
     if (interface is None) != (channel is None):
         raise UserError("-i, -c", "", "give both or none; none: a bus of its own on this machine")
     bus = None if interface is None or channel is None else (interface, channel)
+    if vary:
+        from brakelab.rig import vary as many
+
+        if not lock_step:
+            raise UserError("--vary", "", "drives in memory; add --lock-step")
+        spans = [many.span(one) for one in vary]
+        return many.vary(command.found(scenario), config, out, spans, runs or 50, seed, plant, junit)
+    if runs is not None:
+        raise UserError("--runs", str(runs), "draws from the ranges of --vary; give one")
     return command.rig(scenario, config, bus, out, lock_step, seed, plant, junit)
 
 

@@ -23,6 +23,8 @@ class Verdict(NamedTuple):
     expected: str
     found: str
     passed: bool
+    margin: float = math.nan
+    """By how much the limit is kept, in its unit; below 0: it is not; ±inf: yes or no; NaN: no limit."""
 
     @property
     def line(self) -> str:
@@ -47,7 +49,7 @@ def _verdict(one: Expectation, seen: Figures, longer: float, faults: Sequence[Fa
             rows = (drive.t >= (one.t or 0.0)) & (drive.t <= seen.truth.t[-1])
             rows &= (fault_masks(drive) & one.fault_bit.bit) != 0
             at = 1e-3 * first_after(drive.t, rows, 0.0)
-            return Verdict(one.text, "never" if math.isnan(at) else f"at t = {at:.2f} s", math.isnan(at))
+            return _yes_or_no(one, "never" if math.isnan(at) else f"at t = {at:.2f} s", math.isnan(at))
         case "mode" if one.within is None:
             return _mode_at(one, seen)
         case "mode":
@@ -71,7 +73,13 @@ def _verdict(one: Expectation, seen: Figures, longer: float, faults: Sequence[Fa
 def _in_time(one: Expectation, after_ms: float) -> Verdict:
     assert one.within is not None
     after = round(1e-3 * after_ms, 6)
-    return Verdict(one.text, "never" if math.isnan(after) else f"after {after:.3g} s", after <= one.within)
+    if math.isnan(after):
+        return _yes_or_no(one, "never", passed=False)
+    return Verdict(one.text, f"after {after:.3g} s", after <= one.within, one.within - after)
+
+
+def _yes_or_no(one: Expectation, found: str, passed: bool) -> Verdict:
+    return Verdict(one.text, found, passed, math.inf if passed else -math.inf)
 
 
 def _mode_at(one: Expectation, seen: Figures) -> Verdict:
@@ -79,12 +87,13 @@ def _mode_at(one: Expectation, seen: Figures) -> Verdict:
     t = seen.drive.t
     rows = np.flatnonzero((t <= one.t) & (t > one.t - HEARD_S))
     found = MODES[int(seen.drive.column("mode")[rows[-1]])] if len(rows) else "silent"
-    return Verdict(one.text, found, found == one.mode)
+    return _yes_or_no(one, found, found == one.mode)
 
 
 def _in_limits(one: Expectation, value: float) -> Verdict:
     if math.isnan(value):
-        return Verdict(one.text, "none", passed=False)
+        return _yes_or_no(one, "none", passed=False)
     least = -math.inf if one.at_least is None else one.at_least
     most = math.inf if one.at_most is None else one.at_most
-    return Verdict(one.text, f"{value:.3f} {UNITS[one.what]}", least <= value <= most)
+    margin = min(value - least, most - value)
+    return Verdict(one.text, f"{value:.3f} {UNITS[one.what]}", margin >= 0.0, margin)

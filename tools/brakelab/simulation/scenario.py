@@ -38,6 +38,10 @@ bias = [-0.1, 0.1]               # drawn per car; or one number
 [sensor.wheel_speed_fl]          # `wheel_speed` would be all four
 lost_from = 3.0                  # s
 
+[car]                            # what of the drawn car is set
+cog_height = 0.75                # m
+friction_scale_front = "80 %"    # of the drawn one
+
 [payload]                        # what the car carries
 mass = 495.0                     # kg
 behind = 0.65                    # m, of the empty car's centre of gravity
@@ -83,6 +87,7 @@ from brakelab.plant.driver import PEDAL_TRAVEL, Script
 from brakelab.plant.records import BRAKE, COAST, CRUISE, FOLLOW, PHASE
 from brakelab.plant.sensor_errors import Sensors
 from brakelab.plant.steering import Steering
+from brakelab.simulation.car_parameters import CarParameters
 from brakelab.simulation.expectations import Expectation
 from brakelab.simulation.faults import Fault
 from brakelab.simulation.scenario_tables import (
@@ -123,6 +128,8 @@ class Scenario(BaseModel):
     """Car: a file beside the scenario, or a name of config/plant."""
     draw: Literal["wide", "nominal"] = "wide"
     """How far the car of a seed is from its file; see `brakelab.plant.draw`."""
+    car: CarParameters = {}
+    """Parameters of the drawn car that are set, in their units or in per cent of it; docs/rig.md has them."""
     payload: Payload | None = None
     """What the car carries beside the driver."""
     engine: Engine | None = None

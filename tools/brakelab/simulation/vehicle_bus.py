@@ -27,6 +27,7 @@ from brakelab.plant.sensor_errors import (
 from brakelab.plant.sensors import body_accelerations, true_readings
 from brakelab.plant.vehicle import new_state
 from brakelab.plant.wear import pad_wear
+from brakelab.simulation.car_parameters import set_parameters
 from brakelab.simulation.fault_kernels import spoil_car
 from brakelab.simulation.faults import fault_records
 from brakelab.simulation.scenario import Scenario
@@ -122,6 +123,7 @@ def new_vehicle(scenario: Scenario, seed: int) -> Vehicle:
         params = draw(plant, seed, width)
     except PlantFileError as error:
         raise UserError(error.where, error.place, error.remedy) from None
+    set_parameters(params, scenario.car)
     commands = new_record(COMMANDS)
     commands["road_friction"] = script.road_friction[0, 1]
     demand = new_record(DEMAND)

@@ -1,0 +1,186 @@
+"""`brake-ecu rig SCENARIO… --lock-step --vary mass=1900..2400`: scenarios with many cars, on all cores.
+
+Each `--vary` is a range, from which `--runs` values are drawn, or a list; lists are combined with each other
+and with every draw. A run is judged by its scenario's `[[expect]]` alone; nothing is written of it but its
+verdicts, in `vary.parquet` and with `--junit`.
+"""
+
+import json
+import os
+import re
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from itertools import product
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+from scipy.stats import qmc
+
+from brakelab.results.console import new_console
+from brakelab.results.outputs import check_outputs, config_files, write_text
+from brakelab.results.progress import tracked
+from brakelab.results.text_table import Table, show
+from brakelab.rig.junit import junit_text
+from brakelab.rig.live import make_folder
+from brakelab.rig.simulated import driven_in_memory, verdicts
+from brakelab.rig.verdicts import Verdict
+from brakelab.simulation.car_parameters import parameter
+from brakelab.simulation.closed_loop import new_loop, run
+from brakelab.simulation.scenario import Scenario, load_scenario
+from brakelab.simulation.scenario_car import with_plant_for
+from ecu.errors import UserError
+from ecu.output import wrote
+from ecu.settings.config import Config, load_config
+
+NUMBER: Final = r"\d+(?:\.\d+)?(?:e[-+]?\d+)?"
+RANGE: Final = re.compile(rf"({NUMBER})\.\.({NUMBER}) ?(%?)")
+LIST: Final = re.compile(rf"({NUMBER}(?:,{NUMBER})*) ?(%?)")
+WIDTH: Final = 150  # columns of the table if the terminal's width is unknown
+
+Car = dict[str, float | str]
+"""A scenario's `[car]`."""
+
+
+class Span(NamedTuple):
+    """One `--vary`."""
+
+    name: str
+    numbers: tuple[float, ...]
+    """Those of the list, or least and greatest of the range."""
+    drawn: bool
+    percent: bool
+    """Of the drawn car's value."""
+
+    def value(self, number: float) -> float | str:
+        """Return a number as a value of `[car]`, to four digits."""
+        return f"{number:.4g} %" if self.percent else float(f"{number:.4g}")
+
+
+def span(text: str) -> Span:
+    """Return a `--vary`. Raises UserError, one line."""
+    name, _, given = text.partition("=")
+    try:
+        parameter(name)
+    except ValueError as error:
+        raise UserError("--vary", text, str(error)) from None
+    drawn, listed = RANGE.fullmatch(given), LIST.fullmatch(given)
+    if drawn:
+        written, percent = [drawn[1], drawn[2]], drawn[3]
+    elif listed:
+        written, percent = listed[1].split(","), listed[2]
+    else:
+        raise UserError("--vary", text, "give NAME=LOW..HIGH or NAME=A,B,C; with %: of the drawn car's")
+    numbers = tuple(map(float, written))
+    if drawn and numbers[0] >= numbers[1]:
+        raise UserError("--vary", text, "give the lower number first")
+    if min(numbers) <= 0.0:
+        raise UserError("--vary", text, "give numbers above 0")
+    return Span(name, numbers, drawn is not None, bool(percent))
+
+
+def cars(spans: Sequence[Span], runs: int, seed: int) -> list[Car]:
+    """Return the cars of all runs: a Latin hypercube over the ranges, for each combination of the lists.
+
+    Raises:
+        UserError: a parameter is given twice.
+    """
+    names = [one.name for one in spans]
+    if len({*names}) < len(names):
+        raise UserError("--vary", " ".join(names), "a parameter is given twice")
+    ranges, lists = [one for one in spans if one.drawn], [one for one in spans if not one.drawn]
+    drawn: list[Car] = [{}]
+    if ranges:
+        shares = qmc.LatinHypercube(len(ranges), rng=seed).random(runs)
+        low, high = zip(*(one.numbers for one in ranges), strict=True)
+        rows = qmc.scale(shares, low, high)
+        drawn = [{one.name: one.value(x) for one, x in zip(ranges, row, strict=True)} for row in rows]
+    combined = product(*([(one.name, one.value(x)) for x in one.numbers] for one in lists))
+    return [dict(some) | car for some in combined for car in drawn]
+
+
+def car_text(car: Car) -> str:
+    """Return a car as a scenario has it, between the braces of `car = { … }`."""
+    return ", ".join(f"{name} = {json.dumps(value)}" for name, value in car.items())
+
+
+def judged(job: tuple[Scenario, Config, int]) -> list[Verdict]:
+    """Drive a scenario in memory; return the verdicts."""
+    scenario, vehicle, seed = job
+    driven = driven_in_memory(scenario, vehicle, seed, run(new_loop(scenario, vehicle, seed)))
+    return verdicts(driven, scenario.expect)
+
+
+class Run(NamedTuple):
+    """One expectation of one run."""
+
+    scenario: str
+    car: Car
+    verdict: Verdict
+
+
+def worst(runs: Sequence[Run]) -> Table:
+    """Return for each expectation of each scenario how often it failed, and the run that is nearest to it."""
+    groups: dict[tuple[str, str], list[Run]] = {}
+    for one in runs:
+        groups.setdefault((one.scenario, one.verdict.expected), []).append(one)
+    rows = []
+    for (scenario, expected), group in groups.items():
+        least = min(group, key=lambda one: one.verdict.margin)
+        failed = sum(not one.verdict.passed for one in group)
+        cells = (scenario, expected, f"{failed} of {len(group)}", least.verdict.found, car_text(least.car))
+        rows.append((-failed / len(group), least.verdict.margin, cells))
+    columns = ("scenario", "expected", "failed", "worst: found", "of the car")
+    return Table("The worst of each expectation", columns, [row for *_, row in sorted(rows)], "")
+
+
+def write_runs(path: Path, runs: Sequence[Run]) -> None:
+    """Write a row for each expectation of each run; a share of the drawn car's value is text."""
+    rows = [{"scenario": one.scenario} | one.car | one.verdict._asdict() for one in runs]
+    pq.write_table(pa.Table.from_pylist(rows), path)
+
+
+def vary(
+    names: Sequence[Path],
+    config: Path,
+    out: Path,
+    spans: Sequence[Span],
+    runs: int,
+    seed: int,
+    plant: str | None = None,
+    junit: Path | None = None,
+) -> int:
+    """Drive each scenario with all cars; return 0, or 1 if an expectation of a run is not met.
+
+    Raises:
+        UserError: a scenario or the configuration is invalid or expects nothing, or nothing can be written.
+    """
+    written = [out / "vary.parquet", *([junit] if junit else [])]
+    vehicle, given = load_config(config), cars(spans, runs, seed)
+    if junit is not None:
+        check_outputs(junit, (junit,), [*config_files(config), *names], option="--junit")
+    make_folder(out)
+    jobs: list[tuple[Scenario, Config, int]] = []
+    for path in names:
+        scenario = with_plant_for(load_scenario(path), plant, vehicle, out / "plant")
+        if not scenario.expect:
+            raise UserError(str(path), "expect", "missing; --vary judges runs by [[expect]], add one")
+        jobs += [(scenario.model_copy(update={"car": scenario.car | car}), vehicle, seed) for car in given]
+    of_runs = [(path.stem, car) for path in names for car in given]
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads of their own in every process cost more
+    workers = min(len(os.sched_getaffinity(0)), len(jobs))
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        done = list(tracked(pool.map(judged, jobs), f"{len(jobs)} runs", len(jobs)))
+    found = [Run(*one, verdict) for one, some in zip(of_runs, done, strict=True) for verdict in some]
+    show(new_console(WIDTH), worst(found))
+    write_runs(written[0], found)
+    if junit is not None:
+        by_scenario: dict[str, list[Verdict]] = {path.stem: [] for path in names}
+        for one in found:
+            named = one.verdict._replace(expected=f"{one.verdict.expected}; {car_text(one.car)}")
+            by_scenario[one.scenario].append(named)
+        write_text(junit, junit_text(by_scenario), option="--junit")
+    wrote(*written)
+    return int(not all(one.verdict.passed for one in found))

@@ -1,0 +1,75 @@
+"""Parameters of a drawn car that a scenario sets: its `[car]`, and `rig --vary`.
+
+A name alone is of the car or of all four wheels; `_front`, `_rear`, `_fl` … are some of the wheels.
+"""
+
+import re
+from typing import Annotated, Final
+
+from pydantic import AfterValidator
+
+from brakelab.plant.records import PARAMS, RecordArray
+from ecu.contract.signals import CORNERS
+from ecu.errors import closest
+
+PARAMETERS: Final = {
+    "mass": ("kg", 1.0),
+    "yaw_inertia": ("kg m²", 1.0),
+    "cog_height": ("m", 1.0),
+    "drag_factor": ("N s²/m²", 1.0),
+    "rolling_resistance": ("-", 1.0),
+    "pitch_gradient": ("rad s²/m", 1.0),
+    "pressure_limit": ("bar", 1e5),
+    "wheel_inertia": ("kg m²", 1.0),
+    "free_radius": ("m", 1.0),
+    "vertical_stiffness": ("N/m", 1.0),
+    "slip_stiffness": ("-", 1.0),
+    "cornering_stiffness": ("1/rad", 1.0),
+    "effective_radius": ("m", 1.0),
+    "piston_area": ("m²", 1.0),
+    "push_out_pressure": ("bar", 1e5),
+    "friction_scale": ("-", 1.0),
+    "heating": ("K/J", 1.0),
+    "cooling": ("1/s", 1.0),
+}
+"""Of `brakelab.plant.records.PARAMS`: unit here, and what turns it into the record's."""
+_WHEELS: Final = {"_front": slice(0, 2), "_rear": slice(2, 4)} | {
+    f"_{corner}": slice(place, place + 1) for place, corner in enumerate(CORNERS)
+}
+_SHARE: Final = re.compile(r"(\d+(?:\.\d+)?) ?%")
+
+
+def parameter(name: str) -> tuple[str, slice]:
+    """Return the parameter and the wheels of a name. Raises ValueError for one that is none."""
+    stem, wheels = name, slice(None)
+    for ending, some in _WHEELS.items():
+        if name.endswith(ending):
+            stem, wheels = name.removesuffix(ending), some
+    if stem not in PARAMETERS or (stem != name and PARAMS[stem].shape != (4,)):
+        hint = closest(name, PARAMETERS) or f"; there are {', '.join(PARAMETERS)}"
+        raise ValueError(f"{name}: no parameter of a car{hint}")
+    return stem, wheels
+
+
+def _checked(car: dict[str, float | str]) -> dict[str, float | str]:
+    for name, value in car.items():
+        parameter(name)
+        share = _SHARE.fullmatch(value) if isinstance(value, str) else None
+        if isinstance(value, str) and share is None:
+            raise ValueError(f'{name}: give a number, or a share of the drawn one, "80 %"')
+        if float(share[1] if share else value) <= 0.0:
+            raise ValueError(f"{name}: give a value above 0")
+    return car
+
+
+CarParameters = Annotated[dict[str, float | str], AfterValidator(_checked)]
+"""Values in the units of `PARAMETERS`, or as a share of the drawn car's, "80 %"."""
+
+
+def set_parameters(params: RecordArray, car: CarParameters) -> None:
+    """Set parameters of a drawn car, `PARAMS` of shape (1,)."""
+    for name, value in car.items():
+        stem, wheels = parameter(name)
+        share = _SHARE.fullmatch(str(value))
+        target = params[stem] if wheels == slice(None) else params[stem][:, wheels]
+        target[:] = target * (0.01 * float(share[1])) if share else PARAMETERS[stem][1] * float(value)
