@@ -27,6 +27,7 @@ def test_systemd_accepts_the_unit(tmp_path):
     assert "WatchdogSecs" in subprocess.run([program, "verify", unit], capture_output=True, text=True).stderr
 
 
+@pytest.mark.requirement("REQ-PROC-3")
 def test_the_watchdog_waits_for_four_signs_of_life():
     text = (DEPLOY / "brake-ecu.service").read_text()
     assert "\nWatchdogSec=1\n" in text

@@ -233,6 +233,7 @@ SLOW = {".mf4": 4, "dbc": 4, "map": 4, "outputs": 4}
 @pytest.mark.timeout(900)
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 @pytest.mark.parametrize("kind", READERS)
+@pytest.mark.requirement("REQ-KEEP-4")
 def test_a_damaged_file_gives_a_result_or_one_line(
     kind: str, whole: Callable[[str], tuple[str, bytes]], tmp_path: Path
 ) -> None:

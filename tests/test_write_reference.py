@@ -11,10 +11,13 @@ import write_reference as reference
 from contract_page import EXAMPLE, contract_text
 from diagnostics_tables import PAGE as DIAGNOSTICS
 from diagnostics_tables import with_tables
+from requirements_page import PAGE as REQUIREMENTS
+from requirements_page import SAFETY, proofs, requirements, requirements_text
 from xcp_tables import PAGE as XCP
 from xcp_tables import with_xcp_tables
 
 ROOT = Path(__file__).parent.parent
+TESTS = [path for path in (ROOT / "tests").rglob("test_*.py") if path != Path(__file__)]
 OF_THE_SIGNAL = {
     "noise",
     "resolution",
@@ -97,6 +100,19 @@ def test_the_tables_of_diagnostics_are_those_of_the_code() -> None:
 def test_the_tables_of_xcp_are_those_of_the_code() -> None:
     page = XCP.read_text("utf-8")
     assert page == with_xcp_tables(page), "run python tools/write_reference.py"
+
+
+def test_every_requirement_has_a_proof_and_every_proof_a_requirement() -> None:
+    required, found = requirements(), list(proofs())
+    assert len(required) > 30
+    assert len(required) == len(re.findall(r"^\| REQ-", SAFETY.read_text("utf-8"), re.M)), "given twice"
+    assert {one.requirement for one in found} == {*required}
+    named = sum(path.read_text("utf-8").count("@pytest.mark.requirement(") for path in TESTS)
+    assert named == len({one[1:] for one in found}), "above a function of a module, where the page finds it"
+
+
+def test_the_page_of_requirements_is_that_of_the_tests() -> None:
+    assert REQUIREMENTS.read_text("utf-8") == requirements_text(), "run python tools/write_reference.py"
 
 
 def test_the_worked_example_of_the_checksum_is_right() -> None:

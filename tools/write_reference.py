@@ -2,8 +2,8 @@
 
     python tools/write_reference.py
 
-writes docs/reference-*.md, with unit, range, default and meaning of each key, docs/contract.md and the tables
-of docs/diagnostics.md and docs/xcp.md.
+writes docs/reference-*.md, with unit, range, default and meaning of each key, docs/contract.md,
+docs/requirements.md and the tables of docs/diagnostics.md and docs/xcp.md.
 """
 
 import math
@@ -21,6 +21,8 @@ from ecu.bus.signal_map import SignalMap
 from ecu.contract.signals import INPUT_SIGNALS, without_corner
 from ecu.settings.schema import config_schema
 from ecu.settings.sections import Config
+from requirements_page import PAGE as REQUIREMENTS
+from requirements_page import requirements_text
 from xcp_tables import PAGE as XCP
 from xcp_tables import with_xcp_tables
 
@@ -209,8 +211,9 @@ if __name__ == "__main__":
     for name in PAGES:
         (DOCS / name).write_text(page_text(name), "utf-8")
         print(DOCS / name)
-    (DOCS / "contract.md").write_text(contract_text(), "utf-8")
-    print(DOCS / "contract.md")
+    for page, text in ((DOCS / "contract.md", contract_text()), (REQUIREMENTS, requirements_text())):
+        page.write_text(text, "utf-8")
+        print(page)
     for page, with_its_tables in ((DIAGNOSTICS, with_tables), (XCP, with_xcp_tables)):
         page.write_text(with_its_tables(page.read_text("utf-8")), "utf-8")
         print(page)

@@ -109,6 +109,7 @@ LATE = {
 
 
 @pytest.mark.parametrize(("fault", "degraded", "unobserved"), LATE.values(), ids=LATE)
+@pytest.mark.requirement("REQ-E2E-5")
 def test_who_is_late_is_heard(
     punctual: Drive, fault: list[Fault], degraded: float, unobserved: float
 ) -> None:

@@ -198,6 +198,7 @@ PLACES = [
 
 
 @pytest.mark.parametrize(("mode", "above", "own_group", "fault"), PLACES)
+@pytest.mark.requirement("REQ-SEC-2")
 def test_a_cache_that_others_can_write_to_is_found(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mode: int, above: int, own_group: bool, fault: str | None
 ) -> None:
@@ -238,6 +239,7 @@ def test_a_group_is_a_user_s_own_by_its_name_and_members(monkeypatch: pytest.Mon
     assert not jit._of_one_user(1000)
 
 
+@pytest.mark.requirement("REQ-SEC-2")
 def test_kernels_in_a_folder_that_is_open_to_all_are_not_run(tmp_path: Path) -> None:
     tmp_path.chmod(0o777)
     environment = {

@@ -43,6 +43,7 @@ def test_it_starts_cycles_records_and_leaves_in_order(daemon, vehicle, tmp_path)
     )
 
 
+@pytest.mark.requirement("REQ-TWO-1")
 def test_a_second_daemon_on_the_same_bus_refuses(daemon, vehicle):
     car = vehicle("udp_multicast", GROUP)
     first = daemon(*BUS)

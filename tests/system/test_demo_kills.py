@@ -102,6 +102,7 @@ def demo(tmp_path):
         ("recorder", None),
     ],
 )
+@pytest.mark.requirement("REQ-DEM-4")
 def test_whichever_process_of_a_demo_is_killed_nothing_valid_comes_from_a_dead_one(
     victim, silent_after_s, demo, tmp_path
 ):

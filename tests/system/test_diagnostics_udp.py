@@ -190,6 +190,7 @@ def test_fuzzed_frames_and_requests(unit, tmp_path):
     unharmed(unit, tmp_path / "record")
 
 
+@pytest.mark.requirement("REQ-PROC-4")
 def test_loop_and_recorder_do_not_care_for_the_server(unit, tmp_path):
     with foreign_tester(request_timeout=1, p2_timeout=1) as client:
         asked(client, lambda one: one.tester_present())
@@ -205,6 +206,7 @@ def test_loop_and_recorder_do_not_care_for_the_server(unit, tmp_path):
     wait_for(lambda: not Path(f"/proc/{last}").exists())
 
 
+@pytest.mark.requirement("REQ-PROC-5")
 def test_it_does_not_listen_unless_asked(daemon, car):
     one = daemon("--config", ROOT / "config" / "suv.toml", "-i", "udp_multicast", "-c", GROUP)
     one.wait_for("ready")

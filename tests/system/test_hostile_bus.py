@@ -169,6 +169,7 @@ OF_THE_BUS = {
 
 
 @pytest.mark.parametrize(("frames", "told"), BESIDE.values(), ids=BESIDE)
+@pytest.mark.requirement("REQ-IN-4")
 def test_whatever_else_is_on_the_bus_the_car_is_braked(
     bench: Bench, raw: socket.socket, frames: Callable[[], list[bytes]], told: set[str]
 ) -> None:
@@ -216,6 +217,7 @@ def test_what_the_controller_reports_is_told_and_braking_goes_on(
 
 @pytest.mark.skipif(os.environ.get("WITH_VCAN") != "uml", reason="would set the machine's own clock")
 @pytest.mark.parametrize("step_s", [0.03, -0.03, 3600, -3600, 31_536_000, -31_536_000])
+@pytest.mark.requirement("REQ-LOOP-4")
 def test_a_clock_that_is_set_brakes_on(bench: Bench, step_s: float) -> None:
     lines = 0
 
@@ -235,6 +237,7 @@ def test_a_clock_that_is_set_brakes_on(bench: Bench, step_s: float) -> None:
     bench.car.drive(1, until=told)
 
 
+@pytest.mark.requirement("REQ-DEM-5")
 def test_a_daemon_that_wakes_after_five_seconds_asks_for_what_is_asked_then(bench: Bench) -> None:
     car = bench.car
     car.drive(20)
@@ -294,6 +297,7 @@ def test_of_two_armed_ones_that_start_together_one_brakes(daemon: Callable[..., 
         assert sorted(unit.end() for unit in units) in ([0, 0], [0, 2])
 
 
+@pytest.mark.requirement("REQ-TWO-6")
 def test_stray_frames_keep_no_daemon_from_starting_nor_from_braking(daemon: Callable[..., Daemon]) -> None:
     with interface("vcan9") as bus, car_on(bus) as car:
         stray = open_channel("socketcan", bus, receive_ids=[])

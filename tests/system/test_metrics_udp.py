@@ -42,6 +42,7 @@ def server_of(family):
     return None
 
 
+@pytest.mark.requirement("REQ-PROC-4")
 def test_loop_and_recorder_do_not_care_for_the_metrics(daemon, vehicle, tmp_path):
     port = free_port()
     config = ROOT / "config" / "suv.toml"

@@ -66,6 +66,7 @@ def unit_map(tmp_path):
     return tmp_path / "map.toml"
 
 
+@pytest.mark.requirement("REQ-DEM-7")
 def test_an_armed_run_demands_in_another_makers_messages_and_takes_it_back(daemon, car, unit_map):
     hears = open_channel(
         "udp_multicast", GROUP, receive_ids=[288, TORQUES | EXTENDED_ID, *demand_ids()], fd=True
@@ -98,6 +99,7 @@ def test_an_armed_run_demands_in_another_makers_messages_and_takes_it_back(daemo
     hears.close()
 
 
+@pytest.mark.requirement("REQ-DEM-8")
 def test_a_silent_run_estimates_and_sends_nothing(daemon, car):
     unit = daemon("--config", ROOT / "config" / "suv.toml", "--silent", *BUS)
     ready = unit.wait_for("ready")

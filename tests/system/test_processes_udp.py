@@ -63,6 +63,7 @@ def clogged_pipe():
 
 
 @pytest.mark.parametrize("log", ["its reader is gone", "nobody reads it", "its disk is full"])
+@pytest.mark.requirement("REQ-LOOP-5")
 def test_whatever_becomes_of_the_log_the_brakes_go_on(log, daemon, car, bus):
     reading = None
     if log == "nobody reads it":
@@ -130,6 +131,7 @@ def last_flags(car, count=3):
     "number",
     [signal.SIGHUP, signal.SIGTERM, signal.SIGQUIT, signal.SIGALRM, signal.SIGIO, signal.SIGRTMIN + 3],
 )
+@pytest.mark.requirement("REQ-DEM-3")
 def test_a_signal_ends_it_with_three_demands_flagged_invalid(number, daemon, car, bus):
     unit = daemon(*bus)
     unit.wait_for("ready")
@@ -165,6 +167,7 @@ sys.exit(main(sys.argv[1:]))
         ),
     ],
 )
+@pytest.mark.requirement("REQ-DEM-3")
 def test_an_exception_in_the_cycle_ends_it_with_the_farewell_too(function, error, said, daemon, car, bus):
     program = BROKEN.format(module="cycle", function=function, error=error)
     unit = daemon(*bus, program=program)
@@ -179,6 +182,7 @@ def test_an_exception_in_the_cycle_ends_it_with_the_farewell_too(function, error
 
 
 @pytest.mark.parametrize("member", [1, 2], ids=["supervisor", "recorder"])
+@pytest.mark.requirement("REQ-PROC-1")
 def test_a_killed_side_process_comes_back_and_nothing_is_lost(member, daemon, car, bus, tmp_path):
     unit = daemon(*bus, "--record", tmp_path / "record", "--state", tmp_path / "state")
     unit.wait_for("ready")
@@ -202,6 +206,7 @@ def test_a_killed_side_process_comes_back_and_nothing_is_lost(member, daemon, ca
     assert not told[-1]
 
 
+@pytest.mark.requirement("REQ-PROC-2")
 def test_a_state_folder_that_cannot_be_written_is_a_line_and_a_fault_bit(daemon, car, bus, tmp_path):
     (tmp_path / "file").write_text("")
     unit = daemon(*bus, "--state", tmp_path / "file")
@@ -220,6 +225,7 @@ def heard_by(manager):
         return None
 
 
+@pytest.mark.requirement("REQ-PROC-3")
 def test_the_service_manager_hears_ready_signs_of_life_and_the_end(daemon, car, bus, tmp_path):
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
         manager.bind(str(tmp_path / "notify"))
@@ -249,6 +255,7 @@ def test_the_service_manager_hears_ready_signs_of_life_and_the_end(daemon, car, 
             assert word == b"WATCHDOG=1"
 
 
+@pytest.mark.requirement("REQ-LOOP-6")
 def test_while_it_compiles_it_says_so_and_obeys(daemon, bus, tmp_path):
     unit = daemon(*bus, NUMBA_CACHE_DIR=str(tmp_path / "cold"), BRAKE_ECU_LIBRARY="0")
     assert "ecu.warm" in unit.wait_for("compiling")["remedy"]
@@ -258,6 +265,7 @@ def test_while_it_compiles_it_says_so_and_obeys(daemon, bus, tmp_path):
     assert not any_ring_of(unit)
 
 
+@pytest.mark.requirement("REQ-IN-4")
 def test_malformed_datagrams_are_no_bus_off(daemon, car, bus):
     unit = daemon(*bus)
     unit.wait_for("ready")
@@ -274,6 +282,7 @@ def test_malformed_datagrams_are_no_bus_off(daemon, car, bus):
     assert not any(line.get("fault") == "bus off" for line in unit.seen)
 
 
+@pytest.mark.requirement("REQ-TWO-3")
 def test_an_established_one_stays_beside_another_sender_and_tells_it(daemon, car, bus, tmp_path):
     unit = daemon(*bus, "--record", tmp_path)
     unit.wait_for("ready")
@@ -293,6 +302,7 @@ def test_an_established_one_stays_beside_another_sender_and_tells_it(daemon, car
     assert outputs["pressure_demand_valid"][-20:].all()
 
 
+@pytest.mark.requirement("REQ-TWO-5")
 def test_of_two_that_begin_together_one_speaks(daemon, car, bus):
     units = [daemon(*bus) for _ in range(2)]
     silent = ("falls_silent",)
@@ -308,6 +318,7 @@ def test_of_two_that_begin_together_one_speaks(daemon, car, bus):
 
 
 @pytest.mark.parametrize("seed", range(5))
+@pytest.mark.requirement("REQ-DEM-4")
 def test_whoever_is_killed_whenever_no_dead_one_brakes_and_the_state_opens(seed, daemon, car, bus, tmp_path):
     draw = random.Random(seed)
     unit = daemon(*bus, "--state", tmp_path / "state", "--record", tmp_path / "record")

@@ -69,6 +69,7 @@ def rig(tmp_path, *arguments, text=SCENARIO):
         pytest.param(("--lock-step",), id="lock-step"),
     ],
 )
+@pytest.mark.requirement("REQ-TWO-4")
 def test_the_standby_brakes_on_where_the_killed_one_stopped(tmp_path, bus):
     exact = "--lock-step" in bus
     faults, drive = rig(tmp_path, *bus)

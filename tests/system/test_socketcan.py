@@ -236,6 +236,7 @@ def _identifier(line: str) -> str:
     return found[1]
 
 
+@pytest.mark.requirement("REQ-TWO-1")
 def test_the_daemon_refuses_where_someone_sends_its_frames(daemon):
     other = can.Bus(interface="socketcan", channel="vcan0")
     task = other.send_periodic(can.Message(arbitration_id=demand_ids()[0], is_extended_id=False), 0.05)

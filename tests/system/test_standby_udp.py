@@ -24,6 +24,7 @@ def counters(heard):
     return (heard["data"][heard["can_id"] == demand_ids()[0], 1] & 0xF).astype(int)
 
 
+@pytest.mark.requirement("REQ-TWO-4")
 def test_a_standby_is_silent_takes_over_and_keeps_the_killed_one_away(daemon, vehicle, tmp_path):
     car = vehicle("udp_multicast", GROUP)
     first = daemon(*BUS)

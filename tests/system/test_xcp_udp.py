@@ -209,6 +209,7 @@ def test_floods_and_garbage(unit, master, port, tmp_path, kind):
     unharmed(one, tmp_path / "record")
 
 
+@pytest.mark.requirement("REQ-PROC-4")
 def test_loop_and_recorder_do_not_care_for_the_slave(unit, master, port, tmp_path):
     one = unit(f"tcp:{port}")
     asks = master("tcp", port)
@@ -231,6 +232,7 @@ def test_the_end_of_a_run_is_told(unit, master, port):
     assert asks.events == [b"\xfd\x07"]
 
 
+@pytest.mark.requirement("REQ-PROC-5")
 def test_it_does_not_listen_unless_asked(daemon, car):
     one = daemon("--config", ROOT / "config" / "suv.toml", "-i", "udp_multicast", "-c", GROUP)
     one.wait_for("ready")

@@ -57,6 +57,7 @@ def test_a_unit_that_is_another_quantity_is_refused() -> None:
         SPEED.within(0.0, 1.0, "bar")
 
 
+@pytest.mark.requirement("REQ-IN-2")
 def test_a_fault_is_told_by_its_bit_in_time(ecu, plant) -> None:
     plant.fault("lost", message=["Imu"], t=1.0, duration=0.5)
     plant.drive(STOP, seed=1)

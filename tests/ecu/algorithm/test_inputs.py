@@ -89,6 +89,7 @@ def test_any_rising_map_gives_what_numpy_interpolates(suv, points: list[tuple[fl
         ("nobody brakes", 0.0, 0.0, 1.0, 0.0),
     ],
 )
+@pytest.mark.requirement("REQ-DEM-6")
 def test_the_larger_of_pedal_and_valid_demand_counts(params, feed, case, pedal, demand, valid, decel) -> None:
     inputs = feed(pedal_position=pedal, decel_demand=demand, decel_demand_valid=valid)
     assert requested_decel(params[0], inputs[0]) == pytest.approx(decel), case

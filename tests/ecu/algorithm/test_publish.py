@@ -21,6 +21,7 @@ def torques(params, bar, mu):
     ("mode", "bar"),
     [(ACTIVE, [30.0, 31.0, 0.0, 12.0]), (DEGRADED, [30.0, 31.0, 0.0, 12.0]), (FAILED, [0.0, 0.0, 0.0, 0.0])],
 )
+@pytest.mark.requirement("REQ-DEM-1")
 def test_demands_are_sent_in_bar_and_a_failed_ecu_demands_no_pressure(mode: int, bar: list[float]) -> None:
     params = new_params(load_config(resource("config/suv-blended.toml")))
     state, outputs = new_state(params), np.full(1, np.nan, OUTPUTS)

@@ -193,6 +193,7 @@ def test_nothing_promised_is_ever_nan(car: Car) -> None:
     ]
 
 
+@pytest.mark.requirement("REQ-DEM-2")
 def test_armed_or_shadow(params, feed) -> None:
     for armed in (0, 1):
         params[0]["transmit"] = armed
@@ -200,6 +201,7 @@ def test_armed_or_shadow(params, feed) -> None:
         assert column(rows, "pressure_demand_valid")[-1] == armed
 
 
+@pytest.mark.requirement("REQ-DEM-1")
 def test_no_pedal_and_no_demand_is_failed_and_flagged_invalid(params, feed) -> None:
     params[0]["transmit"] = 1
     car = Car(params, feed)
@@ -239,6 +241,7 @@ def test_an_automated_demand_that_is_lost_is_kept_for_a_tenth_of_a_second(
     assert (column(during, "pressure_demand_valid") == 0).tolist() == failed.tolist()
 
 
+@pytest.mark.requirement("REQ-IN-2")
 def test_a_lost_wheel_speed_degrades_and_braking_goes_on(params, feed) -> None:
     params[0]["transmit"] = 1
     car = Car(params, feed)
@@ -263,6 +266,7 @@ def test_a_lost_wheel_speed_degrades_and_braking_goes_on(params, feed) -> None:
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("name", SEEN)
+@pytest.mark.requirement("REQ-IN-3")
 def test_a_value_that_cannot_be_is_survived_told_and_forgotten(car: Car, name: str, value: float) -> None:
     """Freshness lets no such value through; here it comes nevertheless, for 50 ms of a braking."""
     car.drive((0.0, 2.0), (60.0, 1.5))
@@ -425,6 +429,7 @@ def test_after_missed_periods_one_step_covers_the_time(params, feed, missed: int
     assert np.isfinite(rows[:, PROMISED]).all()
 
 
+@pytest.mark.requirement("REQ-LOOP-2")
 def test_ten_thousand_cycles_allocate_nothing(car: Car) -> None:
     memsys_enable_stats()
     car.drive((0.0, 0.5), (60.0, 0.5))

@@ -34,6 +34,7 @@ from .conftest import p01_protect
         (1, 0x91),  # AUTOSAR PRS E2E Protocol, Profile 1 examples
     ],
 )
+@pytest.mark.requirement("REQ-E2E-1")
 def test_profile_1_of_eight_zero_bytes(counter: int, crc: int) -> None:
     data = np.zeros(8, np.uint8)
     p01_protect(data, 8, 0x123, counter)
@@ -61,6 +62,7 @@ def test_crc_vectors_of_the_autosar_crc_routines(text: str, crc: int) -> None:
 
 
 @given(data=st.binary(min_size=8, max_size=8), data_id=st.integers(0, 0xFFFF), counter=st.integers(0, 14))
+@pytest.mark.requirement("REQ-E2E-1")
 def test_profile_1_as_the_e2e_package(data: bytes, data_id: int, counter: int) -> None:
     ours = np.frombuffer(data, np.uint8).copy()
     p01_protect(ours, 8, data_id, counter)
@@ -75,6 +77,7 @@ def test_profile_1_as_the_e2e_package(data: bytes, data_id: int, counter: int) -
     first=st.integers(0, 56),
     flips=st.integers(1, 255),
 )
+@pytest.mark.requirement("REQ-E2E-1")
 def test_no_burst_of_up_to_eight_bits_passes(data: bytes, first: int, flips: int) -> None:
     sent = np.frombuffer(data, np.uint8).copy()
     p01_protect(sent, 8, 0x5A01, 3)

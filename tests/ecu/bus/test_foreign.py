@@ -117,5 +117,6 @@ SPEAKS = {
 
 
 @pytest.mark.parametrize(("heard", "speaks"), SPEAKS.values(), ids=SPEAKS)
+@pytest.mark.requirement("REQ-TWO-6")
 def test_another_ecu_is_known_by_intact_frames_of_two_messages(heard, speaks):
     assert another_ecu_speaks(PLAN, *heard) is speaks

@@ -57,6 +57,7 @@ def test_one_sample_is_new_once_and_ages() -> None:
 
 
 @pytest.mark.parametrize(("age_ms", "alive"), [(99, True), (100, True), (101, False)])
+@pytest.mark.requirement("REQ-IN-1")
 def test_time_out(age_ms: int, alive: bool) -> None:
     signal = Signal()
     signal.cycle(10, (10, 5.0, True))
@@ -70,6 +71,7 @@ def test_the_ends_of_the_range_belong_to_it(value: float) -> None:
 
 
 @pytest.mark.parametrize("value", [-0.1, 100.1, math.nan, math.inf, -math.inf])
+@pytest.mark.requirement("REQ-IN-1")
 def test_a_value_out_of_range_is_not_taken_but_proves_life(value: float) -> None:
     signal = Signal()
     signal.cycle(10, (10, 5.0, True))
@@ -78,6 +80,7 @@ def test_a_value_out_of_range_is_not_taken_but_proves_life(value: float) -> None
     assert signal.cycle(30, (30, 6.0, True)) == (6.0, 1, ALIVE | RATE_OK | VALID)
 
 
+@pytest.mark.requirement("REQ-IN-1")
 def test_a_sample_declared_invalid() -> None:
     signal = Signal()
     signal.cycle(10, (10, 5.0, True))

@@ -79,6 +79,7 @@ STRETCH = st.one_of(
 
 
 @given(stretches=st.lists(STRETCH, max_size=8))
+@pytest.mark.requirement("REQ-E2E-6")
 def test_machine_beside_the_description(stretches: list[list[int]]) -> None:
     state, model = new_link(), Model()
     for status in chain.from_iterable(stretches):
@@ -155,6 +156,7 @@ def loud_after(intervals_ms: list[float], statuses: list[int], period_ms: float 
         ("a burst that does not end", [0.25], [W], 1.0, 10.0),
     ],
 )
+@pytest.mark.requirement("REQ-E2E-6")
 def test_when_a_stream_is_loud(
     what: str, intervals: list[float], statuses: list[int], low: float | None, high: float | None
 ) -> None:

@@ -164,6 +164,7 @@ def test_what_leaves_is_what_the_map_says(tmp_path: Path) -> None:
         (np.nan, 1.0, 2, -100, 0),
     ],
 )
+@pytest.mark.requirement("REQ-DEM-7")
 def test_an_invalid_demand_leaves_as_that(
     tmp_path: Path, demand: float, valid: float, flag: int, left: float, right: float
 ) -> None:

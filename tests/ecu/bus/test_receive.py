@@ -148,6 +148,7 @@ def broken(frames: RecordArray, what: str) -> RecordArray:
         ("counter 15", "sequence_errors"),
     ],
 )
+@pytest.mark.requirement("REQ-E2E-2")
 def test_a_rejected_frame_changes_nothing_it_carries(what: str, counter: str) -> None:
     bus = Bus()
     bus.run(30)
@@ -319,6 +320,7 @@ def test_a_sender_that_restarts_is_accepted_again(before: int, pause: int) -> No
     assert bus.inputs["new"][0, SPEED] == 1
 
 
+@pytest.mark.requirement("REQ-E2E-3")
 def test_a_block_replayed_beside_the_sender_is_not_accepted() -> None:
     """20 old cycles come again, each 3 ms after the true one; the true frames go on being taken."""
     bus = Bus()

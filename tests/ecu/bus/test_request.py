@@ -130,6 +130,7 @@ def duel(phase: int, lost: int, offset: float, deadline: float, seed: int, begin
 @pytest.mark.parametrize("begin", [50, 60])  # before the sender loses frames, and with the first one
 @pytest.mark.parametrize("lost", range(6))
 @pytest.mark.parametrize("phase", range(15))
+@pytest.mark.requirement("REQ-PED-1")
 def test_a_replayed_release_never_lowers_the_demand(phase: int, lost: int, begin: int) -> None:
     """From the second frame on: the very first may come within the sender's own jitter, a cycle before it."""
     for offset in (0.5, 2.0, 3.5, 5.0, 6.5, 8.0, 9.5):
@@ -145,6 +146,7 @@ def test_a_replayed_release_never_lowers_the_demand(phase: int, lost: int, begin
 
 
 @pytest.mark.parametrize("phase", range(15))
+@pytest.mark.requirement("REQ-PED-3")
 def test_a_replayed_braking_is_followed_in_the_senders_own_phase_only(phase: int) -> None:
     """A stream that asks for more can win in the sender's place alone: the safe side of that doubt."""
     wire = Wire()
@@ -156,6 +158,7 @@ def test_a_replayed_braking_is_followed_in_the_senders_own_phase_only(phase: int
     assert worst == pytest.approx(3.0 if phase == 0 else 0.0)
 
 
+@pytest.mark.requirement("REQ-PED-2")
 def test_doubt_delays_a_release_by_120_ms_at_most() -> None:
     wire = Wire()
     for k in range(200):
@@ -178,6 +181,7 @@ def test_without_doubt_a_release_counts_at_once() -> None:
     assert asked(wire.run(100, 1.0)).tolist() == pytest.approx([3.0] * 50 + [0.0] * 50, abs=0.02)
 
 
+@pytest.mark.requirement("REQ-E2E-4")
 def test_a_restarted_sender_is_followed_within_100_ms() -> None:
     for phase in range(15):
         wire = Wire()

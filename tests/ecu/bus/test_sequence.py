@@ -236,6 +236,7 @@ def pauses(ms: float, how: str, start: float) -> Frames:
 @pytest.mark.parametrize("jitter", [0.0, 1.0, 2.5, 5.0])
 @pytest.mark.parametrize("how", HOW)
 @pytest.mark.parametrize("ms", [10, 40, 60, 70, 100, 150, 200, 300])
+@pytest.mark.requirement("REQ-E2E-5")
 def test_an_honest_sender_that_pauses_loses_nothing_else(ms: float, how: str, jitter: float) -> None:
     if ms > 150 and how == "caught up" and jitter > 2.5:
         return  # its counter says nothing then
@@ -278,6 +279,7 @@ IRREGULAR = {
 
 
 @pytest.mark.parametrize(("frames", "share"), IRREGULAR.values(), ids=IRREGULAR)
+@pytest.mark.requirement("REQ-E2E-5")
 def test_an_honest_sender_that_is_irregular_loses_nothing(frames: Frames, share: float) -> None:
     state = new_sequence()
     verdicts = [judge(state, c, t) for t, c in zip(*frames, strict=True)]
@@ -298,6 +300,7 @@ def test_lost_frames_never_cost_another_one(lost: list[bool]) -> None:
     known=st.integers(0, 14),
     jitter=st.lists(st.floats(-1.0, 1.0), min_size=10, max_size=10),
 )
+@pytest.mark.requirement("REQ-E2E-4")
 def test_a_restarted_sender_is_back_within_100_ms(
     restarted_at: int, silent: int, known: int, jitter: list[float]
 ) -> None:
@@ -374,6 +377,7 @@ def distance_ms(offset: float, phase: int) -> float:
 @pytest.mark.parametrize("jitter", [1.0, 2.5, 5.0])
 @pytest.mark.parametrize("lost", range(6))
 @pytest.mark.parametrize("phase", range(15))
+@pytest.mark.requirement("REQ-E2E-3")
 def test_a_replayed_stream_wins_nothing_beside_a_living_sender(phase: int, lost: int, jitter: float) -> None:
     """Frames of both every 10 ms; the living sender jitters and loses `lost` in a row each 0.3 s.
 

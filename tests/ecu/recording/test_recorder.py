@@ -204,6 +204,7 @@ LEFT = {
 
 
 @pytest.mark.parametrize(("frames", "cycles"), LEFT.values(), ids=LEFT)
+@pytest.mark.requirement("REQ-PROC-1")
 def test_one_that_was_killed_is_gone_on_with_in_the_same_recording(tmp_path, frames, cycles):
     run = Run(tmp_path, record=tmp_path / "record", state=tmp_path / "state")
     run.cycles(4, frames=2, mode=1)

@@ -166,6 +166,7 @@ def test_another_file_is_one_line(path, content):
         RingReader(path)
 
 
+@pytest.mark.requirement("REQ-SEC-1")
 def test_it_is_its_owner_s_alone_and_follows_no_link(path, tmp_path):
     victim = tmp_path / "victim"
     victim.write_text("mine")

@@ -29,6 +29,7 @@ def test_what_is_written_can_be_read(pipe):
 
 
 @pytest.mark.parametrize("late", [False, True], ids=["from the start", "later"])
+@pytest.mark.requirement("REQ-LOOP-5")
 def test_a_reader_that_is_gone_is_no_matter(pipe, late):
     if not late:
         os.close(pipe[0])
@@ -58,6 +59,7 @@ def test_closed_standard_streams_are_nobody_else_s(tmp_path):
     assert int((tmp_path / "number").read_bytes()) > 2
 
 
+@pytest.mark.requirement("REQ-LOOP-5")
 def test_a_reader_that_does_not_read_costs_lines_that_are_counted(pipe):
     sink = Sink(pipe[1])
     for _ in range(200):
@@ -90,6 +92,7 @@ def test_a_socket_as_the_journal_gives_it(pipe):
     assert sink.dropped > 0
 
 
+@pytest.mark.requirement("REQ-LOOP-5")
 def test_a_full_disk_is_no_matter():
     with open("/dev/full", "wb") as full:
         sink = Sink(full.fileno())

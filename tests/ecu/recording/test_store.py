@@ -67,6 +67,7 @@ def test_what_was_saved_comes_back_bit_by_bit(tmp_path):
     [("suv/1234/2", ["learned_by_another_version"]), ("suv/5678/1", []), ("van/1234/1", [])],
     ids=["version", "brakes", "vehicle"],
 )
+@pytest.mark.requirement("REQ-KEEP-3")
 def test_another_vehicle_or_version_knows_nothing_of_it(tmp_path, key, told):
     store = open_store(tmp_path)
     save(store, KEY, learned())
@@ -225,6 +226,7 @@ OUT_OF_RANGE = {
 
 
 @pytest.mark.parametrize("wrong", OUT_OF_RANGE.values(), ids=OUT_OF_RANGE)
+@pytest.mark.requirement("REQ-KEEP-3")
 def test_a_value_that_cannot_be_falls_back_to_the_revision_before(tmp_path, wrong):
     store = open_store(tmp_path)
     save(store, KEY, learned(7))
@@ -249,6 +251,7 @@ def test_a_corner_that_was_never_observed_needs_no_friction(tmp_path):
     ],
     ids=["CRC", "content", "length", "number"],
 )
+@pytest.mark.requirement("REQ-KEEP-2")
 def test_a_damaged_row_falls_back_to_the_revision_before(tmp_path, damage):
     store = open_store(tmp_path)
     save(store, KEY, learned(7))
@@ -367,6 +370,7 @@ def write_until_killed(folder: Path, first: int, saved: Connection) -> None:
         saved.send(brakings)
 
 
+@pytest.mark.requirement("REQ-KEEP-1")
 def test_killed_at_fifty_instants_it_opens_and_has_lost_nothing_that_was_saved(tmp_path):
     processes = multiprocessing.get_context("forkserver")
     processes.set_forkserver_preload([__name__])
@@ -417,6 +421,7 @@ def look_at(folder: Path, content: bytes) -> tuple[int | None, list[str]]:
     return None if found is None else int(found[1]["brakings"][0]), [line["event"] for line in lines]
 
 
+@pytest.mark.requirement("REQ-KEEP-2")
 def test_a_single_damaged_byte_costs_one_line_at_most_and_gives_no_wrong_value(whole, tmp_path):
     """The header, every third byte of the schema, and a sample of all (the whole file was tried once)."""
     draw = random.Random(12)
@@ -435,6 +440,7 @@ def test_a_single_damaged_byte_costs_one_line_at_most_and_gives_no_wrong_value(w
     assert len(set(outcomes)) >= 3  # whole, the revision before, set aside
 
 
+@pytest.mark.requirement("REQ-SEC-1")
 def test_the_folder_is_its_owner_s_alone(tmp_path):
     open_store(tmp_path / "state").close()
     assert (tmp_path / "state").stat().st_mode & 0o777 == 0o700

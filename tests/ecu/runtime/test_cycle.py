@@ -159,6 +159,7 @@ def test_a_frame_that_came_late_is_taken_and_counted(bench):
     assert bench.run()["late_frames"] == bench.ecu.cycle["frames"][0] > 0
 
 
+@pytest.mark.requirement("REQ-LOOP-3")
 def test_after_missed_periods_one_step_covers_them_all(bench):
     bench.run(5)
     bench.now_ns += 3 * CYCLE_NS + MS
@@ -195,6 +196,7 @@ def test_the_first_demand_after_standing_still_is_what_is_asked_then(braking, st
 
 
 @pytest.mark.parametrize("still_ms", [30, 503, 5000, 10_000])
+@pytest.mark.requirement("REQ-DEM-5")
 def test_what_was_computed_before_the_process_stood_still_is_not_sent(braking, still_ms):
     braking.stopped_ns = still_ms * MS  # behind its waking
     braking.run()
@@ -253,6 +255,7 @@ YEAR_S = 31_536_000
 
 @pytest.mark.parametrize("when", ["before the frames came", "after they came"])
 @pytest.mark.parametrize("step_s", [0.02, -0.02, 0.2, -0.2, 3600, -3600, YEAR_S, -YEAR_S])
+@pytest.mark.requirement("REQ-LOOP-4")
 def test_a_clock_that_is_set_changes_nothing_but_its_own_record(braking, step_s, when):
     def set_clock():
         braking.offset_ns = EPOCH_NS + round(step_s * 1e9)
@@ -302,6 +305,7 @@ def test_what_the_service_sees_reaches_step_as_fault_bits(bench, status, now, la
     assert bench.faults() == later
 
 
+@pytest.mark.requirement("REQ-TWO-3")
 def test_a_second_sender_of_our_frames_is_a_fault(bench):
     bench.run(3)
     bench.speaks = False
@@ -311,6 +315,7 @@ def test_a_second_sender_of_our_frames_is_a_fault(bench):
     assert bench.faults() == faults.FOREIGN_SENDER
 
 
+@pytest.mark.requirement("REQ-LOOP-2")
 def test_a_compilation_in_operation_is_a_fault(bench):
     bench.run(3)
     bench.progress._compiled.count += 1
@@ -318,6 +323,7 @@ def test_a_compilation_in_operation_is_a_fault(bench):
     assert bench.faults() == faults.COMPILED
 
 
+@pytest.mark.requirement("REQ-DEM-3")
 def test_the_last_frames_flag_every_demand_invalid(bench):
     bench.ecu.params["transmit"] = 1
     bench.values[INPUT["decel_demand"]] = 3.0
@@ -329,6 +335,7 @@ def test_the_last_frames_flag_every_demand_invalid(bench):
     assert set(bench.ecu.transmit_plan.ids[:2].tolist()) <= set(bench.sent)
 
 
+@pytest.mark.requirement("REQ-DEM-7")
 def test_a_farewell_lasts_until_the_slowest_demand_of_a_map_has_left(bench, tmp_path):
     (tmp_path / "car.dbc").write_text(
         'VERSION ""\nBU_: A\nBO_ 10 Wheels: 8 A\n SG_ v : 0|16@1+ (1,0) [0|0] "rad/s" A\n'
@@ -360,6 +367,7 @@ def test_learned_values_are_taken_over(tmp_path):
     assert ecu.learned.tobytes() == learned.tobytes()
 
 
+@pytest.mark.requirement("REQ-LOOP-2")
 def test_thousands_of_cycles_leave_no_memory_behind(bench):
     enabled = _nrt_python.memsys_stats_enabled()
     _nrt_python.memsys_enable_stats()

@@ -237,6 +237,7 @@ def test_a_signal_that_wakes_the_sleep_does_not_start_the_cycle(loop):
 
 
 @pytest.mark.parametrize(("still_ms", "said"), [(0, True), (10, True), (35, False), (5000, False)])
+@pytest.mark.requirement("REQ-DEM-5")
 def test_what_was_computed_before_the_process_stood_still_is_not_sent(tmp_path, still_ms, said):
     slow = OnSocket(STOP.params, tmp_path / "ring", period_ns=10_000 * MS)  # a deadline stays the last one
     try:
@@ -246,6 +247,7 @@ def test_what_was_computed_before_the_process_stood_still_is_not_sent(tmp_path, 
         slow.close()
 
 
+@pytest.mark.requirement("REQ-LOOP-2")
 def test_thousands_of_cycles_leave_no_memory_behind(tmp_path):
     fast = OnSocket(STOP.params, tmp_path / "ring", period_ns=MS)
     gc.disable()

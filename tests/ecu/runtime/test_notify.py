@@ -46,5 +46,6 @@ WATCHDOGS = {
 
 
 @pytest.mark.parametrize(("environment", "cycles"), WATCHDOGS.values(), ids=WATCHDOGS)
+@pytest.mark.requirement("REQ-PROC-3")
 def test_signs_of_life_come_as_often_as_they_are_waited_for(environment, cycles):
     assert Manager({"NOTIFY_SOCKET": "notify", **environment}).watchdog_cycles == cycles

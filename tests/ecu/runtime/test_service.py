@@ -17,6 +17,7 @@ LOOP = (clock, cycle, notify, regulation, service, side, step)
 
 
 @pytest.mark.parametrize("module", LOOP, ids=lambda module: module.__name__)
+@pytest.mark.requirement("REQ-LOOP-1")
 def test_what_runs_in_the_loop_neither_logs_nor_prints(module):
     source = inspect.getsource(module)
     for way in ("structlog", "print(", "sys.stderr", "logging.getLogger"):
@@ -48,6 +49,7 @@ ENDS = {
 
 
 @pytest.mark.parametrize(("error", "farewell_works", "raised"), ENDS.values(), ids=ENDS)
+@pytest.mark.requirement("REQ-DEM-3")
 def test_whatever_ends_the_loop_first_the_farewell_then_the_last_words(
     error, farewell_works, raised, monkeypatch
 ):

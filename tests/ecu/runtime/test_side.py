@@ -62,6 +62,7 @@ def test_its_words_and_its_silence(side, words, seconds, kept):
     assert side.look(int((100 + seconds) * S)) is kept
 
 
+@pytest.mark.requirement("REQ-PROC-2")
 def test_when_all_of_them_are_gone_nothing_is_kept(side):
     side.says(READY)
     side.await_ready()

@@ -65,6 +65,7 @@ def listened(*heard_ms: int) -> list[int]:
     ],
     ids=["dies", "lives", "never heard", "stumbles", "comes back"],
 )
+@pytest.mark.requirement("REQ-TWO-4")
 def test_it_speaks_when_the_first_one_was_silent_for_50_ms(heard, first, last):
     spoken = listened(*heard)
     assert (spoken[:1], spoken[-1:]) == ([first] if first is not None else [], [last] if last else [])
@@ -173,6 +174,7 @@ def garbage(draw, count):
     return list(frames)
 
 
+@pytest.mark.requirement("REQ-TWO-6")
 def test_garbage_with_our_identifiers_silences_neither_a_newcomer_nor_a_standby(tmp_path):
     now, draw = [0], random.Random(6)
     clock = TimeSource(lambda: now[0], lambda: now[0], lambda until_ns: now.__setitem__(0, until_ns))
@@ -226,6 +228,7 @@ CLAIMS = {
 
 
 @pytest.mark.parametrize(("foreign", "missed", "cycle"), CLAIMS.values(), ids=CLAIMS)
+@pytest.mark.requirement("REQ-TWO-2")
 def test_who_spoke_first_goes_on_and_a_newcomer_yields(foreign, missed, cycle):
     assert yields_after(foreign, missed) == cycle
 
@@ -242,6 +245,7 @@ HELD_UP = {
 
 
 @pytest.mark.parametrize(("cycle", "yields"), HELD_UP.values(), ids=HELD_UP)
+@pytest.mark.requirement("REQ-TWO-2")
 def test_one_that_stood_still_while_another_spoke_yields_at_once(cycle, yields):
     claim = new_record(CLAIM)[0]
     assert not any(claim_is_lost(claim, 0, 0) for _ in range(1000))
@@ -249,6 +253,7 @@ def test_one_that_stood_still_while_another_spoke_yields_at_once(cycle, yields):
 
 
 @pytest.mark.parametrize("apart", [0, 1, 7, 50])
+@pytest.mark.requirement("REQ-TWO-5")
 def test_of_two_that_began_together_one_speaks_before_long(tmp_path, apart):
     """Eight seeds of the draw; `apart`: cycles between their starts."""
     longest = 0

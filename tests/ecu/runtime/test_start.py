@@ -29,6 +29,7 @@ def test_each_compilation_is_told_before_it_begins():
     assert (told, counter.count) == ([0, 1], 2)
 
 
+@pytest.mark.requirement("REQ-LOOP-6")
 def test_a_signal_ends_what_compiles_at_once_and_nobody_s_business_else():
     script = (
         "import ctypes, os, signal\n"

@@ -43,6 +43,7 @@ def get(server, address="127.0.0.1", **headers):
         ("", 403),
     ],
 )
+@pytest.mark.requirement("REQ-PROC-5")
 def test_only_this_machine_s_own_names_are_answered(server, host, status):
     assert get(server, Host=host)[0] == status
 

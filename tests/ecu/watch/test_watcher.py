@@ -91,6 +91,7 @@ def test_two_daemons_and_no_name(loop, clock):
     assert kept
 
 
+@pytest.mark.requirement("REQ-PROC-4")
 def test_the_ring_is_only_read(loop, clock):
     """Neither lock nor page of it changes hands."""
     watcher, one = Watcher(None, clock), loop()
