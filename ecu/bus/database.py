@@ -13,6 +13,8 @@ from ecu.bus.database_mistakes import Mistake, parse, syntax_fault
 from ecu.errors import Mistakes, UserError, closest
 
 LONGEST_PAYLOAD: Final = 64  # bytes, CAN FD
+ANYBODY: Final = 0xFE
+"""J1939's null address, as source in a database."""
 SHOWN: Final = 6  # suggested names
 KINDS: Final = ".dbc, .arxml, .kcd, .sym"
 BEGINNING: Final = {"0", "7"}  # start position of a PDU that begins with its frame, little- and big-endian
@@ -129,6 +131,24 @@ def find_message(database: Database, name: str, where: Path, key: str) -> Messag
         names = [message.name for message in database.messages]
         remedy = f"the database has no message {name}{_choice(name, names)}"
         raise UserError(str(where), key, remedy) from None
+
+
+def set_sender(message: Message, source: int | None, priority: int | None, where: Path, key: str) -> None:
+    """Give a J1939 message the source address and priority of `key` of the file `where`, where there are any.
+
+    Raises UserError for an identifier of 11 bits, and for a J1939 message that nobody in particular sends.
+    """
+    anybody = message.protocol == "j1939" and message.frame_id & 0xFF == ANYBODY
+    if source is None and anybody:
+        remedy = "missing, and the database leaves the sender open (FE); give its address"
+        raise UserError(str(where), f"{key}.source", remedy)
+    if (source, priority) != (None, None) and not message.is_extended_frame:
+        remedy = f"source and priority are of 29 bits (J1939), {message.name} has 11; remove them"
+        raise UserError(str(where), key, remedy)
+    if source is not None:
+        message.frame_id = message.frame_id & ~0xFF | source
+    if priority is not None:
+        message.frame_id = message.frame_id & ~(7 << 26) | priority << 26
 
 
 def find_signal(message: Message, name: str, path: Path, where: Path, key: str) -> Any:

@@ -13,6 +13,8 @@ ford_accel_data  0x092: byte 6 = 0x16 − (b0 + … + b5 + b7)
 toyota           last byte = identifier's bytes + length + all other bytes
 hyundai_sum      last byte = sum of all other bytes (0x153)
 hyundai_xor      high nibble of the last byte = XOR of all other nibbles (0x2B0)
+j1939            SAE J1939-71, SPN 3188 of XBR: high nibble of the last byte = (s >> 4) + s, s the sum of
+                 all other bytes, of the counter in its low nibble and of the identifier's four bytes
 
 Each maker's rule holds for every frame of the recorded drives that the tests read.
 """
@@ -24,7 +26,7 @@ from numpy.typing import NDArray
 
 from ecu.jit import kernel
 
-NO_CHECKSUM, AUTOSAR_P01, FORD_BRAKE_SN_4, FORD_ACCEL_DATA, TOYOTA, HYUNDAI_SUM, HYUNDAI_XOR = range(7)
+NO_CHECKSUM, AUTOSAR_P01, FORD_BRAKE_SN_4, FORD_ACCEL_DATA, TOYOTA, HYUNDAI_SUM, HYUNDAI_XOR, J1939 = range(8)
 RULES: Final = {
     "autosar_p01": AUTOSAR_P01,
     "ford_brake_sn_4": FORD_BRAKE_SN_4,
@@ -32,6 +34,7 @@ RULES: Final = {
     "toyota": TOYOTA,
     "hyundai_sum": HYUNDAI_SUM,
     "hyundai_xor": HYUNDAI_XOR,
+    "j1939": J1939,
 }
 SHORTEST: Final = {"autosar_p01": 2, "ford_brake_sn_4": 4, "ford_accel_data": 8}
 """The payload that a rule needs at least [bytes], 2 where not listed."""
@@ -74,7 +77,7 @@ def checksum_place(rule: int, length: int) -> int:
         return 2
     if rule == FORD_ACCEL_DATA:
         return 6
-    if rule in (TOYOTA, HYUNDAI_SUM, HYUNDAI_XOR):
+    if rule in (TOYOTA, HYUNDAI_SUM, HYUNDAI_XOR, J1939):
         return length - 1
     return 0
 
@@ -104,6 +107,12 @@ def _checked_byte(rule: int, data: NDArray[np.uint8], length: int, can_id: int, 
         for i in range(place):
             total ^= int(data[i]) ^ (int(data[i]) >> 4)
         return (((total ^ low) & 0xF) << 4) | low
+    if rule == J1939:
+        low = int(data[place]) & 0xF
+        total = low + (can_id >> 24) + ((can_id >> 16) & 0xFF) + ((can_id >> 8) & 0xFF) + (can_id & 0xFF)
+        for i in range(place):
+            total += int(data[i])
+        return ((((total >> 4) + total) & 0xF) << 4) | low
     return int(data[place])
 
 

@@ -14,7 +14,7 @@ from cantools.database.errors import Error as DatabaseError
 
 from ecu.bus import e2e
 from ecu.bus.bits import FLOAT32, first_bit
-from ecu.bus.database import LONGEST_PAYLOAD, find_message, find_signal, read_database
+from ecu.bus.database import LONGEST_PAYLOAD, find_message, find_signal, read_database, set_sender
 from ecu.bus.plan import not_available_code, signal_row
 from ecu.bus.protection import Protection
 from ecu.bus.receive_plan import ReceivePlan
@@ -124,6 +124,7 @@ def _sent_message(
     outputs: dict[str, MappedOutput],
 ) -> SentMessage:
     key = f"messages.{message.name}"
+    set_sender(message, settings.source, settings.priority, path, key)
     if message.length > LONGEST_CLASSICAL and message.length not in FD_LENGTHS:
         lengths = ", ".join(map(str, FD_LENGTHS))
         raise UserError(
@@ -254,7 +255,7 @@ def _refuse_shared_bits(
     taken: dict[tuple[int, int], str] = {}
     if protection.rule != e2e.NO_CHECKSUM:
         byte = e2e.checksum_place(protection.rule, message.length)
-        first = 4 if protection.rule == e2e.HYUNDAI_XOR else 0
+        first = 4 if protection.rule in (e2e.HYUNDAI_XOR, e2e.J1939) else 0
         taken |= {(byte, bit): "the checksum" for bit in range(first, 8)}
     if protection.counter is not None:
         if taken.keys() & _bits(protection.counter):

@@ -13,7 +13,7 @@ from cantools.database import Database, Message
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ecu.bus import e2e
-from ecu.bus.database import find_message, find_signal, read_database
+from ecu.bus.database import find_message, find_signal, read_database, set_sender
 from ecu.bus.freshness import input_freshness
 from ecu.bus.plan import SignalUse
 from ecu.bus.protection import Protection
@@ -126,6 +126,10 @@ class MappedMessage(_Table):
     """Of the rule autosar_p01."""
     counter: Counter | None = None
     """Its frame counter."""
+    source: Annotated[int, Field(ge=0, le=253), Unit("-")] | None = None
+    """J1939: address of its sender, instead of that in the database's identifier."""
+    priority: Annotated[int, Field(ge=0, le=7), Unit("-")] | None = None
+    """J1939: instead of that in the database's identifier."""
     constants: Annotated[dict[str, int], Unit("-")] = {}
     """Raw codes of other signals, by name, in a message that is sent."""
 
@@ -241,6 +245,7 @@ def _message_use(
     message = find_message(database, name, path, f"inputs.{first}.message")
     settings = signal_map.messages.get(name, MappedMessage())
     key = f"messages.{name}"
+    set_sender(message, settings.source, settings.priority, path, key)
     period_s = period_of(path, message, settings, key)
     signals = [
         _signal_use(path, database_path, signal_map, message, f"inputs.{target}", target, mapped)

@@ -42,7 +42,7 @@ def _ask(
         ("brake-ecu r", {"run", "rig", "replay", "report"}),
         ("brake-ecu run --config s", {"suv", "sedan", "suv-blended"}),
         ("brake-ecu run --log-format ", {"console", "json"}),
-        ("brake-ecu replay a.log --map ", {"kona", "mustang", "rav4"}),
+        ("brake-ecu replay a.log --map ", {"kona", "mustang", "rav4", "van"}),
         ("brake-ecu replay a.log --observer o", {"observer1", "observer2"}),
         ("brake-ecu replay a.log --config nosuch --observer j", {"joint"}),
         ("brake-ecu simulate stop-", {"stop-1", "stop-2", "stop-3", "stop-4"}),

@@ -200,3 +200,28 @@ def test_without_a_rule_nothing_is_protected(data: bytes) -> None:
     payload = np.frombuffer(data, np.uint8).copy()
     protect(protection.NO_CHECKSUM, payload, 8, 0x50, 0)
     assert payload.tobytes() == data
+
+
+BRAKE_REQUEST = 0x0C040B2A
+# Sum of 7F 65 E4 and four FF: 1476; of the identifier's bytes: 69; counter. Example: 1476 + 69 + 5 = 1550,
+# 1550 >> 4 = 96, 96 + 1550 = 1646, whose last four bits are E.
+REQUESTS = [(0, 0x90), (5, 0xE5), (6, 0xF6), (7, 0x17), (15, 0x9F)]
+
+
+@pytest.mark.parametrize(("counter", "last"), REQUESTS)
+def test_the_checksum_of_j1939_s_brake_request_by_hand(counter: int, last: int) -> None:
+    data = np.frombuffer(bytes.fromhex("7F65E4FFFFFFFF") + bytes([0xF0 | counter]), np.uint8).copy()
+    protection.protect(protection.J1939, data, 8, BRAKE_REQUEST, 0)
+    assert data[7] == last
+    assert data[:7].tobytes() == bytes.fromhex("7F65E4FFFFFFFF")
+
+
+def test_no_flipped_bit_and_no_other_sender_passes_the_checksum_of_j1939() -> None:
+    data = np.frombuffer(bytes.fromhex("7F65E4FFFFFFFFE5"), np.uint8).copy()
+    assert protection.checksum_holds(protection.J1939, data, 8, BRAKE_REQUEST, 0)
+    for bit in range(64):
+        data[bit // 8] ^= 1 << bit % 8
+        assert not protection.checksum_holds(protection.J1939, data, 8, BRAKE_REQUEST, 0), bit
+        data[bit // 8] ^= 1 << bit % 8
+    for bit in range(29):
+        assert not protection.checksum_holds(protection.J1939, data, 8, BRAKE_REQUEST ^ 1 << bit, 0), bit
