@@ -52,6 +52,14 @@ def test_near_another_signal_of_another_rate(by: float, unit: str, near: bool) -
         SPEED.between(0.0, 0.03).near(other, by, unit)
 
 
+def test_a_temperature_has_another_zero_and_its_difference_none() -> None:
+    disc = Signal("disc_temperature_fl", "degC", np.zeros(1), np.array([100.0]))
+    disc.within(373.0, 373.3, "K")
+    disc.near(98.0, 2.0, "K")
+    with pytest.raises(AssertionError, match=r"is 373\.1 K at t = 0\.00 s, not within 374 to 400 K"):
+        disc.within(374.0, 400.0, "K")
+
+
 def test_a_unit_that_is_another_quantity_is_refused() -> None:
     with pytest.raises(UserError, match='"bar" does not turn into m/s'):
         SPEED.within(0.0, 1.0, "bar")
