@@ -187,12 +187,7 @@ def replay(
     ] = False,
     stood: Annotated[
         float | None,
-        typer.Option(
-            "--stood",
-            metavar="HOURS",
-            min=0.0,
-            help="Time for which the car stood before: the discs have cooled. Default: unknown",
-        ),
+        typer.Option("--stood", metavar="HOURS", min=0.0, help="Time for which the car stood: discs cooled"),
     ] = None,
 ) -> int:
     """Replay a recorded drive through the ECU. Write results."""
