@@ -9,10 +9,11 @@ Lining friction is uncertain, so none of the three alone guarantees the order in
 functions do (ECE R13-H, Annex 5: the rear uses no more grip than the front):
 
 - `watch_trailing`: where a rear wheel slips more than the front one of its side by more than
-  `rear_slip_margin`, and the more than `LEAST_SLIP` by the car's speed, torque of the rear axle moves to the
-  front one until it no longer does: a front wheel whose speed is late or scaled alone takes nothing. This
-  needs no friction estimate. Beside a front wheel whose brake has failed it may slip `LONE_SLIP`. The front
-  takes all of it up to `GRIP` of its load, beyond that slowly; none from when it slips more than `GRIP_SLIP`.
+  `rear_slip_margin`, and by the car's speed `LEAST_SLIP` more than tyres do at the deceleration measured,
+  torque of the rear axle moves to the front one until it no longer does. A front wheel counts as no faster
+  than the ground: one whose speed is late or scaled alone takes nothing. This needs no friction estimate.
+  Beside a front wheel whose brake has failed it may slip `LONE_SLIP`. The front takes all of it up to `GRIP`
+  of its load, beyond that slowly; none from when it slips more than `GRIP_SLIP`.
 - `cap_trailing`: compensation raises the rear's pressure relative to the front's only as far as the estimate
   is certain, with the rear at mu + 2 sigma and the front at mu - 2 sigma.
 
@@ -54,7 +55,7 @@ SMOOTHING = 0.2  # per sample: 50 ms; leaves a fifth of the wheel speeds' noise
 LEARNING_TIME = 2.0  # s
 RADIUS_DOUBT = 0.008  # before learning: radii within 0.3 % and other differences, two standard deviations
 FREE_ACCEL, FREE_YAW_RATE = 0.5, 0.03  # m/s^2, rad/s
-LEAST_SLIP = 0.012  # of a trailing wheel that may lock: tyres peak at 0.03 on ice
+LEAST_SLIP = 0.012  # of a trailing wheel that may lock, beyond that of its force: tyres peak at 0.03 on ice
 RULED_FROM = 0.15  # z above which Annex 5 orders the axles
 FASTEST = 1.02  # of the ground below it
 GRIP, GRIP_RATE = 0.6, 0.5  # force over load taken over at once, 1/s beyond it
@@ -131,11 +132,16 @@ def watch_trailing(
     brakes = decel > 0.0
     free = not brakes and abs(estimate.accel_x) < FREE_ACCEL and abs(estimate.yaw_rate) < FREE_YAW_RATE
     worst, trailing = 0.0, 1.0 if speed > 0.0 else -1.0
+    used = min(max(-trailing * estimate.accel_x, 0.0), max(decel, 0.0)) / GRAVITY
     for side in range(2):
         front = rear = math.nan
         if abs(speed) > params.min_speed:
             front = _rolled(params, inputs, estimate, speed, side)
             rear = _rolled(params, inputs, estimate, speed, side + 2)
+        if brakes and trailing > 0.0:
+            front = min(front, 1.0)
+        elif brakes:
+            rear = min(rear, 1.0)
         beyond = front - rear
         if math.isnan(beyond):
             state.beyond[side] = 0.0
@@ -152,7 +158,7 @@ def watch_trailing(
             doubt += RADIUS_DOUBT
         leading = side if trailing > 0.0 else side + 2
         margin = LONE_SLIP if failed[leading] else params.rear_slip_margin
-        if state.slip[side] > LEAST_SLIP:
+        if state.slip[side] > LEAST_SLIP + used / params.slip_stiffness[leading]:
             worst = max(worst, state.beyond[side] - margin - doubt)
     change = -TAKE_BACK * worst if worst > 0.0 else GIVE_BACK
     state.trailing = min(max(state.trailing + change * dt, LEAST_TRAILING), 1.0) if brakes else 1.0

@@ -171,12 +171,16 @@ class Watch:
         params["rear_slip_margin"] = 0.005
         self.state["free_s"] = learned
 
-    def run(self, slip, seconds=0.1, decel=5.0, speed=20.0, noise=0.0, lost=None, reckoned=0.0) -> float:
+    def run(
+        self, slip, seconds=0.1, decel=5.0, speed=20.0, noise=0.0, lost=None, reckoned=0.0, accel=None
+    ) -> float:
         """Return what the trailing axle is left after some time with a constant slip [%] of fl, fr, rl, rr.
 
         Wheel speeds carry no sign, as most sensors of them."""
         random = np.random.default_rng(0)
         p = self.params
+        if accel is not None:
+            self.estimate["accel_x"] = accel
         radius = [
             rolling_radius(*of)
             for of in zip(self.estimate["load"], p["unloaded_radius"], p["vertical_stiffness"], strict=True)
@@ -197,6 +201,7 @@ def watch(params, state, feed) -> Watch:
 
 LEAST = (LEAST_TRAILING, LEAST_TRAILING)
 EQUAL, WORSE, BEYOND = (-3, -3, -3, -3), (-3, -3, -6, -6), (-3, -3, -4.5, -4.5)
+BY_4 = {"decel": 4.0, "accel": -4.0}
 WATCHED = [
     # case, slip fl fr rl rr [%], other, what the rear is left after a second
     ("equal slip", EQUAL, {}, (1.0, 1.0)),
@@ -210,6 +215,11 @@ WATCHED = [
     ("rear locked", (-3, -3, -100, -100), {"seconds": 0.05}, LEAST),
     ("the front reads 3 % fast, it is late: the rear hardly slips", (2, 2, -1, -1), {}, (1.0, 1.0)),
     ("the same, a speed by which the rear slips", (0, 0, -1, -1), {"reckoned": 20.4}, LEAST),
+    ("a late front beside a rear that slips as its force needs", (3, 3, -1.6, -1.6), BY_4, (1.0, 1.0)),
+    ("rear 1 % beyond that and the front", (-2, -2, -3.7, -3.7), BY_4, LEAST),
+    ("an accelerometer that reads more than is asked for", (-3, -3, -6, -6), {"accel": -30.0}, LEAST),
+    ("one that reads no braking", (-3, -3, -4.5, -4.5), {"accel": 4.0}, LEAST),
+    ("backwards, a late rear", (-1.6, -1.6, 1.9, 1.9), BY_4 | {"accel": 4.0, "speed": -8.0}, (1.0, 1.0)),
     ("a reckoning that is too slow hides nothing", BEYOND, {"reckoned": 15.0}, LEAST),
     ("both locked", (-100, -100, -100, -100), {}, (1.0, 1.0)),
     ("the front drives", (0.3, 0.3, 0.1, 0.1), {}, (1.0, 1.0)),
