@@ -5,8 +5,9 @@
 
 of the blocks of 0.1 s that `acceleration.py` gathers. The first is a Kalman filter of two states: a slope
 does not come and go with the brakes. An error beyond its doubt is taken off the reading; one within is left
-to the observer. A zero b that c does not show is no zero of the accelerometer (`motors.py`). A reading that
-is off by more than `GROSS` is not followed: it is implausible as a whole.
+to the observer. A zero moves b and c alike: c by what it is apart from the slope, its mean while b was within
+its doubt. A b that c does not show is no zero of the accelerometer (`motors.py`). A reading that is off by
+more than `GROSS` is not followed: it is implausible as a whole.
 """
 
 import math
@@ -26,6 +27,8 @@ ACCEL_ERROR_STATE = np.dtype(
         ("scale", "f8"),  # s
         ("p", "f8", (3,)),  # variances of both, covariance
         ("zero", "f8"),  # b [m/s^2]
+        ("slope", "f8"),  # c while b was within its doubt, mean of the last `SLOPE_S` [m/s^2]
+        ("sloped_s", "f8"),  # learning time of that, at most `SLOPE_S`
         ("coasted_s", "f8"),  # learning time of that, at most `ZERO_S`
         ("proven_s", "f8"),  # time for which the motors' torques alone have driven the car, at most `SURE_S`
         ("zero_off", "f8"),  # taken off the reading [m/s^2]
@@ -54,6 +57,7 @@ PROVING, ENGINE = 1.0, 0.2  # m/s^2; of it, what an unreported engine exceeds
 PROVEN_S, SURE_S, REFUTES = 0.5, 3.0, 5.0  # s, s; times as fast as it is proven
 CONFIRMED = 0.5  # of the zero, what the wheels must show of it too
 KEPT = 0.4
+SLOPE_S = 20.0
 SAME_S = 0.6  # the blocks whose deceleration is compared
 CHANGED = 1.0  # m/s^2, of the wheels' deceleration meanwhile
 
@@ -115,6 +119,13 @@ def _follow_zero(params: Record, state: Record, mean: Record) -> None:
 
 
 @kernel
+def moved_offset(state: Record) -> float:
+    """Return what the wheels show of a zero of the accelerometer [m/s^2]: c less the slope."""
+    moved: float = state.offset - state.slope
+    return moved
+
+
+@kernel
 def follow_accel_error(
     params: Record, state: Record, witness: Record, blocks: Record, across: float, braking: bool
 ) -> None:
@@ -138,7 +149,10 @@ def follow_accel_error(
     compare(witness, ACCEL_X, state.scale * LEAST_SHOWN, doubt * LEAST_SHOWN)
     state.scale_off = _off(state.scale, doubt, state.scale_off)
     if state.coasted_s > FEWEST_S:
-        confirmed = state.offset / state.zero > CONFIRMED if state.zero != 0.0 else False
+        if abs(state.zero) < ZERO_DOUBT:
+            state.sloped_s = min(state.sloped_s + BLOCK_S, SLOPE_S)
+            state.slope += (state.offset - state.slope) * BLOCK_S / state.sloped_s
+        confirmed = moved_offset(state) / state.zero > CONFIRMED if state.zero != 0.0 else False
         state.zero_off = _off(state.zero, ZERO_DOUBT, state.zero_off) if confirmed else 0.0
         if confirmed:
             compare(witness, ACCEL_X, state.zero, ZERO_DOUBT)

@@ -16,11 +16,12 @@ before them; the tolerance grows with the noise of the sensors and with the rang
 with least = max(LEAST, NOISE sigma), sigma of a - w by the configured noise of the sensors.
 
 A reading beyond any road (`SLOPE`) that the torques contradict for a second is wrong as well, regardless of
-its history. From then on it is not used until it agrees with the wheels or with the torques as before, the
-longer the more often it has been wrong, or the car is at standstill, on an unknown slope. Where the drive
-torque is unreported or uncertain, the torques neither contradict nor confirm: a reading beyond any road by
-the wheels alone is doubted until it no longer is. No verdict is given while wheels slide or ABS or ESP act. A
-constant or slowly growing bias is not detected.
+its history. From then on it is not used until it agrees with the wheels or with the torques as before, or
+with the wheels on the slope that was known (one that was late agreed with nothing just before), the longer
+the more often it has been wrong, or the car is at standstill, on an unknown slope. Where the drive torque is
+unreported or uncertain, the torques neither contradict nor confirm: a reading beyond any road by the wheels
+alone is doubted until it no longer is. No verdict is given while wheels slide or ABS or ESP act. A constant
+or slowly growing bias is not detected.
 
 Assumption: all constants; found with the simulated vehicle, whose sound sensor stays below a third of `LEAST`
 in all shipped scenarios.
@@ -62,6 +63,7 @@ ACCELERATION_STATE = np.dtype(
         ("agreed", "i8"),  # consecutive blocks that agree again
         ("times", "i8"),  # that it has become implausible, at most `OFTEN`
         ("usual", "f8"),  # a - w before the jump [m/s^2]
+        ("usual_slope", "f8"),  # the same by `accel_error.py` [m/s^2]
         ("usual_force", "f8"),  # a - f before the jump [m/s^2]
         ("implausible", "u1"),
     ],
@@ -201,7 +203,7 @@ def _agrees(state: Record, witness: Record) -> bool:
     against_force = _now(mean, A) - _now(mean, F)
     by_force = state.known_blocks >= SECOND and abs(against_force - state.usual_force) < least
     by_wheels: bool = compare(witness, ACCEL_X, against_wheels - state.usual, least) < 1.0
-    return by_force or by_wheels
+    return by_force or by_wheels or abs(against_wheels - state.usual_slope) < least
 
 
 @kernel
@@ -237,7 +239,7 @@ def _beyond_any_road(state: Record, witness: Record) -> bool:
 
 
 @kernel
-def _judge(state: Record, witness: Record) -> None:
+def _judge(state: Record, witness: Record, slope: float) -> None:
     """Compare the last blocks with those before, or with the values before the sensor jumped."""
     mean = state.mean
     if state.implausible:
@@ -253,6 +255,7 @@ def _judge(state: Record, witness: Record) -> None:
     jumped = state.known_blocks >= 8 and _jumped(state, witness)
     if jumped or state.beyond >= SECOND:
         state.implausible, state.agreed, state.times = 1, 0, min(state.times + 1, OFTEN)
+        state.usual_slope = slope
         state.usual = _usually_beside_wheels(mean, W) if jumped else 0.0
         state.usual_force = _before(mean, A) - _before(mean, F) if jumped else 0.0
 
@@ -265,6 +268,7 @@ def watch_acceleration(
     inputs: Record,
     estimate: Record,
     base: Record,
+    slope: float,
     braking: bool,
     dt: float,
 ) -> None:
@@ -277,6 +281,7 @@ def watch_acceleration(
         inputs: `INPUTS`.
         estimate: `ESTIMATE` of the last cycle.
         base: friction at the start of this application, shape (4,).
+        slope: of the road with the accelerometer's zero [m/s^2].
         braking: a brake application lasts.
         dt: time since the last cycle [s].
     """
@@ -290,4 +295,4 @@ def watch_acceleration(
     state.time += dt
     if state.time > BLOCK_S - 0.001:
         _close_block(params, state)
-        _judge(state, witness)
+        _judge(state, witness, slope)

@@ -34,6 +34,7 @@ MOTORS_WATCH_STATE = np.dtype(
 LAG = 0.2  # s
 LEAST_SPEED = 5.0  # m/s
 ACCEL, MOTORS, LININGS = 0.25, 0.1, 0.4  # m/s^2; of the force by motors, by linings
+DRIVE = 0.2  # of what motors drive by, that is error of the mass too
 EXPLAINS = 0.3  # of the error, what a single motor that lies leaves
 DOUBT_S = 0.5
 DRIVEN, AGAIN, AGAIN_SHARE = 1.0, 0.1, 0.08  # m/s^2, m/s^2, of it
@@ -61,7 +62,7 @@ def watch_motors(
         inputs: `INPUTS` as received.
         estimate: `ESTIMATE` of the last cycle.
         base: friction at the start of this application, shape (4,).
-        accel_offset: zero of the accelerometer and slope, by the wheels [m/s^2].
+        accel_offset: zero of the accelerometer by the wheels [m/s^2].
         dt: time since the last cycle [s].
     """
     speed, gain = estimate.speed, lag_gain(dt, LAG)
@@ -74,6 +75,7 @@ def watch_motors(
         motor = motor_torque(inputs, i) / lever
         error += motor + lining
         doubt += LININGS * lining
+        doubt += DRIVE * max(-motor, 0.0)
         state.decel[i] += gain * (motor - state.decel[i])
     state.error += gain * (error - state.error)
     state.doubt += gain * (doubt - state.doubt)
@@ -84,8 +86,9 @@ def watch_motors(
     if not (moves and usable(inputs, ACCEL_X)) or others_brake(inputs):
         return
     driven = -(state.decel[0] + state.decel[1] + state.decel[2] + state.decel[3])
-    if driven > DRIVEN:
-        _believe_again(witness, abs(apart) < AGAIN + AGAIN_SHARE * driven, dt)
+    explained = abs(apart) < AGAIN + AGAIN_SHARE * driven
+    if driven > DRIVEN and (explained or driver_accelerates(inputs)):
+        _believe_again(witness, explained, dt)
     elif not driver_accelerates(inputs):
         _judge_motors(params, state, witness, inputs, apart, dt)
 

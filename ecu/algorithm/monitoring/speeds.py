@@ -13,6 +13,8 @@ The vehicle speed is judged where it is slower than the wheels and nothing drive
 while they roll freely, or while dead reckoning agrees with them. A constant error of less than
 `FARTHEST_BASE` is another radius.
 
+An input that is late by the braking of the car (`lateness.py`) is judged by that alone.
+
 Braked wheels that slip together leave the car. Dead reckoning does not follow a median that is more than
 `LEAVES` below it, but the vehicle speed where the two agree, and stands for the median. For `SPIN_UP_S` more
 no wheel is judged as one that rolls freely, or as too slow.
@@ -23,6 +25,13 @@ import math
 import numpy as np
 
 from ecu.algorithm.inputs import OVERSLEPT_S, driver_accelerates, motor_torque, usable
+from ecu.algorithm.monitoring.lateness import (
+    LATENESS_STATE,
+    begin_lateness,
+    follow_lag,
+    judge_lag,
+    tyre_slip,
+)
 from ecu.algorithm.monitoring.witness import judge
 from ecu.algorithm.vehicle import corner_speed
 from ecu.contract.signals import ACCEL_X, VEHICLE_SPEED, VEHICLE_SPEED_VALID, WHEEL_SPEED
@@ -36,12 +45,14 @@ SPEEDS_STATE = np.dtype(
         ("sorted", "f8", (WITNESSES,)),
         ("apart", "f8", (5,)),  # excess of an input over the median or reckoning, relative, low-passed
         ("base", "f8", (5,)),  # the same while rolling: error of the radius
+        ("torque", "f8", (4,)),  # of the linings, low-passed [N m]
         ("spins_s", "f8", (4, 2)),  # time for which a wheel that was braked, or driven, may still slide
         ("left_s", "f8"),  # the same of all that slid together
         ("rolled_s", "f8"),  # learning time of that, at most `BASE_S`
         ("reckoned", "f8"),  # m/s
         ("slope", "f8"),  # of the road and the accelerometer's zero [m/s^2]
         ("started", "u1"),
+        ("lateness", LATENESS_STATE),
     ],
     align=True,
 )
@@ -167,8 +178,36 @@ def _slides(state: Record, i: int, apart: float, braked: bool, driven: bool, dt:
 
 
 @kernel
+def _believed(state: Record, witness: Record) -> int:
+    """Return the mask of the inputs that speak and are not rejected."""
+    mask = 0
+    for i in range(5):
+        if math.isfinite(state.told[i]) and not witness.rejected[_place(i)]:
+            mask |= 1 << i
+    return mask
+
+
+@kernel
+def _above(state: Record, witness: Record, i: int, ground: float, slip: float) -> float:
+    """Return what a wheel reads above vehicle speed and median, or the former above the wheels [m/s].
+
+    `slip` [m/s] of the wheels is allowed for.
+    """
+    told, fastest = state.told[i], max(ground + slip, state.reckoned)
+    if i < SPEED:
+        speed = state.told[SPEED]
+        if math.isfinite(speed) and not witness.rejected[VEHICLE_SPEED]:
+            fastest = max(fastest, speed)
+        return told + slip - fastest
+    for j in range(4):
+        if math.isfinite(state.told[j]) and not witness.rejected[_place(j)]:
+            fastest = max(fastest, state.told[j] + slip)
+    return told - fastest
+
+
+@kernel
 def watch_speeds(
-    params: Record, state: Record, witness: Record, inputs: Record, estimate: Record, dt: float
+    params: Record, state: Record, witness: Record, inputs: Record, estimate: Record, guarded: bool, dt: float
 ) -> None:
     """Judge wheel speeds and vehicle speed.
 
@@ -178,6 +217,7 @@ def watch_speeds(
         witness: `WITNESS_STATE`; the five inputs' fields are overwritten.
         inputs: `INPUTS` as received.
         estimate: `ESTIMATE` of the last cycle; backwards, or slower than `LEAST_SPEED`, nothing is judged.
+        guarded: the slip guard acts.
         dt: time since the last cycle [s].
     """
     if dt > OVERSLEPT_S:
@@ -186,7 +226,8 @@ def watch_speeds(
     median, accel = _median(state, witness), estimate.accel_x
     braked = accel < DRAGGED_ACCEL
     for i in range(4):
-        braked = braked or estimate.brake_torque[i] > TORQUE
+        state.torque[i] += (estimate.brake_torque[i] - state.torque[i]) * min(dt / SMOOTHING_S, 1.0)
+        braked = braked or state.torque[i] > TORQUE
     left = braked and _wheels_left(state, median)
     ground = state.reckoned if left else median
     if estimate.backwards or not ground > LEAST_SPEED:
@@ -200,7 +241,7 @@ def watch_speeds(
     state.left_s = SPIN_UP_S if left else max(state.left_s - dt, 0.0)
     free = free and state.left_s == 0.0
     for i in range(4):
-        torque = estimate.brake_torque[i] + motor_torque(inputs, i)
+        torque = state.torque[i] + motor_torque(inputs, i)
         free = free and abs(torque) < TORQUE
     state.rolled_s = min(state.rolled_s + dt, BASE_S) if free else state.rolled_s
     found = state.rolled_s >= FOUND_S
@@ -208,12 +249,18 @@ def watch_speeds(
     if free and found:
         tolerance = ROLLING + ROLLING_ACROSS * abs(estimate.accel_y)
         tolerance += (ABSOLUTE + LAG_S * abs(accel)) / ground
+    lateness = state.lateness
+    believed, slides = _believed(state, witness), guarded or state.left_s > 0.0
+    shows = begin_lateness(lateness, believed, accel, estimate.accel_y, slides, dt)
+    slip = tyre_slip(params, accel) * ground
     for i in range(5):
         if math.isnan(state.told[i]):
             continue
+        if shows:
+            follow_lag(lateness, i, _above(state, witness, i, ground, slip), accel, ground, dt)
         told = state.told[i] / (1.0 - state.base[i])
         state.apart[i] += (told / ground - 1.0 - state.apart[i]) * min(dt / SMOOTHING_S, 1.0)
-        braking, motor = estimate.brake_torque[i % 4], motor_torque(inputs, i % 4)
+        braking, motor = state.torque[i % 4], motor_torque(inputs, i % 4)
         braked, driven = False, accelerates or motor < -TORQUE
         if i < SPEED:
             braked = braking + motor > TORQUE or accel < DRAGGED_ACCEL or state.left_s > 0.0
@@ -222,7 +269,8 @@ def watch_speeds(
             apart = math.nan
         place = _place(i)
         unit = ground / params.wheel_radius[i] if i < SPEED else ground
-        judge(witness, place, apart * unit, tolerance * unit, DOUBT_S, dt)
+        if not judge_lag(lateness, witness, i, place, unit / ground, dt):
+            judge(witness, place, apart * unit, tolerance * unit, DOUBT_S, dt)
         if free and not witness.rejected[place] and abs(apart) < tolerance:
             base = state.base[i] + (state.apart[i] - state.base[i]) * dt / max(state.rolled_s, dt)
             state.base[i] = min(max(base, -FARTHEST_BASE), FARTHEST_BASE)

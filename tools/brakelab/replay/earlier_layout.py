@@ -48,6 +48,8 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "beyond_grip",
         "cos_steering",
         "sin_steering",
+        "lateness",
+        "usual_slope",
     ),
 }
 

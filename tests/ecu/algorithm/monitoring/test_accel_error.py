@@ -60,7 +60,9 @@ class Car:
             self.estimate["speed"] = speed
             self.estimate["brake_torque"] = np.maximum(-wheel_torque, 0.0)
             braking = force < 0.0
-            watch_acceleration(p, self.blocks, self.witness, self.inputs[0], self.estimate, base, braking, DT)
+            watch_acceleration(
+                p, self.blocks, self.witness, self.inputs[0], self.estimate, base, 0.0, braking, DT
+            )
             watch_frozen(self.state, self.blocks, self.witness, self.inputs[0], DT)
             if self.blocks["time"] == 0.0:
                 follow_accel_error(p, self.state, self.witness, self.blocks, 0.0, braking)
@@ -85,3 +87,23 @@ def test_what_is_taken_off_a_reading(params, feed, case, wrong, seconds, at_rest
     print(car.state)
     assert -correct_accel(car.state, 0.0) == pytest.approx(at_rest, abs=0.1)
     assert -4.0 - correct_accel(car.state, -4.0) == pytest.approx(braked, abs=0.2)
+
+
+ON_A_SLOPE = [
+    # what begins to lie, taken off a reading of 0
+    ("the accelerometer's zero, up", {"zero": 0.5}, 0.5),
+    ("down", {"zero": -0.5}, -0.5),
+    ("the motors, by as much as the slope", {"motors": 1.3}, 0.0),
+    ("nobody", {}, 0.0),
+]
+
+
+@pytest.mark.parametrize("slope", [-0.6, 0.0, 0.6])
+@pytest.mark.parametrize(("case", "wrong", "off"), ON_A_SLOPE, ids=[c[0] for c in ON_A_SLOPE])
+def test_a_slope_is_no_zero(params, feed, slope: float, case, wrong, off: float) -> None:
+    """The wheels show it as they did before; what motors alone show is none either."""
+    car = Car(params, feed)
+    car.drive(48.0, slope=slope)
+    car.drive(40.0, **{"slope": slope} | wrong)
+    print(car.state)
+    assert -correct_accel(car.state, 0.0) == pytest.approx(off, abs=0.1)

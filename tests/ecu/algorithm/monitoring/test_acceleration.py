@@ -77,11 +77,12 @@ def drive(
     reading: Course,
     seconds: float = 6.0,
     motors: bool = True,
+    slope: float = 0.0,
     **disturbed: Any,
 ) -> list[bool]:
     """Return in which cycles the reading was implausible.
 
-    `motors`: their torque is reported; `disturbed`: inputs from `JUMP` on.
+    `motors`: their torque is reported; `slope` [m/s^2]: as it is known; `disturbed`: inputs from `JUMP` on.
     """
     rng = np.random.default_rng(7)
     p = params[0]
@@ -102,7 +103,7 @@ def drive(
         if not motors:
             inputs[0]["verdict"][MOTOR_TORQUE : MOTOR_TORQUE + 4] = 0
         estimate["speed"] = speed
-        watch_acceleration(p, state, witness, inputs[0], estimate, base, False, 0.01)
+        watch_acceleration(p, state, witness, inputs[0], estimate, base, slope, False, 0.01)
         said.append(bool(state["implausible"]))
     return said
 
@@ -123,6 +124,18 @@ def test_it_is_believed_again_when_it_reads_as_before(params, feed, back: float)
     print(f"said for {0.01 * sum(said):.2f} s, to {0.01 * gone - JUMP - back:.2f} s after the recovery")
     assert 0.01 * gone - JUMP - back == pytest.approx(0.25, abs=0.11)
     assert sum(said) == gone - said.index(True)  # once
+
+
+@pytest.mark.parametrize(("slope", "again"), [(0.0, False), (0.3, True)])
+def test_a_reading_is_believed_again_on_the_slope_that_was_known(params, feed, slope, again: bool) -> None:
+    """One that was late as the brakes came agreed with nothing just before."""
+
+    def late(t: float) -> float:
+        return 0.0 if t < JUMP else 0.6 if t < JUMP + 1.0 else 0.3
+
+    said = drive(params, feed, braked, none, none, late, slope=slope)
+    assert any(said)
+    assert said[-1] != again
 
 
 def test_it_is_believed_again_at_standstill(params, feed) -> None:

@@ -73,7 +73,7 @@ def car(params, feed) -> Car:
 
 
 ALL, ONE = CORNERS, (1.0, 1.0, 2.0, 1.0)
-BRAKES = {"decel": 0.5}
+BRAKES, DRIVER = {"decel": 0.5}, {"accelerator_position": 20.0}
 CASES = [
     # case, what the car does, seconds, left out
     ("all right", BRAKES, 20.0, ()),
@@ -91,6 +91,9 @@ CASES = [
     ("one reads twice, ABS", {"decel": 0.5, "reads": ONE, "abs_active": 1.0}, 9.0, ()),
     ("the linings' doubt", {"decel": 0.1, "lining": 1.0, "off": 1.5}, 9.0, ()),
     ("more than it", {"decel": 0.1, "lining": 0.25, "off": 1.5}, 9.0, ALL),
+    ("they drive by themselves, says their torque", {"decel": -0.5, "off": 1.5}, 9.0, ALL),
+    ("they drive a heavier car", {"decel": -0.5, "off": 0.6}, 9.0, ()),
+    ("they drive as the driver wants", DRIVER | {"decel": -0.5, "off": 1.5}, 9.0, ()),
     ("the accelerometer's zero", {"decel": 0.5, "off": 1.0, "accel_offset": -0.9}, 9.0, ()),
     ("a zero of the other sign", {"decel": 0.5, "off": 1.0, "accel_offset": 0.9}, 9.0, ALL),
     ("a greater zero takes just the error", {"decel": 0.5, "off": 1.0, "accel_offset": -9.0}, 9.0, ()),

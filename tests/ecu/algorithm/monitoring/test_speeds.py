@@ -19,7 +19,7 @@ class Road:
         self.params, self.feed, self.inputs = params[0], feed, feed()
         self.state, self.witness = np.zeros(1, SPEEDS_STATE)[0], np.zeros(1, WITNESS_STATE)[0]
         self.estimate = np.zeros(1, ESTIMATE)[0]
-        self.speed, self.reference = 25.0, reference
+        self.speed, self.reference, self.noise = 25.0, reference, 0.0  # m/s, -, N m
         self.random = np.random.default_rng(0)
 
     def drive(
@@ -28,22 +28,28 @@ class Road:
         turns=(1, 1, 1, 1, 1),
         accel: float = 0.0,
         gas: float = 0.0,
+        late=0.0,
+        guarded=False,
         overslept: float = 0.0,
     ) -> tuple[str, ...]:
-        """Return the names that are rejected at the end.
+        """Return the names that are rejected at the end; `accel` < 0 brakes all wheels, `gas` [%].
 
-        `accel` < 0 brakes all wheels, `gas` [%]; the first cycle comes `overslept` seconds late.
+        `late` [s]: of each input; `guarded`: the slip guard acts; the first cycle comes `overslept` seconds late.
         """
-        turns = np.array(turns, float)
+        turns, late = np.array(turns, float), np.broadcast_to(late, 5)
         for _ in range(round(seconds / DT)):
             self.speed += accel * DT
             self.estimate["speed"], self.estimate["accel_x"] = self.speed, accel
-            self.estimate["brake_torque"] = 800.0 if accel < -1.0 else 0.0
-            wheels = self.speed * turns[:4] / self.params["wheel_radius"]
+            braking = 800.0 if accel < -1.0 else 0.0
+            self.estimate["brake_torque"] = np.maximum(
+                braking + self.noise * self.random.standard_normal(4), 0.0
+            )
+            told = (self.speed - accel * late) * turns
+            wheels = told[:4] / self.params["wheel_radius"]
             self.feed(
                 self.inputs,
                 wheel_speed=wheels + 0.1 * self.random.standard_normal(4),
-                vehicle_speed=self.speed * turns[4] - self.params["vehicle_speed_delay"] * accel,
+                vehicle_speed=told[4] - self.params["vehicle_speed_delay"] * accel,
                 vehicle_speed_valid=1.0,
                 accelerator_position=gas,
                 accel_x=accel,
@@ -51,7 +57,9 @@ class Road:
             )
             if not self.reference:
                 self.inputs[0]["verdict"][INPUT["vehicle_speed"]] = 0
-            watch_speeds(self.params, self.state, self.witness, self.inputs[0], self.estimate, DT + overslept)
+            watch_speeds(
+                self.params, self.state, self.witness, self.inputs[0], self.estimate, guarded, DT + overslept
+            )
             overslept = 0.0
         return tuple(name for name in NAMES if self.witness["rejected"][INPUT[name]])
 
@@ -183,3 +191,54 @@ def test_two_witnesses_that_differ_judge_nobody(params, feed) -> None:
     road.inputs[0]["verdict"][INPUT["wheel_speed_fl"] : INPUT["wheel_speed_fl"] + 3] = 0
     assert road.drive(2.0, (1, 1, 1, 1, 1)) == ()
     assert road.drive(2.0, (1, 1, 1, 0.5, 1)) == ()
+
+
+LATE = [
+    # case, braking, wheels and vehicle speed over the car's, late by [s], rejected
+    ("nobody", -4.0, (0.98, 0.98, 0.98, 0.98, 1), (0, 0, 0, 0, 0), ()),
+    ("an axle by 0.2 s", -4.0, (0.98, 0.98, 0.98, 0.98, 1), (0.2, 0.2, 0, 0, 0), FRONT),
+    ("the other, that slips more", -4.0, (0.985, 0.985, 0.975, 0.975, 1), (0, 0, 0.2, 0.2, 0), REAR),
+    ("a wheel by 0.1 s", -4.0, (0.98, 0.98, 0.98, 0.98, 1), (0, 0.1, 0, 0, 0), NAMES[1:2]),
+    ("the vehicle speed", -4.0, (0.98, 0.98, 0.98, 0.98, 1), (0, 0, 0, 0, 0.2), NAMES[4:]),
+    ("by 20 ms: within the doubt", -4.0, (0.98, 0.98, 0.98, 0.98, 1), (0.02, 0.02, 0, 0, 0.02), ()),
+    ("an axle, the car rolls", -0.5, (1, 1, 1, 1, 1), (0.2, 0.2, 0, 0, 0), ()),
+]
+
+
+@pytest.mark.parametrize(("case", "accel", "turns", "late", "rejected"), LATE, ids=[c[0] for c in LATE])
+def test_who_is_late(road, case, accel, turns, late, rejected) -> None:
+    assert road.drive(4.5, turns, accel, late=late) == rejected
+
+
+def test_who_was_late_is_left_out_in_the_next_braking_from_the_first(road) -> None:
+    slips, late = (0.98, 0.98, 0.98, 0.98, 1), (0.2, 0.2, 0, 0, 0)
+    assert road.drive(4.5, slips, -4.0, late=late) == FRONT
+    assert road.drive(10.0, accel=2.0, gas=20.0, late=late) == FRONT
+    assert road.drive(0.3, slips, -4.0, late=late) == FRONT
+
+
+@pytest.mark.parametrize(("speed", "lost"), [(1.0, None), (1.0, "vehicle_speed"), (1.0, "wheel_speed_rl")])
+def test_what_is_left_out_makes_nobody_else_late(road, speed: float, lost: str | None) -> None:
+    """Without it the others' reference is another one, in the middle of a braking."""
+    slips = (0.98, 0.98, 0.98, 0.98, speed)
+    assert road.drive(2.5, slips, -4.0) == ()
+    if lost:
+        road.inputs[0]["verdict"][INPUT[lost]] = 0
+        road.reference = lost != "vehicle_speed"
+    assert road.drive(2.5, slips, -4.0) == ()
+
+
+@pytest.mark.parametrize("guarded", [False, True])
+def test_a_wheel_that_comes_back_from_a_slip_is_not_late(road, guarded: bool) -> None:
+    """By the guard, or as more than 4 % of slip become less."""
+    slid = 0.035 if guarded else 0.08
+    road.drive(0.8, (1 - slid, 0.98, 0.98, 0.98, 1), -4.0, guarded=guarded)
+    for slip in np.linspace(slid, 0.0, 30):
+        road.drive(0.1, (1 - slip, 0.98, 0.98, 0.98, 1), -4.0, guarded=guarded)
+        assert road.drive(0.0) == ()
+
+
+def test_pressures_noise_brakes_no_wheel(road) -> None:
+    """A sensor of 1.8 bar reads 100 N m now and then; the axle that is not driven is judged all the same."""
+    road.noise = 60.0
+    assert road.drive(1.5, (0.9, 0.9, 1.01, 1.01, 1), 2.0, 30.0) == FRONT
