@@ -29,6 +29,7 @@ import math
 import numpy as np
 
 from ecu.algorithm.inputs import fresh, usable
+from ecu.algorithm.monitoring.plausibility import SECOND_DIFFERENCE
 from ecu.algorithm.vehicle import corner_speed
 from ecu.contract.params import BAR
 from ecu.contract.signals import ABS_ACTIVE, CYCLE_NS, ESP_ACTIVE, WHEEL_SPEED
@@ -60,7 +61,6 @@ RETURNING = -5.0  # m/s^2
 STAYS, HALF, STEADY_S = 2.0, 0.5, 0.1  # m/s^2, slip, s
 GROWTH_LAG = 0.02  # s
 NOISE = 4.0  # sigma
-SECOND_DIFFERENCE = 1.95  # mean modulus of a second difference of white noise, over sigma: sqrt(12 / pi)
 OF_GROWTH = 0.45  # sigma of the low-passed first difference of white noise over its sigma
 QUIET = 20.0  # m/s^2 of noise that the cycle of slipping and spinning up itself shows
 NOISE_S = 0.5

@@ -27,7 +27,7 @@ ACCEL_ERROR_STATE = np.dtype(
         ("scale", "f8"),  # s
         ("p", "f8", (3,)),  # variances of both, covariance
         ("zero", "f8"),  # b [m/s^2]
-        ("slope", "f8"),  # c while b was within its doubt, mean of the last `SLOPE_S` [m/s^2]
+        ("slope", "f8"),  # c as b was found within its doubt, mean of the last `SLOPE_S` [m/s^2]
         ("sloped_s", "f8"),  # learning time of that, at most `SLOPE_S`
         ("coasted_s", "f8"),  # learning time of that, at most `ZERO_S`
         ("proven_s", "f8"),  # time for which the motors' torques alone have driven the car, at most `SURE_S`
@@ -57,7 +57,7 @@ PROVING, ENGINE = 1.0, 0.2  # m/s^2; of it, what an unreported engine exceeds
 PROVEN_S, SURE_S, REFUTES = 0.5, 3.0, 5.0  # s, s; times as fast as it is proven
 CONFIRMED = 0.5  # of the zero, what the wheels must show of it too
 KEPT = 0.4
-SLOPE_S = 20.0
+SLOPE_S = 10.0
 SAME_S = 0.6  # the blocks whose deceleration is compared
 CHANGED = 1.0  # m/s^2, of the wheels' deceleration meanwhile
 
@@ -100,7 +100,7 @@ def _follow_scale(state: Record, mean: Record) -> None:
 
 @kernel
 def _follow_zero(params: Record, state: Record, mean: Record) -> None:
-    """Low-pass the difference from the motors' force and the resistances, by its certainty."""
+    """Low-pass the difference from the motors' force and the resistances, by its certainty, and the slope."""
     speed = mean[0, W]
     resistance = params.drag_area * speed * speed / params.mass + params.rolling_resistance * GRAVITY
     innovation = mean[0, A] - mean[0, F] + resistance - state.zero
@@ -116,6 +116,9 @@ def _follow_zero(params: Record, state: Record, mean: Record) -> None:
     state.coasted_s = min(state.coasted_s + certainty * BLOCK_S, ZERO_S)
     gain = certainty * BLOCK_S / state.coasted_s
     state.zero += gain * innovation
+    if abs(state.zero) < ZERO_DOUBT:
+        state.sloped_s = min(state.sloped_s + BLOCK_S, SLOPE_S)
+        state.slope += (state.offset - state.slope) * BLOCK_S / state.sloped_s
 
 
 @kernel
@@ -149,9 +152,6 @@ def follow_accel_error(
     compare(witness, ACCEL_X, state.scale * LEAST_SHOWN, doubt * LEAST_SHOWN)
     state.scale_off = _off(state.scale, doubt, state.scale_off)
     if state.coasted_s > FEWEST_S:
-        if abs(state.zero) < ZERO_DOUBT:
-            state.sloped_s = min(state.sloped_s + BLOCK_S, SLOPE_S)
-            state.slope += (state.offset - state.slope) * BLOCK_S / state.sloped_s
         confirmed = moved_offset(state) / state.zero > CONFIRMED if state.zero != 0.0 else False
         state.zero_off = _off(state.zero, ZERO_DOUBT, state.zero_off) if confirmed else 0.0
         if confirmed:

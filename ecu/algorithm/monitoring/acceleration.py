@@ -63,7 +63,7 @@ ACCELERATION_STATE = np.dtype(
         ("agreed", "i8"),  # consecutive blocks that agree again
         ("times", "i8"),  # that it has become implausible, at most `OFTEN`
         ("usual", "f8"),  # a - w before the jump [m/s^2]
-        ("usual_slope", "f8"),  # the same by `accel_error.py` [m/s^2]
+        ("usual_slope", "f8"),  # of the road, as it was known then [m/s^2]
         ("usual_force", "f8"),  # a - f before the jump [m/s^2]
         ("implausible", "u1"),
     ],
@@ -88,15 +88,21 @@ STANDSTILL = 0.1  # m/s
 
 
 @kernel
-def _tells(params: Record, inputs: Record, speed: float) -> bool:
-    """Return whether this cycle's readings are current and the linings' pressures known."""
+def _tells(params: Record, witness: Record, inputs: Record, speed: float) -> bool:
+    """Return whether this cycle's readings are current and believed, and the linings' pressures known."""
     value = inputs.value
     oldest = 1e9 * OLDEST_S
     told = speed > LEAST_SPEED and usable(inputs, ACCEL_X) and inputs.age_ns[ACCEL_X] < oldest
     for i in range(4):
         wheel = WHEEL_SPEED + i
         rolls = abs(value[wheel] * params.wheel_radius[i] - speed) < ROLLING * speed
-        told = told and rolls and usable(inputs, wheel) and inputs.age_ns[wheel] < oldest
+        told = (
+            told
+            and rolls
+            and usable(inputs, wheel)
+            and not witness.rejected[wheel]
+            and inputs.age_ns[wheel] < oldest
+        )
         told = told and usable(inputs, CALLIPER_PRESSURE + i)
     works = others_brake(inputs) or value[REVERSE] > 0.5
     return told and not works
@@ -281,13 +287,13 @@ def watch_acceleration(
         inputs: `INPUTS`.
         estimate: `ESTIMATE` of the last cycle.
         base: friction at the start of this application, shape (4,).
-        slope: of the road with the accelerometer's zero [m/s^2].
+        slope: of the road, as it was last known [m/s^2].
         braking: a brake application lasts.
         dt: time since the last cycle [s].
     """
     if estimate.speed < STANDSTILL:
         state.implausible = 0
-    if not _tells(params, inputs, estimate.speed):
+    if not _tells(params, witness, inputs, estimate.speed):
         state.good = 0
     if not _drive_known(params, inputs):
         state.known = 0

@@ -5,7 +5,8 @@ wrong. A stuck sensor shows this as soon as the car slows down; its frames are n
 wheel slower than the car may slide, so it is not judged.
 
 A wheel speed that falls faster than the brake could cause is a sensor fault: a broken wire reads 0. It is
-masked out until it agrees with the vehicle speed again, or the car is at standstill.
+masked out until it agrees with the vehicle speed again, or the car is at standstill. One whose noise, by the
+second differences of its samples, is `NOISY` times the configured one is left out for as long as it is.
 
 A pressure follows the demands that were sent (`ecu.algorithm.hydraulics` models how) if the three others
 do. Where more than one does not, another controller brakes, or the demands are not executed: no sensor or
@@ -17,7 +18,8 @@ import math
 import numpy as np
 
 from ecu.algorithm.inputs import fresh, motor_torque, others_brake, usable
-from ecu.algorithm.monitoring.witness import compare
+from ecu.algorithm.lag import lag_gain
+from ecu.algorithm.monitoring.witness import compare, judge
 from ecu.algorithm.vehicle import corner_speed
 from ecu.contract.signals import CALLIPER_PRESSURE, WHEEL_SPEED
 from ecu.jit import Record, kernel
@@ -27,6 +29,8 @@ PLAUSIBILITY_STATE = np.dtype(
         ("for_s", "f8", (4,)),  # time for which a wheel has been too fast
         ("omega", "f8", (4,)),  # last sample of a wheel [rad/s]
         ("age_s", "f8", (4,)),  # of it
+        ("change", "f8", (4,)),  # of it from the sample before [rad/s]
+        ("jitter", "f8", (4,)),  # noise [rad/s]
         ("fell", "u1", (4,)),  # fell faster than a wheel can
         ("apart_s", "f8", (4,)),  # excess time for which a pressure deviated from its demand
         ("pressure", "u1"),  # one pressure has deviated for too long
@@ -40,6 +44,9 @@ BRAKED = 100.0  # N m
 LEAST_SPEED = 5.0  # m/s
 DOUBT_S = 0.3
 FALL, FALL_SHARE = 5.0, 1.6  # rad/s, effect of the brake torque on the free wheel
+SECOND_DIFFERENCE = 1.95  # mean modulus of a second difference of white noise, over sigma: sqrt(12 / pi)
+NOISY, NOISE_S = 6.0, 0.5  # times the configured noise; s
+JUMP = 30.0  # times that noise, of a sample: a single one says nothing
 OLDEST_S = 0.1  # age of a sample that the next is compared with
 ROLLING = 0.06  # of the speed, greatest difference of a rolling wheel
 STANDSTILL = 0.1  # m/s
@@ -94,7 +101,7 @@ def wheel_speed_implausible(
 def watch_wheels(
     params: Record, state: Record, witness: Record, inputs: Record, estimate: Record, dt: float
 ) -> None:
-    """Overwrite `state.fell`: wheels whose speed has fallen faster than a wheel's can.
+    """Overwrite `state.fell`, wheels whose speed has fallen faster than a wheel's can; judge their noise.
 
     Arguments as for `wheel_speed_implausible`.
     """
@@ -111,7 +118,13 @@ def watch_wheels(
                 state.fell[i] = 1
             elif abs(omega * params.wheel_radius[i] - ground) < ROLLING * ground:
                 state.fell[i] = 0
-            state.omega[i], state.age_s[i] = omega, 0.0
+            change = omega - state.omega[i]
+            jerk = min(abs(change - state.change[i]) / SECOND_DIFFERENCE, JUMP * params.sigma_wheel_speed)
+            state.jitter[i] += lag_gain(min(state.age_s[i], OLDEST_S), NOISE_S) * (jerk - state.jitter[i])
+            state.omega[i], state.age_s[i], state.change[i] = omega, 0.0, change
+        noise = NOISY * params.sigma_wheel_speed
+        if state.jitter[i] > noise:
+            judge(witness, WHEEL_SPEED + i, state.jitter[i], noise, DOUBT_S, dt)
         if estimate.speed < STANDSTILL:
             state.fell[i] = 0
 

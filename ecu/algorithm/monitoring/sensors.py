@@ -41,8 +41,8 @@ def _watch_motion(p: Record, s: Record, u: Record, dt: float) -> int:
     """Return the fault bits of accelerometer, motors and speeds by the torques, where these are known."""
     faults, estimate = 0, s.estimate
     braking = s.application.braking != 0
-    base, offset = s.control.base, s.accel_error.offset
-    watch_acceleration(p, s.acceleration, s.witness, u, estimate, base, offset, braking, dt)
+    base, slope = s.control.base, s.accel_error.slope
+    watch_acceleration(p, s.acceleration, s.witness, u, estimate, base, slope, braking, dt)
     watch_frozen(s.accel_error, s.acceleration, s.witness, u, dt)
     if s.acceleration.time == 0.0 and not s.witness.rejected[ACCEL_X]:
         follow_accel_error(p, s.accel_error, s.witness, s.acceleration, estimate.accel_y, braking)

@@ -49,6 +49,8 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "cos_steering",
         "sin_steering",
         "lateness",
+        "change",
+        "jitter",
         "usual_slope",
     ),
 }

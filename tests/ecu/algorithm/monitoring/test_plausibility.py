@@ -319,3 +319,29 @@ def test_what_lasts_0_3_s_is_not_said_yet(params, feed) -> None:
         watch_pressures(state, inputs[0], np.zeros(4), np.zeros(4), 0.15)
         pressures.append(bool(state["pressure"]))
     assert wheels == pressures == [False, False, True]
+
+
+JITTERS = [
+    # noise over the configured one, jumps [rad/s] each second, seconds, left out
+    (1.0, 0.0, 20.0, False),
+    (4.0, 0.0, 5.0, False),
+    (10.0, 0.0, 1.5, True),
+    (10.0, 0.0, 0.3, False),
+    (1.0, 60.0, 20.0, False),
+]
+
+
+@pytest.mark.parametrize(("noise", "jump", "seconds", "left_out"), JITTERS)
+def test_a_wheel_that_is_far_noisier_than_configured_is_left_out(
+    params, feed, noise: float, jump: float, seconds: float, left_out: bool
+) -> None:
+    """From the first sample on; a sample lost or wrong now and then is no noise."""
+    state, witness = np.zeros(1, PLAUSIBILITY_STATE)[0], np.zeros(1, WITNESS_STATE)[0]
+    inputs, random = feed(), np.random.default_rng(0)
+    sigma, radius = params[0]["sigma_wheel_speed"], params[0]["wheel_radius"]
+    for k in range(round(100 * seconds)):
+        wrong = jump if k % 100 == 50 else 0.0
+        omega = 20.0 / radius + noise * sigma * random.standard_normal(4) + wrong
+        feed(inputs, wheel_speed=omega, motor_torque=0.0, calliper_pressure=0.0)
+        watch_wheels(params[0], state, witness, inputs[0], estimated(20.0, 0.0), 0.01)
+    assert (witness["rejected"][WHEEL_SPEED : WHEEL_SPEED + 4] == left_out).all()
