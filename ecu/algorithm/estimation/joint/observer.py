@@ -119,9 +119,13 @@ def _learning_forbidden(params: Record, state: Record, inputs: Record, braking: 
 
 @kernel
 def _watch_release(state: Record, braking: bool) -> None:
-    """Restore friction to its value before the release of the brakes, which disturbs it."""
-    falling = braking and min(pressure_change(state, 0), pressure_change(state, 2)) < -RELEASE
-    if falling and not state.releasing:
+    """Restore friction to its value before the release of the brakes, which disturbs it.
+
+    Where one axle gives up its share to the other, the brakes are not released: nothing is learned meanwhile.
+    """
+    front, rear = pressure_change(state, 0), pressure_change(state, 2)
+    falling = braking and min(front, rear) < -RELEASE
+    if falling and max(front, rear) < 0.0 and not state.releasing:
         for i in range(LEVEL, LEVEL + 4):
             state.x[i] = state.kept_x[1, i]
         for i in range(CHANGE, CHANGE + 2):

@@ -380,6 +380,18 @@ def test_releasing_the_brakes_teaches_nothing(new_car, front: float, rear: float
     assert is_one_of(friction(state), known_before(rows, begun + WINDOW_S))
 
 
+@pytest.mark.parametrize(("front", "rear"), [(45.0, 12.0), (12.0, 45.0)])
+def test_an_axle_that_gives_up_its_share_is_no_release(new_car, front: float, rear: float) -> None:
+    """What was learned in the 0.4 s before it stays, as little teaches while it falls."""
+    car = new_car(seed=6, mu=0.40, speed=38.0)
+    car.drive(1.0)
+    before = car.drive(0.6, **BRAKING)["x"].copy()
+    state = car.drive(WINDOW_S, front=front, rear=rear, braking=True)
+    assert state["releasing"]
+    assert not state["free"][LEVELS].any()
+    assert state["x"][LEVELS] == pytest.approx(before[LEVELS], abs=1e-3)
+
+
 NOT_FINITE = [
     # what is not finite, and its value; times that all begins anew
     ("speed", "x", V, math.nan, 1),
