@@ -7,6 +7,7 @@ import math
 
 from ecu.algorithm.estimation.friction import update_pressure
 from ecu.algorithm.estimation.joint.ceiling import follow_ceiling
+from ecu.algorithm.estimation.joint.drive import compare_drive
 from ecu.algorithm.estimation.joint.estimates import tell_joint
 from ecu.algorithm.estimation.joint.learned import hand_over_level, keep_joint, restore_joint
 from ecu.algorithm.estimation.joint.observer import update_joint
@@ -22,7 +23,6 @@ from ecu.algorithm.estimation.joint.whole_application import (
     add_to_whole,
     apply_scale,
     begin_whole,
-    compare_drive,
     end_whole,
     forget_whole,
     keep_whole,

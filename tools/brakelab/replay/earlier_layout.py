@@ -39,6 +39,8 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "spins_s",
         "before",
         "unshown",
+        "noise_ratio",
+        "noise_count",
         "ceiling",
         "ceiling_variance",
         "measured_slip",

@@ -12,12 +12,13 @@ is the friction as learned window by window, s next to 1. Elsewhere windows teac
 configured friction, or what was learned where they did. The bend stands for wheels that reach their limit one
 after the other: wide (n = 2.5, close to a tanh) where they have one speed, else sharper (n = 4). States are
 the logarithm of s, that of the ceiling c over `CEILING`, and the unreported drag o, which includes the
-accelerometer's zero where no window teaches it: an extended Kalman filter, corrected once an application. An
-innovation beyond `GATE` standard deviations counts with a variance that puts it there; an application that
-was not measured widens nothing.
+accelerometer's zero where no window teaches it, and is none where windows teach: an extended Kalman filter,
+corrected once an application. An innovation beyond `GATE` standard deviations counts with a variance that
+puts it there; an application that was not measured widens nothing.
 
-Reported torques count as long as they explain how the car is driven: what an engine's controller reports is
-often that of the crankshaft, or a guess. Of those that do not counts the share that arrives.
+The law is not quite the car's: the error of a mean is a share of it, and what the drive does unseen. How much
+that is differs from car to car, so it is measured: the expectation of innovation times residual is the
+variance of a mean, and their average over the last applications counts.
 """
 
 import math
@@ -25,6 +26,7 @@ import math
 import numpy as np
 
 from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
+from ecu.algorithm.estimation.joint.drive import other_decel, torque_share
 from ecu.algorithm.estimation.joint.layout import BIAS, LEVEL, MASS, V
 from ecu.algorithm.estimation.joint.wheel import (
     brake_torque,
@@ -46,7 +48,9 @@ BESIDE, BESIDE_STEP = 0.03, 0.006  # prior of the scale beside windows, which te
 PAUSE = np.array([0.03, 0.15, 0.1])  # of unknown length: rain, another road, another day
 LOWEST = np.array([-0.7, math.log(3.0 / CEILING), -1.0])
 HIGHEST = np.array([0.6, math.log(30.0 / CEILING), 1.4])
-NOISE = 0.35  # m/s^2, of the mean of an application
+NOISE, NOISE_SHARE = 0.2, 0.05  # m/s^2, of the mean of an application, and of the linings' part of it
+LEAST_NOISE, GREATEST_NOISE = 0.5, 4.0  # times that variance, as measured
+BEFORE, MEMORY = 4.0, 10.0  # applications that the prior of this ratio is worth; that are remembered
 GATE = 2.5
 LEAST_SPEED, ACROSS = 5.0, 0.4  # m/s, lateral acceleration over gravity: limits of the force balance
 ONSET_S = 0.25  # callipers and accelerometer lag behind the pressure
@@ -56,10 +60,6 @@ LONGEST_STEP_S = 0.5  # between samples that are compared
 ONE_SPEED_KNEE, WHEELS_KNEE = 2.5, 4.0  # n
 BENDS = 0.7  # of the ceiling, beyond which windows no longer teach friction
 USUAL = 6.0  # m/s^2, of the linings, before any application
-DRIVES = 0.5  # m/s^2, by reported torques, from which they are compared with the motion
-DRIVE_MEMORY_S = 60.0
-LEAST_DRIVEN = 10.0  # m^2/s^3, the integral of their square from which they are judged
-LEAST_SHARE, GREATEST_SHARE, MOST_SHARE = 0.75, 1.33, 1.5  # of them that arrives: explained, at most
 
 WHOLE_STATE = np.dtype(
     [
@@ -68,6 +68,8 @@ WHOLE_STATE = np.dtype(
         ("alone", "u1"),  # nothing but whole applications teaches
         ("bent", "u1"),  # the linings ask for more than road and tyres give freely
         ("knee", "f8"),  # exponent n of the bend
+        ("noise_ratio", "f8"),  # variance of an application's mean over the usual one
+        ("noise_count", "f8"),  # applications in that, and what its prior is worth
         ("unshown", "f8", (4,)),  # variance of ln friction of a lining against that of all together
         ("age_s", "f8"),  # of the application
         ("common", "f8"),  # time of the last comparison [s]
@@ -105,6 +107,7 @@ def restore_whole(state: Record, learned: Record) -> None:
 @kernel
 def forget_whole(state: Record) -> None:
     """Reset to the prior."""
+    state.noise_ratio, state.noise_count = 1.0, BEFORE
     for i in range(3):
         state.x[i] = PRIOR_MEAN[i]
         for j in range(3):
@@ -157,17 +160,11 @@ def _hand_over_scale(state: Record, joint: Record) -> None:
 @kernel
 def begin_whole(params: Record, state: Record, joint: Record) -> None:
     """Begin an application."""
-    apart = wheels_mapped(params) and joint.speed_copies <= COPIES
+    apart = wheels_mapped(params) and joint.speed_copies <= COPIES and joint.sliding < 4
     alone = not (apart and torques_measured(params, joint))
     if state.alone and not alone:
         _hand_over_scale(state, joint)
     state.alone = 1 if alone else 0
-    most, variance = BESIDE**2, state.p[SCALE, SCALE]
-    if not alone and variance > most:
-        for i in range(3):
-            state.p[SCALE, i] *= math.sqrt(most / variance)
-            state.p[i, SCALE] = state.p[SCALE, i]
-        state.p[SCALE, SCALE] = most
     state.knee = WHEELS_KNEE if apart else ONE_SPEED_KNEE
     state.bent = 0
     state.common = joint.sampling.common
@@ -188,40 +185,6 @@ def _lining_decel(params: Record, joint: Record, mass: float) -> float:
         r, _ = radius(params, joint, i, joint.window.load[i])
         total += max(brake_torque(params, joint, i, joint.window.common_pressure[i]), 0.0) / (r * mass)
     return total
-
-
-@kernel
-def _other_decel(params: Record, joint: Record, mass: float, share: float) -> float:
-    """Return drag, rolling and a share of the torques over the mass, plus the specific force [m/s^2]."""
-    w, speed = joint.window, joint.x[V]
-    total = w.common_accel + (w.lateral + params.drag_area * speed * abs(speed)) / mass
-    for i in range(4):
-        r, _ = radius(params, joint, i, w.load[i])
-        own = params.rolling_resistance * w.load[i] * r + params.wheel_inertia[i] * w.common_accel / r
-        total += (w.motor[i] * share + own) / (r * mass)
-    return total
-
-
-@kernel
-def compare_drive(params: Record, state: Record, joint: Record) -> None:
-    """Compare reported torques with the motion in the last window, in which no brake was applied."""
-    w, reported = joint.window, 0.0
-    for i in range(4):
-        reported += w.motor[i] / (params.wheel_radius[i] * params.mass)
-    if abs(reported) < DRIVES or joint.x[V] < LEAST_SPEED or joint.unmeasured_s > 0.0:
-        return
-    keeps = math.exp(-w.time / DRIVE_MEMORY_S)
-    state.driven = keeps * state.driven + w.time * reported * reported
-    state.arrived = keeps * state.arrived - w.time * reported * _other_decel(params, joint, params.mass, 0.0)
-
-
-@kernel
-def torque_share(state: Record) -> float:
-    """Return the share of the reported torques that counts: all while they explain how the car is driven."""
-    if state.driven < LEAST_DRIVEN:
-        return 1.0
-    share: float = state.arrived / state.driven
-    return 1.0 if LEAST_SHARE < share < GREATEST_SHARE else min(max(share, 0.0), MOST_SHARE)
 
 
 @kernel
@@ -254,7 +217,7 @@ def add_to_whole(params: Record, state: Record, joint: Record) -> None:
     expected, by_scale, by_grip = bend(linings, ceiling, state.knee)
     state.bent = 1 if linings > BENDS * ceiling else 0
     state.time += step
-    state.measured -= step * _other_decel(params, joint, mass, share)
+    state.measured -= step * other_decel(params, joint, mass, share)
     if not state.alone:
         state.measured += step * joint.x[BIAS]
     state.linings += step * linings
@@ -265,11 +228,17 @@ def add_to_whole(params: Record, state: Record, joint: Record) -> None:
 
 
 @kernel
-def _variance(state: Record, by_scale: float, by_grip: float) -> float:
+def _usual_noise(expected: float) -> float:
+    """Return the variance of an application's mean [m^2/s^4], `expected` of the linings [m/s^2]."""
+    return NOISE**2 + (NOISE_SHARE * expected) ** 2
+
+
+@kernel
+def _variance(state: Record, by_scale: float, by_grip: float, noise: float) -> float:
     p = state.p
     own = by_scale * by_scale * p[SCALE, SCALE] + by_grip * by_grip * p[GRIP, GRIP] + p[OVERRUN, OVERRUN]
     shared = by_scale * by_grip * p[SCALE, GRIP] + by_scale * p[SCALE, OVERRUN] + by_grip * p[GRIP, OVERRUN]
-    variance: float = own + 2.0 * shared + NOISE**2
+    variance: float = own + 2.0 * shared + noise
     return variance
 
 
@@ -281,15 +250,34 @@ def _gain(state: Record, i: int, by_scale: float, by_grip: float, total: float) 
 
 
 @kernel
+def _believe_windows(state: Record) -> None:
+    """Limit the scale's variance to what windows leave of it; they leave no unreported drag."""
+    p, variance = state.p, state.p[SCALE, SCALE]
+    state.x[OVERRUN] = 0.0
+    for i in range(3):
+        p[OVERRUN, i] = p[i, OVERRUN] = 0.0
+    if variance > BESIDE**2:
+        for i in range(3):
+            p[SCALE, i] *= BESIDE / math.sqrt(variance)
+            p[i, SCALE] = p[SCALE, i]
+        p[SCALE, SCALE] = BESIDE**2
+
+
+@kernel
 def end_whole(state: Record) -> None:
     """Correct the states by the mean of this application, if it was measured."""
     linings = state.linings >= LEAST_DECEL * state.time
     if state.time < LEAST_S or not (linings or state.total >= LEAST_TOTAL * state.time):
         return
+    if not state.alone:
+        _believe_windows(state)
     x, p = state.x, state.p
     h_scale, h_grip = state.by_scale / state.time, state.by_grip / state.time
-    innovation = (state.measured - state.expected) / state.time - x[OVERRUN]
-    total = max(_variance(state, h_scale, h_grip), (innovation / GATE) ** 2)
+    expected = state.expected / state.time
+    innovation = state.measured / state.time - expected - x[OVERRUN]
+    usual = _usual_noise(expected)
+    likely = _variance(state, h_scale, h_grip, state.noise_ratio * usual)
+    total = max(likely, (innovation / GATE) ** 2)
     gain = (
         _gain(state, SCALE, h_scale, h_grip, total),
         _gain(state, GRIP, h_scale, h_grip, total),
@@ -299,7 +287,15 @@ def end_whole(state: Record) -> None:
         x[i] = min(max(x[i] + gain[i] * innovation, LOWEST[i]), HIGHEST[i])
         for j in range(3):
             p[i, j] -= gain[i] * gain[j] * total
-        p[i, i] += (STEP[i] if state.alone or i != SCALE else BESIDE_STEP) ** 2
+        if state.alone or i == GRIP:
+            p[i, i] += STEP[i] ** 2
+        elif i == SCALE:
+            p[i, i] += BESIDE_STEP**2
+    left = 1.0 - (gain[SCALE] * h_scale + gain[GRIP] * h_grip + gain[OVERRUN])
+    product = min(innovation * innovation * left, GATE * GATE * likely)
+    state.noise_count = min(state.noise_count + 1.0, MEMORY)
+    state.noise_ratio += (product / usual - state.noise_ratio) / state.noise_count
+    state.noise_ratio = min(max(state.noise_ratio, LEAST_NOISE), GREATEST_NOISE)
     if linings:
         state.usual = state.linings / state.time
 
@@ -334,8 +330,11 @@ def tell_whole(params: Record, state: Record, joint: Record, estimate: Record) -
         estimate.mu[i] *= scale
         estimate.sigma[i] = estimate.mu[i] * math.sqrt(own + variance)
     expected, by_scale, by_grip = bend(state.usual, ceiling, state.knee)
-    estimate.sigma_force = math.sqrt(_variance(state, by_scale, by_grip)) / expected
-    estimate.overrun = state.x[OVERRUN]
+    variance = _variance(state, by_scale, by_grip, state.noise_ratio * _usual_noise(expected))
+    if not state.alone:
+        variance += (by_scale * estimate.sigma_force) ** 2
+    estimate.sigma_force = math.sqrt(variance) / expected
+    estimate.overrun = 0.0 if estimate.torques_known and not state.alone else state.x[OVERRUN]
     if state.alone:
         estimate.accel_bias, estimate.mass = 0.0, params.mass
     estimate.torque_share = torque_share(state)
