@@ -12,9 +12,9 @@ is the friction as learned window by window, s next to 1. Elsewhere windows teac
 configured friction, or what was learned where they did. The bend stands for wheels that reach their limit one
 after the other: wide (n = 2.5, close to a tanh) where they have one speed, else sharper (n = 4). States are
 the logarithm of s, that of the ceiling c over `CEILING`, and the unreported drag o, which includes the
-accelerometer's zero where no window teaches it, and is none where windows teach: an extended Kalman filter,
-corrected once an application. An innovation beyond `GATE` standard deviations counts with a variance that
-puts it there; an application that was not measured widens nothing.
+accelerometer's zero where no window teaches it, and is next to none where windows teach: an extended Kalman
+filter, corrected once an application. An innovation beyond `GATE` standard deviations counts with a variance
+that puts it there; an application that was not measured widens nothing.
 
 The law is not quite the car's: the error of a mean is a share of it, and what the drive does unseen. How much
 that is differs from car to car, so it is measured: the expectation of innovation times residual is the
@@ -44,11 +44,12 @@ CEILING = 14.0  # m/s^2: a first braking at 12 must be possible before any was s
 PRIOR_MEAN = np.array([0.0, 0.0, 0.2])  # the drag in m/s^2
 PRIOR = np.array([0.25, 0.4, 0.3])  # standard deviations
 STEP = np.array([0.05, 0.03, 0.03])  # between applications
-BESIDE, BESIDE_STEP = 0.03, 0.006  # prior of the scale beside windows, which teach nearly all; its step
+# Priors of scale and drag [m/s^2] beside windows, which teach nearly all; their step.
+BESIDE, BESIDE_DRAG, BESIDE_STEP = 0.03, 0.05, 0.006
 PAUSE = np.array([0.03, 0.15, 0.1])  # of unknown length: rain, another road, another day
 LOWEST = np.array([-0.7, math.log(3.0 / CEILING), -1.0])
 HIGHEST = np.array([0.6, math.log(30.0 / CEILING), 1.4])
-NOISE, NOISE_SHARE = 0.2, 0.05  # m/s^2, of the mean of an application, and of the linings' part of it
+NOISE, NOISE_SHARE = 0.2, 0.07  # m/s^2, of the mean of an application, and of the linings' part of it
 LEAST_NOISE, GREATEST_NOISE = 0.5, 4.0  # times that variance, as measured
 BEFORE, MEMORY = 4.0, 10.0  # applications that the prior of this ratio is worth; that are remembered
 GATE = 2.5
@@ -251,16 +252,17 @@ def _gain(state: Record, i: int, by_scale: float, by_grip: float, total: float) 
 
 @kernel
 def _believe_windows(state: Record) -> None:
-    """Limit the scale's variance to what windows leave of it; they leave no unreported drag."""
-    p, variance = state.p, state.p[SCALE, SCALE]
-    state.x[OVERRUN] = 0.0
-    for i in range(3):
-        p[OVERRUN, i] = p[i, OVERRUN] = 0.0
-    if variance > BESIDE**2:
-        for i in range(3):
-            p[SCALE, i] *= BESIDE / math.sqrt(variance)
-            p[i, SCALE] = p[SCALE, i]
-        p[SCALE, SCALE] = BESIDE**2
+    """Limit the variances of scale and drag to what windows leave of them."""
+    x, p = state.x, state.p
+    for i, sigma in ((SCALE, BESIDE), (OVERRUN, BESIDE_DRAG)):
+        most, variance = sigma * sigma, p[i, i]
+        if variance > most:
+            if i == OVERRUN:
+                x[i] *= most / variance  # around nothing
+            for j in range(3):
+                p[i, j] *= math.sqrt(most / variance)
+                p[j, i] = p[i, j]
+            p[i, i] = most
 
 
 @kernel
@@ -287,10 +289,7 @@ def end_whole(state: Record) -> None:
         x[i] = min(max(x[i] + gain[i] * innovation, LOWEST[i]), HIGHEST[i])
         for j in range(3):
             p[i, j] -= gain[i] * gain[j] * total
-        if state.alone or i == GRIP:
-            p[i, i] += STEP[i] ** 2
-        elif i == SCALE:
-            p[i, i] += BESIDE_STEP**2
+        p[i, i] += (STEP[i] if state.alone or i == GRIP else BESIDE_STEP) ** 2
     left = 1.0 - (gain[SCALE] * h_scale + gain[GRIP] * h_grip + gain[OVERRUN])
     product = min(innovation * innovation * left, GATE * GATE * likely)
     state.noise_count = min(state.noise_count + 1.0, MEMORY)
@@ -334,7 +333,9 @@ def tell_whole(params: Record, state: Record, joint: Record, estimate: Record) -
     if not state.alone:
         variance += (by_scale * estimate.sigma_force) ** 2
     estimate.sigma_force = math.sqrt(variance) / expected
-    estimate.overrun = 0.0 if estimate.torques_known and not state.alone else state.x[OVERRUN]
+    estimate.overrun = state.x[OVERRUN]
+    if estimate.torques_known and not state.alone:
+        estimate.overrun *= BESIDE_DRAG**2 / max(state.p[OVERRUN, OVERRUN], BESIDE_DRAG**2)
     if state.alone:
         estimate.accel_bias, estimate.mass = 0.0, params.mass
     estimate.torque_share = torque_share(state)
