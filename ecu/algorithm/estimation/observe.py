@@ -19,6 +19,7 @@ from ecu.algorithm.estimation.joint.prediction import (
 )
 from ecu.algorithm.estimation.joint.prior import begin_application, end_application, forget_levels
 from ecu.algorithm.estimation.joint.sliding import suspend_learning
+from ecu.algorithm.estimation.joint.speed import MISLED_S
 from ecu.algorithm.estimation.joint.whole_application import (
     add_to_whole,
     apply_scale,
@@ -156,6 +157,8 @@ def _observe_jointly(
     joint.held = 1 if s.whole.alone or s.whole.bent else 0
     if guarded or contradicted:
         suspend_learning(joint)
+    if contradicted and s.motion.measured == 0:
+        joint.unseen_s = max(joint.unseen_s, MISLED_S)
     update_joint(p, joint, u, s.motion, s.wheel_load.load, s.hydraulics, braking, dt)
     if joint.closed and p.transmit:
         follow_ceiling(p, joint, braking)

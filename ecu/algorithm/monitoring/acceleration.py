@@ -20,8 +20,9 @@ its history. From then on it is not used until it agrees with the wheels or with
 with the wheels on the slope that was known (one that was late agreed with nothing just before), the longer
 the more often it has been wrong, or the car is at standstill, on an unknown slope. Where the drive torque is
 unreported or uncertain, the torques neither contradict nor confirm: a reading beyond any road by the wheels
-alone is doubted until it no longer is. No verdict is given while wheels slide or ABS or ESP act. A constant
-or slowly growing bias is not detected.
+alone is doubted until it no longer is. One that reads forwards for `OPPOSED` blocks while the linings brake
+and the wheels slow down is wrong whatever the speed is taken for, which it may have misled. Otherwise no
+verdict is given while wheels slide or ABS or ESP act. A constant or slowly growing bias is not detected.
 
 Assumption: all constants; found with the simulated vehicle, whose sound sensor stays below a third of `LEAST`
 in all shipped scenarios.
@@ -31,7 +32,7 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.inputs import fresh, motor_torque, others_brake, usable
+from ecu.algorithm.inputs import driver_accelerates, fresh, motor_torque, others_brake, usable
 from ecu.algorithm.monitoring.witness import compare, compare_both
 from ecu.contract.params import GRAVITY
 from ecu.contract.signals import (
@@ -60,6 +61,7 @@ ACCELERATION_STATE = np.dtype(
         ("known_blocks", "i8"),  # in a row
         ("sigma", "f8"),  # of a - w by the sensors' noise [m/s^2]
         ("beyond", "i8"),  # consecutive blocks beyond any road
+        ("opposed", "i8"),  # consecutive blocks in which it reads forwards while the linings slow the wheels
         ("agreed", "i8"),  # consecutive blocks that agree again
         ("times", "i8"),  # that it has become implausible, at most `OFTEN`
         ("usual", "f8"),  # a - w before the jump [m/s^2]
@@ -81,7 +83,7 @@ FORCE = 0.3  # possible error of friction
 KNOWN_MOTORS = 0.1  # greatest relative error of a motor torque that still yields a force
 SLOPE, STEEP = 2.0, 1.5  # m/s^2, of a slope of 20 %, of 15 %
 DENIED = 1.0  # m/s^2
-SECOND = 10  # blocks
+SECOND, OPPOSED = 10, 3  # blocks
 AGAIN, AGREED = 0.5, 2  # of LEAST; blocks after the first time, twice as many after each further
 OFTEN = 6
 STANDSTILL = 0.1  # m/s
@@ -245,21 +247,35 @@ def _beyond_any_road(state: Record, witness: Record) -> bool:
 
 
 @kernel
-def _judge(state: Record, witness: Record, slope: float) -> None:
-    """Compare the last blocks with those before, or with the values before the sensor jumped."""
+def _opposes_the_brakes(state: Record) -> bool:
+    """Return whether the reading is forwards although linings brake and the wheels slow down."""
     mean = state.mean
+    slows = mean[0, ROLLED] < mean[2, ROLLED] and mean[0, ROLLED] > LEAST_SPEED
+    opposes: bool = slows and mean[0, F] < -DENIED and mean[0, A] > DENIED
+    return opposes
+
+
+@kernel
+def _judge(state: Record, witness: Record, slope: float, slowed: bool) -> None:
+    """Compare the last blocks with those before, or with the values before the sensor jumped.
+
+    `slowed`: by its linings, forwards, and its driver does not accelerate.
+    """
+    mean = state.mean
+    state.opposed = state.opposed + 1 if slowed and _opposes_the_brakes(state) else 0
     if state.implausible:
         agrees = state.good_blocks >= 3 and _agrees(state, witness)
         state.agreed = state.agreed + 1 if agrees else 0
         if state.agreed >= AGREED << (state.times - 1):
             state.implausible, state.good_blocks, state.known_blocks = 0, 0, 0
         return
+    jumped = False
     if state.good_blocks < 8:
         state.beyond = 0
-        return
-    state.beyond = state.beyond + 1 if _beyond_any_road(state, witness) else 0
-    jumped = state.known_blocks >= 8 and _jumped(state, witness)
-    if jumped or state.beyond >= SECOND:
+    else:
+        state.beyond = state.beyond + 1 if _beyond_any_road(state, witness) else 0
+        jumped = state.known_blocks >= 8 and _jumped(state, witness)
+    if jumped or state.beyond >= SECOND or state.opposed >= OPPOSED:
         state.implausible, state.agreed, state.times = 1, 0, min(state.times + 1, OFTEN)
         state.usual_slope = slope
         state.usual = _usually_beside_wheels(mean, W) if jumped else 0.0
@@ -301,4 +317,5 @@ def watch_acceleration(
     state.time += dt
     if state.time > BLOCK_S - 0.001:
         _close_block(params, state)
-        _judge(state, witness, slope)
+        reverses = estimate.backwards or inputs.value[REVERSE] > 0.5
+        _judge(state, witness, slope, braking and not (reverses or driver_accelerates(inputs)))

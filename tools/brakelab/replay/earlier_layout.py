@@ -23,6 +23,7 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "unmeasured_s",
         "unseen_s",
         "still_s",
+        "opposed",
         "latest",
         "steady_s",
         "left_s",

@@ -12,6 +12,7 @@ from ecu.contract.signals import ACCEL_X, VEHICLE_SPEED
 from ecu.jit import Record, kernel
 
 LOST_S = 0.3  # without an accelerometer: longer than between two frames of a slow one
+MISLED_S = 0.4  # for which an accelerometer that is found wrong may have misled the speed
 UNSEEN_ACCEL = 12.0  # m/s^2, greatest that nobody saw
 VARIANCE = 0.25  # m^2/s^2
 

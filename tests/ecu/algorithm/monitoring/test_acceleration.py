@@ -202,3 +202,40 @@ def test_and_is_believed_again_once_a_road_could_do_it(params, feed) -> None:
 def test_forces_that_are_reported_tell_what_wheels_alone_do_not(params, feed) -> None:
     assert any(drive(params, feed, braked, none, none, steps(1.0)))
     assert not any(drive(params, feed, braked, none, none, steps(1.0), motors=False))
+
+
+OPPOSED = [
+    # case, reading [m/s^2], dv/dt of the wheels, accelerator [%], reverse, said in 3 s at 4 m/s^2
+    ("the sensor is turned round", 4.0, -4.0, 0.0, 0.0, True),
+    ("it sticks at what driving off gave", 1.5, -4.0, 0.0, 0.0, True),
+    ("it reads what a hill may do", 0.8, -4.0, 0.0, 0.0, False),
+    ("the driver accelerates against the brakes", 1.5, -4.0, 50.0, 0.0, False),
+    ("the car reverses", 4.0, -4.0, 0.0, 1.0, False),
+    ("the wheels do not slow down", 4.0, 0.5, 0.0, 0.0, False),
+    ("all wheels lock on ice", -1.0, -12.0, 0.0, 0.0, False),
+]
+
+
+@pytest.mark.parametrize(
+    ("case", "reading", "wheels", "gas", "reverse", "found"), OPPOSED, ids=[row[0] for row in OPPOSED]
+)
+def test_a_reading_forwards_while_linings_slow_the_wheels_is_wrong(
+    params, feed, case, reading, wheels, gas, reverse, found
+) -> None:
+    """The speed follows the reading, so that no wheel seems to roll; no motor reports its torque."""
+    p, state = params[0], np.zeros(1, ACCELERATION_STATE)[0]
+    witness, estimate = np.zeros(1, WITNESS_STATE)[0], np.zeros(1, ESTIMATE)[0]
+    base, inputs, speed, rolled = p["mu_nominal"], feed(), 25.0, 25.0
+    estimate["mu"], estimate["brake_torque"] = base, 4.0 * p["mass"] * p["wheel_radius"] / 4.0
+    inputs[0]["verdict"][MOTOR_TORQUE : MOTOR_TORQUE + 4] = 0
+    said = []
+    for _ in range(300):
+        speed, rolled = speed + 0.01 * reading, max(rolled + 0.01 * wheels, 0.0)
+        accelerator = {"accelerator_position": gas, "reverse": reverse}
+        feed(inputs, wheel_speed=rolled / p["wheel_radius"], accel_x=reading, **accelerator)
+        estimate["speed"] = speed
+        watch_acceleration(p, state, witness, inputs[0], estimate, base, 0.0, True, 0.01)
+        said.append(bool(state["implausible"]))
+    assert any(said) == found
+    if found:
+        assert 0.01 * said.index(True) < 0.5

@@ -34,7 +34,7 @@ class Road:
     ) -> tuple[str, ...]:
         """Return the names that are rejected at the end; `accel` < 0 brakes all wheels, `gas` [%].
 
-        `late` [s]: of each input; `guarded`: the slip guard acts; the first cycle is `overslept` seconds late.
+        `late` [s]: of each input; `guarded`: the slip guard acts; the first cycle is `overslept` s late.
         """
         turns, late = np.array(turns, float), np.broadcast_to(late, 5)
         for _ in range(round(seconds / DT)):
