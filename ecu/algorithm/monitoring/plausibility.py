@@ -6,7 +6,8 @@ wheel slower than the car may slide, so it is not judged.
 
 A wheel speed that falls faster than the brake could cause is a sensor fault: a broken wire reads 0. It is
 masked out until it agrees with the vehicle speed again, or the car is at standstill. One whose noise, by the
-second differences of its samples, is `NOISY` times the configured one is left out for as long as it is.
+second differences of its samples beside the others', is `NOISY` times the configured one is left out for as
+long as it is.
 
 A pressure follows the demands that were sent (`ecu.algorithm.hydraulics` models how) if the three others
 do. Where more than one does not, another controller brakes, or the demands are not executed: no sensor or
@@ -29,8 +30,9 @@ PLAUSIBILITY_STATE = np.dtype(
         ("for_s", "f8", (4,)),  # time for which a wheel has been too fast
         ("omega", "f8", (4,)),  # last sample of a wheel [rad/s]
         ("age_s", "f8", (4,)),  # of it
-        ("change", "f8", (4,)),  # of it from the sample before [rad/s]
+        ("change", "f8", (4,)),  # of it from the sample before, less that of the others [rad/s]
         ("jitter", "f8", (4,)),  # noise [rad/s]
+        ("noisy", "u1", (4,)),  # judged by it until it is believed again
         ("fell", "u1", (4,)),  # fell faster than a wheel can
         ("apart_s", "f8", (4,)),  # excess time for which a pressure deviated from its demand
         ("pressure", "u1"),  # one pressure has deviated for too long
@@ -98,6 +100,21 @@ def wheel_speed_implausible(
 
 
 @kernel
+def _common_change(state: Record, inputs: Record) -> float:
+    """Return how the wheels' speeds have changed since their last samples [rad/s], without the two extremes.
+
+    NaN: not all four have come.
+    """
+    total, least, greatest = 0.0, math.inf, -math.inf
+    for i in range(4):
+        change = inputs.value[WHEEL_SPEED + i] - state.omega[i]
+        if not fresh(inputs, WHEEL_SPEED + i):
+            return math.nan
+        total, least, greatest = total + change, min(least, change), max(greatest, change)
+    return 0.5 * (total - least - greatest)
+
+
+@kernel
 def watch_wheels(
     params: Record, state: Record, witness: Record, inputs: Record, estimate: Record, dt: float
 ) -> None:
@@ -105,6 +122,7 @@ def watch_wheels(
 
     Arguments as for `wheel_speed_implausible`.
     """
+    common = _common_change(state, inputs)
     for i in range(4):
         state.age_s[i] += dt
         if fresh(inputs, WHEEL_SPEED + i):
@@ -118,13 +136,18 @@ def watch_wheels(
                 state.fell[i] = 1
             elif abs(omega * params.wheel_radius[i] - ground) < ROLLING * ground:
                 state.fell[i] = 0
-            change = omega - state.omega[i]
-            jerk = min(abs(change - state.change[i]) / SECOND_DIFFERENCE, JUMP * params.sigma_wheel_speed)
-            state.jitter[i] += lag_gain(min(state.age_s[i], OLDEST_S), NOISE_S) * (jerk - state.jitter[i])
-            state.omega[i], state.age_s[i], state.change[i] = omega, 0.0, change
+            if math.isfinite(common):
+                change = omega - state.omega[i] - common
+                jerk = min(abs(change - state.change[i]) / SECOND_DIFFERENCE, JUMP * params.sigma_wheel_speed)
+                state.jitter[i] += lag_gain(min(state.age_s[i], OLDEST_S), NOISE_S) * (jerk - state.jitter[i])
+                state.change[i] = change
+            state.omega[i], state.age_s[i] = omega, 0.0
         noise = NOISY * params.sigma_wheel_speed
         if state.jitter[i] > noise:
+            state.noisy[i] = 1
+        if state.noisy[i]:
             judge(witness, WHEEL_SPEED + i, state.jitter[i], noise, DOUBT_S, dt)
+            state.noisy[i] = 1 if state.jitter[i] > noise or witness.rejected[WHEEL_SPEED + i] else 0
         if estimate.speed < STANDSTILL:
             state.fell[i] = 0
 

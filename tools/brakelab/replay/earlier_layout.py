@@ -24,6 +24,7 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "unseen_s",
         "still_s",
         "opposed",
+        "noisy",
         "latest",
         "steady_s",
         "left_s",
