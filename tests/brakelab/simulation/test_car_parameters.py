@@ -33,6 +33,15 @@ def test_one_parameter_is_set(name: str, value: float | str, field: str, expecte
     assert [one for one in PARAMS.names or () if not np.array_equal(car[one], DRAWN[one])] == [field]
 
 
+@pytest.mark.parametrize("names", [("", "_front", "_fl"), ("_fl", "_front", ""), ("_front", "", "_fl")])
+def test_fewer_wheels_go_before_more_and_shares_are_of_the_drawn_car(names: tuple[str, ...]) -> None:
+    values = {"": "80 %", "_front": "90 %", "_fl": 1.1}
+    given = {f"friction_scale{name}": values[name] for name in names}
+    car = new_vehicle(Scenario.model_validate(STOP | {"car": given}), 3).params[0]
+    drawn = DRAWN["friction_scale"]
+    np.testing.assert_allclose(car["friction_scale"], [1.1, 0.9 * drawn[1], *0.8 * drawn[2:]], rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("line", "told"),
     [

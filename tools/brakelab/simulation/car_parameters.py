@@ -4,7 +4,7 @@ A name alone is of the car or of all four wheels; `_front`, `_rear`, `_fl` … a
 """
 
 import re
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 from pydantic import AfterValidator
 
@@ -67,9 +67,17 @@ CarParameters = Annotated[dict[str, float | str], AfterValidator(_checked)]
 
 
 def set_parameters(params: RecordArray, car: CarParameters) -> None:
-    """Set parameters of a drawn car, `PARAMS` of shape (1,)."""
-    for name, value in car.items():
+    """Set parameters of a drawn car, `PARAMS` of shape (1,); what names fewer wheels goes before."""
+    drawn = params.copy()
+    for name in sorted(car, key=_wheels, reverse=True):
         stem, wheels = parameter(name)
-        share = _SHARE.fullmatch(str(value))
-        target = params[stem] if wheels == slice(None) else params[stem][:, wheels]
-        target[:] = target * (0.01 * float(share[1])) if share else PARAMETERS[stem][1] * float(value)
+        share = _SHARE.fullmatch(str(car[name]))
+        rows: Any = ... if wheels == slice(None) else (slice(None), wheels)
+        unit = PARAMETERS[stem][1]
+        params[stem][rows] = (
+            drawn[stem][rows] * (0.01 * float(share[1])) if share else unit * float(car[name])
+        )
+
+
+def _wheels(name: str) -> int:
+    return len(range(4)[parameter(name)[1]])
