@@ -89,6 +89,20 @@ def test_the_configuration_is_that_of_the_fixture_and_the_changes(ecu, plant, ec
     assert ecu["pressure_demand_fl"].between(5.0, 6.0).values.mean() != pytest.approx(braked, rel=0.01)
 
 
+def test_another_signal_is_converted_and_of_the_same_quantity() -> None:
+    speeds = SPEED.between(0.0, 0.03)
+    speeds.near(speeds._replace(unit="km/h", values=3.6 * speeds.values), 0.01, "m/s")
+    with pytest.raises(UserError, match='"bar" does not turn into m/s'):
+        speeds.near(speeds._replace(unit="bar"), 100.0, "%")
+
+
+def test_nothing_is_near_a_signal_where_it_has_no_row() -> None:
+    with pytest.raises(AssertionError, match=r"at t = 0\.02 s, not within 50 % of vehicle_speed \(1 of 3"):
+        SPEED.between(0.0, 0.03).near(SPEED.between(0.0, 0.02), 50.0, "%")
+    with pytest.raises(AssertionError, match="vehicle_speed: no row in this span"):
+        SPEED.between(0.0, 0.03).near(SPEED.between(7.0, 8.0), 50.0, "%")
+
+
 @pytest.mark.parametrize(
     ("wrong", "line"),
     [

@@ -63,14 +63,21 @@ class Signal(NamedTuple):
     def near(self, other: "Signal | float", by: float, unit: str) -> None:
         """Assert that every row is within `by` of another signal, or of a number in this one's unit.
 
-        `unit` is one of a difference; "%": of `other`.
+        `unit` is one of a difference; "%": of `other`. Another signal is converted into this one's unit; where
+        it has no row, nothing is near. Raises UserError for one of another quantity.
         """
         __tracebackhide__ = True
-        aim: Any = np.interp(self.t, other.t, other.values) if isinstance(other, Signal) else other
+        aim: Any = self._seen(other) if isinstance(other, Signal) else other
         share = unit == "%"
         limit = 0.01 * by * np.abs(aim) if share else self._from(unit)[0] * by
         told = other.name if isinstance(other, Signal) else f"{other:g} {self.unit}"
         self._assert(np.abs(self.values - aim) <= limit, f"within {by:g} {unit} of {told}")
+
+    def _seen(self, other: "Signal") -> NDArray[np.float64]:
+        __tracebackhide__ = True
+        assert len(other.t), f"{other.name}: no row in this span"
+        factor, offset = self._from(other.unit)
+        return factor * np.interp(self.t, other.t, other.values, math.nan, math.nan) + offset
 
     def _from(self, unit: str) -> tuple[float, float]:
         return conversion(unit, self.unit, None, "signal", self.name)
@@ -95,7 +102,7 @@ class Signal(NamedTuple):
 
 
 def _signal(drive: Drive, name: str, unit: str) -> Signal:
-    return Signal(name, unit, np.asarray(drive.t), Table(drive.columns, {})[name])
+    return Signal(name, unit or "-", np.asarray(drive.t), Table(drive.columns, {})[name])
 
 
 class Ecu:
