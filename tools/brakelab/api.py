@@ -211,13 +211,18 @@ def simulate(
         UserError: a file is not right or cannot be written.
     """
     path = scenario_file(os.fspath(scenario))
-    if not isinstance(seed, int | np.integer) or seed < 0:
-        raise UserError("seed", str(seed), "give a whole number from 0 on")
+    check_seed(seed)
     folder = TemporaryDirectory(prefix="brake-ecu-") if out is None else None
     written = Path(folder.name, path.stem) if folder else Path(out or "")
     with changed(config, changes) as car:
         run_scenario(path, car, written, int(seed), draw, told=False)
     return Simulation(written, folder)
+
+
+def check_seed(seed: object) -> None:
+    """Raise UserError for anything but a whole number from 0 on."""
+    if not isinstance(seed, int | np.integer) or seed < 0:
+        raise UserError("seed", str(seed), "give a whole number from 0 on")
 
 
 @contextmanager

@@ -75,6 +75,10 @@ def test_a_fault_is_told_by_its_bit_in_time(ecu, plant) -> None:
     with pytest.raises(AssertionError, match="never"):
         ecu.told("pedal lost", within_ms=500)
     ecu.shows("recovered", within=0.3)
+    assert "mu_b_fl" in ecu.columns
+    assert "distance" in plant.columns
+    with pytest.raises(AssertionError, match=r"mu_b_fl is [.\d]+ at t = 0\.00 s, not within 5 to 6 \("):
+        ecu["mu_b_fl"].within(5, 6, "-")
     assert (ecu["mu_b_fl"].unit, plant["distance"].unit, ecu["mode_fl"].unit) == ("-", "m", "-")
 
 
@@ -109,6 +113,9 @@ def test_nothing_is_near_a_signal_where_it_has_no_row() -> None:
         (lambda ecu, plant: ecu["mode"], "ecu: there is no drive yet; call plant.drive first"),
         (lambda ecu, plant: plant.drive("nosuch"), "nosuch"),
         (lambda ecu, plant: plant.drive(STOP, initial_sped=3.0), "scenario: initial_sped"),
+        (lambda ecu, plant: plant.drive(STOP, seed=-1), "seed: -1: give a whole number from 0 on"),
+        (lambda ecu, plant: plant.drive(STOP, seed=1.5), "seed: 1.5: give a whole number from 0 on"),
+        (lambda ecu, plant: plant.drive(STOP, fault=None), "scenario: fault: give"),
         (lambda ecu, plant: plant.fault("lots", t=1.0), "fault: kind"),
         (lambda ecu, plant: plant.fault("lost"), "fault: t: missing"),
         (lambda ecu, plant: (plant.drive(STOP), ecu["mu_b"]), "mu_b: no such column; did you mean mu_b_"),

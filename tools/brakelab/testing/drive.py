@@ -15,7 +15,7 @@ import tomlkit
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from brakelab.api import AnyPath, Change, changed, truth_unit
+from brakelab.api import AnyPath, Change, changed, check_seed, truth_unit
 from brakelab.report.drive import Drive, read_drive, start_ns
 from brakelab.rig.live import choose_bus
 from brakelab.rig.live import drive as drive_on_bus
@@ -58,20 +58,20 @@ class Signal(NamedTuple):
         __tracebackhide__ = True
         factor, offset = self._from(unit)
         kept = (self.values >= factor * low + offset) & (self.values <= factor * high + offset)
-        self._assert(kept, f"within {low:g} to {high:g} {unit}", factor, offset, unit)
+        self._assert(kept, f"within {low:g} to {_said(high, 'g', unit)}", factor, offset, unit)
 
     def near(self, other: "Signal | float", by: float, unit: str) -> None:
         """Assert that every row is within `by` of another signal, or of a number in this one's unit.
 
-        `unit` is one of a difference; "%": of `other`. Another signal is converted into this one's unit; where
-        it has no row, nothing is near. Raises UserError for one of another quantity.
+        `unit` is one of a difference; "%": of `other`. Another signal is converted into this one's unit; where it
+        has no row, nothing is near. Raises UserError for one of another quantity.
         """
         __tracebackhide__ = True
         aim: Any = self._seen(other) if isinstance(other, Signal) else other
         share = unit == "%"
         limit = 0.01 * by * np.abs(aim) if share else self._from(unit)[0] * by
-        told = other.name if isinstance(other, Signal) else f"{other:g} {self.unit}"
-        self._assert(np.abs(self.values - aim) <= limit, f"within {by:g} {unit} of {told}")
+        told = other.name if isinstance(other, Signal) else _said(other, "g", self.unit)
+        self._assert(np.abs(self.values - aim) <= limit, f"within {_said(by, 'g', unit)} of {told}")
 
     def _seen(self, other: "Signal") -> NDArray[np.float64]:
         __tracebackhide__ = True
@@ -94,11 +94,15 @@ class Signal(NamedTuple):
         assert len(kept), f"{self.name}: no row in this span"
         if not kept.all():
             first = int(np.argmin(kept))
-            found = f"{(self.values[first] - offset) / factor:.4g} {unit or self.unit}"
+            found = _said((self.values[first] - offset) / factor, ".4g", unit or self.unit)
             share = f"{np.count_nonzero(~kept)} of {len(kept)} rows"
             raise AssertionError(
                 f"{self.name} is {found} at t = {self.t[first]:.2f} s, not {expected} ({share})"
             )
+
+
+def _said(value: float, digits: str, unit: str) -> str:
+    return f"{value:{digits}}" + (f" {unit}" if unit != "-" else "")
 
 
 def _signal(drive: Drive, name: str, unit: str) -> Signal:
@@ -124,6 +128,11 @@ class Ecu:
     @driven.setter
     def driven(self, driven: Driven) -> None:
         self._driven = driven
+
+    @property
+    def columns(self) -> list[str]:
+        """Names of the outputs of the last drive."""
+        return [*self.driven.drive.columns]
 
     def __getitem__(self, name: str) -> Signal:
         """Return an output. Raises UserError for a name that is none."""
@@ -155,6 +164,11 @@ class Plant:
         self._folder = folder
         """For files of processes; None: in memory."""
 
+    @property
+    def columns(self) -> list[str]:
+        """Names of the true values of the last drive."""
+        return [*self._ecu.driven.truth.columns]
+
     def __getitem__(self, name: str) -> Signal:
         """Return a true value. Raises UserError for a name that is none."""
         return _signal(self._ecu.driven.truth, name, truth_unit(name))
@@ -179,8 +193,10 @@ class Plant:
             UserError: the scenario or the configuration is not right.
             RunFault: a process ended early.
         """
+        check_seed(seed)
         content = self._content(scenario) | keys
-        content["fault"] = [*content.get("fault", []), *self._faults]
+        if isinstance(given := content.get("fault", []), list | tuple):
+            content["fault"] = [*given, *self._faults]
         try:
             asked = Scenario.model_validate(content)
         except ValidationError as error:
