@@ -63,8 +63,8 @@ class Signal(NamedTuple):
     def near(self, other: "Signal | float", by: float, unit: str) -> None:
         """Assert that every row is within `by` of another signal, or of a number in this one's unit.
 
-        `unit` is one of a difference; "%": of `other`. Another signal is converted into this one's unit; where it
-        has no row, nothing is near. Raises UserError for one of another quantity.
+        `unit` is one of a difference; "%": of `other`. Another signal is converted into this one's
+        unit; where it has no row, nothing is near. Raises UserError for one of another quantity.
         """
         __tracebackhide__ = True
         aim: Any = self._seen(other) if isinstance(other, Signal) else other
