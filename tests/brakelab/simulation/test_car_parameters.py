@@ -47,7 +47,12 @@ def test_fewer_wheels_go_before_more_and_shares_are_of_the_drawn_car(names: tupl
     [
         ("mas = 1.0", "car: mas: no parameter of a car; did you mean mass"),
         ("mass_fl = 1.0", "car: mass_fl: no parameter of a car"),
-        ("mass = 0.0", "car: mass: give a value above 0"),
+        ("mass = 0.0", "car: mass: give a finite value above 0"),
+        ('mass = "0 %"', "car: mass: give a finite value above 0"),
+        ("mass = nan", "car: mass: give a finite value above 0 (found nan)"),
+        ("mass = inf", "car: mass: give a finite value above 0 (found inf)"),
+        ("mass = true", "car: mass: give a number, or a share"),
+        ("mass = [1.0]", "car: mass: give a number, or a share"),
         ('mass = "80"', 'car: mass: give a number, or a share of the drawn one, "80 %"'),
     ],
 )

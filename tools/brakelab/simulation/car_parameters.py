@@ -3,10 +3,11 @@
 A name alone is of the car or of all four wheels; `_front`, `_rear`, `_fl` … are some of the wheels.
 """
 
+import math
 import re
 from typing import Annotated, Any, Final
 
-from pydantic import AfterValidator
+from pydantic import BeforeValidator
 
 from brakelab.plant.records import PARAMS, RecordArray
 from ecu.contract.signals import CORNERS
@@ -36,7 +37,8 @@ PARAMETERS: Final = {
 _WHEELS: Final = {"_front": slice(0, 2), "_rear": slice(2, 4)} | {
     f"_{corner}": slice(place, place + 1) for place, corner in enumerate(CORNERS)
 }
-_SHARE: Final = re.compile(r"(\d+(?:\.\d+)?) ?%")
+NUMBER: Final = r"\d+(?:\.\d+)?(?:e[-+]?\d+)?"
+_SHARE: Final = re.compile(rf"({NUMBER}) ?%")
 
 
 def parameter(name: str) -> tuple[str, slice]:
@@ -51,18 +53,19 @@ def parameter(name: str) -> tuple[str, slice]:
     return stem, wheels
 
 
-def _checked(car: dict[str, float | str]) -> dict[str, float | str]:
-    for name, value in car.items():
+def _checked(car: object) -> object:
+    for name, value in car.items() if isinstance(car, dict) else ():
         parameter(name)
         share = _SHARE.fullmatch(value) if isinstance(value, str) else None
-        if isinstance(value, str) and share is None:
+        number = float(share[1]) if share else value
+        if isinstance(number, bool) or not isinstance(number, int | float):
             raise ValueError(f'{name}: give a number, or a share of the drawn one, "80 %"')
-        if float(share[1] if share else value) <= 0.0:
-            raise ValueError(f"{name}: give a value above 0")
+        if not 0.0 < number < math.inf:
+            raise ValueError(f"{name}: give a finite value above 0 (found {value})")
     return car
 
 
-CarParameters = Annotated[dict[str, float | str], AfterValidator(_checked)]
+CarParameters = Annotated[dict[str, float | str], BeforeValidator(_checked)]
 """Values in the units of `PARAMETERS`, or as a share of the drawn car's, "80 %"."""
 
 
