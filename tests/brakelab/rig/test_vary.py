@@ -1,6 +1,7 @@
 """Many cars: which are driven, which is the worst, and what a wrong `--vary` is told."""
 
 import json
+import tomllib
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -9,6 +10,8 @@ import pytest
 
 from brakelab.rig.vary import Run, car_text, cars, span, worst
 from brakelab.rig.verdicts import Verdict
+from brakelab.simulation.scenario import Scenario
+from brakelab.simulation.vehicle_bus import new_vehicle
 from ecu import cli
 from ecu.errors import UserError
 
@@ -46,6 +49,26 @@ def test_the_worst_is_the_run_nearest_to_its_limit_or_furthest_beyond() -> None:
     assert calm[2] == "0 of 3"
 
 
+@pytest.mark.parametrize(
+    ("given", "values"),
+    [
+        ("free_radius=0.351234567", [0.351234567]),
+        ("mass=1e3,1234.5 %", ["1000 %", "1234.5 %"]),
+        ("cooling=20000,1e-5 %", ["20000 %", "1e-05 %"]),
+        ("cooling=1e-6..2e-6%", None),
+        ("cooling=20000..99999%", None),
+    ],
+)
+def test_what_a_list_names_is_driven_and_every_value_is_one_of_a_scenario(
+    given: str, values: list[float | str] | None
+) -> None:
+    found = cars([span(given)], 5, 0)
+    if values is not None:
+        assert [next(iter(car.values())) for car in found] == values
+    for car in found:
+        new_vehicle(Scenario.model_validate(tomllib.loads(STOP) | {"car": car}), 0)
+
+
 def test_a_car_is_said_as_a_scenario_takes_it() -> None:
     assert car_text({"mass": 1800.0, "heating": "80 %"}) == 'mass = 1800.0, heating = "80 %"'
 
@@ -57,7 +80,9 @@ def test_a_car_is_said_as_a_scenario_takes_it() -> None:
         ("mass", "give NAME=LOW..HIGH or NAME=A,B,C"),
         ("mass=1600-2400", "give NAME=LOW..HIGH or NAME=A,B,C"),
         ("mass=2400..1600", "give the lower number first"),
-        ("mass=0,1600", "give numbers above 0"),
+        ("mass=0,1600", "give finite numbers above 0"),
+        ("mass=1e400", "give finite numbers above 0"),
+        ("mass=1..1e400", "give finite numbers above 0"),
     ],
 )
 def test_a_wrong_range_is_one_line(given: str, told: str) -> None:
@@ -104,6 +129,7 @@ def test_the_run_that_fails_is_named_with_its_car(tmp_path: Path, capsys: pytest
     ("arguments", "told"),
     [
         (("--runs", "9", "--lock-step"), "--runs: 9: draws from the ranges of --vary; give one"),
+        (("--runs", "9", "--lock-step", "--vary", "mass=2000"), "--runs: 9: draws from the ranges of --vary"),
         (("--vary", "mass=1..2"), "--vary: drives in memory; add --lock-step"),
         (("--vary", "mass=5..2", "--lock-step"), "--vary: mass=5..2: give the lower number first"),
     ],
@@ -113,6 +139,17 @@ def test_what_does_not_fit_is_refused(
 ) -> None:
     assert rig(tmp_path, *arguments) == 2
     assert told in capsys.readouterr().err
+
+
+def test_a_folder_in_the_place_of_the_results_is_told_before_the_runs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "out/vary.parquet").mkdir(parents=True)
+    assert rig(tmp_path, "--lock-step", "--vary", "mass=1900") == 2
+    told = capsys.readouterr()
+    assert "--out" in told.err
+    assert "which is a folder" in told.err
+    assert "worst" not in told.out
 
 
 def test_a_scenario_that_expects_nothing_is_not_driven(

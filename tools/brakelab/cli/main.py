@@ -146,7 +146,7 @@ def rig(
         if not lock_step:
             raise UserError("--vary", "", "drives in memory; add --lock-step")
         spans = [many.span(one) for one in vary]
-        return many.vary(command.found(scenario), config, out, spans, runs or 50, seed, plant, junit)
+        return many.vary(command.found(scenario), config, out, spans, runs, seed, plant, junit)
     if runs is not None:
         raise UserError("--runs", str(runs), "draws from the ranges of --vary; give one")
     return command.rig(scenario, config, bus, out, lock_step, seed, plant, junit)

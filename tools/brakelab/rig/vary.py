@@ -6,6 +6,7 @@ verdicts, in `vary.parquet` and with `--junit`.
 """
 
 import json
+import math
 import os
 import re
 from collections.abc import Sequence
@@ -27,7 +28,7 @@ from brakelab.rig.junit import junit_text
 from brakelab.rig.live import make_folder
 from brakelab.rig.simulated import driven_in_memory, verdicts
 from brakelab.rig.verdicts import Verdict
-from brakelab.simulation.car_parameters import parameter
+from brakelab.simulation.car_parameters import NUMBER, parameter
 from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.scenario import Scenario, load_scenario
 from brakelab.simulation.scenario_car import with_plant_for
@@ -35,9 +36,9 @@ from ecu.errors import UserError
 from ecu.output import wrote
 from ecu.settings.config import Config, load_config
 
-NUMBER: Final = r"\d+(?:\.\d+)?(?:e[-+]?\d+)?"
 RANGE: Final = re.compile(rf"({NUMBER})\.\.({NUMBER}) ?(%?)")
 LIST: Final = re.compile(rf"({NUMBER}(?:,{NUMBER})*) ?(%?)")
+RUNS: Final = 50
 WIDTH: Final = 150  # columns of the table if the terminal's width is unknown
 
 Car = dict[str, float | str]
@@ -55,8 +56,9 @@ class Span(NamedTuple):
     """Of the drawn car's value."""
 
     def value(self, number: float) -> float | str:
-        """Return a number as a value of `[car]`, to four digits."""
-        return f"{number:.4g} %" if self.percent else float(f"{number:.4g}")
+        """Return a number as a value of `[car]`, one that is drawn to four digits."""
+        text = f"{number:{'.4g' if self.drawn else '.15g'}}"
+        return f"{text} %" if self.percent else float(text)
 
 
 def span(text: str) -> Span:
@@ -72,12 +74,14 @@ def span(text: str) -> Span:
     elif listed:
         written, percent = listed[1].split(","), listed[2]
     else:
-        raise UserError("--vary", text, "give NAME=LOW..HIGH or NAME=A,B,C; with %: of the drawn car's")
+        raise UserError(
+            "--vary", text, "give NAME=LOW..HIGH or NAME=A,B,C; a % at the end: of the drawn car's value"
+        )
     numbers = tuple(map(float, written))
+    if not all(0.0 < number < math.inf for number in numbers):
+        raise UserError("--vary", text, "give finite numbers above 0")
     if drawn and numbers[0] >= numbers[1]:
         raise UserError("--vary", text, "give the lower number first")
-    if min(numbers) <= 0.0:
-        raise UserError("--vary", text, "give numbers above 0")
     return Span(name, numbers, drawn is not None, bool(percent))
 
 
@@ -147,7 +151,7 @@ def vary(
     config: Path,
     out: Path,
     spans: Sequence[Span],
-    runs: int,
+    runs: int | None,
     seed: int,
     plant: str | None = None,
     junit: Path | None = None,
@@ -158,15 +162,20 @@ def vary(
         UserError: a scenario or the configuration is invalid or expects nothing, or nothing can be written.
     """
     written = [out / "vary.parquet", *([junit] if junit else [])]
-    vehicle, given = load_config(config), cars(spans, runs, seed)
+    if runs is not None and not any(one.drawn for one in spans):
+        raise UserError("--runs", str(runs), "draws from the ranges of --vary; give one")
+    vehicle, given = load_config(config), cars(spans, runs or RUNS, seed)
+    scenarios = [load_scenario(path) for path in names]
+    for path, scenario in zip(names, scenarios, strict=True):
+        if not scenario.expect:
+            raise UserError(str(path), "expect", "missing; --vary judges runs by [[expect]], add one")
+    check_outputs(out, written[:1], ())
     if junit is not None:
         check_outputs(junit, (junit,), [*config_files(config), *names], option="--junit")
     make_folder(out)
     jobs: list[tuple[Scenario, Config, int]] = []
-    for path in names:
-        scenario = with_plant_for(load_scenario(path), plant, vehicle, out / "plant")
-        if not scenario.expect:
-            raise UserError(str(path), "expect", "missing; --vary judges runs by [[expect]], add one")
+    for shipped in scenarios:
+        scenario = with_plant_for(shipped, plant, vehicle, out / "plant")
         jobs += [(scenario.model_copy(update={"car": scenario.car | car}), vehicle, seed) for car in given]
     of_runs = [(path.stem, car) for path in names for car in given]
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads of their own in every process cost more
