@@ -230,6 +230,8 @@ def test_a_log_that_cannot_be_replayed_gives_one_line_and_no_result(tmp_path: Pa
         ({"observer": "best"}, "--observer: best: not known; take joint"),
         ({"out": Path("result.csv")}, "--out: result.csv: results are Parquet, MDF4 or MCAP"),
         ({"logs": [Path("no.log")]}, "no.log: no such file"),
+        ({"logs": [Path(__file__).parent], "stood": 8.0}, "--stood: 8: a recording has the temperatures"),
+        ({"cycles": Path("kept"), "stood": 0.0}, "--stood: 0: a recording has the temperatures"),
     ],
 )
 def test_an_argument_that_is_wrong_gives_one_line(

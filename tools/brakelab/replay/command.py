@@ -121,7 +121,7 @@ def replay_into(
         UserError: an argument, the configuration, the map or a log is not right.
     """
     vehicle = with_observer(load_config(config), observer)
-    _check(logs, out, cycles)
+    _check(logs, out, cycles, stood)
     check_outputs(
         out,
         (out, brakes_path(out)),
@@ -197,7 +197,7 @@ def _run(
     return after
 
 
-def _check(logs: Sequence[Path], out: Path, cycles: Path | None) -> None:
+def _check(logs: Sequence[Path], out: Path, cycles: Path | None, stood: float | None) -> None:
     if out.suffix not in (".parquet", *EXPORTS):
         remedy = f"results are Parquet, MDF4 or MCAP; let the name end in .parquet, {' or '.join(EXPORTS)}"
         raise UserError("--out", str(out), remedy)
@@ -205,6 +205,9 @@ def _check(logs: Sequence[Path], out: Path, cycles: Path | None) -> None:
         if not log.exists():
             raise UserError(str(log), "", "no such file; give an existing log")
         kind = kind_of(log)
+        if stood is not None and (cycles or kind == "recording"):
+            remedy = "a recording has the temperatures that its discs began with; leave --stood out"
+            raise UserError("--stood", f"{stood:g}", remedy)
         if cycles and kind != "frames":
             raise UserError(
                 str(log), "", "only a log of frames can take its cycles from a recording; leave --cycles out"
