@@ -105,9 +105,8 @@ def _refuse_repeated(manifest: Path, rows: Sequence[dict[str, str]]) -> None:
                 content = hashlib.file_digest(file, "sha256").hexdigest()
             measured = (content, *(cell for name, cell in row.items() if name not in NAMES))
             if (before := first.setdefault(measured, line)) != line:
-                raise UserError(
-                    str(manifest), f"line {line}", f"line {before} once more; leave one of them out"
-                )
+                remedy = f"the same measurement as line {before}; leave one of them out"
+                raise UserError(str(manifest), f"line {line}", remedy)
 
 
 def read_columns(path: Path, names: tuple[str, ...], what: str) -> dict[str, Array]:
