@@ -109,5 +109,7 @@ def test_a_measurement_counts_once(tmp_path: Path, rows: tuple[str, ...], line: 
     if line is None:
         open_campaign(manifest, resource("config/suv.toml"), "front", tmp_path / "out.toml")
         return
-    with pytest.raises(UserError, match=f"manifest.csv: {line}: the same measurement as line 2; leave one of them out"):
+    with pytest.raises(
+        UserError, match=f"manifest.csv: {line}: the same measurement as line 2; leave one of them out"
+    ):
         open_campaign(manifest, resource("config/suv.toml"), "front", tmp_path / "out.toml")

@@ -187,7 +187,7 @@ def replay(
     ] = False,
     stood: Annotated[
         float | None,
-        typer.Option("--stood", metavar="HOURS", min=0.0, help="Time for which the car stood: discs cooled"),
+        typer.Option("--stood", metavar="HOURS", min=0.0, help="Time the car stood before, discs cooling"),
     ] = None,
 ) -> int:
     """Replay a recorded drive through the ECU. Write results."""
