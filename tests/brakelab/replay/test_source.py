@@ -61,3 +61,8 @@ def test_a_lag_beside_that_of_the_car_is_told(tmp_path: Path, lag: float, delay:
     line = delay_line(load_source(map), params[0])
     assert ("inputs.vehicle_speed.lag: 0.2 s beside 0.1 s" in line) == told
     assert bool(line) == told
+
+
+def test_the_shipped_van_rolls_as_the_shipped_configuration_of_one() -> None:
+    map = resource("config/maps/van.toml")
+    assert not radius_line(map, load_source(map), new_params(load_config(resource("config/lcv.toml")))[0])

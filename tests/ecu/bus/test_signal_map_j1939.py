@@ -32,7 +32,7 @@ HEARD = {
             "RearAxle1LeftWheelSpeed": 36.0,
             "RearAxle1RightWheelSpeed": 36.0,
         },
-        {"wheel_speed_fl": 10.0 / 0.330, "wheel_speed_fr": 20.0 / 0.330, "wheel_speed_rr": 10.0 / 0.330},
+        {"wheel_speed_fl": 10.0 / 0.337, "wheel_speed_fr": 20.0 / 0.337, "wheel_speed_rr": 10.0 / 0.337},
     ),
     "VDC2": (
         0x18F0090B,
