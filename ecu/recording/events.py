@@ -23,7 +23,7 @@ def in_names_of(messages: Mapping[str, Sequence[str]], remedy: str) -> str:
     def named(word: re.Match[str]) -> str:
         return ", ".join(messages.get(word[1], [word[0]]))
 
-    return re.sub(r"\b(\w+)\b\*?", named, remedy)
+    return re.sub(r"\b(\w+)(, \1\b)+", r"\1", re.sub(r"\b(\w+)\b\*?", named, remedy))
 
 
 class EventLog:

@@ -18,6 +18,7 @@ MUSTANG = Path(__file__).parents[3] / "config" / "maps" / "mustang.toml"
         ({}, "check CalliperPressure*", "check CalliperPressure*"),
         ({"CalliperPressure": ["PRESS"]}, "check CalliperPressure*", "check PRESS"),
         ({"Imu": ["YAW", "ACC"]}, "check Steering, Imu", "check Steering, YAW, ACC"),
+        ({"Imu": ["VDC2"], "Steering": ["VDC2"]}, "check Steering, Imu", "check VDC2"),
         ({"Motor": ["INV_1"]}, "check the sender of Motor*", "check the sender of INV_1"),
         ({"Motor": ["INV_1"]}, "the receiver of MotorDemand*", "the receiver of MotorDemand*"),
     ],
