@@ -130,6 +130,7 @@ def test_the_run_that_fails_is_named_with_its_car(tmp_path: Path, capsys: pytest
     [
         (("--runs", "9", "--lock-step"), "--runs: 9: draws from the ranges of --vary; give one"),
         (("--runs", "9", "--lock-step", "--vary", "mass=2000"), "--runs: 9: draws from the ranges of --vary"),
+        (("--lock-step", "-i", "virtual", "-c", "x"), "-i, -c: --lock-step drives in memory; leave one out"),
         (("--vary", "mass=1..2"), "--vary: drives in memory; add --lock-step"),
         (("--vary", "mass=5..2", "--lock-step"), "--vary: mass=5..2: give the lower number first"),
     ],

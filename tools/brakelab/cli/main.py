@@ -140,6 +140,8 @@ def rig(
     if (interface is None) != (channel is None):
         raise UserError("-i, -c", "", "give both or none; none: a bus of its own on this machine")
     bus = None if interface is None or channel is None else (interface, channel)
+    if bus and lock_step:
+        raise UserError("-i, -c", "", "--lock-step drives in memory; leave one out")
     if vary:
         from brakelab.rig import vary as many
 
