@@ -69,17 +69,20 @@ def follow_friction(params: Record, state: Record, estimate: Record, dt: float) 
 
     An estimate above the base counts only as far as it is certain: too much torque is preferred to too
     little, and as far as the deceleration confirms it. While it still is the final friction of the last
-    application, whose initial friction differed, what is in use stays, as far as it is confirmed.
+    application, whose initial friction differed, what is in use stays, less what is taken back.
     """
     if params.compensation == OFF:
         return
     step, mu = FRICTION_RATE * dt, estimate.mu
     for i in range(4):
+        waits = estimate.observed_s[i] < EARLY_S and state.start[i] != 1.0
+        if waits and state.confirmed.back == 0.0:
+            continue
         if state.early[i] == 0.0 and estimate.observed_s[i] >= EARLY_S:
             state.early[i] = mu[i]
         base: float = state.base[i]
         target = mu[i] if math.isfinite(mu[i]) else base
-        if estimate.observed_s[i] < EARLY_S and state.start[i] != 1.0:
+        if waits:
             target = state.used[i]
         doubt = max(estimate.sigma[i] / max(mu[i], 0.1) - SURE, 0.0)
         if target > base:

@@ -19,7 +19,7 @@ from ecu.algorithm.estimation.joint.prediction import (
 )
 from ecu.algorithm.estimation.joint.prior import begin_application, end_application, forget_levels
 from ecu.algorithm.estimation.joint.sliding import suspend_learning
-from ecu.algorithm.estimation.joint.speed import MISLED_S
+from ecu.algorithm.estimation.joint.speed import doubt_speed
 from ecu.algorithm.estimation.joint.whole_application import (
     add_to_whole,
     apply_scale,
@@ -158,7 +158,7 @@ def _observe_jointly(
     if guarded or contradicted:
         suspend_learning(joint)
     if contradicted and s.motion.measured == 0:
-        joint.unseen_s = max(joint.unseen_s, MISLED_S)
+        doubt_speed(p, joint, u)
     update_joint(p, joint, u, s.motion, s.wheel_load.load, s.hydraulics, braking, dt)
     if joint.closed and p.transmit:
         follow_ceiling(p, joint, braking)

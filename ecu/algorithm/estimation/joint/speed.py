@@ -12,7 +12,7 @@ from ecu.contract.signals import ACCEL_X, VEHICLE_SPEED
 from ecu.jit import Record, kernel
 
 LOST_S = 0.3  # without an accelerometer: longer than between two frames of a slow one
-MISLED_S = 0.4  # for which an accelerometer that is found wrong may have misled the speed
+MISLED, MISLED_S = 0.06, 0.4  # of the speed, s for which an accelerometer that is wrong may have misled it
 UNSEEN_ACCEL = 12.0  # m/s^2, greatest that nobody saw
 VARIANCE = 0.25  # m^2/s^2
 
@@ -69,3 +69,11 @@ def bridge_gap(params: Record, state: Record, inputs: Record, motion: Record, dt
     forget(state, V, VARIANCE)
     open_window(state)
     return True
+
+
+@kernel
+def doubt_speed(params: Record, state: Record, inputs: Record) -> None:
+    """Let the wheels tell the speed that an accelerometer has misled, which is now found wrong."""
+    speed = mean_wheel_speed(params, inputs)
+    if abs(speed - state.x[V]) > MISLED * state.x[V]:
+        state.unseen_s = max(state.unseen_s, MISLED_S)
