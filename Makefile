@@ -1,5 +1,8 @@
 # make demo | test | studies | check | coverage | mutants | fuzz | soak | results | screenshot | clean. Sets up .venv itself; PYTHON=... chooses the interpreter.
 PIP := .venv/bin/python -m pip --disable-pip-version-check install --quiet
+# A worker a core: threads of a library that wait for a core of another worker make a product of matrices
+# take a hundred times as long.
+test studies coverage: export OPENBLAS_NUM_THREADS = 1
 PINNED := $(PIP) --no-deps --require-hashes --requirement requirements/build.txt
 
 .PHONY: help demo test studies check coverage mutants fuzz soak results screenshot clean
