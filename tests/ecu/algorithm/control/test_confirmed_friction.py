@@ -113,6 +113,16 @@ def test_a_rise_in_the_first_braking_is_one_over_the_base(
     assert car.law["used"] == pytest.approx([used * MU] * 4, rel=0.015)
 
 
+@pytest.mark.parametrize(("true", "used"), [(1.0, 1.0), (0.5, 0.7)])
+def test_a_lining_that_is_not_observed_brakes_with_what_is_in_use_less_what_is_taken_back(
+    car, true, used
+) -> None:
+    """Its friction at the start of the last application was another one than at its end."""
+    car.law["start"], car.estimate["observed_s"] = 1.1, 0.0
+    car.brake(6.0, believed=1.4 * MU, true=true * MU)
+    assert car.law["used"] == pytest.approx([used * MU] * 4, rel=0.015)
+
+
 def test_a_rise_that_is_a_lie_takes_more_than_a_tenth_for_less_than_a_second(car) -> None:
     """The friction in use moves by half a unit a second at most, there and back."""
     assert car.brake(0.9, believed=1.5 * MU) == pytest.approx(0.79, abs=0.02)
