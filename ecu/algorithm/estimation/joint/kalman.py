@@ -12,6 +12,7 @@ from ecu.jit import Record, kernel
 
 GATE = 3.0
 REJECT = 4.0 * GATE
+SPEED_VARIANCE = 0.25  # m^2/s^2, of a speed that is taken anew
 
 
 @kernel
@@ -20,6 +21,12 @@ def forget(state: Record, i: int, variance: float) -> None:
     for j in range(N):
         state.p[i, j] = state.p[j, i] = 0.0
     state.p[i, i] = variance
+
+
+@kernel
+def forget_speed(state: Record) -> None:
+    """Reset the variance of the car's speed to that of one taken anew, and clear its covariances."""
+    forget(state, V, SPEED_VARIANCE)
 
 
 @kernel

@@ -21,7 +21,7 @@ from ecu.algorithm.estimation.joint.kalman import (
     clear_derivatives,
     clear_state,
     drift_by_derivatives,
-    forget,
+    forget_speed,
 )
 from ecu.algorithm.estimation.joint.layout import (
     BIAS,
@@ -319,7 +319,7 @@ def _look_after(params: Record, state: Record, braking: bool) -> None:
     if state.untrusted_s > BELIEVED_AFTER and not braking:
         state.started = 0  # then the speed itself is wrong
         state.untrusted_s = 0.0
-        forget(state, V, 0.25)
+        forget_speed(state)
     state.kept_s += w.time
     sliding = state.slides[0] + state.slides[1] + state.slides[2] + state.slides[3]
     if sliding > state.sliding and braking and state.hold_s <= 0.0:

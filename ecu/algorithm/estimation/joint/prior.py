@@ -6,7 +6,14 @@ import math
 import numpy as np
 
 from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
-from ecu.algorithm.estimation.joint.kalman import clear_derivatives, clear_state, correct, drift_speed, forget
+from ecu.algorithm.estimation.joint.kalman import (
+    SPEED_VARIANCE,
+    clear_derivatives,
+    clear_state,
+    correct,
+    drift_speed,
+    forget,
+)
 from ecu.algorithm.estimation.joint.layout import (
     BIAS,
     CHANGE,
@@ -175,7 +182,7 @@ def set_prior(params: Record, state: Record) -> None:
         for j in range(N):
             p[i, j] = 0.0
         p[i, i] = PRIOR[i] ** 2
-    p[V, V] = 0.25
+    p[V, V] = SPEED_VARIANCE
     p[MOTOR, MOTOR] = params.sigma_motor_torque**2
     widen_levels(state, LEVEL_COMMON**2, LEVEL_AXLE**2, LEVEL_WHEEL**2)
 

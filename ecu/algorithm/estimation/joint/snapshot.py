@@ -1,6 +1,6 @@
 """Snapshots of the state, restored when it was learned from a wheel about to lock."""
 
-from ecu.algorithm.estimation.joint.kalman import forget
+from ecu.algorithm.estimation.joint.kalman import forget_speed
 from ecu.algorithm.estimation.joint.layout import N, V
 from ecu.jit import Record, kernel
 
@@ -30,7 +30,7 @@ def restore_snapshot(state: Record) -> None:
             state.x[i] = state.kept_x[1, i]
         for j in range(N):
             state.p[i, j] = state.kept_p[1, i, j]
-    forget(state, V, 0.25)
+    forget_speed(state)
     _copy(state, 1, 0)
     state.kept_s = 0.0
 

@@ -2,7 +2,7 @@
 
 import math
 
-from ecu.algorithm.estimation.joint.kalman import forget
+from ecu.algorithm.estimation.joint.kalman import forget_speed
 from ecu.algorithm.estimation.joint.layout import V
 from ecu.algorithm.estimation.joint.sliding import HOLD_S
 from ecu.algorithm.estimation.joint.window import open_window
@@ -14,7 +14,6 @@ from ecu.jit import Record, kernel
 LOST_S = 0.3  # without an accelerometer: longer than between two frames of a slow one
 MISLED, MISLED_S = 0.06, 0.4  # of the speed, s for which an accelerometer that is wrong may have misled it
 UNSEEN_ACCEL = 12.0  # m/s^2, greatest that nobody saw
-VARIANCE = 0.25  # m^2/s^2
 
 
 @kernel
@@ -40,7 +39,7 @@ def reverses(params: Record, state: Record, inputs: Record, motion: Record, dt: 
         speed = mean_wheel_speed(params, inputs)
         state.x[V] = speed if math.isfinite(speed) else abs(state.x[V])
         state.reversing = 0
-        forget(state, V, VARIANCE)
+        forget_speed(state)
         open_window(state)
     return False
 
@@ -66,7 +65,7 @@ def bridge_gap(params: Record, state: Record, inputs: Record, motion: Record, dt
     state.x[V] = speed if seen else max(state.x[V] + dt * motion.accel_x, 0.0)
     state.unseen_s, state.hold_s = 0.0 if seen else state.unseen_s, HOLD_S
     state.sampling.now += dt
-    forget(state, V, VARIANCE)
+    forget_speed(state)
     open_window(state)
     return True
 
