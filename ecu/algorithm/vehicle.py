@@ -19,7 +19,14 @@ the steering angle, which a dozen places of a cycle need, are computed once (`se
 
 import math
 
+from ecu.contract.params import GRAVITY
 from ecu.jit import Record, kernel
+
+
+@kernel
+def tyre_slip(params: Record, accel: float) -> float:
+    """Return the slip of the configured tyres of a car that brakes by -`accel` [m/s^2], negative: driven."""
+    return -accel / (GRAVITY * params.slip_stiffness[0])
 
 
 @kernel

@@ -34,6 +34,7 @@ import numpy as np
 
 from ecu.algorithm.inputs import driver_accelerates, fresh, motor_torque, others_brake, usable
 from ecu.algorithm.monitoring.witness import compare, compare_both
+from ecu.algorithm.vehicle import tyre_slip
 from ecu.contract.params import GRAVITY
 from ecu.contract.signals import (
     ACCEL_X,
@@ -136,7 +137,7 @@ def _gather(
         wheels += 0.25 * value[WHEEL_SPEED + i] * radius
     reading = value[ACCEL_X] / (1.0 + GRAVITY * params.pitch_gradient)
     state.sum[A] += reading + estimate.yaw_rate * estimate.lateral_speed
-    state.sum[W] += wheels * (1.0 - reading / (GRAVITY * params.slip_stiffness[0]))
+    state.sum[W] += wheels * (1.0 + tyre_slip(params, reading))
     state.sum[F] += force
     state.sum[ROLLED] += wheels
     state.readings += 1 if fresh(inputs, ACCEL_X) else 0

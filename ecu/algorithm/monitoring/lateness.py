@@ -19,7 +19,6 @@ import numpy as np
 
 from ecu.algorithm.lag import PERIOD
 from ecu.algorithm.monitoring.witness import judge
-from ecu.contract.params import GRAVITY
 from ecu.jit import Record, kernel
 
 WHEELS, JUDGED = 4, 5  # with the vehicle speed
@@ -69,12 +68,6 @@ def begin_lateness(state: Record, others: int, accel: float, across: float, slid
     state.slid = 1 if slows and (slides or state.slid) else 0
     shows: bool = state.slowed_s > SETTLED_S and abs(across) < ACROSS and not state.slid
     return shows
-
-
-@kernel
-def tyre_slip(params: Record, accel: float) -> float:
-    """Return the slip of the configured tyres of a car that brakes by -`accel` [m/s^2]."""
-    return -accel / (GRAVITY * params.slip_stiffness[0])
 
 
 @kernel

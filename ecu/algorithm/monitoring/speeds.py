@@ -25,15 +25,9 @@ import math
 import numpy as np
 
 from ecu.algorithm.inputs import OVERSLEPT_S, driver_accelerates, motor_torque, usable
-from ecu.algorithm.monitoring.lateness import (
-    LATENESS_STATE,
-    begin_lateness,
-    follow_lag,
-    judge_lag,
-    tyre_slip,
-)
+from ecu.algorithm.monitoring.lateness import LATENESS_STATE, begin_lateness, follow_lag, judge_lag
 from ecu.algorithm.monitoring.witness import judge
-from ecu.algorithm.vehicle import corner_speed
+from ecu.algorithm.vehicle import corner_speed, tyre_slip
 from ecu.contract.signals import ACCEL_X, VEHICLE_SPEED, VEHICLE_SPEED_VALID, WHEEL_SPEED
 from ecu.jit import Record, kernel
 
