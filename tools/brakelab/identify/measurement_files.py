@@ -3,7 +3,6 @@
 import codecs
 import csv
 import datetime
-import hashlib
 import io
 import re
 from collections.abc import Sequence
@@ -19,6 +18,7 @@ from brakelab.identify.units import UNITS, ZEROS
 from brakelab.logs.csv_header import find_header
 from brakelab.logs.csv_rows import csv_columns, csv_rows
 from brakelab.logs.log_quality import Damage
+from brakelab.replay.log import log_hash
 from brakelab.results.mdf import load_asammdf
 from brakelab.results.outputs import check_outputs, config_files
 from ecu.errors import UserError
@@ -101,9 +101,7 @@ def _refuse_repeated(manifest: Path, rows: Sequence[dict[str, str]]) -> None:
     for line, row in enumerate(rows, start=2):
         path = manifest.parent / row.get("file", "")
         if path.is_file():
-            with path.open("rb") as file:
-                content = hashlib.file_digest(file, "sha256").hexdigest()
-            measured = (content, *(cell for name, cell in row.items() if name not in NAMES))
+            measured = (log_hash(path), *(cell for name, cell in row.items() if name not in NAMES))
             if (before := first.setdefault(measured, line)) != line:
                 remedy = f"the same measurement as line {before}; leave one of them out"
                 raise UserError(str(manifest), f"line {line}", remedy)
