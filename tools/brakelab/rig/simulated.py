@@ -1,23 +1,23 @@
 """Verdicts on one drive by expectations: of `brake-ecu simulate`, of `rig --vary`, of a test."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from brakelab.arrays import Vector
 from brakelab.report.brakings import brakings
 from brakelab.report.drive import Drive
 from brakelab.rig.figures import figures
 from brakelab.rig.outcome import undisturbed
 from brakelab.rig.verdicts import Verdict, judge
-from brakelab.simulation.closed_loop import Drive as InMemory
+from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.expectations import Expectation
 from brakelab.simulation.scenario import Scenario
 from brakelab.simulation.simulate import Simulated
 from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS
-from ecu.contract.records import FRAME, new_record
 from ecu.contract.signals import OUTPUT_COLUMNS
 from ecu.output import give
 from ecu.settings.config import Config
@@ -36,11 +36,16 @@ class Driven(NamedTuple):
     """File of the truth, for messages."""
 
 
-def driven_in_memory(scenario: Scenario, vehicle: Config, seed: int, loop: InMemory) -> Driven:
-    """Return a drive of the closed loop in memory."""
-    lives = np.isfinite(loop.outputs["mode"])
-    drive = Drive(loop.t[lives], {name: values[lives] for name, values in loop.outputs.items()}, {})
-    return Driven(scenario, vehicle, seed, drive, Drive(loop.t, loop.truth, {}))
+def drive_in_memory(scenario: Scenario, vehicle: Config, seed: int) -> Driven:
+    """Drive a scenario in the closed loop in memory."""
+    loop = run(new_loop(scenario, vehicle, seed))
+    drive, truth = _where_it_lives(loop.t, loop.outputs), Drive(loop.t, loop.truth, {})
+    return Driven(scenario, vehicle, seed, drive, truth)
+
+
+def _where_it_lives(t: Vector, outputs: Mapping[str, Vector]) -> Drive:
+    lives = np.isfinite(outputs["mode"])
+    return Drive(t[lives], {name: values[lives] for name, values in outputs.items()}, {})
 
 
 def verdicts(driven: Driven, expected: Sequence[Expectation]) -> list[Verdict]:
@@ -55,11 +60,10 @@ def verdicts(driven: Driven, expected: Sequence[Expectation]) -> list[Verdict]:
 
 def judge_simulated(simulated: Simulated, seed: int) -> int:
     """Print the verdicts; return 1 if an expectation is not met, else 0. `seed`: of the drive."""
-    columns = zip(OUTPUT_COLUMNS, simulated.outputs.T, strict=True)
-    truth = dict(zip(TRUTH_COLUMNS, simulated.truth.T, strict=True))
-    loop = InMemory(simulated.t, {}, dict(columns), truth, new_record(FRAME, 0))
-    driven = driven_in_memory(simulated.scenario, simulated.vehicle, seed, loop)
-    found = verdicts(driven._replace(path=simulated.path), simulated.scenario.expect)
+    scenario, t = simulated.scenario, simulated.t
+    drive = _where_it_lives(t, dict(zip(OUTPUT_COLUMNS, simulated.outputs.T, strict=True)))
+    truth = Drive(t, dict(zip(TRUTH_COLUMNS, simulated.truth.T, strict=True)), {})
+    found = verdicts(Driven(scenario, simulated.vehicle, seed, drive, truth, simulated.path), scenario.expect)
     for verdict in found:
         print(verdict.line)
     give(verdicts=found)

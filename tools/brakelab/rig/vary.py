@@ -26,10 +26,9 @@ from brakelab.results.progress import tracked
 from brakelab.results.text_table import Table, show
 from brakelab.rig.junit import junit_text
 from brakelab.rig.live import make_folder
-from brakelab.rig.simulated import driven_in_memory, verdicts
+from brakelab.rig.simulated import drive_in_memory, verdicts
 from brakelab.rig.verdicts import Verdict
 from brakelab.simulation.car_parameters import NUMBER, parameter
-from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.scenario import Scenario, load_scenario
 from brakelab.simulation.scenario_car import with_plant_for
 from ecu.errors import UserError
@@ -113,8 +112,7 @@ def car_text(car: Car) -> str:
 def judged(job: tuple[Scenario, Config, int]) -> list[Verdict]:
     """Drive a scenario in memory; return the verdicts."""
     scenario, vehicle, seed = job
-    driven = driven_in_memory(scenario, vehicle, seed, run(new_loop(scenario, vehicle, seed)))
-    return verdicts(driven, scenario.expect)
+    return verdicts(drive_in_memory(scenario, vehicle, seed), scenario.expect)
 
 
 class Run(NamedTuple):

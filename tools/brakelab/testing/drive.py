@@ -20,9 +20,8 @@ from brakelab.report.drive import Drive, read_drive, start_ns
 from brakelab.rig.live import choose_bus
 from brakelab.rig.live import drive as drive_on_bus
 from brakelab.rig.results import write_recorded
-from brakelab.rig.simulated import Driven, driven_in_memory, verdicts
+from brakelab.rig.simulated import Driven, drive_in_memory, verdicts
 from brakelab.rig.vehicle_node import warm_up
-from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.expectations import Expectation, What
 from brakelab.simulation.faults import Fault, Kind
 from brakelab.simulation.scenario import Scenario, load_scenario
@@ -205,9 +204,7 @@ class Plant:
             if self._folder is not None:
                 self._ecu.driven = _in_real_time(asked, config, seed, self._folder)
                 return
-            vehicle = load_config(config)
-            driven = run(new_loop(asked, vehicle, seed))
-        self._ecu.driven = driven_in_memory(asked, vehicle, seed, driven)
+            self._ecu.driven = drive_in_memory(asked, load_config(config), seed)
 
     def _content(self, scenario: AnyPath | Mapping[str, Any]) -> dict[str, Any]:
         if isinstance(scenario, Mapping):
