@@ -1,14 +1,16 @@
 """Tables of the studies that give the same each time, as committed: of two cars, or all that a study has.
 
-Those of a minute are studies for `make studies`; energy, thermal, wear, dust, cycles, compensation, lab,
-stops, vehicle and lies take longer still, `observers` prints times. See `reference.py`.
+Their pictures are drawn. Those of a minute are studies for `make studies`; energy, thermal, wear, dust, cycles,
+compensation, lab, stops, vehicle and lies take longer still, `observers` prints times. See `reference.py`.
 """
 
-import json
+from importlib import import_module
+from pathlib import Path
 
 import pytest
 
-from ecu import cli
+from brakelab.bench.registry import MODULES
+from brakelab.studies.study import Asked, Study
 
 from .reference import ROUNDED, check
 
@@ -23,10 +25,13 @@ from .reference import ROUNDED, check
         ),
     ],
 )
-def test_a_study_gives_the_committed_tables(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["bench", name, "--seeds", "2", "--json"]) == 0
-    tables = json.loads(capsys.readouterr().out)["tables"]
+def test_a_study_gives_the_committed_tables(name: str, tmp_path: Path) -> None:
+    study: Study = import_module(f"brakelab.{MODULES[name]}").STUDY
+    measured = study.run(Asked(seeds=2))
     parts = {
-        table["title"]: "\n".join(map("\t".join, [table["columns"], *table["rows"]])) for table in tables
+        table.title: "\n".join(map("\t".join, [table.columns, *table.rows])) for table in measured.tables
     }
     check(f"bench {name}", parts, ROUNDED)
+    if measured.draw is not None:
+        measured.draw(tmp_path)
+        assert list(tmp_path.iterdir())

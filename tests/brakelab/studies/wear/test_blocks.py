@@ -5,9 +5,7 @@ import pytest
 
 from brakelab.plant.wear_rig import AIR, TORQUE, T, wear_block
 from brakelab.simulation.campaigns.wear_blocks import drawn_car
-from brakelab.studies.study import Asked
-from brakelab.studies.wear import blocks
-from brakelab.studies.wear.blocks import DRIVERS, pair_of, repeated
+from brakelab.studies.wear.blocks import pair_of, repeated
 from brakelab.studies.wear.blocks_rig import CHECK_OFF, corner_of, energy_error, run_stops
 
 CORNER = corner_of(drawn_car(1), 0)
@@ -65,13 +63,3 @@ def test_new_linings_wear_more_at_first():
     assert found.rig[0] > 1.1 * found.rig[-1]
     assert 0.01 < found.without_weather < 0.2
     assert (np.diff(found.energy) > 0.0).all()
-
-
-@pytest.mark.study
-def test_the_page_has_every_block_and_claim(monkeypatch):
-    monkeypatch.setattr(blocks, "picture", lambda file, panels, legend: panels)
-    measured = blocks.STUDY.run(Asked(seeds=1))
-    tables, panels = measured.tables, measured.draw
-    assert len(tables[0].rows) == 4 * len(DRIVERS)
-    assert len(tables[1].rows) == 6
-    assert len(panels) == 6
