@@ -133,6 +133,7 @@ def test_the_run_that_fails_is_named_with_its_car(tmp_path: Path, capsys: pytest
         (("--lock-step", "-i", "virtual", "-c", "x"), "-i, -c: --lock-step drives in memory; leave one out"),
         (("--vary", "mass=1..2"), "--vary: drives in memory; add --lock-step"),
         (("--vary", "mass=5..2", "--lock-step"), "--vary: mass=5..2: give the lower number first"),
+        (("--vary", "mass=1.9", "--lock-step"), "[car]: mass = 1.9: the drawn car has 2"),
     ],
 )
 def test_what_does_not_fit_is_refused(
@@ -140,6 +141,12 @@ def test_what_does_not_fit_is_refused(
 ) -> None:
     assert rig(tmp_path, *arguments) == 2
     assert told in capsys.readouterr().err
+
+
+def test_verdicts_are_not_written_over_the_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    junit = str(tmp_path / "out/vary.parquet")
+    assert rig(tmp_path, "--lock-step", "--vary", "mass=1900", "--junit", junit) == 2
+    assert f"--junit: {junit}: has the runs themselves" in capsys.readouterr().err
 
 
 def test_a_folder_in_the_place_of_the_results_is_told_before_the_runs(

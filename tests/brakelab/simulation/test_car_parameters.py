@@ -65,6 +65,13 @@ def test_a_mistake_is_one_line(tmp_path: Path, line: str, told: str) -> None:
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("car", [{"mass": 1.9}, {"mass": 1.9e6}, {"free_radius_fl": 350.0}])
+def test_another_unit_than_the_car_s_is_refused(car: dict[str, float | str]) -> None:
+    ((name, value),) = car.items()
+    with pytest.raises(UserError, match=rf"^\[car\]: {name} = {value}: the drawn car has \d"):
+        new_vehicle(Scenario.model_validate(STOP | {"car": car}), 3)
+
+
 def test_all_are_parameters_of_the_car_and_documented() -> None:
     page = (Path(__file__).parents[3] / "docs/rig.md").read_text("utf-8")
     for name, (unit, _) in PARAMETERS.items():

@@ -133,9 +133,10 @@ def worst(runs: Sequence[Run]) -> Table:
         least = min(group, key=lambda one: one.verdict.margin)
         failed = sum(not one.verdict.passed for one in group)
         cells = (scenario, expected, f"{failed} of {len(group)}", least.verdict.found, car_text(least.car))
-        rows.append((-failed / len(group), least.verdict.margin, cells))
+        rows.append((failed / len(group), cells))
+    rows.sort(key=lambda row: row[0], reverse=True)
     columns = ("scenario", "expected", "failed", "worst: found", "of the car")
-    return Table("The worst of each expectation", columns, [row for *_, row in sorted(rows)], "")
+    return Table("The worst of each expectation", columns, [cells for _, cells in rows], "")
 
 
 def write_runs(path: Path, runs: Sequence[Run]) -> None:
@@ -170,6 +171,8 @@ def vary(
     check_outputs(out, written[:1], ())
     if junit is not None:
         check_outputs(junit, (junit,), [*config_files(config), *names], option="--junit")
+        if junit.absolute() == written[0].absolute():
+            raise UserError("--junit", str(junit), "has the runs themselves; choose another name")
     make_folder(out)
     jobs: list[tuple[Scenario, Config, int]] = []
     for shipped in scenarios:

@@ -45,6 +45,8 @@ def _verdict(one: Expectation, seen: Figures, longer: float, faults: Sequence[Fa
         case "bit":
             bits = seen.reactions[one.fault - 1].bits if one.t is None else raised(drive, one.t)
             return _in_time(one, dict(bits).get(one.fault_bit.name, math.nan))
+        case "no_bit" if one.t is not None and one.t > seen.truth.t[-1]:
+            return _yes_or_no(one, f"the run ended at t = {seen.truth.t[-1]:.3g} s", passed=False)
         case "no_bit":
             rows = (drive.t >= (one.t or 0.0)) & (drive.t <= seen.truth.t[-1])
             rows &= (fault_masks(drive) & one.fault_bit.bit) != 0

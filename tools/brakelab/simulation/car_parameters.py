@@ -7,11 +7,12 @@ import math
 import re
 from typing import Annotated, Any, Final
 
+import numpy as np
 from pydantic import BeforeValidator
 
 from brakelab.plant.records import PARAMS, RecordArray
 from ecu.contract.signals import CORNERS
-from ecu.errors import closest
+from ecu.errors import UserError, closest
 
 PARAMETERS: Final = {
     "mass": ("kg", 1.0),
@@ -34,6 +35,8 @@ PARAMETERS: Final = {
     "cooling": ("1/s", 1.0),
 }
 """Of `brakelab.plant.records.PARAMS`: unit here, and what turns it into the record's."""
+FARTHEST: Final = 30.0
+"""A value farther from the drawn car's is one of another unit."""
 _WHEELS: Final = {"_front": slice(0, 2), "_rear": slice(2, 4)} | {
     f"_{corner}": slice(place, place + 1) for place, corner in enumerate(CORNERS)
 }
@@ -70,16 +73,26 @@ CarParameters = Annotated[dict[str, float | str], BeforeValidator(_checked)]
 
 
 def set_parameters(params: RecordArray, car: CarParameters) -> None:
-    """Set parameters of a drawn car, `PARAMS` of shape (1,); what names fewer wheels goes before."""
+    """Set parameters of a drawn car, `PARAMS` of shape (1,); what names fewer wheels goes before.
+
+    Raises:
+        UserError: a value in a unit is `FARTHEST` times the drawn one, or that part of it.
+    """
     drawn = params.copy()
     for name in sorted(car, key=_wheels, reverse=True):
         stem, wheels = parameter(name)
         share = _SHARE.fullmatch(str(car[name]))
         rows: Any = ... if wheels == slice(None) else (slice(None), wheels)
         unit = PARAMETERS[stem][1]
-        params[stem][rows] = (
-            drawn[stem][rows] * (0.01 * float(share[1])) if share else unit * float(car[name])
-        )
+        was = drawn[stem][rows]
+        if share:
+            params[stem][rows] = was * (0.01 * float(share[1]))
+            continue
+        params[stem][rows] = unit * float(car[name])
+        ratio = params[stem][rows] / was
+        if not ((ratio > 1.0 / FARTHEST) & (ratio < FARTHEST)).all():
+            drawn_one = f"{np.mean(was) / unit:.4g} {PARAMETERS[stem][0]}"
+            raise UserError("[car]", f"{name} = {car[name]}", f"the drawn car has {drawn_one}")
 
 
 def _wheels(name: str) -> int:
