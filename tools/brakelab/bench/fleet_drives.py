@@ -10,9 +10,7 @@ A car is drawn once; its drives, half a week apart, differ in route, weather and
 import argparse
 import json
 import time
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
@@ -22,6 +20,7 @@ import numpy as np
 from brakelab.fleet.job import Job, Outcome
 from brakelab.fleet.task import replay_job
 from brakelab.logs.candump_text import candump_text
+from brakelab.results.processes import new_pool
 from brakelab.results.progress import progress_bar
 from brakelab.simulation.closed_loop import START_NS, VEHICLE_BUS, new_loop, run, run_blocks
 from brakelab.simulation.scenario import Scenario
@@ -141,7 +140,7 @@ def main() -> None:
         for drive, path in enumerate(drives)
     ]
     with (
-        ProcessPoolExecutor(given.workers, get_context("spawn")) as pool,
+        new_pool(given.workers) as pool,
         progress_bar("simulate", len(tasks)) as advance,
     ):
         for _ in pool.map(_task, tasks):

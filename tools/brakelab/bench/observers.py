@@ -1,11 +1,10 @@
 """`brake-ecu bench observers`: the observers beside their goals, and the time of a step with each."""
 
 from collections.abc import Callable, Iterable
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from typing import Final
 
 from brakelab.bench.observer_times import step_times
+from brakelab.results.processes import new_pool
 from brakelab.results.progress import tracked
 from brakelab.studies.accuracy.observers import Sample, Task, observer_rows, tasks
 from brakelab.studies.accuracy.observers_cases import configured
@@ -27,7 +26,7 @@ TEXT: Final = (
 
 def _run(asked: Asked) -> Measured:
     seeds, todo = asked.seeds, tasks(asked.seeds, asked.draw)
-    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+    with new_pool() as pool:
 
         def all_cores(drive: Callable[[Task], list[Sample]], cars: list[Task]) -> Iterable[list[Sample]]:
             return tracked(pool.map(drive, cars), "observers", len(cars))

@@ -5,7 +5,6 @@ sits between them and the client. A scheduler elsewhere has to be one of TLS the
 configuration says `distributed.comm.require-encryption: false`.
 """
 
-import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
@@ -14,6 +13,7 @@ from typing import Any, Final, NamedTuple
 from urllib.parse import urlsplit
 
 from brakelab.fleet.local import LocalWorkers, WorkerDied
+from brakelab.results.processes import cores
 from ecu import __version__
 from ecu.errors import UserError
 
@@ -42,7 +42,7 @@ def connect(scheduler: str | None, workers: int | None) -> Iterator[Workers]:
             have another version of this program.
     """
     if scheduler is None:
-        count = workers or _cores()
+        count = workers or cores()
         with LocalWorkers(count) as local:
             yield Workers(local, lambda: count, WorkerDied)
         return
@@ -64,10 +64,6 @@ def connect(scheduler: str | None, workers: int | None) -> Iterator[Workers]:
             lambda: QUEUED * max(sum(client.nthreads().values()), 1),
             KilledWorker,
         )
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _refuse_open(scheduler: str) -> None:

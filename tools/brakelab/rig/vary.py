@@ -7,12 +7,9 @@ verdicts, in `vary.parquet` and with `--junit`.
 
 import json
 import math
-import os
 import re
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from itertools import product
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -22,7 +19,7 @@ from scipy.stats import qmc
 
 from brakelab.results.console import new_console
 from brakelab.results.outputs import check_outputs, config_files, write_text
-from brakelab.results.progress import tracked
+from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table, show
 from brakelab.rig.junit import junit_text
 from brakelab.rig.live import make_folder
@@ -179,10 +176,7 @@ def vary(
         scenario = with_plant_for(shipped, plant, vehicle, out / "plant")
         jobs += [(scenario.model_copy(update={"car": scenario.car | car}), vehicle, seed) for car in given]
     of_runs = [(path.stem, car) for path in names for car in given]
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads of their own in every process cost more
-    workers = min(len(os.sched_getaffinity(0)), len(jobs))
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        done = list(tracked(pool.map(judged, jobs), f"{len(jobs)} runs", len(jobs)))
+    done = run_each(f"{len(jobs)} runs", judged, jobs)
     found = [Run(*one, verdict) for one, some in zip(of_runs, done, strict=True) for verdict in some]
     show(new_console(WIDTH), worst(found))
     write_runs(written[0], found)

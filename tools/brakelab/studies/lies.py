@@ -4,12 +4,10 @@ Twelve brakings of 4 m/s^2 from 28 m/s by an automated demand; from `BEGIN` on o
 frame, lie. `lies_cell.py` says what is measured of a drive.
 """
 
-from concurrent.futures import ProcessPoolExecutor
 from itertools import product
-from multiprocessing import get_context
 from typing import Final, NamedTuple
 
-from brakelab.results.progress import tracked
+from brakelab.results.processes import run_each
 from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.faults import Fault
 from brakelab.simulation.scenario import Phase, Scenario
@@ -158,5 +156,4 @@ def _one(task: tuple[str, str, str, int]) -> list[Cell]:
 def all_cells(seed: int = 1) -> list[Cell]:
     """Drive every input by every car on every road, on all cores."""
     tasks = [(*cell, seed) for cell in product(CARS, ROADS, INPUTS)]
-    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
-        return [cell for found in tracked(pool.map(_one, tasks), "lies", len(tasks)) for cell in found]
+    return [cell for found in run_each("lies", _one, tasks) for cell in found]

@@ -12,6 +12,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from brakelab.results.processes import cores
 from ecu.jit import compiler_version
 
 NOT_INSTALLED: Final = "{} not installed: in the repository pip install '.[dev]'"
@@ -91,10 +92,9 @@ def installed(package: str) -> str:
 
 def machine() -> str:
     """Return one line: processor, cores, load, Python, numba, numpy."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     load = f", load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
     return (
-        f"{_processor()}, {cores} cores{load}; {platform.system()} {platform.release()}; "
+        f"{_processor()}, {cores()} cores{load}; {platform.system()} {platform.release()}; "
         f"Python {platform.python_version()}, numba {compiler_version()}, numpy {np.__version__}"
     )
 

@@ -11,8 +11,7 @@ at their edge; of those within the quarter, the least criterion.
 """
 
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
+from concurrent.futures import as_completed
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -22,6 +21,7 @@ from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.fit import Fitted, error_of, fit, refit
 from brakelab.identify.friction.stops import Stops, some
 from brakelab.plant.friction.law import Law, RigBrake
+from brakelab.results.processes import new_pool
 
 HELD_OUT: Final = 0.2
 TIE: Final = 1.05
@@ -86,7 +86,7 @@ def identify(
     names = [candidate.name for candidate in candidates(stops, columns.brake, own)]
     jobs = [_Job(name, columns.brake, stops, unseen, own) for name in names]
     done: dict[str, Judged] = {}
-    with ProcessPoolExecutor(PROCESSES, mp_context=get_context("spawn")) as pool:
+    with new_pool(PROCESSES) as pool:
         running = [pool.submit(judge, job) for job in reversed(jobs)]  # the slowest first
         for future in as_completed(running):
             judged = future.result()

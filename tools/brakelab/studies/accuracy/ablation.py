@@ -14,6 +14,7 @@ import numpy as np
 
 from brakelab.arrays import Vector
 from brakelab.plant.sensor_errors import ABSENT
+from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
 from brakelab.simulation.accuracy import AXLES, estimate_errors
 from brakelab.simulation.closed_loop import Drive, new_loop, plans, run
@@ -21,7 +22,6 @@ from brakelab.simulation.ecu_inputs import ecu_inputs, vehicle_frames
 from brakelab.simulation.scenario import Scenario
 from brakelab.studies.accuracy.observers import ORDINARY, counted
 from brakelab.studies.accuracy.observers_cases import ACCURACY, configured, shipped
-from brakelab.studies.cars import each_car
 from brakelab.studies.study import Asked, Measured, Study
 from ecu.algorithm.estimation.joint.layout import (
     BIAS,
@@ -210,7 +210,7 @@ TEXT: Final = (
 
 
 def _run(asked: Asked) -> Measured:
-    cars = each_car("ablation", samples_of, min(asked.seeds, CARS))
+    cars = run_each("ablation", samples_of, range(min(asked.seeds, CARS)))
     return Measured([ablation_table(cars)])
 
 

@@ -18,6 +18,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from brakelab.arrays import Vector
+from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
 from brakelab.simulation.accuracy import AXLES, estimate_errors
 from brakelab.simulation.scenario_car import with_draw
@@ -50,7 +51,6 @@ from brakelab.studies.accuracy.linear_bound import filtered, sampled
 from brakelab.studies.accuracy.observers import JOINT, ORDINARY, counted, drive_car
 from brakelab.studies.accuracy.observers_cases import ACCURACY, Setup, configured, goals, shipped
 from brakelab.studies.accuracy.observers_table import ROUNDING
-from brakelab.studies.cars import each_car
 from brakelab.studies.study import Asked, Measured, Study
 from ecu.algorithm.estimation.joint import layout
 from ecu.algorithm.step import new_state
@@ -224,7 +224,7 @@ TEXT: Final = (
 
 
 def _run(asked: Asked) -> Measured:
-    return Measured([bound_table(each_car("bound", bounds_of, min(asked.seeds, CARS)))])
+    return Measured([bound_table(run_each("bound", bounds_of, range(min(asked.seeds, CARS))))])
 
 
 STUDY: Final = Study("What the sensors allow", TEXT, _run)

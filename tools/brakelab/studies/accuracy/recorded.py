@@ -20,13 +20,13 @@ from brakelab.replay.source import load_source
 from brakelab.replay.summary import peers
 from brakelab.results.brakes import BrakeBook, BrakeRow
 from brakelab.results.prediction import corners, errors
+from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
 from brakelab.simulation.closed_loop import Drive, new_loop, run
 from brakelab.simulation.scenario import Phase, Scenario
 from brakelab.simulation.simulate import write_columns
 from brakelab.studies.accuracy.observers_cases import shipped
 from brakelab.studies.accuracy.table import spread
-from brakelab.studies.cars import each_car
 from brakelab.studies.measure import figure
 from brakelab.studies.study import Asked, Measured, Study
 from brakelab.studies.verdict import Goal, verdict
@@ -214,7 +214,7 @@ TEXT: Final = (
 
 
 def _run(asked: Asked) -> Measured:
-    cars = each_car("recorded", recorded_of, min(asked.seeds, CARS))
+    cars = run_each("recorded", recorded_of, range(min(asked.seeds, CARS)))
     return Measured([recorded_table(cars)])
 
 

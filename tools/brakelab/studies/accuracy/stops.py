@@ -8,15 +8,14 @@ compensation  mean of |achieved - wanted| / wanted; wanted is the demand, or the
 """
 
 from collections.abc import Callable, Iterable
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from itertools import product
-from multiprocessing import get_context
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from brakelab.arrays import Vector
+from brakelab.results.processes import new_pool
 from brakelab.results.progress import tracked
 from brakelab.results.text_table import Table
 from brakelab.simulation.accuracy import AXLES, achieved_decel, friction_errors, window
@@ -242,7 +241,7 @@ def drawn_of(name: str, config: Config, asked: Asked) -> str:
 def _run(asked: Asked) -> Measured:
     path = resource("config/suv.toml")
     config = load_config(path)
-    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+    with new_pool() as pool:
 
         def all_cores(drive: Case, cases: list[Named]) -> Iterable[Result]:
             results = pool.map(drive, cases)

@@ -25,12 +25,12 @@ from brakelab.replay.quality import Findings
 from brakelab.replay.source import load_source
 from brakelab.results.brakes import BrakeBook
 from brakelab.results.prediction import errors
+from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
 from brakelab.simulation.closed_loop import Drive, new_loop, run
 from brakelab.simulation.scenario import Scenario, Trace
 from brakelab.simulation.simulate import write_columns
 from brakelab.studies.accuracy.observers_cases import shipped
-from brakelab.studies.cars import each_car
 from brakelab.studies.study import Asked, Measured, Study
 from ecu.contract.signals import CORNERS
 from ecu.settings.config import Config, load_config, new_params
@@ -275,7 +275,7 @@ TEXT: Final = (
 
 
 def _run(asked: Asked) -> Measured:
-    cars = each_car("vehicle", identified_of, min(asked.seeds, CARS))
+    cars = run_each("vehicle", identified_of, range(min(asked.seeds, CARS)))
     return Measured(identified_tables(cars))
 
 

@@ -1,11 +1,10 @@
 """`brake-ecu bench compensation`: what compensation is worth."""
 
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Final
 
 from brakelab.results.chart import write_chart
+from brakelab.results.processes import new_pool
 from brakelab.studies.control.compensation import drive_cars
 from brakelab.studies.control.compensation_picture import LEGEND, pictured
 from brakelab.studies.control.compensation_table import compensation_tables
@@ -26,7 +25,7 @@ TEXT: Final = (
 
 def _run(asked: Asked) -> Measured:
     config = load_config(resource("config/suv.toml"))
-    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+    with new_pool() as pool:
         cars = drive_cars(config, spread=pool.map)
 
     def draw(folder: Path) -> None:

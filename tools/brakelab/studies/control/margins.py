@@ -14,15 +14,14 @@ on the friction in use is neglected: it makes the loop slower still.
 """
 
 from collections.abc import Callable, Iterable
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
-from multiprocessing import get_context
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Line, Panel
+from brakelab.results.processes import new_pool
 from brakelab.results.text_table import Table
 from brakelab.simulation.accuracy import AXLES, columns
 from brakelab.simulation.closed_loop import FrictionOverride, new_loop, run
@@ -216,7 +215,7 @@ TEXT: Final = (
 
 def _run(asked: Asked) -> Measured:
     config = load_config(resource("config/suv.toml"))
-    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+    with new_pool() as pool:
         cars = measure_cars(config, spread=pool.map)
     drawn = picture("control-margins.svg", margin_panels(cars), LEGEND)
     return Measured(margin_tables(cars), draw=drawn)

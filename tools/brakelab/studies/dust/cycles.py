@@ -6,8 +6,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from brakelab.results import euro7
+from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
-from brakelab.studies.cars import each_car
 from brakelab.studies.dust.cycle_cars import (
     SHIPPED,
     Shipped,
@@ -227,9 +227,9 @@ TEXT: Final = (
 
 
 def _run(asked: Asked) -> Measured:
-    cars = each_car("cycles", drive_shipped, len(SHIPPED))
+    cars = run_each("cycles", drive_shipped, range(len(SHIPPED)))
     names = [car.config for car in SHIPPED if car.config == car.plant]
-    draws = {name: each_car("cycles", partial(draw_car, name=name), DRAWS) for name in names}
+    draws = {name: run_each("cycles", partial(draw_car, name=name), range(DRAWS)) for name in names}
     tables = [
         Table(
             "Beside the limits",

@@ -7,8 +7,8 @@ import numpy as np
 
 from brakelab.identify.dust.page import LEGEND, THESIS, dust_panels, spearman_table, trip_table
 from brakelab.results import euro7
+from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
-from brakelab.studies.cars import each_car
 from brakelab.studies.dust.study import Draw, OnBoard, draw_trips, drive_on_board, pictured
 from brakelab.studies.study import Asked, Measured, Study, picture
 from brakelab.studies.verdict import Goal, verdict
@@ -153,9 +153,9 @@ TEXT: Final = (
 
 def _run(asked: Asked) -> Measured:
     draws = min(asked.seeds, DRAWS)
-    many = each_car("dust", draw_trips, draws)
-    quiet = each_car("dust", partial(draw_trips, quiet=True), min(draws, QUIET_DRAWS))
-    cars = each_car("dust", drive_on_board, min(draws, CARS))
+    many = run_each("dust", draw_trips, range(draws))
+    quiet = run_each("dust", partial(draw_trips, quiet=True), range(min(draws, QUIET_DRAWS)))
+    cars = run_each("dust", drive_on_board, range(min(draws, CARS)))
     trips, judged, chosen = pictured()
     tables = [*dust_tables(many, quiet, cars), trip_table(trips), spearman_table(trips)]
     return Measured(tables, draw=picture("dust.svg", dust_panels(trips, judged, chosen), LEGEND))

@@ -4,9 +4,9 @@ from functools import partial
 from pathlib import Path
 from typing import Final, NamedTuple
 
+from brakelab.results.processes import run_each
 from brakelab.results.progress import tracked
 from brakelab.studies.accuracy.observers_table import finite
-from brakelab.studies.cars import each_car
 from brakelab.studies.entries.drives import car_tracks, real_drive
 from brakelab.studies.entries.export import export_car, new_folder
 from brakelab.studies.entries.ours import OURS
@@ -46,7 +46,7 @@ def measure_entries(asked: Asked) -> Measured:
     car, log = _drive(entered.drive)
     real = None if log is None else real_drive(car, log)
     say(f"cars to drive: {cars}, heard by {len(names)} entries; minutes")
-    results = each_car(ENTRIES, partial(judge_car, names), cars)
+    results = run_each(ENTRIES, partial(judge_car, names), range(cars))
     predictions = {} if real is None else predict_all(names, real)
     found = standings(results, predictions)
     rows = [{"rank_error": one.rank_error, **_plain(one)} for one in found]

@@ -1,12 +1,10 @@
 """All that `brake-ecu bench lab` measures."""
 
-import os
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from itertools import product
-from multiprocessing import get_context
 from typing import NamedTuple
 
+from brakelab.results.processes import new_pool
 from brakelab.studies.lab.brakes import DRAWS, R2_DRAWS, Brake, Recovered, measure, recovered
 from brakelab.studies.lab.choice import Choice, choices
 from brakelab.studies.lab.discovery import Draw, PadTerms, discovered, jobs, pad_terms
@@ -31,13 +29,11 @@ class Lab(NamedTuple):
 
 def run_lab(progress: Callable[[str], None]) -> Lab:
     """Return all results; `progress` is told a line at a time. Minutes, on two cores."""
-    # Small matrices: threads of their own in every process cost more than they give.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     brakes = {}
     for brake in BRAKES:
         brakes[brake] = measure(brake, progress)
         progress(f"{brake}: CPC simulated and all laws identified in {brakes[brake].seconds:.0f} s")
-    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+    with new_pool(2) as pool:
         on_road, searched = pool.submit(trips), pool.submit(searches)
         sets = [*product(("R1",), BRAKES, range(DRAWS)), *product(("R2",), BRAKES, range(R2_DRAWS))]
         found = list(pool.map(recovered, sets))

@@ -10,8 +10,8 @@ from brakelab.identify.thermal.model import ROW
 from brakelab.identify.thermal.page import cooling_panel
 from brakelab.identify.thermal.result import SYMBOLS, values_of
 from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Line, Panel
+from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
-from brakelab.studies.cars import each_car
 from brakelab.studies.study import Asked, Measured, Study, picture
 from brakelab.studies.thermal.study import JUDGED, Appraised, Car, Series, drive_car
 from brakelab.studies.verdict import Goal, verdict
@@ -170,7 +170,7 @@ TEXT: Final = (
 
 
 def _run(asked: Asked) -> Measured:
-    cars = each_car("thermal", drive_car, min(asked.seeds, CARS))
+    cars = run_each("thermal", drive_car, range(min(asked.seeds, CARS)))
     drawn = picture("disc-temperature.svg", thermal_panels(cars), LEGEND)
     return Measured(thermal_tables(cars), draw=drawn)
 

@@ -7,8 +7,8 @@ import numpy as np
 from brakelab.arrays import Array
 from brakelab.identify.wear.fit import TERMS
 from brakelab.results.chart import BLUE, GREY, ORANGE, PINK, Line, Panel
+from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
-from brakelab.studies.cars import each_car
 from brakelab.studies.study import Asked, Measured, Study, picture
 from brakelab.studies.verdict import Goal, met, verdict
 from brakelab.studies.wear.drives import CarDrives, drive_car
@@ -202,7 +202,7 @@ TEXT: Final = (
 
 
 def _run(asked: Asked) -> Measured:
-    cars = each_car("wear", drive_car, min(asked.seeds, CARS))
+    cars = run_each("wear", drive_car, range(min(asked.seeds, CARS)))
     laws = dynamometer_laws()
     lives = wear_lives(cars, laws)
     drawn = picture("wear.svg", wear_panels(lives, len(cars)), LEGEND)
