@@ -42,7 +42,7 @@ EXPORTS = {
 def test_a_manifest_is_what_a_spreadsheet_writes(tmp_path: Path, text: bytes) -> None:
     (tmp_path / "manifest.csv").write_bytes(text)
     row = {"block": "kühl", "file": "b1.csv", "mass_before": "905.123"}
-    assert read_manifest(tmp_path / "manifest.csv") == [row]
+    assert read_manifest(tmp_path / "manifest.csv") == [(2, row)]
 
 
 BLOCKS = {
@@ -98,6 +98,7 @@ def test_what_is_no_number_is_named(tmp_path: Path, text: str, line: str) -> Non
         ),  # run once more: another mass
         (("a.csv,1,12.1", "b.csv,2,12.1", "c.csv,3,12.3"), "line 3"),
         (("a.csv,1,12.1", "c.csv,2,12.3", "a.csv,3,12.1"), "line 4"),
+        (("a.csv,1,12.1", "", "c.csv,2,12.3", "", "a.csv,3,12.1"), "line 6"),
     ],
 )
 def test_a_measurement_counts_once(tmp_path: Path, rows: tuple[str, ...], line: str | None) -> None:

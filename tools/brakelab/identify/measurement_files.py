@@ -46,8 +46,8 @@ _EPOCH: Final = datetime.date(2000, 1, 1).toordinal()
 """Seconds are counted from here: of today's dates a microsecond is left."""
 
 
-def read_manifest(path: Path) -> list[dict[str, str]]:
-    """Return the rows of a CSV manifest, as spreadsheets write them; decimal commas are points.
+def read_manifest(path: Path) -> list[tuple[int, dict[str, str]]]:
+    """Return the rows of a CSV manifest, each with its line in the file; decimal commas are points.
 
     Raises:
         UserError: it cannot be read.
@@ -60,10 +60,11 @@ def read_manifest(path: Path) -> list[dict[str, str]]:
     names = text.partition("\n")[0]
     delimiter = max(",;\t", key=names.count)
     rows = csv.DictReader(io.StringIO(text), delimiter=delimiter)
-    return [
-        {name.strip(): _DECIMAL.sub(r"\1.\2", (cell or "").strip()) for name, cell in row.items() if name}
-        for row in rows
-    ]
+    return [(rows.line_num, _cells(row)) for row in rows]
+
+
+def _cells(row: dict[str, str]) -> dict[str, str]:
+    return {name.strip(): _DECIMAL.sub(r"\1.\2", (cell or "").strip()) for name, cell in row.items() if name}
 
 
 def _decoded(given: bytes) -> str:
@@ -89,16 +90,16 @@ def open_campaign(
     vehicle = load_config(config)
     written = out, out.with_suffix(".md"), out.with_suffix(".svg")
     rows = read_manifest(manifest)
-    files = [manifest.parent / row["file"] for row in rows if row.get("file")]
+    files = [manifest.parent / row["file"] for _, row in rows if row.get("file")]
     _refuse_repeated(manifest, rows)
     check_outputs(out, written, [manifest, *files, *config_files(config)], toml=True)
     return vehicle, written
 
 
-def _refuse_repeated(manifest: Path, rows: Sequence[dict[str, str]]) -> None:
+def _refuse_repeated(manifest: Path, rows: Sequence[tuple[int, dict[str, str]]]) -> None:
     """Refuse a measurement that counts twice: a file of the same bytes with the same masses or counts."""
     first: dict[tuple[str, ...], int] = {}
-    for line, row in enumerate(rows, start=2):
+    for line, row in rows:
         path = manifest.parent / row.get("file", "")
         if path.is_file():
             measured = (log_hash(path), *(cell for name, cell in row.items() if name not in NAMES))

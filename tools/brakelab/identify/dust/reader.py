@@ -59,7 +59,7 @@ def read_trips(manifest: Path, config: Config, axle: str) -> list[Applications]:
     """
     trips = []
     columns = Columns.contract(IN_ORDER, "m/s", config, axle)
-    for line, row in enumerate(read_manifest(manifest), 2):
+    for line, row in read_manifest(manifest):
         if not row.get("trip") or not row.get("file") or row.get("test") not in ("0", "1"):
             raise UserError(str(manifest), f"line {line}", "needs trip, file and test (1: held out, else 0)")
         path = manifest.parent / row["file"]

@@ -60,7 +60,7 @@ def read_blocks(manifest: Path, config: Config, axle: str) -> list[Block]:
     rows = read_manifest(manifest)
     if not rows:
         raise UserError(str(manifest), "", "no blocks; give a row with block, file, mass_before, mass_after")
-    return [_block(manifest, number, row, config, axle) for number, row in enumerate(rows, 2)]
+    return [_block(manifest, line, row, config, axle) for line, row in rows]
 
 
 def _block(manifest: Path, line: int, row: dict[str, str], config: Config, axle: str) -> Block:
