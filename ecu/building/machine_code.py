@@ -1,8 +1,5 @@
 """Machine code of kernels that Python calls: by numba up to LLVM's text, llvmlite and a C compiler."""
 
-import os
-import shutil
-import subprocess
 import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -13,8 +10,8 @@ from llvmlite import binding, ir  # type: ignore[import-untyped]
 from numba.core import codegen, cpu
 from numba.core.registry import cpu_target
 
+from ecu.building.c_compiler import compile_shared
 from ecu.building.calls import Call
-from ecu.errors import UserError
 from ecu.library import Spec, places_of
 
 RUNTIME: Final = r"""
@@ -234,24 +231,13 @@ def machine_code(whole: Any, processor: str) -> bytes:
     return bytes(machine.emit_object(module))
 
 
-def compiler() -> str | None:
-    """Return the C compiler that links a library, None without one."""
-    return shutil.which(os.environ.get("CC", "cc"))
-
-
 def link_shared(code: bytes, file: Path) -> None:
     """Write an object file as a shared library. Raises UserError: the C compiler cannot."""
     with tempfile.TemporaryDirectory(prefix="brake-ecu-") as folder:
         made, runtime, shared = (Path(folder, name) for name in ("kernels.o", "runtime.c", "kernels.so"))
         made.write_bytes(code)
         runtime.write_text(RUNTIME)
-        options = ["-O2", "-shared", "-fPIC", "-fvisibility=hidden", "-s", "-Wl,--no-undefined", "-lm"]
-        command = [compiler() or "cc", str(made), str(runtime), *options, "-o", str(shared)]
-        try:
-            subprocess.run(command, check=True, capture_output=True, text=True)
-        except (OSError, subprocess.CalledProcessError) as error:
-            words = (getattr(error, "stderr", "") or str(error)).splitlines()[-1][:300]
-            raise UserError(command[0], "", f"{words}; install a C compiler, or set CC to one") from None
+        compile_shared((made, runtime), ("-lm",), shared)
         part = file.with_suffix(".part")
         part.write_bytes(shared.read_bytes())
         part.replace(file)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ecu import jit, library
-from ecu.building.machine_code import compiler
+from ecu.building.c_compiler import compiler
 
 ROOT = Path(__file__).parents[2]
 pytestmark = [

@@ -26,28 +26,16 @@ from brakelab.report.command import report as write_report
 from brakelab.results.files import EXPORTS, brakes_path, read_result
 from brakelab.rig.play.play_log import decoded
 from brakelab.simulation.simulate import simulate as run_scenario
+from brakelab.simulation.vehicle_bus import truth_unit
 from brakelab.table import Table
 from ecu.arguments import config_file, map_file, scenario_file
-from ecu.contract.signals import INPUT_SIGNALS, OUTPUT_SIGNALS
+from ecu.contract.signals import INPUT_SIGNALS
 from ecu.errors import UserError
 
 __all__ = ["Drive", "Result", "Simulation", "Table", "UserError", "load", "replay", "simulate"]
 
 AnyPath = str | os.PathLike[str]
 Change = float | int | bool | str | Sequence[float]
-TRUTH_UNITS = {
-    "t": "s",
-    "distance": "m",
-    "pitch": "rad",
-    "grade": "rad",
-    "heading": "rad",
-    "road_friction": "-",
-    "position_x": "m",
-    "position_y": "m",
-    "rolling_radius": "m",
-    "particles": "-",
-}
-"""Of true values that are neither input nor output."""
 _KEY = re.compile(r"\w+(\.\w+)*", re.ASCII)
 INPUT_UNITS = {signal.name: signal.unit for signal in INPUT_SIGNALS}
 
@@ -259,10 +247,3 @@ def _toml(key: str, value: Change) -> str:
     if text == "null":
         raise UserError("changes", key, f"{value!r} is no value of a configuration")
     return text
-
-
-def truth_unit(name: str) -> str:
-    """Return the unit of a true value, empty: none."""
-    stem = name[:-3] if name[-3:] in ("_fl", "_fr", "_rl", "_rr") else name
-    outputs = {signal.name: signal.unit for signal in OUTPUT_SIGNALS}
-    return (TRUTH_UNITS | outputs).get(stem, INPUT_UNITS.get(name, ""))

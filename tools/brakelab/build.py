@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import NoReturn
 
 from ecu import build
-from ecu.building.machine_code import compiler
+from ecu.building.c_compiler import compiler
 
 
 def _load_workload() -> Callable[[], None]:

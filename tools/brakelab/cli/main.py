@@ -6,9 +6,11 @@ from typing import Annotated
 
 import typer
 
+from brakelab.cli.arguments import Plant, Scenario, Seed
 from brakelab.cli.bench import HELP as BENCH_HELP
 from brakelab.cli.bench import bench
 from brakelab.cli.dynamometer import app as lab_app
+from brakelab.cli.fmu import app as fmu_app
 from brakelab.cli.identify import app as identify_app
 from brakelab.cli.maps import app as map_app
 from ecu.arguments import (
@@ -25,24 +27,15 @@ from ecu.arguments import (
     State,
     scenario_file,
 )
-from ecu.completion import fitting, known, shipped
+from ecu.completion import fitting, shipped
 from ecu.errors import UserError
 from ecu.output import wrote
 from ecu.settings.resources import SCENARIOS, resource
 
-Plant = Annotated[
-    str | None,
-    typer.Option(
-        "--plant",
-        autocompletion=known("as-config", "suv", "suv14", "sedan", "lcv"),
-        metavar="PLANT",
-        help="Simulated car: as-config, file or name (sedan, …); default: SCENARIO's",
-    ),
-]
-
 app = Commands()
 app.add_typer(lab_app, name="lab")
 app.add_typer(identify_app, name="identify")
+app.add_typer(fmu_app, name="fmu")
 app.add_typer(map_app, name="map")
 
 
@@ -66,22 +59,12 @@ def demo(
 
 @app.command()
 def simulate(
-    scenario: Annotated[
-        Path,
-        typer.Argument(
-            parser=scenario_file,
-            autocompletion=shipped(*SCENARIOS),
-            metavar="SCENARIO",
-            help="Scenario file, or name of a shipped one",
-        ),
-    ],
+    scenario: Scenario,
     config: Config,
     out: Annotated[
         Path, typer.Option("--out", metavar="NAME", help="Write NAME.log, NAME.parquet, NAME.truth.parquet")
     ],
-    seed: Annotated[
-        int, typer.Option("--seed", metavar="N", min=0, help="Seed of the drawn vehicle and its noise")
-    ] = 0,
+    seed: Seed = 0,
     draw: Draw = None,
     plant: Plant = None,
 ) -> int:
@@ -115,9 +98,7 @@ def rig(
     lock_step: Annotated[
         bool, typer.Option("--lock-step", help="Run in memory, as fast as possible, instead of on a bus")
     ] = False,
-    seed: Annotated[
-        int, typer.Option("--seed", metavar="N", min=0, help="Seed of the drawn vehicle and its noise")
-    ] = 0,
+    seed: Seed = 0,
     plant: Plant = None,
     junit: Annotated[
         Path | None, typer.Option("--junit", metavar="FILE.xml", help="Write the verdicts as JUnit XML")

@@ -33,7 +33,15 @@ from brakelab.simulation.faults import fault_records
 from brakelab.simulation.scenario import Scenario
 from brakelab.simulation.scenario_car import scenario_plant, scenario_widths
 from ecu.contract import signals
-from ecu.contract.signals import CORNERS, INPUT, N_INPUTS, OUTPUT
+from ecu.contract.signals import (
+    CORNERS,
+    INPUT,
+    INPUT_SIGNALS,
+    N_INPUTS,
+    OUTPUT,
+    OUTPUT_SIGNALS,
+    without_corner,
+)
 from ecu.errors import UserError
 from ecu.jit import Record, kernel
 
@@ -79,10 +87,22 @@ _CORNER_TRUTH: Final = (
     "particles",
 )
 TRUTH_COLUMNS: Final = _SCALAR_TRUTH + tuple(f"{name}_{c}" for name in _CORNER_TRUTH for c in CORNERS)
-"""True values by the contract's names; beyond it: distance and position [m], pitch, heading and grade [rad],
-rolling radius [m], particles emitted so far."""
+"""True values, those of the contract by its names; units: `truth_unit`."""
 N_TRUTH: Final = len(TRUTH_COLUMNS)
 _FIRST_CORNER: Final = len(_SCALAR_TRUTH)
+_UNITS: Final = {
+    **{signal.name: signal.unit for signal in INPUT_SIGNALS},
+    **{signal.name: signal.unit for signal in OUTPUT_SIGNALS},
+    **dict.fromkeys(("distance", "position_x", "position_y", "rolling_radius"), "m"),
+    **dict.fromkeys(("pitch", "grade", "heading"), "rad"),
+    **dict.fromkeys(("road_friction", "particles"), "-"),
+    "t": "s",
+}
+
+
+def truth_unit(name: str) -> str:
+    """Return the unit of a true value, of `TRUTH_COLUMNS` or `t`; empty: none known."""
+    return _UNITS.get(name, _UNITS.get(without_corner(name), ""))
 
 
 class Vehicle(NamedTuple):

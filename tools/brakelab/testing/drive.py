@@ -15,7 +15,7 @@ import tomlkit
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from brakelab.api import AnyPath, Change, changed, check_seed, truth_unit
+from brakelab.api import AnyPath, Change, changed, check_seed
 from brakelab.report.drive import Drive, read_drive, start_ns
 from brakelab.rig.live import choose_bus
 from brakelab.rig.live import drive as drive_on_bus
@@ -25,6 +25,7 @@ from brakelab.rig.vehicle_node import warm_up
 from brakelab.simulation.expectations import Expectation, What
 from brakelab.simulation.faults import Fault, Kind
 from brakelab.simulation.scenario import Scenario, load_scenario
+from brakelab.simulation.vehicle_bus import truth_unit
 from brakelab.table import Table
 from ecu.arguments import scenario_file
 from ecu.bus.units import conversion

@@ -1,0 +1,123 @@
+"""A small co-simulation master: what an importer of FMI 3.0 does, with names in place of value references."""
+
+import ctypes
+import platform
+import xml.etree.ElementTree as ET
+import zipfile
+from collections.abc import Mapping, Sequence
+from ctypes import byref, c_bool, c_char_p, c_double, c_int, c_size_t, c_uint8, c_uint32, c_void_p
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+OK, WARNING, DISCARD, ERROR = range(4)
+STEP = 0.01
+_LOGGER = ctypes.CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)
+
+
+class Fmu:
+    """An unpacked FMU."""
+
+    def __init__(self, path: Path, folder: Path) -> None:
+        with zipfile.ZipFile(path) as packed:
+            packed.extractall(folder)
+        self.description = ET.parse(folder / "modelDescription.xml").getroot()
+        interface = self.description.find("CoSimulation")
+        assert interface is not None
+        binaries = folder / "binaries" / f"{platform.machine()}-linux"
+        self.library = ctypes.CDLL(str(binaries / f"{interface.get('modelIdentifier')}.so"))
+        self.library.fmi3InstantiateCoSimulation.restype = c_void_p
+        variables = self.description.findall("ModelVariables/*")
+        self.references = {one.get("name", ""): int(one.get("valueReference", "")) for one in variables}
+        by_cause: dict[str | None, list[str]] = {}
+        for one in variables:
+            by_cause.setdefault(one.get("causality"), []).append(one.get("name", ""))
+        self.inputs, self.outputs = by_cause["input"], by_cause["output"]
+
+    def instantiate(self, token: str | None = None) -> "Instance":
+        return Instance(self, token or self.description.get("instantiationToken", ""))
+
+
+class Instance:
+    """One instance. A call returns FMI's status; `messages` is what the FMU has said."""
+
+    def __init__(self, fmu: Fmu, token: str) -> None:
+        self.fmu, self.messages = fmu, list[tuple[int, str, str]]()
+        self._log = _LOGGER(
+            lambda _, status, kind, text: self.messages.append((status, kind.decode(), text.decode()))
+        )
+        self._number, self._truth = (c_double * 1)(), (c_bool * 1)()
+        made = fmu.library.fmi3InstantiateCoSimulation(
+            b"one", token.encode(), b"", c_bool(False), c_bool(True), c_bool(False), c_bool(False),
+            None, c_size_t(0), None, self._log, None,
+        )  # fmt: skip
+        self.address = made and c_void_p(made)
+        self.terminates, self.time = False, 0.0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.fmu.library.fmi3FreeInstance(self.address)
+
+    def call(self, name: str, *arguments: Any) -> int:
+        return int(getattr(self.fmu.library, f"fmi3{name}")(self.address, *arguments))
+
+    def initialise(self, start: float = 0.0, stop: float | None = None) -> int:
+        self.time = start
+        return self.call(
+            "EnterInitializationMode", c_bool(False), c_double(0.0), c_double(start),
+            c_bool(stop is not None), c_double(stop or 0.0),
+        ) or self.call("ExitInitializationMode")  # fmt: skip
+
+    def put(self, values: Mapping[str, float]) -> int:
+        count = len(values)
+        references = (c_uint32 * count)(*(self.fmu.references[name] for name in values))
+        return self.call(
+            "SetFloat64", references, c_size_t(count), (c_double * count)(*values.values()), c_size_t(count)
+        )
+
+    def put_truth(self, name: str, value: bool) -> int:
+        reference = (c_uint32 * 1)(self.fmu.references[name])
+        return self.call("SetBoolean", reference, c_size_t(1), (c_bool * 1)(value), c_size_t(1))
+
+    def get(self, names: Sequence[str]) -> NDArray[np.float64]:
+        count = len(names)
+        references = (c_uint32 * count)(*(self.fmu.references[name] for name in names))
+        values = np.full(count, -1.0)
+        status = self.call(
+            "GetFloat64", references, c_size_t(count), c_void_p(values.ctypes.data), c_size_t(count)
+        )
+        assert status == OK, self.messages[-1]
+        return values
+
+    def step(self, by: float = STEP) -> int:
+        event, ends, early, reached = c_bool(True), c_bool(True), c_bool(True), c_double()
+        status = self.call(
+            "DoStep", c_double(self.time), c_double(by), c_bool(False),
+            byref(event), byref(ends), byref(early), byref(reached),
+        )  # fmt: skip
+        self.time, self.terminates = reached.value, ends.value
+        assert (event.value, early.value) == (False, False)
+        return status
+
+    def state(self) -> c_void_p:
+        kept = c_void_p()
+        assert self.call("GetFMUState", byref(kept)) == OK
+        return kept
+
+    def restore(self, state: c_void_p) -> int:
+        return self.call("SetFMUState", state)
+
+    def serialised(self, state: c_void_p) -> bytes:
+        size = c_size_t()
+        assert self.call("SerializedFMUStateSize", state, byref(size)) == OK
+        content = (c_uint8 * size.value)()
+        assert self.call("SerializeFMUState", state, content, size) == OK
+        return bytes(content)
+
+    def deserialised(self, content: bytes) -> tuple[int, c_void_p]:
+        state = c_void_p()
+        return self.call("DeserializeFMUState", content, c_size_t(len(content)), byref(state)), state

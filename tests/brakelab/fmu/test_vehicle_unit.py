@@ -1,0 +1,147 @@
+"""The vehicle as an FMU drives as in `simulate`: by the same demands to the bit, and with the ECU's FMU."""
+
+import cantools
+import numpy as np
+import pytest
+
+from brakelab.fmu.vehicle_unit import DEMANDED, vehicle_unit
+from brakelab.simulation.closed_loop import START_NS, Drive, new_loop, run
+from brakelab.simulation.scenario import Scenario, load_scenario
+from ecu.contract.signals import CYCLE_NS
+from ecu.errors import UserError
+from ecu.settings.config import load_config
+from ecu.settings.resources import resource
+
+from .conftest import Make
+from .master import OK, WARNING, Fmu
+
+
+def simulated(scenario: str, config: str) -> Drive:
+    path = resource(f"config/scenarios/{scenario}.toml")
+    return run(new_loop(load_scenario(path), load_config(resource(f"config/{config}.toml")), 0))
+
+
+def demands_by_cycle(drive: Drive) -> dict[int, dict[str, float]]:
+    """What the frames of the ECU say, decoded by cantools, by the cycle that they were sent in."""
+    database = cantools.database.load_file(str(resource("dbc/brake_ecu.dbc")))
+    wanted = {
+        message.frame_id: message
+        for message in database.messages
+        if message.name.startswith(("PressureDemand", "MotorDemand"))
+    }
+    found: dict[int, dict[str, float]] = {}
+    for frame in drive.frames:
+        if (message := wanted.get(int(frame["can_id"]))) is not None:
+            values = message.decode(bytes(frame["data"][: frame["length"]]), decode_choices=False)
+            cycle = (int(frame["stamp_ns"]) - START_NS) // CYCLE_NS
+            sent = {name: float(value) for name, value in values.items() if name in DEMANDED}
+            found.setdefault(cycle, {}).update(sent)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("scenario", "config"),
+    [("stop-1", "suv"), ("blending-40", "suv-blended"), ("faults/calliper-dead", "suv")],
+)
+def test_the_same_demands_give_the_same_drive_to_the_bit(
+    make_vehicle: Make, scenario: str, config: str
+) -> None:
+    drive, fmu = simulated(scenario, config), make_vehicle(scenario)
+    demands = demands_by_cycle(drive)
+    true = [name for name in fmu.outputs if name.startswith("truth.")]
+    with fmu.instantiate() as vehicle:
+        assert vehicle.initialise() == OK
+        for k in range(len(drive.t)):
+            expected = np.array([drive.truth[name.removeprefix("truth.")][k] for name in true])
+            assert vehicle.get(true).tobytes() == expected.tobytes(), k
+            assert not vehicle.terminates
+            assert vehicle.put(demands[k]) == OK
+            assert vehicle.step() == OK
+        assert vehicle.terminates
+
+
+def test_what_it_measures_is_what_simulate_sends(stop: Fmu) -> None:
+    """But for the bits of a frame: the ECU of `simulate` reads rounded values."""
+    drive = simulated("stop-1", "suv")
+    names = ["wheel_speed_fl", "accel_x", "calliper_pressure_rr", "yaw_rate", "vehicle_speed"]
+    steps = dict(zip(names, (0.01, 0.005, 0.01, 0.001, 0.01), strict=True))
+    demands = demands_by_cycle(drive)
+    with stop.instantiate() as vehicle:
+        vehicle.initialise()
+        for k in range(len(drive.t)):
+            for name, value in zip(names, vehicle.get(names).tolist(), strict=True):
+                assert value == pytest.approx(drive.inputs[name][k], abs=steps[name], nan_ok=True)
+            vehicle.put(demands[k])
+            vehicle.step()
+
+
+def loop(ecu: Fmu, car: Fmu) -> dict[str, np.ndarray]:
+    """Drive to the scenario's end: measure, ECU, car. Returns the car's true values by name."""
+    measured = [name for name in car.outputs if name in ecu.inputs]
+    true = [name for name in car.outputs if name.startswith("truth.")]
+    rows = []
+    with ecu.instantiate() as brain, car.instantiate() as body:
+        assert brain.initialise() == body.initialise() == OK
+        while not body.terminates:
+            rows.append(body.get(true))
+            brain.put(dict(zip(measured, body.get(measured).tolist(), strict=True)))
+            assert brain.step() == OK
+            body.put(dict(zip(car.inputs, brain.get(car.inputs).tolist(), strict=True)))
+            assert body.step() == OK
+    return dict(zip((name.removeprefix("truth.") for name in true), np.array(rows).T, strict=True))
+
+
+CLOSE = {
+    # of true values over the whole drive, to `simulate`: frames round and stamp what FMUs hand over as it is
+    "vehicle_speed": 0.005,  # m/s
+    "distance": 0.02,  # m
+    "accel_x_road": 0.05,  # m/s^2
+    "calliper_pressure_fl": 0.2,  # bar
+    "calliper_pressure_rr": 0.2,
+    "mu_b_fl": 1e-4,
+    "disc_temperature_fl": 0.05,  # K
+}
+
+
+@pytest.mark.parametrize(("scenario", "config"), [("stop-1", "suv"), ("stop-4", "suv")])
+def test_the_loop_of_two_fmus_brakes_as_simulate_does(
+    make_ecu: Make, make_vehicle: Make, scenario: str, config: str
+) -> None:
+    drive = simulated(scenario, config)
+    found = loop(make_ecu(config), make_vehicle(scenario))
+    assert len(found["distance"]) == pytest.approx(len(drive.t), abs=1)
+    rows = min(len(found["distance"]), len(drive.t))
+    off = {name: np.max(np.abs(found[name][:rows] - drive.truth[name][:rows])) for name in CLOSE}
+    print(scenario, {name: float(f"{value:.2g}") for name, value in off.items()})
+    assert {name for name, value in off.items() if value > CLOSE[name]} == set()
+
+
+def test_without_demands_the_hydraulics_brake(stop: Fmu) -> None:
+    with stop.instantiate() as vehicle:
+        vehicle.initialise()
+        while not vehicle.terminates:
+            assert vehicle.step() == OK
+        heard, speed = vehicle.get(["truth.demand_heard", "truth.vehicle_speed"])
+    assert heard == 0.0
+    assert speed < 0.1
+
+
+def test_after_the_scenario_values_are_held(stop: Fmu) -> None:
+    with stop.instantiate() as vehicle:
+        vehicle.initialise()
+        while not vehicle.terminates:
+            vehicle.step()
+        assert [status for status, *_ in vehicle.messages] == [WARNING]
+        last, time = vehicle.get(stop.outputs), vehicle.time
+        assert vehicle.step() == OK
+        assert vehicle.terminates
+        assert vehicle.get(stop.outputs).tobytes() == last.tobytes()
+        assert vehicle.time == pytest.approx(time + 0.01)
+        assert len(vehicle.messages) == 1
+
+
+def test_faults_of_frames_are_refused() -> None:
+    scenario: Scenario = load_scenario(resource("config/scenarios/faults/lost.toml"))
+    with pytest.raises(UserError, match='lost: fault: "lost" acts on frames') as caught:
+        vehicle_unit(scenario, 0, "lost")
+    assert "leave it out" in str(caught.value)

@@ -1,0 +1,36 @@
+"""`brake-ecu fmu …`: FMUs. Each command imports what it needs when it is called."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from brakelab.cli.arguments import Plant, Scenario, Seed
+from ecu.arguments import CONFIG_OPTION, Commands, Config, Draw
+
+app = Commands(help="Write FMUs (FMI 3.0) for Simulink, CarMaker and others.", no_args_is_help=True)
+
+Out = Annotated[Path, typer.Option("--out", "-o", metavar="FILE.fmu", help="FMU to write")]
+
+
+@app.command()
+def ecu(config: Config, out: Out) -> int:
+    """Write the ECU of a configuration."""
+    from brakelab.fmu import command
+
+    return command.write_ecu(config, out)
+
+
+@app.command()
+def vehicle(
+    scenario: Scenario,
+    out: Out,
+    seed: Seed = 0,
+    draw: Draw = None,
+    plant: Plant = None,
+    config: Annotated[Path | None, CONFIG_OPTION] = None,
+) -> int:
+    """Write the simulated vehicle of a scenario with its driver. CONFIG is the car of --plant as-config."""
+    from brakelab.fmu import command
+
+    return command.write_vehicle(scenario, config, out, seed, draw, plant)

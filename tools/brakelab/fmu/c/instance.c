@@ -1,0 +1,208 @@
+/* One instance of an FMU: its memory, calls of compiled kernels, messages, states.
+ *
+ * The tables above this text (brakelab/fmu/source.py) say what the memory holds at the start, where in it each
+ * variable lies, and with what each kernel is called. All of an instance is in its memory, so that a state is a
+ * copy of it. Nothing is shared by instances, and after instantiation nothing is allocated but states.
+ */
+enum phase { INSTANTIATED = 1, INITIALISING = 2, STEPPING = 4, ENDED = 8 };
+enum status { OK, WARNING, DISCARD, ERROR };
+
+typedef void logger(void *environment, int status, const char *category, const char *message);
+typedef int kernel(int64_t *places);
+
+typedef struct {
+    char token[sizeof TOKEN];
+    int32_t phase, script_ended;
+    int64_t cycle; /* steps since the start */
+    double start, stop;
+    _Alignas(64) unsigned char memory[MEMORY];
+} snapshot;
+
+typedef struct {
+    snapshot now;
+    int64_t places[CALLS][MOST_PLACES];
+    kernel *kernels[CALLS];
+    void *library, *environment;
+    logger *log;
+    unsigned logged; /* a bit for each status */
+} instance;
+
+static const char *const CATEGORIES[] = {"", "logStatusWarning", "logStatusDiscard", "logStatusError"};
+
+/* Return `status` after its message; an error ends the run, as FMI has it. */
+__attribute__((format(printf, 3, 4))) static int tell(instance *of, int status, const char *format, ...) {
+    if (of->log && (status == ERROR || of->logged >> status & 1)) {
+        char text[400];
+        va_list values;
+        va_start(values, format);
+        vsnprintf(text, sizeof text, format, values);
+        va_end(values);
+        of->log(of->environment, status, CATEGORIES[status], text);
+    }
+    if (status == ERROR) of->now.phase = ENDED;
+    return status;
+}
+
+static double *number(instance *of, uint32_t variable) {
+    return (double *)(of->now.memory + VARIABLES[variable].offset);
+}
+
+/* Noise: PCG XSL RR 128/64 (M. E. O'Neill, HMC-CS-2014-0905), the sequence of numpy's PCG64. */
+typedef struct {
+    uint64_t state[2], step[2]; /* low half first */
+    uint64_t kept, value;       /* the other half of a number handed out in halves */
+} noise;
+
+static uint64_t next_64(void *of) {
+    noise *n = of;
+    const unsigned __int128 factor = (unsigned __int128)0x2360ED051FC65DA4u << 64 | 0x4385DF649FCCF645u;
+    unsigned __int128 state = (unsigned __int128)n->state[1] << 64 | n->state[0];
+    state = state * factor + ((unsigned __int128)n->step[1] << 64 | n->step[0]);
+    n->state[0] = (uint64_t)state, n->state[1] = (uint64_t)(state >> 64);
+    uint64_t folded = n->state[0] ^ n->state[1];
+    unsigned turn = (unsigned)(state >> 122);
+    return folded >> turn | folded << (-turn & 63);
+}
+
+static uint32_t next_32(void *of) {
+    noise *n = of;
+    if (n->kept) {
+        n->kept = 0;
+        return (uint32_t)n->value;
+    }
+    uint64_t whole = next_64(of);
+    n->kept = 1, n->value = whole >> 32;
+    return (uint32_t)whole;
+}
+
+static double next_real(void *of) { return (double)(next_64(of) >> 11) * 0x1p-53; }
+
+/* What a place of a call holds that is known at run time alone: -1 … -3, else an offset in the memory. */
+static int64_t resolved(instance *of, int64_t target) {
+    switch (target) {
+    case -1: return (int64_t)(uintptr_t)next_64;
+    case -2: return (int64_t)(uintptr_t)next_32;
+    case -3: return (int64_t)(uintptr_t)next_real;
+    default: return (int64_t)(uintptr_t)(of->now.memory + target);
+    }
+}
+
+static int runs_here(const char *processor) {
+#if defined __x86_64__
+    if (!strcmp(processor, "x86-64-v3"))
+        return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
+               __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2");
+#endif
+    (void)processor;
+    return 1;
+}
+
+/* Load the kernels for this processor from the folder of this file. */
+static int load(instance *of) {
+    Dl_info here;
+    if (!dladdr((void *)load, &here)) return tell(of, ERROR, "the folder of the FMU's library is not known");
+    const char *end = strrchr(here.dli_fname, '/');
+    int length = end ? (int)(end - here.dli_fname) + 1 : 0;
+    for (size_t i = 0; i < sizeof LIBRARIES / sizeof *LIBRARIES; i++) {
+        if (!runs_here(LIBRARIES[i].processor)) continue;
+        char path[4096];
+        int size = snprintf(path, sizeof path, "%.*s%s", length, here.dli_fname, LIBRARIES[i].file);
+        if (size < 0 || size >= (int)sizeof path) return tell(of, ERROR, "the path of the FMU is too long");
+        of->library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
+        if (!of->library) return tell(of, ERROR, "%s", dlerror());
+        for (int call = 0; call < CALLS; call++) {
+            void *found = dlsym(of->library, SYMBOLS[call]);
+            if (!found) return tell(of, ERROR, "%s: no %s", path, SYMBOLS[call]);
+            memcpy(&of->kernels[call], &found, sizeof found);
+        }
+        return OK;
+    }
+    return tell(of, ERROR, "the FMU holds no kernels for this processor, only for %s", LIBRARIES[0].processor);
+}
+
+static void restart(instance *of) {
+    memset(&of->now, 0, sizeof of->now);
+    memcpy(of->now.token, TOKEN, sizeof TOKEN);
+    memcpy(of->now.memory, START, MEMORY);
+    of->now.phase = INSTANTIATED;
+}
+
+static void discard(instance *of) {
+    if (of && of->library) dlclose(of->library);
+    free(of);
+}
+
+static instance *instantiate(const char *token, void *environment, logger *log, bool logging) {
+    instance *of = aligned_alloc(64, (sizeof *of + 63) / 64 * 64);
+    if (!of) return NULL;
+    memset(of, 0, sizeof *of);
+    of->environment = environment, of->log = log, of->logged = logging ? ~0u : 0u;
+    restart(of);
+    int wrong = token && !strcmp(token, TOKEN) ? load(of) : tell(of, ERROR, "the token is another FMU's");
+    if (wrong) {
+        discard(of);
+        return NULL;
+    }
+    for (int call = 0; call < CALLS; call++) memcpy(of->places[call], PLACES[call], sizeof *of->places);
+    for (size_t i = 0; i < sizeof TARGETS / sizeof *TARGETS; i++)
+        of->places[TARGETS[i].call][TARGETS[i].place] = resolved(of, TARGETS[i].target);
+    return of;
+}
+
+/* Call a kernel; return 0, or 1 where it failed. */
+static int run(instance *of, int call) { return of->kernels[call](of->places[call]) != 0; }
+
+/* What the ECU or the vehicle does, in ecu.c or vehicle.c: at the start, and from one communication point to the
+ * next. Return 0, or 1 where a kernel failed. */
+static int begin_unit(instance *of);
+static int step_unit(instance *of, int64_t t_ns);
+
+/* Kernels compare with NaN and round to nearest: an importer that traps or flushes has its own setting back. */
+static int guarded(instance *of, bool begins, int64_t t_ns) {
+    fenv_t theirs;
+    fegetenv(&theirs);
+    fesetenv(FE_DFL_ENV);
+    int failed = begins ? begin_unit(of) : step_unit(of, t_ns);
+    fesetenv(&theirs);
+    return failed ? tell(of, ERROR, "a kernel failed: an index or a shape") : OK;
+}
+
+static double time_of(const snapshot *now) { return now->start + (double)now->cycle * 1e-9 * CYCLE_NS; }
+
+static int initialise(instance *of, double start, double stop) {
+    if (!(fabs(start) < 1e9)) return tell(of, ERROR, "start time %g s: give one of at most 1e9 s", start);
+    of->now.start = start, of->now.stop = stop;
+    of->now.phase = INITIALISING;
+    return guarded(of, true, 0);
+}
+
+static int advance(instance *of, double at, double by) {
+    double now = time_of(&of->now), cycle = 1e-9 * CYCLE_NS;
+    if (!(fabs(by - cycle) < 1e-6))
+        return tell(of, DISCARD, "a step of %g s: this FMU takes steps of %g s alone", by, cycle);
+    if (!(fabs(at - now) < 0.1 * cycle))
+        return tell(of, DISCARD, "a step from %.9g s: this FMU is at %.9g s", at, now);
+    if (now + cycle > of->now.stop + 0.1 * cycle)
+        return tell(of, ERROR, "a step to %.9g s: the stop time is %.9g s", now + cycle, of->now.stop);
+    int failed = OK;
+    if (!of->now.script_ended) {
+        failed = guarded(of, false, llround(of->now.start * 1e9) + of->now.cycle * CYCLE_NS);
+        if (of->now.script_ended) tell(of, WARNING, "the scenario has ended; values are held from here on");
+    }
+    of->now.cycle++;
+    return failed;
+}
+
+static int keep(instance *of, void **state) {
+    if (!*state && !(*state = aligned_alloc(64, sizeof(snapshot)))) return tell(of, ERROR, "no memory for a state");
+    memcpy(*state, &of->now, sizeof(snapshot));
+    return OK;
+}
+
+static int deserialise(instance *of, const unsigned char *bytes, size_t size, void **state) {
+    if (size != sizeof(snapshot) || memcmp(bytes, TOKEN, sizeof TOKEN))
+        return tell(of, ERROR, "not a state of this FMU: %zu bytes, its own have %zu", size, sizeof(snapshot));
+    if (!*state && !(*state = aligned_alloc(64, sizeof(snapshot)))) return tell(of, ERROR, "no memory for a state");
+    memcpy(*state, bytes, size);
+    return OK;
+}

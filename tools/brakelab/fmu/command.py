@@ -1,0 +1,102 @@
+"""`brake-ecu fmu ecu|vehicle`: write an FMU, a library of C over the compiled kernels in a zip file."""
+
+import platform
+import tempfile
+import zipfile
+from pathlib import Path
+from typing import Final
+
+from brakelab.fmu.description import model_description
+from brakelab.fmu.ecu_unit import ecu_unit
+from brakelab.fmu.source import c_source
+from brakelab.fmu.unit import Unit
+from brakelab.fmu.vehicle_unit import vehicle_unit
+from brakelab.simulation.plant_of_config import AS_CONFIG
+from brakelab.simulation.scenario import load_scenario
+from brakelab.simulation.scenario_car import with_draw, with_plant, with_plant_for
+from ecu.building.c_compiler import compile_shared
+from ecu.errors import UserError
+from ecu.library import BASELINE, V3
+from ecu.output import give, wrote
+from ecu.settings.config import load_config
+from ecu.settings.resources import command_name
+
+OPTIONS: Final = ("-std=c11", "-ffp-contract=off", "-ldl", "-lm")
+SUFFIX: Final = ".fmu"
+EARLIEST: Final = (1980, 1, 1, 0, 0, 0)
+"""Time of every file in the zip file: the same unit gives the same bytes."""
+
+
+def write_ecu(config: Path, out: Path) -> int:
+    """Write the ECU of a configuration; return 0.
+
+    Raises:
+        UserError: the configuration is wrong, the compiled library is not there, there is no C compiler, or
+            `out` cannot be written.
+    """
+    write_fmu(ecu_unit(load_config(config)), out)
+    return 0
+
+
+def write_vehicle(
+    scenario: Path, config: Path | None, out: Path, seed: int, draw: str | None, plant: str | None
+) -> int:
+    """Write the simulated vehicle of a scenario; return 0.
+
+    `config` is the car of the plant "as-config".
+
+    Raises:
+        UserError: as `write_ecu`, of the scenario; "as-config" without `config`.
+    """
+    driven = load_scenario(scenario)
+    if draw is not None:
+        driven = with_draw(driven, draw)
+    with tempfile.TemporaryDirectory(prefix="brake-ecu-") as folder:
+        if config is not None:
+            driven = with_plant_for(driven, plant, load_config(config), Path(folder))
+        elif plant == AS_CONFIG:
+            raise UserError("--plant", plant, "of which car? give --config")
+        else:
+            driven = with_plant(driven, plant)
+        write_fmu(vehicle_unit(driven, seed, command_name(scenario)), out)
+    return 0
+
+
+def write_fmu(unit: Unit, out: Path) -> None:
+    """Write an FMU.
+
+    Raises:
+        UserError: there is no C compiler, or `out` is not named as an FMU or cannot be written.
+    """
+    if out.suffix != SUFFIX:
+        raise UserError(str(out), "", f"importers know an FMU by its name; end it with {SUFFIX}")
+    library = unit.calls[0].library
+    known = library.manifest["processors"]
+    kernels = {name: known[name] for name in (V3, BASELINE[platform.machine()]) if name in known}
+    token, text = c_source(unit, kernels)
+    with tempfile.TemporaryDirectory(prefix="brake-ecu-") as folder:
+        source, shared = Path(folder, f"{unit.name}.c"), Path(folder, f"{unit.name}.so")
+        source.write_text(text, "utf-8")
+        compile_shared((source,), OPTIONS, shared)
+        binaries = f"binaries/{platform.machine()}-linux"
+        files = {
+            "modelDescription.xml": model_description(unit, token),
+            f"{binaries}/{shared.name}": shared.read_bytes(),
+            **{f"{binaries}/{file}": (library.folder / file).read_bytes() for file in kernels.values()},
+            "resources/origin.json": unit.origin.encode(),
+        }
+    part = out.with_name(f".{out.name}.part")
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as fmu:
+            for name, content in files.items():
+                entry = zipfile.ZipInfo(name, EARLIEST)
+                entry.external_attr = (0o755 if name.endswith(".so") else 0o644) << 16
+                fmu.writestr(entry, content, zipfile.ZIP_DEFLATED)
+        part.replace(out)
+    except OSError as error:
+        raise UserError(str(out), "", f"cannot be written ({error.strerror}); choose another --out") from None
+    finally:
+        part.unlink(missing_ok=True)
+    give(processors=list(kernels), variables=len(unit.variables))
+    wrote(out)
