@@ -93,20 +93,31 @@ class Instance:
         assert status == OK, self.messages[-1]
         return values
 
+    def step_arguments(self, by: float = STEP) -> tuple[Any, ...]:
+        self._told = c_bool(True), c_bool(True), c_bool(True), c_double()
+        return c_double(self.time), c_double(by), c_bool(False), *map(byref, self._told)
+
     def step(self, by: float = STEP) -> int:
-        event, ends, early, reached = c_bool(True), c_bool(True), c_bool(True), c_double()
-        status = self.call(
-            "DoStep", c_double(self.time), c_double(by), c_bool(False),
-            byref(event), byref(ends), byref(early), byref(reached),
-        )  # fmt: skip
-        self.time, self.terminates = reached.value, ends.value
-        assert (event.value, early.value) == (False, False)
+        status = self.call("DoStep", *self.step_arguments(by))
+        event, ends, early, reached = (one.value for one in self._told)
+        if status == OK:
+            assert (event, early) == (False, False)
+            self.time, self.terminates = reached, ends
         return status
 
-    def state(self) -> c_void_p:
-        kept = c_void_p()
+    def step_from(self, time: float) -> int:
+        own, self.time = self.time, time
+        status = self.step()
+        self.time = own
+        return status
+
+    def state(self, kept: c_void_p | None = None) -> c_void_p:
+        kept = kept or c_void_p()
         assert self.call("GetFMUState", byref(kept)) == OK
         return kept
+
+    def free(self, state: c_void_p) -> int:
+        return self.call("FreeFMUState", byref(state))
 
     def restore(self, state: c_void_p) -> int:
         return self.call("SetFMUState", state)

@@ -51,7 +51,10 @@ def _tables(unit: Unit, libraries: dict[str, str]) -> str:
             f"static const struct {{ uint32_t offset, place, kind; }} VARIABLES[] = {_listed(variables)};",
             f"static const struct {{ int call, place; int64_t target; }} TARGETS[] = {_listed(targets)};",
             f"static const int64_t PLACES[CALLS][MOST_PLACES] = {_listed(places)};",
-            *(f"static const int AT_{call.name}[] = {_listed(call.at)};" for call in unit.calls),
+            *(
+                f"__attribute__((unused)) static const int AT_{call.name}[] = {_listed(call.at)};"
+                for call in unit.calls
+            ),
             f"static const unsigned char START[MEMORY] = {_listed(unit.memory.content())};",
             "",
         )
