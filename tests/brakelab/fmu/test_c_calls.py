@@ -18,6 +18,9 @@ from .test_ecu_unit import DRIVING
 
 ENTER = ("EnterInitializationMode", c_bool(False), c_double(0.0), c_double(0.0), c_bool(False), c_double(0.0))
 
+_BYTES = ctypes.create_string_buffer(100)
+FOREIGN = ctypes.cast(_BYTES, ctypes.c_void_p)
+
 
 def one(reference: int, count: int = 1) -> tuple[object, ...]:
     """Arguments of a function that reads or writes a number."""
@@ -29,12 +32,14 @@ def truth(reference: int) -> tuple[object, ...]:
 
 
 WRONG: list[tuple[str, Callable[[Instance], int], int, str]] = [
-    ("a step of 7 ms", lambda fmu: fmu.step(0.007), DISCARD, "a step of 0.007 s: this FMU takes steps of 0.01"),
-    ("a step of 20 ms", lambda fmu: fmu.step(0.02), DISCARD, "a step of 0.02 s"),
+    ("a step of 7 ms", lambda fmu: fmu.step(0.007), DISCARD, "of 0.007 s: this FMU takes steps of 0.01"),
+    ("a step of 25 ms", lambda fmu: fmu.step(0.025), DISCARD, "a step of 0.025 s"),
+    ("no step", lambda fmu: fmu.step(0.0), DISCARD, "a step of 0 s"),
+    ("a step without an end", lambda fmu: fmu.step(1e300), DISCARD, "a step of 1e+300 s"),
     ("a step back", lambda fmu: fmu.step(-0.01), DISCARD, "a step of -0.01 s"),
     ("a step of NaN", lambda fmu: fmu.step(float("nan")), DISCARD, "a step of nan s"),
     ("a step elsewhere", lambda fmu: fmu.step_from(5.0), DISCARD, "a step from 5 s: this FMU is at 0.01"),
-    ("an unknown one read", lambda fmu: fmu.call("GetFloat64", *one(9999)), ERROR, "no variable 9999, the last"),
+    ("an unknown one read", lambda fmu: fmu.call("GetFloat64", *one(9999)), ERROR, "no variable 9999, the"),
     ("an unknown one set", lambda fmu: fmu.call("SetFloat64", *one(9999)), ERROR, "no variable 9999"),
     ("values missing", lambda fmu: fmu.call("GetFloat64", *one(1, 2)), ERROR, "2 values of 1 variables"),
     ("an output set", lambda fmu: fmu.put({"mode": 1.0}), ERROR, "cannot be set"),
@@ -45,7 +50,8 @@ WRONG: list[tuple[str, Callable[[Instance], int], int, str]] = [
     ("another type", lambda fmu: fmu.call("GetInt32", *one(1)), ERROR, "no variable is of this type"),
     ("initialised twice", lambda fmu: fmu.call(*ENTER), ERROR, "InitializationMode: not between steps"),
     ("event mode", lambda fmu: fmu.call("EnterEventMode"), ERROR, "fmi3EnterEventMode: not provided"),
-    ("no state", lambda fmu: fmu.restore(ctypes.c_void_p()), ERROR, "no state"),
+    ("no state", lambda fmu: fmu.restore(ctypes.c_void_p()), ERROR, "no state of this FMU"),
+    ("a foreign state", lambda fmu: fmu.restore(FOREIGN), ERROR, "no state of this FMU"),
 ]  # fmt: skip
 
 

@@ -149,3 +149,15 @@ def test_inputs_that_were_never_set_are_absent(suv: Fmu) -> None:
 
 def test_every_signal_of_a_frame_is_an_input(suv: Fmu) -> None:
     assert suv.inputs == [signal.name for signal in INPUT_SIGNALS if signal.message]
+
+
+@pytest.mark.parametrize(("cycles", "faults"), [(2, 0), (10, 0), (50, WHEEL_SPEED_LOST)])
+def test_between_communication_points_no_sample_arrives(suv: Fmu, cycles: int, faults: int) -> None:
+    """A longer step is several cycles, in the first of which inputs are new: time-outs follow that rate to 0.3 s."""
+    with suv.instantiate() as ecu:
+        ecu.put(DRIVING)
+        ecu.initialise()
+        for _ in range(300 // cycles):
+            assert ecu.step(0.01 * cycles) == OK
+        assert ecu.time == pytest.approx(0.01 * cycles * (300 // cycles))
+        assert int(ecu.get(["active_faults"])[0]) & WHEEL_SPEED_LOST == faults

@@ -145,3 +145,16 @@ def test_faults_of_frames_are_refused() -> None:
     with pytest.raises(UserError, match='lost: fault: "lost" acts on frames') as caught:
         vehicle_unit(scenario, 0, "lost")
     assert "leave it out" in str(caught.value)
+
+
+def test_a_longer_step_is_several_cycles_with_the_same_demands(stop: Fmu) -> None:
+    demands = {name: 20.0 if name.startswith("pressure") else 0.0 for name in stop.inputs}
+    rows = []
+    for cycles in (1, 5):
+        with stop.instantiate() as vehicle:
+            vehicle.put(demands | {"pressure_demand_valid": 1.0})
+            vehicle.initialise()
+            for _ in range(100 // cycles):
+                assert vehicle.step(0.01 * cycles) == OK
+            rows.append(vehicle.get(stop.outputs).tobytes())
+    assert rows[0] == rows[1]

@@ -143,7 +143,7 @@ EXPORT int fmi3GetFMUState(instance *of, void **state) {
 
 EXPORT int fmi3SetFMUState(instance *of, void *state) {
     if (!of) return ERROR;
-    if (!state) return tell(of, ERROR, "%s: no state", __func__);
+    if (!state || memcmp(state, TOKEN, sizeof TOKEN)) return tell(of, ERROR, "%s: no state of this FMU", __func__);
     memcpy(&of->now, state, sizeof of->now);
     return OK;
 }

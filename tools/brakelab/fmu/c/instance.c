@@ -6,6 +6,7 @@
  */
 enum phase { INSTANTIATED = 1, INITIALISING = 2, STEPPING = 4, ENDED = 8 };
 enum status { OK, WARNING, DISCARD, ERROR };
+#define LONGEST_S 3600.5 /* of a step */
 
 typedef void logger(void *environment, int status, const char *category, const char *message);
 typedef int kernel(int64_t *places);
@@ -152,45 +153,46 @@ static instance *instantiate(const char *token, void *environment, logger *log, 
 /* Call a kernel; return 0, or 1 where it failed. */
 static int run(instance *of, int call) { return of->kernels[call](of->places[call]) != 0; }
 
-/* What the ECU or the vehicle does, in ecu.c or vehicle.c: at the start, and from one communication point to the
- * next. Return 0, or 1 where a kernel failed. */
+/* What the ECU or the vehicle does, in ecu.c or vehicle.c: at the start, and in a cycle from `t_ns` on, at the begin of
+ * which there is a communication point or not. Return 0, or 1 where a kernel failed. */
 static int begin_unit(instance *of);
-static int step_unit(instance *of, int64_t t_ns);
+static int step_unit(instance *of, int64_t t_ns, bool communicates);
+
+static double time_of(const snapshot *now) { return now->start + (double)now->cycle * 1e-9 * CYCLE_NS; }
 
 /* Kernels compare with NaN and round to nearest: an importer that traps or flushes has its own setting back. */
-static int guarded(instance *of, bool begins, int64_t t_ns) {
+static int guarded(instance *of, int64_t cycles) {
     fenv_t theirs;
     fegetenv(&theirs);
     fesetenv(FE_DFL_ENV);
-    int failed = begins ? begin_unit(of) : step_unit(of, t_ns);
+    int failed = cycles ? 0 : begin_unit(of);
+    for (int64_t k = 0; k < cycles && !failed && !of->now.script_ended; k++)
+        failed = step_unit(of, llround(of->now.start * 1e9) + (of->now.cycle + k) * CYCLE_NS, k == 0);
     fesetenv(&theirs);
     return failed ? tell(of, ERROR, "a kernel failed: an index or a shape") : OK;
 }
-
-static double time_of(const snapshot *now) { return now->start + (double)now->cycle * 1e-9 * CYCLE_NS; }
 
 static int initialise(instance *of, double start, double stop) {
     if (!(fabs(start) < 1e9)) return tell(of, ERROR, "start time %g s: give one of at most 1e9 s", start);
     of->now.start = start, of->now.stop = stop;
     of->now.phase = INITIALISING;
-    return guarded(of, true, 0);
+    return guarded(of, 0);
 }
 
 static int advance(instance *of, double at, double by) {
     double now = time_of(&of->now), cycle = 1e-9 * CYCLE_NS;
-    if (!(fabs(by - cycle) < 1e-6))
-        return tell(of, DISCARD, "a step of %g s: this FMU takes steps of %g s alone", by, cycle);
+    int64_t cycles = by > 0.0 && by < LONGEST_S ? llround(by / cycle) : 0;
+    if (!cycles || !(fabs(by - (double)cycles * cycle) < 1e-6))
+        return tell(of, DISCARD, "a step of %g s: this FMU takes steps of %g s, or multiples of it", by, cycle);
     if (!(fabs(at - now) < 0.1 * cycle))
         return tell(of, DISCARD, "a step from %.9g s: this FMU is at %.9g s", at, now);
-    if (now + cycle > of->now.stop + 0.1 * cycle)
-        return tell(of, ERROR, "a step to %.9g s: the stop time is %.9g s", now + cycle, of->now.stop);
-    int failed = OK;
-    if (!of->now.script_ended) {
-        failed = guarded(of, false, llround(of->now.start * 1e9) + of->now.cycle * CYCLE_NS);
-        if (of->now.script_ended) tell(of, WARNING, "the scenario has ended; values are held from here on");
-    }
-    of->now.cycle++;
-    return failed;
+    if (now + by > of->now.stop + 0.1 * cycle)
+        return tell(of, ERROR, "a step to %.9g s: the stop time is %.9g s", now + by, of->now.stop);
+    int ended = of->now.script_ended;
+    int status = guarded(of, cycles);
+    of->now.cycle += cycles;
+    if (of->now.script_ended > ended) tell(of, WARNING, "the scenario has ended; values are held from here on");
+    return status;
 }
 
 static int keep(instance *of, void **state) {

@@ -1,0 +1,103 @@
+"""The description has names and units of the contract; FMPy finds nothing wrong with it, and simulates it."""
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from brakelab.fmu.unit import BASE
+from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS, truth_unit
+from ecu.bus.units import CONVERSIONS
+from ecu.contract.signals import INPUT_SIGNALS, OUTPUT_SIGNALS, column_names
+
+from .master import Fmu
+
+UNITS = {one.name: one.unit for one in INPUT_SIGNALS} | {
+    name: one.unit for one in OUTPUT_SIGNALS for name in column_names(one)
+}
+
+
+@pytest.fixture(params=["suv", "stop"])
+def fmu(request: pytest.FixtureRequest) -> Fmu:
+    """The ECU, the vehicle."""
+    return request.getfixturevalue(request.param)
+
+
+def test_every_unit_of_the_contract_is_one_of_si() -> None:
+    units = {one.unit for one in (*INPUT_SIGNALS, *OUTPUT_SIGNALS)} | {truth_unit(n) for n in TRUTH_COLUMNS}
+    assert units - {"", "-"} <= BASE.keys()
+
+
+SI = {"rad/s": "rad/s", "m/s": "m/s", "bar": "Pa", "N": "N", "degC": "K", "%": "-"}
+
+
+@pytest.mark.parametrize(("unit", "base"), SI.items())
+def test_factors_are_those_of_signal_maps(unit: str, base: str) -> None:
+    """A signal map turns SI into the contract's unit, an importer the other way."""
+    factor, offset = CONVERSIONS[unit][base]
+    assert BASE[unit].get("factor", 1.0) == pytest.approx(1.0 / factor)
+    assert BASE[unit].get("offset", 0.0) == pytest.approx(-offset / factor)
+
+
+def test_variables_have_the_units_of_the_contract(fmu: Fmu) -> None:
+    defined = {
+        one.get("name"): one.find("BaseUnit") for one in fmu.description.findall("UnitDefinitions/Unit")
+    }
+    found = 0
+    for variable in fmu.description.findall("ModelVariables/Float64"):
+        name, unit = variable.get("name", ""), variable.get("unit")
+        stem = name.removeprefix("estimate.").removeprefix("truth.")
+        expected = "s" if name == "time" else UNITS.get(stem, truth_unit(stem))
+        assert (unit or "-") == (expected or "-"), name
+        assert unit is None or unit in defined
+        found += unit is not None
+    assert found > 30
+    bar = defined["bar"]
+    assert bar is not None
+    assert bar.attrib == {"kg": "1", "m": "-1", "s": "-2", "factor": "100000"}
+
+
+def test_it_is_a_co_simulation_of_ten_milliseconds_with_states(fmu: Fmu) -> None:
+    interface = fmu.description.find("CoSimulation")
+    assert interface is not None
+    assert interface.attrib.items() >= {
+        ("fixedInternalStepSize", "0.01"),
+        ("canHandleVariableCommunicationStepSize", "false"),
+        ("canGetAndSetFMUState", "true"),
+        ("canSerializeFMUState", "true"),
+    }
+    references = [int(one.get("valueReference", "")) for one in fmu.description.findall("ModelVariables/*")]
+    assert references == list(range(len(references)))
+    outputs = [one.get("valueReference") for one in fmu.description.findall("ModelStructure/Output")]
+    assert outputs == [str(fmu.references[name]) for name in fmu.outputs]
+
+
+def test_what_the_database_says_of_a_signal_is_told(suv: Fmu) -> None:
+    variables: dict[str, ET.Element] = {
+        one.get("name", ""): one for one in suv.description.findall("ModelVariables/*")
+    }
+    assert variables["yaw_rate"].get("description") == "Yaw rate, left positive (-6 to 6; NaN: no sample)"
+    assert variables["mu_b_fl"].get("description") == "Estimated friction of pad and disc front left"
+    assert variables["accel_x"].get("start") == "NaN"
+
+
+def packed(fmu: Fmu) -> Path:
+    """Return the FMU that was unpacked beside itself."""
+    return next(Path(fmu.library._name).parents[3].glob("*.fmu"))
+
+
+def test_fmpy_finds_nothing_wrong(fmu: Fmu) -> None:
+    fmpy = pytest.importorskip("fmpy.validation", reason="FMPy is not installed: pip install fmpy")
+    assert fmpy.validate_fmu(str(packed(fmu))) == []
+
+
+def test_fmpy_simulates_a_stop(stop: Fmu, suv: Fmu) -> None:
+    """The vehicle alone brakes by its hydraulics; the ECU alone hears nobody, and says so."""
+    fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed: pip install fmpy")
+    names = ["truth.vehicle_speed", "truth.demand_heard"]
+    drive = fmpy.simulate_fmu(str(packed(stop)), stop_time=12.0, step_size=0.01, output=names)
+    assert drive["truth.vehicle_speed"][0] == pytest.approx(33.333)
+    assert drive["truth.vehicle_speed"][-1] < 20.0
+    alone = fmpy.simulate_fmu(str(packed(suv)), stop_time=2.0, step_size=0.01, output=["mode"])
+    assert np.unique(alone["mode"]).tolist() == [0.0, 4.0]
