@@ -1,5 +1,6 @@
 """The description has names and units of the contract; FMPy finds nothing wrong with it, and simulates it."""
 
+import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -9,10 +10,12 @@ import pytest
 from brakelab.fmu.unit import BASE
 from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS, truth_unit
 from ecu.bus.units import CONVERSIONS
+from ecu.cli import main
 from ecu.contract.signals import INPUT_SIGNALS, OUTPUT_SIGNALS, column_names
 
 from .master import Fmu
 
+PAGE = (Path(__file__).parents[3] / "docs/fmu.md").read_text("utf-8")
 UNITS = {one.name: one.unit for one in INPUT_SIGNALS} | {
     name: one.unit for one in OUTPUT_SIGNALS for name in column_names(one)
 }
@@ -101,3 +104,14 @@ def test_fmpy_simulates_a_stop(stop: Fmu, suv: Fmu) -> None:
     assert drive["truth.vehicle_speed"][-1] < 20.0
     alone = fmpy.simulate_fmu(str(packed(suv)), stop_time=2.0, step_size=0.01, output=["mode"])
     assert np.unique(alone["mode"]).tolist() == [0.0, 4.0]
+
+
+def test_the_script_of_the_page_brakes_as_it_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("fmpy", reason="FMPy is not installed: pip install fmpy")
+    monkeypatch.chdir(tmp_path)
+    for line in re.findall(r"^brake-ecu (fmu \w+ .*?) +#", PAGE, re.MULTILINE):
+        assert main(line.split()) == 0
+    exec(re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)[0], {})
+    assert capsys.readouterr().out == "at rest after 339.4 m, 15.25 s\n"

@@ -153,7 +153,7 @@ def test_every_signal_of_a_frame_is_an_input(suv: Fmu) -> None:
 
 @pytest.mark.parametrize(("cycles", "faults"), [(2, 0), (10, 0), (50, WHEEL_SPEED_LOST)])
 def test_between_communication_points_no_sample_arrives(suv: Fmu, cycles: int, faults: int) -> None:
-    """A longer step is several cycles, in the first of which inputs are new: time-outs follow that rate to 0.3 s."""
+    """A longer step is several cycles, in the first of which inputs are new; time-outs follow up to 0.3 s."""
     with suv.instantiate() as ecu:
         ecu.put(DRIVING)
         ecu.initialise()

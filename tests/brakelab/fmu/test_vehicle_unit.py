@@ -1,5 +1,7 @@
 """The vehicle as an FMU drives as in `simulate`: by the same demands to the bit, and with the ECU's FMU."""
 
+from pathlib import Path
+
 import cantools
 import numpy as np
 import pytest
@@ -145,6 +147,36 @@ def test_faults_of_frames_are_refused() -> None:
     with pytest.raises(UserError, match='lost: fault: "lost" acts on frames') as caught:
         vehicle_unit(scenario, 0, "lost")
     assert "leave it out" in str(caught.value)
+
+
+OWN = """
+NUMBERS = {"mu": ("-", 0.1, 0.8)}
+
+
+def step(numbers, memory, pressure, speed, slowing, temperature, dt):
+    return memory, numbers[0]
+"""
+LINING = """
+[lining.A.friction.OWN]
+law = "own"
+code = "own.py"
+rig_mass = 996.0
+numbers = { mu = 0.42 }
+"""
+
+
+def test_a_friction_law_of_ones_own_is_refused(tmp_path: Path) -> None:
+    """Its row holds an address in this process, which would be called in another one."""
+    for name, more in (("suv.toml", ""), ("linings.toml", LINING)):
+        text = resource(f"config/plant/{name}").read_text("utf-8") + more
+        (tmp_path / name).write_text(
+            text.replace('lining = "A" ', 'friction = "OWN"\nlining = "A" '), "utf-8"
+        )
+    (tmp_path / "own.py").write_text(OWN)
+    stop = load_scenario(resource("config/scenarios/stop-1.toml"))
+    changed = {"plant": str(tmp_path / "suv.toml"), "draw": "nominal"}  # a wide one draws the law, too
+    with pytest.raises(UserError, match="mine: plant: a friction law of one's own"):
+        vehicle_unit(stop.model_copy(update=changed), 0, "mine")
 
 
 def test_a_longer_step_is_several_cycles_with_the_same_demands(stop: Fmu) -> None:

@@ -7,6 +7,8 @@ import numpy as np
 from brakelab.fmu.image import Memory, arrays_in, compiled_call, noise_state
 from brakelab.fmu.unit import TIME, Unit, Variable, described
 from brakelab.fmu.vehicle_cycle import go_on, measure
+from brakelab.plant.friction.laws import LAWS
+from brakelab.plant.friction.own import Own
 from brakelab.simulation.faults import DAEMON_KILLED, KINDS
 from brakelab.simulation.scenario import Scenario
 from brakelab.simulation.vehicle_bus import (
@@ -36,8 +38,8 @@ def vehicle_unit(scenario: Scenario, seed: int, where: str) -> Unit:
     `where` names the scenario in messages.
 
     Raises:
-        UserError: a fault of the scenario is one of frames; the plant's file is wrong; the compiled library
-            is missing or of another text.
+        UserError: a fault of the scenario is one of frames; a lining has a friction law of the user's own;
+            the plant's file is wrong; the compiled library is missing or of another text.
     """
     for fault in scenario.fault:
         if KINDS.index(fault.kind) <= DAEMON_KILLED:
@@ -45,6 +47,10 @@ def vehicle_unit(scenario: Scenario, seed: int, where: str) -> Unit:
                 where, "fault", f'"{fault.kind}" acts on frames, which an FMU has none of; leave it out'
             )
     vehicle, values, row = new_vehicle(scenario, seed), new_values(), np.full(N_TRUTH, np.nan)
+    if np.any(vehicle.params["friction_law"] == LAWS.index(Own)):
+        raise UserError(
+            where, "plant", 'a friction law of one\'s own is not in the library; take a law = "table"'
+        )
     source = new_noise(seed)
     noise, heard = noise_state(source), np.zeros(1, target_dtype(N_OUTPUTS))
     heard["value"] = np.nan
