@@ -1,4 +1,4 @@
-"""A small co-simulation master: what an importer of FMI 3.0 does, with names in place of value references."""
+"""A small co-simulation master: what an importer of FMI 3.0 or 2.0 does, with names for value references."""
 
 import ctypes
 import platform
@@ -26,9 +26,9 @@ class Fmu:
         self.description = ET.parse(folder / "modelDescription.xml").getroot()
         interface = self.description.find("CoSimulation")
         assert interface is not None
-        binaries = folder / "binaries" / f"{platform.machine()}-linux"
+        self.version = int(self.description.get("fmiVersion", "")[0])
+        binaries = folder / "binaries" / ("linux64" if self.version == 2 else f"{platform.machine()}-linux")
         self.library = ctypes.CDLL(str(binaries / f"{interface.get('modelIdentifier')}.so"))
-        self.library.fmi3InstantiateCoSimulation.restype = c_void_p
         variables = self.description.findall("ModelVariables/*")
         self.references = {one.get("name", ""): int(one.get("valueReference", "")) for one in variables}
         by_cause: dict[str | None, list[str]] = {}
@@ -37,6 +37,8 @@ class Fmu:
         self.inputs, self.outputs = by_cause["input"], by_cause["output"]
 
     def instantiate(self, token: str | None = None) -> "Instance":
+        if self.version == 2:
+            return Instance2(self, token or self.description.get("guid", ""))
         return Instance(self, token or self.description.get("instantiationToken", ""))
 
 
@@ -45,25 +47,28 @@ class Instance:
 
     def __init__(self, fmu: Fmu, token: str) -> None:
         self.fmu, self.messages = fmu, list[tuple[int, str, str]]()
-        self._log = _LOGGER(
-            lambda _, status, kind, text: self.messages.append((status, kind.decode(), text.decode()))
-        )
-        self._number, self._truth = (c_double * 1)(), (c_bool * 1)()
-        made = fmu.library.fmi3InstantiateCoSimulation(
-            b"one", token.encode(), b"", c_bool(False), c_bool(True), c_bool(False), c_bool(False),
-            None, c_size_t(0), None, self._log, None,
-        )  # fmt: skip
+        self._log = _LOGGER(lambda _, *said: self._note(*said))
+        made = self.make(token.encode())
         self.address = made and c_void_p(made)
         self.terminates, self.time = False, 0.0
+
+    def _note(self, status: int, kind: bytes, text: bytes) -> None:
+        self.messages.append((status, kind.decode(), text.decode()))
+
+    def make(self, token: bytes) -> int | None:
+        instantiate = self.fmu.library.fmi3InstantiateCoSimulation
+        instantiate.restype = c_void_p
+        no, yes = c_bool(False), c_bool(True)
+        return instantiate(b"one", token, b"", no, yes, no, no, None, c_size_t(0), None, self._log, None)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.fmu.library.fmi3FreeInstance(self.address)
+        getattr(self.fmu.library, f"fmi{self.fmu.version}FreeInstance")(self.address)
 
     def call(self, name: str, *arguments: Any) -> int:
-        return int(getattr(self.fmu.library, f"fmi3{name}")(self.address, *arguments))
+        return int(getattr(self.fmu.library, f"fmi{self.fmu.version}{name}")(self.address, *arguments))
 
     def initialise(self, start: float = 0.0, stop: float | None = None) -> int:
         self.time = start
@@ -132,3 +137,85 @@ class Instance:
     def deserialised(self, content: bytes) -> tuple[int, c_void_p]:
         state = c_void_p()
         return self.call("DeserializeFMUState", content, c_size_t(len(content)), byref(state)), state
+
+
+class _Callbacks(ctypes.Structure):
+    _fields_ = (
+        ("log", c_void_p), ("allocate", c_void_p), ("release", c_void_p), ("finished", c_void_p),
+        ("environment", c_void_p),
+    )  # fmt: skip
+
+
+_LOGGER_2 = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p, c_char_p)
+
+
+class Instance2(Instance):
+    """One instance of FMI 2.0; what follows differs from FMI 3.0."""
+
+    def make(self, token: bytes) -> int | None:
+        def log(_: object, name: bytes, status: int, kind: bytes, form: bytes, text: bytes) -> None:
+            assert (name, form) == (b"one", b"%s")
+            self._note(status, kind, text)
+
+        self._log_2 = _LOGGER_2(log)
+        self._callbacks = _Callbacks(log=ctypes.cast(self._log_2, c_void_p).value)
+        instantiate = self.fmu.library.fmi2Instantiate
+        instantiate.restype = c_void_p
+        return instantiate(b"one", c_int(1), token, b"", byref(self._callbacks), c_int(0), c_int(1))
+
+    def initialise(self, start: float = 0.0, stop: float | None = None) -> int:
+        self.time = start
+        given, end = c_int(stop is not None), c_double(stop or 0.0)
+        return (
+            self.call("SetupExperiment", c_int(0), c_double(0.0), c_double(start), given, end)
+            or self.call("EnterInitializationMode")
+            or self.call("ExitInitializationMode")
+        )
+
+    def put(self, values: Mapping[str, float]) -> int:
+        references = (c_uint32 * len(values))(*(self.fmu.references[name] for name in values))
+        return self.call(
+            "SetReal", references, c_size_t(len(values)), (c_double * len(values))(*values.values())
+        )
+
+    def put_truth(self, name: str, value: bool) -> int:
+        reference = (c_uint32 * 1)(self.fmu.references[name])
+        return self.call("SetBoolean", reference, c_size_t(1), (c_int * 1)(value))
+
+    def get(self, names: Sequence[str]) -> NDArray[np.float64]:
+        references = (c_uint32 * len(names))(*(self.fmu.references[name] for name in names))
+        values = np.full(len(names), -1.0)
+        status = self.call("GetReal", references, c_size_t(len(names)), c_void_p(values.ctypes.data))
+        assert status == OK, self.messages[-1]
+        return values
+
+    def step(self, by: float = STEP) -> int:
+        status = self.call("DoStep", c_double(self.time), c_double(by), c_int(0))
+        reached, ends = c_double(), c_int(-1)
+        if status in (OK, DISCARD):
+            assert self.call("GetRealStatus", c_int(2), byref(reached)) == OK
+            assert self.call("GetBooleanStatus", c_int(3), byref(ends)) == OK
+            self.time, self.terminates = reached.value, ends.value == 1
+        return status
+
+    def state(self, kept: c_void_p | None = None) -> c_void_p:
+        kept = kept or c_void_p()
+        assert self.call("GetFMUstate", byref(kept)) == OK
+        return kept
+
+    def free(self, state: c_void_p) -> int:
+        return self.call("FreeFMUstate", byref(state))
+
+    def restore(self, state: c_void_p) -> int:
+        return self.call("SetFMUstate", state)
+
+    def serialised(self, state: c_void_p) -> bytes:
+        size = c_size_t()
+        assert self.call("SerializedFMUstateSize", state, byref(size)) == OK
+        content = (c_uint8 * size.value)()
+        assert self.call("SerializeFMUstate", state, content, size) == OK
+        return bytes(content)
+
+    def deserialised(self, content: bytes) -> tuple[int, c_void_p]:
+        state = c_void_p()
+        return self.call("DeSerializeFMUstate", content, c_size_t(len(content)), byref(state)), state

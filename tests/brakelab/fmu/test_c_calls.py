@@ -50,8 +50,8 @@ WRONG: list[tuple[str, Callable[[Instance], int], int, str]] = [
     ("another type", lambda fmu: fmu.call("GetInt32", *one(1)), ERROR, "no variable is of this type"),
     ("initialised twice", lambda fmu: fmu.call(*ENTER), ERROR, "InitializationMode: not between steps"),
     ("event mode", lambda fmu: fmu.call("EnterEventMode"), ERROR, "fmi3EnterEventMode: not provided"),
-    ("no state", lambda fmu: fmu.restore(ctypes.c_void_p()), ERROR, "no state of this FMU"),
-    ("a foreign state", lambda fmu: fmu.restore(FOREIGN), ERROR, "no state of this FMU"),
+    ("no state", lambda fmu: fmu.restore(ctypes.c_void_p()), ERROR, "no state of this FMU is given"),
+    ("a foreign state", lambda fmu: fmu.restore(FOREIGN), ERROR, "no state of this FMU is given"),
 ]  # fmt: skip
 
 
@@ -136,7 +136,7 @@ def test_logging_can_be_turned_off_but_for_errors(suv: Fmu) -> None:
         assert len(ecu.messages) == 1
         assert logging(ecu, False) == OK
         assert logging(ecu, True, b"logNothing") == ERROR
-        assert ecu.messages[-1][2] == "fmi3SetDebugLogging: no category logNothing"
+        assert ecu.messages[-1][2] == "there is no category logNothing of messages"
 
 
 def test_no_instance_is_an_error(suv: Fmu) -> None:

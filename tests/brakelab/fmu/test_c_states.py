@@ -9,9 +9,9 @@ from .master import ERROR, OK, Fmu, Instance
 from .test_ecu_unit import DRIVING
 
 
-@pytest.fixture(params=["suv", "stop"])
+@pytest.fixture(params=["suv", "stop", "suv_2", "stop_2"])
 def fmu(request: pytest.FixtureRequest) -> Fmu:
-    """The ECU, the vehicle."""
+    """The ECU, the vehicle, both of FMI 2.0."""
     return request.getfixturevalue(request.param)
 
 

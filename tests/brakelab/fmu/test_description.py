@@ -21,9 +21,9 @@ UNITS = {one.name: one.unit for one in INPUT_SIGNALS} | {
 }
 
 
-@pytest.fixture(params=["suv", "stop"])
+@pytest.fixture(params=["suv", "stop", "suv_2", "stop_2"])
 def fmu(request: pytest.FixtureRequest) -> Fmu:
-    """The ECU, the vehicle."""
+    """The ECU, the vehicle, both of FMI 2.0."""
     return request.getfixturevalue(request.param)
 
 
@@ -44,12 +44,12 @@ def test_factors_are_those_of_signal_maps(unit: str, base: str) -> None:
 
 
 def test_variables_have_the_units_of_the_contract(fmu: Fmu) -> None:
-    defined = {
-        one.get("name"): one.find("BaseUnit") for one in fmu.description.findall("UnitDefinitions/Unit")
-    }
+    units = fmu.description.findall("UnitDefinitions/Unit")
+    defined = {one.get("name"): one.find("BaseUnit") for one in units}
     found = 0
-    for variable in fmu.description.findall("ModelVariables/Float64"):
-        name, unit = variable.get("name", ""), variable.get("unit")
+    for variable in fmu.description.findall("ModelVariables/*"):
+        name, kind = variable.get("name", ""), variable.find("*")
+        unit = (variable if kind is None else kind).get("unit")
         stem = name.removeprefix("estimate.").removeprefix("truth.")
         expected = "s" if name == "time" else UNITS.get(stem, truth_unit(stem))
         assert (unit or "-") == (expected or "-"), name
@@ -62,18 +62,22 @@ def test_variables_have_the_units_of_the_contract(fmu: Fmu) -> None:
 
 
 def test_it_is_a_co_simulation_of_ten_milliseconds_with_states(fmu: Fmu) -> None:
-    interface = fmu.description.find("CoSimulation")
+    interface, experiment = fmu.description.find("CoSimulation"), fmu.description.find("DefaultExperiment")
     assert interface is not None
-    assert interface.attrib.items() >= {
-        ("fixedInternalStepSize", "0.01"),
-        ("canHandleVariableCommunicationStepSize", "false"),
-        ("canGetAndSetFMUState", "true"),
-        ("canSerializeFMUState", "true"),
-    }
+    assert experiment is not None
+    assert experiment.get("stepSize") == interface.get("fixedInternalStepSize", "0.01") == "0.01"
+    assert interface.get("canHandleVariableCommunicationStepSize") == "false"
+    state = "FMUstate" if fmu.version == 2 else "FMUState"
+    assert interface.get(f"canGetAndSet{state}") == interface.get(f"canSerialize{state}") == "true"
     references = [int(one.get("valueReference", "")) for one in fmu.description.findall("ModelVariables/*")]
     assert references == list(range(len(references)))
-    outputs = [one.get("valueReference") for one in fmu.description.findall("ModelStructure/Output")]
-    assert outputs == [str(fmu.references[name]) for name in fmu.outputs]
+    places = [fmu.references[name] for name in fmu.outputs]
+    if fmu.version == 2:
+        outputs = fmu.description.findall("ModelStructure/Outputs/Unknown")
+        assert [int(one.get("index", "")) - 1 for one in outputs] == places
+    else:
+        outputs = fmu.description.findall("ModelStructure/Output")
+        assert [int(one.get("valueReference", "")) for one in outputs] == places
 
 
 def test_what_the_database_says_of_a_signal_is_told(suv: Fmu) -> None:

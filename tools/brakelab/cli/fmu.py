@@ -8,17 +8,18 @@ import typer
 from brakelab.cli.arguments import Plant, Scenario, Seed
 from ecu.arguments import CONFIG_OPTION, Commands, Config, Draw
 
-app = Commands(help="Write FMUs (FMI 3.0) for Simulink, CarMaker and others.", no_args_is_help=True)
+app = Commands(help="Write FMUs (FMI 3.0, 2.0) for Simulink, CarMaker and others.", no_args_is_help=True)
 
 Out = Annotated[Path, typer.Option("--out", "-o", metavar="FILE.fmu", help="FMU to write")]
+Fmi = Annotated[int, typer.Option("--fmi", metavar="N", min=2, max=3, help="Version of FMI, 3 or 2")]
 
 
 @app.command()
-def ecu(config: Config, out: Out) -> int:
+def ecu(config: Config, out: Out, fmi: Fmi = 3) -> int:
     """Write the ECU of a configuration."""
     from brakelab.fmu import command
 
-    return command.write_ecu(config, out)
+    return command.write_ecu(config, out, 2 if fmi == 2 else 3)
 
 
 @app.command()
@@ -29,8 +30,9 @@ def vehicle(
     draw: Draw = None,
     plant: Plant = None,
     config: Annotated[Path | None, CONFIG_OPTION] = None,
+    fmi: Fmi = 3,
 ) -> int:
     """Write the simulated vehicle of a scenario with its driver. CONFIG is the car of --plant as-config."""
     from brakelab.fmu import command
 
-    return command.write_vehicle(scenario, config, out, seed, draw, plant)
+    return command.write_vehicle(scenario, config, out, seed, draw, plant, 2 if fmi == 2 else 3)

@@ -6,7 +6,7 @@ import zipfile
 from pathlib import Path
 from typing import Final
 
-from brakelab.fmu.description import model_description
+from brakelab.fmu.description import Version, model_description
 from brakelab.fmu.ecu_unit import ecu_unit
 from brakelab.fmu.source import c_source
 from brakelab.fmu.unit import Unit
@@ -27,19 +27,25 @@ EARLIEST: Final = (1980, 1, 1, 0, 0, 0)
 """Time of every file in the zip file: the same unit gives the same bytes."""
 
 
-def write_ecu(config: Path, out: Path) -> int:
-    """Write the ECU of a configuration; return 0.
+def write_ecu(config: Path, out: Path, version: Version = 3) -> int:
+    """Write the ECU of a configuration for a version of FMI; return 0.
 
     Raises:
         UserError: the configuration is wrong, the compiled library is not there, there is no C compiler, or
             `out` cannot be written.
     """
-    write_fmu(ecu_unit(load_config(config)), out)
+    write_fmu(ecu_unit(load_config(config)), out, version)
     return 0
 
 
 def write_vehicle(
-    scenario: Path, config: Path | None, out: Path, seed: int, draw: str | None, plant: str | None
+    scenario: Path,
+    config: Path | None,
+    out: Path,
+    seed: int,
+    draw: str | None,
+    plant: str | None,
+    version: Version = 3,
 ) -> int:
     """Write the simulated vehicle of a scenario; return 0.
 
@@ -58,29 +64,33 @@ def write_vehicle(
             raise UserError("--plant", plant, "of which car? give --config")
         else:
             driven = with_plant(driven, plant)
-        write_fmu(vehicle_unit(driven, seed, command_name(scenario)), out)
+        write_fmu(vehicle_unit(driven, seed, command_name(scenario)), out, version)
     return 0
 
 
-def write_fmu(unit: Unit, out: Path) -> None:
+def write_fmu(unit: Unit, out: Path, version: Version) -> None:
     """Write an FMU.
 
     Raises:
-        UserError: there is no C compiler, or `out` is not named as an FMU or cannot be written.
+        UserError: there is no C compiler, `out` is not named as an FMU or cannot be written, or this version
+            of FMI has no name for this processor.
     """
+    machine = platform.machine()
+    if version == 2 and machine != "x86_64":
+        raise UserError("--fmi", "2", f"has no name for {machine}; take 3")
     if out.suffix != SUFFIX:
         raise UserError(str(out), "", f"importers know an FMU by its name; end it with {SUFFIX}")
     library = unit.calls[0].library
     known = library.manifest["processors"]
-    kernels = {name: known[name] for name in (V3, BASELINE[platform.machine()]) if name in known}
-    token, text = c_source(unit, kernels)
+    kernels = {name: known[name] for name in (V3, BASELINE[machine]) if name in known}
+    token, text = c_source(unit, kernels, version)
     with tempfile.TemporaryDirectory(prefix="brake-ecu-") as folder:
         source, shared = Path(folder, f"{unit.name}.c"), Path(folder, f"{unit.name}.so")
         source.write_text(text, "utf-8")
         compile_shared((source,), OPTIONS, shared)
-        binaries = f"binaries/{platform.machine()}-linux"
+        binaries = "binaries/linux64" if version == 2 else f"binaries/{machine}-linux"
         files = {
-            "modelDescription.xml": model_description(unit, token),
+            "modelDescription.xml": model_description(unit, token, version),
             f"{binaries}/{shared.name}": shared.read_bytes(),
             **{f"{binaries}/{file}": (library.folder / file).read_bytes() for file in kernels.values()},
             "resources/origin.json": unit.origin.encode(),

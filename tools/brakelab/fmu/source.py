@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
 
+from brakelab.fmu.description import Version
 from brakelab.fmu.unit import Unit
 from ecu.contract.signals import CYCLE_NS
 
@@ -66,10 +67,10 @@ def _plain(places: list[int], targets: dict[int, int]) -> list[int]:
     return [0 if place in targets else value for place, value in enumerate(places)]
 
 
-def c_source(unit: Unit, libraries: dict[str, str]) -> tuple[str, str]:
+def c_source(unit: Unit, libraries: dict[str, str], version: Version) -> tuple[str, str]:
     """Return the token that identifies the unit, and the C text of its library."""
     text = _tables(unit, libraries) + "".join(
-        (FOLDER / name).read_text("utf-8") for name in ("instance.c", unit.text, "fmi3.c")
+        (FOLDER / name).read_text("utf-8") for name in ("instance.c", unit.text, f"fmi{version}.c")
     )
     names = "".join(f"{one.name} {one.unit}\n" for one in unit.variables)
     token = hashlib.sha256((names + text).encode()).hexdigest()

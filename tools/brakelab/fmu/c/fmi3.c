@@ -4,41 +4,23 @@
  * instance is terminated, as chapter 2.3.2 asks for. A step of another length or from another time:
  * fmi3Discard, nothing has changed.
  */
-#define EXPORT __attribute__((visibility("default")))
-typedef uint32_t reference;
 
-static int refused(instance *of, int phases, const char *function) {
-    if (!of) return ERROR;
-    if (of->now.phase & phases) return OK;
-    const char *in = of->now.phase == INSTANTIATED   ? "before initialisation"
-                     : of->now.phase == INITIALISING ? "during initialisation"
-                     : of->now.phase == STEPPING     ? "between steps"
-                                                     : "after the end, or an error";
-    return tell(of, ERROR, "%s: not %s", function, in);
+static void deliver(instance *of, int status, const char *category, const char *message) {
+    ((void (*)(void *, int, const char *, const char *))of->log)(of->environment, status, category, message);
 }
 
 EXPORT const char *fmi3GetVersion(void) { return "3.0"; }
 
 EXPORT int fmi3SetDebugLogging(instance *of, bool on, size_t count, const char *const categories[]) {
-    if (!of) return ERROR;
-    unsigned chosen = count ? 0 : ~0u;
-    for (size_t i = 0; i < count; i++) {
-        unsigned known = 0;
-        for (int status = WARNING; status <= ERROR; status++)
-            if (categories[i] && !strcmp(categories[i], CATEGORIES[status])) known = 1u << status;
-        if (!known) return tell(of, ERROR, "fmi3SetDebugLogging: no category %s", categories[i] ? categories[i] : "");
-        chosen |= known;
-    }
-    of->logged = on ? of->logged | chosen : of->logged & ~chosen;
-    return OK;
+    return of ? choose_messages(of, on, count, categories) : ERROR;
 }
 
 EXPORT void *fmi3InstantiateCoSimulation(const char *name, const char *token, const char *resources, bool visible,
                                          bool logging, bool event_mode, bool early_return,
                                          const reference intermediate[], size_t count, void *environment,
-                                         logger *log, void *update) {
-    (void)name, (void)resources, (void)visible, (void)early_return, (void)intermediate, (void)count, (void)update;
-    instance *of = instantiate(token, environment, log, logging);
+                                         void (*log)(void), void *update) {
+    (void)resources, (void)visible, (void)early_return, (void)intermediate, (void)count, (void)update;
+    instance *of = instantiate(name, token, environment, log, logging);
     if (of && event_mode) tell(of, WARNING, "there is no event mode; events are handled within a step");
     return of;
 }
@@ -67,18 +49,6 @@ EXPORT int fmi3Terminate(instance *of) {
 EXPORT int fmi3Reset(instance *of) {
     if (!of) return ERROR;
     restart(of);
-    return OK;
-}
-
-/* Return whether `variable` can be set now, or read, as a number or as a truth value. */
-static int misused(instance *of, const char *function, reference variable, bool sets, bool truth) {
-    if (variable >= COUNT) return tell(of, ERROR, "%s: no variable %u, the last is %d", function, variable, COUNT - 1);
-    int kind = VARIABLES[variable].kind;
-    if ((kind == PARAMETER) != truth)
-        return tell(of, ERROR, "%s: variable %u is %s", function, variable, truth ? "a number" : "a truth value");
-    if (sets && kind != INPUT && !(kind == PARAMETER && of->now.phase != STEPPING))
-        return tell(of, ERROR, "%s: variable %u cannot be set%s", function, variable,
-                    kind == PARAMETER ? " any more" : "");
     return OK;
 }
 
@@ -136,22 +106,13 @@ EXPORT int fmi3DoStep(instance *of, double at, double by, bool no_state_before, 
     return status;
 }
 
-EXPORT int fmi3GetFMUState(instance *of, void **state) {
-    if (!of || !state) return ERROR;
-    return keep(of, state);
-}
+EXPORT int fmi3GetFMUState(instance *of, void **state) { return of && state ? keep(of, state) : ERROR; }
 
-EXPORT int fmi3SetFMUState(instance *of, void *state) {
-    if (!of) return ERROR;
-    if (!state || memcmp(state, TOKEN, sizeof TOKEN)) return tell(of, ERROR, "%s: no state of this FMU", __func__);
-    memcpy(&of->now, state, sizeof of->now);
-    return OK;
-}
+EXPORT int fmi3SetFMUState(instance *of, void *state) { return of ? restore(of, state) : ERROR; }
 
 EXPORT int fmi3FreeFMUState(instance *of, void **state) {
     (void)of;
-    if (state) free(*state), *state = NULL;
-    return OK;
+    return drop(state);
 }
 
 EXPORT int fmi3SerializedFMUStateSize(instance *of, void *state, size_t *size) {
@@ -161,28 +122,14 @@ EXPORT int fmi3SerializedFMUStateSize(instance *of, void *state, size_t *size) {
 }
 
 EXPORT int fmi3SerializeFMUState(instance *of, void *state, unsigned char bytes[], size_t size) {
-    if (!of) return ERROR;
-    if (!state || size < sizeof(snapshot))
-        return tell(of, ERROR, "%s: %zu bytes for a state of %zu", __func__, size, sizeof(snapshot));
-    memcpy(bytes, state, sizeof(snapshot));
-    return OK;
+    return of ? serialise(of, state, bytes, size) : ERROR;
 }
 
 EXPORT int fmi3DeserializeFMUState(instance *of, const unsigned char bytes[], size_t size, void **state) {
-    if (!of || !state) return ERROR;
-    return deserialise(of, bytes, size, state);
+    return of && state ? deserialise(of, bytes, size, state) : ERROR;
 }
 
 /* What every library has to export, and this one has no use for (chapter 2.5). */
-#define NONE_OF_THIS_TYPE(name)                                                                                  \
-    EXPORT int name(instance *of, const reference variables[], size_t count) {                                   \
-        (void)variables;                                                                                         \
-        if (!of) return ERROR;                                                                                   \
-        return count ? tell(of, ERROR, "%s: no variable is of this type", __func__) : OK;                        \
-    }
-#define NOT_PROVIDED(name)                                                                                       \
-    EXPORT int name(instance *of) { return of ? tell(of, ERROR, "%s: not provided", __func__) : ERROR; }
-
 #define FOR_BOTH(of, type) of(fmi3Get##type) of(fmi3Set##type)
 FOR_BOTH(NONE_OF_THIS_TYPE, Float32)
 FOR_BOTH(NONE_OF_THIS_TYPE, Int8)

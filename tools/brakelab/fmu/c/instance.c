@@ -8,8 +8,8 @@ enum phase { INSTANTIATED = 1, INITIALISING = 2, STEPPING = 4, ENDED = 8 };
 enum status { OK, WARNING, DISCARD, ERROR };
 #define LONGEST_S 3600.5 /* of a step */
 
-typedef void logger(void *environment, int status, const char *category, const char *message);
 typedef int kernel(int64_t *places);
+typedef uint32_t reference;
 
 typedef struct {
     char token[sizeof TOKEN];
@@ -24,9 +24,13 @@ typedef struct {
     int64_t places[CALLS][MOST_PLACES];
     kernel *kernels[CALLS];
     void *library, *environment;
-    logger *log;
-    unsigned logged; /* a bit for each status */
+    void (*log)(void); /* of a type that the version of FMI says */
+    unsigned logged;   /* a bit for each status */
+    char name[100];
 } instance;
+
+/* Hand a message to the importer, in fmi2.c or fmi3.c. */
+static void deliver(instance *of, int status, const char *category, const char *message);
 
 static const char *const CATEGORIES[] = {"", "logStatusWarning", "logStatusDiscard", "logStatusError"};
 
@@ -38,7 +42,7 @@ __attribute__((format(printf, 3, 4))) static int tell(instance *of, int status, 
         va_start(values, format);
         vsnprintf(text, sizeof text, format, values);
         va_end(values);
-        of->log(of->environment, status, CATEGORIES[status], text);
+        deliver(of, status, CATEGORIES[status], text);
     }
     if (status == ERROR) of->now.phase = ENDED;
     return status;
@@ -125,7 +129,7 @@ static void restart(instance *of) {
     memset(&of->now, 0, sizeof of->now);
     memcpy(of->now.token, TOKEN, sizeof TOKEN);
     memcpy(of->now.memory, START, MEMORY);
-    of->now.phase = INSTANTIATED;
+    of->now.phase = INSTANTIATED, of->now.stop = INFINITY;
 }
 
 static void discard(instance *of) {
@@ -133,11 +137,13 @@ static void discard(instance *of) {
     free(of);
 }
 
-static instance *instantiate(const char *token, void *environment, logger *log, bool logging) {
+static instance *instantiate(const char *name, const char *token, void *environment, void (*log)(void),
+                             bool logging) {
     instance *of = aligned_alloc(64, (sizeof *of + 63) / 64 * 64);
     if (!of) return NULL;
     memset(of, 0, sizeof *of);
     of->environment = environment, of->log = log, of->logged = logging ? ~0u : 0u;
+    snprintf(of->name, sizeof of->name, "%s", name ? name : "");
     restart(of);
     int wrong = token && !strcmp(token, TOKEN) ? load(of) : tell(of, ERROR, "the token is another FMU's");
     if (wrong) {
@@ -208,3 +214,68 @@ static int deserialise(instance *of, const unsigned char *bytes, size_t size, vo
     memcpy(*state, bytes, size);
     return OK;
 }
+
+static int restore(instance *of, const void *state) {
+    if (!state || memcmp(state, TOKEN, sizeof TOKEN)) return tell(of, ERROR, "no state of this FMU is given");
+    memcpy(&of->now, state, sizeof of->now);
+    return OK;
+}
+
+static int serialise(instance *of, const void *state, unsigned char *bytes, size_t size) {
+    if (!state || size < sizeof(snapshot))
+        return tell(of, ERROR, "%zu bytes for a state of %zu", size, sizeof(snapshot));
+    memcpy(bytes, state, sizeof(snapshot));
+    return OK;
+}
+
+static int drop(void **state) {
+    if (state) free(*state), *state = NULL;
+    return OK;
+}
+
+/* What both versions of FMI check. */
+static int refused(instance *of, int phases, const char *function) {
+    if (!of) return ERROR;
+    if (of->now.phase & phases) return OK;
+    const char *in = of->now.phase == INSTANTIATED   ? "before initialisation"
+                     : of->now.phase == INITIALISING ? "during initialisation"
+                     : of->now.phase == STEPPING     ? "between steps"
+                                                     : "after the end, or an error";
+    return tell(of, ERROR, "%s: not %s", function, in);
+}
+
+/* Return whether `variable` can be set now, or read, as a number or as a truth value. */
+static int misused(instance *of, const char *function, reference variable, bool sets, bool truth) {
+    if (variable >= COUNT) return tell(of, ERROR, "%s: no variable %u, the last is %d", function, variable, COUNT - 1);
+    int kind = VARIABLES[variable].kind;
+    if ((kind == PARAMETER) != truth)
+        return tell(of, ERROR, "%s: variable %u is %s", function, variable, truth ? "a number" : "a truth value");
+    if (sets && kind != INPUT && !(kind == PARAMETER && of->now.phase != STEPPING))
+        return tell(of, ERROR, "%s: variable %u cannot be set%s", function, variable,
+                    kind == PARAMETER ? " any more" : "");
+    return OK;
+}
+
+static int choose_messages(instance *of, bool on, size_t count, const char *const categories[]) {
+    unsigned chosen = count ? 0 : ~0u;
+    for (size_t i = 0; i < count; i++) {
+        const char *name = categories[i] ? categories[i] : "";
+        unsigned known = 0;
+        for (int status = WARNING; status <= ERROR; status++)
+            if (!strcmp(name, CATEGORIES[status])) known = 1u << status;
+        if (!known) return tell(of, ERROR, "there is no category %s of messages", name);
+        chosen |= known;
+    }
+    of->logged = on ? of->logged | chosen : of->logged & ~chosen;
+    return OK;
+}
+
+#define EXPORT __attribute__((visibility("default")))
+#define NONE_OF_THIS_TYPE(name)                                                                                  \
+    EXPORT int name(instance *of, const reference variables[], size_t count) {                                   \
+        (void)variables;                                                                                         \
+        if (!of) return ERROR;                                                                                   \
+        return count ? tell(of, ERROR, "%s: no variable is of this type", __func__) : OK;                        \
+    }
+#define NOT_PROVIDED(name)                                                                                       \
+    EXPORT int name(instance *of) { return of ? tell(of, ERROR, "%s: not provided", __func__) : ERROR; }
