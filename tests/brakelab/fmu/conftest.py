@@ -18,6 +18,8 @@ Make = Callable[..., Fmu]
 
 @pytest.fixture(scope="session", autouse=True)
 def _kernels() -> None:
+    if jit.interprets():
+        pytest.skip("kernels run as plain Python")
     if compiler() is None:
         pytest.skip("no C compiler")
     for module in ("ecu.algorithm.step", "brakelab.fmu.vehicle_cycle"):

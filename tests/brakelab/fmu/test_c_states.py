@@ -68,16 +68,21 @@ def test_a_state_is_taken_over_an_older_one(running: Instance) -> None:
     assert running.serialised(state) != old
 
 
-@pytest.mark.parametrize("damage", ["cut", "longer", "foreign", "empty"])
+@pytest.mark.parametrize("damage", ["cut", "longer", "foreign", "empty", "one bit"])
 def test_a_state_of_something_else_is_refused(running: Instance, damage: str) -> None:
     kept = running.serialised(running.state())
-    content = {"cut": kept[:-8], "longer": kept + b"\0", "foreign": b"0" * 64 + kept[64:], "empty": b""}[
-        damage
-    ]
-    status, state = running.deserialised(content)
+    flipped = bytes([kept[len(kept) // 2] ^ 16])
+    content = {
+        "cut": kept[:-8],
+        "longer": kept + b"\0",
+        "foreign": b"0" * 64 + kept[64:],
+        "empty": b"",
+        "one bit": kept[: len(kept) // 2] + flipped + kept[len(kept) // 2 + 1 :],
+    }
+    status, state = running.deserialised(content[damage])
     assert status == ERROR
     assert not state
-    assert "not a state of this FMU" in running.messages[-1][2]
+    assert "not a state of this FMU, or damaged" in running.messages[-1][2]
 
 
 def test_instances_do_not_know_each_other(fmu: Fmu) -> None:

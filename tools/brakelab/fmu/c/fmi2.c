@@ -125,7 +125,7 @@ EXPORT int fmi2FreeFMUstate(instance *of, void **state) {
 
 EXPORT int fmi2SerializedFMUstateSize(instance *of, void *state, size_t *size) {
     (void)of, (void)state;
-    *size = sizeof(snapshot);
+    *size = SERIALISED;
     return OK;
 }
 

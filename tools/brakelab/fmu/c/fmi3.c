@@ -117,7 +117,7 @@ EXPORT int fmi3FreeFMUState(instance *of, void **state) {
 
 EXPORT int fmi3SerializedFMUStateSize(instance *of, void *state, size_t *size) {
     (void)of, (void)state;
-    *size = sizeof(snapshot);
+    *size = SERIALISED;
     return OK;
 }
 

@@ -207,24 +207,36 @@ static int keep(instance *of, void **state) {
     return OK;
 }
 
-static int deserialise(instance *of, const unsigned char *bytes, size_t size, void **state) {
-    if (size != sizeof(snapshot) || memcmp(bytes, TOKEN, sizeof TOKEN))
-        return tell(of, ERROR, "not a state of this FMU: %zu bytes, its own have %zu", size, sizeof(snapshot));
-    if (!*state && !(*state = aligned_alloc(64, sizeof(snapshot)))) return tell(of, ERROR, "no memory for a state");
-    memcpy(*state, bytes, size);
-    return OK;
-}
-
 static int restore(instance *of, const void *state) {
     if (!state || memcmp(state, TOKEN, sizeof TOKEN)) return tell(of, ERROR, "no state of this FMU is given");
     memcpy(&of->now, state, sizeof of->now);
     return OK;
 }
 
+/* FNV-1a: a kernel that went on from damaged bytes would leave its memory. */
+static uint64_t checksum(const unsigned char *bytes) {
+    uint64_t sum = 0xCBF29CE484222325u;
+    for (size_t i = 0; i < sizeof(snapshot); i++) sum = (sum ^ bytes[i]) * 0x100000001B3u;
+    return sum;
+}
+
+enum { SERIALISED = sizeof(snapshot) + sizeof(uint64_t) };
+
 static int serialise(instance *of, const void *state, unsigned char *bytes, size_t size) {
-    if (!state || size < sizeof(snapshot))
-        return tell(of, ERROR, "%zu bytes for a state of %zu", size, sizeof(snapshot));
+    if (!state || size < SERIALISED) return tell(of, ERROR, "%zu bytes for a state of %d", size, SERIALISED);
     memcpy(bytes, state, sizeof(snapshot));
+    uint64_t sum = checksum(bytes);
+    memcpy(bytes + sizeof(snapshot), &sum, sizeof sum);
+    return OK;
+}
+
+static int deserialise(instance *of, const unsigned char *bytes, size_t size, void **state) {
+    uint64_t sum = 0;
+    if (size == SERIALISED) memcpy(&sum, bytes + sizeof(snapshot), sizeof sum);
+    if (size != SERIALISED || memcmp(bytes, TOKEN, sizeof TOKEN) || sum != checksum(bytes))
+        return tell(of, ERROR, "not a state of this FMU, or damaged: %zu bytes, its own have %d", size, SERIALISED);
+    if (!*state && !(*state = aligned_alloc(64, sizeof(snapshot)))) return tell(of, ERROR, "no memory for a state");
+    memcpy(*state, bytes, sizeof(snapshot));
     return OK;
 }
 
