@@ -32,5 +32,6 @@ def compile_shared(sources: Sequence[Path], options: Sequence[str], file: Path) 
     try:
         subprocess.run(command, check=True, capture_output=True, text=True)
     except (OSError, subprocess.CalledProcessError) as error:
-        words = (getattr(error, "stderr", "") or str(error)).splitlines()[-1][:300]
+        lines = (getattr(error, "stderr", "") or str(error)).splitlines()
+        words = next((line for line in lines if "error:" in line), lines[-1])[:300]
         raise UserError(command[0], "", f"{words}; install a C compiler, or set CC to one") from None

@@ -149,6 +149,30 @@ def test_faults_of_frames_are_refused() -> None:
     assert "leave it out" in str(caught.value)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_no_demand_makes_the_car_anything_but_a_car(stop: Fmu, seed: int) -> None:
+    """What no frame could say is its range's end, and of demands that belong together all arrive, or none."""
+    random = np.random.default_rng(seed)
+    odd = [1e300, -1e300, 1e6, 30.0, 1.0, 0.0, 5e-324, np.nan, np.inf, -np.inf]
+    true = [name for name in stop.outputs if name.startswith("truth.")]
+    with stop.instantiate() as vehicle:
+        vehicle.initialise()
+        for _ in range(300):
+            vehicle.put({name: float(random.choice(odd)) for name in stop.inputs})
+            assert vehicle.step() == OK
+            assert np.isfinite(vehicle.get(true)).all()
+        vehicle.put(dict.fromkeys(stop.inputs, 0.0) | dict.fromkeys(stop.inputs[:4], 1e3) | {VALID: 1.0})
+        for _ in range(100):
+            assert vehicle.step() == OK
+        pressure = vehicle.get(["truth.calliper_pressure_fl"])[0]
+        assert 100.0 < pressure <= 200.0
+        vehicle.put({"pressure_demand_fr": np.nan})
+        for _ in range(10):
+            vehicle.step()
+        assert vehicle.get(["truth.demand_heard"])[0] == 0.0
+
+
+VALID = "pressure_demand_valid"
 OWN = """
 NUMBERS = {"mu": ("-", 0.1, 0.8)}
 

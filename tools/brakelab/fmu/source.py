@@ -1,6 +1,7 @@
 """C text of an FMU's library: tables of its variables, memory and calls, and behind them the files of c/."""
 
 import hashlib
+import math
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
@@ -24,10 +25,17 @@ def _text(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
+def _number(value: float) -> str:
+    return repr(value) if math.isfinite(value) else "INFINITY" if value > 0.0 else "-INFINITY"
+
+
 def _tables(unit: Unit, libraries: dict[str, str]) -> str:
     """Return what depends on the unit; `libraries`: files of the kernels by processor, the best first."""
     most = max(len(call.places) for call in unit.calls)
-    variables = (f"{{{one.offset},{one.place},{one.kind}}}" for one in unit.variables)
+    variables = (
+        _listed((one.offset, one.place, one.kind, _number(one.low), _number(one.high)))
+        for one in unit.variables
+    )
     targets = (
         f"{{{number},{place},{target}}}"
         for number, call in enumerate(unit.calls)
@@ -43,13 +51,14 @@ def _tables(unit: Unit, libraries: dict[str, str]) -> str:
         (
             f"enum {{ MEMORY = {unit.memory.size}, COUNT = {len(unit.variables)}, CYCLE_NS = {CYCLE_NS} }};",
             f"enum {{ {', '.join(call.name for call in unit.calls)}, CALLS }};",
-            f"enum {{ MOST_PLACES = {most} }};",
+            f"enum {{ MOST_PLACES = {most}, TAKEN_AT = {unit.taken_at} }};",
             "enum { TIME, INPUT, OUTPUT, PARAMETER };",
             "static const struct { const char *processor, *file; } LIBRARIES[] = "
             + _listed(_listed(map(_text, one)) for one in libraries.items())
             + ";",
             f"static const char *const SYMBOLS[] = {_listed(_text(call.symbol) for call in unit.calls)};",
-            f"static const struct {{ uint32_t offset, place, kind; }} VARIABLES[] = {_listed(variables)};",
+            "typedef struct { uint32_t offset, place, kind; double low, high; } variable;",
+            f"static const variable VARIABLES[] = {_listed(variables)};",
             f"static const struct {{ int call, place; int64_t target; }} TARGETS[] = {_listed(targets)};",
             f"static const int64_t PLACES[CALLS][MOST_PLACES] = {_listed(places)};",
             *(

@@ -1,5 +1,6 @@
 """What an FMU is made of: its variables with units, and the calls by which it steps."""
 
+import math
 from collections.abc import Sequence
 from functools import cache
 from typing import Final, Literal, NamedTuple
@@ -43,7 +44,10 @@ class Variable(NamedTuple):
     """Of its value in the memory: a double, of a parameter a byte."""
     description: str = ""
     place: int = 0
-    """Of an input among those of the ECU."""
+    """Of an input among the inputs or outputs of the ECU."""
+    low: float = -math.inf
+    """Range of an input."""
+    high: float = math.inf
 
 
 class Unit(NamedTuple):
@@ -59,21 +63,33 @@ class Unit(NamedTuple):
     calls: Sequence[Call]
     origin: str
     """What it was made of, as text for people."""
+    taken_at: int = 0
+    """Offset in the memory of the values by place that the vehicle hears."""
 
 
 TIME: Final = Variable("time", "TIME", "s", 0, "Simulation time")
 
 
+class Told(NamedTuple):
+    """What the contract's database says of a signal."""
+
+    description: str = ""
+    low: float = -math.inf
+    high: float = math.inf
+
+
 @cache
-def _comments() -> dict[str, str]:
-    """Return what the contract's database says of its signals, by name."""
+def _told() -> dict[str, Told]:
     found = {}
     for message in load_database(resource("dbc/brake_ecu.dbc")).messages:
         for signal in message.signals:
-            found[signal.name] = (signal.comment or "").partition(" Not available:")[0].rstrip(".")
+            text = (signal.comment or "").partition(" Not available:")[0].rstrip(".")
+            low = -math.inf if signal.minimum is None else float(signal.minimum)
+            high = math.inf if signal.maximum is None else float(signal.maximum)
+            found[signal.name] = Told(text, low, high)
     return found
 
 
-def described(name: str) -> str:
-    """Return the description of a signal of the contract, empty: its database has none."""
-    return _comments().get(name, "")
+def told(name: str) -> Told:
+    """Return what the contract's database says of a signal by name, nothing of one that it has not."""
+    return _told().get(name, Told())

@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from brakelab.fmu.image import Memory, arrays_in, compiled_call, noise_state
-from brakelab.fmu.unit import TIME, Unit, Variable, described
+from brakelab.fmu.unit import TIME, Unit, Variable, told
 from brakelab.fmu.vehicle_cycle import go_on, measure
 from brakelab.plant.friction.laws import LAWS
 from brakelab.plant.friction.own import Own
@@ -51,12 +51,12 @@ def vehicle_unit(scenario: Scenario, seed: int, where: str) -> Unit:
         raise UserError(
             where, "plant", 'a friction law of one\'s own is not in the library; take a law = "table"'
         )
-    source = new_noise(seed)
+    source, given = new_noise(seed), np.full(len(DEMANDED), np.nan)
     noise, heard = noise_state(source), np.zeros(1, target_dtype(N_OUTPUTS))
-    heard["value"] = np.nan
-    memory = Memory((*arrays_in(vehicle), values, row, noise, heard))
-    demands, at = heard["value"][0], noise.ctypes.data
+    memory = Memory((*arrays_in(vehicle), values, row, noise, heard, given))
+    at, demanded = noise.ctypes.data, [(name, told(name)) for name in DEMANDED]
     units = {name: one.unit for one in OUTPUT_SIGNALS for name in column_names(one)}
+
     return Unit(
         NAME,
         f"Simulated vehicle with its driver: scenario {where}",
@@ -68,10 +68,13 @@ def vehicle_unit(scenario: Scenario, seed: int, where: str) -> Unit:
                     name,
                     "INPUT",
                     units[name],
-                    memory.offset(demands[OUTPUT[name] :].ctypes.data),
-                    f"{described(name)} (NaN: none arrived)",
+                    memory.offset(given[place:].ctypes.data),
+                    f"{of.description} ({of.low:g} to {of.high:g}; NaN: none arrived)",
+                    OUTPUT[name],
+                    of.low,
+                    of.high,
                 )
-                for name in DEMANDED
+                for place, (name, of) in enumerate(demanded)
             ),
             *(
                 Variable(
@@ -79,7 +82,7 @@ def vehicle_unit(scenario: Scenario, seed: int, where: str) -> Unit:
                     "OUTPUT",
                     one.unit,
                     memory.offset(values[place:].ctypes.data),
-                    described(one.name),
+                    told(one.name).description,
                 )
                 for place, one in enumerate(INPUT_SIGNALS)
                 if one.message
@@ -95,4 +98,5 @@ def vehicle_unit(scenario: Scenario, seed: int, where: str) -> Unit:
             compiled_call("GO_ON", go_on, (vehicle, heard[0], source, values, row), memory, at),
         ),
         scenario.model_dump_json(indent=1),
+        memory.offset(heard["value"].ctypes.data),
     )
