@@ -38,6 +38,5 @@ def arrow_array(values: Any, kind: Any) -> "pa.Array[Any]":
         known &= np.isfinite(numbers)
         numbers = np.where(known, numbers, 0.0)
     data = numbers.astype(kind.to_pandas_dtype(), copy=False)
-    valid = np.packbits(known, bitorder="little")
-    nulls = None if known.all() else pa.py_buffer(valid)
+    nulls = None if known.all() else pa.py_buffer(np.packbits(known, bitorder="little").data)
     return pa.Array.from_buffers(kind, len(numbers), [nulls, pa.py_buffer(data)])

@@ -34,6 +34,15 @@ N_ROW: Final = len(ROW_COLUMNS)
 
 _SMALL: Final = {"mode", "mode_mu_b", "pressure_demand_valid", "motor_demand_valid", "braking"}
 _COUNTS: Final = {"active_faults", "active_faults_2", "overruns"}
+# Dictionaries of rarely repeated numbers cost as much time as all else, and more space. The usual level of zstd
+# takes an eighth more time, for 6 % less; pages of the first version a fifth, to pack the places of nulls.
+_QUICK: Final[dict[str, Any]] = {
+    "compression": "zstd",
+    "compression_level": -1,
+    "use_dictionary": False,
+    "data_page_version": "2.0",
+    "write_statistics": ["t"],
+}
 
 
 def _row_schema() -> pa.Schema:
@@ -150,10 +159,7 @@ class ResultWriter:
             schema = ROW_SCHEMA.with_metadata(_encoded(self.provenance))
             try:
                 self.path.parent.mkdir(parents=True, exist_ok=True)
-                # Dictionaries of rarely repeated numbers cost as much time as all else, and more space.
-                self._file = pq.ParquetWriter(
-                    self._unfinished, schema, compression="zstd", use_dictionary=False
-                )
+                self._file = pq.ParquetWriter(self._unfinished, schema, **_QUICK)
             except OSError as error:
                 raise _not_written(self.path, error) from None
         return self._file
