@@ -45,31 +45,25 @@ def smooth(values: Vector) -> Vector:
     return np.convolve(padded, np.full(width, 1.0 / width), mode="valid")
 
 
-def _product(one: Vector, other: Vector) -> float:
-    """Return the scalar product; BLAS would have threads wait for each, busily."""
-    return float(np.einsum("i,i", one, other))
-
-
 def fit(signal: Vector, reference: Vector, rows: NDArray[np.bool_]) -> Fit:
     """Return the line of the best of a few lags between a signal and its expected value."""
-    best, places = Fit(0.0, 0.0, 0.0), np.flatnonzero(rows)
+    places = np.flatnonzero(rows)
     if len(places) < 2 * RATE:
-        return best
+        return Fit(0.0, 0.0, 0.0)
     places = places[::STRIDE]
     r = reference[places]
-    mean = float(r.mean())
+    mean = r.mean()
     r -= mean
-    size = _product(r, r)
     padded = np.pad(signal, LAGS[-1], mode="wrap")
-    for lag in LAGS:
-        s = padded[places + (LAGS[-1] - lag)]
-        level = float(s.mean())
-        s -= level
-        both, own = _product(s, r), _product(s, s)
-        if own == 0.0 or size == 0.0:
-            continue
-        correlation = both / float(np.sqrt(own * size))
-        if abs(correlation) > abs(best.correlation):
-            slope = both / size
-            best = Fit(correlation, slope, level - slope * mean)
-    return best
+    s = padded[places + LAGS[-1] - np.array(LAGS)[:, np.newaxis]]
+    levels = s.mean(axis=1)
+    s -= levels[:, np.newaxis]
+    # Not by BLAS, whose threads would wait for each other, busily.
+    size, both, own = np.einsum("i,i", r, r), np.einsum("ki,i->k", s, r), np.einsum("ki,ki->k", s, s)
+    spread = np.sqrt(own * size)
+    correlations = np.divide(both, spread, out=np.zeros_like(both), where=spread > 0.0)
+    best = int(np.argmax(np.abs(correlations)))
+    if correlations[best] == 0.0:
+        return Fit(0.0, 0.0, 0.0)
+    slope = both[best] / size
+    return Fit(float(correlations[best]), float(slope), float(levels[best] - slope * mean))
