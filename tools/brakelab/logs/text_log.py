@@ -148,17 +148,15 @@ def open_log(path: Path) -> IO[bytes]:
         raise UserError(str(path), "", f"cannot be read ({error.strerror}); give an existing log") from None
 
 
-def _read(stream: IO[bytes]) -> tuple[bytes, Exception | None]:
-    """Return the next bytes of a log, and why a packed one cannot be unpacked beyond them."""
-    parts: list[bytes] = []
-    missing = BLOCK_BYTES
+def _read(stream: IO[bytes], room: memoryview) -> tuple[int, Exception | None]:
+    """Return how many of the next bytes of a log are in `room`, and why a packed one ends with them."""
+    count = 0
     try:
-        while missing > 0 and (part := stream.read1(missing)):  # type: ignore[attr-defined]
-            parts.append(part)
-            missing -= len(part)
+        while count < len(room) and (read := stream.readinto1(room[count:])):  # type: ignore[attr-defined]
+            count += read
     except (OSError, EOFError, zlib.error) as error:
-        return b"".join(parts), error
-    return b"".join(parts), None
+        return count, error
+    return count, None
 
 
 def read_text(
@@ -175,17 +173,18 @@ def read_text(
     `advance(bytes)` hears of progress in bytes of text. Raises UserError with `no_log` where no line is good.
     """
     counts = np.zeros(1, COUNTS)
-    rest, read, too_long = b"", 0, False
+    room = np.empty(2 * BLOCK_BYTES, np.uint8)
+    rest, read, too_long = 0, 0, False
     with open_log(path) as stream:
         torn: Exception | None = None
         while torn is None:
-            chunk, torn = _read(stream)
-            if not chunk:
+            came, torn = _read(stream, room[rest : rest + BLOCK_BYTES].data)
+            if not came:
                 break
+            text = room[: rest + came]
             if too_long:  # its beginning was counted already
-                end = chunk.find(b"\n")
-                chunk, too_long = chunk[end + 1 :] if end >= 0 else b"", end < 0
-            text = np.frombuffer(rest + chunk, np.uint8)
+                ends = np.flatnonzero(text == 0x0A)
+                text, too_long = text[ends[0] + 1 :] if len(ends) else text[:0], not len(ends)
             while True:
                 frames = np.zeros(min(BLOCK_FRAMES, len(text) // SHORTEST + 1), FRAME)
                 lines = np.empty(len(frames), np.int64)
@@ -205,19 +204,20 @@ def read_text(
                     yield FrameBlock(frames[:count], lines[:count], "line")
                 if count < len(frames) and not at_header:
                     break
-            rest = text.tobytes()
+            rest = len(text)
+            room[:rest] = text
             if not read and quality.damaged:
                 break
-            if len(rest) >= BLOCK_BYTES:
+            if rest >= BLOCK_BYTES:
                 counts["line"] += 1
                 quality.note_damage(1, f"line {counts[0]['line']}")
-                rest, too_long = b"", True
+                rest, too_long = 0, True
             if advance:
-                advance(len(chunk))
+                advance(came)
     if not read:
         raise UserError(str(path), "line 1", f"cannot be unpacked ({torn}); {no_log}" if torn else no_log)
     if torn:
         place = f"line {counts[0]['line'] + 1}"
         quality.cut = f"{place}: the packed data is cut off or damaged here, the rest was not read"
-    elif rest.strip():
+    elif room[:rest].tobytes().strip():
         quality.cut = f"line {counts[0]['line'] + 1}: the last line is cut off and was not used"
