@@ -100,7 +100,7 @@ def live_samples(params: RecordArray, block: SampleBlock, cycles: int) -> np.nda
 def test_mixed_rates_give_the_bits_of_a_live_loop(
     params: RecordArray, size: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(engine, "BLOCK_CYCLES", 13 if size == 7 else 4096)
+    monkeypatch.setattr(engine, "BATCH", 13 if size == 7 else 4096)
     block = braking(MIXED, 7.0, seed=1)
     rows = list(run_samples(new_ecu(params, None), freshness_at_any_rate(), in_blocks(block, size)))
     values = joined(rows)

@@ -2,7 +2,8 @@
 
 Cycle k consumes the frames stamped up to T_k, then `step` runs, exactly as in the daemon. T_k is either the
 grid t_0 + k·10 ms from the first frame or sample up to the last, or that of a recording, which notes the T_k,
-missed periods and bus faults of its cycles.
+missed periods and bus faults of its cycles. Nothing that is received depends on `step`, so the inputs of the
+next cycles are made beside it.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from brakelab.arrays import Vector
 from brakelab.logs.physics.samples import KEPT
 from brakelab.logs.sample_block import SampleBlock
+from brakelab.replay.ahead import read_ahead
 from brakelab.replay.seen import look_at, new_seen
 from brakelab.results.row import MEASURED_INPUTS, N_ROW
 from ecu.algorithm.step import new_state, step
@@ -31,7 +33,10 @@ from ecu.jit import Record, batch_kernel, kernel
 
 Block = TypeVar("Block")
 
-BLOCK_CYCLES: Final = 16384
+BATCH: Final = 2048
+"""Cycles whose inputs are made at once: 1.8 MB."""
+BATCHES: Final = 8
+"""Of a block of rows."""
 
 _APART: Final = 8  # numbers, a line of the processor's cache
 _EVERYTHING: Final = 1 << 62
@@ -77,50 +82,19 @@ def _open_cycle(inputs: Record, cycle: Record) -> None:
     inputs.worst_lateness_us = cycle.worst_lateness_us
 
 
-@kernel
-def _close_cycle(
-    params: Any,
-    state: Any,
-    inputs: Any,
-    outputs: Any,
-    seen: Any,
-    vector: Vector,
-    freshness: Any,
-    row: Vector,
-    samples: Vector,
-) -> None:
-    end_cycle(inputs[0], freshness)
-    look_at(inputs[0], seen)
-    step(params, state, inputs, outputs)
-    row[:N_OUTPUTS] = vector
-    for i in range(len(MEASURED_INPUTS)):
-        place = MEASURED_INPUTS[i]
-        usable = inputs[0].verdict[place] & USABLE == USABLE
-        row[N_OUTPUTS + i] = inputs[0].value[place] if usable else np.nan
-    for i in range(len(KEPT)):
-        place = KEPT[i]
-        samples[i] = inputs[0].value[place] if inputs[0].new[place] else np.nan
-
-
 @batch_kernel
-def _run_frames(
-    params: Any,
-    state: Any,
-    inputs: Any,
-    outputs: Any,
-    seen: Any,
-    vector: Vector,
+def _gather_frames(
     plan: ReceivePlan,
     reception: Reception,
     counted: bool,
     frames: Any,
     cycles: Any,
-    values: Vector,
-    samples: Vector,
+    now: Any,
+    inputs: Any,
     at: Any,
     last: bool,
 ) -> None:
-    """Run `cycles` until frames are wanted that are not here yet; `last`: no more will come.
+    """Make the inputs of `cycles` until frames are wanted that are not here yet; `last`: no more will come.
 
     `counted`: a cycle takes as many frames as it notes, which a recording knows.
     """
@@ -128,83 +102,86 @@ def _run_frames(
     while run.done < len(cycles):
         cycle = cycles[run.done]
         if run.open == 0:
-            _open_cycle(inputs[0], cycle)
+            _open_cycle(now[0], cycle)
             run.open = 1
             run.left = cycle.frames if counted else _EVERYTHING
         limit = min(len(frames), run.cursor + run.left)
-        cursor = receive(plan, reception, frames, run.cursor, limit, inputs[0])
+        cursor = receive(plan, reception, frames, run.cursor, limit, now[0])
         run.left -= cursor - run.cursor
         run.cursor = cursor
         if cursor == len(frames) and run.left > 0 and not last:
             return
-        _close_cycle(
-            params,
-            state,
-            inputs,
-            outputs,
-            seen,
-            vector,
-            reception.freshness,
-            values[run.done],
-            samples[run.done],
-        )
+        end_cycle(now[0], reception.freshness)
+        inputs[run.done] = now[0]
         run.done += 1
         run.open = 0
 
 
 @batch_kernel
-def _run_samples(
-    params: Any,
-    state: Any,
-    inputs: Any,
-    outputs: Any,
-    seen: Any,
-    vector: Vector,
+def _gather_samples(
     freshness: Any,
     block: SampleBlock,
     cycles: Any,
     t: Vector,
-    values: Vector,
-    samples: Vector,
+    now: Any,
+    inputs: Any,
     at: Any,
     last: bool,
 ) -> None:
-    """Run `cycles` until rows are wanted that are not here yet; `last`: no more will come."""
+    """Make the inputs of `cycles` until rows are wanted that are not here yet; `last`: no more will come."""
     run = at[0]
     while run.done < len(cycles):
         cycle = cycles[run.done]
         if run.open == 0:
-            _open_cycle(inputs[0], cycle)
+            _open_cycle(now[0], cycle)
             run.open = 1
         while run.cursor < len(block.t_ns) and block.t_ns[run.cursor] <= cycle.t_ns:
             row = run.cursor
             for column in range(len(block.places)):
                 value = block.values[row, column]
                 if not np.isnan(value):
-                    accept(inputs[0], freshness, block.places[column], value, block.t_ns[row], True)
+                    accept(now[0], freshness, block.places[column], value, block.t_ns[row], True)
             if block.t_ns[row] == cycle.t_ns:
                 t[run.done] = block.t[row]
             run.cursor += 1
         if run.cursor == len(block.t_ns) and not last:
             return
-        _close_cycle(
-            params, state, inputs, outputs, seen, vector, freshness, values[run.done], samples[run.done]
-        )
+        end_cycle(now[0], freshness)
+        inputs[run.done] = now[0]
         run.done += 1
         run.open = 0
 
 
+@batch_kernel
+def _run(
+    params: Any, state: Any, inputs: Any, outputs: Any, seen: Any, vector: Vector, values: Any, samples: Any
+) -> None:
+    """Run `step` with each of `inputs`; write a row of `values` and one of `samples`."""
+    for k in range(len(inputs)):
+        now = inputs[k]
+        look_at(now, seen)
+        step(params, state, inputs[k : k + 1], outputs)
+        values[k, :N_OUTPUTS] = vector
+        for i in range(len(MEASURED_INPUTS)):
+            place = MEASURED_INPUTS[i]
+            usable = now.verdict[place] & USABLE == USABLE
+            values[k, N_OUTPUTS + i] = now.value[place] if usable else np.nan
+        for i in range(len(KEPT)):
+            place = KEPT[i]
+            samples[k, i] = now.value[place] if now.new[place] else np.nan
+
+
 def _grid(start_ns: int) -> Iterator[RecordArray]:
-    for first in count(0, BLOCK_CYCLES):
-        cycles = np.zeros(BLOCK_CYCLES, CYCLE)
-        cycles["number"] = np.arange(first, first + BLOCK_CYCLES)
+    for first in count(0, BATCH):
+        cycles = np.zeros(BATCH, CYCLE)
+        cycles["number"] = np.arange(first, first + BATCH)
         cycles["t_ns"] = start_ns + cycles["number"] * CYCLE_NS
         yield cycles
 
 
 def _recorded(cycles: RecordArray) -> Iterator[RecordArray]:
-    for first in range(0, len(cycles), BLOCK_CYCLES):
-        yield cycles[first : first + BLOCK_CYCLES].copy()
+    for first in range(0, len(cycles), BATCH):
+        yield cycles[first : first + BATCH].copy()
 
 
 def run_frames(
@@ -218,39 +195,52 @@ def run_frames(
     """Yield the rows of a log whose frames come in `blocks` of FRAME, in the order of arrival.
 
     `cycles` (CYCLE, shape (n,)) gives T_k instead of the grid; `counted`: its `frames` were consumed in each.
+    Another thread reads `blocks`.
     """
-    vector = output_vector(ecu.outputs)
 
-    def advance(frames: RecordArray, rows: Rows, chunk: RecordArray, at: RecordArray, last: bool) -> None:
-        _run_frames(
-            *ecu, vector, plan, reception, counted, frames, chunk, rows.values, rows.samples, at, last
-        )
+    def gather(frames: RecordArray, batch: _Batch, at: RecordArray, last: bool) -> None:
+        _gather_frames(plan, reception, counted, frames, batch.cycles, ecu.inputs, batch.inputs, at, last)
 
-    return _run(blocks, new_record(FRAME, 0), lambda frames: frames["stamp_ns"], cycles, advance)
+    return _rows(
+        ecu, _gathered(blocks, new_record(FRAME, 0), lambda frames: frames["stamp_ns"], cycles, gather)
+    )
 
 
 def run_samples(ecu: Ecu, freshness: RecordArray, blocks: Iterable[SampleBlock]) -> Iterator[Rows]:
-    """Yield the rows of a signal file; `freshness` is FRESHNESS per input, overwritten."""
-    vector = output_vector(ecu.outputs)
+    """Yield the rows of a signal file; `freshness` is FRESHNESS per input, overwritten.
+
+    Another thread reads `blocks`.
+    """
     end = SampleBlock(np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 0)))
 
-    def advance(block: SampleBlock, rows: Rows, chunk: RecordArray, at: RecordArray, last: bool) -> None:
-        _run_samples(*ecu, vector, freshness, block, chunk, rows.t, rows.values, rows.samples, at, last)
+    def gather(block: SampleBlock, batch: _Batch, at: RecordArray, last: bool) -> None:
+        _gather_samples(freshness, block, batch.cycles, batch.t, ecu.inputs, batch.inputs, at, last)
 
-    return _run(blocks, end, lambda block: block.t_ns, None, advance)
+    return _rows(ecu, _gathered(blocks, end, lambda block: block.t_ns, None, gather))
 
 
-def _run(
+class _Batch(NamedTuple):
+    """Cycles and their inputs."""
+
+    cycles: RecordArray
+    t: Vector
+    inputs: RecordArray
+
+
+def _new_batch(cycles: RecordArray) -> _Batch:
+    return _Batch(cycles, np.full(len(cycles), np.nan), np.empty(len(cycles), INPUTS))
+
+
+def _gathered(
     blocks: Iterable[Block],
     end: Block,
     stamps: Callable[[Block], NDArray[np.int64]],
     cycles: RecordArray | None,
-    advance: Callable[[Block, Rows, RecordArray, RecordArray, bool], None],
-) -> Iterator[Rows]:
-    """Hand blocks of input and chunks of cycles to `advance` until one ends; `end` is an empty block."""
+    gather: Callable[[Block, _Batch, RecordArray, bool], None],
+) -> Iterator[_Batch]:
+    """Hand blocks of input and batches of cycles to `gather` until one ends; `end` is an empty block."""
     schedule = None if cycles is None else _recorded(cycles)
-    chunk = new_record(CYCLE, 0)
-    rows = _new_rows(chunk)
+    batch = _new_batch(new_record(CYCLE, 0))
     at = new_record(_AT)
     latest = None
     for block in chain(blocks, [end]):
@@ -264,28 +254,48 @@ def _run(
             latest = newest if latest is None else max(newest, latest)
         at["cursor"] = 0
         while True:
-            if at[0]["done"] == len(chunk):
-                if len(chunk):
-                    yield rows
-                chunk = next(schedule, new_record(CYCLE, 0))
-                rows = _new_rows(chunk)
+            if at[0]["done"] == len(batch.cycles):
+                if len(batch.cycles):
+                    yield batch
+                batch = _new_batch(next(schedule, new_record(CYCLE, 0)))
                 at["done"] = 0
-            whole = len(chunk)
             if last and cycles is None:
-                chunk = chunk[chunk["t_ns"] <= latest]
-            if not len(chunk):
+                due = int(np.count_nonzero(batch.cycles["t_ns"] <= latest))
+                if due < len(batch.cycles):
+                    schedule, batch = iter(()), _Batch(batch.cycles[:due], batch.t[:due], batch.inputs[:due])
+            if not len(batch.cycles):
                 return
-            advance(block, rows, chunk, at, last)
-            if at[0]["done"] < len(chunk):
+            gather(block, batch, at, last)
+            if at[0]["done"] < len(batch.cycles):
                 break
-            if len(chunk) < whole:
-                n = len(chunk)
-                yield Rows(rows.t_ns[:n], rows.t[:n], rows.values[:n], rows.samples[:n])
-                return
 
 
-def _new_rows(cycles: RecordArray) -> Rows:
-    count = len(cycles)
+def _rows(ecu: Ecu, batches: Iterator[_Batch]) -> Iterator[Rows]:
+    vector = output_vector(ecu.outputs)
+    rows, done = _new_rows(), 0
+    for cycles, t, inputs in read_ahead(batches):
+        part = slice(done, done + len(cycles))
+        rows.t_ns[part], rows.t[part] = cycles["t_ns"], t
+        _run(
+            ecu.params,
+            ecu.state,
+            inputs,
+            ecu.outputs,
+            ecu.seen,
+            vector,
+            rows.values[part],
+            rows.samples[part],
+        )
+        done += len(cycles)
+        if done == len(rows.t):
+            yield rows
+            rows, done = _new_rows(), 0
+    if done:
+        yield Rows(rows.t_ns[:done], rows.t[:done], rows.values[:done], rows.samples[:done])
+
+
+def _new_rows() -> Rows:
+    count = BATCH * BATCHES
     # Column by column, as results store them; a row lies in as many sets of the processor's cache as it can.
     values = np.empty((N_ROW, count + _APART))[:, :count].T
-    return Rows(cycles["t_ns"], np.full(count, np.nan), values, np.empty((count, len(KEPT))))
+    return Rows(np.empty(count, np.int64), np.empty(count), values, np.empty((count, len(KEPT))))

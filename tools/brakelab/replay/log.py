@@ -13,7 +13,6 @@ from brakelab.logs.physics.judge import judge
 from brakelab.logs.physics.samples import Collector, car_of
 from brakelab.logs.sample_block import SampleBlock
 from brakelab.logs.signal_file import freshness_at_any_rate, read_signals
-from brakelab.replay.ahead import read_ahead
 from brakelab.replay.earlier_layout import convert_initial
 from brakelab.replay.engine import Ecu, Rows, run_frames, run_samples
 from brakelab.replay.quality import Findings, identifier, note_faults
@@ -112,7 +111,7 @@ def replay_log(
     if source.bus and not counted:
         blocks = only_interface(blocks, source.bus, findings)
     if recording is None:
-        rows = run_frames(ecu, plan, reception, read_ahead(blocks))
+        rows = run_frames(ecu, plan, reception, blocks)
     else:
         start_as_recorded(ecu, recording)
         cycles = read_cycles(recording)
@@ -122,7 +121,7 @@ def replay_log(
             counted = _heard_everything(cycles)
             if counted:
                 blocks = _expected_only(blocks, plan)
-        rows = run_frames(ecu, plan, reception, read_ahead(blocks), cycles, counted)
+        rows = run_frames(ecu, plan, reception, blocks, cycles, counted)
     yield from _noted(rows, findings, ecu)
     if not reception.messages["accepted"].any():
         raise _foreign(path, source, findings)

@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Iterable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -38,17 +39,21 @@ class Source(NamedTuple):
 def load_source(map: Path | None) -> Source:
     """Return the source by a signal map, None: the contract. Raises UserError for a map that is not right."""
     if map is None:
-        database = resource("dbc/brake_ecu.dbc")
-        return Source(contract_receive_plan(database), "", _hash(database))
+        return _contract()
     if maps_columns(map):
-        plan = contract_receive_plan(resource("dbc/brake_ecu.dbc"))
         columns = read_column_map(map)
-        return Source(plan, "", _hash(map), columns, columns.content.rolling_radius)
+        return Source(_contract().plan, "", _hash(map), columns, columns.content.rolling_radius)
     mapped = load_signal_map(map)
     content = read_signal_map(map)
     database = map.parent / content.database
     radius = content.rolling_radius
     return Source(mapped.plan, mapped.bus or "", _hash(map, database), None, radius, mapped.left_out)
+
+
+@cache
+def _contract() -> Source:
+    database = resource("dbc/brake_ecu.dbc")
+    return Source(contract_receive_plan(database), "", _hash(database))
 
 
 def announced(source: Source) -> Source:
