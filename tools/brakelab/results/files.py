@@ -34,8 +34,8 @@ N_ROW: Final = len(ROW_COLUMNS)
 
 _SMALL: Final = {"mode", "mode_mu_b", "pressure_demand_valid", "motor_demand_valid", "braking"}
 _COUNTS: Final = {"active_faults", "active_faults_2", "overruns"}
-# Dictionaries of rarely repeated numbers cost as much time as all else, and more space. The usual level of zstd
-# takes an eighth more time, for 6 % less; pages of the first version a fifth, to pack the places of nulls.
+# Dictionaries of numbers that rarely repeat cost as much time as all else, and space. The usual level of zstd
+# takes an eighth more time for 6 % less, pages of the first version a fifth, to pack the places of nulls.
 _QUICK: Final[dict[str, Any]] = {
     "compression": "zstd",
     "compression_level": -1,
