@@ -18,6 +18,7 @@ if is_run(sys.argv[1:]):  # under load, importing the command line alone would t
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # numpy's: 40 MB of locked memory a thread
 
 import errno
+import gc
 import traceback
 from functools import cache
 from importlib.metadata import entry_points
@@ -312,6 +313,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _run(arguments: list[str]) -> int:
     if not is_run(arguments):
+        gc.set_threshold(50_000)  # what is imported stays: looking through it again and again takes time
         _add_commands()
     return app(arguments, prog_name="brake-ecu", standalone_mode=False) or 0
 

@@ -17,8 +17,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final, TypeVar
 
-import structlog
-
 from ecu.errors import UserError
 from ecu.recording.ring import ring_folder
 
@@ -156,6 +154,8 @@ def _set_aside(path: Path, reason: str) -> None:
         part = path.with_name(path.name + suffix)
         if part.exists():
             part.rename(aside.with_name(aside.name + suffix))
+    import structlog  # takes a tenth of the start of a command that has nothing to log
+
     structlog.get_logger("store").error(
         "store_damaged",
         file=str(path),
@@ -208,6 +208,8 @@ def newest_good(
                 raise ValueError("CRC")
             return revision, read(record)
         except ValueError as error:
+            import structlog
+
             structlog.get_logger("store").warning(
                 "revision_refused", revision=revision, reason=str(error), remedy="the one before it is tried"
             )

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-import structlog
 from numpy.typing import NDArray
 
 from ecu.contract.records import DUST, LEARNED, WEAR, RecordArray
@@ -145,6 +144,8 @@ def _tell_of_other_versions(store: sqlite3.Connection, key: str) -> None:
     keys = {row[0] for row in store.execute("SELECT DISTINCT key FROM learned")} - {key}
     others = sorted(other for other in keys if other.rpartition("/")[0] == vehicle)
     if others:
+        import structlog
+
         structlog.get_logger("store").warning(
             "learned_by_another_version", key=others[-1], remedy="it stays in the store; learning begins anew"
         )
