@@ -50,6 +50,8 @@ class Measurement:
             from asammdf import MDF
         except ImportError:
             raise UserError(str(path), "", "MDF4 needs asammdf: pip install asammdf") from None
+        self._read: Any = None
+        self._wanted: tuple[int, int, int, int, bool] | None = None
         logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # the same, in one line, comes from here
         # Where its constructor fails its destructor does so too, and Python would print that.
         hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
@@ -93,18 +95,24 @@ class Measurement:
         return cast("int | None", self._mdf.masters_db.get(group))
 
     def column(self, group: int, index: int, first: int, count: int, raw: bool) -> Column:
-        """Return records `first` to `first + count` of a channel, `raw`: without its conversion."""
-        return cast(
-            Column,
-            self._mdf.get(
-                group=group,
-                index=index,
-                raw=raw,
-                record_offset=first,
-                record_count=None if first == 0 and count >= self.rows(group) else count,
-                ignore_invalidation_bits=True,
-            ),
-        )
+        """Return records `first` to `first + count` of a channel, `raw`: without its conversion.
+
+        What was read last is not read again.
+        """
+        wanted = group, index, first, count, raw
+        if wanted != self._wanted:
+            self._read, self._wanted = (
+                self._mdf.get(
+                    group=group,
+                    index=index,
+                    raw=raw,
+                    record_offset=first,
+                    record_count=None if first == 0 and count >= self.rows(group) else count,
+                    ignore_invalidation_bits=True,
+                ),
+                wanted,
+            )
+        return cast(Column, self._read)
 
     def start_ns(self) -> int:
         """Return the start of the measurement as Unix time [ns], whole microseconds."""
@@ -208,18 +216,18 @@ def _merged(sources: Sequence[Iterator[FrameBlock]]) -> Iterator[FrameBlock]:
 
 def _counts_from_zero(measurement: Measurement, groups: Sequence[tuple[int, int, str]]) -> bool:
     """Return whether any frame is on channel 0; looked for until the first one."""
-    for group, _, kind in groups:
-        places = [
-            place for name, of, place in measurement.channels() if (of, name) == (group, f"{kind}.BusChannel")
-        ]
+    for group, index, kind in groups:
+        bus = f"{kind}.BusChannel"
+        places = [place for name, of, place in measurement.channels() if (of, name) == (group, bus)]
         rows = measurement.rows(group)
-        windows = ((0, _FEW), *((first, WINDOW) for first in range(_FEW, rows, WINDOW)))
-        for first, count in windows if places else ():
+        windows = [(0, _FEW), *((first, WINDOW) for first in range(_FEW, rows, WINDOW))]
+        at_once = rows <= AT_ONCE and measurement.is_plain(group, f"{kind}.")
+        for first, count in ([(0, AT_ONCE)] if at_once else windows) if places else ():
             try:
-                column = measurement.column(group, places[0], first, count, raw=True)
+                column = measurement.column(group, index if at_once else places[0], first, count, raw=True)
             except Exception:  # a damaged file makes asammdf raise anything; `_frames` tells where
                 break
-            if (column.samples == 0).any():
+            if ((column.samples[bus] if at_once else column.samples) == 0).any():
                 return True
     return False
 
