@@ -225,9 +225,9 @@ def wear(
 ) -> int:
     """Show how thick the brake pads are and how far they last. Register new and measured ones."""
     from ecu import pads
-    from ecu.compiling import compiling_told
+    from ecu.compiling import report_compiling
 
-    with compiling_told():
+    with report_compiling():
         return pads.wear_command(config, state, new_pads, measured)
 
 

@@ -15,15 +15,15 @@ def _reason() -> str:
 
 
 @contextmanager
-def compiling_told() -> Iterator[None]:
+def report_compiling() -> Iterator[None]:
     """Say so when something is compiled in this block."""
-    told = False
+    reported = False
 
     def begins(dispatcher: Any) -> None:
-        nonlocal told
-        if not told:
+        nonlocal reported
+        if not reported:
             say(f"{_reason()}: once per version, minutes at most")
-        told = True
+        reported = True
         function = dispatcher.py_func
         if not function.__module__.startswith("numba."):
             detail(f"compiling {function.__module__}.{function.__qualname__}")

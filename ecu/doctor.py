@@ -24,7 +24,7 @@ from ecu.bus.receive import Reception, new_reception, receive
 from ecu.bus.receive_plan import ReceivePlan
 from ecu.bus.signal_map import receive_plan
 from ecu.bus.transmit import TransmitPlan
-from ecu.compiling import compiling_told
+from ecu.compiling import report_compiling
 from ecu.contract.records import FRAME, INPUTS, new_record
 from ecu.contract.signals import CYCLE_NS, INPUT_SIGNALS
 from ecu.errors import UserError
@@ -76,7 +76,7 @@ def doctor(config: Path | None, map: Path | None, interface: str | None, channel
     sending = transmit_plan(map, plan)
     if config is not None:
         refuse_fd(sending, load_config(config).can_fd, config)
-    with compiling_told():
+    with report_compiling():
         checks = [*machine(), kernels(config, plan, sending), bus_load(interface, channel, plan, sending)]
     if interface is not None and channel is not None:
         say(f"listening to {channel} for {LISTEN_S:.0f} s")
@@ -198,12 +198,12 @@ def bus_load(interface: str | None, channel: str | None, plan: ReceivePlan, send
 
 
 def bit_rate(channel: str) -> int | None:
-    """Return the nominal bit rate of a SocketCAN interface [bit/s], None where `ip` does not tell it."""
+    """Return the nominal bit rate of a SocketCAN interface [bit/s], None where `ip` does not show it."""
     try:
-        told = subprocess.run(
+        answer = subprocess.run(
             ["ip", "-details", "-json", "link", "show", channel], capture_output=True, check=True
         )
-        return int(json.loads(told.stdout)[0]["linkinfo"]["info_data"]["bittiming"]["bitrate"])
+        return int(json.loads(answer.stdout)[0]["linkinfo"]["info_data"]["bittiming"]["bitrate"])
     except (OSError, subprocess.CalledProcessError, LookupError, ValueError):
         return None
 

@@ -179,7 +179,7 @@ _BEGINS: list[Callable[[Any], None]] = []
 
 @cache
 def compiler() -> ModuleType:
-    """Return numba, which is loaded where something has to be compiled, and tells what it compiles."""
+    """Return numba, which is loaded where something has to be compiled, and reports what it compiles."""
     try:
         import numba
         import numba.core.event as event

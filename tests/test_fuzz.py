@@ -252,13 +252,13 @@ def test_a_damaged_file_gives_a_result_or_one_line(
         for left in path.parent.iterdir():
             left.unlink()
         _write(kind, path, damaged(content, changes))
-        told = ""
+        message = ""
         try:
             READERS[kind](path)
         except (UserError, RunFault) as error:
-            told = str(error)
-        assert "\n" not in told
-        assert len(told) < 1000
+            message = str(error)
+        assert "\n" not in message
+        assert len(message) < 1000
 
     run()
 

@@ -173,7 +173,7 @@ A counter says which place on its sender's grid a frame has (`ecu/bus/sequence.p
 - A repeated count, one out of sequence, a wrong checksum or length: nothing that the frame carries is taken.
 - {int(sequence.LIVING) - 1} frames may be lost in a row. After a longer gap a sender that starts again is taken with frame
   {sequence.CONFIRMED} in sequence. Where two streams claim one place, neither lowers a demand for {sequence.DOUBT_NS / 1e9:.0f} s.
-- "E2E rejections" is told for {link.TOLD_NS / 1e9:.0f} s when {link.MANY_REJECTED} of the last {link.WINDOW} checks rejected a
+- "E2E rejections" is reported for {link.REPORTED_NS / 1e9:.0f} s when {link.MANY_REJECTED} of the last {link.WINDOW} checks rejected a
   frame, or {link.CROWD:.0f} frames more came than one sender makes.
 
 Measured reactions: [safety.md](safety.md#signals-and-e2e).

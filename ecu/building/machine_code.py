@@ -203,7 +203,7 @@ def link(results: list[Any], symbols: list[str], specs: list[Sequence[Spec]]) ->
     for part in _parts(results):
         for function in part._final_module.functions:
             if function.name in COUNTED and not function.is_declaration:
-                function.linkage = binding.Linkage.linkonce_any  # numba's own give way
+                function.linkage = binding.Linkage.linkonce_any  # numba's own are replaced
         whole.link_in(part._final_module, preserve=True)
     for function in whole.functions:
         if not function.is_declaration and function.name not in symbols:

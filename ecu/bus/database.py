@@ -68,9 +68,11 @@ class Readable(NamedTuple):
             return ""
         first = f"{others[0].place}: {others[0].remedy.partition(';')[0]}"
         spoilt = dict.fromkeys(mistake.message for mistake in others if mistake.message)
-        told = f"{len(spoilt)} message{'s' if len(spoilt) > 1 else ''} left out, which the map does not use"
+        omitted = (
+            f"{len(spoilt)} message{'s' if len(spoilt) > 1 else ''} left out, which the map does not use"
+        )
         more = f" (and {len(others) - 1} more)" if len(others) > 1 else ""
-        return f"{path}: {first}{more}; {told if spoilt else 'only a comment is lost'}"
+        return f"{path}: {first}{more}; {omitted if spoilt else 'only a comment is lost'}"
 
 
 def load_database(path: Path, strict: bool = True) -> Database:

@@ -11,7 +11,7 @@ A check is one frame, or one period without any (NONEWDATA; counted when the nex
 freshness reports the silence). OK is an accepted frame, ERROR a wrong checksum or length; a frame repeated or
 out of sequence is neither, as in AUTOSAR. One window serves all states, so MIN_OK holds for INIT too.
 
-A stream is loud, and reported as a fault for `TOLD_NS`, if `MANY_REJECTED` frames of the window were rejected
+A stream is loud, and a fault for `REPORTED_NS`, if `MANY_REJECTED` frames of the window were rejected
 for any reason, or if it carries more frames than one sender makes: those beyond `FASTER` times its rate fill
 a bucket, whose limit is `CROWD` periods; as many periods without a frame may be caught up.
 """
@@ -29,7 +29,7 @@ MIN_OK_AGAIN, MAX_ERROR_AGAIN = 12, 2
 MANY_REJECTED: Final = 8
 FASTER: Final = 1.25  # times its rate, limit of one sender: clock error, and late frames caught up
 CROWD: Final = 16.0  # periods
-TOLD_NS: Final = 1_000_000_000
+REPORTED_NS: Final = 1_000_000_000
 _MASK: Final = (1 << WINDOW) - 1
 
 LINK: Final = [
@@ -42,7 +42,7 @@ LINK: Final = [
     ("link", "i8"),  # NODATA, INIT, VALID or INVALID
     ("crowd", "f8"),  # frames in excess of one sender
     ("checked_ns", "i8"),  # stamp of the last frame checked
-    ("told_ns", "i8"),  # stamp of the last frame that made it loud
+    ("reported_ns", "i8"),  # stamp of the last frame that made it loud
 ]
 
 
@@ -103,5 +103,5 @@ def judge_link(state: Record, status: int, stamp_ns: int, period_ns: int, slowes
     loud = state.crowd > CROWD or state.rejected_count >= MANY_REJECTED
     state.crowd = min(state.crowd, CROWD + 1.0)
     if loud:
-        state.told_ns = stamp_ns
+        state.reported_ns = stamp_ns
     return loud

@@ -166,9 +166,9 @@ def _is_unsure(counters: Record, status: int, stamp_ns: int) -> bool:
 @kernel
 def _tell_links(totals: Record, inputs: Record) -> None:
     """Write the fault bit of streams that are loud, and whether a stream's content is unsure."""
-    loud = totals.loud_ns > 0 and inputs.t_ns - totals.loud_ns < link.TOLD_NS
+    loud = totals.loud_ns > 0 and inputs.t_ns - totals.loud_ns < link.REPORTED_NS
     inputs.e2e_faults = E2E_REJECTIONS if loud else 0
-    unsure = totals.unsure_ns > 0 and inputs.t_ns - totals.unsure_ns < link.TOLD_NS
+    unsure = totals.unsure_ns > 0 and inputs.t_ns - totals.unsure_ns < link.REPORTED_NS
     inputs.e2e_unsure = 1 if unsure else 0
 
 

@@ -73,9 +73,9 @@ SEQUENCE: Final = [
 
 
 @kernel
-def _lasts(told_ns: int, stamp_ns: int) -> bool:
+def _lasts(reported_ns: int, stamp_ns: int) -> bool:
     """Return whether a report is still in force; 0: never made."""
-    return told_ns > 0 and stamp_ns - told_ns < DOUBT_NS
+    return reported_ns > 0 and stamp_ns - reported_ns < DOUBT_NS
 
 
 @kernel

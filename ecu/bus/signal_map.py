@@ -205,7 +205,7 @@ def load_signal_map(path: Path) -> MappedBus:
 def receive_plan(map_file: Path | None, tell: Callable[[str], None] = lambda line: None) -> ReceivePlan:
     """Return the receive plan of the bus: the contract's frames, or those of a signal map.
 
-    `tell` is given a line on what is wrong elsewhere in the map's database.
+    `tell` receives a line on what is wrong elsewhere in the map's database.
 
     Raises UserError for a map or a database that is not usable.
     """

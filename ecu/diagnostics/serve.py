@@ -15,7 +15,7 @@ from ecu.runtime.place import Place
 
 PERIOD_S: Final = 0.1
 BUSY_S: Final = 0.002
-"""Longest wait for a frame while a message is under way: a flow control, a pause between its frames."""
+"""Longest wait for a frame while a message is in progress: a flow control, a pause between its frames."""
 
 
 def _place(settings: Settings) -> Place[Link]:

@@ -19,7 +19,7 @@ from ecu.errors import RunFault, UserError, closest
 from ecu.output import give
 
 PATIENCE_S: Final = 1.0
-"""For the first byte of a response; P2 is 50 ms, and the way there and back."""
+"""For the first byte of a response; P2 is 50 ms, and transmission in both directions."""
 PATIENCE_PENDING_S: Final = 1e-3 * P2_STAR_MS
 TURN_S: Final = 0.01
 ACTIONS: Final = ("faults", "clear", "read", "info")

@@ -1,7 +1,7 @@
 """Diagnostic messages on a bus: ISO-TP (ISO 15765-2) by can-isotp, over any interface of python-can.
 
 Normal addressing, classical frames of eight bytes padded with 0xCC. The server answers one request at a
-time: one that comes while a response is under way waits for its end, at most the time-out of a flow control
+time: one that comes while a response is in progress waits for its end, at most the time-out of a flow control
 (1 s).
 """
 
@@ -67,7 +67,7 @@ class Link:
 
     @property
     def is_busy(self) -> bool:
-        """True while a message is under way, in either direction."""
+        """True while a message is in progress, in either direction."""
         return self._layer.transmitting() or self._layer.is_rx_active()
 
     def turn(self, timeout_s: float) -> None:

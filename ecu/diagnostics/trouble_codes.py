@@ -2,7 +2,7 @@
 
 Three bytes as in DTCFormat_00 of SAE J2012-DA (ISO 15031-6): a chassis code of the manufacturer's range,
 C1000 plus the number of the fault's bit, and the failure type byte of J2012-DA that fits, else 00 (no
-subtype). Bits keep their numbers, so codes do; what testers and service manuals were told stays true.
+subtype). Bits keep their numbers, and so do codes: testers and service manuals stay valid.
 """
 
 from typing import Final, NamedTuple

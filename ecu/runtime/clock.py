@@ -5,7 +5,7 @@ did (a stopped process, a paused virtual machine, a suspended machine, whose tim
 counts): a cycle's deadline T_k is the last one on the grid when it wakes, never one from before the sleep.
 
 The frames' stamps are of the real-time clock, which can be set at any time. A run keeps the time line on
-which it began, real time at its start plus monotonic time since; `follow_realtime` tells by how much the
+which it began, real time at its start plus monotonic time since; `follow_realtime` returns by how much the
 real-time clock has been set, and the cycle takes that off the stamps.
 """
 

@@ -65,7 +65,7 @@ def begin_companion(
 ) -> "tuple[argparse.Namespace, Callable[[], bool]]":
     """In the process of a `Companion`: take its options, leave priority and signals to the loop, and pause.
 
-    `parser` has the options of its own. Returns all of them, and what tells whether the supervisor is there.
+    `parser` has the options of its own. Returns all of them, and a check whether the supervisor is there.
     """
     parser.add_argument("--ring", type=Path, required=True)
     parser.add_argument("--parent", type=int, required=True)

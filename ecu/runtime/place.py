@@ -28,25 +28,25 @@ class Place(Generic[End]):
         self._server, self._open, self._now_s = server, open_end, now_s
         self._end: End | None = None
         self._again_s = 0.0
-        self._told = False
+        self._reported = False
 
     def end(self) -> End | None:
         """Return the open end, None: it is not there; it is tried every 5 s."""
         if self._end is None and self._now_s() >= self._again_s:
             try:
                 self._end = self._open()
-                self._told = False
+                self._reported = False
             except UserError as error:
                 self.lose(error)
         return self._end
 
     def lose(self, error: Exception) -> None:
         """Close an end that failed; say why, once until it is back."""
-        if not self._told:
+        if not self._reported:
             structlog.get_logger(self._server).error(
                 f"no_{self._server}", reason=str(error), remedy="it is tried again every 5 s"
             )
-        self._told, self._again_s = True, self._now_s() + AGAIN_S
+        self._reported, self._again_s = True, self._now_s() + AGAIN_S
         self.close()
 
     def close(self) -> None:

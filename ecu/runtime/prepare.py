@@ -93,16 +93,16 @@ class CompileProgress:
     """Report that kernels are being compiled, and the progress; silent once it `is_over`."""
 
     def __init__(self, manager: Manager) -> None:
-        self._manager, self._told_s, self.is_over = manager, 0.0, False
+        self._manager, self._reported_s, self.is_over = manager, 0.0, False
 
     def __call__(self, count: int) -> None:
         """Note that another compilation begins after `count`."""
         now_s = time.monotonic()
-        if self.is_over or (count and now_s - self._told_s < TELL_PROGRESS_S):
+        if self.is_over or (count and now_s - self._reported_s < TELL_PROGRESS_S):
             return
         if not count:
             lower_priority()  # minutes of compiling are not worth anyone's standing still
-        self._told_s = now_s
+        self._reported_s = now_s
         self._manager.tell(f"STATUS=compiling kernels, {count} done")
         structlog.get_logger("ecu").info(
             "compiling",

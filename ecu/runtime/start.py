@@ -22,7 +22,7 @@ IGNORED: Final = _signals("SIGTSTP", "SIGTTIN", "SIGTTOU")
 HARMLESS: Final = _signals("SIGCHLD", "SIGCONT", "SIGURG", "SIGWINCH", "SIGPIPE", "SIGXFSZ")
 """Signals that end no process, the last two because Python ignores them."""
 OUT_OF_REACH: Final = _signals("SIGKILL", "SIGSTOP", "SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL", "SIGSYS")
-"""Signals that cannot be caught, or that tell of an instruction that would be tried again for ever."""
+"""Signals that cannot be caught, or that report an instruction that would be tried again for ever."""
 ENDING: Final = tuple(
     sorted({int(one) for one in signal.valid_signals()} - IGNORED - HARMLESS - OUT_OF_REACH)
 )

@@ -127,7 +127,7 @@ def _holds(content: Any, keys: tuple[int | str, ...]) -> bool:
 
 
 def config_hash(config: Config) -> str:
-    """Return a hash of everything that changes results, so two runs can be told apart."""
+    """Return a hash of everything that changes results, by which two runs are distinguished."""
     text = json.dumps(config.model_dump(exclude={"transmit"}), sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
@@ -145,7 +145,7 @@ def store_key(config: Config) -> str:
 
 
 def new_params(config: Config) -> RecordArray:
-    """Return `PARAMS` of length 1 in SI units; every input counts as mapped until told otherwise."""
+    """Return `PARAMS` of length 1 in SI units; every input counts as mapped until a map is read."""
     params = np.zeros(1, PARAMS)
     row = params[0]
     vehicle, sensors, observer, control = config.vehicle, config.sensors, config.observer, config.control

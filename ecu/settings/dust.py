@@ -19,7 +19,7 @@ class Dust(Section):
     numbers: list[Annotated[float, Field(ge=-1e4, le=1e4)]] = Field(max_length=MOST)
     """Of the model, in the order that its kernel takes them."""
     low: list[Feature] = Field(min_length=len(FEATURES), max_length=len(FEATURES))
-    """Of each feature, the least that it was trained on: outside nothing is told."""
+    """Of each feature, the least that it was trained on: beyond it no particles are counted."""
     high: list[Feature] = Field(min_length=len(FEATURES), max_length=len(FEATURES))
     """Of each feature, the greatest."""
     factor: Annotated[float, Field(gt=0.1, lt=10.0)] = 1.0
@@ -52,6 +52,6 @@ def set_dust(row: Any, corner: int, dust: Dust | None) -> None:
 
 
 def set_dust_version(row: Any) -> None:
-    """Write a number that tells these emission models from others into `row`, once all corners are set."""
+    """Write a number that identifies these emission models into `row`, once all corners are set."""
     names = ("dust_model", "dust_numbers", "dust_factor", "dust_low", "dust_high")
     row["dust_version"] = zlib.crc32(b"".join(row[name].tobytes() for name in names))

@@ -43,7 +43,7 @@ class Value(NamedTuple):
 def new(given: list[str], out: Path | None) -> int:
     """Ask for the data sheet, or take it from `given` ("key=value" each), and write a CONFIG file.
 
-    Returns 0; 1 where ECE R13-H forbids the car that results, which is told. Nothing is written over.
+    Returns 0, or 1 after a warning where ECE R13-H forbids the resulting car. Nothing is written over.
 
     Raises:
         UserError: an answer is wrong or missing, or the file exists.
@@ -157,7 +157,7 @@ def config_text(answers: Given, like: Config, taken: Collection[str] = ()) -> st
     name = answers.get("name", "car")
     lines = [
         f'# {name}, by `brake-ecu config new`. "data sheet": as given; "{ASSUMED}": measure it, or',
-        "# let a drive tell it (`brake-ecu identify vehicle`). All keys: docs/reference-config.md.",
+        "# identify it from a drive (`brake-ecu identify vehicle`). All keys: docs/reference-config.md.",
         "",
         f'name = "{name}"',
         "transmit = false  # true arms the ECU: its pressure demands are flagged valid",
@@ -243,8 +243,8 @@ def _axle(axle: str, answers: Given, like: Config, taken: Collection[str]) -> di
             remedy = f"a fixed calliper has as many pistons on both sides (found {pistons}); give their sum"
             raise UserError("config new", f"{axle}.pistons", remedy)
         pistons //= 2
-    told = _origin(f"{axle}.pistons", like, taken)
-    values["pistons"] = Value(pistons, f"{given('calliper')} calliper, {told}")
+    counted = _origin(f"{axle}.pistons", like, taken)
+    values["pistons"] = Value(pistons, f"{given('calliper')} calliper, {counted}")
     piston = float(given("piston_diameter")) / 1000.0
     values["piston_diameter"] = Value(round(piston, 5), _origin(f"{axle}.piston_diameter", like, taken))
     if given("effective_radius") is not None:

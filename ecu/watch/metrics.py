@@ -41,8 +41,8 @@ def families(tally: Tally) -> Iterator["Metric"]:
     about = tally.reader.description
     named = {"car": about.get("name"), "channel": about.get("channel"), "config": about.get("config_hash")}
     named["version"] = about.get("versions", {}).get("brake-ecu")
-    told = {key: str(value) for key, value in named.items() if value is not None}
-    yield InfoMetricFamily("brake_ecu", "The daemon", value=told)
+    information = {key: str(value) for key, value in named.items() if value is not None}
+    yield InfoMetricFamily("brake_ecu", "The daemon", value=information)
     yield GaugeMetricFamily("brake_ecu_up", "1 while cycles advance", value=float(not tally.ailment()))
     yield CounterMetricFamily(
         "brake_ecu_metrics_cycles_lost",

@@ -103,16 +103,16 @@ def new_handler(shared: Shared) -> type[Handler]:
 def open_server(place: str, handler: type[Handler], goes_on: Callable[[], bool]) -> Server | None:
     """Return the server at `place`, as soon as that is free; None: it need not be any more."""
     address, _, port = place.rpartition(":")
-    told = False
+    reported = False
     while goes_on():
         try:
             return Server(address, int(port), handler)
         except UserError as error:
-            if not told:
+            if not reported:
                 structlog.get_logger("metrics").error(
                     "no_metrics", reason=str(error), remedy="it is tried again every 5 s"
                 )
-            told = True
+            reported = True
             time.sleep(AGAIN_S)
     return None
 

@@ -158,9 +158,9 @@ def _inputs(inputs: Sequence[InputRow]) -> Text:
     rejected = ", ".join(row.name for row in inputs if row.rejected)
     judged = [row for row in inputs if not row.rejected and row.judged_s < RECENT_S]
     worst = max(judged, key=lambda row: row.ratio, default=None)
-    told = f"test ratio at most {number(worst.ratio, 2)} ({worst.name})" if worst else "no input compared"
+    compared = f"test ratio at most {number(worst.ratio, 2)} ({worst.name})" if worst else "no input compared"
     line = Text(f"left out: {rejected}; " if rejected else "", "bold red", no_wrap=True, overflow="ellipsis")
-    return line.append(told, "none")
+    return line.append(compared, "none")
 
 
 def _lateness(watcher: Watcher, width: int, height: int) -> Iterable[Text]:

@@ -122,12 +122,12 @@ def show(watcher: Watcher, folder: Path) -> int:
 
 def print_lines(watcher: Watcher, as_json: bool) -> int:
     """Print a line a second until Ctrl-C or until nobody reads it; return the exit code 0."""
-    told = 0.0
+    printed_s = 0.0
     try:
         while True:
             watcher.turn()
-            if time.monotonic() - told >= 1.0:
-                told = time.monotonic()
+            if time.monotonic() - printed_s >= 1.0:
+                printed_s = time.monotonic()
                 print(json_line(watcher) if as_json else text_line(watcher), flush=True)
             time.sleep(PERIOD_S)
     except (KeyboardInterrupt, BrokenPipeError):

@@ -50,7 +50,7 @@ class Shared:
             count = min(history.added - seen, len(history.rows))
             rows = [history.rows[place] for place in range(len(history.rows) - count, len(history.rows))]
             daemon = self.watcher.daemon
-            told = {
+            status = {
                 "daemon": daemon.label if daemon else "",
                 "trouble": self.watcher.trouble,
                 "cycles": history.cycles,
@@ -62,7 +62,7 @@ class Shared:
                 "events": [[e.clock, e.text, e.serious] for e in list(history.events)[-40:]],
             }
             added = history.added
-        return added, {**told, "rows": [_numbers(row) for row in rows]}
+        return added, {**status, "rows": [_numbers(row) for row in rows]}
 
     def keep(self) -> str:
         """Keep the last minutes; return the line for the user."""
@@ -130,8 +130,8 @@ def new_handler(shared: Shared) -> type[Handler]:
             self.close_connection = True
             seen = 0
             while True:
-                seen, told = shared.news(seen)
-                self.wfile.write(f"data: {json.dumps(told)}\n\n".encode())
+                seen, status = shared.news(seen)
+                self.wfile.write(f"data: {json.dumps(status)}\n\n".encode())
 
     return Viewer
 
@@ -150,13 +150,13 @@ def serve(watcher: Watcher, port: int, folder: Path) -> int:
         f"http://127.0.0.1:{server.server_port}/ (Ctrl-C ends it); {watcher.trouble or 'attached'}",
         flush=True,
     )
-    told = watcher.trouble
+    trouble = watcher.trouble
     try:
         while True:
             shared.turn()
-            if watcher.trouble != told:
-                told = watcher.trouble
-                print(told or f"attached to {watcher.daemon and watcher.daemon.label}", flush=True)
+            if watcher.trouble != trouble:
+                trouble = watcher.trouble
+                print(trouble or f"attached to {watcher.daemon and watcher.daemon.label}", flush=True)
             time.sleep(PERIOD_S)
     except KeyboardInterrupt:
         return 0

@@ -66,7 +66,7 @@ def test_units_are_with_pandas_and_arrow_and_the_table(polars: Any) -> None:
 
 
 @pytest.mark.parametrize("mask", [np.ones(2, bool), np.ones(3), [0, 1, 2], True])
-def test_what_is_no_mask_is_told(mask: Any) -> None:
+def test_what_is_no_mask_is_refused(mask: Any) -> None:
     with pytest.raises(UserError, match=r"give a mask of bool of shape \(3,\)"):
         TABLE.where(mask)
 

@@ -3,7 +3,7 @@
 import numba
 import pytest
 
-from ecu.compiling import compiling_told
+from ecu.compiling import report_compiling
 from ecu.output import Level, new_policy
 
 
@@ -19,7 +19,7 @@ def test_compiling_is_said_once_and_named_to_who_asks(capsys: pytest.CaptureFixt
 
     with new_policy() as policy:
         policy.level = Level.VERBOSE
-        with compiling_told():
+        with report_compiling():
             assert volume(1.0, 2.0) == 6.0
             assert volume(2.0, 1.0) == 12.0
         assert volume(1, 2) == 6.0  # other types: compiled anew, but outside

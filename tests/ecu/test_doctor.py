@@ -76,7 +76,7 @@ def test_a_kernel_that_cannot_be_compiled_is_a_row(monkeypatch):
         (250_000, False, "96% of 250 kbit/s at worst"),
     ],
 )
-def test_what_the_frames_take_of_the_bus_is_told_beforehand(monkeypatch, rate, good, found):
+def test_what_the_frames_take_of_the_bus_is_stated_beforehand(monkeypatch, rate, good, found):
     monkeypatch.setattr("ecu.doctor.bit_rate", lambda channel: rate)
     plans = contract_receive_plan(DBC), contract_transmit_plan(DBC, "BrakeEcu")
     row = bus_load("socketcan", "can0", *plans)
@@ -88,13 +88,13 @@ LINK = {"linkinfo": {"info_kind": "can", "info_data": {"bittiming": {"bitrate": 
 
 
 @pytest.mark.parametrize(
-    ("told", "rate"),
+    ("answer", "rate"),
     [(json.dumps([LINK]), 250_000), (json.dumps([{"linkinfo": {"info_kind": "vcan"}}]), None), ("", None)],
     ids=["can", "vcan", "nothing"],
 )
-def test_the_bit_rate_is_what_ip_says(monkeypatch, told, rate):
+def test_the_bit_rate_is_what_ip_says(monkeypatch, answer, rate):
     monkeypatch.setattr(
-        subprocess, "run", lambda *given, **more: subprocess.CompletedProcess(given, 0, told.encode())
+        subprocess, "run", lambda *given, **more: subprocess.CompletedProcess(given, 0, answer.encode())
     )
     assert bit_rate("can0") == rate
 

@@ -15,7 +15,7 @@ from ecu import jit
 from ecu.algorithm.step import step
 
 ROOT = Path(__file__).parents[2]
-WAYS = {
+IMPORTS = {
     # of taking the constant: the text of a module with a kernel that returns `{}`
     "by name": ("from {package}.limits import GREATEST", "GREATEST"),
     "by another name": ("from {package}.limits import GREATEST as g", "g"),
@@ -41,7 +41,7 @@ WAYS = {
 
 
 class Package:
-    """A package with a module for each way, and `page`, which no kernel reaches."""
+    """A package with a module for each import, and `page`, which no kernel reaches."""
 
     def __init__(self, folder: Path) -> None:
         self.name, self.folder, self.cache = "thrown_away", folder / "thrown_away", folder / "cache"
@@ -53,8 +53,8 @@ class Package:
         self.write("derived", "from . import limits\n\nTWICE = 2.0 * limits.GREATEST")
         self.write("alone", self.kernel("NUMBER = 7.0", "NUMBER"))
         self.write("page", f"import {self.name}.alone")
-        for way, (imports, value) in WAYS.items():
-            self.write(way.replace(" ", "_"), self.kernel(imports, value))
+        for kind, (imports, value) in IMPORTS.items():
+            self.write(kind.replace(" ", "_"), self.kernel(imports, value))
 
     def kernel(self, imports: str, value: str) -> str:
         head, value = (text.replace("{package}", self.name) for text in (imports, value))
@@ -74,7 +74,7 @@ class Package:
             "kernels = [importlib.import_module(f'{package}.{name}').value for name in names]\n"
             "print(json.dumps([(k(), bool(k.stats.cache_misses)) for k in kernels]))"
         )
-        names = ["alone", *(way.replace(" ", "_") for way in WAYS)]
+        names = ["alone", *(kind.replace(" ", "_") for kind in IMPORTS)]
         environment = {
             **os.environ, "PYTHONPATH": f"{ROOT}:{self.folder.parent}", "NUMBA_CACHE_DIR": str(self.cache),
             "PYTHONDONTWRITEBYTECODE": "1",
@@ -86,7 +86,7 @@ class Package:
         return dict(zip(names, map(tuple, json.loads(done.stdout)), strict=True))
 
 
-def test_a_changed_constant_is_compiled_in_whichever_way_it_is_imported(tmp_path: Path) -> None:
+def test_a_changed_constant_is_compiled_however_it_is_imported(tmp_path: Path) -> None:
     package = Package(tmp_path)
     package.limit(2.0)
     assert set(package.run().values()) == {(7.0, True), (2.0, True)}
@@ -94,7 +94,7 @@ def test_a_changed_constant_is_compiled_in_whichever_way_it_is_imported(tmp_path
     package.write("page", "WORDS = 'new'")
     changed = package.run()
     assert changed.pop("alone") == (7.0, False)
-    assert {way: found for way, found in changed.items() if found != (3.0, True)} == {}
+    assert {kind: found for kind, found in changed.items() if found != (3.0, True)} == {}
     assert {compiled for _, compiled in package.run().values()} == {False}
 
 

@@ -43,7 +43,7 @@ def priority() -> Iterator[None]:
 
 
 class Vehicle:
-    """Sends every frame of the vehicle at its rate for as long as it is told to, and hears what it must."""
+    """Sends every frame of the vehicle at its rate until it is stopped, and receives what it must."""
 
     def __init__(self, channel: Channel) -> None:
         self.channel = channel

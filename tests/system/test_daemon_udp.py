@@ -64,7 +64,7 @@ def test_a_run_without_any_frame_found_a_fault(daemon):
 
 def test_a_quiet_daemon_logs_warnings_and_errors_alone_from_all_its_processes(daemon):
     unit = daemon(*BUS, "--log-format", "json", "--quiet")
-    unit.wait_for("fault")  # told by the side process
+    unit.wait_for("fault")  # reported by the side process
     unit.end(signal.SIGINT)
     assert {line["level"] for line in unit.seen} == {"warning"}
 

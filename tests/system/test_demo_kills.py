@@ -23,7 +23,7 @@ from .conftest import ROOT, demand_ids, priority
 pytestmark = pytest.mark.multicast
 
 REQUEST_LOST_S = 0.1  # time-out of BrakeRequest
-FAREWELL_S = 5.0  # a daemon that is told to end says so on the bus; a busy machine takes its time
+FAREWELL_S = 5.0  # a daemon that is stopped says so on the bus; a busy machine takes its time
 
 
 class Witness:

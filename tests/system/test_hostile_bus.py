@@ -114,7 +114,7 @@ def assert_braked(heard: np.ndarray[Any, Any]) -> None:
 
 
 def faults_since(unit: Daemon, line: int) -> set[str]:
-    """Return what was told of the bus since a line of the log; the ECU has never failed."""
+    """Return what was reported of the bus since a line of the log; the ECU has never failed."""
     unit.said("any")
     said = unit.seen[line:]
     assert not [one for one in said if one["event"] == "mode" and one["now"] == "failed"]
@@ -143,7 +143,7 @@ SPOILT = b"\xff" * 8
 """Of either identifier the checksum is wrong."""
 DRAW = random.Random(8)
 
-# what else is on the bus in each period, and what may be told of it
+# what else is on the bus in each period, and which faults may be reported
 BESIDE: dict[str, tuple[Callable[[], list[bytes]], set[str]]] = {
     "full, of the highest priority": (lambda: [classical(0, b"\0" * 8)] * FULL, set()),
     "full of the lowest": (lambda: [classical(0x7FF, DRAW.randbytes(8)) for _ in range(FULL)], set()),
@@ -168,10 +168,10 @@ OF_THE_BUS = {
 """Faults that are looked at; a car that rolls on although it is braked raises others."""
 
 
-@pytest.mark.parametrize(("frames", "told"), BESIDE.values(), ids=BESIDE)
+@pytest.mark.parametrize(("frames", "allowed"), BESIDE.values(), ids=BESIDE)
 @pytest.mark.requirement("REQ-IN-4")
 def test_whatever_else_is_on_the_bus_the_car_is_braked(
-    bench: Bench, raw: socket.socket, frames: Callable[[], list[bytes]], told: set[str]
+    bench: Bench, raw: socket.socket, frames: Callable[[], list[bytes]], allowed: set[str]
 ) -> None:
     lines = 0
 
@@ -187,10 +187,10 @@ def test_whatever_else_is_on_the_bus_the_car_is_braked(
 
     assert_braked(braked(bench.car, send, begin))
     bench.car.drive(20)
-    assert faults_since(bench.unit, lines) <= told
+    assert faults_since(bench.unit, lines) <= allowed
 
 
-# class and state of the controller in an error frame -> the fault that is told
+# class and state of the controller in an error frame -> the fault that is reported
 ERRORS = {
     "bus-off": (0x40, 0, "bus off"),
     "passive": (0x04, 0x30, "error passive"),
@@ -199,16 +199,16 @@ ERRORS = {
 
 
 @pytest.mark.parametrize(("kind", "state", "fault"), ERRORS.values(), ids=ERRORS)
-def test_what_the_controller_reports_is_told_and_braking_goes_on(
+def test_what_the_controller_reports_becomes_a_fault_and_braking_goes_on(
     bench: Bench, raw: socket.socket, kind: int, state: int, fault: str
 ) -> None:
     assert_braked(braked(bench.car))
 
-    def told() -> bool:
+    def allowed() -> bool:
         raw.send(classical(ERROR | kind, bytes([0, state, 0, 0, 0, 0, 0, 0])))
         return bench.unit.said("fault", fault=fault)
 
-    valid, _ = front(bench.car.drive(1, until=told))
+    valid, _ = front(bench.car.drive(1, until=allowed))
     assert (valid == 1).any()
     raw.send(classical(ERROR | 0x100, b"\0" * 8))  # restarted
     bench.car.drive(1, until=lambda: bench.unit.said("fault_gone", fault=fault))
@@ -230,11 +230,11 @@ def test_a_clock_that_is_set_brakes_on(bench: Bench, step_s: float) -> None:
     assert_braked(braked(bench.car, before=set_clock))
     assert not faults_since(bench.unit, lines)
 
-    def told() -> bool:
+    def allowed() -> bool:
         bench.unit.said("any")
         return any(line["event"] == "clock_set" for line in bench.unit.seen[lines:])
 
-    bench.car.drive(1, until=told)
+    bench.car.drive(1, until=allowed)
 
 
 @pytest.mark.requirement("REQ-DEM-5")

@@ -201,9 +201,9 @@ def test_a_killed_side_process_comes_back_and_nothing_is_lost(member, daemon, ca
     stopped, recording = unit.wait_for("stopped"), read_recording(tmp_path / "record")
     assert recording.cycles["number"].tolist() == list(range(stopped["cycles"]))
     assert len(recording.frames.read_text().splitlines()) == recording.cycles["frames"].sum()
-    told = (recording.outputs["active_faults"].astype(int) & NOT_KEPT) > 0
-    assert told.any() == (member == 2)
-    assert not told[-1]
+    unkept = (recording.outputs["active_faults"].astype(int) & NOT_KEPT) > 0
+    assert unkept.any() == (member == 2)
+    assert not unkept[-1]
 
 
 @pytest.mark.requirement("REQ-PROC-2")

@@ -90,7 +90,7 @@ def test_the_standby_brakes_on_where_the_killed_one_stopped(tmp_path, bus):
 
 
 @pytest.mark.socketcan
-def test_a_controller_that_goes_off_is_told_and_obeyed_again_after_its_restart(tmp_path):
+def test_a_controller_that_goes_off_is_reported_and_obeyed_again_after_its_restart(tmp_path):
     try:
         lay_wire().close()
     except UserError as error:

@@ -45,12 +45,12 @@ class Lines:
     """Facts that a watcher prints, line by line."""
 
     def __init__(self, process):
-        self.told, self.process = [], process
+        self.lines, self.process = [], process
         threading.Thread(target=self._read, daemon=True).start()
 
     def _read(self):
         for line in self.process.stdout:
-            self.told.append(json.loads(line))
+            self.lines.append(json.loads(line))
 
     def wait_for(self, fact, meanwhile=lambda: time.sleep(0.1)):
         """Return the first line not yet asked for that `fact` holds of; lines before it are left out."""
@@ -58,8 +58,8 @@ class Lines:
 
         def looked():
             meanwhile()
-            while self.told and not found:
-                found.extend(filter(fact, [self.told.pop(0)]))
+            while self.lines and not found:
+                found.extend(filter(fact, [self.lines.pop(0)]))
             return found
 
         wait_for(looked)
@@ -69,21 +69,21 @@ class Lines:
 def test_it_attaches_tells_the_end_and_attaches_again(daemon, car, watch):
     watcher = watch("--json")
     lines = Lines(watcher)
-    assert lines.wait_for(lambda told: told.get("trouble"))["trouble"].startswith("no daemon")
+    assert lines.wait_for(lambda line: line.get("trouble"))["trouble"].startswith("no daemon")
     first = daemon(*BUS)
     first.wait_for("ready")
-    told = lines.wait_for(lambda told: told.get("mode") == "active", lambda: car.drive(20))
-    assert told["daemon"].endswith(f"process {first.process.pid}")
-    assert told["vehicle_speed"] == pytest.approx(20, abs=1.5)
-    assert told["decel_demand_total"] == pytest.approx(3, abs=0.01)
+    reported = lines.wait_for(lambda line: line.get("mode") == "active", lambda: car.drive(20))
+    assert reported["daemon"].endswith(f"process {first.process.pid}")
+    assert reported["vehicle_speed"] == pytest.approx(20, abs=1.5)
+    assert reported["decel_demand_total"] == pytest.approx(3, abs=0.01)
     first.process.kill()
-    assert "was killed" in lines.wait_for(lambda told: told.get("trouble"))["trouble"]
+    assert "was killed" in lines.wait_for(lambda line: line.get("trouble"))["trouble"]
     first.end(None)
     second = daemon(*BUS)
     second.wait_for("ready")
 
-    def of_the_second(told):
-        return str(told.get("daemon")).endswith(str(second.process.pid))
+    def of_the_second(line):
+        return str(line.get("daemon")).endswith(str(second.process.pid))
 
     assert lines.wait_for(of_the_second, lambda: car.drive(20))["cycles"] > 0
     watcher.send_signal(signal.SIGTERM)

@@ -223,7 +223,7 @@ def test_loop_and_recorder_do_not_care_for_the_slave(unit, master, port, tmp_pat
     unharmed(one, tmp_path / "record")
 
 
-def test_the_end_of_a_run_is_told(unit, master, port):
+def test_the_end_of_a_run_is_reported(unit, master, port):
     one = unit(f"udp:{port}")
     asks = master("udp", port)
     assert one.end() == 0

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .config import Nominal
-from .course import G, Values
 from .logger import CORNERS
+from .route import G, Values
 
 PERIOD = 0.01  # s, of a row
 HELD = 0.7  # s over which samples are joined

@@ -1,8 +1,8 @@
-"""A stranger's car on a course: four wheels, brakes, discs, a slip control that reports nothing.
+"""A stranger's car on a route: four wheels, brakes, discs, a slip control that reports nothing.
 
     m dv/dt = -sum F_i - drag - rolling - cornering - m g grade,  I omega' = r F - T_brake - T_engine
 
-The lateral motion is the course's: a_y = v^2 curvature up to what the road holds, shared like the loads.
+The lateral motion is the route's: a_y = v^2 curvature up to what the road holds, shared like the loads.
 Loads shift with the specific force a lag behind. 10 ms a row, four steps in each.
 """
 
@@ -12,9 +12,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from .course import Course, G, Values
 from .driver import Driver, Engine, accelerate, decide, meant_ahead, press, yield_to_lock
 from .lining import Brake, friction, rear_pressure
+from .route import G, Route, Values
 from .state import ROW
 from .tyre import Tyre, grip_left, spin
 
@@ -176,14 +176,14 @@ def turn_wheel(
 
 @numba.njit(cache=True)
 def move(
-    state: NDArray[np.void], car: Car, course: Course, bounce: float, recuperated: float, dt: float
+    state: NDArray[np.void], car: Car, route: Route, bounce: float, recuperated: float, dt: float
 ) -> None:
     """Move the car by dt; `specific_force` becomes that of the step."""
     body, place = car.body, int(state.distance)
-    air = max(state.speed + course.headwind[place], 0.0)
-    down, grip, grade = body.lift * air**2, course.grip[place], course.grade[place]
+    air = max(state.speed + route.headwind[place], 0.0)
+    down, grip, grade = body.lift * air**2, route.grip[place], route.grade[place]
     widest = 0.97 * grip * (G + down / state.mass)  # faster, it runs wide
-    state.lateral = min(max(state.speed**2 * course.curvature[place], -widest), widest)
+    state.lateral = min(max(state.speed**2 * route.curvature[place], -widest), widest)
     for axle in range(2):
         state.calliper[axle] += (state.line[axle] - state.calliper[axle]) * dt / car.brake.lag
     share_load(state, body, down, bounce)
@@ -211,13 +211,13 @@ def move(
 
 @numba.njit(cache=True)
 def drive(
-    car: Car, course: Course, start: Start, tremor: Values, scatter: Values, rows: NDArray[np.void]
+    car: Car, route: Route, start: Start, tremor: Values, scatter: Values, rows: NDArray[np.void]
 ) -> int:
-    """Drive the course; return how many rows it took.
+    """Drive the route; return how many rows it took.
 
     Args:
         car: the car.
-        course: the road.
+        route: the road.
         start: how it begins.
         tremor: of the brake foot, standard normal and slow, a value each row.
         scatter: factor of the linings' friction, a value each brake application.
@@ -236,26 +236,26 @@ def drive(
             rows[row] = rows[row - 1]
         state = rows[row]
         place = int(state.distance)
-        if place >= len(course.speed) - 2:
+        if place >= len(route.speed) - 2:
             return row
-        meant, demand = meant_ahead(course, place, state.speed)
-        decide(state, course, state.speed - meant, demand)
+        meant, demand = meant_ahead(route, place, state.speed)
+        decide(state, route, state.speed - meant, demand)
         recuperated = press(
-            state, car.driver, car.engine, course, radius, tremor[row], state.speed - meant, demand
+            state, car.driver, car.engine, route, radius, tremor[row], state.speed - meant, demand
         )
         if car.abs_.kind == NO_ABS:
             yield_to_lock(state, car.driver)
-        accelerate(state, car.driver, car.engine, course.grip[place], radius, meant)
+        accelerate(state, car.driver, car.engine, route.grip[place], radius, meant)
         state.line[1] = rear_pressure(car.brake, state.line[0])
         rub(state, car.brake, start.ambient, scatter[min(state.applications, len(scatter) - 1)])
-        bounce = 0.4 * course.kerb[place] * np.sin(75.0 * row * ROW)
+        bounce = 0.4 * route.kerb[place] * np.sin(75.0 * row * ROW)
         total = 0.0
         for _ in range(STEPS):
-            move(state, car, course, bounce, recuperated, ROW / STEPS)
+            move(state, car, route, bounce, recuperated, ROW / STEPS)
             total += state.specific_force / STEPS
         state.specific_force = total
         state.mass -= body.fuel * ROW * state.throttle
         state.yaw_rate = state.lateral / max(state.speed, 1.0)
-        state.steering = course.curvature[place] * (body.wheelbase + 0.002 * state.speed**2)
-        state.kerb = course.kerb[place]
+        state.steering = route.curvature[place] * (body.wheelbase + 0.002 * state.speed**2)
+        state.kerb = route.kerb[place]
     return len(rows)

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from .car import Body
-from .course import G, Values
 from .lining import Brake, warm_level
 from .logger import Logger
+from .route import G, Values
 
 VEHICLE = (
     "mass", "wheelbase", "front_axle", "cog_height", "track", "drag_coefficient", "frontal_area",

@@ -18,7 +18,6 @@ from scipy.signal import lfilter
 
 from .car import NO_ABS, Car, Start, drive
 from .config import Nominal, believe
-from .course import Course
 from .kinds import (
     ELECTRIC,
     RACER,
@@ -35,7 +34,8 @@ from .kinds import (
     draw_tyre,
 )  # fmt: skip
 from .logger import Logger, draw_logger
-from .roads import draw_course
+from .roads import draw_route
+from .route import Route
 from .state import ROW, STATE
 
 SETS = {
@@ -59,7 +59,7 @@ class Stranger(NamedTuple):
     letter: str  # of its set
     rain: bool
     car: Car
-    course: Course
+    route: Route
     start: Start
     nominal: Nominal
     logger: Logger
@@ -73,7 +73,7 @@ class Stranger(NamedTuple):
             "engine's torque at 2.5 times": reported and not self.nominal.electric,
             "hidden slip control": silent and not self.logger.abs_reported,
             "left foot": self.car.driver.overlap > 0.0,
-            "taps": bool(np.any(self.course.tap)),
+            "taps": bool(np.any(self.route.tap)),
             "rain": self.rain,
         }
         return tuple(name for name, true in of.items() if true)
@@ -85,7 +85,7 @@ class Stranger(NamedTuple):
         tremor = lfilter([np.sqrt(1.0 - slow**2)], [1.0, -slow], rng.normal(size=round(LONGEST / ROW)))
         rows = np.zeros(len(tremor), STATE)
         return rows[
-            : drive(self.car, self.course, self.start, tremor, 1.0 + 0.02 * rng.normal(size=400), rows)
+            : drive(self.car, self.route, self.start, tremor, 1.0 + 0.02 * rng.normal(size=400), rows)
         ]
 
 
@@ -105,7 +105,7 @@ def _stranger(seed: int, number: int) -> Stranger:
     brake = draw_brake(kind, body, grip, electric, rng)
     control = draw_abs(kind, rng)
     engine = draw_engine(kind, body, electric, rng)
-    course = draw_course(kind, body, grip, control.kind != NO_ABS, engine.blend > 0.0, rng)
+    route = draw_route(kind, body, grip, control.kind != NO_ABS, engine.blend > 0.0, rng)
     logger = draw_logger(letter, electric, rng)
     ambient = rng.uniform(8.0, 30.0)
     if rng.random() < 0.5:
@@ -115,7 +115,7 @@ def _stranger(seed: int, number: int) -> Stranger:
     else:
         warm = rng.uniform(90.0, 300.0) if kind.track == "race" else rng.uniform(30.0, 90.0)
         start = Start(
-            idle=0.0, speed=0.8 * float(course.speed[0]), front=warm, rear=0.8 * warm, ambient=ambient
+            idle=0.0, speed=0.8 * float(route.speed[0]), front=warm, rear=0.8 * warm, ambient=ambient
         )
     return Stranger(
         seed=seed,
@@ -130,7 +130,7 @@ def _stranger(seed: int, number: int) -> Stranger:
             driver=draw_driver(kind, body, brake, grip, rng),
             abs_=control,
         ),
-        course=course,
+        route=route,
         start=start,
         nominal=believe(body, brake, kind.scale, logger, electric, rng),
         logger=logger,

@@ -11,7 +11,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from .course import Course, G
+from .route import G, Route
 from .state import ROW
 
 LOCKED = 0.3  # slip
@@ -64,17 +64,17 @@ def change_gear(engine: Engine, gear: int, wheel: float, braking: bool) -> int:
 
 
 @numba.njit(cache=True)
-def meant_ahead(course: Course, place: int, speed: float) -> tuple[float, float]:
+def meant_ahead(route: Route, place: int, speed: float) -> tuple[float, float]:
     """Return the least speed [m/s] and the deceleration [m/s^2] meant within the next 0.15 s."""
-    ahead = min(place + int(0.15 * speed), len(course.speed) - 2)
-    least = course.speed[place]
+    ahead = min(place + int(0.15 * speed), len(route.speed) - 2)
+    least = route.speed[place]
     for k in range(place, ahead + 1):
-        least = min(least, course.speed[k])
-    return least, course.decel[ahead]
+        least = min(least, route.speed[k])
+    return least, route.decel[ahead]
 
 
 @numba.njit(cache=True)
-def decide(state: NDArray[np.void], course: Course, too_fast: float, demand: float) -> None:
+def decide(state: NDArray[np.void], route: Route, too_fast: float, demand: float) -> None:
     """Begin a braking, or a stop, or drive on from one."""
     place = int(state.distance)
     if state.standing:
@@ -83,9 +83,9 @@ def decide(state: NDArray[np.void], course: Course, too_fast: float, demand: flo
             state.standing, state.braking, state.dwell = 0, 0, 0.0
             state.distance = max(state.distance, state.resume)
     elif state.speed < 0.5 and state.braking:
-        for k in range(max(place - 3, 0), min(place + 4, len(course.stop))):
-            if course.stop[k] > 0.0:
-                state.standing, state.wait, state.resume, state.speed = 1, course.stop[k], k + 1.0, 0.0
+        for k in range(max(place - 3, 0), min(place + 4, len(route.stop))):
+            if route.stop[k] > 0.0:
+                state.standing, state.wait, state.resume, state.speed = 1, route.stop[k], k + 1.0, 0.0
                 state.omega[:] = 0.0
     elif not state.braking and too_fast > 0.0 and demand > 0.8:
         state.braking, state.since = 1, 0.0
@@ -95,7 +95,7 @@ def decide(state: NDArray[np.void], course: Course, too_fast: float, demand: flo
 
 @numba.njit(cache=True)
 def press(
-    state: NDArray[np.void], driver: Driver, engine: Engine, course: Course, radius: float, tremor: float,
+    state: NDArray[np.void], driver: Driver, engine: Engine, route: Route, radius: float, tremor: float,
     too_fast: float, demand: float,
 ) -> float:  # fmt: skip
     """Move the brake pedal; return the torque [N m] that motors regenerate for it.
@@ -104,7 +104,7 @@ def press(
         state: of the car.
         driver: the driver.
         engine: the engine.
-        course: the road.
+        route: the road.
         radius: of the driven wheels [m].
         tremor: standard normal.
         too_fast: speed above the one meant [m/s].
@@ -117,7 +117,7 @@ def press(
     elif state.braking:
         state.since += ROW
         demand += 0.8 * too_fast
-        if demand < 0.3 or (too_fast < -1.0 and course.decel[place] < 0.3):
+        if demand < 0.3 or (too_fast < -1.0 and route.decel[place] < 0.3):
             state.braking = 0
         else:
             fade = min(max(state.speed - 1.0, 0.0) / 3.0, 1.0)
@@ -128,8 +128,8 @@ def press(
             overshoot = 1.0 + driver.stab * np.exp(-state.since / 0.3)
             wanted = max(demand - rest, 0.0) * driver.bar_per_decel * (1.0 + state.trim) * overshoot
             wanted *= state.habit * state.relax * (1.0 + driver.tremble * tremor)
-    elif course.tap[place] > 0.0:
-        wanted = course.tap[place]
+    elif route.tap[place] > 0.0:
+        wanted = route.tap[place]
     wanted = min(max(wanted, 0.0), driver.pressure)
     state.line[0] += min(max(wanted - state.line[0], -driver.release * ROW), driver.press * ROW)
     return recuperated

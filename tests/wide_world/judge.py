@@ -29,10 +29,10 @@ from brakelab.api import Result, replay
 
 from .brakings import Braking, Signals, find, lining_decel, read, rest_decel
 from .config import Nominal
-from .course import G, Values
 from .draw import CARS, SETS, draw
 from .logger import CORNERS, record, truth, write
 from .references import REFERENCES, Prediction
+from .route import G, Values
 
 LEAST = 1.5  # m/s^2, of a braking that is judged
 SIGMAS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)

@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from .car import Abs, Body
-from .course import G
 from .driver import Driver, Engine
 from .lining import CONSTANT, FADING, GREEN, LOAD_AND_SPEED, RISING, Brake, warm_level
+from .route import G
 from .tyre import BRUSH, DUGOFF, EXPONENTIAL, Tyre, greatest
 
 Range = tuple[float, float]

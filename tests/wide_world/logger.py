@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from .course import G, Values
+from .route import G, Values
 from .state import ROW
 
 CORNERS = ("fl", "fr", "rl", "rr")

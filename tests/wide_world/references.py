@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from .brakings import Braking
-from .course import Values
+from .route import Values
 
 AVERAGE = 0.4
 PRIOR = (

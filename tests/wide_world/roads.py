@@ -3,8 +3,8 @@
 import numpy as np
 
 from .car import Body
-from .course import Course, Lap, Straight, drive_course, lay
 from .kinds import Kind
+from .route import Lap, Route, Straight, drive_route, lay
 
 MEANT = {"race": 40, "student": 80, "road": 40}  # brakings meant in a drive: not each can be judged
 MOST_LAPS = 30
@@ -32,10 +32,10 @@ def draw_lap(track: str, rng: np.random.Generator) -> Lap:
     return lay(straights, SLOPE[track] * rng.uniform(0.3, 1.3), rng)
 
 
-def draw_course(
+def draw_route(
     kind: Kind, body: Body, grip: float, stamps: bool, blends: bool, rng: np.random.Generator
-) -> Course:
-    """Return a course of as many laps as the brakings meant take.
+) -> Route:
+    """Return a route of as many laps as the brakings meant take.
 
     Args:
         kind: of the car.
@@ -63,9 +63,9 @@ def draw_course(
         gentle = np.clip(rng.lognormal(0.8, 0.35, shape), 1.2, 4.5)
         decel = np.where(hard, rng.uniform(5.0, 9.0, shape), gentle)
 
-    def of(laps: int) -> Course:
+    def of(laps: int) -> Route:
         some = slice(0, laps)
-        return drive_course(
+        return drive_route(
             lap,
             laps,
             grip * corner[some],
@@ -82,11 +82,11 @@ def draw_course(
     return of(int(np.clip(np.ceil(meant / max(per_lap, 1.0)), 2, MOST_LAPS)))
 
 
-def count_brakings(course: Course) -> int:
+def count_brakings(route: Route) -> int:
     """Return how many times a driver means to lose more than 4 m/s."""
-    edges = np.diff((course.decel > 0.8).astype(int), prepend=0, append=0)
-    last = len(course.speed) - 1
+    edges = np.diff((route.decel > 0.8).astype(int), prepend=0, append=0)
+    last = len(route.speed) - 1
     return sum(
-        bool(course.speed[start] - course.speed[min(end, last)] > 4.0)
+        bool(route.speed[start] - route.speed[min(end, last)] > 4.0)
         for start, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True)
     )

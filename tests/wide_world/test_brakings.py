@@ -5,7 +5,7 @@ import pytest
 
 from .brakings import PERIOD, find, lining_decel, read, rest_decel
 from .config import Nominal
-from .course import G, Values
+from .route import G, Values
 
 NOMINAL = Nominal(
     mass=1200.0, wheelbase=2.6, front_axle=1.3, cog_height=0.5, track=1.6, drag_coefficient=0.4,

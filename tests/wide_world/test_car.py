@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from .car import CYCLING, HOLDING, NO_ABS, Abs, Body, Car, Start, drive
-from .course import Course, G
 from .draw import draw
 from .driver import Driver, Engine
 from .lining import CONSTANT, Brake
+from .route import G, Route
 from .state import ROW, STATE
 from .tyre import BRUSH, Tyre, greatest
 
@@ -43,11 +43,11 @@ def stop(pressure: float, car: Car = CAR, seconds: float = 3.0, speed: float = 4
         "stop": 0.0,
     }
     columns = {name: np.full(n, value) for name, value in (level | road).items()}
-    course = Course(**columns, speed=np.zeros(n), decel=np.zeros(n))
+    route = Route(**columns, speed=np.zeros(n), decel=np.zeros(n))
     count = round(seconds / ROW)
     rows = np.zeros(count, STATE)
     start = Start(0.0, speed, 100.0, 100.0, 20.0)
-    return rows[: drive(car, course, start, np.zeros(count), np.ones(10), rows)]
+    return rows[: drive(car, route, start, np.zeros(count), np.ones(10), rows)]
 
 
 @pytest.mark.parametrize("pressure", [5.0, 20.0, 40.0])
@@ -127,7 +127,7 @@ def test_energy_is_neither_made_nor_lost(number: int) -> None:
     car = one.car._replace(body=body, engine=engine)
     n = drive(
         car,
-        one.course._replace(stop=np.zeros_like(one.course.stop)),
+        one.route._replace(stop=np.zeros_like(one.route.stop)),
         one.start,
         np.zeros(count),
         np.ones(99),

@@ -1,4 +1,4 @@
-"""Physics of strangers' logs: sound ones give no line, each contradiction is told, and nothing is learned."""
+"""Physics of strangers' logs: sound ones give no line, contradictions do, and nothing is learned."""
 
 from collections.abc import Callable
 from contextlib import closing
@@ -21,9 +21,9 @@ from ecu.contract.signals import CORNERS, INPUT_SIGNALS
 from ecu.recording.store import open_store, restore
 from ecu.settings.config import load_config, new_params, store_key
 
-from .course import G, Values
 from .draw import draw
 from .logger import record, write
+from .route import G, Values
 
 Columns = dict[str, Values]
 Change = Callable[[Columns], None]
@@ -125,19 +125,19 @@ def test_sound_logs_contradict_nothing(logged: dict[tuple[int, int], Logged]) ->
 
 
 @pytest.mark.parametrize(("what", "change", "begins", "least"), WRONG, ids=[row[0] for row in WRONG])
-def test_a_contradiction_is_told(
+def test_a_contradiction_is_reported(
     logged: dict[tuple[int, int], Logged], what: str, change: Change, begins: str, least: int
 ) -> None:
-    told = 0
+    reported = 0
     for columns, _, car in logged.values():
         wrong = dict(columns)
         change(wrong)
         lines = contradictions(wrong, car)
-        told += any(line.startswith(begins) for line in lines)
+        reported += any(line.startswith(begins) for line in lines)
         if all(wrong[name] is columns[name] for name in columns):
             assert not lines  # this log has no such signal
-    print(what, told, "of", len(logged))
-    assert told >= least
+    print(what, reported, "of", len(logged))
+    assert reported >= least
 
 
 def replayed(
@@ -211,10 +211,10 @@ def test_a_fleet_learns_nothing_of_a_contradicted_drive(
     assert sound.summary["learned"] > 0
     times("accel_x", -1.0)(columns)
     write(columns, log)
-    told = replay_job(replace(job, learned=sound.learned))
-    assert told.summary["notes"].splitlines()[0].endswith("accel_x: turned against dv/dt; factor = -1")
-    assert told.summary["learned"] == 0
-    assert told.summary["brakings"] > 10
-    assert told.learned == sound.learned
+    done = replay_job(replace(job, learned=sound.learned))
+    assert done.summary["notes"].splitlines()[0].endswith("accel_x: turned against dv/dt; factor = -1")
+    assert done.summary["learned"] == 0
+    assert done.summary["brakings"] > 10
+    assert done.learned == sound.learned
     if rows:
         assert np.ptp(pq.read_table(out)["mu_b_fl"].to_numpy()) == 0.0

@@ -35,7 +35,7 @@ def test_thirty_cars_of_six_sets_are_the_same_by_seed_and_number() -> None:
 
 
 def test_the_draw_is_wide() -> None:
-    grip = np.array([np.mean(one.course.grip) for one in ALL])
+    grip = np.array([np.mean(one.route.grip) for one in ALL])
     assert grip.min() < 0.7
     assert grip.max() > 1.25
     assert {one.car.tyre.kind for one in ALL} == {0, 1, 2}

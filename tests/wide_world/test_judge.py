@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from .brakings import find, read
-from .course import G
 from .judge import Judged, judge_car, main, published, report, tabled
 from .logger import CORNERS
+from .route import G
 from .test_brakings import NOMINAL, pulse, signals
 
 

@@ -15,7 +15,7 @@ from .test_contradictions import grid
 COLUMN = {INPUT_SIGNALS[place].name: column for column, place in enumerate(SAMPLED)}
 CARS = ((1, 7), (1, 8), (1, 11), (1, 14), (1, 19), (1, 20), (2, 14), (2, 21))
 """Seed and number: a late speed of several kinds, and four wheels beside a late accelerometer."""
-ADDED = (-0.3, -0.2, 0.15, 0.2, 0.3)  # s: what remains below 0.03 s is not told
+ADDED = (-0.3, -0.2, 0.15, 0.2, 0.3)  # s: what remains below 0.03 s is not reported
 
 
 @pytest.fixture(scope="module")

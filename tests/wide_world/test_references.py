@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from .brakings import Braking
-from .course import Values
 from .references import (
     PRIOR,
     REFERENCES,
@@ -15,6 +14,7 @@ from .references import (
     saturating,
     saturating_hindsight,
 )
+from .route import Values
 
 REST = 0.4
 

@@ -83,7 +83,7 @@ def spin(
     tyre: Tyre, omega: float, speed: float, torque: float, inertia: float, radius: float, load: float,
     left: float, dt: float,
 ) -> tuple[float, float]:  # fmt: skip
-    """Return wheel speed [rad/s] after dt and the mean braking force [N] on the way there.
+    """Return wheel speed [rad/s] after dt and the mean braking force [N] until then.
 
     I omega' = r F(s) - T is stiff: an implicit Euler step, linear in omega. Beyond the peak the slope is
     left out, so a wheel falls into lock by its inertia. A wheel that stands slides at the force of lock.

@@ -203,7 +203,7 @@ def simulate(
     folder = TemporaryDirectory(prefix="brake-ecu-") if out is None else None
     written = Path(folder.name, path.stem) if folder else Path(out or "")
     with changed(config, changes) as car:
-        run_scenario(path, car, written, int(seed), draw, told=False)
+        run_scenario(path, car, written, int(seed), draw, printed=False)
     return Simulation(written, folder)
 
 

@@ -68,8 +68,8 @@ def test_plant_rows() -> None:
 def test_step_rows() -> None:
     rows = step_rows(rounds=2, cycles=20)
     whole, filters = "whole step", "four filters"
-    ways = ("compiled loop", "called from Python")
-    assert_sane(rows, {f"{what}, {way}" for what in (whole, filters) for way in ways})
+    callers = ("compiled loop", "called from Python")
+    assert_sane(rows, {f"{what}, {caller}" for what in (whole, filters) for caller in callers})
     assert {"numpy" in row.note for row in rows} == {True, False}
 
 

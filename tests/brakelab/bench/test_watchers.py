@@ -40,13 +40,13 @@ class Clock:
 )
 def test_it_begins_without_and_takes_turns(monkeypatch, seconds, late_s, blocks):
     monkeypatch.setattr(watchers, "time", Clock(round(1e9 * late_s)))
-    told = []
+    calls = []
 
-    class Told:
-        run = staticmethod(told.append)
+    class Calls:
+        run = staticmethod(calls.append)
 
-    found = alternate(Told(), seconds, lambda: True)
-    assert told == [bool(i % 2) for i in range(len(blocks))] == [block.watched for block in found]
+    found = alternate(Calls(), seconds, lambda: True)
+    assert calls == [bool(i % 2) for i in range(len(blocks))] == [block.watched for block in found]
     edges_s = np.array([(block.begin_ns, block.end_ns) for block in found]) * 1e-9
     np.testing.assert_allclose(edges_s, blocks)
 
@@ -55,10 +55,10 @@ def test_a_run_that_ended_takes_no_more_turns(monkeypatch):
     monkeypatch.setattr(watchers, "time", Clock(0))
     goes_on = iter([True, True, False])
 
-    class Told:
+    class Calls:
         run = staticmethod(lambda on: None)
 
-    assert len(alternate(Told(), 60.0, lambda: next(goes_on))) == 2
+    assert len(alternate(Calls(), 60.0, lambda: next(goes_on))) == 2
 
 
 def test_messages_a_second_of_being_watched():

@@ -58,9 +58,9 @@ def test_of_a_fleet_without_one_good_drive_each_reason_is_said(
         (tmp_path / "data" / vehicle).mkdir(parents=True)
         (tmp_path / "data" / vehicle / "1.log").write_bytes(b"\x00garbage" * 1000)
     assert fleet([f"{tmp_path}/data/*/*.log"], SUV, None, None, None, 1, tmp_path / "out") == 1
-    told = capsys.readouterr()
-    assert told.err.count("failed: ") == 2
-    assert "0 of 2 drives of 2 vehicles" in told.out
+    printed = capsys.readouterr()
+    assert printed.err.count("failed: ") == 2
+    assert "0 of 2 drives of 2 vehicles" in printed.out
     assert "Drives that failed" in (tmp_path / "out" / "report.html").read_text("utf-8")
 
 
@@ -72,10 +72,10 @@ def test_a_fleet_is_its_drives_in_order(
     whole = (mine / "two/10.log").read_bytes()
     (mine / "two/10.log").write_bytes(b"\x00garbage" * 1000)
     assert fleet([f"{mine}/*/*.log"], SUV, None, None, None, 2, out, rows=True) == 1
-    told = capsys.readouterr()
-    assert told.err.count("failed: ") == 1
-    assert "two/10.log" in told.err
-    assert "5 of 6 drives of 2 vehicles" in told.out
+    printed = capsys.readouterr()
+    assert printed.err.count("failed: ") == 1
+    assert "two/10.log" in printed.err
+    assert "5 of 6 drives of 2 vehicles" in printed.out
     for vehicle, drives in {"one": DRIVES, "two": (2, 11)}.items():
         expected = replayed([mine / vehicle / f"{drive}.log" for drive in drives], tmp_path / vehicle)
         for drive, table in zip(drives, expected, strict=True):
@@ -138,7 +138,7 @@ def test_a_damaged_log_is_one_line_and_teaches_nothing(name: str, tmp_path: Path
     assert outcome.file == b""
 
 
-def test_a_log_that_starts_before_the_one_before_it_is_told() -> None:
+def test_a_log_that_starts_before_the_one_before_it_is_reported() -> None:
     def starts(*times: int | None) -> list[dict[str, object]]:
         hour = 3_600 * 10**9
         return [
@@ -157,6 +157,6 @@ def test_ctrl_c_before_the_first_drive_is_done_is_one_line(
 
     monkeypatch.setattr(command, "run_fleet", interrupted)
     assert fleet([f"{data}/*/*.log"], SUV, None, None, None, 1, tmp_path / "out") == 130
-    told = capsys.readouterr()
-    assert "interrupted: the same command goes on with the rest" in told.out + told.err
+    printed = capsys.readouterr()
+    assert "interrupted: the same command goes on with the rest" in printed.out + printed.err
     assert list((tmp_path / "out").iterdir()) == []

@@ -66,7 +66,7 @@ WRONG = [
 
 @pytest.mark.drives
 @pytest.mark.parametrize(("car", "pattern", "new", "line"), WRONG, ids=[row[3] for row in WRONG])
-def test_a_wrong_map_of_a_recorded_drive_is_told(
+def test_a_wrong_map_of_a_recorded_drive_is_reported(
     drives: Path,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],

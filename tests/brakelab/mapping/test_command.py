@@ -123,7 +123,7 @@ TURNED = ["accel_x", "accel_y", "yaw_rate"]
 
 
 @pytest.mark.parametrize("signal", TURNED)
-def test_a_turned_axis_is_told_by_the_drive(drive, signal: str) -> None:
+def test_the_drive_shows_a_turned_axis(drive, signal: str) -> None:
     found = proposed(drive, negated(contract(), signal))
     assert {name: found[name].factor for name in TURNED} == {
         name: -1.0 if name == signal else 1.0 for name in TURNED
@@ -131,7 +131,7 @@ def test_a_turned_axis_is_told_by_the_drive(drive, signal: str) -> None:
     assert all(found[name].series.signal == name for name in TURNED)
 
 
-def test_swapped_axes_are_told_by_the_drive(drive) -> None:
+def test_the_drive_shows_swapped_axes(drive) -> None:
     found = proposed(drive, renamed(contract(), accel_x="accel_y", accel_y="accel_x"))
     assert found["accel_x"].series.signal == "accel_y"
     assert found["accel_y"].series.signal == "accel_x"
@@ -183,7 +183,7 @@ def scaled(text: str, signal: str, by: float) -> str:
         ("yaw_rate", 57.29578, "it would fit deg/s"),
     ],
 )
-def test_a_slope_that_is_not_one_is_told(drive, signal: str, by: float, said: str) -> None:
+def test_a_slope_that_is_not_one_is_reported(drive, signal: str, by: float, said: str) -> None:
     """Beside the 1.12 of the tyres, whose radius is 0.37 m instead of the 0.33 m assumed."""
     warning = proposed(drive, scaled(contract(), signal, by))[signal].warning
     assert (said in warning) if said else not warning

@@ -53,10 +53,10 @@ def test_the_lag_of_a_speed_goes_into_the_map(
     out = tmp_path / "out.toml"
     words = ["map", "check", str(log), "--config", "mustang", "--map"]
     assert cli.main([*words, str(map), "--out", str(out)]) == 0
-    (told,) = re.findall(r"vehicle_speed: (0\.\d+) ± 0\.0\d s late; lag = \1", capsys.readouterr().out)
-    assert float(told) == pytest.approx(late, abs=0.02)
+    (lag,) = re.findall(r"vehicle_speed: (0\.\d+) ± 0\.0\d s late; lag = \1", capsys.readouterr().out)
+    assert float(lag) == pytest.approx(late, abs=0.02)
     inputs = read_column_map(out).content.inputs
-    assert inputs["vehicle_speed"].lag == float(told)
+    assert inputs["vehicle_speed"].lag == float(lag)
     assert inputs["accel_x"].lag == 0.0
     assert "# of the car" in out.read_text("utf-8")
     assert cli.main([*words, str(out)]) == 0

@@ -117,7 +117,7 @@ def test_the_slope_at_rest_is_that_of_an_undeformed_tyre():
     assert line.slope == pytest.approx(0.8, rel=0.01)
 
 
-def test_at_one_speed_the_slope_at_rest_is_not_told():
+def test_at_one_speed_the_slope_at_rest_is_not_known():
     t = np.arange(0.0, 200.0, 0.02)
     speed, true = np.full(len(t), 20.0), np.sin(t / 2.0)
     noisy = true + np.random.default_rng(1).normal(0.0, 0.2, len(t))
@@ -274,10 +274,10 @@ def test_a_pressure_in_bar_keeps_its_scale_whatever_the_brakes():
 
 
 @pytest.mark.parametrize("name", ["BRAKE_POSITION", "BrakePedal_Travel"])
-def test_the_way_of_a_pedal_is_no_pressure(name):
-    told = found(series(name, 8.0 * BAR))
-    assert "calliper_pressure_fl" not in told
-    assert told["pedal_position"].factor == pytest.approx(100.0 / (8.0 * BAR.max()))
+def test_the_travel_of_a_pedal_is_no_pressure(name):
+    inputs = found(series(name, 8.0 * BAR))
+    assert "calliper_pressure_fl" not in inputs
+    assert inputs["pedal_position"].factor == pytest.approx(100.0 / (8.0 * BAR.max()))
 
 
 def test_a_pressure_that_no_braking_checks_needs_a_name_of_brakes():
@@ -290,8 +290,8 @@ def test_a_pressure_that_no_braking_checks_needs_a_name_of_brakes():
 
 
 def test_a_pressure_is_no_pedal():
-    told = found(series("BRAKE_PRESSURE", 3.0 * BAR))
-    assert "pedal_position" not in told
+    inputs = found(series("BRAKE_PRESSURE", 3.0 * BAR))
+    assert "pedal_position" not in inputs
 
 
 def test_a_pedal_in_per_cent_keeps_its_scale():
@@ -326,8 +326,8 @@ def test_a_reverse_gear_is_known_by_its_name_where_the_car_is_slow(name, on, tak
     """Wheel speeds without a sign: a car that backs out would else be driving forwards."""
     slow = drive(slowest=1.0)
     flag = series(name, on(slow.t).astype(float))._replace(flag=True)
-    told = {one.target: one for one in flags([flag], motion_of(slow.wheels))}
-    assert ("reverse" in told) == taken
+    inputs = {one.target: one for one in flags([flag], motion_of(slow.wheels))}
+    assert ("reverse" in inputs) == taken
 
 
 CASES = [
@@ -345,6 +345,6 @@ CASES = [
 
 @pytest.mark.parametrize(("unit", "slope", "correlation", "in_curves", "factor", "said"), CASES)
 def test_a_scale_is_the_drives_where_no_unit_tells_it(unit, slope, correlation, in_curves, factor, said):
-    told = scale_of(series("A", np.arange(9.0), unit), slope, correlation, in_curves)
-    assert told.factor == pytest.approx(factor)
-    assert (said in told.warning) if said else not told.warning
+    scale = scale_of(series("A", np.arange(9.0), unit), slope, correlation, in_curves)
+    assert scale.factor == pytest.approx(factor)
+    assert (said in scale.warning) if said else not scale.warning

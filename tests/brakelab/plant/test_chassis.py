@@ -167,7 +167,7 @@ def test_an_anti_roll_bar_acts_in_roll_and_not_in_heave(sprung_at: Maker) -> Non
     assert difference == pytest.approx(moment / ROLL_INERTIA, rel=1e-6)
 
 
-def test_dampers_follow_their_table_and_resist_both_ways(sprung_at: Maker) -> None:
+def test_dampers_follow_their_table_and_resist_in_both_directions(sprung_at: Maker) -> None:
     params = sprung_at(0.0).params[0]
     for wheel, table in ((0, DAMPER_FRONT), (3, DAMPER_REAR)):
         for speed in np.linspace(-1.0, 1.0, 81):

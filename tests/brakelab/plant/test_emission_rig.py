@@ -1,4 +1,4 @@
-"""A brake in its enclosure: work, particles on their way, background, the counter's second."""
+"""A brake in its enclosure: work, transport of particles, background, the counter's second."""
 
 import numpy as np
 import pytest

@@ -91,7 +91,7 @@ def test_same_seed_same_bits(car_at: Callable[[float], Any]) -> None:
 def test_only_a_satellite_receiver_sees_the_side_speed(car_at: Callable[[float], Any]) -> None:
     car = car_at(20.0)
     car.state["speed_y"] = -1.5
-    along, over_ground = (truth(car.params, car.state, way)[3] for way in (False, True))
+    along, over_ground = (truth(car.params, car.state, reference)[3] for reference in (False, True))
     assert along == 20.0
     assert over_ground == pytest.approx(math.sqrt(20.0**2 + 1.5**2), rel=1e-12)
 

@@ -62,8 +62,8 @@ def test_a_circle_closes(car_at: Callable[[float], Any]) -> None:
     assert rows[end, 1:3] == pytest.approx(rows[start, 1:3], abs=0.5)
     assert y.max() - y.min() == pytest.approx(2.0 * radius, rel=0.02)
     assert np.all(np.diff(rows[start:, 3]) > 0.0)
-    course = np.unwrap(np.arctan2(np.diff(rows[start:, 2]), np.diff(rows[start:, 1])))
-    drift = course - 0.5 * (rows[start + 1 :, 3] + rows[start:-1, 3])
+    direction = np.unwrap(np.arctan2(np.diff(rows[start:, 2]), np.diff(rows[start:, 1])))
+    drift = direction - 0.5 * (rows[start + 1 :, 3] + rows[start:-1, 3])
     towards = np.arctan2(car.now["speed_y"], car.now["speed_x"])
     assert np.allclose(np.angle(np.exp(1j * (drift - towards))), 0.0, atol=1e-3)
 

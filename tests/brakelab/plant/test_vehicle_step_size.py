@@ -20,24 +20,24 @@ Maker = Callable[[str, float], Any]
 
 
 def stop(car: Any, name: str, dt: float) -> tuple[float, float]:
-    """Drive a stop of Table 4.2 on the hydraulics' fallback; return way [m] and mean friction by way."""
+    """Drive a stop of Table 4.2 on the hydraulics' fallback; return distance [m] and mean friction by it."""
     script = load_scenario(SCENARIOS / f"{name}.toml").script()
     driver, demand = new_record(DRIVER), new_record(DEMAND)
     demand["pressure_age"] = demand["motor_age"] = math.inf
-    way, friction = [], []
+    distance, friction = [], []
     while drive(script, car.params[0], car.now, driver[0], CYCLE):
         set_commands(script, car.params[0], car.now, driver[0], demand[0], car.commands[0])
         car.run(CYCLE, dt)
         if driver["decel_demand"][0] > 0.0:
-            way.append(float(car.now["distance"]))
+            distance.append(float(car.now["distance"]))
             friction.append(float(car.now["mu_b"].mean()))
     assert abs(float(car.now["speed_x"])) < 0.01
-    return way[-1] - way[0], float(np.average(friction[1:], weights=np.diff(way)))
+    return distance[-1] - distance[0], float(np.average(friction[1:], weights=np.diff(distance)))
 
 
 @pytest.mark.parametrize("name", ["stop-1", "stop-2", "stop-3", "stop-4"])
 @pytest.mark.parametrize("car", ["suv", "suv14"])
-def test_half_a_step_changes_way_and_friction_of_a_stop_by_less_than_a_thousandth(
+def test_half_a_step_changes_distance_and_friction_of_a_stop_by_less_than_a_thousandth(
     shipped: Maker, car: str, name: str
 ) -> None:
     whole, half = (stop(shipped(car, 33.333), name, dt) for dt in (STEP, 0.5 * STEP))

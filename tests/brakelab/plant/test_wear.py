@@ -15,7 +15,7 @@ def row(law: WearLaw) -> np.ndarray:
     return np.array(law.row(7.125e-3))
 
 
-def test_plain_archard_is_rate_times_force_times_way():
+def test_plain_archard_is_rate_times_force_times_distance():
     law = row(PLAIN)
     for force, speed in ((5e3, 2.0), (20e3, 8.0), (5e3, 8.0)):
         assert wear_rate(law, force, speed, 20e5, 100.0) == pytest.approx(PLAIN.rate * 1e-6 * force * speed)

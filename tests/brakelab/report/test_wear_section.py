@@ -151,7 +151,7 @@ def test_tables_and_plots_have_what_the_drive_has(page: str, tmp_path: Path) -> 
     assert set(plots["wear_plots"]) == {"wear-drive", "lining-front", "lining-rear"}
     assert set(plots["emission_plots"]) == {"emission-energy", "emission-heat"}
     assert [row.name for row in section.roads] == ["town", "motorway"]
-    assert section.untold == []
+    assert section.missing == []
     assert len(section.dirtiest) == 10
 
 
@@ -172,7 +172,7 @@ CANNOT = {
         "Wear and dust against temperature : no disc temperature",
     ),
     "no pads stated": ({}, [], "Thickness and remaining distance : the result does not state the pads"),
-    "pads never told": (
+    "pads never registered": (
         {}, [pad(corner, told=False, measurements=0) for corner in CORNERS],
         "Thickness of fl, fr, rl, rr to better than their life : nobody said what is fitted",
     ),
@@ -197,7 +197,7 @@ CANNOT = {
 
 @pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(("change", "pads", "said"), CANNOT.values(), ids=CANNOT)
-def test_what_cannot_be_told_is_a_sentence(
+def test_what_is_missing_is_a_sentence(
     tmp_path: Path, change: dict[str, Any], pads: list[PadState] | None, said: str
 ) -> None:
     page = page_of(made_up(tmp_path, change, pads))

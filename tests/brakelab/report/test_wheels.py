@@ -57,7 +57,7 @@ def test_motors_share_while_braking_only() -> None:
         ),
     ],
 )
-def test_only_what_is_told_is_drawn(columns: dict[str, np.ndarray], plots: set[str]) -> None:
+def test_only_what_is_known_is_drawn(columns: dict[str, np.ndarray], plots: set[str]) -> None:
     assert names(drive(**columns)) == plots
 
 

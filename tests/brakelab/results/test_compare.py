@@ -68,7 +68,7 @@ def test_a_result_equals_itself(results, capsys) -> None:
     assert "0 columns differ" in capsys.readouterr().out
 
 
-def test_another_observer_is_told_and_shown(results, capsys) -> None:
+def test_another_observer_is_named_and_shown(results, capsys) -> None:
     assert cli.main(["compare", str(results["joint"]), str(results["observer2"])]) == 1
     said = capsys.readouterr().out
     print(said)

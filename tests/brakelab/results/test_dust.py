@@ -57,7 +57,7 @@ OUTSIDE = {
 
 
 @pytest.mark.parametrize("given", OUTSIDE.values(), ids=OUTSIDE)
-def test_what_is_not_told(params, given):
+def test_what_is_not_counted(params, given):
     assert np.isnan(dust_of(given, params).factor).all()
 
 

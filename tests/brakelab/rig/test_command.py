@@ -22,7 +22,7 @@ until_speed = 0.0
 
 
 @pytest.mark.parametrize(
-    ("config", "plant", "code", "told"),
+    ("config", "plant", "code", "message"),
     [
         ("suv", (), 0, ""),
         ("lcv", (), 1, "brake-ecu: plant suv is another car than lcv (mass +11 %"),
@@ -34,7 +34,7 @@ def test_a_rig_with_another_car_than_the_configured_one_has_failed(
     config: str,
     plant: tuple[str, ...],
     code: int,
-    told: str,
+    message: str,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -42,8 +42,8 @@ def test_a_rig_with_another_car_than_the_configured_one_has_failed(
     arguments = ["rig", str(tmp_path / "stop.toml"), "--config", config, "--lock-step", *plant]
     assert cli.main([*arguments, "--out", str(tmp_path / "out")]) == code
     lines = [line for line in capsys.readouterr().err.splitlines() if line.startswith("brake-ecu:")]
-    assert len(lines) == bool(told)
-    assert all(line.startswith(told) for line in lines)
+    assert len(lines) == bool(message)
+    assert all(line.startswith(message) for line in lines)
 
 
 EXPECTED = """

@@ -28,7 +28,7 @@ def records(braking: list[int]) -> Any:
         pytest.param([1] * 50 + [0] + [1] * 50, 1, 2, id="the last one lasts"),
     ],
 )
-def test_every_braking_is_told_once(
+def test_every_braking_is_reported_once(
     braking: list[int], before_the_end: int, in_all: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
     brakings = Brakings()

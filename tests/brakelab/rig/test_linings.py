@@ -27,7 +27,7 @@ def truth(front, rear=0.45, change_at=T[-1] + 1.0, then=0.45):
     ("front", "rear", "beyond"),
     [
         (0.45, 0.45, False),
-        (0.36, 0.54, False),  # 20 % off both ways: compensated
+        (0.36, 0.54, False),  # 20 % off in both directions: compensated
         (0.335, 0.45, False),  # -26 %
         (0.32, 0.45, True),  # -29 %: the estimate may be 5 % off its 30 %
         (0.45, 0.28, True),

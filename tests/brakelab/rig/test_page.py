@@ -24,7 +24,7 @@ STRONG = "demand limited: rear linings 39 % above the configured friction"
 )
 def test_a_thing_of_the_car_is_said_once(of_linings: dict[str, list[str]], lines: list[str]) -> None:
     outcomes: list[Any] = [
-        SimpleNamespace(scenario=name, of_linings=told) for name, told in of_linings.items()
+        SimpleNamespace(scenario=name, of_linings=reasons) for name, reasons in of_linings.items()
     ]
     assert by_the_car(outcomes) == lines
 

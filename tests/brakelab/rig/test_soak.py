@@ -24,14 +24,14 @@ def test_forty_seconds_of_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) ->
     assert checks["periods missed"].seen == "4, overslept 4"
 
 
-def test_a_recorder_that_is_too_slow_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_recorder_that_is_too_slow_is_reported(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     create = soak.create_ring
     monkeypatch.setattr(soak, "create_ring", lambda *what: create(*what, slots=100, frames=4096))
     checks = short(monkeypatch, tmp_path)
     assert not checks["cycles and frames that the recorder lost"].good
 
 
-def test_frames_that_are_spoilt_are_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_frames_that_are_spoilt_are_reported(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     drain = soak.Rig.drain
 
     def spoil(rig: soak.Rig, frames, start: int) -> int:
@@ -46,6 +46,6 @@ def test_frames_that_are_spoilt_are_told(monkeypatch: pytest.MonkeyPatch, tmp_pa
     assert not checks["frames that either side did not accept"].good
 
 
-def test_growing_memory_is_told() -> None:
+def test_growing_memory_is_reported() -> None:
     assert soak._growth("x", [50.0, 100.0, 101.0, 103.9], 1).good
     assert not soak._growth("x", [50.0, 100.0, 101.0, 104.1], 1).good

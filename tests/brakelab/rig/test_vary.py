@@ -1,4 +1,4 @@
-"""Many cars: which are driven, which is the worst, and what a wrong `--vary` is told."""
+"""Many cars: which are driven, which is the worst, and the error of a wrong `--vary`."""
 
 import json
 import tomllib
@@ -74,7 +74,7 @@ def test_a_car_is_said_as_a_scenario_takes_it() -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "told"),
+    ("given", "message"),
     [
         ("mas=1..2", "mas: no parameter of a car; did you mean mass"),
         ("mass", "give NAME=LOW..HIGH or NAME=A,B,C"),
@@ -85,10 +85,10 @@ def test_a_car_is_said_as_a_scenario_takes_it() -> None:
         ("mass=1..1e400", "give finite numbers above 0"),
     ],
 )
-def test_a_wrong_range_is_one_line(given: str, told: str) -> None:
+def test_a_wrong_range_is_one_line(given: str, message: str) -> None:
     with pytest.raises(UserError) as caught:
         span(given)
-    assert str(caught.value).startswith(f"--vary: {given}: {told}")
+    assert str(caught.value).startswith(f"--vary: {given}: {message}")
 
 
 def test_a_parameter_is_varied_once() -> None:
@@ -126,7 +126,7 @@ def test_the_run_that_fails_is_named_with_its_car(tmp_path: Path, capsys: pytest
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         (("--runs", "9", "--lock-step"), "--runs: 9: draws from the ranges of --vary; give one"),
         (("--runs", "9", "--lock-step", "--vary", "mass=2000"), "--runs: 9: draws from the ranges of --vary"),
@@ -137,10 +137,10 @@ def test_the_run_that_fails_is_named_with_its_car(tmp_path: Path, capsys: pytest
     ],
 )
 def test_what_does_not_fit_is_refused(
-    arguments: tuple[str, ...], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    arguments: tuple[str, ...], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert rig(tmp_path, *arguments) == 2
-    assert told in capsys.readouterr().err
+    assert message in capsys.readouterr().err
 
 
 def test_verdicts_are_not_written_over_the_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -149,15 +149,15 @@ def test_verdicts_are_not_written_over_the_runs(tmp_path: Path, capsys: pytest.C
     assert f"--junit: {junit}: has the runs themselves" in capsys.readouterr().err
 
 
-def test_a_folder_in_the_place_of_the_results_is_told_before_the_runs(
+def test_a_folder_in_the_place_of_the_results_is_refused_before_the_runs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "out/vary.parquet").mkdir(parents=True)
     assert rig(tmp_path, "--lock-step", "--vary", "mass=1900") == 2
-    told = capsys.readouterr()
-    assert "--out" in told.err
-    assert "which is a folder" in told.err
-    assert "worst" not in told.out
+    message = capsys.readouterr()
+    assert "--out" in message.err
+    assert "which is a folder" in message.err
+    assert "worst" not in message.out
 
 
 def test_a_scenario_that_expects_nothing_is_not_driven(

@@ -133,7 +133,7 @@ def test_frames_are_lost_as_often_as_asked_and_always_the_same() -> None:
     assert sent(0.05, 1) == some != sent(0.05, 2)
 
 
-def test_it_leaves_when_it_is_told_to() -> None:
+def test_it_leaves_when_it_is_stopped() -> None:
     clock = FakeClock()
     bus = FakeBus(clock)
     truth = drive_in_real_time(

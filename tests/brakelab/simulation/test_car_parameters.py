@@ -43,7 +43,7 @@ def test_fewer_wheels_go_before_more_and_shares_are_of_the_drawn_car(names: tupl
 
 
 @pytest.mark.parametrize(
-    ("line", "told"),
+    ("line", "message"),
     [
         ("mas = 1.0", "car: mas: no parameter of a car; did you mean mass"),
         ("mass_fl = 1.0", "car: mass_fl: no parameter of a car"),
@@ -56,12 +56,12 @@ def test_fewer_wheels_go_before_more_and_shares_are_of_the_drawn_car(names: tupl
         ('mass = "80"', 'car: mass: give a number, or a share of the drawn one, "80 %"'),
     ],
 )
-def test_a_mistake_is_one_line(tmp_path: Path, line: str, told: str) -> None:
+def test_a_mistake_is_one_line(tmp_path: Path, line: str, message: str) -> None:
     phase = '[[phase]]\nkind = "coast"\nseconds = 1.0\n'
     (tmp_path / "s.toml").write_text(f'plant = "suv"\ninitial_speed = 8.0\n{phase}[car]\n{line}\n')
     with pytest.raises(UserError) as caught:
         load_scenario(tmp_path / "s.toml")
-    assert told in str(caught.value)
+    assert message in str(caught.value)
     assert "\n" not in str(caught.value)
 
 

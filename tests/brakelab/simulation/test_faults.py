@@ -42,7 +42,7 @@ def identifier(name: str) -> int:
     return Fault(kind="lost", t=0.0, message=[name]).ids()[0]
 
 
-def way(fault: dict[str, Any], cycles: int, name: str = "Imu") -> list[list[int]]:
+def frames_sent(fault: dict[str, Any], cycles: int, name: str = "Imu") -> list[list[int]]:
     """Return which numbers arrive in each cycle of 10 ms when one frame numbered by its cycle is sent."""
     records, link, noise = fault_records([Fault(**fault)]), new_link(), np.random.default_rng(0)
     frames = new_record(FRAME)
@@ -55,7 +55,7 @@ def way(fault: dict[str, Any], cycles: int, name: str = "Imu") -> list[list[int]
     return arrived
 
 
-WAYS = {
+FRAMES_SENT = {
     "lost": ({"kind": "lost", "t": 0.02, "duration": 0.02}, [[0], [1], [], [], [4], [5]]),
     "doubled": ({"kind": "doubled", "t": 0.02, "duration": 0.02}, [[0], [1], [2, 2], [3, 3], [4], [5]]),
     "late": ({"kind": "late", "t": 0.01, "duration": 0.02, "delay": 0.02}, [[0], [], [], [1], [2, 3, 4]]),
@@ -70,11 +70,11 @@ WAYS = {
 }
 
 
-@pytest.mark.parametrize("case", WAYS)
+@pytest.mark.parametrize("case", FRAMES_SENT)
 def test_what_arrives(case: str) -> None:
-    fault, expected = WAYS[case]
+    fault, expected = FRAMES_SENT[case]
     name = "PressureDemandFront" if case == "not the ECU's" else "Imu"
-    assert way(fault, len(expected), name) == expected
+    assert frames_sent(fault, len(expected), name) == expected
 
 
 def test_jitter_is_a_normal_draw_that_keeps_the_order() -> None:
@@ -101,7 +101,7 @@ def test_jitter_is_a_normal_draw_that_keeps_the_order() -> None:
 
 
 def test_a_share_of_the_frames_is_hit() -> None:
-    kept = sum(map(len, way({"kind": "lost", "t": 0.0, "share": 0.25}, 4000)))
+    kept = sum(map(len, frames_sent({"kind": "lost", "t": 0.0, "share": 0.25}, 4000)))
     print(f"{kept} of 4000 frames kept")
     assert kept == pytest.approx(3000, abs=4 * (4000 * 0.25 * 0.75) ** 0.5)
 
@@ -269,7 +269,7 @@ def test_a_wheel_speed_lies_as_asked_and_no_longer(tmp_path: Path, fault: str, e
         ("calliper_pressure_fl", 3.0, "", 0, 0.0),
     ],
 )
-def test_a_sensor_that_contradicts_the_others_is_told_and_not_followed(
+def test_a_sensor_that_contradicts_the_others_is_reported_and_not_followed(
     tmp_path: Path, signal: str, amount: float, keys: str, bit: int, after: float
 ) -> None:
     fault = f'kind = "biased"\nsignal = ["{signal}"]\namount = {amount}'

@@ -16,7 +16,7 @@ def changed(table: str, **values: float) -> Config:
 
 
 @pytest.mark.parametrize(
-    ("config", "plant", "told"),
+    ("config", "plant", "message"),
     [
         (load_config(SUV), None, ""),
         (load_config(SUV), "suv14", ""),
@@ -30,11 +30,13 @@ def changed(table: str, **values: float) -> Config:
         (load_config(resource("config/lcv.toml")), None, "mass +11 %"),
     ],
 )
-def test_another_car_than_the_configured_one_is_named(config: Config, plant: str | None, told: str) -> None:
+def test_another_car_than_the_configured_one_is_named(
+    config: Config, plant: str | None, message: str
+) -> None:
     scenario = load_scenario(resource("config/scenarios/single.toml"))
     line = other_car(with_plant(scenario, plant), config)
-    assert told in line
-    assert bool(line) == bool(told)
+    assert message in line
+    assert bool(line) == bool(message)
 
 
 def test_a_payload_is_not_another_car() -> None:

@@ -66,14 +66,14 @@ def test_a_unit_that_is_another_quantity_is_refused() -> None:
 
 
 @pytest.mark.requirement("REQ-IN-2")
-def test_a_fault_is_told_by_its_bit_in_time(ecu, plant) -> None:
+def test_a_fault_is_reported_by_its_bit_in_time(ecu, plant) -> None:
     plant.fault("lost", message=["Imu"], t=1.0, duration=0.5)
     plant.drive(STOP, seed=1)
-    ecu.told("IMU lost", within_ms=150)
+    ecu.reported("IMU lost", within_ms=150)
     with pytest.raises(AssertionError, match=r"FAILED: IMU lost within 0.02 s of fault 1 \(found: after 0"):
-        ecu.told("IMU lost", within_ms=20)
+        ecu.reported("IMU lost", within_ms=20)
     with pytest.raises(AssertionError, match="never"):
-        ecu.told("pedal lost", within_ms=500)
+        ecu.reported("pedal lost", within_ms=500)
     ecu.shows("recovered", within=0.3)
     assert "mu_b_fl" in ecu.columns
     assert "distance" in plant.columns
@@ -119,8 +119,8 @@ def test_nothing_is_near_a_signal_where_it_has_no_row() -> None:
         (lambda ecu, plant: plant.fault("lots", t=1.0), "fault: kind"),
         (lambda ecu, plant: plant.fault("lost"), "fault: t: missing"),
         (lambda ecu, plant: (plant.drive(STOP), ecu["mu_b"]), "mu_b: no such column; did you mean mu_b_"),
-        (lambda ecu, plant: (plant.drive(STOP), ecu.told("IMU gone", 9)), "did you mean IMU lost"),
-        (lambda ecu, plant: (plant.drive(STOP), ecu.told("IMU lost", 9)), "there is none; give t"),
+        (lambda ecu, plant: (plant.drive(STOP), ecu.reported("IMU gone", 9)), "did you mean IMU lost"),
+        (lambda ecu, plant: (plant.drive(STOP), ecu.reported("IMU lost", 9)), "there is none; give t"),
     ],
 )  # fmt: skip
 def test_a_mistake_is_one_line(ecu, plant, wrong, line: str) -> None:

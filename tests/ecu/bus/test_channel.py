@@ -255,7 +255,9 @@ def test_what_another_group_sends_while_a_channel_is_opened_is_not_heard(monkeyp
     def begin_slowly(**arguments):
         bus = begin(**arguments)
         other.send(frame(0x10), 1)
-        assert select.select([bus.fileno()], [], [], 60)[0]  # Linux hands it over until told not to
+        assert select.select([bus.fileno()], [], [], 60)[
+            0
+        ]  # Linux hands it over until the socket option forbids it
         return bus
 
     monkeypatch.setattr(can, "Bus", begin_slowly)
@@ -323,7 +325,7 @@ def test_only_socketcan_on_linux_is_drained_past_python_can(monkeypatch, interfa
     assert isinstance(found, GenericChannel) is not drains_itself
 
 
-def test_classical_data_frames_are_read_until_none_comes_and_a_bus_that_is_gone_is_told():
+def test_classical_data_frames_are_read_until_none_comes_and_a_bus_that_is_gone_is_reported():
     bus = ScriptedBus()
     other = [{"is_error_frame": True}, {"is_remote_frame": True, "data": None}, {"is_fd": True}]
     bus.heard = [

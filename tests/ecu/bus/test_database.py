@@ -61,7 +61,7 @@ def test_names_that_are_missing_get_a_hint(contract: Path) -> None:
         find_signal(database.get_message_by_name("Imu"), "accel_z", contract, Path("map.toml"), "x.signal")
 
 
-def test_a_message_without_signals_is_told(tmp_path: Path) -> None:
+def test_a_message_without_signals_is_reported(tmp_path: Path) -> None:
     (tmp_path / "car.dbc").write_text('VERSION ""\nBU_: A\nBO_ 10 Empty: 8 A\n')
     (empty,) = load_database(tmp_path / "car.dbc").messages
     with pytest.raises(UserError, match="message Empty has no signal v; it has none that can be read"):
@@ -126,14 +126,16 @@ def test_a_diagnostics_database_is_refused(tmp_path: Path, monkeypatch: pytest.M
         load_database(path)
 
 
-@pytest.mark.parametrize(("start", "told"), [(0, ""), (60, "M.which: start bit, length or scale is wrong")])
-def test_the_multiplexer_of_a_signal_has_to_be_readable_too(tmp_path: Path, start: int, told: str) -> None:
+@pytest.mark.parametrize(
+    ("start", "message"), [(0, ""), (60, "M.which: start bit, length or scale is wrong")]
+)
+def test_the_multiplexer_of_a_signal_has_to_be_readable_too(tmp_path: Path, start: int, message: str) -> None:
     path = tmp_path / "car.dbc"
     which = f' SG_ which M : {start}|8@1+ (1,0) [0|0] "" A\n'
     path.write_text(HEAD + f'BO_ 1 M: 8 A\n{which} SG_ one m1 : 8|8@1+ (1,0) [0|0] "" A\n')
     message = load_database(path, strict=False).messages[0]
-    if told:
-        with pytest.raises(UserError, match=told):
+    if message:
+        with pytest.raises(UserError, match=message):
             find_signal(message, "one", path, path, "x")
     else:
         assert find_signal(message, "one", path, path, "x").name == "one"

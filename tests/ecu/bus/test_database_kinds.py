@@ -90,7 +90,7 @@ def overlapping(kind: str) -> str:
 
 
 @pytest.mark.parametrize("kind", TEXT)
-def test_overlapping_signals_are_told_with_message_and_signal(tmp_path: Path, kind: str) -> None:
+def test_overlapping_signals_are_reported_with_message_and_signal(tmp_path: Path, kind: str) -> None:
     said = refusal(tmp_path, kind, overlapping(kind))
     remedy = "if that is meant, set strict = false in the map"
     assert re.fullmatch(
@@ -100,7 +100,7 @@ def test_overlapping_signals_are_told_with_message_and_signal(tmp_path: Path, ki
 
 
 @pytest.mark.parametrize("kind", ["kcd", "arxml"])
-def test_a_truncated_file_is_told_with_line_and_column(tmp_path: Path, kind: str) -> None:
+def test_a_truncated_file_is_reported_with_line_and_column(tmp_path: Path, kind: str) -> None:
     lines = TEXT[kind].splitlines()
     half = len(lines) // 2
     said = refusal(tmp_path, kind, "\n".join(lines[:half]))

@@ -1,4 +1,4 @@
-"""A database with mistakes: all are told at once, each with its line, and spoil their own message alone."""
+"""A database with mistakes: all are reported at once with their lines, and spoil their own message alone."""
 
 import pickle
 from pathlib import Path
@@ -31,7 +31,7 @@ period = 0.01
 wheel_speed_fl = { message = "Wheels", signal = "v_fl" }
 wheel_speed_fr = { message = "Wheels", signal = "v_fr" }
 """
-# the text before, after, and what is told of it
+# the text before, after, and the error message
 MISTAKES = {
     "overlap": (
         "b : 8|8@1+",
@@ -62,29 +62,29 @@ def written(folder: Path, text: str) -> Path:
 
 
 @pytest.mark.parametrize("case", MISTAKES)
-def test_a_mistake_elsewhere_is_told_and_the_map_works(tmp_path: Path, case: str) -> None:
-    before, after, told = MISTAKES[case]
+def test_a_mistake_elsewhere_is_reported_and_the_map_works(tmp_path: Path, case: str) -> None:
+    before, after, message = MISTAKES[case]
     path = written(tmp_path, GOOD.replace(before, after))
     said: list[str] = []
     plan = receive_plan(tmp_path / "map.toml", said.append)
     assert [str(message["name"]) for message in plan.messages] == ["Wheels"]
     (line,) = said
-    assert line.startswith(f"{path}: {told.partition(';')[0]}")
+    assert line.startswith(f"{path}: {message.partition(';')[0]}")
     assert line.endswith("; 1 message left out, which the map does not use")
     with pytest.raises(Mistakes) as refusal:
         load_database(path)
-    assert str(refusal.value).startswith(f"{path}: {told}")
+    assert str(refusal.value).startswith(f"{path}: {message}")
 
 
 @pytest.mark.parametrize("case", MISTAKES)
 def test_a_mistake_in_a_message_of_the_map_refuses_it(tmp_path: Path, case: str) -> None:
-    before, after, told = MISTAKES[case]
+    before, after, message = MISTAKES[case]
     written(tmp_path, GOOD.replace(before, after))
     other = MAP.replace("Wheels", "Other").replace("v_fl", "a").replace("v_fr", "a")
     (tmp_path / "map.toml").write_text(other)
     with pytest.raises(Mistakes) as refusal:
         load_signal_map(tmp_path / "map.toml")
-    assert told in str(refusal.value)
+    assert message in str(refusal.value)
 
 
 def test_a_message_defined_twice_is_refused_where_it_is_used(tmp_path: Path) -> None:
@@ -94,7 +94,7 @@ def test_a_message_defined_twice_is_refused_where_it_is_used(tmp_path: Path) -> 
         load_signal_map(tmp_path / "map.toml")
 
 
-def test_all_mistakes_are_told_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_all_mistakes_are_reported_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Of the messages that the map uses; one that it does not use is none of its business."""
     text = GOOD.replace("v_fr : 16|16", "v_fr : 8|16").replace("b : 8|8@1+", "b : 4|8@1+")
     more = ' SG_ far : 60|8@1+ (1,0) [0|0] "" A\n SG_ odd : 50|2@1+ (.5,0) [0|0] "" A\n'
@@ -109,7 +109,7 @@ def test_all_mistakes_are_told_at_once(tmp_path: Path, capsys: pytest.CaptureFix
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "told"),
+    ("before", "after", "message"),
     [
         ("8 A\n SG_ v_fl : 0|16", "8 A SG_ v_fl : 0|0", "v_fl length 0 is not greater than 0"),
         ("BO_ 1 W", "BO_ 9999 W", "id 0x270f is more than 11 bits in message Wheels"),
@@ -117,10 +117,10 @@ def test_all_mistakes_are_told_at_once(tmp_path: Path, capsys: pytest.CaptureFix
     ids=["no line of its own", "no identifier"],
 )
 def test_what_spoils_no_signal_s_line_refuses_the_database(
-    tmp_path: Path, before: str, after: str, told: str
+    tmp_path: Path, before: str, after: str, message: str
 ) -> None:
     path = written(tmp_path, GOOD.replace(before, after))
-    with pytest.raises(Mistakes, match=rf"^{path}: .*{told}"):
+    with pytest.raises(Mistakes, match=rf"^{path}: .*{message}"):
         read_database(path)
 
 

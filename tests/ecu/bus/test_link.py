@@ -132,7 +132,7 @@ def loud_after(intervals_ms: list[float], statuses: list[int], period_ms: float 
     k = 0
     while t - start < 60_000.0:
         if judge_link(state, statuses[k % len(statuses)], int(t * MS), period, period):
-            assert state["told_ns"] == int(t * MS)
+            assert state["reported_ns"] == int(t * MS)
             return t - start
         t += intervals_ms[k % len(intervals_ms)]
         k += 1
@@ -162,10 +162,10 @@ def test_when_a_stream_is_loud(
 ) -> None:
     after = loud_after(intervals, statuses)
     if low is None or high is None:
-        assert after is None, f"{what}: told after {after} ms"
+        assert after is None, f"{what}: reported after {after} ms"
     else:
         assert after is not None, what
-        assert low <= after <= high, f"{what}: told after {after} ms"
+        assert low <= after <= high, f"{what}: reported after {after} ms"
 
 
 def test_a_period_without_a_frame_is_a_check() -> None:
@@ -233,11 +233,11 @@ def test_errors_alone_are_no_crowd_at_the_senders_rate() -> None:
     assert not any(judge_link(state, P_ERROR, (1000 + 10 * k) * MS, PERIOD, PERIOD) for k in range(100))
 
 
-def test_the_seventeenth_frame_of_a_crowd_is_told_and_four_more_at_its_rate() -> None:
+def test_the_seventeenth_frame_of_a_crowd_is_reported_and_four_more_at_its_rate() -> None:
     """Beyond 16 periods; it empties by 1.25 a period, and each frame adds one."""
     state = new_link()
     loud = [bool(judge_link(state, P_OK, 1000 * MS, PERIOD, PERIOD)) for _ in range(100)]
     assert loud == [False] * 16 + [True] * 84
     after = [bool(judge_link(state, P_OK, (1010 + 10 * k) * MS, PERIOD, PERIOD)) for k in range(8)]
     assert after == [True] * 3 + [False] * 5
-    assert state["told_ns"] == 1030 * MS
+    assert state["reported_ns"] == 1030 * MS

@@ -265,7 +265,7 @@ def test_what_is_surely_its_sender_s_is_learned_from(what: Any, unsure: bool) ->
 
     assert not run(30)
     assert run(100, what) is unsure
-    assert run(99) is unsure, "told for a second"
+    assert run(99) is unsure, "reported for a second"
     assert not run(20)
 
 

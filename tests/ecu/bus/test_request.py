@@ -140,9 +140,9 @@ def test_a_replayed_release_never_lowers_the_demand(phase: int, lost: int, begin
             inputs = duel(phase, lost, offset, deadline, 100 * phase + lost, begin)
             demand = np.delete(asked(inputs), (0, 1, begin))
             assert demand.min() == pytest.approx(3.0), (offset, deadline)
-            told = inputs["e2e_faults"] == E2E_REJECTIONS
-            assert not told[:begin].any()
-            assert told[begin + 25 :].all(), "told after a quarter of a second at most"
+            reported = inputs["e2e_faults"] == E2E_REJECTIONS
+            assert not reported[:begin].any()
+            assert reported[begin + 25 :].all(), "reported after a quarter of a second at most"
 
 
 @pytest.mark.parametrize("phase", range(15))

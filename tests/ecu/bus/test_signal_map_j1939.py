@@ -170,7 +170,7 @@ def test_a_request_that_leaves_is_what_arrives_at_the_other_end(
 
 
 @pytest.mark.parametrize(
-    ("car", "old", "new", "told"),
+    ("car", "old", "new", "message"),
     [
         ("van", "[messages.EBC1]\nsource = 0x0B", "", "messages.EBC1.source: missing, and the data"),
         ("van", "source = 0x21", "source = 254", "messages.AMB.source: give a value of at most 253"),
@@ -178,12 +178,12 @@ def test_a_request_that_leaves_is_what_arrives_at_the_other_end(
         ("mustang", "[messages.WheelSpeed]", "[messages.WheelSpeed]\nsource = 11", "source and priority are"),
     ],
 )  # fmt: skip
-def test_a_mistake_is_one_line(tmp_path: Path, car: str, old: str, new: str, told: str) -> None:
+def test_a_mistake_is_one_line(tmp_path: Path, car: str, old: str, new: str, message: str) -> None:
     text = resource(f"config/maps/{car}.toml").read_text("utf-8")
     assert old in text
     text = text.replace(old, new).replace("../../dbc/cars", str(resource("dbc/cars/j1939.dbc").parent))
     (tmp_path / "car.toml").write_text(text)
     with pytest.raises(UserError) as caught:
         transmit_plan(tmp_path / "car.toml", load_signal_map(tmp_path / "car.toml").plan)
-    assert told in str(caught.value)
+    assert message in str(caught.value)
     assert "\n" not in str(caught.value)

@@ -99,10 +99,10 @@ ERRORS = {
 @pytest.mark.parametrize(("number", "expected"), ERRORS.items(), ids=errno.errorcode.get)
 def test_an_error_tells_whether_the_interface_is_down_or_gone(number, expected):
     memory, status = socketcan.new_socket(), new_record(socketcan.STATUS)
-    told = np.array([number], np.int32)
+    code = np.array([number], np.int32)
     socketcan._note_error(memory.line)  # of whatever: afterwards it compiles nothing
     memory.line[:] = 0
-    memcpy(errno_location(), told.ctypes.data, 4)
+    memcpy(errno_location(), code.ctypes.data, 4)
     socketcan._note_error(memory.line)
     socketcan.read_status(memory, status[0])
     assert (bool(status["bus_off"][0]), bool(memory.line[socketcan._GONE])) == expected

@@ -60,7 +60,7 @@ def test_each_has_a_number_of_its_own_in_the_manufacturers_range():
         ("speaks", 0x0123, math.nan, "00"),
     ],
 )
-def test_numbers_and_bytes_that_testers_were_told(name, number, values, text):
+def test_numbers_and_bytes_that_testers_rely_on(name, number, values, text):
     one = BY_NAME[name]
     assert one.number == number
     assert to_bytes(one, {name: np.array(values)}).hex(" ").upper() == text

@@ -88,7 +88,7 @@ def test_a_daemon_that_is_silent_does_not_answer(speaks, begin):
     assert ask(server, "3E 00") == ["7E 00"] * speaks
 
 
-def test_a_clear_is_told_to_be_pending_and_is_stored(begin):
+def test_a_clear_is_answered_pending_and_is_stored(begin):
     run, server = begin()
     run.publish(20, active_faults=LATE)
     assert ask(server, "14 FF FF FF") == ["7F 14 78", "54"]

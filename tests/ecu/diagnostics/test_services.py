@@ -247,7 +247,7 @@ def test_a_clear_that_cannot_be_stored_is_no_success(tester, world):
         ("", True, ""),
     ],
 )
-def test_a_response_that_may_be_late_is_told_to_be_pending(request_, lasts, first, tester):
+def test_a_response_that_may_be_late_is_preceded_by_pending(request_, lasts, first, tester):
     ecu = tester(clearing_lasts=lasts).ecu
     assert pending(bytes.fromhex(request_), ecu) == bytes.fromhex(first)
 

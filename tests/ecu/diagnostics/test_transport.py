@@ -47,7 +47,7 @@ def turn(*links, turns=300):
 
 @pytest.mark.parametrize("length", [1, 7, 8, 62, 63, 500, 4095])
 @pytest.mark.parametrize("request_id", [0x7E0, 0x18DA28F1])
-def test_a_message_arrives_whole_both_ways(length, request_id, ends):
+def test_a_message_arrives_whole_in_both_directions(length, request_id, ends):
     ecu, tester, _ = ends(request_id, request_id + 8)
     text = bytes(number & 0xFF for number in range(length))
     for sender, receiver in ((tester, ecu), (ecu, tester)):

@@ -92,7 +92,7 @@ def test_real_time_deadlines_are_whole_microseconds_on_the_same_grid():
 
 @pytest.mark.parametrize("step_s", [0.05, -0.05, 3600, -3600, 31_536_000, -31_536_000])
 @pytest.mark.requirement("REQ-LOOP-4")
-def test_a_clock_that_was_set_is_told_and_moves_no_deadline(step_s):
+def test_a_clock_that_was_set_is_reported_and_moves_no_deadline(step_s):
     time = FakeTime()
     grid = Grid(time.source())
     before = grid.wait()

@@ -1,4 +1,4 @@
-"""What `run --diagnostics` is refused for before it starts, and what its process is told."""
+"""What `run --diagnostics` is refused for before it starts, and the arguments of its process."""
 
 import sys
 from pathlib import Path

@@ -17,21 +17,21 @@ def manager(tmp_path, monkeypatch):
         yield listening
 
 
-def test_the_service_manager_hears_what_it_is_told(manager):
+def test_the_service_manager_receives_what_is_sent(manager):
     assert Manager({"NOTIFY_SOCKET": "notify"}).tell("READY=1")
     assert manager.recv(64) == b"READY=1"
 
 
-@pytest.mark.parametrize(("environment", "told"), [({"NOTIFY_SOCKET": "gone"}, False), ({}, True)])
-def test_one_that_is_gone_or_never_asked_is_no_matter(environment, told, tmp_path, monkeypatch):
+@pytest.mark.parametrize(("environment", "sent"), [({"NOTIFY_SOCKET": "gone"}, False), ({}, True)])
+def test_one_that_is_gone_or_never_asked_is_no_matter(environment, sent, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert Manager(environment).tell("READY=1") is told
+    assert Manager(environment).tell("READY=1") is sent
 
 
 def test_one_that_does_not_read_holds_nobody_up(manager):
-    told = [Manager({"NOTIFY_SOCKET": "notify"}).tell("WATCHDOG=1") for _ in range(10_000)]
-    assert told[0]
-    assert not told[-1]
+    sent = [Manager({"NOTIFY_SOCKET": "notify"}).tell("WATCHDOG=1") for _ in range(10_000)]
+    assert sent[0]
+    assert not sent[-1]
 
 
 # environment -> cycles between two signs of life: at most half of what systemd waits

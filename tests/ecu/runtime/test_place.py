@@ -42,7 +42,7 @@ def test_an_end_that_is_not_there_is_one_line_and_tried_again():
     assert "is down" in lines[0]["reason"]
 
 
-def test_an_end_that_goes_is_told_each_time():
+def test_an_end_that_goes_is_reported_each_time():
     wires = [Wire(), Wire()]
     place, clock = place_of(*wires)
     with structlog.testing.capture_logs() as lines:

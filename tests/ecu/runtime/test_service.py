@@ -20,8 +20,8 @@ LOOP = (clock, cycle, notify, regulation, service, side, step)
 @pytest.mark.requirement("REQ-LOOP-1")
 def test_what_runs_in_the_loop_neither_logs_nor_prints(module):
     source = inspect.getsource(module)
-    for way in ("structlog", "print(", "sys.stderr", "logging.getLogger"):
-        assert way not in source
+    for output in ("structlog", "print(", "sys.stderr", "logging.getLogger"):
+        assert output not in source
 
 
 class Bus:

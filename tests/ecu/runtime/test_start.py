@@ -21,12 +21,12 @@ from ecu.runtime.start import (
 )
 
 
-def test_each_compilation_is_told_before_it_begins():
-    told = []
-    counter = CompileCounter(told.append)
+def test_each_compilation_is_reported_before_it_begins():
+    reported = []
+    counter = CompileCounter(reported.append)
     for result in (1, 2):
         numba.njit(lambda result=result: result)()
-    assert (told, counter.count) == ([0, 1], 2)
+    assert (reported, counter.count) == ([0, 1], 2)
 
 
 @pytest.mark.requirement("REQ-LOOP-6")

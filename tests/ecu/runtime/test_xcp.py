@@ -1,4 +1,4 @@
-"""What `run --xcp` is refused for before it starts, and what its process is told."""
+"""What `run --xcp` is refused for before it starts, and the arguments of its process."""
 
 import pytest
 

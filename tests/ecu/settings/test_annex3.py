@@ -88,8 +88,8 @@ def test_what_is_just_enough_is_enough(tmp_path: Path, values) -> None:
 def test_the_check_names_it_beside_the_figures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = written(tmp_path, max_pressure="60.0")
     assert cli.main(["config", "check", str(path)]) == 2
-    told = capsys.readouterr()
-    assert "10.00 m/s^2, the linings alone brake by 5.19 m/s^2 (6.43 in 2.1.1)" in told.out
-    assert told.err.startswith(
+    printed = capsys.readouterr()
+    assert "10.00 m/s^2, the linings alone brake by 5.19 m/s^2 (6.43 in 2.1.1)" in printed.out
+    assert printed.err.startswith(
         f"brake-ecu: {path}: control.max_pressure: the linings brake the car, laden, by"
     )

@@ -26,7 +26,7 @@ def changed(to: Path, **values: str) -> Path:
     return out
 
 
-def test_all_mistakes_are_told_at_once_unknown_keys_first(
+def test_all_mistakes_are_reported_at_once_unknown_keys_first(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = changed(
@@ -58,7 +58,7 @@ def test_other_commands_tell_the_first_and_how_many_more(
 
 
 @pytest.mark.parametrize("path", CARS, ids=lambda path: path.stem)
-def test_a_shipped_car_is_told_in_figures(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_shipped_car_is_described_in_figures(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["config", "check", str(path)]) == 0
     out = capsys.readouterr().out
     assert out.endswith("nothing wrong\n")
@@ -106,7 +106,7 @@ def test_a_road_holds_the_demand_at_which_the_first_axle_uses_all_of_it(
     assert held[0 if road == 0.2 else 2] == pytest.approx(demand, abs=0.06)
 
 
-def test_the_whole_pedal_is_told_with_the_adhesion_that_it_needs() -> None:
+def test_the_whole_pedal_is_reported_with_the_adhesion_that_it_needs() -> None:
     """10 m/s^2 at the ideal distribution: both axles use 10 / 9.81."""
     config = load_config(CONFIGS / "suv.toml")
     said = grip(new_params(config)[0], config.vehicle.loads()[0])

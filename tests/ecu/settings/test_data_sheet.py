@@ -1,4 +1,4 @@
-"""Answers from a data sheet: units, ranges, sizes of tyres; what is wrong is told with the remedy."""
+"""Answers from a data sheet: units, ranges, sizes of tyres; a wrong answer is reported with the remedy."""
 
 import pytest
 
@@ -52,7 +52,7 @@ def test_an_answer_is_read_in_its_unit(key: str, text: str, value: object) -> No
         ("name", 'a "b"', "give a word"),
     ],
 )
-def test_a_wrong_answer_is_told_with_what_would_be_right(key: str, text: str, says: str) -> None:
+def test_a_wrong_answer_is_reported_with_what_would_be_right(key: str, text: str, says: str) -> None:
     with pytest.raises(UserError) as error:
         parse_answer(BY_KEY[key], text, "--set")
     assert str(error.value).startswith(f"--set: {key}: ")

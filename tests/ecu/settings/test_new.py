@@ -1,4 +1,4 @@
-"""`config new`: the shipped cars come out again from their data sheets; what is missing or wrong is told."""
+"""`config new`: the shipped cars come out again from data sheets; what is missing or wrong is reported."""
 
 import io
 from pathlib import Path
@@ -85,7 +85,7 @@ def test_the_file_passes_the_check_and_names_the_origin_of_every_line(
     assert car.front.effective_radius == pytest.approx((0.288 - 0.057) / 2)
 
 
-def test_what_is_missing_is_told_whole(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_everything_that_is_missing_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(tmp_path / "car.toml", "vehicle.mass=1400", "vehicle.wheelbase=2620") == 2
     said = capsys.readouterr().err
     assert "missing: vehicle.front_load [kg] or vehicle.front_axle [mm], front.tyre, front.calliper" in said

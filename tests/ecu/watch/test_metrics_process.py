@@ -78,7 +78,7 @@ def test_a_port_that_is_taken_is_tried_again(monkeypatch, capsys):
 
 
 def test_it_ends_with_its_parent(tmp_path):
-    """The parent that it is told of is not the one it has."""
+    """The process has another parent than its arguments name."""
     command = [sys.executable, "-m", "ecu.watch.metrics_process", "--ring", str(tmp_path / "no.ring")]
     command += ["--metrics", "127.0.0.1:1", "--parent", str(os.getpid() + 1)]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}

@@ -36,7 +36,7 @@ def test_it_waits_for_a_daemon_and_attaches_by_itself(loop, clock, rings):
     assert watcher.history.events[0].text == "attached to suv on socketcan can0, process 4711"
 
 
-def test_a_daemon_that_ends_is_told_and_the_next_one_is_attached_to(loop, clock):
+def test_a_daemon_that_ends_is_reported_and_the_next_one_is_attached_to(loop, clock):
     watcher, one = Watcher("4711", clock), loop()
     one.publish(8)
     turn(watcher, clock)
@@ -75,7 +75,7 @@ def test_a_name_that_no_daemon_answers_to(loop, clock):
     assert one
 
 
-def test_what_happened_before_it_was_attached_is_told_before(loop, clock):
+def test_what_happened_before_it_was_attached_is_reported_first(loop, clock):
     one, watcher = loop(), Watcher(None, clock)
     one.publish(300)
     one.publish(300, mode=2)

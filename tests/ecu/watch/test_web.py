@@ -61,24 +61,24 @@ def test_every_viewer_gets_all_rows_and_then_the_new_ones(watched):
     one, shared, port = watched
     viewers = [ask(port, "GET", "/stream") for _ in range(3)]
     for viewer in viewers:
-        told = news(viewer)
-        assert len(told["rows"]) == 20
-        assert told["daemon"] == "suv on socketcan can0, process 4711"
-        row = dict(zip(COLUMNS, told["rows"][-1], strict=True))
+        status = news(viewer)
+        assert len(status["rows"]) == 20
+        assert status["daemon"] == "suv on socketcan can0, process 4711"
+        row = dict(zip(COLUMNS, status["rows"][-1], strict=True))
         assert (row["vehicle_speed"], row["mu_b_fl"], row["mu_b_fr"]) == (20.0, 0.41, None)
         assert row["clock"] == pytest.approx(1_800_000_000.79)
     one.find("accel_x", value=-3.0, innovation=0.5, sigma=0.1, ratio=2.7, judged_s=0.05, unused_s=0.0)
     one.publish(8, vehicle_speed=19.0)
     shared.turn()
     for viewer in viewers:
-        told = news(viewer)
-        assert [row[COLUMNS.index("vehicle_speed")] for row in told["rows"]] == [19.0, 19.0]
-        assert told["inputs"] == [["accel_x", "m/s^2", -3.0, 0.5, 0.1, 2.7, 0.05, False, 0.0]]
-        assert (told["cycles"], sum(told["lateness"])) == (88, 88)
+        status = news(viewer)
+        assert [row[COLUMNS.index("vehicle_speed")] for row in status["rows"]] == [19.0, 19.0]
+        assert status["inputs"] == [["accel_x", "m/s^2", -3.0, 0.5, 0.1, 2.7, 0.05, False, 0.0]]
+        assert (status["cycles"], sum(status["lateness"])) == (88, 88)
         viewer.close()
 
 
-def test_the_end_of_the_daemon_is_told(watched):
+def test_the_end_of_the_daemon_is_reported(watched):
     one, shared, port = watched
     viewer = ask(port, "GET", "/stream")
     news(viewer)

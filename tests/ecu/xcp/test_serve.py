@@ -124,7 +124,7 @@ def test_without_room_cycles_wait_in_the_ring(run, server, wire):
     assert [value for *_, value in found] == [float(n) for n in range(1000) for _ in range(2)]
 
 
-def test_what_the_ring_has_lost_is_told(run, server, wire):
+def test_what_the_ring_has_lost_is_reported(run, server, wire):
     run.publish(1)
     measure(server, wire)
     wire.room = 0

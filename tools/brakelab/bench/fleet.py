@@ -145,7 +145,7 @@ def _simulated(kilometres: float) -> list[Chain]:
 def distance(kilometres: float, minutes: float, workers: int) -> None:
     """Print the distance simulated in `minutes` or until Ctrl-C, and the time needed for `kilometres`."""
     done: list[dict[str, Any]] = []
-    driven = wall = told = 0.0
+    driven = wall = due = 0.0
     chains = _simulated(kilometres)
     with TemporaryDirectory() as folder, _warm(workers, chains, simulate_and_replay) as crew:
         work = time.process_time() + _of_workers()[0]
@@ -155,8 +155,8 @@ def distance(kilometres: float, minutes: float, workers: int) -> None:
                 done.append(summary)
                 driven += 1e-3 * summary.get("distance", 0.0)
                 wall = time.perf_counter() - began
-                if wall > told:
-                    told = wall + TELL_S
+                if wall > due:
+                    due = wall + TELL_S
                     print(f"{wall:.0f} s: {len(done)} drives, {driven:.0f} km", file=sys.stderr, flush=True)
                 if wall > 60.0 * minutes or driven >= kilometres:
                     break

@@ -70,9 +70,9 @@ def run(
 ) -> int:
     """Run a programme on the dynamometer. Record at 200 Hz; the pad follows none of the friction laws."""
     from brakelab.identify.friction import command
-    from ecu.compiling import compiling_told
+    from ecu.compiling import report_compiling
 
-    with compiling_told():
+    with report_compiling():
         return command.run(programme, brake, seed, out, law, linings)
 
 

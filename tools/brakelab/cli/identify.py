@@ -46,9 +46,9 @@ def friction(
 ) -> int:
     """Identify a friction law from dynamometer recordings. Fit all laws, choose one, state its limits."""
     from brakelab.identify.friction import command
-    from ecu.compiling import compiling_told
+    from ecu.compiling import report_compiling
 
-    with compiling_told():
+    with report_compiling():
         return command.friction(data, columns, held_out, out, profile, tuple(own or ()))
 
 

@@ -17,10 +17,10 @@ from brakelab.fleet.statistics import (
     Vehicles,
     Weeks,
     by_week,
+    lines_of,
     notes,
     outliers,
     per_vehicle,
-    told,
     values_of,
 )
 from brakelab.fleet.wear import Due, pads_due
@@ -59,7 +59,7 @@ def write_page(done: Sequence[Summary], out: Path) -> None:
             "due_left": max(len(due) - ROWS, 0),
             "outliers": outliers(vehicles)[:ROWS],
             "failed": [
-                Note(row["vehicle"], row["drive"], told(row, "fault")) for row in done if row["fault"]
+                Note(row["vehicle"], row["drive"], lines_of(row, "fault")) for row in done if row["fault"]
             ],
             "noted": notes(good),
             "few": len(vehicles.names) <= FEW,

@@ -133,7 +133,7 @@ def outliers(vehicles: Vehicles) -> list[Outlier]:
     return sorted(found, key=lambda outlier: -abs(outlier.score))
 
 
-def told(row: Summary, column: str) -> list[str]:
+def lines_of(row: Summary, column: str) -> list[str]:
     """Return the lines of `fault` or `notes` without the names of the logs, implied by the drive's."""
     text = row[column]
     for log in row["logs"].splitlines():
@@ -144,11 +144,11 @@ def told(row: Summary, column: str) -> list[str]:
 def notes(done: Sequence[Summary]) -> list[Note]:
     """Return the peculiarities of a drive's logs, not shared by more than half of the vehicle's drives."""
     drives = Counter(row["vehicle"] for row in done)
-    times = Counter((row["vehicle"], line) for row in done for line in set(told(row, "notes")))
+    times = Counter((row["vehicle"], line) for row in done for line in set(lines_of(row, "notes")))
     found = []
     for row in done:
         name = row["vehicle"]
-        lines = [line for line in told(row, "notes") if 2 * times[name, line] <= drives[name]]
+        lines = [line for line in lines_of(row, "notes") if 2 * times[name, line] <= drives[name]]
         if lines:
             found.append(Note(name, row["drive"], lines))
     return found

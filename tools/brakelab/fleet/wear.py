@@ -85,8 +85,8 @@ def wear_summary(
     brakings: Sequence[BrakeRow],
 ) -> dict[str, Any]:
     """Return a drive's part of the summary: `last` is its last row, shape (N_ROW,)."""
-    told = np.isfinite(corners(last, "pad_wear"))
-    pads = [pad for pad, has in zip(pads_of(params, learned, config), told, strict=True) if has]
+    worn = np.isfinite(corners(last, "pad_wear"))
+    pads = [pad for pad, has in zip(pads_of(params, learned, config), worn, strict=True) if has]
     return {
         "pads": packed(pads),
         "pad_wear_mass": float(np.nansum([row.pad_wear_mass for row in brakings])) if pads else None,

@@ -70,18 +70,18 @@ def _pressures(best: Series, line: Fit | None, series: list[Series], motion: Mot
     found = []
     for corner in CORNERS:
         one = others[corner] if whole else best
-        told = evidence if whole else f"{evidence}; one pressure for all wheels"
+        shown = evidence if whole else f"{evidence}; one pressure for all wheels"
         unit = unit_of("calliper_pressure_fl", one)
         name = f"calliper_pressure_{corner}"
-        found.append(Found(name, one, factor, 0.0, unit, told, line is not None, warning))
+        found.append(Found(name, one, factor, 0.0, unit, shown, line is not None, warning))
     return found
 
 
 def _without_unit(each: list[Series], motion: Motion, car: Car) -> tuple[float, str]:
     """Return factor and warning of pressures without a unit: what the brakes of CONFIG need."""
-    told = "the database states no unit"
+    unitless = "the database states no unit"
     if car.brakes is None:
-        return 1.0, f"{told}, taken for bar: friction is off by its scale; --config CONFIG tells more"
+        return 1.0, f"{unitless}, taken for bar: friction is off by its scale; --config CONFIG shows more"
     pressures = np.stack([smooth(on_grid(one, motion.t)) for one in each], axis=1)
     braking = motion.faster(MOVING) & (motion.change < -BRAKING)
     released = motion.faster(MOVING) & (motion.change > 0.2)
@@ -93,9 +93,9 @@ def _without_unit(each: list[Series], motion: Motion, car: Car) -> tuple[float, 
     decel = float((-motion.change[braking] - OVERRUN).sum())
     factor = decel / expected if expected > 0.0 else 1.0
     if 1.0 / READS_AS_BAR < factor < READS_AS_BAR:
-        return 1.0, f"{told}, taken for bar, as which it fits CONFIG's brakes"
+        return 1.0, f"{unitless}, taken for bar, as which it fits CONFIG's brakes"
     factor = float(f"{factor:.3g}")
-    return factor, f"{told}; factor {factor:g} is what CONFIG's brakes need: friction is relative to it"
+    return factor, f"{unitless}; factor {factor:g} is what CONFIG's brakes need: friction is relative to it"
 
 
 def flags(series: list[Series], motion: Motion) -> list[Found]:

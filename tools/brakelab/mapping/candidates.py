@@ -46,8 +46,8 @@ def best_of(
         found = fit(smooth(on_grid(one, motion.t)), reference, rows & is_near(one, motion.t))
         strength = found.correlation * fixed_sign if fixed_sign else abs(found.correlation)
         said = one.unit.strip() or unit == "%" or (unit == "bar" and tells_pressure(one.message, one.signal))
-        told = points > 0 and said
-        least = LEAST if told else LEAST_ALONE
+        named = points > 0 and said
+        least = LEAST if named else LEAST_ALONE
         if not strength >= least:
             continue
         # Between signals that follow equally well the name decides, then the rate.

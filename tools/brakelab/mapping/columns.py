@@ -90,6 +90,6 @@ def column_map_text(
     lines += ["", "[inputs]"]
     for before, one in zip([None, *found], found, strict=False):
         source = f'column = "{one.series.signal}"'
-        unit_told = bool(one.series.unit.strip())
-        lines += input_lines(one, before, source, timeouts[one.target], unit_told)
+        unit_known = bool(one.series.unit.strip())
+        lines += input_lines(one, before, source, timeouts[one.target], unit_known)
     return "\n".join(lines) + "\n"

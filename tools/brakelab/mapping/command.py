@@ -104,12 +104,12 @@ def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) 
 
 def _warnings(found: list[Found]) -> list[str]:
     """Return a line for each thing to look into; wheels that share it share the line."""
-    told: dict[tuple[str, str], str] = {}
+    names: dict[tuple[str, str], str] = {}
     for one in found:
         stem = without_corner(one.target)
-        several = (stem, one.warning) in told
-        told[stem, one.warning] = f"{stem}_*" if several else one.target
-    return [f"{name}: {warning}" for (_, warning), name in told.items() if warning]
+        several = (stem, one.warning) in names
+        names[stem, one.warning] = f"{stem}_*" if several else one.target
+    return [f"{name}: {warning}" for (_, warning), name in names.items() if warning]
 
 
 def _speed_alone(series: list[Series]) -> str:
@@ -177,8 +177,8 @@ def _load(dbc: Path) -> tuple[Database, list[str]]:
     """Return the messages of a database that can be used, and the names of those that want strict = false."""
     database, mistakes = read_database(dbc)
     for mistake in mistakes[:SHOWN]:
-        told = mistake.remedy.partition(";")[0] if mistake.tolerable else f"{mistake.remedy}; left out"
-        say(f"{dbc}: {mistake.place}: {told}")
+        text = mistake.remedy.partition(";")[0] if mistake.tolerable else f"{mistake.remedy}; left out"
+        say(f"{dbc}: {mistake.place}: {text}")
     if len(mistakes) > SHOWN:
         say(f"{dbc}: {len(mistakes) - SHOWN} more mistakes")
     spoilt = {mistake.message for mistake in mistakes if not mistake.tolerable}
@@ -202,8 +202,8 @@ def _show(found: list[Found], drives: bool) -> None:
         first = ones[0]
         table.add_row(stem, first.series.message, signals, first.unit, f"{first.factor:.4g}", evidence)
     console.print(table)
-    told = ("target", "factor", "offset", "unit", "evidence", "sure", "warning")
-    give(inputs=[{name: getattr(one, name) for name in told} | _source(one) for one in found])
+    names = ("target", "factor", "offset", "unit", "evidence", "sure", "warning")
+    give(inputs=[{name: getattr(one, name) for name in names} | _source(one) for one in found])
     targets = {one.target for one in found}
     missing = [without_corner(name) for name in WANTED if name not in targets]
     if missing:

@@ -106,13 +106,13 @@ def _yaw_rate(series: list[Series], motion: Motion, fast: Rows, taken: set[str])
     where = " at low speed" if slow else ""
     unit = unit_of("yaw_rate", one, slope)
     slope *= CONVERSIONS["rad/s"][unit][0]
-    told = scale_of(one, slope, line.correlation, in_curves=slow is None)
+    scale = scale_of(one, slope, line.correlation, in_curves=slow is None)
     evidence = (
         f"against right less left wheels: correlation {abs(line.correlation):.2f}, slope {slope:+.2f}{where}"
     )
     stood = (motion.speed < STANDING) & motion.known & is_near(one, motion.t)
     zero = float(np.median(signal[stood])) if stood.sum() > LEAST_STOOD else line.intercept
-    return _with_zero("yaw_rate", one, told.factor, unit, zero, evidence, told.warning)
+    return _with_zero("yaw_rate", one, scale.factor, unit, zero, evidence, scale.warning)
 
 
 def _accel_y(
@@ -133,11 +133,11 @@ def _accel_y(
     unit = unit_of("accel_y", one, slope)
     slope *= CONVERSIONS["m/s^2"][unit][0]
     disturbed = yaw_rate is motion.yaw_rates[0] and slow is None
-    told = scale_of(one, slope, line.correlation, in_curves=disturbed)
+    scale = scale_of(one, slope, line.correlation, in_curves=disturbed)
     evidence = (
         f"against speed times yaw rate: correlation {abs(line.correlation):.2f}, slope {slope:+.2f}{where}"
     )
-    return _with_zero("accel_y", one, told.factor, unit, line.intercept, evidence, told.warning)
+    return _with_zero("accel_y", one, scale.factor, unit, line.intercept, evidence, scale.warning)
 
 
 def _with_zero(

@@ -20,7 +20,9 @@ FOLLOWS: Final = 0.7  # correlation with dv/dt while no brake acts, from which a
 WHEEL: Final = {"whl", "wheel", "wheels", "axle"}
 BRAKES: Final = {"brk", "brake", "brakes", "rgen", "regen"}
 ASKED: Final = {"rq", "req", "request", "mx", "mn", "max", "min", "lim", "limit"}
-SLIPS: Final = 0.4  # correlation of the axles' difference with the torque, from which it tells who drives
+SLIPS: Final = (
+    0.4  # correlation of the axles' difference with the torque, from which it shows the driven axle
+)
 LEAST: Final = 0.5  # m/s^2, standard deviation of dv/dt
 PER_TORQUE: Final = (250.0, 2000.0)  # N m per m/s^2: mass times radius of a car or van
 
@@ -43,18 +45,18 @@ def drive_torque(series: list[Series], motion: Motion) -> tuple[Series, Fit] | N
 
 
 def driven_wheels(torque: Series, wheels: dict[str, Series], motion: Motion) -> tuple[tuple[float, ...], str]:
-    """Return the share of each wheel in the torque, in the order of CORNERS, and what it is told by."""
+    """Return the share of each wheel in the torque, in the order of CORNERS, and the evidence for it."""
     drive = smooth(on_grid(torque, motion.t))
     fl, fr, rl, rr = (smooth(np.abs(on_grid(wheels[corner], motion.t))) for corner in CORNERS)
     rows = motion.faster(MOVING)
     ahead = (rl + rr - fl - fr)[rows] / np.maximum(fl + fr, 1e-6)[rows]
     if rows.sum() < 2 or ahead.std() == 0.0 or drive[rows].std() == 0.0:
         return (0.25,) * 4, "all wheels, assumed"
-    told = float(np.corrcoef(ahead, drive[rows])[0, 1])
-    if told > SLIPS:
-        return (0.0, 0.0, 0.5, 0.5), f"rear wheels slip with it (correlation {told:.2f})"
-    if told < -SLIPS:
-        return (0.5, 0.5, 0.0, 0.0), f"front wheels slip with it (correlation {-told:.2f})"
+    correlation = float(np.corrcoef(ahead, drive[rows])[0, 1])
+    if correlation > SLIPS:
+        return (0.0, 0.0, 0.5, 0.5), f"rear wheels slip with it (correlation {correlation:.2f})"
+    if correlation < -SLIPS:
+        return (0.5, 0.5, 0.0, 0.0), f"front wheels slip with it (correlation {-correlation:.2f})"
     return (0.25,) * 4, "all wheels: neither axle slips more with it"
 
 

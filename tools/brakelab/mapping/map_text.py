@@ -6,7 +6,7 @@ from ecu.bus.units import spelled
 
 
 def input_lines(
-    one: Found, before: Found | None, source: str, after: float | None, unit_told: bool = True
+    one: Found, before: Found | None, source: str, after: float | None, unit_known: bool = True
 ) -> list[str]:
     """Return the lines of one input.
 
@@ -15,7 +15,7 @@ def input_lines(
         before: the one above it, whose evidence is not repeated.
         source: keys that say where its values come from.
         after: its time-out [s]; None or 0: the usual one.
-        unit_told: the map's reader knows the signal's own unit.
+        unit_known: the map's reader knows the signal's own unit.
     """
     lines = [f"# {one.evidence}"] if before is None or one.evidence != before.evidence else []
     if one.warning and (before is None or one.warning != before.warning):
@@ -25,7 +25,7 @@ def input_lines(
         entry += f", factor = {one.factor:.6g}"
     if one.offset:
         entry += f", offset = {one.offset:.6g}"
-    if one.unit != spelled(one.series.unit) or not unit_told:
+    if one.unit != spelled(one.series.unit) or not unit_known:
         entry += f', unit = "{one.unit}"'
     if after:
         entry += f", timeout = {after:g}"

@@ -1,4 +1,4 @@
-"""Motion of a car that is told by its four wheel speeds, and what is known of the car beforehand."""
+"""Motion of a car by its four wheel speeds, and what is known of the car beforehand."""
 
 from collections.abc import Callable, Iterable
 from typing import Final, NamedTuple

@@ -124,14 +124,14 @@ def tells_direction(name: str, target: str) -> bool:
 
 def tells_pressure(message: str, signal: str) -> bool:
     """Return whether a signal's name, or its message's, speaks of a pressure."""
-    told = ("press", "pres", "prs", "druck", "cyl")
-    return any(part.startswith(told) or "druck" in part for part in (*words(message), *words(signal)))
+    stems = ("press", "pres", "prs", "druck", "cyl")
+    return any(part.startswith(stems) or "druck" in part for part in (*words(message), *words(signal)))
 
 
 def tells_brake(message: str, signal: str) -> bool:
     """Return whether a pressure by name, or its message by its own, is one of the brakes."""
-    told = ("brk", "brake", "brems", "cyl", "calliper", "caliper", "esp", "esc", "abs", "vsa", "ibst", "ehb")
-    return any(part.startswith(told) for part in (*words(message), *words(signal)))
+    stems = ("brk", "brake", "brems", "cyl", "calliper", "caliper", "esp", "esc", "abs", "vsa", "ibst", "ehb")
+    return any(part.startswith(stems) for part in (*words(message), *words(signal)))
 
 
 def names_itself(name: str, target: str) -> bool:

@@ -42,13 +42,13 @@ def accel_x(series: list[Series], motion: Motion) -> list[Found]:
     unit = unit_of("accel_x", one, line.slope)
     in_unit = CONVERSIONS[contract_unit("accel_x")][unit][0]
     slope = line.slope * in_unit
-    told = scale_of(one, slope, line.correlation)
+    scale = scale_of(one, slope, line.correlation)
     evidence = f"against dv/dt: correlation {abs(line.correlation):.2f}, slope {slope:+.2f}"
     offset = 0.0
-    if abs(told.factor * line.intercept * in_unit) > LEAST_ZERO:
-        offset = -told.factor * line.intercept
+    if abs(scale.factor * line.intercept * in_unit) > LEAST_ZERO:
+        offset = -scale.factor * line.intercept
         evidence += f"; {line.intercept:+.2f} {unit} at constant speed, with the slope of the road"
-    return [Found("accel_x", one, told.factor, offset, unit, evidence, True, told.warning)]
+    return [Found("accel_x", one, scale.factor, offset, unit, evidence, True, scale.warning)]
 
 
 def named_only(series: list[Series], targets: Iterable[str], because: str) -> list[Found]:
@@ -106,6 +106,6 @@ def propose(series: list[Series], car: Car = ANY_CAR) -> tuple[list[Found], bool
         found += named_only(here, ("accel_x", *CURVES), "the car stands")
     found += brakes(here, motion, car) + flags(here, motion)
     own = {one.target: one for one in _named_as_inputs(here)}
-    told = {one.target for one in found if one.sure}
+    sure = {one.target for one in found if one.sure}
     kept = [one for one in found if one.sure or one.target not in own]
-    return kept + [one for target, one in own.items() if target not in told], motion.drives
+    return kept + [one for target, one in own.items() if target not in sure], motion.drives

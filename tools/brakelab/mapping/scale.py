@@ -23,7 +23,7 @@ class Scale(NamedTuple):
 def scale_of(one: Series, slope: float, correlation: float, in_curves: bool = False) -> Scale:
     """Return sign and scale of a signal that reads `slope` times what it should, in the unit it is taken for.
 
-    Of a signal in a unit the sign alone is taken: a wrong scale is the database's or the wheels', and told.
+    Of a signal in a unit the sign alone is taken: a wrong scale is the database's or the wheels', a warning.
     One without a unit counts something: its scale is the drive's.
 
     `in_curves`: the reference is the wheels' yaw rate, which is too large at speed.

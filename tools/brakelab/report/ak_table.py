@@ -61,7 +61,7 @@ def observed(drive: Drive, found: list[Braking]) -> dict[str, list[Observed]]:
     """Return by axle the brake applications in which its friction was observed."""
     period = float(np.median(np.diff(drive.t)))
     speed = np.abs(drive.column("vehicle_speed"))
-    told = {}
+    by_axle = {}
     for axle, wheels in AXLES.items():
         friction, pressure = _friction(drive, wheels), axle_pressure(drive, wheels)
         rows = []
@@ -83,8 +83,8 @@ def observed(drive: Drive, found: list[Braking]) -> dict[str, list[Observed]]:
                     float(mu.max()),
                 )
             )
-        told[axle] = rows
-    return told
+        by_axle[axle] = rows
+    return by_axle
 
 
 def _friction(drive: Drive, wheels: slice) -> Vector:
@@ -97,10 +97,10 @@ def _friction(drive: Drive, wheels: slice) -> Vector:
     return np.where(count > 0, np.nansum(friction, axis=1) / np.maximum(count, 1), np.nan)
 
 
-def sections(told: dict[str, list[Observed]]) -> list[Section]:
+def sections(by_axle: dict[str, list[Observed]]) -> list[Section]:
     """Return the sections that the drive has, by axle, speed, pressure and temperature."""
     table = []
-    for axle, rows in told.items():
+    for axle, rows in by_axle.items():
         by_class: dict[tuple[int, int, int], list[Observed]] = {}
         for row in rows:
             heat = int(np.digitize(row.temperature, TEMPERATURES)) if np.isfinite(row.temperature) else -1

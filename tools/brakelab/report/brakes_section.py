@@ -15,7 +15,7 @@ from brakelab.report.drive import Drive
 from brakelab.report.energy import Work, plots_of_energy, works
 from brakelab.report.response import LEAST_BAR, Response, plots_of_response, responses
 from brakelab.report.torque import plots_of_torque
-from brakelab.report.wear_untold import Untold
+from brakelab.report.wear_missing import Missing
 from brakelab.results.car import KEY, Car, unpacked
 from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
@@ -34,7 +34,7 @@ class Section(NamedTuple):
     """The size of the pads is known."""
     csv: str
     """Address of the download."""
-    untold: list[Untold]
+    missing: list[Missing]
 
 
 def read_car(drive: Drive, result: Path) -> Car | None:
@@ -61,7 +61,7 @@ def brakes_section(
     plots: dict[str, dict[str, Any]] = {place: {} for place in places}
     if without_pressure or not found:
         return Section([], [], [], [], False, csv, _of_drive(drive)), plots
-    told = observed(drive, found)
+    applications = observed(drive, found)
     done: list[Work] = []
     if car is not None:
         done = works(drive, found, car)
@@ -75,13 +75,13 @@ def brakes_section(
     dense = car is not None and bool(np.isfinite(car.pad_area).all())
     some = [row for row in rows if any(math.isfinite(each) for each in (*row.plateau, *row.friction_sides))]
     section = Section(
-        sections(told),
-        [fade(axle, mine) for axle, mine in told.items() if mine],
+        sections(applications),
+        [fade(axle, mine) for axle, mine in applications.items() if mine],
         some,
         done,
         dense,
         csv,
-        [*_of_plots(plots, car, told, some, done, dense), *_of_drive(drive)],
+        [*_of_plots(plots, car, applications, some, done, dense), *_of_drive(drive)],
     )
     return section, plots
 
@@ -89,43 +89,43 @@ def brakes_section(
 def _of_plots(
     plots: dict[str, dict[str, Any]],
     car: Car | None,
-    told: dict[str, Any],
+    applications: dict[str, Any],
     rows: list[Response],
     done: list[Work],
     dense: bool,
-) -> list[Untold]:
+) -> list[Missing]:
     found = []
     if car is None:
-        found.append(Untold("Specific torque, distribution, energy of each brake", _AGAIN))
+        found.append(Missing("Specific torque, distribution, energy of each brake", _AGAIN))
     else:
         if not plots["torque_plots"]:
             reason = "friction was observed for less than a second on either axle."
-            found.append(Untold("Specific torque, C*", reason))
+            found.append(Missing("Specific torque, C*", reason))
         if not plots["distribution_plots"]:
             reason = "the torques of the brakes are known for less than half a second of braking."
-            found.append(Untold("Distribution of brake force", reason))
+            found.append(Missing("Distribution of brake force", reason))
         if not done:
-            found.append(Untold("Energy and power of each brake", "no brake torque is in this result."))
+            found.append(Missing("Energy and power of each brake", "no brake torque is in this result."))
         elif not dense:
             reason = "CONFIG names no [front.pad] and [rear.pad] with their area; power stands in kW."
-            found.append(Untold("Power density", reason))
-    if not any(told.values()):
+            found.append(Missing("Power density", reason))
+    if not any(applications.values()):
         reason = "no braking had 0.3 s of observed friction above 5 km/h."
-        found.append(Untold("Friction by section", reason))
+        found.append(Missing("Friction by section", reason))
     if not any(math.isfinite(each) for row in rows for each in row.build_up):
         reason = f"no pressure rose from nothing to a plateau above {LEAST_BAR:.0f} bar."
-        found.append(Untold("Build-up of pressure", reason))
+        found.append(Missing("Build-up of pressure", reason))
     return found
 
 
-def _of_drive(drive: Drive) -> list[Untold]:
+def _of_drive(drive: Drive) -> list[Missing]:
     """Return the reasons for plots over the drive that are left out."""
     found = []
     if not any(drive.has(f"slip_{corner}") for corner in CORNERS):
         reason = "no slip is in this result: no wheel speed came in, or the car never rolled."
-        found.append(Untold("Slip and speeds of the wheels", reason))
+        found.append(Missing("Slip and speeds of the wheels", reason))
     if not any(np.nan_to_num(drive.column(f"motor_torque_{corner}")).any() for corner in CORNERS):
-        found.append(Untold("Motors' share over time", "no motor torque is in this log, or it is always 0."))
+        found.append(Missing("Motors' share over time", "no motor torque is in this log, or it is always 0."))
     if not drive.has("accelerator_position"):
-        found.append(Untold("Accelerator", "its position is not in this log."))
+        found.append(Missing("Accelerator", "its position is not in this log."))
     return found

@@ -117,7 +117,7 @@ def _from_file(drive: Drive, path: Path) -> list[Braking]:
     friction = optional("mu_b_end" if "mu_b_end" in table.column_names else "mu_b_mean")
     per_corner = [optional(name) for name in ("sigma_mu_b_end", "mu_b_before", "sigma_mu_b_before")]
     forces = [optional(name) for name in _OF_FORCE]
-    told = table.column("left_out").to_pylist() if "left_out" in table.column_names else None
+    reasons = table.column("left_out").to_pylist() if "left_out" in table.column_names else None
     found = []
     for number in np.unique(brake):
         rows = np.flatnonzero(brake == number)
@@ -133,7 +133,7 @@ def _from_file(drive: Drive, path: Path) -> list[Braking]:
             friction[order], per_corner[0][order], temperature[order], float(energy[order].sum()),
             Force(*(float(column[order[0]]) for column in forces)),
             per_corner[1][order], per_corner[2][order],
-            str(told[order[0]] or "") if told else left_out(duration, achieved, predicted),
+            str(reasons[order[0]] or "") if reasons else left_out(duration, achieved, predicted),
         )  # fmt: skip
         found.append(braking._replace(demanded=_mean(_demand(drive)[inside(drive, braking)])))
     return found

@@ -21,7 +21,7 @@ from brakelab.report.prediction import (
     prediction_errors,
     prediction_rows,
 )
-from brakelab.report.quality import lacks_pressure, only_told, quality_tiles, read_quality
+from brakelab.report.quality import drop_placeholders, lacks_pressure, quality_tiles, read_quality
 from brakelab.report.sparkline import sparklines
 from brakelab.report.summary import facts, faults, tiles
 from brakelab.report.timing import read_timing, spreads
@@ -69,7 +69,7 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
     )
     quality = read_quality(drive, result)
     without_pressure = lacks_pressure(drive, quality)
-    drive = only_told(drive, without_pressure)
+    drive = drop_placeholders(drive, without_pressure)
     true = None
     if truth is not None and truth.resolve() == result.resolve():
         raise UserError(str(truth), "", "this is the result; give true values as --truth, or none")

@@ -37,7 +37,7 @@ class Forces(NamedTuple):
 def plots_of_distribution(
     drive: Drive, truth: Drive | None, found: list[Braking], car: Car
 ) -> dict[str, Any]:
-    """Return the two figures by name, empty where no braking is told."""
+    """Return the two figures by name, empty where no braking shows it."""
     rows = np.zeros(len(drive.t), bool)
     for braking in found:
         rows |= inside(drive, braking)
@@ -58,9 +58,9 @@ def plots_of_distribution(
     end = max(0.5, min(1.2, 1.15 * float(z[some].max())))
     true = None
     if truth is not None and truth.has("brake_torque_fl"):
-        told = forces_of(truth, car)
-        rate = told.front[places] + told.rear[places]
-        true = binned(rate, 100.0 * told.front[places] / np.where(rate > LEAST_RATE, rate, np.nan))
+        true_forces = forces_of(truth, car)
+        rate = true_forces.front[places] + true_forces.rear[places]
+        true = binned(rate, 100.0 * true_forces.front[places] / np.where(rate > LEAST_RATE, rate, np.nan))
     return {"distribution": _shares(car, source, end, true), "forces": _forces(car, source, end)}
 
 

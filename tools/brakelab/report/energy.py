@@ -67,8 +67,8 @@ def works(drive: Drive, found: list[Braking], car: Car) -> list[Work]:
         return []
     period = float(np.median(np.diff(drive.t)))
     mean = np.nanmean(np.where(np.isfinite(watts[known]), watts[known], 0.0), axis=0)
-    told = [bool(np.isfinite(one).any()) for one in watts[known].T]
-    joules = np.where(told, mean * period * known.sum(), np.nan)
+    known_corners = [bool(np.isfinite(one).any()) for one in watts[known].T]
+    joules = np.where(known_corners, mean * period * known.sum(), np.nan)
     highest = np.fmax.reduce(peaks(drive, found, watts), axis=0)
     area = np.repeat(car.pad_area, 2)
     whole = float(np.nansum(joules))
@@ -77,9 +77,9 @@ def works(drive: Drive, found: list[Braking], car: Car) -> list[Work]:
             corner.upper(),
             1e-3 * float(joules[i]),
             float(joules[i]) / whole if whole > 0.0 else float("nan"),
-            1e-3 * float(mean[i]) if told[i] else float("nan"),
+            1e-3 * float(mean[i]) if known_corners[i] else float("nan"),
             1e-3 * float(highest[i]),
-            float(mean[i] / area[i]) if told[i] else float("nan"),
+            float(mean[i] / area[i]) if known_corners[i] else float("nan"),
             float(highest[i] / area[i]),
         )
         for i, corner in enumerate(CORNERS)

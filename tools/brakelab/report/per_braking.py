@@ -44,23 +44,23 @@ def points_by_braking(
         least_span: of the axis.
         zero: colour of a line at 0.
     """
-    told = [one for one in series if np.isfinite(one.values).any()]
-    if len(numbers) < 2 or not told:
+    shown = [one for one in series if np.isfinite(one.values).any()]
+    if len(numbers) < 2 or not shown:
         return None
     plot = _figure(Range1d(start=0.5, end=numbers[-1] + 0.5, bounds="auto"), label, len(numbers), least_span)
     columns: dict[str, Any] = {"number": np.array(numbers, float)}
-    for place, one in enumerate(told):
-        columns[f"at_{place}"] = columns["number"] + (place - 0.5 * (len(told) - 1)) * 0.15
+    for place, one in enumerate(shown):
+        columns[f"at_{place}"] = columns["number"] + (place - 0.5 * (len(shown) - 1)) * 0.15
         columns[f"value_{place}"] = one.values
     source = ColumnDataSource(columns)
-    for place, one in enumerate(told):
+    for place, one in enumerate(shown):
         plot.scatter(
             f"at_{place}", f"value_{place}", source=source, marker=one.marker, size=8, line_color=one.colour,
             fill_color=one.colour, fill_alpha=0.7, line_width=2, legend_label=one.label,
         )  # fmt: skip
     if zero is not None:
         plot.add_layout(Span(location=0.0, dimension="width", line_color=zero, line_width=1))
-    _hover(plot, [(one.label, f"@value_{place}{{0.00}}") for place, one in enumerate(told)])
+    _hover(plot, [(one.label, f"@value_{place}{{0.00}}") for place, one in enumerate(shown)])
     return plot
 
 

@@ -175,8 +175,8 @@ def lacks_pressure(drive: Drive, quality: Quality | None) -> bool:
     return not any(name.startswith("calliper_pressure") for name in came)
 
 
-def only_told(drive: Drive, without_pressure: bool) -> Drive:
-    """Return the drive without the columns that stand for nothing.
+def drop_placeholders(drive: Drive, without_pressure: bool) -> Drive:
+    """Return the drive without the columns that hold placeholders.
 
     Friction without a pressure is the configured one, a demand that nobody made is zero.
     """

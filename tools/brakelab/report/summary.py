@@ -109,15 +109,15 @@ def _friction(drive: Drive, accuracy: dict[str, Accuracy] | None) -> list[Tile]:
     shown = []
     for axle, wheels in AXLES.items():
         last, band = _last(mu[:, wheels]), 2.0 * _last(sigma[:, wheels])
-        told = bool(np.isfinite(last))
-        note = "at the end of the drive" if told else "nothing is known"
+        known = bool(np.isfinite(last))
+        note = "at the end of the drive" if known else "nothing is known"
         warns = False
-        if accuracy is not None and told:
+        if accuracy is not None and known:
             row = accuracy[axle]
             note = f"nRMSE {percent(row.nrmse, 1)} %, truth inside ±2σ {percent(row.inside, 0)} %"
             warns = row.inside < _HONEST_SHARE
         shown.append(
-            Tile(f"Friction {axle}, ±2σ", fixed(last, 3), f"± {fixed(band, 3)}" if told else "", note, warns)
+            Tile(f"Friction {axle}, ±2σ", fixed(last, 3), f"± {fixed(band, 3)}" if known else "", note, warns)
         )
     return shown
 

@@ -21,7 +21,7 @@ DIRTIEST: Final = 10
 
 
 class Application(NamedTuple):
-    """One brake application of any length; per corner shape (4,), NaN: not told."""
+    """One brake application of any length; per corner shape (4,), NaN: not available."""
 
     t_start: float
     t_end: float

@@ -84,7 +84,7 @@ def _lining(axle: str, pads: list[PadState], km: Vector, worn: Vector, sigma: Ve
 
 
 def plots_of_emission(applications: list[Application]) -> dict[str, Any]:
-    """Return log10 of the particles of a brake over energy and over temperature; empty where none is told."""
+    """Return log10 of the particles of a brake over energy and over temperature; empty: none known."""
     energy, heat, factor, low, high = (
         np.array([getattr(each, name) for each in applications]).reshape(-1, 4)
         for name in ("energies", "heat", "factor", "factor_low", "factor_high")

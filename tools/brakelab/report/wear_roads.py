@@ -1,4 +1,4 @@
-"""Wear and dust by kind of road: town, country, motorway, told apart by speed.
+"""Wear and dust by kind of road: town, country, motorway, separated by speed.
 
 A moment belongs to the kind of the highest speed within `AROUND` before or after it, so that a junction in
 the country is country, and half an hour's jam is town. The limits are those of real-driving emission tests

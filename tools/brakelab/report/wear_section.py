@@ -10,9 +10,9 @@ from brakelab.report.drive import Drive
 from brakelab.report.page import fixed
 from brakelab.report.quality import Quality
 from brakelab.report.wear_applications import Application, dirtiest, read_applications
+from brakelab.report.wear_missing import counted_share, missing
 from brakelab.report.wear_plots import BAND, plots_of_emission, plots_of_wear
 from brakelab.report.wear_roads import KINDS, LEAST_WAY, roads, way
-from brakelab.report.wear_untold import told_share, untold
 from brakelab.results import euro7
 from brakelab.results.pads import KEY, PadState, unpacked
 from ecu.algorithm.monitoring.dust import UNTOLD
@@ -46,7 +46,7 @@ class Section(NamedTuple):
     dirtiest: list[Application]
     counted: bool
     """The dirtiest are by particles, else by mass."""
-    untold: list[Any]
+    missing: list[Any]
 
 
 def wear_section(
@@ -63,25 +63,25 @@ def wear_section(
         remedy = f"not readable ({error!r}); write the result again with `brake-ecu replay`"
         raise UserError(str(result), f"metadata {KEY}", remedy) from None
     applications = read_applications(drive, result)
-    lacks = untold(drive, quality, without_pressure, pads, applications)
-    tells = not without_pressure and drive.has("vehicle_speed")
-    pads = [pad for pad in pads if tells and drive.has(f"pad_wear_{pad.corner}")]
-    worst = dirtiest(applications) if tells else []
+    lacks = missing(drive, quality, without_pressure, pads, applications)
+    shown = not without_pressure and drive.has("vehicle_speed")
+    pads = [pad for pad in pads if shown and drive.has(f"pad_wear_{pad.corner}")]
+    worst = dirtiest(applications) if shown else []
     section = Section(
         pads,
         [f"{pad.thickness:.2f} ± {BAND * pad.sigma:.2f}" for pad in pads],
         [_known_by(pad) for pad in pads],
-        roads(drive, applications) if tells else [],
+        roads(drive, applications) if shown else [],
         ", ".join(f"{name} to {high:.0f} km/h" for name, high in KINDS[:-1]) + f", {KINDS[-1][0]} above",
-        _amounts(drive, pads, applications) if tells else [],
+        _amounts(drive, pads, applications) if shown else [],
         _share(drive),
         worst,
         any(math.isfinite(each.particles) for each in worst),
         lacks,
     )
     plots = {
-        "wear_plots": plots_of_wear(drive, truth, pads) if tells else {},
-        "emission_plots": plots_of_emission(applications) if tells else {},
+        "wear_plots": plots_of_wear(drive, truth, pads) if shown else {},
+        "emission_plots": plots_of_emission(applications) if shown else {},
     }
     return section, plots
 
@@ -114,15 +114,15 @@ def _amounts(drive: Drive, pads: list[PadState], applications: list[Application]
             )
         )
     life = float(drive.column("particles_per_km")[-1])
-    told = [each for each in applications if math.isfinite(each.particles)]
+    counted = [each for each in applications if math.isfinite(each.particles)]
     text = fixed(math.nan, 0)
-    if told and km >= LEAST_WAY and told_share(pads, applications) >= 1.0 - UNTOLD:
+    if counted and km >= LEAST_WAY and counted_share(pads, applications) >= 1.0 - UNTOLD:
         low, middle, high = (
-            1e-9 * sum(getattr(each, name) for each in told) / km
+            1e-9 * sum(getattr(each, name) for each in counted) / km
             for name in ("particles_low", "particles", "particles_high")
         )
         text = f"{middle:.2f} ({low:.2f} to {high:.2f})"
-    if told or math.isfinite(life):
+    if counted or math.isfinite(life):
         found.append(Amount("Particles [10⁹/km]", text, fixed(1e-9 * life, 2), "none yet", False))
     return found
 

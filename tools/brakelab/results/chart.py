@@ -28,7 +28,7 @@ class Line(NamedTuple):
 
 
 class Cells(NamedTuple):
-    """A surface as coloured cells; `low` and `high` are the ends of its colours, told beside the title."""
+    """A surface as coloured cells; `low` and `high` are the ends of its colours, stated beside the title."""
 
     x: NDArray[np.float64]  # (columns + 1,), edges
     y: NDArray[np.float64]  # (rows + 1,)

@@ -176,7 +176,7 @@ def compare(a: Path, b: Path) -> int:
         UserError: a file cannot be read, is no result, or the two have no row in common.
     """
     console = new_console()
-    matters, told = 0, []
+    matters, listed = 0, []
     first, second = read_result(a), read_result(b)
     for path, result in ((a, first), (b, second)):
         if "t" not in result.columns or "mu_b_fl" not in result.columns:
@@ -210,7 +210,7 @@ def compare(a: Path, b: Path) -> int:
         for row in heavy:
             by_quantity.setdefault(without_corner(row.name), row)
         worst = list(by_quantity.values())
-        told += [row._asdict() | {"of": title, "at": _place(title, before, row)} for row in found]
+        listed += [row._asdict() | {"of": title, "at": _place(title, before, row)} for row in found]
         if worst:
             places = [_place(title, before, row) for row in worst]
             _show(console, f"{title} that differ, by their worst corner", worst, units, places)
@@ -218,7 +218,7 @@ def compare(a: Path, b: Path) -> int:
             f"{title}: {len(heavy)} columns differ, {light} by less than matters, {equal} are equal",
             highlight=False,
         )
-    give(matter=matters, provenance=_provenance(first, second), differences=told)
+    give(matter=matters, provenance=_provenance(first, second), differences=listed)
     return 1 if matters else 0
 
 

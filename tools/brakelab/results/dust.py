@@ -1,7 +1,7 @@
 """Emission of one brake application at each corner, from its rows, by the models that the ECU runs.
 
 The same means as `ecu/algorithm/monitoring/dust.py` takes, of what results hold. Outside what a model was
-trained on, and where there is none, nothing is told.
+trained on, and where there is none, nothing is counted.
 """
 
 from typing import Final, NamedTuple
@@ -24,7 +24,7 @@ Corners = NDArray[np.float64]
 
 
 class Dust(NamedTuple):
-    """Of an application, log10 of particles, shapes (4,); NaN: not told."""
+    """Of an application, log10 of particles, shapes (4,); NaN: not available."""
 
     factor: Corners
     low: Corners

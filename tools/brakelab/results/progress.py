@@ -9,7 +9,7 @@ from typing import Final, TypeVar
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from ecu.compiling import compiling_told
+from ecu.compiling import report_compiling
 from ecu.output import say
 
 PERIOD_S: Final = 10.0
@@ -26,7 +26,7 @@ def progress_bar(text: str, total: float | None, shown: bool = True) -> Iterator
         yield lambda amount: None
         return
     console = Console(stderr=True)
-    with compiling_told():
+    with report_compiling():
         if not console.is_terminal:
             with _lines(text, total) as advance:
                 yield advance

@@ -21,7 +21,7 @@ from brakelab.rig.vehicle_node import warm_up
 from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.scenario import Scenario, load_scenario
 from brakelab.simulation.scenario_car import other_car, with_plant_for
-from ecu.compiling import compiling_told
+from ecu.compiling import report_compiling
 from ecu.errors import RunFault, UserError
 from ecu.output import fault, give, say
 from ecu.settings.config import Config, load_config
@@ -89,7 +89,7 @@ def rig(
         warm()
     outcomes = []
     try:
-        with compiling_told():
+        with report_compiling():
             for path, scenario in scenarios:
                 folder = out / path.stem
                 folder.mkdir(exist_ok=True)

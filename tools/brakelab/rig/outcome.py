@@ -44,7 +44,7 @@ class Outcome(NamedTuple):
     unexplained: list[str]
     """Fault bits that neither an injected fault nor the car's linings account for."""
     of_linings: list[str]
-    """Fault bits that the car's linings account for, with what is told by them."""
+    """Fault bits that the car's linings account for, with their reason."""
     reactions: list[Reaction]
     verdicts: list[Verdict]
     """On the scenario's expectations."""

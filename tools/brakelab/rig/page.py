@@ -60,13 +60,13 @@ def summary(outcomes: list[Outcome]) -> Table:
 
 def by_the_car(outcomes: list[Outcome]) -> list[str]:
     """Return the fault bits that the car's linings account for, each once with its scenarios."""
-    told: dict[str, list[str]] = {}
+    scenarios_of: dict[str, list[str]] = {}
     for one in outcomes:
         for line in one.of_linings:
-            told.setdefault(line, []).append(one.scenario)
+            scenarios_of.setdefault(line, []).append(one.scenario)
     where = {
         line: ", ".join(names) if len(names) <= NAMED else f"{len(names)} of {len(outcomes)}"
-        for line, names in told.items()
+        for line, names in scenarios_of.items()
     }
     return [f"by the car, in {scenarios}: {line}" for line, scenarios in where.items()]
 

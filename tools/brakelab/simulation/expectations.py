@@ -121,5 +121,5 @@ class Expectation(ScenarioTable):
                 return f"recovered within {self.within:g} s after fault {self.fault}"
         name = " ".join([*([self.axle] if self.axle else []), self.what.replace("_", " ")])
         limits = (("at least", self.at_least), ("at most", self.at_most))
-        told = " and ".join(f"{side} {limit:g}" for side, limit in limits if limit is not None)
-        return f"{name} {told} {UNITS[self.what]}"
+        bounds = " and ".join(f"{side} {limit:g}" for side, limit in limits if limit is not None)
+        return f"{name} {bounds} {UNITS[self.what]}"

@@ -62,10 +62,10 @@ def other_car(scenario: Scenario, config: Config) -> str:
     vehicle = scenario_plant(scenario.model_copy(update={"payload": None})).vehicle
     ratios = {"mass": vehicle.body.mass / config.vehicle.mass}
     for axle in ("front", "rear"):
-        told, brake = getattr(config, axle), getattr(vehicle, f"brake_{axle}")
-        area = (brake.piston_diameter / told.piston_diameter) ** 2 / told.pistons
-        ratios[f"{axle} wheels"] = vehicle.tyre.free_radius / told.unloaded_radius
-        ratios[f"{axle} brakes"] = area * brake.effective_radius / told.effective_radius
+        configured, brake = getattr(config, axle), getattr(vehicle, f"brake_{axle}")
+        area = (brake.piston_diameter / configured.piston_diameter) ** 2 / configured.pistons
+        ratios[f"{axle} wheels"] = vehicle.tyre.free_radius / configured.unloaded_radius
+        ratios[f"{axle} brakes"] = area * brake.effective_radius / configured.effective_radius
     more = {name: ratio - 1.0 for name, ratio in ratios.items() if abs(ratio - 1.0) > ANOTHER}
     found = ", ".join(f"{name} {100.0 * by:+.0f} %" for name, by in more.items())
     if not found:

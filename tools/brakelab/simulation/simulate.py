@@ -63,13 +63,13 @@ def simulate(
     seed: int = 0,
     draw: str | None = None,
     plant: str | None = None,
-    told: bool = True,
+    printed: bool = True,
 ) -> Simulated:
     """Run a scenario with the ECU of `config`, armed; write OUT.log, OUT.parquet, OUT.truth.parquet.
 
     `draw`: width of the car's draw, see `Scenario.draw`; `plant`: the car's file or name, or "as-config",
-    which is made in OUT.plant/; None: the scenario's. `told`: False for use from Python, where nothing is
-    printed.
+    which is made in OUT.plant/; None: the scenario's. `printed`: False for use from Python, which
+    prints nothing.
 
     Raises:
         UserError: a file cannot be read, is wrong, or cannot be written.
@@ -78,7 +78,7 @@ def simulate(
     check_outputs(out, (log, inputs, truth), (scenario, config))
     vehicle = load_config(config)
     driven = with_plant_for(load_scenario(scenario), plant, vehicle, out.with_name(out.name + ".plant"))
-    if told and (differs := other_car(driven, vehicle)):
+    if printed and (differs := other_car(driven, vehicle)):
         say(f"brake-ecu: {differs}")
     if draw is not None:
         driven = with_draw(driven, draw)
@@ -92,7 +92,7 @@ def simulate(
     true: list[NDArray[np.float64]] = []
     outputs = [np.empty((0, N_OUTPUTS))]
     frames = 0
-    with progress_bar("simulate", None, told):
+    with progress_bar("simulate", None, printed):
         loop = new_loop(driven, vehicle, seed)
         try:
             out.parent.mkdir(parents=True, exist_ok=True)
@@ -110,7 +110,7 @@ def simulate(
         except OSError as error:
             remedy = f"cannot be written ({error.strerror}); choose another --out"
             raise UserError(str(out), "", remedy) from None
-    if told:
+    if printed:
         give(seconds=float(t[-1]), frames=frames)
         again = f"brake-ecu replay {log} --config {command_name(config)} --out {out}.result.parquet"
         wrote(log, inputs, truth, next=again)

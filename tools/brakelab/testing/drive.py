@@ -70,8 +70,8 @@ class Signal(NamedTuple):
         aim: Any = self._seen(other) if isinstance(other, Signal) else other
         share = unit == "%"
         limit = 0.01 * by * np.abs(aim) if share else self._from(unit)[0] * by
-        told = other.name if isinstance(other, Signal) else _said(other, "g", self.unit)
-        self._assert(np.abs(self.values - aim) <= limit, f"within {_said(by, 'g', unit)} of {told}")
+        target = other.name if isinstance(other, Signal) else _said(other, "g", self.unit)
+        self._assert(np.abs(self.values - aim) <= limit, f"within {_said(by, 'g', unit)} of {target}")
 
     def _seen(self, other: "Signal") -> NDArray[np.float64]:
         __tracebackhide__ = True
@@ -138,7 +138,7 @@ class Ecu:
         """Return an output. Raises UserError for a name that is none."""
         return _signal(self.driven.drive, name, OUTPUT_UNITS.get(name, ""))
 
-    def told(self, bit: str | int, within_ms: float, t: float | None = None) -> None:
+    def reported(self, bit: str | int, within_ms: float, t: float | None = None) -> None:
         """Assert that a bit of docs/faults.md was raised in time after `t` [s], or after the first fault."""
         __tracebackhide__ = True
         self.shows("bit", bit=bit, within=1e-3 * within_ms, **({} if t is None else {"t": t}))

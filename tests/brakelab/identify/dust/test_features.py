@@ -9,7 +9,7 @@ from brakelab.identify.dust.features import (
     extract,
     find_applications,
     find_background,
-    way_of_air,
+    transport_time,
 )
 from ecu.errors import UserError
 
@@ -18,7 +18,7 @@ STILL, BY_SPEED = 300.0, 20.0
 PER_STOP = 1e9  # particles
 
 
-def trip(way: float = 2.0, stops: int = 10, noise: float = 0.0, holds: bool = False) -> Recorded:
+def trip(delay: float = 2.0, stops: int = 10, noise: float = 0.0, holds: bool = False) -> Recorded:
     """Cruise at 10, 20 or 30 m/s for 100 s, brake by 5 m/s at 2 m/s^2, again; the plume is 4 s long."""
     random = np.random.default_rng(3)
     speed, braked = [], []
@@ -33,9 +33,9 @@ def trip(way: float = 2.0, stops: int = 10, noise: float = 0.0, holds: bool = Fa
     t = PERIOD * np.arange(len(v))
     rate = np.zeros(len(v))
     for start in np.flatnonzero(np.diff(on, prepend=0.0) == 1.0)[:stops]:
-        plume = start + round((way - 0.7) / PERIOD) + np.arange(40)
+        plume = start + round((delay - 0.7) / PERIOD) + np.arange(40)
         rate[plume[plume < len(v)]] = PER_STOP / 40 / PERIOD
-    sampled = np.concatenate([np.full(round(way / PERIOD), v[0]), v])[: len(v)]
+    sampled = np.concatenate([np.full(round(delay / PERIOD), v[0]), v])[: len(v)]
     shown = rate / (1e6 * FLOW) + STILL + BY_SPEED * sampled
     shown *= 1.0 + noise * random.normal(size=len(v))
     return Recorded(
@@ -75,7 +75,7 @@ def test_particles_are_what_was_above_the_background(noise):
 
 
 def test_background_is_a_line_over_speed():
-    recorded = trip(way=0.7, noise=0.05)
+    recorded = trip(delay=0.7, noise=0.05)
     found = find_background(recorded, find_applications(recorded))
     assert found.still == pytest.approx(STILL, rel=0.05)
     assert found.by_speed == pytest.approx(BY_SPEED, rel=0.05)
@@ -84,7 +84,7 @@ def test_background_is_a_line_over_speed():
 
 
 def test_a_background_that_wanders_is_followed():
-    recorded = trip(way=0.7)
+    recorded = trip(delay=0.7)
     wander = np.exp(0.3 * np.sin(2 * np.pi * recorded.t / 600.0))
     recorded = recorded._replace(concentration=recorded.concentration * wander)
     found = find_background(recorded, find_applications(recorded))
@@ -92,22 +92,22 @@ def test_a_background_that_wanders_is_followed():
     assert np.std(np.log(ratio)) < 0.3 * np.std(np.log(wander))
 
 
-@pytest.mark.parametrize("way", [1.0, 3.0, 12.0, 25.0])
-def test_the_way_of_the_air(way):
-    """The plume's middle lies `way` + 1.3 s behind the start, that of the application 1.25 s."""
-    assert way_of_air(trip(way=way)) == pytest.approx(way, abs=0.8)
+@pytest.mark.parametrize("delay", [1.0, 3.0, 12.0, 25.0])
+def test_the_transport_time_of_the_air(delay):
+    """The plume's middle lies `delay` + 1.3 s behind the start, that of the application 1.25 s."""
+    assert transport_time(trip(delay=delay)) == pytest.approx(delay, abs=0.8)
 
 
-@pytest.mark.parametrize("way", [6.0, 12.0, 20.0])
-def test_a_long_way_of_the_air_costs_no_particles(way):
+@pytest.mark.parametrize("delay", [6.0, 12.0, 20.0])
+def test_a_long_transport_time_costs_no_particles(delay):
     """The background of the sampled air is that of the speed it was sampled at, too."""
-    found = extract(trip(way=way), RADIUS)
+    found = extract(trip(delay=delay), RADIUS)
     assert found.particles[:9] / PER_STOP == pytest.approx(np.ones(9), abs=0.05)
 
 
 def test_a_trip_without_cruising_tells_no_background():
     """Its particles came out three times too many, without a word."""
-    recorded = trip(way=0.7)
+    recorded = trip(delay=0.7)
     uneven = recorded.speed + 8.0 * np.sin(1.5 * recorded.t)
     with pytest.raises(UserError, match="trip a: vehicle_speed: no steady driving 25 s after a braking"):
         find_background(recorded._replace(speed=uneven), find_applications(recorded))
@@ -115,4 +115,4 @@ def test_a_trip_without_cruising_tells_no_background():
 
 def test_a_counter_that_follows_no_braking_is_refused():
     with pytest.raises(UserError, match="trip a: particle_concentration: follows the braking by none"):
-        way_of_air(trip(way=44.0))
+        transport_time(trip(delay=44.0))

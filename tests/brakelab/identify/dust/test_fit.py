@@ -97,7 +97,7 @@ def test_kpis_are_those_of_table_8_3():
     assert (found.covered, found.known) == (1.0, 1.0)
 
 
-def test_what_lies_outside_is_told_by_its_work():
+def test_what_lies_outside_is_stated_by_its_work():
     made = trips(2, 2)
     features = made[1].features.copy()
     features[:10, 3] = 400.0  # degC

@@ -69,7 +69,7 @@ def test_shares_of_inputs_that_go_together_are_not_added(stops: Stops, hotter: f
     assert ("their shares overlap" in table.below) == (hotter > 0.0)
 
 
-def test_levels_are_told_apart_wherever_they_lie() -> None:
+def test_levels_are_separated_wherever_they_lie() -> None:
     """Speeds about 13.5 m/s, where rounding would make two of them."""
     random = np.random.default_rng(0)
     speed, bar, temperature = np.array(list(product((6.7, 13.5, 14.6), (10.0, 20.0), (50.0, 75.0)))).T

@@ -178,7 +178,7 @@ def test_held_out_are_the_hottest(stops: Stops) -> None:
     assert seen.start_temperature.max() <= unseen.start_temperature.min()
 
 
-def test_a_wrong_ending_is_told_before_the_programme_is_run(
+def test_a_wrong_ending_is_refused_before_the_programme_is_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(command, "new_bench", lambda *_, **__: pytest.fail("the rig was started"))

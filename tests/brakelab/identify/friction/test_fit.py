@@ -100,7 +100,7 @@ def test_a_law_that_leaves_the_numbers_costs_but_does_not_stop(stops: Stops, col
 
 
 @pytest.mark.parametrize("name", ["ilvo", "ostermeyer", "surface", "table"])
-def test_no_law_is_told_the_measured_torque(
+def test_no_law_is_given_the_measured_torque(
     name: str, recording: Recording, stops: Stops, columns: Columns
 ) -> None:
     """Slowing follows from the law's own friction (3.22a); the measured one is the measured friction."""

@@ -21,7 +21,7 @@ def test_the_page_of_a_constant(tmp_path: Path, columns: Columns, stops: Stops) 
     write_report(path, columns, stops, identified, [Table("All & every", ("a",), [("1 < 2",)], "")])
     page = path.read_text("utf-8")
     assert "Seen: 80 to 250 °C, 10 to 70 bar, sliding at 1.0 to 9.0 m/s. Beyond: knows no fade." in page
-    assert "Not told by the data: &lt;mu&gt;." in page
+    assert "Not identified by the data: &lt;mu&gt;." in page
     assert "1 &lt; 2" in page
     assert not re.search(r"<script|src=|href=|url\(", page)
     charts = re.findall(r"<svg.*?</svg>", page, re.DOTALL)

@@ -74,7 +74,7 @@ def test_the_documented_commands_make_a_configuration_a_page_and_a_result(
     assert config.front.sigma_disc_heating < before.front.sigma_disc_heating
     assert config.vehicle == before.vehicle
     said = capsys.readouterr()
-    assert "front δ0 in rain: not told by these logs" in said.out
+    assert "front δ0 in rain: not identified by these logs" in said.out
     assert said.err.splitlines()[-1].endswith(
         f"next: brake-ecu replay LOG --config {out} --out drive.parquet"
     )
@@ -117,9 +117,9 @@ MEASURED = tuple(f"disc_temperature_measured_{c}" for c in CORNERS[:3])
 def test_a_bad_log_is_one_line_and_exit_code_2(log, tmp_path, capsys, columns, text) -> None:
     bad, out = change(log, tmp_path / "bad.parquet", **columns), tmp_path / "car.toml"
     assert identify(bad, "--config", CONFIG, "--out", out) == 2
-    told = capsys.readouterr().err.strip().splitlines()
-    assert "bad.parquet" in told[-1]
-    assert text in told[-1]
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert "bad.parquet" in lines[-1]
+    assert text in lines[-1]
     assert not out.exists()
 
 

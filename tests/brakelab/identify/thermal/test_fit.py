@@ -28,7 +28,7 @@ def in_sigmas(fit) -> np.ndarray:
 
 def test_a_dry_and_a_wet_drive_give_all_five_numbers() -> None:
     fit = fit_axle(discs(series(), series(seed=2, rain=True)), START_XI, START)
-    assert fit.told.all()
+    assert fit.identified.all()
     assert fit.rank == 6
     assert fit.heating == pytest.approx(XI, rel=0.01)
     assert np.array(fit.cooling) == pytest.approx(np.array(TRUE), rel=0.05)
@@ -38,7 +38,7 @@ def test_a_dry_and_a_wet_drive_give_all_five_numbers() -> None:
 
 
 @pytest.mark.parametrize(
-    ("drive", "told", "not_told"),
+    ("drive", "identified", "left"),
     [
         ({}, [HEATING, STILL, BY_SPEED], [STILL_WET, BY_SPEED_WET]),
         ({"rain": True}, [HEATING, STILL_WET, BY_SPEED_WET], [STILL, BY_SPEED]),
@@ -47,11 +47,11 @@ def test_a_dry_and_a_wet_drive_give_all_five_numbers() -> None:
     ],
     ids=["dry", "rain", "one speed", "at rest"],
 )
-def test_what_a_drive_cannot_tell_stays_as_configured(drive, told, not_told) -> None:
+def test_what_a_drive_cannot_identify_stays_as_configured(drive, identified, left) -> None:
     fit = fit_axle(discs(series(**drive)), START_XI, START)
-    assert fit.told[told].all()
-    assert not fit.told[not_told].any()
-    if STILL_WET in not_told:  # follows the dry one
+    assert fit.identified[identified].all()
+    assert not fit.identified[left].any()
+    if STILL_WET in left:  # follows the dry one
         assert fit.cooling.still_wet / fit.cooling.still == pytest.approx(START.still_wet / START.still)
 
 

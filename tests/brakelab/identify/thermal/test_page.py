@@ -1,4 +1,4 @@
-"""The page of a fit: tables, picture, and the lines of what is not told."""
+"""The page of a fit: tables, picture, and the lines of what is not identified."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from brakelab.identify.thermal.fit import fit_axle, fit_nothing
-from brakelab.identify.thermal.page import Judged, cooling_panel, untold, write_page
+from brakelab.identify.thermal.page import Judged, cooling_panel, unidentified, write_page
 from brakelab.identify.thermal.result import errors_of, judge, start_of
 from ecu.settings.config import load_config
 
@@ -20,8 +20,8 @@ def axle() -> Judged:
     both, start = discs(series(1500)), start_of(FRONT)
     fit = fit_axle(both, FRONT.disc_heating, start)
     before, errors = fit_nothing(both, FRONT.disc_heating, start, fit), errors_of(fit, FRONT)
-    told = [judge(disc, np.zeros(1500), fit, k, errors, before) for k, disc in enumerate(both)]
-    return Judged("front", FRONT, both, fit, before, errors, told)
+    predictions = [judge(disc, np.zeros(1500), fit, k, errors, before) for k, disc in enumerate(both)]
+    return Judged("front", FRONT, both, fit, before, errors, predictions)
 
 
 def test_a_page_has_parameters_logs_and_a_picture(axle, tmp_path) -> None:
@@ -36,8 +36,8 @@ def test_a_page_has_parameters_logs_and_a_picture(axle, tmp_path) -> None:
     assert "nan" not in picture
 
 
-def test_what_is_not_told_names_the_drive_that_would(axle) -> None:
-    lines = untold(axle)
+def test_what_is_not_identified_names_the_drive_that_would(axle) -> None:
+    lines = unidentified(axle)
     assert [line.split(":")[0] for line in lines] == ["front δ0 in rain", "front δ1 in rain"]
     assert "cruise at 100 km/h" in lines[1]
 

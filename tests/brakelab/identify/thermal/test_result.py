@@ -59,9 +59,9 @@ def test_the_fit_is_nearer_than_the_configuration(dry, fit) -> None:
     start = start_of(FRONT)
     before = fit_nothing(dry, FRONT.disc_heating, start, fit)
     friction = np.zeros(len(dry[0].series.speed))
-    told = judge(dry[0], friction, fit, 0, errors_of(fit, FRONT), before)
-    assert told.after < 0.6 < 0.8 < told.before
-    assert told.inside > 0.95
+    prediction = judge(dry[0], friction, fit, 0, errors_of(fit, FRONT), before)
+    assert prediction.after < 0.6 < 0.8 < prediction.before
+    assert prediction.inside > 0.95
 
 
 def test_a_dry_fit_gives_dry_keys_and_what_follows_from_them(fit) -> None:

@@ -39,7 +39,7 @@ def found(car):
     return identify(read_drives([car[1]], params, None), params, closed=True)
 
 
-def test_a_car_is_told_from_a_start_20_percent_off(car, found):
+def test_a_car_is_identified_from_a_start_20_percent_off(car, found):
     start = start_of(SEED)
     parameters = parameters_of(found, start)
     drive, _, (plant, sensors) = car
@@ -48,11 +48,11 @@ def test_a_car_is_told_from_a_start_20_percent_off(car, found):
         plant, drive, sensors, [used[f"{axle}.push_out_pressure"] for axle in ("front", "rear")]
     )
     true = values_of(found, start, theta) | {"vehicle.track": float(plant["track"])}
-    told = [one for one in parameters if not one.remedy]
+    identified = [one for one in parameters if not one.remedy]
     assert {"vehicle.mass", "vehicle.drag_coefficient", "front.mu_nominal", "rear.slip_stiffness"} <= {
-        one.key for one in told
+        one.key for one in identified
     }
-    for one in told:
+    for one in identified:
         assert one.value == pytest.approx(true[one.key], abs=3.0 * one.sigma), one.key
         if one.key.endswith(("mass", "drag_coefficient", "unloaded_radius", "slip_stiffness")):
             assert one.value == pytest.approx(true[one.key], rel=0.035), one.key
@@ -87,7 +87,9 @@ def test_a_configuration_a_page_and_a_picture_are_written(car, tmp_path, capsys)
     assert identify_vehicle([car[1]], SUV, None, True, out) == 0
     assert load_config(out).vehicle.mass != load_config(SUV).vehicle.mass
     page = (tmp_path / "car.md").read_text("utf-8")
-    assert all(word in page for word in ("## Told", "## Not told", "## Zeros of sensors", "vehicle.mass"))
+    assert all(
+        word in page for word in ("## Identified", "## Not identified", "## Zeros of sensors", "vehicle.mass")
+    )
     assert (tmp_path / "car.svg").read_text("utf-8").count("<rect") >= 4
     said = capsys.readouterr()
     assert "next: brake-ecu replay" in said.err.splitlines()[-1]
@@ -111,38 +113,38 @@ def reduced(car, tmp_path, *without: str, rows: slice = slice(None)):
     return path
 
 
-def told_of(path, closed=True):
+def keys_of(path, closed=True):
     config = load_config(SUV)
     params = new_params(config)
     drives = identify(read_drives([path], params, None), params, closed)
     return {one.key: one for one in parameters_of(drives, config)}
 
 
-def test_without_motor_torque_mass_is_not_told_and_the_brakes_are_for_starts_mass(car, tmp_path):
-    told = told_of(reduced(car, tmp_path, "motor_torque"))
-    assert "motors" in told["vehicle.mass"].remedy
-    assert "coast-down" in told["vehicle.drag_coefficient"].remedy
-    assert not told["front.mu_nominal"].remedy
+def test_without_motor_torque_mass_is_not_identified_and_the_brakes_are_for_starts_mass(car, tmp_path):
+    keys = keys_of(reduced(car, tmp_path, "motor_torque"))
+    assert "motors" in keys["vehicle.mass"].remedy
+    assert "coast-down" in keys["vehicle.drag_coefficient"].remedy
+    assert not keys["front.mu_nominal"].remedy
 
 
-def test_without_a_reference_only_the_ratio_of_the_radii_is_told(car, tmp_path):
-    told = told_of(reduced(car, tmp_path, "vehicle_speed"))
-    assert "speed reference" in told["front.unloaded_radius"].remedy
-    assert not told["rear.unloaded_radius"].remedy
-    assert told["vehicle.pitch_gradient"].remedy
+def test_without_a_reference_only_the_ratio_of_the_radii_is_identified(car, tmp_path):
+    keys = keys_of(reduced(car, tmp_path, "vehicle_speed"))
+    assert "speed reference" in keys["front.unloaded_radius"].remedy
+    assert not keys["rear.unloaded_radius"].remedy
+    assert keys["vehicle.pitch_gradient"].remedy
 
 
 def test_without_pressures_nothing_is_said_of_the_brakes(car, tmp_path):
-    told = told_of(reduced(car, tmp_path, "calliper_pressure"))
-    assert told["front.mu_nominal"].remedy
-    assert told["rear.mu_nominal"].remedy
-    assert not told["vehicle.mass"].remedy
+    keys = keys_of(reduced(car, tmp_path, "calliper_pressure"))
+    assert keys["front.mu_nominal"].remedy
+    assert keys["rear.mu_nominal"].remedy
+    assert not keys["vehicle.mass"].remedy
 
 
-def test_without_a_yaw_rate_the_track_is_not_told(car, tmp_path):
-    told = told_of(reduced(car, tmp_path, "yaw_rate"))
-    assert "slalom" in told["vehicle.track"].remedy
-    assert told["front.vertical_stiffness"].remedy
+def test_without_a_yaw_rate_the_track_is_not_identified(car, tmp_path):
+    keys = keys_of(reduced(car, tmp_path, "yaw_rate"))
+    assert "slalom" in keys["vehicle.track"].remedy
+    assert keys["front.vertical_stiffness"].remedy
 
 
 @pytest.mark.parametrize(
@@ -161,7 +163,7 @@ def test_a_drive_that_tells_nothing_is_one_line(car, tmp_path, without, rows, li
     assert not (tmp_path / "car.toml").exists()
 
 
-def test_a_wrong_unit_is_told(car, tmp_path):
+def test_a_wrong_unit_is_reported(car, tmp_path):
     table = pq.read_table(car[1])
     place = table.column_names.index("accel_x")
     wrong = table.set_column(place, "accel_x", [np.asarray(table["accel_x"].to_pandas()) / 9.81])

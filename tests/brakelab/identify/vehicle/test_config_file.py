@@ -1,4 +1,4 @@
-"""The CONFIG and the map that are written: includes, what is told, what is out of range, offsets."""
+"""The CONFIG and the map that are written: includes, what is identified, what is out of range, offsets."""
 
 import tomllib
 from pathlib import Path
@@ -62,7 +62,7 @@ def test_a_value_out_of_range_is_left_at_start(tmp_path):
     assert kept[1].remedy
 
 
-def test_an_out_that_cannot_be_written_is_told(tmp_path):
+def test_an_out_that_cannot_be_written_is_reported(tmp_path):
     (tmp_path / "cars").write_text("")
     with pytest.raises(UserError, match="cannot be written"):
         written(tmp_path, SUV, MASS)

@@ -99,11 +99,11 @@ def test_without_a_reference_the_front_axle_is_the_measure(reference):
     n = 4
     windows = steady(np.full(n, -2.0), np.linspace(10.0, 25.0, n), (20.0, 10.0), reference=reference)
     params = suv()[0]
-    told = signals_of(windows, params)
-    assert told.speed == reference
-    found = residuals_of(windows, params, told, (0.001, 0.005))
+    signals = signals_of(windows, params)
+    assert signals.speed == reference
+    found = residuals_of(windows, params, signals, (0.001, 0.005))
     assert len(found.kind) == (3 * n if reference else 2 * n)
-    prior = prior_of(params, told)
+    prior = prior_of(params, signals)
     assert (prior.sigma[Place.RADIUS_F] > 0.0) == reference
     assert found.of(prior.mean, 0).shape == found.kind.shape
 
@@ -111,10 +111,10 @@ def test_without_a_reference_the_front_axle_is_the_measure(reference):
 def test_mass_is_held_where_no_torque_is_known_well():
     windows = steady(np.array([-1.0]), np.array([20.0]), motor=np.nan)
     params = suv()[0]
-    told = signals_of(windows, params)
-    assert not told.motor
-    assert not told.torque
-    assert prior_of(params, told).sigma[Place.MASS] == 0.0
+    signals = signals_of(windows, params)
+    assert not signals.motor
+    assert not signals.torque
+    assert prior_of(params, signals).sigma[Place.MASS] == 0.0
     rough = suv()
     rough["sigma_motor_torque"] = 0.3
     assert not signals_of(steady(np.array([-1.0]), np.array([20.0]), motor=5.0), rough[0]).motor

@@ -55,7 +55,7 @@ def test_a_drive_that_cannot_be_used_is_refused(name):
         check(drive_of("drive.csv", rows), [], suv()[0])
 
 
-def test_what_physics_finds_wrong_is_told_but_a_zero_is_not():
+def test_what_physics_finds_wrong_is_reported_but_a_zero_is_not():
     good = drive(60.0, 20.0)
     check(
         good,

@@ -33,7 +33,7 @@ def windows_of(grade_mean=0.0, stands=False):
     return windows, steps_of(windows, np.where(windows.free, rolls, np.where(windows.standing, 0.0, np.nan)))
 
 
-def test_dive_is_told_without_the_grade():
+def test_dive_is_found_without_the_grade():
     _, steps = windows_of()
     value, sigma, count = dive_of(steps, (0.0028, 0.001))
     assert count > 100
@@ -67,7 +67,7 @@ def slalom_on_hills(begin: float):
 
 
 def test_the_hill_under_the_curves_is_in_the_sigma_of_the_zero():
-    """What curves add is told beside the grade of their place: of a closed drive the greatest error."""
+    """What curves add is shown beside the grade of their place: of a closed drive the greatest error."""
     z, off = [], []
     for begin in np.linspace(0.0, 1.0, 12, endpoint=False):
         value, sigma = accel_zero(*slalom_on_hills(float(begin)), PITCH, closed=True)

@@ -27,14 +27,14 @@ def curves(amplitude=0.12):
     return drive(200.0, speed, yaw_rate=yaw + ZERO + noise, **wheels)
 
 
-def told(found, yaw=None):
+def pairs_in(found, yaw=None):
     windows = cut([found], [np.zeros(4)], RADIUS)
     rolls = np.zeros((2, len(windows.t)))
     return pairs_of(windows, np.array([RADIUS, RADIUS]), rolls, yaw, suv()[0])
 
 
-def test_track_zero_radii_and_deflection_are_told():
-    pairs = told(curves())
+def test_track_zero_radii_and_deflection_are_identified():
+    pairs = pairs_in(curves())
     assert pairs.track[0] == pytest.approx(TRACK, abs=3 * pairs.track[1])
     assert pairs.track[1] < 0.02 * TRACK
     assert pairs.yaw_zero[0] == pytest.approx(ZERO, abs=3 * pairs.yaw_zero[1])
@@ -44,6 +44,6 @@ def test_track_zero_radii_and_deflection_are_told():
     assert pairs.deflection[0] == pytest.approx(2 * DEFLECTION * TRACK / (2 * base), rel=0.05)
 
 
-def test_a_straight_drive_tells_nothing():
-    assert told(curves(0.001)) is None
-    assert told(drive(60.0, 20.0)) is None
+def test_a_straight_drive_identifies_nothing():
+    assert pairs_in(curves(0.001)) is None
+    assert pairs_in(drive(60.0, 20.0)) is None

@@ -228,7 +228,7 @@ SENT = "20 frames sent, late by "
 
 
 @pytest.mark.parametrize(
-    ("end", "told"),
+    ("end", "message"),
     [
         ("", ""),
         ("(1.000021) can0 114#15", "line 21: the last line is cut off and was not used"),
@@ -237,7 +237,7 @@ SENT = "20 frames sent, late by "
     ids=["whole", "without its end of line", "torn in the stamp"],
 )
 def test_a_bus_hears_the_drive_though_the_last_line_is_torn(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], end: str, told: str
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], end: str, message: str
 ) -> None:
     log = tmp_path / "drive.log"
     log.write_text("".join(f"(1.{k:06d}) can0 {0x100 + k:03X}#{k:02X}\n" for k in range(20)) + end)
@@ -246,11 +246,13 @@ def test_a_bus_hears_the_drive_though_the_last_line_is_torn(
     assert printed.out.startswith(f"{log}: {SENT}")
     assert printed.out.count("\n") == 1
     assert printed.err == f"playing {log} onto virtual play-test; Ctrl-C ends it\n" + (
-        f"{log}: {told}\n" if told else ""
+        f"{log}: {message}\n" if message else ""
     )
 
 
-def test_damage_and_steps_of_the_clock_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_damage_and_steps_of_the_clock_are_reported(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     log = tmp_path / "drive.log"
     log.write_text("(9.000000) can0 100#00\nnonsense\n(8.000000) can0 101#01\n(8.001000) can0 102#02\n")
     assert [can_id for can_id, _ in heard_by("play-back", log, 1.0)[1]] == [0x100, 0x101, 0x102]
@@ -321,7 +323,7 @@ def test_what_cannot_be_played_gives_one_line(
     assert line in str(error.value)
 
 
-def test_a_map_beside_decoded_signals_is_told_to_be_of_no_use(
+def test_a_map_beside_decoded_signals_is_reported_as_of_no_use(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path, map = write_signals(tmp_path / "drive.csv"), resource("config/maps/mustang.toml")

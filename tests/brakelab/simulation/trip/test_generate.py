@@ -209,12 +209,14 @@ def test_a_braking_with_constant_deceleration_has_that_mean(
 
 
 def test_mean_deceleration_is_by_distance() -> None:
-    """1 m/s^2 down to half the lost speed, then 3: v_b^2 - v_e^2 over the way in between."""
+    """1 m/s^2 down to half the lost speed, then 3: v_b^2 - v_e^2 over the distance in between."""
     t = np.arange(0.0, 20.0, 0.001)
     a = np.where(t < 10.0, 1.0, np.where(t < 10.0 + 10.0 / 3.0, 3.0, 0.0))
     speed = 20.0 - np.concatenate([[0.0], np.cumsum(0.001 * a[:-1])])
-    way = (16.0**2 - 10.0**2) / 2.0 + (10.0**2 - 2.0**2) / 6.0
-    assert brakings(t, speed, a).mean_decel[0] == pytest.approx((16.0**2 - 2.0**2) / (2.0 * way), rel=2e-3)
+    distance = (16.0**2 - 10.0**2) / 2.0 + (10.0**2 - 2.0**2) / 6.0
+    assert brakings(t, speed, a).mean_decel[0] == pytest.approx(
+        (16.0**2 - 2.0**2) / (2.0 * distance), rel=2e-3
+    )
 
 
 def truth(path: Path) -> None:
@@ -240,7 +242,7 @@ def test_a_drive_is_reported_beside_its_trip(tmp_path: Path, capsys: pytest.Capt
 
 
 def test_brakings_are_counted_where_they_begin() -> None:
-    """200 s at 15 m/s, 100 s at 20 m/s and 100 s at 30 m/s, and no way that takes time in between."""
+    """200 s at 15 m/s, 100 s at 20 m/s and 100 s at 30 m/s, and no distance that takes time in between."""
     t = np.arange(0.0, 400.5, 1.0)
     speed = np.where(t <= 200.0, 15.0, np.where(t <= 300.0, 20.0, 30.0))
     rows = np.array([(10.0, 5.0, 15.0, 0.0, 1.0), (20.0, 5.0, 16.0, 8.0, 2.0), (390.0, 5.0, 30.0, 25.0, 1.5)])

@@ -32,10 +32,13 @@ def parameter(key, value, sigma, remedy=""):
     return Parameter(key, "kg", 2000.0, value, sigma, 10, "by hand", remedy)
 
 
-def test_only_what_was_told_is_taken():
+def test_only_what_was_identified_is_taken():
     start = start_of(1)
-    told = [parameter("vehicle.mass", 1900.0, 10.0), parameter("front.mu_nominal", 0.3, 0.1, "brakings")]
-    found = with_parameters(start, told)
+    identified = [
+        parameter("vehicle.mass", 1900.0, 10.0),
+        parameter("front.mu_nominal", 0.3, 0.1, "brakings"),
+    ]
+    found = with_parameters(start, identified)
     assert found.vehicle.mass == 1900.0
     assert found.front == start.front
 
@@ -57,7 +60,7 @@ def test_the_table_counts_and_names_misses():
 
 
 @pytest.mark.study
-def test_six_cars_are_told_within_their_sigma_and_predict_a_strangers_drive():
+def test_six_cars_are_identified_within_their_sigma_and_predict_a_strangers_drive():
     """The page has ten."""
     cars = [identified_of(seed) for seed in range(6)]
     beside = [each for car in cars for each in car.keys if not each.parameter.remedy]

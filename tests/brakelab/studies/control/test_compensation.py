@@ -63,7 +63,7 @@ def test_what_the_mass_leaves_is_the_same_in_cars_that_differ_by_mass_alone() ->
     assert rows[-1][2:] == ("-3.6 (0.0)",) * 6
 
 
-def test_told_too_much_friction_the_car_brakes_too_little() -> None:
+def test_given_too_much_friction_the_car_brakes_too_little() -> None:
     config = load_config(resource("config/suv.toml"))
     scenario = manoeuvre("single application")
     runs = {kind: drive_as(kind, scenario, config, 0) for kind in ("ideal", "under", "over")}

@@ -18,7 +18,7 @@ def sound():
 
 
 @pytest.mark.parametrize(
-    ("case", "least", "most", "told_ms"),
+    ("case", "least", "most", "reported_ms"),
     [
         ("calliper front left", -5.0, 5.0, 120.0),
         ("circuit of the rear axle", -5.0, 6.0, 120.0),
@@ -28,10 +28,10 @@ def sound():
         ("sensor keeps its value, front left", -6.0, 6.0, None),
     ],
 )
-def test_what_a_failure_leaves(sound, case, least, most, told_ms) -> None:
+def test_what_a_failure_leaves(sound, case, least, most, reported_ms) -> None:
     left = left_of(run(new_loop(braking(4.0, False, [FAILURES[case]]), CONFIG, CAR)), sound)
     print(left)
     assert least <= left.deceleration <= most
-    assert (left.told_ms <= told_ms) if told_ms else left.told_ms != left.told_ms
+    assert (left.reported_ms <= reported_ms) if reported_ms else left.reported_ms != left.reported_ms
     assert left.beside < 0.5
     assert left.slip < 10.0

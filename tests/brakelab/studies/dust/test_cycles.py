@@ -14,12 +14,12 @@ from ecu.settings.config import new_params
 from ecu.settings.dust import Dust
 
 
-def driven(particles: float, work: float = 4e6, told: float = 2e9) -> CycleDrive:
+def driven(particles: float, work: float = 4e6, mass: float = 2e9) -> CycleDrive:
     """Return 100 km with 8 g worn off, of which half stays in the air."""
     every = np.full(4, 0.25)
     return CycleDrive(
         1e5, particles * every, 8.0 * every, work * every, 2e6, np.array([90.0, 95.0, 110.0, 105.0]), -0.01,
-        (0.012, 0.008), 0.0, 0.07, told, 30.0, 1e6 * 0.5 * 8.0 / 1e5,
+        (0.012, 0.008), 0.0, 0.07, mass, 30.0, 1e6 * 0.5 * 8.0 / 1e5,
     )  # fmt: skip
 
 
@@ -41,7 +41,7 @@ def cars(blended_work: float = 1e6) -> list[Driven]:
 def test_a_row_beside_the_limits_has_mass_by_law_and_by_coefficient() -> None:
     rows = {(row[0], row[1]): row[2:] for row in limit_rows(cars())}
     assert rows["suv", "real-driving"] == (
-        "40.0", "30.0", "7", "40.0", "10.00", "not told", "0.040", "1.00"
+        "40.0", "30.0", "7", "40.0", "10.00", "not known", "0.040", "1.00"
     )  # fmt: skip
     assert rows["lcv", "wltp-brake"][2] == "11"
     assert rows["suv-blended", "wltp-brake"][2:4] == ("3", "6.8")  # 0.17 of 40
@@ -56,7 +56,7 @@ def test_a_row_of_savings_is_against_the_policy_off() -> None:
     assert rows["suv", "real-driving", "dust"][6] == "1.2, 0.8"
 
 
-def test_draws_are_told_by_median_and_ends() -> None:
+def test_draws_are_stated_by_median_and_ends() -> None:
     saved = [
         Drawn(
             lots,
@@ -87,13 +87,13 @@ def law() -> Dust:
 
 
 def test_the_work_of_a_braking_on_the_level_is_what_resistances_leave_of_the_motion() -> None:
-    """20 m/s to 10 m/s within 8 s: m/2 (v1^2 - v2^2) less drag and rolling on the way."""
+    """20 m/s to 10 m/s within 8 s: m/2 (v1^2 - v2^2) less drag and rolling over that distance."""
     t, v = np.array([0.0, 5.0, 13.0, 20.0]), np.array([20.0, 20.0, 10.0, 10.0])
     car = drawn("suv", 3)
     params = new_params(configured("suv", (law(), law())))
     done = drive_open(car, params, [(20.0, profile(t, v, np.zeros(4)))])
     metres = 8.0 * 15.0
-    drag = float(car["drag_factor"][0]) * metres * 250.0  # mean of v^2 by way: (v1^2 + v2^2) / 2
+    drag = float(car["drag_factor"][0]) * metres * 250.0  # mean of v^2 by distance: (v1^2 + v2^2) / 2
     rolling = 9.81 * float(car["rolling_resistance"][0]) * float(params["mass"][0]) * metres
     motion = 0.5 * float(params["mass"][0]) * (20.0**2 - 10.0**2)
     assert done.work.sum() == pytest.approx(motion - drag - rolling, rel=0.03)  # radii

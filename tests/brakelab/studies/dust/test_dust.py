@@ -1,4 +1,4 @@
-"""`bench dust`: its rows by hand, errors of what is told, one draw of the trips."""
+"""`bench dust`: its rows by hand, errors of what is counted, one draw of the trips."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from brakelab.studies.dust.study import (
     Draw,
     OnBoard,
     Outcome,
-    _told_error,
+    _counted_error,
     draw_trips,
     mass_after_measurement,
 )
@@ -36,14 +36,24 @@ def test_a_row_holds_median_and_worst_over_the_draws():
     assert rows[4][-1] == "missed: worst by 20"
 
 
-def test_what_is_not_told_per_kilometre_says_so():
+def test_what_is_not_known_per_kilometre_says_so():
     car = OnBoard(0, "monotone law", -0.2, -0.05, 0.85, float("nan"), 12.0, 8.5, 8.0)
     tables = dust_tables([draw(0.0, 0.0)], [draw(0.0, 0.0)], [car])
-    assert tables[2].rows[0] == ("0", "monotone law", "-20.0", "-5.0", "85", "not told", "12.0", "8.5", "8.0")
+    assert tables[2].rows[0] == (
+        "0",
+        "monotone law",
+        "-20.0",
+        "-5.0",
+        "85",
+        "not known",
+        "12.0",
+        "8.5",
+        "8.0",
+    )
 
 
-def test_errors_of_what_is_told_leave_the_rest_out():
-    """Two applications that emit 100 and 50; of the second nothing is told."""
+def test_errors_of_what_is_counted_leave_the_rest_out():
+    """Two applications that emit 100 and 50; of the second nothing is counted."""
     rows = np.zeros((1000, 3))
     rows[:, 1] = np.nan
     for start, end, gain in ((100, 200, 100.0), (500, 600, 50.0)):
@@ -51,7 +61,7 @@ def test_errors_of_what_is_told_leave_the_rest_out():
         rows[start:end, 2] += np.linspace(0.0, gain, end - start)
         rows[end:, 2] += gain
     rows[200:600, 1] = 110.0
-    assert _told_error(rows) == pytest.approx(0.10)
+    assert _counted_error(rows) == pytest.approx(0.10)
 
 
 def test_a_measured_thickness_puts_the_mass_right_whatever_the_law():

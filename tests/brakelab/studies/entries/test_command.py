@@ -26,7 +26,7 @@ ROOT = Path(__file__).parents[4]
         (Entered(drive=f"mustang:{ROOT}/tests/data/kona.log"), "no braking of mustang to predict"),
     ],
 )
-def test_a_mistake_is_told_before_anything_is_driven(entered: Entered, remedy: str) -> None:
+def test_a_mistake_is_reported_before_anything_is_driven(entered: Entered, remedy: str) -> None:
     with pytest.raises(UserError, match=remedy):
         measure_entries(Asked(1, entered=entered))
 

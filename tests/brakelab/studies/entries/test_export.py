@@ -37,7 +37,7 @@ def test_inputs_and_truth_are_files_without_the_wheel_forces(tmp_path: Path) -> 
     assert load_config(tmp_path / "out/suv.toml") == configured()
 
 
-def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_made_is_reported(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(UserError, match="cannot be written"):
         new_folder(tmp_path / "file" / "out")

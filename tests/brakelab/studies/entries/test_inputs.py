@@ -30,6 +30,6 @@ def test_samples_cannot_be_changed_for_the_next_entry() -> None:
         inputs().wheel_speed[0] = 1.0
 
 
-def test_a_misspelt_signal_is_told() -> None:
+def test_a_misspelt_signal_is_reported() -> None:
     with pytest.raises(AttributeError, match="calliper_pressure"):
         _ = inputs().caliper_pressure

@@ -1,4 +1,4 @@
-"""How `--observer` names a class, and every way to get it wrong."""
+"""How `--observer` names a class, and every mistake in it."""
 
 from pathlib import Path
 

@@ -24,9 +24,9 @@ def test_thermocouples_lag_scatter_and_are_off() -> None:
 def test_a_trip_begins_at_a_stop(share) -> None:
     trip = measured_trip(3, "usual", 8.0, 1.0, share)
     assert trip.trace is not None
-    way = np.array(trip.trace.speed)
-    assert tuple(way[0]) == (0.0, 0.0)
-    assert (way[-1, 0] < 5000.0) == bool(share)
+    speeds = np.array(trip.trace.speed)
+    assert tuple(speeds[0]) == (0.0, 0.0)
+    assert (speeds[-1, 0] < 5000.0) == bool(share)
     assert trip.initial_disc_temperature == (8.0, 8.0)
     assert trip.wetness == 1.0
     assert trip.grade[0][0] == 0.0

@@ -19,11 +19,21 @@ CONFIG = load_config(Path(__file__).parents[4] / "config" / "suv.toml")
 
 
 def judged(name: str) -> Judged:
-    told = np.array([True, True, True, True, False, True])
+    identified = np.array([True, True, True, True, False, True])
     new, old = Cooling(2e-3, 1e-4, 3e-3, 2e-4), Cooling(1e-3, 1e-4, 1e-3, 2e-4)
     some = np.zeros(2)
     fit = Fit(
-        2.2e-4, new, 0.03 * np.ones(6), told, 6, 2.0, some, some, 2.0, 200.0, np.array([0.03, 0.05, 0.1])
+        2.2e-4,
+        new,
+        0.03 * np.ones(6),
+        identified,
+        6,
+        2.0,
+        some,
+        some,
+        2.0,
+        200.0,
+        np.array([0.03, 0.05, 0.1]),
     )
     before = fit._replace(heating=2e-4, cooling=old)
     return Judged(name, CONFIG.front, [], fit, before, Errors(0.03, 0.06, 0.17), [])
@@ -63,7 +73,7 @@ def test_every_car_has_its_parameters_against_the_configuration(cars) -> None:
     assert table.rows[3][-4:] == ("11.0", "11.0", "97", "97")
 
 
-def test_an_unknown_rest_is_told_apart(cars) -> None:
+def test_an_unknown_rest_is_listed_apart(cars) -> None:
     assert thermal_tables(cars)[2].rows[0] == ("front", "7.5 (11.0)", "12.0 (12.0)")
     assert all(markdown(table) for table in thermal_tables(cars))
 

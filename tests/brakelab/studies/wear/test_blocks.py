@@ -17,14 +17,16 @@ def stop(v_in: float, v_end: float, decel: float, gap: float = 30.0) -> np.ndarr
 
 @pytest.mark.parametrize(("v_in", "v_end", "decel"), [(30, 5, 3), (30, 5, 1), (15, 2, 1), (36, 25, 2)])
 def test_the_energies_are_those_of_7_20_and_7_21(v_in: float, v_end: float, decel: float):
-    """Dynamometer: all of the kinetic energy. Road: less by what drag and rolling take over the way."""
+    """Dynamometer: all of the kinetic energy. Road: less by what drag and rolling take over the distance."""
     found = pair_of(CORNER, stop(v_in, v_end, decel))
     kinetic = 0.5 * CORNER.mass * (v_in**2 - v_end**2)
     assert found.rig.energy[0] == pytest.approx(kinetic, rel=0.004)
-    way = np.linspace(0.0, (v_in**2 - v_end**2) / (2.0 * decel), 2001)
-    resistance = CORNER.rolling + CORNER.drag * (v_in**2 - 2.0 * decel * way)
-    assert found.road.energy[0] == pytest.approx(kinetic - np.trapezoid(resistance, way), rel=0.012)
-    assert energy_error(CORNER, v_in, v_end, decel) == pytest.approx(np.trapezoid(resistance, way) / kinetic)
+    distance = np.linspace(0.0, (v_in**2 - v_end**2) / (2.0 * decel), 2001)
+    resistance = CORNER.rolling + CORNER.drag * (v_in**2 - 2.0 * decel * distance)
+    assert found.road.energy[0] == pytest.approx(kinetic - np.trapezoid(resistance, distance), rel=0.012)
+    assert energy_error(CORNER, v_in, v_end, decel) == pytest.approx(
+        np.trapezoid(resistance, distance) / kinetic
+    )
     assert found.energy_error == pytest.approx(energy_error(CORNER, v_in, v_end, decel), abs=0.01)
     assert found.rig.seconds[0] == pytest.approx(found.road.seconds[0], abs=0.2)
 

@@ -131,7 +131,7 @@ def means_table(title: str, means: list[Means]) -> Table:
 def _summary(means: list[Means]) -> str:
     """Return nominal, cold and least fade friction in one line, where the programme has them."""
     of = {each.name.split(" ", 1)[-1]: each.mu for each in means}
-    told = [
+    stated = [
         (label, float(of[name].min() if "fade" in name else of[name].mean()))
         for name, label in (
             ("characteristic value 3", "nominal"),
@@ -141,4 +141,4 @@ def _summary(means: list[Means]) -> str:
         )
         if name in of
     ]
-    return f"Friction: {', '.join(f'{label} {mu:.3f}' for label, mu in told)}." if told else ""
+    return f"Friction: {', '.join(f'{label} {mu:.3f}' for label, mu in stated)}." if stated else ""

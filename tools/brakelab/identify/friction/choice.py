@@ -81,7 +81,7 @@ def identify(
 ) -> Identified:
     """Return all laws identified on `stops` and judged on `unseen`, by default the hottest of `stops`.
 
-    `progress` is told a line for each law; `own`: files and entry points of laws of one's own. Two processes.
+    `progress` receives a line for each law; `own`: files and entry points of own laws. Two processes.
     """
     names = [candidate.name for candidate in candidates(stops, columns.brake, own)]
     jobs = [_Job(name, columns.brake, stops, unseen, own) for name in names]

@@ -1,4 +1,4 @@
-"""Finds the terms of a friction law in stops instead of being told them (C.1).
+"""Finds the terms of a friction law in stops instead of taking them as given (C.1).
 
 Model. mu_b = kappa alpha, alpha 1 at the start of an application,
 

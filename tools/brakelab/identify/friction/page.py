@@ -88,7 +88,7 @@ def write_report(
         f"<p>{identified.stops} stops; nRMSE {chosen.error:.2f} % on them, {chosen.held_out:.2f} % unseen. "
         "</p>",
         f'<p class="limit"><b>Do not extrapolate.</b> Seen: {ends}. Beyond: {escape(chosen.extrapolates)}.'
-        + (f" Not told by the data: {escape(unsure)}." if unsure else "")
+        + (f" Not identified by the data: {escape(unsure)}." if unsure else "")
         + "</p>",
         _scrolling(chart_svg(fit, [("measured", GREY), ("law", BLUE)])),
         "<h2>What the law leaves</h2><p>A mark is a block of 50 ms, the line their mean. A line off zero is "

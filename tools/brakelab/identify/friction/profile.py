@@ -1,6 +1,6 @@
 """Profile likelihood: how much worse the fit becomes when one number is held and all others follow.
 
-Where a profile stays flat the number is not told by the data, whatever its interval from slopes says. The
+Where a profile stays flat the data do not identify the number, whatever its interval from slopes says. The
 height is scaled as `fitting.clustered` has it: a quadratic cost gives the same interval as the slopes.
 """
 

@@ -48,7 +48,7 @@ def law_tables(identified: Identified, unseen: str) -> list[Table]:
     )
     return [
         Table("Laws", ("law", "numbers", "nRMSE [%]", "unseen [%]", "criterion", "agree"), errors, chosen),
-        Table("Where laws end", ("law", "numbers not told by these stops", "note"), limits, seen),
+        Table("Where laws end", ("law", "numbers not identified by these stops", "note"), limits, seen),
     ]
 
 
@@ -64,13 +64,14 @@ def number_table(judged: Judged) -> Table:
     ]
     below = (
         "±: 95 % by the scatter of these stops, residuals of one stop taken together; lag, filters and scale "
-        "of the sensors, which shift numbers by several times that, are not in it. Told: by these stops."
+        "of the sensors, which shift numbers by several times that, are not in it. "
+        "Identified: by these stops."
     )
-    return Table(f"Numbers of {judged.name}", ("number", "value", "±", "unit", "told"), rows, below)
+    return Table(f"Numbers of {judged.name}", ("number", "value", "±", "unit", "identified"), rows, below)
 
 
 def profile_table(fitted: Fitted, brake: RigBrake, stops: Stops, progress: Callable[[str], None]) -> Table:
-    """Return the profile likelihood's intervals beside those of slopes; `progress` is told each number."""
+    """Return the profile likelihood's intervals beside those of slopes; `progress` receives each number."""
     rows = []
     for place, (free, value, half) in enumerate(
         zip(fitted.candidate.free, fitted.values, fitted.half, strict=True)

@@ -9,7 +9,7 @@ import numpy as np
 from brakelab.identify.config_file import Section, write_car
 from brakelab.identify.thermal.check import check_drive, check_fit
 from brakelab.identify.thermal.fit import Disc, Fit, fit_axle, fit_nothing
-from brakelab.identify.thermal.page import Judged, untold, write_page
+from brakelab.identify.thermal.page import Judged, unidentified, write_page
 from brakelab.identify.thermal.reader import Drive, read_drives
 from brakelab.identify.thermal.result import errors_of, judge, section_of, start_of
 from brakelab.results.outputs import check_outputs, config_files
@@ -28,11 +28,11 @@ def judge_axle(name: str, drives: Sequence[Drive], discs: list[Disc], axle: Axle
     check_fit(str(drive_of[id(discs[0].series)].path), discs, fit, axle.disc_heating, start)
     before = fit_nothing(discs, axle.disc_heating, start, fit)
     errors = errors_of(fit, axle)
-    told = [
+    predictions = [
         judge(disc, drive_of[id(disc.series)].friction_error[:, disc.corner], fit, number, errors, before)
         for number, disc in enumerate(discs)
     ]
-    return Judged(name, axle, discs, fit, before, errors, told)
+    return Judged(name, axle, discs, fit, before, errors, predictions)
 
 
 def _mean(values: Sequence[float]) -> float:
@@ -41,7 +41,7 @@ def _mean(values: Sequence[float]) -> float:
 
 def _about(axle: Judged) -> str:
     names = ", ".join(dict.fromkeys(disc.series.name for disc in axle.discs))
-    before, after = (_mean([getattr(told, when) for told in axle.told]) for when in ("before", "after"))
+    before, after = (_mean([getattr(one, when) for one in axle.predictions]) for when in ("before", "after"))
     return f"{names}; RMSE {before:.1f} to {after:.1f} K"
 
 
@@ -80,8 +80,8 @@ def identify_thermal(logs: Sequence[Path], config: Path, map: Path | None, out: 
         if discs:
             print(f"{name}: fitting {len(discs)} discs …", flush=True)
             axles.append(judge_axle(name, drives, discs, getattr(vehicle, name)))
-    if not any(axle.fit.told[:5].any() for axle in axles):
-        raise UserError(str(logs[0]), "disc_temperature_measured_*", "; ".join(untold(axles[0])[:1]))
+    if not any(axle.fit.identified[:5].any() for axle in axles):
+        raise UserError(str(logs[0]), "disc_temperature_measured_*", "; ".join(unidentified(axles[0])[:1]))
     sections: dict[str, Section] = {
         axle.name: section_of(axle.fit, axle.brake, axle.errors, _about(axle)) for axle in axles
     }
@@ -93,11 +93,11 @@ def identify_thermal(logs: Sequence[Path], config: Path, map: Path | None, out: 
         if not drive.rain_known:
             print(f"{drive.path}: no rain signal; taken as dry")
     for axle in axles:
-        for line in untold(axle):
+        for line in unidentified(axle):
             print(line)
     give(axles=sections)
     for axle in axles:
-        fit, inside = axle.fit, 100.0 * float(np.mean([told.inside for told in axle.told]))
+        fit, inside = axle.fit, 100.0 * float(np.mean([one.inside for one in axle.predictions]))
         print(
             f"{axle.name}: ξ {fit.heating:.3g} K/J, δ {fit.cooling.still:.3g} + {fit.cooling.by_speed:.3g} v "
             f"1/s; {_about(axle)}, inside 2σ {inside:.0f} %"

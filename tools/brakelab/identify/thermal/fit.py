@@ -7,7 +7,7 @@ projection); the sensor's time constant is fitted with the rest.
 What a lump leaves over is no noise: it lasts for minutes, and left and right share it. A residual therefore
 counts by its standard deviation times the square root of its autocorrelation time and of the axle's discs, so
 that the covariance is that of the parameters and not of the number of samples. Wide priors hold what a drive
-does not move; what stays wider than `TOLD` is not told, and keeps the value of the configuration.
+does not move; what stays wider than `IDENTIFIED_SIGMA` is not identified, and keeps its configured value.
 
 Source. Section 7.6.1 (the sedan, dry and wet); scipy `least_squares`. Assumption: all constants.
 """
@@ -26,8 +26,8 @@ HEATING, STILL, BY_SPEED, STILL_WET, BY_SPEED_WET, LAG = range(6)
 NAMES: Final = ("xi", "delta_0", "delta_1", "delta_0 in rain", "delta_1 in rain", "lag of the sensor")
 PRIOR: Final = np.array([0.4, 0.7, 0.7, 0.5, 0.5, 1.0])
 """Standard deviation of the logarithms; in rain of the ratio to dry."""
-TOLD: Final = 0.25
-"""Standard deviation of a logarithm from which on a parameter is not told."""
+IDENTIFIED_SIGMA: Final = 0.25
+"""Standard deviation of a logarithm beyond which a parameter is not identified."""
 LAG_S: Final = 2.0
 OFFSET: Final = 1.5  # K, of a thermocouple; what the ECU cannot know is better not given to the sensor
 OFFSET_NO_AIR: Final = 15.0  # K, where no air temperature is in the log; AMBIENT_UNKNOWN
@@ -63,7 +63,7 @@ class Fit(NamedTuple):
     cooling: Cooling
     sigma: Array
     """Standard deviation of the logarithms in the order of `NAMES`, with the priors, shape (6,)."""
-    told: Rows
+    identified: Rows
     """Shape (6,)."""
     rank: int
     """Of the Jacobian, of at most six."""
@@ -256,12 +256,12 @@ def fit_axle(discs: Sequence[Disc], heating: float, start: Cooling) -> Fit:
         own[free] = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
         own[LAG] = 0.0
         wide = np.where(free, own, 0.0)
-        if wide.max() <= TOLD:
+        if wide.max() <= IDENTIFIED_SIGMA:
             break
         free[int(wide.argmax())] = False
         x = np.where(free, x, 0.0)
-    told = free.copy()
-    told[[STILL, BY_SPEED]] &= dry > 0.0
+    identified = free.copy()
+    identified[[STILL, BY_SPEED]] &= dry > 0.0
     both = np.eye(len(NAMES))
     both[STILL_WET, STILL] = both[BY_SPEED_WET, BY_SPEED] = 1.0  # in rain: dry times ratio
     whole = both @ covariance @ both.T
@@ -270,7 +270,7 @@ def fit_axle(discs: Sequence[Disc], heating: float, start: Cooling) -> Fit:
     return Fit(
         *final,
         np.sqrt(np.diag(whole)),
-        told,
+        identified,
         rank,
         lag,
         np.array([start for _, start, _ in gone]),

@@ -9,7 +9,7 @@ import numpy as np
 from brakelab.arrays import Array
 from brakelab.identify.thermal.fit import Disc, Fit
 from brakelab.identify.thermal.model import ROW, Cooling
-from brakelab.identify.thermal.result import KEYS, REMEDIES, SYMBOLS, Errors, Told, values_of
+from brakelab.identify.thermal.result import KEYS, REMEDIES, SYMBOLS, Errors, Prediction, values_of
 from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Line, Panel, write_chart
 from brakelab.results.text_table import Table, markdown
 from ecu.contract.signals import CORNERS
@@ -37,15 +37,15 @@ class Judged(NamedTuple):
     before: Fit
     """The configuration before, as if it were a fit."""
     errors: Errors
-    told: list[Told]
+    predictions: list[Prediction]
 
 
-def untold(axle: Judged) -> list[str]:
-    """Return a line for every parameter that the logs do not tell, and which drive would."""
+def unidentified(axle: Judged) -> list[str]:
+    """Return a line for every parameter that the logs do not identify, with the drive that would."""
     return [
-        f"{axle.name} {SYMBOLS[place]}: not told by these logs, as configured; {remedy}"
+        f"{axle.name} {SYMBOLS[place]}: not identified by these logs, as configured; {remedy}"
         for place, remedy in REMEDIES.items()
-        if not axle.fit.told[place]
+        if not axle.fit.identified[place]
     ]
 
 
@@ -56,8 +56,8 @@ def tables(axles: Sequence[Judged]) -> list[Table]:
         new = values_of(axle.fit.heating, axle.fit.cooling)
         old = values_of(axle.before.heating, axle.before.cooling)
         for place, (key, unit) in KEYS.items():
-            told = bool(axle.fit.told[place])
-            sigma = f"{new[place] * axle.fit.sigma[place]:.2g}" if told else "–"
+            known = bool(axle.fit.identified[place])
+            sigma = f"{new[place] * axle.fit.sigma[place]:.2g}" if known else "–"
             row = (
                 axle.name,
                 SYMBOLS[place],
@@ -67,8 +67,8 @@ def tables(axles: Sequence[Judged]) -> list[Table]:
                 f"{new[place]:.4g}",
                 sigma,
             )
-            parameters.append((*row, "yes" if told else REMEDIES[place]))
-        for number, (disc, told_disc) in enumerate(zip(axle.discs, axle.told, strict=True)):
+            parameters.append((*row, "yes" if known else REMEDIES[place]))
+        for number, (disc, prediction) in enumerate(zip(axle.discs, axle.predictions, strict=True)):
             series, seen = disc.series, disc.seen
             measured = series.measured[seen, disc.corner]
             logs.append(
@@ -80,9 +80,9 @@ def tables(axles: Sequence[Judged]) -> list[Table]:
                     f"{measured.min():.0f}–{measured.max():.0f}",
                     f"{axle.fit.starts[number]:+.0f}",
                     f"{axle.fit.offsets[number]:+.1f}",
-                    f"{told_disc.before:.1f}",
-                    f"{told_disc.after:.1f}",
-                    f"{100 * told_disc.inside:.0f}",
+                    f"{prediction.before:.1f}",
+                    f"{prediction.after:.1f}",
+                    f"{100 * prediction.inside:.0f}",
                 )
             )
     lag = ", ".join(f"{axle.name} {axle.fit.lag:.1f} s" for axle in axles)
@@ -91,10 +91,10 @@ def tables(axles: Sequence[Judged]) -> list[Table]:
     return [
         Table(
             "Parameters",
-            ("axle", "", "key", "unit", "before", "now", "σ", "told"),
+            ("axle", "", "key", "unit", "before", "now", "σ", "identified"),
             parameters,
             f"σ by the residual, which lasts (standard deviation, autocorrelation time: {lasts}). Rank of "
-            f"the six parameters, the sensor's lag among them: {ranks}. Not told: the drive that would.",
+            f"the six parameters, the sensor's lag among them: {ranks}. Otherwise the drive that would.",
         ),
         Table(
             "Logs",
@@ -143,12 +143,16 @@ def write_page(page: Path, axles: Sequence[Judged]) -> None:
         cooling_panel(f"{axle.name}: δ [1/1000 s], before dashed", axle.fit.cooling, axle.before.cooling)
         for axle in axles
     ]
-    discs = [pair for axle in axles for pair in zip(axle.discs, axle.told, strict=True)]
-    for disc, told in discs[:MOST]:
+    discs = [pair for axle in axles for pair in zip(axle.discs, axle.predictions, strict=True)]
+    for disc, prediction in discs[:MOST]:
         series = disc.series
         minutes = np.arange(1, len(series.speed) + 1, dtype=np.float64) * ROW / 60.0
         title = f"{series.name}, {CORNERS[disc.corner]} [°C]"
-        panels.append(disc_panel(title, minutes, series.measured[:, disc.corner], told.predicted, told.sigma))
+        panels.append(
+            disc_panel(
+                title, minutes, series.measured[:, disc.corner], prediction.predicted, prediction.sigma
+            )
+        )
     picture = page.with_suffix(".svg")
     write_chart(picture, panels, LEGEND)
     head = f"# Disc temperature by {len({id(disc.series) for disc, _ in discs})} logs\n\n"

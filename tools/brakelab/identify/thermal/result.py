@@ -53,14 +53,14 @@ KEYS: Final = {
 
 
 class Errors(NamedTuple):
-    """Relative standard deviations that the ECU is told."""
+    """Relative standard deviations that the ECU is given."""
 
     heating: float
     cooling: float
     wet: float
 
 
-class Told(NamedTuple):
+class Prediction(NamedTuple):
     """One disc in one log, predicted and measured; shapes (n,)."""
 
     predicted: Array
@@ -86,11 +86,13 @@ def values_of(heating: float, cooling: Cooling) -> tuple[float, ...]:
 
 def errors_of(fit: Fit, axle: Axle) -> Errors:
     """Return the errors of a fit, widened by the spread between drives; without data those configured."""
-    heating = float(np.hypot(fit.stated[0], HEAT_CAPACITY)) if fit.told[HEATING] else axle.sigma_disc_heating
+    heating = (
+        float(np.hypot(fit.stated[0], HEAT_CAPACITY)) if fit.identified[HEATING] else axle.sigma_disc_heating
+    )
     cooling, wet = axle.sigma_disc_cooling, axle.sigma_disc_cooling_wet
-    if fit.told[[STILL, BY_SPEED]].any():
+    if fit.identified[[STILL, BY_SPEED]].any():
         cooling = float(np.hypot(fit.stated[1], AIR_FLOW))
-    if fit.told[[STILL_WET, BY_SPEED_WET]].any():
+    if fit.identified[[STILL_WET, BY_SPEED_WET]].any():
         wet = float(np.linalg.norm([fit.stated[2], AIR_FLOW, RAIN]))
     return Errors(*(min(max(value, 0.01), 0.9) for value in (heating, cooling, wet)))
 
@@ -112,7 +114,7 @@ def predict(
     return lagged(series.air + excess, lag), np.sqrt(by_heating**2 + by_cooling**2 + air**2)
 
 
-def judge(disc: Disc, friction: Array, fit: Fit, number: int, errors: Errors, before: Fit) -> Told:
+def judge(disc: Disc, friction: Array, fit: Fit, number: int, errors: Errors, before: Fit) -> Prediction:
     """Return the fit of disc `number` beside the measurement; `before` is that of the configuration."""
     seen = disc.seen
     measured = disc.series.measured[seen, disc.corner]
@@ -127,7 +129,7 @@ def judge(disc: Disc, friction: Array, fit: Fit, number: int, errors: Errors, be
         disc, before.heating, before.cooling, errors, friction, before.lag, float(before.starts[number])
     )
     inside = float(np.mean(np.abs(said[seen] - measured) <= 2.0 * sigma[seen]))
-    return Told(said, sigma, rmse(old), rmse(said), inside)
+    return Prediction(said, sigma, rmse(old), rmse(said), inside)
 
 
 def section_of(fit: Fit, axle: Axle, errors: Errors, about: str) -> Section:
@@ -136,13 +138,13 @@ def section_of(fit: Fit, axle: Axle, errors: Errors, about: str) -> Section:
     given = axle.disc_cooling_wet is not None or axle.disc_cooling_by_speed_wet is not None
     for place, value in enumerate(values_of(fit.heating, fit.cooling)):
         key, unit = KEYS[place]
-        if fit.told[place]:
+        if fit.identified[place]:
             sigma = value * float(fit.sigma[place])
             found[key] = (f"{value:.4g}", f"{unit}, ± {sigma:.2g}; {about}")
-        elif place >= STILL_WET and (given or fit.told[[STILL_WET, BY_SPEED_WET]].any()):
-            found[key] = (f"{value:.4g}", f"{unit}, not told: by its ratio to the dry one")
+        elif place >= STILL_WET and (given or fit.identified[[STILL_WET, BY_SPEED_WET]].any()):
+            found[key] = (f"{value:.4g}", f"{unit}, not identified: by its ratio to the dry one")
     found["sigma_disc_heating"] = (f"{errors.heating:.3g}", "relative, with c_p by temperature")
     found["sigma_disc_cooling"] = (f"{errors.cooling:.3g}", "relative, with wind and load of other days")
-    if fit.told[[STILL_WET, BY_SPEED_WET]].any():
+    if fit.identified[[STILL_WET, BY_SPEED_WET]].any():
         found["sigma_disc_cooling_wet"] = (f"{errors.wet:.3g}", "relative, with other rain")
     return found

@@ -43,7 +43,7 @@ def identify_vehicle(drives: Sequence[Path], config: Path, map: Path | None, clo
     for one in parameters:
         unit = "" if one.unit == "-" else f" {one.unit}"
         if one.remedy:
-            print(f"{one.key}: not told; {one.remedy} would tell it")
+            print(f"{one.key}: not identified; {one.remedy} would identify it")
         else:
             value = f"{one.value:.5g} ± {one.sigma:.2g}{unit}{one.doubt}"
             print(f"{one.key} = {value} ({one.source}; was {one.start:.5g})")

@@ -32,10 +32,10 @@ def sections_of(parameters: Sequence[Parameter], config: Config) -> dict[str, Se
 
 
 def head_of(parameters: Sequence[Parameter], start: str, drives: Sequence[str]) -> str:
-    """Return the first lines of CAR: where its keys are from, and which no drive told."""
+    """Return the first lines of CAR: where its keys are from, and which no drive identified."""
     lines = [f"# Identified by `brake-ecu identify vehicle` from {', '.join(drives)}; ± is 1 σ."]
     if left := [one for one in parameters if one.remedy]:
-        lines += [f"# Not told, {start}'s value:"]
+        lines += [f"# Not identified, {start}'s value:"]
         lines += [f"# {one.key} = {one.start:.4g} {one.unit}: {one.remedy} would tell it" for one in left]
     return "\n".join(lines)
 
@@ -74,9 +74,9 @@ def offsets(zeros: Zeros) -> dict[str, float]:
     """Return zeros that are sure, by input: what a map has to take off."""
     found = {"accel_x": zeros.accel_x, "accel_y": zeros.accel_y, "yaw_rate": zeros.yaw_rate}
     sure = {
-        name: told[0]
-        for name, told in found.items()
-        if told and abs(told[0]) > SURE * told[1] and told[1] < SMALLEST[name]
+        name: zero[0]
+        for name, zero in found.items()
+        if zero and abs(zero[0]) > SURE * zero[1] and zero[1] < SMALLEST[name]
     }
     for name, value, sigma in zeros.pressure:
         if abs(value) > SURE * sigma and sigma < SMALLEST["calliper_pressure"]:

@@ -72,7 +72,7 @@ class Place(IntEnum):
     """m/s^2"""
 
 
-class Told(NamedTuple):
+class Signals(NamedTuple):
     """Which signals there are."""
 
     speed: bool
@@ -83,10 +83,10 @@ class Told(NamedTuple):
     pressure: bool
 
 
-def signals_of(windows: Windows, params: Any) -> Told:
+def signals_of(windows: Windows, params: Any) -> Signals:
     """Return which signals the drives have."""
     torque = bool(np.isfinite(windows.motor).all(axis=(0, 1)).any())
-    return Told(
+    return Signals(
         bool(np.isfinite(windows.speed).any()),
         torque and float(params["sigma_motor_torque"]) <= KNOWN_TORQUE,
         torque,
@@ -94,8 +94,8 @@ def signals_of(windows: Windows, params: Any) -> Told:
     )
 
 
-def prior_of(params: Any, told: Told) -> Prior:
-    """Return what START, one `PARAMS`, says, and how far it may be off; what cannot be told is held."""
+def prior_of(params: Any, signals: Signals) -> Prior:
+    """Return what START, one `PARAMS`, says, and how far it may be off; what cannot be identified is held."""
     p, off = params, 0.25
     base, gravity = float(p["wheelbase"]), GRAVITY
     height = float(p["cog_height"])
@@ -104,14 +104,14 @@ def prior_of(params: Any, told: Told) -> Prior:
     stiffness = p["slip_stiffness"] * load
     sink = float(p["mass"]) * height / (2.0 * base) / (3.0 * float(np.mean(p["vertical_stiffness"])))
     rows = {
-        Place.MASS: (np.log(p["mass"]), off if told.motor else 0.0),
-        Place.MOTOR: (0.0, max(float(p["sigma_motor_torque"]), 1e-3) if told.torque else 0.0),
-        Place.DRAG: (np.log(p["drag_area"]), off if told.torque else 0.0),
-        Place.ROLLING: (p["rolling_resistance"], 0.005 if told.torque else 0.0),
+        Place.MASS: (np.log(p["mass"]), off if signals.motor else 0.0),
+        Place.MOTOR: (0.0, max(float(p["sigma_motor_torque"]), 1e-3) if signals.torque else 0.0),
+        Place.DRAG: (np.log(p["drag_area"]), off if signals.torque else 0.0),
+        Place.ROLLING: (p["rolling_resistance"], 0.005 if signals.torque else 0.0),
         Place.PITCH: (p["pitch_gradient"], 0.001),
         Place.ZERO: (0.0, 0.15),
-        Place.RADIUS_F: (np.log(p["wheel_radius"][0]), off if told.speed else 0.0),
-        Place.RADIUS_R: (np.log(p["wheel_radius"][2]), off if told.speed else 0.03),
+        Place.RADIUS_F: (np.log(p["wheel_radius"][0]), off if signals.speed else 0.0),
+        Place.RADIUS_R: (np.log(p["wheel_radius"][2]), off if signals.speed else 0.03),
         Place.STIFFNESS: (0.5 * np.log(stiffness[:2].sum() * stiffness[2:].sum()), 0.3),
         Place.STIFFNESS_RATIO: (np.log(stiffness[2:].sum() / stiffness[:2].sum()), 0.3),
         Place.CURVE: (0.3, 0.2),
@@ -119,13 +119,13 @@ def prior_of(params: Any, told: Told) -> Prior:
         Place.LOAD_R: (np.log(height / (gravity * p["front_axle"])), 0.3),
         Place.DEGRESSION: (p["stiffness_degression"][0], 0.05),
         Place.DEFLECTION: (np.log(sink / np.mean(p["wheel_radius"])), 0.4),
-        Place.BRAKES: (np.log(per_bar.sum()), 0.7 if told.pressure else 0.0),
-        Place.BRAKE_RATIO: (np.log(per_bar[2:].sum() / per_bar[:2].sum()), 0.5 if told.pressure else 0.0),
-        Place.PUSH_OUT_F: (p["push_out_pressure"][0] / BAR, 0.3 if told.pressure else 0.0),
-        Place.PUSH_OUT_R: (p["push_out_pressure"][2] / BAR, 0.3 if told.pressure else 0.0),
+        Place.BRAKES: (np.log(per_bar.sum()), 0.7 if signals.pressure else 0.0),
+        Place.BRAKE_RATIO: (np.log(per_bar[2:].sum() / per_bar[:2].sum()), 0.5 if signals.pressure else 0.0),
+        Place.PUSH_OUT_F: (p["push_out_pressure"][0] / BAR, 0.3 if signals.pressure else 0.0),
+        Place.PUSH_OUT_R: (p["push_out_pressure"][2] / BAR, 0.3 if signals.pressure else 0.0),
         Place.INERTIA: (0.0, 0.2),
-        Place.DELAY: (p["vehicle_speed_delay"], 0.1 if told.speed else 0.0),
-        Place.OVERRUN: ((0.0 if told.torque else 0.2), (0.0 if told.torque else 0.3)),
+        Place.DELAY: (p["vehicle_speed_delay"], 0.1 if signals.speed else 0.0),
+        Place.OVERRUN: ((0.0 if signals.torque else 0.2), (0.0 if signals.torque else 0.3)),
     }
     mean, sigma = (np.array([float(rows[place][k]) for place in Place]) for k in range(2))
     return Prior(mean, sigma)
@@ -191,18 +191,20 @@ def motion(theta: Vector, windows: Windows, half: int, params: Any) -> Motion:
     return Motion(balance, axle, reference, force, slip)
 
 
-def residuals_of(windows: Windows, params: Any, told: Told, least: tuple[float, float]) -> Residuals:
+def residuals_of(windows: Windows, params: Any, signals: Signals, least: tuple[float, float]) -> Residuals:
     """Return the residuals of steady, straight windows; `least` noise of balance [m/s^2] and speed [m/s]."""
     steady = windows.steady & windows.straight
-    if not told.pressure:
+    if not signals.pressure:
         steady = steady & (windows.accel.mean(axis=0) > UNBRAKED)
     gentle = np.abs(windows.accel.mean(axis=0)) < GENTLE * GRAVITY
-    braking = np.flatnonzero(steady & windows.braking & gentle & told.pressure)
-    free = np.flatnonzero(steady & windows.free & gentle & told.torque)
-    coasting = windows.free if told.torque else windows.free & (np.abs(windows.accel.mean(axis=0)) < COASTING)
+    braking = np.flatnonzero(steady & windows.braking & gentle & signals.pressure)
+    free = np.flatnonzero(steady & windows.free & gentle & signals.torque)
+    coasting = (
+        windows.free if signals.torque else windows.free & (np.abs(windows.accel.mean(axis=0)) < COASTING)
+    )
     rolling = np.flatnonzero(steady & coasting & gentle)
     parts = [(free, 0, 0), (braking, 0, 1)]
-    axles = (0, 1) if told.speed else (1,)
+    axles = (0, 1) if signals.speed else (1,)
     parts += [
         (rows, 1 + axle, 2 + 2 * axle + kind)
         for axle in axles

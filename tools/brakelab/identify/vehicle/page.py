@@ -1,4 +1,4 @@
-"""Page of an identification: tables of what was told and what was not, and how well the fits lie."""
+"""Page of an identification: tables of what was identified and what was not, and how good the fits are."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -20,23 +20,26 @@ FEWEST: Final = 4  # windows of a speed
 
 
 def fitted_table(parameters: Sequence[Parameter]) -> Table:
-    """Return the keys that were told."""
+    """Return the keys that were identified."""
     rows = [
         (one.key, one.unit, f"{one.start:.4g}", f"{one.value:.4g}", f"{one.sigma:.2g}",
          f"{one.windows}", one.source + one.doubt)
         for one in parameters if not one.remedy
     ]  # fmt: skip
     return Table(
-        "Told", ("key", "unit", "START", "value", "±σ", "windows", "note"), rows,
+        "Identified", ("key", "unit", "START", "value", "±σ", "windows", "note"), rows,
         "Windows of half a second; σ is robust to errors that a manoeuvre has in common.",
     )  # fmt: skip
 
 
 def left_table(parameters: Sequence[Parameter]) -> Table:
-    """Return the keys that were not told, with what would tell them."""
+    """Return the keys that were not identified, with the drive that would identify them."""
     rows = [(one.key, f"{one.start:.4g} {one.unit}", one.remedy) for one in parameters if one.remedy]
     return Table(
-        "Not told", ("key", "START's value, kept", "note"), rows, "The note says what would tell it."
+        "Not identified",
+        ("key", "START's value, kept", "note"),
+        rows,
+        "The note names the drive that would identify it.",
     )
 
 
@@ -46,7 +49,7 @@ def zeros_table(found: Identified) -> Table:
     named = [("accel_x", "m/s^2", zeros.accel_x), ("accel_y", "m/s^2", zeros.accel_y),
              ("yaw_rate", "rad/s", zeros.yaw_rate)]  # fmt: skip
     named += [(name, "bar", (value, sigma)) for name, value, sigma in zeros.pressure]
-    rows = [(name, unit, f"{told[0]:+.4g}", f"{told[1]:.2g}") for name, unit, told in named if told]
+    rows = [(name, unit, f"{zero[0]:+.4g}", f"{zero[1]:.2g}") for name, unit, zero in named if zero]
     return Table(
         "Zeros of sensors", ("input", "unit", "reads at 0", "±σ"), rows,
         "CONFIG has no keys for them: the ECU learns them, or the signal map takes them off.",
@@ -61,7 +64,7 @@ def overrun_table(found: Identified, params: Any) -> Table:
     rest = np.exp(theta[Place.DRAG] - theta[Place.MASS]) * moving.reference**2
     drive = -accel - rest - GRAVITY * theta[Place.ROLLING]
     reported = np.nan_to_num(windows.motor.mean(axis=1)).sum(axis=0)
-    pulled = reported < 0.0 if found.told.torque else accel > 0.0
+    pulled = reported < 0.0 if found.signals.torque else accel > 0.0
     rows = []
     for low, high in pairwise(SPEEDS):
         own = windows.free & windows.steady & windows.straight & ~pulled
@@ -69,13 +72,13 @@ def overrun_table(found: Identified, params: Any) -> Table:
         if own.sum() < FEWEST:
             continue
         least, mid, most = np.percentile(drive[own], (16, 50, 84))
-        torque = f"{np.median(reported[own]):.0f}" if found.told.torque else "–"
+        torque = f"{np.median(reported[own]):.0f}" if found.signals.torque else "–"
         spread = f"{least:.3f} to {most:.3f}"
         rows.append((f"{low:.0f} to {high:.0f}", f"{mid:.3f}", spread, torque, f"{own.sum()}"))
     return Table(
         "Drag of the drive, accelerator and brake released",
         ("m/s", "m/s^2", "68 %", "reported [N m]", "windows"), rows,
-        "Deceleration beyond drag and rolling resistance. The gear is not known, so it is told by speed.",
+        "Deceleration beyond drag and rolling resistance. The gear is not known, so it is listed by speed.",
     )  # fmt: skip
 
 

@@ -1,10 +1,10 @@
-"""What was identified, as keys of CONFIG: value, standard deviation, samples, origin; or what would tell it.
+"""What was identified, as keys of CONFIG: value, standard deviation, samples, origin; or the drive it needs.
 
-Forces alone tell products, so a key carries what START's other keys leave: `mu_nominal` the torque per bar
+Forces alone show products, so a key carries what START's other keys leave: `mu_nominal` the torque per bar
 (with START's pistons and radius), `slip_stiffness` that of the axle at its load, `vertical_stiffness` the
 deflection under load transfer (with START's height of the centre of gravity), `unloaded_radius` the rolling
 radius at rest, `drag_coefficient` the drag area over START's frontal area. A key whose standard deviation
-the drive does not halve is not told.
+the drive does not halve is not identified.
 """
 
 from collections.abc import Callable
@@ -19,7 +19,7 @@ from ecu.algorithm.vehicle import rolling_radius
 from ecu.contract.params import BAR, GRAVITY
 from ecu.settings.config import AIR_DENSITY, Config
 
-HALVED: Final = 0.5  # of the prior's standard deviation: a key is told
+HALVED: Final = 0.5  # of the prior's standard deviation: a key is identified
 ROUGH: Final = 0.05  # relative standard deviation from which a value is called rough
 START_OFF: Final = 0.25  # relative, of START's lengths
 
@@ -123,15 +123,16 @@ def _given(found: Identified, left: list[Place]) -> Vector:
 
 
 def _of_track(config: Config, track: float, sigma: float, count: int) -> Parameter:
-    told = sigma < 0.5 * START_OFF * config.vehicle.track
+    known = sigma < 0.5 * START_OFF * config.vehicle.track
     return Parameter(
-        "vehicle.track", "m", config.vehicle.track, track if told else config.vehicle.track, sigma, count,
-        "left against right wheels in curves", "" if told else "a slalom at 30 to 50 km/h, or a tape measure",
+        "vehicle.track", "m", config.vehicle.track, track if known else config.vehicle.track, sigma, count,
+        "left against right wheels in curves",
+        "" if known else "a slalom at 30 to 50 km/h, or a tape measure",
     )  # fmt: skip
 
 
 def _car(found: Identified, config: Config) -> list[_Kind]:
-    vehicle, told = config.vehicle, found.told
+    vehicle, signals = config.vehicle, found.signals
     area = 0.5 * AIR_DENSITY * vehicle.frontal_area
     coast = "coast-downs from 120 km/h, with the drive's torque reported or disengaged and reported as 0"
     kinds = [
@@ -148,7 +149,7 @@ def _car(found: Identified, config: Config) -> list[_Kind]:
               "accelerometer against the change of speed, without grade",
               "brakings of 3 m/s^2 and more with a speed reference (optical, GNSS)"),
     ]  # fmt: skip
-    if told.speed:
+    if signals.speed:
         kinds.append(
             _Kind("sensors.vehicle_speed_delay", "s", lambda x: max(float(x[Place.DELAY]), 0.0),
                   (2, 3, 4, 5), "reference against wheels while the speed changes",
@@ -184,7 +185,7 @@ def _axles(found: Identified, config: Config) -> list[_Kind]:
         ratio = "rear over front wheel speeds, less slip; scale by START's front radius"
         kinds += [
             _Kind(f"{axle}.unloaded_radius", "m", radius, (2 + 2 * place, 3 + 2 * place),
-                  speed if found.told.speed else ratio,
+                  speed if found.signals.speed else ratio,
                   "a speed reference (GNSS, optical) on straight roads at two constant speeds"),
             _Kind(f"{axle}.vertical_stiffness", "N/m", vertical, (),
                   "left against right wheels in curves, with START's height of the centre of gravity",
@@ -228,8 +229,8 @@ def _parameter(found: Identified, config: Config, kind: _Kind, beside: Vector) -
         windows = found.dive[2] if found.dive else 0
     if name == "vertical_stiffness":
         windows = found.pairs.windows if found.pairs else 0
-    told = windows > 0 and 0.0 < sigma < HALVED * before
-    value = kind.of(beside) if told else start
+    identified = windows > 0 and 0.0 < sigma < HALVED * before
+    value = kind.of(beside) if identified else start
     return Parameter(
-        kind.key, kind.unit, start, value, sigma, windows, kind.source, "" if told else kind.remedy
+        kind.key, kind.unit, start, value, sigma, windows, kind.source, "" if identified else kind.remedy
     )

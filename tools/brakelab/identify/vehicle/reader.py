@@ -121,7 +121,7 @@ def check(drive: Drive, wrong: Sequence[str], params: Any) -> None:
         remedy = "needs the speeds of all four wheels; map them (`map suggest`), or mend the log"
         raise UserError(drive.name, ", ".join(lost), f"{'is' if len(lost) == 1 else 'are'} missing: {remedy}")
     if "accel_x" not in drive:
-        raise UserError(drive.name, "accel_x", "is missing: forces are told by it; map it (`map suggest`)")
+        raise UserError(drive.name, "accel_x", "is missing: forces follow from it; map it (`map suggest`)")
     speed = drive.corners("wheel_speed").mean(axis=(0, 1)) * float(np.mean(params["wheel_radius"]))
     moving = float(np.count_nonzero(np.abs(speed) > MOVING)) / RATE
     if moving < SHORTEST:

@@ -7,7 +7,7 @@
 parabola of the place; what is left of a_x,m follows what is left of v' by kappa. *Zero of accel_x.* The
 mean of a_x,m / kappa - v' by distance is b / kappa + g (mean grade), beside what curves add. A drive that
 ends where it began has no mean grade; of another the grade of its blocks says how sure the mean is. What
-curves add is told beside the grade of their places, which a closed drive does not cancel: the grade of the
+curves add is shown beside the grade of their places, which a closed drive does not cancel: the grade of the
 blocks says how far that may mislead. Each standstill shows b + g grade of its place. Speeds are those of the
 wheels by the model of `model.py`.
 """
@@ -36,7 +36,7 @@ YAW_STEP: Final = 1e-4  # rad/s, resolution and drift
 BANK: Final = 0.05  # m/s^2, of twenty seconds of road
 FEWEST: Final = 20  # windows
 
-Told = tuple[float, float]
+Estimate = tuple[float, float]
 """A value and its standard deviation."""
 
 
@@ -82,7 +82,7 @@ def steps_of(windows: Windows, speed: Vector) -> Steps:
     return Steps(*chosen)
 
 
-def dive_of(steps: Steps, prior: Told) -> tuple[float, float, int] | None:
+def dive_of(steps: Steps, prior: Estimate) -> tuple[float, float, int] | None:
     """Return pitch gradient [rad per m/s^2], its standard deviation, number of steps; None: no braking."""
     rows, segments = [], []
     number = (steps.drive * 1e6 + steps.at // MANOEUVRE).astype(np.int64)
@@ -113,7 +113,7 @@ def _without_grade(place: Vector) -> Vector:
     return np.asarray(np.eye(len(place)) - basis @ basis.T)
 
 
-def accel_zero(windows: Windows, steps: Steps, pitch_gradient: float, closed: bool) -> Told:
+def accel_zero(windows: Windows, steps: Steps, pitch_gradient: float, closed: bool) -> Estimate:
     """Return the zero of accel_x [m/s^2]; `closed`: each drive ends at the height where it began."""
     kappa = 1.0 + GRAVITY * pitch_gradient
     rest = (steps.felt / kappa - steps.change).mean(axis=0)
@@ -159,9 +159,9 @@ def _by_curves(columns: Vector, weight: Vector, grade: float, block: Places) -> 
     return float(np.linalg.norm(scores @ inverse @ mean))
 
 
-def _standing(windows: Windows, steps: Steps, grade: float) -> list[Told]:
+def _standing(windows: Windows, steps: Steps, grade: float) -> list[Estimate]:
     """Return the reading of each standstill; `grade` [m/s^2] of the roads, which it holds."""
-    found: list[Told] = []
+    found: list[Estimate] = []
     for drive in np.unique(windows.drive):
         own = np.flatnonzero((windows.drive == drive) & windows.standing)
         rolled = steps.drive == drive
@@ -174,13 +174,13 @@ def _standing(windows: Windows, steps: Steps, grade: float) -> list[Told]:
     return found
 
 
-def _combined(estimates: list[Told]) -> Told:
+def _combined(estimates: list[Estimate]) -> Estimate:
     weights = np.array([1.0 / sigma**2 for _, sigma in estimates])
     values = np.array([value for value, _ in estimates])
     return float(weights @ values / weights.sum()), float(1.0 / np.sqrt(weights.sum()))
 
 
-def yaw_zero(windows: Windows) -> Told | None:
+def yaw_zero(windows: Windows) -> Estimate | None:
     """Return the zero of the yaw rate of a car that stands [rad/s]; None: it does not, or none is sent."""
     still = np.flatnonzero(windows.standing & np.isfinite(windows.yaw_rate).all(axis=0))
     if len(still) * SECONDS < LEAST_STAND:
@@ -189,7 +189,7 @@ def yaw_zero(windows: Windows) -> Told | None:
     return float(seen.mean()), float(np.hypot(seen.std() / np.sqrt(len(still)), YAW_STEP))
 
 
-def lateral_zero(windows: Windows, radius: float, yaw: Told) -> Told | None:
+def lateral_zero(windows: Windows, radius: float, yaw: Estimate) -> Estimate | None:
     """Return the zero of accel_y [m/s^2], which holds the mean bank of the roads; None: not sent."""
     rows = np.flatnonzero(windows.free & np.isfinite(windows.accel_y + windows.yaw_rate).all(axis=0))
     if len(rows) < FEWEST:

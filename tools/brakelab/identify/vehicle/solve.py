@@ -13,7 +13,7 @@ from brakelab.arrays import Vector
 from brakelab.identify.vehicle.fit import Fit, Prior, Residuals, fit
 from brakelab.identify.vehicle.model import (
     Place,
-    Told,
+    Signals,
     motion,
     prior_of,
     residuals_of,
@@ -53,7 +53,7 @@ class Zeros(NamedTuple):
 class Identified(NamedTuple):
     """What drives tell of a car."""
 
-    told: Told
+    signals: Signals
     prior: Prior
     """START's, of `Place`."""
     fit: Fit
@@ -76,10 +76,10 @@ def identify(drives: Sequence[Drive], start: RecordArray, closed: bool) -> Ident
     params: Any = start[0]
     zeros = [pressure_zeros(drive) for drive in drives]
     windows = cut(drives, zeros, float(np.mean(params["wheel_radius"])))
-    told = signals_of(windows, params)
-    prior = prior_of(params, told)
+    signals = signals_of(windows, params)
+    prior = prior_of(params, signals)
     noise = _noise(drives, params)
-    residuals = residuals_of(windows, params, told, noise)
+    residuals = residuals_of(windows, params, signals, noise)
     if len(residuals.kind) < FEWEST:
         raise UserError(
             drives[0].name,
@@ -94,7 +94,7 @@ def identify(drives: Sequence[Drive], start: RecordArray, closed: bool) -> Ident
         pairs = pairs_of(windows, radius, moving.slip, still, params)
         steps = steps_of(windows, _speed(found.theta, windows, params))
         start_dive = float(prior.mean[Place.PITCH]), float(prior.sigma[Place.PITCH])
-        dive = dive_of(steps, start_dive) if told.speed else None
+        dive = dive_of(steps, start_dive) if signals.speed else None
         gradient = dive[0] if dive else start_dive[0]
         zero = accel_zero(windows, steps, gradient, closed)
         known = _with(prior, pairs, dive, zero)
@@ -102,7 +102,7 @@ def identify(drives: Sequence[Drive], start: RecordArray, closed: bool) -> Ident
     yaw = still or (pairs.yaw_zero if pairs else None)
     across = lateral_zero(windows, float(radius.mean()), yaw) if yaw else None
     sensors = Zeros(zero, across, yaw, _pressures(drives, zeros, windows))
-    return Identified(told, prior, found, residuals, windows, pairs, dive, sensors, steps)
+    return Identified(signals, prior, found, residuals, windows, pairs, dive, sensors, steps)
 
 
 def _noise(drives: Sequence[Drive], params: Any) -> tuple[float, float]:

@@ -19,7 +19,7 @@ from brakelab.identify.vehicle.model import select
 from brakelab.identify.vehicle.windows import Windows
 from ecu.contract.params import GRAVITY
 
-CURVES: Final = 0.02  # rad/s, standard deviation of a yaw rate that tells anything
+CURVES: Final = 0.02  # rad/s, standard deviation of a yaw rate that shows the wheels' differences
 FEWEST: Final = 20  # windows
 LARGEST: Final = 4.0  # m/s^2 across
 
@@ -41,7 +41,7 @@ class Pairs(NamedTuple):
 def pairs_of(
     windows: Windows, radius: Vector, slip: Vector, yaw: tuple[float, float] | None, params: Any
 ) -> Pairs | None:
-    """Return it for axles of that `radius` [m], shape (2,), and `slip`, shape (2, n); None: no curves seen.
+    """Return the differences of wheels of `radius` [m], shape (2,), by `slip`, shape (2, n); None: no curves.
 
     `yaw`: zero of the yaw rate by a standstill [rad/s], and its standard deviation.
     """
@@ -82,9 +82,13 @@ def _read(found: Fit, params: Any, count: int) -> Pairs:
     variance = float(np.array([1.0, 1.0]) @ found.covariance[4:6, 4:6] @ np.array([1.0, 1.0]))
     lever = float(value[0]) * half_base
 
-    def told(place: int) -> tuple[float, float]:
+    def with_sigma(place: int) -> tuple[float, float]:
         return float(value[place]), float(sigma[place])
 
     return Pairs(
-        told(0), told(1), (told(2), told(3)), (both * lever, float(np.sqrt(variance)) * lever), count
+        with_sigma(0),
+        with_sigma(1),
+        (with_sigma(2), with_sigma(3)),
+        (both * lever, float(np.sqrt(variance)) * lever),
+        count,
     )

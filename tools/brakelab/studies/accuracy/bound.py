@@ -217,7 +217,7 @@ TEXT: Final = (
     "observer kept of the ten minutes. *Ten minutes*: with what they show at best, to one who knew the "
     "spread of the drawn cars. *Car known*: friction alone is unknown. In these three friction changes by "
     "a rate of each axle, random, but as fast and for as long as in that very stop. *Change known*: as "
-    "ten minutes, but how friction changes is known, as if a law of friction told it. Assumed: friction "
+    "ten minutes, but how friction changes is known, as if a law of friction gave it. Assumed: friction "
     "at the beginning of an application is known from the one before to 5 % in common and 3 % an axle; "
     "pressure follows the demand to 5 % of its change; motor torque is exact, as it is in these cars."
 )

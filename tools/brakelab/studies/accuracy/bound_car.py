@@ -48,7 +48,7 @@ SPEED_REFERENCE: Final = 5  # measurements: four wheel speeds, accelerometer, re
 PRESSURE: Final = 6
 M: Final = 8
 NOISE: Final = np.array([0.1, 0.1, 0.1, 0.1, 0.01, 0.027, 1.8 / 2**0.5, 1.8 / 2**0.5]) / CYCLES**0.5
-"""Standard deviations of a window's means (Table 4.1); an axle's pressure is told twice."""
+"""Standard deviations of a window's means (Table 4.1); an axle's pressure is measured twice."""
 
 RUBBING: Final = 1.0  # bar above push-out
 SLOWEST: Final = 3.4  # m/s

@@ -250,7 +250,7 @@ def _sensors() -> dict[str, Case]:
         ),
         "accelerometer at 10 Hz": _sensing(lambda sign: {"accel_x": SensorErrors(period=0.1)}),
         "pressures at 20 Hz": _sensing(lambda sign: {"calliper_pressure": SensorErrors(period=0.05)}),
-        "motor torque not told": _sensing(lambda sign: {"motor_torque": ABSENT}),
+        "motor torque not reported": _sensing(lambda sign: {"motor_torque": ABSENT}),
     }
     for name, change in lacking.items():
         at_any_rate = _at_any_rate(change)

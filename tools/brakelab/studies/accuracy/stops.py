@@ -218,7 +218,7 @@ def stop_tables(result: Stops, seeds: int) -> list[Table]:
                 "to ideal, uncompensated",
             ),
             compensation,
-            f"Median (least–greatest) over {seeds} cars. Ideal: the same controller in the same car, told "
+            f"Median (least–greatest) over {seeds} cars. Ideal: the same controller in the same car, given "
             "the true friction. The error to the demand holds that of the mass too.",
         ),
     ]

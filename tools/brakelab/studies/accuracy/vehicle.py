@@ -85,7 +85,7 @@ def start_of(seed: int) -> Config:
 
 
 def with_parameters(config: Config, parameters: Sequence[Parameter]) -> Config:
-    """Return `config` with the keys that were told."""
+    """Return `config` with the keys that were identified."""
     update: dict[str, Any] = {}
     for section in ("vehicle", "front", "rear", "sensors"):
         own: Any = getattr(config, section)
@@ -216,23 +216,23 @@ def identified_tables(cars: Iterable[Car]) -> list[Table]:
     every = list(cars)
     rows = []
     for place, one in enumerate(every[0].keys):
-        told = [car.keys[place] for car in every if not car.keys[place].parameter.remedy]
-        if not told:
+        identified = [car.keys[place] for car in every if not car.keys[place].parameter.remedy]
+        if not identified:
             rows.append((one.parameter.key, f"0 of {len(every)}", *["–"] * 5))
             continue
-        error = np.array([each.parameter.value - each.truth for each in told])
-        relative = 100.0 * np.abs(error) / np.maximum(np.abs([each.truth for each in told]), 1e-9)
-        z = error / np.array([each.parameter.sigma for each in told])
-        sigma = np.median([each.parameter.sigma / max(abs(each.truth), 1e-9) for each in told])
+        error = np.array([each.parameter.value - each.truth for each in identified])
+        relative = 100.0 * np.abs(error) / np.maximum(np.abs([each.truth for each in identified]), 1e-9)
+        z = error / np.array([each.parameter.sigma for each in identified])
+        sigma = np.median([each.parameter.sigma / max(abs(each.truth), 1e-9) for each in identified])
         if one.parameter.key.endswith("delay"):
             spread = f"{1e3 * np.median(np.abs(error)):.1f} ms", f"{1e3 * np.abs(error).max():.1f} ms"
-            inside = f"{np.sum(np.abs(z) <= 2.0)} of {len(told)}"
-            rows.append((one.parameter.key, f"{len(told)} of {len(every)}", *spread, "–", inside, "–"))
+            inside = f"{np.sum(np.abs(z) <= 2.0)} of {len(identified)}"
+            rows.append((one.parameter.key, f"{len(identified)} of {len(every)}", *spread, "–", inside, "–"))
             continue
         rows.append((
-            one.parameter.key, f"{len(told)} of {len(every)}", f"{np.median(relative):.2f}",
-            f"{relative.max():.2f}", f"{100 * sigma:.2f}", f"{np.sum(np.abs(z) <= 2.0)} of {len(told)}",
-            f"{np.sum(relative <= 3.0)} of {len(told)}",
+            one.parameter.key, f"{len(identified)} of {len(every)}", f"{np.median(relative):.2f}",
+            f"{relative.max():.2f}", f"{100 * sigma:.2f}", f"{np.sum(np.abs(z) <= 2.0)} of {len(identified)}",
+            f"{np.sum(relative <= 3.0)} of {len(identified)}",
         ))  # fmt: skip
     known = {each.parameter.key for each in every[0].keys}
     rows += [_over_mass(every, key) for key in OVER_MASS if key in known]
@@ -251,7 +251,8 @@ def identified_tables(cars: Iterable[Car]) -> list[Table]:
     ]  # fmt: skip
     return [
         Table("Keys beside the truth",
-              ("key", "told", "error, median [%]", "worst [%]", "σ [%]", "inside 2σ", "within 3 %"), rows,
+              ("key", "identified", "error, median [%]", "worst [%]", "σ [%]", "inside 2σ", "within 3 %"),
+              rows,
               f"{len(every)} cars of the wide draw, START 20 % off. Truth in terms of START's other keys: "
               "torque per bar, stiffness per axle load, deflection for its height of the centre of gravity."),
         Table("Beyond 2σ or 3 %", ("car", "key", "truth", "value", "σ", "error/σ", "error [%]"), misses,

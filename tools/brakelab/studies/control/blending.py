@@ -232,8 +232,8 @@ def _changing_table(cars: int) -> Table:
     below = (
         "How far the sum of the torques is below and above the demand at most, from the full demand to "
         f"{3.6 * LOWEST_SPEED:g} km/h. While they fade: how far its error goes, below {FADES:g} m/s, from "
-        "what it was before. Motors' share: of the braking energy. Told the true friction but for the last "
-        "rows: there the ECU uses what it has learned in ten minutes of ordinary driving."
+        "what it was before. Motors' share: of the braking energy. The true friction is given, except in "
+        "the last rows: there the ECU uses what it has learned in ten minutes of ordinary driving."
     )
     return Table("Torque that changes hands", columns, rows, below)
 
@@ -248,9 +248,9 @@ def _loss_table(cars: int) -> Table:
     hidden = Fault(kind="stuck", t=LOSS, signal=["motor_limit"])
     mute = Fault(kind="lost", t=LOSS, message=["MotorFront", "MotorRear"])
     cases: dict[str, tuple[Scenario, float]] = {
-        **{f"limit 0 is told, f = {f:g}": (shipped("motor-loss"), f) for f in (*SHARES[1:], 1.0)},
-        "limit told as before, f = 0.8": (_faulty(gone, hidden), 0.8),
-        "limit told as before, f = 1": (_faulty(gone, hidden), 1.0),
+        **{f"limit 0 is reported, f = {f:g}": (shipped("motor-loss"), f) for f in (*SHARES[1:], 1.0)},
+        "limit reported as before, f = 0.8": (_faulty(gone, hidden), 0.8),
+        "limit reported as before, f = 1": (_faulty(gone, hidden), 1.0),
         "frames of the motors stop, f = 0.8": (_faulty(gone, mute), 0.8),
         "frames of the motors stop, f = 1": (_faulty(gone, mute), 1.0),
     }
@@ -300,7 +300,7 @@ TEXT: Final = (
     f"both axles. {CARS} cars, drawn from config/plant/suv.toml; figures are median (least–greatest) over "
     "them. Torque is that of linings and motors, true; the demand is m a r with mass and radius of the "
     "configuration (5.1). Cars of the wide draw: their hydraulics, motors and frictions are not those that "
-    "the ECU knows. Where it is told the true friction, what is left is the error of blending."
+    "the ECU knows. Where it is given the true friction, what is left is the error of blending."
 )
 
 

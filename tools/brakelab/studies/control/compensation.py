@@ -1,6 +1,6 @@
 """Benefit of compensation: the manoeuvres of section 5.7 and fade, with cars drawn per seed.
 
-ideal           the same controller in the same car, told the true friction
+ideal           the same controller in the same car, given the true friction
 compensated     as configured, unadapted
 uncompensated   nominal friction always (`control.compensation = "off"`)
 under, over     the controller uses 1.15 and 0.85 of the true friction (section 5.6)
@@ -33,7 +33,7 @@ RUNS: Final = {
     "under": GREEN,
     "over": PINK,
 }
-TOLD: Final = {"ideal": 1.0, "under": 1.15, "over": 0.85}
+GIVEN_SHARE: Final = {"ideal": 1.0, "under": 1.15, "over": 0.85}
 SWEEP: Final = 78.0  # % of the pedal, for 6.3 m/s^2: the curve up to 6
 LEVELS: Final = np.arange(1.0, 6.01, 0.5)  # m/s^2
 MOTORS: Final = 0.7  # f of section 5.7.2
@@ -96,7 +96,7 @@ def drive_as(kind: str, scenario: Scenario, config: Config, seed: int) -> Run:
         control = config.control.model_copy(update={"compensation": "off"})
         config = config.model_copy(update={"control": control})
     loop = new_loop(scenario, config, seed)
-    drive = run(loop, override=FrictionOverride(TOLD.get(kind, 0.0)))
+    drive = run(loop, override=FrictionOverride(GIVEN_SHARE.get(kind, 0.0)))
     return Run(drive, achieved_decel(loop, drive))
 
 

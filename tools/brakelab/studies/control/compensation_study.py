@@ -15,9 +15,9 @@ from ecu.settings.resources import resource
 TEXT: Final = (
     "Manoeuvres of section 5.7 and fade (6.2.3) in closed loop with the ECU of config/suv.toml, motors at "
     "rest but where it says so (then the ECU blends, f = 0.7 on both axles); cars are drawn per seed from "
-    "config/plant/suv.toml, nothing was learned before. Ideal: the same controller in the same car, told "
+    "config/plant/suv.toml, nothing was learned before. Ideal: the same controller in the same car, given "
     "the true friction. Achieved: brake and motor torque over radius and mass, all true. Uncompensated: "
-    "nominal friction always. Under, over: told 1.15 and 0.85 of the true friction (section 5.6).\n\n"
+    "nominal friction always. Under, over: given 1.15 and 0.85 of the true friction (section 5.6).\n\n"
     "![Figures 5.8 to 5.12 with car 0](images/compensation.svg)\n\nCar 0; pedal curves of its second "
     "application. In 5.8 friction is a constant that the configuration has 15 % too high or too low."
 )

@@ -35,7 +35,7 @@ class Left(NamedTuple):
 
     deceleration: float
     """In the second from `AFTER` on, against the sound car [%]."""
-    told_ms: float
+    reported_ms: float
     """After the fault; NaN: never."""
     yaw: float
     """Largest yaw rate [deg/s]."""
@@ -62,11 +62,11 @@ def left_of(drive: Drive, sound: Drive) -> Left:
 
     failed = (drive.t >= FAILS) & (drive.truth["vehicle_speed"] > LOWEST_SPEED)
     masks = np.nan_to_num(drive.outputs["active_faults"][failed]).astype(int)
-    told = np.flatnonzero(masks & BRAKE_FAILED)
+    reports = np.flatnonzero(masks & BRAKE_FAILED)
     slips = [drive.truth[f"slip_{corner}"][failed] for corner in CORNERS]
     return Left(
         100.0 * (decel(drive) / decel(sound) - 1.0),
-        1e3 * (float(drive.t[failed][told[0]]) - FAILS) if len(told) else np.nan,
+        1e3 * (float(drive.t[failed][reports[0]]) - FAILS) if len(reports) else np.nan,
         float(np.degrees(np.abs(drive.truth["yaw_rate"][failed]).max())),
         float(np.abs(drive.truth["position_y"][failed]).max()),
         -100.0 * float(np.min(slips)),
@@ -107,10 +107,10 @@ def _table(title: str, decel: float, config: Config, motors: bool, cars: int) ->
         scenario = braking(decel, motors, [fault])
         left = [left_of(run(new_loop(scenario, config, seed)), sound[seed]) for seed in range(cars)]
         cells = [figure(list(values)) for values in zip(*left, strict=True)]
-        told = "–" if np.isnan(cells[1].median) else spread(cells[1])
-        rows.append((name, spread(cells[0]), told, *map(spread, cells[2:])))
+        reported = "–" if np.isnan(cells[1].median) else spread(cells[1])
+        rows.append((name, spread(cells[0]), reported, *map(spread, cells[2:])))
     columns = (
-        *("failure", "deceleration against the sound car [%]", "told after [ms]", "yaw rate [deg/s]"),
+        *("failure", "deceleration against the sound car [%]", "reported after [ms]", "yaw rate [deg/s]"),
         *("beside the line [m]", "largest slip [%]"),
     )
     return Table(title, columns, rows, "")

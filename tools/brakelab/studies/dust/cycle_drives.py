@@ -141,7 +141,7 @@ def drive_cycle(car: Shipped, models: tuple[Dust, Dust], cycle: str, minimise: s
                 break
             end = begin + len(block.truth)
             sums.add(block.truth, block.outputs, np.interp(CYCLE * np.arange(begin, end), *trace.T))
-            told, begin = block.outputs[-1], end
+            outputs, begin = block.outputs[-1], end
         distance += float(state["distance"])
         regenerated += float(np.sum(state["regenerated"]))
         particles += state["particles"]
@@ -162,7 +162,7 @@ def drive_cycle(car: Shipped, models: tuple[Dust, Dust], cycle: str, minimise: s
         (_high(slips[:, :2]), _high(slips[:, 2:])),
         sums.guarded,
         float(np.sqrt(sums.squares / sums.rows)),
-        float(told[OUTPUT["particles_per_km"]]),
-        float(told[OUTPUT["particle_mass_per_km"]]),
+        float(outputs[OUTPUT["particles_per_km"]]),
+        float(outputs[OUTPUT["particle_mass_per_km"]]),
         float(1e6 * (share * worn).sum() / distance),
     )

@@ -116,7 +116,7 @@ def limit_rows(cars: list[Driven]) -> list[tuple[str, ...]]:
                     f"{LIMITS[driven.car.config]:.0f}",
                     f"{driven.car.coefficient * whole.true_mass_per_km:.1f}",
                     f"{1e-9 * drive.particles.sum() / km:.2f}",
-                    _told(1e-9 * drive.particles_per_km),
+                    _known(1e-9 * drive.particles_per_km),
                     f"{1e-6 * drive.work.sum() / km:.3f}",
                     f"{drive.work.sum() / whole.work.sum():.2f}",
                 )
@@ -163,8 +163,8 @@ def _percent(share: float) -> str:
     return f"{100.0 * share:+.1f}"
 
 
-def _told(value: float) -> str:
-    return f"{value:.2f}" if np.isfinite(value) else "not told"
+def _known(value: float) -> str:
+    return f"{value:.2f}" if np.isfinite(value) else "not known"
 
 
 def draw_rows(draws: dict[str, list[Drawn]]) -> list[tuple[str, ...]]:

@@ -89,9 +89,9 @@ def dust_tables(draws: list[Draw], quiet: list[Draw], cars: list[OnBoard]) -> li
             f"{car.seed}",
             car.model,
             f"{100 * car.error:+.1f}",
-            f"{100 * car.told_error:+.1f}",
-            f"{100 * car.told:.0f}",
-            f"{1e-9 * car.particles_per_km:.2f}" if np.isfinite(car.particles_per_km) else "not told",
+            f"{100 * car.counted_error:+.1f}",
+            f"{100 * car.counted:.0f}",
+            f"{1e-9 * car.particles_per_km:.2f}" if np.isfinite(car.particles_per_km) else "not known",
             f"{car.mass_per_km:.1f}",
             f"{car.measured_mass_per_km:.1f}",
             f"{car.true_mass_per_km:.1f}",
@@ -121,15 +121,17 @@ def dust_tables(draws: list[Draw], quiet: list[Draw], cars: list[OnBoard]) -> li
         ),
         Table(
             "On board",
-            ("car", "model", "particles of the front brakes [%]", "of what is told [%]", "work told [%]",
+            ("car", "model", "particles of the front brakes [%]", "of what is counted [%]",
+             "work counted [%]",
              "particles [10⁹/km], both front", "mass by the law alone [mg/km], four brakes",
              "after a measured thickness [mg/km]", "truth [mg/km]"),
             board,
             "A van in closed loop over a trip of real driving that no model has seen, its ECU with the "
             "model of trips 1 to 7 with its linings; truth is the law's mean, all of it, the model counts "
             "what reached the counter. Errors: by the ECU over emitted, minus 1, of the trip and of the "
-            "applications of which it is told. Not told: hotter discs than on the trips, by the ECU's own "
-            "temperature, which begins with not knowing how long the car stood; per kilometre is told "
+            "applications whose particles it counts. Not counted: hotter discs than on the trips, by the "
+            "ECU's own "
+            "temperature, which begins with not knowing how long the car stood; per kilometre is known "
             "from 90 % of the work on. Mass: half of what the linings lose, without the discs: by the law "
             "of Table 7.1, which these linings do not obey; once their thickness was measured (± 0.1 mm) "
             "after 10,000 km like this trip; and of what they lost. The half itself is not tested: 0.02 to "
@@ -141,7 +143,8 @@ def dust_tables(draws: list[Draw], quiet: list[Draw], cars: list[OnBoard]) -> li
 
 
 TEXT: Final = (
-    "How dust is counted, identified and told: [brake-dust.md](../brake-dust.md). Vans are drawn (wide) from "
+    "How dust is counted, identified and reported: [brake-dust.md](../brake-dust.md). Vans are drawn (wide) "
+    "from "
     "config/plant/lcv.toml with linings whose emission follows the plant's own law "
     "(tools/brakelab/plant/emission.py: effects (i) to (v) of section 8.1), which nothing on board and no "
     "model knows. Their front right brake runs in an enclosure with a counter, read once a second, over "

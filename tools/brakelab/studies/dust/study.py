@@ -65,9 +65,9 @@ class OnBoard(NamedTuple):
     model: str
     error: float
     """Particles of both front brakes by the ECU over those emitted, minus 1."""
-    told_error: float
-    """The same of the reported applications."""
-    told: float
+    counted_error: float
+    """The same of the applications whose particles are counted."""
+    counted: float
     """Share of the work."""
     particles_per_km: float
     mass_per_km: float
@@ -161,8 +161,8 @@ def mass_after_measurement(params: RecordArray, learned: RecordArray, worn: Arra
     return float(1e6 * (params[0]["airborne_share"] * state["mass"]).sum() / MEASURED_AT)
 
 
-def _told_error(rows: Array) -> float:
-    """Return the error of the reported applications; rows of braking, last reported, emitted so far."""
+def _counted_error(rows: Array) -> float:
+    """Return the error of the counted applications; rows of braking, last counted, emitted so far."""
     starts, ends = stretches(rows[:, 0] > 0.0).T
     emitted = rows[np.minimum(ends, len(rows) - 1), 2] - rows[np.maximum(starts - LATER, 0), 2]
     said = rows[np.minimum(ends + 1, len(rows) - 1), 1]
@@ -188,7 +188,7 @@ def drive_on_board(seed: int) -> OnBoard:
         car["wear_row"][:, :, WEAR_RUN_IN] = 0.0
     rows = []
     for block in run_blocks(loop):
-        told = block.outputs[-1]
+        last = block.outputs[-1]
         emitted = block.truth[:, PARTICLES] + block.truth[:, PARTICLES + 1]
         rows.append(np.column_stack([block.outputs[:, [BRAKING, LAST]], emitted]))
     car = loop.sides.vehicle.state[0]
@@ -200,10 +200,10 @@ def drive_on_board(seed: int) -> OnBoard:
         seed,
         chosen.name,
         float(kept["particles"] / car["particles"][:2].sum() - 1.0),
-        _told_error(np.concatenate(rows)),
+        _counted_error(np.concatenate(rows)),
         float(kept["told_work"] / kept["work"]),
-        float(told[OUTPUT["particles_per_km"]]),
-        float(told[OUTPUT["particle_mass_per_km"]]),
+        float(last[OUTPUT["particles_per_km"]]),
+        float(last[OUTPUT["particle_mass_per_km"]]),
         mass_after_measurement(loop.sides.params, learned, car["pad_wear_mass"], seed),
         float(1e3 * (params["airborne_share"] * car["pad_wear_mass"]).sum() / km),
     )

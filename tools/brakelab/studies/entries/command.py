@@ -56,8 +56,8 @@ def measure_entries(asked: Asked) -> Measured:
 
 def _plain(one: NamedTuple) -> dict[str, object]:
     values = one._asdict()
-    told = values["prediction"]
-    return values | {"prediction": None if told is None else told._asdict()}
+    prediction = values["prediction"]
+    return values | {"prediction": None if prediction is None else prediction._asdict()}
 
 
 def _drive(named: str | None) -> tuple[str, Path | None]:

@@ -26,7 +26,7 @@ class Observer(Protocol):
         """Forget everything: another car, configured so."""
 
     def step(self, inputs: Inputs) -> tuple[Any, Any]:
-        """Return friction and its standard deviation, four values each; sigma NaN: not told."""
+        """Return friction and its standard deviation, four values each; sigma NaN: not stated."""
 
 
 class EntryError(Exception):

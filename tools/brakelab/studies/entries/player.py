@@ -29,7 +29,7 @@ class Heard(NamedTuple):
     mu: Vector
     """Shape (n, 4)."""
     sigma: Vector
-    """Shape (n, 4), NaN: not told."""
+    """Shape (n, 4), NaN: not stated."""
     us: float
     """Processor time of a step, mean [µs]."""
     known: dict[int, Known]

@@ -34,7 +34,7 @@ class Judged(NamedTuple):
     nrmse: tuple[float, float]
     """Front and rear [%]."""
     inside: tuple[float, float]
-    """Share of rows and corners inside 1 and 2 sigma [%]; NaN: sigma not told."""
+    """Share of rows and corners inside 1 and 2 sigma [%]; NaN: sigma not stated."""
 
 
 class CarScore(NamedTuple):
@@ -56,8 +56,8 @@ def judge(heard: Heard, track: Track) -> Judged:
     """Return the errors of answers to a drive."""
     mu, sigma, true = heard.mu[track.rows], heard.sigma[track.rows], track.mu[track.rows]
     off = np.abs(mu - true)
-    told = not np.isnan(sigma).any()
-    inside = [100.0 * float(np.mean(off <= n * sigma)) if told else float("nan") for n in (1, 2)]
+    stated = not np.isnan(sigma).any()
+    inside = [100.0 * float(np.mean(off <= n * sigma)) if stated else float("nan") for n in (1, 2)]
     return Judged((nrmse(mu[:, :2], true[:, :2]), nrmse(mu[:, 2:], true[:, 2:])), (inside[0], inside[1]))
 
 

@@ -90,8 +90,8 @@ def entry_tables(found: Sequence[Standing], cars: int, drive: str) -> list[Table
             "–" if np.isnan(median) else f"{_number(median)} ({_number(worst)})"
             for median, worst in one.recorded
         ]
-        told = one.prediction
-        real = (_number(told.median * 100.0), _number(told.worst * 100.0)) if told else ("–", "–")
+        errors = one.prediction
+        real = (_number(errors.median * 100.0), _number(errors.worst * 100.0)) if errors else ("–", "–")
         others.append((one.name, *sets, *real))
     failed = [f"{one.name}: {one.failure}." for one in found if one.failure]
     counted = next((one.prediction.counted for one in found if one.prediction), 0)
@@ -110,7 +110,7 @@ def entry_tables(found: Sequence[Standing], cars: int, drive: str) -> list[Table
             ("entry", "inside 1σ [%]", "inside 2σ [%]", "µs a step"),
             sigmas,
             "Inside: share of time and corners, mean over the same drives; normal errors have 68 and 95; "
-            "–: sigma not told. µs: processor time of `step` called from Python, mean over a drive, median "
+            "–: sigma not stated. µs: processor time of `step` called from Python, mean over a drive, median "
             "over drives.",
         ),
         Table(

@@ -92,7 +92,7 @@ def _ostermeyer(lab: Lab) -> Table:
     below = (
         "SI units, temperature in K. Settled, within 1 / (p_1 p_2), the law is p_3 T / (p_2 + power of the "
         "normal force): p_1 is gone, and p_2 shows only where that power comes near it, so stops tell p_3 / "
-        f"p_2. Not told: {'; '.join(f'{b} {names}' for b, names in unsure.items())}."
+        f"p_2. Not identified: {'; '.join(f'{b} {names}' for b, names in unsure.items())}."
     )
     columns = ("number", *(f"{b}{what}" for b in BRAKES for what in (", thesis", "")))
     return Table("Table C.3: Ostermeyer", columns, rows, below)

@@ -28,7 +28,7 @@ class Lab(NamedTuple):
 
 
 def run_lab(progress: Callable[[str], None]) -> Lab:
-    """Return all results; `progress` is told a line at a time. Minutes, on two cores."""
+    """Return all results; `progress` receives a line at a time. Minutes, on two cores."""
     brakes = {}
     for brake in BRAKES:
         brakes[brake] = measure(brake, progress)

@@ -295,7 +295,7 @@ def _recovery(lab: Lab) -> Table:
     )
     below = (
         f"R1, 36 stops at constant pressure, torque with 1 % noise, {DRAWS} draws; the goal is 90 to 99 % "
-        f"within the intervals, found over all {overall:.0f} %. All five numbers are told by these stops. "
+        f"within the intervals, found over all {overall:.0f} %. These stops identify all five numbers. "
         f"With the numbers identified, Table 3.4's ILVO column comes out as with the published: {again}."
     )
     columns = ("number", "truth", "within the interval of 95 % [%]", "half interval [%]")

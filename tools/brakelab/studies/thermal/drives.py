@@ -118,14 +118,14 @@ def drive_measured(
     axles = [nodes_like(heating, still, by_speed, random) for heating, still, by_speed in lumps]
     torque, omega, speed = map(TRUTH_COLUMNS.index, ("brake_torque_fl", "wheel_speed_fl", "vehicle_speed"))
     parts: list[tuple[Array, ...]] = []
-    told, sure = OUTPUT["disc_temperature_fl"], OUTPUT["sigma_disc_temperature_fl"]
+    temperature, sure = OUTPUT["disc_temperature_fl"], OUTPUT["sigma_disc_temperature_fl"]
     for block in run_blocks(loop, seconds):
         power = block.truth[:, torque : torque + 4] * np.abs(block.truth[:, omega : omega + 4])
         parts.append(
             (
                 block.outputs[:, USED].copy(),
                 block.decoded[:, KEPT].copy(),
-                block.outputs[:, [*range(told, told + 4), *range(sure, sure + 4)]],
+                block.outputs[:, [*range(temperature, temperature + 4), *range(sure, sure + 4)]],
                 power,
                 block.truth[:, speed].copy(),
                 block.decoded.copy() if with_inputs else block.decoded[:, :0].copy(),

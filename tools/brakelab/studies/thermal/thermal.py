@@ -69,12 +69,12 @@ def _car_rows(cars: Sequence[Car]) -> list[tuple[str, ...]]:
         for axle, part in zip(car.axles, AXLES.values(), strict=True):
             new, old = (values_of(fit.heating, fit.cooling) for fit in (axle.fit, axle.before))
             changes = [f"{100 * (a / b - 1):+.0f}" for a, b in zip(new, old, strict=True)]
-            told = [SYMBOLS[k] for k in range(5) if not axle.fit.told[k]]
+            missing = [SYMBOLS[k] for k in range(5) if not axle.fit.identified[k]]
             rows.append(
                 (
                     f"{car.seed} {axle.name}",
                     *changes,
-                    ", ".join(told) or "–",
+                    ", ".join(missing) or "–",
                     f"{100 * axle.errors.heating:.1f} / {100 * axle.errors.cooling:.1f} / "
                     f"{100 * axle.errors.wet:.0f}",
                     *(f"{np.max(trip.after[part]):.1f}" for trip in car.trips),
@@ -109,7 +109,7 @@ def thermal_tables(cars: Sequence[Car]) -> list[Table]:
         ),
         Table(
             "Cars",
-            ("car", "ξ [%]", "δ0 [%]", "δ1 [%]", "δ0 rain [%]", "δ1 rain [%]", "not told",
+            ("car", "ξ [%]", "δ0 [%]", "δ1 [%]", "δ0 rain [%]", "δ1 rain [%]", "not identified",
              "σ of ξ / dry / rain [%]", "RMSE dry [K]", "RMSE rain [K]", "inside dry [%]", "inside rain [%]"),
             _car_rows(cars),
             "Parameters: change against the configuration. RMSE: the worse disc of the axle.",

@@ -26,7 +26,7 @@ class Lap(NamedTuple):
     zone: NDArray[np.int64]  # number of the corner that is next
 
 
-class Course(NamedTuple):
+class Route(NamedTuple):
     """A whole drive, every metre."""
 
     curvature: Values  # 1/m
@@ -113,11 +113,11 @@ def meant_speed(
     return speed
 
 
-def drive_course(
+def drive_route(
     lap: Lap, laps: int, grip: Values, decel: Values, daring: Values, lateral: float, lift: float,
     wind: float, tap: Values,
-) -> Course:  # fmt: skip
-    """Return the course of several laps.
+) -> Route:  # fmt: skip
+    """Return the route of several laps.
 
     Args:
         lap: the lap.
@@ -144,7 +144,7 @@ def drive_course(
     speed = meant_speed(curvature, grip[here], limit, stop, decel[here], lateral, lift, daring[here])
     meant = np.maximum(-0.5 * np.diff(speed**2, append=speed[-1] ** 2), 0.0)
     heading = np.cumsum(curvature)
-    return Course(
+    return Route(
         curvature, np.tile(lap.grade, laps), grip[here], wind * np.cos(heading), np.tile(lap.kerb, laps),
         taps, stop, speed, meant,
     )  # fmt: skip

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from .course import G, Straight, drive_course, lay, meant_speed
 from .roads import count_brakings
+from .route import G, Straight, drive_route, lay, meant_speed
 
 N = 400
 
@@ -68,13 +68,13 @@ def test_a_drive_repeats_its_lap_and_has_a_braking_for_each_corner() -> None:
     shape = (3, 2)
     taps = np.zeros(shape)
     taps[1, 0] = 8.0
-    course = drive_course(lap, 3, np.ones(shape), np.full(shape, 6.0), np.ones(shape), 30.0, 0.0, 5.0, taps)
+    route = drive_route(lap, 3, np.ones(shape), np.full(shape, 6.0), np.ones(shape), 30.0, 0.0, 5.0, taps)
     n = len(lap.curvature)
-    assert len(course.speed) == 3 * n
-    np.testing.assert_array_equal(course.curvature[:n], course.curvature[n : 2 * n])
-    assert count_brakings(course) == 6
-    assert set(np.flatnonzero(course.tap) // n) == {1}
-    assert np.max(np.abs(course.headwind)) == pytest.approx(5.0, rel=1e-3)
+    assert len(route.speed) == 3 * n
+    np.testing.assert_array_equal(route.curvature[:n], route.curvature[n : 2 * n])
+    assert count_brakings(route) == 6
+    assert set(np.flatnonzero(route.tap) // n) == {1}
+    assert np.max(np.abs(route.headwind)) == pytest.approx(5.0, rel=1e-3)
     # an arc of 1.5 to the left, one of 2.0 to the right
     assert np.sum(lap.curvature) == pytest.approx(1.5 - 2.0, abs=0.1)
     assert np.sqrt(np.mean(lap.grade**2)) == pytest.approx(0.02, rel=0.3)
