@@ -14,7 +14,7 @@ from cantools.database import Database, Message
 
 from ecu.bus.bits import first_bit
 
-MOST: Final = 40  # pieces that are blanked out before the file is given up
+MOST_BLANKED: Final = 40  # pieces that are blanked out before the file is given up
 
 _SYNTAX: Final = re.compile(r'Invalid syntax at line (\d+), column (\d+): "(.*?)"{1,2}$', re.DOTALL)
 _EMPTY: Final = re.compile(r"The signal (\S+) length (-?\d+) is not greater than 0 in message (\S+?)\.?\"?$")
@@ -83,7 +83,7 @@ def _parse_dbc(lines: list[str], mistakes: list[Mistake]) -> Any:
         try:
             return cantools.database.load_string("\n".join(lines), "dbc", strict=False)
         except Exception as error:  # cantools' parsers raise errors of many kinds
-            mistake = _blank_out(lines, str(error)) if len(mistakes) < MOST else None
+            mistake = _blank_out(lines, str(error)) if len(mistakes) < MOST_BLANKED else None
             if mistake is None:
                 raise
             mistakes.append(mistake)

@@ -36,7 +36,7 @@ RULES: Final = {
     "hyundai_xor": HYUNDAI_XOR,
     "j1939": J1939,
 }
-SHORTEST: Final = {"autosar_p01": 2, "ford_brake_sn_4": 4, "ford_accel_data": 8}
+SHORTEST_PAYLOAD: Final = {"autosar_p01": 2, "ford_brake_sn_4": 4, "ford_accel_data": 8}
 """The payload that a rule needs at least [bytes], 2 where not listed."""
 
 P01_MODULO: Final = 15  # counter 0–14
@@ -52,12 +52,12 @@ def _crc8_tables() -> NDArray[np.uint8]:
     for _ in range(8):
         table = np.where(table & 0x80, (table << 1) ^ polynomial, table << 1) & 0xFF
     tables = [np.arange(256)]
-    for _ in range(_LONGEST + 1):
+    for _ in range(_LONGEST_PAYLOAD + 1):
         tables.append(table[tables[-1]])
     return np.array(tables, np.uint8)
 
 
-_LONGEST: Final = 64  # bytes of a CAN FD payload
+_LONGEST_PAYLOAD: Final = 64  # bytes of a CAN FD payload
 _CRC8: Final = _crc8_tables()
 
 

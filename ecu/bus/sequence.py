@@ -39,7 +39,7 @@ _JITTER_OVER: Final = 16  # frames of the mean distance from the grid
 _JITTERS: Final = (
     5  # mean distances that a frame may be off the grid, where that is more than half a period …
 )
-_WIDEST: Final = 2  # … and at most so many periods
+_WIDEST_WINDOW: Final = 2  # … and at most so many periods
 
 STREAM: Final = np.dtype(
     [
@@ -288,7 +288,7 @@ def check_counter(
     elif _lasts(state.disputed_ns, stamp_ns):
         tolerance = period_ns // 4
     else:
-        tolerance = min(max(period_ns // 2, _JITTERS * state.jitter_ns), _WIDEST * period_ns)
+        tolerance = min(max(period_ns // 2, _JITTERS * state.jitter_ns), _WIDEST_WINDOW * period_ns)
     step = (counter - sender.counter) % modulo
     late, turn = _lateness(sender, counter, modulo, stamp_ns, period_ns), modulo * period_ns
     if late >= turn - period_ns // 2:

@@ -279,7 +279,7 @@ def protection_of(
             raise UserError(
                 str(path), f"{key}.checksum", f'unknown rule "{settings.checksum}"; known: {known}'
             )
-        if message.length < e2e.SHORTEST.get(settings.checksum, 2):
+        if message.length < e2e.SHORTEST_PAYLOAD.get(settings.checksum, 2):
             raise UserError(str(path), f"{key}.checksum", f"{message.name} is too short for this rule")
         rule = e2e.RULES[settings.checksum]
     if settings.counter is not None:

@@ -16,4 +16,4 @@ KNOTS: Final = (100.0, 120.0, 140.0, 160.0, 180.0, 200.0)
 LAW_TERMS: Final = 4 + len(KNOTS)
 NUMBERS: Final = (2 * INPUTS + 2 + HIDDEN * (INPUTS + 1) + HIDDEN + 1, 2 * NODES + NODES**2, 1 + LAW_TERMS)
 """How many each of `MODELS` has; their order: `monitoring/emission_factor.py`."""
-MOST: Final = max(NUMBERS)
+MOST_NUMBERS: Final = max(NUMBERS)

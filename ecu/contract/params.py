@@ -4,7 +4,7 @@ from typing import Final
 
 import numpy as np
 
-from ecu.contract.dust import MOST
+from ecu.contract.dust import MOST_NUMBERS
 from ecu.contract.signals import N_INPUTS
 
 # Points of the pedal map; a shorter map is padded with its last point.
@@ -78,7 +78,7 @@ PARAMS: Final = np.dtype(
         ("chamfer_share", "f8", (4,)),  # of the area, removed by chamfers on new pads
         # dust, see monitoring/dust.py
         ("dust_model", "i8", (4,)),  # MODELS of contract/dust.py, NONE without
-        ("dust_numbers", "f8", (4, MOST)),
+        ("dust_numbers", "f8", (4, MOST_NUMBERS)),
         ("dust_low", "f8", (4, 6)),  # training range of a model's FEATURES
         ("dust_high", "f8", (4, 6)),
         ("dust_factor", "f8", (4,)),  # mean of the particles over ten to the emission factor

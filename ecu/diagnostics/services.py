@@ -56,7 +56,7 @@ SUPPRESS: Final = 0x80
 
 ALL_GROUPS: Final = 0xFFFFFF
 MOST_IDENTIFIERS: Final = 32
-LONGEST: Final = 4095
+LONGEST_MESSAGE: Final = 4095
 """Bytes of a message of ISO-TP with classical frames."""
 
 SELF_TEST: Final = 0x0200
@@ -218,7 +218,7 @@ def respond(
     if service.subfunctions and request[1] & SUPPRESS:
         return session, b""
     response = bytes([request[0] + POSITIVE]) + text
-    return session, response if len(response) <= LONGEST else negative(request[0], RESPONSE_TOO_LONG)
+    return session, response if len(response) <= LONGEST_MESSAGE else negative(request[0], RESPONSE_TOO_LONG)
 
 
 def _allowed(session: Session, request: bytes) -> Service:

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from ecu.contract.dust import FEATURES, MODELS, MOST, NONE, NUMBERS
+from ecu.contract.dust import FEATURES, MODELS, MOST_NUMBERS, NONE, NUMBERS
 from ecu.settings.toml_file import Section
 
 Feature = Annotated[float, Field(ge=-1e6, le=1e6)]
@@ -16,7 +16,7 @@ class Dust(Section):
 
     model: Literal["network", "table", "law"]
     """Kind of the model that `identify dust` found."""
-    numbers: list[Annotated[float, Field(ge=-1e4, le=1e4)]] = Field(max_length=MOST)
+    numbers: list[Annotated[float, Field(ge=-1e4, le=1e4)]] = Field(max_length=MOST_NUMBERS)
     """Of the model, in the order that its kernel takes them."""
     low: list[Feature] = Field(min_length=len(FEATURES), max_length=len(FEATURES))
     """Of each feature, the least that it was trained on: beyond it no particles are counted."""

@@ -42,7 +42,7 @@ FLAT: Final = 0.005
 HEADROOM: Final = 40.0  # K that the next brakings may add, and that a temperature may be too low
 UNKNOWN: Final = 30.0  # K in which emission is taken to grow e-fold, hotter than the model was trained on
 ADMITTED: Final = np.linspace(0.0, 1.0, 201)
-STEEPEST: Final = 8.0  # rise of the least share per braking rate
+STEEPEST_SHARE: Final = 8.0  # rise of the least share per braking rate
 EARLIER: Final = 3  # nodes, before what Annex 5 asks of the rear: linings may give more than is counted on
 TORQUE, TEMPERATURE = FEATURES.index("torque"), FEATURES.index("temperature")
 FRONT, REAR = 0, 2
@@ -102,5 +102,5 @@ def admitted_shares(row: Any, loads: tuple[Load, ...]) -> tuple[Array, Array]:
         most[node] = above.min() - 2.0 * step if len(above) else 1.0
     least = np.array([least[node : node + EARLIER + 1].max() for node in range(RATE_NODES)])
     for node in range(RATE_NODES - 2, -1, -1):
-        least[node] = max(least[node], least[node + 1] - STEEPEST * RATE_STEP)
+        least[node] = max(least[node], least[node + 1] - STEEPEST_SHARE * RATE_STEP)
     return np.minimum(least, base), np.maximum(most, base)

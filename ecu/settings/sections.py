@@ -21,7 +21,7 @@ Doubt = Annotated[float, Field(gt=1e-3, lt=1), Unit("-")]
 
 WET = 1.5
 """Rain on delta_1 where CONFIG has no number for it: Figure 7.15 shows more cooling at speed, no numbers."""
-STEEPEST = 1.0  # m/s^2 per % of the pedal's travel: its sensor's noise shall not jolt. Assumption.
+PEDAL_GAIN = 1.0  # m/s^2 per % of the pedal's travel: its sensor's noise shall not jolt. Assumption.
 HALFWAY = 1.0  # m/s^2, the least that half of the travel asks for. Assumption.
 
 
@@ -237,8 +237,8 @@ class Control(Section):
         if len(self.pedal_position) != len(self.pedal_decel):
             raise ValueError("pedal_position and pedal_decel need the same number of points")
         points = list(zip(self.pedal_position, self.pedal_decel, strict=True))
-        if any(b[1] - a[1] > STEEPEST * (b[0] - a[0]) for a, b in pairwise(points)):
-            raise ValueError(f"pedal_decel must rise by no more than {STEEPEST:g} m/s^2 per % of the pedal")
+        if any(b[1] - a[1] > PEDAL_GAIN * (b[0] - a[0]) for a, b in pairwise(points)):
+            raise ValueError(f"pedal_decel must rise by no more than {PEDAL_GAIN:g} m/s^2 per % of the pedal")
         if float(np.interp(50.0, self.pedal_position, self.pedal_decel)) < HALFWAY:
             raise ValueError(f"pedal_decel must reach {HALFWAY:g} m/s^2 in the first half of the pedal")
         if (self.front_share is None) != (self.distribution == "ideal"):

@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 from ecu.errors import UserError, closest
 from ecu.output import detail
 
-LONGEST: Final = 16 << 20
+LONGEST_FILE: Final = 16 << 20
 """Characters of a file: a fleet's manifest of 100,000 drives has 5 million."""
 SHOWN: Final = 60
 """Characters that are shown of a value."""
@@ -159,15 +159,15 @@ def _text(path: Path) -> str:
         with open(path, encoding="utf-8-sig", opener=_without_waiting) as file:  # Windows editors mark it
             if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
                 raise UserError(str(path), "", "is no regular file; give a TOML file")
-            text = file.read(LONGEST + 1)
+            text = file.read(LONGEST_FILE + 1)
     except FileNotFoundError:
         raise UserError(str(path), "", "no such file") from None
     except IsADirectoryError:
         raise UserError(str(path), "", "is a folder; give a TOML file") from None
     except (OSError, ValueError) as error:
         raise UserError(str(path), "", f"cannot be read as text: {error}") from None
-    if len(text) > LONGEST:
-        raise UserError(str(path), "", f"is larger than {LONGEST >> 20} MB; give a TOML file")
+    if len(text) > LONGEST_FILE:
+        raise UserError(str(path), "", f"is larger than {LONGEST_FILE >> 20} MB; give a TOML file")
     return text
 
 

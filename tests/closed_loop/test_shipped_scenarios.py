@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from brakelab.simulation.closed_loop import Drive, new_loop, run
-from brakelab.simulation.scenario import LONGEST, load_scenario
+from brakelab.simulation.scenario import LONGEST_DRIVE, load_scenario
 from brakelab.simulation.scenario_car import with_draw
 from ecu.contract.signals import CORNERS
 from ecu.settings.config import load_config
@@ -90,7 +90,8 @@ def driven(name: str, armed: bool = True) -> Drive:
     """Return the drive of one car, cut after CUT where it is long; unarmed the hydraulics brake alone."""
     scenario, config = load_scenario(CONFIG / "scenarios" / f"{name}.toml"), load_config(CONFIG / "suv.toml")
     return run(
-        new_loop(with_draw(scenario, "nominal"), config, 1, armed), seconds=LONGEST if name in WHOLE else CUT
+        new_loop(with_draw(scenario, "nominal"), config, 1, armed),
+        seconds=LONGEST_DRIVE if name in WHOLE else CUT,
     )
 
 

@@ -24,7 +24,7 @@ from .route import G, Values
 
 PERIOD = 0.01  # s, of a row
 HELD = 0.7  # s over which samples are joined
-SHORTEST = 30  # rows to judge
+FEWEST_ROWS = 30  # rows to judge
 ONSET = 25  # rows in which force and reading follow the pressure
 
 
@@ -112,7 +112,7 @@ def find(signals: Signals, nominal: Nominal) -> list[Braking]:
         rows = np.arange(start + ONSET, end)
         fit = (signals.speed[rows] > 5.0) & (np.abs(signals.across[rows]) < 0.4 * G)
         rows = rows[fit & ~np.isnan(signals.decel[rows]) & ~np.isnan(signals.pressure[rows]).any(axis=1)]
-        if len(rows) < SHORTEST:
+        if len(rows) < FEWEST_ROWS:
             continue
         lining = lining_decel(signals, rows, nominal, np.repeat(nominal.mu_nominal, 2), nominal.mass)
         known = signals if nominal.electric else signals._replace(motor=np.zeros_like(signals.motor))

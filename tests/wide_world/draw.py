@@ -48,7 +48,7 @@ SETS = {
 }
 CARS = 30
 RAIN = 0.15, (0.4, 0.7)  # share of sessions, grip
-LONGEST = 3600.0  # s
+LONGEST_DRIVE = 3600.0  # s
 
 
 class Stranger(NamedTuple):
@@ -82,7 +82,7 @@ class Stranger(NamedTuple):
         """Return its drive: a record of STATE every 10 ms."""
         rng = np.random.default_rng([self.seed, self.number, 1])
         slow = np.exp(-ROW / 0.4)
-        tremor = lfilter([np.sqrt(1.0 - slow**2)], [1.0, -slow], rng.normal(size=round(LONGEST / ROW)))
+        tremor = lfilter([np.sqrt(1.0 - slow**2)], [1.0, -slow], rng.normal(size=round(LONGEST_DRIVE / ROW)))
         rows = np.zeros(len(tremor), STATE)
         return rows[
             : drive(self.car, self.route, self.start, tremor, 1.0 + 0.02 * rng.normal(size=400), rows)

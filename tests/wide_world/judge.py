@@ -34,9 +34,9 @@ from .logger import CORNERS, record, truth, write
 from .references import REFERENCES, Prediction
 from .route import G, Values
 
-LEAST = 1.5  # m/s^2, of a braking that is judged
+LEAST_DECEL = 1.5  # m/s^2, of a braking that is judged
 SIGMAS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
-MOST = 40  # brakings of a car, lest one outweigh the others
+MOST_BRAKINGS = 40  # brakings of a car, lest one outweigh the others
 
 
 class Judged(NamedTuple):
@@ -134,7 +134,7 @@ def judge_car(seed: int, number: int, folder: Path) -> list[Judged]:
     write(truth(rows, stranger.logger), name.with_suffix(".truth.parquet"))
     config.write_text(stranger.nominal.toml(f"stranger-{number}"), "utf-8")
     signals = read(columns, stranger.nominal)
-    brakings = [one for one in find(signals, stranger.nominal) if one.measured > LEAST][:MOST]
+    brakings = [one for one in find(signals, stranger.nominal) if one.measured > LEAST_DECEL][:MOST_BRAKINGS]
     measured = np.array([braking.measured for braking in brakings])
     predictions = {name: (reference(brakings), measured) for name, reference in REFERENCES.items()}
     result = replay(log, config=config, out=name.with_suffix(".result.parquet"))
@@ -146,7 +146,7 @@ def judge_car(seed: int, number: int, folder: Path) -> list[Judged]:
         Judged(*who, k + 1, predictor, float(said.decel[k]), float(real[k]), float(said.sigma[k]))
         for predictor, (said, real) in predictions.items()
         for k in range(len(brakings))
-        if not np.isnan(said.decel[k]) and real[k] > LEAST
+        if not np.isnan(said.decel[k]) and real[k] > LEAST_DECEL
     ]
 
 
@@ -219,7 +219,7 @@ def report(judged: list[Judged]) -> str:
     }
     return "\n\n".join(
         (
-            f"Brakings beyond {LEAST} m/s^2. Mean/p90 error [%], share inside 2 sigma [%]. By set:",
+            f"Brakings beyond {LEAST_DECEL} m/s^2. Mean/p90 error [%], share inside 2 sigma [%]. By set:",
             table(judged, columns({"pooled": lambda one: True} | sets), _cell),
             "By what the cars have:",
             table(judged, columns(sound | traits), _cell),

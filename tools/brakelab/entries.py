@@ -8,7 +8,7 @@ import numpy as np
 from brakelab.fmu.vehicle_cycle import go_on, measure
 from brakelab.identify.tuning.recording import Recording
 from brakelab.identify.tuning.replay import replay_errors
-from brakelab.mapping.series import FEWEST, read_series
+from brakelab.mapping.series import FEWEST_FRAMES, read_series
 from brakelab.plant.disc import cooling_rate
 from brakelab.simulation.ecu_inputs import ecu_inputs
 from brakelab.simulation.scenario import load_scenario
@@ -30,9 +30,9 @@ def call_every_entry() -> None:
     ecu_inputs(new_record(FRAME), 1)
     database = load_database(resource("dbc/brake_ecu.dbc"))
     message = database.messages[0]
-    frames = new_record(FRAME, FEWEST)
+    frames = new_record(FRAME, FEWEST_FRAMES)
     frames["can_id"], frames["length"] = message.frame_id, message.length
-    frames["stamp_ns"] = np.arange(FEWEST)
+    frames["stamp_ns"] = np.arange(FEWEST_FRAMES)
     read_series([frames], database)
     cooling_rate(1e-3, 1e-4, 10.0, 0.0)
     vehicle = new_vehicle(load_scenario(resource("config/scenarios/stop-1.toml")), 0)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from brakelab.fleet.manifest import Drive, find_drives
+from brakelab.fleet.manifest import VehicleDrive, find_drives
 from ecu.errors import UserError
 from ecu.settings.resources import resource
 
@@ -12,7 +12,7 @@ SUV, SEDAN = resource("config/suv.toml"), resource("config/sedan.toml")
 KONA = resource("config/maps/kona.toml")
 
 
-def names(drives: list[Drive]) -> list[str]:
+def names(drives: list[VehicleDrive]) -> list[str]:
     return [f"{drive.vehicle}/{drive.name}" for drive in drives]
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from brakelab.fleet.cluster import Workers
 from brakelab.fleet.job import Job, Outcome, metadata_of
-from brakelab.fleet.manifest import Drive
+from brakelab.fleet.manifest import VehicleDrive
 from brakelab.fleet.run import TRIES, Chain, Planned, run_fleet
 from brakelab.replay.source import load_source
 from brakelab.results.files import brakes_table
@@ -58,7 +58,7 @@ def fleet(**vehicles: str) -> list[Chain]:
         chain = Chain()
         for name in names.split():
             config = SEDAN if name.endswith("!") else SUV
-            drive = Drive(vehicle, name, (f"/d/{name}",), Path("suv.toml"), None)
+            drive = VehicleDrive(vehicle, name, (f"/d/{name}",), Path("suv.toml"), None)
             chain.add(Planned(drive, config, SOURCE, 100, name, ""))
         chains.append(chain)
     return chains

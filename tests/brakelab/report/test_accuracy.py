@@ -3,7 +3,7 @@ import pytest
 
 from brakelab.report.accuracy import accuracy, achieved_deceleration, evaluated, tracking
 from brakelab.report.brakings import Braking
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from ecu.contract.signals import CORNERS
 
 from .conftest import braking_between
@@ -12,13 +12,13 @@ T = np.arange(0.0, 12.0, 0.01)
 DEMANDED = 5.0
 
 
-def stop(achieved: float) -> tuple[Drive, list[Braking]]:
+def stop(achieved: float) -> tuple[DriveResult, list[Braking]]:
     """A stop from 108 km/h that begins at 2 s and reaches its deceleration after 0.3 s."""
     decel = achieved * np.clip((T - 2.0) / 0.3, 0.0, 1.0)
     speed = np.maximum(30.0 - np.cumsum(decel) * 0.01, 0.0)
     demand = np.where((T >= 2.0) & (T < 9.0), DEMANDED, 0.0)
     columns = {"vehicle_speed": speed, "decel_demand_total": demand, "accel_x_road": -decel}
-    return Drive(T, columns, {}), [braking_between(2.0, 9.0)]
+    return DriveResult(T, columns, {}), [braking_between(2.0, 9.0)]
 
 
 def test_window_begins_half_a_second_after_the_demand_and_ends_at_15_kmh() -> None:
@@ -58,7 +58,7 @@ def test_motors_that_brake_on_another_demand_hide_the_brakes(
 
 def test_true_deceleration_goes_before_the_measured_one() -> None:
     drive, _ = stop(achieved=4.5)
-    truth = Drive(T, {"accel_x_road": np.full_like(T, -1.0)}, {})
+    truth = DriveResult(T, {"accel_x_road": np.full_like(T, -1.0)}, {})
     assert achieved_deceleration(drive, truth)[0] == 1.0
 
 

@@ -15,7 +15,7 @@ from brakelab.report.ak_table import fade, observed, sections
 from brakelab.report.brakes_section import brakes_section
 from brakelab.report.csv_table import HEAD, csv_link
 from brakelab.report.distribution import forbidden_stretches, forces_of, ideal_share
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.report.energy import works
 from brakelab.report.response import responses
 from brakelab.report.torque import plots_of_torque
@@ -35,7 +35,7 @@ CAR = Car(
 )  # fmt: skip
 
 
-def drive(**columns: Any) -> Drive:
+def drive(**columns: Any) -> DriveResult:
     """A stop from 30 m/s with 3 m/s^2 and 30 bar at friction 0.4 everywhere."""
     brakes = (T >= 5.0) & (T < 15.0)
     own: dict[str, Any] = {"braking": brakes.astype(float)}
@@ -46,7 +46,7 @@ def drive(**columns: Any) -> Drive:
         own[f"mu_b_{corner}"] = np.full_like(T, 0.4)
         own[f"mode_{corner}"] = np.where(brakes, float(OBSERVING), 0.0)
         own[f"brake_torque_{corner}"] = CAR.gain[place // 2] * 0.4 * pressure
-    return Drive(T, own | columns, {})
+    return DriveResult(T, own | columns, {})
 
 
 def test_specific_torque_and_its_axis_of_c_star() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from brakelab.report.brakings import brakings
-from brakelab.report.drive import Drive, read_drive
+from brakelab.report.drive import DriveResult, read_drive
 
 STOPS = [(5.0, 6.94, 4.0), (22.0, 4.63, 6.0), (40.0, 3.47, 8.0)]  # start, duration, deceleration
 
@@ -23,7 +23,7 @@ def test_both_sources_find_the_same_brakings(drive_files: dict[str, Path], with_
         assert braking.v_in == pytest.approx(27.8, abs=0.2)
 
 
-def own_copy(path: Path) -> Drive:
+def own_copy(path: Path) -> DriveResult:
     drive = read_drive(path, (), "")
     return drive._replace(columns={name: values.copy() for name, values in drive.columns.items()})
 

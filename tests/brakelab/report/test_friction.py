@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.report.friction import plots_of_friction
 from ecu.contract.signals import CORNERS, HOLDING, OBSERVING
 
@@ -13,7 +13,7 @@ T = np.arange(0.0, 20.0, 0.01)
 STOP = braking_between(5.0, 15.0)
 
 
-def drive(observed: tuple[float, float]) -> Drive:
+def drive(observed: tuple[float, float]) -> DriveResult:
     """Friction falls by 0.001 per degree, discs warm from 100 to 300 °C in the stop from 5 to 15 s."""
     disc = 100.0 + 20.0 * np.clip(T - 5.0, 0.0, 10.0)
     columns = {"vehicle_speed": 30.0 - 3.0 * np.clip(T - 5.0, 0.0, 10.0)}
@@ -23,7 +23,7 @@ def drive(observed: tuple[float, float]) -> Drive:
         columns[f"disc_temperature_{corner}"] = disc
         inside = (observed[0] <= T) & (observed[1] > T)
         columns[f"mode_{corner}"] = np.where(inside, OBSERVING, HOLDING).astype(float)
-    return Drive(T, columns, {})
+    return DriveResult(T, columns, {})
 
 
 def lines(plot: object) -> list[dict[str, np.ndarray]]:

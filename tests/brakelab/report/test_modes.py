@@ -1,15 +1,15 @@
 import numpy as np
 
 from brakelab.report.downsample import buckets
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.report.modes import Bar, faults_seen, mode_bars
 from ecu.contract.faults import IMU_LOST
 from ecu.contract.signals import ACTIVE, HOLDING, OBSERVING, READY, STARTING
 
 
-def drive(**columns: list[float]) -> Drive:
+def drive(**columns: list[float]) -> DriveResult:
     values = {name: np.array(column, float) for name, column in columns.items()}
-    return Drive(np.arange(len(next(iter(values.values()))), dtype=float), values, {})
+    return DriveResult(np.arange(len(next(iter(values.values()))), dtype=float), values, {})
 
 
 def test_bars_are_the_stretches_of_a_mode() -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.report.quality import quality_tiles, read_quality
 from ecu.errors import UserError
 
@@ -25,9 +25,9 @@ def log(
     )
 
 
-def drive(*logs: dict[str, Any]) -> Drive:
+def drive(*logs: dict[str, Any]) -> DriveResult:
     names = [{"name": f"{place}.log", "sha256": ""} for place in range(len(logs))]
-    return Drive(np.arange(2.0), {}, {"quality": json.dumps(logs), "inputs": json.dumps(names)})
+    return DriveResult(np.arange(2.0), {}, {"quality": json.dumps(logs), "inputs": json.dumps(names)})
 
 
 def row(*logs: dict[str, Any]) -> list[tuple[str, bool]]:
@@ -108,11 +108,11 @@ def test_what_never_came_is_named_and_no_metadata_is_no_page() -> None:
     quality = read_quality(drive(log({"samples": 0})), Path("r.parquet"))
     assert quality is not None
     assert (quality.silent, quality.inputs) == (["accel_x"], [])
-    assert read_quality(Drive(np.arange(2.0), {}, {}), Path("r.parquet")) is None
+    assert read_quality(DriveResult(np.arange(2.0), {}, {}), Path("r.parquet")) is None
 
 
 @pytest.mark.parametrize("text", ["{", '[{"rows": 3}]', "[3]", '[{"rows": 1, "samples": 0, "inputs": [{}]}]'])
 def test_damaged_metadata_gives_one_line(text: str) -> None:
     metadata = {"quality": text, "inputs": '[{"name": "a.log"}]'}
     with pytest.raises(UserError, match=r"^r\.parquet: metadata quality: not readable"):
-        read_quality(Drive(np.arange(2.0), {}, metadata), Path("r.parquet"))
+        read_quality(DriveResult(np.arange(2.0), {}, metadata), Path("r.parquet"))

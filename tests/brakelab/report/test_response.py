@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.report.response import build_up, plots_of_response, responses
 from ecu.contract.signals import CORNERS
 
@@ -36,7 +36,7 @@ def test_what_does_not_rise_has_no_build_up(pressure: np.ndarray) -> None:
     assert np.isnan(build_up(T, pressure).seconds)
 
 
-def made_up() -> Drive:
+def made_up() -> DriveResult:
     """Front pressure 0.1 s after the demand, left 44, right 36 bar; motors brake with a quarter."""
     columns = {"braking": ((T >= 2.0) & (T < 8.0)).astype(float)}
     for corner in CORNERS:
@@ -46,7 +46,7 @@ def made_up() -> Drive:
         columns[f"brake_torque_{corner}"] = np.where(T < 8.0, 300.0, 0.0)
         columns[f"motor_torque_{corner}"] = np.where(T < 8.0, 100.0, 0.0)
         columns[f"mu_b_{corner}"] = np.full_like(T, 0.38 if corner.endswith("l") else 0.42)
-    return Drive(T, columns, {})
+    return DriveResult(T, columns, {})
 
 
 def test_delay_sides_and_motors() -> None:

@@ -7,20 +7,20 @@ import pytest
 from bokeh.models import Range1d
 
 from brakelab.report.downsample import buckets
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.report.wheels import motors_share, plots_of_wheels, road_speed
 from ecu.contract.signals import CORNERS
 
 T = np.arange(0.0, 10.0, 0.01)
 
 
-def drive(**columns: Any) -> Drive:
-    return Drive(
+def drive(**columns: Any) -> DriveResult:
+    return DriveResult(
         T, {"vehicle_speed": np.full_like(T, 20.0), "braking": (T > 5.0).astype(float)} | columns, {}
     )
 
 
-def names(found: Drive, truth: Drive | None = None) -> set[str]:
+def names(found: DriveResult, truth: DriveResult | None = None) -> set[str]:
     grid = buckets(np.zeros(len(T), bool), 6000)
     plots = plots_of_wheels(found, truth, grid, Range1d(start=0.0, end=10.0))
     return {name for name, plot in plots.items() if plot.renderers}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.rig.linings import beyond_compensation, tell_linings
 from brakelab.rig.outcome import account_for
 from brakelab.simulation.faults import Fault
@@ -20,7 +20,7 @@ def truth(front, rear=0.45, change_at=T[-1] + 1.0, then=0.45):
     """Return a drive whose front linings have `front`, and `then` from `change_at` s on."""
     axle = np.where(change_at > T, front, then)
     columns = {f"mu_b_{corner}": axle if corner[0] == "f" else np.full(len(T), rear) for corner in CORNERS}
-    return Drive(T, columns, {})
+    return DriveResult(T, columns, {})
 
 
 @pytest.mark.parametrize(
@@ -67,12 +67,12 @@ def test_the_text_tells_the_furthest_axle():
     ],
 )
 def test_bits_that_nothing_accounts_for(bits, front, alone, of_linings):
-    raised = Drive(T, {"active_faults": np.where(T > 2.0, float(bits), 0.0)}, {})
+    raised = DriveResult(T, {"active_faults": np.where(T > 2.0, float(bits), 0.0)}, {})
     found = account_for(raised, truth(front), [], SUV, frozenset())
     assert (found[0], len(found[1])) == (alone, of_linings)
 
 
 def test_bits_within_an_injected_fault_need_no_linings():
-    raised = Drive(T, {"active_faults": np.where(T > 2.0, float(BRAKE_FADE), 0.0)}, {})
+    raised = DriveResult(T, {"active_faults": np.where(T > 2.0, float(BRAKE_FADE), 0.0)}, {})
     fault = Fault(kind="lost", message=["Imu"], t=1.9, duration=1.0)
     assert account_for(raised, truth(0.45), [fault], SUV, frozenset()) == ([], [])

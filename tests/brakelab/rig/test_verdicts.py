@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.rig.figures import Figures, Stop, last_stop
 from brakelab.rig.reaction import reactions
 from brakelab.rig.verdicts import judge
@@ -23,8 +23,10 @@ FAULTS = [Fault(kind="lost", t=2.0, duration=1.0)]
 def figures(stop: Stop) -> Figures:
     """Return a drive whose IMU is lost from 2.1 to 3.05 s; E2E rejections stand all the time."""
     masks = np.where(LOST, IMU_LOST | E2E_REJECTIONS, E2E_REJECTIONS).astype(float)
-    drive = Drive(T, {"active_faults": masks, "mode": np.where(LOST, DEGRADED, ACTIVE).astype(float)}, {})
-    truth = Drive(T, {"demand_heard": np.ones(len(T))}, {})
+    drive = DriveResult(
+        T, {"active_faults": masks, "mode": np.where(LOST, DEGRADED, ACTIVE).astype(float)}, {}
+    )
+    truth = DriveResult(T, {"demand_heard": np.ones(len(T))}, {})
     error = {"front": 0.021, "rear": math.nan}
     return Figures(drive, truth, 0.25, {}, error, stop, reactions(drive, truth, FAULTS))
 
@@ -103,6 +105,6 @@ def test_the_last_stop_is_that_from_the_demand_to_rest() -> None:
         "pedal_position": np.zeros(len(T)),
         "distance": np.cumsum(speed) * 0.01,
     }
-    stop = last_stop(Drive(T, columns, {}))
+    stop = last_stop(DriveResult(T, columns, {}))
     assert stop.seconds == pytest.approx(1.9, abs=0.02)
     assert stop.distance == pytest.approx(4.0, abs=0.05)

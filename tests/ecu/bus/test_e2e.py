@@ -96,7 +96,7 @@ def test_no_burst_of_up_to_eight_bits_passes(data: bytes, first: int, flips: int
     ],
 )
 def test_the_shortest_payload_ends_with_the_highest_byte_of_the_rule(rule: str, highest: int) -> None:
-    assert protection.SHORTEST[rule] == highest + 1
+    assert protection.SHORTEST_PAYLOAD[rule] == highest + 1
 
 
 @given(data=st.binary(min_size=8, max_size=8))

@@ -27,7 +27,7 @@ CARS = ("mustang", "rav4", "kona")
 
 
 @dataclass(frozen=True)
-class Drive:
+class ReceivedInputs:
     """Inputs of each cycle, shapes (cycles, inputs)."""
 
     value: NDArray[np.float64]
@@ -39,7 +39,7 @@ class Drive:
         return self.value[:, INPUT[name]]
 
 
-def drive(mapped: MappedBus, frames: RecordArray) -> Drive:
+def drive(mapped: MappedBus, frames: RecordArray) -> ReceivedInputs:
     inputs, reception = new_record(INPUTS), new_reception(mapped.plan)
     t_ns, left = int(frames["stamp_ns"][0]), 0
     rows = []
@@ -50,7 +50,7 @@ def drive(mapped: MappedBus, frames: RecordArray) -> Drive:
         rows.append(inputs.copy())
         t_ns += CYCLE_NS
     whole = np.concatenate(rows)
-    return Drive(whole["value"], whole["new"].astype(bool), whole["verdict"], reception)
+    return ReceivedInputs(whole["value"], whole["new"].astype(bool), whole["verdict"], reception)
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +59,7 @@ def maps(root: Path) -> dict[str, MappedBus]:
 
 
 @pytest.fixture(scope="module")
-def cuts(root: Path, maps: dict[str, MappedBus], read_log: ReadLog) -> dict[str, Drive]:
+def cuts(root: Path, maps: dict[str, MappedBus], read_log: ReadLog) -> dict[str, ReceivedInputs]:
     data = root / "tests" / "data"
     return {car: drive(maps[car], read_log(data / f"{car}.log", str(maps[car].bus))) for car in CARS}
 
@@ -69,13 +69,13 @@ def nothing_rejected(reception: Reception) -> bool:
 
 
 @pytest.mark.parametrize("car", CARS)
-def test_every_frame_of_a_recorded_car_is_accepted(cuts: dict[str, Drive], car: str) -> None:
+def test_every_frame_of_a_recorded_car_is_accepted(cuts: dict[str, ReceivedInputs], car: str) -> None:
     assert nothing_rejected(cuts[car].reception)
 
 
 @pytest.mark.parametrize("car", CARS)
 def test_what_is_mapped_comes_alive_and_nothing_else(
-    maps: dict[str, MappedBus], cuts: dict[str, Drive], car: str
+    maps: dict[str, MappedBus], cuts: dict[str, ReceivedInputs], car: str
 ) -> None:
     alive = (cuts[car].verdict[-20] & ALIVE) != 0
     assert alive.tolist() == maps[car].plan.mapped.tolist()
@@ -88,7 +88,7 @@ def slope(speed: NDArray[np.float64]) -> float:
     return float(np.polyfit(np.arange(len(speed[SETTLED])) * 0.01, speed[SETTLED], 1)[0])
 
 
-def test_braking_mustang(cuts: dict[str, Drive]) -> None:
+def test_braking_mustang(cuts: dict[str, ReceivedInputs]) -> None:
     """ISO 8855: braking is negative, wheels slow down; the sensor reads 0.4 too much at rest."""
     braking = cuts["mustang"]
     hard = braking["calliper_pressure_fl"] > 8.0
@@ -103,7 +103,9 @@ def test_braking_mustang(cuts: dict[str, Drive]) -> None:
     assert not braking["motor_torque_fl"].any()
 
 
-def test_mustang_pressures_give_the_torque_of_its_configuration(root: Path, cuts: dict[str, Drive]) -> None:
+def test_mustang_pressures_give_the_torque_of_its_configuration(
+    root: Path, cuts: dict[str, ReceivedInputs]
+) -> None:
     car = tomllib.loads((root / "config" / "mustang.toml").read_text())
     torque = np.zeros(len(cuts["mustang"].value))
     for axle, wheels in (("front", ("fl", "fr")), ("rear", ("rl", "rr"))):
@@ -118,7 +120,7 @@ def test_mustang_pressures_give_the_torque_of_its_configuration(root: Path, cuts
     np.testing.assert_allclose(front, 0.68 * torque, rtol=1e-4)
 
 
-def test_decelerating_rav4(cuts: dict[str, Drive]) -> None:
+def test_decelerating_rav4(cuts: dict[str, ReceivedInputs]) -> None:
     slowing = cuts["rav4"]
     speed = np.mean([slowing[f"wheel_speed_{wheel}"] for wheel in ("fl", "fr", "rl", "rr")], 0) * 0.352
     assert -2.5 < slope(speed) < -1.5
@@ -126,7 +128,7 @@ def test_decelerating_rav4(cuts: dict[str, Drive]) -> None:
     assert not slowing.new[:, INPUT["calliper_pressure_fl"]].any(), "the car sends no calliper pressure"
 
 
-def test_kona_sensors_that_start_are_not_believed(cuts: dict[str, Drive]) -> None:
+def test_kona_sensors_that_start_are_not_believed(cuts: dict[str, ReceivedInputs]) -> None:
     kona = cuts["kona"]
     starting = kona.verdict[:, INPUT["accel_x"]] == ALIVE | 2  # comes, at its rate, but not valid
     assert starting.sum() > 50

@@ -29,7 +29,7 @@ import numpy as np
 from brakelab.bench.fleet_drives import plant_of, simulate_and_replay, write_drive
 from brakelab.fleet.cluster import Workers, connect
 from brakelab.fleet.command import plan
-from brakelab.fleet.manifest import Drive, find_drives
+from brakelab.fleet.manifest import VehicleDrive, find_drives
 from brakelab.fleet.run import Chain, Planned, Task, run_fleet
 from brakelab.fleet.task import replay_job
 from brakelab.logs.candump_text import candump_text
@@ -72,7 +72,7 @@ def _of_workers() -> tuple[float, float]:
     return ticks / os.sysconf("SC_CLK_TCK"), max(map(_peak_megabytes, pids))
 
 
-def _by_workers(workers: int, drives: Sequence[Drive]) -> dict[str, float]:
+def _by_workers(workers: int, drives: Sequence[VehicleDrive]) -> dict[str, float]:
     with TemporaryDirectory() as folder, _warm(workers, plan(drives, None)) as crew:
         chains = plan(drives, None)
         before, _ = _of_workers()
@@ -90,7 +90,7 @@ def _by_workers(workers: int, drives: Sequence[Drive]) -> dict[str, float]:
     }
 
 
-def _alone(drives: Sequence[Drive]) -> tuple[float, float]:
+def _alone(drives: Sequence[VehicleDrive]) -> tuple[float, float]:
     """Replay without workers; return wall time and total processor time."""
     began, work = time.perf_counter(), time.process_time()
     for chain in plan(drives, None):
@@ -136,7 +136,7 @@ def _simulated(kilometres: float) -> list[Chain]:
         path = named(plant_of(vehicle), "config")
         config, chain = load_config(path), Chain()
         for k in range(drives):
-            drive = Drive(f"{vehicle}", f"{k}", (f"{vehicle}/{k}/{SECONDS}",), path, None)
+            drive = VehicleDrive(f"{vehicle}", f"{k}", (f"{vehicle}/{k}/{SECONDS}",), path, None)
             chain.add(Planned(drive, config, source, SECONDS, f"{k}", ""))
         chains.append(chain)
     return chains

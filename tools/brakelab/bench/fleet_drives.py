@@ -102,7 +102,7 @@ def simulate_and_replay(job: Job) -> Outcome:
 
 
 def damage(logs: list[Path]) -> None:
-    """Damage five logs, one in each way: cut, bytes flipped, emptied, another suffix, garbage."""
+    """Damage five logs, each differently: cut, bytes flipped, emptied, another suffix, garbage."""
     draw = np.random.default_rng(5)
     cut, flipped, emptied, renamed, garbage = logs
     cut.write_bytes(cut.read_bytes()[: cut.stat().st_size // 2 + 7])

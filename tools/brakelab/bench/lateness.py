@@ -2,7 +2,7 @@
 
 Daemon and simulated vehicle are processes on a bus of their own. Beside them, on the daemon's own core and
 above its priority, a bare loop wakes every 10 ms and does nothing: the floor of this machine.
-The daemon serves metrics; every other five seconds it is watched, in two ways, and scraped.
+The daemon serves metrics; every other five seconds it is watched, by two clients, and scraped.
 """
 
 import json

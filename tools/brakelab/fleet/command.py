@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 
 from brakelab.fleet.cluster import connect
 from brakelab.fleet.files import state_of
-from brakelab.fleet.manifest import Drive, find_drives
+from brakelab.fleet.manifest import VehicleDrive, find_drives
 from brakelab.fleet.output import brakes_file, others
 from brakelab.fleet.page import write_page
 from brakelab.fleet.run import Chain, Planned, run_fleet
@@ -87,7 +87,7 @@ def fleet(
     return 1 if any(summary["fault"] for summary in done) else 0
 
 
-def plan(drives: Sequence[Drive], observer: str | None) -> list[Chain]:
+def plan(drives: Sequence[VehicleDrive], observer: str | None) -> list[Chain]:
     """Return the drives vehicle by vehicle, with their configurations, maps and the state of their logs."""
     config_of = cache(lambda path: with_observer(load_config(path), observer))
     source_of = cache(lambda path: announced(load_source(path)))

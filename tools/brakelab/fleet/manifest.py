@@ -37,7 +37,7 @@ FITTED: Final = {"new": ("front", "rear"), "front": ("front",), "rear": ("rear",
 """Axles that got new pads, by the word in the column `pads`."""
 
 
-class Drive(NamedTuple):
+class VehicleDrive(NamedTuple):
     """One drive of one vehicle."""
 
     vehicle: str
@@ -64,7 +64,7 @@ class _Manifest(BaseModel):
     vehicle: Annotated[list[_Vehicle], Field(min_length=1)]
 
 
-def find_drives(given: Sequence[str], config: Path | None, map: Path | None, out: Path) -> list[Drive]:
+def find_drives(given: Sequence[str], config: Path | None, map: Path | None, out: Path) -> list[VehicleDrive]:
     """Return the drives selected on the command line, those of a vehicle in order.
 
     `given` is one manifest, or patterns and names of logs: then the vehicle is the parent folder's name, and
@@ -79,7 +79,7 @@ def find_drives(given: Sequence[str], config: Path | None, map: Path | None, out
         drives = _from_csv(Path(given[0]), config, map)
     else:
         drives = _from_patterns(given, config, map, out)
-    seen: dict[tuple[str, str], Drive] = {}
+    seen: dict[tuple[str, str], VehicleDrive] = {}
     for drive in drives:
         other = seen.setdefault((drive.vehicle, drive.name), drive)
         if other is not drive:
@@ -89,7 +89,9 @@ def find_drives(given: Sequence[str], config: Path | None, map: Path | None, out
     return drives
 
 
-def _from_patterns(given: Sequence[str], config: Path | None, map: Path | None, out: Path) -> list[Drive]:
+def _from_patterns(
+    given: Sequence[str], config: Path | None, map: Path | None, out: Path
+) -> list[VehicleDrive]:
     own = str(out.resolve()) + "/"
     logs = [log for pattern in given for log in expand(pattern) if not log.startswith(own)]
     if not logs:
@@ -99,11 +101,13 @@ def _from_patterns(given: Sequence[str], config: Path | None, map: Path | None, 
     return [_drive(log.rstrip("/").split("/")[-2], (log,), config, map, "--config") for log in logs]
 
 
-def _drive(vehicle: str, logs: Iterable[str], config: Path | None, map: Path | None, where: str) -> Drive:
+def _drive(
+    vehicle: str, logs: Iterable[str], config: Path | None, map: Path | None, where: str
+) -> VehicleDrive:
     if config is None:
         raise UserError(where, "", f"vehicle {vehicle} has no configuration; give --config CONFIG")
     logs = tuple(logs)
-    return Drive(vehicle, logs[0].rstrip("/").rpartition("/")[2], logs, config, map)
+    return VehicleDrive(vehicle, logs[0].rstrip("/").rpartition("/")[2], logs, config, map)
 
 
 def _beside(manifest: Path, name: str) -> str:
@@ -118,7 +122,7 @@ def _setting(manifest: Path, name: str | None, folder: str, default: Path | None
     return beside if beside.is_file() else named(name, folder)
 
 
-def _from_toml(path: Path, config: Path | None, map: Path | None) -> list[Drive]:
+def _from_toml(path: Path, config: Path | None, map: Path | None) -> list[VehicleDrive]:
     try:
         manifest = _Manifest.model_validate(read_toml(path))
     except ValidationError as error:
@@ -135,7 +139,7 @@ def _from_toml(path: Path, config: Path | None, map: Path | None) -> list[Drive]
     return drives
 
 
-def _from_csv(path: Path, config: Path | None, map: Path | None) -> list[Drive]:
+def _from_csv(path: Path, config: Path | None, map: Path | None) -> list[VehicleDrive]:
     try:
         with path.open(encoding="utf-8-sig", newline="") as stream:
             reader = csv.DictReader(stream)

@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple
 
 from brakelab.fleet.cluster import Workers
 from brakelab.fleet.job import Job, Outcome, failed
-from brakelab.fleet.manifest import Drive
+from brakelab.fleet.manifest import VehicleDrive
 from brakelab.fleet.output import keep, rows_file, standing
 from brakelab.fleet.task import replay_job
 from brakelab.replay.source import Source
@@ -35,7 +35,7 @@ Task = Callable[[Job], Outcome]
 class Planned(NamedTuple):
     """A drive with the information available before its replay."""
 
-    drive: Drive
+    drive: VehicleDrive
     config: Config
     source: Source
     size: int

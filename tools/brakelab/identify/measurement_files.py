@@ -26,7 +26,7 @@ from ecu.settings.config import Config, load_config
 
 WARMEST_COLD: Final = 250.0
 """degC: a disc that is never cooler is given in K."""
-COLDEST: Final = -60.0  # degC
+LOWEST_TEMPERATURE: Final = -60.0  # degC
 CONTRACT: Final = {
     "t": ("time", "s"),
     "omega": ("speed", "rad/s"),
@@ -272,5 +272,5 @@ def check_celsius(path: Path, name: str, values: Array, hottest: float) -> None:
         UserError: they cannot.
     """
     low, high = values.min(), values.max()
-    if low > WARMEST_COLD or high > hottest or low < COLDEST:
+    if low > WARMEST_COLD or high > hottest or low < LOWEST_TEMPERATURE:
         raise UserError(str(path), name, f"{low:.0f} to {high:.0f} cannot be degC; convert it")

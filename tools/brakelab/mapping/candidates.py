@@ -14,7 +14,7 @@ from brakelab.mapping.names import converts, names_itself, score, tells_directio
 from brakelab.mapping.series import Series
 from ecu.bus.units import spelled
 
-LEAST: Final = 0.5  # correlation that speaks for a signal
+LEAST_CORRELATION: Final = 0.5  # correlation that speaks for a signal
 LEAST_ALONE: Final = 0.8  # for one whose unit or name says nothing
 PER_WORD: Final = 0.1  # of correlation, that a word of the name is worth
 NEAR: Final = 0.02  # of correlation, by which two signals follow equally well
@@ -47,7 +47,7 @@ def best_of(
         strength = found.correlation * fixed_sign if fixed_sign else abs(found.correlation)
         said = one.unit.strip() or unit == "%" or (unit == "bar" and tells_pressure(one.message, one.signal))
         named = points > 0 and said
-        least = LEAST if named else LEAST_ALONE
+        least = LEAST_CORRELATION if named else LEAST_ALONE
         if not strength >= least:
             continue
         # Between signals that follow equally well the name decides, then the rate.

@@ -16,7 +16,7 @@ from brakelab.logs.signal_file import check_seconds
 from brakelab.mapping.map_text import input_lines, radius_line
 from brakelab.mapping.motion import Found
 from brakelab.mapping.names import converts
-from brakelab.mapping.series import FEWEST, Series
+from brakelab.mapping.series import FEWEST_FRAMES, Series
 from ecu.errors import UserError
 
 FLAG: Final = {0.0, 1.0}
@@ -43,7 +43,7 @@ def read_column_series(log: Path, quality: SignalQuality) -> tuple[Columns, list
     check_seconds(log, time, known, f'; or write its unit behind the name, "{time} [us]"')
     t = t - known[0]
     series = [_series(name, columns.units.get(name, ""), t, read[name]) for name in names]
-    return columns, [one for one in series if len(one.t) >= FEWEST]
+    return columns, [one for one in series if len(one.t) >= FEWEST_FRAMES]
 
 
 def _numbers(column: "pa.Array[Any]") -> Vector:

@@ -40,7 +40,7 @@ WANTED: Final = (
     *("pedal_position", "accelerator_position", "motor_torque_fl", "abs_active"),
 )
 SPARE: Final = 1.5  # time-out over the longest gap seen
-LONGEST: Final = 0.5  # s, a gap beyond it is a sender that fell silent
+LONGEST_GAP: Final = 0.5  # s, a gap beyond it is a sender that fell silent
 SHOWN: Final = 20  # names in a line
 PERIODS: Final = 3.0  # likewise, of a sender that is slow
 STEP: Final = 0.05  # s, time-outs are rounded up to it
@@ -235,7 +235,7 @@ def _counter(series: list[Series], message: str) -> str | None:
 def timeout(found: Found) -> float | None:
     """Return the time-out [s] that spans the gaps of a signal, None: the contract's does."""
     usual = INPUT_SIGNALS[INPUT[found.target]].timeout_s
-    silent = max(LONGEST, PERIODS * found.series.period)
+    silent = max(LONGEST_GAP, PERIODS * found.series.period)
     wanted = min(SPARE * min(found.series.longest_gap, silent), SLOWEST_S)
     return round(STEP * math.ceil(wanted / STEP - 1e-9), 3) if wanted > usual else None
 
@@ -280,7 +280,7 @@ def map_text(
         if one.series.sign:
             source += f', sign = {{ signal = "{one.series.sign}", values = [1] }}'
         lines += input_lines(one, before, source, timeout(one))
-        if one.series.longest_gap > max(LONGEST, PERIODS * one.series.period):
+        if one.series.longest_gap > max(LONGEST_GAP, PERIODS * one.series.period):
             lines.append(
                 f"# {one.target}: no value for {one.series.longest_gap:.2f} s: look at the log there"
             )

@@ -23,14 +23,14 @@ ASKED: Final = {"rq", "req", "request", "mx", "mn", "max", "min", "lim", "limit"
 SLIPS: Final = (
     0.4  # correlation of the axles' difference with the torque, from which it shows the driven axle
 )
-LEAST: Final = 0.5  # m/s^2, standard deviation of dv/dt
+LEAST_SIGMA: Final = 0.5  # m/s^2, standard deviation of dv/dt
 PER_TORQUE: Final = (250.0, 2000.0)  # N m per m/s^2: mass times radius of a car or van
 
 
 def drive_torque(series: list[Series], motion: Motion) -> tuple[Series, Fit] | None:
     """Return the torque at the wheels [N m] that the car's acceleration follows best; None: there is none."""
     rows = motion.faster(MOVING) & (motion.change > -BRAKING)
-    if not motion.drives or rows.sum() < 2 or motion.change[rows].std() < LEAST:
+    if not motion.drives or rows.sum() < 2 or motion.change[rows].std() < LEAST_SIGMA:
         return None
     found = []
     for one in series:

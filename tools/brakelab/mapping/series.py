@@ -15,7 +15,7 @@ from ecu.bus.units import spelled
 from ecu.contract.records import EXTENDED_ID, FRAME_ERROR, FRAME_EXTENDED, FRAME_REMOTE, RecordArray
 from ecu.jit import kernel
 
-FEWEST = 20  # frames of a message
+FEWEST_FRAMES = 20  # frames of a message
 MAGNITUDES = {"deg", "rad", "deg/s", "rad/s", "m/s^2", "g", "N m"}  # units of what has two sides
 TURNS = 4  # of a sign, in a drive
 ZERO = 0.05  # of the largest value, that a magnitude is below where its sign turns
@@ -75,7 +75,7 @@ def _readable(message: Message) -> bool:
 
 
 def read_series(blocks: Iterable[RecordArray], database: Database) -> list[Series]:
-    """Return the series of all messages that came at least `FEWEST` times, on each bus for itself.
+    """Return the series of all messages that came at least `FEWEST_FRAMES` times, on each bus for itself.
 
     `blocks`: FRAME in the order of the log. Frames of a wrong length are left out.
     """
@@ -93,7 +93,7 @@ def read_series(blocks: Iterable[RecordArray], database: Database) -> list[Serie
             continue
         for bus in np.unique(mine["bus"]):
             here = mine[mine["bus"] == bus]
-            if len(here) >= FEWEST:
+            if len(here) >= FEWEST_FRAMES:
                 own = [one for one in _series(message, here, int(bus), int(start)) if one.is_known]
                 found += [*own, *with_signs(own)]
     return found

@@ -25,7 +25,7 @@ from brakelab.plant.records import RecordArray, new_record
 STEP: Final = 1e-3  # s
 AMBIENT: Final = 20.0  # degC
 RAMP: Final = 0.15  # s. Assumption
-LONGEST: Final = 180.0  # s of a stop
+LONGEST_S: Final = 180.0  # s of a stop
 HIGHEST_PRESSURE: Final = 210e5  # Pa (3.2)
 SMALLEST_LEVER: Final = 1e-9  # m^3, keeps the quotient finite for a brake without friction
 PRESSURE, DECELERATION, REPLAY, DRAG = range(4)
@@ -152,7 +152,9 @@ def new_stop(
     return record
 
 
-def run_stop(rig: RecordArray, stop: RecordArray, dt: float = STEP, longest: float = LONGEST) -> RecordArray:
+def run_stop(
+    rig: RecordArray, stop: RecordArray, dt: float = STEP, longest: float = LONGEST_S
+) -> RecordArray:
     """Return the trace of a stop, at most `longest` [s]; dtype TRACE, one entry per step."""
     trace = np.empty(round(longest / dt), TRACE)
     return trace[: run(rig[0], stop[0], trace, dt)].copy()

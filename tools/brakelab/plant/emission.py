@@ -25,20 +25,20 @@ from brakelab.plant.jit import Record, kernel
 
 REFERENCE_POWER: Final = 5e3  # W
 REFERENCE_SPEED: Final = 5.0  # m/s, of sliding
-SMALLEST: Final = 23e-9  # m, counted from here
-LARGEST: Final = 2.5e-6  # m, to here
+SMALLEST_PARTICLE: Final = 23e-9  # m, counted from here
+LARGEST_PARTICLE: Final = 2.5e-6  # m, to here
 EMISSION_ROW: Final = 13
 (RATE, BY_POWER, BY_SPEED, COARSE, ULTRAFINE, HOT_FROM, HOT_WIDTH, FLASH, RUN_IN, RUN_IN_WORK, TREATED,
  TREATED_FROM, TREATED_WORK) = range(EMISSION_ROW)  # fmt: skip
 
 
 def share_counted(median: float, spread: float) -> float:
-    """Return the share of particles between `SMALLEST` and `LARGEST`.
+    """Return the share of particles between `SMALLEST_PARTICLE` and `LARGEST_PARTICLE`.
 
     `median` of the diameter [m], `spread` its geometric standard deviation [-].
     """
     width = math.sqrt(2.0) * math.log(spread)
-    low, high = (math.erf(math.log(end / median) / width) for end in (SMALLEST, LARGEST))
+    low, high = (math.erf(math.log(end / median) / width) for end in (SMALLEST_PARTICLE, LARGEST_PARTICLE))
     return 0.5 * (high - low)
 
 

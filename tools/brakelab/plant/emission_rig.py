@@ -1,7 +1,7 @@
 """Brake in its enclosure on the road: load by a trip, emission, and the counter's reading.
 
 The brake of one corner follows a speed trace: the brakes supply the force not given by drag, rolling, grade
-and engine. Air is drawn through the enclosure and a tunnel (Figure 8.1); on the way
+and engine. Air is drawn through the enclosure and a tunnel (Figure 8.1); there
 
     n' = (1 - d) N' + s / T_s - n / T_m             n mixes in the enclosure
     s' = d N' - s / T_s                             a share d settles and comes off later, while driving
@@ -88,7 +88,7 @@ def run_trip(
     heat, mu, memory, torque = trip.ambient, 0.4, lining[START], 0.0
     work, treatment, emitted, settled, mixed, shown = trip.work, trip.treatment, 0.0, 0.0, 0.0, 0.0
     last, presses, count, rows = 0.0, False, 0, 0
-    way = np.zeros(STORED)
+    delayed = np.zeros(STORED)
     delay = min(int(trip.delay / STEP), STORED - 1)
     for k in range(len(drive)):
         speed, accel, grade = drive[k, 0], drive[k, 1], drive[k, 2]
@@ -116,8 +116,8 @@ def run_trip(
         comes_off = settled / trip.settled_for if speed > 0.5 else 0.0
         settled += STEP * (trip.settles * rate - comes_off)
         mixed += STEP * ((1.0 - trip.settles) * rate + comes_off - mixed / trip.mixing)
-        way[k % STORED] = mixed / trip.mixing / trip.flow / CUBIC_METRE
-        arrives = way[(k - delay) % STORED]
+        delayed[k % STORED] = mixed / trip.mixing / trip.flow / CUBIC_METRE
+        arrives = delayed[(k - delay) % STORED]
         air = wander[k] * (trip.background + trip.background_by_speed * speed)
         shown += STEP / trip.response * (arrives + air - shown)
         cooling = cooling_rate(car.cooling[wheel], car.cooling_by_speed[wheel], speed, 0.0)

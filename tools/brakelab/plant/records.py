@@ -235,7 +235,7 @@ PHASE: Final = np.dtype(
     [
         ("kind", "i8"),  # CRUISE, COAST, BRAKE or FOLLOW
         ("speed", "f8"),  # m/s, to be held on the motors
-        ("accel", "f8"),  # m/s^2, largest acceleration on the way to that speed
+        ("accel", "f8"),  # m/s^2, largest acceleration up to that speed
         ("decel", "f8"),  # m/s^2, as a deceleration demand, or NaN
         ("pedal", "f8"),  # %, or NaN
         ("kept_decel", "f8"),  # m/s^2, to be reached and kept by the pedal, or NaN

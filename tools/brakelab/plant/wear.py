@@ -33,7 +33,7 @@ class WearLaw(Section):
     """Numbers of the law for one lining."""
 
     rate: Positive = 0.035
-    """k, g per MJ of normal force times way."""
+    """k, g per MJ of normal force times distance."""
     by_pressure: float = 0.10
     by_speed: float = 0.12
     hot: NotNegative = 2.0

@@ -18,7 +18,7 @@ SAMPLE: Final = 20  # steps
 RAMP: Final = 0.3  # s of the deceleration
 FAN: Final = 0.6  # of the road's air speed. Assumption
 AIR: Final = 22.0  # degC
-SLOWEST: Final = 0.2  # m/s, end of a stop
+LOWEST_SPEED: Final = 0.2  # m/s, end of a stop
 T, OMEGA, PRESSURE, TORQUE, HEAT = range(5)
 
 
@@ -41,7 +41,7 @@ def wear_block(
     lever = 2.0 * car.piston_area[wheel] * car.effective_radius[wheel]
     heat, t, place, mu = AIR, 0.0, 0, 0.3
     for k in range(len(stops)):
-        first, last, decel, gap = stops[k, 0], max(stops[k, 1], SLOWEST), stops[k, 2], stops[k, 3]
+        first, last, decel, gap = stops[k, 0], max(stops[k, 1], LOWEST_SPEED), stops[k, 2], stops[k, 3]
         air = cooling_rate(car.cooling[wheel], car.cooling_by_speed[wheel], FAN * first, 0.0)
         for _ in range(int(gap / 0.1)):
             heat = disc_step(heat, 0.0, air, 0.0, AIR, 0.1)

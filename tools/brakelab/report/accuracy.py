@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from brakelab.arrays import Vector
 from brakelab.report.brakings import Braking, inside
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 
 AXLES = {"front": slice(0, 2), "rear": slice(2, 4)}
 
@@ -35,12 +35,12 @@ class Accuracy(NamedTuple):
     """Driving time that was evaluated."""
 
 
-def achieved_deceleration(drive: Drive, truth: Drive | None) -> Vector:
+def achieved_deceleration(drive: DriveResult, truth: DriveResult | None) -> Vector:
     """Return the true deceleration where it is known, else the measured one [m/s^2], shape (n,)."""
     return -(truth if truth and truth.has("accel_x_road") else drive).column("accel_x_road")
 
 
-def evaluated(drive: Drive, truth: Drive | None, found: list[Braking]) -> NDArray[np.bool_]:
+def evaluated(drive: DriveResult, truth: DriveResult | None, found: list[Braking]) -> NDArray[np.bool_]:
     """Return the rows evaluated, shape (n,); `truth` lies on the time axis of `drive`."""
     demand = drive.column("decel_demand_total")
     achieved = achieved_deceleration(drive, truth)
@@ -55,7 +55,7 @@ def evaluated(drive: Drive, truth: Drive | None, found: list[Braking]) -> NDArra
     return rows
 
 
-def tracking(drive: Drive, truth: Drive | None, found: list[Braking]) -> list[float]:
+def tracking(drive: DriveResult, truth: DriveResult | None, found: list[Braking]) -> list[float]:
     """Return per brake application the relative excess of achieved over demanded deceleration.
 
     NaN: nothing to evaluate, or motors braked on another controller's demand.
@@ -90,7 +90,7 @@ def accuracy(estimate: Vector, sigma: Vector, true: Vector, dt: float) -> Accura
     )
 
 
-def accuracy_per_axle(drive: Drive, truth: Drive, found: list[Braking]) -> dict[str, Accuracy]:
+def accuracy_per_axle(drive: DriveResult, truth: DriveResult, found: list[Braking]) -> dict[str, Accuracy]:
     """Return the accuracy of the front and the rear axle over all brake applications."""
     rows = evaluated(drive, truth, found)
     dt = float(np.median(np.diff(drive.t)))
@@ -101,7 +101,7 @@ def accuracy_per_axle(drive: Drive, truth: Drive, found: list[Braking]) -> dict[
     }
 
 
-def error_at_end(drive: Drive, truth: Drive, found: list[Braking]) -> dict[str, float]:
+def error_at_end(drive: DriveResult, truth: DriveResult, found: list[Braking]) -> dict[str, float]:
     """Return by axle |estimate - truth| of friction over the truth in the last row evaluated; NaN: none."""
     rows = np.flatnonzero(evaluated(drive, truth, found))[-1:]
     if not len(rows):

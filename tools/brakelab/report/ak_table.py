@@ -11,7 +11,7 @@ import numpy as np
 from brakelab.arrays import Vector
 from brakelab.report.accuracy import AXLES
 from brakelab.report.brakings import Braking, inside
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.report.torque import axle_pressure
 from ecu.contract.signals import CORNERS, OBSERVING
 
@@ -21,7 +21,7 @@ PRESSURES: Final = (20.0, 40.0, 60.0)
 """bar"""
 TEMPERATURES: Final = (50.0, 150.0, 300.0)
 """degC: cold, as most sections (100 degC), warm, fade."""
-SLOWEST: Final = 5.0 / 3.6
+LEAST_SPEED: Final = 5.0 / 3.6
 LEAST_SECONDS: Final = 0.3
 """Of observation in a braking that counts."""
 RECOVERED: Final = 3
@@ -57,7 +57,7 @@ class Section(NamedTuple):
     greatest: float
 
 
-def observed(drive: Drive, found: list[Braking]) -> dict[str, list[Observed]]:
+def observed(drive: DriveResult, found: list[Braking]) -> dict[str, list[Observed]]:
     """Return by axle the brake applications in which its friction was observed."""
     period = float(np.median(np.diff(drive.t)))
     speed = np.abs(drive.column("vehicle_speed"))
@@ -67,7 +67,7 @@ def observed(drive: Drive, found: list[Braking]) -> dict[str, list[Observed]]:
         rows = []
         for braking in found:
             places = np.flatnonzero(
-                inside(drive, braking) & np.isfinite(friction) & np.isfinite(pressure) & (speed > SLOWEST)
+                inside(drive, braking) & np.isfinite(friction) & np.isfinite(pressure) & (speed > LEAST_SPEED)
             )
             if len(places) * period < LEAST_SECONDS:
                 continue
@@ -87,7 +87,7 @@ def observed(drive: Drive, found: list[Braking]) -> dict[str, list[Observed]]:
     return by_axle
 
 
-def _friction(drive: Drive, wheels: slice) -> Vector:
+def _friction(drive: DriveResult, wheels: slice) -> Vector:
     """Return the mean friction of an axle's wheels where it was observed, else NaN, shape (n,)."""
     friction = drive.corners("mu_b")[:, wheels]
     modes = np.column_stack([drive.column(f"mode_{corner}") for corner in CORNERS[wheels]])

@@ -11,7 +11,7 @@ from brakelab.report.ak_table import fade, observed, sections
 from brakelab.report.brakings import Braking
 from brakelab.report.csv_table import csv_link
 from brakelab.report.distribution import plots_of_distribution
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.report.energy import Work, plots_of_energy, works
 from brakelab.report.response import LEAST_BAR, Response, plots_of_response, responses
 from brakelab.report.torque import plots_of_torque
@@ -37,7 +37,7 @@ class Section(NamedTuple):
     missing: list[Missing]
 
 
-def read_car(drive: Drive, result: Path) -> Car | None:
+def read_car(drive: DriveResult, result: Path) -> Car | None:
     """Return the car that the result states, None: none. Raises UserError if it is damaged."""
     try:
         return unpacked(drive.metadata.get(KEY, ""))
@@ -47,7 +47,7 @@ def read_car(drive: Drive, result: Path) -> Car | None:
 
 
 def brakes_section(
-    drive: Drive, truth: Drive | None, result: Path, found: list[Braking], without_pressure: bool
+    drive: DriveResult, truth: DriveResult | None, result: Path, found: list[Braking], without_pressure: bool
 ) -> tuple[Section, dict[str, dict[str, Any]]]:
     """Return the section on the drive of `result` and its plots by place.
 
@@ -118,7 +118,7 @@ def _of_plots(
     return found
 
 
-def _of_drive(drive: Drive) -> list[Missing]:
+def _of_drive(drive: DriveResult) -> list[Missing]:
     """Return the reasons for plots over the drive that are left out."""
     found = []
     if not any(drive.has(f"slip_{corner}") for corner in CORNERS):

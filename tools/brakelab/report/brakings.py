@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.arrays import Vector
-from brakelab.report.drive import Drive, numbers, read_parquet
+from brakelab.report.drive import DriveResult, numbers, read_parquet
 from brakelab.results.files import brakes_path
 from brakelab.results.prediction import SHORT, left_out
 from brakelab.stretches import stretches
@@ -73,7 +73,7 @@ class Braking(NamedTuple):
     """Why the prediction does not count, empty where it does."""
 
 
-def brakings(drive: Drive, result: Path) -> list[Braking]:
+def brakings(drive: DriveResult, result: Path) -> list[Braking]:
     """Return the brake applications of a drive in order, without taps shorter than `SHORT`.
 
     Raises UserError when their file is damaged.
@@ -84,7 +84,7 @@ def brakings(drive: Drive, result: Path) -> list[Braking]:
     return [braking._replace(number=number) for number, braking in enumerate(lasting, 1)]
 
 
-def inside(drive: Drive, braking: Braking) -> NDArray[np.bool_]:
+def inside(drive: DriveResult, braking: Braking) -> NDArray[np.bool_]:
     """Return the rows of the brake application, shape (n,)."""
     return np.asarray((drive.t >= braking.t_start) & (drive.t <= braking.t_end))
 
@@ -94,12 +94,12 @@ def _mean(values: Vector) -> float:
     return float(finite.mean()) if finite.size else float("nan")
 
 
-def _demand(drive: Drive) -> Vector:
+def _demand(drive: DriveResult) -> Vector:
     stands = np.abs(drive.column("vehicle_speed")) < STANDING
     return drive.column("decel_demand_total") * ~stands
 
 
-def _from_file(drive: Drive, path: Path) -> list[Braking]:
+def _from_file(drive: DriveResult, path: Path) -> list[Braking]:
     table = read_parquet(path, _REMEDY)
     for name in ("brake", "corner", *_PER_BRAKE, "mu_b_mean"):
         if name not in table.column_names:
@@ -139,7 +139,7 @@ def _from_file(drive: Drive, path: Path) -> list[Braking]:
     return found
 
 
-def _from_result(drive: Drive) -> list[Braking]:
+def _from_result(drive: DriveResult) -> list[Braking]:
     name = "braking" if drive.has("braking") else "decel_demand_total"
     busy = np.nan_to_num(drive.column(name)) > 0.5
     friction, sigma = drive.corners("mu_b"), drive.corners("sigma_mu_b")

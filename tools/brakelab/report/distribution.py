@@ -11,7 +11,7 @@ from bokeh.models import ColumnDataSource, Range1d
 
 from brakelab.arrays import Vector
 from brakelab.report.brakings import Braking, inside
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.report.look import DEGRADED, DEMAND, ESTIMATE, GRID, INK, QUIET, new_figure
 from brakelab.report.torque import binned
 from brakelab.results.car import RATES, Car
@@ -35,7 +35,7 @@ class Forces(NamedTuple):
 
 
 def plots_of_distribution(
-    drive: Drive, truth: Drive | None, found: list[Braking], car: Car
+    drive: DriveResult, truth: DriveResult | None, found: list[Braking], car: Car
 ) -> dict[str, Any]:
     """Return the two figures by name, empty where no braking shows it."""
     rows = np.zeros(len(drive.t), bool)
@@ -64,7 +64,7 @@ def plots_of_distribution(
     return {"distribution": _shares(car, source, end, true), "forces": _forces(car, source, end)}
 
 
-def forces_of(drive: Drive, car: Car) -> Forces:
+def forces_of(drive: DriveResult, car: Car) -> Forces:
     """Return the brake forces of the axles over the weight; driving motors count against them."""
     torque = drive.corners("brake_torque") + np.nan_to_num(drive.corners("motor_torque"))
     weight = car.mass * GRAVITY

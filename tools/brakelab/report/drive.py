@@ -14,7 +14,7 @@ from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
 
 
-class Drive(NamedTuple):
+class DriveResult(NamedTuple):
     """Columns in the contract's units; NaN means "not available"."""
 
     t: Vector
@@ -57,7 +57,7 @@ def numbers(table: pa.Table, name: str, path: Path) -> Vector:
         raise UserError(str(path), f"column {name}", f"holds {kind}; numbers are needed") from error
 
 
-def read_drive(path: Path, required: tuple[str, ...], remedy: str) -> Drive:
+def read_drive(path: Path, required: tuple[str, ...], remedy: str) -> DriveResult:
     """Read a result or truth file.
 
     Raises UserError when the file is missing or damaged, lacks `t` or a required column, is empty, or
@@ -86,16 +86,16 @@ def read_drive(path: Path, required: tuple[str, ...], remedy: str) -> Drive:
         key.decode(errors="replace"): value.decode(errors="replace")
         for key, value in (pq.read_metadata(path).metadata or {}).items()
     }
-    return Drive(t, {name: numbers(table, name, path) for name in numeric if name != "t"}, metadata)
+    return DriveResult(t, {name: numbers(table, name, path) for name in numeric if name != "t"}, metadata)
 
 
-def start_ns(drive: Drive) -> int | None:
+def start_ns(drive: DriveResult) -> int | None:
     """Return the absolute start [ns since 1970] from the metadata, None when it is not stated."""
     text = drive.metadata.get("start_time_ns", "")
     return int(text) if text.lstrip("-").isdigit() else None
 
 
-def onto(drive: Drive, truth: Drive, truth_path: Path) -> Drive:
+def onto(drive: DriveResult, truth: DriveResult, truth_path: Path) -> DriveResult:
     """Return the truth on the time axis of `drive`, NaN outside its span.
 
     The axes are aligned by the dates of their first rows if both files state them, else by a common zero.
@@ -114,4 +114,4 @@ def onto(drive: Drive, truth: Drive, truth_path: Path) -> Drive:
         name: np.interp(drive.t, t, values, left=np.nan, right=np.nan)
         for name, values in truth.columns.items()
     }
-    return Drive(drive.t, columns, truth.metadata)
+    return DriveResult(drive.t, columns, truth.metadata)

@@ -6,7 +6,7 @@ import numpy as np
 
 from brakelab.arrays import Vector
 from brakelab.report.brakings import Braking, inside
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.report.per_braking import CORNER_MARKS, Series, points_by_braking
 from brakelab.results.car import Car
 from ecu.contract.signals import CORNERS
@@ -31,7 +31,7 @@ class Work(NamedTuple):
     peak_density: float
 
 
-def power(drive: Drive, car: Car) -> Vector:
+def power(drive: DriveResult, car: Car) -> Vector:
     """Return the power of each brake [W], shape (n, 4); a wheel that stands takes none."""
     speed = np.abs(drive.column("vehicle_speed"))[:, np.newaxis]
     radius = np.repeat(car.radius, 2)
@@ -39,7 +39,7 @@ def power(drive: Drive, car: Car) -> Vector:
     return np.asarray(drive.corners("brake_torque") * speed * turning / radius)
 
 
-def peaks(drive: Drive, found: list[Braking], watts: Vector) -> Vector:
+def peaks(drive: DriveResult, found: list[Braking], watts: Vector) -> Vector:
     """Return the greatest power of each brake application, smoothed [W], shape (brakings, 4)."""
     period = float(np.median(np.diff(drive.t)))
     width = max(1, round(SMOOTHING / period))
@@ -56,7 +56,7 @@ def peaks(drive: Drive, found: list[Braking], watts: Vector) -> Vector:
     return rows
 
 
-def works(drive: Drive, found: list[Braking], car: Car) -> list[Work]:
+def works(drive: DriveResult, found: list[Braking], car: Car) -> list[Work]:
     """Return the four brakes; empty without brake applications or torque."""
     watts = power(drive, car)
     rows = np.zeros(len(drive.t), bool)
@@ -86,7 +86,7 @@ def works(drive: Drive, found: list[Braking], car: Car) -> list[Work]:
     ]
 
 
-def plots_of_energy(drive: Drive, found: list[Braking], car: Car) -> dict[str, Any]:
+def plots_of_energy(drive: DriveResult, found: list[Braking], car: Car) -> dict[str, Any]:
     """Return the figures by name: work, and the greatest power or power density, per application."""
     watts = power(drive, car)
     numbers = [braking.number for braking in found]

@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 from brakelab.arrays import Vector
 from brakelab.report.accuracy import AXLES
 from brakelab.report.brakings import Braking, inside
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.report.look import INK, LEFT, RIGHT, new_figure
 from ecu.contract.signals import CORNERS, OBSERVING
 
 POINTS: Final = 600
 """Of each wheel in a plot."""
 BINS: Final = 12
-_FEWEST: Final = 20  # rows of a bin
+_FEWEST_ROWS: Final = 20  # rows of a bin
 _LEAST_ROWS: Final = 100  # of a plot: 1 s of observation
 _LEAST_SPAN: Final = 0.1
 
@@ -27,7 +27,7 @@ _AGAINST: Final = (
 )
 
 
-def plots_of_friction(drive: Drive, truth: Drive | None, found: list[Braking]) -> dict[str, Any]:
+def plots_of_friction(drive: DriveResult, truth: DriveResult | None, found: list[Braking]) -> dict[str, Any]:
     """Return the figures by name, front and rear for each quantity; empty where nothing was observed."""
     rows = np.zeros(len(drive.t), bool)
     for braking in found:
@@ -43,7 +43,7 @@ def plots_of_friction(drive: Drive, truth: Drive | None, found: list[Braking]) -
 
 
 def _observed(
-    drive: Drive, corner: str, stem: str, factor: float, rows: NDArray[np.bool_]
+    drive: DriveResult, corner: str, stem: str, factor: float, rows: NDArray[np.bool_]
 ) -> tuple[Vector, NDArray[np.int64]]:
     """Return a quantity where the corner's friction was observed, and in which rows."""
     at = drive.column(stem if drive.has(stem) else f"{stem}_{corner}") * factor
@@ -55,7 +55,7 @@ def _observed(
 
 
 def _plot(
-    drive: Drive,
+    drive: DriveResult,
     observed: list[tuple[Vector, NDArray[np.int64]]],
     label: str,
     axle: str,
@@ -98,5 +98,5 @@ def _binned(at: Vector, values: Vector) -> tuple[Vector, Vector]:
         return np.empty(0), np.empty(0)
     number = np.minimum(((at - at.min()) / np.ptp(at) * BINS).astype(int), BINS - 1)
     count = np.bincount(number, minlength=BINS)
-    kept = count >= _FEWEST
+    kept = count >= _FEWEST_ROWS
     return tuple(np.bincount(number, of, BINS)[kept] / count[kept] for of in (at, values))  # type: ignore[return-value]

@@ -8,7 +8,7 @@ from bokeh.models.annotations import Legend
 
 from brakelab.arrays import Vector
 from brakelab.report.downsample import Buckets, worst
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.report.look import DEGRADED, ESTIMATE, FAILED, HOLDING, IDLE, new_figure
 from ecu.contract.faults import FAULTS, WORD, WORDS, fault_mask
 from ecu.contract.signals import CORNERS, STARTING
@@ -36,7 +36,7 @@ class Bar(NamedTuple):
     kind: str
 
 
-def fault_masks(drive: Drive) -> np.ndarray[Any, np.dtype[np.int64]]:
+def fault_masks(drive: DriveResult) -> np.ndarray[Any, np.dtype[np.int64]]:
     """Return the mask of active faults per row, 0 where it is not available, shape (n,).
 
     While the ECU starts, inputs not yet received count as lost, which is no fault.
@@ -45,7 +45,7 @@ def fault_masks(drive: Drive) -> np.ndarray[Any, np.dtype[np.int64]]:
     return np.where(drive.column("mode") == STARTING, 0, fault_mask(words))
 
 
-def faults_seen(drive: Drive) -> dict[int, str]:
+def faults_seen(drive: DriveResult) -> dict[int, str]:
     """Return bit mask and name of every fault that was active at some time."""
     seen = int(np.bitwise_or.reduce(fault_masks(drive)))
     names = {fault.bit: fault.name for fault in FAULTS}
@@ -66,7 +66,7 @@ def _bars(row: str, t: Vector, end: float, levels: Vector, states: tuple[tuple[s
     ]
 
 
-def mode_bars(drive: Drive, grid: Buckets) -> list[Bar]:
+def mode_bars(drive: DriveResult, grid: Buckets) -> list[Bar]:
     """Return the bars of all rows; in each bucket the most severe state counts."""
     t, end = drive.t[grid.first], float(drive.t[-1])
     bars = _bars("ECU", t, end, worst(grid, drive.column("mode")), _ECU)
@@ -79,7 +79,7 @@ def mode_bars(drive: Drive, grid: Buckets) -> list[Bar]:
     return bars
 
 
-def modes_plot(drive: Drive, grid: Buckets, span: Range1d) -> Any:
+def modes_plot(drive: DriveResult, grid: Buckets, span: Range1d) -> Any:
     """Return the timeline as a figure."""
     rows = ["ECU", *(corner.upper() for corner in CORNERS), *faults_seen(drive).values()]
     height = max(225, 75 + 22 * len(rows))

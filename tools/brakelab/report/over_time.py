@@ -9,7 +9,7 @@ from bokeh.models.annotations import BoxAnnotation
 from brakelab.arrays import Vector
 from brakelab.report.brakings import Braking, inside
 from brakelab.report.downsample import Buckets, buckets, extremes, times
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.report.look import DEMAND, ESTIMATE, INK, LEFT, RIGHT, SHADE, link_crosshair, new_figure
 from brakelab.report.modes import modes_plot
 from brakelab.report.wheels import plots_of_wheels
@@ -38,7 +38,7 @@ _FRICTION = _Estimated("mu_b", "0.000", 0.2)
 _DISC = _Estimated("disc_temperature", "0", 40.0)
 
 
-def plots_over_time(drive: Drive, truth: Drive | None, found: list[Braking]) -> dict[str, Any]:
+def plots_over_time(drive: DriveResult, truth: DriveResult | None, found: list[Braking]) -> dict[str, Any]:
     """Return the figures by name in reading order; all share the x range `drive-time` and one source."""
     busy = np.zeros(len(drive.t), bool)
     for braking in found:
@@ -84,7 +84,7 @@ def _coarse(grid: Buckets) -> Buckets:
     return Buckets(grid.first[::2], last)
 
 
-def _lines(drive: Drive, truth: Drive | None) -> dict[str, Vector]:
+def _lines(drive: DriveResult, truth: DriveResult | None) -> dict[str, Vector]:
     """Return every quantity with at least one number, in the units of the plots."""
     lines = {
         "speed": drive.column("vehicle_speed") * KMH,

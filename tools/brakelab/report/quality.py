@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.report.page import Tile, fixed
 from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
@@ -57,7 +57,7 @@ class Quality(NamedTuple):
     """Inputs that could have come and never did."""
 
 
-def read_quality(drive: Drive, path: Path) -> Quality | None:
+def read_quality(drive: DriveResult, path: Path) -> Quality | None:
     """Return the quality stored by `replay` in the metadata of `path`, None: nothing.
 
     Raises UserError if it is damaged.
@@ -166,7 +166,7 @@ def _message(row: dict[str, Any], seconds: float) -> list[Cell]:
     ]
 
 
-def lacks_pressure(drive: Drive, quality: Quality | None) -> bool:
+def lacks_pressure(drive: DriveResult, quality: Quality | None) -> bool:
     """Return whether the logs are known to hold no calliper pressure: then no friction was estimated."""
     pressure = drive.column("calliper_pressure_fl")
     if quality is None or not (pressure == 0.0).all():
@@ -175,7 +175,7 @@ def lacks_pressure(drive: Drive, quality: Quality | None) -> bool:
     return not any(name.startswith("calliper_pressure") for name in came)
 
 
-def drop_placeholders(drive: Drive, without_pressure: bool) -> Drive:
+def drop_placeholders(drive: DriveResult, without_pressure: bool) -> DriveResult:
     """Return the drive without the columns that hold placeholders.
 
     Friction without a pressure is the configured one, a demand that nobody made is zero.

@@ -11,7 +11,7 @@ import numpy as np
 from brakelab.arrays import Vector
 from brakelab.report.accuracy import AXLES
 from brakelab.report.brakings import Braking, inside
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.report.look import DEMAND, LEFT, QUIET, RIGHT, STAGE_COLOURS
 from brakelab.report.per_braking import Series, points_by_braking
 from brakelab.report.torque import axle_pressure
@@ -81,7 +81,7 @@ def _crossing(t: Vector, pressure: Vector, row: int, level: float) -> float:
     return float(t[row - 1] + (t[row] - t[row - 1]) * (level - first) / (second - first))
 
 
-def responses(drive: Drive, found: list[Braking]) -> list[Response]:
+def responses(drive: DriveResult, found: list[Braking]) -> list[Response]:
     """Return the rows of all brake applications."""
     share = motors_share(drive) / 100.0
     measured = [axle_pressure(drive, wheels) for wheels in AXLES.values()]

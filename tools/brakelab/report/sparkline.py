@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from brakelab.arrays import Vector
 from brakelab.report.brakings import Braking, inside
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 
 Rows = NDArray[np.bool_]
 Curve = tuple[Vector, Vector]
@@ -17,20 +17,20 @@ DRIVE_WIDTH, DRIVE_POINTS = 240, 120
 _LEAST_SCALE = 2.0  # m/s^2
 
 
-def sparklines(drive: Drive, found: list[Braking]) -> list[str]:
+def sparklines(drive: DriveResult, found: list[Braking]) -> list[str]:
     """Return an SVG for each application, empty without data; one scale for all."""
     lines = [_pair(drive, inside(drive, braking), POINTS) for braking in found]
     scale = _scale(lines)
     return [_svg(pair, scale, WIDTH) for pair in lines]
 
 
-def drive_sparkline(drive: Drive) -> str:
+def drive_sparkline(drive: DriveResult) -> str:
     """Return an SVG of a whole drive, empty without data."""
     pair = _pair(drive, np.ones(len(drive.t), np.bool_), DRIVE_POINTS)
     return _svg(pair, _scale([pair]), DRIVE_WIDTH)
 
 
-def _pair(drive: Drive, rows: Rows, points: int) -> list[Curve]:
+def _pair(drive: DriveResult, rows: Rows, points: int) -> list[Curve]:
     decelerations = drive.column("decel_demand_total"), -drive.column("accel_x_road")
     return [_means(drive.t[rows], values[rows], points) for values in decelerations]
 

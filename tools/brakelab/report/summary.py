@@ -9,7 +9,7 @@ import numpy as np
 from brakelab.arrays import Vector
 from brakelab.report.accuracy import AXLES, Accuracy
 from brakelab.report.brakings import Braking
-from brakelab.report.drive import Drive, start_ns
+from brakelab.report.drive import DriveResult, start_ns
 from brakelab.report.modes import fault_masks, faults_seen
 from brakelab.report.page import Tile, fixed, percent, signed_percent
 from brakelab.report.timing import Timing, spread
@@ -31,7 +31,7 @@ class FaultSeen(NamedTuple):
     remedy: str
 
 
-def facts(drive: Drive) -> list[tuple[str, str]]:
+def facts(drive: DriveResult) -> list[tuple[str, str]]:
     """Return label and value of each statement of the result on its origin."""
     start = start_ns(drive)
     when = ""
@@ -48,7 +48,7 @@ def facts(drive: Drive) -> list[tuple[str, str]]:
 
 
 def tiles(
-    drive: Drive,
+    drive: DriveResult,
     found: list[Braking],
     shares: list[float],
     predicted: Errors,
@@ -70,7 +70,7 @@ def tiles(
     return shown
 
 
-def faults(drive: Drive) -> list[FaultSeen]:
+def faults(drive: DriveResult) -> list[FaultSeen]:
     """Return every fault that was active, with time and duration."""
     masks = fault_masks(drive)
     dt = np.append(np.diff(drive.t), 0.0)
@@ -83,7 +83,7 @@ def faults(drive: Drive) -> list[FaultSeen]:
     return rows
 
 
-def _drive(drive: Drive) -> Tile:
+def _drive(drive: DriveResult) -> Tile:
     speed = np.nan_to_num(drive.column("vehicle_speed"))
     kilometres = float((speed[1:] * np.diff(drive.t)).sum()) * 1e-3
     seconds = drive.t[-1] - drive.t[0]
@@ -104,7 +104,7 @@ def _while_moving(braking: Braking) -> float:
     return measured if math.isfinite(measured) else braking.achieved
 
 
-def _friction(drive: Drive, accuracy: dict[str, Accuracy] | None) -> list[Tile]:
+def _friction(drive: DriveResult, accuracy: dict[str, Accuracy] | None) -> list[Tile]:
     mu, sigma = drive.corners("mu_b"), drive.corners("sigma_mu_b")
     shown = []
     for axle, wheels in AXLES.items():
@@ -143,7 +143,7 @@ def _prediction(found: Errors) -> Tile:
     return Tile("Prediction error", percent(found.mean, 1), "%", note, found.mean > _PREDICTION_ERROR)
 
 
-def _faults(drive: Drive) -> Tile:
+def _faults(drive: DriveResult) -> Tile:
     seen = list(faults_seen(drive).values())
     if not drive.has("active_faults"):
         return Tile("Faults", fixed(float("nan"), 0), "", "not in the result")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from brakelab.arrays import Vector
 from brakelab.report.accuracy import AXLES
 from brakelab.report.brakings import Braking, inside
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.report.look import INK, QUIET, STAGE_COLOURS, new_figure
 from brakelab.results.car import Car
 from ecu.contract.signals import CORNERS, OBSERVING
@@ -21,7 +21,7 @@ from ecu.contract.signals import CORNERS, OBSERVING
 POINTS: Final = 300
 """Of a class in a plot."""
 BINS: Final = 10
-_FEWEST: Final = 20  # rows of a bin
+_FEWEST_ROWS: Final = 20  # rows of a bin
 _LEAST_ROWS: Final = 100  # of a plot: 1 s of observation
 _LEAST_SPAN: Final = 0.2  # of the axis, in C*
 _DASHES: Final = ("solid", "dashed", "dotdash")
@@ -43,7 +43,9 @@ AGAINST: Final = (
 )
 
 
-def plots_of_torque(drive: Drive, truth: Drive | None, found: list[Braking], car: Car) -> dict[str, Any]:
+def plots_of_torque(
+    drive: DriveResult, truth: DriveResult | None, found: list[Braking], car: Car
+) -> dict[str, Any]:
     """Return the figures by name, each axle over pressure and speed; empty where nothing was observed."""
     rows = np.zeros(len(drive.t), bool)
     for braking in found:
@@ -66,13 +68,13 @@ def plots_of_torque(drive: Drive, truth: Drive | None, found: list[Braking], car
     return plots
 
 
-def axle_pressure(drive: Drive, wheels: slice) -> Vector:
+def axle_pressure(drive: DriveResult, wheels: slice) -> Vector:
     """Return the mean pressure of an axle's callipers, zeros of the sensors taken off [bar], shape (n,)."""
     zero = np.nan_to_num(drive.corners("pressure_zero")[:, wheels])
     return np.asarray((drive.corners("calliper_pressure")[:, wheels] - zero).mean(axis=1))
 
 
-def _observed(drive: Drive, wheels: slice) -> NDArray[np.bool_]:
+def _observed(drive: DriveResult, wheels: slice) -> NDArray[np.bool_]:
     columns = [f"mode_{corner}" for corner in CORNERS[wheels]]
     if not any(drive.has(name) for name in columns):
         return np.ones(len(drive.t), bool)
@@ -131,6 +133,6 @@ def binned(at: Vector, values: Vector) -> tuple[Vector, Vector]:
         return np.empty(0), np.empty(0)
     number = np.minimum(((at - at.min()) / np.ptp(at) * BINS).astype(int), BINS - 1)
     count = np.bincount(number, minlength=BINS)
-    kept = count >= _FEWEST
+    kept = count >= _FEWEST_ROWS
     first, second = (np.bincount(number, of, BINS)[kept] / count[kept] for of in (at, values))
     return first, second

@@ -7,7 +7,7 @@ import numpy as np
 import pyarrow as pa
 
 from brakelab.arrays import Vector
-from brakelab.report.drive import Drive, numbers, read_parquet
+from brakelab.report.drive import DriveResult, numbers, read_parquet
 from brakelab.results.files import brakes_path
 from ecu.contract.signals import CORNERS
 
@@ -17,7 +17,7 @@ _PER_CORNER: Final = (
     "particle_mass_high", "emission_factor", "emission_factor_low", "emission_factor_high",
 )  # fmt: skip
 AFTER: Final = 0.005  # s after an application: the ECU has counted its particles
-DIRTIEST: Final = 10
+DIRTIEST_SHOWN: Final = 10
 
 
 class Application(NamedTuple):
@@ -50,7 +50,7 @@ class Application(NamedTuple):
     factor_high: Vector
 
 
-def read_applications(drive: Drive, result: Path) -> list[Application]:
+def read_applications(drive: DriveResult, result: Path) -> list[Application]:
     """Return the brake applications of a drive in order; none without their file.
 
     Raises:
@@ -103,9 +103,9 @@ def _optional(table: pa.Table, name: str, path: Path) -> Vector:
 
 
 def dirtiest(applications: list[Application]) -> list[Application]:
-    """Return the `DIRTIEST` applications, by particles where they are counted, else by their mass."""
+    """Return the `DIRTIEST_SHOWN` applications, by particles where they are counted, else by their mass."""
     counted = [each for each in applications if np.isfinite(each.particles)]
     weighed = [each for each in applications if np.isfinite(each.mass) and each.mass > 0.0]
     if counted:
-        return sorted(counted, key=lambda each: -each.particles)[:DIRTIEST]
-    return sorted(weighed, key=lambda each: -each.mass)[:DIRTIEST]
+        return sorted(counted, key=lambda each: -each.particles)[:DIRTIEST_SHOWN]
+    return sorted(weighed, key=lambda each: -each.mass)[:DIRTIEST_SHOWN]

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.report.quality import Quality
 from brakelab.report.wear_applications import Application
 from brakelab.results.pads import PadState
@@ -21,7 +21,7 @@ class Missing(NamedTuple):
 
 
 def missing(
-    drive: Drive,
+    drive: DriveResult,
     quality: Quality | None,
     without_pressure: bool,
     pads: list[PadState],
@@ -78,7 +78,7 @@ def _of_pads(pads: list[PadState]) -> list[Missing]:
     return found
 
 
-def _of_inputs(drive: Drive, quality: Quality | None) -> list[Missing]:
+def _of_inputs(drive: DriveResult, quality: Quality | None) -> list[Missing]:
     found = []
     if not any(drive.has(f"motor_torque_{corner}") for corner in CORNERS):
         reason = (

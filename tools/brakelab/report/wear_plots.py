@@ -8,10 +8,10 @@ from bokeh.models.annotations import Span
 
 from brakelab.arrays import Vector
 from brakelab.report.accuracy import AXLES
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.report.look import FAILED, LEFT, RIGHT, new_figure
 from brakelab.report.wear_applications import Application
-from brakelab.report.wear_roads import way
+from brakelab.report.wear_roads import distance
 from brakelab.results.pads import PadState
 from ecu.contract.signals import CORNERS
 
@@ -23,13 +23,13 @@ HEIGHT: Final = 300
 _COLOURS: Final = (LEFT, RIGHT, LEFT, RIGHT)
 
 
-def plots_of_wear(drive: Drive, truth: Drive | None, pads: list[PadState]) -> dict[str, Any]:
+def plots_of_wear(drive: DriveResult, truth: DriveResult | None, pads: list[PadState]) -> dict[str, Any]:
     """Return wear in the drive and each axle's lining over distance, by name; empty if nothing is known."""
     worn = drive.corners("pad_wear")
     known = [i for i, corner in enumerate(CORNERS) if drive.has(f"pad_wear_{corner}")]
     if not known:
         return {}
-    km = 1e-3 * way(drive)
+    km = 1e-3 * distance(drive)
     some = np.unique(np.linspace(0, len(km) - 1, POINTS).astype(int))
     plots = {"wear-drive": _in_drive(km[some], worn[some], known, truth, some)}
     for axle, wheels in AXLES.items():
@@ -40,7 +40,7 @@ def plots_of_wear(drive: Drive, truth: Drive | None, pads: list[PadState]) -> di
     return plots
 
 
-def _in_drive(km: Vector, worn: Vector, known: list[int], truth: Drive | None, some: Any) -> Any:
+def _in_drive(km: Vector, worn: Vector, known: list[int], truth: DriveResult | None, some: Any) -> Any:
     plot = _figure("Distance in this drive [km]", "Worn off in this drive [µm]")
     for i in known:
         front = i < 2

@@ -13,13 +13,13 @@ from scipy.ndimage import maximum_filter1d
 
 from brakelab.arrays import Vector
 from brakelab.report.accuracy import AXLES
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.report.wear_applications import Application
 
 KINDS: Final = (("town", 60.0), ("country", 90.0), ("motorway", float("inf")))
 """Name and highest speed [km/h]."""
 AROUND: Final = 60.0  # s
-LEAST_WAY: Final = 1.0  # km of a kind, below which nothing is said per distance
+LEAST_KM: Final = 1.0  # km of a kind, below which nothing is said per distance
 
 
 class Road(NamedTuple):
@@ -38,13 +38,13 @@ class Road(NamedTuple):
     """Of particles, mg per km."""
 
 
-def way(drive: Drive) -> Vector:
+def distance(drive: DriveResult) -> Vector:
     """Return the distance from the start of the drive [m], shape (n,)."""
     step = np.diff(drive.t, prepend=drive.t[0])
     return np.asarray(np.cumsum(np.nan_to_num(np.abs(drive.column("vehicle_speed"))) * step))
 
 
-def kinds(drive: Drive) -> NDArray[np.int64]:
+def kinds(drive: DriveResult) -> NDArray[np.int64]:
     """Return the place in `KINDS` of each row, shape (n,)."""
     speed = 3.6 * np.nan_to_num(np.abs(drive.column("vehicle_speed")))
     period = float(np.median(np.diff(drive.t)))
@@ -52,11 +52,11 @@ def kinds(drive: Drive) -> NDArray[np.int64]:
     return np.searchsorted([limit for _, limit in KINDS], highest)
 
 
-def roads(drive: Drive, applications: list[Application]) -> list[Road]:
-    """Return a row for each kind of road with `LEAST_WAY` or more, none without wear."""
+def roads(drive: DriveResult, applications: list[Application]) -> list[Road]:
+    """Return a row for each kind of road with `LEAST_KM` or more, none without wear."""
     if not any(drive.has(f"pad_wear_{corner}") for corner in ("fl", "fr", "rl", "rr")):
         return []
-    kind, driven = kinds(drive), np.diff(way(drive), prepend=0.0) * 1e-3
+    kind, driven = kinds(drive), np.diff(distance(drive), prepend=0.0) * 1e-3
     worn = np.diff(drive.corners("pad_wear"), axis=0, prepend=drive.corners("pad_wear")[:1])
     at = kind[np.clip(np.searchsorted(drive.t, [each.t_start for each in applications]), 0, len(kind) - 1)]
     found, low = [], 0.0
@@ -67,7 +67,7 @@ def roads(drive: Drive, applications: list[Application]) -> list[Road]:
         if low and np.isfinite(high):
             speeds = f"{low:.0f} to {high:.0f} km/h"
         low = high
-        if km < LEAST_WAY:
+        if km < LEAST_KM:
             continue
         front, rear = (1e3 * float(worn[rows][:, axle].sum(axis=0).mean()) / km for axle in AXLES.values())
         energy = 1e-3 * sum(each.energy for each in own) / km if applications else float("nan")

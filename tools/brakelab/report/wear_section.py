@@ -6,13 +6,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.report.page import fixed
 from brakelab.report.quality import Quality
 from brakelab.report.wear_applications import Application, dirtiest, read_applications
 from brakelab.report.wear_missing import counted_share, missing
 from brakelab.report.wear_plots import BAND, plots_of_emission, plots_of_wear
-from brakelab.report.wear_roads import KINDS, LEAST_WAY, roads, way
+from brakelab.report.wear_roads import KINDS, LEAST_KM, distance, roads
 from brakelab.results import euro7
 from brakelab.results.pads import KEY, PadState, unpacked
 from ecu.algorithm.monitoring.dust import UNTOLD
@@ -50,7 +50,11 @@ class Section(NamedTuple):
 
 
 def wear_section(
-    drive: Drive, truth: Drive | None, result: Path, quality: Quality | None, without_pressure: bool
+    drive: DriveResult,
+    truth: DriveResult | None,
+    result: Path,
+    quality: Quality | None,
+    without_pressure: bool,
 ) -> tuple[Section, dict[str, dict[str, Any]]]:
     """Return the section on the drive of `result` and its plots by place.
 
@@ -93,11 +97,11 @@ def _known_by(pad: PadState) -> str:
     return "fitted as new, by the law" if pad.told else "by the law, from half a life"
 
 
-def _amounts(drive: Drive, pads: list[PadState], applications: list[Application]) -> list[Amount]:
-    km = 1e-3 * float(way(drive)[-1])
+def _amounts(drive: DriveResult, pads: list[PadState], applications: list[Application]) -> list[Amount]:
+    km = 1e-3 * float(distance(drive)[-1])
     weighed = [each for each in applications if math.isfinite(each.mass)]
     per_km, low, high = (
-        sum(getattr(each, name) for each in weighed) / km if weighed and km >= LEAST_WAY else math.nan
+        sum(getattr(each, name) for each in weighed) / km if weighed and km >= LEAST_KM else math.nan
         for name in ("mass", "mass_low", "mass_high")
     )
     band = f" ({low:.1f} to {high:.1f})" if math.isfinite(low + high) else ""
@@ -116,7 +120,7 @@ def _amounts(drive: Drive, pads: list[PadState], applications: list[Application]
     life = float(drive.column("particles_per_km")[-1])
     counted = [each for each in applications if math.isfinite(each.particles)]
     text = fixed(math.nan, 0)
-    if counted and km >= LEAST_WAY and counted_share(pads, applications) >= 1.0 - UNTOLD:
+    if counted and km >= LEAST_KM and counted_share(pads, applications) >= 1.0 - UNTOLD:
         low, middle, high = (
             1e-9 * sum(getattr(each, name) for each in counted) / km
             for name in ("particles_low", "particles", "particles_high")
@@ -127,7 +131,7 @@ def _amounts(drive: Drive, pads: list[PadState], applications: list[Application]
     return found
 
 
-def _share(drive: Drive) -> float:
+def _share(drive: DriveResult) -> float:
     """Return the share of the brakes in the work of brakes and motors while they brake."""
     if not any(drive.has(f"motor_torque_{corner}") for corner in CORNERS):
         return math.nan

@@ -7,7 +7,7 @@ from bokeh.models import ColumnDataSource, Range1d
 
 from brakelab.arrays import Vector
 from brakelab.report.downsample import Buckets, extremes, times
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.report.look import DEMAND, ESTIMATE, INK, LEFT, QUIET, RIGHT, STAGE_COLOURS, new_figure
 from ecu.contract.signals import CORNERS
 
@@ -33,7 +33,9 @@ _TORQUES: Final = (
 _PEDALS: Final = (("pedal", "brake", DEMAND), ("accelerator", "accelerator", STAGE_COLOURS[1]))
 
 
-def plots_of_wheels(drive: Drive, truth: Drive | None, grid: Buckets, span: Range1d) -> dict[str, Any]:
+def plots_of_wheels(
+    drive: DriveResult, truth: DriveResult | None, grid: Buckets, span: Range1d
+) -> dict[str, Any]:
     """Return the figures by name in reading order, all over the range `span`; those without a line, too."""
     lines = {name: v for name, v in _lines(drive, truth).items() if np.isfinite(v).any()}
     source = ColumnDataSource(
@@ -51,7 +53,7 @@ def plots_of_wheels(drive: Drive, truth: Drive | None, grid: Buckets, span: Rang
     }
 
 
-def motors_share(drive: Drive) -> Vector:
+def motors_share(drive: DriveResult) -> Vector:
     """Return the motors' part of the braking torque [%], shape (n,); NaN where nothing brakes."""
     if not any(drive.has(f"motor_torque_{corner}") for corner in CORNERS):
         return np.full(len(drive.t), np.nan)
@@ -62,7 +64,7 @@ def motors_share(drive: Drive) -> Vector:
     return np.where(brakes_now, 100.0 * motors / np.maximum(both, LEAST_TORQUE), np.nan)
 
 
-def _lines(drive: Drive, truth: Drive | None) -> dict[str, Vector]:
+def _lines(drive: DriveResult, truth: DriveResult | None) -> dict[str, Vector]:
     speed = 3.6 * np.abs(drive.column("vehicle_speed"))
     lines = {"speed": speed}
     for corner in CORNERS:

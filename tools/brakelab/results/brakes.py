@@ -23,7 +23,7 @@ from ecu.contract.records import RecordArray
 from ecu.contract.signals import CORNERS, FAULT, HOLDING, OBSERVING, OUTPUT
 
 RELEASE_BAR: Final = 1.0  # an application lasts while a pressure is this much above p_0 (contract)
-SLOWEST: Final = 5.0 / 3.6  # m/s, end of the friction mean (contract)
+LOWEST_SPEED: Final = 5.0 / 3.6  # m/s, end of the friction mean (contract)
 PERIOD: Final = 0.01  # s, one row
 LEARNED: Final = "learned"
 HOLDS: Final = WHEEL_SPEED_LOST | PRESSURE_LOST | E2E_REJECTIONS
@@ -143,7 +143,7 @@ def friction_means(
     steady = np.median(pressure[pressure > 0.5 * highest])
     reached = np.flatnonzero(pressure >= 0.9 * steady)
     first = int(reached[0])
-    over = (pressure * BAR < p_0 + RELEASE_BAR * BAR) | (speed < SLOWEST)
+    over = (pressure * BAR < p_0 + RELEASE_BAR * BAR) | (speed < LOWEST_SPEED)
     ends = np.flatnonzero(over[first:])
     last = first + int(ends[0]) if len(ends) else len(pressure)
     if last == first:

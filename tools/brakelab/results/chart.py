@@ -13,7 +13,7 @@ from ecu.errors import UserError
 WIDTH, HEIGHT = 330.0, 180.0  # of a panel's inside
 LEFT, TOP, GAP_X, GAP_Y = 48.0, 52.0, 64.0, 66.0
 GREY, ORANGE, BLUE, GREEN, PINK = "#9aa5b1", "#d55e00", "#0072b2", "#009e73", "#cc79a7"
-LARGEST: Final = 400  # points of a line; marks are all drawn
+MOST_POINTS: Final = 400  # points of a line; marks are all drawn
 
 
 class Line(NamedTuple):
@@ -98,7 +98,7 @@ def _draw(panel: Panel, left: float, top: float) -> list[str]:
         x = float(place_x(tick))
         parts.append(f'<text x="{x:.1f}" y="{top + HEIGHT + 16}" text-anchor="middle">{tick:.4g}</text>')
     for line in panel.lines:
-        every = 1 if line.marks else max(len(line.x) // LARGEST, 1)
+        every = 1 if line.marks else max(len(line.x) // MOST_POINTS, 1)
         heights = np.clip(line.y[::every], *panel.y)
         pairs = [
             (a, b)

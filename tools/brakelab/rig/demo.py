@@ -84,7 +84,7 @@ class Brakings:
             self._t, self._rows = [], []
 
 
-def _say_on_the_way(line: str) -> None:
+def _say_progress(line: str) -> None:
     if policy().level > Level.QUIET:
         say(line)
 
@@ -98,11 +98,11 @@ def demo(out: Path) -> int:
     """
     make_folder(out)
     config, bus = resource("config/suv.toml"), choose_bus()
-    _say_on_the_way(f"bus: {bus.why}")
-    _say_on_the_way("compiling what is not in the cache yet, about a minute the first time")
+    _say_progress(f"bus: {bus.why}")
+    _say_progress("compiling what is not in the cache yet, about a minute the first time")
     warm_up(load_scenario(resource(SCENARIO)))
     warm()
-    _say_on_the_way("driving: a staircase of 1 to 5 m/s² and three stops, about 70 s")
+    _say_progress("driving: a staircase of 1 to 5 m/s² and three stops, about 70 s")
     if bus.interface == "virtual":
         recordings = _in_one_process(bus, config, out)
     else:

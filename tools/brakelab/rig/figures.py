@@ -16,7 +16,7 @@ from brakelab.report.accuracy import (
     evaluated,
 )
 from brakelab.report.brakings import Braking
-from brakelab.report.drive import Drive, onto, start_ns
+from brakelab.report.drive import DriveResult, onto, start_ns
 from brakelab.rig.reaction import Reaction, reactions
 from brakelab.simulation.faults import Fault
 
@@ -35,9 +35,9 @@ class Stop(NamedTuple):
 class Figures(NamedTuple):
     """Figures of one drive; NaN where not applicable."""
 
-    drive: Drive
+    drive: DriveResult
     """The ECU's results; time since the car set off, as that of `truth`."""
-    truth: Drive
+    truth: DriveResult
     decel_error: float
     """Largest |achieved - demanded| [m/s^2] in the rows of `brakelab.report.accuracy.evaluated` whose demand
     has not moved for 0.5 s."""
@@ -56,7 +56,7 @@ def _steady(demand: Vector) -> NDArray[np.bool_]:
     return np.asarray(spread < 0.05)
 
 
-def last_stop(truth: Drive) -> Stop:
+def last_stop(truth: DriveResult) -> Stop:
     """Return the last braking that ends at rest."""
     speed = truth.column("vehicle_speed")
     asked = (truth.column("decel_demand") > 0.0) | (truth.column("pedal_position") > 0.0)
@@ -70,7 +70,9 @@ def last_stop(truth: Drive) -> Stop:
     return Stop(float(distance[end] - distance[begin]), float(truth.t[end] - truth.t[begin]))
 
 
-def figures(drive: Drive, own: Drive, truth_path: Path, found: list[Braking], faults: list[Fault]) -> Figures:
+def figures(
+    drive: DriveResult, own: DriveResult, truth_path: Path, found: list[Braking], faults: list[Fault]
+) -> Figures:
     """Return the figures of a drive with the brake applications `found`; `own`: truth on its own time axis.
 
     Raises:

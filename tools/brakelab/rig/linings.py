@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.arrays import Vector
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from ecu.algorithm.control.limiter import LEAST_TORQUE
 from ecu.algorithm.control.pressure_law import GREATEST_CHANGE
 from ecu.contract.faults import BRAKE_FADE, DEMAND_LIMITED
@@ -22,7 +22,7 @@ TOLERANCE: Final = 1.05
 """The ECU judges by its estimate of friction, whose error this is."""
 
 
-def friction_ratios(truth: Drive, vehicle: Config) -> tuple[Vector, Vector]:
+def friction_ratios(truth: DriveResult, vehicle: Config) -> tuple[Vector, Vector]:
     """Return true friction over what the ECU may expect, and over the configured one, shape (n, 4) each.
 
     Expected is the configured friction, or the greatest that the wheel had before: its base is learned.
@@ -32,7 +32,7 @@ def friction_ratios(truth: Drive, vehicle: Config) -> tuple[Vector, Vector]:
     return mu / np.maximum(np.maximum.accumulate(mu, axis=0), nominal), mu / nominal
 
 
-def beyond_compensation(truth: Drive, vehicle: Config) -> NDArray[np.bool_]:
+def beyond_compensation(truth: DriveResult, vehicle: Config) -> NDArray[np.bool_]:
     """Return the rows in which linings of a wheel are, or were, beyond what is compensated, shape (n,).
 
     Were counts: the pressure law begins each application with what the last one taught.
@@ -43,7 +43,7 @@ def beyond_compensation(truth: Drive, vehicle: Config) -> NDArray[np.bool_]:
     return np.logical_or.accumulate((weak | strong).any(axis=1))
 
 
-def tell_linings(truth: Drive, vehicle: Config) -> str:
+def tell_linings(truth: DriveResult, vehicle: Config) -> str:
     """Return which linings are furthest from the configured friction, as text."""
     _, configured = friction_ratios(truth, vehicle)
     furthest = np.unravel_index(np.argmax(np.abs(np.log(configured))), configured.shape)

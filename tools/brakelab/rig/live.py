@@ -45,7 +45,7 @@ def make_folder(out: Path) -> None:
 
 
 def end_with_parent() -> None:
-    """Arrange for SIGTERM when the parent process ends, in any way: between fork and exec."""
+    """Arrange for SIGTERM when the parent process ends, however it ends: between fork and exec."""
     LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from brakelab.report.brakings import brakings
-from brakelab.report.drive import Drive, read_drive
+from brakelab.report.drive import DriveResult, read_drive
 from brakelab.report.sparkline import drive_sparkline
 from brakelab.report.timing import Spread, read_timing, spread
 from brakelab.rig.figures import figures, last_stop
@@ -79,11 +79,13 @@ def undisturbed(scenario: Scenario, vehicle: Config, seed: int) -> Undisturbed:
         return Undisturbed(math.nan, frozenset())
     sound = run(new_loop(scenario.model_copy(update={"fault": []}), vehicle, seed))
     mask = int(np.bitwise_or.reduce(fault_mask(sound.outputs)))
-    return Undisturbed(last_stop(Drive(sound.t, sound.truth, {})).distance, frozenset(fault_names(mask)))
+    return Undisturbed(
+        last_stop(DriveResult(sound.t, sound.truth, {})).distance, frozenset(fault_names(mask))
+    )
 
 
 def account_for(
-    drive: Drive, truth: Drive, faults: list[Fault], vehicle: Config, usual: frozenset[str]
+    drive: DriveResult, truth: DriveResult, faults: list[Fault], vehicle: Config, usual: frozenset[str]
 ) -> tuple[list[str], list[str]]:
     """Return the fault bits that nothing accounts for, and those that the car's linings account for.
 

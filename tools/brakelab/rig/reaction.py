@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.report.modes import fault_masks
 from brakelab.simulation.faults import Fault
 from ecu.contract.faults import FAULTS, LATE
@@ -44,7 +44,7 @@ class Reaction(NamedTuple):
     """ms after the fault's end (of a killed daemon: after the kill) until everything is as before."""
 
 
-def reactions(drive: Drive, truth: Drive, faults: list[Fault]) -> list[Reaction]:
+def reactions(drive: DriveResult, truth: DriveResult, faults: list[Fault]) -> list[Reaction]:
     """Return the reaction to every fault, up to the beginning of the next or the vehicle's departure.
 
     `drive` are the ECU's results, `truth` the vehicle's on its own axis; both count from T_0.
@@ -57,14 +57,14 @@ def reactions(drive: Drive, truth: Drive, faults: list[Fault]) -> list[Reaction]
     return found
 
 
-def _until(drive: Drive, limit: float) -> Drive:
+def _until(drive: DriveResult, limit: float) -> DriveResult:
     rows = drive.t < limit
-    return Drive(
+    return DriveResult(
         drive.t[rows], {name: values[rows] for name, values in drive.columns.items()}, drive.metadata
     )
 
 
-def raised_alone(drive: Drive, truth: Drive, faults: list[Fault]) -> NDArray[np.int64]:
+def raised_alone(drive: DriveResult, truth: DriveResult, faults: list[Fault]) -> NDArray[np.int64]:
     """Return the fault bits raised in each row, not within a fault or `AFTER_S` after it, shape (n,).
 
     Effects of the machine's load are excluded: "late", and inputs lost where the vehicle was delayed by more
@@ -91,13 +91,13 @@ def first_after(t: NDArray[np.float64], rows: NDArray[np.bool_], since: float) -
     return 1e3 * (float(t[places[0]]) - since) if len(places) else math.nan
 
 
-def _usual(drive: Drive, since: float) -> int:
+def _usual(drive: DriveResult, since: float) -> int:
     """Return the mask of the last row before `since`."""
     before = np.flatnonzero(drive.t < since)
     return int(fault_masks(drive)[before[-1]]) if len(before) else 0
 
 
-def raised(drive: Drive, since: float, until: float = math.inf) -> list[tuple[str, float]]:
+def raised(drive: DriveResult, since: float, until: float = math.inf) -> list[tuple[str, float]]:
     """Return the fault bits raised from `since` to `until` [s], with when in ms after `since`, in order.
 
     A bit that stood before does not count.
@@ -108,7 +108,7 @@ def raised(drive: Drive, since: float, until: float = math.inf) -> list[tuple[st
     return sorted((bit for bit in found if math.isfinite(bit[1])), key=lambda bit: bit[1])
 
 
-def _reaction(drive: Drive, truth: Drive, fault: Fault) -> Reaction:
+def _reaction(drive: DriveResult, truth: DriveResult, fault: Fault) -> Reaction:
     mode = drive.column("mode")
     end = _end(fault)
     within = (drive.t >= fault.t) & (drive.t < end + AFTER_S)
@@ -130,7 +130,7 @@ def _reaction(drive: Drive, truth: Drive, fault: Fault) -> Reaction:
     )
 
 
-def _recovered(drive: Drive, truth: Drive, fault: Fault) -> float:
+def _recovered(drive: DriveResult, truth: DriveResult, fault: Fault) -> float:
     """Return when the last effect of the fault disappeared, in ms after its end; "late" is the machine's."""
     since = fault.t if fault.kind == "daemon_killed" else _end(fault)
     if math.isinf(since):

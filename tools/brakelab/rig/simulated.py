@@ -9,7 +9,7 @@ import numpy as np
 
 from brakelab.arrays import Vector
 from brakelab.report.brakings import brakings
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.rig.figures import figures
 from brakelab.rig.outcome import undisturbed
 from brakelab.rig.verdicts import Verdict, judge
@@ -29,9 +29,9 @@ class Driven(NamedTuple):
     scenario: Scenario
     vehicle: Config
     seed: int
-    drive: Drive
+    drive: DriveResult
     """The ECU's outputs, where it lives."""
-    truth: Drive
+    truth: DriveResult
     path: Path = Path("truth")
     """File of the truth, for messages."""
 
@@ -39,13 +39,13 @@ class Driven(NamedTuple):
 def drive_in_memory(scenario: Scenario, vehicle: Config, seed: int) -> Driven:
     """Drive a scenario in the closed loop in memory."""
     loop = run(new_loop(scenario, vehicle, seed))
-    drive, truth = _where_it_lives(loop.t, loop.outputs), Drive(loop.t, loop.truth, {})
+    drive, truth = _where_it_lives(loop.t, loop.outputs), DriveResult(loop.t, loop.truth, {})
     return Driven(scenario, vehicle, seed, drive, truth)
 
 
-def _where_it_lives(t: Vector, outputs: Mapping[str, Vector]) -> Drive:
+def _where_it_lives(t: Vector, outputs: Mapping[str, Vector]) -> DriveResult:
     lives = np.isfinite(outputs["mode"])
-    return Drive(t[lives], {name: values[lives] for name, values in outputs.items()}, {})
+    return DriveResult(t[lives], {name: values[lives] for name, values in outputs.items()}, {})
 
 
 def verdicts(driven: Driven, expected: Sequence[Expectation]) -> list[Verdict]:
@@ -62,7 +62,7 @@ def judge_simulated(simulated: Simulated, seed: int) -> int:
     """Print the verdicts; return 1 if an expectation is not met, else 0. `seed`: of the drive."""
     scenario, t = simulated.scenario, simulated.t
     drive = _where_it_lives(t, dict(zip(OUTPUT_COLUMNS, simulated.outputs.T, strict=True)))
-    truth = Drive(t, dict(zip(TRUTH_COLUMNS, simulated.truth.T, strict=True)), {})
+    truth = DriveResult(t, dict(zip(TRUTH_COLUMNS, simulated.truth.T, strict=True)), {})
     found = verdicts(Driven(scenario, simulated.vehicle, seed, drive, truth, simulated.path), scenario.expect)
     for verdict in found:
         print(verdict.line)

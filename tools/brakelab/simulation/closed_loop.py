@@ -3,7 +3,7 @@
 One cycle k: the driver acts, the vehicle measures and sends; its frames arrive shortly before T_k; the ECU
 receives, steps and sends; the vehicle decodes the demands and advances by 10 ms. All of it runs in one kernel
 with the ECU's own kernels, so that simulated and driven code are the same. Frames of both directions pass the
-scenario's faults (`brakelab.simulation.faults`) on their way.
+scenario's faults (`brakelab.simulation.faults`) in between.
 """
 
 import math
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from brakelab.plant.driver import drive
 from brakelab.simulation.fault_kernels import Link, deliver, new_link
 from brakelab.simulation.outages import find_outages
-from brakelab.simulation.scenario import LONGEST, Scenario
+from brakelab.simulation.scenario import LONGEST_DRIVE, Scenario
 from brakelab.simulation.vehicle_bus import (
     N_TRUTH,
     TRUTH_COLUMNS,
@@ -281,7 +281,7 @@ def _start_anew(sides: Sides) -> None:
 
 
 def run_blocks(
-    loop: Loop, seconds: float = LONGEST, override: FrictionOverride | None = None
+    loop: Loop, seconds: float = LONGEST_DRIVE, override: FrictionOverride | None = None
 ) -> Iterator[Block]:
     """Run a new loop like `run`, yielding blocks of its cycles; each block overwrites the last."""
     override, sides = override or FrictionOverride(), loop.sides
@@ -304,7 +304,7 @@ def run_blocks(
 
 
 def run(
-    loop: Loop, ideal: bool = False, seconds: float = LONGEST, override: FrictionOverride | None = None
+    loop: Loop, ideal: bool = False, seconds: float = LONGEST_DRIVE, override: FrictionOverride | None = None
 ) -> Drive:
     """Run a new loop to the end of its script, or for `seconds`, and return the drive.
 

@@ -1,4 +1,4 @@
-"""Faults of a scenario applied: to frames on their way, to signals before they are sent, and to the car."""
+"""Faults of a scenario applied: to frames on the bus, to signals before they are sent, and to the car."""
 
 import math
 from typing import Any, Final, NamedTuple

@@ -5,7 +5,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from brakelab.simulation.faults import DAEMON_KILLED
-from brakelab.simulation.scenario import LONGEST
+from brakelab.simulation.scenario import LONGEST_DRIVE
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CYCLE_NS
 from ecu.runtime.standby import SILENCE_NS
@@ -30,6 +30,6 @@ def find_outages(faults: RecordArray) -> list[Outage]:
     for fault in np.sort(faults[faults["kind"] == DAEMON_KILLED], order="begin"):
         begin, standby = float(fault["begin"]), bool(fault["standby"])
         end = begin + TAKEOVER if standby else float(fault["end"]) + START_UP
-        first, last = (round(min(instant, LONGEST) * 1e9 / CYCLE_NS) for instant in (begin, end))
+        first, last = (round(min(instant, LONGEST_DRIVE) * 1e9 / CYCLE_NS) for instant in (begin, end))
         outages.append(Outage(first, last, standby))
     return outages

@@ -107,7 +107,16 @@ from brakelab.simulation.scenario_tables import (
 from brakelab.simulation.speed_trace import SpeedTrace
 from ecu.settings.toml_file import Unit, describe, read_toml
 
-__all__ = ["LONGEST", "Payload", "Phase", "RoadByPlace", "Scenario", "SteeringFile", "Trace", "load_scenario"]
+__all__ = [
+    "LONGEST_DRIVE",
+    "Payload",
+    "Phase",
+    "RoadByPlace",
+    "Scenario",
+    "SteeringFile",
+    "Trace",
+    "load_scenario",
+]
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 ByTime = Annotated[
@@ -115,7 +124,7 @@ ByTime = Annotated[
 ]
 """Rows of time [s] and value; a number alone holds all the time."""
 KINDS = {"cruise": CRUISE, "coast": COAST, "brake": BRAKE, "follow": FOLLOW}
-LONGEST = 21_600.0
+LONGEST_DRIVE = 21_600.0
 """s, a scenario that did not end by itself ends here."""
 
 
@@ -151,7 +160,7 @@ class Scenario(BaseModel):
     wetness: Annotated[Share, Unit("-")] = 0.0
     """Of the discs, 0 dry to 1 rain; above 0 the bus says that it rains."""
     tyre_fault: TyreFault | None = None
-    """Tyres that change on the way."""
+    """Tyres that change during the drive."""
     vehicle_speed: Literal["ideal", "optical", "gnss", "none"] = "ideal"
     """Source of the speed on the bus; see `brakelab.plant.sensor_errors.SPEED_SOURCES`."""
     wheel_transducers: bool = False
@@ -169,7 +178,7 @@ class Scenario(BaseModel):
     repeat: Annotated[int, Field(ge=1), Unit("-")] = 1
     """How often the phases are driven."""
     fault: list[Fault] = []
-    """Faults on the way."""
+    """Faults during the drive."""
     expect: list[Expectation] = []
     """What the run has to show."""
     phase: Annotated[list[Phase], Field(min_length=1)]

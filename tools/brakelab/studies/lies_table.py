@@ -17,7 +17,7 @@ from ecu.settings.config import load_config
 from ecu.settings.resources import resource
 
 IN_TIME: Final = 2.0  # s
-WORST: Final = 10
+WORST_SHOWN: Final = 10
 HOUR: Final = "real-driving"
 ASIDE: Final = 0.03
 """Change of friction or motors that is named as a cause."""
@@ -80,7 +80,7 @@ def why(cell: Cell) -> str:
 
 
 def _worst(cells: list[Cell]) -> Table:
-    off = sorted(cells, key=lambda cell: min(cell.least_short, 2.0 - cell.most_long))[:WORST]
+    off = sorted(cells, key=lambda cell: min(cell.least_short, 2.0 - cell.most_long))[:WORST_SHOWN]
     rows = [
         (
             f"{cell.input}: {cell.lie}",
@@ -99,7 +99,7 @@ def _worst(cells: list[Cell]) -> Table:
         *(f"more than {100 * COSTS:.0f} % off [s]", "named after [s]", "after it costs [s]"),
         *("reported first", "where it is worst"),
     )
-    return Table(f"The {WORST} worst", columns, rows, "")
+    return Table(f"The {WORST_SHOWN} worst", columns, rows, "")
 
 
 def _alarms(cells: list[Cell], cars: int) -> Table:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from brakelab.api import AnyPath, Change, changed, check_seed
-from brakelab.report.drive import Drive, read_drive, start_ns
+from brakelab.report.drive import DriveResult, read_drive, start_ns
 from brakelab.rig.live import choose_bus
 from brakelab.rig.live import drive as drive_on_bus
 from brakelab.rig.results import write_recorded
@@ -105,7 +105,7 @@ def _said(value: float, digits: str, unit: str) -> str:
     return f"{value:{digits}}" + (f" {unit}" if unit != "-" else "")
 
 
-def _signal(drive: Drive, name: str, unit: str) -> Signal:
+def _signal(drive: DriveResult, name: str, unit: str) -> Signal:
     return Signal(name, unit or "-", np.asarray(drive.t), Table(drive.columns, {})[name])
 
 

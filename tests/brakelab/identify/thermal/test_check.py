@@ -8,7 +8,7 @@ import pytest
 from brakelab.identify.thermal.check import check_drive, check_fit
 from brakelab.identify.thermal.fit import fit_axle
 from brakelab.identify.thermal.model import Cooling
-from brakelab.identify.thermal.reader import Drive
+from brakelab.identify.thermal.reader import ThermalLog
 from ecu.errors import UserError
 
 from .series import DRY, XI, discs, series
@@ -22,18 +22,18 @@ def good():
     return series(1500)
 
 
-def drive(one, **changed) -> Drive:
+def drive(one, **changed) -> ThermalLog:
     given = {"applications": 25, "wheels_seen": ONES, "pressures_seen": ONES, "rain_known": True} | changed
-    return Drive(Path("a.csv"), one, np.zeros((len(one.speed), 4)), **given)
+    return ThermalLog(Path("a.csv"), one, np.zeros((len(one.speed), 4)), **given)
 
 
-def reading(one, change) -> Drive:
+def reading(one, change) -> ThermalLog:
     measured = one.measured.copy()
     measured[:, 0] = change(measured[:, 0])
     return drive(one._replace(measured=measured))
 
 
-def short(one) -> Drive:
+def short(one) -> ThermalLog:
     cut = {name: getattr(one, name)[:200] for name in ("power", "speed", "wet", "air", "measured")}
     return drive(one._replace(**cut))
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from brakelab.identify.vehicle.reader import PRESENT, Drive, drive_of
+from brakelab.identify.vehicle.reader import PRESENT, DriveSamples, drive_of
 from brakelab.logs.physics.samples import SAMPLED
 from ecu.settings.config import load_config, new_params
 from ecu.settings.resources import resource
@@ -31,6 +31,6 @@ def samples(seconds: float, speed, **signals) -> np.ndarray:
     return rows
 
 
-def drive(seconds: float, speed, **signals) -> Drive:
+def drive(seconds: float, speed, **signals) -> DriveSamples:
     """Return them as a drive."""
     return drive_of("drive.csv", samples(seconds, speed, **signals))

@@ -19,7 +19,7 @@ from ecu.settings.resources import resource
 
 BRAKE = RigBrake(piston_area=2.827e-3, pad_area=7.125e-3, effective_radius=0.1459, tyre_radius=0.36)
 PAGE = resource("docs") / "own-friction-law.md"
-NUMBERS = {"mu": 0.42, "drop": 0.15, "speed": 5.0, "heat": 3e-4, "bite": 0.1, "way": 12.0}
+NUMBERS = {"mu": 0.42, "drop": 0.15, "speed": 5.0, "heat": 3e-4, "bite": 0.1, "distance": 12.0}
 
 
 def example(language: str) -> str:
@@ -36,7 +36,7 @@ def burnish(tmp_path: Path) -> Path:
 
 
 def test_the_page_s_law_is_its_closed_form(burnish: Path) -> None:
-    """At constant speed the memory has rubbed v t: 1 - exp(-v t / way)."""
+    """At constant speed the memory has rubbed v t: 1 - exp(-v t / distance)."""
     number, row = law_row(Own(law="own", rig_mass=996.0, code=str(burnish), numbers=NUMBERS), BRAKE)
     memory = float(row[0])
     assert memory == 0.0
@@ -131,8 +131,8 @@ def test_a_mistake_in_the_law_is_one_line(burnish: Path, old: str, new: str, lin
     ("old", "new", "line"),
     [
         ('"burnish.py"', '"polish.py"', "polish.py: No such file"),
-        ("way = 12.0", "path = 12.0", "numbers.way is missing; burnish.py wants mu, drop"),
-        ("way = 12.0", "way = 12.0, path = 1.0", "numbers.path is unknown"),
+        ("distance = 12.0", "path = 12.0", "numbers.distance is missing; burnish.py wants mu, drop"),
+        ("distance = 12.0", "distance = 12.0, path = 1.0", "numbers.path is unknown"),
     ],
 )
 def test_a_mistake_in_the_lining_file_is_one_line(burnish: Path, old: str, new: str, line: str) -> None:

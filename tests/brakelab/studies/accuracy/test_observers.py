@@ -29,7 +29,7 @@ from brakelab.studies.accuracy.observers_cases import (
     ACCURACY,
     CASES,
     EVENTS,
-    LONGEST,
+    LONGEST_EFFECT,
     ROBUSTNESS,
     WRONG_START,
     Setup,
@@ -180,7 +180,7 @@ def test_verdicts() -> None:
     robust = pages["Joint observer, disturbed"]
     assert {line[-1] for line in robust.values()} == {"met"}
     events = pages["How long it takes"]
-    longest = {name: events[f"{name}, joint, cold"][5] for name in LONGEST}
+    longest = {name: events[f"{name}, joint, cold"][5] for name in LONGEST_EFFECT}
     assert longest == {
         "tyre stiffness × 0.67": "missed: time by 0.1, force by 2.5",  # 0.2 s, no better than Observer 2
         "low-grip patch": "missed: force by 2.5",

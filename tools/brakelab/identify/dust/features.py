@@ -24,14 +24,14 @@ PERIOD: Final = 0.1  # s, grid of a trip
 PRESSED: Final = 1.5  # bar, of the mean over SMOOTH
 SMOOTH: Final = 5  # samples
 MOVING: Final = 0.5  # m/s: below, the car is at standstill
-SHORTEST: Final = 0.5  # s
+SHORTEST_APPLICATION: Final = 0.5  # s
 LEAST_WORK: Final = 500.0  # J: below it an application counts as negligible
 CLEAR_S: Final = 25.0  # after an application, until the counter shows background again
 STEADY: Final = 0.4  # m/s^2
 SPEED_BIN: Final = 4.0  # m/s
 NEAR_S: Final = 60.0  # standard deviation of the window of the slow factor
 NEAR_COUNT: Final = 10.0  # prior weight of the line in samples
-LONGEST_WAY_S: Final = 40.0
+LONGEST_DELAY_S: Final = 40.0
 LEAST_CORRELATION: Final = 0.05  # of counter and power, at the delay of best correlation
 BEFORE_S: Final = 2.0  # the plume begins this much before its middle
 TAIL_S: Final = 5.0
@@ -93,7 +93,7 @@ class Applications(NamedTuple):
     decel: Array
     """m/s^2, mean"""
     background: Background
-    way_s: float
+    delay_s: float
     """s of the air from disc to counter"""
 
     @property
@@ -114,7 +114,7 @@ def find_applications(trip: Recorded) -> list[tuple[int, int]]:
         start, end = above[0], above[-1] + 1
         part = slice(start, end)
         work = PERIOD * float(np.sum(trip.torque[part] * trip.speed[part]))
-        if (end - start) * PERIOD >= SHORTEST and work > LEAST_WORK:
+        if (end - start) * PERIOD >= SHORTEST_APPLICATION and work > LEAST_WORK:
             found.append((int(start), int(end)))
     return found
 
@@ -161,7 +161,7 @@ def find_background(trip: Recorded, applications: list[tuple[int, int]]) -> Back
     return Background(still, slope, np.array(speeds), np.array(levels), factor)
 
 
-def way_of_air(trip: Recorded) -> float:
+def transport_time(trip: Recorded) -> float:
     """Return the transport delay [s] with which the counter follows the friction power best.
 
     Of the power counts what the speed does not tell: the background grows with that.
@@ -172,18 +172,18 @@ def way_of_air(trip: Recorded) -> float:
     power, known = trip.torque * trip.speed, np.column_stack([np.ones(len(trip.t)), trip.speed])
     power = power - known @ np.linalg.lstsq(known, power, rcond=None)[0]
     shown = trip.concentration - trip.concentration.mean()
-    lags = range(min(round(LONGEST_WAY_S / PERIOD), len(power) - 1))
+    lags = range(min(round(LONGEST_DELAY_S / PERIOD), len(power) - 1))
     means = [float(power[: len(power) - lag] @ shown[lag:]) / (len(power) - lag) for lag in lags]
     best = int(np.argmax(means))
     if means[best] < LEAST_CORRELATION * power.std() * shown.std():
-        remedy = f"follows the braking by none of 0 to {LONGEST_WAY_S:.0f} s; align its clock or mend it"
+        remedy = f"follows the braking by none of 0 to {LONGEST_DELAY_S:.0f} s; align its clock or mend it"
         raise UserError(f"trip {trip.name}", "particle_concentration", remedy)
     return PERIOD * best
 
 
-def aligned(trip: Recorded, way: float) -> Recorded:
-    """Return a trip whose counter shows at once what the disc emits; its last `way` [s] are cut off."""
-    late = round(way / PERIOD)
+def aligned(trip: Recorded, delay: float) -> Recorded:
+    """Return a trip whose counter shows at once what the disc emits; its last `delay` [s] are cut off."""
+    late = round(delay / PERIOD)
     whole = len(trip.t) - late
     t, speed, pressure, torque, temperature = (column[:whole] for column in trip[2:7])
     counted, flow = trip.concentration[late:], trip.flow[:whole]
@@ -212,13 +212,13 @@ def _sequence(trip: Recorded, start: int, end: int) -> Array:
 
 def extract(trip: Recorded, radius: float) -> Applications:
     """Return the applications of a trip; `radius` of the tyre [m]."""
-    way = way_of_air(trip)
-    trip = aligned(trip, way)
+    delay = transport_time(trip)
+    trip = aligned(trip, delay)
     places = find_applications(trip)
     background = find_background(trip, places)
     excess = trip.concentration - background.at(trip.speed)
     emitted = np.cumsum(1e6 * trip.flow * excess) * PERIOD
-    before = round(min(way, BEFORE_S) / PERIOD)
+    before = round(min(delay, BEFORE_S) / PERIOD)
     particles, energy = [], []
     for k, (start, end) in enumerate(places):
         first = max(start - before, 0)
@@ -241,5 +241,5 @@ def extract(trip: Recorded, radius: float) -> Applications:
         np.array(energy),
         (features[:, 0] - features[:, 1]) / features[:, 4],
         background,
-        way,
+        delay,
     )

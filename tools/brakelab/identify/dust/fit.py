@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from brakelab.arrays import Array
 from brakelab.identify.dust.features import FEATURES, Applications
-from brakelab.identify.dust.model import FITS, LEAST, Model, samples_of
+from brakelab.identify.dust.model import FITS, LEAST_PARTICLES, Model, samples_of
 
 COVERAGE: Final = 0.95
 MARGIN: Final = 0.02  # of a range, beyond the outermost application
@@ -94,7 +94,7 @@ def kpis(
     )
     factors = model.predict(features, sequences)
     said = factor * 10.0**factors
-    known = counted > LEAST
+    known = counted > LEAST_PARTICLES
     measured = np.log10(counted[known])
     off = measured - factors[known]
     within = inside_of(features, trained)
@@ -119,7 +119,7 @@ def judge(name: str, trips: list[Applications], test: list[Applications], seed: 
         counted.append(trip.particles[within])
     factor = float(np.concatenate(counted).sum() / (10.0 ** np.concatenate(said)).sum())
     sums = [factor * (10.0**ef).sum() / n.sum() - 1.0 for ef, n in zip(said, counted, strict=True)]
-    known = np.concatenate(counted) > LEAST
+    known = np.concatenate(counted) > LEAST_PARTICLES
     residuals = np.log10(np.concatenate(counted)[known]) - np.concatenate(said)[known]
     below, above = conformal(residuals)
     began = time.process_time()
@@ -150,7 +150,7 @@ def spearman(trips: list[Applications]) -> tuple[tuple[str, ...], Array]:
         np.concatenate([getattr(trip, name) for trip in trips])
         for name in ("features", "energy", "particles")
     )
-    known = particles > LEAST
+    known = particles > LEAST_PARTICLES
     columns = (*features[known, :5].T, energy[known], np.log10(particles[known]))
     ranks = np.array([rankdata(column) for column in columns])
     names = ("v_in", "v_end", "T_b", "τ", "Δt_b", "E_b", "EF")

@@ -29,12 +29,12 @@ from ecu.contract.dust import HIDDEN, INPUTS, KNOTS, LAW, LAW_TERMS, NETWORK, NO
 Predictor = Callable[[Array, Array], Array]
 """EF, shape (n,), of features, shape (n, 6), and sequences, shape (n, ·)."""
 
-LEAST: Final = 2e7  # particles: fewer are indistinguishable from the background
+LEAST_PARTICLES: Final = 2e7  # particles: fewer are indistinguishable from the background
 SCATTER: Final = 0.2  # of EF, application by application
 BACKGROUND_ERROR: Final = 1e8  # particles, error of an application by the background
 SMOOTH: Final = 0.3  # weight of the table's bends
 EVENLY: Final = 0.4  # of EF: width of the classes made equally frequent
-FEWEST: Final = 5  # of a class: a smaller one is not resampled
+FEWEST_OF_CLASS: Final = 5  # of a class: a smaller one is not resampled
 SHRINK: Final = 0.01  # of a network's weights, per application
 SHRINK_DYNAMIC: Final = 0.03
 HIDDEN_DYNAMIC: Final = 10
@@ -66,7 +66,7 @@ def samples_of(trips: list[Applications]) -> Samples:
         np.concatenate([getattr(trip, name) for trip in trips])
         for name in ("features", "sequences", "particles", "energy")
     )
-    known = particles > LEAST
+    known = particles > LEAST_PARTICLES
     factor, work = np.log10(particles[known]), np.log10(energy[known])
     # By the count expected from work: weighting by the count itself would favour upward scatter.
     expected = 10.0 ** np.polyval(np.polyfit(work, factor, 1), work)
@@ -122,7 +122,7 @@ def _rising(nodes: Array) -> Array:
 def resample(factor: Array, seed: int) -> NDArray[np.int64]:
     """Return places, shape (n,), drawn so that all classes of EF are about as frequent (Figure 8.4)."""
     classes = np.floor((factor - factor.min()) / EVENLY).astype(int)
-    share = 1.0 / np.maximum(np.bincount(classes)[classes], FEWEST)
+    share = 1.0 / np.maximum(np.bincount(classes)[classes], FEWEST_OF_CLASS)
     random = np.random.default_rng(seed)
     return random.choice(len(factor), len(factor), p=share / share.sum())
 

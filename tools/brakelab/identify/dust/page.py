@@ -8,7 +8,7 @@ import numpy as np
 from brakelab.arrays import Array
 from brakelab.identify.dust.features import Applications
 from brakelab.identify.dust.fit import Judged, spearman
-from brakelab.identify.dust.model import LEAST
+from brakelab.identify.dust.model import LEAST_PARTICLES
 from brakelab.results.chart import BLUE, GREY, ORANGE, PINK, Line, Panel, write_chart
 from brakelab.results.text_table import Table, markdown
 
@@ -29,17 +29,17 @@ def trip_table(trips: list[Applications]) -> Table:
             f"{1e-6 * trip.energy.sum():.2f}",
             f"{1e-9 * trip.particles.sum() / trip.km:.2f}",
             f"{trip.background.still:.0f} + {trip.background.by_speed:.0f} v",
-            f"{trip.way_s:.1f}",
+            f"{trip.delay_s:.1f}",
         )
         for trip in trips
     ]
     return Table(
         "Trips",
         ("trip", "km", "mean a_x [m/s²]", "var a_x", "applications", "E_b [MJ]", "ΣPN [10⁹/km]",
-         "background [1/cm³]", "way of the air [s]"),
+         "background [1/cm³]", "transport delay of the air [s]"),
         rows,
         "As Table 8.1: one front brake. Background: what cruising shows against the speed v in m/s "
-        "(Figure 8.2). Way of the air: until the counter follows the friction power best.",
+        "(Figure 8.2). Transport delay: until the counter follows the friction power best.",
     )  # fmt: skip
 
 
@@ -98,7 +98,7 @@ def _pairs(judged: Judged, trips: list[Applications]) -> tuple[Array, Array]:
         np.concatenate([getattr(trip, name) for trip in trips])
         for name in ("features", "sequences", "particles")
     )
-    known = counted > LEAST
+    known = counted > LEAST_PARTICLES
     measured = np.log10(counted[known])
     order = np.argsort(measured)
     return measured[order], judged.model.predict(features, sequences)[known][order]

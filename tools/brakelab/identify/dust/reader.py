@@ -16,7 +16,7 @@ from brakelab.identify.dust.features import (
     MOVING,
     PERIOD,
     PRESSED,
-    SHORTEST,
+    SHORTEST_APPLICATION,
     Applications,
     Recorded,
     extract,
@@ -43,9 +43,9 @@ IN_ORDER: Final = (COLUMNS[0], COLUMNS[2], COLUMNS[3], COLUMNS[1], COLUMNS[4])
 """As `Columns.contract` has them."""
 LONGEST_GAP: Final = 5.0  # s between two samples
 FEWEST_TRIPS: Final = 3  # for identification: each is left out once
-FEWEST: Final = 20  # applications of a trip
-FASTEST: Final = 90.0  # m/s
-HOTTEST: Final = 900.0  # degC
+FEWEST_APPLICATIONS: Final = 20  # applications of a trip
+HIGHEST_SPEED: Final = 90.0  # m/s
+HIGHEST_TEMPERATURE: Final = 900.0  # degC
 MOST_COUNT: Final = 1e6  # 1/cm^3; a street has 1e3 to 1e5
 LONGEST_TOP: Final = 10.0  # s at the greatest value, to the digit
 MOST_FLOW: Final = 5.0  # m^3/s
@@ -66,8 +66,8 @@ def read_trips(manifest: Path, config: Config, axle: str) -> list[Applications]:
         trip = _read_trip(path, row["trip"], row["test"] == "1", columns.rig.push_out_pressure)
         _check_units(path, trip, columns)
         found = extract(trip, columns.brake.tyre_radius)
-        if len(found.particles) < FEWEST:
-            remedy = f"{len(found.particles)} brake applications; a trip needs {FEWEST} or more"
+        if len(found.particles) < FEWEST_APPLICATIONS:
+            remedy = f"{len(found.particles)} brake applications; a trip needs {FEWEST_APPLICATIONS} or more"
             raise UserError(str(path), f"trip {row['trip']}", remedy)
         if found.particles.sum() <= 0.0:
             raise UserError(str(path), "particle_concentration", "does not rise when the brake is applied")
@@ -105,7 +105,7 @@ def _check_units(path: Path, trip: Recorded, columns: Columns) -> None:
             trip.temperature[begin:end],
         )
         for begin, end in pressed
-        if (end - begin) * PERIOD >= SHORTEST
+        if (end - begin) * PERIOD >= SHORTEST_APPLICATION
     ]
     if applications:
         refuse_units(applications, columns, str(path))
@@ -123,9 +123,9 @@ def _on_grid(path: Path, name: str, t: Array, values: Array, grid: Array) -> Arr
 def _check_ranges(path: Path, even: dict[str, Array]) -> None:
     speed, heat = even["vehicle_speed"], even[f"disc_temperature_{CORNER}"]
     flow, count = even["tunnel_flow"], even["particle_concentration"]
-    if speed.max() > FASTEST:
+    if speed.max() > HIGHEST_SPEED:
         raise UserError(str(path), "vehicle_speed", f"up to {speed.max():.0f} m/s: km/h? convert it to m/s")
-    check_celsius(path, f"disc_temperature_{CORNER}", heat, HOTTEST)
+    check_celsius(path, f"disc_temperature_{CORNER}", heat, HIGHEST_TEMPERATURE)
     if not 0.0 < flow.min() <= flow.max() < MOST_FLOW:
         remedy = f"{flow.min():.3g} to {flow.max():.3g} cannot be m^3/s of a tunnel; convert it"
         raise UserError(str(path), "tunnel_flow", remedy)

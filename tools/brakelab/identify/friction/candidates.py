@@ -40,7 +40,7 @@ class Free(NamedTuple):
     """Is a friction: starts of a search have it near the measured mean."""
 
     def value(self, share: float) -> float:
-        """Return the number at `share` 0 to 1 of the way between its bounds."""
+        """Return the number at `share` 0 to 1 between its bounds."""
         if self.log:
             return float(self.low * (self.high / self.low) ** share)
         return self.low + share * (self.high - self.low)

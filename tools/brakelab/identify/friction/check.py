@@ -1,6 +1,6 @@
 """Doubts a recording: units and sensors that would make no physical sense, one line each with the remedy.
 
-Three numbers of a recording have to fit known physics, and every usual mistake moves them in its own way:
+Three numbers of a recording have to fit known physics, and every usual mistake moves them differently:
 
     friction  median of T / (2 A_k r_eff p)                    0.42, give or take a third
     inertia   torque impulse over the loss of speed            of the flywheel, or 60 kg m^2 within a factor 4
@@ -27,8 +27,8 @@ GIVEN: Final = 0.15  # likewise where the file of columns gives the number
 CONFIGURED: Final = 0.3  # likewise where CONFIG does, of any disc of this car
 DOUBTFUL: Final = 2.0  # standard deviations
 CLEARER: Final = 4.0  # a mistake must explain the numbers better by this much, in squares
-HOTTEST: Final = 900.0  # degC
-COLDEST: Final = -40.0  # degC
+HIGHEST_TEMPERATURE: Final = 900.0  # degC
+LOWEST_TEMPERATURE: Final = -40.0  # degC
 WARM: Final = 250.0  # degC; no programme keeps a disc above this all the time
 SAMPLES: Final = (1e-4, 0.05)  # s between them, least and greatest
 
@@ -143,7 +143,7 @@ def refuse_nonsense(recording: Recording, columns: Columns, where: str) -> Numbe
         UserError: it does not; names the column, the finding and the remedy.
     """
     hottest, coldest = float(recording.temperature.max()), float(recording.temperature.min())
-    if hottest > HOTTEST or coldest < COLDEST:
+    if hottest > HIGHEST_TEMPERATURE or coldest < LOWEST_TEMPERATURE:
         place = f"temperature {coldest:.0f} to {hottest:.0f} °C"
         raise UserError(where, place, "no brake disc is that; check its unit, and the thermocouple")
     if coldest > WARM:

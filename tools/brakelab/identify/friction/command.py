@@ -39,7 +39,7 @@ from ecu.errors import UserError
 from ecu.output import give, say, wrote
 from ecu.settings.resources import named, resource
 
-FEWEST: Final = 10
+FEWEST_STOPS: Final = 10
 """Stops that identification needs."""
 HELD_OUT: Final = "the fifth of the stops that begins hottest"
 BETWEEN: Final = 600.0
@@ -207,5 +207,5 @@ def _read(data: list[Path], columns: Path | None) -> _Measured:
 
 
 def _need(stops: Stops, path: Path) -> None:
-    if len(stops) < FEWEST:
-        raise UserError(str(path), "", f"{len(stops)} stops; needs {FEWEST}")
+    if len(stops) < FEWEST_STOPS:
+        raise UserError(str(path), "", f"{len(stops)} stops; needs {FEWEST_STOPS}")

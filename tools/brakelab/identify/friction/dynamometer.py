@@ -17,7 +17,7 @@ from brakelab.plant.disc import cooling_rate
 from brakelab.plant.dynamometer import (
     DECELERATION,
     DRAG,
-    LONGEST,
+    LONGEST_S,
     PRESSURE,
     STEP,
     TRACE,
@@ -62,7 +62,7 @@ class Bench:
         self.temperature = float(rig[0]["ambient"])
         self.time = 0.0
 
-    def run(self, stop: RecordArray, fall: float = 0.0, longest: float = LONGEST) -> RecordArray:
+    def run(self, stop: RecordArray, fall: float = 0.0, longest: float = LONGEST_S) -> RecordArray:
         """Return the true trace of a stop, dtype TRACE."""
         if self.pad is None:
             trace = run_stop(self.rig, stop, longest=longest)

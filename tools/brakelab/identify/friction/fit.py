@@ -10,7 +10,7 @@ starts do not agree on is said.
 
 Confidence. Residuals of one stop hang together, those of two stops do not: the covariance is that of sums
 over stops (Liang and Zeger's), with Student's t for as many degrees of freedom as stops less one. It holds
-for noise and for a law that is wrong in its own way at every stop, not for one that is wrong everywhere.
+for noise and for a law that is wrong differently at every stop, not for one that is wrong everywhere.
 
 Where no stop was. A number that is a friction at a place, as a table's, is held to the mean friction of all
 stops by `BAND`, with the weight of a stop that is `CHANCE` off: beyond the data it is the constant, with that

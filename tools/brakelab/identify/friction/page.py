@@ -21,7 +21,7 @@ from brakelab.results.text_table import Table
 
 WORD: Final = re.compile("[a-z]{3}")
 """Mark of a column of words, which is set from the left."""
-MOST: Final = 1500  # points of a chart
+MOST_POINTS: Final = 1500  # points of a chart
 PARTS: Final = 12  # of a running mean
 STYLE: Final = (
     "body{font:15px/1.5 system-ui,sans-serif;margin:2em auto;max-width:990px;padding:0 1em;color:#1d2733}"
@@ -109,7 +109,7 @@ def write_report(
 def _residuals(name: str, values: Vector, off: Vector) -> Panel:
     """Return the residuals, thinned evenly, zero, and their running mean."""
     order = np.argsort(values, kind="stable")
-    thin = order[:: max(len(order) // MOST, 1)]
+    thin = order[:: max(len(order) // MOST_POINTS, 1)]
     parts = np.array_split(order, PARTS)
     middle = np.array([values[part].mean() for part in parts])
     mean = np.array([off[part].mean() for part in parts])

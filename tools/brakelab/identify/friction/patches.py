@@ -1,15 +1,15 @@
 """A pad as no law under test has it: plateaus that heat builds, a film that running-in leaves, and chance.
 
 Model. Contact temperature T_c of the plateaus, share n of secondary plateaus, film f, chance x, with p
-pressure, v sliding speed and T disc temperature; w the way that the pad has rubbed:
+pressure, v sliding speed and T disc temperature; w the sliding distance of the pad:
 
     T_c' = (T + flash p v - T_c) / 0.3 s
-    dn/dw = (B (1 - n) - D n) / way,   B = birth exp(-E (1/T_c - 1/373 K)) (p / 30 bar)^press
+    dn/dw = (B (1 - n) - D n) / distance,   B = birth exp(-E (1/T_c - 1/373 K)) (p / 30 bar)^press
                                        D = 1 + wear p v / 30 MPa m/s + 3 S((T_c - fade_at) / 40 K)
     df/dw = (1 - f) / 600 m - S((T_c - fade_at) / 40 K) f / 80 m,   S the logistic function
     mu_b = (mu_0 + mu_n n (0.8 + 0.2 f)) (1 - fade S((T_c - fade_at) / 60 K)) exp(x + x_stop)
 
-x is a first-order Markov process over the way (5 m, `ripple`), x_stop a draw per application (`scatter`).
+x is a first-order Markov process over distance (5 m, `ripple`), x_stop a draw per application (`scatter`).
 At the release half of what n differs from its value at rest is lost. T_c is not measured, n and f outlive
 the stop: so the same stop depends on what was before it. The disc's heat capacity rises with temperature
 (xi of 3.7, Figure 3.6a), which the lining file and every lumped model leave out: theirs holds at 100 degC.
@@ -40,7 +40,7 @@ PAD: Final = np.dtype(
         ("press", "f8"),
         ("wear", "f8"),
         ("flash", "f8"),  # K per Pa m/s
-        ("way", "f8"),  # m
+        ("distance", "f8"),  # m
         ("fade", "f8"),
         ("fade_at", "f8"),  # degC
         ("scatter", "f8"),
@@ -69,7 +69,7 @@ SPREAD: Final = 0.06
 REST: Final = 0.30  # share of plateaus that a pad at rest tends to
 KEPT: Final = 0.5
 FLASH_TIME: Final = 0.3  # s
-RIPPLE_WAY: Final = 5.0  # m
+RIPPLE_DISTANCE: Final = 5.0  # m
 PRESSURE: Final = 30e5  # Pa
 POWER: Final = 30e6  # Pa m/s
 LEAST_DEMAND: Final = 0.3  # of a demand that falls
@@ -118,15 +118,15 @@ def rub(
     power = pressure * speed
     goal = temperature + pad.flash * power
     state.contact_temperature += (goal - state.contact_temperature) * dt / FLASH_TIME
-    way = speed * dt
+    distance = speed * dt
     kelvin = state.contact_temperature + KELVIN
     burnt = logistic((state.contact_temperature - pad.fade_at) / 40.0)
     births = pad.birth * math.exp(-pad.activation * (1.0 / kelvin - 1.0 / 373.15))
     births *= (max(pressure, 1e3) / PRESSURE) ** pad.press
     deaths = 1.0 + pad.wear * power / POWER + 3.0 * burnt
-    state.plateaus += (births * (1.0 - state.plateaus) - deaths * state.plateaus) * way / pad.way
-    state.film += way * ((1.0 - state.film) / 600.0 - burnt * state.film / 80.0)
-    kept = math.exp(-way / RIPPLE_WAY)
+    state.plateaus += (births * (1.0 - state.plateaus) - deaths * state.plateaus) * distance / pad.distance
+    state.film += distance * ((1.0 - state.film) / 600.0 - burnt * state.film / 80.0)
+    kept = math.exp(-distance / RIPPLE_DISTANCE)
     state.ripple = kept * state.ripple + pad.ripple * math.sqrt(1.0 - kept * kept) * random.standard_normal()
     mu = pad.mu_0 + pad.mu_n * state.plateaus * (0.8 + 0.2 * state.film)
     mu *= 1.0 - pad.fade * logistic((state.contact_temperature - pad.fade_at) / 60.0)

@@ -25,7 +25,7 @@ from ecu.errors import UserError
 Places = NDArray[np.int64]
 
 APPLIED: Final = 1.5e5  # Pa
-SHORTEST: Final = 0.5  # s
+SHORTEST_STOP: Final = 0.5  # s
 GAP: Final = 0.1  # s
 BLOCK: Final = 0.05  # s
 MEMORY: Final = 0.1  # s, of the recursive least squares
@@ -185,7 +185,7 @@ def _applications(time: Vector, on: NDArray[np.bool_]) -> list[tuple[int, int]]:
 def _is_stop(recording: Recording, run: tuple[int, int], dt: float) -> bool:
     begin, end = run
     few = max(round(BLOCK / dt), 1)
-    if (end - begin) * dt < SHORTEST:
+    if (end - begin) * dt < SHORTEST_STOP:
         return False
     before = recording.speed[begin : begin + few].mean()
     return bool(recording.speed[end - few : end].mean() < 0.9 * before)

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 from brakelab.identify.measurement_files import WARMEST_COLD
 from brakelab.identify.thermal.fit import Disc, Fit, fit_axle
 from brakelab.identify.thermal.model import ROW, Cooling, Series
-from brakelab.identify.thermal.reader import Drive
+from brakelab.identify.thermal.reader import ThermalLog
 from brakelab.stretches import stretches
 from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
 
-SHORTEST: Final = 300.0  # s
-FEWEST: Final = 3  # brake applications
+SHORTEST_LOG: Final = 300.0  # s
+FEWEST_APPLICATIONS: Final = 3  # brake applications
 LEAST_ROWS: Final = 200  # with a measured temperature
 LEAST_RISE: Final = 15.0  # K
 STILL: Final = 2.0  # K, of a sensor that shows nothing
@@ -31,7 +31,7 @@ def _longest_run(there: NDArray[np.bool_]) -> int:
     return int(np.max(end - begin, initial=0))
 
 
-def check_drive(drive: Drive) -> list[int]:
+def check_drive(drive: ThermalLog) -> list[int]:
     """Return the corners with a measured temperature that can be used.
 
     Raises:
@@ -44,9 +44,9 @@ def check_drive(drive: Drive) -> list[int]:
         remedy = "not in this log; give the disc's thermocouples in degC under these names (or in the map)"
         raise UserError(path, "disc_temperature_measured_*", remedy)
     length = ROW * len(series.speed)
-    if length < SHORTEST:
+    if length < SHORTEST_LOG:
         raise UserError(
-            path, "t", f"lasts {length:.0f} s; a disc heats and cools over {SHORTEST:.0f} s and more"
+            path, "t", f"lasts {length:.0f} s; a disc heats and cools over {SHORTEST_LOG:.0f} s and more"
         )
     for i in corners:
         if drive.wheels_seen[i] < SEEN:
@@ -56,8 +56,10 @@ def check_drive(drive: Drive) -> list[int]:
         if drive.pressures_seen[i] < SEEN:
             remedy = "mostly missing; the friction torque comes from it"
             raise UserError(path, f"calliper_pressure_{CORNERS[i]}", remedy)
-    if drive.applications < FEWEST:
-        remedy = f"{drive.applications} brake applications; give {FEWEST} or more that warm the discs"
+    if drive.applications < FEWEST_APPLICATIONS:
+        remedy = (
+            f"{drive.applications} brake applications; give {FEWEST_APPLICATIONS} or more that warm the discs"
+        )
         raise UserError(path, "calliper_pressure_*", remedy)
     for i in corners:
         _check_sensor(path, series, i)
@@ -69,7 +71,7 @@ def _check_sensor(path: str, series: Series, corner: int) -> None:
     seen = np.isfinite(series.measured[:, corner])
     values, air = series.measured[seen, corner], series.air[seen]
     if len(values) < LEAST_ROWS:
-        remedy = f"{len(values)} s with a sample; log it once a second or faster, all the way"
+        remedy = f"{len(values)} s with a sample; log it once a second or faster, throughout"
         raise UserError(path, name, remedy)
     low, high = float(values.min()), float(values.max())
     if high - low < STILL:

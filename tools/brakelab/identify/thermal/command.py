@@ -10,7 +10,7 @@ from brakelab.identify.config_file import Section, write_car
 from brakelab.identify.thermal.check import check_drive, check_fit
 from brakelab.identify.thermal.fit import Disc, Fit, fit_axle, fit_nothing
 from brakelab.identify.thermal.page import Judged, unidentified, write_page
-from brakelab.identify.thermal.reader import Drive, read_drives
+from brakelab.identify.thermal.reader import ThermalLog, read_drives
 from brakelab.identify.thermal.result import errors_of, judge, section_of, start_of
 from brakelab.results.outputs import check_outputs, config_files
 from ecu.errors import UserError
@@ -20,7 +20,7 @@ from ecu.settings.config import Axle, Config, load_config
 AXLES: Final = {"front": (0, 1), "rear": (2, 3)}
 
 
-def judge_axle(name: str, drives: Sequence[Drive], discs: list[Disc], axle: Axle) -> Judged:
+def judge_axle(name: str, drives: Sequence[ThermalLog], discs: list[Disc], axle: Axle) -> Judged:
     """Return the fit of one axle beside the configuration's own. Raises `UserError`: see `check_fit`."""
     start = start_of(axle)
     fit = fit_axle(discs, axle.disc_heating, start)

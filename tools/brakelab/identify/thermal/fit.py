@@ -34,7 +34,7 @@ OFFSET_NO_AIR: Final = 15.0  # K, where no air temperature is in the log; AMBIEN
 ROUNDS: Final = 5
 OUTLIER: Final = 3.0  # standard deviations
 LEAST_NOISE: Final = 0.5  # K
-LONGEST: Final = 900.0  # s, of an autocorrelation
+LONGEST_CORRELATION: Final = 900.0  # s, of an autocorrelation
 UNCORRELATED: Final = 0.1
 LEAST_LASTS: Final = 200.0
 """s: a disc's own time constant; in a short log the fit follows what lasts, and the residual hides it."""
@@ -136,7 +136,7 @@ def _residuals(x: Array, discs: Sequence[Disc], heating: float, start: Cooling, 
 def autocorrelation_rows(residual: Array) -> float:
     """Return the integrated autocorrelation time of a residual, in rows, at least 1."""
     centred = residual - residual.mean()
-    most = min(int(LONGEST / ROW), len(centred) // 4)
+    most = min(int(LONGEST_CORRELATION / ROW), len(centred) // 4)
     size = 1 << (2 * len(centred) - 1).bit_length()
     power = np.abs(np.fft.rfft(centred, size)) ** 2
     found = np.fft.irfft(power, size)[:most]

@@ -17,7 +17,7 @@ from scipy.signal import lfilter
 from brakelab.arrays import Array
 
 ROW: Final = 1.0  # s, of one row
-STEEPEST: Final = 600.0  # of D within one piece: exp stays finite
+GREATEST_EXPONENT: Final = 600.0  # of D within one piece: exp stays finite
 
 
 class Series(NamedTuple):
@@ -65,7 +65,7 @@ def respond(rate: Array, power: Array) -> tuple[Array, Array]:
     heat, decay = np.empty_like(power), np.exp(-depth[1:])
     carried, first = 0.0, 0
     while first < len(power):
-        last = int(np.searchsorted(depth, depth[first] + STEEPEST, "right")) - 1
+        last = int(np.searchsorted(depth, depth[first] + GREATEST_EXPONENT, "right")) - 1
         last = min(max(last, first + 1), len(power))
         grown = np.exp(depth[first + 1 : last + 1] - depth[first])
         heat[first:last] = (carried + np.cumsum(warmed[first:last] * grown)) / grown

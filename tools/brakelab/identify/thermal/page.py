@@ -22,8 +22,8 @@ LEGEND: Final = (
     ("dry", ORANGE),
     ("rain", GREEN),
 )
-FASTEST: Final = 45.0  # m/s
-MOST: Final = 12  # panels of discs
+HIGHEST_SPEED: Final = 45.0  # m/s
+MOST_PANELS: Final = 12  # panels of discs
 
 
 class Judged(NamedTuple):
@@ -114,14 +114,14 @@ def _rates(cooling: Cooling, speed: Array) -> tuple[Array, Array]:
 
 def cooling_panel(title: str, new: Cooling, old: Cooling | None = None) -> Panel:
     """Return Figure 7.15: the cooling coefficient by speed, dry and wet; `old` dashed."""
-    speed = np.linspace(0.0, FASTEST, 50)
+    speed = np.linspace(0.0, HIGHEST_SPEED, 50)
     dry, wet = _rates(new, speed)
     lines = [Line(speed, dry, ORANGE), Line(speed, wet, GREEN)]
     if old is not None:
         before = _rates(old, speed)
         lines += [Line(speed, before[0], ORANGE, True), Line(speed, before[1], GREEN, True)]
     top = 1.1 * max(float(line.y.max()) for line in lines)
-    return Panel(title, "speed [m/s]", (0.0, FASTEST), (0.0, top), lines)
+    return Panel(title, "speed [m/s]", (0.0, HIGHEST_SPEED), (0.0, top), lines)
 
 
 def disc_panel(title: str, minutes: Array, measured: Array, predicted: Array, sigma: Array) -> Panel:
@@ -144,7 +144,7 @@ def write_page(page: Path, axles: Sequence[Judged]) -> None:
         for axle in axles
     ]
     discs = [pair for axle in axles for pair in zip(axle.discs, axle.predictions, strict=True)]
-    for disc, prediction in discs[:MOST]:
+    for disc, prediction in discs[:MOST_PANELS]:
         series = disc.series
         minutes = np.arange(1, len(series.speed) + 1, dtype=np.float64) * ROW / 60.0
         title = f"{series.name}, {CORNERS[disc.corner]} [°C]"

@@ -44,7 +44,7 @@ USED: Final = (
 _SPEED, _BRAKING, _TORQUE, _MU, _SIGMA = 0, 1, 2, 6, 10
 
 
-class Drive(NamedTuple):
+class ThermalLog(NamedTuple):
     """One log."""
 
     path: Path
@@ -87,7 +87,7 @@ def _place(signal: int) -> int:
     return KEPT.index(signal)
 
 
-def as_drive(path: Path, outputs: Array, samples: Array, air: float) -> Drive:
+def as_drive(path: Path, outputs: Array, samples: Array, air: float) -> ThermalLog:
     """Return a log from its cycles.
 
     Args:
@@ -116,7 +116,7 @@ def as_drive(path: Path, outputs: Array, samples: Array, air: float) -> Drive:
         bool(known[:, 0].any()),
         _means(four(samples, _place(DISC_TEMPERATURE_MEASURED))),
     )
-    return Drive(
+    return ThermalLog(
         path,
         series,
         np.nan_to_num(_means(four(outputs, _SIGMA) / four(outputs, _MU))),
@@ -127,7 +127,7 @@ def as_drive(path: Path, outputs: Array, samples: Array, air: float) -> Drive:
     )
 
 
-def read_drives(logs: Sequence[Path], config: Config, map: Path | None) -> list[Drive]:
+def read_drives(logs: Sequence[Path], config: Config, map: Path | None) -> list[ThermalLog]:
     """Return the drives of `logs`, whose frames `map` describes (None: the ECU's own database).
 
     Raises:
@@ -135,7 +135,7 @@ def read_drives(logs: Sequence[Path], config: Config, map: Path | None) -> list[
     """
     source, params = announced(load_source(map)), new_params(config)
     learned: RecordArray | None = None
-    drives: list[Drive] = []
+    drives: list[ThermalLog] = []
     with progress_bar("identify thermal", 2 * sum(log_size(path) for path in logs)) as advance:
         for learns in (True, False):
             for path in logs:

@@ -13,7 +13,7 @@ from brakelab.identify.vehicle.solve import Zeros
 from ecu.settings.config import Config, validate_config
 
 SURE: Final = 2.0  # standard deviations: a zero that is one
-SMALLEST: Final = {"accel_x": 0.05, "accel_y": 0.05, "yaw_rate": 0.002, "calliper_pressure": 0.3}
+LARGEST_SIGMA: Final = {"accel_x": 0.05, "accel_y": 0.05, "yaw_rate": 0.002, "calliper_pressure": 0.3}
 """Standard deviations from which a zero is not taken off, in the signal's unit."""
 
 
@@ -76,10 +76,10 @@ def offsets(zeros: Zeros) -> dict[str, float]:
     sure = {
         name: zero[0]
         for name, zero in found.items()
-        if zero and abs(zero[0]) > SURE * zero[1] and zero[1] < SMALLEST[name]
+        if zero and abs(zero[0]) > SURE * zero[1] and zero[1] < LARGEST_SIGMA[name]
     }
     for name, value, sigma in zeros.pressure:
-        if abs(value) > SURE * sigma and sigma < SMALLEST["calliper_pressure"]:
+        if abs(value) > SURE * sigma and sigma < LARGEST_SIGMA["calliper_pressure"]:
             sure.setdefault(name, value)
     return sure
 

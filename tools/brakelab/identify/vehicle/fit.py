@@ -33,7 +33,7 @@ PASSES: Final = 4  # of scales and weights
 SMALL: Final = 1e-5  # of a prior's sigma, for derivatives
 DONE: Final = 1e-4  # of a prior's sigma, a step that ends the search
 SINGULAR: Final = 1e-12
-FEWEST: Final = 8  # residuals of a kind that set its scale
+FEWEST_RESIDUALS: Final = 8  # residuals of a kind that set its scale
 
 
 class Residuals(NamedTuple):
@@ -118,7 +118,7 @@ def _scales(residuals: Residuals, r: Vector) -> tuple[Vector, Vector]:
         if not rows.any():
             continue
         least = float(np.sqrt(np.mean(residuals.least[rows] ** 2)))
-        spread = 1.4826 * float(np.median(np.abs(r[rows]))) if rows.sum() >= FEWEST else 0.0
+        spread = 1.4826 * float(np.median(np.abs(r[rows]))) if rows.sum() >= FEWEST_RESIDUALS else 0.0
         scale[kind] = max(spread, least)
         clipped = np.clip(r[rows] / scale[kind], -HUBER, HUBER)
         sums = np.bincount(residuals.cluster[rows], clipped)

@@ -16,7 +16,7 @@ from brakelab.results.text_table import Table, markdown
 from ecu.contract.params import GRAVITY
 
 SPEEDS: Final = (3.0, 8.0, 14.0, 20.0, 26.0, 32.0, 45.0)  # m/s, of the table of overrun
-FEWEST: Final = 4  # windows of a speed
+FEWEST_WINDOWS: Final = 4  # windows of a speed
 
 
 def fitted_table(parameters: Sequence[Parameter]) -> Table:
@@ -69,7 +69,7 @@ def overrun_table(found: Identified, params: Any) -> Table:
     for low, high in pairwise(SPEEDS):
         own = windows.free & windows.steady & windows.straight & ~pulled
         own = own & (moving.reference >= low) & (moving.reference < high)
-        if own.sum() < FEWEST:
+        if own.sum() < FEWEST_WINDOWS:
             continue
         least, mid, most = np.percentile(drive[own], (16, 50, 84))
         torque = f"{np.median(reported[own]):.0f}" if found.signals.torque else "–"

@@ -29,14 +29,14 @@ from ecu.output import say
 RATE: Final = 100.0  # Hz, of the grid
 GAP: Final = 0.15  # s to the nearest sample, beyond which a signal is not known
 SLOW_GAP: Final = 0.3  # s, of the speed reference, which may come ten times a second
-FEWEST: Final = 500  # samples of a signal that counts as there
-SHORTEST: Final = 15.0  # s of driving
+FEWEST_SAMPLES: Final = 500  # samples of a signal that counts as there
+SHORTEST_DRIVE: Final = 15.0  # s of driving
 PRESENT: Final = {INPUT_SIGNALS[place].name: column for column, place in enumerate(SAMPLED)}
 
 Rows = NDArray[np.bool_]
 
 
-class Drive(NamedTuple):
+class DriveSamples(NamedTuple):
     """One drive on the grid; what the car does not send is not in `halves`."""
 
     name: str
@@ -66,13 +66,13 @@ class Drive(NamedTuple):
         return np.stack([self.halves[f"{stem}_{corner}"] for corner in CORNERS])
 
 
-def drive_of(name: str, samples: Vector) -> Drive:
+def drive_of(name: str, samples: Vector) -> DriveSamples:
     """Return a drive by its samples, shape (n, len(SAMPLED)), NaN: none in this cycle."""
     grid = np.arange(len(samples))
     halves, known, spread = {}, {}, {}
     for signal, column in PRESENT.items():
         there = np.flatnonzero(np.isfinite(samples[:, column]))
-        if len(there) < FEWEST:
+        if len(there) < FEWEST_SAMPLES:
             continue
         values = samples[there, column]
         halves[signal] = np.stack([np.interp(grid, there[k::2], values[k::2]) for k in range(2)])
@@ -81,10 +81,10 @@ def drive_of(name: str, samples: Vector) -> Drive:
         known[signal] = near <= RATE * (SLOW_GAP if signal == "vehicle_speed" else GAP)
         bend = values[2:] - 2.0 * values[1:-1] + values[:-2]
         spread[signal] = float(1.4826 * np.median(np.abs(bend)) / np.sqrt(6.0))
-    return Drive(name, halves, known, spread)
+    return DriveSamples(name, halves, known, spread)
 
 
-def read_drives(paths: Sequence[Path], params: RecordArray, map: Path | None) -> list[Drive]:
+def read_drives(paths: Sequence[Path], params: RecordArray, map: Path | None) -> list[DriveSamples]:
     """Read logs or files of decoded signals; `params` is one `PARAMS` of START.
 
     Raises:
@@ -110,7 +110,7 @@ def read_drives(paths: Sequence[Path], params: RecordArray, map: Path | None) ->
     return drives
 
 
-def check(drive: Drive, wrong: Sequence[str], params: Any) -> None:
+def check(drive: DriveSamples, wrong: Sequence[str], params: Any) -> None:
     """Refuse a drive that cannot be used; `wrong` are the lines that physics has on its inputs.
 
     Raises:
@@ -124,8 +124,8 @@ def check(drive: Drive, wrong: Sequence[str], params: Any) -> None:
         raise UserError(drive.name, "accel_x", "is missing: forces follow from it; map it (`map suggest`)")
     speed = drive.corners("wheel_speed").mean(axis=(0, 1)) * float(np.mean(params["wheel_radius"]))
     moving = float(np.count_nonzero(np.abs(speed) > MOVING)) / RATE
-    if moving < SHORTEST:
-        remedy = f"give a drive of at least {SHORTEST:.0f} s on the move, better ten minutes"
+    if moving < SHORTEST_DRIVE:
+        remedy = f"give a drive of at least {SHORTEST_DRIVE:.0f} s on the move, better ten minutes"
         raise UserError(drive.name, "", f"the car moves for {moving:.0f} s only; {remedy}")
     lines = [line for line in wrong if "offset =" not in line]
     if lines:

@@ -34,7 +34,7 @@ APART: Final = 100.0  # m between two standstills that count as two
 LEAST_STAND: Final = 2.0  # s
 YAW_STEP: Final = 1e-4  # rad/s, resolution and drift
 BANK: Final = 0.05  # m/s^2, of twenty seconds of road
-FEWEST: Final = 20  # windows
+FEWEST_WINDOWS: Final = 20  # windows
 
 Estimate = tuple[float, float]
 """A value and its standard deviation."""
@@ -192,7 +192,7 @@ def yaw_zero(windows: Windows) -> Estimate | None:
 def lateral_zero(windows: Windows, radius: float, yaw: Estimate) -> Estimate | None:
     """Return the zero of accel_y [m/s^2], which holds the mean bank of the roads; None: not sent."""
     rows = np.flatnonzero(windows.free & np.isfinite(windows.accel_y + windows.yaw_rate).all(axis=0))
-    if len(rows) < FEWEST:
+    if len(rows) < FEWEST_WINDOWS:
         return None
     speed = windows.omega.mean(axis=(0, 1))[rows] * radius
     felt, turn = windows.accel_y[:, rows], windows.yaw_rate[:, rows]

@@ -19,7 +19,7 @@ from brakelab.identify.vehicle.model import (
     residuals_of,
     signals_of,
 )
-from brakelab.identify.vehicle.reader import Drive
+from brakelab.identify.vehicle.reader import DriveSamples
 from brakelab.identify.vehicle.sensors import (
     Steps,
     accel_zero,
@@ -36,7 +36,7 @@ from ecu.errors import UserError
 
 ROUNDS: Final = 3
 RATE: Final = 100.0  # Hz, of samples at most
-FEWEST: Final = 6  # windows of forces or wheels
+FEWEST_WINDOWS: Final = 6  # windows of forces or wheels
 DEFLECTION_MODEL: Final = 0.04  # relative, of two axles that differ
 
 
@@ -65,7 +65,7 @@ class Identified(NamedTuple):
     steps: Steps
 
 
-def identify(drives: Sequence[Drive], start: RecordArray, closed: bool) -> Identified:
+def identify(drives: Sequence[DriveSamples], start: RecordArray, closed: bool) -> Identified:
     """Return what `drives` tell of the car that `start`, `PARAMS` of shape (1,), describes about.
 
     `closed`: each drive ends at the height where it began.
@@ -80,7 +80,7 @@ def identify(drives: Sequence[Drive], start: RecordArray, closed: bool) -> Ident
     prior = prior_of(params, signals)
     noise = _noise(drives, params)
     residuals = residuals_of(windows, params, signals, noise)
-    if len(residuals.kind) < FEWEST:
+    if len(residuals.kind) < FEWEST_WINDOWS:
         raise UserError(
             drives[0].name,
             "",
@@ -105,7 +105,7 @@ def identify(drives: Sequence[Drive], start: RecordArray, closed: bool) -> Ident
     return Identified(signals, prior, found, residuals, windows, pairs, dive, sensors, steps)
 
 
-def _noise(drives: Sequence[Drive], params: Any) -> tuple[float, float]:
+def _noise(drives: Sequence[DriveSamples], params: Any) -> tuple[float, float]:
     """Return what sensors alone scatter in a window: accelerometer [m/s^2], speed of an axle [m/s]."""
     root = np.sqrt(RATE * SECONDS)
     accel = max(drive.spread["accel_x"] for drive in drives) / root
@@ -138,7 +138,7 @@ def _with(
 
 
 def _pressures(
-    drives: Sequence[Drive], zeros: Sequence[Vector], windows: Windows
+    drives: Sequence[DriveSamples], zeros: Sequence[Vector], windows: Windows
 ) -> list[tuple[str, float, float]]:
     rows = []
     for place, (drive, zero) in enumerate(zip(drives, zeros, strict=True)):

@@ -20,8 +20,8 @@ from brakelab.identify.vehicle.windows import Windows
 from ecu.contract.params import GRAVITY
 
 CURVES: Final = 0.02  # rad/s, standard deviation of a yaw rate that shows the wheels' differences
-FEWEST: Final = 20  # windows
-LARGEST: Final = 4.0  # m/s^2 across
+FEWEST_WINDOWS: Final = 20  # windows
+LARGEST_LATERAL: Final = 4.0  # m/s^2 across
 
 
 class Pairs(NamedTuple):
@@ -47,8 +47,8 @@ def pairs_of(
     """
     rate = windows.yaw_rate.mean(axis=0)
     speed = windows.omega.mean(axis=(0, 1)) * float(radius.mean())
-    rows = np.flatnonzero(windows.free & np.isfinite(rate) & (np.abs(rate) * speed < LARGEST))
-    if len(rows) < FEWEST or float(np.std(rate[rows])) < CURVES:
+    rows = np.flatnonzero(windows.free & np.isfinite(rate) & (np.abs(rate) * speed < LARGEST_LATERAL))
+    if len(rows) < FEWEST_WINDOWS or float(np.std(rate[rows])) < CURVES:
         return None
     own, driven = select(windows, rows), slip[:, rows]
     shift = 2.0 * float(params["cog_height"]) / (GRAVITY * float(params["track"]))

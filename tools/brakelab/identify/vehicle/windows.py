@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from brakelab.arrays import Vector
-from brakelab.identify.vehicle.reader import RATE, Drive, Rows
+from brakelab.identify.vehicle.reader import RATE, DriveSamples, Rows
 from brakelab.logs.physics.line import MOVING
 from ecu.contract.signals import CORNERS
 
@@ -60,7 +60,7 @@ class Windows(NamedTuple):
     cluster: NDArray[np.int64]
 
 
-def pressure_zeros(drive: Drive) -> Vector:
+def pressure_zeros(drive: DriveSamples) -> Vector:
     """Return the reading of each released brake [bar], shape (4,); 0 of a sensor that cannot report less."""
     zeros = np.zeros(4)
     if not drive.has("calliper_pressure"):
@@ -82,7 +82,7 @@ def pressure_zeros(drive: Drive) -> Vector:
     return zeros
 
 
-def _brakes(drive: Drive, zeros: Vector) -> Rows:
+def _brakes(drive: DriveSamples, zeros: Vector) -> Rows:
     """Return the rows in which a brake is applied, shape (n,)."""
     if not drive.has("calliper_pressure"):
         return np.zeros(len(drive), np.bool_)
@@ -95,7 +95,7 @@ def _brakes(drive: Drive, zeros: Vector) -> Rows:
     return np.asarray(np.maximum(smooth[0] + smooth[1], smooth[2] + smooth[3]) > 2.0 * least)
 
 
-def cut(drives: Sequence[Drive], zeros: Sequence[Vector], radius: float) -> Windows:
+def cut(drives: Sequence[DriveSamples], zeros: Sequence[Vector], radius: float) -> Windows:
     """Return the windows of all drives; `zeros` of each drive's pressures, `radius` [m] is rough."""
     parts = [_cut(drive, zero, radius) for drive, zero in zip(drives, zeros, strict=True)]
     joined = []
@@ -107,7 +107,7 @@ def cut(drives: Sequence[Drive], zeros: Sequence[Vector], radius: float) -> Wind
     return Windows(*columns)
 
 
-def _cut(drive: Drive, zeros: Vector, radius: float) -> Windows:
+def _cut(drive: DriveSamples, zeros: Vector, radius: float) -> Windows:
     width = int(SECONDS * RATE)
     count = len(drive) // width
 

@@ -31,7 +31,7 @@ LEAST_WEIGHT: Final = 0.02  # of the best set's, below which a set is left out
 STRANGE: Final = np.log(1.8)
 """Logarithm of a block's mass over its law's; pressure and running-in, in no law, make half of that."""
 FAR: Final = 4.0  # standard deviations of the others, likewise
-FEWEST: Final = 4  # blocks that must agree
+FEWEST_BLOCKS: Final = 4  # blocks that must agree
 
 
 class Fit(NamedTuple):
@@ -176,7 +176,7 @@ def strangers(regressors: Array, mass: Array, variance: Array) -> list[int]:
     """
     kept = np.arange(len(mass))
     found: list[int] = []
-    while len(kept) > FEWEST and len(found) < len(mass) // FEWEST:
+    while len(kept) > FEWEST_BLOCKS and len(found) < len(mass) // FEWEST_BLOCKS:
         law = fit_law(regressors[kept], mass[kept], variance[kept])
         worst = int(np.argmax(_off(mass[kept], law.left_out)))
         one, others = kept[worst], np.delete(kept, worst)

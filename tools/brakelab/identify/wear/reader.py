@@ -27,12 +27,12 @@ COLUMNS: Final = ("t", "omega", "calliper_pressure", "brake_torque", "disc_tempe
 IN_ORDER: Final = ("t", "calliper_pressure", "brake_torque", "omega", "disc_temperature")
 """As `Columns.contract` has them."""
 POINTS: Final = 6
-FEWEST: Final = 100  # applications of a block; the thesis has 250 and more
+FEWEST_APPLICATIONS: Final = 100  # applications of a block; the thesis has 250 and more
 PRESSED: Final = 1.0  # bar
-SHORTEST: Final = 0.1  # s of an application
+SHORTEST_APPLICATION: Final = 0.1  # s of an application
 SLOPE_S: Final = 0.2  # s to either side, for the slope of the speed
 UNEVEN: Final = 0.3  # mm by which a point may lose more or less than the others, beside what all lose
-HOTTEST: Final = 1100.0  # degC
+HIGHEST_TEMPERATURE: Final = 1100.0  # degC
 SPECIFIC: Final = (2e-3, 20.0)  # g/MJ: linings 0.05 to 1, some tens of times less or more where cold or hot
 
 
@@ -77,8 +77,9 @@ def _block(manifest: Path, line: int, row: dict[str, str], config: Config, axle:
     stops = read_stops(path)
     if stops:
         _check_physics(path, stops, Columns.contract(IN_ORDER, "rad/s", config, axle))
-    if len(stops) < FEWEST:
-        remedy = f"{len(stops)} applications; a block needs {FEWEST} or more to wear what can be measured"
+    if len(stops) < FEWEST_APPLICATIONS:
+        needed = f"a block needs {FEWEST_APPLICATIONS} or more to wear what can be measured"
+        remedy = f"{len(stops)} applications; {needed}"
         raise UserError(str(path), f"block {row['block']}", remedy)
     regressors = np.sum([stop_regressors(stop) for stop in stops], axis=0)
     specific = (before - after) / float(regressors[0])
@@ -138,7 +139,7 @@ def read_stops(path: Path) -> list[dict[str, Array]]:
     stops = [
         {name: column[start:end] for name, column in columns.items()} for start, end in stretches(pressed)
     ]
-    return [stop for stop in stops if stop["t"][-1] - stop["t"][0] >= SHORTEST]
+    return [stop for stop in stops if stop["t"][-1] - stop["t"][0] >= SHORTEST_APPLICATION]
 
 
 def stop_regressors(stop: dict[str, Array]) -> Array:
@@ -155,7 +156,7 @@ def _check_physics(path: Path, stops: list[dict[str, Array]], columns: Columns) 
         if not np.isfinite(everything).all():
             raise UserError(str(path), name, "has gaps while the brake is applied; fill them")
     heat = np.concatenate([stop["disc_temperature"] for stop in stops])
-    check_celsius(path, "disc_temperature", heat, HOTTEST)
+    check_celsius(path, "disc_temperature", heat, HIGHEST_TEMPERATURE)
     applications = [
         Recording(
             stop["t"],

@@ -30,7 +30,7 @@ from brakelab.plant.jit import Record, interprets, kernel
 GROUP: Final = "brakelab.friction_laws"
 ADDRESS: Final = 1
 NUMBERS: Final = 2  # index of the first number in the row
-MOST: Final = ROW - NUMBERS
+MOST_NUMBERS: Final = ROW - NUMBERS
 TRIED: Final = (1.0, 30e5, 5.0, 30.0, 100.0, 1e-3)
 """Inputs after the numbers at which a law must give a friction: 30 bar, 5 m/s, 30 rad/s^2, 100 degC, 1 ms."""
 
@@ -119,8 +119,8 @@ def _checked(code: str, module: ModuleType) -> Code:
     for name, (_, low, high) in numbers.items():
         if not low < high:
             raise ValueError(f"{code}: NUMBERS[{name!r}]: least {low:g} is not below greatest {high:g}")
-    if len(numbers) > MOST:
-        raise ValueError(f"{code}: {len(numbers)} numbers; at most {MOST}")
+    if len(numbers) > MOST_NUMBERS:
+        raise ValueError(f"{code}: {len(numbers)} numbers; at most {MOST_NUMBERS}")
     if not callable(law):
         raise ValueError(f"{code}: has no function step")
     try:

@@ -38,7 +38,7 @@ BRAKE_JERK: Final = 2.0  # m/s^3
 DRIVE_JERK: Final = 1.0  # m/s^3
 STRONGEST_BRAKING: Final = 4.0  # m/s^2
 UNEVEN: Final = 0.025  # of the speed, standard deviation added by traffic while it is held
-STEEPEST: Final = 0.08  # rad
+STEEPEST_GRADE: Final = 0.08  # rad
 SHORTEST_LEG: Final = 60.0  # m
 
 
@@ -228,7 +228,7 @@ def _hills(rng: Generator, parts: list[tuple[float, float]]) -> Array:
         rows.append((place, hilly * rng.standard_normal()))
     table = np.array(rows)
     steps, means = np.diff(table[:, 0]), 0.5 * (table[1:, 1] + table[:-1, 1])
-    table[:, 1] = np.clip(table[:, 1] - steps @ means / table[-1, 0], -STEEPEST, STEEPEST)
+    table[:, 1] = np.clip(table[:, 1] - steps @ means / table[-1, 0], -STEEPEST_GRADE, STEEPEST_GRADE)
     return table
 
 

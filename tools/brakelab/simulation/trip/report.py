@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from brakelab.arrays import Array
-from brakelab.report.drive import Drive
+from brakelab.report.drive import DriveResult
 from brakelab.simulation.trip.table import KMH, RURAL, URBAN, Brakings, Row, distance_driven, trip_rows
 from ecu.contract.signals import CORNERS
 
@@ -105,7 +105,7 @@ def follow_line(t: Array, speed: Array, trip_t: Array, trip_speed: Array) -> str
     )
 
 
-def brake_lines(drive: Drive) -> list[str]:
+def brake_lines(drive: DriveResult) -> list[str]:
     """Return temperature, energy and use of each brake of a drive with `DRIVE_COLUMNS`."""
     power = drive.corners("brake_torque") * np.abs(drive.corners("wheel_speed"))
     energy = np.diff(drive.t) @ (0.5 * (power[1:] + power[:-1])) * 1e-6

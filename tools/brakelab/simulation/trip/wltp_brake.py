@@ -68,7 +68,7 @@ SPEED_SCATTER: Final = 0.45  # of the logarithm of the speed a braking begins wi
 TO_REST: Final = 0.55  # share of the brakings from a trip's slower half of speeds. Assumption
 SLOWED_TO: Final = (0.3, 0.8)  # of the speed, where not to rest. Assumption
 FAST_ROADS: Final = 2.0  # the time that a speed is held grows with its power: fewer brakings. Assumption
-SLOWEST: Final = 15.0 * KMH
+LOWEST_SPEED: Final = 15.0 * KMH
 ACCEL: Final = (0.6, 1.3)  # m/s^2. Assumption
 WAITING: Final = 0.13  # share of a trip's time at rest. Assumption
 LEAST_HELD: Final = 2.0  # s
@@ -122,7 +122,7 @@ class _Plan(NamedTuple):
 
 def _plan(trip: Division, draws: _Draws, level: float, fastest: bool) -> _Plan:
     """Return the trip with speeds of `level` [m/s]; its waits come out as the time that is left."""
-    before = np.clip(level * draws.speed, SLOWEST, TOTALS.fastest)
+    before = np.clip(level * draws.speed, LOWEST_SPEED, TOTALS.fastest)
     if fastest:
         before[np.argmax(draws.speed)] = TOTALS.fastest
     after = draws.left * before
@@ -140,7 +140,7 @@ def _plan(trip: Division, draws: _Draws, level: float, fastest: bool) -> _Plan:
 def _trip_rows(number: int) -> Array:
     """Return the knots of a trip, numbered from 0: time [s] from 0 and speed [m/s], shape (m, 2)."""
     trip, draws, fastest = TRIPS[number], _draws()[number], number == len(TRIPS) - 1
-    low, high = SLOWEST, TOTALS.fastest
+    low, high = LOWEST_SPEED, TOTALS.fastest
     while high - low > 1e-9:  # faster: less time held, more at rest
         level = 0.5 * (low + high)
         less = _plan(trip, draws, level, fastest).wait.sum() < WAITING * trip.seconds

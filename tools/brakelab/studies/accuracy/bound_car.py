@@ -51,7 +51,7 @@ NOISE: Final = np.array([0.1, 0.1, 0.1, 0.1, 0.01, 0.027, 1.8 / 2**0.5, 1.8 / 2*
 """Standard deviations of a window's means (Table 4.1); an axle's pressure is measured twice."""
 
 RUBBING: Final = 1.0  # bar above push-out
-SLOWEST: Final = 3.4  # m/s
+LOWEST_SPEED: Final = 3.4  # m/s
 STEP: Final = 1e-4
 NEAR_PEAK: Final = 0.98
 

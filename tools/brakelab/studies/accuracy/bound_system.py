@@ -12,6 +12,7 @@ from brakelab.studies.accuracy.bound_car import (
     DEGRESSION,
     DRAG,
     FOLLOWING,
+    LOWEST_SPEED,
     MASS,
     MOTOR,
     MU,
@@ -25,7 +26,6 @@ from brakelab.studies.accuracy.bound_car import (
     ROLLING,
     RUBBING,
     SLOPE,
-    SLOWEST,
     SPEED_REFERENCE,
     STIFFNESS,
     TRANSFER,
@@ -122,7 +122,7 @@ def system_of(trajectory: Trajectory, shown: Vector, wander: Wander, car_known: 
     see[:, SPEED_REFERENCE, V] = 1.0
     for axle in range(2):
         see[:, PRESSURE + axle, FOLLOWING + axle] = rubbing[:, axle]
-    see[trajectory.speed < SLOWEST] = 0.0
+    see[trajectory.speed < LOWEST_SPEED] = 0.0
     return System(move, walk, see / NOISE[:, None])
 
 

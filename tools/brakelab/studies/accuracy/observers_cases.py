@@ -302,6 +302,6 @@ EVENTS: Final = {
     "low-grip patch": Case(shipped("low-grip"), change=_unguarded),
 }
 """Drives whose times are reported."""
-LONGEST: Final = {"tyre stiffness × 0.67": 0.10, "low-grip patch": 0.30}
+LONGEST_EFFECT: Final = {"tyre stiffness × 0.67": 0.10, "low-grip patch": 0.30}
 """How long their events may be felt [s]: as in the thesis, read off Figures 4.11 and 5.5."""
 CASES: Final = ACCURACY | ROBUSTNESS | SENSORS | EVENTS

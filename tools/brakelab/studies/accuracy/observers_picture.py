@@ -20,7 +20,7 @@ PICTURED: Final = 5
 CHANNELS: Final = (*(f"test_ratio_{corner}" for corner in CORNERS), "test_ratio_balance")
 EVERY: Final = 10  # cycles
 LEFT, WIDTH, TOP, HEIGHT, GAP = 44.0, 520.0, 24.0, 96.0, 40.0
-SECONDS, LARGEST = 7.0, 2.0  # of the panels' axes
+SECONDS, LARGEST_ERROR = 7.0, 2.0  # of the panels' axes
 BIN, BINS = 0.25, 16
 COLOURS: Final = ("#9aa5b1", "#d55e00")  # cold, adapted
 
@@ -81,7 +81,7 @@ def _frame(title: str, top: float) -> list[str]:
 
 def _error_panel(title: str, axle: int, top: float, cars: list[Consistency]) -> list[str]:
     parts, middle = _frame(title, top), top + 0.5 * HEIGHT
-    scale = 0.5 * HEIGHT / LARGEST
+    scale = 0.5 * HEIGHT / LARGEST_ERROR
     for bound in (-1, 0, 1):
         y = middle - scale * bound
         parts.append(f'<path d="M{LEFT} {y:.1f}h{WIDTH}" stroke="#888" stroke-dasharray="4 4"/>')
@@ -89,7 +89,7 @@ def _error_panel(title: str, axle: int, top: float, cars: list[Consistency]) -> 
     for state, colour in enumerate(COLOURS):
         for car in cars:
             x = LEFT + WIDTH * np.minimum(car.t[state][::EVERY] / SECONDS, 1.0)
-            y_of = middle - scale * np.clip(car.error[state][axle, ::EVERY], -LARGEST, LARGEST)
+            y_of = middle - scale * np.clip(car.error[state][axle, ::EVERY], -LARGEST_ERROR, LARGEST_ERROR)
             points = " ".join(f"{a:.0f},{b:.1f}" for a, b in zip(x, y_of, strict=True))
             parts.append(f'<polyline points="{points}" stroke="{colour}"/>')
     return parts

@@ -10,7 +10,7 @@ from brakelab.studies.accuracy.observers import JOINT, NEVER, Row
 from brakelab.studies.accuracy.observers_cases import (
     ACCURACY,
     EVENTS,
-    LONGEST,
+    LONGEST_EFFECT,
     LOST_IN_GAPS,
     ROBUSTNESS,
     SENSORS,
@@ -229,7 +229,7 @@ def _seconds(figure: Figure) -> str:
 
 def _event_verdict(row: Row, rows: Rows) -> str:
     """Return whether the time is met and the force error half that of Observer 2; "–" without a goal."""
-    longest = LONGEST.get(row.case)
+    longest = LONGEST_EFFECT.get(row.case)
     if longest is None or row.observer != JOINT:
         return "–"
     half = 0.5 * rows[row.case, "observer2", row.adapted].force.median
@@ -243,7 +243,7 @@ def _events(rows: Rows) -> Table:
     for row in rows.values():
         if row.case not in EVENTS:
             continue
-        longest = LONGEST.get(row.case)
+        longest = LONGEST_EFFECT.get(row.case)
         lines.append(
             (
                 f"{row.case}, {row.observer}, {'adapted' if row.adapted else 'cold'}",

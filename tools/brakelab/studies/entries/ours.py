@@ -113,10 +113,10 @@ class RunningAverage:
     linings by configured friction; level road, no zero errors. The average starts with one scale of 1.
     """
 
-    LEAST: Final = 0.05
+    LEAST_FORCE: Final = 0.05
     """Of the car's weight that the linings must take."""
-    SLOWEST: Final = 15.0 / 3.6  # m/s
-    SHORTEST: Final = 50  # samples of the accelerometer
+    LOWEST_SPEED: Final = 15.0 / 3.6  # m/s
+    FEWEST_SAMPLES: Final = 50  # samples of the accelerometer
 
     def reset(self, config: Config) -> None:
         """Begin with one scale of 1."""
@@ -136,7 +136,7 @@ class RunningAverage:
         lever = 2.0 * car["piston_area"] * car["effective_radius"] / car["wheel_radius"]
         linings = float((lever * car["mu_nominal"] * acts).sum())
         speed = float((speeds * car["wheel_radius"]).mean())
-        if linings > self.LEAST * GRAVITY * car["mass"] and speed > self.SLOWEST:
+        if linings > self.LEAST_FORCE * GRAVITY * car["mass"] and speed > self.LOWEST_SPEED:
             if not np.isnan(inputs.accel_x):
                 rest = float((motors / car["wheel_radius"]).sum()) + car["drag_area"] * speed**2
                 rest += car["rolling_resistance"] * GRAVITY * car["mass"]
@@ -145,7 +145,7 @@ class RunningAverage:
                 self._linings += linings
                 self._samples += 1
         elif self._samples:
-            if self._samples >= self.SHORTEST:
+            if self._samples >= self.FEWEST_SAMPLES:
                 self._sum, self._count = self._sum + self._force / self._linings, self._count + 1
             self._force, self._linings, self._samples = 0.0, 0.0, 0
         return self._sum / self._count * car["mu_nominal"], self._sigma

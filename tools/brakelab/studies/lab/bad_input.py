@@ -1,4 +1,4 @@
-"""Answers to wrong recordings: files are spoilt in the usual ways and given to the reader."""
+"""Answers to wrong recordings: files are spoilt by the usual mistakes and given to the reader."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -34,10 +34,10 @@ CARS: Final = 8
 BRAKINGS: Final = 6  # of each kind
 KINDS: Final = "ABCD"
 CRUISE: Final = 12.0  # s before each braking
-SLOWEST: Final = 40.0 / 3.6  # m/s, at the start of a braking
-FASTEST: Final = 130.0 / 3.6
-SOFTEST: Final = 0.5  # m/s^2
-HARDEST: Final = 3.5
+LOWEST_SPEED: Final = 40.0 / 3.6  # m/s, at the start of a braking
+HIGHEST_SPEED: Final = 130.0 / 3.6
+LEAST_DECEL: Final = 0.5  # m/s^2
+GREATEST_DECEL: Final = 3.5
 
 
 AS_DRAWN: Final = "as drawn"
@@ -70,9 +70,9 @@ def trip_of_kinds(seed: int) -> tuple[Scenario, str]:
     kinds = "".join(random.permutation(list(KINDS * BRAKINGS)))
     phases = []
     for kind in kinds:
-        low, high = (SLOWEST, LOW) if kind in "AC" else (HIGH, FASTEST)
+        low, high = (LOWEST_SPEED, LOW) if kind in "AC" else (HIGH, HIGHEST_SPEED)
         speed = float(random.uniform(low, high))
-        soft, hard = (MILD, HARDEST) if kind in "AB" else (SOFTEST, GENTLE)
+        soft, hard = (MILD, GREATEST_DECEL) if kind in "AB" else (LEAST_DECEL, GENTLE)
         end = speed * float(random.uniform(0.4, 0.7))
         phases.append(Phase(kind="cruise", speed=speed, seconds=CRUISE))
         phases.append(Phase(kind="brake", decel=float(random.uniform(soft, hard)), until_speed=end))

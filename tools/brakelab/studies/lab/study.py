@@ -74,7 +74,7 @@ Drawn by `brake-ecu bench lab`.
 
 Figure 3.3. The thesis: friction rises with pressure, shows no clear effect of speed, rises with temperature
 to a critical one and falls. Here pressure counts half as much, on C not at all (in the print least on C);
-speed raises it a little, since a longer way grows more plateaus; the fall begins at 200 °C on C, beyond the
+speed raises it a little, since a longer slide grows more plateaus; the fall begins at 200 °C on C, beyond the
 cycle on A and B. The thesis's points scatter more.
 
 ![Mean friction over temperature and pressure, a map for each initial speed](images/lab-surface.svg)

@@ -13,7 +13,7 @@ from numpy.random import Generator
 
 from brakelab.arrays import Array
 from brakelab.identify.thermal.model import ROW
-from brakelab.identify.thermal.reader import USED, Drive, as_drive
+from brakelab.identify.thermal.reader import USED, ThermalLog, as_drive
 from brakelab.logs.physics.samples import KEPT
 from brakelab.plant.disc_nodes import heat_discs, nodes_like, wind
 from brakelab.simulation.closed_loop import Loop, new_loop, run_blocks
@@ -38,7 +38,7 @@ RESOLUTION: Final = 0.1  # K
 WEATHER: Final = (("dry", "lively", 18.0, 0.0), ("rain", "usual", 9.0, 1.0))
 """Name, driver, air [degC] and wetness of a trip to identify by."""
 BEYOND_TOWN: Final = 0.4
-LONGEST: Final = 10_000.0  # s
+LONGEST_DRIVE: Final = 10_000.0  # s
 
 
 class Measured(NamedTuple):
@@ -57,7 +57,7 @@ class Measured(NamedTuple):
     inputs: Array
     """All inputs as decoded, shape (n, N_INPUTS); without rows if not wanted."""
 
-    def drive(self, name: str, air: float) -> Drive:
+    def drive(self, name: str, air: float) -> ThermalLog:
         """Return it as read from a log."""
         return as_drive(Path(name), self.outputs, self.samples, air)
 
@@ -88,10 +88,10 @@ def measured_trip(seed: int, driver: str, air: float, wetness: float, from_share
     trip = trip_scenario(seed, driver)
     assert trip.trace is not None
     assert trip.trace.speed is not None
-    way, grade = np.array(trip.trace.speed), np.array(trip.grade)
-    stops = way[(way[:, 1] == 0.0) & (way[:, 0] <= from_share * way[-1, 0]), 0]
+    speeds, grade = np.array(trip.trace.speed), np.array(trip.grade)
+    stops = speeds[(speeds[:, 1] == 0.0) & (speeds[:, 0] <= from_share * speeds[-1, 0]), 0]
     begin = float(stops[-1])
-    speed = way[way[:, 0] >= begin] - (begin, 0.0)
+    speed = speeds[speeds[:, 0] >= begin] - (begin, 0.0)
     slope = np.column_stack([grade[:, 0] - begin, grade[:, 1]])
     slope = np.vstack([(0.0, np.interp(0.0, *slope.T)), slope[slope[:, 0] > 0.0]])
     changed = {
@@ -162,7 +162,7 @@ def write_log(path: Path, driven: Measured) -> None:
     write_columns(path, 0.01 * np.arange(len(driven.inputs), dtype=np.float64), columns, {})
 
 
-def write_drives(folder: Path, seed: int, seconds: float = LONGEST) -> list[Path]:
+def write_drives(folder: Path, seed: int, seconds: float = LONGEST_DRIVE) -> list[Path]:
     """Write a dry and a rainy trip of the SUV of a seed as `dry.parquet` and `rain.parquet`; return them."""
     config = load_config(resource("config/suv.toml"))
     paths = []

@@ -14,7 +14,7 @@ from brakelab.identify.thermal.command import AXLES, judge_axle, with_fits
 from brakelab.identify.thermal.fit import Disc
 from brakelab.identify.thermal.model import Cooling, respond
 from brakelab.identify.thermal.page import Judged
-from brakelab.identify.thermal.reader import Drive
+from brakelab.identify.thermal.reader import ThermalLog
 from brakelab.identify.thermal.result import start_of
 from brakelab.simulation.closed_loop import new_loop
 from brakelab.studies.thermal.drives import BEYOND_TOWN, Measured, drive_measured, measured_trip
@@ -105,7 +105,7 @@ def _go(
     return driven, loop.sides.state["learned"].copy()
 
 
-def _cold(drive: Drive, config: Config) -> Array:
+def _cold(drive: ThermalLog, config: Config) -> Array:
     """Return temperatures [degC] of a configuration from a cold start by the ECU's power, shape (n, 4)."""
     series = drive.series
     found = []
@@ -166,7 +166,7 @@ def drive_car(seed: int) -> Car:
     return Car(seed, axles, trips, plotted, unknown)
 
 
-def _decay(rate: Cooling, drive: Drive, excess: float) -> NDArray[np.float64]:
+def _decay(rate: Cooling, drive: ThermalLog, excess: float) -> NDArray[np.float64]:
     """Return the remainder of a wrong start of `excess` [K], shape (n,)."""
     series = drive.series
     _, decay = respond(rate.rate(series.speed, series.wet), series.power[:, 0])

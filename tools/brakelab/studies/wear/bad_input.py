@@ -1,4 +1,4 @@
-"""Answers to wrong blocks, trips and drives: files are spoilt in the usual ways and given."""
+"""Answers to wrong blocks, trips and drives: files are spoilt by the usual mistakes and given."""
 
 import csv
 import shutil

@@ -21,7 +21,7 @@ from brakelab.plant.friction.law import START
 from brakelab.plant.friction.laws import friction
 from brakelab.plant.records import RecordArray
 from brakelab.plant.wear import running_in, wear_rate
-from brakelab.plant.wear_rig import AIR, FAN, RAMP, SLOWEST
+from brakelab.plant.wear_rig import AIR, FAN, LOWEST_SPEED, RAMP
 
 STEP: Final = 5e-3  # s
 COARSE: Final = 0.5  # s, while nothing brakes
@@ -97,7 +97,7 @@ def run_stops(
         air = 1.0 if references is None else FAN
         resists = references is None
         energy, seconds, warm, lost, after = _stop(
-            corner, (first, max(last, SLOWEST), decel), air, resists, worn, heat
+            corner, (first, max(last, LOWEST_SPEED), decel), air, resists, worn, heat
         )
         done[k] = energy, seconds, heat, warm, lost, waited
         worn, heat = worn + lost, after

@@ -24,7 +24,7 @@ from ecu.settings.resources import resource
 DRIVERS: Final = {"calm": (0.95, 1.10, 5.0), "usual": (1.0, 1.0, 18.0), "lively": (1.08, 0.82, 30.0)}
 """Factors on speed and on time; ambient temperature [degC]."""
 PARTS: Final = {"town": 0.335, "country": 0.715, "motorway": np.inf}
-"""Share of the trip's way at which it ends."""
+"""Share of the trip's distance at which it ends."""
 EVERY: Final = 2  # thinning of the generated trip for the scenario's trace, in samples
 GRADE_EVERY: Final = 50
 
@@ -86,7 +86,7 @@ def _true_mass(outputs: Array, truth: Array, law: Array) -> Array:
 class _Kept(NamedTuple):
     """Sums so far: distance [m], wear [g], regressors and their errors."""
 
-    way: float
+    distance: float
     worn: Array
     regressors: Array
     friction_error: Array
@@ -103,7 +103,7 @@ def _part(driver: str, road: str, before: _Kept, after: _Kept) -> Part:
     return Part(
         driver,
         road,
-        after.way - before.way,
+        after.distance - before.distance,
         after.worn - before.worn,
         after.regressors - before.regressors,
         after.friction_error - before.friction_error,
@@ -125,8 +125,8 @@ def drive_car(seed: int) -> CarDrives:
             car["wear_scale"] = lot["wear_scale"]
         if learned is not None:
             loop.sides.state[:] = new_state(loop.sides.params, learned)
-        way = np.array(scenario.trace.speed if scenario.trace else [])
-        length = float(np.trapezoid(way[:, 1], way[:, 0]))
+        trace = np.array(scenario.trace.speed if scenario.trace else [])
+        length = float(np.trapezoid(trace[:, 1], trace[:, 0]))
         first = before = _kept(loop)
         true, ends = np.zeros(4), iter(PARTS.items())
         road, end = next(ends)

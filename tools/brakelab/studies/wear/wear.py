@@ -167,7 +167,7 @@ def wear_tables(cars: list[CarDrives], laws: dict[str, Law], lives: list[Life]) 
             ("law", "coefficients (95 % confidence)", "R² of the blocks", "spread given [%]"),
             _law_rows(laws),
             "Eight blocks of 300 applications; units as Table 7.1, disc in degC. Spread: blocks left out, "
-            "and 10 % for the way to the road.",
+            "and 10 % for the transfer to the road.",
         ),
     ]  # fmt: skip
 
