@@ -5,7 +5,6 @@ import os
 import re
 import subprocess
 import sys
-import tokenize
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -287,19 +286,3 @@ def test_the_glossary_names_what_the_code_has() -> None:
     words = {word for path in SOURCES for word in re.findall(r"\w+", path.read_text("utf-8"))}
     assert len(names) > 50
     assert names <= words, f"renamed or gone: {sorted(names - words)}"
-
-
-RETIRED = {
-    "course": "series (of samples), trajectory (of states); the angle of ISO 8855, in steering.py, is one"
-}
-
-
-def test_no_name_is_a_retired_word() -> None:
-    for path in SOURCES:
-        with path.open("rb") as source:
-            names = {
-                token.string for token in tokenize.tokenize(source.readline) if token.type == tokenize.NAME
-            }
-        words = {word.removesuffix("s") for name in names for word in name.lower().split("_")}
-        for word in RETIRED.keys() & words:
-            assert path.name == "steering.py", f"{path}: {word}; say {RETIRED[word]}"

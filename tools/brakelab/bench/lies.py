@@ -14,7 +14,7 @@ TEXT: Final = (
     "motors over that of the same car without the lie, at the same time in the same braking, above "
     f"{lies_cell.LOWEST_SPEED:g} m/s. What it falls below for {lies_cell.SHORT_S:g} s is the most that the "
     f"lie takes; a lie costs where it is off by more than {100 * lies_cell.COSTS:g} % for "
-    f"{lies_cell.LONG_S:g} s, and is reported in time where the bit of its own input comes no later than 2 s "
+    f"{lies_cell.LONG_S:g} s, and is told in time where the bit of its own input comes no later than 2 s "
     "after the begin of that. Where a lie is worst, the friction that the ECU believes over the true one, "
     "and the motors' demand, are compared with the sound car's at the same time of that braking; faults are "
     "those that only the lie brings. Cars of the wide draw: lies by car 1, sound cars by the number in the "

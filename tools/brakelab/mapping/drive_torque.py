@@ -1,6 +1,6 @@
 """The powertrain's torque at the wheels as motor torque of the driven ones.
 
-A car that has one tells what engine drag and down-shifts do while it brakes; without it they are taken for
+A car that has one shows what engine drag and down-shifts do while it brakes; without it they are taken for
 friction. The driven axle is the one whose wheels turn faster the more torque there is; positive motor torque
 brakes, a powertrain's drives.
 """

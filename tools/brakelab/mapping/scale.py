@@ -1,4 +1,4 @@
-"""Factor of a signal by its slope over what it should read: sign, and scale where no unit tells it."""
+"""Factor of a signal by its slope over what it should read: sign, and scale where no unit states it."""
 
 import math
 from typing import Final, NamedTuple

@@ -102,7 +102,7 @@ def read_series(blocks: Iterable[RecordArray], database: Database) -> list[Serie
 def with_signs(series: list[Series]) -> list[Series]:
     """Return the series of one message that may be magnitudes, with each flag that may be their sign.
 
-    A magnitude passes through zero where its sign turns; which flag is the sign, motion tells.
+    A magnitude passes through zero where its sign turns; which flag is the sign, motion shows.
     """
     flags = [one for one in series if one.flag and set(np.unique(one.value)) == {0.0, 1.0}]
     found = []

@@ -1,6 +1,6 @@
 """Road by distance: friction and height under each side, grade and bank.
 
-Friction tells left from right, so that a table describes a patch, a change of surface or a split road (dry
+Friction has a left and a right value: a table describes a patch, a change of surface or a split road (dry
 about 1.2, wet 0.7, ice 0.2). Each axle meets a place when it reaches it: the front axle is `front_length`
 ahead of the centre of gravity.
 """

@@ -25,7 +25,7 @@ LEAST_SPEED: Final = 5.0 / 3.6
 LEAST_SECONDS: Final = 0.3
 """Of observation in a braking that counts."""
 RECOVERED: Final = 3
-"""Brakings after the hot ones that tell the recovery."""
+"""Brakings after the hot ones that show the recovery."""
 
 
 class Observed(NamedTuple):

@@ -72,7 +72,7 @@ def _lines(drive: DriveResult, truth: DriveResult | None) -> dict[str, Vector]:
         lines[f"slip_{corner}"] = 100.0 * slip
         lines[f"speed_{corner}"] = road_speed(drive.column(f"wheel_speed_{corner}"), speed * (1.0 + slip))
         if truth is not None:
-            # Standing and creeping wheels slip by anything; the ECU tells none there.
+            # Standing and creeping wheels slip by anything; the ECU reports none there.
             true = np.where(np.isfinite(slip), truth.column(f"slip_{corner}"), np.nan)
             lines[f"slip_true_{corner}"] = 100.0 * true
     motors = drive.corners("motor_torque")

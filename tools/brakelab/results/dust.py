@@ -36,7 +36,7 @@ def airborne_mass(worn: Corners, error: Corners, params: RecordArray) -> tuple[C
     """Return the airborne mass of `worn` [g] and its 95 % band [mg], shapes (4,).
 
     `error`: relative standard deviation of the wear. The share in the air is anything within its bounds: no
-    signal of a car tells it.
+    signal of a car shows it.
     """
     p = params[0]
     worn = np.maximum(worn, 0.0)

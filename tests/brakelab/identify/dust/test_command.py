@@ -137,7 +137,7 @@ def test_what_is_wrong_is_one_line_that_names_file_and_place(trips, spoil, said)
 def test_trips_that_do_not_count_alike_are_no_model(trips):
     """One of four counted three hundredfold: exit 1, and what each counted per work."""
     column("particle_concentration", lambda x: 300.0 * x)(trips)
-    with pytest.raises(RunFault, match=r"no model tells these trips: .* trip 1 \S+ 1/MJ, trip 2 "):
+    with pytest.raises(RunFault, match=r"no model predicts these trips: .* trip 1 \S+ 1/MJ, trip 2 "):
         identify_dust(trips / "manifest.csv", CONFIG, "front", trips / "car.toml")
     assert not (trips / "car.toml").exists()
 

@@ -32,7 +32,7 @@ def test_fitted_keys_are_written_and_the_rest_is_start(tmp_path):
     assert car.control == start.control
     assert "mass = 1990 # kg, ± 20; motor torque; 300 half seconds; was 2105" in text
     assert "slip_stiffness = 24.5 # ± 2, rough" in text
-    assert "# rear.mu_nominal = 0.45 -: brakings would tell it" in text
+    assert "# rear.mu_nominal = 0.45 -: needs brakings" in text
 
 
 def test_a_start_that_includes_another_is_written_out(tmp_path):

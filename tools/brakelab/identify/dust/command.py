@@ -15,7 +15,7 @@ from ecu.errors import RunFault
 from ecu.output import give, wrote
 
 LOST: Final = 1.0
-"""Relative error of the particles of trips left out, from which on a model tells nothing."""
+"""Relative error of the particles of trips left out, from which on a model predicts nothing."""
 
 
 def _numbers(values: Array) -> str:
@@ -61,7 +61,7 @@ def identify_dust(manifest: Path, config: Path, axle: str, out: Path) -> int:
     chosen = choose(judged)
     if chosen.left_out_sum > LOST:
         raise RunFault(
-            f"{manifest}: no model tells these trips: left out, missed by "
+            f"{manifest}: no model predicts these trips: left out, missed by "
             f"{100 * chosen.left_out_sum:.0f} % RMS; check that all count in the same unit and "
             f"dilution: {_per_megajoule(trained)}"
         )

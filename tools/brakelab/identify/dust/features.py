@@ -144,7 +144,7 @@ def find_background(trip: Recorded, applications: list[tuple[int, int]]) -> Back
             counts.append(np.count_nonzero(inside))
     if not speeds:
         remedy = (
-            f"no steady driving {CLEAR_S:.0f} s after a braking, so nothing tells the background; "
+            f"no steady driving {CLEAR_S:.0f} s after a braking, so nothing shows the background; "
             "give trips that have some"
         )
         raise UserError(f"trip {trip.name}", "vehicle_speed", remedy)
@@ -164,7 +164,7 @@ def find_background(trip: Recorded, applications: list[tuple[int, int]]) -> Back
 def transport_time(trip: Recorded) -> float:
     """Return the transport delay [s] with which the counter follows the friction power best.
 
-    Of the power counts what the speed does not tell: the background grows with that.
+    Of the power counts what the speed does not explain: the background grows with that.
 
     Raises:
         UserError: it follows it at no delay that is sought.

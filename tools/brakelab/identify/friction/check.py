@@ -161,7 +161,7 @@ def refuse_nonsense(recording: Recording, columns: Columns, where: str) -> Numbe
 
 
 def likeliest(numbers: Numbers, columns: Columns, given: float = GIVEN) -> Mistake | None:
-    """Return the mistake that the three numbers tell, None if they make sense.
+    """Return the mistake that the three numbers show, None if they make sense.
 
     `given`: standard deviation of the logarithm of a number that `columns` gives.
     """

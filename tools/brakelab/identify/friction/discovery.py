@@ -5,7 +5,7 @@ Model. mu_b = kappa alpha, alpha 1 at the start of an application,
     kappa = sum k_j g_j(T, p, v),    alpha' = sum w_i f_i(p, v, T, |omega'|, mu, alpha)
 
 g and f come from a library; every f is normalised by the root mean square of its integral over a stop and
-every g by its own, so that a coefficient tells how much its term moves friction (C.1). |omega'| is p mu, as
+every g by its own, so that a coefficient shows how much its term moves friction (C.1). |omega'| is p mu, as
 on a flywheel: the measured slowing over the measured pressure is the measured friction, which a term that
 follows it fast would only copy, noise and all. T in K.
 

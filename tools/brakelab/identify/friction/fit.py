@@ -65,7 +65,7 @@ class Fitted(NamedTuple):
         return self.candidate.values(self.shares)
 
     def unidentified(self) -> list[str]:
-        """Return the names of numbers that the stops do not tell: on a bound, or within a wide interval."""
+        """Return the names of numbers that the stops do not identify: on a bound, or in a wide interval."""
         named = []
         for free, value, half, bound in zip(
             self.candidate.free, self.values, self.half, self.at_bound, strict=True

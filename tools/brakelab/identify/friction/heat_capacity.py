@@ -43,7 +43,7 @@ class HeatCapacity(NamedTuple):
 
 
 def heat_capacity(stops: Stops, columns: Columns) -> HeatCapacity:
-    """Return the heat capacity that the stops tell."""
+    """Return the heat capacity by the stops."""
     disc, radius = columns.disc, columns.brake.effective_radius
     to_car = columns.brake.tyre_radius / radius
     energy, last, shown, mean = [], [], [], []

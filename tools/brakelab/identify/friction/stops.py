@@ -192,7 +192,7 @@ def _is_stop(recording: Recording, run: tuple[int, int], dt: float) -> bool:
 
 
 def _inertia(recording: Recording, run: tuple[int, int]) -> float:
-    """Return the inertia [kg m^2] that the torque impulse over the loss of speed tells."""
+    """Return the inertia [kg m^2] by the torque impulse over the loss of speed."""
     few = 5
     begin, end = run
     first, last = slice(begin, begin + few), slice(end - few, end)

@@ -1,4 +1,4 @@
-"""Logs that cannot tell the temperature model of a disc: each refused with one line."""
+"""Logs that cannot identify the temperature model of a disc: each refused with one line."""
 
 from typing import Final
 

@@ -59,7 +59,7 @@ def identify_thermal(logs: Sequence[Path], config: Path, map: Path | None, out: 
     """Identify the disc temperature model of a car; write `out`, `out`.md and `out`.svg, return 0.
 
     Raises:
-        UserError: an argument or a log is invalid, or the logs tell nothing.
+        UserError: an argument or a log is invalid, or the logs identify nothing.
     """
     vehicle = load_config(config)
     written = out, page, _ = out, out.with_suffix(".md"), out.with_suffix(".svg")

@@ -18,7 +18,7 @@ def identify_vehicle(drives: Sequence[Path], config: Path, map: Path | None, clo
     """Identify the car of `drives`; write `out`, a page and, with a `map`, that without zeros. Return 0.
 
     Raises:
-        UserError: an argument or a file is not right, or the drives tell nothing.
+        UserError: an argument or a file is not right, or the drives identify nothing.
     """
     start = load_config(config)
     page, own_map = out.with_suffix(".md"), out.with_name(f"{out.stem}-map.toml")

@@ -36,7 +36,7 @@ def head_of(parameters: Sequence[Parameter], start: str, drives: Sequence[str]) 
     lines = [f"# Identified by `brake-ecu identify vehicle` from {', '.join(drives)}; ± is 1 σ."]
     if left := [one for one in parameters if one.remedy]:
         lines += [f"# Not identified, {start}'s value:"]
-        lines += [f"# {one.key} = {one.start:.4g} {one.unit}: {one.remedy} would tell it" for one in left]
+        lines += [f"# {one.key} = {one.start:.4g} {one.unit}: needs {one.remedy}" for one in left]
     return "\n".join(lines)
 
 

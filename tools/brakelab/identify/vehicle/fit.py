@@ -9,7 +9,7 @@ Each Jacobian is an instrument for the other: E[J_1' n_0] = 0 although both regr
 are not attenuated as those of least squares are. Weights: residuals beyond three robust standard deviations
 of their kind count less (Huber); a kind whose residuals are correlated within a manoeuvre counts as fewer
 (its design effect). The covariance is the sandwich over manoeuvres, plus what the priors leave. A manoeuvre
-that tells much of a parameter pulls it towards its own errors, so that its residuals are too small: its score
+that shows much of a parameter pulls it towards its own errors, so that its residuals are too small: its score
 is taken as it would be had the manoeuvre not been in the fit (the jackknife's correction, CR3),
 
     s_g -> (1 - A_g M^-1)^-1 s_g          A_g = J_g' W J_g, M: the matrix above

@@ -25,8 +25,8 @@ from ecu.settings.config import torque_per_bar
 
 GENTLE: Final = 0.6  # of the weight: no stronger braking is used
 COASTING: Final = 0.3  # m/s^2, where a drive that nobody reports pulls or drags little
-UNBRAKED: Final = -0.45  # m/s^2, above: hardly a brake acts, where no pressure tells it
-KNOWN_TORQUE: Final = 0.1  # relative, of motor torque that tells mass
+UNBRAKED: Final = -0.45  # m/s^2, above: hardly a brake acts, where no pressure shows it
+KNOWN_TORQUE: Final = 0.1  # relative, of motor torque that identifies mass
 
 
 class Place(IntEnum):

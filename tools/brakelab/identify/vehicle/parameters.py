@@ -48,7 +48,7 @@ class Parameter(NamedTuple):
     source: str
     """Where the value comes from."""
     remedy: str
-    """What would tell it, where the drive does not; else empty."""
+    """What would identify it, where the drive does not; else empty."""
 
     @property
     def doubt(self) -> str:
@@ -61,7 +61,7 @@ class _Kind(NamedTuple):
     unit: str
     of: Callable[[Vector], float]
     kinds: tuple[int, ...]
-    """Of residuals that tell it."""
+    """Of residuals that show it."""
     source: str
     remedy: str
 

@@ -88,7 +88,7 @@ def read_drives(paths: Sequence[Path], params: RecordArray, map: Path | None) ->
     """Read logs or files of decoded signals; `params` is one `PARAMS` of START.
 
     Raises:
-        UserError: a log or `map` is not right, or a drive cannot tell anything: wheels missing, standing,
+        UserError: a log or `map` is not right, or a drive identifies nothing: wheels missing, standing,
             too short, or an input that physics says is another one.
     """
     source, drives = announced(load_source(map)), []

@@ -1,4 +1,4 @@
-"""Everything that drives tell of a car, from windows to parameters: forces, wheels, sensors in turn.
+"""Everything that drives show of a car, from windows to parameters: forces, wheels, sensors in turn.
 
 Kinematics (dive, zero of the accelerometer, deflection of the tyres) need the wheels' slip, forces need the
 kinematics: three rounds, each with the other's result as its prior.
@@ -51,7 +51,7 @@ class Zeros(NamedTuple):
 
 
 class Identified(NamedTuple):
-    """What drives tell of a car."""
+    """What drives show of a car."""
 
     signals: Signals
     prior: Prior
@@ -66,7 +66,7 @@ class Identified(NamedTuple):
 
 
 def identify(drives: Sequence[DriveSamples], start: RecordArray, closed: bool) -> Identified:
-    """Return what `drives` tell of the car that `start`, `PARAMS` of shape (1,), describes about.
+    """Return what `drives` show of the car that `start`, `PARAMS` of shape (1,), describes about.
 
     `closed`: each drive ends at the height where it began.
 

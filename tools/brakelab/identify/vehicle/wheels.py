@@ -25,7 +25,7 @@ LARGEST_LATERAL: Final = 4.0  # m/s^2 across
 
 
 class Pairs(NamedTuple):
-    """What left and right wheels tell; without curves the prior."""
+    """What left and right wheels show; without curves the prior."""
 
     track: tuple[float, float]
     """m, and its standard deviation; likewise the others."""

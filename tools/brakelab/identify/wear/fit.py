@@ -3,7 +3,7 @@
 Every column is scaled to 1, every block weighted by its standard deviation: that of the measurement and a
 share of its mass, the scatter unexplained by any law, estimated with it. All sets of terms admitted by the
 rank of the scaled regressors are tried, and each is judged by the blocks that it did not see. The law is the
-mean of all sets, each by its likelihood of the blocks left out, (error)^-n: few blocks do not tell one set,
+mean of all sets, each by its likelihood of the blocks left out, (error)^-n: few blocks do not select one set,
 and a law chosen as if they did is wrong by what was left out of it. Confidence: parametric bootstrap, the set
 drawn anew every time.
 """
@@ -47,7 +47,7 @@ class Fit(NamedTuple):
     """g, each block by the law of the others; shape (n,)."""
     elsewhere: float
     """Relative standard deviation of the wear at discs `ELSEWHERE` hotter or cooler than the blocks', by the
-    sets that tell the blocks as well as each other."""
+    sets that predict the blocks as well as each other."""
     scatter: float
     """Relative standard deviation that is not the measurement's."""
     r2: float
@@ -195,13 +195,13 @@ def _off(mass: Array, predicted: Array) -> Array:
 
 
 def _amid(regressors: Array, one: int, others: NDArray[np.int64]) -> bool:
-    """Return whether the mean temperature of a block lies among those of the others, so that they tell it."""
+    """Return whether the mean temperature of a block lies among those of the others: they predict it."""
     heat = regressors[:, 1] / regressors[:, 0]
     return bool(heat[others].min() <= heat[one] <= heat[others].max())
 
 
 def explains(fit: Fit, mass: Array) -> bool:
-    """Return whether the law tells blocks left out within 30 %, or any better than their mean does."""
+    """Return whether the law predicts blocks left out within 30 %, or any better than their mean does."""
     return fit.r2 > 0.0 or leave_one_out(fit, mass) < 0.3
 
 

@@ -33,7 +33,7 @@ class Fused(NamedTuple):
 def disagreeing(wear: NDArray[np.float64], mass: NDArray[np.float64]) -> list[tuple[int, float]]:
     """Return the blocks of which balance and thickness cannot both be right, and the mass by thickness [g].
 
-    `wear` [mm], NaN where not measured, and `mass` [g], shape (n,); three or more tell what is usual.
+    `wear` [mm], NaN where not measured, and `mass` [g], shape (n,); three or more show what is usual.
     """
     known = np.flatnonzero(np.isfinite(wear))
     if len(known) < 3:

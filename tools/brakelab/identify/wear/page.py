@@ -147,8 +147,8 @@ def tables(blocks: list[Block], fused: Fused, fit: Fit, static: Fit) -> list[Tab
             "Law",
             ("term", "unit", "value", "95 % confidence"),
             coefficients,
-            "Of both pads of a calliper, disc in degC; the mean of all sets of terms by how they tell blocks "
-            "left out, the choice is in the confidence. At discs 50 K hotter or cooler it is sure to "
+            "Of both pads of a calliper, disc in degC; the mean of all sets of terms by how they predict "
+            "blocks left out, the choice is in the confidence. At discs 50 K hotter or cooler it is sure to "
             f"{100 * fit.elsewhere:.0f} % (σ).",
         ),
         Table(

@@ -46,7 +46,7 @@ from ecu.settings.config import new_params
 CARS: Final = 10
 CASES: Final = ("stop #1", "1 m/s²", "blending 0.4")
 UNKNOWN: Final = 1e3
-"""A standard deviation that tells nothing."""
+"""A standard deviation without information."""
 
 
 class Ablation(NamedTuple):
@@ -59,7 +59,7 @@ class Ablation(NamedTuple):
     worthless: str = ""
     """A standard deviation of `PARAMS`."""
     shadow: bool = False
-    """The demand tells nothing of the pressure."""
+    """The demand shows nothing of the pressure."""
     forgotten: tuple[int, ...] = ()
     """States that the case begins without."""
     linings: bool = False

@@ -200,7 +200,7 @@ def recorded_table(cars: Iterable[list[Recorded]]) -> Table:
         "true friction at its true pressures. Prediction: of the specific force, beside the same with the "
         "configured friction, a running average of the ratio that starts there, and one scale chosen "
         "afterwards. Goals: medians of brake force and prediction. Inside 2σ: friction of each corner, of "
-        "which proportional pressures hardly tell more than the sum.",
+        "which proportional pressures hardly show more than the sum.",
     )
 
 

@@ -154,7 +154,7 @@ def beside_truth(seed: int) -> tuple[list[Beside], Config]:
     """Drive one car and identify it; return its keys and the CONFIG that results."""
     start = start_of(seed)
     suv, driven = load_config(resource("config/suv.toml")), DRIVEN
-    for _ in range(2):  # the first drive tells how far it is
+    for _ in range(2):  # the first drive shows how far it is
         loop = new_loop(_on_own_road(shipped("identify"), seed, driven), suv, seed)
         car, sensors = loop.sides.vehicle.params[0].copy(), loop.sides.vehicle.sensors.copy()
         drive = run(loop)

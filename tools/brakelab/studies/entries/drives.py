@@ -141,6 +141,6 @@ def real_drive(car: str, log: Path) -> RealDrive:
     counting = [row for row in book.rows[:: len(CORNERS)] if not row.left_out and row.t_start > 0.0]
     if not counting:
         raise UserError(
-            "--drive", str(log), f"no braking of {car} to predict; `map check` tells what is heard"
+            "--drive", str(log), f"no braking of {car} to predict; `map check` shows what is received"
         )
     return RealDrive(track, results, params, counting)

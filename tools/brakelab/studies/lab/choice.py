@@ -84,7 +84,7 @@ def choice_table(found: list[Choice]) -> Table:
         f"Better than every single law of the thesis on {better} of {len(found)}, "
         f"worse than the constant on {worse}. The goal, two of three brakes and never worse than the "
         f"constant, is met on {whole} of {len(SEEDS)} sets of three. In hindsight: the least error of all "
-        "laws, which CPC alone does not tell."
+        "laws, which CPC alone does not show."
     )
     columns = ("pad", "chosen", "best of the others", "constant", "best in hindsight")
     return Table("The choice on pads it was not made on", columns, rows, below)

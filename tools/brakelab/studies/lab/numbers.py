@@ -91,7 +91,7 @@ def _ostermeyer(lab: Lab) -> Table:
     unsure = {b: ", ".join(_law(lab, b, "ostermeyer").unidentified) or "none" for b in BRAKES}
     below = (
         "SI units, temperature in K. Settled, within 1 / (p_1 p_2), the law is p_3 T / (p_2 + power of the "
-        "normal force): p_1 is gone, and p_2 shows only where that power comes near it, so stops tell p_3 / "
+        "normal force): p_1 is gone, and p_2 shows only where that power comes near it, so stops show p_3 / "
         f"p_2. Not identified: {'; '.join(f'{b} {names}' for b, names in unsure.items())}."
     )
     columns = ("number", *(f"{b}{what}" for b in BRAKES for what in (", thesis", "")))

@@ -119,7 +119,7 @@ def thermal_tables(cars: Sequence[Car]) -> list[Table]:
             ("axle", "RMSE, night known [K]", "unknown [K]"),
             rest,
             "Dry trips, whole, median (worst). Unknown: the discs begin half as hot as the last trip left "
-            "them at most, which is how the ECU starts when no clock tells how long it rested (a replay, or "
+            "them at most, which is how the ECU starts when no clock shows how long it rested (a replay, or "
             "a daemon whose clock was not set).",
         ),
     ]  # fmt: skip
