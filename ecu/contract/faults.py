@@ -75,9 +75,9 @@ _CONTRADICTED: Final = (
     ("vehicle_speed", "contradicts the wheels and the acceleration: it is left out", "check the receiver or the sensor of the speed over ground"),
     ("accumulator_pressure", "less than a calliper's pressure: it limits nothing", "check the sender of HydraulicStatus"),
     ("reverse", "the car drives forwards: too fast for a reverse gear, engaged while moving, or decelerating as only forwards; it is taken for 0", "check the sender of reverse"),
-    ("abs_active", "stands for longer than an ABS acts, or without a braking: it is taken for 0", "check the sender of abs_active"),
+    ("abs_active", "stands for longer than an ABS acts, or without a brake application: it is taken for 0", "check the sender of abs_active"),
     ("esp_active", "stands for longer than an ESP acts: it is taken for 0", "check the sender of esp_active"),
-    ("accelerator_position", "does not return through several brakings: what it returned to last counts as its rest", "check the pedal sensor and the factor and offset of the map"),
+    ("accelerator_position", "does not return through several brake applications: what it returned to last counts as its rest", "check the pedal sensor and the factor and offset of the map"),
 )  # fmt: skip
 IMPLAUSIBLE: Final = {row[0]: 1 << (WORD + place) for place, row in enumerate(_CONTRADICTED)}
 """Bit of each input that is watched, by its name."""
@@ -111,7 +111,7 @@ FAULTS: Final = (
     Fault(MOTOR_SHORT, "motor gives less than demanded", "a motor gave less than demanded within the limit that it reports: the linings brake in its place until the brakes are released", "compare motor_demand, motor_torque and motor_limit of that wheel; check the inverter"),
     Fault(PRESSURE_NOT_FOLLOWING, "pressure does not follow demand", "a calliper pressure is not what was demanded while the three others are: it is not used, that of the other side stands for it", "check that wheel's pressure sensor and valve, and the receiver of PressureDemand*"),
     Fault(LEARNED_AT_BOUND, "learned value at its bound", "a friction, mass, stiffness, motor scale, radius or zero would be learned beyond what a car can be: it stays at its bound", "compare the configuration with the car: mass, tyres, brakes; check the sensors"),
-    Fault(LEARNING_GIVEN_UP, "learning given up", "what was learned predicted the last brakings worse than the configured friction: it was forgotten and is learned anew", "look at the prediction in the report; check pressures, accelerometer and motor torques against each other"),
+    Fault(LEARNING_GIVEN_UP, "learning given up", "what was learned predicted the last brake applications worse than the configured friction: it was forgotten and is learned anew", "look at the prediction in the report; check pressures, accelerometer and motor torques against each other"),
     Fault(NOT_KEPT, "nothing is kept", "the side process is away or hangs, or the state folder cannot be written: what is learned now ends with this run", "it is started again by itself; look at the disk and at the log lines before"),
     Fault(E2E_REJECTIONS, "E2E rejections", "of a protected message more frames come than its sender makes, or many are rejected: nothing is learned, and a request in doubt is not lowered", "look for a second sender of that message and for disturbances of the bus: `brake-ecu doctor -i -c` counts them"),
     Fault(BRAKE_FAILED, "brake gives nothing", "a calliper has far less pressure than demanded, and the car brakes less by its share: the other wheels and the motors brake in its place", "stop; look for a leak, a valve that does not open, or a line that is shut"),

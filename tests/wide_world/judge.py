@@ -219,11 +219,12 @@ def report(judged: list[Judged]) -> str:
     }
     return "\n\n".join(
         (
-            f"Brakings beyond {LEAST_DECEL} m/s^2. Mean/p90 error [%], share inside 2 sigma [%]. By set:",
+            f"Brake applications beyond {LEAST_DECEL} m/s^2. "
+            "Mean/p90 error [%], share inside 2 sigma [%]. By set:",
             table(judged, columns({"pooled": lambda one: True} | sets), _cell),
             "By what the cars have:",
             table(judged, columns(sound | traits), _cell),
-            "By the number of the braking, mean error (bias) [%]:",
+            "By the number of the brake application, mean error (bias) [%]:",
             table(judged, columns(numbers), _bias),
             "Share inside k sigma [%]:",
             calibration(judged),

@@ -92,5 +92,5 @@ def test_a_recorded_car_without_pressure_or_demand_is_no_alarm(
     assert not (columns["mode"] == FAILED).any()
     report(tmp_path / "out.parquet", None, tmp_path / "out.html")
     page = (tmp_path / "out.html").read_text("utf-8")
-    assert "nothing is known of brakings and friction" in page
+    assert "nothing is known of brake applications and friction" in page
     assert "Friction front [-]" not in page

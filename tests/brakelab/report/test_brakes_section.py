@@ -90,14 +90,14 @@ def test_work_is_the_integral_of_torque_and_speed() -> None:
 
 
 def test_sections_and_fade() -> None:
-    observed_by_axle = observed(drive(), [STOP])
-    assert [row[:5] for row in sections(observed_by_axle)] == [
+    by_axle = observed(drive(), [STOP])
+    assert [row[:5] for row in sections(by_axle)] == [
         ("front", "100 to 140", "20 to 40", "50 to 150", 1),
         ("rear", "100 to 140", "20 to 40", "50 to 150", 1),
     ]
-    assert observed_by_axle["front"][0].mean == pytest.approx(0.4)
-    assert "not shown; discs began a braking with 100 °C at most" in fade("front", observed_by_axle["front"])
-    usual = observed_by_axle["front"][0]
+    assert by_axle["front"][0].mean == pytest.approx(0.4)
+    assert "not shown; discs began an application with 100 °C at most" in fade("front", by_axle["front"])
+    usual = by_axle["front"][0]
     hot = usual._replace(number=2, temperature=350.0, mean=0.3)
     text = fade("front", [usual, hot, usual._replace(number=3, mean=0.38)])
     assert "0.400 before, 0.300 at the least from 350 °C up (-25 %); recovery to 0.380 (-5 %)" in text
@@ -125,9 +125,9 @@ def test_csv_has_a_column_for_each_name() -> None:
     head, row = csv.reader(io.StringIO(text))
     assert tuple(head) == HEAD
     assert len(row) == len(HEAD)
-    observed_by_axle = dict(zip(head, row, strict=True))
-    assert float(observed_by_axle["duration [s]"]) == 10.0
-    assert float(observed_by_axle["plateau_front [bar]"]) == 30.0
-    assert observed_by_axle["predicted [m/s^2]"] == ""
-    assert math.isfinite(float(observed_by_axle["v_in [km/h]"]))
+    by_axle = dict(zip(head, row, strict=True))
+    assert float(by_axle["duration [s]"]) == 10.0
+    assert float(by_axle["plateau_front [bar]"]) == 30.0
+    assert by_axle["predicted [m/s^2]"] == ""
+    assert math.isfinite(float(by_axle["v_in [km/h]"]))
     assert csv_link([], []) == ""

@@ -117,7 +117,7 @@ def test_columns_of_the_contract_alone_are_enough(drive_files: Files) -> None:
     names = ["t", "vehicle_speed", *(f"mu_b_{corner}" for corner in ("fl", "fr", "rl", "rr"))]
     change(drive_files["result"], lambda table: table.select(names))
     drive_files["brakes"].unlink()
-    assert "No braking was found" in visible(written(drive_files))
+    assert "No brake application was found" in visible(written(drive_files))
 
 
 @pytest.mark.parametrize("rows", [400, 6000])
@@ -131,7 +131,7 @@ def test_a_drive_without_brakings_draws_nothing_empty(
     change(drive_files["result"], still)
     drive_files["brakes"].unlink()
     page = written(drive_files, truth=False, timing=False)
-    assert "No braking was found" in visible(page)
+    assert "No brake application was found" in visible(page)
     assert "brakings.csv" not in page
     assert caplog.records == []
 

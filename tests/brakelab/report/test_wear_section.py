@@ -220,7 +220,7 @@ def test_a_drive_without_braking_says_so(tmp_path: Path) -> None:
     pq.write_table(pq.read_table(brakes).slice(0, 0), brakes)
     page = page_of(result)
     assert "dirtiest" not in page
-    assert "No braking was found in this drive." in result.with_name("report.html").read_text("utf-8")
+    assert "No brake application was found in this" in result.with_name("report.html").read_text("utf-8")
     assert "mg/km] – 6.5" in page
     assert "nan" not in page
 

@@ -88,7 +88,13 @@ def _tiles(done: Sequence[Summary], good: Sequence[Summary], vehicles: Vehicles)
             "km",
             f"{hours / 3600.0:.1f} h, {counted}",
         ),
-        Tile("Brakings", f"{brakings}", "", f"{taught} of them taught friction", brakings > 0 == taught),
+        Tile(
+            "Brake applications",
+            f"{brakings}",
+            "",
+            f"{taught} of them taught friction",
+            brakings > 0 == taught,
+        ),
     ]
     errors = values_of(good, "prediction_error")
     tiles.append(_spread_tile("Prediction error [%]", errors, 100.0, 1, "drives"))

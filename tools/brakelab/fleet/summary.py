@@ -52,7 +52,7 @@ _COLUMNS: Final[tuple[tuple[str, pa.DataType, str], ...]] = (
 SUMMARY_SCHEMA: Final = pa.schema(
     [pa.field(name, kind, metadata={"unit": unit}) for name, kind, unit in _COLUMNS]
 )
-"""Of `drives.parquet`. `fault` is empty for a drive that is done; `learned` counts the brakings that taught
+"""Of `drives.parquet`. `fault` is empty for a drive that is done; `learned` counts applications that taught
 at least one corner, `predicted` those whose prediction counts; friction is that at the end of the drive.
 Emissions per km are of the life of the pads, and since the models count; `pad_wear_mass` is the drive's."""
 

@@ -55,7 +55,7 @@ def _percent(one: Series) -> float:
 
 
 def _pressures(best: Series, line: Fit | None, series: list[Series], motion: Motion, car: Car) -> list[Found]:
-    evidence = "by its name; the drive shows no braking to check it by"
+    evidence = "by its name; the drive shows no brake application to check it by"
     if line:
         evidence = f"against deceleration: correlation {line.correlation:.2f}"
     _, stem = corner_of(best.signal)

@@ -1,6 +1,6 @@
 """Friction by speed, pressure and disc temperature, as AK-Master (SAE J2522) sorts it; fade and recovery.
 
-A drive has no sections: its brakings are sorted by the conditions that the programme's sections have. Of each
+A drive has no sections: its applications are sorted by the conditions of the programme's sections. Of each
 braking the mean by distance, the least and the greatest friction that was observed.
 """
 
@@ -23,9 +23,9 @@ TEMPERATURES: Final = (50.0, 150.0, 300.0)
 """degC: cold, as most sections (100 degC), warm, fade."""
 LEAST_SPEED: Final = 5.0 / 3.6
 LEAST_SECONDS: Final = 0.3
-"""Of observation in a braking that counts."""
+"""Of observation in a brake application that counts."""
 RECOVERED: Final = 3
-"""Brakings after the hot ones that show the recovery."""
+"""Brake applications after the hot ones that show the recovery."""
 
 
 class Observed(NamedTuple):
@@ -52,7 +52,7 @@ class Section(NamedTuple):
     temperature: str
     brakings: int
     mean: float
-    """Of the brakings' means."""
+    """Of the brake applications' means."""
     least: float
     greatest: float
 
@@ -134,23 +134,26 @@ def fade(axle: str, rows: list[Observed]) -> str:
     """Return fade and recovery of an axle in the drive, or why it shows none."""
     known = [row for row in rows if np.isfinite(row.temperature)]
     if not known:
-        return f"Fade {axle}: no disc temperature at the start of a braking is known."
+        return f"Fade {axle}: no disc temperature at the start of a brake application is known."
     hot = [row for row in known if row.temperature >= TEMPERATURES[2]]
     if not hot:
         hottest = max(row.temperature for row in known)
         return (
-            f"Fade {axle}: not shown; discs began a braking with {hottest:.0f} °C at most, and fade asks for "
+            f"Fade {axle}: not shown; discs began an application with {hottest:.0f} °C at most, "
+            "and fade asks for "
             f"{TEMPERATURES[2]:.0f} °C."
         )
     cool = [row for row in known if row.temperature < TEMPERATURES[1]]
     before = [row.mean for row in cool if row.number < hot[0].number]
     if not before:
-        return f"Fade {axle}: no braking from below {TEMPERATURES[1]:.0f} °C came before the hot ones."
+        return f"Fade {axle}: no application from below {TEMPERATURES[1]:.0f} °C came before the hot ones."
     usual, least = float(np.mean(before)), min(row.mean for row in hot)
     text = f"Fade {axle}: {usual:.3f} before, {least:.3f} at the least from {hot[0].temperature:.0f} °C up"
     text += f" ({100.0 * (least / usual - 1.0):+.0f} %)"
     after = [row.mean for row in cool if row.number > hot[-1].number][:RECOVERED]
     if not after:
-        return f"{text}; no braking from below {TEMPERATURES[1]:.0f} °C came after: recovery is not shown."
+        return (
+            f"{text}; no application from below {TEMPERATURES[1]:.0f} °C after them: recovery is not shown."
+        )
     again = float(np.mean(after))
     return f"{text}; recovery to {again:.3f} ({100.0 * (again / usual - 1.0):+.0f} %)."

@@ -110,7 +110,7 @@ def _of_plots(
             reason = "CONFIG names no [front.pad] and [rear.pad] with their area; power stands in kW."
             found.append(Missing("Power density", reason))
     if not any(applications.values()):
-        reason = "no braking had 0.3 s of observed friction above 5 km/h."
+        reason = "no brake application had 0.3 s of observed friction above 5 km/h."
         found.append(Missing("Friction by section", reason))
     if not any(math.isfinite(each) for row in rows for each in row.build_up):
         reason = f"no pressure rose from nothing to a plateau above {LEAST_BAR:.0f} bar."

@@ -37,7 +37,7 @@ class Forces(NamedTuple):
 def plots_of_distribution(
     drive: DriveResult, truth: DriveResult | None, found: list[Braking], car: Car
 ) -> dict[str, Any]:
-    """Return the two figures by name, empty where no braking shows it."""
+    """Return the two figures by name, empty where no brake application shows it."""
     rows = np.zeros(len(drive.t), bool)
     for braking in found:
         rows |= inside(drive, braking)

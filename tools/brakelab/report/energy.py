@@ -40,7 +40,7 @@ def power(drive: DriveResult, car: Car) -> Vector:
 
 
 def peaks(drive: DriveResult, found: list[Braking], watts: Vector) -> Vector:
-    """Return the greatest power of each brake application, smoothed [W], shape (brakings, 4)."""
+    """Return the greatest power of each brake application, smoothed [W], shape (brake applications, 4)."""
     period = float(np.median(np.diff(drive.t)))
     width = max(1, round(SMOOTHING / period))
     window = np.full(width, 1.0 / width)

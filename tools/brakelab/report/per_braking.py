@@ -29,7 +29,7 @@ class Series(NamedTuple):
     colour: str
     marker: str
     values: Vector
-    """NaN: not known, shape (brakings,)."""
+    """NaN: not known, shape (brake applications,)."""
 
 
 def points_by_braking(
@@ -101,11 +101,11 @@ def plots_per_braking(found: list[Braking]) -> dict[str, Any]:
 
 
 def _hover(plot: Any, tips: list[tuple[str, str]]) -> None:
-    plot.add_tools(HoverTool(tooltips=[("braking", "@number"), *tips]))
+    plot.add_tools(HoverTool(tooltips=[("application", "@number"), *tips]))
 
 
 def _figure(span: Range1d, label: str, count: int, least_span: float) -> Any:
-    plot = new_figure("Braking", label, x_range=span)
+    plot = new_figure("Brake application", label, x_range=span)
     plot.y_range.min_interval = least_span
     plot.xaxis.ticker = SingleIntervalTicker(interval=max(1, -(-count // 15)))
     plot.xgrid.grid_line_color = None

@@ -32,7 +32,7 @@ class Row(NamedTuple):
     configured: float
     """Predicted with the configured friction."""
     front: str
-    """Friction before the braking, with its standard deviation."""
+    """Friction before the brake application, with its standard deviation."""
     rear: str
     left_out: str
 
@@ -146,7 +146,7 @@ def _over_measured(source: ColumnDataSource, others: ColumnDataSource) -> Any:
 def _over_number(source: ColumnDataSource, count: int) -> Any:
     largest = max(_reach(source, ("error",), "error_low", "error_high"), 200.0 * BAND)
     along, across = Range1d(start=0.5, end=count + 0.5, bounds="auto"), Range1d(start=-largest, end=largest)
-    plot = _figure("Braking", "Predicted over measured − 1 [%]", x_range=along, y_range=across)
+    plot = _figure("Brake application", "Predicted over measured − 1 [%]", x_range=along, y_range=across)
     plot.xaxis.ticker = SingleIntervalTicker(interval=max(1, -(-count // 15)))
     plot.xgrid.grid_line_color = None
     plot.add_layout(
@@ -175,11 +175,11 @@ def _points(plot: Any, source: ColumnDataSource, x: str, y: str, low: str, high:
         plot.segment(x, low, x, high, source=source, line_color=ESTIMATE, line_alpha=0.45, legend_label="±2σ")
     shown = plot.scatter(
         x, y, source=source, size=8, line_color=ESTIMATE, fill_color=ESTIMATE, fill_alpha=0.85,
-        legend_label="brakings",
+        legend_label="brake applications",
     )  # fmt: skip
     _hover(plot, shown, [("error", "@error{+0.0} %"), ("friction front", "@front"), ("rear", "@rear")])
 
 
 def _hover(plot: Any, shown: Any, more: list[tuple[str, str]]) -> None:
     values = [(name, f"@{name}{{0.00}} m/s²") for name in ("measured", "predicted")]
-    plot.add_tools(HoverTool(renderers=[shown], tooltips=[("braking", "@number"), *values, *more]))
+    plot.add_tools(HoverTool(renderers=[shown], tooltips=[("application", "@number"), *values, *more]))

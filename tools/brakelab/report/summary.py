@@ -92,10 +92,10 @@ def _drive(drive: DriveResult) -> Tile:
 
 def _brakings(found: list[Braking]) -> Tile:
     if not found:
-        return Tile("Brakings", "0", "", "none in this drive")
+        return Tile("Brake applications", "0", "", "none in this drive")
     hardest = max(found, key=_while_moving)
     note = f"hardest: no. {hardest.number}, {fixed(_while_moving(hardest), 1)} m/s²"
-    return Tile("Brakings", f"{len(found)}", "", note)
+    return Tile("Brake applications", f"{len(found)}", "", note)
 
 
 def _while_moving(braking: Braking) -> float:
@@ -131,7 +131,7 @@ def _deceleration(shares: list[float]) -> Tile:
     known = np.array([share for share in shares if np.isfinite(share)])
     title = "Achieved over demanded"
     if not known.size:
-        return Tile(title, fixed(float("nan"), 0), "", "no steady braking by the brakes alone")
+        return Tile(title, fixed(float("nan"), 0), "", "no steady brake application by the brakes alone")
     mean, worst = float(known.mean()), float(known[np.argmax(np.abs(known))])
     note = f"steady deceleration; worst braking {signed_percent(worst, 1)} %"
     return Tile(title, signed_percent(mean, 1), "%", note, abs(worst) > _DEMAND_ERROR)

@@ -45,7 +45,7 @@ def missing(
     found += [*_of_pads(own), *_of_inputs(drive, quality)]
     if not applications and drive.has("braking") and (drive.column("braking") == 1.0).any():
         reason = "RESULT.brakes.parquet is not beside the result: keep the two together."
-        found.append(Missing("Work, mass and particles of single brakings", reason))
+        found.append(Missing("Work, mass and particles of single brake applications", reason))
     elif own:
         found += _of_particles(own, applications)
     return found

@@ -151,7 +151,7 @@ def _provenance(a: Result, b: Result) -> list[str]:
 def _judged(brakes: Columns) -> tuple[str, str]:
     """Return how far the predictions of a result were off, and its friction at the end."""
     counts = (brakes["corner"] == CORNERS[0]) & (brakes["left_out"] == "")
-    off = "no braking to judge it by"
+    off = "no brake application to judge it by"
     if counts.any():
         measured, predicted = (brakes[f"specific_force_{name}"][counts] for name in ("mean", "predicted"))
         found = errors(measured.tolist(), predicted.tolist())

@@ -25,7 +25,7 @@ SETTLED_ROWS = 50  # 0.5 s
 
 
 class Stop(NamedTuple):
-    """The last braking that ends at rest, from the demand to rest; NaN: there is none."""
+    """The last brake application that ends at rest, from the demand to rest; NaN: there is none."""
 
     distance: float = math.nan
     """m"""
@@ -44,7 +44,7 @@ class Figures(NamedTuple):
     accuracy: dict[str, Accuracy]
     """Of friction, by axle."""
     friction_error: dict[str, float]
-    """By axle, at the end of the last braking, as a share."""
+    """By axle, at the end of the last brake application, as a share."""
     stop: Stop
     reactions: list[Reaction]
 
@@ -57,7 +57,7 @@ def _steady(demand: Vector) -> NDArray[np.bool_]:
 
 
 def last_stop(truth: DriveResult) -> Stop:
-    """Return the last braking that ends at rest."""
+    """Return the last brake application that ends at rest."""
     speed = truth.column("vehicle_speed")
     asked = (truth.column("decel_demand") > 0.0) | (truth.column("pedal_position") > 0.0)
     rests = np.flatnonzero((speed[1:] < STANDSTILL) & (speed[:-1] >= STANDSTILL) & asked[1:])

@@ -36,7 +36,7 @@ class Outcome(NamedTuple):
     """Of friction, as a share."""
     nrmse_rear: float
     stopping_distance: float
-    """From the demand of the last braking that ends at rest to rest [m]."""
+    """From the demand of the last brake application that ends at rest to rest [m]."""
     undisturbed: float
     """The same without the scenario's faults [m]."""
     longer: float

@@ -109,7 +109,9 @@ def test_a_trip_without_cruising_tells_no_background():
     """Its particles came out three times too many, without a word."""
     recorded = trip(delay=0.7)
     uneven = recorded.speed + 8.0 * np.sin(1.5 * recorded.t)
-    with pytest.raises(UserError, match="trip a: vehicle_speed: no steady driving 25 s after a braking"):
+    with pytest.raises(
+        UserError, match="trip a: vehicle_speed: no steady driving 25 s after a brake
+    ):
         find_background(recorded._replace(speed=uneven), find_applications(recorded))
 
 

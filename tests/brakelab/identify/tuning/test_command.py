@@ -104,5 +104,5 @@ def test_a_scenario_that_never_brakes_is_one_line(tmp_path: Path) -> None:
         'plant = "suv"\ninitial_speed = 15.0\nphase = [{ kind = "cruise", speed = 15.0, seconds = 2.0 }]\n',
         encoding="utf-8",
     )
-    with pytest.raises(UserError, match=r"cruise\.toml: has no braking"):
+    with pytest.raises(UserError, match=r"cruise\.toml: has no brake application"):
         command.tune(SUV, [path], [], 1, BUDGET, tmp_path / "tuned.toml")

@@ -70,4 +70,4 @@ def test_all_of_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pads = pq.read_table("out/fleet/pads.parquet")
     assert all(low is not None for low in pads.column("remaining_low").to_pylist())
     report = Path("out/third.html").read_text("utf-8")
-    assert "dirtiest brakings, by particles" in report
+    assert "dirtiest brake applications, by particles" in report

@@ -144,7 +144,7 @@ def find_background(trip: Recorded, applications: list[tuple[int, int]]) -> Back
             counts.append(np.count_nonzero(inside))
     if not speeds:
         remedy = (
-            f"no steady driving {CLEAR_S:.0f} s after a braking, so nothing shows the background; "
+            f"no steady driving {CLEAR_S:.0f} s after a brake application, so nothing shows the background; "
             "give trips that have some"
         )
         raise UserError(f"trip {trip.name}", "vehicle_speed", remedy)

@@ -1,6 +1,6 @@
-"""Trips: brakings of a road drive on the simulated dynamometer, as section 2.4.2 takes them from a car.
+"""Trips: brake applications of a drive on the simulated dynamometer, as section 2.4.2 takes them from a car.
 
-Speeds and decelerations are drawn; most brakings are gentle (Chapter 1: more than 80 % below 2 m/s^2), the
+Speeds and decelerations are drawn; most of them are gentle (Chapter 1: more than 80 % below 2 m/s^2), the
 demand of some falls. Between them the disc cools at the speed of the drive. Beside the measured temperature
 stands that of a lumped model as a car has it: heated by pressure times nominal friction, its constants
 wrong by 5 %.
@@ -78,7 +78,7 @@ def lump(
 
 
 def manoeuvres(stops: Stops, radius: float) -> dict[str, np.ndarray]:
-    """Return the numbers of the brakings of each kind of Table 2.1; `radius` [m]: tyre over effective.
+    """Return the numbers of the applications of each kind of Table 2.1; `radius` [m]: tyre over effective.
 
     A mild from low speed, B mild from high speed, C gentle from low speed, D gentle from high speed.
     """

@@ -86,7 +86,7 @@ def _record(config: Config, scenarios: Mapping[Path, Scenario], cars: range) -> 
                 recordings.append(recording(drive_once(scenario, config, car)))
                 if not (recordings[-1].braking >= 0).any():
                     raise UserError(
-                        str(path), "", "has no braking above 15 km/h of a second or more; add one"
+                        str(path), "", "has no brake application above 15 km/h of a second or more; add one"
                     )
                 advance(1.0)
     return recordings

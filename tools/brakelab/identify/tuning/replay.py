@@ -22,7 +22,7 @@ from ecu.settings.config import Config, new_params
 def _replay(
     params: Any, states: Any, outputs: Any, inputs: Any, mu_b: Array, braking: NDArray[np.int64], sums: Array
 ) -> None:
-    """Add up squares, truth, samples, samples inside 2 sigma in `sums`, shape (tunings, brakings, 2, 4)."""
+    """Add squares, truth, samples, samples inside 2 sigma to `sums`, shape (tunings, applications, 2, 4)."""
     for one in range(len(params)):
         for k in range(len(inputs)):
             step(params[one : one + 1], states[one : one + 1], inputs[k : k + 1], outputs[one : one + 1])

@@ -147,7 +147,7 @@ def _car(found: Identified, config: Config) -> list[_Kind]:
               "coast-downs on a drive that ends where it began (--closed), or standstills at many places"),
         _Kind("vehicle.pitch_gradient", "rad/(m/s^2)", lambda x: max(float(x[Place.PITCH]), 0.0), (),
               "accelerometer against the change of speed, without grade",
-              "brakings of 3 m/s^2 and more with a speed reference (optical, GNSS)"),
+              "brake applications of 3 m/s^2 and more with a speed reference (optical, GNSS)"),
     ]  # fmt: skip
     if signals.speed:
         kinds.append(
@@ -192,12 +192,12 @@ def _axles(found: Identified, config: Config) -> list[_Kind]:
                   "a slalom at 50 to 90 km/h: curves of 2 m/s^2 to both sides"),
             _Kind(f"{axle}.slip_stiffness", "-", stiffness, (2 + 2 * place, 3 + 2 * place),
                   "slip against force at START's axle loads",
-                  "motor-only brakings of 2 to 3 m/s^2 with a speed reference"),
+                  "motor-only brake applications of 2 to 3 m/s^2 with a speed reference"),
             _Kind(f"{axle}.mu_nominal", "-", friction, (1, 3 + 2 * place),
-                  "torque per bar with START's pistons and radius, mean of all brakings",
-                  "brakings of 1.5 to 5 m/s^2 with calliper pressures"),
-            _Kind(f"{axle}.push_out_pressure", "bar", push_out, (1,), "brakings at low pressure",
-                  "many brakings of less than 1.5 m/s^2"),
+                  "torque per bar with START's pistons and radius, mean of all brake applications",
+                  "brake applications of 1.5 to 5 m/s^2 with calliper pressures"),
+            _Kind(f"{axle}.push_out_pressure", "bar", push_out, (1,), "brake applications at low pressure",
+                  "many brake applications of less than 1.5 m/s^2"),
         ]  # fmt: skip
     return kinds
 

@@ -83,7 +83,7 @@ def steps_of(windows: Windows, speed: Vector) -> Steps:
 
 
 def dive_of(steps: Steps, prior: Estimate) -> tuple[float, float, int] | None:
-    """Return pitch gradient [rad per m/s^2], its standard deviation, number of steps; None: no braking."""
+    """Return pitch gradient [rad per m/s^2], its standard deviation, number of steps; None: none seen."""
     rows, segments = [], []
     number = (steps.drive * 1e6 + steps.at // MANOEUVRE).astype(np.int64)
     for place in np.unique(number):

@@ -84,7 +84,7 @@ def identify(drives: Sequence[DriveSamples], start: RecordArray, closed: bool) -
         raise UserError(
             drives[0].name,
             "",
-            "hardly a steady stretch on a straight road; give a longer drive with brakings",
+            "hardly a steady stretch on a straight road; give a longer drive with brake applications",
         )
     found, known = fit(residuals, prior), prior
     still = yaw_zero(windows)

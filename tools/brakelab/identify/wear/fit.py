@@ -154,7 +154,7 @@ def fit_law(
 
 
 def _warmer(regressors: Array, kelvin: float) -> Array:
-    """Return the regressors (7.16) of the same brakings with discs `kelvin` hotter, not below 0 degC."""
+    """Return the regressors (7.16) of the same applications with discs `kelvin` hotter, not below 0 degC."""
     e, et, ett, r, rt, p, pt = regressors.T
     k = np.maximum(kelvin, -et / e)
     return np.column_stack([e, et + k * e, ett + 2.0 * k * et + k * k * e, r, rt + k * r, p, pt + k * p])

@@ -1,4 +1,4 @@
-"""Check of a trip against the rules for real driving emissions (Table 1.1), and its brakings (Table 1.2).
+"""Check of a trip against the rules for real driving emissions (Table 1.1), and its applications (Table 1.2).
 
 Works on any trip: a reference to be driven, or a recorded one. Urban, rural and motorway operation are
 distinguished by speed alone (up to 60, up to 90, above 90 km/h; EU 2016/427, annex IIIA), so no map is
@@ -20,7 +20,7 @@ MOTORWAY: Final = 100.0 * KMH
 """The regulation counts the time on a motorway from here, though the distance from `RURAL`."""
 
 BRAKING_FROM: Final = 0.5  # m/s^2, more than by rolling out. Assumption
-SHORTEST_GAP: Final = 0.5  # s; events closer together are one braking. Assumption
+SHORTEST_GAP: Final = 0.5  # s; events closer together are one brake application. Assumption
 LEAST_LOSS: Final = 5.0 * KMH  # m/s, of speed. Assumption
 
 
@@ -42,7 +42,7 @@ class Row(NamedTuple):
 
 
 class Brakings(NamedTuple):
-    """The brakings of a trip in the order of time, each array of shape (brakings,)."""
+    """The brake applications of a trip in the order of time, each array of shape (brake applications,)."""
 
     start: Array
     """s"""
@@ -108,7 +108,7 @@ def trip_rows(t: Array, speed: Array, grade: Array) -> list[Row]:
 
 
 def brakings(t: Array, speed: Array, decel: Array) -> Brakings:
-    """Return the brakings in a trip: `t` [s], `speed` [m/s], `decel` [m/s^2], all of shape (n,).
+    """Return the brake applications in a trip: `t` [s], `speed` [m/s], `decel` [m/s^2], all of shape (n,).
 
     A braking decelerates by more than `BRAKING_FROM` and takes at least `LEAST_LOSS` of the speed. Its mean
     deceleration is that of ECE R13-H, (v_b^2 - v_e^2)/(2 (s_e - s_b)), with v_b and v_e where 80 % and 10 %

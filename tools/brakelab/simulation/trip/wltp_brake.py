@@ -1,13 +1,13 @@
-"""A cycle with the published totals of the WLTP-Brake cycle: ten trips, 303 brakings, 192 km, 15,826 s.
+"""A cycle with the published totals of the WLTP-Brake cycle: ten trips, 303 applications, 192 km, 15,826 s.
 
 The trace of UN GTR 24 (UN R179) is not at hand: this one is generated to what is published of it, `TOTALS`.
-How the totals divide among the trips, and the speeds and decelerations of the single brakings, are
-assumptions (`TRIPS`, `_draws`). Every braking is of constant deceleration; between two the car accelerates
+How the totals divide among the trips, and the speeds and decelerations of the single brake applications, are
+assumptions (`TRIPS`, `_draws`). Applications are of constant deceleration; between two the car accelerates
 and holds a speed. Cooling between trips is no part of the cycle: a trip begins with its disc at
 `DISC_AT_START`.
 
 ```
-trip of duration T, distance D, brakings k = 1..n from u_k to w_k [m/s] by d_k [m/s^2]:
+trip of duration T, distance D, brake applications k = 1..n from u_k to w_k [m/s] by d_k [m/s^2]:
   D = sum (u_k^2 - w_{k-1}^2) / 2 a_k + sum u_k h_k + sum (u_k^2 - w_k^2) / 2 d_k     h_k: time held, ~ a draw
   T = sum of the same pieces' times + waits at rest, by the speeds' level: `WAITING` of T
 ```
@@ -34,7 +34,7 @@ class Totals(NamedTuple):
     fastest: float
     """m/s"""
     mean_decel: float
-    """m/s^2, over the brakings."""
+    """m/s^2, over the brake applications."""
 
 
 TOTALS: Final = Totals(15_826.0, 192e3, 303, 132.5 * KMH, 0.97)
@@ -64,10 +64,10 @@ DISC_AT_START: Final = (23.0, *(40.0,) * (len(TRIPS) - 1))
 """degC; a trip is begun once the disc has cooled to it."""
 LEAST_DECEL, LARGEST_DECEL = 0.49, 2.2  # m/s^2. Assumption
 MEDIAN_DECEL, DECEL_SCATTER = 0.92, 0.33  # m/s^2, of the logarithm. Assumption
-SPEED_SCATTER: Final = 0.45  # of the logarithm of the speed a braking begins with. Assumption
-TO_REST: Final = 0.55  # share of the brakings from a trip's slower half of speeds. Assumption
+SPEED_SCATTER: Final = 0.45  # of the logarithm of the speed a brake application begins with. Assumption
+TO_REST: Final = 0.55  # share of the brake applications from a trip's slower half of speeds. Assumption
 SLOWED_TO: Final = (0.3, 0.8)  # of the speed, where not to rest. Assumption
-FAST_ROADS: Final = 2.0  # the time that a speed is held grows with its power: fewer brakings. Assumption
+FAST_ROADS: Final = 2.0  # the time that a speed is held grows with its power: fewer applications. Assumption
 LOWEST_SPEED: Final = 15.0 * KMH
 ACCEL: Final = (0.6, 1.3)  # m/s^2. Assumption
 WAITING: Final = 0.13  # share of a trip's time at rest. Assumption
@@ -76,7 +76,7 @@ SEED: Final = 24
 
 
 class _Draws(NamedTuple):
-    """Random draws of a trip's brakings; shape (n,)."""
+    """Random draws of a trip's brake applications; shape (n,)."""
 
     speed: Array
     """Relative."""
@@ -112,7 +112,7 @@ def _draws() -> tuple[_Draws, ...]:
 
 
 class _Plan(NamedTuple):
-    """A trip's brakings: speeds before and after [m/s], time held before and time waited after [s]."""
+    """A trip's applications: speeds before and after [m/s], time held before and time waited after [s]."""
 
     before: Array
     after: Array
