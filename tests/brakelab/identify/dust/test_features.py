@@ -110,7 +110,7 @@ def test_a_trip_without_cruising_tells_no_background():
     recorded = trip(delay=0.7)
     uneven = recorded.speed + 8.0 * np.sin(1.5 * recorded.t)
     with pytest.raises(
-        UserError, match="trip a: vehicle_speed: no steady driving 25 s after a brake
+        UserError, match="trip a: vehicle_speed: no steady driving 25 s after a brake application"
     ):
         find_background(recorded._replace(speed=uneven), find_applications(recorded))
 
