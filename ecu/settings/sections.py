@@ -207,7 +207,7 @@ class Control(Section):
     max_pressure_rate: Annotated[float, Field(ge=1500, le=18000), Unit("bar/s")] = 3000.0
     """Of a demand; the greatest is all of it in one cycle."""
     compensation: Literal["second-order", "inverse", "off"] = "inverse"
-    """How pressure follows friction in a brake application: by (5.8) corrected, by the plain ratio, or not."""
+    """How pressure follows friction in a brake application: by (5.8) corrected, by the plain ratio or not."""
     slip_guard: bool = True
     """Hold the pressure back at a wheel that slips beyond its tyre's range."""
 
