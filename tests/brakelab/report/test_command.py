@@ -64,7 +64,7 @@ def page(source: str) -> str:
         "Missed periods 2 of 6000",
         "Achieved over demanded \N{MINUS SIGN}3.0 %",
         "Prediction error 4.0 % mean of 2; worst 4.0 %, bias +4.0 %",
-        "2 brakings: off by 4.0 % in the median, 4.0 % at worst, bias +4.0 %.",
+        "2 brake applications: off by 4.0 % in the median, 4.0 % at worst, bias +4.0 %.",
         "On the mean 4.0 %; beside it the configured friction, never learning 10.0 %",
         "1 4.00 4.16 0.08 4.40 +4.0 0.450 ± 0.055 0.450 ± 0.055",
         "2 6.00 6.24 0.12 6.60 +4.0 0.380 ± 0.010 0.495 ± 0.010",

@@ -124,7 +124,7 @@ TOWN_MG = 9 * 2 * 500 * 0.02 / TOWN_KM
         "[mg/km] 17.5 (0.7 to 24.5) 6.5 7, battery electric 3; heavier vans 11, battery electric 5",
         "Particles [10⁹/km] 5.25 (2.10 to 10.50) 3.00 none yet",
         "brakes did 75 % of the work of brakes and motors or engine",
-        "The 10 dirtiest brakings, by particles",
+        "The 10 dirtiest brake applications, by particles",
         "1950.0 4.0 108 → 18 400 119 100.0 50.00 20.00 8.00 to 40.00",
         "A drive is not that cycle",
     ],
