@@ -1,7 +1,7 @@
 """Time of the simulated vehicle per millisecond of its drive, with fourteen and seven degrees of freedom.
 
 The car brakes, steers and drives over a rough road, so that all states are excited. Beside it the multi-body
-model of commonroad-vehicle-models under scipy, where both are installed: a braking and a step-steer of its
+model of commonroad-vehicle-models under scipy, where both are installed: a stop and a step-steer of its
 own car.
 """
 

@@ -23,7 +23,7 @@ ROOT = Path(__file__).parents[4]
         (Entered(drive="mustang:nothing.log"), "no such log"),
         (Entered(drive=f"mustang:{ROOT}/README.md"), "unknown kind of log"),
         (Entered(drive=f"mustang:{ROOT}/tests/data/exports/aim.csv"), "give a log of frames"),
-        (Entered(drive=f"mustang:{ROOT}/tests/data/kona.log"), "no braking of mustang to predict"),
+        (Entered(drive=f"mustang:{ROOT}/tests/data/kona.log"), "no brake application of mustang to predict"),
     ],
 )
 def test_a_mistake_is_reported_before_anything_is_driven(entered: Entered, remedy: str) -> None:

@@ -82,7 +82,7 @@ def configured() -> Config:
 
 
 def _stop(**brake: Any) -> Scenario:
-    """Return one stop from 100 km/h, the first of `sensitivity` with another braking."""
+    """Return one stop from 100 km/h, the first of `sensitivity` with another brake application."""
     base = shipped("sensitivity")
     return base.model_copy(update={"phase": [base.phase[0], Phase(kind="brake", until_speed=0.0, **brake)]})
 

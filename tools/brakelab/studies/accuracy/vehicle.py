@@ -3,7 +3,7 @@
 A car of the wide draw drives `config/scenarios/identify.toml`; START is config/suv.toml with every key of
 masses, tyres and brakes 20 % off, up or down by the seed, but for what a data sheet says (wheelbase,
 frontal area, pistons). Then another trip of the same car, real driving of another seed, is replayed with
-START and with the identified CONFIG, and each predicts the brakings.
+START and with the identified CONFIG, and each predicts the brake applications.
 """
 
 from collections.abc import Iterable, Sequence
@@ -63,7 +63,7 @@ class Car(NamedTuple):
 
     keys: list[Beside]
     before: tuple[float, float]
-    """Mean error of the stranger's predicted brakings with START [%]: learning, and with its friction."""
+    """Mean error of the stranger's predicted applications with START [%]: learning, and with its friction."""
     after: tuple[float, float]
     """With the identified CONFIG."""
     brakings: int
@@ -183,7 +183,7 @@ def identified_of(seed: int) -> Car:
 
 
 def _predicted(drive: Drive, config: Config) -> tuple[tuple[float, float], int]:
-    """Return the mean error of predicted brakings [%], learning and with the configured friction; count."""
+    """Return the mean error of predicted applications [%], learning and with configured friction; count."""
     params = new_params(config)
     book = BrakeBook(params)
     with TemporaryDirectory(prefix="brake-ecu-identified-") as folder:
@@ -212,7 +212,7 @@ def _over_mass(cars: Sequence[Car], key: str) -> tuple[str, ...]:
 
 
 def identified_tables(cars: Iterable[Car]) -> list[Table]:
-    """Return errors by key, each car's worst, and the stranger's brakings."""
+    """Return errors by key, each car's worst, and the stranger's brake applications."""
     every = list(cars)
     rows = []
     for place, one in enumerate(every[0].keys):
@@ -257,10 +257,10 @@ def identified_tables(cars: Iterable[Car]) -> list[Table]:
               "torque per bar, stiffness per axle load, deflection for its height of the centre of gravity."),
         Table("Beyond 2σ or 3 %", ("car", "key", "truth", "value", "σ", "error/σ", "error [%]"), misses,
               "Every one of them."),
-        Table("Brakings of a stranger's drive: mean error of the prediction [%]",
-              ("car", "brakings", "START, learning", "START, configured", "CAR, learning", "CAR, configured"),
+        Table("Brake applications of a stranger's drive: mean error of the prediction [%]",
+              ("car", "number", "START, learning", "START, configured", "CAR, learning", "CAR, configured"),
               strange, "Fifteen minutes of real driving by the same car. Learning: with the friction learned "
-              "before each braking; configured: with that of the CONFIG."),
+              "before each brake application; configured: with that of the CONFIG."),
     ]  # fmt: skip
 
 

@@ -296,7 +296,8 @@ def blending_tables(cars: int = CARS) -> list[Table]:
 
 
 TEXT: Final = (
-    "Brakings from 75 km/h in closed loop with the ECU of config/suv.toml, whose motors take the share f on "
+    "Brake applications from 75 km/h in closed loop with the ECU of config/suv.toml, whose motors take "
+    "the share f on "
     f"both axles. {CARS} cars, drawn from config/plant/suv.toml; figures are median (least–greatest) over "
     "them. Torque is that of linings and motors, true; the demand is m a r with mass and radius of the "
     "configuration (5.1). Cars of the wide draw: their hydraulics, motors and frictions are not those that "

@@ -117,7 +117,8 @@ def _table(title: str, decel: float, config: Config, motors: bool, cars: int) ->
 
 
 TEXT: Final = (
-    "In the second of two brakings from 28 m/s, by a driver who keeps the lane, a brake gives nothing "
+    "In the second of two brake applications from 28 m/s, by a driver who keeps the lane, a brake gives "
+    "nothing "
     f"any more from t = {FAILS:g} s on. Deceleration is that of the second that begins "
     f"{1e3 * AFTER:g} ms after it, against the same car without the fault. "
     f"{CARS} cars of the wide draw, median (least–greatest). "

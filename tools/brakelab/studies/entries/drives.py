@@ -113,7 +113,7 @@ def real_drive(car: str, log: Path) -> RealDrive:
     """Return a log of frames of the car whose configuration and signal map have this name.
 
     Raises:
-        UserError: there is no such car or log, it holds decoded signals, or no braking.
+        UserError: there is no such car or log, it holds decoded signals, or no brake application.
     """
     config = load_config(named(car, "config"))
     source = load_source(named(car, "config/maps"))
@@ -141,6 +141,8 @@ def real_drive(car: str, log: Path) -> RealDrive:
     counting = [row for row in book.rows[:: len(CORNERS)] if not row.left_out and row.t_start > 0.0]
     if not counting:
         raise UserError(
-            "--drive", str(log), f"no braking of {car} to predict; `map check` shows what is received"
+            "--drive",
+            str(log),
+            f"no brake application of {car} to predict; `map check` shows what is received",
         )
     return RealDrive(track, results, params, counting)

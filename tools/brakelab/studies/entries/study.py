@@ -122,7 +122,7 @@ def judge_car(names: Sequence[str], seed: int) -> CarScores:
 
 
 def predicted(heard: Heard, drive: RealDrive) -> list[float]:
-    """Return the specific force of each braking of a recorded drive as known before it [m/s^2]."""
+    """Return the specific force of each brake application of a recorded drive as known before it [m/s^2]."""
     forces = []
     for braking in drive.brakings:
         first = round(braking.t_start / PERIOD)

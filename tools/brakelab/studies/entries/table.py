@@ -114,11 +114,11 @@ def entry_tables(found: Sequence[Standing], cars: int, drive: str) -> list[Table
             "over drives.",
         ),
         Table(
-            "Recorded cars: error of what was known before a braking [%]",
+            "Recorded cars: error of what was known before a brake application [%]",
             ("entry", *SETS, "recorded drive, median", "recorded drive, worst"),
             others,
             f"First the brake force of all wheels, median (worst) over {cars} simulated {noun} of "
             "their median from the third application on, with the signals of a logger alone. Then the "
-            f"specific force of brakings of a real car. {recorded}.",
+            f"specific force of brake applications of a real car. {recorded}.",
         ),
     ]

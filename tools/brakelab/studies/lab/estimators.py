@@ -44,7 +44,8 @@ def _estimators(lab: Lab) -> Table:
     below = (
         "nRMSE [%], brake A, identified on trip 1 and judged on trip 2 of the same pad; *: temperature of "
         "a lumped model with constants 5 % off. A mild from low speed, B mild from high, C gentle from "
-        "low, D gentle from high: all brakings of a kind, where the thesis shows one of each. The order of "
+        "low, D gentle from high: all brake applications of a kind, where the thesis shows one of each. The "
+        "order of "
         f"the three is the thesis's in {', '.join(same_ranking(lab.on_trips.errors)) or 'none'}. True "
         "friction is measured here; the thesis has an observer's estimate. Static LuGre knows speed alone."
         "\n\nThe joint observer: "

@@ -1,6 +1,6 @@
 """The joint observer in the four manoeuvres of Table 2.1: in a car, without a dynamometer.
 
-A trip of brakings of the kinds of `friction/trips.py` in closed loop, cars of the wide draw. The observer
+A trip of applications of the kinds of `friction/trips.py` in closed loop, cars of the wide draw. The observer
 has the car's configuration and the learned values of ten minutes of ordinary driving; the front linings are
 of brake A under one of three laws, at a level other than the configured one. Counted as in `bench observers`:
 from 0.8 s after the brakes of both axles are applied, above 15 km/h.
@@ -33,8 +33,8 @@ from ecu.settings.resources import resource
 CARS: Final = 8
 BRAKINGS: Final = 6  # of each kind
 KINDS: Final = "ABCD"
-CRUISE: Final = 12.0  # s before each braking
-LOWEST_SPEED: Final = 40.0 / 3.6  # m/s, at the start of a braking
+CRUISE: Final = 12.0  # s before each brake application
+LOWEST_SPEED: Final = 40.0 / 3.6  # m/s, at the start of a brake application
 HIGHEST_SPEED: Final = 130.0 / 3.6
 LEAST_DECEL: Final = 0.5  # m/s^2
 GREATEST_DECEL: Final = 3.5
@@ -65,7 +65,7 @@ class OnTrip(NamedTuple):
 
 
 def trip_of_kinds(seed: int) -> tuple[Scenario, str]:
-    """Return a trip, drawn by `seed`, and the kinds of its brakings in order."""
+    """Return a trip, drawn by `seed`, and the kinds of its brake applications in order."""
     random = np.random.default_rng(seed)
     kinds = "".join(random.permutation(list(KINDS * BRAKINGS)))
     phases = []

@@ -34,7 +34,7 @@ class Map(NamedTuple):
 
 
 class Trace(NamedTuple):
-    """One braking; all of shape (blocks,)."""
+    """One brake application; all of shape (blocks,)."""
 
     t: Vector  # s
     speed: Vector  # m/s, of the car
