@@ -207,15 +207,9 @@ def recorded_table(cars: Iterable[list[Recorded]]) -> Table:
 TEXT: Final = (
     "Ten brake applications of 1.5 to 7 m/s² from 30 m/s by cars whose front and rear pressures are "
     "proportional, braked by an ECU that corrects nothing. Replayed is what a logger has: wheel speeds at "
-<<<<<<< HEAD
     "100 Hz, one pressure per axle at 20 Hz, the accelerometer at 50 or 10 Hz; no speed reference, no motor "
     "torque. The cars have an engine in front, whose drag nothing reports: 0.1 m/s² at 30 m/s to 0.4 at 5, "
     "by its gear, drawn within ±40 %."
-=======
-    "100 Hz, one pressure per axle at 20 Hz, the accelerometer at 50 or 10 Hz; no speed reference, no "
-    "motor torque. The cars have an engine in front, whose drag nothing reports: 0.1 m/s² at 30 m/s to "
-    "0.4 at 5, by its gear, drawn within ±40 %."
->>>>>>> ddfee1e (golden: studies of blending and failures in the new words; every value is the same)
 )
 
 
