@@ -56,6 +56,9 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "change",
         "jitter",
         "usual_slope",
+        "sigma_axles",
+        "wheels",
+        "torques",
     ),
 }
 

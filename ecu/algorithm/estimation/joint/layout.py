@@ -125,6 +125,7 @@ JOINT_STATE: Final = np.dtype(
         ("unmeasured_s", "f8"),  # time without an accelerometer: the acceleration is that of the torques [s]
         ("unseen_s", "f8"),  # time in which neither accelerometer nor wheels told how the car moved [s]
         ("before", "f8", (4,)),  # LEVEL before this brake application
+        ("sigma_axles", "f8"),  # of the front levels less the rear ones, as this application began
         ("left_s", "f8"),  # time for which the balance is beyond its gate while braking, signed as it is [s]
         ("untrusted_s", "f8"),  # time since a wheel was last trusted [s]
         ("hold_s", "f8"),  # time for which learning stays suspended after a wheel left its tyre's range

@@ -16,6 +16,7 @@ import math
 
 from ecu.algorithm.estimate import STANDING
 from ecu.algorithm.estimation.joint.balance import correct_by_balance, predict_balance
+from ecu.algorithm.estimation.joint.bounds import keep_within_bounds
 from ecu.algorithm.estimation.joint.drive import KNOWN, measure_drive
 from ecu.algorithm.estimation.joint.kalman import (
     clear_derivatives,
@@ -48,7 +49,6 @@ from ecu.algorithm.estimation.joint.layout import (
 from ecu.algorithm.estimation.joint.prior import (
     PRIOR,
     forget_rate,
-    keep_within_bounds,
     note_change,
     pressure_change,
     set_prior,
@@ -270,8 +270,6 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     learning = learning and not _learning_forbidden(params, state, inputs, braking)
     if not braking:
         learning = learning and abs(w.across) < STRAIGHT and state.released != 0
-        for i in range(4):
-            state.before[i] = x[LEVEL + i]
     if learning and not braking and motors <= MOTORS:
         learning = w.balanced and abs(predict_balance(params, state, False)) < UNEXPLAINED
     _choose_free(state, braking, motors > MOTORS, learning)

@@ -5,7 +5,6 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
 from ecu.algorithm.estimation.joint.kalman import (
     SPEED_VARIANCE,
     clear_derivatives,
@@ -92,26 +91,6 @@ RATE_WALK = 0.05
 LEVEL_WALK = 0.01  # common to all levels while the pads rub
 
 
-# Bounds of learned states: beyond them a fault was learned, not a car. Of friction: `friction.py`.
-LOWEST, HIGHEST = np.full(N, -np.inf), np.full(N, np.inf)
-LOWEST[LEVEL : LEVEL + 4], HIGHEST[LEVEL : LEVEL + 4] = math.log(LEAST_RATIO), math.log(GREATEST_RATIO)
-LEFT_RIGHT = 0.2  # of an axle's two levels: its linings are of one batch, and one that is oiled is found
-LOWEST[STIFFNESS], HIGHEST[STIFFNESS] = math.log(0.4), math.log(2.5)
-LOWEST[RADIUS : RADIUS + 4], HIGHEST[RADIUS : RADIUS + 4] = -0.02, 0.02
-LOWEST[BIAS], HIGHEST[BIAS] = -0.6, 0.6
-LOWEST[SLOPE], HIGHEST[SLOPE] = -4.0, 4.0
-LOWEST[MASS], HIGHEST[MASS] = math.log(0.85), math.log(1.30)
-LOWEST[PEAK], HIGHEST[PEAK] = -1.0, 0.2
-LOWEST[RATIO], HIGHEST[RATIO] = -0.4, 0.4
-LOWEST[LOAD], HIGHEST[LOAD] = -0.3, 0.3
-LOWEST[DEFLECTION_GAIN], HIGHEST[DEFLECTION_GAIN] = -1.2, 1.2
-LOWEST[MOTOR], HIGHEST[MOTOR] = math.log(0.6), math.log(1.6)
-LOWEST[DRAG], HIGHEST[DRAG] = math.log(0.5), math.log(2.0)
-LOWEST[ROLLING], HIGHEST[ROLLING] = -0.03, 0.03
-LOWEST[DELAY], HIGHEST[DELAY] = -0.1, 0.1
-LOWEST[OVERRUN], HIGHEST[OVERRUN] = OVERRUN_MEAN - 4.0 * OVERRUN_SIGMA, OVERRUN_MEAN + 4.0 * OVERRUN_SIGMA
-
-
 @kernel
 def limit_variance(state: Record, i: int, most: float) -> None:
     """Raise no state's variance above `most`: its covariances shrink with it."""
@@ -121,42 +100,6 @@ def limit_variance(state: Record, i: int, most: float) -> None:
         for j in range(N):
             p[i, j] *= scale
             p[j, i] = p[i, j] if j != i else scale * p[i, i]
-
-
-@kernel
-def _keep_alike(state: Record, left: int) -> bool:
-    """Return the levels of an axle to within `LEFT_RIGHT` of each other; return whether they had parted."""
-    x, p, free, right = state.x, state.p, state.free, left + 1
-    apart = x[left] - x[right]
-    variance = p[left, left] + p[right, right] - 2.0 * p[left, right]
-    if abs(apart) <= LEFT_RIGHT * (1.0 + 1e-9) or not variance > 0.0:
-        return False
-    back = (math.copysign(LEFT_RIGHT, apart) - apart) / variance
-    for j in range(N):
-        if free[j] or left <= j <= right:
-            x[j] += (p[j, left] - p[j, right]) * back
-    return True
-
-
-@kernel
-def keep_within_bounds(state: Record) -> bool:
-    """Return learned states to their bounds; return whether any had left them.
-
-    The other states follow by their covariances and explain the remainder; otherwise they would drift for as
-    long as the bound acts. Peak and slope belong to the road: at their bounds they are no fault.
-    """
-    x, p, free, found = state.x, state.p, state.free, False
-    for i in range(N):
-        if x[i] < LOWEST[i] or x[i] > HIGHEST[i]:
-            back = min(max(x[i], LOWEST[i]), HIGHEST[i]) - x[i]
-            for j in range(N):
-                if j != i and free[i] and free[j] and p[i, i] > 0.0:
-                    x[j] += p[j, i] / p[i, i] * back
-            x[i] += back
-            found = found or (i != PEAK and i != SLOPE)
-    for left in (LEVEL, LEVEL + 2):
-        found = _keep_alike(state, left) or found
-    return found
 
 
 @kernel
@@ -196,6 +139,16 @@ def forget_levels(state: Record) -> None:
 
 
 @kernel
+def _sigma_of_axles(p: Record) -> float:
+    """Return the standard deviation of the front levels' mean less the rear ones'."""
+    variance = 0.0
+    for i in range(4):
+        for j in range(4):
+            variance += (0.25 if i // 2 == j // 2 else -0.25) * p[LEVEL + i, LEVEL + j]
+    return math.sqrt(max(variance, 0.0))
+
+
+@kernel
 def begin_application(state: Record, heat: Record) -> None:
     """Widen the levels by their change since the last application, and start with friction at its level.
 
@@ -210,8 +163,10 @@ def begin_application(state: Record, heat: Record) -> None:
         p[i, i] = max(p[i, i], PRIOR[i] ** 2 + zeros)
     widen_levels(state, STEP_COMMON**2, STEP_AXLE**2, STEP_WHEEL**2)
     for i in range(4):
+        state.before[i] = state.x[LEVEL + i]
         for j in range(4):
             p[LEVEL + i, LEVEL + j] += heat[i] * heat[j]
+    state.sigma_axles = _sigma_of_axles(p)
     for axle in range(2):
         clear_state(state, CHANGE + axle, CHANGE_COMMON**2 + CHANGE_AXLE**2)
         clear_state(state, MEAN + axle, 0.0)

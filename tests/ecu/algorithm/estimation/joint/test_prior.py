@@ -1,4 +1,4 @@
-"""What a brake application begins and ends with, and what a bound does to what is tied to it."""
+"""What a brake application begins and ends with."""
 
 import math
 
@@ -10,25 +10,18 @@ from ecu.algorithm.estimation.joint.layout import (
     DRIVE,
     JOINT_STATE,
     LEVEL,
-    MASS,
     MEAN,
     OFFSET,
     OVERRUN,
-    PEAK,
     RATE,
-    SLOPE,
-    STIFFNESS,
     N,
 )
 from ecu.algorithm.estimation.joint.prior import (
     CHANGE_AXLE,
     CHANGE_COMMON,
-    HIGHEST,
-    LEFT_RIGHT,
     LEVEL_AXLE,
     LEVEL_COMMON,
     LEVEL_WHEEL,
-    LOWEST,
     MEAN_ZERO,
     OVERRUN_MEAN,
     OVERRUN_SIGMA,
@@ -41,7 +34,6 @@ from ecu.algorithm.estimation.joint.prior import (
     begin_application,
     end_application,
     forget_levels,
-    keep_within_bounds,
     note_change,
     pressure_change,
     set_prior,
@@ -243,72 +235,3 @@ def test_relative_change_of_an_axles_pressure(last: float, now: float, change: f
     state["last_pressure"][2:], state["window"]["pressure"][2:] = [last - 2, last + 2], [now + 1, now - 1]
     assert pressure_change(state, 2) == pytest.approx(change)
     assert pressure_change(state, 0) == 0.0
-
-
-BOUNDED = [i for i in range(N) if math.isfinite(HIGHEST[i])]
-
-
-@pytest.mark.parametrize("side", ["lowest", "highest"])
-@pytest.mark.parametrize("i", BOUNDED)
-def test_a_state_beyond_its_bound_is_put_on_it_and_what_it_is_tied_to_follows(i: int, side: str) -> None:
-    """As a measurement without noise that it lies there would move them."""
-    state = tied(7)
-    bound = (LOWEST if side == "lowest" else HIGHEST)[i]
-    state["x"] = 0.0
-    if LEVEL <= i < LEVEL + 4:
-        state["x"][LEVEL : LEVEL + 4] = 0.9 * bound  # linings that are alike
-    state["x"][i] = bound + math.copysign(0.001, bound)
-    state["free"] = 1
-    x, P = state["x"].copy(), state["p"].copy()
-    assert keep_within_bounds(state) == (i not in (PEAK, SLOPE))  # they are the road's
-    np.testing.assert_allclose(state["x"], x + P[:, i] / P[i, i] * (bound - x[i]), rtol=1e-9, atol=1e-15)
-    assert state["x"][i] == pytest.approx(bound)
-    np.testing.assert_array_equal(state["p"], P)
-
-
-@pytest.mark.parametrize("apart", [0.3, -0.3])
-@pytest.mark.parametrize("axle", [0, 1])
-def test_levels_of_an_axle_stay_alike_as_if_their_difference_was_measured(axle: int, apart: float) -> None:
-    state = tied(10)
-    state["x"], state["free"] = 0.0, 1
-    left = LEVEL + 2 * axle
-    state["x"][left], state["x"][left + 1] = 0.5 * apart, -0.5 * apart
-    x, P = state["x"].copy(), state["p"].copy()
-    assert keep_within_bounds(state)
-    h = np.zeros(N)
-    h[left], h[left + 1] = 1.0, -1.0
-    kept = math.copysign(LEFT_RIGHT, apart)
-    np.testing.assert_allclose(state["x"], x + P @ h / (h @ P @ h) * (kept - apart), rtol=1e-9, atol=1e-15)
-    assert not keep_within_bounds(state)
-
-
-@pytest.mark.parametrize("free", [[], [STIFFNESS], [STIFFNESS, MASS]])
-def test_at_a_bound_only_what_is_free_follows(free) -> None:
-    state = tied(8)
-    state["x"] = 0.0
-    state["x"][STIFFNESS], state["free"][free] = 3.0, 1
-    assert keep_within_bounds(state)
-    assert state["x"][STIFFNESS] == HIGHEST[STIFFNESS]
-    moved = {int(i) for i in np.flatnonzero(state["x"])}
-    assert moved == {STIFFNESS} | ({MASS} if MASS in free else set())
-
-
-def test_inside_the_bounds_nothing_happens() -> None:
-    state = tied(9)
-    state["x"], state["free"] = 0.001, 1
-    before = state.tobytes()
-    assert not keep_within_bounds(state)
-    assert state.tobytes() == before
-
-
-def test_a_pushed_bound_does_not_drive_the_others_away() -> None:
-    """A hundred measurements that only a peak beyond its bound would fit, friction tied to it."""
-    state = np.zeros(1, JOINT_STATE)[0]
-    state["p"][np.ix_([PEAK, LEVEL], [PEAK, LEVEL])] = [[0.04, 0.018], [0.018, 0.01]]
-    state["free"] = 1
-    furthest = 0.0
-    for _ in range(100):
-        state["x"][[PEAK, LEVEL]] += [0.05, 0.0225]
-        keep_within_bounds(state)
-        furthest = max(furthest, abs(float(state["x"][LEVEL])))
-    assert furthest <= 0.45 * HIGHEST[PEAK] + 0.0225

@@ -1,0 +1,122 @@
+"""Bounds of what the joint observer learns: beyond them a fault was learned, not a car."""
+
+import math
+
+import numpy as np
+
+from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
+from ecu.algorithm.estimation.joint.kalman import clear_derivatives
+from ecu.algorithm.estimation.joint.layout import (
+    BIAS,
+    CHANGE,
+    DEFLECTION_GAIN,
+    DELAY,
+    DRAG,
+    LEVEL,
+    LOAD,
+    MASS,
+    MOTOR,
+    OVERRUN,
+    PEAK,
+    RADIUS,
+    RATIO,
+    ROLLING,
+    SLOPE,
+    STIFFNESS,
+    N,
+)
+from ecu.algorithm.estimation.joint.prior import OVERRUN_MEAN, OVERRUN_SIGMA
+from ecu.jit import Record, kernel
+
+LOWEST, HIGHEST = np.full(N, -np.inf), np.full(N, np.inf)
+LOWEST[LEVEL : LEVEL + 4], HIGHEST[LEVEL : LEVEL + 4] = math.log(LEAST_RATIO), math.log(GREATEST_RATIO)
+LEFT_RIGHT = 0.2  # of an axle's two levels: its linings are of one batch, and one that is oiled is found
+FRONT_REAR = 0.3  # of the axles' frictions within an application: fade on a steep descent
+AT_BOUND = 0.95  # of it
+PARTED = 3.0  # sigma, of what they may have been apart before
+LOWEST[STIFFNESS], HIGHEST[STIFFNESS] = math.log(0.4), math.log(2.5)
+LOWEST[RADIUS : RADIUS + 4], HIGHEST[RADIUS : RADIUS + 4] = -0.02, 0.02
+LOWEST[BIAS], HIGHEST[BIAS] = -0.6, 0.6
+LOWEST[SLOPE], HIGHEST[SLOPE] = -4.0, 4.0
+LOWEST[MASS], HIGHEST[MASS] = math.log(0.85), math.log(1.30)
+LOWEST[PEAK], HIGHEST[PEAK] = -1.0, 0.2
+LOWEST[RATIO], HIGHEST[RATIO] = -0.4, 0.4
+LOWEST[LOAD], HIGHEST[LOAD] = -0.3, 0.3
+LOWEST[DEFLECTION_GAIN], HIGHEST[DEFLECTION_GAIN] = -1.2, 1.2
+LOWEST[MOTOR], HIGHEST[MOTOR] = math.log(0.6), math.log(1.6)
+LOWEST[DRAG], HIGHEST[DRAG] = math.log(0.5), math.log(2.0)
+LOWEST[ROLLING], HIGHEST[ROLLING] = -0.03, 0.03
+LOWEST[DELAY], HIGHEST[DELAY] = -0.1, 0.1
+LOWEST[OVERRUN], HIGHEST[OVERRUN] = OVERRUN_MEAN - 4.0 * OVERRUN_SIGMA, OVERRUN_MEAN + 4.0 * OVERRUN_SIGMA
+
+
+@kernel
+def _keep_alike(state: Record, apart: float, most: float) -> bool:
+    """Return states that are `apart`, by derivatives `state.h`, to `most`; return whether they had parted."""
+    x, p, h, ph, free, variance = state.x, state.p, state.h, state.ph, state.free, 0.0
+    if abs(apart) <= most * (1.0 + 1e-9):
+        return False
+    for j in range(N):
+        ph[j] = 0.0
+        for i in range(N):
+            ph[j] += p[j, i] * h[i]
+        variance += h[j] * ph[j]
+    if not variance > 0.0:
+        return False
+    back = (math.copysign(most, apart) - apart) / variance
+    for j in range(N):
+        if free[j] or h[j] != 0.0:
+            x[j] += ph[j] * back
+    return True
+
+
+@kernel
+def _keep_sides_alike(state: Record, left: int) -> bool:
+    """Return the levels of an axle to within `LEFT_RIGHT` of each other; return whether they had parted."""
+    clear_derivatives(state)
+    state.h[left], state.h[left + 1] = 1.0, -1.0
+    return _keep_alike(state, state.x[left] - state.x[left + 1], LEFT_RIGHT)
+
+
+@kernel
+def _keep_axles_alike(state: Record) -> bool:
+    """Return the axles' frictions to within `FRONT_REAR` of the ratio that they had before this application.
+
+    Return whether they had parted. Linings of front and rear fade together or slowly; what moves them apart
+    faster is an axle's slip: of other tyres, or of wheel speeds that lie. Where a level is at its bound, the
+    changes contain what it lacks: then nothing is said.
+    """
+    clear_derivatives(state)
+    h, apart = state.h, 0.0
+    for i in range(4):
+        level = state.x[LEVEL + i]
+        if not AT_BOUND * LOWEST[LEVEL] < level < AT_BOUND * HIGHEST[LEVEL]:
+            return False
+        h[LEVEL + i] = 0.5 if i < 2 else -0.5
+        apart += h[LEVEL + i] * (state.x[LEVEL + i] - state.before[i])
+    h[CHANGE], h[CHANGE + 1] = 1.0, -1.0
+    apart += state.x[CHANGE] - state.x[CHANGE + 1]
+    return _keep_alike(state, apart, math.hypot(FRONT_REAR, PARTED * state.sigma_axles))
+
+
+@kernel
+def keep_within_bounds(state: Record) -> bool:
+    """Return learned states to their bounds; return whether any had left them.
+
+    The other states follow by their covariances and explain the remainder; otherwise they would drift for as
+    long as the bound acts. Peak and slope belong to the road: at their bounds they are no fault.
+    """
+    x, p, free, found = state.x, state.p, state.free, False
+    for i in range(N):
+        if x[i] < LOWEST[i] or x[i] > HIGHEST[i]:
+            back = min(max(x[i], LOWEST[i]), HIGHEST[i]) - x[i]
+            for j in range(N):
+                if j != i and free[i] and free[j] and p[i, i] > 0.0:
+                    x[j] += p[j, i] / p[i, i] * back
+            x[i] += back
+            found = found or (i != PEAK and i != SLOPE)
+    for left in (LEVEL, LEVEL + 2):
+        found = _keep_sides_alike(state, left) or found
+    if free[CHANGE]:
+        found = _keep_axles_alike(state) or found
+    return found
