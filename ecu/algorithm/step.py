@@ -309,7 +309,7 @@ def _control(p: Record, s: Record, u: Record, dt: float) -> float:
     if p.minimised:
         straight, share = calm and abs(e.accel_y) <= CALM_ACROSS, front_share(p, decel)
         lean(p, s.cleaner, torque, allowed, s.discs.temperature, share, e.mass, decel, straight, dt)
-    confirm_friction(p, s.control.confirmed, e, s.control.used, s.accel_error.offset, decel, calm, dt)
+    confirm_friction(p, s.control.confirmed, e, s.control.used, s.accel_error.wheels.offset, decel, calm, dt)
     follow_friction(p, s.control, e, dt)
     advance_pressures(s.hydraulics, s.limiter.pressure)
     update_motors(p, s.blending, u, s.guard.capped, e.speed, decel, dt)

@@ -1,16 +1,19 @@
-"""Zero and scale of the accelerometer that have drifted, by the wheels' deceleration and by coasting.
+"""Zero and scale of the accelerometer that have drifted, by the wheels' deceleration and by the torques.
 
     a - dw/dt = c + s dw/dt      c: zero and slope of the road, walks by `SLOPE_WALK`; s: scale error
-    a - f     = b                b: zero, while no brake is applied and the motors alone drive the car
+    a - f     = b + k f          b: zero; k: scale error, while no brake is applied and the motors alone drive
 
-of the blocks of 0.1 s that `acceleration.py` gathers. The first is a Kalman filter of two states: a slope
-does not come and go with the brakes. An error beyond its doubt is taken off the reading; one within is left
-to the observer. A zero moves b and c alike: c by what it is apart from the slope, its mean while b was within
-its doubt. A b that c does not show is no zero of the accelerometer (`motors.py`). A reading that is off by
-more than `GROSS` is not followed: it is implausible as a whole.
+of the blocks of 0.1 s that `acceleration.py` gathers. Each is a Kalman filter of two states: a slope does not
+come and go with the force. Errors of mass, motors, drag and pitch are in them from the start, so what counts
+is what they have moved by from their means, which stand still meanwhile.
+
+A zero moves b and c alike, a scale k and s: what has moved in both is taken off the reading. A c without b is
+a slope; a b without c is no zero of the accelerometer (`motors.py`), an s without k none of its scale. What
+both lines have moved by, where the car is now, tells the accelerometer's name before zero and scale can be
+told apart. Who gets in at a standstill changes b and k: then they are learned anew.
+
+A reading that is off by more than `GROSS` at once is not followed: it is implausible as a whole.
 """
-
-import math
 
 import numpy as np
 
@@ -21,16 +24,26 @@ from ecu.contract.params import GRAVITY
 from ecu.contract.signals import ACCEL_X
 from ecu.jit import Record, kernel
 
+LINE_STATE = np.dtype(
+    [
+        ("offset", "f8"),  # m/s^2
+        ("scale", "f8"),
+        ("p", "f8", (3,)),  # variances of both, covariance
+        ("usual_offset", "f8"),  # mean while nothing has moved [m/s^2]
+        ("usual_scale", "f8"),
+        ("offset_s", "f8"),  # learning times of these [s]
+        ("scale_s", "f8"),
+    ],
+    align=True,
+)
 ACCEL_ERROR_STATE = np.dtype(
     [
-        ("offset", "f8"),  # c [m/s^2]
-        ("scale", "f8"),  # s
-        ("p", "f8", (3,)),  # variances of both, covariance
-        ("zero", "f8"),  # b [m/s^2]
-        ("slope", "f8"),  # c as b was found within its doubt, mean of the last `SLOPE_S` [m/s^2]
-        ("sloped_s", "f8"),  # learning time of that, at most `SLOPE_S`
-        ("coasted_s", "f8"),  # learning time of that, at most `ZERO_S`
+        ("wheels", LINE_STATE),  # c, s
+        ("torques", LINE_STATE),  # b, k
         ("proven_s", "f8"),  # time for which the motors' torques alone have driven the car, at most `SURE_S`
+        ("doubted_s", "f8"),  # time for which both lines have moved to the same side, at most `TOLD_S`
+        ("told", "u1"),  # that has lasted
+        ("stood_s", "f8"),
         ("zero_off", "f8"),  # taken off the reading [m/s^2]
         ("scale_off", "f8"),  # of it
         ("reading", "f8"),  # last sample [m/s^2]
@@ -43,21 +56,22 @@ OFFSET_START, SCALE_START, SCALE_MOST = 0.5, 0.03, 0.05  # m/s^2, -, -
 LEAST_SHOWN = 2.0  # m/s^2, below which a scale does not show
 ACROSS = 1.0  # m/s^2, above which tyres drag
 SLOPE_WALK, SCALE_WALK = 0.1, 0.01  # m/s^2 and - per root second
-NOISE = 0.15  # m/s^2, of a block's difference
+ZERO_WALK, TORQUE_WALK = 0.03, 0.003  # likewise, of b and k
+NOISE, TORQUE_NOISE = 0.15, 0.1  # m/s^2, of a block's difference
 SLIP, SLIP_BY_SPEED = 0.1, 0.01  # of a change of force, -, s/m
 STEADY = 1.0  # m/s^2 in 0.2 s, beyond which tyres are on their way
 FARTHEST = 0.5
 GROSS = 1.5  # m/s^2
-ZERO_S, FEWEST_S = 1.0, 0.3
-FORCE = 0.1  # relative error of mass and motors
-WEIGHT = 0.15  # m/s^2, error of drag and rolling resistance
-SCALE_DOUBT, SIGMAS = 0.03, 2.0
-ZERO_DOUBT = 0.25  # m/s^2
-PROVING, ENGINE = 1.0, 0.2  # m/s^2; of it, what an unreported engine exceeds
+SLOPE_S, SCALE_S, TORQUES_S = 10.0, 30.0, 60.0  # memory of c, s, b and k
+FEWEST_S, FEWEST_SCALE_S, FEWEST_TOLD_S = 2.0, 3.0, 5.0
+MOVED, TOLD_S = 0.14, 0.4  # m/s^2, sound cars stay below 0.07; s
+STANDS, STOOD_S = 0.1, 10.0  # m/s, s
+ZERO_DOUBT = 0.18  # m/s^2; sound cars stay below 0.1
+SCALE_DOUBT, LEAST_SCALE = 0.033, 0.02  # of the mean of both, of each; sound cars stay below 0.029
+PROVING, ENGINE, ENGINE_ZERO = 1.0, 0.2, 0.25  # m/s^2; of it, m/s^2: what an unreported engine exceeds
 PROVEN_S, SURE_S, REFUTES = 0.5, 3.0, 5.0  # s, s; times as fast as it is proven
 CONFIRMED = 0.5  # of the zero, what the wheels must show of it too
 KEPT = 0.4
-SLOPE_S = 10.0
 SAME_S = 0.6  # the blocks whose deceleration is compared
 CHANGED = 1.0  # m/s^2, of the wheels' deceleration meanwhile
 
@@ -73,59 +87,112 @@ def _off(value: float, doubt: float, off: float) -> float:
 
 
 @kernel
-def _follow_scale(state: Record, mean: Record) -> None:
-    """Correct offset and scale error by the last block."""
-    p = state.p
-    p[0] += SLOPE_WALK**2 * BLOCK_S
-    p[1] = min(p[1] + SCALE_WALK**2 * BLOCK_S, SCALE_MOST**2)
-    change = abs(mean[0, F] - mean[2, F])
-    if change > STEADY:
-        return
-    rolled = (mean[0, W] - mean[1, W]) / BLOCK_S
-    h = (mean[0, W] - mean[3, W]) / (3.0 * BLOCK_S)
-    if abs(h) < LEAST_SHOWN:
-        h = 0.0  # noise of the wheels would show as a scale
-    noise = NOISE + (SLIP + SLIP_BY_SPEED * mean[0, W]) * change / (2.0 * BLOCK_S)
-    innovation = 0.5 * (mean[0, A] + mean[1, A]) - rolled - state.offset - state.scale * h
-    if abs(innovation) > GROSS:
-        return
+def _correct(line: Record, h: float, innovation: float, noise: float) -> None:
+    """Correct a line by a difference at `h` [m/s^2]."""
+    p = line.p
     to_offset, to_scale = p[0] + h * p[2], p[2] + h * p[1]
     variance = to_offset + h * to_scale + noise * noise
-    state.offset += to_offset / variance * innovation
-    state.scale = min(max(state.scale + to_scale / variance * innovation, -FARTHEST), FARTHEST)
+    line.offset += to_offset / variance * innovation
+    line.scale = min(max(line.scale + to_scale / variance * innovation, -FARTHEST), FARTHEST)
     p[0] -= to_offset * to_offset / variance
     p[1] -= to_scale * to_scale / variance
     p[2] -= to_offset * to_scale / variance
 
 
 @kernel
-def _follow_zero(params: Record, state: Record, mean: Record) -> None:
-    """Low-pass the difference from the motors' force and the resistances, by its certainty, and the slope."""
-    speed = mean[0, W]
-    resistance = params.drag_area * speed * speed / params.mass + params.rolling_resistance * GRAVITY
-    innovation = mean[0, A] - mean[0, F] + resistance - state.zero
-    if mean[0, F] > PROVING:
-        engine = ENGINE * mean[0, F] + ZERO_DOUBT
-        if abs(innovation) < engine:
-            state.proven_s = min(state.proven_s + BLOCK_S, SURE_S)
-        elif innovation > engine:
-            state.proven_s = max(state.proven_s - REFUTES * BLOCK_S, 0.0)
-    if abs(innovation) > GROSS or state.proven_s < PROVEN_S:
-        return
-    certainty = (WEIGHT / (WEIGHT + FORCE * abs(mean[0, F]))) ** 2
-    state.coasted_s = min(state.coasted_s + certainty * BLOCK_S, ZERO_S)
-    gain = certainty * BLOCK_S / state.coasted_s
-    state.zero += gain * innovation
-    if abs(state.zero) < ZERO_DOUBT:
-        state.sloped_s = min(state.sloped_s + BLOCK_S, SLOPE_S)
-        state.slope += (state.offset - state.slope) * BLOCK_S / state.sloped_s
+def _walk(line: Record, offset: float, scale: float) -> None:
+    """Widen a line by a block's random walk."""
+    line.p[0] += offset * offset * BLOCK_S
+    line.p[1] = min(line.p[1] + scale * scale * BLOCK_S, SCALE_MOST**2)
 
 
 @kernel
-def moved_offset(state: Record) -> float:
-    """Return what the wheels show of a zero of the accelerometer [m/s^2]: c less the slope."""
-    moved: float = state.offset - state.slope
+def _learn_offset(line: Record, memory_s: float) -> None:
+    line.offset_s = min(line.offset_s + BLOCK_S, memory_s)
+    line.usual_offset += (line.offset - line.usual_offset) * BLOCK_S / line.offset_s
+
+
+@kernel
+def _learn_scale(line: Record, memory_s: float) -> None:
+    line.scale_s = min(line.scale_s + BLOCK_S, memory_s)
+    line.usual_scale += (line.scale - line.usual_scale) * BLOCK_S / line.scale_s
+
+
+@kernel
+def _follow_wheels(state: Record, mean: Record) -> None:
+    """Correct c and s by the last block."""
+    line = state.wheels
+    _walk(line, SLOPE_WALK, SCALE_WALK)
+    change = abs(mean[0, F] - mean[2, F])
+    h = (mean[0, W] - mean[3, W]) / (3.0 * BLOCK_S)
+    if abs(h) < LEAST_SHOWN:
+        h = 0.0  # noise of the wheels would show as a scale
+    elif state.scale_off == 0.0 and state.told == 0:
+        _learn_scale(line, SCALE_S)
+    rolled = (mean[0, W] - mean[1, W]) / BLOCK_S
+    innovation = 0.5 * (mean[0, A] + mean[1, A]) - rolled - line.offset - line.scale * h
+    if change > STEADY or abs(innovation) > GROSS:
+        return
+    _correct(line, h, innovation, NOISE + (SLIP + SLIP_BY_SPEED * mean[0, W]) * change / (2.0 * BLOCK_S))
+
+
+@kernel
+def moved_offset(line: Record) -> float:
+    """Return what the offset of a line has moved by [m/s^2]; of that by the wheels it is c less the slope."""
+    moved: float = line.offset - line.usual_offset
     return moved
+
+
+@kernel
+def _compare_lines(state: Record, mean: Record, witness: Record) -> None:
+    """Overwrite `told`: both lines have moved to the same side at the force and the deceleration of now."""
+    wheels, torques = state.wheels, state.torques
+    h = (mean[0, W] - mean[3, W]) / (3.0 * BLOCK_S)
+    moved = moved_offset(torques) + (torques.scale - torques.usual_scale) * mean[0, F]
+    beside = moved_offset(wheels)
+    if abs(h) > LEAST_SHOWN:
+        beside += (wheels.scale - wheels.usual_scale) * h
+    if torques.offset_s < FEWEST_TOLD_S:
+        return
+    agree = beside * moved > CONFIRMED * moved * moved
+    if agree:
+        compare(witness, ACCEL_X, moved, MOVED)
+    stands = abs(moved) > (KEPT if state.told else 1.0) * MOVED
+    change = BLOCK_S if stands and (agree or state.told != 0) else -BLOCK_S
+    state.doubted_s = min(max(state.doubted_s + change, 0.0), TOLD_S)
+    state.told = (
+        1 if state.doubted_s > TOLD_S - 0.5 * BLOCK_S or (state.told and state.doubted_s > 0.0) else 0
+    )
+
+
+@kernel
+def _follow_torques(params: Record, state: Record, mean: Record, witness: Record) -> None:
+    """Correct b and k by the last block, and find the zero."""
+    line, force, speed = state.torques, mean[0, F], mean[0, W]
+    resistance = params.drag_area * speed * speed / params.mass + params.rolling_resistance * GRAVITY
+    left = mean[0, A] - force + resistance
+    if force > PROVING:
+        engine = ENGINE * force + ENGINE_ZERO
+        if abs(left) < engine:
+            state.proven_s = min(state.proven_s + BLOCK_S, SURE_S)
+        elif left - max(moved_offset(state.wheels), 0.0) > engine:
+            state.proven_s = max(state.proven_s - REFUTES * BLOCK_S, 0.0)
+    innovation = left - line.offset - line.scale * force
+    if abs(innovation) > GROSS or state.proven_s < PROVEN_S:
+        return
+    _walk(line, ZERO_WALK, TORQUE_WALK)
+    _correct(line, force, innovation, TORQUE_NOISE)
+    _compare_lines(state, mean, witness)
+    if state.zero_off == 0.0 and state.told == 0:
+        _learn_offset(line, TORQUES_S)
+        _learn_scale(line, TORQUES_S)
+        if abs(moved_offset(line)) < 0.5 * ZERO_DOUBT:
+            _learn_offset(state.wheels, SLOPE_S)
+    zero = moved_offset(line)
+    confirmed = line.offset_s > FEWEST_S and moved_offset(state.wheels) * zero > CONFIRMED * zero * zero
+    if confirmed:
+        compare(witness, ACCEL_X, zero, ZERO_DOUBT)
+    state.zero_off = _off(zero, ZERO_DOUBT, state.zero_off) if confirmed else 0.0
 
 
 @kernel
@@ -142,20 +209,27 @@ def follow_accel_error(
         across: lateral acceleration [m/s^2].
         braking: a brake application lasts.
     """
-    if state.p[0] == 0.0:
-        state.p[0], state.p[1] = OFFSET_START**2, SCALE_START**2
+    wheels, torques = state.wheels, state.torques
+    if wheels.p[0] == 0.0:
+        wheels.p[0], wheels.p[1] = OFFSET_START**2, SCALE_START**2
+        torques.p[0], torques.p[1] = OFFSET_START**2, SCALE_MOST**2
+    stands = abs(blocks.mean[0, ROLLED]) < STANDS
+    state.stood_s = state.stood_s + BLOCK_S if stands else 0.0
+    if state.stood_s > STOOD_S and not (state.told or state.zero_off != 0.0 or state.scale_off != 0.0):
+        torques.offset_s = torques.scale_s = 0.0
+        torques.p[1] = SCALE_MOST**2
     if blocks.good_blocks > 3:
-        _follow_scale(state, blocks.mean)
+        _follow_wheels(state, blocks.mean)
     if blocks.known_blocks > 1 and not braking and abs(across) < ACROSS:
-        _follow_zero(params, state, blocks.mean)
-    doubt = SCALE_DOUBT + SIGMAS * math.sqrt(state.p[1])
-    compare(witness, ACCEL_X, state.scale * LEAST_SHOWN, doubt * LEAST_SHOWN)
-    state.scale_off = _off(state.scale, doubt, state.scale_off)
-    if state.coasted_s > FEWEST_S:
-        confirmed = moved_offset(state) / state.zero > CONFIRMED if state.zero != 0.0 else False
-        state.zero_off = _off(state.zero, ZERO_DOUBT, state.zero_off) if confirmed else 0.0
-        if confirmed:
-            compare(witness, ACCEL_X, state.zero, ZERO_DOUBT)
+        _follow_torques(params, state, blocks.mean, witness)
+    by_wheels, by_torques = wheels.scale - wheels.usual_scale, torques.scale - torques.usual_scale
+    shown = 0.5 * (by_wheels + by_torques)
+    if by_wheels * by_torques <= 0.0 or min(abs(by_wheels), abs(by_torques)) < LEAST_SCALE:
+        shown = 0.0
+    if wheels.scale_s > FEWEST_SCALE_S and torques.scale_s > FEWEST_S:
+        compare(witness, ACCEL_X, shown * LEAST_SHOWN, SCALE_DOUBT * LEAST_SHOWN)
+        still = state.scale_off != 0.0 and abs(by_wheels) > KEPT * SCALE_DOUBT
+        state.scale_off = by_wheels if still or abs(shown) > SCALE_DOUBT else 0.0
 
 
 @kernel

@@ -41,15 +41,15 @@ def _watch_motion(p: Record, s: Record, u: Record, dt: float) -> int:
     """Return the fault bits of accelerometer, motors and speeds by the torques, where these are known."""
     faults, estimate = 0, s.estimate
     braking = s.application.braking != 0
-    base, slope = s.control.base, s.accel_error.slope
+    base, slope = s.control.base, s.accel_error.wheels.usual_offset
     watch_acceleration(p, s.acceleration, s.witness, u, estimate, base, slope, braking, dt)
     watch_frozen(s.accel_error, s.acceleration, s.witness, u, dt)
     if s.acceleration.time == 0.0 and not s.witness.rejected[ACCEL_X]:
         follow_accel_error(p, s.accel_error, s.witness, s.acceleration, estimate.accel_y, braking)
-    if s.accel_error.zero_off != 0.0 or s.accel_error.scale_off != 0.0:
+    if s.accel_error.told or s.accel_error.zero_off != 0.0 or s.accel_error.scale_off != 0.0:
         faults |= ACCEL_X_DRIFTED
     if s.accel_error.proven_s > PROVEN_S and not wheels_deny(s.acceleration):
-        moved = moved_offset(s.accel_error)
+        moved = moved_offset(s.accel_error.wheels)
         watch_motors(p, s.motors, s.witness, u, estimate, base, moved, dt)
     asked = braking and requested_decel(p, u) > LEAST_REQUEST
     if asked and s.plausibility.sent and not (driver_accelerates(u) or others_brake(u)):

@@ -26,6 +26,7 @@ class Car:
         self.blocks, self.estimate = np.zeros(1, ACCELERATION_STATE)[0], np.zeros(1, ESTIMATE)[0]
         self.state, self.witness = np.zeros(1, ACCEL_ERROR_STATE)[0], np.zeros(1, WITNESS_STATE)[0]
         self.random, self.clock = np.random.default_rng(7), 0.0
+        self.told: float | None = None
         self.estimate["mu"] = self.p["mu_nominal"]
 
     def asked(self, t: float) -> float:
@@ -33,12 +34,28 @@ class Car:
         t %= 12.0
         return 2.5 if t < 4.0 else 0.0 if t < 7.0 else -4.0 * min((t - 7.0) / 0.4, 1.0) if t < 9.5 else 0.0
 
-    def drive(self, seconds, zero=0.0, scale=0.0, slope=0.0, motors=1.0, frozen=False) -> None:
-        """`motors`: share of the driving force that their torques show; `slope` of the road [m/s^2]."""
+    def drive(
+        self, seconds, zero=0.0, scale=0.0, slope=0.0, motors=1.0, rolled=1.0, frozen=False, grows=False
+    ) -> None:
+        """Drive on.
+
+        Args:
+            seconds: duration.
+            zero: of the accelerometer [m/s^2].
+            scale: of it.
+            slope: of the road [m/s^2].
+            motors: share of the driving force that their torques show.
+            rolled: of their speed that all wheel speeds show.
+            frozen: the accelerometer's reading stays as it is.
+            grows: these are what is added to each in a second.
+        """
         p, base = self.p, self.p["mu_nominal"].copy()
-        speed = 20.0
-        for _ in range(round(seconds / DT)):
+        speed, each = 20.0, (zero, scale, slope, motors - 1.0, rolled - 1.0)
+        for k in range(round(seconds / DT)):
             self.clock += DT
+            if grows:
+                zero, scale, slope, motors, rolled = (k * DT * value for value in each)
+                motors, rolled = 1.0 + motors, 1.0 + rolled
             force = self.asked(self.clock)
             resistance = p["drag_area"] * speed * speed / p["mass"] + p["rolling_resistance"] * GRAVITY
             if force > 0.0:  # a third of the time: what keeps the speed
@@ -46,7 +63,7 @@ class Car:
             dv = force - resistance - slope
             speed = max(speed + DT * dv, 12.0)
             slip = force / (GRAVITY * p["slip_stiffness"][0])
-            wheels = speed * (1.0 + slip) / p["wheel_radius"]
+            wheels = rolled * speed * (1.0 + slip) / p["wheel_radius"]
             reading = (1.0 + scale) * dv + slope + zero + self.random.normal(0.0, 0.05)
             wheel_torque = force * p["mass"] * p["wheel_radius"] / 4.0
             self.feed(
@@ -66,6 +83,14 @@ class Car:
             watch_frozen(self.state, self.blocks, self.witness, self.inputs[0], DT)
             if self.blocks["time"] == 0.0:
                 follow_accel_error(p, self.state, self.witness, self.blocks, 0.0, braking)
+            if self.state["told"] and self.told is None:
+                self.told = self.clock
+
+    def stand(self, seconds) -> None:
+        self.blocks["mean"] = 0.0
+        self.blocks["good_blocks"] = self.blocks["known_blocks"] = 0
+        for _ in range(round(seconds / 0.1)):
+            follow_accel_error(self.p, self.state, self.witness, self.blocks, 0.0, False)
 
 
 # reading, seconds; taken off a reading of 0 and of -4 m/s2
@@ -107,3 +132,45 @@ def test_a_slope_is_no_zero(params, feed, slope: float, case, wrong, off: float)
     car.drive(40.0, **{"slope": slope} | wrong)
     print(car.state)
     assert -correct_accel(car.state, 0.0) == pytest.approx(off, abs=0.1)
+
+
+GROWS = [
+    # what grows, each second; told after [s], None: never
+    ("nothing", {}, None),
+    ("the accelerometer's zero by 0.05 m/s2", {"zero": 0.05}, 6.0),
+    ("by -0.05 m/s2", {"zero": -0.05}, 6.0),
+    ("its scale by 1 %", {"scale": 0.01}, 15.0),
+    ("by -1 %", {"scale": -0.01}, 15.0),
+    ("the slope by 0.05 m/s2", {"slope": 0.05}, None),
+    ("all wheel speeds by 0.5 %", {"rolled": 1.005}, None),
+    ("by -0.5 %", {"rolled": 0.995}, None),
+    ("motor torques by 1 %", {"motors": 1.01}, None),
+]
+
+
+@pytest.mark.parametrize(("case", "wrong", "after"), GROWS, ids=[c[0] for c in GROWS])
+def test_when_the_accelerometer_is_told(params, feed, case, wrong, after: float | None) -> None:
+    """By two witnesses; what one alone shows is taken off no reading."""
+    car = Car(params, feed)
+    car.drive(48.0)
+    car.drive(20.0, grows=True, **wrong)
+    print(car.told, car.state)
+    if after is None:
+        assert car.told is None
+        assert correct_accel(car.state, -4.0) == -4.0
+    else:
+        assert car.told is not None
+        assert 1.0 < car.told - 48.0 < after
+
+
+@pytest.mark.parametrize(("stands", "told"), [(0.0, True), (15.0, False)])
+def test_who_gets_in_at_a_standstill_is_no_error_of_the_accelerometer(
+    params, feed, stands: float, told: bool
+) -> None:
+    """A sixth more of mass, on a road that climbs as much as the car then lacks."""
+    car = Car(params, feed)
+    car.drive(48.0)
+    car.stand(stands)
+    car.drive(12.0, motors=1.17)
+    car.drive(24.0, motors=1.17, slope=-0.5)
+    assert (car.told is not None) == told
