@@ -25,7 +25,7 @@ import pytest
 from brakelab.bench.braking import simulated_stop
 from brakelab.bench.cycle import bursts, our_side
 from brakelab.bench.socket_pair import put, take
-from ecu.jit import library
+from ecu.jit import library, library_of
 
 pytestmark = pytest.mark.compiled
 ROOT, COMMITTED = Path(__file__).parent.parent, Path(__file__).parent / "counts.json"
@@ -34,6 +34,13 @@ GROWTH = 1.1
 CYCLES = 30
 KERNEL = re.compile(r"^@(?:parallel_|batch_)?kernel\b", re.MULTILINE)
 IMPORTED = re.compile(r"^import time: +\d+ \| +\d+ \| *([\w.]+)$", re.MULTILINE)
+
+
+@pytest.fixture(autouse=True)
+def of_these_texts() -> None:
+    """With numba in place of a library all counts are others."""
+    if None in map(library_of, ("ecu.algorithm.step", "brakelab.replay.engine", "brakelab.logs.candump")):
+        pytest.skip("no library of these texts; python -m brakelab.build makes it")
 
 
 def check(name: str, found: int, of: str = "") -> None:
@@ -54,8 +61,8 @@ def check(name: str, found: int, of: str = "") -> None:
 def test_kernels_and_their_library(package: str, folder: str) -> None:
     texts = (path.read_text("utf-8") for path in (ROOT / folder).rglob("*.py"))
     check(f"kernels in {folder}", sum(len(KERNEL.findall(text)) for text in texts))
-    if (found := library(package)) is None:
-        pytest.skip("no library for this processor")
+    found = library(package)
+    assert found is not None
     check(f"kernels of {folder} that Python calls", len(found.manifest["kernels"]))
     file = found.folder / found.manifest["processors"][found.processor]
     check(f"library of {folder}, kB", file.stat().st_size // 1000, found.processor)
@@ -137,8 +144,16 @@ def test_memory_of_python_in_a_cycle(cycle: Callable[..., None]) -> None:
 def test_system_calls_in_a_cycle(cycle: Callable[..., None], tmp_path: Path) -> None:
     if shutil.which("strace") is None:
         pytest.skip("no strace")
-    calls = tmp_path / "calls"
-    command = ["strace", "-p", str(threading.get_native_id()), "-o", str(calls)]
+    calls = tmp_path / "calls"  # a cycle that is late sleeps less often
+    command = [
+        "strace",
+        "-e",
+        "trace=!clock_nanosleep",
+        "-p",
+        str(threading.get_native_id()),
+        "-o",
+        str(calls),
+    ]
     strace = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     assert strace.stderr is not None
     if "attached" not in strace.stderr.readline():
@@ -153,4 +168,5 @@ def test_system_calls_in_a_cycle(cycle: Callable[..., None], tmp_path: Path) -> 
         r"^getppid\(.*\n((?:(?!getppid).*\n)*)getppid", calls.read_text("utf-8"), re.MULTILINE
     )
     assert len(between) == CYCLES
-    check("system calls in a cycle", sum(one.count("\n") for one in between) // CYCLES, platform.machine())
+    counts = sorted(one.count("\n") for one in between)
+    check("system calls in a cycle, but sleeps", counts[CYCLES // 2], platform.machine())

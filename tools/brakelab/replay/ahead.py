@@ -1,4 +1,4 @@
-"""Blocks of input that another thread prepares: reading and parsing beside the algorithm.
+"""Input that another thread prepares: reading, parsing and receiving beside the algorithm.
 
 Both spend most of their time where other threads of Python run (`ecu.jit.batch_kernel`).
 """
