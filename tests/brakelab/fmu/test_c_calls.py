@@ -4,7 +4,7 @@ import ctypes
 import os
 import subprocess
 from collections.abc import Callable
-from ctypes import c_bool, c_double, c_size_t, c_uint32
+from ctypes import byref, c_bool, c_double, c_size_t, c_uint32
 from pathlib import Path
 
 import pytest
@@ -13,7 +13,7 @@ from brakelab.fmu import command
 from ecu.building.c_compiler import compile_shared
 from ecu.settings.resources import resource
 
-from .master import DISCARD, ERROR, OK, Fmu, Instance
+from .master import DISCARD, ERROR, OK, STEP, Fmu, Instance
 from .test_ecu_unit import DRIVING
 
 ENTER = ("EnterInitializationMode", c_bool(False), c_double(0.0), c_double(0.0), c_bool(False), c_double(0.0))
@@ -36,12 +36,16 @@ WRONG: list[tuple[str, Callable[[Instance], int], int, str]] = [
     ("a step of 25 ms", lambda fmu: fmu.step(0.025), DISCARD, "a step of 0.025 s"),
     ("no step", lambda fmu: fmu.step(0.0), DISCARD, "a step of 0 s"),
     ("a step without an end", lambda fmu: fmu.step(1e300), DISCARD, "a step of 1e+300 s"),
+    ("a step of days", lambda fmu: fmu.step(1e6), DISCARD, "this FMU takes steps of 1 h at most"),
     ("a step back", lambda fmu: fmu.step(-0.01), DISCARD, "a step of -0.01 s"),
     ("a step of NaN", lambda fmu: fmu.step(float("nan")), DISCARD, "a step of nan s"),
     ("a step elsewhere", lambda fmu: fmu.step_from(5.0), DISCARD, "a step from 5 s: this FMU is at 0.01"),
     ("an unknown one read", lambda fmu: fmu.call("GetFloat64", *one(9999)), ERROR, "no variable 9999, the"),
     ("an unknown one set", lambda fmu: fmu.call("SetFloat64", *one(9999)), ERROR, "no variable 9999"),
     ("values missing", lambda fmu: fmu.call("GetFloat64", *one(1, 2)), ERROR, "2 values of 1 variables"),
+    ("no array", lambda fmu: fmu.call("GetFloat64", None, *one(1)[1:]), ERROR, "no array of variables"),
+    ("no values", lambda fmu: fmu.call("SetFloat64", *one(1)[:2], None, c_size_t(1)), ERROR, "of values"),
+    ("values without end", lambda fmu: fmu.call("GetFloat64", *one(1, 2**64 - 1)), ERROR, "of 1 variables"),
     ("an output set", lambda fmu: fmu.put({"mode": 1.0}), ERROR, "cannot be set"),
     ("time set", lambda fmu: fmu.put({"time": 1.0}), ERROR, "cannot be set"),
     ("a parameter set late", lambda fmu: fmu.put_truth("armed", False), ERROR, "cannot be set any more"),
@@ -52,6 +56,13 @@ WRONG: list[tuple[str, Callable[[Instance], int], int, str]] = [
     ("event mode", lambda fmu: fmu.call("EnterEventMode"), ERROR, "fmi3EnterEventMode: not provided"),
     ("no state", lambda fmu: fmu.restore(ctypes.c_void_p()), ERROR, "no state of this FMU is given"),
     ("a foreign state", lambda fmu: fmu.restore(FOREIGN), ERROR, "no state of this FMU is given"),
+    ("a foreign one kept", lambda fmu: fmu.call("GetFMUState", byref(FOREIGN)), ERROR, "no place for a"),
+    ("nowhere kept", lambda fmu: fmu.call("GetFMUState", None), ERROR, "no place for a state"),
+    ("a foreign one out", lambda fmu: fmu.call("SerializeFMUState", FOREIGN, _BYTES, c_size_t(2**20)), ERROR,
+        "no state of this FMU"),
+    ("no bytes", lambda fmu: fmu.call("DeserializeFMUState", None, c_size_t(100), byref(FOREIGN)), ERROR,
+        "not a state of this FMU"),
+    ("no size", lambda fmu: fmu.call("SerializedFMUStateSize", FOREIGN, None), ERROR, "no place for the"),
 ]  # fmt: skip
 
 
@@ -86,6 +97,26 @@ def test_a_call_at_the_wrong_time_is_refused(suv: Fmu) -> None:
         assert ecu.call("Terminate") == OK
         assert ecu.step() == ERROR
         assert "fmi3DoStep: not after the end, or an error" in ecu.messages[-1][2]
+
+
+def test_results_of_a_step_that_nobody_asks_for_are_left_out(suv: Fmu) -> None:
+    with suv.instantiate() as ecu:
+        ecu.initialise()
+        assert ecu.call("DoStep", *ecu.step_arguments()[:3], None, None, None, None) == OK
+        assert ecu.get(["time"])[0] == STEP
+
+
+def test_a_library_of_a_relative_path_finds_its_kernels_from_any_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its folder may have a space and an umlaut."""
+    command.write_ecu(resource("config/suv.toml"), tmp_path / "ecu.fmu")
+    monkeypatch.chdir(tmp_path)
+    fmu = Fmu(Path("ecu.fmu"), Path("Prüfstand 1"))
+    monkeypatch.chdir("/")
+    with fmu.instantiate() as ecu:
+        assert ecu.initialise() == OK
+        assert ecu.step() == OK
 
 
 def test_the_stop_time_is_the_end(suv: Fmu) -> None:

@@ -1,4 +1,4 @@
-"""FMI 2.0: the same bits as by FMI 3.0, the same refusals, and the end of a scenario in its own way."""
+"""FMI 2.0: the same bits as by FMI 3.0, the same refusals, and how it ends a scenario."""
 
 import ctypes
 import subprocess
@@ -54,6 +54,14 @@ WRONG: list[tuple[str, Callable[[Instance], int], int, str]] = [
     ("a step elsewhere", lambda fmu: fmu.step_from(5.0), DISCARD, "a step from 5 s: this FMU is at 0.01"),
     ("an unknown one read", lambda fmu: fmu.call("GetReal", *one), ERROR, "fmi2GetReal: no variable 9999"),
     ("an unknown one set", lambda fmu: fmu.call("SetReal", *one), ERROR, "fmi2SetReal: no variable 9999"),
+    (
+        "no array",
+        lambda fmu: fmu.call("GetReal", None, *one[1:]),
+        ERROR,
+        "fmi2GetReal: no array of variables",
+    ),
+    ("no values", lambda fmu: fmu.call("SetReal", *one[:2], None), ERROR, "fmi2SetReal: no array of values"),
+    ("no size", lambda fmu: fmu.call("SerializedFMUstateSize", None, None), ERROR, "no place for the size"),
     ("an output set", lambda fmu: fmu.put({"mode": 1.0}), ERROR, "cannot be set"),
     ("a parameter set late", lambda fmu: fmu.put_truth("armed", False), ERROR, "cannot be set any more"),
     ("another type", lambda fmu: fmu.call("GetInteger", *one), ERROR, "no variable is of this type"),

@@ -1,6 +1,7 @@
 """States: a run goes on from one as it went on before, in this instance or in another one."""
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -96,6 +97,36 @@ def test_instances_do_not_know_each_other(fmu: Fmu) -> None:
             rows.append(braking(one, 1, k))
             braking(other, 1, 200 - k)
         assert np.concatenate(rows).tobytes() == expected.tobytes()
+
+
+def test_instances_run_in_threads_of_their_own(fmu: Fmu) -> None:
+    def drive(first: int) -> bytes:
+        with fmu.instantiate() as instance:
+            assert instance.initialise() == OK
+            return braking(instance, 300, first).tobytes()
+
+    expected = [drive(0), drive(70)]
+    assert expected[0] != expected[1]
+    with ThreadPoolExecutor(2) as threads:
+        assert list(threads.map(drive, (0, 70) * 3)) == expected * 3
+
+
+@pytest.mark.parametrize("start", [-9.99e8, -5.0, 0.005, 1e5, 9.99e8])
+def test_the_start_time_changes_no_output(fmu: Fmu, start: float) -> None:
+    rows = []
+    for begin in (0.0, start):
+        with fmu.instantiate() as instance:
+            assert instance.initialise(begin) == OK
+            rows.append(braking(instance, 150)[:, :-1].tobytes())  # but for the time
+    assert rows[0] == rows[1]
+
+
+def test_a_state_of_another_unit_is_refused(suv: Fmu, stop: Fmu) -> None:
+    with suv.instantiate() as ecu, stop.instantiate() as vehicle:
+        state = ecu.state()
+        assert vehicle.restore(state) == ERROR
+        assert ecu.restore(state) == OK
+        assert ecu.free(state) == OK
 
 
 def test_reset_is_a_new_instance(running: Instance) -> None:

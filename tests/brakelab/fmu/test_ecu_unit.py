@@ -13,7 +13,16 @@ from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.scenario import load_scenario
 from brakelab.simulation.simulate import write_columns
 from ecu.contract.faults import IMU_LOST, PRESSURE_LOST, WHEEL_SPEED_LOST
-from ecu.contract.signals import ACTIVE, FAILED, INPUT_SIGNALS, N_OUTPUTS, OUTPUT_COLUMNS, READY, STARTING
+from ecu.contract.signals import (
+    ACTIVE,
+    CORNERS,
+    FAILED,
+    INPUT_SIGNALS,
+    N_OUTPUTS,
+    OUTPUT_COLUMNS,
+    READY,
+    STARTING,
+)
 from ecu.settings.config import load_config, new_params
 from ecu.settings.resources import resource
 
@@ -135,6 +144,25 @@ def test_nan_ages_until_the_time_out_and_what_is_out_of_range_is_invalid_at_once
         assert (before & fault, after & fault) == (0, fault)
         ecu.put({name: DRIVING[name]})
         assert int(stepped(ecu, 20)["active_faults"]) & fault == 0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_input_makes_the_ecu_demand_what_no_brake_gives(suv: Fmu, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    odd = [1e300, -1e300, 1e6, 30.0, 1.0, 0.0, -1.0, 5e-324, np.nan, np.inf, -np.inf]
+    names = [f"{demand}_demand_{corner}" for demand in ("pressure", "motor") for corner in CORNERS]
+    with suv.instantiate() as ecu:
+        ecu.initialise()
+        for cycle in range(300):
+            values = {name: DRIVING.get(name, 0.0) for name in suv.inputs}
+            if cycle >= 100:
+                values |= {name: float(random.choice(odd)) for name in suv.inputs if random.random() < 0.3}
+            ecu.put(values)
+            assert ecu.step() == OK
+            pressures, motors = np.split(ecu.get(names), 2)
+            assert ((pressures >= 0.0) & (pressures <= 200.0)).all(), pressures
+            assert np.isnan(motors).all() or np.isfinite(motors).all()
+            assert ecu.get(["mode"])[0] in (0.0, 1.0, 2.0, 3.0, 4.0)
 
 
 def test_inputs_that_were_never_set_are_absent(suv: Fmu) -> None:

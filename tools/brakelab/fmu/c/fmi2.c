@@ -60,7 +60,7 @@ EXPORT int fmi2Reset(instance *of) {
 }
 
 EXPORT int fmi2GetReal(instance *of, const reference variables[], size_t count, double values[]) {
-    if (!of) return ERROR;
+    if (!of || incomplete(of, __func__, count, variables, values)) return ERROR;
     for (size_t i = 0; i < count; i++) {
         if (misused(of, __func__, variables[i], false, false)) return ERROR;
         values[i] = VARIABLES[variables[i]].kind == TIME ? time_of(&of->now) : *number(of, variables[i]);
@@ -70,6 +70,7 @@ EXPORT int fmi2GetReal(instance *of, const reference variables[], size_t count, 
 
 EXPORT int fmi2SetReal(instance *of, const reference variables[], size_t count, const double values[]) {
     if (refused(of, INSTANTIATED | INITIALISING | STEPPING, __func__)) return ERROR;
+    if (incomplete(of, __func__, count, variables, values)) return ERROR;
     for (size_t i = 0; i < count; i++) {
         if (misused(of, __func__, variables[i], true, false)) return ERROR;
         *number(of, variables[i]) = values[i];
@@ -78,7 +79,7 @@ EXPORT int fmi2SetReal(instance *of, const reference variables[], size_t count, 
 }
 
 EXPORT int fmi2GetBoolean(instance *of, const reference variables[], size_t count, int values[]) {
-    if (!of) return ERROR;
+    if (!of || incomplete(of, __func__, count, variables, values)) return ERROR;
     for (size_t i = 0; i < count; i++) {
         if (misused(of, __func__, variables[i], false, true)) return ERROR;
         values[i] = of->now.memory[VARIABLES[variables[i]].offset] != 0;
@@ -88,6 +89,7 @@ EXPORT int fmi2GetBoolean(instance *of, const reference variables[], size_t coun
 
 EXPORT int fmi2SetBoolean(instance *of, const reference variables[], size_t count, const int values[]) {
     if (refused(of, INSTANTIATED | INITIALISING | STEPPING, __func__)) return ERROR;
+    if (incomplete(of, __func__, count, variables, values)) return ERROR;
     for (size_t i = 0; i < count; i++) {
         if (misused(of, __func__, variables[i], true, true)) return ERROR;
         of->now.memory[VARIABLES[variables[i]].offset] = values[i] != 0;
@@ -114,7 +116,7 @@ EXPORT int fmi2GetBooleanStatus(instance *of, int kind, int *value) {
     return OK;
 }
 
-EXPORT int fmi2GetFMUstate(instance *of, void **state) { return of && state ? keep(of, state) : ERROR; }
+EXPORT int fmi2GetFMUstate(instance *of, void **state) { return of ? keep(of, state) : ERROR; }
 
 EXPORT int fmi2SetFMUstate(instance *of, void *state) { return of ? restore(of, state) : ERROR; }
 
@@ -124,7 +126,8 @@ EXPORT int fmi2FreeFMUstate(instance *of, void **state) {
 }
 
 EXPORT int fmi2SerializedFMUstateSize(instance *of, void *state, size_t *size) {
-    (void)of, (void)state;
+    (void)state;
+    if (!of || !size) return of ? tell(of, ERROR, "%s: no place for the size", __func__) : ERROR;
     *size = SERIALISED;
     return OK;
 }
@@ -134,7 +137,7 @@ EXPORT int fmi2SerializeFMUstate(instance *of, void *state, unsigned char bytes[
 }
 
 EXPORT int fmi2DeSerializeFMUstate(instance *of, const unsigned char bytes[], size_t size, void **state) {
-    return of && state ? deserialise(of, bytes, size, state) : ERROR;
+    return of ? deserialise(of, bytes, size, state) : ERROR;
 }
 
 /* What every library for co-simulation has to export, and this one has no use for. */

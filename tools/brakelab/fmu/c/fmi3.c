@@ -52,13 +52,14 @@ EXPORT int fmi3Reset(instance *of) {
     return OK;
 }
 
-static int miscounted(instance *of, const char *function, size_t variables, size_t values) {
-    if (variables == values) return OK;
-    return tell(of, ERROR, "%s: %zu values of %zu variables", function, values, variables);
+static int miscounted(instance *of, const char *function, size_t count, size_t n, const void *variables,
+                      const void *values) {
+    if (count != n) return tell(of, ERROR, "%s: %zu values of %zu variables", function, n, count);
+    return incomplete(of, function, count, variables, values);
 }
 
 EXPORT int fmi3GetFloat64(instance *of, const reference variables[], size_t count, double values[], size_t n) {
-    if (!of || miscounted(of, __func__, count, n)) return ERROR;
+    if (!of || miscounted(of, __func__, count, n, variables, values)) return ERROR;
     for (size_t i = 0; i < count; i++) {
         if (misused(of, __func__, variables[i], false, false)) return ERROR;
         values[i] = VARIABLES[variables[i]].kind == TIME ? time_of(&of->now) : *number(of, variables[i]);
@@ -67,8 +68,8 @@ EXPORT int fmi3GetFloat64(instance *of, const reference variables[], size_t coun
 }
 
 EXPORT int fmi3SetFloat64(instance *of, const reference variables[], size_t count, const double values[], size_t n) {
-    if (refused(of, INSTANTIATED | INITIALISING | STEPPING, __func__) || miscounted(of, __func__, count, n))
-        return ERROR;
+    if (refused(of, INSTANTIATED | INITIALISING | STEPPING, __func__)) return ERROR;
+    if (miscounted(of, __func__, count, n, variables, values)) return ERROR;
     for (size_t i = 0; i < count; i++) {
         if (misused(of, __func__, variables[i], true, false)) return ERROR;
         *number(of, variables[i]) = values[i];
@@ -77,7 +78,7 @@ EXPORT int fmi3SetFloat64(instance *of, const reference variables[], size_t coun
 }
 
 EXPORT int fmi3GetBoolean(instance *of, const reference variables[], size_t count, bool values[], size_t n) {
-    if (!of || miscounted(of, __func__, count, n)) return ERROR;
+    if (!of || miscounted(of, __func__, count, n, variables, values)) return ERROR;
     for (size_t i = 0; i < count; i++) {
         if (misused(of, __func__, variables[i], false, true)) return ERROR;
         values[i] = of->now.memory[VARIABLES[variables[i]].offset] != 0;
@@ -86,8 +87,8 @@ EXPORT int fmi3GetBoolean(instance *of, const reference variables[], size_t coun
 }
 
 EXPORT int fmi3SetBoolean(instance *of, const reference variables[], size_t count, const bool values[], size_t n) {
-    if (refused(of, INSTANTIATED | INITIALISING | STEPPING, __func__) || miscounted(of, __func__, count, n))
-        return ERROR;
+    if (refused(of, INSTANTIATED | INITIALISING | STEPPING, __func__)) return ERROR;
+    if (miscounted(of, __func__, count, n, variables, values)) return ERROR;
     for (size_t i = 0; i < count; i++) {
         if (misused(of, __func__, variables[i], true, true)) return ERROR;
         of->now.memory[VARIABLES[variables[i]].offset] = values[i];
@@ -100,13 +101,14 @@ EXPORT int fmi3DoStep(instance *of, double at, double by, bool no_state_before, 
     (void)no_state_before;
     if (refused(of, STEPPING, __func__)) return ERROR;
     int status = advance(of, at, by);
-    *event = *early = false;
-    *terminate = of->now.script_ended != 0;
-    *reached = time_of(&of->now);
+    if (event) *event = false;
+    if (early) *early = false;
+    if (terminate) *terminate = of->now.script_ended != 0;
+    if (reached) *reached = time_of(&of->now);
     return status;
 }
 
-EXPORT int fmi3GetFMUState(instance *of, void **state) { return of && state ? keep(of, state) : ERROR; }
+EXPORT int fmi3GetFMUState(instance *of, void **state) { return of ? keep(of, state) : ERROR; }
 
 EXPORT int fmi3SetFMUState(instance *of, void *state) { return of ? restore(of, state) : ERROR; }
 
@@ -116,7 +118,8 @@ EXPORT int fmi3FreeFMUState(instance *of, void **state) {
 }
 
 EXPORT int fmi3SerializedFMUStateSize(instance *of, void *state, size_t *size) {
-    (void)of, (void)state;
+    (void)state;
+    if (!of || !size) return of ? tell(of, ERROR, "%s: no place for the size", __func__) : ERROR;
     *size = SERIALISED;
     return OK;
 }
@@ -126,7 +129,7 @@ EXPORT int fmi3SerializeFMUState(instance *of, void *state, unsigned char bytes[
 }
 
 EXPORT int fmi3DeserializeFMUState(instance *of, const unsigned char bytes[], size_t size, void **state) {
-    return of && state ? deserialise(of, bytes, size, state) : ERROR;
+    return of ? deserialise(of, bytes, size, state) : ERROR;
 }
 
 /* What every library has to export, and this one has no use for (chapter 2.5). */

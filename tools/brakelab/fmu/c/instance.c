@@ -102,17 +102,22 @@ static int runs_here(const char *processor) {
     return 1;
 }
 
-/* Load the kernels for this processor from the folder of this file. */
+enum { PATH_SIZE = 4096 };
+
+/* Load the kernels for this processor from the folder that this library was loaded from. It is absolute: the importer
+ * may have loaded the library by a relative path, and changed its working directory since. */
 static int load(instance *of) {
     Dl_info here;
-    if (!dladdr((void *)load, &here)) return tell(of, ERROR, "the folder of the FMU's library is not known");
-    const char *end = strrchr(here.dli_fname, '/');
-    int length = end ? (int)(end - here.dli_fname) + 1 : 0;
+    void *own;
+    char folder[2 * PATH_SIZE + 1]; /* working directory and relative path */
+    if (!dladdr1((void *)load, &here, &own, RTLD_DL_LINKMAP) || strlen(here.dli_fname) >= PATH_SIZE ||
+        dlinfo(own, RTLD_DI_ORIGIN, folder))
+        return tell(of, ERROR, "the folder of the FMU's library is not known");
     for (size_t i = 0; i < sizeof LIBRARIES / sizeof *LIBRARIES; i++) {
         if (!runs_here(LIBRARIES[i].processor)) continue;
-        char path[4096];
-        int size = snprintf(path, sizeof path, "%.*s%s", length, here.dli_fname, LIBRARIES[i].file);
-        if (size < 0 || size >= (int)sizeof path) return tell(of, ERROR, "the path of the FMU is too long");
+        char path[PATH_SIZE];
+        int size = snprintf(path, sizeof path, "%s/%s", folder, LIBRARIES[i].file);
+        if (size < 0 || size >= PATH_SIZE) return tell(of, ERROR, "the path of the FMU is too long");
         of->library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
         if (!of->library) return tell(of, ERROR, "%s", dlerror());
         for (int call = 0; call < CALLS; call++) {
@@ -188,6 +193,7 @@ static int initialise(instance *of, double start, double stop) {
 static int advance(instance *of, double at, double by) {
     double now = time_of(&of->now), cycle = 1e-9 * CYCLE_NS;
     int64_t cycles = by > 0.0 && by < LONGEST_S ? llround(by / cycle) : 0;
+    if (by >= LONGEST_S) return tell(of, DISCARD, "a step of %g s: this FMU takes steps of 1 h at most", by);
     if (!cycles || !(fabs(by - (double)cycles * cycle) < 1e-6))
         return tell(of, DISCARD, "a step of %g s: this FMU takes steps of %g s, or multiples of it", by, cycle);
     if (!(fabs(at - now) < 0.1 * cycle))
@@ -201,14 +207,20 @@ static int advance(instance *of, double at, double by) {
     return status;
 }
 
-static int keep(instance *of, void **state) {
+static bool is_own(const void *state) { return state && !memcmp(state, TOKEN, sizeof TOKEN); }
+
+/* Write a state to `*state`: a new one, or over an older one of this FMU. */
+static int hand_out(instance *of, const void *now, void **state) {
+    if (!state || (*state && !is_own(*state))) return tell(of, ERROR, "no place for a state of this FMU is given");
     if (!*state && !(*state = aligned_alloc(64, sizeof(snapshot)))) return tell(of, ERROR, "no memory for a state");
-    memcpy(*state, &of->now, sizeof(snapshot));
+    memcpy(*state, now, sizeof(snapshot));
     return OK;
 }
 
+static int keep(instance *of, void **state) { return hand_out(of, &of->now, state); }
+
 static int restore(instance *of, const void *state) {
-    if (!state || memcmp(state, TOKEN, sizeof TOKEN)) return tell(of, ERROR, "no state of this FMU is given");
+    if (!is_own(state)) return tell(of, ERROR, "no state of this FMU is given");
     memcpy(&of->now, state, sizeof of->now);
     return OK;
 }
@@ -223,7 +235,9 @@ static uint64_t checksum(const unsigned char *bytes) {
 enum { SERIALISED = sizeof(snapshot) + sizeof(uint64_t) };
 
 static int serialise(instance *of, const void *state, unsigned char *bytes, size_t size) {
-    if (!state || size < SERIALISED) return tell(of, ERROR, "%zu bytes for a state of %d", size, SERIALISED);
+    if (!is_own(state)) return tell(of, ERROR, "no state of this FMU is given");
+    if (!bytes || size < SERIALISED)
+        return tell(of, ERROR, "%zu bytes for a state of %d", bytes ? size : 0, SERIALISED);
     memcpy(bytes, state, sizeof(snapshot));
     uint64_t sum = checksum(bytes);
     memcpy(bytes + sizeof(snapshot), &sum, sizeof sum);
@@ -232,12 +246,10 @@ static int serialise(instance *of, const void *state, unsigned char *bytes, size
 
 static int deserialise(instance *of, const unsigned char *bytes, size_t size, void **state) {
     uint64_t sum = 0;
-    if (size == SERIALISED) memcpy(&sum, bytes + sizeof(snapshot), sizeof sum);
-    if (size != SERIALISED || memcmp(bytes, TOKEN, sizeof TOKEN) || sum != checksum(bytes))
+    if (bytes && size == SERIALISED) memcpy(&sum, bytes + sizeof(snapshot), sizeof sum);
+    if (!bytes || size != SERIALISED || !is_own(bytes) || sum != checksum(bytes))
         return tell(of, ERROR, "not a state of this FMU, or damaged: %zu bytes, its own have %d", size, SERIALISED);
-    if (!*state && !(*state = aligned_alloc(64, sizeof(snapshot)))) return tell(of, ERROR, "no memory for a state");
-    memcpy(*state, bytes, sizeof(snapshot));
-    return OK;
+    return hand_out(of, bytes, state);
 }
 
 static int drop(void **state) {
@@ -254,6 +266,12 @@ static int refused(instance *of, int phases, const char *function) {
                      : of->now.phase == STEPPING     ? "between steps"
                                                      : "after the end, or an error";
     return tell(of, ERROR, "%s: not %s", function, in);
+}
+
+/* Refuse a list without its arrays. */
+static int incomplete(instance *of, const char *function, size_t count, const void *variables, const void *values) {
+    if (!count || (variables && values)) return OK;
+    return tell(of, ERROR, "%s: no array of %s", function, variables ? "values" : "variables");
 }
 
 /* Return whether `variable` can be set now, or read, as a number or as a truth value. */
