@@ -22,13 +22,15 @@ def test_the_same_ecu_gives_the_same_bytes(tmp_path: Path) -> None:
 def test_it_holds_description_kernels_and_origin(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "new" / "vehicle.fmu"
     assert main(["fmu", "vehicle", "stop-1", "--seed", "3", "--out", str(out), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["written"] == [str(out)]
+    result = json.loads(capsys.readouterr().out)
+    assert result["written"] == [str(out)]
     binaries = f"binaries/{platform.machine()}-linux"
     with zipfile.ZipFile(out) as fmu:
         names = fmu.namelist()
         assert names[:2] == ["modelDescription.xml", f"{binaries}/brake_vehicle.so"]
-        assert len([name for name in names if name.startswith(f"{binaries}/")]) == 1 + len(told["processors"])
+        assert len([name for name in names if name.startswith(f"{binaries}/")]) == 1 + len(
+            result["processors"]
+        )
         assert json.loads(fmu.read("resources/origin.json"))["initial_speed"] == pytest.approx(33.333)
         assert {one.compress_type for one in fmu.infolist()} <= {zipfile.ZIP_DEFLATED}
 
@@ -49,6 +51,14 @@ WRONG = {
     ),
     "no car": (["vehicle", "stop-1", "--plant", "as-config", "--out", "a.fmu"], "as-config: of which car?"),
     "frames": (["vehicle", "lost", "--out", "a.fmu"], 'lost: fault: "lost" acts on frames'),
+    "another car": (
+        ["vehicle", "stop-1", "--config", "suv", "--out", "a.fmu"],
+        "--config: suv: is the car of --plant as-config",
+    ),
+    "in a file": (
+        ["ecu", "--config", "suv", "--out", f"{__file__}/a.fmu"],
+        "test_command.py/a.fmu: cannot be written",
+    ),
     "nowhere": (["ecu", "--config", "suv", "--out", "/proc/a.fmu"], "/proc/a.fmu: cannot be written"),
 }
 

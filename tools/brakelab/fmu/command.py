@@ -3,6 +3,7 @@
 import platform
 import tempfile
 import zipfile
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
@@ -23,8 +24,8 @@ from ecu.settings.resources import command_name
 
 OPTIONS: Final = ("-std=c11", "-ffp-contract=off", "-ldl", "-lm")
 SUFFIX: Final = ".fmu"
-EARLIEST: Final = (1980, 1, 1, 0, 0, 0)
-"""Time of every file in the zip file: the same unit gives the same bytes."""
+ZIP_EPOCH: Final = (1980, 1, 1, 0, 0, 0)
+"""Earliest time of a zip file, that of every entry: the same unit gives the same bytes."""
 
 
 def write_ecu(config: Path, out: Path, version: Version = 3) -> int:
@@ -49,21 +50,25 @@ def write_vehicle(
 ) -> int:
     """Write the simulated vehicle of a scenario; return 0.
 
-    `config` is the car of the plant "as-config".
+    `config` is the car of the plant "as-config", and of no other.
 
     Raises:
-        UserError: as `write_ecu`, of the scenario; "as-config" without `config`.
+        UserError: as `write_ecu`, of the scenario; "as-config" without `config`, or this without that.
     """
+    if config is not None and plant != AS_CONFIG:
+        raise UserError(
+            "--config", command_name(config), f"is the car of --plant {AS_CONFIG}; give that, too"
+        )
     driven = load_scenario(scenario)
     if draw is not None:
         driven = with_draw(driven, draw)
     with tempfile.TemporaryDirectory(prefix="brake-ecu-") as folder:
-        if config is not None:
-            driven = with_plant_for(driven, plant, load_config(config), Path(folder))
-        elif plant == AS_CONFIG:
-            raise UserError("--plant", plant, "of which car? give --config")
-        else:
+        if plant != AS_CONFIG:
             driven = with_plant(driven, plant)
+        elif config is not None:
+            driven = with_plant_for(driven, plant, load_config(config), Path(folder))
+        else:
+            raise UserError("--plant", plant, "of which car? give --config")
         write_fmu(vehicle_unit(driven, seed, command_name(scenario)), out, version)
     return 0
 
@@ -100,13 +105,14 @@ def write_fmu(unit: Unit, out: Path, version: Version) -> None:
         out.parent.mkdir(parents=True, exist_ok=True)
         with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as fmu:
             for name, content in files.items():
-                entry = zipfile.ZipInfo(name, EARLIEST)
+                entry = zipfile.ZipInfo(name, ZIP_EPOCH)
                 entry.external_attr = (0o755 if name.endswith(".so") else 0o644) << 16
                 fmu.writestr(entry, content, zipfile.ZIP_DEFLATED)
         part.replace(out)
     except OSError as error:
         raise UserError(str(out), "", f"cannot be written ({error.strerror}); choose another --out") from None
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):
+            part.unlink()
     give(processors=list(kernels), variables=len(unit.variables))
     wrote(out)
