@@ -14,9 +14,9 @@ RADIUS_ERROR_LIMIT: Final = 0.03
 DISC_EXCESS_LIMIT: Final = 2000.0  # K above the air, with its error
 JOINT_LIMIT: Final = 1.5
 """Of any state of the joint observer: logarithms, and the rest is smaller still."""
-FARTHEST: Final = 1e10  # m, of an odometer
-THICKEST: Final = 50.0  # mm
-COLDEST: Final = -100.0  # degC, of a disc
+FARTHEST_DISTANCE: Final = 1e10  # m, of an odometer
+THICKEST_PAD: Final = 50.0  # mm
+COLDEST_DISC: Final = -100.0  # degC
 LEAST_EIGENVALUE: Final = 1e-6  # of a correlation matrix, below zero: rounding
 
 
@@ -51,22 +51,22 @@ def wear_out_of_range(wear: RecordArray) -> str:
         name: np.isfinite(row[name]) & (row[name] >= 0) for name in ("friction_error", "temperature_error")
     }
     checks |= {name: _are_sums(row[name]) for name in ("regressors", "leg_ends", "measured_at")}
-    checks["odometer"] = np.asarray(0 <= row["odometer"] <= FARTHEST)
+    checks["odometer"] = np.asarray(0 <= row["odometer"] <= FARTHEST_DISTANCE)
     checks["fitted_at"] = (row["fitted_at"] >= 0) & (row["fitted_at"] <= row["odometer"])
     checks["told"] = np.isin(row["told"], (0, 1))
     checks["measurements"] = (row["measurements"] >= 0) & (row["measurements"] <= N_MEASURED)
     used = np.arange(N_MEASURED)[:, None] < row["measurements"]
-    checks["measured_wear"] = ~used | (np.abs(row["measured_wear"]) <= THICKEST)
-    checks["measured_sigma"] = ~used | ((row["measured_sigma"] > 0) & (row["measured_sigma"] <= THICKEST))
-    checks["legs"] = np.asarray(0 <= row["legs"] <= FARTHEST)
+    checks["measured_wear"] = ~used | (np.abs(row["measured_wear"]) <= THICKEST_PAD)
+    checks["measured_sigma"] = ~used | ((row["measured_sigma"] > 0) & (row["measured_sigma"] <= THICKEST_PAD))
+    checks["legs"] = np.asarray(0 <= row["legs"] <= FARTHEST_DISTANCE)
     return next((name for name, good in checks.items() if not good.all()), "")
 
 
 def _are_sums(values: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return which regressors of wear, shape (..., N_REGRESSORS, 4), a disc above `COLDEST` gives."""
+    """Return which regressors of wear, shape (..., N_REGRESSORS, 4), a disc above `COLDEST_DISC` gives."""
     least = np.zeros_like(values)
     for with_temperature, without in ((ENERGY_T, ENERGY), (RATE_T, RATE), (POWER2_T, POWER2)):
-        least[..., with_temperature, :] = COLDEST * np.abs(values[..., without, :])
+        least[..., with_temperature, :] = COLDEST_DISC * np.abs(values[..., without, :])
     return np.isfinite(values) & (values >= least)
 
 
@@ -74,7 +74,7 @@ def dust_out_of_range(dust: RecordArray) -> str:
     """Return the name of the first implausible value of `dust` (shape (1,)), empty if there is none."""
     row = dust[0]
     checks = {name: np.isfinite(row[name]) and row[name] >= 0 for name in ("particles", "work", "told_work")}
-    checks["way"] = 0 <= row["way"] <= FARTHEST
+    checks["way"] = 0 <= row["way"] <= FARTHEST_DISTANCE
     checks["applications"] = row["applications"] >= 0
     return next((name for name, good in checks.items() if not good), "")
 

@@ -38,7 +38,7 @@ BESIDE: Final = np.dtype([("inputs", INPUTS), ("estimate", ESTIMATE)], align=Tru
 _SLOT: Final = np.dtype(
     [("number", "i8"), ("first_frame", "i8"), ("recorded", RECORDED), ("beside", BESIDE)], align=True
 )
-_LATEST: Final = np.dtype([("learned", LEARNED), ("watched", INPUT_WATCH)], align=True)
+_LATEST_VALUES: Final = np.dtype([("learned", LEARNED), ("watched", INPUT_WATCH)], align=True)
 _LAST_WORDS_BYTES: Final = 3072
 _HEADER: Final = np.dtype(
     [
@@ -129,7 +129,7 @@ def _is_ring(memory: mmap.mmap) -> bool:
     sizes = [int(row[name]) for name in ("slots", "frames", "description_bytes", "initial_bytes")]
     if int(row["magic"]) != _MAGIC or min(sizes[:2]) < 1 or min(sizes[2:]) < 0:
         return False
-    parts = (_HEADER.itemsize, sum(sizes[2:]), sizes[0] * _SLOT.itemsize, 2 * _LATEST.itemsize)
+    parts = (_HEADER.itemsize, sum(sizes[2:]), sizes[0] * _SLOT.itemsize, 2 * _LATEST_VALUES.itemsize)
     return sum(map(_round_up, (*parts, sizes[1] * FRAME.itemsize))) == len(memory)
 
 
@@ -139,7 +139,7 @@ def _map(path: Path, memory: mmap.mmap) -> Ring:
     at = _round_up(_HEADER.itemsize) + _round_up(int(row["description_bytes"]) + int(row["initial_bytes"]))
     slots = np.frombuffer(memory, _SLOT, int(row["slots"]), at)
     at += _round_up(slots.nbytes)
-    latest = np.frombuffer(memory, _LATEST, 2, at)
+    latest = np.frombuffer(memory, _LATEST_VALUES, 2, at)
     frames = np.frombuffer(memory, FRAME, int(row["frames"]), at + _round_up(latest.nbytes))
     return Ring(path, memory, header, slots, latest, frames)
 
@@ -156,7 +156,7 @@ def create_ring(
     """
     text = json.dumps(description).encode()
     head = _round_up(_HEADER.itemsize) + _round_up(len(text) + len(initial))
-    parts = (slots * _SLOT.itemsize, 2 * _LATEST.itemsize, frames * FRAME.itemsize)
+    parts = (slots * _SLOT.itemsize, 2 * _LATEST_VALUES.itemsize, frames * FRAME.itemsize)
     size = head + sum(map(_round_up, parts))
     unfinished = path.with_name(f"{path.name}.{secrets.token_hex(4)}.new")
     try:

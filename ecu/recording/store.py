@@ -106,9 +106,9 @@ def restore(
     if not found:
         _tell_of_other_versions(store, key)
         return None
-    for part, (_, _, way) in PARTS.items():
+    for part, (_, _, distance) in PARTS.items():
         own = restore_part(store, key, part)
-        if own is not None and own[way][0] >= found[1][part][way][0]:
+        if own is not None and own[distance][0] >= found[1][part][distance][0]:
             found[1][part] = own
     return found
 
@@ -155,7 +155,7 @@ PARTS: Final = {
     "wear": (WEAR, wear_out_of_range, "odometer"),
     "dust": (DUST, dust_out_of_range, "way"),
 }
-"""Record of the vehicle and its pads: layout, check, and the distance [m] by which it went on."""
+"""Record of the vehicle and its pads: layout, check, and the field that holds its distance [m]."""
 
 
 class Keeper(NamedTuple):

@@ -1,5 +1,5 @@
 """Motors and linings in closed loop: their sum follows the demand while torque changes hands, and without
-motors soon again; cars of three seeds, the ECU told the true friction."""
+motors soon again; cars of three seeds; the ECU knows the true friction."""
 
 import numpy as np
 import pytest
@@ -72,7 +72,7 @@ def test_a_limit_that_falls_without_notice_is_felt_for_50_ms_at_most() -> None:
 @pytest.mark.parametrize(
     "scenario",
     [shipped("motor-loss"), faulty(GONE, HIDDEN), faulty(GONE, MUTE)],
-    ids=["limit 0 is told", "limit told as before", "frames stop"],
+    ids=["limit 0 is sent", "limit sent as before", "frames stop"],
 )
 @pytest.mark.parametrize("share", [0.2, 0.8, 1.0])
 def test_linings_make_up_for_lost_motors_within_250_ms(scenario: Scenario, share: float) -> None:
@@ -94,17 +94,17 @@ def test_linings_make_up_for_lost_motors_within_250_ms(scenario: Scenario, share
         (shipped("hand-over"), True, None),
         (shipped("charge-limit"), True, None),
     ],
-    ids=["limit told as before", "shadow", "limit 0 is told", "frames stop", "sound", "battery takes less"],
+    ids=["limit sent as before", "shadow", "limit 0 is sent", "frames stop", "sound", "battery takes less"],
 )
-def test_a_motor_that_gives_less_than_its_limit_promises_is_told(scenario, armed, after) -> None:
+def test_a_motor_that_gives_less_than_its_limit_promises_is_reported(scenario, armed, after) -> None:
     for share in (0.2, 0.8, 1.0):
         result = drive(scenario, share, armed=armed)
-        told = result.t[(result.outputs["active_faults"].astype(int) & MOTOR_SHORT) != 0]
-        assert bool(len(told)) == (after is not None), share
+        reported = result.t[(result.outputs["active_faults"].astype(int) & MOTOR_SHORT) != 0]
+        assert bool(len(reported)) == (after is not None), share
         if after is not None:
-            print(f"f = {share}: after {1e3 * (told[0] - LOSS):.0f} ms")
-            assert LOSS < told[0] < LOSS + after
-            assert told[-1] > result.t[-1] - 0.2  # until the brakes are released
+            print(f"f = {share}: after {1e3 * (reported[0] - LOSS):.0f} ms")
+            assert LOSS < reported[0] < LOSS + after
+            assert reported[-1] > result.t[-1] - 0.2  # until the brakes are released
 
 
 def test_motors_that_only_fall_silent_hand_over_smoothly() -> None:

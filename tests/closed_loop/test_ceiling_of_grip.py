@@ -1,4 +1,4 @@
-"""Linings that fade and roads that give no more, in closed loop: each is told as what it is.
+"""Linings that fade and roads that give no more, in closed loop: each is reported as what it is.
 
 Cars of the wide draw: mass, tyres, brakes, linings and sensors differ from the configuration.
 """
@@ -36,8 +36,8 @@ class Braking(NamedTuple):
     """True: what the tyres of all wheels give at their loads, over the mass [m/s^2]."""
     masks: NDArray[np.int64]
 
-    def told(self, bit: int) -> NDArray[np.bool_]:
-        """Return the rows of the braking in which a fault is told."""
+    def reported(self, bit: int) -> NDArray[np.bool_]:
+        """Return the rows of the braking in which a fault is reported."""
         rows: NDArray[np.bool_] = (self.masks[self.rows] & bit) != 0
         return rows
 
@@ -96,20 +96,20 @@ def on_another_road(car: str, seed: int, road: float, decel: float) -> Braking:
         (0.6, 7.0, True),
     ],
 )
-def test_a_road_that_gives_less_is_told_as_that_and_friction_is_held(road, decel, beyond) -> None:
+def test_a_road_that_gives_less_is_reported_as_that_and_friction_is_held(road, decel, beyond) -> None:
     for car, seed in product(CARS, SEEDS):
         last = on_another_road(car, seed, road, decel)
-        told, settled = last.told(GRIP_EXCEEDED), slice(50, None)
+        reported, settled = last.reported(GRIP_EXCEEDED), slice(50, None)
         names = fault_names(int(np.bitwise_or.reduce(last.masks)))
         moved = {axle: last.friction(axle)[settled] / last.friction(axle)[0] - 1.0 for axle in "fr"}
-        print(f"{car}, car {seed}: told for {told.mean():.2f}, {names}")
+        print(f"{car}, car {seed}: reported for {reported.mean():.2f}, {names}")
         print("  friction moved by", {axle: f"{100 * np.abs(by).max():.1f} %" for axle, by in moved.items()})
         assert not (last.masks & (BRAKE_FADE | ALARMS)).any()
-        assert not last.masks[: np.argmax(last.rows)].any(), "dry: nothing is told"
+        assert not last.masks[: np.argmax(last.rows)].any(), "dry: nothing is reported"
         if not beyond:
-            assert not told.any()
+            assert not reported.any()
             continue
-        assert told.mean() > 0.7
+        assert reported.mean() > 0.7
         assert max(np.abs(by).max() for by in moved.values()) < 0.08
         known = np.isfinite(last.drive.outputs["grip_limit"]) & last.rows
         limit = last.drive.outputs["grip_limit"][known]
@@ -124,8 +124,8 @@ def test_a_road_that_gives_less_is_told_as_that_and_friction_is_held(road, decel
 
 
 @pytest.mark.parametrize(
-    ("car", "seed", "disc", "decel", "lost", "told"),
-    [  # greatest loss of the front linings' friction below the configured one, and whether that is told
+    ("car", "seed", "disc", "decel", "lost", "reported"),
+    [  # greatest loss of the front linings' friction below the configured one, and whether that is reported
         ("suv", 1, 200.0, 3.0, 0.25, False),
         ("suv", 1, 300.0, 4.0, 0.38, True),
         ("suv", 2, 300.0, 4.0, 0.0, False),
@@ -133,8 +133,8 @@ def test_a_road_that_gives_less_is_told_as_that_and_friction_is_held(road, decel
         ("sedan", 4, 300.0, 4.0, 0.06, False),
     ],
 )
-def test_linings_that_fade_on_a_road_with_grip_are_followed_and_told_where_it_is_true(
-    car, seed, disc, decel, lost, told
+def test_linings_that_fade_on_a_road_with_grip_are_followed_and_reported_where_it_is_true(
+    car, seed, disc, decel, lost, reported
 ) -> None:
     """Down a slope of 15 %, from 40 m/s to rest."""
     phases = [
@@ -150,10 +150,10 @@ def test_linings_that_fade_on_a_road_with_grip_are_followed_and_told_where_it_is
     print(f"{car}, car {seed}: true {truth[60]:.3f} to {least:.3f}, off by {off:.1f} %, {names}")
     assert 1.0 - least / 0.45 == pytest.approx(lost, abs=0.04) if lost else least > 0.45
     assert np.abs(error).max() < 0.12
-    assert not last.told(GRIP_EXCEEDED).any()
-    fade = last.told(BRAKE_FADE)
-    assert fade.any() == told
-    if told:
+    assert not last.reported(GRIP_EXCEEDED).any()
+    fade = last.reported(BRAKE_FADE)
+    assert fade.any() == reported
+    if reported:
         assert truth[np.argmax(fade)] < 0.7 * 0.45 * 1.05
 
 

@@ -154,7 +154,7 @@ def test_twelve_seconds_of_frames_that_come_twice_cost_no_learning(seed: int) ->
         end=" ",
     )
     print(f"{share.min():.3f} to {share.max():.3f}")
-    assert np.all(doubled.outputs["mode"][same[late]] == DEGRADED), "it is told"
+    assert np.all(doubled.outputs["mode"][same[late]] == DEGRADED), "reduced mode"
     assert not np.any(doubled.outputs["mode"][same] == FAILED)
     straight = np.abs(sound.truth["yaw_rate"][rows][late]) < 0.1  # a swerving car magnifies any difference
     assert straight.mean() > 0.6

@@ -99,12 +99,12 @@ class Instance:
         return values
 
     def step_arguments(self, by: float = STEP) -> tuple[Any, ...]:
-        self._told = c_bool(True), c_bool(True), c_bool(True), c_double()
-        return c_double(self.time), c_double(by), c_bool(False), *map(byref, self._told)
+        self._results = c_bool(True), c_bool(True), c_bool(True), c_double()
+        return c_double(self.time), c_double(by), c_bool(False), *map(byref, self._results)
 
     def step(self, by: float = STEP) -> int:
         status = self.call("DoStep", *self.step_arguments(by))
-        event, ends, early, reached = (one.value for one in self._told)
+        event, ends, early, reached = (one.value for one in self._results)
         if status == OK:
             assert (event, early) == (False, False)
             self.time, self.terminates = reached, ends

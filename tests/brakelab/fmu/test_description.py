@@ -37,7 +37,7 @@ SI = {"rad/s": "rad/s", "m/s": "m/s", "bar": "Pa", "N": "N", "degC": "K", "%": "
 
 @pytest.mark.parametrize(("unit", "base"), SI.items())
 def test_factors_are_those_of_signal_maps(unit: str, base: str) -> None:
-    """A signal map turns SI into the contract's unit, an importer the other way."""
+    """A signal map turns SI into the contract's unit, an importer the contract's unit into SI."""
     factor, offset = CONVERSIONS[unit][base]
     assert BASE[unit].get("factor", 1.0) == pytest.approx(1.0 / factor)
     assert BASE[unit].get("offset", 0.0) == pytest.approx(-offset / factor)
@@ -71,16 +71,17 @@ def test_it_is_a_co_simulation_of_ten_milliseconds_with_states(fmu: Fmu) -> None
     assert interface.get(f"canGetAndSet{state}") == interface.get(f"canSerialize{state}") == "true"
     references = [int(one.get("valueReference", "")) for one in fmu.description.findall("ModelVariables/*")]
     assert references == list(range(len(references)))
+    assert len(fmu.references) == len(references), "names are unique"
     places = [fmu.references[name] for name in fmu.outputs]
-    if fmu.version == 2:
-        outputs = fmu.description.findall("ModelStructure/Outputs/Unknown")
-        assert [int(one.get("index", "")) - 1 for one in outputs] == places
-    else:
-        outputs = fmu.description.findall("ModelStructure/Output")
-        assert [int(one.get("valueReference", "")) for one in outputs] == places
+    for kind in ("Output", "InitialUnknown"):
+        path, key, first = (
+            (f"{kind}s/Unknown", "index", 1) if fmu.version == 2 else (kind, "valueReference", 0)
+        )
+        listed = fmu.description.findall(f"ModelStructure/{path}")
+        assert [int(one.get(key, "")) - first for one in listed] == places
 
 
-def test_what_the_database_says_of_a_signal_is_told(suv: Fmu) -> None:
+def test_a_variable_has_the_description_of_its_signal(suv: Fmu) -> None:
     variables: dict[str, ET.Element] = {
         one.get("name", ""): one for one in suv.description.findall("ModelVariables/*")
     }

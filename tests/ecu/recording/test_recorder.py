@@ -244,7 +244,7 @@ def test_a_store_that_cannot_be_written_is_tried_again(tmp_path):
     assert saved_brakings(tmp_path / "state") == 3
 
 
-def test_a_disk_that_is_full_is_told_once(tmp_path, monkeypatch):
+def test_a_disk_that_is_full_is_reported_once(tmp_path, monkeypatch):
     """The store opens, and every value that is written to it fails."""
     run = Run(tmp_path, state=tmp_path / "state")
     run.cycles(2)
@@ -266,7 +266,7 @@ def test_a_disk_that_is_full_is_told_once(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("what", ["the folder", "the file", "the file, and another was put there"])
-def test_a_store_that_is_removed_is_told_and_made_anew(tmp_path, what):
+def test_a_store_that_is_removed_is_reported_and_made_anew(tmp_path, what):
     run = Run(tmp_path, state=tmp_path / "state")
     run.cycles(1, brakings=1)
     if what == "the folder":
@@ -343,7 +343,7 @@ def test_events_are_lines_on_change_only(tmp_path):
     ]
 
 
-def test_rejections_are_told_with_what_was_late_lost_repeated_and_wrong_so_far(tmp_path):
+def test_rejections_are_reported_with_what_was_late_lost_repeated_and_wrong_so_far(tmp_path):
     run = Run(tmp_path)
     with capture_logs() as lines:
         run.cycle["e2e"] = 4, 3, 9, 0
@@ -356,7 +356,7 @@ def test_rejections_are_told_with_what_was_late_lost_repeated_and_wrong_so_far(t
     ]
 
 
-def test_a_clock_that_was_set_is_told(tmp_path):
+def test_a_clock_that_was_set_is_reported(tmp_path):
     run = Run(tmp_path)
     with capture_logs() as lines:
         for set_s in (0, 60, 60, -3600):

@@ -63,17 +63,17 @@ def test_what_was_saved_comes_back_bit_by_bit(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("key", "told"),
+    ("key", "events"),
     [("suv/1234/2", ["learned_by_another_version"]), ("suv/5678/1", []), ("van/1234/1", [])],
     ids=["version", "brakes", "vehicle"],
 )
 @pytest.mark.requirement("REQ-KEEP-3")
-def test_another_vehicle_or_version_knows_nothing_of_it(tmp_path, key, told):
+def test_another_vehicle_or_version_knows_nothing_of_it(tmp_path, key, events):
     store = open_store(tmp_path)
     save(store, KEY, learned())
     with capture_logs() as lines:
         assert restore(store, key, NOMINAL) is None
-    assert [line["event"] for line in lines] == told
+    assert [line["event"] for line in lines] == events
     assert restore(store, KEY, NOMINAL) is not None
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from brakelab.fmu.image import Memory, compiled_call
-from brakelab.fmu.unit import TIME, Unit, Variable, told
+from brakelab.fmu.unit import TIME, Unit, Variable, stated
 from brakelab.logs.signal_file import freshness_at_any_rate
 from ecu.algorithm.step import new_state, step
 from ecu.bus.freshness import accept, begin_cycle, end_cycle
@@ -64,7 +64,7 @@ def ecu_unit(config: Config) -> Unit:
                     "INPUT",
                     one.unit,
                     memory.offset(given[place:].ctypes.data),
-                    f"{told(one.name).description} ({one.low:g} to {one.high:g}; NaN: no sample)",
+                    f"{stated(one.name).description} ({one.low:g} to {one.high:g}; NaN: no sample)",
                     place,
                 )
                 for place, one in signals
@@ -75,7 +75,7 @@ def ecu_unit(config: Config) -> Unit:
                     "OUTPUT",
                     one.unit,
                     memory.offset(vector[OUTPUT[name] :].ctypes.data),
-                    told(name).description,
+                    stated(name).description,
                 )
                 for name, one in sent
             ),

@@ -70,8 +70,8 @@ class Unit(NamedTuple):
 TIME: Final = Variable("time", "TIME", "s", 0, "Simulation time")
 
 
-class Told(NamedTuple):
-    """What the contract's database says of a signal."""
+class Stated(NamedTuple):
+    """Description and range of a signal, as the contract's database states them."""
 
     description: str = ""
     low: float = -math.inf
@@ -79,17 +79,17 @@ class Told(NamedTuple):
 
 
 @cache
-def _told() -> dict[str, Told]:
+def _statements() -> dict[str, Stated]:
     found = {}
     for message in load_database(resource("dbc/brake_ecu.dbc")).messages:
         for signal in message.signals:
             text = (signal.comment or "").partition(" Not available:")[0].rstrip(".")
             low = -math.inf if signal.minimum is None else float(signal.minimum)
             high = math.inf if signal.maximum is None else float(signal.maximum)
-            found[signal.name] = Told(text, low, high)
+            found[signal.name] = Stated(text, low, high)
     return found
 
 
-def told(name: str) -> Told:
-    """Return what the contract's database says of a signal by name, nothing of one that it has not."""
-    return _told().get(name, Told())
+def stated(name: str) -> Stated:
+    """Return what the contract's database states of a signal by name; of one that it lacks, nothing."""
+    return _statements().get(name, Stated())

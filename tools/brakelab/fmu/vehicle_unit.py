@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from brakelab.fmu.image import Memory, arrays_in, compiled_call, noise_state
-from brakelab.fmu.unit import TIME, Unit, Variable, told
+from brakelab.fmu.unit import TIME, Unit, Variable, stated
 from brakelab.fmu.vehicle_cycle import go_on, measure
 from brakelab.plant.friction.laws import LAWS
 from brakelab.plant.friction.own import Own
@@ -54,7 +54,7 @@ def vehicle_unit(scenario: Scenario, seed: int, where: str) -> Unit:
     source, given = new_noise(seed), np.full(len(DEMANDED), np.nan)
     noise, heard = noise_state(source), np.zeros(1, target_dtype(N_OUTPUTS))
     memory = Memory((*arrays_in(vehicle), values, row, noise, heard, given))
-    at, demanded = noise.ctypes.data, [(name, told(name)) for name in DEMANDED]
+    at, demanded = noise.ctypes.data, [(name, stated(name)) for name in DEMANDED]
     units = {name: one.unit for one in OUTPUT_SIGNALS for name in column_names(one)}
 
     return Unit(
@@ -82,7 +82,7 @@ def vehicle_unit(scenario: Scenario, seed: int, where: str) -> Unit:
                     "OUTPUT",
                     one.unit,
                     memory.offset(values[place:].ctypes.data),
-                    told(one.name).description,
+                    stated(one.name).description,
                 )
                 for place, one in enumerate(INPUT_SIGNALS)
                 if one.message
