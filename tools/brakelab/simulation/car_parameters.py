@@ -35,7 +35,7 @@ PARAMETERS: Final = {
     "cooling": ("1/s", 1.0),
 }
 """Of `brakelab.plant.records.PARAMS`: unit here, and what turns it into the record's."""
-FARTHEST: Final = 30.0
+FARTHEST_RATIO: Final = 30.0
 """A value farther from the drawn car's is one of another unit."""
 _WHEELS: Final = {"_front": slice(0, 2), "_rear": slice(2, 4)} | {
     f"_{corner}": slice(place, place + 1) for place, corner in enumerate(CORNERS)
@@ -76,7 +76,7 @@ def set_parameters(params: RecordArray, car: CarParameters) -> None:
     """Set parameters of a drawn car, `PARAMS` of shape (1,); what names fewer wheels goes before.
 
     Raises:
-        UserError: a value in a unit is `FARTHEST` times the drawn one, or that part of it.
+        UserError: a value in a unit is `FARTHEST_RATIO` times the drawn one, or that part of it.
     """
     drawn = params.copy()
     for name in sorted(car, key=_wheels, reverse=True):
@@ -90,7 +90,7 @@ def set_parameters(params: RecordArray, car: CarParameters) -> None:
             continue
         params[stem][rows] = unit * float(car[name])
         ratio = params[stem][rows] / was
-        if not ((ratio > 1.0 / FARTHEST) & (ratio < FARTHEST)).all():
+        if not ((ratio > 1.0 / FARTHEST_RATIO) & (ratio < FARTHEST_RATIO)).all():
             drawn_one = f"{np.mean(was) / unit:.4g} {PARAMETERS[stem][0]}"
             raise UserError("[car]", f"{name} = {car[name]}", f"the drawn car has {drawn_one}")
 
