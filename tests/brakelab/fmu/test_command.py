@@ -2,12 +2,14 @@
 
 import json
 import platform
+import xml.etree.ElementTree as ET
 import zipfile
 from pathlib import Path
 
 import pytest
 
 from ecu.cli import main
+from ecu.settings.resources import resource
 
 
 def test_the_same_ecu_gives_the_same_bytes(tmp_path: Path) -> None:
@@ -41,6 +43,16 @@ def test_a_car_of_a_configuration(tmp_path: Path) -> None:
     as_config = (tmp_path / "vehicle.fmu").read_bytes()
     assert main([*words, "sedan", "--draw", "nominal"]) == 0
     assert (tmp_path / "vehicle.fmu").read_bytes() != as_config
+
+
+@pytest.mark.parametrize("name", ["c\x01", "b\udcff", 'Nässe <&> "1"'])
+def test_a_scenario_may_be_called_anything(tmp_path: Path, name: str) -> None:
+    scenario, out = tmp_path / f"{name}.toml", tmp_path / "vehicle.fmu"
+    scenario.write_bytes(resource("config/scenarios/stop-1.toml").read_bytes())
+    assert main(["fmu", "vehicle", str(scenario), "--out", str(out)]) == 0
+    with zipfile.ZipFile(out) as fmu:
+        description = ET.fromstring(fmu.read("modelDescription.xml")).get("description", "")
+    assert description.endswith(f"{name}.toml" if name.isprintable() else f"{name[0]}?.toml")
 
 
 WRONG = {

@@ -22,12 +22,15 @@ _CAPABILITIES: Final[dict[Version, dict[str, str]]] = {
 
 
 def model_description(unit: Unit, token: str, version: Version) -> bytes:
-    """Return the file; `token` identifies the library that belongs to it."""
+    """Return the file; `token` identifies the library that belongs to it.
+
+    A path in the description may hold what XML cannot: that becomes a question mark.
+    """
     root = ET.Element(
         "fmiModelDescription",
         {"fmiVersion": f"{version}.0", "modelName": unit.name},
         **{"guid" if version == 2 else "instantiationToken": token},
-        description=unit.description,
+        description="".join(one if one.isprintable() else "?" for one in unit.description),
         version=__version__,
         license="Apache-2.0",
         generationTool=f"brake-ecu {__version__}",
