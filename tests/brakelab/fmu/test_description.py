@@ -107,7 +107,8 @@ def test_fmpy_simulates_a_stop(stop: Fmu, suv: Fmu) -> None:
     drive = fmpy.simulate_fmu(str(packed(stop)), stop_time=12.0, step_size=0.01, output=names)
     assert drive["truth.vehicle_speed"][0] == pytest.approx(33.333)
     assert drive["truth.vehicle_speed"][-1] < 20.0
-    alone = fmpy.simulate_fmu(str(packed(suv)), stop_time=2.0, step_size=0.01, output=["mode"])
+    alone = fmpy.simulate_fmu(str(packed(suv)), stop_time=40.0, output_interval=0.01, output=["mode"])
+    assert len(alone) == 4001
     assert np.unique(alone["mode"]).tolist() == [0.0, 4.0]
 
 
