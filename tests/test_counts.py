@@ -144,7 +144,7 @@ def test_memory_of_python_in_a_cycle(cycle: Callable[..., None]) -> None:
 def test_system_calls_in_a_cycle(cycle: Callable[..., None], tmp_path: Path) -> None:
     if shutil.which("strace") is None:
         pytest.skip("no strace")
-    calls = tmp_path / "calls"  # a cycle that is late sleeps less often
+    calls = tmp_path / "calls"  # a cycle that is late sleeps and drains less often
     command = [
         "strace",
         "-e",
@@ -168,5 +168,4 @@ def test_system_calls_in_a_cycle(cycle: Callable[..., None], tmp_path: Path) -> 
         r"^getppid\(.*\n((?:(?!getppid).*\n)*)getppid", calls.read_text("utf-8"), re.MULTILINE
     )
     assert len(between) == CYCLES
-    counts = sorted(one.count("\n") for one in between)
-    check("system calls in a cycle, but sleeps", counts[CYCLES // 2], platform.machine())
+    check("system calls in a cycle, but sleeps", max(one.count("\n") for one in between), platform.machine())
