@@ -54,7 +54,7 @@ ACCEL_ERROR_STATE = np.dtype(
 
 OFFSET_START, SCALE_START, SCALE_MOST = 0.5, 0.03, 0.05  # m/s^2, -, -
 LEAST_SHOWN = 2.0  # m/s^2, below which a scale does not show
-ACROSS = 1.0  # m/s^2, above which tyres drag
+ACROSS = 2.0  # m/s^2, above which tyres drag by more than 0.03
 SLOPE_WALK, SCALE_WALK = 0.1, 0.01  # m/s^2 and - per root second
 ZERO_WALK, TORQUE_WALK = 0.03, 0.003  # likewise, of b and k
 NOISE, TORQUE_NOISE = 0.15, 0.1  # m/s^2, of a block's difference

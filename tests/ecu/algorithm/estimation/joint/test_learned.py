@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ecu.algorithm.estimate import ESTIMATE, GREATEST_RATIO, LEAST_RATIO
+from ecu.algorithm.estimation.joint.bounds import HIGHEST, LOWEST
 from ecu.algorithm.estimation.joint.layout import (
     CHANGE,
     JOINT_STATE,
@@ -29,7 +30,7 @@ from ecu.algorithm.estimation.joint.learned import (
     restore_joint,
 )
 from ecu.algorithm.estimation.joint.observer import _choose_free
-from ecu.algorithm.estimation.joint.prior import HIGHEST, LOWEST, set_prior
+from ecu.algorithm.estimation.joint.prior import set_prior
 from ecu.contract.records import LEARNED, N_KEPT
 from ecu.recording.learned_range import JOINT_LIMIT, out_of_range
 from ecu.settings.config import load_config, new_params
