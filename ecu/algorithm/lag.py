@@ -15,7 +15,7 @@ PERIOD: Final = 1e-9 * CYCLE_NS
 
 @kernel
 def lag_gain(dt: float, lag: float) -> float:
-    """Return which share of its way to a constant value a lag of time `lag` [s] covers in `dt` [s]."""
+    """Return the share of a step that a lag of time `lag` [s] has followed after `dt` [s]."""
     if dt == PERIOD:
         return 1.0 - math.exp(-PERIOD / lag)
     return 1.0 - math.exp(-dt / lag)

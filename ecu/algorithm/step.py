@@ -233,11 +233,11 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
     dt = 1e-9 * u.dt_ns
     s.trusted = u
     begin_watch(s.witness, dt)
-    told = correct_flags(p, s.flags, s.witness, s.trusted, s.estimate, s.application.braking != 0, dt)
+    stuck = correct_flags(p, s.flags, s.witness, s.trusted, s.estimate, s.application.braking != 0, dt)
     u = s.trusted
     faults, contradicted = watch_sensors(p, s, u, dt)
     contradicted = contradicted or u.e2e_unsure != 0
-    faults |= told | u.bus_faults | u.e2e_faults | input_faults(p, u)
+    faults |= stuck | u.bus_faults | u.e2e_faults | input_faults(p, u)
     mask_implausible(p, s, u)
     hold_pedal(p, s.demand, u)
     faults |= hold_automated(s.demand, u, dt)

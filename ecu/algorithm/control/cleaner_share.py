@@ -36,7 +36,7 @@ CALM_ACROSS = 3.0  # m/s^2
 
 @kernel
 def _node(value: float, step: float, nodes: int) -> tuple[int, float]:
-    """Return the node below `value` and the fraction of the way to the next, within the table."""
+    """Return the node below `value` and the fraction to the next, within the table."""
     place = min(max(value / step, 0.0), nodes - 1.0)
     below = min(int(place), nodes - 2)
     return below, place - below

@@ -5,8 +5,8 @@ the speed over ground; the force of all brakes is known otherwise:
 
     r = (-a + d - drag / m - f_roll g) / a_dem                         while the demand is steady
 
-While r is at least `CONFIRMS`, the friction in use counts as confirmed. Below `LEAST` what it has risen by
-since is taken back, until r is `AGREES`; where that is not enough, up to `LOWER` of the confirmed friction
+While r is at least `CONFIRMS`, the friction in use counts as confirmed. Below `LEAST_SHARE` what it has risen
+by since is taken back, until r is `AGREES`; where that is not enough, up to `LOWER` of the confirmed friction
 too: the linings have changed since. All is given again slowly. A friction that falls raises the pressure: it
 is followed.
 
@@ -37,7 +37,7 @@ CONFIRMED_STATE = np.dtype(
 LEAST_SPEED = 3.0  # m/s: a car that stands does not decelerate
 LEAST_DECEL = 2.0  # m/s^2: at less the accelerometer's zero counts for too much
 LAG, STEADY, SETTLED_S = 0.15, 0.05, 0.3  # s, of the demand, s: hydraulics and tyres have followed
-LEAST, AGREES, CONFIRMS = 0.92, 0.95, 0.93
+LEAST_SHARE, AGREES, CONFIRMS = 0.92, 0.95, 0.93
 TAKE, WIDTH = 10.0, 0.04  # 1/s at an error of `WIDTH`
 GIVE, GIVE_FAST, OVER = 0.05, 0.5, 1.04  # 1/s, 1/s where more than that is given
 LOWER, LOWERING = 0.3, 0.25  # of the friction, 1/s at an error of `WIDTH`: slow against the lag
@@ -88,7 +88,7 @@ def confirm_friction(
     else:
         drifted = min(drifted, 0.0) if state.friction[0] > 0.0 else 0.0
     share = (state.given + drifted) / state.asked
-    missing = min(max(((AGREES if state.back > 0.0 else LEAST) - share) / WIDTH, -1.0), 1.0)
+    missing = min(max(((AGREES if state.back > 0.0 else LEAST_SHARE) - share) / WIDTH, -1.0), 1.0)
     if state.back > 1.0 or (state.back == 1.0 and missing > 0.0):
         state.back = min(max(state.back + LOWERING * missing * dt, 1.0), 2.0)
     elif missing > 0.0:

@@ -37,7 +37,7 @@ DISTRIBUTION_STATE = np.dtype(
         ("torque", "f8", (4,)),  # demanded of each wheel [N m], >= 0; NaN without a request
         ("trailing", "f8"),  # share of its torque that the trailing axle keeps, LEAST_TRAILING to 1
         ("grip", "f8"),  # force over load to which the leading axle takes the rest; 0: none of it
-        ("rolled", "f8", (2,)),  # by a leading wheel over the way of the ground below it, low-passed
+        ("rolled", "f8", (2,)),  # by a leading wheel over the distance of the ground below it, low-passed
         ("beyond", "f8", (2,)),  # slip of a trailing wheel less that of the leading one, low-passed
         ("offset", "f8", (2,)),  # the same of a rear wheel while rolling freely: error of the radii
         ("free_s", "f8", (2,)),  # learning time of that, at most LEARNING_TIME
@@ -57,7 +57,7 @@ RADIUS_DOUBT = 0.008  # before learning: radii within 0.3 % and other difference
 FREE_ACCEL, FREE_YAW_RATE = 0.5, 0.03  # m/s^2, rad/s
 LEAST_SLIP = 0.012  # of a trailing wheel that may lock, beyond that of its force: tyres peak at 0.03 on ice
 RULED_FROM = 0.15  # z above which Annex 5 orders the axles
-FASTEST = 1.02  # of the ground below it
+FASTEST_ROLLING = 1.02  # of the ground below it
 GRIP, GRIP_RATE = 0.6, 0.5  # force over load taken over at once, 1/s beyond it
 GRIP_SLIP = 0.05  # of a leading wheel, beyond which it takes nothing until the braking ends
 LONE_SLIP = 0.04  # of a trailing wheel beside one that rolls freely: tyres peak at 0.1 on a dry road
@@ -88,7 +88,7 @@ def front_share(params: Record, decel: float) -> float:
 
 @kernel
 def _rolled(params: Record, inputs: Record, estimate: Record, speed: float, i: int) -> float:
-    """Return how far a wheel rolls over the way of the ground below it: 1 plus its slip.
+    """Return how far a wheel rolls over the distance of the ground below it: 1 plus its slip.
 
     NaN without a new sample, or where the wheel turns faster than a braked one can: its sensor is stuck.
     """
@@ -97,7 +97,7 @@ def _rolled(params: Record, inputs: Record, estimate: Record, speed: float, i: i
         return math.nan
     radius = rolling_radius(estimate.load[i], params.unloaded_radius[i], params.vertical_stiffness[i])
     rolled: float = abs(inputs.value[WHEEL_SPEED + i]) * radius / ground
-    return rolled if rolled <= FASTEST else math.nan
+    return rolled if rolled <= FASTEST_ROLLING else math.nan
 
 
 @kernel

@@ -61,8 +61,8 @@ CONFIRMED_S, DENIED_S = 0.4, 0.1
 @kernel
 def reads_empty(inputs: Record) -> bool:
     """Return whether an accumulator reports a pressure at which no brake would work."""
-    told: bool = usable(inputs, ACCUMULATOR_PRESSURE)
-    return told and BAR * inputs.value[ACCUMULATOR_PRESSURE] <= EMPTY
+    known: bool = usable(inputs, ACCUMULATOR_PRESSURE)
+    return known and BAR * inputs.value[ACCUMULATOR_PRESSURE] <= EMPTY
 
 
 @kernel

@@ -59,8 +59,8 @@ def _drives_backwards(params: Record, inputs: Record) -> bool:
         place = WHEEL_SPEED + i
         if usable(inputs, place) and inputs.value[place] * params.wheel_radius[i] < -STANDING:
             back += 1
-    told: bool = usable(inputs, REVERSE) and inputs.value[REVERSE] > 0.5
-    return told or back > 2
+    reverse: bool = usable(inputs, REVERSE) and inputs.value[REVERSE] > 0.5
+    return reverse or back > 2
 
 
 @kernel

@@ -169,10 +169,10 @@ def _observe_jointly(
             add_to_whole(p, s.whole, joint)
         if not s.whole.alone:
             add_window(p, s.prediction, joint, u)
-    s.prediction.told_s = max(s.prediction.told_s - dt, 0.0)
+    s.prediction.reported_s = max(s.prediction.reported_s - dt, 0.0)
     learns = braking and not p.fixed
     tell_joint(p, joint, s.hydraulics, s.estimate, s.learned, u, learns, dt)
-    s.estimate.given_up = 1 if s.prediction.told_s > 0.0 else 0
+    s.estimate.given_up = 1 if s.prediction.reported_s > 0.0 else 0
     s.estimate.torques_known = 1 if p.transmit or torques_measured(p, joint) else 0
     if not p.transmit:
         tell_whole(p, s.whole, joint, s.estimate)

@@ -31,7 +31,7 @@ ZERO_STATE = np.dtype(
 START, MEMORY = 100, 12_000  # samples: of the prior, and until older ones are forgotten
 FREE = 0.4  # bar above push-out, mean of the wheels: the brakes are released
 LIMIT = 8.0  # bar, more is neither zero nor noise
-LARGEST = 3.0  # bar, of a sound sensor
+LARGEST_ZERO = 3.0  # bar, of a sound sensor
 LEAST_SHARE = 0.05  # at the floor, of a floored sensor
 NEARLY_ALL = 0.97
 UNKNOWN = 0.7  # bar, standard deviation of an unknown zero
@@ -95,7 +95,7 @@ def settle_zero(state: Record, i: int) -> None:
         ratio = zero / sigma
         sigma *= math.sqrt(1.0 + 0.5 * ratio * ratio)
         zero = max(zero, -2.0 * UNKNOWN)
-    state.value[i] = min(max(known * zero, -LARGEST), LARGEST)
+    state.value[i] = min(max(known * zero, -LARGEST_ZERO), LARGEST_ZERO)
     state.variance[i] = sigma * sigma / max(n, 1) + ((1.0 - known) * UNKNOWN) ** 2 + LEAST_SIGMA**2
 
 

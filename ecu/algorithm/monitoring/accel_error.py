@@ -10,7 +10,7 @@ is what they have moved by from their means, which stand still meanwhile.
 A zero moves b and c alike, a scale k and s: what has moved in both is taken off the reading. A c without b is
 a slope; a b without c is no zero of the accelerometer (`motors.py`), an s without k none of its scale. What
 both lines have moved by, where the car is now, tells the accelerometer's name before zero and scale can be
-told apart. Who gets in at a standstill changes b and k: then they are learned anew.
+separated. Who gets in at a standstill changes b and k: then they are learned anew.
 
 A reading that is off by more than `GROSS` at once is not followed: it is implausible as a whole.
 """
@@ -41,8 +41,8 @@ ACCEL_ERROR_STATE = np.dtype(
         ("wheels", LINE_STATE),  # c, s
         ("torques", LINE_STATE),  # b, k
         ("proven_s", "f8"),  # time for which the motors' torques alone have driven the car, at most `SURE_S`
-        ("doubted_s", "f8"),  # time for which both lines have moved to the same side, at most `TOLD_S`
-        ("told", "u1"),  # that has lasted
+        ("doubted_s", "f8"),  # time for which both lines have moved to the same side, at most `REPORTED_S`
+        ("reported", "u1"),  # that has lasted
         ("stood_s", "f8"),
         ("zero_off", "f8"),  # taken off the reading [m/s^2]
         ("scale_off", "f8"),  # of it
@@ -59,12 +59,12 @@ SLOPE_WALK, SCALE_WALK = 0.1, 0.01  # m/s^2 and - per root second
 ZERO_WALK, TORQUE_WALK = 0.03, 0.003  # likewise, of b and k
 NOISE, TORQUE_NOISE = 0.15, 0.1  # m/s^2, of a block's difference
 SLIP, SLIP_BY_SPEED = 0.1, 0.01  # of a change of force, -, s/m
-STEADY = 1.0  # m/s^2 in 0.2 s, beyond which tyres are on their way
-FARTHEST = 0.5
+STEADY = 1.0  # m/s^2 in 0.2 s, beyond which tyre forces still build up
+LARGEST_SCALE = 0.5
 GROSS = 1.5  # m/s^2
 SLOPE_S, SCALE_S, TORQUES_S = 10.0, 30.0, 60.0  # memory of c, s, b and k
-FEWEST_S, FEWEST_SCALE_S, FEWEST_TOLD_S = 2.0, 3.0, 5.0
-MOVED, TOLD_S = 0.14, 0.4  # m/s^2, sound cars stay below 0.07; s
+FEWEST_S, FEWEST_SCALE_S, FEWEST_REPORTED_S = 2.0, 3.0, 5.0
+MOVED, REPORTED_S = 0.14, 0.4  # m/s^2, sound cars stay below 0.07; s
 STANDS, STOOD_S = 0.1, 10.0  # m/s, s
 ZERO_DOUBT = 0.18  # m/s^2; sound cars stay below 0.1
 SCALE_DOUBT, LEAST_SCALE = 0.033, 0.02  # of the mean of both, of each; sound cars stay below 0.029
@@ -93,7 +93,7 @@ def _correct(line: Record, h: float, innovation: float, noise: float) -> None:
     to_offset, to_scale = p[0] + h * p[2], p[2] + h * p[1]
     variance = to_offset + h * to_scale + noise * noise
     line.offset += to_offset / variance * innovation
-    line.scale = min(max(line.scale + to_scale / variance * innovation, -FARTHEST), FARTHEST)
+    line.scale = min(max(line.scale + to_scale / variance * innovation, -LARGEST_SCALE), LARGEST_SCALE)
     p[0] -= to_offset * to_offset / variance
     p[1] -= to_scale * to_scale / variance
     p[2] -= to_offset * to_scale / variance
@@ -127,7 +127,7 @@ def _follow_wheels(state: Record, mean: Record) -> None:
     h = (mean[0, W] - mean[3, W]) / (3.0 * BLOCK_S)
     if abs(h) < LEAST_SHOWN:
         h = 0.0  # noise of the wheels would show as a scale
-    elif state.scale_off == 0.0 and state.told == 0:
+    elif state.scale_off == 0.0 and state.reported == 0:
         _learn_scale(line, SCALE_S)
     rolled = (mean[0, W] - mean[1, W]) / BLOCK_S
     innovation = 0.5 * (mean[0, A] + mean[1, A]) - rolled - line.offset - line.scale * h
@@ -145,23 +145,23 @@ def moved_offset(line: Record) -> float:
 
 @kernel
 def _compare_lines(state: Record, mean: Record, witness: Record) -> None:
-    """Overwrite `told`: both lines have moved to the same side at the force and the deceleration of now."""
+    """Overwrite `reported`: both lines have moved to the same side at the present force and deceleration."""
     wheels, torques = state.wheels, state.torques
     h = (mean[0, W] - mean[3, W]) / (3.0 * BLOCK_S)
     moved = moved_offset(torques) + (torques.scale - torques.usual_scale) * mean[0, F]
     beside = moved_offset(wheels)
     if abs(h) > LEAST_SHOWN:
         beside += (wheels.scale - wheels.usual_scale) * h
-    if torques.offset_s < FEWEST_TOLD_S:
+    if torques.offset_s < FEWEST_REPORTED_S:
         return
     agree = beside * moved > CONFIRMED * moved * moved
     if agree:
         compare(witness, ACCEL_X, moved, MOVED)
-    stands = abs(moved) > (KEPT if state.told else 1.0) * MOVED
-    change = BLOCK_S if stands and (agree or state.told != 0) else -BLOCK_S
-    state.doubted_s = min(max(state.doubted_s + change, 0.0), TOLD_S)
-    state.told = (
-        1 if state.doubted_s > TOLD_S - 0.5 * BLOCK_S or (state.told and state.doubted_s > 0.0) else 0
+    stands = abs(moved) > (KEPT if state.reported else 1.0) * MOVED
+    change = BLOCK_S if stands and (agree or state.reported != 0) else -BLOCK_S
+    state.doubted_s = min(max(state.doubted_s + change, 0.0), REPORTED_S)
+    state.reported = (
+        1 if state.doubted_s > REPORTED_S - 0.5 * BLOCK_S or (state.reported and state.doubted_s > 0.0) else 0
     )
 
 
@@ -183,7 +183,7 @@ def _follow_torques(params: Record, state: Record, mean: Record, witness: Record
     _walk(line, ZERO_WALK, TORQUE_WALK)
     _correct(line, force, innovation, TORQUE_NOISE)
     _compare_lines(state, mean, witness)
-    if state.zero_off == 0.0 and state.told == 0:
+    if state.zero_off == 0.0 and state.reported == 0:
         _learn_offset(line, TORQUES_S)
         _learn_scale(line, TORQUES_S)
         if abs(moved_offset(line)) < 0.5 * ZERO_DOUBT:
@@ -215,7 +215,7 @@ def follow_accel_error(
         torques.p[0], torques.p[1] = OFFSET_START**2, SCALE_MOST**2
     stands = abs(blocks.mean[0, ROLLED]) < STANDS
     state.stood_s = state.stood_s + BLOCK_S if stands else 0.0
-    if state.stood_s > STOOD_S and not (state.told or state.zero_off != 0.0 or state.scale_off != 0.0):
+    if state.stood_s > STOOD_S and not (state.reported or state.zero_off != 0.0 or state.scale_off != 0.0):
         torques.offset_s = torques.scale_s = 0.0
         torques.p[1] = SCALE_MOST**2
     if blocks.good_blocks > 3:

@@ -13,7 +13,7 @@ before them; the tolerance grows with the noise of the sensors and with the rang
 
     |a - w| > least + (SLIP + SLIP_BY_SPEED v) range(f)        |a - f| > least + FORCE range(f)
 
-with least = max(LEAST, NOISE sigma), sigma of a - w by the configured noise of the sensors.
+with least = max(LEAST_ERROR, NOISE sigma), sigma of a - w by the configured noise of the sensors.
 
 A reading beyond any road (`SLOPE`) that the torques contradict for a second is wrong as well, regardless of
 its history. From then on it is not used until it agrees with the wheels or with the torques as before, or
@@ -24,8 +24,8 @@ alone is doubted until it no longer is. One that reads forwards for `OPPOSED` bl
 and the wheels slow down is wrong whatever the speed is taken for, which it may have misled. Otherwise no
 verdict is given while wheels slide or ABS or ESP act. A constant or slowly growing bias is not detected.
 
-Assumption: all constants; found with the simulated vehicle, whose sound sensor stays below a third of `LEAST`
-in all shipped scenarios.
+Assumption: all constants; found with the simulated vehicle, whose sound sensor stays below a third of
+`LEAST_ERROR` in all shipped scenarios.
 """
 
 import math
@@ -78,14 +78,14 @@ LONGEST_BLOCK_S = 0.125  # cycles were missed
 OLDEST_S = 0.06  # of a reading
 LEAST_SPEED = 3.0  # m/s
 ROLLING = 0.06  # of the speed, greatest difference of a rolling wheel
-LEAST, NOISE = 0.25, 6.0  # m/s^2, times sigma
+LEAST_ERROR, NOISE = 0.25, 6.0  # m/s^2, times sigma
 SLIP, SLIP_BY_SPEED = 0.1, 0.01  # -, s/m
 FORCE = 0.3  # possible error of friction
 KNOWN_MOTORS = 0.1  # greatest relative error of a motor torque that still yields a force
 SLOPE, STEEP = 2.0, 1.5  # m/s^2, of a slope of 20 %, of 15 %
 DENIED = 1.0  # m/s^2
 SECOND, OPPOSED = 10, 3  # blocks
-AGAIN, AGREED = 0.5, 2  # of LEAST; blocks after the first time, twice as many after each further
+AGAIN, AGREED = 0.5, 2  # of LEAST_ERROR; blocks after the first time, twice as many after each further
 OFTEN = 6
 STANDSTILL = 0.1  # m/s
 
@@ -95,20 +95,20 @@ def _tells(params: Record, witness: Record, inputs: Record, speed: float) -> boo
     """Return whether this cycle's readings are current and believed, and the linings' pressures known."""
     value = inputs.value
     oldest = 1e9 * OLDEST_S
-    told = speed > LEAST_SPEED and usable(inputs, ACCEL_X) and inputs.age_ns[ACCEL_X] < oldest
+    known = speed > LEAST_SPEED and usable(inputs, ACCEL_X) and inputs.age_ns[ACCEL_X] < oldest
     for i in range(4):
         wheel = WHEEL_SPEED + i
         rolls = abs(value[wheel] * params.wheel_radius[i] - speed) < ROLLING * speed
-        told = (
-            told
+        known = (
+            known
             and rolls
             and usable(inputs, wheel)
             and not witness.rejected[wheel]
             and inputs.age_ns[wheel] < oldest
         )
-        told = told and usable(inputs, CALLIPER_PRESSURE + i)
+        known = known and usable(inputs, CALLIPER_PRESSURE + i)
     works = others_brake(inputs) or value[REVERSE] > 0.5
-    return told and not works
+    return known and not works
 
 
 @kernel
@@ -204,7 +204,7 @@ def _moved_against_wheels(mean: Record) -> float:
 def _agrees(state: Record, witness: Record) -> bool:
     """Return whether a doubted reading agrees as before."""
     mean = state.mean
-    least = AGAIN * max(LEAST, NOISE * state.sigma)
+    least = AGAIN * max(LEAST_ERROR, NOISE * state.sigma)
     against_wheels = _beside_wheels(mean, W)
     if state.known_blocks < 3:
         on_a_road: bool = compare(witness, ACCEL_X, against_wheels, SLOPE) < 1.0
@@ -225,7 +225,7 @@ def _jumped(state: Record, witness: Record) -> bool:
     moved = greatest - least
     wheels = _moved_against_wheels(mean)
     force = _now(mean, A) - _now(mean, F) - (_before(mean, A) - _before(mean, F))
-    noise = max(LEAST, NOISE * state.sigma)
+    noise = max(LEAST_ERROR, NOISE * state.sigma)
     wheels_err = noise + (SLIP + SLIP_BY_SPEED * _now(mean, W)) * moved
     force_err = noise + FORCE * moved
     compare_both(witness, ACCEL_X, wheels, wheels_err, force, force_err)

@@ -11,7 +11,7 @@ and not summed. Axles without a model are excluded.
 
 Stored permanently, with the version of the models: particles, distance, the work of all applications and of
 the reported ones. Other models start from zero: their sum is a different quantity. Emission per kilometre is
-reported while no more than `UNTOLD` of the work was outside.
+reported while no more than `UNKNOWN_WORK` of the work was outside.
 
 Mass is `airborne_share` of the linings' wear (`wear.py`), up to 10 um, without that of the discs.
 
@@ -42,9 +42,9 @@ from ecu.jit import Record, kernel
 
 MOVING = 0.5  # m/s: a disc at standstill emits nothing
 LEAST_WORK = 500.0  # J: below it an application counts as negligible
-UNTOLD = 0.10  # share of the work
-LEAST_WAY = 1e3  # m, before emission per kilometre is reported
-LEAST_WEAR_WAY = 50e3  # m with these linings, before mass per kilometre is reported
+UNKNOWN_WORK = 0.10  # share of the work
+LEAST_DISTANCE = 1e3  # m, before emission per kilometre is reported
+LEAST_WEAR_DISTANCE = 50e3  # m with these linings, before mass per kilometre is reported
 
 DUST_STATE = np.dtype(
     [
@@ -118,7 +118,7 @@ def update_dust(
 
 @kernel
 def _count(params: Record, state: Record, dust: Record) -> None:
-    particles, low, high, work, told = 0.0, 0.0, 0.0, 0.0, True
+    particles, low, high, work, counted = 0.0, 0.0, 0.0, 0.0, True
     for i in range(4):
         x = state.features[i]
         if params.dust_model[i] == NONE or x[DURATION] <= 0.0 or not state.work[i] > LEAST_WORK:
@@ -128,7 +128,7 @@ def _count(params: Record, state: Record, dust: Record) -> None:
                 x[k] /= x[DURATION]
         work += state.work[i]
         if not inside(params.dust_low[i], params.dust_high[i], x):
-            told = False
+            counted = False
             continue
         ef = emission_factor(params.dust_model[i], params.dust_numbers[i], x)
         particles += params.dust_factor[i] * 10.0**ef
@@ -136,7 +136,7 @@ def _count(params: Record, state: Record, dust: Record) -> None:
         high += 10.0 ** (ef + params.dust_above[i])
     state.particles = state.low = state.high = math.nan
     dust.work += work
-    if told and work > 0.0:
+    if counted and work > 0.0:
         state.particles, state.low, state.high = particles, low, high
         dust.particles += particles
         dust.told_work += work
@@ -147,10 +147,11 @@ def _count(params: Record, state: Record, dust: Record) -> None:
 def _renew(params: Record, state: Record, learned: Record, wear: Record) -> None:
     """Overwrite the emission per kilometre; `wear` is `WEAR_STATE`."""
     dust, state.per_km, state.mass_per_km = learned.dust, math.nan, 0.0
-    if dust.way >= LEAST_WAY and dust.told_work > 0.0 and dust.told_work >= (1.0 - UNTOLD) * dust.work:
+    counted = dust.told_work > 0.0 and dust.told_work >= (1.0 - UNKNOWN_WORK) * dust.work
+    if counted and dust.way >= LEAST_DISTANCE:
         state.per_km = 1e3 * dust.particles / dust.way
     for i in range(4):
-        way = learned.wear.odometer - learned.wear.fitted_at[i]
+        distance = learned.wear.odometer - learned.wear.fitted_at[i]
         worn = wear.belief.scale[i] * mass_by_law(params, learned.wear.regressors, i)
         grams = params.airborne_share[i] * worn
-        state.mass_per_km += 1e6 * grams / way if way >= LEAST_WEAR_WAY else math.nan
+        state.mass_per_km += 1e6 * grams / distance if distance >= LEAST_WEAR_DISTANCE else math.nan

@@ -66,7 +66,7 @@ def _network(numbers: Record, features: Record) -> float:
 
 @kernel
 def node_below(numbers: Record, first: int, value: float) -> tuple[int, float]:
-    """Return the node below `value` in `numbers[first:]`, and the fraction of the way to the next, 0 to 1."""
+    """Return the node below `value` in `numbers[first:]`, and the fraction to the next, 0 to 1."""
     k = 0
     while k < NODES - 2 and value >= numbers[first + k + 1]:
         k += 1

@@ -34,7 +34,7 @@ FAILED_BRAKES_STATE = np.dtype(
     align=True,
 )
 
-LEAST = 8.0  # bar expected, below it nothing is judged
+LEAST_EXPECTED = 8.0  # bar expected, below it nothing is judged
 FOLLOWING = 0.5  # of the expected pressure
 MISSING = 0.5  # of the owed force
 SURE_S = 0.05
@@ -86,7 +86,7 @@ def watch_brakes(
         given -= motor_torque(inputs, i) / params.wheel_radius[i]
         due += force
         total += state.owed[i]
-        braked = braked or expected[i] > LEAST
+        braked = braked or expected[i] > LEAST_EXPECTED
         if _lacks(inputs, expected[i], zero[i], i):
             suspected += state.owed[i]
     state.given += gain * (given - state.given)
@@ -102,7 +102,7 @@ def watch_brakes(
     missing = state.scale * total - state.given > MISSING * state.scale * suspected
     state.any = 0
     for i in range(4):
-        known = judged and expected[i] > LEAST and usable(inputs, CALLIPER_PRESSURE + i)
+        known = judged and expected[i] > LEAST_EXPECTED and usable(inputs, CALLIPER_PRESSURE + i)
         stays = state.failed[i] != 0 and state.settled_s > AGAIN_S
         fails = _lacks(inputs, expected[i], zero[i], i) and (missing or stays)
         state.doubt_s[i] = state.doubt_s[i] + dt if known and fails != (state.failed[i] != 0) else 0.0
@@ -114,5 +114,5 @@ def watch_brakes(
 @kernel
 def _lacks(inputs: Record, expected: float, zero: float, i: int) -> bool:
     reading = inputs.value[CALLIPER_PRESSURE + i] - zero
-    below = -LEAST < reading < FOLLOWING * expected  # a brake that gives nothing reads no suction
-    return expected > LEAST and usable(inputs, CALLIPER_PRESSURE + i) and below
+    below = -LEAST_EXPECTED < reading < FOLLOWING * expected  # a brake that gives nothing reads no suction
+    return expected > LEAST_EXPECTED and usable(inputs, CALLIPER_PRESSURE + i) and below

@@ -49,7 +49,7 @@ FLAGS_STATE = np.dtype(
 REVERSE_BIT, ABS_BIT = IMPLAUSIBLE["reverse"], IMPLAUSIBLE["abs_active"]
 ESP_BIT, ACCELERATOR_BIT = IMPLAUSIBLE["esp_active"], IMPLAUSIBLE["accelerator_position"]
 ENGAGED, FASTEST_BACK = 2.0, 12.0  # m/s
-START_S = 1.0  # in which an ECU that starts on the way believes the flag
+START_S = 1.0  # in which an ECU that starts in a moving car believes the flag
 RATE_S, USUAL_S, FADING_S = 0.15, 2.0, 3.0
 MOVED = 0.5  # m^2/s^3, from which the sign of the motion is known
 FORWARDS = 0.4  # of the square, share that the product has
@@ -96,18 +96,18 @@ def _contradict(witness: Record, place: int, evidence: float) -> None:
 def _watch_reverse(params: Record, state: Record, witness: Record, inputs: Record, dt: float) -> None:
     rolled = mean_wheel_speed(params, inputs)
     _follow_direction(params, state, inputs, rolled, dt)
-    told = _set(inputs, REVERSE)
-    if told and not state.reverse_was:
+    reverse = _set(inputs, REVERSE)
+    if reverse and not state.reverse_was:
         state.reverse = 0 if rolled > ENGAGED and state.age_s > START_S else 1
     state.age_s += dt
     forwards = state.moved > MOVED and state.agreed > FORWARDS * state.moved
     if rolled > FASTEST_BACK or forwards:
         state.reverse = 0
-    if told:
+    if reverse:
         _contradict(witness, REVERSE, rolled / FASTEST_BACK)
         if state.moved > MOVED:
             _contradict(witness, REVERSE, state.agreed / (FORWARDS * state.moved))
-    state.reverse_was = 1 if told else 0
+    state.reverse_was = 1 if reverse else 0
 
 
 @kernel
@@ -125,9 +125,9 @@ def _some_wheel_slips(params: Record, inputs: Record, estimate: Record) -> bool:
 
 
 @kernel
-def _stands(stood_s: float, told: bool, slips: bool, dt: float) -> float:
+def _stands(stood_s: float, flag: bool, slips: bool, dt: float) -> float:
     """Return for how long a controller's flag has stood without reason [s]; once too long, until it falls."""
-    if not told:
+    if not flag:
         return 0.0
     if slips and stood_s < LONGEST_S:
         return max(stood_s - dt, 0.0)

@@ -35,7 +35,7 @@ LATENESS_STATE = np.dtype(
 )
 
 SLOWS, SETTLED_S = 1.5, 0.5  # m/s^2, s
-ACROSS = 1.0  # m/s^2, above which the wheels' ways differ by more than is known
+ACROSS = 1.0  # m/s^2, above which the wheels' distances differ by more than is known
 LAG_START, SHARE_START = 0.1, 0.005  # s, -: standard deviations
 WALK = 0.004  # s per root second
 NOISE = 0.25  # m/s of a cycle's reading

@@ -46,7 +46,7 @@ def _watch_motion(p: Record, s: Record, u: Record, dt: float) -> int:
     watch_frozen(s.accel_error, s.acceleration, s.witness, u, dt)
     if s.acceleration.time == 0.0 and not s.witness.rejected[ACCEL_X]:
         follow_accel_error(p, s.accel_error, s.witness, s.acceleration, estimate.accel_y, braking)
-    if s.accel_error.told or s.accel_error.zero_off != 0.0 or s.accel_error.scale_off != 0.0:
+    if s.accel_error.reported or s.accel_error.zero_off != 0.0 or s.accel_error.scale_off != 0.0:
         faults |= ACCEL_X_DRIFTED
     if s.accel_error.proven_s > PROVEN_S and not wheels_deny(s.acceleration):
         moved = moved_offset(s.accel_error.wheels)

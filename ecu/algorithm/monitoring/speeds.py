@@ -35,7 +35,7 @@ SPEED, RECKONED = 4, 5
 WITNESSES = 6
 SPEEDS_STATE = np.dtype(
     [
-        ("told", "f8", (WITNESSES,)),  # car's speed by wheels, vehicle speed, reckoning [m/s]; NaN: silent
+        ("implied", "f8", (WITNESSES,)),  # car's speed by wheels, vehicle speed, reckoning [m/s]; NaN: silent
         ("sorted", "f8", (WITNESSES,)),
         ("apart", "f8", (5,)),  # excess of an input over the median or reckoning, relative, low-passed
         ("base", "f8", (5,)),  # the same while rolling: error of the radius
@@ -77,19 +77,19 @@ def _place(i: int) -> int:
 
 @kernel
 def _gather(params: Record, state: Record, inputs: Record, estimate: Record) -> None:
-    """Overwrite the car's speed by each input, `told`."""
+    """Overwrite the car's speed by each input, `implied`."""
     for i in range(4):
         turning = corner_speed(params, estimate, estimate.speed, i) - estimate.speed
         rolled = abs(inputs.value[WHEEL_SPEED + i]) * params.wheel_radius[i]
-        state.told[i] = (rolled - turning) * (1.0 - state.base[i])
+        state.implied[i] = (rolled - turning) * (1.0 - state.base[i])
     delay = params.vehicle_speed_delay + 1e-9 * inputs.age_ns[VEHICLE_SPEED]
     over_ground = inputs.value[VEHICLE_SPEED] + delay * estimate.accel_x
-    state.told[SPEED] = over_ground * (1.0 - state.base[SPEED])
+    state.implied[SPEED] = over_ground * (1.0 - state.base[SPEED])
     invalid = params.mapped[VEHICLE_SPEED_VALID] != 0 and inputs.value[VEHICLE_SPEED_VALID] < 0.5
     for i in range(5):
         if not usable(inputs, _place(i)) or (i == SPEED and invalid):
-            state.told[i] = math.nan
-    state.told[RECKONED] = state.reckoned if state.started else math.nan
+            state.implied[i] = math.nan
+    state.implied[RECKONED] = state.reckoned if state.started else math.nan
 
 
 @kernel
@@ -97,7 +97,7 @@ def _median(state: Record, witness: Record) -> float:
     """Return the median of the witnesses that speak and are not rejected; NaN: fewer than three do."""
     count = 0
     for i in range(WITNESSES):
-        value = state.told[i]
+        value = state.implied[i]
         if math.isfinite(value) and (i == RECKONED or not witness.rejected[_place(i)]):
             k = count
             while k > 0 and state.sorted[k - 1] > value:
@@ -112,7 +112,7 @@ def _median(state: Record, witness: Record) -> float:
 @kernel
 def _wheels_left(state: Record, median: float) -> bool:
     """Return whether braked wheels' median is below the car's speed, and no vehicle speed agrees with it."""
-    speed = state.told[SPEED]
+    speed = state.implied[SPEED]
     below = median < (1.0 - LEAVES) * state.reckoned
     left: bool = state.started != 0 and below and not speed < 0.5 * (median + state.reckoned)
     return left
@@ -129,7 +129,7 @@ def _reckon(
     reach = RECKON_REACH * max(median, LEAST_SPEED)
     innovation = min(max(median - state.reckoned, -reach), reach)
     if left:
-        innovation = state.told[SPEED] - state.reckoned
+        innovation = state.implied[SPEED] - state.reckoned
         if not (abs(innovation) < LEAVES * state.reckoned) or witness.rejected[VEHICLE_SPEED]:
             innovation = 0.0
     state.slope -= SLOPE_RECKON * dt * innovation
@@ -146,7 +146,7 @@ def _judged(state: Record, i: int, ground: float, free: bool, braked: bool, driv
     if free:
         return apart
     if i < SPEED:
-        reckoned, speed = state.reckoned / ground, state.told[SPEED] / ground
+        reckoned, speed = state.reckoned / ground, state.implied[SPEED] / ground
         if not math.isfinite(speed):
             speed = 1.0
         faster = apart + 1.0 - max(reckoned, speed, 1.0)
@@ -156,7 +156,7 @@ def _judged(state: Record, i: int, ground: float, free: bool, braked: bool, driv
         return slower if slower < 0.0 and not braked else math.nan
     if apart < 0.0:
         return math.nan if driven else apart
-    away = abs(state.told[SPEED] - state.reckoned)
+    away = abs(state.implied[SPEED] - state.reckoned)
     judged = away > 2.0 * abs(ground - state.reckoned) + SLIPPING * ground
     return max(apart - SLIPPING, 0.0) if judged else math.nan
 
@@ -176,7 +176,7 @@ def _believed(state: Record, witness: Record) -> int:
     """Return the mask of the inputs that speak and are not rejected."""
     mask = 0
     for i in range(5):
-        if math.isfinite(state.told[i]) and not witness.rejected[_place(i)]:
+        if math.isfinite(state.implied[i]) and not witness.rejected[_place(i)]:
             mask |= 1 << i
     return mask
 
@@ -187,16 +187,16 @@ def _above(state: Record, witness: Record, i: int, ground: float, slip: float) -
 
     `slip` [m/s] of the wheels is allowed for.
     """
-    told, fastest = state.told[i], max(ground + slip, state.reckoned)
+    implied, fastest = state.implied[i], max(ground + slip, state.reckoned)
     if i < SPEED:
-        speed = state.told[SPEED]
+        speed = state.implied[SPEED]
         if math.isfinite(speed) and not witness.rejected[VEHICLE_SPEED]:
             fastest = max(fastest, speed)
-        return told + slip - fastest
+        return implied + slip - fastest
     for j in range(4):
-        if math.isfinite(state.told[j]) and not witness.rejected[_place(j)]:
-            fastest = max(fastest, state.told[j] + slip)
-    return told - fastest
+        if math.isfinite(state.implied[j]) and not witness.rejected[_place(j)]:
+            fastest = max(fastest, state.implied[j] + slip)
+    return implied - fastest
 
 
 @kernel
@@ -248,12 +248,12 @@ def watch_speeds(
     shows = begin_lateness(lateness, believed, accel, estimate.accel_y, slides, dt)
     slip = tyre_slip(params, accel) * ground
     for i in range(5):
-        if math.isnan(state.told[i]):
+        if math.isnan(state.implied[i]):
             continue
         if shows:
             follow_lag(lateness, i, _above(state, witness, i, ground, slip), accel, ground, dt)
-        told = state.told[i] / (1.0 - state.base[i])
-        state.apart[i] += (told / ground - 1.0 - state.apart[i]) * min(dt / SMOOTHING_S, 1.0)
+        implied = state.implied[i] / (1.0 - state.base[i])
+        state.apart[i] += (implied / ground - 1.0 - state.apart[i]) * min(dt / SMOOTHING_S, 1.0)
         braking, motor = state.torque[i % 4], motor_torque(inputs, i % 4)
         braked, driven = False, accelerates or motor < -TORQUE
         if i < SPEED:

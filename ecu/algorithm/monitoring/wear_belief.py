@@ -10,7 +10,7 @@ s starts at 1 with the law's spread and, relative to the mass so far, the errors
 A measured thickness is a measured M (`pad_geometry.py`); both states are corrected by Kalman's rule. All of
 it is computed anew from the stored values, so that another law reinterprets the same regressors and
 measurements. Linings not registered as new when counting began may have any wear: the belief begins at half
-a life, with the deviation of a uniform distribution, and what is left of them is not told before they are
+a life, with the deviation of a uniform distribution, and what is left of them is not reported before they are
 measured.
 """
 

@@ -59,6 +59,9 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "sigma_axles",
         "wheels",
         "torques",
+        "implied",
+        "reported",
+        "reported_s",
     ),
 }
 

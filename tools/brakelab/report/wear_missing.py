@@ -8,7 +8,7 @@ from brakelab.report.drive import DriveResult
 from brakelab.report.quality import Quality
 from brakelab.report.wear_applications import Application
 from brakelab.results.pads import PadState
-from ecu.algorithm.monitoring.dust import UNTOLD
+from ecu.algorithm.monitoring.dust import UNKNOWN_WORK
 from ecu.contract.signals import CORNERS
 from ecu.pads import LEAST_DISTANCE
 
@@ -112,7 +112,7 @@ def _of_particles(pads: list[PadState], applications: list[Application]) -> list
     else:
         found = []
     share = counted_share(pads, applications)
-    if share < 1.0 - UNTOLD:
+    if share < 1.0 - UNKNOWN_WORK:
         reason = (
             f"{100.0 * (1.0 - share):.0f} % of the work was outside what the emission model was trained on."
         )

@@ -15,7 +15,7 @@ from brakelab.report.wear_plots import BAND, plots_of_emission, plots_of_wear
 from brakelab.report.wear_roads import KINDS, LEAST_KM, distance, roads
 from brakelab.results import euro7
 from brakelab.results.pads import KEY, PadState, unpacked
-from ecu.algorithm.monitoring.dust import UNTOLD
+from ecu.algorithm.monitoring.dust import UNKNOWN_WORK
 from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
 
@@ -120,7 +120,7 @@ def _amounts(drive: DriveResult, pads: list[PadState], applications: list[Applic
     life = float(drive.column("particles_per_km")[-1])
     counted = [each for each in applications if math.isfinite(each.particles)]
     text = fixed(math.nan, 0)
-    if counted and km >= LEAST_KM and counted_share(pads, applications) >= 1.0 - UNTOLD:
+    if counted and km >= LEAST_KM and counted_share(pads, applications) >= 1.0 - UNKNOWN_WORK:
         low, middle, high = (
             1e-9 * sum(getattr(each, name) for each in counted) / km
             for name in ("particles_low", "particles", "particles_high")

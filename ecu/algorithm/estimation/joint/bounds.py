@@ -28,26 +28,32 @@ from ecu.algorithm.estimation.joint.layout import (
 from ecu.algorithm.estimation.joint.prior import OVERRUN_MEAN, OVERRUN_SIGMA
 from ecu.jit import Record, kernel
 
-LOWEST, HIGHEST = np.full(N, -np.inf), np.full(N, np.inf)
-LOWEST[LEVEL : LEVEL + 4], HIGHEST[LEVEL : LEVEL + 4] = math.log(LEAST_RATIO), math.log(GREATEST_RATIO)
+LOWEST_VALUE, HIGHEST_VALUE = np.full(N, -np.inf), np.full(N, np.inf)
+LOWEST_VALUE[LEVEL : LEVEL + 4], HIGHEST_VALUE[LEVEL : LEVEL + 4] = (
+    math.log(LEAST_RATIO),
+    math.log(GREATEST_RATIO),
+)
 LEFT_RIGHT = 0.2  # of an axle's two levels: its linings are of one batch, and one that is oiled is found
 FRONT_REAR = 0.3  # of the axles' frictions within an application: fade on a steep descent
 AT_BOUND = 0.95  # of it
 PARTED = 3.0  # sigma, of what they may have been apart before
-LOWEST[STIFFNESS], HIGHEST[STIFFNESS] = math.log(0.4), math.log(2.5)
-LOWEST[RADIUS : RADIUS + 4], HIGHEST[RADIUS : RADIUS + 4] = -0.02, 0.02
-LOWEST[BIAS], HIGHEST[BIAS] = -0.6, 0.6
-LOWEST[SLOPE], HIGHEST[SLOPE] = -4.0, 4.0
-LOWEST[MASS], HIGHEST[MASS] = math.log(0.85), math.log(1.30)
-LOWEST[PEAK], HIGHEST[PEAK] = -1.0, 0.2
-LOWEST[RATIO], HIGHEST[RATIO] = -0.4, 0.4
-LOWEST[LOAD], HIGHEST[LOAD] = -0.3, 0.3
-LOWEST[DEFLECTION_GAIN], HIGHEST[DEFLECTION_GAIN] = -1.2, 1.2
-LOWEST[MOTOR], HIGHEST[MOTOR] = math.log(0.6), math.log(1.6)
-LOWEST[DRAG], HIGHEST[DRAG] = math.log(0.5), math.log(2.0)
-LOWEST[ROLLING], HIGHEST[ROLLING] = -0.03, 0.03
-LOWEST[DELAY], HIGHEST[DELAY] = -0.1, 0.1
-LOWEST[OVERRUN], HIGHEST[OVERRUN] = OVERRUN_MEAN - 4.0 * OVERRUN_SIGMA, OVERRUN_MEAN + 4.0 * OVERRUN_SIGMA
+LOWEST_VALUE[STIFFNESS], HIGHEST_VALUE[STIFFNESS] = math.log(0.4), math.log(2.5)
+LOWEST_VALUE[RADIUS : RADIUS + 4], HIGHEST_VALUE[RADIUS : RADIUS + 4] = -0.02, 0.02
+LOWEST_VALUE[BIAS], HIGHEST_VALUE[BIAS] = -0.6, 0.6
+LOWEST_VALUE[SLOPE], HIGHEST_VALUE[SLOPE] = -4.0, 4.0
+LOWEST_VALUE[MASS], HIGHEST_VALUE[MASS] = math.log(0.85), math.log(1.30)
+LOWEST_VALUE[PEAK], HIGHEST_VALUE[PEAK] = -1.0, 0.2
+LOWEST_VALUE[RATIO], HIGHEST_VALUE[RATIO] = -0.4, 0.4
+LOWEST_VALUE[LOAD], HIGHEST_VALUE[LOAD] = -0.3, 0.3
+LOWEST_VALUE[DEFLECTION_GAIN], HIGHEST_VALUE[DEFLECTION_GAIN] = -1.2, 1.2
+LOWEST_VALUE[MOTOR], HIGHEST_VALUE[MOTOR] = math.log(0.6), math.log(1.6)
+LOWEST_VALUE[DRAG], HIGHEST_VALUE[DRAG] = math.log(0.5), math.log(2.0)
+LOWEST_VALUE[ROLLING], HIGHEST_VALUE[ROLLING] = -0.03, 0.03
+LOWEST_VALUE[DELAY], HIGHEST_VALUE[DELAY] = -0.1, 0.1
+LOWEST_VALUE[OVERRUN], HIGHEST_VALUE[OVERRUN] = (
+    OVERRUN_MEAN - 4.0 * OVERRUN_SIGMA,
+    OVERRUN_MEAN + 4.0 * OVERRUN_SIGMA,
+)
 
 
 @kernel
@@ -90,7 +96,7 @@ def _keep_axles_alike(state: Record) -> bool:
     h, apart = state.h, 0.0
     for i in range(4):
         level = state.x[LEVEL + i]
-        if not AT_BOUND * LOWEST[LEVEL] < level < AT_BOUND * HIGHEST[LEVEL]:
+        if not AT_BOUND * LOWEST_VALUE[LEVEL] < level < AT_BOUND * HIGHEST_VALUE[LEVEL]:
             return False
         h[LEVEL + i] = 0.5 if i < 2 else -0.5
         apart += h[LEVEL + i] * (state.x[LEVEL + i] - state.before[i])
@@ -108,8 +114,8 @@ def keep_within_bounds(state: Record) -> bool:
     """
     x, p, free, found = state.x, state.p, state.free, False
     for i in range(N):
-        if x[i] < LOWEST[i] or x[i] > HIGHEST[i]:
-            back = min(max(x[i], LOWEST[i]), HIGHEST[i]) - x[i]
+        if x[i] < LOWEST_VALUE[i] or x[i] > HIGHEST_VALUE[i]:
+            back = min(max(x[i], LOWEST_VALUE[i]), HIGHEST_VALUE[i]) - x[i]
             for j in range(N):
                 if j != i and free[i] and free[j] and p[i, i] > 0.0:
                     x[j] += p[j, i] / p[i, i] * back

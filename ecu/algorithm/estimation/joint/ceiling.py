@@ -10,7 +10,7 @@ is an assumption: a measurement counts the less the further its wheels are from 
 changes. Wheels of one side alone say nothing of the road. Where no wheel slips, but the car uses most of the
 peak that the observer has learned, that is a measurement too.
 
-A car that brakes harder than the ceiling raises it. What was measured is forgotten on the way, and at once
+A car that brakes harder than the ceiling raises it. What was measured is forgotten with distance, and at once
 where it is contradicted: the road is another one.
 """
 

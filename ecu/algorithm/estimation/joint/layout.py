@@ -123,7 +123,7 @@ JOINT_STATE: Final = np.dtype(
         ("releasing", "u1"),
         ("released", "u1"),  # no friction brake is applied
         ("unmeasured_s", "f8"),  # time without an accelerometer: the acceleration is that of the torques [s]
-        ("unseen_s", "f8"),  # time in which neither accelerometer nor wheels told how the car moved [s]
+        ("unseen_s", "f8"),  # time in which neither accelerometer nor wheels showed how the car moved [s]
         ("before", "f8", (4,)),  # LEVEL before this brake application
         ("sigma_axles", "f8"),  # of the front levels less the rear ones, as this application began
         ("left_s", "f8"),  # time for which the balance is beyond its gate while braking, signed as it is [s]

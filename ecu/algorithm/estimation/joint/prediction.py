@@ -20,7 +20,7 @@ from ecu.algorithm.inputs import driver_accelerates, others_brake
 from ecu.contract.params import GRAVITY
 from ecu.jit import Record, kernel
 
-LEARNED_WAY, CONFIGURED_WAY = range(2)
+LEARNED, CONFIGURED = range(2)
 
 PREDICTION_STATE = np.dtype(
     [
@@ -33,7 +33,7 @@ PREDICTION_STATE = np.dtype(
         ("applications", "f8"),  # in the record
         ("worse", "f8"),  # mean of |learned| - |configured|
         ("spread", "f8"),  # variance of that
-        ("told_s", "f8"),  # remaining time of the fault bit [s]
+        ("reported_s", "f8"),  # remaining time of the fault bit [s]
     ],
     align=True,
 )
@@ -46,20 +46,20 @@ MEMORY = 10.0  # applications
 LEAST_APPLICATIONS = 4.0
 LEAST_WORSE = 0.02  # of the deceleration
 BEYOND_DOUBT = 2.5  # standard errors
-TOLD_S = 60.0
+REPORTED_S = 60.0
 
 
 @kernel
 def begin_prediction(params: Record, state: Record, joint: Record) -> None:
     """Store the values with which an application is predicted."""
-    state.mass[LEARNED_WAY] = params.mass * math.exp(joint.x[MASS])
-    state.mass[CONFIGURED_WAY] = params.mass
+    state.mass[LEARNED] = params.mass * math.exp(joint.x[MASS])
+    state.mass[CONFIGURED] = params.mass
     state.samples = 0
-    for way in range(2):
-        state.measured[way] = state.predicted[way] = 0.0
+    for by in range(2):
+        state.measured[by] = state.predicted[by] = 0.0
     for i in range(4):
-        state.mu[LEARNED_WAY, i] = params.mu_nominal[i] * math.exp(joint.x[LEVEL + i])
-        state.mu[CONFIGURED_WAY, i] = params.mu_nominal[i]
+        state.mu[LEARNED, i] = params.mu_nominal[i] * math.exp(joint.x[LEVEL + i])
+        state.mu[CONFIGURED, i] = params.mu_nominal[i]
 
 
 @kernel
@@ -84,29 +84,29 @@ def add_window(params: Record, state: Record, joint: Record, inputs: Record) -> 
         motors += w.motor[i] / r
         wheels += params.wheel_inertia[i] / (r * r * params.mass)
         force = brake_gain_per_bar(params, i) * w.common_pressure[i] / r
-        learned += force * state.mu[LEARNED_WAY, i]
-        configured += force * state.mu[CONFIGURED_WAY, i]
+        learned += force * state.mu[LEARNED, i]
+        configured += force * state.mu[CONFIGURED, i]
     rolling, drag = params.rolling_resistance * GRAVITY, params.drag_area * speed * speed
-    mass = state.mass[LEARNED_WAY]
+    mass = state.mass[LEARNED]
     rest = rolling + (drag * math.exp(x[DRAG] + x[MASS]) + motors * math.exp(x[MOTOR])) / mass
-    state.measured[LEARNED_WAY] += -(1.0 + wheels) * (w.common_accel - x[BIAS]) - x[OVERRUN] - rest
-    state.predicted[LEARNED_WAY] += learned / mass
-    mass = state.mass[CONFIGURED_WAY]
-    state.measured[CONFIGURED_WAY] += -(1.0 + wheels) * w.common_accel - rolling - (drag + motors) / mass
-    state.predicted[CONFIGURED_WAY] += configured / mass
+    state.measured[LEARNED] += -(1.0 + wheels) * (w.common_accel - x[BIAS]) - x[OVERRUN] - rest
+    state.predicted[LEARNED] += learned / mass
+    mass = state.mass[CONFIGURED]
+    state.measured[CONFIGURED] += -(1.0 + wheels) * w.common_accel - rolling - (drag + motors) / mass
+    state.predicted[CONFIGURED] += configured / mass
 
 
 @kernel
 def end_prediction(state: Record) -> bool:
     """Record an application; return whether learned values predict significantly worse than configured."""
     n = state.samples
-    if n < LEAST_SAMPLES or state.measured[CONFIGURED_WAY] < LEAST_DECEL * n:
+    if n < LEAST_SAMPLES or state.measured[CONFIGURED] < LEAST_DECEL * n:
         return False
-    if state.measured[LEARNED_WAY] < 0.5 * LEAST_DECEL * n:
+    if state.measured[LEARNED] < 0.5 * LEAST_DECEL * n:
         return False
-    for way in range(2):
-        state.error[way] = state.predicted[way] / state.measured[way] - 1.0
-    difference = abs(state.error[LEARNED_WAY]) - abs(state.error[CONFIGURED_WAY])
+    for by in range(2):
+        state.error[by] = state.predicted[by] / state.measured[by] - 1.0
+    difference = abs(state.error[LEARNED]) - abs(state.error[CONFIGURED])
     state.applications = min(state.applications + 1.0, MEMORY)
     gain = 1.0 / state.applications
     before = state.worse
@@ -121,4 +121,4 @@ def end_prediction(state: Record) -> bool:
 def close_book(state: Record) -> None:
     """Reset the record: the values it judged were discarded."""
     state.applications = state.worse = state.spread = 0.0
-    state.told_s = TOLD_S
+    state.reported_s = REPORTED_S

@@ -53,14 +53,14 @@ def bridge_gap(params: Record, state: Record, inputs: Record, motion: Record, dt
     belongs to the gap.
     """
     speed = mean_wheel_speed(params, inputs)
-    told = motion.measured != 0 or math.isfinite(speed) or usable(inputs, VEHICLE_SPEED)
-    if not told and state.unseen_s == 0.0:
+    known = motion.measured != 0 or math.isfinite(speed) or usable(inputs, VEHICLE_SPEED)
+    if not known and state.unseen_s == 0.0:
         state.unseen_s = min(1e-9 * inputs.age_ns[ACCEL_X], LOST_S)
-    if not told or dt > OVERSLEPT_S:
+    if not known or dt > OVERSLEPT_S:
         state.unseen_s += dt
     reach = UNSEEN_ACCEL * state.unseen_s
     seen = reach > 0.0 and abs(speed - state.x[V]) < reach
-    if told and not seen:
+    if known and not seen:
         return False
     state.x[V] = speed if seen else max(state.x[V] + dt * motion.accel_x, 0.0)
     state.unseen_s, state.hold_s = 0.0 if seen else state.unseen_s, HOLD_S

@@ -32,7 +32,7 @@ SHAPE = 1.6  # c of the Magic Formula
 NOMINAL_PEAK = 0.9  # adhesion
 PEAK_DEGRESSION = 0.05  # adhesion falls a little with load (Figure A.6)
 LEAST_OF_PEAK = 0.2  # of 1 - 4 y: a peak 1.5 times the usual
-STEEPEST = 0.93  # of the peak; the curve continues linearly from there
+LINEAR_FROM = 0.93  # of the peak; the curve continues linearly from there
 APPLIED = 1.0  # bar above push-out: the brakes act
 
 
@@ -40,7 +40,7 @@ APPLIED = 1.0  # bar above push-out: the brakes act
 def slip_of_force(used: float, stiffness: float, peak: float) -> tuple[float, float]:
     """Return slip and its derivative by the adhesion used (force over load); `stiffness` over load."""
     u = used / peak
-    inside = min(max(u, -STEEPEST), STEEPEST)
+    inside = min(max(u, -LINEAR_FROM), LINEAR_FROM)
     tangent = math.tan(math.asin(inside) / SHAPE)
     slope = (1.0 + tangent * tangent) / (math.sqrt(1.0 - inside * inside) * stiffness)
     return peak * SHAPE * tangent / stiffness + slope * peak * (u - inside), slope

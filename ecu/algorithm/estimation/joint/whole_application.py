@@ -47,8 +47,8 @@ STEP = np.array([0.05, 0.03, 0.03])  # between applications
 # Priors of scale and drag [m/s^2] beside windows, which teach nearly all; their step.
 BESIDE, BESIDE_DRAG, BESIDE_STEP = 0.03, 0.05, 0.006
 PAUSE = np.array([0.03, 0.15, 0.1])  # of unknown length: rain, another road, another day
-LOWEST = np.array([-0.7, math.log(3.0 / CEILING), -1.0])
-HIGHEST = np.array([0.6, math.log(30.0 / CEILING), 1.4])
+LOWEST_STATE = np.array([-0.7, math.log(3.0 / CEILING), -1.0])
+HIGHEST_STATE = np.array([0.6, math.log(30.0 / CEILING), 1.4])
 NOISE, NOISE_SHARE = 0.2, 0.07  # m/s^2, of the mean of an application, and of the linings' part of it
 LEAST_NOISE, GREATEST_NOISE = 0.5, 4.0  # times that variance, as measured
 BEFORE, MEMORY = 4.0, 10.0  # applications that the prior of this ratio is worth; that are remembered
@@ -286,7 +286,7 @@ def end_whole(state: Record) -> None:
         _gain(state, OVERRUN, h_scale, h_grip, total),
     )
     for i in range(3):
-        x[i] = min(max(x[i] + gain[i] * innovation, LOWEST[i]), HIGHEST[i])
+        x[i] = min(max(x[i] + gain[i] * innovation, LOWEST_STATE[i]), HIGHEST_STATE[i])
         for j in range(3):
             p[i, j] -= gain[i] * gain[j] * total
         p[i, i] += (STEP[i] if state.alone or i == GRIP else BESIDE_STEP) ** 2

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ecu.algorithm.estimate import ESTIMATE, GREATEST_RATIO, LEAST_RATIO
-from ecu.algorithm.estimation.joint.bounds import HIGHEST, LOWEST
+from ecu.algorithm.estimation.joint.bounds import HIGHEST_VALUE, LOWEST_VALUE
 from ecu.algorithm.estimation.joint.layout import (
     CHANGE,
     JOINT_STATE,
@@ -228,5 +228,5 @@ def test_what_may_be_learned_and_is_stored_has_bounds_that_a_store_takes(braking
     _choose_free(state, braking, motors, True)
     learned = [i for i in KEPT if state["free"][i]]
     assert len(learned) >= 8
-    assert np.all(LOWEST[learned] >= -JOINT_LIMIT)
-    assert np.all(HIGHEST[learned] <= JOINT_LIMIT)
+    assert np.all(LOWEST_VALUE[learned] >= -JOINT_LIMIT)
+    assert np.all(HIGHEST_VALUE[learned] <= JOINT_LIMIT)
