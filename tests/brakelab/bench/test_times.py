@@ -202,5 +202,5 @@ def test_replay_tables() -> None:
         "candump: signals",
         "MDF4: signals",
     ]
-    assert [row[0] for row in whole.rows] == [*formats, replay.LONGEST, "step alone"]
+    assert [row[0] for row in whole.rows] == [*formats, replay.LONGEST_THREAD, "step alone"]
     assert all(name in whole.below for name in formats)

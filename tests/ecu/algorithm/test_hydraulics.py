@@ -181,7 +181,7 @@ def test_it_follows_with_less_error_than_the_samples(callipers, name: str) -> No
 
 
 HONEST = [
-    # hydraulics, gain of the demand, course
+    # hydraulics, gain of the demand, trace
     ("2 % more", BUILD_UP, 1.02, "in two steps"),
     ("5 % more", BUILD_UP, 1.05, "in two steps"),
     ("A.17, a fifth faster", (0.00075 * 0.64, 0.037 * 0.8, 0.026), 1.00, "in two steps"),
@@ -194,9 +194,9 @@ HONEST = [
 ]
 
 
-@pytest.mark.parametrize(("name", "kind", "gain", "course"), HONEST)
-def test_its_variance_is_honest(callipers, name: str, kind, gain: float, course: str) -> None:
-    demand = np.interp(np.arange(0, 4, DT), *RAMPS[course][1:])
+@pytest.mark.parametrize(("name", "kind", "gain", "trace"), HONEST)
+def test_its_variance_is_honest(callipers, name: str, kind, gain: float, trace: str) -> None:
+    demand = np.interp(np.arange(0, 4, DT), *RAMPS[trace][1:])
     pressure = hydraulics(kind, gain * demand)
     ratios = []
     for seed in range(30):
@@ -204,7 +204,7 @@ def test_its_variance_is_honest(callipers, name: str, kind, gain: float, course:
         on = following > 0
         ratios.append((value[on] - pressure[on]) / np.sqrt(variance[on]))
     inside = float(np.mean(np.abs(np.concatenate(ratios)) < 2))
-    print(f"{name}, gain {gain}, {course}: {100 * inside:.1f} % inside two sigma (85 … 99.7)")
+    print(f"{name}, gain {gain}, {trace}: {100 * inside:.1f} % inside two sigma (85 … 99.7)")
     assert 0.85 < inside < 0.997
 
 
@@ -219,12 +219,12 @@ FOREIGN = [
 ]
 
 
-@pytest.mark.parametrize(("name", "course", "within"), FOREIGN, ids=[row[0] for row in FOREIGN])
+@pytest.mark.parametrize(("name", "trace", "within"), FOREIGN, ids=[row[0] for row in FOREIGN])
 def test_it_stops_following_a_pressure_that_does_something_else(
-    callipers, name: str, course, within: float
+    callipers, name: str, trace, within: float
 ) -> None:
     demand = np.full(300, 40.0)
-    pressure = np.where(np.arange(300) < 200, 40.0, course((np.arange(300) - 199) * DT))
+    pressure = np.where(np.arange(300) < 200, 40.0, trace((np.arange(300) - 199) * DT))
     stopped = []
     for seed in range(20):
         _, _, following, _ = follow(callipers, demand, pressure, seed)

@@ -1,5 +1,5 @@
 """The whole algorithm: same inputs give the same bits, promised outputs are never NaN, a value that is not
-finite is survived and told, and the cycle allocates nothing."""
+finite is survived and reported, and the cycle allocates nothing."""
 
 import math
 
@@ -395,8 +395,8 @@ def test_an_accumulator_that_reads_less_than_a_calliper_holds_limits_nothing(car
     car.overwrite = {"accumulator_pressure": 11.0}
     lied = car.drive((60.0, 1.5))
     assert column(lied, "pressure_demand_fl").min() > 0.95 * column(fine, "pressure_demand_fl")[-1]
-    told = column(lied, "active_faults_2").astype(int) & (IMPLAUSIBLE["accumulator_pressure"] >> 32)
-    assert told[15:].all()
+    reported = column(lied, "active_faults_2").astype(int) & (IMPLAUSIBLE["accumulator_pressure"] >> 32)
+    assert reported[15:].all()
     assert not (column(lied, "active_faults").astype(int) & ACCUMULATOR_LOW).any()
 
 

@@ -74,7 +74,7 @@ NEVER = (
     "demands that do not count though somebody asks",
     "a failed ECU that demands pressure",
     "a motor demand that is not a number, negative or beyond the limit that the motor reports",
-    "motor demands that count where pressures do not, or the other way round",
+    "motor demands that count where pressures do not, or the reverse",
 )
 KINDS = (
     *("honest", "anywhere in its range", "stuck anywhere", "stuck", "at an end of its range", "no number"),

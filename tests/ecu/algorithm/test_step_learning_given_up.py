@@ -13,7 +13,7 @@ ROLLS, BRAKES = (0.0, 2.0), (60.0, 2.5)
 
 
 class Brakings:
-    """One car that brakes from 90 km/h again and again, with the friction that it is told."""
+    """One car that brakes from 90 km/h again and again, with the friction that is given."""
 
     def __init__(self, params, feed) -> None:
         self.car = Car(params, feed, mu=NOMINAL)
@@ -21,7 +21,7 @@ class Brakings:
     def brake(self, mu: float, believed: float | None = None) -> tuple[np.ndarray, np.ndarray, bool]:
         """Return friction before a braking, friction after it, and whether learning was given up.
 
-        `believed`: what was learned, whatever the brakings before have told.
+        `believed`: what was learned, whatever the brake applications before have shown.
         """
         car = self.car
         car.mu, car.speed = mu, 25.0
@@ -30,16 +30,20 @@ class Brakings:
         before = [column(car.drive(ROLLS), f"mu_b_{c}")[-1] for c in ("fl", "rl")]
         car.drive(BRAKES)
         rows = car.drive((0.0, 1.0))
-        told = column(rows, "active_faults").astype(np.int64)[-1] & LEARNING_GIVEN_UP
-        return np.array(before), np.array([column(rows, f"mu_b_{c}")[-1] for c in ("fl", "rl")]), bool(told)
+        reported = column(rows, "active_faults").astype(np.int64)[-1] & LEARNING_GIVEN_UP
+        return (
+            np.array(before),
+            np.array([column(rows, f"mu_b_{c}")[-1] for c in ("fl", "rl")]),
+            bool(reported),
+        )
 
 
 @pytest.mark.parametrize("mu", [0.36, 0.45, 0.54], ids=["smooth", "as configured", "rough"])
 def test_linings_that_stay_what_they_are_are_learned_and_kept(params, feed, mu: float) -> None:
     brakings = Brakings(params, feed)
     for _ in range(10):
-        before, _, told = brakings.brake(mu)
-        assert not told
+        before, _, reported = brakings.brake(mu)
+        assert not reported
     assert before == pytest.approx([mu, mu], rel=0.05)
     book = brakings.car.state["prediction"][0]
     assert book["applications"] >= 6
@@ -49,9 +53,9 @@ def test_linings_that_stay_what_they_are_are_learned_and_kept(params, feed, mu: 
 @pytest.mark.parametrize("believed", [0.36, 0.54], ids=["too smooth", "too rough"])
 def test_what_misleads_four_times_is_forgotten(params, feed, believed: float) -> None:
     brakings = Brakings(params, feed)
-    for told in (False, False, False, True):
+    for reported in (False, False, False, True):
         _, after, given_up = brakings.brake(NOMINAL, believed)
-        assert given_up == told
+        assert given_up == reported
     assert after == pytest.approx([NOMINAL, NOMINAL], rel=0.01)
     assert np.all(brakings.car.state["learned"][0]["sigma_mu_b"] > 0.2 * NOMINAL)
     # It is learned anew, and predicts well.

@@ -43,7 +43,7 @@ ROUNDS: Final = 3
 SCENARIO: Final = "ordinary"
 PART_S: Final = 20.0
 """Length of drive for the programs in Python [s]."""
-LONGEST: Final = "candump: the longest thread"
+LONGEST_THREAD: Final = "candump: the longest thread"
 _DBC: Final = "dbc/brake_ecu.dbc"
 _NAMES: Final = {".log": "candump", ".asc": "ASC", ".blf": "BLF", ".trc": "TRC", ".mf4": "MDF4"}
 
@@ -195,7 +195,7 @@ def _tables(folder: Path, rounds: int, scenario: str, part_s: float) -> list[Tab
             other = _task(lambda log=parts[end]: _python_replay(log, ecu), part_cycles)  # type: ignore[misc]
         replays[_NAMES[end]] = (ours, other, "µs", note)
     longest = _task(lambda: _replay(logs[".log"], out), cycles, time.thread_time_ns)
-    replays[LONGEST] = (longest, None, "µs", "the bound where cores are free")
+    replays[LONGEST_THREAD] = (longest, None, "µs", "the bound where cores are free")
     steps = _inputs_of_cycles(logs[".log"])
     replays["step alone"] = (_task(lambda: _step(steps, params), len(steps)), None, "µs", "the bound")
     read_rows, replay_rows = _rows(reading, rounds), _rows(replays, rounds)
@@ -227,8 +227,8 @@ def _below_replays(rows: list[Row]) -> str:
         "Processor time of 10 ms of the drive, on one core: everything that `brake-ecu replay` does, in a "
         "process that has started and knows the contract's database: configuration, SHA-256 of the log, "
         f"reading, decoding, step, results in Parquet, the table. Times real time: {shown}; candump "
-        f"{speed[LONGEST]:.0f} where reading, decoding, hash and Parquet have cores of their own. The step "
-        f"alone takes {share:.0f} % of a replay of candump. The peer reads the first "
+        f"at most {speed[LONGEST_THREAD]:.0f} where reading, decoding, hash and Parquet have their own cores. "
+        f"The step alone takes {share:.0f} % of a replay of candump. The peer reads the first "
         f"{PART_S:.0f} s: no CRC, no counter, no time-out, four filters, no results."
     )
 

@@ -46,7 +46,7 @@ def test_foot_off_the_share_is_taken_as_it_is_and_the_next_braking_begins_with_i
     assert cleaner() == pytest.approx(0.8)
 
 
-def test_in_an_application_the_share_moves_slowly_both_ways(cleaner) -> None:
+def test_in_an_application_the_share_moves_slowly_to_both_sides(cleaner) -> None:
     cleaner(decel=0.0)
     cleaner.params["wanted_share"] = 0.5
     assert cleaner(dt=0.1) == pytest.approx(0.8 - 0.1 * SHARE_RATE)

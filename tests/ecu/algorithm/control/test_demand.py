@@ -22,7 +22,7 @@ G, DT = 9.81, 0.01
 
 
 class Holding:
-    """A car whose wheels turn as told; `run` returns the demand of every cycle."""
+    """A car whose wheels turn as given; `run` returns the demand of every cycle."""
 
     def __init__(self, params, feed) -> None:
         self.params, self.feed, self.state = params[0], feed, np.zeros(1, DEMAND_STATE)
@@ -161,7 +161,7 @@ def test_a_map_that_asks_for_less_than_a_secondary_brake_gives_all_it_has(params
 
 
 GAPS = [
-    # case, flag, verdicts of demand and flag, demand after 0.01, 0.09 and 0.2 s [m/s^2], told after 0.2 s
+    # case, flag, verdicts of demand and flag, demand after 0.01, 0.09 and 0.2 s [m/s^2], reported after 0.2 s
     ("followed", 1.0, USABLE, USABLE, (4.0, 4.0, 4.0), False),
     ("withdrawn", 0.0, USABLE, USABLE, (0.0, 0.0, 0.0), False),
     ("withdrawn, and no value any more", 0.0, ALIVE, USABLE, (0.0, 0.0, 0.0), False),
@@ -173,10 +173,10 @@ GAPS = [
 
 
 @pytest.mark.parametrize(
-    ("case", "flag", "value", "flagged", "asked", "told"), GAPS, ids=[row[0] for row in GAPS]
+    ("case", "flag", "value", "flagged", "asked", "reported"), GAPS, ids=[row[0] for row in GAPS]
 )
 def test_an_automated_demand_ends_at_once_only_where_it_is_withdrawn(
-    params, feed, case, flag, value, flagged, asked, told
+    params, feed, case, flag, value, flagged, asked, reported
 ) -> None:
     state = np.zeros(1, DEMAND_STATE)[0]
     assert hold_automated(state, feed(decel_demand=4.0, decel_demand_valid=1.0)[0], DT) == 0
@@ -187,8 +187,8 @@ def test_an_automated_demand_ends_at_once_only_where_it_is_withdrawn(
         bits = hold_automated(state, inputs, DT)
         got.append(update_demand(params[0], state, inputs, 20.0, DT))
     assert (got[0], got[8], got[19]) == asked, case
-    assert bits == (DEMAND_LOST if told else 0)
-    if told:
+    assert bits == (DEMAND_LOST if reported else 0)
+    if reported:
         assert hold_automated(state, feed(decel_demand=2.0, decel_demand_valid=1.0)[0], DT) == 0, "it is back"
 
 

@@ -161,7 +161,7 @@ def test_beyond_the_grip_of_most_roads_the_leading_axle_takes_it_slowly(params, 
 
 
 class Watch:
-    """A car whose wheels slip as told; radii by their loads and errors."""
+    """A car whose wheels slip as given; radii by their loads and errors."""
 
     def __init__(self, params, state, feed, learned: float = 2.0) -> None:
         self.params, self.state, self.feed = params[0], state[0], feed
@@ -199,7 +199,7 @@ def watch(params, state, feed) -> Watch:
     return Watch(params, state, feed)
 
 
-LEAST = (LEAST_TRAILING, LEAST_TRAILING)
+LEAST_REAR = (LEAST_TRAILING, LEAST_TRAILING)
 EQUAL, WORSE, BEYOND = (-3, -3, -3, -3), (-3, -3, -6, -6), (-3, -3, -4.5, -4.5)
 BY_4 = {"decel": 4.0, "accel": -4.0}
 WATCHED = [
@@ -207,20 +207,20 @@ WATCHED = [
     ("equal slip", EQUAL, {}, (1.0, 1.0)),
     ("rear 0.4 % beyond: within the margin", (-3, -3, -3.4, -3.4), {}, (1.0, 1.0)),
     ("rear 0.6 % beyond: within margin and noise", (-3, -3, -3.6, -3.6), {}, (1.0, 1.0)),
-    ("rear 1.5 % beyond", BEYOND, {}, LEAST),
+    ("rear 1.5 % beyond", BEYOND, {}, LEAST_REAR),
     # 0.82 % over margin and noise, 0.05 s late: 1 - 6 * 0.82 * (0.2 - 0.05) = 0.3
     ("rear 1.5 % beyond for 0.15 s", BEYOND, {"seconds": 0.15}, (0.4, 0.65)),
     ("one side is enough: the bend's inner wheels", (-3, -2, -4.5, -2), {"seconds": 0.15}, (0.4, 0.65)),
     ("front beyond the rear", (-5, -5, -3, -3), {}, (1.0, 1.0)),
-    ("rear locked", (-3, -3, -100, -100), {"seconds": 0.05}, LEAST),
+    ("rear locked", (-3, -3, -100, -100), {"seconds": 0.05}, LEAST_REAR),
     ("the front reads 3 % fast, it is late: the rear hardly slips", (2, 2, -1, -1), {}, (1.0, 1.0)),
-    ("the same, a speed by which the rear slips", (0, 0, -1, -1), {"reckoned": 20.4}, LEAST),
+    ("the same, a speed by which the rear slips", (0, 0, -1, -1), {"reckoned": 20.4}, LEAST_REAR),
     ("a late front beside a rear that slips as its force needs", (3, 3, -1.6, -1.6), BY_4, (1.0, 1.0)),
-    ("rear 1 % beyond that and the front", (-2, -2, -3.7, -3.7), BY_4, LEAST),
-    ("an accelerometer that reads more than is asked for", (-3, -3, -6, -6), {"accel": -30.0}, LEAST),
-    ("one that reads no braking", (-3, -3, -4.5, -4.5), {"accel": 4.0}, LEAST),
+    ("rear 1 % beyond that and the front", (-2, -2, -3.7, -3.7), BY_4, LEAST_REAR),
+    ("an accelerometer that reads more than is asked for", (-3, -3, -6, -6), {"accel": -30.0}, LEAST_REAR),
+    ("one that reads no braking", (-3, -3, -4.5, -4.5), {"accel": 4.0}, LEAST_REAR),
     ("backwards, a late rear", (-1.6, -1.6, 1.9, 1.9), BY_4 | {"accel": 4.0, "speed": -8.0}, (1.0, 1.0)),
-    ("a reckoning that is too slow hides nothing", BEYOND, {"reckoned": 15.0}, LEAST),
+    ("a reckoning that is too slow hides nothing", BEYOND, {"reckoned": 15.0}, LEAST_REAR),
     ("both locked", (-100, -100, -100, -100), {}, (1.0, 1.0)),
     ("the front drives", (0.3, 0.3, 0.1, 0.1), {}, (1.0, 1.0)),
     ("noise of the wheel speeds at 20 m/s", (-3, -3, -3.4, -3.4), {"noise": 0.1}, (0.99, 1.0)),
@@ -231,13 +231,13 @@ WATCHED = [
         "a rear wheel's speed lost: the other side watches",
         WORSE,
         {"lost": 2},
-        LEAST,
+        LEAST_REAR,
     ),
     ("a front wheel's sensor keeps its value: no slip of a braked wheel", (30, -3, -3, -3), {}, (1.0, 1.0)),
     ("nobody brakes", WORSE, {"decel": 0.0}, (1.0, 1.0)),
     ("request lost", WORSE, {"decel": math.nan}, (1.0, 1.0)),
     ("backwards, equal slip", EQUAL, {"speed": -8.0}, (1.0, 1.0)),
-    ("backwards, front beyond the rear", (-5, -5, -3, -3), {"speed": -8.0}, LEAST),
+    ("backwards, front beyond the rear", (-5, -5, -3, -3), {"speed": -8.0}, LEAST_REAR),
     ("backwards, one front wheel locked", (-100, -3, -3, -3), {"speed": -8.0, "seconds": 0.05}, (0.3, 0.3)),
     ("backwards, rear beyond the front", WORSE, {"speed": -8.0}, (1.0, 1.0)),
     ("backwards, too slow for slip", (-5, -5, -3, -3), {"speed": -4.0}, (1.0, 1.0)),

@@ -113,12 +113,12 @@ def test_a_torque_whose_pressure_is_no_number(torque: float, wanted: float, unco
 
 
 def test_half_a_pascal_of_rounding_is_no_limit_and_two_are() -> None:
-    """`limited` is told from 1 Pa on."""
-    for beyond, told in ((0.95, 0), (1.05, 1)):
+    """`limited` is reported from 1 Pa on."""
+    for beyond, reported in ((0.95, 0), (1.05, 1)):
         state = fresh()
         wanted = PUSH_OUT + 1.6 * 400.0 / PER_PASCAL[0] + beyond
         limit(PARAMS, state, 0, wanted, nominal(400.0), 400.0, DT)
-        assert state["limited"] == told
+        assert state["limited"] == reported
 
 
 def test_the_smallest_torque_is_a_demand() -> None:

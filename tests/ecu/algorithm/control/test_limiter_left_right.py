@@ -105,12 +105,12 @@ def test_hydraulics_that_have_no_more_to_give() -> None:
     assert got[:2] == pytest.approx([179.5 / 200.0, 1.1])
 
 
-def test_levelling_is_told_and_what_is_within_the_rule_is_not() -> None:
-    for wanted, told in (([1.05, 0.95, 1, 1], 0), ([1.06, 0.95, 1, 1], 1)):
+def test_levelling_is_reported_and_what_is_within_the_rule_is_not() -> None:
+    for wanted, reported in (([1.05, 0.95, 1, 1], 0), ([1.06, 0.95, 1, 1], 1)):
         torque = np.full(4, 400.0)
         state = new_state()
         limit_both(PARAMS, state, 0, pressure(wanted, torque), pressure(1.0, torque), torque, DT)
-        assert state["limited"][0] == told
+        assert state["limited"][0] == reported
         moved = 0.5 * max(wanted[0] - wanted[1] - 0.1, 0.0)
         assert state["asked"][0, :2] == pytest.approx(
             pressure([wanted[0] - moved, wanted[1] + moved, 1, 1], torque)[:2]
@@ -132,7 +132,7 @@ def test_every_pair_of_shares() -> None:
 
 @kernel
 def _attack(params, state, random, special, per_pascal, found):
-    """Adversarial cycles; `found`: cycles on their way, worst share apart there and elsewhere, breaches."""
+    """Adversarial cycles; `found`: cycles in progress, worst share apart there and elsewhere, breaches."""
     torque, wanted, uncompensated = np.zeros(4), np.zeros(4), np.zeros(4)
     last, target = np.zeros(4), np.zeros(4)
     demand = 0.0
@@ -195,14 +195,14 @@ def test_a_million_adversarial_cycles() -> None:
     state, found = new_state(), np.zeros(5)
     for _ in range(20):
         _attack(PARAMS, state, random.random((50_000, 20)), ANY, PER_PASCAL, found)
-    on_the_way, _, worst, breaches, judged = found
+    in_progress, _, worst, breaches, judged = found
     assert breaches == 0
     assert judged > 500_000, judged
     assert worst <= 0.1 + 1e-6, f"left and right {worst:.3f} apart in {judged:.0f} axles"
-    assert on_the_way < judged, "most cycles are not on their way"
+    assert in_progress < judged, "most cycles are not in progress"
 
 
-def test_a_corner_is_on_its_way_for_60_ms_at_most() -> None:
+def test_a_corner_takes_60_ms_at_most() -> None:
     torque = 179.0 * BAR * PER_PASCAL
     state = new_state()
     state["pressure"][0] = [0.0, 179.5 * BAR, 0.0, 0.0]

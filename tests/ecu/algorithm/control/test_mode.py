@@ -127,7 +127,7 @@ def test_hydraulics_that_are_not_ready(params, feed, ready, bit) -> None:
 
 
 @pytest.mark.parametrize("verdict", [0, ALIVE, VALID], ids=["never", "invalid", "stale"])
-def test_hydraulics_that_say_nothing_are_not_told_as_not_ready(params, feed, verdict) -> None:
+def test_hydraulics_that_say_nothing_are_not_reported_as_not_ready(params, feed, verdict) -> None:
     inputs = feed(**ALL_GOOD | {"hydraulic_ready": 0.0})
     inputs[0]["verdict"][INPUT["hydraulic_ready"]] = verdict
     assert input_faults(params[0], inputs[0]) == 0

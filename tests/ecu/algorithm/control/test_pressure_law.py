@@ -221,7 +221,7 @@ def test_friction_in_use_does_not_run_on_while_the_pressure_is_cut(case, cut, es
 
 
 @pytest.mark.parametrize(
-    ("case", "compensation", "estimate", "cut", "guarded", "asked", "told"),
+    ("case", "compensation", "estimate", "cut", "guarded", "asked", "last"),
     [
         ("friction as known", SECOND_ORDER, 0.45, 0, 0, True, False),
         ("29 % below its base", SECOND_ORDER, 0.45 * 0.71, 0, 0, True, False),
@@ -235,8 +235,8 @@ def test_friction_in_use_does_not_run_on_while_the_pressure_is_cut(case, cut, es
         ("not a number", SECOND_ORDER, math.nan, 0, 0, True, False),
     ],
 )
-def test_when_the_driver_is_told_that_the_brakes_fade(
-    params, case, compensation, estimate, cut, guarded, asked, told
+def test_when_it_is_reported_that_the_brakes_fade(
+    params, case, compensation, estimate, cut, guarded, asked, last
 ) -> None:
     params["compensation"] = compensation
     state = law()
@@ -247,10 +247,10 @@ def test_when_the_driver_is_told_that_the_brakes_fade(
         watch_limit(params[0], state, known, guard, False, 4.0 * asked, 0.01)
         after.append(int(state["at_limit"]))
     assert after[28] == 0, case  # 0.29 s
-    assert after[-1] == told, case
+    assert after[-1] == last, case
 
 
-def test_what_the_driver_is_told_lasts_until_the_brakes_are_released() -> None:
+def test_what_is_reported_lasts_until_the_brakes_are_released() -> None:
     state, faded, well = law(), estimated(0.3), estimated(0.45)
     seen = []
     for known, decel, cycles in ((faded, 4.0, 40), (well, 4.0, 100), (well, 0.0, 1), (well, 4.0, 40)):
@@ -275,7 +275,7 @@ def test_what_the_driver_is_told_lasts_until_the_brakes_are_released() -> None:
         ("the request is unknown", 2.5, 0.2, True, 0.3, math.nan, 0, 0),
     ],
 )
-def test_either_the_ceiling_of_grip_or_the_brakes_are_told(
+def test_either_the_ceiling_of_grip_or_the_brakes_are_reported(
     case, limit, sigma, slips, mu, decel, beyond, faded
 ) -> None:
     state, after = law(), []

@@ -20,7 +20,7 @@ def new_guard() -> np.void:
 
 
 class Wheels:
-    """A car that keeps its speed while the front-left wheel does what it is told.
+    """A car that keeps its speed while the front-left wheel does as given.
 
     `turns`: the sign that its sensors give a wheel speed."""
 
@@ -313,7 +313,7 @@ def test_noise_of_a_wheel_speed_is_no_slip(wheels, noise: float, capped: bool) -
 
 
 def test_a_wheel_without_torque_that_does_not_spin_up_has_a_sensor_that_lies(wheels: Wheels) -> None:
-    """It falls to a value and stays there: held for the cut, 0.3 s and the way back, then never again."""
+    """It falls to a value and stays there: held for the cut, 0.3 s and the return, then never again."""
     caps = wheels.run_into(-0.6) + [wheels.cycle(-0.6) for _ in range(150)]
     bottom = next(k for k, cap in enumerate(caps) if cap == pytest.approx(0.5))
     returned = next(k for k in range(bottom, len(caps)) if caps[k] > 1.0)

@@ -12,7 +12,7 @@ OBSERVERS = [JOINT, OBSERVER1, OBSERVER2]
 SPEED = 20.0  # m/s
 RATIOS = {"test_ratio", "test_ratio_balance", "test_ratio_speed"}
 GRIP = ("grip_limit", "sigma_grip_limit", "grip_knee")
-NOT_TOLD = {
+NOT_ESTIMATED = {
     JOINT: {"test_ratio_balance", "test_ratio_speed"},  # nothing brakes or drives, and there is no reference
     OBSERVER1: {"sigma_force", *GRIP, *RATIOS},  # only a filter of the whole car knows these
     OBSERVER2: {"sigma_force", *GRIP, *RATIOS},
@@ -34,7 +34,7 @@ def roll(params, feed, observer: int, seconds: float, bars=(0.0, 0.0, 0.0, 0.0),
 def test_every_observer_says_all_that_it_knows(params, feed, observer: int) -> None:
     estimate = roll(params, feed, observer, 1.0, vehicle_speed_valid=0.0)
     unknown = {name for name in ESTIMATE.names or () if not np.isfinite(estimate[name]).all()}
-    assert unknown == NOT_TOLD[observer]
+    assert unknown == NOT_ESTIMATED[observer]
     assert estimate["started"]
     assert estimate["speed"] == pytest.approx(SPEED, abs=0.2)
     assert estimate["mass"] == pytest.approx(params[0]["mass"], rel=0.05)

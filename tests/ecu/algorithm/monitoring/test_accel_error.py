@@ -26,7 +26,7 @@ class Car:
         self.blocks, self.estimate = np.zeros(1, ACCELERATION_STATE)[0], np.zeros(1, ESTIMATE)[0]
         self.state, self.witness = np.zeros(1, ACCEL_ERROR_STATE)[0], np.zeros(1, WITNESS_STATE)[0]
         self.random, self.clock = np.random.default_rng(7), 0.0
-        self.told: float | None = None
+        self.reported: float | None = None
         self.estimate["mu"] = self.p["mu_nominal"]
 
     def asked(self, t: float) -> float:
@@ -83,8 +83,8 @@ class Car:
             watch_frozen(self.state, self.blocks, self.witness, self.inputs[0], DT)
             if self.blocks["time"] == 0.0:
                 follow_accel_error(p, self.state, self.witness, self.blocks, 0.0, braking)
-            if self.state["told"] and self.told is None:
-                self.told = self.clock
+            if self.state["reported"] and self.reported is None:
+                self.reported = self.clock
 
     def stand(self, seconds) -> None:
         self.blocks["mean"] = 0.0
@@ -135,7 +135,7 @@ def test_a_slope_is_no_zero(params, feed, slope: float, case, wrong, off: float)
 
 
 GROWS = [
-    # what grows, each second; told after [s], None: never
+    # what grows, each second; reported after [s], None: never
     ("nothing", {}, None),
     ("the accelerometer's zero by 0.05 m/s2", {"zero": 0.05}, 6.0),
     ("by -0.05 m/s2", {"zero": -0.05}, 6.0),
@@ -149,23 +149,23 @@ GROWS = [
 
 
 @pytest.mark.parametrize(("case", "wrong", "after"), GROWS, ids=[c[0] for c in GROWS])
-def test_when_the_accelerometer_is_told(params, feed, case, wrong, after: float | None) -> None:
+def test_when_the_accelerometer_is_reported(params, feed, case, wrong, after: float | None) -> None:
     """By two witnesses; what one alone shows is taken off no reading."""
     car = Car(params, feed)
     car.drive(48.0)
     car.drive(20.0, grows=True, **wrong)
-    print(car.told, car.state)
+    print(car.reported, car.state)
     if after is None:
-        assert car.told is None
+        assert car.reported is None
         assert correct_accel(car.state, -4.0) == -4.0
     else:
-        assert car.told is not None
-        assert 1.0 < car.told - 48.0 < after
+        assert car.reported is not None
+        assert 1.0 < car.reported - 48.0 < after
 
 
-@pytest.mark.parametrize(("stands", "told"), [(0.0, True), (15.0, False)])
+@pytest.mark.parametrize(("stands", "reported"), [(0.0, True), (15.0, False)])
 def test_who_gets_in_at_a_standstill_is_no_error_of_the_accelerometer(
-    params, feed, stands: float, told: bool
+    params, feed, stands: float, reported: bool
 ) -> None:
     """A sixth more of mass, on a road that climbs as much as the car then lacks."""
     car = Car(params, feed)
@@ -173,4 +173,4 @@ def test_who_gets_in_at_a_standstill_is_no_error_of_the_accelerometer(
     car.stand(stands)
     car.drive(12.0, motors=1.17)
     car.drive(24.0, motors=1.17, slope=-0.5)
-    assert (car.told is not None) == told
+    assert (car.reported is not None) == reported

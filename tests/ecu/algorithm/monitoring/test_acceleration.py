@@ -1,6 +1,6 @@
 """An accelerometer against wheels and torques: what is said of it, when, and of what nothing is said.
 
-A car of this table is three courses: what the torques give, what the accelerometer reads and how the wheels
+A car of this table is three series: what the torques give, what the accelerometer reads and how the wheels
 slow down. They differ as slope, lining and sensor make them differ.
 """
 
@@ -18,7 +18,7 @@ from ecu.contract.records import RecordArray
 from ecu.contract.signals import MOTOR_TORQUE
 
 JUMP = 3.0  # s
-Course = Callable[[float], float]
+Series = Callable[[float], float]
 
 
 def braked(t: float) -> float:
@@ -31,11 +31,11 @@ def begins(t: float) -> float:
     return -4.0 * min(max((t - JUMP) / 0.3, 0.0), 1.0)
 
 
-def steps(height: float, since: float = JUMP, until: float = 99.0) -> Course:
+def steps(height: float, since: float = JUMP, until: float = 99.0) -> Series:
     return lambda t: height if since <= t < until else 0.0
 
 
-def ramps(rate: float) -> Course:
+def ramps(rate: float) -> Series:
     return lambda t: rate * max(t - JUMP, 0.0)
 
 
@@ -45,7 +45,7 @@ def none(t: float) -> float:
 
 # what, force by the torques, on top of it: of car (reading and dv/dt), of dv/dt alone, of the reading alone;
 # said after [s], None: never
-CASES: list[tuple[str, Course, Course, Course, Course, float | None]] = [
+CASES: list[tuple[str, Series, Series, Series, Series, float | None]] = [
     ("brakes", braked, none, none, none, None),
     ("brakes harder", begins, none, none, none, None),
     ("a slope of 8 % at once", braked, none, steps(-0.8), none, None),
@@ -71,10 +71,10 @@ CASES: list[tuple[str, Course, Course, Course, Course, float | None]] = [
 def drive(
     params: RecordArray,
     feed: Any,
-    force: Course,
-    car: Course,
-    wheels: Course,
-    reading: Course,
+    force: Series,
+    car: Series,
+    wheels: Series,
+    reading: Series,
     seconds: float = 6.0,
     motors: bool = True,
     slope: float = 0.0,
@@ -183,7 +183,7 @@ BY_WHEELS_ALONE = [
 @pytest.mark.parametrize("drive_torque", [unreported, badly_known])
 @pytest.mark.parametrize(("reading", "after"), BY_WHEELS_ALONE)
 def test_where_the_drive_s_torque_is_not_known_only_what_no_road_does_is_doubted(
-    params, feed, drive_torque, reading: Course, after: float | None
+    params, feed, drive_torque, reading: Series, after: float | None
 ) -> None:
     said = drive(params, feed, braked, none, none, reading, **drive_torque(params))
     found = 0.01 * said.index(True) - JUMP if any(said) else None

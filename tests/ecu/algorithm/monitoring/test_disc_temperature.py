@@ -314,7 +314,7 @@ def test_without_a_pressure_signal_there_is_no_temperature(params, feed) -> None
 
 
 @pytest.mark.parametrize(("excess", "expected"), [(0.0, 0.04), (100.0, 0.0), (200.0, 0.04), (350.0, 0.10)])
-def test_friction_gets_less_certain_by_4_percent_per_100_kelvin_either_way(discs, excess, expected) -> None:
+def test_friction_gets_less_certain_by_4_percent_per_100_kelvin_off(discs, excess, expected) -> None:
     discs.s["estimate"]["mode"] = OBSERVING
     discs.d["excess"] = 100.0
     discs.go(0.001, dt=0.001)

@@ -30,7 +30,7 @@ def changed(config: Config, heating: float, cooling: float) -> Config:
 
 
 def driven(name: str, config: Config, known: bool) -> Drive:
-    """Return a whole drive; `known`: the ECU is told how hot the discs are at the start."""
+    """Return a whole drive; `known`: the ECU knows how hot the discs are at the start."""
     scenario = with_draw(load_scenario(CONFIG / "scenarios" / f"{name}.toml"), "nominal")
     loop = new_loop(scenario, config, 1)
     if known:

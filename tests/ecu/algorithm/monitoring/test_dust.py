@@ -1,4 +1,4 @@
-"""Dust on board: closed forms of a stop, what is not told, life totals, other models, mass by wear."""
+"""Dust on board: closed forms of a stop, what is not counted, life totals, other models, mass by wear."""
 
 import math
 from pathlib import Path
@@ -29,7 +29,7 @@ MODEL = Dust(
 
 
 class Car:
-    """Four equal brakes told speed, torque, temperature and pressure."""
+    """Four equal brakes with given speed, torque, temperature and pressure."""
 
     def __init__(self, params, feed, front: Dust | None = MODEL, rear: Dust | None = None) -> None:
         self.params = params.copy()
@@ -92,23 +92,23 @@ def by_hand(torque: float = 500.0, v: float = 15.0, seconds: float = 5.0) -> flo
 
 
 def test_particles_of_a_stop_are_those_of_both_front_brakes(car):
-    told = car.stop()
-    assert told["particles"] == pytest.approx(2.0 * 1.2 * by_hand(), rel=2e-3)
-    assert told["low"] == pytest.approx(2.0 * by_hand() * 10**-0.5, rel=2e-3)
-    assert told["high"] == pytest.approx(2.0 * by_hand() * 10**0.4, rel=2e-3)
+    got = car.stop()
+    assert got["particles"] == pytest.approx(2.0 * 1.2 * by_hand(), rel=2e-3)
+    assert got["low"] == pytest.approx(2.0 * by_hand() * 10**-0.5, rel=2e-3)
+    assert got["high"] == pytest.approx(2.0 * by_hand() * 10**0.4, rel=2e-3)
 
 
 def test_means_are_those_of_the_moving_car(car):
     """A car that is held after its stop emits as if it were released."""
-    told = car.stop(20.0, 0.6, 5.0)["particles"]
-    assert car.stop(20.0, 0.6, 5.0, stands=30.0)["particles"] == pytest.approx(told, rel=1e-9)
+    got = car.stop(20.0, 0.6, 5.0)["particles"]
+    assert car.stop(20.0, 0.6, 5.0, stands=30.0)["particles"] == pytest.approx(got, rel=1e-9)
     features = car.s["dust"]["features"][0]
     push_out = 1e-5 * car.p["push_out_pressure"][0]
     expected = [20.0, 0.6, 500.0, 90.0, 5.0, 20.0 - push_out]
     assert features == pytest.approx(np.array(expected), abs=0.03)
 
 
-NOT_TOLD = {
+NOT_COUNTED = {
     "hotter than any trip": {"heat": 400.0},
     "faster": {"first": 60.0, "last": 50.0},
     "stronger": {"torque": 3000.0},
@@ -116,8 +116,8 @@ NOT_TOLD = {
 }
 
 
-@pytest.mark.parametrize("given", NOT_TOLD.values(), ids=NOT_TOLD)
-def test_outside_what_it_was_trained_on_nothing_is_told(car, given):
+@pytest.mark.parametrize("given", NOT_COUNTED.values(), ids=NOT_COUNTED)
+def test_outside_what_it_was_trained_on_nothing_is_counted(car, given):
     car.stop()
     particles, told_work = float(car.kept["particles"]), float(car.kept["told_work"])
     state = car.stop(**given)
@@ -151,8 +151,8 @@ def test_a_lost_pressure_tells_nothing(car):
 
 
 def test_what_is_only_felt_is_not_counted(car):
-    told = car.stop(torque=2.0)
-    assert math.isnan(told["particles"])
+    got = car.stop(torque=2.0)
+    assert math.isnan(got["particles"])
     assert car.kept["work"] == 0.0
 
 
@@ -160,17 +160,17 @@ def test_per_kilometre_is_the_life_s_sum_over_its_way(car):
     for _ in range(5):
         car.stop()
         car.roll(1000.0)
-    told = car.stop()
-    way = 5 * 1000.0 + 6 * 75.0
-    assert car.kept["way"] == pytest.approx(way, rel=1e-3)
-    assert told["per_km"] == pytest.approx(1e3 * 6 * told["particles"] / way, rel=2e-3)
+    got = car.stop()
+    distance = 5 * 1000.0 + 6 * 75.0
+    assert car.kept["way"] == pytest.approx(distance, rel=1e-3)
+    assert got["per_km"] == pytest.approx(1e3 * 6 * got["particles"] / distance, rel=2e-3)
     assert car.kept["applications"] == 6
 
 
 def test_a_car_without_a_model_tells_nothing(params, feed):
     car = Car(params, feed, None)
-    told = car.stop()
-    assert np.isnan([told["particles"], told["low"], told["per_km"]]).all()
+    got = car.stop()
+    assert np.isnan([got["particles"], got["low"], got["per_km"]]).all()
     assert list(car.p["dust_model"]) == [NONE] * 4
 
 

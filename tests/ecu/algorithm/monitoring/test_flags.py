@@ -71,7 +71,7 @@ def test_reverse_is_believed_while_the_wheels_can_turn_backwards(
     assert bool(car.said[-1] & IMPLAUSIBLE["reverse"]) == (lost > 0.0)
 
 
-def test_reverse_that_is_set_on_the_way_is_never_believed(params, feed) -> None:
+def test_reverse_that_is_set_in_a_moving_car_is_never_believed(params, feed) -> None:
     car = Car(params, feed, 8.0)
     car.drive(2.0, reverse=0.0)
     assert car.drive(1.0, reverse=1.0) == pytest.approx(1.0)
@@ -131,7 +131,7 @@ def test_a_foot_that_moves_on_before_the_brakes_are_released_hides_no_rest(
     assert car.inputs[0]["value"][INPUT["accelerator_position"]] == read
 
 
-def test_an_accelerator_far_from_zero_at_rest_is_told(params, feed) -> None:
+def test_an_accelerator_far_from_zero_at_rest_is_reported(params, feed) -> None:
     car = Car(params, feed, 20.0)
     for _ in range(2):
         car.drive(2.0, braking=True, accelerator_position=50.0)

@@ -28,7 +28,7 @@ CASES = [
     ("spins under the motor", 1.30, 800.0, -900.0, 20.0, False),
     ("a small tyre", 1.04, 800.0, 0.0, 20.0, False),
     ("too slow to tell", 1.30, 800.0, 0.0, 3.0, False),
-    ("no faster than where it can be told", 1.30, 800.0, 0.0, 5.0, False),
+    ("no faster than where it can be judged", 1.30, 800.0, 0.0, 5.0, False),
     ("not braked", 1.30, 20.0, 0.0, 20.0, False),
     ("hardly braked", 1.30, 100.0, 0.0, 20.0, False),
     ("braked just enough to tell", 1.30, 101.0, 0.0, 20.0, True),
@@ -82,7 +82,7 @@ def fallen(speeds: list[float], torque: float, params, feed, period: float = 0.0
 
 
 def locking(torque: float, inertia: float, period: float = 0.01) -> list[float]:
-    """A wheel of 60 rad/s whose road gives way: T / I, no tyre holds it."""
+    """A wheel of 60 rad/s whose road has no grip: T / I, no tyre holds it."""
     return [max(60.0 - torque / inertia * period * k, 0.0) for k in range(30)]
 
 

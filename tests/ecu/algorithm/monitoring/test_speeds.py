@@ -44,12 +44,12 @@ class Road:
             self.estimate["brake_torque"] = np.maximum(
                 braking + self.noise * self.random.standard_normal(4), 0.0
             )
-            told = (self.speed - accel * late) * turns
-            wheels = told[:4] / self.params["wheel_radius"]
+            read = (self.speed - accel * late) * turns
+            wheels = read[:4] / self.params["wheel_radius"]
             self.feed(
                 self.inputs,
                 wheel_speed=wheels + 0.1 * self.random.standard_normal(4),
-                vehicle_speed=told[4] - self.params["vehicle_speed_delay"] * accel,
+                vehicle_speed=read[4] - self.params["vehicle_speed_delay"] * accel,
                 vehicle_speed_valid=1.0,
                 accelerator_position=gas,
                 accel_x=accel,

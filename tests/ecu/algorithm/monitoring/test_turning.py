@@ -33,8 +33,8 @@ def drive(params, feed, yaw: float, reads: dict[str, float], seconds: float, spe
     sides = 0.5 * p["track"] * np.array([-1, 1, -1, 1])
     true = {"yaw_rate": yaw, "accel_y": yaw * speed, "steering_angle": yaw * p["wheelbase"] / speed}
     turns = (speed + yaw * sides) * (1.0 - np.array([reads.get("slip", 0.0), 0, 0, 0]))
-    told = {name: value for name, value in (true | reads).items() if name != "slip"}
-    inputs = feed(wheel_speed=turns / p["wheel_radius"], **told)
+    given = {name: value for name, value in (true | reads).items() if name != "slip"}
+    inputs = feed(wheel_speed=turns / p["wheel_radius"], **given)
     for _ in range(round(seconds / DT)):
         watch_turning(p, state, witness, inputs[0], speed, DT)
     return witness

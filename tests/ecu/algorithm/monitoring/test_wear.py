@@ -21,7 +21,7 @@ LAW = np.array([0.1016, 0.0, 0.3984e-6, 0.4887, 0.0, 0.0, 0.66e-2])  # Table 7.1
 
 
 class Brakes:
-    """Four equal brakes told torque, wheel speed and temperature."""
+    """Four equal brakes with given torque, wheel speed and temperature."""
 
     def __init__(self, params, feed) -> None:
         self.params, self.p, self.inputs = params, params[0], feed()

@@ -144,7 +144,7 @@ def test_a_tyre_of_another_size_does_not_slip(road) -> None:
     assert road.state["measured_slip"] == pytest.approx(0.02, abs=0.002)
 
 
-def test_it_is_forgotten_on_the_way(road) -> None:
+def test_it_is_forgotten_with_distance(road) -> None:
     road.brake(0.25, (0.12, 0.12, 0.12, 0.12), windows=40)
     sigmas = []
     for _ in range(8):
@@ -175,10 +175,10 @@ def test_another_road_is_believed_within_half_a_second(road, first, then) -> Non
     assert abs(math.log(road.state["ceiling"] / then)) < 2.0 * road.sigma
 
 
-@pytest.mark.parametrize(("used", "told"), [(0.6, False), (0.8, True)])
-def test_close_to_the_peak_that_slip_has_shown_no_wheel_needs_to_slide(road, used, told) -> None:
+@pytest.mark.parametrize(("used", "known"), [(0.6, False), (0.8, True)])
+def test_close_to_the_peak_that_slip_has_shown_no_wheel_needs_to_slide(road, used, known) -> None:
     """0.9 is the peak of the prior, here known to 5 %."""
     road.state["p"][PEAK, PEAK] = 0.05**2
     road.brake(0.9, ROLLING, rolls=used)
-    assert road.known == told
-    assert not told or road.state["ceiling"] == pytest.approx(0.9)
+    assert road.known == known
+    assert not known or road.state["ceiling"] == pytest.approx(0.9)

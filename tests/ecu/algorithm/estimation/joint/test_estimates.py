@@ -161,15 +161,15 @@ def test_a_test_ratio_is_one_at_the_gate_and_none_before_a_start(feed, started: 
     assert found == pytest.approx(expected, nan_ok=True)
 
 
-@pytest.mark.parametrize(("sigma", "told"), [(0.0, False), (0.05, True), (0.19, True), (0.21, False)])
-def test_a_ceiling_of_grip_is_published_where_it_is_known(feed, sigma, told) -> None:
+@pytest.mark.parametrize(("sigma", "known"), [(0.0, False), (0.05, True), (0.19, True), (0.21, False)])
+def test_a_ceiling_of_grip_is_published_where_it_is_known(feed, sigma, known) -> None:
     """A road of 0.25: 2.45 m/s^2, with the sigma of its logarithm; 0: nothing is known of it."""
     state = driven(6)
     state["ceiling"], state["ceiling_variance"] = 0.25, sigma**2
     estimate = np.zeros(1, ESTIMATE)[0]
     estimate["grip_limit"] = estimate["sigma_grip_limit"] = math.nan
     got = published(state, feed, True, estimate)
-    assert math.isfinite(got["grip_limit"]) == told
-    if told:
+    assert math.isfinite(got["grip_limit"]) == known
+    if known:
         assert got["grip_limit"] == pytest.approx(2.45, abs=0.01)
         assert got["sigma_grip_limit"] == pytest.approx(2.45 * sigma, rel=0.01)

@@ -26,7 +26,7 @@ def follow(feed, torques, every: int = 1):
     return state
 
 
-COURSES = {
+TORQUES = {
     # what the torque does beside its noise, over the time [s]
     "rests": lambda time: 200.0 + 0.0 * time,
     "rises by 100 N m/s": lambda time: 100.0 * time,
@@ -36,15 +36,15 @@ COURSES = {
 
 @pytest.mark.parametrize("sigma", [2.0, 10.0, 25.0])
 @pytest.mark.parametrize("every", [1, 2])
-@pytest.mark.parametrize("name", COURSES)
+@pytest.mark.parametrize("name", TORQUES)
 def test_second_differences_give_the_variance_of_white_noise(feed, name: str, every: int, sigma) -> None:
     """Mean over seeds; a torque that rests or rises evenly adds nothing to it, one that swings little."""
-    course, ratios = COURSES[name](np.arange(3 * MEMORY) * every * DT)[:, None], []
+    torque, ratios = TORQUES[name](np.arange(3 * MEMORY) * every * DT)[:, None], []
     for seed in range(40):
         noise = sigma * np.random.default_rng(seed).standard_normal((3 * MEMORY, 4))
-        ratios.append(follow(feed, course + noise, every)["variance"] / sigma**2)
-    bend = np.mean(np.diff(course[:, 0], 2) ** 2) / 6 / sigma**2
-    print(f"{name}, {sigma} N m: {np.mean(ratios):.3f} of the variance, {bend:.3f} of it by its course")
+        ratios.append(follow(feed, torque + noise, every)["variance"] / sigma**2)
+    bend = np.mean(np.diff(torque[:, 0], 2) ** 2) / 6 / sigma**2
+    print(f"{name}, {sigma} N m: {np.mean(ratios):.3f} of the variance, {bend:.3f} of it by its bend")
     assert np.mean(ratios) == pytest.approx(1.0 + bend, abs=0.05)
 
 
@@ -109,7 +109,7 @@ def test_the_balances_derivatives_hold_nothing_of_this_windows_torque(new_car, s
 
 
 CRUISES = [
-    # motor torque of each wheel [N m], which swings by as much as told every 8 s, so that mass is freed
+    # motor torque of each wheel [N m], which swings by as much as given every 8 s, so that mass is freed
     ("cruise", -100.0, 0.0),
     ("cruise that speeds up and slows down", -50.0, 200.0),
 ]

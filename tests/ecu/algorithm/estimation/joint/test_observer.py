@@ -494,7 +494,7 @@ def test_it_does_not_start_before_two_wheels_are_known(new_car) -> None:
     assert car.state["x"][V] == pytest.approx(car.speed, abs=0.1)
 
 
-def test_a_pressure_that_is_not_told_is_that_of_the_other_side(new_car) -> None:
+def test_a_pressure_that_is_not_measured_is_that_of_the_other_side(new_car) -> None:
     """And counts for less."""
     states = []
     for lost in (False, True):
@@ -502,9 +502,9 @@ def test_a_pressure_that_is_not_told_is_that_of_the_other_side(new_car) -> None:
         car.drive(1.0)
         car.inputs[0]["new"][CALLIPER_PRESSURE] = not lost
         states.append(car.drive(3.0, **BRAKING))
-    told, guessed = states
+    measured, guessed = states
     assert friction(guessed)[0] == pytest.approx(0.40 / 0.45, rel=0.05)
-    assert sigma_friction(guessed)[0] > sigma_friction(told)[0]
+    assert sigma_friction(guessed)[0] > sigma_friction(measured)[0]
 
 
 def test_covariance_stays_one_over_a_drive(new_car) -> None:

@@ -151,7 +151,7 @@ def test_the_level_after_an_application_is_the_mean_of_its_friction(params) -> N
     for _ in range(60):
         state = begun(car)
         state["free"] = np.isin(np.arange(N), BRAKING)
-        truth, course = draw(state["p"], random), []
+        truth, trajectory = draw(state["p"], random), []
         for k in range(60):
             state["last_pressure"] = state["window"]["pressure"] = 30.0
             walk(state, True, STEP)
@@ -160,11 +160,11 @@ def test_the_level_after_an_application_is_the_mean_of_its_friction(params) -> N
             for h, sigma in zip(H[k // 20], noise, strict=True):
                 state["h"] = h
                 correct(state, h @ (truth - state["x"]) + sigma * random.standard_normal(), sigma**2, REJECT)
-            course.append(truth[LEVELS] + truth[np.repeat(CHANGES, 2)])
+            trajectory.append(truth[LEVELS] + truth[np.repeat(CHANGES, 2)])
             note_change(state, 120.0)
         end_application(state)
         P = state["p"][np.ix_(LEVELS, LEVELS)]
-        off = np.mean(course, axis=0) - state["x"][LEVELS]
+        off = np.mean(trajectory, axis=0) - state["x"][LEVELS]
         errors.append((*(off / np.sqrt(np.diag(P))), off @ np.linalg.solve(P, off) / 4))
     ratios = np.array(errors)
     print(

@@ -12,8 +12,8 @@ import pytest
 
 from ecu.algorithm.estimation.joint.layout import BIAS, DRAG, JOINT_STATE, LEVEL, MASS, MOTOR, OVERRUN, V
 from ecu.algorithm.estimation.joint.prediction import (
-    CONFIGURED_WAY,
-    LEARNED_WAY,
+    CONFIGURED,
+    LEARNED,
     PREDICTION_STATE,
     add_window,
     begin_prediction,
@@ -76,13 +76,13 @@ def test_a_car_that_is_known_is_predicted_without_error(params, feed, case, true
     car = Braking(params, feed, **true)
     car.run()
     book = car.book
-    assert book["measured"][LEARNED_WAY] / WINDOWS == pytest.approx(car.linings, rel=1e-6)
-    assert book["error"][LEARNED_WAY] == pytest.approx(0.0, abs=1e-6)
+    assert book["measured"][LEARNED] / WINDOWS == pytest.approx(car.linings, rel=1e-6)
+    assert book["error"][LEARNED] == pytest.approx(0.0, abs=1e-6)
     assert book["applications"] == 1
     if math.isnan(configured):
-        assert abs(book["error"][CONFIGURED_WAY]) > 0.005, case
+        assert abs(book["error"][CONFIGURED]) > 0.005, case
     else:
-        assert book["error"][CONFIGURED_WAY] == pytest.approx(configured, abs=1e-6), case
+        assert book["error"][CONFIGURED] == pytest.approx(configured, abs=1e-6), case
 
 
 def test_it_is_predicted_with_what_was_known_before_the_braking(params, feed) -> None:
@@ -227,5 +227,5 @@ def test_what_was_given_up_is_judged_no_more() -> None:
     book = new_book()
     assert [booked(book, 0.2, 0.05) for _ in range(4)] == [False, False, False, True]
     close_book(book)
-    assert book["told_s"] == 60.0
+    assert book["reported_s"] == 60.0
     assert [booked(book, 0.2, 0.05) for _ in range(4)] == [False, False, False, True]

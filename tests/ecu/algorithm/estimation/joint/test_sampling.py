@@ -32,14 +32,14 @@ CAR = {
 }
 
 
-def drive(rates, ages, seconds: float, course=None, stop: int | None = None):
+def drive(rates, ages, seconds: float, signals=None, stop: int | None = None):
     """Return rows (now, common time, values there) of the windows with something new.
 
-    `course` gives all channels at a time [s], straight lines by default; `stop`: a channel without samples
+    `signals` gives all channels at a time [s], straight lines by default; `stop`: a channel without samples
     after half of the drive.
     """
     state, rows = np.zeros(1, SAMPLING_STATE)[0], []
-    course = course or (lambda time: START + RAMP * time)
+    signals = signals or (lambda time: START + RAMP * time)
     every = np.round(1 / (np.array(rates) * DT)).astype(int)
     cycles = round(seconds / DT)
     for k in range(1, cycles + 1):
@@ -48,7 +48,7 @@ def drive(rates, ages, seconds: float, course=None, stop: int | None = None):
         state["now"] += DT
         for i in range(CHANNELS):
             if k % every[i] == 0 and not (i == stop and k > cycles / 2):
-                add_sample(state, i, course(k * DT - ages[i])[i], ages[i])
+                add_sample(state, i, signals(k * DT - ages[i])[i], ages[i])
         if k % WINDOW == 0:
             close_sampling(state)
             if advance_common_time(state):

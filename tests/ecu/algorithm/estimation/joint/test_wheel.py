@@ -323,7 +323,7 @@ UNKNOWN_SHARES = [
 
 
 @pytest.mark.parametrize(("error", "reported", "share"), UNKNOWN_SHARES)
-def test_a_drive_is_known_as_well_as_its_torque_is_told(params, state, error, reported, share) -> None:
+def test_a_drive_is_known_as_well_as_its_torque_is(params, state, error, reported, share) -> None:
     """An error of scale is `MOTOR`'s; what is beyond counts twice."""
     params[0]["sigma_motor_torque"] = error
     state["motors"]["samples"] = 5 * reported

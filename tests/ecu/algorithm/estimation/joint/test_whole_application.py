@@ -290,7 +290,7 @@ def test_windows_teach_where_all_torques_and_each_wheel_are_measured(
 
 
 def test_windows_go_on_from_what_whole_applications_have_learned(bystander: Bystander) -> None:
-    """The pressures of an axle are told apart at last: the linings' force stays, the scale is 1."""
+    """The pressures of an axle are separated at last: the linings' force stays, the scale is 1."""
     joint, state, params = bystander.joint, bystander.state, bystander.params
     params["sigma_motor_torque"], joint["speed_copies"], joint["motors"]["samples"] = 0.0, -1, 1
     begin_whole(params, state, joint)
