@@ -227,7 +227,7 @@ def _below_replays(rows: list[Row]) -> str:
         "Processor time of 10 ms of the drive, on one core: everything that `brake-ecu replay` does, in a "
         "process that has started and knows the contract's database: configuration, SHA-256 of the log, "
         f"reading, decoding, step, results in Parquet, the table. Times real time: {shown}; candump "
-        f"at most {speed[LONGEST_THREAD]:.0f} where reading, decoding, hash and Parquet have their own cores. "
+        f"at most {speed[LONGEST_THREAD]:.0f} where reading, hash and Parquet have their own cores. "
         f"The step alone takes {share:.0f} % of a replay of candump. The peer reads the first "
         f"{PART_S:.0f} s: no CRC, no counter, no time-out, four filters, no results."
     )
