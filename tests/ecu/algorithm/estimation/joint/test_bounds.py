@@ -7,9 +7,9 @@ import pytest
 
 from ecu.algorithm.estimation.joint.bounds import (
     FRONT_REAR,
-    HIGHEST,
+    HIGHEST_VALUE,
     LEFT_RIGHT,
-    LOWEST,
+    LOWEST_VALUE,
     PARTED,
     keep_within_bounds,
 )
@@ -27,7 +27,7 @@ def tied(seed: int):
     return state
 
 
-BOUNDED = [i for i in range(N) if math.isfinite(HIGHEST[i])]
+BOUNDED = [i for i in range(N) if math.isfinite(HIGHEST_VALUE[i])]
 
 
 @pytest.mark.parametrize("side", ["lowest", "highest"])
@@ -35,7 +35,7 @@ BOUNDED = [i for i in range(N) if math.isfinite(HIGHEST[i])]
 def test_a_state_beyond_its_bound_is_put_on_it_and_what_it_is_tied_to_follows(i: int, side: str) -> None:
     """As a measurement without noise that it lies there would move them."""
     state = tied(7)
-    bound = (LOWEST if side == "lowest" else HIGHEST)[i]
+    bound = (LOWEST_VALUE if side == "lowest" else HIGHEST_VALUE)[i]
     state["x"] = 0.0
     if LEVEL <= i < LEVEL + 4:
         state["x"][LEVEL : LEVEL + 4] = 0.9 * bound  # linings that are alike
@@ -70,7 +70,7 @@ def test_at_a_bound_only_what_is_free_follows(free) -> None:
     state["x"] = 0.0
     state["x"][STIFFNESS], state["free"][free] = 3.0, 1
     assert keep_within_bounds(state)
-    assert state["x"][STIFFNESS] == HIGHEST[STIFFNESS]
+    assert state["x"][STIFFNESS] == HIGHEST_VALUE[STIFFNESS]
     moved = {int(i) for i in np.flatnonzero(state["x"])}
     assert moved == {STIFFNESS} | ({MASS} if MASS in free else set())
 
@@ -94,7 +94,7 @@ def test_a_pushed_bound_does_not_drive_the_others_away() -> None:
         state["x"][[PEAK, LEVEL]] += [0.05, 0.0225]
         keep_within_bounds(state)
         furthest = max(furthest, abs(float(state["x"][LEVEL])))
-    assert furthest <= 0.45 * HIGHEST[PEAK] + 0.0225
+    assert furthest <= 0.45 * HIGHEST_VALUE[PEAK] + 0.0225
 
 
 OF_AXLES = np.zeros(N)
@@ -145,7 +145,7 @@ def test_what_the_axles_parted_by_is_counted_from_the_beginning_of_the_applicati
 def test_changes_take_what_a_level_at_its_bound_lacks() -> None:
     state = tied(13)
     state["x"], state["free"] = 0.0, 1
-    state["x"][LEVEL : LEVEL + 4] = state["before"] = [HIGHEST[LEVEL], HIGHEST[LEVEL], 0.2, 0.2]
+    state["x"][LEVEL : LEVEL + 4] = state["before"] = [HIGHEST_VALUE[LEVEL], HIGHEST_VALUE[LEVEL], 0.2, 0.2]
     state["x"][CHANGE : CHANGE + 2] = 0.4, 0.1
     x = state["x"].copy()
     assert not keep_within_bounds(state)

@@ -29,9 +29,9 @@ from ecu.algorithm.estimation.joint.layout import (
 )
 from ecu.algorithm.estimation.joint.prior import PRIOR
 from ecu.algorithm.estimation.joint.wheel import (
+    LINEAR_FROM,
     NOMINAL_PEAK,
     SHAPE,
-    STEEPEST,
     combined_slip,
     peak_adhesion,
     slip_of_force,
@@ -90,7 +90,7 @@ def test_slip_is_odd_along_and_even_across(used: float, across: float, stiffness
 @pytest.mark.parametrize(("stiffness", "peak"), TYRES)
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_slip_goes_on_straight_beyond_the_steepest_point(sign: float, stiffness: float, peak: float) -> None:
-    edge = sign * STEEPEST * peak
+    edge = sign * LINEAR_FROM * peak
     slip, slope = slip_of_force(edge, stiffness, peak)
     for off in (-1e-9, 1e-9):
         near, near_slope = slip_of_force(edge + off, stiffness, peak)
@@ -278,7 +278,7 @@ def test_wheel_speed_is_the_one_at_which_the_tyre_carries_the_torque(params, sta
         torque += w["motor"][i] + car["rolling_resistance"] * load * r
         torque += car["wheel_inertia"][i] * w["change"] / r
         used = -torque / r / load
-        if math.hypot(used, w["across"]) > STEEPEST * peak:
+        if math.hypot(used, w["across"]) > LINEAR_FROM * peak:
             assert point == "front beyond the tyre's range"
             continue
         # What carries `across` too slips in the direction of both forces.
