@@ -72,7 +72,7 @@ def grid(columns: Columns) -> Values:
 def contradictions(columns: Columns, car: Car) -> list[str]:
     collector = Collector()
     collector.add(grid(columns))
-    return judge(collector.drive(), car).contradictions
+    return judge(collector.series(), car).contradictions
 
 
 def times(stem: str, factor: float) -> Change:

@@ -27,7 +27,7 @@ def logged() -> list[tuple[Stranger, np.ndarray]]:
 def found(samples: np.ndarray) -> dict[str, float]:
     collector = Collector()
     collector.add(samples)
-    return {lag.name: lag.seconds for lag in lags(collector.drive())}
+    return {lag.name: lag.seconds for lag in lags(collector.series())}
 
 
 def beside_accel(lag: dict[str, float], name: str) -> float:

@@ -177,7 +177,7 @@ def test_a_column_without_a_unit_wants_one(tmp_path: Path, read: Callable[..., S
     ]
 
 
-def test_the_two_kinds_of_map_are_told_apart(tmp_path: Path) -> None:
+def test_the_two_kinds_of_map_are_distinguished(tmp_path: Path) -> None:
     path = tmp_path / "map.toml"
     path.write_text(MAPS["aim"])
     assert maps_columns(path)

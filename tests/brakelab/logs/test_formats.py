@@ -1,4 +1,4 @@
-"""One drive in every format: the same frames, the same results; damage is told in a line."""
+"""One drive in every format: the same frames, the same results; damage is reported in a line."""
 
 import gzip
 import shutil
@@ -326,7 +326,7 @@ def test_a_stamp_far_from_its_neighbours_is_left_out(tmp_path: Path) -> None:
 
 
 SECOND = 1_000_000_000
-# Of 200 frames on two interfaces, 10 ms apart: stamps of some are off; frames left out, what is told.
+# Of 200 frames on two interfaces, 10 ms apart: stamps of some are off; what the reader reports.
 CLOCKS: dict[str, tuple[Callable[[int], int], dict[str, Any]]] = {
     "as it was": (lambda k: 0, {}),
     "set back by 10 s": (
@@ -358,11 +358,11 @@ CLOCKS: dict[str, tuple[Callable[[int], int], dict[str, Any]]] = {
 
 @pytest.mark.parametrize("clock", CLOCKS)
 @pytest.mark.parametrize("block_frames", [1 << 14, 7])
-def test_clocks_that_jump_are_mended_and_told(
+def test_clocks_that_jump_are_mended_and_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, clock: str, block_frames: int
 ) -> None:
     monkeypatch.setattr(text_log, "BLOCK_FRAMES", block_frames)
-    off, told = CLOCKS[clock]
+    off, reported = CLOCKS[clock]
     true = [1_600_000_000 * SECOND + k * SECOND // 100 for k in range(200)]
     stamps = [stamp + off(k) for k, stamp in enumerate(true)]
     path = tmp_path / "drive.log"
@@ -371,11 +371,11 @@ def test_clocks_that_jump_are_mended_and_told(
     )
     frames, quality = read(path)
     unlike = {name: value for name, value in vars(quality).items() if value != vars(LogQuality())[name]}
-    assert unlike == told | {"frames": 200 - told.get("damaged", 0)}
+    assert unlike == reported | {"frames": 200 - reported.get("damaged", 0)}
     kept = [k for k in range(200) if k in frames["data"][:, 0]]
-    expected = np.array(true if "clock_set_back" in told else stamps, object)[kept]
+    expected = np.array(true if "clock_set_back" in reported else stamps, object)[kept]
     # A clock that was set back goes on from the last frame of the same interface, 20 ms before.
-    assert np.abs(frames["stamp_ns"] - expected).max() <= 40_000_000 * ("clock_set_back" in told)
+    assert np.abs(frames["stamp_ns"] - expected).max() <= 40_000_000 * ("clock_set_back" in reported)
 
 
 @pytest.mark.parametrize("compression", [0, 2])

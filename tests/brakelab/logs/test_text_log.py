@@ -41,7 +41,7 @@ def read(path: Path, interfaces: list[str] | None = None) -> tuple[RecordArray, 
 def messages(draw: st.DrawFn, fd_too: bool) -> can.Message:
     fd = fd_too and draw(st.booleans())
     extended = draw(st.booleans())
-    # A CAN FD frame without data cannot be told from a remote frame in ASC.
+    # A CAN FD frame without data cannot be distinguished from a remote frame in ASC.
     length = draw(st.sampled_from(FD_LENGTHS[1:] if fd else FD_LENGTHS[:9]))
     remote = fd_too and not fd and draw(st.booleans())
     return can.Message(

@@ -146,14 +146,14 @@ def _classical(
         frame.can_id, frame.flags, frame.length = 0, FRAME_ERROR, 0
         return DATA
     known = _identifier(text, at, last, base, frame)
-    way = skip_blanks(text, last, end)
-    last = word_end(text, way, end)
-    if not (is_word(text, way, last, b"rx") or is_word(text, way, last, b"tx")):
+    direction = skip_blanks(text, last, end)
+    last = word_end(text, direction, end)
+    if not (is_word(text, direction, last, b"rx") or is_word(text, direction, last, b"tx")):
         # Statistics, states of the chip and the like have no direction; a line that ends here is cut.
-        return DAMAGED if way >= end else SKIPPED
+        return DAMAGED if direction >= end else SKIPPED
     if not known:
         return DAMAGED
-    if last - way > 2:
+    if last - direction > 2:
         return SKIPPED  # TxRq
     at = skip_blanks(text, last, end)
     last = word_end(text, at, end)

@@ -35,10 +35,10 @@ from ecu.errors import UserError
 from ecu.jit import Record, kernel
 
 BLOCK_BYTES: Final = 1 << 20
-LARGEST: Final = 1 << 26  # bytes of an object: a length beyond is damage
+LARGEST_OBJECT: Final = 1 << 26  # bytes of an object: a length beyond is damage
 _HEADER: Final = 16
 _CONTAINER: Final = 10
-_SHORTEST: Final = 48  # bytes of an object that holds a frame
+_SHORTEST_FRAME: Final = 48  # bytes of an object that holds a frame
 _LONGEST_FRAME: Final = 512
 # "LOBJ" as a little-endian number
 _SIGNATURE: Final = 0x4A424F4C
@@ -169,7 +169,7 @@ def _parse_blf(
             break
         used = at
         header, length, kind = _u2(stream, at + 4), _u4(stream, at + 8), _u4(stream, at + 12)
-        longest = _LONGEST_FRAME if kind in _FRAMES else LARGEST
+        longest = _LONGEST_FRAME if kind in _FRAMES else LARGEST_OBJECT
         if header < _HEADER or length < header or length > longest:
             damage.count += 1
             damage.first = used if damage.first < 0 else damage.first
@@ -211,11 +211,11 @@ def _unpack(packed: bytes, method: int) -> tuple[bytes, str]:
         return b"", f"packed by an unknown method ({method})"
     unpacker = zlib.decompressobj()
     try:
-        content = unpacker.decompress(packed, LARGEST)
+        content = unpacker.decompress(packed, LARGEST_OBJECT)
     except zlib.error as error:
         return b"", str(error)  # what came before may be wrong already
     if unpacker.unconsumed_tail:
-        return b"", f"more than {LARGEST >> 20} MB in one container"
+        return b"", f"more than {LARGEST_OBJECT >> 20} MB in one container"
     return content, "" if unpacker.eof else "its end is missing"
 
 
@@ -235,7 +235,7 @@ def _pieces(stream: IO[bytes], advance: Callable[[int], None] | None) -> Iterato
             yield _Piece(b"", offset, "the file is cut off here")
             return
         signature, _, _, length, kind = struct.unpack("<4sHHLL", header)
-        if signature != b"LOBJ" or not _HEADER <= length <= LARGEST:
+        if signature != b"LOBJ" or not _HEADER <= length <= LARGEST_OBJECT:
             yield _Piece(b"", offset, "no object begins here")
             if not _seek_object(stream, offset + 1):
                 return
@@ -296,7 +296,7 @@ def read_blf(
             origins = np.array([rest_offset, *(piece.offset for piece in batch)])
             used = 0
             while True:
-                frames = np.zeros(min(BLOCK_FRAMES, len(content) // _SHORTEST + 1), FRAME)
+                frames = np.zeros(min(BLOCK_FRAMES, len(content) // _SHORTEST_FRAME + 1), FRAME)
                 offsets = np.empty(len(frames), np.int64)
                 damage = new_record(_DAMAGE)
                 damage["first"] = -1

@@ -23,7 +23,7 @@ from ecu.settings.toml_file import Unit, describe, read_toml
 TIMES: Final = ("t", "time", "timestamp", "timestamps", "interval", "zeit", "elapsed time", "offset")
 """Names of the column of time, in lower case."""
 LONGEST_LAG_S: Final = 0.5
-"""Of an input, either way [s]."""
+"""By which an input may come late or early."""
 SECONDS: Final = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3, "us": 1e-6, "µs": 1e-6,
                   "μs": 1e-6, "ns": 1e-9, "min": 60.0}  # fmt: skip
 

@@ -28,7 +28,7 @@ FEW_ROWS: Final = 10  # too few to judge their distance
 SLOWEST_STEP: Final = 1.1  # s, above: no input would stay alive, so t is probably not in seconds
 SLOWEST_S: Final = 0.3
 """Between samples of a signal that still counts as one."""
-LATEST: Final = 9e9  # s, the year 2255 as Unix time
+LATEST_S: Final = 9e9  # the year 2255 as Unix time
 _SHOWN: Final = 20  # names in a line
 _REMEDY: Final = f"give t [s] and columns such as {', '.join(list(INPUT)[:3])} (contract input names)"
 
@@ -169,7 +169,7 @@ def check_seconds(path: Path, name: str, t: NDArray[np.float64], or_else: str) -
     """
     step = float(np.median(np.diff(t))) if len(t) > FEW_ROWS else 0.0
     found = f"the rows are {step:g} s apart" if step > SLOWEST_STEP else ""
-    if np.abs(t).max() > LATEST:
+    if np.abs(t).max() > LATEST_S:
         found = f"a value is {t[np.abs(t).argmax()]:g} s"
     if found:
         remedy = f"convert it from ms, us or ns, or give every sample{or_else}"

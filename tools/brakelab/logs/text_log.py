@@ -18,7 +18,7 @@ from ecu.errors import UserError
 from ecu.jit import Record, kernel
 
 BLOCK_BYTES: Final = 1 << 20
-SHORTEST: Final = 12  # bytes of a line that holds a frame
+SHORTEST_LINE: Final = 12  # bytes of a line that holds a frame
 
 # What a line is.
 DATA, SKIPPED, DAMAGED, HEADER = 0, 1, 2, 3
@@ -186,7 +186,7 @@ def read_text(
                 ends = np.flatnonzero(text == 0x0A)
                 text, too_long = text[ends[0] + 1 :] if len(ends) else text[:0], not len(ends)
             while True:
-                frames = np.zeros(min(BLOCK_FRAMES, len(text) // SHORTEST + 1), FRAME)
+                frames = np.zeros(min(BLOCK_FRAMES, len(text) // SHORTEST_LINE + 1), FRAME)
                 lines = np.empty(len(frames), np.int64)
                 used, count, at_header = parse(text, frames, frames["data"], lines, counts[0])
                 text = text[used:]

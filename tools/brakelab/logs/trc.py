@@ -49,8 +49,10 @@ from ecu.jit import Record, kernel
 EXAMPLE: Final = "1  1059.900 DT  1  0300 Rx -  7  00 00 00 00 04 00 00"
 _COLUMNS: Final = {"1.0": "NOIlD", "1.1": "NOTIlD", "1.2": "NOBTIlD", "1.3": "NOBTIRlD"}
 _KINDS: Final = "NOTBIdRLlD"
-_MOST: Final = 12
-_STATE: Final = np.dtype([("start_ns", "i8"), ("columns", "i8", (_MOST,)), ("count", "i8"), ("old", "i8")])
+_MOST_COLUMNS: Final = 12
+_STATE: Final = np.dtype(
+    [("start_ns", "i8"), ("columns", "i8", (_MOST_COLUMNS,)), ("count", "i8"), ("old", "i8")]
+)
 _DATE: Final = re.compile(
     r"(?:(?P<d>\d+)\.(?P<m>\d+)\.(?P<y>\d{4})|(?P<iso>\d{4}-\d\d-\d\d))\s+(?P<t>\d+:\d\d:\d\d)(?P<f>\.\d+)?"
 )
@@ -103,7 +105,7 @@ def _read_header(path: Path, state: RecordArray) -> Callable[[str], bool]:
         elif key == ";$COLUMNS":
             names = value.replace(" ", "").replace(",", "")
             missing = [name for name in "OTID" if name not in names]
-            if missing or len(names) > _MOST or not {"l", "L"} & set(names):
+            if missing or len(names) > _MOST_COLUMNS or not {"l", "L"} & set(names):
                 raise UserError(str(path), "COLUMNS", f"{value.strip()}: O, T, I, D and l or L are needed")
             _set_columns(state, names)
         elif "Start time:" in line and not row["start_ns"]:

@@ -50,9 +50,9 @@ def check(log: Path, map: Path, config: Path | None, out: Path | None = None) ->
         for rows in replay_log(log, new_ecu(params, None), source, None, findings, advance):
             collector.add(rows.samples)
     assert findings.freshness is not None
-    drive = collector.drive()
-    judged = judge(drive, car_of(params[0]) if config else ANY_CAR)
-    late = lags(drive) if not judged.contradictions else []
+    series = collector.series()
+    judged = judge(series, car_of(params[0]) if config else ANY_CAR)
+    late = lags(series) if not judged.contradictions else []
     counts = quality_counts(findings, source.plan)
     new_console(WIDTH).print(_table(inputs, counts))
     wrong = [*range_lines(findings.freshness), *judged.lines]

@@ -164,7 +164,7 @@ def _noted(rows: Iterator[Rows], findings: Findings, ecu: Ecu) -> Iterator[Rows]
         note_faults(findings, block.values)
         collector.add(block.samples)
         yield block
-    findings.physics = judge(collector.drive(), car_of(ecu.params[0]))
+    findings.physics = judge(collector.series(), car_of(ecu.params[0]))
 
 
 def _replay_signals(

@@ -1,4 +1,4 @@
-"""Physics of a log: copies of a simulated drive, each wrong in one way; the right one gives no line."""
+"""Physics of a log: copies of a simulated drive, each with one error; the right one gives no line."""
 
 from collections.abc import Callable
 
@@ -39,7 +39,7 @@ def lines_of(samples: Samples, car: Car) -> list[str]:
     for begin in range(0, len(samples), 4096):
         block = samples[begin : begin + 4096]
         collector.add(np.where((block >= low) & (block <= high), block, np.nan))
-    return judge(collector.drive(), car).lines
+    return judge(collector.series(), car).lines
 
 
 def times(columns: list[int], factor: float, offset: float = 0.0) -> Callable[[Samples], None]:
@@ -155,14 +155,14 @@ def test_two_witnesses_that_disagree_are_both_named(right: Samples) -> None:
     assert "unless left and right" in yaw_rate
 
 
-@pytest.mark.parametrize(("factor", "told"), [(1.0, []), (1.25, ["accel_x: reads 1.2"])])
-def test_a_driven_axle_that_slips_hides_no_scale(right: Samples, factor: float, told: list[str]) -> None:
+@pytest.mark.parametrize(("factor", "starts"), [(1.0, []), (1.25, ["accel_x: reads 1.2"])])
+def test_a_driven_axle_that_slips_hides_no_scale(right: Samples, factor: float, starts: list[str]) -> None:
     slipping = right.copy()
     slipping[:, WHEELS[2:]] *= 1.0 + 0.15 * np.clip(np.nan_to_num(right[:, ACCEL_X]), 0.0, 1.0)
     slipping[:, ACCEL_X] *= factor
     slipping[:, PLACE["vehicle_speed"]] = np.nan
     lines = lines_of(slipping, SUV)
-    assert [line.startswith(begins) for line, begins in zip(lines, told, strict=True)] == [True] * len(told)
+    assert all(line.startswith(begins) for line, begins in zip(lines, starts, strict=True))
 
 
 def test_a_turned_pressure_falls_out_of_its_range() -> None:
@@ -191,6 +191,6 @@ def test_pressures_of_a_drive_without_a_braking_are_not_judged(right: Samples, n
     samples[:, PRESSURES] = random.normal(0.5, noise, (len(samples), 4))
     collector = Collector()
     collector.add(samples)
-    judged = judge(collector.drive(), SUV)
+    judged = judge(collector.series(), SUV)
     assert not judged.lines
     assert "calliper_pressure" not in judged.checked

@@ -31,14 +31,14 @@ def stops() -> dict[str, np.ndarray]:
 def judged(samples: np.ndarray) -> Judged:
     collector = Collector()
     collector.add(samples)
-    return judge(collector.drive(), car_of(new_params(SUV)[0]))
+    return judge(collector.series(), car_of(new_params(SUV)[0]))
 
 
 @pytest.mark.parametrize(
     ("name", "axles"),
     [("calliper-dead", ["front"]), ("circuit-dead-diagonal", ["front", "rear"]), ("circuit-dead-front", [])],
 )
-def test_a_dead_brake_is_told_and_contradicts_nothing(
+def test_a_dead_brake_is_reported_and_contradicts_nothing(
     stops: dict[str, np.ndarray], name: str, axles: list[str]
 ) -> None:
     found = judged(stops[name])
@@ -51,7 +51,7 @@ def test_a_dead_brake_is_told_and_contradicts_nothing(
 @pytest.mark.parametrize(
     ("name", "axles"), [("calliper-dead", ["front"]), ("circuit-dead-diagonal", ["front", "rear"])]
 )
-def test_left_and_right_exchanged_are_told(stops: dict[str, np.ndarray], name: str, axles: list[str]) -> None:
+def test_exchanged_sides_are_reported(stops: dict[str, np.ndarray], name: str, axles: list[str]) -> None:
     wrong = stops[name].copy()
     wrong[:, PRESSURES] = wrong[:, [PRESSURES[i] for i in (1, 0, 3, 2)]]
     for axle, line in zip(axles, judged(wrong).contradictions, strict=True):

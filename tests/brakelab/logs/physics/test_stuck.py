@@ -1,9 +1,9 @@
-"""What stands still while the car does not; what may stand still is not told. Wrong drives: test_judge.py."""
+"""What stands still while the car does not; what may, gives no line. Wrong drives: test_judge.py."""
 
 import numpy as np
 import pytest
 
-from brakelab.logs.physics.samples import SAMPLED, Drive
+from brakelab.logs.physics.samples import SAMPLED, InputSeries
 from brakelab.logs.physics.stuck import clipped_accels, clipped_pressures, runs, stuck_wheels
 from ecu.contract.signals import INPUT_SIGNALS
 
@@ -31,7 +31,7 @@ def stops(decels: list[float]) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize(
-    ("decels", "range_bar", "told"),
+    ("decels", "range_bar", "reported"),
     [
         ([3.0, 4.0, 5.0], 25.0, True),
         ([3.0, 4.0, 5.0], 60.0, False),
@@ -39,26 +39,26 @@ def stops(decels: list[float]) -> tuple[np.ndarray, np.ndarray]:
         ([5.0, 1.0], 25.0, False),  # one braking alone could be one that was held
     ],
 )
-def test_pressures_that_end_at_one_value(decels: list[float], range_bar: float, told: bool) -> None:
+def test_pressures_that_end_at_one_value(decels: list[float], range_bar: float, reported: bool) -> None:
     rows, speed = stops(decels)
     rows[:, PRESSURES] = np.minimum(rows[:, PRESSURES], range_bar)
-    line = clipped_pressures(Drive(rows), np.gradient(speed, 0.02), np.ones(ROWS, np.bool_))
-    assert bool(line) == told
-    assert not told or "fl fr rl rr stand at 25.0 bar" in line
+    line = clipped_pressures(InputSeries(rows), np.gradient(speed, 0.02), np.ones(ROWS, np.bool_))
+    assert bool(line) == reported
+    assert not reported or "fl fr rl rr stand at 25.0 bar" in line
 
 
-@pytest.mark.parametrize(("range_", "told"), [(4.0, True), (6.0, False)])
-def test_an_acceleration_that_ends_below_what_the_car_reaches(range_: float, told: bool) -> None:
+@pytest.mark.parametrize(("range_", "reported"), [(4.0, True), (6.0, False)])
+def test_an_acceleration_that_ends_below_what_the_car_reaches(range_: float, reported: bool) -> None:
     rows, speed = stops([3.0, 4.0, 5.0])
     column = PLACE["accel_x"]
     rows[:, column] = np.clip(rows[:, column], -range_, range_)
-    lines, clear = clipped_accels(Drive(rows), speed, np.ones(ROWS, np.bool_))
-    assert [line.startswith("accel_x: stands at -4.00 m/s^2") for line in lines] == [True] * told
-    assert clear.all() != told
+    lines, clear = clipped_accels(InputSeries(rows), speed, np.ones(ROWS, np.bool_))
+    assert [line.startswith("accel_x: stands at -4.00 m/s^2") for line in lines] == [True] * reported
+    assert clear.all() != reported
 
 
 @pytest.mark.parametrize(
-    ("begin", "seconds", "value", "told"),
+    ("begin", "seconds", "value", "cause"),
     [
         (12.0, 8.0, 40.0, "frozen"),
         (0.0, 2.9, 75.0, ""),  # all of them stand at a constant speed
@@ -67,13 +67,13 @@ def test_an_acceleration_that_ends_below_what_the_car_reaches(range_: float, tol
     ],
 )
 def test_a_wheel_that_stands_while_the_others_change(
-    begin: float, seconds: float, value: float, told: str
+    begin: float, seconds: float, value: float, cause: str
 ) -> None:
     rows, speed = stops([3.0, 4.0, 5.0])
     rows[int(50 * begin) : int(50 * (begin + seconds)), WHEELS[2]] = value
     wheels = np.tile(speed[:, None], 4)
-    lines, mended = stuck_wheels(Drive(rows), wheels, np.ones(ROWS, np.bool_))
-    assert [told in line for line in lines] == ([True] if told else [])
+    lines, mended = stuck_wheels(InputSeries(rows), wheels, np.ones(ROWS, np.bool_))
+    assert [cause in line for line in lines] == ([True] if cause else [])
     assert np.allclose(mended, wheels)
 
 

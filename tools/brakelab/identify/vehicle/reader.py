@@ -105,7 +105,7 @@ def read_drives(paths: Sequence[Path], params: RecordArray, map: Path | None) ->
                     str(path), "", "not one sample of the needed inputs was usable; check the map"
                 )
             drive = drive_of(str(path), np.concatenate(rows))
-            check(drive, judge(collector.drive(), ANY_CAR).lines, params[0])
+            check(drive, judge(collector.series(), ANY_CAR).lines, params[0])
             drives.append(drive)
     return drives
 

@@ -44,7 +44,7 @@ def lateral_lines(relations: Relations, car: Car) -> list[str]:
     for name in against:
         if name == "wheels":
             lines.append(
-                "wheel_speed_*: left and right are exchanged: every other sensor turns the other way"
+                "wheel_speed_*: left and right are exchanged: every other sensor turns in the other direction"
             )
         else:
             alone = ", unless yaw_rate is turned" if list(votes) == [name] else ""
@@ -59,13 +59,13 @@ def lateral_lines(relations: Relations, car: Car) -> list[str]:
     if relations.accel_y and abs(relations.accel_y.correlation) > SIGNED:
         for slope, unit in ((np.pi / 180.0, "deg/s"), (180.0 / np.pi, "rad/s")):
             if not is_apart(abs(relations.accel_y.slope) / slope, UNIT):
-                told = f"yaw_rate: reads {times(1.0 / abs(relations.accel_y.slope))} what accel_y says"
-                return [*lines, f'{told}; unit = "{unit}"']
+                message = f"yaw_rate: reads {times(1.0 / abs(relations.accel_y.slope))} what accel_y says"
+                return [*lines, f'{message}; unit = "{unit}"']
     if relations.accel_y and not any(line.startswith("accel_y") for line in lines):
         if _yaw_explains(relations, car):
             factor = 1.0 / abs(relations.accel_y.slope)
-            told = f"yaw_rate: reads {times(factor)} what lateral acceleration and steering say"
-            lines.append(f"{told}; check its factor")
+            message = f"yaw_rate: reads {times(factor)} what lateral acceleration and steering say"
+            lines.append(f"{message}; check its factor")
         else:
             flat = relations.accel_y._replace(slope=abs(relations.accel_y.slope))
             flat = flat._replace(correlation=abs(flat.correlation))
@@ -73,8 +73,8 @@ def lateral_lines(relations: Relations, car: Car) -> list[str]:
     steering = relations.steering
     if steering and abs(steering.correlation) > SIGNED and abs(steering.slope) > HAND_WHEEL:
         ratio = f"factor = {1.0 / abs(steering.slope):.3g}"
-        told = f"steering_angle: {abs(steering.slope):.0f} times that of the road wheels"
-        lines.append(f"{told}; is it the hand wheel's, or in deg? {ratio}")
+        message = f"steering_angle: {abs(steering.slope):.0f} times that of the road wheels"
+        lines.append(f"{message}; is it the hand wheel's, or in deg? {ratio}")
     return lines
 
 

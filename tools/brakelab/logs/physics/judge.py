@@ -6,9 +6,9 @@
     curves            against each other: wheels, yaw rate, lateral acceleration, steering
     calliper_pressure the deceleration, by the brakes of the car
 
-A wrong input breaks every relation it stands in, so the one that explains most of what is broken is told, and
-the others are not. What a drive does not show is not judged: a scale is wrong if it is so whichever side has
-all of the noise, which with a correlation r leaves it open between s and s / r^2.
+A wrong input breaks every relation it stands in, so the one that explains most of what is broken is reported,
+and the others are not. What a drive does not show is not judged: a scale is wrong if it is so whichever side
+has all of the noise, which with a correlation r leaves it open between s and s / r^2.
 """
 
 from typing import Final, NamedTuple
@@ -20,7 +20,7 @@ from brakelab.logs.physics.curves import lateral_lines
 from brakelab.logs.physics.line import MOVING, RATE, Fit
 from brakelab.logs.physics.pressures import judge_pressures
 from brakelab.logs.physics.relations import LEAST_ROWS, Relations, relate, rescaled
-from brakelab.logs.physics.samples import SAMPLED, Car, Drive, Rows
+from brakelab.logs.physics.samples import SAMPLED, Car, InputSeries, Rows
 from brakelab.logs.physics.scales import (
     CHECK,
     SCALE,
@@ -60,40 +60,40 @@ class Judged(NamedTuple):
         return self.contradictions + self.flaws
 
 
-def judge(drive: Drive, car: Car) -> Judged:
+def judge(series: InputSeries, car: Car) -> Judged:
     """Return the findings of a drive's physics about its inputs."""
-    omega = drive.corners("wheel_speed")
+    omega = series.corners("wheel_speed")
     measured = omega is not None
     if omega is not None:
         wheels = omega * car.radius
-    elif "vehicle_speed" in drive:
-        wheels = np.tile(drive["vehicle_speed"][:, None], 4)
+    elif "vehicle_speed" in series:
+        wheels = np.tile(series["vehicle_speed"][:, None], 4)
     else:
         return Judged([], [], [])
-    rows = drive.known & (np.median(np.abs(wheels), axis=1) > MOVING)
+    rows = series.known & (np.median(np.abs(wheels), axis=1) > MOVING)
     if rows.sum() < LEAST_ROWS:
         return Judged([], [], [])
     flaws: list[str] = []
     lines: list[str] = []
     if measured:
-        flaws, wheels = stuck_wheels(drive, wheels, rows)
+        flaws, wheels = stuck_wheels(series, wheels, rows)
         lines, wheels = _wheels(wheels, rows, car)
     speed = wheels.mean(axis=1)
-    clipped, unclipped = clipped_accels(drive, speed, rows)
+    clipped, unclipped = clipped_accels(series, speed, rows)
     rows = unclipped if unclipped.sum() >= LEAST_ROWS else rows
     flaws += clipped
     checked = ["wheel_speed"] if measured else []
-    relations = relate(drive, car, wheels, rows)
-    factor, told = _speed_scale(drive, relations, speed, rows, car, measured)
-    lines += told
+    relations = relate(series, car, wheels, rows)
+    factor, speed_lines = _speed_scale(series, relations, speed, rows, car, measured)
+    lines += speed_lines
     relations = rescaled(relations, factor)
     checked += [name for name in ("accel_x", "yaw_rate", "accel_y") if getattr(relations, name)]
     checked += ["steering_angle"] if relations.steering else []
-    checked += ["vehicle_speed"] if "vehicle_speed" in drive else []
+    checked += ["vehicle_speed"] if "vehicle_speed" in series else []
     if relations.swapped:
         lines.append("accel_x and accel_y are swapped: each follows what the other should; exchange them")
     else:
-        alone = "vehicle_speed" not in drive and not is_clean(relations.accel_y)
+        alone = "vehicle_speed" not in series and not is_clean(relations.accel_y)
         lines += _longitudinal(relations.accel_x, car, alone)
         flaws += _zero(relations.accel_x, car)
     lines += lateral_lines(relations, car)
@@ -101,8 +101,8 @@ def judge(drive: Drive, car: Car) -> Judged:
     change = np.gradient(fastest / factor, 1.0 / RATE)
     agrees = relations.accel_x is not None and relations.accel_x.correlation > SIGNED
     if agrees and not any("accel_x" in line for line in lines + flaws):
-        change = drive["accel_x"]  # slopes of the road and wheels that slip are no matter to it
-    pressures = judge_pressures(drive, car, change, rows)
+        change = series["accel_x"]  # slopes of the road and wheels that slip are no matter to it
+    pressures = judge_pressures(series, car, change, rows)
     return Judged(lines + pressures.contradictions, flaws + pressures.flaws, checked + pressures.checked)
 
 
@@ -111,17 +111,17 @@ def range_lines(freshness: RecordArray) -> list[str]:
 
     `freshness` is FRESHNESS of each input after the drive, shape (N_INPUTS,).
     """
-    told: dict[str, list[str]] = {}
+    refused: dict[str, list[str]] = {}
     for place in SAMPLED:
         known, signal = freshness[place], INPUT_SIGNALS[place]
         outside = int(known["outside"])
         share = outside / max(outside + int(known["taken"]), 1)
         if share > OUTSIDE:
             span = f"{signal.low:g}…{signal.high:g} {signal.unit}"
-            told.setdefault(span, []).append(f"{signal.name} {100.0 * share:.0f} %")
+            refused.setdefault(span, []).append(f"{signal.name} {100.0 * share:.0f} %")
     return [
         f"{', '.join(names)} of samples outside {span}: refused; check sign and unit"
-        for span, names in told.items()
+        for span, names in refused.items()
     ]
 
 
@@ -135,8 +135,8 @@ def _wheels(wheels: Vector, rows: Rows, car: Car) -> tuple[list[str], Vector]:
     wrong = [i for i in range(4) if not abs(ratios[i] - 1.0) <= WHEEL[car.known]]
     if len(wrong) > 1:
         front, rear = float(np.mean(ratios[:2])), float(np.mean(ratios[2:]))
-        told = f"wheel_speed_*: wheels differ, front {front:.2f} and rear {rear:.2f} of the others"
-        return [f"{told}; check unit and factor of each"], wheels
+        message = f"wheel_speed_*: wheels differ, front {front:.2f} and rear {rear:.2f} of the others"
+        return [f"{message}; check unit and factor of each"], wheels
     lines, mended = [], wheels.copy()
     for i in wrong:
         name = f"wheel_speed_{CORNERS[i]}"
@@ -146,7 +146,7 @@ def _wheels(wheels: Vector, rows: Rows, car: Car) -> tuple[list[str], Vector]:
 
 
 def _speed_scale(
-    drive: Drive, relations: Relations, speed: Vector, rows: Rows, car: Car, measured: bool
+    series: InputSeries, relations: Relations, speed: Vector, rows: Rows, car: Car, measured: bool
 ) -> tuple[float, list[str]]:
     """Return by how much all wheels read too much, and the line about them or about the reference.
 
@@ -156,16 +156,16 @@ def _speed_scale(
     both = (relations.accel_x, relations.accel_y)
     by_accel = [1.0 / abs(line.slope) for line in both if is_clean(line) and line.slope]
     beyond = [line for line in both if line and abs(line.correlation) > SIGNED and line.is_beyond(tolerated)]
-    if measured and "vehicle_speed" in drive:
-        reference = drive["vehicle_speed"]
+    if measured and "vehicle_speed" in series:
+        reference = series["vehicle_speed"]
         there = rows & (np.abs(reference) > 0.5)
         if there.sum() >= LEAST_ROWS:
             by_reference = abs(float(np.median(speed[there] / reference[there])))
             if is_apart(by_reference, 1.0 + 0.6 * SCALE[car.known]):
                 if not by_accel or any(not is_apart(one / by_reference, tolerated) for one in by_accel):
                     return by_reference, [_speed_line(by_reference, car, "vehicle_speed says")]
-                told = f"vehicle_speed: reads {times(1.0 / by_reference)} what wheels and accelerations say"
-                return 1.0, [f"{told}{unit_of('m/s', by_reference, CHECK)}"]
+                reads = f"vehicle_speed: reads {times(1.0 / by_reference)} what wheels and accelerations say"
+                return 1.0, [f"{reads}{unit_of('m/s', by_reference, CHECK)}"]
             return 1.0, []
     if len(beyond) == 2:
         one, other = (1.0 / float(np.sqrt(line.span[0] * line.span[1])) for line in beyond)
@@ -174,8 +174,8 @@ def _speed_scale(
         if not is_apart(one / other, ALIKE) and not in_g:
             if measured:
                 return mean, [_speed_line(mean, car, "both accelerations say")]
-            told = f"vehicle_speed: reads {times(mean)} what both accelerations say"
-            return mean, [f"{told}{unit_of('m/s', 1.0 / mean, CHECK)}"]
+            reads = f"vehicle_speed: reads {times(mean)} what both accelerations say"
+            return mean, [f"{reads}{unit_of('m/s', 1.0 / mean, CHECK)}"]
     return 1.0, []
 
 
@@ -189,10 +189,10 @@ def _speed_line(factor: float, car: Car, who: str) -> str:
         "deg/s": 180.0 / np.pi,
     }
     near = [unit for unit, scale in units.items() if abs(factor / scale - 1.0) < 0.08]
-    told = f"wheel_speed_*: all read {times(factor)} what {who}"
+    message = f"wheel_speed_*: all read {times(factor)} what {who}"
     if near:
-        return f'{told}, as {near[0]} read as rad/s would; unit = "{near[0]}", or check rolling_radius'
-    return f"{told}; check unit, factor and rolling_radius"
+        return f'{message}, as {near[0]} read as rad/s would; unit = "{near[0]}", or check rolling_radius'
+    return f"{message}; check unit, factor and rolling_radius"
 
 
 def _longitudinal(line: Fit | None, car: Car, alone: bool) -> list[str]:
@@ -212,4 +212,4 @@ def _zero(line: Fit | None, car: Car) -> list[str]:
     if _longitudinal(line, car, alone=False):
         return []
     zero = f"accel_x: reads {line.intercept:+.2f} m/s^2 at constant speed"
-    return [f"{zero}; offset = {-line.intercept:+.2f}, unless the road falls or rises all the way"]
+    return [f"{zero}; offset = {-line.intercept:+.2f}, unless the road falls or rises throughout"]

@@ -15,17 +15,17 @@ from numpy.typing import NDArray
 
 from brakelab.arrays import Vector
 from brakelab.logs.physics.line import BRAKING, MOVING, RATE
-from brakelab.logs.physics.samples import Drive, Rows
+from brakelab.logs.physics.samples import InputSeries, Rows
 from ecu.contract.signals import CORNERS
 
 STEPS: Final = range(-35, 36)  # of the grid, beyond what a map takes: a peak at the end is none
 PARTS: Final = 8
-FEWEST: Final = 3  # of them
+FEWEST_PARTS: Final = 3
 LEAST_ROWS: Final = int(6 * RATE)  # of a part
 FOLLOWS: Final = 0.7  # correlation from which a peak is one
-CERTAIN: Final = 0.012  # s, standard deviation of a lag that is told
+CERTAIN: Final = 0.012  # s, greatest standard deviation of a lag that is reported
 FLOOR: Final = 0.005  # s, half a cycle
-TOLD: Final = 0.03  # s, from which a lag matters
+LEAST_LAG: Final = 0.03  # s, that matters
 UNDRIVEN: Final = 0.05  # s, by which the axle that is not driven comes later than the other
 BESIDE: Final = int(0.4 * RATE)  # rows beside a braking
 ANSWERS: Final = 0.08  # s, from the pressure to the deceleration
@@ -51,36 +51,36 @@ class Lag(NamedTuple):
         return f"{name}: {abs(self.seconds):.2f} ± {self.sigma:.2f} s {late}"
 
 
-def lags(drive: Drive) -> list[Lag]:
+def lags(series: InputSeries) -> list[Lag]:
     """Return the inputs that come late or early by more than their uncertainty, where the drive shows it."""
-    if "accel_x" not in drive:
+    if "accel_x" not in series:
         return []
-    accel = drive["accel_x"]
+    accel = series["accel_x"]
     found = {
-        name: lag for name in ("wheel_speed", "vehicle_speed") if (lag := _speed_lag(drive, accel, name))
+        name: lag for name in ("wheel_speed", "vehicle_speed") if (lag := _speed_lag(series, accel, name))
     }
     if not found:
         return []
     found["accel_x"] = Lag("accel_x", 0.0, max(lag.sigma for lag in found.values()))
     earliest = min(lag.seconds for lag in found.values())
-    pressures = drive.corners("calliper_pressure")
+    pressures = series.corners("calliper_pressure")
     if pressures is not None:
-        answer = _lag("accel_x", accel, -pressures.sum(axis=1), drive.known)
+        answer = _lag("accel_x", accel, -pressures.sum(axis=1), series.known)
         if answer and answer.seconds + earliest < PRECEDES:
             earliest = ANSWERS - answer.seconds
     late = [lag._replace(seconds=lag.seconds - earliest) for lag in found.values()]
-    return [lag for lag in late if abs(lag.seconds) > max(TOLD, 3.0 * lag.sigma)]
+    return [lag for lag in late if abs(lag.seconds) > max(LEAST_LAG, 3.0 * lag.sigma)]
 
 
-def _speed_lag(drive: Drive, accel: Vector, name: str) -> Lag | None:
+def _speed_lag(series: InputSeries, accel: Vector, name: str) -> Lag | None:
     """Return by how much a speed comes later than the accelerometer; None: the drive does not show it."""
-    wheels = drive.corners(name)
-    if wheels is None and name not in drive:
+    wheels = series.corners(name)
+    if wheels is None and name not in series:
         return None
-    speed = np.median(wheels, axis=1) * RADIUS if wheels is not None else drive[name]
-    moving = drive.known & (speed > MOVING)
+    speed = np.median(wheels, axis=1) * RADIUS if wheels is not None else series[name]
+    moving = series.known & (speed > MOVING)
     brakes = np.convolve(accel < -BRAKING, np.ones(2 * BESIDE + 1), mode="same") > 0.5
-    if wheels is None or _is_copied(drive, moving):
+    if wheels is None or _is_copied(series, moving):
         change = np.gradient(speed, 1.0 / RATE)
         both = [_peak(change, accel, _inner(moving & rows)) for rows in (brakes, ~brakes)]
         if both[0] is None or both[1] is None or abs(both[0] - both[1]) > SLIPS:
@@ -93,9 +93,9 @@ def _speed_lag(drive: Drive, accel: Vector, name: str) -> Lag | None:
     return max(front, rear, key=lambda lag: lag.seconds)
 
 
-def _is_copied(drive: Drive, moving: Rows) -> bool:
+def _is_copied(series: InputSeries, moving: Rows) -> bool:
     """Return whether one speed stands for all four wheels."""
-    raw = np.stack([drive.raw(f"wheel_speed_{corner}") for corner in CORNERS], axis=1)[moving]
+    raw = np.stack([series.raw(f"wheel_speed_{corner}") for corner in CORNERS], axis=1)[moving]
     return len(raw) > 0 and bool((raw / np.maximum(raw[:, :1], 1.0)).std(axis=0).max() < COPIES)
 
 
@@ -109,9 +109,9 @@ def _lag(name: str, signal: Vector, reference: Vector, rows: Rows) -> Lag | None
     """Return by how much `signal` comes later than `reference` in the `rows`, all of shape (n,)."""
     places = _inner(rows)
     count = min(len(places) // LEAST_ROWS, PARTS)
-    parts = np.array_split(places, count) if count >= FEWEST else []
+    parts = np.array_split(places, count) if count >= FEWEST_PARTS else []
     peaks = [peak for part in parts if (peak := _peak(signal, reference, part)) is not None]
-    if len(peaks) < FEWEST:
+    if len(peaks) < FEWEST_PARTS:
         return None
     sigma = float(np.hypot(np.std(peaks, ddof=1) / np.sqrt(len(peaks)), FLOOR))
     return Lag(name, float(np.median(peaks)), sigma) if sigma < CERTAIN else None

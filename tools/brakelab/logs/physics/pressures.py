@@ -5,7 +5,7 @@
 Friction may be half or nearly twice the nominal one, so that only a scale beyond shows, also in the brakings
 that road and tyres do not limit; a wrong scale of one calliper shows against the other side of its axle
 (`sides`). Front and rear are exchanged if the rear wheels would have to bear more than the front ones for
-their load, and would not the other way round: no car is built so.
+their load, and would not if they were exchanged: no car is built so.
 """
 
 from typing import Final, NamedTuple
@@ -14,7 +14,7 @@ import numpy as np
 
 from brakelab.arrays import Vector
 from brakelab.logs.physics.line import BRAKING, RATE, fit
-from brakelab.logs.physics.samples import Car, Drive, Rows
+from brakelab.logs.physics.samples import Car, InputSeries, Rows
 from brakelab.logs.physics.sides import Sides, judge_sides
 from brakelab.logs.physics.stuck import clipped_pressures
 from ecu.bus.units import CONVERSIONS
@@ -41,12 +41,12 @@ class Pressures(NamedTuple):
     checked: list[str]
 
 
-def judge_pressures(drive: Drive, car: Car, change: Vector, rows: Rows) -> Pressures:
+def judge_pressures(series: InputSeries, car: Car, change: Vector, rows: Rows) -> Pressures:
     """Return what the pressures cannot be.
 
     `change` [m/s^2] of speed and the `rows` in which the car moves are of shape (n,).
     """
-    pressures = drive.corners("calliper_pressure")
+    pressures = series.corners("calliper_pressure")
     if pressures is None:
         return Pressures([], [], [])
     checked = ["calliper_pressure"]
@@ -54,11 +54,11 @@ def judge_pressures(drive: Drive, car: Car, change: Vector, rows: Rows) -> Press
     rest = np.median(pressures[idle], axis=0) if idle.sum() > LEAST_ROWS else np.zeros(4)
     if np.abs(rest).max() > REST:
         worst = float(rest[np.argmax(np.abs(rest))])
-        told = (
+        message = (
             f"calliper_pressure_*: reads {worst:+.1f} bar while the car speeds up;"
             f" add {-worst:+.1f} bar to its offset"
         )
-        return Pressures([], [told], checked)
+        return Pressures([], [message], checked)
     total = pressures.sum(axis=1)
     greatest = np.percentile(np.abs(total[rows]), 99)
     if idle.sum() > LEAST_ROWS:
@@ -72,18 +72,18 @@ def judge_pressures(drive: Drive, car: Car, change: Vector, rows: Rows) -> Press
     if line.correlation < -TURNED:
         return Pressures(["calliper_pressure_*: turned: falls as the car brakes; factor = -1"], [], checked)
     if line.correlation < 0.2:
-        told = f"calliper_pressure_*: does not follow the deceleration (correlation {line.correlation:.2f})"
-        return Pressures([f"{told}; is it another signal?"], [], checked)
-    clipped = clipped_pressures(drive, change, rows)
-    sides = Sides([], []) if clipped else judge_sides(drive, car, pressures, pressed)
-    lines = sides.contradictions + _unit(drive, car, pressures - rest, change, rows)
+        flaw = f"calliper_pressure_*: does not follow the deceleration (correlation {line.correlation:.2f})"
+        return Pressures([f"{flaw}; is it another signal?"], [], checked)
+    clipped = clipped_pressures(series, change, rows)
+    sides = Sides([], []) if clipped else judge_sides(series, car, pressures, pressed)
+    lines = sides.contradictions + _unit(series, car, pressures - rest, change, rows)
     if not sides.differ:
         lines += _axles(pressures - rest, change, rows, car)
     return Pressures(lines, sides.flaws + ([clipped] if clipped else []), checked)
 
 
 def _axles(pressures: Vector, change: Vector, rows: Rows, car: Car) -> list[str]:
-    """Compare what the axles would bear with their loads, as mapped and the other way round."""
+    """Compare what the axles would bear with their loads, as mapped and exchanged."""
     if car.brakes is None:
         return []
     hard = rows & (change < -HARD)
@@ -101,14 +101,14 @@ def _axles(pressures: Vector, change: Vector, rows: Rows, car: Car) -> list[str]
     alive = mean[:2].sum() > ALIVE * mean[2:].sum()
     if not (alive and mapped > OVERBRAKED and exchanged < 1.0 / OVERBRAKED):
         return []
-    told = f"the rear wheels would bear {mapped:.1f} times what the front ones do for their load"
-    return [f"calliper_pressure_*: front and rear are exchanged: {told}; exchange them"]
+    reason = f"the rear wheels would bear {mapped:.1f} times what the front ones do for their load"
+    return [f"calliper_pressure_*: front and rear are exchanged: {reason}; exchange them"]
 
 
-def _unit(drive: Drive, car: Car, pressures: Vector, change: Vector, rows: Rows) -> list[str]:
+def _unit(series: InputSeries, car: Car, pressures: Vector, change: Vector, rows: Rows) -> list[str]:
     if car.brakes is None:
         return []
-    motors = drive.corners("motor_torque")
+    motors = series.corners("motor_torque")
     others = OVERRUN if motors is None else OVERRUN + motors @ car.brakes.decel_per_torque
     total = pressures.sum(axis=1)
     decel = -change - others

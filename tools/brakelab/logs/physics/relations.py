@@ -14,7 +14,7 @@ import numpy as np
 
 from brakelab.arrays import Vector
 from brakelab.logs.physics.line import MOVING, RATE, Fit, fit
-from brakelab.logs.physics.samples import Car, Drive, Rows
+from brakelab.logs.physics.samples import Car, InputSeries, Rows
 from brakelab.logs.physics.scales import CLEAN, is_in_degrees
 
 LEAST_ROWS: Final = int(8 * RATE)
@@ -33,14 +33,14 @@ class Relations(NamedTuple):
     steering: Fit | None
 
 
-def relate(drive: Drive, car: Car, wheels: Vector, rows: Rows) -> Relations:
+def relate(series: InputSeries, car: Car, wheels: Vector, rows: Rows) -> Relations:
     """Return the lines that a drive shows in the `rows` where it moves; `wheels` [m/s] of shape (n, 4)."""
     speed = wheels.mean(axis=1)
 
     def line(name: str, reference: Vector, least: float, where: Rows = rows) -> Fit | None:
-        if name not in drive or where.sum() < LEAST_ROWS or reference[where].std() < least:
+        if name not in series or where.sum() < LEAST_ROWS or reference[where].std() < least:
             return None
-        return fit(drive[name], reference, where)
+        return fit(series[name], reference, where)
 
     def cleanest(name: str, references: Iterable[Vector], least: float) -> Fit | None:
         """Of all wheels and of each axle: one that slips or is pressed flat tells less."""
@@ -60,9 +60,9 @@ def relate(drive: Drive, car: Car, wheels: Vector, rows: Rows) -> Relations:
     )
     turns = (wheels[:, 1] - wheels[:, 0]) / car.track, (wheels[:, 3] - wheels[:, 2]) / car.track
     yaw_rate = cleanest("yaw_rate", (0.5 * (turns[0] + turns[1]), *turns), LEAST_TURN)
-    if "yaw_rate" not in drive:
+    if "yaw_rate" not in series:
         return Relations(accel_x, swapped, None, None, None)
-    yaw = drive["yaw_rate"]
+    yaw = series["yaw_rate"]
     scale = np.pi / 180.0 if is_in_degrees(yaw_rate) else 1.0
     curved = rows if rows.sum() >= LEAST_CURVED else np.zeros_like(rows)
     accel_y = line("accel_y", scale * speed * yaw, LEAST_CHANGE, curved)

@@ -44,7 +44,7 @@ KEPT: Final = (
 CYCLES: Final = 2  # of 10 ms in a row of the grid
 MOST_ROWS: Final = int(3600 * RATE)
 BRIDGED: Final = int(0.5 * RATE)  # rows without a sample that a straight line may fill
-FEWEST: Final = 100  # samples
+FEWEST_SAMPLES: Final = 100
 
 Rows = NDArray[np.bool_]
 
@@ -116,14 +116,14 @@ class Collector:
         self._rows.append(mean.astype(np.float32))
         self._count += len(mean)
 
-    def drive(self) -> "Drive":
-        """Return the collected samples."""
+    def series(self) -> "InputSeries":
+        """Return the series of the collected samples."""
         rows = np.concatenate(self._rows) if self._rows else np.zeros((0, len(SAMPLED)), np.float32)
-        return Drive(rows.astype(np.float64))
+        return InputSeries(rows.astype(np.float64))
 
 
-class Drive:
-    """Inputs of a drive by name: smoothed on the grid, with the rows where they are known."""
+class InputSeries:
+    """Series of a drive's inputs by name: smoothed on the grid, with the rows where they are known."""
 
     def __init__(self, samples: Vector) -> None:
         """Take rows of the grid, shape (n, len(SAMPLED))."""
@@ -134,7 +134,7 @@ class Drive:
         places = np.arange(len(samples))
         for column, place in enumerate(SAMPLED):
             there = np.flatnonzero(np.isfinite(samples[:, column]))
-            if len(there) < FEWEST:
+            if len(there) < FEWEST_SAMPLES:
                 continue
             name = INPUT_SIGNALS[place].name
             if len(there) == len(samples):

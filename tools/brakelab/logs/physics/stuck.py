@@ -10,7 +10,7 @@ import numpy as np
 
 from brakelab.arrays import Vector
 from brakelab.logs.physics.line import RATE, smooth
-from brakelab.logs.physics.samples import Drive, Rows
+from brakelab.logs.physics.samples import InputSeries, Rows
 from brakelab.stretches import stretches
 from ecu.contract.signals import CORNERS
 
@@ -30,50 +30,52 @@ def runs(at: Rows, least: int) -> list[slice]:
     return [slice(begin, end) for begin, end in stretches(at).tolist() if end - begin >= least]
 
 
-def clipped_accels(drive: Drive, speed: Vector, rows: Rows) -> tuple[list[str], Rows]:
+def clipped_accels(series: InputSeries, speed: Vector, rows: Rows) -> tuple[list[str], Rows]:
     """Return a line for each clipped acceleration, and those of the `rows` in which none is.
 
     `speed` [m/s] and the `rows` in which the car moves are of shape (n,).
     """
     expected = {"accel_x": np.gradient(speed, 1.0 / RATE)}
-    if "yaw_rate" in drive:
-        expected["accel_y"] = speed * drive["yaw_rate"]
+    if "yaw_rate" in series:
+        expected["accel_y"] = speed * series["yaw_rate"]
     lines, clear = [], rows.copy()
     for name, by_motion in expected.items():
-        if name in drive:
-            line, at = _clipped(drive, name, by_motion, rows)
+        if name in series:
+            line, at = _clipped(series, name, by_motion, rows)
             lines += [line] if line else []
             clear &= ~at
     return lines, clear
 
 
-def _clipped(drive: Drive, name: str, expected: Vector, rows: Rows) -> tuple[str, Rows]:
+def _clipped(series: InputSeries, name: str, expected: Vector, rows: Rows) -> tuple[str, Rows]:
     """Return a line if an acceleration is clipped, else an empty one, and the rows in which it is.
 
     `expected` [m/s^2] by the motion and `rows` in which it is known are of shape (n,).
     """
-    values, none = drive.raw(name), np.zeros(len(rows), np.bool_)
+    values, none = series.raw(name), np.zeros(len(rows), np.bool_)
     for extreme in (values[rows].min(), values[rows].max()):
         at = rows & (values == extreme)
         if abs(extreme) < LEAST_ACCEL or sum(part.stop - part.start for part in runs(at, 3)) < CLIPPED:
             continue
         ahead = np.quantile(smooth(expected)[at] / extreme, 0.75)
         if ahead > BEYOND:
-            told = f"{name}: stands at {extreme:+.2f} m/s^2 for {at.sum() / RATE:.1f} s while the car reaches"
+            stands = (
+                f"{name}: stands at {extreme:+.2f} m/s^2 for {at.sum() / RATE:.1f} s while the car reaches"
+            )
             remedy = "its range ends there; take a sensor or a signal of more range"
             both = np.isin(values, (values[rows].min(), values[rows].max()))
-            return f"{told} {ahead * extreme:+.1f}: {remedy}", smooth(both.astype(float)) > 0.01
+            return f"{stands} {ahead * extreme:+.1f}: {remedy}", smooth(both.astype(float)) > 0.01
     return "", none
 
 
-def stuck_wheels(drive: Drive, wheels: Vector, rows: Rows) -> tuple[list[str], Vector]:
+def stuck_wheels(series: InputSeries, wheels: Vector, rows: Rows) -> tuple[list[str], Vector]:
     """Return a line for each wheel that stands still in its value while the others change.
 
     `wheels` [m/s], shape (n, 4), come back with the other wheels' mean where one is stuck.
     """
     lines, mended = [], wheels.copy()
     for i, corner in enumerate(CORNERS):
-        values = drive.raw(f"wheel_speed_{corner}")
+        values = series.raw(f"wheel_speed_{corner}")
         others = np.median(np.delete(wheels, i, axis=1), axis=1)
         constant = np.concatenate(([False], np.diff(values) == 0.0)) & rows
         stuck = np.zeros(len(rows), np.bool_)
@@ -88,13 +90,13 @@ def stuck_wheels(drive: Drive, wheels: Vector, rows: Rows) -> tuple[list[str], V
         mended[near, i] = others[near]
         at_top = bool((values[stuck] == greatest).all())
         seconds = stuck.sum() / RATE
-        told = f"wheel_speed_{corner}: stands at {values[stuck][0]:.1f} rad/s for {seconds:.0f} s"
+        message = f"wheel_speed_{corner}: stands at {values[stuck][0]:.1f} rad/s for {seconds:.0f} s"
         what = "its range ends there" if at_top and greatest > 0.1 else "the sensor or its gateway is frozen"
-        lines.append(f"{told} while the others change: {what}; mend it, or leave that part out")
+        lines.append(f"{message} while the others change: {what}; mend it, or leave that part out")
     return lines, mended
 
 
-def clipped_pressures(drive: Drive, change: Vector, rows: Rows) -> str:
+def clipped_pressures(series: InputSeries, change: Vector, rows: Rows) -> str:
     """Return a line if pressures stand at one greatest value in brakings of different strength, else none.
 
     `change` [m/s^2] is that of the car's speed, shape (n,).
@@ -102,7 +104,7 @@ def clipped_pressures(drive: Drive, change: Vector, rows: Rows) -> str:
     ends: dict[str, float] = {}
     found = set()
     for corner in CORNERS:
-        values = drive.raw(f"calliper_pressure_{corner}")
+        values = series.raw(f"calliper_pressure_{corner}")
         greatest = float(values[rows].max())
         brakings = runs(rows & (values == greatest), PRESSED)
         if greatest <= LEAST_BAR or not brakings:
@@ -115,5 +117,5 @@ def clipped_pressures(drive: Drive, change: Vector, rows: Rows) -> str:
         return ""
     corners = " ".join(corner for corner, greatest in ends.items() if greatest in found)
     bar = " and ".join(f"{greatest:.1f}" for greatest in sorted(found))
-    told = f"calliper_pressure_*: {corners} stand at {bar} bar while the car brakes harder"
-    return f"{told}: the range ends there; take a signal of more range, or leave such brakings out"
+    message = f"calliper_pressure_*: {corners} stand at {bar} bar while the car brakes harder"
+    return f"{message}: the range ends there; take a signal of more range, or leave such brakings out"
