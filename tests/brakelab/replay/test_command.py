@@ -296,7 +296,7 @@ def test_the_folder_of_the_result_is_made(tmp_path: Path) -> None:
     assert out.is_file()
 
 
-def test_a_map_beside_decoded_signals_is_told_to_be_of_no_use(
+def test_a_map_beside_decoded_signals_is_reported_as_of_no_use(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path, map = stop(tmp_path / "stop.parquet"), resource("config/maps/mustang.toml")
@@ -362,7 +362,7 @@ WORTHLESS: dict[str, tuple[dict[str, float | None], list[str]]] = {
 
 
 @pytest.mark.parametrize("case", WORTHLESS)
-def test_needed_inputs_of_no_use_are_told(
+def test_needed_inputs_of_no_use_are_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], case: str
 ) -> None:
     columns, lines = WORTHLESS[case]

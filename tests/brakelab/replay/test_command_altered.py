@@ -97,7 +97,7 @@ ALTERED = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("what", "change", "off", "told"), ALTERED, ids=[row[0] for row in ALTERED])
+@pytest.mark.parametrize(("what", "change", "off", "note"), ALTERED, ids=[row[0] for row in ALTERED])
 def test_an_altered_drive_teaches_the_same_friction(
     recorded: Columns,
     base: Result,
@@ -105,7 +105,7 @@ def test_an_altered_drive_teaches_the_same_friction(
     what: str,
     change: Callable[[Columns], Columns],
     off: float,
-    told: str,
+    note: str,
 ) -> None:
     """`off` [sigma]: by how much friction may differ at the end."""
     result = replayed(change(recorded), tmp_path)
@@ -113,7 +113,7 @@ def test_an_altered_drive_teaches_the_same_friction(
         differs = abs(result[f"mu_b_{corner}"][-1] - base[f"mu_b_{corner}"][-1])
         print(what, corner, differs / base[f"sigma_mu_b_{corner}"][-1])
         assert differs <= off * base[f"sigma_mu_b_{corner}"][-1]
-    assert any(told in line for line in result.notes)
+    assert any(note in line for line in result.notes)
     assert not any("--force" in line for line in result.notes)
 
 

@@ -126,7 +126,7 @@ def test_no_row_knows_the_future(params: RecordArray) -> None:
 
 
 def drive_frames(tmp_path: Path, seconds: float = 3.0) -> RecordArray:
-    """Contract frames of a stop, each some way into the 10 ms before its cycle, 5 % of them lost."""
+    """Contract frames of a stop, each within the 10 ms before its cycle, 5 % of them lost."""
     path = tmp_path / "drive.csv"
     t = np.arange(int(seconds * 100)) * 0.01
     speed = 30.0 - 4.0 * np.clip(t - 1.0, 0, 9)

@@ -28,7 +28,7 @@ from ecu.contract.signals import CORNERS, INPUT
     ],
     ids=["healthy", "a frame missing for 200 ms", "no pedal for most of it"],
 )
-def test_faults_are_told_with_how_long_they_lasted(faulty, by_fault, said) -> None:
+def test_faults_are_reported_with_how_long_they_lasted(faulty, by_fault, said) -> None:
     found = Findings(Path("d.log"), rows=1000, faulty_rows=faulty)
     found.fault_rows.update(by_fault)
     assert fault_lines(found) == said
@@ -42,29 +42,29 @@ def came(*names: str) -> Findings:
     return found
 
 
-def test_a_log_without_pressures_is_told_once_and_not_as_a_fault() -> None:
+def test_missing_pressures_are_reported_once_and_not_as_a_fault() -> None:
     found = came("accel_x", *(f"wheel_speed_{corner}" for corner in CORNERS))
     found.faulty_rows = 980
     found.fault_rows[PRESSURE_LOST] = 980
     (line,) = needed_lines(found)
-    assert line.startswith("d.log: no calliper pressure, so nothing about friction can be told")
+    assert line.startswith("d.log: no calliper pressure, so friction cannot be estimated")
     assert fault_lines(found) == []
 
 
 @pytest.mark.parametrize(
-    ("names", "told"), [(["accel_x", "pedal_pressed"], 1), (["pedal_position"], 0), (["decel_demand"], 0)]
+    ("names", "count"), [(["accel_x", "pedal_pressed"], 1), (["pedal_position"], 0), (["decel_demand"], 0)]
 )
-def test_a_car_without_a_demand_is_told_so(names: list[str], told: int) -> None:
+def test_a_log_without_a_demand_is_reported(names: list[str], count: int) -> None:
     lines = request_line(came(*names))
-    assert len(lines) == told
+    assert len(lines) == count
     assert all("not mapped; nothing is demanded" in line for line in lines)
 
 
 @pytest.mark.parametrize(
-    ("observer", "names", "told"),
+    ("observer", "names", "count"),
     [("observer1", ["accel_x"], 1), ("observer1", ["wheel_force_x_fl"], 0), ("observer2", ["accel_x"], 0)],
 )
-def test_observer_1_without_wheel_transducers_is_told_to_be_observer_2(observer, names, told) -> None:
+def test_observer_1_without_wheel_transducers_is_reported_as_observer_2(observer, names, count) -> None:
     lines = transducer_line(came(*names), observer)
-    assert len(lines) == told
+    assert len(lines) == count
     assert all(line.startswith("d.log: wheel_force_x_*: no sample for observer1") for line in lines)

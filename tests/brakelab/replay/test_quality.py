@@ -22,7 +22,7 @@ from ecu.settings.resources import resource
         ("", ["can0"], "a.log: never received: BrakeSnData_3 (077), ", "; the log has can0"),
     ],
 )
-def test_messages_that_never_came_are_told_with_the_buses_of_the_log(
+def test_messages_that_never_came_are_reported_with_the_buses_of_the_log(
     bus: str, interfaces: list[str], begins: str, ends: str
 ) -> None:
     plan = load_source(resource("config/maps/mustang.toml")).plan

@@ -14,15 +14,15 @@ MUSTANG = resource("config").parent / "tests/data/mustang.log"
 ROLLS = float(PARAMS["wheel_radius"].mean())
 
 
-@pytest.mark.parametrize(("share", "told"), [(0.91, "+10 %"), (1.0, ""), (1.012, ""), (1.1, "-9 %")])
-def test_a_rolling_radius_that_is_not_the_cars_is_told(tmp_path: Path, share: float, told: str) -> None:
+@pytest.mark.parametrize(("share", "off"), [(0.91, "+10 %"), (1.0, ""), (1.012, ""), (1.1, "-9 %")])
+def test_a_rolling_radius_that_is_not_the_cars_is_reported(tmp_path: Path, share: float, off: str) -> None:
     """Speeds in km/h would come out wrong by as much, and friction with them."""
     text = resource("config/maps/rav4.toml").read_text("utf-8")
     text = text.replace("../../dbc/cars", str(resource("dbc/cars/rav4.dbc").parent))
     map = tmp_path / "map.toml"
     map.write_text(text.replace("rolling_radius = 0.352", f"rolling_radius = {share * ROLLS:.5f}"), "utf-8")
     line = radius_line(map, load_source(map), PARAMS)
-    assert (told in line and f"give {ROLLS:.4g}" in line) if told else not line
+    assert (off in line and f"give {ROLLS:.4g}" in line) if off else not line
 
 
 def test_wheels_in_rad_per_s_need_no_radius() -> None:
@@ -31,7 +31,7 @@ def test_wheels_in_rad_per_s_need_no_radius() -> None:
     assert not radius_line(None, load_source(None), PARAMS)
 
 
-def test_mistakes_that_the_map_does_not_meet_are_told_once_and_by_who_reads_it(
+def test_mistakes_that_the_map_does_not_meet_are_reported_once_and_by_who_reads_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text = resource("dbc/cars/mustang.dbc").read_text("utf-8")
@@ -52,15 +52,19 @@ def test_mistakes_that_the_map_does_not_meet_are_told_once_and_by_who_reads_it(
     assert load(MUSTANG, map=map).notes[0] == source.left_out
 
 
-@pytest.mark.parametrize(("lag", "delay", "told"), [(0.2, 0.1, True), (0.2, 0.0, False), (0.0, 0.1, False)])
-def test_a_lag_beside_that_of_the_car_is_told(tmp_path: Path, lag: float, delay: float, told: bool) -> None:
+@pytest.mark.parametrize(
+    ("lag", "delay", "reported"), [(0.2, 0.1, True), (0.2, 0.0, False), (0.0, 0.1, False)]
+)
+def test_a_lag_beside_that_of_the_car_is_reported(
+    tmp_path: Path, lag: float, delay: float, reported: bool
+) -> None:
     map = tmp_path / "map.toml"
     map.write_text(f'[inputs]\nvehicle_speed = {{ column = "v", lag = {lag} }}\n')
     params = new_params(load_config(resource("config/suv.toml")))
     params["vehicle_speed_delay"] = delay
     line = delay_line(load_source(map), params[0])
-    assert ("inputs.vehicle_speed.lag: 0.2 s beside 0.1 s" in line) == told
-    assert bool(line) == told
+    assert ("inputs.vehicle_speed.lag: 0.2 s beside 0.1 s" in line) == reported
+    assert bool(line) == reported
 
 
 def test_the_shipped_van_rolls_as_the_shipped_configuration_of_one() -> None:

@@ -82,7 +82,7 @@ def test_a_braking_is_one_line_off_a_terminal() -> None:
     assert len([line for line in capture.get().splitlines() if "0.400" in line or "reverse" in line]) == 1
 
 
-def told(*brakings: tuple[float, float, float, str]) -> list[str]:
+def lines_of(*brakings: tuple[float, float, float, str]) -> list[str]:
     """Lines for brakings of measured, predicted and configured specific force, and why they are left out."""
     rows = [
         row(
@@ -135,5 +135,5 @@ NONE = "prediction: no braking to judge it by"
         ),
     ],
 )
-def test_what_is_told_of_the_prediction(brakings, lines: list[str]) -> None:
-    assert told(*brakings) == lines
+def test_what_the_lines_say_of_the_prediction(brakings, lines: list[str]) -> None:
+    assert lines_of(*brakings) == lines

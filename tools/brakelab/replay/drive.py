@@ -36,8 +36,8 @@ def replay_drive(
     """Replay the logs that `findings` name, in order, and return the learned values, LEARNED of shape (1,).
 
     `learned` is from before the drive. `write(t, rows)` takes the rows as they come: t [s], shape (n,), and
-    shape (n, N_ROW); `end_log()` is told where a log ends, `advance(bytes)` of progress. `recording` gives
-    initial state, T_k and missed periods to an independent log of the same drive.
+    shape (n, N_ROW); `end_log()` is called where a log ends, `advance(bytes)` as it is read. `recording`
+    gives initial state, T_k and missed periods to an independent log of the same drive.
 
     Raises:
         UserError: a log is not right.

@@ -29,7 +29,7 @@ from ecu.contract.signals import (
 
 
 class Group(NamedTuple):
-    """Inputs that are told in one line."""
+    """Inputs that share one line."""
 
     name: str
     places: tuple[int, ...]
@@ -54,15 +54,15 @@ HELPFUL: Final = (
     ),
     (Group("accel_y", (ACCEL_Y,)), "lateral load transfer by yaw rate and speed"),
     (Group("yaw_rate", (YAW_RATE,)), "yaw rate by lateral acceleration and speed"),
-    (Group("steering_angle", (STEERING_ANGLE,)), "cornering forces of the front axle are not told apart"),
+    (Group("steering_angle", (STEERING_ANGLE,)), "cornering forces of the front axle are not separated"),
 )
 """Inputs that a car may lack, and the estimates that suffer without them."""
 NO_PRESSURE: Final = (
-    "no calliper pressure, so nothing about friction can be told; map the pressures, or a brake torque "
+    "no calliper pressure, so friction cannot be estimated; map the pressures, or a brake torque "
     "in their place (docs/signal-maps.md)"
 )
-MOST: Final = 0.5
-"""Share of the samples, or of the drive, from which on it is told."""
+MAJORITY: Final = 0.5
+"""Share of its samples above which an input counts as refused; of a drive, above which a time is in %."""
 
 
 def needed_lines(found: Findings) -> list[str]:
@@ -134,10 +134,11 @@ def fault_lines(found: Findings) -> list[str]:
         return []
 
     def extent(rows: int) -> str:
-        return _percent(rows / found.rows) if rows > MOST * found.rows else f"{1e-9 * CYCLE_NS * rows:.2f} s"
+        share = rows / found.rows
+        return _percent(share) if share > MAJORITY else f"{1e-9 * CYCLE_NS * rows:.2f} s"
 
-    told = 0 if has_pressure(found) else PRESSURE_LOST
-    causes = [fault for fault in FAULTS if fault.bit & (DEGRADING | REQUEST_LOST) & ~told]
+    reported = 0 if has_pressure(found) else PRESSURE_LOST
+    causes = [fault for fault in FAULTS if fault.bit & (DEGRADING | REQUEST_LOST) & ~reported]
     lasting = sorted(causes, key=lambda fault: -found.fault_rows[fault.bit])
     names = [
         f"{fault.name} ({extent(found.fault_rows[fault.bit])})"
@@ -160,7 +161,7 @@ def _cause(found: Findings, place: int) -> str:
         if found.reception is None:
             return "no sample in the whole log; fill this column"
         return "no sample in the whole log; check its sender, or map it"
-    if outside + invalid <= MOST * (taken + outside + invalid):
+    if outside + invalid <= MAJORITY * (taken + outside + invalid):
         return ""
     if outside > invalid:
         return f"of samples outside {signal.low:g}…{signal.high:g} {signal.unit}; is the unit {signal.unit}?"

@@ -85,10 +85,10 @@ def radius_line(map: Path | None, source: Source, params: Any) -> str:
     if map is None or source.rolling_radius is None or abs(source.rolling_radius / radius - 1.0) < NEAR:
         return ""
     off = 100.0 * (radius / source.rolling_radius - 1.0)
-    told = (
+    reason = (
         f"the wheels of CONFIG roll on {radius:.4g} m, so that speeds are read {off:+.0f} % beside the log's"
     )
-    return f"{map}: rolling_radius: {told}; give {radius:.4g}, unless the log's speeds are wrong by as much"
+    return f"{map}: rolling_radius: {reason}; give {radius:.4g}, unless the log's speeds are wrong by as much"
 
 
 def delay_line(source: Source, params: Any) -> str:
@@ -97,8 +97,8 @@ def delay_line(source: Source, params: Any) -> str:
     lag = source.columns.lags.get(VEHICLE_SPEED, 0.0) if source.columns else 0.0
     if not (lag and delay and source.columns):
         return ""
-    told = f"{lag:g} s beside {delay:g} s of CONFIG's sensors.vehicle_speed_delay; keep one of them"
-    return f"{source.columns.path}: inputs.vehicle_speed.lag: {told}"
+    reason = f"{lag:g} s beside {delay:g} s of CONFIG's sensors.vehicle_speed_delay; keep one of them"
+    return f"{source.columns.path}: inputs.vehicle_speed.lag: {reason}"
 
 
 def _hash(*paths: Path) -> str:

@@ -74,10 +74,10 @@ def prediction_lines(rows: Sequence[BrakeRow]) -> list[str]:
     ones = rows[:: len(CORNERS)]
     counted = [row for row in ones if not row.left_out]
     measured = [row.specific_force_mean for row in counted]
-    told = ["prediction: no braking to judge it by"]
+    lines = ["prediction: no braking to judge it by"]
     if counted:
         found = errors(measured, [row.specific_force_predicted for row in counted])
-        told = [
+        lines = [
             f"prediction of {found.counted} brakings: off by {100 * found.mean:.1f} % on the mean, "
             f"{100 * found.median:.1f} % in the median, {100 * found.worst:.1f} % at worst, "
             f"bias {100 * found.bias:+.1f} %",
@@ -87,9 +87,9 @@ def prediction_lines(rows: Sequence[BrakeRow]) -> list[str]:
         ]  # fmt: skip
     why = Counter(row.left_out for row in ones if row.left_out)
     if not why:
-        return told
+        return lines
     return [
-        *told,
+        *lines,
         "left out of the prediction: "
         + ", ".join(f"{count} {reason}" for reason, count in why.most_common()),
     ]
