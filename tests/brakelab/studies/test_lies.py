@@ -81,7 +81,7 @@ def test_how_much_is_taken_for_how_long(share, lost, short, long, most, taken, o
     assert found.mean == pytest.approx(1.0 + (share - 1.0) * settled / 5.0, abs=1e-3)
 
 
-TOLD = [
+REPORTED = [
     # when faults come [s]; named after the lie's beginning, after it cost; first
     ({}, math.nan, math.nan, 0),
     ({OWN: 22.0}, 2.0, 0.0, OWN),
@@ -91,8 +91,8 @@ TOLD = [
 ]
 
 
-@pytest.mark.parametrize(("faults", "named", "late", "first"), TOLD)
-def test_when_the_lie_is_told_and_as_what(faults, named, late, first) -> None:
+@pytest.mark.parametrize(("faults", "named", "late", "first"), REPORTED)
+def test_when_the_lie_is_reported_and_as_what(faults, named, late, first) -> None:
     found = cell(share=0.9, lost=(1.0, 5.0), faults=faults)
     assert (found.named_s, found.late_s) == pytest.approx((named, late), nan_ok=True, abs=0.011)
     assert found.first == first
@@ -113,13 +113,13 @@ CAUSES = [
 ]
 
 
-@pytest.mark.parametrize(("lie", "sound", "told"), CAUSES)
-def test_why_is_what_differs_where_it_is_worst(lie, sound, told) -> None:
-    assert why(cell(drive(**sound), share=0.7, lost=(1.0, 4.0), **lie)) == told
+@pytest.mark.parametrize(("lie", "sound", "cause"), CAUSES)
+def test_why_is_what_differs_where_it_is_worst(lie, sound, cause) -> None:
+    assert why(cell(drive(**sound), share=0.7, lost=(1.0, 4.0), **lie)) == cause
 
 
 def test_the_page_counts_the_cells(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(lies_table, "WORST", 2)
+    monkeypatch.setattr(lies_table, "WORST_LIES", 2)
     found = [
         cell(),
         cell(share=0.5, lost=(1.0, 4.0)),

@@ -17,7 +17,7 @@ from ecu.settings.config import load_config
 from ecu.settings.resources import resource
 
 IN_TIME: Final = 2.0  # s
-WORST: Final = 10
+WORST_LIES: Final = 10
 HOUR: Final = "real-driving"
 ASIDE: Final = 0.03
 """Change of friction or motors that is named as a cause."""
@@ -34,7 +34,7 @@ def driven(cells: list[Cell]) -> str:
 
 def _counted(cells: Sequence[Cell]) -> tuple[str, ...]:
     costly = [cell for cell in cells if cell.costs]
-    told = sum(cell.late_s <= IN_TIME for cell in costly)
+    reported = sum(cell.late_s <= IN_TIME for cell in costly)
     return (
         str(len(cells)),
         f"{min(cell.least_short for cell in cells):.2f}",
@@ -44,7 +44,7 @@ def _counted(cells: Sequence[Cell]) -> tuple[str, ...]:
         f"{max(cell.taken_s for cell in cells):.1f}",
         str(len(costly)),
         f"{max(cell.off_s for cell in cells):.1f}",
-        f"{told} ({100 * told / len(costly):.0f} %)" if costly else "–",
+        f"{reported} ({100 * reported / len(costly):.0f} %)" if costly else "–",
     )
 
 
@@ -59,7 +59,7 @@ def _grouped(
     columns = (
         *(by, "lies", f"least force for {SHORT_S:g} s", f"least and greatest for {LONG_S:g} s", "mean"),
         *(f"more than {100 * TAKES:.0f} % taken for {SHORT_S:g} s", "longest [s]"),
-        *(f"more than {100 * COSTS:.0f} % off for {LONG_S:g} s", "longest [s]", "of them told in time"),
+        *(f"more than {100 * COSTS:.0f} % off for {LONG_S:g} s", "longest [s]", "of them reported in time"),
     )
     return Table(title, columns, [*rows, ("all", *_counted(cells))], "")
 
@@ -80,7 +80,7 @@ def why(cell: Cell) -> str:
 
 
 def _worst(cells: list[Cell]) -> Table:
-    off = sorted(cells, key=lambda cell: min(cell.least_short, 2.0 - cell.most_long))[:WORST]
+    off = sorted(cells, key=lambda cell: min(cell.least_short, 2.0 - cell.most_long))[:WORST_LIES]
     rows = [
         (
             f"{cell.input}: {cell.lie}",
@@ -97,9 +97,9 @@ def _worst(cells: list[Cell]) -> Table:
         *("lie", "car, road", f"least for {SHORT_S:g} s", f"least for {LONG_S:g} s"),
         *(f"greatest for {LONG_S:g} s", "mean", f"more than {100 * TAKES:.0f} % taken [s]"),
         *(f"more than {100 * COSTS:.0f} % off [s]", "named after [s]", "after it costs [s]"),
-        *("told first", "where it is worst"),
+        *("reported first", "where it is worst"),
     )
-    return Table(f"The {WORST} worst", columns, rows, "")
+    return Table(f"The {WORST_LIES} worst", columns, rows, "")
 
 
 def _alarms(cells: list[Cell], cars: int) -> Table:
