@@ -34,7 +34,7 @@ LOWEST_VALUE[LEVEL : LEVEL + 4], HIGHEST_VALUE[LEVEL : LEVEL + 4] = (
     math.log(GREATEST_RATIO),
 )
 LEFT_RIGHT = 0.2  # of an axle's two levels: its linings are of one batch, and one that is oiled is found
-FRONT_REAR = 0.3  # of the axles' frictions within an application: fade on a steep descent
+FRONT_REAR = 0.4  # of the axles' frictions within an application: fade on a steep descent
 AT_BOUND = 0.95  # of it
 PARTED = 3.0  # sigma, of what they may have been apart before
 LOWEST_VALUE[STIFFNESS], HIGHEST_VALUE[STIFFNESS] = math.log(0.4), math.log(2.5)
