@@ -136,7 +136,7 @@ def mass_table(cars: list[Car]) -> Table:
         "learned from deceleration makes the car keep what the pedal asks for whatever it weighs; the ideal "
         "knows friction and not mass, so beside it such a car is off by its mass. What that leaves differs "
         f"between cars by {scatter.min():.1f} to {scatter.max():.1f} % (σ): friction at the beginning of a "
-        "braking, see [control.md](../control.md). –: this car did not get there.",
+        "brake application, see [control.md](../control.md). –: this car did not get there.",
     )
 
 
