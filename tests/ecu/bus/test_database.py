@@ -127,15 +127,15 @@ def test_a_diagnostics_database_is_refused(tmp_path: Path, monkeypatch: pytest.M
 
 
 @pytest.mark.parametrize(
-    ("start", "message"), [(0, ""), (60, "M.which: start bit, length or scale is wrong")]
+    ("start", "mistake"), [(0, ""), (60, "M.which: start bit, length or scale is wrong")]
 )
-def test_the_multiplexer_of_a_signal_has_to_be_readable_too(tmp_path: Path, start: int, message: str) -> None:
+def test_the_multiplexer_of_a_signal_has_to_be_readable_too(tmp_path: Path, start: int, mistake: str) -> None:
     path = tmp_path / "car.dbc"
     which = f' SG_ which M : {start}|8@1+ (1,0) [0|0] "" A\n'
     path.write_text(HEAD + f'BO_ 1 M: 8 A\n{which} SG_ one m1 : 8|8@1+ (1,0) [0|0] "" A\n')
     message = load_database(path, strict=False).messages[0]
-    if message:
-        with pytest.raises(UserError, match=message):
+    if mistake:
+        with pytest.raises(UserError, match=mistake):
             find_signal(message, "one", path, path, "x")
     else:
         assert find_signal(message, "one", path, path, "x").name == "one"

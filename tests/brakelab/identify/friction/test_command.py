@@ -28,7 +28,7 @@ FEW = ("constant", "ilvo")
 class InThisProcess(ThreadPoolExecutor):
     """A pool that sees what a test has replaced."""
 
-    def __init__(self, workers: int, mp_context: object) -> None:
+    def __init__(self, workers: int) -> None:
         super().__init__(1)
 
 
@@ -54,7 +54,7 @@ def test_a_law_is_identified_and_runs_on_the_rig(
     """The lining file has the chosen law as SIM; its nominal friction is what the recording shows."""
     few = [c for c in choice.candidates(stops, lining.brake) if c.name in FEW]
     monkeypatch.setattr(choice, "candidates", lambda stops, brake, own: few)
-    monkeypatch.setattr(choice, "ProcessPoolExecutor", InThisProcess)
+    monkeypatch.setattr(choice, "new_pool", InThisProcess)
     monkeypatch.setattr(choice, "as_completed", list)
     data, out = tmp_path / "own.parquet", tmp_path / "brake.toml"
     assert columns.rig.inertia is not None
@@ -83,7 +83,7 @@ def test_a_law_of_one_s_own_is_identified_with_the_others(
         "candidates",
         lambda stops, brake, own: [c for c in every(stops, brake, own) if c.name in ("constant", "line")],
     )
-    monkeypatch.setattr(choice, "ProcessPoolExecutor", InThisProcess)
+    monkeypatch.setattr(choice, "new_pool", InThisProcess)
     monkeypatch.setattr(choice, "as_completed", list)
     (tmp_path / "laws").mkdir()
     own, data, out = tmp_path / "laws" / "line.py", tmp_path / "own.parquet", tmp_path / "brake.toml"

@@ -25,7 +25,7 @@ PAGE = resource("docs/results/friction-lab.md")
 class InThisProcess(ThreadPoolExecutor):
     """A pool that sees what a test has replaced."""
 
-    def __init__(self, workers: int, mp_context: object) -> None:
+    def __init__(self, workers: int) -> None:
         super().__init__(1)
 
 
@@ -42,7 +42,7 @@ def test_five_commands(
         return [candidate for candidate in every(stops, brake) if candidate.name in ("constant", "ilvo")]
 
     monkeypatch.setattr(choice, "candidates", quick)
-    monkeypatch.setattr(choice, "ProcessPoolExecutor", InThisProcess)
+    monkeypatch.setattr(choice, "new_pool", InThisProcess)
     monkeypatch.setattr(choice, "as_completed", list)
     monkeypatch.chdir(tmp_path)
     text = PAGE.read_text("utf-8")

@@ -206,7 +206,7 @@ def test_page_and_picture(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> No
     monkeypatch.setattr(bench, "tasks", lambda seeds, draw: [])
     found = observer_rows([Task(JOINT, 0, ())], lambda drive, todo: [_samples(1.0)])
     monkeypatch.setattr(bench, "observer_rows", lambda todo, spread: found)
-    monkeypatch.setattr(bench, "ProcessPoolExecutor", lambda mp_context: ThreadPoolExecutor())
+    monkeypatch.setattr(bench, "new_pool", ThreadPoolExecutor)
     monkeypatch.setattr(bench, "consistency_of", lambda seed: car)
     monkeypatch.setattr(bench, "step_times", lambda: {JOINT: Figure(2.0, 1.0, 3.0)})
     assert command.bench("observers", Asked(seeds=1), write=True) == 0
