@@ -1,7 +1,6 @@
 # make demo | test | studies | check | coverage | mutants | fuzz | soak | results | screenshot | clean. Sets up .venv itself; PYTHON=... chooses the interpreter.
 PIP := .venv/bin/python -m pip --disable-pip-version-check install --quiet
-# A worker a core: threads of a library that wait for a core of another worker make a product of matrices
-# take a hundred times as long.
+# A worker a core: threads of a library would wait for the core of another worker.
 test studies coverage: export OPENBLAS_NUM_THREADS = 1
 PINNED := $(PIP) --no-deps --require-hashes --requirement requirements/build.txt
 

@@ -1,4 +1,8 @@
-"""Prediction and correction against matrices: F P F' + Q, and the update of Kalman and of Schmidt."""
+"""Prediction and correction against matrices: F P F' + Q, and the update of Kalman and of Schmidt.
+
+The gate is always given: once a kernel has been called with different arguments left out, numba takes a
+hundred times as long to find its compiled form, at every call.
+"""
 
 import math
 
@@ -105,7 +109,7 @@ def test_correction_is_that_of_kalman_and_of_schmidt(seed: int, free: str, sigma
         h = state["h"]
         K = before_P @ h / (h @ before_P @ h + variance)
         np.testing.assert_allclose((np.eye(N) - np.outer(K, h)) @ before_P, P, atol=1e-12)
-    assert correct(state, innovation, variance) == pytest.approx(sigmas**2)
+    assert correct(state, innovation, variance, GATE) == pytest.approx(sigmas**2)
     np.testing.assert_allclose(state["x"], x, rtol=1e-10, atol=1e-12)
     np.testing.assert_allclose(state["p"], P, rtol=1e-8, atol=1e-12)
     held = [i for i in range(N) if i not in FREE[free]]
@@ -118,7 +122,7 @@ def test_covariance_stays_one_over_many_corrections(free: str) -> None:
     state, random = some_state(3, FREE[free]), np.random.default_rng(4)
     for _ in range(300):
         state["h"] = random.standard_normal(N) / scales() * (random.random(N) < 0.3)
-        correct(state, 0.3 * random.standard_normal(), 10 ** random.uniform(-4, 1))
+        correct(state, 0.3 * random.standard_normal(), 10 ** random.uniform(-4, 1), GATE)
         assert_covariance(state["p"])
 
 
@@ -131,7 +135,7 @@ def test_beyond_the_gate_it_counts_with_the_variance_that_puts_it_there(free: st
     wider = (innovation / GATE) ** 2 - spread
     assert wider > variance
     expected = schmidt(state["x"], state["p"], state["h"], state["free"] != 0, innovation, wider)
-    assert correct(state, innovation, variance) == pytest.approx(sigmas**2)
+    assert correct(state, innovation, variance, GATE) == pytest.approx(sigmas**2)
     np.testing.assert_allclose(state["x"], expected[0], rtol=1e-10, atol=1e-12)
     np.testing.assert_allclose(state["p"], expected[1], rtol=1e-8, atol=1e-12)
 
@@ -140,7 +144,7 @@ def test_beyond_the_gate_it_counts_with_the_variance_that_puts_it_there(free: st
 def test_four_gates_off_or_not_finite_it_is_rejected(far: float) -> None:
     state = some_state(6)
     x, P = state["x"].copy(), state["p"].copy()
-    ratio = correct(state, innovation_of(state, far, 0.3), 0.3)
+    ratio = correct(state, innovation_of(state, far, 0.3), 0.3, GATE)
     assert not ratio <= REJECT**2
     np.testing.assert_array_equal(state["x"], x)
     np.testing.assert_array_equal(state["p"], P)
@@ -163,7 +167,7 @@ def test_beyond_the_gate_without_braking_it_corrects_speed_and_slope_alone(sigma
     wider = (innovation / GATE) ** 2 - state["h"] @ state["p"] @ state["h"]
     only = np.isin(np.arange(N), [V, SLOPE])
     expected = schmidt(state["x"], state["p"], state["h"], only, innovation, wider)
-    correct(state, innovation, variance)
+    correct(state, innovation, variance, GATE)
     np.testing.assert_allclose(state["x"], expected[0], rtol=1e-10, atol=1e-12)
     np.testing.assert_allclose(state["p"], expected[1], rtol=1e-8, atol=1e-12)
 
@@ -333,7 +337,7 @@ def test_a_measurement_of_friction_and_mass_together_ties_them() -> None:
     state["p"] = np.diag(np.full(N, 0.1**2))
     state["h"] = np.zeros(N)
     state["h"][LEVEL], state["h"][MASS] = 1.0, -1.0
-    correct(state, 0.0, 1e-8)
+    correct(state, 0.0, 1e-8, GATE)
     P = state["p"]
     assert P[LEVEL, LEVEL] + P[MASS, MASS] - 2 * P[LEVEL, MASS] == pytest.approx(1e-8, rel=1e-3)
     assert P[LEVEL, LEVEL] + P[MASS, MASS] + 2 * P[LEVEL, MASS] == pytest.approx(2 * 0.1**2)
