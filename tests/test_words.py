@@ -28,10 +28,6 @@ PATTERN = re.compile(rf"(?<![A-Za-z])({'|'.join(map(_spellings, RETIRED))})(?![a
 BARE = re.compile(r"_?([A-Z]+EST|LEAST|MOST|WORST)")
 """A superlative of nothing: the quantity belongs to the name (FEWEST_BLOCKS, LOWEST_SPEED)."""
 NO_SUPERLATIVES = {"DIGEST", "HONEST", "MANIFEST", "REQUEST", "REST", "TEST"}
-NOT_YET = (
-    "docs/requirements.md",  # names of tests
-)
-"""Where they are still to be replaced."""
 OWN_NAME = {
     "told": {  # of the stored wear and of pads.parquet: these pads were registered as new
         "ecu/algorithm/monitoring/dust.py",
@@ -73,7 +69,7 @@ OWN_NAME = {
 }
 """Files in which a word is a name that users' files or standards have."""
 DRIVES = {"tools/brakelab/api.py", "tools/brakelab/simulation/closed_loop.py"}
-"""Where a class is called Drive; the second until tests/closed_loop is done."""
+"""Where a class is called Drive: the api's, and that of a drive in memory."""
 
 
 def _name(path: Path) -> str:
@@ -82,7 +78,7 @@ def _name(path: Path) -> str:
 
 def _files(*suffixes: str) -> list[Path]:
     files = (path for folder in FOLDERS for path in (ROOT / folder).rglob("*") if path.suffix in suffixes)
-    return sorted(path for path in files if path != Path(__file__) and not _name(path).startswith(NOT_YET))
+    return sorted(path for path in files if path != Path(__file__))
 
 
 def _retired(name: str, text: str) -> Iterator[str]:

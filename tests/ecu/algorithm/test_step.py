@@ -267,7 +267,7 @@ def test_a_lost_wheel_speed_degrades_and_braking_goes_on(params, feed) -> None:
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("name", SEEN)
 @pytest.mark.requirement("REQ-IN-3")
-def test_a_value_that_cannot_be_is_survived_told_and_forgotten(car: Car, name: str, value: float) -> None:
+def test_a_value_that_cannot_be_is_survived_reported_and_forgotten(car: Car, name: str, value: float) -> None:
     """Freshness lets no such value through; here it comes nevertheless, for 50 ms of a braking."""
     car.drive((0.0, 2.0), (60.0, 1.5))
     car.overwrite = {name: value}
