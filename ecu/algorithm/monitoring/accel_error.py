@@ -119,12 +119,19 @@ def _learn_scale(line: Record, memory_s: float) -> None:
 
 
 @kernel
+def _wheels_accel(mean: Record) -> float:
+    """Return dw/dt over the last blocks [m/s^2]."""
+    accel: float = (mean[0, W] - mean[3, W]) / (3.0 * BLOCK_S)
+    return accel
+
+
+@kernel
 def _follow_wheels(state: Record, mean: Record) -> None:
     """Correct c and s by the last block."""
     line = state.wheels
     _walk(line, SLOPE_WALK, SCALE_WALK)
     change = abs(mean[0, F] - mean[2, F])
-    h = (mean[0, W] - mean[3, W]) / (3.0 * BLOCK_S)
+    h = _wheels_accel(mean)
     if abs(h) < LEAST_SHOWN:
         h = 0.0  # noise of the wheels would show as a scale
     elif state.scale_off == 0.0 and state.reported == 0:
@@ -144,16 +151,22 @@ def moved_offset(line: Record) -> float:
 
 
 @kernel
+def _moved_scale(line: Record) -> float:
+    moved: float = line.scale - line.usual_scale
+    return moved
+
+
+@kernel
 def _compare_lines(state: Record, mean: Record, witness: Record) -> None:
     """Overwrite `reported`: both lines have moved to the same side at the present force and deceleration."""
     wheels, torques = state.wheels, state.torques
-    h = (mean[0, W] - mean[3, W]) / (3.0 * BLOCK_S)
-    moved = moved_offset(torques) + (torques.scale - torques.usual_scale) * mean[0, F]
-    beside = moved_offset(wheels)
-    if abs(h) > LEAST_SHOWN:
-        beside += (wheels.scale - wheels.usual_scale) * h
     if torques.offset_s < FEWEST_REPORTED_S:
         return
+    h = _wheels_accel(mean)
+    moved = moved_offset(torques) + _moved_scale(torques) * mean[0, F]
+    beside = moved_offset(wheels)
+    if abs(h) > LEAST_SHOWN:
+        beside += _moved_scale(wheels) * h
     agree = beside * moved > CONFIRMED * moved * moved
     if agree:
         compare(witness, ACCEL_X, moved, MOVED)
@@ -222,7 +235,7 @@ def follow_accel_error(
         _follow_wheels(state, blocks.mean)
     if blocks.known_blocks > 1 and not braking and abs(across) < ACROSS:
         _follow_torques(params, state, blocks.mean, witness)
-    by_wheels, by_torques = wheels.scale - wheels.usual_scale, torques.scale - torques.usual_scale
+    by_wheels, by_torques = _moved_scale(wheels), _moved_scale(torques)
     shown = 0.5 * (by_wheels + by_torques)
     if by_wheels * by_torques <= 0.0 or min(abs(by_wheels), abs(by_torques)) < LEAST_SCALE:
         shown = 0.0

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
-from ecu.algorithm.estimation.joint.kalman import clear_derivatives
+from ecu.algorithm.estimation.joint.kalman import clear_derivatives, variance_by_derivatives
 from ecu.algorithm.estimation.joint.layout import (
     BIAS,
     CHANGE,
@@ -25,7 +25,7 @@ from ecu.algorithm.estimation.joint.layout import (
     STIFFNESS,
     N,
 )
-from ecu.algorithm.estimation.joint.prior import OVERRUN_MEAN, OVERRUN_SIGMA
+from ecu.algorithm.estimation.joint.prior import OVERRUN_MEAN, OVERRUN_SIGMA, derive_axles
 from ecu.jit import Record, kernel
 
 LOWEST_VALUE, HIGHEST_VALUE = np.full(N, -np.inf), np.full(N, np.inf)
@@ -57,16 +57,14 @@ LOWEST_VALUE[OVERRUN], HIGHEST_VALUE[OVERRUN] = (
 
 
 @kernel
-def _keep_alike(state: Record, apart: float, most: float) -> bool:
-    """Return states that are `apart`, by derivatives `state.h`, to `most`; return whether they had parted."""
-    x, p, h, ph, free, variance = state.x, state.p, state.h, state.ph, state.free, 0.0
-    if abs(apart) <= most * (1.0 + 1e-9):
-        return False
-    for j in range(N):
-        ph[j] = 0.0
-        for i in range(N):
-            ph[j] += p[j, i] * h[i]
-        variance += h[j] * ph[j]
+def _parted(apart: float, most: float) -> bool:
+    return abs(apart) > most * (1.0 + 1e-9)
+
+
+@kernel
+def _bring_together(state: Record, apart: float, most: float) -> bool:
+    """Return states that are `apart`, by derivatives `state.h`, to `most`; return whether they could be."""
+    x, h, ph, free, variance = state.x, state.h, state.ph, state.free, variance_by_derivatives(state)
     if not variance > 0.0:
         return False
     back = (math.copysign(most, apart) - apart) / variance
@@ -79,9 +77,12 @@ def _keep_alike(state: Record, apart: float, most: float) -> bool:
 @kernel
 def _keep_sides_alike(state: Record, left: int) -> bool:
     """Return the levels of an axle to within `LEFT_RIGHT` of each other; return whether they had parted."""
+    apart = state.x[left] - state.x[left + 1]
+    if not _parted(apart, LEFT_RIGHT):
+        return False
     clear_derivatives(state)
     state.h[left], state.h[left + 1] = 1.0, -1.0
-    return _keep_alike(state, state.x[left] - state.x[left + 1], LEFT_RIGHT)
+    return _bring_together(state, apart, LEFT_RIGHT)
 
 
 @kernel
@@ -92,17 +93,18 @@ def _keep_axles_alike(state: Record) -> bool:
     faster is an axle's slip: of other tyres, or of wheel speeds that lie. Where a level is at its bound, the
     changes contain what it lacks: then nothing is said.
     """
-    clear_derivatives(state)
-    h, apart = state.h, 0.0
+    apart, most = 0.0, math.hypot(FRONT_REAR, PARTED * state.sigma_axles)
     for i in range(4):
         level = state.x[LEVEL + i]
         if not AT_BOUND * LOWEST_VALUE[LEVEL] < level < AT_BOUND * HIGHEST_VALUE[LEVEL]:
             return False
-        h[LEVEL + i] = 0.5 if i < 2 else -0.5
-        apart += h[LEVEL + i] * (state.x[LEVEL + i] - state.before[i])
-    h[CHANGE], h[CHANGE + 1] = 1.0, -1.0
+        apart += (0.5 if i < 2 else -0.5) * (level - state.before[i])
     apart += state.x[CHANGE] - state.x[CHANGE + 1]
-    return _keep_alike(state, apart, math.hypot(FRONT_REAR, PARTED * state.sigma_axles))
+    if not _parted(apart, most):
+        return False
+    derive_axles(state)
+    state.h[CHANGE], state.h[CHANGE + 1] = 1.0, -1.0
+    return _bring_together(state, apart, most)
 
 
 @kernel

@@ -56,17 +56,25 @@ def drift_speed(state: Record, time: float) -> None:
 
 
 @kernel
-def drift_by_derivatives(state: Record, time: float) -> None:
-    """Propagate into the covariance of speed what `state.h`, derivatives of dv/dt [m/s^2], says of others."""
+def variance_by_derivatives(state: Record) -> float:
+    """Return the variance of what has the derivatives `state.h`; overwrite `state.ph`, its covariances."""
     p, h, ph = state.p, state.h, state.ph
-    own = 0.0
+    variance = 0.0
     for j in range(N):
         ph[j] = 0.0
         for i in range(N):
             if h[i] != 0.0:
                 ph[j] += h[i] * p[i, j]
     for j in range(N):
-        own += h[j] * ph[j]
+        variance += h[j] * ph[j]
+    return variance
+
+
+@kernel
+def drift_by_derivatives(state: Record, time: float) -> None:
+    """Propagate into the covariance of speed what `state.h`, derivatives of dv/dt [m/s^2], says of others."""
+    p, ph = state.p, state.ph
+    own = variance_by_derivatives(state)
     for j in range(N):
         if j != V:
             p[V, j] += time * ph[j]

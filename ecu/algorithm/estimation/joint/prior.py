@@ -12,6 +12,7 @@ from ecu.algorithm.estimation.joint.kalman import (
     correct,
     drift_speed,
     forget,
+    variance_by_derivatives,
 )
 from ecu.algorithm.estimation.joint.layout import (
     BIAS,
@@ -139,13 +140,11 @@ def forget_levels(state: Record) -> None:
 
 
 @kernel
-def _sigma_of_axles(p: Record) -> float:
-    """Return the standard deviation of the front levels' mean less the rear ones'."""
-    variance = 0.0
+def derive_axles(state: Record) -> None:
+    """Overwrite the derivatives by those of the front levels' mean less the rear ones'."""
+    clear_derivatives(state)
     for i in range(4):
-        for j in range(4):
-            variance += (0.25 if i // 2 == j // 2 else -0.25) * p[LEVEL + i, LEVEL + j]
-    return math.sqrt(max(variance, 0.0))
+        state.h[LEVEL + i] = 0.5 if i < 2 else -0.5
 
 
 @kernel
@@ -166,7 +165,8 @@ def begin_application(state: Record, heat: Record) -> None:
         state.before[i] = state.x[LEVEL + i]
         for j in range(4):
             p[LEVEL + i, LEVEL + j] += heat[i] * heat[j]
-    state.sigma_axles = _sigma_of_axles(p)
+    derive_axles(state)
+    state.sigma_axles = math.sqrt(max(variance_by_derivatives(state), 0.0))
     for axle in range(2):
         clear_state(state, CHANGE + axle, CHANGE_COMMON**2 + CHANGE_AXLE**2)
         clear_state(state, MEAN + axle, 0.0)

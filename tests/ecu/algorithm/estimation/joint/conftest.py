@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from ecu.algorithm.estimation.joint.layout import CHANGE, JOINT_STATE, LEVEL
+from ecu.algorithm.estimation.joint.layout import CHANGE, JOINT_STATE, LEVEL, N
 from ecu.algorithm.estimation.joint.observer import start_joint, update_joint
-from ecu.algorithm.estimation.joint.prior import begin_application, end_application, set_prior
+from ecu.algorithm.estimation.joint.prior import PRIOR, begin_application, end_application, set_prior
 from ecu.algorithm.estimation.motion import MOTION_STATE
 from ecu.algorithm.hydraulics import HYDRAULICS_STATE
 from ecu.contract.signals import CALLIPER_PRESSURE, MOTOR_TORQUE, VEHICLE_SPEED, WHEEL_SPEED
@@ -23,6 +23,16 @@ BAR = 1e5
 GRAVITY = 9.81
 SHAPE, PEAK = 1.6, 0.9  # Magic Formula: c, D at static load
 NEARLY_QUIET = 1e-4  # bar; a sensor that read exactly zero at rest would pass for one that is cut off there
+
+
+def tied(seed: int) -> Any:
+    """Return a state in which everything is tied to everything."""
+    state, random = np.zeros(1, JOINT_STATE)[0], np.random.default_rng(seed)
+    root = np.maximum(PRIOR, 0.05)[:, None] * random.standard_normal((N, 2 * N)) / math.sqrt(2 * N)
+    state["p"] = root @ root.T
+    state["x"] = 0.05 * random.standard_normal(N)
+    state["drive_known"] = 1.0
+    return state
 
 
 def magic_formula_slip(used: float, stiffness: float, peak: float) -> float:

@@ -14,18 +14,9 @@ from ecu.algorithm.estimation.joint.bounds import (
     keep_within_bounds,
 )
 from ecu.algorithm.estimation.joint.layout import CHANGE, JOINT_STATE, LEVEL, MASS, PEAK, SLOPE, STIFFNESS, N
-from ecu.algorithm.estimation.joint.prior import PRIOR, begin_application
+from ecu.algorithm.estimation.joint.prior import begin_application
 
-
-def tied(seed: int):
-    """Return a state in which everything is tied to everything."""
-    state, random = np.zeros(1, JOINT_STATE)[0], np.random.default_rng(seed)
-    root = np.maximum(PRIOR, 0.05)[:, None] * random.standard_normal((N, 2 * N)) / math.sqrt(2 * N)
-    state["p"] = root @ root.T
-    state["x"] = 0.05 * random.standard_normal(N)
-    state["drive_known"] = 1.0
-    return state
-
+from .conftest import tied
 
 BOUNDED = [i for i in range(N) if math.isfinite(HIGHEST_VALUE[i])]
 

@@ -39,6 +39,8 @@ from ecu.algorithm.estimation.joint.prior import (
     set_prior,
 )
 
+from .conftest import tied
+
 LEVELS = list(range(LEVEL, LEVEL + 4))
 CHANGES, MEANS, DRIVES = [CHANGE, CHANGE + 1], [MEAN, MEAN + 1], [DRIVE, DRIVE + 1]
 SAME_AXLE = np.kron(np.eye(2), np.ones((2, 2)))
@@ -47,16 +49,6 @@ SAME_AXLE = np.kron(np.eye(2), np.ones((2, 2)))
 def shared(common: float, axle: float, wheel: float) -> np.ndarray:
     """Return the covariance of four wheels by what all, an axle's and single ones have."""
     return common**2 * np.ones((4, 4)) + axle**2 * SAME_AXLE + wheel**2 * np.eye(4)
-
-
-def tied(seed: int):
-    """Return a state in which everything is tied to everything."""
-    state, random = np.zeros(1, JOINT_STATE)[0], np.random.default_rng(seed)
-    root = np.maximum(PRIOR, 0.05)[:, None] * random.standard_normal((N, 2 * N)) / math.sqrt(2 * N)
-    state["p"] = root @ root.T
-    state["x"] = 0.05 * random.standard_normal(N)
-    state["drive_known"] = 1.0
-    return state
 
 
 def test_friction_is_prior_by_what_all_an_axle_and_a_wheel_share(params) -> None:
