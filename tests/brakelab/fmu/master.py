@@ -4,7 +4,7 @@ import ctypes
 import platform
 import xml.etree.ElementTree as ET
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from ctypes import byref, c_bool, c_char_p, c_double, c_int, c_size_t, c_uint8, c_uint32, c_void_p
 from pathlib import Path
 from typing import Any, Self
@@ -44,6 +44,8 @@ class Fmu:
 
 class Instance:
     """One instance. A call returns FMI's status; `messages` is what the FMU has said."""
+
+    STATE, DESERIALISE = "FMUState", "DeserializeFMUState"
 
     def __init__(self, fmu: Fmu, token: str) -> None:
         self.fmu, self.messages = fmu, list[tuple[int, str, str]]()
@@ -118,25 +120,45 @@ class Instance:
 
     def state(self, kept: c_void_p | None = None) -> c_void_p:
         kept = kept or c_void_p()
-        assert self.call("GetFMUState", byref(kept)) == OK
+        assert self.call(f"Get{self.STATE}", byref(kept)) == OK
         return kept
 
     def free(self, state: c_void_p) -> int:
-        return self.call("FreeFMUState", byref(state))
+        return self.call(f"Free{self.STATE}", byref(state))
 
     def restore(self, state: c_void_p) -> int:
-        return self.call("SetFMUState", state)
+        return self.call(f"Set{self.STATE}", state)
 
     def serialised(self, state: c_void_p) -> bytes:
         size = c_size_t()
-        assert self.call("SerializedFMUStateSize", state, byref(size)) == OK
+        assert self.call(f"Serialized{self.STATE}Size", state, byref(size)) == OK
         content = (c_uint8 * size.value)()
-        assert self.call("SerializeFMUState", state, content, size) == OK
+        assert self.call(f"Serialize{self.STATE}", state, content, size) == OK
         return bytes(content)
 
     def deserialised(self, content: bytes) -> tuple[int, c_void_p]:
         state = c_void_p()
-        return self.call("DeserializeFMUState", content, c_size_t(len(content)), byref(state)), state
+        return self.call(self.DESERIALISE, content, c_size_t(len(content)), byref(state)), state
+
+
+def assert_refused(
+    fmu: Fmu, call: Callable[[Instance], int], status: int, message: str, values: Mapping[str, float]
+) -> None:
+    """A step that cannot be done changes nothing; after an error a run has ended, until a reset."""
+    with fmu.instantiate() as one:
+        one.put(values)
+        one.initialise()
+        assert one.step() == OK
+        before = one.get(fmu.outputs).tobytes()
+        assert call(one) == status
+        assert one.messages[-1][0] == status
+        assert one.messages[-1][1] == {DISCARD: "logStatusDiscard", ERROR: "logStatusError"}[status]
+        assert message in one.messages[-1][2]
+        assert one.get(fmu.outputs).tobytes() == before
+        assert one.step() == (OK if status == DISCARD else ERROR)
+        assert one.call("Reset") == OK
+        assert one.initialise() == OK
+        assert one.step() == OK
 
 
 class _Callbacks(ctypes.Structure):
@@ -151,6 +173,8 @@ _LOGGER_2 = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p
 
 class Instance2(Instance):
     """One instance of FMI 2.0; what follows differs from FMI 3.0."""
+
+    STATE, DESERIALISE = "FMUstate", "DeSerializeFMUstate"
 
     def make(self, token: bytes) -> int | None:
         def log(_: object, name: bytes, status: int, kind: bytes, form: bytes, text: bytes) -> None:
@@ -197,25 +221,3 @@ class Instance2(Instance):
             assert self.call("GetBooleanStatus", c_int(3), byref(ends)) == OK
             self.time, self.terminates = reached.value, ends.value == 1
         return status
-
-    def state(self, kept: c_void_p | None = None) -> c_void_p:
-        kept = kept or c_void_p()
-        assert self.call("GetFMUstate", byref(kept)) == OK
-        return kept
-
-    def free(self, state: c_void_p) -> int:
-        return self.call("FreeFMUstate", byref(state))
-
-    def restore(self, state: c_void_p) -> int:
-        return self.call("SetFMUstate", state)
-
-    def serialised(self, state: c_void_p) -> bytes:
-        size = c_size_t()
-        assert self.call("SerializedFMUstateSize", state, byref(size)) == OK
-        content = (c_uint8 * size.value)()
-        assert self.call("SerializeFMUstate", state, content, size) == OK
-        return bytes(content)
-
-    def deserialised(self, content: bytes) -> tuple[int, c_void_p]:
-        state = c_void_p()
-        return self.call("DeSerializeFMUstate", content, c_size_t(len(content)), byref(state)), state

@@ -13,7 +13,7 @@ from brakelab.fmu import command
 from ecu.building.c_compiler import compile_shared
 from ecu.settings.resources import resource
 
-from .master import DISCARD, ERROR, OK, STEP, Fmu, Instance
+from .master import DISCARD, ERROR, OK, STEP, Fmu, Instance, assert_refused
 from .test_ecu_unit import DRIVING
 
 ENTER = ("EnterInitializationMode", c_bool(False), c_double(0.0), c_double(0.0), c_bool(False), c_double(0.0))
@@ -70,21 +70,7 @@ WRONG: list[tuple[str, Callable[[Instance], int], int, str]] = [
 def test_what_is_wrong_has_a_status_and_a_message(
     suv: Fmu, what: str, call: Callable[[Instance], int], status: int, message: str
 ) -> None:
-    """A step that cannot be done changes nothing; after an error a run has ended, until a reset."""
-    with suv.instantiate() as ecu:
-        ecu.put(DRIVING)
-        ecu.initialise()
-        assert ecu.step() == OK
-        before = ecu.get(suv.outputs).tobytes()
-        assert call(ecu) == status, what
-        assert ecu.messages[-1][0] == status
-        assert ecu.messages[-1][1] == {DISCARD: "logStatusDiscard", ERROR: "logStatusError"}[status]
-        assert message in ecu.messages[-1][2]
-        assert ecu.get(suv.outputs).tobytes() == before
-        assert ecu.step() == (OK if status == DISCARD else ERROR)
-        assert ecu.call("Reset") == OK
-        assert ecu.initialise() == OK
-        assert ecu.step() == OK
+    assert_refused(suv, call, status, message, DRIVING)
 
 
 def test_a_call_at_the_wrong_time_is_refused(suv: Fmu) -> None:

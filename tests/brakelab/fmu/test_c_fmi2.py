@@ -7,7 +7,7 @@ from ctypes import c_double, c_int, c_size_t, c_uint32
 
 import pytest
 
-from .master import DISCARD, ERROR, OK, Fmu, Instance
+from .master import DISCARD, ERROR, OK, Fmu, Instance, assert_refused
 from .test_c_states import braking
 from .test_ecu_unit import DRIVING
 
@@ -75,18 +75,7 @@ WRONG: list[tuple[str, Callable[[Instance], int], int, str]] = [
 def test_what_is_wrong_has_a_status_and_a_message(
     suv_2: Fmu, what: str, call: Callable[[Instance], int], status: int, message: str
 ) -> None:
-    with suv_2.instantiate() as ecu:
-        ecu.put(DRIVING)
-        ecu.initialise()
-        assert ecu.step() == OK
-        before = ecu.get(suv_2.outputs).tobytes()
-        assert call(ecu) == status, what
-        assert ecu.messages[-1][0] == status
-        assert message in ecu.messages[-1][2]
-        assert ecu.get(suv_2.outputs).tobytes() == before
-        assert ecu.call("Reset") == OK
-        assert ecu.initialise() == OK
-        assert ecu.step() == OK
+    assert_refused(suv_2, call, status, message, DRIVING)
 
 
 def test_another_guid_and_model_exchange_are_refused(suv_2: Fmu) -> None:

@@ -61,28 +61,20 @@ EXPORT int fmi2Reset(instance *of) {
 
 EXPORT int fmi2GetReal(instance *of, const reference variables[], size_t count, double values[]) {
     if (!of || incomplete(of, __func__, count, variables, values)) return ERROR;
-    for (size_t i = 0; i < count; i++) {
-        if (misused(of, __func__, variables[i], false, false)) return ERROR;
-        values[i] = VARIABLES[variables[i]].kind == TIME ? time_of(&of->now) : *number(of, variables[i]);
-    }
-    return OK;
+    return get_numbers(of, __func__, variables, count, values);
 }
 
 EXPORT int fmi2SetReal(instance *of, const reference variables[], size_t count, const double values[]) {
     if (refused(of, INSTANTIATED | INITIALISING | STEPPING, __func__)) return ERROR;
     if (incomplete(of, __func__, count, variables, values)) return ERROR;
-    for (size_t i = 0; i < count; i++) {
-        if (misused(of, __func__, variables[i], true, false)) return ERROR;
-        *number(of, variables[i]) = values[i];
-    }
-    return OK;
+    return set_numbers(of, __func__, variables, count, values);
 }
 
 EXPORT int fmi2GetBoolean(instance *of, const reference variables[], size_t count, int values[]) {
     if (!of || incomplete(of, __func__, count, variables, values)) return ERROR;
     for (size_t i = 0; i < count; i++) {
         if (misused(of, __func__, variables[i], false, true)) return ERROR;
-        values[i] = of->now.memory[VARIABLES[variables[i]].offset] != 0;
+        values[i] = *truth(of, variables[i]) != 0;
     }
     return OK;
 }
@@ -92,7 +84,7 @@ EXPORT int fmi2SetBoolean(instance *of, const reference variables[], size_t coun
     if (incomplete(of, __func__, count, variables, values)) return ERROR;
     for (size_t i = 0; i < count; i++) {
         if (misused(of, __func__, variables[i], true, true)) return ERROR;
-        of->now.memory[VARIABLES[variables[i]].offset] = values[i] != 0;
+        *truth(of, variables[i]) = values[i] != 0;
     }
     return OK;
 }
@@ -127,9 +119,7 @@ EXPORT int fmi2FreeFMUstate(instance *of, void **state) {
 
 EXPORT int fmi2SerializedFMUstateSize(instance *of, void *state, size_t *size) {
     (void)state;
-    if (!of || !size) return of ? tell(of, ERROR, "%s: no place for the size", __func__) : ERROR;
-    *size = SERIALISED;
-    return OK;
+    return state_size(of, __func__, size);
 }
 
 EXPORT int fmi2SerializeFMUstate(instance *of, void *state, unsigned char bytes[], size_t size) {

@@ -60,28 +60,20 @@ static int miscounted(instance *of, const char *function, size_t count, size_t n
 
 EXPORT int fmi3GetFloat64(instance *of, const reference variables[], size_t count, double values[], size_t n) {
     if (!of || miscounted(of, __func__, count, n, variables, values)) return ERROR;
-    for (size_t i = 0; i < count; i++) {
-        if (misused(of, __func__, variables[i], false, false)) return ERROR;
-        values[i] = VARIABLES[variables[i]].kind == TIME ? time_of(&of->now) : *number(of, variables[i]);
-    }
-    return OK;
+    return get_numbers(of, __func__, variables, count, values);
 }
 
 EXPORT int fmi3SetFloat64(instance *of, const reference variables[], size_t count, const double values[], size_t n) {
     if (refused(of, INSTANTIATED | INITIALISING | STEPPING, __func__)) return ERROR;
     if (miscounted(of, __func__, count, n, variables, values)) return ERROR;
-    for (size_t i = 0; i < count; i++) {
-        if (misused(of, __func__, variables[i], true, false)) return ERROR;
-        *number(of, variables[i]) = values[i];
-    }
-    return OK;
+    return set_numbers(of, __func__, variables, count, values);
 }
 
 EXPORT int fmi3GetBoolean(instance *of, const reference variables[], size_t count, bool values[], size_t n) {
     if (!of || miscounted(of, __func__, count, n, variables, values)) return ERROR;
     for (size_t i = 0; i < count; i++) {
         if (misused(of, __func__, variables[i], false, true)) return ERROR;
-        values[i] = of->now.memory[VARIABLES[variables[i]].offset] != 0;
+        values[i] = *truth(of, variables[i]) != 0;
     }
     return OK;
 }
@@ -91,7 +83,7 @@ EXPORT int fmi3SetBoolean(instance *of, const reference variables[], size_t coun
     if (miscounted(of, __func__, count, n, variables, values)) return ERROR;
     for (size_t i = 0; i < count; i++) {
         if (misused(of, __func__, variables[i], true, true)) return ERROR;
-        of->now.memory[VARIABLES[variables[i]].offset] = values[i];
+        *truth(of, variables[i]) = values[i];
     }
     return OK;
 }
@@ -119,9 +111,7 @@ EXPORT int fmi3FreeFMUState(instance *of, void **state) {
 
 EXPORT int fmi3SerializedFMUStateSize(instance *of, void *state, size_t *size) {
     (void)state;
-    if (!of || !size) return of ? tell(of, ERROR, "%s: no place for the size", __func__) : ERROR;
-    *size = SERIALISED;
-    return OK;
+    return state_size(of, __func__, size);
 }
 
 EXPORT int fmi3SerializeFMUState(instance *of, void *state, unsigned char bytes[], size_t size) {

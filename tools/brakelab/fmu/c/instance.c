@@ -286,6 +286,32 @@ static int misused(instance *of, const char *function, reference variable, bool 
     return OK;
 }
 
+static int get_numbers(instance *of, const char *function, const reference variables[], size_t count,
+                       double values[]) {
+    for (size_t i = 0; i < count; i++) {
+        if (misused(of, function, variables[i], false, false)) return ERROR;
+        values[i] = VARIABLES[variables[i]].kind == TIME ? time_of(&of->now) : *number(of, variables[i]);
+    }
+    return OK;
+}
+
+static int set_numbers(instance *of, const char *function, const reference variables[], size_t count,
+                       const double values[]) {
+    for (size_t i = 0; i < count; i++) {
+        if (misused(of, function, variables[i], true, false)) return ERROR;
+        *number(of, variables[i]) = values[i];
+    }
+    return OK;
+}
+
+static unsigned char *truth(instance *of, uint32_t variable) { return of->now.memory + VARIABLES[variable].offset; }
+
+static int state_size(instance *of, const char *function, size_t *size) {
+    if (!of || !size) return of ? tell(of, ERROR, "%s: no place for the size", function) : ERROR;
+    *size = SERIALISED;
+    return OK;
+}
+
 static int choose_messages(instance *of, bool on, size_t count, const char *const categories[]) {
     unsigned chosen = count ? 0 : ~0u;
     for (size_t i = 0; i < count; i++) {
