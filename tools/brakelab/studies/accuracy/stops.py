@@ -15,8 +15,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from brakelab.arrays import Vector
-from brakelab.results.processes import new_pool
-from brakelab.results.progress import tracked
+from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
 from brakelab.simulation.accuracy import AXLES, achieved_decel, friction_errors, window
 from brakelab.simulation.closed_loop import Drive, new_loop, run
@@ -241,13 +240,7 @@ def drawn_of(name: str, config: Config, asked: Asked) -> str:
 def _run(asked: Asked) -> Measured:
     path = resource("config/suv.toml")
     config = load_config(path)
-    with new_pool() as pool:
-
-        def all_cores(drive: Case, cases: list[Named]) -> Iterable[Result]:
-            results = pool.map(drive, cases)
-            return tracked(results, "stops", len(cases))
-
-        result = stops(config, asked.seeds, spread=all_cores, draw=asked.draw)
+    result = stops(config, asked.seeds, spread=partial(run_each, "stops"), draw=asked.draw)
     plain = {key: [plain_row(row) for row in rows] for key, rows in result._asdict().items()}
     return Measured(stop_tables(result, asked.seeds), drawn_of(path.name, config, asked), plain)
 

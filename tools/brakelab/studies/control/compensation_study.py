@@ -1,10 +1,11 @@
 """`brake-ecu bench compensation`: what compensation is worth."""
 
+from functools import partial
 from pathlib import Path
 from typing import Final
 
 from brakelab.results.chart import write_chart
-from brakelab.results.processes import new_pool
+from brakelab.results.processes import run_each
 from brakelab.studies.control.compensation import drive_cars
 from brakelab.studies.control.compensation_picture import LEGEND, pictured
 from brakelab.studies.control.compensation_table import compensation_tables
@@ -25,8 +26,7 @@ TEXT: Final = (
 
 def _run(asked: Asked) -> Measured:
     config = load_config(resource("config/suv.toml"))
-    with new_pool() as pool:
-        cars = drive_cars(config, spread=pool.map)
+    cars = drive_cars(config, spread=partial(run_each, "compensation"))
 
     def draw(folder: Path) -> None:
         panels = pictured(config)

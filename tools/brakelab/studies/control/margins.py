@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Line, Panel
-from brakelab.results.processes import new_pool
+from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
 from brakelab.simulation.accuracy import AXLES, columns
 from brakelab.simulation.closed_loop import FrictionOverride, new_loop, run
@@ -215,8 +215,7 @@ TEXT: Final = (
 
 def _run(asked: Asked) -> Measured:
     config = load_config(resource("config/suv.toml"))
-    with new_pool() as pool:
-        cars = measure_cars(config, spread=pool.map)
+    cars = measure_cars(config, spread=partial(run_each, "margins"))
     drawn = picture("control-margins.svg", margin_panels(cars), LEGEND)
     return Measured(margin_tables(cars), draw=drawn)
 
