@@ -1,6 +1,5 @@
 """`brake-ecu lab` and `brake-ecu identify friction` from a recording to a law that the rig runs."""
 
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -21,15 +20,10 @@ from brakelab.plant.friction.own import Own
 from brakelab.plant.linings import Lining, Linings, rig_with
 from ecu.errors import UserError
 
+from .conftest import InThisProcess
+
 FEW = ("constant", "ilvo")
 """Laws that are quickly identified."""
-
-
-class InThisProcess(ThreadPoolExecutor):
-    """A pool that sees what a test has replaced."""
-
-    def __init__(self, workers: int) -> None:
-        super().__init__(1)
 
 
 def test_ams_of_brake_b_is_written_and_read(tmp_path: Path) -> None:

@@ -3,7 +3,6 @@
 import re
 import shutil
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -19,14 +18,9 @@ from brakelab.plant.friction.law import RigBrake
 from brakelab.plant.linings import Linings
 from ecu.settings.resources import resource
 
+from .conftest import InThisProcess
+
 PAGE = resource("docs/results/friction-lab.md")
-
-
-class InThisProcess(ThreadPoolExecutor):
-    """A pool that sees what a test has replaced."""
-
-    def __init__(self, workers: int) -> None:
-        super().__init__(1)
 
 
 def test_five_commands(
