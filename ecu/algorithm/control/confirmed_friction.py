@@ -6,9 +6,11 @@ the speed over ground; the force of all brakes is known otherwise:
     r = (-a + d - drag / m - f_roll g) / a_dem                         while the demand is steady
 
 While r is at least `CONFIRMS`, the friction in use counts as confirmed. Below `LEAST_SHARE` what it has risen
-by since is taken back, until r is `AGREES`; where that is not enough, up to `LOWER` of the confirmed friction
-too: the linings have changed since. All is given again slowly. A friction that falls raises the pressure: it
-is followed.
+by since is taken back, until r will be `AGREES`; where that is not enough, up to `LOWER` of the confirmed
+friction too: the linings have changed since. All is given again slowly. A friction that falls raises the
+pressure: it is followed. What r will be once hydraulics and car have followed what is taken back already is
+predicted (a Smith predictor, with their lag as a model): without it twice of what is missing was given, and
+wheels locked.
 
 d is what the accelerometer has moved by against the wheels of late (c of `accel_error.py`): a drift, or the
 road. A negative d counts against a rise: two witnesses, accelerometer and wheels, must confirm what lowers
@@ -28,6 +30,10 @@ CONFIRMED_STATE = np.dtype(
         ("asked", "f8"),  # deceleration demanded and given, low-passed [m/s^2]
         ("given", "f8"),
         ("usual", "f8"),  # c, low-passed [m/s^2]
+        ("heading", "f8"),  # torque over that at the base friction: of the friction that is aimed at
+        ("in_use", "f8"),  # of the friction in use
+        ("pressed", "f8"),  # of that which the pressures have followed
+        ("followed", "f8"),  # of that which `given` has followed
         ("steady_s", "f8"),
         ("back", "f8"),  # share of an unconfirmed rise that is taken back; above 1, of `LOWER` too
     ],
@@ -37,10 +43,11 @@ CONFIRMED_STATE = np.dtype(
 LEAST_SPEED = 3.0  # m/s: a car that stands does not decelerate
 LEAST_DECEL = 2.0  # m/s^2: at less the accelerometer's zero counts for too much
 LAG, STEADY, SETTLED_S = 0.15, 0.05, 0.3  # s, of the demand, s: hydraulics and tyres have followed
+HYDRAULIC_LAG = 0.1  # s, dead time, lag and tyres
 LEAST_SHARE, AGREES, CONFIRMS = 0.92, 0.95, 0.93
-TAKE, WIDTH = 10.0, 0.04  # 1/s at an error of `WIDTH`
+TAKE, WIDTH = 10.0, 0.4  # 1/s at an error of `WIDTH`: no more than hydraulics and car can follow
 GIVE, GIVE_FAST, OVER = 0.05, 0.5, 1.04  # 1/s, 1/s where more than that is given
-LOWER, LOWERING = 0.3, 0.25  # of the friction, 1/s at an error of `WIDTH`: slow against the lag
+LOWER, LOWERING, SMALL = 0.3, 0.25, 0.04  # of the friction, 1/s at an error of `SMALL`: slow against the lag
 FOLLOW_S, USUAL_S = 0.5, 30.0
 
 
@@ -70,11 +77,14 @@ def confirm_friction(
     state.usual += (accel_offset - state.usual) * min(dt / USUAL_S, 1.0)
     if not decel > LEAST_DECEL:
         state.asked = state.given = state.steady_s = 0.0
+        state.pressed = state.followed = 1.0
         return
     resistance = params.drag_area * estimate.speed**2 / params.mass + params.rolling_resistance * GRAVITY
     gain = lag_gain(dt, LAG)
     state.asked += gain * (decel - state.asked)
     state.given += gain * (-estimate.accel_x - resistance - state.given)
+    state.pressed += lag_gain(dt, HYDRAULIC_LAG) * (state.in_use - state.pressed)
+    state.followed += gain * (state.pressed - state.followed)
     moves = estimate.speed > LEAST_SPEED and estimate.measured != 0
     steady = calm and moves and abs(decel - state.asked) < STEADY * decel
     state.steady_s = state.steady_s + dt if steady else 0.0
@@ -88,13 +98,15 @@ def confirm_friction(
     else:
         drifted = min(drifted, 0.0) if state.friction[0] > 0.0 else 0.0
     share = (state.given + drifted) / state.asked
-    missing = min(max(((AGREES if state.back > 0.0 else LEAST_SHARE) - share) / WIDTH, -1.0), 1.0)
+    coming = share * state.heading / state.followed
+    missing = (AGREES if state.back > 0.0 else LEAST_SHARE) - coming
     if state.back > 1.0 or (state.back == 1.0 and missing > 0.0):
-        state.back = min(max(state.back + LOWERING * missing * dt, 1.0), 2.0)
+        lowering = LOWERING * min(max(missing / SMALL, -1.0), 1.0)
+        state.back = min(max(state.back + lowering * dt, 1.0), 2.0)
     elif missing > 0.0:
-        state.back = min(state.back + TAKE * missing * dt, 1.0)
+        state.back = min(state.back + TAKE * min(missing / WIDTH, 1.0) * dt, 1.0)
     else:
-        state.back = max(state.back - (GIVE_FAST if share > OVER else GIVE) * dt, 0.0)
+        state.back = max(state.back - (GIVE_FAST if coming > OVER else GIVE) * dt, 0.0)
     if state.back == 0.0 and share > CONFIRMS:
         if state.friction[0] == 0.0:
             state.usual = accel_offset  # of the road that the first braking was on

@@ -64,6 +64,22 @@ def pressure_for_torque(params: Record, torque: float, mu: float, corner: int) -
 
 
 @kernel
+def _target(params: Record, state: Record, estimate: Record, i: int) -> float:
+    """Return the friction of wheel i that the law moves towards."""
+    base: float = state.base[i]
+    target: float = estimate.mu[i] if math.isfinite(estimate.mu[i]) else base
+    if estimate.observed_s[i] < EARLY_S and state.start[i] != 1.0:
+        target = state.used[i]
+        if state.confirmed.back == 0.0:
+            return target
+    doubt = max(estimate.sigma[i] / max(estimate.mu[i], 0.1) - SURE, 0.0)
+    if target > base:
+        target = max(target * math.exp(-2.0 * doubt), base)
+    target = confirmed_friction(state.confirmed, target, i, base)
+    return min(max(target, LEAST_RATIO * params.mu_nominal[i]), GREATEST_RATIO * params.mu_nominal[i])
+
+
+@kernel
 def follow_friction(params: Record, state: Record, estimate: Record, dt: float) -> None:
     """Move the friction in use towards the estimate, within its admissible range.
 
@@ -73,24 +89,18 @@ def follow_friction(params: Record, state: Record, estimate: Record, dt: float) 
     """
     if params.compensation == OFF:
         return
-    step, mu = FRICTION_RATE * dt, estimate.mu
+    step, confirmed = FRICTION_RATE * dt, state.confirmed
+    confirmed.heading = confirmed.in_use = 0.0
     for i in range(4):
-        waits = estimate.observed_s[i] < EARLY_S and state.start[i] != 1.0
-        if waits and state.confirmed.back == 0.0:
-            continue
         if state.early[i] == 0.0 and estimate.observed_s[i] >= EARLY_S:
-            state.early[i] = mu[i]
+            state.early[i] = estimate.mu[i]
         base: float = state.base[i]
-        target = mu[i] if math.isfinite(mu[i]) else base
-        if waits:
-            target = state.used[i]
-        doubt = max(estimate.sigma[i] / max(mu[i], 0.1) - SURE, 0.0)
-        if target > base:
-            target = max(target * math.exp(-2.0 * doubt), base)
-        target = confirmed_friction(state.confirmed, target, i, base)
-        target = min(max(target, LEAST_RATIO * params.mu_nominal[i]), GREATEST_RATIO * params.mu_nominal[i])
-        least = 0.0 if state.cut[i] or state.beyond_grip else -step
-        state.used[i] += min(max(target - state.used[i], least), step)
+        target = _target(params, state, estimate, i)
+        if state.cut[i] or state.beyond_grip:
+            target = max(target, state.used[i])
+        state.used[i] += min(max(target - state.used[i], -step), step)
+        confirmed.heading += 0.25 * base / target
+        confirmed.in_use += 0.25 * base / state.used[i]
 
 
 @kernel
