@@ -9,7 +9,7 @@ from 90 % of the steady pressure (the median of values above half of the highest
 Expected deceleration: `brakelab.results.prediction`.
 """
 
-from typing import Final, NamedTuple
+from typing import Annotated, Final, NamedTuple, get_type_hints
 
 import numpy as np
 
@@ -29,96 +29,57 @@ LEARNED: Final = "learned"
 HOLDS: Final = WHEEL_SPEED_LOST | PRESSURE_LOST | E2E_REJECTIONS
 """Fault bits that explain why nothing was learned."""
 
-BRAKE_UNITS: Final = {
-    "brake": "-",
-    "corner": "-",
-    "t_start": "s",
-    "duration": "s",
-    "v_in": "m/s",
-    "v_end": "m/s",
-    "decel_mean": "m/s^2",
-    "decel_predicted": "m/s^2",
-    "mu_b_mean": "-",
-    "mu_b_mean_time": "-",
-    "brake_torque_mean": "N m",
-    "brake_energy": "J",
-    "disc_temperature_in": "degC",
-    "disc_temperature_mean": "degC",
-    "pad_wear_mass": "g",
-    "emission_factor": "log10(particles)",
-    # Beyond the contract: learned values after the application, for the next one.
-    "mu_b_end": "-",
-    "sigma_mu_b_end": "-",
-    "observed": "s",
-    "learning": "-",
-    # Beyond the contract: quality of the prediction, see `brakelab.results.prediction`.
-    "mu_b_before": "-",
-    "sigma_mu_b_before": "-",
-    "specific_force_mean": "m/s^2",
-    "specific_force_predicted": "m/s^2",
-    "sigma_specific_force": "m/s^2",
-    "specific_force_configured": "m/s^2",
-    "specific_force_rest": "m/s^2",
-    "specific_force_configured_rest": "m/s^2",
-    "learned_before": "-",
-    "left_out": "-",
-    "sigma_pad_wear_mass": "g",
-    "emission_factor_low": "log10(particles)",
-    "emission_factor_high": "log10(particles)",
-    "particle_mass": "mg",
-    # Beyond the contract: its 95 % band.
-    "particle_mass_low": "mg",
-    "particle_mass_high": "mg",
-    **dict(REGRESSORS),
-}
-
 
 class BrakeRow(NamedTuple):
-    """One application at one corner; NaN: not available. Units: `BRAKE_UNITS`."""
+    """One application at one corner, each value with its unit; NaN: not available.
 
-    brake: int
-    corner: str
-    t_start: float
-    duration: float
-    v_in: float
-    v_end: float
-    decel_mean: float
-    decel_predicted: float
-    mu_b_mean: float
-    mu_b_mean_time: float
-    brake_torque_mean: float
-    brake_energy: float
-    disc_temperature_in: float
-    disc_temperature_mean: float
-    pad_wear_mass: float
-    emission_factor: float
-    mu_b_end: float
-    sigma_mu_b_end: float
-    observed: float
-    learning: str
+    From `mu_b_end` on beyond the contract: learned values after the application, for the next one; from
+    `mu_b_before` on quality of the prediction, see `brakelab.results.prediction`.
+    """
+
+    brake: Annotated[int, "-"]
+    corner: Annotated[str, "-"]
+    t_start: Annotated[float, "s"]
+    duration: Annotated[float, "s"]
+    v_in: Annotated[float, "m/s"]
+    v_end: Annotated[float, "m/s"]
+    decel_mean: Annotated[float, "m/s^2"]
+    decel_predicted: Annotated[float, "m/s^2"]
+    mu_b_mean: Annotated[float, "-"]
+    mu_b_mean_time: Annotated[float, "-"]
+    brake_torque_mean: Annotated[float, "N m"]
+    brake_energy: Annotated[float, "J"]
+    disc_temperature_in: Annotated[float, "degC"]
+    disc_temperature_mean: Annotated[float, "degC"]
+    pad_wear_mass: Annotated[float, "g"]
+    emission_factor: Annotated[float, "log10(particles)"]
+    mu_b_end: Annotated[float, "-"]
+    sigma_mu_b_end: Annotated[float, "-"]
+    observed: Annotated[float, "s"]
+    learning: Annotated[str, "-"]
     """`LEARNED`, or why this application taught nothing."""
-    mu_b_before: float
-    sigma_mu_b_before: float
-    specific_force_mean: float
+    mu_b_before: Annotated[float, "-"]
+    sigma_mu_b_before: Annotated[float, "-"]
+    specific_force_mean: Annotated[float, "m/s^2"]
     """Measured; positive braking."""
-    specific_force_predicted: float
-    sigma_specific_force: float
-    specific_force_configured: float
+    specific_force_predicted: Annotated[float, "m/s^2"]
+    sigma_specific_force: Annotated[float, "m/s^2"]
+    specific_force_configured: Annotated[float, "m/s^2"]
     """Predicted with the configured friction."""
-    specific_force_rest: float
+    specific_force_rest: Annotated[float, "m/s^2"]
     """Part of the predicted one that is not the linings'."""
-    specific_force_configured_rest: float
-    learned_before: int
+    specific_force_configured_rest: Annotated[float, "m/s^2"]
+    learned_before: Annotated[int, "-"]
     """1: the friction in the prediction was learned, 0: it is nominal."""
-    left_out: str
+    left_out: Annotated[str, "-"]
     """Why the prediction does not count, empty where it does."""
-    sigma_pad_wear_mass: float
-    emission_factor_low: float
-    emission_factor_high: float
-    particle_mass: float
+    sigma_pad_wear_mass: Annotated[float, "g"]
+    emission_factor_low: Annotated[float, "log10(particles)"]
+    emission_factor_high: Annotated[float, "log10(particles)"]
+    particle_mass: Annotated[float, "mg"]
     """By the wear that the ECU believes, measured thicknesses included."""
-    particle_mass_low: float
-    particle_mass_high: float
+    particle_mass_low: Annotated[float, "mg"]
+    particle_mass_high: Annotated[float, "mg"]
     wear_energy: float
     wear_energy_t: float
     wear_energy_t2: float
@@ -126,6 +87,16 @@ class BrakeRow(NamedTuple):
     wear_torque_rate_t: float
     wear_power2: float
     wear_power2_t: float
+
+
+BRAKE_UNITS: Final = {
+    name: hint.__metadata__[0]
+    for name, hint in get_type_hints(BrakeRow, include_extras=True).items()
+    if hasattr(hint, "__metadata__")
+} | dict(REGRESSORS)
+"""Unit of each value of a row."""
+_PARTICLES: Final = ("particle_mass", "particle_mass_low", "particle_mass_high")
+_REGRESSORS: Final = tuple(name for name, _ in REGRESSORS)
 
 
 def friction_means(
@@ -205,41 +176,41 @@ def application(
         power = torque[:, i] * speed * (1.0 + slip[:, i]) / p["wheel_radius"][i]
         lines.append(
             BrakeRow(
-                number,
-                corner,
-                float(t[0]),
-                duration,
-                v_in,
-                v_end,
-                decel,
-                prediction.decel,
-                mu_distance,
-                mu_time,
-                mean(torque[:, i]),
-                mean(power) * duration,
-                float(heat[0, i]),
-                mean(heat[:, i]),
-                float(wear.mass[i]),
-                float(dust.factor[i]),
-                float(corners(after, "mu_b")[i]),
-                float(corners(after, "sigma_mu_b")[i]),
-                PERIOD * float(np.count_nonzero(_modes(rows, i) == OBSERVING)),
-                learning(rows, i, params),
-                float(corners(before, "mu_b")[i]),
-                float(corners(before, "sigma_mu_b")[i]),
-                prediction.measured,
-                prediction.force,
-                prediction.sigma,
-                prediction.configured,
-                prediction.rest,
-                prediction.configured_rest,
-                int(_modes(before, i) == HOLDING),
-                left_out(duration, prediction.measured, prediction.force, prediction.too_few),
-                float(wear.sigma[i]),
-                float(dust.low[i]),
-                float(dust.high[i]),
-                *(float(mass[i]) for mass in airborne),
-                *wear.regressors[:, i].tolist(),
+                brake=number,
+                corner=corner,
+                t_start=float(t[0]),
+                duration=duration,
+                v_in=v_in,
+                v_end=v_end,
+                decel_mean=decel,
+                decel_predicted=prediction.decel,
+                mu_b_mean=mu_distance,
+                mu_b_mean_time=mu_time,
+                brake_torque_mean=mean(torque[:, i]),
+                brake_energy=mean(power) * duration,
+                disc_temperature_in=float(heat[0, i]),
+                disc_temperature_mean=mean(heat[:, i]),
+                pad_wear_mass=float(wear.mass[i]),
+                emission_factor=float(dust.factor[i]),
+                mu_b_end=float(corners(after, "mu_b")[i]),
+                sigma_mu_b_end=float(corners(after, "sigma_mu_b")[i]),
+                observed=PERIOD * float(np.count_nonzero(_modes(rows, i) == OBSERVING)),
+                learning=learning(rows, i, params),
+                mu_b_before=float(corners(before, "mu_b")[i]),
+                sigma_mu_b_before=float(corners(before, "sigma_mu_b")[i]),
+                specific_force_mean=prediction.measured,
+                specific_force_predicted=prediction.force,
+                sigma_specific_force=prediction.sigma,
+                specific_force_configured=prediction.configured,
+                specific_force_rest=prediction.rest,
+                specific_force_configured_rest=prediction.configured_rest,
+                learned_before=int(_modes(before, i) == HOLDING),
+                left_out=left_out(duration, prediction.measured, prediction.force, prediction.too_few),
+                sigma_pad_wear_mass=float(wear.sigma[i]),
+                emission_factor_low=float(dust.low[i]),
+                emission_factor_high=float(dust.high[i]),
+                **dict(zip(_PARTICLES, (float(mass[i]) for mass in airborne), strict=True)),
+                **dict(zip(_REGRESSORS, wear.regressors[:, i].tolist(), strict=True)),
             )
         )
     return lines
