@@ -1,7 +1,7 @@
 """Tables of the studies that give the same each time, as committed: of two cars, or all that a study has.
 
 Their pictures are drawn. Those of a minute are studies for `make studies`; energy, thermal, wear, dust,
-cycles, compensation, lab, stops, vehicle and lies take longer still, `observers` prints times. See
+cycles, compensation, lab, stops, tuning, vehicle and lies take longer still, `observers` prints times. See
 `reference.py`.
 """
 

@@ -15,6 +15,7 @@ STUDIES: Final = {
         "bound": "studies.accuracy.bound",
         "recorded": "studies.accuracy.recorded",
         "vehicle": "studies.accuracy.vehicle",
+        "tuning": "studies.accuracy.tuning",
     },
     "control": {
         "compensation": "studies.control.compensation_study",

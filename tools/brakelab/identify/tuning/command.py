@@ -63,8 +63,8 @@ def tune(
     check_outputs(out, (out,), [*config_files(config), *trained, *validated], toml=True)
     manual = with_observer(load_config(config), kind="observer2")
     scenarios = {path: load_scenario(path) for path in (*trained, *validated)}
-    recordings = _record(manual, {path: scenarios[path] for path in trained}, range(seeds))
-    before, generations, best = _search(manual, recordings, budget)
+    recordings = record_drives(manual, {path: scenarios[path] for path in trained}, range(seeds))
+    before, generations, best = find_tuning(manual, recordings, budget)
     names = " + ".join(dict.fromkeys(path.stem for path in trained))
     rows = [Row(f"{names}, tuned on", before, best.errors)]
     if generations == budget.generations:
@@ -78,7 +78,8 @@ def tune(
     return 0
 
 
-def _record(config: Config, scenarios: Mapping[Path, Scenario], cars: range) -> list[Recording]:
+def record_drives(config: Config, scenarios: Mapping[Path, Scenario], cars: range) -> list[Recording]:
+    """Drive every scenario with every car. Raises UserError for a scenario that never brakes."""
     recordings = []
     with progress_bar("record", len(scenarios) * len(cars)) as advance:
         for path, scenario in scenarios.items():
@@ -92,8 +93,8 @@ def _record(config: Config, scenarios: Mapping[Path, Scenario], cars: range) -> 
     return recordings
 
 
-def _search(manual: Config, recordings: list[Recording], budget: Budget) -> tuple[Errors, int, Best]:
-    """Return the initial errors, the number of generations, and the best tuning."""
+def find_tuning(manual: Config, recordings: list[Recording], budget: Budget) -> tuple[Errors, int, Best]:
+    """Return the errors of `manual`, the number of generations until Ctrl-C, and the best tuning."""
     start = Best(manual, replay_errors(recordings, [manual])[0])
     generations, best = 0, start
     with progress_bar("tune", budget.generations) as advance:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.arrays import Array
-from brakelab.simulation.accuracy import AXLES, LOWEST_SPEED, SETTLING_S, estimate_errors
+from brakelab.simulation.accuracy import AXLES, LOWEST_SPEED, SETTLING_S, columns, estimate_errors
 from brakelab.simulation.closed_loop import Drive, new_loop, run
 from brakelab.simulation.ecu_inputs import ecu_inputs, vehicle_frames
 from brakelab.simulation.scenario import Scenario
@@ -65,21 +65,42 @@ def applications(drive: Drive) -> NDArray[np.int64]:
     return numbers
 
 
+class Application(NamedTuple):
+    """Friction in one brake application: shape (front and rear,)."""
+
+    nrmse: Array
+    """%."""
+    inside_2_sigma: Array
+    """Share of the samples whose truth lies within ±2σ [%]."""
+    true: Array
+    """Mean of the true friction."""
+    estimated: Array
+    """Mean of the estimate."""
+
+
+def application_errors(drive: Drive) -> list[Application]:
+    """Return the ECU's own estimate in each brake application that counts."""
+    number, found = applications(drive), []
+    for rows in (number == each for each in range(number.max() + 1)):
+        errors = np.array([estimate_errors(drive, rows, axle) for axle in AXLES])
+        true, estimated = (
+            np.array([columns(table, "mu_b", axle, rows).mean() for axle in AXLES])
+            for table in (drive.truth, drive.outputs)
+        )
+        found.append(Application(errors[:, 0], 100.0 * errors[:, 1], true, estimated))
+    return found
+
+
 def drive_errors(drive: Drive) -> Errors:
     """Return the errors of the ECU's own estimate during the drive; NaN without an application."""
-    braking = applications(drive)
-    if braking.max() < 0:
+    found = application_errors(drive)
+    if not found:
         return Errors(np.full(len(AXLES), np.nan), np.full(len(AXLES), np.nan))
-    table = [
-        [estimate_errors(drive, braking == number, axle) for axle in AXLES]
-        for number in range(braking.max() + 1)
-    ]
-    error, inside = np.mean(table, axis=0).T
-    return Errors(error, 100.0 * inside)
+    return mean_errors(Errors(each.nrmse, each.inside_2_sigma) for each in found)
 
 
 def mean_errors(errors: Iterable[Errors]) -> Errors:
-    """Return the mean over drives."""
+    """Return the mean over drives or brake applications."""
     nrmses, inside = zip(*errors, strict=True)
     return Errors(np.mean(nrmses, axis=0), np.mean(inside, axis=0))
 
