@@ -19,7 +19,7 @@ from ecu.algorithm.monitoring.plausibility import watch_pressures, watch_wheels,
 from ecu.algorithm.monitoring.pressures import DOUBT_S, compare_pressures, lasting_difference
 from ecu.algorithm.monitoring.speeds import watch_speeds
 from ecu.algorithm.monitoring.turning import watch_turning
-from ecu.algorithm.monitoring.witness import leave_out, rejected_faults
+from ecu.algorithm.monitoring.witness import believe, leave_out, rejected_faults
 from ecu.contract.faults import (
     ACCEL_IMPLAUSIBLE,
     BRAKE_FAILED,
@@ -28,7 +28,7 @@ from ecu.contract.faults import (
     WHEEL_SPEED_IMPLAUSIBLE,
 )
 from ecu.contract.records import WATCHED
-from ecu.contract.signals import ACCEL_X, CALLIPER_PRESSURE, MOTOR_TORQUE, WHEEL_SPEED
+from ecu.contract.signals import ACCEL_X, CALLIPER_PRESSURE, MOTOR_TORQUE, VEHICLE_SPEED, WHEEL_SPEED
 from ecu.jit import Record, kernel
 
 ACCEL_X_DRIFTED = IMPLAUSIBLE["accel_x"]
@@ -59,6 +59,16 @@ def _watch_motion(p: Record, s: Record, u: Record, dt: float) -> int:
 
 
 @kernel
+def _forget_speeds(s: Record) -> None:
+    """Believe all speeds again: the car's, by which they were judged, is not known any more."""
+    s.speeds.started = 0
+    for i in range(4):
+        s.plausibility.fell[i] = 0
+        believe(s.witness, WHEEL_SPEED + i)
+    believe(s.witness, VEHICLE_SPEED)
+
+
+@kernel
 def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool]:
     """Return the fault bits of sensors whose readings contradict the others, and whether one is new.
 
@@ -79,6 +89,8 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
         faults |= rejected_faults(s.witness)
         if wheel_speed_implausible(p, s.plausibility, s.witness, u, estimate, dt):
             faults |= WHEEL_SPEED_IMPLAUSIBLE
+    else:
+        _forget_speeds(s)
     if s.acceleration.implausible:
         faults |= ACCEL_IMPLAUSIBLE
     begins = s.acceleration.implausible != 0 and not doubted

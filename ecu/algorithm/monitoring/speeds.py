@@ -17,7 +17,8 @@ An input that is late by the braking of the car (`lateness.py`) is judged by tha
 
 Braked wheels that slip together leave the car. Dead reckoning does not follow a median that is more than
 `LEAVES` below it, but the vehicle speed where the two agree, and stands for the median. For `SPIN_UP_S` more
-no wheel is judged as one that rolls freely, or as too slow.
+no wheel is judged as one that rolls freely, or as too slow. So do driven wheels that spin together, by more
+than `SPINS` and `SPINS_BY`.
 """
 
 import math
@@ -68,6 +69,7 @@ TORQUE = 60.0  # N m, above which a wheel is braked or driven
 RECKON, SLOPE_RECKON = 0.8, 0.16  # 1/s, 1/s^2: critically damped at 0.4 rad/s
 RECKON_REACH = 0.04  # of the speed, greatest innovation
 LEAVES = 0.5 * SLID  # of the speed: reckoning and wheels that slip by `SLID` have this median
+SPINS, SPINS_BY = 0.15, 2.0  # of the speed, m/s: more than a grade that begins moves the reckoning by
 
 
 @kernel
@@ -116,6 +118,14 @@ def _wheels_left(state: Record, median: float) -> bool:
     below = median < (1.0 - LEAVES) * state.reckoned
     left: bool = state.started != 0 and below and not speed < 0.5 * (median + state.reckoned)
     return left
+
+
+@kernel
+def _wheels_spin(state: Record, median: float, speed: float) -> bool:
+    """Return whether driven wheels' median is above the car's `speed`, and no vehicle speed agrees."""
+    above = median > (1.0 + SPINS) * speed + SPINS_BY
+    spin: bool = above and not state.implied[SPEED] > 0.5 * (median + speed)
+    return spin
 
 
 @kernel
@@ -223,14 +233,23 @@ def watch_speeds(
         state.torque[i] += (estimate.brake_torque[i] - state.torque[i]) * min(dt / SMOOTHING_S, 1.0)
         braked = braked or state.torque[i] > TORQUE
     left = braked and _wheels_left(state, median)
+    accelerates = driver_accelerates(inputs) or accel > DRIVEN_ACCEL
+    drives = accelerates
+    for i in range(4):
+        drives = drives or motor_torque(inputs, i) < -TORQUE
+    known = state.reckoned if state.started else estimate.speed
+    spin = drives and not braked and _wheels_spin(state, median, known)
+    left = left or (spin and state.started != 0)
     ground = state.reckoned if left else median
-    if estimate.backwards or not ground > LEAST_SPEED:
+    begins = not state.started and not spin and estimate.speed > LEAST_SPEED
+    if estimate.backwards or not ground > LEAST_SPEED or not (state.started or begins):
         state.started = 0
         for i in range(5):
             state.apart[i] = state.base[i]
         return
     _reckon(state, witness, inputs, accel, median, left, dt)
-    accelerates = driver_accelerates(inputs) or accel > DRIVEN_ACCEL
+    if begins and drives:
+        state.reckoned = estimate.speed
     free = not accelerates and accel > DRAGGED_ACCEL
     state.left_s = SPIN_UP_S if left else max(state.left_s - dt, 0.0)
     free = free and state.left_s == 0.0

@@ -116,7 +116,13 @@ def judge(state: Record, place: int, innovation: float, tolerance: float, doubt_
     if state.doubted_s[place] > doubt_s:
         state.rejected[place], state.doubted_s[place] = 1, doubt_s
     if state.rejected[place] and state.agreed_s[place] > AGAIN_S:
-        state.rejected[place], state.doubted_s[place] = 0, 0.0
+        believe(state, place)
+
+
+@kernel
+def believe(state: Record, place: int) -> None:
+    """Accept an input again."""
+    state.rejected[place], state.doubted_s[place] = 0, 0.0
 
 
 @kernel

@@ -241,6 +241,20 @@ def test_an_automated_demand_that_is_lost_is_kept_for_a_tenth_of_a_second(
     assert (column(during, "pressure_demand_valid") == 0).tolist() == failed.tolist()
 
 
+def test_wheel_speeds_judged_by_a_speed_that_was_wrong_are_believed_again(params, feed) -> None:
+    """No wheel shows the speed while all are left out, and none was judged without it: for good."""
+    params[0]["transmit"] = 1
+    car = Car(params, feed)
+    car.drive((0.0, 1.0))
+    wheels = slice(INPUT["wheel_speed_fl"], INPUT["wheel_speed_fl"] + 4)
+    car.state["witness"]["rejected"][0, wheels] = 1
+    car.state["plausibility"]["fell"] = 1
+    car.state["joint"]["started"] = 0
+    speed = column(car.drive((0.0, 1.0)), "vehicle_speed")
+    assert speed[-1] == pytest.approx(car.speed, rel=0.01)
+    assert not car.state["witness"]["rejected"][0, wheels].any()
+
+
 @pytest.mark.requirement("REQ-IN-2")
 def test_a_lost_wheel_speed_degrades_and_braking_goes_on(params, feed) -> None:
     params[0]["transmit"] = 1

@@ -128,6 +128,9 @@ JOINT_STATE: Final = np.dtype(
         ("sigma_axles", "f8"),  # of the front levels less the rear ones, as this application began
         ("left_s", "f8"),  # time for which the balance is beyond its gate while braking, signed as it is [s]
         ("untrusted_s", "f8"),  # time since a wheel was last trusted [s]
+        ("contradicted_s", "f8"),  # time for which the wheels have shown since that the speed is wrong [s]
+        ("distance_least", "f8"),  # distance of the wheels from the speed meanwhile [m/s]
+        ("distance_most", "f8"),
         ("hold_s", "f8"),  # time for which learning stays suspended after a wheel left its tyre's range
         ("reference_s", "f8"),  # time since the last speed reference [s]
         ("smooth_pressure", "f8", (4,)),  # bar above push-out

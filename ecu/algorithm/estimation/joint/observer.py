@@ -61,7 +61,7 @@ from ecu.algorithm.estimation.joint.sliding import (
     watch_tyres,
 )
 from ecu.algorithm.estimation.joint.snapshot import restore_snapshot, save_newer_snapshot, save_snapshot
-from ecu.algorithm.estimation.joint.speed import LOST_S, bridge_gap, reverses, start_speed
+from ecu.algorithm.estimation.joint.speed import LOST_S, bridge_gap, reverses, speed_is_wrong, start_speed
 from ecu.algorithm.estimation.joint.wheel import APPLIED, brake_torque, drive_opposes, unknown_share
 from ecu.algorithm.estimation.joint.wheel_speed import correct_by_wheels
 from ecu.algorithm.estimation.joint.window import close_window, compare_wheels, gather, open_window
@@ -86,7 +86,6 @@ LEAST_SPEED = 3.4  # m/s
 STRAIGHT = 0.05  # lateral acceleration over gravity: above it wheels roll at unequal loads and angles
 VARIES_FROM, VARIES = 0.3, 0.2  # m/s^2: acceleration at which mass is observable, and its change
 MOTORS = 100.0  # N m of all motors: above it their torque is evaluated
-BELIEVED_AFTER = 3.0  # s without a freely rolling wheel, brakes released
 RELEASE = 0.15  # relative fall in a window: beyond it lags differ too much to learn
 SNAPSHOT_S = 0.2
 
@@ -204,7 +203,7 @@ def update_joint(
     _fuse(params, state, inputs, braking)
     if not braking and usable(inputs, ACCEL_X):
         measure_drive(params, state)
-    _look_after(params, state, braking)
+    _look_after(params, state, inputs, braking)
     state.closed = 1
 
 
@@ -303,7 +302,7 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
 
 
 @kernel
-def _look_after(params: Record, state: Record, braking: bool) -> None:
+def _look_after(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     """Keep snapshots, restore one when a wheel slides, reset when a value is not finite."""
     w, x = state.window, state.x
     total = 0.0
@@ -314,8 +313,10 @@ def _look_after(params: Record, state: Record, braking: bool) -> None:
         start_joint(state)
         state.reset = 1
         return
-    if state.untrusted_s > BELIEVED_AFTER and not braking:
-        state.started = 0  # then the speed itself is wrong
+    if braking:
+        state.untrusted_s = state.contradicted_s = 0.0
+    elif speed_is_wrong(params, state, inputs):
+        state.started = 0
         state.untrusted_s = 0.0
         forget_speed(state)
     state.kept_s += w.time

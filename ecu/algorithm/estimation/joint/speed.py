@@ -7,13 +7,23 @@ from ecu.algorithm.estimation.joint.layout import V
 from ecu.algorithm.estimation.joint.sliding import HOLD_S
 from ecu.algorithm.estimation.joint.window import open_window
 from ecu.algorithm.estimation.motion import speed_backwards
-from ecu.algorithm.inputs import OVERSLEPT_S, mean_wheel_speed, usable, wheels_mapped
+from ecu.algorithm.inputs import (
+    OVERSLEPT_S,
+    driver_accelerates,
+    mean_wheel_speed,
+    motor_torque,
+    usable,
+    wheels_mapped,
+)
 from ecu.contract.signals import ACCEL_X, VEHICLE_SPEED
 from ecu.jit import Record, kernel
 
 LOST_S = 0.3  # without an accelerometer: longer than between two frames of a slow one
 MISLED, MISLED_S = 0.06, 0.4  # of the speed, s for which an accelerometer that is wrong may have misled it
 UNSEEN_ACCEL = 12.0  # m/s^2, greatest that nobody saw
+BELIEVED_AFTER, AT_LAST = 3.0, 15.0  # s without a wheel that shows the speed, brakes released
+SAME = 1.0  # m/s, change of the wheels' distance from the speed: the accelerometer's error over that time
+DRIVEN_ACCEL, DRIVEN = 0.5, 100.0  # m/s^2, N m of all motors
 
 
 @kernel
@@ -76,3 +86,38 @@ def doubt_speed(params: Record, state: Record, inputs: Record) -> None:
     speed = mean_wheel_speed(params, inputs)
     if abs(speed - state.x[V]) > MISLED * state.x[V]:
         state.unseen_s = max(state.unseen_s, MISLED_S)
+
+
+@kernel
+def _driven(inputs: Record, accel: float) -> bool:
+    total = 0.0
+    for i in range(4):
+        total += motor_torque(inputs, i)
+    return driver_accelerates(inputs) or total < -DRIVEN or accel > DRIVEN_ACCEL
+
+
+@kernel
+def speed_is_wrong(params: Record, state: Record, inputs: Record) -> bool:
+    """Return whether the wheels, which all differ from the speed for long, show it nevertheless.
+
+    Wheels that nothing drives or brakes roll. Driven ones may spin, all of them: then they do not change
+    their speed as the accelerometer says.
+    """
+    w, total, wheels = state.window, 0.0, 0
+    for i in range(4):
+        if w.omega_samples[i] > 0:
+            total += w.omega[i] * params.wheel_radius[i]
+            wheels += 1
+    apart = total / max(wheels, 1) - state.x[V]
+    if state.untrusted_s == 0.0 or state.contradicted_s == 0.0:
+        state.contradicted_s, state.distance_least, state.distance_most = 0.0, apart, apart
+    if state.untrusted_s == 0.0:
+        return False
+    state.distance_least = min(state.distance_least, apart)
+    state.distance_most = max(state.distance_most, apart)
+    same = state.distance_most - state.distance_least < SAME
+    if wheels == 0 or same or state.unmeasured_s >= LOST_S or not _driven(inputs, w.accel):
+        state.contradicted_s += w.time
+    else:
+        state.contradicted_s = 0.0
+    return state.contradicted_s > BELIEVED_AFTER or state.untrusted_s > AT_LAST
