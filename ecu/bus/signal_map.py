@@ -21,6 +21,7 @@ from ecu.bus.receive_plan import MessageUse, ReceivePlan, compile_receive, contr
 from ecu.bus.units import conversion
 from ecu.contract.signals import INPUT, INPUT_SIGNALS
 from ecu.errors import UserError, closest
+from ecu.settings.described import describe_keys
 from ecu.settings.resources import resource
 from ecu.settings.toml_file import Unit, describe, read_toml
 
@@ -30,7 +31,9 @@ Seconds = Annotated[float, Field(gt=0.0, le=SLOWEST_S), Unit("s")]
 
 
 class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, json_schema_extra=describe_keys
+    )
 
 
 class Validity(_Table):

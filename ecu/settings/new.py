@@ -20,6 +20,7 @@ from ecu.output import fault, give
 from ecu.settings import data_sheet as sheet
 from ecu.settings.check import figures
 from ecu.settings.config import Config, load_config, new_params, violations
+from ecu.settings.described import descriptions
 from ecu.settings.resources import resource
 from ecu.settings.sections import Axle, Control, Sensors, Vehicle
 from ecu.settings.toml_file import Section, describe, unit_of
@@ -271,11 +272,12 @@ def _table(name: str, values: dict[str, Value], model: type[Section]) -> Iterato
     """Yield the lines of a table, its keys in the order of the model."""
     yield ""
     yield f"[{name}]"
+    described = descriptions(model)
     for key, field in model.model_fields.items():
         if key in values:
             unit = unit_of(field)
             line = f"{key} = {_toml(values[key].value)}"
-            what = brief(field.description or key, unit)
+            what = brief(described.get(key, key), unit)
             shown = "" if unit in (None, "-") else f"{unit}, "
             yield f"{line:<31}  # {shown}{what}; {values[key].origin}"
 

@@ -12,6 +12,7 @@ from pydantic.fields import FieldInfo
 
 from ecu.errors import UserError, closest
 from ecu.output import detail
+from ecu.settings.described import describe_keys
 
 LONGEST_FILE: Final = 16 << 20
 """Characters of a file: a fleet's manifest of 100,000 drives has 5 million."""
@@ -33,7 +34,7 @@ class Section(BaseModel):
     """A table of a TOML file: no key but those it knows, no value but of the kind it has."""
 
     model_config = ConfigDict(
-        extra="forbid", frozen=True, allow_inf_nan=False, strict=True, use_attribute_docstrings=True
+        extra="forbid", frozen=True, allow_inf_nan=False, strict=True, json_schema_extra=describe_keys
     )
 
 

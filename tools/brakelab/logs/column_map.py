@@ -18,6 +18,7 @@ from ecu.bus.signal_map import Seconds
 from ecu.bus.units import conversion
 from ecu.contract.signals import INPUT, INPUT_SIGNALS
 from ecu.errors import UserError, closest
+from ecu.settings.described import describe_keys
 from ecu.settings.toml_file import Unit, describe, read_toml
 
 TIMES: Final = ("t", "time", "timestamp", "timestamps", "interval", "zeit", "elapsed time", "offset")
@@ -29,7 +30,9 @@ SECONDS: Final = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3
 
 
 class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, json_schema_extra=describe_keys
+    )
 
 
 class MappedColumn(_Table):

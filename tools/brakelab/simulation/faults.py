@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from ecu.bus.transmit import contract_transmit_plan
 from ecu.contract.records import RecordArray, new_record
 from ecu.contract.signals import CORNERS, INPUT, N_INPUTS
+from ecu.settings.described import describe_keys
 from ecu.settings.resources import resource
 from ecu.settings.toml_file import Unit
 
@@ -112,7 +113,9 @@ def _messages() -> dict[str, dict[str, int]]:
 class Fault(BaseModel):
     """A fault; docs/rig.md has the keys and the effect of each kind."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, json_schema_extra=describe_keys
+    )
 
     kind: Kind
     """What fails."""

@@ -17,6 +17,7 @@ from brakelab.simulation.speed_trace import (
     trace_of,
     wltp_brake_trace,
 )
+from ecu.settings.described import describe_keys
 from ecu.settings.toml_file import Unit
 
 Positive = Annotated[float, Field(gt=0.0)]
@@ -35,7 +36,9 @@ def as_rows(rows: list[Row] | list[Sides], columns: int = 2) -> NDArray[np.float
 class ScenarioTable(BaseModel):
     """A table of a scenario: no key but those it knows."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, json_schema_extra=describe_keys
+    )
 
 
 class Phase(ScenarioTable):
