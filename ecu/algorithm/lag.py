@@ -16,6 +16,7 @@ PERIOD: Final = 1e-9 * CYCLE_NS
 @kernel
 def lag_gain(dt: float, lag: float) -> float:
     """Return the share of a step that a lag of time `lag` [s] has followed after `dt` [s]."""
-    if dt == PERIOD:
-        return 1.0 - math.exp(-PERIOD / lag)
-    return 1.0 - math.exp(-dt / lag)
+    nominal = 1.0 - math.exp(
+        -PERIOD / lag
+    )  # before the branch: two calls of `exp` would become one of either
+    return nominal if dt == PERIOD else 1.0 - math.exp(-dt / lag)

@@ -29,6 +29,7 @@ import math
 import numpy as np
 
 from ecu.algorithm.inputs import fresh, usable
+from ecu.algorithm.lag import lag_gain
 from ecu.algorithm.monitoring.plausibility import SECOND_DIFFERENCE
 from ecu.algorithm.vehicle import corner_speed
 from ecu.contract.params import BAR
@@ -88,13 +89,13 @@ def _follow_lag(
         rolled = abs(inputs.value[WHEEL_SPEED + i]) * params.wheel_radius[i]
         fall, age = state.rolled[i] - rolled, state.age[i]
         if math.isfinite(fall):
-            gain = 1.0 - math.exp(-age / GROWTH_LAG)
+            gain = lag_gain(age, GROWTH_LAG)
             before, last, latest = state.before[i], state.latest[i], fall / age - braking
             state.before[i], state.latest[i] = last, latest
             middle = max(min(before, last), min(max(before, last), latest))
             state.growth[i] += gain * (middle - state.growth[i])
             jerk = abs(fall - state.fall[i]) / SECOND_DIFFERENCE
-            state.noise[i] += (1.0 - math.exp(-age / NOISE_S)) * (jerk - state.noise[i])
+            state.noise[i] += lag_gain(age, NOISE_S) * (jerk - state.noise[i])
             state.fall[i] = fall
         state.lag[i], state.rolled[i], state.age[i] = ground - rolled, rolled, 0.0
     if not (usable(inputs, WHEEL_SPEED + i) and math.isfinite(state.lag[i] + state.growth[i])):
