@@ -111,9 +111,11 @@ def update_discs(
         seen = usable(inputs, WHEEL_SPEED + i)
         omega = abs(inputs.value[WHEEL_SPEED + i]) if seen else abs(speed) / params.wheel_radius[i]
         if usable(inputs, CALLIPER_PRESSURE + i):
+            power = heating_error = 0.0
             # The noise of a released brake has a mean above zero once negative torque is cut off.
-            power = estimate.brake_torque[i] * omega if application.braking else 0.0
-            heating_error = math.hypot(params.sigma_disc_heating[i], estimate.sigma[i] / estimate.mu[i])
+            if application.braking:
+                power = estimate.brake_torque[i] * omega
+                heating_error = math.hypot(params.sigma_disc_heating[i], estimate.sigma[i] / estimate.mu[i])
         else:
             power = max(-estimate.tyre_force, 0.0) * load[i] / load_sum * abs(speed)
             heating_error = 1.0
