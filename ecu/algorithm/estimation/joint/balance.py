@@ -26,7 +26,7 @@ from ecu.algorithm.estimation.joint.layout import (
 from ecu.algorithm.estimation.joint.noise import COLOURED, motor_variance, skew
 from ecu.algorithm.estimation.joint.prior import SCALE_ONLY, UNKNOWN_KICKS
 from ecu.algorithm.estimation.joint.sampling import ACCEL
-from ecu.algorithm.estimation.joint.wheel import brake_torque, friction, radius
+from ecu.algorithm.estimation.joint.wheel import brake_torque, friction, radius, torque_at
 from ecu.contract.params import GRAVITY
 from ecu.jit import Record, kernel
 
@@ -48,16 +48,16 @@ def predict_balance(params: Record, state: Record, braking: bool) -> float:
     left = heavier * (w.common_accel - x[BIAS] + w.lateral / mass) + drag
     # Mass-dependent terms use the earlier accelerometer mean: free of the noise of this window's torques.
     inert = heavier * (state.last_smooth_accel - x[BIAS] + w.lateral / mass) + drag
-    linings = 0.0
+    linings, motor_scale = 0.0, math.exp(x[MOTOR])
     for i in range(4):
         r, _ = radius(params, state, i, w.load[i])
-        driven = w.motor[i] * math.exp(x[MOTOR])
+        driven = w.motor[i] * motor_scale
         own = heavier * (params.rolling_resistance * w.load[i] * r + params.wheel_inertia[i] * w.change / r)
         inert += own / (r * mass)
-        left += (brake_torque(params, state, i, w.common_pressure[i]) + driven + own) / (r * mass)
-        smooth = state.last_smooth[i]
-        linings += brake_torque(params, state, i, smooth) / (r * mass)
-        per_bar = brake_gain_per_bar(params, i) * friction(params, state, i) / (r * mass)
+        per_bar, smooth = brake_gain_per_bar(params, i) * friction(params, state, i), state.last_smooth[i]
+        left += (torque_at(state, i, per_bar, w.common_pressure[i]) + driven + own) / (r * mass)
+        linings += torque_at(state, i, per_bar, smooth) / (r * mass)
+        per_bar /= r * mass
         h[LEVEL + i] = per_bar * max(smooth - x[OFFSET + i // 2], 0.0)
         h[CHANGE + i // 2] += h[LEVEL + i]
         if smooth > 0.5:

@@ -92,8 +92,13 @@ def brake_torque(params: Record, state: Record, i: int, pressure: float) -> floa
     """Return the brake torque [N m] at a pressure above push-out [bar]."""
     if pressure == 0.0:
         return 0.0
-    acts = pressure - state.x[OFFSET + i // 2]
-    return brake_gain_per_bar(params, i) * friction(params, state, i) * acts
+    return torque_at(state, i, brake_gain_per_bar(params, i) * friction(params, state, i), pressure)
+
+
+@kernel
+def torque_at(state: Record, i: int, per_bar: float, pressure: float) -> float:
+    """Return the same where the torque per pressure, `per_bar` [N m/bar], is known already."""
+    return per_bar * (pressure - state.x[OFFSET + i // 2]) if pressure != 0.0 else 0.0
 
 
 @kernel

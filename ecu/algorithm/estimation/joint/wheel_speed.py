@@ -39,11 +39,11 @@ from ecu.algorithm.estimation.joint.sliding import wheel_slides
 from ecu.algorithm.estimation.joint.wheel import (
     APPLIED,
     LEAST_OF_PEAK,
-    brake_torque,
     combined_slip,
     friction,
     peak_adhesion,
     radius,
+    torque_at,
 )
 from ecu.jit import Record, kernel
 
@@ -71,13 +71,15 @@ def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float
     x, h, w = state.x, state.h, state.window
     load, pressure, smooth = w.load[i], w.pressure[i], state.last_smooth[i]
     r, deflection_gain = radius(params, state, i, load)
-    motor = w.motor[i] * math.exp(x[MOTOR])
+    motor_scale, lever, mu = math.exp(x[MOTOR]), brake_gain_per_bar(params, i), friction(params, state, i)
+    motor, braked = w.motor[i] * motor_scale, torque_at(state, i, lever * mu, pressure)
     # With the mass, so that air drag alone reveals a scale common to mass and all torques.
     heavier = math.exp(x[MASS])
     own = heavier * (params.rolling_resistance * load * r + params.wheel_inertia[i] * w.change / r)
-    force = -(brake_torque(params, state, i, pressure) + motor + own) / r
+    force = -(braked + motor + own) / r
     scale = 1.0 / (heavier * load)
     relative = load / params.static_load[i]
+    log_relative = math.log(relative)
     exponent = params.stiffness_degression[i] + x[LOAD]
     rear = x[RATIO] if i >= 2 else 0.0
     side = 0.5 * x[SIDE] if i % 2 == 0 else -0.5 * x[SIDE]
@@ -92,15 +94,12 @@ def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float
     else:
         keep = max(1.0 - slip, 0.1)
         omega, by_slip = ground / (keep * r), ground / (keep * keep * r)
-    driven = state.motors.last_smooth[i] * math.exp(x[MOTOR])
-    later = brake_torque(params, state, i, pressure) - brake_torque(params, state, i, smooth)
-    used += (later + motor - driven) * scale / r
+    driven = state.motors.last_smooth[i] * motor_scale
+    used += (braked - torque_at(state, i, lever * mu, smooth) + motor - driven) * scale / r
     slip, slope, by_peak = combined_slip(used, w.across, stiffness, peak)
     state.unsettled = state.slip[i] - slip
     clear_derivatives(state)
     h[V] = omega / max(ground, 0.1)
-    mu = friction(params, state, i)
-    lever = brake_gain_per_bar(params, i)
     by_force = by_slip * slope * scale
     state.per_torque = -by_force / r
     h[LEVEL + i] = -by_force * lever * mu * max(smooth - x[OFFSET + i // 2], 0.0) / r
@@ -111,9 +110,9 @@ def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float
     h[STIFFNESS] = -by_slip * slip
     if i >= 2:
         h[RATIO] = -by_slip * slip
-    h[LOAD] = by_slip * slip * math.log(relative)
+    h[LOAD] = by_slip * slip * log_relative
     h[PEAK] = by_slip * by_peak / max(1.0 - 4.0 * x[PEAK], LEAST_OF_PEAK)
-    h[PEAK_LOAD] = by_slip * by_peak * math.log(relative)
+    h[PEAK_LOAD] = by_slip * by_peak * log_relative
     h[SIDE] = -by_slip * slip * (0.5 if i % 2 == 0 else -0.5)
     h[SLIP_ERROR + i // 2] = by_slip
     h[RADIUS + i] = h[ROLLING] = -omega - by_slip * slope * used  # a larger wheel needs less force
