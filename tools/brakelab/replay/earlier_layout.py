@@ -64,6 +64,7 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "jitter",
         "usual_slope",
         "sigma_axles",
+        "order",
         "wheels",
         "torques",
         "implied",

@@ -83,8 +83,26 @@ def drift_by_derivatives(state: Record, time: float) -> None:
 
 
 @kernel
-def _corrects(free: Record, i: int, only_speed: bool) -> bool:
-    return free[i] != 0 and (not only_speed or i in (V, SLOPE))
+def _list_derived(h: Record, order: Record) -> int:
+    """Write the states with a derivative, few have one, to the beginning of `order`; return their number."""
+    count = 0
+    for i in range(N):
+        order[count] = i
+        count += h[i] != 0.0  # no branch: processors predict it wrongly
+    return count
+
+
+@kernel
+def _list_corrected(free: Record, order: Record, only_speed: bool) -> int:
+    """Write the states that are corrected to the beginning of `order`, the others behind them.
+
+    Return how many are.
+    """
+    count = 0
+    for i in range(N):
+        order[count] = order[N - 1 - i + count] = i
+        count += (free[i] != 0) & ((not only_speed) | (i == V) | (i == SLOPE))
+    return count
 
 
 @kernel
@@ -96,37 +114,35 @@ def correct(
     `gate`, `reject`: standard deviations of the innovation beyond which it counts as if on the gate, and
     beyond which nothing is corrected.
     """
-    p, h, ph, x, free = state.p, state.h, state.ph, state.x, state.free
+    p, h, ph, x, order = state.p, state.h, state.ph, state.x, state.order
     total = variance
     for i in range(N):
         ph[i] = 0.0
-    for j in range(N):
+    count = _list_derived(h, order)
+    for k in range(count):
+        j = order[k]
         derivative = h[j]  # read once: the compiler cannot know that it is not in `ph`
-        if derivative != 0.0:  # most are
-            for i in range(N):
-                ph[i] += p[j, i] * derivative
-    for i in range(N):
-        total += ph[i] * h[i]
+        for i in range(N):
+            ph[i] += p[j, i] * derivative
+    for k in range(count):
+        total += ph[order[k]] * h[order[k]]
     ratio = innovation * innovation / total
     if not math.isfinite(ratio) or ratio > reject * reject:
         return ratio
     outlier = ratio > gate * gate
     if outlier:
         total = innovation * innovation / (gate * gate)
-    only_speed = outlier and not free[LEVEL]
-    scale = innovation / total
-    for i in range(N):
-        if _corrects(free, i, only_speed):
-            x[i] += scale * ph[i]
-    inverse = 1.0 / total
-    for i in range(N):
-        if _corrects(free, i, only_speed):
-            gain = ph[i] * inverse
-            for j in range(N):
-                p[i, j] -= gain * ph[j]
-    for j in range(N):  # few are free
-        if _corrects(free, j, only_speed):
-            for i in range(N):
-                if not _corrects(free, i, only_speed):
-                    p[i, j] = p[j, i]
+    count = _list_corrected(state.free, order, outlier and not state.free[LEVEL])
+    scale, inverse = innovation / total, 1.0 / total
+    for k in range(count):
+        i = order[k]
+        x[i] += scale * ph[i]
+        gain = ph[i] * inverse
+        for j in range(N):
+            p[i, j] -= gain * ph[j]
+    for k in range(count, N):
+        i = order[k]
+        for corrected in range(count):
+            j = order[corrected]
+            p[i, j] = p[j, i]
     return ratio

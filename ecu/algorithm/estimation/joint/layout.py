@@ -89,6 +89,7 @@ JOINT_STATE: Final = np.dtype(
         ("free", "u1", (N,)),  # states that this window may correct; the others are consider states
         ("h", "f8", (N,)),  # derivatives of one measurement
         ("ph", "f8", (N,)),
+        ("order", "u1", (N,)),  # of the states in one correction: those that take part come first
         ("drive_known", "f8"),  # share of the drive torque that is reported
         ("weight", "f8"),  # of MEAN so far [bar]
         ("per_torque", "f8"),  # derivative of that measurement by a torque on the wheel
