@@ -16,7 +16,6 @@ PERIOD: Final = 1e-9 * CYCLE_NS
 @kernel
 def lag_gain(dt: float, lag: float) -> float:
     """Return the share of a step that a lag of time `lag` [s] has followed after `dt` [s]."""
-    nominal = 1.0 - math.exp(
-        -PERIOD / lag
-    )  # before the branch: two calls of `exp` would become one of either
+    # Before the branch: two calls of `exp` in its arms become one, whose argument the compiler does not know.
+    nominal = 1.0 - math.exp(-PERIOD / lag)
     return nominal if dt == PERIOD else 1.0 - math.exp(-dt / lag)
