@@ -13,6 +13,10 @@ both lines have moved by, where the car is now, tells the accelerometer's name b
 separated. Who gets in at a standstill changes b and k: then they are learned anew.
 
 A reading that is off by more than `GROSS` at once is not followed: it is implausible as a whole.
+
+What the reading differs from the second line's mean by is kept for the motors (`motors.py`). A scale of the
+first line alone is that of all wheel speeds: reported, but used, for slip and radius are ratios of speeds;
+what it makes of the reading is nothing then.
 """
 
 import numpy as np
@@ -21,7 +25,7 @@ from ecu.algorithm.inputs import fresh
 from ecu.algorithm.monitoring.acceleration import BLOCK_S, ROLLED, A, F, W
 from ecu.algorithm.monitoring.witness import compare
 from ecu.contract.params import GRAVITY
-from ecu.contract.signals import ACCEL_X
+from ecu.contract.signals import ACCEL_X, MOTOR_TORQUE, WHEEL_SPEED
 from ecu.jit import Record, kernel
 
 LINE_STATE = np.dtype(
@@ -40,9 +44,13 @@ ACCEL_ERROR_STATE = np.dtype(
     [
         ("wheels", LINE_STATE),  # c, s
         ("torques", LINE_STATE),  # b, k
+        ("apart", "f8"),  # reading less the torques' deceleration, beside its mean at that force, low-passed;
+        # 0 while it is not known [m/s^2]
         ("proven_s", "f8"),  # time for which the motors' torques alone have driven the car, at most `SURE_S`
         ("doubted_s", "f8"),  # time for which both lines have moved to the same side, at most `REPORTED_S`
         ("reported", "u1"),  # that has lasted
+        ("rolls_s", "f8"),  # time for which the scale of the wheels' line alone has moved, at most `ROLLS_S`
+        ("rolls_wrong", "u1"),  # that has lasted: all wheel speeds are scaled
         ("stood_s", "f8"),
         ("zero_off", "f8"),  # taken off the reading [m/s^2]
         ("scale_off", "f8"),  # of it
@@ -64,12 +72,17 @@ LARGEST_SCALE = 0.5
 GROSS = 1.5  # m/s^2
 SLOPE_S, SCALE_S, TORQUES_S = 10.0, 30.0, 60.0  # memory of c, s, b and k
 FEWEST_S, FEWEST_SCALE_S, FEWEST_REPORTED_S = 2.0, 3.0, 5.0
+APART_S = 0.5
+UNSEEN, UNSEEN_SHARE, WIND = 0.1, 0.03, 0.25  # m/s^2, of the force, of the drag: what torques may differ by
 MOVED, REPORTED_S = 0.14, 0.4  # m/s^2, sound cars stay below 0.07; s
+ROLLS, ROLLS_S = 0.05, 1.0  # of the speed, sound cars stay below 0.031; s
+UNMOVED = 0.4  # of that, what the torques show of it
 STANDS, STOOD_S = 0.1, 10.0  # m/s, s
 ZERO_DOUBT = 0.18  # m/s^2; sound cars stay below 0.1
 SCALE_DOUBT, LEAST_SCALE = 0.033, 0.02  # of the mean of both, of each; sound cars stay below 0.029
 PROVING, ENGINE, ENGINE_ZERO = 1.0, 0.2, 0.25  # m/s^2; of it, m/s^2: what an unreported engine exceeds
 PROVEN_S, SURE_S, REFUTES = 0.5, 3.0, 5.0  # s, s; times as fast as it is proven
+USUAL = 0.5  # of that, within which the torques are as usual
 CONFIRMED = 0.5  # of the zero, what the wheels must show of it too
 KEPT = 0.4
 SAME_S = 0.6  # the blocks whose deceleration is compared
@@ -119,6 +132,12 @@ def _learn_scale(line: Record, memory_s: float) -> None:
 
 
 @kernel
+def accel_doubted(state: Record) -> bool:
+    """Return whether zero or scale of the accelerometer are known to have drifted."""
+    return state.reported != 0 or state.zero_off != 0.0 or state.scale_off != 0.0
+
+
+@kernel
 def _wheels_accel(mean: Record) -> float:
     """Return dw/dt over the last blocks [m/s^2]."""
     accel: float = (mean[0, W] - mean[3, W]) / (3.0 * BLOCK_S)
@@ -134,7 +153,7 @@ def _follow_wheels(state: Record, mean: Record) -> None:
     h = _wheels_accel(mean)
     if abs(h) < LEAST_SHOWN:
         h = 0.0  # noise of the wheels would show as a scale
-    elif state.scale_off == 0.0 and state.reported == 0:
+    elif not (accel_doubted(state) or state.rolls_wrong):
         _learn_scale(line, SCALE_S)
     rolled = (mean[0, W] - mean[1, W]) / BLOCK_S
     innovation = 0.5 * (mean[0, A] + mean[1, A]) - rolled - line.offset - line.scale * h
@@ -157,17 +176,56 @@ def _moved_scale(line: Record) -> float:
 
 
 @kernel
+def wheels_confirm(state: Record, mean: Record, moved: float) -> bool:
+    """Return whether the wheels show what the reading has moved by [m/s^2], at the present deceleration."""
+    h, beside = _wheels_accel(mean), moved_offset(state.wheels)
+    if abs(h) > LEAST_SHOWN:
+        beside += _moved_scale(state.wheels) * h
+    confirm: bool = beside * moved > CONFIRMED * moved * moved
+    return confirm
+
+
+@kernel
+def torques_tolerance(params: Record, mean: Record) -> float:
+    """Return what the torques' deceleration may differ from its usual one by [m/s^2]."""
+    drag: float = params.drag_area * mean[0, W] * mean[0, W] / params.mass
+    return UNSEEN + UNSEEN_SHARE * abs(mean[0, F]) + WIND * drag
+
+
+@kernel
+def usual_known(state: Record) -> bool:
+    """Return whether it is known what reading and torques usually differ by."""
+    known: bool = state.torques.offset_s > FEWEST_REPORTED_S
+    return known
+
+
+@kernel
+def _compare_scales(params: Record, state: Record, mean: Record, witness: Record) -> None:
+    """Overwrite `rolls_wrong`: the wheels' line has moved by a scale, and the torques of motors deny it."""
+    moved, force = _moved_scale(state.wheels), mean[0, F]
+    if state.wheels.scale_s < FEWEST_SCALE_S or not usual_known(state) or force < LEAST_SHOWN:
+        return
+    alone = abs(state.apart) < UNMOVED * abs(moved) * force
+    if alone:
+        for i in range(4):
+            turns = mean[0, ROLLED] / params.wheel_radius[i]
+            compare(witness, WHEEL_SPEED + i, -moved * turns, ROLLS * turns)
+    stands = alone and abs(moved) > (KEPT if state.rolls_wrong else 1.0) * ROLLS
+    state.rolls_s = min(max(state.rolls_s + (BLOCK_S if stands else -BLOCK_S), 0.0), ROLLS_S)
+    if state.rolls_s > ROLLS_S - 0.5 * BLOCK_S:
+        state.rolls_wrong = 1
+    elif state.rolls_s == 0.0:
+        state.rolls_wrong = 0
+
+
+@kernel
 def _compare_lines(state: Record, mean: Record, witness: Record) -> None:
     """Overwrite `reported`: both lines have moved to the same side at the present force and deceleration."""
-    wheels, torques = state.wheels, state.torques
-    if torques.offset_s < FEWEST_REPORTED_S:
+    torques = state.torques
+    if not usual_known(state):
         return
-    h = _wheels_accel(mean)
     moved = moved_offset(torques) + _moved_scale(torques) * mean[0, F]
-    beside = moved_offset(wheels)
-    if abs(h) > LEAST_SHOWN:
-        beside += _moved_scale(wheels) * h
-    agree = beside * moved > CONFIRMED * moved * moved
+    agree = wheels_confirm(state, mean, moved) and state.rolls_wrong == 0
     if agree:
         compare(witness, ACCEL_X, moved, MOVED)
     stands = abs(moved) > (KEPT if state.reported else 1.0) * MOVED
@@ -190,19 +248,24 @@ def _follow_torques(params: Record, state: Record, mean: Record, witness: Record
             state.proven_s = min(state.proven_s + BLOCK_S, SURE_S)
         elif left - max(moved_offset(state.wheels), 0.0) > engine:
             state.proven_s = max(state.proven_s - REFUTES * BLOCK_S, 0.0)
+    apart = left - line.usual_offset - line.usual_scale * force if usual_known(state) else 0.0
+    state.apart += (apart - state.apart) * BLOCK_S / APART_S
     innovation = left - line.offset - line.scale * force
     if abs(innovation) > GROSS or state.proven_s < PROVEN_S:
         return
     _walk(line, ZERO_WALK, TORQUE_WALK)
     _correct(line, force, innovation, TORQUE_NOISE)
+    _compare_scales(params, state, mean, witness)
     _compare_lines(state, mean, witness)
-    if state.zero_off == 0.0 and state.reported == 0:
+    usual = abs(state.apart) < USUAL * torques_tolerance(params, mean)
+    if usual and state.zero_off == 0.0 and state.reported == 0:
         _learn_offset(line, TORQUES_S)
         _learn_scale(line, TORQUES_S)
         if abs(moved_offset(line)) < 0.5 * ZERO_DOUBT:
             _learn_offset(state.wheels, SLOPE_S)
     zero = moved_offset(line)
     confirmed = line.offset_s > FEWEST_S and moved_offset(state.wheels) * zero > CONFIRMED * zero * zero
+    confirmed = confirmed and state.rolls_wrong == 0
     if confirmed:
         compare(witness, ACCEL_X, zero, ZERO_DOUBT)
     state.zero_off = _off(zero, ZERO_DOUBT, state.zero_off) if confirmed else 0.0
@@ -228,13 +291,18 @@ def follow_accel_error(
         torques.p[0], torques.p[1] = OFFSET_START**2, SCALE_MOST**2
     stands = abs(blocks.mean[0, ROLLED]) < STANDS
     state.stood_s = state.stood_s + BLOCK_S if stands else 0.0
-    if state.stood_s > STOOD_S and not (state.reported or state.zero_off != 0.0 or state.scale_off != 0.0):
+    doubted = accel_doubted(state)
+    for i in range(MOTOR_TORQUE, MOTOR_TORQUE + 4):
+        doubted = doubted or witness.rejected[i] != 0
+    if state.stood_s > STOOD_S and not doubted:
         torques.offset_s = torques.scale_s = 0.0
         torques.p[1] = SCALE_MOST**2
     if blocks.good_blocks > 3:
         _follow_wheels(state, blocks.mean)
     if blocks.known_blocks > 1 and not braking and abs(across) < ACROSS:
         _follow_torques(params, state, blocks.mean, witness)
+    else:
+        state.apart = 0.0
     by_wheels, by_torques = _moved_scale(wheels), _moved_scale(torques)
     shown = 0.5 * (by_wheels + by_torques)
     if by_wheels * by_torques <= 0.0 or min(abs(by_wheels), abs(by_torques)) < LEAST_SCALE:

@@ -7,14 +7,20 @@ estimation, by the estimate of the last cycle.
 from ecu.algorithm.inputs import LEAST_REQUEST, driver_accelerates, others_brake, requested_decel, usable
 from ecu.algorithm.monitoring.accel_error import (
     PROVEN_S,
+    accel_doubted,
     correct_accel,
     follow_accel_error,
-    moved_offset,
     watch_frozen,
 )
 from ecu.algorithm.monitoring.acceleration import watch_acceleration, wheels_deny
 from ecu.algorithm.monitoring.failed_brakes import watch_brakes
-from ecu.algorithm.monitoring.motors import compare_motors, watch_motors
+from ecu.algorithm.monitoring.motors import (
+    LEAST_SPEED,
+    LET_GO_S,
+    compare_motors,
+    deny_drive,
+    watch_motors,
+)
 from ecu.algorithm.monitoring.plausibility import watch_pressures, watch_wheels, wheel_speed_implausible
 from ecu.algorithm.monitoring.pressures import DOUBT_S, compare_pressures, lasting_difference
 from ecu.algorithm.monitoring.speeds import watch_speeds
@@ -32,6 +38,7 @@ from ecu.contract.signals import ACCEL_X, CALLIPER_PRESSURE, MOTOR_TORQUE, VEHIC
 from ecu.jit import Record, kernel
 
 ACCEL_X_DRIFTED = IMPLAUSIBLE["accel_x"]
+ALL_WHEELS = 0b1111 * IMPLAUSIBLE["wheel_speed_fl"]
 PRESSURE_IMPLAUSIBLE = IMPLAUSIBLE["calliper_pressure_fl"]
 LEFT_OUT_S = 0.03  # duration of a pressure's deviation from its demand
 
@@ -46,14 +53,17 @@ def _watch_motion(p: Record, s: Record, u: Record, dt: float) -> int:
     watch_frozen(s.accel_error, s.acceleration, s.witness, u, dt)
     if s.acceleration.time == 0.0 and not s.witness.rejected[ACCEL_X]:
         follow_accel_error(p, s.accel_error, s.witness, s.acceleration, estimate.accel_y, braking)
-    if s.accel_error.reported or s.accel_error.zero_off != 0.0 or s.accel_error.scale_off != 0.0:
+    if accel_doubted(s.accel_error):
         faults |= ACCEL_X_DRIFTED
+    if s.accel_error.rolls_wrong:
+        faults |= ALL_WHEELS
     if s.accel_error.proven_s > PROVEN_S and not wheels_deny(s.acceleration):
-        moved = moved_offset(s.accel_error.wheels)
-        watch_motors(p, s.motors, s.witness, u, estimate, base, moved, dt)
+        watch_motors(p, s.motors, s.witness, u, estimate, base, s.accel_error, s.acceleration, dt)
     asked = braking and requested_decel(p, u) > LEAST_REQUEST
     if asked and s.plausibility.sent and not (driver_accelerates(u) or others_brake(u)):
         compare_motors(p, s.motors, s.witness, u, s.blending, dt)
+        if s.application.duration_s > LET_GO_S and estimate.speed > LEAST_SPEED:
+            deny_drive(p, s.motors, s.witness, u, dt)
     watch_speeds(p, s.speeds, s.witness, u, estimate, s.guard.acting != 0, dt)
     return faults
 

@@ -52,6 +52,7 @@ ANALOGUE: Final = {
     "wheel speed rear right": Input(_SPEED[3:], 80.0, 0.1),
     "wheel speeds front": Input(_SPEED[:2], 80.0, 0.1),
     "wheel speeds rear": Input(_SPEED[2:], 80.0, 0.1),
+    "wheel speeds, all": Input(_SPEED, 80.0, 0.1),
     "vehicle_speed": Input(("vehicle_speed",), 30.0, 0.03),
     "accel_x": Input(("accel_x",), 5.0, 0.01),
     "accel_y": Input(("accel_y",), 5.0, 0.01),

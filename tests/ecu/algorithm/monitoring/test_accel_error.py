@@ -74,7 +74,7 @@ class Car:
             )
             if not frozen:
                 self.inputs[0]["value"][INPUT["accel_x"]] = reading
-            self.estimate["speed"] = speed
+            self.estimate["speed"] = rolled * speed
             self.estimate["brake_torque"] = np.maximum(-wheel_torque, 0.0)
             braking = force < 0.0
             watch_acceleration(
@@ -174,3 +174,27 @@ def test_who_gets_in_at_a_standstill_is_no_error_of_the_accelerometer(
     car.drive(12.0, motors=1.17)
     car.drive(24.0, motors=1.17, slope=-0.5)
     assert (car.reported is not None) == reported
+
+
+ROLLS = [
+    # what is wrong, are all wheel speeds reported
+    ("nothing", {}, False),
+    ("all wheel speeds by 3 %", {"rolled": 1.03}, False),
+    ("by 8 %", {"rolled": 1.08}, True),
+    ("by -8 %", {"rolled": 0.92}, True),
+    ("the accelerometer's scale by 8 %", {"scale": 0.08}, False),
+    ("motor torques by 8 %", {"motors": 1.08}, False),
+    ("a slope of 8 %", {"slope": 0.8}, False),
+]
+
+
+@pytest.mark.parametrize(("case", "wrong", "reported"), ROLLS, ids=[c[0] for c in ROLLS])
+def test_all_wheel_speeds_are_scaled(params, feed, case, wrong, reported: bool) -> None:
+    """Against the accelerometer, which the torques confirm; nothing is taken off it then."""
+    car = Car(params, feed)
+    car.drive(48.0)
+    car.drive(24.0, **wrong)
+    print(car.state)
+    assert bool(car.state["rolls_wrong"]) == reported
+    if reported:
+        assert correct_accel(car.state, -4.0) == -4.0

@@ -5,14 +5,20 @@ import pytest
 
 from ecu.algorithm.control.blending import BLENDING_STATE
 from ecu.algorithm.estimate import ESTIMATE
+from ecu.algorithm.monitoring.accel_error import ACCEL_ERROR_STATE, APART_S
+from ecu.algorithm.monitoring.acceleration import ACCELERATION_STATE, BLOCK_S
 from ecu.algorithm.monitoring.motors import (
     ACCEL,
+    DRIVES_ON,
     GAP,
     GAP_SHARE,
     LEAST_SPEED,
     MOTORS,
     MOTORS_WATCH_STATE,
+    USUAL_GAP,
+    USUAL_GAP_SHARE,
     compare_motors,
+    deny_drive,
     watch_motors,
 )
 from ecu.algorithm.monitoring.witness import WITNESS_STATE
@@ -31,6 +37,7 @@ class Car:
         self.state, self.witness = np.zeros(1, MOTORS_WATCH_STATE)[0], np.zeros(1, WITNESS_STATE)[0]
         self.estimate, self.blending = np.zeros(1, ESTIMATE)[0], np.zeros(1, BLENDING_STATE)[0]
         self.estimate["measured"], self.estimate["mu"] = 1, 0.4
+        self.lines, self.blocks = np.zeros(1, ACCEL_ERROR_STATE)[0], np.zeros(1, ACCELERATION_STATE)[0]
         self.unit = self.p["wheel_radius"] * self.p["mass"]
         self.base = np.full(4, 0.4)
 
@@ -42,6 +49,7 @@ class Car:
         decel, p = np.broadcast_to(decel, 4), self.p
         drag = p["drag_area"] * speed**2 / p["mass"] + p["rolling_resistance"] * GRAVITY
         accel = -(decel.sum() + 4.0 * lining + drag + off)
+        self.lines["wheels"]["offset"], self.blocks["time"] = accel_offset, 0.05
         self.estimate["speed"], self.estimate["brake_torque"] = speed, lining * self.unit
         for _ in range(round(seconds / DT)):
             self.feed(
@@ -51,7 +59,36 @@ class Car:
                 **inputs,
             )
             watch_motors(
-                p, self.state, self.witness, self.inputs[0], self.estimate, self.base, accel_offset, DT
+                *(p, self.state, self.witness, self.inputs[0], self.estimate, self.base),
+                *(self.lines, self.blocks, DT),
+            )
+        return self.rejected()
+
+    def known(self, seconds: float, decel, reads=1.0, apart: float | None = None, **lines) -> tuple[str, ...]:
+        """Return the wheels whose motors are left out, where what the car does at each torque is known.
+
+        They read `reads` times their torque; `apart` [m/s²]: from what it usually does, else by that.
+        """
+        decel, reads = np.broadcast_to(decel, 4), np.broadcast_to(reads, 4)
+        self.lines["torques"]["offset_s"], self.blocks["known_blocks"] = 20.0, 5
+        self.blocks["mean"][0] = -decel.sum(), 20.0, -(reads * decel).sum(), 20.0
+        apart = ((reads - 1.0) * decel).sum() if apart is None else apart
+        for name, value in lines.items():
+            self.lines[name] = value
+        self.estimate["speed"], self.estimate["brake_torque"] = 20.0, 0.0
+        accel = -decel.sum()
+        for k in range(round(seconds / DT)):
+            self.feed(
+                self.inputs,
+                accel_x=accel * (1.0 + GRAVITY * self.p["pitch_gradient"]),
+                motor_torque=reads * decel * self.unit,
+                accelerator_position=30.0,
+            )
+            self.blocks["time"] = 0.0 if k % round(BLOCK_S / DT) == 0 else 0.05
+            self.lines["apart"] += (apart - self.lines["apart"]) * DT / APART_S
+            watch_motors(
+                *(self.p, self.state, self.witness, self.inputs[0], self.estimate, self.base),
+                *(self.lines, self.blocks, DT),
             )
         return self.rejected()
 
@@ -164,3 +201,78 @@ def test_what_does_not_blend_or_is_stale_is_not_compared(car: Car) -> None:
 def test_a_gap_is_judged_within_half_a_second(car: Car) -> None:
     assert car.obey(0.1, (500.0,) * 3, 400.0) == ()
     assert car.obey(0.4, (500.0,) * 3, 400.0) == ALL
+
+
+DRIVES = {"decel": -1.0}
+MOVED = [
+    # case, what the car does after 10 s in which all read right, seconds, left out
+    ("all right", DRIVES, 20.0, ()),
+    ("all read 3 % less", DRIVES | {"reads": 0.97}, 20.0, ()),
+    ("all read a tenth less", DRIVES | {"reads": 0.9}, 1.0, ALL),
+    ("all read a tenth more", DRIVES | {"reads": 1.1}, 1.0, ALL),
+    ("no time for it yet", DRIVES | {"reads": 0.9}, 0.2, ()),
+    ("one reads a fifth less than its mate", DRIVES | {"reads": (0.8, 1.0, 1.0, 1.0)}, 1.5, ("fl",)),
+    ("one reads a fifth more", DRIVES | {"reads": (1.0, 1.0, 1.0, 1.2)}, 1.5, ("rr",)),
+    ("one reads a tenth less", DRIVES | {"reads": (0.9, 1.0, 1.0, 1.0)}, 20.0, ()),
+    ("torque goes from left to right", {"decel": (-0.7, -1.3, -1.0, -1.0)}, 20.0, ()),
+    ("the wheels show it too", DRIVES | {"apart": 1.0, "wheels": 0.8}, 20.0, ()),
+    ("the wheels show the contrary", DRIVES | {"apart": 1.0, "wheels": -0.8}, 2.0, ALL),
+    ("the accelerometer is known to drift", DRIVES | {"apart": 1.0, "reported": 1}, 20.0, ()),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("what", "seconds", "left_out"), [case[1:] for case in MOVED], ids=[c[0] for c in MOVED]
+)
+def test_which_motor_no_longer_drives_the_car_as_it_used_to(car: Car, what, seconds, left_out) -> None:
+    assert car.known(10.0, **DRIVES) == ()
+    what = dict(what)
+    car.lines["wheels"]["offset"] = what.pop("wheels", 0.0)
+    assert car.known(seconds, **what) == left_out
+
+
+def test_motors_are_usually_unequal(car: Car) -> None:
+    """By a tenth, for as long as the car is known: then both have to become equal to be found to lie."""
+    assert car.known(10.0, (-1.1, -0.9, -1.0, -1.0)) == ()
+    assert car.known(5.0, (-1.1, -0.9, -1.0, -1.0), reads=(1.0 / 1.3, 1.0, 1.0, 1.0)) == ("fl",)
+
+
+def test_what_moved_is_believed_again_once_it_has_moved_back(car: Car) -> None:
+    car.known(10.0, **DRIVES)
+    assert car.known(2.0, reads=0.9, **DRIVES) == ALL
+    assert car.known(5.0, reads=0.9, **DRIVES) == ALL
+    assert car.known(2.5, **DRIVES) == ()
+
+
+@pytest.mark.parametrize(("over", "left_out"), [(0.95, ()), (1.05, ALL)])
+def test_a_motor_gives_the_share_of_a_demand_that_it_usually_gives(car: Car, over: float, left_out) -> None:
+    """5 % too little for as long as it is known."""
+    asked, usual = (500.0,) * 3, 475.0
+    assert car.obey(10.0, asked, usual) == ()
+    assert car.obey(5.0, asked, usual + over * (USUAL_GAP + USUAL_GAP_SHARE * 500.0)) == left_out
+
+
+NO_DRIVE = [
+    # torque while the brakes are applied and the accelerator is free [N m], left out
+    (0.0, ()),
+    (-0.95 * DRIVES_ON, ()),
+    (-1.05 * DRIVES_ON, ALL),
+    (200.0, ()),  # it brakes by itself
+]
+
+
+@pytest.mark.parametrize(("torque", "left_out"), NO_DRIVE)
+def test_a_motor_that_does_not_blend_does_not_drive_against_the_brakes(car: Car, torque, left_out) -> None:
+    car.p["blending"] = 0.0
+    for _ in range(100):
+        car.feed(car.inputs, motor_torque=torque)
+        deny_drive(car.p, car.state, car.witness, car.inputs[0], DT)
+    assert car.rejected() == left_out
+
+
+def test_a_torque_that_is_a_guess_denies_nothing(car: Car) -> None:
+    car.p["blending"], car.p["sigma_motor_torque"] = 0.0, 0.5
+    for _ in range(100):
+        car.feed(car.inputs, motor_torque=-200.0)
+        deny_drive(car.p, car.state, car.witness, car.inputs[0], DT)
+    assert car.rejected() == ()
