@@ -181,7 +181,7 @@ def test_a_file_of_that_name_comes_first(
     "command",
     [
         *("run", "demo", "simulate", "rig", "replay", "play", "report", "fleet", "wear", "compare", "tune"),
-        *("bench", "doctor", "map suggest", "lab run", "lab look"),
+        *("bench", "doctor", "map suggest", "lab run", "lab look", "lab report"),
         *("identify friction", "identify wear", "identify dust"),
     ],
 )

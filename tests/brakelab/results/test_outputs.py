@@ -25,6 +25,7 @@ OVERWRITING = {
     "identify friction brake.csv --columns mine.toml --out mine.toml": "mine.toml",
     "lab run mine.toml --brake A --out mine.csv": "mine.toml",
     "lab run cpc --brake A --linings brake.toml --law SIM --out brake.csv": "brake.toml",
+    "lab report brake.csv --columns mine.html --out mine.html": "mine.html",
     "tune --config car.toml --out base.toml": "base.toml",
     "map suggest drive.csv --config car.toml --out base.toml": "base.toml",
     "replay drive.brakes.parquet --config base.toml --out drive.parquet": "drive.brakes.parquet",

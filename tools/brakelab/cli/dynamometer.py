@@ -90,3 +90,34 @@ def look(
     from brakelab.identify.friction import command
 
     return command.look(data, columns)
+
+
+@app.command()
+def report(
+    data: Annotated[
+        Path, typer.Argument(metavar="DATA", help="Recording of a programme: .csv .parquet .mf4")
+    ],
+    other: Annotated[
+        Path | None, typer.Argument(metavar="[DATA2]", help="Recording of another lining, compared with it")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="REPORT.html", help="Page to write, with the charts")
+    ] = None,
+    columns: Annotated[
+        Path | None,
+        typer.Option("--columns", metavar="MAP.toml", help="Columns, units, brake; default: DATA with .toml"),
+    ] = None,
+    programme: Annotated[
+        str | None,
+        typer.Option(
+            "--programme",
+            autocompletion=shipped("config/rig"),
+            metavar="PROGRAMME",
+            help="File as in config/rig; default: the shipped one that it is",
+        ),
+    ] = None,
+) -> int:
+    """Show friction section by section, as for AK-Master (SAE J2522). Compare two linings."""
+    from brakelab.identify.friction.report import report as report_of
+
+    return report_of(data, other, columns, programme, out)

@@ -49,6 +49,8 @@ class Panel(NamedTuple):
     """The axis of x."""
     cells: Cells | None = None
     """Below the lines."""
+    names: Sequence[tuple[str, str]] = ()
+    """Of its own lines with their colours, in the corner below left."""
 
 
 SCALE: Final = ((247, 251, 255), (158, 202, 225), (66, 146, 198), (8, 81, 156), (8, 29, 68))
@@ -115,6 +117,11 @@ def _draw(panel: Panel, left: float, top: float) -> list[str]:
         points = " ".join(f"{a:.1f},{b:.1f}" for a, b in pairs)
         dashes = ' stroke-dasharray="5 4"' if line.dashed else ""
         parts.append(f'<polyline points="{points}" stroke="{line.colour}" stroke-width="1.4"{dashes}/>')
+    for place, (name, colour) in enumerate(reversed(panel.names)):
+        y = top + HEIGHT - 8 - 13 * place
+        parts.append(
+            f'<text x="{left + 8}" y="{y}" font-size="10" style="fill:{colour}">{escape(name)}</text>'
+        )
     return parts
 
 

@@ -115,7 +115,7 @@ def test_a_law_of_one_s_own_must_have_a_name_of_its_own(tmp_path: Path) -> None:
         (lambda f: command.run("cpc", "D", 0, f), "--brake: D: no such brake; choose one of A, B, C"),
         (
             lambda f: command.run("cpd", "A", 0, f),
-            "cpd: no such file, and none that is shipped (ak-master, ams, cpc)",
+            "cpd: no such file, and none that is shipped (ak-master, ams, cpc, j2707, pressure-gradient)",
         ),
         (lambda f: command.run("ams", "A", 0, f, "R9"), "--law: R9: no such law; choose one of SIM, R1"),
         (lambda f: command.run("ams", "A", 0, f.with_suffix(".xls")), "ends in .csv or .parquet"),

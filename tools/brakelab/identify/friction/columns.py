@@ -7,9 +7,11 @@ pressure = ["P_Line", "psi"]
 torque = ["Torque", "N m"]
 speed = ["Speed", "rpm"]           # rpm, 1/min, rad/s of the disc; km/h, m/s, mph of the car
 temperature = ["T_disc", "°F"]
+section = "Step"                   # optional: number of the section of the programme, in every row
 [brake]                            # as in config/plant/linings.toml
 [rig]                              # inertia, pads, push_out_pressure
 [disc]                             # optional; without, heating is found from the stops
+[uncertainty]                      # optional, see `Uncertainty`
 """
 
 import math
@@ -33,6 +35,7 @@ class Names(Section):
     torque: Column
     speed: Column
     temperature: Column
+    section: Annotated[str, Field(min_length=1)] | None = None
 
     @model_validator(mode="after")
     def _units(self) -> Self:
@@ -56,6 +59,21 @@ class DiscGiven(Section):
     cooling_by_speed: NotNegative = 9e-5  # 1/m, likewise
 
 
+class Uncertainty(Section):
+    """Standard uncertainties (GUM) of what is the same in a whole stop: of calibrations and tolerances.
+
+    What a section's scatter shows already, noise above all, does not belong here.
+    """
+
+    torque: NotNegative = 0.0  # N m, of its zero
+    torque_gain: NotNegative = 0.0  # share of the reading
+    pressure: NotNegative = 0.0  # bar, of its zero
+    pressure_gain: NotNegative = 0.0  # share of the reading
+    push_out_pressure: NotNegative = 0.0  # bar
+    piston_area: NotNegative = 0.0  # share
+    effective_radius: NotNegative = 0.0  # share
+
+
 class Columns(Section):
     """A file of columns."""
 
@@ -64,9 +82,10 @@ class Columns(Section):
     brake: RigBrake
     rig: Rig = Rig()
     disc: DiscGiven = DiscGiven()
+    uncertainty: Uncertainty | None = None
 
     @classmethod
-    def own(cls, lining: Lining, inertia: float) -> Self:
+    def own(cls, lining: Lining, inertia: float, uncertainty: Uncertainty | None = None) -> Self:
         """Return the description of our own recordings of `lining` on a flywheel of `inertia` [kg m^2]."""
         names = Names(
             time=("time_s", "s"),
@@ -76,7 +95,8 @@ class Columns(Section):
             temperature=("disc_temperature_C", "°C"),
         )
         disc = DiscGiven(**lining.disc.model_dump())
-        return cls(columns=names, brake=lining.brake, rig=Rig(inertia=inertia), disc=disc)
+        rig = Rig(inertia=inertia)
+        return cls(columns=names, brake=lining.brake, rig=rig, disc=disc, uncertainty=uncertainty)
 
     @classmethod
     def contract(cls, names: tuple[str, str, str, str, str], speed: str, config: Config, axle: str) -> Self:
@@ -100,8 +120,8 @@ class Columns(Section):
             cooling_by_speed=brake.disc_cooling_by_speed,
         )
         rig = Rig(push_out_pressure=brake.push_out_pressure)
-        return cls(columns=Names(**dict(zip(UNITS, zip(names, units, strict=True), strict=True))), brake=pad,
-                   rig=rig, disc=disc)  # fmt: skip
+        given = Names.model_validate(dict(zip(UNITS, zip(names, units, strict=True), strict=True)))
+        return cls(columns=given, brake=pad, rig=rig, disc=disc)
 
 
 def load_columns(path: Path) -> Columns:
@@ -115,10 +135,15 @@ def load_columns(path: Path) -> Columns:
 def columns_text(columns: Columns) -> str:
     """Return it as TOML."""
     lines = [f'name = "{columns.name}"', "", "[columns]"]
-    for quantity, (name, unit) in columns.columns.model_dump().items():
+    for quantity in UNITS:
+        name, unit = getattr(columns.columns, quantity)
         lines.append(f'{quantity} = ["{name}", "{unit}"]')
-    for section in ("brake", "rig", "disc"):
+    if columns.columns.section is not None:
+        lines.append(f'section = "{columns.columns.section}"')
+    for section in ("brake", "rig", "disc", *(["uncertainty"] if columns.uncertainty else [])):
         lines += ["", f"[{section}]"]
-        values = getattr(columns, section).model_dump(exclude_none=True)
+        values = getattr(columns, section).model_dump(
+            exclude_none=True, exclude_defaults=section == "uncertainty"
+        )
         lines += [f"{name} = {value!r}" for name, value in values.items()]
     return "\n".join([*lines, ""])

@@ -6,20 +6,20 @@ from typing import Final, NamedTuple
 import numpy as np
 from rich.console import Console
 
-from brakelab.identify.friction.ak_master import has_sections, load_sequence, means_table, run_sequence
 from brakelab.identify.friction.analysis import history_effect, principal_components
 from brakelab.identify.friction.candidates import candidates
 from brakelab.identify.friction.check import refuse_nonsense
 from brakelab.identify.friction.choice import identify
 from brakelab.identify.friction.columns import Columns
-from brakelab.identify.friction.dynamometer import new_bench, run_programme
+from brakelab.identify.friction.dynamometer import new_bench
 from brakelab.identify.friction.fit import fit
 from brakelab.identify.friction.heat_capacity import SLOW, heat_capacity, undelayed
 from brakelab.identify.friction.lining_file import write_lining
 from brakelab.identify.friction.page import write_report
 from brakelab.identify.friction.reader import read_recording
 from brakelab.identify.friction.recording import Recording, check_name, joined, write_recording
-from brakelab.identify.friction.stops import Stops, find_stops
+from brakelab.identify.friction.sequence import load_sequence, run_sequence
+from brakelab.identify.friction.stops import Stops, find_stops, say_dead
 from brakelab.identify.friction.tables import (
     component_table,
     heat_line,
@@ -30,7 +30,6 @@ from brakelab.identify.friction.tables import (
     residual_table,
 )
 from brakelab.plant.description import PlantFileError, read_file
-from brakelab.plant.dynamometer_programme import load_programme
 from brakelab.plant.linings import Lining, Linings
 from brakelab.results.outputs import check_outputs
 from brakelab.results.progress import progress_bar
@@ -51,7 +50,7 @@ def run(
 ) -> int:
     """Run a programme on the simulated dynamometer and write its recording. Returns 0.
 
-    `programme`: a file, or cpc, ams, ak-master, whose table of means is printed; `brake`: A, B or C, of which
+    `programme`: a file, or a name of config/rig; `brake`: A, B or C, of which
     `seed` draws a pad and the sensors, or a lining of the file `linings`; `law`: of the lining, not a pad.
 
     Raises:
@@ -71,21 +70,18 @@ def run(
     bench = new_bench(lining, brake, seed, law=law or "")
     rig = bench.rig[0]
     inertia = float(rig["mass"] * rig["tyre_radius"] ** 2)
-    if has_sections(path):
-        sequence = load_sequence(path)
-        with progress_bar("lab run", 1.0) as advance:
-            recording, means = run_sequence(bench, sequence, Columns.own(lining, inertia), advance)
-        show(Console(), means_table(f"{sequence.title}, {brake}", means))
-    else:
-        with progress_bar("lab run", 1.0) as advance:
-            recording = run_programme(bench, load_programme(path), advance)
-    write_recording(out, recording, lining, inertia)
+    sequence = load_sequence(path)
+    with progress_bar("lab run", 1.0) as advance:
+        recording = run_sequence(bench, sequence, advance)
+    write_recording(out, recording, lining, inertia, bench.noise.stated())
     hours, minutes = bench.time / 3600.0, recording.time.size / 200.0 / 60.0
     say(f"{hours:.1f} h on the rig, {minutes:.0f} min recorded")
     give(hours=hours, minutes_recorded=minutes)
     lining_file = out.with_name(f"{out.stem}-lining.toml")
     wrote(
-        out, beside, next=f"brake-ecu lab look {out}; brake-ecu identify friction {out} --out {lining_file}"
+        out,
+        beside,
+        next=f"brake-ecu lab report {out}; brake-ecu identify friction {out} --out {lining_file}",
     )
     return 0
 
@@ -198,11 +194,7 @@ def _read(data: list[Path], columns: Path | None) -> _Measured:
         parts.append(read.recording._replace(time=read.recording.time - read.recording.time[0] + begin))
     assert first is not None
     stops = find_stops(joined(parts), first, str(data[0]))
-    if len(stops.dead):
-        say(
-            f"{data[0]}: {len(stops.dead)} of {len(stops.dead) + len(stops)} stops left out, the first at "
-            f"{stops.dead[0]:.1f} s: their torque does not explain the loss of speed; check its sensor there"
-        )
+    say_dead(stops, str(data[0]))
     return _Measured(first, stops, float(np.median(heating)))
 
 

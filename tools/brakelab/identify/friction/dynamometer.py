@@ -11,6 +11,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.random import Generator
 
+from brakelab.identify.friction.columns import Uncertainty
 from brakelab.identify.friction.patches import bedded, draw_pad, run_pad
 from brakelab.identify.friction.recording import RATE, THRESHOLD, Recording, joined
 from brakelab.plant.disc import cooling_rate
@@ -47,6 +48,10 @@ class Noise(NamedTuple):
     speed: float = 0.05  # rad/s
     temperature: float = 0.5  # K
     thermocouple: float = 0.4  # s, time constant
+
+    def stated(self) -> Uncertainty:
+        """Return what a certificate of calibration states of these sensors."""
+        return Uncertainty(torque_gain=self.torque_gain, pressure=round(1e-5 * self.pressure_zero, 4))
 
 
 class Bench:

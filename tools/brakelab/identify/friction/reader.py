@@ -4,7 +4,7 @@ Rows whose numbers cannot be read, or whose time does not rise, are left out and
 turned to be positive; torque of one pad is doubled where the file of columns says so.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,6 +21,7 @@ from brakelab.logs.log_quality import Damage
 from ecu.errors import UserError
 
 Places = NDArray[np.int64]
+Labels = NDArray[np.str_]
 
 LEAST_SAMPLES = 100
 ANEW = 1.0  # of a file's time, by which a stop may begin later than the first
@@ -34,6 +35,8 @@ class Read(NamedTuple):
 
     recording: Recording
     columns: Columns
+    sections: Labels
+    """What the column of sections has, shape (samples,); without one, empty texts."""
     damaged: str
     """Rows that were left out, one line; empty if none."""
 
@@ -57,19 +60,19 @@ def read_recording(path: Path, columns: Path | None = None) -> Read:
     names = [getattr(described.columns, quantity)[0] for quantity in NAMES]
     damage = Damage()
     word, first = PLACES[path.suffix.lower()]
-    lines, raw = _joined(list(_rows(path, names, damage, first)))
+    lines, raw, labels = _joined(list(_rows(path, names, described.columns.section, damage, first)))
     whole = np.isfinite(raw)
     missing = ~whole.all(axis=0)
     if missing.any():
         row = int(np.argmax(missing))
         name = names[int(np.argmin(whole[:, row]))]
         damage.note_damage(int(missing.sum()), f"{word} {lines[row]} ({name} is no number)")
-    lines, raw = lines[~missing], raw[:, ~missing]
+    lines, raw, labels = lines[~missing], raw[:, ~missing], labels[~missing]
     raw[0] = _continued(raw[0])
     back = np.concatenate([[False], raw[0, 1:] <= np.maximum.accumulate(raw[0])[:-1]])[: raw.shape[1]]
     if back.any():
         damage.note_damage(int(back.sum()), f"{word} {lines[int(np.argmax(back))]} (time does not rise)")
-    raw = raw[:, ~back]
+    raw, labels = raw[:, ~back], labels[~back]
     if raw.shape[1] < LEAST_SAMPLES:
         because = f"; first left out: {damage.first_damaged}" if damage.damaged else ""
         raise UserError(str(path), "", f"only {raw.shape[1]} whole rows; needs {LEAST_SAMPLES}{because}")
@@ -78,34 +81,47 @@ def read_recording(path: Path, columns: Path | None = None) -> Read:
         f"{path}: {damage.damaged} {rows} left out, first: {damage.first_damaged}" if damage.damaged else ""
     )
     cut = f"{path}: {damage.cut}" if damage.cut else ""
-    return Read(_in_si(raw, described), described, "; ".join(part for part in (note, cut) if part))
+    return Read(_in_si(raw, described), described, labels, "; ".join(part for part in (note, cut) if part))
 
 
-def _joined(blocks: list[tuple[Places, Vector]]) -> tuple[Places, Vector]:
-    lines = [lines for lines, _ in blocks]
-    rows = [rows for _, rows in blocks]
-    return np.concatenate([np.empty(0, np.int64), *lines]), np.concatenate([np.empty((5, 0)), *rows], axis=1)
+def _joined(blocks: list[tuple[Places, Vector, Labels]]) -> tuple[Places, Vector, Labels]:
+    lines, rows, labels = zip(*blocks, strict=True) if blocks else ((), (), ())
+    return (
+        np.concatenate([np.empty(0, np.int64), *lines]),
+        np.concatenate([np.empty((5, 0)), *rows], axis=1),
+        np.concatenate([np.empty(0, np.str_), *labels]),
+    )
 
 
-def _rows(path: Path, names: list[str], damage: Damage, first: int) -> Iterator[tuple[Places, Vector]]:
-    """Yield where rows stand in the file, and their columns as numbers in its units, shape (5, rows)."""
+def _rows(
+    path: Path, names: list[str], section: str | None, damage: Damage, first: int
+) -> Iterator[tuple[Places, Vector, Labels]]:
+    """Yield where rows stand in the file, columns as numbers in its units, shape (5, rows), sections."""
     if path.suffix.lower() == ".mf4":
-        channels = _mdf(path, names)
-        yield first + np.arange(channels.shape[1]), channels
+        channels, labels = _mdf(path, names, section)
+        yield first + np.arange(channels.shape[1]), channels, labels
         return
+    read = list(dict.fromkeys([*names, *([section] if section else [])]))
     if path.suffix.lower() == ".parquet":
         import pyarrow.parquet as pq
 
-        _refuse_missing(path, names, pq.read_schema(path).names)
-        table = pq.read_table(path, columns=names)
+        _refuse_missing(path, read, pq.read_schema(path).names)
+        table = pq.read_table(path, columns=read)
         columns = np.array([_column(path, name, table[name]) for name in names])
-        yield first + np.arange(columns.shape[1]), columns
+        labels = _labels(table[section].to_pylist() if section else [""] * columns.shape[1])
+        yield first + np.arange(columns.shape[1]), columns, labels
         return
     found, delimiter, above, _ = header_of(path, names)
-    _refuse_missing(path, names, found)
-    for lines, batch in csv_rows(path, found, delimiter, list(dict.fromkeys(names)), damage, above):
+    _refuse_missing(path, read, found)
+    for lines, batch in csv_rows(path, found, delimiter, read, damage, above):
         cells = {name: numbers_of(batch.column(name).to_pylist()) for name in dict.fromkeys(names)}
-        yield lines, np.array([cells[name] for name in names])
+        labels = _labels(batch.column(section).to_pylist() if section else [""] * len(lines))
+        yield lines, np.array([cells[name] for name in names]), labels
+
+
+def _labels(cells: Sequence[object]) -> Labels:
+    """Return cells of a column of sections as text."""
+    return np.array(["" if cell is None else str(cell) for cell in cells], np.str_)
 
 
 def _continued(time: Vector) -> Vector:
@@ -132,19 +148,28 @@ def _column(path: Path, name: str, column: Any) -> Vector:
         raise UserError(str(path), name, f"is {column.type}, not numbers; write it as float") from None
 
 
-def _mdf(path: Path, names: list[str]) -> Vector:
-    """Return channels of an MDF4 file on the time of the pressure, shape (5, rows)."""
+def _mdf(path: Path, names: list[str], section: str | None) -> tuple[Vector, Labels]:
+    """Return channels of an MDF4 file on the time of the pressure, shape (5, rows), and its sections."""
     try:
         from asammdf import MDF
     except ImportError:
         raise UserError(str(path), "", "MDF4 needs asammdf: pip install asammdf") from None
     with MDF(path) as file:
-        _refuse_missing(path, names[1:], list(file.channels_db))
+        _refuse_missing(path, [*names[1:], *([section] if section else [])], list(file.channels_db))
         pressure = file.get(names[1])
         time = np.asarray(pressure.timestamps, dtype=float)
         others = [file.get(name) for name in names[2:]]
         values = [np.interp(time, other.timestamps, np.asarray(other.samples, float)) for other in others]
-        return np.array([time, np.asarray(pressure.samples, float), *values])
+        labels = _labels([""] * len(time))
+        if section:
+            steps = file.get(section)
+            held = np.maximum(np.searchsorted(steps.timestamps, time, side="right") - 1, 0)
+            labels = _labels([_text(steps.samples[place]) for place in held])
+        return np.array([time, np.asarray(pressure.samples, float), *values]), labels
+
+
+def _text(sample: object) -> str:
+    return sample.decode("utf-8", "replace") if isinstance(sample, bytes) else str(sample)
 
 
 def _in_si(raw: Vector, described: Columns) -> Recording:

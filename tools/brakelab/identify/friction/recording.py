@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from brakelab.arrays import Vector
-from brakelab.identify.friction.columns import Columns, columns_text
+from brakelab.identify.friction.columns import Columns, Uncertainty, columns_text
 from brakelab.plant.linings import Lining
 from ecu.errors import UserError
 
@@ -37,10 +37,16 @@ def check_name(path: Path) -> None:
         raise UserError(str(path), "", "give a name that ends in .csv or .parquet")
 
 
-def write_recording(path: Path, recording: Recording, lining: Lining, inertia: float) -> Path:
+def write_recording(
+    path: Path,
+    recording: Recording,
+    lining: Lining,
+    inertia: float,
+    uncertainty: Uncertainty | None = None,
+) -> Path:
     """Write `path` (.csv or .parquet), and beside it PATH.toml, which names columns, units and the brake.
 
-    `inertia` [kg m^2] is that of the flywheel. Returns the second file.
+    `inertia` [kg m^2] is that of the flywheel, `uncertainty` that of its sensors. Returns the second file.
 
     Raises:
         UserError: the ending of `path` is neither.
@@ -63,5 +69,5 @@ def write_recording(path: Path, recording: Recording, lining: Lining, inertia: f
 
         pq.write_table(pa.table(dict(zip(HEADER, columns, strict=True))), path, compression="zstd")
     beside = path.with_suffix(".toml")
-    beside.write_text(columns_text(Columns.own(lining, inertia)), encoding="utf-8")
+    beside.write_text(columns_text(Columns.own(lining, inertia, uncertainty)), encoding="utf-8")
     return beside

@@ -21,6 +21,7 @@ from brakelab.identify.friction.recording import Recording
 from brakelab.plant.jit import Record, kernel
 from brakelab.stretches import stretches
 from ecu.errors import UserError
+from ecu.output import say
 
 Places = NDArray[np.int64]
 
@@ -54,6 +55,7 @@ class Stops:
     block_stop: Places  # (blocks,), the stop of each
     mu: Vector  # (blocks,), measured
     mean: Vector  # (stops,), over distance, of the recursive curve (SAE J2522)
+    begin: Vector  # (stops,), s, of the recording
     start_speed: Vector  # (stops,), m/s, sliding
     start_temperature: Vector  # (stops,), degC
     held_pressure: Vector  # (stops,), Pa, mean where friction counts
@@ -133,6 +135,7 @@ def find_stops(recording: Recording, columns: Columns, where: str) -> Stops:
         np.concatenate(owners).astype(np.int64),
         np.concatenate(mu),
         np.array(mean),
+        np.array([time[run[0]] for run in runs]),
         np.array([speed[begin : begin + per_block].mean() for begin in first[:-1]]),
         np.array([recording.temperature[run[0] : run[0] + per_block].mean() for run in runs]),
         np.array(held),
@@ -140,6 +143,15 @@ def find_stops(recording: Recording, columns: Columns, where: str) -> Stops:
         lever,
         dead,
     )
+
+
+def say_dead(stops: Stops, where: str) -> None:
+    """Say which stops of the recording `where` are left out, if any."""
+    if len(stops.dead):
+        say(
+            f"{where}: {len(stops.dead)} of {len(stops.dead) + len(stops)} stops left out, the first at "
+            f"{stops.dead[0]:.1f} s: their torque does not explain the loss of speed; check its sensor there"
+        )
 
 
 def some(stops: Stops, wanted: Places) -> Stops:
@@ -154,7 +166,7 @@ def some(stops: Stops, wanted: Places) -> Stops:
     ]
     owners = [np.full(len(block), place) for place, block in enumerate(blocks)]
     sampled = ("pressure", "speed", "temperature", "torque")
-    each = ("mean", "start_speed", "start_temperature", "held_pressure")
+    each = ("mean", "begin", "start_speed", "start_temperature", "held_pressure")
     return replace(
         stops,
         first=first.astype(np.int64),

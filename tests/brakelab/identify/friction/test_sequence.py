@@ -1,19 +1,23 @@
-"""A programme of sections and its table of means: AK Master as shipped, and a short one run."""
+"""A programme of sections: AK Master as shipped, a full factorial, and a short one run."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from brakelab.identify.friction.ak_master import Sequence, load_sequence, means_table, run_sequence
-from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.dynamometer import new_bench
-from brakelab.identify.friction.stops import find_stops
+from brakelab.identify.friction.sequence import Sequence, load_sequence, run_sequence
 from brakelab.plant.description import PlantFileError
 from brakelab.plant.linings import Lining
 from ecu.settings.resources import resource
 
 AK_MASTER = resource("config/rig/ak-master.toml")
+
+
+def short(**keys: float) -> Sequence:
+    gate = {"warm_speed": 80.0, "warm_pressure": 20.0, "cool_speed": 80.0}
+    stop = {"name": "1", "speed": 80.0, "end_speed": 60.0, "level": [30.0], "temperature": [100.0], **keys}
+    return Sequence.model_validate({"title": "short", "gate": gate, "section": [stop]})
 
 
 def test_ak_master_has_its_fourteen_sections() -> None:
@@ -42,31 +46,20 @@ def test_a_section_s_applications(
     assert section.each()[-1] == last
 
 
-def test_the_means_are_those_of_the_recording(lining: Lining, columns: Columns) -> None:
-    """Law of constant friction 0.455 within the sensors' errors; the recording has the same stops."""
-    gate = {"warm_speed": 80.0, "warm_pressure": 20.0, "cool_speed": 80.0}
-    stop = {"speed": 80.0, "end_speed": 40.0, "temperature": [100.0, 140.0]}
-    sequence = Sequence.model_validate(
-        {
-            "title": "short",
-            "gate": gate,
-            "section": [
-                {"name": "3 characteristic value 3", "level": [30.0], "times": 2} | stop,
-                {"name": "9 fade 1", "control": "deceleration", "level": [4.0]} | stop,
-            ],
-        }
-    )
-    recording, means = run_sequence(new_bench(lining, "A", 2), sequence, columns, lambda share: None)
-    whole = find_stops(recording, columns, "short")
-    assert [len(each.mu) for each in means] == [4, 2]
-    assert np.concatenate([each.mu for each in means]) == pytest.approx(whole.mean)
-    assert means[0].start == pytest.approx([100.0, 140.0, 100.0, 140.0], abs=3.0)
-    assert means[0].pressure == pytest.approx([30e5] * 4, rel=0.01)
-    table = means_table("short", means)
-    assert table.rows[0][2:4] == ("4", f"{whole.mean[:4].mean():.3f}")
-    assert table.below == (
-        f"Friction: nominal {whole.mean[:4].mean():.3f}, least in fade 1 {whole.mean[4:].min():.3f}."
-    )
+def test_a_full_factorial_is_a_section_for_each_row_of_levels() -> None:
+    sections = load_sequence(resource("config/rig/cpc.toml")).section
+    assert len(sections) == 7 * 5
+    assert [section.name for section in sections[:2]] == ["50 °C, 60 km/h", "50 °C, 80 km/h"]
+    assert sections[-1].each() == [(10.0 * k, 200.0) for k in range(1, 10)]
+
+
+@pytest.mark.parametrize(("ramp", "samples"), [(0.1, 20), (0.5, 100)])
+def test_pressure_rises_in_the_time_that_the_section_asks_for(
+    lining: Lining, ramp: float, samples: int
+) -> None:
+    recording = run_sequence(new_bench(lining, "A", 2), short(ramp=ramp), lambda share: None)
+    risen = int(np.argmax(recording.pressure > 0.97 * 30e5))
+    assert risen == pytest.approx(samples, abs=4)
 
 
 def test_a_section_without_levels_is_one_line(tmp_path: Path) -> None:
