@@ -63,10 +63,25 @@ def test_monte_carlo_agrees(recording: Recording, columns: Columns, stops: Stops
     np.testing.assert_allclose(u, means.std(axis=0, ddof=1), rtol=0.2)
 
 
-def test_by_hand(columns: Columns, stops: Stops) -> None:
-    """At 20 bar on the pads and 0.4: 3 % of torque, 0.4 bar of zero (2 %) and 1 % of radius are 3.742 %."""
-    one = replace(stops, mean=np.array([0.4]), held_pressure=np.array([20e5]))
-    given = Uncertainty(torque_gain=0.03, pressure=0.4, effective_radius=0.01)
-    u = standard_uncertainty(one, columns.model_copy(update={"uncertainty": given}))
-    assert u == pytest.approx([0.4 * np.sqrt(0.03**2 + 0.02**2 + 0.01**2)])
-    assert standard_uncertainty(one, columns) is None
+@pytest.mark.parametrize(
+    ("given", "share"),
+    [
+        ({"torque": 33.0}, 0.05),  # of 660 N m
+        ({"torque_gain": 0.03}, 0.03),
+        ({"pressure": 0.4}, 0.02),
+        ({"pressure_gain": 0.01}, 0.0125),  # of the 25 bar that the sensor shows
+        ({"push_out_pressure": 0.2}, 0.01),
+        ({"piston_area": 0.02}, 0.02),
+        ({"torque_gain": 0.03, "pressure": 0.8}, 0.05),
+    ],
+)
+def test_by_hand(columns: Columns, stops: Stops, given: dict[str, float], share: float) -> None:
+    """At 20 bar on the pads, 5 bar of push-out pressure, friction 0.4 and 660 N m."""
+    one = replace(stops, mean=np.array([0.4]), held_pressure=np.array([20e5]), lever=660.0 / 0.4 / 20e5)
+    rig = columns.rig.model_copy(update={"push_out_pressure": 5.0})
+    stated = columns.model_copy(update={"uncertainty": Uncertainty(**given), "rig": rig})
+    assert standard_uncertainty(one, stated) == pytest.approx([0.4 * share])
+
+
+def test_what_states_nothing_has_none(columns: Columns, stops: Stops) -> None:
+    assert standard_uncertainty(stops, columns) is None
