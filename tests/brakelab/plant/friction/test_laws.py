@@ -15,9 +15,12 @@ from scipy.interpolate import RegularGridInterpolator
 from brakelab.plant.description import Plant, PlantFileError, load_plant
 from brakelab.plant.dynamometer import PRESSURE, STEP, new_stop, run_stop
 from brakelab.plant.friction.constant import Constant
-from brakelab.plant.friction.law import ROW, RigBrake, linear_step
+from brakelab.plant.friction.law import ROW, Law, RigBrake, linear_step
 from brakelab.plant.friction.laws import LAWS, friction, law_row
+from brakelab.plant.friction.network import WEIGHTS, Network
 from brakelab.plant.friction.own import Own
+from brakelab.plant.friction.quadratic import Quadratic
+from brakelab.plant.friction.static_lugre import StaticLugre
 from brakelab.plant.friction.table import Table
 from brakelab.plant.linings import Lining, rig_with
 
@@ -35,6 +38,31 @@ TABLE = Table(
     ),
 )
 CONSTANT = Constant(law="constant", rig_mass=1000.0, mu=0.42)
+QUADRATIC = Quadratic(
+    law="quadratic",
+    rig_mass=1000.0,
+    speed=(2.0, 12.0),
+    pressure=(10.0, 90.0),
+    factors=(0.4, -0.03, 0.05, 0.02, -0.01, -0.04),
+)
+LUGRE = StaticLugre(
+    law="static_lugre",
+    rig_mass=1000.0,
+    coulomb=0.36,
+    static=0.44,
+    stribeck=3.0,
+    viscous=-0.002,
+    highest_speed=15.0,
+)
+NETWORK = Network(
+    law="network",
+    rig_mass=1000.0,
+    low=(1.0, 5e5, 40.0),
+    high=(15.0, 90e5, 300.0),
+    middle=(7.0, 40e5, 150.0, 0.42),
+    scale=(4.0, 20e5, 60.0, 0.03),
+    weights=tuple(np.random.default_rng(5).standard_normal(WEIGHTS)),
+)
 
 Rate = Callable[[float, float, float, float, float], tuple[float, float]]
 """(memory, pressure, sliding speed, slowing per mu, temperature) -> (d memory/dt, mu)."""
@@ -232,6 +260,51 @@ def test_a_mistake_in_a_lining_file_is_one_line(tmp_path: Path, old: str, new: s
     assert "\n" not in str(caught.value)
 
 
+def at(law: Law, speed: float, bar: float, temperature: float) -> float:
+    number, row = law_row(law, BRAKE_A)
+    memory, mu = friction(number, row, 0.7, 1e5 * bar, speed, 3.0, temperature, 1e-3)
+    assert memory == 0.7
+    return mu
+
+
+@pytest.mark.parametrize(
+    ("speed", "bar", "expected"),
+    [
+        (7.0, 50.0, 0.4),  # the middle of both
+        (12.0, 50.0, 0.4 - 0.03 + 0.02),
+        (7.0, 90.0, 0.4 + 0.05 - 0.04),
+        (2.0, 10.0, 0.4 + 0.03 - 0.05 + 0.02 - 0.01 - 0.04),
+        (1.0, 5.0, 0.4 + 0.03 - 0.05 + 0.02 - 0.01 - 0.04),  # held at the edge
+        (30.0, 120.0, 0.4 - 0.03 + 0.05 + 0.02 - 0.01 - 0.04),
+        (9.5, 50.0, 0.4 - 0.015 + 0.005),
+    ],
+)
+def test_a_quadratic_surface_by_hand(speed: float, bar: float, expected: float) -> None:
+    assert at(QUADRATIC, speed, bar, 100.0) == at(QUADRATIC, speed, bar, 400.0) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("speed", "expected"),
+    [(0.0, 0.44), (3.0, 0.36 + 0.08 / math.e - 0.006), (15.0, 0.33), (40.0, 0.33)],
+)
+def test_static_lugre_by_hand(speed: float, expected: float) -> None:
+    assert at(LUGRE, speed, 10.0, 20.0) == at(LUGRE, speed, 90.0, 300.0) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("change", "line"),
+    [
+        (NETWORK.model_dump() | {"weights": (0.1,) * 92}, "at least 93 items"),
+        (NETWORK.model_dump() | {"scale": (1.0, 1.0, 0.0, 1.0)}, "scales above zero"),
+        (NETWORK.model_dump() | {"low": (16.0, 5e5, 40.0)}, "low below high"),
+        (QUADRATIC.model_dump() | {"speed": (12.0, 2.0)}, "give the lower bound first"),
+    ],
+)
+def test_a_law_without_memory_that_is_none_is_refused(change: dict[str, object], line: str) -> None:
+    with pytest.raises(ValueError, match=line):
+        (Network if change["law"] == "network" else Quadratic).model_validate(change)
+
+
 def test_constant_friction_depends_on_nothing() -> None:
     number, row = law_row(CONSTANT, BRAKE_A)
     found = {
@@ -244,7 +317,7 @@ def test_constant_friction_depends_on_nothing() -> None:
 
 
 def test_every_law_has_its_number_and_its_row(suv: Plant) -> None:
-    entries = [*suv.linings.lining["A"].friction.values(), TABLE, CONSTANT]
+    entries = [*suv.linings.lining["A"].friction.values(), TABLE, CONSTANT, QUADRATIC, LUGRE, NETWORK]
     assert {type(entry) for entry in entries} == set(LAWS) - {Own}
     for entry in entries:
         number, row = law_row(entry, BRAKE_A)

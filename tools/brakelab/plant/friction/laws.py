@@ -10,9 +10,12 @@ from brakelab.plant.friction import (
     constant,
     ilvo,
     ilvo_bounded,
+    network,
     ostermeyer,
     ostermeyer_revised,
     own,
+    quadratic,
+    static_lugre,
     surface,
     table,
 )
@@ -20,9 +23,12 @@ from brakelab.plant.friction.constant import Constant
 from brakelab.plant.friction.ilvo import Ilvo
 from brakelab.plant.friction.ilvo_bounded import IlvoBounded
 from brakelab.plant.friction.law import ROW, Law, RigBrake
+from brakelab.plant.friction.network import Network
 from brakelab.plant.friction.ostermeyer import Ostermeyer
 from brakelab.plant.friction.ostermeyer_revised import OstermeyerRevised
 from brakelab.plant.friction.own import Own
+from brakelab.plant.friction.quadratic import Quadratic
+from brakelab.plant.friction.static_lugre import StaticLugre
 from brakelab.plant.friction.surface import Surface
 from brakelab.plant.friction.table import Table
 from brakelab.plant.jit import Record, kernel
@@ -35,10 +41,23 @@ LAWS: Final[tuple[type[Law], ...]] = (
     Constant,
     Table,
     Surface,
+    Quadratic,
+    StaticLugre,
+    Network,
     Own,
 )
 AnyLaw = Annotated[
-    IlvoBounded | Ilvo | Ostermeyer | OstermeyerRevised | Constant | Table | Surface | Own,
+    IlvoBounded
+    | Ilvo
+    | Ostermeyer
+    | OstermeyerRevised
+    | Constant
+    | Table
+    | Surface
+    | Quadratic
+    | StaticLugre
+    | Network
+    | Own,
     Field(discriminator="law"),
 ]
 
@@ -77,4 +96,10 @@ def friction(
         return table.step(row, memory, pressure, speed, slowing, temperature, dt)
     if law == 6:
         return surface.step(row, memory, pressure, speed, slowing, temperature, dt)
+    if law == 7:
+        return quadratic.step(row, memory, pressure, speed, slowing, temperature, dt)
+    if law == 8:
+        return static_lugre.step(row, memory, pressure, speed, slowing, temperature, dt)
+    if law == 9:
+        return network.step(row, memory, pressure, speed, slowing, temperature, dt)
     return own.step(row, memory, pressure, speed, slowing, temperature, dt)
