@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 from scipy.optimize import approx_fprime
 
-from brakelab.identify.friction.network import loss, train
+from brakelab.identify.friction.network import loss, train, train_best
+from brakelab.identify.friction.static_candidates import trained_network
+from brakelab.identify.friction.stops import Stops, block_inputs
+from brakelab.plant.friction.law import RigBrake
+from brakelab.plant.friction.laws import friction, law_row
 
 
 def test_back_propagation_is_the_derivative() -> None:
@@ -34,3 +38,28 @@ def test_noise_is_not_learned() -> None:
     inputs, output = random.standard_normal((400, 3)), random.standard_normal(400)
     network = train(inputs, output, np.repeat(np.arange(40), 10), 0)
     assert np.std(network(inputs)) < 0.6
+
+
+def test_the_best_of_four_starts_is_taken(stops: Stops) -> None:
+    inputs = block_inputs(stops)
+    every = [train(inputs, stops.mu, stops.block_stop, 0, start) for start in range(4)]
+    best, agreed = train_best(inputs, stops.mu, stops.block_stop, 0)
+    assert best.aside == min(one.aside for one in every)
+    assert len({one.aside for one in every}) == 4
+    assert agreed == sum(one.aside <= 1.05 * best.aside for one in every)
+
+
+def test_the_law_of_the_plant_is_the_trained_network(stops: Stops) -> None:
+    """Within what it was trained on; beyond, what it is at the edge."""
+    candidate = trained_network(1000.0)
+    assert candidate.train is not None
+    law = candidate.law(candidate.train(stops, 0).values)
+    brake = RigBrake(piston_area=2.8e-3, pad_area=7e-3, effective_radius=0.15, tyre_radius=0.36)
+    number, row = law_row(law, brake)
+    inputs = block_inputs(stops)
+    network, _ = train_best(inputs, stops.mu, stops.block_stop, 0)
+    low, high = inputs.min(axis=0), inputs.max(axis=0)
+    tried = np.vstack([inputs[::97], low - 0.2 * (high - low), high + 0.2 * (high - low)])
+    found = [friction(number, row, 0.3, p, v, 1.0, heat, 0.01) for v, p, heat in tried]
+    assert [mu for _, mu in found] == pytest.approx(network(np.clip(tried, low, high)), rel=1e-9)
+    assert {memory for memory, _ in found} == {0.3}

@@ -5,13 +5,15 @@ the recording: knots of the tables span its temperatures and pressures, the debr
 inertia.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Final, Literal, NamedTuple
+from typing import Final, Literal
 
 import numpy as np
 
 from brakelab.arrays import Vector
+from brakelab.identify.friction.candidate import Candidate, Free
+from brakelab.identify.friction.static_candidates import quadratic, static_lugre, trained_network
 from brakelab.identify.friction.stops import Stops
 from brakelab.plant.friction.constant import Constant
 from brakelab.plant.friction.ilvo import Ilvo
@@ -28,53 +30,6 @@ TEMPERATURES: Final = 6  # knots of a table
 PRESSURES: Final = 3
 
 
-class Free(NamedTuple):
-    """A number that is searched."""
-
-    name: str
-    unit: str
-    low: float
-    high: float
-    log: bool = False
-    friction: bool = False
-    """Is a friction: starts of a search have it near the measured mean."""
-
-    def value(self, share: float) -> float:
-        """Return the number at `share` 0 to 1 between its bounds."""
-        if self.log:
-            return float(self.low * (self.high / self.low) ** share)
-        return self.low + share * (self.high - self.low)
-
-    def share(self, value: float) -> float:
-        """Return where `value` lies between the bounds, 0 to 1."""
-        if self.log:
-            return float(np.log(value / self.low) / np.log(self.high / self.low))
-        return (value - self.low) / (self.high - self.low)
-
-    def slope(self, share: float) -> float:
-        """Return the derivative of `value`."""
-        if self.log:
-            return self.value(share) * float(np.log(self.high / self.low))
-        return self.high - self.low
-
-
-class Candidate(NamedTuple):
-    """A law to identify. `starts_at_measured`: its memory starts at the friction first measured (3.6)."""
-
-    name: str
-    free: tuple[Free, ...]
-    law: Callable[[Sequence[float]], Law]
-    starts_at_measured: bool = False
-    extrapolates: str = ""
-    """Where the law must not be used beyond the data, and why."""
-    bounded: bool = False
-    """Beyond the data it keeps its value at their edge."""
-
-    def values(self, shares: Sequence[float] | Vector) -> list[float]:
-        """Return the numbers at these shares."""
-        return [free.value(share) for free, share in zip(self.free, shares, strict=True)]
-
-
 def candidates(stops: Stops, brake: RigBrake, own: Sequence[str] = ()) -> list[Candidate]:
     """Return all laws for a recording, the simplest first; at last those of one's `own`: files, entry points.
 
@@ -84,12 +39,15 @@ def candidates(stops: Stops, brake: RigBrake, own: Sequence[str] = ()) -> list[C
     mass = stops.inertia / brake.tyre_radius**2
     shipped = [
         _constant(mass),
+        static_lugre(stops, mass),
+        quadratic(stops, mass),
         _table(stops, mass),
         _surface(mass),
         _ostermeyer(mass),
         _revised(mass),
         ilvo(mass),
         _bounded(stops, mass),
+        trained_network(mass),
     ]
     laws = [*shipped, *(own_candidate(code, mass) for code in own)]
     names = [law.name for law in laws]

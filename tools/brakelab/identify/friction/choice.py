@@ -120,7 +120,7 @@ def judge(job: _Job) -> Judged:
         candidate.name,
         fitted.law,
         candidate.starts_at_measured,
-        len(candidate.free),
+        candidate.size,
         100.0 * float(np.sqrt(np.mean(fitted.residuals**2)) / np.mean(job.stops.mu)),
         held_out,
         candidate.bounded,
@@ -139,7 +139,7 @@ def criterion(fitted: Fitted, stops: Stops) -> float:
     """Return n ln(mean square) + k ln n, n the number of stops."""
     count = len(stops)
     mean_square = max(float(np.mean(fitted.residuals**2)), 1e-300)
-    return count * float(np.log(mean_square)) + len(fitted.candidate.free) * float(np.log(count))
+    return count * float(np.log(mean_square)) + fitted.candidate.size * float(np.log(count))
 
 
 def choose(laws: tuple[Judged, ...]) -> Judged:

@@ -26,7 +26,7 @@ from scipy.optimize import least_squares, minimize
 from scipy.stats import qmc, t
 
 from brakelab.arrays import Matrix, Vector
-from brakelab.identify.friction.candidates import Candidate
+from brakelab.identify.friction.candidate import Candidate
 from brakelab.identify.friction.stops import Stops, some
 from brakelab.plant.dynamometer import HIGHEST_PRESSURE, SMALLEST_LEVER
 from brakelab.plant.friction.law import START, Law, RigBrake
@@ -174,6 +174,8 @@ def held_by(stops: Stops) -> float:
 
 def fit(candidate: Candidate, brake: RigBrake, stops: Stops, seed: int = 0) -> Fitted:
     """Return the law that fits `stops` best, starts drawn by `seed`."""
+    if candidate.train is not None:
+        return _trained(candidate, brake, stops, seed)
     count = len(candidate.free)
     part = stops
     if len(stops) > PART:
@@ -204,8 +206,18 @@ def fit(candidate: Candidate, brake: RigBrake, stops: Stops, seed: int = 0) -> F
 def refit(fitted: Fitted, brake: RigBrake, stops: Stops) -> Law:
     """Return the law fitted to other `stops`, by least squares from where `fitted` ended."""
     candidate = fitted.candidate
+    if candidate.train is not None:
+        return _trained(candidate, brake, stops, 0).law
     found = _least_squares(residual_function(candidate, brake, stops), fitted.shares)
     return candidate.law(candidate.values(found.x))
+
+
+def _trained(candidate: Candidate, brake: RigBrake, stops: Stops, seed: int) -> Fitted:
+    assert candidate.train is not None
+    found = candidate.train(stops, seed)
+    law = candidate.law(found.values)
+    left = replayed(law, brake, stops, candidate.starts_at_measured) - stops.mu
+    return Fitted(candidate, np.empty(0), law, left, np.empty(0), (), found.agreed, found.tried)
 
 
 def _starts(candidate: Candidate, mean: float, seed: int) -> Matrix:

@@ -145,6 +145,13 @@ def find_stops(recording: Recording, columns: Columns, where: str) -> Stops:
     )
 
 
+def block_inputs(stops: Stops) -> NDArray[np.float64]:
+    """Return sliding speed [m/s], pressure [Pa] and temperature [degC] of the blocks, shape (blocks, 3)."""
+    at = stops.block_first[:, None] + np.arange(stops.per_block)
+    columns = (stops.speed, stops.pressure, stops.temperature)
+    return np.stack([column[at].mean(axis=1) for column in columns], axis=1)
+
+
 def say_dead(stops: Stops, where: str) -> None:
     """Say which stops of the recording `where` are left out, if any."""
     if len(stops.dead):

@@ -55,7 +55,7 @@ brake-ecu lab look own.csv
 cp brake.toml linings.toml
 ```
 
-The first shows what moves friction; the second identifies seven laws, one line each, chooses one and
+The first shows what moves friction; the second identifies all laws, one line each, chooses one and
 writes all (`--held-out` names a second recording to choose by, `--profile ilvo` adds the profile
 likelihood of a law). The third runs the chosen law on the simulated dynamometer through the constant
 pressure cycle, the fourth looks at that as at the original. `linings.toml` beside a vehicle file of the

@@ -10,12 +10,11 @@ from brakelab.identify.friction.estimators import (
     NETWORK,
     SURFACE,
     Estimator,
-    block_inputs,
     error_by_temperature,
     errors_by_manoeuvre,
     estimators,
 )
-from brakelab.identify.friction.stops import Stops
+from brakelab.identify.friction.stops import Stops, block_inputs
 from brakelab.identify.friction.trips import Trip, drive, manoeuvres
 from brakelab.studies.lab.brakes import SEED, columns_of, linings
 
