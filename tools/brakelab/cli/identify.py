@@ -43,13 +43,17 @@ def friction(
         list[str] | None,
         typer.Option("--own", metavar="LAW.py", help="A law of your own: a file, or an entry point's name"),
     ] = None,
+    discover: Annotated[
+        Path | None,
+        typer.Option("--discover", metavar="LAW.py", help="Law to write of the terms found, and to identify"),
+    ] = None,
 ) -> int:
     """Identify a friction law from dynamometer recordings. Fit all laws, choose one, state its limits."""
     from brakelab.identify.friction import command
     from ecu.compiling import report_compiling
 
     with report_compiling():
-        return command.friction(data, columns, held_out, out, profile, tuple(own or ()))
+        return command.friction(data, columns, held_out, out, profile, tuple(own or ()), discover)
 
 
 @app.command()

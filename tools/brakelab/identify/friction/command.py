@@ -9,8 +9,9 @@ from rich.console import Console
 from brakelab.identify.friction.analysis import history_effect, principal_components
 from brakelab.identify.friction.candidates import candidates
 from brakelab.identify.friction.check import refuse_nonsense
-from brakelab.identify.friction.choice import identify
+from brakelab.identify.friction.choice import hottest, identify
 from brakelab.identify.friction.columns import Columns
+from brakelab.identify.friction.discovered_law import discovered_law
 from brakelab.identify.friction.dynamometer import new_bench
 from brakelab.identify.friction.fit import fit
 from brakelab.identify.friction.heat_capacity import SLOW, heat_capacity, undelayed
@@ -31,7 +32,7 @@ from brakelab.identify.friction.tables import (
 )
 from brakelab.plant.description import PlantFileError, read_file
 from brakelab.plant.linings import Lining, Linings
-from brakelab.results.outputs import check_outputs
+from brakelab.results.outputs import check_outputs, write_text
 from brakelab.results.progress import progress_bar
 from brakelab.results.text_table import show
 from ecu.errors import UserError
@@ -106,13 +107,15 @@ def friction(
     out: Path,
     profile: str | None = None,
     own: tuple[str, ...] = (),
+    discover: Path | None = None,
 ) -> int:
     """Identify all laws, print them, and write them with the chosen one as a lining file. Returns 0.
 
     A page with the law's fit is written beside it, with the ending .html.
 
     `data` are recordings of one brake; `columns` describes them all, default: the file beside each;
-    `held_out` is a recording that the choice is made by; `own` are laws of one's own.
+    `held_out` is a recording that the choice is made by; `own` are laws of one's own; to `discover` a law of
+    the terms that these stops show is written, which is then identified like those.
 
     Raises:
         UserError: a file cannot be read or makes no physical sense, or holds too few stops; one line.
@@ -120,13 +123,24 @@ def friction(
     page = out.with_suffix(".html")
     recordings = [*data, *([held_out] if held_out else [])]
     described_by = [columns or path.with_suffix(".toml") for path in recordings]
-    check_outputs(out, (out, page), [*recordings, *described_by, *map(Path, own)], toml=True)
+    read = [*recordings, *described_by, *map(Path, own)]
+    check_outputs(out, (out, page), read, toml=True)
+    if discover is not None:
+        if discover.suffix != ".py":
+            raise UserError("--discover", str(discover), "is written as Python; let the name end in .py")
+        check_outputs(discover, (discover,), read, option="--discover")
     measured = _read(data, columns)
     _need(measured.stops, data[0])
     heat = heat_capacity(measured.stops, measured.columns)
     if heat.lag > SLOW:
         say(f"{data[0]}: the thermocouple lags {heat.lag:.1f} s: what it has not shown is added by the work")
     measured = measured._replace(stops=undelayed(measured.stops, heat, measured.columns))
+    if discover is not None:
+        seen = measured.stops if held_out is not None else hottest(measured.stops)[0]
+        found, code = discovered_law(seen)
+        write_text(discover, code, "--discover")
+        say(f"{discover}: {', '.join(found.names())}; nRMSE {found.error:.2f} % in the search")
+        own = (*own, str(discover))
     own = tuple(str(Path(code).resolve()) if code.endswith(".py") else code for code in own)
     try:
         known = candidates(measured.stops, measured.columns.brake, own)
