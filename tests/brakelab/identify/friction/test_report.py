@@ -186,10 +186,26 @@ def test_a_shipped_programme_is_recognised(capsys: pytest.CaptureFixture[str]) -
     assert [row[0] for row in found["tables"][0]["rows"]] == [f"{t} °C, 100 km/h" for t in range(50, 301, 50)]
 
 
+@pytest.mark.parametrize(("factor", "said"), [(0.78, "at 0.7"), (0.95, ""), (1.25, "at 1.2")])
+def test_speeds_of_no_such_programme_are_said(
+    folder: Path, capsys: pytest.CaptureFixture[str], factor: float, said: str
+) -> None:
+    """rad/s that were called km/h, say, on a tyre of 0.36 m: 0.77 of the speeds."""
+    table = pq.read_table(folder / "one.parquet").to_pandas()
+    table.assign(speed_km_h=factor * table["speed_km_h"]).to_csv(folder / "slow.csv", index=False)
+    text = re.sub(r"inertia = .*\n", "", (folder / "one.toml").read_text("utf-8"))
+    (folder / "slow.toml").write_text(text, "utf-8")
+    assert cli.main(["lab", "report", "slow.csv", "--programme", "short-programme.toml"]) == 0
+    error = capsys.readouterr().err
+    assert ("times the speeds of short: check the unit of speed" in error) == bool(said)
+    assert said in error
+
+
 @pytest.mark.parametrize(
     ("line", "said"),
     [
         ("lab report none.csv", "none.csv: no such file"),
+        ("lab report one.parquet --columns none.toml", "none.toml: no such file"),
         ("lab report one.parquet --programme nothing", "nothing: no such file, and none that is shipped"),
         ("lab report ams.csv --programme ak-master", "only 1 of 6 stops are of it; give --programme"),
         ("lab report one.parquet --programme one.toml", "one.toml: "),

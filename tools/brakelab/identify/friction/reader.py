@@ -53,8 +53,11 @@ def read_recording(path: Path, columns: Path | None = None) -> Read:
         raise UserError(str(path), "", f"ends in none of {' '.join(PLACES)}; export it as CSV")
     beside = columns or path.with_suffix(".toml")
     if not beside.is_file():
-        raise UserError(
-            str(path), "", "no file of columns; give --columns (docs/results/friction-lab.md has one)"
+        remedy = "no file of columns; give --columns (docs/results/friction-lab.md has one)"
+        raise (
+            UserError(str(path), "", remedy)
+            if columns is None
+            else UserError(str(columns), "", "no such file")
         )
     described = load_columns(beside)
     names = [getattr(described.columns, quantity)[0] for quantity in NAMES]

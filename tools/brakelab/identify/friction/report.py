@@ -16,7 +16,7 @@ from brakelab.identify.friction.report_tables import (
     measured,
     section_table,
 )
-from brakelab.identify.friction.sections import conditions_of, find_sections, number_of
+from brakelab.identify.friction.sections import conditions_of, find_sections, number_of, speed_ratio
 from brakelab.identify.friction.sequence import Sequence, load_sequence
 from brakelab.identify.friction.stops import find_stops, say_dead
 from brakelab.plant.description import PlantFileError
@@ -27,6 +27,8 @@ from ecu.errors import UserError
 from ecu.output import give, say, wrote
 from ecu.settings.resources import named, resource
 
+DOUBTFUL_SPEED: Final = 0.08
+"""Share by which most stops begin faster or slower than the programme asks, that is no rig's tolerance."""
 ENOUGH: Final = 0.5
 """Share of the stops of a recording that must be of a section."""
 
@@ -103,6 +105,11 @@ def _measure(path: Path, columns: Path | None, known: list[Sequence]) -> tuple[S
     if len(stops) - len(outside) < ENOUGH * len(stops):
         remedy = f"only {len(stops) - len(outside)} of {len(stops)} stops are of it; give --programme"
         raise UserError(str(path), sequence.title, remedy)
+    if (off := speed_ratio(sequence, parts, conditions)) and abs(off - 1.0) > DOUBTFUL_SPEED:
+        say(
+            f"{path}: the stops begin at {off:.2f} times the speeds of {sequence.title}: check the unit of speed "
+            "and the tyre radius; of a programme of other speeds give --programme"
+        )
     return sequence, measured(path.stem, stops, read.columns, parts, outside)
 
 

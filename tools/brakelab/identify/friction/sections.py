@@ -120,6 +120,13 @@ def find_sections(
     return parts, np.flatnonzero(matched < 0)
 
 
+def speed_ratio(sequence: Sequence, parts: list[Part], found: Conditions) -> float:
+    """Return the median of the initial speeds over those that the sections ask for; 0 without any."""
+    asked = {one.name: one.speed for one in sequence.section}
+    ratios = [found.speed[part.stops] / asked[part.name] for part in parts]
+    return float(np.median(np.concatenate(ratios))) if ratios else 0.0
+
+
 def number_of(label: str) -> str:
     """Return the number that a name of a section begins with, empty if none."""
     return match[1] if (match := NUMBER.match(label)) else ""
