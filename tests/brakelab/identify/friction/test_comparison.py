@@ -46,7 +46,10 @@ def test_a_section_is_a_t_test_of_pairs(stops: Stops, columns: Columns) -> None:
     """What rises over the test in both is no scatter."""
     one, other = recorded(stops, columns, 1), recorded(stops, columns, 2, level=1.05)
     rows = compare(one, other)
-    for row, mine, theirs in zip(rows, one.parts, other.parts, strict=True):
+    whole = ttest_rel(np.log(other.stops.mean), np.log(one.stops.mean)).pvalue
+    assert (rows[-1].name, rows[-1].pairs) == ("all together", SECTIONS * EACH)
+    assert rows[-1].p == pytest.approx(whole)
+    for row, mine, theirs in zip(rows[:-1], one.parts, other.parts, strict=True):
         p = ttest_rel(np.log(other.mu(theirs)), np.log(one.mu(mine))).pvalue
         assert row.p == pytest.approx(p)
         assert row.low < row.change < row.high
@@ -79,11 +82,12 @@ def test_ten_per_cent_are_found(stops: Stops, columns: Columns) -> None:
 def test_pairs_are_of_the_same_place(stops: Stops, columns: Columns) -> None:
     """An application that one of them lacks is in no pair; without three pairs there is no test."""
     rows = compare(recorded(stops, columns, 1), recorded(stops, columns, 2, lost=1))
-    assert {row.pairs for row in rows} == {3}
+    assert [row.pairs for row in rows] == [3] * 6 + [18]
     rows = compare(recorded(stops, columns, 1), recorded(stops, columns, 2, lost=2))
-    assert all(np.isnan(row.p) and np.isnan(row.adjusted) for row in rows)
+    assert all(np.isnan(row.p) and np.isnan(row.adjusted) for row in rows[:-1])
+    assert np.isfinite(rows[-1].p)  # six sections of two are twelve pairs
     table = comparison_table(recorded(stops, columns, 1), recorded(stops, columns, 2), rows)
-    assert {row[-1] for row in table.rows} == {"too few"}
+    assert {row[-1] for row in table.rows[:-1]} == {"too few"}
     assert "0 of 0 sections differ" in table.below
 
 

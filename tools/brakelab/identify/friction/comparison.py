@@ -13,13 +13,14 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy.stats import t as student
 
-from brakelab.arrays import Vector
+from brakelab.arrays import Matrix, Vector
 from brakelab.identify.friction.report_tables import Measured
 from brakelab.identify.friction.sections import Part
 from brakelab.results.text_table import Table
 
 ALPHA: Final = 0.05
 FEWEST_PAIRS: Final = 3
+TOGETHER: Final = "all together"
 
 
 class Compared(NamedTuple):
@@ -36,28 +37,39 @@ class Compared(NamedTuple):
 
 
 def compare(first: Measured, second: Measured) -> list[Compared]:
-    """Return the sections that both recordings have, in the order of the programme."""
+    """Return the sections that both recordings have, in the order of the programme, and all together."""
     others = {part.name: part for part in second.parts}
-    rows = [_paired(part, first, others[part.name], second) for part in first.parts if part.name in others]
+    pairs = {
+        part.name: _pairs(part, first, others[part.name], second)
+        for part in first.parts
+        if part.name in others
+    }
+    if len(pairs) > 1:
+        pairs[TOGETHER] = np.concatenate(list(pairs.values()), axis=1)
+    rows = [_compared(name, *mu) for name, mu in pairs.items()]
     adjusted = holm(np.array([row.p for row in rows]))
     return [row._replace(adjusted=float(p)) for row, p in zip(rows, adjusted, strict=True)]
 
 
-def _paired(one: Part, first: Measured, other: Part, second: Measured) -> Compared:
+def _pairs(one: Part, first: Measured, other: Part, second: Measured) -> Matrix:
+    """Return friction of the applications that both have, shape (2, pairs)."""
     _, here, there = np.intersect1d(one.places, other.places, return_indices=True)
-    mu, with_mu = first.mu(one)[here], second.mu(other)[there]
+    return np.stack([first.mu(one)[here], second.mu(other)[there]])
+
+
+def _compared(name: str, mu: Vector, with_mu: Vector) -> Compared:
     ratio = np.log(with_mu / mu)
     count = len(ratio)
-    means = float(mu.mean()) if count else np.nan, float(with_mu.mean()) if count else np.nan
-    middle = float(ratio.mean()) if count else np.nan
+    if not count:
+        return Compared(name, 0, (np.nan, np.nan), *[np.nan] * 5)
+    means, middle = (float(mu.mean()), float(with_mu.mean())), float(ratio.mean())
     if count < FEWEST_PAIRS:
-        return Compared(one.name, count, means, _percent(middle), np.nan, np.nan, np.nan, np.nan)
+        return Compared(name, count, means, _percent(middle), *[np.nan] * 4)
     error = float(ratio.std(ddof=1) / np.sqrt(count))
     half = float(student.ppf(1.0 - 0.5 * ALPHA, count - 1)) * error
     p = float(2.0 * student.sf(abs(middle) / max(error, 1e-300), count - 1))
-    return Compared(
-        one.name, count, means, _percent(middle), _percent(middle - half), _percent(middle + half), p, np.nan
-    )
+    ends = _percent(middle - half), _percent(middle + half)
+    return Compared(name, count, means, _percent(middle), *ends, p, np.nan)
 
 
 def _percent(logarithm: float) -> float:
@@ -91,12 +103,13 @@ def comparison_table(first: Measured, second: Measured, rows: list[Compared]) ->
                 ("differs" if row.adjusted < ALPHA else "–") if tested else "too few",
             )
         )
-    differ = sum(row.adjusted < ALPHA for row in rows)
-    tested = sum(bool(np.isfinite(row.p)) for row in rows)
+    sections = [row for row in rows if row.name != TOGETHER]
+    differ = sum(row.adjusted < ALPHA for row in sections)
+    tested = sum(bool(np.isfinite(row.p)) for row in sections)
     below = (
         f"Second: {second.name}. {differ} of {tested} sections differ. Pairs of applications at the same "
         "place of the programme: mean ratio with its interval of 95 %, t-test of pairs, p adjusted for all "
-        f"sections by Holm's method ({ALPHA:g} in all). Two recordings are two pads: the scatter between "
+        f"rows by Holm's method ({ALPHA:g} in all). Two recordings are two pads: the scatter between "
         "pads of one make is not in the intervals. What one rig's sensors are off by cancels."
     )
     columns = ("section", "pairs", "μ first", "μ second", "change [%]", "95 % [%]", "p", "note")

@@ -53,7 +53,7 @@ def law_code(found: Found, of: Library) -> str:
         ends = sorted((value * (1.0 - ABOUT), value * (1.0 + ABOUT)))
         numbers.append(f'    "{NAMES[term]}": ("SI", {ends[0]!r}, {ends[1]!r}),  # found: {value:.4g}')
         sums[_kind(term)].append(f"numbers[{place}] * {_code(term)}")
-    kappa, by_mu, by_alpha, plain = (" + ".join(parts) or "0.0" for parts in sums.values())
+    kappa, by_mu, by_alpha, plain = ("\n        + ".join(parts) or "0.0" for parts in sums.values())
     return f'''"""Terms found by `identify friction --discover`: mu_b = kappa alpha. Pa, m/s, K, s."""
 
 NUMBERS = {{
@@ -64,10 +64,20 @@ START = 1.0
 
 def step(numbers, memory, pressure, speed, slowing, temperature, dt):
     kelvin = temperature + 273.15
-    kappa = {kappa}
-    slope = kappa * ({by_mu}) + {by_alpha}
-    half = min(0.5 * dt * slope, 0.5)
-    memory = (memory * (1.0 + half) + dt * ({plain})) / (1.0 - half)
+    kappa = (
+        {kappa}
+    )
+    by_mu = (
+        {by_mu}
+    )
+    by_alpha = (
+        {by_alpha}
+    )
+    plain = (
+        {plain}
+    )
+    half = min(0.5 * dt * (kappa * by_mu + by_alpha), 0.5)
+    memory = (memory * (1.0 + half) + dt * plain) / (1.0 - half)
     return memory, kappa * memory
 '''
 

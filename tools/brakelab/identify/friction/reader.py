@@ -53,12 +53,10 @@ def read_recording(path: Path, columns: Path | None = None) -> Read:
         raise UserError(str(path), "", f"ends in none of {' '.join(PLACES)}; export it as CSV")
     beside = columns or path.with_suffix(".toml")
     if not beside.is_file():
+        if columns is not None:
+            raise UserError(str(columns), "", "no such file")
         remedy = "no file of columns; give --columns (docs/results/friction-lab.md has one)"
-        raise (
-            UserError(str(path), "", remedy)
-            if columns is None
-            else UserError(str(columns), "", "no such file")
-        )
+        raise UserError(str(path), "", remedy)
     described = load_columns(beside)
     names = [getattr(described.columns, quantity)[0] for quantity in NAMES]
     damage = Damage()

@@ -107,8 +107,8 @@ def _measure(path: Path, columns: Path | None, known: list[Sequence]) -> tuple[S
         raise UserError(str(path), sequence.title, remedy)
     if (off := speed_ratio(sequence, parts, conditions)) and abs(off - 1.0) > DOUBTFUL_SPEED:
         say(
-            f"{path}: the stops begin at {off:.2f} times the speeds of {sequence.title}: check the unit of speed "
-            "and the tyre radius; of a programme of other speeds give --programme"
+            f"{path}: the stops begin at {off:.2f} times the speeds of {sequence.title}: check the unit of "
+            "speed and the tyre radius; of a programme of other speeds give --programme"
         )
     return sequence, measured(path.stem, stops, read.columns, parts, outside)
 
