@@ -156,7 +156,7 @@ def friction(
     identified = identify(measured.columns, measured.stops, unseen, say, own)
     tables = [
         *law_tables(identified, described),
-        number_table(identified.chosen),
+        *([number_table(identified.chosen)] if identified.chosen.numbers else []),
         residual_table(identified.chosen, measured.columns, measured.stops),
     ]
     if profile is not None:

@@ -68,6 +68,7 @@ def write_report(
         f"{identified.speed[1]:.1f} m/s"
     )
     unsure = ", ".join(chosen.unidentified)
+    within = _over_time(stops, law)
     body = [
         f"<h1>Friction law of {escape(columns.name)}: {escape(chosen.name)}</h1>",
         f"<p>{identified.stops} stops; nRMSE {chosen.error:.2f} % on them, {chosen.held_out:.2f} % unseen. "
@@ -76,12 +77,33 @@ def write_report(
         + (f" Not identified by the data: {escape(unsure)}." if unsure else "")
         + "</p>",
         scrolling(chart_svg(fit, [("measured", GREY), ("law", BLUE)])),
+        "<h2>Friction over time</h2><p>From the stop that the law explains best to the one it explains worst.</p>",
+        scrolling(chart_svg(within, [("measured", GREY), ("law", BLUE)])),
         "<h2>What the law leaves</h2><p>A mark is a block of 50 ms, the line their mean. A line off zero is "
         "what the law has no term for.</p>",
         scrolling(chart_svg(left, [("blocks", BLUE), ("their mean", ORANGE)])),
         *(html_of(table) for table in tables),
     ]
     write_sheet(path, f"Friction law of {columns.name}", body)
+
+
+def _over_time(stops: Stops, law: Vector) -> list[Panel]:
+    """Return measured friction and the law's over time, as Figure 3.12, of four stops."""
+    off = np.array([np.mean((law - stops.mu)[stops.block_stop == stop] ** 2) for stop in range(len(stops))])
+    order = np.argsort(off, kind="stable")
+    picked = order[np.linspace(0, len(order) - 1, 4).astype(int)].tolist()
+    shown = [stops.block_stop == stop for stop in picked]
+    span = ends_of(*(values[at] for at in shown for values in (law, stops.mu)))
+    panels = []
+    for stop, at in zip(picked, shown, strict=True):
+        t = (stops.block_first[at] - stops.first[stop]) * stops.dt
+        title = (
+            f"stop {stop + 1}: {1e-5 * stops.held_pressure[stop]:.0f} bar, "
+            f"from {stops.start_temperature[stop]:.0f} °C, {stops.start_speed[stop]:.1f} m/s"
+        )
+        lines = [Line(t, stops.mu[at], GREY), Line(t, law[at], BLUE)]
+        panels.append(Panel(title, "s", ends_of(t), span, lines))
+    return panels
 
 
 def _residuals(name: str, values: Vector, off: Vector) -> Panel:
