@@ -77,7 +77,8 @@ def write_report(
         + (f" Not identified by the data: {escape(unsure)}." if unsure else "")
         + "</p>",
         scrolling(chart_svg(fit, [("measured", GREY), ("law", BLUE)])),
-        "<h2>Friction over time</h2><p>From the stop that the law explains best to the one it explains worst.</p>",
+        "<h2>Friction over time</h2><p>From the stop that the law explains best to that which it explains "
+        "worst.</p>",
         scrolling(chart_svg(within, [("measured", GREY), ("law", BLUE)])),
         "<h2>What the law leaves</h2><p>A mark is a block of 50 ms, the line their mean. A line off zero is "
         "what the law has no term for.</p>",
