@@ -7,9 +7,9 @@ import pytest
 
 from brakelab.identify.friction.choice import Judged
 from brakelab.identify.friction.columns import Columns
-from brakelab.identify.friction.dynamometer import new_bench, run_programme
+from brakelab.identify.friction.dynamometer import new_bench
+from brakelab.identify.friction.sequence import load_sequence, run_sequence
 from brakelab.identify.friction.stops import Stops, find_stops
-from brakelab.plant.dynamometer_programme import load_programme
 from brakelab.plant.friction.constant import Constant
 from brakelab.studies.lab.bad_input import answers
 from brakelab.studies.lab.brakes import (
@@ -32,8 +32,8 @@ from ecu.settings.resources import resource
 def ams() -> Stops:
     lining = linings().lining["A"]
     bench = new_bench(lining, "A", 1)
-    programme = load_programme(resource("config/rig/ams.toml"))
-    recording = run_programme(bench, programme, lambda share: None)
+    programme = load_sequence(resource("config/rig/ams.toml"))
+    recording = run_sequence(bench, programme, lambda share: None)
     rig = bench.rig[0]
     return find_stops(recording, Columns.own(lining, float(rig["mass"] * rig["tyre_radius"] ** 2)), "ams")
 

@@ -5,7 +5,6 @@ times a second, from the beginning of a stop to its end (3.2).
 """
 
 from collections.abc import Callable
-from itertools import product
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -13,19 +12,17 @@ from numpy.random import Generator
 
 from brakelab.identify.friction.columns import Uncertainty
 from brakelab.identify.friction.patches import bedded, draw_pad, run_pad
-from brakelab.identify.friction.recording import RATE, THRESHOLD, Recording, joined
+from brakelab.identify.friction.recording import RATE, THRESHOLD, Recording
 from brakelab.plant.disc import cooling_rate
 from brakelab.plant.dynamometer import (
-    DECELERATION,
     DRAG,
     LONGEST_S,
-    PRESSURE,
     STEP,
     TRACE,
     new_stop,
     run_stop,
 )
-from brakelab.plant.dynamometer_programme import BAR, DRAG_TIME, KMH, MOST_DRAGS, Gate, Programme
+from brakelab.plant.dynamometer_programme import BAR, DRAG_TIME, KMH, MOST_DRAGS, Gate
 from brakelab.plant.jit import Record, kernel
 from brakelab.plant.linings import Lining, rig_with
 from brakelab.plant.records import RecordArray
@@ -145,22 +142,6 @@ def lagged(values: np.ndarray, dt: float, constant: float) -> np.ndarray:
     if constant > 0.0:
         _lag(np.ascontiguousarray(values), 1.0 - float(np.exp(-dt / constant)), out)
     return out
-
-
-def run_programme(bench: Bench, programme: Programme, advance: Callable[[float], None]) -> Recording:
-    """Return the recording of a programme, temperatures outermost; `advance` hears the share of each stop."""
-    parts = []
-    stops = list(product(programme.temperature, programme.speed, programme.level))
-    for wanted, speed, level in stops:
-        bench.bring_to(programme.gate, wanted)
-        start, end = KMH * speed, KMH * programme.end_speed
-        if programme.control == "pressure":
-            stop = new_stop(PRESSURE, start, end, bench.temperature, pressure=BAR * level)
-        else:
-            stop = new_stop(DECELERATION, start, end, bench.temperature, deceleration=level)
-        parts.append(bench.measure(stop))
-        advance(1.0 / len(stops))
-    return joined(parts)
 
 
 def new_bench(lining: Lining, brake: str, seed: int, noise: Noise | None = None, law: str = "") -> Bench:

@@ -6,10 +6,10 @@ from tempfile import TemporaryDirectory
 from typing import Final, NamedTuple
 
 from brakelab.identify.friction.check import refuse_nonsense
-from brakelab.identify.friction.dynamometer import new_bench, run_programme
+from brakelab.identify.friction.dynamometer import new_bench
 from brakelab.identify.friction.reader import read_recording
 from brakelab.identify.friction.recording import write_recording
-from brakelab.plant.dynamometer_programme import load_programme
+from brakelab.identify.friction.sequence import load_sequence, run_sequence
 from brakelab.results.text_table import Table
 from brakelab.studies.lab.brakes import SEED, columns_of, linings
 from ecu.errors import UserError
@@ -109,8 +109,8 @@ def answers() -> list[Answer]:
     lining = linings().lining["A"]
     inertia = columns_of(lining).rig.inertia
     assert inertia is not None
-    programme = load_programme(resource("config/rig/ams.toml"))
-    recording = run_programme(new_bench(lining, "A", SEED), programme, lambda share: None)
+    programme = load_sequence(resource("config/rig/ams.toml"))
+    recording = run_sequence(new_bench(lining, "A", SEED), programme, lambda share: None)
     found = []
     for what, spoil in CASES.items():
         with TemporaryDirectory() as name:

@@ -18,14 +18,14 @@ from brakelab.identify.friction.analysis import (
 from brakelab.identify.friction.candidates import ilvo
 from brakelab.identify.friction.choice import Identified, Judged, identify
 from brakelab.identify.friction.columns import Columns
-from brakelab.identify.friction.dynamometer import Bench, new_bench, run_programme
+from brakelab.identify.friction.dynamometer import Bench, new_bench
 from brakelab.identify.friction.fit import fit, replayed
 from brakelab.identify.friction.heat_capacity import HeatCapacity, heat_capacity
 from brakelab.identify.friction.recording import THRESHOLD, Recording, joined
+from brakelab.identify.friction.sequence import load_sequence, run_sequence
 from brakelab.identify.friction.stops import Stops, find_stops
 from brakelab.plant.description import read_file
 from brakelab.plant.dynamometer import DECELERATION, PRESSURE, REPLAY, mean_friction, new_stop, run_stop
-from brakelab.plant.dynamometer_programme import load_programme
 from brakelab.plant.friction.ilvo import Ilvo
 from brakelab.plant.linings import Lining, Linings, rig_with
 from brakelab.studies.physics.friction import TABLE_3_4, TEMPERATURES, stop_means
@@ -90,8 +90,8 @@ def columns_of(lining: Lining, law: str = "SIM") -> Columns:
 
 def run(bench: Bench, programme: str, columns: Columns) -> Stops:
     """Return the stops of a shipped programme on a bench."""
-    found = load_programme(resource(f"config/rig/{programme}.toml"))
-    return find_stops(run_programme(bench, found, lambda share: None), columns, programme)
+    found = load_sequence(resource(f"config/rig/{programme}.toml"))
+    return find_stops(run_sequence(bench, found, lambda share: None), columns, programme)
 
 
 def measure(brake: str, progress: Callable[[str], None], seed: int = SEED) -> Brake:

@@ -6,9 +6,9 @@ from itertools import product
 from typing import Final, NamedTuple
 
 from brakelab.identify.friction.discovery import ILVO, NAMES, Support, greedy, library, sparse
-from brakelab.identify.friction.dynamometer import new_bench, run_programme
+from brakelab.identify.friction.dynamometer import new_bench
+from brakelab.identify.friction.sequence import load_sequence, run_sequence
 from brakelab.identify.friction.stops import find_stops
-from brakelab.plant.dynamometer_programme import load_programme
 from brakelab.results.text_table import Table
 from brakelab.studies.lab.brakes import columns_of, linings, r1_recording
 from brakelab.studies.physics.heat import BRAKES
@@ -54,8 +54,8 @@ def discovered(job: tuple[str, float, int]) -> Draw:
 def pad_terms(brake: str) -> PadTerms:
     """Return the terms found in CPC of a drawn pad."""
     lining = linings().lining[brake]
-    programme = load_programme(resource("config/rig/cpc.toml"))
-    recording = run_programme(new_bench(lining, brake, SEED), programme, lambda share: None)
+    programme = load_sequence(resource("config/rig/cpc.toml"))
+    recording = run_sequence(new_bench(lining, brake, SEED), programme, lambda share: None)
     found = sparse(library(find_stops(recording, columns_of(lining), "cpc")))
     return PadTerms(brake, found.terms, found.error)
 
