@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 import pytest
 
@@ -177,6 +178,45 @@ def test_channels_of_mdf4(tmp_path: Path, recording: Recording, columns: Columns
     path.with_suffix(".toml").write_text(columns_text(columns), "utf-8")
     for found, written in zip(read_recording(path).recording, recording, strict=True):
         np.testing.assert_allclose(found, written, rtol=1e-9, atol=1e-6)
+
+
+@pytest.mark.parametrize("ending", [".csv", ".parquet", ".mf4"])
+def test_a_column_of_sections_goes_with_its_rows(
+    tmp_path: Path, recording: Recording, columns: Columns, ending: str
+) -> None:
+    """Texts in MDF4 are bytes and change now and then; a row that is left out takes its section along."""
+    path = tmp_path / f"labelled{ending}"
+    half = len(recording.time) // 2
+    labels = np.where(np.arange(len(recording.time)) < half, "4.1 line", "9 fade")
+    values = dict(
+        zip(
+            ("time_s", "pressure_bar", "torque_Nm", "speed_km_h", "disc_temperature_C"),
+            recording,
+            strict=True,
+        )
+    )
+    values["pressure_bar"] = 1e-5 * values["pressure_bar"]
+    values["speed_km_h"] = 3.6 * columns.brake.tyre_radius * values["speed_km_h"]
+    if ending == ".mf4":
+        asammdf = pytest.importorskip("asammdf")
+        file, time = asammdf.MDF(version="4.10"), values.pop("time_s")
+        file.append([asammdf.Signal(v, time, name=name) for name, v in values.items()])
+        steps = np.array([b"4.1 line", b"9 fade"])
+        file.append([asammdf.Signal(steps, time[[0, half]], name="step", encoding="utf-8")])
+        file.save(path)
+        lost = 0
+    else:
+        values["torque_Nm"] = values["torque_Nm"].copy()
+        values["torque_Nm"][10] = np.nan
+        table = pa.table({**values, "step": labels})
+        pq.write_table(table, path) if ending == ".parquet" else pacsv.write_csv(table, path)
+        lost = 1
+    text = columns_text(columns).replace("[brake]", 'section = "step"\n\n[brake]', 1)
+    path.with_suffix(".toml").write_text(text, "utf-8")
+    read = read_recording(path)
+    assert read.columns.columns.section == "step"
+    assert columns_text(read.columns) == text.replace("\n\n\n", "\n\n").replace("]\n\nsection", "]\nsection")
+    assert read.sections.tolist() == labels[lost:].tolist()
 
 
 @pytest.mark.parametrize(

@@ -65,7 +65,9 @@ def own_candidate(code: str, mass: float) -> Candidate:
     def law(values: Sequence[float]) -> Law:
         return Own(law="own", rig_mass=mass, code=code, numbers=dict(zip(given, values, strict=True)))
 
-    return Candidate(Path(code).stem, free, law, extrapolates="as its author says")
+    return Candidate(
+        Path(code).stem, free, law, extrapolates="as its author says; found terms hold where they were found"
+    )
 
 
 def _constant(mass: float) -> Candidate:

@@ -5,7 +5,8 @@ no scatter then. Of each section the mean logarithm of the ratio of friction has
 by the t-test of pairs. Over all sections p is adjusted by Holm's method, so that of linings that do not
 differ at all one table in twenty shows a difference. Sections of one application have no scatter: no test.
 
-Two recordings are two pads: what pads of one make differ by is in the difference, not in its interval.
+Two recordings are two pads: what pads of one make differ by is in the difference, not in its interval, and
+so is what the sensors of two rigs differ by.
 """
 
 from typing import Final, NamedTuple
@@ -110,7 +111,8 @@ def comparison_table(first: Measured, second: Measured, rows: list[Compared]) ->
         f"Second: {second.name}. {differ} of {tested} sections differ. Pairs of applications at the same "
         "place of the programme: mean ratio with its interval of 95 %, t-test of pairs, p adjusted for all "
         f"rows by Holm's method ({ALPHA:g} in all). Two recordings are two pads: the scatter between "
-        "pads of one make is not in the intervals. What one rig's sensors are off by cancels."
+        "pads of one make is not in the intervals. What one rig's sensors are off by cancels, "
+        "what two rigs' are does not."
     )
     columns = ("section", "pairs", "μ first", "μ second", "change [%]", "95 % [%]", "p", "note")
     return Table(f"{first.name} and {second.name}", columns, table, below)
