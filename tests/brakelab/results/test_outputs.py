@@ -23,6 +23,7 @@ OVERWRITING = {
     "identify dust trips.csv --config linked.toml --out base.toml": "linked.toml",
     "identify friction brake.csv --out brake.toml": "brake.toml",
     "identify friction brake.csv --columns mine.toml --out mine.toml": "mine.toml",
+    "identify friction brake.csv --own mine.py --discover mine.py --out own.toml": "mine.py",
     "lab run mine.toml --brake A --out mine.csv": "mine.toml",
     "lab run cpc --brake A --linings brake.toml --law SIM --out brake.csv": "brake.toml",
     "lab report brake.csv --columns mine.html --out mine.html": "mine.html",

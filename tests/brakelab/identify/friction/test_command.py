@@ -10,6 +10,7 @@ from brakelab.cli import app
 from brakelab.identify.friction import choice, command
 from brakelab.identify.friction.choice import Judged, choose, hottest
 from brakelab.identify.friction.columns import Columns, load_columns
+from brakelab.identify.friction.fit import error_of
 from brakelab.identify.friction.reader import read_recording
 from brakelab.identify.friction.recording import Recording, write_recording
 from brakelab.identify.friction.stops import Stops, find_stops
@@ -99,6 +100,33 @@ def test_a_law_of_one_s_own_is_identified_with_the_others(
     assert found.numbers["heat"] * found.numbers["mu"] == pytest.approx(slope, rel=1e-2)
 
 
+def test_found_terms_are_written_and_judged_as_a_law(
+    tmp_path: Path, recording: Recording, lining: Lining, columns: Columns, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a drawn pad they explain more than a constant does; what is held out is not searched."""
+    every, searched = choice.candidates, command.discovered_law
+    few = ("constant", "terms")
+    monkeypatch.setattr(
+        choice, "candidates", lambda stops, brake, own: [c for c in every(stops, brake, own) if c.name in few]
+    )
+    monkeypatch.setattr(choice, "new_pool", InThisProcess)
+    monkeypatch.setattr(choice, "as_completed", list)
+    counts: list[int] = []
+    monkeypatch.setattr(command, "discovered_law", lambda stops: counts.append(len(stops)) or searched(stops))
+    data, out, terms = tmp_path / "own.parquet", tmp_path / "brake.toml", tmp_path / "laws" / "terms.py"
+    assert columns.rig.inertia is not None
+    write_recording(data, recording, lining, columns.rig.inertia)
+    assert command.friction([data], None, None, out, discover=terms) == 0
+    assert counts == [19]  # of 24, without the hottest fifth
+    found = read_file(out, Linings).lining["mine"].friction["terms"]
+    assert isinstance(found, Own)
+    assert found.code == str(terms)
+    stops = find_stops(recording, columns, "x")
+    constant = read_file(out, Linings).lining["mine"].friction["constant"]
+    errors = [error_of(law, lining.brake, stops, False, closed=True) for law in (found, constant)]
+    assert errors[0] < 0.7 * errors[1]
+
+
 def test_a_law_of_one_s_own_must_have_a_name_of_its_own(tmp_path: Path) -> None:
     own, data = tmp_path / "ilvo.py", tmp_path / "cpc.csv"
     own.write_text(
@@ -120,6 +148,12 @@ def test_a_law_of_one_s_own_must_have_a_name_of_its_own(tmp_path: Path) -> None:
         (lambda f: command.run("ams", "A", 0, f, "R9"), "--law: R9: no such law; choose one of SIM, R1"),
         (lambda f: command.run("ams", "A", 0, f.with_suffix(".xls")), "ends in .csv or .parquet"),
         (lambda f: command.friction([f], None, None, f.with_name("law.toml")), "6 stops; needs 10"),
+        (
+            lambda f: command.friction(
+                [f], None, None, f.with_name("law.toml"), discover=f.with_name("law.txt")
+            ),
+            "is written as Python; let the name end in .py",
+        ),
     ],
 )
 def test_one_line_says_what_to_do(tmp_path: Path, call, line: str) -> None:
