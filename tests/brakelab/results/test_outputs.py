@@ -80,7 +80,7 @@ def test_an_output_or_its_neighbour_is_no_input(
     assert cli.main(line.split()) == 2
     said = capsys.readouterr().err
     assert re.search(
-        rf"--out: .*: would overwrite (/.*/)?{OVERWRITING[line]}, which this command reads", said
+        rf"--(out|discover): .*: would overwrite (/.*/)?{OVERWRITING[line]}, which this command reads", said
     )
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
