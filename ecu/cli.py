@@ -161,6 +161,16 @@ def run(
             help="Answer a master of XCP: udp:[ADDRESS:]PORT, tcp:[ADDRESS:]PORT or can:REQUEST:RESPONSE",
         ),
     ] = None,
+    xcp_key: Annotated[
+        Path | None,
+        typer.Option(
+            "--xcp-key", metavar="FILE", help="Secret of a master that calibrates; without it none does"
+        ),
+    ] = None,
+    xcp_save: Annotated[
+        Path | None,
+        typer.Option("--xcp-save", metavar="FILE", help="CONFIG file to write when a master stores"),
+    ] = None,
     log_format: Annotated[
         str | None,
         typer.Option(
@@ -183,6 +193,7 @@ def run(
             import numba.np.arraymath  # noqa: F401
 
         from ecu.runtime import prepare, service
+        from ecu.runtime.xcp import Calibrating
     metrics = f"{metrics_address}:{metrics_port}" if metrics_port else None
     level = Level.QUIET if quiet else Level.VERBOSE if verbose else policy().level
     log_as(log_format, level)
@@ -202,6 +213,7 @@ def run(
             diagnostics,
             diagnostics_key,
             xcp,
+            Calibrating(xcp_key, xcp_save),
         )
     )
 

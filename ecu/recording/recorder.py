@@ -1,7 +1,7 @@
 """Recording of a run: its files, written while the ECU runs, resumable by another process, and read back.
 
-A folder holds the frames (candump text), the cycles (`RECORDED`, raw), their description (JSON) and the state
-before the first cycle.
+A folder holds the frames (candump text), the cycles (`RECORDED`, raw), their description (JSON), the state
+before the first cycle, and, where parameters were calibrated meanwhile, since when by what (`calibration`).
 """
 
 import json
@@ -16,6 +16,7 @@ import numpy as np
 
 from ecu.contract.records import FRAME_EXTENDED, FRAME_FD, RecordArray
 from ecu.errors import UserError
+from ecu.recording.calibration import NOTES_FILE, Note, read_notes
 from ecu.recording.ring import RECORDED, Batch
 
 FRAMES_FILE, CYCLES_FILE, ABOUT_FILE, INITIAL_FILE = (
@@ -24,7 +25,7 @@ FRAMES_FILE, CYCLES_FILE, ABOUT_FILE, INITIAL_FILE = (
     "recording.json",
     "initial.bin",
 )
-FILES: Final = (FRAMES_FILE, CYCLES_FILE, INITIAL_FILE, ABOUT_FILE)
+FILES: Final = (FRAMES_FILE, CYCLES_FILE, INITIAL_FILE, NOTES_FILE, ABOUT_FILE)
 
 
 def layout(dtype: np.dtype[Any]) -> dict[str, Any]:
@@ -189,6 +190,8 @@ class Recording(NamedTuple):
     """The state before the first cycle, shape (1,)."""
     frames: Path
     """candump text of the frames that were consumed, in order."""
+    calibrations: list[Note]
+    """Taken over meanwhile, in order."""
 
 
 def read_recording(folder: Path) -> Recording:
@@ -209,7 +212,8 @@ def read_recording(folder: Path) -> Recording:
         records = np.frombuffer(content, kind, len(content) // kind.itemsize)
         cycles, outputs = records["cycle"], records["outputs"]
         initial = np.frombuffer((folder / INITIAL_FILE).read_bytes(), dtype_of(about["state"]))
+        notes = read_notes(folder)
     except (OSError, ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         reason = " ".join(str(error).split())[:200]
         raise UserError(str(folder), "", f"not a complete recording: {reason}") from None
-    return Recording(folder, about, cycles, outputs, initial, folder / FRAMES_FILE)
+    return Recording(folder, about, cycles, outputs, initial, folder / FRAMES_FILE, notes)

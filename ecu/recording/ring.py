@@ -1,10 +1,10 @@
 """Ring in shared memory: written by the cycle without waiting (`publish.py`), read by any process.
 
-The file holds a header, a description (JSON), the state before the first cycle, a slot per cycle, the learned
-values and what was found of the inputs (of the last two cycles, in turn) and a ring of frames. A slot holds
-what a recording keeps of a cycle, and its inputs and estimate. It carries its number before and after its
-content is written (-1 between), so an overtaken reader notices and counts its losses. Frames are claimed
-before they are overwritten.
+The file holds a header, parameters that another process asks the loop for (`calibration.py`), a description
+(JSON), the state before the first cycle, a slot per cycle, the learned values and what was found of the
+inputs (of the last two cycles, in turn) and a ring of frames. A slot holds what a recording keeps of a cycle,
+and its inputs and estimate. It carries its number before and after its content is written (-1 between), so an
+overtaken reader notices and counts its losses. Frames are claimed before they are overwritten.
 
 The file is its owner's alone: made anew (O_EXCL, O_NOFOLLOW), mode 0600, and read only if it belongs to the
 reader's user. Its writer holds a lock on it for its lifetime, across namespaces.
@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ecu.algorithm.estimate import ESTIMATE
+from ecu.contract.params import PARAMS
 from ecu.contract.records import CYCLE, FRAME, INPUT_WATCH, INPUTS, LEARNED, OUTPUTS, RecordArray
 from ecu.errors import UserError
 from ecu.recording.lock import lock
@@ -40,6 +41,19 @@ _SLOT: Final = np.dtype(
 )
 _LATEST_VALUES: Final = np.dtype([("learned", LEARNED), ("watched", INPUT_WATCH)], align=True)
 _LAST_WORDS_BYTES: Final = 3072
+TABLES_BYTES: Final = 16384
+# What another process asks for; its number is written last.
+ASKED: Final = np.dtype(
+    [
+        ("number", "i8"),
+        ("page", "i8"),  # of those below
+        ("until_ns", "i8"),  # on the monotonic clock: refused later
+        ("check", "i8"),  # CRC-32 of the page
+    ]
+)
+# Parameters, and the tables of CONFIG that they are made of (JSON).
+PAGE: Final = np.dtype([("number", "i8"), ("params", PARAMS), ("tables", f"S{TABLES_BYTES}")], align=True)
+_CALIBRATION: Final = np.dtype([("asked", ASKED), ("pages", PAGE, (2,))], align=True)
 _HEADER: Final = np.dtype(
     [
         ("magic", "u8"),
@@ -52,10 +66,14 @@ _HEADER: Final = np.dtype(
         ("frames_written", "i8"),
         ("closed", "i8"),
         ("followed", "i8"),  # last cycle that the side process reported as handled, -1: none
+        ("answered", "i8"),  # number of the last question for a calibration that was answered
+        ("calibration", "i8"),  # number of the calibration that the loop goes by, 0: CONFIG
+        ("page", "i8"),  # in which it is
+        ("calibrated_from", "i8"),  # its first cycle
         ("last_words", f"S{_LAST_WORDS_BYTES}"),  # JSON
     ]
 )
-_MAGIC: Final = int.from_bytes(b"ecuring5", "little")
+_MAGIC: Final = int.from_bytes(b"ecuring6", "little")
 _PAGE: Final = 4096
 _NO_OBJECT: Final = (ValueError, TypeError, RecursionError)  # of JSON
 
@@ -70,6 +88,10 @@ class Ring(NamedTuple):
     latest: RecordArray
     """Shape (2,): after cycle k in row k % 2."""
     frames: RecordArray
+    asked: RecordArray
+    """ASKED, shape (1,)."""
+    pages: RecordArray
+    """PAGE, shape (2,)."""
 
 
 def ring_folder() -> Path:
@@ -96,9 +118,9 @@ def living_rings() -> list[Path]:
     return rings
 
 
-def open_own(path: Path) -> int:
+def open_own(path: Path, access: int = os.O_RDONLY) -> int:
     """Open a regular file that is ours and writable by nobody else. Raises OSError for any other."""
-    handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+    handle = os.open(path, access | os.O_NOFOLLOW | os.O_NONBLOCK)
     found = os.fstat(handle)
     others = stat.S_IWGRP | stat.S_IWOTH
     if stat.S_ISREG(found.st_mode) and found.st_uid == os.geteuid() and not found.st_mode & others:
@@ -121,6 +143,9 @@ def _round_up(size: int) -> int:
     return -(-size // _PAGE) * _PAGE
 
 
+_HEAD: Final = _round_up(_HEADER.itemsize) + _round_up(_CALIBRATION.itemsize)
+
+
 def _is_ring(memory: mmap.mmap) -> bool:
     """Return whether header and size agree."""
     if len(memory) < _PAGE:
@@ -129,19 +154,25 @@ def _is_ring(memory: mmap.mmap) -> bool:
     sizes = [int(row[name]) for name in ("slots", "frames", "description_bytes", "initial_bytes")]
     if int(row["magic"]) != _MAGIC or min(sizes[:2]) < 1 or min(sizes[2:]) < 0:
         return False
-    parts = (_HEADER.itemsize, sum(sizes[2:]), sizes[0] * _SLOT.itemsize, 2 * _LATEST_VALUES.itemsize)
-    return sum(map(_round_up, (*parts, sizes[1] * FRAME.itemsize))) == len(memory)
+    parts = (
+        sum(sizes[2:]),
+        sizes[0] * _SLOT.itemsize,
+        2 * _LATEST_VALUES.itemsize,
+        sizes[1] * FRAME.itemsize,
+    )
+    return _HEAD + sum(map(_round_up, parts)) == len(memory)
 
 
 def _map(path: Path, memory: mmap.mmap) -> Ring:
     header = np.frombuffer(memory, _HEADER, 1)
     row = header[0]
-    at = _round_up(_HEADER.itemsize) + _round_up(int(row["description_bytes"]) + int(row["initial_bytes"]))
+    calibration = np.frombuffer(memory, _CALIBRATION, 1, _round_up(_HEADER.itemsize))
+    at = _HEAD + _round_up(int(row["description_bytes"]) + int(row["initial_bytes"]))
     slots = np.frombuffer(memory, _SLOT, int(row["slots"]), at)
     at += _round_up(slots.nbytes)
     latest = np.frombuffer(memory, _LATEST_VALUES, 2, at)
     frames = np.frombuffer(memory, FRAME, int(row["frames"]), at + _round_up(latest.nbytes))
-    return Ring(path, memory, header, slots, latest, frames)
+    return Ring(path, memory, header, slots, latest, frames, calibration["asked"], calibration["pages"][0])
 
 
 def create_ring(
@@ -155,7 +186,7 @@ def create_ring(
         UserError: no room for it.
     """
     text = json.dumps(description).encode()
-    head = _round_up(_HEADER.itemsize) + _round_up(len(text) + len(initial))
+    head = _HEAD + _round_up(len(text) + len(initial))
     parts = (slots * _SLOT.itemsize, 2 * _LATEST_VALUES.itemsize, frames * FRAME.itemsize)
     size = head + sum(map(_round_up, parts))
     unfinished = path.with_name(f"{path.name}.{secrets.token_hex(4)}.new")
@@ -176,7 +207,7 @@ def create_ring(
     row = header[0]
     row["slots"], row["frames"], row["followed"] = slots, frames, -1
     row["description_bytes"], row["initial_bytes"] = len(text), len(initial)
-    at = _round_up(_HEADER.itemsize)
+    at = _HEAD
     memory[at : at + len(text) + len(initial)] = text + initial
     ring = _map(path, memory)
     ring.slots["number"] = -1
@@ -209,11 +240,13 @@ class Batch(NamedTuple):
 class RingReader:
     """Reader of a ring behind its writer, from the oldest cycle still present."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, asks: bool = False) -> None:
+        """`asks`: it may write, to ask for a calibration. Raises UserError: there is no ring."""
+        access, protection = (os.O_RDWR, mmap.PROT_WRITE) if asks else (os.O_RDONLY, 0)
         try:
-            handle = open_own(path)
+            handle = open_own(path, access)
             try:
-                memory = mmap.mmap(handle, 0, prot=mmap.PROT_READ)
+                memory = mmap.mmap(handle, 0, prot=mmap.PROT_READ | protection)
             finally:
                 os.close(handle)
         except (OSError, ValueError) as error:
@@ -222,7 +255,7 @@ class RingReader:
             raise UserError(str(path), "", "not a ring of this version; start the service anew")
         self.ring = _map(path, memory)
         row = self.ring.header[0]
-        at = _round_up(_HEADER.itemsize)
+        at = _HEAD
         end = at + int(row["description_bytes"])
         try:
             self.description: dict[str, Any] = dict(json.loads(memory[at:end]))

@@ -42,7 +42,8 @@ from ecu.runtime.side import Side
 from ecu.runtime.standby import learned_by_first
 from ecu.runtime.start import lower_priority
 from ecu.runtime.warm_up import warm_up
-from ecu.settings.config import Config, config_hash, load_config, new_params, store_key
+from ecu.runtime.xcp import Calibrating
+from ecu.settings.config import Config, config_files, config_hash, load_config, new_params, store_key
 
 LISTEN_S: Final = 1.0
 TELL_PROGRESS_S: Final = 5.0
@@ -74,6 +75,8 @@ class RunOptions(NamedTuple):
     """File of the secret by which a tester gets access."""
     xcp: str | None = None
     """Transport on which a master of XCP is answered."""
+    calibrating: Calibrating = Calibrating()
+    """What it needs to calibrate."""
 
 
 class Session(NamedTuple):
@@ -274,7 +277,12 @@ def _side_arguments(options: RunOptions, taken: set[int]) -> list[str]:
             *bus, options.diagnostics, options.diagnostics_key, taken, options.silent
         ),
         "--xcp": xcp.checked_settings(
-            options.xcp, *bus, taken | diagnostics.identifiers(options.diagnostics), options.silent
+            options.xcp,
+            *bus,
+            taken | diagnostics.identifiers(options.diagnostics),
+            options.silent,
+            options.calibrating,
+            config_files(options.config),
         ),
     }
     return [word for name, value in given.items() if value is not None for word in (name, str(value))]

@@ -14,6 +14,7 @@ from ecu.contract.records import STAGES, e2e_counts
 from ecu.errors import RunFault
 from ecu.recording.log import configure_logging
 from ecu.recording.ring import close_ring, remove_ring
+from ecu.runtime.calibration import consider
 from ecu.runtime.clock import Grid, system_time
 from ecu.runtime.cycle import Progress, cycle_once, send_farewell
 from ecu.runtime.prepare import RunOptions, Session, prepare
@@ -79,6 +80,7 @@ def _cycle_until(session: Session, progress: Progress, stopping: list[int]) -> N
         if progress.number % LOOK_AT_SIDE_CYCLES == 0:
             progress.loop["kept"] = session.side.look(grid.deadline_ns)
             session.ring.header["followed"] = session.side.followed
+            consider(session.ring, session.ecu, progress.number, grid.deadline_ns)
         if watchdog and progress.number % watchdog == 0:
             session.manager.tell("WATCHDOG=1")
 

@@ -26,6 +26,7 @@ import structlog
 from ecu.contract.records import RecordArray
 from ecu.errors import UserError
 from ecu.recording import store as state_store
+from ecu.recording.calibration import add_note, in_force, read_notes
 from ecu.recording.events import EventLog
 from ecu.recording.log import configure_logging
 from ecu.recording.recorder import (
@@ -66,6 +67,7 @@ class Recorder:
         self.channel, self.key = str(about["channel"]), str(about["store_key"])
         self.files: RecordingFiles | None = None
         self._limit_bytes, self._looked_s = limit_bytes, -math.inf
+        self._noted = 0
         if again:
             self._go_on(record)
         elif record:
@@ -92,6 +94,7 @@ class Recorder:
             found = None
         if found:
             self.files, last = found
+            self._noted = max((one.number for one in read_notes(self.files.folder)), default=0)
         seen = self.reader.go_on_after(last)
         if seen is not None:
             self.events.begin_after(seen)
@@ -122,6 +125,7 @@ class Recorder:
         if len(batch.records):
             if self.files:
                 self._record(self.files, batch)
+            self._note_calibration()
             self.events.look(batch.records, self.reader.lost_cycles, self.reader.lost_frames)
             self._keep()
         return len(batch.records)
@@ -135,6 +139,21 @@ class Recorder:
                     self._stop_recording(str(files.folder), "this recording alone is at --record-limit")
         except OSError as error:
             self._stop_recording(str(files.folder), str(error.strerror))
+
+    def _note_calibration(self) -> None:
+        """Log a calibration and note it in the recording, before its cycles are reported as handled."""
+        if int(self.reader.ring.header["calibration"][0]) == self._noted:
+            return
+        found = in_force(self.reader.ring)
+        if found is None:
+            return
+        self._noted = found.number
+        self.log.info("calibrated", number=found.number, cycle=found.cycle)
+        if self.files:
+            try:
+                add_note(self.files.folder, found)
+            except OSError as error:
+                self._stop_recording(str(self.files.folder), str(error.strerror))
 
     def _stop_recording(self, folder: str, reason: str) -> None:
         self.log.error(

@@ -8,6 +8,7 @@ missing, unknown or out of range is one line: the file, the key and what would b
 import hashlib
 import json
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -35,13 +36,15 @@ from ecu.settings.lining_share import set_lining_share
 from ecu.settings.pad import set_pad
 from ecu.settings.resources import shipped_in
 from ecu.settings.sections import Axle, Config, Observer
-from ecu.settings.toml_file import findings, read_toml, summarised
+from ecu.settings.toml_file import describe, findings, read_toml, summarised
 
 __all__ = [
     "Axle",
     "Config",
     "Observer",
+    "config_files",
     "config_hash",
+    "config_of",
     "included_file",
     "load_config",
     "new_params",
@@ -64,6 +67,23 @@ def load_config(path: Path) -> Config:
     config = validate_config(path)
     if not isinstance(config, Config):
         raise summarised(config)
+    return _lawful(path, config)
+
+
+def config_of(given: Mapping[str, Any], where: str) -> Config:
+    """Return the configuration of tables as a CONFIG file has them, checked as one; errors name `where`.
+
+    Raises:
+        UserError: as `load_config`.
+    """
+    try:
+        config = Config.model_validate(given)
+    except ValidationError as error:
+        raise describe(error, where, Config) from None
+    return _lawful(Path(where), config)
+
+
+def _lawful(path: Path, config: Config) -> Config:
     found = violations(path, config, new_params(config)[0])
     if found:
         raise summarised(found)
@@ -102,6 +122,12 @@ def _included(path: Path, name: object) -> tuple[Path, dict[str, Any]]:
     if "include" in included:
         raise UserError(str(source), "include", f"an included file includes no other; name it in {path}")
     return source, included
+
+
+def config_files(config: Path) -> list[Path]:
+    """Return `config` and the file that it includes, if any."""
+    name = read_toml(config).get("include")
+    return [config, included_file(config, str(name))] if name else [config]
 
 
 def included_file(path: Path, name: str) -> Path:

@@ -23,7 +23,7 @@ from ecu.settings.config import Config, load_config, new_params, violations
 from ecu.settings.described import descriptions
 from ecu.settings.resources import resource
 from ecu.settings.sections import Axle, Control, Sensors, Vehicle
-from ecu.settings.toml_file import Section, describe, unit_of
+from ecu.settings.toml_file import Section, describe, toml_value, unit_of
 
 CARS: Final = ("suv", "sedan", "lcv")
 """Shipped cars of a data sheet; the nearest gives the figures that the user leaves out."""
@@ -276,7 +276,7 @@ def _table(name: str, values: dict[str, Value], model: type[Section]) -> Iterato
     for key, field in model.model_fields.items():
         if key in values:
             unit = unit_of(field)
-            line = f"{key} = {_toml(values[key].value)}"
+            line = f"{key} = {toml_value(values[key].value)}"
             what = brief(described.get(key, key), unit)
             shown = "" if unit in (None, "-") else f"{unit}, "
             yield f"{line:<31}  # {shown}{what}; {values[key].origin}"
@@ -286,16 +286,6 @@ def brief(description: str, unit: str | None) -> str:
     """Return the first part of a key's description, without its unit."""
     first = " ".join(description.split()).partition(". ")[0].partition(": ")[0].partition("; ")[0].rstrip(".")
     return f"{first[:1].lower()}{first[1:]}".replace(f", {unit}", "").removesuffix(", -")
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return f'"{value}"'
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_toml, value))}]"
-    return repr(value)
 
 
 def _tell(out: Path, config: Config) -> int:

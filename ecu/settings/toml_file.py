@@ -1,9 +1,9 @@
-"""Reading TOML that a person wrote: a mistake is one line that names the file, the key and the remedy."""
+"""TOML: what a person wrote is read, a mistake one line with file, key and remedy; tables are written."""
 
 import os
 import stat
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final, NamedTuple, get_args, get_origin
 
@@ -175,3 +175,25 @@ def _text(path: Path) -> str:
 def _without_waiting(path: str, flags: int) -> int:
     """Open a file; a fifo that nobody writes to would wait for ever."""
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+
+
+def toml_value(value: Any) -> str:
+    """Return a value of a key as it stands in a file: numbers in full, texts without control characters."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+        return f'"{escaped}"'
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(toml_value, value))}]"
+    return repr(value)
+
+
+def toml_lines(given: Mapping[str, Any], path: str = "") -> list[str]:
+    """Return tables as the lines of a file; a key without a value (None) is left out."""
+    keys = {key: value for key, value in given.items() if value is not None}
+    lines = [f"{key} = {toml_value(value)}" for key, value in keys.items() if not isinstance(value, dict)]
+    for key, value in keys.items():
+        if isinstance(value, dict):
+            lines += ["", f"[{path}{key}]", *toml_lines(value, f"{path}{key}.")]
+    return lines

@@ -9,6 +9,7 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
 from ecu.errors import UserError
+from ecu.recording.calibration import add_note, in_force
 from ecu.recording.recorder import start_recording, write_batch
 from ecu.recording.ring import Batch, RingReader
 from ecu.watch.watcher import Watcher
@@ -22,12 +23,19 @@ def keep(batches: Sequence[Batch], reader: RingReader, folder: Path) -> Path:
     """
     if not batches:
         raise UserError(str(folder), "", "nothing to keep yet: no cycle was seen")
+    batches = _since_known(batches, reader)
     first = batches[0].records["cycle"][0]
     about = {**reader.description, "first_cycle": int(first["number"])}
+    calibration = in_force(reader.ring)
+    if calibration is not None and (about["first_cycle"] or calibration.number > 1):
+        about["configuration"] = {**about["configuration"], **calibration.tables}
+        calibration = None
     if about["first_cycle"]:
         about["start_ns"] = int(first["t_ns"])
     files = start_recording(folder, about, reader.initial)
     try:
+        if calibration is not None:
+            add_note(files.folder, calibration)
         for batch in batches:
             write_batch(files, batch, str(about["channel"]))
     except OSError as error:
@@ -36,6 +44,14 @@ def keep(batches: Sequence[Batch], reader: RingReader, folder: Path) -> Path:
         files.frames.close()
         files.cycles.close()
     return files.folder
+
+
+def _since_known(batches: Sequence[Batch], reader: RingReader) -> Sequence[Batch]:
+    """Leave out what was before the last calibration, if others were before: their values are gone."""
+    found = in_force(reader.ring)
+    if found is None or found.number == 1:
+        return batches
+    return [one for one in batches if one.records["cycle"]["number"][0] >= found.cycle] or batches[-1:]
 
 
 def keep_now(watcher: Watcher, folder: Path, lock: AbstractContextManager[object] | None = None) -> str:

@@ -13,7 +13,7 @@ from ecu import __version__
 from ecu.output import give, policy
 from ecu.runtime.xcp import LOOPBACK, Transport, parse_transport
 from ecu.settings.config import load_config
-from ecu.xcp.a2l_if_data import A2ML, if_data
+from ecu.xcp.a2l_if_data import A2ML, MEMORY_SEGMENT, if_data
 from ecu.xcp.memory import EPK
 from ecu.xcp.parameters import NO_WORD, to_record
 from ecu.xcp.variables import RECORDS, Record, Variable
@@ -59,7 +59,7 @@ def a2l_text(transports: Sequence[Transport], configuration: Mapping[str, Any] |
         f'/begin HEADER "Written by brake-ecu a2l" VERSION "{__version__}" /end HEADER',
         '/begin MODULE brake_ecu "Brake ECU"',
         A2ML,
-        f'/begin MOD_PAR "" EPK "{EPK}" /end MOD_PAR',
+        f'/begin MOD_PAR "" EPK "{EPK}"\n{MEMORY_SEGMENT}\n/end MOD_PAR',
         '/begin MOD_COMMON "" BYTE_ORDER MSB_LAST /end MOD_COMMON',
         if_data(transports),
         *_conversions(chosen),
@@ -125,10 +125,11 @@ def _measurement(record: Record, one: Variable) -> str:
 def _characteristic(record: Record, one: Variable) -> str:
     kind, dimension = ("VALUE", "") if one.length == 1 else ("VAL_BLK", f" MATRIX_DIM {one.length}")
     conversion = _table_of(one.texts) if one.texts else _conversion_of(_unit(one))
+    access = "" if one.writable else " READ_ONLY"
     return (
         f"/begin CHARACTERISTIC {record.name}.{one.name} {_text(one.meaning)} {kind}"
         f" 0x{record.base + one.offset:X} {TYPES[one.kind.str[1:]]} 0 {conversion}"
-        f" {_number(one.low)} {_number(one.high)}{dimension} READ_ONLY /end CHARACTERISTIC"
+        f" {_number(one.low)} {_number(one.high)}{dimension}{access} /end CHARACTERISTIC"
     )
 
 

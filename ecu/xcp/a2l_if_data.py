@@ -4,8 +4,10 @@ from collections.abc import Iterable
 from typing import Final
 
 from ecu.runtime.xcp import Transport
+from ecu.xcp.calibration import SEGMENT, Page
 from ecu.xcp.slave import CYCLE_MS, CYCLE_NAME, MOST_LISTS, OPTIONAL_COMMANDS, UNIT_1_MS, largest_entry
 from ecu.xcp.transport import CAN, ETHERNET
+from ecu.xcp.variables import RECORDS
 
 VERSION: Final = "0x0105"
 
@@ -22,6 +24,18 @@ block "IF_DATA" taggedunion if_data {
           COMMANDS
         })*; };
       };
+      block "SEGMENT" struct {
+        uchar; uchar; uchar; uchar; uchar;
+        taggedstruct {
+          (block "PAGE" struct {
+            uchar;
+            enum { "ECU_ACCESS_NOT_ALLOWED" = 0, "ECU_ACCESS_DONT_CARE" = 3 };
+            enum { "XCP_READ_ACCESS_NOT_ALLOWED" = 0, "XCP_READ_ACCESS_DONT_CARE" = 3 };
+            enum { "XCP_WRITE_ACCESS_NOT_ALLOWED" = 0, "XCP_WRITE_ACCESS_DONT_CARE" = 3 };
+          })*;
+        };
+      };
+      block "PAG" struct { uchar; };
       block "DAQ" struct {
         enum { "STATIC" = 0, "DYNAMIC" = 1 };
         uint; uint; uchar;
@@ -54,6 +68,18 @@ block "IF_DATA" taggedunion if_data {
 };
 /end A2ML""".replace("COMMANDS", _COMMANDS)
 
+_PARAMETERS: Final = next(one for one in RECORDS if one.name == "parameters")
+_READ: Final = "ECU_ACCESS_DONT_CARE XCP_READ_ACCESS_DONT_CARE XCP_WRITE_ACCESS"
+MEMORY_SEGMENT: Final = f"""/begin MEMORY_SEGMENT parameters "" DATA RAM INTERN
+0x{_PARAMETERS.base:X} 0x{_PARAMETERS.dtype.itemsize:X} -1 -1 -1 -1 -1
+/begin IF_DATA XCP
+/begin SEGMENT {SEGMENT} {len(Page)} 0 0 0
+/begin PAGE {Page.REFERENCE} {_READ}_NOT_ALLOWED /end PAGE
+/begin PAGE {Page.WORKING} {_READ}_DONT_CARE /end PAGE
+/end SEGMENT
+/end IF_DATA
+/end MEMORY_SEGMENT"""
+
 
 def if_data(transports: Iterable[Transport]) -> str:
     """Return the block of the module; the packets' sizes are those of the smallest transport."""
@@ -74,6 +100,7 @@ PRESCALER_SUPPORTED
 /begin EVENT "{CYCLE_NAME}" "{CYCLE_NAME}"
 0 DAQ {MOST_LISTS} {CYCLE_MS} {UNIT_1_MS} 0 CONSISTENCY EVENT /end EVENT
 /end DAQ
+/begin PAG 1 /end PAG
 {places}
 /end IF_DATA"""
 

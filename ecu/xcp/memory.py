@@ -55,6 +55,11 @@ def _readable() -> NDArray[np.bool_]:
 _READABLE: Final = _readable()
 
 
+def base_of(name: str) -> int:
+    """Return the address of a record."""
+    return next(record.base for record in RECORDS if record.name == name)
+
+
 def place_of(address: int, length: int) -> int | None:
     """Return where `length` bytes from `address` on are in an image, None: some have no address."""
     for record in RECORDS:
@@ -65,7 +70,10 @@ def place_of(address: int, length: int) -> int | None:
 
 
 def images(batch: Batch, parameters: RecordArray) -> Image:
-    """Return the images of the cycles of a batch, shape (n, `IMAGE_BYTES`); `parameters`: PARAMETERS."""
+    """Return the images of the cycles of a batch, shape (n, `IMAGE_BYTES`).
+
+    `parameters`: PARAMETERS, shape (n,).
+    """
     parts = {
         "outputs": batch.records["outputs"],
         "inputs": batch.beside["inputs"],

@@ -1,8 +1,12 @@
-"""The keys of a CONFIG as one record: what a master reads of the configuration that a run goes by.
+"""The keys of a CONFIG as one record: what a master reads, and calibrates, of what a run goes by.
 
 Its fields are those of the schema (`ecu/settings/schema.py`): numbers as float64, whole ones too, true and
 false as 0 and 1, a word as its place among those allowed. A key that is not given, and what of a list is not,
 is NaN; a word that is not given is 255. Names are left out.
+
+The numbers of `CALIBRATED` may be written: how the ECU judges its sensors, estimates, brakes and blends. What
+the car and its brakes are may not: what was learned belongs to them. Nor may what a word or a truth value
+switches: what the other kind would remember of the drive is missing.
 """
 
 from collections.abc import Iterator, Mapping
@@ -15,6 +19,8 @@ from ecu.contract.records import RecordArray, new_record
 from ecu.settings.schema import config_schema
 
 NO_WORD: Final = 255
+CALIBRATED: Final = ("sensors", "observer", "control", "blending")
+"""Tables of CONFIG."""
 
 
 class Parameter(NamedTuple):
@@ -31,6 +37,11 @@ class Parameter(NamedTuple):
     meaning: str
     texts: tuple[str, ...]
     """Words that are allowed, empty: a number."""
+
+    @property
+    def writable(self) -> bool:
+        """Return whether a master may calibrate it."""
+        return not self.texts and self.key.partition(".")[0] in CALIBRATED
 
 
 @cache
@@ -84,6 +95,24 @@ def to_record(given: Mapping[str, Any]) -> RecordArray:
         else:
             record[one.key] = np.nan if value is None else value
     return record
+
+
+def tables_of(record: RecordArray, given: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return the tables of `CALIBRATED` as `given`, with the numbers of `record` (PARAMETERS, shape (1,)).
+
+    A list ends before its last NaNs; NaN for a key that is not given is none. Any other NaN stays, and is a
+    mistake for who checks them.
+    """
+    tables: dict[str, dict[str, Any]] = {name: dict(given[name]) for name in CALIBRATED}
+    for one in parameters():
+        table, _, name = one.key.partition(".")
+        if one.writable:
+            value = record[one.key][0].tolist()
+            while one.length and value and np.isnan(value[-1]):
+                value.pop()
+            absent = not one.length and np.isnan(value) and tables[table][name] is None
+            tables[table][name] = None if absent else value
+    return tables
 
 
 def _value(given: Mapping[str, Any], key: str) -> Any:

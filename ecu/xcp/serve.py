@@ -1,5 +1,6 @@
 """The loop of the XCP slave: commands from a master, cycles from the ring, packets to the master."""
 
+import secrets
 import time
 from collections import deque
 from collections.abc import Callable
@@ -7,15 +8,21 @@ from pathlib import Path
 from typing import Final
 
 import can
+import numpy as np
 
+from ecu.contract.records import RecordArray
+from ecu.diagnostics.session import SEED_BYTES
 from ecu.recording.ring import Batch, RingReader
 from ecu.runtime.clock import monotonic_s
+from ecu.runtime.diagnostics import read_secret
 from ecu.runtime.place import Place
 from ecu.runtime.xcp import Settings, parse_transport
 from ecu.xcp.a2l import a2l_text
+from ecu.xcp.calibration import Calibration
 from ecu.xcp.memory import Image, images
 from ecu.xcp.parameters import to_record
 from ecu.xcp.slave import Size, Slave
+from ecu.xcp.takeover import Takeover
 from ecu.xcp.transport import CAN, ETHERNET, Can, End, Tcp, Udp
 
 PERIOD_S: Final = 0.1
@@ -30,18 +37,32 @@ class Server:
     """Slave of one run, by its ring."""
 
     def __init__(self, ring: Path, settings: Settings) -> None:
-        """Raises UserError: there is no ring."""
-        self.reader = RingReader(ring)
+        """Raises UserError: there is no ring, or no secret in the file of the key."""
+        self.reader = RingReader(ring, asks=bool(settings.key))
         self.transport = parse_transport(settings.transport)
         self._configuration = self.reader.description["configuration"]
         self._parameters = to_record(self._configuration)
+        self._takeover: Takeover | None = None
         self._image: Image | None = None
         self._speaks = False
         self._lost = 0
         self._due: deque[bytes] = deque()
         """Packets with measured data that wait for room."""
-        self.slave = Slave(self._size(), lambda: self._image, lambda: round(1e9 * monotonic_s()), self._a2l)
+        calibration = self._calibration(settings) if settings.key else None
+        clock = lambda: round(1e9 * monotonic_s())  # noqa: E731
+        self.slave = Slave(self._size(), lambda: self._image, clock, self._a2l, calibration)
         self.place = Place("xcp", lambda: self._open(settings))
+
+    def _calibration(self, settings: Settings) -> Calibration:
+        self._takeover = Takeover(self.reader, Path(settings.save) if settings.save else None)
+        secret = read_secret(Path(settings.key))
+        return Calibration(self._takeover, secret, lambda: secrets.token_bytes(SEED_BYTES))
+
+    def _parameters_of(self, batch: Batch) -> RecordArray:
+        cycles = batch.records["cycle"]
+        if self._takeover is not None:
+            return self._takeover.parameters_of(cycles)
+        return np.repeat(self._parameters, len(cycles))
 
     def _size(self) -> Size:
         return CAN if self.transport.kind == "can" else ETHERNET
@@ -66,7 +87,7 @@ class Server:
         while not self._due and len((batch := self.reader.read(AT_ONCE)).records):
             measuring = self.slave.daq.running
             taken = batch if measuring else Batch(*(part[-1:] for part in batch))
-            found = images(taken, self._parameters)
+            found = images(taken, self._parameters_of(taken))
             if measuring:
                 if self.reader.lost_cycles > self._lost:
                     self._due.append(self.slave.overload())
@@ -106,8 +127,8 @@ class Server:
         response = self.slave.answer(command)
         if not self.slave.daq.running:
             self._due.clear()
-        if response is not None:
-            end.send(response)
+        for packet in [] if response is None else [response, *self.slave.events()]:
+            end.send(packet)
 
     def finish(self) -> None:
         """Send what is left and say that the session has ended."""

@@ -1,16 +1,18 @@
 """XCP slave (ASAM MCD-1 XCP 1.5): answers the commands of one master. It knows no transport and no clock.
 
 Numbers of several bytes are little-endian (Intel), addresses are of bytes, one command has one response. A
-slave that is not connected answers CONNECT alone. Nothing can be written: parameters are CONFIG's.
+slave that is not connected answers CONNECT alone. Without a calibration nothing can be written.
 """
 
 import struct
 from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple
 
+from ecu.xcp.calibration import Calibration
 from ecu.xcp.daq import EVENT_CYCLE, TICK_NS, DaqLists
-from ecu.xcp.memory import EPK, Image, place_of
+from ecu.xcp.memory import EPK, Image, base_of, place_of
 from ecu.xcp.protocol import (
+    CAL_PAG_RESOURCE,
     DAQ_RESOURCE,
     ERROR,
     EV_DAQ_OVERLOAD,
@@ -58,9 +60,13 @@ class Slave:
         latest: Callable[[], Image | None],
         clock_ns: Callable[[], int],
         a2l: Callable[[], str],
+        calibration: Calibration | None = None,
     ) -> None:
-        """Take what it reads: the image of the last cycle, the monotonic clock, and the A2L file's text."""
-        self._size, self._latest, self._clock_ns = size, latest, clock_ns
+        """Take what it reads: the image of the last cycle, the monotonic clock, and the A2L file's text.
+
+        `calibration`: of the run, None: measurement alone.
+        """
+        self._size, self._latest, self._clock_ns, self._calibration = size, latest, clock_ns, calibration
         self.connected = False
         self.daq = DaqLists(size.data, largest_entry(size))
         self._text: bytes | None = None
@@ -85,6 +91,13 @@ class Slave:
         except Refused as refused:
             return bytes([ERROR, refused.error])
 
+    def events(self) -> list[bytes]:
+        """Return the events that the last command led to."""
+        if self._calibration is None:
+            return []
+        found, self._calibration.events = self._calibration.events, []
+        return found
+
     def overload(self) -> bytes:
         """Return the event that cycles were lost."""
         return struct.pack("<BBH", EVENT, EV_DAQ_OVERLOAD, EVENT_CYCLE)
@@ -102,10 +115,11 @@ class Slave:
             raise Refused(Error.OUT_OF_RANGE)
         self._disconnect(b"")
         self.connected = True
-        size = self._size
-        return struct.pack(
-            "<BBBHBB", DAQ_RESOURCE, OPTIONAL_COMM_MODE, size.command, size.data, VERSION, VERSION
-        )
+        size, resource = self._size, DAQ_RESOURCE
+        if self._calibration is not None:
+            self._calibration.begin()
+            resource |= CAL_PAG_RESOURCE
+        return struct.pack("<BBBHBB", resource, OPTIONAL_COMM_MODE, size.command, size.data, VERSION, VERSION)
 
     def _disconnect(self, command: bytes) -> bytes:
         self.connected = False
@@ -114,7 +128,8 @@ class Slave:
         return b""
 
     def _status(self, command: bytes) -> bytes:
-        return struct.pack("<BBBH", DAQ_RUNNING if self.daq.running else 0, 0, 0, 0)
+        protection = 0 if self._calibration is None else self._calibration.protection
+        return struct.pack("<BBBH", DAQ_RUNNING if self.daq.running else 0, protection, 0, 0)
 
     def _synch(self, command: bytes) -> bytes:
         raise Refused(Error.CMD_SYNCH)
@@ -130,10 +145,18 @@ class Slave:
     def _seed(self, command: bytes) -> bytes:
         if command[1] > 1:
             raise Refused(Error.OUT_OF_RANGE)
-        return b"\x00"
+        if self._calibration is None or command[1:3] == bytes([0, DAQ_RESOURCE]):
+            return b"\x00"
+        return self._calibration.seed(command[1], command[2], self._size.command - 2)
 
     def _unlock(self, command: bytes) -> bytes:
-        raise Refused(Error.SEQUENCE)
+        if self._calibration is None:
+            raise Refused(Error.SEQUENCE)
+        response = self._calibration.unlock(command[1], command[2 : 2 + command[1]])
+        if response is None:
+            self._disconnect(b"")
+            raise Refused(Error.ACCESS_LOCKED)
+        return response
 
     def _set_mta(self, command: bytes) -> bytes:
         extension, address = struct.unpack_from("<BL", command, 3)
@@ -163,13 +186,58 @@ class Slave:
         place = place_of(address, length)
         if place is None:
             raise Refused(Error.ACCESS_DENIED)
+        found = None if self._calibration is None else self._calibration.read(place, length)
+        if found is not None:
+            return found
         image = self._latest()
         if image is None:
             raise Refused(Error.RESOURCE_TEMPORARY_NOT_ACCESSIBLE)
         return image[place : place + length].tobytes()
 
     def _download(self, command: bytes) -> bytes:
-        raise Refused(Error.WRITE_PROTECTED)
+        if self._calibration is None:
+            raise Refused(Error.WRITE_PROTECTED)
+        length, data = command[1], command[2 : 2 + command[1]]
+        if not length or len(data) != length:
+            raise Refused(Error.OUT_OF_RANGE if len(data) == length else Error.CMD_SYNTAX)
+        place = None if self._text is not None else place_of(self._mta, length)
+        if place is None:
+            raise Refused(Error.ACCESS_DENIED)
+        self._calibration.write(place, data)
+        self._mta += length
+        return b""
+
+    def _short_download(self, command: bytes) -> bytes:
+        self._set_mta(b"\x00" + command[1:])
+        return self._download(command[:2] + command[8:])
+
+    def _calibrating(self) -> Calibration:
+        if self._calibration is None:
+            raise Refused(Error.CMD_UNKNOWN)
+        return self._calibration
+
+    def _set_page(self, command: bytes) -> bytes:
+        return self._calibrating().set_page(*command[1:4])
+
+    def _get_page(self, command: bytes) -> bytes:
+        return self._calibrating().get_page(*command[1:3])
+
+    def _pages_info(self, command: bytes) -> bytes:
+        self._calibrating()
+        return bytes([1, 0])
+
+    def _segment_info(self, command: bytes) -> bytes:
+        mode, segment, what = command[1:4]
+        return self._calibrating().segment_info(mode, segment, what, base_of("parameters"))
+
+    def _page_info(self, command: bytes) -> bytes:
+        return self._calibrating().page_info(*command[2:4])
+
+    def _copy_page(self, command: bytes) -> bytes:
+        return self._calibrating().copy_page(*command[1:5])
+
+    def _request(self, command: bytes) -> bytes:
+        return self._calibrating().request(command[1])
 
     def _processor_info(self, command: bytes) -> bytes:
         properties = DYNAMIC | PRESCALER | TIMESTAMPS | OVERLOAD_EVENT
@@ -250,6 +318,14 @@ _COMMANDS: Final[Mapping[int, tuple[int, Callable[[Slave, bytes], bytes]]]] = {
     Command.UPLOAD: (2, Slave._upload),
     Command.SHORT_UPLOAD: (8, Slave._short_upload),
     Command.DOWNLOAD: (2, Slave._download),
+    Command.SHORT_DOWNLOAD: (8, Slave._short_download),
+    Command.SET_CAL_PAGE: (4, Slave._set_page),
+    Command.GET_CAL_PAGE: (3, Slave._get_page),
+    Command.GET_PAG_PROCESSOR_INFO: (1, Slave._pages_info),
+    Command.GET_SEGMENT_INFO: (5, Slave._segment_info),
+    Command.GET_PAGE_INFO: (4, Slave._page_info),
+    Command.COPY_CAL_PAGE: (5, Slave._copy_page),
+    Command.SET_REQUEST: (4, Slave._request),
     Command.GET_DAQ_PROCESSOR_INFO: (1, Slave._processor_info),
     Command.GET_DAQ_RESOLUTION_INFO: (1, Slave._resolution_info),
     Command.GET_DAQ_EVENT_INFO: (4, Slave._event_info),
@@ -269,6 +345,5 @@ _COMMANDS: Final[Mapping[int, tuple[int, Callable[[Slave, bytes], bytes]]]] = {
 """Of each command its least length and what does it."""
 
 _NOT_OPTIONAL: Final = (Command.CONNECT, Command.DISCONNECT, Command.GET_STATUS, Command.SYNCH)
-_REFUSED: Final = (Command.DOWNLOAD, Command.UNLOCK)
-OPTIONAL_COMMANDS: Final = tuple(one for one in Command if one not in (*_NOT_OPTIONAL, *_REFUSED))
+OPTIONAL_COMMANDS: Final = tuple(one for one in Command if one not in _NOT_OPTIONAL)
 """Those that an A2L file lists."""

@@ -34,6 +34,8 @@ class Variable(NamedTuple):
     meaning: str = ""
     texts: tuple[str, ...] = ()
     """Of the values 0, 1, …; empty: a number."""
+    writable: bool = False
+    """A master may calibrate it."""
 
 
 class Record(NamedTuple):
@@ -114,6 +116,7 @@ def _parameters() -> Iterator[Variable]:
             high if one.high is None else one.high,
             one.meaning,
             one.texts,
+            one.writable,
         )
 
 

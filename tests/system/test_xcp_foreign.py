@@ -1,11 +1,14 @@
 """`run --xcp` with a foreign master, pyxcp: what it reads, what it may not, what it measures."""
 
+import hmac
+import struct
 import time
 
 import numpy as np
 import pytest
 
 from brakelab.testing.daemon import wait_for
+from ecu.settings.config import load_config
 from ecu.xcp.memory import EPK
 
 from .conftest import ROOT, driven
@@ -76,6 +79,47 @@ def test_a_foreign_master_reads_what_it_may(settings):
         master.disconnect()
     finally:
         master.close()
+
+
+def test_a_foreign_master_calibrates_stores_and_is_refused(daemon, car, tmp_path):
+    from pyxcp.config import create_application_from_config, set_application
+    from pyxcp.master.errorhandler import SystemExit  # not Python's
+
+    key, port = tmp_path / "key", free_port()
+    key.write_text(bytes(32).hex())
+    key.chmod(0o600)
+    one = daemon(
+        *("--config", ROOT / "config" / "suv.toml", "-i", "udp_multicast", "-c", GROUP),
+        *("--xcp", f"udp:{port}", "--xcp-key", key, "--xcp-save", tmp_path / "saved.toml"),
+    )
+    one.wait_for("ready")
+    place = {"host": "127.0.0.1", "port": port, "protocol": "UDP", "ipv6": False}
+    application = create_application_from_config({"Transport": {"Eth": place}})
+    application.general.seed_n_key_function = lambda _, seed: hmac.digest(bytes(32), seed, "sha256")[:16]
+    set_application(application)
+    rate, _ = VARIABLES["parameters.control.max_pressure_rate"]
+    with driven(car):
+        master = opened(application)
+        try:
+            assert master.getPagProcessorInfo().maxSegments == 1
+            master.cond_unlock("calpag")
+            for value, code in ((100.0, "ERR_OUT_OF_RANGE"), (2000.0, None)):
+                master.setMta(rate)
+                master.download(struct.pack("<d", value))
+                if code:
+                    with pytest.raises(SystemExit) as refused:
+                        master.setCalPage(1, 0, 1)
+                    assert code in repr(refused.value)
+                else:
+                    master.setCalPage(1, 0, 1)
+            assert master.getCalPage(1, 0) == 1
+            master.setRequest(1, 0)
+            assert np.frombuffer(master.shortUpload(8, rate)).tolist() == [2000.0]
+            master.disconnect()
+        finally:
+            master.close()
+        assert load_config(tmp_path / "saved.toml").control.max_pressure_rate == 2000.0
+        assert one.end() == 0
 
 
 def test_a_foreign_master_measures_200_signals_and_none_is_lost(settings):

@@ -1,5 +1,6 @@
 """Replay against an explicit live loop, cycle by cycle: the same bits, never a sample from the future."""
 
+from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from brakelab.logs.log_quality import LogQuality
 from brakelab.logs.sample_block import SampleBlock
 from brakelab.logs.signal_file import freshness_at_any_rate
 from brakelab.replay import engine
-from brakelab.replay.engine import Rows, new_ecu, run_frames, run_samples
+from brakelab.replay.engine import Change, Rows, new_ecu, run_frames, run_samples
 from brakelab.replay.quality import Findings
 from brakelab.replay.source import load_source
 from brakelab.rig.play.play_log import contract_frames
@@ -144,11 +145,20 @@ def drive_frames(tmp_path: Path, seconds: float = 3.0) -> RecordArray:
     return np.concatenate(frames)
 
 
-def live_frames(params: RecordArray, frames: RecordArray, cycles: RecordArray, counted: bool) -> np.ndarray:
+def live_frames(
+    params: RecordArray,
+    frames: RecordArray,
+    cycles: RecordArray,
+    counted: bool,
+    changes: Sequence[Change] = (),
+) -> np.ndarray:
     plan = contract_receive_plan(resource("dbc/brake_ecu.dbc"))
-    ecu, reception = new_ecu(params, None), new_reception(plan)
+    ecu, reception = new_ecu(params.copy(), None), new_reception(plan)
     lines, first = [], 0
     for cycle in cycles:
+        for change in changes:
+            if change.cycle == cycle["number"]:
+                ecu.params[0] = change.params[0]
         begin_cycle(ecu.inputs[0], int(cycle["t_ns"]), int(cycle["missed"] + 1) * CYCLE_NS)
         for name in ("bus_faults", "overruns", "worst_lateness_us"):
             ecu.inputs[name] = cycle[name]
@@ -191,6 +201,30 @@ def test_a_recording_repeats_which_frames_a_cycle_took(params: RecordArray, tmp_
     for counted in (True, False):
         rows = run_frames(new_ecu(params, None), plan, new_reception(plan), [frames], cycles, counted)
         assert (joined(list(rows))[:, :N_OUTPUTS].tobytes() == live.tobytes()) == counted
+
+
+@pytest.mark.parametrize("batch", [2048, 64, 1])
+def test_a_calibration_is_repeated_before_its_cycle(
+    params: RecordArray, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, batch: int
+) -> None:
+    """Also two before one cycle, one before the first and one after the last."""
+    monkeypatch.setattr(engine, "BATCH", batch)
+    frames = drive_frames(tmp_path)
+    cycles = np.zeros(200, CYCLE)
+    cycles["number"], cycles["t_ns"] = np.arange(200), START_NS + np.arange(1, 201) * CYCLE_NS
+    plan = contract_receive_plan(resource("dbc/brake_ecu.dbc"))
+    changes = []
+    for cycle, scale in ((0, 1.0), (64, 0.3), (129, 0.9), (129, 0.5), (199, 0.8), (200, 0.1)):
+        other = params.copy()
+        for name in ("mass", "unloaded_radius", "wheel_radius"):
+            other[name] *= scale
+        changes.append(Change(cycle, other))
+    before = params.tobytes()
+    live = live_frames(params, frames, cycles, False, changes)
+    rows = run_frames(new_ecu(params, None), plan, new_reception(plan), [frames], cycles, False, changes)
+    assert joined(list(rows))[:, :N_OUTPUTS].tobytes() == live.tobytes()
+    assert live.tobytes() != live_frames(params, frames, cycles, False).tobytes()
+    assert params.tobytes() == before  # the next log begins with CONFIG
 
 
 def test_candump_text_keeps_every_bit_of_a_frame(tmp_path: Path) -> None:

@@ -26,6 +26,7 @@ from ecu.contract.records import (
 )
 from ecu.errors import UserError
 from ecu.recording import store as state_store
+from ecu.recording.calibration import NOTES_FILE
 from ecu.recording.publish import publish
 from ecu.recording.recorder import (
     CYCLES_FILE,
@@ -89,6 +90,36 @@ def test_a_recording_reads_back_as_it_was_written(tmp_path):
     assert recording.about["config_hash"] == "abcd"
     assert len(recording.frames.read_text().splitlines()) == 3 * 2 + 2 * 1
     assert recording.cycles["frames"].sum() == 8
+
+
+def calibrate(run, number, cycle):
+    page = run.ring.pages[:1]
+    page["number"], page["tables"] = number, json.dumps({"control": {"n": number}}).encode()
+    run.ring.header["calibrated_from"], run.ring.header["calibration"] = cycle, number
+
+
+def test_a_calibration_is_noted_once_also_by_the_recorder_that_takes_over(tmp_path):
+    run = Run(tmp_path, record=tmp_path / "record")
+    run.cycles(3)
+    calibrate(run, 1, 3)
+    run.cycles(2)
+    run.cycles(2)
+    assert read_recording(tmp_path / "record").calibrations == [(1, 3, {"control": {"n": 1}})]
+    calibrate(run, 2, 7)
+    run.recorder = Recorder(RingReader(run.ring.path), tmp_path / "record", None, again=True)
+    run.cycles(1)
+    run.recorder.finish()
+    notes = read_recording(tmp_path / "record").calibrations
+    assert [note[:2] for note in notes] == [(1, 3), (2, 7)]
+
+
+def test_notes_that_are_none_make_no_recording(tmp_path):
+    run = Run(tmp_path, record=tmp_path / "record")
+    run.cycles(1)
+    for text in ("{", "[]", '{"number": 1}', '{"number": 1, "cycle": "x", "tables": {}}'):
+        (run.recorder.files.folder / NOTES_FILE).write_text(text)
+        with pytest.raises(UserError, match="not a complete recording"):
+            read_recording(tmp_path / "record")
 
 
 def test_each_start_has_a_folder_and_the_latest_is_read(tmp_path):

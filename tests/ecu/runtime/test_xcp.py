@@ -1,9 +1,33 @@
 """What `run --xcp` is refused for before it starts, and the arguments of its process."""
 
+from pathlib import Path
+
 import pytest
 
 from ecu.errors import UserError
-from ecu.runtime.xcp import Settings, Transport, checked_settings, parse_transport, read_settings
+from ecu.runtime.xcp import (
+    SAVED,
+    Calibrating,
+    Settings,
+    Transport,
+    checked_settings,
+    parse_transport,
+    read_settings,
+)
+
+NOTHING = Calibrating()
+
+
+def checked(text, channel="can0", taken=(), silent=False, calibrating=NOTHING, inputs=()):
+    return checked_settings(text, "socketcan", channel, set(taken), silent, calibrating, inputs)
+
+
+@pytest.fixture
+def key(tmp_path):
+    path = tmp_path / "key"
+    path.write_text("00" * 16)
+    path.chmod(0o600)
+    return path
 
 
 @pytest.mark.parametrize(
@@ -46,8 +70,25 @@ def test_a_transport_that_is_none_is_one_line(text, says):
 
 
 def test_what_is_checked_reaches_the_process():
-    word = checked_settings("can:0x7A0:0x7A8", "socketcan", "can 0", {0x50}, silent=False)
+    word = checked("can:0x7A0:0x7A8", channel="can 0")
     assert read_settings(word) == Settings("can:0x7A0:0x7A8", "socketcan", "can 0")
+
+
+def test_files_of_calibration_reach_it_whole(key, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    word = checked("udp:5555", calibrating=Calibrating(Path("key"), Path("new.toml")))
+    assert read_settings(word)[3:] == (str(tmp_path / "key"), str(tmp_path / "new.toml"))
+
+
+def test_what_a_calibration_wrote_it_may_renew_unless_the_run_reads_it(key, tmp_path):
+    save = tmp_path / "saved.toml"
+    save.write_text(f"{SAVED}\n")
+    assert checked("udp:5555", calibrating=Calibrating(key, save))
+    with pytest.raises(UserError, match="is read by this run"):
+        checked("udp:5555", calibrating=Calibrating(key, save), inputs=[save])
+    save.write_text("name = 'mine'\n")
+    with pytest.raises(UserError, match="exists, and no calibration wrote it"):
+        checked("udp:5555", calibrating=Calibrating(key, save))
 
 
 @pytest.mark.parametrize(
@@ -60,12 +101,12 @@ def test_what_is_checked_reaches_the_process():
 )
 def test_what_cannot_be_served_is_refused(text, silent, says):
     with pytest.raises(UserError, match=says):
-        checked_settings(text, "socketcan", "can0", {0x50, 0x60}, silent)
+        checked(text, taken={0x50, 0x60}, silent=silent)
 
 
 def test_a_silent_run_is_measured_on_ethernet():
-    assert checked_settings("udp:5555", "socketcan", "can0", set(), silent=True)
+    assert checked("udp:5555", silent=True)
 
 
 def test_without_xcp_there_is_nothing_to_tell():
-    assert checked_settings(None, "socketcan", "can0", set(), silent=True) is None
+    assert checked(None, silent=True) is None

@@ -1,3 +1,5 @@
+import json
+
 import pytest
 
 from ecu.errors import UserError
@@ -33,6 +35,36 @@ def test_one_that_begins_later_says_so(loop, tmp_path):
     recording = read_recording(keep(batches(reader), reader, tmp_path))
     assert recording.about["first_cycle"] == recording.cycles["number"][0] == 600
     assert recording.about["start_ns"] == recording.cycles["t_ns"][0]
+
+
+@pytest.mark.parametrize(
+    ("before", "calibrated", "after", "first", "notes", "rate"),
+    [
+        (100, 1, 100, 0, [(1, 100)], 1.0),  # all of the run, and how it was calibrated: it can be repeated
+        (100, 2, 100, 101, [], 2.0),  # what held before the last one is gone, and its cycles with it
+        (100, 1, 2900, 600, [], 1.0),  # calibrated before the first cycle that is kept
+        (100, 0, 10, 0, [], None),
+    ],
+)
+def test_a_calibrated_run_says_which_parameters_held(
+    loop, tmp_path, before, calibrated, after, first, notes, rate
+):
+    one = loop(configuration={"control": {}})
+    for number in range(1, calibrated + 1):
+        one.publish(before if number == 1 else 1)
+        page = one.ring.pages[number % 2 : number % 2 + 1]
+        page["number"], page["tables"] = number, json.dumps({"control": {"rate": float(number)}}).encode()
+        one.ring.header["page"], one.ring.header["calibrated_from"] = number % 2, one.number
+        one.ring.header["calibration"] = number
+    for _ in range(after):
+        one.publish(1)
+    reader = RingReader(one.ring.path)
+    found = [reader.read(1) for _ in range(2400)]
+    recording = read_recording(keep([each for each in found if len(each.records)], reader, tmp_path / "kept"))
+    assert recording.about["first_cycle"] == recording.cycles["number"][0] == first
+    assert [note[:2] for note in recording.calibrations] == notes
+    last = recording.calibrations[-1].tables if notes else recording.about["configuration"]
+    assert last["control"].get("rate") == rate
 
 
 def test_what_cannot_be_kept(loop, tmp_path):

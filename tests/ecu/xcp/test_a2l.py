@@ -54,7 +54,7 @@ def test_every_variable_is_at_its_address_with_its_type_unit_and_limits(module):
             name = f"{record.name}.{one.name}"
             if record.name == "parameters":
                 _, _, kind, address, layout, _, conversion, low, high, *rest = given[name]
-                assert rest[-1] == "READ_ONLY"
+                assert ("READ_ONLY" in rest) == (not one.writable)
                 assert (kind == "VAL_BLK") == (one.length > 1) == ("MATRIX_DIM" in rest)
             else:
                 _, _, layout, conversion, _, _, low, high, keyword, address = measured[name]
@@ -138,7 +138,21 @@ def test_of_a_car_only_what_it_gives_is_named(configuration):
 
 def test_the_program_is_named(module):
     (parameters,) = within(module, "MOD_PAR")
-    assert parameters == ['""', "EPK", f'"{EPK}"']
+    assert parameters[:3] == ['""', "EPK", f'"{EPK}"']
+
+
+def test_the_configuration_is_a_segment_of_two_pages_one_of_them_written(module):
+    (segment,) = within(within(module, "MOD_PAR")[0], "MEMORY_SEGMENT")
+    parameters = RECORDS[-1]
+    assert segment[2:7] == ["DATA", "RAM", "INTERN", "0x40000", f"0x{parameters.dtype.itemsize:X}"]
+    (described,) = within(within(segment, "IF_DATA")[0], "SEGMENT")
+    assert described[:5] == ["0", "2", "0", "0", "0"]
+    assert [page[3] for page in within(described, "PAGE")] == [
+        "XCP_WRITE_ACCESS_NOT_ALLOWED",
+        "XCP_WRITE_ACCESS_DONT_CARE",
+    ]
+    (xcp,) = within(module, "IF_DATA")
+    assert within(xcp, "PAG") == [["1"]]
 
 
 def test_the_command_writes_or_prints(tmp_path, capsys):

@@ -34,6 +34,10 @@ ADDRESS_OF_MODE = "00 10 00 01 00"  # extension, then 0x10010 with the least byt
         ("E3 00 00 00", "FE 22"),
         ("F0 01 00", "FE 23"),  # DOWNLOAD: write protected
         ("12", "FE 20"),
+        ("ED 01 00 00 00 00 04 00 00", "FE 23"),
+        ("EB 01 00 01", "FE 20"),  # no pages
+        ("EA 01 00", "FE 20"),
+        ("F9 01 00 00", "FE 20"),
         ("F3 00 00 00 01 00 00 00", "FE 20"),  # BUILD_CHECKSUM: not there
         ("F4 01", "FE 21"),  # too short
         ("C7 02 FF 08", "FE 21"),

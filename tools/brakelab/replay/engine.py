@@ -6,6 +6,7 @@ missed periods and bus faults of its cycles. Nothing that is received depends on
 next cycles are made beside it.
 """
 
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from itertools import chain, count
 from typing import Any, Final, NamedTuple, TypeVar
@@ -54,6 +55,15 @@ class Ecu(NamedTuple):
     outputs: RecordArray
     seen: RecordArray
     """SEEN, shape (N_INPUTS,)."""
+
+
+class Change(NamedTuple):
+    """Parameters that take the place of others."""
+
+    cycle: int
+    """Number of the first that goes by them."""
+    params: RecordArray
+    """`PARAMS`, shape (1,)."""
 
 
 class Rows(NamedTuple):
@@ -191,18 +201,21 @@ def run_frames(
     blocks: Iterable[RecordArray],
     cycles: RecordArray | None = None,
     counted: bool = False,
+    changes: Iterable[Change] = (),
 ) -> Iterator[Rows]:
     """Yield the rows of a log whose frames come in `blocks` of FRAME, in the order of arrival.
 
     `cycles` (CYCLE, shape (n,)) gives T_k instead of the grid; `counted`: its `frames` were consumed in each.
-    Another thread reads `blocks`.
+    `changes` are of the recorded run, in order. Another thread reads `blocks`.
     """
 
     def gather(frames: RecordArray, batch: _Batch, at: RecordArray, last: bool) -> None:
         _gather_frames(plan, reception, counted, frames, batch.cycles, ecu.inputs, batch.inputs, at, last)
 
     return _rows(
-        ecu, _gathered(blocks, new_record(FRAME, 0), lambda frames: frames["stamp_ns"], cycles, gather)
+        ecu,
+        _gathered(blocks, new_record(FRAME, 0), lambda frames: frames["stamp_ns"], cycles, gather),
+        changes,
     )
 
 
@@ -270,28 +283,42 @@ def _gathered(
                 break
 
 
-def _rows(ecu: Ecu, batches: Iterator[_Batch]) -> Iterator[Rows]:
-    vector = output_vector(ecu.outputs)
+def _rows(ecu: Ecu, batches: Iterator[_Batch], changes: Iterable[Change] = ()) -> Iterator[Rows]:
+    vector, params, due = output_vector(ecu.outputs), ecu.params.copy(), deque(changes)
     rows, done = _new_rows(), 0
     for cycles, t, inputs in read_ahead(batches):
         part = slice(done, done + len(cycles))
         rows.t_ns[part], rows.t[part] = cycles["t_ns"], t
-        _run(
-            ecu.params,
-            ecu.state,
-            inputs,
-            ecu.outputs,
-            ecu.seen,
-            vector,
-            rows.values[part],
-            rows.samples[part],
-        )
+        for begin, end in _pieces(cycles["number"], params, due):
+            part = slice(done + begin, done + end)
+            _run(
+                params,
+                ecu.state,
+                inputs[begin:end],
+                ecu.outputs,
+                ecu.seen,
+                vector,
+                rows.values[part],
+                rows.samples[part],
+            )
         done += len(cycles)
         if done == len(rows.t):
             yield rows
             rows, done = _new_rows(), 0
     if done:
         yield Rows(rows.t_ns[:done], rows.t[:done], rows.values[:done], rows.samples[:done])
+
+
+def _pieces(numbers: NDArray[np.int64], params: RecordArray, due: deque[Change]) -> Iterator[tuple[int, int]]:
+    """Yield the pieces of a batch that go by the same parameters, and exchange `params` between them."""
+    begin = 0
+    while due and due[0].cycle <= numbers[-1]:
+        end = int(np.searchsorted(numbers, due[0].cycle))
+        if end > begin:
+            yield begin, end
+        params[:] = due.popleft().params
+        begin = end
+    yield begin, len(numbers)
 
 
 def _new_rows() -> Rows:

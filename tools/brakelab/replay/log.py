@@ -13,6 +13,7 @@ from brakelab.logs.physics.judge import judge
 from brakelab.logs.physics.samples import Collector, car_of
 from brakelab.logs.sample_block import SampleBlock
 from brakelab.logs.signal_file import freshness_at_any_rate, read_signals
+from brakelab.replay.calibrated import changes_of
 from brakelab.replay.earlier_layout import convert_initial
 from brakelab.replay.engine import Ecu, Rows, run_frames, run_samples
 from brakelab.replay.quality import Findings, identifier, note_faults
@@ -121,7 +122,8 @@ def replay_log(
             counted = _heard_everything(cycles)
             if counted:
                 blocks = _expected_only(blocks, plan)
-        rows = run_frames(ecu, plan, reception, blocks, cycles, counted)
+        changes, findings.calibrated = changes_of(recording, ecu)
+        rows = run_frames(ecu, plan, reception, blocks, cycles, counted, changes)
     yield from _noted(rows, findings, ecu)
     if not reception.messages["accepted"].any():
         raise _foreign(path, source, findings)

@@ -61,6 +61,8 @@ class Findings:
     """Findings of the physics check about the inputs."""
     dropped: int = 0
     """Frames that the kernel dropped in a recorded run."""
+    calibrated: str = ""
+    """The line about calibrations of a recorded run that were left out."""
     seconds: float = 0.0
     """That the replay took."""
     faulty_rows: int = 0

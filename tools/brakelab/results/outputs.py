@@ -8,14 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ecu.errors import UserError
-from ecu.settings.config import included_file
-from ecu.settings.toml_file import read_toml
-
-
-def config_files(config: Path) -> list[Path]:
-    """Return `config` and the file that it includes, if any."""
-    name = read_toml(config).get("include")
-    return [config, included_file(config, str(name))] if name else [config]
+from ecu.settings.config import config_files as config_files
 
 
 def check_outputs(
