@@ -21,7 +21,7 @@ from ecu.bus.load import received_load, sent_load
 from ecu.bus.output_map import refuse_fd, transmit_plan
 from ecu.bus.protocol import Channel
 from ecu.bus.receive import Reception, new_reception, receive
-from ecu.bus.receive_plan import ReceivePlan
+from ecu.bus.receive_plan import ReceivePlan, accepted_ids
 from ecu.bus.signal_map import receive_plan
 from ecu.bus.transmit import TransmitPlan
 from ecu.compiling import report_compiling
@@ -211,7 +211,7 @@ def bit_rate(channel: str) -> int | None:
 def bus(interface: str, channel: str, plan: ReceivePlan, config: Path | None) -> list[Check]:
     """Listen for two seconds and check every message of the plan."""
     fd = load_config(config).can_fd if config else False
-    opened = open_channel(interface, channel, receive_ids=plan.ids.tolist(), fd=fd)
+    opened = open_channel(interface, channel, receive_ids=accepted_ids(plan.messages), fd=fd)
     try:
         reception = listen(opened, plan, LISTEN_S)
         status = opened.status()

@@ -135,10 +135,15 @@ def find_message(database: Database, name: str, where: Path, key: str) -> Messag
         raise UserError(str(where), key, remedy) from None
 
 
-def set_sender(message: Message, source: int | None, priority: int | None, where: Path, key: str) -> None:
+def set_sender(
+    message: Message, source: int | None, priority: int | str | None, where: Path, key: str
+) -> None:
     """Give a J1939 message the source address and priority of `key` of the file `where`, where there are any.
 
-    Raises UserError for an identifier of 11 bits, and for a J1939 message that nobody in particular sends.
+    Any priority (a word) is 0.
+
+    Raises:
+        UserError: an identifier of 11 bits, or a J1939 message that nobody in particular sends.
     """
     anybody = message.protocol == "j1939" and message.frame_id & 0xFF == ANYBODY
     if source is None and anybody:
@@ -150,7 +155,8 @@ def set_sender(message: Message, source: int | None, priority: int | None, where
     if source is not None:
         message.frame_id = message.frame_id & ~0xFF | source
     if priority is not None:
-        message.frame_id = message.frame_id & ~(7 << 26) | priority << 26
+        bits = priority if isinstance(priority, int) else 0
+        message.frame_id = message.frame_id & ~(7 << 26) | bits << 26
 
 
 def find_signal(message: Message, name: str, path: Path, where: Path, key: str) -> Any:

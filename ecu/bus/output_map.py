@@ -17,7 +17,7 @@ from ecu.bus.bits import FLOAT32, first_bit
 from ecu.bus.database import LONGEST_PAYLOAD, find_message, find_signal, read_database, set_sender
 from ecu.bus.plan import not_available_code, signal_row
 from ecu.bus.protection import Protection
-from ecu.bus.receive_plan import ReceivePlan
+from ecu.bus.receive_plan import ReceivePlan, accepted_ids
 from ecu.bus.signal_map import (
     MappedMessage,
     MappedOutput,
@@ -82,9 +82,7 @@ def refuse_fd(plan: TransmitPlan, can_fd: bool, config: Path) -> None:
 
 def _refuse_shared(path: Path, plan: TransmitPlan, receiving: ReceivePlan) -> None:
     """Raise UserError where two messages have one identifier, or one beyond 11 bits."""
-    names: dict[int, str] = dict(
-        zip(receiving.ids.tolist(), receiving.messages["name"].tolist(), strict=True)
-    )
+    names = accepted_ids(receiving.messages)
     for message in plan.messages:
         number, name = int(message["id"]), str(message["name"])
         if LAST_STANDARD < number < EXTENDED_ID:
@@ -124,6 +122,8 @@ def _sent_message(
     outputs: dict[str, MappedOutput],
 ) -> SentMessage:
     key = f"messages.{message.name}"
+    if settings.priority == "any":
+        raise UserError(str(path), f"{key}.priority", "a message that is sent has one; give a number, 0 to 7")
     set_sender(message, settings.source, settings.priority, path, key)
     if message.length > LONGEST_CLASSICAL and message.length not in FD_LENGTHS:
         lengths = ", ".join(map(str, FD_LENGTHS))

@@ -12,7 +12,7 @@ from ecu.bus import e2e, link, sequence
 from ecu.bus.freshness import NEVER, accept
 from ecu.bus.plan import is_present, is_valid, raw_code, signed_value
 from ecu.bus.protection import frame_count
-from ecu.bus.receive_plan import ReceivePlan
+from ecu.bus.receive_plan import PRIORITIES, PRIORITY_BIT, ReceivePlan
 from ecu.bus.request import (
     FIRST,
     LAST,
@@ -89,7 +89,17 @@ def new_reception(plan: ReceivePlan) -> Reception:
 
 
 @kernel
-def _find(ids: NDArray[np.uint32], identifier: int) -> int:
+def _find(ids: NDArray[np.uint32], messages: Any, identifier: int) -> int:
+    """Return the message of an identifier of 29 bits, -1: none; where any priority counts, of the rest."""
+    place = _search(ids, identifier)
+    if place >= 0:
+        return place
+    place = _search(ids, identifier & ~(PRIORITIES - 1 << PRIORITY_BIT))
+    return place if place >= 0 and messages[place].any_priority else -1
+
+
+@kernel
+def _search(ids: NDArray[np.uint32], identifier: int) -> int:
     low, high = 0, len(ids)
     while low < high:
         middle = (low + high) // 2
@@ -195,7 +205,7 @@ def receive(
         identifier: Any = np.int64(frame.can_id)
         if frame.flags & FRAME_EXTENDED:
             identifier |= EXTENDED_ID
-        place = np.int64(places[identifier]) if identifier < len(places) else _find(ids, identifier)
+        place = np.int64(places[identifier]) if identifier < len(places) else _find(ids, messages, identifier)
         if place < 0:
             totals.unknown += 1
             continue

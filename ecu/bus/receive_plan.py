@@ -31,19 +31,22 @@ MESSAGE: Final = np.dtype(
         ("length", "u1"),
         ("foreign", "u1"),  # own identifier, never expected from another sender
         ("request", "u1"),  # carries the driver's request
+        ("any_priority", "u1"),  # J1939: the three bits in `id` are 0, and count for nothing
         *PROTECTION,
     ],
     align=True,
 )
 
 STANDARD_IDS: Final = 1 << 11
+PRIORITY_BIT, PRIORITIES = 26, 8
+"""Of an identifier of J1939 (SAE J1939-21): its three highest bits."""
 
 
 class ReceivePlan(NamedTuple):
     """Signals to take from frames; `messages` in ascending order of identifiers. Read only."""
 
     ids: NDArray[np.uint32]
-    """Identifiers, those of 29 bits with EXTENDED_ID: what kernel filters must let through."""
+    """Identifiers, those of 29 bits with EXTENDED_ID."""
     places: NDArray[np.int16]
     """Message of each identifier of 11 bits, −1: none, shape (2048,)."""
     messages: RecordArray
@@ -64,6 +67,19 @@ class MessageUse(NamedTuple):
     slowest_s: float
     protection: Protection = UNPROTECTED
     foreign: bool = False
+    any_priority: bool = False
+
+
+def accepted_ids(messages: RecordArray) -> dict[int, str]:
+    """Return every identifier that is one of `messages` (MESSAGE), with its name; 29 bits with EXTENDED_ID.
+
+    They are what kernel filters must let through.
+    """
+    return {
+        int(one["id"]) | priority << PRIORITY_BIT: str(one["name"])
+        for one in messages
+        for priority in (range(PRIORITIES) if one["any_priority"] else (0,))
+    }
 
 
 def places_of(ids: NDArray[np.uint32]) -> NDArray[np.int16]:
@@ -92,7 +108,7 @@ def compile_receive(uses: Sequence[MessageUse], expected: RecordArray) -> Receiv
         message["period_ns"] = round(use.period_s * 1e9)
         message["slowest_ns"] = round(use.slowest_s * 1e9)
         message["first"], message["count"] = first, compiled.wanted
-        message["foreign"] = use.foreign
+        message["foreign"], message["any_priority"] = use.foreign, use.any_priority
         set_protection(message, use.protection)
         asks = [FIRST <= signal.place <= LAST for signal in use.signals]
         message["request"] = len(expected) == N_INPUTS and any(asks)

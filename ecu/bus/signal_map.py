@@ -7,7 +7,7 @@ What such a map says of outputs: `output_map.py`.
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Final, NamedTuple
+from typing import Annotated, Final, Literal, NamedTuple
 
 from cantools.database import Database, Message
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -17,8 +17,15 @@ from ecu.bus.database import find_message, find_signal, read_database, set_sende
 from ecu.bus.freshness import input_freshness
 from ecu.bus.plan import SignalUse
 from ecu.bus.protection import Protection
-from ecu.bus.receive_plan import MessageUse, ReceivePlan, compile_receive, contract_receive_plan
+from ecu.bus.receive_plan import (
+    MessageUse,
+    ReceivePlan,
+    accepted_ids,
+    compile_receive,
+    contract_receive_plan,
+)
 from ecu.bus.units import conversion
+from ecu.contract.records import EXTENDED_ID
 from ecu.contract.signals import INPUT, INPUT_SIGNALS
 from ecu.errors import UserError, closest
 from ecu.settings.described import describe_keys
@@ -131,8 +138,8 @@ class MappedMessage(_Table):
     """Its frame counter."""
     source: Annotated[int, Field(ge=0, le=253), Unit("-")] | None = None
     """J1939: address of its sender, instead of that in the database's identifier."""
-    priority: Annotated[int, Field(ge=0, le=7), Unit("-")] | None = None
-    """J1939: instead of that in the database's identifier."""
+    priority: Annotated[int, Field(ge=0, le=7), Unit("-")] | Literal["any"] | None = None
+    """J1939: instead of that in the database's identifier; "any": whatever a received frame has."""
     constants: Annotated[dict[str, int], Unit("-")] = {}
     """Raw codes of other signals, by name, in a message that is sent."""
 
@@ -202,6 +209,7 @@ def load_signal_map(path: Path) -> MappedBus:
         if mapped.timeout is not None
     }
     plan = compile_receive(uses, input_freshness(periods, timeouts))
+    _refuse_shared(path, plan)
     return MappedBus(plan, signal_map.bus, readable.left_out(database_path, names))
 
 
@@ -218,6 +226,16 @@ def receive_plan(map_file: Path | None, tell: Callable[[str], None] = lambda lin
     if mapped.left_out:
         tell(mapped.left_out)
     return mapped.plan
+
+
+def _refuse_shared(path: Path, plan: ReceivePlan) -> None:
+    """Raise UserError where a frame would be two messages: which of them counts is not said."""
+    names: dict[int, str] = {}
+    for place in range(len(plan.messages)):
+        for number, name in accepted_ids(plan.messages[place : place + 1]).items():
+            if (other := names.setdefault(number, name)) != name:
+                remedy = f"{other} has the identifier {number & ~EXTENDED_ID:X} too; give each its own"
+                raise UserError(str(path), f"messages.{name}", remedy)
 
 
 def _check_names(path: Path, signal_map: SignalMap) -> None:
@@ -257,7 +275,8 @@ def _message_use(
     ]
     if settings.constants:
         raise UserError(str(path), f"{key}.constants", "belong to a message that is sent; remove them")
-    use = MessageUse(message, signals, period_s, settings.slowest_period or period_s)
+    slowest_s, any_priority = settings.slowest_period or period_s, settings.priority == "any"
+    use = MessageUse(message, signals, period_s, slowest_s, any_priority=any_priority)
     if name in signal_map.ignore_checksum:
         return use
     return use._replace(protection=protection_of(path, database_path, message, settings, key))

@@ -23,7 +23,7 @@ from ecu.bus.e2e import NO_CHECKSUM
 from ecu.bus.foreign import KNOWN_BY, discard, listen_before_send
 from ecu.bus.output_map import refuse_fd, transmit_plan
 from ecu.bus.protocol import Channel
-from ecu.bus.receive_plan import messages_by_contract
+from ecu.bus.receive_plan import accepted_ids, messages_by_contract
 from ecu.bus.signal_map import receive_plan
 from ecu.bus.transmit import TransmitPlan, compile_transmit
 from ecu.contract.records import RecordArray
@@ -136,7 +136,8 @@ def prepare(options: RunOptions) -> Session:
     receiving = receive_plan(options.map, lambda line: log.warning("database", left_out=line))
     sending = SILENCE if options.silent else transmit_plan(options.map, receiving)
     _check_sending(options, config, sending)
-    side_arguments = _side_arguments(options, {*receiving.ids.tolist(), *sending.ids.tolist()})
+    heard = accepted_ids(receiving.messages)
+    side_arguments = _side_arguments(options, {*heard, *sending.ids.tolist()})
     params = new_params(config)
     description = _describe(options, config)
     if options.map is not None:
@@ -152,7 +153,7 @@ def prepare(options: RunOptions) -> Session:
     channel = open_channel(
         options.interface,
         options.channel,
-        receive_ids=[*receiving.ids.tolist(), *sending.ids.tolist()],
+        receive_ids=[*heard, *sending.ids.tolist()],
         fd=config.can_fd,
     )
     began = time.monotonic()

@@ -10,9 +10,10 @@ import pytest
 from ecu.bus.freshness import begin_cycle, end_cycle
 from ecu.bus.output_map import transmit_plan
 from ecu.bus.receive import new_reception, receive
+from ecu.bus.receive_plan import accepted_ids
 from ecu.bus.signal_map import MappedBus, load_signal_map
 from ecu.bus.transmit import frame_buffer, new_transmission, transmit
-from ecu.contract.records import FRAME_EXTENDED, INPUTS, RecordArray
+from ecu.contract.records import EXTENDED_ID, FRAME_EXTENDED, INPUTS, RecordArray
 from ecu.contract.signals import INPUT, N_OUTPUTS, OUTPUT, USABLE
 from ecu.errors import UserError
 from ecu.settings.resources import resource
@@ -76,8 +77,19 @@ def test_a_parameter_group_is_heard_from_its_sender_alone(van: MappedBus, name: 
     for target, value in expected.items():
         assert heard["verdict"][INPUT[target]] & USABLE == USABLE
         assert heard["value"][INPUT[target]] == pytest.approx(value, abs=1e-3)
-    for other in (can_id ^ 0x01, can_id ^ 0x100, can_id ^ (1 << 26)):  # source, parameter group, priority
+    for other in (can_id ^ 0x01, can_id ^ 0x100):  # source, parameter group
         assert not hear(van, frame(0, other, data, FRAME_EXTENDED))["new"].any()
+    assert not hear(van, frame(0, can_id & 0x7FF, data, 0))["new"].any()  # 11 bits
+    for priority in range(8):
+        found = hear(van, frame(0, can_id & 0x3FFFFFF | priority << 26, data, FRAME_EXTENDED))
+        assert found["new"].any() == (name == "HRW" or priority == can_id >> 26), priority
+
+
+def test_the_filter_lets_each_priority_through_where_any_counts(van: MappedBus) -> None:
+    accepted = accepted_ids(van.plan.messages)
+    heard = {can_id | EXTENDED_ID: name for name, (can_id, _, _) in HEARD.items() if name != "HRW"}
+    wheels = {0xFE6E0B | priority << 26 | EXTENDED_ID: "HRW" for priority in range(8)}
+    assert accepted == heard | wheels
 
 
 # of 2 bits 11 and 10, of 8 bits FF and FE, of 16 bits FFxx and FExx
@@ -169,12 +181,45 @@ def test_a_request_that_leaves_is_what_arrives_at_the_other_end(
         assert heard["value"][INPUT["decel_demand"]] == pytest.approx(3.0, abs=2.5e-4)
 
 
+TWO_OF_A_GROUP = """VERSION ""
+BU_: X Y
+BO_ 2566844427 Fast: 8 X
+ SG_ a : 0|16@1+ (0.01,0) [0|0] "m/s^2" Y
+BO_ 2365517835 Slow: 8 X
+ SG_ a : 0|16@1+ (0.01,0) [0|0] "m/s^2" Y
+"""
+
+
+@pytest.mark.parametrize(("priority", "refused"), [("6", False), ('"any"', True), ("3", True)])
+def test_two_messages_that_one_frame_could_be_are_refused(
+    tmp_path: Path, priority: str, refused: bool
+) -> None:
+    (tmp_path / "two.dbc").write_text(TWO_OF_A_GROUP)
+    (tmp_path / "car.toml").write_text(
+        f"""database = "two.dbc"
+[messages]
+Fast = {{ period = 0.01, priority = {priority} }}
+Slow = {{ period = 0.1 }}
+[inputs]
+accel_x = {{ message = "Fast", signal = "a" }}
+accel_y = {{ message = "Slow", signal = "a" }}
+"""
+    )
+    if not refused:
+        assert len(load_signal_map(tmp_path / "car.toml").plan.ids) == 2
+        return
+    with pytest.raises(UserError, match="has the identifier CFEF00B too; give each its own"):
+        load_signal_map(tmp_path / "car.toml")
+
+
 @pytest.mark.parametrize(
     ("car", "old", "new", "message"),
     [
         ("van", "[messages.EBC1]\nsource = 0x0B", "", "messages.EBC1.source: missing, and the data"),
         ("van", "source = 0x21", "source = 254", "messages.AMB.source: give a value of at most 253"),
         ("van", "source = 0x2A", "", "messages.XBR.source: missing"),
+        ("van", "source = 0x2A", 'source = 0x2A\npriority = "any"', "a message that is sent has one; give a"),
+        ("van", 'priority = "any"', 'priority = "some"', "messages.HRW.priority"),
         ("mustang", "[messages.WheelSpeed]", "[messages.WheelSpeed]\nsource = 11", "source and priority are"),
     ],
 )  # fmt: skip

@@ -21,7 +21,7 @@ from brakelab.replay.seen import set_raw_ends
 from brakelab.replay.source import Source, only_interface
 from ecu.algorithm.step import INITIAL, initial_part, resume
 from ecu.bus.receive import new_reception
-from ecu.bus.receive_plan import ReceivePlan
+from ecu.bus.receive_plan import ReceivePlan, accepted_ids
 from ecu.contract.faults import FOREIGN_SENDER
 from ecu.contract.records import CYCLE, EXTENDED_ID, FRAME_ERROR, FRAME_EXTENDED, RecordArray
 from ecu.errors import UserError
@@ -149,7 +149,7 @@ def _heard_everything(cycles: RecordArray) -> bool:
 
 def _expected_only(blocks: Iterator[RecordArray], plan: ReceivePlan) -> Iterator[RecordArray]:
     """Leave out frames that the kernel's filter kept from the recorded run, and its own."""
-    wanted = plan.ids[plan.messages["foreign"] == 0]
+    wanted = list(accepted_ids(plan.messages[plan.messages["foreign"] == 0]))
     for block in blocks:
         extended = np.where(block["flags"] & FRAME_EXTENDED, EXTENDED_ID, 0).astype(np.uint32)
         expected = block[np.isin(block["can_id"] | extended, wanted) & (block["flags"] & FRAME_ERROR == 0)]
