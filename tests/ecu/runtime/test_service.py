@@ -9,11 +9,11 @@ import pytest
 from ecu.algorithm import step
 from ecu.contract.records import CYCLE, new_record
 from ecu.errors import RunFault
-from ecu.runtime import clock, cycle, notify, service, side
+from ecu.runtime import calibration, clock, cycle, notify, service, side
 from ecu.runtime.prepare import RunOptions
 from ecu.settings import annex5 as regulation
 
-LOOP = (clock, cycle, notify, regulation, service, side, step)
+LOOP = (calibration, clock, cycle, notify, regulation, service, side, step)
 
 
 @pytest.mark.parametrize("module", LOOP, ids=lambda module: module.__name__)
