@@ -18,6 +18,8 @@ from ecu.contract.records import RecordArray
 from ecu.recording.ring import PAGE, TABLES_BYTES, Ring
 
 NOTES_FILE: Final = "calibrations.jsonl"
+KEPT: Final = ("transmit", "fixed", "mapped")
+"""Parameters of the run, not of CONFIG."""
 
 
 class Note(NamedTuple):

@@ -4,16 +4,11 @@ The other process has checked the parameters as a CONFIG file is, and made all t
 is left to do here is a look at one number ten times a second, and, once it is another one, a copy.
 """
 
-from typing import Final
-
 from ecu.algorithm.control.demand import STANDING_TIME
 from ecu.algorithm.estimate import STANDING
-from ecu.recording.calibration import check_of
+from ecu.recording.calibration import KEPT, check_of
 from ecu.recording.ring import Ring
 from ecu.runtime.memory import Ecu
-
-KEPT: Final = ("transmit", "fixed", "mapped")
-"""Of the run, not of CONFIG."""
 
 
 def consider(ring: Ring, ecu: Ecu, number: int, now_ns: int) -> None:

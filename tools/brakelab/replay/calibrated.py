@@ -3,8 +3,8 @@
 from brakelab.replay.engine import Change, Ecu
 from ecu.contract.params import PARAMS
 from ecu.contract.records import RecordArray
+from ecu.recording.calibration import KEPT
 from ecu.recording.recorder import Recording
-from ecu.runtime.calibration import KEPT
 from ecu.settings.config import config_of, new_params
 
 
