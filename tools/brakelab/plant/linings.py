@@ -37,15 +37,18 @@ class Linings(Section):
     lining: dict[str, Lining]
 
 
-def rig_with(lining: Lining, law: str) -> RecordArray:
-    """Return the rig that carries `lining` under its friction law `law`, shape (1,), dtype `RIG`."""
+def rig_with(lining: Lining, law: str, mass: float | None = None) -> RecordArray:
+    """Return the rig that carries `lining` under its friction law `law`, shape (1,), dtype `RIG`.
+
+    `mass` [kg] that the flywheel stands for; without, that of the law.
+    """
     record = new_record(RIG)
     rig = record[0]
     entry, brake = lining.friction[law], lining.brake
     number, row = law_row(entry, brake)
     rig["law"], rig["row"] = number, row
-    rig["mass"] = entry.rig_mass
-    rig["gain"] = brake.gain(entry.rig_mass)
+    rig["mass"] = entry.rig_mass if mass is None else mass
+    rig["gain"] = brake.gain(float(rig["mass"]))
     for name in ("piston_area", "effective_radius", "tyre_radius"):
         rig[name] = getattr(brake, name)
     for name in ("heating", "cooling", "cooling_by_speed"):

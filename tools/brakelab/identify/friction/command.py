@@ -68,10 +68,10 @@ def run(
         raise UserError("--law", "", f"missing; --linings has laws, no pads: {', '.join(lining.friction)}")
     if law is not None and law not in lining.friction:
         raise UserError("--law", law, f"no such law; choose one of {', '.join(lining.friction)}")
-    bench = new_bench(lining, brake, seed, law=law or "")
+    sequence = load_sequence(path)
+    bench = new_bench(lining, brake, seed, law=law or "", mass=sequence.mass)
     rig = bench.rig[0]
     inertia = float(rig["mass"] * rig["tyre_radius"] ** 2)
-    sequence = load_sequence(path)
     with progress_bar("lab run", 1.0) as advance:
         recording = run_sequence(bench, sequence, advance)
     write_recording(out, recording, lining, inertia, bench.noise.stated())

@@ -144,8 +144,18 @@ def lagged(values: np.ndarray, dt: float, constant: float) -> np.ndarray:
     return out
 
 
-def new_bench(lining: Lining, brake: str, seed: int, noise: Noise | None = None, law: str = "") -> Bench:
-    """Return the rig for brake A, B or C with a pad drawn by `seed`, or with `law` of `lining`."""
+def new_bench(
+    lining: Lining,
+    brake: str,
+    seed: int,
+    noise: Noise | None = None,
+    law: str = "",
+    mass: float | None = None,
+) -> Bench:
+    """Return the rig for brake A, B or C with a pad drawn by `seed`, or with `law` of `lining`.
+
+    `mass` [kg] that the flywheel stands for; without, that of the law.
+    """
     random = np.random.default_rng([seed, *brake.encode()])
-    rig = rig_with(lining, law or CYCLE_LAW)
+    rig = rig_with(lining, law or CYCLE_LAW, mass)
     return Bench(rig, random, Noise() if noise is None else noise, "" if law else brake)

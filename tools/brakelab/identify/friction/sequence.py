@@ -41,6 +41,7 @@ class Sequence(Section):
     """A programme file of sections."""
 
     title: str
+    mass: Positive | None = None  # kg, that the flywheel stands for; without, the rig's own
     gate: Gate
     section: Annotated[tuple[Applications, ...], Field(min_length=1)]
 
