@@ -58,22 +58,34 @@ def friction(
 
 @app.command()
 def wear(
-    manifest: Annotated[
-        Path,
-        typer.Argument(metavar="MANIFEST.csv", help="Table of blocks: file, masses, thicknesses"),
+    measured: Annotated[
+        list[Path],
+        typer.Argument(metavar="MANIFEST.csv", help="Table of blocks; with --from-logs results of drives"),
     ],
     config: Config,
     out: Annotated[
-        Path, typer.Option("--out", metavar="CAR.toml", help="CONFIG to write, with a page CAR.md beside it")
+        Path,
+        typer.Option("--out", metavar="CAR.toml", help="CONFIG to write, CAR.md beside it; or BLOCKS.csv"),
     ],
     axle: Annotated[
         str, typer.Option("--axle", metavar="AXLE", help="Axle of the linings: front or rear")
     ] = "front",
+    from_logs: Annotated[
+        bool,
+        typer.Option(
+            "--from-logs", help="Write the blocks that stand for your drives, for a rig: BLOCKS.csv"
+        ),
+    ] = False,
 ) -> int:
     """Identify the wear law of brake linings from dynamometer blocks. Write a CONFIG."""
-    from brakelab.identify.wear import command
+    from brakelab.identify.wear import command, from_drives
+    from ecu.errors import UserError
 
-    return command.identify_wear(manifest, config, axle, out)
+    if from_logs:
+        return from_drives.blocks_from_drives(measured, config, axle, out)
+    if len(measured) > 1:
+        raise UserError(str(measured[1]), "", "one MANIFEST.csv; for blocks of drives give --from-logs")
+    return command.identify_wear(measured[0], config, axle, out)
 
 
 @app.command()

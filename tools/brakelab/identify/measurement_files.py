@@ -36,7 +36,7 @@ CONTRACT: Final = {
     "disc_temperature": ("temperature", "degC"),
 }
 """Quantity and unit of the columns of blocks and trips."""
-NAMES: Final = ("file", "block", "trip", "test")
+NAMES: Final = ("file", "block", "trip", "test", "programme", "road_energy")
 """Columns of a manifest that measure nothing."""
 _DECIMAL: Final = re.compile(r"^([-+]?\d+),(\d+)$")
 _DATE: Final = re.compile(

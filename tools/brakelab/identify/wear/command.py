@@ -22,6 +22,7 @@ from brakelab.identify.wear.fit import (
 from brakelab.identify.wear.fusion import Fused, disagreeing, fuse
 from brakelab.identify.wear.page import tables, write_page
 from brakelab.identify.wear.reader import Block, read_blocks
+from brakelab.identify.wear.weighings import SIDES
 from ecu.errors import RunFault, UserError
 from ecu.output import give, say, wrote
 from ecu.settings.config import Axle
@@ -65,7 +66,7 @@ def law_section(fit: Fit, error: float, pad: Pad, slope: float) -> Section:
 
 def _measured(blocks: list[Block]) -> tuple[Fused, Array]:
     """Return the wear of blocks by balance and thickness, and their regressors, shape (n, 7)."""
-    fused = fuse(np.array([b.wear for b in blocks]), np.array([b.mass for b in blocks]))
+    fused = fuse(np.array([b.lost.wear for b in blocks]), np.array([b.lost.mass for b in blocks]))
     return fused, np.array([block.regressors for block in blocks])
 
 
@@ -75,13 +76,11 @@ def _agreeing(blocks: list[Block]) -> list[Block]:
     Raises:
         UserError: balance and thickness of a block cannot both be right.
     """
-    masses = np.array([b.mass for b in blocks])
-    for place, grams in disagreeing(np.array([b.wear for b in blocks]), masses):
-        remedy = (
-            f"lost {masses[place]:.2f} g by the balance, {grams:.2f} g by its thickness and what the other "
-            "blocks lose per mm; correct one of them, or leave the thicknesses of all blocks out"
-        )
-        raise UserError(f"block {blocks[place].name}", "", remedy)
+    masses = np.array([b.lost.mass for b in blocks])
+    for side, name in enumerate(SIDES):
+        thin, weighed = (np.array([getattr(b.lost, of)[side] for b in blocks]) for of in ("thin", "sides"))
+        _refuse_disagreeing(blocks, f"{name} pad ", thin, weighed)
+    _refuse_disagreeing(blocks, "", np.array([b.lost.wear for b in blocks]), masses)
     fused, regressors = _measured(blocks)
     strange = strangers(regressors, fused.mass, np.diag(fused.covariance))
     rest = [block for place, block in enumerate(blocks) if place not in strange]
@@ -95,6 +94,15 @@ def _agreeing(blocks: list[Block]) -> list[Block]:
                 "and its file"
             )
     return rest
+
+
+def _refuse_disagreeing(blocks: list[Block], what: str, wear: Array, mass: Array) -> None:
+    for place, grams in disagreeing(wear, mass):
+        remedy = (
+            f"{what}lost {mass[place]:.2f} g by the balance, {grams:.2f} g by its thickness and what the "
+            "other blocks lose per mm; correct one of them, or leave the thicknesses of all blocks out"
+        )
+        raise UserError(f"block {blocks[place].name}", "", remedy)
 
 
 def identify_wear(manifest: Path, config: Path, axle: str, out: Path) -> int:
@@ -131,6 +139,9 @@ def identify_wear(manifest: Path, config: Path, axle: str, out: Path) -> int:
     kept = ", ".join(f"{name} = {value:.4g} {unit}" for name, value, unit in named if value)
     give(coefficients=dict(zip(TERMS, fit.coefficients, strict=True)), r2=fit.r2)
     give(left_out=leave_one_out(fit, fused.mass), tables=tables(blocks, fused, fit, static))
+    for one in (block.reproduced for block in blocks):
+        if one is not None and one.verdict != "met":
+            say(f"block {one.block}: not run as its programme asks, {one.verdict}; see {page}")
     print(f"{out}: {kept}")
     print(
         f"{page}: {len(blocks)} blocks, R² {fit.r2:.4f} (quasi-static {static.r2:.4f}), blocks left out "

@@ -10,6 +10,7 @@ from brakelab.identify.wear.curves import sensitivity, specific_wear, wear_surfa
 from brakelab.identify.wear.fit import TERMS, UNITS, Fit, leave_one_out
 from brakelab.identify.wear.fusion import Fused
 from brakelab.identify.wear.reader import Block
+from brakelab.identify.wear.reproduced import reproduced_table
 from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Cells, Line, Panel, write_chart
 from brakelab.results.text_table import Table, markdown
 
@@ -165,7 +166,64 @@ def tables(blocks: list[Block], fused: Fused, fit: Fit, static: Fit) -> list[Tab
             laws,
             "Rank: of the scaled regressors; no set of which the law is the mean has more terms.",
         ),
+        *_apart(blocks),
+        *_beside(blocks),
     ]  # fmt: skip
+
+
+def _apart(blocks: list[Block]) -> list[Table]:
+    """Return pads and disc of every block one by one, where they were measured."""
+
+    def shown(value: float, digits: str) -> str:
+        return f"{value:{digits}}" if np.isfinite(value) else "–"
+
+    rows = [
+        (
+            block.name,
+            *(shown(mass, ".2f") for mass in block.lost.sides),
+            shown(block.lost.sides[0] / block.lost.sides[1], ".2f"),
+            *(shown(1e3 * value, ".0f") for value in block.lost.thin),
+            *(shown(1e3 * value, "+.0f") for value in (block.lost.along, block.lost.across)),
+            shown(block.lost.disc_mass, ".2f"),
+            shown(1e3 * block.lost.disc_wear, ".0f"),
+            shown(block.lost.disc_mass / float(block.regressors[0]), ".4f"),
+        )
+        for block in blocks
+    ]
+    if not any(cell != "–" for row in rows for cell in row[1:]):
+        return []
+    return [
+        Table(
+            "Pads and disc apart",
+            ("block", "inboard [g]", "outboard [g]", "inboard / outboard", "inboard [µm]", "outboard [µm]",
+             "taper along [µm]", "taper across [µm]", "disc [g]", "disc [µm]", "disc [g/MJ]"),
+            rows,
+            "The law is of both pads together. Taper: what the leading end (points 1, 2) lost more than the "
+            "trailing one (5, 6), the outer radius (1, 3, 5) more than the inner one. "
+            f"{disc_line(blocks)}",
+        )
+    ]  # fmt: skip
+
+
+def disc_line(blocks: list[Block]) -> str:
+    """Return what the disc loses for the work of the brake, beside the pads, in one sentence."""
+    weighed = [block for block in blocks if np.isfinite(block.lost.disc_mass)]
+    if not weighed:
+        return "No disc was weighed."
+    disc, pads, work = np.array([(b.lost.disc_mass, b.lost.mass, b.regressors[0]) for b in weighed]).T
+    rate = float(disc.sum() / work.sum())
+    spread = float(np.std(disc / work, ddof=1)) if len(weighed) > 1 else np.nan
+    sigma = f" (σ of a block {spread:.4f})" if np.isfinite(spread) else ""
+    share = 100.0 * float(disc.sum() / (disc.sum() + pads.sum()))
+    return (
+        f"The disc lost {rate:.4f} g/MJ{sigma}, {share:.0f} % of what disc and pads lost together: no key of "
+        "CONFIG, which knows the wear of pads."
+    )
+
+
+def _beside(blocks: list[Block]) -> list[Table]:
+    found = [block.reproduced for block in blocks if block.reproduced is not None]
+    return [reproduced_table(found)] if found else []
 
 
 def write_page(page: Path, blocks: list[Block], fused: Fused, fit: Fit, static: Fit, of_brake: float) -> None:

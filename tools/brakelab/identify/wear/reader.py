@@ -1,9 +1,9 @@
 """Blocks of a brake dynamometer: their manifest, regressors (7.16) and wear.
 
-The manifest is a CSV file, a row a block: `block`, `file`, `mass_before`, `mass_after` [g, of the two pads of
-one calliper] and, where measured, `thickness_before_1…6`, `thickness_after_1…6` [mm]. A block's file (CSV or
-Parquet) has `t` [s], `omega` [rad/s], `calliper_pressure` [bar], `brake_torque` [N m] and `disc_temperature`
-[degC]; stops are found by the pressure.
+The manifest is a CSV file, a row a block: `block`, `file`, and what was weighed and measured before and after
+(`weighings`). A block's file (CSV or Parquet) has `t` [s], `omega` [rad/s], `calliper_pressure` [bar],
+`brake_torque` [N m] and `disc_temperature` [degC], or any other names and units that a file of columns beside
+it states, as of `lab run`; stops are found by the pressure. `programme` names what the rig was asked to do.
 """
 
 import math
@@ -13,25 +13,28 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from brakelab.arrays import Array
+from brakelab.identify.friction.ak_master import load_sequence
 from brakelab.identify.friction.check import refuse_units
 from brakelab.identify.friction.columns import Columns
+from brakelab.identify.friction.reader import read_recording
 from brakelab.identify.friction.recording import Recording
 from brakelab.identify.measurement_files import check_celsius, read_columns, read_manifest
+from brakelab.identify.wear.reproduced import Reproduced, reproduced
+from brakelab.identify.wear.weighings import Lost, read_lost
+from brakelab.plant.description import PlantFileError
 from brakelab.results.wear import regressors_of
 from brakelab.stretches import stretches
 from ecu.errors import UserError
+from ecu.output import say
 from ecu.settings.config import Config
-from ecu.settings.pad import Pad
 
 COLUMNS: Final = ("t", "omega", "calliper_pressure", "brake_torque", "disc_temperature")
 IN_ORDER: Final = ("t", "calliper_pressure", "brake_torque", "omega", "disc_temperature")
 """As `Columns.contract` has them."""
-POINTS: Final = 6
 FEWEST_APPLICATIONS: Final = 100  # applications of a block; the thesis has 250 and more
 PRESSED: Final = 1.0  # bar
 SHORTEST_APPLICATION: Final = 0.1  # s of an application
 SLOPE_S: Final = 0.2  # s to either side, for the slope of the speed
-UNEVEN: Final = 0.3  # mm by which a point may lose more or less than the others, beside what all lose
 HIGHEST_TEMPERATURE: Final = 1100.0  # degC
 SPECIFIC: Final = (2e-3, 20.0)  # g/MJ: linings 0.05 to 1, some tens of times less or more where cold or hot
 
@@ -43,12 +46,11 @@ class Block(NamedTuple):
     applications: int
     regressors: Array
     """Units of `REGRESSORS`, shape (7,)."""
-    mass: float
-    """Lost by the balance, g."""
-    wear: float
-    """By thickness, mm; NaN: not measured."""
+    lost: Lost
     temperature: float
     """Mean of the disc while braking, by energy [degC]."""
+    reproduced: Reproduced | None
+    """Beside the programme that the manifest names."""
 
 
 def read_blocks(manifest: Path, config: Config, axle: str) -> list[Block]:
@@ -67,79 +69,76 @@ def _block(manifest: Path, line: int, row: dict[str, str], config: Config, axle:
     where = f"line {line}"
     if not row.get("block") or not row.get("file"):
         raise UserError(str(manifest), where, "needs block, file, mass_before and mass_after")
-    before, after = (_number(manifest, where, row, name) for name in ("mass_before", "mass_after"))
-    if not before > after:
-        raise UserError(
-            str(manifest), f"{where}, block {row['block']}", f"pads gained mass ({before:g} to {after:g} g)"
-        )
-    wear = _thickness(manifest, where, row, getattr(config, axle).pad)
+    lost = read_lost(manifest, line, row, getattr(config, axle).pad)
     path = manifest.parent / row["file"]
-    stops = read_stops(path)
+    stops, columns = read_stops(path, Columns.contract(IN_ORDER, "rad/s", config, axle))
     if stops:
-        _check_physics(path, stops, Columns.contract(IN_ORDER, "rad/s", config, axle))
+        _check_physics(path, stops, columns)
     if len(stops) < FEWEST_APPLICATIONS:
         needed = f"a block needs {FEWEST_APPLICATIONS} or more to wear what can be measured"
         remedy = f"{len(stops)} applications; {needed}"
         raise UserError(str(path), f"block {row['block']}", remedy)
     regressors = np.sum([stop_regressors(stop) for stop in stops], axis=0)
-    specific = (before - after) / float(regressors[0])
+    specific = lost.mass / float(regressors[0])
     if not SPECIFIC[0] < specific < SPECIFIC[1]:
         remedy = (
-            f"{before - after:.3g} over {regressors[0]:.3g} MJ make {specific:.2g} g/MJ, which no lining "
+            f"{lost.mass:.3g} over {regressors[0]:.3g} MJ make {specific:.2g} g/MJ, which no lining "
             "wears; give masses in g"
         )
         raise UserError(str(manifest), f"{where}, block {row['block']}", remedy)
     mean = regressors[1] / regressors[0]
-    return Block(row["block"], len(stops), regressors, before - after, wear, float(mean))
+    beside = _beside(manifest, where, row, stops, columns.brake.tyre_radius) if row.get("programme") else None
+    return Block(row["block"], len(stops), regressors, lost, float(mean), beside)
 
 
-def _number(manifest: Path, where: str, row: dict[str, str], name: str) -> float:
+def _beside(
+    manifest: Path, where: str, row: dict[str, str], stops: list[dict[str, Array]], radius: float
+) -> Reproduced:
+    """Return the stops of a block beside its programme."""
+    path = manifest.parent / row["programme"]
+    if not path.is_file():
+        raise UserError(str(manifest), f"{where}, programme", f"{row['programme']}: no such file beside it")
     try:
-        value = float(row[name])
-    except (KeyError, TypeError, ValueError):
-        value = math.nan
-    if not math.isfinite(value):
-        raise UserError(str(manifest), f"{where}, {name}", f"give a number (found {row.get(name)!r})")
-    return value
+        programme = load_sequence(path)
+    except PlantFileError as error:
+        raise UserError(str(path), error.place, error.remedy) from None
+    if held := [section.name for section in programme.section if section.control != "deceleration"]:
+        remedy = "asks for a pressure, which says no speed to compare; leave `programme` empty"
+        raise UserError(str(path), f"section {held[0]}", remedy)
+    road = math.nan
+    if row.get("road_energy"):
+        try:
+            road = float(row["road_energy"])
+        except ValueError:
+            remedy = f"give a number of MJ (found {row['road_energy']!r}), or nothing"
+            raise UserError(str(manifest), f"{where}, road_energy", remedy) from None
+    return reproduced(row["block"], programme, stops, radius, road)
 
 
-def _thickness(manifest: Path, where: str, row: dict[str, str], pad: Pad) -> float:
-    if not row.get("thickness_before_1"):
-        return math.nan
-    lost: list[float] = []
-    for point in range(1, POINTS + 1):
-        names = f"thickness_before_{point}", f"thickness_after_{point}"
-        before, after = (_number(manifest, where, row, name) for name in names)
-        if not 0.0 < before < pad.thickness_new + 1.0:
-            remedy = f"{before:g} mm cannot be of a pad that is {pad.thickness_new:g} mm thick when new"
-            raise UserError(str(manifest), f"{where}, {names[0]}", remedy)
-        lost.append(before - after)
-    off = np.abs(np.array(lost) - np.median(lost))
-    if off.max() > UNEVEN + np.abs(np.median(lost)):
-        point = int(np.argmax(off)) + 1
-        said = " and ".join(
-            f"{name} {row[name]}" for name in (f"thickness_before_{point}", f"thickness_after_{point}")
-        )
-        remedy = f"{off.max():.1f} mm off what the other points lost; correct the reading"
-        raise UserError(str(manifest), f"{where}, {said} mm", remedy)
-    if np.mean(lost) <= 0.0:
-        remedy = f"the pads grew by {-1e3 * float(np.mean(lost)):.0f} µm; measure them cold, same points"
-        raise UserError(str(manifest), f"{where}, thickness_after_1…{POINTS}", remedy)
-    return float(np.mean(lost))
+def read_stops(path: Path, contract: Columns) -> tuple[list[dict[str, Array]], Columns]:
+    """Return the applications of a block, each by `COLUMNS` with arrays of shape (n,), and their description.
 
-
-def read_stops(path: Path) -> list[dict[str, Array]]:
-    """Return the applications of a block, each by `COLUMNS` with arrays of shape (n,).
+    It is `contract`, or the file of columns beside `path`, where there is one.
 
     Raises:
         UserError: the file cannot be read or lacks a column.
     """
-    columns = read_columns(path, COLUMNS, "block")
-    pressed = columns["calliper_pressure"] > PRESSED
+    described, push_out = contract, 0.0
+    if path.with_suffix(".toml").is_file():
+        read = read_recording(path)
+        if read.damaged:
+            say(read.damaged)
+        described, push_out = read.columns, read.columns.rig.push_out_pressure
+        time, pressure, torque, speed, heat = read.recording
+        columns = dict(zip(COLUMNS, (time, speed, 1e-5 * pressure, torque, heat), strict=True))
+    else:
+        columns = read_columns(path, COLUMNS, "block")
+    pressed = columns["calliper_pressure"] > push_out + PRESSED
     stops = [
         {name: column[start:end] for name, column in columns.items()} for start, end in stretches(pressed)
     ]
-    return [stop for stop in stops if stop["t"][-1] - stop["t"][0] >= SHORTEST_APPLICATION]
+    stops = [stop for stop in stops if stop["t"][-1] - stop["t"][0] >= SHORTEST_APPLICATION]
+    return stops, described
 
 
 def stop_regressors(stop: dict[str, Array]) -> Array:

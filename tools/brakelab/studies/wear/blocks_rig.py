@@ -16,6 +16,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from brakelab.arrays import Array
+from brakelab.identify.wear.programme import CHECK_OFF
 from brakelab.plant.disc import cooling_rate, disc_step
 from brakelab.plant.friction.law import START
 from brakelab.plant.friction.laws import friction
@@ -25,7 +26,6 @@ from brakelab.plant.wear_rig import AIR, FAN, LOWEST_SPEED, RAMP
 
 STEP: Final = 5e-3  # s
 COARSE: Final = 0.5  # s, while nothing brakes
-CHECK_OFF: Final = 65.0  # degC, section 7.3.2
 RUN_UP: Final = 2.0  # m/s^2 of the flywheel. Assumption
 LONGEST_WAIT: Final = 1800.0  # s, for the disc to cool
 GRAVITY: Final = 9.81
