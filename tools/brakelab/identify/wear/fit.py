@@ -28,9 +28,9 @@ CONFIDENCE: Final = (2.5, 97.5)  # %
 ELSEWHERE: Final = 50.0  # K by which roads differ from a programme
 LEAST_ERROR: Final = 0.02  # of blocks left out: weighings are no better
 LEAST_WEIGHT: Final = 0.02  # of the best set's, below which a set is left out
-STRANGE: Final = np.log(1.8)
-"""Logarithm of a block's mass over its law's; pressure and running-in, in no law, make half of that."""
-FAR: Final = 4.0  # standard deviations of the others, likewise
+STRANGE: Final = 0.25
+"""Logarithm of a block's mass over its law's; pressure and running-in, in no law, can make as much."""
+FAR: Final = 4.0  # of what the others miss by, RMS
 FEWEST_BLOCKS: Final = 4  # blocks that must agree
 
 
@@ -172,7 +172,9 @@ def _left_out(regressors: Array, mass: Array, sigma: Array, terms: tuple[int, ..
 def strangers(regressors: Array, mass: Array, variance: Array) -> list[int]:
     """Return the blocks whose mass the law of the others does not come near, worst first.
 
-    Arguments as of `fit_law`. At most one block of four is left out, and four must agree.
+    A wrong block spoils the law of all, so that everybody seems off; without it the others agree. So a block
+    is held against how well the others predict each other once it is gone. Arguments as of `fit_law`. At most
+    one block of four is left out, and four must agree.
     """
     kept = np.arange(len(mass))
     found: list[int] = []
@@ -181,7 +183,7 @@ def strangers(regressors: Array, mass: Array, variance: Array) -> list[int]:
         worst = int(np.argmax(_off(mass[kept], law.left_out)))
         one, others = kept[worst], np.delete(kept, worst)
         rest = fit_law(regressors[others], mass[others], variance[others])
-        usual = float(np.median(_off(mass[others], rest.left_out))) / 0.6745
+        usual = float(np.sqrt(np.mean(_off(mass[others], rest.left_out) ** 2)))
         off = float(_off(mass[one], regressors[one] @ rest.coefficients))
         if off < max(STRANGE, FAR * usual) or not _amid(regressors, one, others):
             break
