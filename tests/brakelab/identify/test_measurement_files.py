@@ -114,3 +114,9 @@ def test_a_measurement_counts_once(tmp_path: Path, rows: tuple[str, ...], line: 
         UserError, match=f"manifest.csv: {line}: the same measurement as line 2; leave one of them out"
     ):
         open_campaign(manifest, resource("config/suv.toml"), "front", tmp_path / "out.toml")
+
+
+def test_a_measured_file_in_the_manifests_place_is_refused_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "block.parquet").write_bytes(b"PAR1\x00\r\x00\n")
+    with pytest.raises(UserError, match=r"block\.parquet: is no text; give a CSV manifest"):
+        read_manifest(tmp_path / "block.parquet")

@@ -38,6 +38,7 @@ CONTRACT: Final = {
 """Quantity and unit of the columns of blocks and trips."""
 NAMES: Final = ("file", "block", "trip", "test", "programme", "road_energy")
 """Columns of a manifest that measure nothing."""
+UTF16: Final = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _DECIMAL: Final = re.compile(r"^([-+]?\d+),(\d+)$")
 _DATE: Final = re.compile(
     r"(?:(\d{1,4})[-./](\d{1,2})[-./](\d{1,4})[T ]+)?(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d*)?)"
@@ -56,6 +57,8 @@ def read_manifest(path: Path) -> list[tuple[int, dict[str, str]]]:
         given = path.read_bytes()
     except OSError as error:
         raise UserError(str(path), "", f"cannot be read ({error.strerror}); give a CSV manifest") from None
+    if given[:2] not in UTF16 and b"\0" in given:
+        raise UserError(str(path), "", "is no text; give a CSV manifest, which names the measured files")
     text = _decoded(given)
     names = text.partition("\n")[0]
     delimiter = max(",;\t", key=names.count)
@@ -69,7 +72,7 @@ def _cells(row: dict[str, str]) -> dict[str, str]:
 
 def _decoded(given: bytes) -> str:
     """Return text of whatever a spreadsheet writes: UTF-8 with or without a mark, UTF-16, Windows-1252."""
-    if given[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
+    if given[:2] in UTF16:
         return given.decode("utf-16", "replace")
     try:
         return given.decode("utf-8-sig")

@@ -212,3 +212,18 @@ def test_a_wrong_ending_is_refused_before_the_programme_is_run(
     monkeypatch.setattr(command, "new_bench", lambda *_, **__: pytest.fail("the rig was started"))
     with pytest.raises(UserError, match=r"ends in \.csv or \.parquet"):
         command.run("ams", "A", 0, tmp_path / "data.xls")
+
+
+PROGRAMMES = {
+    "a table": (b"speed,level\n80,30\n", "not valid TOML"),
+    "a recording": (b"PAR1\xff\xfe\x00", "is no text; give a programme"),
+    "sections without a speed": (b'title = "x"\n[gate]\n[[section]]\nname = "1"\n', "section|gate"),
+}
+
+
+@pytest.mark.parametrize(("text", "said"), PROGRAMMES.values(), ids=PROGRAMMES)
+def test_a_programme_that_is_none_is_refused_in_one_line(tmp_path: Path, text: bytes, said: str) -> None:
+    (tmp_path / "p.toml").write_bytes(text)
+    with pytest.raises(UserError, match=said) as caught:
+        command.run(str(tmp_path / "p.toml"), "A", 0, tmp_path / "out.csv")
+    assert "\n" not in str(caught.value)

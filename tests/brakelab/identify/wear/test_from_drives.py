@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from brakelab.identify.friction.ak_master import Sequence, load_sequence
+from brakelab.identify.friction.sequence import Sequence, load_sequence
 from brakelab.identify.wear.applications import FEWEST_APPLICATIONS, ROADS, read_drives, road_blocks, steps_of
 from brakelab.identify.wear.from_drives import COUNT, blocks_from_drives
 from brakelab.identify.wear.programme import CHECK_OFF, CONTROLLER, mass_of, stops_of

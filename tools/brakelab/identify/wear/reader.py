@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from brakelab.arrays import Array
-from brakelab.identify.friction.ak_master import load_sequence
+from brakelab.identify.friction.sequence import load_sequence
 from brakelab.identify.friction.check import refuse_units
 from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.reader import read_recording
