@@ -94,14 +94,23 @@ def dust(
         Path, typer.Argument(metavar="MANIFEST.csv", help="Trips with a particle counter: trip, file, test")
     ],
     config: Config,
-    out: Annotated[Path, typer.Option("--out", metavar="CAR.toml", help="CONFIG to write, CAR.md beside it")],
+    out: Annotated[
+        Path,
+        typer.Option("--out", metavar="CAR.toml", help="CONFIG to write, CAR.md beside it; or RUN.md"),
+    ],
     axle: Annotated[
         str, typer.Option("--axle", metavar="AXLE", help="Axle of the brakes: front or rear")
     ] = "front",
+    cycle: Annotated[
+        bool,
+        typer.Option("--cycle", help="Report one run of the WLTP-Brake cycle, for UN R179: RUN.md"),
+    ] = False,
 ) -> int:
     """Identify particle emission from trips with a counter. Write a CONFIG."""
-    from brakelab.identify.dust import command
+    from brakelab.identify.dust import command, cycle_page
 
+    if cycle:
+        return cycle_page.report_cycle(manifest, config, axle, out)
     return command.identify_dust(manifest, config, axle, out)
 
 

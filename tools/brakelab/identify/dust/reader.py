@@ -58,13 +58,12 @@ def read_trips(manifest: Path, config: Config, axle: str) -> list[Applications]:
         UserError: a file, a row or a value of it is invalid.
     """
     trips = []
-    columns = Columns.contract(IN_ORDER, "m/s", config, axle)
+    columns = trip_columns(config, axle)
     for line, row in read_manifest(manifest):
         if not row.get("trip") or not row.get("file") or row.get("test") not in ("0", "1"):
             raise UserError(str(manifest), f"line {line}", "needs trip, file and test (1: held out, else 0)")
         path = manifest.parent / row["file"]
-        trip = _read_trip(path, row["trip"], row["test"] == "1", columns.rig.push_out_pressure)
-        _check_units(path, trip, columns)
+        trip = read_trip(path, row["trip"], row["test"] == "1", columns)
         found = extract(trip, columns.brake.tyre_radius)
         if len(found.particles) < FEWEST_APPLICATIONS:
             remedy = f"{len(found.particles)} brake applications; a trip needs {FEWEST_APPLICATIONS} or more"
@@ -78,19 +77,32 @@ def read_trips(manifest: Path, config: Config, axle: str) -> list[Applications]:
     return trips
 
 
-def _read_trip(path: Path, name: str, test: bool, push_out: float) -> Recorded:
+def trip_columns(config: Config, axle: str) -> Columns:
+    """Return what describes the files of trips, of a brake of an `axle` of `config`."""
+    return Columns.contract(IN_ORDER, "m/s", config, axle)
+
+
+def read_trip(path: Path, name: str, test: bool, described: Columns) -> Recorded:
+    """Return a trip from its file, checked.
+
+    Raises:
+        UserError: the file or a value of it is invalid.
+    """
     columns = read_columns(path, COLUMNS, "trip")
     t = columns["t"]
     if len(t) < 2:
         raise UserError(str(path), "t", "must rise from row to row")
     grid = np.arange(t[0], t[-1], PERIOD)
-    even = {c: _on_grid(path, c, t, columns[c], grid) for c in COLUMNS[1:]}
+    even = {c: on_grid(path, c, t, columns[c], grid) for c in COLUMNS[1:]}
     _check_ranges(path, even)
     speed, pressure, torque, temperature, concentration, flow = even.values()
-    return Recorded(
-        name, test, grid - grid[0], np.maximum(speed, 0.0), pressure - push_out, np.abs(torque), temperature,
+    pressure = pressure - described.rig.push_out_pressure
+    trip = Recorded(
+        name, test, grid - grid[0], np.maximum(speed, 0.0), pressure, np.abs(torque), temperature,
         concentration, flow,
     )  # fmt: skip
+    _check_units(path, trip, described)
+    return trip
 
 
 def _check_units(path: Path, trip: Recorded, columns: Columns) -> None:
@@ -111,7 +123,12 @@ def _check_units(path: Path, trip: Recorded, columns: Columns) -> None:
         refuse_units(applications, columns, str(path))
 
 
-def _on_grid(path: Path, name: str, t: Array, values: Array, grid: Array) -> Array:
+def on_grid(path: Path, name: str, t: Array, values: Array, grid: Array) -> Array:
+    """Return samples at the times of a grid; NaN among them is between two samples.
+
+    Raises:
+        UserError: two samples are too far apart.
+    """
     known = np.isfinite(values)
     gaps = np.diff(t[known], prepend=t[0], append=t[-1])
     if not known.any() or gaps.max() > LONGEST_GAP:
