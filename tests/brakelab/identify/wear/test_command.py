@@ -59,6 +59,25 @@ def test_what_a_gram_is_worth_is_taken_from_the_blocks(blocks):
     assert 2.0 * pad.density * pad.area == pytest.approx(slope, rel=1e-3)
 
 
+def test_a_disc_that_was_weighed_is_on_the_page(blocks):
+    """It loses half of what the pads lose, on a balance of ± 0.05 g."""
+
+    def weigh(rows):
+        random = np.random.default_rng(2)
+        for row in rows:
+            lost = 0.5 * (float(row["mass_before"]) - float(row["mass_after"]))
+            row["disc_mass_before"] = f"{9000.0 + 0.05 * random.normal():.2f}"
+            row["disc_mass_after"] = f"{9000.0 - lost + 0.05 * random.normal():.2f}"
+
+    rewrite(blocks / "manifest.csv", weigh)
+    identify_wear(blocks / "manifest.csv", CONFIG, "front", blocks / "car.toml")
+    page = (blocks / "car.md").read_text()
+    share = int(page.partition("block 0.")[2].partition("), ")[2].partition(" %")[0])
+    assert share == pytest.approx(33, abs=2)
+    assert "| taper along [µm] |" in page
+    assert "inboard [g]" not in page
+
+
 def test_blocks_in_mdf4_give_the_same_law(blocks):
     mdf = pytest.importorskip("asammdf")
     identify_wear(blocks / "manifest.csv", CONFIG, "front", blocks / "csv.toml")
@@ -177,6 +196,27 @@ def weighed(factor: float):
     return spoil
 
 
+def programmed(name: str, energy: str = ""):
+    """Return what names a programme in the first block's row."""
+
+    def spoil(folder: Path) -> None:
+        for control, file in (("pressure", "pressures.toml"), ("deceleration", "held.toml")):
+            (folder / file).write_text(
+                'title = "x"\n[gate]\nwarm_speed = 80\nwarm_pressure = 20\ncool_speed = 80\n[[section]]\n'
+                f'name = "1"\ncontrol = "{control}"\nspeed = 50\nend_speed = 5\nlevel = [2]\n'
+                "temperature = [100]\n"
+            )
+
+        def change(rows):
+            for row in rows:
+                row.update(programme="", road_energy="")
+            rows[0].update(programme=name, road_energy=energy)
+
+        rewrite(folder / "manifest.csv", change)
+
+    return spoil
+
+
 def mistyped_thickness(folder: Path) -> None:
     rewrite(folder / "manifest.csv", lambda rows: rows[2].update(thickness_after_3="1.1"))
 
@@ -216,6 +256,13 @@ BAD = {
     "collinear regressors": (alike, "collinear"),
     "a column that is missing": (without_column, "no such column"),
     "a mass that is no number": (text, "give a number"),
+    "a programme that is not there": (programmed("no.toml"), "line 2, programme: no.toml: no such file"),
+    "a programme of pressures": (
+        programmed("pressures.toml"),
+        "line 2, programme: .*, section 1 asks for a pressure",
+    ),
+    "a programme that is none": (programmed("manifest.csv"), "manifest.csv: .*not valid TOML"),
+    "an energy that is none": (programmed("held.toml", "much"), "line 2, road_energy: give a number of MJ"),
 }
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from brakelab.identify.wear.fit import QUASI_STATIC, explains, fit_law, rank_of, strangers
-from brakelab.identify.wear.fusion import BALANCE, POINT, POINTS, disagreeing, fuse
+from brakelab.identify.wear.fusion import BALANCE, POINT, POINTS, disagreeing, fuse, unequal
 from ecu.errors import UserError
 
 LAW = np.array([0.1016, 0.0, 0.0, 0.4887, 0.0, 0.0, 0.66e-2])  # Table 7.1 without its smallest term
@@ -102,6 +102,16 @@ def test_balance_and_thickness_that_disagree(grams: float, found: list[int]):
     wear[1] = np.nan
     mass[3] += grams
     assert [place for place, _ in disagreeing(wear, mass)] == found
+
+
+@pytest.mark.parametrize(("grams", "found"), [(0.0, []), (0.8, [3]), (-0.7, [3]), (0.15, [])])
+def test_pads_that_share_their_wear_unlike_in_the_other_blocks(grams: float, found: list[int]):
+    """Inboard pads lose 1.2 times what outboard ones lose, give or take 5 %; one is mistyped."""
+    outboard = np.array([1.0, 1.4, 1.2, 1.5, 1.1])
+    inboard = 1.2 * outboard * (1.0 + 0.05 * np.array([1.0, -1.0, 0.5, 0.0, -0.5]))
+    inboard[3] += grams
+    outboard[1] = np.nan
+    assert [place for place, _ in unequal(inboard, outboard)] == found
 
 
 @pytest.mark.study

@@ -19,7 +19,7 @@ from brakelab.identify.wear.fit import (
     leave_one_out,
     strangers,
 )
-from brakelab.identify.wear.fusion import Fused, disagreeing, fuse
+from brakelab.identify.wear.fusion import Fused, disagreeing, fuse, unequal
 from brakelab.identify.wear.page import tables, write_page
 from brakelab.identify.wear.reader import Block, read_blocks
 from brakelab.identify.wear.weighings import SIDES
@@ -81,6 +81,13 @@ def _agreeing(blocks: list[Block]) -> list[Block]:
         thin, weighed = (np.array([getattr(b.lost, of)[side] for b in blocks]) for of in ("thin", "sides"))
         _refuse_disagreeing(blocks, f"{name} pad ", thin, weighed)
     _refuse_disagreeing(blocks, "", np.array([b.lost.wear for b in blocks]), masses)
+    sides = np.array([b.lost.sides for b in blocks])
+    for place, usual in unequal(sides[:, 0], sides[:, 1]):
+        inboard, outboard = sides[place]
+        say(
+            f"block {blocks[place].name}: inboard pad {inboard:.2f} g, outboard {outboard:.2f} g, in the "
+            f"others {usual:.2f} to 1; check their weighings"
+        )
     fused, regressors = _measured(blocks)
     strange = strangers(regressors, fused.mass, np.diag(fused.covariance))
     rest = [block for place, block in enumerate(blocks) if place not in strange]

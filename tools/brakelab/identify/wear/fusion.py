@@ -45,6 +45,19 @@ def disagreeing(wear: NDArray[np.float64], mass: NDArray[np.float64]) -> list[tu
     return [(int(k), float(by_thickness[k])) for k in known if abs(mass[k] - by_thickness[k]) > allowed[k]]
 
 
+def unequal(inboard: NDArray[np.float64], outboard: NDArray[np.float64]) -> list[tuple[int, float]]:
+    """Return the blocks of which the pads share their wear unlike in the others, and the usual ratio.
+
+    `inboard` and `outboard` [g], NaN where not weighed apart, shape (n,); three or more show what is usual.
+    """
+    known = np.flatnonzero(np.isfinite(inboard) & np.isfinite(outboard))
+    if len(known) < 3:
+        return []
+    usual = float(np.median(inboard[known] / outboard[known]))
+    allowed = SURE * BALANCE * np.hypot(1.0, usual) + UNEVEN * np.minimum(inboard, usual * outboard)
+    return [(int(k), usual) for k in known if abs(inboard[k] - usual * outboard[k]) > allowed[k]]
+
+
 def fuse(wear: NDArray[np.float64], mass: NDArray[np.float64]) -> Fused:
     """Return the blended masses of `wear` [mm], NaN where not measured, and `mass` [g], shape (n,)."""
     own = np.full(len(mass), 2.0 * BALANCE**2)

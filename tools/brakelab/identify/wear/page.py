@@ -20,6 +20,10 @@ SPEED: Final = np.linspace(20.0, 140.0, 25)  # km/h
 HEAT: Final = np.linspace(20.0, 400.0, 39)  # degC
 FRICTION_ERRORS: Final = np.linspace(-0.3, 0.3, 31)
 HEAT_ERRORS: Final = np.linspace(-50.0, 50.0, 41)  # K
+APART: Final = (
+    "block", "inboard [g]", "outboard [g]", "inboard / outboard", "inboard [µm]", "outboard [µm]",
+    "taper along [µm]", "taper across [µm]", "disc [g]", "disc [µm]", "disc [g/MJ]",
+)  # fmt: skip
 LEGEND: Final = (
     ("5 kW, or coolest block", BLUE),
     ("20 kW", GREEN),
@@ -190,14 +194,14 @@ def _apart(blocks: list[Block]) -> list[Table]:
         )
         for block in blocks
     ]
-    if not any(cell != "–" for row in rows for cell in row[1:]):
+    measured = [k for k in range(len(APART)) if any(row[k] != "–" for row in rows)]
+    if len(measured) < 2:
         return []
     return [
         Table(
             "Pads and disc apart",
-            ("block", "inboard [g]", "outboard [g]", "inboard / outboard", "inboard [µm]", "outboard [µm]",
-             "taper along [µm]", "taper across [µm]", "disc [g]", "disc [µm]", "disc [g/MJ]"),
-            rows,
+            tuple(APART[k] for k in measured),
+            [tuple(row[k] for k in measured) for row in rows],
             "The law is of both pads together. Taper: what the leading end (points 1, 2) lost more than the "
             "trailing one (5, 6), the outer radius (1, 3, 5) more than the inner one. "
             f"{disc_line(blocks)}",

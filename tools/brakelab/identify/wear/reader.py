@@ -103,8 +103,10 @@ def _beside(
     except PlantFileError as error:
         raise UserError(str(path), error.place, error.remedy) from None
     if held := [section.name for section in programme.section if section.control != "deceleration"]:
-        remedy = "asks for a pressure, which says no speed to compare; leave `programme` empty"
-        raise UserError(str(path), f"section {held[0]}", remedy)
+        remedy = (
+            f"{row['programme']}, section {held[0]} asks for a pressure, which says no speed; leave it empty"
+        )
+        raise UserError(str(manifest), f"{where}, programme", remedy)
     road = math.nan
     if row.get("road_energy"):
         try:
