@@ -123,7 +123,7 @@ def dust_panels(trips: list[Applications], judged: list[Judged], chosen: Judged)
         ends = float(np.floor(min(counted.min(), said.min()))), float(np.ceil(max(counted.max(), said.max())))
         diagonal = np.array(ends)
         lines = [
-            Line(counted, said, BLUE if one is chosen else ORANGE),
+            Line(counted, said, BLUE if one is chosen else ORANGE, marks=True),
             Line(diagonal, diagonal, GREY),
             Line(diagonal, diagonal - one.below, PINK, True),
             Line(diagonal, diagonal - one.above, PINK, True),

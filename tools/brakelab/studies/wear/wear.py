@@ -179,15 +179,16 @@ def wear_panels(lives: list[Life], cars: int) -> list[Panel]:
     """Return Figure 7.16 for the first two cars: both laws, front left pad."""
     panels = []
     for life in (lives[0], lives[1], lives[cars], lives[cars + 1]):
-        top = 1.2 * float(np.nanmax(life.true[:, 0]))
-        lines = [Line(life.km, life.true[:, 0], GREY)]
-        lines += [Line(life.km, life.predicted[mode][:, 0], COLOURS[mode]) for mode in MODES]
+        km = 1e-3 * life.km
+        lines = [Line(km, life.true[:, 0], GREY)]
+        lines += [Line(km, life.predicted[mode][:, 0], COLOURS[mode]) for mode in MODES]
         for sign in (-BAND, BAND):
             mode = "every measurement"
             band = life.predicted[mode][:, 0] + sign * life.sigma[mode][:, 0]
-            lines.append(Line(life.km, band, BLUE, True))
+            lines.append(Line(km, band, BLUE, True))
+        top = 1.05 * max(float(np.nanmax(line.y)) for line in lines)
         title = f"car {life.seed}, {CORNERS[0]}, {life.law}: wear [mm]"
-        panels.append(Panel(title, "km", (0.0, 30e3), (0.0, top), lines))
+        panels.append(Panel(title, "1,000 km", (0.0, 30.0), (0.0, top), lines))
     return panels
 
 
