@@ -104,6 +104,12 @@ def _pairs(judged: Judged, trips: list[Applications]) -> tuple[Array, Array]:
     return measured[order], judged.model.predict(features, sequences)[known][order]
 
 
+def _beside(ends: tuple[float, float], less: float, colour: str) -> Line:
+    """Return the line y = x - `less` where both are within `ends`."""
+    x = np.array([max(ends[0], ends[0] + less), min(ends[1], ends[1] + less)])
+    return Line(x, x - less, colour, less != 0.0)
+
+
 def dust_panels(trips: list[Applications], judged: list[Judged], chosen: Judged) -> list[Panel]:
     """Return Figures 8.2 and 8.8: background by speed, and predicted over counted EF of the tests."""
     shown = [trip for trip in trips if trip.test] or trips
@@ -121,12 +127,11 @@ def dust_panels(trips: list[Applications], judged: list[Judged], chosen: Judged)
             continue
         counted, said = _pairs(one, shown)
         ends = float(np.floor(min(counted.min(), said.min()))), float(np.ceil(max(counted.max(), said.max())))
-        diagonal = np.array(ends)
         lines = [
             Line(counted, said, BLUE if one is chosen else ORANGE, marks=True),
-            Line(diagonal, diagonal, GREY),
-            Line(diagonal, diagonal - one.below, PINK, True),
-            Line(diagonal, diagonal - one.above, PINK, True),
+            _beside(ends, 0.0, GREY),
+            _beside(ends, one.below, PINK),
+            _beside(ends, one.above, PINK),
         ]
         panels.append(Panel(f"EF by {one.name}", "EF counted", ends, ends, lines))
     return panels
