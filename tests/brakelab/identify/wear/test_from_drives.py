@@ -33,7 +33,7 @@ def drive(path: Path, seed: int, count: int = 240, **changed) -> Path:
         v_end = v_in * random.choice([0.02, 0.4, 0.7])
         duration = (v_in - v_end) / random.uniform(0.6, 3.0)
         energy = SLOWED * 0.5 * (v_in**2 - v_end**2) * (1.0 - 0.1 * random.random())  # drag does the rest
-        heat = 40.0 + 3.0 * v_in + 20.0 * random.normal()
+        heat = 10.0 + 3.0 * v_in + 8.0 * random.normal()
         for corner in CORNERS:
             row = dict.fromkeys(BRAKE_UNITS, float("nan"))
             row |= {"brake": k, "corner": corner, "learning": "", "left_out": "", "v_in": v_in}
