@@ -19,7 +19,7 @@ from brakelab.identify.friction.lining_file import write_lining
 from brakelab.identify.friction.page import write_report
 from brakelab.identify.friction.reader import read_recording
 from brakelab.identify.friction.recording import Recording, check_name, joined, write_recording
-from brakelab.identify.friction.sequence import Sequence, load_sequence, run_sequence
+from brakelab.identify.friction.sequence import read_sequence, run_sequence
 from brakelab.identify.friction.stops import Stops, find_stops, say_dead
 from brakelab.identify.friction.tables import (
     component_table,
@@ -68,7 +68,7 @@ def run(
         raise UserError("--law", "", f"missing; --linings has laws, no pads: {', '.join(lining.friction)}")
     if law is not None and law not in lining.friction:
         raise UserError("--law", law, f"no such law; choose one of {', '.join(lining.friction)}")
-    sequence = _programme(path)
+    sequence = read_sequence(path)
     bench = new_bench(lining, brake, seed, law=law or "", mass=sequence.mass)
     rig = bench.rig[0]
     inertia = float(rig["mass"] * rig["tyre_radius"] ** 2)
@@ -170,16 +170,6 @@ def friction(
     wrote(out, page)
     say(f"{out}: the law chosen under the name SIM; {page}: how well and how far it holds")
     return 0
-
-
-def _programme(path: Path) -> Sequence:
-    """Return the programme of a file. Raises UserError for a file that is none."""
-    try:
-        return load_sequence(path)
-    except PlantFileError as error:
-        raise UserError(str(path), error.place, error.remedy) from None
-    except (OSError, UnicodeDecodeError):
-        raise UserError(str(path), "", "is no text; give a programme as in config/rig") from None
 
 
 def _linings(path: Path | None) -> dict[str, Lining]:

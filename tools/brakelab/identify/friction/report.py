@@ -17,9 +17,8 @@ from brakelab.identify.friction.report_tables import (
     section_table,
 )
 from brakelab.identify.friction.sections import conditions_of, find_sections, number_of, speed_ratio
-from brakelab.identify.friction.sequence import Sequence, load_sequence
+from brakelab.identify.friction.sequence import Sequence, load_sequence, read_sequence
 from brakelab.identify.friction.stops import find_stops, say_dead
-from brakelab.plant.description import PlantFileError
 from brakelab.results.console import new_console
 from brakelab.results.outputs import check_outputs
 from brakelab.results.text_table import show
@@ -81,11 +80,7 @@ def report(
 def _programmes(named_one: str | None) -> list[Sequence]:
     if named_one is None:
         return [load_sequence(path) for path in sorted(resource("config/rig").glob("*.toml"))]
-    path = named(named_one, "config/rig")
-    try:
-        return [load_sequence(path)]
-    except PlantFileError as error:
-        raise UserError(str(path), error.place, error.remedy) from None
+    return [read_sequence(named(named_one, "config/rig"))]
 
 
 def _measure(path: Path, columns: Path | None, known: list[Sequence]) -> tuple[Sequence, Measured]:

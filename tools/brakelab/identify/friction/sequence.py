@@ -12,10 +12,11 @@ from pydantic import Field
 
 from brakelab.identify.friction.dynamometer import Bench
 from brakelab.identify.friction.recording import Recording, joined
-from brakelab.plant.description import read_file
+from brakelab.plant.description import PlantFileError, read_file
 from brakelab.plant.dynamometer import DECELERATION, PRESSURE, RAMP, new_stop
 from brakelab.plant.dynamometer_programme import BAR, KMH, Gate, Levels, Programme, load_programme
 from brakelab.plant.friction.law import Positive, Section
+from ecu.errors import UserError
 
 
 class Applications(Section):
@@ -54,6 +55,16 @@ def load_sequence(path: Path) -> Sequence:
     if "[[section]]" in path.read_text("utf-8"):
         return read_file(path, Sequence)
     return factorial(load_programme(path))
+
+
+def read_sequence(path: Path) -> Sequence:
+    """Return the programme of a user's file. Raises UserError for a file that is none."""
+    try:
+        return load_sequence(path)
+    except PlantFileError as error:
+        raise UserError(str(path), error.place, error.remedy) from None
+    except (OSError, UnicodeDecodeError):
+        raise UserError(str(path), "", "is no text; give a programme as in config/rig") from None
 
 
 def factorial(programme: Programme) -> Sequence:

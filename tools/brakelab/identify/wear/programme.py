@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from brakelab.identify.friction.ak_master import Sequence
+from brakelab.identify.friction.sequence import Sequence
 from brakelab.identify.wear.applications import KMH, Applications, RoadBlock, Step
 from brakelab.results.chart import BLUE, GREY, Line, Panel
 from brakelab.results.text_table import Table

@@ -13,15 +13,14 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from brakelab.arrays import Array
-from brakelab.identify.friction.sequence import load_sequence
 from brakelab.identify.friction.check import refuse_units
 from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.reader import read_recording
 from brakelab.identify.friction.recording import Recording
+from brakelab.identify.friction.sequence import read_sequence
 from brakelab.identify.measurement_files import check_celsius, read_columns, read_manifest
 from brakelab.identify.wear.reproduced import Reproduced, reproduced
 from brakelab.identify.wear.weighings import Lost, read_lost
-from brakelab.plant.description import PlantFileError
 from brakelab.results.wear import regressors_of
 from brakelab.stretches import stretches
 from ecu.errors import UserError
@@ -98,10 +97,7 @@ def _beside(
     path = manifest.parent / row["programme"]
     if not path.is_file():
         raise UserError(str(manifest), f"{where}, programme", f"{row['programme']}: no such file beside it")
-    try:
-        programme = load_sequence(path)
-    except PlantFileError as error:
-        raise UserError(str(path), error.place, error.remedy) from None
+    programme = read_sequence(path)
     if held := [section.name for section in programme.section if section.control != "deceleration"]:
         remedy = (
             f"{row['programme']}, section {held[0]} asks for a pressure, which says no speed; leave it empty"

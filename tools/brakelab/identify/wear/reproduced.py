@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from brakelab.arrays import Array
-from brakelab.identify.friction.ak_master import Sequence
+from brakelab.identify.friction.sequence import Sequence
 from brakelab.identify.wear.applications import KMH
 from brakelab.identify.wear.programme import Stop, stops_of
 from brakelab.results.text_table import Table
