@@ -30,7 +30,7 @@ from ecu.algorithm.monitoring.accel_error import (
     wheels_confirm,
 )
 from ecu.algorithm.monitoring.acceleration import BLOCK_S, KNOWN_MOTORS
-from ecu.algorithm.monitoring.witness import AGAIN_S, compare, judge
+from ecu.algorithm.monitoring.witness import AGAIN_S, FASTEST_DOUBT, compare, judge
 from ecu.contract.params import GRAVITY
 from ecu.contract.signals import ACCEL_X, MOTOR_TORQUE
 from ecu.jit import Record, kernel
@@ -63,7 +63,6 @@ SHARE_S, FEWEST_S = 60.0, 2.0
 DRIVES_ON, LET_GO_S = 15.0, 0.5  # N m, less than keeps a car rolling; s
 LEAST_ASKED, STEADY = 100.0, 0.05  # N m, of it
 MOVED_S = 0.4
-FASTEST = 5.0  # times as fast as at the tolerance
 ALONE = 0.5  # of the tolerance, where the mate confirms it
 GAP_LAG, GAP_DOUBT_S = 0.15, 0.2  # s
 
@@ -192,7 +191,7 @@ def _judge_moved(
     ratio = abs(apart) / tolerance
     trusted = blocks.implausible == 0 and blocks.known_blocks > 1 and not accel_doubted(lines)
     moved = ratio > 1.0 and trusted and not wheels_confirm(lines, blocks.mean, apart)
-    state.moved_s = max(state.moved_s + (min(ratio, FASTEST) if moved else -1.0) * BLOCK_S, 0.0)
+    state.moved_s = max(state.moved_s + (min(ratio, FASTEST_DOUBT) if moved else -1.0) * BLOCK_S, 0.0)
     for i in range(4):
         place = MOTOR_TORQUE + i
         if moved and alone in (-1, i) and usable(inputs, place):
