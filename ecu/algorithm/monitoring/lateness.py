@@ -6,8 +6,8 @@ A reading that is late by L is too high by L d, whatever the speed is; slip, rad
 it. Each input has a Kalman filter of the two states, while the car brakes by more than `SLOWS`; q begins anew
 in every braking, and where an input is left out. The others are the fastest of median, dead reckoning and
 vehicle speed, and the slip of the configured tyre at this deceleration is allowed for: wheels that slip
-together make nobody late. Once a wheel slips by `SLIDES` more than that, the slip guard acts, or an axle
-takes over from the other, nothing is said until the next braking: what comes back from there looks late.
+together make nobody late. Once a wheel slips by `SLIDES` more than that, or the slip guard acts, nothing is
+said until the next braking: what comes back from there looks late.
 
 Assumption: all constants. On straight, split and sloping roads and in bends L of sound inputs stays below
 0.04 s.
@@ -28,8 +28,7 @@ LATENESS_STATE = np.dtype(
         ("share", "f8", (JUDGED,)),  # q
         ("p", "f8", (JUDGED, 3)),  # variances of both, covariance
         ("slowed_s", "f8"),  # since the braking began
-        ("slid", "u1"),  # a wheel has, in this braking, or an axle has taken over
-        ("front", "f8"),  # share of the front in the torque, as this braking began
+        ("slid", "u1"),  # a wheel has, in this braking
         ("others", "i8"),  # mask of the inputs that are believed
     ],
     align=True,
@@ -41,16 +40,13 @@ LAG_START, SHARE_START = 0.1, 0.005  # s, -: standard deviations
 WALK = 0.004  # s per root second
 NOISE = 0.25  # m/s of a cycle's reading
 SLIDES, LONGEST = 0.04, 0.35  # of the speed, s: what is beyond that is no lag
-TAKES_OVER = 0.08  # of the torque
 LATE, LATE_DOUBT, SIGMAS = 0.05, 0.03, 2.0  # s, s, -
 REFERENCE = 4.0  # m/s^2, the deceleration at which an innovation is published
 DOUBT_S = 0.3
 
 
 @kernel
-def begin_lateness(
-    state: Record, others: int, accel: float, across: float, front: float, slides: bool, dt: float
-) -> bool:
+def begin_lateness(state: Record, others: int, accel: float, across: float, slides: bool, dt: float) -> bool:
     """Begin a cycle; return whether lags show in it.
 
     Args:
@@ -58,7 +54,6 @@ def begin_lateness(
         others: mask of the inputs that are believed.
         accel: of the car [m/s^2].
         across: lateral acceleration [m/s^2].
-        front: share of the front wheels in the torque.
         slides: a wheel does.
         dt: time since the last cycle [s].
     """
@@ -70,9 +65,6 @@ def begin_lateness(
         if not slows or others != state.others:
             state.share[i], p[1], p[2] = 0.0, SHARE_START**2, 0.0
     state.others = others
-    if state.slowed_s <= SETTLED_S:
-        state.front = front
-    slides = slides or abs(front - state.front) > TAKES_OVER
     state.slid = 1 if slows and (slides or state.slid) else 0
     shows: bool = state.slowed_s > SETTLED_S and abs(across) < ACROSS and not state.slid
     return shows

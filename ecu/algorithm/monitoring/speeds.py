@@ -253,12 +253,9 @@ def watch_speeds(
     free = not accelerates and accel > DRAGGED_ACCEL
     state.left_s = SPIN_UP_S if left else max(state.left_s - dt, 0.0)
     free = free and state.left_s == 0.0
-    front = total = 0.0
     for i in range(4):
         torque = state.torque[i] + motor_torque(inputs, i)
         free = free and abs(torque) < TORQUE
-        front += torque if i < 2 else 0.0
-        total += torque
     state.rolled_s = min(state.rolled_s + dt, BASE_S) if free else state.rolled_s
     found = state.rolled_s >= FOUND_S
     tolerance = TOLERANCE + ABSOLUTE / ground + (0.0 if found else UNFOUND)
@@ -267,8 +264,7 @@ def watch_speeds(
         tolerance += (ABSOLUTE + LAG_S * abs(accel)) / ground
     lateness = state.lateness
     believed, slides = _believed(state, witness), guarded or state.left_s > 0.0
-    front /= max(total, TORQUE)
-    shows = begin_lateness(lateness, believed, accel, estimate.accel_y, front, slides, dt)
+    shows = begin_lateness(lateness, believed, accel, estimate.accel_y, slides, dt)
     slip = tyre_slip(params, accel) * ground
     for i in range(5):
         if math.isnan(state.implied[i]):

@@ -31,18 +31,16 @@ class Road:
         late=0.0,
         guarded=False,
         overslept: float = 0.0,
-        torque=800.0,
     ) -> tuple[str, ...]:
         """Return the names that are rejected at the end; `accel` < 0 brakes all wheels, `gas` [%].
 
-        `late` [s]: of each input; `guarded`: the slip guard acts; the first cycle is `overslept` s late;
-        `torque` [N m]: of each brake, while it brakes.
+        `late` [s]: of each input; `guarded`: the slip guard acts; the first cycle is `overslept` s late.
         """
         turns, late = np.array(turns, float), np.broadcast_to(late, 5)
         for _ in range(round(seconds / DT)):
             self.speed += accel * DT
             self.estimate["speed"], self.estimate["accel_x"] = self.speed, accel
-            braking = torque if accel < -1.0 else 0.0
+            braking = 800.0 if accel < -1.0 else 0.0
             self.estimate["brake_torque"] = np.maximum(
                 braking + self.noise * self.random.standard_normal(4), 0.0
             )
@@ -210,19 +208,6 @@ LATE = [
 @pytest.mark.parametrize(("case", "accel", "turns", "late", "rejected"), LATE, ids=[c[0] for c in LATE])
 def test_who_is_late(road, case, accel, turns, late, rejected) -> None:
     assert road.drive(4.5, turns, accel, late=late) == rejected
-
-
-def test_an_axle_that_takes_over_from_the_other_is_not_late(params, feed) -> None:
-    """6 m/s² on a wet road: the rear, taken back to 400 N m, comes to 770; slips as tyres have them."""
-    road = Road(params, feed, False)
-    road.drive(5.0)
-    road.speed = road.state["reckoned"] = 33.0
-    for k, back in enumerate(np.clip(np.linspace(-0.4, 1.6, 40), 0.0, 1.0)):
-        built = min(0.25 * k + 0.25, 1.0)
-        slips = [0.044 - 0.002 * back, 0.049 - 0.004 * back, 0.013 + 0.027 * back, 0.014 + 0.033 * back]
-        torque = built * np.array([1550.0, 1550.0, 400.0 + 370.0 * back, 400.0 + 370.0 * back])
-        turns = (*(1.0 - built * np.array(slips)), 1.0)
-        assert road.drive(0.1, turns, -5.8 * built, torque=torque) == ()
 
 
 def test_who_was_late_is_left_out_in_the_next_braking_from_the_first(road) -> None:
