@@ -74,7 +74,6 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "moved_s",
         "rolls_s",
         "rolls_wrong",
-        "front",
         "torques",
         "implied",
         "reported",
