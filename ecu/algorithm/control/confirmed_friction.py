@@ -6,11 +6,13 @@ the speed over ground; the force of all brakes is known otherwise:
     r = (-a + d - drag / m - f_roll g) / a_dem                         while the demand is steady
 
 While r is at least `CONFIRMS`, the friction in use counts as confirmed. Below `LEAST_SHARE` what it has risen
-by since is taken back, until r will be `AGREES`; where that is not enough, up to `LOWER` of the confirmed
-friction too: the linings have changed since. All is given again slowly. A friction that falls raises the
-pressure: it is followed. What r will be once hydraulics and car have followed what is taken back already is
-predicted (a Smith predictor, with their lag as a model): without it twice of what is missing was given, and
-wheels locked.
+by since is taken back, until r is `AGREES`; where that is not enough, up to `LOWER` of the confirmed friction
+too: the linings have changed since. All is given again slowly. A friction that falls raises the pressure: it
+is followed.
+
+Until a friction was confirmed, all of a rise is one over the base, and more than what is missing. Then what r
+will be once hydraulics and car have followed what is taken back already is predicted (a Smith predictor, with
+their lag as a model), and counts: without it twice of what is missing was given, and wheels locked.
 
 d is what the accelerometer has moved by against the wheels of late (c of `accel_error.py`): a drift, or the
 road. A negative d counts against a rise: two witnesses, accelerometer and wheels, must confirm what lowers
@@ -45,9 +47,10 @@ LEAST_DECEL = 2.0  # m/s^2: at less the accelerometer's zero counts for too much
 LAG, STEADY, SETTLED_S = 0.15, 0.05, 0.3  # s, of the demand, s: hydraulics and tyres have followed
 HYDRAULIC_LAG = 0.1  # s, dead time, lag and tyres
 LEAST_SHARE, AGREES, CONFIRMS = 0.92, 0.95, 0.93
-TAKE, WIDTH = 10.0, 0.4  # 1/s at an error of `WIDTH`: no more than hydraulics and car can follow
+TAKE, WIDTH = 10.0, 0.04  # 1/s at an error of `WIDTH`
+FIRST_WIDTH = 0.4  # until a friction was confirmed: no more than hydraulics and car can follow
 GIVE, GIVE_FAST, OVER = 0.05, 0.5, 1.04  # 1/s, 1/s where more than that is given
-LOWER, LOWERING, SMALL = 0.3, 0.25, 0.04  # of the friction, 1/s at an error of `SMALL`: slow against the lag
+LOWER, LOWERING = 0.3, 0.25  # of the friction, 1/s at an error of `WIDTH`: slow against the lag
 FOLLOW_S, USUAL_S = 0.5, 30.0
 
 
@@ -98,13 +101,15 @@ def confirm_friction(
     else:
         drifted = min(drifted, 0.0) if state.friction[0] > 0.0 else 0.0
     share = (state.given + drifted) / state.asked
-    coming = share * state.heading / state.followed
+    coming, width = share, WIDTH
+    if state.friction[0] == 0.0:
+        coming, width = share * state.heading / state.followed, FIRST_WIDTH
     missing = (AGREES if state.back > 0.0 else LEAST_SHARE) - coming
     if state.back > 1.0 or (state.back == 1.0 and missing > 0.0):
-        lowering = LOWERING * min(max(missing / SMALL, -1.0), 1.0)
+        lowering = LOWERING * min(max(missing / WIDTH, -1.0), 1.0)
         state.back = min(max(state.back + lowering * dt, 1.0), 2.0)
     elif missing > 0.0:
-        state.back = min(state.back + TAKE * min(missing / WIDTH, 1.0) * dt, 1.0)
+        state.back = min(state.back + TAKE * min(missing / width, 1.0) * dt, 1.0)
     else:
         state.back = max(state.back - (GIVE_FAST if coming > OVER else GIVE) * dt, 0.0)
     if state.back == 0.0 and share > CONFIRMS:

@@ -67,7 +67,7 @@ CASES = [
         "it rises by an accelerometer that the wheels deny",
         {"believed": 1.15 * MU, "reads": -0.6, "offset": -0.6},
         1.0,
-        1.08,
+        1.06,
     ),
     (
         "the linings rub less on a road that falls away",
@@ -123,12 +123,14 @@ def test_a_lining_that_is_not_observed_brakes_with_what_is_in_use_less_what_is_t
     assert car.law["used"] == pytest.approx([used * MU] * 4, rel=0.015)
 
 
-def test_a_rise_that_is_a_lie_takes_less_than_a_tenth(car) -> None:
-    assert car.brake(6.0, believed=1.5 * MU) > 0.9
+def test_a_rise_that_is_a_lie_takes_more_than_a_tenth_for_less_than_a_second(car) -> None:
+    """The friction in use moves by half a unit a second at most, there and back."""
+    assert car.brake(0.9, believed=1.5 * MU) == pytest.approx(0.79, abs=0.02)
+    assert car.brake(5.0, believed=1.5 * MU) > 0.9
 
 
 @pytest.mark.parametrize("true", [1.1, 1.15, 1.2])
-def test_what_is_taken_back_does_not_overshoot(params, true) -> None:
+def test_what_is_taken_back_before_any_friction_was_confirmed_does_not_overshoot(params, true) -> None:
     """Hydraulics and car are seen 0.25 s late: force beyond the demand may be more than tyres can give."""
     car = Car(params)
     car.brake(0.8, believed=1.12 * true * MU, true=true * MU)
