@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from brakelab.bench.watchers import BLOCK_S, PORTS, VIEWERS, Block, Watchers, alternate, inside
 from brakelab.results.text_table import Table
+from brakelab.results.verdict import Goal, verdict
 from brakelab.rig.live import Processes, choose_bus
 from brakelab.studies.measure import machine
 from brakelab.studies.study import Asked, Measured, Study
-from brakelab.studies.verdict import Goal, verdict
 from ecu.contract.signals import CYCLE_NS
 from ecu.recording.recorder import read_recording
 from ecu.runtime.clock import Grid, system_time

@@ -25,13 +25,13 @@ from numpy.typing import NDArray
 
 from brakelab.replay.quality import Findings
 from brakelab.results.text_table import Table
+from brakelab.results.verdict import Goal, verdict
 from brakelab.rig.live import Bus, choose_bus
 from brakelab.rig.play.command import Sent, send_on_schedule
 from brakelab.rig.play.play_log import timed_frames
 from brakelab.simulation.priority import PRIORITY, ask_for_priority
 from brakelab.studies.measure import installed, machine
 from brakelab.studies.study import Asked, Measured, Study
-from brakelab.studies.verdict import Goal, verdict
 from ecu.runtime.clock import system_time
 from ecu.runtime.warm_up import Silence
 

@@ -16,7 +16,7 @@ from brakelab.identify.friction.sequence import Sequence
 from brakelab.identify.wear.applications import KMH
 from brakelab.identify.wear.programme import Stop, stops_of
 from brakelab.results.text_table import Table
-from brakelab.studies.verdict import Goal, verdict
+from brakelab.results.verdict import Goal, verdict
 
 LARGEST_ERROR: Final = 6.0
 """%, of the speed's nRMSE (section 7.3.2) and of ΔE_b."""

@@ -22,6 +22,7 @@ from brakelab.results.brakes import BrakeBook, BrakeRow
 from brakelab.results.prediction import corners, errors
 from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
+from brakelab.results.verdict import Goal, verdict
 from brakelab.simulation.closed_loop import Drive, new_loop, run
 from brakelab.simulation.scenario import Phase, Scenario
 from brakelab.simulation.simulate import write_columns
@@ -29,7 +30,6 @@ from brakelab.studies.accuracy.observers_cases import shipped
 from brakelab.studies.accuracy.table import spread
 from brakelab.studies.measure import figure
 from brakelab.studies.study import Asked, Measured, Study
-from brakelab.studies.verdict import Goal, verdict
 from ecu.contract.signals import CORNERS
 from ecu.settings.config import Config, load_config, new_params
 from ecu.settings.resources import resource

@@ -21,12 +21,12 @@ from brakelab.identify.tuning.search import RANGES
 from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, Line, Panel
 from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
+from brakelab.results.verdict import Goal, met, verdict
 from brakelab.simulation.accuracy import AXLES
 from brakelab.simulation.observer import with_observer
 from brakelab.simulation.scenario import Scenario, load_scenario
 from brakelab.simulation.scenario_car import with_draw
 from brakelab.studies.study import Asked, Measured, Study, picture
-from brakelab.studies.verdict import Goal, met, verdict
 from ecu.settings.config import Config, config_hash, load_config
 from ecu.settings.resources import resource
 

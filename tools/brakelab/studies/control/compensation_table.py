@@ -6,6 +6,7 @@ import numpy as np
 
 from brakelab.arrays import Matrix, Vector
 from brakelab.results.text_table import Table
+from brakelab.results.verdict import Goal, met, verdict
 from brakelab.studies.control.compensation import (
     CURVES,
     FADE_RUNS,
@@ -16,7 +17,6 @@ from brakelab.studies.control.compensation import (
     Car,
 )
 from brakelab.studies.measure import Figure, figure
-from brakelab.studies.verdict import Goal, met, verdict
 
 FIRST_WITHIN: Final = 5.0  # %, first application
 WITHIN: Final = 3.0  # %, later ones

@@ -8,6 +8,7 @@ import numpy as np
 from brakelab.results import euro7
 from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
+from brakelab.results.verdict import Goal, verdict
 from brakelab.studies.dust.cycle_cars import (
     SHIPPED,
     Shipped,
@@ -19,7 +20,6 @@ from brakelab.studies.dust.cycle_cars import (
 from brakelab.studies.dust.cycle_drives import CYCLES, REAL_DRIVING, WLTP_BRAKE, CycleDrive, drive_cycle
 from brakelab.studies.dust.cycle_open import OpenDrive, drive_open, real_driving_profile, wltp_brake_profile
 from brakelab.studies.study import Asked, Measured, Study
-from brakelab.studies.verdict import Goal, verdict
 from ecu.settings.config import Config, new_params
 
 CAR: Final = 1

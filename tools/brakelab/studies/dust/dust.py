@@ -9,9 +9,9 @@ from brakelab.identify.dust.page import LEGEND, THESIS, dust_panels, spearman_ta
 from brakelab.results import euro7
 from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
+from brakelab.results.verdict import Goal, verdict
 from brakelab.studies.dust.study import Draw, OnBoard, draw_trips, drive_on_board, pictured
 from brakelab.studies.study import Asked, Measured, Study, picture
-from brakelab.studies.verdict import Goal, verdict
 
 DRAWS: Final = 20
 QUIET_DRAWS: Final = 10

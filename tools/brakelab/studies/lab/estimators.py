@@ -5,11 +5,11 @@ from typing import Final
 import numpy as np
 
 from brakelab.results.text_table import Table
+from brakelab.results.verdict import Goal, verdict
 from brakelab.studies.lab.goals import OBSERVER_GOAL, as_drawn, same_ranking
 from brakelab.studies.lab.observer import CAUSES, KINDS
 from brakelab.studies.lab.run import Lab
 from brakelab.studies.lab.trips import FACTORS
-from brakelab.studies.verdict import Goal, verdict
 
 TABLE_2_1: Final = {
     "response surface": (28.14, 17.74, 18.35, 12.27),

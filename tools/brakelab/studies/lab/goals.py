@@ -7,13 +7,13 @@ import numpy as np
 from brakelab.identify.friction.discovery import ILVO
 from brakelab.identify.friction.estimators import NETWORK, OSTERMEYER, SURFACE
 from brakelab.results.text_table import Table
+from brakelab.results.verdict import Goal, met, verdict
 from brakelab.studies.lab.brakes import SEED, recovery, table_errors
 from brakelab.studies.lab.choice import choice_of, compared
 from brakelab.studies.lab.discovery import NOISES
 from brakelab.studies.lab.observer import AS_DRAWN, KINDS, OnTrip
 from brakelab.studies.lab.run import Lab
 from brakelab.studies.physics.heat import BRAKES
-from brakelab.studies.verdict import Goal, met, verdict
 
 OBSERVER_GOAL: Final = 3.0  # %
 INSIDE: Final = (90.0, 99.0)  # %

@@ -8,6 +8,7 @@ from brakelab.identify.friction.dynamometer import Noise
 from brakelab.identify.friction.patches import CAPACITY_RISE
 from brakelab.plant.disc import DISC_SHARE
 from brakelab.results.text_table import Table
+from brakelab.results.verdict import Goal, verdict
 from brakelab.studies.lab.bad_input import bad_input_table
 from brakelab.studies.lab.brakes import DRAWS, SEED, linings, recovery, table_errors
 from brakelab.studies.lab.choice import choice_of, choice_table, compared
@@ -19,7 +20,6 @@ from brakelab.studies.lab.run import Lab
 from brakelab.studies.lab.searches import search_table
 from brakelab.studies.physics.friction import LOADINGS, TABLE_3_4, TEMPERATURES
 from brakelab.studies.physics.heat import BRAKES
-from brakelab.studies.verdict import Goal, verdict
 
 TABLE_B_1: Final = {
     "initial speed": (-0.0961, 0.9907, 0.0),

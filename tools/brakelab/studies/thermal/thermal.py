@@ -12,9 +12,9 @@ from brakelab.identify.thermal.result import SYMBOLS, values_of
 from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Line, Panel
 from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
+from brakelab.results.verdict import Goal, verdict
 from brakelab.studies.study import Asked, Measured, Study, picture
 from brakelab.studies.thermal.study import JUDGED, Appraised, Car, Series, drive_car
-from brakelab.studies.verdict import Goal, verdict
 
 CARS: Final = 8
 FIRST: Final = 3

@@ -10,8 +10,8 @@ from brakelab.identify.wear.fit import ELSEWHERE, TERMS
 from brakelab.results.chart import BLUE, GREY, ORANGE, PINK, Line, Panel
 from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
+from brakelab.results.verdict import Goal, met, verdict
 from brakelab.studies.study import Asked, Measured, Study, picture
-from brakelab.studies.verdict import Goal, met, verdict
 from brakelab.studies.wear.drives import CarDrives, drive_car
 from brakelab.studies.wear.study import LAWS, MODES, Law, Life, dynamometer_laws, live
 from ecu.contract.signals import CORNERS

@@ -2,7 +2,7 @@
 
 import pytest
 
-from brakelab.studies.verdict import Goal, met, verdict
+from brakelab.results.verdict import Goal, met, verdict
 
 
 @pytest.mark.parametrize(
