@@ -17,13 +17,7 @@ from ecu.bus.database import find_message, find_signal, read_database, set_sende
 from ecu.bus.freshness import input_freshness
 from ecu.bus.plan import SignalUse
 from ecu.bus.protection import Protection
-from ecu.bus.receive_plan import (
-    MessageUse,
-    ReceivePlan,
-    accepted_ids,
-    compile_receive,
-    contract_receive_plan,
-)
+from ecu.bus.receive_plan import MessageUse, ReceivePlan, accepted_ids, compile_receive, contract_receive_plan
 from ecu.bus.units import conversion
 from ecu.contract.records import EXTENDED_ID
 from ecu.contract.signals import INPUT, INPUT_SIGNALS
