@@ -79,6 +79,6 @@ def test_the_page_shows_the_shipped_tuning_and_the_ranges() -> None:
     page = resource("docs/tuning.md").read_text("utf-8")
     for key, (low, high) in RANGES.items():
         (row,) = [line for line in page.splitlines() if line.startswith(f"| `{key}` |")]
-        _, _, manual, searched, _ = (cell.strip() for cell in row.strip("|").split("|"))
+        _, _, manual, searched = (cell.strip() for cell in row.strip("|").split("|"))
         assert float(manual) == getattr(Observer(), key), key
         assert tuple(float(bound) for bound in searched.split("–")) == (low, high), key
