@@ -71,7 +71,7 @@ _CONTRADICTED: Final = (
     ("yaw_rate", "contradicts lateral acceleration, steering and wheels: it is left out", "check mounting, supply and calibration of the IMU"),
     ("steering_angle", "contradicts yaw rate, lateral acceleration and wheels: it is left out", "check the zero and the ratio of the steering sensor"),
     *_corners("calliper_pressure", "differs from the pressure demanded while the car brakes as demanded: the pressure that follows from the demand stands for it", "check that wheel's pressure sensor and valve, and the receiver of PressureDemand*"),
-    *_corners("motor_torque", "differs from what was demanded of that motor, or from what the car does: it is left out", "check the inverter and the sender of Motor*"),
+    *_corners("motor_torque", "differs from what was demanded of that motor, or from what the car usually does at that torque, or drives while the brakes are applied: it is left out", "check the inverter and the sender of Motor*"),
     ("vehicle_speed", "contradicts the wheels and the acceleration: it is left out", "check the receiver or the sensor of the speed over ground"),
     ("accumulator_pressure", "less than a calliper's pressure: it limits nothing", "check the sender of HydraulicStatus"),
     ("reverse", "the car drives forwards: too fast for a reverse gear, engaged while moving, or decelerating as only forwards; it is taken for 0", "check the sender of reverse"),
