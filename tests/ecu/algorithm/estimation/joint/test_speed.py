@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from ecu.algorithm.estimation.joint.layout import CHANGE, LEVEL, V
-from ecu.algorithm.estimation.joint.observer import update_joint
+from ecu.algorithm.estimation.joint.layout import CHANGE, JOINT_STATE, LEVEL, V
+from ecu.algorithm.estimation.joint.observer import WINDOW_S, update_joint
+from ecu.algorithm.estimation.joint.speed import speed_is_wrong
 from ecu.contract.signals import CALLIPER_PRESSURE, VEHICLE_SPEED, WHEEL_SPEED
 
 BRAKING = {"front": 38.0, "rear": 30.0}
@@ -77,3 +78,29 @@ def test_wheels_that_lock_in_a_gap_are_not_the_car(new_car) -> None:
     state = car.drive(0.3, reference=False, slide=dict.fromkeys(range(4), 0.6), **BRAKING)
     assert state["x"][V] == pytest.approx(car.speed, rel=0.15)
     assert state["sliding"] == 4
+
+
+SPINNING = [
+    # N m of all motors, change of the wheels' distance from the speed [m/s^2], s, whether the speed is wrong
+    (0.0, 0.0, 2.9, False),
+    (0.0, 0.0, 3.2, True),
+    (0.0, -2.5, 3.2, True),  # undriven wheels roll, whatever the accelerometer says
+    (-2000.0, 0.0, 3.2, True),  # driven ones that change their speed as the car does
+    (-2000.0, 0.3, 3.2, True),  # and an accelerometer's error
+    (-2000.0, -2.5, 14.0, False),  # they spin: their speed stays, and the car's rises
+    (-2000.0, -2.5, 15.2, True),
+]
+
+
+@pytest.mark.parametrize(("torque", "drift", "seconds", "wrong"), SPINNING)
+def test_wheels_that_differ_from_the_speed_for_long(params, feed, torque, drift, seconds, wrong) -> None:
+    state, inputs = np.zeros(1, JOINT_STATE), feed(motor_torque=torque / 4.0)
+    window, found = state["window"][0], False
+    window["time"], window["omega_samples"] = WINDOW_S, 5
+    state["x"][0, V] = 20.0
+    for _ in range(round(seconds / WINDOW_S)):
+        state["untrusted_s"] += WINDOW_S
+        distance = 8.0 + drift * state["untrusted_s"][0]
+        window["omega"] = (20.0 + distance) / params[0]["wheel_radius"]
+        found = found or speed_is_wrong(params[0], state[0], inputs[0])
+    assert found == wrong
