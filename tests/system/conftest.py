@@ -6,7 +6,7 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,8 @@ from ecu.contract.records import FRAME, new_record
 from ecu.contract.signals import INPUT, N_INPUTS
 from ecu.recording.recorder import read_recording
 from ecu.runtime.clock import Grid, system_time
+
+from .xcp_master import Master, Wire
 
 ROOT = Path(__file__).parents[2]
 DBC = ROOT / "dbc" / "brake_ecu.dbc"
@@ -126,6 +128,24 @@ def driven(car: Vehicle) -> Iterator[None]:
     finally:
         ends.set()
         thread.join()
+
+
+@pytest.fixture
+def start_driving(car: Vehicle) -> Iterator[Callable[[], None]]:
+    """Let the car drive from the call on until the test ends."""
+    with ExitStack() as stack:
+        yield lambda: stack.enter_context(driven(car))
+
+
+@pytest.fixture
+def connect() -> Iterator[Callable[[str, int], Master]]:
+    """Connect XCP masters that do not outlive the test."""
+    with ExitStack() as stack:
+
+        def start(kind: str, port: int) -> Master:
+            return stack.enter_context(closing(Master(Wire(kind, port)))).connect()
+
+        yield start
 
 
 def process_of(daemon: Daemon, module: str) -> int | None:

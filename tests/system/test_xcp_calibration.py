@@ -17,9 +17,9 @@ from ecu.contract.signals import OUTPUT_COLUMNS
 from ecu.recording.recorder import read_recording
 from ecu.settings.config import load_config
 
-from .conftest import ROOT, driven, process_of, unharmed
+from .conftest import ROOT, process_of, unharmed
 from .test_xcp_udp import free_port
-from .xcp_master import VARIABLES, CanWire, Master, Refused, Wire
+from .xcp_master import VARIABLES, CanWire, Master, Refused
 
 pytestmark = pytest.mark.multicast
 
@@ -33,12 +33,11 @@ NAN = float("nan")
 
 
 @pytest.fixture
-def unit(daemon, car, tmp_path):
+def unit(daemon, car, start_driving, tmp_path):
     """Start a daemon that may be calibrated, beside a car that drives, or stands."""
     key = tmp_path / "key"
     key.write_text(SECRET.hex())
     key.chmod(0o600)
-    driving = []
 
     def start(transport, *more, stands=False):
         if stands:
@@ -47,27 +46,10 @@ def unit(daemon, car, tmp_path):
         files = ("--xcp-key", key, "--xcp-save", tmp_path / "saved.toml")
         one = daemon(*bus, "--xcp", transport, *files, *more)
         one.wait_for("ready")
-        driving.append(driven(car))
-        driving[-1].__enter__()
+        start_driving()
         return one
 
-    yield start
-    for one in driving:
-        one.__exit__(None, None, None)
-
-
-@pytest.fixture
-def connect():
-    """Connect masters that do not outlive the test."""
-    opened = []
-
-    def start(port):
-        opened.append(Master(Wire("udp", port)))
-        return opened[-1].connect()
-
-    yield start
-    for one in opened:
-        one.close()
+    return start
 
 
 def stop(car):
@@ -115,7 +97,7 @@ def test_a_shadow_is_calibrated_as_it_drives_the_loop_goes_by_it_and_the_replay_
 ):
     port = free_port()
     one = unit(f"udp:{port}")
-    master = connect(port)
+    master = connect("udp", port)
     refused(ACCESS_LOCKED, master.download, DECEL, 0.0, 2.0)
     refused(ACCESS_LOCKED, master.take_over)
     master.unlock(SECRET)
@@ -149,7 +131,7 @@ def test_a_shadow_is_calibrated_as_it_drives_the_loop_goes_by_it_and_the_replay_
 def test_armed_and_moving_nothing_is_taken_over_standing_it_is(unit, connect, car, tmp_path):
     port = free_port()
     one = unit(f"udp:{port}", "--armed")
-    master = connect(port)
+    master = connect("udp", port)
     master.unlock(SECRET)
     master.download(RATE, 2000.0)
     wait_for(lambda: master.value("outputs.vehicle_speed") > 10.0)
@@ -170,13 +152,13 @@ def test_armed_and_moving_nothing_is_taken_over_standing_it_is(unit, connect, ca
 def test_a_master_that_dies_with_half_a_value_downloaded_leaves_nothing_behind(unit, connect, tmp_path):
     port = free_port()
     one = unit(f"udp:{port}", stands=True)
-    first = connect(port)
+    first = connect("udp", port)
     first.unlock(SECRET)
     first.ask("BHBL", 0xF6, 0, 0, VARIABLES[RATE][0])
     first.ask("BB4s", 0xF0, 4, struct.pack("<d", 2000.0)[4:])
     assert first.value(RATE) != 3000.0
     first.close()
-    second = connect(port)
+    second = connect("udp", port)
     assert second.value(RATE) == 3000.0
     refused(ACCESS_LOCKED, second.take_over)
     second.unlock(SECRET)
@@ -189,7 +171,7 @@ def test_a_master_that_dies_with_half_a_value_downloaded_leaves_nothing_behind(u
 def test_what_is_stored_is_a_config_file_and_a_slave_that_is_killed_goes_on_with_it(unit, connect, tmp_path):
     port = free_port()
     one = unit(f"udp:{port}", "--armed", stands=True)
-    master = connect(port)
+    master = connect("udp", port)
     master.unlock(SECRET)
     for name, code in ((RATE, None), ("parameters.vehicle.mass", WRITE_PROTECTED)):
         if code:
@@ -202,7 +184,7 @@ def test_what_is_stored_is_a_config_file_and_a_slave_that_is_killed_goes_on_with
     saved = load_config(tmp_path / "saved.toml")
     assert (saved.control.max_pressure_rate, saved.transmit) == (2000.0, False)
     os.kill(process_of(one, "ecu.xcp.process"), signal.SIGKILL)
-    again = connect(port)
+    again = connect("udp", port)
     assert again.value(RATE) == 2000.0
     assert again.ask("BBB", 0xEA, 1, 0)[2] == 1
     again.unlock(SECRET)
@@ -228,7 +210,7 @@ def test_on_the_bus_of_the_run_all_comes_in_pieces(unit, tmp_path):
 def test_a_recorder_that_dies_notes_it_all_the_same(unit, connect, tmp_path):
     port = free_port()
     one = unit(f"udp:{port}")
-    master = connect(port)
+    master = connect("udp", port)
     master.unlock(SECRET)
     for number, rate in enumerate((2000.0, 2100.0, 2200.0), 1):
         master.download(RATE, rate)

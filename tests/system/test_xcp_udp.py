@@ -18,7 +18,7 @@ from ecu.recording.recorder import read_recording
 from ecu.xcp.a2l import a2l_text
 from ecu.xcp.memory import EPK
 
-from .conftest import ROOT, driven, process_of, unharmed
+from .conftest import ROOT, process_of, unharmed
 from .xcp_master import VARIABLES, CanWire, Master, Refused, Wire
 
 pytestmark = pytest.mark.multicast
@@ -40,35 +40,17 @@ def port():
 
 
 @pytest.fixture
-def unit(daemon, car, tmp_path):
+def unit(daemon, start_driving, tmp_path):
     """Start a daemon with XCP beside a car that drives in a thread."""
-    driving = []
 
     def start(transport, *more):
         bus = ("--config", ROOT / "config" / "suv.toml", "--armed", "-i", "udp_multicast", "-c", GROUP)
         one = daemon(*bus, "--record", tmp_path / "record", "--xcp", transport, *more)
         one.wait_for("ready")
-        driving.append(driven(car))
-        driving[-1].__enter__()
+        start_driving()
         return one
 
-    yield start
-    for one in driving:
-        one.__exit__(None, None, None)
-
-
-@pytest.fixture
-def master():
-    """Connect masters that do not outlive the test."""
-    opened = []
-
-    def connect(kind, port):
-        opened.append(Master(Wire(kind, port)))
-        return opened[-1].connect()
-
-    yield connect
-    for one in opened:
-        one.close()
+    return start
 
 
 def slave_of(unit):
@@ -77,10 +59,10 @@ def slave_of(unit):
 
 @pytest.mark.parametrize("kind", ["udp", "tcp"])
 def test_two_hundred_signals_at_100_hz_none_is_lost_and_all_are_those_of_the_recording(
-    unit, master, port, tmp_path, kind
+    unit, connect, port, tmp_path, kind
 ):
     one = unit(f"{kind}:{port}")
-    asks = master(kind, port)
+    asks = connect(kind, port)
     stamps, rows = asks.measure(SIGNALS, 400)
     assert len(SIGNALS) == 200
     assert asks.wire.lost == 0
@@ -99,9 +81,9 @@ def test_two_hundred_signals_at_100_hz_none_is_lost_and_all_are_those_of_the_rec
     assert measured[-1, SIGNALS.index("inputs.vehicle_speed")] == pytest.approx(20.0, abs=0.01)
 
 
-def test_a_master_reads_what_has_an_address_and_nothing_else(unit, master, port):
+def test_a_master_reads_what_has_an_address_and_nothing_else(unit, connect, port):
     unit(f"udp:{port}")
-    asks = master("udp", port)
+    asks = connect("udp", port)
     assert asks.value("parameters.vehicle.mass") == 2105.0
     wait_for(lambda: asks.value("estimate.speed") == pytest.approx(20.0, abs=0.5))
     assert asks.value("outputs.pressure_demand_fl") >= 0.0
@@ -118,9 +100,9 @@ def test_a_master_reads_what_has_an_address_and_nothing_else(unit, master, port)
     assert asks.value("parameters.vehicle.mass") == 2105.0
 
 
-def test_the_slave_hands_out_its_own_file_of_addresses(unit, master, port):
+def test_the_slave_hands_out_its_own_file_of_addresses(unit, connect, port):
     unit(f"tcp:{port}")
-    asks = master("tcp", port)
+    asks = connect("tcp", port)
     length = struct.unpack("<BHL", asks.ask("BB", 0xFA, 4))[2]
     text = b""
     while len(text) < length:
@@ -158,35 +140,35 @@ def test_on_the_bus_of_the_run(unit, daemon, tmp_path):
     unharmed(one, tmp_path / "record")
 
 
-def test_a_master_that_dies_while_it_measures(unit, master, port, tmp_path):
+def test_a_master_that_dies_while_it_measures(unit, connect, port, tmp_path):
     """On UDP nothing says so: the next one is heard once the dead one has been silent."""
     one = unit(f"udp:{port}")
-    first = master("udp", port)
+    first = connect("udp", port)
     first.begin([[(VARIABLES["outputs.mode"][0], 8)]])
     first.take()
     first.close()
-    second = master("udp", port)
+    second = connect("udp", port)
     assert second.ask("B", 0xFD)[0] & 0x40 == 0  # no list runs
     assert second.value("outputs.mode") >= 0
     unharmed(one, tmp_path / "record")
 
 
-def test_a_second_master_on_tcp_is_refused_until_the_first_has_gone(unit, master, port, tmp_path):
+def test_a_second_master_on_tcp_is_refused_until_the_first_has_gone(unit, connect, port, tmp_path):
     one = unit(f"tcp:{port}")
-    first = master("tcp", port)
+    first = connect("tcp", port)
     second = Wire("tcp", port)
     with pytest.raises(ConnectionError):
         Master(second).ask("BB", 0xFF, 0)
     assert first.value("outputs.mode") >= 0
     first.close()
-    assert master("tcp", port).value("outputs.mode") >= 0
+    assert connect("tcp", port).value("outputs.mode") >= 0
     unharmed(one, tmp_path / "record")
 
 
 @pytest.mark.parametrize("kind", ["udp", "tcp"])
-def test_floods_and_garbage(unit, master, port, tmp_path, kind):
+def test_floods_and_garbage(unit, connect, port, tmp_path, kind):
     one = unit(f"{kind}:{port}")
-    asks = master(kind, port)
+    asks = connect(kind, port)
     before = slave_of(one)
     draw = random.Random(9)
     if kind == "udp":
@@ -203,29 +185,29 @@ def test_floods_and_garbage(unit, master, port, tmp_path, kind):
             asks.wire.send(bytes([draw.randint(0xC0, 0xFD)]) + draw.randbytes(7))
     time.sleep(0.5)
     asks.close()
-    again = master(kind, port)
+    again = connect(kind, port)
     assert again.value("parameters.vehicle.mass") == 2105.0
     assert slave_of(one) == before
     unharmed(one, tmp_path / "record")
 
 
 @pytest.mark.requirement("REQ-PROC-4")
-def test_loop_and_recorder_do_not_care_for_the_slave(unit, master, port, tmp_path):
+def test_loop_and_recorder_do_not_care_for_the_slave(unit, connect, port, tmp_path):
     one = unit(f"tcp:{port}")
-    asks = master("tcp", port)
+    asks = connect("tcp", port)
     first = slave_of(one)
     for number in (signal.SIGTERM, signal.SIGINT):  # a group's are left to the loop
         os.kill(first, number)
     assert asks.value("outputs.mode") >= 0
     os.kill(first, signal.SIGKILL)
-    assert master("tcp", port).value("outputs.mode") >= 0
+    assert connect("tcp", port).value("outputs.mode") >= 0
     assert slave_of(one) not in (None, first)
     unharmed(one, tmp_path / "record")
 
 
-def test_the_end_of_a_run_is_reported(unit, master, port):
+def test_the_end_of_a_run_is_reported(unit, connect, port):
     one = unit(f"udp:{port}")
-    asks = master("udp", port)
+    asks = connect("udp", port)
     assert one.end() == 0
     while not asks.events:
         asks.take()
