@@ -17,8 +17,8 @@ An input that is late by the braking of the car (`lateness.py`) is judged by tha
 
 Braked wheels that slip together leave the car. Dead reckoning does not follow a median that is more than
 `LEAVES` below it, but the vehicle speed where the two agree, and stands for the median. For `SPIN_UP_S` more
-no wheel is judged as one that rolls freely, or as too slow. So do driven wheels that spin together, by more
-than `SPINS` and `SPINS_BY`.
+no wheel is judged as one that rolls freely, or as too slow. Driven wheels that spin together leave the car
+likewise, above it by more than `SPINS` of its speed and `SPINS_BY`.
 """
 
 import math
