@@ -91,6 +91,7 @@ VEHICLE_SPEED_VALID: Final = INPUT["vehicle_speed_valid"]
 ACCUMULATOR_PRESSURE: Final = INPUT["accumulator_pressure"]
 HYDRAULIC_READY: Final = INPUT["hydraulic_ready"]
 WHEEL_FORCE_X: Final = INPUT["wheel_force_x_fl"]
+WHEEL_TORQUE_Y: Final = INPUT["wheel_torque_y_fl"]
 AMBIENT_TEMPERATURE: Final = INPUT["ambient_temperature"]
 RAIN: Final = INPUT["rain"]
 
@@ -152,6 +153,7 @@ OUTPUT_SIGNALS: Final[tuple[OutputSignal, ...]] = (
     OutputSignal("braking", "-", False, ""),  # 1 while a brake application lasts
     OutputSignal("calliper_pressure", "bar", True, ""),  # as measured, last sample
     OutputSignal("pressure_zero", "bar", True, ""),  # pressure zero
+    OutputSignal("wheel_torque_y", "N m", True, ""),  # as measured, last sample
     OutputSignal("pressure_uncompensated", "bar", True, ""),  # the demand with the base friction
     OutputSignal("sigma_disc_temperature", "K", True, ""),
     OutputSignal("sigma_pad_wear", "mm", True, ""),

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from brakelab.report.ak_table import fade, observed, sections
-from brakelab.report.brakes_section import brakes_section
+from brakelab.report.brakes_section import brakes_section, read_car
 from brakelab.report.csv_table import HEAD, csv_link
 from brakelab.report.distribution import forbidden_stretches, forces_of, ideal_share
 from brakelab.report.drive import DriveResult
@@ -105,19 +105,19 @@ def test_sections_and_fade() -> None:
 
 
 def test_what_lacks_is_a_sentence_and_no_plot() -> None:
-    section, plots = brakes_section(drive(), None, Path("x"), [STOP], False)
+    section, plots = brakes_section(drive(), None, None, [STOP], False)
     assert plots["torque_plots"] == plots["distribution_plots"] == plots["energy_plots"] == {}
     missing = {row.quantity for row in section.missing}
     assert "Specific torque, distribution, energy of each brake" in missing
     assert {"Slip and speeds of the wheels", "Motors' share over time", "Accelerator"} <= missing
-    section, _ = brakes_section(drive(), None, Path("x"), [], True)
+    section, _ = brakes_section(drive(), None, None, [], True)
     assert not section.conditions
     assert not section.csv
 
 
 def test_damaged_car_is_one_line() -> None:
     with pytest.raises(UserError, match="metadata car: not readable"):
-        brakes_section(drive()._replace(metadata={KEY: json.dumps({"mass": 1})}), None, Path("x"), [], False)
+        read_car(drive()._replace(metadata={KEY: json.dumps({"mass": 1})}), Path("x"))
 
 
 def test_csv_has_a_column_for_each_name() -> None:

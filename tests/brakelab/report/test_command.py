@@ -10,6 +10,7 @@ import pytest
 
 from brakelab.report.command import report
 from brakelab.report.look import DARK
+from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
 
 from .conftest import write_drive
@@ -220,3 +221,16 @@ def test_friction_that_nobody_knows_is_one_dash(drive_files: Files) -> None:
     shown = visible(written(drive_files, truth=False, timing=False))
     assert "Friction front, ±2σ – nothing is known" in shown
     assert "Friction rear, ±2σ 0." in shown
+
+
+def test_wheel_torque_in_the_log_stands_for_the_truth(drive_files: Files) -> None:
+    def measured(table: pa.Table) -> pa.Table:
+        for corner in CORNERS:
+            values = -60.0 * 0.4 * table[f"calliper_pressure_{corner}"].to_numpy()
+            table = column(f"wheel_torque_y_{corner}", values)(table)
+        return table
+
+    change(drive_files["result"], measured)
+    text = visible(written(drive_files, truth=False, timing=False))
+    assert "Friction against measured wheel torque" in text
+    assert "Hold-off pressure" in text

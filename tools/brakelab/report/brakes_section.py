@@ -47,14 +47,13 @@ def read_car(drive: DriveResult, result: Path) -> Car | None:
 
 
 def brakes_section(
-    drive: DriveResult, truth: DriveResult | None, result: Path, found: list[Braking], without_pressure: bool
+    drive: DriveResult,
+    truth: DriveResult | None,
+    car: Car | None,
+    found: list[Braking],
+    without_pressure: bool,
 ) -> tuple[Section, dict[str, dict[str, Any]]]:
-    """Return the section on the drive of `result` and its plots by place.
-
-    Raises:
-        UserError: the metadata are damaged.
-    """
-    car = read_car(drive, result)
+    """Return the section on a drive of `car` and its plots by place."""
     rows = responses(drive, found)
     csv = csv_link(found, rows)
     places = ("torque_plots", "distribution_plots", "response_plots", "energy_plots")

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from brakelab.report.accuracy import accuracy_per_axle, tracking
-from brakelab.report.brakes_section import brakes_section
+from brakelab.report.brakes_section import brakes_section, read_car
 from brakelab.report.brakings import Braking, brakings
 from brakelab.report.drive import onto, read_drive
 from brakelab.report.friction import plots_of_friction
@@ -26,6 +26,7 @@ from brakelab.report.sparkline import sparklines
 from brakelab.report.summary import facts, faults, tiles
 from brakelab.report.timing import read_timing, spreads
 from brakelab.report.wear_section import wear_section
+from brakelab.report.wheel_torque import reference_of
 from brakelab.results.outputs import check_outputs
 from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
@@ -77,6 +78,10 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
         remedy = "give the NAME.truth.parquet that `brake-ecu simulate` wrote"
         true = onto(drive, read_drive(truth, _FRICTION, remedy), truth)
     found = brakings(drive, result)
+    car = read_car(drive, result)
+    measured = None if car is None else reference_of(drive, car, found)
+    if true is None and measured is not None:
+        true = measured.drive
     accuracy = None if true is None else accuracy_per_axle(drive, true, found)
     if accuracy is not None and not any(row.seconds for row in accuracy.values()):
         accuracy = None
@@ -84,7 +89,7 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
     rows = [_row(*pair) for pair in zip(found, sparklines(drive, found), strict=True)]
     predicted = prediction_errors(found)
     wear, wear_plots = wear_section(drive, true, result, quality, without_pressure)
-    brakes, brakes_plots = brakes_section(drive, true, result, found, without_pressure)
+    brakes, brakes_plots = brakes_section(drive, true, car, found, without_pressure)
     page = fill(
         {
             "over_time": plots_over_time(drive, true, found),
@@ -111,6 +116,8 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
             "prediction_errors": predicted,
             "prediction_peers": peer_errors(found),
             "accuracy": accuracy,
+            "reference": "the truth" if truth is not None else "measured wheel torque",
+            "factors": {} if measured is None else measured.factors,
             "brakes": brakes,
             "wear": wear,
             "reduced": len(drive.t) > POINTS,

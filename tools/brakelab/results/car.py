@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from ecu.algorithm.brake import brake_gain_per_bar
 from ecu.algorithm.control.distribution import front_share
-from ecu.contract.params import GRAVITY
+from ecu.contract.params import BAR, GRAVITY
 from ecu.settings.annex5 import Load
 from ecu.settings.config import Config, new_params
 
 KEY: Final = "car"
 RATES: Final[NDArray[np.float64]] = np.round(np.arange(0.0, 1.001, 0.05), 2)
 """Braking rates of `Car.share`."""
-_PAIRS: Final = ("radius", "gain", "pad_area")
+_PAIRS: Final = ("radius", "gain", "pad_area", "push_out")
 
 
 class Car(NamedTuple):
@@ -40,6 +40,8 @@ class Car(NamedTuple):
     """Brake torque of one wheel per friction and pressure, N m/bar."""
     pad_area: tuple[float, float]
     """Of both pads of a brake, mm^2; NaN: CONFIG names no lining."""
+    push_out: tuple[float, float] = (0.0, 0.0)
+    """Push-out pressure, bar; results of earlier versions do not state it."""
 
 
 def car_of(config: Config) -> dict[str, Any]:
@@ -51,6 +53,7 @@ def car_of(config: Config) -> dict[str, Any]:
         "share": [round(float(front_share(params, z * GRAVITY)), 4) for z in RATES],
         "radius": [float(params["wheel_radius"][i]) for i in (0, 2)],
         "gain": [float(brake_gain_per_bar(params, i)) for i in (0, 2)],
+        "push_out": [float(params["push_out_pressure"][i] / BAR) for i in (0, 2)],
         "pad_area": [
             2e6 * axle.pad.area if "pad" in axle.model_fields_set else None
             for axle in (config.front, config.rear)

@@ -5,7 +5,8 @@ import pytest
 
 from brakelab.identify.friction.columns import Columns, Rig
 from brakelab.identify.friction.recording import Recording, joined
-from brakelab.identify.friction.stops import Stops, find_stops, friction_over_time, some
+from brakelab.identify.friction.stops import Stops, find_stops, some
+from brakelab.results.torque_friction import friction_over_time
 from ecu.errors import UserError
 
 

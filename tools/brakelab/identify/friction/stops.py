@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from brakelab.arrays import Vector
 from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.recording import Recording
-from brakelab.plant.jit import Record, kernel
+from brakelab.results.torque_friction import friction_over_time
 from brakelab.stretches import stretches
 from ecu.errors import UserError
 from ecu.output import say
@@ -29,7 +29,6 @@ APPLIED: Final = 1.5e5  # Pa
 SHORTEST_STOP: Final = 0.5  # s
 GAP: Final = 0.1  # s
 BLOCK: Final = 0.05  # s
-MEMORY: Final = 0.1  # s, of the recursive least squares
 RISEN: Final = 0.9  # of the pressure that a stop holds: from here friction counts (SAE J2522)
 RELEASED: Final = 0.5  # likewise: below it at the end the brake is let go
 STANDS: Final = 0.2  # m/s of sliding
@@ -65,23 +64,6 @@ class Stops:
 
     def __len__(self) -> int:
         return len(self.mean)
-
-
-@kernel
-def recursive_friction(torque: Record, pressed: Record, forget: float, out: Record) -> None:
-    """Write friction over time by recursive least squares of `torque` over `pressed`, its lever [N m]."""
-    mu, information = 0.0, 1e-3
-    for k in range(len(torque)):
-        information = forget * information + pressed[k] * pressed[k]
-        mu += pressed[k] / information * (torque[k] - pressed[k] * mu)
-        out[k] = mu
-
-
-def friction_over_time(torque: Vector, pressure: Vector, lever: float, dt: float) -> Vector:
-    """Return mu_b, shape as `torque` [N m]; `pressure` [Pa] on the pads, `lever` 2 A_k r_eff [m^3]."""
-    out = np.empty_like(torque)
-    recursive_friction(torque, lever * pressure, float(np.exp(-dt / MEMORY)), out)
-    return out
 
 
 def find_stops(recording: Recording, columns: Columns, where: str) -> Stops:
