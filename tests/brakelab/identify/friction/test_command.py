@@ -164,6 +164,23 @@ def test_one_line_says_what_to_do(tmp_path: Path, call, line: str) -> None:
     assert line in str(error.value)
 
 
+@pytest.mark.parametrize(("kelvin", "refused"), [(0.0, ""), (273.15, "stop00.csv and 23 more")])
+def test_a_file_may_hold_a_single_hot_stop(
+    tmp_path: Path, recording: Recording, lining: Lining, columns: Columns, kelvin: float, refused: str
+) -> None:
+    ends = [0, *np.flatnonzero(np.diff(recording.time) > 1.0) + 1, len(recording.time)]
+    paths = [tmp_path / f"stop{number:02d}.csv" for number in range(len(ends) - 1)]
+    for path, begin, end in zip(paths, ends[:-1], ends[1:], strict=True):
+        stop = Recording(*(values[begin:end] for values in recording))
+        hot = 100.0 * (stop.temperature[0] > 190.0) + kelvin
+        write_recording(path, stop._replace(temperature=stop.temperature + hot), lining, columns.rig.inertia)
+    if not refused:
+        assert command.look(paths, None) == 0
+        return
+    with pytest.raises(UserError, match=f'{refused}.*reads like K: give the unit "K"'):
+        command.look(paths, None)
+
+
 def test_recordings_of_two_brakes_are_not_one(tmp_path: Path) -> None:
     for brake in "AB":
         command.run("ams", brake, 0, tmp_path / f"{brake}.csv")

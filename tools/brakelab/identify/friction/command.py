@@ -42,6 +42,8 @@ from ecu.settings.resources import named, resource
 FEWEST_STOPS: Final = 10
 """Stops that identification needs."""
 HELD_OUT: Final = "the fifth of the stops that begins hottest"
+SINGLE_S: Final = 60.0
+"""A shorter recording may be of a single stop, hot from its begin: such are judged together."""
 BETWEEN: Final = 600.0
 """s between recordings."""
 
@@ -191,9 +193,10 @@ class _Measured(NamedTuple):
 def _read(data: list[Path], columns: Path | None) -> _Measured:
     """Return the stops of recordings of one brake, one after the other."""
     parts: list[Recording] = []
+    short: list[int] = []
     first: Columns | None = None
     heating = []
-    for path in data:
+    for place, path in enumerate(data):
         read = read_recording(path, columns)
         if read.damaged:
             say(read.damaged)
@@ -203,10 +206,16 @@ def _read(data: list[Path], columns: Path | None) -> _Measured:
             raise UserError(
                 str(path), "brake, rig", f"differ from those of {data[0]}; identify one brake at a time"
             )
-        heating.append(refuse_nonsense(read.recording, read.columns, str(path)).heating)
+        if np.ptp(read.recording.time) < SINGLE_S:
+            short.append(place)
+        else:
+            heating.append(refuse_nonsense(read.recording, read.columns, str(path)).heating)
         begin = parts[-1].time[-1] + BETWEEN if parts else 0.0
         parts.append(read.recording._replace(time=read.recording.time - read.recording.time[0] + begin))
     assert first is not None
+    if short:
+        where = f"{data[short[0]]}{f' and {len(short) - 1} more' if len(short) > 1 else ''}"
+        heating.append(refuse_nonsense(joined([parts[place] for place in short]), first, where).heating)
     stops = find_stops(joined(parts), first, str(data[0]))
     say_dead(stops, str(data[0]))
     return _Measured(first, stops, float(np.median(heating)))
