@@ -10,11 +10,10 @@ import numpy as np
 from ecu.algorithm.control.blending import blends
 from ecu.algorithm.control.friction_torque import lining_torque
 from ecu.algorithm.estimate import STANDING
-from ecu.algorithm.inputs import usable
 from ecu.algorithm.monitoring.wear_belief import is_known
 from ecu.contract.faults import WORD
 from ecu.contract.params import BAR
-from ecu.contract.signals import CALLIPER_PRESSURE, FAILED, WHEEL_TORQUE_Y
+from ecu.contract.signals import CALLIPER_PRESSURE, FAILED
 from ecu.jit import Record, kernel
 
 DEMANDS = np.dtype(
@@ -78,7 +77,6 @@ def publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: in
         y.brake_torque[i] = e.brake_torque[i]
         y.calliper_pressure[i] = u.value[CALLIPER_PRESSURE + i]
         y.pressure_zero[i] = e.pressure_zero[i]
-        y.wheel_torque_y[i] = u.value[WHEEL_TORQUE_Y + i] if usable(u, WHEEL_TORQUE_Y + i) else math.nan
         mapped = p.mapped[CALLIPER_PRESSURE + i] != 0
         y.disc_temperature[i] = s.discs.temperature[i] if mapped else math.nan
         y.sigma_disc_temperature[i] = s.discs.sigma[i] if mapped else math.nan

@@ -153,7 +153,6 @@ OUTPUT_SIGNALS: Final[tuple[OutputSignal, ...]] = (
     OutputSignal("braking", "-", False, ""),  # 1 while a brake application lasts
     OutputSignal("calliper_pressure", "bar", True, ""),  # as measured, last sample
     OutputSignal("pressure_zero", "bar", True, ""),  # pressure zero
-    OutputSignal("wheel_torque_y", "N m", True, ""),  # as measured, last sample
     OutputSignal("pressure_uncompensated", "bar", True, ""),  # the demand with the base friction
     OutputSignal("sigma_disc_temperature", "K", True, ""),
     OutputSignal("sigma_pad_wear", "mm", True, ""),

@@ -227,7 +227,7 @@ def test_wheel_torque_in_the_log_stands_for_the_truth(drive_files: Files) -> Non
     def measured(table: pa.Table) -> pa.Table:
         for corner in CORNERS:
             values = -60.0 * 0.4 * table[f"calliper_pressure_{corner}"].to_numpy()
-            table = column(f"wheel_torque_y_{corner}", values)(table)
+            table = table.append_column(f"wheel_torque_y_{corner}", pa.array(values))
         return table
 
     change(drive_files["result"], measured)

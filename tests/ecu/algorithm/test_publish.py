@@ -4,7 +4,7 @@ import pytest
 from ecu.algorithm.publish import publish
 from ecu.algorithm.step import new_state
 from ecu.contract.records import INPUTS, OUTPUTS
-from ecu.contract.signals import ACTIVE, DEGRADED, FAILED, USABLE, WHEEL_TORQUE_Y
+from ecu.contract.signals import ACTIVE, DEGRADED, FAILED
 from ecu.settings.config import load_config, new_params
 from ecu.settings.resources import resource
 
@@ -44,12 +44,3 @@ def test_what_remains_of_linings_is_unknown_until_somebody_says_what_is_fitted()
     publish(params[0], state[0], np.zeros(1, INPUTS)[0], outputs[0], 3.0, 0, ACTIVE)
     assert np.isfinite(outputs["pad_remaining"][0]).tolist() == [True, True, False, False]
     assert np.isfinite(outputs["sigma_pad_wear"][0]).all()
-
-
-def test_a_wheel_torque_that_is_lost_is_not_published() -> None:
-    params = new_params(load_config(resource("config/suv.toml")))
-    inputs, outputs = np.zeros(1, INPUTS), np.full(1, np.nan, OUTPUTS)
-    torques = slice(WHEEL_TORQUE_Y, WHEEL_TORQUE_Y + 4)
-    inputs["value"][0, torques], inputs["verdict"][0, torques] = -800.0, [USABLE, USABLE, 0, USABLE]
-    publish(params[0], new_state(params)[0], inputs[0], outputs[0], 3.0, 0, ACTIVE)
-    assert outputs["wheel_torque_y"][0] == pytest.approx([-800.0, -800.0, np.nan, -800.0], nan_ok=True)

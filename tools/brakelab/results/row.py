@@ -2,12 +2,20 @@
 
 from typing import Final
 
-from ecu.contract.signals import ACCELERATOR_POSITION, MOTOR_TORQUE, N_OUTPUTS, PEDAL_POSITION, WHEEL_SPEED
+from ecu.contract.signals import (
+    ACCELERATOR_POSITION,
+    MOTOR_TORQUE,
+    N_OUTPUTS,
+    PEDAL_POSITION,
+    WHEEL_SPEED,
+    WHEEL_TORQUE_Y,
+)
 
 MEASURED_INPUTS: Final = (
     *range(MOTOR_TORQUE, MOTOR_TORQUE + 4),
     ACCELERATOR_POSITION,
     PEDAL_POSITION,
     *range(WHEEL_SPEED, WHEEL_SPEED + 4),
+    *range(WHEEL_TORQUE_Y, WHEEL_TORQUE_Y + 4),
 )
 N_ROW: Final = N_OUTPUTS + len(MEASURED_INPUTS)
