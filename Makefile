@@ -2,6 +2,8 @@
 PIP := .venv/bin/python -m pip --disable-pip-version-check install --quiet
 # A worker a core: threads of a library would wait for the core of another worker.
 test studies coverage: export OPENBLAS_NUM_THREADS = 1
+# Kept for the next run: modules, and tests as pytest rewrites them.
+test studies coverage mutants fuzz: export PYTHONDONTWRITEBYTECODE =
 PINNED := $(PIP) --no-deps --require-hashes --requirement requirements/build.txt
 
 .PHONY: help demo test studies check coverage mutants fuzz soak results screenshot clean
