@@ -93,10 +93,11 @@ def _modules(checkout: Path) -> dict[str, Path]:
     return found
 
 
-def _named(path: Path) -> set[str]:
+@cache
+def _named(content: bytes) -> frozenset[str]:
     """Return the dotted names that a module may import, and its text constants."""
     names: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_bytes())):
+    for node in ast.walk(ast.parse(content)):
         if isinstance(node, ast.Import):
             names.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module:
@@ -104,7 +105,7 @@ def _named(path: Path) -> set[str]:
             names.update(f"{node.module}.{alias.name}" for alias in node.names)
         elif isinstance(node, ast.Constant) and isinstance(node.value, str):
             names.add(node.value)
-    return names
+    return frozenset(names)
 
 
 def _modules_of(bench: str, benches: list[str]) -> list[str]:
@@ -113,13 +114,13 @@ def _modules_of(bench: str, benches: list[str]) -> list[str]:
     return own or [name for name in benches if f".{bench}." in name]
 
 
-def _loaded(modules: dict[str, Path], start: list[str]) -> dict[str, set[str]]:
+def _loaded(modules: dict[str, Path], start: list[str]) -> dict[str, frozenset[str]]:
     """Return the modules that those of `start` load, each with the names that it has."""
-    seen: dict[str, set[str]] = {}
+    seen: dict[str, frozenset[str]] = {}
     while start:
         name = start.pop()
         if name not in seen:
-            seen[name] = _named(modules[name])
+            seen[name] = _named(modules[name].read_bytes())
             start.extend(seen[name] & modules.keys() - seen.keys())
     return seen
 
@@ -128,7 +129,7 @@ def code_of(checkout: Path, bench: str) -> set[Path]:
     """Return the modules and configuration files that a bench depends on and no golden run shows."""
     modules = _modules(checkout)
     benches = [name for name in modules if name.startswith(tuple(f"brakelab.{one}." for one in BENCHES))]
-    golden = {name for path in (checkout / GOLDEN).glob("test_*.py") for name in _named(path)}
+    golden = {name for path in (checkout / GOLDEN).glob("test_*.py") for name in _named(path.read_bytes())}
     shown = _loaded(modules, sorted(golden & modules.keys())).keys() - set(UNSEEN)
     for name in (*shown, *(f"brakelab.{name}" for name in PRESENTATION)):
         modules.pop(name, None)
