@@ -1,5 +1,7 @@
 """A daemon's ring, written by the test."""
 
+import threading
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +17,7 @@ from ecu.recording.publish import publish
 from ecu.recording.recorder import layout
 from ecu.recording.ring import close_ring, create_ring
 from ecu.settings.resources import resource
+from ecu.watch.serve import Server
 
 START_NS = 1_800_000_000_000_000_000
 MONO_NS = 5_000_000_000_000
@@ -112,3 +115,18 @@ def contract_frames():
         return frames
 
     return make
+
+
+@pytest.fixture
+def serve_here():
+    """Start a server of a handler; it looks every 10 ms, not twice a second, whether the test has ended."""
+    with ExitStack() as stack:
+
+        def start(handler, address="127.0.0.1") -> Server:
+            server = stack.enter_context(Server(address, 0, handler))
+            often = {"poll_interval": 0.01}
+            threading.Thread(target=server.serve_forever, kwargs=often, daemon=True).start()
+            stack.callback(server.shutdown)
+            return server
+
+        yield start

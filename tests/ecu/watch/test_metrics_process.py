@@ -3,13 +3,12 @@ import os
 import socket
 import subprocess
 import sys
-import threading
 from pathlib import Path
 
 import pytest
 
 from ecu.watch.metrics_process import NO_RING, Shared, new_handler, open_server
-from ecu.watch.serve import Handler, Server
+from ecu.watch.serve import Handler
 
 ROOT = Path(__file__).parents[3]
 
@@ -22,13 +21,9 @@ def ask(port, path, **headers):
 
 
 @pytest.fixture
-def served(rings):
+def served(rings, serve_here):
     shared = Shared(rings / "brake-ecu.1.4711.ring")
-    server = Server("127.0.0.1", 0, new_handler(shared))
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    yield shared, server.server_port
-    server.shutdown()
-    server.server_close()
+    return shared, serve_here(new_handler(shared)).server_port
 
 
 def test_health_follows_the_loop(served, loop):

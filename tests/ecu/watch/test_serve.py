@@ -16,12 +16,8 @@ class Echo(Handler):
 
 
 @pytest.fixture
-def server():
-    one = Server("127.0.0.1", 0, Echo)
-    threading.Thread(target=one.serve_forever, daemon=True).start()
-    yield one
-    one.shutdown()
-    one.server_close()
+def server(serve_here):
+    return serve_here(Echo)
 
 
 def get(server, address="127.0.0.1", **headers):
@@ -56,11 +52,8 @@ def test_only_this_machine_s_own_names_are_answered(server, host, status):
         ("0.0.0.0", "vehicle.example:9476", 200),  # anybody may ask it, by any name
     ],
 )
-def test_who_listens_elsewhere_has_the_name_of_that_place(address, host, status):
-    with Server(address, 0, Echo) as one:
-        threading.Thread(target=one.serve_forever, daemon=True).start()
-        assert get(one, address, Host=host)[0] == status
-        one.shutdown()
+def test_who_listens_elsewhere_has_the_name_of_that_place(serve_here, address, host, status):
+    assert get(serve_here(Echo, address), address, Host=host)[0] == status
 
 
 def test_a_request_that_comes_line_by_line_holds_no_place(server, monkeypatch):

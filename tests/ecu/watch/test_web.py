@@ -2,29 +2,23 @@ import http.client
 import json
 import re
 import socket
-import threading
 
 import numpy as np
 import pytest
 
 from ecu.recording.recorder import read_recording
 from ecu.watch.history import COLUMNS
-from ecu.watch.serve import Server
 from ecu.watch.watcher import Watcher
 from ecu.watch.web import Shared, new_handler, page
 
 
 @pytest.fixture
-def watched(loop, tmp_path):
+def watched(loop, tmp_path, serve_here):
     one = loop()
     one.publish(80, frames=1, vehicle_speed=20.0, mu_b=[0.41, np.nan, 0.43, 0.44])
     shared = Shared(Watcher(None), tmp_path / "kept")
     shared.turn()
-    server = Server("127.0.0.1", 0, new_handler(shared))
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    yield one, shared, server.server_port
-    server.shutdown()
-    server.server_close()
+    return one, shared, serve_here(new_handler(shared)).server_port
 
 
 def ask(port, method, path, **headers):
