@@ -3,6 +3,7 @@
 import os
 import re
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from ecu.bus.e2e import AUTOSAR_P01, protect
 from ecu.contract.records import FRAME, RecordArray
 
 ROOT = Path(__file__).parents[3]
-LINE = re.compile(r"\((\d+)\.(\d{6})\) (\S+) ([0-9A-F]+)#([0-9A-F]*)")
+LINE = re.compile(r"^\((\d+)\.(\d{6})\) (\S+) ([0-9A-F]+)#([0-9A-F]*)", re.MULTILINE)
 
 
 @pytest.fixture(scope="session")
@@ -52,15 +53,18 @@ def frame() -> Callable[..., RecordArray]:
 def read_log() -> Callable[[Path, str], RecordArray]:
     """read_log(path, bus) -> the frames of one interface of a candump log."""
 
+    @cache
     def read(path: Path, bus: str) -> RecordArray:
-        lines = (LINE.match(line) for line in path.read_text().splitlines())
-        return np.concatenate(
-            [
-                _frame((int(m[1]) * 1_000_000 + int(m[2])) * 1000, int(m[4], 16), bytes.fromhex(m[5]))
-                for m in lines
-                if m is not None and m[3] == bus
-            ]
-        )
+        found = [m.groups() for m in LINE.finditer(path.read_text()) if m[3] == bus]
+        frames = np.zeros(len(found), FRAME)
+        frames["stamp_ns"] = [(int(s) * 1_000_000 + int(us)) * 1000 for s, us, *_ in found]
+        frames["can_id"] = [int(can_id, 16) for *_, can_id, _ in found]
+        payloads = [bytes.fromhex(data) for *_, data in found]
+        frames["length"] = [len(data) for data in payloads]
+        whole = b"".join(data.ljust(frames["data"].shape[1], b"\0") for data in payloads)
+        frames["data"] = np.frombuffer(whole, np.uint8).reshape(frames["data"].shape)
+        frames.flags.writeable = False
+        return frames
 
     return read
 
