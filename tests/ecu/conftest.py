@@ -14,10 +14,15 @@ from ecu.settings.config import load_config, new_params
 CONFIGS = Path(__file__).parents[2] / "config"
 
 
-@pytest.fixture
-def params() -> RecordArray:
-    """`PARAMS` of the shipped SUV, shape (1,), fresh for each test."""
+@pytest.fixture(scope="session")
+def shipped_params() -> RecordArray:
     return new_params(load_config(CONFIGS / "suv.toml"))
+
+
+@pytest.fixture
+def params(shipped_params: RecordArray) -> RecordArray:
+    """`PARAMS` of the shipped SUV, shape (1,), fresh for each test."""
+    return shipped_params.copy()
 
 
 @pytest.fixture

@@ -36,6 +36,7 @@ from ecu.settings.config import load_config, new_params
 
 ROOT = Path(__file__).parents[3]
 DBC = ROOT / "dbc" / "brake_ecu.dbc"
+OURS = contract_transmit_plan(DBC, "BrakeEcu").ids.tolist()
 FINE = BusStatus(False, False, 0, 0)
 NOMINAL = np.full(4, 0.45)
 MS = 1_000_000
@@ -167,9 +168,9 @@ def test_one_that_stood_still_while_the_standby_spoke_says_nothing_any_more(tmp_
 
 def garbage(draw, count):
     """Frames with identifiers of the ECU and random content."""
-    frames, ids = new_record(FRAME, count), contract_transmit_plan(DBC, "BrakeEcu").ids
+    frames = new_record(FRAME, count)
     for frame in frames:
-        frame["can_id"], frame["length"] = draw.choice(ids.tolist()), 8
+        frame["can_id"], frame["length"] = draw.choice(OURS), 8
         frame["data"][:8] = list(draw.randbytes(8))
     return list(frames)
 

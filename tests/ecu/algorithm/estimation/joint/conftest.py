@@ -1,4 +1,4 @@
-"""A car on a straight road for the joint observer: linings, tyres and balance solved here, with scipy.
+"""A car on a straight road for the joint observer: linings, tyres and balance solved here.
 
 Signs of the observer: forces are positive forward, torques positive when they brake.
 """
@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
 from ecu.algorithm.estimation.joint.layout import CHANGE, JOINT_STATE, LEVEL, N
 from ecu.algorithm.estimation.joint.observer import start_joint, update_joint
@@ -35,15 +34,9 @@ def tied(seed: int) -> Any:
     return state
 
 
-def magic_formula_slip(used: float, stiffness: float, peak: float) -> float:
-    """Return the slip at which D sin(c atan(B s)) is `used` [-], left of the peak; B c D = `stiffness`."""
-    b = stiffness / (SHAPE * peak)
-
-    def excess(slip: float) -> float:
-        return peak * math.sin(SHAPE * math.atan(b * slip)) - used
-
-    at_peak = math.tan(0.5 * math.pi / SHAPE) / b
-    return brentq(excess, -at_peak, at_peak, xtol=1e-15, rtol=1e-14)
+def magic_formula_slip(used: np.ndarray, stiffness: np.ndarray, peak: float) -> np.ndarray:
+    """Return the slips at which D sin(c atan(B s)) is `used` [-], left of the peak; B c D = `stiffness`."""
+    return np.tan(np.arcsin(used / peak) / SHAPE) * (SHAPE * peak) / stiffness
 
 
 class Car:
@@ -116,7 +109,7 @@ class Car:
             self.speed = max(self.speed + change * DT, 0.0)
             used = force / self.load
             stiffness = p["slip_stiffness"] * self.stiffness
-            slip = np.array([magic_formula_slip(*row, PEAK) for row in zip(used, stiffness, strict=True)])
+            slip = magic_formula_slip(used, stiffness, PEAK)
             for i, own in (slide or {}).items():
                 slip[i] = own
             rolled = np.where(slip < 0, 1 + slip, 1 / (1 - slip)) * self.speed
