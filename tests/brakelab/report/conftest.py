@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from brakelab.report import command, page
 from brakelab.report.brakings import Braking, Force
 from brakelab.results.car import car_of
 from brakelab.results.files import brakes_path
@@ -156,3 +157,11 @@ def write_drive(folder: Path) -> dict[str, Path]:
 def drive_files(tmp_path: Path) -> dict[str, Path]:
     """The made-up drive on disk."""
     return write_drive(tmp_path)
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave the plots, which are most of the work, out of a page whose text is read."""
+    monkeypatch.setattr(page, "embed", lambda figures: ("", dict.fromkeys(figures, "")))
+    for name in ("over_time", "of_friction", "of_prediction", "per_braking", "of_loop"):
+        monkeypatch.setattr(command, f"plots_{name}", lambda *arguments: {})

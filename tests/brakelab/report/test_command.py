@@ -103,17 +103,20 @@ def test_a_quarter_of_an_hour_with_45_brakings_stays_small(drive_files: Files) -
     assert "the smallest and the largest value" in page
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_without_truth_and_timing_their_tables_are_absent(drive_files: Files) -> None:
     text = visible(written(drive_files, truth=False, timing=False))
     assert "nRMSE" not in text
     assert "Loop timing" not in text
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_result_without_metadata_has_no_data_quality(drive_files: Files) -> None:
     change(drive_files["result"], lambda table: table.replace_schema_metadata({}))
     assert "Data quality" not in visible(written(drive_files))
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_columns_of_the_contract_alone_are_enough(drive_files: Files) -> None:
     names = ["t", "vehicle_speed", *(f"mu_b_{corner}" for corner in ("fl", "fr", "rl", "rr"))]
     change(drive_files["result"], lambda table: table.select(names))
@@ -143,6 +146,7 @@ def test_brakings_as_csv_are_in_the_page(source: str) -> None:
     assert len(unquote(address[1]).splitlines()) == 1 + 3
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_names_from_outside_are_text(drive_files: Files) -> None:
     change(
         drive_files["result"], lambda table: table.replace_schema_metadata({"vehicle": "<script>alert(1)"})
@@ -150,6 +154,7 @@ def test_names_from_outside_are_text(drive_files: Files) -> None:
     assert "&lt;script&gt;alert(1)" in written(drive_files)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_truth_is_shifted_by_the_dates_of_the_first_rows(drive_files: Files, page: str) -> None:
     date = {"start_time_ns": "1717240000000000000"}
 
@@ -191,6 +196,7 @@ def test_damage_gives_one_line(
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_place_that_cannot_be_written(drive_files: Files) -> None:
     with pytest.raises(UserError, match="choose another --out"):
         report(drive_files["result"], None, drive_files["result"] / "report.html")
@@ -214,6 +220,7 @@ def test_an_input_is_never_overwritten(drive_files: Files, name: str) -> None:
     assert drive_files[name].read_bytes() == before
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_friction_that_nobody_knows_is_one_dash(drive_files: Files) -> None:
     for corner in ("fl", "fr"):
         unknown = np.full(pq.read_table(drive_files["result"]).num_rows, np.nan)

@@ -10,7 +10,6 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from brakelab.report import page as page_module
 from brakelab.report.command import report
 from brakelab.report.drive import read_drive
 from brakelab.report.wear_section import wear_section
@@ -99,12 +98,6 @@ def page_of(result: Path) -> str:
 @pytest.fixture(scope="module")
 def page(tmp_path_factory: pytest.TempPathFactory) -> str:
     return page_of(made_up(tmp_path_factory.mktemp("wear")))
-
-
-@pytest.fixture
-def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave the plots' script, which is most of the work, out of a page whose text is read."""
-    monkeypatch.setattr(page_module, "embed", lambda figures: ("", dict.fromkeys(figures, "")))
 
 
 # Ten brakings of 20 mg over 10 km in town: 0.2 g / 36 g/mm / 10 km = 0.556 mm per 1,000 km. A minute before
@@ -214,6 +207,7 @@ def test_without_its_table_of_brakings(tmp_path: Path) -> None:
     assert "dirtiest" not in page
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_drive_without_braking_says_so(tmp_path: Path) -> None:
     result = made_up(tmp_path, {"braking": 0.0, "particles_last_brake": NAN})
     brakes = brakes_path(result)

@@ -30,6 +30,7 @@ until_speed = 0.0
         ("lcv", ("--plant", "as-config"), 0, ""),
     ],
 )
+@pytest.mark.usefixtures("undrawn")
 def test_a_rig_with_another_car_than_the_configured_one_has_failed(
     config: str,
     plant: tuple[str, ...],
@@ -79,6 +80,7 @@ def test_a_rig_fails_by_a_limit_that_is_not_kept(
     (row,) = pq.read_table(out / "scenarios.parquet", columns=["expected", "failed"]).to_pylist()
     assert row["expected"] == 2
     assert ("FAILED: stopping distance at most 1 m (found: " in row["failed"]) == bool(code)
+    assert (out / "stop" / "report.html").exists()
     page = (out / "rig.html").read_text("utf-8")
     assert page.count("<b>failed</b>") == code
     assert ("1 of 2 failed" in page) == bool(code)
@@ -96,6 +98,7 @@ def test_simulate_fails_by_a_limit_that_is_not_kept(
     assert lines[1] == f"passed: {KEPT} (found: never)"
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_shipped_scenario_passes_and_fails_by_a_time_out_that_is_shorter_than_the_ecu_has(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

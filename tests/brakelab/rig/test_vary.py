@@ -15,6 +15,8 @@ from brakelab.simulation.vehicle_bus import new_vehicle
 from ecu import cli
 from ecu.errors import UserError
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 STOP = """
 plant = "suv"
 draw = "nominal"
