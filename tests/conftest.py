@@ -1,13 +1,18 @@
 """What tests need around them: a SocketCAN bus, UDP multicast, the recorded drives; else they are skipped."""
 
 import os
+import pickle
 import re
 import socket
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
 
+from brakelab.results import processes
 from ecu import jit
 
 pytest_plugins = ["brakelab.testing.plugin"]
@@ -49,6 +54,31 @@ def shared_folder() -> Path:
 def drives() -> Path:
     """Folder of the recorded drives."""
     return shared_folder() / "drives"
+
+
+class InThisProcess(Executor):
+    """Does each task at once; what is pickled on its way to a process is pickled here too."""
+
+    def __init__(self, *arguments: object, **named: object) -> None:
+        pass
+
+    def submit(self, task: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Do a task; return a future that has its result."""
+        future: Future[Any] = Future()
+        task, args, kwargs = pickle.loads(pickle.dumps((task, args, kwargs)))
+        try:
+            future.set_result(task(*args, **kwargs))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+
+@pytest.fixture(autouse=True, scope="session")
+def in_this_process() -> Iterator[None]:
+    """Pools of processes start none: there is a worker of pytest for each core already."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(processes, "ProcessPoolExecutor", InThisProcess)
+        yield
 
 
 def _has_multicast() -> bool:

@@ -1,7 +1,6 @@
 """A short programme on brake A, with a drawn pad and with ILVO of the set R1; and as a stranger's CSV."""
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -20,13 +19,6 @@ from brakelab.studies.lab.brakes import r1_recording
 from ecu.settings.resources import resource
 
 KMH = 1.0 / 3.6
-
-
-class InThisProcess(ThreadPoolExecutor):
-    """A pool that sees what a test has replaced."""
-
-    def __init__(self, workers: int) -> None:
-        super().__init__(1)
 
 
 @pytest.fixture(scope="session")

@@ -21,8 +21,6 @@ from brakelab.plant.friction.own import Own
 from brakelab.plant.linings import Lining, Linings, rig_with
 from ecu.errors import UserError
 
-from .conftest import InThisProcess
-
 FEW = ("constant", "ilvo")
 """Laws that are quickly identified."""
 
@@ -49,7 +47,6 @@ def test_a_law_is_identified_and_runs_on_the_rig(
     """The lining file has the chosen law as SIM; its nominal friction is what the recording shows."""
     few = [c for c in choice.candidates(stops, lining.brake) if c.name in FEW]
     monkeypatch.setattr(choice, "candidates", lambda stops, brake, own: few)
-    monkeypatch.setattr(choice, "new_pool", InThisProcess)
     monkeypatch.setattr(choice, "as_completed", list)
     data, out = tmp_path / "own.parquet", tmp_path / "brake.toml"
     assert columns.rig.inertia is not None
@@ -78,7 +75,6 @@ def test_a_law_of_one_s_own_is_identified_with_the_others(
         "candidates",
         lambda stops, brake, own: [c for c in every(stops, brake, own) if c.name in ("constant", "line")],
     )
-    monkeypatch.setattr(choice, "new_pool", InThisProcess)
     monkeypatch.setattr(choice, "as_completed", list)
     (tmp_path / "laws").mkdir()
     own, data, out = tmp_path / "laws" / "line.py", tmp_path / "own.parquet", tmp_path / "brake.toml"
@@ -109,7 +105,6 @@ def test_found_terms_are_written_and_judged_as_a_law(
     monkeypatch.setattr(
         choice, "candidates", lambda stops, brake, own: [c for c in every(stops, brake, own) if c.name in few]
     )
-    monkeypatch.setattr(choice, "new_pool", InThisProcess)
     monkeypatch.setattr(choice, "as_completed", list)
     counts: list[int] = []
     monkeypatch.setattr(command, "discovered_law", lambda stops: counts.append(len(stops)) or searched(stops))

@@ -18,8 +18,6 @@ from brakelab.plant.friction.law import RigBrake
 from brakelab.plant.linings import Linings
 from ecu.settings.resources import resource
 
-from .conftest import InThisProcess
-
 PAGE = resource("docs/results/friction-lab.md")
 
 
@@ -36,7 +34,6 @@ def test_five_commands(
         return [candidate for candidate in every(stops, brake) if candidate.name in ("constant", "ilvo")]
 
     monkeypatch.setattr(choice, "candidates", quick)
-    monkeypatch.setattr(choice, "new_pool", InThisProcess)
     monkeypatch.setattr(choice, "as_completed", list)
     monkeypatch.chdir(tmp_path)
     text = PAGE.read_text("utf-8")
