@@ -1,11 +1,13 @@
 """What tests need around them: a SocketCAN bus, UDP multicast, the recorded drives; else they are skipped."""
 
+import math
 import os
 import pickle
 import re
 import socket
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -93,13 +95,20 @@ def _has_multicast() -> bool:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    """One worker more than there are cores: tests of whole processes wait for most of their time."""
-    return len(os.sched_getaffinity(0)) + 1
+    """Two workers more than there are cores: tests of whole processes wait for most of their time."""
+    return len(os.sched_getaffinity(0)) + 2
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    # Long tests first (`--no-loadscope-reorder`), lest all workers but one wait for them at the end.
-    items.sort(key=lambda item: LONG.match(item.nodeid) is None)
+    # Long tests first (`--no-loadscope-reorder`), lest all workers but one wait for them at the end: a file
+    # that waits for processes and one that computes in turn.
+    waiting, computing = count(0, 2), count(1, 2)
+    rank: dict[Path, float] = {}
+    for item in items:
+        if item.path not in rank:
+            turns = waiting if item.nodeid.startswith("tests/system/") else computing
+            rank[item.path] = next(turns) if LONG.match(item.nodeid) else math.inf
+    items.sort(key=lambda item: rank[item.path])
     absent = {}
     if not Path("/sys/class/net/vcan0").exists():
         absent["socketcan"] = "no interface vcan0"

@@ -1,5 +1,6 @@
 """`run --diagnostics` on a real bus, asked by foreign testers (udsoncan): one, two, dead and hostile ones."""
 
+import io
 import json
 import os
 import random
@@ -7,10 +8,9 @@ import re
 import signal
 import socket
 import struct
-import subprocess
-import sys
 import threading
 import time
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import can
@@ -24,6 +24,7 @@ from udsoncan.exceptions import (
 
 from brakelab.testing.daemon import wait_for
 from ecu import __version__
+from ecu.cli import main
 from ecu.contract.faults import WHEEL_SPEED_LOST
 from ecu.diagnostics.identifiers import MEASURED, OF_SNAPSHOT, has_corners
 from ecu.diagnostics.services import SELF_TEST
@@ -142,7 +143,7 @@ def test_two_testers_at_once(unit, tmp_path):
     def ask_for(which):
         with foreign_tester(request_timeout=2, p2_timeout=2) as client:
             asked(client, lambda one: one.tester_present())
-            end_s = time.monotonic() + 5
+            end_s = time.monotonic() + 2
             while time.monotonic() < end_s or counts[which] < 20:
                 try:
                     wanted[which](client)
@@ -248,15 +249,9 @@ def test_what_cannot_be_served_is_one_line(options, says, daemon, tmp_path):
 
 def diag(*words):
     """Run `brake-ecu diag`; return its exit code, output and errors."""
-    paths = os.pathsep.join([str(ROOT), str(ROOT / "tools")])
-    done = subprocess.run(
-        [sys.executable, "-m", "ecu.cli", "diag", *words, "-i", "udp_multicast", "-c", GROUP],
-        env={**os.environ, "PYTHONPATH": paths},
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
-    return done.returncode, done.stdout, done.stderr
+    with redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()) as error:
+        code = main(["diag", *words, "-i", "udp_multicast", "-c", GROUP])
+    return code, out.getvalue(), error.getvalue()
 
 
 def test_the_small_tester(unit, tmp_path):

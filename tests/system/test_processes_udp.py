@@ -146,7 +146,7 @@ import itertools, sys
 import ecu.runtime.{module}
 count, whole = itertools.count(), ecu.runtime.{module}.{function}
 def broken(*arguments):
-    if next(count) == 400:
+    if next(count) == 250:
         raise {error}
     return whole(*arguments)
 ecu.runtime.{module}.{function} = broken
@@ -286,7 +286,7 @@ def test_malformed_datagrams_are_no_bus_off(daemon, car, bus):
 def test_an_established_one_stays_beside_another_sender_and_tells_it(daemon, car, bus, tmp_path):
     unit = daemon(*bus, "--record", tmp_path)
     unit.wait_for("ready")
-    car.drive(300)
+    car.drive(220)
     drive_until_braking(car)
     stale = car.drive(1)
     stale = stale[stale["can_id"] == demand_ids()[0]][-1:].copy()

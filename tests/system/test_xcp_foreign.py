@@ -19,7 +19,7 @@ pyxcp = pytest.importorskip("pyxcp", reason="pyxcp is not installed: pip install
 
 pytestmark = pytest.mark.multicast
 
-SECONDS = 3.0
+SECONDS = 2.0
 
 
 @pytest.fixture(params=["UDP", "TCP"])

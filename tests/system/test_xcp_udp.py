@@ -63,7 +63,7 @@ def test_two_hundred_signals_at_100_hz_none_is_lost_and_all_are_those_of_the_rec
 ):
     one = unit(f"{kind}:{port}")
     asks = connect(kind, port)
-    stamps, rows = asks.measure(SIGNALS, 400)
+    stamps, rows = asks.measure(SIGNALS, 200)
     assert len(SIGNALS) == 200
     assert asks.wire.lost == 0
     assert asks.events == []

@@ -229,7 +229,8 @@ def test_flipped_bits_never_end_in_a_traceback(kona: dict[str, Path], tmp_path: 
     path = tmp_path / f"flipped{end}"
     whole = len(read(kona[end])[0])
     read_on = 0
-    for _ in range(12):
+    tries = 12 if end in TEXT else 5
+    for _ in range(tries):
         damaged = np.frombuffer(content, np.uint8).copy()
         places = random.integers(1000, len(damaged), 30)
         damaged[places] ^= 1 << random.integers(0, 8, 30).astype(np.uint8)
@@ -243,7 +244,7 @@ def test_flipped_bits_never_end_in_a_traceback(kona: dict[str, Path], tmp_path: 
         if end in TEXT:
             assert len(frames) >= whole - 60
             assert quality.frames == len(frames)
-    assert read_on >= (0 if end in (".mf4", ".blf") else 12)
+    assert read_on >= (0 if end in (".mf4", ".blf") else tries)
 
 
 def test_a_lost_blf_container_costs_its_own_frames_only(tmp_path: Path) -> None:

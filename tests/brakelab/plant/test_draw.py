@@ -13,7 +13,7 @@ from brakelab.plant.draw import Widths, draw, draw_sensors, load_widths
 from brakelab.plant.sensor_errors import STANDARD
 
 DRAW = Path(__file__).parents[3] / "config" / "plant" / "draw.toml"
-SEEDS, MANY = range(80), range(300)
+SEEDS, MANY = range(80), range(150)
 WIDE, NOMINAL = load_widths(DRAW, "wide"), load_widths(DRAW, "nominal")
 
 Quantity = Callable[[NDArray[np.void], Any], NDArray[np.float64]]

@@ -375,7 +375,7 @@ def test_thousands_of_cycles_leave_no_memory_behind(bench):
     try:
         bench.run(2000)
         numba_before, blocks = rtsys.get_allocation_stats(), [sys.getallocatedblocks()]
-        for _ in range(10):
+        for _ in range(5):
             bench.run(5000)
             blocks.append(sys.getallocatedblocks())
         numba_after = rtsys.get_allocation_stats()
