@@ -7,20 +7,26 @@ from pathlib import Path
 import pytest
 
 
+WARM = [sys.executable, "-m", "brakelab.warm"]
+
+
+@pytest.fixture(scope="module")
+def warmed() -> None:
+    subprocess.run(WARM, capture_output=True, check=True)
+
+
 @pytest.mark.compiled
+@pytest.mark.usefixtures("warmed")
 def test_what_was_compiled_once_is_loaded_by_the_next_process() -> None:
-    runs = [
-        subprocess.run([sys.executable, "-m", "brakelab.warm"], capture_output=True, text=True, check=True)
-        for _ in range(2)
-    ]
-    assert runs[1].stdout.splitlines() == ["0 kernels compiled", "0 kernels of the laboratory compiled"]
+    again = subprocess.run(WARM, capture_output=True, text=True, check=True)
+    assert again.stdout.splitlines() == ["0 kernels compiled", "0 kernels of the laboratory compiled"]
 
 
 @pytest.mark.compiled
+@pytest.mark.usefixtures("warmed")
 @pytest.mark.parametrize("scenario", ["fade", "blending-40", "low-grip"])
 def test_a_first_drive_compiles_nothing(scenario: str, tmp_path: Path) -> None:
     """Other linings, motors and roads than the one that warming drives."""
-    subprocess.run([sys.executable, "-m", "brakelab.warm"], capture_output=True, check=True)
     brake_ecu = [sys.executable, "-m", "ecu.cli", "--verbose"]
     for line in (
         f"simulate {scenario} --config suv --out drive",
