@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-
 WARM = [sys.executable, "-m", "brakelab.warm"]
 
 

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import socket
 import subprocess
 import threading
 import time
@@ -28,6 +29,8 @@ from .xcp_master import Master, Wire
 
 ROOT = Path(__file__).parents[2]
 DBC = ROOT / "dbc" / "brake_ecu.dbc"
+ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tools")])}
+"""In which a child takes the modules of this checkout."""
 
 
 @contextmanager
@@ -146,6 +149,12 @@ def connect() -> Iterator[Callable[[str, int], Master]]:
             return stack.enter_context(closing(Master(Wire(kind, port)))).connect()
 
         yield start
+
+
+def free_port() -> int:
+    """A port of this machine that nobody has."""
+    with socket.create_server(("127.0.0.1", 0)) as one:
+        return int(one.getsockname()[1])
 
 
 def process_of(daemon: Daemon, module: str) -> int | None:

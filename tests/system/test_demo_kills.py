@@ -18,7 +18,7 @@ from ecu.contract.records import FRAME, new_record
 from ecu.contract.signals import CYCLE_NS
 from ecu.recording.store import open_store
 
-from .conftest import ROOT, demand_ids, priority
+from .conftest import ENVIRONMENT, demand_ids, priority
 
 pytestmark = pytest.mark.multicast
 
@@ -82,10 +82,9 @@ def runs(pid):
 
 @pytest.fixture
 def demo(tmp_path):
-    paths = os.pathsep.join([str(ROOT), str(ROOT / "tools")])
     with subprocess.Popen(
         [sys.executable, "-m", "ecu.cli", "demo", "--out", tmp_path],
-        env={**os.environ, "PYTHONPATH": paths},
+        env=ENVIRONMENT,
         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
     ) as process:  # fmt: skip
         yield process

@@ -20,7 +20,7 @@ from ecu.contract.records import output_vector
 from ecu.contract.signals import OUTPUT_COLUMNS
 from ecu.recording.recorder import read_recording
 
-from .conftest import ROOT
+from .conftest import ENVIRONMENT, ROOT
 
 pytestmark = pytest.mark.socketcan
 
@@ -51,8 +51,7 @@ def test_an_independent_log_gives_the_same_bits(daemon, witness, tmp_path, lost_
     unit.wait_for("ready")
     independent = witness()
     command = [sys.executable, "-m", "brakelab.rig.vehicle_node", scenario, "-i", "socketcan", "-c", "vcan0"]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tools")])}
-    with subprocess.Popen(command, env=environment, stdout=-1) as vehicle:
+    with subprocess.Popen(command, env=ENVIRONMENT, stdout=-1) as vehicle:
         assert vehicle.stdout is not None
         vehicle.stdout.readline()
         for seconds in held_up_s:

@@ -11,7 +11,7 @@ import pytest
 from brakelab.bench.play import Listener, write_log
 from brakelab.rig.live import Bus
 
-from .conftest import ROOT
+from .conftest import ENVIRONMENT
 
 GROUP = f"239.75.{os.getpid() >> 8 & 0xFF}.{os.getpid() & 0xFF}"  # a bus of this run's own
 BUSES = [
@@ -36,14 +36,13 @@ def listener(bus):
 
 
 def play(bus, log, speed):
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tools")])}
     command = [sys.executable, "-m", "ecu.cli", "play", str(log), "-i", bus.interface, "-c", bus.channel]
     return subprocess.Popen(
         [*command, "--speed", str(speed)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        env=environment,
+        env=ENVIRONMENT,
     )
 
 

@@ -11,7 +11,7 @@ from brakelab.rig.wire import lay_wire
 from brakelab.testing.daemon import PATIENCE_S
 from ecu.errors import UserError
 
-from .conftest import ROOT
+from .conftest import ENVIRONMENT
 
 GROUP = f"239.76.{os.getpid() >> 8 & 0xFF}.{os.getpid() & 0xFF}"
 # Imu frames are lost after the kill, which the standby has to notice.
@@ -46,11 +46,10 @@ def rig(tmp_path, *arguments, text=SCENARIO):
     """Run the rig on the scenario; return its rows by kind of fault, and the row of the scenario."""
     scenario = tmp_path / "drive.toml"
     scenario.write_text(text, "utf-8")
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tools")])}
     command = [sys.executable, "-m", "ecu.cli", "rig", scenario, "--config", "suv", "--seed", "1"]
     done = subprocess.run(
         [*command, "--out", tmp_path / "out", *arguments],
-        env=environment, capture_output=True, text=True, timeout=PATIENCE_S, check=False,
+        env=ENVIRONMENT, capture_output=True, text=True, timeout=PATIENCE_S, check=False,
     )  # fmt: skip
     assert done.returncode in ((0,) if "--lock-step" in arguments else (0, 1)), done.stderr
     print(done.stdout)

@@ -14,7 +14,7 @@ from brakelab.testing.daemon import wait_for
 from draw_watch import Browser, chromium
 from ecu.recording.recorder import read_recording
 
-from .conftest import ROOT
+from .conftest import ENVIRONMENT, ROOT
 
 pytestmark = pytest.mark.multicast
 
@@ -29,9 +29,7 @@ def watch(tmp_path):
 
     def start(*options):
         command = [sys.executable, "-m", "ecu.cli", "watch", GROUP, *options]
-        paths = os.pathsep.join([str(ROOT), str(ROOT / "tools")])
-        environment = {**os.environ, "PYTHONPATH": paths}
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=tmp_path, env=environment)
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=tmp_path, env=ENVIRONMENT)
         started.append(process)
         return process
 

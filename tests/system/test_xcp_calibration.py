@@ -17,8 +17,7 @@ from ecu.contract.signals import OUTPUT_COLUMNS
 from ecu.recording.recorder import read_recording
 from ecu.settings.config import load_config
 
-from .conftest import ROOT, process_of, unharmed
-from .test_xcp_udp import free_port
+from .conftest import ROOT, free_port, process_of, unharmed
 from .xcp_master import VARIABLES, CanWire, Master, Refused
 
 pytestmark = pytest.mark.multicast

@@ -18,7 +18,7 @@ from ecu.recording.recorder import read_recording
 from ecu.xcp.a2l import a2l_text
 from ecu.xcp.memory import EPK
 
-from .conftest import ROOT, process_of, unharmed
+from .conftest import ROOT, free_port, process_of, unharmed
 from .xcp_master import VARIABLES, CanWire, Master, Refused, Wire
 
 pytestmark = pytest.mark.multicast
@@ -26,12 +26,6 @@ pytestmark = pytest.mark.multicast
 GROUP = f"239.82.{os.getpid() >> 8 & 0xFF}.{os.getpid() & 0xFF}"
 DOUBLES = [name for name, (_, one) in VARIABLES.items() if one.kind == "f8" and one.length == 1]
 SIGNALS = [name for name in DOUBLES if not name.startswith("parameters")][:200]
-
-
-def free_port():
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return one.getsockname()[1]
 
 
 @pytest.fixture
