@@ -1,6 +1,8 @@
 """A request in doubt is not lowered: the table of replayed streams, at the inputs that `step` reads."""
 
+from collections.abc import Iterator
 from functools import cache
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -129,19 +131,18 @@ def duel(phase: int, lost: int, offset: float, deadline: float, seed: int, begin
 @pytest.mark.compiled
 @pytest.mark.parametrize("begin", [50, 60])  # before the sender loses frames, and with the first one
 @pytest.mark.parametrize("lost", range(6))
-@pytest.mark.parametrize("phase", range(15))
 @pytest.mark.requirement("REQ-PED-1")
-def test_a_replayed_release_never_lowers_the_demand(phase: int, lost: int, begin: int) -> None:
+def test_a_replayed_release_never_lowers_the_demand(lost: int, begin: int) -> None:
     """From the second frame on: the very first may come within the sender's own jitter, a cycle before it."""
-    for offset in (0.5, 2.0, 3.5, 5.0, 6.5, 8.0, 9.5):
+    for phase, offset in product(range(15), (0.5, 2.0, 3.5, 5.0, 6.5, 8.0, 9.5)):
         if begin == 60 and abs(offset - 10 * (phase == 1)) < 3.6 and phase < 2:
             continue  # in the place of a sender that is silent: it is the sender
         for deadline in (1.5, 9.2):
             inputs = duel(phase, lost, offset, deadline, 100 * phase + lost, begin)
             demand = np.delete(asked(inputs), (0, 1, begin))
-            assert demand.min() == pytest.approx(3.0), (offset, deadline)
+            assert demand.min() == pytest.approx(3.0), (phase, offset, deadline)
             reported = inputs["e2e_faults"] == E2E_REJECTIONS
-            assert not reported[:begin].any()
+            assert not reported[:begin].any(), (phase, offset, deadline)
             assert reported[begin + 25 :].all(), "reported after a quarter of a second at most"
 
 
@@ -345,39 +346,38 @@ SILENT = (0, 5, 7, 10, 20, 50)
 LEADS = (150, 50, 0, -2, -5)
 
 
+def gaps(silent: int, lead: int) -> Iterator[tuple[Gap, int, float]]:
+    """Yield gaps with every jump and jitter, each with the phases and offsets of streams beside it."""
+    for ahead, jitter in product((0, 3, 8), (1.0, 5.0)):
+        gap = Gap(silent, ahead, lead, jitter)
+        yield from ((gap, phase, offset) for phase, offset in gap.phases())
+
+
 @pytest.mark.compiled
-@pytest.mark.parametrize("jitter", [1.0, 5.0])
-@pytest.mark.parametrize("ahead", [0, 3, 8])
 @pytest.mark.parametrize("lead", LEADS)
 @pytest.mark.parametrize("silent", SILENT)
-def test_a_replayed_release_locks_no_pedal_out(silent: int, lead: int, ahead: int, jitter: float) -> None:
+def test_a_replayed_release_locks_no_pedal_out(silent: int, lead: int) -> None:
     """Behind the gap the driver brakes: within 0.2 s he is followed, or the request is not valid."""
-    gap = Gap(silent, ahead, lead, jitter)
-    for phase, offset in gap.phases():
+    for gap, phase, offset in gaps(silent, lead):
         position = gap.drive(PEDAL, PEDAL_FREE, phase, offset)[200 + silent + 20 :]
-        assert np.nanmin(position, initial=40.0) == pytest.approx(40.0, abs=0.5), (phase, offset)
-        if ahead == 0 or lead > 0:  # back on its grid, or beside a stream that is known
-            assert np.isfinite(position).all(), (phase, offset)
+        assert np.nanmin(position, initial=40.0) == pytest.approx(40.0, abs=0.5), (gap, phase, offset)
+        if gap.ahead == 0 or lead > 0:  # back on its grid, or beside a stream that is known
+            assert np.isfinite(position).all(), (gap, phase, offset)
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("jitter", [1.0, 5.0])
-@pytest.mark.parametrize("ahead", [0, 3, 8])
 @pytest.mark.parametrize("lead", LEADS)
 @pytest.mark.parametrize("silent", SILENT)
-def test_a_replayed_braking_is_followed_while_it_is_alone_and_a_second_longer(
-    silent: int, lead: int, ahead: int, jitter: float
-) -> None:
+def test_a_replayed_braking_is_followed_while_it_is_alone_and_a_second_longer(silent: int, lead: int) -> None:
     """Known beside the sender before the gap, it is not followed at all."""
-    gap = Gap(silent, ahead, lead, jitter)
-    for phase, offset in gap.phases():
+    for gap, phase, offset in gaps(silent, lead):
         braked = np.sum(gap.drive(PEDAL_FREE, PEDAL, phase, offset) > 1.0)
         if lead > 0:
-            assert braked <= (16 if jitter > 1.0 else 0), (phase, offset)
-        elif ahead == 0:
-            assert braked <= silent + 17, (phase, offset)
+            assert braked <= (16 if gap.jitter > 1.0 else 0), (gap, phase, offset)
+        elif gap.ahead == 0:
+            assert braked <= silent + 17, (gap, phase, offset)
         else:
-            assert braked <= silent + 117, (phase, offset)
+            assert braked <= silent + 117, (gap, phase, offset)
 
 
 @pytest.mark.parametrize("phase", [2, 7, 13])
