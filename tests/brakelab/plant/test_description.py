@@ -117,3 +117,14 @@ def test_an_engine_that_the_file_describes(tmp_path: Path) -> None:
     assert car["engine_ratio"].tolist() == [6.0, 3.0, *[0.0] * 8]
     assert car["engine_share"].tolist() == [0.5, 0.5, 0.0, 0.0]
     assert (car["engine_drag_torque"], car["engine_lowest_speed"]) == (30.0, 130.0)
+
+
+def test_a_hydraulic_unit_that_the_file_describes(tmp_path: Path) -> None:
+    unit = "[hydraulics]\nbuild_up = [0.003, 0.074, 0.15]\nrise_limit = 80.0"
+    path = tmp_path / "car.toml"
+    path.write_text((CONFIG / "suv.toml").read_text().replace("[hydraulics]", unit))
+    (tmp_path / "linings.toml").write_text((CONFIG / "linings.toml").read_text())
+    car, usual = nominal(load_plant(path))[0], nominal(load_plant(CONFIG / "suv.toml"))[0]
+    assert car["build_up"].tolist() == [0.003, 0.074, 0.15]
+    assert car["release"].tolist() == usual["release"].tolist()
+    assert (car["rise_limit"], car["fall_limit"], usual["rise_limit"]) == (80e5, float("inf"), float("inf"))

@@ -18,7 +18,12 @@ BAR = 1e5
 
 
 def respond(
-    demand_bar: NDArray[np.float64], start_bar: float = 0.0, slope: float = 0.0, known: float = 0.0
+    demand_bar: NDArray[np.float64],
+    start_bar: float = 0.0,
+    slope: float = 0.0,
+    known: float = 0.0,
+    rise_limit: float = np.inf,
+    fall_limit: float = np.inf,
 ) -> NDArray[np.float64]:
     """Return the pressure [bar] after every step of a demand, from rest at `start_bar`."""
     params, state = new_record(PARAMS), new_record(STATE)
@@ -26,6 +31,7 @@ def respond(
     params["offset_start"] = 60 * BAR
     params["offset_slope"], params["offset_known"] = slope, known
     params["build_up"], params["release"] = BUILD_UP, RELEASE
+    params["rise_limit"], params["fall_limit"] = rise_limit * BAR, fall_limit * BAR
     state["pressure"] = state["turning_point"] = start_bar * BAR
     state["demand_history"] = start_bar * BAR
     pressure = []
@@ -54,6 +60,15 @@ def test_step_response_is_the_published_transfer_function(
     _, unit = signal.step(([1.0], denominator), T=np.arange(0, 0.5, DT / 4))
     expected = start + (end - start) * np.interp(t, np.arange(0, 0.5, DT / 4), unit, left=0.0)
     assert np.max(np.abs(found - expected)) < 0.005 * abs(end - start)
+
+
+@pytest.mark.parametrize(("start", "end", "rate"), [(0.0, 80.0, 80.0), (100.0, 0.0, 200.0)])
+def test_a_slow_unit_moves_at_its_rate_and_arrives(start: float, end: float, rate: float) -> None:
+    found = respond(np.full(2000, end), start, rise_limit=80.0, fall_limit=200.0)
+    slope = np.abs(np.diff(found)) / DT
+    assert slope.max() == pytest.approx(rate)
+    assert np.median(slope[slope > 0.5 * rate]) == pytest.approx(rate)
+    assert found[-1] == pytest.approx(end, abs=0.1)
 
 
 def test_overshoot_of_the_build_up_is_kept() -> None:

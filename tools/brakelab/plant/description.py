@@ -117,12 +117,21 @@ class Brake(Section):
     push_out_pressure: NotNegative  # bar
 
 
+LONGEST_DEAD_TIME: Final = 0.24  # s, that the history holds for every draw
+Response = tuple[Positive, Positive, Annotated[float, Field(ge=0.0, le=LONGEST_DEAD_TIME)]]
+"""Inertia [s^2], damping [s] and dead time [s], as (A.17)."""
+
+
 class Hydraulics(Section):
     pressure_limit: Positive  # bar
     fallback_friction: Positive
     offset_start: NotNegative = 60.0  # bar. Assumption; see hydraulics.py
     offset_slope: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.04  # Assumption: 2.8 bar at 130 bar
     offset_known: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.04  # as the thesis's inverse map: all of it
+    build_up: Response = BUILD_UP
+    release: Response = RELEASE
+    rise_limit: Positive = np.inf  # bar/s
+    fall_limit: Positive = np.inf
 
 
 class Motor(Section):
@@ -286,7 +295,8 @@ def nominal(plant: Plant) -> RecordArray:
     if suspension is not None:
         _set_suspension(car, suspension)
     hydraulics = plant.vehicle.hydraulics
-    car["build_up"], car["release"] = BUILD_UP, RELEASE
+    car["build_up"], car["release"] = hydraulics.build_up, hydraulics.release
+    car["rise_limit"], car["fall_limit"] = 1e5 * hydraulics.rise_limit, 1e5 * hydraulics.fall_limit
     car["pressure_limit"] = 1e5 * hydraulics.pressure_limit
     car["offset_start"] = 1e5 * hydraulics.offset_start
     car["offset_slope"], car["offset_known"] = hydraulics.offset_slope, hydraulics.offset_known

@@ -6,8 +6,8 @@ that a change of model is continuous. Input: the smaller of the demands 15 ms an
 after the longer, a fall after the shorter dead time. The direction of that input chooses the model; it has
 turned when it is HYSTERESIS away from its last extreme. The unit settles below high demands (offset map after
 Figure A.10a, straight from a starting pressure on; assumption, the figure has no numbers) and its controller
-inverts its own map; an exact inverse cancels the offset. The accumulator limits the pressure. Discretised by
-the trapezoidal rule (stable at every step, second order).
+inverts its own map; an exact inverse cancels the offset. The accumulator limits the pressure, a pump or the
+valves its rate. Discretised by the trapezoidal rule (stable at every step, second order).
 """
 
 from typing import Final
@@ -76,6 +76,10 @@ def advance_pressure(params: Record, state: Record, dt: float) -> None:
         pressure, rate = second_order(
             state.pressure[wheel], state.pressure_rate[wheel], demand, model[INERTIA], model[DAMPING], dt
         )
+        limited = min(max(rate, -params.fall_limit), params.rise_limit)
+        if limited != rate:
+            pressure = state.pressure[wheel] + 0.5 * dt * (state.pressure_rate[wheel] + limited)
+            rate = limited
         if pressure < 0.0 or pressure > params.pressure_limit[wheel]:
             pressure = min(max(pressure, 0.0), params.pressure_limit[wheel])
             rate = 0.0

@@ -15,7 +15,7 @@ from brakelab.plant.wear import WEAR_ROW
 RecordArray = NDArray[np.void]
 
 GRAVITY: Final = 9.81  # m/s^2
-HISTORY: Final = 80  # demand samples in the history: 40 ms at steps of 0.5 ms
+HISTORY: Final = 640  # demand samples in the history: 0.32 s at steps of 0.5 ms
 LOOK_BACK: Final = 64  # cycles in a sensor's history: 0.64 s
 DAMPER_KNOTS: Final = 7  # of a damper's force over speed
 GEARS: Final = 10  # of a gearbox, at most
@@ -58,6 +58,8 @@ PARAMS: Final = np.dtype(
         ("offset_known", "f8"),  # -, slope that the unit's inverse map corrects
         ("build_up", "f8", (3,)),  # s^2, s, dead time s (A.17)
         ("release", "f8", (3,)),  # likewise (A.18)
+        ("rise_limit", "f8"),  # Pa/s, of the pressure
+        ("fall_limit", "f8"),
         ("fallback_gain", "f8"),  # Pa per m/s^2, of the hydraulics without the ECU
         ("friction_law", "i8", (4,)),  # number in friction/laws.py
         ("friction_row", "f8", (4, ROW)),  # the law's numbers

@@ -36,6 +36,7 @@ def respond(start: float, end: float) -> NDArray[np.float64]:
     params, state = new_record(PARAMS), new_record(STATE)
     params["pressure_limit"] = 180.0 * BAR
     params["build_up"], params["release"] = BUILD_UP, RELEASE
+    params["rise_limit"] = params["fall_limit"] = np.inf
     state["pressure"] = state["turning_point"] = state["demand_history"] = start * BAR
     pressure = np.empty(round(HOLD / DT))
     for place in range(len(pressure)):
