@@ -10,7 +10,6 @@ import numpy as np
 from cantools.database import Message
 
 from brakelab.plant.cycle import DEMAND_TIMEOUT
-from ecu.algorithm import hydraulics
 from ecu.algorithm.control import demand, mode
 from ecu.bus import e2e, link, sequence
 from ecu.bus.database import attribute, load_database
@@ -26,6 +25,7 @@ from ecu.runtime.cycle import FAREWELLS
 from ecu.runtime.loop import GIVEN_UP_NS
 from ecu.runtime.prepare import LISTEN_S
 from ecu.runtime.standby import SILENCE_NS
+from ecu.settings.hydraulics import BUILD_UP, RELEASE
 
 ROOT: Final = Path(__file__).parent.parent
 DBC: Final = ROOT / "dbc" / "brake_ecu.dbc"
@@ -200,7 +200,7 @@ and no automated demand is left, or until `accelerator_position` passes {demand.
 
 
 def _unit() -> str:
-    (a_rise, b_rise), (a_fall, b_fall) = hydraulics.BUILD_UP, hydraulics.RELEASE
+    rise, fall = BUILD_UP, RELEASE
     return f"""
 ## The hydraulic unit
 
@@ -210,9 +210,9 @@ simulated car. The ECU expects pressures to follow by
 
     a p'' + b p' + p = demand
 
-with a = {a_rise:g} s², b = {b_rise:g} s after a dead time of 25 ms for a rise,
-and a = {a_fall:g} s², b = {b_fall:g} s after 15 ms for a fall. Where sensors disagree
-for long, they count alone.
+with a = {rise.inertia:g} s², b = {rise.lag:g} s after a dead time of {1e3 * rise.dead_time:.0f} ms for a rise,
+and a = {fall.inertia:g} s², b = {fall.lag:g} s after {1e3 * fall.dead_time:.0f} ms for a fall, or as `[hydraulics]` of
+CONFIG has it. Where sensors disagree for long, they count alone.
 
 ## Over UDP multicast
 

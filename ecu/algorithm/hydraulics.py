@@ -1,11 +1,12 @@
 """Calliper pressures: the hydraulics' response to the demands sent, corrected by the sensors.
 
-Model. The demands sent, after the dead time of the hydraulics (A.17, A.18: 26 ms for a rise, 15 ms for a
-fall; here 25 and 15, half cycles), drive a second-order pressure,
+Model. The demands sent, after the dead time of the hydraulics for a rise and for a fall (by default A.17,
+A.18: 26 and 15 ms; here in half cycles), drive a second-order pressure,
 
-    inertia p'' + damping p' + p = min(rise, fall)
+    inertia p'' + lag p' + p = min(rise, fall)        p' within the limits of the unit, where it has any
 
-by the trapezoidal rule. The dead time is longer than a cycle, so the coming one is known already.
+by the trapezoidal rule. No dead time is shorter than a cycle, so the coming one is known already. Where the
+rise is the sooner of both, the larger counts.
 
 The sensor's noise (Table 4.1: 1.8 bar) is some 50 N m at a front wheel and multiplies the unknown friction;
 only averaging over time reduces it. Where the hydraulics follow the demand, the pressure is predictable and
@@ -19,13 +20,17 @@ import numpy as np
 
 from ecu.algorithm.inputs import fresh
 from ecu.algorithm.lag import lag_gain
-from ecu.contract.params import BAR
+from ecu.contract.params import BAR, FALL, RISE
 from ecu.contract.signals import CALLIPER_PRESSURE, CYCLE_NS
 from ecu.jit import Record, kernel
 
+LONGEST_DEAD_TIME = 0.3  # s
+CYCLE = 1e-9 * CYCLE_NS
+KEPT = round(LONGEST_DEAD_TIME / CYCLE) + 1  # demands
+
 HYDRAULICS_STATE = np.dtype(
     [
-        ("demand", "f8", (3, 4)),  # of the last cycles [bar], the newest in row 0
+        ("history", "f8", (KEPT, 4)),  # demands of the last cycles [bar], the newest in row 0
         ("model", "f8", (4,)),  # pressure by the demands alone [bar]
         ("rate", "f8", (4,)),  # bar/s
         ("value", "f8", (4,)),  # the same pressure, corrected by the sensor [bar]
@@ -37,9 +42,6 @@ HYDRAULICS_STATE = np.dtype(
     align=True,
 )
 
-BUILD_UP = (0.00075, 0.037)  # s^2, s (A.17)
-RELEASE = (0.00021, 0.045)  # s^2, s (A.18)
-CYCLE = 1e-9 * CYCLE_NS
 LONGEST_GAP = 100  # cycles
 WALK = 0.1  # bar/sqrt(s)
 SHARE = 0.15  # of a change, one standard deviation
@@ -50,22 +52,34 @@ AGREED_S = 0.3
 
 
 @kernel
-def _advance_half_cycle(state: Record, i: int, target: float) -> None:
-    inertia, damping = RELEASE if target < state.model[i] else BUILD_UP
+def _half_cycles(dead_time: float) -> int:
+    return min(max(int(2.0 * dead_time / CYCLE + 0.5), 2), 2 * KEPT - 2)
+
+
+@kernel
+def _advance_half_cycle(params: Record, state: Record, i: int, target: float) -> None:
+    direction = FALL if target < state.model[i] else RISE
+    inertia, lag = params.pressure_inertia[direction], params.pressure_lag[direction]
     half = 0.25 * CYCLE
-    weight = half * (damping + half) / inertia
+    weight = half * (lag + half) / inertia
     pull = 2.0 * half / inertia * (target - state.model[i])
     rate = (state.rate[i] * (1.0 - weight) + pull) / (1.0 + weight)
+    rate = min(max(rate, -params.pressure_rate[FALL]), params.pressure_rate[RISE])
     state.model[i] += half * (state.rate[i] + rate)
     state.rate[i] = rate
 
 
 @kernel
-def _advance(state: Record, i: int, sent: float) -> None:
-    demand, before = state.demand, state.model[i]
-    demand[2, i], demand[1, i], demand[0, i] = demand[1, i], demand[0, i], sent
-    _advance_half_cycle(state, i, min(demand[2, i], demand[1, i]))
-    _advance_half_cycle(state, i, min(demand[1, i], demand[0, i]))
+def _advance(params: Record, state: Record, i: int, sent: float) -> None:
+    demand, before = state.history, state.model[i]
+    rising, falling = _half_cycles(params.dead_time[RISE]), _half_cycles(params.dead_time[FALL])
+    for k in range(KEPT - 1, 0, -1):
+        demand[k, i] = demand[k - 1, i]
+    demand[0, i] = sent
+    for passed in (1, 2):
+        rise, fall = demand[(rising - passed) // 2, i], demand[(falling - passed) // 2, i]
+        target = min(rise, fall) if rising >= falling else max(rise, fall)
+        _advance_half_cycle(params, state, i, target)
     change = state.model[i] - before
     state.value[i] += change
     state.variance[i] += WALK**2 * CYCLE + (SHARE * change) ** 2
@@ -73,10 +87,10 @@ def _advance(state: Record, i: int, sent: float) -> None:
 
 
 @kernel
-def advance_pressures(state: Record, sent: Record) -> None:
+def advance_pressures(params: Record, state: Record, sent: Record) -> None:
     """Move the pressures on by the coming cycle; `sent` [Pa], shape (4,): the demands of the last one."""
     for i in range(4):
-        _advance(state, i, sent[i] / BAR)
+        _advance(params, state, i, sent[i] / BAR)
 
 
 @kernel
@@ -116,7 +130,7 @@ def correct_pressures(
     missed = min(max(round(dt / CYCLE), 1), LONGEST_GAP) - 1
     for i in range(4):
         for _ in range(missed):
-            _advance(state, i, sent[i] / BAR)
+            _advance(params, state, i, sent[i] / BAR)
         place = CALLIPER_PRESSURE + i
         if fresh(inputs, place):
             _correct(state, i, inputs.value[place] - zero[i], params.sigma_pressure / BAR, dt)

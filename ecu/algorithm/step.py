@@ -311,7 +311,7 @@ def _control(p: Record, s: Record, u: Record, dt: float) -> float:
         lean(p, s.cleaner, torque, allowed, s.discs.temperature, share, e.mass, decel, straight, dt)
     confirm_friction(p, s.control.confirmed, e, s.control.used, s.accel_error.wheels.offset, decel, calm, dt)
     follow_friction(p, s.control, e, dt)
-    advance_pressures(s.hydraulics, s.limiter.pressure)
+    advance_pressures(p, s.hydraulics, s.limiter.pressure)
     update_motors(p, s.blending, u, s.guard.capped, e.speed, decel, dt)
     replace_failed(p, s.replacement, s.failed_brakes, s.distribution, allowed, decel, backwards, dt)
     share_torque(p, s.blending, torque, dt)

@@ -25,6 +25,7 @@ RATE_NODES: Final = 81  # of the shares that Annex 5 admits
 RATE_STEP: Final = 0.01  # of the braking rate z, from 0 on
 COMPENSATIONS: Final = ("second-order", "inverse", "off")
 SECOND_ORDER, INVERSE, OFF = range(3)
+RISE, FALL = range(2)
 
 PARAMS: Final = np.dtype(
     [
@@ -88,6 +89,12 @@ PARAMS: Final = np.dtype(
         ("airborne_share", "f8", (4,)),  # share of pad wear emitted as particles up to 10 um
         ("airborne_low", "f8", (4,)),  # the least and the most that it may be
         ("airborne_high", "f8", (4,)),
+        # hydraulics, see hydraulics.py: for a rise and a fall
+        ("dead_time", "f8", (2,)),  # s
+        ("pressure_inertia", "f8", (2,)),  # s^2
+        ("pressure_lag", "f8", (2,)),  # s
+        ("pressure_rate", "f8", (2,)),  # greatest, bar/s
+        ("slowness", "f8"),  # lateness of a rise beside that of A.17
         # sensors
         ("sigma_wheel_speed", "f8"),  # rad/s
         ("sigma_accel", "f8"),  # m/s^2

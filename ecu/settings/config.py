@@ -32,6 +32,7 @@ from ecu.errors import UserError
 from ecu.settings.annex3 import annex_3_violation
 from ecu.settings.annex5 import annex_5_violation
 from ecu.settings.dust import set_dust, set_dust_version
+from ecu.settings.hydraulics import set_hydraulics
 from ecu.settings.lining_share import set_lining_share
 from ecu.settings.pad import set_pad
 from ecu.settings.resources import shipped_in
@@ -218,6 +219,7 @@ def new_params(config: Config) -> RecordArray:
     for name in ("pedal_position", "pedal_decel"):
         points = getattr(control, name)
         row[name] = points + points[-1:] * (PEDAL_POINTS - len(points))
+    set_hydraulics(row, config.hydraulics)
     row["fade_speed"] = config.blending.fade_speed
     row["blending"] = np.repeat((config.blending.front, config.blending.rear), 2)
     heaviest = max(load.mass for load in vehicle.loads())

@@ -11,6 +11,7 @@ from ecu.contract.params import PEDAL_POINTS
 from ecu.settings.annex3 import GREATEST_PRESSURE
 from ecu.settings.annex5 import Load
 from ecu.settings.dust import Dust
+from ecu.settings.hydraulics import Hydraulics
 from ecu.settings.pad import Pad
 from ecu.settings.toml_file import Section, Unit
 
@@ -278,6 +279,8 @@ class Config(Section):
     """Estimation of friction."""
     control: Control
     """From pedal to pressure."""
+    hydraulics: Hydraulics = Hydraulics()
+    """From pressure demand to pressure."""
     blending: Blending = Blending()
     """Motors and friction brakes."""
 

@@ -46,9 +46,9 @@ BLENDING_STATE = np.dtype(
     align=True,
 )
 
-AHEAD = 0.12  # s: dead time and lag of the hydraulics, and a margin for the motor
+AHEAD = 0.12  # s: dead time and lag of usual hydraulics, and a margin for the motor
 RATE_GAIN = 0.5  # weight of a new sample in a rate
-RISE = 2000.0  # N m/s, of the planned torque
+TAKEN = 2000.0  # N m/s, rise of the planned torque
 FADE = 6000.0  # N m/s, of the demand to a motor that has left the plan
 LATER, LATER_S = 0.16, 0.06  # -, s: settles a step of (A.17) within 1 % in 0.11 s instead of 0.18 s
 OLDEST_S = 0.05  # of a limit or torque
@@ -74,7 +74,7 @@ def _watch_motor(state: Record, inputs: Record, i: int, dt: float) -> None:
 
 
 @kernel
-def _follow_limit(state: Record, inputs: Record, fading: float, i: int, dt: float) -> None:
+def _follow_limit(params: Record, state: Record, inputs: Record, fading: float, i: int, dt: float) -> None:
     """Update the motor's limit; `fading`: share that the fade at low speed will leave of it."""
     limit: float = inputs.value[MOTOR_LIMIT + i]
     if fresh(inputs, MOTOR_LIMIT + i):
@@ -82,8 +82,8 @@ def _follow_limit(state: Record, inputs: Record, fading: float, i: int, dt: floa
         state.fall[i] = max(fall, state.fall[i] + RATE_GAIN * (fall - state.fall[i]))
         state.limit[i] = limit
     state.ceiling[i] = max(limit - dt * state.fall[i], 0.0)
-    ahead = max(min(limit - AHEAD * state.fall[i], fading * limit), 0.0)
-    state.allowed[i] = min(ahead, state.allowed[i] + RISE * dt)
+    ahead = max(min(limit - AHEAD * params.slowness * state.fall[i], fading * limit), 0.0)
+    state.allowed[i] = min(ahead, state.allowed[i] + TAKEN * dt)
 
 
 @kernel
@@ -91,7 +91,7 @@ def _fading(params: Record, speed: float, decel: float) -> float:
     """Return the share left of a motor's present limit when it fades below `fade_speed`."""
     if not (params.fade_speed > 0.0 and speed > params.fade_speed and decel > 0.0):
         return 1.0
-    return min(max(speed - AHEAD * decel, 0.0) / params.fade_speed, 1.0)
+    return min(max(speed - AHEAD * params.slowness * decel, 0.0) / params.fade_speed, 1.0)
 
 
 @kernel
@@ -123,7 +123,7 @@ def update_motors(
         if forbidden or guarded[i]:
             state.ceiling[i] = state.allowed[i] = 0.0
         elif known and not state.lost[i]:
-            _follow_limit(state, inputs, fading, i, dt)
+            _follow_limit(params, state, inputs, fading, i, dt)
         else:
             if usable(inputs, MOTOR_LIMIT + i):
                 state.ceiling[i] = min(state.ceiling[i], value[MOTOR_LIMIT + i])
@@ -146,10 +146,10 @@ def share_torque(params: Record, state: Record, torque: Record, dt: float) -> No
         rise = max((demand - state.torque[i]) / dt, 0.0) if dt > 0.0 else 0.0
         state.rise[i] += RATE_GAIN * (rise - state.rise[i])
         state.torque[i] = demand
-        allowed = max(state.allowed[i] - AHEAD * state.rise[i], 0.0)
+        allowed = max(state.allowed[i] - AHEAD * params.slowness * state.rise[i], 0.0)
         plan = min(params.blending[i] * demand, allowed)
         later = LATER * max(state.slow[i] - plan, 0.0)
-        state.slow[i] += lag_gain(dt, LATER_S) * (plan - state.slow[i])
+        state.slow[i] += lag_gain(dt, LATER_S * params.slowness) * (plan - state.slow[i])
         state.plan[i] = min(plan + later, demand)
         state.lining[i] = torque[i] - state.plan[i]
         if demand == 0.0:

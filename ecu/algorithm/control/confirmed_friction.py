@@ -45,7 +45,7 @@ CONFIRMED_STATE = np.dtype(
 LEAST_SPEED = 3.0  # m/s: a car that stands does not decelerate
 LEAST_DECEL = 2.0  # m/s^2: at less the accelerometer's zero counts for too much
 LAG, STEADY, SETTLED_S = 0.15, 0.05, 0.3  # s, of the demand, s: hydraulics and tyres have followed
-HYDRAULIC_LAG = 0.1  # s, dead time, lag and tyres
+USUAL_LATENESS, TYRES = 0.063, 0.037  # s: dead time and lag (A.17), tyres
 LEAST_SHARE, AGREES, CONFIRMS = 0.92, 0.95, 0.93
 TAKE, WIDTH = 10.0, 0.04  # 1/s at an error of `WIDTH`
 FIRST_WIDTH = 0.4  # until a friction was confirmed: no more than hydraulics and car can follow
@@ -86,14 +86,14 @@ def confirm_friction(
     gain = lag_gain(dt, LAG)
     state.asked += gain * (decel - state.asked)
     state.given += gain * (-estimate.accel_x - resistance - state.given)
-    state.pressed += lag_gain(dt, HYDRAULIC_LAG) * (state.in_use - state.pressed)
+    state.pressed += lag_gain(dt, USUAL_LATENESS * params.slowness + TYRES) * (state.in_use - state.pressed)
     state.followed += gain * (state.pressed - state.followed)
     moves = estimate.speed > LEAST_SPEED and estimate.measured != 0
     steady = calm and moves and abs(decel - state.asked) < STEADY * decel
     state.steady_s = state.steady_s + dt if steady else 0.0
     if estimate.measured == 0:  # left out: nobody confirms a rise, and nothing is taken on its word
         state.back += min(max(1.0 - state.back, -TAKE * dt), TAKE * dt)
-    if state.steady_s < SETTLED_S:
+    if state.steady_s < SETTLED_S * max(params.slowness, 1.0):
         return
     drifted = accel_offset - state.usual
     if state.back >= 1.0:

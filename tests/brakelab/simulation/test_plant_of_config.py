@@ -11,6 +11,7 @@ from brakelab.simulation.plant_of_config import AS_CONFIG
 from brakelab.simulation.scenario import load_scenario
 from brakelab.simulation.scenario_car import other_car, with_draw, with_plant_for
 from ecu.settings.config import Config, load_config
+from ecu.settings.hydraulics import Hydraulics
 from ecu.settings.resources import resource
 
 STOP = load_scenario(resource("config/scenarios/stop-1.toml"))
@@ -51,3 +52,13 @@ def test_it_stops_as_asked(base: str, tmp_path: Path) -> None:
     achieved = -float(np.mean(np.gradient(speed, 0.01)[braking]))
     print(f"{achieved:.2f} m/s^2 of 4")
     assert achieved == pytest.approx(4.0, abs=0.4)
+
+
+def test_its_hydraulic_unit_is_the_configured_one(tmp_path: Path) -> None:
+    unit = Hydraulics(dead_time_rise=0.15, lag_fall=0.09, rise_limit=80.0)
+    config = hatchback().model_copy(update={"hydraulics": unit})
+    driven = with_plant_for(STOP, AS_CONFIG, config, tmp_path)
+    car = nominal(load_plant(Path(driven.plant)))[0]
+    assert car["build_up"] == pytest.approx([0.00075, 0.037, 0.15])
+    assert car["release"] == pytest.approx([4 * 0.00021, 0.09, 0.015])
+    assert (car["rise_limit"], car["fall_limit"]) == (80e5, 18000e5)

@@ -16,6 +16,7 @@ from ecu.algorithm.hydraulics import (
 )
 from ecu.contract.signals import CALLIPER_PRESSURE
 from ecu.jit import kernel
+from ecu.settings.hydraulics import Hydraulics, set_hydraulics
 
 BAR = 1e5
 DT = 0.01
@@ -52,7 +53,7 @@ class Callipers:
 
     def start(self, bar: float) -> None:
         self.state = np.zeros(1, HYDRAULICS_STATE)[0]
-        self.state["demand"] = self.state["model"] = self.state["value"] = bar
+        self.state["history"] = self.state["model"] = self.state["value"] = bar
 
     def correct(self, sent: float, measured: float, dt: float = DT) -> tuple[float, float, bool]:
         """Take in a sample [bar], NaN: none; return value, variance and whether it follows the demand."""
@@ -67,7 +68,7 @@ class Callipers:
     def cycle(self, sent: float, measured: float, dt: float = DT) -> float:
         """Take in the demand sent in the last cycle [bar] and a sample; return the pressure soon [bar]."""
         self.correct(sent, measured, dt)
-        advance_pressures(self.state, np.full(4, sent * BAR))
+        advance_pressures(self.p, self.state, np.full(4, sent * BAR))
         return float(self.state["value"][0])
 
 
@@ -99,6 +100,46 @@ def test_the_pressure_is_known_a_cycle_ahead(callipers, name: str, noise: float 
     # 25 ms instead of 26, half cycles instead of a continuum; what noise adds
     bound = (1.3 if name == "step up" else 0.3) + (0.6 if noise else 0.0)
     assert np.max(np.abs(error)) < bound, np.round(error, 2)
+
+
+UNITS = {
+    "pump of a stability control": Hydraulics(
+        dead_time_rise=0.15, lag_rise=0.074, dead_time_fall=0.03, lag_fall=0.06
+    ),
+    "one box": Hydraulics(dead_time_rise=0.015, lag_rise=0.06, dead_time_fall=0.01, lag_fall=0.03),
+    "falls later than it rises": Hydraulics(dead_time_rise=0.02, dead_time_fall=0.12),
+    "the latest": Hydraulics(dead_time_rise=0.3, dead_time_fall=0.3, lag_rise=0.3, lag_fall=0.3),
+}
+
+
+@pytest.mark.parametrize("name", UNITS)
+@pytest.mark.parametrize("falls", [False, True], ids=["rise", "fall"])
+def test_a_unit_of_another_car_is_known_a_cycle_ahead(callipers, name: str, falls: bool) -> None:
+    """Dead time and lag are CONFIG's, the damping of a step that of (A.17, A.18)."""
+    unit = UNITS[name]
+    set_hydraulics(callipers.p, unit)
+    lag, dead = (unit.lag_fall, unit.dead_time_fall) if falls else (unit.lag_rise, unit.dead_time_rise)
+    inertia, usual, _ = RELEASE if falls else BUILD_UP
+    up = np.clip(10.0 + 0.5 * (np.arange(300) - 5), 10.0, 40.0)
+    demand = 50.0 - up if falls else up
+    true = hydraulics((inertia * (lag / usual) ** 2, lag, dead), demand)
+    for _ in range(100):
+        callipers.cycle(true[0], math.nan)
+    callipers.start(true[0])
+    error = [callipers.cycle(demand[k - 1], math.nan) - true[k + 1] for k in range(1, len(true) - 1)]
+    arrived = int(np.argmax(np.abs(true - true[-1]) < 0.5))  # then it overshoots
+    assert np.max(np.abs(error[:arrived])) < 0.2, np.round(error, 2)
+
+
+def test_a_unit_of_limited_rate_moves_at_that_rate(callipers) -> None:
+    set_hydraulics(callipers.p, Hydraulics(rise_limit=80.0, fall_limit=200.0))
+    up = np.array([callipers.cycle(60.0, math.nan) for _ in range(150)])
+    down = np.array([callipers.cycle(0.0, math.nan) for _ in range(150)])
+    assert np.diff(up).max() == pytest.approx(0.8)
+    assert up[55] == pytest.approx(80.0 * (0.56 - 0.025) - 80.0 * 0.01, abs=3.0)
+    assert up[-1] == pytest.approx(60.0, abs=0.1)
+    assert np.diff(down).min() == pytest.approx(-2.0)
+    assert down[-1] == pytest.approx(0.0, abs=0.1)
 
 
 def test_noise_of_the_sensor_is_not_felt(callipers) -> None:
@@ -155,7 +196,7 @@ def follow_cycles(params, state, inputs, zero, failed, sent, samples, rows):
         correct_pressures(params, state, inputs[0], pressures, zero, failed, DT)
         rows[k, 0], rows[k, 1] = state.value[0], state.variance[0]
         rows[k, 2] = follows_demand(params, state, 0)
-        advance_pressures(state, pressures)
+        advance_pressures(params, state, pressures)
 
 
 def rms(errors) -> float:

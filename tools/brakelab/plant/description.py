@@ -117,7 +117,7 @@ class Brake(Section):
     push_out_pressure: NotNegative  # bar
 
 
-LONGEST_DEAD_TIME: Final = 0.24  # s, that the history holds for every draw
+LONGEST_DEAD_TIME: Final = 0.3  # s, that the history holds for every draw
 Response = tuple[Positive, Positive, Annotated[float, Field(ge=0.0, le=LONGEST_DEAD_TIME)]]
 """Inertia [s^2], damping [s] and dead time [s], as (A.17)."""
 

@@ -15,7 +15,7 @@ from brakelab.plant.wear import WEAR_ROW
 RecordArray = NDArray[np.void]
 
 GRAVITY: Final = 9.81  # m/s^2
-HISTORY: Final = 640  # demand samples in the history: 0.32 s at steps of 0.5 ms
+HISTORY: Final = 800  # demand samples in the history: 0.4 s at steps of 0.5 ms
 LOOK_BACK: Final = 64  # cycles in a sensor's history: 0.64 s
 DAMPER_KNOTS: Final = 7  # of a damper's force over speed
 GEARS: Final = 10  # of a gearbox, at most

@@ -78,6 +78,7 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "implied",
         "reported",
         "reported_s",
+        "history",
     ),
 }
 

@@ -9,10 +9,12 @@ import math
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 import tomlkit
 
 from ecu.errors import UserError
-from ecu.settings.config import Config
+from ecu.settings.config import Config, new_params
+from ecu.settings.hydraulics import Hydraulics
 
 AS_CONFIG: Final = "as-config"
 _BY_MASS: Final = {
@@ -70,7 +72,7 @@ def _values(config: Config, base: Any) -> dict[str, dict[str, Any]]:
             "rolling_resistance": car.rolling_resistance,
             **{name: mean(name) for name in ("vertical_stiffness", "wheel_inertia", "slip_stiffness")},
         },
-        "hydraulics": {"fallback_friction": mean("mu_nominal")},
+        "hydraulics": {"fallback_friction": mean("mu_nominal"), **_unit(config)},
     }
     for name, axle in zip(("brake_front", "brake_rear"), axles, strict=True):
         values[name] = {
@@ -85,6 +87,17 @@ def _values(config: Config, base: Any) -> dict[str, dict[str, Any]]:
         given = {key: base[table][key] for key in keys if key in base.get(table, {})}
         values[table] = {key: _scaled(value, heavier) for key, value in given.items()}
     return {table: of_table for table, of_table in values.items() if of_table}
+
+
+def _unit(config: Config) -> dict[str, Any]:
+    """Return the hydraulic unit where CONFIG has one."""
+    unit, params = config.hydraulics, new_params(config)[0]
+    if unit == Hydraulics():
+        return {}
+    answers = np.stack([params["pressure_inertia"], params["pressure_lag"], params["dead_time"]])
+    build_up, release = answers.T.tolist()
+    limits = {"rise_limit": unit.rise_limit, "fall_limit": unit.fall_limit}
+    return {"build_up": build_up, "release": release, **limits}
 
 
 def _scaled(value: Any, factor: float) -> Any:

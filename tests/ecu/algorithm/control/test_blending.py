@@ -101,6 +101,17 @@ def test_a_limit_that_falls_is_planned_for_a_tenth_of_a_second_before(params, fe
     assert motors.state["lining"][0] <= 800.0 - (limit - 0.15 * rate)
 
 
+@pytest.mark.parametrize("slowness", [0.5, 2.0, 4.0])
+def test_the_slower_the_hydraulics_the_earlier_the_plan(params, feed, slowness: float) -> None:
+    params["slowness"] = slowness
+    motors = Motors(params, feed, 1.0, 500.0)
+    for k in range(1, 46):  # 1000 N m/s
+        motors.cycle(10.0 * k)
+    planned = max(500.0 - 0.12 * slowness * 1000.0, 0.0)
+    assert motors.state["plan"][0] <= planned + 0.2 * 120.0 * slowness
+    assert motors.state["lining"][0] == pytest.approx(450.0 - planned, rel=0.06)
+
+
 def test_the_fade_at_low_speed_is_planned_for_before_the_limit_falls(params, feed) -> None:
     motors = Motors(params, feed, 1.0, 900.0)
     motors.settle(900.0)

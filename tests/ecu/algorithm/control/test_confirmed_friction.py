@@ -17,7 +17,8 @@ DT, MU, DECEL = 0.01, 0.45, 4.0
 class Car:
     """Brakes with 4 m/s^2; friction in use decides how hard, by linings whose true friction may change."""
 
-    def __init__(self, params) -> None:
+    def __init__(self, params, lag: float = 0.1) -> None:
+        self.lag = lag
         self.p, self.law = params[0], np.zeros(1, PRESSURE_LAW_STATE)[0]
         self.law["base"] = self.law["used"] = MU
         self.law["mu_override"], self.law["start"] = math.nan, 1.0
@@ -36,7 +37,7 @@ class Car:
         resistance = self.p["drag_area"] * speed**2 / self.p["mass"] + self.p["rolling_resistance"] * GRAVITY
         for _ in range(round(seconds / DT)):
             given = decel * true / float(np.mean(self.law["used"]))
-            self.force += (given - self.force) * DT / 0.1
+            self.force += (given - self.force) * DT / self.lag
             self.estimate["accel_x"] = -self.force - resistance + reads
             confirm_friction(self.p, self.state, self.estimate, self.law["used"], offset, decel, calm, DT)
             follow_friction(self.p, self.law, self.estimate, DT)
@@ -138,6 +139,17 @@ def test_what_is_taken_back_before_any_friction_was_confirmed_does_not_overshoot
     car.brake(3.0, believed=1.12 * true * MU, true=true * MU)
     assert (car.law["used"] < 1.08 * true * MU).all()
     assert car.most < 1.01
+
+
+@pytest.mark.parametrize(("slowness", "most"), [(4.0, 0.95), (1.0, 1.008)])
+def test_hydraulics_that_are_slower_are_waited_for(params, slowness, most) -> None:
+    """Four times as late as usual; known to be, the force returns to what is aimed at and no further."""
+    params["slowness"] = slowness
+    car = Car(params, lag=0.1 + 3.0 * 0.063)
+    car.brake(0.8, believed=1.5 * MU, true=1.15 * MU)
+    car.most = 0.0
+    car.brake(4.0, believed=1.5 * MU, true=1.15 * MU)
+    assert car.most == pytest.approx(most, abs=0.003)
 
 
 def test_the_next_braking_begins_with_what_was_confirmed(car) -> None:
