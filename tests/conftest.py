@@ -1,5 +1,6 @@
 """What tests need around them: a SocketCAN bus, UDP multicast, the recorded drives; else they are skipped."""
 
+import gc
 import math
 import os
 import pickle
@@ -33,6 +34,8 @@ for name in ("BRAKE_ECU_DEBUG", "NOTIFY_SOCKET", "COLUMNS", "FORCE_COLOR", "GITH
 # Small matrices: threads of their own in every worker cost more than they give.
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(name, "1")
+
+gc.disable()  # until all tests are collected
 
 # Kernels come from the library where it holds them; `BRAKE_ECU_TEST_LIBRARY=0`: in tests all from numba.
 if os.environ.get("BRAKE_ECU_TEST_LIBRARY") == "0":
@@ -97,6 +100,13 @@ def _has_multicast() -> bool:
 def pytest_xdist_auto_num_workers() -> int:
     """Two workers more than there are cores: tests of whole processes wait for most of their time."""
     return len(os.sched_getaffinity(0)) + 2
+
+
+def pytest_collection_finish() -> None:
+    """Collect garbage of tests from here on, and look at none of the twelve thousand items each time."""
+    gc.enable()
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
