@@ -31,6 +31,7 @@ from ecu.contract.signals import (
 from ecu.jit import Record, kernel
 
 SLOPE = 2.0  # m/s^2, of a slope of 20 %
+TURNS = 2.0  # m/s
 LEAST_CORNERING_SPEED = 5.0  # m/s, above which lateral acceleration yields the yaw rate
 
 MOTION_STATE = np.dtype(
@@ -52,15 +53,18 @@ MOTION_STATE = np.dtype(
 
 
 @kernel
-def _drives_backwards(params: Record, inputs: Record) -> bool:
-    """Return whether the car is in reverse gear, or rolls back by wheel speed sensors with direction."""
+def _drives_backwards(params: Record, inputs: Record, speed: float) -> bool:
+    """Return whether the car is in reverse gear, or rolls back by wheel speed sensors with direction.
+
+    One that was faster than `TURNS` [m/s] forwards stands before it does.
+    """
     back = 0
     for i in range(4):
         place = WHEEL_SPEED + i
         if usable(inputs, place) and inputs.value[place] * params.wheel_radius[i] < -STANDING:
             back += 1
     reverse: bool = usable(inputs, REVERSE) and inputs.value[REVERSE] > 0.5
-    return reverse or back > 2
+    return reverse or (back > 2 and speed < TURNS)
 
 
 @kernel
@@ -90,7 +94,7 @@ def update_motion(params: Record, state: Record, inputs: Record, speed: float, b
     state.accel_y = value[ACCEL_Y] if across else state.yaw_rate * speed
     if across and not yaw and speed > LEAST_CORNERING_SPEED:
         state.yaw_rate = state.accel_y / speed
-    state.backwards = 1 if _drives_backwards(params, inputs) else 0
+    state.backwards = 1 if _drives_backwards(params, inputs, speed) else 0
     against = -1.0 if state.backwards else 1.0 if speed > STANDING else 0.0
     force = -params.drag_area * speed * abs(speed)
     for i in range(4):

@@ -81,3 +81,10 @@ def test_torques_and_drag_stand_in_for_a_lost_acceleration(params, feed, verdict
     car = params[0]
     tyres = -(500.0 + 100.0 + 600.0) / car["wheel_radius"][0] - 600.0 / car["wheel_radius"][2]
     assert state[0]["accel_x"] == pytest.approx((tyres - car["drag_area"] * 20.0**2) / car["mass"])
+
+
+@pytest.mark.parametrize(("speed", "backwards"), [(-3.0, 1), (0.0, 1), (1.5, 1), (2.5, 0), (20.0, 0)])
+def test_wheels_that_turn_backwards_drive_a_car_backwards_that_stood(params, feed, speed, backwards) -> None:
+    state, inputs = np.zeros(1, MOTION_STATE), feed(wheel_speed=-3.0 / params[0]["wheel_radius"])
+    update_motion(params[0], state[0], inputs[0], speed, np.zeros(4))
+    assert state[0]["backwards"] == backwards
