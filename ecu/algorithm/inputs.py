@@ -75,6 +75,15 @@ def wheels_mapped(params: Record) -> bool:
 
 
 @kernel
+def no_wheel_known(inputs: Record) -> bool:
+    """Return whether no wheel speed is usable."""
+    known = False
+    for i in range(4):
+        known = known or usable(inputs, WHEEL_SPEED + i)
+    return not known
+
+
+@kernel
 def mean_wheel_speed(params: Record, inputs: Record) -> float:
     """Return the mean speed of the wheels [m/s] whose samples are usable, unsigned; NaN: fewer than two."""
     total, wheels = 0.0, 0

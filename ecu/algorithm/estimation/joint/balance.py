@@ -35,6 +35,7 @@ BALANCE_FLOOR = 0.01  # m/s^2, unmodelled in the balance
 BALANCE_SHARE = 0.004  # of the deceleration
 ACROSS = 0.4  # of the lateral acceleration: stands for a smaller error that lasts a second
 PERSISTS_S = 0.3  # beyond the gate on one side while braking: then the state is wrong, not the measurement
+UNSEEN_SHARE = 0.15  # of the deceleration, while no wheel speed is known
 SKEW_ACCEL = 0.5  # windows between acceleration and torques
 
 
@@ -70,6 +71,17 @@ def predict_balance(params: Record, state: Record, braking: bool) -> float:
         left += x[OVERRUN]
         h[OVERRUN] = 1.0
     return left
+
+
+@kernel
+def linings_tell(params: Record, state: Record, braking: bool) -> bool:
+    """Return whether, without any wheel, the car's force is that of linings and motors, not of the road.
+
+    No wheel shows whether it slides: then far less force than expected is no lining's.
+    """
+    w = state.window
+    left = abs(predict_balance(params, state, braking))
+    return w.reference_samples > 0 and left < UNSEEN_SHARE * abs(w.accel)
 
 
 @kernel

@@ -15,7 +15,7 @@ restored from a snapshot 0.2 to 0.4 s old.
 import math
 
 from ecu.algorithm.estimate import STANDING
-from ecu.algorithm.estimation.joint.balance import correct_by_balance, predict_balance
+from ecu.algorithm.estimation.joint.balance import correct_by_balance, linings_tell, predict_balance
 from ecu.algorithm.estimation.joint.bounds import keep_within_bounds
 from ecu.algorithm.estimation.joint.drive import KNOWN, measure_drive
 from ecu.algorithm.estimation.joint.kalman import (
@@ -69,10 +69,10 @@ from ecu.algorithm.estimation.zero import FREE, settle_zero
 from ecu.algorithm.inputs import (
     LEAST_REQUEST,
     driver_accelerates,
+    no_wheel_known,
     others_brake,
     requested_decel,
     usable,
-    wheels_mapped,
 )
 from ecu.contract.signals import (
     ACCEL_X,
@@ -276,12 +276,12 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     for place in range(RATIOS):
         state.ratio[place] = math.nan
     state.reference_s += time
+    state.untrusted_s += time
     if w.reference_samples > 0:
         state.reference_s = state.unseen_s = 0.0
         correct_by_reference(params, state)
-        if not wheels_mapped(params):
+        if no_wheel_known(inputs):
             state.untrusted_s = 0.0
-    state.untrusted_s += time
     seen = correct_by_wheels(params, state, before, moving, learning and braking)
     if state.untrusted_s == 0.0:
         state.unseen_s = 0.0
@@ -292,6 +292,9 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
         if weight > 4.0 * APPLIED:
             note_change(state, weight)
     watch_tyres(state, learning and braking)
+    if no_wheel_known(inputs):
+        state.free[OVERRUN] = 0  # the wheels' slip tells it from the linings
+        seen = linings_tell(params, state, braking)
     if seen and learning and w.balanced and (braking or w.motor_reported):
         correct_by_balance(params, state, braking)
     state.pressed = max(abs(pressure_change(state, 0)), abs(pressure_change(state, 2)))

@@ -485,6 +485,24 @@ def test_to_a_standstill(new_car) -> None:
     assert np.linalg.eigvalsh(car.state["p"]).min() > -1e-9
 
 
+@pytest.mark.parametrize(
+    # lining over nominal, whether the speed over ground is known, share of its error that is found at least
+    ("lining", "reference", "found"),
+    [(0.9, True, 0.8), (1.1, True, 0.8), (0.9, False, 0.0), (0.5, True, 0.0)],
+)
+def test_without_any_wheel_the_balance_tells_a_lining_from_a_road(new_car, lining, reference, found) -> None:
+    """Half of the force is the road's rather than a lining's, and no wheel shows it."""
+    car = new_car(quiet=True, speed=40.0)
+    car.drive(2.0)
+    wheels = slice(WHEEL_SPEED, WHEEL_SPEED + 4)
+    car.inputs[0]["verdict"][wheels] = car.inputs[0]["new"][wheels] = 0
+    car.mu[:] = car.params["mu_nominal"] * lining
+    state = car.drive(4.0, front=38.0, rear=20.0, reference=reference)
+    learned = np.log(friction(state)).mean() / np.log(lining)
+    print(f"{learned:.2f} of the change")
+    assert (learned > found) == (found > 0.0)
+
+
 def test_it_does_not_start_before_two_wheels_are_known(new_car) -> None:
     car = new_car(seed=11, speed=20.0)
     car.inputs[0]["verdict"][WHEEL_SPEED + 1 : WHEEL_SPEED + 4] = 0

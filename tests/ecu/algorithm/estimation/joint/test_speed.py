@@ -104,3 +104,15 @@ def test_wheels_that_differ_from_the_speed_for_long(params, feed, torque, drift,
         window["omega"] = (20.0 + distance) / params[0]["wheel_radius"]
         found = found or speed_is_wrong(params[0], state[0], inputs[0])
     assert found == wrong
+
+
+def test_without_any_wheel_the_speed_over_ground_is_the_speed(new_car) -> None:
+    """For longer than the speed is believed that all wheels differ from."""
+    car = new_car(quiet=True, speed=20.0)
+    car.drive(0.1)
+    wheels = slice(WHEEL_SPEED, WHEEL_SPEED + 4)
+    car.inputs[0]["verdict"][wheels] = car.inputs[0]["new"][wheels] = 0
+    for _ in range(20):
+        car.drive(1.0)
+        assert car.state["started"]
+        assert car.state["x"][V] == pytest.approx(car.speed, abs=0.1)
