@@ -9,6 +9,9 @@ differ by while rolling:
     faster than it    while nothing drives it
 
 and where it is off by more than `SLID`, `SPIN_UP_S` later, so a wheel that slides or spins is never judged.
+Where the accelerometer confirms the vehicle speed and not the wheels together (`carried.py`), which slip does
+not explain, or no wheel is believed, the vehicle speed stands for the median.
+
 The vehicle speed is judged where it is slower than the wheels and nothing drives them, and where it is faster
 while they roll freely, or while dead reckoning agrees with them. A constant error of less than
 `FARTHEST_BASE` is another radius.
@@ -26,6 +29,13 @@ import math
 import numpy as np
 
 from ecu.algorithm.inputs import OVERSLEPT_S, driver_accelerates, motor_torque, usable
+from ecu.algorithm.monitoring.carried import (
+    CARRIED_STATE,
+    OVER_GROUND,
+    WHEELS,
+    follow_carried,
+    over_ground_confirmed,
+)
 from ecu.algorithm.monitoring.lateness import LATENESS_STATE, begin_lateness, follow_lag, judge_lag
 from ecu.algorithm.monitoring.witness import judge
 from ecu.algorithm.vehicle import corner_speed, tyre_slip
@@ -48,6 +58,7 @@ SPEEDS_STATE = np.dtype(
         ("slope", "f8"),  # of the road and the accelerometer's zero [m/s^2]
         ("started", "u1"),
         ("lateness", LATENESS_STATE),
+        ("carried", CARRIED_STATE),
     ],
     align=True,
 )
@@ -109,6 +120,43 @@ def _median(state: Record, witness: Record) -> float:
             count += 1
     middle: float = 0.5 * (state.sorted[(count - 1) // 2] + state.sorted[count // 2])
     return middle if count > 2 else math.nan
+
+
+@kernel
+def _carry(params: Record, state: Record, accel: float, known: bool, dt: float) -> None:
+    """Let the accelerometer carry the wheels' speed and the vehicle speed on, where it is `known`."""
+    total, wheels = 0.0, 0
+    for i in range(4):
+        if math.isfinite(state.implied[i]):
+            total, wheels = total + state.implied[i], wheels + 1
+    rolled = total / wheels * (1.0 + tyre_slip(params, accel)) if known and wheels > 2 else math.nan
+    over_ground = state.implied[SPEED] if known else math.nan
+    follow_carried(state.carried, WHEELS, rolled, accel, dt)
+    follow_carried(state.carried, OVER_GROUND, over_ground, accel, dt)
+
+
+@kernel
+def _may_slip(state: Record, braked: bool, drives: bool) -> bool:
+    """Return whether the wheels may have left the car by slip."""
+    for i in range(4):
+        braked = braked or state.spins_s[i, 0] > 0.0
+        drives = drives or state.spins_s[i, 1] > 0.0
+    behind = state.carried.behind[WHEELS]
+    slip: bool = (braked and behind < 0.0) or (drives and behind > 0.0)
+    return slip
+
+
+@kernel
+def _over_ground_tells(state: Record, witness: Record, braked: bool, drives: bool) -> bool:
+    """Return whether the vehicle speed stands for the wheels: it is confirmed, or no wheel is believed."""
+    if not math.isfinite(state.implied[SPEED]) or witness.rejected[VEHICLE_SPEED]:
+        return False
+    wheels = 0
+    for i in range(4):
+        if math.isfinite(state.implied[i]) and not witness.rejected[_place(i)]:
+            wheels += 1
+    confirmed = over_ground_confirmed(state.carried) and not _may_slip(state, braked, drives)
+    return wheels == 0 or confirmed
 
 
 @kernel
@@ -232,14 +280,17 @@ def watch_speeds(
     for i in range(4):
         state.torque[i] += (estimate.brake_torque[i] - state.torque[i]) * min(dt / SMOOTHING_S, 1.0)
         braked = braked or state.torque[i] > TORQUE
-    left = braked and _wheels_left(state, median)
     accelerates = driver_accelerates(inputs) or accel > DRIVEN_ACCEL
     drives = accelerates
     for i in range(4):
         drives = drives or motor_torque(inputs, i) < -TORQUE
+    seen = usable(inputs, ACCEL_X) and not estimate.backwards and dt < OVERSLEPT_S
+    _carry(params, state, accel, seen, dt)
+    if _over_ground_tells(state, witness, braked, drives):
+        median = state.implied[SPEED]
     known = state.reckoned if state.started else estimate.speed
     spin = drives and not braked and _wheels_spin(state, median, known)
-    left = left or (spin and state.started != 0)
+    left = (braked and _wheels_left(state, median)) or (spin and state.started != 0)
     ground = state.reckoned if left else median
     begins = not state.started and not spin and estimate.speed > LEAST_SPEED
     if estimate.backwards or not ground > LEAST_SPEED or not (state.started or begins):

@@ -60,6 +60,7 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "cos_steering",
         "sin_steering",
         "lateness",
+        "carried",
         "change",
         "jitter",
         "usual_slope",

@@ -94,6 +94,10 @@ CASES = [
     ("the speed reads zero", (1, 1, 1, 1, 0), 0.0, 0.0, 0.3, NAMES[4:]),
     ("the speed stands still above", (0.97, 0.97, 0.97, 0.97, 1.4), -4.0, 0.0, 0.5, NAMES[4:]),
     ("the speed stands below braked wheels", (0.97, 0.97, 0.97, 0.97, 0.7), -4.0, 0.0, 0.5, NAMES[4:]),
+    ("all that roll read 5 % more", (1.05, 1.05, 1.05, 1.05, 1), 0.0, 0.0, 0.5, NAMES[:4]),
+    ("all that roll read 5 % less", (0.95, 0.95, 0.95, 0.95, 1), 0.0, 0.0, 0.5, NAMES[:4]),
+    ("all that brake read 20 % more", (1.2, 1.2, 1.2, 1.2, 1), -4.0, 0.0, 0.5, NAMES[:4]),
+    ("all that drive read 10 % less", (0.9, 0.9, 0.9, 0.9, 1), 2.0, 30.0, 0.5, NAMES[:4]),
 ]
 
 
@@ -154,6 +158,20 @@ def test_without_a_speed_over_ground_the_accelerometer_sees_which_axle_lies(para
     assert road.drive(1.0, (1.2, 1.2, 0.98, 0.98, 1), -4.0) == FRONT
 
 
+def test_all_wheels_that_lied_are_believed_again_by_the_vehicle_speed(road) -> None:
+    assert road.drive(3.0, (1.1, 1.1, 1.1, 1.1, 1)) == NAMES[:4]
+    assert road.drive(1.5, (1, 1, 1, 1, 1)) == ()
+
+
+def test_without_an_accelerometer_s_word_the_wheels_outvote_the_vehicle_speed(road) -> None:
+    """A slope of 6 % begins as all wheels begin to read more: both speeds leave dead reckoning alike."""
+    for k in range(30):
+        road.speed += 0.06
+        rolled = 1.0 + 0.001 * k
+        road.drive(0.1, (rolled, rolled, rolled, rolled, 1))
+    assert road.drive(0.0) == NAMES[4:]
+
+
 def test_another_tyre_is_learned_while_rolling(params, feed) -> None:
     """A spare wheel 2.5 % smaller is no lie, braked or not; what it then changes by is."""
     road = Road(params, feed)
@@ -200,6 +218,7 @@ LATE = [
     ("the other, that slips more", -4.0, (0.985, 0.985, 0.975, 0.975, 1), (0, 0, 0.2, 0.2, 0), REAR),
     ("a wheel by 0.1 s", -4.0, (0.98, 0.98, 0.98, 0.98, 1), (0, 0.1, 0, 0, 0), NAMES[1:2]),
     ("the vehicle speed", -4.0, (0.98, 0.98, 0.98, 0.98, 1), (0, 0, 0, 0, 0.2), NAMES[4:]),
+    ("all wheels", -4.0, (0.98, 0.98, 0.98, 0.98, 1), (0.2, 0.2, 0.2, 0.2, 0), NAMES[:4]),
     ("by 20 ms: within the doubt", -4.0, (0.98, 0.98, 0.98, 0.98, 1), (0.02, 0.02, 0, 0, 0.02), ()),
     ("an axle, the car rolls", -0.5, (1, 1, 1, 1, 1), (0.2, 0.2, 0, 0, 0), ()),
 ]

@@ -1,0 +1,69 @@
+"""Which of two speeds the accelerometer confirms: that of the wheels together, or the vehicle speed.
+
+All wheel speeds come from one unit, so one lie may be in all four. Each of the two speeds s carries a dead
+reckoning v of its own,
+
+    i = s - v        v' = a - c + 2 w i        c' = -w^2 i
+
+slow enough (w = `MEMORY`, faster while it begins) that a speed that jumps, sticks, drifts or is late leaves
+it behind by i. A slope that begins, or an accelerometer that drifts, leaves both behind. The one whose i is
+less than `CONFIRMED` of the other's is confirmed: two of three witnesses.
+
+The wheels' speed is their mean without the slip of the configured tyres.
+"""
+
+import math
+
+import numpy as np
+
+from ecu.jit import Record, kernel
+
+WHEELS, OVER_GROUND = 0, 1
+CARRIED_STATE = np.dtype(
+    [
+        ("speed", "f8", (2,)),  # v [m/s], carried on
+        ("slope", "f8", (2,)),  # c [m/s^2]
+        ("behind", "f8", (2,)),  # i [m/s]
+        ("age_s", "f8", (2,)),  # since it began
+    ],
+    align=True,
+)
+
+MEMORY = 0.15  # rad/s
+BEGINS, LEAST_AGE_S = 1.5, 0.5  # over the time since it began; s
+CONFIRMED = 0.4
+KNOWN_S = 5.0  # after which its slope is known
+LEAST = 0.1  # m/s: slip and radii that differ from the configured ones
+
+
+@kernel
+def follow_carried(state: Record, k: int, speed: float, accel: float, dt: float) -> None:
+    """Advance the dead reckoning of a speed; one that is silent begins anew.
+
+    Args:
+        state: `CARRIED_STATE`, overwritten.
+        k: `WHEELS` or `OVER_GROUND`.
+        speed: s [m/s], NaN: silent.
+        accel: a [m/s^2].
+        dt: time since the last cycle [s].
+    """
+    if not math.isfinite(speed):
+        state.age_s[k] = state.behind[k] = 0.0
+        return
+    if state.age_s[k] == 0.0:
+        state.speed[k] = speed
+    state.age_s[k] += dt
+    memory = max(BEGINS / max(state.age_s[k], LEAST_AGE_S), MEMORY)
+    behind = speed - state.speed[k]
+    state.slope[k] -= memory * memory * dt * behind
+    state.speed[k] += (accel - state.slope[k] + 2.0 * memory * behind) * dt
+    state.behind[k] = behind
+
+
+@kernel
+def over_ground_confirmed(state: Record) -> bool:
+    """Return whether the accelerometer confirms the vehicle speed, and not the wheels."""
+    wheels, over_ground = abs(state.behind[WHEELS]), abs(state.behind[OVER_GROUND])
+    known = state.age_s[OVER_GROUND] > KNOWN_S and wheels > LEAST
+    confirmed: bool = known and over_ground < CONFIRMED * wheels
+    return confirmed
