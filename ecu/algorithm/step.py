@@ -94,6 +94,7 @@ from ecu.algorithm.monitoring.sensors import mask_implausible, watch_sensors
 from ecu.algorithm.monitoring.speeds import SPEEDS_STATE
 from ecu.algorithm.monitoring.turning import TURNING_STATE
 from ecu.algorithm.monitoring.wear import WEAR_STATE, restore_wear, update_wear
+from ecu.algorithm.monitoring.wheel_unit import WHEEL_UNIT_STATE
 from ecu.algorithm.monitoring.witness import WITNESS_STATE, begin_watch, end_watch
 from ecu.algorithm.publish import DEMANDS, publish
 from ecu.contract.faults import (
@@ -147,6 +148,7 @@ INITIAL = np.dtype(
         ("motors", MOTORS_WATCH_STATE),
         ("turning", TURNING_STATE),
         ("speeds", SPEEDS_STATE),
+        ("wheel_unit", WHEEL_UNIT_STATE),
         ("acceleration", ACCELERATION_STATE),
         ("prediction", PREDICTION_STATE),
         ("trusted", INPUTS),  # inputs with implausible ones masked out

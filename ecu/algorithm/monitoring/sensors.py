@@ -13,6 +13,7 @@ from ecu.algorithm.monitoring.accel_error import (
     watch_frozen,
 )
 from ecu.algorithm.monitoring.acceleration import watch_acceleration, wheels_deny
+from ecu.algorithm.monitoring.carried import OVER_GROUND
 from ecu.algorithm.monitoring.failed_brakes import watch_brakes
 from ecu.algorithm.monitoring.motors import (
     LEAST_SPEED,
@@ -25,6 +26,7 @@ from ecu.algorithm.monitoring.plausibility import watch_pressures, watch_wheels,
 from ecu.algorithm.monitoring.pressures import DOUBT_S, compare_pressures, lasting_difference
 from ecu.algorithm.monitoring.speeds import watch_speeds
 from ecu.algorithm.monitoring.turning import watch_turning
+from ecu.algorithm.monitoring.wheel_unit import watch_wheel_unit
 from ecu.algorithm.monitoring.witness import believe, leave_out, rejected_faults
 from ecu.contract.faults import (
     ACCEL_IMPLAUSIBLE,
@@ -94,6 +96,8 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
     if estimate.started:
         if estimate.torques_known:
             faults |= _watch_motion(p, s, u, dt)
+        slope = s.speeds.carried.slope[OVER_GROUND]
+        watch_wheel_unit(p, s.wheel_unit, s.witness, u, estimate, slope, dt)
         watch_wheels(p, s.plausibility, s.witness, u, estimate, dt)
         watch_turning(p, s.turning, s.witness, u, estimate.speed, dt)
         faults |= rejected_faults(s.witness)

@@ -8,7 +8,7 @@ from ecu.contract.records import RecordArray
 RENAMED = {"hydraulics": "friction_torque"}  # present name: earlier one
 # Begin as in a new state.
 ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"} | {
-    *("pressures", "flags", "accel_error", "witness", "motors", "turning", "speeds"),
+    *("pressures", "flags", "accel_error", "witness", "motors", "turning", "speeds", "wheel_unit"),
     *(
         "grip",
         "rolled",
