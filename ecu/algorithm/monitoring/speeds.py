@@ -10,7 +10,8 @@ differ by while rolling:
 
 and where it is off by more than `SLID`, `SPIN_UP_S` later, so a wheel that slides or spins is never judged.
 Where the accelerometer confirms the vehicle speed and not the wheels together (`carried.py`), which slip does
-not explain, or no wheel is believed, the vehicle speed stands for the median.
+not explain, or no wheel is believed, the vehicle speed stands for the median; while it is confirmed it is not
+judged.
 
 The vehicle speed is judged where it is slower than the wheels and nothing drives them, and where it is faster
 while they roll freely, or while dead reckoning agrees with them. A constant error of less than
@@ -329,7 +330,8 @@ def watch_speeds(
         if i < SPEED:
             braked = braking + motor > TORQUE or accel < DRAGGED_ACCEL or state.left_s > 0.0
         apart = _judged(state, i, ground, free, braked, driven)
-        if i < SPEED and _slides(state, i, apart, braked, driven, dt):
+        confirmed = i == SPEED and over_ground_confirmed(state.carried)
+        if confirmed or (i < SPEED and _slides(state, i, apart, braked, driven, dt)):
             apart = math.nan
         place = _place(i)
         unit = ground / params.wheel_radius[i] if i < SPEED else ground

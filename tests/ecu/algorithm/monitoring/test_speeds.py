@@ -163,6 +163,15 @@ def test_all_wheels_that_lied_are_believed_again_by_the_vehicle_speed(road) -> N
     assert road.drive(1.5, (1, 1, 1, 1, 1)) == ()
 
 
+def test_wheels_that_drift_while_they_drive_are_found_as_they_brake(road) -> None:
+    """What may be slip says nothing of them, nor of the vehicle speed that the accelerometer confirms."""
+    for k in range(30):
+        rolled = 1.0 + 0.002 * k
+        assert road.drive(0.1, (rolled, rolled, rolled, rolled, 1), 2.0, 30.0) == ()
+    assert road.drive(0.4, (1.06, 1.06, 1.06, 1.06, 1), -4.0) == ()
+    assert road.drive(1.0, (1.06, 1.06, 1.06, 1.06, 1), -4.0) == NAMES[:4]
+
+
 def test_without_an_accelerometer_s_word_the_wheels_outvote_the_vehicle_speed(road) -> None:
     """A slope of 6 % begins as all wheels begin to read more: both speeds leave dead reckoning alike."""
     for k in range(30):
