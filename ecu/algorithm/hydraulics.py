@@ -12,6 +12,13 @@ The sensor's noise (Table 4.1: 1.8 bar) is some 50 N m at a front wheel and mult
 only averaging over time reduces it. Where the hydraulics follow the demand, the pressure is predictable and
 can be averaged; the variance grows with the change, which covers errors of lag and gain. Where the sensor
 disagrees persistently (a fallback, another controller) its samples count alone until both agree again.
+
+Lateness. While all pressures rise, or fall, each shows by how much it is later than its model,
+
+    behind = (model - measured) / model'
+
+of which the second least counts: two brakes that give nothing are not late. Once it is known to `SURE`, what
+is beyond `ALLOWED` stretches all times of the model; less may be an error of gain or zero.
 """
 
 import math
@@ -38,6 +45,8 @@ HYDRAULICS_STATE = np.dtype(
         ("gain_variance", "f8", (4,)),  # the same with `SMOOTHED` instead of `SHARE`: gives the gain [bar^2]
         ("disagreement", "f8", (4,)),  # low-passed innovation [bar]
         ("agreed_s", "f8", (4,)),  # time for which model and sensor have agreed
+        ("late", "f8", (2,)),  # lateness beyond that of CONFIG, of a rise and a fall [s]
+        ("late_known", "f8", (2,)),  # 1 / variance of it, without what was unknown before [1/s^2]
     ],
     align=True,
 )
@@ -49,6 +58,92 @@ SMOOTHED = 0.08  # the same, assumed for the gain: noise that motors follow cost
 DISAGREEMENT_LAG = 0.4  # s
 TOLERANCE = 3.0  # standard deviations
 AGREED_S = 0.3
+STEEP, LOW = 40.0, 30.0  # bar/s, bar: slower, or above it, errors of zero and gain are taken for lateness
+UNKNOWN, SURE, SUREST = 0.03, 0.01, 0.004  # s, standard deviations: at first, to be used, to follow a change
+CORRELATED = 10.0  # samples that count as one: errors of gain and shape last
+ALLOWED = 0.015  # s
+LEAST_STRETCH, LARGEST_STRETCH = 0.4, 6.0
+
+
+@kernel
+def _is_known(state: Record, direction: int) -> bool:
+    known: bool = SURE * SURE * state.late_known[direction] >= 1.0
+    return known
+
+
+@kernel
+def stretch(params: Record, state: Record, direction: int) -> float:
+    """Return the factor on the unit's times of CONFIG by which pressures have shown to follow.
+
+    That of the other direction where only that was shown.
+    """
+    shown = direction if _is_known(state, direction) else 1 - direction
+    late: float = state.late[shown]
+    if not _is_known(state, shown) or abs(late) < ALLOWED:
+        return 1.0
+    return 1.0 + late / (params.dead_time[shown] + params.pressure_lag[shown])
+
+
+@kernel
+def slowness(params: Record, state: Record) -> float:
+    """Return the lateness of a rise over that of (A.17), as it has shown to be."""
+    slow: float = params.slowness * stretch(params, state, RISE)
+    return slow
+
+
+@kernel
+def lateness(params: Record, state: Record, direction: int) -> float:
+    """Return by how much pressures follow a steady change of their demands later [s]; NaN: not known."""
+    if not _is_known(state, direction):
+        return math.nan
+    late: float = params.dead_time[direction] + params.pressure_lag[direction] + state.late[direction]
+    return late
+
+
+@kernel
+def _behind(
+    params: Record, state: Record, inputs: Record, zero: Record, failed: Record, direction: int
+) -> tuple[float, float]:
+    """Return by how much the pressures are behind their models [s] and the information in it [1/s^2].
+
+    None where not every pressure moves so.
+    """
+    least = second = math.inf
+    known = 0.0
+    for i in range(4):
+        rate = abs(state.rate[i])
+        moves = rate > STEEP and state.model[i] < LOW and (state.rate[i] < 0.0) == (direction == FALL)
+        if failed[i] or not moves or not fresh(inputs, CALLIPER_PRESSURE + i):
+            return 0.0, 0.0
+        missing = state.model[i] + zero[i] - inputs.value[CALLIPER_PRESSURE + i]
+        behind = missing / state.rate[i]
+        second = min(second, max(least, behind))
+        least = min(least, behind)
+        known += rate * rate
+    return second, known * BAR * BAR / (CORRELATED * params.sigma_pressure**2)
+
+
+@kernel
+def learn_lateness(
+    params: Record, state: Record, inputs: Record, zero: Record, failed: Record, dt: float
+) -> None:
+    """Learn by how much the pressures are later than CONFIG says; the ECU alone brakes.
+
+    Arguments as for `correct_pressures`, `inputs` before what is implausible was masked out.
+    """
+    if dt > 1.5 * CYCLE:  # the missed cycles are made up for later
+        return
+    for direction in (RISE, FALL):
+        behind, known = _behind(params, state, inputs, zero, failed, direction)
+        if known == 0.0:
+            continue
+        usual = params.dead_time[direction] + params.pressure_lag[direction]
+        now = usual * stretch(params, state, direction)
+        found = now - usual + min(max(behind, -now), 2.0 * now)
+        state.late_known[direction] = min(state.late_known[direction] + known, 1.0 / SUREST**2)
+        late = state.late[direction]
+        late += known / (state.late_known[direction] + 1.0 / UNKNOWN**2) * (found - late)
+        state.late[direction] = min(max(late, (LEAST_STRETCH - 1.0) * usual), (LARGEST_STRETCH - 1.0) * usual)
 
 
 @kernel
@@ -59,7 +154,8 @@ def _half_cycles(dead_time: float) -> int:
 @kernel
 def _advance_half_cycle(params: Record, state: Record, i: int, target: float) -> None:
     direction = FALL if target < state.model[i] else RISE
-    inertia, lag = params.pressure_inertia[direction], params.pressure_lag[direction]
+    slow = stretch(params, state, direction)
+    inertia, lag = slow * slow * params.pressure_inertia[direction], slow * params.pressure_lag[direction]
     half = 0.25 * CYCLE
     weight = half * (lag + half) / inertia
     pull = 2.0 * half / inertia * (target - state.model[i])
@@ -72,7 +168,8 @@ def _advance_half_cycle(params: Record, state: Record, i: int, target: float) ->
 @kernel
 def _advance(params: Record, state: Record, i: int, sent: float) -> None:
     demand, before = state.history, state.model[i]
-    rising, falling = _half_cycles(params.dead_time[RISE]), _half_cycles(params.dead_time[FALL])
+    rising = _half_cycles(stretch(params, state, RISE) * params.dead_time[RISE])
+    falling = _half_cycles(stretch(params, state, FALL) * params.dead_time[FALL])
     for k in range(KEPT - 1, 0, -1):
         demand[k, i] = demand[k - 1, i]
     demand[0, i] = sent

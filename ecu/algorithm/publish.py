@@ -10,9 +10,10 @@ import numpy as np
 from ecu.algorithm.control.blending import blends
 from ecu.algorithm.control.friction_torque import lining_torque
 from ecu.algorithm.estimate import STANDING
+from ecu.algorithm.hydraulics import lateness
 from ecu.algorithm.monitoring.wear_belief import is_known
 from ecu.contract.faults import WORD
-from ecu.contract.params import BAR
+from ecu.contract.params import BAR, FALL, RISE
 from ecu.contract.signals import CALLIPER_PRESSURE, FAILED
 from ecu.jit import Record, kernel
 
@@ -58,6 +59,8 @@ def publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: in
     y.sigma_brake_force = e.sigma_force
     y.grip_limit, y.sigma_grip_limit, y.grip_knee = e.grip_limit, e.sigma_grip_limit, e.grip_knee
     y.motor_torque_share = e.torque_share
+    y.pressure_lateness_rise = lateness(p, s.hydraulics, RISE)
+    y.pressure_lateness_fall = lateness(p, s.hydraulics, FALL)
     y.braking = s.application.braking
     y.test_ratio_balance, y.test_ratio_speed = e.test_ratio_balance, e.test_ratio_speed
     y.particles_last_brake, y.particles_per_km = s.dust.particles, s.dust.per_km

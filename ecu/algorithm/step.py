@@ -72,7 +72,7 @@ from ecu.algorithm.estimation.thesis.observer2 import OBSERVER_STATE
 from ecu.algorithm.estimation.thesis.slip import RADIUS_START, WHEELS_STATE
 from ecu.algorithm.estimation.thesis.speed import SPEED_STATE
 from ecu.algorithm.estimation.wheel_load import WHEEL_LOAD_STATE
-from ecu.algorithm.hydraulics import HYDRAULICS_STATE, advance_pressures, correct_pressures
+from ecu.algorithm.hydraulics import HYDRAULICS_STATE, advance_pressures, correct_pressures, slowness
 from ecu.algorithm.inputs import others_brake
 from ecu.algorithm.monitoring.accel_error import ACCEL_ERROR_STATE
 from ecu.algorithm.monitoring.acceleration import ACCELERATION_STATE
@@ -311,12 +311,13 @@ def _control(p: Record, s: Record, u: Record, dt: float) -> float:
     if p.minimised:
         straight, share = calm and abs(e.accel_y) <= CALM_ACROSS, front_share(p, decel)
         lean(p, s.cleaner, torque, allowed, s.discs.temperature, share, e.mass, decel, straight, dt)
-    confirm_friction(p, s.control.confirmed, e, s.control.used, s.accel_error.wheels.offset, decel, calm, dt)
+    slow, offset = slowness(p, s.hydraulics), s.accel_error.wheels.offset
+    confirm_friction(p, s.control.confirmed, e, s.control.used, offset, decel, calm, slow, dt)
     follow_friction(p, s.control, e, dt)
     advance_pressures(p, s.hydraulics, s.limiter.pressure)
-    update_motors(p, s.blending, u, s.guard.capped, e.speed, decel, dt)
+    update_motors(p, s.blending, u, s.guard.capped, e.speed, decel, slow, dt)
     replace_failed(p, s.replacement, s.failed_brakes, s.distribution, allowed, decel, backwards, dt)
-    share_torque(p, s.blending, torque, dt)
+    share_torque(p, s.blending, torque, slow, dt)
     for i in range(4):
         demands.uncompensated[i] = pressure_for_torque(p, s.blending.lining[i], s.control.base[i], i)
         demands.pressure[i] = compensated_pressure(p, s.control, demands.uncompensated[i], i)

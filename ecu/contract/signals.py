@@ -168,6 +168,8 @@ OUTPUT_SIGNALS: Final[tuple[OutputSignal, ...]] = (
     OutputSignal("grip_knee", "-", False, ""),  # exponent of the bend towards it; NaN: the ECU brakes
     OutputSignal("motor_torque_share", "-", False, ""),  # of reported torques that counts, by the motion
     OutputSignal("torque_demand", "N m", True, ""),  # of the linings: that of the pressure demand
+    OutputSignal("pressure_lateness_rise", "s", False, ""),  # of pressures behind their demands, as learned
+    OutputSignal("pressure_lateness_fall", "s", False, ""),
 )
 
 DEMANDS: Final = {

@@ -74,7 +74,7 @@ def _watch_motor(state: Record, inputs: Record, i: int, dt: float) -> None:
 
 
 @kernel
-def _follow_limit(params: Record, state: Record, inputs: Record, fading: float, i: int, dt: float) -> None:
+def _follow_limit(state: Record, inputs: Record, fading: float, ahead_s: float, i: int, dt: float) -> None:
     """Update the motor's limit; `fading`: share that the fade at low speed will leave of it."""
     limit: float = inputs.value[MOTOR_LIMIT + i]
     if fresh(inputs, MOTOR_LIMIT + i):
@@ -82,21 +82,28 @@ def _follow_limit(params: Record, state: Record, inputs: Record, fading: float, 
         state.fall[i] = max(fall, state.fall[i] + RATE_GAIN * (fall - state.fall[i]))
         state.limit[i] = limit
     state.ceiling[i] = max(limit - dt * state.fall[i], 0.0)
-    ahead = max(min(limit - AHEAD * params.slowness * state.fall[i], fading * limit), 0.0)
+    ahead = max(min(limit - ahead_s * state.fall[i], fading * limit), 0.0)
     state.allowed[i] = min(ahead, state.allowed[i] + TAKEN * dt)
 
 
 @kernel
-def _fading(params: Record, speed: float, decel: float) -> float:
+def _fading(params: Record, speed: float, decel: float, ahead_s: float) -> float:
     """Return the share left of a motor's present limit when it fades below `fade_speed`."""
     if not (params.fade_speed > 0.0 and speed > params.fade_speed and decel > 0.0):
         return 1.0
-    return min(max(speed - AHEAD * params.slowness * decel, 0.0) / params.fade_speed, 1.0)
+    return min(max(speed - ahead_s * decel, 0.0) / params.fade_speed, 1.0)
 
 
 @kernel
 def update_motors(
-    params: Record, state: Record, inputs: Record, guarded: Record, speed: float, decel: float, dt: float
+    params: Record,
+    state: Record,
+    inputs: Record,
+    guarded: Record,
+    speed: float,
+    decel: float,
+    slowness: float,
+    dt: float,
 ) -> None:
     """Overwrite each motor's greatest demand and greatest planned torque.
 
@@ -107,10 +114,12 @@ def update_motors(
         guarded: wheels whose lining is held back because they slip, shape (4,).
         speed: of the vehicle [m/s].
         decel: demanded [m/s^2], may be NaN.
+        slowness: of the hydraulics.
         dt: time since the last cycle [s].
     """
     value = inputs.value
-    fading = _fading(params, speed, decel)
+    ahead_s = AHEAD * slowness
+    fading = _fading(params, speed, decel, ahead_s)
     forbidden = others_brake(inputs) or value[REVERSE] > 0.5
     for i in range(4):
         known = (
@@ -123,7 +132,7 @@ def update_motors(
         if forbidden or guarded[i]:
             state.ceiling[i] = state.allowed[i] = 0.0
         elif known and not state.lost[i]:
-            _follow_limit(params, state, inputs, fading, i, dt)
+            _follow_limit(state, inputs, fading, ahead_s, i, dt)
         else:
             if usable(inputs, MOTOR_LIMIT + i):
                 state.ceiling[i] = min(state.ceiling[i], value[MOTOR_LIMIT + i])
@@ -132,13 +141,14 @@ def update_motors(
 
 
 @kernel
-def share_torque(params: Record, state: Record, torque: Record, dt: float) -> None:
+def share_torque(params: Record, state: Record, torque: Record, slowness: float, dt: float) -> None:
     """Overwrite the torque demanded of the linings and planned for the motors.
 
     Args:
         params: `PARAMS`.
         state: `BLENDING_STATE`, after `update_motors`.
         torque: demanded of the wheels [N m], shape (4,); may be NaN.
+        slowness: of the hydraulics.
         dt: time since the last cycle [s].
     """
     for i in range(4):
@@ -146,10 +156,10 @@ def share_torque(params: Record, state: Record, torque: Record, dt: float) -> No
         rise = max((demand - state.torque[i]) / dt, 0.0) if dt > 0.0 else 0.0
         state.rise[i] += RATE_GAIN * (rise - state.rise[i])
         state.torque[i] = demand
-        allowed = max(state.allowed[i] - AHEAD * params.slowness * state.rise[i], 0.0)
+        allowed = max(state.allowed[i] - AHEAD * slowness * state.rise[i], 0.0)
         plan = min(params.blending[i] * demand, allowed)
         later = LATER * max(state.slow[i] - plan, 0.0)
-        state.slow[i] += lag_gain(dt, LATER_S * params.slowness) * (plan - state.slow[i])
+        state.slow[i] += lag_gain(dt, LATER_S * slowness) * (plan - state.slow[i])
         state.plan[i] = min(plan + later, demand)
         state.lining[i] = torque[i] - state.plan[i]
         if demand == 0.0:

@@ -63,6 +63,7 @@ def confirm_friction(
     accel_offset: float,
     decel: float,
     calm: bool,
+    slowness: float,
     dt: float,
 ) -> None:
     """Confirm the friction in use by the car's deceleration, or contradict it.
@@ -75,6 +76,7 @@ def confirm_friction(
         accel_offset: c, the accelerometer's difference from the wheels [m/s^2].
         decel: demanded [m/s^2], NaN: unknown.
         calm: the ECU alone brakes, forwards, no wheel or axle is held back and no brake has failed.
+        slowness: of the hydraulics.
         dt: time since the last cycle [s].
     """
     state.usual += (accel_offset - state.usual) * min(dt / USUAL_S, 1.0)
@@ -86,14 +88,14 @@ def confirm_friction(
     gain = lag_gain(dt, LAG)
     state.asked += gain * (decel - state.asked)
     state.given += gain * (-estimate.accel_x - resistance - state.given)
-    state.pressed += lag_gain(dt, USUAL_LATENESS * params.slowness + TYRES) * (state.in_use - state.pressed)
+    state.pressed += lag_gain(dt, USUAL_LATENESS * slowness + TYRES) * (state.in_use - state.pressed)
     state.followed += gain * (state.pressed - state.followed)
     moves = estimate.speed > LEAST_SPEED and estimate.measured != 0
     steady = calm and moves and abs(decel - state.asked) < STEADY * decel
     state.steady_s = state.steady_s + dt if steady else 0.0
     if estimate.measured == 0:  # left out: nobody confirms a rise, and nothing is taken on its word
         state.back += min(max(1.0 - state.back, -TAKE * dt), TAKE * dt)
-    if state.steady_s < SETTLED_S * max(params.slowness, 1.0):
+    if state.steady_s < SETTLED_S * max(slowness, 1.0):
         return
     drifted = accel_offset - state.usual
     if state.back >= 1.0:

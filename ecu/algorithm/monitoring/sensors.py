@@ -4,6 +4,7 @@ Accelerometer, wheel speeds and calliper pressures are compared with each other 
 estimation, by the estimate of the last cycle.
 """
 
+from ecu.algorithm.hydraulics import learn_lateness
 from ecu.algorithm.inputs import LEAST_REQUEST, driver_accelerates, others_brake, requested_decel, usable
 from ecu.algorithm.monitoring.accel_error import (
     PROVEN_S,
@@ -108,6 +109,8 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
     if s.acceleration.implausible:
         faults |= ACCEL_IMPLAUSIBLE
     begins = s.acceleration.implausible != 0 and not doubted
+    if p.transmit and s.plausibility.sent and not others_brake(u):
+        learn_lateness(p, s.hydraulics, u, estimate.pressure_zero, s.failed_brakes.failed, dt)
     watch_pressures(s.plausibility, u, s.hydraulics.model, estimate.pressure_zero, dt)
     if s.plausibility.pressure:
         faults |= PRESSURE_NOT_FOLLOWING

@@ -9,11 +9,17 @@ from scipy.signal import TransferFunction, lsim
 from ecu.algorithm.hydraulics import (
     AGREED_S,
     HYDRAULICS_STATE,
+    LARGEST_STRETCH,
     TOLERANCE,
     advance_pressures,
     correct_pressures,
     follows_demand,
+    lateness,
+    learn_lateness,
+    slowness,
+    stretch,
 )
+from ecu.contract.params import FALL, RISE
 from ecu.contract.signals import CALLIPER_PRESSURE
 from ecu.jit import kernel
 from ecu.settings.hydraulics import Hydraulics, set_hydraulics
@@ -329,3 +335,66 @@ def test_only_a_working_brake_of_an_armed_ecu_follows(callipers, armed, failed, 
     callipers.p["transmit"], callipers.failed[0] = armed, failed
     callipers.start(20.0)
     assert [callipers.correct(20.0, 20.0)[2] for _ in range(50)][-1] is follows
+
+
+STEPS = [0, 0.5, 0.7, 1.5, 1.7, 2.5, 2.7, 4], [10, 10, 30, 30, 50, 50, 70, 70]  # s, bar
+
+
+def learn(callipers: Callipers, kind, times: float, seed: int, scale=1.0, slow=1.0, dt: float = DT) -> None:
+    """Let pressures follow steps later than configured, `times` of dead time and lag; those of the wheels
+    are `scale` of it."""
+    inertia, lag, dead = kind
+    demand = np.interp(np.arange(0, 4 * slow, DT), np.multiply(slow, STEPS[0]), STEPS[1])
+    demand = demand if kind is BUILD_UP else 80.0 - demand
+    true = hydraulics((times**2 * inertia, times * lag, times * dead), demand)
+    random = np.random.default_rng(seed)
+    c, learned = callipers, callipers.state
+    c.start(demand[0])
+    for name in ("late", "late_known"):
+        c.state[name] = learned[name]
+    for k in range(1, len(true)):
+        c.feed(c.inputs, calliper_pressure=scale * true[k] + SIGMA * random.standard_normal(4))
+        learn_lateness(c.p, c.state, c.inputs[0], c.zero, c.failed, dt)
+        advance_pressures(c.p, c.state, np.full(4, demand[k - 1] * BAR))
+
+
+@pytest.mark.parametrize("times", [0.5, 1.0, 1.5, 2.0, 4.0])
+@pytest.mark.parametrize(("direction", "kind"), [(RISE, BUILD_UP), (FALL, RELEASE)], ids=["rise", "fall"])
+def test_how_late_the_pressures_are_is_learned(callipers, direction, kind, times) -> None:
+    """The second least of four is 0.3 standard deviations below their mean: 5 ms at 100 bar/s."""
+    true = times * (kind[1] + kind[2])
+    for application in range(8):
+        learn(callipers, kind, times, application)
+        if application < 3:
+            continue
+        found = lateness(callipers.p, callipers.state, direction)
+        assert found == pytest.approx(true - 0.005, rel=0.08 if times < 4.0 else 0.2, abs=0.006)
+        used = stretch(callipers.p, callipers.state, direction)
+        assert used == (1.0 if times == 1.0 else pytest.approx(found / (kind[1] + kind[2])))
+        assert stretch(callipers.p, callipers.state, 1 - direction) == used
+        assert math.isnan(lateness(callipers.p, callipers.state, 1 - direction))
+        if direction == RISE:
+            callipers.p["slowness"] = 3.0
+            assert slowness(callipers.p, callipers.state) == pytest.approx(3.0 * used)
+
+
+@pytest.mark.parametrize(
+    ("case", "keys", "failed"),
+    [
+        ("two brakes give nothing", {"scale": np.array([1.0, 0.0, 0.0, 1.0])}, 0),
+        ("three times too late, one brake has failed", {"times": 3.0}, 1),
+        ("changes too slow to show it", {"times": 3.0, "slow": 6.0}, 0),
+        ("cycles are missed", {"times": 3.0, "dt": 2 * DT}, 0),
+        ("all brake 5 % less", {"scale": 0.95}, 0),
+    ],
+)
+def test_what_shows_no_lateness(callipers, case, keys, failed) -> None:
+    callipers.failed[2] = failed
+    learn(callipers, BUILD_UP, keys.pop("times", 1.0), 1, **keys)
+    assert stretch(callipers.p, callipers.state, RISE) == 1.0, case
+
+
+def test_a_pressure_that_is_never_there_has_a_largest_lateness(callipers) -> None:
+    for seed in range(5):
+        learn(callipers, BUILD_UP, 1.0, seed, scale=0.0)
+    assert 1.0 < stretch(callipers.p, callipers.state, RISE) <= LARGEST_STRETCH

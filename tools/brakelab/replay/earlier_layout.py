@@ -80,6 +80,8 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "reported",
         "reported_s",
         "history",
+        "late",
+        "late_known",
     ),
 }
 

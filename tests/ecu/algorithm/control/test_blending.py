@@ -23,7 +23,10 @@ SPEED, DECEL = 15.0, 4.0
 class Motors:
     """Blending of four wheels, cycle by cycle; what motors report is `gives` of their demand."""
 
-    def __init__(self, params, feed, share: float, limit: float, gives: float = 1.0) -> None:
+    def __init__(
+        self, params, feed, share: float, limit: float, gives: float = 1.0, slowness: float = 1.0
+    ) -> None:
+        self.slowness = slowness
         params["blending"] = share
         self.p, self.feed, self.inputs = params[0], feed, feed(motor_limit=limit)
         self.state = np.zeros(1, BLENDING_STATE)[0]
@@ -34,8 +37,8 @@ class Motors:
     def cycle(self, torque: float, lag: float = 0.0, speed: float = SPEED, **inputs: float) -> float:
         """Run a cycle with this torque demanded of each wheel; return what the first motor is asked for."""
         self.feed(self.inputs, **{"motor_torque": self.gives * self.asked, **inputs})
-        update_motors(self.p, self.state, self.inputs[0], self.guarded, speed, DECEL, DT)
-        share_torque(self.p, self.state, np.full(4, torque), DT)
+        update_motors(self.p, self.state, self.inputs[0], self.guarded, speed, DECEL, self.slowness, DT)
+        share_torque(self.p, self.state, np.full(4, torque), self.slowness, DT)
         self.asked = np.array([motor_torque_demand(self.p, self.state, lag, i) for i in range(4)])
         return float(self.asked[0])
 
@@ -103,8 +106,7 @@ def test_a_limit_that_falls_is_planned_for_a_tenth_of_a_second_before(params, fe
 
 @pytest.mark.parametrize("slowness", [0.5, 2.0, 4.0])
 def test_the_slower_the_hydraulics_the_earlier_the_plan(params, feed, slowness: float) -> None:
-    params["slowness"] = slowness
-    motors = Motors(params, feed, 1.0, 500.0)
+    motors = Motors(params, feed, 1.0, 500.0, slowness=slowness)
     for k in range(1, 46):  # 1000 N m/s
         motors.cycle(10.0 * k)
     planned = max(500.0 - 0.12 * slowness * 1000.0, 0.0)
@@ -271,5 +273,5 @@ def test_what_will_be_left_of_a_limit_that_fades(
     params["fade_speed"] = fade_speed
     state, inputs = np.zeros(1, BLENDING_STATE)[0], feed(motor_limit=1000.0, motor_torque=0.0)
     for _ in range(300):
-        update_motors(params[0], state, inputs[0], np.zeros(4, np.uint8), of_fade_speed * 3.0, decel, DT)
+        update_motors(params[0], state, inputs[0], np.zeros(4, np.uint8), of_fade_speed * 3.0, decel, 1.0, DT)
     assert state["allowed"] == pytest.approx([1000.0 * left] * 4)

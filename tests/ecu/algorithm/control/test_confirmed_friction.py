@@ -17,8 +17,8 @@ DT, MU, DECEL = 0.01, 0.45, 4.0
 class Car:
     """Brakes with 4 m/s^2; friction in use decides how hard, by linings whose true friction may change."""
 
-    def __init__(self, params, lag: float = 0.1) -> None:
-        self.lag = lag
+    def __init__(self, params, lag: float = 0.1, slowness: float = 1.0) -> None:
+        self.lag, self.slowness = lag, slowness
         self.p, self.law = params[0], np.zeros(1, PRESSURE_LAW_STATE)[0]
         self.law["base"] = self.law["used"] = MU
         self.law["mu_override"], self.law["start"] = math.nan, 1.0
@@ -39,7 +39,9 @@ class Car:
             given = decel * true / float(np.mean(self.law["used"]))
             self.force += (given - self.force) * DT / self.lag
             self.estimate["accel_x"] = -self.force - resistance + reads
-            confirm_friction(self.p, self.state, self.estimate, self.law["used"], offset, decel, calm, DT)
+            confirm_friction(
+                self.p, self.state, self.estimate, self.law["used"], offset, decel, calm, self.slowness, DT
+            )
             follow_friction(self.p, self.law, self.estimate, DT)
             least, self.most = min(least, self.force / decel), max(self.most, self.force / decel)
         return least
@@ -144,8 +146,7 @@ def test_what_is_taken_back_before_any_friction_was_confirmed_does_not_overshoot
 @pytest.mark.parametrize(("slowness", "most"), [(4.0, 0.95), (1.0, 1.008)])
 def test_hydraulics_that_are_slower_are_waited_for(params, slowness, most) -> None:
     """Four times as late as usual; known to be, the force returns to what is aimed at and no further."""
-    params["slowness"] = slowness
-    car = Car(params, lag=0.1 + 3.0 * 0.063)
+    car = Car(params, 0.1 + 3.0 * 0.063, slowness)
     car.brake(0.8, believed=1.5 * MU, true=1.15 * MU)
     car.most = 0.0
     car.brake(4.0, believed=1.5 * MU, true=1.15 * MU)
