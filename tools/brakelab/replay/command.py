@@ -235,7 +235,7 @@ def _notes(findings: Sequence[Findings], plan: ReceivePlan, observer: str) -> li
             *(transducer_line(found, observer), lacking_line(found), fault_lines(found)),
         )
         flaws = (f"{found.path}: {line}" for line in found.physics.flaws)
-        lines += chain(*about, flaws, [found.calibrated] if found.calibrated else [])
+        lines += chain(*about, flaws, [line for line in (found.calibrated, found.late) if line])
     return lines
 
 

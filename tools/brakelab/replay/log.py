@@ -16,6 +16,7 @@ from brakelab.logs.signal_file import freshness_at_any_rate, read_signals
 from brakelab.replay.calibrated import changes_of
 from brakelab.replay.earlier_layout import convert_initial
 from brakelab.replay.engine import Ecu, Rows, run_frames, run_samples
+from brakelab.replay.lateness import lateness_line
 from brakelab.replay.quality import Findings, identifier, note_faults
 from brakelab.replay.seen import set_raw_ends
 from brakelab.replay.source import Source, only_interface
@@ -125,6 +126,8 @@ def replay_log(
         changes, findings.calibrated = changes_of(recording, ecu)
         rows = run_frames(ecu, plan, reception, blocks, cycles, counted, changes)
     yield from _noted(rows, findings, ecu)
+    if recording is not None and ecu.params[0]["transmit"]:
+        findings.late = lateness_line(ecu.params[0], ecu.outputs[0])
     if not reception.messages["accepted"].any():
         raise _foreign(path, source, findings)
 

@@ -63,6 +63,8 @@ class Findings:
     """Frames that the kernel dropped in a recorded run."""
     calibrated: str = ""
     """The line about calibrations of a recorded run that were left out."""
+    late: str = ""
+    """The line about hydraulics of a recorded run that are not CONFIG's."""
     seconds: float = 0.0
     """That the replay took."""
     faulty_rows: int = 0

@@ -1,0 +1,16 @@
+"""Line on pressures that followed their demands later, or sooner, than CONFIG says."""
+
+from typing import Any
+
+from ecu.algorithm.hydraulics import ALLOWED
+
+
+def lateness_line(params: Any, outputs: Any) -> str:
+    """Return the line on a run that braked, or empty; one `PARAMS`, and its last `OUTPUTS`."""
+    found = []
+    for place, verb in enumerate(("rise", "fall")):
+        told = float(params["dead_time"][place] + params["pressure_lag"][place])
+        shown = float(outputs[f"pressure_lateness_{verb}"])
+        if abs(shown - told) > ALLOWED:
+            found.append(f"{verb} {1e3 * shown:.0f} ms after their demands (CONFIG: {1e3 * told:.0f} ms)")
+    return f"pressures {' and '.join(found)}: correct dead times and lags of [hydraulics]" if found else ""
