@@ -303,7 +303,7 @@ def _control(p: Record, s: Record, u: Record, dt: float) -> float:
     backwards = e.backwards != 0
     failed = s.failed_brakes.failed
     reckoned = s.speeds.reckoned if s.speeds.started else 0.0
-    watch_trailing(p, s.distribution, u, e, failed, decel, speed, reckoned, dt)
+    watch_trailing(p, s.distribution, u, e, failed, s.guard.capped, decel, speed, reckoned, dt)
     distribute(p, s.distribution, e.mass, decel, backwards, dt)
     held = s.guard.acting != 0 or s.distribution.trailing < 1.0 or s.failed_brakes.any != 0
     calm = not (held or backwards or s.control.beyond_grip or others_brake(u))
@@ -323,7 +323,8 @@ def _control(p: Record, s: Record, u: Record, dt: float) -> float:
         demands.pressure[i] = compensated_pressure(p, s.control, demands.uncompensated[i], i)
     cap_trailing(p, s.distribution, decel, s.blending.lining, e, demands.pressure, failed, backwards)
     if p.slip_guard:
-        guard_slip(p, s.guard, u, e, speed, s.limiter.pressure, demands.pressure, torque, dt)
+        sent, model, motors = s.limiter.pressure, s.hydraulics.model, s.blending.asked[0]
+        guard_slip(p, s.guard, u, e, speed, sent, model, motors, demands.pressure, torque, dt)
     watch_accumulator(s.limiter, s.witness, u, dt)
     _limit(p, s, available_pressure(p, s.limiter, u), decel, dt)
     return decel

@@ -11,7 +11,8 @@ functions do (ECE R13-H, Annex 5: the rear uses no more grip than the front):
 - `watch_trailing`: where a rear wheel slips more than the front one of its side by more than
   `rear_slip_margin`, and by the car's speed `LEAST_SLIP` more than tyres do at the deceleration measured,
   torque of the rear axle moves to the front one until it no longer does. A front wheel counts as no faster
-  than the ground: one whose speed is late or scaled alone takes nothing. This needs no friction estimate.
+  than the ground: one whose speed is late or scaled alone takes nothing. One that the slip guard holds is no
+  measure: just cut, it slips less than it can. This needs no friction estimate.
   Beside a front wheel whose brake has failed it may slip `LONE_SLIP`. The front takes all of it up to `GRIP`
   of its load, beyond that slowly; none from when it slips more than `GRIP_SLIP`.
 - `cap_trailing`: compensation raises the rear's pressure relative to the front's only as far as the estimate
@@ -107,6 +108,7 @@ def watch_trailing(
     inputs: Record,
     estimate: Record,
     failed: Record,
+    guarded: Record,
     decel: float,
     speed: float,
     reckoned: float,
@@ -124,6 +126,7 @@ def watch_trailing(
         inputs: `INPUTS`.
         estimate: `ESTIMATE`.
         failed: wheels whose brake has failed, shape (4,).
+        guarded: wheels held by the slip guard, shape (4,): a leading one is no measure.
         decel: demanded [m/s^2]; the axle regains its full torque once no brake is demanded.
         speed: of the vehicle [m/s], NaN: unknown. Below `min_speed` slip is not evaluated.
         reckoned: the same by dead reckoning [m/s], 0: unknown; the greater of the two shows a slip.
@@ -158,7 +161,7 @@ def watch_trailing(
             doubt += RADIUS_DOUBT
         leading = side if trailing > 0.0 else side + 2
         margin = LONE_SLIP if failed[leading] else params.rear_slip_margin
-        if state.slip[side] > LEAST_SLIP + used / params.slip_stiffness[leading]:
+        if not guarded[leading] and state.slip[side] > LEAST_SLIP + used / params.slip_stiffness[leading]:
             worst = max(worst, state.beyond[side] - margin - doubt)
     change = -TAKE_BACK * worst if worst > 0.0 else GIVE_BACK
     state.trailing = min(max(state.trailing + change * dt, LEAST_TRAILING), 1.0) if brakes else 1.0

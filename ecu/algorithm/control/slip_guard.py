@@ -1,14 +1,19 @@
 """Slip guard: holds the pressure at a wheel beyond its tyre's range, returns it once the wheel recovers.
 
-    lag    = |v_i| - |omega| r                       speed deficit of a wheel [m/s]; slip = -lag / |v_i|
-    growth = -d(|omega| r)/dt - braking of the car   rate of that deficit [m/s^2], median of three samples,
+    lag     = |v_i| - |omega| r                      speed deficit of a wheel [m/s]; slip = -lag / |v_i|
+    growth  = -d(|omega| r)/dt - braking of the car  rate of that deficit [m/s^2], median of three samples,
                                                      low-passed
+    inertia = I / (2 A_k r_eff mu r)                 pressure that changes that rate by 1 m/s^2 [Pa s^2/m]
+    carried = p - inertia (growth + braking)         pressure whose torque the road's force balances (A.3)
+    slides  = WHOLLY F / (C_L F_z)                   slip from which a tyre slides wholly, by the brush model;
+                                                     F: force that balances `carried`
 
 begins   slip beyond `RANGE` while the lag grows: the cap is the pressure demanded last
-cut      slip beyond `RANGE` that grows, or beyond `HALF` and the wheel is not coming back: the cap falls
-hold     slip beyond `RANGE` that stays, or the wheel comes back: the cap stays
-return   slip within `RANGE` or steady, or the car slower than `LEAST_SPEED`: the cap rises until it no longer
-         acts
+cut      while the lag that is coming, in `AHEAD`, is beyond that of `slides`: the cap falls to where the
+         wheel comes back to it within `BACK_S`: little where it slips a little, to nothing where it stands
+return   then, at once to `RETURNED` of the pressure that the road carried, which is the least while the wheel
+         fell behind and the greatest while it came back; from there slowly, ever faster where the wheel rolls
+         beyond it, until the cap no longer acts. Fast where the car is slower than `LEAST_SPEED`
 
 The rate is the wheel's own against the accelerometer, not against the vehicle speed: a speed that errs, jumps
 or stands still caps nothing. A wheel that locks falls behind from sample to sample; a wheel speed that jumps
@@ -18,16 +23,20 @@ wheel's speed, `NOISE` sigma, by its second differences. A wheel that brakes no 
 neither falls behind nor comes back for `STEADY_S` is in the stable range of its tyre, or its sensor is
 scaled. The pressure of both returns, and is capped again only where the deficit grows anew.
 
-While ABS or ESP report activity the cap never falls: two controllers would cut the same wheel. This is no
-ABS: it seeks no optimal slip, has no yaw control and treats each wheel alone.
+A rear wheel has no more than `ABOVE_LOW` of what the road carries at the other one (select-low): with ice on
+one side its tyre keeps the force across that holds the car's course.
 
-Assumption: all constants; found with the simulated vehicle on friction of 0.2 to 1.2.
+While ABS or ESP report activity the cap never falls: two controllers would cut the same wheel. This is no
+ABS: it seeks no optimal slip and has no yaw control.
+
+Assumption: all constants; found with simulated vehicles on friction of 0.1 to 1.2.
 """
 
 import math
 
 import numpy as np
 
+from ecu.algorithm.brake import brake_gain
 from ecu.algorithm.inputs import fresh, usable
 from ecu.algorithm.lag import lag_gain
 from ecu.algorithm.monitoring.plausibility import SECOND_DIFFERENCE
@@ -48,6 +57,9 @@ SLIP_GUARD_STATE = np.dtype(
         ("latest", "f8", (4,)),  # of the last sample alone [m/s^2]
         ("before", "f8", (4,)),  # of the sample before that
         ("age", "f8", (4,)),  # of the lag [s]
+        ("pressed", "f8", (4,)),  # pressure as late as `growth`, motors as the pressure of their torque [Pa]
+        ("slides", "u1", (4,)),  # it is cut
+        ("grip", "f8", (4,)),  # pressure that the road carried at the last slip [Pa]
         ("freed_s", "f8", (4,)),  # time at push-out pressure without spinning up
         ("steady_s", "f8", (4,)),  # time for which it has slipped less than `HALF` and steadily
         ("denied", "u1", (4,)),  # it did not spin up, or slips steadily: that is no wheel that locks
@@ -61,13 +73,24 @@ GROWING = 10.0  # m/s^2; noise of the wheel speeds and braking as in RANGE stay 
 RETURNING = -5.0  # m/s^2
 STAYS, HALF, STEADY_S = 2.0, 0.5, 0.1  # m/s^2, slip, s
 GROWTH_LAG = 0.02  # s
+PRESSED_LAG = 0.05  # s: that, the median and a difference
 NOISE = 4.0  # sigma
 OF_GROWTH = 0.45  # sigma of the low-passed first difference of white noise over its sigma
 QUIET = 20.0  # m/s^2 of noise that the cycle of slipping and spinning up itself shows
 NOISE_S = 0.5
 SPIN_UP_S = 0.3  # lag of the hydraulics, and 15 m/s^2 at an adhesion of 0.05
 LEAST_SPEED = 3.0  # m/s
-CUT = 400.0 * BAR  # Pa/s
+WHOLLY = 3.4  # 3 by the brush model, and what nominal friction and load may be off
+LEAST_SLIDING = 0.03  # slip that radii and noise hide
+AHEAD = 0.06  # s: dead time and lag of the hydraulics
+AGAIN = 5.0  # m/s^2, of a wheel that is capped already
+STANDS = 0.02  # of the ground's speed
+BACK_S, LEAST_BACK = 0.15, 6.0  # s, m/s^2
+STILL = 0.9  # of what the road carried is carried by a tyre that slips on, until the hydraulics follow
+RETURNED = (0.97, 0.97, 0.9, 0.9)  # of `grip`, which is low-passed: the peak is higher
+CLIMB, FASTER = 0.25, 7.0  # of `grip` /s, 1/s of what is beyond it
+ABOVE_LOW = 1.2
+CUT = 400.0 * BAR  # Pa/s; back to a wheel whose sensor lies
 RETURN = 150.0 * BAR  # Pa/s
 
 
@@ -105,25 +128,83 @@ def _follow_lag(
 
 
 @kernel
+def _noise(state: Record, i: int) -> float:
+    """Return how far noise alone takes the growth of a lag beyond `QUIET` [m/s^2]."""
+    noise: float = NOISE * OF_GROWTH * state.noise[i] / (1e-9 * CYCLE_NS)
+    return max(noise - QUIET, 0.0)
+
+
+@kernel
 def _grows(state: Record, i: int) -> bool:
     """Return whether a wheel falls behind the car by more than its noise."""
-    noise = NOISE * OF_GROWTH * state.noise[i] / (1e-9 * CYCLE_NS)
-    grows: bool = state.growth[i] > GROWING + max(noise - QUIET, 0.0)
+    grows: bool = state.growth[i] > GROWING + _noise(state, i)
     return grows
 
 
 @kernel
-def _doubt(params: Record, state: Record, i: int, ground: float, slipping: bool, dt: float) -> None:
-    """Overwrite `denied`: a wheel that does not behave as one that locks, until its lag is gone or grows."""
+def _doubt(
+    params: Record, state: Record, i: int, ground: float, slipping: bool, far: bool, dt: float
+) -> None:
+    """Overwrite `denied`: a wheel that does not behave as one that locks, until its lag is gone or grows.
+
+    `slipping`: beyond its tyre's range; `far`: beyond `RANGE`.
+    """
     capped = state.capped[i] != 0 and slipping
     freed = capped and state.cap[i] <= params.push_out_pressure[i] and state.growth[i] > RETURNING
-    steady = capped and state.lag[i] < HALF * ground and abs(state.growth[i]) < STAYS
+    steady = capped and far and state.lag[i] < HALF * ground and abs(state.growth[i]) < STAYS
     state.freed_s[i] = state.freed_s[i] + dt if freed else 0.0
     state.steady_s[i] = state.steady_s[i] + dt if steady else 0.0
     if state.freed_s[i] > SPIN_UP_S or state.steady_s[i] > STEADY_S:
         state.denied[i] = 1
     elif not slipping or _grows(state, i):
         state.denied[i] = 0
+
+
+@kernel
+def _cut(state: Record, i: int, carried: float, inertia: float, beyond: float, least: float) -> float:
+    """Return the pressure [Pa] at which a wheel comes back; `beyond` [m/s]: lag to lose, `least` [Pa]."""
+    back = max(beyond / BACK_S, LEAST_BACK)
+    return max(min(state.cap[i], STILL * carried - inertia * back), least)
+
+
+@kernel
+def _remember(state: Record, i: int, carried: float, stands: bool) -> None:
+    """Follow the pressure that the road carries while a wheel slips [Pa]; unknown of one that stands."""
+    if not state.slides[i]:
+        state.slides[i], state.grip[i] = 1, 0.0 if stands else max(state.cap[i], state.pressed[i])
+    if not stands:
+        comes_back = state.growth[i] < 0.0
+        state.grip[i] = max(state.grip[i], carried) if comes_back else min(state.grip[i], carried)
+
+
+@kernel
+def _give_back(state: Record, i: int, carried: float, watching: bool, dt: float) -> None:
+    """Raise the cap of a wheel that slips no more."""
+    if state.slides[i] or state.growth[i] < RETURNING:
+        state.slides[i], state.grip[i] = 0, max(state.grip[i], carried)
+        state.cap[i] = max(state.cap[i], RETURNED[i] * state.grip[i])
+    rise = CLIMB * max(state.grip[i], BAR) + FASTER * max(state.cap[i] - state.grip[i], 0.0)
+    if state.denied[i]:
+        rise = CUT
+    elif not watching:
+        rise = RETURN
+    state.cap[i] += rise * dt
+
+
+@kernel
+def _select_low(state: Record, sent: Record, wanted: Record) -> None:
+    """Cap a rear wheel by what the road carries at the other one; hold it while that slips."""
+    for i in range(2, 4):
+        low = 5 - i
+        if not state.capped[low] or state.denied[low]:
+            continue
+        most = ABOVE_LOW * max(state.cap[low], state.grip[low])
+        if state.slides[low]:
+            most = max(sent[i], state.pressed[i])
+        if most < wanted[i]:
+            if not state.capped[i]:
+                state.capped[i], state.grip[i], state.cap[i] = 1, most, most
+            state.cap[i] = min(state.cap[i], most)
 
 
 @kernel
@@ -134,6 +215,8 @@ def guard_slip(
     estimate: Record,
     speed: float,
     sent: Record,
+    pressure: Record,
+    motor: Record,
     wanted: Record,
     torque: Record,
     dt: float,
@@ -147,31 +230,53 @@ def guard_slip(
         estimate: `ESTIMATE`.
         speed: of the car [m/s], negative backwards, NaN where it is not known.
         sent: pressures demanded in the last cycle [Pa], shape (4,).
+        pressure: of the callipers at the end of the coming cycle, by the demands sent [bar], shape (4,).
+        motor: torques demanded of the motors in the last cycle [N m], shape (4,).
         wanted: pressures demanded by the pressure law now [Pa], shape (4,).
         torque: demanded of each wheel's motor and lining together [N m], shape (4,).
         dt: time since the last cycle [s].
     """
     watching = abs(speed) > LEAST_SPEED
     other = _flag(inputs, ABS_ACTIVE) or _flag(inputs, ESP_ACTIVE)
-    state.acting = 0
     braking = -math.copysign(1.0, speed) * estimate.accel_x if watching else 0.0
     for i in range(4):
         ground = abs(corner_speed(params, estimate, speed, i)) if watching else 0.0
         _follow_lag(params, state, inputs, ground, braking, i, dt)
-        slipping = watching and state.lag[i] > RANGE * max(ground, LEAST_SPEED)
-        _doubt(params, state, i, ground, slipping, dt)
-        slipping = slipping and state.denied[i] == 0
-        if slipping and not state.capped[i] and _grows(state, i):
+        per_torque, radius = 1.0 / (brake_gain(params, i) * params.mu_nominal[i]), params.wheel_radius[i]
+        inertia = per_torque * params.wheel_inertia[i] / radius
+        presses = BAR * pressure[i] + per_torque * motor[i]
+        state.pressed[i] += lag_gain(dt, PRESSED_LAG) * (presses - state.pressed[i])
+        carried = state.pressed[i] - inertia * (state.growth[i] + braking)
+        known = carried if state.slides[i] else max(state.grip[i], carried)
+        adhesion = known / (per_torque * radius * max(estimate.load[i], 1.0))
+        slides = min(max(WHOLLY * adhesion / params.slip_stiffness[i], LEAST_SLIDING), RANGE)
+        base = max(ground, LEAST_SPEED)
+        target, lag = slides * base, state.lag[i]
+        far = watching and lag > RANGE * base
+        slipping = watching and lag > target if state.capped[i] else far
+        _doubt(params, state, i, ground, slipping, far, dt)
+        begins = far and _grows(state, i) and state.denied[i] == 0
+        if begins and not state.capped[i]:
             state.capped[i], state.cap[i] = 1, sent[i]
-        falls = min(state.growth[i], state.latest[i]) > STAYS
-        if state.lag[i] > HALF * ground:
-            falls = state.growth[i] > RETURNING
-        if slipping and falls and not other:
-            state.cap[i] = max(state.cap[i] - CUT * dt, params.push_out_pressure[i])
-        if not slipping:
-            state.cap[i] += (CUT if state.denied[i] else RETURN) * dt
-            if not state.cap[i] < wanted[i]:
+        if state.capped[i]:
+            beyond = lag + AHEAD * state.growth[i] - target
+            again = begins or state.slides[i] != 0 or state.growth[i] > AGAIN + _noise(state, i)
+            if watching and beyond > 0.0 and again and not state.denied[i]:
+                least = params.push_out_pressure[i]
+                stands = state.rolled[i] < STANDS * ground
+                _remember(state, i, carried, stands)
+                if not other:
+                    state.cap[i] = least if stands else _cut(state, i, carried, inertia, beyond, least)
+            else:
+                _give_back(state, i, carried, watching, dt)
+                if not state.cap[i] < wanted[i]:
+                    state.capped[i] = 0
+            if not torque[i] > 0.0:
                 state.capped[i] = 0
-        if not torque[i] > 0.0:
-            state.capped[i] = 0
+        if not state.capped[i]:
+            state.slides[i], state.grip[i] = 0, 0.0
+    if watching and not other:
+        _select_low(state, sent, wanted)
+    state.acting = 0
+    for i in range(4):
         state.acting = max(state.acting, state.capped[i])

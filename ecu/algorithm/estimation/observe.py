@@ -161,7 +161,7 @@ def _observe_jointly(
         doubt_speed(p, joint, u)
     update_joint(p, joint, u, s.motion, s.wheel_load.load, s.hydraulics, braking, dt)
     if joint.closed and p.transmit:
-        follow_ceiling(p, joint, braking)
+        follow_ceiling(p, joint, s.guard.capped, braking)
     if joint.closed and joint.released and not p.transmit:
         compare_drive(p, s.whole, joint)
     if braking and joint.closed:

@@ -82,6 +82,7 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "history",
         "late",
         "late_known",
+        "slides",
     ),
 }
 

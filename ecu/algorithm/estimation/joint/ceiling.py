@@ -31,6 +31,7 @@ NEAR = 0.8  # of the learned peak that the car uses: there slip shows where the 
 ROLLING_S, CALM = 1.0, 1.0  # s, m/s^2: what a wheel slips by while it rolls is an error of its radius
 LASTS_S = 0.5  # for which an error of the curve's shape is the same
 SLIPS = 0.1  # slip that no error of the speed explains; a wheel on a dry road has its peak there
+HELD_SLIPS = 0.03  # of one that the slip guard holds: it has slipped more
 GATE = 3.0
 LEAST_ADHESION, LEAST_SPEED = 0.03, 4.0  # -, m/s
 ITERATIONS = 4
@@ -78,12 +79,13 @@ def _raise(state: Record, used: float) -> None:
 
 
 @kernel
-def follow_ceiling(params: Record, state: Record, braking: bool) -> None:
+def follow_ceiling(params: Record, state: Record, held: Record, braking: bool) -> None:
     """Overwrite the ceiling at the end of a window.
 
     Args:
         params: `PARAMS`.
         state: `JOINT_STATE`; `ceiling`, its relative variance, and each wheel's slip are overwritten.
+        held: wheels held by the slip guard, shape (4,).
         braking: a brake application lasts.
     """
     w = state.window
@@ -106,7 +108,7 @@ def follow_ceiling(params: Record, state: Record, braking: bool) -> None:
             state.rolling_slip[i] += (slip - state.rolling_slip[i]) * min(w.time / ROLLING_S, 1.0)
         slip -= state.rolling_slip[i]
         change, state.measured_slip[i] = slip - state.measured_slip[i], slip
-        state.slipping[i] = 1 if slip > SLIPS else 0
+        state.slipping[i] = 1 if slip > (HELD_SLIPS if held[i] else SLIPS) else 0
         if state.slipping[i]:
             slips += w.load[i]
             left, right = left or i % 2 == 0, right or i % 2 == 1

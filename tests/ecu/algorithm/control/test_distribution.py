@@ -168,6 +168,7 @@ class Watch:
         self.estimate = np.zeros(1, ESTIMATE)[0]
         self.estimate["load"] = self.params["static_load"]
         self.error, self.failed = np.zeros(4), np.zeros(4, np.uint8)
+        self.guarded = np.zeros(4, np.uint8)
         params["rear_slip_margin"] = 0.005
         self.state["free_s"] = learned
 
@@ -190,8 +191,16 @@ class Watch:
             inputs = self.feed(wheel_speed=omega + noise * random.standard_normal(4))
             if lost is not None:
                 inputs[0]["new"][WHEEL_SPEED + lost] = 0
-            watch_trailing(p, self.state, inputs[0], self.estimate, self.failed, decel, speed, reckoned, DT)
+            wheels = self.failed, self.guarded
+            watch_trailing(p, self.state, inputs[0], self.estimate, *wheels, decel, speed, reckoned, DT)
         return float(self.state["trailing"])
+
+
+@pytest.mark.parametrize("guarded", [(1, 1, 0, 0), (1, 0, 0, 0), (0, 0, 1, 1)])
+def test_a_front_wheel_that_the_slip_guard_holds_is_no_measure(params, state, feed, guarded) -> None:
+    watch = Watch(params, state, feed)
+    watch.guarded[:] = guarded
+    assert (watch.run(WORSE, seconds=1.0) == 1.0) == (guarded[:2] == (1, 1))
 
 
 @pytest.fixture

@@ -5,7 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from ecu.algorithm.control.slip_guard import SLIP_GUARD_STATE, guard_slip
+from ecu.algorithm.control.slip_guard import (
+    ABOVE_LOW,
+    AHEAD,
+    BACK_S,
+    RANGE,
+    SLIP_GUARD_STATE,
+    STILL,
+    guard_slip,
+)
 from ecu.algorithm.estimate import ESTIMATE
 from ecu.contract.signals import INPUT
 
@@ -27,16 +35,22 @@ class Wheels:
     def __init__(self, params, feed, speed: float = 20.0, turns: float = 1.0, **flags: float) -> None:
         self.params, self.feed, self.flags, self.turns = params[0], feed, flags, turns
         self.state, self.estimate = new_guard(), np.zeros(1, ESTIMATE)[0]
+        self.estimate["load"] = self.params["static_load"]
         self.inputs, self.speed = feed(), speed
-        self.sent, self.wanted = SENT.copy(), SENT.copy()
+        self.sent, self.wanted, self.motor = SENT.copy(), SENT.copy(), np.zeros(4)
+        self.state["pressed"] = SENT
+
+    def guard(self, speed: float, dt: float = DT) -> None:
+        """Run the kernel on the inputs as they are; the callipers hold what was sent."""
+        known = self.params, self.state, self.inputs[0], self.estimate, speed
+        guard_slip(*known, self.sent, self.sent / BAR, self.motor, self.wanted, self.wanted, dt)
 
     def cycle(self, slip: float) -> float:
         """Run a cycle; return the front-left wheel's cap [bar], infinite if it has none."""
         omega = self.turns * abs(self.speed) / self.params["wheel_radius"]
         omega[0] *= 1.0 + slip
         self.feed(self.inputs, wheel_speed=omega, **self.flags)
-        pressures = self.sent, self.wanted, self.wanted
-        guard_slip(self.params, self.state, self.inputs[0], self.estimate, self.speed, *pressures, DT)
+        self.guard(self.speed)
         assert not self.state["capped"][1:].any()
         assert self.state["acting"] == self.state["capped"][0]
         if not self.state["capped"][0]:
@@ -55,24 +69,42 @@ def wheels(params, feed) -> Wheels:
     return Wheels(params, feed)
 
 
-def test_a_wheel_that_falls_behind_is_capped_from_a_tenth_of_slip_on(wheels: Wheels) -> None:
-    caps = wheels.run_into(-0.5)
-    assert all(math.isinf(cap) for cap in caps[: 5 + 2])  # 5 and 10 % of slip
-    assert caps[5 + 2] == pytest.approx(56.0)  # 15 %: the last demand, less a cycle of 400 bar/s
-    assert np.diff(caps[5 + 2 :]) == pytest.approx(np.full(7, -4.0))
+@pytest.mark.parametrize("growth", [12.0, 25.0, 60.0, 100.0])
+def test_a_wheel_that_falls_behind_is_capped_from_a_tenth_of_slip_on(wheels: Wheels, growth) -> None:
+    """The low-pass and the median take 30 ms."""
+    slips = [-growth * k * DT / 20.0 for k in range(60)]
+    caps = [wheels.cycle(slip) for slip in slips]
+    first = next(k for k, cap in enumerate(caps) if math.isfinite(cap))
+    assert 0.10 < -slips[first] <= 0.10 + growth * 3 * DT / 20.0
+    assert caps[first] < 60.0
 
 
-def test_cut_down_to_the_push_out_pressure_and_no_further(wheels: Wheels) -> None:
-    wheels.run_into(-1.0)
-    assert [wheels.cycle(-1.0) for _ in range(30)][-1] == pytest.approx(0.5)
+def test_a_wheel_that_stands_is_cut_down_to_the_push_out_pressure_and_no_further(wheels: Wheels) -> None:
+    caps = wheels.run_into(-1.0)
+    assert caps[-1] == pytest.approx(0.5)
+    assert [wheels.cycle(-1.0) for _ in range(20)] == pytest.approx([0.5] * 20)
 
 
-@pytest.mark.parametrize(("slip", "cut"), [(-0.2, False), (-0.45, False), (-0.55, True)])
-def test_a_slip_that_stays_gets_its_pressure_back_unless_the_wheel_nearly_stands(wheels, slip, cut) -> None:
+def test_cut_to_what_the_road_carries_less_what_brings_the_wheel_back(wheels: Wheels) -> None:
+    """What a wheel slips more than it may it loses within 0.15 s: by torque over inertia."""
+    wheels.run_into(-0.25, 0.25)  # at 20 m/s^2
+    p = wheels.params
+    gain = 2.0 * p["piston_area"][0] * p["effective_radius"][0] * p["mu_nominal"][0]
+    bar = p["wheel_inertia"][0] / (p["wheel_radius"][0] * gain) / BAR  # of 1 m/s^2
+    cap = wheels.cycle(-0.26)
+    beyond = (0.26 - RANGE) * 20.0 + AHEAD * wheels.state["growth"][0]
+    carried = wheels.state["pressed"][0] / BAR - bar * wheels.state["growth"][0]
+    assert cap == pytest.approx(STILL * carried - bar * beyond / BACK_S, rel=0.02)
+
+
+@pytest.mark.parametrize(("slip", "returned"), [(-0.2, True), (-0.45, True), (-0.55, False)])
+def test_a_slip_that_stays_gets_its_pressure_back_unless_the_wheel_nearly_stands(
+    wheels, slip, returned
+) -> None:
     wheels.run_into(slip, 0.05)
-    caps = [wheels.cycle(slip) for _ in range(30)]
-    assert (min(caps) == 0.5) == cut
-    assert math.isinf(caps[-1]) != cut
+    caps = [wheels.cycle(slip) for _ in range(40 if returned else 25)]
+    assert math.isinf(caps[-1]) == returned
+    assert returned or caps[-1] < 10.0
 
 
 def test_a_sensor_that_is_scaled_at_once_costs_a_tenth_of_a_second(wheels: Wheels) -> None:
@@ -82,18 +114,36 @@ def test_a_sensor_that_is_scaled_at_once_costs_a_tenth_of_a_second(wheels: Wheel
     assert len(below) * DT <= 0.15
 
 
-def test_held_while_the_wheel_comes_back_then_given_back_at_150_bar_a_second(wheels: Wheels) -> None:
-    caps = wheels.run_into(-0.4)
-    slips = np.linspace(-0.4, -0.11, 8)
-    held = [wheels.cycle(slip) for slip in slips][2:]  # the growth is low-passed
-    assert held == pytest.approx([held[0]] * len(held))
-    assert held[0] <= caps[-1]
-    given = [wheels.cycle(-0.02) for _ in range(10)]
-    assert np.diff([held[-1], *given]) == pytest.approx(np.full(10, 1.5))
-    released = [wheels.cycle(-0.02) for _ in range(30)]
-    assert math.isinf(released[-1])
-    below = [cap for cap in (*given, *released) if math.isfinite(cap)]
-    assert max(below) <= 60.0  # let go where the demand is reached, not before
+def test_given_back_to_what_the_road_carried_then_slowly_then_ever_faster(wheels: Wheels) -> None:
+    """A wheel that comes back at 27 m/s^2, as a road that carries 35 bar would have it with 10 bar on it."""
+    wheels.run_into(-0.4)
+    wheels.wanted[:] = 150.0 * BAR
+    cut = [wheels.cycle(slip) for slip in np.linspace(-0.4, -0.02, 28)]
+    caps = [wheels.cycle(-0.02) for _ in range(150)]
+    given = [cap for cap in caps if math.isfinite(cap)]
+    print(f"cut to {min(cut):.1f}, given {given[0]:.1f} to {max(given):.1f} bar in {len(given)} cycles")
+    rises = np.diff(given)
+    assert (rises > 0.0).all()
+    assert rises[0] < 0.01 * given[0]
+    assert rises[-1] > 5.0 * rises[0]
+    assert math.isinf(caps[-1])  # let go where the demand is reached
+
+
+@pytest.mark.parametrize(("left", "right"), [(2, 3), (3, 2)])
+def test_a_rear_wheel_brakes_by_what_the_road_carries_at_the_other_one(params, feed, left, right) -> None:
+    state, estimate, inputs = new_guard(), np.zeros(1, ESTIMATE)[0], feed()
+    estimate["load"], state["pressed"] = params[0]["static_load"], SENT
+    sent = SENT.copy()
+    for slip in [*np.linspace(0.0, 0.5, 12), *np.linspace(0.5, 0.02, 20), *[0.02] * 5]:
+        omega = 20.0 / params[0]["wheel_radius"]
+        omega[left] *= 1.0 - slip
+        feed(inputs, wheel_speed=omega)
+        pressures = sent, sent / BAR, np.zeros(4), SENT, SENT
+        guard_slip(params[0], state, inputs[0], estimate, 20.0, *pressures, DT)
+        sent = np.where(state["capped"], np.minimum(state["cap"], SENT), SENT)
+    assert state["capped"][:2].tolist() == [0, 0]
+    assert 0.8 < state["cap"][right] / state["cap"][left] <= ABOVE_LOW
+    assert sent[right] < 0.95 * SENT[right]
 
 
 @pytest.mark.parametrize(
@@ -178,9 +228,8 @@ def test_an_old_sample_is_not_taken_twice(wheels: Wheels) -> None:
     before = wheels.state["growth"][0], wheels.state["lag"][0]
     omega = wheels.inputs[0]["value"].copy()
     wheels.inputs[0]["new"][place] = 0
-    pressures = wheels.sent, wheels.wanted, wheels.wanted
     for _ in range(3):
-        guard_slip(wheels.params, wheels.state, wheels.inputs[0], wheels.estimate, 30.0, *pressures, DT)
+        wheels.guard(30.0)
     assert (wheels.inputs[0]["value"] == omega).all()
     assert (wheels.state["growth"][0], wheels.state["lag"][0]) == before
     assert wheels.state["age"][0] == pytest.approx(3 * DT)
@@ -190,8 +239,7 @@ def test_of_a_lost_wheel_speed_nothing_is_kept(wheels: Wheels) -> None:
     place = INPUT["wheel_speed_fl"]
     wheels.run_into(-0.4)
     wheels.inputs[0]["new"][place] = wheels.inputs[0]["verdict"][place] = 0
-    pressures = wheels.sent, wheels.wanted, wheels.wanted
-    guard_slip(wheels.params, wheels.state, wheels.inputs[0], wheels.estimate, 20.0, *pressures, DT)
+    wheels.guard(20.0)
     assert wheels.state["lag"][0] == wheels.state["growth"][0] == 0.0
 
 
@@ -205,24 +253,14 @@ def test_growth_that_is_not_finite_is_forgotten_while_the_sensor_lives(wheels: W
 def test_a_cap_is_set_once_and_not_raised_by_the_demand(wheels: Wheels) -> None:
     """While the wheel locks the demand that was sent is the cap itself, whatever the driver adds."""
     caps = [cap for cap in wheels.run_into(-0.9) if math.isfinite(cap)]
-    wheels.sent[0] = 150.0 * BAR
-    assert wheels.cycle(-0.95) == pytest.approx(caps[-1] - 4.0)
+    wheels.sent[0] = wheels.wanted[0] = 150.0 * BAR
+    assert wheels.cycle(-0.95) <= caps[-1]
 
 
 @pytest.mark.parametrize(("speed", "capped"), [(2.9, False), (3.2, True), (4.0, True), (-4.0, True)])
 def test_wheels_are_watched_from_three_metres_per_second_on(params, feed, speed, capped) -> None:
     caps = Wheels(params, feed, speed).run_into(-0.95)
     assert any(map(math.isfinite, caps)) == capped
-
-
-@pytest.mark.parametrize(("returning", "cut"), [(3.0, True), (4.5, True), (5.5, False), (8.0, False)])
-def test_the_cap_falls_until_a_wheel_comes_back_at_five_metres_per_second_squared(
-    wheels: Wheels, returning: float, cut: bool
-) -> None:
-    wheels.run_into(-0.9)
-    wheels.wanted[:], wheels.state["cap"][0] = 180.0 * BAR, 170.0 * BAR
-    caps = [wheels.cycle(-0.9 + returning * k * DT / 20.0) for k in range(30)]
-    assert (caps[-1] < caps[-10]) == cut
 
 
 def test_growth_is_low_passed_with_20_ms(wheels: Wheels) -> None:
@@ -264,7 +302,7 @@ def test_each_wheel_is_watched_by_its_own_sensor(params, feed, corner: int, lost
         feed(inputs, wheel_speed=omega)
         if lost:
             inputs[0]["new"][place] = inputs[0]["verdict"][place] = 0
-        guard_slip(params[0], state, inputs[0], estimate, 20.0, SENT, SENT, SENT, DT)
+        guard_slip(params[0], state, inputs[0], estimate, 20.0, SENT, SENT / BAR, np.zeros(4), SENT, SENT, DT)
     assert state["capped"].tolist() == [int(i == corner and not lost) for i in range(4)]
 
 
@@ -279,7 +317,7 @@ def test_a_late_sample_is_waited_for_and_a_lost_one_forgotten(params, feed, corn
         feed(inputs, wheel_speed=omega)
         inputs[0]["new"][place] = k < 5
         inputs[0]["verdict"][place] *= k < 7
-        guard_slip(params[0], state, inputs[0], estimate, 20.0, SENT, SENT, SENT, DT)
+        guard_slip(params[0], state, inputs[0], estimate, 20.0, SENT, SENT / BAR, np.zeros(4), SENT, SENT, DT)
         lags.append(float(state["lag"][corner]))
     assert lags == pytest.approx([20.0 * 0.07 * k for k in (0, 1, 2, 3, 4, 4, 4)] + [0.0])
     assert state["growth"][corner] == 0.0
@@ -288,8 +326,7 @@ def test_a_late_sample_is_waited_for_and_a_lost_one_forgotten(params, feed, corn
 def test_no_time_between_two_cycles_changes_nothing(wheels: Wheels) -> None:
     wheels.run_into(-0.08)
     before = wheels.state.copy()
-    pressures = wheels.sent, wheels.wanted, wheels.wanted
-    guard_slip(wheels.params, wheels.state, wheels.inputs[0], wheels.estimate, 20.0, *pressures, 0.0)
+    wheels.guard(20.0, 0.0)
     assert wheels.state["growth"].tolist() == before["growth"].tolist()
     assert wheels.state["lag"].tolist() == before["lag"].tolist()
 

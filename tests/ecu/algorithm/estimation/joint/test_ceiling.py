@@ -29,6 +29,7 @@ class Road:
         self.params, self.state = params, np.zeros(1, JOINT_STATE)[0]
         set_prior(params, self.state)
         self.state["x"][V] = SPEED
+        self.held = np.zeros(4, np.uint8)
 
     def brake(self, road: float, slips, windows: int = 10, rolls: float = 0.0, braking: bool = True) -> None:
         """Brake for some windows at these slips; wheels that roll brake with the adhesion `rolls`."""
@@ -44,7 +45,7 @@ class Road:
         window["accel"] = -(force.sum() + drag) / p["mass"]
         state["force"], state["measured_slip"] = np.where(slides, 0.0, -force), slips
         for _ in range(windows):
-            follow_ceiling(p, state, braking)
+            follow_ceiling(p, state, self.held, braking)
 
     @property
     def known(self) -> bool:
@@ -124,7 +125,7 @@ def test_a_wheel_that_spins_up_is_no_grip_of_the_road(road) -> None:
     turned = p["wheel_inertia"][2:] * SPEED * 0.04 / (WINDOW_S * p["wheel_radius"][2:] ** 2)
     state["measured_slip"][2:] = 0.05
     state["window"]["accel"] -= turned.sum() / p["mass"]
-    follow_ceiling(p, state, True)
+    follow_ceiling(p, state, road.held, True)
     assert state["ceiling"] == pytest.approx(before, rel=0.01)
 
 
@@ -134,14 +135,22 @@ def test_a_tyre_of_another_size_does_not_slip(road) -> None:
     road.brake(0.9, (0.08,) * 4, windows=0)
     road.state["window"]["accel"] = 0.0
     for _ in range(100):
-        follow_ceiling(road.params, road.state, False)
+        follow_ceiling(road.params, road.state, road.held, False)
     road.state["released"] = 0
     road.brake(0.9, ROLLING, windows=1)  # the forces of wheels that roll
     road.state["window"]["omega"] = SPEED * 0.9 / road.params["wheel_radius"]
     for _ in range(20):
-        follow_ceiling(road.params, road.state, True)
+        follow_ceiling(road.params, road.state, road.held, True)
     assert road.state["ceiling_variance"] == 0.0
     assert road.state["measured_slip"] == pytest.approx(0.02, abs=0.002)
+
+
+@pytest.mark.parametrize("held", [0, 1])
+def test_wheels_that_the_slip_guard_holds_show_it_near_their_peak(road, held) -> None:
+    road.held[:] = held
+    road.brake(0.25, (0.05, 0.05, 0.05, 0.05), windows=40)
+    assert road.known == bool(held)
+    assert not held or road.state["ceiling"] == pytest.approx(0.25, rel=0.1)
 
 
 def test_it_is_forgotten_with_distance(road) -> None:
