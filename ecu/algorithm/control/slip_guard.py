@@ -24,7 +24,7 @@ neither falls behind nor comes back for `STEADY_S` is in the stable range of its
 scaled. The pressure of both returns, and is capped again only where the deficit grows anew.
 
 A rear wheel has no more than `ABOVE_LOW` of what the road carries at the other one (select-low): with ice on
-one side its tyre keeps the force across that holds the car's course.
+one side its tyre has the force across that keeps the car's heading.
 
 While ABS or ESP report activity the cap never falls: two controllers would cut the same wheel. This is no
 ABS: it seeks no optimal slip and has no yaw control.
