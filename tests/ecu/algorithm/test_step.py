@@ -48,8 +48,13 @@ SEEN = (  # inputs of a car with everything but a speed reference
     "pedal_position",
     "decel_demand",
 )
-# NaN here: the car does not blend, has no emission model, and a test ratio needs its measurement.
-NOT_BUILT = ("motor_demand_", "particle", "test_ratio")  # ratios: of what was fused alone
+# NaN here: the car does not blend, has no emission model; a test ratio or a lateness needs its measurement.
+NOT_BUILT = (
+    "motor_demand_",
+    "particle",
+    "test_ratio",
+    "pressure_lateness",
+)  # ratios: of what was fused alone
 PROMISED = [k for k, name in enumerate(OUTPUT_COLUMNS) if not name.startswith(NOT_BUILT)]
 
 
