@@ -62,7 +62,7 @@ def drives() -> Path:
 
 
 class InThisProcess(Executor):
-    """Does each task at once; what is pickled on its way to a process is pickled here too."""
+    """Does each task at once; what a process would be sent pickled is pickled here too."""
 
     def __init__(self, *arguments: object, **named: object) -> None:
         pass

@@ -17,8 +17,9 @@ Lateness. While all pressures rise, or fall, each shows by how much it is later 
 
     behind = (model - measured) / model'
 
-of which the second least counts: two brakes that give nothing are not late. Once it is known to `SURE`, what
-is beyond `ALLOWED` stretches all times of the model; less may be an error of gain or zero.
+of which the second least counts: two brakes that give nothing are not late. Once it is known to `SURE` and by
+its standard deviation beyond `ALLOWED`, all times of the model are stretched; less may be an error of gain or
+zero.
 """
 
 import math
@@ -37,7 +38,8 @@ KEPT = round(LONGEST_DEAD_TIME / CYCLE) + 1  # demands
 
 HYDRAULICS_STATE = np.dtype(
     [
-        ("history", "f8", (KEPT, 4)),  # demands of the last cycles [bar], the newest in row 0
+        ("history", "f8", (4, KEPT)),  # demands of the last cycles [bar], in a ring
+        ("newest", "i8", (4,)),  # place of the last one in it
         ("model", "f8", (4,)),  # pressure by the demands alone [bar]
         ("rate", "f8", (4,)),  # bar/s
         ("value", "f8", (4,)),  # the same pressure, corrected by the sensor [bar]
@@ -79,7 +81,8 @@ def stretch(params: Record, state: Record, direction: int) -> float:
     """
     shown = direction if _is_known(state, direction) else 1 - direction
     late: float = state.late[shown]
-    if not _is_known(state, shown) or abs(late) < ALLOWED:
+    beyond = max(abs(late) - ALLOWED, 0.0)
+    if not _is_known(state, shown) or beyond * beyond * state.late_known[shown] < 1.0:
         return 1.0
     return 1.0 + late / (params.dead_time[shown] + params.pressure_lag[shown])
 
@@ -152,11 +155,20 @@ def _half_cycles(dead_time: float) -> int:
 
 
 @kernel
-def _advance_half_cycle(params: Record, state: Record, i: int, target: float) -> None:
+def _delayed(state: Record, i: int, half_cycles: int) -> float:
+    """Return the demand of a wheel as old as that [bar], 0: of the coming cycle."""
+    place = state.newest[i] - half_cycles // 2
+    demand: float = state.history[i, place if place >= 0 else place + KEPT]
+    return demand
+
+
+@kernel
+def _advance_half_cycle(
+    params: Record, state: Record, i: int, target: float, slow: tuple[float, float]
+) -> None:
     direction = FALL if target < state.model[i] else RISE
-    slow = stretch(params, state, direction)
-    inertia, lag = slow * slow * params.pressure_inertia[direction], slow * params.pressure_lag[direction]
-    half = 0.25 * CYCLE
+    inertia = slow[direction] * slow[direction] * params.pressure_inertia[direction]
+    lag, half = slow[direction] * params.pressure_lag[direction], 0.25 * CYCLE
     weight = half * (lag + half) / inertia
     pull = 2.0 * half / inertia * (target - state.model[i])
     rate = (state.rate[i] * (1.0 - weight) + pull) / (1.0 + weight)
@@ -167,16 +179,16 @@ def _advance_half_cycle(params: Record, state: Record, i: int, target: float) ->
 
 @kernel
 def _advance(params: Record, state: Record, i: int, sent: float) -> None:
-    demand, before = state.history, state.model[i]
-    rising = _half_cycles(stretch(params, state, RISE) * params.dead_time[RISE])
-    falling = _half_cycles(stretch(params, state, FALL) * params.dead_time[FALL])
-    for k in range(KEPT - 1, 0, -1):
-        demand[k, i] = demand[k - 1, i]
-    demand[0, i] = sent
+    slow = stretch(params, state, RISE), stretch(params, state, FALL)
+    rising = _half_cycles(slow[RISE] * params.dead_time[RISE])
+    falling = _half_cycles(slow[FALL] * params.dead_time[FALL])
+    before = state.model[i]
+    state.newest[i] = state.newest[i] + 1 if state.newest[i] + 1 < KEPT else 0
+    state.history[i, state.newest[i]] = sent
     for passed in (1, 2):
-        rise, fall = demand[(rising - passed) // 2, i], demand[(falling - passed) // 2, i]
+        rise, fall = _delayed(state, i, rising - passed), _delayed(state, i, falling - passed)
         target = min(rise, fall) if rising >= falling else max(rise, fall)
-        _advance_half_cycle(params, state, i, target)
+        _advance_half_cycle(params, state, i, target, slow)
     change = state.model[i] - before
     state.value[i] += change
     state.variance[i] += WALK**2 * CYCLE + (SHARE * change) ** 2

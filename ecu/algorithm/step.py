@@ -300,8 +300,7 @@ def _control(p: Record, s: Record, u: Record, dt: float) -> float:
     e, demands = s.estimate, s.demands
     speed = e.speed if e.started else math.nan
     decel = update_demand(p, s.demand, u, speed, dt)
-    backwards = e.backwards != 0
-    failed = s.failed_brakes.failed
+    backwards, failed = e.backwards != 0, s.failed_brakes.failed
     reckoned = s.speeds.reckoned if s.speeds.started else 0.0
     watch_trailing(p, s.distribution, u, e, failed, s.guard.capped, decel, speed, reckoned, dt)
     distribute(p, s.distribution, e.mass, decel, backwards, dt)

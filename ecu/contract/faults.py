@@ -65,7 +65,7 @@ def _corners(stem: str, meaning: str, remedy: str) -> list[tuple[str, str, str]]
 
 # An input that the others contradict is left out, or corrected where the text says so: in the order of the bits.
 _CONTRADICTED: Final = (
-    *_corners("wheel_speed", "turns as the other wheels and the car's motion do not allow, or is far noisier than configured: it is left out; all four: scaled alike, and used", "check that wheel's sensor, its wires and the tyre's size"),
+    *_corners("wheel_speed", "turns as the other wheels and the car's motion do not allow, or is far noisier than configured: it is left out; all four: used where they are scaled alike, else left out", "check that wheel's sensor, its wires and the tyre's size"),
     ("accel_x", "zero or scale have drifted from what wheels and torques show: it is corrected by what is known of them, or left out", "check mounting, supply and calibration of the IMU"),
     ("accel_y", "contradicts yaw rate, steering and wheels: it is left out", "check mounting, supply and calibration of the IMU"),
     ("yaw_rate", "contradicts lateral acceleration, steering and wheels: it is left out", "check mounting, supply and calibration of the IMU"),

@@ -1,4 +1,4 @@
-"""A car whose hydraulic unit is another one than the thesis's: told, learned or unknown."""
+"""A car whose hydraulic unit is another one than the thesis's: configured, learned or unknown."""
 
 import numpy as np
 import pytest
@@ -60,11 +60,11 @@ def friction_error(unit: str, config: Config) -> float:
     [("twice as late", 3.0), ("four times", 15.0), ("half", 4.0), ("80 bar/s", 10.0)],
 )
 def test_motors_and_linings_change_torque_where_the_unit_is_known(unit, next_one) -> None:
-    """The sum beside the demand [%], worst of the cars: told, and in the application after the first."""
-    errors = {"told": 0.0, "first": 0.0, "next": 0.0}
+    """The sum beside the demand [%], worst of the cars: configured, and after the first application."""
+    errors = {"configured": 0.0, "first": 0.0, "next": 0.0}
     for seed in SEEDS:
         found, learned = {}, new_state(new_params(blended(0.7)))["hydraulics"]
-        for case, given in (("told", UNITS[unit][2]), ("first", USUAL), ("next", USUAL)):
+        for case, given in (("configured", UNITS[unit][2]), ("first", USUAL), ("next", USUAL)):
             config = knowing(blended(0.7), given)
             loop = car_with(unit, "hand-over", config, seed)
             if case == "next":
@@ -74,26 +74,26 @@ def test_motors_and_linings_change_torque_where_the_unit_is_known(unit, next_one
             learned = loop.sides.state["hydraulics"].copy()
         errors = {case: max(errors[case], one.below, one.above) for case, one in found.items()}
     print(unit, {case: f"{error:.1f} %" for case, error in errors.items()})
-    assert errors["told"] < 2.0
-    assert errors["told"] < errors["first"] - 1.0
+    assert errors["configured"] < 2.0
+    assert errors["configured"] < errors["first"] - 1.0
     assert errors["next"] < next_one
 
 
 @pytest.mark.parametrize("unit", ["twice as late", "four times", "half"])
-def test_a_unit_whose_times_are_others_is_learned_as_well_as_told(unit) -> None:
+def test_a_unit_whose_times_are_others_is_learned_as_well_as_configured(unit) -> None:
     base = load_config(resource("config/suv.toml"))
-    told, learned = (friction_error(unit, knowing(base, given)) for given in (UNITS[unit][2], USUAL))
-    print(f"{unit}: told {told:.1f} %, learned {learned:.1f} %")
-    assert learned < 1.1 * told
+    configured, learned = (friction_error(unit, knowing(base, given)) for given in (UNITS[unit][2], USUAL))
+    print(f"{unit}: configured {configured:.1f} %, learned {learned:.1f} %")
+    assert learned < 1.1 * configured
 
 
-def test_a_limited_rate_has_to_be_told() -> None:
+def test_a_limited_rate_has_to_be_configured() -> None:
     base = load_config(resource("config/suv.toml"))
-    told, unknown = (
+    configured, unknown = (
         friction_error("80 bar/s", knowing(base, given)) for given in (UNITS["80 bar/s"][2], USUAL)
     )
-    print(f"told {told:.1f} %, unknown {unknown:.1f} %")
-    assert told < 0.8 * unknown
+    print(f"configured {configured:.1f} %, unknown {unknown:.1f} %")
+    assert configured < 0.8 * unknown
 
 
 @pytest.mark.parametrize("unit", UNITS)

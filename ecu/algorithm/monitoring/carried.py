@@ -33,7 +33,7 @@ MEMORY = 0.15  # rad/s
 BEGINS, LEAST_AGE_S = 1.5, 0.5  # over the time since it began; s
 CONFIRMED = 0.4
 KNOWN_S = 5.0  # after which its slope is known
-LEAST = 0.1  # m/s: slip and radii that differ from the configured ones
+LEAST_BEHIND = 0.1  # m/s: slip and radii that differ from the configured ones
 
 
 @kernel
@@ -64,6 +64,6 @@ def follow_carried(state: Record, k: int, speed: float, accel: float, dt: float)
 def over_ground_confirmed(state: Record) -> bool:
     """Return whether the accelerometer confirms the vehicle speed, and not the wheels."""
     wheels, over_ground = abs(state.behind[WHEELS]), abs(state.behind[OVER_GROUND])
-    known = state.age_s[OVER_GROUND] > KNOWN_S and wheels > LEAST
+    known = state.age_s[OVER_GROUND] > KNOWN_S and wheels > LEAST_BEHIND
     confirmed: bool = known and over_ground < CONFIRMED * wheels
     return confirmed

@@ -94,10 +94,11 @@ def loop(ecu: Fmu, car: Fmu) -> dict[str, np.ndarray]:
 
 
 CLOSE = {
-    # of true values over the whole drive, to `simulate`: frames round and stamp what FMUs hand over as it is
+    # of true values over the whole drive, to `simulate`: frames round and stamp what FMUs hand over as it is,
+    # and at the edge of grip (stop-4) that moves by a cycle when the slip guard cuts
     "vehicle_speed": 0.005,  # m/s
-    "distance": 0.02,  # m
-    "accel_x_road": 0.05,  # m/s^2
+    "distance": 0.03,  # m
+    "accel_x_road": 0.1,  # m/s^2
     "calliper_pressure_fl": 0.2,  # bar
     "calliper_pressure_rr": 0.2,
     "mu_b_fl": 1e-4,

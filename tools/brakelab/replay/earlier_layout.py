@@ -80,6 +80,7 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "reported",
         "reported_s",
         "history",
+        "newest",
         "late",
         "late_known",
         "slides",

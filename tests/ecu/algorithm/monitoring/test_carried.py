@@ -37,8 +37,8 @@ def test_whom_the_accelerometer_confirms(case, wheels, over_ground, slope, confi
         speed += along * DT
         accel = along + known + (slope if lies else 0.0)
         for witness, (factor, rate, plus) in ((WHEELS, wheels), (OVER_GROUND, over_ground)):
-            told = speed * (factor + rate * (t - 60.0)) + plus if lies else speed
-            follow_carried(state, witness, told, accel, DT)
+            reported = speed * (factor + rate * (t - 60.0)) + plus if lies else speed
+            follow_carried(state, witness, reported, accel, DT)
     assert over_ground_confirmed(state) == confirmed
 
 
