@@ -378,7 +378,8 @@ def test_how_late_the_pressures_are_is_learned(callipers, direction, kind, times
         if direction == RISE:
             callipers.p["slowness"] = 3.0
             assert slowness(callipers.p, callipers.state) == pytest.approx(3.0 * used)
-    assert (used == 1.0) == (times == 1.0)
+    assert used == 1.0 or times != 1.0
+    assert used != 1.0 or times in (1.0, 1.5)
 
 
 @pytest.mark.parametrize(
