@@ -15,6 +15,7 @@ from ecu.algorithm.inputs import (
     mean_wheel_speed,
     motor_torque,
     motor_torque_known,
+    no_wheel_known,
     others_brake,
     pedal_known,
     pedal_to_decel,
@@ -185,6 +186,13 @@ def test_the_mean_is_of_two_wheels_at_least(params, feed, lost: int, mean: float
     inputs = feed(wheel_speed=np.array([8.0, 8.0, 4.0, 0.0]) / params[0]["wheel_radius"])[0]
     inputs["verdict"][WHEEL_SPEED : WHEEL_SPEED + lost] = 0
     assert mean_wheel_speed(params[0], inputs) == pytest.approx(mean, nan_ok=True)
+
+
+@pytest.mark.parametrize(("lost", "none"), [([], False), ([0, 1, 2], False), ([0, 1, 2, 3], True)])
+def test_no_wheel_is_known_where_each_is_lost(feed, lost: list[int], none: bool) -> None:
+    inputs = feed()[0]
+    inputs["verdict"][[WHEEL_SPEED + i for i in lost]] = 0
+    assert no_wheel_known(inputs) == none
 
 
 @pytest.mark.parametrize(

@@ -263,6 +263,13 @@ def test_wheels_are_watched_from_three_metres_per_second_on(params, feed, speed,
     assert any(map(math.isfinite, caps)) == capped
 
 
+def test_a_car_that_becomes_too_slow_gives_the_pressure_back_with_150_bar_per_second(wheels: Wheels) -> None:
+    cut = wheels.run_into(-1.0)[-1]
+    wheels.speed = 2.0
+    caps = [wheels.cycle(-1.0) for _ in range(10)]
+    assert caps == pytest.approx([cut + 1.5 * (k + 1) for k in range(10)], abs=0.1)
+
+
 def test_growth_is_low_passed_with_20_ms(wheels: Wheels) -> None:
     for _ in range(20):
         wheels.cycle(0.0)
