@@ -243,16 +243,19 @@ def guard_slip(
         ground = abs(corner_speed(params, estimate, speed, i)) if watching else 0.0
         _follow_lag(params, state, inputs, ground, braking, i, dt)
         per_torque, radius = 1.0 / (brake_gain(params, i) * params.mu_nominal[i]), params.wheel_radius[i]
-        inertia = per_torque * params.wheel_inertia[i] / radius
         presses = BAR * pressure[i] + per_torque * motor[i]
         state.pressed[i] += lag_gain(dt, PRESSED_LAG) * (presses - state.pressed[i])
+        base, lag = max(ground, LEAST_SPEED), state.lag[i]
+        far = watching and lag > RANGE * base
+        if not (far or state.capped[i]):
+            state.denied[i] = state.slides[i] = 0
+            state.freed_s[i] = state.steady_s[i] = state.grip[i] = 0.0
+            continue
+        inertia = per_torque * params.wheel_inertia[i] / radius
         carried = state.pressed[i] - inertia * (state.growth[i] + braking)
         known = carried if state.slides[i] else max(state.grip[i], carried)
         adhesion = known / (per_torque * radius * max(estimate.load[i], 1.0))
-        slides = min(max(WHOLLY * adhesion / params.slip_stiffness[i], LEAST_SLIDING), RANGE)
-        base = max(ground, LEAST_SPEED)
-        target, lag = slides * base, state.lag[i]
-        far = watching and lag > RANGE * base
+        target = min(max(WHOLLY * adhesion / params.slip_stiffness[i], LEAST_SLIDING), RANGE) * base
         slipping = watching and lag > target if state.capped[i] else far
         _doubt(params, state, i, ground, slipping, far, dt)
         begins = far and _grows(state, i) and state.denied[i] == 0
