@@ -178,8 +178,13 @@ def _advance_half_cycle(
 
 
 @kernel
-def _advance(params: Record, state: Record, i: int, sent: float) -> None:
-    slow = stretch(params, state, RISE), stretch(params, state, FALL)
+def _stretches(params: Record, state: Record) -> tuple[float, float]:
+    """Return the factors on the unit's times of a rise and a fall."""
+    return stretch(params, state, RISE), stretch(params, state, FALL)
+
+
+@kernel
+def _advance(params: Record, state: Record, i: int, sent: float, slow: tuple[float, float]) -> None:
     rising = _half_cycles(slow[RISE] * params.dead_time[RISE])
     falling = _half_cycles(slow[FALL] * params.dead_time[FALL])
     before = state.model[i]
@@ -198,8 +203,9 @@ def _advance(params: Record, state: Record, i: int, sent: float) -> None:
 @kernel
 def advance_pressures(params: Record, state: Record, sent: Record) -> None:
     """Move the pressures on by the coming cycle; `sent` [Pa], shape (4,): the demands of the last one."""
+    slow = _stretches(params, state)
     for i in range(4):
-        _advance(params, state, i, sent[i] / BAR)
+        _advance(params, state, i, sent[i] / BAR, slow)
 
 
 @kernel
@@ -237,9 +243,10 @@ def correct_pressures(
         dt: time since the last cycle [s].
     """
     missed = min(max(round(dt / CYCLE), 1), LONGEST_GAP) - 1
+    slow = _stretches(params, state)
     for i in range(4):
         for _ in range(missed):
-            _advance(params, state, i, sent[i] / BAR)
+            _advance(params, state, i, sent[i] / BAR, slow)
         place = CALLIPER_PRESSURE + i
         if fresh(inputs, place):
             _correct(state, i, inputs.value[place] - zero[i], params.sigma_pressure / BAR, dt)
