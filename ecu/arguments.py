@@ -119,41 +119,56 @@ def scenario_file(name: str) -> Path:
     return named(name, *SCENARIOS)
 
 
-CONFIG_OPTION = typer.Option(
+def option(metavar: str, help: str, *names: str, **more: Any) -> Any:
+    """Return an option that takes a value; without `names` it has its parameter's."""
+    return typer.Option(*names, metavar=metavar, help=help, **more)
+
+
+def flag(name: str, help: str) -> Any:
+    """Return an option that takes no value."""
+    return typer.Option(name, help=help)
+
+
+def argument(metavar: str, help: str, **more: Any) -> Any:
+    """Return an argument."""
+    return typer.Argument(metavar=metavar, help=help, **more)
+
+
+CONFIG_OPTION = option(
+    "CONFIG",
+    "Vehicle and tuning: file or name (suv, …)",
     "--config",
     parser=config_file,
     autocompletion=shipped("config"),
-    metavar="CONFIG",
-    help="Vehicle and tuning: file or name (suv, …)",
 )
-MAP_OPTION = typer.Option(
+MAP_OPTION = option(
+    "MAP",
+    "Signal map: file or name (mustang, …)",
     "--map",
     parser=map_file,
     autocompletion=shipped("config/maps"),
-    metavar="MAP",
-    help="Signal map: file or name (mustang, …)",
 )
-INTERFACE_OPTION = typer.Option(
+INTERFACE_OPTION = option(
+    "INTERFACE",
+    "Interface of python-can: socketcan, …",
     "-i",
     "--interface",
     autocompletion=known("socketcan", "udp_multicast", "virtual"),
-    metavar="INTERFACE",
-    help="Interface of python-can: socketcan, …",
 )
-CHANNEL_OPTION = typer.Option("-c", "--channel", metavar="CHANNEL", help="Channel of the interface: can0, …")
-OBSERVER_OPTION = typer.Option(
+CHANNEL_OPTION = option("CHANNEL", "Channel of the interface: can0, …", "-c", "--channel")
+OBSERVER_OPTION = option(
+    "OBSERVER",
+    "joint, observer1 or observer2; default: CONFIG's",
     "--observer",
     autocompletion=known("joint", "observer1", "observer2"),
-    metavar="OBSERVER",
-    help="joint, observer1 or observer2; default: CONFIG's",
 )
-STATE_OPTION = typer.Option("--state", metavar="DIR", help="Folder that keeps learned values between runs")
+STATE_OPTION = option("DIR", "Folder that keeps learned values between runs", "--state")
 
-DRAW_OPTION = typer.Option(
+DRAW_OPTION = option(
+    "WIDTH",
+    "Spread of the drawn cars: wide or nominal; default: SCENARIO's",
     "--draw",
     autocompletion=known("wide", "nominal"),
-    metavar="WIDTH",
-    help="Spread of the drawn cars: wide or nominal; default: SCENARIO's",
 )
 
 Config = Annotated[Path, CONFIG_OPTION]

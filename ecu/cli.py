@@ -40,6 +40,8 @@ from ecu.arguments import (
     PlainHelp,
     State,
     TopLevel,
+    flag,
+    option,
 )
 from ecu.cli_config import app as config_app
 from ecu.cli_diagnostics import app as diagnostics_app
@@ -99,85 +101,52 @@ def run(
     channel: Channel,
     map: Map = None,
     record: Annotated[
-        Path | None,
-        typer.Option(
-            "--record", metavar="DIR", help="Record frames, cycles and outputs into a new folder of DIR"
-        ),
+        Path | None, option("DIR", "Record frames, cycles and outputs into a new folder of DIR")
     ] = None,
     record_limit: Annotated[
-        float | None,
-        typer.Option(
-            "--record-limit",
-            metavar="GB",
-            min=0.01,
-            help="Remove the oldest recordings in DIR beyond this size",
-        ),
+        float | None, option("GB", "Remove the oldest recordings in DIR beyond this size", min=0.01)
     ] = None,
     state: State = None,
     standby: Annotated[
-        bool,
-        typer.Option("--standby", help="Stay silent beside a running daemon; take over when it falls silent"),
+        bool, flag("--standby", "Stay silent beside a running daemon; take over when it falls silent")
     ] = False,
     armed: Annotated[
-        bool,
-        typer.Option("--armed", help="Flag the demands valid, as `transmit = true` in CONFIG does"),
+        bool, flag("--armed", "Flag the demands valid, as `transmit = true` in CONFIG does")
     ] = False,
     silent: Annotated[
-        bool, typer.Option("--silent", help="Receive and estimate only: send nothing, whatever CONFIG says")
+        bool, flag("--silent", "Receive and estimate only: send nothing, whatever CONFIG says")
     ] = False,
     metrics_port: Annotated[
-        int | None,
-        typer.Option(
-            "--metrics-port",
-            metavar="N",
-            min=1,
-            max=65535,
-            help="Serve metrics for Prometheus and /health at this port",
-        ),
+        int | None, option("N", "Serve metrics for Prometheus and /health at this port", min=1, max=65535)
     ] = None,
-    metrics_address: Annotated[
-        str, typer.Option("--metrics-address", metavar="IP", help="Address to serve metrics on")
-    ] = "127.0.0.1",
+    metrics_address: Annotated[str, option("IP", "Address to serve metrics on")] = "127.0.0.1",
     diagnostics: Annotated[
         str | None,
-        typer.Option(
-            "--diagnostics",
-            metavar="REQUEST:RESPONSE",
-            help="Answer a tester (UDS) on these identifiers of the bus, such as 0x7E0:0x7E8",
+        option(
+            "REQUEST:RESPONSE", "Answer a tester (UDS) on these identifiers of the bus, such as 0x7E0:0x7E8"
         ),
     ] = None,
     diagnostics_key: Annotated[
-        Path | None,
-        typer.Option(
-            "--diagnostics-key", metavar="FILE", help="Secret of the tester's access; without it none gets it"
-        ),
+        Path | None, option("FILE", "Secret of the tester's access; without it none gets it")
     ] = None,
     xcp: Annotated[
         str | None,
-        typer.Option(
-            "--xcp",
-            metavar="TRANSPORT",
+        option(
+            "TRANSPORT",
+            "Answer a master of XCP: udp:[ADDRESS:]PORT, tcp:[ADDRESS:]PORT or can:REQUEST:RESPONSE",
             autocompletion=known("udp:127.0.0.1:5555", "tcp:127.0.0.1:5555"),
-            help="Answer a master of XCP: udp:[ADDRESS:]PORT, tcp:[ADDRESS:]PORT or can:REQUEST:RESPONSE",
         ),
     ] = None,
     xcp_key: Annotated[
-        Path | None,
-        typer.Option(
-            "--xcp-key", metavar="FILE", help="Secret of a master that calibrates; without it none does"
-        ),
+        Path | None, option("FILE", "Secret of a master that calibrates; without it none does")
     ] = None,
-    xcp_save: Annotated[
-        Path | None,
-        typer.Option("--xcp-save", metavar="FILE", help="CONFIG file to write when a master stores"),
-    ] = None,
+    xcp_save: Annotated[Path | None, option("FILE", "CONFIG file to write when a master stores")] = None,
     log_format: Annotated[
         str | None,
-        typer.Option(
-            "--log-format",
-            metavar="FORMAT",
+        option(
+            "FORMAT",
+            "console or json; default: console on a terminal, json elsewhere",
             autocompletion=known(*LOG_FORMATS),
-            help="console or json; default: console on a terminal, json elsewhere",
         ),
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Log warnings and errors only")] = False,
@@ -221,18 +190,10 @@ def run(
 @app.command()
 def wear(
     config: Config,
-    state: Annotated[
-        Path,
-        typer.Option("--state", metavar="DIR", help="Folder of learned values, as for `run` and `replay`"),
-    ],
-    new_pads: Annotated[
-        str | None, typer.Option("--new-pads", metavar="AXLE", help="Register new pads: front, rear or all")
-    ] = None,
+    state: Annotated[Path, option("DIR", "Folder of learned values, as for `run` and `replay`")],
+    new_pads: Annotated[str | None, option("AXLE", "Register new pads: front, rear or all")] = None,
     measured: Annotated[
-        str | None,
-        typer.Option(
-            "--measured", metavar="fl=9.8,…", help="Register measured linings in mm, without backplate"
-        ),
+        str | None, option("fl=9.8,…", "Register measured linings in mm, without backplate")
     ] = None,
 ) -> int:
     """Show how thick the brake pads are and how far they last. Register new and measured ones."""

@@ -3,21 +3,15 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from ecu.arguments import Commands, config_file
+from ecu.arguments import Commands, argument, config_file, flag, option
 
 app = Commands(help="Write, check and describe configurations.", no_args_is_help=True)
 
 
 @app.command()
 def check(
-    file: Annotated[
-        Path, typer.Argument(parser=config_file, metavar="CONFIG", help="Vehicle and tuning: file or name")
-    ],
-    picture: Annotated[
-        bool, typer.Option("--picture", help="Draw the distribution beside what Annex 5 forbids")
-    ] = False,
+    file: Annotated[Path, argument("CONFIG", "Vehicle and tuning: file or name", parser=config_file)],
+    picture: Annotated[bool, flag("--picture", "Draw the distribution beside what Annex 5 forbids")] = False,
 ) -> int:
     """List every mistake of a configuration, or what its car comes to."""
     from ecu.settings import check
@@ -28,12 +22,9 @@ def check(
 @app.command()
 def new(
     given: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Answer without being asked; as often as needed"),
+        list[str] | None, option("KEY=VALUE", "Answer without being asked; as often as needed", "--set")
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="CAR.toml", help="File to write; default: the car's name")
-    ] = None,
+    out: Annotated[Path | None, option("CAR.toml", "File to write; default: the car's name")] = None,
 ) -> int:
     """Write a configuration from a data sheet."""
     from ecu.settings import new

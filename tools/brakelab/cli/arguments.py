@@ -3,30 +3,29 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from ecu.arguments import scenario_file
+from ecu.arguments import argument, option, scenario_file
 from ecu.completion import known, shipped
 from ecu.settings.resources import SCENARIOS
 
 Plant = Annotated[
     str | None,
-    typer.Option(
+    option(
+        "PLANT",
+        "Simulated car: as-config, file or name (sedan, …); default: SCENARIO's",
         "--plant",
         autocompletion=known("as-config", "suv", "suv14", "sedan", "lcv"),
-        metavar="PLANT",
-        help="Simulated car: as-config, file or name (sedan, …); default: SCENARIO's",
     ),
 ]
 Scenario = Annotated[
     Path,
-    typer.Argument(
+    argument(
+        "SCENARIO",
+        "Scenario file, or name of a shipped one",
         parser=scenario_file,
         autocompletion=shipped(*SCENARIOS),
-        metavar="SCENARIO",
-        help="Scenario file, or name of a shipped one",
     ),
 ]
-Seed = Annotated[
-    int, typer.Option("--seed", metavar="N", min=0, help="Seed of the drawn vehicle and its noise")
+Seed = Annotated[int, option("N", "Seed of the drawn vehicle and its noise", "--seed", min=0)]
+Columns = Annotated[
+    Path | None, option("MAP.toml", "Columns, units, brake; default: DATA with .toml", "--columns")
 ]

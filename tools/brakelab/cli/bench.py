@@ -3,9 +3,8 @@
 from pathlib import Path
 from typing import Annotated, Final
 
-import typer
-
 from brakelab.bench.registry import MODULES, NAMES, TIMES
+from ecu.arguments import argument, flag, option
 from ecu.completion import fitting
 
 HELP: Final = "\n".join(
@@ -23,33 +22,19 @@ def names(incomplete: str) -> list[str]:
 
 def bench(
     name: Annotated[
-        str | None,
-        typer.Argument(
-            autocompletion=names, metavar="NAME", help="Bench to run; default: step, codec, plant, cycle"
-        ),
+        str | None, argument("NAME", "Bench to run; default: step, codec, plant, cycle", autocompletion=names)
     ] = None,
-    seeds: Annotated[
-        int, typer.Option(metavar="N", min=1, help="Number of cars that are drawn, at most")
-    ] = 20,
-    seconds: Annotated[
-        float, typer.Option(metavar="S", min=5.0, max=580.0, help="Duration of lateness and play")
-    ] = 60.0,
+    seeds: Annotated[int, option("N", "Number of cars that are drawn, at most", min=1)] = 20,
+    seconds: Annotated[float, option("S", "Duration of lateness and play", min=5.0, max=580.0)] = 60.0,
     draw: Annotated[
-        str, typer.Option(metavar="WIDTH", help="Spread of the cars of stops and observers: wide or nominal")
+        str, option("WIDTH", "Spread of the cars of stops and observers: wide or nominal")
     ] = "wide",
     observer: Annotated[
-        list[str] | None,
-        typer.Option(metavar="MODULE:CLASS", help="Enter this observer in entries; may be repeated"),
+        list[str] | None, option("MODULE:CLASS", "Enter this observer in entries; may be repeated")
     ] = None,
-    drive: Annotated[
-        str | None, typer.Option(metavar="CAR:LOG", help="Recorded drive that entries predict")
-    ] = None,
-    export: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Write the drives of entries there, run nothing")
-    ] = None,
-    write: Annotated[
-        bool, typer.Option("--write", help="Renew the page in docs/results of this checkout")
-    ] = False,
+    drive: Annotated[str | None, option("CAR:LOG", "Recorded drive that entries predict")] = None,
+    export: Annotated[Path | None, option("DIR", "Write the drives of entries there, run nothing")] = None,
+    write: Annotated[bool, flag("--write", "Renew the page in docs/results of this checkout")] = False,
 ) -> int:
     """Run one bench, see `HELP`."""
     from brakelab.bench import command

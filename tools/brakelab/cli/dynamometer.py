@@ -4,9 +4,8 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
-from ecu.arguments import Commands
+from brakelab.cli.arguments import Columns
+from ecu.arguments import Commands, argument, option
 from ecu.completion import fitting, shipped
 from ecu.settings.resources import resource
 
@@ -33,39 +32,22 @@ def laws(incomplete: str) -> list[str]:
 def run(
     programme: Annotated[
         str,
-        typer.Argument(
+        argument(
+            "PROGRAMME",
+            "cpc, ams, ak-master, or a file as in config/rig",
             autocompletion=shipped("config/rig"),
-            metavar="PROGRAMME",
-            help="cpc, ams, ak-master, or a file as in config/rig",
         ),
     ],
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out", metavar="DATA", help="Recording to write, .csv or .parquet; columns and brake beside it"
-        ),
-    ],
+    out: Annotated[Path, option("DATA", "Recording to write, .csv or .parquet; columns and brake beside it")],
     brake: Annotated[
-        str,
-        typer.Option(
-            "--brake", autocompletion=brakes, metavar="BRAKE", help="Brake A, B or C, or a lining of LININGS"
-        ),
+        str, option("BRAKE", "Brake A, B or C, or a lining of LININGS", autocompletion=brakes)
     ] = "A",
-    seed: Annotated[
-        int, typer.Option("--seed", metavar="N", min=0, help="Seed of the pad, its scatter and the sensors")
-    ] = 0,
+    seed: Annotated[int, option("N", "Seed of the pad, its scatter and the sensors", min=0)] = 0,
     law: Annotated[
-        str | None,
-        typer.Option(
-            "--law",
-            autocompletion=laws,
-            metavar="LAW",
-            help="Use this friction law of the lining instead of a pad",
-        ),
+        str | None, option("LAW", "Use this friction law of the lining instead of a pad", autocompletion=laws)
     ] = None,
     linings: Annotated[
-        Path | None,
-        typer.Option("--linings", metavar="LININGS", help="Lining file of `identify friction`; needs --law"),
+        Path | None, option("LININGS", "Lining file of `identify friction`; needs --law")
     ] = None,
 ) -> int:
     """Run a programme on the dynamometer. Record at 200 Hz; the pad follows none of the friction laws."""
@@ -78,13 +60,8 @@ def run(
 
 @app.command()
 def look(
-    data: Annotated[
-        list[Path], typer.Argument(metavar="DATA", help="Recordings of one brake: .csv .parquet .mf4")
-    ],
-    columns: Annotated[
-        Path | None,
-        typer.Option("--columns", metavar="MAP.toml", help="Columns, units, brake; default: DATA with .toml"),
-    ] = None,
+    data: Annotated[list[Path], argument("DATA", "Recordings of one brake: .csv .parquet .mf4")],
+    columns: Columns = None,
 ) -> int:
     """Analyse a recording. Show principal components, shares of variance, effect of the previous stop."""
     from brakelab.identify.friction import command
@@ -94,26 +71,18 @@ def look(
 
 @app.command()
 def report(
-    data: Annotated[
-        Path, typer.Argument(metavar="DATA", help="Recording of a programme: .csv .parquet .mf4")
-    ],
+    data: Annotated[Path, argument("DATA", "Recording of a programme: .csv .parquet .mf4")],
     other: Annotated[
-        Path | None, typer.Argument(metavar="[DATA2]", help="Recording of another lining, compared with it")
+        Path | None, argument("[DATA2]", "Recording of another lining, compared with it")
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="REPORT.html", help="Page to write, with the charts")
-    ] = None,
-    columns: Annotated[
-        Path | None,
-        typer.Option("--columns", metavar="MAP.toml", help="Columns, units, brake; default: DATA with .toml"),
-    ] = None,
+    out: Annotated[Path | None, option("REPORT.html", "Page to write, with the charts")] = None,
+    columns: Columns = None,
     programme: Annotated[
         str | None,
-        typer.Option(
-            "--programme",
+        option(
+            "PROGRAMME",
+            "File as in config/rig; default: the shipped one that it is",
             autocompletion=shipped("config/rig"),
-            metavar="PROGRAMME",
-            help="File as in config/rig; default: the shipped one that it is",
         ),
     ] = None,
 ) -> int:

@@ -3,15 +3,13 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from brakelab.cli.arguments import Plant, Scenario, Seed
-from ecu.arguments import CONFIG_OPTION, Commands, Config, Draw
+from ecu.arguments import CONFIG_OPTION, Commands, Config, Draw, option
 
 app = Commands(help="Write FMUs (FMI 3.0, 2.0) for Simulink, CarMaker and others.", no_args_is_help=True)
 
-Out = Annotated[Path, typer.Option("--out", "-o", metavar="FILE.fmu", help="FMU to write")]
-Fmi = Annotated[int, typer.Option("--fmi", metavar="N", min=2, max=3, help="Version of FMI, 3 or 2")]
+Out = Annotated[Path, option("FILE.fmu", "FMU to write", "--out", "-o")]
+Fmi = Annotated[int, option("N", "Version of FMI, 3 or 2", "--fmi", min=2, max=3)]
 
 
 @app.command()

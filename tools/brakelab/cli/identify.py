@@ -3,9 +3,8 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from ecu.arguments import Commands, Config, Map
+from brakelab.cli.arguments import Columns
+from ecu.arguments import Commands, Config, Map, argument, flag, option
 
 app = Commands(help="Identify models from your own measurements.", no_args_is_help=True)
 
@@ -18,34 +17,21 @@ def _identify() -> None:
 @app.command()
 def friction(
     data: Annotated[
-        list[Path],
-        typer.Argument(metavar="DATA", help="Recordings of one brake on a dynamometer: .csv .parquet .mf4"),
+        list[Path], argument("DATA", "Recordings of one brake on a dynamometer: .csv .parquet .mf4")
     ],
-    out: Annotated[
-        Path,
-        typer.Option("--out", metavar="BRAKE.toml", help="Lining file to write, for the simulated vehicle"),
-    ],
-    columns: Annotated[
-        Path | None,
-        typer.Option("--columns", metavar="MAP.toml", help="Columns, units, brake; default: DATA with .toml"),
-    ] = None,
+    out: Annotated[Path, option("BRAKE.toml", "Lining file to write, for the simulated vehicle")],
+    columns: Columns = None,
     held_out: Annotated[
-        Path | None,
-        typer.Option(
-            "--held-out", metavar="DATA", help="Recording to choose the law by; default: the hottest stops"
-        ),
+        Path | None, option("DATA", "Recording to choose the law by; default: the hottest stops")
     ] = None,
     profile: Annotated[
-        str | None,
-        typer.Option("--profile", metavar="LAW", help="Compute profile likelihoods of this law's parameters"),
+        str | None, option("LAW", "Compute profile likelihoods of this law's parameters")
     ] = None,
     own: Annotated[
-        list[str] | None,
-        typer.Option("--own", metavar="LAW.py", help="A law of your own: a file, or an entry point's name"),
+        list[str] | None, option("LAW.py", "A law of your own: a file, or an entry point's name")
     ] = None,
     discover: Annotated[
-        Path | None,
-        typer.Option("--discover", metavar="LAW.py", help="Law to write of the terms found, and to identify"),
+        Path | None, option("LAW.py", "Law to write of the terms found, and to identify")
     ] = None,
 ) -> int:
     """Identify a friction law from dynamometer recordings. Fit all laws, choose one, state its limits."""
@@ -59,22 +45,13 @@ def friction(
 @app.command()
 def wear(
     measured: Annotated[
-        list[Path],
-        typer.Argument(metavar="MANIFEST.csv", help="Table of blocks; with --from-logs results of drives"),
+        list[Path], argument("MANIFEST.csv", "Table of blocks; with --from-logs results of drives")
     ],
     config: Config,
-    out: Annotated[
-        Path,
-        typer.Option("--out", metavar="CAR.toml", help="CONFIG to write, CAR.md beside it; or BLOCKS.csv"),
-    ],
-    axle: Annotated[
-        str, typer.Option("--axle", metavar="AXLE", help="Axle of the linings: front or rear")
-    ] = "front",
+    out: Annotated[Path, option("CAR.toml", "CONFIG to write, CAR.md beside it; or BLOCKS.csv")],
+    axle: Annotated[str, option("AXLE", "Axle of the linings: front or rear")] = "front",
     from_logs: Annotated[
-        bool,
-        typer.Option(
-            "--from-logs", help="Write the blocks that stand for your drives, for a rig: BLOCKS.csv"
-        ),
+        bool, flag("--from-logs", "Write the blocks that stand for your drives, for a rig: BLOCKS.csv")
     ] = False,
 ) -> int:
     """Identify the wear law of brake linings from dynamometer blocks. Write a CONFIG."""
@@ -90,20 +67,12 @@ def wear(
 
 @app.command()
 def dust(
-    manifest: Annotated[
-        Path, typer.Argument(metavar="MANIFEST.csv", help="Trips with a particle counter: trip, file, test")
-    ],
+    manifest: Annotated[Path, argument("MANIFEST.csv", "Trips with a particle counter: trip, file, test")],
     config: Config,
-    out: Annotated[
-        Path,
-        typer.Option("--out", metavar="CAR.toml", help="CONFIG to write, CAR.md beside it; or RUN.md"),
-    ],
-    axle: Annotated[
-        str, typer.Option("--axle", metavar="AXLE", help="Axle of the brakes: front or rear")
-    ] = "front",
+    out: Annotated[Path, option("CAR.toml", "CONFIG to write, CAR.md beside it; or RUN.md")],
+    axle: Annotated[str, option("AXLE", "Axle of the brakes: front or rear")] = "front",
     cycle: Annotated[
-        bool,
-        typer.Option("--cycle", help="Report one run of the WLTP-Brake cycle, for UN R179: RUN.md"),
+        bool, flag("--cycle", "Report one run of the WLTP-Brake cycle, for UN R179: RUN.md")
     ] = False,
 ) -> int:
     """Identify particle emission from trips with a counter. Write a CONFIG."""
@@ -116,14 +85,9 @@ def dust(
 
 @app.command()
 def thermal(
-    logs: Annotated[
-        list[Path],
-        typer.Argument(metavar="LOG", help="Drives with disc_temperature_measured_*, any log format"),
-    ],
+    logs: Annotated[list[Path], argument("LOG", "Drives with disc_temperature_measured_*, any log format")],
     config: Config,
-    out: Annotated[
-        Path, typer.Option("--out", metavar="CAR.toml", help="CONFIG to write, CAR.md and CAR.svg beside it")
-    ],
+    out: Annotated[Path, option("CAR.toml", "CONFIG to write, CAR.md and CAR.svg beside it")],
     map: Map = None,
 ) -> int:
     """Identify the disc temperature model, dry and wet. Write a CONFIG."""
@@ -134,16 +98,12 @@ def thermal(
 
 @app.command()
 def vehicle(
-    drives: Annotated[
-        list[Path], typer.Argument(metavar="DRIVE", help="Logs (with --map) or files of decoded signals")
-    ],
+    drives: Annotated[list[Path], argument("DRIVE", "Logs (with --map) or files of decoded signals")],
     config: Config,
-    out: Annotated[
-        Path, typer.Option("--out", metavar="CAR.toml", help="CONFIG to write, with a page CAR.md beside it")
-    ],
+    out: Annotated[Path, option("CAR.toml", "CONFIG to write, with a page CAR.md beside it")],
     map: Map = None,
     closed: Annotated[
-        bool, typer.Option("--closed", help="State that each drive ends at the height where it began")
+        bool, flag("--closed", "State that each drive ends at the height where it began")
     ] = False,
 ) -> int:
     """Identify radii, mass, drag, tyres and brakes of a car. Write a CONFIG."""

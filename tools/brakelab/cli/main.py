@@ -4,8 +4,6 @@ without it."""
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from brakelab.cli.arguments import Plant, Scenario, Seed
 from brakelab.cli.bench import HELP as BENCH_HELP
 from brakelab.cli.bench import bench
@@ -25,6 +23,9 @@ from ecu.arguments import (
     Map,
     Observer,
     State,
+    argument,
+    flag,
+    option,
     scenario_file,
 )
 from ecu.completion import fitting, shipped
@@ -47,9 +48,7 @@ def scenarios_and_folders(incomplete: str) -> list[str]:
 
 @app.command()
 def demo(
-    out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Folder to write recording and report into")
-    ] = Path("out/demo"),
+    out: Annotated[Path, option("DIR", "Folder to write recording and report into")] = Path("out/demo"),
 ) -> int:
     """Brake a simulated car in real time and write a report."""
     from brakelab.rig import demo
@@ -61,9 +60,7 @@ def demo(
 def simulate(
     scenario: Scenario,
     config: Config,
-    out: Annotated[
-        Path, typer.Option("--out", metavar="NAME", help="Write NAME.log, NAME.parquet, NAME.truth.parquet")
-    ],
+    out: Annotated[Path, option("NAME", "Write NAME.log, NAME.parquet, NAME.truth.parquet")],
     seed: Seed = 0,
     draw: Draw = None,
     plant: Plant = None,
@@ -83,37 +80,30 @@ def simulate(
 def rig(
     scenario: Annotated[
         list[str],
-        typer.Argument(
+        argument(
+            "SCENARIO",
+            "Scenario files, folders of them, or shipped names: faults, …",
             autocompletion=scenarios_and_folders,
-            metavar="SCENARIO",
-            help="Scenario files, folders of them, or shipped names: faults, …",
         ),
     ],
     config: Config,
     interface: Annotated[str | None, INTERFACE_OPTION] = None,
     channel: Annotated[str | None, CHANNEL_OPTION] = None,
-    out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Folder to write results and reports into")
-    ] = Path("out/rig"),
+    out: Annotated[Path, option("DIR", "Folder to write results and reports into")] = Path("out/rig"),
     lock_step: Annotated[
-        bool, typer.Option("--lock-step", help="Run in memory, as fast as possible, instead of on a bus")
+        bool, flag("--lock-step", "Run in memory, as fast as possible, instead of on a bus")
     ] = False,
     seed: Seed = 0,
     plant: Plant = None,
-    junit: Annotated[
-        Path | None, typer.Option("--junit", metavar="FILE.xml", help="Write the verdicts as JUnit XML")
-    ] = None,
+    junit: Annotated[Path | None, option("FILE.xml", "Write the verdicts as JUnit XML")] = None,
     vary: Annotated[
         list[str] | None,
-        typer.Option(
-            "--vary",
-            metavar="NAME=LOW..HIGH|A,B,C",
-            help="Drive many cars: a parameter drawn from a range, or from a list; several: repeat",
+        option(
+            "NAME=LOW..HIGH|A,B,C",
+            "Drive many cars: a parameter drawn from a range, or from a list; several: repeat",
         ),
     ] = None,
-    runs: Annotated[
-        int | None, typer.Option("--runs", metavar="N", min=1, help="With --vary: draws from the ranges (50)")
-    ] = None,
+    runs: Annotated[int | None, option("N", "With --vary: draws from the ranges (50)", min=1)] = None,
 ) -> int:
     """Test the ECU in scenarios with faults. Write one report. Exit code 1: a scenario failed."""
     from brakelab.rig import command
@@ -139,38 +129,22 @@ def rig(
 def replay(
     logs: Annotated[
         list[Path],
-        typer.Argument(
-            metavar="LOG",
-            help="Logs of one drive, in order: frames (.log .asc .blf .trc .mf4) or "
-            "signals (.mf4 .parquet .csv)",
+        argument(
+            "LOG",
+            "Logs of one drive, in order: frames (.log .asc .blf .trc .mf4) or signals (.mf4 .parquet .csv)",
         ),
     ],
     config: Config,
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out",
-            metavar="RESULT.parquet",
-            help="Results to write, a row per 10 ms: .parquet .mf4 .mcap",
-        ),
-    ],
+    out: Annotated[Path, option("RESULT.parquet", "Results to write, a row per 10 ms: .parquet .mf4 .mcap")],
     map: Map = None,
     observer: Observer = None,
     state: State = None,
     cycles: Annotated[
-        Path | None,
-        typer.Option(
-            "--cycles",
-            metavar="RECORDING",
-            help="Repeat the cycles of this recording of `run --record` to the bit",
-        ),
+        Path | None, option("RECORDING", "Repeat the cycles of this recording of `run --record` to the bit")
     ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Learn friction although physics contradicts the log")
-    ] = False,
+    force: Annotated[bool, flag("--force", "Learn friction although physics contradicts the log")] = False,
     stood: Annotated[
-        float | None,
-        typer.Option("--stood", metavar="HOURS", min=0.0, help="Time the car stood before, discs cooling"),
+        float | None, option("HOURS", "Time the car stood before, discs cooling", min=0.0)
     ] = None,
 ) -> int:
     """Replay a recorded drive through the ECU. Write results."""
@@ -182,17 +156,12 @@ def replay(
 @app.command()
 def play(
     log: Annotated[
-        Path,
-        typer.Argument(
-            metavar="LOG", help="Log of frames (.log .asc .blf .trc .mf4) or signals (.mf4 .parquet .csv)"
-        ),
+        Path, argument("LOG", "Log of frames (.log .asc .blf .trc .mf4) or signals (.mf4 .parquet .csv)")
     ],
     interface: Interface,
     channel: Channel,
     map: Map = None,
-    speed: Annotated[
-        float, typer.Option("--speed", metavar="X", help="Speed over real time, 0.1 to 20")
-    ] = 1.0,
+    speed: Annotated[float, option("X", "Speed over real time, 0.1 to 20")] = 1.0,
 ) -> int:
     """Play a recorded drive onto a CAN bus. With MAP, send frames of the ECU with fresh E2E."""
     from brakelab.rig.play import command as play
@@ -202,16 +171,11 @@ def play(
 
 @app.command()
 def report(
-    result: Annotated[Path, typer.Argument(metavar="RESULT.parquet", help="Results of `replay`")],
-    out: Annotated[Path, typer.Option("--out", metavar="REPORT.html", help="Page to write, self-contained")],
-    truth: Annotated[
-        Path | None, typer.Option("--truth", metavar="TRUTH.parquet", help="True values of a simulated drive")
-    ] = None,
+    result: Annotated[Path, argument("RESULT.parquet", "Results of `replay`")],
+    out: Annotated[Path, option("REPORT.html", "Page to write, self-contained")],
+    truth: Annotated[Path | None, option("TRUTH.parquet", "True values of a simulated drive")] = None,
     timing: Annotated[
-        Path | None,
-        typer.Option(
-            "--timing", metavar="RECORDING", help="Recording of `run --record`, to show times of its loop"
-        ),
+        Path | None, option("RECORDING", "Recording of `run --record`, to show times of its loop")
     ] = None,
 ) -> int:
     """Write results as a page of linked figures."""
@@ -228,37 +192,19 @@ def report(
 def fleet(
     logs: Annotated[
         list[str],
-        typer.Argument(
-            metavar="GLOB|MANIFEST",
-            help='"data/*/*.log" (a folder per vehicle), or a manifest, .csv or .toml',
-        ),
+        argument("GLOB|MANIFEST", '"data/*/*.log" (a folder per vehicle), or a manifest, .csv or .toml'),
     ],
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out", metavar="DIR", help="Folder of tables and report; a stopped run continues here"
-        ),
-    ],
+    out: Annotated[Path, option("DIR", "Folder of tables and report; a stopped run continues here")],
     config: Annotated[Path | None, CONFIG_OPTION] = None,
     map: Map = None,
     observer: Observer = None,
     scheduler: Annotated[
-        str | None,
-        typer.Option(
-            "--scheduler",
-            metavar="ADDRESS",
-            help="Use this Dask cluster, tls://HOST:PORT; default: local processes",
-        ),
+        str | None, option("ADDRESS", "Use this Dask cluster, tls://HOST:PORT; default: local processes")
     ] = None,
     workers: Annotated[
-        int | None,
-        typer.Option(
-            "--workers", min=1, metavar="N", help="Number of local processes; default: one per core"
-        ),
+        int | None, option("N", "Number of local processes; default: one per core", min=1)
     ] = None,
-    rows: Annotated[
-        bool, typer.Option("--rows", help="Keep the rows of every drive too: up to 1 GB per 15 h")
-    ] = False,
+    rows: Annotated[bool, flag("--rows", "Keep the rows of every drive too: up to 1 GB per 15 h")] = False,
 ) -> int:
     """Replay thousands of recorded drives in parallel. Exit code 1: drives failed."""
     from brakelab.fleet import command
@@ -268,8 +214,8 @@ def fleet(
 
 @app.command()
 def compare(
-    a: Annotated[Path, typer.Argument(metavar="A.parquet", help="Results of `replay`")],
-    b: Annotated[Path, typer.Argument(metavar="B.parquet", help="Results of another version or tuning")],
+    a: Annotated[Path, argument("A.parquet", "Results of `replay`")],
+    b: Annotated[Path, argument("B.parquet", "Results of another version or tuning")],
 ) -> int:
     """Compare two results, largest difference first. Exit code 1: a difference matters."""
     from brakelab.results import compare
@@ -282,42 +228,29 @@ def tune(
     config: Config,
     scenario: Annotated[
         list[Path] | None,
-        typer.Option(
-            "--scenario",
+        option(
+            "SCENARIO",
+            "Scenario to tune on, repeatable; default: fixed-pedal, bursts",
             parser=scenario_file,
             autocompletion=shipped(*SCENARIOS),
-            metavar="SCENARIO",
-            help="Scenario to tune on, repeatable; default: fixed-pedal, bursts",
         ),
     ] = None,
     validate: Annotated[
         list[Path] | None,
-        typer.Option(
-            "--validate",
+        option(
+            "SCENARIO",
+            "Scenario to validate on, repeatable; default: fixed-decel, fade",
             parser=scenario_file,
             autocompletion=shipped(*SCENARIOS),
-            metavar="SCENARIO",
-            help="Scenario to validate on, repeatable; default: fixed-decel, fade",
         ),
     ] = None,
-    seeds: Annotated[
-        int,
-        typer.Option(
-            "--seeds", metavar="N", min=1, help="Number of drawn cars to tune on; as many to validate"
-        ),
-    ] = 4,
-    generations: Annotated[
-        int, typer.Option("--generations", metavar="G", min=1, help="Number of generations")
-    ] = 20,
-    population: Annotated[
-        int, typer.Option("--population", metavar="P", min=4, help="Tunings per generation")
-    ] = 30,
-    seed: Annotated[
-        int, typer.Option("--seed", metavar="N", min=0, help="Seed of the genetic algorithm")
-    ] = 0,
-    out: Annotated[
-        Path, typer.Option("--out", metavar="TUNED.toml", help="Tuning to write; a CONFIG can `include` it")
-    ] = Path("tuned.toml"),
+    seeds: Annotated[int, option("N", "Number of drawn cars to tune on; as many to validate", min=1)] = 4,
+    generations: Annotated[int, option("G", "Number of generations", min=1)] = 20,
+    population: Annotated[int, option("P", "Tunings per generation", min=4)] = 30,
+    seed: Annotated[int, option("N", "Seed of the genetic algorithm", min=0)] = 0,
+    out: Annotated[Path, option("TUNED.toml", "Tuning to write; a CONFIG can `include` it")] = Path(
+        "tuned.toml"
+    ),
 ) -> int:
     """Tune Observer 2 on simulated drives by a genetic algorithm. Ctrl-C writes the best so far."""
     from brakelab.identify.tuning import command

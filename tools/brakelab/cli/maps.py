@@ -3,28 +3,19 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from ecu.arguments import CONFIG_OPTION, MAP_OPTION, Commands
+from ecu.arguments import CONFIG_OPTION, MAP_OPTION, Commands, argument, option
 
 app = Commands(help="Make signal maps for other CAN databases and signal files.", no_args_is_help=True)
 
 
 @app.command()
 def suggest(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="Recorded drive")],
+    log: Annotated[Path, argument("LOG", "Recorded drive")],
     dbc: Annotated[
-        Path | None,
-        typer.Option(
-            "--dbc",
-            metavar="DB",
-            help="CAN database of the car: DBC, KCD, SYM, ARXML; none for a signal file",
-        ),
+        Path | None, option("DB", "CAN database of the car: DBC, KCD, SYM, ARXML; none for a signal file")
     ] = None,
     config: Annotated[Path | None, CONFIG_OPTION] = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="MAP.toml", help="Map to write; default: print it")
-    ] = None,
+    out: Annotated[Path | None, option("MAP.toml", "Map to write; default: print it")] = None,
 ) -> int:
     """Propose a map by names, units and physics, for you to edit."""
     from brakelab.mapping import command
@@ -34,12 +25,11 @@ def suggest(
 
 @app.command()
 def check(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="Recorded drive")],
+    log: Annotated[Path, argument("LOG", "Recorded drive")],
     map: Annotated[Path, MAP_OPTION],
     config: Annotated[Path | None, CONFIG_OPTION] = None,
     out: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="MAP.toml", help="Map of columns to write, with the lags of the drive"),
+        Path | None, option("MAP.toml", "Map of columns to write, with the lags of the drive")
     ] = None,
 ) -> int:
     """Check a map on a drive: what feeds each input, and the physics. Exit code 1: it is wrong."""
