@@ -89,6 +89,14 @@ def inside(drive: DriveResult, braking: Braking) -> NDArray[np.bool_]:
     return np.asarray((drive.t >= braking.t_start) & (drive.t <= braking.t_end))
 
 
+def inside_any(drive: DriveResult, found: list[Braking]) -> NDArray[np.bool_]:
+    """Return the rows of all brake applications, shape (n,)."""
+    rows = np.zeros(len(drive.t), bool)
+    for braking in found:
+        rows |= inside(drive, braking)
+    return rows
+
+
 def _mean(values: Vector) -> float:
     finite = values[np.isfinite(values)]
     return float(finite.mean()) if finite.size else float("nan")

@@ -10,10 +10,10 @@ import numpy as np
 from bokeh.models import ColumnDataSource, Range1d
 
 from brakelab.arrays import Vector
-from brakelab.report.brakings import Braking, inside
+from brakelab.report.brakings import Braking, inside_any
+from brakelab.report.cloud import binned, draw_dots, draw_true_mean, thinned
 from brakelab.report.drive import DriveResult
-from brakelab.report.look import DEGRADED, DEMAND, ESTIMATE, GRID, INK, QUIET, new_figure
-from brakelab.report.torque import binned
+from brakelab.report.look import DEGRADED, DEMAND, ESTIMATE, GRID, QUIET, free_figure
 from brakelab.results.car import RATES, Car
 from brakelab.stretches import stretches
 from ecu.contract.params import GRAVITY
@@ -38,15 +38,12 @@ def plots_of_distribution(
     drive: DriveResult, truth: DriveResult | None, found: list[Braking], car: Car
 ) -> dict[str, Any]:
     """Return the two figures by name, empty where no brake application shows it."""
-    rows = np.zeros(len(drive.t), bool)
-    for braking in found:
-        rows |= inside(drive, braking)
     forces = forces_of(drive, car)
     z = forces.front + forces.rear
-    places = np.flatnonzero(rows & (z >= LEAST_RATE))  # NaN is not
+    places = np.flatnonzero(inside_any(drive, found) & (z >= LEAST_RATE))  # NaN is not
     if len(places) < _LEAST_ROWS:
         return {}
-    some = places[:: max(1, -(-len(places) // POINTS))]
+    some = thinned(places, POINTS)
     source = ColumnDataSource(
         {
             "z": z[some].astype("f4"),
@@ -96,32 +93,22 @@ def forbidden_stretches(car: Car, end: float) -> dict[str, list[float]]:
 
 def _shares(car: Car, source: ColumnDataSource, end: float, true: tuple[Vector, Vector] | None) -> Any:
     low = min(float(np.percentile(source.data["share"], 1)), 100.0 * float(ideal_share(car, RATES).min()))
-    plot = new_figure(
-        "Braking rate z [-]", "Front share [%]", height=300, tools="pan,box_zoom,reset,save",
-        active_drag="box_zoom", x_range=Range1d(start=0.0, end=end),
-        y_range=Range1d(start=max(30.0, low - 8.0), end=100.0),
-    )  # fmt: skip
+    spans: dict[str, Any] = {
+        "x_range": Range1d(start=0.0, end=end),
+        "y_range": Range1d(start=max(30.0, low - 8.0), end=100.0),
+    }
+    plot = free_figure("Braking rate z [-]", "Front share [%]", **spans)
     stretches = forbidden_stretches(car, end)
     if stretches["left"]:
-        plot.quad(
-            "left", "right", "bottom", "top", source=ColumnDataSource(stretches), fill_color=DEGRADED,
-            fill_alpha=0.22, line_color=None, legend_label="forbidden by Annex 5",
-        )  # fmt: skip
-    plot.scatter(
-        "z", "share", source=source, size=3, line_color=None, fill_color=ESTIMATE, fill_alpha=0.4,
-        legend_label="this drive",
-    )  # fmt: skip
+        look: dict[str, Any] = {"fill_color": DEGRADED, "fill_alpha": 0.22, "line_color": None}
+        sides, label = ("left", "right", "bottom", "top"), "forbidden by Annex 5"
+        plot.quad(*sides, source=ColumnDataSource(stretches), legend_label=label, **look)
+    draw_dots(plot, "z", "share", ESTIMATE, 0.4, "this drive", source=source)
     shown = end >= RATES
-    plot.line(
-        RATES[shown], 100.0 * np.array(car.share)[shown], line_color=DEMAND, line_width=2.0,
-        legend_label="control, by CONFIG",
-    )  # fmt: skip
-    plot.line(
-        RATES[shown], 100.0 * ideal_share(car, RATES)[shown], line_color=QUIET, line_width=1.6,
-        legend_label="ideal",
-    )  # fmt: skip
-    if true is not None and len(true[0]) > 1:
-        plot.line(*true, line_color=INK, line_dash="dashed", line_width=1.3, legend_label="mean, true")
+    rates, control = RATES[shown], 100.0 * np.array(car.share)[shown]
+    _draw_laws(plot, (rates, control), (rates, 100.0 * ideal_share(car, rates)))
+    if true is not None:
+        draw_true_mean(plot, *true)
     return plot
 
 
@@ -129,24 +116,20 @@ def _forces(car: Car, source: ColumnDataSource, end: float) -> Any:
     z = np.linspace(0.0, end, 41)
     front, rear = z * ideal_share(car, z), z * (1.0 - ideal_share(car, z))
     tallest = 1.15 * max(float(rear.max()), float(np.percentile(source.data["rear"], 99)))
-    plot = new_figure(
-        "Front brake force over weight [-]", "Rear over weight [-]", height=300,
-        tools="pan,box_zoom,reset,save", active_drag="box_zoom", x_range=Range1d(start=0.0, end=end),
-        y_range=Range1d(start=0.0, end=tallest),
-    )  # fmt: skip
-    rates = np.arange(0.2, 1.2 * end, 0.2)
-    plot.multi_line(
-        [[0.0, rate] for rate in rates], [[rate, 0.0] for rate in rates], line_color=GRID, line_width=1.5,
-        legend_label="z = 0.2, 0.4, …",
-    )  # fmt: skip
-    plot.scatter(
-        "front", "rear", source=source, size=3, line_color=None, fill_color=ESTIMATE, fill_alpha=0.4,
-        legend_label="this drive",
-    )  # fmt: skip
+    spans: dict[str, Any] = {
+        "x_range": Range1d(start=0.0, end=end),
+        "y_range": Range1d(start=0.0, end=tallest),
+    }
+    plot = free_figure("Front brake force over weight [-]", "Rear over weight [-]", **spans)
+    ends = [[[0.0, rate], [rate, 0.0]] for rate in np.arange(0.2, 1.2 * end, 0.2)]
+    xs, ys = ([end[k] for end in ends] for k in (0, 1))
+    plot.multi_line(xs, ys, line_color=GRID, line_width=1.5, legend_label="z = 0.2, 0.4, …")
+    draw_dots(plot, "front", "rear", ESTIMATE, 0.4, "this drive", source=source)
     share = np.array(car.share)
-    plot.line(
-        RATES * share, RATES * (1.0 - share), line_color=DEMAND, line_width=2.0,
-        legend_label="control, by CONFIG",
-    )  # fmt: skip
-    plot.line(front, rear, line_color=QUIET, line_width=1.6, legend_label="ideal")
+    _draw_laws(plot, (RATES * share, RATES * (1.0 - share)), (front, rear))
     return plot
+
+
+def _draw_laws(plot: Any, control: tuple[Vector, Vector], ideal: tuple[Vector, Vector]) -> None:
+    plot.line(*control, line_color=DEMAND, line_width=2.0, legend_label="control, by CONFIG")
+    plot.line(*ideal, line_color=QUIET, line_width=1.6, legend_label="ideal")

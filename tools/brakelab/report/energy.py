@@ -5,7 +5,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from brakelab.arrays import Vector
-from brakelab.report.brakings import Braking, inside
+from brakelab.report.brakings import Braking, inside, inside_any
 from brakelab.report.drive import DriveResult
 from brakelab.report.per_braking import CORNER_MARKS, Series, points_by_braking
 from brakelab.results.car import Car
@@ -59,10 +59,7 @@ def peaks(drive: DriveResult, found: list[Braking], watts: Vector) -> Vector:
 def works(drive: DriveResult, found: list[Braking], car: Car) -> list[Work]:
     """Return the four brakes; empty without brake applications or torque."""
     watts = power(drive, car)
-    rows = np.zeros(len(drive.t), bool)
-    for braking in found:
-        rows |= inside(drive, braking)
-    known = rows & np.isfinite(watts).any(axis=1)
+    known = inside_any(drive, found) & np.isfinite(watts).any(axis=1)
     if not known.any():
         return []
     period = float(np.median(np.diff(drive.t)))

@@ -7,15 +7,15 @@ from numpy.typing import NDArray
 
 from brakelab.arrays import Vector
 from brakelab.report.accuracy import AXLES
-from brakelab.report.brakings import Braking, inside
+from brakelab.report.brakings import Braking, inside_any
+from brakelab.report.cloud import binned, draw_dots, draw_true_mean, thinned
 from brakelab.report.drive import DriveResult
-from brakelab.report.look import INK, LEFT, RIGHT, new_figure
+from brakelab.report.look import INK, LEFT, RIGHT, free_figure
 from ecu.contract.signals import CORNERS, OBSERVING
 
 POINTS: Final = 600
 """Of each wheel in a plot."""
 BINS: Final = 12
-_FEWEST_ROWS: Final = 20  # rows of a bin
 _LEAST_ROWS: Final = 100  # of a plot: 1 s of observation
 _LEAST_SPAN: Final = 0.1
 
@@ -29,9 +29,7 @@ _AGAINST: Final = (
 
 def plots_of_friction(drive: DriveResult, truth: DriveResult | None, found: list[Braking]) -> dict[str, Any]:
     """Return the figures by name, front and rear for each quantity; empty where nothing was observed."""
-    rows = np.zeros(len(drive.t), bool)
-    for braking in found:
-        rows |= inside(drive, braking)
+    rows = inside_any(drive, found)
     plots = {}
     for stem, label, factor in _AGAINST:
         for axle, wheels in AXLES.items():
@@ -62,19 +60,18 @@ def _plot(
     true: Vector | None,
 ) -> Any:
     wheels = AXLES[axle]
-    plot = new_figure(label, f"Friction {axle} [-]", tools="pan,box_zoom,reset,save", active_drag="box_zoom")
+    plot = free_figure(label, f"Friction {axle} [-]", 225)
     mu, sigma = drive.corners("mu_b")[:, wheels], drive.corners("sigma_mu_b")[:, wheels]
     for wheel, (values, places) in enumerate(observed):
-        some = slice(None, None, max(1, -(-len(values) // POINTS)))
-        plot.scatter(
-            values[some].astype("f4"), mu[places[some], wheel].astype("f4"), size=3, line_color=None,
-            fill_color=(LEFT, RIGHT)[wheel], fill_alpha=0.35, legend_label=("left", "right")[wheel],
-        )  # fmt: skip
+        some = thinned(np.arange(len(values)), POINTS)
+        colour, label = ((LEFT, "left"), (RIGHT, "right"))[wheel]
+        dots = values[some].astype("f4"), mu[places[some], wheel].astype("f4")
+        draw_dots(plot, *dots, colour, 0.35, label)
     at = np.concatenate([at for at, _ in observed])
     place = np.concatenate([places for _, places in observed])
     side = np.repeat([0, 1], [len(places) for _, places in observed])
-    centre, mean = _binned(at, mu[place, side])
-    spread = 2.0 * _binned(at, sigma[place, side])[1]
+    centre, mean = binned(at, mu[place, side], BINS)
+    spread = 2.0 * binned(at, sigma[place, side], BINS)[1]
     # Points and means set the range: a wide band would compress them.
     shown = list(plot.renderers)
     if len(centre) > 1:
@@ -83,20 +80,6 @@ def _plot(
         )
         shown.append(plot.line(centre, mean, line_color=INK, line_width=1.6, legend_label="mean, ±2σ"))
         if true is not None:
-            centre, mean = _binned(at, true[place, side])
-            dashed = {"line_color": INK, "line_dash": "dashed", "line_width": 1.3}
-            shown.append(plot.line(centre, mean, legend_label="mean, true", **dashed))
+            shown += draw_true_mean(plot, *binned(at, true[place, side], BINS))
     plot.y_range.update(renderers=shown, range_padding=0.2, min_interval=_LEAST_SPAN)
     return plot
-
-
-def _binned(at: Vector, values: Vector) -> tuple[Vector, Vector]:
-    """Return the mean of `values` in intervals of `at`, and the intervals' own mean; few rows give none."""
-    known = np.isfinite(values)
-    at, values = at[known], values[known]
-    if not len(at) or np.ptp(at) == 0.0:
-        return np.empty(0), np.empty(0)
-    number = np.minimum(((at - at.min()) / np.ptp(at) * BINS).astype(int), BINS - 1)
-    count = np.bincount(number, minlength=BINS)
-    kept = count >= _FEWEST_ROWS
-    return tuple(np.bincount(number, of, BINS)[kept] / count[kept] for of in (at, values))  # type: ignore[return-value]

@@ -5,6 +5,7 @@ Left and right, estimated and demanded come from the palette of Okabe and Ito (2
 
 from typing import Any, Final
 
+from bokeh.models import SingleIntervalTicker
 from bokeh.models.annotations import Legend, Span
 from bokeh.models.tools import CrosshairTool
 from bokeh.plotting import figure
@@ -70,15 +71,7 @@ def new_figure(x_label: str, y_label: str, height: int = 225, **options: Any) ->
     plot.toolbar.logo = None
     plot.grid.grid_line_color = GRID
     for axis in plot.axis:
-        axis.axis_label_text_font_style = "normal"
-        axis.axis_label_text_font_size = "12px"
-        axis.major_label_text_font_size = "11px"
-        axis.axis_label_text_color = INK
-        axis.major_label_text_color = QUIET
-        axis.axis_line_color = QUIET
-        axis.major_tick_line_color = QUIET
-        axis.minor_tick_line_color = None
-        axis.axis_label_standoff = 4
+        style_axis(axis).axis_label_standoff = 4
     legend = Legend(
         orientation="horizontal",
         border_line_color=None,
@@ -94,6 +87,38 @@ def new_figure(x_label: str, y_label: str, height: int = 225, **options: Any) ->
     legend.update(padding=2)
     plot.add_layout(legend, "above")
     return plot
+
+
+def free_figure(x_label: str, y_label: str, height: int = 300, **options: Any) -> Any:
+    """Return an empty figure of no other's range: it is moved and zoomed both ways."""
+    tools = "pan,box_zoom,reset,save"
+    return new_figure(x_label, y_label, height, tools=tools, active_drag="box_zoom", **options)
+
+
+def style_axis(axis: Any) -> Any:
+    """Return an axis in the page's style."""
+    axis.axis_label_text_font_style = "normal"
+    axis.axis_label_text_font_size = "12px"
+    axis.major_label_text_font_size = "11px"
+    axis.axis_label_text_color = INK
+    axis.major_label_text_color = QUIET
+    axis.axis_line_color = QUIET
+    axis.major_tick_line_color = QUIET
+    axis.minor_tick_line_color = None
+    return axis
+
+
+def number_applications(plot: Any, count: int) -> None:
+    """Let the x axis count brake applications."""
+    plot.xaxis.ticker = SingleIntervalTicker(interval=max(1, -(-count // 15)))
+    plot.xgrid.grid_line_color = None
+
+
+def draw_line(plot: Any, source: Any, name: str, label: str, colour: str, **style: Any) -> None:
+    """Draw a quantity over time and enter it in the legend, if the drive has it."""
+    if name in source.column_names:
+        style = {"line_width": 1.6, **style}
+        plot.line("t", name, source=source, line_color=colour, legend_label=label, **style)
 
 
 def link_crosshair(plots: list[Any]) -> None:

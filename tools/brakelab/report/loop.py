@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from brakelab.arrays import Vector
-from brakelab.report.look import ESTIMATE, STAGE_COLOURS, new_figure
+from brakelab.report.look import ESTIMATE, STAGE_COLOURS, free_figure
 from brakelab.report.timing import Timing
 
 # Shorter than the clock's own grain here: drawn in the first bin.
@@ -24,10 +24,7 @@ def plots_of_loop(timing: Timing) -> dict[str, Any]:
 
 
 def _figure(label: str) -> Any:
-    return new_figure(
-        label, "Cycles per bin", x_axis_type="log", y_axis_type="log", tools="pan,box_zoom,reset,save",
-        active_drag="box_zoom",
-    )  # fmt: skip
+    return free_figure(label, "Cycles per bin", 225, x_axis_type="log", y_axis_type="log")
 
 
 def _histogram(plot: Any, durations: Vector, label: str, colour: str, alpha: float) -> None:
@@ -38,9 +35,12 @@ def _histogram(plot: Any, durations: Vector, label: str, colour: str, alpha: flo
     counts = np.histogram(shown, edges)[0].astype(float)
     # A logarithmic axis has no zero: a bin without a cycle ends at half a cycle.
     height = np.maximum(counts, 0.5)
-    plot.varea_step(
-        edges, np.full(len(edges), 0.5), np.append(height, 0.5), step_mode="after", fill_color=colour,
-        fill_alpha=alpha, legend_label=label,
-    )  # fmt: skip
+    look: dict[str, Any] = {
+        "step_mode": "after",
+        "fill_color": colour,
+        "fill_alpha": alpha,
+        "legend_label": label,
+    }
+    plot.varea_step(edges, np.full(len(edges), 0.5), np.append(height, 0.5), **look)
     outline = np.concatenate([[0.5], np.repeat(height, 2), [0.5]])
     plot.line(np.repeat(edges, 2), outline, line_color=colour, line_width=1.6, legend_label=label)

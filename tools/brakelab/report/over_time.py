@@ -7,10 +7,20 @@ from bokeh.models import ColumnDataSource, HoverTool, Range1d
 from bokeh.models.annotations import BoxAnnotation
 
 from brakelab.arrays import Vector
-from brakelab.report.brakings import Braking, inside
+from brakelab.report.brakings import Braking, inside_any
 from brakelab.report.downsample import Buckets, buckets, extremes, times
 from brakelab.report.drive import DriveResult
-from brakelab.report.look import DEMAND, ESTIMATE, INK, LEFT, RIGHT, SHADE, link_crosshair, new_figure
+from brakelab.report.look import (
+    DEMAND,
+    ESTIMATE,
+    INK,
+    LEFT,
+    RIGHT,
+    SHADE,
+    draw_line,
+    link_crosshair,
+    new_figure,
+)
 from brakelab.report.modes import modes_plot
 from brakelab.report.wheels import plots_of_wheels
 
@@ -40,10 +50,7 @@ _DISC = _Estimated("disc_temperature", "0", 40.0)
 
 def plots_over_time(drive: DriveResult, truth: DriveResult | None, found: list[Braking]) -> dict[str, Any]:
     """Return the figures by name in reading order; all share the x range `drive-time` and one source."""
-    busy = np.zeros(len(drive.t), bool)
-    for braking in found:
-        busy |= inside(drive, braking)
-    grid = buckets(busy, POINTS)
+    grid = buckets(inside_any(drive, found), POINTS)
     lines = _lines(drive, truth)
     source = ColumnDataSource(
         {"t": times(grid, drive.t), **{name: extremes(grid, v).astype("f4") for name, v in lines.items()}}
@@ -63,13 +70,8 @@ def plots_over_time(drive: DriveResult, truth: DriveResult | None, found: list[B
         "modes": modes_plot(drive, _coarse(grid), span),
     }
     plots = {name: plot for name, plot in plots.items() if plot.renderers}
-    shades = [
-        BoxAnnotation(
-            left=braking.t_start, right=braking.t_end, fill_color=SHADE, fill_alpha=1.0, line_color=None,
-            level="image",
-        )
-        for braking in found
-    ]  # fmt: skip
+    look: dict[str, Any] = {"fill_color": SHADE, "fill_alpha": 1.0, "line_color": None, "level": "image"}
+    shades = [BoxAnnotation(left=braking.t_start, right=braking.t_end, **look) for braking in found]
     for plot in plots.values():
         plot.center.extend(shades)  # the same in all plots: a long drive has hundreds
     link_crosshair(list(plots.values()))
@@ -111,13 +113,6 @@ def _lines(drive: DriveResult, truth: DriveResult | None) -> dict[str, Vector]:
     return {name: values for name, values in lines.items() if np.isfinite(values).any()}
 
 
-def _line(plot: Any, source: ColumnDataSource, name: str, label: str, colour: str, **style: Any) -> None:
-    """Draw a line and enter it in the legend, if the drive has it."""
-    if name in source.column_names:
-        style = {"line_width": 1.6, **style}
-        plot.line("t", name, source=source, line_color=colour, legend_label=label, **style)
-
-
 def _hover(plot: Any, source: ColumnDataSource, rows: list[tuple[str, str, str]]) -> None:
     """Show the values of (label, column, format) at the time under the mouse."""
     tips = [(label, f"@{name}{{{form}}}") for label, name, form in rows if name in source.column_names]
@@ -130,8 +125,8 @@ def _hover(plot: Any, source: ColumnDataSource, rows: list[tuple[str, str, str]]
 def _speed(source: ColumnDataSource, span: Range1d) -> Any:
     plot = new_figure(TIME, "Speed [km/h]", x_range=span, window_axis="x")
     plot.y_range.min_interval = _LEAST_KMH
-    _line(plot, source, "speed", "estimated", ESTIMATE)
-    _line(plot, source, "speed_true", "true", INK, line_dash="dashed", line_width=1.2)
+    draw_line(plot, source, "speed", "estimated", ESTIMATE)
+    draw_line(plot, source, "speed_true", "true", INK, line_dash="dashed", line_width=1.2)
     _hover(plot, source, [("estimated", "speed", "0.0"), ("true", "speed_true", "0.0")])
     return plot
 
@@ -139,10 +134,10 @@ def _speed(source: ColumnDataSource, span: Range1d) -> Any:
 def _deceleration(source: ColumnDataSource, span: Range1d) -> Any:
     plot = new_figure(TIME, "Deceleration [m/s²]", x_range=span, window_axis="x")
     plot.y_range.min_interval = _LEAST_DECELERATION
-    _line(plot, source, "achieved", "achieved (measured)", ESTIMATE, line_width=1.0)
-    _line(plot, source, "achieved_true", "achieved (true)", INK, line_dash="dashed", line_width=1.2)
-    _line(plot, source, "grip_limit", "ceiling of grip", INK, line_dash="dotted", line_width=1.2)
-    _line(plot, source, "demanded", "demanded", DEMAND, line_width=2.0)
+    draw_line(plot, source, "achieved", "achieved (measured)", ESTIMATE, line_width=1.0)
+    draw_line(plot, source, "achieved_true", "achieved (true)", INK, line_dash="dashed", line_width=1.2)
+    draw_line(plot, source, "grip_limit", "ceiling of grip", INK, line_dash="dotted", line_width=1.2)
+    draw_line(plot, source, "demanded", "demanded", DEMAND, line_width=2.0)
     rows = [("demanded", "demanded"), ("achieved", "achieved"), ("true", "achieved_true")]
     rows.append(("ceiling", "grip_limit"))
     _hover(plot, source, [(label, name, "0.00") for label, name in rows])
@@ -161,14 +156,17 @@ def _estimate(
             plot.varea("t", low, high, source=source, fill_color=colour, fill_alpha=0.16)
     bands = len(plot.renderers)
     for corner, side, colour in sides:
-        _line(plot, source, f"{name}_{corner}", f"{side}, band ±2σ", colour)
+        draw_line(plot, source, f"{name}_{corner}", f"{side}, band ±2σ", colour)
     for corner, side, _ in sides:
         dash = "dashed" if side == "left" else "dotted"
-        _line(plot, source, f"{name}_true_{corner}", f"{side}, true", INK, line_dash=dash, line_width=1.3)
+        draw_line(plot, source, f"{name}_true_{corner}", f"{side}, true", INK, line_dash=dash, line_width=1.3)
     # The lines set the range: a band that is briefly wide would compress everything.
     plot.y_range.update(renderers=plot.renderers[bands:], range_padding=0.5, min_interval=what.least_span)
-    rows = [(f"{side}{kind}", f"{name}{true}_{corner}", what.digits)
-            for corner, side, _ in sides for kind, true in (("", ""), (" true", "_true"))]  # fmt: skip
+    rows = [
+        (f"{side}{kind.replace('_', ' ')}", f"{name}{kind}_{corner}", what.digits)
+        for corner, side, _ in sides
+        for kind in ("", "_true")
+    ]
     _hover(plot, source, rows)
     return plot
 
@@ -178,12 +176,16 @@ def _pressure(source: ColumnDataSource, span: Range1d, axle: str, corners: tuple
     plot.y_range.min_interval = _LEAST_BAR
     sides = list(zip(corners, ("left", "right"), (LEFT, RIGHT), strict=True))
     for corner, side, colour in sides:
-        _line(plot, source, f"pressure_{corner}", side, colour, line_width=0.8, line_alpha=0.55)
+        draw_line(plot, source, f"pressure_{corner}", side, colour, line_width=0.8, line_alpha=0.55)
     for corner, side, _ in sides:
         dash = "solid" if side == "left" else "dashed"
-        _line(plot, source, f"demand_{corner}", f"{side}, demanded", DEMAND, line_width=1.8, line_dash=dash)
-    rows = [(f"{side} {kind}", f"{name}_{corner}", "0.0") for corner, side, _ in sides
-            for kind, name in (("demanded", "demand"), ("measured", "pressure"))]  # fmt: skip
+        draw_line(
+            plot, source, f"demand_{corner}", f"{side}, demanded", DEMAND, line_width=1.8, line_dash=dash
+        )
+    kinds = (("demanded", "demand"), ("measured", "pressure"))
+    rows = [
+        (f"{side} {kind}", f"{name}_{corner}", "0.0") for corner, side, _ in sides for kind, name in kinds
+    ]
     _hover(plot, source, rows)
     return plot
 
@@ -191,7 +193,7 @@ def _pressure(source: ColumnDataSource, span: Range1d, axle: str, corners: tuple
 def _tyre_factor(source: ColumnDataSource, span: Range1d) -> Any:
     plot = new_figure(TIME, "Tyre factor K_f [-]", x_range=span, window_axis="x")
     plot.y_range.min_interval = _LEAST_FACTOR
-    _line(plot, source, "k_f", "estimated", ESTIMATE)
-    _line(plot, source, "k_f_true", "true", INK, line_dash="dashed", line_width=1.2)
+    draw_line(plot, source, "k_f", "estimated", ESTIMATE)
+    draw_line(plot, source, "k_f_true", "true", INK, line_dash="dashed", line_width=1.2)
     _hover(plot, source, [("estimated", "k_f", "0.000"), ("true", "k_f_true", "0.000")])
     return plot

@@ -4,16 +4,19 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from bokeh.models import ColumnDataSource, HoverTool, Range1d, SingleIntervalTicker
+from bokeh.models import ColumnDataSource, HoverTool, Range1d
 from bokeh.models.annotations import Span
 
 from brakelab.arrays import Vector
 from brakelab.report.brakings import Braking
-from brakelab.report.look import DEMAND, ESTIMATE, LEFT, RIGHT, new_figure
+from brakelab.report.look import DEMAND, ESTIMATE, LEFT, RIGHT, new_figure, number_applications
 from ecu.contract.signals import CORNERS
 
-CORNER_MARKS = (("front left", LEFT, "circle"), ("front right", RIGHT, "circle"),
-            ("rear left", LEFT, "triangle"), ("rear right", RIGHT, "triangle"))  # fmt: skip
+CORNER_MARKS = tuple(
+    (f"{axle} {side}", colour, marker)
+    for axle, marker in (("front", "circle"), ("rear", "triangle"))
+    for side, colour in (("left", LEFT), ("right", RIGHT))
+)
 
 _DECELERATIONS = (
     ("demanded", DEMAND, "dash", 18),
@@ -54,10 +57,14 @@ def points_by_braking(
         columns[f"value_{place}"] = one.values
     source = ColumnDataSource(columns)
     for place, one in enumerate(shown):
-        plot.scatter(
-            f"at_{place}", f"value_{place}", source=source, marker=one.marker, size=8, line_color=one.colour,
-            fill_color=one.colour, fill_alpha=0.7, line_width=2, legend_label=one.label,
-        )  # fmt: skip
+        look: dict[str, Any] = {
+            "marker": one.marker,
+            "size": 8,
+            "fill_alpha": 0.7,
+            "line_width": 2,
+            **_of(one.colour),
+        }
+        plot.scatter(f"at_{place}", f"value_{place}", source=source, legend_label=one.label, **look)
     if zero is not None:
         plot.add_layout(Span(location=0.0, dimension="width", line_color=zero, line_width=1))
     _hover(plot, [(one.label, f"@value_{place}{{0.00}}") for place, one in enumerate(shown)])
@@ -84,20 +91,21 @@ def plots_per_braking(found: list[Braking]) -> dict[str, Any]:
     for place, (corner, (label, colour, marker)) in enumerate(zip(CORNERS, CORNER_MARKS, strict=True)):
         if np.isfinite(mean[:, place]).any():
             friction.line(f"at_{corner}", corner, source=source, line_color=colour, line_alpha=0.35)
-            friction.scatter(
-                f"at_{corner}", corner, source=source, marker=marker, size=8, line_color=colour,
-                fill_color=colour, fill_alpha=0.35 if place > 1 else 0.9, legend_label=label,
-            )  # fmt: skip
+            alpha = 0.35 if place > 1 else 0.9
+            look: dict[str, Any] = {"marker": marker, "size": 8, "fill_alpha": alpha, **_of(colour)}
+            friction.scatter(f"at_{corner}", corner, source=source, legend_label=label, **look)
     deceleration = _figure(span, "Mean deceleration [m/s²]", len(found), 1.0)
     for name, colour, marker, size in _DECELERATIONS:
         if np.isfinite(columns[name]).any():
-            deceleration.scatter(
-                "number", name, source=source, marker=marker, size=size, line_color=colour, fill_color=colour,
-                line_width=2, legend_label=name,
-            )  # fmt: skip
+            look = {"marker": marker, "size": size, "line_width": 2, **_of(colour)}
+            deceleration.scatter("number", name, source=source, legend_label=name, **look)
     _hover(deceleration, [(name, f"@{name}{{0.00}} m/s²") for name, *_ in _DECELERATIONS])
     _hover(friction, [(corner.upper(), f"@{corner}{{0.000}}") for corner in CORNERS])
     return {"braking-friction": friction, "braking-deceleration": deceleration}
+
+
+def _of(colour: str) -> dict[str, Any]:
+    return {"line_color": colour, "fill_color": colour}
 
 
 def _hover(plot: Any, tips: list[tuple[str, str]]) -> None:
@@ -107,6 +115,5 @@ def _hover(plot: Any, tips: list[tuple[str, str]]) -> None:
 def _figure(span: Range1d, label: str, count: int, least_span: float) -> Any:
     plot = new_figure("Brake application", label, x_range=span)
     plot.y_range.min_interval = least_span
-    plot.xaxis.ticker = SingleIntervalTicker(interval=max(1, -(-count // 15)))
-    plot.xgrid.grid_line_color = None
+    number_applications(plot, count)
     return plot

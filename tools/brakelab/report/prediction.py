@@ -6,16 +6,15 @@ Without a friction sensor this is the criterion of an estimate.
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from bokeh.models import ColumnDataSource, HoverTool, Range1d, SingleIntervalTicker
+from bokeh.models import ColumnDataSource, HoverTool, Range1d
 from bokeh.models.annotations import BoxAnnotation, Span
 
 from brakelab.arrays import Vector
 from brakelab.report.brakings import Braking, Force
-from brakelab.report.look import DEMAND, ESTIMATE, INK, QUIET, new_figure
+from brakelab.report.look import DEMAND, ESTIMATE, INK, QUIET, free_figure, number_applications
 from brakelab.results.prediction import Errors, errors, one_scale, running_average
 
 BAND: Final = 0.05
-HEIGHT: Final = 300
 _BAND_ALPHA: Final = 0.14
 
 
@@ -127,18 +126,18 @@ def _source(rows: list[Row]) -> ColumnDataSource:
 def _over_measured(source: ColumnDataSource, others: ColumnDataSource) -> Any:
     end = _reach(source, ("measured", "predicted"), "high")
     spans = [Range1d(start=0.0, end=end) for _ in range(2)]
-    plot = _figure("Measured [m/s²]", "Predicted [m/s²]", x_range=spans[0], y_range=spans[1])
-    plot.varea(
-        [0.0, end], [0.0, (1.0 - BAND) * end], [0.0, (1.0 + BAND) * end], fill_color=DEMAND,
-        fill_alpha=_BAND_ALPHA, legend_label=f"±{100 * BAND:.0f} %",
-    )  # fmt: skip
+    plot = free_figure("Measured [m/s²]", "Predicted [m/s²]", x_range=spans[0], y_range=spans[1])
+    band: dict[str, Any] = {
+        "fill_color": DEMAND,
+        "fill_alpha": _BAND_ALPHA,
+        "legend_label": f"±{100 * BAND:.0f} %",
+    }
+    plot.varea([0.0, end], [0.0, (1.0 - BAND) * end], [0.0, (1.0 + BAND) * end], **band)
     plot.line([0.0, end], [0.0, end], line_color=INK, line_dash="dashed", legend_label="1:1")
     _points(plot, source, "measured", "predicted", "low", "high")
     if len(others.data["number"]):
-        shown = plot.scatter(
-            "measured", "predicted", source=others, marker="x", size=8, line_color=QUIET, line_width=1.6,
-            legend_label="left out",
-        )  # fmt: skip
+        look: dict[str, Any] = {"marker": "x", "size": 8, "line_color": QUIET, "line_width": 1.6}
+        shown = plot.scatter("measured", "predicted", source=others, legend_label="left out", **look)
         _hover(plot, shown, [("left out", "@left_out")])
     return plot
 
@@ -146,13 +145,10 @@ def _over_measured(source: ColumnDataSource, others: ColumnDataSource) -> Any:
 def _over_number(source: ColumnDataSource, count: int) -> Any:
     largest = max(_reach(source, ("error",), "error_low", "error_high"), 200.0 * BAND)
     along, across = Range1d(start=0.5, end=count + 0.5, bounds="auto"), Range1d(start=-largest, end=largest)
-    plot = _figure("Brake application", "Predicted over measured − 1 [%]", x_range=along, y_range=across)
-    plot.xaxis.ticker = SingleIntervalTicker(interval=max(1, -(-count // 15)))
-    plot.xgrid.grid_line_color = None
-    plot.add_layout(
-        BoxAnnotation(bottom=-100.0 * BAND, top=100.0 * BAND, fill_color=DEMAND, fill_alpha=_BAND_ALPHA,
-                      line_color=None)
-    )  # fmt: skip
+    plot = free_figure("Brake application", "Predicted over measured − 1 [%]", x_range=along, y_range=across)
+    number_applications(plot, count)
+    band: dict[str, Any] = {"fill_color": DEMAND, "fill_alpha": _BAND_ALPHA, "line_color": None}
+    plot.add_layout(BoxAnnotation(bottom=-100.0 * BAND, top=100.0 * BAND, **band))
     plot.add_layout(Span(location=0.0, dimension="width", line_color=INK, line_dash="dashed"))
     _points(plot, source, "number", "error", "error_low", "error_high")
     return plot
@@ -165,18 +161,11 @@ def _reach(source: ColumnDataSource, points: tuple[str, ...], *bars: str) -> flo
     return 1.08 * max(farthest, float(np.quantile(ends, 0.9)) if np.isfinite(ends).all() else 0.0)
 
 
-def _figure(x_label: str, y_label: str, **ranges: Range1d) -> Any:
-    tools = "pan,box_zoom,reset,save"
-    return new_figure(x_label, y_label, height=HEIGHT, tools=tools, active_drag="box_zoom", **ranges)
-
-
 def _points(plot: Any, source: ColumnDataSource, x: str, y: str, low: str, high: str) -> None:
     if np.isfinite(source.data[low]).any():
         plot.segment(x, low, x, high, source=source, line_color=ESTIMATE, line_alpha=0.45, legend_label="±2σ")
-    shown = plot.scatter(
-        x, y, source=source, size=8, line_color=ESTIMATE, fill_color=ESTIMATE, fill_alpha=0.85,
-        legend_label="brake applications",
-    )  # fmt: skip
+    look: dict[str, Any] = {"size": 8, "line_color": ESTIMATE, "fill_color": ESTIMATE, "fill_alpha": 0.85}
+    shown = plot.scatter(x, y, source=source, legend_label="brake applications", **look)
     _hover(plot, shown, [("error", "@error{+0.0} %"), ("friction front", "@front"), ("rear", "@rear")])
 
 

@@ -12,16 +12,15 @@ from numpy.typing import NDArray
 
 from brakelab.arrays import Vector
 from brakelab.report.accuracy import AXLES
-from brakelab.report.brakings import Braking, inside
+from brakelab.report.brakings import Braking, inside_any
+from brakelab.report.cloud import binned, draw_dots, draw_true_mean, thinned
 from brakelab.report.drive import DriveResult
-from brakelab.report.look import INK, QUIET, STAGE_COLOURS, new_figure
+from brakelab.report.look import STAGE_COLOURS, free_figure, style_axis
 from brakelab.results.car import Car
 from ecu.contract.signals import CORNERS, OBSERVING
 
 POINTS: Final = 300
 """Of a class in a plot."""
-BINS: Final = 10
-_FEWEST_ROWS: Final = 20  # rows of a bin
 _LEAST_ROWS: Final = 100  # of a plot: 1 s of observation
 _LEAST_SPAN: Final = 0.2  # of the axis, in C*
 _DASHES: Final = ("solid", "dashed", "dotdash")
@@ -47,9 +46,7 @@ def plots_of_torque(
     drive: DriveResult, truth: DriveResult | None, found: list[Braking], car: Car
 ) -> dict[str, Any]:
     """Return the figures by name, each axle over pressure and speed; empty where nothing was observed."""
-    rows = np.zeros(len(drive.t), bool)
-    for braking in found:
-        rows |= inside(drive, braking)
+    rows = inside_any(drive, found)
     plots = {}
     for (axle, wheels), gain in zip(AXLES.items(), car.gain, strict=True):
         torque = gain * drive.corners("mu_b")[:, wheels].sum(axis=1)
@@ -87,52 +84,21 @@ def _plot(
     low, high = (float(value) for value in np.percentile(torque, (0.5, 99.5)))
     margin = max(0.15 * (high - low), 0.5 * (_LEAST_SPAN * gain - (high - low)))
     low, high = max(low - margin, 0.0), high + margin
-    plot = new_figure(
-        classes.label, f"T/p {axle} [N m/bar]", tools="pan,box_zoom,reset,save", active_drag="box_zoom",
-        y_range=Range1d(start=low, end=high),
-    )  # fmt: skip
+    plot = free_figure(classes.label, f"T/p {axle} [N m/bar]", 225, y_range=Range1d(start=low, end=high))
     plot.extra_y_ranges = {"c": Range1d(start=low / gain, end=high / gain)}
-    plot.add_layout(
-        LinearAxis(
-            y_range_name="c", axis_label="C* [-]", axis_label_text_font_style="normal",
-            axis_label_text_font_size="12px", major_label_text_font_size="11px", axis_label_text_color=INK,
-            major_label_text_color=QUIET, axis_line_color=QUIET, major_tick_line_color=QUIET,
-            minor_tick_line_color=None,
-        ),
-        "right",
-    )  # fmt: skip
+    plot.add_layout(style_axis(LinearAxis(y_range_name="c", axis_label="C* [-]")), "right")
     number = np.digitize(other, classes.limits)
     for place, name in enumerate(classes.names):
         mine = np.flatnonzero(number == place)
         if not len(mine):
             continue
-        some = mine[:: max(1, -(-len(mine) // POINTS))]
+        some = thinned(mine, POINTS)
         colour = STAGE_COLOURS[(0, 1, 3)[place]]
-        plot.scatter(
-            at[some].astype("f4"), torque[some].astype("f4"), size=3, line_color=None, fill_color=colour,
-            fill_alpha=0.35, legend_label=name,
-        )  # fmt: skip
+        draw_dots(plot, at[some].astype("f4"), torque[some].astype("f4"), colour, 0.35, name)
         centre, mean = binned(at[mine], torque[mine])
         if len(centre) > 1:
             style = {"line_color": colour, "line_width": 1.6, "line_dash": _DASHES[place]}
             plot.line(centre, mean, legend_label=name, **style)
     if true is not None:
-        centre, mean = binned(at, true)
-        if len(centre) > 1:
-            plot.line(
-                centre, mean, line_color=INK, line_dash="dashed", line_width=1.3, legend_label="mean, true"
-            )
+        draw_true_mean(plot, *binned(at, true))
     return plot
-
-
-def binned(at: Vector, values: Vector) -> tuple[Vector, Vector]:
-    """Return the means of `at` and `values` in intervals of `at`; intervals of few rows are left out."""
-    known = np.isfinite(at) & np.isfinite(values)
-    at, values = at[known], values[known]
-    if not len(at) or np.ptp(at) == 0.0:
-        return np.empty(0), np.empty(0)
-    number = np.minimum(((at - at.min()) / np.ptp(at) * BINS).astype(int), BINS - 1)
-    count = np.bincount(number, minlength=BINS)
-    kept = count >= _FEWEST_ROWS
-    first, second = (np.bincount(number, of, BINS)[kept] / count[kept] for of in (at, values))
-    return first, second

@@ -9,7 +9,7 @@ from bokeh.models.annotations import Span
 from brakelab.arrays import Vector
 from brakelab.report.accuracy import AXLES
 from brakelab.report.drive import DriveResult
-from brakelab.report.look import FAILED, LEFT, RIGHT, new_figure
+from brakelab.report.look import FAILED, LEFT, RIGHT, free_figure
 from brakelab.report.wear_applications import Application
 from brakelab.report.wear_roads import distance
 from brakelab.results.pads import PadState
@@ -19,7 +19,6 @@ BAND: Final = 1.96
 """Standard deviations of a 95 % band."""
 POINTS: Final = 400
 """Of a line: wear rises in small steps."""
-HEIGHT: Final = 300
 _COLOURS: Final = (LEFT, RIGHT, LEFT, RIGHT)
 
 
@@ -43,11 +42,9 @@ def plots_of_wear(drive: DriveResult, truth: DriveResult | None, pads: list[PadS
 def _in_drive(km: Vector, worn: Vector, known: list[int], truth: DriveResult | None, some: Any) -> Any:
     plot = _figure("Distance in this drive [km]", "Worn off in this drive [µm]")
     for i in known:
-        front = i < 2
-        plot.line(
-            km, 1e3 * (worn[:, i] - worn[0, i]), line_color=_COLOURS[i], legend_label=CORNERS[i],
-            line_width=2.0 if front else 1.2, line_alpha=1.0 if front else 0.6,
-        )  # fmt: skip
+        width, alpha = (2.0, 1.0) if i < 2 else (1.2, 0.6)
+        look: dict[str, Any] = {"line_color": _COLOURS[i], "line_width": width, "line_alpha": alpha}
+        plot.line(km, 1e3 * (worn[:, i] - worn[0, i]), legend_label=CORNERS[i], **look)
         true = None if truth is None else truth.column(f"pad_wear_{CORNERS[i]}")[some]
         if true is not None and np.isfinite(true).any():
             lost = 1e3 * (true - true[np.isfinite(true)][0])
@@ -62,7 +59,7 @@ def _lining(axle: str, pads: list[PadState], km: Vector, worn: Vector, sigma: Ve
         i = CORNERS.index(pad.corner)
         at = max(pad.driven, km[-1]) - km[-1] + km
         thickness = pad.thickness_new - worn[:, i]
-        look = {"fill_color": _COLOURS[i], "fill_alpha": 0.14}
+        look: dict[str, Any] = {"fill_color": _COLOURS[i], "fill_alpha": 0.14}
         low, high = (
             np.clip(thickness + sign * BAND * sigma[:, i], 0.0, pad.thickness_new) for sign in (-1.0, 1.0)
         )
@@ -101,31 +98,27 @@ def plots_of_emission(applications: list[Application]) -> dict[str, Any]:
         plot = _figure(label, "Particles of the brake [log10]", x_axis_type=kind)
         for i in np.flatnonzero(known.any(axis=0)):
             rows = known[:, i]
-            source = ColumnDataSource(
-                {"x": x[rows, i], "factor": factor[rows, i], "low": low[rows, i], "high": high[rows, i],
-                 "start": start[rows]}
-            )  # fmt: skip
+            columns = {"x": x, "factor": factor, "low": low, "high": high}
+            source = ColumnDataSource({k: v[rows, i] for k, v in columns.items()} | {"start": start[rows]})
             plot.segment("x", "low", "x", "high", source=source, line_color=_COLOURS[i], line_alpha=0.25)
-            dots = plot.scatter(
-                "x", "factor", source=source, marker="circle" if i < 2 else "triangle", size=6,
-                line_color=None, fill_color=_COLOURS[i], fill_alpha=0.8, legend_label=CORNERS[i],
-            )  # fmt: skip
-            plot.add_tools(
-                HoverTool(
-                    renderers=[dots],
-                    tooltips=[
-                        ("start", "@start{0.0} s"),
-                        ("log10", "@factor{0.00}"),
-                        ("95 %", "@low{0.00} to @high{0.00}"),
-                    ],
-                )
-            )
+            look: dict[str, Any] = {
+                "marker": "circle" if i < 2 else "triangle",
+                "size": 6,
+                "line_color": None,
+            }
+            look |= {"fill_color": _COLOURS[i], "fill_alpha": 0.8, "legend_label": CORNERS[i]}
+            dots = plot.scatter("x", "factor", source=source, **look)
+            tips = [
+                ("start", "@start{0.0} s"),
+                ("log10", "@factor{0.00}"),
+                ("95 %", "@low{0.00} to @high{0.00}"),
+            ]
+            plot.add_tools(HoverTool(renderers=[dots], tooltips=tips))
         plots[name] = plot
     return plots
 
 
 def _figure(x_label: str, y_label: str, **options: Any) -> Any:
-    tools = "pan,box_zoom,reset,save"
-    plot = new_figure(x_label, y_label, height=HEIGHT, tools=tools, active_drag="box_zoom", **options)
+    plot = free_figure(x_label, y_label, **options)
     plot.ygrid.grid_line_alpha = 0.6
     return plot

@@ -8,7 +8,17 @@ from bokeh.models import ColumnDataSource, Range1d
 from brakelab.arrays import Vector
 from brakelab.report.downsample import Buckets, extremes, times
 from brakelab.report.drive import DriveResult
-from brakelab.report.look import DEMAND, ESTIMATE, INK, LEFT, QUIET, RIGHT, STAGE_COLOURS, new_figure
+from brakelab.report.look import (
+    DEMAND,
+    ESTIMATE,
+    INK,
+    LEFT,
+    QUIET,
+    RIGHT,
+    STAGE_COLOURS,
+    draw_line,
+    new_figure,
+)
 from ecu.contract.signals import CORNERS
 
 TIME: Final = "Time [s]"
@@ -105,9 +115,9 @@ def _slip(source: ColumnDataSource, span: Range1d, axle: str, corners: tuple[str
     plot = new_figure(TIME, f"Slip {axle} [%]", x_range=span, window_axis="x")
     plot.y_range.min_interval = _LEAST_SLIP
     for corner, (side, colour, _) in zip(corners, _SIDES, strict=True):
-        _line(plot, source, f"slip_{corner}", side, colour)
+        draw_line(plot, source, f"slip_{corner}", side, colour, line_width=1.4)
     for corner, (side, _, dash) in zip(corners, _SIDES, strict=True):
-        _line(plot, source, f"slip_true_{corner}", f"{side}, true", INK, line_dash=dash, line_width=1.2)
+        draw_line(plot, source, f"slip_true_{corner}", f"{side}, true", INK, line_dash=dash, line_width=1.2)
     return plot
 
 
@@ -116,9 +126,9 @@ def _speeds(source: ColumnDataSource, span: Range1d) -> Any:
     plot.y_range.min_interval = _LEAST_KMH
     if not any(f"speed_{corner}" in source.column_names for corner in _WHEELS):
         return plot
-    _line(plot, source, "speed", "car", QUIET, line_width=3.0, line_alpha=0.5)
+    draw_line(plot, source, "speed", "car", QUIET, line_width=3.0, line_alpha=0.5)
     for corner, (label, colour, dash) in _WHEELS.items():
-        _line(plot, source, f"speed_{corner}", label, colour, line_dash=dash, line_width=1.2)
+        draw_line(plot, source, f"speed_{corner}", label, colour, line_dash=dash, line_width=1.2)
     return plot
 
 
@@ -134,11 +144,5 @@ def _few(
     if label.endswith("[%]"):
         plot.y_range.start = 0.0
     for name, of, colour in lines:
-        _line(plot, source, name, of, colour)
+        draw_line(plot, source, name, of, colour, line_width=1.4)
     return plot
-
-
-def _line(plot: Any, source: ColumnDataSource, name: str, label: str, colour: str, **style: Any) -> None:
-    if name in source.column_names:
-        style = {"line_width": 1.4, **style}
-        plot.line("t", name, source=source, line_color=colour, legend_label=label, **style)
