@@ -11,6 +11,8 @@ import pytest
 from brakelab.report.command import report
 from draw_watch import chromium
 
+from .conftest import write_drive
+
 CHROMIUM = chromium()
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium here (apt-get install chromium)")
 
@@ -57,27 +59,25 @@ setTimeout(() => {
 </script></body>"""
 
 
+@pytest.fixture(scope="module")
+def probed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("probed")
+    drive_files, page = write_drive(folder), folder / "report.html"
+    report(drive_files["result"], drive_files["truth"], page, drive_files["timing"])
+    page.write_text(page.read_text("utf-8").replace("</body>", PROBE), "utf-8")
+    return page
+
+
 @pytest.mark.parametrize(
     ("scheme", "ink", "width"), [(1, "#1b1f24", 1400), (0, "#e8ebef", 400)], ids=["light", "dark and narrow"]
 )
-def test_every_plot_is_drawn(
-    drive_files: dict[str, Path], tmp_path: Path, scheme: int, ink: str, width: int
-) -> None:
-    page = tmp_path / "report.html"
-    report(drive_files["result"], drive_files["truth"], page, drive_files["timing"])
-    probed = tmp_path / "probed.html"
-    probed.write_text(page.read_text("utf-8").replace("</body>", PROBE), "utf-8")
-    profile = f"--user-data-dir={tmp_path / 'profile'}"
-    shade = f"--blink-settings=preferredColorScheme={scheme}"
-    command = [
-        str(CHROMIUM),
-        *OPTIONS,
+def test_every_plot_is_drawn(probed: Path, tmp_path: Path, scheme: int, ink: str, width: int) -> None:
+    own = (
         f"--window-size={width},9000",
-        profile,
-        shade,
-        "--dump-dom",
-        probed.as_uri(),
-    ]
+        f"--user-data-dir={tmp_path / 'profile'}",
+        f"--blink-settings=preferredColorScheme={scheme}",
+    )
+    command = [str(CHROMIUM), *OPTIONS, *own, "--dump-dom", probed.as_uri()]
     short = {**os.environ, "TMPDIR": "/tmp"}  # where it makes a socket, whose name has at most 107 letters
     done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False, env=short)
     title = re.search(r"<title>(.*?)</title>", done.stdout)
