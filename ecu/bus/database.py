@@ -117,12 +117,12 @@ def _check_pdus(path: Path) -> None:
                 raise UserError(str(path), frame.findtext("{*}SHORT-NAME", ""), remedy)
 
 
-def attribute(message: Message, name: str, default: int = 0) -> int:
-    """Return an integer message attribute of a DBC, else its default there, else `default`."""
+def attribute(message: Message, name: str) -> int:
+    """Return an integer message attribute of a DBC, else its default there, else 0."""
     specifics = message.dbc
     if specifics is not None and name in specifics.attributes:
         return int(specifics.attributes[name].value)
-    return default
+    return 0
 
 
 def find_message(database: Database, name: str, where: Path, key: str) -> Message:

@@ -7,7 +7,7 @@ from rich.console import Console
 WIDTH: Final = 110  # columns where no terminal says how wide it is
 
 
-def new_console(width: int = WIDTH, stderr: bool = False) -> Console:
+def new_console(width: int = WIDTH) -> Console:
     """Return a console as wide as its terminal, `width` columns where there is none."""
-    console = Console(stderr=stderr)
-    return console if console.is_terminal else Console(stderr=stderr, width=width)
+    console = Console()
+    return console if console.is_terminal else Console(width=width)

@@ -47,12 +47,12 @@ class WornBlock(NamedTuple):
     """g, true."""
 
 
-def road_stops(road: str, driver: str, seed: int, count: int = APPLICATIONS) -> Array:
-    """Return speeds before and after [m/s], deceleration [m/s^2] and seconds before; shape (count, 4)."""
+def road_stops(road: str, driver: str, seed: int) -> Array:
+    """Return speeds before and after [m/s], deceleration [m/s^2], seconds before; shape (APPLICATIONS, 4)."""
     low, high = (KMH * value for value in ROADS[road])
     harder, faster = DRIVERS[driver]
     rows: list[Array] = []
-    while sum(map(len, rows)) < count:
+    while sum(map(len, rows)) < APPLICATIONS:
         trip = real_driving(seed + 100 * len(rows))
         found = brakings(trip.t, trip.speed, -np.gradient(trip.speed, trip.t))
         before = np.diff(found.start, prepend=0.0) - np.concatenate([[0.0], found.duration[:-1]])
@@ -64,7 +64,7 @@ def road_stops(road: str, driver: str, seed: int, count: int = APPLICATIONS) -> 
             np.minimum(before, 120.0),
         )
         rows.append(np.column_stack(table)[part])
-    return np.concatenate(rows)[:count]
+    return np.concatenate(rows)[:APPLICATIONS]
 
 
 def drawn_car(seed: int) -> RecordArray:

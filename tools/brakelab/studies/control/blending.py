@@ -186,9 +186,9 @@ def wrong_friction(share: float, ratio: float, compensate: bool, seed: int) -> f
     return float(100.0 * np.sqrt(np.mean((decel - wanted) ** 2)) / np.mean(wanted))
 
 
-def _over_cars(of: Callable[[int], NamedTuple], cars: int) -> list[str]:
+def _over_cars(of: Callable[[int], NamedTuple]) -> list[str]:
     """Return each field of the results of `of` as median (least–greatest) over the cars."""
-    return [spread(figure(values)) for values in zip(*map(of, range(cars)), strict=True)]
+    return [spread(figure(values)) for values in zip(*map(of, range(CARS)), strict=True)]
 
 
 def _drive(scenario: Scenario, config: Config, seed: int) -> Drive:
@@ -208,7 +208,7 @@ def _changing_of(
     return changing(drive(scenario, config, seed), config)
 
 
-def _changing_table(cars: int) -> Table:
+def _changing_table() -> Table:
     torque_unknown = {"motor_torque": SensorErrors(lost_from=LOSS)}
     cases: dict[str, tuple[Scenario, float]] = {
         **{f"to rest at 4 m/s², f = {f:g}": (shipped("hand-over"), f) for f in (*SHARES[1:], 1.0)},
@@ -221,10 +221,10 @@ def _changing_table(cars: int) -> Table:
     }
     rows = []
     for name, (scenario, share) in cases.items():
-        rows.append((name, *_over_cars(partial(_changing_of, scenario, blended(share), _drive), cars)))
+        rows.append((name, *_over_cars(partial(_changing_of, scenario, blended(share), _drive))))
     for share in (0.4, 0.8, 1.0):
         own = partial(_changing_of, shipped("hand-over"), blended(share), _drive_as_learned)
-        rows.append((f"to rest at 4 m/s², f = {share:g}, own friction", *_over_cars(own, cars)))
+        rows.append((f"to rest at 4 m/s², f = {share:g}, own friction", *_over_cars(own)))
     columns = (
         *("case", "below [%]", "above [%]", "longest outside 2 % [ms]", "while they fade [%]"),
         "motors' share [%]",
@@ -243,7 +243,7 @@ def _faulty(*faults: Fault) -> Scenario:
     return shipped("hand-over").model_copy(update={"fault": list(faults)})
 
 
-def _loss_table(cars: int) -> Table:
+def _loss_table() -> Table:
     gone = Fault(kind="motor_lost", t=LOSS)
     hidden = Fault(kind="stuck", t=LOSS, signal=["motor_limit"])
     mute = Fault(kind="lost", t=LOSS, message=["MotorFront", "MotorRear"])
@@ -261,7 +261,7 @@ def _loss_table(cars: int) -> Table:
         def one(seed: int, scenario: Scenario = scenario, config: Config = config) -> Loss:
             return loss(_drive(scenario, config, seed), config)
 
-        rows.append((name, *_over_cars(one, cars)))
+        rows.append((name, *_over_cars(one)))
     columns = ("case", "within 2 % after [ms]", "below the linings before [% of the demand]", "above [%]")
     below = (
         f"All motors are lost at t = {LOSS:g} s; the sum is counted from then on. The greatest above is that "
@@ -270,13 +270,13 @@ def _loss_table(cars: int) -> Table:
     return Table("Motors lost", columns, rows, below)
 
 
-def _wrong_friction_table(cars: int) -> Table:
+def _wrong_friction_table() -> Table:
     rows = []
     for share in SHARES:
         cells = []
         for ratio in (1.0 + WRONG, 1.0 - WRONG):
             for compensate in (False, True):
-                errors = [wrong_friction(share, ratio, compensate, seed) for seed in range(cars)]
+                errors = [wrong_friction(share, ratio, compensate, seed) for seed in range(CARS)]
                 cells.append(spread(figure(errors)))
         rows.append((f"{share:g}", *cells))
     columns = ("f", "under-braking", "compensated", "over-braking", "compensated ")
@@ -290,9 +290,9 @@ def _wrong_friction_table(cars: int) -> Table:
     return Table("Friction wrong by 15 %: error of the deceleration [%]", columns, rows, below)
 
 
-def blending_tables(cars: int = CARS) -> list[Table]:
-    """Return the tables, each figure as median (least–greatest) over the cars 0 to `cars` - 1."""
-    return [_changing_table(cars), _loss_table(cars), _wrong_friction_table(cars)]
+def blending_tables() -> list[Table]:
+    """Return the tables, each figure as median (least–greatest) over the cars."""
+    return [_changing_table(), _loss_table(), _wrong_friction_table()]
 
 
 TEXT: Final = (

@@ -9,8 +9,6 @@ Achieved is the sum over the wheels of (brake torque + motor torque) / rolling r
 true. Errors are against the ideal at the same time, above 15 km/h.
 """
 
-from collections.abc import Callable, Iterable
-from functools import partial
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -213,11 +211,3 @@ def one_car(config: Config, seed: int) -> Car:
     for kind in FADE_RUNS:
         car.fade[kind] = fade_pedal(drive_as(kind, fade, config, seed))
     return car
-
-
-Spread = Callable[[Callable[[int], Car], Iterable[int]], Iterable[Car]]
-
-
-def drive_cars(config: Config, cars: int = CARS, spread: Spread = map) -> list[Car]:
-    """Drive cars 0 to `cars` - 1."""
-    return list(spread(partial(one_car, config), range(cars)))

@@ -6,7 +6,7 @@ from typing import Final
 
 from brakelab.results.chart import write_chart
 from brakelab.results.processes import run_each
-from brakelab.studies.control.compensation import drive_cars
+from brakelab.studies.control.compensation import CARS, one_car
 from brakelab.studies.control.compensation_picture import LEGEND, pictured
 from brakelab.studies.control.compensation_table import compensation_tables
 from brakelab.studies.study import Asked, Measured, Study
@@ -26,7 +26,7 @@ TEXT: Final = (
 
 def _run(asked: Asked) -> Measured:
     config = load_config(resource("config/suv.toml"))
-    cars = drive_cars(config, spread=partial(run_each, "compensation"))
+    cars = run_each("compensation", partial(one_car, config), range(CARS))
 
     def draw(folder: Path) -> None:
         panels = pictured(config)

@@ -89,23 +89,23 @@ FAILURES: Final[dict[str, Fault]] = {
 }
 
 
-def failure_tables(cars: int = CARS) -> list[Table]:
-    """Return the tables, each figure as median (least–greatest) over the cars 0 to `cars` - 1."""
+def failure_tables() -> list[Table]:
+    """Return the tables, each figure as median (least–greatest) over the cars."""
     config = load_config(resource("config/suv.toml"))
     blended = load_config(resource("config/suv-blended.toml"))
     blended = blended.model_copy(update={"blending": blended.blending.model_copy(update=HALF)})
     return [
-        *(_table(f"{decel:g} m/s², linings alone", decel, config, False, cars) for decel in DECELS),
-        _table("4 m/s², motors at 50 %", 4.0, blended, True, cars),
+        *(_table(f"{decel:g} m/s², linings alone", decel, config, False) for decel in DECELS),
+        _table("4 m/s², motors at 50 %", 4.0, blended, True),
     ]
 
 
-def _table(title: str, decel: float, config: Config, motors: bool, cars: int) -> Table:
-    sound = [run(new_loop(braking(decel, motors, []), config, seed)) for seed in range(cars)]
+def _table(title: str, decel: float, config: Config, motors: bool) -> Table:
+    sound = [run(new_loop(braking(decel, motors, []), config, seed)) for seed in range(CARS)]
     rows = []
     for name, fault in FAILURES.items():
         scenario = braking(decel, motors, [fault])
-        left = [left_of(run(new_loop(scenario, config, seed)), sound[seed]) for seed in range(cars)]
+        left = [left_of(run(new_loop(scenario, config, seed)), sound[seed]) for seed in range(CARS)]
         cells = [figure(list(values)) for values in zip(*left, strict=True)]
         reported = "–" if np.isnan(cells[1].median) else spread(cells[1])
         rows.append((name, spread(cells[0]), reported, *map(spread, cells[2:])))

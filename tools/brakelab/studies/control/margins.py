@@ -13,7 +13,6 @@ margin the least phase where a modulus is 1, distance the least |1 - eigenvalue|
 on the friction in use is neglected: it makes the loop slower still.
 """
 
-from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Final, NamedTuple
 
@@ -123,14 +122,6 @@ def margins_of(config: Config, seed: int) -> Margins:
     return Margins(loop, np.linalg.eigvals(loop).astype(np.complex128))
 
 
-Spread = Callable[[Callable[[int], Margins], Iterable[int]], Iterable[Margins]]
-
-
-def measure_cars(config: Config, cars: int = CARS, spread: Spread = map) -> list[Margins]:
-    """Measure cars 0 to `cars` - 1."""
-    return list(spread(partial(margins_of, config), range(cars)))
-
-
 def _decibel(value: float) -> str:
     return f"{20.0 * np.log10(value):.0f}"
 
@@ -215,7 +206,7 @@ TEXT: Final = (
 
 def _run(asked: Asked) -> Measured:
     config = load_config(resource("config/suv.toml"))
-    cars = measure_cars(config, spread=partial(run_each, "margins"))
+    cars = run_each("margins", partial(margins_of, config), range(CARS))
     drawn = picture("control-margins.svg", margin_panels(cars), LEGEND)
     return Measured(margin_tables(cars), draw=drawn)
 

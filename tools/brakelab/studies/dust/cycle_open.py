@@ -45,9 +45,9 @@ def profile(t: Array, speed: Array, grade: Array) -> Array:
     return np.column_stack((v, np.gradient(v, STEP), np.interp(fine, t, grade)))
 
 
-def real_driving_profile(seed: int = 1) -> list[tuple[float, Array]]:
-    """Return the trip of a seed as its disc temperature at the start [degC] and its `profile`."""
-    trip = real_driving(seed)
+def real_driving_profile() -> list[tuple[float, Array]]:
+    """Return the trip of seed 1 as its disc temperature at the start [degC] and its `profile`."""
+    trip = real_driving(1)
     return [(20.0, profile(trip.t, trip.speed, trip.grade_by_time()))]
 
 

@@ -53,10 +53,10 @@ class Pair(NamedTuple):
         return float(self.rig.worn.sum() / self.road.worn.sum()) - 1.0
 
 
-def pair_of(corner: Corner, stops: Array, worn: float = RUN_IN) -> Pair:
+def pair_of(corner: Corner, stops: Array) -> Pair:
     """Run a block on the road, then its reproduction from the disc temperatures of the road."""
-    road = run_stops(corner, stops, worn)
-    return Pair(road, run_stops(corner, stops, worn, road.heat_in))
+    road = run_stops(corner, stops, RUN_IN)
+    return Pair(road, run_stops(corner, stops, RUN_IN, road.heat_in))
 
 
 def car_pairs(seed: int) -> list[Pair]:

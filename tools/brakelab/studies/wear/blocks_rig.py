@@ -79,15 +79,13 @@ def energy_error(corner: Corner, v_in: float, v_end: float, decel: float) -> flo
     return mean / (corner.mass * decel)
 
 
-def run_stops(
-    corner: Corner, stops: Array, worn: float, references: Array | None = None, heat: float = AIR
-) -> Done:
+def run_stops(corner: Corner, stops: Array, worn: float, references: Array | None = None) -> Done:
     """Run applications on the road, or with `references` [degC], shape (n,), on the dynamometer.
 
     `stops`: speed before and after [m/s], deceleration [m/s^2], seconds before; shape (n, 4). `worn`: off
     both pads before [g].
     """
-    done = np.zeros((len(stops), 6))
+    done, heat = np.zeros((len(stops), 6)), AIR
     for k, (first, last, decel, gap) in enumerate(stops.tolist()):
         waited = gap
         if references is None:
