@@ -1,9 +1,7 @@
 """BLF: python-can's writer and hand-made objects of every kind; damage costs what is damaged, no more."""
 
 import struct
-import time
 import zlib
-from collections.abc import Iterator
 from pathlib import Path
 
 import can
@@ -13,36 +11,10 @@ from can.io import BLFReader, BLFWriter
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from brakelab.logs.formats import read_frames
-from brakelab.logs.log_quality import LogQuality
-from ecu.contract.records import FRAME_ERROR, FRAME_EXTENDED, FRAME_FD, FRAME_REMOTE, RecordArray
+from ecu.contract.records import FRAME_ERROR, FRAME_EXTENDED, FRAME_FD, FRAME_REMOTE
 from ecu.errors import UserError
 
-FD_LENGTHS = [*range(9), 12, 16, 20, 24, 32, 48, 64]
-
-
-def read(path: Path, interfaces: list[str] | None = None) -> tuple[RecordArray, LogQuality]:
-    quality = LogQuality()
-    blocks = list(read_frames(path, interfaces if interfaces is not None else [], quality))
-    return np.concatenate(blocks), quality
-
-
-@st.composite
-def messages(draw: st.DrawFn) -> can.Message:
-    fd, extended = draw(st.booleans()), draw(st.booleans())
-    length = draw(st.sampled_from(FD_LENGTHS if fd else FD_LENGTHS[:9]))
-    remote = not fd and draw(st.booleans())
-    return can.Message(
-        timestamp=1_600_000_000 + draw(st.integers(0, 10_000_000)) / 1e6,
-        arbitration_id=draw(st.integers(0, (1 << 29) - 1 if extended else 0x7FF)),
-        is_extended_id=extended,
-        is_fd=fd,
-        is_remote_frame=remote,
-        data=None if remote else draw(st.binary(min_size=length, max_size=length)),
-        dlc=length if remote else None,
-        channel=draw(st.integers(0, 7)),
-        is_rx=draw(st.booleans()),
-    )
+from .conftest import assert_is, messages, read
 
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
@@ -60,14 +32,8 @@ def test_reads_what_python_can_reads(
     assert (quality.damaged, len(frames)) == (0, len(expected))
     for frame, message in zip(frames, expected, strict=True):
         assert frame["stamp_ns"] == round(message.timestamp * 1e6) * 1000
-        assert frame["can_id"] == message.arbitration_id
-        assert bool(frame["flags"] & FRAME_EXTENDED) == message.is_extended_id
-        assert bool(frame["flags"] & FRAME_REMOTE) == message.is_remote_frame
-        assert bool(frame["flags"] & FRAME_FD) == message.is_fd
+        assert_is(frame, message)
         assert interfaces[frame["bus"]] == f"can{message.channel}"
-        assert frame["length"] == message.dlc
-        if not message.is_remote_frame:
-            assert bytes(frame["data"][: frame["length"]]) == bytes(message.data)
 
 
 def blf(*objects: bytes, method: int = 2) -> bytes:
@@ -118,15 +84,6 @@ OBJECTS = {
     "CAN_ERROR_EXT": (73, ERROR[:32], 0, FRAME_ERROR, "can1", b""),
     "CAN_FD_ERROR_64": (104, ERROR, 0, FRAME_ERROR, "can1", b""),
 }
-
-
-@pytest.fixture
-def berlin(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setenv("TZ", "CET-1CEST,M3.5.0,M10.5.0/3")
-    time.tzset()
-    yield
-    monkeypatch.undo()
-    time.tzset()
 
 
 @pytest.mark.usefixtures("berlin")

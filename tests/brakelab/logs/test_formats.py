@@ -26,14 +26,10 @@ from ecu.contract.records import RecordArray
 from ecu.errors import UserError
 from ecu.settings.resources import resource
 
+from .conftest import read
+
 DATA = Path(__file__).parents[2] / "data"
 TEXT = (".log", ".asc", ".trc")
-
-
-def read(path: Path, interfaces: list[str] | None = None) -> tuple[RecordArray, LogQuality]:
-    quality = LogQuality()
-    blocks = list(read_frames(path, interfaces if interfaces is not None else [], quality))
-    return np.concatenate(blocks), quality
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,5 @@
 """ASC and TRC text: python-can's readers are the oracle; dates, number bases and every version's columns."""
 
-import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import can
@@ -13,52 +11,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from brakelab.logs.asc import date_ns
-from brakelab.logs.formats import read_frames
-from brakelab.logs.log_quality import LogQuality
 from brakelab.logs.trc import days_ns
 from ecu.contract.records import FRAME_ERROR, FRAME_EXTENDED, FRAME_FD, FRAME_REMOTE, RecordArray
 from ecu.errors import UserError
 
-FD_LENGTHS = [*range(9), 12, 16, 20, 24, 32, 48, 64]
-
-
-@pytest.fixture
-def berlin(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setenv("TZ", "CET-1CEST,M3.5.0,M10.5.0/3")
-    time.tzset()
-    yield
-    monkeypatch.undo()
-    time.tzset()
-
-
-def read(path: Path, interfaces: list[str] | None = None) -> tuple[RecordArray, LogQuality]:
-    quality = LogQuality()
-    blocks = list(read_frames(path, interfaces if interfaces is not None else [], quality))
-    return np.concatenate(blocks), quality
-
-
-@st.composite
-def messages(draw: st.DrawFn, fd_too: bool) -> can.Message:
-    fd = fd_too and draw(st.booleans())
-    extended = draw(st.booleans())
-    # A CAN FD frame without data cannot be distinguished from a remote frame in ASC.
-    length = draw(st.sampled_from(FD_LENGTHS[1:] if fd else FD_LENGTHS[:9]))
-    remote = fd_too and not fd and draw(st.booleans())
-    return can.Message(
-        timestamp=1_600_000_000 + draw(st.integers(0, 10_000_000)) / 1e6,
-        # python-can's TRC writer gives a small 29-bit identifier fewer than the format's eight digits.
-        arbitration_id=draw(st.integers(0x10000000 if not fd_too else 0, (1 << 29) - 1))
-        if extended
-        else draw(st.integers(0, 0x7FF)),
-        is_extended_id=extended,
-        is_fd=fd,
-        is_remote_frame=remote,
-        bitrate_switch=fd and draw(st.booleans()),
-        data=None if remote else draw(st.binary(min_size=length, max_size=length)),
-        dlc=length if remote else None,
-        channel=draw(st.integers(0, 7)),
-        is_rx=draw(st.booleans()),
-    )
+from .conftest import FD_LENGTHS, assert_is, messages, read
 
 
 def assert_same(frames: RecordArray, interfaces: list[str], expected: list[can.Message], first: int) -> None:
@@ -66,19 +23,13 @@ def assert_same(frames: RecordArray, interfaces: list[str], expected: list[can.M
     assert len(frames) == len(expected)
     for frame, message in zip(frames, expected, strict=True):
         assert abs(frame["stamp_ns"] - round(message.timestamp * 1e6) * 1000) <= 1000
-        assert frame["can_id"] == message.arbitration_id
-        assert bool(frame["flags"] & FRAME_EXTENDED) == message.is_extended_id
-        assert bool(frame["flags"] & FRAME_REMOTE) == message.is_remote_frame
-        assert bool(frame["flags"] & FRAME_FD) == message.is_fd
+        assert_is(frame, message)
         assert interfaces[frame["bus"]] == f"can{message.channel - first}"
-        assert frame["length"] == message.dlc
-        if not message.is_remote_frame:
-            assert bytes(frame["data"][: frame["length"]]) == bytes(message.data)
-        assert not frame["data"][len(message.data) :].any()
 
 
+# A CAN FD frame without data cannot be distinguished from a remote frame in ASC.
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
-@given(st.lists(messages(fd_too=True), min_size=1, max_size=30))
+@given(st.lists(messages(fd_lengths=FD_LENGTHS[1:]), min_size=1, max_size=30))
 def test_asc_is_what_python_can_reads(tmp_path: Path, sent: list[can.Message]) -> None:
     path = tmp_path / "drive.asc"
     with ASCWriter(path) as writer:
@@ -90,8 +41,9 @@ def test_asc_is_what_python_can_reads(tmp_path: Path, sent: list[can.Message]) -
     assert_same(frames, interfaces, list(ASCReader(path, relative_timestamp=False)), 0)
 
 
+# python-can's TRC writer gives a small 29-bit identifier fewer than the format's eight digits.
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
-@given(st.lists(messages(fd_too=False), min_size=1, max_size=30), st.booleans())
+@given(st.lists(messages(fd_too=False, least_extended=0x10000000), min_size=1, max_size=30), st.booleans())
 def test_trc_is_what_python_can_reads(tmp_path: Path, sent: list[can.Message], old: bool) -> None:
     path = tmp_path / "drive.trc"
     with TRCWriter(path) as writer:
