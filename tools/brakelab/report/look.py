@@ -90,7 +90,7 @@ def new_figure(x_label: str, y_label: str, height: int = 225, **options: Any) ->
 
 
 def free_figure(x_label: str, y_label: str, height: int = 300, **options: Any) -> Any:
-    """Return an empty figure of no other's range: it is moved and zoomed both ways."""
+    """Return an empty figure of no other's range: it is moved and zoomed along both axes."""
     tools = "pan,box_zoom,reset,save"
     return new_figure(x_label, y_label, height, tools=tools, active_drag="box_zoom", **options)
 
